@@ -1,0 +1,1 @@
+//! Contact manifolds, force models, the god-object and the force guard

@@ -1,0 +1,1 @@
+//! A tool against moving tetrahedra: broad phases, narrow phase, response

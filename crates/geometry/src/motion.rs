@@ -1,0 +1,109 @@
+//! How a tool moves and what pushes it: twist, wrench, tool state.
+
+use crate::{Pose, Vec3};
+
+/// Velocity of a rigid body, world axes, at the tool's origin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Twist {
+    /// Linear velocity, mm/ms.
+    pub linear: Vec3,
+    /// Angular velocity, rad/ms.
+    pub angular: Vec3,
+}
+
+/// Force and torque on a rigid body, world axes, at the tool's origin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// Force, N.
+    pub force: Vec3,
+    /// Torque, N mm.
+    pub torque: Vec3,
+}
+
+impl Wrench {
+    /// No force, no torque.
+    pub const ZERO: Self = Self { force: Vec3::ZERO, torque: Vec3::ZERO };
+
+    /// Whether all six numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        self.force.is_finite() && self.torque.is_finite()
+    }
+}
+
+impl core::ops::Add for Wrench {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self { force: self.force + other.force, torque: self.torque + other.torque }
+    }
+}
+
+/// Pressed buttons, one bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Buttons(pub u32);
+
+impl Buttons {
+    /// The drill's foot pedal.
+    pub const PEDAL: Self = Self(1);
+    /// Ask for the next tool.
+    pub const NEXT_TOOL: Self = Self(2);
+
+    /// Whether every button of `other` is pressed.
+    pub fn has(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+}
+
+/// The tool at one instant, in world space.
+#[derive(Clone, Copy, Debug)]
+pub struct ToolState {
+    /// Where the tool frame is: origin at the centre of the tip, +z along the shaft, away from the patient.
+    pub world_from_tool: Pose,
+    /// How it moves.
+    pub twist: Twist,
+    /// What the user presses.
+    pub buttons: Buttons,
+    /// When this was sensed, ms since the session began.
+    pub time_ms: f64,
+}
+
+impl ToolState {
+    /// A tool at rest.
+    pub fn at(world_from_tool: Pose) -> Self {
+        Self { world_from_tool, twist: Twist::default(), buttons: Buttons::default(), time_ms: 0.0 }
+    }
+
+    /// Centre of the tip, world mm.
+    pub fn tip(&self) -> Vec3 {
+        self.world_from_tool.translation
+    }
+
+    /// Whether pose and velocity are all finite and the rotation is a unit quaternion to 1e-3.
+    pub fn is_finite(&self) -> bool {
+        let pose = &self.world_from_tool;
+        pose.translation.is_finite()
+            && pose.rotation.is_finite()
+            && (pose.rotation.length_squared() - 1.0).abs() < 1e-3
+            && self.twist.linear.is_finite()
+            && self.twist.angular.is_finite()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_nan_pose_is_noticed() {
+        let mut tool = ToolState::at(Pose::from_translation(Vec3::ONE));
+        assert!(tool.is_finite());
+        tool.world_from_tool.translation.y = f32::NAN;
+        assert!(!tool.is_finite());
+    }
+
+    #[test]
+    fn buttons_combine() {
+        let both = Buttons(3);
+        assert!(both.has(Buttons::PEDAL) && both.has(Buttons::NEXT_TOOL));
+        assert!(!Buttons::PEDAL.has(Buttons(3)));
+    }
+}

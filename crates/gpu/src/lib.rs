@@ -1,0 +1,1 @@
+//! A thin layer over wgpu: device, buffers, textures, kernels, passes, timing, readback

@@ -1,0 +1,1 @@
+//! Haptic devices: scripted, replayed, mouse and simulated, all behind one guarded seam

@@ -1,0 +1,1 @@
+//! Tetrahedra and triangles: topology, quality, files, and tetrahedra from a label volume

@@ -1,0 +1,1 @@
+//! A point shell against voxel bone, with drilling

@@ -1,0 +1,1 @@
+//! Threads, clocks, phases, warnings, scores and reports of the three simulators

@@ -1,0 +1,1 @@
+//! Total Lagrangian Explicit Dynamics for soft tissue

@@ -1,0 +1,1 @@
+//! Scenes with known truth, error measures, speed-accuracy rows and stability maps

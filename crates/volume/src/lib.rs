@@ -1,0 +1,1 @@
+//! Voxel volumes with patient orientation: files in, resampling, masks, distance fields, carving

@@ -1,0 +1,1 @@
+//! The optimal voxel size: cost function, calibration, prediction

@@ -1,0 +1,1 @@
+//! Trepan's WGSL shaders as strings
