@@ -1,1 +1,5 @@
-//! Tetrahedra and triangles: topology, quality, files, and tetrahedra from a label volume
+//! Tetrahedral and triangle meshes.
+
+mod tets;
+
+pub use tets::{FACES, OPPOSITE, TetMesh};

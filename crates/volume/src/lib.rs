@@ -1,1 +1,7 @@
-//! Voxel volumes with patient orientation: files in, resampling, masks, distance fields, carving
+//! Voxel volumes with patient orientation.
+
+mod bone;
+mod volume;
+
+pub use bone::{AIR_HU, BRICK, BoneError, BoneVolume};
+pub use volume::VoxelVolume;

@@ -1,0 +1,239 @@
+//! The skull while it is being drilled: one writer, any number of readers, no locks.
+//!
+//! # Theory
+//! Densities live in a flat grid of atomics, so the haptic tick can take bone away while the picture and the distance field read.
+//! Each brick of 8³ voxels has a version that goes up after a write. A reader keeps the versions that it has seen and
+//! so finds what changed since, however late it looks: there is no queue that could overflow.
+//!
+//! ```text
+//! writer: store density (relaxed) → version += 1 (release)
+//! reader: load version (acquire) → load densities (relaxed)    a newer density than the version is only looked at again
+//! ```
+//!
+//! # Practice
+//! World is patient RAS+ mm; the grid is axis-aligned and isotropic (the import resamples), so a world point costs three
+//! multiply-adds. 2 bytes a voxel, 4 bytes a brick. Exactly one thread may write at a time; that is the caller's to keep.
+//!
+//! # When not to use it
+//! For volumes that do not change: [`VoxelVolume`] is plainer.
+
+use crate::VoxelVolume;
+use glam::{DVec3, IVec3};
+use std::sync::atomic::{AtomicI16, AtomicU32, Ordering};
+use trepan_geometry::{Aabb, Vec3};
+
+/// Edge of a brick in voxels.
+pub const BRICK: usize = 8;
+
+/// Density of air, HU: what is outside the grid and what is left after drilling.
+pub const AIR_HU: i16 = -1000;
+
+/// A grid of densities in HU that one thread carves and others read.
+#[derive(Debug)]
+pub struct BoneVolume {
+    dims: [usize; 3],
+    origin: Vec3,
+    spacing_mm: f32,
+    isovalue: i16,
+    bounds: Aabb,
+    hu: Vec<AtomicI16>,
+    bricks: [usize; 3],
+    versions: Vec<AtomicU32>,
+}
+
+/// Why a volume cannot be carved.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum BoneError {
+    /// The grid is oblique, mirrored or anisotropic.
+    #[error("the bone grid must be axis-aligned with cubic voxels, but its affine is {0}; resample it first")]
+    Grid(String),
+    /// Nothing reaches the isovalue.
+    #[error("no voxel reaches {0} HU, so there is no bone; give a lower isovalue or another CT")]
+    Empty(i16),
+}
+
+impl BoneVolume {
+    /// Takes densities over. `isovalue` in HU: a voxel at or over it is bone.
+    pub fn new(volume: &VoxelVolume<i16>, isovalue: i16) -> Result<Self, BoneError> {
+        let spacing = volume.spacing_mm().x;
+        let scale = volume.world_from_voxel.matrix3;
+        if !scale.abs_diff_eq(glam::DMat3::from_diagonal(DVec3::splat(spacing)), 1e-6 * spacing) {
+            return Err(BoneError::Grid(format!("{scale:?}")));
+        }
+        let bricks = volume.dims.map(|n| n.div_ceil(BRICK));
+        let mut bone = Self {
+            dims: volume.dims,
+            origin: volume.world_from_voxel.translation.as_vec3(),
+            spacing_mm: spacing as f32,
+            isovalue,
+            bounds: Aabb::EMPTY,
+            hu: volume.data.iter().map(|&v| AtomicI16::new(v)).collect(),
+            bricks,
+            versions: (0..bricks.iter().product()).map(|_| AtomicU32::new(0)).collect(),
+        };
+        bone.bounds = bone.bone_box().ok_or(BoneError::Empty(isovalue))?;
+        Ok(bone)
+    }
+
+    fn bone_box(&self) -> Option<Aabb> {
+        let voxels = self.hu.iter().enumerate().filter(|(_, v)| v.load(Ordering::Relaxed) >= self.isovalue);
+        let [nx, ny, _] = self.dims;
+        let (mut low, mut high) = (IVec3::MAX, IVec3::MIN);
+        for (at, _) in voxels {
+            let voxel = IVec3::new((at % nx) as i32, (at / nx % ny) as i32, (at / (nx * ny)) as i32);
+            (low, high) = (low.min(voxel), high.max(voxel));
+        }
+        let half = Vec3::splat(0.5 * self.spacing_mm);
+        (low.x <= high.x).then(|| Aabb { min: self.centre_of(low) - half, max: self.centre_of(high) + half })
+    }
+
+    /// Voxels along x, y, z.
+    pub fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    /// Edge of a voxel, mm.
+    pub fn spacing_mm(&self) -> f32 {
+        self.spacing_mm
+    }
+
+    /// Volume of a voxel, mm³.
+    pub fn voxel_mm3(&self) -> f32 {
+        self.spacing_mm.powi(3)
+    }
+
+    /// World centre of voxel (0, 0, 0), mm.
+    pub fn origin(&self) -> Vec3 {
+        self.origin
+    }
+
+    /// The threshold in HU; at or over it a voxel is bone.
+    pub fn isovalue(&self) -> i16 {
+        self.isovalue
+    }
+
+    /// World box of what was bone at the start, mm.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// The voxel that holds a world point (perhaps outside the grid).
+    pub fn voxel_of(&self, point: Vec3) -> IVec3 {
+        self.grid_of(point).round().as_ivec3()
+    }
+
+    /// Continuous grid coordinates of a world point: voxel centres are at whole numbers.
+    pub fn grid_of(&self, point: Vec3) -> Vec3 {
+        (point - self.origin) / self.spacing_mm
+    }
+
+    /// World centre of a voxel, mm.
+    pub fn centre_of(&self, voxel: IVec3) -> Vec3 {
+        self.origin + self.spacing_mm * voxel.as_vec3()
+    }
+
+    fn index(&self, voxel: IVec3) -> Option<usize> {
+        let [nx, ny, nz] = self.dims;
+        let inside = voxel.cmpge(IVec3::ZERO).all() && voxel.cmplt(IVec3::new(nx as i32, ny as i32, nz as i32)).all();
+        inside.then(|| voxel.x as usize + nx * (voxel.y as usize + ny * voxel.z as usize))
+    }
+
+    /// Density of a voxel, HU; [`AIR_HU`] outside the grid.
+    pub fn hu(&self, voxel: IVec3) -> i16 {
+        self.index(voxel).map_or(AIR_HU, |at| self.hu[at].load(Ordering::Relaxed))
+    }
+
+    /// Whether a voxel is bone.
+    pub fn is_bone(&self, voxel: IVec3) -> bool {
+        self.hu(voxel) >= self.isovalue
+    }
+
+    /// Sets the density of a voxel, HU; does nothing outside the grid. For the one writer only.
+    pub fn set_hu(&self, voxel: IVec3, hu: i16) {
+        if let Some(at) = self.index(voxel) {
+            self.hu[at].store(hu, Ordering::Relaxed);
+            let [bx, by, _] = self.bricks;
+            let b = voxel.as_uvec3() / BRICK as u32;
+            self.versions[b.x as usize + bx * (b.y as usize + by * b.z as usize)].fetch_add(1, Ordering::Release);
+        }
+    }
+
+    /// Bricks along x, y, z; brick (0, 0, 0) starts at voxel (0, 0, 0).
+    pub fn bricks(&self) -> [usize; 3] {
+        self.bricks
+    }
+
+    /// A reader's memory of what it has seen, for [`changed`](Self::changed): everything so far counts as seen.
+    pub fn seen(&self) -> Vec<u32> {
+        self.versions.iter().map(|v| v.load(Ordering::Acquire)).collect()
+    }
+
+    /// Calls `visit` with the coordinates of up to `limit` bricks that changed since `seen`, and marks them seen. Returns how many were left.
+    ///
+    /// Cost: one load and compare per brick; no allocation. The rest comes with the next call.
+    pub fn changed(&self, seen: &mut [u32], limit: usize, mut visit: impl FnMut([usize; 3])) -> usize {
+        let [bx, by, _] = self.bricks;
+        let mut found = 0;
+        for (at, (version, seen)) in self.versions.iter().zip(seen).enumerate() {
+            let now = version.load(Ordering::Acquire);
+            if now != *seen {
+                found += 1;
+                if found <= limit {
+                    *seen = now;
+                    visit([at % bx, at / bx % by, at / (bx * by)]);
+                }
+            }
+        }
+        found.saturating_sub(limit)
+    }
+
+    /// A copy of the densities as they are now, HU.
+    pub fn snapshot(&self) -> VoxelVolume<i16> {
+        let mut volume = VoxelVolume::isotropic(self.dims, self.origin, self.spacing_mm, AIR_HU);
+        volume.data.iter_mut().zip(&self.hu).for_each(|(to, from)| *to = from.load(Ordering::Relaxed));
+        volume
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ball() -> VoxelVolume<i16> {
+        let mut volume = VoxelVolume::isotropic([20, 18, 17], Vec3::new(-9.0, 4.0, 1.0), 0.5, AIR_HU);
+        for k in 4..10 {
+            for j in 3..9 {
+                for i in 5..12 {
+                    let at = volume.index([i, j, k]);
+                    volume.data[at] = 900;
+                }
+            }
+        }
+        volume
+    }
+
+    #[test]
+    fn a_late_reader_still_finds_every_change() {
+        let bone = BoneVolume::new(&ball(), 400).unwrap();
+        let mut seen = bone.seen();
+        bone.set_hu(IVec3::new(5, 3, 4), AIR_HU);
+        bone.set_hu(IVec3::new(11, 8, 9), AIR_HU);
+        bone.set_hu(IVec3::new(-1, 0, 0), 5);
+        let mut found = Vec::new();
+        assert_eq!(bone.changed(&mut seen, 1, |b| found.push(b)), 1);
+        assert_eq!(bone.changed(&mut seen, 9, |b| found.push(b)), 0);
+        assert_eq!(found, [[0, 0, 0], [1, 1, 1]]);
+        assert_eq!(bone.changed(&mut seen, 9, |_| panic!("seen")), 0);
+        assert_eq!(bone.snapshot().get([5, 3, 4]), Some(AIR_HU));
+    }
+
+    #[test]
+    fn points_and_voxels_agree_and_bounds_hold_the_bone() {
+        let bone = BoneVolume::new(&ball(), 400).unwrap();
+        let voxel = IVec3::new(7, 5, 9);
+        assert_eq!(bone.voxel_of(bone.centre_of(voxel) + Vec3::splat(0.24)), voxel);
+        assert_eq!(bone.bounds().min, Vec3::new(-9.0 + 4.5 * 0.5, 4.0 + 2.5 * 0.5, 1.0 + 3.5 * 0.5));
+        assert_eq!(bone.hu(IVec3::new(0, 0, 40)), AIR_HU);
+        assert_eq!(BoneVolume::new(&ball(), 1000).unwrap_err(), BoneError::Empty(1000));
+    }
+}

@@ -1,0 +1,66 @@
+//! A box of samples with its place in the patient: the form in which every image travels.
+
+use glam::{DAffine3, DVec3};
+use trepan_geometry::Vec3;
+
+/// Samples on a regular grid, x fastest, with the affine that puts voxel indices into patient RAS+ mm.
+///
+/// Voxel `(i, j, k)` has its **centre** at `world_from_voxel · (i, j, k)`; the affine may be oblique, anisotropic or mirrored.
+/// Invariant: `data.len() = dims.x · dims.y · dims.z`, the affine is finite and invertible (readers refuse the rest).
+#[derive(Clone, Debug, PartialEq)]
+pub struct VoxelVolume<T> {
+    /// Voxels along i, j, k.
+    pub dims: [usize; 3],
+    /// Samples, `data[i + dims[0] * (j + dims[1] * k)]`.
+    pub data: Vec<T>,
+    /// RAS+ mm from voxel indices.
+    pub world_from_voxel: DAffine3,
+}
+
+impl<T: Copy> VoxelVolume<T> {
+    /// A volume of one value.
+    pub fn filled(dims: [usize; 3], world_from_voxel: DAffine3, value: T) -> Self {
+        Self { dims, data: vec![value; dims.iter().product()], world_from_voxel }
+    }
+
+    /// An axis-aligned isotropic volume with voxel (0, 0, 0) centred at `origin`.
+    pub fn isotropic(dims: [usize; 3], origin: Vec3, spacing_mm: f32, value: T) -> Self {
+        let affine = DAffine3::from_translation(origin.as_dvec3()) * DAffine3::from_scale(DVec3::splat(spacing_mm.into()));
+        Self::filled(dims, affine, value)
+    }
+
+    /// Place of a voxel in `data`.
+    pub fn index(&self, [i, j, k]: [usize; 3]) -> usize {
+        i + self.dims[0] * (j + self.dims[1] * k)
+    }
+
+    /// The sample of a voxel; `None` outside.
+    pub fn get(&self, voxel: [usize; 3]) -> Option<T> {
+        voxel.iter().zip(self.dims).all(|(&v, n)| v < n).then(|| self.data[self.index(voxel)])
+    }
+
+    /// The same grid with other samples.
+    pub fn map<U>(&self, f: impl Fn(T) -> U) -> VoxelVolume<U> {
+        VoxelVolume {
+            dims: self.dims,
+            data: self.data.iter().map(|&v| f(v)).collect(),
+            world_from_voxel: self.world_from_voxel,
+        }
+    }
+
+    /// Edge lengths of a voxel along i, j, k, mm.
+    pub fn spacing_mm(&self) -> DVec3 {
+        let m = self.world_from_voxel.matrix3;
+        DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length())
+    }
+
+    /// Volume of one voxel, mm³.
+    pub fn voxel_mm3(&self) -> f64 {
+        self.world_from_voxel.matrix3.determinant().abs()
+    }
+
+    /// World centre of a voxel, mm.
+    pub fn centre_of(&self, voxel: [usize; 3]) -> DVec3 {
+        self.world_from_voxel.transform_point3(DVec3::new(voxel[0] as f64, voxel[1] as f64, voxel[2] as f64))
+    }
+}
