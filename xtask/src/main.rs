@@ -1,1 +1,109 @@
-fn main() {}
+//! The project's own commands: `cargo xtask test | validate | layers | tidy`.
+
+mod layers;
+mod operation;
+mod tidy;
+
+use anyhow::{Context, Result, bail};
+use clap::{Parser, Subcommand};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+#[derive(Parser)]
+#[command(about = "Trepan's project commands", max_term_width = 120)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Everything that CI runs: fmt, layers, tidy, clippy, a short headless operation, tests, doc tests, docs
+    Test,
+    /// Run validation suites in release mode; writes SUITE.json and index.html
+    Validate {
+        /// Passed on: [SUITE] [--quick] [--shard I/N] [--out DIR]
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
+    /// Check that every arrow between crates points down and that each crate does only what is its to do
+    Layers,
+    /// Check module docs, file lengths, READMEs, examples, shader and Rust pairs
+    Tidy,
+}
+
+fn main() -> Result<()> {
+    match Arguments::parse().command {
+        Task::Test => test(),
+        Task::Validate { arguments } => {
+            cargo(&["run", "--release", "--quiet", "--package", "trepan-trials", "--bin", "validate", "--"], &arguments)
+        }
+        Task::Layers => report("layers", layers::check(&root())?),
+        Task::Tidy => report("tidy", tidy::check(&root())?),
+    }
+}
+
+/// The steps of CI in the order in which they fail fastest.
+fn test() -> Result<()> {
+    cargo(&["fmt", "--all", "--check"], &[])?;
+    report("layers", layers::check(&root())?)?;
+    report("tidy", tidy::check(&root())?)?;
+    cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"], &[])?;
+    operation::check(&root())?;
+    tests()?;
+    cargo(&["test", "--workspace", "--doc", "--quiet"], &[])?;
+    documentation()?;
+    println!("xtask test: all passed");
+    Ok(())
+}
+
+/// Nextest where it is installed, for its timeouts and its clear failures; else cargo's own runner.
+fn tests() -> Result<()> {
+    let nextest = Command::new("cargo").args(["nextest", "--version"]).output().is_ok_and(|out| out.status.success());
+    if nextest {
+        cargo(&["nextest", "run", "--workspace", "--all-targets", "--no-fail-fast", "--status-level", "slow"], &[])
+    } else {
+        cargo(&["test", "--workspace", "--all-targets", "--quiet"], &[])
+    }
+}
+
+fn documentation() -> Result<()> {
+    println!("xtask: cargo doc");
+    let status = Command::new("cargo")
+        .args(["doc", "--workspace", "--no-deps", "--quiet"])
+        .env("RUSTDOCFLAGS", "--deny warnings")
+        .current_dir(root())
+        .status()
+        .context("cannot start cargo doc")?;
+    if !status.success() {
+        bail!("cargo doc failed");
+    }
+    Ok(())
+}
+
+fn cargo(arguments: &[&str], more: &[String]) -> Result<()> {
+    println!("xtask: cargo {} {}", arguments.join(" "), more.join(" "));
+    let status = Command::new("cargo")
+        .args(arguments)
+        .args(more)
+        .current_dir(root())
+        .status()
+        .with_context(|| format!("cannot start cargo {}", arguments[0]))?;
+    if !status.success() {
+        bail!("cargo {} failed", arguments[0]);
+    }
+    Ok(())
+}
+
+fn report(name: &str, faults: Vec<String>) -> Result<()> {
+    if faults.is_empty() {
+        println!("xtask {name}: clean");
+        return Ok(());
+    }
+    faults.iter().for_each(|fault| eprintln!("{name}: {fault}"));
+    bail!("{} fault(s) in {name}", faults.len());
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies in the workspace").to_path_buf()
+}

@@ -1,0 +1,147 @@
+//! Checks the floors of the crates and what each crate keeps away from.
+//!
+//! A crate may use only crates on lower floors, and inside floors 1 and 2 the two arrows that the map names. Some
+//! packages and some parts of the standard library belong to a few crates only.
+
+use anyhow::{Context, Result};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Crates by floor, lowest first.
+const FLOORS: [&[&str]; 6] = [
+    &["geometry", "shaders", "fixtures"],
+    &["volume", "mesh", "contact", "gpu"],
+    &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
+    &["voxel-size", "budget"],
+    &["simulator", "trials"],
+    &["craniotomy", "brain", "integrated"],
+];
+
+/// Arrows within one floor, from user to used.
+const SIDEWAYS: [(&str, &str); 2] = [("mesh", "volume"), ("tled", "soft")];
+
+/// Packages that only some crates may depend on.
+const KEPT: [(&str, &[&str]); 8] = [
+    ("wgpu", &["gpu"]),
+    ("eframe", &["render"]),
+    ("mcap", &["link"]),
+    ("iceoryx2", &["link"]),
+    ("clap", &["simulator", "trials"]),
+    ("tracing", &["simulator", "craniotomy", "brain", "integrated"]),
+    ("anyhow", &["simulator", "craniotomy", "brain", "integrated", "trials"]),
+    ("trepan-trials", &[]),
+];
+
+/// Words in the sources that only some crates may use (tests and examples are free).
+const WORDS: [(&str, &[&str]); 6] = [
+    ("Instant::now", &["simulator", "trials", "gpu", "render"]),
+    ("SystemTime", &["simulator", "trials"]),
+    ("thread::sleep", &["simulator", "trials"]),
+    ("thread::spawn", &["simulator", "trials", "tled", "haptics"]),
+    ("std::fs", &["volume", "mesh", "link", "haptics", "render", "simulator", "trials"]),
+    ("unsafe {", &["haptics", "tled", "simulator"]),
+];
+
+/// All faults found, each one line.
+pub fn check(root: &Path) -> Result<Vec<String>> {
+    let out = Command::new("cargo")
+        .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
+        .current_dir(root)
+        .output()
+        .context("cannot run cargo metadata")?;
+    let metadata: Value = serde_json::from_slice(&out.stdout).context("cargo metadata gave no JSON")?;
+    let mut faults = Vec::new();
+    for package in metadata["packages"].as_array().into_iter().flatten() {
+        let name = short(package["name"].as_str().unwrap_or_default());
+        if name == "xtask" {
+            continue;
+        }
+        let Some(floor) = floor_of(name) else {
+            faults.push(format!("{name} stands on no floor: add it to the map in xtask/src/layers.rs"));
+            continue;
+        };
+        for dependency in package["dependencies"].as_array().into_iter().flatten() {
+            let dev = dependency["kind"].as_str() == Some("dev");
+            faults.extend(arrow(name, floor, dependency["name"].as_str().unwrap_or_default(), dev));
+        }
+        let manifest = PathBuf::from(package["manifest_path"].as_str().unwrap_or_default());
+        faults.extend(words(name, &manifest.with_file_name("src"))?);
+    }
+    Ok(faults)
+}
+
+fn short(package: &str) -> &str {
+    package.strip_prefix("trepan-").unwrap_or(package)
+}
+
+fn floor_of(name: &str) -> Option<usize> {
+    FLOORS.iter().position(|floor| floor.contains(&name))
+}
+
+fn arrow(name: &str, floor: usize, dependency: &str, dev: bool) -> Option<String> {
+    if let Some((_, users)) = KEPT.iter().find(|(kept, _)| *kept == dependency)
+        && !users.contains(&name)
+        && !dev
+    {
+        return Some(format!("{name} depends on {dependency}, which is kept to {users:?}"));
+    }
+    let used = dependency.strip_prefix("trepan-")?;
+    let below = floor_of(used).is_some_and(|f| f < floor) || SIDEWAYS.contains(&(name, used));
+    (!below).then(|| format!("{name} (floor {floor}) uses {used}, which is not on a lower floor"))
+}
+
+fn words(name: &str, folder: &Path) -> Result<Vec<String>> {
+    let mut faults = Vec::new();
+    for file in rust_files(folder)? {
+        let text = fs::read_to_string(&file)?;
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        for (number, line) in code.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//")) {
+            let stray = WORDS.iter().filter(|(word, users)| line.contains(word) && !users.contains(&name));
+            faults.extend(
+                stray.map(|(word, users)| format!("{}:{}: `{word}` is kept to {users:?}", file.display(), number + 1)),
+            );
+        }
+    }
+    Ok(faults)
+}
+
+/// Every `.rs` file under a folder, sorted.
+pub fn rust_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    files(folder, "rs")
+}
+
+/// Every file with an extension under a folder, sorted; none when the folder is missing.
+pub fn files(folder: &Path, extension: &str) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(next) = folders.pop().filter(|f| f.is_dir()) {
+        for entry in fs::read_dir(&next).with_context(|| format!("cannot list {}", next.display()))? {
+            let path = entry?.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == extension) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arrow_up_or_sideways_is_a_fault() {
+        assert!(arrow("mesh", 1, "trepan-rigid", false).is_some());
+        assert!(arrow("rigid", 2, "trepan-soft", false).is_some());
+        assert!(arrow("link", 2, "wgpu", false).is_some());
+        assert!(arrow("tled", 2, "trepan-soft", false).is_none());
+        assert!(arrow("rigid", 2, "trepan-volume", false).is_none());
+        assert!(arrow("simulator", 4, "trepan-trials", false).is_some());
+        assert!(arrow("gpu", 1, "wgpu", false).is_none());
+    }
+}

@@ -1,0 +1,57 @@
+//! A short headless operation of the integrated simulator, judged by its `summary.json`.
+
+use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
+use std::path::Path;
+
+/// Fields that every summary has, as paths.
+const FIELDS: [&str; 24] = [
+    "/case",
+    "/device",
+    "/phases",
+    "/ticks",
+    "/rate_hz",
+    "/late_ticks",
+    "/held_ticks",
+    "/tick_us/p50",
+    "/tick_us/p99",
+    "/tick_us/p999",
+    "/tick_us/max",
+    "/solver/name",
+    "/solver/tets",
+    "/solver/dt_ms",
+    "/solver/step_us",
+    "/solver/real_time_factor",
+    "/force_n/max",
+    "/force_n/max_step",
+    "/bone_removed_mm3",
+    "/warnings",
+    "/scores",
+    "/frames",
+    "/fps",
+    "/machine",
+];
+
+/// Runs the operation in the profile of the tests and checks what must hold on any machine.
+pub fn check(root: &Path) -> Result<()> {
+    let out = root.join("target/xtask-operation");
+    let out_text = out.display().to_string();
+    let arguments = ["--headless", "--duration", "8", "--out", &out_text];
+    crate::cargo(&["run", "--quiet", "--bin", "integrated", "--"], &arguments.map(String::from))?;
+    let text = std::fs::read_to_string(out.join("summary.json")).context("the operation left no summary.json")?;
+    let summary: Value = serde_json::from_str(&text).context("summary.json is not JSON")?;
+    for field in FIELDS {
+        ensure!(summary.pointer(field).is_some_and(|v| !v.is_null()), "summary.json lacks {field}");
+    }
+    let number = |field: &str| summary.pointer(field).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    ensure!(number("/bone_removed_mm3") > 0.0, "the operation removed no bone");
+    ensure!(number("/force_n/max") <= 3.3 + 1e-6, "a force over the device's limit: {} N", number("/force_n/max"));
+    ensure!(number("/ticks") > 0.0, "no tick ran");
+    for file in ["report.html", "session.mcap", "drilled.nii.gz"] {
+        if !out.join(file).is_file() {
+            bail!("the operation left no {file}");
+        }
+    }
+    println!("xtask: a headless operation ran and its summary holds");
+    Ok(())
+}
