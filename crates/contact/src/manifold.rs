@@ -48,6 +48,20 @@ impl Default for ContactManifold {
 }
 
 impl ContactManifold {
+    /// A manifold of one contact, which is its aggregate too.
+    pub fn single(contact: Contact) -> Self {
+        let mut manifold = Self::default();
+        manifold.set_single(contact);
+        manifold
+    }
+
+    /// Makes this a manifold of one contact, without touching the whole list.
+    pub fn set_single(&mut self, contact: Contact) {
+        self.clear();
+        self.push(contact);
+        (self.normal, self.depth_mm, self.point) = (contact.normal, contact.depth_mm, contact.point);
+    }
+
     /// Forgets everything, without touching the whole list.
     pub fn clear(&mut self) {
         (self.normal, self.depth_mm, self.point) = (Vec3::ZERO, 0.0, Vec3::ZERO);
