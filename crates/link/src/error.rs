@@ -1,0 +1,54 @@
+//! What can go wrong with a recording, with the file's name and what to do.
+
+use std::path::PathBuf;
+
+/// A recording could not be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// The file could not be made.
+    #[error("cannot create the recording {}: {source}; choose a folder that exists and that you may write to", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Writing failed part way. Every later call fails too; what was flushed before stays readable.
+    #[error("cannot write to the recording {}: {reason}; free some disk space or record elsewhere; what was flushed before can still be opened", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The file could not be read at all.
+    #[error("cannot read the recording {}: {source}; check the name and the rights to read it", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is not an MCAP file.
+    #[error("{} is not a recording: it does not begin as an MCAP file does; give a file that --record wrote", path.display())]
+    NotARecording {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file ends, or is damaged, before the session header.
+    #[error("{} holds no session header: it was cut in its first bytes or another program wrote it; give a file that --record wrote", path.display())]
+    NoHeader {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file was made by a later version.
+    #[error("{} has recording format {found}, this program reads up to {known}; open it with a newer version", path.display())]
+    TooNew {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        found: u32,
+        /// The newest format that this version reads.
+        known: u32,
+    },
+}

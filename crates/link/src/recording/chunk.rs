@@ -1,0 +1,49 @@
+//! Unpacks one chunk, checks its checksum, and hands out its records.
+
+use super::scan::{Cursor, Record};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+/// Largest chunk that is read, unpacked; ours have 256 KiB and one record more.
+const MAX_CHUNK_BYTES: u64 = 16 << 20;
+
+/// Bytes that all chunks of a file of `length` bytes may unpack to: recordings shrink about threefold under LZ4, whose
+/// format allows 255-fold.
+pub(super) fn budget(length: usize) -> u64 {
+    (length as u64).saturating_mul(32).max(MAX_CHUNK_BYTES)
+}
+
+/// Calls `each` with opcode and body of the records in a chunk. `None` when anything is wrong; `each` may have been
+/// called by then.
+pub(super) fn unpack(
+    chunk: &Record<'_>,
+    budget: &mut u64,
+    mut each: impl FnMut(u8, &[u8]) -> Option<()>,
+) -> Option<()> {
+    let size = Cursor(chunk.body).chunk_size()?;
+    if size > MAX_CHUNK_BYTES {
+        return None;
+    }
+    *budget = budget.checked_sub(size)?;
+
+    let mut reader = LinearReader::new_with_options(
+        LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_validate_chunk_crcs(true)
+            .with_record_length_limit(MAX_CHUNK_BYTES as usize),
+    );
+    let mut packed = chunk.whole;
+    while let Some(event) = reader.next_event() {
+        match event.ok()? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let count = wanted.min(packed.len());
+                let (now, later) = packed.split_at(count);
+                reader.insert(count).copy_from_slice(now);
+                reader.notify_read(count);
+                packed = later;
+            }
+            LinearReadEvent::Record { data, opcode } => each(opcode, data)?,
+        }
+    }
+    Some(())
+}

@@ -1,0 +1,132 @@
+//! MCAP's record layouts, read with every length checked.
+//!
+//! # Sources
+//! <https://mcap.dev/spec#records>. The `mcap` crate has these parsers too, but some of them trust lengths.
+
+use super::Recording;
+use crate::protobuf::{Fields, decode};
+use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TickRecord};
+
+/// Bytes not yet read.
+#[derive(Clone, Copy)]
+pub(super) struct Cursor<'a>(pub &'a [u8]);
+
+/// A record as it lies in the file.
+pub(super) struct Record<'a> {
+    pub opcode: u8,
+    pub body: &'a [u8],
+    /// Opcode, length and body.
+    pub whole: &'a [u8],
+}
+
+/// What the messages of a channel are.
+#[derive(Clone, Copy, Default)]
+pub(super) enum Topic {
+    Tick,
+    Collision,
+    Solver,
+    Event,
+    /// Nothing that a session is made of.
+    #[default]
+    Other,
+}
+
+impl Topic {
+    fn of_schema(name: &str) -> Self {
+        match name {
+            TickRecord::NAME => Self::Tick,
+            CollisionRecord::NAME => Self::Collision,
+            SolverRecord::NAME => Self::Solver,
+            EventRecord::NAME => Self::Event,
+            _ => Self::Other,
+        }
+    }
+
+    pub(super) fn read_into(self, message: &[u8], recording: &mut Recording) -> Option<()> {
+        match self {
+            Self::Tick => recording.ticks.push(decode(message)?),
+            Self::Collision => recording.collisions.push(decode(message)?),
+            Self::Solver => recording.solver.push(decode(message)?),
+            Self::Event => recording.events.push(decode(message)?),
+            Self::Other => {}
+        }
+        Some(())
+    }
+}
+
+impl<'a> Cursor<'a> {
+    pub(super) fn record(&mut self) -> Option<Record<'a>> {
+        let start = self.0;
+        let opcode = self.u8()?;
+        let length = usize::try_from(self.u64()?).ok()?;
+        let body = self.take(length)?;
+        Some(Record { opcode, body, whole: &start[..start.len() - self.0.len()] })
+    }
+
+    /// Id and meaning of a schema.
+    pub(super) fn schema(mut self) -> Option<(u16, Topic)> {
+        let id = self.u16()?;
+        Some((id, Topic::of_schema(self.text()?)))
+    }
+
+    /// Id of a channel and of its schema.
+    pub(super) fn channel(mut self) -> Option<(u16, u16)> {
+        Some((self.u16()?, self.u16()?))
+    }
+
+    /// Channel of a message, and its data.
+    pub(super) fn message(mut self) -> Option<(u16, &'a [u8])> {
+        let channel = self.u16()?;
+        let (_sequence, _log_time, _publish_time) = (self.u32()?, self.u64()?, self.u64()?);
+        Some((channel, self.0))
+    }
+
+    /// Name of a metadata record, and its entries.
+    pub(super) fn metadata(mut self) -> Option<(&'a str, Vec<(&'a str, &'a str)>)> {
+        let name = self.text()?;
+        let length = usize::try_from(self.u32()?).ok()?;
+        let mut map = Cursor(self.take(length)?);
+        let mut entries = Vec::new();
+        while !map.0.is_empty() {
+            entries.push((map.text()?, map.text()?));
+        }
+        Some((name, entries))
+    }
+
+    /// Unpacked size that a chunk claims.
+    pub(super) fn chunk_size(mut self) -> Option<u64> {
+        let (_start, _end) = (self.u64()?, self.u64()?);
+        self.u64()
+    }
+
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (head, tail) = self.0.split_at_checked(count)?;
+        self.0 = tail;
+        Some(head)
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        self.take(N)?.try_into().ok()
+    }
+
+    fn u8(&mut self) -> Option<u8> {
+        self.array().map(u8::from_le_bytes)
+    }
+
+    fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    fn text(&mut self) -> Option<&'a str> {
+        let length = usize::try_from(self.u32()?).ok()?;
+        str::from_utf8(self.take(length)?).ok()
+    }
+}
