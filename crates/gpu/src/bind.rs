@@ -1,0 +1,116 @@
+//! Slots of a shader and what is bound to them.
+
+use crate::{Buffer, Gpu, GpuError, Texture};
+
+/// What a shader expects at one binding of group 0; the place in the list is the binding number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slot {
+    /// `var<uniform>`.
+    Uniform,
+    /// `var<storage, read>`.
+    Storage,
+    /// `var<storage, read_write>`.
+    StorageMut,
+    /// `texture_2d<f32>`, filtered or loaded.
+    Texture2,
+    /// `texture_2d<f32>` of a format that cannot be filtered: only loaded.
+    Loaded2,
+    /// `texture_3d<f32>`, filtered or loaded.
+    Texture3,
+    /// `texture_3d<u32>`: only loaded.
+    Integer3,
+    /// A linear `sampler`.
+    Sampler,
+}
+
+/// Something that can be bound.
+#[derive(Clone, Copy, Debug)]
+pub enum Resource<'a> {
+    /// A whole buffer.
+    Buffer(&'a wgpu::Buffer),
+    /// A whole texture.
+    Texture(&'a Texture),
+    /// Linear filtering, clamped at the edges.
+    Linear,
+}
+
+/// Resources bound to the slots of one kernel or pipeline. Resources stay alive as long as this does.
+#[derive(Clone, Debug)]
+pub struct Bindings {
+    pub(crate) group: wgpu::BindGroup,
+}
+
+impl<'a, T: bytemuck::Pod> From<&'a Buffer<T>> for Resource<'a> {
+    fn from(buffer: &'a Buffer<T>) -> Self {
+        Self::Buffer(buffer.raw())
+    }
+}
+
+impl<'a> From<&'a Texture> for Resource<'a> {
+    fn from(texture: &'a Texture) -> Self {
+        Self::Texture(texture)
+    }
+}
+
+impl Slot {
+    fn binding_type(self) -> wgpu::BindingType {
+        let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+        let texture = |sample_type, view_dimension| wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension,
+            multisampled: false,
+        };
+        let float = |filterable| wgpu::TextureSampleType::Float { filterable };
+        match self {
+            Self::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+            Self::Storage => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+            Self::StorageMut => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+            Self::Texture2 => texture(float(true), wgpu::TextureViewDimension::D2),
+            Self::Loaded2 => texture(float(false), wgpu::TextureViewDimension::D2),
+            Self::Texture3 => texture(float(true), wgpu::TextureViewDimension::D3),
+            Self::Integer3 => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D3),
+            Self::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+        }
+    }
+}
+
+/// The layout of group 0 for a list of slots.
+pub(crate) fn layout(gpu: &Gpu, label: &str, slots: &[Slot], stages: wgpu::ShaderStages) -> wgpu::BindGroupLayout {
+    let entry = |(binding, slot): (usize, &Slot)| wgpu::BindGroupLayoutEntry {
+        binding: binding as u32,
+        visibility: stages,
+        ty: slot.binding_type(),
+        count: None,
+    };
+    let entries: Vec<_> = slots.iter().enumerate().map(entry).collect();
+    gpu.device().create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+}
+
+/// Binds resources in the order of the slots.
+pub(crate) fn bind(
+    gpu: &Gpu,
+    label: &str,
+    layout: &wgpu::BindGroupLayout,
+    resources: &[Resource],
+) -> Result<Bindings, GpuError> {
+    let sampler = gpu.device().create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("linear"),
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        ..Default::default()
+    });
+    // Whether resources fit the slots is checked by wgpu's validation, which names the binding that does not.
+    let mut entries = Vec::with_capacity(resources.len());
+    for (binding, resource) in resources.iter().enumerate() {
+        let resource = match resource {
+            Resource::Buffer(buffer) => buffer.as_entire_binding(),
+            Resource::Texture(texture) => wgpu::BindingResource::TextureView(texture.view()),
+            Resource::Linear => wgpu::BindingResource::Sampler(&sampler),
+        };
+        entries.push(wgpu::BindGroupEntry { binding: binding as u32, resource });
+    }
+    let make =
+        || gpu.device().create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries });
+    let group = gpu.checked(make, |reason| GpuError::Bind { label: label.into(), reason })?;
+    Ok(Bindings { group })
+}

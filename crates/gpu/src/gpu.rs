@@ -1,0 +1,242 @@
+//! The device: which adapter, its limits, its faults.
+
+use crate::{GpuError, Recorder};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// How long a wait for the device may take before it counts as lost.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Which kind of adapter to take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Prefer {
+    /// A graphics card if there is one, else a software driver.
+    #[default]
+    Hardware,
+    /// A software driver if there is one, else a graphics card: the same pictures on every machine.
+    Software,
+}
+
+/// An open graphics device. Clones share it.
+#[derive(Clone, Debug)]
+pub struct Gpu {
+    inner: Arc<Inner>,
+}
+
+/// What the device has complained about since it was opened.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Faults {
+    /// Errors that no call returned: a mistake in how the device is used.
+    pub count: u32,
+    /// The first of them.
+    pub first: Option<String>,
+    /// Why the device is gone, if it is.
+    pub lost: Option<String>,
+}
+
+#[derive(Debug)]
+struct Inner {
+    instance: wgpu::Instance,
+    adapter: wgpu::Adapter,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    info: wgpu::AdapterInfo,
+    faults: Arc<FaultLog>,
+}
+
+#[derive(Debug, Default)]
+struct FaultLog {
+    count: AtomicU32,
+    first: Mutex<Option<String>>,
+    lost: Mutex<Option<String>>,
+}
+
+impl Gpu {
+    /// Opens the best adapter: by kind first (see [`Prefer`]), Vulkan, Metal and DX12 before GL.
+    pub fn open(prefer: Prefer) -> Result<Self, GpuError> {
+        match Self::open_on(prefer, wgpu::Backends::PRIMARY) {
+            Err(GpuError::NoAdapter) => Self::open_on(prefer, wgpu::Backends::GL),
+            opened => opened,
+        }
+    }
+
+    /// Opens the best adapter of some backends only.
+    fn open_on(prefer: Prefer, backends: wgpu::Backends) -> Result<Self, GpuError> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = backends;
+        let instance = wgpu::Instance::new(descriptor);
+        let adapters = pollster::block_on(instance.enumerate_adapters(backends));
+        let adapter = adapters.into_iter().min_by_key(|a| rank(prefer, &a.get_info())).ok_or(GpuError::NoAdapter)?;
+        let info = adapter.get_info();
+        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::FLOAT32_FILTERABLE;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("trepan"),
+            required_features: adapter.features() & wanted,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| GpuError::Open { adapter: info.name.clone(), reason: e.to_string() })?;
+        let faults = Arc::new(FaultLog::default());
+        let log = faults.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| log.note(&error.to_string())));
+        let log = faults.clone();
+        device.set_device_lost_callback(move |reason, words| {
+            *log.lost.lock().unwrap_or_else(PoisonError::into_inner) = Some(format!("{reason:?}: {words}"));
+        });
+        Ok(Self { inner: Arc::new(Inner { instance, adapter, device, queue, info, faults }) })
+    }
+
+    /// Name of the adapter and of the interface that drives it, for people.
+    pub fn name(&self) -> String {
+        format!("{} ({})", self.inner.info.name, self.inner.info.backend)
+    }
+
+    /// Whether the adapter is a program on the processor.
+    pub fn is_software(&self) -> bool {
+        self.inner.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether pass times can be measured.
+    pub fn has_timestamps(&self) -> bool {
+        self.inner.device.features().contains(wgpu::Features::TIMESTAMP_QUERY)
+    }
+
+    /// The device's limits.
+    pub fn limits(&self) -> wgpu::Limits {
+        self.inner.device.limits()
+    }
+
+    /// What went wrong so far without being returned by a call.
+    pub fn faults(&self) -> Faults {
+        let log = &self.inner.faults;
+        let copy = |m: &Mutex<Option<String>>| m.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        Faults { count: log.count.load(Ordering::Relaxed), first: copy(&log.first), lost: copy(&log.lost) }
+    }
+
+    /// Starts a list of passes.
+    pub fn record(&self, label: &str) -> Recorder<'_> {
+        Recorder::new(self, label)
+    }
+
+    /// Waits until everything submitted is done.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
+        self.inner.device.poll(wait).map_err(|e| GpuError::Lost(e.to_string()))?;
+        self.faults().lost.map_or(Ok(()), |why| Err(GpuError::Lost(why)))
+    }
+
+    /// The bare instance, for sharing with a window.
+    pub fn instance(&self) -> &wgpu::Instance {
+        &self.inner.instance
+    }
+
+    /// The bare adapter, for sharing with a window.
+    pub fn adapter(&self) -> &wgpu::Adapter {
+        &self.inner.adapter
+    }
+
+    /// The bare device.
+    pub fn device(&self) -> &wgpu::Device {
+        &self.inner.device
+    }
+
+    /// The bare queue.
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.inner.queue
+    }
+
+    /// Runs `make`, and turns what validation says about it into an error.
+    pub(crate) fn checked<T>(
+        &self,
+        make: impl FnOnce() -> T,
+        error: impl FnOnce(String) -> GpuError,
+    ) -> Result<T, GpuError> {
+        let scope = self.inner.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let made = make();
+        match pollster::block_on(scope.pop()) {
+            None => Ok(made),
+            Some(e) => Err(error(e.to_string())),
+        }
+    }
+
+    /// Refuses what is over a limit.
+    pub(crate) fn within(&self, label: &str, wanted: u64, limit: u64, unit: &'static str) -> Result<(), GpuError> {
+        let too_large = || GpuError::TooLarge { label: label.into(), wanted, limit, unit, adapter: self.name() };
+        (wanted <= limit).then_some(()).ok_or_else(too_large)
+    }
+
+    /// Maps the first `bytes` of a readback buffer and hands them to `take`.
+    pub(crate) fn read_back<T>(
+        &self,
+        staging: &wgpu::Buffer,
+        bytes: u64,
+        take: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, GpuError> {
+        let slice = staging.slice(..bytes);
+        let (tell, told) = std::sync::mpsc::channel();
+        slice.map_async(wgpu::MapMode::Read, move |mapped| {
+            // The receiver is gone only when this call has already given up.
+            tell.send(mapped).ok();
+        });
+        self.wait()?;
+        let lost = |e: String| GpuError::Lost(e);
+        told.try_recv().map_err(|e| lost(e.to_string()))?.map_err(|e| lost(e.to_string()))?;
+        let view = slice.get_mapped_range().map_err(|e| lost(e.to_string()))?;
+        let taken = take(&view);
+        drop(view);
+        staging.unmap();
+        Ok(taken)
+    }
+}
+
+impl FaultLog {
+    fn note(&self, words: &str) {
+        self.count.fetch_add(1, Ordering::Relaxed);
+        self.first.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| words.into());
+    }
+}
+
+/// Lower is better.
+fn rank(prefer: Prefer, info: &wgpu::AdapterInfo) -> (u8, u8) {
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    };
+    let kind = if prefer == Prefer::Software { 4 - kind } else { kind };
+    (kind, u8::from(info.backend == wgpu::Backend::Gl))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_an_adapter_the_error_names_the_remedy() {
+        let error = Gpu::open_on(Prefer::Hardware, wgpu::Backends::empty()).unwrap_err();
+        assert_eq!(error, GpuError::NoAdapter);
+        assert!(error.to_string().contains("mesa-vulkan-drivers"), "{error}");
+    }
+
+    #[test]
+    fn a_mistake_is_counted_and_does_not_panic() {
+        let gpu = match Gpu::open(Prefer::Software) {
+            Ok(gpu) => gpu,
+            Err(error) => return assert_eq!(error, GpuError::NoAdapter, "this machine has no adapter"),
+        };
+        assert_eq!(gpu.faults(), Faults::default());
+        let _broken = gpu.device().create_buffer(&wgpu::BufferDescriptor {
+            label: Some("impossible"),
+            size: 4,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::MAP_WRITE,
+            mapped_at_creation: false,
+        });
+        let faults = gpu.faults();
+        assert_eq!(faults.count, 1);
+        assert!(faults.first.unwrap().contains("impossible"));
+    }
+}

@@ -1,0 +1,106 @@
+//! Drawing pipelines. Vertices come from storage buffers by vertex index: there are no vertex layouts.
+
+use crate::{Bindings, Format, Gpu, GpuError, Resource, Slot, bind};
+
+/// How vertices make primitives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Topology {
+    /// Three vertices a triangle.
+    #[default]
+    Triangles,
+    /// Two vertices a line, one pixel wide.
+    Lines,
+}
+
+/// What to compile; entries are `vertex` and `fragment`, bindings are in group 0.
+#[derive(Clone, Copy, Debug)]
+pub struct PipelineSpec<'a> {
+    /// Name in messages, best the shader file's stem.
+    pub label: &'static str,
+    /// The shader's text.
+    pub wgsl: &'a str,
+    /// What it binds.
+    pub slots: &'a [Slot],
+    /// Formats of the textures that it draws into.
+    pub targets: &'a [Format],
+    /// Whether nearer hides farther (depth grows away from the eye).
+    pub depth: bool,
+    /// Whether colours are mixed by alpha over what is there.
+    pub blend: bool,
+    /// How vertices make primitives.
+    pub topology: Topology,
+}
+
+/// A drawing pipeline with its slots in group 0.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    label: &'static str,
+    pub(crate) raw: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+}
+
+impl Pipeline {
+    /// Compiles the vertex and fragment entries.
+    pub fn new(gpu: &Gpu, spec: &PipelineSpec) -> Result<Self, GpuError> {
+        gpu.checked(|| compile(gpu, spec), |reason| GpuError::Shader { label: spec.label.into(), reason })
+    }
+
+    /// Binds resources in the order of the slots.
+    pub fn bind(&self, gpu: &Gpu, resources: &[Resource]) -> Result<Bindings, GpuError> {
+        bind::bind(gpu, self.label, &self.layout, resources)
+    }
+
+    /// The name in messages.
+    pub fn label(&self) -> &'static str {
+        self.label
+    }
+}
+
+fn compile(gpu: &Gpu, spec: &PipelineSpec) -> Pipeline {
+    let device = gpu.device();
+    let source = wgpu::ShaderSource::Wgsl(spec.wgsl.into());
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(spec.label), source });
+    let layout = bind::layout(gpu, spec.label, spec.slots, wgpu::ShaderStages::VERTEX_FRAGMENT);
+    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(spec.label),
+        bind_group_layouts: &[Some(&layout)],
+        immediate_size: 0,
+    });
+    let blend = spec.blend.then_some(wgpu::BlendState::ALPHA_BLENDING);
+    let target =
+        |f: &Format| Some(wgpu::ColorTargetState { format: f.raw(), blend, write_mask: wgpu::ColorWrites::ALL });
+    let targets: Vec<_> = spec.targets.iter().map(target).collect();
+    let depth_stencil = spec.depth.then(|| wgpu::DepthStencilState {
+        format: Format::Depth32Float.raw(),
+        depth_write_enabled: Some(true),
+        depth_compare: Some(wgpu::CompareFunction::Less),
+        stencil: Default::default(),
+        bias: Default::default(),
+    });
+    let topology = match spec.topology {
+        Topology::Triangles => wgpu::PrimitiveTopology::TriangleList,
+        Topology::Lines => wgpu::PrimitiveTopology::LineList,
+    };
+    let raw = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(spec.label),
+        layout: Some(&pipeline_layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState { topology, ..Default::default() },
+        depth_stencil,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    });
+    Pipeline { label: spec.label, raw, layout }
+}
