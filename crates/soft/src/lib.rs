@@ -1,1 +1,44 @@
-//! The soft-tissue solver seam, materials, rival solvers and an f64 implicit reference
+//! Soft tissue: the seam that every solver sits behind, materials, a small-strain rival and an f64 implicit reference.
+//!
+//! # Theory
+//! A body is a mesh of 4-node tetrahedra with lumped masses. With nodal positions `x = X + u` every solver here answers the same
+//! semi-discrete equation `M ü + C u̇ + f_int(u) = f_ext`, or its static limit.
+//!
+//! # Practice
+//! Units mm, ms, g: stiffness in MPa, forces in N, densities in g/mm³. [`SoftSolver`] is the seam, [`Method`] the list of solvers in this
+//! crate; the fast explicit solver lives in `trepan-tled` behind the same seam. Nothing here does I/O, reads a clock or starts a thread.
+//!
+//! ```
+//! use trepan_soft::{Body, Loads, Material, Method, boxes};
+//!
+//! let mesh = boxes::split_box([2, 2, 2], trepan_geometry::Vec3::splat(20.0));
+//! let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
+//! let body = Body { mesh, fixed, material: Material::BRAIN };
+//! let mut solver = Method::named("reference").unwrap().build(&body)?;
+//! let gravity = trepan_geometry::Vec3::new(0.0, 0.0, -9.81e-3);
+//! let report = solver.step(&Loads { gravity, ..Loads::default() }, 1.0);
+//! assert_eq!(report.inverted, 0);
+//! # Ok::<(), trepan_soft::BodyError>(())
+//! ```
+
+mod body;
+mod bound;
+pub mod boxes;
+mod energy;
+mod factor;
+pub mod linear;
+mod material;
+mod method;
+mod operator;
+pub mod reference;
+mod solver;
+mod tetra;
+
+pub use body::{Body, BodyError};
+pub use bound::{element_bound_ms, highest_frequency, lowest_frequency, power_bound_ms};
+pub use energy::{FADE_BELOW, NeoHookean};
+pub use material::{Material, MaterialError};
+pub use method::Method;
+pub use operator::Stiffness;
+pub use solver::{Loads, SoftSolver, StepReport};
+pub use tetra::Shape;

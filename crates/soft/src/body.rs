@@ -1,0 +1,183 @@
+//! A body: tetrahedra, what they are made of, and which nodes do not move.
+
+use crate::{Material, MaterialError, Shape};
+use trepan_geometry::Vec3;
+use trepan_mesh::TetMesh;
+
+/// A deformable body in its rest state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Rest positions, mm, and tetrahedra of positive volume.
+    pub mesh: TetMesh,
+    /// Nodes that do not move; order and repeats do not matter.
+    pub fixed: Vec<u32>,
+    /// Material of every tetrahedron.
+    pub material: Material,
+}
+
+/// Why a body was refused.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum BodyError {
+    /// The material is not physical.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+    /// There is nothing to simulate.
+    #[error("mesh.tets is empty: a body needs at least one tetrahedron")]
+    Empty,
+    /// A tetrahedron names a node that does not exist.
+    #[error("mesh.tets[{tet}] uses node {node}, but there are only {nodes} nodes")]
+    NodeRange {
+        /// The tetrahedron.
+        tet: usize,
+        /// The node that it names.
+        node: u32,
+        /// Nodes in the mesh.
+        nodes: usize,
+    },
+    /// A node position is not a number.
+    #[error("mesh.positions[{0}] is not finite")]
+    Position(usize),
+    /// A tetrahedron is flat or inside out.
+    #[error(
+        "mesh.tets[{tet}] has volume {volume_mm3:e} mm³: it must be positive (swap two of its nodes if it is inside out)"
+    )]
+    Volume {
+        /// The tetrahedron.
+        tet: usize,
+        /// Its signed volume, mm³.
+        volume_mm3: f64,
+    },
+    /// A node belongs to no tetrahedron, so it has no mass.
+    #[error("mesh.positions[{0}] belongs to no tetrahedron: remove it")]
+    Orphan(usize),
+    /// A fixed node does not exist.
+    #[error("fixed names node {node}, but there are only {nodes} nodes")]
+    FixedRange {
+        /// The node.
+        node: u32,
+        /// Nodes in the mesh.
+        nodes: usize,
+    },
+    /// A static solver was given a body that can float away.
+    #[error("fixed holds {0} nodes: a static solver needs at least 3 that are not on one line")]
+    Floating(usize),
+    /// A setting of the solver makes no sense.
+    #[error("config.{field} is {value}: {right}")]
+    Config {
+        /// The setting.
+        field: &'static str,
+        /// What it was.
+        value: f32,
+        /// What would be right.
+        right: &'static str,
+    },
+}
+
+impl Body {
+    /// Checks everything that a solver relies on.
+    pub fn check(&self) -> Result<(), BodyError> {
+        self.material.check()?;
+        let (nodes, tets) = (self.mesh.positions.len(), &self.mesh.tets);
+        if tets.is_empty() {
+            return Err(BodyError::Empty);
+        }
+        if let Some(bad) = self.mesh.positions.iter().position(|p| !p.is_finite()) {
+            return Err(BodyError::Position(bad));
+        }
+        let mut used = vec![false; nodes];
+        for (tet, corners) in tets.iter().enumerate() {
+            for &node in corners {
+                *used.get_mut(node as usize).ok_or(BodyError::NodeRange { tet, node, nodes })? = true;
+            }
+            let volume_mm3 = self.mesh.volume_mm3(tet);
+            if volume_mm3.is_nan() || volume_mm3 <= 1e-9 {
+                return Err(BodyError::Volume { tet, volume_mm3 });
+            }
+        }
+        if let Some(orphan) = used.iter().position(|u| !u) {
+            return Err(BodyError::Orphan(orphan));
+        }
+        match self.fixed.iter().find(|&&n| n as usize >= nodes) {
+            Some(&node) => Err(BodyError::FixedRange { node, nodes }),
+            None => Ok(()),
+        }
+    }
+
+    /// Rest shape of a tetrahedron, f64.
+    pub fn shape(&self, tet: usize) -> Shape {
+        Shape::of(self.mesh.corners(tet).map(Vec3::as_dvec3))
+    }
+
+    /// Mass of every node, g: a quarter of each of its tetrahedra.
+    pub fn lumped_masses_g(&self) -> Vec<f64> {
+        let mut masses = vec![0.0; self.mesh.positions.len()];
+        for (tet, corners) in self.mesh.tets.iter().enumerate() {
+            let quarter = f64::from(self.material.density_g_mm3()) * self.mesh.volume_mm3(tet) / 4.0;
+            corners.iter().for_each(|&n| masses[n as usize] += quarter);
+        }
+        masses
+    }
+
+    /// Whether each node is fixed.
+    pub fn fixed_mask(&self) -> Vec<bool> {
+        let mut mask = vec![false; self.mesh.positions.len()];
+        self.fixed.iter().for_each(|&n| mask[n as usize] = true);
+        mask
+    }
+
+    /// Whether the fixed nodes hold the body: three of them span a plane.
+    pub fn is_held(&self) -> bool {
+        let points = || self.fixed.iter().map(|&n| self.mesh.positions[n as usize].as_dvec3());
+        let Some(origin) = points().next() else { return false };
+        let furthest = |measure: &dyn Fn(glam::DVec3) -> f64| {
+            points().max_by(|a, b| measure(*a).total_cmp(&measure(*b))).map(|p| (p, measure(p)))
+        };
+        let Some((far, length)) = furthest(&|p| (p - origin).length()) else { return false };
+        let axis = (far - origin).normalize_or_zero();
+        furthest(&|p| (p - origin).cross(axis).length()).is_some_and(|(_, width)| width > 1e-3 * length && length > 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::boxes;
+
+    fn cube() -> Body {
+        let mesh = boxes::split_box([2, 2, 2], Vec3::splat(10.0));
+        let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
+        Body { mesh, fixed, material: Material::BRAIN }
+    }
+
+    #[test]
+    fn masses_add_up_to_density_times_volume() {
+        let total: f64 = cube().lumped_masses_g().iter().sum();
+        assert!((total - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn each_fault_is_named() {
+        assert_eq!(cube().check(), Ok(()));
+        let broken = |change: fn(&mut Body)| {
+            let mut body = cube();
+            change(&mut body);
+            body.check().unwrap_err()
+        };
+        assert!(matches!(broken(|b| b.mesh.tets.clear()), BodyError::Empty));
+        assert!(matches!(broken(|b| b.mesh.tets[3].swap(0, 1)), BodyError::Volume { tet: 3, .. }));
+        assert!(matches!(broken(|b| b.mesh.tets[2][1] = 99), BodyError::NodeRange { tet: 2, node: 99, .. }));
+        assert!(matches!(broken(|b| b.mesh.positions[4].y = f32::NAN), BodyError::Position(4)));
+        assert!(matches!(broken(|b| b.mesh.positions.push(Vec3::ZERO)), BodyError::Orphan(27)));
+        assert!(matches!(broken(|b| b.fixed.push(27)), BodyError::FixedRange { node: 27, .. }));
+    }
+
+    #[test]
+    fn nodes_on_one_line_do_not_hold_a_body() {
+        let mut body = cube();
+        assert!(body.is_held());
+        body.fixed = boxes::nodes_where(&body.mesh, |p| p.z < 1e-3 && p.y < 1e-3);
+        assert!(!body.is_held());
+        body.fixed.clear();
+        assert!(!body.is_held());
+    }
+}

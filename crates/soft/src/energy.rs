@@ -1,0 +1,128 @@
+//! Neo-Hookean energy, stress and tangent in f64, finite for every deformation, turned over or not.
+//!
+//! # Theory
+//! ```text
+//! W(F) = μ/2 (g(J) I₁ - 3) + κ/2 (J-1)²      g(J) = J^(-2/3) for J ≥ J₀, its tangent line below
+//! P    = ∂W/∂F = μ g F + q C                   q = μ/2 g' I₁ + κ (J-1),   C = cof F = ∂J/∂F
+//! ```
+//! With `g = J^(-2/3)` throughout, W is infinite at J = 0 and undefined beyond. Continued linearly below `J₀ = 0.3` it stays once
+//! differentiable, and its force always pushes J back towards 1: an inverted element heals by itself.
+//!
+//! # Sources
+//! The split energy is the one of Miller, Joldes, Lance and Wittek 2007 (TLED); continuing an energy linearly beyond a threshold
+//! follows the idea of Irving, Teran and Fedkiw 2004.
+
+use glam::{DMat3, DVec3};
+
+/// Below this volume ratio the isochoric factor continues along its tangent line.
+pub const FADE_BELOW: f64 = 0.3;
+
+/// The compressible neo-Hookean law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NeoHookean {
+    /// Shear modulus μ, MPa.
+    pub mu: f64,
+    /// Bulk modulus κ, MPa.
+    pub kappa: f64,
+}
+
+impl NeoHookean {
+    /// Energy per rest volume, N mm/mm³.
+    pub fn energy(&self, f: DMat3) -> f64 {
+        let j = f.determinant();
+        let [g, ..] = isochoric(j);
+        0.5 * self.mu * (g * squared(f) - 3.0) + 0.5 * self.kappa * (j - 1.0).powi(2)
+    }
+
+    /// First Piola-Kirchhoff stress P, MPa.
+    pub fn stress(&self, f: DMat3) -> DMat3 {
+        let j = f.determinant();
+        let [g, dg, _] = isochoric(j);
+        f * (self.mu * g) + cofactor(f) * self.volumetric(f, j, dg)
+    }
+
+    /// The change of the stress, `∂P/∂F : dF`, for a change `df`, MPa.
+    pub fn stress_change(&self, f: DMat3, df: DMat3) -> DMat3 {
+        let j = f.determinant();
+        let [g, dg, ddg] = isochoric(j);
+        let c = cofactor(f);
+        let (fd, cd) = (dot(f, df), dot(c, df));
+        let along_c = self.mu * dg * fd + (0.5 * self.mu * ddg * squared(f) + self.kappa) * cd;
+        df * (self.mu * g) + f * (self.mu * dg * cd) + c * along_c + cofactor_change(f, df) * self.volumetric(f, j, dg)
+    }
+
+    fn volumetric(&self, f: DMat3, j: f64, dg: f64) -> f64 {
+        0.5 * self.mu * dg * squared(f) + self.kappa * (j - 1.0)
+    }
+}
+
+/// g, g', g'' at J.
+fn isochoric(j: f64) -> [f64; 3] {
+    let at = j.max(FADE_BELOW);
+    let g = at.powf(-2.0 / 3.0);
+    let dg = -2.0 / 3.0 * g / at;
+    if j < FADE_BELOW { [g + dg * (j - at), dg, 0.0] } else { [g, dg, 10.0 / 9.0 * g / (at * at)] }
+}
+
+/// Cofactor matrix, the gradient of the determinant: `cof F = J F⁻ᵀ`, defined for singular F too.
+pub(crate) fn cofactor(f: DMat3) -> DMat3 {
+    DMat3::from_cols(f.y_axis.cross(f.z_axis), f.z_axis.cross(f.x_axis), f.x_axis.cross(f.y_axis))
+}
+
+fn cofactor_change(f: DMat3, df: DMat3) -> DMat3 {
+    let mixed = |a: DVec3, b: DVec3, da: DVec3, db: DVec3| da.cross(b) + a.cross(db);
+    DMat3::from_cols(
+        mixed(f.y_axis, f.z_axis, df.y_axis, df.z_axis),
+        mixed(f.z_axis, f.x_axis, df.z_axis, df.x_axis),
+        mixed(f.x_axis, f.y_axis, df.x_axis, df.y_axis),
+    )
+}
+
+fn dot(a: DMat3, b: DMat3) -> f64 {
+    a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
+}
+
+fn squared(f: DMat3) -> f64 {
+    dot(f, f)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const LAW: NeoHookean = NeoHookean { mu: 0.7, kappa: 3.0 };
+
+    proptest! {
+        #[test]
+        fn stress_is_the_gradient_of_the_energy_and_the_tangent_that_of_the_stress(
+            entries in proptest::array::uniform9(-1.5f64..1.5), change in proptest::array::uniform9(-1.0f64..1.0),
+        ) {
+            let (f, df) = (DMat3::from_cols_array(&entries), DMat3::from_cols_array(&change));
+            prop_assume!((f.determinant() - FADE_BELOW).abs() > 1e-3);
+            let h = 1e-6;
+            let slope = (LAW.energy(f + df * h) - LAW.energy(f - df * h)) / (2.0 * h);
+            prop_assert!((slope - dot(LAW.stress(f), df)).abs() < 1e-4 * (1.0 + slope.abs()));
+            let turn = (LAW.stress(f + df * h) - LAW.stress(f - df * h)) * (0.5 / h);
+            let error = squared(turn - LAW.stress_change(f, df)).sqrt();
+            prop_assert!(error < 1e-4 * (1.0 + squared(turn).sqrt()));
+        }
+
+        #[test]
+        fn an_element_turned_inside_out_is_pushed_back(stretch in proptest::array::uniform3(0.2f64..1.5)) {
+            let f = DMat3::from_diagonal(DVec3::new(-stretch[0], stretch[1], stretch[2]));
+            let pushed = f - LAW.stress(f) * 1e-6;
+            prop_assert!(pushed.determinant() > f.determinant());
+        }
+    }
+
+    #[test]
+    fn the_rest_state_is_free_of_stress_and_has_the_small_strain_moduli() {
+        assert!(squared(LAW.stress(DMat3::IDENTITY)) < 1e-28);
+        let shear = DMat3::from_cols(DVec3::ZERO, DVec3::X, DVec3::ZERO);
+        let found = LAW.stress_change(DMat3::IDENTITY, shear + shear.transpose());
+        assert!((found.y_axis.x - 2.0 * LAW.mu).abs() < 1e-12);
+        let swell = LAW.stress_change(DMat3::IDENTITY, DMat3::IDENTITY);
+        assert!((swell.x_axis.x - 3.0 * LAW.kappa).abs() < 1e-12);
+    }
+}

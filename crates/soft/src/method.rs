@@ -1,0 +1,40 @@
+//! The closed list of the solvers in this crate, by name, for tests, charts and command lines.
+
+use crate::{Body, BodyError, SoftSolver, linear, reference};
+
+/// A soft-tissue solver with its settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// Small strain, explicit.
+    Linear(linear::Config),
+    /// Static neo-Hookean oracle, f64.
+    Reference(reference::Config),
+}
+
+impl Method {
+    /// Every method with its default settings.
+    pub fn all() -> Vec<Self> {
+        vec![Self::Linear(linear::Config::default()), Self::Reference(reference::Config::default())]
+    }
+
+    /// The method of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::all().into_iter().find(|method| method.name() == name)
+    }
+
+    /// Its name on a command line and in charts.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Linear(_) => "linear",
+            Self::Reference(_) => "reference",
+        }
+    }
+
+    /// Makes the solver for a body at rest.
+    pub fn build(&self, body: &Body) -> Result<Box<dyn SoftSolver>, BodyError> {
+        Ok(match self {
+            Self::Linear(config) => Box::new(linear::Linear::new(body, config)?),
+            Self::Reference(config) => Box::new(reference::Reference::new(body, config)?),
+        })
+    }
+}

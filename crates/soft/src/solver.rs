@@ -1,0 +1,55 @@
+//! The seam of the soft-tissue solvers: loads in, nodal state out.
+
+use trepan_contact::NodalContact;
+use trepan_geometry::Vec3;
+
+/// Advances a body under loads. One implementation owns all of a body's nodal state.
+///
+/// # Practice
+/// The real-time solvers neither allocate, lock, wait nor panic in [`step`](Self::step); a solver that does (the reference) says so.
+/// Nodes are numbered as in the mesh that the solver was made from.
+pub trait SoftSolver: Send {
+    /// Advances by `dt_ms`. Whatever goes wrong is healed and counted in the report; positions stay finite.
+    fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport;
+
+    /// Present node positions, world mm.
+    fn positions(&self) -> &[Vec3];
+
+    /// Present node velocities, mm/ms.
+    fn velocities(&self) -> &[Vec3];
+
+    /// Longest step that is stable with margin, ms; infinite for implicit and static solvers.
+    fn stable_dt_ms(&self) -> f32;
+}
+
+/// What acts on the body during one step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Loads {
+    /// Acceleration of gravity, mm/ms² (9.81e-3 downwards on Earth; zero = none).
+    pub gravity: Vec3,
+    /// The tool's spring on the tissue, evaluated with the solver's own positions.
+    pub contact: NodalContact,
+}
+
+/// What happened in one step; every count is of this step alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepReport {
+    /// Elements whose volume was zero or negative; the energy turns them back.
+    pub inverted: u32,
+    /// Nodes whose new state was not finite; put back to where they were, at rest.
+    pub non_finite: u32,
+    /// Nodes that hit the speed or displacement limit and were held to it.
+    pub limited: u32,
+    /// Steps actually made, over 1 when `dt_ms` was over the stable bound.
+    pub substeps: u32,
+    /// Time that was asked for and not simulated, because it would have taken too many substeps, ms.
+    pub skipped_ms: f32,
+    /// Force of the contact spring on the tissue at the end of the step, N.
+    pub contact_n: f32,
+    /// Share of the contact's stiffness and damping that was used, 1 unless it would have been unstable at this step.
+    pub contact_scale: f32,
+    /// Iterations of an implicit or static solver.
+    pub iterations: u32,
+    /// Whether an iterative solver reached its tolerance; explicit solvers always say true.
+    pub converged: bool,
+}
