@@ -1,7 +1,41 @@
-//! Voxel volumes with patient orientation.
+//! Voxel volumes with patient orientation: files in, resampling, masks, distance fields, carving.
+//!
+//! # Theory
+//! An image is a box of samples and the affine that puts voxel indices into the patient's RAS+ mm ([`VoxelVolume`]). Everything that
+//! a file format says about axes, units and stored numbers is settled when it is read; after that there is one form.
+//!
+//! # Practice
+//! [`read`] finds the format by content. A CT becomes [`hounsfield`] values and, with [`bone_isovalue`] and [`skull_only`], the
+//! [`BoneVolume`] that a burr carves; an MRI becomes a [`brain_mask`]; a mask becomes a [`DistanceField`].
+//!
+//! # When not to use it
+//! For pictures in time or colour: only real-valued volumes are read.
 
+mod atomic;
 mod bone;
+mod brain;
+mod component;
+mod distance;
+mod error;
+pub mod nifti;
+mod note;
+mod overlap;
+mod read;
+mod resample;
+mod sample;
+mod skull;
+mod source;
 mod volume;
 
 pub use bone::{AIR_HU, BRICK, BoneError, BoneVolume};
+pub use brain::{BrainConfig, MaskError, brain_mask, check_brain_mask};
+pub use component::largest_component;
+pub use distance::{DistanceField, FAR_MM};
+pub use error::{ReadError, WriteError};
+pub use note::{Import, Note};
+pub use overlap::{LEAST_SHARE, OverlapError, overlap};
+pub use read::{import, read};
+pub use resample::{Grid, Interpolation, resample};
+pub use sample::{ByteOrder, Number, Sample};
+pub use skull::{GREATEST_ISOVALUE, HounsfieldError, LEAST_ISOVALUE, bone_isovalue, hounsfield, labels, skull_only};
 pub use volume::VoxelVolume;

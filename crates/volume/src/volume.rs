@@ -1,7 +1,7 @@
 //! A box of samples with its place in the patient: the form in which every image travels.
 
 use glam::{DAffine3, DVec3};
-use trepan_geometry::Vec3;
+use trepan_geometry::{Aabb, Vec3};
 
 /// Samples on a regular grid, x fastest, with the affine that puts voxel indices into patient RAS+ mm.
 ///
@@ -25,7 +25,8 @@ impl<T: Copy> VoxelVolume<T> {
 
     /// An axis-aligned isotropic volume with voxel (0, 0, 0) centred at `origin`.
     pub fn isotropic(dims: [usize; 3], origin: Vec3, spacing_mm: f32, value: T) -> Self {
-        let affine = DAffine3::from_translation(origin.as_dvec3()) * DAffine3::from_scale(DVec3::splat(spacing_mm.into()));
+        let affine =
+            DAffine3::from_translation(origin.as_dvec3()) * DAffine3::from_scale(DVec3::splat(spacing_mm.into()));
         Self::filled(dims, affine, value)
     }
 
@@ -62,5 +63,21 @@ impl<T: Copy> VoxelVolume<T> {
     /// World centre of a voxel, mm.
     pub fn centre_of(&self, voxel: [usize; 3]) -> DVec3 {
         self.world_from_voxel.transform_point3(DVec3::new(voxel[0] as f64, voxel[1] as f64, voxel[2] as f64))
+    }
+
+    /// Lowest and highest corner of the box around the voxels' outer faces, world mm.
+    pub fn world_corners(&self) -> (DVec3, DVec3) {
+        let n = DVec3::from_array(self.dims.map(|n| n as f64));
+        let corner = |bits: usize| {
+            let at = |axis: usize| if bits >> axis & 1 == 0 { -0.5 } else { n[axis] - 0.5 };
+            self.world_from_voxel.transform_point3(DVec3::new(at(0), at(1), at(2)))
+        };
+        (0..8).map(corner).fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(p), high.max(p)))
+    }
+
+    /// The box around the voxels' outer faces, world mm.
+    pub fn world_box(&self) -> Aabb {
+        let (low, high) = self.world_corners();
+        Aabb { min: low.as_vec3(), max: high.as_vec3() }
     }
 }

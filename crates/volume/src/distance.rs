@@ -1,0 +1,243 @@
+//! Signed distance to the surface of a mask or of a density level.
+//!
+//! # Theory
+//! The surface is known where grid edges cross it: between an inside voxel a and an outside voxel b at the fraction
+//! `t = (v_a - level) / (v_a - v_b)` of the edge (1/2 for a mask). The field is the exact Euclidean distance to the nearest such
+//! crossing, `D(p) = min_s |p - s|`, negative inside. Squared distances separate by axis, and each axis is a lower envelope of parabolas
+//! (Felzenszwalb and Huttenlocher 2012), here with vertices at fractional places along the edge's own axis:
+//!
+//! ```text
+//! D² = min( Z·Y·X̂, Z·X·Ŷ, Y·X·Ẑ )     X̂: parabolas at the crossings of x-edges; X: envelope over x of what is there
+//! ```
+//!
+//! # Practice
+//! Grids of cubes or boxes in any orientation, axes at right angles. Linear in voxels: about 50 ns each and core; 4 bytes
+//! each kept, 12 while building. Slices run in parallel with the same bytes for any number of threads. What lies beyond the grid's
+//! border is unknown: a mask that touches it has no surface there.
+//!
+//! # Sources
+//! P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012.
+//!
+//! # When not to use it
+//! For single queries near a surface: looking at the voxels around is cheaper. On sheared grids the distances are only near.
+
+use crate::resample::corners;
+use crate::{Sample, VoxelVolume};
+use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
+use trepan_geometry::{Mat3, Vec3};
+
+/// Signed distances in mm on a grid: negative inside, sampled at any world point.
+#[derive(Clone, Debug)]
+pub struct DistanceField {
+    values: VoxelVolume<f32>,
+    voxel_from_world: DAffine3,
+    last: Vec3,
+    /// World gradient from the slopes along i, j, k.
+    world_from_slope: Mat3,
+}
+
+impl DistanceField {
+    /// The distance to a mask (what is not 0), its surface halfway between voxel centres.
+    ///
+    /// An empty mask is at [`FAR_MM`] everywhere, a full one at minus that.
+    pub fn of_mask(mask: &VoxelVolume<u8>) -> Self {
+        Self::of(mask, |at| if mask.data[at] != 0 { 1.0 } else { -1.0 })
+    }
+
+    /// The distance to the surface where values reach `level`; inside is at or over it. Finer than the voxels.
+    pub fn of_level<T: Sample>(volume: &VoxelVolume<T>, level: f32) -> Self {
+        Self::of(volume, |at| volume.data[at].to_f32() - level)
+    }
+
+    /// `inside` gives how far a voxel is over the surface's level.
+    fn of<T: Copy>(grid: &VoxelVolume<T>, inside: impl Fn(usize) -> f32 + Sync) -> Self {
+        let spacing = grid.spacing_mm();
+        let mut data = squared_distances(grid.dims, spacing, &inside);
+        data.par_iter_mut().enumerate().for_each(|(at, d)| {
+            let far = d.sqrt().min(FAR_MM);
+            *d = if inside(at) >= 0.0 { -far } else { far };
+        });
+        Self::from_values(VoxelVolume { dims: grid.dims, data, world_from_voxel: grid.world_from_voxel })
+    }
+
+    fn from_values(values: VoxelVolume<f32>) -> Self {
+        let m = values.world_from_voxel.matrix3;
+        Self {
+            voxel_from_world: values.world_from_voxel.inverse(),
+            last: Vec3::from_array(values.dims.map(|n| n.saturating_sub(1) as f32)),
+            world_from_slope: m.inverse().transpose().as_mat3(),
+            values,
+        }
+    }
+
+    /// The distances at the voxel centres, mm.
+    pub fn values(&self) -> &VoxelVolume<f32> {
+        &self.values
+    }
+
+    /// The distance at a world point, mm: trilinear, clamped to the grid's border outside.
+    pub fn sample(&self, world: Vec3) -> f32 {
+        self.at(self.voxel_of(world))
+    }
+
+    /// The field's slope at a world point, over one voxel each way: about 1 long and pointing outwards, away from the mask.
+    ///
+    /// Shorter where the nearest surface changes, and towards the outside of the grid, where the field is flat.
+    pub fn gradient(&self, world: Vec3) -> Vec3 {
+        let p = self.voxel_of(world);
+        let slope = |step: Vec3| self.at(p + step) - self.at(p - step);
+        self.world_from_slope * Vec3::new(slope(0.5 * Vec3::X), slope(0.5 * Vec3::Y), slope(0.5 * Vec3::Z))
+    }
+
+    fn voxel_of(&self, world: Vec3) -> Vec3 {
+        self.voxel_from_world.transform_point3(world.as_dvec3()).as_vec3()
+    }
+
+    fn at(&self, voxel: Vec3) -> f32 {
+        if self.values.data.is_empty() {
+            return FAR_MM;
+        }
+        corners(self.values.dims, self.last, voxel).iter().map(|&(at, w)| w * self.values.data[at]).sum()
+    }
+}
+
+/// The distance where there is no surface at all, mm.
+pub const FAR_MM: f32 = 1e6;
+
+/// Squared distances to the nearest crossing, mm².
+fn squared_distances(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) -> f32 + Sync)) -> Vec<f32> {
+    let crossings = |axis: usize| {
+        along(dims, axis, |line, envelope, out| {
+            envelope.clear();
+            for n in 1..line.length {
+                let (a, b) = (inside(line.at(n - 1)), inside(line.at(n)));
+                if (a >= 0.0) != (b >= 0.0) {
+                    envelope.add(((n - 1) as f64 + f64::from(a / (a - b))) * spacing[axis], 0.0);
+                }
+            }
+            envelope.read(spacing[axis], out);
+        })
+    };
+    let spread = |axis: usize, field: Vec<f32>| {
+        along(dims, axis, |line, envelope, out| {
+            envelope.clear();
+            for n in 0..line.length {
+                envelope.add(n as f64 * spacing[axis], field[line.at(n)]);
+            }
+            envelope.read(spacing[axis], out);
+        })
+    };
+    let xy = least(spread(1, crossings(0)), &spread(0, crossings(1)));
+    least(spread(2, xy), &spread(1, spread(0, crossings(2))))
+}
+
+fn least(mut a: Vec<f32>, b: &[f32]) -> Vec<f32> {
+    a.par_iter_mut().zip(b).for_each(|(a, b)| *a = a.min(*b));
+    a
+}
+
+/// A row of voxels along one axis.
+#[derive(Clone, Copy)]
+struct Line {
+    start: usize,
+    step: usize,
+    length: usize,
+}
+
+impl Line {
+    fn at(self, n: usize) -> usize {
+        self.start + n * self.step
+    }
+}
+
+/// Computes every line along `axis` by itself and puts the results in the volume's order.
+fn along([nx, ny, nz]: [usize; 3], axis: usize, line: impl Fn(Line, &mut Envelope, &mut [f32]) + Sync) -> Vec<f32> {
+    let slice = nx * ny;
+    let mut all = vec![0.0; slice * nz];
+    if all.is_empty() {
+        return all;
+    }
+    match axis {
+        0 => all.par_chunks_mut(nx).enumerate().for_each_init(Envelope::default, |envelope, (row, out)| {
+            line(Line { start: row * nx, step: 1, length: nx }, envelope, out);
+        }),
+        1 => all.par_chunks_mut(slice).enumerate().for_each_init(Envelope::default, |envelope, (k, out)| {
+            plane(nx, ny, out, |i, column| line(Line { start: k * slice + i, step: nx, length: ny }, envelope, column));
+        }),
+        _ => {
+            let planes: Vec<Vec<f32>> = (0..ny)
+                .into_par_iter()
+                .map_init(Envelope::default, |envelope, j| {
+                    let mut out = vec![0.0; nx * nz];
+                    plane(nx, nz, &mut out, |i, column| {
+                        line(Line { start: j * nx + i, step: slice, length: nz }, envelope, column);
+                    });
+                    out
+                })
+                .collect();
+            all.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
+                let k = row / ny;
+                out.copy_from_slice(&planes[row % ny][k * nx..(k + 1) * nx]);
+            });
+        }
+    }
+    all
+}
+
+/// Fills a plane of `width` columns, x fastest, column by column.
+fn plane(width: usize, height: usize, out: &mut [f32], mut column: impl FnMut(usize, &mut [f32])) {
+    let mut values = vec![0.0; height];
+    for i in 0..width {
+        column(i, &mut values);
+        for (j, &value) in values.iter().enumerate() {
+            out[i + j * width] = value;
+        }
+    }
+}
+
+/// The least of parabolas `(x - vertex)² + height`, whose vertices are added in rising order.
+#[derive(Default)]
+struct Envelope {
+    /// Vertex, height and where the parabola becomes the least.
+    parabolas: Vec<(f64, f64, f64)>,
+}
+
+impl Envelope {
+    fn clear(&mut self) {
+        self.parabolas.clear();
+    }
+
+    fn add(&mut self, vertex: f64, height: f32) {
+        if !height.is_finite() {
+            return;
+        }
+        let height = f64::from(height);
+        let mut from = f64::NEG_INFINITY;
+        while let Some(&(v, h, start)) = self.parabolas.last() {
+            from = match vertex > v {
+                true => 0.5 * ((height - h) / (vertex - v) + vertex + v),
+                false if height < h => f64::NEG_INFINITY,
+                false => return,
+            };
+            if from > start {
+                break;
+            }
+            self.parabolas.pop();
+            from = f64::NEG_INFINITY;
+        }
+        self.parabolas.push((vertex, height, from));
+    }
+
+    /// The envelope at whole steps from 0.
+    fn read(&self, step: f64, out: &mut [f32]) {
+        let mut at = 0;
+        for (n, out) in out.iter_mut().enumerate() {
+            let x = n as f64 * step;
+            while at + 1 < self.parabolas.len() && self.parabolas[at + 1].2 <= x {
+                at += 1;
+            }
+            *out = self.parabolas.get(at).map_or(f32::INFINITY, |&(v, h, _)| ((x - v) * (x - v) + h) as f32);
+        }
+    }
+}

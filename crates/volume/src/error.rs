@@ -1,0 +1,154 @@
+//! What can be wrong with a file, said so that its owner can put it right.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Why a file was not read. Names the file, the header field and the remedy; never a patient.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// There is no such file.
+    #[error("{}: no such file; check the spelling of the path", file.display())]
+    Missing {
+        /// The file.
+        file: PathBuf,
+    },
+    /// The system refuses to read.
+    #[error("{}: cannot be read ({source})", file.display())]
+    Io {
+        /// The file.
+        file: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The content is of no format that is read here.
+    #[error("{}: {found}; readable are NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr with .img), NRRD, MetaImage and DICOM", file.display())]
+    Format {
+        /// The file.
+        file: PathBuf,
+        /// What it looks like.
+        found: String,
+    },
+    /// A header field is wrong.
+    #[error("{}: {field} is {found}; {remedy}", file.display())]
+    Field {
+        /// The file.
+        file: PathBuf,
+        /// The field, as the format's standard calls it.
+        field: &'static str,
+        /// What it holds.
+        found: String,
+        /// What would be right.
+        remedy: &'static str,
+    },
+    /// Sizes that no image has.
+    #[error("{}: {field} is {found}; a volume with at least 2 voxels along each of three axes is needed, not a single picture", file.display())]
+    Dimensions {
+        /// The file.
+        file: PathBuf,
+        /// The field.
+        field: &'static str,
+        /// The sizes.
+        found: String,
+    },
+    /// Voxel edges that are zero, negative, not a number, or not of this world.
+    #[error("{}: {field} gives voxel edges of {found} mm; edges between 0.0001 and 1000 mm are right", file.display())]
+    Spacing {
+        /// The file.
+        file: PathBuf,
+        /// The field.
+        field: &'static str,
+        /// The edges.
+        found: String,
+    },
+    /// The axes lie in a plane, or hold something that is not a number.
+    #[error("{}: {field} is {found}, which turns the volume into something flat; correct the orientation where the file was made", file.display())]
+    Orientation {
+        /// The file.
+        file: PathBuf,
+        /// The field.
+        field: &'static str,
+        /// The affine.
+        found: String,
+    },
+    /// Fewer bytes than the header promises.
+    #[error("{}: ends after {found} bytes of the {expected} that its header announces ({what}); the copy is incomplete, fetch the file again", file.display())]
+    Truncated {
+        /// The file.
+        file: PathBuf,
+        /// Which part ends early.
+        what: &'static str,
+        /// Bytes that the part needs.
+        expected: u64,
+        /// Bytes that are there (at most).
+        found: u64,
+    },
+    /// Compressed data that cannot be unpacked.
+    #[error("{}: the compressed data are damaged ({source}); fetch the file again", file.display())]
+    Compression {
+        /// The file.
+        file: PathBuf,
+        /// The unpacker's reason.
+        source: io::Error,
+    },
+    /// Several volumes in one file.
+    #[error("{}: {field} announces {found} volumes and {remedy}", file.display())]
+    Volumes {
+        /// The file.
+        file: PathBuf,
+        /// The field.
+        field: &'static str,
+        /// How many.
+        found: u64,
+        /// How to choose.
+        remedy: &'static str,
+    },
+}
+
+impl ReadError {
+    /// The file that this is about.
+    pub fn file(&self) -> &std::path::Path {
+        match self {
+            Self::Missing { file }
+            | Self::Io { file, .. }
+            | Self::Format { file, .. }
+            | Self::Field { file, .. }
+            | Self::Dimensions { file, .. }
+            | Self::Spacing { file, .. }
+            | Self::Orientation { file, .. }
+            | Self::Truncated { file, .. }
+            | Self::Compression { file, .. }
+            | Self::Volumes { file, .. } => file,
+        }
+    }
+}
+
+/// Why a file was not written. What was there before is still there.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// The name does not say the format.
+    #[error("{}: the name must end in {expected}", file.display())]
+    Name {
+        /// The file.
+        file: PathBuf,
+        /// The endings that are right.
+        expected: &'static str,
+    },
+    /// The volume does not fit the format.
+    #[error("{}: {found} voxels do not fit the format; crop or resample the volume", file.display())]
+    Dimensions {
+        /// The file.
+        file: PathBuf,
+        /// The sizes.
+        found: String,
+    },
+    /// The system refuses to write.
+    #[error("{}: cannot be written ({source}); check that the folder exists, may be written to and has room", file.display())]
+    Io {
+        /// The file.
+        file: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+}

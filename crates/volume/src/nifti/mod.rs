@@ -1,0 +1,120 @@
+//! NIfTI-1 and NIfTI-2: the format of brain imaging.
+//!
+//! # Theory
+//! A header of 348 (version 1) or 540 bytes (version 2), then voxels with i fastest. The header's `sform` is the affine to
+//! RAS+ mm; the older `qform` gives it as a quaternion, spacings and an offset. Stored numbers become values by
+//! `scl_slope · stored + scl_inter`, unless the slope is 0.
+//!
+//! # Practice
+//! Read: both versions, both byte orders, gzip found by content, `.nii` or `.hdr` with `.img`, every real number type. `sform` goes
+//! before `qform`; with neither, i, j, k are taken as right, front, head, and a note says so. World units other than mm are
+//! converted. NaN voxels stay NaN: [`import`] counts them and [`hounsfield`](crate::hounsfield) refuses them. Written: version 1, single
+//! file, little-endian, both forms; a file appears whole or not at all.
+//!
+//! # Sources
+//! R. W. Cox et al., "A (sort of) new image data format standard: NIfTI-1", 2004; the NIfTI-1 and NIfTI-2 C headers, nifti.nimh.nih.gov.
+//!
+//! # When not to use it
+//! Version 1 keeps the affine in f32: where an orientation must survive to the last bit of an f64, write [`nrrd`](crate::nrrd).
+
+mod header;
+mod write;
+
+pub use write::write;
+
+use crate::sample::Scale;
+use crate::source::Source;
+use crate::{Import, Note, ReadError, VoxelVolume};
+use header::Header;
+use std::path::{Path, PathBuf};
+
+/// Reads the one volume of a file.
+pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
+    import(path).map(|import| import.volume)
+}
+
+/// Reads the one volume of a file, with what there is to say about it.
+pub fn import(path: &Path) -> Result<Import, ReadError> {
+    read_one(path, None)
+}
+
+/// Reads volume number `index` (from 0) of a file with several: time points, directions, vector components.
+pub fn import_volume(path: &Path, index: u64) -> Result<Import, ReadError> {
+    read_one(path, Some(index))
+}
+
+fn read_one(path: &Path, index: Option<u64>) -> Result<Import, ReadError> {
+    let path = &header_of_pair(path);
+    let mut source = Source::open(path)?;
+    let header = Header::read(&mut source)?;
+    match header.voxels_elsewhere {
+        false => voxels(source, &header, index),
+        true => voxels(Source::open(&voxels_of_pair(path)?)?, &header, index),
+    }
+}
+
+/// Reads a single file whose bytes are at hand.
+pub(crate) fn import_source(mut source: Source, index: Option<u64>) -> Result<Import, ReadError> {
+    let header = Header::read(&mut source)?;
+    voxels(source, &header, index)
+}
+
+fn voxels(mut source: Source, header: &Header, index: Option<u64>) -> Result<Import, ReadError> {
+    let count = source.voxels("dim", header.dims)?;
+    let mut notes = Vec::new();
+    let index = match index {
+        None if header.volumes == 1 => 0,
+        None => return Err(several(&source, header, "one must be chosen: name its number, or split the file")),
+        Some(index) if index < header.volumes => index,
+        Some(_) => return Err(several(&source, header, "numbers go from 0 to one less")),
+    };
+    if header.volumes > 1 {
+        notes.push(Note::OneOf { what: "volumes", count: header.volumes as usize, chosen: index as usize });
+    }
+    let skipped = index.checked_mul(count).and_then(|n| n.checked_mul(header.number.bytes() as u64));
+    let start = header.vox_offset.saturating_add(skipped.unwrap_or(u64::MAX));
+    let ahead = start.checked_sub(source.taken()).ok_or_else(|| {
+        source.field(
+            "vox_offset",
+            header.vox_offset,
+            "voxels must start after the header (352 for NIfTI-1, 544 for NIfTI-2)",
+        )
+    })?;
+    if ahead > source.left() {
+        return Err(source.field("vox_offset", start, "voxels must start before the end of the file"));
+    }
+    source.skip(ahead, "bytes before the voxels")?;
+    let data = source.samples(count, header.number, header.order, header.scale.unwrap_or(Scale::NONE))?;
+    source.check_end()?;
+    let orientation = header.orientation(&source)?;
+    notes.extend(orientation.note);
+    let volume = source.volume(header.dims, data, orientation.field, orientation.world_from_voxel)?;
+    Ok(Import::new(volume, notes))
+}
+
+fn several(source: &Source, header: &Header, remedy: &'static str) -> ReadError {
+    ReadError::Volumes { file: source.file().into(), field: "dim", found: header.volumes, remedy }
+}
+
+/// The header's path where the user named the voxels' half of a pair.
+fn header_of_pair(path: &Path) -> PathBuf {
+    let plain = if ends(path, "gz") { path.with_extension("") } else { path.into() };
+    let other = [plain.with_extension("hdr"), plain.with_extension("HDR"), plain.with_extension("hdr.gz")];
+    match ends(&plain, "img") {
+        true => other.into_iter().find(|p| p.exists()).unwrap_or_else(|| path.into()),
+        false => path.into(),
+    }
+}
+
+/// The voxels' path beside a header.
+fn voxels_of_pair(header: &Path) -> Result<PathBuf, ReadError> {
+    let plain = if ends(header, "gz") { header.with_extension("") } else { header.into() };
+    let places = ["img", "IMG", "img.gz"].map(|end| plain.with_extension(end));
+    let [first, ..] = &places;
+    let missing = ReadError::Missing { file: first.clone() };
+    places.into_iter().find(|p| p.exists()).ok_or(missing)
+}
+
+fn ends(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}

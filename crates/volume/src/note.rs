@@ -1,0 +1,74 @@
+//! What a reader found worth saying about a file that it could read.
+
+use crate::VoxelVolume;
+
+/// A volume with what its reader has to say about it.
+#[derive(Clone, Debug)]
+pub struct Import {
+    /// The volume.
+    pub volume: VoxelVolume<f32>,
+    /// What the user should know; empty for a plain file.
+    pub notes: Vec<Note>,
+}
+
+/// Something about a file that is no error and yet matters.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Note {
+    /// Voxels that hold no number.
+    #[error("{count} voxels hold no number (NaN or infinite)")]
+    NotANumber {
+        /// How many.
+        count: usize,
+    },
+    /// Left and right are a guess.
+    #[error("the file does not say how the patient lies ({field}): i is taken as right, j as front, k as head")]
+    NoOrientation {
+        /// The field that would say it.
+        field: &'static str,
+    },
+    /// Two orientations that differ.
+    #[error("{used} and {ignored} differ by up to {by_mm:.2} mm at the corners; {used} is used")]
+    TwoOrientations {
+        /// The field that is used.
+        used: &'static str,
+        /// The field that is not.
+        ignored: &'static str,
+        /// Largest distance between where the two put a corner.
+        by_mm: f64,
+    },
+    /// One of several.
+    #[error("{count} {what} are in there; number {chosen} (from 0) is read")]
+    OneOf {
+        /// What there are several of.
+        what: &'static str,
+        /// How many.
+        count: usize,
+        /// Which was read.
+        chosen: usize,
+    },
+    /// The stack leans.
+    #[error("the gantry was tilted: the stack leans by {degrees:.1} degrees, which is kept as it is")]
+    Tilt {
+        /// Angle between the stack and the slices' normal.
+        degrees: f64,
+    },
+    /// Files that were passed over.
+    #[error("{count} files were passed over: {why}")]
+    Skipped {
+        /// How many.
+        count: usize,
+        /// Why.
+        why: &'static str,
+    },
+}
+
+impl Import {
+    pub(crate) fn new(volume: VoxelVolume<f32>, mut notes: Vec<Note>) -> Self {
+        let count = volume.data.iter().filter(|v| !v.is_finite()).count();
+        if count > 0 {
+            notes.push(Note::NotANumber { count });
+        }
+        Self { volume, notes }
+    }
+}

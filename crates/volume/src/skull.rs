@@ -1,0 +1,109 @@
+//! Bone out of a CT: HU, the threshold, the skull without the table.
+//!
+//! # Theory
+//! The threshold is Otsu's (1979) on the histogram from 100 to 2000 HU: the t that makes
+//! `w₀(t) · w₁(t) · (μ₀(t) - μ₁(t))²` largest, kept within the 300 to 500 HU that cortical bone is segmented at. The skull is the largest
+//! piece at or over it: table, head rest and teeth that touch nothing fall away.
+//!
+//! # Sources
+//! N. Otsu, "A threshold selection method from gray-level histograms", IEEE SMC 9, 1979.
+
+use crate::component::Components;
+use crate::{ReadError, Sample, VoxelVolume};
+use std::path::Path;
+
+/// Least of the isovalues that [`bone_isovalue`] gives, HU.
+pub const LEAST_ISOVALUE: i16 = 300;
+
+/// Greatest of the isovalues that [`bone_isovalue`] gives, HU.
+pub const GREATEST_ISOVALUE: i16 = 500;
+
+/// Why a volume is not a CT in HU.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum HounsfieldError {
+    /// Voxels without a number.
+    #[error(
+        "{count} voxels of the CT hold no number (NaN or infinite); write them as air (-1000 HU) or give another file"
+    )]
+    NotANumber {
+        /// How many.
+        count: usize,
+    },
+    /// Values that are not HU.
+    #[error(
+        "the values go from {low} to {high}, which is not a CT in HU (air -1000, water 0, bone over 300); is this the MRI, or is the rescale intercept lost?"
+    )]
+    Range {
+        /// Lowest value.
+        low: f32,
+        /// Highest value.
+        high: f32,
+    },
+}
+
+/// A CT's values as whole HU. Refuses NaN (with the count) and values that cannot be HU.
+pub fn hounsfield(ct: &VoxelVolume<f32>) -> Result<VoxelVolume<i16>, HounsfieldError> {
+    let count = ct.data.iter().filter(|v| !v.is_finite()).count();
+    if count > 0 {
+        return Err(HounsfieldError::NotANumber { count });
+    }
+    let (low, high) = ct.data.iter().fold((f32::MAX, f32::MIN), |(l, h), &v| (l.min(v), h.max(v)));
+    match low < -500.0 && high > 200.0 && low >= -32768.0 && high < 65536.0 {
+        true => Ok(ct.map(i16::from_f32)),
+        false => Err(HounsfieldError::Range { low, high }),
+    }
+}
+
+/// A bone threshold from the histogram, HU, within [`LEAST_ISOVALUE`] and [`GREATEST_ISOVALUE`].
+pub fn bone_isovalue(ct: &VoxelVolume<i16>) -> i16 {
+    const LOW: i16 = 100;
+    let mut histogram = [0u64; 1901];
+    for &hu in &ct.data {
+        if (LOW..=2000).contains(&hu) {
+            histogram[(hu - LOW) as usize] += 1;
+        }
+    }
+    let total: u64 = histogram.iter().sum();
+    let sum: f64 = histogram.iter().enumerate().map(|(bin, &n)| bin as f64 * n as f64).sum();
+    let (mut below, mut below_sum, mut best) = (0u64, 0.0, (0.0, usize::from(LEAST_ISOVALUE.unsigned_abs())));
+    for (bin, &n) in histogram.iter().enumerate() {
+        below += n;
+        below_sum += bin as f64 * n as f64;
+        let above = total - below;
+        if below > 0 && above > 0 {
+            let apart = below_sum / below as f64 - (sum - below_sum) / above as f64;
+            let between = below as f64 * above as f64 * apart * apart;
+            if between > best.0 {
+                best = (between, bin + LOW as usize + 1);
+            }
+        }
+    }
+    (best.1 as i16).clamp(LEAST_ISOVALUE, GREATEST_ISOVALUE)
+}
+
+/// Leaves only the skull: what is at or over the isovalue but not in the largest piece becomes one HU under it.
+pub fn skull_only(ct: &mut VoxelVolume<i16>, isovalue: i16) {
+    let pieces = Components::of(ct.dims, |at| ct.data[at] >= isovalue);
+    let Some(skull) = pieces.largest() else { return };
+    let under = isovalue.saturating_sub(1);
+    let data = &mut ct.data;
+    pieces.every_run(|piece, run| {
+        if piece != skull {
+            data[run].fill(under);
+        }
+    });
+}
+
+/// A label volume's values as whole numbers. Refuses what is no label: NaN, negative, fractional, over 65535.
+pub fn labels(file: &Path, volume: &VoxelVolume<f32>) -> Result<VoxelVolume<u16>, ReadError> {
+    let wrong = volume.data.iter().find(|&&v| v.round() != v || !(0.0..=65535.0).contains(&v));
+    match wrong {
+        None => Ok(volume.map(u16::from_f32)),
+        Some(found) => Err(ReadError::Field {
+            file: file.into(),
+            field: "a voxel",
+            found: found.to_string(),
+            remedy: "labels are whole numbers from 0 to 65535; is this an image instead of a label volume?",
+        }),
+    }
+}
