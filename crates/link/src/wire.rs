@@ -59,6 +59,8 @@ impl TickRecord {
     pub const DRILLING: u32 = 1 << 3;
     /// The device gave an old pose.
     pub const STALE: u32 = 1 << 4;
+    /// The force was being let go at the end.
+    pub const RELEASED: u32 = 1 << 5;
 
     /// Whether every flag of `mask` is set.
     pub fn has(&self, mask: u32) -> bool {
