@@ -1,1 +1,45 @@
-//! Total Lagrangian Explicit Dynamics for soft tissue
+//! Total Lagrangian Explicit Dynamics: large deformations of soft tissue in real time on a plain CPU.
+//!
+//! # Theory
+//! ```text
+//! M ü + α M u̇ + f_int(u) = f_ext            F = I + Σ u_a ⊗ ∇N_a,   f_int,a = V P(F) ∇N_a
+//! v⁺ = ((1 - α dt/2) v + dt M⁻¹ (f_ext - f_int)) / (1 + α dt/2)          u⁺ = u + dt v⁺
+//! ```
+//! Everything refers to the rest state, so shape-function gradients are computed once (Miller, Joldes, Lance and Wittek 2007). A step is
+//! four passes: element forces, contact, node update, bookkeeping; no equation is solved.
+//!
+//! # Practice
+//! One step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms); a longer one is cut into substeps. Elements sit in blocks of eight with one
+//! lane each; their forces are kept and gathered per node in a fixed order, so the same input gives the same bytes on every machine and with
+//! every kernel. A step neither allocates, locks, waits nor panics.
+//!
+//! ```
+//! use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+//! use trepan_tled::{Config, Tled};
+//!
+//! let mesh = boxes::split_box([3, 3, 3], trepan_geometry::Vec3::splat(30.0));
+//! let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
+//! let mut tled = Tled::new(&Body { mesh, fixed, material: Material::BRAIN }, &Config::default())?;
+//! let gravity = trepan_geometry::Vec3::new(0.0, 0.0, -9.81e-3);
+//! let dt = tled.stable_dt_ms();
+//! let report = tled.step(&Loads { gravity, ..Loads::default() }, dt);
+//! assert_eq!((report.inverted, report.substeps), (0, 1));
+//! # Ok::<(), trepan_soft::BodyError>(())
+//! ```
+//!
+//! # When not to use it
+//! For nearly incompressible tissue (ν over about 0.47): plain 4-node tetrahedra lock. For slow processes (minutes): the step is
+//! bound by sound, use a static solver.
+
+mod block;
+mod config;
+mod contact;
+mod damping;
+mod element;
+mod lane;
+mod layout;
+mod nodes;
+mod tled;
+
+pub use config::{Config, Damping, Kernel};
+pub use tled::Tled;

@@ -1,0 +1,93 @@
+//! Settings of the TLED solver.
+
+use trepan_geometry::Vec3;
+use trepan_soft::BodyError;
+
+/// Settings of the TLED solver; `Default` is what the simulators use.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// How motion dies away.
+    pub damping: Damping,
+    /// Share of the true stable bound that a step may use, over 0 and below 1. The rest is for elements that stiffen as they are
+    /// compressed, and for the tool's spring.
+    pub safety: f32,
+    /// Most substeps in one call; a `dt_ms` that needs more is shortened, and the rest counted as skipped. 0 = obey `dt_ms` even where
+    /// it is unstable (for experiments on stability).
+    pub substeps: u32,
+    /// Gravity under which the given mesh is already in equilibrium, mm/ms². The scan was taken lying in CSF, so the case's mesh is not
+    /// stress-free: forces `-m g` are added that balance this gravity exactly. Give the same vector in `Loads::gravity` and nothing
+    /// sags; turn the head there and only the difference acts. Zero = the mesh is free of load.
+    pub balanced_gravity: Vec3,
+    /// Fastest that a node may move, mm/ms (m/s). A surgeon's hand stays under 1; what is over is held to it and counted.
+    pub max_speed: f32,
+    /// Furthest that a node may get from its rest position, as a share of the body's largest extent; held to it and counted.
+    pub max_displacement: f32,
+    /// Which implementation of the element forces; all give the same bytes.
+    pub kernel: Kernel,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            damping: Damping::Critical(1.0),
+            safety: 0.8,
+            substeps: 4,
+            balanced_gravity: Vec3::ZERO,
+            max_speed: 10.0,
+            max_displacement: 2.0,
+            kernel: Kernel::Fastest,
+        }
+    }
+}
+
+/// How motion dies away. All are proportional to mass, so they cost no stability.
+///
+/// A body that its fixed nodes do not hold is damped relative to its own best-fitting rigid motion: it falls and turns unbraked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Damping {
+    /// None: energy is kept.
+    None,
+    /// This share of critical damping of the lowest mode, without unit; 1 = back at rest soonest (under 1 s for a brain).
+    Critical(f32),
+    /// Rate α, 1/ms.
+    Rate(f32),
+}
+
+/// Which implementation computes the element forces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// The fastest that this CPU has.
+    Fastest,
+    /// One element after the other.
+    Scalar,
+    /// Eight elements at once with portable SIMD.
+    Wide,
+}
+
+impl Config {
+    /// Refuses settings that make no sense.
+    pub fn check(&self) -> Result<(), BodyError> {
+        let refuse = |field, value, right| Err(BodyError::Config { field, value, right });
+        let damping = match self.damping {
+            Damping::None => 0.0,
+            Damping::Critical(share) => share,
+            Damping::Rate(rate) => rate,
+        };
+        if !(damping.is_finite() && damping >= 0.0) {
+            return refuse("damping", damping, "at least 0 and finite");
+        }
+        if !(self.safety > 0.0 && self.safety < 1.0) {
+            return refuse("safety", self.safety, "over 0 and below 1");
+        }
+        if !self.balanced_gravity.is_finite() {
+            return refuse("balanced_gravity", self.balanced_gravity.length(), "finite, 9.81e-3 mm/ms² on Earth");
+        }
+        if !(self.max_speed > 0.0 && self.max_speed.is_finite()) {
+            return refuse("max_speed", self.max_speed, "over 0 and finite");
+        }
+        if !(self.max_displacement > 0.0 && self.max_displacement.is_finite()) {
+            return refuse("max_displacement", self.max_displacement, "over 0 and finite");
+        }
+        Ok(())
+    }
+}

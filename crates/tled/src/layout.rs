@@ -1,0 +1,57 @@
+//! Order of nodes and elements in memory: neighbours in space become neighbours in memory.
+//!
+//! # Theory
+//! Nodes are sorted along a Morton curve, elements by their lowest node. A step then reads nodes that are still in the cache.
+
+use trepan_geometry::Vec3;
+use trepan_mesh::TetMesh;
+
+/// Solver order of nodes and elements.
+pub(crate) struct Layout {
+    /// The mesh's node at each place of the solver's order.
+    pub node_at: Vec<u32>,
+    /// Where each of the mesh's nodes went.
+    pub place_of: Vec<u32>,
+    /// The mesh's tetrahedron at each place of the solver's order.
+    pub tet_at: Vec<u32>,
+}
+
+impl Layout {
+    pub fn of(mesh: &TetMesh) -> Self {
+        let bounds = mesh.bounds();
+        let scale = Vec3::splat(1023.0) / (bounds.max - bounds.min).max(Vec3::splat(f32::MIN_POSITIVE));
+        let code = |n: &u32| morton((mesh.positions[*n as usize] - bounds.min) * scale);
+        let mut node_at: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+        node_at.sort_by_cached_key(|n| (code(n), *n));
+        let mut place_of = vec![0; node_at.len()];
+        node_at.iter().enumerate().for_each(|(place, &n)| place_of[n as usize] = place as u32);
+        let mut tet_at: Vec<u32> = (0..mesh.tets.len() as u32).collect();
+        tet_at.sort_by_cached_key(|&t| {
+            let mut places = mesh.tets[t as usize].map(|n| place_of[n as usize]);
+            places.sort_unstable();
+            (places, t)
+        });
+        Self { node_at, place_of, tet_at }
+    }
+}
+
+/// Interleaves ten bits of each coordinate.
+fn morton(p: Vec3) -> u32 {
+    let spread = |x: f32| (0..10).fold(0u32, |code, bit| code | ((x as u32 >> bit & 1) << (3 * bit)));
+    spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_soft::boxes;
+
+    #[test]
+    fn every_node_and_element_has_one_place() {
+        let layout = Layout::of(&boxes::split_box([3, 2, 4], Vec3::new(3.0, 5.0, 7.0)));
+        assert!(layout.node_at.iter().enumerate().all(|(place, &n)| layout.place_of[n as usize] == place as u32));
+        let mut tets = layout.tet_at.clone();
+        tets.sort_unstable();
+        assert!(tets.iter().enumerate().all(|(i, &t)| i == t as usize));
+    }
+}

@@ -1,0 +1,146 @@
+//! The solver: one step, pass by pass.
+
+use crate::block::Elements;
+use crate::config::{Config, Damping};
+use crate::contact::stable_share;
+use crate::layout::Layout;
+use crate::nodes::{Nodes, Update};
+use trepan_contact::NodalContact;
+use trepan_geometry::Vec3;
+use trepan_soft::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency, power_bound_ms};
+
+/// Total Lagrangian explicit solver of one body.
+pub struct Tled {
+    config: Config,
+    elements: Elements,
+    nodes: Nodes,
+    place_of: Vec<u32>,
+    bound_ms: f32,
+    damping_per_ms: f32,
+    max_displacement_mm: f32,
+    held: bool,
+}
+
+impl Tled {
+    /// Takes a body at rest: orders it for the cache, precomputes gradients, finds the stable step and the damping.
+    pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
+        body.check()?;
+        config.check()?;
+        let layout = Layout::of(&body.mesh);
+        let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
+        Ok(Self {
+            config: *config,
+            elements: Elements::of(body, &layout),
+            nodes: Nodes::of(body, &layout),
+            bound_ms: power_bound_ms(body) as f32,
+            damping_per_ms: damping_rate(body, config.damping, extent),
+            max_displacement_mm: config.max_displacement * extent,
+            held: body.is_held(),
+            place_of: layout.place_of,
+        })
+    }
+
+    /// Length of a step that is just stable, ms, without any margin.
+    pub fn bound_ms(&self) -> f32 {
+        self.bound_ms
+    }
+
+    /// Mass-proportional damping α in use, 1/ms.
+    pub fn damping_per_ms(&self) -> f32 {
+        self.damping_per_ms
+    }
+
+    /// Sets the state of a node: displacement from rest, mm, and velocity, mm/ms. Fixed nodes take a displacement and keep it.
+    pub fn set_node(&mut self, node: u32, displacement: Vec3, velocity: Vec3) {
+        if let Some(&place) = self.place_of.get(node as usize) {
+            self.nodes.set(place as usize, displacement, velocity);
+        }
+    }
+
+    /// Into how many steps of what length `dt_ms` is cut.
+    fn cut(&self, dt_ms: f32) -> (u32, f32) {
+        let longest = self.stable_dt_ms();
+        let wanted = (dt_ms / longest * (1.0 - 1e-5)).ceil().max(1.0);
+        if self.config.substeps == 0 {
+            (1, dt_ms)
+        } else if wanted <= self.config.substeps as f32 {
+            (wanted as u32, dt_ms / wanted)
+        } else {
+            (self.config.substeps, longest)
+        }
+    }
+
+    fn substep(&mut self, loads: &Loads, dt_ms: f32, report: &mut StepReport) {
+        report.inverted += self.elements.compute(&self.nodes.u, self.config.kernel);
+        self.press(&loads.contact, dt_ms, report);
+        let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.nodes.rigid_motion());
+        let update = Update {
+            dt_ms,
+            damping_per_ms: self.damping_per_ms,
+            gravity: loads.gravity - self.config.balanced_gravity,
+            max_speed: self.config.max_speed,
+            max_displacement_mm: self.max_displacement_mm,
+            rigid,
+        };
+        self.nodes.update(&self.elements, &update, report);
+    }
+
+    fn press(&mut self, contact: &NodalContact, dt_ms: f32, report: &mut StepReport) {
+        let nodes = &mut self.nodes;
+        let known = |values: &[Vec3], n: u32| values.get(n as usize).copied().unwrap_or_default();
+        let place = |n: u32| self.place_of.get(n as usize).map(|&p| p as usize);
+        let omega2 = 4.0 / (self.bound_ms * self.bound_ms);
+        let share = stable_share(contact, omega2, dt_ms, |n| place(n).map_or(0.0, |p| nodes.inverse_mass[p]));
+        let mean = contact.mean(|n| known(&nodes.positions, n));
+        let velocity = contact.mean(|n| known(&nodes.velocities, n));
+        let pressure = share * contact.pressure_n(mean, velocity);
+        (report.contact_n, report.contact_scale) = (pressure, report.contact_scale.min(share));
+        if !pressure.is_finite() {
+            report.contact_n = 0.0;
+            return;
+        }
+        for (n, w) in contact.nodes() {
+            if let Some(p) = place(n) {
+                nodes.external[p] -= contact.normal * (pressure * w);
+            }
+        }
+    }
+}
+
+impl SoftSolver for Tled {
+    fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
+        let (substeps, dt) = self.cut(dt_ms);
+        let skipped_ms = (dt_ms - substeps as f32 * dt).max(0.0);
+        let mut report =
+            StepReport { substeps, skipped_ms, contact_scale: 1.0, converged: true, ..StepReport::default() };
+        for _ in 0..substeps {
+            self.substep(loads, dt, &mut report);
+        }
+        report
+    }
+
+    fn positions(&self) -> &[Vec3] {
+        &self.nodes.positions
+    }
+
+    fn velocities(&self) -> &[Vec3] {
+        &self.nodes.velocities
+    }
+
+    fn stable_dt_ms(&self) -> f32 {
+        self.config.safety * self.bound_ms
+    }
+}
+
+/// α = 2 ω₁ is critical. A body that is not held has no lowest mode by its supports: its slowest shear wave stands in.
+fn damping_rate(body: &Body, damping: Damping, extent_mm: f32) -> f32 {
+    match damping {
+        Damping::None => 0.0,
+        Damping::Rate(rate) => rate,
+        Damping::Critical(share) => {
+            let shear_speed = (body.material.shear_mpa() / f64::from(body.material.density_g_mm3())).sqrt();
+            let standing = std::f64::consts::PI * shear_speed / f64::from(extent_mm);
+            (f64::from(share) * 2.0 * lowest_frequency(body).unwrap_or(standing)) as f32
+        }
+    }
+}
