@@ -1,0 +1,54 @@
+//! Broad phases: from moving boxes to few pairs of point and tetrahedron.
+
+pub(crate) mod uniform_grid;
+
+pub(crate) use uniform_grid::PointCells;
+pub use uniform_grid::UniformGrid;
+
+use trepan_geometry::{Aabb, Vec3};
+
+/// Finds which points may lie in which tetrahedra. A pair may be false, a missing pair may not.
+///
+/// Both calls run once in every collision step: no allocation, no lock, no panic.
+pub trait BroadPhase: Send {
+    /// Takes the tetrahedra of a moved mesh; only those whose box meets `region` matter.
+    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb);
+
+    /// Clears `out` and fills it, up to its capacity, with `[point, tetrahedron]` pairs, ascending by tetrahedron; returns how many did not fit.
+    fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32;
+}
+
+/// Box of a tetrahedron; empty when a corner is not finite.
+pub(crate) fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Aabb {
+    let corners = tet.map(|n| positions[n as usize]);
+    if corners.iter().all(|c| c.is_finite()) { Aabb::of_points(&corners) } else { Aabb::EMPTY }
+}
+
+/// The boxes of a mesh's tetrahedra that meet a region, in order.
+#[derive(Debug, Default)]
+pub(crate) struct TetBoxes {
+    pub boxes: Vec<(u32, Aabb)>,
+}
+
+impl TetBoxes {
+    pub(crate) fn with_capacity(tets: usize) -> Self {
+        Self { boxes: Vec::with_capacity(tets) }
+    }
+
+    pub(crate) fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
+        self.boxes.clear();
+        let met = tets.iter().enumerate().map(|(t, tet)| (t as u32, box_of(positions, tet)));
+        self.boxes.extend(met.filter(|(_, b)| b.overlaps(*region)).take(self.boxes.capacity()));
+    }
+}
+
+/// Adds a pair when it fits; returns 1 when it does not.
+pub(crate) fn push_bounded(out: &mut Vec<[u32; 2]>, pair: [u32; 2]) -> u32 {
+    match out.len() < out.capacity() {
+        true => {
+            out.push(pair);
+            0
+        }
+        false => 1,
+    }
+}

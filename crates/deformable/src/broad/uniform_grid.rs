@@ -1,0 +1,145 @@
+//! Points in a uniform grid of cells, tetrahedra looked up through the cells of their boxes.
+//!
+//! # Theory
+//! Teschner et al. 2003 with an array in place of the hash, as in the thesis 4.2.2: a point belongs to the one cell
+//! `floor((x - origin) / cell)`, a tetrahedron asks every cell that its box meets. Each pair is found once, since a point has one cell.
+//!
+//! # Practice
+//! The array spans only the box of the points, so a mesh that leaves any preset world box does no harm. `cell_mm` trades
+//! cells visited against points per cell: see `trepan-voxel-size`. When the points' box asks for more than [`UniformGrid::MAX_CELLS`] cells, the
+//! cells of that step are doubled until they fit, and [`UniformGrid::coarsened`] counts it. O(tetrahedra + points + cells) in each step.
+//!
+//! # When not to use it
+//! For a small tool in a large mesh: it still looks at every tetrahedron's box.
+
+use super::{BroadPhase, TetBoxes, push_bounded};
+use trepan_geometry::{Aabb, Vec3};
+
+/// A uniform grid over the points, as an array.
+#[derive(Debug)]
+pub struct UniformGrid {
+    cell_mm: f32,
+    tets: TetBoxes,
+    cells: PointCells,
+    /// Steps in which the cells had to be coarsened.
+    pub coarsened: u32,
+}
+
+impl UniformGrid {
+    /// Most cells in the array.
+    pub const MAX_CELLS: usize = 1 << 16;
+
+    /// A grid with cells of `cell_mm` (positive) for at most so many points and tetrahedra.
+    pub fn new(cell_mm: f32, points: usize, tets: usize) -> Self {
+        Self { cell_mm, tets: TetBoxes::with_capacity(tets), cells: PointCells::new(points), coarsened: 0 }
+    }
+}
+
+impl BroadPhase for UniformGrid {
+    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
+        self.tets.update(positions, tets, region);
+    }
+
+    fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
+        out.clear();
+        self.coarsened += u32::from(self.cells.place(points, self.cell_mm));
+        let mut overflow = 0;
+        for &(tet, bounds) in &self.tets.boxes {
+            self.cells.visit(points, &bounds, |point| overflow += push_bounded(out, [point, tet]));
+        }
+        overflow
+    }
+}
+
+/// Points sorted by cell.
+#[derive(Debug)]
+pub(crate) struct PointCells {
+    origin: Vec3,
+    cell_mm: f32,
+    dims: [usize; 3],
+    starts: Vec<u32>,
+    sorted: Vec<u32>,
+    cell_of: Vec<u32>,
+}
+
+impl PointCells {
+    pub(crate) fn new(points: usize) -> Self {
+        Self {
+            origin: Vec3::ZERO,
+            cell_mm: 1.0,
+            dims: [0; 3],
+            starts: vec![0; UniformGrid::MAX_CELLS + 1],
+            sorted: vec![0; points],
+            cell_of: vec![0; points],
+        }
+    }
+
+    /// Sorts the points into cells; says whether the cells had to be larger than asked for.
+    pub(crate) fn place(&mut self, points: &[Vec3], cell_mm: f32) -> bool {
+        let points = &points[..points.len().min(self.sorted.len())];
+        let bounds = Aabb::of_points(points);
+        self.dims = [0; 3];
+        if bounds.is_empty() || !bounds.size().is_finite() {
+            return false;
+        }
+        (self.origin, self.cell_mm) = (bounds.min, cell_mm);
+        while bounds.size().to_array().map(|s| (s / self.cell_mm) as f64 + 1.0).iter().product::<f64>()
+            > UniformGrid::MAX_CELLS as f64
+        {
+            self.cell_mm *= 2.0;
+        }
+        self.dims = bounds.size().to_array().map(|s| (s / self.cell_mm) as usize + 1);
+        self.count_and_sort(points);
+        self.cell_mm != cell_mm
+    }
+
+    /// Counting sort: cells ascending, in each cell points ascending.
+    fn count_and_sort(&mut self, points: &[Vec3]) {
+        let cells = self.dims.iter().product::<usize>();
+        self.starts[..=cells].fill(0);
+        for (i, p) in points.iter().enumerate() {
+            let [x, y, z] = self.cell_at(*p);
+            self.cell_of[i] = ((z * self.dims[1] + y) * self.dims[0] + x) as u32;
+            self.starts[self.cell_of[i] as usize] += 1;
+        }
+        for cell in 0..cells {
+            self.starts[cell + 1] += self.starts[cell];
+        }
+        for i in (0..points.len()).rev() {
+            let next = &mut self.starts[self.cell_of[i] as usize];
+            *next -= 1;
+            self.sorted[*next as usize] = i as u32;
+        }
+    }
+
+    /// Calls `found` for every point inside `bounds`, through the cells that it meets.
+    pub(crate) fn visit(&self, points: &[Vec3], bounds: &Aabb, mut found: impl FnMut(u32)) {
+        let size = Vec3::from(self.dims.map(|d| d as f32)) * self.cell_mm;
+        if self.dims[0] == 0 || !bounds.overlaps(Aabb { min: self.origin, max: self.origin + size }) {
+            return;
+        }
+        let (low, high) = (self.cell_at(bounds.min), self.cell_at(bounds.max));
+        for z in low[2]..=high[2] {
+            for y in low[1]..=high[1] {
+                for x in low[0]..=high[0] {
+                    let cell = (z * self.dims[1] + y) * self.dims[0] + x;
+                    for &i in self.points_in(cell) {
+                        if bounds.contains(points[i as usize]) {
+                            found(i);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn points_in(&self, cell: usize) -> &[u32] {
+        &self.sorted[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    /// `floor((x - origin) / cell)`, kept inside the array.
+    fn cell_at(&self, p: Vec3) -> [usize; 3] {
+        let at = ((p - self.origin) / self.cell_mm).floor().to_array();
+        core::array::from_fn(|axis| (at[axis].max(0.0) as usize).min(self.dims[axis] - 1))
+    }
+}

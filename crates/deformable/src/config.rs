@@ -1,0 +1,98 @@
+//! What a user chooses, and what is refused.
+
+use crate::{Method, Response};
+
+/// How the tool is tested against the tissue and how the tissue answers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// How the points inside the tissue are found.
+    pub method: Method,
+    /// How normal and depth come out of what was found; `None` takes the one that belongs to the method.
+    pub response: Option<Response>,
+    /// Points on the tool's ball. More points feel smaller features; the time grows in proportion.
+    pub points: usize,
+    /// Edge of a grid cell, mm, for the methods with a grid; `None` takes 1.45 x the mean edge of the mesh.
+    pub cell_mm: Option<f32>,
+    /// Contact spring between tool and tissue, N/mm. Higher feels harder and lowers the solver's stable step.
+    pub stiffness: f32,
+    /// Contact damper along the normal, N ms/mm.
+    pub damping: f32,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            method: Method::RECOMMENDED,
+            response: None,
+            points: trepan_geometry::Pointshell::DEFORMABLE_COUNT,
+            cell_mm: None,
+            stiffness: 0.3,
+            damping: 0.3,
+        }
+    }
+}
+
+/// Why a collision test cannot be set up.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ConfigError {
+    /// A number that makes no sense.
+    #[error("{field} is {value}; it must be {must}")]
+    Value {
+        /// Field of [`Config`] or of the tool.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// What would be right.
+        must: &'static str,
+    },
+    /// There is nothing to collide with.
+    #[error("the mesh has no tetrahedra; it needs at least one")]
+    EmptyMesh,
+    /// A tetrahedron names a node that is not there.
+    #[error("tetrahedron {tet} names node {node}, but there are only {nodes} nodes")]
+    NoSuchNode {
+        /// The tetrahedron.
+        tet: usize,
+        /// The node that it names.
+        node: u32,
+        /// How many there are.
+        nodes: usize,
+    },
+    /// A node is nowhere.
+    #[error("node {node} lies at {position}; every coordinate at rest must be finite")]
+    NonFinite {
+        /// The node.
+        node: usize,
+        /// Where it lies.
+        position: trepan_geometry::Vec3,
+    },
+}
+
+impl Config {
+    /// Refuses what cannot work, naming the field.
+    pub(crate) fn check(&self, tip_radius_mm: f32) -> Result<(), ConfigError> {
+        let positive = |field, value: f32| match value.is_finite() && value > 0.0 {
+            true => Ok(()),
+            false => Err(ConfigError::Value { field, value: value.into(), must: "finite and above 0" }),
+        };
+        positive("tool.tip_radius_mm", tip_radius_mm)?;
+        positive("stiffness", self.stiffness)?;
+        if let Some(cell_mm) = self.cell_mm {
+            positive("cell_mm", cell_mm)?;
+        }
+        if !(self.damping.is_finite() && self.damping >= 0.0) {
+            return Err(ConfigError::Value {
+                field: "damping",
+                value: self.damping.into(),
+                must: "finite and 0 or more",
+            });
+        }
+        if !(1..=MAX_POINTS).contains(&self.points) {
+            return Err(ConfigError::Value { field: "points", value: self.points as f64, must: "1 to 65536" });
+        }
+        Ok(())
+    }
+}
+
+/// Most points on one tool.
+const MAX_POINTS: usize = 65_536;

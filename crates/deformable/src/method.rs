@@ -1,0 +1,65 @@
+//! The ways to find which tool points lie in which tetrahedra, as one closed list.
+
+use crate::Response;
+
+/// How the points inside the tissue are found. The list feeds tests, charts and command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Every point against every tetrahedron in f64: the oracle, slow and obvious.
+    Brute,
+    /// Every tetrahedron's box against the tool's box, then the exact test: the plain baseline.
+    Scan,
+    /// Points in a uniform grid, every tetrahedron's box against its cells (Teschner et al. 2003, as an array).
+    UniformGrid,
+    /// The thesis's chapter 4: grid, first tetrahedron from the last one found, two rings of neighbours.
+    Thesis,
+    /// Each point keeps its tetrahedron and walks on through neighbours; only what lies near the tool is looked at.
+    Walk,
+}
+
+impl Method {
+    /// The charted choice.
+    pub const RECOMMENDED: Self = Self::Walk;
+
+    /// All methods, the oracle first.
+    pub fn all() -> [Self; 5] {
+        [Self::Brute, Self::Scan, Self::UniformGrid, Self::Thesis, Self::Walk]
+    }
+
+    /// The name used in files and on command lines.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Brute => "brute",
+            Self::Scan => "scan",
+            Self::UniformGrid => "uniform-grid",
+            Self::Thesis => "thesis",
+            Self::Walk => "walk",
+        }
+    }
+
+    /// The method of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::all().into_iter().find(|method| method.name() == name)
+    }
+
+    /// The response that belongs to the method: the thesis's own to the thesis, the recommended one to all others.
+    pub fn response(&self) -> Response {
+        match self {
+            Self::Thesis => Response::Printed,
+            _ => Response::RECOMMENDED,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_leads_back_to_its_method() {
+        for method in Method::all() {
+            assert_eq!(Method::named(method.name()), Some(method));
+        }
+        assert_eq!(Method::named("octree of dreams"), None);
+    }
+}

@@ -1,0 +1,103 @@
+//! From what was found to one contact: normal, depth, and the nodes that feel it.
+
+mod ball;
+mod printed;
+
+use crate::{narrow::Hits, scene::Scene, step::TissueStep, surface::MovingSurface};
+use trepan_contact::SurfacePatch;
+use trepan_geometry::Vec3;
+
+/// How normal and depth come out of the points inside the tissue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Response {
+    /// The ball against the moving surface: continuous, and deeper is more.
+    Ball,
+    /// The thesis's Algorithm 2 as printed: the greatest distance to any surface face of the tetrahedra hit.
+    Printed,
+    /// Algorithm 2 with each point measured against the nearest surface face of its tetrahedron.
+    NearestFace,
+}
+
+impl Response {
+    /// The charted choice.
+    pub const RECOMMENDED: Self = Self::Ball;
+}
+
+/// A response with its memory.
+pub(crate) enum Responder {
+    Ball(ball::Ball),
+    Faces(printed::Faces),
+}
+
+impl Responder {
+    pub(crate) fn new(response: Response) -> Self {
+        match response {
+            Response::Ball => Self::Ball(ball::Ball::new()),
+            Response::Printed => Self::Faces(printed::Faces { nearest: false }),
+            Response::NearestFace => Self::Faces(printed::Faces { nearest: true }),
+        }
+    }
+
+    /// Whether it reads the moving surface.
+    pub(crate) fn needs_surface(&self) -> bool {
+        matches!(self, Self::Ball(_))
+    }
+
+    /// Fills the list and the nodes; normal and depth are the answer, `None` when nothing is touched.
+    pub(crate) fn respond(
+        &mut self,
+        scene: &Scene,
+        hits: &Hits,
+        surface: &mut MovingSurface,
+        out: &mut TissueStep,
+    ) -> Option<Answer> {
+        match self {
+            Self::Ball(ball) => ball.respond(scene, hits, surface, out),
+            Self::Faces(faces) => faces.respond(scene, hits, out),
+        }
+    }
+
+    /// Forgets what was touched.
+    pub(crate) fn reset(&mut self) {
+        if let Self::Ball(ball) = self {
+            ball.reset();
+        }
+    }
+}
+
+/// What every response ends in.
+pub(crate) struct Answer {
+    /// Unit vector out of the tissue.
+    pub normal: Vec3,
+    /// How deep, mm, above 0.
+    pub depth_mm: f32,
+}
+
+/// Writes the answer into manifold, patch and nodal spring, whose nodes are already there; nothing when a number is not finite.
+pub(crate) fn finish(scene: &Scene, answer: &Answer, stiffness: f32, damping: f32, out: &mut TissueStep) {
+    out.nodal.normalise();
+    let place = out.nodal.mean(|n| scene.positions[n as usize]);
+    let tissue_velocity = out.nodal.mean(|n| scene.velocities[n as usize]).dot(answer.normal);
+    let sound =
+        answer.depth_mm > 0.0 && answer.depth_mm.is_finite() && answer.normal.is_normalized() && place.is_finite();
+    if !sound || out.nodal.is_empty() {
+        return out.forget_contact();
+    }
+    let tool_velocity = scene.tool_velocity_at(place).dot(answer.normal);
+    (out.manifold.normal, out.manifold.depth_mm, out.manifold.point) = (answer.normal, answer.depth_mm, place);
+    out.nodal.normal = answer.normal;
+    out.nodal.offset_mm = answer.depth_mm - place.dot(answer.normal);
+    (out.nodal.stiffness, out.nodal.damping) = (stiffness, damping);
+    out.nodal.tool_normal_velocity = finite_or_zero(tool_velocity);
+    out.patch = SurfacePatch {
+        time_ms: scene.tool.time_ms,
+        normal: answer.normal,
+        tip_mm: scene.tool.tip(),
+        depth_mm: answer.depth_mm,
+        normal_velocity: finite_or_zero(tissue_velocity),
+    };
+}
+
+fn finite_or_zero(x: f32) -> f32 {
+    if x.is_finite() { x } else { 0.0 }
+}

@@ -1,0 +1,43 @@
+//! What one collision step looks at, borrowed from its owners.
+
+use trepan_geometry::{Aabb, ToolState, Vec3};
+
+/// Tissue and tool at one instant.
+#[derive(Clone, Copy)]
+pub(crate) struct Scene<'a> {
+    /// Moved nodes, world mm.
+    pub positions: &'a [Vec3],
+    /// Node velocities, mm/ms.
+    pub velocities: &'a [Vec3],
+    /// Corners of the tetrahedra.
+    pub tets: &'a [[u32; 4]],
+    /// The tetrahedron across each face, in the order of `trepan_mesh::FACES`.
+    pub neighbours: &'a [[u32; 4]],
+    /// Points on the tool's ball, world mm, and its centre as the last one.
+    pub points: &'a [Vec3],
+    /// The tool.
+    pub tool: &'a ToolState,
+    /// Radius of the ball, mm.
+    pub radius_mm: f32,
+}
+
+impl Scene<'_> {
+    pub(crate) fn corners(&self, tet: u32) -> [Vec3; 4] {
+        self.tets[tet as usize].map(|n| self.positions[n as usize])
+    }
+
+    /// Box of the ball.
+    pub(crate) fn ball_box(&self) -> Aabb {
+        Aabb::of_sphere(self.tool.tip(), self.radius_mm)
+    }
+
+    /// Number of the last point, the centre.
+    pub(crate) fn centre(&self) -> usize {
+        self.points.len() - 1
+    }
+
+    /// Velocity of the tool's body at a world point, mm/ms.
+    pub(crate) fn tool_velocity_at(&self, point: Vec3) -> Vec3 {
+        self.tool.twist.linear + self.tool.twist.angular.cross(point - self.tool.tip())
+    }
+}

@@ -1,0 +1,49 @@
+//! The searches behind [`Method`](crate::Method): each fills, for every tool point, the tetrahedron that holds it.
+
+mod brute;
+mod gridded;
+mod thesis;
+mod walk;
+
+use crate::{Method, narrow::Hits, scene::Scene, surface::MovingSurface};
+use trepan_mesh::TetMesh;
+
+/// One search with its memory.
+pub(crate) enum Search {
+    Brute(brute::Brute),
+    Gridded(gridded::Gridded),
+    Thesis(thesis::Thesis),
+    Walk(walk::Walk),
+}
+
+impl Search {
+    pub(crate) fn new(method: Method, mesh: &TetMesh, points: usize, cell_mm: f32) -> Self {
+        let tets = mesh.tets.len();
+        match method {
+            Method::Brute => Self::Brute(brute::Brute),
+            Method::Scan => Self::Gridded(gridded::Gridded::new(f32::MAX, points, tets)),
+            Method::UniformGrid => Self::Gridded(gridded::Gridded::new(cell_mm, points, tets)),
+            Method::Thesis => Self::Thesis(thesis::Thesis::new(cell_mm, points, tets)),
+            Method::Walk => Self::Walk(walk::Walk::new(points, tets)),
+        }
+    }
+
+    /// Fills `hits` for the scene's points.
+    pub(crate) fn find(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
+        match self {
+            Self::Brute(search) => search.find(scene, hits),
+            Self::Gridded(search) => search.find(scene, hits),
+            Self::Thesis(search) => search.find(scene, hits),
+            Self::Walk(search) => search.find(scene, surface, hits),
+        }
+    }
+
+    /// Forgets where the tool was.
+    pub(crate) fn reset(&mut self) {
+        match self {
+            Self::Brute(_) | Self::Gridded(_) => {}
+            Self::Thesis(search) => search.reset(),
+            Self::Walk(search) => search.reset(),
+        }
+    }
+}

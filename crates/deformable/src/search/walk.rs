@@ -1,0 +1,186 @@
+//! Points that keep their tetrahedron and walk on through neighbours in the moving mesh.
+//!
+//! # Theory
+//! A point that was in a tetrahedron is, a millisecond later, in it or in one close by: step across the face with the most negative
+//! barycentric coordinate until all are 0 or more (Guibas and Stolfi's walk). A point that leaves through the border, or had no tetrahedron, is
+//! looked for by a flood: every tetrahedron that meets the box of such points is reached, through faces inside that box, either from a border triangle in
+//! the box or from a tetrahedron that already holds a point. So the flood misses nothing, however the tool moved.
+//! When there is neither (the tool jumped deep into the tissue), the segment from the centre to the closest surface point holds no other surface, and a
+//! flood along it finds the centre's tetrahedron; all points start there.
+//!
+//! ```text
+//!   surface ___/\___      o  kept its tetrahedron: walks
+//!           o |/\| x      x  has none: flood from the border triangles in the box of all x
+//! ```
+//!
+//! # Practice
+//! Warm, a few microseconds at any mesh size. Inverted and flat tetrahedra are stepped through, never counted as holding a point.
+
+use crate::{
+    broad::box_of,
+    narrow::{Hits, NONE, is_inside},
+    scene::Scene,
+    surface::MovingSurface,
+};
+use trepan_geometry::{Aabb, Vec3};
+use trepan_mesh::OPPOSITE;
+
+/// The tetrahedron of each point, and room for floods.
+pub(crate) struct Walk {
+    last: Vec<u32>,
+    lost: Vec<u32>,
+    near: Vec<u32>,
+    open: Vec<u32>,
+    seen_at: Vec<u32>,
+    flood: u32,
+}
+
+/// Most tetrahedra crossed by one point in one step.
+const MAX_STEPS: usize = 32;
+/// Most tetrahedra in one flood.
+const MAX_FLOOD: usize = 16_384;
+/// Most border triangles taken as seeds.
+const MAX_SEEDS: usize = 4_096;
+
+impl Walk {
+    pub(crate) fn new(points: usize, tets: usize) -> Self {
+        Self {
+            last: vec![NONE; points],
+            lost: Vec::with_capacity(points),
+            near: Vec::with_capacity(MAX_SEEDS),
+            open: Vec::with_capacity(MAX_FLOOD.min(tets)),
+            seen_at: vec![0; tets],
+            flood: 0,
+        }
+    }
+
+    pub(crate) fn reset(&mut self) {
+        self.last.fill(NONE);
+    }
+
+    pub(crate) fn find(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
+        if !scene.ball_box().overlaps(surface.bounds) {
+            return self.reset();
+        }
+        self.walk_all(scene, hits);
+        self.search_lost(scene, surface, hits);
+        if self.lost.len() == scene.points.len() && hits.tet.iter().all(|&t| t == NONE) && self.near.is_empty() {
+            self.enter_deep(scene, surface, hits);
+        }
+        self.last.copy_from_slice(&hits.tet);
+    }
+
+    /// Every point from where it was; those that do not arrive are lost.
+    fn walk_all(&mut self, scene: &Scene, hits: &mut Hits) {
+        self.lost.clear();
+        for i in 0..scene.points.len() {
+            if self.last[i] == NONE || !walk(scene, i, self.last[i], hits) {
+                self.lost.push(i as u32);
+            }
+        }
+    }
+
+    /// Lost points against every tetrahedron that meets their box.
+    fn search_lost(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
+        self.near.clear();
+        if self.lost.is_empty() {
+            return;
+        }
+        let region = Aabb::of_points(self.lost.iter().map(|&i| &scene.points[i as usize]));
+        hits.overflow += surface.gather(scene.positions, region, &mut self.near);
+        self.begin_flood();
+        for k in 0..self.near.len() {
+            self.reach(surface.tet_of_triangle[self.near[k] as usize], hits);
+        }
+        for i in 0..scene.points.len() {
+            if hits.tet[i] != NONE {
+                self.reach(hits.tet[i], hits);
+            }
+        }
+        self.run_flood(scene, region, hits);
+    }
+
+    /// No border near and no memory: all points are inside or all outside, as the centre is.
+    fn enter_deep(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
+        let centre = scene.points[scene.centre()];
+        let Some(foot) = surface.closest(scene.positions, centre) else { return };
+        self.lost.clear();
+        self.lost.push(scene.centre() as u32);
+        self.begin_flood();
+        self.reach(surface.tet_of_triangle[foot.triangle as usize], hits);
+        self.run_flood(scene, Aabb::of_points(&[foot.point, centre]), hits);
+        let start = hits.tet[scene.centre()];
+        if start == NONE {
+            return;
+        }
+        self.last.fill(start);
+        self.walk_all(scene, hits);
+        self.search_lost(scene, surface, hits);
+    }
+
+    fn begin_flood(&mut self) {
+        self.open.clear();
+        self.flood = self.flood.wrapping_add(1);
+        if self.flood == 0 {
+            self.seen_at.fill(0);
+            self.flood = 1;
+        }
+    }
+
+    fn reach(&mut self, tet: u32, hits: &mut Hits) {
+        if self.seen_at[tet as usize] == self.flood {
+            return;
+        }
+        self.seen_at[tet as usize] = self.flood;
+        match self.open.len() < self.open.capacity() {
+            true => self.open.push(tet),
+            false => hits.overflow += 1,
+        }
+    }
+
+    /// Spreads over all tetrahedra that meet `region`, testing the lost points in each.
+    fn run_flood(&mut self, scene: &Scene, region: Aabb, hits: &mut Hits) {
+        while let Some(tet) = self.open.pop() {
+            let bounds = passage(scene, tet);
+            if !bounds.overlaps(region) {
+                continue;
+            }
+            for k in 0..self.lost.len() {
+                let i = self.lost[k] as usize;
+                if hits.tet[i] == NONE && bounds.contains(scene.points[i]) {
+                    hits.test(i, scene.points[i], tet, scene.corners(tet));
+                }
+            }
+            for next in scene.neighbours[tet as usize] {
+                if next != NONE {
+                    self.reach(next, hits);
+                }
+            }
+        }
+    }
+}
+
+/// Box that a flood passes through: one with a NaN corner is passed always, since its place is unknown.
+fn passage(scene: &Scene, tet: u32) -> Aabb {
+    let bounds = box_of(scene.positions, &scene.tets[tet as usize]);
+    if bounds.is_empty() { EVERYWHERE } else { bounds }
+}
+
+const EVERYWHERE: Aabb = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
+
+/// Walks point `i` from `tet`; says whether it arrived.
+fn walk(scene: &Scene, i: usize, mut tet: u32, hits: &mut Hits) -> bool {
+    for _ in 0..MAX_STEPS {
+        let Some(weights) = hits.test(i, scene.points[i], tet, scene.corners(tet)) else { return false };
+        if is_inside(&weights) {
+            return true;
+        }
+        let corner = (0..4).fold(0, |lowest, c| if weights[c] < weights[lowest] { c } else { lowest });
+        let face = (0..4).find(|&f| OPPOSITE[f] == corner).unwrap_or(0);
+        tet = scene.neighbours[tet as usize][face];
+        if tet == NONE {
+            return false;
+        }
+    }
+    false
+}

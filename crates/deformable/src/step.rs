@@ -1,0 +1,173 @@
+//! One collision step, readable as a list: place the points, fit the surface, find, respond.
+
+use crate::{
+    Config, ConfigError,
+    narrow::Hits,
+    response::{Responder, finish},
+    scene::Scene,
+    search::Search,
+    surface::MovingSurface,
+};
+use trepan_contact::{ContactManifold, NodalContact, SurfacePatch};
+use trepan_geometry::{Pointshell, Spread, Tool, ToolState, Vec3};
+use trepan_mesh::{TetMesh, Topology};
+
+/// What one step found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TissueStep {
+    /// The contact, as force models read it.
+    pub manifold: ContactManifold,
+    /// The tangent plane that the haptic tick holds on to until the next result.
+    pub patch: SurfacePatch,
+    /// The spring that presses on the tissue's nodes, equal and opposite.
+    pub nodal: NodalContact,
+    /// Tool points inside the tissue.
+    pub points_in_contact: u32,
+    /// Exact tests of a point in a tetrahedron.
+    pub tests: u32,
+    /// Candidates, triangles or nodes that did not fit their limits.
+    pub overflow: u32,
+    /// Inverted, flat or non-finite tetrahedra met and skipped; all of them, when the step was refused for lack of sound input.
+    pub skipped: u32,
+}
+
+impl TissueStep {
+    /// Back to no contact, counters kept.
+    pub(crate) fn forget_contact(&mut self) {
+        self.manifold.clear();
+        self.patch = SurfacePatch { time_ms: self.patch.time_ms, tip_mm: self.patch.tip_mm, ..SurfacePatch::default() };
+        self.nodal = NodalContact::none();
+    }
+}
+
+/// Tests one ball-tipped tool against one moving tetrahedral mesh.
+///
+/// Everything is allocated in [`new`](Self::new); the mesh's connections are fixed, its nodes move.
+pub struct TissueCollision {
+    tets: Vec<[u32; 4]>,
+    neighbours: Vec<[u32; 4]>,
+    nodes: usize,
+    shell: Pointshell,
+    radius_mm: f32,
+    points: Vec<Vec3>,
+    surface: MovingSurface,
+    search: Search,
+    responder: Responder,
+    uses_surface: bool,
+    hits: Hits,
+    stiffness: f32,
+    damping: f32,
+}
+
+impl TissueCollision {
+    /// Prepares for this mesh and tool.
+    ///
+    /// # Errors
+    /// When a number in the config, the tool or the mesh makes no sense; the error names it.
+    pub fn new(mesh: &TetMesh, tool: &Tool, config: &Config) -> Result<Self, ConfigError> {
+        config.check(tool.tip_radius_mm)?;
+        check_mesh(mesh)?;
+        let shell = Pointshell::sphere(tool.tip_radius_mm, config.points, Spread::Fibonacci);
+        let count = shell.points.len() + 1;
+        let cell_mm = config.cell_mm.unwrap_or_else(|| CELL_PER_EDGE * mean_edge_mm(mesh));
+        let responder = Responder::new(config.response.unwrap_or(config.method.response()));
+        Ok(Self {
+            neighbours: Topology::of(mesh).neighbours,
+            tets: mesh.tets.clone(),
+            nodes: mesh.positions.len(),
+            radius_mm: tool.tip_radius_mm,
+            points: vec![Vec3::ZERO; count],
+            surface: MovingSurface::of(mesh),
+            search: Search::new(config.method, mesh, count, cell_mm),
+            uses_surface: responder.needs_surface() || config.method == crate::Method::Walk,
+            responder,
+            hits: Hits::with_points(count),
+            shell,
+            stiffness: config.stiffness,
+            damping: config.damping,
+        })
+    }
+
+    /// One step: where the tissue's nodes are now (mm, mm/ms), where the tool is, what touches.
+    ///
+    /// A pose that is not finite, or arrays of another length than the mesh, give no contact and `skipped` counts all tetrahedra.
+    pub fn step(&mut self, positions: &[Vec3], velocities: &[Vec3], tool: &ToolState, out: &mut TissueStep) {
+        self.clear(tool, out);
+        if !tool.is_finite() || positions.len() != self.nodes || velocities.len() != self.nodes {
+            self.reset();
+            out.skipped = self.tets.len() as u32;
+            return;
+        }
+        self.place_points(tool);
+        if self.uses_surface {
+            self.surface.refit(positions);
+        }
+        let (tets, neighbours, points) = (&self.tets[..], &self.neighbours[..], &self.points[..]);
+        let scene = Scene { positions, velocities, tets, neighbours, points, tool, radius_mm: self.radius_mm };
+        self.search.find(&scene, &self.surface, &mut self.hits);
+        count(&self.hits, out);
+        match self.responder.respond(&scene, &self.hits, &mut self.surface, out) {
+            Some(answer) => finish(&scene, &answer, self.stiffness, self.damping, out),
+            None => out.forget_contact(),
+        }
+    }
+
+    /// Forgets where the tool was, as after a tool change. Results do not depend on it, only the next step's time.
+    pub fn reset(&mut self) {
+        self.search.reset();
+        self.responder.reset();
+    }
+
+    fn clear(&mut self, tool: &ToolState, out: &mut TissueStep) {
+        self.hits.clear();
+        out.patch = SurfacePatch { time_ms: tool.time_ms, tip_mm: tool.tip(), ..SurfacePatch::default() };
+        out.forget_contact();
+        (out.points_in_contact, out.tests, out.overflow, out.skipped) = (0, 0, 0, 0);
+    }
+
+    /// The shell in world space, and the centre behind it.
+    fn place_points(&mut self, tool: &ToolState) {
+        let pose = &tool.world_from_tool;
+        for (world, local) in self.points.iter_mut().zip(&self.shell.points) {
+            *world = *pose * *local;
+        }
+        if let Some(centre) = self.points.last_mut() {
+            *centre = tool.tip();
+        }
+    }
+}
+
+/// Default cell: this times the mean edge (the thesis's analytic optimum on its spheres).
+const CELL_PER_EDGE: f32 = 1.45;
+
+fn count(hits: &Hits, out: &mut TissueStep) {
+    let shell = &hits.tet[..hits.tet.len() - 1];
+    out.points_in_contact = shell.iter().filter(|&&t| t != crate::narrow::NONE).count() as u32;
+    (out.tests, out.skipped) = (hits.tests, hits.skipped);
+    out.overflow += hits.overflow;
+}
+
+fn check_mesh(mesh: &TetMesh) -> Result<(), ConfigError> {
+    let nodes = mesh.positions.len();
+    if mesh.tets.is_empty() {
+        return Err(ConfigError::EmptyMesh);
+    }
+    let unknown = |tet: &[u32; 4]| tet.iter().copied().find(|&n| n as usize >= nodes);
+    if let Some((tet, node)) = mesh.tets.iter().enumerate().find_map(|(t, tet)| unknown(tet).map(|n| (t, n))) {
+        return Err(ConfigError::NoSuchNode { tet, node, nodes });
+    }
+    match mesh.positions.iter().enumerate().find(|(_, p)| !p.is_finite()) {
+        Some((node, &position)) => Err(ConfigError::NonFinite { node, position }),
+        None => Ok(()),
+    }
+}
+
+fn mean_edge_mm(mesh: &TetMesh) -> f32 {
+    const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+    let of_tet = |t: usize| {
+        let corners = mesh.corners(t);
+        EDGES.iter().map(|&[a, b]| corners[a].distance(corners[b]) as f64).sum::<f64>()
+    };
+    let sum: f64 = (0..mesh.tets.len()).map(of_tet).sum();
+    (sum / (6 * mesh.tets.len()) as f64).max(1e-6) as f32
+}

@@ -1,0 +1,237 @@
+//! The moving surface near the tool: which triangles lie in a box, and which point of them is closest.
+//!
+//! # Theory
+//! Border triangles are sorted once along a Morton curve at rest and cut into clusters of 32. At every step the boxes of all
+//! clusters are fitted anew to the moved nodes, so nothing here goes stale and nothing needs a warm start; searches then visit
+//! only clusters whose box is near enough. Vertex normals are area-weighted means of the moved triangles, made on demand.
+//!
+//! ```text
+//!   nodes -> [box][box][box][box] ... -> boxes near the tool -> their triangles -> exact closest point
+//! ```
+//!
+//! # Practice
+//! Cost: 2 ns for each surface node (a brain of 22 thousand tetrahedra has 2 thousand of them), plus 10 ns for each triangle near the tool.
+//! Triangles with a NaN corner are skipped.
+
+use crate::{narrow::NONE, triangle};
+use trepan_geometry::{Aabb, Vec3};
+use trepan_mesh::{Csr, Surface, TetMesh};
+
+/// Triangles in one cluster.
+const CLUSTER: usize = 32;
+
+/// Closest point on the surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Foot {
+    /// The triangle.
+    pub triangle: u32,
+    /// The point on it, world mm.
+    pub point: Vec3,
+    /// Its weights on the triangle's nodes.
+    pub weights: [f32; 3],
+    /// How far away it is, squared, mm².
+    pub distance2: f32,
+}
+
+/// Border triangles of a moving mesh, in clusters with boxes.
+pub(crate) struct MovingSurface {
+    /// Node indices, counterclockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// The tetrahedron behind each triangle.
+    pub tet_of_triangle: Vec<u32>,
+    nodes_of_cluster: Csr,
+    triangles_of_node: Csr,
+    boxes: Vec<Aabb>,
+    /// Box of the whole surface.
+    pub bounds: Aabb,
+    normals: Vec<Vec3>,
+    normal_made_at: Vec<u32>,
+    step: u32,
+}
+
+impl MovingSurface {
+    pub(crate) fn of(mesh: &TetMesh) -> Self {
+        let surface = Surface::of(mesh);
+        let order = along_morton_curve(mesh, &surface);
+        let triangles: Vec<_> = order.iter().map(|&t| surface.triangles[t as usize]).collect();
+        let tet_of_triangle = order.iter().map(|&t| surface.tet_of_triangle[t as usize]).collect();
+        let around = triangles.iter().enumerate().flat_map(|(t, nodes)| nodes.map(|n| (n, t as u32)));
+        let nodes_of_cluster = nodes_of_clusters(&triangles);
+        Self {
+            triangles_of_node: Csr::of_pairs(mesh.positions.len(), around),
+            boxes: vec![Aabb::EMPTY; nodes_of_cluster.len()],
+            nodes_of_cluster,
+            triangles,
+            tet_of_triangle,
+            bounds: Aabb::EMPTY,
+            normals: vec![Vec3::ZERO; mesh.positions.len()],
+            normal_made_at: vec![0; mesh.positions.len()],
+            step: 0,
+        }
+    }
+
+    /// Fits all boxes to the moved nodes.
+    pub(crate) fn refit(&mut self, positions: &[Vec3]) {
+        self.step = self.step.wrapping_add(1).max(1);
+        self.bounds = Aabb::EMPTY;
+        for (cluster, fitted) in self.boxes.iter_mut().enumerate() {
+            let nodes = self.nodes_of_cluster.row(cluster);
+            *fitted =
+                nodes.iter().map(|&n| positions[n as usize]).filter(|p| p.is_finite()).fold(Aabb::EMPTY, Aabb::grown);
+            self.bounds = Aabb { min: self.bounds.min.min(fitted.min), max: self.bounds.max.max(fitted.max) };
+        }
+    }
+
+    /// Puts the triangles whose boxes meet `region` into `near`, up to its capacity; returns how many did not fit.
+    pub(crate) fn gather(&self, positions: &[Vec3], region: Aabb, near: &mut Vec<u32>) -> u32 {
+        near.clear();
+        let mut overflow = 0;
+        for (cluster, _) in self.boxes.iter().enumerate().filter(|(_, fitted)| fitted.overlaps(region)) {
+            for t in self.triangles_of(cluster) {
+                let corners = self.corners(positions, t);
+                if !Aabb::of_points(&corners).overlaps(region) || !corners.iter().all(|c| c.is_finite()) {
+                    continue;
+                }
+                match near.len() < near.capacity() {
+                    true => near.push(t),
+                    false => overflow += 1,
+                }
+            }
+        }
+        overflow
+    }
+
+    /// The closest point of the whole surface: nearest boxes first, then only boxes nearer than the best so far.
+    pub(crate) fn closest(&self, positions: &[Vec3], to: Vec3) -> Option<Foot> {
+        let first =
+            (0..self.boxes.len()).min_by(|&a, &b| self.box_distance2(a, to).total_cmp(&self.box_distance2(b, to)))?;
+        let mut best = self.closest_among(positions, self.triangles_of(first), to, None);
+        for cluster in 0..self.boxes.len() {
+            let bound = best.map_or(f32::INFINITY, |b| b.distance2);
+            if cluster != first && self.box_distance2(cluster, to) < bound {
+                best = self.closest_among(positions, self.triangles_of(cluster), to, best);
+            }
+        }
+        best
+    }
+
+    /// The closest point on the given triangles, or `best` when none is nearer.
+    pub(crate) fn closest_among(
+        &self,
+        positions: &[Vec3],
+        among: impl Iterator<Item = u32>,
+        to: Vec3,
+        best: Option<Foot>,
+    ) -> Option<Foot> {
+        among.fold(best, |best, t| {
+            let foot = self.foot(positions, t, to);
+            match best {
+                Some(b) if b.distance2 <= foot.distance2 => Some(b),
+                _ if foot.distance2.is_finite() => Some(foot),
+                _ => best,
+            }
+        })
+    }
+
+    /// Walks from a triangle over those that share a node with it to a local minimum of the distance.
+    pub(crate) fn descend(&self, positions: &[Vec3], from: u32, to: Vec3) -> Option<Foot> {
+        let mut best = Some(self.foot(positions, from, to)).filter(|f| f.distance2.is_finite());
+        for _ in 0..MAX_DESCENT {
+            let here = best?.triangle;
+            let around =
+                self.triangles[here as usize].into_iter().flat_map(|n| self.triangles_of_node.row(n as usize)).copied();
+            best = self.closest_among(positions, around, to, best);
+            if best?.triangle == here {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Unit normal of the flat triangle, outwards; zero when it has no area.
+    pub(crate) fn flat_normal(&self, positions: &[Vec3], t: u32) -> Vec3 {
+        let [a, b, c] = self.corners(positions, t);
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
+    /// Normal that runs continuously over edges: vertex normals, blended by the foot's weights.
+    pub(crate) fn smooth_normal(&mut self, positions: &[Vec3], foot: &Foot) -> Vec3 {
+        let nodes = self.triangles[foot.triangle as usize];
+        let blend: Vec3 =
+            nodes.iter().zip(foot.weights).map(|(&n, w)| self.node_normal(positions, n as usize) * w).sum();
+        let unit = blend.normalize_or_zero();
+        if unit == Vec3::ZERO { self.flat_normal(positions, foot.triangle) } else { unit }
+    }
+
+    pub(crate) fn corners(&self, positions: &[Vec3], t: u32) -> [Vec3; 3] {
+        self.triangles[t as usize].map(|n| positions[n as usize])
+    }
+
+    fn node_normal(&mut self, positions: &[Vec3], node: usize) -> Vec3 {
+        if self.normal_made_at[node] != self.step {
+            let twice_area = |&t: &u32| {
+                let [a, b, c] = self.corners(positions, t);
+                (b - a).cross(c - a)
+            };
+            let sum: Vec3 = self.triangles_of_node.row(node).iter().map(twice_area).filter(|v| v.is_finite()).sum();
+            self.normals[node] = sum.normalize_or_zero();
+            self.normal_made_at[node] = self.step;
+        }
+        self.normals[node]
+    }
+
+    fn foot(&self, positions: &[Vec3], t: u32, to: Vec3) -> Foot {
+        let corners = self.corners(positions, t);
+        let weights = triangle::closest_weights(corners, to);
+        let point = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+        Foot { triangle: t, point, weights, distance2: point.distance_squared(to) }
+    }
+
+    fn triangles_of(&self, cluster: usize) -> core::ops::Range<u32> {
+        (cluster * CLUSTER) as u32..((cluster + 1) * CLUSTER).min(self.triangles.len()) as u32
+    }
+
+    fn box_distance2(&self, cluster: usize, to: Vec3) -> f32 {
+        let fitted = self.boxes[cluster];
+        (fitted.min - to).max(to - fitted.max).max(Vec3::ZERO).length_squared()
+    }
+}
+
+/// Most triangles crossed in one descent.
+const MAX_DESCENT: usize = 64;
+
+/// Triangle numbers sorted by the Morton code of their centre at rest.
+fn along_morton_curve(mesh: &TetMesh, surface: &Surface) -> Vec<u32> {
+    let bounds = mesh.bounds();
+    let scale = 1023.0 / bounds.size().max_element().max(f32::MIN_POSITIVE);
+    let code = |t: &u32| {
+        let [a, b, c] = surface.triangles[*t as usize].map(|n| mesh.positions[n as usize]);
+        let cell = (((a + b + c) / 3.0 - bounds.min) * scale).as_uvec3();
+        spread_bits(cell.x) | spread_bits(cell.y) << 1 | spread_bits(cell.z) << 2
+    };
+    let mut order: Vec<u32> = (0..surface.triangles.len() as u32).collect();
+    order.sort_by_cached_key(code);
+    order
+}
+
+/// Ten bits, two zeros between each.
+fn spread_bits(x: u32) -> u32 {
+    let x = (x | x << 16) & 0x0300_00ff;
+    let x = (x | x << 8) & 0x0300_f00f;
+    let x = (x | x << 4) & 0x030c_30c3;
+    (x | x << 2) & 0x0924_9249
+}
+
+fn nodes_of_clusters(triangles: &[[u32; 3]]) -> Csr {
+    let mut csr = Csr { starts: vec![0], items: Vec::new() };
+    for cluster in triangles.chunks(CLUSTER) {
+        let mut nodes: Vec<u32> = cluster.iter().flatten().copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        csr.items.extend(nodes);
+        csr.starts.push(csr.items.len() as u32);
+    }
+    csr
+}
+
+const _: () = assert!(NONE == trepan_mesh::NONE);
