@@ -1,1 +1,25 @@
-//! Haptic devices: scripted, replayed, mouse and simulated, all behind one guarded seam
+//! Haptic devices behind one seam: read where the tool is, apply a force that a guard has passed.
+//!
+//! # Practice
+//! World space is the patient's RAS+ mm; forces are N, torques N mm. Each driver converts from its vendor's units and
+//! axes. A device takes nothing but a [`GuardedWrench`], which only the force guard makes: no path goes round it. `read`
+//! and `apply` are called once per haptic tick; they neither allocate, lock nor wait, unless the device itself is
+//! the clock (documented at the driver).
+//!
+//! # When not to use it
+//! For input that moves a camera or a menu.
+
+mod device;
+pub mod mouse;
+mod name;
+pub mod replay;
+pub mod script;
+pub mod simulated;
+mod workspace;
+
+pub use device::{Capabilities, HapticDevice, Reading, Status};
+pub use name::{DeviceName, Listed, NameError, list};
+pub use workspace::Workspace;
+
+#[doc(no_inline)]
+pub use trepan_contact::GuardedWrench;

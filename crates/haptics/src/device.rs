@@ -1,0 +1,75 @@
+//! The seam of the devices.
+
+use trepan_contact::GuardedWrench;
+use trepan_geometry::{ToolState, Vec3};
+
+/// A device that a hand holds, or something that behaves as one.
+pub trait HapticDevice: Send {
+    /// Where the tool is. `time_ms` is the session time of this tick; it never goes back.
+    fn read(&mut self, time_ms: f64) -> Reading;
+
+    /// What the hand shall feel until the next call.
+    fn apply(&mut self, wrench: GuardedWrench);
+
+    /// What the device can do.
+    fn capabilities(&self) -> Capabilities;
+
+    /// No force, then lets go of the device. May be called more than once; later calls to `apply` do nothing.
+    fn close(&mut self);
+}
+
+/// What one read gave.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    /// The tool in world space.
+    pub tool: ToolState,
+    /// What it is worth.
+    pub status: Status,
+}
+
+/// What a reading is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Sensed for this tick.
+    Fresh,
+    /// The device gave nothing new: the last pose, again.
+    Stale,
+    /// A script or a replay is over; the pose stays.
+    Finished,
+    /// The device is gone or faulty; the pose is the last one known. Apply no force.
+    Lost,
+}
+
+/// What a device can do. Numbers of a virtual device say what it pretends to be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Capabilities {
+    /// Name for people.
+    pub name: String,
+    /// Largest force for a short time, N; 0 for a device without motors.
+    pub peak_force_n: f32,
+    /// Largest force for any time, N.
+    pub continuous_force_n: f32,
+    /// Rate at which it wants to be read, Hz.
+    pub rate_hz: f32,
+    /// Box that the tip can reach, mm.
+    pub workspace_mm: Vec3,
+    /// Driven axes: 0, 3 or 6.
+    pub axes_driven: u8,
+    /// Smallest step of position that it senses, mm.
+    pub position_resolution_mm: f32,
+}
+
+impl Capabilities {
+    /// A device without motors or limits that is read at 1 kHz.
+    pub(crate) fn passive(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            peak_force_n: 0.0,
+            continuous_force_n: 0.0,
+            rate_hz: 1000.0,
+            workspace_mm: Vec3::INFINITY,
+            axes_driven: 0,
+            position_resolution_mm: 0.0,
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! Device names as users write them.
+
+use crate::script;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Which device a user wants.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DeviceName {
+    /// `mouse`: the window's pointer.
+    Mouse,
+    /// `script:NAME`: a scripted operation.
+    Script(String),
+    /// `replay:FILE`: the motion of a recorded session.
+    Replay(PathBuf),
+    /// `simulated:NAME`: a device with mass, friction and delay, in a springy hand that wants to do a scripted operation.
+    Simulated(String),
+    /// `openhaptics[:NAME]`: 3D Systems Touch and its kin, by the name given in the vendor's set-up tool.
+    OpenHaptics(Option<String>),
+    /// `force-dimension`: omega, delta, sigma, lambda, Falcon.
+    ForceDimension,
+    /// `haply`: Inverse3 with VerseGrip, through its service.
+    Haply,
+}
+
+/// A device name that does not say which device.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NameError {
+    /// No driver has this name.
+    #[error("there is no device {name:?}; known are {KNOWN}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+    },
+    /// The script or simulated hand is not known.
+    #[error("device {name:?}: the scripts are {}", script::NAMES.join(", "))]
+    UnknownScript {
+        /// What was asked for.
+        name: String,
+    },
+    /// The name needs something after its colon.
+    #[error("device {name:?} lacks its {what}; write {name}:{example}")]
+    Incomplete {
+        /// What was asked for.
+        name: String,
+        /// What is missing.
+        what: &'static str,
+        /// An example of it.
+        example: &'static str,
+    },
+    /// The device takes nothing after a colon.
+    #[error("device {name:?} takes no {extra:?}; write {name}")]
+    Superfluous {
+        /// The device.
+        name: String,
+        /// What was after the colon.
+        extra: String,
+    },
+}
+
+const KNOWN: &str = "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension, haply";
+
+impl FromStr for DeviceName {
+    type Err = NameError;
+
+    fn from_str(text: &str) -> Result<Self, NameError> {
+        let (driver, detail) = match text.split_once(':') {
+            Some((driver, detail)) => (driver, Some(detail).filter(|d| !d.is_empty())),
+            None => (text, None),
+        };
+        let plain = |device: Self| match detail {
+            None => Ok(device),
+            Some(extra) => Err(NameError::Superfluous { name: driver.to_owned(), extra: extra.to_owned() }),
+        };
+        let incomplete = |what, example| NameError::Incomplete { name: driver.to_owned(), what, example };
+        match driver {
+            "mouse" => plain(Self::Mouse),
+            "force-dimension" => plain(Self::ForceDimension),
+            "haply" => plain(Self::Haply),
+            "openhaptics" => Ok(Self::OpenHaptics(detail.map(str::to_owned))),
+            "replay" => Ok(Self::Replay(detail.ok_or_else(|| incomplete("file", "session.mcap"))?.into())),
+            "script" | "simulated" => {
+                let name = detail.ok_or_else(|| incomplete("operation", script::NAMES[0]))?;
+                if !script::NAMES.contains(&name) {
+                    return Err(NameError::UnknownScript { name: text.to_owned() });
+                }
+                Ok(if driver == "script" { Self::Script(name.into()) } else { Self::Simulated(name.into()) })
+            }
+            _ => Err(NameError::Unknown { name: text.to_owned() }),
+        }
+    }
+}
+
+impl std::fmt::Display for DeviceName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Mouse => f.write_str("mouse"),
+            Self::Script(name) => write!(f, "script:{name}"),
+            Self::Replay(path) => write!(f, "replay:{}", path.display()),
+            Self::Simulated(name) => write!(f, "simulated:{name}"),
+            Self::OpenHaptics(None) => f.write_str("openhaptics"),
+            Self::OpenHaptics(Some(name)) => write!(f, "openhaptics:{name}"),
+            Self::ForceDimension => f.write_str("force-dimension"),
+            Self::Haply => f.write_str("haply"),
+        }
+    }
+}
+
+/// A device that a user can ask for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Listed {
+    /// What to write after `--device`.
+    pub name: String,
+    /// Whether it is there, and if not, what is missing.
+    pub state: String,
+}
+
+/// Every device that a user can ask for, and whether it is there.
+pub fn list() -> Vec<Listed> {
+    let ready = |name: String, state: &str| Listed { name, state: state.to_owned() };
+    let mut listed = vec![ready("mouse".to_owned(), "ready where there is a window")];
+    listed.extend(script::NAMES.map(|name| ready(format!("script:{name}"), "ready")));
+    listed.extend(script::NAMES.map(|name| ready(format!("simulated:{name}"), "ready")));
+    listed.push(ready("replay:FILE".to_owned(), "ready"));
+    listed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_survive_a_round_trip() {
+        let names = [
+            "mouse",
+            "script:probe",
+            "replay:a:b.mcap",
+            "simulated:craniotomy",
+            "openhaptics",
+            "openhaptics:Left",
+            "force-dimension",
+            "haply",
+        ];
+        for name in names {
+            assert_eq!(name.parse::<DeviceName>().unwrap().to_string(), name);
+        }
+    }
+
+    #[test]
+    fn errors_say_what_would_be_right() {
+        let error = |name: &str| name.parse::<DeviceName>().unwrap_err().to_string();
+        assert!(error("joystick").contains(KNOWN));
+        assert!(error("script").contains("write script:craniotomy-and-probe"));
+        assert!(error("script:x").contains("craniotomy-and-probe, craniotomy, probe"));
+        assert!(error("replay:").contains("file"));
+        assert!(error("haply:2").contains("takes no \"2\""));
+    }
+
+    #[test]
+    fn whatever_is_listed_can_be_asked_for() {
+        for listed in list() {
+            assert!(listed.name.parse::<DeviceName>().is_ok(), "{}", listed.name);
+            assert!(!listed.state.is_empty());
+        }
+    }
+}

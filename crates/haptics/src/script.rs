@@ -1,0 +1,259 @@
+//! Scripted operations: a hand that never tires, for demonstrations, tests and machines without a device.
+//!
+//! # Theory
+//! Between waypoints the tip follows the minimum-jerk law of human reaching (Flash and Hogan 1985, J. Neurosci. 5):
+//! `x(τ) = x₀ + (x₁ - x₀)(10τ³ - 15τ⁴ + 6τ⁵)`, τ = t/T; it starts and ends at rest, its velocity is continuous and
+//! peaks at 15/8 of the mean. Velocities are its exact derivative.
+//!
+//! # Practice
+//! A script is a pure function of time: the same times give the same bits, in any order. The tool's shaft (+z) points out of
+//! the patient along the hole.
+//!
+//! ```text
+//!  approach     drill, pedal down     retreat  change  approach   three presses          leave
+//!  ╲___________╲____________________╱─────────────────╲__________╲╱─╲╱─╲╱───────────────╱
+//! ```
+//!
+//! # When not to use it
+//! To judge what a person would feel or do: it does not yield to force. Use [`crate::simulated`] for that.
+
+mod operation;
+mod path;
+
+pub use operation::{Plan, Site};
+pub use path::Waypoint;
+
+use crate::{Capabilities, HapticDevice, Reading, Status};
+use path::Path;
+use trepan_contact::GuardedWrench;
+use trepan_geometry::{ToolState, Wrench};
+
+/// The names of the operations that [`Script::named`] knows.
+pub const NAMES: [&str; 3] = ["craniotomy-and-probe", "craniotomy", "probe"];
+
+/// Duration of an operation when none is asked for, ms.
+pub const DEFAULT_DURATION_MS: f64 = 20_000.0;
+
+/// A script could not be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ScriptError {
+    /// There is no such operation.
+    #[error("there is no script {name:?}; the scripts are {}", NAMES.join(", "))]
+    UnknownName {
+        /// What was asked for.
+        name: String,
+    },
+    /// The duration is not a time.
+    #[error("a script cannot last {duration_ms} ms; give more than 0 and at most 86400000 (a day)")]
+    Duration {
+        /// What was asked for.
+        duration_ms: f64,
+    },
+    /// The site is not a place to operate.
+    #[error("the site's {field} is {value}; it must be {wanted}")]
+    Site {
+        /// Which field.
+        field: &'static str,
+        /// What it was.
+        value: String,
+        /// What would be right.
+        wanted: &'static str,
+    },
+}
+
+/// A scripted operation, and the device that performs it.
+#[derive(Clone, Debug)]
+pub struct Script {
+    name: &'static str,
+    path: Path,
+    applied: GuardedWrench,
+    closed: bool,
+}
+
+impl Script {
+    /// The operation `name` (see [`NAMES`]) at `site`, with the recommended [`Plan`].
+    pub fn named(name: &str, site: &Site, duration_ms: f64) -> Result<Self, ScriptError> {
+        Self::planned(name, site, duration_ms, &Plan::default())
+    }
+
+    /// The operation `name` at `site`, with a plan.
+    pub fn planned(name: &str, site: &Site, duration_ms: f64, plan: &Plan) -> Result<Self, ScriptError> {
+        let Some(name) = NAMES.into_iter().find(|&known| known == name) else {
+            return Err(ScriptError::UnknownName { name: name.to_owned() });
+        };
+        if !(duration_ms > 0.0 && duration_ms <= 86_400_000.0) {
+            return Err(ScriptError::Duration { duration_ms });
+        }
+        site.check()?;
+        let path = operation::path(name, site, plan, duration_ms);
+        Ok(Self { name, path, applied: GuardedWrench::ZERO, closed: false })
+    }
+
+    /// The operation's name.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// When the operation ends, ms after its start.
+    pub fn duration_ms(&self) -> f64 {
+        self.path.end_ms()
+    }
+
+    /// The stations of the way; the first is where the tool waits at time 0.
+    pub fn waypoints(&self) -> &[Waypoint] {
+        self.path.waypoints()
+    }
+
+    /// The tool at a time after the start; it waits before 0 and rests after the end.
+    pub fn at(&self, time_ms: f64) -> ToolState {
+        self.path.at(time_ms)
+    }
+
+    /// The wrench last applied.
+    pub fn applied(&self) -> Wrench {
+        self.applied.wrench()
+    }
+}
+
+impl HapticDevice for Script {
+    fn read(&mut self, time_ms: f64) -> Reading {
+        let status = if time_ms > self.duration_ms() { Status::Finished } else { Status::Fresh };
+        Reading { tool: self.at(time_ms), status }
+    }
+
+    fn apply(&mut self, wrench: GuardedWrench) {
+        if !self.closed {
+            self.applied = wrench;
+        }
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::passive(format!("script:{}", self.name))
+    }
+
+    fn close(&mut self) {
+        (self.applied, self.closed) = (GuardedWrench::ZERO, true);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use trepan_geometry::{Buttons, Vec3};
+
+    fn site() -> Site {
+        Site {
+            entry: Vec3::new(30.0, 40.0, 90.0),
+            inward: Vec3::new(-0.3, -0.4, -0.866).normalize(),
+            bone_mm: 6.0,
+            brain_mm: 8.5,
+        }
+    }
+
+    /// Depth of the tip's centre below the entry, mm.
+    fn depth(site: &Site, tool: &ToolState) -> f32 {
+        (tool.tip() - site.entry).dot(site.inward)
+    }
+
+    fn ticks(script: &Script) -> impl Iterator<Item = ToolState> {
+        (0..=script.duration_ms() as u32).map(|tick| script.at(f64::from(tick)))
+    }
+
+    #[test]
+    fn every_name_builds_and_an_unknown_one_lists_them() {
+        for name in NAMES {
+            let script = Script::named(name, &site(), DEFAULT_DURATION_MS).unwrap();
+            assert_eq!((script.name(), script.duration_ms()), (name, DEFAULT_DURATION_MS));
+        }
+        let error = Script::named("lobotomy", &site(), 1000.0).unwrap_err().to_string();
+        assert!(NAMES.iter().all(|name| error.contains(name)), "{error}");
+    }
+
+    #[test]
+    fn the_burr_breaks_through_and_stops_at_the_brain() {
+        let (site, plan) = (site(), Plan::default());
+        let script = Script::named("craniotomy", &site, 20_000.0).unwrap();
+        let drilled = ticks(&script).filter(|tool| tool.buttons.has(Buttons::PEDAL));
+        let deepest = drilled.map(|tool| depth(&site, &tool)).fold(f32::MIN, f32::max);
+        let foremost = deepest + plan.burr_radius_mm;
+        assert!(foremost > site.bone_mm + 0.5, "foremost point {foremost} mm below the entry");
+        assert!(foremost < site.brain_mm + plan.burr_overlap_mm + 1e-3, "foremost point {foremost} mm below the entry");
+        let hole = (plan.burr_radius_mm.powi(2) - (site.bone_mm - deepest).max(0.0).powi(2)).sqrt();
+        assert!(hole > plan.probe_radius_mm, "hole of {hole} mm");
+        let share = ticks(&script).filter(|tool| tool.buttons.has(Buttons::PEDAL)).count() as f64 / 20_000.0;
+        assert!(share > 0.4, "drilling for {share} of the time");
+    }
+
+    #[test]
+    fn three_presses_reach_four_to_six_millimetres() {
+        let (site, plan) = (site(), Plan::default());
+        let script = Script::named("craniotomy-and-probe", &site, 20_000.0).unwrap();
+        let changed = ticks(&script).position(|tool| tool.buttons.has(Buttons::NEXT_TOOL)).unwrap();
+        let into_brain: Vec<f32> = ticks(&script)
+            .skip(changed)
+            .map(|tool| depth(&site, &tool) + plan.probe_radius_mm - site.brain_mm)
+            .collect();
+        let mut peaks = Vec::new();
+        for press in into_brain.chunk_by(|a, b| (*a > 0.0) == (*b > 0.0)).filter(|chunk| chunk[0] > 0.0) {
+            peaks.push(press.iter().copied().fold(0.0, f32::max));
+        }
+        assert_eq!(peaks.len(), 3, "{peaks:?}");
+        assert!(peaks.iter().all(|p| (4.0..=6.0).contains(p)), "{peaks:?}");
+    }
+
+    #[test]
+    fn the_next_tool_is_asked_for_once_and_far_from_the_patient() {
+        let script = Script::named("craniotomy-and-probe", &site(), 20_000.0).unwrap();
+        let all: Vec<ToolState> = ticks(&script).collect();
+        let presses =
+            all.windows(2).filter(|w| !w[0].buttons.has(Buttons::NEXT_TOOL) && w[1].buttons.has(Buttons::NEXT_TOOL));
+        assert_eq!(presses.count(), 1);
+        assert!(all.iter().filter(|t| t.buttons.has(Buttons::NEXT_TOOL)).all(|t| depth(&site(), t) < -30.0));
+    }
+
+    #[test]
+    fn the_shaft_points_out_along_the_hole() {
+        for inward in [Vec3::NEG_Z, Vec3::Z, Vec3::X, site().inward] {
+            let script = Script::named("probe", &Site { inward, ..site() }, 1000.0).unwrap();
+            assert!((script.at(500.0).world_from_tool.rotation * Vec3::Z + inward).length() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn unusable_sites_and_durations_are_named() {
+        let named = |site: &Site, ms: f64| Script::named("probe", site, ms).unwrap_err().to_string();
+        assert!(named(&Site { inward: Vec3::ZERO, ..site() }, 1.0).contains("inward"));
+        assert!(named(&Site { entry: Vec3::NAN, ..site() }, 1.0).contains("entry"));
+        assert!(named(&Site { bone_mm: -1.0, ..site() }, 1.0).contains("bone_mm"));
+        assert!(named(&Site { brain_mm: f32::NAN, ..site() }, 1.0).contains("brain_mm"));
+        for duration in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(Script::named("probe", &site(), duration), Err(ScriptError::Duration { .. })));
+        }
+    }
+
+    #[test]
+    fn after_its_end_it_is_finished_and_at_rest() {
+        let mut script = Script::named("craniotomy", &site(), 500.0).unwrap();
+        assert_eq!(script.read(500.0).status, Status::Fresh);
+        let end = script.read(501.0);
+        assert_eq!((end.status, end.tool.twist.linear), (Status::Finished, Vec3::ZERO));
+        assert!(depth(&site(), &end.tool) < -30.0);
+    }
+
+    proptest! {
+        #[test]
+        fn motion_is_continuous_and_velocity_is_its_derivative(name in 0usize..3, duration_ms in 50.0f64..60_000.0, at in 0.0f64..1.0) {
+            let script = Script::named(NAMES[name], &site(), duration_ms).unwrap();
+            let (t, h) = (at * duration_ms, duration_ms * 1e-4);
+            let (a, b) = (script.at(t), script.at(t + h));
+            let mean = (b.tip() - a.tip()) / h as f32;
+            // 60 mm in 7 % of the time is the fastest segment.
+            let bound = 60.0 * 1.875 / (0.07 * duration_ms) as f32;
+            prop_assert!(a.twist.linear.length() <= bound, "{} > {}", a.twist.linear.length(), bound);
+            let middle = script.at(t + h / 2.0).twist.linear;
+            prop_assert!((mean - middle).length() < 0.01 * bound + 1e-4 / h as f32, "{} against {}", mean, middle);
+            prop_assert!(a.is_finite());
+        }
+    }
+}

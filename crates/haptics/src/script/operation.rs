@@ -1,0 +1,156 @@
+//! The operations: what is done at a site, in shares of the whole time.
+
+use super::ScriptError;
+use super::path::Path;
+use trepan_geometry::{Buttons, Quat, Vec3};
+
+/// Where to operate.
+///
+/// ```text
+///      tool ↓ inward
+///   ────────●──────── entry: outer surface of the bone
+///   ▒▒▒▒▒▒▒▒▒▒▒▒▒▒▒▒▒ bone_mm thick
+///   ─────────────────
+///        gap
+///   ~~~~~~~~~~~~~~~~~ brain_mm below the entry
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Site {
+    /// Point on the outer surface of the bone, world mm.
+    pub entry: Vec3,
+    /// Unit direction into the head.
+    pub inward: Vec3,
+    /// Thickness of the bone along `inward`, mm.
+    pub bone_mm: f32,
+    /// Depth of the brain's surface below `entry` along `inward`, mm.
+    pub brain_mm: f32,
+}
+
+impl Site {
+    pub(super) fn check(&self) -> Result<(), ScriptError> {
+        let wrong = |field, value: String, wanted| Err(ScriptError::Site { field, value, wanted });
+        if !self.entry.is_finite() {
+            return wrong("entry", self.entry.to_string(), "a finite point");
+        }
+        if !((self.inward.length() - 1.0).abs() < 1e-3) {
+            return wrong("inward", self.inward.to_string(), "a direction of length 1");
+        }
+        if !(0.0..=50.0).contains(&self.bone_mm) {
+            return wrong("bone_mm", self.bone_mm.to_string(), "from 0 to 50 mm");
+        }
+        if !(0.0..=100.0).contains(&self.brain_mm) {
+            return wrong("brain_mm", self.brain_mm.to_string(), "from 0 to 100 mm");
+        }
+        Ok(())
+    }
+
+    /// The point `depth_mm` below the entry.
+    fn below(&self, depth_mm: f32) -> Vec3 {
+        self.entry + self.inward * depth_mm
+    }
+}
+
+/// How an operation is done: sizes of the tools and lengths of the ways.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Radius of the burr's ball, mm.
+    pub burr_radius_mm: f32,
+    /// Radius of the probe's ball, mm.
+    pub probe_radius_mm: f32,
+    /// Where a tool starts its approach, mm outside the bone.
+    pub start_mm: f32,
+    /// Where a tool is changed, mm outside the bone.
+    pub away_mm: f32,
+    /// How far past the inner side of the bone the burr's centre goes where there is room, mm.
+    pub breakthrough_mm: f32,
+    /// How far the burr's foremost point stays from the brain where there is room, mm.
+    pub burr_clearance_mm: f32,
+    /// How far the burr's foremost point may go into the brain to make a hole that the probe fits through, mm.
+    pub burr_overlap_mm: f32,
+    /// How deep each press of the probe goes into the brain, mm.
+    pub presses_mm: [f32; 3],
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self {
+            burr_radius_mm: 3.0,
+            probe_radius_mm: 2.0,
+            start_mm: 35.0,
+            away_mm: 40.0,
+            breakthrough_mm: 0.75,
+            burr_clearance_mm: 0.3,
+            burr_overlap_mm: 0.8,
+            presses_mm: [4.0, 5.0, 6.0],
+        }
+    }
+}
+
+impl Plan {
+    /// Where the burr's centre ends, mm below the entry.
+    ///
+    /// It goes `breakthrough_mm` past the bone, unless the brain is nearer; then it stops before the brain, unless the hole
+    /// at the bone's inner side would be too narrow for the probe; then it goes on, into the brain by the overlap at most.
+    pub fn burr_depth_mm(&self, site: &Site) -> f32 {
+        const ROOM_MM: f32 = 0.5;
+        let wanted = site.bone_mm + self.breakthrough_mm;
+        let clear_of_brain = site.brain_mm - self.burr_clearance_mm - self.burr_radius_mm;
+        let (burr, hole) = (self.burr_radius_mm, self.probe_radius_mm + ROOM_MM);
+        let wide_enough = site.bone_mm - (burr * burr - hole * hole).max(0.0).sqrt();
+        let deepest = site.brain_mm + self.burr_overlap_mm - self.burr_radius_mm;
+        wanted.min(clear_of_brain.max(wide_enough)).min(deepest)
+    }
+}
+
+/// One move: its share of the whole time, where it ends (mm below the entry), what is pressed.
+struct Move(&'static str, f64, f32, Buttons);
+
+const HANDS_OFF: Buttons = Buttons(0);
+
+/// The way of an operation that [`super::NAMES`] lists.
+pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Path {
+    let moves = match name {
+        "craniotomy" => craniotomy(site, plan),
+        "probe" => probe(site, plan),
+        _ => [craniotomy(site, plan), change(plan), probe(site, plan)].into_iter().flatten().collect(),
+    };
+    let whole: f64 = moves.iter().map(|m| m.1).sum();
+    let rotation = Quat::from_rotation_arc(Vec3::Z, -site.inward.normalize());
+    let mut path = Path::from(site.below(-plan.start_mm), rotation);
+    for Move(label, share, depth_mm, buttons) in moves {
+        path.to(label, duration_ms * share / whole, site.below(depth_mm), buttons);
+    }
+    path.end_at(duration_ms);
+    path
+}
+
+fn craniotomy(site: &Site, plan: &Plan) -> Vec<Move> {
+    let depth_mm = plan.burr_depth_mm(site);
+    vec![
+        Move("approach with the burr", 8.0, -plan.burr_radius_mm - 1.0, HANDS_OFF),
+        Move("drill", 43.0, depth_mm, Buttons::PEDAL),
+        Move("clean the hole", 2.0, depth_mm, Buttons::PEDAL),
+        Move("retreat", 7.0, -plan.away_mm, HANDS_OFF),
+    ]
+}
+
+fn change(plan: &Plan) -> Vec<Move> {
+    vec![
+        Move("change the tool", 1.5, -plan.away_mm, Buttons::NEXT_TOOL),
+        Move("take the probe", 1.5, -plan.away_mm, HANDS_OFF),
+    ]
+}
+
+fn probe(site: &Site, plan: &Plan) -> Vec<Move> {
+    let over_brain = site.brain_mm - plan.probe_radius_mm;
+    let mut moves = vec![Move("approach with the probe", 8.0, over_brain - 1.0, HANDS_OFF)];
+    for press_mm in plan.presses_mm {
+        moves.extend([
+            Move("press", 3.0, over_brain + press_mm, HANDS_OFF),
+            Move("hold", 1.5, over_brain + press_mm, HANDS_OFF),
+            Move("withdraw", 2.5, over_brain - 1.0, HANDS_OFF),
+        ]);
+    }
+    moves.push(Move("leave", 8.0, -plan.away_mm, HANDS_OFF));
+    moves
+}
