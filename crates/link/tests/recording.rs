@@ -1,0 +1,288 @@
+//! A recording survives what happens to files: a whole read, a cut at any byte, damage, a full disk.
+#![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
+
+use std::io::{Cursor, Seek, SeekFrom, Write};
+use std::path::Path;
+use trepan_geometry::{Pose, Quat, Twist, Vec3, Wrench};
+use trepan_link::wire::{CollisionRecord, EventRecord, SessionHeader, SolverRecord, TickRecord};
+use trepan_link::{LinkError, Recorder, Recording};
+
+fn header() -> SessionHeader {
+    SessionHeader {
+        app: "integrated".into(),
+        version: "0.1.0".into(),
+        case: "built-in".into(),
+        seed: 7,
+        hashes: [("ct".to_owned(), "00ff".to_owned())].into(),
+        config: [("rigid".to_owned(), "thesis".to_owned()), ("solver".to_owned(), "tled \"ü\"".to_owned())].into(),
+    }
+}
+
+/// Numbers of every bit pattern, from a counter (splitmix64).
+struct Noise(u64);
+
+impl Noise {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn float(&mut self) -> f32 {
+        f32::from_bits(self.bits() as u32)
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.float(), self.float(), self.float())
+    }
+
+    fn pose(&mut self) -> Pose {
+        Pose {
+            translation: self.vector(),
+            rotation: Quat::from_xyzw(self.float(), self.float(), self.float(), self.float()),
+            ..Pose::IDENTITY
+        }
+    }
+}
+
+fn tick(number: u64) -> TickRecord {
+    let mut noise = Noise(number);
+    TickRecord {
+        tick: number,
+        time_ms: number as f64 + 1e-7,
+        device: noise.pose(),
+        twist: Twist { linear: noise.vector(), angular: noise.vector() },
+        buttons: noise.bits() as u32,
+        proxy: noise.pose(),
+        wrench: Wrench { force: noise.vector(), torque: noise.vector() },
+        contact_normal: noise.vector(),
+        depth_mm: f32::NAN,
+        tissue_depth_mm: -0.0,
+        removed_mm3: f32::MIN_POSITIVE / 2.0,
+        brain_distance_mm: f32::NEG_INFINITY,
+        patch_seq: noise.bits(),
+        compute_us: noise.float(),
+        flags: TickRecord::LATE | TickRecord::DRILLING,
+        phase: noise.bits() as u8,
+        tool: noise.bits() as u8,
+    }
+}
+
+/// Every bit of a tick, in words.
+fn bits(t: &TickRecord) -> Vec<u64> {
+    let pose = |p: &Pose| [p.translation.to_array().to_vec(), p.rotation.to_array().to_vec()].concat();
+    let floats = [
+        pose(&t.device),
+        pose(&t.proxy),
+        [t.twist.linear, t.twist.angular, t.wrench.force, t.wrench.torque, t.contact_normal]
+            .map(|v| v.to_array())
+            .concat(),
+        vec![t.depth_mm, t.tissue_depth_mm, t.removed_mm3, t.brain_distance_mm, t.compute_us],
+    ]
+    .concat();
+    let whole =
+        [t.tick, t.time_ms.to_bits(), t.patch_seq, t.buttons.into(), t.flags.into(), t.phase.into(), t.tool.into()];
+    floats.iter().map(|f| u64::from(f.to_bits())).chain(whole).collect()
+}
+
+fn record<W: Write + Seek>(recorder: &mut Recorder<W>, ticks: u64) -> Result<(), LinkError> {
+    for number in 0..ticks {
+        recorder.tick(&tick(number))?;
+        recorder.collision(&CollisionRecord { seq: number, tick: number, points: 3, ..Default::default() })?;
+        if number % 7 == 0 {
+            recorder.solver(&SolverRecord { step: number, time_ms: 0.1, inverted: 2, ..Default::default() })?;
+        }
+        if number % 50 == 0 {
+            let kind = if number == 0 { "phase" } else { "warning" };
+            recorder.event(&EventRecord {
+                tick: number,
+                time_ms: number as f64,
+                kind: kind.into(),
+                text: "dura ahead: ½ mm".into(),
+            })?;
+        }
+    }
+    Ok(())
+}
+
+fn file(ticks: u64) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let mut recorder = Recorder::create(&path, &header()).unwrap();
+    record(&mut recorder, ticks).unwrap();
+    recorder.finish().unwrap();
+    std::fs::read(path).unwrap()
+}
+
+fn open(bytes: &[u8]) -> Result<Recording, LinkError> {
+    Recording::of_bytes(bytes, Path::new("session.mcap"))
+}
+
+#[test]
+fn every_record_comes_back_bit_for_bit() {
+    let recording = open(&file(1000)).unwrap();
+    assert_eq!((&recording.header, recording.truncated), (&header(), false));
+    assert_eq!(recording.ticks.len(), 1000);
+    for (number, read) in recording.ticks.iter().enumerate() {
+        assert_eq!(bits(read), bits(&tick(number as u64)));
+    }
+    assert_eq!((recording.collisions.len(), recording.solver.len(), recording.events.len()), (1000, 143, 20));
+    assert_eq!(recording.solver[1], SolverRecord { step: 7, time_ms: 0.1, inverted: 2, ..Default::default() });
+    assert_eq!((recording.events[1].kind.as_str(), recording.events[1].text.as_str()), ("warning", "dura ahead: ½ mm"));
+}
+
+#[test]
+fn the_same_session_makes_the_same_bytes() {
+    assert_eq!(file(300), file(300));
+}
+
+#[test]
+fn a_cut_at_any_byte_leaves_all_complete_chunks() {
+    let whole = file(900);
+    let mut last = 0;
+    let mut steps = std::collections::BTreeSet::new();
+    // The index holds no records: cuts in it are few.
+    for length in (0..whole.len()).filter(|l| l % 331 == 0 || *l < 600 || l + 600 > whole.len()) {
+        match open(&whole[..length]) {
+            Ok(recording) => {
+                let count = recording.ticks.len();
+                assert!(count >= last, "cut at {length}: {count} ticks after {last}");
+                assert!(recording.ticks.iter().enumerate().all(|(n, t)| bits(t) == bits(&tick(n as u64))));
+                assert!(recording.truncated || count == 900);
+                last = count;
+                steps.insert(count);
+            }
+            Err(LinkError::NotARecording { .. }) => assert!(length < 8, "{length}"),
+            Err(LinkError::NoHeader { .. }) => assert!(length < 1000 && last == 0, "{length}"),
+            Err(other) => panic!("cut at {length}: {other}"),
+        }
+    }
+    assert_eq!(last, 900);
+    let longest_loss = steps.iter().zip(steps.iter().skip(1)).map(|(a, b)| b - a).max().unwrap();
+    assert!(longest_loss <= 201, "{longest_loss} ticks lost at once: {steps:?}");
+}
+
+#[test]
+fn a_recorder_that_dies_unfinished_leaves_what_was_flushed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("killed.mcap");
+    let mut recorder = Recorder::create(&path, &header()).unwrap();
+    record(&mut recorder, 250).unwrap();
+    recorder.flush().unwrap();
+    std::mem::forget(recorder);
+    let recording = Recording::open(&path).unwrap();
+    assert_eq!((recording.ticks.len(), recording.truncated), (250, true));
+}
+
+#[test]
+fn damaged_files_never_panic_and_never_lie() {
+    let whole = file(450);
+    let mut noise = Noise(1);
+    for _ in 0..1500 {
+        let mut bytes = whole.clone();
+        for _ in 0..=noise.bits() % 4 {
+            let at = (noise.bits() % bytes.len() as u64) as usize;
+            match noise.bits() % 4 {
+                0 => bytes[at] = noise.bits() as u8,
+                1 => bytes[at] ^= 1 << (noise.bits() % 8),
+                2 => bytes.truncate(at.max(1)),
+                _ => {
+                    let end = (at + 8).min(bytes.len());
+                    bytes[at..end].fill(0xff);
+                }
+            }
+        }
+        if let Ok(recording) = open(&bytes) {
+            assert!(recording.ticks.len() <= 450);
+            // A checksum stands over every tick: what is given is what was recorded.
+            assert!(recording.ticks.iter().enumerate().all(|(n, t)| bits(t) == bits(&tick(n as u64))));
+        }
+    }
+}
+
+/// Where the record with this opcode begins.
+fn offset_of(opcode: u8, file: &[u8]) -> usize {
+    let mut at = 8;
+    while file[at] != opcode {
+        at += 9 + u64::from_le_bytes(file[at + 1..at + 9].try_into().unwrap()) as usize;
+    }
+    at
+}
+
+#[test]
+fn claims_of_huge_sizes_are_refused() {
+    const CHUNK: u8 = 6;
+    let whole = file(450);
+    let first = offset_of(CHUNK, &whole);
+    let claims = |field: usize, value: u64| {
+        let mut bytes = whole.clone();
+        bytes[first + field..first + field + 8].copy_from_slice(&value.to_le_bytes());
+        let recording = open(&bytes).unwrap();
+        assert!(recording.truncated && recording.ticks.is_empty(), "field at {field} = {value}");
+    };
+    for value in [u64::MAX, 1 << 60, 1 << 40, 17 << 20] {
+        claims(1, value); // length of the record
+        claims(9 + 16, value); // unpacked size
+    }
+}
+
+#[test]
+fn errors_name_the_file_and_the_remedy() {
+    let missing = Recording::open(Path::new("nowhere/session.mcap")).unwrap_err().to_string();
+    assert!(missing.contains("nowhere/session.mcap") && missing.contains("check the name"), "{missing}");
+    let folder = Recorder::create(Path::new("nowhere/session.mcap"), &header()).err().unwrap().to_string();
+    assert!(folder.contains("nowhere/session.mcap") && folder.contains("folder"), "{folder}");
+    let other = open(b"not a recording at all").unwrap_err().to_string();
+    assert!(other.contains("session.mcap") && other.contains("--record"), "{other}");
+}
+
+/// A disk with room for so many bytes.
+struct SmallDisk {
+    stream: Cursor<Vec<u8>>,
+    room: usize,
+}
+
+impl Write for SmallDisk {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let count = bytes.len().min(self.room.saturating_sub(self.stream.position() as usize));
+        if count == 0 && !bytes.is_empty() {
+            return Err(std::io::Error::from(std::io::ErrorKind::StorageFull));
+        }
+        self.stream.write(&bytes[..count])
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for SmallDisk {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.stream.seek(to)
+    }
+}
+
+#[test]
+fn a_full_disk_is_an_error_each_time_and_never_a_panic() {
+    let whole = file(600).len();
+    for room in (0..whole).step_by(1717) {
+        let disk = SmallDisk { stream: Cursor::new(Vec::new()), room };
+        let Ok(mut recorder) = Recorder::to(disk, Path::new("full.mcap"), &header()) else { continue };
+        let written = record(&mut recorder, 600);
+        if written.is_err() {
+            assert!(recorder.flush().is_err() && recorder.tick(&tick(0)).is_err());
+        }
+        let error = written.and_then(|()| recorder.finish()).unwrap_err().to_string();
+        assert!(error.contains("full.mcap") && error.contains("free some disk space"), "{error}");
+    }
+}
+
+#[test]
+fn times_that_are_no_numbers_are_recorded_as_they_are() {
+    let mut recorder = Recorder::to(Cursor::new(Vec::new()), Path::new("odd.mcap"), &header()).unwrap();
+    for time_ms in [f64::NAN, f64::INFINITY, -5.0, 1e300, 3.0] {
+        recorder.tick(&TickRecord { time_ms, ..TickRecord::default() }).unwrap();
+    }
+    recorder.finish().unwrap();
+}
