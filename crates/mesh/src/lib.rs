@@ -1,5 +1,39 @@
-//! Tetrahedral and triangle meshes.
+//! Tetrahedral and triangle meshes: what is a sound one, how its parts hang together, how good it is, and how to get one from a mask or a file.
+//!
+//! # Theory
+//! A [`TetMesh`] is two arrays: vertices and corner indices. Everything else is derived when needed: [`Topology`] (face neighbours, tetrahedra of
+//! a node), [`Surface`] (border triangles seen from outside), [`Quality`] (angles, volumes, edges). [`lattice`] fills a binary
+//! mask with tetrahedra by isosurface stuffing (Labelle and Shewchuk 2007), whose angles are bounded by proof.
+//!
+//! # Practice
+//! World mm, patient RAS+. Everything here runs when a case is loaded, never inside a tick. The same input gives the same bytes on any machine.
+//!
+//! ```
+//! use trepan_geometry::Vec3;
+//! use trepan_mesh::{Surface, lattice};
+//! use trepan_volume::VoxelVolume;
+//!
+//! let mut ball = VoxelVolume::isotropic([24, 24, 24], Vec3::splat(-11.5), 1.0, 0u8);
+//! for at in 0..ball.data.len() {
+//!     let centre = ball.centre_of([at % 24, at / 24 % 24, at / 576]);
+//!     ball.data[at] = u8::from(centre.length() < 9.0);
+//! }
+//! let mesh = lattice::tetrahedra(&ball, &lattice::Config { target_tets: 2000, ..Default::default() })?;
+//! assert!(mesh.check().is_ok() && Surface::of(&mesh).is_closed());
+//! # Ok::<(), trepan_mesh::MeshError>(())
+//! ```
 
+mod check;
+pub mod lattice;
+mod quality;
+mod surface;
 mod tets;
+mod topology;
+mod triangles;
 
+pub use check::MeshError;
+pub use quality::Quality;
+pub use surface::Surface;
 pub use tets::{FACES, OPPOSITE, TetMesh};
+pub use topology::{Csr, NONE, Topology};
+pub use triangles::TriMesh;
