@@ -1,4 +1,16 @@
 //! A tool's ball against a moving tetrahedral mesh: which points are inside, how deep, and what pushes back.
+//!
+//! # Theory
+//! Detection: 211 points on the ball, each in a tetrahedron or in none (thesis chapter 4). Response: one contact whose
+//! normal and depth stay continuous while the points change tetrahedra ([`Response`]). The load goes to the nodes under the contact as one
+//! spring ([`trepan_contact::NodalContact`]), equal and opposite.
+//!
+//! # Practice
+//! [`TissueCollision::step`] runs in the collision thread, once for each new state of the tissue; it allocates nothing, and what it found is one
+//! plain struct, [`TissueStep`]. Searches are a closed list, [`Method`], with an f64 oracle among them.
+//!
+//! # When not to use it
+//! For two meshes or a mesh against itself, for the tool's shaft, for cutting: connections of the mesh are fixed.
 
 pub mod broad;
 mod config;
@@ -16,3 +28,7 @@ pub use config::{Config, ConfigError};
 pub use method::Method;
 pub use response::Response;
 pub use step::{TissueCollision, TissueStep};
+
+#[doc = include_str!("../README.md")]
+#[cfg(doctest)]
+struct ReadmeExample;

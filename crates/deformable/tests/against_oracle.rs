@@ -1,0 +1,132 @@
+//! Every search against the f64 oracle, over random poses, jumps, deformed, torn and degenerate meshes.
+
+mod common;
+
+use common::{Random, block, deformed, tool_at};
+use glam::Vec3;
+use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
+use trepan_geometry::Tool;
+use trepan_mesh::TetMesh;
+
+/// Steps both methods over the same poses and meshes; every step must find the same number of points.
+fn same_points_as_oracle(method: Method, mesh: &TetMesh, radius: f32, poses: usize, jump: f32, seed: u64) {
+    let tool = Tool::probe(radius);
+    let new = |method| TissueCollision::new(mesh, &tool, &Config { method, points: 60, ..Config::default() }).unwrap();
+    let (mut tested, mut oracle) = (new(method), new(Method::Brute));
+    let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
+    let mut random = Random::new(seed);
+    let edge = mesh.positions[1].distance(mesh.positions[0]);
+    let bounds = mesh.bounds().inflated(radius);
+    let mut tip = bounds.centre();
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    let mut hits = 0;
+    for pose in 0..poses {
+        let positions = deformed(mesh, edge, pose as f32 * 0.01, &mut random);
+        let anywhere = bounds.min + (random.cube() * 0.5 + 0.5) * bounds.size();
+        tip = if random.unit() < jump { anywhere } else { tip + random.cube() * 0.5 };
+        let state = tool_at(tip, random.rotation());
+        tested.step(&positions, &still, &state, &mut found);
+        oracle.step(&positions, &still, &state, &mut truth);
+        assert_eq!(found.points_in_contact, truth.points_in_contact, "{} at pose {pose}, tip {tip}", method.name());
+        assert_eq!(found.overflow, 0);
+        assert_eq!(found.manifold, truth.manifold, "{} at pose {pose}", method.name());
+        hits += u32::from(truth.points_in_contact > 0);
+    }
+    assert!(hits as usize > poses / 10, "the poses hardly touch: {hits}");
+}
+
+fn complete() -> impl Iterator<Item = Method> {
+    [Method::Scan, Method::UniformGrid, Method::Walk].into_iter()
+}
+
+#[test]
+fn small_steps_on_a_deforming_block() {
+    let mesh = block([6, 5, 4], 5.0);
+    complete().for_each(|method| same_points_as_oracle(method, &mesh, 2.0, 250, 0.02, 7));
+}
+
+#[test]
+fn jumps_at_every_step() {
+    let mesh = block([6, 5, 4], 5.0);
+    complete().for_each(|method| same_points_as_oracle(method, &mesh, 2.0, 250, 1.0, 11));
+}
+
+#[test]
+fn a_tool_much_larger_than_the_tetrahedra() {
+    let mesh = block([6, 6, 6], 2.0);
+    complete().for_each(|method| same_points_as_oracle(method, &mesh, 5.0, 120, 0.2, 13));
+}
+
+#[test]
+fn a_tool_much_smaller_than_the_tetrahedra() {
+    let mesh = block([2, 2, 1], 30.0);
+    complete().for_each(|method| same_points_as_oracle(method, &mesh, 1.0, 250, 0.3, 17));
+}
+
+#[test]
+fn two_blocks_apart() {
+    let mut mesh = block([3, 3, 3], 4.0);
+    let first = mesh.positions.len() as u32;
+    let other = mesh.clone();
+    mesh.positions.extend(other.positions.iter().map(|p| *p + Vec3::new(20.0, 0.0, 0.0)));
+    mesh.tets.extend(other.tets.iter().map(|t| t.map(|n| n + first)));
+    complete().for_each(|method| same_points_as_oracle(method, &mesh, 1.5, 250, 0.1, 19));
+}
+
+/// Inverted, flat and NaN tetrahedra: the searches agree on what is left, count what they skip, and put out no NaN.
+#[test]
+fn degenerate_meshes_lose_nothing_and_give_no_nan() {
+    let mesh = block([4, 4, 3], 4.0);
+    let tool = Tool::probe(2.0);
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    for method in complete() {
+        let new =
+            |m| TissueCollision::new(&mesh, &tool, &Config { method: m, points: 60, ..Config::default() }).unwrap();
+        let (mut tested, mut oracle) = (new(method), new(Method::Brute));
+        let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
+        let mut random = Random::new(23);
+        let mut skipped = 0;
+        for pose in 0..300 {
+            let mut positions = deformed(&mesh, 4.0, 0.0, &mut random);
+            let place = |random: &mut Random| ((random.unit() * still.len() as f32) as usize).min(still.len() - 1);
+            let (nan, moved, doubled) = (place(&mut random), place(&mut random), place(&mut random));
+            positions[nan] = if pose % 3 == 0 { Vec3::NAN } else { positions[nan] };
+            positions[moved] += random.cube() * 8.0;
+            positions[doubled] = positions[moved];
+            let tip = (random.cube() * 0.5 + 0.5) * Vec3::new(16.0, 16.0, 12.0);
+            let state = tool_at(tip, random.rotation());
+            tested.step(&positions, &still, &state, &mut found);
+            oracle.step(&positions, &still, &state, &mut truth);
+            assert_eq!(found.points_in_contact, truth.points_in_contact, "{} at pose {pose}", method.name());
+            assert!(
+                found.manifold.is_finite() && found.nodal.offset_mm.is_finite() && found.patch.depth_mm.is_finite()
+            );
+            assert!(found.nodal.nodes().all(|(n, w)| w.is_finite() && positions[n as usize].is_finite()));
+            skipped += found.skipped;
+        }
+        assert!(skipped > 0);
+    }
+}
+
+#[test]
+fn the_thesis_never_sees_a_point_that_is_not_there() {
+    let mesh = block([6, 5, 4], 5.0);
+    let tool = Tool::probe(2.0);
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    let new = |method| TissueCollision::new(&mesh, &tool, &Config { method, ..Config::default() }).unwrap();
+    let (mut thesis, mut oracle) = (new(Method::Thesis), new(Method::Brute));
+    let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
+    let mut random = Random::new(29);
+    for _ in 0..200 {
+        let positions = deformed(&mesh, 5.0, 0.0, &mut random);
+        let state = tool_at((random.cube() * 0.6 + 0.5) * Vec3::new(30.0, 25.0, 20.0), random.rotation());
+        thesis.step(&positions, &still, &state, &mut found);
+        oracle.step(&positions, &still, &state, &mut truth);
+        assert!(found.points_in_contact <= truth.points_in_contact);
+        assert_eq!(
+            found.points_in_contact > 0,
+            truth.points_in_contact > 0,
+            "two rings may miss points, not the contact"
+        );
+    }
+}
