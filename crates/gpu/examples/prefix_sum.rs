@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut recorder = gpu.record("prefix sum").timed(timer.as_mut());
     let steps = count.trailing_zeros();
     for step in 0..steps {
-        let (from, to) = ((step % 2) as usize, (step % 2 ^ 1) as usize);
+        let (from, to) = ((step % 2) as usize, ((step + 1) % 2) as usize);
         let reach = Buffer::from_slice(&gpu, "reach", &[1u32 << step])?;
         let bindings = kernel.bind(&gpu, &[(&reach).into(), (&sums[from]).into(), (&sums[to]).into()])?;
         recorder.dispatch("step", &kernel, &bindings, [count / 256, 1, 1]);

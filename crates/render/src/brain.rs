@@ -1,0 +1,115 @@
+//! The brain's pass: the border of the tetrahedra where the physics has put it, with smooth normals.
+//!
+//! # Practice
+//! Only border nodes travel to the device, 32 bytes each a frame. Normals are the area-weighted mean of a node's triangles, made on the processor.
+
+use crate::RenderError;
+use crate::scene::Scene;
+use glam::{Vec3, Vec4};
+use trepan_gpu::{
+    Bindings, Buffer, Depth, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
+};
+use trepan_mesh::{Surface, TetMesh};
+
+/// The brain's border on the device.
+#[derive(Debug)]
+pub(crate) struct Brain {
+    /// Border nodes, as indices of the mesh.
+    nodes: Vec<u32>,
+    /// Triangles over `nodes`.
+    triangles: Vec<[u32; 3]>,
+    /// All nodes at rest, world mm.
+    rest: Vec<Vec3>,
+    /// Border nodes now, world mm.
+    pub places: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    device: Device,
+    pipeline: Pipeline,
+}
+
+#[derive(Debug)]
+struct Device {
+    places: Buffer<Vec4>,
+    normals: Buffer<Vec4>,
+    rest: Buffer<Vec4>,
+    corners: Buffer<[u32; 3]>,
+}
+
+impl Brain {
+    pub fn new(gpu: &Gpu, mesh: &TetMesh) -> Result<Self, RenderError> {
+        let surface = Surface::of(mesh);
+        let nodes = surface.nodes();
+        // Every corner is in the sorted list of nodes that was made from the corners.
+        let local = |n: u32| nodes.partition_point(|&m| m < n) as u32;
+        let triangles: Vec<[u32; 3]> = surface.triangles.iter().map(|t| t.map(local)).collect();
+        let places: Vec<Vec3> = nodes.iter().map(|&n| mesh.positions[n as usize]).collect();
+        let device = Device {
+            places: Buffer::zeroed(gpu, "brain places", nodes.len())?,
+            normals: Buffer::zeroed(gpu, "brain normals", nodes.len())?,
+            rest: Buffer::from_slice(gpu, "brain at rest", &places.iter().map(|p| p.extend(1.0)).collect::<Vec<_>>())?,
+            corners: Buffer::from_slice(gpu, "brain corners", &triangles)?,
+        };
+        let slots = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage];
+        let pipeline = Pipeline::new(
+            gpu,
+            &PipelineSpec {
+                label: "brain",
+                wgsl: trepan_shaders::RENDER_BRAIN,
+                slots: &slots,
+                targets: &[Format::Rgba32Float, Format::Rgba16Float],
+                depth: true,
+                blend: false,
+                topology: Topology::Triangles,
+            },
+        )?;
+        let normals = vec![Vec3::ZERO; nodes.len()];
+        Ok(Self { nodes, triangles, rest: mesh.positions.clone(), places, normals, device, pipeline })
+    }
+
+    /// Moves the border to where the nodes of the whole mesh are, or back to rest.
+    pub fn follow(&mut self, gpu: &Gpu, positions: Option<&[Vec3]>) -> Result<(), RenderError> {
+        let positions = positions.unwrap_or(&self.rest);
+        let (given, wanted) = (positions.len(), self.rest.len());
+        if given != wanted {
+            return Err(RenderError::Nodes { wanted, given });
+        }
+        self.places.iter_mut().zip(&self.nodes).for_each(|(place, &n)| *place = positions[n as usize]);
+        smooth_normals(&self.places, &self.triangles, &mut self.normals);
+        let wide = |v: &[Vec3]| v.iter().map(|p| p.extend(1.0)).collect::<Vec<_>>();
+        self.device.places.write(gpu, 0, &wide(&self.places));
+        self.device.normals.write(gpu, 0, &wide(&self.normals));
+        Ok(())
+    }
+
+    /// The triangles of the border as they are now.
+    pub fn triangles(&self) -> impl Iterator<Item = [Vec3; 3]> + Clone + '_ {
+        self.triangles.iter().map(|t| t.map(|n| self.places[n as usize]))
+    }
+
+    /// Binds the pass to the frame's uniform.
+    pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Bindings, RenderError> {
+        let d = &self.device;
+        Ok(self.pipeline.bind(
+            gpu,
+            &[scene.into(), (&d.places).into(), (&d.normals).into(), (&d.rest).into(), (&d.corners).into()],
+        )?)
+    }
+
+    /// Draws the border into what was cleared before.
+    pub fn draw(&self, recorder: &mut Recorder, bindings: &Bindings, hit: &Texture, rest: &Texture, depth: &Texture) {
+        let colours = [Target { texture: hit, clear: Some([0.0; 4]) }, Target { texture: rest, clear: Some([0.0; 4]) }];
+        let target = DrawTarget { colours: &colours, depth: Some(Depth { texture: depth, clear: Some(1.0) }) };
+        recorder.draw("brain", &target, |d| d.draw(&self.pipeline, bindings, 3 * self.triangles.len() as u32));
+    }
+}
+
+/// Area-weighted mean of the triangles' normals at every node; zero where all cancel.
+fn smooth_normals(places: &[Vec3], triangles: &[[u32; 3]], normals: &mut [Vec3]) {
+    normals.fill(Vec3::ZERO);
+    for corners in triangles {
+        let [a, b, c] = corners.map(|n| places[n as usize]);
+        let twice_area = (b - a).cross(c - a);
+        corners.iter().for_each(|&n| normals[n as usize] += twice_area);
+    }
+    normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
+}

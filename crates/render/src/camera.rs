@@ -1,0 +1,139 @@
+//! A camera that circles a target.
+//!
+//! # Practice
+//! World mm, z up. Elevation stops just short of the poles, so up is always defined. `viewed_from` puts the eye along a direction: seen from in front, the
+//! patient's right is on the left of the picture.
+
+use glam::{Mat4, Vec2, Vec3};
+
+/// Where the eye is and what it looks at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// The point in the middle of the picture, world mm.
+    pub target: Vec3,
+    /// Turn of the eye around z, from +x towards +y, rad.
+    pub azimuth_rad: f32,
+    /// Height of the eye over the target's horizon, rad.
+    pub elevation_rad: f32,
+    /// From the target to the eye, mm.
+    pub distance_mm: f32,
+    /// Opening angle from the lower to the upper edge, rad.
+    pub fov_rad: f32,
+}
+
+/// The camera as vectors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The eye, world mm.
+    pub eye: Vec3,
+    /// Unit, to the right in the picture.
+    pub right: Vec3,
+    /// Unit, upwards in the picture.
+    pub up: Vec3,
+    /// Unit, into the picture.
+    pub forward: Vec3,
+    /// Half the picture's width and height at distance 1.
+    pub half: Vec2,
+}
+
+const STEEPEST_RAD: f32 = 1.55;
+
+impl Camera {
+    /// An eye at `distance_mm` from `target` in the direction `towards_eye` (any length; zero means from in front).
+    pub fn viewed_from(target: Vec3, towards_eye: Vec3, distance_mm: f32) -> Self {
+        let d = towards_eye.try_normalize().unwrap_or(Vec3::Y);
+        let azimuth_rad = if d.x.hypot(d.y) < 1e-4 { core::f32::consts::FRAC_PI_2 } else { d.y.atan2(d.x) };
+        let elevation_rad = d.z.clamp(-1.0, 1.0).asin().clamp(-STEEPEST_RAD, STEEPEST_RAD);
+        Self { target, azimuth_rad, elevation_rad, distance_mm, fov_rad: 0.6 }
+    }
+
+    /// Turns around the target, rad; to the right and upwards.
+    pub fn orbit(&mut self, azimuth_rad: f32, elevation_rad: f32) {
+        self.azimuth_rad = (self.azimuth_rad + azimuth_rad) % core::f32::consts::TAU;
+        self.elevation_rad = (self.elevation_rad + elevation_rad).clamp(-STEEPEST_RAD, STEEPEST_RAD);
+    }
+
+    /// Goes nearer (factor under 1) or farther, between 2 mm and 5 m.
+    pub fn zoom(&mut self, factor: f32) {
+        self.distance_mm = (self.distance_mm * factor).clamp(2.0, 5000.0);
+    }
+
+    /// The camera as vectors, for a picture of some width over height.
+    pub fn view(&self, aspect: f32) -> View {
+        let elevation = self.elevation_rad.clamp(-STEEPEST_RAD, STEEPEST_RAD);
+        let ring = elevation.cos();
+        let back = Vec3::new(ring * self.azimuth_rad.cos(), ring * self.azimuth_rad.sin(), elevation.sin());
+        let right = Vec3::Z.cross(back).normalize();
+        let half = (0.5 * self.fov_rad).tan();
+        View {
+            eye: self.target + self.distance_mm * back,
+            right,
+            up: back.cross(right),
+            forward: -back,
+            half: Vec2::new(half * aspect, half),
+        }
+    }
+}
+
+impl View {
+    /// Nearest distance that triangles are drawn at, mm.
+    pub const NEAR_MM: f32 = 0.5;
+    /// Farthest distance that triangles are drawn at, mm.
+    pub const FAR_MM: f32 = 6000.0;
+
+    /// Unit direction of the ray through a point of the picture, each coordinate from -1 (left, bottom) to 1 (right, top).
+    pub fn ray(&self, at: Vec2) -> Vec3 {
+        (self.forward + at.x * self.half.x * self.right + at.y * self.half.y * self.up).normalize()
+    }
+
+    /// Where a world point is in the picture, from -1 to 1, and its depth along `forward`, mm.
+    pub fn project(&self, point: Vec3) -> (Vec2, f32) {
+        let from = point - self.eye;
+        let depth = from.dot(self.forward);
+        (Vec2::new(from.dot(self.right), from.dot(self.up)) / (self.half * depth), depth)
+    }
+
+    /// The same as a matrix for drawing triangles.
+    pub fn clip_from_world(&self) -> Mat4 {
+        let aspect = self.half.x / self.half.y;
+        let clip_from_eye =
+            glam::camera::rh::proj::directx::perspective(2.0 * self.half.y.atan(), aspect, Self::NEAR_MM, Self::FAR_MM);
+        clip_from_eye * glam::camera::rh::view::look_to_mat4(self.eye, self.forward, self.up)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn seen_from_in_front_the_patients_right_is_on_the_left() {
+        let view = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 400.0).view(1.0);
+        assert!((view.eye - Vec3::new(0.0, 400.0, 0.0)).length() < 1e-3);
+        assert!((view.right - Vec3::NEG_X).length() < 1e-5 && (view.up - Vec3::Z).length() < 1e-5);
+    }
+
+    #[test]
+    fn over_a_pole_up_is_still_defined() {
+        let mut camera = Camera::viewed_from(Vec3::ONE, Vec3::Z, 100.0);
+        camera.orbit(1.0, 9.0);
+        let view = camera.view(2.0);
+        assert!(view.right.is_normalized() && view.up.is_normalized() && view.up.dot(view.forward).abs() < 1e-5);
+    }
+
+    proptest! {
+        #[test]
+        fn matrix_projection_and_ray_agree(azimuth in -3.0f32..3.0, elevation in -1.5f32..1.5, x in -40.0f32..40.0, y in -40.0f32..40.0, z in -40.0f32..40.0) {
+            let camera = Camera { target: Vec3::new(3.0, -8.0, 5.0), azimuth_rad: azimuth, elevation_rad: elevation, distance_mm: 200.0, fov_rad: 0.7 };
+            let view = camera.view(1.4);
+            let point = Vec3::new(x, y, z);
+            let (at, depth) = view.project(point);
+            let clip = view.clip_from_world() * point.extend(1.0);
+            prop_assert!((at - Vec2::new(clip.x, clip.y) / clip.w).length() < 1e-3);
+            prop_assert!((depth - clip.w).abs() < 1e-2);
+            let along = view.ray(at);
+            prop_assert!((point - view.eye).cross(along).length() < 0.02);
+        }
+    }
+}

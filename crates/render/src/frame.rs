@@ -1,0 +1,81 @@
+//! What a picture is made of: the scene that stays and the frame that changes.
+
+use crate::Camera;
+use glam::Vec3;
+use std::sync::Arc;
+use trepan_geometry::{Pose, Tool};
+use trepan_mesh::TetMesh;
+use trepan_volume::{BoneVolume, VoxelVolume};
+
+/// What stays for the whole session.
+#[derive(Clone, Debug)]
+pub struct SceneData<'a> {
+    /// The skull; the picture follows its changes.
+    pub bone: Arc<BoneVolume>,
+    /// The brain at rest.
+    pub brain: Option<&'a TetMesh>,
+    /// The MRI in patient space, any range.
+    pub mri: Option<&'a VoxelVolume<f32>>,
+}
+
+/// What one picture shows.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// Where the eye is.
+    pub camera: Camera,
+    /// The tool, if one is shown.
+    pub tool: Option<Tool>,
+    /// Where the tool is; slices pass through its tip.
+    pub world_from_tool: Pose,
+    /// Turn of the burr around its shaft, rad.
+    pub turn_rad: f32,
+    /// Whether the burr cuts.
+    pub drilling: bool,
+    /// Nodes of the brain now, world mm, in the order of the mesh; `None` shows it at rest.
+    pub brain_positions: Option<&'a [Vec3]>,
+    /// Whether the skull is shown in the 3-D view.
+    pub show_bone: bool,
+    /// Whether the brain is shown in the 3-D view.
+    pub show_brain: bool,
+    /// Grey values of the slices.
+    pub slices: SliceLook,
+}
+
+/// How the slices look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SliceLook {
+    /// Whether there are slices beside the 3-D view.
+    pub shown: bool,
+    /// Density in the middle of the grey scale, HU.
+    pub level_hu: f32,
+    /// Densities from black to white, HU.
+    pub width_hu: f32,
+    /// Share of the MRI where there is no bone: 0 is CT only, 1 is MRI only.
+    pub mri_share: f32,
+    /// Half the height of what a slice shows, mm; `None` shows the whole volume.
+    pub half_height_mm: Option<f32>,
+}
+
+impl Default for SliceLook {
+    /// A bone window, with the MRI inside the skull.
+    fn default() -> Self {
+        Self { shown: true, level_hu: 500.0, width_hu: 2000.0, mri_share: 0.85, half_height_mm: None }
+    }
+}
+
+impl Frame<'_> {
+    /// A picture without a tool, with everything else shown.
+    pub fn of(camera: Camera) -> Self {
+        Self {
+            camera,
+            tool: None,
+            world_from_tool: Pose::from_translation(camera.target),
+            turn_rad: 0.0,
+            drilling: false,
+            brain_positions: None,
+            show_bone: true,
+            show_brain: true,
+            slices: SliceLook::default(),
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! The lighting pass: the nearest of bone, brain and tool at each pixel of the 3-D view, lit.
+
+use crate::RenderError;
+use crate::scene::Scene;
+use trepan_gpu::{
+    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
+    Topology,
+};
+
+/// The pass.
+#[derive(Debug)]
+pub(crate) struct Light {
+    pipeline: Pipeline,
+}
+
+/// What the pass reads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Inputs<'a> {
+    pub skull_hit: &'a Texture,
+    pub brain_hit: &'a Texture,
+    pub brain_rest: &'a Texture,
+    pub mri: &'a Texture,
+    pub density: &'a Texture,
+    pub crowd: &'a Texture,
+}
+
+impl Light {
+    pub fn new(gpu: &Gpu) -> Result<Self, RenderError> {
+        let volume = Slot::Texture3;
+        let slots = [Slot::Uniform, Slot::Loaded2, Slot::Loaded2, Slot::Loaded2, volume, Slot::Sampler, volume, volume];
+        let spec = PipelineSpec {
+            label: "light",
+            wgsl: trepan_shaders::RENDER_LIGHT,
+            slots: &slots,
+            targets: &[Format::Rgba8Unorm],
+            depth: false,
+            blend: false,
+            topology: Topology::Triangles,
+        };
+        Ok(Self { pipeline: Pipeline::new(gpu, &spec)? })
+    }
+
+    pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>, from: &Inputs) -> Result<Bindings, RenderError> {
+        let hits = [scene.into(), from.skull_hit.into(), from.brain_hit.into(), from.brain_rest.into()];
+        let volumes = [from.mri.into(), Resource::Linear, from.density.into(), from.crowd.into()];
+        Ok(self.pipeline.bind(gpu, &[hits, volumes].concat())?)
+    }
+
+    pub fn draw(&self, recorder: &mut Recorder, bindings: &Bindings, view: [u32; 4], picture: &Texture) {
+        let colours = [Target { texture: picture, clear: Some([0.0, 0.0, 0.0, 1.0]) }];
+        recorder.draw("light", &DrawTarget { colours: &colours, depth: None }, |d| {
+            d.viewport(view);
+            d.draw(&self.pipeline, bindings, 3);
+        });
+    }
+}

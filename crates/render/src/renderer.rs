@@ -1,0 +1,279 @@
+//! The picture from its parts: newest poses → changed bricks → brain → rays → light → slices.
+
+use crate::RenderError;
+use crate::brain::Brain;
+use crate::camera::View;
+use crate::contour::Contour;
+use crate::frame::{Frame, SceneData};
+use crate::image::Image;
+use crate::layout::Layout;
+use crate::light::{Inputs, Light};
+use crate::mri::Mri;
+use crate::scene::Scene;
+use crate::skull::{NOTHING, Skull};
+use crate::slice::{Plane, Slices};
+use glam::Vec3;
+use trepan_geometry::Aabb;
+use trepan_gpu::{Bindings, Buffer, DrawTarget, Format, Gpu, PassTime, Recorder, Target, Texture, TextureSpec, Timer};
+
+/// Changed bricks that one picture takes over, by default: 1 MiB of densities.
+pub const BRICKS_PER_FRAME: usize = 1024;
+
+/// Draws pictures of one scene into a texture.
+#[derive(Debug)]
+pub struct Renderer {
+    gpu: Gpu,
+    scene: Buffer<Scene>,
+    skull: Skull,
+    brain: Option<Brain>,
+    mri: Mri,
+    light: Light,
+    slices: Slices,
+    contour: Option<Contour>,
+    canvas: Canvas,
+    bounds: Aabb,
+    timer: Option<Timer>,
+    /// Changed bricks that one picture takes over at most; the rest comes with the next pictures.
+    pub bricks_per_frame: usize,
+}
+
+/// What drawing a picture came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DrawReport {
+    /// Changed bricks taken over.
+    pub bricks: u32,
+    /// Changed bricks left for the next picture.
+    pub bricks_left: u32,
+    /// Pixels whose rays through the bone were cast again.
+    pub pixels_cast: u32,
+    /// Lines of the brain's outline that found no room.
+    pub lines_left: u32,
+}
+
+/// What one size of picture needs.
+#[derive(Debug)]
+struct Canvas {
+    layout: Layout,
+    picture: Texture,
+    skull_hit: Texture,
+    brain_hit: Texture,
+    brain_rest: Texture,
+    depth: Texture,
+    skull: Bindings,
+    light: Bindings,
+    brain: Option<Bindings>,
+}
+
+impl Renderer {
+    /// Loads a scene for pictures of `size` pixels, width and height.
+    pub fn new(gpu: &Gpu, data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
+        let scene = Buffer::zeroed(gpu, "scene", 1)?;
+        let skull = Skull::new(gpu, data.bone.clone())?;
+        let brain = data.brain.map(|mesh| Brain::new(gpu, mesh)).transpose()?;
+        let mri = Mri::new(gpu, data.mri)?;
+        let light = Light::new(gpu)?;
+        let slices = Slices::new(gpu, &scene, &skull.density, &mri.texture)?;
+        let contour = brain.is_some().then(|| Contour::new(gpu, &scene, Vec3::new(1.0, 0.45, 0.55))).transpose()?;
+        let last = glam::IVec3::from(data.bone.dims().map(|n| n as i32 - 1));
+        let bounds = Aabb { min: data.bone.origin(), max: data.bone.centre_of(last) };
+        let canvas = Canvas::new(gpu, size, true, &scene, &skull, brain.as_ref(), &mri, &light)?;
+        let timer = Timer::new(gpu, 16)?;
+        Ok(Self {
+            gpu: gpu.clone(),
+            scene,
+            skull,
+            brain,
+            mri,
+            light,
+            slices,
+            contour,
+            canvas,
+            bounds,
+            timer,
+            bricks_per_frame: BRICKS_PER_FRAME,
+        })
+    }
+
+    /// Draws a picture; does not wait for the device.
+    pub fn draw(&mut self, frame: &Frame) -> Result<DrawReport, RenderError> {
+        self.divide(self.size(), frame.slices.shown)?;
+        let view = self.view(frame);
+        let followed = self.skull.follow(&self.gpu, self.bricks_per_frame);
+        if let Some(brain) = &mut self.brain {
+            brain.follow(&self.gpu, frame.brain_positions)?;
+        }
+        let [_, _, width, height] = self.canvas.layout.view;
+        let mri_from_world = self.mri.texture_from_world;
+        let scene = Scene::of(frame, &view, [width, height], &self.skull.grid, mri_from_world, self.brain.is_some());
+        self.scene.write(&self.gpu, 0, &[scene]);
+        let lines_left = self.follow_slices(frame);
+        let mut timer = self.timer.take();
+        let gpu = self.gpu.clone();
+        let mut recorder = gpu.record("picture").timed(timer.as_mut());
+        let pixels_cast = self.draw_view(&mut recorder, frame, &view);
+        self.draw_slices(&mut recorder);
+        recorder.submit();
+        self.timer = timer;
+        Ok(DrawReport { bricks: followed.bricks, bricks_left: followed.left, pixels_cast, lines_left })
+    }
+
+    /// The bone, the brain and the tool.
+    fn draw_view(&mut self, recorder: &mut Recorder, frame: &Frame, view: &View) -> u32 {
+        let canvas = &self.canvas;
+        match (&self.brain, &canvas.brain) {
+            (Some(brain), Some(bindings)) if frame.show_brain => {
+                brain.draw(recorder, bindings, &canvas.brain_hit, &canvas.brain_rest, &canvas.depth);
+            }
+            _ => clear(recorder, &canvas.brain_hit, 0.0),
+        }
+        let pixels_cast = if frame.show_bone {
+            self.skull.cast(recorder, &canvas.skull, view, &canvas.skull_hit)
+        } else {
+            self.skull.forget();
+            clear(recorder, &canvas.skull_hit, f64::from(NOTHING));
+            0
+        };
+        self.light.draw(recorder, &canvas.light, canvas.layout.view, &canvas.picture);
+        pixels_cast
+    }
+
+    fn draw_slices(&self, recorder: &mut Recorder) {
+        if let Some(rectangles) = &self.canvas.layout.slices {
+            self.slices.draw(recorder, rectangles, &self.canvas.picture);
+            if let Some(contour) = &self.contour {
+                contour.draw(recorder, rectangles, &self.canvas.picture);
+            }
+        }
+    }
+
+    fn follow_slices(&mut self, frame: &Frame) -> u32 {
+        let Some(rectangles) = &self.canvas.layout.slices else { return 0 };
+        let planes =
+            Plane::three(frame.world_from_tool.translation, self.bounds, frame.slices.half_height_mm, rectangles);
+        self.slices.follow(&self.gpu, &planes, rectangles, &frame.slices);
+        match (&mut self.contour, &self.brain) {
+            (Some(contour), Some(brain)) => contour.follow(&self.gpu, &planes, brain.triangles()),
+            _ => 0,
+        }
+    }
+
+    /// Changes the size of the pictures, width and height.
+    pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
+        self.divide(size, self.canvas.layout.slices.is_some())
+    }
+
+    fn divide(&mut self, [width, height]: [u32; 2], slices: bool) -> Result<(), RenderError> {
+        if self.size() != [width, height] || self.canvas.layout != Layout::of(width, height, slices) {
+            let (skull, brain) = (&self.skull, self.brain.as_ref());
+            self.canvas =
+                Canvas::new(&self.gpu, [width, height], slices, &self.scene, skull, brain, &self.mri, &self.light)?;
+            self.skull.forget();
+        }
+        Ok(())
+    }
+
+    /// Pixels of the picture, width and height.
+    pub fn size(&self) -> [u32; 2] {
+        let [width, height, _] = self.canvas.picture.size();
+        [width, height]
+    }
+
+    /// Which part of the picture is what.
+    pub fn layout(&self) -> Layout {
+        self.canvas.layout
+    }
+
+    /// The camera of a frame as vectors, for the 3-D view of this picture.
+    pub fn view(&self, frame: &Frame) -> View {
+        let [_, _, width, height] = self.canvas.layout.view;
+        frame.camera.view(width as f32 / height as f32)
+    }
+
+    /// The newest picture on the device.
+    pub fn texture(&self) -> &Texture {
+        &self.canvas.picture
+    }
+
+    /// Waits for the newest picture and copies it.
+    pub fn image(&self) -> Result<Image, RenderError> {
+        let [width, height] = self.size();
+        Ok(Image { width, height, rgba: self.canvas.picture.read::<u8>(&self.gpu)? })
+    }
+
+    /// Waits for the newest picture and gives the bone at each pixel of its 3-D view, row by row.
+    pub fn bone_hits(&self) -> Result<Vec<Option<Hit>>, RenderError> {
+        let hits = self.canvas.skull_hit.read::<[f32; 4]>(&self.gpu)?;
+        let hit = |h: [f32; 4]| (h[3] < NOTHING).then(|| Hit { distance_mm: h[3], normal: unfold([h[0], h[1]]) });
+        Ok(hits.into_iter().map(hit).collect())
+    }
+
+    /// Waits for the newest picture and gives the device's time for each pass; empty where it cannot measure.
+    pub fn pass_times(&self) -> Result<Vec<PassTime>, RenderError> {
+        Ok(self.timer.as_ref().map(|t| t.read(&self.gpu)).transpose()?.unwrap_or_default())
+    }
+}
+
+/// Where a ray meets bone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// From the eye, mm.
+    pub distance_mm: f32,
+    /// Unit, outwards.
+    pub normal: Vec3,
+}
+
+/// The unit vector that two octahedral coordinates stand for.
+fn unfold([x, y]: [f32; 2]) -> Vec3 {
+    let z = 1.0 - x.abs() - y.abs();
+    let folded = if z < 0.0 { [(1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)] } else { [x, y] };
+    Vec3::new(folded[0], folded[1], z).normalize_or(Vec3::Z)
+}
+
+fn clear(recorder: &mut Recorder, texture: &Texture, value: f64) {
+    let colours = [Target { texture, clear: Some([0.0, 0.0, 0.0, value]) }];
+    recorder.draw("clear", &DrawTarget { colours: &colours, depth: None }, |_| ());
+}
+
+impl Canvas {
+    fn new(
+        gpu: &Gpu,
+        [width, height]: [u32; 2],
+        slices: bool,
+        scene: &Buffer<Scene>,
+        skull: &Skull,
+        brain: Option<&Brain>,
+        mri: &Mri,
+        light: &Light,
+    ) -> Result<Self, RenderError> {
+        if width == 0 || height == 0 {
+            return Err(RenderError::Size(width, height));
+        }
+        let layout = Layout::of(width, height, slices);
+        let sheet = |label, width, height, format| {
+            Texture::new(gpu, &TextureSpec { label, size: [width, height, 1], volume: false, format, drawn_to: true })
+        };
+        let [_, _, w, h] = layout.view;
+        let skull_hit = sheet("skull hit", w, h, Format::Rgba32Float)?;
+        let brain_hit = sheet("brain hit", w, h, Format::Rgba32Float)?;
+        let brain_rest = sheet("brain rest", w, h, Format::Rgba16Float)?;
+        let inputs = Inputs {
+            skull_hit: &skull_hit,
+            brain_hit: &brain_hit,
+            brain_rest: &brain_rest,
+            mri: &mri.texture,
+            density: &skull.density,
+            crowd: &skull.crowd,
+        };
+        Ok(Self {
+            layout,
+            picture: sheet("picture", width, height, Format::Rgba8Unorm)?,
+            depth: sheet("depth", w, h, Format::Depth32Float)?,
+            skull: skull.bind(gpu, scene)?,
+            light: light.bind(gpu, scene, &inputs)?,
+            brain: brain.map(|b| b.bind(gpu, scene)).transpose()?,
+            skull_hit,
+            brain_hit,
+            brain_rest,
+        })
+    }
+}

@@ -1,0 +1,142 @@
+//! The three orthogonal slices through the tool's tip.
+//!
+//! # Practice
+//! Radiological convention: the patient is seen from the feet (axial) and from in front (coronal), so the patient's right, R, is on the left of
+//! the picture. The sagittal slice looks from the patient's left: the face, A, is on the left.
+//!
+//! ```text
+//!  axial      coronal    sagittal
+//!    A           S          S
+//!  R   L       R   L      A   P
+//!    P           I          I
+//! ```
+
+use crate::RenderError;
+use crate::frame::SliceLook;
+use crate::scene::Scene;
+use glam::{Vec2, Vec3, Vec4};
+use trepan_geometry::Aabb;
+use trepan_gpu::{
+    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
+    Topology,
+};
+
+/// Numbers of the letters R L A P S I in the shader's font.
+const LETTERS: [[f32; 4]; 3] = [[0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 4.0, 5.0], [2.0, 3.0, 4.0, 5.0]];
+
+/// To the right and upwards in the picture: axial, coronal, sagittal; +x is the patient's right, +y the front, +z the head.
+const AXES: [[Vec3; 2]; 3] = [[Vec3::NEG_X, Vec3::Y], [Vec3::NEG_X, Vec3::Z], [Vec3::NEG_Y, Vec3::Z]];
+
+/// A slice: a plane and what of it the picture shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Plane {
+    pub centre: Vec3,
+    pub right: Vec3,
+    pub up: Vec3,
+    /// From the middle of the picture to its right and upper edge, mm.
+    pub half: Vec2,
+}
+
+/// Twin of the shader's `Slice`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+struct Slice {
+    centre: Vec4,
+    right: Vec4,
+    up: Vec4,
+    window: Vec4,
+    corner: Vec4,
+    colour: Vec4,
+}
+
+/// The pass.
+#[derive(Debug)]
+pub(crate) struct Slices {
+    pipeline: Pipeline,
+    uniforms: [Buffer<Slice>; 3],
+    bindings: [Bindings; 3],
+}
+
+impl Plane {
+    /// The three slices through a point. The whole box is shown, centred, or what is around the point.
+    pub fn three(through: Vec3, bounds: Aabb, half_height_mm: Option<f32>, rectangles: &[[u32; 4]; 3]) -> [Self; 3] {
+        [0, 1, 2].map(|n| {
+            let [right, up] = AXES[n];
+            let aspect = rectangles[n][2] as f32 / rectangles[n][3].max(1) as f32;
+            let size = 0.5 * bounds.size();
+            let whole = size.dot(up.abs()).max(size.dot(right.abs()) / aspect) * 1.04;
+            let normal = right.cross(up);
+            let around = if half_height_mm.is_some() { through } else { bounds.centre() };
+            let centre = around + normal * normal.dot(through - around);
+            let height = half_height_mm.unwrap_or(whole).max(1.0);
+            Self { centre, right, up, half: Vec2::new(height * aspect, height) }
+        })
+    }
+
+    /// Where the plane cuts a triangle, in the picture's coordinates from -1 to 1.
+    pub fn cut(&self, triangle: [Vec3; 3]) -> Option<[Vec2; 2]> {
+        let normal = self.right.cross(self.up);
+        let height = triangle.map(|p| (p - self.centre).dot(normal));
+        let over = height.map(|h| h >= 0.0);
+        if over == [over[0]; 3] {
+            return None;
+        }
+        // The corner that is alone on its side.
+        let alone = (0..3).find(|&n| over[n] != over[(n + 1) % 3] && over[n] != over[(n + 2) % 3])?;
+        let end = |other: usize| {
+            let share = height[alone] / (height[alone] - height[other]);
+            let from = triangle[alone].lerp(triangle[other], share) - self.centre;
+            Vec2::new(from.dot(self.right), from.dot(self.up)) / self.half
+        };
+        Some([end((alone + 1) % 3), end((alone + 2) % 3)])
+    }
+}
+
+impl Slices {
+    pub fn new(gpu: &Gpu, scene: &Buffer<Scene>, density: &Texture, mri: &Texture) -> Result<Self, RenderError> {
+        let spec = PipelineSpec {
+            label: "slice",
+            wgsl: trepan_shaders::RENDER_SLICE,
+            slots: &[Slot::Uniform, Slot::Uniform, Slot::Texture3, Slot::Texture3, Slot::Sampler],
+            targets: &[Format::Rgba8Unorm],
+            depth: false,
+            blend: false,
+            topology: Topology::Triangles,
+        };
+        let pipeline = Pipeline::new(gpu, &spec)?;
+        let uniform = || Buffer::<Slice>::zeroed(gpu, "slice", 1);
+        let uniforms = [uniform()?, uniform()?, uniform()?];
+        let bind = |slice: &Buffer<Slice>| {
+            pipeline.bind(gpu, &[scene.into(), slice.into(), density.into(), mri.into(), Resource::Linear])
+        };
+        let bindings = [bind(&uniforms[0])?, bind(&uniforms[1])?, bind(&uniforms[2])?];
+        Ok(Self { pipeline, uniforms, bindings })
+    }
+
+    /// Tells the device what the slices show.
+    pub fn follow(&self, gpu: &Gpu, planes: &[Plane; 3], rectangles: &[[u32; 4]; 3], look: &SliceLook) {
+        for n in 0..3 {
+            let (plane, [x, y, width, height]) = (&planes[n], rectangles[n].map(|v| v as f32));
+            let [left, right, top, bottom] = LETTERS[n];
+            let slice = Slice {
+                centre: plane.centre.extend(plane.half.x),
+                right: plane.right.extend(plane.half.y),
+                up: plane.up.extend(width),
+                window: Vec4::new(look.level_hu - 0.5 * look.width_hu, look.width_hu.max(1.0), look.mri_share, height),
+                corner: Vec4::new(x, y, left, right),
+                colour: Vec4::new(0.22, 0.24, 0.28, 8.0 * top + bottom),
+            };
+            self.uniforms[n].write(gpu, 0, &[slice]);
+        }
+    }
+
+    pub fn draw(&self, recorder: &mut Recorder, rectangles: &[[u32; 4]; 3], picture: &Texture) {
+        let colours = [Target { texture: picture, clear: None }];
+        recorder.draw("slice", &DrawTarget { colours: &colours, depth: None }, |d| {
+            for n in 0..3 {
+                d.viewport(rectangles[n]);
+                d.draw(&self.pipeline, &self.bindings[n], 3);
+            }
+        });
+    }
+}

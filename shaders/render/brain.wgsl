@@ -1,0 +1,30 @@
+// The brain's surface where the physics has put it, drawn as triangles with smooth normals.
+// Output 0: folded normal (xy), distance along the ray in mm (w). Output 1: the place at rest, where the MRI was taken.
+
+@group(0) @binding(1) var<storage, read> places: array<vec4f>;    // now, world mm
+@group(0) @binding(2) var<storage, read> normals: array<vec4f>;   // now, unit
+@group(0) @binding(3) var<storage, read> rest: array<vec4f>;      // at rest, world mm
+@group(0) @binding(4) var<storage, read> corners: array<u32>;     // three vertices a triangle
+
+struct Corner {
+    @builtin(position) clip: vec4f,
+    @location(0) place: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) rest: vec3f,
+}
+
+struct Seen {
+    @location(0) hit: vec4f,
+    @location(1) rest: vec4f,
+}
+
+@vertex fn vertex(@builtin(vertex_index) i: u32) -> Corner {
+    let v = corners[i];
+    let place = places[v].xyz;
+    return Corner(scene.clip_from_world * vec4f(place, 1.0), place, normals[v].xyz, rest[v].xyz);
+}
+
+@fragment fn fragment(v: Corner) -> Seen {
+    let hit = vec4f(fold(normalize(v.normal)), 0.0, distance(v.place, scene.eye.xyz));
+    return Seen(hit, vec4f(v.rest, 1.0));
+}

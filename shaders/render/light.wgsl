@@ -1,0 +1,126 @@
+// The 3-D view: takes the nearest of bone, brain and tool at each pixel and lights it.
+
+@group(0) @binding(1) var skull_hit: texture_2d<f32>;
+@group(0) @binding(2) var brain_hit: texture_2d<f32>;
+@group(0) @binding(3) var brain_rest: texture_2d<f32>;
+@group(0) @binding(4) var mri: texture_3d<f32>;
+@group(0) @binding(5) var linear: sampler;
+@group(0) @binding(6) var density: texture_3d<f32>;
+@group(0) @binding(7) var crowd: texture_3d<f32>;
+
+@vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
+
+// Distance along the ray to a ball, or NOTHING.
+fn ball(eye: vec3f, along: vec3f, centre: vec3f, radius: f32) -> f32 {
+    let to = centre - eye;
+    let middle = dot(to, along);
+    let off = to - middle * along;
+    let room = radius * radius - dot(off, off);
+    let t = middle - sqrt(max(room, 0.0));
+    return select(NOTHING, t, room > 0.0 && t > 0.0);
+}
+
+// Distance along the ray to the shaft's mantle, or NOTHING.
+fn shaft(eye: vec3f, along: vec3f) -> f32 {
+    let axis = scene.tail.xyz - scene.tip.xyz;
+    let away = eye - scene.tip.xyz;
+    let length2 = dot(axis, axis);
+    let a = length2 - dot(axis, along) * dot(axis, along);
+    let b = length2 * dot(away, along) - dot(axis, away) * dot(axis, along);
+    let c = length2 * (dot(away, away) - scene.tail.w * scene.tail.w) - dot(axis, away) * dot(axis, away);
+    let room = b * b - a * c;
+    let t = (-b - sqrt(max(room, 0.0))) / max(a, 1e-9);
+    let at = dot(axis, away) + t * dot(axis, along);
+    return select(NOTHING, t, room > 0.0 && t > 0.0 && at > 0.0 && at < length2);
+}
+
+// Light that passes the tool on its way to a point: 0 in its shadow, 1 far from it.
+fn past_tool(point: vec3f) -> f32 {
+    if scene.tip.w < 0.0 { return 1.0; }
+    var bright = 1.0;
+    var way = 0.6;
+    for (var i = 0; i < 12; i++) {
+        let gap = tool_distance(point + scene.light.xyz * way);
+        bright = min(bright, 0.5 + 4.0 * gap / way);
+        way += max(gap, 0.4);
+    }
+    return smoothstep(0.0, 1.0, bright);
+}
+
+// Ambient light at a point of the brain: little where bone crowds around it.
+fn openness(point: vec3f, normal: vec3f) -> f32 {
+    var dark = 0.0;
+    for (var i = 1; i <= 4; i++) {
+        let g = (point + normal * 2.0 * exp2(f32(i)) - scene.origin.xyz) / scene.origin.w;
+        dark += textureSampleLevel(crowd, linear, (g + 0.5) / (4.0 * vec3f(textureDimensions(crowd))), 0.0).x;
+    }
+    return exp(-0.9 * dark);
+}
+
+// Diffuse light from above left and from the sky, and a highlight.
+fn lit(albedo: vec3f, normal: vec3f, along: vec3f, open: f32, key: f32, gloss: f32) -> vec3f {
+    let facing = max(dot(normal, scene.light.xyz), 0.0) * key;
+    let sky = 0.5 + 0.5 * dot(normal, normalize(scene.up.xyz));
+    let ambient = open * mix(vec3f(0.16, 0.14, 0.13), vec3f(0.30, 0.33, 0.38), sky);
+    let head = 0.18 * open * max(-dot(normal, along), 0.0);
+    let halfway = normalize(scene.light.xyz - along);
+    let shine = gloss * pow(max(dot(normal, halfway), 0.0), 48.0) * key * open;
+    return albedo * (ambient + head + facing * vec3f(0.78, 0.75, 0.69)) + shine;
+}
+
+fn bone_colour(point: vec3f, normal: vec3f) -> vec3f {
+    let g = (point - normal * 1.2 - scene.origin.xyz) / scene.origin.w;
+    let inside = textureSampleLevel(density, linear, (g + 0.5) / scene.dims.xyz, 0.0).x;
+    return mix(vec3f(0.80, 0.62, 0.50), vec3f(0.96, 0.91, 0.80), smoothstep(scene.dims.w, scene.dims.w + 500.0, inside));
+}
+
+fn brain_colour(rest: vec3f) -> vec3f {
+    let at = (scene.mri_from_world * vec4f(rest, 1.0)).xyz;
+    let signal = textureSampleLevel(mri, linear, at, 0.0).x;
+    let shade = select(0.8, 0.45 + 0.75 * signal, scene.eye.w > 0.0);
+    return vec3f(0.93, 0.66, 0.61) * shade;
+}
+
+fn tool_colour(point: vec3f, on_ball: bool) -> vec3f {
+    let steel = vec3f(0.62, 0.66, 0.72);
+    if !on_ball || scene.spin.w < 0.5 { return steel; }
+    let axis = normalize(scene.tail.xyz - scene.tip.xyz);
+    let away = point - scene.tip.xyz;
+    let angle = atan2(dot(away, cross(axis, scene.spin.xyz)), dot(away, scene.spin.xyz));
+    let flute = smoothstep(-0.2, 0.5, sin(8.0 * angle + 3.0 * dot(away, axis) / scene.tip.w));
+    return mix(vec3f(0.34, 0.36, 0.40), vec3f(0.80, 0.80, 0.78), flute);
+}
+
+fn shade_tool(point: vec3f, along: vec3f, on_ball: bool) -> vec3f {
+    let axis = normalize(scene.tail.xyz - scene.tip.xyz);
+    let away = point - scene.tip.xyz;
+    let normal = normalize(select(away - axis * dot(away, axis), away, on_ball));
+    return lit(tool_colour(point, on_ball), normal, along, 1.0, 1.0, 0.7);
+}
+
+@fragment fn fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
+    let along = ray_of(pixel.xy);
+    let at = vec2i(pixel.xy);
+    let skull = textureLoad(skull_hit, at, 0);
+    var brain = textureLoad(brain_hit, at, 0);
+    brain.w = select(NOTHING, brain.w, brain.w > 0.0);
+    let tip = select(NOTHING, ball(scene.eye.xyz, along, scene.tip.xyz, scene.tip.w), scene.tip.w > 0.0);
+    let stem = select(NOTHING, shaft(scene.eye.xyz, along), scene.tip.w > 0.0);
+    let t = min(min(skull.w, brain.w), min(tip, stem));
+    let point = scene.eye.xyz + t * along;
+    let back = pixel.y / scene.up.w;
+    var colour = mix(vec3f(0.105, 0.125, 0.155), vec3f(0.035, 0.04, 0.05), back);
+    if t >= NOTHING {
+    } else if t == tip || t == stem {
+        colour = shade_tool(point, along, t == tip);
+    } else if t == brain.w {
+        let normal = unfold(brain.xy);
+        let open = openness(point, normal);
+        let rest = textureLoad(brain_rest, at, 0).xyz - 1.5 * normal;
+        colour = lit(brain_colour(rest), normal, along, open, past_tool(point) * smoothstep(0.05, 0.6, open), 0.25);
+    } else {
+        let normal = unfold(skull.xy);
+        colour = lit(bone_colour(point, normal), normal, along, skull.z, past_tool(point), 0.10);
+    }
+    return vec4f(pow(clamp(colour, vec3f(0.0), vec3f(1.0)), vec3f(1.0 / 2.2)), 1.0);
+}

@@ -1,0 +1,53 @@
+// What every pass of the picture knows: camera, bone grid, tool, light. Rust twin: `Scene`.
+
+struct Scene {
+    clip_from_world: mat4x4f,
+    mri_from_world: mat4x4f,  // texture coordinates of the MRI, 0 to 1
+    eye: vec4f,               // world mm; w: 1 if there is an MRI
+    right: vec4f,             // half the picture's width at distance 1; w: width in pixels
+    up: vec4f,                // half its height at distance 1; w: height in pixels
+    forward: vec4f,           // unit; w: 1 if there is a brain
+    origin: vec4f,            // world centre of the padded voxel (0, 0, 0); w: voxel edge, mm
+    dims: vec4f,              // padded voxels along x, y, z; w: isovalue, HU
+    tip: vec4f,               // centre of the tool's ball; w: its radius (negative: no tool)
+    tail: vec4f,              // far end of the shaft; w: its radius
+    light: vec4f,             // unit, towards the light; w: 1 while drilling
+    spin: vec4f,              // unit, across the shaft: turns with the burr; w: 1 for a burr, 0 for a probe
+}
+
+@group(0) @binding(0) var<uniform> scene: Scene;
+
+const NOTHING: f32 = 1e30;
+
+// A triangle that covers the viewport.
+fn cover(vertex: u32) -> vec4f {
+    return vec4f(f32(vertex & 1u) * 4.0 - 1.0, f32(vertex >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+
+// Unit direction of the ray through a pixel's position in the 3-D view.
+fn ray_of(pixel: vec2f) -> vec3f {
+    let x = 2.0 * pixel.x / scene.right.w - 1.0;
+    let y = 1.0 - 2.0 * pixel.y / scene.up.w;
+    return normalize(scene.forward.xyz + x * scene.right.xyz + y * scene.up.xyz);
+}
+
+// Unit vectors in two numbers (Cigolle et al. 2014, octahedral).
+fn fold(n: vec3f) -> vec2f {
+    let p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
+    let signs = select(vec2f(-1.0), vec2f(1.0), p >= vec2f(0.0));
+    return select(p, (1.0 - abs(p.yx)) * signs, n.z < 0.0);
+}
+
+fn unfold(p: vec2f) -> vec3f {
+    let z = 1.0 - abs(p.x) - abs(p.y);
+    let signs = select(vec2f(-1.0), vec2f(1.0), p >= vec2f(0.0));
+    return normalize(vec3f(select(p, (1.0 - abs(p.yx)) * signs, z < 0.0), z));
+}
+
+// Distance to the tool's surface, mm: a ball and a capsule.
+fn tool_distance(point: vec3f) -> f32 {
+    let axis = scene.tail.xyz - scene.tip.xyz;
+    let along = clamp(dot(point - scene.tip.xyz, axis) / dot(axis, axis), 0.0, 1.0);
+    let shaft = distance(point, scene.tip.xyz + along * axis) - scene.tail.w;
+    return min(shaft, distance(point, scene.tip.xyz) - scene.tip.w);
+}
