@@ -1,0 +1,138 @@
+//! Derived data in the user's cache folder, named by the hash of what it was made from.
+//!
+//! # Practice
+//! A folder appears whole or not at all: it is filled beside its place and then renamed. Two programs that make the same case
+//! at once both succeed; the second keeps the first's. `TREPAN_CACHE` names another place.
+
+use crate::error::SessionError;
+use etcetera::{BaseStrategy, choose_base_strategy};
+use sha2::{Digest, Sha256};
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// Goes up when kept cases change their form or the code that makes them changes its results.
+const FORM: u32 = 1;
+
+/// The folder of kept cases.
+#[derive(Clone, Debug)]
+pub struct Cache {
+    root: PathBuf,
+}
+
+impl Cache {
+    /// The user's: `TREPAN_CACHE`, else `trepan` in the platform's cache folder.
+    pub fn of_user() -> Result<Self, SessionError> {
+        if let Some(root) = std::env::var_os("TREPAN_CACHE").filter(|root| !root.is_empty()) {
+            return Ok(Self { root: root.into() });
+        }
+        let strategy = choose_base_strategy()
+            .map_err(|fault| SessionError::Usage(format!("no cache folder ({fault}): set HOME or TREPAN_CACHE")))?;
+        Ok(Self { root: strategy.cache_dir().join("trepan").join("cases") })
+    }
+
+    /// A cache at a given place.
+    pub fn at(root: PathBuf) -> Self {
+        Self { root }
+    }
+
+    /// The name of what is made from these files (folders with all that lies in them) by this recipe, 64 digits.
+    pub fn key(&self, inputs: &[&Path], recipe: &str) -> Result<String, SessionError> {
+        let mut hash = Sha256::new();
+        hash.update(format!("{FORM} {recipe}"));
+        for input in inputs {
+            for file in files_of(input).map_err(|fault| unreadable(input, &fault))? {
+                add(&mut hash, &file).map_err(|fault| unreadable(&file, &fault))?;
+            }
+        }
+        Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+
+    /// The folder of that name, if it is there.
+    pub fn find(&self, key: &str) -> Option<PathBuf> {
+        Some(self.root.join(key)).filter(|folder| folder.is_dir())
+    }
+
+    /// Fills a folder and puts it in its place; a broken one that is there already gives way.
+    pub fn keep(&self, key: &str, fill: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), String> {
+        let text = |fault: io::Error| format!("{}: {fault}", self.root.display());
+        fs::create_dir_all(&self.root).map_err(text)?;
+        let folder = tempfile::Builder::new().prefix(".making-").tempdir_in(&self.root).map_err(text)?;
+        fill(folder.path())?;
+        let place = self.root.join(key);
+        if place.is_dir() {
+            fs::remove_dir_all(&place).map_err(text)?;
+        }
+        fs::rename(folder.path(), &place).map_err(text)?;
+        _ = folder.keep();
+        Ok(())
+    }
+}
+
+fn unreadable(path: &Path, fault: &io::Error) -> SessionError {
+    let remedy = match fault.kind() {
+        io::ErrorKind::NotFound => "give the path of a file, or of a folder of DICOM slices, that exists",
+        io::ErrorKind::PermissionDenied => "allow reading it",
+        _ => "check the file and the disk",
+    };
+    SessionError::Usage(format!("cannot read {}: {fault}; {remedy}", path.display()))
+}
+
+/// The file itself, or every file under a folder, in a fixed order.
+fn files_of(input: &Path) -> io::Result<Vec<PathBuf>> {
+    if !fs::metadata(input)?.is_dir() {
+        return Ok(vec![input.to_path_buf()]);
+    }
+    let mut files = Vec::new();
+    let mut entries: Vec<_> = fs::read_dir(input)?.collect::<io::Result<_>>()?;
+    entries.sort_by_key(|entry| entry.file_name());
+    for entry in entries {
+        files.extend(files_of(&entry.path())?);
+    }
+    Ok(files)
+}
+
+fn add(hash: &mut Sha256, file: &Path) -> io::Result<()> {
+    let mut stream = File::open(file)?;
+    hash.update(stream.metadata()?.len().to_le_bytes());
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match stream.read(&mut buffer)? {
+            0 => return Ok(()),
+            count => hash.update(&buffer[..count]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_names_a_case_and_a_failed_fill_leaves_nothing() {
+        let home = tempfile::tempdir().unwrap();
+        let cache = Cache::at(home.path().join("cases"));
+        let file = home.path().join("a");
+        fs::write(&file, b"one").unwrap();
+        let key = cache.key(&[&file], "r").unwrap();
+        fs::write(&file, b"two").unwrap();
+        assert_ne!(key, cache.key(&[&file], "r").unwrap());
+        assert_eq!(key.len(), 64);
+        let failed = cache.keep(&key, |folder| {
+            fs::write(folder.join("half"), b"x").unwrap();
+            Err("disk full".into())
+        });
+        assert_eq!(failed, Err("disk full".into()));
+        assert!(cache.find(&key).is_none());
+        assert_eq!(fs::read_dir(home.path().join("cases")).unwrap().count(), 0);
+        cache.keep(&key, |folder| fs::write(folder.join("whole"), b"x").map_err(|f| f.to_string())).unwrap();
+        assert!(cache.find(&key).unwrap().join("whole").is_file());
+    }
+
+    #[test]
+    fn a_missing_input_is_named_with_a_remedy() {
+        let cache = Cache::at(PathBuf::from("nowhere"));
+        let fault = cache.key(&[Path::new("no/such/ct.nii.gz")], "").unwrap_err().to_string();
+        assert!(fault.contains("no/such/ct.nii.gz") && fault.contains("give the path"), "{fault}");
+    }
+}

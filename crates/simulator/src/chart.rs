@@ -1,0 +1,114 @@
+//! The curves of a report, as SVG.
+
+use plotters::prelude::*;
+
+/// One line of a chart.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Its name in the legend.
+    pub name: &'static str,
+    /// (x, y) in the chart's units.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Blue, orange, green: told apart by readers with any colour vision (Okabe and Ito 2008).
+const COLOURS: [RGBColor; 3] = [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115)];
+/// Points a curve keeps; between them the largest stands for all.
+const POINTS: usize = 1200;
+const SIZE: (u32, u32) = (900, 260);
+
+/// Curves over session time in s. `limit`: a dashed line with its meaning.
+pub fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Result<String, String> {
+    let curves: Vec<Curve> = curves.iter().map(thinned).collect();
+    let points = || curves.iter().flat_map(|curve| &curve.points);
+    let end = points().map(|p| p.0).fold(1e-3, f64::max);
+    let low = points().map(|p| p.1).fold(0.0, f64::min);
+    let high = points().map(|p| p.1).chain(limit.map(|l| l.0)).fold(low + 1e-6, f64::max);
+    let mut svg = String::new();
+    let text = |fault: &dyn std::fmt::Display| format!("chart of {unit}: {fault}");
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(|f| text(&f))?;
+        let mut chart = ChartBuilder::on(&root)
+            .margin(8)
+            .x_label_area_size(34)
+            .y_label_area_size(60)
+            .build_cartesian_2d(0.0..end, low..high + 0.06 * (high - low))
+            .map_err(|f| text(&f))?;
+        let mesh = &mut chart.configure_mesh();
+        mesh.x_desc("time, s").y_desc(unit).light_line_style(WHITE).draw().map_err(|f| text(&f))?;
+        for (curve, colour) in curves.iter().zip(COLOURS) {
+            let line = LineSeries::new(curve.points.iter().copied(), colour.stroke_width(2));
+            let drawn = chart.draw_series(line).map_err(|f| text(&f))?;
+            drawn.label(curve.name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3)));
+        }
+        if let Some((value, meaning)) = limit {
+            let dashes = DashedLineSeries::new([(0.0, value), (end, value)], 6, 4, BLACK.stroke_width(1));
+            let drawn = chart.draw_series(dashes).map_err(|f| text(&f))?;
+            drawn.label(meaning).legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], BLACK));
+        }
+        let labels = &mut chart.configure_series_labels();
+        labels.background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw().map_err(|f| text(&f))?;
+        root.present().map_err(|f| text(&f))?;
+    }
+    Ok(svg)
+}
+
+/// How often times fell into bins, both axes logarithmic. `bins`: (upper edge in µs, count).
+pub fn histogram(bins: &[(f64, u64)], limit_us: f64) -> Result<String, String> {
+    let used: Vec<(f64, f64)> = bins.iter().filter(|b| b.1 > 0).map(|&(edge, count)| (edge.max(0.01), count as f64)).collect();
+    let low = used.first().map_or(0.1, |b| 0.7 * b.0);
+    let high = used.last().map_or(1000.0, |b| 1.5 * b.0).max(1.5 * limit_us);
+    let most = used.iter().map(|b| b.1).fold(10.0, f64::max);
+    let mut svg = String::new();
+    let text = |fault: &dyn std::fmt::Display| format!("histogram: {fault}");
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(|f| text(&f))?;
+        let mut chart = ChartBuilder::on(&root)
+            .margin(8)
+            .x_label_area_size(34)
+            .y_label_area_size(60)
+            .build_cartesian_2d((low..high).log_scale(), (0.5..2.0 * most).log_scale())
+            .map_err(|f| text(&f))?;
+        let mesh = &mut chart.configure_mesh();
+        mesh.x_desc("compute time of a tick, µs").y_desc("ticks").light_line_style(WHITE).draw().map_err(|f| text(&f))?;
+        let width = 10f64.powf(-0.1);
+        let bars = used.iter().map(|&(x, n)| Rectangle::new([(x * width, 0.5), (x * 0.97, n)], COLOURS[0].filled()));
+        chart.draw_series(bars).map_err(|f| text(&f))?;
+        let dashes = DashedLineSeries::new([(limit_us, 0.5), (limit_us, 2.0 * most)], 6, 4, BLACK.stroke_width(1));
+        chart.draw_series(dashes).map_err(|f| text(&f))?;
+        root.present().map_err(|f| text(&f))?;
+    }
+    Ok(svg)
+}
+
+/// A curve of few enough points: of each run of neighbours the one farthest from zero.
+fn thinned(curve: &Curve) -> Curve {
+    let run = curve.points.len().div_ceil(POINTS).max(1);
+    let farthest = |points: &[(f64, f64)]| points.iter().copied().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    Curve { name: curve.name, points: curve.points.chunks(run).filter_map(farthest).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_the_peak() {
+        let mut points: Vec<(f64, f64)> = (0..20_000).map(|i| (f64::from(i), 0.1)).collect();
+        points[12_345].1 = -3.0;
+        let thin = thinned(&Curve { name: "f", points });
+        assert!(thin.points.len() <= POINTS && thin.points.contains(&(12_345.0, -3.0)));
+    }
+
+    #[test]
+    fn charts_hold_their_names_and_survive_emptiness() {
+        let curve = Curve { name: "bone", points: vec![(0.0, 0.0), (1.0, 2.0)] };
+        let svg = over_time("force, N", &[curve], Some((3.3, "limit"))).unwrap();
+        assert!(svg.contains("force, N") && svg.contains("limit") && svg.contains("bone"));
+        assert!(over_time("x", &[], None).unwrap().contains("<svg"));
+        assert!(histogram(&[], 1000.0).unwrap().contains("<svg"));
+        assert!(histogram(&[(5.0, 100), (6.3, 3)], 1000.0).unwrap().contains("ticks"));
+    }
+}

@@ -1,0 +1,56 @@
+//! What every program does with its command line: flags, session, exit code.
+
+use crate::{Ended, Inputs, Options, Program, Session, SessionError};
+use clap::Parser;
+use std::process::ExitCode;
+use tracing_subscriber::EnvFilter;
+
+/// Runs a program. Exit code 0 for a session that ended, 2 for what the user can put right, 1 for the rest, 128 + n after
+/// signal n.
+///
+/// `built_in` is the case that is taken when no image is given.
+pub fn command(program: Program, built_in: Inputs) -> ExitCode {
+    let options = Options::parse();
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,trepan_simulator=info"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).without_time().init();
+    if options.list_devices {
+        trepan_haptics::list().iter().for_each(|device| println!("{:28} {}", device.name, device.state));
+        return ExitCode::SUCCESS;
+    }
+    match Session::open(program, options, built_in).and_then(Session::run) {
+        Ok(ended) => told(&ended),
+        Err(fault) => failed(program, &fault),
+    }
+}
+
+fn told(ended: &Ended) -> ExitCode {
+    let summary = &ended.summary;
+    println!(
+        "{} ticks at {:.1} Hz (compute p50 {:.1}, p99 {:.1} us; {} late), force up to {:.2} N, {:.1} mm3 of bone removed, {} warnings, {} pictures",
+        summary.ticks,
+        summary.rate_hz,
+        summary.tick_us.p50,
+        summary.tick_us.p99,
+        summary.late_ticks,
+        summary.force_n.max,
+        summary.bone_removed_mm3,
+        summary.warnings.len(),
+        summary.frames
+    );
+    if let Some(replay) = &summary.replay {
+        println!(
+            "replay: {} of {} ticks gave the same force, bit for bit; largest difference {:.6} N",
+            replay.identical, replay.ticks, replay.max_difference_n
+        );
+    }
+    println!("report: {}", ended.out.join("report.html").display());
+    match ended.signal {
+        Some(signal) => ExitCode::from(128 + signal as u8),
+        None => ExitCode::SUCCESS,
+    }
+}
+
+fn failed(program: Program, fault: &SessionError) -> ExitCode {
+    eprintln!("{}: {fault}", program.name());
+    ExitCode::from(fault.exit_code())
+}

@@ -1,0 +1,137 @@
+//! The recording thread: takes what the loops send through rings and writes it, so that no loop ever touches a file.
+//!
+//! # Practice
+//! Rings hold 4 s of ticks; what does not fit is counted and told. Chunks are flushed five times a second, so that a killed
+//! session loses at most the last fifth of a second. A full disk ends the recording, never the session.
+
+use crate::clock::Clock;
+use crate::notice::{Notice, What};
+use std::time::Duration;
+use trepan_link::queue::{Receiver, Sender, bounded};
+use trepan_link::wire::{CollisionRecord, EventRecord, SolverRecord, TickRecord};
+use trepan_link::{LinkError, Recorder};
+
+const RING: usize = 8192;
+const FLUSH_MS: f64 = 200.0;
+const DRAIN: Duration = Duration::from_millis(5);
+
+/// The loops' ends of the rings.
+pub struct Pens {
+    /// For the haptic loop.
+    pub ticks: Sender<TickRecord>,
+    /// For the haptic loop.
+    pub notices: Sender<Notice>,
+    /// For the collision loop.
+    pub collisions: Sender<CollisionRecord>,
+    /// For the solver loop.
+    pub solver: Sender<SolverRecord>,
+}
+
+/// The recording thread's ends.
+pub struct Journal {
+    ticks: Receiver<TickRecord>,
+    notices: Receiver<Notice>,
+    collisions: Receiver<CollisionRecord>,
+    solver: Receiver<SolverRecord>,
+}
+
+/// What the recording thread knows at the end.
+#[derive(Debug, Default)]
+pub struct Written {
+    /// Every notice, in order.
+    pub notices: Vec<Notice>,
+    /// Records that did not fit into a ring.
+    pub dropped: u64,
+    /// Why the recording ended early, if it did.
+    pub fault: Option<LinkError>,
+}
+
+/// Both ends.
+pub fn journal() -> (Pens, Journal) {
+    let (ticks, ticks_in) = bounded(RING);
+    let (notices, notices_in) = bounded(RING / 8);
+    let (collisions, collisions_in) = bounded(RING);
+    let (solver, solver_in) = bounded(RING);
+    (
+        Pens { ticks, notices, collisions, solver },
+        Journal { ticks: ticks_in, notices: notices_in, collisions: collisions_in, solver: solver_in },
+    )
+}
+
+impl Journal {
+    /// Writes until every loop has dropped its pens and the rings are empty; then closes the recording.
+    pub fn write(mut self, mut recorder: Recorder, clock: Clock) -> Written {
+        let mut written = Written::default();
+        let mut flushed_ms = 0.0;
+        loop {
+            let over = self.is_over();
+            if let Err(fault) = self.drain(&mut recorder, &mut written) {
+                written.fault.get_or_insert(fault);
+                self.discard(&mut written);
+            }
+            if clock.now_ms() - flushed_ms >= FLUSH_MS && written.fault.is_none() {
+                flushed_ms = clock.now_ms();
+                written.fault = recorder.flush().err();
+            }
+            if over {
+                break;
+            }
+            std::thread::sleep(DRAIN);
+        }
+        written.dropped = self.dropped();
+        let closed = recorder.finish();
+        written.fault = written.fault.or(closed.err());
+        if let Some(fault) = &written.fault {
+            tracing::error!("the recording ended early: {fault}");
+        }
+        written
+    }
+
+    /// Asked before draining: what was sent before the last pen fell is still drained.
+    fn is_over(&self) -> bool {
+        self.ticks.is_abandoned() && self.collisions.is_abandoned() && self.solver.is_abandoned()
+    }
+
+    fn drain(&mut self, recorder: &mut Recorder, written: &mut Written) -> Result<(), LinkError> {
+        while let Some(record) = self.ticks.receive() {
+            recorder.tick(&record)?;
+        }
+        while let Some(record) = self.collisions.receive() {
+            recorder.collision(&record)?;
+        }
+        while let Some(record) = self.solver.receive() {
+            recorder.solver(&record)?;
+        }
+        while let Some(notice) = self.notices.receive() {
+            written.notices.push(notice);
+            say(&notice);
+            let (kind, text) = notice.words();
+            recorder.event(&EventRecord { tick: notice.tick, time_ms: notice.time_ms, kind: kind.into(), text })?;
+        }
+        Ok(())
+    }
+
+    /// Keeps the rings empty after the recording failed.
+    fn discard(&mut self, written: &mut Written) {
+        while self.ticks.receive().is_some() {}
+        while self.collisions.receive().is_some() {}
+        while self.solver.receive().is_some() {}
+        while let Some(notice) = self.notices.receive() {
+            written.notices.push(notice);
+            say(&notice);
+        }
+    }
+
+    fn dropped(&self) -> u64 {
+        self.ticks.dropped() + self.collisions.dropped() + self.solver.dropped() + self.notices.dropped()
+    }
+}
+
+fn say(notice: &Notice) {
+    let (kind, text) = notice.words();
+    let seconds = notice.time_ms * 1e-3;
+    match notice.what {
+        What::Warning(_, true, _) => tracing::warn!("{seconds:7.3} s  {text}"),
+        _ => tracing::info!("{seconds:7.3} s  {kind}: {text}"),
+    }
+}

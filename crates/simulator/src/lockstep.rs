@@ -1,0 +1,235 @@
+//! A recorded session run again: the same stages in the recorded order, on one thread.
+//!
+//! # Theory
+//! Live, three loops race; what each of them did depends only on which results of the others it had seen. The recording names
+//! them: a tick its patch, a collision step its tick and its solver step, a solver step its contact. Run again in any order
+//! that respects these names, every stage sees what it saw, so every number comes out the same, bit for bit:
+//!
+//! ```text
+//! tick t      ← patch p                          collisions up to p first
+//! collision c ← tool of tick t, brain of step s  solver up to s first
+//! step n      ← contact c                        c came before n's positions were used
+//! ```
+//!
+//! # Practice
+//! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by how much.
+
+use crate::clock::Clock;
+use crate::collision_step::SoftFrame;
+use crate::haptic_tick::{HapticStage, TickInput, ToolSample};
+use crate::journal::{Journal, Pens, journal};
+use crate::run::{Cells, Eyes, Numbered, Outcome, Replayed, Stages, Ticks, Times, Tissue};
+use crate::stop::Stop;
+use crate::threads::outcome;
+use std::collections::VecDeque;
+use std::thread;
+use trepan_contact::{NodalContact, SurfacePatch};
+use trepan_geometry::{Buttons, ToolState};
+use trepan_haptics::{Reading, Status};
+use trepan_link::wire::{CollisionRecord, SolverRecord, TickRecord};
+use trepan_link::{Recorder, Recording};
+
+/// Tools and patches of this many past ticks are kept for collision steps that refer to them.
+const MEMORY: usize = 16_384;
+
+/// Runs a recording again. `paced`: as fast as it was recorded, for a window; else as fast as it goes.
+pub fn run(
+    stages: Stages,
+    recording: &Recording,
+    recorder: Recorder,
+    start: ToolSample,
+    paced: bool,
+    stop: &Stop,
+    picture: impl FnOnce(Eyes),
+) -> Outcome {
+    let clock = Clock::start();
+    let cells = Cells::new(&stages, start);
+    let (pens, pages) = journal();
+    let eyes = Eyes { view: cells.view.1, soft: stages.tissue.is_some().then_some(cells.shown.1) };
+    thread::scope(|scope| {
+        let writing = scope.spawn(move || Journal::write(pages, recorder, clock));
+        let (mut view, mut shown) = (cells.view.0, cells.shown.0);
+        let replaying = scope.spawn(move || {
+            let mut again = Again::new(stages, recording, pens, start);
+            for record in &recording.ticks {
+                if stop.asked() {
+                    break;
+                }
+                if paced {
+                    clock.sleep_until(record.time_ms);
+                }
+                again.tick(record, &clock, |ticks, tick, stage| {
+                    view.set(ticks.view(tick, stage.scores(), false));
+                });
+                if let Some(tissue) = &again.tissue {
+                    shown.write(|frame| tissue.solver.publish(frame));
+                }
+            }
+            stop.ask();
+            again.outcome()
+        });
+        picture(eyes);
+        let mut outcome = replaying.join().unwrap_or_default();
+        outcome.written = writing.join().unwrap_or_default();
+        outcome
+    })
+}
+
+struct Again<'a> {
+    haptic: HapticStage,
+    tissue: Option<Tissue>,
+    collisions: VecDeque<CollisionRecord>,
+    switches: VecDeque<SolverRecord>,
+    pens: Pens,
+    ticks: Ticks,
+    tools: VecDeque<ToolSample>,
+    patches: VecDeque<Numbered<SurfacePatch>>,
+    contacts: VecDeque<Numbered<NodalContact>>,
+    contact: Numbered<NodalContact>,
+    frame: SoftFrame,
+    step_times: Times,
+    collision_times: Times,
+    replayed: Replayed,
+    recording: &'a Recording,
+}
+
+impl<'a> Again<'a> {
+    fn new(stages: Stages, recording: &'a Recording, pens: Pens, start: ToolSample) -> Self {
+        Self {
+            haptic: stages.haptic,
+            tissue: stages.tissue,
+            collisions: recording.collisions.iter().copied().collect(),
+            switches: recording.solver.iter().copied().collect(),
+            pens,
+            ticks: Ticks::default(),
+            tools: VecDeque::from([start]),
+            patches: VecDeque::from([(0, SurfacePatch::default())]),
+            contacts: VecDeque::from([(0, NodalContact::none())]),
+            contact: (0, NodalContact::none()),
+            frame: SoftFrame::default(),
+            step_times: Times::default(),
+            collision_times: Times::default(),
+            replayed: Replayed::default(),
+            recording,
+        }
+    }
+
+    fn tick(&mut self, record: &TickRecord, clock: &Clock, show: impl FnOnce(&Ticks, &crate::Tick, &HapticStage)) {
+        self.collide_up_to(record.patch_seq, clock);
+        let &(patch_seq, patch) =
+            self.patches.iter().rev().find(|(seq, _)| *seq <= record.patch_seq).unwrap_or(&(0, PATCH));
+        let input = TickInput { tick: record.tick, reading: reading(record), patch: &patch, patch_seq };
+        if record.has(TickRecord::RELEASED) {
+            self.haptic.release();
+        }
+        let began_ms = clock.now_ms();
+        let notices = &mut self.pens.notices;
+        let mut tick = self.haptic.tick(&input, &mut |notice| _ = notices.send(notice));
+        tick.record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
+        self.ticks.add(&tick);
+        self.compare(record, &tick.record);
+        remember(&mut self.tools, tick.sample);
+        while !self.pens.ticks.send(tick.record) {
+            thread::yield_now();
+        }
+        show(&self.ticks, &tick, &self.haptic);
+    }
+
+    /// Every collision step up to a number, each with the tool and the brain that it had.
+    fn collide_up_to(&mut self, seq: u64, clock: &Clock) {
+        while let Some(next) = self.collisions.front().copied().filter(|c| c.seq <= seq) {
+            self.collisions.pop_front();
+            self.solve_up_to(next.solver_step, clock);
+            let Some(tissue) = &mut self.tissue else { return };
+            let Some(&tool) = self.tools.iter().rev().find(|t| t.tick <= next.tick) else { return };
+            tissue.solver.publish(&mut self.frame);
+            let began_ms = clock.now_ms();
+            let mut record = tissue.collision.step(&tool, &self.frame);
+            record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
+            self.collision_times.add_us(record.compute_us);
+            remember(&mut self.patches, (record.seq, *tissue.collision.patch()));
+            remember(&mut self.contacts, (record.seq, tissue.collision.contact()));
+            self.pens.collisions.send(record);
+        }
+    }
+
+    /// Every solver step up to a number, each with the contact that it had.
+    fn solve_up_to(&mut self, step: u64, clock: &Clock) {
+        while self.tissue.as_ref().is_some_and(|tissue| tissue.solver.steps() < step) {
+            self.solve(clock);
+        }
+    }
+
+    fn solve(&mut self, clock: &Clock) {
+        let Some(tissue) = &mut self.tissue else { return };
+        let next = tissue.solver.steps() + 1;
+        while let Some(switch) = self.switches.front().copied().filter(|s| s.step <= next) {
+            self.switches.pop_front();
+            if let Some(contact) = self.contacts.iter().rev().find(|(seq, _)| *seq == switch.contact_seq) {
+                self.contact = *contact;
+            }
+        }
+        let began_ms = clock.now_ms();
+        let record = tissue.solver.step(&self.contact.1, self.contact.0);
+        let us = ((clock.now_ms() - began_ms) * 1e3) as f32;
+        self.step_times.add_us(us);
+        if let Some(mut record) = record {
+            record.compute_us = us;
+            self.pens.solver.send(record);
+        }
+    }
+
+    fn compare(&mut self, was: &TickRecord, is: &TickRecord) {
+        let bits = |r: &TickRecord| r.wrench.force.to_array().map(f32::to_bits);
+        self.replayed.ticks += 1;
+        self.replayed.identical += u64::from(bits(was) == bits(is));
+        let difference = (was.wrench.force - is.wrench.force).length();
+        self.replayed.max_difference_n = self.replayed.max_difference_n.max(difference);
+    }
+
+    fn outcome(self) -> Outcome {
+        let last = self.recording.ticks.last();
+        let solver = self.tissue.as_ref().map(|tissue| {
+            let mut solver = outcome(&tissue.solver);
+            (solver.times, solver.collision_times) = (self.step_times, self.collision_times);
+            solver.real_time_factor = last.map_or(0.0, |t| tissue.solver.time_ms() / t.time_ms.max(1e-3));
+            solver
+        });
+        Outcome {
+            ticks: self.ticks,
+            seconds: last.map_or(0.0, |tick| tick.time_ms * 1e-3),
+            solver,
+            scores: *self.haptic.scores(),
+            guard: self.haptic.guard().counters(),
+            end_force_n: last.map_or(0.0, |tick| tick.wrench.force.length()),
+            replayed: Some(self.replayed),
+            ..Outcome::default()
+        }
+    }
+}
+
+const PATCH: SurfacePatch = SurfacePatch {
+    time_ms: 0.0,
+    normal: trepan_geometry::Vec3::ZERO,
+    tip_mm: trepan_geometry::Vec3::ZERO,
+    depth_mm: 0.0,
+    normal_velocity: 0.0,
+};
+
+/// What the device said at a recorded tick.
+fn reading(record: &TickRecord) -> Reading {
+    let tool = ToolState {
+        world_from_tool: record.device,
+        twist: record.twist,
+        buttons: Buttons(record.buttons),
+        time_ms: record.time_ms,
+    };
+    Reading { tool, status: if record.has(TickRecord::STALE) { Status::Stale } else { Status::Fresh } }
+}
+
+fn remember<T>(memory: &mut VecDeque<T>, item: T) {
+    if memory.len() == MEMORY {
+        memory.pop_front();
+    }
+    memory.push_back(item);
+}

@@ -1,0 +1,140 @@
+//! What the session says while it runs: phase and tool changes, warnings raised and cleared.
+//!
+//! # Practice
+//! A notice is plain data, made inside a tick without allocation; its words are made by whoever shows it.
+
+use crate::program::Phase;
+
+/// A warning that can stand for a while.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Warning {
+    /// The burr is close to the brain.
+    BrainNear,
+    /// The burr touches the brain.
+    BrainTouched,
+    /// The wanted force is over the device's limit.
+    ForceLimit,
+    /// The last collision result is old; its force fades.
+    TissueLate,
+    /// The device gave no fresh or no finite pose.
+    DeviceStale,
+}
+
+impl Warning {
+    /// Every warning, in the order of their bits.
+    pub const ALL: [Self; 5] =
+        [Self::BrainNear, Self::BrainTouched, Self::ForceLimit, Self::TissueLate, Self::DeviceStale];
+
+    /// A short name for files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BrainNear => "brain-near",
+            Self::BrainTouched => "brain-touched",
+            Self::ForceLimit => "force-limit",
+            Self::TissueLate => "tissue-late",
+            Self::DeviceStale => "device-stale",
+        }
+    }
+
+    /// What the trainee reads.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::BrainNear => "the drill is about to reach the brain",
+            Self::BrainTouched => "the drill touches the brain",
+            Self::ForceLimit => "the force is at the device's limit",
+            Self::TissueLate => "the tissue's answer is late, its force fades",
+            Self::DeviceStale => "the device gave no fresh position, the last one is held",
+        }
+    }
+}
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum What {
+    /// A phase began.
+    Phase(Phase),
+    /// A warning was raised (`true`) or cleared; the number says how near, how strong or how old (mm, N or ms).
+    Warning(Warning, bool, f32),
+}
+
+/// Something that happened at a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Notice {
+    /// Tick number.
+    pub tick: u64,
+    /// Session time, ms.
+    pub time_ms: f64,
+    /// What.
+    pub what: What,
+}
+
+impl Notice {
+    /// Kind and sentence, as recorded.
+    pub fn words(&self) -> (&'static str, String) {
+        match self.what {
+            What::Phase(phase) => ("phase", format!("{} begins with the {:?}", phase.name(), phase.tool().kind).to_lowercase()),
+            What::Warning(warning, true, value) => {
+                let unit = match warning {
+                    Warning::BrainNear | Warning::BrainTouched => "mm away",
+                    Warning::ForceLimit => "N wanted",
+                    Warning::TissueLate | Warning::DeviceStale => "ms old",
+                };
+                ("warning", format!("{}: {} ({value:.2} {unit})", warning.name(), warning.text()))
+            }
+            What::Warning(warning, false, _) => ("cleared", warning.name().to_string()),
+        }
+    }
+}
+
+/// Which warnings stand, with hysteresis, so that noise at a threshold does not repeat them.
+#[derive(Clone, Debug, Default)]
+pub struct Watch {
+    standing: u32,
+    quiet_since_ms: [f64; Warning::ALL.len()],
+}
+
+/// How long a cause must be gone before its warning is cleared, ms.
+const CLEAR_MS: f64 = 100.0;
+
+impl Watch {
+    /// Tells whether a cause is present at `time_ms`; returns the change, if it is one.
+    pub fn tell(&mut self, warning: Warning, present: bool, value: f32, time_ms: f64) -> Option<What> {
+        let at = Warning::ALL.iter().position(|&w| w == warning)?;
+        let bit = 1 << at;
+        let stands = self.standing & bit != 0;
+        if present {
+            self.quiet_since_ms[at] = time_ms;
+            self.standing |= bit;
+            (!stands).then_some(What::Warning(warning, true, value))
+        } else if stands && time_ms - self.quiet_since_ms[at] >= CLEAR_MS {
+            self.standing &= !bit;
+            Some(What::Warning(warning, false, value))
+        } else {
+            None
+        }
+    }
+
+    /// The bits of the standing warnings, as in [`Warning::ALL`].
+    pub fn standing(&self) -> u32 {
+        self.standing
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_is_raised_once_and_cleared_after_quiet() {
+        let mut watch = Watch::default();
+        let mut told = Vec::new();
+        for ms in 0..400 {
+            let present = ms < 50 || (ms < 150 && ms % 20 == 0);
+            told.extend(watch.tell(Warning::BrainNear, present, 1.5, f64::from(ms)).map(|what| (ms, what)));
+        }
+        assert_eq!(told.len(), 2);
+        assert_eq!(told[0], (0, What::Warning(Warning::BrainNear, true, 1.5)));
+        assert!(matches!(told[1], (240, What::Warning(Warning::BrainNear, false, _))), "{told:?}");
+        assert_eq!(watch.standing(), 0);
+    }
+}

@@ -1,0 +1,106 @@
+//! The command line that the three programs share.
+
+use clap::Parser;
+use std::path::PathBuf;
+
+/// Flags of every program; names say their unit.
+#[derive(Clone, Debug, Parser)]
+#[command(max_term_width = 120, version)]
+pub struct Options {
+    /// CT of the patient: a file, or a folder of DICOM slices [default: the built-in case]
+    #[arg(long, value_name = "PATH")]
+    pub ct: Option<PathBuf>,
+    /// MRI of the same patient in the same space
+    #[arg(long, value_name = "PATH")]
+    pub mri: Option<PathBuf>,
+    /// Label volume: what is not 0 is brain [default: found in the MRI]
+    #[arg(long, value_name = "PATH")]
+    pub labels: Option<PathBuf>,
+    /// mouse | script:NAME | replay:FILE | openhaptics[:NAME] | force-dimension | haply [default: mouse with a window, else a script]
+    #[arg(long, value_name = "DEVICE")]
+    pub device: Option<String>,
+    /// Run without a window
+    #[arg(long)]
+    pub headless: bool,
+    /// Length of a scripted operation, and at most of any other, seconds [default: 20 for a script]
+    #[arg(long, value_name = "S")]
+    pub duration: Option<f64>,
+    /// Where to record the session [default: session.mcap in the output folder]
+    #[arg(long, value_name = "FILE.mcap")]
+    pub record: Option<PathBuf>,
+    /// Folder for summary, report, recording, pictures [default: trepan-out/PROGRAM]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Solver of the brain [default: tled]
+    #[arg(long, value_name = "NAME")]
+    pub solver: Option<String>,
+    /// How bone is touched [default: the recommended method]
+    #[arg(long, value_name = "NAME")]
+    pub rigid: Option<String>,
+    /// Seed of everything random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// List the haptic devices and what each needs, then end
+    #[arg(long)]
+    pub list_devices: bool,
+    /// Edge of a skull voxel, mm
+    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    pub spacing_mm: f32,
+    /// Tetrahedra of the brain, met within a tenth
+    #[arg(long, value_name = "N", default_value_t = 12_000)]
+    pub tets: usize,
+    /// Threshold of bone, HU [default: from the histogram, 300 to 500]
+    #[arg(long, value_name = "HU")]
+    pub isovalue_hu: Option<i16>,
+    /// Young's modulus of the brain, kPa
+    #[arg(long, value_name = "KPA", default_value_t = 3.0)]
+    pub young_modulus_kpa: f32,
+    /// Haptic ticks a second
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    pub rate_hz: f32,
+    /// Pictures a second in a headless run; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 1.0)]
+    pub frames_per_second: f64,
+    /// Width and height of the picture, pixels
+    #[arg(long, value_name = "WxH", default_value = "960x600", value_parser = size)]
+    pub picture: [u32; 2],
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let remedy = "expected WIDTHxHEIGHT with 16 to 8192 pixels each, as in 960x600";
+    let (width, height) = text.split_once('x').ok_or(remedy)?;
+    let side = |s: &str| s.parse().ok().filter(|n| (16..=8192).contains(n)).ok_or(remedy);
+    Ok([side(width)?, side(height)?])
+}
+
+impl Options {
+    /// Refuses numbers that make no sense, naming the flag and what would be right.
+    pub fn check(&self) -> Result<(), String> {
+        let within = |flag: &str, value: f64, low: f64, high: f64| {
+            let good = value.is_finite() && value >= low && value <= high;
+            good.then_some(()).ok_or(format!("--{flag} {value} is out of range: give {low} to {high}"))
+        };
+        within("duration", self.duration.unwrap_or(1.0), 0.1, 86_400.0)?;
+        within("spacing-mm", self.spacing_mm.into(), 0.2, 4.0)?;
+        within("tets", self.tets as f64, 500.0, 1e6)?;
+        within("isovalue-hu", self.isovalue_hu.unwrap_or(0).into(), -900.0, 3000.0)?;
+        within("young-modulus-kpa", self.young_modulus_kpa.into(), 0.05, 1000.0)?;
+        within("rate-hz", self.rate_hz.into(), 100.0, 10_000.0)?;
+        within("frames-per-second", self.frames_per_second, 0.0, 120.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_numbers_are_refused_with_a_range() {
+        let parse = |line: &str| Options::try_parse_from(line.split(' '));
+        assert!(parse("x --headless --duration 20 --out demo").unwrap().check().is_ok());
+        let fault = parse("x --duration nan").unwrap().check().unwrap_err();
+        assert!(fault.contains("--duration") && fault.contains("0.1 to 86400"), "{fault}");
+        assert!(parse("x --spacing-mm 0").unwrap().check().is_err());
+        assert!(parse("x --picture 960").is_err() && parse("x --picture 0x7").is_err());
+    }
+}

@@ -1,0 +1,108 @@
+//! The main thread of a headless run: one picture after another, from the newest state, through the same drawing code as the window.
+
+use crate::clock::Clock;
+use crate::collision_step::SoftFrame;
+use crate::report::Shot;
+use crate::run::{Eyes, View};
+use crate::scene::Scene;
+use crate::stop::Stop;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use trepan_geometry::Vec3;
+use trepan_haptics::script::Site;
+use trepan_render::{Camera, Frame, Renderer};
+
+/// Pictures that go into the report beside the first and the last.
+const SHOWN: usize = 4;
+
+/// What the pictures came to.
+#[derive(Debug, Default)]
+pub struct Album {
+    /// Pictures written.
+    pub frames: u64,
+    /// Those for the report.
+    pub shots: Vec<Shot>,
+    /// What went wrong.
+    pub faults: Vec<String>,
+}
+
+/// The eye over the site: a little from behind and from the side, so that hole and tool are both seen.
+pub fn camera(site: &Site) -> Camera {
+    let outward = -site.inward;
+    let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
+    Camera::viewed_from(site.entry, outward + 0.55 * side + 0.1 * Vec3::Z, 230.0)
+}
+
+/// A frame of the newest state.
+pub fn frame<'a>(camera: Camera, view: &View, soft: Option<&'a SoftFrame>, bone_shown: bool) -> Frame<'a> {
+    Frame {
+        tool: Some(view.sample.phase.tool()),
+        world_from_tool: view.sample.state.world_from_tool,
+        turn_rad: if view.sample.drilling { view.time_ms as f32 * 0.7 } else { 0.0 },
+        drilling: view.sample.drilling,
+        brain_positions: soft.map(|soft| soft.positions.as_slice()),
+        show_bone: bone_shown,
+        ..Frame::of(camera)
+    }
+}
+
+/// Waits for the end without a picture.
+pub fn wait(mut eyes: Eyes, stop: &Stop) {
+    while !stop.asked() && !eyes.view.latest().0.finished {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Draws `per_second` pictures a second into `folder` until the end, and one more then.
+pub fn draw(mut eyes: Eyes, mut renderer: Renderer, scene: &Scene, per_second: f64, folder: &Path, stop: &Stop) -> Album {
+    let mut album = Album::default();
+    let mut candidates: Vec<(f64, PathBuf)> = Vec::new();
+    let clock = Clock::start();
+    let camera = camera(&scene.site);
+    let mut next_ms = 0.0;
+    loop {
+        let view = *eyes.view.latest().0;
+        let over = view.finished || stop.asked();
+        if over || clock.now_ms() >= next_ms {
+            next_ms = clock.now_ms().max(next_ms) + 1e3 / per_second.max(1e-3);
+            let soft = eyes.soft.as_mut().map(|soft| soft.latest().0);
+            let path = folder.join(format!("frame-{:05}.png", album.frames));
+            let drawn = renderer.draw(&frame(camera, &view, soft, scene.bone.is_some()));
+            match drawn.map_err(|f| f.to_string()).and_then(|_| write(&mut renderer, &path)) {
+                Ok(()) => {
+                    album.frames += 1;
+                    candidates.push((view.time_ms * 1e-3, path));
+                }
+                Err(fault) => {
+                    album.faults.push(format!("the pictures ended: {fault}"));
+                    wait(eyes, stop);
+                    break;
+                }
+            }
+        }
+        if over {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    album.shots = chosen(&candidates);
+    album
+}
+
+fn write(renderer: &mut Renderer, path: &Path) -> Result<(), String> {
+    let image = renderer.image().map_err(|fault| fault.to_string())?;
+    image.write_png(path).map_err(|fault| format!("{}: {fault}", path.display()))
+}
+
+/// The first, the last, and some evenly between.
+fn chosen(candidates: &[(f64, PathBuf)]) -> Vec<Shot> {
+    let last = candidates.len().saturating_sub(1);
+    let mut picks: Vec<usize> = (0..=SHOWN + 1).map(|i| i * last / (SHOWN + 1)).collect();
+    picks.dedup();
+    let shot = |&at: &usize| {
+        let (seconds, path) = candidates.get(at)?;
+        let when = if at == 0 { "before" } else if at == last { "after" } else { "during" };
+        Some(Shot { caption: format!("{when}, at {seconds:.1} s"), png: std::fs::read(path).ok()? })
+    };
+    picks.iter().filter_map(shot).collect()
+}

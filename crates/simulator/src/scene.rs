@@ -1,0 +1,116 @@
+//! The operating table: a case made ready to be touched, drilled and pressed.
+
+use crate::error::SessionError;
+use crate::import::{Brain, Case};
+use crate::program::Program;
+use crate::site;
+use std::sync::Arc;
+use trepan_geometry::Vec3;
+use trepan_haptics::script::Site;
+use trepan_mesh::{Surface, TetMesh};
+use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+
+/// Brain nodes nearer to bone than this, in the lower part of the brain, do not move, mm.
+const HELD_BY_BONE_MM: f32 = 6.0;
+/// The lower part of the brain, as a share of its height.
+const LOWER_PART: f32 = 0.35;
+/// Fewer held nodes than this do not hold a brain.
+const FEWEST_HELD: usize = 12;
+
+/// What the stages share.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The skull, while it is drilled.
+    pub bone: Option<Arc<BoneVolume>>,
+    /// The brain at rest.
+    pub brain: Option<RestBrain>,
+    /// Where to operate.
+    pub site: Site,
+    /// Remarks for the user.
+    pub remarks: Vec<String>,
+}
+
+/// The brain at rest.
+#[derive(Clone, Debug)]
+pub struct RestBrain {
+    /// Tetrahedra.
+    pub mesh: TetMesh,
+    /// Nodes that do not move.
+    pub fixed: Vec<u32>,
+    /// Distance to its surface, mm, negative inside.
+    pub field: Arc<DistanceField>,
+    /// The MRI around it.
+    pub mri: VoxelVolume<f32>,
+}
+
+impl Scene {
+    /// Makes a case ready for a program.
+    pub fn new(program: Program, case: Case) -> Result<Self, SessionError> {
+        let mut remarks = case.notes;
+        let bone = match &case.skull {
+            Some(skull) => {
+                let bone = BoneVolume::new(skull, case.isovalue_hu);
+                Some(Arc::new(bone.map_err(|fault| SessionError::Case(format!("the CT: {fault}")))?))
+            }
+            None => None,
+        };
+        let brain = case.brain.map(|brain| rest_brain(brain, bone.as_deref(), &mut remarks));
+        if brain.is_none() {
+            remarks.push("without an MRI nothing warns before the burr reaches the brain".into());
+        }
+        let site = find_site(program, bone.as_deref(), brain.as_ref()).ok_or_else(|| {
+            SessionError::Case(
+                "no ray from above meets bone and then brain: are the CT and the MRI of one head, upright, in one space?".into(),
+            )
+        })?;
+        Ok(Self { bone, brain, site, remarks })
+    }
+}
+
+fn find_site(program: Program, bone: Option<&BoneVolume>, brain: Option<&RestBrain>) -> Option<Site> {
+    match (bone, brain) {
+        (Some(bone), Some(brain)) if program.has_bone() => site::burr_hole(bone, &brain.field, brain.mesh.bounds().centre()),
+        (_, Some(brain)) => site::bare_brain(&brain.field, brain.mesh.bounds().centre()),
+        (Some(bone), None) => site::bare_skull(bone),
+        (None, None) => None,
+    }
+}
+
+fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>) -> RestBrain {
+    let mut fixed = bone.map(|bone| held_by_bone(&brain.mesh, bone)).unwrap_or_default();
+    if fixed.len() < FEWEST_HELD {
+        remarks.push("too little bone lies under the brain to hold it: its lowest tenth is held instead".into());
+        fixed = below(&brain.mesh, 0.1);
+    }
+    RestBrain { fixed, field: Arc::new(DistanceField::of_mask(&brain.mask)), mesh: brain.mesh, mri: brain.mri }
+}
+
+/// Surface nodes near the skull base.
+fn held_by_bone(mesh: &TetMesh, bone: &BoneVolume) -> Vec<u32> {
+    let mut on_surface = vec![false; mesh.positions.len()];
+    Surface::of(mesh).triangles.iter().flatten().for_each(|&node| on_surface[node as usize] = true);
+    below(mesh, LOWER_PART)
+        .into_iter()
+        .filter(|&node| on_surface[node as usize] && near_bone(mesh.positions[node as usize], bone))
+        .collect()
+}
+
+fn below(mesh: &TetMesh, share: f32) -> Vec<u32> {
+    let bounds = mesh.bounds();
+    let top = bounds.min.z + share * bounds.size().z;
+    (0..mesh.positions.len() as u32).filter(|&node| mesh.positions[node as usize].z <= top).collect()
+}
+
+fn near_bone(point: Vec3, bone: &BoneVolume) -> bool {
+    let reach = (HELD_BY_BONE_MM / bone.spacing_mm()).ceil() as i32;
+    let centre = bone.voxel_of(point);
+    let offsets = || -reach..=reach;
+    offsets().any(|k| {
+        offsets().any(|j| {
+            offsets().any(|i| {
+                let voxel = centre + glam::IVec3::new(i, j, k);
+                bone.is_bone(voxel) && bone.centre_of(voxel).distance(point) <= HELD_BY_BONE_MM
+            })
+        })
+    })
+}

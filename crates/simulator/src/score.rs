@@ -1,0 +1,93 @@
+//! The scores so far: what the hand did to bone and brain, summed tick by tick.
+//!
+//! # Theory
+//! Path length `Σ |xₙ - xₙ₋₁|` of the tool's tip, drilling time, volume of bone removed, plunge (how far the burr's ball went past the
+//! brain's rest surface), largest force on the brain, and the number of separate touches of the brain with the burr.
+//! They are plain physical quantities; none is validated against clinical skill.
+
+use serde::Serialize;
+use trepan_geometry::Vec3;
+use trepan_link::wire::TickRecord;
+
+/// Running sums; a copy of it is the score.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct ScoreKeeper {
+    /// Path of the tip, mm.
+    pub path_mm: f64,
+    /// Time with the burr turning, s.
+    pub drilling_s: f64,
+    /// Bone removed, mm³.
+    pub bone_removed_mm3: f64,
+    /// Deepest place of the burr past the brain's rest surface, mm; 0 when it never got there.
+    pub plunge_mm: f32,
+    /// Separate touches of the brain with the burr.
+    pub burr_touches_of_brain: u32,
+    /// Largest force while the tool pressed on tissue, N.
+    pub peak_tissue_force_n: f32,
+    /// Largest depth of the probe in tissue, mm.
+    pub peak_tissue_depth_mm: f32,
+    /// Largest force of all, N.
+    pub peak_force_n: f32,
+    /// Largest change of force between two ticks, N.
+    pub peak_force_step_n: f32,
+    #[serde(skip)]
+    last_tip: Option<Vec3>,
+    #[serde(skip)]
+    last_force: Vec3,
+    #[serde(skip)]
+    touching: bool,
+}
+
+impl ScoreKeeper {
+    /// Adds one tick.
+    pub fn add(&mut self, record: &TickRecord, dt_ms: f32) {
+        let tip = record.proxy.translation;
+        let force = record.wrench.force;
+        self.path_mm += self.last_tip.map_or(0.0, |last| f64::from((tip - last).length()));
+        self.last_tip = Some(tip);
+        self.peak_force_n = self.peak_force_n.max(force.length());
+        self.peak_force_step_n = self.peak_force_step_n.max((force - self.last_force).length());
+        self.last_force = force;
+        self.bone_removed_mm3 += f64::from(record.removed_mm3);
+        if record.has(TickRecord::DRILLING) {
+            self.drilling_s += f64::from(dt_ms) * 1e-3;
+        }
+        if record.phase == 0 && record.tool == 0 {
+            self.plunge_mm = self.plunge_mm.max(-record.brain_distance_mm);
+            let touching = record.brain_distance_mm <= 0.0;
+            self.burr_touches_of_brain += u32::from(touching && !self.touching);
+            self.touching = touching;
+        } else if record.tissue_depth_mm > 0.0 {
+            self.peak_tissue_depth_mm = self.peak_tissue_depth_mm.max(record.tissue_depth_mm);
+            self.peak_tissue_force_n = self.peak_tissue_force_n.max(force.length());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_geometry::{Pose, Quat, Wrench};
+
+    #[test]
+    fn a_known_path_gives_known_scores() {
+        let mut keeper = ScoreKeeper::default();
+        for i in 0..=100u16 {
+            let x = f32::from(i) * 0.1;
+            let record = TickRecord {
+                proxy: Pose::from_parts(Vec3::new(x, 0.0, 0.0), Quat::IDENTITY),
+                wrench: Wrench { force: Vec3::new(0.0, 0.0, if i < 50 { 1.0 } else { 0.25 }), torque: Vec3::ZERO },
+                removed_mm3: 0.5,
+                brain_distance_mm: if (20..30).contains(&i) || i == 40 { -0.75 } else { 3.0 },
+                flags: TickRecord::DRILLING,
+                ..TickRecord::default()
+            };
+            keeper.add(&record, 1.0);
+        }
+        assert!((keeper.path_mm - 10.0).abs() < 1e-4);
+        assert!((keeper.drilling_s - 0.101).abs() < 1e-9);
+        assert!((keeper.bone_removed_mm3 - 50.5).abs() < 1e-9);
+        assert_eq!((keeper.plunge_mm, keeper.burr_touches_of_brain), (0.75, 2));
+        assert_eq!((keeper.peak_force_n, keeper.peak_force_step_n), (1.0, 1.0));
+    }
+}

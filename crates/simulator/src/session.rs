@@ -1,0 +1,326 @@
+//! A session from its flags to its files: open (everything that a user can get wrong), run, write.
+
+use crate::cache::Cache;
+use crate::collision_step::CollisionStage;
+use crate::driver;
+use crate::error::SessionError;
+use crate::haptic_tick::{HapticConfig, HapticStage, ToolSample};
+use crate::import::{self, Inputs, Recipe};
+use crate::options::Options;
+use crate::output;
+use crate::picture::{self, Album};
+use crate::program::Program;
+use crate::run::{Eyes, Outcome, Stages, Tissue};
+use crate::scene::{RestBrain, Scene};
+use crate::solver_step::SolverStage;
+use crate::stop::Stop;
+use crate::summary::{About, Machine, Summary};
+use crate::threads::{self, Pace};
+use crate::{lockstep, window};
+use std::path::PathBuf;
+use std::sync::Arc;
+use trepan_contact::{GuardConfig, Viscoelastic};
+use trepan_geometry::{ToolState, Vec3, units};
+use trepan_haptics::{DeviceName, HapticDevice, mouse, script::Script, simulated};
+use trepan_link::wire::SessionHeader;
+use trepan_link::{Recorder, Recording};
+use trepan_render::{Renderer, SceneData};
+use trepan_soft::{Body, Material, SoftSolver};
+
+/// A session that is ready to run.
+pub struct Session {
+    program: Program,
+    options: Options,
+    device: DeviceName,
+    recording: Option<Recording>,
+    case: String,
+    hash: String,
+    scene: Scene,
+    rigid: trepan_rigid::Method,
+    out: PathBuf,
+    windowed: bool,
+}
+
+/// How a session ended.
+#[derive(Debug)]
+pub struct Ended {
+    /// Its summary.
+    pub summary: Summary,
+    /// Where its files are.
+    pub out: PathBuf,
+    /// The signal that ended it, if one did.
+    pub signal: Option<i32>,
+}
+
+impl Session {
+    /// Checks and loads everything; writes nothing but the cache.
+    ///
+    /// `built_in` is the case that is taken when no image is given.
+    pub fn open(program: Program, options: Options, built_in: Inputs) -> Result<Self, SessionError> {
+        options.check().map_err(SessionError::Usage)?;
+        let windowed = !options.headless && window::has_display();
+        if !windowed && !options.headless {
+            tracing::info!("no display here: running the scripted operation headless");
+        }
+        let device = device_name(program, &options, windowed)?;
+        let rigid = rigid_method(&options)?;
+        solver_named(&options)?;
+        let recording = match &device {
+            DeviceName::Replay(path) => Some(Recording::open(path)?),
+            _ => None,
+        };
+        let recipe = Recipe { spacing_mm: options.spacing_mm, tets: options.tets, isovalue_hu: options.isovalue_hu };
+        let case = import::open(program, &inputs(&options, built_in), &recipe, &Cache::of_user()?)?;
+        tracing::info!("case {} {}", case.name, if case.cached { "from the cache" } else { "imported" });
+        let (name, hash) = (case.name.clone(), case.hash.clone());
+        let scene = Scene::new(program, case)?;
+        scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
+        let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
+        Ok(Self { program, options, device, recording, case: name, hash, scene, rigid, out, windowed })
+    }
+
+    /// Runs it and writes its files.
+    pub fn run(self) -> Result<Ended, SessionError> {
+        let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
+        let (hand, pointer) = self.hand()?;
+        let start = self.start(hand.as_deref());
+        let stages = self.stages(start.state)?;
+        output::folder(&self.out)?;
+        let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
+        let recorder = Recorder::create(&record, &self.header())?;
+        let mut graphics = self.graphics();
+        let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
+        let mut album = Album::default();
+        let outcome = self.loops(stages, hand, recorder, start, &stop, |eyes| {
+            album = self.picture(eyes, &mut graphics, pointer, &stop);
+        });
+        let mut remarks = self.scene.remarks.clone();
+        remarks.extend(graphics.err());
+        remarks.append(&mut album.faults);
+        let summary = Summary::new(self.about(&album, adapter, remarks), &outcome);
+        output::write(&self.out, &record, &summary, &outcome, &album.shots, self.drilled())?;
+        Ok(Ended { summary, out: self.out, signal: stop.signal() })
+    }
+
+    fn loops(
+        &self,
+        stages: Stages,
+        hand: Option<Box<dyn HapticDevice>>,
+        recorder: Recorder,
+        start: ToolSample,
+        stop: &Stop,
+        picture: impl FnOnce(Eyes),
+    ) -> Outcome {
+        match (&self.recording, hand) {
+            (Some(recording), _) => lockstep::run(stages, recording, recorder, start, self.windowed, stop, picture),
+            (None, Some(hand)) => threads::run(stages, hand, recorder, start, self.pace(), stop, picture),
+            (None, None) => Outcome::default(),
+        }
+    }
+
+    /// The device, and the window's end of it when it is the mouse. None for a replay, which brings its own hand.
+    fn hand(&self) -> Result<(Option<Box<dyn HapticDevice>>, Option<mouse::MouseHandle>), SessionError> {
+        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
+        let script = |name: &str| Script::named(name, &self.scene.site, 1e3 * self.options.duration.unwrap_or(20.0));
+        Ok(match &self.device {
+            DeviceName::Script(name) => (Some(Box::new(script(name).map_err(|f| fault(&f))?)), None),
+            DeviceName::Simulated(name) => {
+                let intent = Box::new(script(name).map_err(|f| fault(&f))?);
+                let hand = simulated::Simulated::new(simulated::Config::default(), simulated::Hand::FIRM, intent);
+                (Some(Box::new(hand)), None)
+            }
+            DeviceName::Mouse => {
+                let start = script(self.program.script()).map_err(|f| fault(&f))?.at(0.0);
+                let (handle, hand) = mouse::pair(start.world_from_tool);
+                (Some(Box::new(hand)), Some(handle))
+            }
+            DeviceName::Replay(_) => (None, None),
+            other => return Err(SessionError::Device(format!("{other} is not there: no driver for it in this version"))),
+        })
+    }
+
+    fn start(&self, _hand: Option<&dyn HapticDevice>) -> ToolSample {
+        let script = Script::named(self.program.script(), &self.scene.site, 1e4).map(|script| script.at(0.0));
+        let first = self.recording.as_ref().and_then(|r| r.ticks.first()).map(|t| ToolState::at(t.device));
+        let state = first.or(script.ok()).unwrap_or_else(|| ToolState::at(trepan_geometry::Pose::IDENTITY));
+        ToolSample { tick: 0, state, phase: self.program.phases()[0], drilling: false }
+    }
+
+    fn stages(&self, start: ToolState) -> Result<Stages, SessionError> {
+        let config = HapticConfig {
+            program: self.program,
+            rigid: self.rigid.clone(),
+            dt_ms: self.tick_ms(),
+            bone_force: Viscoelastic { stiffness: 2.0, damping: 0.5 },
+            tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
+            guard: GuardConfig::default(),
+            near_mm: 2.0,
+        };
+        let bone = self.scene.bone.clone().filter(|_| self.program.has_bone());
+        let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));
+        let tissue = match &self.scene.brain {
+            Some(brain) if self.program.has_tissue() => Some(self.tissue(brain)?),
+            _ => None,
+        };
+        Ok(Stages { haptic: HapticStage::new(config, bone, field, start), tissue })
+    }
+
+    fn tissue(&self, brain: &RestBrain) -> Result<Tissue, SessionError> {
+        let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(format!("the brain: {fault}"));
+        let gravity = Vec3::new(0.0, -units::GRAVITY_MM_PER_MS2, 0.0);
+        let material = Material::NeoHookean {
+            young_mpa: units::mpa_from_kpa(self.options.young_modulus_kpa),
+            poisson: 0.45,
+            density_g_mm3: units::WATER_G_PER_MM3,
+        };
+        let body = Body { mesh: brain.mesh.clone(), fixed: brain.fixed.clone(), material };
+        let solver: Box<dyn SoftSolver> = match solver_named(&self.options)? {
+            None => {
+                let config = trepan_tled::Config { balanced_gravity: gravity, ..Default::default() };
+                Box::new(trepan_tled::Tled::new(&body, &config).map_err(|f| internal(&f))?)
+            }
+            Some(method) => method.build(&body).map_err(|f| internal(&f))?,
+        };
+        let collision = CollisionStage::new(self.program, &brain.mesh, &trepan_deformable::Config::default());
+        Ok(Tissue { collision: collision.map_err(|f| internal(&f))?, solver: SolverStage::new(solver, gravity) })
+    }
+
+    fn graphics(&self) -> Result<Graphics, String> {
+        if !self.windowed && self.options.frames_per_second == 0.0 {
+            return Err("no picture was asked for".into());
+        }
+        let bone = self.scene.bone.clone().ok_or("no picture without a CT")?;
+        let gpu = driver::open().inspect_err(|fault| tracing::warn!("{fault}"))?;
+        let data = SceneData {
+            bone,
+            brain: self.scene.brain.as_ref().map(|brain| &brain.mesh),
+            mri: self.scene.brain.as_ref().map(|brain| &brain.mri),
+        };
+        let [width, height] = self.options.picture;
+        let adapter = gpu.name();
+        let renderer = Renderer::new(&gpu, &data, [width, height]).map_err(|fault| fault.to_string())?;
+        Ok(Graphics { adapter, renderer: Some(renderer) })
+    }
+
+    fn picture(
+        &self,
+        eyes: Eyes,
+        graphics: &mut Result<Graphics, String>,
+        pointer: Option<mouse::MouseHandle>,
+        stop: &Stop,
+    ) -> Album {
+        let Some(renderer) = graphics.as_mut().ok().and_then(|g| g.renderer.take()) else {
+            picture::wait(eyes, stop);
+            return Album::default();
+        };
+        if self.windowed {
+            return window::show(eyes, renderer, &self.scene, self.program, pointer, &self.out, stop);
+        }
+        picture::draw(eyes, renderer, &self.scene, self.options.frames_per_second, &self.out.join("frames"), stop)
+    }
+
+    fn pace(&self) -> Pace {
+        let scripted = matches!(self.device, DeviceName::Script(_) | DeviceName::Simulated(_));
+        let end_ms = self.options.duration.filter(|_| !scripted).map_or(f64::INFINITY, |s| 1e3 * s);
+        Pace { tick_ms: self.tick_ms(), collision_ms: 1.0, end_ms }
+    }
+
+    fn tick_ms(&self) -> f32 {
+        1e3 / self.options.rate_hz
+    }
+
+    fn solver_name(&self) -> String {
+        self.options.solver.clone().unwrap_or_else(|| TLED.into())
+    }
+
+    fn header(&self) -> SessionHeader {
+        let config = [
+            ("rigid", self.rigid.name().to_string()),
+            ("solver", self.solver_name()),
+            ("rate_hz", self.options.rate_hz.to_string()),
+            ("spacing_mm", self.options.spacing_mm.to_string()),
+            ("tets", self.options.tets.to_string()),
+            ("young_modulus_kpa", self.options.young_modulus_kpa.to_string()),
+        ];
+        SessionHeader {
+            app: self.program.name().into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            case: self.case.clone(),
+            seed: self.options.seed,
+            hashes: [("case".to_string(), self.hash.clone())].into(),
+            config: config.map(|(key, value)| (key.to_string(), value)).into(),
+        }
+    }
+
+    fn about(&self, album: &Album, adapter: Option<String>, remarks: Vec<String>) -> About {
+        let brain = self.scene.brain.as_ref();
+        About {
+            program: self.program,
+            case: self.case.clone(),
+            device: match &self.device {
+                DeviceName::Replay(_) => "replay".into(),
+                other => other.to_string(),
+            },
+            solver: self.solver_name(),
+            brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
+            frames: album.frames,
+            remarks,
+            machine: Machine::here(adapter),
+        }
+    }
+
+    /// The drilled volume, in headless runs of programs that drill.
+    fn drilled(&self) -> Option<trepan_volume::VoxelVolume<i16>> {
+        let bone = self.scene.bone.as_ref().filter(|_| self.program.has_bone() && !self.windowed)?;
+        Some(bone.snapshot())
+    }
+}
+
+struct Graphics {
+    adapter: String,
+    renderer: Option<Renderer>,
+}
+
+const TLED: &str = "tled";
+
+fn inputs(options: &Options, built_in: Inputs) -> Inputs {
+    let given = options.ct.is_some() || options.mri.is_some() || options.labels.is_some();
+    if !given {
+        return built_in;
+    }
+    Inputs { name: None, ct: options.ct.clone(), mri: options.mri.clone(), labels: options.labels.clone() }
+}
+
+fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
+    let script = || DeviceName::Script(program.script().into());
+    let name = match &options.device {
+        Some(text) => text.parse().map_err(|fault: trepan_haptics::NameError| SessionError::Device(fault.to_string()))?,
+        None if windowed => DeviceName::Mouse,
+        None => script(),
+    };
+    if name == DeviceName::Mouse && !windowed {
+        let text = "the mouse needs a window: leave out --headless on a machine with a display, or give --device script:NAME";
+        return Err(SessionError::Device(text.into()));
+    }
+    Ok(name)
+}
+
+fn rigid_method(options: &Options) -> Result<trepan_rigid::Method, SessionError> {
+    let Some(name) = &options.rigid else { return Ok(trepan_rigid::Method::RECOMMENDED) };
+    trepan_rigid::Method::named(name).ok_or_else(|| {
+        let known: Vec<_> = trepan_rigid::Method::all().iter().map(|method| method.name()).collect();
+        SessionError::Usage(format!("--rigid {name} is not known; known are {}", known.join(", ")))
+    })
+}
+
+/// The rival solver of that name; `None` for TLED.
+fn solver_named(options: &Options) -> Result<Option<trepan_soft::Method>, SessionError> {
+    let name = options.solver.as_deref().unwrap_or(TLED);
+    if name == TLED {
+        return Ok(None);
+    }
+    trepan_soft::Method::named(name).map(Some).ok_or_else(|| {
+        let known: Vec<_> = trepan_soft::Method::all().iter().map(|method| method.name()).collect();
+        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {}", known.join(", ")))
+    })
+}

@@ -1,0 +1,131 @@
+//! Where to operate: a place on the skull where the bone is moderately thick, the brain is close below, and the way goes straight in.
+//!
+//! # Theory
+//! Rays run from outside towards the brain's middle, spread evenly over the upper right front of the head. Along each: the first
+//! bone is the entry, the last bone before the brain the inner table, the first place with negative distance the brain.
+//! The best ray minimises `|thickness - 6| + 2 |gap - 2| + 40 (1 - cos)`, in mm, cos between the ray and the bone's surface normal.
+//!
+//! # When not to use it
+//! To plan a real operation: nothing here knows vessels, sinuses or eloquent cortex.
+
+use trepan_geometry::Vec3;
+use trepan_haptics::script::Site;
+use trepan_volume::{BoneVolume, DistanceField};
+
+/// Rays tried.
+const RAYS: usize = 400;
+/// Where rays start, mm from the brain's middle.
+const FAR_MM: f32 = 160.0;
+/// Step along a ray, mm.
+const STEP_MM: f32 = 0.1;
+
+/// The best place for a burr hole above a brain with its middle at `centre`; `None` when no ray meets bone and then brain.
+pub fn burr_hole(bone: &BoneVolume, brain: &DistanceField, centre: Vec3) -> Option<Site> {
+    let sites = outward_rays().filter_map(|outward| site(bone, brain, centre, outward));
+    sites.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, site)| site)
+}
+
+/// A place to probe a brain without a skull: straight down from above, a third of the way to the right and front.
+pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
+    let outward = Vec3::new(0.45, 0.35, 0.82).normalize();
+    let depth = march(0.0, |t| brain.sample(centre + outward * (FAR_MM - t)) < 0.0)?;
+    Some(Site { entry: centre + outward * (FAR_MM - depth), inward: -outward, bone_mm: 0.0, brain_mm: 0.0 })
+}
+
+/// A place to drill when there is no brain to look for: towards the middle of the bone, from the same side.
+pub fn bare_skull(bone: &BoneVolume) -> Option<Site> {
+    let centre = bone.bounds().centre();
+    let outward = Vec3::new(0.45, 0.35, 0.82).normalize();
+    let at = |t: f32| bone.is_bone(bone.voxel_of(centre + outward * (FAR_MM - t)));
+    let entry = march(0.0, at)?;
+    let inner = march(entry, |t| !at(t))?;
+    let bone_mm = inner - entry;
+    Some(Site { entry: centre + outward * (FAR_MM - entry), inward: -outward, bone_mm, brain_mm: bone_mm + 5.0 })
+}
+
+/// Even directions over the upper right front.
+fn outward_rays() -> impl Iterator<Item = Vec3> {
+    let golden = std::f32::consts::PI * (3.0 - 5.0f32.sqrt());
+    let of = move |i: usize| {
+        let z = 1.0 - (i as f32 + 0.5) / RAYS as f32;
+        let (sin, cos) = (golden * i as f32).sin_cos();
+        Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+    };
+    (0..RAYS).map(of).filter(|d| d.x > 0.25 && d.y > -0.2 && d.z > 0.45)
+}
+
+fn site(bone: &BoneVolume, brain: &DistanceField, centre: Vec3, outward: Vec3) -> Option<(f32, Site)> {
+    let point = |t: f32| centre + outward * (FAR_MM - t);
+    let is_bone = |t: f32| bone.is_bone(bone.voxel_of(point(t)));
+    let entry = march(0.0, is_bone)?;
+    let surface = march(entry, |t| brain.sample(point(t)) < 0.0)?;
+    let mut inner = surface;
+    while inner > entry && !is_bone(inner) {
+        inner -= STEP_MM;
+    }
+    let (bone_mm, brain_mm) = (inner - entry, surface - entry);
+    let cos = normal(bone, point(entry)).dot(outward);
+    let cost = (bone_mm - 6.0).abs() + 2.0 * (brain_mm - bone_mm - 2.0).abs() + 40.0 * (1.0 - cos);
+    Some((cost, Site { entry: point(entry), inward: -outward, bone_mm, brain_mm }))
+}
+
+/// The first place from `start` on where `found` holds, mm along the ray.
+fn march(start: f32, found: impl Fn(f32) -> bool) -> Option<f32> {
+    let steps = ((FAR_MM - start) / STEP_MM) as usize;
+    (0..steps).map(|i| start + i as f32 * STEP_MM).find(|&t| found(t))
+}
+
+/// Outward normal of the bone around a surface point: away from the mean of the bone within 4 voxels.
+fn normal(bone: &BoneVolume, point: Vec3) -> Vec3 {
+    const REACH: i32 = 4;
+    let centre = bone.voxel_of(point);
+    let mut towards_bone = Vec3::ZERO;
+    for k in -REACH..=REACH {
+        for j in -REACH..=REACH {
+            for i in -REACH..=REACH {
+                let offset = glam::IVec3::new(i, j, k);
+                if offset.length_squared() <= REACH * REACH && bone.is_bone(centre + offset) {
+                    towards_bone += offset.as_vec3();
+                }
+            }
+        }
+    }
+    (-towards_bone).normalize_or_zero()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_volume::VoxelVolume;
+
+    /// A round head: bone from 80 to 86 mm, brain within 78 mm.
+    fn head() -> (BoneVolume, DistanceField) {
+        let mut ct = VoxelVolume::isotropic([96, 96, 96], Vec3::splat(-95.0), 2.0, -1000i16);
+        let mut mask = ct.map(|_| 0u8);
+        for at in 0..ct.data.len() {
+            let voxel = [at % 96, at / 96 % 96, at / (96 * 96)];
+            let r = ct.centre_of(voxel).length();
+            ct.data[at] = if (80.0..=86.0).contains(&r) { 900 } else { -1000 };
+            mask.data[at] = u8::from(r < 78.0);
+        }
+        (BoneVolume::new(&ct, 400).unwrap(), DistanceField::of_mask(&mask))
+    }
+
+    #[test]
+    fn a_round_head_is_entered_along_its_radius() {
+        let (bone, brain) = head();
+        let site = burr_hole(&bone, &brain, Vec3::ZERO).unwrap();
+        assert!((site.entry.length() - 86.0).abs() < 2.0, "{site:?}");
+        assert!((site.bone_mm - 6.0).abs() < 2.5 && (site.brain_mm - 8.0).abs() < 2.5, "{site:?}");
+        assert!(site.inward.dot(-site.entry.normalize()) > 0.999);
+        assert!(site.entry.x > 0.0 && site.entry.z > 0.0);
+    }
+
+    #[test]
+    fn a_brain_without_skull_is_touched_at_its_surface() {
+        let (bone, brain) = head();
+        let site = bare_brain(&brain, Vec3::ZERO).unwrap();
+        assert!((site.entry.length() - 78.0).abs() < 1.5, "{site:?}");
+        assert!((bare_skull(&bone).unwrap().bone_mm - 6.0).abs() < 2.5);
+    }
+}

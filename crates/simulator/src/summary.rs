@@ -1,0 +1,267 @@
+//! `summary.json`: what a session did, in numbers.
+
+use crate::notice::What;
+use crate::program::Program;
+use crate::run::{Outcome, Replayed, Times};
+use crate::score::ScoreKeeper;
+use serde::Serialize;
+use std::fs;
+
+/// The whole file.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// The program.
+    pub app: String,
+    /// The case, without a patient's name.
+    pub case: String,
+    /// The device.
+    pub device: String,
+    /// Phases as they began.
+    pub phases: Vec<PhaseStart>,
+    /// Haptic ticks run.
+    pub ticks: u64,
+    /// Ticks a second, as measured.
+    pub rate_hz: f64,
+    /// Ticks that were not done by the next deadline.
+    pub late_ticks: u64,
+    /// Ticks that felt an old collision result.
+    pub held_ticks: u64,
+    /// Compute time of a tick, µs.
+    pub tick_us: Quantiles,
+    /// Soft tissue; `null` without.
+    pub solver: Option<SolverSummary>,
+    /// Forces on the hand, N.
+    pub force_n: Forces,
+    /// Bone removed, mm³.
+    pub bone_removed_mm3: f64,
+    /// Warnings as they were raised.
+    pub warnings: Vec<Raised>,
+    /// Scores.
+    pub scores: ScoreKeeper,
+    /// Ticks in which the force guard acted, by cause.
+    pub guard: GuardSummary,
+    /// Pictures drawn.
+    pub frames: u64,
+    /// Pictures a second.
+    pub fps: f64,
+    /// Against its recording, in a replay.
+    pub replay: Option<Replayed>,
+    /// Records that the recording lost.
+    pub dropped_records: u64,
+    /// Remarks on the case, the machine and the run.
+    pub remarks: Vec<String>,
+    /// The machine.
+    pub machine: Machine,
+}
+
+/// A phase and when it began.
+#[derive(Clone, Debug, Serialize)]
+pub struct PhaseStart {
+    /// Its name.
+    pub name: String,
+    /// Session time, s.
+    pub from_s: f64,
+}
+
+/// A warning and when it was raised.
+#[derive(Clone, Debug, Serialize)]
+pub struct Raised {
+    /// Session time, s.
+    pub time_s: f64,
+    /// Its name.
+    pub name: String,
+    /// What the trainee read.
+    pub text: String,
+}
+
+/// Quantiles of a time, µs.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Quantiles {
+    /// Median.
+    pub p50: f64,
+    /// 99 of 100.
+    pub p99: f64,
+    /// 999 of 1000.
+    pub p999: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl From<&Times> for Quantiles {
+    fn from(times: &Times) -> Self {
+        let [p50, p99, p999] = [0.5, 0.99, 0.999].map(|q| times.quantile_us(q));
+        Self { p50, p99, p999, max: times.max_us() }
+    }
+}
+
+/// The solver.
+#[derive(Clone, Debug, Serialize)]
+pub struct SolverSummary {
+    /// Its name.
+    pub name: String,
+    /// Tetrahedra.
+    pub tets: usize,
+    /// Nodes.
+    pub nodes: usize,
+    /// Nodes that do not move.
+    pub fixed_nodes: usize,
+    /// Step, ms.
+    pub dt_ms: f32,
+    /// Compute time of a step, µs.
+    pub step_us: Quantiles,
+    /// Compute time of a collision step, µs.
+    pub collision_us: Quantiles,
+    /// Simulated time over wall time.
+    pub real_time_factor: f64,
+    /// Largest displacement of a node, mm.
+    pub max_displacement_mm: f32,
+    /// Largest displacement left at the end, mm.
+    pub end_displacement_mm: f32,
+    /// Inverted elements, summed over steps.
+    pub inverted: u64,
+}
+
+/// Forces on the hand.
+#[derive(Clone, Debug, Serialize)]
+pub struct Forces {
+    /// Largest, N.
+    pub max: f32,
+    /// Largest change between two ticks, N.
+    pub max_step: f32,
+    /// At the very end, N.
+    pub end: f32,
+}
+
+/// What the force guard had to do, ticks.
+#[derive(Clone, Debug, Serialize)]
+pub struct GuardSummary {
+    /// Over the device's limit.
+    pub clamped: u64,
+    /// Changed too fast.
+    pub slewed: u64,
+    /// Not a number.
+    pub non_finite: u64,
+    /// Gave out energy.
+    pub passivity: u64,
+}
+
+/// Where it ran.
+#[derive(Clone, Debug, Serialize)]
+pub struct Machine {
+    /// Processor.
+    pub cpu: String,
+    /// Logical cores.
+    pub cores: usize,
+    /// Operating system and architecture.
+    pub system: String,
+    /// Graphics adapter, if pictures were drawn.
+    pub graphics: Option<String>,
+    /// `release` or `dev`.
+    pub profile: String,
+}
+
+impl Machine {
+    /// This one.
+    pub fn here(graphics: Option<String>) -> Self {
+        let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let cpu = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':')).map(|(_, name)| name.trim());
+        Self {
+            cpu: cpu.unwrap_or("unknown").into(),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            graphics,
+            profile: if cfg!(debug_assertions) { "dev" } else { "release" }.into(),
+        }
+    }
+}
+
+/// What a summary needs beside the outcome.
+#[derive(Clone, Debug)]
+pub struct About {
+    /// The program.
+    pub program: Program,
+    /// The case.
+    pub case: String,
+    /// The device.
+    pub device: String,
+    /// Name of the solver.
+    pub solver: String,
+    /// Tetrahedra, nodes, fixed nodes.
+    pub brain: [usize; 3],
+    /// Pictures drawn.
+    pub frames: u64,
+    /// Remarks of import and pictures.
+    pub remarks: Vec<String>,
+    /// The machine.
+    pub machine: Machine,
+}
+
+impl Summary {
+    /// From all that is known at the end.
+    pub fn new(about: About, outcome: &Outcome) -> Self {
+        let seconds = outcome.seconds.max(1e-9);
+        let guard = &outcome.guard;
+        Self {
+            app: about.program.name().into(),
+            case: about.case,
+            device: about.device,
+            phases: phases(outcome),
+            ticks: outcome.ticks.count,
+            rate_hz: outcome.ticks.count as f64 / seconds,
+            late_ticks: outcome.ticks.late,
+            held_ticks: outcome.ticks.held,
+            tick_us: (&outcome.ticks.times).into(),
+            solver: outcome.solver.as_ref().map(|solver| SolverSummary {
+                name: about.solver,
+                tets: about.brain[0],
+                nodes: about.brain[1],
+                fixed_nodes: about.brain[2],
+                dt_ms: solver.dt_ms,
+                step_us: (&solver.times).into(),
+                collision_us: (&solver.collision_times).into(),
+                real_time_factor: solver.real_time_factor,
+                max_displacement_mm: solver.max_displacement_mm,
+                end_displacement_mm: solver.end_displacement_mm,
+                inverted: solver.inverted,
+            }),
+            force_n: Forces {
+                max: outcome.scores.peak_force_n,
+                max_step: outcome.scores.peak_force_step_n,
+                end: outcome.end_force_n,
+            },
+            bone_removed_mm3: outcome.scores.bone_removed_mm3,
+            warnings: warnings(outcome),
+            scores: outcome.scores,
+            guard: GuardSummary {
+                clamped: guard.clamped,
+                slewed: guard.slewed,
+                non_finite: guard.non_finite,
+                passivity: guard.passivity,
+            },
+            frames: about.frames,
+            fps: about.frames as f64 / seconds,
+            replay: outcome.replayed,
+            dropped_records: outcome.written.dropped,
+            remarks: about.remarks.into_iter().chain(outcome.remarks.iter().cloned()).collect(),
+            machine: about.machine,
+        }
+    }
+}
+
+fn phases(outcome: &Outcome) -> Vec<PhaseStart> {
+    let start = |notice: &crate::Notice| match notice.what {
+        What::Phase(phase) => Some(PhaseStart { name: phase.name().into(), from_s: notice.time_ms * 1e-3 }),
+        What::Warning(..) => None,
+    };
+    outcome.written.notices.iter().filter_map(start).collect()
+}
+
+fn warnings(outcome: &Outcome) -> Vec<Raised> {
+    let raised = |notice: &crate::Notice| match notice.what {
+        What::Warning(warning, true, _) => {
+            Some(Raised { time_s: notice.time_ms * 1e-3, name: warning.name().into(), text: notice.words().1 })
+        }
+        _ => None,
+    };
+    outcome.written.notices.iter().filter_map(raised).collect()
+}

@@ -1,0 +1,246 @@
+//! A live session: the threads of the thesis (6.2), exchanging newest values, never waiting for one another.
+//!
+//! ```text
+//!            tool                    contact
+//!  haptic ─────────→ collision ─────────────→ simulation
+//!    ↑  ↖───patch──────╯    ↖────positions──────╯
+//!  device        main: picture from view, positions, bone      recording: rings → file
+//! ```
+//!
+//! # Practice
+//! Loops: [`haptic_loop`] at the device's rate, [`collision_loop`] at 1 kHz, [`solver_loop`] at the solver's own step, bound to
+//! wall time. The operating system's real-time priority is asked for and its refusal remarked. Whatever happens, the device is closed, and
+//! with it the force: also when a loop panics.
+
+use crate::clock::{Clock, Schedule};
+use crate::haptic_tick::{HapticStage, TickInput};
+use crate::journal::{Journal, Pens, journal};
+use crate::run::{Cells, Eyes, Numbered, Outcome, SolverOutcome, Stages, Ticks, Times, View};
+use crate::stop::Stop;
+use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
+use std::thread;
+use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
+use trepan_contact::{GuardedWrench, NodalContact, SurfacePatch};
+use trepan_haptics::{HapticDevice, Status};
+use trepan_link::Recorder;
+use trepan_link::cell::{Reader, Writer};
+use trepan_link::queue::Sender;
+use trepan_link::wire::{CollisionRecord, SolverRecord, TickRecord};
+
+/// Pace of the loops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Length of a haptic tick, ms.
+    pub tick_ms: f32,
+    /// Length of a collision step, ms.
+    pub collision_ms: f32,
+    /// End of the session, ms; infinite for none.
+    pub end_ms: f64,
+}
+
+/// The solver may lag this far behind; more is given up and counted, ms.
+const LAG_MS: f64 = 40.0;
+/// Most ticks for the force to fade at the end.
+const FADE_TICKS: u64 = 200;
+
+/// Runs until the device is finished, the time is over or a stop is asked for. `picture` runs on the calling thread.
+pub fn run(
+    stages: Stages,
+    device: Box<dyn HapticDevice>,
+    recorder: Recorder,
+    start: ToolSample,
+    pace: Pace,
+    stop: &Stop,
+    picture: impl FnOnce(Eyes),
+) -> Outcome {
+    let clock = Clock::start();
+    let cells = Cells::new(&stages, start);
+    let (pens, pages) = journal();
+    let Pens { ticks, notices, collisions, solver } = pens;
+    let Stages { haptic, tissue } = stages;
+    let eyes = Eyes { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1) };
+    thread::scope(|scope| {
+        let writing = scope.spawn(move || Journal::write(pages, recorder, clock));
+        let hand = Hand { device, stop: stop.clone() };
+        let ends = HapticEnds { tool: cells.tool.0, view: cells.view.0, patch: cells.patch.1, ticks, notices };
+        let feeling = scope.spawn(move || haptic_loop(haptic, hand, ends, clock, pace, stop));
+        let simulating = tissue.map(|tissue| {
+            let ends = CollisionEnds {
+                tool: cells.tool.1,
+                soft: cells.soft.1,
+                patch: cells.patch.0,
+                contact: cells.contact.0,
+                records: collisions,
+            };
+            let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
+            let ends = SolverEnds { contact: cells.contact.1, soft: cells.soft.0, shown: cells.shown.0, records: solver };
+            let solving = scope.spawn(move || solver_loop(tissue.solver, ends, clock, stop));
+            (colliding, solving)
+        });
+        picture(eyes);
+        stop.ask();
+        let mut outcome = feeling.join().unwrap_or_else(|_| fallen("haptic"));
+        if let Some((colliding, solving)) = simulating {
+            let mut solver = solving.join().unwrap_or_default();
+            solver.collision_times = colliding.join().unwrap_or_default();
+            outcome.solver = Some(solver);
+        }
+        outcome.written = writing.join().unwrap_or_default();
+        outcome
+    })
+}
+
+fn fallen(name: &str) -> Outcome {
+    Outcome { remarks: vec![format!("the {name} loop fell; the device was closed")], ..Outcome::default() }
+}
+
+/// Holds the device; however the thread ends, lets go of the force and ends the session.
+struct Hand {
+    device: Box<dyn HapticDevice>,
+    stop: Stop,
+}
+
+impl Drop for Hand {
+    fn drop(&mut self) {
+        self.device.apply(GuardedWrench::ZERO);
+        self.device.close();
+        self.stop.ask();
+    }
+}
+
+struct HapticEnds {
+    tool: Writer<ToolSample>,
+    view: Writer<View>,
+    patch: Reader<Numbered<SurfacePatch>>,
+    ticks: Sender<TickRecord>,
+    notices: Sender<Notice>,
+}
+
+/// The haptic loop: read, tick, apply, publish, wait. Late ticks are counted, never caught up.
+fn haptic_loop(mut stage: HapticStage, mut hand: Hand, mut ends: HapticEnds, clock: Clock, pace: Pace, stop: &Stop) -> Outcome {
+    let remarks = real_time(80, "haptic").into_iter().collect();
+    let mut ticks = Ticks::default();
+    let mut schedule = Schedule::new(pace.tick_ms.into(), clock.now_ms());
+    let mut ending: Option<u64> = None;
+    loop {
+        clock.spin_until(schedule.next_ms());
+        let now_ms = clock.now_ms();
+        let reading = hand.device.read(now_ms);
+        let &(patch_seq, patch) = ends.patch.latest().0;
+        let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq };
+        let mut tick = stage.tick(&input, &mut |notice| _ = ends.notices.send(notice));
+        hand.device.apply(tick.wrench);
+        let done_ms = clock.now_ms();
+        tick.record.compute_us = ((done_ms - now_ms) * 1e3) as f32;
+        tick.record.flags |= if schedule.advance(done_ms) { TickRecord::LATE } else { 0 };
+        ticks.add(&tick);
+        let over = reading.status == Status::Finished || now_ms >= pace.end_ms || stop.asked();
+        if over && ending.is_none() {
+            stage.release();
+            ending = Some(ticks.count);
+        }
+        let finished = ending.is_some_and(|since| stage.is_at_rest() || ticks.count - since > FADE_TICKS);
+        ends.tool.set(tick.sample);
+        ends.view.set(ticks.view(&tick, stage.scores(), finished));
+        ends.ticks.send(tick.record);
+        if finished {
+            let seconds = clock.now_ms() * 1e-3;
+            let end_force_n = if stage.is_at_rest() { tick.wrench.force().length() } else { 0.0 };
+            let (scores, guard) = (*stage.scores(), stage.guard().counters());
+            return Outcome { ticks, seconds, scores, guard, end_force_n, remarks, ..Outcome::default() };
+        }
+    }
+}
+
+struct CollisionEnds {
+    tool: Reader<ToolSample>,
+    soft: Reader<SoftFrame>,
+    patch: Writer<Numbered<SurfacePatch>>,
+    contact: Writer<Numbered<NodalContact>>,
+    records: Sender<CollisionRecord>,
+}
+
+/// The collision loop: newest tool against newest brain, at its own rate.
+fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clock, pace: Pace, stop: &Stop) -> Times {
+    let _ = real_time(60, "collision");
+    let mut times = Times::default();
+    let mut schedule = Schedule::new(pace.collision_ms.into(), clock.now_ms());
+    while !stop.asked() {
+        clock.sleep_until(schedule.next_ms());
+        let began_ms = clock.now_ms();
+        let sample = *ends.tool.latest().0;
+        let mut record = stage.step(&sample, ends.soft.latest().0);
+        ends.patch.set((record.seq, *stage.patch()));
+        ends.contact.set((record.seq, stage.contact()));
+        let done_ms = clock.now_ms();
+        record.compute_us = ((done_ms - began_ms) * 1e3) as f32;
+        times.add_us(record.compute_us);
+        ends.records.send(record);
+        schedule.advance(done_ms);
+    }
+    times
+}
+
+struct SolverEnds {
+    contact: Reader<Numbered<NodalContact>>,
+    soft: Writer<SoftFrame>,
+    shown: Writer<SoftFrame>,
+    records: Sender<SolverRecord>,
+}
+
+/// The solver loop: simulated time follows wall time; what cannot be followed is given up and told.
+fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop: &Stop) -> SolverOutcome {
+    let _ = real_time(40, "simulation");
+    let mut times = Times::default();
+    let begin_ms = clock.now_ms();
+    let mut given_up_ms = 0.0;
+    while !stop.asked() {
+        let began_ms = clock.now_ms();
+        let behind_ms = began_ms - begin_ms - given_up_ms - stage.time_ms();
+        if behind_ms < f64::from(stage.dt_ms()) {
+            clock.sleep_until(began_ms + f64::from(stage.dt_ms()) - behind_ms);
+            continue;
+        }
+        if behind_ms > LAG_MS {
+            given_up_ms += behind_ms - LAG_MS;
+            thread::yield_now();
+        }
+        let &(seq, contact) = ends.contact.latest().0;
+        let record = stage.step(&contact, seq);
+        ends.soft.write(|frame| stage.publish(frame));
+        let us = ((clock.now_ms() - began_ms) * 1e3) as f32;
+        times.add_us(us);
+        if let Some(mut record) = record {
+            record.compute_us = us;
+            ends.records.send(record);
+            ends.shown.write(|frame| stage.publish(frame));
+        }
+    }
+    let span_ms = (clock.now_ms() - begin_ms).max(1e-3);
+    SolverOutcome { real_time_factor: stage.time_ms() / span_ms, times, ..outcome(&stage) }
+}
+
+/// What a solver stage knows of itself.
+pub fn outcome(stage: &SolverStage) -> SolverOutcome {
+    SolverOutcome {
+        dt_ms: stage.dt_ms(),
+        steps: stage.steps(),
+        max_displacement_mm: stage.max_displacement_mm(),
+        end_displacement_mm: stage.displacement_mm(),
+        inverted: stage.inverted(),
+        ..SolverOutcome::default()
+    }
+}
+
+/// Asks for a first-in-first-out priority; says so when it is refused.
+fn real_time(priority: u8, name: &str) -> Option<String> {
+    let value = priority.try_into().ok().map(ThreadPriority::Crossplatform)?;
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    let set = thread_priority::set_thread_priority_and_policy(thread_priority::thread_native_id(), value, policy);
+    set.err().map(|fault| {
+        format!(
+            "the {name} loop runs without real-time priority ({fault:?}): ticks may be late on a busy machine; \
+             allow it with `ulimit -r 80` or the CAP_SYS_NICE capability"
+        )
+    })
+}
