@@ -64,6 +64,22 @@ pub enum Kernel {
     Wide,
 }
 
+impl Kernel {
+    /// Every kernel, the scalar one first.
+    pub fn all() -> [Self; 3] {
+        [Self::Scalar, Self::Wide, Self::Fastest]
+    }
+
+    /// Its name on a command line and in charts.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Wide => "wide",
+            Self::Fastest => "fastest",
+        }
+    }
+}
+
 impl Config {
     /// Refuses settings that make no sense.
     pub fn check(&self) -> Result<(), BodyError> {

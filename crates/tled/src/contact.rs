@@ -31,7 +31,8 @@ mod tests {
 
     #[test]
     fn a_soft_spring_is_used_whole_and_a_stiff_one_to_the_bound() {
-        let mut contact = NodalContact { stiffness: 0.3, ..NodalContact::none() };
+        let mut contact = NodalContact::none();
+        contact.stiffness = 0.3;
         contact.add(0, 1.0);
         assert_eq!(stable_share(&contact, 2.0, 0.5, |_| 2.0), 1.0);
         contact.stiffness = 300.0;

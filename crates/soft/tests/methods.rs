@@ -1,0 +1,81 @@
+//! What every method must do, and the reference against closed forms and an independent code.
+
+use glam::{DMat3, DVec3};
+use trepan_geometry::Vec3;
+use trepan_soft::reference::{self, Reference};
+use trepan_soft::{Body, Loads, Material, Method, NeoHookean, SoftSolver, boxes};
+
+const GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.81e-3);
+
+fn block(cells: [usize; 3], size: Vec3, material: Material, fixed: impl Fn(Vec3) -> bool) -> Body {
+    let mesh = boxes::split_box(cells, size);
+    Body { fixed: boxes::nodes_where(&mesh, fixed), mesh, material }
+}
+
+fn settle(solver: &mut dyn SoftSolver, loads: &Loads, ms: f32) {
+    let dt = solver.stable_dt_ms().min(ms);
+    (0..(ms / dt).ceil() as usize).for_each(|_| _ = solver.step(loads, dt));
+}
+
+#[test]
+fn every_method_rests_without_load_sags_under_gravity_and_keeps_its_supports() {
+    let body = block([2, 2, 3], Vec3::new(20.0, 20.0, 30.0), Material::THESIS, |p| p.z < 1e-3);
+    for method in Method::all() {
+        let mut solver = method.build(&body).unwrap();
+        settle(&mut *solver, &Loads::default(), 20.0);
+        assert_eq!(solver.positions(), body.mesh.positions, "{}", method.name());
+        settle(&mut *solver, &Loads { gravity: GRAVITY, ..Loads::default() }, 600.0);
+        let top = solver.positions().last().unwrap().z - 30.0;
+        assert!((-0.2..-0.08).contains(&top), "{}: {top} mm", method.name());
+        assert!(body.fixed.iter().all(|&n| solver.positions()[n as usize] == body.mesh.positions[n as usize]));
+    }
+}
+
+#[test]
+fn names_find_their_methods() {
+    for method in Method::all() {
+        assert_eq!(Method::named(method.name()), Some(method));
+    }
+    assert_eq!(Method::named("wishful"), None);
+}
+
+#[test]
+fn the_reference_passes_the_patch_test_and_gives_the_closed_form_reaction() {
+    let size = 10.0;
+    let body = block([3, 3, 3], Vec3::splat(size as f32), Material::BRAIN, |p| {
+        p.min_element() < 1e-3 || p.max_element() > 9.999
+    });
+    let stretch = DVec3::new(0.95, 0.95, 1.2);
+    let mut solver = Reference::new(&body, &reference::Config::default()).unwrap();
+    let wanted = |n: usize| (stretch - DVec3::ONE) * body.mesh.positions[n].as_dvec3();
+    body.fixed.iter().for_each(|&n| solver.prescribe(n, wanted(n as usize)));
+    assert!(solver.step(&Loads::default(), 1.0).converged);
+    for (n, u) in solver.displacements().iter().enumerate() {
+        assert!((*u - wanted(n)).length() < 1e-9 * size, "{n}");
+    }
+    let law = NeoHookean { mu: body.material.shear_mpa(), kappa: body.material.bulk_mpa() };
+    let stress = law.stress(DMat3::from_diagonal(stretch)).z_axis.z;
+    let top = boxes::nodes_where(&body.mesh, |p| p.z > 9.999);
+    let reactions = solver.reactions(&Loads::default());
+    let force: f64 = top.iter().map(|&n| reactions[n as usize].z).sum();
+    assert!((force / (stress * size * size) - 1.0).abs() < 1e-6, "{force} {}", stress * size * size);
+}
+
+#[test]
+fn the_reference_is_where_an_independent_code_is() {
+    // scikit-fem, split box of 10×2×2 cells, 30 kPa, ν 0.3, own weight: the tip hangs 55.458 mm down, 17.374 mm back and 7.062 mm aside.
+    let body = block([10, 2, 2], Vec3::new(100.0, 20.0, 20.0), Material::THESIS, |p| p.x < 1e-3);
+    let mut solver = Reference::new(&body, &reference::Config::default()).unwrap();
+    let report = solver.step(&Loads { gravity: GRAVITY, ..Loads::default() }, 1.0);
+    assert!(report.converged, "{report:?}");
+    let tip = boxes::nodes_where(&body.mesh, |p| p.distance(Vec3::new(100.0, 10.0, 10.0)) < 1e-3)[0];
+    let u = solver.displacements()[tip as usize];
+    println!("{u} {}", report.iterations);
+    assert!((u.z + 55.45793504085147).abs() < 1e-3 && (u.x + 17.373738376834773).abs() < 1e-3, "{u}");
+}
+
+#[test]
+fn a_static_solver_refuses_what_floats() {
+    let body = block([1, 1, 1], Vec3::ONE, Material::BRAIN, |p| p.z < 1e-3 && p.x < 1e-3);
+    assert!(Method::named("reference").unwrap().build(&body).is_err());
+}

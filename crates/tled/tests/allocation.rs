@@ -1,0 +1,53 @@
+//! A step must not allocate: counted by an allocator that wraps the system's.
+#![expect(unsafe_code, reason = "only a global allocator sees every allocation, and its trait is unsafe")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+use trepan_contact::NodalContact;
+use trepan_geometry::Vec3;
+use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+use trepan_tled::{Config, Tled};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call goes to the system allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller keeps alloc's contract.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller keeps dealloc's contract.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn a_step_never_allocates() {
+    let mesh = boxes::split_box([4, 4, 4], Vec3::splat(40.0));
+    let top = boxes::nodes_where(&mesh, |p| p.z > 39.0);
+    let mut body = Body { fixed: boxes::nodes_where(&mesh, |p| p.z < 1.0), mesh, material: Material::BRAIN };
+    let mut contact = NodalContact::none();
+    top.iter().for_each(|&n| contact.add(n, 1.0));
+    contact.normalise();
+    (contact.normal, contact.stiffness, contact.offset_mm) = (Vec3::Z, 0.3, -38.0);
+    let loads = Loads { gravity: Vec3::NEG_Z * 9.81e-3, contact };
+    for held in [true, false] {
+        if !held {
+            body.fixed.clear();
+        }
+        let mut tled = Tled::new(&body, &Config::default()).unwrap();
+        let dt = tled.stable_dt_ms() * 2.5;
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let report = (0..50).map(|_| tled.step(&loads, dt)).last().unwrap();
+        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);
+        assert_eq!(report.substeps, 3);
+    }
+}

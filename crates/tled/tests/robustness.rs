@@ -1,0 +1,150 @@
+//! TLED where such solvers fail: too long steps, elements turned over, hard contact; and the same bytes every time.
+
+use trepan_contact::NodalContact;
+use trepan_geometry::Vec3;
+use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+use trepan_tled::{Config, Kernel, Tled};
+
+fn cube() -> Body {
+    let mesh = boxes::split_box([4, 4, 4], Vec3::splat(40.0));
+    Body { fixed: boxes::nodes_where(&mesh, |p| p.z < 1.0), mesh, material: Material::BRAIN }
+}
+
+fn noise(i: usize) -> f32 {
+    ((i as f32 * 12.9898).sin() * 43758.547).fract()
+}
+
+fn shaken(config: &Config, amplitude: f32) -> Tled {
+    let body = cube();
+    let mut tled = Tled::new(&body, config).unwrap();
+    for n in 0..body.mesh.positions.len() {
+        if body.mesh.positions[n].z > 1.0 {
+            let kick = Vec3::new(noise(3 * n), noise(3 * n + 1), noise(3 * n + 2)) * amplitude;
+            tled.set_node(n as u32, kick, Vec3::ZERO);
+        }
+    }
+    tled
+}
+
+fn is_finite(tled: &Tled) -> bool {
+    tled.positions().iter().chain(tled.velocities()).all(|p| p.is_finite())
+}
+
+fn offset(tled: &Tled) -> f32 {
+    tled.positions().iter().zip(&cube().mesh.positions).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
+}
+
+fn press(stiffness: f32, damping: f32) -> Loads {
+    let mut contact = NodalContact::none();
+    let corner = cube().mesh.positions.len() as u32 - 1;
+    contact.add(corner, 1.0);
+    (contact.normal, contact.offset_mm, contact.stiffness, contact.damping) = (Vec3::Z, 2.0 - 40.0, stiffness, damping);
+    Loads { contact, ..Loads::default() }
+}
+
+#[test]
+fn runs_repeat_bit_for_bit_and_kernels_agree_bit_for_bit() {
+    let end = |kernel| {
+        let mut tled = shaken(&Config { kernel, ..Config::default() }, 1.0);
+        let dt = tled.stable_dt_ms();
+        (0..500).for_each(|_| _ = tled.step(&press(0.3, 0.1), dt));
+        tled.positions().iter().flat_map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>()
+    };
+    let first = end(Kernel::Fastest);
+    assert_eq!(first, end(Kernel::Fastest));
+    assert_eq!(first, end(Kernel::Scalar));
+    assert_eq!(first, end(Kernel::Wide));
+}
+
+#[test]
+fn a_step_over_the_bound_explodes_when_obeyed_and_is_cut_by_default() {
+    let mut obeyed = shaken(&Config { substeps: 0, ..Config::default() }, 0.01);
+    let dt = 2.0 * obeyed.bound_ms();
+    let mut held = 0;
+    for _ in 0..400 {
+        let report = obeyed.step(&Loads::default(), dt);
+        held += report.limited + report.non_finite;
+        assert!(is_finite(&obeyed));
+    }
+    assert!(held > 0 && offset(&obeyed) > 1.0, "{held} {}", offset(&obeyed));
+    let mut cut = shaken(&Config::default(), 0.01);
+    for _ in 0..400 {
+        let report = cut.step(&Loads::default(), dt);
+        assert_eq!((report.substeps, report.limited, report.non_finite, report.skipped_ms), (3, 0, 0, 0.0));
+    }
+    assert!(offset(&cut) < 0.02);
+    let report = cut.step(&Loads::default(), 100.0);
+    assert!(report.substeps == 4 && report.skipped_ms > 90.0);
+}
+
+#[test]
+fn just_under_the_bound_it_is_stable_and_just_over_it_is_not() {
+    let end = |share: f32| {
+        let mut tled = shaken(&Config { substeps: 0, ..Config::default() }, 0.001);
+        let dt = share * tled.bound_ms();
+        (0..3000).for_each(|_| _ = tled.step(&Loads::default(), dt));
+        offset(&tled)
+    };
+    assert!(end(0.99) < 0.01);
+    assert!(end(1.05) > 1.0);
+}
+
+#[test]
+fn elements_turned_over_heal() {
+    let mut tled = shaken(&Config::default(), 12.0);
+    let dt = 0.5 * tled.stable_dt_ms();
+    let first = tled.step(&Loads::default(), dt);
+    assert!(first.inverted > 20, "{}", first.inverted);
+    let last = (0..4000).map(|_| tled.step(&Loads::default(), dt)).last().unwrap();
+    assert!(is_finite(&tled));
+    assert_eq!((last.inverted, last.non_finite), (0, 0));
+    assert!(offset(&tled) < 0.1, "{}", offset(&tled));
+}
+
+#[test]
+fn a_body_squashed_flat_or_to_a_point_comes_back() {
+    // No mirror image here: clamped at its base it comes out twisted by half a turn, which is an equilibrium too.
+    for squash in [Vec3::new(1.0, 1.0, 0.0), Vec3::new(0.05, 1.0, 1.0), Vec3::ZERO] {
+        let body = cube();
+        let mut tled = Tled::new(&body, &Config::default()).unwrap();
+        for (n, p) in body.mesh.positions.iter().enumerate().filter(|(_, p)| p.z > 1.0) {
+            let to = (*p - Vec3::splat(20.0)) * squash + Vec3::splat(20.0);
+            tled.set_node(n as u32, to - *p, Vec3::ZERO);
+        }
+        let dt = 0.5 * tled.stable_dt_ms();
+        let last = (0..6000).map(|_| tled.step(&Loads::default(), dt)).last().unwrap();
+        assert!(is_finite(&tled), "{squash}");
+        assert_eq!(last.inverted, 0, "{squash}");
+        assert!(offset(&tled) < 0.2, "{squash}: {}", offset(&tled));
+    }
+}
+
+#[test]
+fn a_contact_stiffer_than_the_step_bears_is_scaled_and_said_so() {
+    let mut tled = shaken(&Config::default(), 0.0);
+    let dt = tled.stable_dt_ms();
+    let soft = tled.step(&press(0.01, 0.0), dt);
+    assert_eq!(soft.contact_scale, 1.0);
+    for (stiffness, damping) in [(1e4, 0.0), (0.3, 1e4), (f32::MAX, 0.0)] {
+        for _ in 0..2000 {
+            let report = tled.step(&press(stiffness, damping), dt);
+            assert!(report.contact_scale < 1.0 && report.non_finite == 0);
+        }
+        assert!(offset(&tled) < 4.0, "{}", offset(&tled));
+    }
+}
+
+#[test]
+fn loads_that_are_not_numbers_are_healed_and_counted() {
+    let mut tled = shaken(&Config::default(), 0.0);
+    let dt = tled.stable_dt_ms();
+    let bad = Loads { gravity: Vec3::splat(f32::NAN), ..Loads::default() };
+    let report = tled.step(&bad, dt);
+    assert!(report.non_finite > 0 && is_finite(&tled));
+    let mut strange = press(f32::NAN, 0.0);
+    strange.contact.add(1_000_000, 0.5);
+    tled.step(&strange, dt);
+    tled.step(&press(0.3, 0.0), f32::NAN);
+    tled.step(&press(0.3, 0.0), -1.0);
+    assert!(is_finite(&tled));
+}
