@@ -62,9 +62,9 @@ impl Components {
         Some(best.0 as u32)
     }
 
-    /// Voxels of a piece.
-    pub fn size(&self, piece: u32) -> usize {
-        self.sizes[piece as usize]
+    /// Voxels of the largest piece and of the second; 0 for what is not there.
+    pub fn two_largest(&self) -> [usize; 2] {
+        self.sizes.iter().fold([0, 0], |[first, second], &n| [first.max(n), second.max(n.min(first))])
     }
 
     /// How many pieces there are.
@@ -131,4 +131,65 @@ fn root(runs: &mut [Run], mut run: u32) -> u32 {
         run = above;
     }
     run
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use trepan_geometry::Vec3;
+
+    fn volume(dims: [usize; 3], data: Vec<u8>) -> VoxelVolume<u8> {
+        VoxelVolume { data, ..VoxelVolume::isotropic(dims, Vec3::ZERO, 1.0, 0) }
+    }
+
+    /// Every piece by flooding, as sorted sizes.
+    fn flooded(dims: [usize; 3], data: &[u8]) -> Vec<usize> {
+        let mut left = data.to_vec();
+        let mut sizes = Vec::new();
+        let v = volume(dims, Vec::new());
+        for start in 0..left.len() {
+            let mut stack = vec![start];
+            let mut size = 0;
+            while let Some(at) = stack.pop() {
+                if std::mem::take(&mut left[at]) == 0 {
+                    continue;
+                }
+                size += 1;
+                let p = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
+                for axis in 0..3 {
+                    for side in [p[axis].wrapping_sub(1), p[axis] + 1] {
+                        let mut q = p;
+                        q[axis] = side;
+                        if side < dims[axis] && left[v.index(q)] != 0 {
+                            stack.push(v.index(q));
+                        }
+                    }
+                }
+            }
+            sizes.extend((size > 0).then_some(size));
+        }
+        sizes.sort_unstable();
+        sizes
+    }
+
+    #[test]
+    fn voxels_that_touch_at_an_edge_are_apart() {
+        let mask = volume([2, 2, 1], vec![1, 0, 0, 1]);
+        assert_eq!(largest_component(&mask).data, [1, 0, 0, 0]);
+        assert_eq!(largest_component(&volume([2, 2, 1], vec![0; 4])).data, [0; 4]);
+    }
+
+    proptest! {
+        #[test]
+        fn pieces_are_those_of_a_flood(dims in [1usize..7, 1usize..7, 1usize..7], bits in prop::collection::vec(0u8..2, 216)) {
+            let data = bits[..dims.iter().product()].to_vec();
+            let pieces = Components::of(dims, |at| data[at] != 0);
+            let mut sizes: Vec<usize> = pieces.sizes.iter().copied().filter(|&n| n > 0).collect();
+            sizes.sort_unstable();
+            prop_assert_eq!(&sizes, &flooded(dims, &data));
+            let largest = largest_component(&volume(dims, data));
+            prop_assert_eq!(largest.data.iter().filter(|&&v| v == 1).count(), sizes.last().copied().unwrap_or(0));
+        }
+    }
 }

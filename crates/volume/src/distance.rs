@@ -10,6 +10,9 @@
 //! D² = min( Z·Y·X̂, Z·X·Ŷ, Y·X·Ẑ )     X̂: parabolas at the crossings of x-edges; X: envelope over x of what is there
 //! ```
 //!
+//! A voxel whose own edges cross the surface at distances aᵢ along the axes takes its distance to the plane through these crossings,
+//! `1 / √(Σ 1/aᵢ²)`, the smaller one: between the crossings the surface is nearer than they are.
+//!
 //! # Practice
 //! Grids of cubes or boxes in any orientation, axes at right angles. Linear in voxels: about 50 ns each and core; 4 bytes
 //! each kept, 12 while building. Slices run in parallel with the same bytes for any number of threads. What lies beyond the grid's
@@ -51,12 +54,18 @@ impl DistanceField {
     }
 
     /// `inside` gives how far a voxel is over the surface's level.
-    fn of<T: Copy>(grid: &VoxelVolume<T>, inside: impl Fn(usize) -> f32 + Sync) -> Self {
+    fn of<T: Sample>(grid: &VoxelVolume<T>, inside: impl Fn(usize) -> f32 + Sync) -> Self {
         let spacing = grid.spacing_mm();
         let mut data = squared_distances(grid.dims, spacing, &inside);
         data.par_iter_mut().enumerate().for_each(|(at, d)| {
-            let far = d.sqrt().min(FAR_MM);
-            *d = if inside(at) >= 0.0 { -far } else { far };
+            let to_crossing = d.sqrt().min(FAR_MM);
+            let own = inside(at);
+            let far = if f64::from(to_crossing) > spacing.max_element() {
+                to_crossing
+            } else {
+                to_crossing.min(to_plane(grid.dims, spacing, at, own, &inside))
+            };
+            *d = if own >= 0.0 { -far } else { far };
         });
         Self::from_values(VoxelVolume { dims: grid.dims, data, world_from_voxel: grid.world_from_voxel })
     }
@@ -105,6 +114,21 @@ impl DistanceField {
 /// The distance where there is no surface at all, mm.
 pub const FAR_MM: f32 = 1e6;
 
+/// Distance to the plane through the crossings of a voxel's own edges, mm; infinite where none crosses.
+fn to_plane(dims: [usize; 3], spacing: DVec3, at: usize, own: f32, inside: &impl Fn(usize) -> f32) -> f32 {
+    let steps = [1, dims[0], dims[0] * dims[1]];
+    let mut sum = 0.0;
+    for axis in 0..3 {
+        let place = at / steps[axis] % dims[axis];
+        let before = (place > 0).then(|| inside(at - steps[axis]));
+        let after = (place + 1 < dims[axis]).then(|| inside(at + steps[axis]));
+        let crossings = [before, after].into_iter().flatten().filter(|&v| (v >= 0.0) != (own >= 0.0));
+        let nearest = crossings.map(|v| own / (own - v)).fold(f32::INFINITY, f32::min);
+        sum += (nearest * spacing[axis] as f32).powi(-2);
+    }
+    sum.sqrt().recip()
+}
+
 /// Squared distances to the nearest crossing, mm².
 fn squared_distances(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) -> f32 + Sync)) -> Vec<f32> {
     let crossings = |axis: usize| {
@@ -113,7 +137,8 @@ fn squared_distances(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) 
             for n in 1..line.length {
                 let (a, b) = (inside(line.at(n - 1)), inside(line.at(n)));
                 if (a >= 0.0) != (b >= 0.0) {
-                    envelope.add(((n - 1) as f64 + f64::from(a / (a - b))) * spacing[axis], 0.0);
+                    let part = Some(a / (a - b)).filter(|t| t.is_finite()).unwrap_or(0.5);
+                    envelope.add(((n - 1) as f64 + f64::from(part)) * spacing[axis], 0.0);
                 }
             }
             envelope.read(spacing[axis], out);
@@ -239,5 +264,96 @@ impl Envelope {
             }
             *out = self.parabolas.get(at).map_or(f32::INFINITY, |&(v, h, _)| ((x - v) * (x - v) + h) as f32);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DMat3, DVec3};
+    use proptest::prelude::*;
+
+    /// The nearest crossing of any grid edge by looking at all of them, or the plane through a voxel's own.
+    fn slow(levels: &VoxelVolume<f32>, from: [usize; 3]) -> f64 {
+        let mut best = f64::INFINITY;
+        let mut own = [f64::INFINITY; 3];
+        let [nx, ny, nz] = levels.dims;
+        for at in 0..nx * ny * nz {
+            let p = [at % nx, at / nx % ny, at / (nx * ny)];
+            for axis in 0..3 {
+                let mut q = p;
+                q[axis] += 1;
+                let (a, Some(b)) = (levels.data[at], levels.get(q)) else { continue };
+                if (a >= 0.0) != (b >= 0.0) {
+                    let place = levels.centre_of(p).lerp(levels.centre_of(q), f64::from(a / (a - b)));
+                    let apart = place.distance(levels.centre_of(from));
+                    best = best.min(apart);
+                    if p == from || q == from {
+                        own[axis] = own[axis].min(apart);
+                    }
+                }
+            }
+        }
+        best.min(own.iter().map(|a| a.powi(-2)).sum::<f64>().sqrt().recip())
+    }
+
+    proptest! {
+        #[test]
+        fn distances_are_those_to_the_nearest_crossing(
+            dims in [1usize..7, 1usize..7, 1usize..7],
+            values in prop::collection::vec(-9i8..9, 216),
+            spacing in [0.5f64..2.0, 0.5f64..2.0, 0.5f64..2.0],
+        ) {
+            let turn = DMat3::from_rotation_y(0.4) * DMat3::from_rotation_z(1.1);
+            let affine = DAffine3::from_mat3(turn * DMat3::from_diagonal(DVec3::from_array(spacing)));
+            let data = values[..dims.iter().product()].iter().map(|&v| f32::from(v)).collect();
+            let levels = VoxelVolume { dims, data, world_from_voxel: affine };
+            let field = DistanceField::of_level(&levels, 0.0);
+            for at in 0..levels.data.len() {
+                let p = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
+                let truth = slow(&levels, p).min(f64::from(FAR_MM));
+                let found = f64::from(field.values().data[at]);
+                prop_assert!((found.abs() - truth).abs() < 1e-4 * (1.0 + truth), "{found} for {truth}");
+                let inside = levels.data[at] >= 0.0;
+                prop_assert!(found == 0.0 || inside == (found < 0.0));
+            }
+        }
+    }
+
+    #[test]
+    fn a_ball_has_its_closed_form_and_its_gradient_points_outwards() {
+        let centre = Vec3::new(1.0, -2.0, 3.0);
+        let mut ball = VoxelVolume::isotropic([41, 41, 41], centre - 20.0, 1.0, 0f32);
+        for at in 0..ball.data.len() {
+            let p = ball.centre_of([at % 41, at / 41 % 41, at / 1681]).as_vec3();
+            ball.data[at] = 11.3 - p.distance(centre);
+        }
+        let fine = DistanceField::of_level(&ball, 0.0);
+        let coarse = DistanceField::of_mask(&ball.map(|v| u8::from(v >= 0.0)));
+        let (mut worst_fine, mut worst_coarse) = (0.0f32, 0.0f32);
+        for n in 0..200 {
+            let direction = Vec3::new((n as f32).sin(), (1.7 * n as f32).cos(), (0.3 * n as f32).sin()).normalize();
+            let radius = 5.0 + 0.05 * n as f32;
+            let p = centre + radius * direction;
+            worst_fine = worst_fine.max((fine.sample(p) - (radius - 11.3)).abs());
+            worst_coarse = worst_coarse.max((coarse.sample(p) - (radius - 11.3)).abs());
+            let slope = fine.gradient(p);
+            assert!(slope.dot(direction) > 0.9 && slope.length() < 1.1, "{slope} along {direction} at {radius}");
+        }
+        assert!(worst_fine < 0.3 && worst_coarse < 0.6, "{worst_fine} {worst_coarse}");
+    }
+
+    #[test]
+    fn a_wall_is_exact_and_what_has_no_surface_is_far() {
+        let mut wall = VoxelVolume::isotropic([12, 4, 4], Vec3::ZERO, 0.5, 0u8);
+        assert_eq!(DistanceField::of_mask(&wall).sample(Vec3::ONE), FAR_MM);
+        for at in 0..wall.data.len() {
+            wall.data[at] = u8::from(at % 12 < 6);
+        }
+        let field = DistanceField::of_mask(&wall);
+        assert!((field.sample(Vec3::new(4.0, 0.7, 0.6)) - 1.25).abs() < 1e-6);
+        assert!((field.sample(Vec3::new(1.1, 0.7, 0.6)) + 1.65).abs() < 1e-6);
+        assert!(field.gradient(Vec3::new(3.0, 0.7, 0.6)).distance(Vec3::X) < 1e-6);
+        assert_eq!(field.sample(Vec3::new(99.0, 0.0, 0.0)), field.sample(Vec3::new(5.5, 0.0, 0.0)));
     }
 }

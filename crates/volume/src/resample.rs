@@ -194,3 +194,94 @@ impl<T: Sample> Votes<T> {
         best.map(|(label, _)| label)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+    use proptest::prelude::*;
+
+    fn oblique(dims: [usize; 3], seed: f64) -> DAffine3 {
+        let turn = DMat3::from_rotation_x(seed) * DMat3::from_rotation_z(0.7 * seed);
+        let scale = DMat3::from_diagonal(DVec3::new(-0.8, 1.1, 1.9));
+        let middle = DVec3::from_array(dims.map(|n| 0.5 * (n as f64 - 1.0)));
+        let matrix3 = turn * scale;
+        DAffine3 { matrix3, translation: DVec3::new(3.0, -5.0, 2.0) - matrix3 * middle }
+    }
+
+    proptest! {
+        #[test]
+        fn trilinear_keeps_what_is_linear(seed in -3.0f64..3.0, slope in [-2.0f64..2.0, -2.0f64..2.0, -2.0f64..2.0]) {
+            let slope = DVec3::from_array(slope);
+            let dims = [14, 12, 9];
+            let mut from = VoxelVolume::filled(dims, oblique(dims, seed), 0f32);
+            for at in 0..from.data.len() {
+                let p = from.centre_of([at % 14, at / 14 % 12, at / 168]);
+                from.data[at] = (7.0 + slope.dot(p)) as f32;
+            }
+            let grid = Grid { dims: [5, 4, 3], world_from_voxel: oblique([5, 4, 3], 1.0 - seed) };
+            let to = resample(&from, &grid, Interpolation::Trilinear, f32::NAN);
+            let inner = from.world_from_voxel.inverse();
+            for at in 0..to.data.len() {
+                let world = to.centre_of([at % 5, at / 5 % 4, at / 20]);
+                let voxel = inner.transform_point3(world);
+                if voxel.cmpgt(DVec3::ZERO).all() && voxel.cmplt(DVec3::new(13.0, 11.0, 8.0)).all() {
+                    prop_assert!((f64::from(to.data[at]) - 7.0 - slope.dot(world)).abs() < 1e-3);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_grid_gives_the_same_samples_and_a_mirrored_one_the_same_world() {
+        let dims = [5, 4, 3];
+        let mut from = VoxelVolume::filled(dims, oblique(dims, 0.0), 0i16);
+        from.data.iter_mut().enumerate().for_each(|(at, v)| *v = 7 * at as i16 - 90);
+        for how in [Interpolation::Trilinear, Interpolation::Nearest, Interpolation::Majority] {
+            assert_eq!(resample(&from, &Grid::of(&from), how, -1), from);
+        }
+        let over = Grid::isotropic_over(&from, 0.4);
+        let there = resample(&from, &over, Interpolation::Nearest, i16::MIN);
+        let back = resample(&there, &Grid::of(&from), Interpolation::Nearest, i16::MIN);
+        assert_eq!(back, from);
+    }
+
+    #[test]
+    fn the_isotropic_grid_covers_the_outer_faces_and_leaves_a_fitting_grid_alone() {
+        let from = VoxelVolume::<u8>::filled([187, 243, 113], DAffine3::from_scale(DVec3::new(1.0, 1.0, 2.0)), 0);
+        let grid = Grid::isotropic_over(&from, 1.0);
+        assert_eq!((grid.dims, grid.voxels()), ([187, 243, 226], 187 * 243 * 226));
+        assert_eq!(grid.world_from_voxel.translation, DVec3::new(0.0, 0.0, -0.5));
+        let cubes = VoxelVolume::isotropic([9, 8, 7], Vec3::new(-3.25, 8.0, 1.5), 0.75, 0u8);
+        assert_eq!(Grid::isotropic_over(&cubes, 0.75), Grid::of(&cubes));
+    }
+
+    #[test]
+    fn majority_counts_what_a_coarse_voxel_covers() {
+        let mut from = VoxelVolume::isotropic([6, 6, 6], Vec3::ZERO, 1.0, 2u8);
+        for at in 0..216 {
+            if at % 6 < 2 || at % 6 == 4 {
+                from.data[at] = 9;
+            }
+        }
+        let grid = Grid {
+            dims: [2, 2, 2],
+            world_from_voxel: DAffine3::from_translation(DVec3::ONE) * DAffine3::from_scale(DVec3::splat(3.0)),
+        };
+        let to = resample(&from, &grid, Interpolation::Majority, 0);
+        assert_eq!(to.data, [9, 2, 9, 2, 9, 2, 9, 2]);
+    }
+
+    #[test]
+    fn the_bytes_do_not_depend_on_the_number_of_threads() {
+        let dims = [33, 21, 17];
+        let mut from = VoxelVolume::filled(dims, oblique(dims, 0.3), 0f32);
+        from.data.iter_mut().enumerate().for_each(|(at, v)| *v = (at as f32).sin());
+        let grid = Grid::isotropic_over(&from, 0.7);
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| resample(&from, &grid, Interpolation::Trilinear, 0.0))
+        };
+        assert_eq!(with(1), with(3));
+    }
+}

@@ -107,3 +107,59 @@ pub fn labels(file: &Path, volume: &VoxelVolume<f32>) -> Result<VoxelVolume<u16>
         }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_geometry::Vec3;
+
+    #[test]
+    fn a_table_that_does_not_touch_the_skull_goes() {
+        let mut ct = VoxelVolume::isotropic([10, 3, 1], Vec3::ZERO, 1.0, -1000i16);
+        ct.data[0..6].fill(900);
+        ct.data[20..24].fill(1200);
+        ct.data[12] = 40;
+        skull_only(&mut ct, 300);
+        assert!(ct.data[0..6].iter().all(|&v| v == 900) && ct.data[20..24].iter().all(|&v| v == 299));
+        assert_eq!(ct.data[12], 40);
+    }
+
+    #[test]
+    fn the_isovalue_lies_between_the_modes_within_its_limits() {
+        let of = |soft: i16, bone: i16| {
+            let mut ct = VoxelVolume::isotropic([40, 40, 40], Vec3::ZERO, 1.0, soft);
+            ct.data
+                .iter_mut()
+                .enumerate()
+                .filter(|(at, _)| at % 5 == 0)
+                .for_each(|(at, v)| *v = bone + (at % 64) as i16);
+            bone_isovalue(&ct)
+        };
+        assert!((300..=500).contains(&of(120, 700)));
+        assert_eq!(of(-1000, -1000), 300);
+        assert_eq!(of(900, 1900), 500);
+    }
+
+    #[test]
+    fn only_hounsfield_units_pass_as_ct() {
+        let ct = |values: [f32; 3]| VoxelVolume {
+            data: values.into(),
+            ..VoxelVolume::isotropic([3, 1, 1], Vec3::ZERO, 1.0, 0.0)
+        };
+        assert_eq!(hounsfield(&ct([-1000.4, 40.0, 1200.6])).unwrap().data, [-1000, 40, 1201]);
+        assert_eq!(hounsfield(&ct([f32::NAN, f32::INFINITY, 0.0])), Err(HounsfieldError::NotANumber { count: 2 }));
+        assert_eq!(hounsfield(&ct([0.0, 40.0, 255.0])), Err(HounsfieldError::Range { low: 0.0, high: 255.0 }));
+    }
+
+    #[test]
+    fn labels_are_whole_numbers() {
+        let volume = |values: [f32; 2]| VoxelVolume {
+            data: values.into(),
+            ..VoxelVolume::isotropic([2, 1, 1], Vec3::ZERO, 1.0, 0.0)
+        };
+        assert_eq!(labels(Path::new("a.nii"), &volume([0.0, 2035.0])).unwrap().data, [0, 2035]);
+        for wrong in [0.5, -1.0, f32::NAN, 70000.0] {
+            assert!(labels(Path::new("a.nii"), &volume([0.0, wrong])).unwrap_err().to_string().contains("a.nii"));
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Which grey values are brain in a T1 MRI.
+//!
+//! # Theory
+//! Deep in the head there is white matter, grey matter and CSF only. Otsu's threshold parts CSF from tissue there; with m the
+//! median and w the 90th percentile of the tissue, brain is from 0.55 m (halfway between CSF and grey matter) to 1.3 w
+//! (under fat and contrast agent).
+
+use super::morphology::{closed, filled};
+use crate::{DistanceField, VoxelVolume, largest_component};
+
+/// How deep under the skin only brain and its water are, mm.
+const CORE_MM: f32 = 35.0;
+
+/// Grey values of brain tissue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Levels {
+    pub least: f32,
+    pub greatest: f32,
+}
+
+impl Levels {
+    /// From the voxels for which `deep` holds; `None` when they are too few or all alike.
+    pub fn of(mri: &VoxelVolume<f32>, deep: impl Fn(usize) -> bool) -> Option<Self> {
+        let mut values: Vec<f32> = (0..mri.data.len()).filter(|&at| deep(at)).map(|at| mri.data[at]).collect();
+        values.sort_unstable_by(f32::total_cmp);
+        let floor = 0.1 * *values.get(values.len() * 99 / 100)?;
+        let signal = &values[values.partition_point(|&v| v <= floor)..];
+        let tissue = &signal[signal.partition_point(|&v| v <= otsu(signal))..];
+        if tissue.len() < 1000 {
+            return None;
+        }
+        let at = |share: f64| tissue[(share * (tissue.len() - 1) as f64) as usize];
+        Some(Self { least: 0.55 * at(0.5), greatest: 1.3 * at(0.9) })
+    }
+
+    pub fn hold(self, value: f32) -> bool {
+        (self.least..=self.greatest).contains(&value)
+    }
+}
+
+/// How deep each voxel lies under the skin, mm; negative outside the head.
+pub(super) fn depth_in_head(mri: &VoxelVolume<f32>) -> VoxelVolume<f32> {
+    let mut values: Vec<f32> = mri.data.iter().copied().filter(|&v| v > 0.0).collect();
+    values.sort_unstable_by(f32::total_cmp);
+    let level = 0.5 * otsu(&values);
+    let head = filled(&closed(&largest_component(&mri.map(|v| u8::from(v > level))), 6.0));
+    DistanceField::of_mask(&head).values().map(|d| -d)
+}
+
+/// Whether a depth is one of the middle of the head.
+pub(super) fn is_core(depth_mm: f32) -> bool {
+    depth_mm > CORE_MM
+}
+
+/// Otsu's threshold of sorted values, on 512 bins.
+fn otsu(sorted: &[f32]) -> f32 {
+    let (Some(&low), Some(&high)) = (sorted.first(), sorted.last()) else { return 0.0 };
+    let total: f64 = sorted.iter().map(|&v| f64::from(v)).sum();
+    let (mut below, mut sum, mut best) = (0, 0.0, (0.0, low));
+    for bin in 1..512 {
+        let edge = low + (high - low) * bin as f32 / 512.0;
+        let until = sorted.partition_point(|&v| v <= edge);
+        sum += sorted[below..until].iter().map(|&v| f64::from(v)).sum::<f64>();
+        below = until;
+        let above = sorted.len() - below;
+        if below > 0 && above > 0 {
+            let apart = sum / below as f64 - (total - sum) / above as f64;
+            let between = below as f64 * above as f64 * apart * apart;
+            if between > best.0 {
+                best = (between, edge);
+            }
+        }
+    }
+    best.1
+}

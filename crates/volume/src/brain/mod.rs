@@ -1,0 +1,207 @@
+//! The brain in a T1 MRI, by threshold, morphology and the largest piece; inside the skull where a CT is given.
+//!
+//! # Theory
+//! All on a grid of cubes (1.5 mm by default), with balls of any radius from distance fields:
+//!
+//! ```text
+//! room    with a CT: the inside of the skull; without: what lies under the skin
+//! tissue  room ∩ brain's grey values, from Otsu's threshold deep in the room
+//! core    largest piece of tissue that a ball of radius r can move in          cuts meninges, vessels, nerves
+//! brain   tissue within r + 1 mm of the core, closed by a ball of 8 mm         fills sulci and ventricles
+//! mask    brain and a rim of 1 mm, brought to the MRI's grid between voxels, less bone
+//! ```
+//!
+//! Without a CT, r starts at 1 mm and grows by 0.5 mm until less than 0.5 % of the brain lies within 6 mm of the skin, where none can be:
+//! the smallest ball at which muscle and scalp let go.
+//!
+//! # Practice
+//! Seconds per head on two cores, linear in the voxels of the working grid. Against masks by other hands: Dice 0.93 to 0.95, the rest
+//! being the water around the brain, which this mask leaves out. The result is checked: one piece of 900 to 1900 ml.
+//!
+//! # When not to use it
+//! For T2, for infants, for brains open to the outside, or when a label volume is at hand: give that and check it with
+//! [`check_brain_mask`].
+
+mod cavity;
+mod levels;
+mod morphology;
+
+use crate::component::Components;
+use crate::{AIR_HU, DistanceField, FAR_MM, Grid, Interpolation, LEAST_ISOVALUE, OverlapError, VoxelVolume};
+use crate::{largest_component, overlap, resample};
+use levels::{Levels, depth_in_head, is_core};
+use morphology::{closed, core, within};
+
+/// Nearer than this to the skin there is no brain, mm.
+const SHALLOW_MM: f32 = 6.0;
+
+/// Share of a mask that may lie nearer to the skin than [`SHALLOW_MM`].
+const LEAK: f64 = 0.005;
+
+/// A second piece up to this volume is a speck, ml.
+const SPECK_ML: f64 = 5.0;
+
+/// How the brain is found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrainConfig {
+    /// Bone threshold in the CT, HU; `None` takes the lowest, [`LEAST_ISOVALUE`], which leaves the fewest holes in thin bone.
+    pub isovalue: Option<i16>,
+    /// Edge of the voxels that the search runs on, mm: smaller is slower and follows the surface closer.
+    pub work_mm: f32,
+    /// Radius of the ball that must fit into brain, mm: parts that hang on something thinner are cut off. Grows by itself without a CT.
+    pub opening_mm: f32,
+    /// Radius of the ball that closes gaps, mm: sulci narrower than twice this are filled.
+    pub closing_mm: f32,
+    /// How far the mask reaches beyond the tissue's threshold, mm: for the border voxels, which are half water.
+    pub rim_mm: f32,
+    /// Least volume that passes for an adult brain, ml.
+    pub least_ml: f64,
+    /// Greatest volume that passes for an adult brain, ml.
+    pub greatest_ml: f64,
+}
+
+impl Default for BrainConfig {
+    fn default() -> Self {
+        Self {
+            isovalue: None,
+            work_mm: 1.5,
+            opening_mm: 1.0,
+            closing_mm: 8.0,
+            rim_mm: 1.0,
+            least_ml: 900.0,
+            greatest_ml: 1900.0,
+        }
+    }
+}
+
+/// Why there is no brain mask.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MaskError {
+    /// Nothing was found.
+    #[error("no brain was found: {0}; is this a T1 MRI of a head? Give a label volume instead")]
+    Empty(&'static str),
+    /// An implausible volume.
+    #[error(
+        "the brain mask holds {found_ml:.0} ml, an adult brain {least_ml:.0} to {greatest_ml:.0} ml; give a label volume instead"
+    )]
+    Volume {
+        /// Volume of the mask, ml.
+        found_ml: f64,
+        /// Least that passes, ml.
+        least_ml: f64,
+        /// Most that passes, ml.
+        greatest_ml: f64,
+    },
+    /// Several pieces.
+    #[error("the brain mask is in {pieces} pieces, the second of {second_ml:.1} ml; keep the largest one")]
+    Pieces {
+        /// How many.
+        pieces: usize,
+        /// Volume of the second largest, ml.
+        second_ml: f64,
+    },
+    /// Voxels without a number.
+    #[error("{count} voxels of the MRI hold no number (NaN or infinite); write them as 0 or give another file")]
+    NotANumber {
+        /// How many.
+        count: usize,
+    },
+    /// CT and MRI lie apart.
+    #[error(transparent)]
+    Apart(#[from] OverlapError),
+}
+
+/// Finds the brain in a T1 MRI: 1 in the brain, 0 elsewhere, on the MRI's grid. `skull` is a CT in HU on any grid.
+pub fn brain_mask(
+    mri: &VoxelVolume<f32>,
+    skull: Option<&VoxelVolume<i16>>,
+    config: &BrainConfig,
+) -> Result<VoxelVolume<u8>, MaskError> {
+    let count = mri.data.iter().filter(|v| !v.is_finite()).count();
+    if count > 0 {
+        return Err(MaskError::NotANumber { count });
+    }
+    let grid = Grid::isotropic_over(mri, config.work_mm);
+    let coarse = resample(mri, &grid, Interpolation::Trilinear, 0.0);
+    let brain = match skull {
+        Some(ct) => {
+            overlap(ct, mri)?;
+            let isovalue = config.isovalue.unwrap_or(LEAST_ISOVALUE);
+            let room = cavity::cavity(ct, isovalue, &grid).ok_or(MaskError::Empty("the CT's bone encloses nothing"))?;
+            in_room(&coarse, &room, config)
+        }
+        None => in_head(&coarse, config),
+    };
+    let brain = brain.ok_or(MaskError::Empty("there is no large piece of one grey value deep in a head"))?;
+    let mask = refined(&brain, mri, skull.map(|ct| (ct, config.isovalue.unwrap_or(LEAST_ISOVALUE))));
+    check_brain_mask(&mask, config)?;
+    Ok(mask)
+}
+
+/// Brain inside the skull: what has brain's grey values, opened, closed, within the room.
+fn in_room(mri: &VoxelVolume<f32>, room: &VoxelVolume<u8>, config: &BrainConfig) -> Option<VoxelVolume<u8>> {
+    let to_wall = DistanceField::of_mask(room);
+    let depth = &to_wall.values().data;
+    let levels = Levels::of(mri, |at| depth[at] < -10.0)?;
+    let tissue = |at: usize| room.data[at] != 0 && levels.hold(mri.data[at]);
+    let brain = closed(&opened(mri, tissue, config.opening_mm)?, config.closing_mm);
+    Some(within(&brain, config.rim_mm, |at| room.data[at] != 0))
+}
+
+/// Brain by the MRI alone: the ball of the opening grows until nothing but a trace of the mask lies right under the skin.
+fn in_head(mri: &VoxelVolume<f32>, config: &BrainConfig) -> Option<VoxelVolume<u8>> {
+    let depth = depth_in_head(mri);
+    let levels = Levels::of(mri, |at| is_core(depth.data[at]))?;
+    let tissue = |at: usize| depth.data[at] > 0.0 && levels.hold(mri.data[at]);
+    for step in 0..12 {
+        let brain = opened(mri, tissue, config.opening_mm + 0.5 * step as f32)?;
+        let inside = brain.data.iter().filter(|&&v| v != 0).count();
+        let shallow = brain.data.iter().zip(&depth.data).filter(|&(&v, &d)| v != 0 && d < SHALLOW_MM).count();
+        if (shallow as f64) < LEAK * inside as f64 {
+            let brain = closed(&brain, config.closing_mm);
+            return Some(within(&brain, config.rim_mm, |_| true));
+        }
+    }
+    None
+}
+
+/// The largest piece that a ball of the radius can move in, and what is within 1 mm of the ball's places.
+fn opened(mri: &VoxelVolume<f32>, tissue: impl Fn(usize) -> bool, radius_mm: f32) -> Option<VoxelVolume<u8>> {
+    let mask = VoxelVolume {
+        dims: mri.dims,
+        data: (0..mri.data.len()).map(|at| u8::from(tissue(at))).collect(),
+        world_from_voxel: mri.world_from_voxel,
+    };
+    Some(within(&core(&mask, radius_mm)?, radius_mm + 1.0, |at| mask.data[at] != 0))
+}
+
+/// The mask on the MRI's grid, its surface between the coarse voxels, without bone; the largest piece.
+fn refined(brain: &VoxelVolume<u8>, mri: &VoxelVolume<f32>, bone: Option<(&VoxelVolume<i16>, i16)>) -> VoxelVolume<u8> {
+    let field = DistanceField::of_mask(brain);
+    let fine = resample(field.values(), &Grid::of(mri), Interpolation::Trilinear, FAR_MM);
+    let mut mask = fine.map(|d| u8::from(d < 0.0));
+    if let Some((ct, isovalue)) = bone {
+        let hu = resample(ct, &Grid::of(mri), Interpolation::Trilinear, AIR_HU);
+        mask.data.iter_mut().zip(&hu.data).for_each(|(m, &hu)| *m &= u8::from(hu < isovalue));
+    }
+    largest_component(&mask)
+}
+
+/// Checks a brain mask, also one that was given as a label volume: not empty, one piece but for specks, an adult's volume.
+pub fn check_brain_mask(mask: &VoxelVolume<u8>, config: &BrainConfig) -> Result<(), MaskError> {
+    let pieces = Components::of(mask.dims, |at| mask.data[at] != 0);
+    let ml = |voxels: usize| voxels as f64 * mask.voxel_mm3() * 1e-3;
+    let [largest, second] = pieces.two_largest();
+    if largest == 0 {
+        return Err(MaskError::Empty("the mask holds no voxel"));
+    }
+    let found_ml = ml(largest);
+    if !(config.least_ml..=config.greatest_ml).contains(&found_ml) {
+        return Err(MaskError::Volume { found_ml, least_ml: config.least_ml, greatest_ml: config.greatest_ml });
+    }
+    match ml(second) > SPECK_ML {
+        true => Err(MaskError::Pieces { pieces: pieces.count(), second_ml: ml(second) }),
+        false => Ok(()),
+    }
+}
