@@ -72,7 +72,7 @@ fn enter(c: vec3i, a: vec3f, b: vec3f) -> f32 {
 }
 
 // Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or NOTHING.
-fn cast(o: vec3f, d: vec3f, furthest: f32) -> f32 {
+fn meet(o: vec3f, d: vec3f, furthest: f32) -> f32 {
     let safe = select(d, vec3f(1e-12), abs(d) < vec3f(1e-12));
     let inverse = 1.0 / safe;
     let near = min(-o * inverse, (scene.dims.xyz - 1.0 - o) * inverse);
@@ -126,7 +126,7 @@ fn openness(g: vec3f, normal: vec3f) -> f32 {
     let along = ray_of(pixel.xy);
     let o = (scene.eye.xyz - scene.origin.xyz) / scene.origin.w;
     let d = along / scene.origin.w;
-    let t = cast(o, d, NOTHING);
+    let t = meet(o, d, NOTHING);
     if t >= NOTHING { return vec4f(0.0, 0.0, 1.0, NOTHING); }
     let g = o + d * t;
     let normal = outward_normal(g, along);
