@@ -1,5 +1,9 @@
 //! Haptic devices behind one seam: read where the tool is, apply a force that a guard has passed.
 //!
+//! ```text
+//!   device ──read──> tool in world space ──> scene ──> wrench ──guard──> GuardedWrench ──apply──> device
+//! ```
+//!
 //! # Practice
 //! World space is the patient's RAS+ mm; forces are N, torques N mm. Each driver converts from its vendor's units and
 //! axes. A device takes nothing but a [`GuardedWrench`], which only the force guard makes: no path goes round it. `read`
@@ -23,3 +27,7 @@ pub use workspace::Workspace;
 
 #[doc(no_inline)]
 pub use trepan_contact::GuardedWrench;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

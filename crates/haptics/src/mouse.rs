@@ -152,7 +152,8 @@ mod tests {
             many_handle.set(target, Buttons::default());
             one_handle.set(target, Buttons::default());
             let total: f64 = steps.iter().sum::<f64>().min(MAX_DT_MS);
-            (many.read(0.0), one.read(0.0));
+            many.read(0.0);
+            one.read(0.0);
             let mut time = 0.0;
             for step in steps {
                 time = (time + step).min(total);

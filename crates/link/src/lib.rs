@@ -21,3 +21,7 @@ pub mod wire;
 pub use error::LinkError;
 pub use recorder::{MAX_CHUNK_BYTES, MAX_CHUNK_MS, Recorder};
 pub use recording::Recording;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

@@ -32,7 +32,7 @@ impl Site {
         if !self.entry.is_finite() {
             return wrong("entry", self.entry.to_string(), "a finite point");
         }
-        if !((self.inward.length() - 1.0).abs() < 1e-3) {
+        if !(0.999..=1.001).contains(&self.inward.length()) {
             return wrong("inward", self.inward.to_string(), "a direction of length 1");
         }
         if !(0.0..=50.0).contains(&self.bone_mm) {
