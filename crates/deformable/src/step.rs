@@ -106,7 +106,7 @@ impl TissueCollision {
         let scene = Scene { positions, velocities, tets, neighbours, points, tool, radius_mm: self.radius_mm };
         self.search.find(&scene, &self.surface, &mut self.hits);
         count(&self.hits, out);
-        match self.responder.respond(&scene, &self.hits, &mut self.surface, out) {
+        match self.responder.respond(&scene, &self.hits, &self.surface, out) {
             Some(answer) => finish(&scene, &answer, self.stiffness, self.damping, out),
             None => out.forget_contact(),
         }

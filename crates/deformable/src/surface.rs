@@ -3,7 +3,7 @@
 //! # Theory
 //! Border triangles are sorted once along a Morton curve at rest and cut into clusters of 32. At every step the boxes of all
 //! clusters are fitted anew to the moved nodes, so nothing here goes stale and nothing needs a warm start; searches then visit
-//! only clusters whose box is near enough. Vertex normals are area-weighted means of the moved triangles, made on demand.
+//! only clusters whose box is near enough.
 //!
 //! ```text
 //!   nodes -> [box][box][box][box] ... -> boxes near the tool -> their triangles -> exact closest point
@@ -44,9 +44,6 @@ pub(crate) struct MovingSurface {
     boxes: Vec<Aabb>,
     /// Box of the whole surface.
     pub bounds: Aabb,
-    normals: Vec<Vec3>,
-    normal_made_at: Vec<u32>,
-    step: u32,
 }
 
 impl MovingSurface {
@@ -64,15 +61,11 @@ impl MovingSurface {
             triangles,
             tet_of_triangle,
             bounds: Aabb::EMPTY,
-            normals: vec![Vec3::ZERO; mesh.positions.len()],
-            normal_made_at: vec![0; mesh.positions.len()],
-            step: 0,
         }
     }
 
     /// Fits all boxes to the moved nodes.
     pub(crate) fn refit(&mut self, positions: &[Vec3]) {
-        self.step = self.step.wrapping_add(1).max(1);
         self.bounds = Aabb::EMPTY;
         for (cluster, fitted) in self.boxes.iter_mut().enumerate() {
             let nodes = self.nodes_of_cluster.row(cluster);
@@ -101,18 +94,24 @@ impl MovingSurface {
         overflow
     }
 
-    /// The closest point of the whole surface: nearest boxes first, then only boxes nearer than the best so far.
-    pub(crate) fn closest(&self, positions: &[Vec3], to: Vec3) -> Option<Foot> {
-        let first =
-            (0..self.boxes.len()).min_by(|&a, &b| self.box_distance2(a, to).total_cmp(&self.box_distance2(b, to)))?;
+    /// The closest point of the whole surface that is nearer than `within` mm; the nearest box first, then only boxes nearer than the best so far.
+    pub(crate) fn closest(&self, positions: &[Vec3], to: Vec3, within: f32) -> Option<Foot> {
+        let (mut first, mut nearest) = (None, within * within);
+        for (cluster, fitted) in self.boxes.iter().enumerate() {
+            let distance2 = distance2_to_box(fitted, to);
+            if distance2 < nearest {
+                (first, nearest) = (Some(cluster), distance2);
+            }
+        }
+        let first = first?;
         let mut best = self.closest_among(positions, self.triangles_of(first), to, None);
-        for cluster in 0..self.boxes.len() {
-            let bound = best.map_or(f32::INFINITY, |b| b.distance2);
-            if cluster != first && self.box_distance2(cluster, to) < bound {
+        for (cluster, fitted) in self.boxes.iter().enumerate() {
+            let bound = best.map_or(f32::INFINITY, |b| b.distance2).min(within * within);
+            if cluster != first && distance2_to_box(fitted, to) < bound {
                 best = self.closest_among(positions, self.triangles_of(cluster), to, best);
             }
         }
-        best
+        best.filter(|b| b.distance2 < within * within)
     }
 
     /// The closest point on the given triangles, or `best` when none is nearer.
@@ -154,30 +153,8 @@ impl MovingSurface {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// Normal that runs continuously over edges: vertex normals, blended by the foot's weights.
-    pub(crate) fn smooth_normal(&mut self, positions: &[Vec3], foot: &Foot) -> Vec3 {
-        let nodes = self.triangles[foot.triangle as usize];
-        let blend: Vec3 =
-            nodes.iter().zip(foot.weights).map(|(&n, w)| self.node_normal(positions, n as usize) * w).sum();
-        let unit = blend.normalize_or_zero();
-        if unit == Vec3::ZERO { self.flat_normal(positions, foot.triangle) } else { unit }
-    }
-
     pub(crate) fn corners(&self, positions: &[Vec3], t: u32) -> [Vec3; 3] {
         self.triangles[t as usize].map(|n| positions[n as usize])
-    }
-
-    fn node_normal(&mut self, positions: &[Vec3], node: usize) -> Vec3 {
-        if self.normal_made_at[node] != self.step {
-            let twice_area = |&t: &u32| {
-                let [a, b, c] = self.corners(positions, t);
-                (b - a).cross(c - a)
-            };
-            let sum: Vec3 = self.triangles_of_node.row(node).iter().map(twice_area).filter(|v| v.is_finite()).sum();
-            self.normals[node] = sum.normalize_or_zero();
-            self.normal_made_at[node] = self.step;
-        }
-        self.normals[node]
     }
 
     fn foot(&self, positions: &[Vec3], t: u32, to: Vec3) -> Foot {
@@ -190,11 +167,10 @@ impl MovingSurface {
     fn triangles_of(&self, cluster: usize) -> core::ops::Range<u32> {
         (cluster * CLUSTER) as u32..((cluster + 1) * CLUSTER).min(self.triangles.len()) as u32
     }
+}
 
-    fn box_distance2(&self, cluster: usize, to: Vec3) -> f32 {
-        let fitted = self.boxes[cluster];
-        (fitted.min - to).max(to - fitted.max).max(Vec3::ZERO).length_squared()
-    }
+fn distance2_to_box(fitted: &Aabb, to: Vec3) -> f32 {
+    (fitted.min - to).max(to - fitted.max).max(Vec3::ZERO).length_squared()
 }
 
 /// Most triangles crossed in one descent.

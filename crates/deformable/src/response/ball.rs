@@ -6,8 +6,8 @@
 //! centre is inside, q is not searched anew but followed: from the last triangle downhill, and only over triangles that face the same way. So
 //! the far side of a thin structure never takes the contact over, and deeper stays deeper through the whole thickness.
 //!
-//! The normal is the mean over all points inside, each with the surface normal at its own closest point (vertex normals, blended) and weighted with its
-//! own depth: `f = Σ dᵢ nᵢ`, `n = f / |f|`. A weight is zero where a point enters, so nothing jumps. In a groove whose walls push against each
+//! The normal is the mean over the centre and all points inside, each with the blended surface normal at its own closest point (`near.rs`) and weighted
+//! with its own depth: `f = Σ dᵢ nᵢ`, `n = f / |f|`. A weight is zero where a point enters, so nothing jumps. In a groove whose walls push against each
 //! other the coherence `κ = |f| / Σ dᵢ` falls to 0, and the depth is scaled by `min(1, 2κ)`: opposite walls cancel, everything else is left alone.
 //!
 //! ```text
@@ -17,12 +17,12 @@
 //! ```
 //!
 //! # Sources
-//! Distance with tracked closest feature: after Ho, Basdogan and Srinivasan 1999. Blended vertex normals: Morgenbesser and Srinivasan 1996 (force shading).
+//! Followed closest feature: after Ho, Basdogan and Srinivasan 1999. Blended normals: the aim of force shading (Morgenbesser and Srinivasan 1996).
 //!
 //! # When not to use it
 //! For a tool that is not a ball at its tip; for a surface that folds within the ball's radius so sharply that one normal says nothing.
 
-use super::Answer;
+use super::{Answer, near::Near, near::Sample};
 use crate::{
     narrow::{Hits, NONE},
     scene::Scene,
@@ -35,17 +35,20 @@ use trepan_geometry::{Aabb, Vec3};
 /// The triangle touched last, and room for those near the contact.
 pub(crate) struct Ball {
     anchor: u32,
-    near: Vec<u32>,
+    numbers: Vec<u32>,
+    near: Near,
 }
 
 /// Most triangles near one contact.
 const MAX_NEAR: usize = 1024;
 /// A triangle belongs to the touched side when its normal is within 70 degrees of the touched triangle's.
 const SAME_SIDE: f32 = 0.34;
+/// Normals blend over this many radii.
+const BLEND: f32 = 0.5;
 
 impl Ball {
     pub(crate) fn new() -> Self {
-        Self { anchor: NONE, near: Vec::with_capacity(MAX_NEAR) }
+        Self { anchor: NONE, numbers: Vec::with_capacity(MAX_NEAR), near: Near::with_capacity(MAX_NEAR) }
     }
 
     pub(crate) fn reset(&mut self) {
@@ -57,64 +60,58 @@ impl Ball {
         &mut self,
         scene: &Scene,
         hits: &Hits,
-        surface: &mut MovingSurface,
+        surface: &MovingSurface,
         out: &mut TissueStep,
     ) -> Option<Answer> {
         let touch = self.touch(scene, hits, surface, out);
-        self.anchor = touch.map_or(NONE, |(foot, _)| foot.triangle);
-        let (foot, depth_mm) = touch?;
+        self.anchor = touch.as_ref().map_or(NONE, |(sample, _)| sample.triangle);
+        let (centre, depth_mm) = touch?;
         let mut sum = Sum::default();
-        sum.add(depth_mm, surface.smooth_normal(scene.positions, &foot));
-        press(surface, &foot, depth_mm, out);
+        sum.add(depth_mm, centre.normal);
+        press(surface, &centre, depth_mm, out);
         let stride = listed_stride(hits);
         for (k, i) in points_inside(hits).enumerate() {
             let p = scene.points[i];
-            let Some(foot) = surface.closest_among(scene.positions, self.near.iter().copied(), p, None) else { break };
-            let (depth_mm, normal) = (foot.distance2.sqrt(), surface.smooth_normal(scene.positions, &foot));
-            sum.add(depth_mm, normal);
-            press(surface, &foot, depth_mm, out);
+            let Some(sample) = self.near.sample(p, BLEND * scene.radius_mm) else { break };
+            sum.add(sample.distance, sample.normal);
+            press(surface, &sample, sample.distance, out);
             if k % stride == 0 {
-                out.manifold.push(Contact { point: p, normal, depth_mm });
+                let normal = sample.normal.normalize_or_zero();
+                out.manifold.push(Contact { point: p, normal, depth_mm: sample.distance });
             }
         }
-        sum.answer(depth_mm, surface.smooth_normal(scene.positions, &foot))
+        let fallback = surface.flat_normal(scene.positions, centre.triangle);
+        Some(sum.answer(depth_mm, fallback))
     }
 
-    /// Closest surface point to the centre and the ball's depth there; gathers the triangles that count around it.
+    /// What the surface says about the ball's centre, and the ball's depth there.
     fn touch(
         &mut self,
         scene: &Scene,
         hits: &Hits,
         surface: &MovingSurface,
         out: &mut TissueStep,
-    ) -> Option<(Foot, f32)> {
+    ) -> Option<(Sample, f32)> {
         let (positions, centre) = (scene.positions, scene.tool.tip());
         let inside = hits.tet[scene.centre()] != NONE;
-        if !inside && !scene.ball_box().overlaps(surface.bounds) {
-            return None;
-        }
-        let followed = inside && self.anchor != NONE;
-        let foot = match followed {
+        let foot = match inside && self.anchor != NONE {
             true => surface.descend(positions, self.anchor, centre),
-            false => surface.closest(positions, centre),
+            false => surface.closest(positions, centre, if inside { f32::INFINITY } else { scene.radius_mm }),
         }?;
-        if !inside && foot.distance2 >= scene.radius_mm * scene.radius_mm {
-            return None;
-        }
-        out.overflow += surface.gather(positions, Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm), &mut self.near);
-        self.keep_touched_side(positions, surface, &foot, centre);
-        let foot = surface.closest_among(positions, self.near.iter().copied(), centre, Some(foot))?;
-        let distance = foot.distance2.sqrt();
-        let depth_mm = if inside { scene.radius_mm + distance } else { scene.radius_mm - distance };
-        (depth_mm > 0.0).then_some((foot, depth_mm))
+        out.overflow +=
+            surface.gather(positions, Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm), &mut self.numbers);
+        self.keep_touched_side(scene, surface, &foot);
+        let sample = self.near.sample(centre, BLEND * scene.radius_mm)?;
+        let depth_mm = scene.radius_mm + if inside { sample.distance } else { -sample.distance };
+        (depth_mm > 0.0).then_some((sample, depth_mm))
     }
 
-    /// Keeps triangles that the centre sees from outside, and those that face as the touched one does.
-    fn keep_touched_side(&mut self, positions: &[Vec3], surface: &MovingSurface, foot: &Foot, centre: Vec3) {
-        let touched = surface.flat_normal(positions, foot.triangle);
-        self.near.retain(|&t| {
-            let normal = surface.flat_normal(positions, t);
-            normal.dot(touched) > SAME_SIDE || (centre - surface.corners(positions, t)[0]).dot(normal) > 0.0
+    /// Takes triangles that the centre sees from outside, and those that face as the touched one does.
+    fn keep_touched_side(&mut self, scene: &Scene, surface: &MovingSurface, foot: &Foot) {
+        let touched = surface.flat_normal(scene.positions, foot.triangle);
+        let centre = scene.tool.tip();
+        self.near.fill(surface, scene.positions, &self.numbers, |normal, corner| {
+            normal.dot(touched) > SAME_SIDE || (centre - corner).dot(normal) > 0.0
         });
     }
 }
@@ -133,10 +130,10 @@ impl Sum {
     }
 
     /// `fallback` is the normal where all normals cancel.
-    fn answer(&self, depth_mm: f32, fallback: Vec3) -> Option<Answer> {
+    fn answer(&self, depth_mm: f32, fallback: Vec3) -> Answer {
         let coherence = self.force.length() / self.total;
         let normal = self.force.try_normalize().unwrap_or(fallback);
-        Some(Answer { normal, depth_mm: depth_mm * (2.0 * coherence).min(1.0) })
+        Answer { normal, depth_mm: depth_mm * (2.0 * coherence).min(1.0) }
     }
 }
 
@@ -150,10 +147,10 @@ fn listed_stride(hits: &Hits) -> usize {
     points_inside(hits).count().div_ceil(trepan_contact::MAX_CONTACTS).max(1)
 }
 
-/// Puts load on the nodes under a foot.
-fn press(surface: &MovingSurface, foot: &Foot, load: f32, out: &mut TissueStep) {
-    let nodes = surface.triangles[foot.triangle as usize];
-    for (node, weight) in nodes.into_iter().zip(foot.weights) {
+/// Puts load on the nodes under a sample.
+fn press(surface: &MovingSurface, sample: &Sample, load: f32, out: &mut TissueStep) {
+    let nodes = surface.triangles[sample.triangle as usize];
+    for (node, weight) in nodes.into_iter().zip(sample.weights) {
         if weight > 0.0 {
             out.nodal.add(node, weight * load);
         }

@@ -1,6 +1,7 @@
 //! From what was found to one contact: normal, depth, and the nodes that feel it.
 
 mod ball;
+mod near;
 mod printed;
 
 use crate::{narrow::Hits, scene::Scene, step::TissueStep, surface::MovingSurface};
@@ -48,7 +49,7 @@ impl Responder {
         &mut self,
         scene: &Scene,
         hits: &Hits,
-        surface: &mut MovingSurface,
+        surface: &MovingSurface,
         out: &mut TissueStep,
     ) -> Option<Answer> {
         match self {

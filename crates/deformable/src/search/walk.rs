@@ -103,7 +103,7 @@ impl Walk {
     /// No border near and no memory: all points are inside or all outside, as the centre is.
     fn enter_deep(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
         let centre = scene.points[scene.centre()];
-        let Some(foot) = surface.closest(scene.positions, centre) else { return };
+        let Some(foot) = surface.closest(scene.positions, centre, f32::INFINITY) else { return };
         self.lost.clear();
         self.lost.push(scene.centre() as u32);
         self.begin_flood();
