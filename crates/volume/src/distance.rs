@@ -10,8 +10,8 @@
 //! D² = min( Z·Y·X̂, Z·X·Ŷ, Y·X·Ẑ )     X̂: parabolas at the crossings of x-edges; X: envelope over x of what is there
 //! ```
 //!
-//! A voxel whose own edges cross the surface at distances aᵢ along the axes takes its distance to the plane through these crossings,
-//! `1 / √(Σ 1/aᵢ²)`, the smaller one: between the crossings the surface is nearer than they are.
+//! Between the crossings the surface is nearer than they are. So each voxel whose own edges cross it, at distances aᵢ along the axes,
+//! adds the foot point on the plane through these crossings, `n / |n|²` with `nᵢ = ± 1/aᵢ`, for the voxels within two of it.
 //!
 //! # Practice
 //! Grids of cubes or boxes in any orientation, axes at right angles. Linear in voxels: about 50 ns each and core; 4 bytes
@@ -57,15 +57,12 @@ impl DistanceField {
     fn of<T: Sample>(grid: &VoxelVolume<T>, inside: impl Fn(usize) -> f32 + Sync) -> Self {
         let spacing = grid.spacing_mm();
         let mut data = squared_distances(grid.dims, spacing, &inside);
+        for (at, foot) in feet(grid.dims, spacing, &inside) {
+            splat(grid.dims, spacing, at, foot, &mut data);
+        }
         data.par_iter_mut().enumerate().for_each(|(at, d)| {
-            let to_crossing = d.sqrt().min(FAR_MM);
-            let own = inside(at);
-            let far = if f64::from(to_crossing) > spacing.max_element() {
-                to_crossing
-            } else {
-                to_crossing.min(to_plane(grid.dims, spacing, at, own, &inside))
-            };
-            *d = if own >= 0.0 { -far } else { far };
+            let far = d.sqrt().min(FAR_MM);
+            *d = if inside(at) >= 0.0 { -far } else { far };
         });
         Self::from_values(VoxelVolume { dims: grid.dims, data, world_from_voxel: grid.world_from_voxel })
     }
@@ -114,19 +111,43 @@ impl DistanceField {
 /// The distance where there is no surface at all, mm.
 pub const FAR_MM: f32 = 1e6;
 
-/// Distance to the plane through the crossings of a voxel's own edges, mm; infinite where none crosses.
-fn to_plane(dims: [usize; 3], spacing: DVec3, at: usize, own: f32, inside: &impl Fn(usize) -> f32) -> f32 {
+/// The foot points: for each voxel with an edge that crosses the surface, from its centre, mm.
+fn feet(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) -> f32 + Sync)) -> Vec<(usize, DVec3)> {
     let steps = [1, dims[0], dims[0] * dims[1]];
-    let mut sum = 0.0;
-    for axis in 0..3 {
-        let place = at / steps[axis] % dims[axis];
-        let before = (place > 0).then(|| inside(at - steps[axis]));
-        let after = (place + 1 < dims[axis]).then(|| inside(at + steps[axis]));
-        let crossings = [before, after].into_iter().flatten().filter(|&v| (v >= 0.0) != (own >= 0.0));
-        let nearest = crossings.map(|v| own / (own - v)).fold(f32::INFINITY, f32::min);
-        sum += (nearest * spacing[axis] as f32).powi(-2);
+    let foot = |at: usize| {
+        let own = inside(at);
+        let mut n = DVec3::ZERO;
+        for axis in 0..3 {
+            let place = at / steps[axis] % dims[axis];
+            let before = (place > 0).then(|| (-1.0, inside(at - steps[axis])));
+            let after = (place + 1 < dims[axis]).then(|| (1.0, inside(at + steps[axis])));
+            for (side, other) in [before, after].into_iter().flatten() {
+                let part = f64::from(own / (own - other)).max(1e-6);
+                let wanted = (other >= 0.0) != (own >= 0.0) && part.is_finite();
+                if wanted && (part * spacing[axis]).recip() > n[axis].abs() {
+                    n[axis] = side / (part * spacing[axis]);
+                }
+            }
+        }
+        (n != DVec3::ZERO).then(|| (at, n / n.length_squared()))
+    };
+    (0..dims.iter().product()).into_par_iter().filter_map(foot).collect()
+}
+
+/// Lowers the squared distances of the voxels within two of a foot point's to that to the foot point.
+fn splat(dims: [usize; 3], spacing: DVec3, at: usize, foot: DVec3, squared: &mut [f32]) {
+    let place = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
+    let range = |axis: usize| place[axis].saturating_sub(2)..(place[axis] + 3).min(dims[axis]);
+    let away = |axis: usize, n: usize| ((n as f64 - place[axis] as f64) * spacing[axis] - foot[axis]).powi(2);
+    for k in range(2) {
+        for j in range(1) {
+            let row = away(2, k) + away(1, j);
+            for i in range(0) {
+                let to = &mut squared[i + dims[0] * (j + dims[1] * k)];
+                *to = to.min((row + away(0, i)) as f32);
+            }
+        }
     }
-    sum.sqrt().recip()
 }
 
 /// Squared distances to the nearest crossing, mm².
@@ -273,28 +294,35 @@ mod tests {
     use glam::{DMat3, DVec3};
     use proptest::prelude::*;
 
-    /// The nearest crossing of any grid edge by looking at all of them, or the plane through a voxel's own.
+    /// The nearest crossing of any grid edge, or foot point within two voxels, by looking at all of them.
     fn slow(levels: &VoxelVolume<f32>, from: [usize; 3]) -> f64 {
         let mut best = f64::INFINITY;
-        let mut own = [f64::INFINITY; 3];
+        let here = levels.centre_of(from);
         let [nx, ny, nz] = levels.dims;
         for at in 0..nx * ny * nz {
             let p = [at % nx, at / nx % ny, at / (nx * ny)];
+            let a = levels.data[at];
+            let mut n = DVec3::ZERO;
             for axis in 0..3 {
-                let mut q = p;
-                q[axis] += 1;
-                let (a, Some(b)) = (levels.data[at], levels.get(q)) else { continue };
-                if (a >= 0.0) != (b >= 0.0) {
-                    let place = levels.centre_of(p).lerp(levels.centre_of(q), f64::from(a / (a - b)));
-                    let apart = place.distance(levels.centre_of(from));
-                    best = best.min(apart);
-                    if p == from || q == from {
-                        own[axis] = own[axis].min(apart);
+                let mut nearest = f64::INFINITY;
+                for side in [p[axis].wrapping_sub(1), p[axis] + 1] {
+                    let mut q = p;
+                    q[axis] = side;
+                    let Some(b) = levels.get(q).filter(|&b| (a >= 0.0) != (b >= 0.0)) else { continue };
+                    let part = f64::from(a / (a - b)).max(1e-6);
+                    let way = (levels.centre_of(q) - levels.centre_of(p)) * part;
+                    best = best.min((levels.centre_of(p) + way).distance(here));
+                    if part < nearest {
+                        nearest = part;
+                        n += way / way.length_squared() - n.project_onto(way);
                     }
                 }
             }
+            if n != DVec3::ZERO && (0..3).all(|axis| p[axis].abs_diff(from[axis]) <= 2) {
+                best = best.min((levels.centre_of(p) + n / n.length_squared()).distance(here));
+            }
         }
-        best.min(own.iter().map(|a| a.powi(-2)).sum::<f64>().sqrt().recip())
+        best
     }
 
     proptest! {
@@ -313,7 +341,7 @@ mod tests {
                 let p = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
                 let truth = slow(&levels, p).min(f64::from(FAR_MM));
                 let found = f64::from(field.values().data[at]);
-                prop_assert!((found.abs() - truth).abs() < 1e-4 * (1.0 + truth), "{found} for {truth}");
+                prop_assert!((found.abs() - truth).abs() < 1e-4 * (1.0 + truth.abs()), "{found} for {truth}");
                 let inside = levels.data[at] >= 0.0;
                 prop_assert!(found == 0.0 || inside == (found < 0.0));
             }
@@ -339,11 +367,11 @@ mod tests {
             worst_coarse = worst_coarse.max((coarse.sample(p) - (radius - 11.3)).abs());
             let slope = fine.gradient(p);
             assert!(
-                slope.normalize().dot(direction) > 0.98 && (0.8..1.25).contains(&slope.length()),
+                slope.normalize().dot(direction) > 0.98 && (0.8..1.2).contains(&slope.length()),
                 "{slope} along {direction} at {radius}"
             );
         }
-        assert!(worst_fine < 0.3 && worst_coarse < 0.6, "{worst_fine} {worst_coarse}");
+        assert!(worst_fine < 0.15 && worst_coarse < 0.6, "{worst_fine} {worst_coarse}");
     }
 
     #[test]
