@@ -24,14 +24,17 @@
 //! ```
 
 mod check;
+mod file;
 pub mod lattice;
 mod quality;
 mod surface;
 mod tets;
 mod topology;
 mod triangles;
+pub mod vtk;
 
 pub use check::MeshError;
+pub use file::FileError;
 pub use quality::Quality;
 pub use surface::Surface;
 pub use tets::{FACES, OPPOSITE, TetMesh};

@@ -1,0 +1,269 @@
+//! What all mesh files share: errors that name file, field and remedy, a reader that never trusts a count, and writing without leaving half a file.
+//!
+//! # Practice
+//! A file is read whole. A count in a header is compared with the bytes that are left before anything is allocated for it, so a
+//! header cannot ask for more than a few times the file's own size. A new file is written beside its place and then renamed.
+
+use crate::{MeshError, TetMesh};
+use std::fmt::Display;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use trepan_geometry::Vec3;
+
+/// Why a mesh file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The operating system says no.
+    #[error("{}: {source}; check that the path exists and may be used", path.display())]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A part of the file is not what it should be.
+    #[error("{}: {field} is {got}; it should be {wanted}", path.display())]
+    Field {
+        /// Which file.
+        path: PathBuf,
+        /// Which part.
+        field: String,
+        /// What is there.
+        got: String,
+        /// What would be right.
+        wanted: String,
+    },
+    /// The file was read, but its mesh is not usable.
+    #[error("{}: {source}", path.display())]
+    Mesh {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong.
+        source: MeshError,
+    },
+}
+
+/// A place in a file's bytes, text or binary.
+pub(crate) struct Reader {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    at: usize,
+}
+
+impl Reader {
+    pub(crate) fn open(path: &Path) -> Result<Self, FileError> {
+        let bytes = std::fs::read(path).map_err(|source| FileError::Io { path: path.into(), source })?;
+        Ok(Self { path: path.into(), bytes, at: 0 })
+    }
+
+    pub(crate) fn error(&self, field: impl Into<String>, got: impl Display, wanted: impl Into<String>) -> FileError {
+        let got: String = got.to_string().chars().take(80).collect();
+        FileError::Field { path: self.path.clone(), field: field.into(), got, wanted: wanted.into() }
+    }
+
+    pub(crate) fn left(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+
+    /// The rest of the current line without its end, or `None` at the end of the file.
+    pub(crate) fn line(&mut self) -> Option<String> {
+        if self.left() == 0 {
+            return None;
+        }
+        let rest = &self.bytes[self.at..];
+        let end = rest.iter().position(|&b| b == b'\n');
+        let line = &rest[..end.unwrap_or(rest.len())];
+        self.at += end.map_or(rest.len(), |e| e + 1);
+        Some(String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)).into_owned())
+    }
+
+    /// The next line that is neither blank nor a comment starting with `comment`, trimmed.
+    pub(crate) fn content_line(&mut self, comment: char) -> Option<String> {
+        loop {
+            let line = self.line()?;
+            let content = line.split(comment).next().unwrap_or_default().trim();
+            if !content.is_empty() {
+                return Some(content.to_owned());
+            }
+        }
+    }
+
+    /// The next word between blanks.
+    pub(crate) fn word(&mut self) -> Option<&str> {
+        let rest = &self.bytes[self.at..];
+        let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
+        let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
+        let from = self.at + start;
+        self.at = from + length;
+        if length == 0 { None } else { Some(std::str::from_utf8(&self.bytes[from..from + length]).unwrap_or("?")) }
+    }
+
+    /// The next word, parsed.
+    pub(crate) fn number<T: std::str::FromStr>(&mut self, field: &str, wanted: &str) -> Result<T, FileError> {
+        let word = self.word().unwrap_or("the end of the file").to_owned();
+        word.parse().map_err(|_| self.error(field, &word, wanted))
+    }
+
+    /// The next word as a count of things that each take at least `bytes_each` in the rest of the file.
+    pub(crate) fn count(&mut self, field: &str, bytes_each: usize) -> Result<usize, FileError> {
+        let count: u64 = self.number(field, "a count")?;
+        self.checked_count(field, count, bytes_each)
+    }
+
+    /// The same for a count that was read otherwise.
+    pub(crate) fn checked_count(&self, field: &str, count: u64, bytes_each: usize) -> Result<usize, FileError> {
+        let fits = usize::try_from(count)
+            .ok()
+            .filter(|n| n.checked_mul(bytes_each.max(1)).is_some_and(|b| b <= self.left() + bytes_each));
+        fits.ok_or_else(|| {
+            self.error(
+                field,
+                count,
+                format!("at most what the remaining {} bytes hold; is the file cut off?", self.left()),
+            )
+        })
+    }
+
+    /// The next `count` bytes.
+    pub(crate) fn take(&mut self, field: &str, count: usize) -> Result<&[u8], FileError> {
+        if count > self.left() {
+            return Err(self.error(
+                field,
+                format!("cut off after {} of {count} bytes", self.left()),
+                "complete; copy the file again",
+            ));
+        }
+        self.at += count;
+        Ok(&self.bytes[self.at - count..self.at])
+    }
+
+    /// The next N bytes as an array.
+    pub(crate) fn array<const N: usize>(&mut self, field: &str) -> Result<[u8; N], FileError> {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(self.take(field, N)?);
+        Ok(bytes)
+    }
+
+    /// Back to the start.
+    pub(crate) fn rewind(&mut self) {
+        self.at = 0;
+    }
+
+    /// Whether the rest starts with these bytes.
+    pub(crate) fn starts_with(&self, bytes: &[u8]) -> bool {
+        self.bytes[self.at..].starts_with(bytes)
+    }
+
+    /// Bytes in the whole file.
+    pub(crate) fn size(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// A position in f32, if it is finite.
+    pub(crate) fn position(&self, node: usize, xyz: [f64; 3]) -> Result<Vec3, FileError> {
+        let position = Vec3::from_array(xyz.map(|c| c as f32));
+        if position.is_finite() {
+            Ok(position)
+        } else {
+            Err(self.error(format!("node {node}"), format!("{xyz:?}"), "three finite numbers"))
+        }
+    }
+
+    /// The mesh, if it has tetrahedra and their indices are in range.
+    pub(crate) fn mesh(&self, positions: Vec<Vec3>, tets: Vec<[u32; 4]>) -> Result<TetMesh, FileError> {
+        let mesh = TetMesh { positions, tets };
+        mesh.check_indices().map_err(|source| FileError::Mesh { path: self.path.clone(), source })?;
+        Ok(mesh)
+    }
+}
+
+/// Writes a file under a temporary name in the same folder, then renames it: the old file, or the whole new one.
+pub(crate) fn write_atomically(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<(), FileError> {
+    let io = |source| FileError::Io { path: path.into(), source };
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".trepan-");
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder).map_err(io)?;
+    let mut buffered = std::io::BufWriter::new(file.as_file_mut());
+    fill(&mut buffered).and_then(|()| buffered.flush()).map_err(io)?;
+    drop(buffered);
+    file.persist(path).map_err(|e| io(e.error))?;
+    Ok(())
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A small sound mesh: an octahedron of four tetrahedra around its axis, off the origin.
+    pub(crate) fn octahedron() -> TetMesh {
+        let ring = [Vec3::X, Vec3::Y, Vec3::NEG_X, Vec3::NEG_Y];
+        let nodes = [Vec3::NEG_Z, Vec3::Z].into_iter().chain(ring);
+        let tets = [0, 1, 2, 3].map(|n| [0, 1, 2 + n, 2 + (n + 1) % 4]).to_vec();
+        let mesh = TetMesh { positions: nodes.map(|p| p * 1.25 + Vec3::new(-40.0, 12.5, 1e-3)).collect(), tets };
+        assert_eq!(mesh.check(), Ok(()));
+        mesh
+    }
+
+    /// Feeds a reader thousands of damaged copies of a good file: cut, bytes changed, numbers swapped for others. It may
+    /// refuse or read them, but must not panic.
+    pub(crate) fn survive_mutations<T>(good: &[u8], name: &str, read: impl Fn(&Path) -> Result<T, FileError>) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        let mut random = 0x2545_F491_4F6C_DD1Du64;
+        let mut next = |n: usize| {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            (random >> 11) as usize % n.max(1)
+        };
+        let numbers: [&[u8]; 8] = [b"-1", b"0", b"4294967295", b"18446744073709551615", b"nan", b"1e400", b"", b"x"];
+        for round in 0..1500 {
+            let mut bad = good.to_vec();
+            match round % 4 {
+                0 => bad.truncate(next(good.len())),
+                1 => (0..=next(4)).for_each(|_| bad[next(good.len())] = next(256) as u8),
+                2 => drop(bad.splice(next(good.len())..good.len().min(next(good.len()) + 1).max(good.len()), [])),
+                _ => replace_number(&mut bad, next(200), numbers[next(numbers.len())]),
+            }
+            std::fs::write(&path, &bad).unwrap();
+            if let Err(error) = read(&path) {
+                assert!(error.to_string().contains(name), "{error}");
+            }
+        }
+    }
+
+    /// Replaces the nth run of digits.
+    fn replace_number(bytes: &mut Vec<u8>, nth: usize, with: &[u8]) {
+        let starts: Vec<usize> = (0..bytes.len())
+            .filter(|&i| bytes[i].is_ascii_digit() && (i == 0 || !bytes[i - 1].is_ascii_digit()))
+            .collect();
+        if let Some(&start) = starts.get(nth % starts.len().max(1)) {
+            let length = bytes[start..].iter().take_while(|b| b.is_ascii_digit()).count();
+            bytes.splice(start..start + length, with.iter().copied());
+        }
+    }
+
+    #[test]
+    fn a_missing_file_and_folder_are_named() {
+        let missing = Path::new("no-such-folder/no-such-file.vtk");
+        assert!(Reader::open(missing).is_err_and(|e| e.to_string().contains("no-such-file.vtk")));
+        let error = write_atomically(missing, |_| Ok(())).unwrap_err();
+        assert!(error.to_string().contains("no-such-file.vtk"));
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.vtk");
+        std::fs::write(&path, b"old").unwrap();
+        assert!(write_atomically(&path, |out| out.write_all(b"new").and(Err(std::io::Error::other("full")))).is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}
