@@ -1,1 +1,38 @@
-//! The optimal voxel size: cost function, calibration, prediction
+//! The cell size of a uniform grid that makes collision detection cheapest.
+//!
+//! # Theory
+//! A grid with cells of edge δ sorts particles; each tetrahedron looks through the cells that its box covers and tests the particles in them. Small cells cost visits, large
+//! ones cost tests. Chapter 5 of the thesis (after Borro et al. 2004) writes that as a cost per tetrahedron,
+//!
+//! ```text
+//! z(δ) = p_nc v_o + (1 − p_nc) v_o p_v r_t        v_o = (s/δ + 2)³      p_v = c δ²,  c = 3√3 / (2 A_t)
+//! ```
+//!
+//! with s the mean longest edge (mm), A_t the mean area of a facet (mm²), p_nc the share of tetrahedra that touch nothing, r_t = t_p / t_v the price of a test in visits. Its minimum is
+//! the one positive root of a cubic ([`CostModel::analytic`]). The usual rule, δ = mean edge (Teschner et al. 2003), is [`Measures::traditional_mm`].
+//!
+//! # Practice
+//! Lengths in mm. Everything is offline and takes no clock: times come in as numbers ([`fit`]), counts come out ([`counts::grid`]).
+//!
+//! ```
+//! use trepan_geometry::Vec3;
+//! use trepan_mesh::TetMesh;
+//! use trepan_voxel_size::{CostModel, Measures};
+//!
+//! let mesh = TetMesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z], tets: vec![[0, 1, 2, 3]] };
+//! let measures = Measures::of(&mesh)?;
+//! let delta = CostModel::default().analytic(&measures)?;
+//! assert!(delta > measures.traditional_mm());
+//! # Ok::<(), trepan_voxel_size::VoxelSizeError>(())
+//! ```
+
+mod cost;
+pub mod counts;
+mod error;
+mod fit;
+mod measures;
+
+pub use cost::{CostModel, zone_error};
+pub use error::VoxelSizeError;
+pub use fit::{Prices, fit};
+pub use measures::Measures;

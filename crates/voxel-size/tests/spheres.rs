@@ -1,0 +1,42 @@
+//! Chapter 5's spheres: evenly meshed balls give the thesis's ratio of analytic to traditional cell size.
+
+use glam::DVec3;
+use trepan_geometry::Vec3;
+use trepan_mesh::{TetMesh, lattice};
+use trepan_volume::VoxelVolume;
+use trepan_voxel_size::{CostModel, Measures, counts};
+
+fn ball(target_tets: usize) -> TetMesh {
+    let mut mask = VoxelVolume::isotropic([48; 3], Vec3::splat(-23.5), 1.0, 0u8);
+    for at in 0..mask.data.len() {
+        mask.data[at] = u8::from(mask.centre_of([at % 48, at / 48 % 48, at / 2304]).distance(DVec3::ZERO) < 22.0);
+    }
+    lattice::tetrahedra(&mask, &lattice::Config { target_tets, ..Default::default() }).unwrap()
+}
+
+#[test]
+fn the_analytic_size_is_1_4_to_1_6_mean_edges_on_even_spheres() {
+    for tets in [3_000, 12_000, 42_000] {
+        let measures = Measures::of(&ball(tets)).unwrap();
+        let ratio = CostModel::default().analytic(&measures).unwrap() / measures.traditional_mm();
+        assert!((1.40..1.60).contains(&ratio), "{ratio} at {tets}");
+    }
+}
+
+#[test]
+fn two_touching_spheres_are_cheaper_at_the_analytic_size() {
+    let mesh = ball(8_000);
+    let measures = Measures::of(&mesh).unwrap();
+    let shift = Vec3::new(42.0, 0.0, 0.0);
+    let particles: Vec<Vec3> = mesh.positions.iter().map(|p| *p + shift).collect();
+    let boxes = counts::boxes(&mesh);
+    let model = CostModel::default();
+    let work = |cell: f64| {
+        let counts = counts::grid(&boxes, &particles, cell).unwrap();
+        assert_eq!(counts.inside, counts::brute_force(&boxes, &particles).inside);
+        counts.visits as f64 + model.r_t * counts.tests as f64
+    };
+    let analytic = model.analytic(&measures).unwrap();
+    assert!(work(analytic) < work(measures.traditional_mm()));
+    assert!(work(analytic) < work(0.3 * analytic) && work(analytic) < work(6.0 * analytic));
+}
