@@ -14,6 +14,8 @@ mod renderer;
 mod scene;
 mod skull;
 mod slice;
+#[cfg(feature = "window")]
+pub mod window;
 
 pub use camera::{Camera, View};
 pub use error::RenderError;

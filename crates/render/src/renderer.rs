@@ -172,6 +172,11 @@ impl Renderer {
         Ok(())
     }
 
+    /// The device that it draws with.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
     /// Pixels of the picture, width and height.
     pub fn size(&self) -> [u32; 2] {
         let [width, height, _] = self.canvas.picture.size();

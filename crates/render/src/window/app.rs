@@ -1,0 +1,141 @@
+//! One picture of the window: input → session → renderer → panel.
+
+use super::input::{Hand, Pointer};
+use super::plot::Trace;
+use super::{Panel, Session, Shared, Start, WindowInput, banner, panel};
+use eframe::egui;
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Duration;
+
+/// Width of the side panel, points.
+const PANEL_WIDTH: f32 = 250.0;
+/// Share of the pixels along an edge that a software driver draws while the camera moves.
+const COARSE: f32 = 0.5;
+/// After this long without a move the picture is fine again, s.
+const SETTLE_S: f64 = 0.3;
+
+/// The application behind the window.
+pub(super) struct Window<S> {
+    shared: Rc<RefCell<Shared<S>>>,
+    start: Start,
+    hand: Hand,
+    force: Trace,
+    panel: Panel,
+    clicks: panel::Clicks,
+    texture: Option<(egui::TextureId, eframe::wgpu::TextureView)>,
+    moved_at: f64,
+}
+
+impl<S: Session> Window<S> {
+    pub fn new(context: &eframe::CreationContext<'_>, shared: Rc<RefCell<Shared<S>>>, start: Start) -> Self {
+        context.egui_ctx.set_visuals(egui::Visuals::dark());
+        let hand = Hand { world_from_tool: start.world_from_tool, camera: start.camera };
+        let force = Trace::over(panel::SECONDS_SHOWN);
+        Self {
+            shared,
+            start,
+            hand,
+            force,
+            panel: Panel::default(),
+            clicks: Default::default(),
+            texture: None,
+            moved_at: f64::MIN,
+        }
+    }
+
+    /// Asks the session what is new.
+    fn update(&mut self, ui: &egui::Ui) {
+        let input = ui.input(|i| WindowInput {
+            world_from_tool: self.hand.world_from_tool,
+            pedal: i.key_down(egui::Key::Space) || self.clicks.pedal,
+            next_tool: i.key_pressed(egui::Key::N) || self.clicks.next_tool,
+            camera: self.hand.camera,
+            seconds: i.time,
+        });
+        self.panel = self.shared.borrow_mut().session.update(&input);
+        self.force.push(input.seconds, self.panel.force_n.into());
+    }
+
+    /// Acts on what concerns the window itself.
+    fn react(&mut self, ui: &egui::Ui) {
+        let pressed = |key| ui.input(|i| i.key_pressed(key));
+        if self.clicks.reset || pressed(egui::Key::R) {
+            self.hand.camera = self.start.camera;
+        }
+        if self.clicks.quit || self.panel.finished || pressed(egui::Key::Q) || pressed(egui::Key::Escape) {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+    }
+
+    /// Draws the picture for an area of the window and shows it there.
+    fn picture(&mut self, ui: &mut egui::Ui, state: &eframe::egui_wgpu::RenderState) {
+        let space = ui.available_size().max(egui::vec2(8.0, 8.0));
+        let (area, response) = ui.allocate_exact_size(space, egui::Sense::click_and_drag());
+        let now = ui.input(|i| i.time);
+        let shared = &mut *self.shared.borrow_mut();
+        let coarse = shared.renderer.gpu().is_software() && now - self.moved_at < SETTLE_S;
+        let scale = ui.ctx().pixels_per_point() * if coarse { COARSE } else { 1.0 };
+        let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
+        let drawn = shared.renderer.resize(pixels).and_then(|()| {
+            let frame = shared.session.frame(self.hand.camera);
+            let view = shared.renderer.view(&frame);
+            shared.renderer.draw(&frame).map(|_| view)
+        });
+        match drawn {
+            Err(error) => shared.fault = Some(error.to_string()),
+            Ok(view) => {
+                let pointer = ui.input(|i| Pointer::over(&response, i));
+                if self.hand.follow(&pointer, &view, space.y) {
+                    self.moved_at = now;
+                }
+                ui.input(|i| self.hand.keys(i, &view));
+            }
+        }
+        let id = show(&mut self.texture, state, &shared.renderer);
+        ui.painter().image(
+            id,
+            area,
+            egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0)),
+            egui::Color32::WHITE,
+        );
+    }
+}
+
+/// Registers the renderer's texture, anew when it is another one.
+fn show(
+    texture: &mut Option<(egui::TextureId, eframe::wgpu::TextureView)>,
+    state: &eframe::egui_wgpu::RenderState,
+    renderer: &crate::Renderer,
+) -> egui::TextureId {
+    let view = renderer.texture().view();
+    if let Some((id, shown)) = texture {
+        if shown == view {
+            return *id;
+        }
+        state.renderer.write().free_texture(id);
+    }
+    let linear = eframe::wgpu::FilterMode::Linear;
+    let id = state.renderer.write().register_native_texture(&state.device, view, linear);
+    *texture = Some((id, view.clone()));
+    id
+}
+
+impl<S: Session> eframe::App for Window<S> {
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        self.update(ui);
+        self.react(ui);
+        banner::show(ui, &self.panel.warnings);
+        egui::Panel::right("panel").exact_size(PANEL_WIDTH).resizable(false).show(ui, |ui| {
+            self.clicks = panel::show(ui, &self.panel, &self.force);
+        });
+        egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| match frame.wgpu_render_state() {
+            Some(state) => self.picture(ui, state),
+            None => self.shared.borrow_mut().fault = Some("the window has no graphics device".into()),
+        });
+        if self.shared.borrow().fault.is_some() {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+        ui.ctx().request_repaint_after(Duration::from_secs_f32(1.0 / self.start.rate_hz.clamp(1.0, 240.0)));
+    }
+}

@@ -1,0 +1,147 @@
+//! What the user does with mouse and keys, as a camera and a wanted tool pose.
+
+use crate::{Camera, View};
+use eframe::egui;
+use glam::{Quat, Vec2};
+use trepan_geometry::Pose;
+
+/// What the user wants, once a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WindowInput {
+    /// Where the mouse has moved the tool.
+    pub world_from_tool: Pose,
+    /// Whether the drill's pedal is down.
+    pub pedal: bool,
+    /// Whether the next tool was asked for since the last picture.
+    pub next_tool: bool,
+    /// The view.
+    pub camera: Camera,
+    /// Since the window opened, s.
+    pub seconds: f64,
+}
+
+/// Turn of the camera for a drag, rad per point.
+const ORBIT_RAD: f32 = 0.008;
+/// Tilt of the shaft for a drag, rad per point.
+const TILT_RAD: f32 = 0.006;
+/// Push for the wheel, mm per point scrolled.
+const PUSH_MM: f32 = 0.02;
+/// Move for a key, mm.
+const KEY_MM: f32 = 0.5;
+
+/// The hand and the eye, as they are moved.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hand {
+    pub world_from_tool: Pose,
+    pub camera: Camera,
+}
+
+/// What the pointer did over the 3-D view since the last picture, in points.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pointer {
+    pub left: Vec2,
+    pub right: Vec2,
+    pub wheel: f32,
+    pub tilt: bool,
+    pub zoom: bool,
+}
+
+impl Hand {
+    /// Moves hand and eye. `height` is that of the 3-D view in points. Whether the camera moved.
+    pub fn follow(&mut self, pointer: &Pointer, view: &View, height: f32) -> bool {
+        let tip = self.world_from_tool.translation;
+        let depth = (tip - view.eye).dot(view.forward).max(1.0);
+        let mm = 2.0 * depth * view.half.y / height.max(1.0);
+        let drag = pointer.left;
+        if pointer.tilt {
+            let turn = Quat::from_axis_angle(view.up, drag.x * TILT_RAD)
+                * Quat::from_axis_angle(view.right, drag.y * TILT_RAD);
+            self.world_from_tool.rotation = (turn * self.world_from_tool.rotation).normalize();
+        } else {
+            self.world_from_tool.translation += mm * (drag.x * view.right - drag.y * view.up);
+        }
+        if pointer.zoom {
+            self.camera.zoom((-0.002 * pointer.wheel).exp());
+        } else {
+            let sight = (tip - view.eye).normalize_or(view.forward);
+            self.world_from_tool.translation += PUSH_MM * pointer.wheel * sight;
+        }
+        self.camera.orbit(-ORBIT_RAD * pointer.right.x, ORBIT_RAD * pointer.right.y);
+        pointer.right != Vec2::ZERO || (pointer.zoom && pointer.wheel != 0.0)
+    }
+
+    /// Moves the tool by keys.
+    pub fn keys(&mut self, input: &egui::InputState, view: &View) {
+        let pressed = |key| input.num_presses(key) as f32;
+        let pair = |more, less| pressed(more) - pressed(less);
+        let step = pair(egui::Key::ArrowRight, egui::Key::ArrowLeft) * view.right
+            + pair(egui::Key::ArrowUp, egui::Key::ArrowDown) * view.up
+            + pair(egui::Key::PageUp, egui::Key::PageDown) * view.forward;
+        self.world_from_tool.translation += KEY_MM * step;
+        let zoom = pair(egui::Key::Minus, egui::Key::Plus) - pressed(egui::Key::Equals);
+        self.camera.zoom(1.1f32.powf(zoom));
+    }
+}
+
+impl Pointer {
+    /// What happened over a widget.
+    pub fn over(response: &egui::Response, input: &egui::InputState) -> Self {
+        let drag = |button| if response.dragged_by(button) { response.drag_delta() } else { egui::Vec2::ZERO };
+        let vec2 = |v: egui::Vec2| Vec2::new(v.x, v.y);
+        Self {
+            left: vec2(drag(egui::PointerButton::Primary)),
+            right: vec2(drag(egui::PointerButton::Secondary)),
+            wheel: if response.hovered() { input.smooth_scroll_delta().y } else { 0.0 },
+            tilt: input.modifiers.shift,
+            zoom: input.modifiers.ctrl || input.modifiers.command,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    fn hand() -> (Hand, View) {
+        let camera = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0);
+        let world_from_tool = Pose::from_translation(Vec3::new(5.0, 20.0, 3.0));
+        (Hand { world_from_tool, camera }, camera.view(1.5))
+    }
+
+    #[test]
+    fn a_left_drag_moves_the_tip_under_the_pointer() {
+        let (mut hand, view) = hand();
+        let before = view.project(hand.world_from_tool.translation).0;
+        let pointer = Pointer { left: Vec2::new(30.0, -12.0), ..Default::default() };
+        assert!(!hand.follow(&pointer, &view, 600.0));
+        let after = view.project(hand.world_from_tool.translation).0;
+        let moved = (after - before) * Vec2::new(0.5 * 900.0, -0.5 * 600.0);
+        assert!((moved - pointer.left).length() < 0.01, "{moved}");
+    }
+
+    #[test]
+    fn the_wheel_pushes_along_the_line_of_sight_and_zooms_with_control() {
+        let (mut hand, view) = hand();
+        let before = hand.world_from_tool.translation;
+        hand.follow(&Pointer { wheel: 50.0, ..Default::default() }, &view, 600.0);
+        let pushed = hand.world_from_tool.translation - before;
+        assert!((pushed.length() - 1.0).abs() < 1e-4 && pushed.dot(before - view.eye) > 0.0);
+        assert!(hand.follow(&Pointer { wheel: 50.0, zoom: true, ..Default::default() }, &view, 600.0));
+        assert!(hand.camera.distance_mm < 200.0 && hand.world_from_tool.translation == before + pushed);
+    }
+
+    #[test]
+    fn a_right_drag_circles_and_a_shifted_drag_tilts_about_the_tip() {
+        let (mut hand, view) = hand();
+        assert!(hand.follow(&Pointer { right: Vec2::new(10.0, 5.0), ..Default::default() }, &view, 600.0));
+        assert!(hand.camera.azimuth_rad < std::f32::consts::FRAC_PI_2 && hand.camera.elevation_rad > 0.0);
+        let tip = hand.world_from_tool.translation;
+        hand.follow(&Pointer { left: Vec2::new(100.0, 0.0), tilt: true, ..Default::default() }, &view, 600.0);
+        assert_eq!(hand.world_from_tool.translation, tip);
+        assert!(
+            hand.world_from_tool.rotation.angle_between(Quat::IDENTITY) > 0.5
+                && hand.world_from_tool.rotation.is_normalized()
+        );
+    }
+}

@@ -1,0 +1,178 @@
+//! A window on the scene: the headless renderer's own picture, a side panel, mouse and keys.
+//!
+//! # Practice
+//! | input | does |
+//! |---|---|
+//! | left drag | moves the tool on the plane of the picture; with Shift tilts its shaft |
+//! | wheel | pushes the tool in or pulls it out along the line of sight; with Ctrl zooms |
+//! | right drag | circles the camera around its target |
+//! | Space (held) | the drill's pedal |
+//! | N | the next tool |
+//! | arrows, Page Up, Page Down | move the tool by half a millimetre |
+//! | + and - | zoom |
+//! | R | resets the view |
+//! | Q or Escape | closes |
+//!
+//! The picture stays on the device: egui shows the very texture that the renderer draws into. With a software driver the picture is coarser
+//! while the camera moves.
+//!
+//! # When not to use it
+//! Without a display: [`run`] says so and hands everything back, so that the session can go on headless.
+
+mod app;
+mod banner;
+mod input;
+mod panel;
+mod plot;
+
+pub use input::WindowInput;
+
+use crate::{Camera, Frame, Renderer};
+use std::cell::RefCell;
+use std::rc::Rc;
+use trepan_geometry::Pose;
+
+/// What the window shows and drives. Called on the window's thread, once a picture; must not wait.
+pub trait Session {
+    /// Takes what the user did and says what the panel shows.
+    fn update(&mut self, input: &WindowInput) -> Panel;
+
+    /// What the picture shows, seen by `camera`.
+    fn frame(&self, camera: Camera) -> Frame<'_>;
+}
+
+/// What the side panel shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Panel {
+    /// The phase of the operation.
+    pub phase: String,
+    /// What to do next.
+    pub hint: String,
+    /// The tool in hand.
+    pub tool: String,
+    /// Whether the drill runs.
+    pub drilling: bool,
+    /// Largest force since the last picture, N.
+    pub force_n: f32,
+    /// Where the force guard clamps, N; the upper end of the plot.
+    pub force_limit_n: f32,
+    /// Named values, in order, for instance rates.
+    pub values: Vec<(String, String)>,
+    /// What must not be missed; shown in a red banner as long as it is here.
+    pub warnings: Vec<String>,
+    /// Whether the window shall close.
+    pub finished: bool,
+}
+
+/// How the window starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    /// The view, to which a reset goes back.
+    pub camera: Camera,
+    /// Where the tool is.
+    pub world_from_tool: Pose,
+    /// Width and height of the window, points.
+    pub size: [f32; 2],
+    /// Pictures a second at most.
+    pub rate_hz: f32,
+}
+
+impl Start {
+    /// 1280 by 800 points at 30 pictures a second.
+    pub fn with(camera: Camera, world_from_tool: Pose) -> Self {
+        Self { camera, world_from_tool, size: [1280.0, 800.0], rate_hz: 30.0 }
+    }
+}
+
+/// Why there is or was no window.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WindowError {
+    /// Nothing to show a window on.
+    #[error("there is no display to open a window on ({0}); run headless, or set DISPLAY or WAYLAND_DISPLAY")]
+    NoDisplay(String),
+    /// The windowing system failed while opening or showing.
+    #[error("the window failed: {0}; on Debian or Ubuntu a window needs libxkbcommon-x11-0 and mesa-vulkan-drivers")]
+    Failed(String),
+}
+
+/// Everything that was given to [`run`], back again.
+#[derive(Debug)]
+pub struct Closed<S> {
+    /// The session.
+    pub session: S,
+    /// The renderer.
+    pub renderer: Renderer,
+    /// Whether the window was shown and closed as it should.
+    pub result: Result<(), WindowError>,
+}
+
+/// What the window works on while it is open.
+pub(crate) struct Shared<S> {
+    pub session: S,
+    pub renderer: Renderer,
+    pub fault: Option<String>,
+}
+
+/// Shows the window until it is closed. Must be called on the main thread.
+pub fn run<S: Session + 'static>(title: &str, renderer: Renderer, session: S, start: Start) -> Closed<S> {
+    let gpu = renderer.gpu().clone();
+    let shared = Rc::new(RefCell::new(Shared { session, renderer, fault: None }));
+    let given = shared.clone();
+    let show = || {
+        let create: eframe::AppCreator<'_> =
+            Box::new(move |context| Ok(Box::new(app::Window::new(context, given, start))));
+        eframe::run_native(title, options(&gpu, &start), create)
+    };
+    let result = match display() {
+        Err(error) => Err(error),
+        // A missing system library makes the windowing crate panic; that must not take the session along.
+        Ok(()) => match std::panic::catch_unwind(std::panic::AssertUnwindSafe(show)) {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(eframe::Error::WinitEventLoop(e))) => Err(WindowError::NoDisplay(e.to_string())),
+            Ok(Err(e)) => Err(WindowError::Failed(e.to_string())),
+            Err(panic) => Err(WindowError::Failed(words(panic.as_ref()))),
+        },
+    };
+    take_back(shared, result)
+}
+
+/// Whether a display is announced at all.
+pub fn display() -> Result<(), WindowError> {
+    let named = |name: &str| std::env::var_os(name).is_some_and(|v| !v.is_empty());
+    let needed = cfg!(all(unix, not(target_os = "macos")));
+    if needed && !["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(named) {
+        return Err(WindowError::NoDisplay("neither DISPLAY nor WAYLAND_DISPLAY is set".into()));
+    }
+    Ok(())
+}
+
+fn options(gpu: &trepan_gpu::Gpu, start: &Start) -> eframe::NativeOptions {
+    let [width, height] = start.size;
+    let mut options = eframe::NativeOptions {
+        viewport: eframe::egui::ViewportBuilder::default()
+            .with_inner_size([width, height])
+            .with_min_inner_size([480.0, 360.0]),
+        renderer: eframe::Renderer::Wgpu,
+        ..Default::default()
+    };
+    options.wgpu_options.wgpu_setup = eframe::egui_wgpu::WgpuSetup::Existing(eframe::egui_wgpu::WgpuSetupExisting {
+        instance: gpu.instance().clone(),
+        adapter: gpu.adapter().clone(),
+        device: gpu.device().clone(),
+        queue: gpu.queue().clone(),
+    });
+    options
+}
+
+fn words(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+    text.unwrap_or("no reason given").into()
+}
+
+fn take_back<S>(shared: Rc<RefCell<Shared<S>>>, result: Result<(), WindowError>) -> Closed<S> {
+    // The window is gone, and with it every other owner.
+    let Some(shared) = Rc::into_inner(shared) else { unreachable!("the closed window still holds its session") };
+    let Shared { session, renderer, fault } = shared.into_inner();
+    let result = fault.map_or(result, |why| Err(WindowError::Failed(why)));
+    Closed { session, renderer, result }
+}

@@ -1,0 +1,42 @@
+//! Scenes whose picture is known in closed form.
+
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+use trepan_gpu::{Gpu, GpuError, Prefer};
+use trepan_render::{Renderer, SceneData};
+use trepan_volume::{BoneVolume, VoxelVolume};
+
+pub const ISO: i16 = 400;
+
+/// The software device; `None` after checking that the absence of any is reported with the remedy.
+pub fn device() -> Option<Gpu> {
+    match Gpu::open(Prefer::Software) {
+        Ok(gpu) => Some(gpu),
+        Err(error) => {
+            println!("no adapter on this machine: {error}");
+            assert_eq!(error, GpuError::NoAdapter);
+            assert!(error.to_string().contains("mesa-vulkan-drivers"));
+            None
+        }
+    }
+}
+
+/// A grid of `edge`³ voxels of 1 mm around the origin, with a density by world point.
+pub fn volume(edge: usize, hu: impl Fn(DVec3) -> f64) -> VoxelVolume<i16> {
+    let mut volume = VoxelVolume::isotropic([edge; 3], Vec3::splat(0.5 - 0.5 * edge as f32), 1.0, 0i16);
+    for at in 0..volume.data.len() {
+        let centre = volume.centre_of([at % edge, at / edge % edge, at / edge / edge]);
+        volume.data[at] = hu(centre).round().clamp(-1000.0, 3000.0) as i16;
+    }
+    volume
+}
+
+/// Bone by a signed distance, mm, negative inside.
+pub fn bone(edge: usize, distance: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
+    Arc::new(BoneVolume::new(&volume(edge, |p| f64::from(ISO) - 100.0 * distance(p)), ISO).unwrap())
+}
+
+/// A renderer of bone alone.
+pub fn renderer(gpu: &Gpu, bone: &Arc<BoneVolume>, size: [u32; 2]) -> Renderer {
+    Renderer::new(gpu, &SceneData { bone: bone.clone(), brain: None, mri: None }, size).unwrap()
+}
