@@ -17,6 +17,8 @@ mod brain;
 mod component;
 mod distance;
 mod error;
+#[cfg(test)]
+mod mutation;
 pub mod nifti;
 mod note;
 mod overlap;

@@ -110,11 +110,36 @@ fn header_of_pair(path: &Path) -> PathBuf {
 fn voxels_of_pair(header: &Path) -> Result<PathBuf, ReadError> {
     let plain = if ends(header, "gz") { header.with_extension("") } else { header.into() };
     let places = ["img", "IMG", "img.gz"].map(|end| plain.with_extension(end));
-    let [first, ..] = &places;
-    let missing = ReadError::Missing { file: first.clone() };
-    places.into_iter().find(|p| p.exists()).ok_or(missing)
+    places.into_iter().find(|p| p.exists()).ok_or_else(|| ReadError::Field {
+        file: header.into(),
+        field: "magic",
+        found: "that of a pair of files".into(),
+        remedy: "the voxels must lie beside it in a file of the same name that ends in .img",
+    })
 }
 
 fn ends(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mutation::survives_mutations;
+    use trepan_geometry::Vec3;
+
+    #[test]
+    fn damaged_files_give_errors_and_no_panic() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut volume = VoxelVolume::isotropic([5, 4, 3], Vec3::ZERO, 1.0, 0i16);
+        volume.data.iter_mut().enumerate().for_each(|(at, v)| *v = at as i16);
+        let seeds: Vec<Vec<u8>> = ["a.nii", "a.nii.gz"]
+            .map(|name| {
+                let path = folder.path().join(name);
+                write(&path, &volume).unwrap();
+                std::fs::read(path).unwrap()
+            })
+            .into();
+        survives_mutations(&seeds, |bytes| import_source(Source::of_bytes(Path::new("a.nii"), bytes), None));
+    }
 }

@@ -1,0 +1,30 @@
+//! What does an image file hold? `inspect FILE|FOLDER...` prints size, spacing, orientation, range and notes of each.
+
+use std::path::Path;
+use trepan_volume::import;
+
+fn main() {
+    for path in std::env::args().skip(1) {
+        match import(Path::new(&path)) {
+            Err(error) => println!("error: {error}"),
+            Ok(import) => {
+                let volume = &import.volume;
+                let finite = volume.data.iter().copied().filter(|v| v.is_finite());
+                let (low, high) = finite.fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(v), h.max(v)));
+                println!("{path}: {:?} voxels of {:.4} mm, {low} to {high}", volume.dims, volume.spacing_mm());
+                for row in 0..3 {
+                    let offset = volume.world_from_voxel.translation[row];
+                    println!("    {:.6} {offset:.6}", volume.world_from_voxel.matrix3.row(row));
+                }
+                let last = volume.dims.map(|n| n - 1);
+                println!(
+                    "    first {:?}, (5, 7, 3) {:?}, last {:?}",
+                    volume.data[0],
+                    volume.get([5, 7, 3]),
+                    volume.get(last)
+                );
+                import.notes.iter().for_each(|note| println!("    note: {note}"));
+            }
+        }
+    }
+}
