@@ -41,3 +41,8 @@ pub use resample::{Grid, Interpolation, resample};
 pub use sample::{ByteOrder, Number, Sample};
 pub use skull::{GREATEST_ISOVALUE, HounsfieldError, LEAST_ISOVALUE, bone_isovalue, hounsfield, labels, skull_only};
 pub use volume::VoxelVolume;
+
+/// The README's example, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExample;

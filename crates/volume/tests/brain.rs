@@ -1,0 +1,104 @@
+//! The brain of a made-up head: nested ellipsoids with a foramen, a neck, orbits of air and a scalp as bright as fat.
+
+use trepan_geometry::Vec3;
+use trepan_volume::{BrainConfig, MaskError, VoxelVolume, brain_mask, check_brain_mask};
+
+/// Half axes of the brain, mm.
+const BRAIN: Vec3 = Vec3::new(62.0, 80.0, 58.0);
+
+/// Signed distance to an ellipsoid that is `margin` mm larger than the brain, good near it.
+fn beyond(p: Vec3, margin: f32) -> f32 {
+    let axes = BRAIN + margin;
+    let k = (p / axes).length();
+    k * (k - 1.0) / (p / (axes * axes)).length().max(1e-6)
+}
+
+/// The tissue at a point: CT in HU, T1 grey value, whether it is brain.
+fn tissue(p: Vec3) -> (i16, f32, bool) {
+    let canal = (p.x * p.x + (p.y + 20.0).powi(2)).sqrt();
+    let neck = (p.x * p.x / 2500.0 + (p.y + 20.0).powi(2) / 2500.0) < 1.0 && p.z < -50.0;
+    if beyond(p, 0.0) < 0.0 {
+        let white = beyond(p, -12.0) < 0.0;
+        let ventricle = (p / Vec3::new(8.0, 20.0, 9.0)).length() < 1.0;
+        return (
+            35,
+            if ventricle {
+                25.0
+            } else if white {
+                105.0
+            } else {
+                72.0
+            },
+            true,
+        );
+    }
+    match beyond(p, 0.0) {
+        d if d < 3.0 => (10, 25.0, false),
+        d if d < 10.0 && p.z < -40.0 && canal < 14.0 => (20, 30.0, false),
+        d if d < 10.0 => (1100, 8.0, false),
+        d if d < 16.0 => (-60, 180.0, false),
+        _ if neck && canal < 14.0 => (30, 70.0, false),
+        _ if neck && canal < 20.0 => (900, 8.0, false),
+        _ if neck => (50, 75.0, false),
+        _ => (-1000, 0.0, false),
+    }
+}
+
+fn head() -> (VoxelVolume<i16>, VoxelVolume<f32>, VoxelVolume<u8>) {
+    let (dims, origin) = ([80, 99, 94], Vec3::new(-79.0, -98.0, -108.0));
+    let mut ct = VoxelVolume::isotropic(dims, origin, 2.0, -1000i16);
+    let (mut mri, mut brain) = (ct.map(f32::from), ct.map(|_| 0u8));
+    for at in 0..ct.data.len() {
+        let p = ct.centre_of([at % 80, at / 80 % 99, at / 7920]).as_vec3();
+        let (hu, grey, inside) = tissue(p);
+        (ct.data[at], mri.data[at], brain.data[at]) = (hu, grey + 2.0 * (at as f32 * 12.9898).sin(), u8::from(inside));
+    }
+    (ct, mri, brain)
+}
+
+fn dice(a: &VoxelVolume<u8>, b: &VoxelVolume<u8>) -> f64 {
+    let both = a.data.iter().zip(&b.data).filter(|&(&a, &b)| a & b == 1).count();
+    let each = a.data.iter().chain(&b.data).filter(|&&v| v == 1).count();
+    2.0 * both as f64 / each as f64
+}
+
+#[test]
+fn the_brain_is_found_with_and_without_the_ct() {
+    let (ct, mri, brain) = head();
+    let config = BrainConfig { work_mm: 2.0, ..BrainConfig::default() };
+    for (skull, least) in [(Some(&ct), 0.96), (None, 0.94)] {
+        let mask = brain_mask(&mri, skull, &config).unwrap();
+        let dice = dice(&mask, &brain);
+        assert!(dice > least, "Dice {dice} with a CT: {}", skull.is_some());
+        let in_bone = mask.data.iter().zip(&ct.data).filter(|&(&m, &hu)| m == 1 && hu >= 300).count();
+        assert!(skull.is_none() || in_bone == 0, "{in_bone} voxels in bone");
+    }
+}
+
+#[test]
+fn what_is_no_head_is_refused_with_a_reason() {
+    let (ct, mut mri, brain) = head();
+    let config = BrainConfig { work_mm: 4.0, ..BrainConfig::default() };
+    let empty = mri.map(|_| 0.0);
+    assert!(matches!(brain_mask(&empty, None, &config), Err(MaskError::Empty(_))));
+    assert!(matches!(brain_mask(&empty, Some(&ct), &config), Err(MaskError::Empty(_))));
+    assert!(matches!(brain_mask(&mri, Some(&ct.map(|_| -1000)), &config), Err(MaskError::Empty(_))));
+    let mut far = ct.clone();
+    far.world_from_voxel.translation.x += 900.0;
+    assert!(matches!(brain_mask(&mri, Some(&far), &config), Err(MaskError::Apart(_))));
+    mri.data[77] = f32::NAN;
+    assert_eq!(brain_mask(&mri, None, &config), Err(MaskError::NotANumber { count: 1 }));
+    mri.data[77] = 0.0;
+    mri.world_from_voxel.matrix3 *= 0.5;
+    let small = brain_mask(&mri, None, &config).unwrap_err();
+    assert!(matches!(small, MaskError::Empty(_) | MaskError::Volume { .. }), "{small}");
+
+    assert_eq!(check_brain_mask(&brain, &config), Ok(()));
+    let mut two = brain.clone();
+    two.data[..2000].fill(1);
+    assert!(matches!(check_brain_mask(&two, &config), Err(MaskError::Pieces { pieces: 2, .. })));
+    let tiny = VoxelVolume::isotropic([9, 9, 9], Vec3::ZERO, 1.0, 1u8);
+    assert!(
+        check_brain_mask(&tiny, &config).unwrap_err().to_string().contains("holds 1 ml, an adult brain 900 to 1900 ml")
+    );
+}
