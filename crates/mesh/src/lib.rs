@@ -40,3 +40,8 @@ pub use surface::Surface;
 pub use tets::{FACES, OPPOSITE, TetMesh};
 pub use topology::{Csr, NONE, Topology};
 pub use triangles::TriMesh;
+
+/// The examples of the README compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -70,7 +70,7 @@ pub fn brute_force(boxes: &[Aabb], particles: &[Vec3]) -> Counts {
 
 fn check_finite(boxes: &[Aabb], particles: &[Vec3]) -> Result<(), VoxelSizeError> {
     let bad = particles.iter().find(|p| !p.is_finite()).map(|p| ("a particle's coordinate", p.element_sum()));
-    let bad_box = |b: &&Aabb| !b.is_empty() && !(b.min.is_finite() && b.max.is_finite());
+    let bad_box = |b: &&Aabb| !(b.is_empty() || b.min.is_finite() && b.max.is_finite());
     let bad = bad.or_else(|| boxes.iter().find(bad_box).map(|b| ("a box's corner", (b.min + b.max).element_sum())));
     bad.map_or(Ok(()), |(field, got)| Err(VoxelSizeError::Field { field, got: got.into(), wanted: "finite" }))
 }

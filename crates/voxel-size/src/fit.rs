@@ -86,7 +86,8 @@ fn solve(mut m: [[f64; 4]; 3]) -> Option<[f64; 3]> {
     for col in 0..3 {
         let pivot = (col..3).max_by(|&a, &b| m[a][col].abs().total_cmp(&m[b][col].abs()))?;
         m.swap(col, pivot);
-        if !(m[col][col].abs() > 1e-10) {
+        let regular = m[col][col].abs() > 1e-10;
+        if !regular {
             return None;
         }
         let pivot_row = m[col];

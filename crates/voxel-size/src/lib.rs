@@ -36,3 +36,8 @@ pub use cost::{CostModel, zone_error};
 pub use error::VoxelSizeError;
 pub use fit::{Prices, fit};
 pub use measures::Measures;
+
+/// The examples of the README compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -11,7 +11,7 @@ fn ball(target_tets: usize) -> TetMesh {
     for at in 0..mask.data.len() {
         mask.data[at] = u8::from(mask.centre_of([at % 48, at / 48 % 48, at / 2304]).distance(DVec3::ZERO) < 22.0);
     }
-    lattice::tetrahedra(&mask, &lattice::Config { target_tets, ..Default::default() }).unwrap()
+    lattice::tetrahedra(&mask, &lattice::Config { target_tets, ..Default::default() }).expect("a ball can be meshed")
 }
 
 #[test]
