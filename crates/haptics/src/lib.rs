@@ -14,14 +14,20 @@
 //! For input that moves a camera or a menu.
 
 mod device;
+mod dynamic;
+mod error;
+mod fault;
 pub mod mouse;
 mod name;
+pub mod openhaptics;
 pub mod replay;
 pub mod script;
 pub mod simulated;
 mod workspace;
 
 pub use device::{Capabilities, HapticDevice, Reading, Status};
+pub use error::DeviceError;
+pub use fault::{Fault, Watch};
 pub use name::{DeviceName, Listed, NameError, list};
 pub use workspace::Workspace;
 

@@ -1,0 +1,102 @@
+//! Vendor libraries, loaded when a device is opened: nothing proprietary is needed to build or to run without them.
+//!
+//! # Practice
+//! A library is never unloaded: the vendors' own threads may outlive it, and a second load in one process is known to fail.
+#![expect(unsafe_code, reason = "loading a library runs its initialisers, and a symbol's type cannot be checked")]
+
+use crate::DeviceError;
+use libloading::Library;
+use std::ffi::OsStr;
+use std::path::Path;
+
+/// A loaded library.
+pub(crate) struct Loaded {
+    library: &'static Library,
+    name: String,
+    install: &'static str,
+}
+
+impl Loaded {
+    /// Loads `path`, or the first of `names` that the system finds.
+    pub(crate) fn open(path: Option<&Path>, names: &[&str], install: &'static str) -> Result<Self, DeviceError> {
+        let wanted: Vec<&OsStr> = match path {
+            Some(path) => vec![path.as_os_str()],
+            None => names.iter().map(OsStr::new).collect(),
+        };
+        let mut reasons = Vec::new();
+        for name in &wanted {
+            // SAFETY: a vendor's library that the user installed or named; its initialisers are trusted as any
+            // program's that the user installs.
+            match unsafe { Library::new(name) } {
+                Ok(library) => {
+                    let name = name.to_string_lossy().into_owned();
+                    return Ok(Self { library: Box::leak(Box::new(library)), name, install });
+                }
+                Err(error) => reasons.push(error.to_string()),
+            }
+        }
+        let library = wanted.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join(" or ");
+        Err(DeviceError::Library { library, reason: reasons.join("; "), install })
+    }
+
+    /// The function `symbol`.
+    ///
+    /// # Safety
+    /// `F` must be the function's true type, an `extern "system"` function pointer.
+    pub(crate) unsafe fn symbol<F: Copy + 'static>(&self, symbol: &'static str) -> Result<F, DeviceError> {
+        // SAFETY: the caller vouches for the type; the library is never unloaded, so that the pointer stays good.
+        match unsafe { self.library.get::<F>(symbol.as_bytes()) } {
+            Ok(function) => Ok(*function),
+            Err(error) => Err(DeviceError::Symbol {
+                library: self.name.clone(),
+                symbol,
+                reason: error.to_string(),
+                install: self.install,
+            }),
+        }
+    }
+
+    /// The name under which the library was found.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+}
+
+/// A struct of function pointers, each looked up by its name in the library; all are needed.
+macro_rules! functions {
+    ($(#[$doc:meta])* $table:ident { $($name:ident($($argument:ty),*) $(-> $result:ty)?;)* }) => {
+        $(#[$doc])*
+        #[expect(non_snake_case, reason = "the vendor's names")]
+        #[derive(Clone, Copy)]
+        struct $table {
+            $($name: unsafe extern "system" fn($($argument),*) $(-> $result)?,)*
+        }
+
+        impl $table {
+            fn load(library: &$crate::dynamic::Loaded) -> Result<Self, $crate::DeviceError> {
+                Ok(Self {
+                    $(
+                        // SAFETY: the types are those of the vendor's header.
+                        $name: unsafe { library.symbol(stringify!($name)) }?,
+                    )*
+                })
+            }
+        }
+    };
+}
+
+pub(crate) use functions;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_library_gives_the_loaders_words_and_what_to_install() {
+        let error =
+            Loaded::open(None, &["libtrepan-none.so"], "install nothing").err().expect("there is none").to_string();
+        assert!(error.contains("libtrepan-none.so") && error.contains("install nothing"), "{error}");
+        let loaders_words = error.split(';').next().unwrap_or_default();
+        assert!(loaders_words.len() > "cannot load libtrepan-none.so: ".len() + 10, "{error}");
+    }
+}

@@ -1,0 +1,115 @@
+//! What goes wrong with a device while it runs, and what a user can do about it.
+//!
+//! # Practice
+//! A driver sets a fault where it happens; the force is zero from that tick on. Whoever shows messages holds a [`Watch`],
+//! made before the device is handed to the haptic loop. Both ends are wait-free.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+
+/// Why a device gives no force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Fault {
+    /// The link to the device is gone.
+    Disconnected = 1,
+    /// The motors are too warm.
+    Overheated = 2,
+    /// The device refused a force.
+    ForceRefused = 3,
+    /// The tool moved faster than the device allows.
+    TooFast = 4,
+    /// The device does not know its own position yet.
+    NotCalibrated = 5,
+    /// Brakes, emergency stop or dead-man switch are engaged.
+    Braked = 6,
+    /// The haptic loop sent no force for 10 ms.
+    LoopSilent = 7,
+    /// The vendor's service does not answer.
+    ServiceSilent = 8,
+    /// What the device or its service sends makes no sense.
+    Garbled = 9,
+    /// Power is missing.
+    NoPower = 10,
+}
+
+const ALL: [Fault; 10] = [
+    Fault::Disconnected,
+    Fault::Overheated,
+    Fault::ForceRefused,
+    Fault::TooFast,
+    Fault::NotCalibrated,
+    Fault::Braked,
+    Fault::LoopSilent,
+    Fault::ServiceSilent,
+    Fault::Garbled,
+    Fault::NoPower,
+];
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Disconnected => "the device is disconnected: check its cable and power, then start again",
+            Self::Overheated => "the motors are too warm: rest the device for a few minutes",
+            Self::ForceRefused => "the device refused a force: lower the stiffness or the force limit",
+            Self::TooFast => "the tool moved too fast and the device cut its force: hold it and move slowly",
+            Self::NotCalibrated => {
+                "the device is not calibrated: put the stylus in its inkwell, or move it through its range"
+            }
+            Self::Braked => "the brakes are on: release the emergency stop, press the device's force button",
+            Self::LoopSilent => "the haptic loop was silent for 10 ms and the force was cut: close other programs",
+            Self::ServiceSilent => "the vendor's service does not answer: see whether it runs, then start again",
+            Self::Garbled => "the device sends what makes no sense: update its driver or its service",
+            Self::NoPower => "the device has no power: plug in its power supply",
+        })
+    }
+}
+
+/// The newest fault of a device, seen from outside.
+#[derive(Clone, Debug, Default)]
+pub struct Watch(Arc<State>);
+
+#[derive(Debug, Default)]
+struct State {
+    now: AtomicU32,
+    count: AtomicU64,
+}
+
+impl Watch {
+    /// The fault that holds now, if any.
+    pub fn fault(&self) -> Option<Fault> {
+        let code = self.0.now.load(Ordering::Relaxed);
+        ALL.into_iter().find(|fault| *fault as u32 == code)
+    }
+
+    /// How many faults there were.
+    pub fn count(&self) -> u64 {
+        self.0.count.load(Ordering::Relaxed)
+    }
+
+    /// Sets or lifts the fault; a new one counts.
+    pub(crate) fn set(&self, fault: Option<Fault>) {
+        let code = fault.map_or(0, |fault| fault as u32);
+        if self.0.now.swap(code, Ordering::Relaxed) != code && code != 0 {
+            self.0.count.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_is_seen_counted_once_and_says_what_to_do() {
+        let watch = Watch::default();
+        for fault in ALL {
+            watch.set(Some(fault));
+            watch.set(Some(fault));
+            assert_eq!(watch.fault(), Some(fault));
+            assert!(fault.to_string().contains(':'), "{fault}");
+        }
+        watch.set(None);
+        assert_eq!((watch.fault(), watch.count()), (None, 10));
+    }
+}

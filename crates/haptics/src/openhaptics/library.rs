@@ -1,0 +1,228 @@
+//! The functions of libHD behind safe methods.
+//!
+//! # Sources
+//! OpenHaptics programmer's guide and API reference (HDAPI 3): names, argument types and numbers only.
+#![expect(unsafe_code, reason = "calls into the vendor's C library")]
+
+use super::codes;
+use super::servo::Servo;
+use crate::DeviceError;
+use crate::dynamic::{Loaded, functions};
+use std::ffi::{CStr, CString, c_char, c_ulong, c_void};
+use std::path::Path;
+
+const NAMES: &[&str] = if cfg!(windows) {
+    &["HD.dll"]
+} else if cfg!(target_os = "macos") {
+    &["libHD.dylib"]
+} else {
+    &["libHD.so", "libHD.so.3.4", "libHD.so.3.0"]
+};
+
+const INSTALL: &str =
+    "install the maker's device driver and OpenHaptics (3D Systems), and name the device in its set-up tool";
+
+/// An entry of the error stack, returned by value.
+#[repr(C)]
+#[derive(Clone, Copy)]
+struct ErrorInfo {
+    code: u32,
+    internal: i32,
+    device: u32,
+}
+
+type Callback = extern "system" fn(*mut c_void) -> u32;
+
+functions! {
+    /// HDAPI.
+    Functions {
+        hdInitDevice(*const c_char) -> u32;
+        hdDisableDevice(u32);
+        hdMakeCurrentDevice(u32);
+        hdBeginFrame(u32);
+        hdEndFrame(u32);
+        hdEnable(u32);
+        hdDisable(u32);
+        hdGetIntegerv(u32, *mut i32);
+        hdGetDoublev(u32, *mut f64);
+        hdSetDoublev(u32, *const f64);
+        hdGetString(u32) -> *const c_char;
+        hdGetError() -> ErrorInfo;
+        hdGetErrorString(u32) -> *const c_char;
+        hdCheckCalibration() -> u32;
+        hdUpdateCalibration(u32);
+        hdStartScheduler();
+        hdStopScheduler();
+        hdSetSchedulerRate(c_ulong);
+        hdScheduleAsynchronous(Callback, *mut c_void, u16) -> c_ulong;
+        hdUnschedule(c_ulong);
+    }
+}
+
+/// Most errors that are taken from the stack at once.
+const MAX_ERRORS: usize = 64;
+
+/// libHD.
+#[derive(Clone, Copy)]
+pub(super) struct Hd {
+    functions: Functions,
+}
+
+impl Hd {
+    /// Loads the library; also its name.
+    pub(super) fn load(path: Option<&Path>) -> Result<(Self, String), DeviceError> {
+        let library = Loaded::open(path, NAMES, INSTALL)?;
+        Ok((Self { functions: Functions::load(&library)? }, library.name().to_owned()))
+    }
+
+    /// Handle of the device of this name; `None` as name is the first one.
+    pub(super) fn init_device(&self, name: Option<&str>) -> Option<u32> {
+        let name = name.map(CString::new).transpose().ok()?;
+        let pointer = name.as_ref().map_or(std::ptr::null(), |name| name.as_ptr());
+        // SAFETY: a C string that outlives the call, or null, which means the first device.
+        let device = unsafe { (self.functions.hdInitDevice)(pointer) };
+        (device != codes::INVALID_HANDLE).then_some(device)
+    }
+
+    pub(super) fn disable_device(&self, device: u32) {
+        // SAFETY: a handle; a bad one only raises an error.
+        unsafe { (self.functions.hdDisableDevice)(device) }
+    }
+
+    pub(super) fn make_current(&self, device: u32) {
+        // SAFETY: as above.
+        unsafe { (self.functions.hdMakeCurrentDevice)(device) }
+    }
+
+    pub(super) fn begin_frame(&self, device: u32) {
+        // SAFETY: as above.
+        unsafe { (self.functions.hdBeginFrame)(device) }
+    }
+
+    pub(super) fn end_frame(&self, device: u32) {
+        // SAFETY: as above.
+        unsafe { (self.functions.hdEndFrame)(device) }
+    }
+
+    pub(super) fn enable(&self, capability: u32) {
+        // SAFETY: a number; a bad one only raises an error.
+        unsafe { (self.functions.hdEnable)(capability) }
+    }
+
+    pub(super) fn disable(&self, capability: u32) {
+        // SAFETY: as above.
+        unsafe { (self.functions.hdDisable)(capability) }
+    }
+
+    pub(super) fn integer(&self, what: u32) -> i32 {
+        let mut value = [0; 16];
+        // SAFETY: no parameter has more than 16 integers.
+        unsafe { (self.functions.hdGetIntegerv)(what, value.as_mut_ptr()) };
+        value[0]
+    }
+
+    /// The values of a parameter, as many as it has; the rest is zero.
+    pub(super) fn doubles(&self, what: u32) -> [f64; 16] {
+        let mut values = [0.0; 16];
+        // SAFETY: no parameter has more than 16 doubles.
+        unsafe { (self.functions.hdGetDoublev)(what, values.as_mut_ptr()) };
+        values
+    }
+
+    pub(super) fn set_vector(&self, what: u32, value: [f64; 3]) {
+        // SAFETY: force and torque, which this is used for, have three doubles.
+        unsafe { (self.functions.hdSetDoublev)(what, value.as_ptr()) }
+    }
+
+    pub(super) fn string(&self, what: u32) -> String {
+        // SAFETY: the library returns null or a C string of its own that lives as long as it does.
+        unsafe { owned((self.functions.hdGetString)(what)) }
+    }
+
+    /// The newest error's code, after which the stack is empty; `SUCCESS` for none.
+    pub(super) fn drain_errors(&self) -> u32 {
+        let mut newest = codes::SUCCESS;
+        for _ in 0..MAX_ERRORS {
+            // SAFETY: no arguments.
+            let ErrorInfo { code, .. } = unsafe { (self.functions.hdGetError)() };
+            if code == codes::SUCCESS {
+                break;
+            }
+            if newest == codes::SUCCESS {
+                newest = code;
+            }
+        }
+        newest
+    }
+
+    /// The vendor's words for an error.
+    pub(super) fn describe(&self, code: u32) -> String {
+        // SAFETY: the library returns null or a C string of its own that lives as long as it does.
+        let words = unsafe { owned((self.functions.hdGetErrorString)(code)) };
+        format!("{words} (error {code:04x})")
+    }
+
+    pub(super) fn check_calibration(&self) -> u32 {
+        // SAFETY: no arguments.
+        unsafe { (self.functions.hdCheckCalibration)() }
+    }
+
+    pub(super) fn update_calibration(&self, style: u32) {
+        // SAFETY: a number; a bad one only raises an error.
+        unsafe { (self.functions.hdUpdateCalibration)(style) }
+    }
+
+    pub(super) fn set_scheduler_rate(&self, hz: u32) {
+        // SAFETY: as above.
+        unsafe { (self.functions.hdSetSchedulerRate)(c_ulong::from(hz)) }
+    }
+
+    pub(super) fn start_scheduler(&self) {
+        // SAFETY: no arguments.
+        unsafe { (self.functions.hdStartScheduler)() }
+    }
+
+    /// Runs `servo` on the library's own thread once per tick, from the scheduler's start until [`Hd::stop`].
+    pub(super) fn schedule(&self, servo: Box<Servo>) -> Scheduled {
+        let data = Box::into_raw(servo);
+        // SAFETY: `data` stays allocated until `stop`, which first stops the scheduler.
+        let handle = unsafe { (self.functions.hdScheduleAsynchronous)(tick, data.cast(), codes::MAX_PRIORITY) };
+        Scheduled { handle, data }
+    }
+
+    /// Stops the scheduler, which waits for a running callback, and takes the servo back.
+    pub(super) fn stop(&self, scheduled: Scheduled) -> Box<Servo> {
+        // SAFETY: after these two calls the library does not use `data` any more; it came from a box in `schedule`.
+        unsafe {
+            (self.functions.hdStopScheduler)();
+            (self.functions.hdUnschedule)(scheduled.handle);
+            Box::from_raw(scheduled.data)
+        }
+    }
+}
+
+/// A servo in the library's hands.
+pub(super) struct Scheduled {
+    handle: c_ulong,
+    data: *mut Servo,
+}
+
+// SAFETY: the pointer is only turned back into the box that it came from, and `Servo` is `Send`.
+unsafe impl Send for Scheduled {}
+
+/// What the library calls once per tick.
+extern "system" fn tick(data: *mut c_void) -> u32 {
+    // SAFETY: `data` is the servo given to `schedule`, which nobody else touches until `stop`.
+    let servo = unsafe { &mut *data.cast::<Servo>() };
+    servo.tick()
+}
+
+/// # Safety
+/// `text` is null or a C string.
+unsafe fn owned(text: *const c_char) -> String {
+    if text.is_null() {
+        return "no description".to_owned();
+    }
+    // SAFETY: not null, and the caller vouches for the rest.
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
+}
