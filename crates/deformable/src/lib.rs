@@ -14,6 +14,7 @@
 
 pub mod broad;
 mod config;
+mod extent;
 mod method;
 mod narrow;
 mod response;

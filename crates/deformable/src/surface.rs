@@ -13,8 +13,8 @@
 //! Cost: 2 ns for each surface node (a brain of 22 thousand tetrahedra has 2 thousand of them), plus 10 ns for each triangle near the tool.
 //! Triangles with a NaN corner are skipped.
 
-use crate::{narrow::NONE, triangle};
-use trepan_geometry::{Aabb, Vec3};
+use crate::{extent::Extent, narrow::NONE, triangle};
+use trepan_geometry::Vec3;
 use trepan_mesh::{Csr, Surface, TetMesh};
 
 /// Triangles in one cluster.
@@ -41,9 +41,9 @@ pub(crate) struct MovingSurface {
     pub tet_of_triangle: Vec<u32>,
     nodes_of_cluster: Csr,
     triangles_of_node: Csr,
-    boxes: Vec<Aabb>,
+    boxes: Vec<Extent>,
     /// Box of the whole surface.
-    pub bounds: Aabb,
+    pub bounds: Extent,
 }
 
 impl MovingSurface {
@@ -56,33 +56,31 @@ impl MovingSurface {
         let nodes_of_cluster = nodes_of_clusters(&triangles);
         Self {
             triangles_of_node: Csr::of_pairs(mesh.positions.len(), around),
-            boxes: vec![Aabb::EMPTY; nodes_of_cluster.len()],
+            boxes: vec![Extent::EMPTY; nodes_of_cluster.len()],
             nodes_of_cluster,
             triangles,
             tet_of_triangle,
-            bounds: Aabb::EMPTY,
+            bounds: Extent::EMPTY,
         }
     }
 
     /// Fits all boxes to the moved nodes.
     pub(crate) fn refit(&mut self, positions: &[Vec3]) {
-        self.bounds = Aabb::EMPTY;
+        self.bounds = Extent::EMPTY;
         for (cluster, fitted) in self.boxes.iter_mut().enumerate() {
-            let nodes = self.nodes_of_cluster.row(cluster);
-            *fitted =
-                nodes.iter().map(|&n| positions[n as usize]).filter(|p| p.is_finite()).fold(Aabb::EMPTY, Aabb::grown);
-            self.bounds = Aabb { min: self.bounds.min.min(fitted.min), max: self.bounds.max.max(fitted.max) };
+            *fitted = Extent::of(self.nodes_of_cluster.row(cluster).iter().map(|&n| &positions[n as usize]));
+            self.bounds.merge(fitted);
         }
     }
 
     /// Puts the triangles whose boxes meet `region` into `near`, up to its capacity; returns how many did not fit.
-    pub(crate) fn gather(&self, positions: &[Vec3], region: Aabb, near: &mut Vec<u32>) -> u32 {
+    pub(crate) fn gather(&self, positions: &[Vec3], region: &Extent, near: &mut Vec<u32>) -> u32 {
         near.clear();
         let mut overflow = 0;
         for (cluster, _) in self.boxes.iter().enumerate().filter(|(_, fitted)| fitted.overlaps(region)) {
             for t in self.triangles_of(cluster) {
                 let corners = self.corners(positions, t);
-                if !Aabb::of_points(&corners).overlaps(region) || !corners.iter().all(|c| c.is_finite()) {
+                if !Extent::of(&corners).overlaps(region) || !corners.iter().all(|c| c.is_finite()) {
                     continue;
                 }
                 match near.len() < near.capacity() {
@@ -98,7 +96,7 @@ impl MovingSurface {
     pub(crate) fn closest(&self, positions: &[Vec3], to: Vec3, within: f32) -> Option<Foot> {
         let (mut first, mut nearest) = (None, within * within);
         for (cluster, fitted) in self.boxes.iter().enumerate() {
-            let distance2 = distance2_to_box(fitted, to);
+            let distance2 = fitted.distance2(to);
             if distance2 < nearest {
                 (first, nearest) = (Some(cluster), distance2);
             }
@@ -107,7 +105,7 @@ impl MovingSurface {
         let mut best = self.closest_among(positions, self.triangles_of(first), to, None);
         for (cluster, fitted) in self.boxes.iter().enumerate() {
             let bound = best.map_or(f32::INFINITY, |b| b.distance2).min(within * within);
-            if cluster != first && distance2_to_box(fitted, to) < bound {
+            if cluster != first && fitted.distance2(to) < bound {
                 best = self.closest_among(positions, self.triangles_of(cluster), to, best);
             }
         }
@@ -167,10 +165,6 @@ impl MovingSurface {
     fn triangles_of(&self, cluster: usize) -> core::ops::Range<u32> {
         (cluster * CLUSTER) as u32..((cluster + 1) * CLUSTER).min(self.triangles.len()) as u32
     }
-}
-
-fn distance2_to_box(fitted: &Aabb, to: Vec3) -> f32 {
-    (fitted.min - to).max(to - fitted.max).max(Vec3::ZERO).length_squared()
 }
 
 /// Most triangles crossed in one descent.

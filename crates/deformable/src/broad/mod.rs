@@ -5,6 +5,7 @@ pub(crate) mod uniform_grid;
 pub(crate) use uniform_grid::PointCells;
 pub use uniform_grid::UniformGrid;
 
+use crate::extent::Extent;
 use trepan_geometry::{Aabb, Vec3};
 
 /// Finds which points may lie in which tetrahedra. A pair may be false, a missing pair may not.
@@ -19,15 +20,17 @@ pub trait BroadPhase: Send {
 }
 
 /// Box of a tetrahedron; empty when a corner is not finite.
-pub(crate) fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Aabb {
+#[inline]
+pub(crate) fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Extent {
     let corners = tet.map(|n| positions[n as usize]);
-    if corners.iter().all(|c| c.is_finite()) { Aabb::of_points(&corners) } else { Aabb::EMPTY }
+    let sum = corners[0] + corners[1] + corners[2] + corners[3];
+    if sum.is_finite() { Extent::of(&corners) } else { Extent::EMPTY }
 }
 
 /// The boxes of a mesh's tetrahedra that meet a region, in order.
 #[derive(Debug, Default)]
 pub(crate) struct TetBoxes {
-    pub boxes: Vec<(u32, Aabb)>,
+    pub boxes: Vec<(u32, Extent)>,
 }
 
 impl TetBoxes {
@@ -37,8 +40,9 @@ impl TetBoxes {
 
     pub(crate) fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
         self.boxes.clear();
+        let region = Extent::from(*region);
         let met = tets.iter().enumerate().map(|(t, tet)| (t as u32, box_of(positions, tet)));
-        self.boxes.extend(met.filter(|(_, b)| b.overlaps(*region)).take(self.boxes.capacity()));
+        self.boxes.extend(met.filter(|(_, b)| b.overlaps(&region)).take(self.boxes.capacity()));
     }
 }
 

@@ -13,6 +13,7 @@
 //! For a small tool in a large mesh: it still looks at every tetrahedron's box.
 
 use super::{BroadPhase, TetBoxes, push_bounded};
+use crate::extent::Extent;
 use trepan_geometry::{Aabb, Vec3};
 
 /// A uniform grid over the points, as an array.
@@ -55,6 +56,7 @@ impl BroadPhase for UniformGrid {
 #[derive(Debug)]
 pub(crate) struct PointCells {
     origin: Vec3,
+    bounds: Extent,
     cell_mm: f32,
     dims: [usize; 3],
     starts: Vec<u32>,
@@ -66,6 +68,7 @@ impl PointCells {
     pub(crate) fn new(points: usize) -> Self {
         Self {
             origin: Vec3::ZERO,
+            bounds: Extent::EMPTY,
             cell_mm: 1.0,
             dims: [0; 3],
             starts: vec![0; UniformGrid::MAX_CELLS + 1],
@@ -82,7 +85,7 @@ impl PointCells {
         if bounds.is_empty() || !bounds.size().is_finite() {
             return false;
         }
-        (self.origin, self.cell_mm) = (bounds.min, cell_mm);
+        (self.origin, self.bounds, self.cell_mm) = (bounds.min, bounds.into(), cell_mm);
         while bounds.size().to_array().map(|s| (s / self.cell_mm) as f64 + 1.0).iter().product::<f64>()
             > UniformGrid::MAX_CELLS as f64
         {
@@ -113,12 +116,11 @@ impl PointCells {
     }
 
     /// Calls `found` for every point inside `bounds`, through the cells that it meets.
-    pub(crate) fn visit(&self, points: &[Vec3], bounds: &Aabb, mut found: impl FnMut(u32)) {
-        let size = Vec3::from(self.dims.map(|d| d as f32)) * self.cell_mm;
-        if self.dims[0] == 0 || !bounds.overlaps(Aabb { min: self.origin, max: self.origin + size }) {
+    pub(crate) fn visit(&self, points: &[Vec3], bounds: &Extent, mut found: impl FnMut(u32)) {
+        if self.dims[0] == 0 || !bounds.overlaps(&self.bounds) {
             return;
         }
-        let (low, high) = (self.cell_at(bounds.min), self.cell_at(bounds.max));
+        let (low, high) = (self.cell_at(bounds.low.into()), self.cell_at(bounds.high.into()));
         for z in low[2]..=high[2] {
             for y in low[1]..=high[1] {
                 for x in low[0]..=high[0] {

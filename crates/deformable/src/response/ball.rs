@@ -99,7 +99,7 @@ impl Ball {
             false => surface.closest(positions, centre, if inside { f32::INFINITY } else { scene.radius_mm }),
         }?;
         out.overflow +=
-            surface.gather(positions, Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm), &mut self.numbers);
+            surface.gather(positions, &Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm).into(), &mut self.numbers);
         self.keep_touched_side(scene, surface, &foot);
         let sample = self.near.sample(centre, BLEND * scene.radius_mm)?;
         let depth_mm = scene.radius_mm + if inside { sample.distance } else { -sample.distance };

@@ -17,6 +17,7 @@
 
 use crate::{
     broad::{PointCells, box_of},
+    extent::Extent,
     narrow::{Hits, NONE},
     scene::Scene,
 };
@@ -26,7 +27,7 @@ use trepan_geometry::Aabb;
 pub(crate) struct Thesis {
     cell_mm: f32,
     cells: PointCells,
-    boxes: Vec<Aabb>,
+    boxes: Vec<Extent>,
     last: u32,
     rings: Vec<u32>,
 }
@@ -52,11 +53,11 @@ impl Thesis {
     pub(crate) fn find(&mut self, scene: &Scene, hits: &mut Hits) {
         self.cells.place(scene.points, self.cell_mm);
         let tissue = self.update_boxes(scene);
-        let colliding = tissue.intersection(scene.ball_box());
+        let colliding = Aabb::from(tissue).intersection(scene.ball_box());
         if colliding.is_empty() {
             return;
         }
-        if let Some(first) = self.first_colliding(scene, colliding, hits) {
+        if let Some(first) = self.first_colliding(scene, &colliding.into(), hits) {
             self.last = first;
             self.two_rings(scene.neighbours, first);
             for k in 1..self.rings.len() {
@@ -66,15 +67,16 @@ impl Thesis {
     }
 
     /// Boxes of all tetrahedra; returns the box of the tissue.
-    fn update_boxes(&mut self, scene: &Scene) -> Aabb {
+    fn update_boxes(&mut self, scene: &Scene) -> Extent {
         self.boxes.clear();
         self.boxes.extend(scene.tets.iter().map(|tet| box_of(scene.positions, tet)));
-        let union = |all: Aabb, b: &Aabb| Aabb { min: all.min.min(b.min), max: all.max.max(b.max) };
-        self.boxes.iter().fold(Aabb::EMPTY, union)
+        let mut tissue = Extent::EMPTY;
+        self.boxes.iter().for_each(|fitted| tissue.merge(fitted));
+        tissue
     }
 
     /// The last one and its rings first, then all others onwards from it.
-    fn first_colliding(&mut self, scene: &Scene, colliding: Aabb, hits: &mut Hits) -> Option<u32> {
+    fn first_colliding(&mut self, scene: &Scene, colliding: &Extent, hits: &mut Hits) -> Option<u32> {
         self.two_rings(scene.neighbours, self.last);
         let count = self.boxes.len() as u32;
         let near = (0..self.rings.len()).map(|k| self.rings[k]);

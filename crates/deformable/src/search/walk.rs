@@ -18,11 +18,11 @@
 
 use crate::{
     broad::box_of,
+    extent::Extent,
     narrow::{Hits, NONE, is_inside},
     scene::Scene,
     surface::MovingSurface,
 };
-use trepan_geometry::{Aabb, Vec3};
 use trepan_mesh::OPPOSITE;
 
 /// The tetrahedron of each point, and room for floods.
@@ -59,7 +59,7 @@ impl Walk {
     }
 
     pub(crate) fn find(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
-        if !scene.ball_box().overlaps(surface.bounds) {
+        if !Extent::from(scene.ball_box()).overlaps(&surface.bounds) {
             return self.reset();
         }
         self.walk_all(scene, hits);
@@ -86,8 +86,8 @@ impl Walk {
         if self.lost.is_empty() {
             return;
         }
-        let region = Aabb::of_points(self.lost.iter().map(|&i| &scene.points[i as usize]));
-        hits.overflow += surface.gather(scene.positions, region, &mut self.near);
+        let region = Extent::of(self.lost.iter().map(|&i| &scene.points[i as usize]));
+        hits.overflow += surface.gather(scene.positions, &region, &mut self.near);
         self.begin_flood();
         for k in 0..self.near.len() {
             self.reach(surface.tet_of_triangle[self.near[k] as usize], hits);
@@ -97,7 +97,7 @@ impl Walk {
                 self.reach(hits.tet[i], hits);
             }
         }
-        self.run_flood(scene, region, hits);
+        self.run_flood(scene, &region, hits);
     }
 
     /// No border near and no memory: all points are inside or all outside, as the centre is.
@@ -108,7 +108,7 @@ impl Walk {
         self.lost.push(scene.centre() as u32);
         self.begin_flood();
         self.reach(surface.tet_of_triangle[foot.triangle as usize], hits);
-        self.run_flood(scene, Aabb::of_points(&[foot.point, centre]), hits);
+        self.run_flood(scene, &Extent::of(&[foot.point, centre]), hits);
         let start = hits.tet[scene.centre()];
         if start == NONE {
             return;
@@ -139,7 +139,7 @@ impl Walk {
     }
 
     /// Spreads over all tetrahedra that meet `region`, testing the lost points in each.
-    fn run_flood(&mut self, scene: &Scene, region: Aabb, hits: &mut Hits) {
+    fn run_flood(&mut self, scene: &Scene, region: &Extent, hits: &mut Hits) {
         while let Some(tet) = self.open.pop() {
             let bounds = passage(scene, tet);
             if !bounds.overlaps(region) {
@@ -161,12 +161,10 @@ impl Walk {
 }
 
 /// Box that a flood passes through: one with a NaN corner is passed always, since its place is unknown.
-fn passage(scene: &Scene, tet: u32) -> Aabb {
+fn passage(scene: &Scene, tet: u32) -> Extent {
     let bounds = box_of(scene.positions, &scene.tets[tet as usize]);
-    if bounds.is_empty() { EVERYWHERE } else { bounds }
+    if bounds == Extent::EMPTY { Extent::EVERYWHERE } else { bounds }
 }
-
-const EVERYWHERE: Aabb = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
 
 /// Walks point `i` from `tet`; says whether it arrived.
 fn walk(scene: &Scene, i: usize, mut tet: u32, hits: &mut Hits) -> bool {

@@ -1,0 +1,106 @@
+//! Boxes for the inner loops: built from corners, compared with few instructions.
+//!
+//! # Practice
+//! The same box as [`Aabb`], kept as six numbers and inlined. A comparison with NaN is false, so a NaN corner neither grows a
+//! box nor lies in one.
+
+use trepan_geometry::{Aabb, Vec3};
+
+/// A closed box, mm; empty when a `low` exceeds its `high`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Extent {
+    pub low: [f32; 3],
+    pub high: [f32; 3],
+}
+
+impl Extent {
+    /// Holds nothing.
+    pub const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+    /// Holds every point.
+    pub const EVERYWHERE: Self = Self { low: [f32::NEG_INFINITY; 3], high: [f32::INFINITY; 3] };
+
+    /// The box of some points.
+    #[inline]
+    pub fn of<'a>(points: impl IntoIterator<Item = &'a Vec3>) -> Self {
+        let mut extent = Self::EMPTY;
+        points.into_iter().for_each(|p| extent.grow(*p));
+        extent
+    }
+
+    #[inline]
+    pub fn grow(&mut self, p: Vec3) {
+        let p = p.to_array();
+        for axis in 0..3 {
+            self.low[axis] = if p[axis] < self.low[axis] { p[axis] } else { self.low[axis] };
+            self.high[axis] = if p[axis] > self.high[axis] { p[axis] } else { self.high[axis] };
+        }
+    }
+
+    /// The box of two boxes.
+    #[inline]
+    pub fn merge(&mut self, other: &Self) {
+        for axis in 0..3 {
+            self.low[axis] = self.low[axis].min(other.low[axis]);
+            self.high[axis] = self.high[axis].max(other.high[axis]);
+        }
+    }
+
+    #[inline]
+    pub fn overlaps(&self, other: &Self) -> bool {
+        (0..3).all(|axis| self.low[axis].max(other.low[axis]) <= self.high[axis].min(other.high[axis]))
+    }
+
+    #[inline]
+    pub fn contains(&self, p: Vec3) -> bool {
+        let p = p.to_array();
+        (0..3).all(|axis| self.low[axis] <= p[axis] && p[axis] <= self.high[axis])
+    }
+
+    /// Squared distance of a point from the box, mm²; infinite for an empty one.
+    #[inline]
+    pub fn distance2(&self, p: Vec3) -> f32 {
+        let p = p.to_array();
+        let outside = |axis: usize| (self.low[axis] - p[axis]).max(p[axis] - self.high[axis]).max(0.0);
+        (0..3).map(|axis| outside(axis) * outside(axis)).sum()
+    }
+}
+
+impl From<Aabb> for Extent {
+    fn from(aabb: Aabb) -> Self {
+        Self { low: aabb.min.to_array(), high: aabb.max.to_array() }
+    }
+}
+
+impl From<Extent> for Aabb {
+    fn from(extent: Extent) -> Self {
+        Self { min: extent.low.into(), max: extent.high.into() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn it_agrees_with_the_plain_box(c in prop::array::uniform9(-2.0f32..2.0), r in 0.1f32..1.0) {
+            let v = |i: usize| Vec3::new(c[3 * i], c[3 * i + 1], c[3 * i + 2]);
+            let (plain, ball) = (Aabb::of_points(&[v(0), v(1)]), Aabb::of_sphere(v(2), r));
+            let extent = Extent::of(&[v(0), v(1)]);
+            prop_assert_eq!(extent, Extent::from(plain));
+            prop_assert_eq!(extent.overlaps(&ball.into()), plain.overlaps(ball));
+            prop_assert_eq!(extent.contains(v(2)), plain.contains(v(2)));
+            prop_assert_eq!(extent.distance2(v(2)) == 0.0, plain.contains(v(2)));
+        }
+    }
+
+    #[test]
+    fn nan_neither_grows_nor_is_held_and_empty_meets_nothing() {
+        let mut extent = Extent::of(&[Vec3::ZERO, Vec3::ONE]);
+        extent.grow(Vec3::NAN);
+        extent.merge(&Extent::EMPTY);
+        assert_eq!(extent, Extent::of(&[Vec3::ZERO, Vec3::ONE]));
+        assert!(!extent.contains(Vec3::NAN) && !Extent::EMPTY.overlaps(&Extent::EVERYWHERE));
+    }
+}
