@@ -40,7 +40,9 @@ pub fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Re
         for (curve, colour) in curves.iter().zip(COLOURS) {
             let line = LineSeries::new(curve.points.iter().copied(), colour.stroke_width(2));
             let drawn = chart.draw_series(line).map_err(|f| text(&f))?;
-            drawn.label(curve.name).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3)));
+            drawn
+                .label(curve.name)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3)));
         }
         if let Some((value, meaning)) = limit {
             let dashes = DashedLineSeries::new([(0.0, value), (end, value)], 6, 4, BLACK.stroke_width(1));
@@ -56,7 +58,8 @@ pub fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Re
 
 /// How often times fell into bins, both axes logarithmic. `bins`: (upper edge in µs, count).
 pub fn histogram(bins: &[(f64, u64)], limit_us: f64) -> Result<String, String> {
-    let used: Vec<(f64, f64)> = bins.iter().filter(|b| b.1 > 0).map(|&(edge, count)| (edge.max(0.01), count as f64)).collect();
+    let used: Vec<(f64, f64)> =
+        bins.iter().filter(|b| b.1 > 0).map(|&(edge, count)| (edge.max(0.01), count as f64)).collect();
     let low = used.first().map_or(0.1, |b| 0.7 * b.0);
     let high = used.last().map_or(1000.0, |b| 1.5 * b.0).max(1.5 * limit_us);
     let most = used.iter().map(|b| b.1).fold(10.0, f64::max);
@@ -72,7 +75,11 @@ pub fn histogram(bins: &[(f64, u64)], limit_us: f64) -> Result<String, String> {
             .build_cartesian_2d((low..high).log_scale(), (0.5..2.0 * most).log_scale())
             .map_err(|f| text(&f))?;
         let mesh = &mut chart.configure_mesh();
-        mesh.x_desc("compute time of a tick, µs").y_desc("ticks").light_line_style(WHITE).draw().map_err(|f| text(&f))?;
+        mesh.x_desc("compute time of a tick, µs")
+            .y_desc("ticks")
+            .light_line_style(WHITE)
+            .draw()
+            .map_err(|f| text(&f))?;
         let width = 10f64.powf(-0.1);
         let bars = used.iter().map(|&(x, n)| Rectangle::new([(x * width, 0.5), (x * 0.97, n)], COLOURS[0].filled()));
         chart.draw_series(bars).map_err(|f| text(&f))?;

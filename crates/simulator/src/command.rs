@@ -12,7 +12,12 @@ use tracing_subscriber::EnvFilter;
 pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     let options = Options::parse();
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,trepan_simulator=info"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).without_time().init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_target(false)
+        .without_time()
+        .init();
     if options.list_devices {
         trepan_haptics::list().iter().for_each(|device| println!("{:28} {}", device.name, device.state));
         return ExitCode::SUCCESS;

@@ -22,7 +22,8 @@ pub fn open() -> Result<Gpu, String> {
     }
     tracing::info!("no Vulkan driver here: installing Mesa's software driver ({command})");
     install()?;
-    Gpu::open(Prefer::default()).map_err(|fault| format!("no picture, although Mesa's software driver was installed: {fault}"))
+    Gpu::open(Prefer::default())
+        .map_err(|fault| format!("no picture, although Mesa's software driver was installed: {fault}"))
 }
 
 fn is_root() -> bool {
@@ -44,5 +45,6 @@ fn install() -> Result<(), String> {
     };
     let packages: Vec<&str> = ["install", "-y", "--no-install-recommends"].into_iter().chain(PACKAGES).collect();
     let done = get(&packages) || (get(&["update"]) && get(&packages));
-    done.then_some(()).ok_or_else(|| format!("no picture: `apt-get install -y {}` failed; run it by hand", PACKAGES.join(" ")))
+    done.then_some(())
+        .ok_or_else(|| format!("no picture: `apt-get install -y {}` failed; run it by hand", PACKAGES.join(" ")))
 }

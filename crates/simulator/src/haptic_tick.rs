@@ -17,9 +17,7 @@ use crate::notice::{Notice, Warning, Watch, What};
 use crate::program::{Phase, Program};
 use crate::score::ScoreKeeper;
 use std::sync::Arc;
-use trepan_contact::{
-    ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardedWrench, SurfacePatch, Viscoelastic,
-};
+use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardedWrench, SurfacePatch, Viscoelastic};
 use trepan_geometry::{Buttons, Pose, Tool, ToolKind, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;

@@ -11,7 +11,7 @@ use crate::program::Program;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use trepan_mesh::{TetMesh, lattice};
+use trepan_mesh::{TetMesh, lattice, vtk};
 use trepan_volume::{
     AIR_HU, BrainConfig, Grid, Interpolation, MaskError, VoxelVolume, bone_isovalue, brain_mask, check_brain_mask,
     hounsfield, largest_component, nifti, overlap, resample, skull_only,
@@ -88,11 +88,12 @@ struct Kept {
 /// Opens a case: from the cache if it was made before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
     needs(program, inputs)?;
-    let files: Vec<&Path> = [&inputs.ct, &inputs.mri, &inputs.labels].into_iter().flatten().map(PathBuf::as_path).collect();
+    let files: Vec<&Path> =
+        [&inputs.ct, &inputs.mri, &inputs.labels].into_iter().flatten().map(PathBuf::as_path).collect();
     let given = [&inputs.ct, &inputs.mri, &inputs.labels].map(Option::is_some);
     let hash = cache.key(&files, &format!("{recipe:?} {given:?}"))?;
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
-    if let Some(mut case) = cache.find(&hash).and_then(|folder| load(&folder, recipe)) {
+    if let Some(mut case) = cache.find(&hash).and_then(|folder| load(&folder)) {
         (case.name, case.hash, case.cached) = (name, hash, true);
         return Ok(case);
     }
@@ -109,7 +110,10 @@ pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -
 
 fn needs(program: Program, inputs: &Inputs) -> Result<(), SessionError> {
     let lacks = |flag: &str, what: &str| {
-        Err(SessionError::Usage(format!("{} needs {what}: give {flag}, or no image at all for the built-in case", program.name())))
+        Err(SessionError::Usage(format!(
+            "{} needs {what}: give {flag}, or no image at all for the built-in case",
+            program.name()
+        )))
     };
     if program.has_bone() && inputs.ct.is_none() {
         return lacks("--ct PATH", "a CT");
@@ -195,13 +199,16 @@ fn find_brain(
 fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> Result<VoxelVolume<i16>, SessionError> {
     let grid = Grid::isotropic_over(ct, recipe.spacing_mm);
     if grid.voxels() > MOST_VOXELS {
-        let text = format!("--spacing-mm {} asks for {} voxels, the limit is {MOST_VOXELS}", recipe.spacing_mm, grid.voxels());
+        let text =
+            format!("--spacing-mm {} asks for {} voxels, the limit is {MOST_VOXELS}", recipe.spacing_mm, grid.voxels());
         return Err(SessionError::Usage(text));
     }
     let mut skull = resample(ct, &grid, Interpolation::Trilinear, AIR_HU);
     skull_only(&mut skull, isovalue_hu);
     if !skull.data.iter().any(|&hu| hu >= isovalue_hu) {
-        return Err(SessionError::Case(format!("no voxel of the CT reaches {isovalue_hu} HU: there is no bone; give --isovalue-hu")));
+        return Err(SessionError::Case(format!(
+            "no voxel of the CT reaches {isovalue_hu} HU: there is no bone; give --isovalue-hu"
+        )));
     }
     Ok(skull)
 }
@@ -210,7 +217,8 @@ fn make_brain(mri: &VoxelVolume<f32>, mask: &VoxelVolume<u8>, recipe: &Recipe) -
     let mask = cropped(mask);
     let mri = resample(mri, &Grid::of(&mask), Interpolation::Trilinear, 0.0);
     let config = lattice::Config { target_tets: recipe.tets, ..lattice::Config::default() };
-    let mesh = lattice::tetrahedra(&mask, &config).map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;
+    let mesh = lattice::tetrahedra(&mask, &config)
+        .map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;
     mesh.check().map_err(|fault| SessionError::Internal(format!("the mesher made a bad mesh: {fault}")))?;
     Ok(Brain { mask, mri, mesh })
 }
@@ -241,6 +249,7 @@ fn save(case: &Case, folder: &Path) -> Result<(), String> {
     if let Some(brain) = &case.brain {
         nifti::write(&folder.join("mask.nii"), &brain.mask).map_err(|f| text(&f))?;
         nifti::write(&folder.join("mri.nii"), &brain.mri).map_err(|f| text(&f))?;
+        vtk::write(&folder.join("brain.vtk"), &brain.mesh).map_err(|f| text(&f))?;
     }
     let kept = Kept {
         isovalue_hu: case.isovalue_hu,
@@ -253,19 +262,18 @@ fn save(case: &Case, folder: &Path) -> Result<(), String> {
 }
 
 /// A kept case; `None` when anything of it is missing or broken, so that it is made anew.
-fn load(folder: &Path, recipe: &Recipe) -> Option<Case> {
+fn load(folder: &Path) -> Option<Case> {
     let kept: Kept = serde_json::from_slice(&std::fs::read(folder.join("case.json")).ok()?).ok()?;
     let skull = match kept.has_skull {
         true => Some(hounsfield(&nifti::read(&folder.join("skull.nii")).ok()?).ok()?),
         false => None,
     };
     let brain = match kept.has_brain {
-        true => {
-            let mask = nifti::read(&folder.join("mask.nii")).ok()?.map(|v| v as u8);
-            let mri = nifti::read(&folder.join("mri.nii")).ok()?;
-            let config = lattice::Config { target_tets: recipe.tets, ..lattice::Config::default() };
-            Some(Brain { mesh: lattice::tetrahedra(&mask, &config).ok()?, mask, mri })
-        }
+        true => Some(Brain {
+            mask: nifti::read(&folder.join("mask.nii")).ok()?.map(|v| v as u8),
+            mri: nifti::read(&folder.join("mri.nii")).ok()?,
+            mesh: vtk::read(&folder.join("brain.vtk")).ok()?,
+        }),
         false => None,
     };
     let (name, hash) = (String::new(), String::new());

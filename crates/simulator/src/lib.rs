@@ -48,8 +48,8 @@ mod window;
 
 pub use cache::Cache;
 pub use clock::{Clock, Schedule};
-pub use command::command;
 pub use collision_step::{CollisionStage, SoftFrame};
+pub use command::command;
 pub use error::SessionError;
 pub use haptic_tick::{FRESH_MS, GONE_MS, HapticConfig, HapticStage, Tick, TickInput, ToolSample};
 pub use import::{Brain, Case, Inputs, Recipe, open as open_case};

@@ -72,7 +72,9 @@ impl Notice {
     /// Kind and sentence, as recorded.
     pub fn words(&self) -> (&'static str, String) {
         match self.what {
-            What::Phase(phase) => ("phase", format!("{} begins with the {:?}", phase.name(), phase.tool().kind).to_lowercase()),
+            What::Phase(phase) => {
+                ("phase", format!("{} begins with the {:?}", phase.name(), phase.tool().kind).to_lowercase())
+            }
             What::Warning(warning, true, value) => {
                 let unit = match warning {
                     Warning::BrainNear | Warning::BrainTouched => "mm away",

@@ -30,7 +30,8 @@ pub fn write(
     shots: &[Shot],
     drilled: Option<VoxelVolume<i16>>,
 ) -> Result<(), SessionError> {
-    let json = serde_json::to_vec_pretty(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
+    let json =
+        serde_json::to_vec_pretty(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
     whole(&out.join("summary.json"), &json)?;
     if let Some(volume) = drilled {
         let path = out.join("drilled.nii.gz");

@@ -1,7 +1,6 @@
 //! The main thread of a headless run: one picture after another, from the newest state, through the same drawing code as the window.
 
 use crate::clock::Clock;
-use crate::collision_step::SoftFrame;
 use crate::report::Shot;
 use crate::run::{Eyes, View};
 use crate::scene::Scene;
@@ -26,6 +25,19 @@ pub struct Album {
     pub faults: Vec<String>,
 }
 
+impl Album {
+    /// Adds one picture, or what went wrong with it.
+    pub fn add(&mut self, shot: Result<Shot, String>) {
+        match shot {
+            Ok(shot) => {
+                self.frames += 1;
+                self.shots.push(shot);
+            }
+            Err(fault) => self.faults.push(format!("a picture failed: {fault}")),
+        }
+    }
+}
+
 /// The eye over the site: a little from behind and from the side, so that hole and tool are both seen.
 pub fn camera(site: &Site) -> Camera {
     let outward = -site.inward;
@@ -34,13 +46,13 @@ pub fn camera(site: &Site) -> Camera {
 }
 
 /// A frame of the newest state.
-pub fn frame<'a>(camera: Camera, view: &View, soft: Option<&'a SoftFrame>, bone_shown: bool) -> Frame<'a> {
+pub fn frame<'a>(camera: Camera, view: &View, brain_positions: Option<&'a [Vec3]>, bone_shown: bool) -> Frame<'a> {
     Frame {
         tool: Some(view.sample.phase.tool()),
         world_from_tool: view.sample.state.world_from_tool,
         turn_rad: if view.sample.drilling { view.time_ms as f32 * 0.7 } else { 0.0 },
         drilling: view.sample.drilling,
-        brain_positions: soft.map(|soft| soft.positions.as_slice()),
+        brain_positions,
         show_bone: bone_shown,
         ..Frame::of(camera)
     }
@@ -54,7 +66,15 @@ pub fn wait(mut eyes: Eyes, stop: &Stop) {
 }
 
 /// Draws `per_second` pictures a second into `folder` until the end, and one more then.
-pub fn draw(mut eyes: Eyes, mut renderer: Renderer, scene: &Scene, per_second: f64, folder: &Path, stop: &Stop) -> Album {
+pub fn draw(
+    mut eyes: Eyes,
+    mut renderer: Renderer,
+    scene: &Scene,
+    bone_shown: bool,
+    per_second: f64,
+    folder: &Path,
+    stop: &Stop,
+) -> Album {
     let mut album = Album::default();
     let mut candidates: Vec<(f64, PathBuf)> = Vec::new();
     let clock = Clock::start();
@@ -65,9 +85,9 @@ pub fn draw(mut eyes: Eyes, mut renderer: Renderer, scene: &Scene, per_second: f
         let over = view.finished || stop.asked();
         if over || clock.now_ms() >= next_ms {
             next_ms = clock.now_ms().max(next_ms) + 1e3 / per_second.max(1e-3);
-            let soft = eyes.soft.as_mut().map(|soft| soft.latest().0);
+            let soft = eyes.soft.as_mut().map(|soft| soft.latest().0.positions.as_slice());
             let path = folder.join(format!("frame-{:05}.png", album.frames));
-            let drawn = renderer.draw(&frame(camera, &view, soft, scene.bone.is_some()));
+            let drawn = renderer.draw(&frame(camera, &view, soft, bone_shown));
             match drawn.map_err(|f| f.to_string()).and_then(|_| write(&mut renderer, &path)) {
                 Ok(()) => {
                     album.frames += 1;
@@ -94,6 +114,14 @@ fn write(renderer: &mut Renderer, path: &Path) -> Result<(), String> {
     image.write_png(path).map_err(|fault| format!("{}: {fault}", path.display()))
 }
 
+/// One picture for the report.
+pub fn snap(renderer: &mut Renderer, frame: &Frame<'_>, folder: &Path, caption: &str) -> Result<Shot, String> {
+    renderer.draw(frame).map_err(|fault| fault.to_string())?;
+    let path = folder.join(format!("frame-{caption}.png"));
+    write(renderer, &path)?;
+    Ok(Shot { caption: caption.into(), png: std::fs::read(&path).map_err(|fault| fault.to_string())? })
+}
+
 /// The first, the last, and some evenly between.
 fn chosen(candidates: &[(f64, PathBuf)]) -> Vec<Shot> {
     let last = candidates.len().saturating_sub(1);
@@ -101,7 +129,13 @@ fn chosen(candidates: &[(f64, PathBuf)]) -> Vec<Shot> {
     picks.dedup();
     let shot = |&at: &usize| {
         let (seconds, path) = candidates.get(at)?;
-        let when = if at == 0 { "before" } else if at == last { "after" } else { "during" };
+        let when = if at == 0 {
+            "before"
+        } else if at == last {
+            "after"
+        } else {
+            "during"
+        };
         Some(Shot { caption: format!("{when}, at {seconds:.1} s"), png: std::fs::read(path).ok()? })
     };
     picks.iter().filter_map(shot).collect()

@@ -30,7 +30,9 @@ pub fn html(summary: &Summary, outcome: &Outcome, recording: &Recording, shots: 
     page += &format!("{head}<title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>");
     page += &format!(
         "<p>Device {}, {} ticks at {:.1} Hz. Tissue and drilling constants are uncalibrated; scores are physical sums, not clinical ones.</p>",
-        escaped(&summary.device), summary.ticks, summary.rate_hz
+        escaped(&summary.device),
+        summary.ticks,
+        summary.rate_hz
     );
     warnings(&mut page, summary);
     pictures(&mut page, shots);
@@ -76,12 +78,18 @@ fn curves(page: &mut String, outcome: &Outcome, recording: &Recording) -> Result
         points: recording.solver.iter().map(|s| (s.time_ms * 1e-3, f64::from(s.max_displacement_mm))).collect(),
     };
     let charts = [
-        ("Force on the hand", over_time("force, N", &[of("force", &|t| t.wrench.force.length())], Some((3.3, "device limit")))?),
+        (
+            "Force on the hand",
+            over_time("force, N", &[of("force", &|t| t.wrench.force.length())], Some((3.3, "device limit")))?,
+        ),
         (
             "Depth of the tool",
             over_time("depth, mm", &[of("in bone", &|t| t.depth_mm), of("in tissue", &|t| t.tissue_depth_mm)], None)?,
         ),
-        ("Distance to the brain at rest (cut at 20 mm)", over_time("distance, mm", &[of("tool to brain", &near)], None)?),
+        (
+            "Distance to the brain at rest (cut at 20 mm)",
+            over_time("distance, mm", &[of("tool to brain", &near)], None)?,
+        ),
         ("Brain", over_time("displacement, mm", &[moved], None)?),
         ("Tick compute time (dashed: the 1 ms of the thesis)", histogram(&outcome.ticks.times.bins(), 1000.0)?),
     ];

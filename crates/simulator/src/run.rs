@@ -135,7 +135,10 @@ impl Times {
 
     /// Counts of times in bins of a tenth of a decade, as (lower edge in µs, count); for a chart.
     pub fn bins(&self) -> Vec<(f64, u64)> {
-        self.0.iter_log(10, 10f64.powf(0.1)).map(|v| (v.value_iterated_to() as f64 * 1e-3, v.count_since_last_iteration())).collect()
+        self.0
+            .iter_log(10, 10f64.powf(0.1))
+            .map(|v| (v.value_iterated_to() as f64 * 1e-3, v.count_since_last_iteration()))
+            .collect()
     }
 }
 

@@ -69,7 +69,9 @@ impl Scene {
 
 fn find_site(program: Program, bone: Option<&BoneVolume>, brain: Option<&RestBrain>) -> Option<Site> {
     match (bone, brain) {
-        (Some(bone), Some(brain)) if program.has_bone() => site::burr_hole(bone, &brain.field, brain.mesh.bounds().centre()),
+        (Some(bone), Some(brain)) if program.has_bone() => {
+            site::burr_hole(bone, &brain.field, brain.mesh.bounds().centre())
+        }
         (_, Some(brain)) => site::bare_brain(&brain.field, brain.mesh.bounds().centre()),
         (Some(bone), None) => site::bare_skull(bone),
         (None, None) => None,

@@ -83,7 +83,7 @@ impl Session {
     pub fn run(self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let (hand, pointer) = self.hand()?;
-        let start = self.start(hand.as_deref());
+        let start = self.start();
         let stages = self.stages(start.state)?;
         output::folder(&self.out)?;
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
@@ -119,7 +119,7 @@ impl Session {
     }
 
     /// The device, and the window's end of it when it is the mouse. None for a replay, which brings its own hand.
-    fn hand(&self) -> Result<(Option<Box<dyn HapticDevice>>, Option<mouse::MouseHandle>), SessionError> {
+    fn hand(&self) -> Result<Hand, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
         let script = |name: &str| Script::named(name, &self.scene.site, 1e3 * self.options.duration.unwrap_or(20.0));
         Ok(match &self.device {
@@ -135,11 +135,14 @@ impl Session {
                 (Some(Box::new(hand)), Some(handle))
             }
             DeviceName::Replay(_) => (None, None),
-            other => return Err(SessionError::Device(format!("{other} is not there: no driver for it in this version"))),
+            other => {
+                return Err(SessionError::Device(format!("{other} is not there: no driver for it in this version")));
+            }
         })
     }
 
-    fn start(&self, _hand: Option<&dyn HapticDevice>) -> ToolSample {
+    /// Where the tool waits.
+    fn start(&self) -> ToolSample {
         let script = Script::named(self.program.script(), &self.scene.site, 1e4).map(|script| script.at(0.0));
         let first = self.recording.as_ref().and_then(|r| r.ticks.first()).map(|t| ToolState::at(t.device));
         let state = first.or(script.ok()).unwrap_or_else(|| ToolState::at(trepan_geometry::Pose::IDENTITY));
@@ -149,7 +152,7 @@ impl Session {
     fn stages(&self, start: ToolState) -> Result<Stages, SessionError> {
         let config = HapticConfig {
             program: self.program,
-            rigid: self.rigid.clone(),
+            rigid: self.rigid,
             dt_ms: self.tick_ms(),
             bone_force: Viscoelastic { stiffness: 2.0, damping: 0.5 },
             tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
@@ -213,10 +216,11 @@ impl Session {
             picture::wait(eyes, stop);
             return Album::default();
         };
+        let (bone_shown, folder) = (self.program.has_bone(), self.out.join("frames"));
         if self.windowed {
-            return window::show(eyes, renderer, &self.scene, self.program, pointer, &self.out, stop);
+            return window::show(eyes, renderer, &self.scene, self.program, pointer, &folder, stop);
         }
-        picture::draw(eyes, renderer, &self.scene, self.options.frames_per_second, &self.out.join("frames"), stop)
+        picture::draw(eyes, renderer, &self.scene, bone_shown, self.options.frames_per_second, &folder, stop)
     }
 
     fn pace(&self) -> Pace {
@@ -276,6 +280,9 @@ impl Session {
     }
 }
 
+/// A device, where the session brings one, and the window's end of it when it is the mouse.
+type Hand = (Option<Box<dyn HapticDevice>>, Option<mouse::MouseHandle>);
+
 struct Graphics {
     adapter: String,
     renderer: Option<Renderer>,
@@ -294,12 +301,15 @@ fn inputs(options: &Options, built_in: Inputs) -> Inputs {
 fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
     let script = || DeviceName::Script(program.script().into());
     let name = match &options.device {
-        Some(text) => text.parse().map_err(|fault: trepan_haptics::NameError| SessionError::Device(fault.to_string()))?,
+        Some(text) => {
+            text.parse().map_err(|fault: trepan_haptics::NameError| SessionError::Device(fault.to_string()))?
+        }
         None if windowed => DeviceName::Mouse,
         None => script(),
     };
     if name == DeviceName::Mouse && !windowed {
-        let text = "the mouse needs a window: leave out --headless on a machine with a display, or give --device script:NAME";
+        let text =
+            "the mouse needs a window: leave out --headless on a machine with a display, or give --device script:NAME";
         return Err(SessionError::Device(text.into()));
     }
     Ok(name)

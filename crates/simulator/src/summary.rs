@@ -164,7 +164,10 @@ impl Machine {
     /// This one.
     pub fn here(graphics: Option<String>) -> Self {
         let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-        let cpu = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':')).map(|(_, name)| name.trim());
+        let cpu = cpuinfo
+            .lines()
+            .find_map(|line| line.strip_prefix("model name")?.split_once(':'))
+            .map(|(_, name)| name.trim());
         Self {
             cpu: cpu.unwrap_or("unknown").into(),
             cores: std::thread::available_parallelism().map_or(1, usize::from),

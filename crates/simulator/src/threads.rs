@@ -73,7 +73,8 @@ pub fn run(
                 records: collisions,
             };
             let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
-            let ends = SolverEnds { contact: cells.contact.1, soft: cells.soft.0, shown: cells.shown.0, records: solver };
+            let ends =
+                SolverEnds { contact: cells.contact.1, soft: cells.soft.0, shown: cells.shown.0, records: solver };
             let solving = scope.spawn(move || solver_loop(tissue.solver, ends, clock, stop));
             (colliding, solving)
         });
@@ -117,7 +118,14 @@ struct HapticEnds {
 }
 
 /// The haptic loop: read, tick, apply, publish, wait. Late ticks are counted, never caught up.
-fn haptic_loop(mut stage: HapticStage, mut hand: Hand, mut ends: HapticEnds, clock: Clock, pace: Pace, stop: &Stop) -> Outcome {
+fn haptic_loop(
+    mut stage: HapticStage,
+    mut hand: Hand,
+    mut ends: HapticEnds,
+    clock: Clock,
+    pace: Pace,
+    stop: &Stop,
+) -> Outcome {
     let remarks = real_time(80, "haptic").into_iter().collect();
     let mut ticks = Ticks::default();
     let mut schedule = Schedule::new(pace.tick_ms.into(), clock.now_ms());
