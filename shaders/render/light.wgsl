@@ -1,12 +1,9 @@
 // The 3-D view: takes the nearest of bone, brain and tool at each pixel and lights it.
 
-@group(0) @binding(1) var skull_hit: texture_2d<f32>;
-@group(0) @binding(2) var brain_hit: texture_2d<f32>;
-@group(0) @binding(3) var brain_rest: texture_2d<f32>;
-@group(0) @binding(4) var mri: texture_3d<f32>;
-@group(0) @binding(5) var linear: sampler;
-@group(0) @binding(6) var density: texture_3d<f32>;
-@group(0) @binding(7) var crowd: texture_3d<f32>;
+@group(0) @binding(5) var skull_hit: texture_2d<f32>;
+@group(0) @binding(6) var brain_hit: texture_2d<f32>;
+@group(0) @binding(7) var brain_rest: texture_2d<f32>;
+@group(0) @binding(8) var mri: texture_3d<f32>;
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
 
@@ -34,43 +31,39 @@ fn shaft(eye: vec3f, along: vec3f) -> f32 {
     return select(NOTHING, t, room > 0.0 && t > 0.0 && at > 0.0 && at < length2);
 }
 
+// Share of the lamp that passes a body at distance `gap` from the beam, `way` mm on: the lamp is a disc.
+fn pass_by(gap: f32, way: f32) -> f32 { return smoothstep(-1.0, 1.0, gap / (0.10 * way + 0.3)); }
+
 // Light that passes the tool on its way to a point: 0 in its shadow, 1 far from it.
 fn past_tool(point: vec3f) -> f32 {
     if scene.tip.w < 0.0 { return 1.0; }
-    var bright = 1.0;
-    var way = 0.6;
-    for (var i = 0; i < 12; i++) {
-        let gap = tool_distance(point + scene.light.xyz * way);
-        bright = min(bright, 0.5 + 4.0 * gap / way);
-        way += max(gap, 0.4);
-    }
-    return smoothstep(0.0, 1.0, bright);
-}
-
-// Ambient light at a point of the brain: little where bone crowds around it.
-fn openness(point: vec3f, normal: vec3f) -> f32 {
-    var dark = 0.0;
-    for (var i = 1; i <= 4; i++) {
-        let g = (point + normal * 2.0 * exp2(f32(i)) - scene.origin.xyz) / scene.origin.w;
-        dark += textureSampleLevel(crowd, linear, (g + 0.5) / (4.0 * vec3f(textureDimensions(crowd))), 0.0).x;
-    }
-    return exp(-0.9 * dark);
+    let to = scene.tip.xyz - point;
+    let way = max(dot(to, scene.light.xyz), 0.0);
+    let ball = pass_by(length(to - way * scene.light.xyz) - scene.tip.w, way);
+    // Nearest points of the beam and the shaft's axis (Ericson 2005, 5.1.9, with a beam that begins at the point).
+    let axis = scene.tail.xyz - scene.tip.xyz;
+    let b = dot(scene.light.xyz, axis);
+    let c = dot(axis, axis);
+    let d = dot(scene.light.xyz, -to);
+    let on_axis = clamp((dot(axis, -to) - b * d) / max(c - b * b, 1e-6), 0.0, 1.0);
+    let on_beam = max(b * on_axis - d, 0.0);
+    let gap = length(on_beam * scene.light.xyz - to - on_axis * axis) - scene.tail.w;
+    return ball * pass_by(gap, on_beam);
 }
 
 // Diffuse light from above left and from the sky, and a highlight.
 fn lit(albedo: vec3f, normal: vec3f, along: vec3f, open: f32, key: f32, gloss: f32) -> vec3f {
     let facing = max(dot(normal, scene.light.xyz), 0.0) * key;
     let sky = 0.5 + 0.5 * dot(normal, normalize(scene.up.xyz));
-    let ambient = open * mix(vec3f(0.16, 0.14, 0.13), vec3f(0.30, 0.33, 0.38), sky);
-    let head = 0.18 * open * max(-dot(normal, along), 0.0);
+    let ambient = open * mix(vec3f(0.10, 0.09, 0.085), vec3f(0.25, 0.28, 0.33), sky);
+    let head = 0.12 * (0.25 + 0.75 * open) * max(-dot(normal, along), 0.0);
     let halfway = normalize(scene.light.xyz - along);
     let shine = gloss * pow(max(dot(normal, halfway), 0.0), 48.0) * key * open;
-    return albedo * (ambient + head + facing * vec3f(0.78, 0.75, 0.69)) + shine;
+    return albedo * (ambient + head + facing * vec3f(0.66, 0.63, 0.57)) + shine;
 }
 
 fn bone_colour(point: vec3f, normal: vec3f) -> vec3f {
-    let g = (point - normal * 1.2 - scene.origin.xyz) / scene.origin.w;
-    let inside = textureSampleLevel(density, linear, (g + 0.5) / scene.dims.xyz, 0.0).x;
+    let inside = hu(grid_of(point - normal * 1.2));
     return mix(vec3f(0.80, 0.62, 0.50), vec3f(0.96, 0.91, 0.80), smoothstep(scene.dims.w, scene.dims.w + 500.0, inside));
 }
 
@@ -91,10 +84,10 @@ fn tool_colour(point: vec3f, on_ball: bool) -> vec3f {
     return mix(vec3f(0.34, 0.36, 0.40), vec3f(0.80, 0.80, 0.78), flute);
 }
 
-fn shade_tool(point: vec3f, along: vec3f, on_ball: bool) -> vec3f {
+fn shade_tool(point: vec3f, along: vec3f, on_ball: bool, on_end: bool) -> vec3f {
     let axis = normalize(scene.tail.xyz - scene.tip.xyz);
-    let away = point - scene.tip.xyz;
-    let normal = normalize(select(away - axis * dot(away, axis), away, on_ball));
+    let away = point - select(scene.tip.xyz, scene.tail.xyz, on_end);
+    let normal = normalize(select(away - axis * dot(away, axis), away, on_ball || on_end));
     return lit(tool_colour(point, on_ball), normal, along, 1.0, 1.0, 0.7);
 }
 
@@ -105,22 +98,24 @@ fn shade_tool(point: vec3f, along: vec3f, on_ball: bool) -> vec3f {
     var brain = textureLoad(brain_hit, at, 0);
     brain.w = select(NOTHING, brain.w, brain.w > 0.0);
     let tip = select(NOTHING, ball(scene.eye.xyz, along, scene.tip.xyz, scene.tip.w), scene.tip.w > 0.0);
-    let stem = select(NOTHING, shaft(scene.eye.xyz, along), scene.tip.w > 0.0);
+    let end = ball(scene.eye.xyz, along, scene.tail.xyz, scene.tail.w);
+    let stem = select(NOTHING, min(shaft(scene.eye.xyz, along), end), scene.tip.w > 0.0);
     let t = min(min(skull.w, brain.w), min(tip, stem));
     let point = scene.eye.xyz + t * along;
     let back = pixel.y / scene.up.w;
     var colour = mix(vec3f(0.105, 0.125, 0.155), vec3f(0.035, 0.04, 0.05), back);
     if t >= NOTHING {
     } else if t == tip || t == stem {
-        colour = shade_tool(point, along, t == tip);
+        colour = shade_tool(point, along, t == tip, t == end);
     } else if t == brain.w {
         let normal = unfold(brain.xy);
-        let open = openness(point, normal);
+        let g = grid_of(point);
         let rest = textureLoad(brain_rest, at, 0).xyz - 1.5 * normal;
-        colour = lit(brain_colour(rest), normal, along, open, past_tool(point) * smoothstep(0.05, 0.6, open), 0.25);
+        let key = past_tool(point) * select(1.0, 0.25, shadowed(g, normal));
+        colour = lit(brain_colour(rest), normal, along, openness(g, normal), key, 0.20);
     } else {
         let normal = unfold(skull.xy);
-        colour = lit(bone_colour(point, normal), normal, along, skull.z, past_tool(point), 0.10);
+        colour = lit(bone_colour(point, normal), normal, along, fract(skull.z), past_tool(point) * floor(skull.z), 0.06);
     }
     return vec4f(pow(clamp(colour, vec3f(0.0), vec3f(1.0)), vec3f(1.0 / 2.2)), 1.0);
 }

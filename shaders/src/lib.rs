@@ -4,18 +4,19 @@
 //! Passes of the picture start with the text of `scene.wgsl`, which declares what all of them know at binding 0.
 //! Every entry is checked by naga when its pipeline is made; there is nothing to build and no path to find at run time.
 
+/// The text of `scene.wgsl` before some others.
 macro_rules! picture {
-    ($file:literal) => {
-        concat!(include_str!("../render/scene.wgsl"), "\n", include_str!(concat!("../render/", $file)))
+    ($($file:literal),+) => {
+        concat!(include_str!("../render/scene.wgsl"), $("\n", include_str!(concat!("../render/", $file))),+)
     };
 }
 
-/// The bone's isosurface by ray casting.
-pub const RENDER_SKULL: &str = picture!("skull.wgsl");
+/// The bone's isosurface by ray casting; `bricks.wgsl` takes the rays through the grid.
+pub const RENDER_SKULL: &str = picture!("bricks.wgsl", "skull.wgsl");
 /// The brain's deformed surface.
 pub const RENDER_BRAIN: &str = picture!("brain.wgsl");
-/// Bone, brain and tool together, lit.
-pub const RENDER_LIGHT: &str = picture!("light.wgsl");
+/// Bone, brain and tool together, lit, with the shadows that bone throws on the brain.
+pub const RENDER_LIGHT: &str = picture!("bricks.wgsl", "light.wgsl");
 /// One orthogonal slice.
 pub const RENDER_SLICE: &str = picture!("slice.wgsl");
 /// The brain's outline in a slice.

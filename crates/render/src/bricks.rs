@@ -2,14 +2,17 @@
 //!
 //! # Theory
 //! The grid is padded by one voxel of air, so that bone at the border has a surface too. Cell (i, j, k) lies between the centres of padded voxels
-//! (i, j, k) and (i+1, j+1, k+1). A brick is 8³ cells. Where no corner of a brick's cells reaches the isovalue, no ray can
+//! (i, j, k) and (i+1, j+1, k+1). A brick is 4³ cells. Where no corner of a brick's cells reaches the isovalue, no ray can
 //! enter bone. Free bricks hold the distance to the nearest other one in bricks, the largest of the three axes counting (Cohen and Sheffer 1994).
 //!
 //! # Practice
 //! One byte a brick. Drilling only makes bricks free; a brick that gets bone back (an undo) makes the distances anew, which costs about 1 ms.
 
 use glam::{IVec3, Vec3};
-use trepan_volume::{AIR_HU, BRICK, BoneVolume};
+use trepan_volume::{AIR_HU, BoneVolume};
+
+/// Edge of a brick of cells; `BRICK` in `bricks.wgsl`. Divides the bone's own brick.
+pub(crate) const LEAP: usize = 4;
 
 /// Edge of a block whose share of bone is kept for ambient light, in voxels.
 pub(crate) const BLOCK: usize = 4;
@@ -67,7 +70,7 @@ pub(crate) fn corners(first: [usize; 3], edge: usize) -> impl Iterator<Item = IV
 
 impl Leaps {
     pub fn of(bone: &BoneVolume, grid: &Grid) -> Self {
-        let bricks = grid.dims.map(|n| (n - 1).div_ceil(BRICK));
+        let bricks = grid.dims.map(|n| (n - 1).div_ceil(LEAP));
         let mut leaps = Self { bricks, free: vec![255; bricks.iter().product()] };
         for at in 0..leaps.free.len() {
             if may_hold_bone(bone, leaps.place(at)) {
@@ -132,7 +135,7 @@ impl Leaps {
 
 /// Whether a corner of the cells of a brick reaches the isovalue.
 fn may_hold_bone(bone: &BoneVolume, brick: [usize; 3]) -> bool {
-    corners(brick.map(|b| b * BRICK), BRICK + 1).any(|padded| bone.is_bone(padded - 1))
+    corners(brick.map(|b| b * LEAP), LEAP + 1).any(|padded| bone.is_bone(padded - 1))
 }
 
 /// Densities of the padded box of `size` voxels from `first`, x fastest, by the given conversion.
@@ -184,17 +187,17 @@ mod tests {
 
     #[test]
     fn leaps_are_the_distance_to_the_nearest_bone_and_stay_safe_while_it_changes() {
-        let bone = bone_at([70, 40, 50], &[[3, 3, 3], [60, 20, 47]]);
+        let bone = bone_at([70, 40, 50], &[[3, 3, 2], [60, 20, 46]]);
         let grid = Grid::of(&bone);
         let mut leaps = Leaps::of(&bone, &grid);
         check(&bone, &leaps, true);
-        bone.set_hu(IVec3::new(60, 20, 47), AIR_HU);
-        for brick in corners([7, 2, 5], 2).map(|b| b.to_array().map(|v| v as usize)) {
+        bone.set_hu(IVec3::new(60, 20, 46), AIR_HU);
+        for brick in corners([14, 4, 10], 3).map(|b| b.to_array().map(|v| v as usize)) {
             assert!(!leaps.refresh(&bone, brick));
         }
         check(&bone, &leaps, false);
         bone.set_hu(IVec3::new(40, 30, 20), 700);
-        assert!(leaps.refresh(&bone, [5, 3, 2]));
+        assert!(leaps.refresh(&bone, [10, 7, 5]));
         check(&bone, &leaps, true);
     }
 
@@ -202,7 +205,7 @@ mod tests {
     fn a_corner_shared_by_eight_bricks_marks_them_all() {
         let bone = bone_at([20, 20, 20], &[[7, 7, 7]]);
         let leaps = Leaps::of(&bone, &Grid::of(&bone));
-        assert_eq!(leaps.bricks, [3, 3, 3]);
+        assert_eq!(leaps.bricks, [6, 6, 6]);
         assert_eq!(leaps.free.iter().filter(|&&f| f == 0).count(), 8);
         assert_eq!(Grid::of(&bone).share(&bone, [2, 2, 2]), 255 / 64 as u8);
     }

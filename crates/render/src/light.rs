@@ -2,9 +2,9 @@
 
 use crate::RenderError;
 use crate::scene::Scene;
+use crate::skull::{Skull, VOLUMES};
 use trepan_gpu::{
-    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
-    Topology,
+    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
 };
 
 /// The pass.
@@ -20,14 +20,13 @@ pub(crate) struct Inputs<'a> {
     pub brain_hit: &'a Texture,
     pub brain_rest: &'a Texture,
     pub mri: &'a Texture,
-    pub density: &'a Texture,
-    pub crowd: &'a Texture,
+    pub skull: &'a Skull,
 }
 
 impl Light {
     pub fn new(gpu: &Gpu) -> Result<Self, RenderError> {
-        let volume = Slot::Texture3;
-        let slots = [Slot::Uniform, Slot::Loaded2, Slot::Loaded2, Slot::Loaded2, volume, Slot::Sampler, volume, volume];
+        let own = [Slot::Loaded2, Slot::Loaded2, Slot::Loaded2, Slot::Texture3];
+        let slots = [&[Slot::Uniform], &VOLUMES[..], &own].concat();
         let spec = PipelineSpec {
             label: "light",
             wgsl: trepan_shaders::RENDER_LIGHT,
@@ -41,9 +40,8 @@ impl Light {
     }
 
     pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>, from: &Inputs) -> Result<Bindings, RenderError> {
-        let hits = [scene.into(), from.skull_hit.into(), from.brain_hit.into(), from.brain_rest.into()];
-        let volumes = [from.mri.into(), Resource::Linear, from.density.into(), from.crowd.into()];
-        Ok(self.pipeline.bind(gpu, &[hits, volumes].concat())?)
+        let own = [from.skull_hit.into(), from.brain_hit.into(), from.brain_rest.into(), from.mri.into()];
+        Ok(self.pipeline.bind(gpu, &[&[scene.into()], &from.skull.volumes()[..], &own].concat())?)
     }
 
     pub fn draw(&self, recorder: &mut Recorder, bindings: &Bindings, view: [u32; 4], picture: &Texture) {

@@ -261,14 +261,8 @@ impl Canvas {
         let skull_hit = sheet("skull hit", w, h, Format::Rgba32Float)?;
         let brain_hit = sheet("brain hit", w, h, Format::Rgba32Float)?;
         let brain_rest = sheet("brain rest", w, h, Format::Rgba16Float)?;
-        let inputs = Inputs {
-            skull_hit: &skull_hit,
-            brain_hit: &brain_hit,
-            brain_rest: &brain_rest,
-            mri: &mri.texture,
-            density: &skull.density,
-            crowd: &skull.crowd,
-        };
+        let inputs =
+            Inputs { skull_hit: &skull_hit, brain_hit: &brain_hit, brain_rest: &brain_rest, mri: &mri.texture, skull };
         Ok(Self {
             layout,
             picture: sheet("picture", width, height, Format::Rgba8Unorm)?,

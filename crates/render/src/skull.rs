@@ -10,7 +10,7 @@
 //! light reaches farther than a brick).
 
 use crate::RenderError;
-use crate::bricks::{BLOCK, Grid, Leaps, densities};
+use crate::bricks::{BLOCK, Grid, LEAP, Leaps, densities};
 use crate::camera::View;
 use crate::scene::Scene;
 use glam::Vec3;
@@ -31,6 +31,9 @@ const MARGIN_MM: f32 = 4.0;
 /// What a ray that meets nothing stores as its distance.
 pub(crate) const NOTHING: f32 = 1e30;
 
+/// The slots of [`Skull::volumes`].
+pub(crate) const VOLUMES: [Slot; 4] = [Slot::Texture3, Slot::Sampler, Slot::Integer3, Slot::Texture3];
+
 /// The skull on the device.
 #[derive(Debug)]
 pub(crate) struct Skull {
@@ -40,7 +43,7 @@ pub(crate) struct Skull {
     seen: Vec<u32>,
     pub density: Texture,
     leap: Texture,
-    pub crowd: Texture,
+    crowd: Texture,
     pipeline: Pipeline,
     cast_for: Option<View>,
     changed: Aabb,
@@ -68,7 +71,7 @@ impl Skull {
         let density = volume("density", grid.dims, Format::R16Float)?;
         let leap = volume("leap", leaps.bricks, Format::R8Uint)?;
         let crowd = volume("crowd", grid.blocks(), Format::R8Unorm)?;
-        let slots = [Slot::Uniform, Slot::Texture3, Slot::Sampler, Slot::Integer3, Slot::Texture3];
+        let slots = [&[Slot::Uniform], &VOLUMES[..]].concat();
         let pipeline = Pipeline::new(
             gpu,
             &PipelineSpec {
@@ -126,8 +129,9 @@ impl Skull {
         let size = [0, 1, 2].map(|a| BRICK.min(self.grid.dims[a] - 1 - first[a]));
         self.upload(gpu, first, size);
         let mut anew = false;
-        for n in 0..8 {
-            let cells = [brick[0] + n % 2, brick[1] + n / 2 % 2, brick[2] + n / 4];
+        for n in 0..27 {
+            let cells = [n % 3, n / 3 % 3, n / 9];
+            let cells = [0, 1, 2].map(|a| brick[a] * (BRICK / LEAP) + cells[a]);
             if (0..3).all(|a| cells[a] < self.leaps.bricks[a]) {
                 anew |= self.leaps.refresh(&self.bone, cells);
                 let free = self.leaps.free[self.leaps.index(cells)];
@@ -150,10 +154,14 @@ impl Skull {
         self.changed = self.changed.grown(corner(first.map(|v| v - 1))).grown(corner(high));
     }
 
+    /// What `bricks.wgsl` binds, after the uniform.
+    pub fn volumes(&self) -> [Resource<'_>; 4] {
+        [(&self.density).into(), Resource::Linear, (&self.leap).into(), (&self.crowd).into()]
+    }
+
     /// Binds the pass to the frame's uniform.
     pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Bindings, RenderError> {
-        let volumes = [Resource::from(&self.density), Resource::Linear, (&self.leap).into(), (&self.crowd).into()];
-        Ok(self.pipeline.bind(gpu, &[&[scene.into()], &volumes[..]].concat())?)
+        Ok(self.pipeline.bind(gpu, &[&[scene.into()], &self.volumes()[..]].concat())?)
     }
 
     /// Forgets the hits, so that the next picture casts all rays.

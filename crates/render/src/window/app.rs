@@ -2,10 +2,8 @@
 
 use super::input::{Hand, Pointer};
 use super::plot::Trace;
-use super::{Panel, Session, Shared, Start, WindowInput, banner, panel};
+use super::{Lent, Panel, Session, Shared, Start, WindowInput, banner, panel};
 use eframe::egui;
-use std::cell::RefCell;
-use std::rc::Rc;
 use std::time::Duration;
 
 /// Width of the side panel, points.
@@ -17,7 +15,7 @@ const SETTLE_S: f64 = 0.3;
 
 /// The application behind the window.
 pub(super) struct Window<S> {
-    shared: Rc<RefCell<Shared<S>>>,
+    lent: Lent<S>,
     start: Start,
     hand: Hand,
     force: Trace,
@@ -28,12 +26,12 @@ pub(super) struct Window<S> {
 }
 
 impl<S: Session> Window<S> {
-    pub fn new(context: &eframe::CreationContext<'_>, shared: Rc<RefCell<Shared<S>>>, start: Start) -> Self {
+    pub fn new(context: &eframe::CreationContext<'_>, lent: Lent<S>, start: Start) -> Self {
         context.egui_ctx.set_visuals(egui::Visuals::dark());
         let hand = Hand { world_from_tool: start.world_from_tool, camera: start.camera };
         let force = Trace::over(panel::SECONDS_SHOWN);
         Self {
-            shared,
+            lent,
             start,
             hand,
             force,
@@ -45,7 +43,7 @@ impl<S: Session> Window<S> {
     }
 
     /// Asks the session what is new.
-    fn update(&mut self, ui: &egui::Ui) {
+    fn update(&mut self, ui: &egui::Ui, shared: &mut Shared<S>) {
         let input = ui.input(|i| WindowInput {
             world_from_tool: self.hand.world_from_tool,
             pedal: i.key_down(egui::Key::Space) || self.clicks.pedal,
@@ -53,7 +51,7 @@ impl<S: Session> Window<S> {
             camera: self.hand.camera,
             seconds: i.time,
         });
-        self.panel = self.shared.borrow_mut().session.update(&input);
+        self.panel = shared.session.update(&input);
         self.force.push(input.seconds, self.panel.force_n.into());
     }
 
@@ -69,11 +67,10 @@ impl<S: Session> Window<S> {
     }
 
     /// Draws the picture for an area of the window and shows it there.
-    fn picture(&mut self, ui: &mut egui::Ui, state: &eframe::egui_wgpu::RenderState) {
+    fn picture(&mut self, ui: &mut egui::Ui, state: &eframe::egui_wgpu::RenderState, shared: &mut Shared<S>) {
         let space = ui.available_size().max(egui::vec2(8.0, 8.0));
         let (area, response) = ui.allocate_exact_size(space, egui::Sense::click_and_drag());
         let now = ui.input(|i| i.time);
-        let shared = &mut *self.shared.borrow_mut();
         let coarse = shared.renderer.gpu().is_software() && now - self.moved_at < SETTLE_S;
         let scale = ui.ctx().pixels_per_point() * if coarse { COARSE } else { 1.0 };
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
@@ -123,17 +120,20 @@ fn show(
 
 impl<S: Session> eframe::App for Window<S> {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
-        self.update(ui);
+        let lent = self.lent.clone();
+        let mut lent = lent.borrow_mut();
+        let Some(shared) = lent.as_mut() else { return };
+        self.update(ui, shared);
         self.react(ui);
         banner::show(ui, &self.panel.warnings);
         egui::Panel::right("panel").exact_size(PANEL_WIDTH).resizable(false).show(ui, |ui| {
             self.clicks = panel::show(ui, &self.panel, &self.force);
         });
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| match frame.wgpu_render_state() {
-            Some(state) => self.picture(ui, state),
-            None => self.shared.borrow_mut().fault = Some("the window has no graphics device".into()),
+            Some(state) => self.picture(ui, state, shared),
+            None => shared.fault = Some("the window has no graphics device".into()),
         });
-        if self.shared.borrow().fault.is_some() {
+        if shared.fault.is_some() {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
         }
         ui.ctx().request_repaint_after(Duration::from_secs_f32(1.0 / self.start.rate_hz.clamp(1.0, 240.0)));

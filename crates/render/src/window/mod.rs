@@ -113,27 +113,39 @@ pub(crate) struct Shared<S> {
     pub fault: Option<String>,
 }
 
+/// Lent to the window, taken back when it is closed.
+pub(crate) type Lent<S> = Rc<RefCell<Option<Shared<S>>>>;
+
 /// Shows the window until it is closed. Must be called on the main thread.
 pub fn run<S: Session + 'static>(title: &str, renderer: Renderer, session: S, start: Start) -> Closed<S> {
     let gpu = renderer.gpu().clone();
-    let shared = Rc::new(RefCell::new(Shared { session, renderer, fault: None }));
-    let given = shared.clone();
+    let lent: Lent<S> = Rc::new(RefCell::new(Some(Shared { session, renderer, fault: None })));
+    let result = display().and_then(|()| open(title, &gpu, &lent, start));
+    let back = lent.borrow_mut().take();
+    let Some(Shared { session, renderer, fault }) = back else { unreachable!("only this line takes what was lent") };
+    Closed { session, renderer, result: fault.map_or(result, |why| Err(WindowError::Failed(why))) }
+}
+
+/// Opens the window and stays until it is closed.
+fn open<S: Session + 'static>(
+    title: &str,
+    gpu: &trepan_gpu::Gpu,
+    lent: &Lent<S>,
+    start: Start,
+) -> Result<(), WindowError> {
+    let lent = lent.clone();
     let show = || {
         let create: eframe::AppCreator<'_> =
-            Box::new(move |context| Ok(Box::new(app::Window::new(context, given, start))));
-        eframe::run_native(title, options(&gpu, &start), create)
+            Box::new(move |context| Ok(Box::new(app::Window::new(context, lent, start))));
+        eframe::run_native(title, options(gpu, &start), create)
     };
-    let result = match display() {
-        Err(error) => Err(error),
-        // A missing system library makes the windowing crate panic; that must not take the session along.
-        Ok(()) => match std::panic::catch_unwind(std::panic::AssertUnwindSafe(show)) {
-            Ok(Ok(())) => Ok(()),
-            Ok(Err(eframe::Error::WinitEventLoop(e))) => Err(WindowError::NoDisplay(e.to_string())),
-            Ok(Err(e)) => Err(WindowError::Failed(e.to_string())),
-            Err(panic) => Err(WindowError::Failed(words(panic.as_ref()))),
-        },
-    };
-    take_back(shared, result)
+    // A missing system library makes the windowing crate panic; that must not take the session along.
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(show)) {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(eframe::Error::WinitEventLoop(e))) => Err(WindowError::NoDisplay(e.to_string())),
+        Ok(Err(e)) => Err(WindowError::Failed(e.to_string())),
+        Err(panic) => Err(WindowError::Failed(words(panic.as_ref()))),
+    }
 }
 
 /// Whether a display is announced at all.
@@ -167,12 +179,4 @@ fn options(gpu: &trepan_gpu::Gpu, start: &Start) -> eframe::NativeOptions {
 fn words(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
     text.unwrap_or("no reason given").into()
-}
-
-fn take_back<S>(shared: Rc<RefCell<Shared<S>>>, result: Result<(), WindowError>) -> Closed<S> {
-    // The window is gone, and with it every other owner.
-    let Some(shared) = Rc::into_inner(shared) else { unreachable!("the closed window still holds its session") };
-    let Shared { session, renderer, fault } = shared.into_inner();
-    let result = fault.map_or(result, |why| Err(WindowError::Failed(why)));
-    Closed { session, renderer, result }
 }
