@@ -1,6 +1,6 @@
 //! Files that appear whole or not at all.
 
-use crate::WriteError;
+use crate::{Sample, WriteError};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
@@ -21,5 +21,16 @@ pub(crate) fn write_atomically(
     drop(buffered);
     file.as_file().sync_all().map_err(io)?;
     file.persist(path).map_err(|e| io(e.error))?;
+    Ok(())
+}
+
+/// Little-endian voxels, a part at a time.
+pub(crate) fn write_voxels<T: Sample>(to: &mut impl Write, data: &[T]) -> io::Result<()> {
+    let mut bytes = Vec::with_capacity(1 << 16);
+    for part in data.chunks(1 << 13) {
+        bytes.clear();
+        part.iter().for_each(|v| v.write_le(&mut bytes));
+        to.write_all(&bytes)?;
+    }
     Ok(())
 }

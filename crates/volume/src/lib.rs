@@ -17,10 +17,13 @@ mod brain;
 mod component;
 mod distance;
 mod error;
+mod keys;
+pub mod metaimage;
 #[cfg(test)]
 mod mutation;
 pub mod nifti;
 mod note;
+pub mod nrrd;
 mod overlap;
 mod read;
 mod resample;

@@ -22,7 +22,9 @@ pub enum Note {
         count: usize,
     },
     /// Left and right are a guess.
-    #[error("the file does not say how the patient lies ({field}): i is taken as right, j as front, k as head")]
+    #[error(
+        "the file does not say how the patient lies ({field}); the format's default is taken, so check left and right"
+    )]
     NoOrientation {
         /// The field that would say it.
         field: &'static str,

@@ -10,11 +10,17 @@ use crate::{ReadError, VoxelVolume};
 use flate2::read::{MultiGzDecoder, ZlibDecoder};
 use glam::{DAffine3, DVec3};
 use std::fs::File;
-use std::io::{self, Cursor, Read, Seek, SeekFrom};
+use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
+
+/// What a gzip file starts with.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// No deflate stream unpacks to more than this many times its length.
 const DEFLATE_LIMIT: u64 = 1032;
+
+/// Longest line of a header, bytes.
+const LONGEST_LINE: usize = 1 << 16;
 
 /// Bytes that are decoded at a time; a multiple of every number's size.
 const CHUNK: usize = 1 << 16;
@@ -23,6 +29,8 @@ const CHUNK: usize = 1 << 16;
 pub(crate) struct Source {
     file: PathBuf,
     stream: Box<dyn Read>,
+    /// Bytes that were looked at and not taken.
+    ahead: Vec<u8>,
     compressed: bool,
     /// Most bytes that can still come.
     left: u64,
@@ -32,8 +40,15 @@ pub(crate) struct Source {
 impl Source {
     /// Opens a file and looks whether it is gzip.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
+        let mut plain = Self::open_plain(path)?;
+        let gzip = plain.peek(2)? == GZIP;
+        Ok(if gzip { plain.gunzipped() } else { plain })
+    }
+
+    /// Opens a file whose bytes are to be taken as they are.
+    pub fn open_plain(path: &Path) -> Result<Self, ReadError> {
         let io = |source| ReadError::Io { file: path.into(), source };
-        let mut file = File::open(path).map_err(|source| match source.kind() {
+        let file = File::open(path).map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => ReadError::Missing { file: path.into() },
             _ => io(source),
         })?;
@@ -41,22 +56,25 @@ impl Source {
         if !kind.is_file() {
             return Err(io(io::Error::other("it is not a regular file")));
         }
-        let mut start = [0; 2];
-        let got = read_up_to(&mut file, &mut start).map_err(io)?;
-        file.seek(SeekFrom::Start(0)).map_err(io)?;
-        let stream = Box::new(io::BufReader::with_capacity(CHUNK, file));
-        Ok(Self::of_stream(path, stream, kind.len(), start[..got] == [0x1f, 0x8b]))
+        Ok(Self::of_stream(path, Box::new(io::BufReader::with_capacity(CHUNK, file)), kind.len()))
     }
 
     /// The same from bytes in memory; `name` stands in messages.
+    #[cfg(test)]
     pub fn of_bytes(name: &Path, bytes: Vec<u8>) -> Self {
-        let (length, gzip) = (bytes.len() as u64, bytes.starts_with(&[0x1f, 0x8b]));
-        Self::of_stream(name, Box::new(Cursor::new(bytes)), length, gzip)
+        let (length, gzip) = (bytes.len() as u64, bytes.starts_with(&GZIP));
+        let plain = Self::of_stream(name, Box::new(Cursor::new(bytes)), length);
+        if gzip { plain.gunzipped() } else { plain }
     }
 
-    fn of_stream(file: &Path, stream: Box<dyn Read>, length: u64, gzip: bool) -> Self {
-        let plain = Self { file: file.into(), stream, compressed: false, left: length, taken: 0 };
-        if gzip { plain.gunzipped() } else { plain }
+    fn of_stream(file: &Path, stream: Box<dyn Read>, length: u64) -> Self {
+        Self { file: file.into(), stream, ahead: Vec::new(), compressed: false, left: length, taken: 0 }
+    }
+
+    /// All that is left, as a source of its own.
+    pub fn take_rest(&mut self) -> Self {
+        let rest = Self::of_stream(&self.file, Box::new(io::empty()), 0);
+        std::mem::replace(self, rest)
     }
 
     /// What follows, unpacked as gzip.
@@ -64,14 +82,16 @@ impl Source {
         self.unpacked(|stream| Box::new(MultiGzDecoder::new(stream)))
     }
 
-    /// What follows, unpacked as zlib.
-    pub fn inflated(self) -> Self {
-        self.unpacked(|stream| Box::new(ZlibDecoder::new(stream)))
+    /// What follows, unpacked as gzip or zlib, whichever it is.
+    pub fn unpacked_by_content(mut self) -> Result<Self, ReadError> {
+        let gzip = self.peek(2)? == GZIP;
+        Ok(if gzip { self.gunzipped() } else { self.unpacked(|stream| Box::new(ZlibDecoder::new(stream))) })
     }
 
     fn unpacked(self, unpack: impl FnOnce(Box<dyn Read>) -> Box<dyn Read>) -> Self {
         let left = self.left.saturating_mul(DEFLATE_LIMIT);
-        Self { stream: unpack(self.stream), compressed: true, left, taken: 0, ..self }
+        let packed: Box<dyn Read> = Box::new(Cursor::new(self.ahead).chain(self.stream));
+        Self { file: self.file, stream: unpack(packed), ahead: Vec::new(), compressed: true, left, taken: 0 }
     }
 
     /// The file's path.
@@ -89,19 +109,91 @@ impl Source {
         self.left
     }
 
+    /// Looks at up to `count` of the next bytes without taking them.
+    pub fn peek(&mut self, count: usize) -> Result<&[u8], ReadError> {
+        let mut more = vec![0; count.saturating_sub(self.ahead.len())];
+        let got = self.pull(&mut more)?;
+        self.ahead.extend_from_slice(&more[..got]);
+        Ok(&self.ahead[..count.min(self.ahead.len())])
+    }
+
     /// Takes what is there, up to the whole of `buffer`; returns how much came.
     pub fn some(&mut self, buffer: &mut [u8]) -> Result<usize, ReadError> {
-        let got = read_up_to(&mut self.stream, buffer).map_err(|source| match (self.compressed, source.kind()) {
+        let known = self.ahead.len().min(buffer.len());
+        buffer[..known].copy_from_slice(&self.ahead[..known]);
+        self.ahead.drain(..known);
+        let got = known + self.pull(&mut buffer[known..])?;
+        self.taken += got as u64;
+        self.left = self.left.saturating_sub(got as u64);
+        Ok(got)
+    }
+
+    fn pull(&mut self, buffer: &mut [u8]) -> Result<usize, ReadError> {
+        read_up_to(&mut self.stream, buffer).map_err(|source| match (self.compressed, source.kind()) {
             (true, io::ErrorKind::UnexpectedEof) => {
                 let compressed = io::Error::other("they end in the middle");
                 ReadError::Compression { file: self.file.clone(), source: compressed }
             }
             (true, _) => ReadError::Compression { file: self.file.clone(), source },
             (false, _) => ReadError::Io { file: self.file.clone(), source },
-        })?;
-        self.taken += got as u64;
-        self.left = self.left.saturating_sub(got as u64);
-        Ok(got)
+        })
+    }
+
+    /// Takes a line of text without its end; `None` at the end of the file.
+    pub fn line(&mut self) -> Result<Option<String>, ReadError> {
+        let mut line = Vec::new();
+        let mut byte = [0];
+        while self.some(&mut byte)? == 1 {
+            match byte[0] {
+                b'\n' => return Ok(Some(text_of(line))),
+                _ if line.len() >= LONGEST_LINE => {
+                    return Err(self.field("the header", "a line of more than 64 KiB", "fetch the file again"));
+                }
+                other => line.push(other),
+            }
+        }
+        Ok((!line.is_empty()).then(|| text_of(line)))
+    }
+
+    /// Decodes numbers in writing, parted by white space or commas.
+    pub fn written_samples(&mut self, count: u64) -> Result<Vec<f32>, ReadError> {
+        let mut values = Vec::new();
+        while (values.len() as u64) < count {
+            let Some(line) = self.line()? else { break };
+            let words = line.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty());
+            for word in words.take(count as usize - values.len()) {
+                let wrong = || self.field("the voxels", format!("{word:?}"), "only numbers may stand there");
+                values.push(word.parse().map_err(|_| wrong())?);
+            }
+        }
+        match values.len() as u64 == count {
+            true => Ok(values),
+            false => Err(self.truncated("voxels", count, values.len() as u64)),
+        }
+    }
+
+    /// Passes over all but the last `count` bytes.
+    pub fn skip_to_last(&mut self, count: u64) -> Result<(), ReadError> {
+        if !self.compressed {
+            return match self.left.checked_sub(count) {
+                Some(before) => self.skip(before, "bytes before the voxels"),
+                None => Err(self.truncated("voxels", count, self.left)),
+            };
+        }
+        let mut all = Vec::new();
+        let mut buffer = vec![0; CHUNK];
+        loop {
+            let got = self.some(&mut buffer)?;
+            all.extend_from_slice(&buffer[..got]);
+            if got < buffer.len() {
+                break;
+            }
+        }
+        let found = all.len() as u64;
+        let Some(before) = found.checked_sub(count) else { return Err(self.truncated("voxels", count, found)) };
+        self.ahead = all.split_off(before as usize);
+        self.left = count;
+        Ok(())
     }
 
     /// Takes exactly `N` bytes of a header.
@@ -209,6 +301,13 @@ fn grow(values: &mut Vec<f32>, more: usize, limit: usize) {
         let wanted = (2 * values.len()).max(values.len() + more).min(limit.max(values.len() + more));
         values.reserve_exact(wanted - values.len());
     }
+}
+
+fn text_of(mut line: Vec<u8>) -> String {
+    if line.last() == Some(&b'\r') {
+        line.pop();
+    }
+    String::from_utf8_lossy(&line).into_owned()
 }
 
 fn read_up_to(stream: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {

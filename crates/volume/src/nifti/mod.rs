@@ -44,19 +44,16 @@ pub fn import_volume(path: &Path, index: u64) -> Result<Import, ReadError> {
 }
 
 fn read_one(path: &Path, index: Option<u64>) -> Result<Import, ReadError> {
-    let path = &header_of_pair(path);
-    let mut source = Source::open(path)?;
+    import_source(Source::open(&header_of_pair(path))?, index)
+}
+
+/// Reads from a source that starts with the header.
+pub(crate) fn import_source(mut source: Source, index: Option<u64>) -> Result<Import, ReadError> {
     let header = Header::read(&mut source)?;
     match header.voxels_elsewhere {
         false => voxels(source, &header, index),
-        true => voxels(Source::open(&voxels_of_pair(path)?)?, &header, index),
+        true => voxels(Source::open(&voxels_of_pair(source.file())?)?, &header, index),
     }
-}
-
-/// Reads a single file whose bytes are at hand.
-pub(crate) fn import_source(mut source: Source, index: Option<u64>) -> Result<Import, ReadError> {
-    let header = Header::read(&mut source)?;
-    voxels(source, &header, index)
 }
 
 fn voxels(mut source: Source, header: &Header, index: Option<u64>) -> Result<Import, ReadError> {
@@ -97,7 +94,7 @@ fn several(source: &Source, header: &Header, remedy: &'static str) -> ReadError 
 }
 
 /// The header's path where the user named the voxels' half of a pair.
-fn header_of_pair(path: &Path) -> PathBuf {
+pub(crate) fn header_of_pair(path: &Path) -> PathBuf {
     let plain = if ends(path, "gz") { path.with_extension("") } else { path.into() };
     let other = [plain.with_extension("hdr"), plain.with_extension("HDR"), plain.with_extension("hdr.gz")];
     match ends(&plain, "img") {

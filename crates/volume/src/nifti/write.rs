@@ -1,6 +1,6 @@
 //! NIfTI-1, single file, little-endian.
 
-use crate::atomic::write_atomically;
+use crate::atomic::{write_atomically, write_voxels};
 use crate::{Sample, VoxelVolume, WriteError};
 use flate2::{Compression, write::GzEncoder};
 use glam::{DAffine3, DMat3, DQuat};
@@ -26,13 +26,7 @@ pub fn write<T: Sample>(path: &Path, volume: &VoxelVolume<T>) -> Result<(), Writ
 
 fn body<T: Sample>(to: &mut impl Write, header: &[u8], data: &[T]) -> io::Result<()> {
     to.write_all(header)?;
-    let mut bytes = Vec::with_capacity(1 << 16);
-    for part in data.chunks(1 << 13) {
-        bytes.clear();
-        part.iter().for_each(|v| v.write_le(&mut bytes));
-        to.write_all(&bytes)?;
-    }
-    Ok(())
+    write_voxels(to, data)
 }
 
 fn header<T: Sample>(path: &Path, volume: &VoxelVolume<T>) -> Result<[u8; HEADER], WriteError> {

@@ -1,0 +1,182 @@
+//! MetaImage: a text header of "Key = value" lines and the voxels, in one file (.mha) or two (.mhd with .raw or .zraw).
+//!
+//! # Theory
+//! `TransformMatrix` lists the direction of each axis one after the other, `ElementSpacing` the edges, `Offset` the centre of the first voxel,
+//! all in LPS; so `world = diag(-1, -1, 1) · (direction · spacing | offset)`.
+//!
+//! # Practice
+//! Read: raw, zlib and text voxels; both byte orders; headers in the voxels' file to skip (`HeaderSize`, also -1); the intensity function.
+//! `AnatomicalOrientation` is not looked at: writers disagree about it and the matrix says the same.
+//!
+//! # Sources
+//! Kitware, "MetaIO/Documentation", itk.org/Wiki/ITK/MetaIO/Documentation.
+//!
+//! # When not to use it
+//! For new files: NIfTI and NRRD say more about the space.
+
+use crate::keys::{Keys, numbers};
+use crate::sample::{ByteOrder, Number, Scale};
+use crate::source::Source;
+use crate::{Import, Note, ReadError, VoxelVolume};
+use glam::{DAffine3, DMat3, DVec3};
+use std::path::Path;
+
+/// Reads the volume of a file.
+pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
+    import(path).map(|import| import.volume)
+}
+
+/// Reads the volume of a file, with what there is to say about it.
+pub fn import(path: &Path) -> Result<Import, ReadError> {
+    import_source(Source::open_plain(path)?)
+}
+
+/// Reads from a source that starts with the header.
+pub(crate) fn import_source(mut source: Source) -> Result<Import, ReadError> {
+    let keys = Keys::read(&mut source, "=", |line| line.trim_start().starts_with("ElementDataFile"))?;
+    let file = keys.needed(&source, "ElementDataFile")?;
+    let dims = dims(&source, &keys)?;
+    let count = source.voxels("DimSize", dims)?;
+    let (world_from_voxel, note) = orientation(&source, &keys)?;
+    let data = match file.to_ascii_uppercase().as_str() {
+        "LOCAL" => voxels(&mut source, &keys, count)?,
+        "LIST" => {
+            return Err(source.field("ElementDataFile", "LIST", "one file must hold all voxels; convert it to .mha"));
+        }
+        name if name.contains('%') => {
+            return Err(source.field(
+                "ElementDataFile",
+                format!("{file:?}"),
+                "one file must hold all voxels; convert it to .mha",
+            ));
+        }
+        _ => {
+            voxels(&mut Source::open_plain(&source.file().parent().unwrap_or(Path::new("")).join(file))?, &keys, count)?
+        }
+    };
+    let volume = source.volume(dims, data, "TransformMatrix", world_from_voxel)?;
+    Ok(Import::new(volume, note.into_iter().collect()))
+}
+
+fn dims(source: &Source, keys: &Keys) -> Result<[i64; 3], ReadError> {
+    if let Some(kind) = keys.text(&["ObjectType"]).filter(|kind| !kind.eq_ignore_ascii_case("image")) {
+        return Err(source.field("ObjectType", format!("{kind:?}"), "only Image is read"));
+    }
+    let sizes: Vec<i64> = numbers(source, "DimSize", keys.needed(source, "DimSize")?)?;
+    let channels: Vec<u64> =
+        numbers(source, "ElementNumberOfChannels", keys.text(&["ElementNumberOfChannels"]).unwrap_or("1"))?;
+    let wrong = || ReadError::Dimensions { file: source.file().into(), field: "DimSize", found: format!("{sizes:?}") };
+    let (first, rest) = sizes.split_first_chunk::<3>().ok_or_else(wrong)?;
+    let several = rest.iter().map(|&n| n.unsigned_abs()).chain(channels).find(|&n| n != 1);
+    match several {
+        None => Ok(*first),
+        Some(found) => Err(ReadError::Volumes {
+            file: source.file().into(),
+            field: "DimSize or ElementNumberOfChannels",
+            found,
+            remedy: "one must be cut out first: time series and vectors are not read",
+        }),
+    }
+}
+
+fn orientation(source: &Source, keys: &Keys) -> Result<(DAffine3, Option<Note>), ReadError> {
+    let vector = |field: &'static str, text: &str, least: usize| {
+        let found: Vec<f64> = numbers(source, field, text)?;
+        match found.len() >= least {
+            true => Ok(found),
+            false => Err(source.field(field, format!("{text:?}"), "a number for each dimension must stand there")),
+        }
+    };
+    let rank = numbers::<i64>(source, "DimSize", keys.needed(source, "DimSize")?)?.len();
+    let spacing = vector("ElementSpacing", keys.text(&["ElementSpacing", "ElementSize"]).unwrap_or("1 1 1"), 3)?;
+    let offset = vector("Offset", keys.text(&["Offset", "Position", "Origin"]).unwrap_or("0 0 0"), 3)?;
+    let spacing = DVec3::new(spacing[0], spacing[1], spacing[2]);
+    if !spacing.cmpgt(DVec3::ZERO).all() {
+        return Err(ReadError::Spacing {
+            file: source.file().into(),
+            field: "ElementSpacing",
+            found: spacing.to_string(),
+        });
+    }
+    let (matrix3, note) = match keys.text(&["TransformMatrix", "Orientation", "Rotation"]) {
+        None => (DMat3::IDENTITY, Some(Note::NoOrientation { field: "no TransformMatrix" })),
+        Some(text) => {
+            let m = vector("TransformMatrix", text, rank * rank)?;
+            let column = |axis: usize| DVec3::new(m[axis * rank], m[axis * rank + 1], m[axis * rank + 2]);
+            (DMat3::from_cols(column(0), column(1), column(2)), None)
+        }
+    };
+    let lps = DAffine3 {
+        matrix3: matrix3 * DMat3::from_diagonal(spacing),
+        translation: DVec3::new(offset[0], offset[1], offset[2]),
+    };
+    Ok((DAffine3::from_scale(DVec3::new(-1.0, -1.0, 1.0)) * lps, note))
+}
+
+fn voxels(source: &mut Source, keys: &Keys, count: u64) -> Result<Vec<f32>, ReadError> {
+    let yes = |names: &[&str]| keys.text(names).is_some_and(|v| v.eq_ignore_ascii_case("true") || v == "1");
+    let number = number(source, keys.needed(source, "ElementType")?)?;
+    let order = match yes(&["BinaryDataByteOrderMSB", "ElementByteOrderMSB"]) {
+        true => ByteOrder::Big,
+        false => ByteOrder::Little,
+    };
+    let scale = scale(source, keys)?;
+    if keys.text(&["BinaryData"]).is_some_and(|v| v.eq_ignore_ascii_case("false")) {
+        let mut values = source.written_samples(count)?;
+        values.iter_mut().for_each(|v| *v = (scale.slope * f64::from(*v) + scale.intercept) as f32);
+        return Ok(values);
+    }
+    let before: Vec<i64> = numbers(source, "HeaderSize", keys.text(&["HeaderSize"]).unwrap_or("0"))?;
+    let mut unpacked;
+    let from = match yes(&["CompressedData"]) {
+        false => source,
+        true => {
+            let rest = source.take_rest();
+            unpacked = rest.unpacked_by_content()?;
+            &mut unpacked
+        }
+    };
+    match before.first().map(|&n| u64::try_from(n)) {
+        None | Some(Ok(0)) => {}
+        Some(Ok(bytes)) => from.skip(bytes, "HeaderSize")?,
+        Some(Err(_)) => from.skip_to_last(count.saturating_mul(number.bytes() as u64))?,
+    }
+    let data = from.samples(count, number, order, scale)?;
+    from.check_end()?;
+    Ok(data)
+}
+
+fn scale(source: &Source, keys: &Keys) -> Result<Scale, ReadError> {
+    let of = |field: &'static str, default: f64| {
+        let Some(text) = keys.text(&[field]) else { return Ok(default) };
+        let found: Option<f64> = text.parse().ok().filter(|v: &f64| v.is_finite());
+        found.ok_or_else(|| source.field(field, format!("{text:?}"), "a number must stand there"))
+    };
+    let slope = of("ElementToIntensityFunctionSlope", 1.0)?;
+    Ok(Scale { slope, intercept: of("ElementToIntensityFunctionOffset", 0.0)? })
+}
+
+fn number(source: &Source, name: &str) -> Result<Number, ReadError> {
+    Ok(match name.to_ascii_uppercase().as_str() {
+        "MET_UCHAR" => Number::U8,
+        "MET_CHAR" => Number::I8,
+        "MET_USHORT" => Number::U16,
+        "MET_SHORT" => Number::I16,
+        "MET_UINT" | "MET_ULONG" => Number::U32,
+        "MET_INT" | "MET_LONG" => Number::I32,
+        "MET_ULONG_LONG" => Number::U64,
+        "MET_LONG_LONG" => Number::I64,
+        "MET_FLOAT" => Number::F32,
+        "MET_DOUBLE" => Number::F64,
+        _ => {
+            return Err(source.field(
+                "ElementType",
+                format!("{name:?}"),
+                "a number type of MetaImage is right, such as MET_SHORT",
+            ));
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests;
