@@ -30,7 +30,8 @@
 //! distance fields*, IEEE Trans. Haptics 10 (2017), for continuous motion.
 //!
 //! # When not to use it
-//! For tools that are not balls. For balls much smaller than a voxel: discs leave gaps of a fifth of a voxel.
+//! For tools that are not balls. Where edges sharper than a voxel matter: discs stand out over them by up to
+//! `disc_voxels`.
 
 use crate::half_spaces::{HalfSpace, nearest};
 use crate::removal::{Burr, Cut, Law};
@@ -54,12 +55,17 @@ const TOUCH: f32 = 0.05;
 /// How the method is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// Radius of a disc, voxels. 0.5 leaves gaps that only balls under a fifth of a voxel could enter; more fattens sharp edges.
+    /// Radius of a disc, voxels. Under 0.71 discs on a plane leave gaps, over which a ball bobs; more fattens sharp edges.
     pub disc_voxels: f32,
     /// Longest way between two gatherings, voxels. More visits more voxels a tick, less takes more gatherings at speed.
     pub move_voxels: f32,
     /// Most gatherings in one tick. What is left of the way is gone in the next tick.
     pub max_moves: u32,
+    /// How deep a burr at work sits in the bone that it cuts, voxels. Its bore is then a little wider than what touches, so that it does not
+    /// lock there. Must be less than `slop_voxels`.
+    pub bite_voxels: f32,
+    /// Overlap that a jammed ball may have, voxels: in a bore of its own width the unevenness of opposite walls would lock it.
+    pub slop_voxels: f32,
     /// How fast a ball that overlaps bone is let out, mm/ms.
     pub recover_mm_per_ms: f32,
     /// What a burr takes away.
@@ -68,8 +74,15 @@ pub struct Config {
 
 impl Config {
     /// The charted choice.
-    pub const RECOMMENDED: Self =
-        Self { disc_voxels: 0.5, move_voxels: 0.5, max_moves: 512, recover_mm_per_ms: 0.05, removal: Law::RATE };
+    pub const RECOMMENDED: Self = Self {
+        disc_voxels: 0.8,
+        move_voxels: 0.5,
+        max_moves: 512,
+        bite_voxels: 0.15,
+        slop_voxels: 0.2,
+        recover_mm_per_ms: 0.05,
+        removal: Law::RATE,
+    };
 }
 
 impl Default for Config {
@@ -87,6 +100,8 @@ pub struct DistanceField {
     placed: bool,
     /// Smallest clearance after the last tick, voxels; what is nearer than this by more than a voxel is known to be free.
     settled: bool,
+    /// How deep the burr sits in the bone now, mm: follows the pedal at `recover_mm_per_ms`.
+    bite_mm: f32,
     discs: Discs,
     spaces: Vec<HalfSpace>,
     burr: Burr,
@@ -102,10 +117,24 @@ impl DistanceField {
             proxy: Pose::IDENTITY,
             placed: false,
             settled: false,
-            discs: Discs::with_limit(MAX_DISCS),
+            bite_mm: 0.0,
+            discs: Discs::new(MAX_DISCS, config.disc_voxels),
             spaces: Vec::with_capacity(MAX_DISCS),
             burr: Burr::new(config.removal, MAX_BITES),
         }
+    }
+
+    /// Radius of the ball that touches, mm.
+    fn radius_mm(&self) -> f32 {
+        self.tool.tip_radius_mm - self.bite_mm
+    }
+
+    /// Lets the burr sink in while it works, and out again, at a rate that a hand does not feel as a jump.
+    fn bite(&mut self, bone: &BoneVolume, works: bool, dt_ms: f32) {
+        let depth = if works { self.config.bite_voxels * bone.spacing_mm() } else { 0.0 };
+        let depth = depth.min(0.5 * self.tool.tip_radius_mm);
+        let change = self.config.recover_mm_per_ms * dt_ms;
+        self.bite_mm += (depth - self.bite_mm).clamp(-change, change);
     }
 
     /// Moves the proxy as near to `device` as the bone lets it.
@@ -129,7 +158,7 @@ impl DistanceField {
     /// One gathering and the slides within it. Returns whether the proxy has come to rest.
     fn advance(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) -> bool {
         let (spacing, reach) = (bone.spacing_mm(), self.config.move_voxels);
-        let radius = self.tool.tip_radius_mm / spacing;
+        let radius = self.radius_mm() / spacing;
         let start = bone.grid_of(self.proxy.translation);
         let hollow = if self.settled { radius - 1.0 } else { 0.0 };
         self.discs.gather(bone, start, hollow, radius + reach + self.config.disc_voxels);
@@ -138,7 +167,7 @@ impl DistanceField {
         let base = self.discs.base.as_vec3();
         let (from, goal) = (start - base, bone.grid_of(device) - base);
         let inside = bone.is_bone(bone.voxel_of(self.proxy.translation));
-        let ball = Ball { radius, disc: self.config.disc_voxels, inside };
+        let ball = Ball { radius, slop: self.config.slop_voxels, inside };
         let recover = self.config.recover_mm_per_ms * dt_ms / spacing;
         let slide = ball.slide(self.discs.list(), &mut self.spaces, from, goal, reach, recover);
         out.fallbacks += u32::from(slide.contradiction);
@@ -158,10 +187,10 @@ impl DistanceField {
         if depth == 0.0 {
             return;
         }
-        let (spacing, radius) = (bone.spacing_mm(), self.tool.tip_radius_mm);
+        let (spacing, radius) = (bone.spacing_mm(), self.radius_mm());
         let base = self.discs.base.as_vec3();
         let centre = bone.grid_of(self.proxy.translation) - base;
-        let ball = Ball { radius: radius / spacing, disc: self.config.disc_voxels, inside: false };
+        let ball = Ball { radius: radius / spacing, slop: self.config.slop_voxels, inside: false };
         for disc in self.discs.list() {
             let near = ball.nearest(disc, centre);
             if near.distance < ball.radius + TOUCH {
@@ -191,11 +220,14 @@ impl RigidContact for DistanceField {
             self.reset(tool.world_from_tool);
         }
         self.proxy.rotation = tool.world_from_tool.rotation;
+        let works = drilling && self.tool.kind == ToolKind::Burr;
+        self.bite(bone, works, dt_ms);
         self.follow(bone, device, dt_ms, out);
         self.report(bone, device, out);
-        if drilling && self.tool.kind == ToolKind::Burr {
-            let cut = Cut { device, proxy: self.proxy.translation, radius_mm: self.tool.tip_radius_mm, dt_ms };
-            out.removed_mm3 = self.burr.cut(bone, &cut);
+        if works {
+            let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
+            let depth_mm = device.distance(proxy) + self.bite_mm;
+            out.removed_mm3 = self.burr.cut(bone, &Cut { device, proxy, radius_mm, depth_mm, dt_ms });
         }
     }
 
@@ -206,7 +238,7 @@ impl RigidContact for DistanceField {
     fn reset(&mut self, pose: Pose) {
         self.proxy = pose;
         self.placed = pose.translation.is_finite();
-        self.settled = false;
+        (self.settled, self.bite_mm) = (false, 0.0);
         self.discs.forget();
         self.burr.reset();
     }
@@ -215,7 +247,7 @@ impl RigidContact for DistanceField {
 /// A ball among discs; all lengths in voxels, in the discs' frame.
 struct Ball {
     radius: f32,
-    disc: f32,
+    slop: f32,
     /// Whether its centre is in bone: then a disc pushes along its own normal, which is the way out.
     inside: bool,
 }
@@ -248,20 +280,20 @@ impl Ball {
         }
         let sideways = from_disc - height * disc.normal;
         let off = sideways.length();
-        let rim = from_disc - sideways * (self.disc / off.max(self.disc));
+        let rim = from_disc - sideways * (disc.radius / off.max(disc.radius));
         let distance = rim.length();
         let direction = if distance > 1e-6 { rim / distance } else { disc.normal };
         Near { distance, direction }
     }
 
-    /// The half-spaces that keep the ball at `centre` clear of the discs. One that is not clear may stay as it is and must
+    /// The half-spaces that keep the ball at `centre` clear of the discs by `radius`. One that is not clear may stay as it is and must
     /// gain `recover`. Returns the smallest clearance.
-    fn constrain(&self, discs: &[Disc], centre: Vec3, recover: f32, spaces: &mut Vec<HalfSpace>) -> f32 {
+    fn constrain(&self, discs: &[Disc], centre: Vec3, radius: f32, recover: f32, spaces: &mut Vec<HalfSpace>) -> f32 {
         spaces.clear();
         let mut clearance = f32::MAX;
         for disc in discs {
             let near = self.nearest(disc, centre);
-            let clear = self.radius.min(near.distance + recover);
+            let clear = radius.min(near.distance + recover);
             clearance = clearance.min(near.distance - self.radius);
             spaces
                 .push(HalfSpace { normal: near.direction, offset: near.direction.dot(centre) - near.distance + clear });
@@ -282,10 +314,10 @@ impl Ball {
         let mut slide = Slide { to: from, rests: false, contradiction: false, clearance: f32::MAX };
         for _ in 0..MAX_SLIDES {
             let at = slide.to;
-            slide.clearance = self.constrain(discs, at, recover, spaces);
+            slide.clearance = self.constrain(discs, at, self.radius, recover, spaces);
             let target = nearest(goal, spaces).or_else(|| {
                 slide.contradiction = true;
-                self.constrain(discs, at, 0.0, spaces);
+                self.constrain(discs, at, self.radius - self.slop, 0.0, spaces);
                 nearest(goal, spaces)
             });
             let way = target.unwrap_or(at) - at;

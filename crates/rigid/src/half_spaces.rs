@@ -9,12 +9,14 @@
 //! The distance to the goal grows with each exchange, so no set comes back.
 //!
 //! # Practice
-//! Two to six exchanges are usual, each one pass over the half-spaces. Any unit of length; tolerances are in that unit.
+//! Two to six exchanges are usual, each one pass over the half-spaces. Any unit of length; tolerances are in that unit. Active sets are solved in f64, as
+//! their borders may be nearly parallel.
 //!
 //! # Sources
 //! M. Sharir, E. Welzl, *A combinatorial bound for linear programming and related problems*, STACS 1992; R. Seidel,
 //! *Small-dimensional linear programming and convex hulls made easy*, Discrete Comput. Geom. 6 (1991).
 
+use glam::DVec3;
 use trepan_geometry::Vec3;
 
 /// How far outside a half-space counts as inside.
@@ -34,6 +36,10 @@ pub(crate) struct HalfSpace {
 impl HalfSpace {
     fn height(&self, x: Vec3) -> f32 {
         self.normal.dot(x) - self.offset
+    }
+
+    fn exact_height(&self, x: DVec3) -> f64 {
+        self.normal.as_dvec3().dot(x) - f64::from(self.offset)
     }
 }
 
@@ -68,8 +74,8 @@ impl Active {
             .map(|others| 1 | others << 1)
             .filter(|set| set.count_ones() <= 3)
             .filter_map(|set| Some((on_borders(goal, all, set)?, set)))
-            .filter(|(x, _)| all.iter().all(|s| s.height(*x) >= -4.0 * TOLERANCE))
-            .min_by(|a, b| a.0.distance_squared(goal).total_cmp(&b.0.distance_squared(goal)))?;
+            .filter(|(x, _)| all.iter().all(|s| s.exact_height(*x) >= -0.5 * f64::from(TOLERANCE)))
+            .min_by(|a, b| a.0.distance_squared(goal.as_dvec3()).total_cmp(&b.0.distance_squared(goal.as_dvec3())))?;
         self.count = 0;
         for (i, space) in all.iter().enumerate() {
             if set >> i & 1 == 1 {
@@ -77,22 +83,23 @@ impl Active {
                 self.count += 1;
             }
         }
-        Some(x)
+        Some(x.as_vec3())
     }
 }
 
 /// The point nearest to `goal` on the borders of the half-spaces in `set`; `None` when they are nearly dependent.
-fn on_borders(goal: Vec3, spaces: &[HalfSpace], set: u32) -> Option<Vec3> {
-    let mut x = goal;
-    let mut basis = [Vec3::ZERO; 4];
+fn on_borders(goal: Vec3, spaces: &[HalfSpace], set: u32) -> Option<DVec3> {
+    let mut x = goal.as_dvec3();
+    let mut basis = [DVec3::ZERO; 4];
     for (i, space) in spaces.iter().enumerate().filter(|(i, _)| set >> i & 1 == 1) {
-        let free = basis.iter().fold(space.normal, |n, b| n - *b * n.dot(*b));
+        let normal = space.normal.as_dvec3();
+        let free = basis.iter().fold(normal, |n, b| n - *b * n.dot(*b));
         let size = free.length();
-        if size.is_nan() || size < 1e-3 {
+        if size.is_nan() || size < 1e-5 {
             return None;
         }
         basis[i] = free / size;
-        x -= basis[i] * (space.height(x) / size);
+        x -= basis[i] * (space.exact_height(x) / size);
     }
     Some(x)
 }
@@ -105,7 +112,7 @@ mod tests {
     /// Dykstra's alternating projections in f64: slow, obvious, and sure to converge.
     fn dykstra(goal: Vec3, spaces: &[HalfSpace]) -> Vec3 {
         let mut x = goal.as_dvec3();
-        let mut given_back = vec![glam::DVec3::ZERO; spaces.len()];
+        let mut given_back = vec![DVec3::ZERO; spaces.len()];
         for _ in 0..4000 {
             for (space, back) in spaces.iter().zip(&mut given_back) {
                 let (n, from) = (space.normal.as_dvec3(), x + *back);

@@ -38,12 +38,17 @@
 //! # When not to use it
 //! For tools that are not round at the tip, for soft tissue, or for bones that move: the bone is fixed in the world.
 
+pub mod brute;
 pub mod distance_field;
 mod half_spaces;
 mod method;
 pub mod removal;
 mod seam;
 mod surface;
+mod sweep;
+pub mod thesis;
+mod traverse;
 
 pub use method::Method;
 pub use seam::{RigidContact, RigidStep};
+pub use sweep::Sweep;

@@ -21,8 +21,9 @@
 //! ```
 //!
 //! # Practice
-//! F = stiffness · depth, N, up to `max_load_n`. Volume counts by fraction, `½ + (hu - iso)/1000` cut to 0..1, so that it is smooth in
-//! time and the same as geometry's after the cut. Densities are whole HU: rounding is carried from voxel to voxel, so none is lost.
+//! F = stiffness · depth, N, up to `max_load_n`. Volume counts by fraction, `½ + (hu - iso)/500` cut to 0..1, so that it is smooth in
+//! time and the same as geometry's after the cut. Densities are whole HU: a fixed dither of voxel and tick rounds them, so that a loss of less than
+//! one HU a tick counts in full over time and the same path gives the same bytes.
 //!
 //! # Sources
 //! J. F. Archard, *Contact and rubbing of flat surfaces*, J. Appl. Phys. 24 (1953). Specific energy per volume constant per bone: M. Arbabtafti et al.,
@@ -36,8 +37,10 @@ use glam::IVec3;
 use trepan_geometry::Vec3;
 use trepan_volume::{AIR_HU, BoneVolume};
 
-/// Fall of the ramp at the burr's surface, HU per voxel, and the width of the fraction, HU.
+/// Fall of the ramp at the burr's surface, HU per voxel.
 const RAMP_HU: f32 = 1000.0;
+/// Span of density around the isovalue in which a voxel counts as partly bone, HU. A span as wide as the ramp would count curved cuts too large.
+const PARTIAL_HU: f32 = 500.0;
 /// How far in front of the proxy the burr bites, voxels: the first layer, not what lies behind it.
 const BITE_VOXELS: f32 = 1.5;
 /// Density at which the specific energy is given, HU: dense cortical bone.
@@ -110,6 +113,8 @@ pub(crate) struct Cut {
     pub proxy: Vec3,
     /// Radius of the burr, mm.
     pub radius_mm: f32,
+    /// How deep the burr is pressed in, mm: what makes the load.
+    pub depth_mm: f32,
     /// Tick, ms.
     pub dt_ms: f32,
 }
@@ -130,25 +135,25 @@ pub(crate) struct Burr {
     law: Law,
     bites: Vec<Bite>,
     limit: usize,
-    /// HU that rounding still owes.
-    carry_hu: f32,
+    /// Cuts so far, for the dither.
+    tick: u32,
 }
 
 impl Burr {
     /// A burr that reaches at most `limit` voxels a tick.
     pub fn new(law: Law, limit: usize) -> Self {
-        Self { law, bites: Vec::with_capacity(limit), limit, carry_hu: 0.0 }
+        Self { law, bites: Vec::with_capacity(limit), limit, tick: 0 }
     }
 
-    /// Forgets what rounding owes.
+    /// Starts the dither anew.
     pub fn reset(&mut self) {
-        self.carry_hu = 0.0;
+        self.tick = 0;
     }
 
     /// Takes bone away and returns how much, mm³.
     pub fn cut(&mut self, bone: &BoneVolume, cut: &Cut) -> f32 {
-        let depth = cut.device.distance(cut.proxy);
-        if depth == 0.0 || !depth.is_finite() || !cut.dt_ms.is_finite() || cut.dt_ms <= 0.0 {
+        let sound = cut.depth_mm.is_finite() && cut.dt_ms.is_finite();
+        if !sound || cut.depth_mm <= 0.0 || cut.dt_ms <= 0.0 {
             return 0.0;
         }
         self.find_bites(bone, cut);
@@ -157,7 +162,7 @@ impl Burr {
                 return self.take(bone, |bite| decrement_hu * f32::from(bite.reach_hu > 0.0));
             }
             Law::Rate { .. } => {
-                let wanted = self.law.volume_mm3(cut.radius_mm, depth, cut.dt_ms) / bone.voxel_mm3();
+                let wanted = self.law.volume_mm3(cut.radius_mm, cut.depth_mm, cut.dt_ms) / bone.voxel_mm3();
                 let within_reach: f32 =
                     self.bites.iter().map(|b| b.reach_hu).sum::<f32>() / (REFERENCE_HU - f32::from(AIR_HU));
                 if within_reach > wanted { wanted / within_reach } else { 1.0 }
@@ -166,20 +171,37 @@ impl Burr {
         self.take(bone, |bite| fraction * bite.reach_hu)
     }
 
-    /// Lists the voxels between proxy and device, inside the ball of the device or on its surface.
+    /// Takes density from `voxels` by the per-tick law, wherever they are, and returns how much, mm³.
+    pub fn wear(&mut self, bone: &BoneVolume, voxels: impl Iterator<Item = IVec3>) -> f32 {
+        let Law::PerTick { decrement_hu } = self.law else { return 0.0 };
+        self.bites.clear();
+        for voxel in voxels.take(self.limit) {
+            let (hu, floor_hu) = (bone.hu(voxel), f32::from(AIR_HU));
+            self.bites.push(Bite { voxel, hu, reach_hu: f32::from(hu) - floor_hu, floor_hu });
+        }
+        self.take(bone, |_| decrement_hu)
+    }
+
+    /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device, or on its surface.
+    ///
+    /// The ball of the device alone would miss the flanks that hold a proxy far behind: the burr would stall.
     fn find_bites(&mut self, bone: &BoneVolume, cut: &Cut) {
         self.bites.clear();
         let spacing = bone.spacing_mm();
         let (device, proxy) = (bone.grid_of(cut.device), bone.grid_of(cut.proxy));
         let radius = cut.radius_mm / spacing;
-        let low = (device - radius - 1.0).max(proxy - radius - BITE_VOXELS).ceil().as_ivec3();
-        let high = (device + radius + 1.0).min(proxy + radius + BITE_VOXELS).floor().as_ivec3();
+        let along = device - proxy;
+        let per_length = along.length_squared().recip();
+        let low = (device.min(proxy) - radius - 1.0).max(proxy - radius - BITE_VOXELS).ceil().as_ivec3();
+        let high = (device.max(proxy) + radius + 1.0).min(proxy + radius + BITE_VOXELS).floor().as_ivec3();
         for k in low.z..=high.z {
             for j in low.y..=high.y {
                 for i in low.x..=high.x {
                     let voxel = IVec3::new(i, j, k);
-                    let outside = voxel.as_vec3().distance(device) - radius;
-                    let ahead = voxel.as_vec3().distance(proxy) - radius;
+                    let from_proxy = voxel.as_vec3() - proxy;
+                    let share = (from_proxy.dot(along) * per_length).clamp(0.0, 1.0);
+                    let outside = from_proxy.distance(share * along) - radius;
+                    let ahead = from_proxy.length() - radius;
                     if outside < 1.0 && ahead < BITE_VOXELS && self.bites.len() < self.limit {
                         self.add_bite(bone, voxel, outside, ahead);
                     }
@@ -200,14 +222,12 @@ impl Burr {
     /// Lowers each bite's density by `loss` HU, not below its floor, and returns the volume, mm³.
     fn take(&mut self, bone: &BoneVolume, loss: impl Fn(&Bite) -> f32) -> f32 {
         let iso = f32::from(bone.isovalue());
-        let fraction = |hu: f32| (0.5 + (hu - iso) / RAMP_HU).clamp(0.0, 1.0);
+        let fraction = |hu: f32| (0.5 + (hu - iso) / PARTIAL_HU).clamp(0.0, 1.0);
         let mut removed = 0.0;
+        self.tick = self.tick.wrapping_add(1);
         for bite in &self.bites {
             let from = f32::from(bite.hu);
-            let exact = loss(bite) + self.carry_hu;
-            let whole = exact.floor().clamp(0.0, (from - bite.floor_hu).floor());
-            // Only rounding is carried; what the floor holds back is not owed by the next voxel.
-            self.carry_hu = (exact - whole).clamp(0.0, 1.0);
+            let whole = (loss(bite) + dither(bite.voxel, self.tick)).floor().clamp(0.0, (from - bite.floor_hu).floor());
             if whole >= 1.0 {
                 bone.set_hu(bite.voxel, (from - whole) as i16);
                 removed += fraction(from) - fraction(from - whole);
@@ -215,4 +235,16 @@ impl Burr {
         }
         removed * bone.voxel_mm3()
     }
+}
+
+/// A number in 0..1 that is spread evenly over voxels and ticks, and always the same.
+fn dither(voxel: IVec3, tick: u32) -> f32 {
+    let [x, y, z] = voxel.as_uvec3().to_array();
+    let mut h = x.wrapping_mul(0x9E37_79B1)
+        ^ y.wrapping_mul(0x85EB_CA77)
+        ^ z.wrapping_mul(0xC2B2_AE3D)
+        ^ tick.wrapping_mul(0x27D4_EB2F);
+    h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
+    h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
+    ((h ^ (h >> 15)) >> 8) as f32 / (1 << 24) as f32
 }

@@ -25,6 +25,11 @@ use trepan_volume::BoneVolume;
 /// Density differences past this many HU from the isovalue do not bend a normal further.
 const CLAMP_HU: i32 = 1000;
 
+/// How far the rim of a disc may stand out over a surface that bends away, voxels.
+const STAND_OUT: f32 = 0.05;
+/// Smallest disc, voxels.
+const SMALLEST: f32 = 0.2;
+
 const NEIGHBOURS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
 
 /// A piece of surface.
@@ -34,6 +39,8 @@ pub(crate) struct Disc {
     pub centre: Vec3,
     /// Unit normal out of the bone.
     pub normal: Vec3,
+    /// Radius, voxels: less where the surface bends away.
+    pub radius: f32,
 }
 
 /// The discs near a point, gathered anew for each place of the tool.
@@ -48,13 +55,14 @@ pub(crate) struct Discs {
     pub overflow: u32,
     list: Vec<Disc>,
     limit: usize,
+    radius: f32,
 }
 
 impl Discs {
-    /// Room for `limit` discs.
-    pub fn with_limit(limit: usize) -> Self {
+    /// Room for `limit` discs, each of at most `radius` voxels.
+    pub fn new(limit: usize, radius: f32) -> Self {
         let list = Vec::with_capacity(limit);
-        Self { base: IVec3::ZERO, visited: 0, voxels: 0, overflow: 0, list, limit }
+        Self { base: IVec3::ZERO, visited: 0, voxels: 0, overflow: 0, list, limit, radius }
     }
 
     /// Drops all discs.
@@ -127,41 +135,77 @@ impl Discs {
                 self.overflow += 1;
                 continue;
             }
-            self.list.push(Disc { centre: x, normal: normal(bone, self.base, x, step.as_vec3()) });
+            self.list.push(disc(bone, self.base, x, step.as_vec3(), self.radius));
         }
         self.voxels += u32::from(self.list.len() > before);
     }
 }
 
-/// Unit normal out of the bone at `x` (voxels from `base`): down the smoothed density; `edge` where that is of no use.
-fn normal(bone: &BoneVolume, base: IVec3, x: Vec3, edge: Vec3) -> Vec3 {
-    let down = -gradient(bone, base, x);
-    let size = down.length();
-    if size < 1.0 || down.dot(edge) < 0.05 * size { edge } else { down / size }
+/// A disc at `x` (voxels from `base`) on an edge that leads out of the bone along `edge`.
+fn disc(bone: &BoneVolume, base: IVec3, x: Vec3, edge: Vec3, radius: f32) -> Disc {
+    let shape = Shape::at(bone, base, x);
+    let size = shape.slope.length();
+    // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than its kernel.
+    if size < 1.0 || -shape.slope.dot(edge) < -0.5 * size {
+        return Disc { centre: x, normal: edge, radius: SMALLEST.min(radius) };
+    }
+    let normal = -shape.slope / size;
+    let bend = shape.bend(normal) / size;
+    let radius = if bend > 0.0 { (2.0 * STAND_OUT / bend).sqrt().clamp(SMALLEST.min(radius), radius) } else { radius };
+    Disc { centre: x, normal, radius }
 }
 
-/// Gradient of the quadratic B-spline of the density, HU per voxel.
-pub(crate) fn gradient(bone: &BoneVolume, base: IVec3, x: Vec3) -> Vec3 {
-    let middle = x.round();
-    let f = x - middle;
-    let weight = |f: f32| [0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f)];
-    let slope = |f: f32| [f - 0.5, -2.0 * f, f + 0.5];
-    let (wx, wy, wz) = (weight(f.x), weight(f.y), weight(f.z));
-    let (sx, sy, sz) = (slope(f.x), slope(f.y), slope(f.z));
-    let corner = base + middle.as_ivec3() - 1;
-    let iso = i32::from(bone.isovalue());
-    let mut sum = Vec3::ZERO;
-    for k in 0..3 {
-        for j in 0..3 {
-            let mut row = [0.0f32; 3];
-            for (i, value) in row.iter_mut().enumerate() {
-                let hu = i32::from(bone.hu(corner + IVec3::new(i as i32, j as i32, k as i32)));
-                *value = (hu - iso).clamp(-CLAMP_HU, CLAMP_HU) as f32;
+/// Slope and bending of the quadratic B-spline of the density, HU per voxel and per voxel².
+struct Shape {
+    slope: Vec3,
+    /// Second derivatives xx, yy, zz.
+    straight: Vec3,
+    /// Second derivatives yz, xz, xy.
+    mixed: Vec3,
+}
+
+impl Shape {
+    fn at(bone: &BoneVolume, base: IVec3, x: Vec3) -> Self {
+        let middle = x.round();
+        let (tx, ty, tz) = (taps(x.x - middle.x), taps(x.y - middle.y), taps(x.z - middle.z));
+        let corner = base + middle.as_ivec3() - 1;
+        let iso = i32::from(bone.isovalue());
+        let mut shape = Self { slope: Vec3::ZERO, straight: Vec3::ZERO, mixed: Vec3::ZERO };
+        for (k, z) in (0..).zip(tz) {
+            for (j, y) in (0..).zip(ty) {
+                let (mut even, mut steep, mut bent) = (0.0, 0.0, 0.0);
+                for (i, x) in (0..).zip(tx) {
+                    let hu = i32::from(bone.hu(corner + IVec3::new(i, j, k)));
+                    let value = (hu - iso).clamp(-CLAMP_HU, CLAMP_HU) as f32;
+                    (even, steep, bent) = (even + value * x[0], steep + value * x[1], bent + value * x[2]);
+                }
+                shape.slope += Vec3::new(steep * y[0] * z[0], even * y[1] * z[0], even * y[0] * z[1]);
+                shape.straight += Vec3::new(bent * y[0] * z[0], even * y[2] * z[0], even * y[0] * z[2]);
+                shape.mixed += Vec3::new(even * y[1] * z[1], steep * y[0] * z[1], steep * y[1] * z[0]);
             }
-            let smooth = row[0] * wx[0] + row[1] * wx[1] + row[2] * wx[2];
-            let steep = row[0] * sx[0] + row[1] * sx[1] + row[2] * sx[2];
-            sum += Vec3::new(steep * wy[j] * wz[k], smooth * sy[j] * wz[k], smooth * wy[j] * sz[k]);
         }
+        shape
     }
-    sum
+
+    /// How much the surface bends away from `normal` where it bends most, times the slope; negative where it bends up everywhere.
+    fn bend(&self, normal: Vec3) -> f32 {
+        let (s, m) = (self.straight, self.mixed);
+        let times = |v: Vec3| {
+            Vec3::new(
+                s.x * v.x + m.z * v.y + m.y * v.z,
+                m.z * v.x + s.y * v.y + m.x * v.z,
+                m.y * v.x + m.x * v.y + s.z * v.z,
+            )
+        };
+        let (u, v) = normal.any_orthonormal_pair();
+        let (uu, uv, vv) = (u.dot(times(u)), u.dot(times(v)), v.dot(times(v)));
+        let (mean, half) = (0.5 * (uu + vv), 0.5 * (uu - vv));
+        (half * half + uv * uv).sqrt() - mean
+    }
+}
+
+/// Weight, slope and bending of the three taps of a quadratic B-spline, `f` off the middle one.
+fn taps(f: f32) -> [[f32; 3]; 3] {
+    let (below, above) = (0.5 - f, 0.5 + f);
+    [[0.5 * below * below, -below, 1.0], [0.75 - f * f, -2.0 * f, -2.0], [0.5 * above * above, above, 1.0]]
 }

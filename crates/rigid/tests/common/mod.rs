@@ -1,4 +1,5 @@
 //! Synthetic bone with known truth.
+#![expect(dead_code, reason = "each test file uses its share")]
 
 use trepan_geometry::{Pose, ToolState, Vec3};
 use trepan_rigid::{RigidContact, RigidStep};
@@ -8,13 +9,18 @@ pub const ISO: i16 = 400;
 
 /// Bone from a signed distance in mm (negative inside). The density is linear within one voxel of the surface.
 pub fn bone(dims: [usize; 3], spacing_mm: f32, distance: impl Fn(Vec3) -> f32) -> BoneVolume {
+    scanned(dims, spacing_mm, |p| distance(p) / spacing_mm, 1.0)
+}
+
+/// Bone from a signed distance in voxels (negative inside), blurred linearly over `blur` voxels either side.
+pub fn scanned(dims: [usize; 3], spacing_mm: f32, voxels_out: impl Fn(Vec3) -> f32, blur: f32) -> BoneVolume {
     let origin = -0.5 * spacing_mm * Vec3::new(dims[0] as f32 - 1.0, dims[1] as f32 - 1.0, dims[2] as f32 - 1.0);
     let mut ct = VoxelVolume::isotropic(dims, origin, spacing_mm, 0i16);
     for at in 0..ct.data.len() {
         let voxel =
             Vec3::new((at % dims[0]) as f32, (at / dims[0] % dims[1]) as f32, (at / (dims[0] * dims[1])) as f32);
-        let voxels_out = distance(origin + spacing_mm * voxel) / spacing_mm;
-        ct.data[at] = (f32::from(ISO) - 1000.0 * voxels_out.clamp(-1.0, 1.0)) as i16;
+        let out = voxels_out(origin + spacing_mm * voxel);
+        ct.data[at] = (f32::from(ISO) - 1000.0 * (out / blur).clamp(-1.0, 1.0)) as i16;
     }
     BoneVolume::new(&ct, ISO).expect("the scene has bone")
 }

@@ -1,0 +1,276 @@
+//! The oracle: a ball on the triangulated isosurface, moved in small steps, in f64.
+//!
+//! # Theory
+//! Each cell of eight voxel centres is cut into six tetrahedra; where the density, linear in each, is the isovalue, there
+//! are one or two triangles. The ball is moved towards the device by a small step, then pushed off the nearest triangle until none is
+//! nearer than its radius; and again, until it comes back to where it was. Its rest is the god-object of the space of
+//! centres by definition: no step towards the device is allowed any more.
+//!
+//! # Practice
+//! A millisecond to tenths of a second a tick. Nothing is cached from tick to tick but the ball's place.
+//!
+//! # Sources
+//! A. Doi, A. Koide, *An efficient method of triangulating equi-valued surfaces by using tetrahedral cells*, IEICE Trans. E74 (1991); distance to a
+//! triangle after C. Ericson, *Real-Time Collision Detection*, 2005, section 5.1.5.
+//!
+//! # When not to use it
+//! In a haptic tick.
+
+use crate::removal::{Burr, Cut, Law};
+use crate::{RigidContact, RigidStep};
+use glam::{DVec3, IVec3};
+use trepan_contact::Contact;
+use trepan_geometry::{Aabb, Pose, Tool, ToolKind, ToolState};
+use trepan_volume::BoneVolume;
+
+/// Most triangles in reach; the rest is counted as a fallback.
+const MAX_TRIANGLES: usize = 1 << 16;
+/// Most pushes off triangles after one step.
+const MAX_PUSHES: usize = 64;
+/// How far the ball may travel between two triangulations, voxels.
+const REACH: f64 = 1.0;
+
+/// How the method is set up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// Longest step, voxels. Smaller is more faithful and slower.
+    pub step_voxels: f64,
+    /// Most steps in one tick.
+    pub max_steps: u32,
+    /// What a burr takes away.
+    pub removal: Law,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { step_voxels: 0.1, max_steps: 20_000, removal: Law::RATE }
+    }
+}
+
+/// The ball of one tool.
+pub struct Brute {
+    config: Config,
+    tool: Tool,
+    proxy: Pose,
+    centre: DVec3,
+    placed: bool,
+    triangles: Vec<[DVec3; 3]>,
+    overflow: bool,
+    burr: Burr,
+}
+
+impl Brute {
+    /// A ball of the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts at the first tool pose.
+    pub fn new(tool: &Tool, config: Config) -> Self {
+        Self {
+            config,
+            tool: *tool,
+            proxy: Pose::IDENTITY,
+            centre: DVec3::ZERO,
+            placed: false,
+            triangles: Vec::with_capacity(MAX_TRIANGLES),
+            overflow: false,
+            burr: Burr::new(config.removal, MAX_TRIANGLES),
+        }
+    }
+
+    /// Triangles within `reach` mm of the centre.
+    fn triangulate(&mut self, bone: &BoneVolume, reach: f64, out: &mut RigidStep) {
+        self.triangles.clear();
+        self.overflow = false;
+        let spacing = f64::from(bone.spacing_mm());
+        let low = bone.grid_of((self.centre - reach).as_vec3()).floor().as_ivec3() - 1;
+        let high = bone.grid_of((self.centre + reach).as_vec3()).ceil().as_ivec3() + 1;
+        for k in low.z..=high.z {
+            for j in low.y..=high.y {
+                for i in low.x..=high.x {
+                    let cell = IVec3::new(i, j, k);
+                    let middle = bone.origin().as_dvec3() + (cell.as_dvec3() + 0.5) * spacing;
+                    out.voxels_swept += 1;
+                    if middle.distance(self.centre) < reach + spacing {
+                        self.cell(bone, cell);
+                    }
+                }
+            }
+        }
+        out.fallbacks += u32::from(self.overflow);
+    }
+
+    /// The triangles of the cell whose lowest corner is voxel `cell`.
+    fn cell(&mut self, bone: &BoneVolume, cell: IVec3) {
+        // The six ways from (0,0,0) to (1,1,1) along edges: each makes a tetrahedron of the diagonal.
+        const WAYS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+        for way in WAYS {
+            let mut corner = cell;
+            let mut tet = [(DVec3::ZERO, 0.0); 4];
+            for (n, vertex) in tet.iter_mut().enumerate() {
+                if n > 0 {
+                    corner[way[n - 1]] += 1;
+                }
+                let place = bone.origin().as_dvec3() + corner.as_dvec3() * f64::from(bone.spacing_mm());
+                *vertex = (place, f64::from(bone.hu(corner)) - f64::from(bone.isovalue()));
+            }
+            self.tetrahedron(&tet);
+        }
+    }
+
+    fn tetrahedron(&mut self, tet: &[(DVec3, f64); 4]) {
+        let crossing = |a: usize, b: usize| tet[a].0.lerp(tet[b].0, tet[a].1 / (tet[a].1 - tet[b].1));
+        let (mut inside, mut outside, mut counts) = ([0; 4], [0; 4], [0, 0]);
+        for (i, vertex) in tet.iter().enumerate() {
+            let (list, count) = if vertex.1 >= 0.0 { (&mut inside, 0) } else { (&mut outside, 1) };
+            list[counts[count]] = i;
+            counts[count] += 1;
+        }
+        let (i, o) = (inside, outside);
+        match counts[0] {
+            1 => self.add([crossing(i[0], o[0]), crossing(i[0], o[1]), crossing(i[0], o[2])]),
+            3 => self.add([crossing(i[0], o[0]), crossing(i[1], o[0]), crossing(i[2], o[0])]),
+            2 => {
+                let (a, b) = (crossing(i[0], o[0]), crossing(i[1], o[1]));
+                self.add([a, crossing(i[0], o[1]), b]);
+                self.add([a, crossing(i[1], o[0]), b]);
+            }
+            _ => {}
+        }
+    }
+
+    fn add(&mut self, triangle: [DVec3; 3]) {
+        if self.triangles.len() < MAX_TRIANGLES {
+            self.triangles.push(triangle);
+        } else {
+            self.overflow = true;
+        }
+    }
+
+    /// The nearest point of the surface and its distance.
+    fn nearest(&self, centre: DVec3) -> Option<(DVec3, f64)> {
+        let points = self.triangles.iter().map(|t| nearest_on_triangle(centre, t));
+        points.map(|p| (p, p.distance(centre))).min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Pushes a ball at `centre` off the surface; `None` when it does not come free.
+    fn pushed_off(&self, mut centre: DVec3, radius: f64) -> Option<DVec3> {
+        for _ in 0..MAX_PUSHES {
+            match self.nearest(centre) {
+                Some((point, distance)) if distance < radius - 1e-7 => {
+                    centre += (centre - point) * ((radius - distance) / distance.max(1e-9));
+                }
+                _ => return Some(centre),
+            }
+        }
+        None
+    }
+
+    fn follow(&mut self, bone: &BoneVolume, device: DVec3, out: &mut RigidStep) {
+        let (radius, spacing) = (f64::from(self.tool.tip_radius_mm), f64::from(bone.spacing_mm()));
+        let way = Aabb::of_points(&[self.centre.as_vec3(), device.as_vec3()]);
+        if !way.inflated((radius + 2.0 * spacing) as f32).overlaps(bone.bounds()) {
+            self.triangles.clear();
+            self.centre = device;
+            return;
+        }
+        let mut known = self.centre;
+        self.triangulate(bone, radius + REACH * spacing, out);
+        for _ in 0..self.config.max_steps {
+            if self.centre.distance(known) > (REACH - 2.0 * self.config.step_voxels) * spacing {
+                known = self.centre;
+                self.triangulate(bone, radius + REACH * spacing, out);
+            }
+            let wanted = (device - self.centre).clamp_length_max(self.config.step_voxels * spacing);
+            let Some(next) = self.pushed_off(self.centre + wanted, radius) else {
+                out.fallbacks += 1;
+                return;
+            };
+            let moved = next.distance(self.centre);
+            // A push that leads further from the device than before is a dead end, not a way round.
+            if moved < 1e-6 * spacing || next.distance(device) > self.centre.distance(device) - 1e-9 {
+                self.centre = if next.distance(device) < self.centre.distance(device) { next } else { self.centre };
+                return;
+            }
+            self.centre = next;
+        }
+        out.fallbacks += 1;
+    }
+
+    fn report(&self, device: DVec3, out: &mut RigidStep) {
+        let lifted = self.centre - device;
+        let depth = lifted.length();
+        if depth < 1e-9 {
+            return;
+        }
+        let radius = f64::from(self.tool.tip_radius_mm);
+        if let Some((point, _)) = self.nearest(self.centre) {
+            let normal = (self.centre - point).normalize_or_zero();
+            let deep = radius - (device - point).dot(normal);
+            let deep = deep.max(0.0) as f32;
+            out.manifold.push(Contact { point: point.as_vec3(), normal: normal.as_vec3(), depth_mm: deep });
+        }
+        (out.points_in_contact, out.voxels_in_contact) = (1, 1);
+        let normal = lifted / depth;
+        out.manifold.normal = normal.as_vec3();
+        out.manifold.depth_mm = depth as f32;
+        out.manifold.point = (self.centre - radius * normal).as_vec3();
+    }
+}
+
+impl RigidContact for Brute {
+    fn step(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool, dt_ms: f32, out: &mut RigidStep) {
+        out.clear();
+        if !tool.is_finite() {
+            out.fallbacks = 1;
+            return;
+        }
+        if !self.placed {
+            self.reset(tool.world_from_tool);
+        }
+        self.follow(bone, tool.tip().as_dvec3(), out);
+        self.proxy = Pose::from_parts(self.centre.as_vec3(), tool.world_from_tool.rotation);
+        self.report(tool.tip().as_dvec3(), out);
+        if drilling && self.tool.kind == ToolKind::Burr {
+            let (device, proxy, radius_mm) = (tool.tip(), self.proxy.translation, self.tool.tip_radius_mm);
+            let depth_mm = device.distance(proxy);
+            out.removed_mm3 = self.burr.cut(bone, &Cut { device, proxy, radius_mm, depth_mm, dt_ms });
+        }
+    }
+
+    fn proxy(&self) -> Pose {
+        self.proxy
+    }
+
+    fn reset(&mut self, pose: Pose) {
+        self.proxy = pose;
+        self.centre = pose.translation.as_dvec3();
+        self.placed = pose.translation.is_finite();
+        self.burr.reset();
+    }
+}
+
+/// The point of a triangle nearest to `p`.
+fn nearest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
+    let (ab, ac) = (b - a, c - a);
+    let (d1, d2) = (ab.dot(p - a), ac.dot(p - a));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return a;
+    }
+    let (d3, d4) = (ab.dot(p - b), ac.dot(p - b));
+    if d3 >= 0.0 && d4 <= d3 {
+        return b;
+    }
+    let (d5, d6) = (ab.dot(p - c), ac.dot(p - c));
+    if d6 >= 0.0 && d5 <= d6 {
+        return c;
+    }
+    let (vc, vb, va) = (d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4);
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return a + ab * (d1 / (d1 - d3));
+    }
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return a + ac * (d2 / (d2 - d6));
+    }
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+    }
+    let sum = va + vb + vc;
+    if sum > 0.0 { a + ab * (vb / sum) + ac * (vc / sum) } else { a }
+}

@@ -1,0 +1,104 @@
+//! How the thesis's proxy moves: along the way towards its goal until bone stands before it.
+//!
+//! # Theory
+//! A ball on its way touches first, if the bone is flat across the way, with the pole that leads. The line rules follow
+//! that pole; the sphere rule tests the whole shell at close steps (thesis, Figure 3.7), which a ball that grazes a wall
+//! or meets a cavity narrower than itself needs.
+//!
+//! # When not to use it
+//! The line rules, for tools wider than a cavity: they pass bone that lies beside the line.
+
+use crate::traverse::{clipped, first_bone};
+use trepan_geometry::Vec3;
+use trepan_volume::BoneVolume;
+
+/// How the way is searched for bone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sweep {
+    /// The thesis as printed: one look per voxel edge along the line. Skips voxels at corners.
+    Steps,
+    /// Every voxel that the line touches (Amanatides and Woo).
+    #[default]
+    Line,
+    /// The whole ball, a third of a voxel at a time.
+    Sphere,
+}
+
+/// Where a sweep ended.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stop {
+    /// Centre of the tool, world mm.
+    pub centre: Vec3,
+    /// Whether bone stopped it before its goal.
+    pub hit: bool,
+}
+
+/// What is swept.
+pub(crate) struct Ball<'a> {
+    /// Radius, mm.
+    pub radius_mm: f32,
+    /// Points of the surface relative to the centre, world axes, mm.
+    pub shell: &'a [Vec3],
+}
+
+impl Ball<'_> {
+    /// Moves from `from` towards `to`, world mm, and stops in light touch with the first bone. Adds to `visited`.
+    pub fn sweep(&self, bone: &BoneVolume, how: Sweep, from: Vec3, to: Vec3, visited: &mut u32) -> Stop {
+        let way = to - from;
+        let length = way.length();
+        if length == 0.0 {
+            return Stop { centre: to, hit: false };
+        }
+        let pole = way * (self.radius_mm / length);
+        let share = match how {
+            Sweep::Steps => stepped(bone, from + pole, to + pole, visited),
+            Sweep::Line => first_bone(bone, from + pole, to + pole, visited),
+            Sweep::Sphere => self.whole(bone, from, to, visited),
+        };
+        match share {
+            // A hundredth of a voxel into the voxel: so that the shell finds it.
+            Some(share) => {
+                let into = 0.01 * bone.spacing_mm() / length;
+                let into = if how == Sweep::Sphere { 0.0 } else { into };
+                Stop { centre: from.lerp(to, (share + into).min(1.0)), hit: true }
+            }
+            None => Stop { centre: to, hit: false },
+        }
+    }
+
+    /// Share of the way at which a point of the shell first enters bone. A ball that touches already may move where no more of it touches.
+    fn whole(&self, bone: &BoneVolume, from: Vec3, to: Vec3, visited: &mut u32) -> Option<f32> {
+        let (enter, leave) = clipped(from, to, bone.bounds().inflated(self.radius_mm + bone.spacing_mm()))?;
+        let steps = (from.distance(to) * (leave - enter) / (0.33 * bone.spacing_mm())).ceil().clamp(1.0, 4096.0) as u32;
+        let mut touching = self.touching(bone, from, visited);
+        for step in 1..=steps {
+            let share = enter + (leave - enter) * step as f32 / steps as f32;
+            let now = self.touching(bone, from.lerp(to, share), visited);
+            if now > touching {
+                return Some(if touching > 0 {
+                    enter + (leave - enter) * (step - 1) as f32 / steps as f32
+                } else {
+                    share
+                });
+            }
+            touching = now;
+        }
+        None
+    }
+
+    fn touching(&self, bone: &BoneVolume, centre: Vec3, visited: &mut u32) -> u32 {
+        *visited += self.shell.len() as u32;
+        self.shell.iter().filter(|&&p| bone.is_bone(bone.voxel_of(centre + p))).count() as u32
+    }
+}
+
+/// The thesis's sweep: looks at one point per voxel edge.
+fn stepped(bone: &BoneVolume, from: Vec3, to: Vec3, visited: &mut u32) -> Option<f32> {
+    let (enter, leave) = clipped(from, to, bone.bounds().inflated(bone.spacing_mm()))?;
+    let length = from.distance(to) * (leave - enter);
+    let steps = (length / bone.spacing_mm()).ceil().clamp(1.0, 1e5) as u32;
+    (0..=steps).map(|step| enter + (leave - enter) * step as f32 / steps as f32).find(|&share| {
+        *visited += 1;
+        bone.is_bone(bone.voxel_of(from.lerp(to, share)))
+    })
+}
