@@ -58,10 +58,15 @@ impl NeoHookean {
 
 /// g, g', g'' at J.
 fn isochoric(j: f64) -> [f64; 3] {
+    power(j, -2.0 / 3.0)
+}
+
+/// `J^n` with its first two derivatives, continued along its tangent line below [`FADE_BELOW`].
+pub(crate) fn power(j: f64, n: f64) -> [f64; 3] {
     let at = j.max(FADE_BELOW);
-    let g = at.powf(-2.0 / 3.0);
-    let dg = -2.0 / 3.0 * g / at;
-    if j < FADE_BELOW { [g + dg * (j - at), dg, 0.0] } else { [g, dg, 10.0 / 9.0 * g / (at * at)] }
+    let g = at.powf(n);
+    let dg = n * g / at;
+    if j < FADE_BELOW { [g + dg * (j - at), dg, 0.0] } else { [g, dg, n * (n - 1.0) * g / (at * at)] }
 }
 
 /// Cofactor matrix, the gradient of the determinant: `cof F = J F⁻ᵀ`, defined for singular F too.
@@ -69,7 +74,7 @@ pub(crate) fn cofactor(f: DMat3) -> DMat3 {
     DMat3::from_cols(f.y_axis.cross(f.z_axis), f.z_axis.cross(f.x_axis), f.x_axis.cross(f.y_axis))
 }
 
-fn cofactor_change(f: DMat3, df: DMat3) -> DMat3 {
+pub(crate) fn cofactor_change(f: DMat3, df: DMat3) -> DMat3 {
     let mixed = |a: DVec3, b: DVec3, da: DVec3, db: DVec3| da.cross(b) + a.cross(db);
     DMat3::from_cols(
         mixed(f.y_axis, f.z_axis, df.y_axis, df.z_axis),
@@ -78,11 +83,11 @@ fn cofactor_change(f: DMat3, df: DMat3) -> DMat3 {
     )
 }
 
-fn dot(a: DMat3, b: DMat3) -> f64 {
+pub(crate) fn dot(a: DMat3, b: DMat3) -> f64 {
     a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
 }
 
-fn squared(f: DMat3) -> f64 {
+pub(crate) fn squared(f: DMat3) -> f64 {
     dot(f, f)
 }
 

@@ -1,12 +1,18 @@
 //! What the tissue is made of: hyperelastic laws with their parameters, checked, and presets with their source.
 //!
 //! # Theory
-//! Shear modulus `μ = E/(2(1+ν))`, bulk modulus `κ = E/(3(1-2ν))`, wave modulus `λ+2μ = κ + 4μ/3`.
-//! Compressible neo-Hookean: `W = μ/2 (J^(-2/3) I₁ - 3) + κ/2 (J-1)²` with `J = det F`, `I₁ = tr FᵀF`.
+//! The equations are in [`Law`]. At small strain every law has a shear modulus μ and a bulk modulus κ, tied by Poisson's ratio:
+//! `κ = 2 μ (1+ν) / (3 (1-2ν))`, `E = 2 μ (1+ν)`.
 //!
 //! # Sources
 //! Wittek, Miller, Kikinis, Warfield, J. Biomech. 40 (2007): brain shift with 3 kPa. Miller and Chinzei, J. Biomech. 35 (2002):
-//! initial shear modulus 842 Pa, so E about 2.5 kPa. Both near 3 kPa at the strain rates of surgery.
+//! Ogden's law with 842 Pa and exponent -4.7, for brain in tension and compression. Both near 3 kPa at the strain rates of surgery.
+//!
+//! # When not to use it
+//! St. Venant-Kirchhoff gives way under compression beyond a stretch of about 0.6 and does not heal when turned inside out: it is here to be
+//! compared with.
+
+use crate::{Law, NeoHookean};
 
 /// A hyperelastic material. A closed list: every solver matches on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +26,37 @@ pub enum Material {
         /// Density of the rest state, g/mm³ (water 1e-3).
         density_g_mm3: f32,
     },
+    /// Linear in Green's strain: right for large rotations, wrong for large strain.
+    StVenantKirchhoff {
+        /// Young's modulus E, MPa.
+        young_mpa: f32,
+        /// Poisson's ratio ν, 0 ≤ ν < 0.5.
+        poisson: f32,
+        /// Density of the rest state, g/mm³.
+        density_g_mm3: f32,
+    },
+    /// Both isochoric invariants.
+    MooneyRivlin {
+        /// Constant of the first invariant, MPa.
+        c10_mpa: f32,
+        /// Constant of the second invariant, MPa; `2 (c10 + c01)` is the shear modulus.
+        c01_mpa: f32,
+        /// Poisson's ratio ν at small strain, 0 ≤ ν < 0.5.
+        poisson: f32,
+        /// Density of the rest state, g/mm³.
+        density_g_mm3: f32,
+    },
+    /// Ogden's law with up to two terms: asymmetric in tension and compression.
+    Ogden {
+        /// μ of each term, MPa; 0 = no term. Their sum is the shear modulus.
+        shear_mpa: [f32; 2],
+        /// α of each term, not 0 where there is a term.
+        exponent: [f32; 2],
+        /// Poisson's ratio ν at small strain, 0 ≤ ν < 0.5.
+        poisson: f32,
+        /// Density of the rest state, g/mm³.
+        density_g_mm3: f32,
+    },
 }
 
 /// Why a material was refused.
@@ -28,53 +65,126 @@ pub enum MaterialError {
     /// Young's modulus is not a positive number.
     #[error("young_mpa is {0}: it must be positive and finite (living brain is about 0.003 MPa = 3 kPa)")]
     Young(f32),
+    /// The shear modulus that the constants add up to is not a positive number.
+    #[error(
+        "the constants give a shear modulus of {0} MPa: it must be positive and finite (living brain is about 0.001 MPa)"
+    )]
+    Shear(f32),
+    /// An exponent of Ogden's law is zero or not a number.
+    #[error("exponent is {0}: it must be finite and not 0 where its shear_mpa is not 0 (brain is about -4.7)")]
+    Exponent(f32),
     /// Poisson's ratio is outside its range.
     #[error("poisson is {0}: it must be at least 0 and below 0.5 (brain is 0.45 to 0.499)")]
     Poisson(f32),
     /// Density is not a positive number.
     #[error("density_g_mm3 is {0}: it must be positive and finite (water is 0.001 g/mm³)")]
     Density(f32),
+    /// A fit that pushes back less when it is stretched more.
+    #[error(
+        "these constants make a material that gets softer until it collapses between stretch 0.5 and 2: \
+         choose ones with all shear_mpa·exponent (or c10, c01) of positive sign, or a fit over a wider range"
+    )]
+    NotConvex,
 }
 
 impl Material {
     /// Living brain: 3 kPa, ν 0.45 (the most that plain tetrahedra bear), density of water.
     pub const BRAIN: Self = Self::NeoHookean { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
+    /// Brain that answers tension and compression differently (Miller and Chinzei 2002), instantaneous moduli.
+    pub const BRAIN_OGDEN: Self =
+        Self::Ogden { shear_mpa: [8.42e-4, 0.0], exponent: [-4.7, 1.0], poisson: 0.45, density_g_mm3: 1.0e-3 };
+
+    /// A tumour, three times as stiff as the brain around it (reports range from 2 to 10 times).
+    pub const TUMOUR: Self = Self::NeoHookean { young_mpa: 0.009, poisson: 0.45, density_g_mm3: 1.0e-3 };
+
     /// The thesis's Table 6.1 in consistent units: 30 kPa, ν 0.3; ten times stiffer and far more compressible than living brain.
     pub const THESIS: Self = Self::NeoHookean { young_mpa: 0.030, poisson: 0.3, density_g_mm3: 1.0e-3 };
 
-    /// Refuses parameters that no material has.
+    /// Refuses parameters that no material has, and fits that are not convex.
     pub fn check(&self) -> Result<(), MaterialError> {
-        let Self::NeoHookean { young_mpa, poisson, density_g_mm3 } = *self;
         let positive = |x: f32| x.is_finite() && x > 0.0;
-        if !positive(young_mpa) {
-            return Err(MaterialError::Young(young_mpa));
-        }
+        let (poisson, density) = (self.poisson(), self.density_g_mm3());
         if !(0.0..0.5).contains(&poisson) {
             return Err(MaterialError::Poisson(poisson));
         }
-        if !positive(density_g_mm3) {
-            return Err(MaterialError::Density(density_g_mm3));
+        if !positive(density) {
+            return Err(MaterialError::Density(density));
         }
-        Ok(())
+        match *self {
+            Self::NeoHookean { young_mpa, .. } | Self::StVenantKirchhoff { young_mpa, .. } => {
+                return if positive(young_mpa) { Ok(()) } else { Err(MaterialError::Young(young_mpa)) };
+            }
+            Self::Ogden { shear_mpa, exponent, .. } => {
+                let bad = |p: &usize| shear_mpa[*p] != 0.0 && (exponent[*p] == 0.0 || !exponent[*p].is_finite());
+                if let Some(p) = (0..2).find(bad) {
+                    return Err(MaterialError::Exponent(exponent[p]));
+                }
+            }
+            Self::MooneyRivlin { .. } => {}
+        }
+        let shear = self.shear_mpa() as f32;
+        if !positive(shear) {
+            return Err(MaterialError::Shear(shear));
+        }
+        if self.law().is_stable() { Ok(()) } else { Err(MaterialError::NotConvex) }
     }
 
     /// Density of the rest state, g/mm³.
     pub fn density_g_mm3(&self) -> f32 {
-        let Self::NeoHookean { density_g_mm3, .. } = *self;
-        density_g_mm3
+        match *self {
+            Self::NeoHookean { density_g_mm3, .. }
+            | Self::StVenantKirchhoff { density_g_mm3, .. }
+            | Self::MooneyRivlin { density_g_mm3, .. }
+            | Self::Ogden { density_g_mm3, .. } => density_g_mm3,
+        }
+    }
+
+    /// Poisson's ratio at small strain.
+    pub fn poisson(&self) -> f32 {
+        match *self {
+            Self::NeoHookean { poisson, .. }
+            | Self::StVenantKirchhoff { poisson, .. }
+            | Self::MooneyRivlin { poisson, .. }
+            | Self::Ogden { poisson, .. } => poisson,
+        }
     }
 
     /// Shear modulus μ at small strain, MPa.
     pub fn shear_mpa(&self) -> f64 {
-        let Self::NeoHookean { young_mpa, poisson, .. } = *self;
-        f64::from(young_mpa) / (2.0 * (1.0 + f64::from(poisson)))
+        match *self {
+            Self::NeoHookean { young_mpa, poisson, .. } | Self::StVenantKirchhoff { young_mpa, poisson, .. } => {
+                f64::from(young_mpa) / (2.0 * (1.0 + f64::from(poisson)))
+            }
+            Self::MooneyRivlin { c10_mpa, c01_mpa, .. } => 2.0 * (f64::from(c10_mpa) + f64::from(c01_mpa)),
+            Self::Ogden { shear_mpa, .. } => f64::from(shear_mpa[0]) + f64::from(shear_mpa[1]),
+        }
+    }
+
+    /// Young's modulus E at small strain, MPa.
+    pub fn young_mpa(&self) -> f64 {
+        2.0 * self.shear_mpa() * (1.0 + f64::from(self.poisson()))
     }
 
     /// Bulk modulus κ at small strain, MPa.
     pub fn bulk_mpa(&self) -> f64 {
-        let Self::NeoHookean { young_mpa, poisson, .. } = *self;
-        f64::from(young_mpa) / (3.0 * (1.0 - 2.0 * f64::from(poisson)))
+        let poisson = f64::from(self.poisson());
+        2.0 * self.shear_mpa() * (1.0 + poisson) / (3.0 * (1.0 - 2.0 * poisson))
+    }
+
+    /// The law with its constants, f64.
+    pub fn law(&self) -> Law {
+        let (mu, kappa) = (self.shear_mpa(), self.bulk_mpa());
+        match *self {
+            Self::NeoHookean { .. } => Law::NeoHookean(NeoHookean { mu, kappa }),
+            Self::StVenantKirchhoff { .. } => Law::StVenantKirchhoff { lambda: kappa - mu * 2.0 / 3.0, mu },
+            Self::MooneyRivlin { c10_mpa, c01_mpa, .. } => {
+                Law::MooneyRivlin { c10: c10_mpa.into(), c01: c01_mpa.into(), kappa }
+            }
+            Self::Ogden { shear_mpa, exponent, .. } => {
+                Law::Ogden { mu: shear_mpa.map(f64::from), alpha: exponent.map(f64::from), kappa }
+            }
+        }
     }
 
     /// Speed of pressure waves `√((κ + 4μ/3)/ρ)`, mm/ms.
@@ -89,7 +199,9 @@ mod tests {
 
     #[test]
     fn presets_are_accepted_and_the_thesis_wave_speed_is_6_35_m_per_s() {
-        assert!(Material::BRAIN.check().is_ok() && Material::THESIS.check().is_ok());
+        for preset in [Material::BRAIN, Material::BRAIN_OGDEN, Material::TUMOUR, Material::THESIS] {
+            assert_eq!(preset.check(), Ok(()));
+        }
         assert!((Material::THESIS.wave_speed() - 6.35).abs() < 0.01);
         assert!((Material::BRAIN.wave_speed() - 3.37).abs() < 0.01);
     }
@@ -104,5 +216,18 @@ mod tests {
         assert!(matches!(with(0.003, f32::NAN, 1e-3), Err(MaterialError::Poisson(_))));
         assert!(with(0.003, -0.1, 1e-3).unwrap_err().to_string().contains("poisson"));
         assert!(matches!(with(0.003, 0.3, f32::INFINITY), Err(MaterialError::Density(_))));
+    }
+
+    #[test]
+    fn fits_that_collapse_are_refused() {
+        let mooney =
+            |c10_mpa, c01_mpa| Material::MooneyRivlin { c10_mpa, c01_mpa, poisson: 0.45, density_g_mm3: 1e-3 }.check();
+        assert_eq!(mooney(2e-4, 1e-4), Ok(()));
+        assert!(matches!(mooney(2e-4, -2e-4), Err(MaterialError::Shear(_))));
+        assert_eq!(mooney(-2e-4, 4e-4), Err(MaterialError::NotConvex));
+        let ogden =
+            |shear_mpa, exponent| Material::Ogden { shear_mpa, exponent, poisson: 0.45, density_g_mm3: 1e-3 }.check();
+        assert_eq!(ogden([2e-3, -1.3e-3], [1.0, 4.0]), Err(MaterialError::NotConvex));
+        assert_eq!(ogden([1e-3, 0.0], [0.0, 1.0]), Err(MaterialError::Exponent(0.0)));
     }
 }

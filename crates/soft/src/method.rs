@@ -7,7 +7,7 @@ use crate::{Body, BodyError, SoftSolver, linear, reference};
 pub enum Method {
     /// Small strain, explicit.
     Linear(linear::Config),
-    /// Static neo-Hookean oracle, f64.
+    /// Static hyperelastic oracle, f64.
     Reference(reference::Config),
 }
 

@@ -1,4 +1,4 @@
-//! The oracle: static equilibrium of a neo-Hookean body, f64, Newton's method with an exact tangent and a sparse Cholesky factor.
+//! The oracle: static equilibrium of a hyperelastic body, f64, Newton's method with an exact tangent and a sparse Cholesky factor.
 //!
 //! # Theory
 //! Minimises the potential energy `Π(u) = Σ V W(F) - Σ m g·u + Π_contact(u)`. Each iteration solves `(K + k v vᵀ + τ I) Δu = -∂Π/∂u`,
@@ -13,9 +13,8 @@
 //! # When not to use it
 //! In any loop that must keep a rate. Where several equilibria exist it finds one of them, not the one that dynamics would reach.
 
-use crate::energy::NeoHookean;
 use crate::factor::Factor;
-use crate::{Body, BodyError, Loads, Shape, SoftSolver, StepReport};
+use crate::{Body, BodyError, Law, Loads, Shape, SoftSolver, StepReport};
 use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;
 
@@ -34,10 +33,11 @@ impl Default for Config {
     }
 }
 
-/// Static neo-Hookean solver.
+/// Static hyperelastic solver.
 pub struct Reference {
     config: Config,
-    law: NeoHookean,
+    law: Law,
+    stiffness_mpa: f64,
     tets: Vec<([u32; 4], Shape)>,
     rest: Vec<DVec3>,
     masses: Vec<f64>,
@@ -66,7 +66,8 @@ impl Reference {
         let nodes = body.mesh.positions.len();
         Ok(Self {
             config: *config,
-            law: NeoHookean { mu: body.material.shear_mpa(), kappa: body.material.bulk_mpa() },
+            law: body.material.law(),
+            stiffness_mpa: body.material.shear_mpa(),
             tets: body.mesh.tets.iter().enumerate().map(|(t, &corners)| (corners, body.shape(t))).collect(),
             rest: body.mesh.positions.iter().map(|p| p.as_dvec3()).collect(),
             masses: body.lumped_masses_g(),
@@ -155,7 +156,7 @@ impl Reference {
             if self.factor.factor() {
                 return true;
             }
-            shift = (4.0 * shift).max(1e-3 * self.law.mu * self.tets[0].1.volume_mm3.cbrt());
+            shift = (4.0 * shift).max(1e-3 * self.stiffness_mpa * self.tets[0].1.volume_mm3.cbrt());
         }
         false
     }
@@ -229,7 +230,7 @@ impl SoftSolver for Reference {
 }
 
 /// Adds one element's tangent: block (a, b) has the columns `V (∂P/∂F : e_c ⊗ ∇N_b) ∇N_a`.
-fn add_element(factor: &mut Factor, law: &NeoHookean, corners: &[u32; 4], shape: &Shape, f: DMat3) {
+fn add_element(factor: &mut Factor, law: &Law, corners: &[u32; 4], shape: &Shape, f: DMat3) {
     for b in 0..4 {
         let g = shape.gradients[b];
         let forces = [DVec3::X, DVec3::Y, DVec3::Z]

@@ -12,7 +12,7 @@ fn main() -> Result<(), trepan_soft::BodyError> {
     let body = Body { fixed: boxes::nodes_where(&mesh, |p| p.z < 1.0), mesh, material: Material::BRAIN };
     println!("{} tetrahedra, {} nodes", body.mesh.tets.len(), body.mesh.positions.len());
     let mut scalar_us = None;
-    for kernel in Kernel::all() {
+    for kernel in Kernel::all().into_iter().filter(|kernel| kernel.runs_here()) {
         let mut tled = Tled::new(&body, &Config { kernel, ..Config::default() })?;
         let loads = Loads { gravity: Vec3::NEG_Z * 9.81e-3, ..Loads::default() };
         let dt = tled.stable_dt_ms();

@@ -1,184 +1,198 @@
-//! Element forces of the whole body: blocks of eight tetrahedra, and where each force goes.
+//! Blocks of sixteen tetrahedra, structure of arrays, and the two passes over them.
 //!
 //! # Theory
-//! Every (element, corner) pair owns one slot. Slots lie sorted by node, so a node's force is the sum of one contiguous run, always in the
-//! same order: no atomics, no colouring, the same bits whatever computed the slots.
-//!
-//! ```text
-//! elements ──write──▶ slots │ node 0 │ node 1   │ node 2 │ …  ──sum──▶ nodes
-//! ```
+//! The force pass turns displacements into forces. Where locking is cured a volume pass goes before it: each node gets the mean `J - 1` of
+//! the elements around it, weighted by volume, and the force pass takes the mean of its four nodes in place of its own. That is the average nodal
+//! pressure of Bonet and Burton 1998 in the form that stays right where materials meet (Joldes, Wittek and Miller 2009): what is
+//! averaged is the volume change, what it is multiplied with is the element's own κ.
 //!
 //! # Practice
-//! 76 bytes of constants a tetrahedron and 64 bytes of slots.
+//! 100 bytes of constants a tetrahedron, 48 more for a memory of past stress.
 
-use crate::config::Kernel;
-use crate::element::Element;
+use crate::element::{deformation, forces};
+use crate::kernel::Pass;
 use crate::lane::Lane;
-use crate::layout::Layout;
-use trepan_soft::Body;
-use wide::f32x8;
+use crate::law::{Constitutive, Stress};
+use crate::relaxation::Fade;
+use std::marker::PhantomData;
+use trepan_soft::{Law, Shape};
 
 /// Tetrahedra in a block.
-pub(crate) const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 16;
 
-/// A vector with a fourth, unused entry: one aligned 16-byte load.
+/// Four numbers in one aligned 16-byte row: a displacement and `J - 1` of a node, or a force and `V (J - 1) / 4` of an element's corner.
 pub(crate) type Quad = [f32; 4];
 
-/// Eight tetrahedra, structure of arrays. Lanes past the last element have no stiffness and write to the spare slot.
+/// Sixteen tetrahedra with K material constants each. Lanes past the last element have no stiffness and write to the spare slot.
 #[derive(Clone)]
 #[repr(C, align(64))]
-struct Block {
+pub(crate) struct Block<const K: usize> {
     gradients: [[[f32; WIDTH]; 3]; 3],
-    mu_volume: [f32; WIDTH],
-    kappa_volume: [f32; WIDTH],
+    constants: [[f32; WIDTH]; K],
+    quarter_volume: [f32; WIDTH],
     nodes: [[u32; WIDTH]; 4],
     slots: [[u32; WIDTH]; 4],
 }
 
-/// The elements of a body and their latest forces.
-pub(crate) struct Elements {
-    blocks: Vec<Block>,
-    slots: Vec<Quad>,
-    /// Slots of the node at each place: `starts[place]..starts[place + 1]`.
-    starts: Vec<u32>,
+/// Past stress of a block, T terms.
+pub(crate) type Memory<const T: usize> = [[[f32; WIDTH]; 6]; T];
+
+/// The force pass.
+pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
+    pub blocks: &'a [Block<K>],
+    pub memory: &'a mut [Memory<T>],
+    pub fade: [Fade; 2],
+    pub u: &'a [Quad],
+    pub slots: &'a mut [Quad],
+    pub cure_locking: bool,
+    pub law: PhantomData<M>,
 }
 
-impl Elements {
-    pub fn of(body: &Body, layout: &Layout) -> Self {
-        let corners = |t: u32| body.mesh.tets[t as usize].map(|n| layout.place_of[n as usize]);
-        let mut starts = vec![0u32; layout.node_at.len() + 1];
-        layout.tet_at.iter().flat_map(|&t| corners(t)).for_each(|place| starts[place as usize + 1] += 1);
-        (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
-        let spare = starts[starts.len() - 1];
-        let mut next = starts.clone();
-        let mut blocks = vec![Block::empty(spare); layout.tet_at.len().div_ceil(WIDTH)];
-        for (at, &t) in layout.tet_at.iter().enumerate() {
-            let nodes = corners(t);
-            let slots = nodes.map(|place| {
-                next[place as usize] += 1;
-                next[place as usize] - 1
-            });
-            blocks[at / WIDTH].put(at % WIDTH, body, t as usize, nodes, slots);
-        }
-        Self { blocks, slots: vec![[0.0; 4]; spare as usize + 1], starts }
-    }
-
-    /// Computes every element's forces from displacements by place; gives the number of elements that are inverted.
-    pub fn compute(&mut self, u: &[Quad], kernel: Kernel) -> u32 {
-        let compute: fn(&Block, &[Quad], &mut [Quad]) -> u32 = match kernel {
-            Kernel::Scalar => Block::compute_scalar,
-            Kernel::Wide | Kernel::Fastest => Block::compute_wide,
-        };
-        self.blocks.iter().map(|block| compute(block, u, &mut self.slots)).sum()
-    }
-
-    /// Force of the elements on the node at `place`, N.
-    #[inline(always)]
-    pub fn force(&self, place: usize) -> glam::Vec3A {
-        let run = self.starts[place] as usize..self.starts[place + 1] as usize;
-        let sum = self.slots[run].iter().fold(glam::Vec4::ZERO, |sum, slot| sum + glam::Vec4::from_array(*slot));
-        glam::Vec3A::from_vec4(sum)
-    }
+/// The volume pass.
+pub(crate) struct Volumes<'a, const K: usize> {
+    pub blocks: &'a [Block<K>],
+    pub u: &'a [Quad],
+    pub slots: &'a mut [Quad],
 }
 
-impl Block {
-    fn empty(spare: u32) -> Self {
+/// Edges of an element as they moved, and the mean of its nodes' fourth numbers.
+struct Moved<L> {
+    edges: [[L; 3]; 3],
+    mean: L,
+}
+
+impl<const K: usize> Block<K> {
+    /// A block of no elements.
+    pub fn empty(spare: u32) -> Self {
         Self {
             gradients: [[[0.0; WIDTH]; 3]; 3],
-            mu_volume: [0.0; WIDTH],
-            kappa_volume: [0.0; WIDTH],
+            constants: [[0.0; WIDTH]; K],
+            quarter_volume: [0.0; WIDTH],
             nodes: [[0; WIDTH]; 4],
             slots: [[spare; WIDTH]; 4],
         }
     }
 
-    fn put(&mut self, lane: usize, body: &Body, tet: usize, nodes: [u32; 4], slots: [u32; 4]) {
-        let shape = body.shape(tet);
+    /// Puts an element into a lane.
+    pub fn put<M: Constitutive<K>>(&mut self, lane: usize, shape: &Shape, law: &Law, nodes: [u32; 4], slots: [u32; 4]) {
         for a in 0..3 {
             let gradient = shape.gradients[a + 1].as_vec3();
             (0..3).for_each(|k| self.gradients[a][k][lane] = gradient[k]);
         }
-        self.mu_volume[lane] = (body.material.shear_mpa() * shape.volume_mm3) as f32;
-        self.kappa_volume[lane] = (body.material.bulk_mpa() * shape.volume_mm3) as f32;
+        for (row, constant) in self.constants.iter_mut().zip(M::constants(law, shape.volume_mm3)) {
+            row[lane] = constant;
+        }
+        self.quarter_volume[lane] = (0.25 * shape.volume_mm3) as f32;
         for corner in 0..4 {
             self.nodes[corner][lane] = nodes[corner];
             self.slots[corner][lane] = slots[corner];
         }
     }
 
-    fn compute_scalar(&self, u: &[Quad], slots: &mut [Quad]) -> u32 {
+    #[inline(always)]
+    fn gradients<L: Lane>(&self, part: usize) -> [[L; 3]; 3] {
+        let [a, b, c] = &self.gradients;
+        [load(a, part), load(b, part), load(c, part)]
+    }
+
+    #[inline(always)]
+    fn moved<L: Lane>(&self, part: usize, u: &[Quad]) -> Moved<L> {
+        let from = part * L::LANES;
+        let o = L::gather(u, &self.nodes[0][from..from + L::LANES]);
+        let a = L::gather(u, &self.nodes[1][from..from + L::LANES]);
+        let b = L::gather(u, &self.nodes[2][from..from + L::LANES]);
+        let c = L::gather(u, &self.nodes[3][from..from + L::LANES]);
+        let mean = (o[3] + a[3] + b[3] + c[3]) * L::splat(0.25);
+        Moved { edges: [minus(&a, &o), minus(&b, &o), minus(&c, &o)], mean }
+    }
+
+    #[inline(always)]
+    fn scatter<L: Lane>(&self, part: usize, corner: usize, xyzw: [L; 4], slots: &mut [Quad]) {
+        let from = part * L::LANES;
+        L::scatter(xyzw, slots, &self.slots[corner][from..from + L::LANES]);
+    }
+}
+
+impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, K, T> {
+    #[inline(always)]
+    fn run<L: Lane>(&mut self) -> u32 {
         let mut inverted = 0;
-        for lane in 0..WIDTH {
-            let [o, a, b, c] = [0, 1, 2, 3].map(|corner| u[self.nodes[corner][lane] as usize]);
-            let element = Element {
-                edges: [a, b, c].map(|p| [p[0] - o[0], p[1] - o[1], p[2] - o[2]]),
-                gradients: self.gradients.map(|g| g.map(|row| row[lane])),
-                mu_volume: self.mu_volume[lane],
-                kappa_volume: self.kappa_volume[lane],
-            };
-            let ([f1, f2, f3], j) = element.forces();
-            let f0 = [0, 1, 2].map(|k| 0.0 - (f1[k] + f2[k] + f3[k]));
-            for (corner, f) in [f0, f1, f2, f3].into_iter().enumerate() {
-                slots[self.slots[corner][lane] as usize] = [f[0], f[1], f[2], 0.0];
+        for (block, memory) in self.blocks.iter().zip(self.memory.iter_mut()) {
+            for part in 0..WIDTH / L::LANES {
+                let moved = block.moved::<L>(part, self.u);
+                let (gradients, constants) = (block.gradients::<L>(part), load::<L, K>(&block.constants, part));
+                let d = deformation(&moved.edges, &gradients);
+                let mut stress = M::stress(&constants, &d);
+                if T > 0 {
+                    relax::<L, T>(&mut stress, &d.inverse_green(), memory, &self.fade, part);
+                }
+                let swelling = if self.cure_locking { moved.mean } else { d.j - L::splat(1.0) };
+                stress.q = stress.q + M::bulk(&constants) * swelling;
+                let [f1, f2, f3] = forces(&stress, M::ROUND && T == 0, &d, &gradients);
+                let zero = L::splat(0.0);
+                let f0 =
+                    [zero - (f1[0] + f2[0] + f3[0]), zero - (f1[1] + f2[1] + f3[1]), zero - (f1[2] + f2[2] + f3[2])];
+                block.scatter(part, 0, [f0[0], f0[1], f0[2], zero], self.slots);
+                block.scatter(part, 1, [f1[0], f1[1], f1[2], zero], self.slots);
+                block.scatter(part, 2, [f2[0], f2[1], f2[2], zero], self.slots);
+                block.scatter(part, 3, [f3[0], f3[1], f3[2], zero], self.slots);
+                inverted += d.j.not_positive();
             }
-            inverted += j.not_positive();
         }
         inverted
     }
+}
 
-    fn compute_wide(&self, u: &[Quad], slots: &mut [Quad]) -> u32 {
-        let [o, a, b, c] = self.nodes.map(|nodes| gather(u, &nodes));
-        let element = Element {
-            edges: [a, b, c].map(|p| [p[0] - o[0], p[1] - o[1], p[2] - o[2]]),
-            gradients: self.gradients.map(|g| g.map(f32x8::new)),
-            mu_volume: f32x8::new(self.mu_volume),
-            kappa_volume: f32x8::new(self.kappa_volume),
-        };
-        let ([f1, f2, f3], j) = element.forces();
-        let f0 = [0, 1, 2].map(|k| f32x8::splat(0.0) - (f1[k] + f2[k] + f3[k]));
-        for (corner, f) in [f0, f1, f2, f3].into_iter().enumerate() {
-            let [x, y, z] = f.map(f32x8::to_array);
-            for lane in 0..WIDTH {
-                slots[self.slots[corner][lane] as usize] = [x[lane], y[lane], z[lane], 0.0];
+impl<const K: usize> Pass for Volumes<'_, K> {
+    #[inline(always)]
+    fn run<L: Lane>(&mut self) -> u32 {
+        let zero = L::splat(0.0);
+        for block in self.blocks {
+            for part in 0..WIDTH / L::LANES {
+                let moved = block.moved::<L>(part, self.u);
+                let d = deformation(&moved.edges, &block.gradients::<L>(part));
+                let share = L::load(&block.quarter_volume, part) * (d.j - L::splat(1.0));
+                for corner in 0..4 {
+                    block.scatter(part, corner, [zero, zero, zero, share], self.slots);
+                }
             }
         }
-        j.not_positive()
+        0
     }
+}
+
+/// Lets the memory take up the isochoric stress and takes the memory off it.
+#[inline(always)]
+fn relax<L: Lane, const T: usize>(
+    stress: &mut Stress<L>,
+    inverse: &[L; 6],
+    memory: &mut Memory<T>,
+    fade: &[Fade; 2],
+    part: usize,
+) {
+    let mut left = stress.s;
+    for k in 0..6 {
+        let whole = stress.s[k] + stress.q * inverse[k];
+        for term in 0..T {
+            let row = &mut memory[term][k];
+            let kept = L::splat(fade[term].keep) * L::load(row, part) + L::splat(fade[term].gain) * whole;
+            kept.store(row, part);
+            left[k] = left[k] - kept;
+        }
+    }
+    stress.s = left;
 }
 
 #[inline(always)]
-fn gather(u: &[Quad], nodes: &[u32; WIDTH]) -> [f32x8; 3] {
-    let mut columns = [[0.0; WIDTH]; 3];
-    for lane in 0..WIDTH {
-        let [x, y, z, _] = u[nodes[lane] as usize];
-        (columns[0][lane], columns[1][lane], columns[2][lane]) = (x, y, z);
-    }
-    columns.map(f32x8::new)
+fn minus<L: Lane>(a: &[L; 4], b: &[L; 4]) -> [L; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use trepan_geometry::Vec3;
-    use trepan_soft::{Material, boxes};
-
-    #[test]
-    fn kernels_give_the_same_bits_and_the_sum_of_all_forces_vanishes() {
-        let mesh = boxes::split_box([3, 2, 3], Vec3::new(24.0, 16.0, 20.0));
-        let body = Body { mesh, fixed: vec![], material: Material::BRAIN };
-        let layout = Layout::of(&body.mesh);
-        let noise = |i: usize| ((i as f32 * 12.9898).sin() * 43758.547).fract() * 3.0;
-        let u: Vec<Quad> =
-            (0..layout.node_at.len()).map(|n| [noise(3 * n), noise(3 * n + 1), noise(3 * n + 2), 0.0]).collect();
-        let forces = |kernel| {
-            let mut elements = Elements::of(&body, &layout);
-            let inverted = elements.compute(&u, kernel);
-            (inverted, (0..u.len()).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
-        };
-        let (scalar, wide) = (forces(Kernel::Scalar), forces(Kernel::Wide));
-        assert_eq!(scalar, wide);
-        let total: glam::Vec3A = wide.1.iter().map(|f| glam::Vec3A::from_array(*f)).sum();
-        let largest = wide.1.iter().flatten().fold(0.0f32, |m, f| m.max(f.abs()));
-        assert!(total.length() < 1e-5 * largest, "{total} {largest}");
+#[inline(always)]
+fn load<L: Lane, const N: usize>(rows: &[[f32; WIDTH]; N], part: usize) -> [L; N] {
+    let mut loaded = [L::splat(0.0); N];
+    for k in 0..N {
+        loaded[k] = L::load(&rows[k], part);
     }
+    loaded
 }

@@ -1,5 +1,6 @@
 //! Settings of the TLED solver.
 
+use crate::{Kernel, Relaxation};
 use trepan_geometry::Vec3;
 use trepan_soft::BodyError;
 
@@ -22,6 +23,10 @@ pub struct Config {
     pub max_speed: f32,
     /// Furthest that a node may get from its rest position, as a share of the body's largest extent; held to it and counted.
     pub max_displacement: f32,
+    /// Averages the volume change over nodes, so that nearly incompressible tissue (ν over about 0.47) does not lock. Costs about half a step.
+    pub cure_locking: bool,
+    /// Stress that fades while the tissue is held.
+    pub relaxation: Relaxation,
     /// Which implementation of the element forces; all give the same bytes.
     pub kernel: Kernel,
 }
@@ -35,6 +40,8 @@ impl Default for Config {
             balanced_gravity: Vec3::ZERO,
             max_speed: 10.0,
             max_displacement: 2.0,
+            cure_locking: false,
+            relaxation: Relaxation::NONE,
             kernel: Kernel::Fastest,
         }
     }
@@ -51,33 +58,6 @@ pub enum Damping {
     Critical(f32),
     /// Rate α, 1/ms.
     Rate(f32),
-}
-
-/// Which implementation computes the element forces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kernel {
-    /// The fastest that this CPU has.
-    Fastest,
-    /// One element after the other.
-    Scalar,
-    /// Eight elements at once with portable SIMD.
-    Wide,
-}
-
-impl Kernel {
-    /// Every kernel, the scalar one first.
-    pub fn all() -> [Self; 3] {
-        [Self::Scalar, Self::Wide, Self::Fastest]
-    }
-
-    /// Its name on a command line and in charts.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Scalar => "scalar",
-            Self::Wide => "wide",
-            Self::Fastest => "fastest",
-        }
-    }
 }
 
 impl Config {
@@ -103,6 +83,10 @@ impl Config {
         }
         if !(self.max_displacement > 0.0 && self.max_displacement.is_finite()) {
             return refuse("max_displacement", self.max_displacement, "over 0 and finite");
+        }
+        self.relaxation.check()?;
+        if !self.kernel.runs_here() {
+            return refuse("kernel", 0.0, "a kernel whose instructions this CPU has; Fastest always runs");
         }
         Ok(())
     }

@@ -1,21 +1,76 @@
-//! One number per element, for one element or for eight at once: the arithmetic of the kernels is written once.
+//! One number per element, for one element or for several at once: the arithmetic of the kernels is written once.
 //!
 //! # Practice
-//! Only operations that IEEE 754 rounds exactly, and no fused ones, so every width gives the same bits.
+//! Only operations that IEEE 754 rounds exactly, and no fused ones, so every width gives the same bits on every machine.
 
-use std::ops::{Add, Mul, Sub};
+use crate::block::{Quad, WIDTH};
+use std::ops::{Add, Div, Mul, Sub};
 use wide::{f32x8, u32x8};
 
 /// A register of f32, one lane per element.
-pub(crate) trait Lane: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+///
+/// Implementations inline always: for the registers of [`x86`](crate::x86) the instructions exist only in their kernel.
+pub(crate) trait Lane:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// Elements at once; a divisor of [`WIDTH`].
+    const LANES: usize;
     /// The same number in every lane.
     fn splat(x: f32) -> Self;
+    /// Lanes `part * LANES ..` of a block's row.
+    fn load(row: &[f32; WIDTH], part: usize) -> Self;
+    /// The four numbers of one node for each lane.
+    fn gather(from: &[Quad], at: &[u32]) -> [Self; 4];
+    /// Writes the four numbers of each lane to its own place.
+    fn scatter(xyzw: [Self; 4], to: &mut [Quad], at: &[u32]);
     /// The larger of each lane and `floor`; `floor` for NaN.
     fn at_least(self, floor: f32) -> Self;
     /// `x^(-1/3)` within 4 % for x over 0, by its bits: the exponent divided by -3.
     fn rough_inverse_cube_root(self) -> Self;
     /// How many lanes are zero or negative.
     fn not_positive(self) -> u32;
+    /// Writes its lanes to `part * LANES ..` of a block's row.
+    fn store(self, row: &mut [f32; WIDTH], part: usize);
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Its magnitude with the sign of `sign`.
+    fn with_sign_of(self, sign: Self) -> Self;
+    /// e of `m 2^e`, for x over 0.
+    fn exponent(self) -> Self;
+    /// m of `m 2^e`, from 1 to 2, for x over 0.
+    fn mantissa(self) -> Self;
+    /// `2^n` for a whole n from -126 to 127.
+    fn power_of_two(self) -> Self;
+
+    /// `log₂ x` for x over 0, within 1e-7: `½ + 2/ln 2 · artanh((m-√2)/(m+√2))` and the exponent.
+    #[inline(always)]
+    fn log2(self) -> Self {
+        let (m, root) = (self.mantissa(), Self::splat(std::f32::consts::SQRT_2));
+        let s = (m - root) / (m + root);
+        let q = s * s;
+        let series = Self::splat(1.0 / 9.0) * q + Self::splat(1.0 / 7.0);
+        let series = (series * q + Self::splat(0.2)) * q + Self::splat(1.0 / 3.0);
+        let artanh = s + s * q * series;
+        self.exponent() + (Self::splat(0.5) + artanh * Self::splat(2.0 * std::f32::consts::LOG2_E))
+    }
+
+    /// `2^x` within 2e-7 of itself; x is held between -126 and 126.
+    #[inline(always)]
+    fn exp2(self) -> Self {
+        let zero = Self::splat(0.0);
+        let x = self.at_least(-126.0);
+        let x = zero - (zero - x).at_least(-126.0);
+        let whole = (x + Self::splat(ROUND)) - Self::splat(ROUND);
+        let f = x - whole;
+        let mut series = Self::splat(EXP2[6]);
+        series = series * f + Self::splat(EXP2[5]);
+        series = series * f + Self::splat(EXP2[4]);
+        series = series * f + Self::splat(EXP2[3]);
+        series = series * f + Self::splat(EXP2[2]);
+        series = series * f + Self::splat(EXP2[1]);
+        series = series * f + Self::splat(EXP2[0]);
+        (series * f + Self::splat(1.0)) * whole.power_of_two()
+    }
 
     /// `x^(-1/3)` to f32 precision: three Newton steps `y ← y (4 - x y³)/3`.
     #[inline(always)]
@@ -29,12 +84,53 @@ pub(crate) trait Lane: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outp
     }
 }
 
-const EXPONENT_MAGIC: u32 = 0x54A2_FA8C;
+/// Adding and taking away this rounds to a whole number.
+const ROUND: f32 = 12_582_912.0;
+
+/// `ln 2ⁿ / n!` for n = 1..7.
+const EXP2: [f32; 7] = [
+    std::f32::consts::LN_2,
+    0.240_226_5,
+    0.055_504_11,
+    0.009_618_129,
+    0.001_333_355_8,
+    0.000_154_035_3,
+    0.000_015_252_734,
+];
+
+/// `2^23`, whose bits end in a whole number added to it; and the same plus the bias of exponents.
+pub(crate) const WHOLE: f32 = 8_388_608.0;
+pub(crate) const BIASED: f32 = WHOLE + 127.0;
+/// Bits of a float's fraction, and of the number 1.
+pub(crate) const FRACTION: u32 = 0x007F_FFFF;
+pub(crate) const ONE: u32 = 0x3F80_0000;
+/// Bit of a float's sign.
+pub(crate) const SIGN: u32 = 0x8000_0000;
+
+/// Makes the bits of a float its rough inverse cube root, less a third of them.
+pub(crate) const ROOT_BITS: u32 = 0x54A2_FA8C;
 
 impl Lane for f32 {
+    const LANES: usize = 1;
+
     #[inline(always)]
     fn splat(x: f32) -> Self {
         x
+    }
+
+    #[inline(always)]
+    fn load(row: &[f32; WIDTH], part: usize) -> Self {
+        row[part]
+    }
+
+    #[inline(always)]
+    fn gather(from: &[Quad], at: &[u32]) -> [Self; 4] {
+        from[at[0] as usize]
+    }
+
+    #[inline(always)]
+    fn scatter(xyzw: [Self; 4], to: &mut [Quad], at: &[u32]) {
+        to[at[0] as usize] = xyzw;
     }
 
     #[inline(always)]
@@ -48,19 +144,74 @@ impl Lane for f32 {
         let mut third = (bits >> 2) + (bits >> 4);
         third += third >> 4;
         third += third >> 8;
-        Self::from_bits(EXPONENT_MAGIC.wrapping_sub(third))
+        Self::from_bits(ROOT_BITS.wrapping_sub(third))
     }
 
     #[inline(always)]
     fn not_positive(self) -> u32 {
         u32::from(self <= 0.0)
     }
+
+    #[inline(always)]
+    fn store(self, row: &mut [f32; WIDTH], part: usize) {
+        row[part] = self;
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f32::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, sign: Self) -> Self {
+        self.copysign(sign)
+    }
+
+    #[inline(always)]
+    fn exponent(self) -> Self {
+        Self::from_bits((self.to_bits() >> 23) | WHOLE.to_bits()) - BIASED
+    }
+
+    #[inline(always)]
+    fn mantissa(self) -> Self {
+        Self::from_bits((self.to_bits() & FRACTION) | ONE)
+    }
+
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        Self::from_bits((self + BIASED).to_bits() << 23)
+    }
 }
 
 impl Lane for f32x8 {
+    const LANES: usize = 8;
+
     #[inline(always)]
     fn splat(x: f32) -> Self {
         Self::splat(x)
+    }
+
+    #[inline(always)]
+    fn load(row: &[f32; WIDTH], part: usize) -> Self {
+        bytemuck::cast::<[f32; WIDTH], [Self; 2]>(*row)[part]
+    }
+
+    #[inline(always)]
+    fn gather(from: &[Quad], at: &[u32]) -> [Self; 4] {
+        let mut columns = [[0.0; 8]; 4];
+        for lane in 0..8 {
+            let [x, y, z, w] = from[at[lane] as usize];
+            (columns[0][lane], columns[1][lane], columns[2][lane], columns[3][lane]) = (x, y, z, w);
+        }
+        columns.map(Self::new)
+    }
+
+    #[inline(always)]
+    fn scatter(xyzw: [Self; 4], to: &mut [Quad], at: &[u32]) {
+        let [x, y, z, w] = xyzw.map(Self::to_array);
+        for lane in 0..8 {
+            to[at[lane] as usize] = [x[lane], y[lane], z[lane], w[lane]];
+        }
     }
 
     #[inline(always)]
@@ -74,12 +225,47 @@ impl Lane for f32x8 {
         let mut third = (bits >> 2) + (bits >> 4);
         third += third >> 4;
         third += third >> 8;
-        bytemuck::cast(u32x8::splat(EXPONENT_MAGIC) - third)
+        bytemuck::cast(u32x8::splat(ROOT_BITS) - third)
     }
 
     #[inline(always)]
     fn not_positive(self) -> u32 {
         self.simd_le(Self::splat(0.0)).to_bitmask().count_ones()
+    }
+
+    #[inline(always)]
+    fn store(self, row: &mut [f32; WIDTH], part: usize) {
+        row[8 * part..8 * part + 8].copy_from_slice(&self.to_array());
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, sign: Self) -> Self {
+        let (bits, sign): (u32x8, u32x8) = (bytemuck::cast(self), bytemuck::cast(sign));
+        bytemuck::cast((bits & u32x8::splat(!SIGN)) | (sign & u32x8::splat(SIGN)))
+    }
+
+    #[inline(always)]
+    fn exponent(self) -> Self {
+        let bits: u32x8 = bytemuck::cast(self);
+        let biased: Self = bytemuck::cast((bits >> 23) | u32x8::splat(WHOLE.to_bits()));
+        biased - Self::splat(BIASED)
+    }
+
+    #[inline(always)]
+    fn mantissa(self) -> Self {
+        let bits: u32x8 = bytemuck::cast(self);
+        bytemuck::cast((bits & u32x8::splat(FRACTION)) | u32x8::splat(ONE))
+    }
+
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        let bits: u32x8 = bytemuck::cast(self + Self::splat(BIASED));
+        bytemuck::cast(bits << 23)
     }
 }
 
@@ -95,6 +281,18 @@ mod tests {
             let found = x.inverse_cube_root();
             prop_assert!((f64::from(found) / exact - 1.0).abs() < 5e-7);
             prop_assert_eq!(<f32x8 as Lane>::splat(x).inverse_cube_root().to_array(), [found; 8]);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn logarithm_and_power_are_right_to_f32_and_the_same_in_every_width(x in 1e-6f32..1e6, y in -60.0f32..60.0) {
+            prop_assert!((f64::from(Lane::log2(x)) - f64::from(x).log2()).abs() < 2e-7 * (1.0 + f64::from(x).log2().abs()));
+            prop_assert!((f64::from(Lane::exp2(y)) / f64::from(y).exp2() - 1.0).abs() < 4e-7);
+            let same = |one: f32, eight: f32x8| eight.to_array().map(f32::to_bits) == [one.to_bits(); 8];
+            prop_assert!(same(Lane::log2(x), Lane::log2(<f32x8 as Lane>::splat(x))));
+            prop_assert!(same(Lane::exp2(y), Lane::exp2(<f32x8 as Lane>::splat(y))));
+            prop_assert!(same(x.with_sign_of(y), <f32x8 as Lane>::splat(x).with_sign_of(<f32x8 as Lane>::splat(y))));
         }
     }
 

@@ -9,7 +9,7 @@
 //! four passes: element forces, contact, node update, bookkeeping; no equation is solved.
 //!
 //! # Practice
-//! One step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms); a longer one is cut into substeps. Elements sit in blocks of eight with one
+//! One step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms); a longer one is cut into substeps. Elements sit in blocks of sixteen with one
 //! lane each; their forces are kept and gathered per node in a fixed order, so the same input gives the same bytes on every machine and with
 //! every kernel. A step neither allocates, locks, waits nor panics.
 //!
@@ -36,10 +36,19 @@ mod config;
 mod contact;
 mod damping;
 mod element;
+mod elements;
+mod kernel;
 mod lane;
+mod law;
 mod layout;
 mod nodes;
+mod principal;
+mod relaxation;
 mod tled;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
-pub use config::{Config, Damping, Kernel};
+pub use config::{Config, Damping};
+pub use kernel::Kernel;
+pub use relaxation::Relaxation;
 pub use tled::Tled;

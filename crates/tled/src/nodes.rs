@@ -4,8 +4,9 @@
 //! State is kept as displacement from rest, by place in the solver's order: f32 displacements of a few mm are a thousand times finer than
 //! positions of 200 mm. Positions and velocities are written out in the mesh's order.
 
-use crate::block::{Elements, Quad};
+use crate::block::Quad;
 use crate::damping::RigidMotion;
+use crate::elements::Elements;
 use crate::layout::Layout;
 use trepan_geometry::Vec3;
 use trepan_soft::{Body, StepReport};

@@ -1,8 +1,8 @@
 //! The solver: one step, pass by pass.
 
-use crate::block::Elements;
 use crate::config::{Config, Damping};
 use crate::contact::stable_share;
+use crate::elements::Elements;
 use crate::layout::Layout;
 use crate::nodes::{Nodes, Update};
 use trepan_contact::NodalContact;
@@ -30,7 +30,7 @@ impl Tled {
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
         Ok(Self {
             config: *config,
-            elements: Elements::of(body, &layout),
+            elements: Elements::of(body, &layout, config.kernel, config.cure_locking, config.relaxation),
             nodes: Nodes::of(body, &layout),
             bound_ms: power_bound_ms(body) as f32,
             damping_per_ms: damping_rate(body, config.damping, extent),
@@ -57,6 +57,12 @@ impl Tled {
         }
     }
 
+    /// Puts every node back to its rest position, at rest, and forgets past stress.
+    pub fn reset(&mut self) {
+        (0..self.place_of.len()).for_each(|place| self.nodes.set(place, Vec3::ZERO, Vec3::ZERO));
+        self.elements.forget();
+    }
+
     /// Into how many steps of what length `dt_ms` is cut.
     fn cut(&self, dt_ms: f32) -> (u32, f32) {
         let longest = self.stable_dt_ms();
@@ -71,7 +77,7 @@ impl Tled {
     }
 
     fn substep(&mut self, loads: &Loads, dt_ms: f32, report: &mut StepReport) {
-        report.inverted += self.elements.compute(&self.nodes.u, self.config.kernel);
+        report.inverted += self.elements.compute(&mut self.nodes.u, dt_ms);
         self.press(&loads.contact, dt_ms, report);
         let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.nodes.rigid_motion());
         let update = Update {

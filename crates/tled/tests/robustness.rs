@@ -16,7 +16,7 @@ fn noise(i: usize) -> f32 {
 
 fn shaken(config: &Config, amplitude: f32) -> Tled {
     let body = cube();
-    let mut tled = Tled::new(&body, config).unwrap();
+    let mut tled = Tled::new(&body, config).expect("the cube is a sound body");
     for n in 0..body.mesh.positions.len() {
         if body.mesh.positions[n].z > 1.0 {
             let kick = Vec3::new(noise(3 * n), noise(3 * n + 1), noise(3 * n + 2)) * amplitude;
@@ -52,8 +52,9 @@ fn runs_repeat_bit_for_bit_and_kernels_agree_bit_for_bit() {
     };
     let first = end(Kernel::Fastest);
     assert_eq!(first, end(Kernel::Fastest));
-    assert_eq!(first, end(Kernel::Scalar));
-    assert_eq!(first, end(Kernel::Wide));
+    for kernel in Kernel::all().into_iter().filter(|kernel| kernel.runs_here()) {
+        assert!(first == end(kernel), "{}", kernel.name());
+    }
 }
 
 #[test]

@@ -1,0 +1,235 @@
+//! The materials as the kernels compute them, in f32, for one element or several at once.
+//!
+//! # Theory
+//! Every law is written as `P = F S + (q_iso + κ (J-1)) cof F`, S a symmetric tensor:
+//! ```text
+//! neo-Hookean          S = μ g I                                        q_iso = μ/2 g' I₁
+//! St. Venant-Kirchhoff S = (λ tr E - μ) I + μ FᵀF                       q_iso = 0, no κ term
+//! Mooney-Rivlin        S = (2 c₁₀ g + 2 c₀₁ h I₁) I - 2 c₀₁ h FᵀF       q_iso = c₁₀ g' I₁ + c₀₁ h' I₂
+//! Ogden                S = Σ_i s_i n_i n_iᵀ, s_i = Σ_p μ_p'/α_p g_p λ_i^(α_p-2)   (μ' = 2 μ)
+//! ```
+//! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3 as in `trepan_soft::Law`, the f64 twin of this file.
+
+use crate::lane::Lane;
+use crate::principal::principal;
+use trepan_soft::{LEAST_STRETCH, Law};
+
+/// What the laws need to know of an element's deformation.
+pub(crate) struct Deformation<L> {
+    /// Rows of F.
+    pub f: [[L; 3]; 3],
+    /// Rows of cof F.
+    pub c: [[L; 3]; 3],
+    /// det F.
+    pub j: L,
+    /// max(J, 0.3) and its power -1/3.
+    pub clamped: L,
+    pub root: L,
+}
+
+/// A symmetric tensor as xx, yy, zz, xy, xz, yz.
+pub(crate) type Symmetric<L> = [L; 6];
+
+/// An isochoric stress, times rest volume: `P V = F s + q cof F`.
+pub(crate) struct Stress<L> {
+    pub s: Symmetric<L>,
+    pub q: L,
+}
+
+/// A law with K constants for each element.
+pub(crate) trait Constitutive<const K: usize> {
+    /// The constants of one element, with its rest volume in mm³ in those that are moduli.
+    fn constants(law: &Law, volume_mm3: f64) -> [f32; K];
+    /// Its stress without the part of the volume.
+    fn stress<L: Lane>(constants: &[L; K], d: &Deformation<L>) -> Stress<L>;
+    /// κ V, N mm: what multiplies `J - 1` in the part of the volume; zero where the law is not split.
+    fn bulk<L: Lane>(constants: &[L; K]) -> L;
+    /// Whether s is a number times the unit tensor, so that its other entries need no arithmetic.
+    const ROUND: bool = false;
+}
+
+pub(crate) struct NeoHookean;
+pub(crate) struct StVenantKirchhoff;
+pub(crate) struct MooneyRivlin;
+pub(crate) struct Ogden;
+
+impl<L: Lane> Deformation<L> {
+    /// J^n continued linearly, and its slope, from `at = max(J, 0.3)^n`.
+    #[inline(always)]
+    fn continued(&self, at: L, n: L) -> (L, L) {
+        let inverse = self.root * self.root * self.root;
+        let slope = n * at * inverse;
+        (at + slope * (self.j - self.clamped), slope)
+    }
+
+    /// FᵀF.
+    #[inline(always)]
+    fn cauchy_green(&self) -> Symmetric<L> {
+        let [a, b, c] = &self.f;
+        [
+            a[0] * a[0] + b[0] * b[0] + c[0] * c[0],
+            a[1] * a[1] + b[1] * b[1] + c[1] * c[1],
+            a[2] * a[2] + b[2] * b[2] + c[2] * c[2],
+            a[0] * a[1] + b[0] * b[1] + c[0] * c[1],
+            a[0] * a[2] + b[0] * b[2] + c[0] * c[2],
+            a[1] * a[2] + b[1] * b[2] + c[1] * c[2],
+        ]
+    }
+
+    /// `(cof F)ᵀ cof F / max(J, 0.3)`, which is J (FᵀF)⁻¹ where J is not clamped.
+    #[inline(always)]
+    pub fn inverse_green(&self) -> Symmetric<L> {
+        let inverse = self.root * self.root * self.root;
+        let [a, b, c] = &self.c;
+        [
+            (a[0] * a[0] + b[0] * b[0] + c[0] * c[0]) * inverse,
+            (a[1] * a[1] + b[1] * b[1] + c[1] * c[1]) * inverse,
+            (a[2] * a[2] + b[2] * b[2] + c[2] * c[2]) * inverse,
+            (a[0] * a[1] + b[0] * b[1] + c[0] * c[1]) * inverse,
+            (a[0] * a[2] + b[0] * b[2] + c[0] * c[2]) * inverse,
+            (a[1] * a[2] + b[1] * b[2] + c[1] * c[2]) * inverse,
+        ]
+    }
+}
+
+#[inline(always)]
+fn squared<L: Lane>(rows: &[[L; 3]; 3]) -> L {
+    let [a, b, c] = rows;
+    (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+        + (b[0] * b[0] + b[1] * b[1] + b[2] * b[2])
+        + (c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
+}
+
+impl Constitutive<2> for NeoHookean {
+    const ROUND: bool = true;
+
+    fn constants(law: &Law, volume_mm3: f64) -> [f32; 2] {
+        let (mu, kappa) = law.moduli();
+        [mu * volume_mm3, kappa * volume_mm3].map(|c| c as f32)
+    }
+
+    #[inline(always)]
+    fn stress<L: Lane>(&[mu, _]: &[L; 2], d: &Deformation<L>) -> Stress<L> {
+        let zero = L::splat(0.0);
+        let (g, dg) = d.continued(d.root * d.root, L::splat(-2.0 / 3.0));
+        let along_f = mu * g;
+        let q_iso = mu * L::splat(0.5) * dg * squared(&d.f);
+        Stress { s: [along_f, along_f, along_f, zero, zero, zero], q: q_iso }
+    }
+
+    #[inline(always)]
+    fn bulk<L: Lane>(constants: &[L; 2]) -> L {
+        constants[1]
+    }
+}
+
+impl Constitutive<2> for StVenantKirchhoff {
+    fn constants(law: &Law, volume_mm3: f64) -> [f32; 2] {
+        let (mu, kappa) = law.moduli();
+        [(kappa - mu * 2.0 / 3.0) * volume_mm3, mu * volume_mm3].map(|c| c as f32)
+    }
+
+    #[inline(always)]
+    fn stress<L: Lane>(&[lambda, mu]: &[L; 2], d: &Deformation<L>) -> Stress<L> {
+        let b = d.cauchy_green();
+        let trace = ((b[0] - L::splat(1.0)) + (b[1] - L::splat(1.0)) + (b[2] - L::splat(1.0))) * L::splat(0.5);
+        let along = lambda * trace - mu;
+        let s = [along + mu * b[0], along + mu * b[1], along + mu * b[2], mu * b[3], mu * b[4], mu * b[5]];
+        Stress { s, q: L::splat(0.0) }
+    }
+
+    #[inline(always)]
+    fn bulk<L: Lane>(_: &[L; 2]) -> L {
+        L::splat(0.0)
+    }
+}
+
+impl Constitutive<3> for MooneyRivlin {
+    fn constants(law: &Law, volume_mm3: f64) -> [f32; 3] {
+        let Law::MooneyRivlin { c10, c01, kappa } = *law else { return [0.0; 3] };
+        [c10 * volume_mm3, c01 * volume_mm3, kappa * volume_mm3].map(|c| c as f32)
+    }
+
+    #[inline(always)]
+    fn stress<L: Lane>(&[c10, c01, _]: &[L; 3], d: &Deformation<L>) -> Stress<L> {
+        let power = d.root * d.root;
+        let (g, dg) = d.continued(power, L::splat(-2.0 / 3.0));
+        let (h, dh) = d.continued(power * power, L::splat(-4.0 / 3.0));
+        let (b, two) = (d.cauchy_green(), L::splat(2.0));
+        let i1 = b[0] + b[1] + b[2];
+        let second = two * c01 * h;
+        let along = two * c10 * g + second * i1;
+        let zero = L::splat(0.0);
+        let s = [
+            along - second * b[0],
+            along - second * b[1],
+            along - second * b[2],
+            zero - second * b[3],
+            zero - second * b[4],
+            zero - second * b[5],
+        ];
+        Stress { s, q: c10 * dg * i1 + c01 * dh * squared(&d.c) }
+    }
+
+    #[inline(always)]
+    fn bulk<L: Lane>(constants: &[L; 3]) -> L {
+        constants[2]
+    }
+}
+
+impl Constitutive<5> for Ogden {
+    fn constants(law: &Law, volume_mm3: f64) -> [f32; 5] {
+        let Law::Ogden { mu, alpha, kappa } = *law else { return [0.0; 5] };
+        let scale = |p: usize| if mu[p] == 0.0 { 0.0 } else { 2.0 * mu[p] / (alpha[p] * alpha[p]) * volume_mm3 };
+        [scale(0), alpha[0], scale(1), alpha[1], kappa * volume_mm3].map(|c| c as f32)
+    }
+
+    #[inline(always)]
+    fn stress<L: Lane>(&[scale1, alpha1, scale2, alpha2, _]: &[L; 5], d: &Deformation<L>) -> Stress<L> {
+        let (squares, axes) = principal(&d.cauchy_green());
+        let (one, q1) = term(scale1, alpha1, &squares, d);
+        let (two, q2) = term(scale2, alpha2, &squares, d);
+        let along = [one[0] + two[0], one[1] + two[1], one[2] + two[2]];
+        Stress { s: spread(&along, &axes), q: q1 + q2 }
+    }
+
+    #[inline(always)]
+    fn bulk<L: Lane>(constants: &[L; 5]) -> L {
+        constants[4]
+    }
+}
+
+/// One term of Ogden's law: s_i and its part of q_iso.
+#[inline(always)]
+fn term<L: Lane>(scale: L, alpha: L, squares: &[L; 3], d: &Deformation<L>) -> ([L; 3], L) {
+    let (g, dg) = d.continued((alpha * L::splat(-1.0 / 3.0) * d.clamped.log2()).exp2(), alpha * L::splat(-1.0 / 3.0));
+    let (v0, s0) = stretch_power(squares[0], alpha);
+    let (v1, s1) = stretch_power(squares[1], alpha);
+    let (v2, s2) = stretch_power(squares[2], alpha);
+    let outer = L::splat(2.0) * scale * g;
+    ([outer * s0, outer * s1, outer * s2], scale * dg * (v0 + v1 + v2))
+}
+
+/// `λ^α` as a function of λ², and its slope over λ²; a tangent line below the least stretch.
+#[inline(always)]
+fn stretch_power<L: Lane>(square: L, alpha: L) -> (L, L) {
+    let at = square.at_least((LEAST_STRETCH * LEAST_STRETCH) as f32);
+    let half = alpha * L::splat(0.5);
+    let value = (half * at.log2()).exp2();
+    let slope = half * value / at;
+    (value + slope * (square - at), slope)
+}
+
+/// `Σ s_i n_i n_iᵀ`, n_i the columns of `axes`, given as rows here.
+#[inline(always)]
+fn spread<L: Lane>(s: &[L; 3], axes: &[[L; 3]; 3]) -> Symmetric<L> {
+    let [a, b, c] = axes;
+    [
+        s[0] * a[0] * a[0] + s[1] * b[0] * b[0] + s[2] * c[0] * c[0],
+        s[0] * a[1] * a[1] + s[1] * b[1] * b[1] + s[2] * c[1] * c[1],
+        s[0] * a[2] * a[2] + s[1] * b[2] * b[2] + s[2] * c[2] * c[2],
+        s[0] * a[0] * a[1] + s[1] * b[0] * b[1] + s[2] * c[0] * c[1],
+        s[0] * a[0] * a[2] + s[1] * b[0] * b[2] + s[2] * c[0] * c[2],
+        s[0] * a[1] * a[2] + s[1] * b[1] * b[2] + s[2] * c[1] * c[2],
+    ]
+}

@@ -1,0 +1,96 @@
+//! Stress that fades while the tissue is held: Prony terms.
+//!
+//! # Theory
+//! Of the instantaneous isochoric stress S, term i lets the share g_i fade with the time τ_i:
+//! ```text
+//! S(t) - Σ_i Υ_i(t)      Υ_i' = (g_i S - Υ_i)/τ_i      Υ⁺ = e^(-dt/τ) Υ + g (1 - e^(-dt/τ)) S
+//! ```
+//! exact for a stress that is constant over the step, stable for any dt. The material's moduli are the instantaneous ones; held for long
+//! the isochoric part falls to `1 - Σ g_i`. S is taken in the rest frame (second Piola-Kirchhoff), so rotation does not mix it.
+//!
+//! # Sources
+//! Taylor, Comas, Cheng, Passenger, Hawkes, Atkinson, Ourselin, Med. Image Anal. 13 (2009). Brain: Miller and Chinzei 2002.
+
+use crate::lane::Lane;
+use trepan_soft::BodyError;
+
+/// Two Prony terms; a share of 0 = no term.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Relaxation {
+    /// Share g_i of the instantaneous isochoric stress that fades, without unit; at least 0, together below 1.
+    pub share: [f32; 2],
+    /// Time τ_i in which it fades to 1/e, ms.
+    pub time_ms: [f32; 2],
+}
+
+/// One term's factors for a step.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Fade {
+    pub keep: f32,
+    pub gain: f32,
+}
+
+impl Relaxation {
+    /// No relaxation: elastic.
+    pub const NONE: Self = Self { share: [0.0; 2], time_ms: [1.0; 2] };
+
+    /// Brain, Miller and Chinzei 2002: 45 % within half a second, 36.5 % within 50 s.
+    pub const BRAIN: Self = Self { share: [0.450, 0.365], time_ms: [500.0, 50_000.0] };
+
+    /// Whether anything fades.
+    pub fn is_none(&self) -> bool {
+        self.share == [0.0; 2]
+    }
+
+    /// Refuses shares and times that make no sense.
+    pub fn check(&self) -> Result<(), BodyError> {
+        let refuse = |field, value, right| Err(BodyError::Config { field, value, right });
+        let total = self.share[0] + self.share[1];
+        if self.share.iter().any(|g| g.is_nan() || *g < 0.0) || total >= 1.0 {
+            return refuse("relaxation.share", total, "each at least 0 and together below 1");
+        }
+        let bad = (0..2).find(|&i| self.share[i] > 0.0 && !(self.time_ms[i] > 0.0 && self.time_ms[i].is_finite()));
+        match bad {
+            Some(i) => refuse("relaxation.time_ms", self.time_ms[i], "over 0 and finite"),
+            None => Ok(()),
+        }
+    }
+
+    /// Factors for a step of `dt_ms`; the same bits on every machine.
+    pub(crate) fn fade(&self, dt_ms: f32) -> [Fade; 2] {
+        [0, 1].map(|i| {
+            let keep = Lane::exp2(-std::f32::consts::LOG2_E * dt_ms / self.time_ms[i].max(f32::MIN_POSITIVE));
+            Fade { keep, gain: self.share[i] * (1.0 - keep) }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nonsense_is_refused() {
+        let with = |share, time_ms| Relaxation { share, time_ms }.check();
+        assert!(
+            Relaxation::BRAIN.check().is_ok()
+                && Relaxation::NONE.check().is_ok()
+                && Relaxation::default().check().is_ok()
+        );
+        assert!(with([0.6, 0.4], [1.0, 1.0]).is_err() && with([-0.1, 0.4], [1.0, 1.0]).is_err());
+        assert!(with([0.1, 0.0], [0.0, 0.0]).is_err() && with([f32::NAN, 0.0], [1.0, 1.0]).is_err());
+    }
+
+    #[test]
+    fn a_held_stress_fades_to_what_is_left() {
+        let relaxation = Relaxation { share: [0.4, 0.2], time_ms: [10.0, 100.0] };
+        let (mut memory, dt) = ([0.0f32; 2], 0.5);
+        for step in 0..4000 {
+            let fade = relaxation.fade(dt);
+            (0..2).for_each(|i| memory[i] = fade[i].keep * memory[i] + fade[i].gain);
+            let t = dt * (step + 1) as f32;
+            let exact = 0.4 * (1.0 - (-t / 10.0).exp()) + 0.2 * (1.0 - (-t / 100.0).exp());
+            assert!((memory[0] + memory[1] - exact).abs() < 1e-4, "{t}");
+        }
+    }
+}
