@@ -23,7 +23,7 @@ pub struct Options {
     #[arg(long)]
     pub headless: bool,
     /// Length of a scripted operation, and at most of any other, seconds [default: 20 for a script]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// Where to record the session [default: session.mcap in the output folder]
     #[arg(long, value_name = "FILE.mcap")]
@@ -44,13 +44,13 @@ pub struct Options {
     #[arg(long)]
     pub list_devices: bool,
     /// Edge of a skull voxel, mm
-    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    #[arg(long, value_name = "MM", default_value_t = 1.0, allow_negative_numbers = true)]
     pub spacing_mm: f32,
     /// Tetrahedra of the brain, met within a tenth
     #[arg(long, value_name = "N", default_value_t = 12_000)]
     pub tets: usize,
     /// Threshold of bone, HU [default: from the histogram, 300 to 500]
-    #[arg(long, value_name = "HU")]
+    #[arg(long, value_name = "HU", allow_negative_numbers = true)]
     pub isovalue_hu: Option<i16>,
     /// Young's modulus of the brain, kPa
     #[arg(long, value_name = "KPA", default_value_t = 3.0)]

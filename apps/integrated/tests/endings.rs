@@ -1,0 +1,78 @@
+//! How a session ends: by a signal, by being killed, by itself; and that a replay of it is the same, bit for bit.
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use trepan_link::Recording;
+
+fn operation(out: &Path, seconds: &str, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_integrated"));
+    command.args(["--headless", "--frames-per-second", "0", "--duration", seconds, "--out"]).arg(out).args(more);
+    command
+        .env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"))
+        .stderr(Stdio::null())
+        .stdout(Stdio::null());
+    command
+}
+
+/// Waits until the recording has grown to some size, then sends a signal.
+fn signalled(mut child: Child, recording: &Path, signal: &str) -> Option<i32> {
+    let patience = Instant::now() + Duration::from_secs(120);
+    while fs::metadata(recording).map_or(0, |m| m.len()) < 100_000 {
+        assert!(Instant::now() < patience, "the operation did not begin to record");
+        assert!(child.try_wait().unwrap().is_none(), "the operation ended before it recorded");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+    child.wait().unwrap().code()
+}
+
+#[test]
+fn a_signal_ends_with_no_force_and_a_whole_recording() {
+    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+        let out = tempfile::tempdir().unwrap();
+        let record = out.path().join("session.mcap");
+        let child = operation(out.path(), "60", &[]).spawn().unwrap();
+        assert_eq!(signalled(child, &record, signal), Some(code));
+        let recording = Recording::open(&record).unwrap();
+        assert!(!recording.truncated && recording.ticks.len() > 100);
+        assert_eq!(recording.ticks.last().unwrap().wrench.force.length(), 0.0, "the force did not end at zero");
+        let summary: Value = serde_json::from_slice(&fs::read(out.path().join("summary.json")).unwrap()).unwrap();
+        assert_eq!(summary["force_n"]["end"], 0.0);
+    }
+}
+
+#[test]
+fn a_killed_session_is_readable_to_its_last_chunk() {
+    let out = tempfile::tempdir().unwrap();
+    let record = out.path().join("session.mcap");
+    let child = operation(out.path(), "60", &[]).spawn().unwrap();
+    assert_eq!(signalled(child, &record, "-KILL"), None);
+    let recording = Recording::open(&record).unwrap();
+    assert!(recording.truncated && recording.ticks.len() > 100, "{} ticks", recording.ticks.len());
+    assert!(recording.ticks.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
+}
+
+#[test]
+fn a_replay_gives_the_same_forces_bit_for_bit() {
+    let (live, again) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    assert!(operation(live.path(), "6", &[]).status().unwrap().success());
+    let device = format!("replay:{}", live.path().join("session.mcap").display());
+    assert!(operation(again.path(), "6", &["--device", &device]).status().unwrap().success());
+    let summary: Value = serde_json::from_slice(&fs::read(again.path().join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["replay"]["ticks"], summary["replay"]["identical"]);
+    let [was, is] = [&live, &again].map(|out| Recording::open(&out.path().join("session.mcap")).unwrap());
+    assert!(was.ticks.len() > 1000 && was.ticks.len() == is.ticks.len());
+    assert!(was.ticks.iter().any(|t| t.wrench.force.length() > 0.1), "nothing was felt");
+    for (a, b) in was.ticks.iter().zip(&is.ticks) {
+        assert_eq!(
+            a.wrench.force.to_array().map(f32::to_bits),
+            b.wrench.force.to_array().map(f32::to_bits),
+            "tick {}",
+            a.tick
+        );
+        assert_eq!(a.proxy.translation, b.proxy.translation, "tick {}", a.tick);
+    }
+}
