@@ -14,7 +14,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "{:>13} {:>7} {:>9} {:>9} {:>9} {:>7} {:>9}",
         "method", "points", "tests", "p50 us", "p99 us", "depth", "jump us"
     );
-    for method in Method::all() {
+    let only = std::env::args().nth(2);
+    for method in Method::all().into_iter().filter(|m| only.as_deref().is_none_or(|name| m.name() == name)) {
         let config = Config { method, ..Config::default() };
         let mut collision = TissueCollision::new(&mesh, &Tool::probe(2.0), &config)?;
         let steps = if method == Method::Brute { 5 } else { 400 };

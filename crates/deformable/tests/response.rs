@@ -65,6 +65,18 @@ fn deeper_is_never_less_through_nine_tenths_of_the_thickness() {
     assert!((last - 10.8).abs() < 1e-3);
 }
 
+/// From deep under the top to deep beside the left wall: the contact is the near wall's, not the one that was left.
+#[test]
+fn after_a_jump_the_contact_is_found_anew() {
+    let mesh = block([8, 8, 8], 4.0);
+    let mut collision = collision(&mesh, Method::Walk);
+    let first = step_at(&mut collision, &mesh, Vec3::new(15.1, 16.7, 29.0));
+    assert!((first.manifold.depth_mm - 5.0).abs() < 1e-3 && first.manifold.normal.z > 0.99);
+    let second = step_at(&mut collision, &mesh, Vec3::new(4.5, 15.9, 16.2));
+    assert!((second.manifold.depth_mm - 6.5).abs() < 1e-3, "{}", second.manifold.depth_mm);
+    assert!(second.manifold.normal.x < -0.99 && second.points_in_contact == 211);
+}
+
 /// The thesis's rule has the fault that its successor is there to cure: the same push reads shallower further down.
 #[test]
 fn the_printed_rule_loses_depth_on_the_way() {

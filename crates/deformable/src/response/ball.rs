@@ -4,7 +4,8 @@
 //! Let c be the ball's centre, R its radius, q the closest surface point, s = +1 outside and -1 inside. Then `depth = R - s |c - q|`: a
 //! distance, so it never jumps when a point crosses a border between tetrahedra, and one millimetre of push is one millimetre of depth. While the
 //! centre is inside, q is not searched anew but followed: from the last triangle downhill, and only over triangles that face the same way. So
-//! the far side of a thin structure never takes the contact over, and deeper stays deeper through the whole thickness.
+//! the far side of a thin structure never takes the contact over, and deeper stays deeper through the whole thickness. A tool that moved by more than R
+//! in one step jumped: q is searched anew.
 //!
 //! The normal is the mean over the centre and all points inside, each with the blended surface normal at its own closest point (`near.rs`) and weighted
 //! with its own depth: `f = Σ dᵢ nᵢ`, `n = f / |f|`. A weight is zero where a point enters, so nothing jumps. In a groove whose walls push against each
@@ -35,6 +36,7 @@ use trepan_geometry::{Aabb, Vec3};
 /// The triangle touched last, and room for those near the contact.
 pub(crate) struct Ball {
     anchor: u32,
+    last_centre: Vec3,
     numbers: Vec<u32>,
     near: Near,
 }
@@ -48,7 +50,7 @@ const BLEND: f32 = 0.5;
 
 impl Ball {
     pub(crate) fn new() -> Self {
-        Self { anchor: NONE, numbers: Vec::with_capacity(MAX_NEAR), near: Near::with_capacity(MAX_NEAR) }
+        Self { anchor: NONE, last_centre: Vec3::ZERO, numbers: Vec::with_capacity(MAX_NEAR), near: Near::with_capacity(MAX_NEAR) }
     }
 
     pub(crate) fn reset(&mut self) {
@@ -94,7 +96,9 @@ impl Ball {
     ) -> Option<(Sample, f32)> {
         let (positions, centre) = (scene.positions, scene.tool.tip());
         let inside = hits.tet[scene.centre()] != NONE;
-        let foot = match inside && self.anchor != NONE {
+        let jumped = self.last_centre.distance(centre) > scene.radius_mm;
+        self.last_centre = centre;
+        let foot = match inside && self.anchor != NONE && !jumped {
             true => surface.descend(positions, self.anchor, centre),
             false => surface.closest(positions, centre, if inside { f32::INFINITY } else { scene.radius_mm }),
         }?;
