@@ -24,9 +24,10 @@ mod codes;
 mod library;
 mod servo;
 
-use crate::{Capabilities, DeviceError, HapticDevice, Reading, Status, Workspace, fault::Fault, fault::Watch};
+use crate::ramp::Ramp;
+use crate::{Capabilities, DeviceError, Fault, HapticDevice, Reading, Status, Watch, Workspace};
 use library::{Hd, Scheduled};
-use servo::{Command, RAMP_TICKS, Sample, Servo};
+use servo::{Command, Sample, Servo};
 use std::path::PathBuf;
 use std::sync::Mutex;
 use trepan_contact::GuardedWrench;
@@ -105,11 +106,10 @@ impl OpenHaptics {
             calibration_style: lowest_bit(hd.integer(codes::CALIBRATION_STYLE)),
             samples: sample_in,
             commands: command_out,
-            watch: watch.clone(),
+            ramp: Ramp::new(watch.clone()),
             number: 0,
             last_command: 0,
             silent_ticks: 0,
-            rest: RAMP_TICKS,
         }));
         hd.set_scheduler_rate(RATE_HZ);
         hd.drain_errors(); // A rate that the link cannot have leaves the default, which is 1 kHz.

@@ -2,21 +2,16 @@
 //!
 //! # Practice
 //! The force is what the haptic loop last asked for, as long as that is younger than [`SILENT_TICKS`] ticks: a loop that died
-//! cannot leave its last force on the motors. After any fault the force stays off for [`REST_TICKS`], then ramps in over
-//! [`RAMP_TICKS`].
+//! cannot leave its last force on the motors. After any fault the force rests, then ramps in.
 
 use super::codes;
 use super::library::Hd;
-use crate::{Fault, fault::Watch};
+use crate::{Fault, ramp::Ramp};
 use trepan_geometry::Wrench;
 use triple_buffer::{Input, Output};
 
 /// Ticks without a new command after which the force is cut.
 pub(super) const SILENT_TICKS: u32 = 10;
-/// Ticks without force after a fault.
-pub(super) const REST_TICKS: u32 = 200;
-/// Ticks from no force to full force after that.
-pub(super) const RAMP_TICKS: u32 = 300;
 
 /// What the device felt, in its own axes: mm, mm/ms, rad/ms.
 #[derive(Clone, Copy, Debug, Default)]
@@ -44,12 +39,10 @@ pub(super) struct Servo {
     pub calibration_style: u32,
     pub samples: Input<Sample>,
     pub commands: Output<Command>,
-    pub watch: Watch,
+    pub ramp: Ramp,
     pub number: u64,
     pub last_command: u64,
     pub silent_ticks: u32,
-    /// Ticks until the force is at full size.
-    pub rest: u32,
 }
 
 impl Servo {
@@ -81,7 +74,7 @@ impl Servo {
             codes::CALIBRATION_NEEDS_UPDATE => self.hd.update_calibration(self.calibration_style),
             _ => {}
         }
-        self.begin_rest(Fault::NotCalibrated);
+        self.ramp.cut(Fault::NotCalibrated);
         false
     }
 
@@ -109,23 +102,11 @@ impl Servo {
             return Wrench::ZERO;
         }
         if self.last_command > 0 && self.silent_ticks >= SILENT_TICKS {
-            self.begin_rest(Fault::LoopSilent);
+            self.ramp.cut(Fault::LoopSilent);
             return Wrench::ZERO;
         }
-        if self.rest == 0 {
-            return command.wrench;
-        }
-        self.rest -= 1;
-        if self.rest < RAMP_TICKS {
-            self.watch.set(None);
-        }
-        let share = 1.0 - (self.rest as f32 / RAMP_TICKS as f32).min(1.0);
+        let share = self.ramp.share();
         Wrench { force: command.wrench.force * share, torque: command.wrench.torque * share }
-    }
-
-    fn begin_rest(&mut self, fault: Fault) {
-        self.rest = REST_TICKS + RAMP_TICKS;
-        self.watch.set(Some(fault));
     }
 
     /// Force errors rest and go on; anything else means that the device or the loop is gone.
@@ -137,11 +118,11 @@ impl Servo {
             _ => {
                 self.hd.disable(codes::FORCE_OUTPUT);
                 self.hd.drain_errors();
-                self.begin_rest(Fault::Disconnected);
+                self.ramp.cut(Fault::Disconnected);
                 return codes::CALLBACK_DONE;
             }
         };
-        self.begin_rest(fault);
+        self.ramp.cut(fault);
         self.samples.publish();
         codes::CALLBACK_CONTINUE
     }
