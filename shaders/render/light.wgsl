@@ -64,14 +64,14 @@ fn lit(albedo: vec3f, normal: vec3f, along: vec3f, open: f32, key: f32, gloss: f
 
 fn bone_colour(point: vec3f, normal: vec3f) -> vec3f {
     let inside = hu(grid_of(point - normal * 1.2));
-    return mix(vec3f(0.80, 0.62, 0.50), vec3f(0.96, 0.91, 0.80), smoothstep(scene.dims.w, scene.dims.w + 500.0, inside));
+    return mix(vec3f(0.80, 0.62, 0.50), vec3f(0.93, 0.89, 0.80), smoothstep(scene.dims.w, scene.dims.w + 500.0, inside));
 }
 
 fn brain_colour(rest: vec3f) -> vec3f {
     let at = (scene.mri_from_world * vec4f(rest, 1.0)).xyz;
     let signal = textureSampleLevel(mri, linear, at, 0.0).x;
-    let shade = select(0.8, 0.45 + 0.75 * signal, scene.eye.w > 0.0);
-    return vec3f(0.93, 0.66, 0.61) * shade;
+    let shade = select(0.85, 0.45 + 0.85 * signal, scene.eye.w > 0.0);
+    return vec3f(0.90, 0.50, 0.45) * shade;
 }
 
 fn tool_colour(point: vec3f, on_ball: bool) -> vec3f {
@@ -111,8 +111,13 @@ fn shade_tool(point: vec3f, along: vec3f, on_ball: bool, on_end: bool) -> vec3f 
         let normal = unfold(brain.xy);
         let g = grid_of(point);
         let rest = textureLoad(brain_rest, at, 0).xyz - 1.5 * normal;
-        let key = past_tool(point) * select(1.0, 0.25, shadowed(g, normal));
-        colour = lit(brain_colour(rest), normal, along, openness(g, normal), key, 0.20);
+        var open = 1.0;
+        var key = past_tool(point);
+        if scene.forward.w > 0.0 {
+            open = openness(g, normal);
+            key *= select(1.0, 0.25, shadowed(g, normal));
+        }
+        colour = lit(brain_colour(rest), normal, along, open, key, 0.20);
     } else {
         let normal = unfold(skull.xy);
         colour = lit(bone_colour(point, normal), normal, along, fract(skull.z), past_tool(point) * floor(skull.z), 0.06);

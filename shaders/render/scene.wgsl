@@ -6,7 +6,7 @@ struct Scene {
     eye: vec4f,               // world mm; w: 1 if there is an MRI
     right: vec4f,             // half the picture's width at distance 1; w: width in pixels
     up: vec4f,                // half its height at distance 1; w: height in pixels
-    forward: vec4f,           // unit; w: 1 if there is a brain
+    forward: vec4f,           // unit; w: 1 if bone is shown
     origin: vec4f,            // world centre of the padded voxel (0, 0, 0); w: voxel edge, mm
     dims: vec4f,              // padded voxels along x, y, z; w: isovalue, HU
     tip: vec4f,               // centre of the tool's ball; w: its radius (negative: no tool)

@@ -104,7 +104,7 @@ impl Renderer {
         }
         let [_, _, width, height] = self.canvas.layout.view;
         let mri_from_world = self.mri.texture_from_world;
-        let scene = Scene::of(frame, &view, [width, height], &self.skull.grid, mri_from_world, self.brain.is_some());
+        let scene = Scene::of(frame, &view, [width, height], &self.skull.grid, mri_from_world);
         self.scene.write(&self.gpu, 0, &[scene]);
         let lines_left = self.follow_slices(frame);
         let mut timer = self.timer.take();

@@ -26,14 +26,7 @@ pub(crate) struct Scene {
 
 impl Scene {
     /// Gathers what a frame says. `mri_from_world` gives texture coordinates, if there is an MRI.
-    pub fn of(
-        frame: &Frame,
-        view: &View,
-        size: [u32; 2],
-        grid: &Grid,
-        mri_from_world: Option<Mat4>,
-        brain: bool,
-    ) -> Self {
+    pub fn of(frame: &Frame, view: &View, size: [u32; 2], grid: &Grid, mri_from_world: Option<Mat4>) -> Self {
         let [width, height] = size.map(|n| n as f32);
         let tool = frame.tool.unwrap_or(Tool {
             kind: ToolKind::Probe,
@@ -51,7 +44,7 @@ impl Scene {
             eye: view.eye.extend(flag(mri_from_world.is_some())),
             right: (view.right * view.half.x).extend(width),
             up: (view.up * view.half.y).extend(height),
-            forward: view.forward.extend(flag(brain)),
+            forward: view.forward.extend(flag(frame.show_bone)),
             origin: grid.origin.extend(grid.spacing_mm),
             dims: dims.extend(grid.isovalue.into()),
             tip: tip.extend(tool.tip_radius_mm),

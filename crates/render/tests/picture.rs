@@ -26,10 +26,10 @@ fn picture(renderer: &mut Renderer, frame: &Frame) -> Image {
     renderer.image().unwrap()
 }
 
-/// How much redder than blue a pixel is: the brain is, bone and steel are less so.
+/// How much redder than green a pixel is: the brain and its outline are, bone and steel are less so.
 fn redness(image: &Image, x: u32, y: u32) -> i32 {
-    let [r, _, b, _] = image.pixel(x, y);
-    i32::from(r) - i32::from(b)
+    let [r, g, _, _] = image.pixel(x, y);
+    i32::from(r) - i32::from(g)
 }
 
 #[test]

@@ -82,7 +82,7 @@ impl<S: Session> Window<S> {
         match drawn {
             Err(error) => shared.fault = Some(error.to_string()),
             Ok(view) => {
-                let pointer = ui.input(|i| Pointer::over(&response, i));
+                let pointer = Pointer::over(ui, &response);
                 if self.hand.follow(&pointer, &view, space.y) {
                     self.moved_at = now;
                 }

@@ -1,4 +1,5 @@
-//! Warnings that cannot be missed: large white letters on red across the whole window, with a sign, so that colour is not needed to see them.
+//! Warnings that cannot be missed: large white letters on red across the whole window, with the word itself, so that colour is not
+//! needed to see them.
 
 use eframe::egui::{self, Color32, RichText};
 
@@ -10,7 +11,7 @@ pub(crate) fn show(ui: &mut egui::Ui, warnings: &[String]) {
     let red = egui::Frame::new().fill(Color32::from_rgb(190, 18, 24)).inner_margin(10.0);
     egui::Panel::top("warnings").frame(red).show(ui, |ui| {
         for warning in warnings {
-            ui.label(RichText::new(format!("⚠  {warning}")).size(24.0).strong().color(Color32::WHITE));
+            ui.label(RichText::new(format!("WARNING   {warning}")).size(24.0).strong().color(Color32::WHITE));
         }
     });
 }

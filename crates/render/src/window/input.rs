@@ -85,16 +85,17 @@ impl Hand {
 
 impl Pointer {
     /// What happened over a widget.
-    pub fn over(response: &egui::Response, input: &egui::InputState) -> Self {
+    pub fn over(ui: &egui::Ui, response: &egui::Response) -> Self {
         let drag = |button| if response.dragged_by(button) { response.drag_delta() } else { egui::Vec2::ZERO };
-        let vec2 = |v: egui::Vec2| Vec2::new(v.x, v.y);
-        Self {
-            left: vec2(drag(egui::PointerButton::Primary)),
-            right: vec2(drag(egui::PointerButton::Secondary)),
-            wheel: if response.hovered() { input.smooth_scroll_delta().y } else { 0.0 },
+        let (left, right) = (drag(egui::PointerButton::Primary), drag(egui::PointerButton::Secondary));
+        let hovered = response.hovered();
+        ui.input(|input| Self {
+            left: Vec2::new(left.x, left.y),
+            right: Vec2::new(right.x, right.y),
+            wheel: if hovered { input.smooth_scroll_delta().y } else { 0.0 },
             tilt: input.modifiers.shift,
             zoom: input.modifiers.ctrl || input.modifiers.command,
-        }
+        })
     }
 }
 

@@ -23,9 +23,9 @@ const ORANGE: Color32 = Color32::from_rgb(230, 159, 0);
 pub(crate) fn show(ui: &mut egui::Ui, panel: &Panel, force: &Trace) -> Clicks {
     ui.add_space(8.0);
     ui.label(RichText::new(&panel.phase).size(22.0).strong());
-    ui.label(RichText::new(&panel.hint).size(14.0));
+    ui.label(RichText::new(&panel.hint).size(14.0).color(Color32::from_gray(200)));
     ui.separator();
-    ui.label(RichText::new(format!("Force  {:.2} N", panel.force_n)).size(18.0));
+    ui.label(RichText::new(format!("Force  {:.2} N", panel.force_n)).size(18.0).color(Color32::WHITE));
     force.show(ui, 90.0, panel.force_limit_n.into(), BLUE);
     ui.label(
         RichText::new(format!(
@@ -46,7 +46,7 @@ pub(crate) fn show(ui: &mut egui::Ui, panel: &Panel, force: &Trace) -> Clicks {
     ui.separator();
     let clicks = buttons(ui, panel);
     ui.add_space(8.0);
-    ui.label(RichText::new(KEYS).small().weak());
+    ui.label(RichText::new(KEYS).small());
     clicks
 }
 
