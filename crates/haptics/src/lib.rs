@@ -18,6 +18,7 @@ mod dynamic;
 mod error;
 mod fault;
 pub mod force_dimension;
+pub mod haply;
 pub mod mouse;
 mod name;
 pub mod openhaptics;

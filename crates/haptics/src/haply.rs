@@ -1,0 +1,254 @@
+//! Haply Inverse3 with a VerseGrip, through Haply's own service on the same machine.
+//!
+//! # Theory
+//! The service answers each message with one state: the sender's pace is the loop's. A thread of the driver sends and
+//! receives; the haptic loop exchanges with it through triple buffers and never waits. That costs one to two ticks of delay.
+//!
+//! ```text
+//!   haptic loop: apply() ──wish──> thread ──set_cursor_force──> service
+//!                read() <──news──  thread <──state───────────── service
+//! ```
+//!
+//! # Practice
+//! The service's x right, y forward, z up (m) become x right, y up, z to the user (mm); [`Workspace`] lays them into the
+//! patient. Button a, or a wired grip's only one, is the pedal; b asks for the next tool. Force is given only while the service
+//! says calibrated, powered and ready, and no event says braked. Needs service 3.5 or later.
+//!
+//! # Sources
+//! Haply Inverse SDK documentation, 3.5. The maker's Rust crate brings an asynchronous runtime; this is 300 lines.
+//!
+//! # When not to use it
+//! Over a network: the delay makes stiff walls buzz.
+
+mod protocol;
+mod pump;
+mod websocket;
+
+use crate::ramp::Ramp;
+use crate::{Capabilities, DeviceError, HapticDevice, Reading, Status, Watch, Workspace};
+use protocol::{Frame, Garbled};
+use pump::{Flags, News, Pump, Wish};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+use trepan_contact::GuardedWrench;
+use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
+use triple_buffer::{Input, Output, triple_buffer};
+use websocket::WebSocket;
+
+const PATIENCE: Duration = Duration::from_secs(1);
+/// A device without news for this long is lost, ms.
+const LOST_MS: f64 = 1000.0;
+
+/// Which device, and where it stands.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// The service's simulation channel, `host:port`.
+    pub service: String,
+    /// The service's event channel, `host:port`.
+    pub events: String,
+    /// Id of the device, four hexadecimal digits; `None` takes the first.
+    pub device: Option<String>,
+    /// How the tool sits on the grip: tool axes seen from the grip's.
+    pub grip_from_tool: Quat,
+    /// How device space lies in the patient.
+    pub workspace: Workspace,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            service: "localhost:10001".to_owned(),
+            events: "localhost:10020".to_owned(),
+            device: None,
+            grip_from_tool: Quat::IDENTITY,
+            workspace: Workspace::default(),
+        }
+    }
+}
+
+/// An open device.
+pub struct Haply {
+    name: String,
+    grip_from_tool: Quat,
+    workspace: Workspace,
+    news: Output<News>,
+    wishes: Input<Wish>,
+    flags: Arc<Flags>,
+    threads: Vec<JoinHandle<()>>,
+    number: u64,
+    last_news: u64,
+    last: Reading,
+    fresh_ms: f64,
+    watch: Watch,
+}
+
+impl Haply {
+    /// Connects to the service and takes the device.
+    pub fn open(config: &Config) -> Result<Self, DeviceError> {
+        let mut socket = WebSocket::connect(&config.service, PATIENCE)
+            .map_err(|error| not_opened(error.to_string(), "install and start Haply's Inverse service"))?;
+        let device = find(&mut socket, config.device.as_deref())?;
+        let events = WebSocket::connect(&config.events, PATIENCE).ok();
+
+        let watch = Watch::default();
+        let flags = Arc::new(Flags::default());
+        let (news_in, news) = triple_buffer(&News::default());
+        let (wishes, wish_out) = triple_buffer(&Wish::default());
+        let name = format!("Haply {device}");
+        let pump = Pump {
+            socket,
+            device,
+            news: news_in,
+            wishes: wish_out,
+            flags: flags.clone(),
+            watch: watch.clone(),
+            ramp: Ramp::new(watch.clone()),
+            known: Frame::default(),
+            number: 0,
+        };
+        let mut threads = vec![thread::spawn(move || pump.run())];
+        if let Some(events) = events {
+            let flags = flags.clone();
+            threads.push(thread::spawn(move || pump::listen(events, &flags)));
+        }
+        let start = config.workspace.world(&ToolState::at(Pose::IDENTITY));
+        Ok(Self {
+            name,
+            grip_from_tool: config.grip_from_tool,
+            workspace: config.workspace,
+            news,
+            wishes,
+            flags,
+            threads,
+            number: 0,
+            last_news: 0,
+            last: Reading { tool: start, status: Status::Stale },
+            fresh_ms: f64::NAN,
+            watch,
+        })
+    }
+
+    /// Shows what is wrong with the device while another thread uses it.
+    pub fn watch(&self) -> Watch {
+        self.watch.clone()
+    }
+
+    fn tool(&self, frame: &Frame, time_ms: f64) -> ToolState {
+        let (position, velocity) = frame.cursor.unwrap_or_default();
+        let grip = frame.orientation.unwrap_or(Quat::IDENTITY).normalize();
+        let turn = axes_turn();
+        let rotation = turn * grip * turn.inverse() * self.grip_from_tool;
+        self.workspace.world(&ToolState {
+            world_from_tool: Pose::from_parts(axes(position) * 1e3, rotation.normalize()),
+            twist: Twist { linear: axes(velocity), angular: Vec3::ZERO },
+            buttons: frame.buttons.unwrap_or(Buttons::default()),
+            time_ms,
+        })
+    }
+}
+
+impl HapticDevice for Haply {
+    fn read(&mut self, time_ms: f64) -> Reading {
+        if self.fresh_ms.is_nan() {
+            self.fresh_ms = time_ms;
+        }
+        let news = *self.news.read();
+        self.last.status = Status::Stale;
+        if news.number != self.last_news {
+            (self.last_news, self.fresh_ms) = (news.number, time_ms);
+            let tool = self.tool(&news.frame, time_ms);
+            if tool.is_finite() {
+                self.last = Reading { tool, status: Status::Fresh };
+            }
+        }
+        let lost = self.threads.is_empty() || self.flags.lost.load(Ordering::Acquire);
+        if lost || time_ms - self.fresh_ms > LOST_MS {
+            self.last.status = Status::Lost;
+        }
+        self.last
+    }
+
+    fn apply(&mut self, wrench: GuardedWrench) {
+        let Some(pump) = self.threads.first() else { return };
+        self.number += 1;
+        let force = services_axes(self.workspace.device_wrench(wrench.wrench()).force);
+        self.wishes.write(Wish { number: self.number, force });
+        pump.thread().unpark();
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            name: self.name.clone(),
+            peak_force_n: 10.0,
+            continuous_force_n: 2.0,
+            rate_hz: 1000.0,
+            workspace_mm: Vec3::splat(300.0),
+            axes_driven: 3,
+            position_resolution_mm: 0.1,
+        }
+    }
+
+    fn close(&mut self) {
+        self.flags.closing.store(true, Ordering::Release);
+        for thread in self.threads.drain(..) {
+            thread.thread().unpark();
+            // A thread that panicked has no force left to take back: the service drops it with the connection.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Haply {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// Reads the inventory, introduces us, and gives the id of the device.
+fn find(socket: &mut WebSocket, wanted: Option<&str>) -> Result<String, DeviceError> {
+    let broken = |error: std::io::Error| not_opened(error.to_string(), "restart Haply's Inverse service");
+    let inventory = socket.receive(PATIENCE).map_err(broken)?;
+    let Some(inventory) = inventory else {
+        return Err(not_opened(
+            "the service does not say which devices it has".to_owned(),
+            "restart Haply's Inverse service",
+        ));
+    };
+    let device = match protocol::first_device(&inventory, wanted) {
+        Ok(Some(device)) => device,
+        Ok(None) => {
+            let reason = wanted
+                .map_or_else(|| "no Inverse3 is connected".to_owned(), |id| format!("no Inverse3 {id} is connected"));
+            return Err(not_opened(reason, "plug it in, switch it on and see whether Haply Hub finds it"));
+        }
+        Err(Garbled::TooOld) => {
+            return Err(not_opened("its service is older than 3.5".to_owned(), "update Haply's Inverse service"));
+        }
+        Err(Garbled::NotJson) => {
+            return Err(not_opened("what answers is not Haply's service".to_owned(), "see which program has its port"));
+        }
+    };
+    socket.send(&protocol::hello(&device)).map_err(broken)?;
+    socket.receive(PATIENCE).map_err(broken)?;
+    Ok(device)
+}
+
+fn not_opened(reason: String, remedy: &'static str) -> DeviceError {
+    DeviceError::Open { device: "haply".to_owned(), reason, remedy }
+}
+
+/// The service's x right, y forward, z up as ours: x right, y up, z to the user.
+fn axes(v: Vec3) -> Vec3 {
+    Vec3::new(v.x, v.z, -v.y)
+}
+
+fn services_axes(v: Vec3) -> Vec3 {
+    Vec3::new(v.x, -v.z, v.y)
+}
+
+/// [`axes`] as a rotation: a quarter turn about x, backwards.
+fn axes_turn() -> Quat {
+    Quat::from_rotation_x(-core::f32::consts::FRAC_PI_2)
+}

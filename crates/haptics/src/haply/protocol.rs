@@ -1,0 +1,238 @@
+//! The messages of the Haply Inverse service, version 3.5.
+//!
+//! # Practice
+//! Entries are read one by one: a bad one does not lose the others. A missing array means "no news".
+//!
+//! # Sources
+//! Haply Inverse SDK documentation: WebSocket protocol, control commands, events.
+
+use crate::Fault;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use trepan_geometry::{Buttons, Quat, Vec3};
+
+/// What one frame of the service says about the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Frame {
+    /// Position, m, and velocity, m/s, service axes.
+    pub cursor: Option<(Vec3, Vec3)>,
+    /// Whether force may be given, and if not, why.
+    pub status: Option<Result<(), Fault>>,
+    /// Orientation of the grip.
+    pub orientation: Option<Quat>,
+    /// Buttons of the grip.
+    pub buttons: Option<Buttons>,
+}
+
+#[derive(Deserialize)]
+struct Vector {
+    x: f32,
+    y: f32,
+    z: f32,
+}
+
+#[derive(Deserialize)]
+struct Rotation {
+    w: f32,
+    x: f32,
+    y: f32,
+    z: f32,
+}
+
+#[derive(Deserialize)]
+struct InverseState {
+    cursor_position: Vector,
+    cursor_velocity: Vector,
+}
+
+#[derive(Deserialize)]
+struct InverseStatus {
+    #[serde(default)]
+    calibrated: bool,
+    #[serde(default)]
+    power_supply: bool,
+    #[serde(default)]
+    ready: bool,
+}
+
+#[derive(Deserialize)]
+struct GripState {
+    orientation: Option<Rotation>,
+    button: Option<bool>,
+    buttons: Option<GripButtons>,
+}
+
+#[derive(Deserialize)]
+struct GripButtons {
+    #[serde(default)]
+    a: bool,
+    #[serde(default)]
+    b: bool,
+}
+
+/// What is wrong with a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Garbled {
+    /// No JSON, or not an object.
+    NotJson,
+    /// Lists of devices are maps: a service before 3.5.
+    TooOld,
+}
+
+/// Id of the first device, or of `wanted`, in the service's inventory.
+pub(super) fn first_device(message: &str, wanted: Option<&str>) -> Result<Option<String>, Garbled> {
+    let message = object(message)?;
+    let ids = entries(&message, "inverse3").filter_map(|entry| entry["device_id"].as_str());
+    Ok(ids.filter(|id| wanted.is_none_or(|wanted| wanted.eq_ignore_ascii_case(id))).map(str::to_owned).next())
+}
+
+/// What a message says about `device`. `None` in its place means that the device is not in a list that is there: gone.
+pub(super) fn frame(message: &str, device: &str) -> Result<Option<Frame>, Garbled> {
+    let message = object(message)?;
+    let mut frame = Frame::default();
+    let listed = entries(&message, "inverse3").find(|entry| entry["device_id"] == device);
+    if let Some(entry) = listed {
+        if let Ok(state) = InverseState::deserialize(&entry["state"]) {
+            frame.cursor = Some((state.cursor_position.vec3(), state.cursor_velocity.vec3()));
+        }
+        if let Ok(status) = InverseStatus::deserialize(&entry["status"]) {
+            frame.status = Some(status.may_push());
+        }
+    } else if message.get("inverse3").is_some() {
+        return Ok(None);
+    }
+    let grips = ["verse_grip", "wireless_verse_grip", "custom_verse_grip"];
+    let states = grips.iter().flat_map(|kind| entries(&message, kind));
+    if let Some(grip) = states.filter_map(|entry| GripState::deserialize(&entry["state"]).ok()).next() {
+        frame.orientation =
+            grip.orientation.as_ref().map(|q| Quat::from_xyzw(q.x, q.y, q.z, q.w)).filter(|q| q.length() > 0.5);
+        frame.buttons = grip.buttons();
+    }
+    Ok(Some(frame))
+}
+
+/// The first message: who we are.
+pub(super) fn hello(device: &str) -> String {
+    json!({
+        "session": {"configure": {"profile": {"name": "trepan"}}},
+        "inverse3": [{"device_id": device, "commands": {"probe_position": {}}}],
+    })
+    .to_string()
+}
+
+/// A force to give, N, service axes.
+pub(super) fn force(device: &str, force: Vec3) -> String {
+    let vector = json!({"x": force.x, "y": force.y, "z": force.z});
+    json!({"inverse3": [{"device_id": device, "commands": {"set_cursor_force": {"vector": vector}}}]}).to_string()
+}
+
+/// The fault that an event of the service tells of, if it does.
+pub(super) fn event_fault(message: &str) -> Option<Fault> {
+    let event = object(message).ok()?;
+    match (event["name"].as_str()?, event["data"]["safety_type"].as_str()) {
+        ("device-safety-triggered", Some("ebrake_triggered" | "stall_detected")) => Some(Fault::Braked),
+        ("device-disconnected", _) => Some(Fault::Disconnected),
+        ("device-battery-critical", _) => Some(Fault::NoPower),
+        ("device-calibration-failed", _) => Some(Fault::NotCalibrated),
+        _ => None,
+    }
+}
+
+fn object(message: &str) -> Result<Value, Garbled> {
+    let value: Value = serde_json::from_str(message).map_err(|_| Garbled::NotJson)?;
+    match &value["inverse3"] {
+        _ if !value.is_object() => Err(Garbled::NotJson),
+        Value::Object(_) => Err(Garbled::TooOld),
+        _ => Ok(value),
+    }
+}
+
+fn entries<'a>(message: &'a Value, kind: &str) -> impl Iterator<Item = &'a Value> {
+    message[kind].as_array().into_iter().flatten()
+}
+
+impl Vector {
+    fn vec3(&self) -> Vec3 {
+        Vec3::new(self.x, self.y, self.z)
+    }
+}
+
+impl InverseStatus {
+    fn may_push(&self) -> Result<(), Fault> {
+        match self {
+            Self { power_supply: false, .. } => Err(Fault::NoPower),
+            Self { calibrated: false, .. } => Err(Fault::NotCalibrated),
+            Self { ready: false, .. } => Err(Fault::Braked),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl GripState {
+    fn buttons(&self) -> Option<Buttons> {
+        let wireless = self.buttons.as_ref().map(|b| u32::from(b.a) | u32::from(b.b) << 1);
+        wireless.or(self.button.map(u32::from)).map(Buttons)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const FRAME: &str = r#"{"session_id":1,"inverse3":[{"device_id":"BAD1","state":7},
+        {"device_id":"049D","state":{"cursor_position":{"x":0.01,"y":0.02,"z":0.03},"cursor_velocity":{"x":1,"y":2,"z":3},"mode":"idle"},
+         "status":{"calibrated":true,"in_use":true,"power_supply":true,"ready":true,"started":true}}],
+        "verse_grip":[{"device_id":"60BD","state":"?"},
+         {"device_id":"60BE","state":{"button":true,"hall":3,"orientation":{"w":1,"x":0,"y":0,"z":0}},"status":{"ready":true}}]}"#;
+
+    #[test]
+    fn a_frame_is_read_past_malformed_neighbours() {
+        let frame = frame(FRAME, "049D").unwrap().unwrap();
+        assert_eq!(frame.cursor, Some((Vec3::new(0.01, 0.02, 0.03), Vec3::new(1.0, 2.0, 3.0))));
+        assert_eq!(
+            (frame.status, frame.orientation, frame.buttons),
+            (Some(Ok(())), Some(Quat::IDENTITY), Some(Buttons(1)))
+        );
+        assert_eq!(first_device(FRAME, Some("049d")), Ok(Some("049D".to_owned())));
+    }
+
+    #[test]
+    fn absence_of_a_list_is_no_news_and_absence_from_it_is_loss() {
+        assert_eq!(frame("{}", "049D"), Ok(Some(Frame::default())));
+        assert_eq!(frame(r#"{"inverse3":[]}"#, "049D"), Ok(None));
+    }
+
+    #[test]
+    fn an_old_service_and_garbage_are_told_apart() {
+        assert_eq!(frame(r#"{"inverse3":{"049D":{}}}"#, "049D"), Err(Garbled::TooOld));
+        assert_eq!(frame("{\"inverse3", "049D"), Err(Garbled::NotJson));
+        assert_eq!(frame("[1]", "049D"), Err(Garbled::NotJson));
+    }
+
+    #[test]
+    fn force_is_refused_unless_powered_calibrated_and_ready() {
+        let status = |text: &str| {
+            let message = format!(r#"{{"inverse3":[{{"device_id":"1","status":{{{text}}}}}]}}"#);
+            frame(&message, "1").unwrap().unwrap().status.unwrap()
+        };
+        assert_eq!(status(r#""calibrated":true,"ready":true"#), Err(Fault::NoPower));
+        assert_eq!(status(r#""power_supply":true,"ready":true"#), Err(Fault::NotCalibrated));
+        assert_eq!(status(r#""power_supply":true,"calibrated":true"#), Err(Fault::Braked));
+    }
+
+    #[test]
+    fn events_that_matter_are_faults_and_others_are_not() {
+        let brake = r#"{"name":"device-safety-triggered","data":{"safety_type":"ebrake_triggered"}}"#;
+        let released = r#"{"name":"device-safety-triggered","data":{"safety_type":"ebrake_released"}}"#;
+        assert_eq!((event_fault(brake), event_fault(released)), (Some(Fault::Braked), None));
+        assert_eq!(event_fault(r#"{"name":"something-new"}"#), None);
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_without_a_panic(text in "\\PC{0,200}") {
+            let _ = (frame(&text, "1"), first_device(&text, None), event_fault(&text));
+        }
+    }
+}

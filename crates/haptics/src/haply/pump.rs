@@ -1,0 +1,162 @@
+//! The thread that talks to the service: one message out, one back, at the haptic loop's pace.
+//!
+//! # Practice
+//! The loop's `apply` wakes the thread; a loop that is silent for [`SILENT`] gets no force. A reply later than [`LATE`] cuts
+//! the force until it comes; without one for [`GONE`] the device is lost.
+
+use super::protocol::{self, Frame};
+use super::websocket::WebSocket;
+use crate::{Fault, Watch, ramp::Ramp};
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+use trepan_geometry::Vec3;
+use triple_buffer::{Input, Output};
+
+const SILENT: Duration = Duration::from_millis(10);
+const LATE: Duration = Duration::from_millis(20);
+const GONE: Duration = Duration::from_millis(1000);
+/// Messages in a row without sense after which the device is lost.
+const MAX_GARBLED: u32 = 100;
+
+/// What the service last said.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct News {
+    pub number: u64,
+    pub frame: Frame,
+}
+
+/// What the loop last asked for, N, service axes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Wish {
+    pub number: u64,
+    pub force: Vec3,
+}
+
+/// Flags that both threads see.
+#[derive(Debug, Default)]
+pub(super) struct Flags {
+    /// The driver wants the thread to end.
+    pub closing: AtomicBool,
+    /// The device is gone.
+    pub lost: AtomicBool,
+    /// Brakes as the service's events tell.
+    pub braked: AtomicBool,
+}
+
+/// The state of the thread.
+pub(super) struct Pump {
+    pub socket: WebSocket,
+    pub device: String,
+    pub news: Input<News>,
+    pub wishes: Output<Wish>,
+    pub flags: Arc<Flags>,
+    pub watch: Watch,
+    pub ramp: Ramp,
+    pub known: Frame,
+    pub number: u64,
+}
+
+impl Pump {
+    /// Runs until the driver closes or the device is lost; the last message asks for no force.
+    pub(super) fn run(mut self) {
+        let mut last = 0;
+        while !self.flags.closing.load(Ordering::Acquire) {
+            let force = self.next_force(&mut last);
+            if self.exchange(force).is_err() {
+                self.flags.lost.store(true, Ordering::Release);
+                self.watch.set(Some(Fault::Disconnected));
+                return;
+            }
+        }
+        let _ = self.exchange(Vec3::ZERO);
+        self.socket.close();
+    }
+
+    /// Waits for the loop, and gives the force to send.
+    fn next_force(&mut self, last: &mut u64) -> Vec3 {
+        // Forget wake-ups for wishes that were read already: the one that counts is still to come.
+        thread::park_timeout(Duration::ZERO);
+        if self.wishes.read().number == *last {
+            thread::park_timeout(SILENT);
+        }
+        let wish = *self.wishes.read();
+        let silent = wish.number == *last;
+        *last = wish.number;
+        if let Err(fault) = self.known.status.unwrap_or(Err(Fault::NotCalibrated)) {
+            self.ramp.cut(fault);
+        } else if self.flags.braked.load(Ordering::Acquire) {
+            self.ramp.cut(Fault::Braked);
+        } else if silent && wish.number > 0 {
+            self.ramp.cut(Fault::LoopSilent);
+        }
+        let share = self.ramp.share();
+        if wish.force.is_finite() { wish.force * share } else { Vec3::ZERO }
+    }
+
+    /// One message out, one back.
+    fn exchange(&mut self, force: Vec3) -> io::Result<()> {
+        self.socket.send(&protocol::force(&self.device, force))?;
+        let mut garbled = 0;
+        let mut waited = Duration::ZERO;
+        loop {
+            let Some(message) = self.socket.receive(LATE)? else {
+                waited += LATE;
+                self.ramp.cut(Fault::ServiceSilent);
+                if waited >= GONE || self.flags.closing.load(Ordering::Acquire) {
+                    return Err(io::ErrorKind::TimedOut.into());
+                }
+                continue;
+            };
+            match protocol::frame(&message, &self.device) {
+                Ok(Some(frame)) => {
+                    self.publish(frame);
+                    return Ok(());
+                }
+                Ok(None) => return Err(io::ErrorKind::NotConnected.into()),
+                Err(_) => {
+                    self.ramp.cut(Fault::Garbled);
+                    garbled += 1;
+                    if garbled >= MAX_GARBLED {
+                        return Err(io::ErrorKind::InvalidData.into());
+                    }
+                    self.socket.send(&protocol::force(&self.device, Vec3::ZERO))?;
+                }
+            }
+        }
+    }
+
+    /// Lays a frame over what is known: what it does not mention stays.
+    fn publish(&mut self, frame: Frame) {
+        let known = &mut self.known;
+        known.status = frame.status.or(known.status);
+        known.orientation = frame.orientation.or(known.orientation);
+        known.buttons = frame.buttons.or(known.buttons);
+        if let Some(cursor) = frame.cursor {
+            known.cursor = Some(cursor);
+            self.number += 1;
+            self.news.write(News { number: self.number, frame: *known });
+        }
+    }
+}
+
+/// Listens to the service's events until the driver closes: brakes and losses show there first.
+pub(super) fn listen(mut events: WebSocket, flags: &Flags) {
+    while !flags.closing.load(Ordering::Acquire) && !flags.lost.load(Ordering::Acquire) {
+        match events.receive(Duration::from_millis(100)) {
+            Ok(Some(message)) => {
+                if let Some(fault) = protocol::event_fault(&message) {
+                    flags.braked.store(true, Ordering::Release);
+                    flags.lost.fetch_or(fault == Fault::Disconnected, Ordering::AcqRel);
+                } else if message.contains("ebrake_released") {
+                    flags.braked.store(false, Ordering::Release);
+                }
+            }
+            Ok(None) => {}
+            Err(_) => return,
+        }
+    }
+    events.close();
+}
