@@ -1,0 +1,180 @@
+//! The stages under faults: nothing that a device, a late thread or an odd script does reaches a hand as a jump, a NaN or a panic.
+
+use std::sync::Arc;
+use trepan_contact::{GuardConfig, SurfacePatch, Viscoelastic};
+use trepan_geometry::{Buttons, Pose, Quat, Tool, ToolState, Vec3};
+use trepan_haptics::{Reading, Status};
+use trepan_link::wire::TickRecord;
+use trepan_simulator::{HapticConfig, HapticStage, Notice, Phase, Program, TickInput, Warning, What};
+use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+
+/// A flat head: bone from z = -6 to 0 mm, brain under z = -8 mm.
+fn head() -> (Arc<BoneVolume>, Arc<DistanceField>) {
+    let n = 48;
+    let mut ct = VoxelVolume::isotropic([n, n, n], Vec3::new(-23.5, -23.5, -27.5), 1.0, -1000i16);
+    let mut mask = ct.map(|_| 0u8);
+    for at in 0..ct.data.len() {
+        let z = -27.5 + (at / (n * n)) as f32;
+        ct.data[at] = (400.0 + 1000.0 * (3.0 - (z + 3.0).abs())).clamp(-1000.0, 1200.0) as i16;
+        mask.data[at] = u8::from(z < -8.0);
+    }
+    (Arc::new(BoneVolume::new(&ct, 400).unwrap()), Arc::new(DistanceField::of_mask(&mask)))
+}
+
+fn config(program: Program) -> HapticConfig {
+    HapticConfig {
+        program,
+        rigid: trepan_rigid::Method::RECOMMENDED,
+        dt_ms: 1.0,
+        bone_force: Viscoelastic { stiffness: 2.0, damping: 0.5 },
+        tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
+        guard: GuardConfig::default(),
+        near_mm: 2.0,
+    }
+}
+
+struct Bench {
+    stage: HapticStage,
+    tick: u64,
+    told: Vec<Notice>,
+}
+
+impl Bench {
+    fn new(program: Program) -> Self {
+        let (bone, brain) = head();
+        let bone = Some(bone).filter(|_| program.has_bone());
+        Self { stage: HapticStage::new(config(program), bone, Some(brain), at(20.0, 0.0)), tick: 0, told: Vec::new() }
+    }
+
+    fn step(&mut self, tool: ToolState, status: Status, patch: &SurfacePatch) -> TickRecord {
+        self.tick += 1;
+        let tool = ToolState { time_ms: self.tick as f64, ..tool };
+        let input = TickInput { tick: self.tick, reading: Reading { tool, status }, patch, patch_seq: 1 };
+        let done = self.stage.tick(&input, &mut |notice| self.told.push(notice));
+        let force = done.wrench.force();
+        assert!(force.is_finite() && force.length() <= 3.3 + 1e-5, "{force} at tick {}", self.tick);
+        done.record
+    }
+
+    fn raised(&self, warning: Warning) -> Option<u64> {
+        self.told.iter().find(|n| matches!(n.what, What::Warning(w, true, _) if w == warning)).map(|n| n.tick)
+    }
+}
+
+/// The tool with its tip at height z, moving at `speed` mm/ms along z.
+fn at(z: f32, speed: f32) -> ToolState {
+    let mut tool = ToolState::at(Pose::from_parts(Vec3::new(0.3, -0.2, z), Quat::IDENTITY));
+    tool.twist.linear.z = speed;
+    tool
+}
+
+const NO_PATCH: SurfacePatch =
+    SurfacePatch { time_ms: 0.0, normal: Vec3::ZERO, tip_mm: Vec3::ZERO, depth_mm: 0.0, normal_velocity: 0.0 };
+
+#[test]
+fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
+    let (bone, brain) = head();
+    let before = bone.snapshot();
+    let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(20.0, 0.0));
+    let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+    let mut deepest = f32::INFINITY;
+    for i in 0..14_000 {
+        let mut tool = at((6.0 - 0.001 * i as f32).max(-7.0), -0.001);
+        tool.buttons = Buttons::PEDAL;
+        let record = bench.step(tool, Status::Fresh, &NO_PATCH);
+        if bench.raised(Warning::BrainNear).is_none() {
+            deepest = deepest.min(record.brain_distance_mm);
+        }
+    }
+    assert!(deepest > 1.9, "no warning although the brain was {deepest} mm away");
+    assert!(bench.raised(Warning::BrainNear).unwrap() < bench.raised(Warning::BrainTouched).unwrap());
+    let after = bone.snapshot();
+    let removed: Vec<_> = (0..before.data.len()).filter(|&v| after.data[v] != before.data[v]).collect();
+    assert!(removed.len() > 100);
+    for voxel in removed {
+        let centre = before.centre_of([voxel % 48, voxel / 48 % 48, voxel / 2304]).as_vec3();
+        assert!(Vec3::new(centre.x - 0.3, centre.y + 0.2, 0.0).length() < 5.0, "bone was lost at {centre}");
+    }
+}
+
+#[test]
+fn a_device_that_gives_nonsense_is_held_and_told() {
+    let mut bench = Bench::new(Program::Integrated);
+    for _ in 0..400 {
+        bench.step(at(2.6, 0.0), Status::Fresh, &NO_PATCH);
+    }
+    let nan = ToolState::at(Pose::from_parts(Vec3::NAN, Quat::IDENTITY));
+    let mut last = f32::INFINITY;
+    for tick in 0..300 {
+        let record = match tick % 3 {
+            0 => bench.step(nan, Status::Fresh, &NO_PATCH),
+            1 => bench.step(at(-1e30, 0.0), Status::Stale, &NO_PATCH),
+            _ => bench.step(at(2.6, f32::INFINITY), Status::Fresh, &NO_PATCH),
+        };
+        assert!(record.has(TickRecord::STALE));
+        last = record.wrench.force.length();
+    }
+    assert!(last.is_finite());
+    assert!(bench.raised(Warning::DeviceStale).is_some());
+}
+
+#[test]
+fn a_teleport_through_the_skull_does_not_carry_the_burr_along() {
+    let mut bench = Bench::new(Program::Craniotomy);
+    bench.step(at(20.0, 0.0), Status::Fresh, &NO_PATCH);
+    let record = bench.step(at(-20.0, 0.0), Status::Fresh, &NO_PATCH);
+    assert!(record.proxy.translation.z > 2.5, "the proxy is at {}", record.proxy.translation);
+}
+
+#[test]
+fn the_force_of_an_old_patch_fades_and_the_ticks_are_held() {
+    let mut bench = Bench::new(Program::Brain);
+    let patch = SurfacePatch {
+        time_ms: 500.0,
+        normal: Vec3::Z,
+        tip_mm: at(0.0, 0.0).tip(),
+        depth_mm: 4.0,
+        normal_velocity: 0.0,
+    };
+    let mut forces = Vec::new();
+    for _ in 0..600 {
+        let record = bench.step(at(0.0, 0.0), Status::Fresh, &patch);
+        forces.push((record.wrench.force.length(), record.has(TickRecord::HELD)));
+    }
+    assert!((forces[505].0 - 1.2).abs() < 0.05 && !forces[505].1, "{:?}", forces[505]);
+    assert!(forces[540].0 < 0.7 && forces[540].1, "{:?}", forces[540]);
+    assert!(forces[599].0 < 1e-3, "{:?}", forces[599]);
+    assert!(bench.raised(Warning::TissueLate).is_some());
+}
+
+#[test]
+fn the_tool_changes_once_for_a_press_and_only_when_free() {
+    let mut bench = Bench::new(Program::Integrated);
+    let press = |z: f32| ToolState { buttons: Buttons::NEXT_TOOL, ..at(z, 0.0) };
+    for _ in 0..5 {
+        bench.step(at(2.5, 0.0), Status::Fresh, &NO_PATCH);
+    }
+    bench.step(press(2.5), Status::Fresh, &NO_PATCH);
+    assert_eq!(bench.stage.phase(), Phase::Craniotomy, "changed in contact");
+    bench.step(at(20.0, 0.0), Status::Fresh, &NO_PATCH);
+    for _ in 0..50 {
+        bench.step(press(20.0), Status::Fresh, &NO_PATCH);
+    }
+    assert_eq!(bench.stage.phase(), Phase::Brain);
+    let phases = bench.told.iter().filter(|n| matches!(n.what, What::Phase(_))).count();
+    assert_eq!((phases, Phase::Brain.tool()), (2, Tool::probe(2.0)));
+}
+
+#[test]
+fn a_release_ends_at_zero_and_stays_there() {
+    let mut bench = Bench::new(Program::Craniotomy);
+    for _ in 0..500 {
+        bench.step(at(2.5, 0.0), Status::Fresh, &NO_PATCH);
+    }
+    bench.stage.release();
+    for _ in 0..20 {
+        bench.step(at(2.5, 0.0), Status::Fresh, &NO_PATCH);
+    }
+    assert!(bench.stage.is_at_rest());
+    assert_eq!(bench.step(at(2.0, 0.0), Status::Fresh, &NO_PATCH).wrench.force, Vec3::ZERO);
+}
