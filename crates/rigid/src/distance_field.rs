@@ -36,6 +36,7 @@
 use crate::half_spaces::{HalfSpace, nearest};
 use crate::removal::{Burr, Cut, Law};
 use crate::surface::{Disc, Discs};
+use crate::window::Window;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
 use trepan_geometry::{Aabb, Pose, Tool, ToolKind, ToolState, Vec3};
@@ -57,9 +58,11 @@ const TOUCH: f32 = 0.05;
 pub struct Config {
     /// Radius of a disc, voxels. Under 0.71 discs on a plane leave gaps, over which a ball bobs; more fattens sharp edges.
     pub disc_voxels: f32,
-    /// Longest way between two gatherings, voxels. More visits more voxels a tick, less takes more gatherings at speed.
+    /// Longest move with one set of discs, voxels. More weighs more discs at each move, less takes more moves at speed.
     pub move_voxels: f32,
-    /// Most gatherings in one tick. What is left of the way is gone in the next tick.
+    /// How far the tool may go before discs are gathered anew, voxels. More gathers less often, and more discs each time.
+    pub ahead_voxels: f32,
+    /// Most moves in one tick. What is left of the way is gone in the next tick.
     pub max_moves: u32,
     /// How deep a burr at work sits in the bone that it cuts, voxels. Its bore is then a little wider than what touches, so that it does not
     /// lock there. Must be less than `slop_voxels`.
@@ -76,8 +79,9 @@ impl Config {
     /// The charted choice.
     pub const RECOMMENDED: Self = Self {
         disc_voxels: 0.8,
-        move_voxels: 0.5,
-        max_moves: 512,
+        move_voxels: 0.25,
+        ahead_voxels: 0.5,
+        max_moves: 1024,
         bite_voxels: 0.15,
         slop_voxels: 0.2,
         recover_mm_per_ms: 0.05,
@@ -98,13 +102,25 @@ pub struct DistanceField {
     proxy: Pose,
     /// Whether the proxy has been put anywhere yet.
     placed: bool,
-    /// Smallest clearance after the last tick, voxels; what is nearer than this by more than a voxel is known to be free.
-    settled: bool,
     /// How deep the burr sits in the bone now, mm: follows the pedal at `recover_mm_per_ms`.
     bite_mm: f32,
+    window: Window,
+    known: Known,
     discs: Discs,
+    near: Vec<Disc>,
     spaces: Vec<HalfSpace>,
     burr: Burr,
+}
+
+/// What the discs at hand are good for.
+#[derive(Clone, Copy, Debug, Default)]
+struct Known {
+    /// Whether they are of the bone as it is now.
+    fresh: bool,
+    /// Grid point around which they were gathered.
+    centre: Vec3,
+    /// Whether the ball was clear of bone there, so that nothing needs to be looked for inside it.
+    clear: bool,
 }
 
 impl DistanceField {
@@ -116,9 +132,11 @@ impl DistanceField {
             tool,
             proxy: Pose::IDENTITY,
             placed: false,
-            settled: false,
             bite_mm: 0.0,
+            window: Window::new(),
+            known: Known::default(),
             discs: Discs::new(MAX_DISCS, config.disc_voxels),
+            near: Vec::with_capacity(MAX_DISCS),
             spaces: Vec::with_capacity(MAX_DISCS),
             burr: Burr::new(config.removal, MAX_BITES),
         }
@@ -139,12 +157,12 @@ impl DistanceField {
 
     /// Moves the proxy as near to `device` as the bone lets it.
     fn follow(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) {
-        let spacing = bone.spacing_mm();
-        let way = Aabb::of_points(&[self.proxy.translation, device]).inflated(self.tool.tip_radius_mm + 2.0 * spacing);
+        let margin = self.tool.tip_radius_mm + 2.0 * bone.spacing_mm();
+        let way = Aabb::of_points(&[self.proxy.translation, device]).inflated(margin);
         if !way.overlaps(bone.bounds()) {
             self.proxy.translation = device;
-            self.settled = true;
             self.discs.forget();
+            self.known = Known { fresh: false, clear: true, ..self.known };
             return;
         }
         for _ in 0..self.config.max_moves {
@@ -155,29 +173,52 @@ impl DistanceField {
         out.fallbacks += 1;
     }
 
-    /// One gathering and the slides within it. Returns whether the proxy has come to rest.
+    /// One move within what is known of the surface. Returns whether the proxy has come to rest.
     fn advance(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) -> bool {
-        let (spacing, reach) = (bone.spacing_mm(), self.config.move_voxels);
-        let radius = self.radius_mm() / spacing;
+        let spacing = bone.spacing_mm();
         let start = bone.grid_of(self.proxy.translation);
-        let hollow = if self.settled { radius - 1.0 } else { 0.0 };
-        self.discs.gather(bone, start, hollow, radius + reach + self.config.disc_voxels);
-        out.voxels_swept += self.discs.visited;
-        out.fallbacks += u32::from(self.discs.overflow > 0);
+        if !self.know(bone, start, out) {
+            return true;
+        }
         let base = self.discs.base.as_vec3();
         let (from, goal) = (start - base, bone.grid_of(device) - base);
-        let inside = bone.is_bone(bone.voxel_of(self.proxy.translation));
-        let ball = Ball { radius, slop: self.config.slop_voxels, inside };
+        let ball = Ball {
+            radius: self.radius_mm() / spacing,
+            slop: self.config.slop_voxels,
+            inside: bone.is_bone(bone.voxel_of(self.proxy.translation)),
+        };
+        let reach = self.config.move_voxels;
+        let clearance = ball.select(self.discs.list(), from, reach, &mut self.near);
+        self.known.clear = clearance > -0.5;
         let recover = self.config.recover_mm_per_ms * dt_ms / spacing;
-        let slide = ball.slide(self.discs.list(), &mut self.spaces, from, goal, reach, recover);
+        let slide = ball.slide(&self.near, &mut self.spaces, from, goal, reach, recover);
         out.fallbacks += u32::from(slide.contradiction);
-        self.settled = slide.clearance > -0.5;
         if slide.to == goal {
             self.proxy.translation = device;
         } else if slide.to != from {
             self.proxy.translation = bone.origin() + spacing * (slide.to + base);
         }
         slide.rests
+    }
+
+    /// Makes sure that all discs in reach of the ball at grid point `at` are known; false when the ball is too large for that.
+    fn know(&mut self, bone: &BoneVolume, at: Vec3, out: &mut RigidStep) -> bool {
+        let (reach, ahead) = (self.config.move_voxels, self.config.ahead_voxels);
+        if self.known.fresh && at.distance(self.known.centre) <= ahead {
+            return true;
+        }
+        let radius = self.tool.tip_radius_mm / bone.spacing_mm();
+        let far = radius + reach + ahead + self.config.disc_voxels;
+        let Some(read) = self.window.cover(bone, at.round().as_ivec3(), far.ceil() as i32 + 3) else {
+            out.fallbacks += 1;
+            return false;
+        };
+        let hollow = if self.known.clear { radius - ahead - 1.0 } else { 0.0 };
+        self.discs.gather(&self.window, at, hollow, far);
+        self.known = Known { fresh: true, centre: at, clear: self.known.clear };
+        out.voxels_swept += read + self.discs.visited;
+        out.fallbacks += u32::from(self.discs.overflow > 0);
+        true
     }
 
     /// Fills the manifold from where proxy and device are.
@@ -191,7 +232,7 @@ impl DistanceField {
         let base = self.discs.base.as_vec3();
         let centre = bone.grid_of(self.proxy.translation) - base;
         let ball = Ball { radius: radius / spacing, slop: self.config.slop_voxels, inside: false };
-        for disc in self.discs.list() {
+        for disc in &self.near {
             let near = ball.nearest(disc, centre);
             if near.distance < ball.radius + TOUCH {
                 let point = bone.origin() + spacing * (centre + base - near.direction * near.distance);
@@ -228,6 +269,10 @@ impl RigidContact for DistanceField {
             let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
             let depth_mm = device.distance(proxy) + self.bite_mm;
             out.removed_mm3 = self.burr.cut(bone, &Cut { device, proxy, radius_mm, depth_mm, dt_ms });
+            for voxel in self.burr.bitten() {
+                self.window.set(voxel, bone.hu(voxel));
+                self.known.fresh = false;
+            }
         }
     }
 
@@ -238,8 +283,11 @@ impl RigidContact for DistanceField {
     fn reset(&mut self, pose: Pose) {
         self.proxy = pose;
         self.placed = pose.translation.is_finite();
-        (self.settled, self.bite_mm) = (false, 0.0);
+        self.bite_mm = 0.0;
+        self.known = Known::default();
+        self.window.forget();
         self.discs.forget();
+        self.near.clear();
         self.burr.reset();
     }
 }
@@ -267,8 +315,6 @@ struct Slide {
     rests: bool,
     /// Whether the constraints contradicted each other.
     contradiction: bool,
-    /// Distance to the nearest disc less the radius.
-    clearance: f32,
 }
 
 impl Ball {
@@ -286,19 +332,33 @@ impl Ball {
         Near { distance, direction }
     }
 
-    /// The half-spaces that keep the ball at `centre` clear of the discs by `radius`. One that is not clear may stay as it is and must
-    /// gain `recover`. Returns the smallest clearance.
-    fn constrain(&self, discs: &[Disc], centre: Vec3, radius: f32, recover: f32, spaces: &mut Vec<HalfSpace>) -> f32 {
-        spaces.clear();
+    /// Copies those discs to `near` that are within `reach` of the ball at `centre`. Returns the smallest clearance.
+    fn select(&self, discs: &[Disc], centre: Vec3, reach: f32, near: &mut Vec<Disc>) -> f32 {
+        near.clear();
         let mut clearance = f32::MAX;
+        for disc in discs {
+            // Cheaper than the disc's own distance and never greater.
+            if disc.centre.distance(centre) - disc.radius <= self.radius + reach {
+                let clear = self.nearest(disc, centre).distance - self.radius;
+                clearance = clearance.min(clear);
+                if clear <= reach {
+                    near.push(*disc);
+                }
+            }
+        }
+        clearance
+    }
+
+    /// The half-spaces that keep the ball at `centre` clear of the discs by `radius`. One that is not clear may stay as it is and must
+    /// gain `recover`.
+    fn constrain(&self, discs: &[Disc], centre: Vec3, radius: f32, recover: f32, spaces: &mut Vec<HalfSpace>) {
+        spaces.clear();
         for disc in discs {
             let near = self.nearest(disc, centre);
             let clear = radius.min(near.distance + recover);
-            clearance = clearance.min(near.distance - self.radius);
             spaces
                 .push(HalfSpace { normal: near.direction, offset: near.direction.dot(centre) - near.distance + clear });
         }
-        clearance
     }
 
     /// Slides from `from` towards `goal`, no further than `reach`.
@@ -311,10 +371,10 @@ impl Ball {
         reach: f32,
         recover: f32,
     ) -> Slide {
-        let mut slide = Slide { to: from, rests: false, contradiction: false, clearance: f32::MAX };
+        let mut slide = Slide { to: from, rests: false, contradiction: false };
         for _ in 0..MAX_SLIDES {
             let at = slide.to;
-            slide.clearance = self.constrain(discs, at, self.radius, recover, spaces);
+            self.constrain(discs, at, self.radius, recover, spaces);
             let target = nearest(goal, spaces).or_else(|| {
                 slide.contradiction = true;
                 self.constrain(discs, at, self.radius - self.slop, 0.0, spaces);

@@ -48,6 +48,7 @@ mod surface;
 mod sweep;
 pub mod thesis;
 mod traverse;
+mod window;
 
 pub use method::Method;
 pub use seam::{RigidContact, RigidStep};

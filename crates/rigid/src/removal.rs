@@ -150,6 +150,11 @@ impl Burr {
         self.tick = 0;
     }
 
+    /// The voxels that the last cut may have changed.
+    pub fn bitten(&self) -> impl Iterator<Item = IVec3> + '_ {
+        self.bites.iter().map(|bite| bite.voxel)
+    }
+
     /// Takes bone away and returns how much, mm³.
     pub fn cut(&mut self, bone: &BoneVolume, cut: &Cut) -> f32 {
         let sound = cut.depth_mm.is_finite() && cut.dt_ms.is_finite();

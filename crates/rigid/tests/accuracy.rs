@@ -2,7 +2,7 @@
 
 mod common;
 use common::{at, bone, directions, scanned, walk};
-use trepan_geometry::{Pose, Tool, Vec3};
+use trepan_geometry::{Pose, Tool};
 use trepan_rigid::{Method, RigidStep};
 
 #[test]

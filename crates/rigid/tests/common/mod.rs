@@ -1,5 +1,5 @@
 //! Synthetic bone with known truth.
-#![expect(dead_code, reason = "each test file uses its share")]
+#![allow(dead_code, reason = "each test file uses its share")]
 
 use trepan_geometry::{Pose, ToolState, Vec3};
 use trepan_rigid::{RigidContact, RigidStep};
