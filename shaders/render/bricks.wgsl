@@ -7,6 +7,7 @@
 
 const BRICK: f32 = 4.0;   // cells along an edge: `LEAP` in Rust
 const NUDGE: f32 = 1e-3;
+const MOST_STEPS: i32 = 8192;
 
 // Continuous padded grid coordinates of a world point: voxel centres are at whole numbers.
 fn grid_of(point: vec3f) -> vec3f { return (point - scene.origin.xyz) / scene.origin.w; }
@@ -52,20 +53,33 @@ fn blend(low: vec4f, high: vec4f, u: vec3f) -> f32 {
     return mix(line.x, line.y, u.x);
 }
 
-// Share of the way through cell `c` between local points `a` and `b` where bone begins, or 2.
-fn enter(c: vec3i, a: vec3f, b: vec3f) -> f32 {
+// The eight corners of a cell, x fastest, less the isovalue.
+struct Corners { low: vec4f, high: vec4f }
+
+fn corners(c: vec3i) -> Corners {
     let e = vec2i(0, 1);
     let low = vec4f(textureLoad(density, c, 0).x, textureLoad(density, c + e.yxx, 0).x,
-                    textureLoad(density, c + e.xyx, 0).x, textureLoad(density, c + e.yyx, 0).x) - scene.dims.w;
+                    textureLoad(density, c + e.xyx, 0).x, textureLoad(density, c + e.yyx, 0).x);
     let high = vec4f(textureLoad(density, c + e.xxy, 0).x, textureLoad(density, c + e.yxy, 0).x,
-                     textureLoad(density, c + e.xyy, 0).x, textureLoad(density, c + e.yyy, 0).x) - scene.dims.w;
-    let most = max(low, high);
-    if max(max(most.x, most.y), max(most.z, most.w)) < 0.0 { return 2.0; }
+                     textureLoad(density, c + e.xyy, 0).x, textureLoad(density, c + e.yyy, 0).x);
+    return Corners(low - scene.dims.w, high - scene.dims.w);
+}
+
+// Whether a cell can hold bone.
+fn promising(c: Corners) -> bool {
+    let most = max(c.low, c.high);
+    return max(max(most.x, most.y), max(most.z, most.w)) >= 0.0;
+}
+
+// Share of the way between two local points of a cell where bone begins, or 2.
+fn enter(c: Corners, a: vec3f, b: vec3f) -> f32 {
     let third = (b - a) / 3.0;
-    return first_root(vec4f(blend(low, high, a), blend(low, high, a + third), blend(low, high, b - third), blend(low, high, b)));
+    let v = vec4f(blend(c.low, c.high, a), blend(c.low, c.high, a + third), blend(c.low, c.high, b - third), blend(c.low, c.high, b));
+    return first_root(v);
 }
 
 // Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or NOTHING.
+// Three loops, each cheap, instead of branches: drivers that run pixels in lockstep skip loops, but pay for all branches.
 fn meet(o: vec3f, d: vec3f, furthest: f32) -> f32 {
     let safe = select(d, vec3f(1e-12), abs(d) < vec3f(1e-12));
     let inverse = 1.0 / safe;
@@ -74,33 +88,52 @@ fn meet(o: vec3f, d: vec3f, furthest: f32) -> f32 {
     var t = max(max(max(near.x, near.y), near.z), 0.0);
     let end = min(min(min(far.x, far.y), far.z), furthest);
     let nudge = NUDGE * scene.origin.w;
+    let positive = safe > vec3f(0.0);
     let last = vec3i(scene.dims.xyz) - 2;
-    let step = select(vec3i(-1), vec3i(1), safe > vec3f(0.0));
-    let ahead = select(vec3f(0.0), vec3f(1.0), safe > vec3f(0.0));
-    for (var bricks = 0; bricks < 4096 && t < end; bricks++) {
-        let g = o + safe * (t + nudge);
-        let brick = clamp(vec3i(floor(g / BRICK)), vec3i(0), vec3i(textureDimensions(leap)) - 1);
-        let free = i32(textureLoad(leap, brick, 0).x);
-        // The way out of the box of bricks that are known to be free, or of this brick.
-        let reach = max(free - 1, 0);
-        let wall = BRICK * (vec3f(brick) + select(vec3f(-f32(reach)), vec3f(f32(reach + 1)), safe > vec3f(0.0)));
-        let exits = (wall - o) * inverse;
-        let out = max(min(min(exits.x, exits.y), exits.z), t + nudge);
-        if free == 0 {
-            var cell = clamp(vec3i(floor(g)), vec3i(0), last);
-            var crossing = (vec3f(cell) + ahead - o) * inverse;
-            for (var cells = 0; cells < 32 && t < out; cells++) {
-                let next = max(min(min(crossing.x, crossing.y), crossing.z), t);
-                let s = enter(cell, o + safe * t - vec3f(cell), o + safe * next - vec3f(cell));
-                if s <= 1.0 { return t + s * (next - t); }
-                t = next;
-                let forward = select(vec3i(0), step, crossing <= vec3f(next));
-                cell = cell + forward;
-                crossing = (vec3f(cell) + ahead - o) * inverse;
-                if any(cell < vec3i(0)) || any(cell > last) { return NOTHING; }
-            }
+    let furthest_brick = vec3i(textureDimensions(leap)) - 1;
+    let step = select(vec3i(-1), vec3i(1), positive);
+    let ahead = select(vec3f(0.0), vec3f(1.0), positive);
+    var steps = 0;
+    while t < end && steps < MOST_STEPS {
+        // Leap to the next brick that may hold bone.
+        var leave = t;
+        var free = 1;
+        while free > 0 && t < end && steps < MOST_STEPS {
+            t = leave;
+            let brick = clamp(vec3i(floor((o + safe * (t + nudge)) / BRICK)), vec3i(0), furthest_brick);
+            free = i32(textureLoad(leap, brick, 0).x);
+            // The way out of the box of bricks that are known to be free, or of this brick.
+            let reach = f32(max(free - 1, 0));
+            let exits = (BRICK * (vec3f(brick) + select(vec3f(-reach), vec3f(reach + 1.0), positive)) - o) * inverse;
+            leave = max(min(min(exits.x, exits.y), exits.z), t + nudge);
+            steps++;
         }
-        t = max(t, out);
+        // Walk its cells to one with a corner in bone, and solve that; if the ray only passes by, go on behind it.
+        var cell = clamp(vec3i(floor(o + safe * (t + nudge))), vec3i(0), last);
+        while t < leave && t < end && steps < MOST_STEPS {
+            var found: Corners;
+            var next = t;
+            var onward = vec3i(0);
+            var open = true;
+            while open && t < leave && steps < MOST_STEPS {
+                let crossing = (vec3f(cell) + ahead - o) * inverse;
+                next = max(min(min(crossing.x, crossing.y), crossing.z), t);
+                onward = select(vec3i(0), step, crossing <= vec3f(next));
+                found = corners(cell);
+                open = !promising(found);
+                t = select(t, next, open);
+                cell += select(vec3i(0), onward, open);
+                leave = select(leave, t, any(cell < vec3i(0)) || any(cell > last));
+                steps++;
+            }
+            if open { break; }
+            let s = enter(found, o + safe * t - vec3f(cell), o + safe * next - vec3f(cell));
+            if s <= 1.0 { return t + s * (next - t); }
+            t = next;
+            cell += onward;
+            leave = select(leave, t, any(cell < vec3i(0)) || any(cell > last));
+        }
+        t = max(t, leave);
     }
     return NOTHING;
 }

@@ -3,10 +3,13 @@
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
 
-// Central differences over 3 voxels: smooths the steps of thick slices and of the burr's voxels.
+// Differences between the corners of a cube of 3.2 voxels: smooths the steps of thick slices and of the burr's voxels.
 fn outward_normal(g: vec3f, along: vec3f) -> vec3f {
-    let e = vec2f(1.5, 0.0);
-    let gradient = vec3f(hu(g + e.xyy) - hu(g - e.xyy), hu(g + e.yxy) - hu(g - e.yxy), hu(g + e.yyx) - hu(g - e.yyx));
+    var gradient = vec3f(0.0);
+    for (var i = 0u; i < 8u; i++) {
+        let corner = vec3f(vec3u(i, i >> 1u, i >> 2u) & vec3u(1u)) * 2.0 - 1.0;
+        gradient += corner * hu(g + 1.6 * corner);
+    }
     return select(-normalize(gradient), -along, dot(gradient, gradient) < 1e-6);
 }
 

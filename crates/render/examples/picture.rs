@@ -1,10 +1,11 @@
-//! Draws a skull with a hole in it to a PNG: `picture OUT.png [CT.nii.gz [WIDTH HEIGHT]]`; without a CT, a made-up one.
+//! Draws a skull with a hole in it to a PNG: `picture OUT.png [CT [BRAIN_MASK [MRI]]]`, NIfTI files; without a CT, a made-up one.
 
 use glam::{DAffine3, Vec3};
 use std::path::Path;
 use std::sync::Arc;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::{Gpu, Prefer};
+use trepan_mesh::lattice;
 use trepan_render::{Camera, Frame, Renderer, SceneData};
 use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
 
@@ -12,16 +13,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let out = arguments.first().map_or("skull.png", String::as_str);
     let ct = arguments.get(1).map_or_else(|| Ok(made_up()), |path| from_file(Path::new(path)))?;
-    let number = |at: usize, default| arguments.get(at).map_or(Ok(default), |a| a.parse());
-    let size = [number(2, 960)?, number(3, 720)?];
+    let read = |at: usize| arguments.get(at).map(|path| trepan_volume::read(Path::new(path))).transpose();
+    let config = lattice::Config { target_tets: 20_000, ..Default::default() };
+    let brain = read(2)?.map(|mask| lattice::tetrahedra(&mask.map(|v| u8::from(v > 0.5)), &config)).transpose()?;
+    let mri = read(3)?;
 
     let bone = Arc::new(BoneVolume::new(&ct, 400)?);
     let bounds = bone.bounds();
     let gpu = Gpu::open(Prefer::Hardware)?;
-    let mut renderer = Renderer::new(&gpu, &SceneData { bone: bone.clone(), brain: None, mri: None }, size)?;
-    let towards_eye = Vec3::new(0.7, 0.9, 0.55);
-    let camera = Camera::viewed_from(bounds.centre(), towards_eye, 1.9 * bounds.size().max_element());
-    let entry = drill(&bone, towards_eye.normalize(), 9.0);
+    let data = SceneData { bone: bone.clone(), brain: brain.as_ref(), mri: mri.as_ref() };
+    let mut renderer = Renderer::new(&gpu, &data, [960, 720])?;
+    let towards_eye = Vec3::new(0.7, 0.6, 0.9);
+    let camera = Camera::viewed_from(bounds.centre() + 25.0 * Vec3::Z, towards_eye, 1.5 * bounds.size().max_element());
+    let entry = drill(&bone, towards_eye.normalize(), 14.0);
     let world_from_tool =
         Pose::from_parts(entry + 8.0 * Vec3::Z, Quat::from_rotation_arc(Vec3::Z, Vec3::new(0.5, 0.2, 0.8).normalize()));
     let frame = Frame { tool: Some(Tool::burr(4.0)), world_from_tool, ..Frame::of(camera) };

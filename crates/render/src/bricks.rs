@@ -207,6 +207,6 @@ mod tests {
         let leaps = Leaps::of(&bone, &Grid::of(&bone));
         assert_eq!(leaps.bricks, [6, 6, 6]);
         assert_eq!(leaps.free.iter().filter(|&&f| f == 0).count(), 8);
-        assert_eq!(Grid::of(&bone).share(&bone, [2, 2, 2]), 255 / 64 as u8);
+        assert_eq!(Grid::of(&bone).share(&bone, [2, 2, 2]), 255 / 64);
     }
 }

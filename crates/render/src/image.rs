@@ -19,7 +19,7 @@ impl Image {
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
         let at = 4 * (x as usize + self.width as usize * y as usize);
         let inside = x < self.width && y < self.height;
-        inside.then(|| [self.rgba[at], self.rgba[at + 1], self.rgba[at + 2], self.rgba[at + 3]]).unwrap_or_default()
+        if inside { [0, 1, 2, 3].map(|c| self.rgba[at + c]) } else { [0; 4] }
     }
 
     /// Writes a PNG file: first beside it, then renamed, so that no half file is ever seen.

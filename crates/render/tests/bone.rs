@@ -23,8 +23,8 @@ fn rays(view: &View, [width, height]: [u32; 2]) -> Vec<Vec3> {
 }
 
 fn draw(renderer: &mut Renderer, frame: &Frame) -> Vec<Option<Hit>> {
-    renderer.draw(frame).unwrap();
-    renderer.bone_hits().unwrap()
+    renderer.draw(frame).expect("the frame is drawn");
+    renderer.bone_hits().expect("the hits are read")
 }
 
 #[test]

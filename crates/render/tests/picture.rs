@@ -22,8 +22,8 @@ fn plain(camera: Camera) -> Frame<'static> {
 }
 
 fn picture(renderer: &mut Renderer, frame: &Frame) -> Image {
-    renderer.draw(frame).unwrap();
-    renderer.image().unwrap()
+    renderer.draw(frame).expect("the frame is drawn");
+    renderer.image().expect("the picture is read")
 }
 
 /// How much redder than green a pixel is: the brain and its outline are, bone and steel are less so.

@@ -33,10 +33,10 @@ pub fn volume(edge: usize, hu: impl Fn(DVec3) -> f64) -> VoxelVolume<i16> {
 
 /// Bone by a signed distance, mm, negative inside.
 pub fn bone(edge: usize, distance: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
-    Arc::new(BoneVolume::new(&volume(edge, |p| f64::from(ISO) - 100.0 * distance(p)), ISO).unwrap())
+    Arc::new(BoneVolume::new(&volume(edge, |p| f64::from(ISO) - 100.0 * distance(p)), ISO).expect("the scene has bone"))
 }
 
 /// A renderer of bone alone.
 pub fn renderer(gpu: &Gpu, bone: &Arc<BoneVolume>, size: [u32; 2]) -> Renderer {
-    Renderer::new(gpu, &SceneData { bone: bone.clone(), brain: None, mri: None }, size).unwrap()
+    Renderer::new(gpu, &SceneData { bone: bone.clone(), brain: None, mri: None }, size).expect("the scene loads")
 }
