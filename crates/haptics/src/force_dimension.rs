@@ -189,6 +189,14 @@ impl Drop for ForceDimension {
     }
 }
 
+/// Whether the library is there, and how many devices it sees.
+pub(crate) fn probe() -> Result<String, DeviceError> {
+    Drd::load(None).map(|drd| match drd.device_count() {
+        1.. => "ready".to_owned(),
+        _ => "its library is installed; no device is connected".to_owned(),
+    })
+}
+
 fn prepare(drd: &Drd, id: i8, auto_init: bool) -> Result<(), DeviceError> {
     if !drd.is_initialised(id) {
         if !auto_init {

@@ -33,7 +33,7 @@ use std::sync::atomic::Ordering;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use trepan_contact::GuardedWrench;
-use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
+use trepan_geometry::{Pose, Quat, ToolState, Twist, Vec3};
 use triple_buffer::{Input, Output, triple_buffer};
 use websocket::WebSocket;
 
@@ -87,8 +87,7 @@ pub struct Haply {
 impl Haply {
     /// Connects to the service and takes the device.
     pub fn open(config: &Config) -> Result<Self, DeviceError> {
-        let mut socket = WebSocket::connect(&config.service, PATIENCE)
-            .map_err(|error| not_opened(error.to_string(), "install and start Haply's Inverse service"))?;
+        let mut socket = connect(&config.service)?;
         let device = find(&mut socket, config.device.as_deref())?;
         let events = WebSocket::connect(&config.events, PATIENCE).ok();
 
@@ -143,7 +142,7 @@ impl Haply {
         self.workspace.world(&ToolState {
             world_from_tool: Pose::from_parts(axes(position) * 1e3, rotation.normalize()),
             twist: Twist { linear: axes(velocity), angular: Vec3::ZERO },
-            buttons: frame.buttons.unwrap_or(Buttons::default()),
+            buttons: frame.buttons.unwrap_or_default(),
             time_ms,
         })
     }
@@ -204,6 +203,20 @@ impl Drop for Haply {
     fn drop(&mut self) {
         self.close();
     }
+}
+
+/// Whether the service is there, and a device with it.
+pub(crate) fn probe() -> Result<String, DeviceError> {
+    let config = Config::default();
+    let mut socket = connect(&config.service)?;
+    let found = find(&mut socket, None).map(|device| format!("ready: Inverse3 {device}"));
+    socket.close();
+    found
+}
+
+fn connect(service: &str) -> Result<WebSocket, DeviceError> {
+    WebSocket::connect(service, PATIENCE)
+        .map_err(|error| not_opened(error.to_string(), "install and start Haply's Inverse service"))
 }
 
 /// Reads the inventory, introduces us, and gives the id of the device.

@@ -19,6 +19,7 @@ mod error;
 mod fault;
 pub mod force_dimension;
 pub mod haply;
+pub mod hardware;
 pub mod mouse;
 mod name;
 pub mod openhaptics;

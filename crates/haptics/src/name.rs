@@ -122,6 +122,7 @@ pub fn list() -> Vec<Listed> {
     listed.extend(script::NAMES.map(|name| ready(format!("script:{name}"), "ready")));
     listed.extend(script::NAMES.map(|name| ready(format!("simulated:{name}"), "ready")));
     listed.push(ready("replay:FILE".to_owned(), "ready"));
+    listed.extend(crate::hardware::list());
     listed
 }
 

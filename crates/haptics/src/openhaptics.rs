@@ -201,6 +201,11 @@ impl Drop for OpenHaptics {
     }
 }
 
+/// Whether the library is there.
+pub(crate) fn probe() -> Result<String, DeviceError> {
+    Hd::load(None).map(|(_, library)| format!("{library} is installed; the device is looked for when it is opened"))
+}
+
 /// A sample as a tool in device space. The transform's columns drift from orthonormal: they are made so again.
 fn tool(sample: &Sample, time_ms: f64) -> ToolState {
     let m = sample.transform.map(|value| value as f32);

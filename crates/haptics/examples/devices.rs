@@ -1,0 +1,51 @@
+//! Lists the devices, opens the one named (a scripted craniotomy by default) and prints where its tool goes.
+//!
+//! `cargo run -p trepan-haptics --example devices [NAME]`
+
+use std::error::Error;
+use trepan_geometry::{Buttons, Vec3};
+use trepan_haptics::script::{Script, Site};
+use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::{DeviceName, GuardedWrench, HapticDevice, Status, Workspace, hardware, list};
+
+const DURATION_MS: f64 = 8000.0;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    for listed in list() {
+        println!("{:<32} {}", listed.name, listed.state);
+    }
+    let name: DeviceName = std::env::args().nth(1).as_deref().unwrap_or("script:craniotomy").parse()?;
+    let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 };
+    let mut device = open(&name, &site)?;
+    let able = device.capabilities();
+    println!("\n{}: {:.1} N peak, {} axes driven", able.name, able.peak_force_n, able.axes_driven);
+    println!("{:>8} {:>24} {:>12} {:>6}", "ms", "tip, mm", "speed, mm/s", "pedal");
+    for tick in 0..=DURATION_MS as u32 {
+        let reading = device.read(f64::from(tick));
+        device.apply(GuardedWrench::ZERO);
+        if tick % 500 == 0 {
+            let tool = reading.tool;
+            let (tip, speed) = (tool.tip(), tool.twist.linear.length() * 1e3);
+            println!("{tick:>8} {:>24} {speed:>12.2} {:>6}", format!("{tip:.2}"), tool.buttons.has(Buttons::PEDAL));
+        }
+        if matches!(reading.status, Status::Finished | Status::Lost) {
+            break;
+        }
+    }
+    device.close();
+    Ok(())
+}
+
+fn open(name: &DeviceName, site: &Site) -> Result<Box<dyn HapticDevice>, Box<dyn Error>> {
+    if let Some(opened) = hardware::open(name, Workspace::default()) {
+        return Ok(opened?.device);
+    }
+    Ok(match name {
+        DeviceName::Script(script) => Box::new(Script::named(script, site, DURATION_MS)?),
+        DeviceName::Simulated(script) => {
+            let intent = Script::named(script, site, DURATION_MS)?;
+            Box::new(Simulated::new(Config::default(), Hand::LIGHT, Box::new(intent)))
+        }
+        _ => return Err(format!("{name} needs a window or a file: this example has neither").into()),
+    })
+}
