@@ -91,6 +91,16 @@ pub enum ReadError {
         /// The unpacker's reason.
         source: io::Error,
     },
+    /// Slices that do not make a volume.
+    #[error("{}: {found}; {remedy}", folder.display())]
+    Series {
+        /// The folder or file.
+        folder: PathBuf,
+        /// What is wrong with the slices.
+        found: String,
+        /// What would be right.
+        remedy: &'static str,
+    },
     /// Several volumes in one file.
     #[error("{}: {field} announces {found} volumes and {remedy}", file.display())]
     Volumes {
@@ -118,6 +128,7 @@ impl ReadError {
             | Self::Orientation { file, .. }
             | Self::Truncated { file, .. }
             | Self::Compression { file, .. }
+            | Self::Series { folder: file, .. }
             | Self::Volumes { file, .. } => file,
         }
     }

@@ -15,6 +15,7 @@ mod atomic;
 mod bone;
 mod brain;
 mod component;
+pub mod dicom;
 mod distance;
 mod error;
 mod keys;

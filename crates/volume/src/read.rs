@@ -1,20 +1,24 @@
 //! Any image file, its format found by content.
 
 use crate::source::Source;
-use crate::{Import, ReadError, VoxelVolume, metaimage, nifti, nrrd};
+use crate::{Import, ReadError, VoxelVolume, dicom, metaimage, nifti, nrrd};
 use std::path::Path;
 
-/// Reads a volume in any format that is known here, whatever its name.
+/// Reads a volume in any format that is known here, whatever its name; a folder is a DICOM series.
 pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
     import(path).map(|import| import.volume)
 }
 
 /// Reads a volume in any format, with what there is to say about the file.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
+    if path.is_dir() {
+        return dicom::import(path);
+    }
     let mut source = Source::open(&nifti::header_of_pair(path))?;
     match Format::of(source.peek(512)?) {
         Ok(Format::Nifti) => nifti::import_source(source, None),
         Ok(Format::Nrrd) => nrrd::import_source(source),
+        Ok(Format::Dicom) => dicom::import(path),
         Ok(Format::MetaImage) => metaimage::import_source(source),
         Err(found) => Err(ReadError::Format { file: path.into(), found: found.into() }),
     }
@@ -26,6 +30,7 @@ enum Format {
     Nifti,
     Nrrd,
     MetaImage,
+    Dicom,
 }
 
 impl Format {
@@ -39,6 +44,7 @@ impl Format {
             [] => Err("it is empty"),
             _ if nifti => Ok(Self::Nifti),
             [b'N', b'R', b'R', b'D', ..] => Ok(Self::Nrrd),
+            _ if dicom::starts(start) => Ok(Self::Dicom),
             _ if meta => Ok(Self::MetaImage),
             [0x89, b'P', b'N', b'G', ..] => Err("it is a PNG picture"),
             [0xff, 0xd8, 0xff, ..] => Err("it is a JPEG picture"),

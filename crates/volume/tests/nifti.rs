@@ -1,5 +1,7 @@
 //! NIfTI files made byte by byte, right and wrong ones.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot make its files should fail")]
+
 use glam::{DAffine3, DMat3, DVec3};
 use std::io::Write;
 use std::path::{Path, PathBuf};

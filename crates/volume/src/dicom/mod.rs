@@ -1,0 +1,221 @@
+//! DICOM series: what the scanner sends, a file per slice or all slices in one.
+//!
+//! # Theory
+//! Files are grouped by series, orientation and size; see the stack for how slices find their order and place. Stored numbers become
+//! values by `RescaleSlope · stored + RescaleIntercept`, which for CT gives HU.
+//!
+//! # Practice
+//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and big-endian, deflated, RLE; 8, 16 and 32 bits;
+//! enhanced multi-frame files; oblique and tilted stacks. Of several series in a folder the one with the most slices is taken and a
+//! note says so; [`series`] lists them. Doubled, missing and uneven slices are refused. Only the elements that place and scale voxels
+//! are looked at: no name, date, identifier or free text of a patient is kept or shown.
+//!
+//! # Sources
+//! NEMA, "DICOM PS3.3 C.7.6.2, C.7.6.16; PS3.5; PS3.10", dicom.nema.org.
+//!
+//! # When not to use it
+//! For colour, ultrasound, and compressed syntaxes other than RLE: the error names the syntax.
+
+mod element;
+mod pixels;
+mod rle;
+mod slice;
+mod stack;
+
+use crate::{Import, Note, ReadError, VoxelVolume};
+use slice::Slice;
+use std::path::{Path, PathBuf};
+
+/// Most files that are looked at in a folder.
+const MOST_FILES: usize = 20_000;
+
+/// Folders inside the folder that are looked into.
+const DEEPEST: usize = 4;
+
+/// A stack of pictures of one size and orientation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// CT, MR or another modality's two letters.
+    pub modality: String,
+    /// The series' number at the scanner.
+    pub number: Option<i64>,
+    /// Pictures.
+    pub slices: usize,
+    /// Columns and rows of a picture.
+    pub size: [usize; 2],
+}
+
+/// Reads the largest series of a folder, or the one that a file belongs to.
+pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
+    import(path).map(|import| import.volume)
+}
+
+/// Reads the largest series of a folder, or the one that a file belongs to, with what there is to say about it.
+pub fn import(path: &Path) -> Result<Import, ReadError> {
+    let groups = Groups::of(path)?;
+    let wanted = match path.is_dir() {
+        true => groups.largest(),
+        false => groups.of_file(path),
+    };
+    groups.read(path, wanted)
+}
+
+/// Reads the series with a number of [`series`]'s list.
+pub fn import_series(folder: &Path, index: usize) -> Result<Import, ReadError> {
+    Groups::of(folder)?.read(folder, index)
+}
+
+/// The series in a folder (and the folders in it), in the order of their first files' names.
+pub fn series(folder: &Path) -> Result<Vec<Series>, ReadError> {
+    Ok(Groups::of(folder)?.groups.iter().map(|group| summary(group)).collect())
+}
+
+/// Whether a file's first bytes are those of DICOM.
+pub(crate) fn starts(bytes: &[u8]) -> bool {
+    bytes.get(128..132) == Some(b"DICM") || matches!(bytes, [2 | 8, 0, _, 0, ..])
+}
+
+struct Groups {
+    groups: Vec<Vec<Slice>>,
+    passed_over: usize,
+    twice: usize,
+}
+
+impl Groups {
+    fn of(path: &Path) -> Result<Self, ReadError> {
+        let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new(".")) };
+        let mut files = Vec::new();
+        collect(folder, if path.is_dir() { DEEPEST } else { 0 }, &mut files)?;
+        let mut found = Self { groups: Vec::new(), passed_over: 0, twice: 0 };
+        for file in files {
+            match looked_at(&file) {
+                Ok(Some(slice)) => found.add(slice),
+                Err(error) if file == path => return Err(error),
+                _ => found.passed_over += 1,
+            }
+        }
+        Ok(found)
+    }
+
+    /// A picture that lies there twice is taken once.
+    fn add(&mut self, slice: Slice) {
+        let same = |known: &Slice| !slice.instance.is_empty() && known.instance == slice.instance;
+        if self.groups.iter().flatten().any(same) {
+            self.twice += 1;
+            return;
+        }
+        match self.groups.iter_mut().find(|group| belongs(&group[0], &slice)) {
+            Some(group) => group.push(slice),
+            None => self.groups.push(vec![slice]),
+        }
+    }
+
+    fn largest(&self) -> usize {
+        let size = |n: &usize| (summary(&self.groups[*n]).slices, std::cmp::Reverse(*n));
+        (0..self.groups.len()).max_by_key(size).unwrap_or(0)
+    }
+
+    fn of_file(&self, path: &Path) -> usize {
+        self.groups.iter().position(|group| group.iter().any(|slice| slice.file == path)).unwrap_or(self.groups.len())
+    }
+
+    fn read(&self, path: &Path, index: usize) -> Result<Import, ReadError> {
+        let Some(group) = self.groups.get(index) else {
+            return Err(ReadError::Series {
+                folder: path.into(),
+                found: format!("there are {} DICOM series with pictures in it", self.groups.len()),
+                remedy: "give the folder with the slices, or a series' number below that",
+            });
+        };
+        let mut notes = Vec::new();
+        if self.groups.len() > 1 {
+            notes.push(Note::OneOf { what: "series", count: self.groups.len(), chosen: index });
+        }
+        if self.passed_over > 0 && path.is_dir() {
+            notes.push(Note::Skipped { count: self.passed_over, why: "they are no DICOM pictures or cannot be read" });
+        }
+        if self.twice > 0 {
+            notes.push(Note::Skipped { count: self.twice, why: "the same pictures lie there twice" });
+        }
+        let stack = stack::stack(path, &group.iter().collect::<Vec<_>>())?;
+        notes.extend(stack.tilt.clone());
+        crate::source::check_affine(
+            path,
+            "ImagePositionPatient, ImageOrientationPatient or PixelSpacing",
+            stack.world_from_voxel,
+        )?;
+        let volume = voxels(&stack)?;
+        Ok(Import::new(volume, notes))
+    }
+}
+
+fn voxels(stack: &stack::Stack) -> Result<VoxelVolume<f32>, ReadError> {
+    let first = stack.pictures[0].slice;
+    let mut data = Vec::new();
+    let mut open: Option<(PathBuf, Vec<u8>)> = None;
+    for picture in &stack.pictures {
+        let file = &picture.slice.file;
+        let bytes = match open.take() {
+            Some((known, bytes)) if known == *file => bytes,
+            _ => bytes_of(file)?,
+        };
+        pixels::frame(picture.slice, &bytes, picture.frame, &mut data)?;
+        open = Some((file.clone(), bytes));
+    }
+    let dims = [first.columns, first.rows, stack.pictures.len()];
+    Ok(VoxelVolume { dims, data, world_from_voxel: stack.world_from_voxel })
+}
+
+fn looked_at(file: &Path) -> Result<Option<Slice>, ReadError> {
+    let mut source = crate::source::Source::open_plain(file)?;
+    if !starts(source.peek(132)?) {
+        return Ok(None);
+    }
+    Slice::parse(file, &bytes_of(file)?)
+}
+
+fn bytes_of(file: &Path) -> Result<Vec<u8>, ReadError> {
+    let bytes = std::fs::read(file).map_err(|source| ReadError::Io { file: file.into(), source })?;
+    slice::inflated(file, bytes)
+}
+
+/// The same series, orientation, size and spacing.
+fn belongs(a: &Slice, b: &Slice) -> bool {
+    let turned = match (a.orientation, b.orientation) {
+        (Some(a), Some(b)) => (0..2).any(|n| !a[n].abs_diff_eq(b[n], 1e-3)),
+        (a, b) => a.is_some() != b.is_some(),
+    };
+    a.series == b.series && !turned && (a.rows, a.columns, a.spacing) == (b.rows, b.columns, b.spacing)
+}
+
+fn summary(group: &[Slice]) -> Series {
+    let first = &group[0];
+    Series {
+        modality: first.modality.clone(),
+        number: first.number,
+        slices: group.iter().map(|slice| slice.frames).sum(),
+        size: [first.columns, first.rows],
+    }
+}
+
+/// Files of a folder by name, then those of the folders in it.
+fn collect(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), ReadError> {
+    let io = |source| ReadError::Io { file: folder.into(), source };
+    let mut entries = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        let entry = entry.map_err(io)?;
+        entries.push((entry.file_type().map_err(io)?.is_dir(), entry.path()));
+    }
+    entries.sort();
+    for (is_folder, path) in entries {
+        if is_folder && depth > 0 {
+            collect(&path, depth - 1, files)?;
+        } else if !is_folder && files.len() < MOST_FILES {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,169 @@
+//! What one DICOM file says about its picture: only the few elements that place and scale voxels are ever kept.
+
+use super::element::{Found, Pixels, Syntax, Walk};
+use crate::ReadError;
+use crate::sample::ByteOrder;
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+
+/// A file with a picture. Holds no name, number, date or free text of a patient.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Slice {
+    pub file: PathBuf,
+    /// Identifier of the series; compared, never shown.
+    pub series: String,
+    /// Identifier of the picture; compared, never shown.
+    pub instance: String,
+    pub modality: String,
+    pub number: Option<i64>,
+    pub syntax: String,
+    pub rows: usize,
+    pub columns: usize,
+    pub frames: usize,
+    pub samples: u16,
+    pub bits_allocated: u16,
+    pub bits_stored: u16,
+    pub high_bit: u16,
+    pub signed: bool,
+    /// Row direction and column direction, LPS.
+    pub orientation: Option<[DVec3; 2]>,
+    /// Centre of the first voxel, LPS mm: one, or one per frame.
+    pub positions: Vec<DVec3>,
+    /// Between rows and between columns, mm.
+    pub spacing: Option<[f64; 2]>,
+    /// Slope and intercept: one, or one per frame.
+    pub rescale: Vec<[f64; 2]>,
+    pub pixels: Option<Pixels>,
+}
+
+impl Slice {
+    /// Looks into a whole file; `None` where it is no DICOM file or holds no picture.
+    pub fn parse(file: &Path, bytes: &[u8]) -> Result<Option<Self>, ReadError> {
+        let Some(start) = Start::of(bytes) else { return Ok(None) };
+        let mut walk = Walk { bytes, at: start.at, syntax: start.syntax, pixels: None };
+        let mut slice = Self { file: file.into(), syntax: start.name, frames: 1, samples: 1, ..Self::default() };
+        let mut slopes: Vec<(usize, f64)> = Vec::new();
+        let mut intercepts: Vec<(usize, f64)> = Vec::new();
+        let ended = walk.run(&mut |found| slice.keep(&found, &mut slopes, &mut intercepts));
+        slice.pixels = walk.pixels.take();
+        let picture = slice.rows > 0 && slice.columns > 0;
+        if let Err(broken) = ended {
+            if !picture {
+                return Ok(None);
+            }
+            let what = "data elements";
+            return Err(ReadError::Truncated {
+                file: file.into(),
+                what,
+                expected: broken.at as u64 + 8,
+                found: bytes.len() as u64,
+            });
+        }
+        slice.rescale = (0..slopes.len().max(intercepts.len()))
+            .map(|n| [slopes.get(n).map_or(1.0, |s| s.1), intercepts.get(n).map_or(0.0, |i| i.1)])
+            .collect();
+        Ok(picture.then_some(slice))
+    }
+
+    fn keep(&mut self, found: &Found, slopes: &mut Vec<(usize, f64)>, intercepts: &mut Vec<(usize, f64)>) {
+        let frame = match found.within {
+            None => 0,
+            Some((0x5200_9229, _)) => 0,
+            Some((0x5200_9230, frame)) => frame,
+            Some(_) => return,
+        };
+        let first = || found.numbers().first().copied().filter(|v| v.is_finite());
+        match found.tag {
+            0x0008_0018 => self.instance = found.text(),
+            0x0008_0060 => self.modality = code(&found.text(), 2),
+            0x0020_000e => self.series = found.text(),
+            0x0020_0011 => self.number = first().map(|n| n as i64),
+            0x0020_0032 => self.positions.extend(vector(&found.numbers())),
+            0x0020_0037 => self.orientation = self.orientation.or_else(|| directions(&found.numbers())),
+            0x0028_0002 => self.samples = found.u16().unwrap_or(0),
+            0x0028_0008 => self.frames = first().map_or(0, |n| n.clamp(0.0, 1e6) as usize),
+            0x0028_0010 => self.rows = found.u16().unwrap_or(0).into(),
+            0x0028_0011 => self.columns = found.u16().unwrap_or(0).into(),
+            0x0028_0030 => self.spacing = self.spacing.or_else(|| found.numbers().try_into().ok()),
+            0x0028_0100 => self.bits_allocated = found.u16().unwrap_or(0),
+            0x0028_0101 => self.bits_stored = found.u16().unwrap_or(0),
+            0x0028_0102 => self.high_bit = found.u16().unwrap_or(0),
+            0x0028_0103 => self.signed = found.u16() == Some(1),
+            0x0028_1052 => intercepts.extend(first().map(|v| (frame, v))),
+            0x0028_1053 => slopes.extend(first().map(|v| (frame, v))),
+            _ => {}
+        }
+    }
+}
+
+/// Where and how the elements start.
+struct Start {
+    at: usize,
+    syntax: Syntax,
+    name: String,
+}
+
+const EXPLICIT: Syntax = Syntax { explicit: true, order: ByteOrder::Little };
+
+impl Start {
+    /// With the preamble, the meta group says the syntax; without, the first element must look like one.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        let meta = if bytes.get(128..132) == Some(b"DICM") { 132 } else { 0 };
+        let mut name = String::new();
+        let mut walk = Walk { bytes, at: meta, syntax: EXPLICIT, pixels: None };
+        while bytes.get(walk.at..walk.at + 2) == Some(&[2, 0]) {
+            let found = walk.plain_element().ok()?;
+            if found.tag == 0x0002_0010 {
+                name = uid(&found.text());
+            }
+        }
+        if walk.at == 0 && bytes.get(0..2) != Some(&[8, 0]) {
+            return None;
+        }
+        let syntax = match name.as_str() {
+            "1.2.840.10008.1.2" => Syntax { explicit: false, ..EXPLICIT },
+            "1.2.840.10008.1.2.2" => Syntax { order: ByteOrder::Big, ..EXPLICIT },
+            "" => guessed(bytes.get(walk.at..)?),
+            _ => EXPLICIT,
+        };
+        Some(Self { at: walk.at, syntax, name })
+    }
+}
+
+/// Explicit where two capital letters follow the first tag; big-endian where the group's zero comes first.
+fn guessed(bytes: &[u8]) -> Syntax {
+    let letters = bytes.get(4..6).is_some_and(|vr| vr.iter().all(u8::is_ascii_uppercase));
+    let order = if bytes.first() == Some(&0) { ByteOrder::Big } else { ByteOrder::Little };
+    Syntax { explicit: letters, order }
+}
+
+/// The deflated syntax's elements, unpacked behind the meta group; other files are left alone.
+pub(super) fn inflated(file: &Path, bytes: Vec<u8>) -> Result<Vec<u8>, ReadError> {
+    let deflated = Start::of(&bytes).filter(|start| start.name == "1.2.840.10008.1.2.1.99");
+    let Some(start) = deflated else { return Ok(bytes) };
+    let mut out = bytes[..start.at].to_vec();
+    let mut stream = flate2::read::DeflateDecoder::new(&bytes[start.at..]);
+    std::io::Read::read_to_end(&mut stream, &mut out)
+        .map_err(|source| ReadError::Compression { file: file.into(), source })?;
+    Ok(out)
+}
+
+fn vector(numbers: &[f64]) -> Option<DVec3> {
+    <[f64; 3]>::try_from(numbers).ok().map(DVec3::from_array).filter(|v| v.is_finite())
+}
+
+fn directions(numbers: &[f64]) -> Option<[DVec3; 2]> {
+    let [a, b] = [vector(numbers.get(..3)?)?, vector(numbers.get(3..6)?)?];
+    let upright = a.dot(b).abs() < 1e-3 && (a.length() - 1.0).abs() < 1e-3 && (b.length() - 1.0).abs() < 1e-3;
+    upright.then_some([a, b])
+}
+
+/// Capital letters only, so that nothing else can come through.
+fn code(text: &str, most: usize) -> String {
+    text.chars().filter(char::is_ascii_uppercase).take(most).collect()
+}
+
+/// Digits and points only, so that nothing else can come through.
+fn uid(text: &str) -> String {
+    text.chars().filter(|c| c.is_ascii_digit() || *c == '.').take(64).collect()
+}

@@ -1,0 +1,122 @@
+//! Slices into a stack: by where they lie, never by what they are called.
+//!
+//! # Theory
+//! With the row direction r and the column direction c, n = r × c is the slices' normal and `n · position` their order. The step
+//! s = (last - first) / (count - 1) is the third axis; where the gantry was tilted it leans against n, and the affine is sheared:
+//!
+//! ```text
+//! world = diag(-1, -1, 1) · ( i · column spacing · r + j · row spacing · c + k · s + first )       DICOM is LPS, the world RAS
+//! ```
+
+use super::slice::Slice;
+use crate::{Note, ReadError};
+use glam::{DAffine3, DMat3, DVec3};
+use std::path::Path;
+
+/// One picture of the stack.
+#[derive(Clone, Copy)]
+pub(super) struct Picture<'a> {
+    pub slice: &'a Slice,
+    pub frame: usize,
+    pub position: DVec3,
+}
+
+/// A stack in order, with its place in the patient.
+pub(super) struct Stack<'a> {
+    pub pictures: Vec<Picture<'a>>,
+    pub world_from_voxel: DAffine3,
+    pub tilt: Option<Note>,
+}
+
+/// Leaning by less than this is rounding, degrees.
+const LEAST_TILT: f64 = 0.1;
+
+/// Puts the pictures of some files in order and checks that they fill a box evenly.
+pub(super) fn stack<'a>(place: &Path, slices: &[&'a Slice]) -> Result<Stack<'a>, ReadError> {
+    let first = slices.first().ok_or_else(|| series(place, "no pictures are there".into(), "choose another folder"))?;
+    let [row, column] = first.orientation.ok_or_else(|| missing(first, "ImageOrientationPatient"))?;
+    let [between_rows, between_columns] = first.spacing.ok_or_else(|| missing(first, "PixelSpacing"))?;
+    let normal = row.cross(column).normalize();
+    let mut pictures = Vec::new();
+    for slice in slices {
+        if slice.positions.len() != slice.frames {
+            return Err(missing(slice, "ImagePositionPatient (for every frame)"));
+        }
+        let of = |(frame, &position): (usize, &DVec3)| Picture { slice, frame, position };
+        pictures.extend(slice.positions.iter().enumerate().map(of));
+    }
+    pictures.sort_by(|a, b| normal.dot(a.position).total_cmp(&normal.dot(b.position)));
+    let [bottom, .., top] = &pictures[..] else {
+        let remedy = "give the folder of the whole series";
+        return Err(series(place, format!("{} picture is no volume", pictures.len()), remedy));
+    };
+    let step = (top.position - bottom.position) / (pictures.len() - 1) as f64;
+    let heights: Vec<f64> = pictures.iter().map(|p| normal.dot(p.position)).collect();
+    check_gaps(place, &heights)?;
+    check_line(place, &pictures, step)?;
+    let degrees = (step.dot(normal) / step.length()).clamp(-1.0, 1.0).acos().to_degrees();
+    let lps = DAffine3 {
+        matrix3: DMat3::from_cols(row * between_columns, column * between_rows, step),
+        translation: bottom.position,
+    };
+    let world_from_voxel = DAffine3::from_scale(DVec3::new(-1.0, -1.0, 1.0)) * lps;
+    Ok(Stack { world_from_voxel, tilt: (degrees > LEAST_TILT).then_some(Note::Tilt { degrees }), pictures })
+}
+
+/// Refuses doubled, missing and uneven slices.
+fn check_gaps(place: &Path, heights: &[f64]) -> Result<(), ReadError> {
+    let mut gaps: Vec<f64> = heights.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let doubled = gaps.iter().filter(|&&gap| gap < 1e-3).count();
+    if doubled > 0 {
+        let found = format!("{doubled} of {} slices lie where another one lies", heights.len());
+        return Err(series(
+            place,
+            found,
+            "a folder must hold each slice once; move repeats or phases to folders of their own",
+        ));
+    }
+    gaps.sort_by(f64::total_cmp);
+    let usual = gaps[gaps.len() / 2];
+    let slack = (0.02 * usual).min(0.1) + 0.01;
+    let lost: f64 = gaps.iter().map(|gap| (gap / usual).round() - 1.0).sum();
+    let whole = gaps.iter().all(|gap| (gap - usual * (gap / usual).round()).abs() < slack);
+    let at = heights.windows(2).find(|pair| (pair[1] - pair[0] - usual).abs() >= slack);
+    match at {
+        None => Ok(()),
+        Some(pair) if whole && lost > 0.0 => {
+            let found = format!(
+                "{lost} slices are missing: slices lie {usual:.3} mm apart, but {:.3} mm at height {:.3} mm",
+                pair[1] - pair[0],
+                pair[0]
+            );
+            Err(series(place, found, "export the series again, or choose a complete one"))
+        }
+        Some(_) => {
+            let (low, high) = (gaps[0], gaps[gaps.len() - 1]);
+            let found = format!("slices lie unevenly, {low:.3} to {high:.3} mm apart");
+            Err(series(place, found, "choose an evenly spaced series, or resample it where it was made"))
+        }
+    }
+}
+
+/// Refuses positions off the line from the first to the last.
+fn check_line(place: &Path, pictures: &[Picture], step: DVec3) -> Result<(), ReadError> {
+    let off = |(n, picture): (usize, &Picture)| (pictures[0].position + n as f64 * step).distance(picture.position);
+    let worst = pictures.iter().enumerate().map(off).fold(0.0, f64::max);
+    match worst <= 0.02 * step.length() + 0.1 {
+        true => Ok(()),
+        false => {
+            let found = format!("slices lie up to {worst:.2} mm beside the line through the first and the last");
+            Err(series(place, found, "the folder mixes several stacks; move them to folders of their own"))
+        }
+    }
+}
+
+fn missing(slice: &Slice, field: &'static str) -> ReadError {
+    let remedy = "without it the picture has no place in the patient; export the original series";
+    ReadError::Field { file: slice.file.clone(), field, found: "missing".into(), remedy }
+}
+
+fn series(place: &Path, found: String, remedy: &'static str) -> ReadError {
+    ReadError::Series { folder: place.into(), found, remedy }
+}
