@@ -2,16 +2,13 @@
 
 use super::input::{Hand, Pointer};
 use super::plot::Trace;
+use super::quality::Quality;
 use super::{Lent, Panel, Session, Shared, Start, WindowInput, banner, panel};
 use eframe::egui;
 use std::time::Duration;
 
 /// Width of the side panel, points.
 const PANEL_WIDTH: f32 = 250.0;
-/// Share of the pixels along an edge that a software driver draws while the camera moves.
-const COARSE: f32 = 0.5;
-/// After this long without a move the picture is fine again, s.
-const SETTLE_S: f64 = 0.3;
 
 /// The application behind the window.
 pub(super) struct Window<S> {
@@ -22,13 +19,16 @@ pub(super) struct Window<S> {
     panel: Panel,
     clicks: panel::Clicks,
     texture: Option<(egui::TextureId, eframe::wgpu::TextureView)>,
-    moved_at: f64,
+    quality: Quality,
+    drawn_at: f64,
 }
 
 impl<S: Session> Window<S> {
     pub fn new(context: &eframe::CreationContext<'_>, lent: Lent<S>, start: Start) -> Self {
         context.egui_ctx.set_visuals(egui::Visuals::dark());
         let hand = Hand { world_from_tool: start.world_from_tool, camera: start.camera };
+        let software = lent.borrow().as_ref().is_some_and(|s| s.renderer.gpu().is_software());
+        let quality = Quality::new(software);
         let force = Trace::over(panel::SECONDS_SHOWN);
         Self {
             lent,
@@ -38,7 +38,8 @@ impl<S: Session> Window<S> {
             panel: Panel::default(),
             clicks: Default::default(),
             texture: None,
-            moved_at: f64::MIN,
+            quality,
+            drawn_at: 0.0,
         }
     }
 
@@ -71,8 +72,9 @@ impl<S: Session> Window<S> {
         let space = ui.available_size().max(egui::vec2(8.0, 8.0));
         let (area, response) = ui.allocate_exact_size(space, egui::Sense::click_and_drag());
         let now = ui.input(|i| i.time);
-        let coarse = shared.renderer.gpu().is_software() && now - self.moved_at < SETTLE_S;
-        let scale = ui.ctx().pixels_per_point() * if coarse { COARSE } else { 1.0 };
+        self.quality.note(now - self.drawn_at);
+        self.drawn_at = now;
+        let scale = ui.ctx().pixels_per_point() * self.quality.scale();
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
         let drawn = shared.renderer.resize(pixels).and_then(|()| {
             let frame = shared.session.frame(self.hand.camera);
@@ -83,9 +85,7 @@ impl<S: Session> Window<S> {
             Err(error) => shared.fault = Some(error.to_string()),
             Ok(view) => {
                 let pointer = Pointer::over(ui, &response);
-                if self.hand.follow(&pointer, &view, space.y) {
-                    self.moved_at = now;
-                }
+                self.hand.follow(&pointer, &view, space.y);
                 ui.input(|i| self.hand.keys(i, &view));
             }
         }

@@ -47,8 +47,8 @@ pub(crate) struct Pointer {
 }
 
 impl Hand {
-    /// Moves hand and eye. `height` is that of the 3-D view in points. Whether the camera moved.
-    pub fn follow(&mut self, pointer: &Pointer, view: &View, height: f32) -> bool {
+    /// Moves hand and eye. `height` is that of the 3-D view in points.
+    pub fn follow(&mut self, pointer: &Pointer, view: &View, height: f32) {
         let tip = self.world_from_tool.translation;
         let depth = (tip - view.eye).dot(view.forward).max(1.0);
         let mm = 2.0 * depth * view.half.y / height.max(1.0);
@@ -67,7 +67,6 @@ impl Hand {
             self.world_from_tool.translation += PUSH_MM * pointer.wheel * sight;
         }
         self.camera.orbit(-ORBIT_RAD * pointer.right.x, ORBIT_RAD * pointer.right.y);
-        pointer.right != Vec2::ZERO || (pointer.zoom && pointer.wheel != 0.0)
     }
 
     /// Moves the tool by keys.
@@ -115,7 +114,7 @@ mod tests {
         let (mut hand, view) = hand();
         let before = view.project(hand.world_from_tool.translation).0;
         let pointer = Pointer { left: Vec2::new(30.0, -12.0), ..Default::default() };
-        assert!(!hand.follow(&pointer, &view, 600.0));
+        hand.follow(&pointer, &view, 600.0);
         let after = view.project(hand.world_from_tool.translation).0;
         let moved = (after - before) * Vec2::new(0.5 * 900.0, -0.5 * 600.0);
         assert!((moved - pointer.left).length() < 0.01, "{moved}");
@@ -128,14 +127,14 @@ mod tests {
         hand.follow(&Pointer { wheel: 50.0, ..Default::default() }, &view, 600.0);
         let pushed = hand.world_from_tool.translation - before;
         assert!((pushed.length() - 1.0).abs() < 1e-4 && pushed.dot(before - view.eye) > 0.0);
-        assert!(hand.follow(&Pointer { wheel: 50.0, zoom: true, ..Default::default() }, &view, 600.0));
+        hand.follow(&Pointer { wheel: 50.0, zoom: true, ..Default::default() }, &view, 600.0);
         assert!(hand.camera.distance_mm < 200.0 && hand.world_from_tool.translation == before + pushed);
     }
 
     #[test]
     fn a_right_drag_circles_and_a_shifted_drag_tilts_about_the_tip() {
         let (mut hand, view) = hand();
-        assert!(hand.follow(&Pointer { right: Vec2::new(10.0, 5.0), ..Default::default() }, &view, 600.0));
+        hand.follow(&Pointer { right: Vec2::new(10.0, 5.0), ..Default::default() }, &view, 600.0);
         assert!(hand.camera.azimuth_rad < std::f32::consts::FRAC_PI_2 && hand.camera.elevation_rad > 0.0);
         let tip = hand.world_from_tool.translation;
         hand.follow(&Pointer { left: Vec2::new(100.0, 0.0), tilt: true, ..Default::default() }, &view, 600.0);

@@ -13,8 +13,8 @@
 //! | R | resets the view |
 //! | Q or Escape | closes |
 //!
-//! The picture stays on the device: egui shows the very texture that the renderer draws into. With a software driver the picture is coarser
-//! while the camera moves.
+//! The picture stays on the device: egui shows the very texture that the renderer draws into. It gets coarser when pictures
+//! take longer than a tenth of a second, and finer again when there is time.
 //!
 //! # When not to use it
 //! Without a display: [`run`] says so and hands everything back, so that the session can go on headless.
@@ -24,6 +24,7 @@ mod banner;
 mod input;
 mod panel;
 mod plot;
+mod quality;
 
 pub use input::WindowInput;
 

@@ -1,0 +1,82 @@
+//! Picture quality that follows the time a picture takes: coarser when the hand waits for the eye, finer when there is time.
+
+/// Shares of the window's pixels along an edge.
+const SCALES: [f32; 5] = [1.0, 0.75, 0.55, 0.4, 0.3];
+
+/// A picture slower than this is too slow, s.
+const SLOW_S: f64 = 0.110;
+
+/// A picture faster than this leaves room for a finer one (which costs about twice as much), s.
+const FAST_S: f64 = 0.045;
+
+/// Pictures in a row that must be too slow before the picture gets coarser.
+const PATIENCE_SLOW: u32 = 3;
+
+/// Pictures in a row that must be fast before the picture gets finer.
+const PATIENCE_FAST: u32 = 25;
+
+/// How fine the picture is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Quality {
+    step: usize,
+    slow: u32,
+    fast: u32,
+}
+
+impl Quality {
+    /// Starts at the finest on a graphics card, in the middle on a software driver.
+    pub fn new(software: bool) -> Self {
+        Self { step: if software { 2 } else { 0 }, ..Self::default() }
+    }
+
+    /// Takes note of the time from picture to picture.
+    pub fn note(&mut self, seconds: f64) {
+        self.slow = if seconds > SLOW_S { self.slow + 1 } else { 0 };
+        self.fast = if seconds < FAST_S { self.fast + 1 } else { 0 };
+        let step = match () {
+            () if self.slow >= PATIENCE_SLOW => (self.step + 1).min(SCALES.len() - 1),
+            () if self.fast >= PATIENCE_FAST => self.step.saturating_sub(1),
+            () => return,
+        };
+        *self = Self { step, ..Self::default() };
+    }
+
+    /// Share of the window's pixels along an edge.
+    pub fn scale(&self) -> f32 {
+        SCALES[self.step]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Scale after some pictures whose time is `full` seconds at the finest and falls with the number of pixels.
+    fn settled(full: f64, pictures: u32) -> f32 {
+        let mut quality = Quality::new(false);
+        for _ in 0..pictures {
+            quality.note(full * f64::from(quality.scale().powi(2)));
+        }
+        quality.scale()
+    }
+
+    #[test]
+    fn quality_settles_where_the_time_fits() {
+        assert_eq!(settled(0.02, 500), 1.0);
+        assert_eq!(settled(0.15, 500), 0.75);
+        assert_eq!(settled(0.5, 500), 0.4);
+        assert_eq!(settled(50.0, 500), 0.3);
+    }
+
+    #[test]
+    fn one_slow_picture_changes_nothing_and_rest_brings_the_finest_back() {
+        let mut quality = Quality::new(true);
+        let start = quality.scale();
+        quality.note(1.0);
+        quality.note(0.08);
+        quality.note(1.0);
+        assert_eq!(quality.scale(), start);
+        (0..200).for_each(|_| quality.note(0.033));
+        assert_eq!(quality.scale(), 1.0);
+    }
+}
