@@ -56,6 +56,32 @@ impl Extent {
         (0..3).all(|axis| self.low[axis] <= p[axis] && p[axis] <= self.high[axis])
     }
 
+    /// Whether `other` lies inside.
+    pub fn holds(&self, other: &Self) -> bool {
+        (0..3).all(|axis| self.low[axis] <= other.low[axis] && other.high[axis] <= self.high[axis])
+    }
+
+    /// What two boxes share.
+    pub fn shared(&self, other: &Self) -> Self {
+        Self {
+            low: core::array::from_fn(|axis| self.low[axis].max(other.low[axis])),
+            high: core::array::from_fn(|axis| self.high[axis].min(other.high[axis])),
+        }
+    }
+
+    /// This box, moved outwards on all sides.
+    #[inline]
+    pub fn widened(&self, margin: f32) -> Self {
+        Self { low: self.low.map(|x| x - margin), high: self.high.map(|x| x + margin) }
+    }
+
+    /// The furthest that a side lies outside where it was; 0 for an empty box, since it holds nothing that could be missed.
+    pub fn moved_from(&self, before: &Self) -> f32 {
+        let outside = |axis: usize| (before.low[axis] - self.low[axis]).max(self.high[axis] - before.high[axis]);
+        let most = (0..3).map(outside).fold(0.0, f32::max);
+        if most.is_finite() { most } else { 0.0 }
+    }
+
     /// Squared distance of a point from the box, mm²; infinite for an empty one.
     #[inline]
     pub fn distance2(&self, p: Vec3) -> f32 {

@@ -9,7 +9,7 @@ use crate::{
     surface::MovingSurface,
 };
 use trepan_contact::{ContactManifold, NodalContact, SurfacePatch};
-use trepan_geometry::{Pointshell, Spread, Tool, ToolState, Vec3};
+use trepan_geometry::{Aabb, Pointshell, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::{TetMesh, Topology};
 
 /// What one step found.
@@ -29,6 +29,8 @@ pub struct TissueStep {
     pub overflow: u32,
     /// Inverted, flat or non-finite tetrahedra met and skipped; all of them, when the step was refused for lack of sound input.
     pub skipped: u32,
+    /// Boxes of far surface that moved faster than was allowed for; a contact there could be some steps late. 0 up to 30 thousand tetrahedra.
+    pub stale: u32,
 }
 
 impl TissueStep {
@@ -100,29 +102,32 @@ impl TissueCollision {
         }
         self.place_points(tool);
         if self.uses_surface {
-            self.surface.refit(positions);
+            let reach = REACH * self.radius_mm;
+            self.surface.refit(positions, Aabb::of_sphere(tool.tip(), reach).into());
         }
         let (tets, neighbours, points) = (&self.tets[..], &self.neighbours[..], &self.points[..]);
         let scene = Scene { positions, velocities, tets, neighbours, points, tool, radius_mm: self.radius_mm };
-        self.search.find(&scene, &self.surface, &mut self.hits);
+        self.search.find(&scene, &mut self.surface, &mut self.hits);
         count(&self.hits, out);
-        match self.responder.respond(&scene, &self.hits, &self.surface, out) {
+        match self.responder.respond(&scene, &self.hits, &mut self.surface, out) {
             Some(answer) => finish(&scene, &answer, self.stiffness, self.damping, out),
             None => out.forget_contact(),
         }
+        out.stale = self.surface.stale;
     }
 
     /// Forgets where the tool was, as after a tool change. Results do not depend on it, only the next step's time.
     pub fn reset(&mut self) {
         self.search.reset();
         self.responder.reset();
+        self.surface.reset();
     }
 
     fn clear(&mut self, tool: &ToolState, out: &mut TissueStep) {
         self.hits.clear();
         out.patch = SurfacePatch { time_ms: tool.time_ms, tip_mm: tool.tip(), ..SurfacePatch::default() };
         out.forget_contact();
-        (out.points_in_contact, out.tests, out.overflow, out.skipped) = (0, 0, 0, 0);
+        (out.points_in_contact, out.tests, out.overflow, out.skipped, out.stale) = (0, 0, 0, 0, 0);
     }
 
     /// The shell in world space, and the centre behind it.
@@ -136,6 +141,9 @@ impl TissueCollision {
         }
     }
 }
+
+/// The surface is kept fitted this many radii around the tip.
+const REACH: f32 = 3.5;
 
 /// Default cell: this times the mean edge (the thesis's analytic optimum on its spheres).
 const CELL_PER_EDGE: f32 = 1.45;

@@ -1,17 +1,18 @@
 //! The moving surface near the tool: which triangles lie in a box, and which point of them is closest.
 //!
 //! # Theory
-//! Border triangles are sorted once along a Morton curve at rest and cut into clusters of 32. At every step the boxes of all
-//! clusters are fitted anew to the moved nodes, so nothing here goes stale and nothing needs a warm start; searches then visit
-//! only clusters whose box is near enough.
+//! Border triangles are sorted once along a Morton curve at rest and cut into clusters of 32, each with a box. Every step fits some of the boxes anew to
+//! the moved nodes, in turn and spread over the whole surface, and learns from them how fast the surface moves. A box that is `a` steps old is
+//! taken wider by `a` times twice that speed; only where such a loose box is near enough to matter is it fitted at once. So a step touches what
+//! lies near the tool and a slice of the rest. A box that moved further than its margin is counted as stale: a contact could have come late by a
+//! few steps. Surfaces of up to [`SLICE`] clusters (a brain of 30 thousand tetrahedra) are fitted whole at every step and never stale.
 //!
 //! ```text
-//!   nodes -> [box][box][box][box] ... -> boxes near the tool -> their triangles -> exact closest point
+//!   [fit] [loose] [loose] [fit]  ( tool ) -> boxes near it fitted -> their triangles -> exact closest point
 //! ```
 //!
 //! # Practice
-//! Cost: 2 ns for each surface node (a brain of 22 thousand tetrahedra has 2 thousand of them), plus 10 ns for each triangle near the tool.
-//! Triangles with a NaN corner are skipped.
+//! Cost: 3 ns for each node of a fitted box, 3 ns for each cluster, 10 ns for each triangle near the tool. Triangles with a NaN corner are skipped.
 
 use crate::{extent::Extent, narrow::NONE, triangle};
 use trepan_geometry::Vec3;
@@ -19,6 +20,10 @@ use trepan_mesh::{Csr, Surface, TetMesh};
 
 /// Triangles in one cluster.
 const CLUSTER: usize = 32;
+/// Clusters fitted at every step at least.
+const SLICE: usize = 128;
+/// Speed that is always allowed for, mm in one step: 0.1 m/s at 1 kHz.
+const LEAST_SPEED: f32 = 0.1;
 
 /// Closest point on the surface.
 #[derive(Clone, Copy, Debug)]
@@ -42,8 +47,16 @@ pub(crate) struct MovingSurface {
     nodes_of_cluster: Csr,
     triangles_of_node: Csr,
     boxes: Vec<Extent>,
-    /// Box of the whole surface.
+    fitted_at: Vec<u32>,
+    step: u32,
+    speed: f32,
+    /// Where the tool works in this step, and the clusters whose loose box meets it.
+    region: Extent,
+    close: Vec<u32>,
+    /// Box around the whole surface.
     pub bounds: Extent,
+    /// Boxes that were found outside their margin in this step.
+    pub stale: u32,
 }
 
 impl MovingSurface {
@@ -54,9 +67,16 @@ impl MovingSurface {
         let tet_of_triangle = order.iter().map(|&t| surface.tet_of_triangle[t as usize]).collect();
         let around = triangles.iter().enumerate().flat_map(|(t, nodes)| nodes.map(|n| (n, t as u32)));
         let nodes_of_cluster = nodes_of_clusters(&triangles);
+        let clusters = nodes_of_cluster.len();
         Self {
             triangles_of_node: Csr::of_pairs(mesh.positions.len(), around),
-            boxes: vec![Extent::EMPTY; nodes_of_cluster.len()],
+            boxes: vec![Extent::EMPTY; clusters],
+            fitted_at: vec![0; clusters],
+            step: 0,
+            speed: LEAST_SPEED,
+            region: Extent::EMPTY,
+            close: Vec::with_capacity(clusters),
+            stale: 0,
             nodes_of_cluster,
             triangles,
             tet_of_triangle,
@@ -64,52 +84,94 @@ impl MovingSurface {
         }
     }
 
-    /// Fits all boxes to the moved nodes.
-    pub(crate) fn refit(&mut self, positions: &[Vec3]) {
-        self.bounds = Extent::EMPTY;
-        for (cluster, fitted) in self.boxes.iter_mut().enumerate() {
-            *fitted = Extent::of(self.nodes_of_cluster.row(cluster).iter().map(|&n| &positions[n as usize]));
-            self.bounds.merge(fitted);
+    /// Forgets all boxes; the next step fits them all.
+    pub(crate) fn reset(&mut self) {
+        (self.step, self.speed) = (0, LEAST_SPEED);
+    }
+
+    /// Begins a step: fits a slice of the boxes to the moved nodes, all of them in the first step, and those that meet `region`.
+    pub(crate) fn refit(&mut self, positions: &[Vec3], region: Extent) {
+        if self.step == u32::MAX {
+            self.reset();
+        }
+        let turns = if self.step == 0 { 1 } else { self.boxes.len().div_ceil(SLICE).max(1) };
+        self.step += 1;
+        (self.stale, self.speed) = (0, LEAST_SPEED.max(0.9 * self.speed));
+        for cluster in (self.step as usize % turns..self.boxes.len()).step_by(turns) {
+            self.fit(positions, cluster);
+        }
+        (self.region, self.bounds) = (region, Extent::EMPTY);
+        self.close.clear();
+        for cluster in 0..self.boxes.len() {
+            let loose = self.loose(cluster);
+            self.bounds.merge(&loose);
+            if loose.overlaps(&region) && self.fitted(positions, cluster).overlaps(&region) {
+                self.close.push(cluster as u32);
+            }
         }
     }
 
     /// Puts the triangles whose boxes meet `region` into `near`, up to its capacity; returns how many did not fit.
-    pub(crate) fn gather(&self, positions: &[Vec3], region: &Extent, near: &mut Vec<u32>) -> u32 {
+    pub(crate) fn gather(&mut self, positions: &[Vec3], region: &Extent, near: &mut Vec<u32>) -> u32 {
         near.clear();
+        if self.region.holds(region) {
+            return (0..self.close.len())
+                .map(|k| self.gather_from(self.close[k] as usize, positions, region, near))
+                .sum();
+        }
         let mut overflow = 0;
-        for (cluster, _) in self.boxes.iter().enumerate().filter(|(_, fitted)| fitted.overlaps(region)) {
-            for t in self.triangles_of(cluster) {
-                let corners = self.corners(positions, t);
-                if !Extent::of(&corners).overlaps(region) || !corners.iter().all(|c| c.is_finite()) {
-                    continue;
-                }
-                match near.len() < near.capacity() {
-                    true => near.push(t),
-                    false => overflow += 1,
-                }
+        for cluster in 0..self.boxes.len() {
+            if self.loose(cluster).overlaps(region) && self.fitted(positions, cluster).overlaps(region) {
+                overflow += self.gather_from(cluster, positions, region, near);
             }
         }
         overflow
     }
 
-    /// The closest point of the whole surface that is nearer than `within` mm; the nearest box first, then only boxes nearer than the best so far.
-    pub(crate) fn closest(&self, positions: &[Vec3], to: Vec3, within: f32) -> Option<Foot> {
-        let (mut first, mut nearest) = (None, within * within);
-        for (cluster, fitted) in self.boxes.iter().enumerate() {
-            let distance2 = fitted.distance2(to);
+    fn gather_from(&self, cluster: usize, positions: &[Vec3], region: &Extent, near: &mut Vec<u32>) -> u32 {
+        let mut overflow = 0;
+        for t in self.triangles_of(cluster) {
+            let corners = self.corners(positions, t);
+            if !Extent::of(&corners).overlaps(region) || !corners.iter().all(|c| c.is_finite()) {
+                continue;
+            }
+            match near.len() < near.capacity() {
+                true => near.push(t),
+                false => overflow += 1,
+            }
+        }
+        overflow
+    }
+
+    /// The closest point of the surface that lies in the region given to [`refit`](Self::refit) and is nearer than `within` mm.
+    pub(crate) fn closest_here(&self, positions: &[Vec3], to: Vec3, within: f32) -> Option<Foot> {
+        let mut best: Option<Foot> = None;
+        for &cluster in &self.close {
+            let bound = best.map_or(f32::INFINITY, |b| b.distance2).min(within * within);
+            if self.boxes[cluster as usize].distance2(to) < bound {
+                best = self.closest_among(positions, self.triangles_of(cluster as usize), to, best);
+            }
+        }
+        best.filter(|b| b.distance2 < within * within)
+    }
+
+    /// The closest point of the whole surface; the nearest box first, then only boxes nearer than the best so far.
+    pub(crate) fn closest(&mut self, positions: &[Vec3], to: Vec3) -> Option<Foot> {
+        let (mut first, mut nearest) = (None, f32::INFINITY);
+        for cluster in 0..self.boxes.len() {
+            let distance2 = self.loose(cluster).distance2(to);
             if distance2 < nearest {
                 (first, nearest) = (Some(cluster), distance2);
             }
         }
-        let first = first?;
-        let mut best = self.closest_among(positions, self.triangles_of(first), to, None);
-        for (cluster, fitted) in self.boxes.iter().enumerate() {
-            let bound = best.map_or(f32::INFINITY, |b| b.distance2).min(within * within);
-            if cluster != first && fitted.distance2(to) < bound {
+        let mut best = self.closest_among(positions, self.triangles_of(first?), to, None);
+        for cluster in 0..self.boxes.len() {
+            let bound = best.map_or(f32::INFINITY, |b| b.distance2);
+            if self.loose(cluster).distance2(to) < bound && self.fitted(positions, cluster).distance2(to) < bound {
                 best = self.closest_among(positions, self.triangles_of(cluster), to, best);
             }
         }
-        best.filter(|b| b.distance2 < within * within)
+        best
     }
 
     /// The closest point on the given triangles, or `best` when none is nearer.
@@ -153,6 +215,31 @@ impl MovingSurface {
 
     pub(crate) fn corners(&self, positions: &[Vec3], t: u32) -> [Vec3; 3] {
         self.triangles[t as usize].map(|n| positions[n as usize])
+    }
+
+    /// The box of a cluster, widened by what it may have moved since it was fitted.
+    #[inline]
+    fn loose(&self, cluster: usize) -> Extent {
+        let age = (self.step - self.fitted_at[cluster]) as f32;
+        self.boxes[cluster].widened(2.0 * self.speed * age)
+    }
+
+    /// The box of a cluster, fitted in this step.
+    fn fitted(&mut self, positions: &[Vec3], cluster: usize) -> Extent {
+        if self.fitted_at[cluster] != self.step {
+            self.fit(positions, cluster);
+        }
+        self.boxes[cluster]
+    }
+
+    fn fit(&mut self, positions: &[Vec3], cluster: usize) {
+        let fitted = Extent::of(self.nodes_of_cluster.row(cluster).iter().map(|&n| &positions[n as usize]));
+        if self.step > 1 {
+            let (moved, age) = (fitted.moved_from(&self.boxes[cluster]), (self.step - self.fitted_at[cluster]) as f32);
+            self.stale += u32::from(age > 1.0 && moved > 2.0 * self.speed * age);
+            self.speed = self.speed.max(moved / age);
+        }
+        (self.boxes[cluster], self.fitted_at[cluster]) = (fitted, self.step);
     }
 
     fn foot(&self, positions: &[Vec3], t: u32, to: Vec3) -> Foot {

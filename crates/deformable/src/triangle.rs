@@ -7,6 +7,7 @@
 use trepan_geometry::Vec3;
 
 /// Weights of the closest point on the corners; they sum to 1 and are never negative.
+#[inline]
 pub(crate) fn closest_weights([a, b, c]: [Vec3; 3], p: Vec3) -> [f32; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));

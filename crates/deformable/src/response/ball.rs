@@ -25,6 +25,7 @@
 
 use super::{Answer, near::Near, near::Sample};
 use crate::{
+    extent::Extent,
     narrow::{Hits, NONE},
     scene::Scene,
     step::TissueStep,
@@ -50,7 +51,12 @@ const BLEND: f32 = 0.5;
 
 impl Ball {
     pub(crate) fn new() -> Self {
-        Self { anchor: NONE, last_centre: Vec3::ZERO, numbers: Vec::with_capacity(MAX_NEAR), near: Near::with_capacity(MAX_NEAR) }
+        Self {
+            anchor: NONE,
+            last_centre: Vec3::ZERO,
+            numbers: Vec::with_capacity(MAX_NEAR),
+            near: Near::with_capacity(MAX_NEAR),
+        }
     }
 
     pub(crate) fn reset(&mut self) {
@@ -62,7 +68,7 @@ impl Ball {
         &mut self,
         scene: &Scene,
         hits: &Hits,
-        surface: &MovingSurface,
+        surface: &mut MovingSurface,
         out: &mut TissueStep,
     ) -> Option<Answer> {
         let touch = self.touch(scene, hits, surface, out);
@@ -91,23 +97,35 @@ impl Ball {
         &mut self,
         scene: &Scene,
         hits: &Hits,
-        surface: &MovingSurface,
+        surface: &mut MovingSurface,
         out: &mut TissueStep,
     ) -> Option<(Sample, f32)> {
         let (positions, centre) = (scene.positions, scene.tool.tip());
         let inside = hits.tet[scene.centre()] != NONE;
         let jumped = self.last_centre.distance(centre) > scene.radius_mm;
         self.last_centre = centre;
-        let foot = match inside && self.anchor != NONE && !jumped {
-            true => surface.descend(positions, self.anchor, centre),
-            false => surface.closest(positions, centre, if inside { f32::INFINITY } else { scene.radius_mm }),
+        let foot = match (inside, self.anchor) {
+            (false, _) => surface.closest_here(positions, centre, scene.radius_mm),
+            (true, NONE) => surface.closest(positions, centre),
+            (true, _) if jumped => surface.closest(positions, centre),
+            (true, anchor) => surface.descend(positions, anchor, centre),
         }?;
-        out.overflow +=
-            surface.gather(positions, &Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm).into(), &mut self.numbers);
+        let signed = |distance: f32| scene.radius_mm + if inside { distance } else { -distance };
+        let region = self.region(scene, hits, &foot, signed(foot.distance2.sqrt()));
+        out.overflow += surface.gather(positions, &region, &mut self.numbers);
         self.keep_touched_side(scene, surface, &foot);
-        let sample = self.near.sample(centre, BLEND * scene.radius_mm)?;
-        let depth_mm = scene.radius_mm + if inside { sample.distance } else { -sample.distance };
-        (depth_mm > 0.0).then_some((sample, depth_mm))
+        let closest = self.near.sample(centre, 0.0)?;
+        let depth_mm = signed(closest.distance);
+        let normal = self.near.sample(closest.point, BLEND * scene.radius_mm)?.normal;
+        (depth_mm > 0.0).then_some((Sample { normal, ..closest }, depth_mm))
+    }
+
+    /// Where triangles matter: as far from the points inside as they are deep, and as normals blend; never beyond a diameter around the foot.
+    fn region(&self, scene: &Scene, hits: &Hits, foot: &Foot, depth_mm: f32) -> Extent {
+        let mut points = Extent::of(&[foot.point]);
+        points_inside(hits).for_each(|i| points.grow(scene.points[i]));
+        let most = Extent::from(Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm));
+        points.widened(depth_mm.max(0.0) + BLEND * scene.radius_mm).shared(&most)
     }
 
     /// Takes triangles that the centre sees from outside, and those that face as the touched one does.

@@ -49,7 +49,7 @@ impl Responder {
         &mut self,
         scene: &Scene,
         hits: &Hits,
-        surface: &MovingSurface,
+        surface: &mut MovingSurface,
         out: &mut TissueStep,
     ) -> Option<Answer> {
         match self {

@@ -7,9 +7,9 @@
 //! Where walls oppose, the mean is shorter than 1; its length says how far they cancel.
 //!
 //! # Practice
-//! Two bounds (plane distance, bounding sphere) spare most exact distances: 1 ns each, against 10 ns.
+//! Two bounds (plane distance, box) spare most exact distances: 2 ns each, against 15 ns; the closest triangle of the last point is tried first.
 
-use crate::{surface::MovingSurface, triangle};
+use crate::{extent::Extent, surface::MovingSurface, triangle};
 use trepan_geometry::Vec3;
 
 /// Triangles near a contact.
@@ -17,6 +17,8 @@ pub(crate) struct Near {
     triangles: Vec<NearTriangle>,
     /// Room for the distances of one sample, by triangle.
     close: Vec<(f32, u32)>,
+    /// Where the last sample's closest triangle is in the list.
+    hint: usize,
 }
 
 /// One moved triangle with what the bounds need.
@@ -25,8 +27,7 @@ struct NearTriangle {
     number: u32,
     corners: [Vec3; 3],
     normal: Vec3,
-    centre: Vec3,
-    radius: f32,
+    bounds: Extent,
     area: f32,
 }
 
@@ -34,7 +35,9 @@ struct NearTriangle {
 pub(crate) struct Sample {
     /// The closest triangle.
     pub triangle: u32,
-    /// Weights of the closest point on its corners.
+    /// The closest point, world mm.
+    pub point: Vec3,
+    /// Its weights on the corners.
     pub weights: [f32; 3],
     /// Distance to it, mm.
     pub distance: f32,
@@ -44,7 +47,7 @@ pub(crate) struct Sample {
 
 impl Near {
     pub(crate) fn with_capacity(triangles: usize) -> Self {
-        Self { triangles: Vec::with_capacity(triangles), close: Vec::with_capacity(triangles) }
+        Self { triangles: Vec::with_capacity(triangles), close: Vec::with_capacity(triangles), hint: 0 }
     }
 
     /// Takes the numbered triangles for which `keep(normal, corner)` holds; flat ones say nothing and are left out.
@@ -56,41 +59,46 @@ impl Near {
         keep: impl Fn(Vec3, Vec3) -> bool,
     ) {
         self.triangles.clear();
+        self.hint = 0;
         for &number in numbers.iter().take(self.triangles.capacity()) {
             let corners = surface.corners(positions, number);
             let twice_area = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
             let Some(normal) = twice_area.try_normalize() else { continue };
             if keep(normal, corners[0]) {
-                let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-                let radius = corners.iter().map(|c| c.distance_squared(centre)).fold(0.0, f32::max).sqrt();
-                let area = 0.5 * twice_area.length();
-                self.triangles.push(NearTriangle { number, corners, normal, centre, radius, area });
+                let (bounds, area) = (Extent::of(&corners), 0.5 * twice_area.length());
+                self.triangles.push(NearTriangle { number, corners, normal, bounds, area });
             }
         }
     }
 
-    /// Closest point and blended normal for `p`; `blend_mm` is r. `None` without any triangle.
+    /// Closest point and blended normal for `p`; `blend_mm` is r, or 0 for no normal. `None` without any triangle.
     pub(crate) fn sample(&mut self, p: Vec3, blend_mm: f32) -> Option<Sample> {
-        let mut best: Option<(f32, usize, [f32; 3])> = None;
+        let (mut best, mut reach2, mut weights) = (self.hint, f32::INFINITY, [0.0; 3]);
+        let mut nearest = f32::INFINITY;
         self.close.clear();
-        for (t, triangle) in self.triangles.iter().enumerate() {
-            let reach = best.map_or(f32::INFINITY, |(d, ..)| d + blend_mm);
-            if triangle.at_least(p) >= reach {
+        let count = self.triangles.len();
+        for (t, triangle) in (self.hint..count).chain(0..self.hint.min(count)).map(|t| (t, &self.triangles[t])) {
+            if triangle.at_least2(p) >= reach2 {
                 continue;
             }
-            let weights = triangle::closest_weights(triangle.corners, p);
-            let distance = triangle.point(weights).distance(p);
+            let at = triangle::closest_weights(triangle.corners, p);
+            let distance = triangle.point(at).distance(p);
             self.close.push((distance, t as u32));
-            if best.is_none_or(|(d, ..)| distance < d) {
-                best = Some((distance, t, weights));
+            if distance < nearest {
+                (best, nearest, weights) = (t, distance, at);
+                reach2 = (distance + blend_mm) * (distance + blend_mm);
             }
         }
-        let (distance, t, weights) = best?;
-        let normal = self.blended(distance, blend_mm);
-        Some(Sample { triangle: self.triangles[t].number, weights, distance, normal })
+        self.hint = best;
+        let triangle = self.triangles.get(best).filter(|_| nearest.is_finite())?;
+        let (point, normal) = (triangle.point(weights), self.blended(nearest, blend_mm));
+        Some(Sample { triangle: triangle.number, point, weights, distance: nearest, normal })
     }
 
     fn blended(&self, nearest: f32, blend_mm: f32) -> Vec3 {
+        if blend_mm <= 0.0 {
+            return Vec3::ZERO;
+        }
         let (mut sum, mut total) = (Vec3::ZERO, 0.0);
         for &(distance, t) in &self.close {
             let triangle = &self.triangles[t as usize];
@@ -103,10 +111,11 @@ impl Near {
 }
 
 impl NearTriangle {
-    /// No point of the triangle is nearer than this.
-    fn at_least(&self, p: Vec3) -> f32 {
-        let from_plane = self.normal.dot(p - self.corners[0]).abs();
-        from_plane.max(self.centre.distance(p) - self.radius)
+    /// No point of the triangle is nearer than the root of this.
+    #[inline]
+    fn at_least2(&self, p: Vec3) -> f32 {
+        let from_plane = self.normal.dot(p - self.corners[0]);
+        (from_plane * from_plane).max(self.bounds.distance2(p))
     }
 
     fn point(&self, weights: [f32; 3]) -> Vec3 {

@@ -29,7 +29,7 @@ impl Search {
     }
 
     /// Fills `hits` for the scene's points.
-    pub(crate) fn find(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
+    pub(crate) fn find(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
         match self {
             Self::Brute(search) => search.find(scene, hits),
             Self::Gridded(search) => search.find(scene, hits),

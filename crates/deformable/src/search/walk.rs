@@ -58,7 +58,7 @@ impl Walk {
         self.last.fill(NONE);
     }
 
-    pub(crate) fn find(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
+    pub(crate) fn find(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
         if !Extent::from(scene.ball_box()).overlaps(&surface.bounds) {
             return self.reset();
         }
@@ -81,7 +81,7 @@ impl Walk {
     }
 
     /// Lost points against every tetrahedron that meets their box.
-    fn search_lost(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
+    fn search_lost(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
         self.near.clear();
         if self.lost.is_empty() {
             return;
@@ -101,9 +101,9 @@ impl Walk {
     }
 
     /// No border near and no memory: all points are inside or all outside, as the centre is.
-    fn enter_deep(&mut self, scene: &Scene, surface: &MovingSurface, hits: &mut Hits) {
+    fn enter_deep(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
         let centre = scene.points[scene.centre()];
-        let Some(foot) = surface.closest(scene.positions, centre, f32::INFINITY) else { return };
+        let Some(foot) = surface.closest(scene.positions, centre) else { return };
         self.lost.clear();
         self.lost.push(scene.centre() as u32);
         self.begin_flood();
