@@ -274,6 +274,55 @@ mod tests {
         }
     }
 
+    /// `λ_i ∂W/∂λ_i`, written by hand from the principal stretches.
+    fn principal_work(law: Law, stretch: DVec3) -> DVec3 {
+        let (j, squares) = (stretch.x * stretch.y * stretch.z, stretch * stretch);
+        let (i1, i2) = (squares.element_sum(), squares.x * squares.y + squares.y * squares.z + squares.z * squares.x);
+        let one = DVec3::ONE;
+        let bulk = |kappa: f64| one * (kappa * (j - 1.0) * j);
+        match law {
+            Law::NeoHookean(NeoHookean { mu, kappa }) => {
+                (squares - one * (i1 / 3.0)) * (mu * j.powf(-2.0 / 3.0)) + bulk(kappa)
+            }
+            Law::StVenantKirchhoff { lambda, mu } => {
+                let e = (squares - one) * 0.5;
+                (one * (lambda * e.element_sum()) + e * (2.0 * mu)) * squares
+            }
+            Law::MooneyRivlin { c10, c01, kappa } => {
+                (squares - one * (i1 / 3.0)) * (2.0 * c10 * j.powf(-2.0 / 3.0))
+                    + (squares * (one * i1 - squares) - one * (2.0 * i2 / 3.0)) * (2.0 * c01 * j.powf(-4.0 / 3.0))
+                    + bulk(kappa)
+            }
+            Law::Ogden { mu, alpha, kappa } => {
+                let term = |p: usize| {
+                    let powers = (stretch / j.cbrt()).powf(alpha[p]);
+                    (powers - one * (powers.element_sum() / 3.0)) * (2.0 * mu[p] / alpha[p])
+                };
+                term(0) + term(1) + bulk(kappa)
+            }
+        }
+    }
+
+    #[test]
+    fn uniaxial_biaxial_and_shear_stress_are_those_of_the_closed_forms() {
+        for law in laws() {
+            for s in [0.7f64, 0.8, 1.1, 1.4] {
+                // Simple shear of amount γ has the principal stretches r, 1/r, 1 with r - 1/r = γ.
+                for stretch in
+                    [DVec3::new(s, 1.0, 1.0), DVec3::new(s, s, 1.0), DVec3::new(s, 1.0 / s, 1.0), DVec3::splat(s)]
+                {
+                    let found = law.stress(DMat3::from_diagonal(stretch));
+                    let exact = principal_work(law, stretch) / stretch;
+                    let found = DVec3::new(found.x_axis.x, found.y_axis.y, found.z_axis.z);
+                    assert!(
+                        (found - exact).length() < 1e-12 * (1.0 + exact.length()),
+                        "{law:?} {stretch} {found} {exact}"
+                    );
+                }
+            }
+        }
+    }
+
     #[test]
     fn an_ogden_law_with_exponent_2_is_neo_hookean_and_a_falling_one_is_found_unstable() {
         let f = DMat3::from_cols(DVec3::new(1.1, 0.2, 0.0), DVec3::new(-0.1, 0.8, 0.3), DVec3::new(0.0, 0.1, 1.3));

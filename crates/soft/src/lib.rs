@@ -36,7 +36,7 @@ mod solver;
 mod tetra;
 
 pub use body::{Body, BodyError};
-pub use bound::{element_bound_ms, highest_frequency, lowest_frequency, power_bound_ms};
+pub use bound::{element_bound_ms, element_omega2, highest_frequency, lowest_frequency, power_bound_ms};
 pub use energy::{FADE_BELOW, NeoHookean};
 pub use law::{LEAST_STRETCH, Law};
 pub use material::{Material, MaterialError};

@@ -10,12 +10,13 @@
 //! 100 bytes of constants a tetrahedron, 48 more for a memory of past stress.
 
 use crate::element::{deformation, forces};
-use crate::kernel::Pass;
+use crate::kernel::{Found, Pass};
 use crate::lane::Lane;
 use crate::law::{Constitutive, Stress};
 use crate::relaxation::Fade;
+use crate::stiffness::stiffness;
 use std::marker::PhantomData;
-use trepan_soft::{Law, Shape};
+use trepan_soft::{Material, Shape, element_omega2};
 
 /// Tetrahedra in a block.
 pub(crate) const WIDTH: usize = 16;
@@ -29,7 +30,10 @@ pub(crate) type Quad = [f32; 4];
 pub(crate) struct Block<const K: usize> {
     gradients: [[[f32; WIDTH]; 3]; 3],
     constants: [[f32; WIDTH]; K],
+    /// V/4, mm³.
     quarter_volume: [f32; WIDTH],
+    /// ω² of the element at rest over its stiffness at rest.
+    omega2: [f32; WIDTH],
     nodes: [[u32; WIDTH]; 4],
     slots: [[u32; WIDTH]; 4],
 }
@@ -68,20 +72,24 @@ impl<const K: usize> Block<K> {
             gradients: [[[0.0; WIDTH]; 3]; 3],
             constants: [[0.0; WIDTH]; K],
             quarter_volume: [0.0; WIDTH],
+            omega2: [0.0; WIDTH],
             nodes: [[0; WIDTH]; 4],
             slots: [[spare; WIDTH]; 4],
         }
     }
 
     /// Puts an element into a lane.
-    pub fn put<M: Constitutive<K>>(&mut self, lane: usize, shape: &Shape, law: &Law, nodes: [u32; 4], slots: [u32; 4]) {
+    pub fn put<M: Constitutive<K>>(&mut self, lane: usize, shape: &Shape, material: &Material, at: [[u32; 4]; 2]) {
+        let [nodes, slots] = at;
         for a in 0..3 {
             let gradient = shape.gradients[a + 1].as_vec3();
             (0..3).for_each(|k| self.gradients[a][k][lane] = gradient[k]);
         }
-        for (row, constant) in self.constants.iter_mut().zip(M::constants(law, shape.volume_mm3)) {
-            row[lane] = constant;
-        }
+        let constants = M::constants(&material.law(), shape.volume_mm3);
+        self.constants.iter_mut().zip(constants).for_each(|(row, constant)| row[lane] = constant);
+        let rest = deformation(&[[0.0; 3]; 3], &[[0.0; 3]; 3]);
+        let at_rest = stiffness(&M::stress(&constants, &rest), M::moduli(&constants), &rest);
+        self.omega2[lane] = (element_omega2(shape, material) / f64::from(at_rest)) as f32;
         self.quarter_volume[lane] = (0.25 * shape.volume_mm3) as f32;
         for corner in 0..4 {
             self.nodes[corner][lane] = nodes[corner];
@@ -115,19 +123,21 @@ impl<const K: usize> Block<K> {
 
 impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, K, T> {
     #[inline(always)]
-    fn run<L: Lane>(&mut self) -> u32 {
-        let mut inverted = 0;
+    fn run<L: Lane>(&mut self) -> Found {
+        let (mut inverted, mut stiffest) = (0, L::splat(0.0));
         for (block, memory) in self.blocks.iter().zip(self.memory.iter_mut()) {
             for part in 0..WIDTH / L::LANES {
                 let moved = block.moved::<L>(part, self.u);
                 let (gradients, constants) = (block.gradients::<L>(part), load::<L, K>(&block.constants, part));
                 let d = deformation(&moved.edges, &gradients);
                 let mut stress = M::stress(&constants, &d);
+                let omega2 = L::load(&block.omega2, part) * stiffness(&stress, M::moduli(&constants), &d);
+                stiffest = omega2.larger(stiffest);
                 if T > 0 {
                     relax::<L, T>(&mut stress, &d.inverse_green(), memory, &self.fade, part);
                 }
                 let swelling = if self.cure_locking { moved.mean } else { d.j - L::splat(1.0) };
-                stress.q = stress.q + M::bulk(&constants) * swelling;
+                stress.q = stress.q + M::moduli(&constants).1 * swelling;
                 let [f1, f2, f3] = forces(&stress, M::ROUND && T == 0, &d, &gradients);
                 let zero = L::splat(0.0);
                 let f0 =
@@ -139,13 +149,13 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 inverted += d.j.not_positive();
             }
         }
-        inverted
+        Found { inverted, stiffest: stiffest.largest() }
     }
 }
 
 impl<const K: usize> Pass for Volumes<'_, K> {
     #[inline(always)]
-    fn run<L: Lane>(&mut self) -> u32 {
+    fn run<L: Lane>(&mut self) -> Found {
         let zero = L::splat(0.0);
         for block in self.blocks {
             for part in 0..WIDTH / L::LANES {
@@ -157,7 +167,7 @@ impl<const K: usize> Pass for Volumes<'_, K> {
                 }
             }
         }
-        0
+        Found::default()
     }
 }
 

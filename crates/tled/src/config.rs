@@ -12,7 +12,8 @@ pub struct Config {
     /// Share of the true stable bound that a step may use, over 0 and below 1. The rest is for elements that stiffen as they are
     /// compressed, and for the tool's spring.
     pub safety: f32,
-    /// Most substeps in one call; a `dt_ms` that needs more is shortened, and the rest counted as skipped. 0 = obey `dt_ms` even where
+    /// Most substeps in one call, taken when `dt_ms` is over the stable bound of the body as it is deformed now; a `dt_ms` that needs more is
+    /// shortened, and the rest counted as skipped. 0 = obey `dt_ms` even where
     /// it is unstable (for experiments on stability).
     pub substeps: u32,
     /// Gravity under which the given mesh is already in equilibrium, mm/ms². The scan was taken lying in CSF, so the case's mesh is not

@@ -9,7 +9,7 @@
 //! ```
 
 use crate::block::{Block, Forces, Memory, Quad, Volumes, WIDTH};
-use crate::kernel::Kernel;
+use crate::kernel::{Found, Kernel};
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
 use crate::layout::Layout;
 use crate::relaxation::{Fade, Relaxation};
@@ -30,7 +30,7 @@ pub(crate) struct Elements {
 
 /// Elements of one law.
 trait Group: Send {
-    fn forces(&mut self, kernel: Kernel, fade: [Fade; 2], cure_locking: bool, u: &[Quad], slots: &mut [Quad]) -> u32;
+    fn forces(&mut self, kernel: Kernel, fade: [Fade; 2], cure_locking: bool, u: &[Quad], slots: &mut [Quad]) -> Found;
     fn volumes(&self, kernel: Kernel, u: &[Quad], slots: &mut [Quad]);
     fn forget(&mut self);
 }
@@ -62,8 +62,8 @@ impl Elements {
         }
     }
 
-    /// Computes every element's forces from displacements by place; gives the number of elements that are inverted.
-    pub fn compute(&mut self, u: &mut [Quad], dt_ms: f32) -> u32 {
+    /// Computes every element's forces from displacements by place, `dt_ms` after the last time.
+    pub fn compute(&mut self, u: &mut [Quad], dt_ms: f32) -> Found {
         if self.cure_locking {
             self.group.volumes(self.kernel, u, &mut self.slots);
             for place in 0..u.len() {
@@ -107,21 +107,20 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Of<M, K, T> {
     fn new(body: &Body, layout: &Layout, starts: &[u32]) -> Self {
         let (mut next, spare) = (starts.to_vec(), starts[starts.len() - 1]);
         let mut blocks = vec![Block::empty(spare); layout.tet_at.len().div_ceil(WIDTH)];
-        let law = body.material.law();
         for (at, &t) in layout.tet_at.iter().enumerate() {
             let nodes = body.mesh.tets[t as usize].map(|n| layout.place_of[n as usize]);
             let slots = nodes.map(|place| {
                 next[place as usize] += 1;
                 next[place as usize] - 1
             });
-            blocks[at / WIDTH].put::<M>(at % WIDTH, &body.shape(t as usize), &law, nodes, slots);
+            blocks[at / WIDTH].put::<M>(at % WIDTH, &body.shape(t as usize), &body.material, [nodes, slots]);
         }
         Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; blocks.len()], blocks, law: PhantomData }
     }
 }
 
 impl<M: Constitutive<K> + Send, const K: usize, const T: usize> Group for Of<M, K, T> {
-    fn forces(&mut self, kernel: Kernel, fade: [Fade; 2], cure_locking: bool, u: &[Quad], slots: &mut [Quad]) -> u32 {
+    fn forces(&mut self, kernel: Kernel, fade: [Fade; 2], cure_locking: bool, u: &[Quad], slots: &mut [Quad]) -> Found {
         let (blocks, memory) = (&self.blocks, &mut self.memory);
         kernel.run(&mut Forces::<M, K, T> { blocks, memory, fade, u, slots, cure_locking, law: PhantomData })
     }
@@ -162,8 +161,8 @@ mod tests {
             let mut u: Vec<Quad> =
                 (0..count).map(|n| [noise(3 * n), noise(3 * n + 1), noise(3 * n + 2), 0.0]).collect();
             let mut elements = Elements::of(body, &layout, kernel, cure, relaxation);
-            let inverted = (0..3).map(|_| elements.compute(&mut u, 0.7)).last();
-            (inverted, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
+            let found = (0..3).map(|_| elements.compute(&mut u, 0.7)).last();
+            (found, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
         };
         let scalar = forces(Kernel::Scalar);
         for kernel in Kernel::all().into_iter().filter(|k| k.runs_here()) {

@@ -22,8 +22,17 @@ pub enum Kernel {
 
 /// Work over all blocks, written once for every width. Implementations inline always.
 pub(crate) trait Pass {
-    /// Does the work with registers of kind L; gives the number of elements that are inverted.
-    fn run<L: Lane>(&mut self) -> u32;
+    /// Does the work with registers of kind L.
+    fn run<L: Lane>(&mut self) -> Found;
+}
+
+/// What a pass noticed on its way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Found {
+    /// Elements with J ≤ 0.
+    pub inverted: u32,
+    /// Largest ω² of a single element as it is deformed now, 1/ms².
+    pub stiffest: f32,
 }
 
 impl Kernel {
@@ -66,7 +75,7 @@ impl Kernel {
 
     /// Runs a pass with this kernel.
     #[inline]
-    pub(crate) fn run<P: Pass>(self, pass: &mut P) -> u32 {
+    pub(crate) fn run<P: Pass>(self, pass: &mut P) -> Found {
         match self {
             Self::Scalar => pass.run::<f32>(),
             #[cfg(target_arch = "x86_64")]

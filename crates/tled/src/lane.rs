@@ -25,6 +25,8 @@ pub(crate) trait Lane:
     fn scatter(xyzw: [Self; 4], to: &mut [Quad], at: &[u32]);
     /// The larger of each lane and `floor`; `floor` for NaN.
     fn at_least(self, floor: f32) -> Self;
+    /// The larger of two; `other` where this one is NaN.
+    fn larger(self, other: Self) -> Self;
     /// `x^(-1/3)` within 4 % for x over 0, by its bits: the exponent divided by -3.
     fn rough_inverse_cube_root(self) -> Self;
     /// How many lanes are zero or negative.
@@ -41,6 +43,14 @@ pub(crate) trait Lane:
     fn mantissa(self) -> Self;
     /// `2^n` for a whole n from -126 to 127.
     fn power_of_two(self) -> Self;
+
+    /// The largest of its lanes.
+    #[inline(always)]
+    fn largest(self) -> f32 {
+        let mut row = [f32::NEG_INFINITY; WIDTH];
+        self.store(&mut row, 0);
+        row.into_iter().fold(f32::NEG_INFINITY, f32::max)
+    }
 
     /// `log₂ x` for x over 0, within 1e-7: `½ + 2/ln 2 · artanh((m-√2)/(m+√2))` and the exponent.
     #[inline(always)]
@@ -139,6 +149,11 @@ impl Lane for f32 {
     }
 
     #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        self.max(other)
+    }
+
+    #[inline(always)]
     fn rough_inverse_cube_root(self) -> Self {
         let bits = self.to_bits();
         let mut third = (bits >> 2) + (bits >> 4);
@@ -217,6 +232,11 @@ impl Lane for f32x8 {
     #[inline(always)]
     fn at_least(self, floor: f32) -> Self {
         self.fast_max(Self::splat(floor))
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        self.fast_max(other)
     }
 
     #[inline(always)]

@@ -42,8 +42,8 @@ pub(crate) trait Constitutive<const K: usize> {
     fn constants(law: &Law, volume_mm3: f64) -> [f32; K];
     /// Its stress without the part of the volume.
     fn stress<L: Lane>(constants: &[L; K], d: &Deformation<L>) -> Stress<L>;
-    /// κ V, N mm: what multiplies `J - 1` in the part of the volume; zero where the law is not split.
-    fn bulk<L: Lane>(constants: &[L; K]) -> L;
+    /// μ V and κ V, N mm. κ multiplies `J - 1` in the part of the volume; it is zero where the law is not split.
+    fn moduli<L: Lane>(constants: &[L; K]) -> (L, L);
     /// Whether s is a number times the unit tensor, so that its other entries need no arithmetic.
     const ROUND: bool = false;
 }
@@ -118,8 +118,8 @@ impl Constitutive<2> for NeoHookean {
     }
 
     #[inline(always)]
-    fn bulk<L: Lane>(constants: &[L; 2]) -> L {
-        constants[1]
+    fn moduli<L: Lane>(constants: &[L; 2]) -> (L, L) {
+        (constants[0], constants[1])
     }
 }
 
@@ -139,8 +139,8 @@ impl Constitutive<2> for StVenantKirchhoff {
     }
 
     #[inline(always)]
-    fn bulk<L: Lane>(_: &[L; 2]) -> L {
-        L::splat(0.0)
+    fn moduli<L: Lane>(constants: &[L; 2]) -> (L, L) {
+        (constants[0] + constants[1], L::splat(0.0))
     }
 }
 
@@ -172,8 +172,8 @@ impl Constitutive<3> for MooneyRivlin {
     }
 
     #[inline(always)]
-    fn bulk<L: Lane>(constants: &[L; 3]) -> L {
-        constants[2]
+    fn moduli<L: Lane>(constants: &[L; 3]) -> (L, L) {
+        ((constants[0] + constants[1]) * L::splat(2.0), constants[2])
     }
 }
 
@@ -194,8 +194,10 @@ impl Constitutive<5> for Ogden {
     }
 
     #[inline(always)]
-    fn bulk<L: Lane>(constants: &[L; 5]) -> L {
-        constants[4]
+    fn moduli<L: Lane>(constants: &[L; 5]) -> (L, L) {
+        let half = L::splat(0.5);
+        let term = |scale: L, alpha: L| scale * alpha * alpha * half;
+        (term(constants[0], constants[1]) + term(constants[2], constants[3]), constants[4])
     }
 }
 

@@ -9,7 +9,8 @@
 //! four passes: element forces, contact, node update, bookkeeping; no equation is solved.
 //!
 //! # Practice
-//! One step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms); a longer one is cut into substeps. Elements sit in blocks of sixteen with one
+//! One step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms); a longer one is cut into substeps, and so is one that
+//! elements do not bear as they are deformed now. Elements sit in blocks of sixteen with one
 //! lane each; their forces are kept and gathered per node in a fixed order, so the same input gives the same bytes on every machine and with
 //! every kernel. A step neither allocates, locks, waits nor panics.
 //!
@@ -44,6 +45,7 @@ mod layout;
 mod nodes;
 mod principal;
 mod relaxation;
+mod stiffness;
 mod tled;
 #[cfg(target_arch = "x86_64")]
 mod x86;

@@ -19,7 +19,17 @@ pub struct Tled {
     damping_per_ms: f32,
     max_displacement_mm: f32,
     held: bool,
+    stiffest_at_rest: f32,
+    /// Since the elements' forces were computed last, ms.
+    elapsed_ms: f32,
 }
+
+/// Share of the present bound that a substep may use.
+const BORNE: f32 = 0.95;
+/// Keeps rounding from adding a substep.
+const NEARLY: f32 = 1.0 - 1e-5;
+/// Most that the frequency of the stiffest element is taken to grow by; a state worse than that is on its way to be healed.
+const MOST_GAINED: f32 = 64.0;
 
 impl Tled {
     /// Takes a body at rest: orders it for the cache, precomputes gradients, finds the stable step and the damping.
@@ -28,10 +38,14 @@ impl Tled {
         config.check()?;
         let layout = Layout::of(&body.mesh);
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
+        let mut nodes = Nodes::of(body, &layout);
+        let mut elements = Elements::of(body, &layout, config.kernel, config.cure_locking, config.relaxation);
         Ok(Self {
             config: *config,
-            elements: Elements::of(body, &layout, config.kernel, config.cure_locking, config.relaxation),
-            nodes: Nodes::of(body, &layout),
+            stiffest_at_rest: elements.compute(&mut nodes.u, 0.0).stiffest,
+            elapsed_ms: 0.0,
+            elements,
+            nodes,
             bound_ms: power_bound_ms(body) as f32,
             damping_per_ms: damping_rate(body, config.damping, extent),
             max_displacement_mm: config.max_displacement * extent,
@@ -57,28 +71,27 @@ impl Tled {
         }
     }
 
+    /// Force that the support of a fixed node exerts on it, N, as of the last step; at a free node the force that accelerates it, reversed.
+    pub fn support_force(&self, node: u32) -> Vec3 {
+        self.place_of.get(node as usize).map_or(Vec3::ZERO, |&place| -Vec3::from(self.elements.force(place as usize)))
+    }
+
     /// Puts every node back to its rest position, at rest, and forgets past stress.
     pub fn reset(&mut self) {
         (0..self.place_of.len()).for_each(|place| self.nodes.set(place, Vec3::ZERO, Vec3::ZERO));
         self.elements.forget();
+        self.elapsed_ms = 0.0;
     }
 
-    /// Into how many steps of what length `dt_ms` is cut.
-    fn cut(&self, dt_ms: f32) -> (u32, f32) {
-        let longest = self.stable_dt_ms();
-        let wanted = (dt_ms / longest * (1.0 - 1e-5)).ceil().max(1.0);
-        if self.config.substeps == 0 {
-            (1, dt_ms)
-        } else if wanted <= self.config.substeps as f32 {
-            (wanted as u32, dt_ms / wanted)
-        } else {
-            (self.config.substeps, longest)
-        }
-    }
-
-    fn substep(&mut self, loads: &Loads, dt_ms: f32, report: &mut StepReport) {
-        report.inverted += self.elements.compute(&mut self.nodes.u, dt_ms);
-        self.press(&loads.contact, dt_ms, report);
+    /// One substep of at most `left_ms`; gives its length. As long as the elements bear as they are now, and of equal lengths while that stays.
+    fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
+        let found = self.elements.compute(&mut self.nodes.u, self.elapsed_ms);
+        report.inverted = report.inverted.max(found.inverted);
+        let bound_ms = self.bound_now_ms(found.stiffest);
+        let longest = self.stable_dt_ms().min(BORNE * bound_ms);
+        let dt_ms =
+            if self.config.substeps == 0 { left_ms } else { left_ms / (left_ms / longest * NEARLY).ceil().max(1.0) };
+        self.press(&loads.contact, dt_ms, bound_ms, report);
         let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.nodes.rigid_motion());
         let update = Update {
             dt_ms,
@@ -89,13 +102,21 @@ impl Tled {
             rigid,
         };
         self.nodes.update(&self.elements, &update, report);
+        self.elapsed_ms = dt_ms;
+        dt_ms
     }
 
-    fn press(&mut self, contact: &NodalContact, dt_ms: f32, report: &mut StepReport) {
+    /// The stable bound as the elements are now: that of the rest state, shortened by what the stiffest element has gained.
+    fn bound_now_ms(&self, stiffest: f32) -> f32 {
+        let gained = (stiffest / self.stiffest_at_rest).sqrt();
+        self.bound_ms / gained.clamp(1.0, MOST_GAINED)
+    }
+
+    fn press(&mut self, contact: &NodalContact, dt_ms: f32, bound_ms: f32, report: &mut StepReport) {
         let nodes = &mut self.nodes;
         let known = |values: &[Vec3], n: u32| values.get(n as usize).copied().unwrap_or_default();
         let place = |n: u32| self.place_of.get(n as usize).map(|&p| p as usize);
-        let omega2 = 4.0 / (self.bound_ms * self.bound_ms);
+        let omega2 = 4.0 / (bound_ms * bound_ms);
         let share = stable_share(contact, omega2, dt_ms, |n| place(n).map_or(0.0, |p| nodes.inverse_mass[p]));
         let mean = contact.mean(|n| known(&nodes.positions, n));
         let velocity = contact.mean(|n| known(&nodes.velocities, n));
@@ -115,13 +136,13 @@ impl Tled {
 
 impl SoftSolver for Tled {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
-        let (substeps, dt) = self.cut(dt_ms);
-        let skipped_ms = (dt_ms - substeps as f32 * dt).max(0.0);
-        let mut report =
-            StepReport { substeps, skipped_ms, contact_scale: 1.0, converged: true, ..StepReport::default() };
-        for _ in 0..substeps {
-            self.substep(loads, dt, &mut report);
+        let mut report = StepReport { contact_scale: 1.0, converged: true, ..StepReport::default() };
+        let mut left_ms = dt_ms.max(0.0);
+        while left_ms > 1e-5 * dt_ms && report.substeps < self.config.substeps.max(1) {
+            left_ms -= self.substep(loads, left_ms, &mut report);
+            report.substeps += 1;
         }
+        report.skipped_ms = if left_ms > 1e-5 * dt_ms { left_ms } else { 0.0 };
         report
     }
 

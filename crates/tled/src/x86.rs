@@ -16,7 +16,7 @@
 )]
 
 use crate::block::{Quad, WIDTH};
-use crate::kernel::Pass;
+use crate::kernel::{Found, Pass};
 use crate::lane::{BIASED, FRACTION, Lane, ONE, ROOT_BITS, SIGN, WHOLE};
 use std::arch::x86_64::*;
 use std::mem::transmute;
@@ -41,10 +41,10 @@ pub(crate) fn has_avx512() -> bool {
 }
 
 /// A pass over some blocks, eight elements at once.
-pub(crate) fn avx2<P: Pass>(pass: &mut P) -> u32 {
+pub(crate) fn avx2<P: Pass>(pass: &mut P) -> Found {
     assert!(has_avx2());
     #[target_feature(enable = "avx2")]
-    fn run<P: Pass>(pass: &mut P) -> u32 {
+    fn run<P: Pass>(pass: &mut P) -> Found {
         pass.run::<Ymm>()
     }
     // SAFETY: the CPU has AVX2, asserted above.
@@ -52,10 +52,10 @@ pub(crate) fn avx2<P: Pass>(pass: &mut P) -> u32 {
 }
 
 /// A pass over some blocks, sixteen elements at once.
-pub(crate) fn avx512<P: Pass>(pass: &mut P) -> u32 {
+pub(crate) fn avx512<P: Pass>(pass: &mut P) -> Found {
     assert!(has_avx512());
     #[target_feature(enable = "avx512f")]
-    fn run<P: Pass>(pass: &mut P) -> u32 {
+    fn run<P: Pass>(pass: &mut P) -> Found {
         pass.run::<Zmm>()
     }
     // SAFETY: the CPU has AVX-512F, asserted above.
@@ -146,6 +146,12 @@ impl Lane for Ymm {
     fn at_least(self, floor: f32) -> Self {
         // SAFETY: called only inside the AVX2 kernel. The second operand wins over NaN.
         Self(unsafe { _mm256_max_ps(self.0, _mm256_set1_ps(floor)) })
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        // SAFETY: called only inside the AVX2 kernel. The second operand wins over NaN.
+        Self(unsafe { _mm256_max_ps(self.0, other.0) })
     }
 
     #[inline(always)]
@@ -292,6 +298,12 @@ impl Lane for Zmm {
     fn at_least(self, floor: f32) -> Self {
         // SAFETY: called only inside the AVX-512 kernel. The second operand wins over NaN.
         Self(unsafe { _mm512_max_ps(self.0, _mm512_set1_ps(floor)) })
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        // SAFETY: called only inside the AVX-512 kernel. The second operand wins over NaN.
+        Self(unsafe { _mm512_max_ps(self.0, other.0) })
     }
 
     #[inline(always)]

@@ -1,0 +1,113 @@
+//! Every material against the f64 reference, relaxation against its curve, and locking with and without its cure.
+
+use glam::{Quat, Vec3};
+use trepan_contact::NodalContact;
+use trepan_soft::reference::{self, Reference};
+use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+use trepan_tled::{Config, Relaxation, Tled};
+
+fn materials() -> [Material; 4] {
+    [
+        Material::BRAIN,
+        Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 },
+        Material::MooneyRivlin { c10_mpa: 3e-4, c01_mpa: 2e-4, poisson: 0.45, density_g_mm3: 1e-3 },
+        Material::BRAIN_OGDEN,
+    ]
+}
+
+fn distance(a: &[Vec3], b: &[Vec3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
+}
+
+#[test]
+fn every_material_settles_where_the_static_reference_is() {
+    for material in materials() {
+        let mesh = boxes::split_box([4, 4, 4], Vec3::splat(40.0));
+        let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0);
+        let body = Body { mesh, fixed, material };
+        let mut contact = NodalContact::none();
+        boxes::nodes_where(&body.mesh, |p| p.z > 39.0 && p.x < 31.0).iter().for_each(|&n| contact.add(n, 1.0));
+        contact.normalise();
+        (contact.normal, contact.offset_mm, contact.stiffness) = (Vec3::Z, 3.0 - 40.0, 0.5);
+        let loads = Loads { gravity: Vec3::X * 2e-3, contact };
+        let mut exact = Reference::new(&body, &reference::Config::default()).unwrap();
+        let report = exact.step(&loads, 1.0);
+        assert!(report.converged, "{material:?} {report:?}");
+        let mut tled = Tled::new(&body, &Config::default()).unwrap();
+        let dt = tled.stable_dt_ms();
+        for i in 0..(1500.0 / dt) as usize {
+            // Slowly: St. Venant-Kirchhoff snaps through when an element is hit down to 0.6 of its height.
+            let mut now = loads;
+            now.contact.offset_mm = -40.0 + (0.01 * dt * i as f32).min(3.0);
+            tled.step(&now, dt);
+        }
+        let moved = distance(exact.positions(), &body.mesh.positions);
+        let error = distance(exact.positions(), tled.positions());
+        assert!(moved > 2.0 && error < 2e-3 * moved, "{material:?}: moved {moved} mm, error {error} mm");
+    }
+}
+
+/// Force on the top of a block sheared by a fifth, every quarter of a ms, the block turned by `turn` after 20 ms.
+fn sheared(material: Material, relaxation: Relaxation, turn: Quat) -> Vec<f32> {
+    let mesh = boxes::split_box([2, 2, 2], Vec3::splat(10.0));
+    let body = Body { fixed: (0..27).collect(), mesh, material };
+    let mut tled = Tled::new(&body, &Config { relaxation, ..Config::default() }).expect("a sound body");
+    let top = boxes::nodes_where(&body.mesh, |p| p.z > 9.0);
+    let place = |tled: &mut Tled, turn: Quat| {
+        for (n, p) in body.mesh.positions.iter().enumerate() {
+            tled.set_node(n as u32, turn * (*p + Vec3::X * (0.2 * p.z)) - *p, Vec3::ZERO);
+        }
+    };
+    place(&mut tled, Quat::IDENTITY);
+    let step = |t: usize| {
+        if t == 80 {
+            place(&mut tled, turn);
+        }
+        assert_eq!(tled.step(&Loads::default(), 0.25).substeps, 1);
+        top.iter().map(|&n| tled.support_force(n)).sum::<Vec3>().dot(if t < 80 { Vec3::X } else { turn * Vec3::X })
+    };
+    (0..240).map(step).collect()
+}
+
+#[test]
+fn a_held_shear_relaxes_along_the_curve_whatever_way_it_is_turned() {
+    let relaxation = Relaxation { share: [0.4, 0.3], time_ms: [5.0, 40.0] };
+    for material in materials() {
+        let elastic = sheared(material, Relaxation::NONE, Quat::IDENTITY);
+        for turn in [Quat::IDENTITY, Quat::from_rotation_y(1.0)] {
+            for (t, force) in sheared(material, relaxation, turn).into_iter().enumerate() {
+                let ms = 0.25 * t as f32;
+                let left = 1.0 - 0.4 * (1.0 - (-ms / 5.0).exp()) - 0.3 * (1.0 - (-ms / 40.0).exp());
+                let ratio = force / elastic[0];
+                assert!((ratio - left).abs() < 0.01, "{material:?}: {ratio} after {ms} ms, the curve says {left}");
+            }
+        }
+    }
+}
+
+/// Force that presses a 100 mm cube of 8³ cells down by a fifth, ends clamped.
+fn pressed(poisson: f32, cure_locking: bool) -> f32 {
+    let mesh = boxes::split_box([8, 8, 8], Vec3::splat(100.0));
+    let ends = boxes::nodes_where(&mesh, |p| p.z < 1.0 || p.z > 99.0);
+    let top = boxes::nodes_where(&mesh, |p| p.z > 99.0);
+    let material = Material::NeoHookean { young_mpa: 0.003, poisson, density_g_mm3: 1e-3 };
+    let body = Body { fixed: ends, mesh, material };
+    let mut tled = Tled::new(&body, &Config { cure_locking, ..Config::default() }).expect("a sound body");
+    for (n, p) in body.mesh.positions.iter().enumerate() {
+        tled.set_node(n as u32, Vec3::NEG_Z * (0.2 * p.z), Vec3::ZERO);
+    }
+    let dt = tled.stable_dt_ms();
+    (0..(500.0 / dt) as usize).for_each(|_| _ = tled.step(&Loads::default(), dt));
+    -top.iter().map(|&n| tled.support_force(n).z).sum::<f32>()
+}
+
+#[test]
+fn the_plain_element_is_the_independent_codes_and_the_cured_one_does_not_lock() {
+    // scikit-fem, same cells: linear tetrahedra 9.961 N (ν 0.45) and 12.905 N (0.49); quadratic ones, finest, 9.117 and 9.667 N.
+    let (plain_45, plain_49) = (pressed(0.45, false), pressed(0.49, false));
+    assert!((plain_45 / 9.961 - 1.0).abs() < 0.02 && (plain_49 / 12.905 - 1.0).abs() < 0.02, "{plain_45} {plain_49}");
+    let (cured_45, cured_49) = (pressed(0.45, true), pressed(0.49, true));
+    println!("{plain_45} {cured_45} {plain_49} {cured_49}");
+    assert!((cured_45 / 9.117 - 1.0).abs() < 0.05 && (cured_49 / 9.667 - 1.0).abs() < 0.07, "{cured_45} {cured_49}");
+    assert!(plain_49 / 9.667 > 1.25, "the plain element must be seen to lock");
+}
