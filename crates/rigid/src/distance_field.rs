@@ -119,6 +119,8 @@ struct Known {
     fresh: bool,
     /// Grid point around which they were gathered.
     centre: Vec3,
+    /// How far from there they are good for, voxels.
+    ahead: f32,
     /// Whether the ball was clear of bone there, so that nothing needs to be looked for inside it.
     clear: bool,
 }
@@ -203,10 +205,12 @@ impl DistanceField {
 
     /// Makes sure that all discs in reach of the ball at grid point `at` are known; false when the ball is too large for that.
     fn know(&mut self, bone: &BoneVolume, at: Vec3, out: &mut RigidStep) -> bool {
-        let (reach, ahead) = (self.config.move_voxels, self.config.ahead_voxels);
-        if self.known.fresh && at.distance(self.known.centre) <= ahead {
+        let reach = self.config.move_voxels;
+        if self.known.fresh && at.distance(self.known.centre) <= self.known.ahead {
             return true;
         }
+        // While bone goes away the discs are out of date in the next tick, so none are gathered ahead.
+        let ahead = if self.bite_mm > 0.0 { 0.0 } else { self.config.ahead_voxels };
         let radius = self.tool.tip_radius_mm / bone.spacing_mm();
         let far = radius + reach + ahead + self.config.disc_voxels;
         let Some(read) = self.window.cover(bone, at.round().as_ivec3(), far.ceil() as i32 + 3) else {
@@ -215,7 +219,7 @@ impl DistanceField {
         };
         let hollow = if self.known.clear { radius - ahead - 1.0 } else { 0.0 };
         self.discs.gather(&self.window, at, hollow, far);
-        self.known = Known { fresh: true, centre: at, clear: self.known.clear };
+        self.known = Known { fresh: true, centre: at, ahead, clear: self.known.clear };
         out.voxels_swept += read + self.discs.visited;
         out.fallbacks += u32::from(self.discs.overflow > 0);
         true
@@ -268,7 +272,11 @@ impl RigidContact for DistanceField {
         if works {
             let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
             let depth_mm = device.distance(proxy) + self.bite_mm;
-            out.removed_mm3 = self.burr.cut(bone, &Cut { device, proxy, radius_mm, depth_mm, dt_ms });
+            let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms };
+            if self.discs.list().is_empty() {
+                return;
+            }
+            out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| self.window.hu(voxel));
             for voxel in self.burr.bitten() {
                 self.window.set(voxel, bone.hu(voxel));
                 self.known.fresh = false;

@@ -43,6 +43,7 @@ pub mod distance_field;
 mod half_spaces;
 mod method;
 pub mod removal;
+mod rows;
 mod seam;
 mod surface;
 mod sweep;

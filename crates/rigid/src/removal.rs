@@ -10,7 +10,7 @@
 //! u grows with density as `(hu + 1000) / 2500`, so that a thin diploë goes faster than the tables. Over dt the volume is V̇ dt, whatever the
 //! tick rate.
 //!
-//! The burr's ball bounds the removal. With s the distance of a voxel from the ball's surface, in voxels, positive outside, no voxel
+//! The burr's ball, swept from the proxy to the device, bounds the removal. With s the distance of a voxel from its surface, in voxels, positive outside, no voxel
 //! falls below `iso + 1000 s`: its centre leaves the bone only once it is inside the ball, and the crossing between voxels
 //! ends on the ball itself. So the cut surface is smooth below the size of a voxel.
 //!
@@ -33,6 +33,7 @@
 //! # When not to use it
 //! `per-tick` for anything but comparison: it removes twice as much at twice the tick rate, and nothing physical drives it.
 
+use crate::rows::{GridBall, rows};
 use glam::IVec3;
 use trepan_geometry::Vec3;
 use trepan_volume::{AIR_HU, BoneVolume};
@@ -156,12 +157,14 @@ impl Burr {
     }
 
     /// Takes bone away and returns how much, mm³.
-    pub fn cut(&mut self, bone: &BoneVolume, cut: &Cut) -> f32 {
+    ///
+    /// `read` gives densities: the bone's, or those of a copy of it.
+    pub fn cut(&mut self, bone: &BoneVolume, cut: &Cut, read: impl Fn(IVec3) -> i16) -> f32 {
         let sound = cut.depth_mm.is_finite() && cut.dt_ms.is_finite();
         if !sound || cut.depth_mm <= 0.0 || cut.dt_ms <= 0.0 {
             return 0.0;
         }
-        self.find_bites(bone, cut);
+        self.find_bites(bone, cut, read);
         let fraction = match self.law {
             Law::PerTick { decrement_hu } => {
                 return self.take(bone, |bite| decrement_hu * f32::from(bite.reach_hu > 0.0));
@@ -190,38 +193,34 @@ impl Burr {
     /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device, or on its surface.
     ///
     /// The ball of the device alone would miss the flanks that hold a proxy far behind: the burr would stall.
-    fn find_bites(&mut self, bone: &BoneVolume, cut: &Cut) {
+    fn find_bites(&mut self, bone: &BoneVolume, cut: &Cut, read: impl Fn(IVec3) -> i16) {
         self.bites.clear();
-        let spacing = bone.spacing_mm();
         let (device, proxy) = (bone.grid_of(cut.device), bone.grid_of(cut.proxy));
-        let radius = cut.radius_mm / spacing;
-        let along = device - proxy;
-        let per_length = along.length_squared().recip();
-        let low = (device.min(proxy) - radius - 1.0).max(proxy - radius - BITE_VOXELS).ceil().as_ivec3();
-        let high = (device.max(proxy) + radius + 1.0).min(proxy + radius + BITE_VOXELS).floor().as_ivec3();
-        for k in low.z..=high.z {
-            for j in low.y..=high.y {
-                for i in low.x..=high.x {
-                    let voxel = IVec3::new(i, j, k);
-                    let from_proxy = voxel.as_vec3() - proxy;
-                    let share = (from_proxy.dot(along) * per_length).clamp(0.0, 1.0);
-                    let outside = from_proxy.distance(share * along) - radius;
+        let radius = cut.radius_mm / bone.spacing_mm();
+        let way = device - proxy;
+        let (forward, length) = (way.normalize_or_zero(), way.length());
+        let iso = f32::from(bone.isovalue());
+        // Within the proxy there is air, but for the foot of the ramp.
+        let ball = GridBall { centre: proxy, radius: radius + BITE_VOXELS };
+        let hole = GridBall { centre: proxy, radius: radius - 2.0 };
+        rows(ball, hole, |start, to| {
+            for x in start.x..=to {
+                let voxel = start.with_x(x);
+                let from_proxy = voxel.as_vec3() - proxy;
+                let along = from_proxy.dot(forward);
+                let hu = if along < -1.0 { AIR_HU } else { read(voxel) };
+                if hu == AIR_HU || self.bites.len() == self.limit {
+                    continue;
+                }
+                let outside = from_proxy.distance(along.clamp(0.0, length) * forward) - radius;
+                let floor_hu = (iso + RAMP_HU * outside).max(f32::from(AIR_HU));
+                if outside < 1.0 && f32::from(hu) > floor_hu {
                     let ahead = from_proxy.length() - radius;
-                    if outside < 1.0 && ahead < BITE_VOXELS && self.bites.len() < self.limit {
-                        self.add_bite(bone, voxel, outside, ahead);
-                    }
+                    let near = ((BITE_VOXELS - ahead) / BITE_VOXELS).clamp(0.0, 1.0);
+                    self.bites.push(Bite { voxel, hu, reach_hu: near * (f32::from(hu) - floor_hu), floor_hu });
                 }
             }
-        }
-    }
-
-    fn add_bite(&mut self, bone: &BoneVolume, voxel: IVec3, outside: f32, ahead: f32) {
-        let hu = bone.hu(voxel);
-        let floor_hu = (f32::from(bone.isovalue()) + RAMP_HU * outside).max(f32::from(AIR_HU));
-        if f32::from(hu) > floor_hu {
-            let near = ((BITE_VOXELS - ahead) / BITE_VOXELS).clamp(0.0, 1.0);
-            self.bites.push(Bite { voxel, hu, reach_hu: near * (f32::from(hu) - floor_hu), floor_hu });
-        }
+        });
     }
 
     /// Lowers each bite's density by `loss` HU, not below its floor, and returns the volume, mm³.

@@ -18,6 +18,7 @@
 //! Lengths are voxels, in a frame shifted to a whole voxel near the tool ([`Discs::base`]). The cost is one load per voxel
 //! visited, six per bone voxel, 27 per disc: 3 to 20 us for a ball of 12 voxels. The capacity is fixed; what does not fit is counted.
 
+use crate::rows::{GridBall, rows};
 use crate::window::Window;
 use glam::IVec3;
 use trepan_geometry::Vec3;
@@ -83,27 +84,10 @@ impl Discs {
         self.base = at.round().as_ivec3();
         let centre = at - self.base.as_vec3();
         // A bone voxel is up to one voxel behind its crossing.
-        let (hollow, outer) = ((hollow - 1.0).max(0.0), reach + 1.0);
-        let n = outer.ceil() as i32;
-        for k in -n..=n {
-            for j in -n..=n {
-                let across = (j as f32 - centre.y).powi(2) + (k as f32 - centre.z).powi(2);
-                let half = outer * outer - across;
-                if half < 0.0 {
-                    continue;
-                }
-                let half = half.sqrt();
-                let hole = (hollow * hollow - across).max(0.0).sqrt();
-                let (from, to) = ((centre.x - half).ceil() as i32, (centre.x + half).floor() as i32);
-                let (skip_from, skip_to) = ((centre.x - hole).ceil() as i32, (centre.x + hole).floor() as i32);
-                if hole > 0.0 && skip_from <= skip_to {
-                    self.row(window, IVec3::new(from, j, k), skip_from - 1, centre, reach);
-                    self.row(window, IVec3::new(skip_to + 1, j, k), to, centre, reach);
-                } else {
-                    self.row(window, IVec3::new(from, j, k), to, centre, reach);
-                }
-            }
-        }
+        let (hollow, outer) = (hollow - 1.0, reach + 1.0);
+        rows(GridBall { centre, radius: outer }, GridBall { centre, radius: hollow }, |start, to| {
+            self.row(window, start, to, centre, reach);
+        });
     }
 
     /// The voxels of one row, from `start` to x = `to`.

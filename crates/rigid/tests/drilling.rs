@@ -31,11 +31,12 @@ fn the_volume_does_not_depend_on_the_tick_rate() {
 
 #[test]
 fn the_volume_is_what_the_law_says() {
-    // Within bone of one density; the scene's bone is 1400 HU, 0.96 of the reference.
-    let law = Law::RATE.volume_mm3(2.0, 0.75, 1500.0) / 0.96;
+    // The scene's bone is 1400 HU, 0.96 of the reference; the burr at work sits another 0.15 voxel deeper. Near its surface and at the
+    // foot of the cut there is less than full density, so that somewhat more volume goes than the law gives for whole bone.
+    let law = Law::RATE.volume_mm3(2.0, 0.75 + 0.075, 1500.0) / 0.96;
     let volume = pressed(1.0, 1500.0, 1.5);
     println!("law {law} removed {volume}");
-    assert!((volume / law - 1.0).abs() < 0.2, "law {law} mm³, removed {volume} mm³");
+    assert!((volume / law - 1.0).abs() < 0.15, "law {law} mm³, removed {volume} mm³");
 }
 
 #[test]
