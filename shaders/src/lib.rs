@@ -21,3 +21,5 @@ pub const RENDER_LIGHT: &str = picture!("bricks.wgsl", "light.wgsl");
 pub const RENDER_SLICE: &str = picture!("slice.wgsl");
 /// The brain's outline in a slice.
 pub const RENDER_CONTOUR: &str = picture!("contour.wgsl");
+/// A coarser 3-D view, enlarged.
+pub const RENDER_ENLARGE: &str = picture!("enlarge.wgsl");

@@ -1,9 +1,9 @@
 //! What a picture is made of: the scene that stays and the frame that changes.
 
 use crate::Camera;
-use glam::Vec3;
+use glam::{IVec3, Vec3};
 use std::sync::Arc;
-use trepan_geometry::{Pose, Tool};
+use trepan_geometry::{Aabb, Pose, Tool};
 use trepan_mesh::TetMesh;
 use trepan_volume::{BoneVolume, VoxelVolume};
 
@@ -16,6 +16,14 @@ pub struct SceneData<'a> {
     pub brain: Option<&'a TetMesh>,
     /// The MRI in patient space, any range.
     pub mri: Option<&'a VoxelVolume<f32>>,
+}
+
+impl SceneData<'_> {
+    /// From the centre of the first voxel to that of the last, world mm.
+    pub fn bounds(&self) -> Aabb {
+        let last = IVec3::from(self.bone.dims().map(|n| n as i32 - 1));
+        Aabb { min: self.bone.origin(), max: self.bone.centre_of(last) }
+    }
 }
 
 /// What one picture shows.

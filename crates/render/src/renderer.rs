@@ -3,31 +3,32 @@
 use crate::RenderError;
 use crate::brain::Brain;
 use crate::camera::View;
+use crate::canvas::{Canvas, Division, Passes};
 use crate::contour::Contour;
+use crate::enlarge::Enlarge;
 use crate::frame::{Frame, SceneData};
 use crate::image::Image;
 use crate::layout::Layout;
-use crate::light::{Inputs, Light};
+use crate::light::Light;
 use crate::mri::Mri;
 use crate::scene::Scene;
 use crate::skull::{NOTHING, Skull};
 use crate::slice::{Plane, Slices};
 use glam::Vec3;
 use trepan_geometry::Aabb;
-use trepan_gpu::{Bindings, Buffer, DrawTarget, Format, Gpu, PassTime, Recorder, Target, Texture, TextureSpec, Timer};
+use trepan_gpu::{Buffer, DrawTarget, Gpu, PassTime, Recorder, Target, Texture, Timer};
 
 /// Changed bricks that one picture takes over, by default: 1 MiB of densities.
 pub const BRICKS_PER_FRAME: usize = 1024;
+
+/// Least share of the 3-D view's pixels along an edge.
+const LEAST_DETAIL: f32 = 0.05;
 
 /// Draws pictures of one scene into a texture.
 #[derive(Debug)]
 pub struct Renderer {
     gpu: Gpu,
-    scene: Buffer<Scene>,
-    skull: Skull,
-    brain: Option<Brain>,
-    mri: Mri,
-    light: Light,
+    passes: Passes,
     slices: Slices,
     contour: Option<Contour>,
     canvas: Canvas,
@@ -50,62 +51,44 @@ pub struct DrawReport {
     pub lines_left: u32,
 }
 
-/// What one size of picture needs.
-#[derive(Debug)]
-struct Canvas {
-    layout: Layout,
-    picture: Texture,
-    skull_hit: Texture,
-    brain_hit: Texture,
-    brain_rest: Texture,
-    depth: Texture,
-    skull: Bindings,
-    light: Bindings,
-    brain: Option<Bindings>,
-}
-
 impl Renderer {
     /// Loads a scene for pictures of `size` pixels, width and height.
     pub fn new(gpu: &Gpu, data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
-        let scene = Buffer::zeroed(gpu, "scene", 1)?;
-        let skull = Skull::new(gpu, data.bone.clone())?;
-        let brain = data.brain.map(|mesh| Brain::new(gpu, mesh)).transpose()?;
-        let mri = Mri::new(gpu, data.mri)?;
-        let light = Light::new(gpu)?;
-        let slices = Slices::new(gpu, &scene, &skull.density, &mri.texture)?;
-        let contour = brain.is_some().then(|| Contour::new(gpu, &scene, Vec3::new(1.0, 0.45, 0.55))).transpose()?;
-        let last = glam::IVec3::from(data.bone.dims().map(|n| n as i32 - 1));
-        let bounds = Aabb { min: data.bone.origin(), max: data.bone.centre_of(last) };
-        let canvas = Canvas::new(gpu, size, true, &scene, &skull, brain.as_ref(), &mri, &light)?;
-        let timer = Timer::new(gpu, 16)?;
+        let passes = Passes {
+            scene: Buffer::zeroed(gpu, "scene", 1)?,
+            skull: Skull::new(gpu, data.bone.clone())?,
+            brain: data.brain.map(|mesh| Brain::new(gpu, mesh)).transpose()?,
+            mri: Mri::new(gpu, data.mri)?,
+            light: Light::new(gpu)?,
+            enlarge: Enlarge::new(gpu)?,
+        };
+        let slices = Slices::new(gpu, &passes.scene, &passes.skull.density, &passes.mri.texture)?;
+        let outline = || Contour::new(gpu, &passes.scene, Vec3::new(1.0, 0.45, 0.55));
+        let contour = passes.brain.is_some().then(outline).transpose()?;
+        let canvas = Canvas::new(gpu, Division { size, slices: true, detail: 1.0 }, &passes)?;
         Ok(Self {
             gpu: gpu.clone(),
-            scene,
-            skull,
-            brain,
-            mri,
-            light,
+            bounds: data.bounds(),
+            passes,
             slices,
             contour,
             canvas,
-            bounds,
-            timer,
+            timer: Timer::new(gpu, 16)?,
             bricks_per_frame: BRICKS_PER_FRAME,
         })
     }
 
     /// Draws a picture; does not wait for the device.
     pub fn draw(&mut self, frame: &Frame) -> Result<DrawReport, RenderError> {
-        self.divide(self.size(), frame.slices.shown)?;
+        self.divide(Division { slices: frame.slices.shown, ..self.canvas.division })?;
         let view = self.view(frame);
-        let followed = self.skull.follow(&self.gpu, self.bricks_per_frame);
-        if let Some(brain) = &mut self.brain {
+        let followed = self.passes.skull.follow(&self.gpu, self.bricks_per_frame);
+        if let Some(brain) = &mut self.passes.brain {
             brain.follow(&self.gpu, frame.brain_positions)?;
         }
-        let [_, _, width, height] = self.canvas.layout.view;
-        let mri_from_world = self.mri.texture_from_world;
-        let scene = Scene::of(frame, &view, [width, height], &self.skull.grid, mri_from_world);
-        self.scene.write(&self.gpu, 0, &[scene]);
+        let mri_from_world = self.passes.mri.texture_from_world;
+        let scene = Scene::of(frame, &view, self.canvas.drawn, &self.passes.skull.grid, mri_from_world);
+        self.passes.scene.write(&self.gpu, 0, &[scene]);
         let lines_left = self.follow_slices(frame);
         let mut timer = self.timer.take();
         let gpu = self.gpu.clone();
@@ -119,21 +102,28 @@ impl Renderer {
 
     /// The bone, the brain and the tool.
     fn draw_view(&mut self, recorder: &mut Recorder, frame: &Frame, view: &View) -> u32 {
-        let canvas = &self.canvas;
-        match (&self.brain, &canvas.brain) {
+        let (canvas, passes) = (&self.canvas, &mut self.passes);
+        match (&passes.brain, &canvas.brain) {
             (Some(brain), Some(bindings)) if frame.show_brain => {
                 brain.draw(recorder, bindings, &canvas.brain_hit, &canvas.brain_rest, &canvas.depth);
             }
             _ => clear(recorder, &canvas.brain_hit, 0.0),
         }
         let pixels_cast = if frame.show_bone {
-            self.skull.cast(recorder, &canvas.skull, view, &canvas.skull_hit)
+            passes.skull.cast(recorder, &canvas.skull, view, &canvas.skull_hit)
         } else {
-            self.skull.forget();
+            passes.skull.forget();
             clear(recorder, &canvas.skull_hit, f64::from(NOTHING));
             0
         };
-        self.light.draw(recorder, &canvas.light, canvas.layout.view, &canvas.picture);
+        let area = canvas.layout.view;
+        match &canvas.coarse {
+            None => passes.light.draw(recorder, &canvas.light, area, &canvas.picture),
+            Some((coarse, bindings)) => {
+                passes.light.draw(recorder, &canvas.light, [0, 0, canvas.drawn[0], canvas.drawn[1]], coarse);
+                passes.enlarge.draw(recorder, bindings, area, &canvas.picture);
+            }
+        }
         pixels_cast
     }
 
@@ -151,7 +141,7 @@ impl Renderer {
         let planes =
             Plane::three(frame.world_from_tool.translation, self.bounds, frame.slices.half_height_mm, rectangles);
         self.slices.follow(&self.gpu, &planes, rectangles, &frame.slices);
-        match (&mut self.contour, &self.brain) {
+        match (&mut self.contour, &self.passes.brain) {
             (Some(contour), Some(brain)) => contour.follow(&self.gpu, &planes, brain.triangles()),
             _ => 0,
         }
@@ -159,15 +149,19 @@ impl Renderer {
 
     /// Changes the size of the pictures, width and height.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
-        self.divide(size, self.canvas.layout.slices.is_some())
+        self.divide(Division { size, ..self.canvas.division })
     }
 
-    fn divide(&mut self, [width, height]: [u32; 2], slices: bool) -> Result<(), RenderError> {
-        if self.size() != [width, height] || self.canvas.layout != Layout::of(width, height, slices) {
-            let (skull, brain) = (&self.skull, self.brain.as_ref());
-            self.canvas =
-                Canvas::new(&self.gpu, [width, height], slices, &self.scene, skull, brain, &self.mri, &self.light)?;
-            self.skull.forget();
+    /// Draws only a share of the 3-D view's pixels along an edge and enlarges them: 1 is all, 0.5 a quarter of them. Slices stay fine.
+    pub fn set_detail(&mut self, share: f32) -> Result<(), RenderError> {
+        let detail = if share.is_finite() { share.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
+        self.divide(Division { detail, ..self.canvas.division })
+    }
+
+    fn divide(&mut self, division: Division) -> Result<(), RenderError> {
+        if self.canvas.division != division {
+            self.canvas = Canvas::new(&self.gpu, division, &self.passes)?;
+            self.passes.skull.forget();
         }
         Ok(())
     }
@@ -179,8 +173,12 @@ impl Renderer {
 
     /// Pixels of the picture, width and height.
     pub fn size(&self) -> [u32; 2] {
-        let [width, height, _] = self.canvas.picture.size();
-        [width, height]
+        self.canvas.division.size
+    }
+
+    /// Pixels that the 3-D view is drawn with, width and height.
+    pub fn view_size(&self) -> [u32; 2] {
+        self.canvas.drawn
     }
 
     /// Which part of the picture is what.
@@ -205,7 +203,7 @@ impl Renderer {
         Ok(Image { width, height, rgba: self.canvas.picture.read::<u8>(&self.gpu)? })
     }
 
-    /// Waits for the newest picture and gives the bone at each pixel of its 3-D view, row by row.
+    /// Waits for the newest picture and gives the bone at each pixel of its 3-D view ([`view_size`](Self::view_size)), row by row.
     pub fn bone_hits(&self) -> Result<Vec<Option<Hit>>, RenderError> {
         let hits = self.canvas.skull_hit.read::<[f32; 4]>(&self.gpu)?;
         let hit = |h: [f32; 4]| (h[3] < NOTHING).then(|| Hit { distance_mm: h[3], normal: unfold([h[0], h[1]]) });
@@ -237,42 +235,4 @@ fn unfold([x, y]: [f32; 2]) -> Vec3 {
 fn clear(recorder: &mut Recorder, texture: &Texture, value: f64) {
     let colours = [Target { texture, clear: Some([0.0, 0.0, 0.0, value]) }];
     recorder.draw("clear", &DrawTarget { colours: &colours, depth: None }, |_| ());
-}
-
-impl Canvas {
-    fn new(
-        gpu: &Gpu,
-        [width, height]: [u32; 2],
-        slices: bool,
-        scene: &Buffer<Scene>,
-        skull: &Skull,
-        brain: Option<&Brain>,
-        mri: &Mri,
-        light: &Light,
-    ) -> Result<Self, RenderError> {
-        if width == 0 || height == 0 {
-            return Err(RenderError::Size(width, height));
-        }
-        let layout = Layout::of(width, height, slices);
-        let sheet = |label, width, height, format| {
-            Texture::new(gpu, &TextureSpec { label, size: [width, height, 1], volume: false, format, drawn_to: true })
-        };
-        let [_, _, w, h] = layout.view;
-        let skull_hit = sheet("skull hit", w, h, Format::Rgba32Float)?;
-        let brain_hit = sheet("brain hit", w, h, Format::Rgba32Float)?;
-        let brain_rest = sheet("brain rest", w, h, Format::Rgba16Float)?;
-        let inputs =
-            Inputs { skull_hit: &skull_hit, brain_hit: &brain_hit, brain_rest: &brain_rest, mri: &mri.texture, skull };
-        Ok(Self {
-            layout,
-            picture: sheet("picture", width, height, Format::Rgba8Unorm)?,
-            depth: sheet("depth", w, h, Format::Depth32Float)?,
-            skull: skull.bind(gpu, scene)?,
-            light: light.bind(gpu, scene, &inputs)?,
-            brain: brain.map(|b| b.bind(gpu, scene)).transpose()?,
-            skull_hit,
-            brain_hit,
-            brain_rest,
-        })
-    }
 }

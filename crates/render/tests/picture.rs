@@ -176,3 +176,25 @@ fn the_same_frame_gives_the_same_bytes() {
     assert_eq!(draw(), draw());
     assert_eq!(gpu.faults(), Faults::default());
 }
+
+#[test]
+fn a_coarser_view_looks_like_the_fine_one_and_leaves_the_slices_alone() {
+    let Some(gpu) = device() else { return };
+    let ball = bone(40, |p| p.length() - 12.0);
+    let mut renderer = renderer(&gpu, &ball, [240, 180]);
+    let frame = Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0), 90.0));
+    let fine = picture(&mut renderer, &frame);
+    renderer.set_detail(0.5).expect("half the detail");
+    let coarse = picture(&mut renderer, &frame);
+    let [_, _, width, height] = renderer.layout().view;
+    assert_eq!(renderer.view_size(), [width / 2, height / 2]);
+    let difference = |x: u32, y: u32| i32::from(fine.pixel(x, y)[1]).abs_diff(i32::from(coarse.pixel(x, y)[1]));
+    let mean = |columns: std::ops::Range<u32>| {
+        let count = columns.len() as u32 * 180;
+        columns.flat_map(|x| (0..180).map(move |y| (x, y))).map(|(x, y)| difference(x, y)).sum::<u32>() as f32
+            / count as f32
+    };
+    assert!((0.05..4.0).contains(&mean(0..width)), "mean difference {}", mean(0..width));
+    assert_eq!(mean(width..240), 0.0);
+    assert_eq!(gpu.faults(), Faults::default());
+}

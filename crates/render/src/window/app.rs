@@ -74,9 +74,11 @@ impl<S: Session> Window<S> {
         let now = ui.input(|i| i.time);
         self.quality.note(now - self.drawn_at);
         self.drawn_at = now;
-        let scale = ui.ctx().pixels_per_point() * self.quality.scale();
+        let scale = ui.ctx().pixels_per_point();
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
-        let drawn = shared.renderer.resize(pixels).and_then(|()| {
+        let detail = self.quality.detail();
+        let sized = shared.renderer.set_detail(detail).and_then(|()| shared.renderer.resize(pixels));
+        let drawn = sized.and_then(|()| {
             let frame = shared.session.frame(self.hand.camera);
             let view = shared.renderer.view(&frame);
             shared.renderer.draw(&frame).map(|_| view)

@@ -1,7 +1,7 @@
 //! Picture quality that follows the time a picture takes: coarser when the hand waits for the eye, finer when there is time.
 
-/// Shares of the window's pixels along an edge.
-const SCALES: [f32; 5] = [1.0, 0.75, 0.55, 0.4, 0.3];
+/// Shares of the 3-D view's pixels along an edge.
+const DETAILS: [f32; 5] = [1.0, 0.75, 0.55, 0.4, 0.3];
 
 /// A picture slower than this is too slow, s.
 const SLOW_S: f64 = 0.110;
@@ -34,16 +34,16 @@ impl Quality {
         self.slow = if seconds > SLOW_S { self.slow + 1 } else { 0 };
         self.fast = if seconds < FAST_S { self.fast + 1 } else { 0 };
         let step = match () {
-            () if self.slow >= PATIENCE_SLOW => (self.step + 1).min(SCALES.len() - 1),
+            () if self.slow >= PATIENCE_SLOW => (self.step + 1).min(DETAILS.len() - 1),
             () if self.fast >= PATIENCE_FAST => self.step.saturating_sub(1),
             () => return,
         };
         *self = Self { step, ..Self::default() };
     }
 
-    /// Share of the window's pixels along an edge.
-    pub fn scale(&self) -> f32 {
-        SCALES[self.step]
+    /// Share of the 3-D view's pixels along an edge.
+    pub fn detail(&self) -> f32 {
+        DETAILS[self.step]
     }
 }
 
@@ -51,13 +51,13 @@ impl Quality {
 mod tests {
     use super::*;
 
-    /// Scale after some pictures whose time is `full` seconds at the finest and falls with the number of pixels.
+    /// Detail after some pictures whose time is `full` seconds at the finest and falls with the number of pixels.
     fn settled(full: f64, pictures: u32) -> f32 {
         let mut quality = Quality::new(false);
         for _ in 0..pictures {
-            quality.note(full * f64::from(quality.scale().powi(2)));
+            quality.note(full * f64::from(quality.detail().powi(2)));
         }
-        quality.scale()
+        quality.detail()
     }
 
     #[test]
@@ -71,12 +71,12 @@ mod tests {
     #[test]
     fn one_slow_picture_changes_nothing_and_rest_brings_the_finest_back() {
         let mut quality = Quality::new(true);
-        let start = quality.scale();
+        let start = quality.detail();
         quality.note(1.0);
         quality.note(0.08);
         quality.note(1.0);
-        assert_eq!(quality.scale(), start);
+        assert_eq!(quality.detail(), start);
         (0..200).for_each(|_| quality.note(0.033));
-        assert_eq!(quality.scale(), 1.0);
+        assert_eq!(quality.detail(), 1.0);
     }
 }
