@@ -4,8 +4,8 @@
 //! One topic per record type in Trepan's own protobuf schemas (`/tick`, `/collision`, `/solver`, `/event`), and
 //! `/tool` and `/log` in Foxglove's for viewers. Chunks are compressed with LZ4 and closed after [`MAX_CHUNK_BYTES`]
 //! or [`MAX_CHUNK_MS`] of session time, whichever comes first, then handed to the operating system: a killed process
-//! loses the open chunk only. 1 kHz of ticks costs about 0.2 MB/s. A write blocks for as long as the disk does, so a
-//! recorder lives on a thread of its own, behind [`crate::queue`].
+//! loses the open chunk only. A tick takes 2 µs and 80 to 250 B, but 5 ms when a chunk closes, or as long as the disk
+//! needs: a recorder lives on a thread of its own, behind [`crate::queue`].
 //!
 //! # Sources
 //! MCAP: <https://mcap.dev/spec>.

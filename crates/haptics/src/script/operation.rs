@@ -154,3 +154,28 @@ fn probe(site: &Site, plan: &Plan) -> Vec<Move> {
     moves.push(Move("leave", 8.0, -plan.away_mm, HANDS_OFF));
     moves
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_burr_spares_the_brain_and_makes_room_for_the_probe(bone_mm in 1.0f32..12.0, gap_mm in 0.0f32..8.0,
+                                                                  burr_radius_mm in 2.5f32..4.0) {
+            let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Z, bone_mm, brain_mm: bone_mm + gap_mm };
+            let plan = Plan { burr_radius_mm, probe_radius_mm: 0.6 * burr_radius_mm, ..Plan::default() };
+            let depth_mm = plan.burr_depth_mm(&site);
+            let into_brain_mm = depth_mm + burr_radius_mm - site.brain_mm;
+            prop_assert!(into_brain_mm <= plan.burr_overlap_mm + 1e-5);
+            prop_assert!(depth_mm <= bone_mm + plan.breakthrough_mm + 1e-5);
+            let short_mm = (bone_mm - depth_mm).max(0.0);
+            let hole_mm = (burr_radius_mm.powi(2) - short_mm.powi(2)).max(0.0).sqrt();
+            // With no gap at all the overlap is what limits the hole.
+            let limited = into_brain_mm > plan.burr_overlap_mm - 1e-4;
+            prop_assert!(limited || hole_mm > plan.probe_radius_mm, "hole of {} mm", hole_mm);
+            prop_assert!(hole_mm > 0.0, "no break-through");
+        }
+    }
+}
