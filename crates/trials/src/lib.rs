@@ -1,1 +1,18 @@
-//! Scenes with known truth, error measures, speed-accuracy rows and stability maps
+//! How right is each method, and what does it cost: scenes with known truth, rows, gates, charts.
+//!
+//! # Theory
+//! Methods never grade themselves. A suite puts every method of a family into the same scenes, measures error against a closed form or an f64
+//! oracle and cost in the same run, and charts one against the other. A method that another beats in both is not worth its code.
+//!
+//! # Practice
+//! `cargo xtask validate [SUITE] [--quick] [--shard I/N] [--out DIR]`. A suite gives `SUITE.json` and a section of `index.html`; a broken
+//! promise makes the command fail. Times are medians and quantiles of many calls; compare them only within one run.
+//!
+//! # When not to use it
+//! In an app or a simulator: nothing there may depend on it.
+
+pub mod front;
+pub mod page;
+pub mod suite;
+pub mod suites;
+pub mod timer;

@@ -1,0 +1,62 @@
+//! The suites, one file each; one list feeds the command line and the page.
+
+mod rigid;
+mod tled;
+mod voxel_size;
+
+use crate::suite::Findings;
+
+/// How much of a suite to run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scope {
+    /// Fewer and smaller scenes, for every day.
+    pub quick: bool,
+    /// This run's part of the rows, and of how many.
+    pub shard: (usize, usize),
+}
+
+impl Scope {
+    /// Whether the row of this number is this run's to make.
+    pub fn takes(&self, number: usize) -> bool {
+        number % self.shard.1 == self.shard.0
+    }
+
+    /// The first of two numbers in a quick run, else the second.
+    pub fn pick<T>(&self, quick: T, full: T) -> T {
+        if self.quick { quick } else { full }
+    }
+}
+
+/// A suite.
+pub struct Suite {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it asks.
+    pub question: &'static str,
+    /// The metrics of its chart: cost, then error.
+    pub chart: (&'static str, &'static str),
+    /// Runs it.
+    pub run: fn(Scope) -> Findings,
+}
+
+/// Every suite.
+pub const ALL: [Suite; 3] = [
+    Suite {
+        name: "rigid",
+        question: "how right is each way of touching voxel bone, and what does a tick cost",
+        chart: ("tick_p50_us", "depth_error_p95_voxel"),
+        run: rigid::run,
+    },
+    Suite {
+        name: "tled",
+        question: "how right is the brain's motion, and what does a step cost",
+        chart: ("step_p50_us", "displacement_error_percent"),
+        run: tled::run,
+    },
+    Suite {
+        name: "voxel-size",
+        question: "which voxel edge makes collision cheapest, and what does a wrong guess cost",
+        chart: ("cost_us", "regret_percent"),
+        run: voxel_size::run,
+    },
+];

@@ -1,0 +1,116 @@
+//! Soft-tissue solvers: a block of brain that hangs from one side under gravity, against the static f64 reference.
+
+use super::Scope;
+use crate::suite::{Findings, Gate, Row};
+use crate::timer::Samples;
+use trepan_geometry::{Vec3, units};
+use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes, linear, reference};
+use trepan_tled::{Config, Kernel, Tled};
+
+/// Edge of the block, mm.
+const BLOCK_MM: Vec3 = Vec3::new(60.0, 20.0, 20.0);
+/// Share of earth's gravity: enough for some mm of sag, little enough that all solvers converge.
+const GRAVITY_SHARE: f32 = 0.1;
+/// Time until the block rests, ms.
+const SETTLE_MS: f32 = 4000.0;
+
+/// Every solver on blocks of several sizes.
+pub fn run(scope: Scope) -> Findings {
+    let mut findings = Findings::default();
+    let cells = scope.pick(&[4usize, 6][..], &[4, 6, 8, 11, 16][..]);
+    for (number, &cells) in cells.iter().enumerate() {
+        if scope.takes(number) {
+            block(cells, scope, &mut findings);
+        }
+    }
+    for (number, &side) in scope.pick(&[10usize][..], &[10, 16, 24][..]).iter().enumerate() {
+        if scope.takes(number + cells.len()) {
+            kernels(side, scope, &mut findings);
+        }
+    }
+    findings
+}
+
+fn body(cells: usize) -> Body {
+    let mesh = boxes::split_box([3 * cells, cells, cells], BLOCK_MM);
+    let left = mesh.bounds().min.x + 1e-3;
+    let fixed = boxes::nodes_where(&mesh, |p| p.x < left);
+    let material = Material::NeoHookean { young_mpa: 0.003, poisson: 0.45, density_g_mm3: units::WATER_G_PER_MM3 };
+    Body { mesh, fixed, material }
+}
+
+/// The sag of every solver beside the reference's on the same mesh.
+fn block(cells: usize, scope: Scope, findings: &mut Findings) {
+    let body = body(cells);
+    let loads = Loads { gravity: Vec3::new(0.0, 0.0, -GRAVITY_SHARE * units::GRAVITY_MM_PER_MS2), ..Loads::default() };
+    let mut truth = reference::Reference::new(&body, &reference::Config::default()).expect("the block is held");
+    truth.step(&loads, 1.0);
+    let scene = format!("hanging block, {} tetrahedra", body.mesh.tets.len());
+    let tled = Tled::new(&body, &Config::default()).expect("the block is sound");
+    let rival = Method::Linear(linear::Config::default()).build(&body).expect("the block is sound");
+    let solvers: [(&str, Box<dyn SoftSolver>); 2] = [("tled", Box::new(tled)), ("linear", rival)];
+    for (name, mut solver) in solvers {
+        let dt_ms = solver.stable_dt_ms();
+        let steps = (SETTLE_MS / dt_ms) as usize;
+        let mut inverted = 0;
+        let times = Samples::of(steps, |_| inverted += solver.step(&loads, dt_ms).inverted);
+        let error = 100.0 * largest_difference(solver.positions(), truth.positions(), &body);
+        findings.rows.push(
+            Row::new(&scene, name)
+                .with("tets", body.mesh.tets.len())
+                .with("dt_ms", f64::from(dt_ms))
+                .metric("step_p50_us", times.quantile(0.5))
+                .metric("step_p99_us", times.quantile(0.99))
+                .metric("displacement_error_percent", error)
+                .metric("inverted_count", f64::from(inverted)),
+        );
+        if name == "tled" {
+            let limit = scope.pick(1.0, 1.0);
+            findings.gates.push(Gate::at_most(
+                format!("{scene}: TLED at rest against the reference, percent"),
+                error,
+                limit,
+            ));
+        }
+    }
+}
+
+/// Largest distance between two shapes over the largest displacement of the second.
+fn largest_difference(found: &[Vec3], truth: &[Vec3], body: &Body) -> f64 {
+    let largest = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| f64::from(a.distance(*b))).fold(0.0, f64::max);
+    largest(found, truth) / largest(truth, &body.mesh.positions)
+}
+
+/// The same step by every kernel, as a ratio to the scalar one in one run; all must give the same bytes.
+fn kernels(side: usize, scope: Scope, findings: &mut Findings) {
+    let mesh = boxes::split_box([side; 3], Vec3::splat(100.0));
+    let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
+    let body = Body { mesh, fixed, material: Material::BRAIN };
+    let loads = Loads { gravity: Vec3::new(0.0, 0.0, -units::GRAVITY_MM_PER_MS2), ..Loads::default() };
+    let scene = format!("cube, {} tetrahedra", body.mesh.tets.len());
+    let mut scalar_us = f64::NAN;
+    let mut bytes: Option<Vec<[u32; 3]>> = None;
+    for (name, kernel) in [("scalar", Kernel::Scalar), ("wide", Kernel::Wide), ("fastest", Kernel::Fastest)] {
+        let mut solver = Tled::new(&body, &Config { kernel, ..Config::default() }).expect("the cube is sound");
+        let dt_ms = solver.stable_dt_ms();
+        let times = Samples::of(scope.pick(60, 400), |_| {
+            solver.step(&loads, dt_ms);
+        });
+        let step_us = times.quantile(0.5);
+        scalar_us = if name == "scalar" { step_us } else { scalar_us };
+        let now: Vec<[u32; 3]> = solver.positions().iter().map(|p| p.to_array().map(f32::to_bits)).collect();
+        let same = bytes.get_or_insert_with(|| now.clone()) == &now;
+        findings.gates.push(Gate::at_least(
+            format!("{scene}: {name} gives the scalar kernel's bytes"),
+            f64::from(same),
+            1.0,
+        ));
+        findings.rows.push(
+            Row::new(&scene, name)
+                .with("tets", body.mesh.tets.len())
+                .metric("step_p50_us", step_us)
+                .metric("ns_per_tetrahedron", 1e3 * step_us / body.mesh.tets.len() as f64)
+                .metric("times_faster_than_scalar", scalar_us / step_us),
+        );
+    }
+}
