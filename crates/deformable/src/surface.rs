@@ -32,8 +32,6 @@ pub(crate) struct Foot {
     pub triangle: u32,
     /// The point on it, world mm.
     pub point: Vec3,
-    /// Its weights on the triangle's nodes.
-    pub weights: [f32; 3],
     /// How far away it is, squared, mm².
     pub distance2: f32,
 }
@@ -246,7 +244,7 @@ impl MovingSurface {
         let corners = self.corners(positions, t);
         let weights = triangle::closest_weights(corners, to);
         let point = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-        Foot { triangle: t, point, weights, distance2: point.distance_squared(to) }
+        Foot { triangle: t, point, distance2: point.distance_squared(to) }
     }
 
     fn triangles_of(&self, cluster: usize) -> core::ops::Range<u32> {

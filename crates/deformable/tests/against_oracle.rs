@@ -11,7 +11,9 @@ use trepan_mesh::TetMesh;
 /// Steps both methods over the same poses and meshes; every step must find the same number of points.
 fn same_points_as_oracle(method: Method, mesh: &TetMesh, radius: f32, poses: usize, jump: f32, seed: u64) {
     let tool = Tool::probe(radius);
-    let new = |method| TissueCollision::new(mesh, &tool, &Config { method, points: 60, ..Config::default() }).unwrap();
+    let new = |method| {
+        TissueCollision::new(mesh, &tool, &Config { method, points: 60, ..Config::default() }).expect("a sound config")
+    };
     let (mut tested, mut oracle) = (new(method), new(Method::Brute));
     let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
     let mut random = Random::new(seed);
@@ -80,8 +82,10 @@ fn degenerate_meshes_lose_nothing_and_give_no_nan() {
     let tool = Tool::probe(2.0);
     let still = vec![Vec3::ZERO; mesh.positions.len()];
     for method in complete() {
-        let new =
-            |m| TissueCollision::new(&mesh, &tool, &Config { method: m, points: 60, ..Config::default() }).unwrap();
+        let new = |m| {
+            TissueCollision::new(&mesh, &tool, &Config { method: m, points: 60, ..Config::default() })
+                .expect("a sound config")
+        };
         let (mut tested, mut oracle) = (new(method), new(Method::Brute));
         let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
         let mut random = Random::new(23);
@@ -113,7 +117,8 @@ fn the_thesis_never_sees_a_point_that_is_not_there() {
     let mesh = block([6, 5, 4], 5.0);
     let tool = Tool::probe(2.0);
     let still = vec![Vec3::ZERO; mesh.positions.len()];
-    let new = |method| TissueCollision::new(&mesh, &tool, &Config { method, ..Config::default() }).unwrap();
+    let new =
+        |method| TissueCollision::new(&mesh, &tool, &Config { method, ..Config::default() }).expect("a sound config");
     let (mut thesis, mut oracle) = (new(Method::Thesis), new(Method::Brute));
     let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
     let mut random = Random::new(29);
@@ -129,4 +134,50 @@ fn the_thesis_never_sees_a_point_that_is_not_there() {
             "two rings may miss points, not the contact"
         );
     }
+}
+
+/// A plate with more surface than is fitted in one step, waving and shaking: nothing is missed and nothing is stale.
+#[test]
+fn a_surface_too_large_to_fit_whole_at_every_step() {
+    let mesh = block([40, 40, 2], 4.0);
+    let tool = Tool::probe(2.0);
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    let new = |method| {
+        TissueCollision::new(&mesh, &tool, &Config { method, points: 60, ..Config::default() }).expect("a sound config")
+    };
+    let (mut walk, mut scan) = (new(Method::Walk), new(Method::Scan));
+    let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
+    let mut random = Random::new(31);
+    let mut tip = Vec3::new(80.0, 80.0, 9.0);
+    let mut touched = 0;
+    for step in 0..400 {
+        let positions = deformed(&mesh, 4.0, step as f32 * 0.02, &mut random);
+        let anywhere = Vec3::new(random.unit() * 160.0, random.unit() * 160.0, 8.0 + 4.0 * random.unit());
+        tip = if random.unit() < 0.1 { anywhere } else { tip + random.cube() * 0.5 };
+        let state = tool_at(tip, random.rotation());
+        walk.step(&positions, &still, &state, &mut found);
+        scan.step(&positions, &still, &state, &mut truth);
+        assert_eq!((found.points_in_contact, found.stale), (truth.points_in_contact, 0), "step {step}, tip {tip}");
+        touched += u32::from(truth.points_in_contact > 0);
+    }
+    assert!(touched > 100);
+}
+
+/// One corner of the plate leaps while the rest has been at rest: boxes that could not know are counted.
+#[test]
+fn a_leap_of_far_surface_is_counted() {
+    let mesh = block([40, 40, 2], 4.0);
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    let mut walk = TissueCollision::new(&mesh, &Tool::probe(2.0), &Config::default()).expect("a sound config");
+    let mut out = TissueStep::default();
+    let state = tool_at(Vec3::new(10.0, 10.0, 9.5), glam::Quat::IDENTITY);
+    let mut stale = 0;
+    for step in 0..20 {
+        let leap = |p: &Vec3| if step > 8 && p.x > 140.0 && p.y > 140.0 { *p + Vec3::Z * 20.0 } else { *p };
+        walk.step(&mesh.positions.iter().map(leap).collect::<Vec<_>>(), &still, &state, &mut out);
+        assert!(step > 8 || out.stale == 0);
+        stale += out.stale;
+        assert!((out.manifold.depth_mm - 0.5).abs() < 1e-3);
+    }
+    assert!(stale > 0);
 }

@@ -11,7 +11,7 @@ use trepan_mesh::TetMesh;
 const RADIUS: f32 = 2.0;
 
 fn collision(mesh: &TetMesh, method: Method) -> TissueCollision {
-    TissueCollision::new(mesh, &Tool::probe(RADIUS), &Config { method, ..Config::default() }).unwrap()
+    TissueCollision::new(mesh, &Tool::probe(RADIUS), &Config { method, ..Config::default() }).expect("a sound config")
 }
 
 fn step_at(collision: &mut TissueCollision, mesh: &TetMesh, tip: Vec3) -> TissueStep {
@@ -241,7 +241,7 @@ fn absurd_cells_change_the_cost_not_the_result() {
     let truth = step_at(&mut collision(&mesh, Method::Brute), &mesh, tip);
     for cell_mm in [1e-6, 0.05, 80.0, 1e30] {
         let config = Config { method: Method::UniformGrid, cell_mm: Some(cell_mm), ..Config::default() };
-        let mut grid = TissueCollision::new(&mesh, &Tool::probe(RADIUS), &config).unwrap();
+        let mut grid = TissueCollision::new(&mesh, &Tool::probe(RADIUS), &config).expect("a sound config");
         assert_eq!(step_at(&mut grid, &mesh, tip).manifold, truth.manifold);
     }
 }
@@ -251,7 +251,7 @@ fn the_nearest_face_reads_less_than_the_printed_rule_on_a_corner() {
     let mesh = block([2, 2, 2], 10.0);
     let depth = |response| {
         let config = Config { method: Method::Thesis, response: Some(response), ..Config::default() };
-        let mut collision = TissueCollision::new(&mesh, &Tool::probe(RADIUS), &config).unwrap();
+        let mut collision = TissueCollision::new(&mesh, &Tool::probe(RADIUS), &config).expect("a sound config");
         step_at(&mut collision, &mesh, Vec3::new(18.0, 1.0, 21.0)).manifold.depth_mm
     };
     let (printed, nearest) = (depth(Response::Printed), depth(Response::NearestFace));

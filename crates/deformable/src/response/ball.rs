@@ -7,7 +7,7 @@
 //! the far side of a thin structure never takes the contact over, and deeper stays deeper through the whole thickness. A tool that moved by more than R
 //! in one step jumped: q is searched anew.
 //!
-//! The normal is the mean over the centre and all points inside, each with the blended surface normal at its own closest point (`near.rs`) and weighted
+//! The normal is the mean over the centre and every second point inside, each with the blended surface normal at its own closest point (`near.rs`) and weighted
 //! with its own depth: `f = Σ dᵢ nᵢ`, `n = f / |f|`. A weight is zero where a point enters, so nothing jumps. In a groove whose walls push against each
 //! other the coherence `κ = |f| / Σ dᵢ` falls to 0, and the depth is scaled by `min(1, 2κ)`: opposite walls cancel, everything else is left alone.
 //!
@@ -31,7 +31,7 @@ use crate::{
     step::TissueStep,
     surface::{Foot, MovingSurface},
 };
-use trepan_contact::Contact;
+use trepan_contact::{Contact, MAX_CONTACTS};
 use trepan_geometry::{Aabb, Vec3};
 
 /// The triangle touched last, and room for those near the contact.
@@ -46,6 +46,8 @@ pub(crate) struct Ball {
 const MAX_NEAR: usize = 1024;
 /// A triangle belongs to the touched side when its normal is within 70 degrees of the touched triangle's.
 const SAME_SIDE: f32 = 0.34;
+/// Every second point inside is sampled: the shell is even, so half of it is too.
+const SAMPLE_EVERY: usize = 2;
 /// Normals blend over this many radii.
 const BLEND: f32 = 0.5;
 
@@ -77,8 +79,8 @@ impl Ball {
         let mut sum = Sum::default();
         sum.add(depth_mm, centre.normal);
         press(surface, &centre, depth_mm, out);
-        let stride = listed_stride(hits);
-        for (k, i) in points_inside(hits).enumerate() {
+        let stride = points_inside(hits).count().div_ceil(SAMPLE_EVERY * MAX_CONTACTS).max(1);
+        for (k, i) in points_inside(hits).filter(|i| i % SAMPLE_EVERY == 0).enumerate() {
             let p = scene.points[i];
             let Some(sample) = self.near.sample(p, BLEND * scene.radius_mm) else { break };
             sum.add(sample.distance, sample.normal);
@@ -114,18 +116,20 @@ impl Ball {
         let region = self.region(scene, hits, &foot, signed(foot.distance2.sqrt()));
         out.overflow += surface.gather(positions, &region, &mut self.numbers);
         self.keep_touched_side(scene, surface, &foot);
-        let closest = self.near.sample(centre, 0.0)?;
-        let depth_mm = signed(closest.distance);
-        let normal = self.near.sample(closest.point, BLEND * scene.radius_mm)?.normal;
-        (depth_mm > 0.0).then_some((Sample { normal, ..closest }, depth_mm))
+        let sample = self.near.sample(centre, BLEND * scene.radius_mm)?;
+        let depth_mm = signed(sample.distance);
+        (depth_mm > 0.0).then_some((sample, depth_mm))
     }
 
-    /// Where triangles matter: as far from the points inside as they are deep, and as normals blend; never beyond a diameter around the foot.
+    /// Where triangles matter: as far from the centre as the closest one, as far from the points inside as they are deep, and further as normals
+    /// blend; never beyond a diameter around the foot.
     fn region(&self, scene: &Scene, hits: &Hits, foot: &Foot, depth_mm: f32) -> Extent {
-        let mut points = Extent::of(&[foot.point]);
+        let blend_mm = BLEND * scene.radius_mm;
+        let mut points = Extent::EMPTY;
         points_inside(hits).for_each(|i| points.grow(scene.points[i]));
-        let most = Extent::from(Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm));
-        points.widened(depth_mm.max(0.0) + BLEND * scene.radius_mm).shared(&most)
+        let mut region = points.widened(depth_mm.max(0.0) + blend_mm);
+        region.merge(&Extent::of(&[scene.tool.tip()]).widened(foot.distance2.sqrt() + blend_mm));
+        region.shared(&Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm).into())
     }
 
     /// Takes triangles that the centre sees from outside, and those that face as the touched one does.
@@ -162,11 +166,6 @@ impl Sum {
 /// Numbers of the points inside, the centre not among them.
 fn points_inside(hits: &Hits) -> impl Iterator<Item = usize> + '_ {
     (0..hits.tet.len() - 1).filter(|&i| hits.tet[i] != NONE)
-}
-
-/// The manifold lists every so many-th point, so that the list spreads over the whole contact.
-fn listed_stride(hits: &Hits) -> usize {
-    points_inside(hits).count().div_ceil(trepan_contact::MAX_CONTACTS).max(1)
 }
 
 /// Puts load on the nodes under a sample.

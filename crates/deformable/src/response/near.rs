@@ -35,9 +35,7 @@ struct NearTriangle {
 pub(crate) struct Sample {
     /// The closest triangle.
     pub triangle: u32,
-    /// The closest point, world mm.
-    pub point: Vec3,
-    /// Its weights on the corners.
+    /// Weights of the closest point on its corners.
     pub weights: [f32; 3],
     /// Distance to it, mm.
     pub distance: f32,
@@ -71,7 +69,7 @@ impl Near {
         }
     }
 
-    /// Closest point and blended normal for `p`; `blend_mm` is r, or 0 for no normal. `None` without any triangle.
+    /// Closest point and blended normal for `p`; `blend_mm` is r. `None` without any triangle.
     pub(crate) fn sample(&mut self, p: Vec3, blend_mm: f32) -> Option<Sample> {
         let (mut best, mut reach2, mut weights) = (self.hint, f32::INFINITY, [0.0; 3]);
         let mut nearest = f32::INFINITY;
@@ -91,14 +89,11 @@ impl Near {
         }
         self.hint = best;
         let triangle = self.triangles.get(best).filter(|_| nearest.is_finite())?;
-        let (point, normal) = (triangle.point(weights), self.blended(nearest, blend_mm));
-        Some(Sample { triangle: triangle.number, point, weights, distance: nearest, normal })
+        let normal = self.blended(nearest, blend_mm);
+        Some(Sample { triangle: triangle.number, weights, distance: nearest, normal })
     }
 
     fn blended(&self, nearest: f32, blend_mm: f32) -> Vec3 {
-        if blend_mm <= 0.0 {
-            return Vec3::ZERO;
-        }
         let (mut sum, mut total) = (Vec3::ZERO, 0.0);
         for &(distance, t) in &self.close {
             let triangle = &self.triangles[t as usize];
