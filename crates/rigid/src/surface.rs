@@ -92,11 +92,11 @@ impl Discs {
 
     /// The voxels of one row, from `start` to x = `to`.
     fn row(&mut self, window: &Window, start: IVec3, to: i32, centre: Vec3, reach: f32) {
+        let row = window.row(self.base + start);
         for i in start.x..=to {
-            let local = IVec3::new(i, start.y, start.z);
-            let hu = window.hu(self.base + local);
+            let hu = row.hu(self.base.x + i);
             if hu >= window.isovalue {
-                self.voxel(window, local, hu, centre, reach);
+                self.voxel(window, start.with_x(i), hu, centre, reach);
             }
         }
         self.visited += (to - start.x + 1).max(0) as u32;
@@ -159,8 +159,9 @@ impl Shape {
         for (k, z) in (0..).zip(tz) {
             for (j, y) in (0..).zip(ty) {
                 let (mut even, mut steep, mut bent) = (0.0, 0.0, 0.0);
-                for (i, x) in (0..).zip(tx) {
-                    let hu = i32::from(window.hu(corner + IVec3::new(i, j, k)));
+                let row = window.row(corner + IVec3::new(0, j, k));
+                for (i, x) in (corner.x..).zip(tx) {
+                    let hu = i32::from(row.hu(i));
                     let value = (hu - iso).clamp(-CLAMP_HU, CLAMP_HU) as f32;
                     (even, steep, bent) = (even + value * x[0], steep + value * x[1], bent + value * x[2]);
                 }

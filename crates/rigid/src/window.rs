@@ -96,6 +96,14 @@ impl Window {
         self.cells[self.index(voxel)]
     }
 
+    /// The row of voxels along x through `voxel`, for looks at many of them.
+    #[inline]
+    pub fn row(&self, voxel: IVec3) -> Row<'_> {
+        let mask = (1usize << self.bits) - 1;
+        let start = self.index(voxel.with_x(0));
+        Row { cells: &self.cells[start..=start + mask], mask }
+    }
+
     /// Takes note of a new density.
     pub fn set(&mut self, voxel: IVec3, hu: i16) {
         let inside = voxel.cmpge(self.low).all() && voxel.cmplt(self.low + (1 << self.bits)).all();
@@ -103,6 +111,19 @@ impl Window {
             let at = self.index(voxel);
             self.cells[at] = hu;
         }
+    }
+}
+
+/// One row of the window.
+pub(crate) struct Row<'a> {
+    cells: &'a [i16],
+    mask: usize,
+}
+
+impl Row<'_> {
+    /// Density of the voxel at `x`, HU.
+    pub fn hu(&self, x: i32) -> i16 {
+        self.cells[x as usize & self.mask]
     }
 }
 
