@@ -41,6 +41,12 @@ pub enum LinkError {
         /// The file.
         path: PathBuf,
     },
+    /// A repair would overwrite what it reads.
+    #[error("cannot repair {} onto itself; give the repaired file another name", path.display())]
+    SameFile {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file was made by a later version.
     #[error("{} has recording format {found}, this program reads up to {known}; open it with a newer version", path.display())]
     TooNew {

@@ -20,7 +20,7 @@ pub mod wire;
 
 pub use error::LinkError;
 pub use recorder::{MAX_CHUNK_BYTES, MAX_CHUNK_MS, Recorder};
-pub use recording::Recording;
+pub use recording::{Recording, Repaired, repair};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

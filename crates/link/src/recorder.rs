@@ -73,14 +73,7 @@ impl<W: Write + Seek> Recorder<W> {
     /// Records into any stream; `path` only serves error messages.
     pub fn to(stream: W, path: &Path, header: &SessionHeader) -> Result<Self, LinkError> {
         let failed = |error: McapError| write_error(path, &error);
-        // Chunks are built in memory and written whole: a cut then never leaves a chunk whose length is not yet known.
-        let options = WriteOptions::new()
-            .compression(Some(Compression::Lz4))
-            .chunk_size(Some(MAX_CHUNK_BYTES))
-            .disable_seeking(true)
-            .profile(PROFILE)
-            .library(concat!("trepan-link ", env!("CARGO_PKG_VERSION")));
-        let mut mcap = options.create(stream).map_err(failed)?;
+        let mut mcap = options().create(stream).map_err(failed)?;
         mcap.write_metadata(&metadata(header)).map_err(failed)?;
         let channels = Channels::add_to(&mut mcap).map_err(failed)?;
         mcap.flush().map_err(failed)?;
@@ -183,6 +176,16 @@ impl Channels {
     }
 }
 
+/// Chunks are built in memory and written whole: a cut then never leaves a chunk whose length is not yet known.
+pub(crate) fn options() -> WriteOptions {
+    WriteOptions::new()
+        .compression(Some(Compression::Lz4))
+        .chunk_size(Some(MAX_CHUNK_BYTES))
+        .disable_seeking(true)
+        .profile(PROFILE)
+        .library(concat!("trepan-link ", env!("CARGO_PKG_VERSION")))
+}
+
 fn own_channel<T: Fields, W: Write + Seek>(mcap: &mut mcap::Writer<W>, topic: &str) -> Result<u16, McapError> {
     let schema = mcap.add_schema(T::NAME, "protobuf", &file_descriptor_set::<T>())?;
     mcap.add_channel(schema, topic, "protobuf", &BTreeMap::new())
@@ -208,7 +211,7 @@ fn nanoseconds(time_ms: f64) -> u64 {
     (time_ms * 1e6) as u64
 }
 
-fn write_error(path: &Path, error: &McapError) -> LinkError {
+pub(crate) fn write_error(path: &Path, error: &McapError) -> LinkError {
     let reason = match error {
         McapError::Io(error) => error.to_string(),
         McapError::AttemptedWriteAfterFailure => "an earlier write failed".to_owned(),

@@ -7,7 +7,10 @@
 //! Memory stays in proportion to the file whatever the bytes claim.
 
 mod chunk;
+mod repair;
 mod scan;
+
+pub use repair::{Repaired, repair};
 
 use crate::LinkError;
 use crate::recorder::{FORMAT, FORMAT_KEY, HEADER_KEY, HEADER_NAME};

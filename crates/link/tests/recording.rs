@@ -5,7 +5,7 @@ use std::io::{Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
 use trepan_geometry::{Pose, Quat, Twist, Vec3, Wrench};
 use trepan_link::wire::{CollisionRecord, EventRecord, SessionHeader, SolverRecord, TickRecord};
-use trepan_link::{LinkError, Recorder, Recording};
+use trepan_link::{LinkError, Recorder, Recording, Repaired, repair};
 
 fn header() -> SessionHeader {
     SessionHeader {
@@ -176,8 +176,35 @@ fn a_recorder_that_dies_unfinished_leaves_what_was_flushed() {
 }
 
 #[test]
+fn a_repaired_file_is_whole_and_holds_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cut, repaired) = (folder.path().join("cut.mcap"), folder.path().join("repaired.mcap"));
+    let whole = file(450);
+    for length in [whole.len(), whole.len() * 3 / 4, whole.len() / 2, offset_of(6, &whole) + 20] {
+        std::fs::write(&cut, &whole[..length]).unwrap();
+        let before = Recording::open(&cut).unwrap();
+        let report = repair(&cut, &repaired).unwrap();
+        let after = Recording::open(&repaired).unwrap();
+        assert_eq!((report.was_whole, after.truncated), (length == whole.len(), false));
+        assert!(report.messages as usize >= after.ticks.len() + after.collisions.len());
+        assert_eq!(after.header, before.header);
+        assert_eq!(after.ticks.iter().map(bits).collect::<Vec<_>>(), before.ticks.iter().map(bits).collect::<Vec<_>>());
+        assert_eq!(
+            (&after.collisions, &after.solver, &after.events),
+            (&before.collisions, &before.solver, &before.events)
+        );
+        let index = mcap::Summary::read(&std::fs::read(&repaired).unwrap()).unwrap().unwrap();
+        assert_eq!(index.stats.unwrap().message_count, report.messages);
+        assert_eq!(repair(&repaired, &cut).unwrap(), Repaired { was_whole: true, ..report });
+    }
+    assert!(repair(&repaired, &repaired).unwrap_err().to_string().contains("another name"));
+}
+
+#[test]
 fn damaged_files_never_panic_and_never_lie() {
     let whole = file(450);
+    let folder = tempfile::tempdir().unwrap();
+    let (damaged, repaired) = (folder.path().join("damaged.mcap"), folder.path().join("repaired.mcap"));
     let mut noise = Noise(1);
     for _ in 0..1500 {
         let mut bytes = whole.clone();
@@ -191,6 +218,14 @@ fn damaged_files_never_panic_and_never_lie() {
                     let end = (at + 8).min(bytes.len());
                     bytes[at..end].fill(0xff);
                 }
+            }
+        }
+        if noise.bits().is_multiple_of(16) {
+            std::fs::write(&damaged, &bytes).unwrap();
+            if repair(&damaged, &repaired).is_ok() {
+                let same =
+                    |r: Result<Recording, LinkError>| r.ok().map(|r| r.ticks.iter().map(bits).collect::<Vec<_>>());
+                assert_eq!(same(Recording::open(&repaired)), same(open(&bytes)));
             }
         }
         if let Ok(recording) = open(&bytes) {

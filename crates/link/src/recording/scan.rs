@@ -83,14 +83,18 @@ impl<'a> Cursor<'a> {
 
     /// Name of a metadata record, and its entries.
     pub(super) fn metadata(mut self) -> Option<(&'a str, Vec<(&'a str, &'a str)>)> {
-        let name = self.text()?;
+        Some((self.text()?, self.map()?))
+    }
+
+    /// Pairs of strings, after their length in bytes.
+    pub(super) fn map(&mut self) -> Option<Vec<(&'a str, &'a str)>> {
         let length = usize::try_from(self.u32()?).ok()?;
         let mut map = Cursor(self.take(length)?);
         let mut entries = Vec::new();
         while !map.0.is_empty() {
             entries.push((map.text()?, map.text()?));
         }
-        Some((name, entries))
+        Some(entries)
     }
 
     /// Unpacked size that a chunk claims.
@@ -99,7 +103,7 @@ impl<'a> Cursor<'a> {
         self.u64()
     }
 
-    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+    pub(super) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
         let (head, tail) = self.0.split_at_checked(count)?;
         self.0 = tail;
         Some(head)
@@ -113,19 +117,19 @@ impl<'a> Cursor<'a> {
         self.array().map(u8::from_le_bytes)
     }
 
-    fn u16(&mut self) -> Option<u16> {
+    pub(super) fn u16(&mut self) -> Option<u16> {
         self.array().map(u16::from_le_bytes)
     }
 
-    fn u32(&mut self) -> Option<u32> {
+    pub(super) fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_le_bytes)
     }
 
-    fn u64(&mut self) -> Option<u64> {
+    pub(super) fn u64(&mut self) -> Option<u64> {
         self.array().map(u64::from_le_bytes)
     }
 
-    fn text(&mut self) -> Option<&'a str> {
+    pub(super) fn text(&mut self) -> Option<&'a str> {
         let length = usize::try_from(self.u32()?).ok()?;
         str::from_utf8(self.take(length)?).ok()
     }
