@@ -12,7 +12,7 @@ use glam::DVec3;
 
 const POWER_STEPS: usize = 200;
 const GRADIENT_STEPS: usize = 400;
-const INVERSE_STEPS: usize = 4;
+const INVERSE_STEPS: usize = 8;
 
 /// Stable step by single elements, ms: safe always, up to twice too careful.
 pub fn element_bound_ms(body: &Body) -> f64 {
@@ -58,43 +58,44 @@ pub fn highest_frequency(stiffness: &Stiffness) -> f64 {
 /// Lowest angular eigenfrequency of the rest state, rad/ms; `None` when the body is not held by its fixed nodes.
 pub fn lowest_frequency(body: &Body) -> Option<f64> {
     let stiffness = Stiffness::of(body);
-    let masses = stiffness.masses_g();
     if !body.is_held() || !stiffness.fixed().contains(&false) {
         return None;
     }
-    let pulls = [DVec3::X, DVec3::Y, DVec3::Z].map(|pull| deflect(&stiffness, &vec![pull; masses.len()]));
-    let (mut shape, mut found) = pulls.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let inverse: Vec<f64> = stiffness.diagonal().iter().map(|d| 1.0 / d).collect();
+    let pull = DVec3::new(0.8, -1.0, 0.4);
+    let mut shape: Vec<DVec3> = stiffness.fixed().iter().map(|fixed| if *fixed { DVec3::ZERO } else { pull }).collect();
+    let mut guess = vec![DVec3::ZERO; shape.len()];
+    let mut found = f64::MAX;
     for _ in 0..INVERSE_STEPS {
         let before = found;
-        (shape, found) = deflect(&stiffness, &shape);
-        if before - found < 2e-3 * found {
+        shape = deflect(&stiffness, &inverse, &shape, guess);
+        found = rayleigh(&stiffness, &shape);
+        if before - found < 1e-3 * found {
             break;
         }
+        guess = shape.iter().map(|u| *u / (found * found)).collect();
     }
     Some(found)
 }
 
-/// One inverse iteration: the deflection u under the weight `M a`, and its Rayleigh frequency.
-fn deflect(stiffness: &Stiffness, a: &[DVec3]) -> (Vec<DVec3>, f64) {
-    let (masses, fixed) = (stiffness.masses_g(), stiffness.fixed());
-    let weigh = |((a, m), fixed): ((&DVec3, &f64), &bool)| if *fixed { DVec3::ZERO } else { *a * *m };
-    let weight: Vec<DVec3> = a.iter().zip(masses).zip(fixed).map(weigh).collect();
-    let u = conjugate_gradients(stiffness, &weight);
+/// Rayleigh's frequency of a deflection.
+fn rayleigh(stiffness: &Stiffness, u: &[DVec3]) -> f64 {
     let mut ku = vec![DVec3::ZERO; u.len()];
-    stiffness.apply(&u, &mut ku);
-    let swung: f64 = u.iter().zip(masses).map(|(u, m)| m * u.length_squared()).sum();
-    let found = (dot(&u, &ku) / swung).sqrt();
-    (u, found)
+    stiffness.apply(u, &mut ku);
+    let swung: f64 = u.iter().zip(stiffness.masses_g()).map(|(u, m)| m * u.length_squared()).sum();
+    (dot(u, &ku) / swung).sqrt()
 }
 
-/// `K u = b` to three digits, preconditioned by the masses.
-fn conjugate_gradients(stiffness: &Stiffness, b: &[DVec3]) -> Vec<DVec3> {
-    let precondition =
-        |r: &[DVec3]| -> Vec<DVec3> { r.iter().zip(stiffness.masses_g()).map(|(r, m)| *r / *m).collect() };
-    let (mut u, mut r) = (vec![DVec3::ZERO; b.len()], b.to_vec());
+/// One inverse iteration: u of `K u = M a` to three digits, by conjugate gradients from a guess on.
+fn deflect(stiffness: &Stiffness, inverse: &[f64], a: &[DVec3], guess: Vec<DVec3>) -> Vec<DVec3> {
+    let precondition = |r: &[DVec3]| -> Vec<DVec3> { r.iter().zip(inverse).map(|(r, d)| *r * *d).collect() };
+    let weight: Vec<DVec3> = a.iter().zip(stiffness.masses_g()).map(|(a, m)| *a * *m).collect();
+    let goal = 1e-6 * dot(&weight, &precondition(&weight));
+    let (mut u, mut kp) = (guess, vec![DVec3::ZERO; a.len()]);
+    stiffness.apply(&u, &mut kp);
+    let mut r: Vec<DVec3> = weight.iter().zip(&kp).map(|(w, k)| *w - *k).collect();
     let mut z = precondition(&r);
-    let (mut p, mut kp, mut rz) = (z.clone(), z.clone(), dot(&r, &z));
-    let goal = 1e-6 * rz;
+    let (mut p, mut rz) = (z.clone(), dot(&r, &z));
     for _ in 0..GRADIENT_STEPS {
         if rz <= goal {
             break;

@@ -25,15 +25,20 @@ impl Shape {
     }
 
     /// Gradient of a nodal field, `Σ u_a ⊗ ∇N_a`.
-    pub fn gradient_of(&self, u: [DVec3; 4]) -> DMat3 {
-        let g = &self.gradients;
-        let column = |k: usize| (0..4).map(|a| u[a] * g[a][k]).sum();
-        DMat3::from_cols(column(0), column(1), column(2))
+    #[inline]
+    pub fn gradient_of(&self, [o, a, b, c]: [DVec3; 4]) -> DMat3 {
+        let [_, f, g, h] = self.gradients;
+        let (a, b, c) = (a - o, b - o, c - o);
+        DMat3::from_cols(a * f.x + b * g.x + c * h.x, a * f.y + b * g.y + c * h.y, a * f.z + b * g.z + c * h.z)
     }
 
     /// Nodal forces `V P ∇N_a` that balance a first Piola-Kirchhoff stress P, N.
+    #[inline]
     pub fn forces_of(&self, stress: DMat3) -> [DVec3; 4] {
-        self.gradients.map(|g| self.volume_mm3 * (stress * g))
+        let [_, f, g, h] = self.gradients;
+        let scaled = stress * self.volume_mm3;
+        let (a, b, c) = (scaled * f, scaled * g, scaled * h);
+        [-(a + b + c), a, b, c]
     }
 }
 
