@@ -11,7 +11,9 @@ fn main() {
                 let volume = &import.volume;
                 let finite = volume.data.iter().copied().filter(|v| v.is_finite());
                 let (low, high) = finite.fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(v), h.max(v)));
-                println!("{path}: {:?} voxels of {:.4} mm, {low} to {high}", volume.dims, volume.spacing_mm());
+                let mean = volume.data.iter().map(|&v| f64::from(v)).sum::<f64>() / volume.data.len() as f64;
+                println!("{path}: {:?} voxels of {:.4} mm", volume.dims, volume.spacing_mm());
+                println!("    {low} to {high}, mean {mean:.6}");
                 for row in 0..3 {
                     let offset = volume.world_from_voxel.translation[row];
                     println!("    {:.6} {offset:.6}", volume.world_from_voxel.matrix3.row(row));

@@ -5,7 +5,7 @@
 //! values by `RescaleSlope · stored + RescaleIntercept`, which for CT gives HU.
 //!
 //! # Practice
-//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and big-endian, deflated, RLE; 8, 16 and 32 bits;
+//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and big-endian, deflated, RLE, lossless JPEG, JPEG-LS; 8, 16 and 32 bits;
 //! enhanced multi-frame files; oblique and tilted stacks. Of several series in a folder the one with the most slices is taken and a
 //! note says so; [`series`] lists them. Doubled, missing and uneven slices are refused. Only the elements that place and scale voxels
 //! are looked at: no name, date, identifier or free text of a patient is kept or shown.
@@ -14,15 +14,16 @@
 //! NEMA, "DICOM PS3.3 C.7.6.2, C.7.6.16; PS3.5; PS3.10", dicom.nema.org.
 //!
 //! # When not to use it
-//! For colour, ultrasound, and compressed syntaxes other than RLE: the error names the syntax.
+//! For colour, ultrasound, and other compressed syntaxes (JPEG baseline, JPEG 2000): the error names the syntax.
 
+mod codec;
 mod element;
 mod pixels;
-mod rle;
 mod slice;
 mod stack;
 
 use crate::{Import, Note, ReadError, VoxelVolume};
+use rayon::prelude::*;
 use slice::Slice;
 use std::path::{Path, PathBuf};
 
@@ -84,10 +85,11 @@ struct Groups {
 impl Groups {
     fn of(path: &Path) -> Result<Self, ReadError> {
         let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new(".")) };
-        let mut files = Vec::new();
+        let mut files: Vec<PathBuf> = path.is_file().then(|| path.to_owned()).into_iter().collect();
         collect(folder, if path.is_dir() { DEEPEST } else { 0 }, &mut files)?;
         let mut found = Self { groups: Vec::new(), passed_over: 0, twice: 0 };
-        for file in files {
+        let again = |(n, file): &(usize, PathBuf)| *n > 0 && file == path;
+        for (_, file) in files.into_iter().enumerate().filter(|entry| !again(entry)) {
             match looked_at(&file) {
                 Ok(Some(slice)) => found.add(slice),
                 Err(error) if file == path => return Err(error),
@@ -151,17 +153,18 @@ impl Groups {
 
 fn voxels(stack: &stack::Stack) -> Result<VoxelVolume<f32>, ReadError> {
     let first = stack.pictures[0].slice;
-    let mut data = Vec::new();
-    let mut open: Option<(PathBuf, Vec<u8>)> = None;
-    for picture in &stack.pictures {
-        let file = &picture.slice.file;
-        let bytes = match open.take() {
-            Some((known, bytes)) if known == *file => bytes,
-            _ => bytes_of(file)?,
-        };
-        pixels::frame(picture.slice, &bytes, picture.frame, &mut data)?;
-        open = Some((file.clone(), bytes));
-    }
+    let several = stack.pictures.iter().filter(|p| p.frame == 0 && p.slice.frames > 1).map(|p| &p.slice.file);
+    let open = several.map(|file| Ok((file, bytes_of(file)?))).collect::<Result<Vec<_>, ReadError>>()?;
+    let decoded = |picture: &stack::Picture| {
+        let mut values = Vec::new();
+        match open.iter().find(|(file, _)| **file == picture.slice.file) {
+            Some((_, bytes)) => pixels::frame(picture.slice, bytes, picture.frame, &mut values)?,
+            None => pixels::frame(picture.slice, &bytes_of(&picture.slice.file)?, picture.frame, &mut values)?,
+        }
+        Ok(values)
+    };
+    let pictures: Vec<Vec<f32>> = stack.pictures.par_iter().map(decoded).collect::<Result<_, ReadError>>()?;
+    let data = pictures.concat();
     let dims = [first.columns, first.rows, stack.pictures.len()];
     Ok(VoxelVolume { dims, data, world_from_voxel: stack.world_from_voxel })
 }

@@ -1,10 +1,12 @@
 //! Stored pixels into values.
 
+use super::codec::{CodecError, jpeg_lossless, jpeg_ls, rle};
 use super::element::Pixels;
-use super::rle;
 use super::slice::Slice;
 use crate::ReadError;
 use crate::sample::ByteOrder;
+use std::borrow::Cow;
+use std::ops::Range;
 
 /// Adds the values of one frame of a picture to `out`.
 pub(super) fn frame(slice: &Slice, bytes: &[u8], frame: usize, out: &mut Vec<f32>) -> Result<(), ReadError> {
@@ -24,19 +26,75 @@ pub(super) fn frame(slice: &Slice, bytes: &[u8], frame: usize, out: &mut Vec<f32
             layout.decode(stored, &mut add);
             Ok(())
         }
-        (Pixels::Fragments(fragments), "1.2.840.10008.1.2.5") => {
-            let one = fragments.get(1 + frame).and_then(|r| bytes.get(r.clone())).ok_or_else(missing)?;
-            let stored = rle::decode(one, layout.pixels, layout.bytes);
-            let stored = stored.map_err(|found| truncated(slice, layout.frame_bytes(), found))?;
-            Layout { order: ByteOrder::Little, ..layout }.decode(&stored, &mut add);
+        (Pixels::Fragments(fragments), syntax) => {
+            let one = joined(slice, fragments, bytes, frame)?;
+            let wrong = |error| match error {
+                CodecError::Short(pixels) => truncated(slice, layout.frame_bytes(), pixels * layout.bytes),
+                CodecError::Wrong(why) => {
+                    field("PixelData", why, "the picture cannot be decoded; fetch the file again")
+                }
+            };
+            match syntax {
+                "1.2.840.10008.1.2.5" => {
+                    let stored = rle::decode(&one, layout.pixels, layout.bytes).map_err(wrong)?;
+                    Layout { order: ByteOrder::Little, ..layout }.decode(&stored, &mut add);
+                }
+                "1.2.840.10008.1.2.4.57" | "1.2.840.10008.1.2.4.70" => {
+                    decoded(slice, layout, jpeg_lossless::decode(&one).map_err(wrong)?, &mut add)?;
+                }
+                "1.2.840.10008.1.2.4.80" | "1.2.840.10008.1.2.4.81" => {
+                    decoded(slice, layout, jpeg_ls::decode(&one).map_err(wrong)?, &mut add)?;
+                }
+                other => {
+                    let found = format!("{other} ({})", name(other));
+                    let remedy = "that compression is not read; convert the series to Explicit VR Little Endian (gdcmconv --raw)";
+                    return Err(field("TransferSyntaxUID", &found, remedy));
+                }
+            }
             Ok(())
         }
-        (Pixels::Fragments(_), syntax) => Err(field(
-            "TransferSyntaxUID",
-            &format!("{syntax} ({})", name(syntax)),
-            "that compression is not read; convert the series to Explicit VR Little Endian (gdcmconv --raw, dcmdjpeg)",
-        )),
     }
+}
+
+/// The compressed stream of a frame: one fragment each, or all of them for a single frame.
+fn joined<'a>(
+    slice: &Slice,
+    fragments: &[Range<usize>],
+    bytes: &'a [u8],
+    frame: usize,
+) -> Result<Cow<'a, [u8]>, ReadError> {
+    let streams = fragments.get(1..).unwrap_or_default();
+    let part = |range: &Range<usize>| bytes.get(range.clone()).unwrap_or_default();
+    match (slice.frames, streams) {
+        (_, []) => Err(truncated(slice, 1, 0)),
+        (1, [one]) => Ok(part(one).into()),
+        (1, several) => Ok(several.iter().flat_map(part).copied().collect::<Vec<u8>>().into()),
+        (frames, several) if several.len() == frames => Ok(several.get(frame).map(part).unwrap_or_default().into()),
+        (frames, several) => Err(ReadError::Field {
+            file: slice.file.clone(),
+            field: "PixelData",
+            found: format!("in {} pieces for {frames} frames", several.len()),
+            remedy: "frames must be compressed one by one; convert the file to Explicit VR Little Endian",
+        }),
+    }
+}
+
+fn decoded(
+    slice: &Slice,
+    layout: Layout,
+    (rows, columns, stored): (usize, usize, Vec<u16>),
+    add: &mut impl FnMut(i64),
+) -> Result<(), ReadError> {
+    if (rows, columns) != (slice.rows, slice.columns) {
+        return Err(ReadError::Field {
+            file: slice.file.clone(),
+            field: "Rows or Columns",
+            found: format!("{} by {}, but {rows} by {columns} in the compressed picture", slice.rows, slice.columns),
+            remedy: "both must agree; fetch the file again",
+        });
+    }
+    stored.into_iter().for_each(|value| add(layout.value(value.into())));
+    Ok(())
 }
 
 fn truncated(slice: &Slice, expected: usize, found: usize) -> ReadError {
@@ -94,10 +152,15 @@ impl Layout {
                 ByteOrder::Big => raw.iter().fold(0, join),
                 ByteOrder::Little => raw.iter().rev().fold(0, join),
             };
-            let up = 64 - self.stored;
-            let top = value >> self.shift << up;
-            add(if self.signed { top as i64 >> up } else { (top >> up) as i64 });
+            add(self.value(value));
         }
+    }
+
+    /// The stored bits out of the allocated ones, with their sign.
+    fn value(&self, allocated: u64) -> i64 {
+        let up = 64 - self.stored;
+        let top = allocated >> self.shift << up;
+        if self.signed { top as i64 >> up } else { (top >> up) as i64 }
     }
 }
 
@@ -106,9 +169,6 @@ fn name(syntax: &str) -> &'static str {
     match syntax {
         "1.2.840.10008.1.2.4.50" => "JPEG baseline",
         "1.2.840.10008.1.2.4.51" => "JPEG extended",
-        "1.2.840.10008.1.2.4.57" | "1.2.840.10008.1.2.4.70" => "JPEG lossless",
-        "1.2.840.10008.1.2.4.80" => "JPEG-LS lossless",
-        "1.2.840.10008.1.2.4.81" => "JPEG-LS near-lossless",
         "1.2.840.10008.1.2.4.90" => "JPEG 2000 lossless",
         "1.2.840.10008.1.2.4.91" => "JPEG 2000",
         _ => "unknown here",

@@ -1,3 +1,4 @@
+use super::codec::{CodecError, rle};
 use super::element::Pixels;
 use super::*;
 use crate::mutation::survives_mutations;
@@ -363,7 +364,7 @@ fn each_wrong_field_has_its_own_error() {
     assert_eq!(
         field(&|s| {
             s.syntax = "1.2.840.10008.1.2.4.91".into();
-            s.pixels = Some(Pixels::Fragments(vec![0..0, 0..4]));
+            s.pixels = Some(Pixels::Fragments(vec![0..0, 0..4, 4..8, 8..12]));
         }),
         "TransferSyntaxUID"
     );
@@ -414,6 +415,6 @@ fn run_lengths_unpack_to_exactly_the_pixels() {
     packed.resize(64, 0);
     packed.extend([2, 7, 8, 9, 254, 5, 128, 0, 1]);
     assert_eq!(rle::decode(&packed, 7, 1).unwrap(), [7, 8, 9, 5, 5, 5, 1]);
-    assert_eq!(rle::decode(&packed, 8, 1), Err(7));
-    assert_eq!(rle::decode(&packed, 7, 2), Err(0));
+    assert_eq!(rle::decode(&packed, 8, 1), Err(CodecError::Short(7)));
+    assert!(matches!(rle::decode(&packed, 7, 2), Err(CodecError::Wrong(_))));
 }

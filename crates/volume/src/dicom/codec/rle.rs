@@ -1,13 +1,15 @@
 //! DICOM's run length encoding (PS3.5 annex G): byte planes, highest first, each in PackBits.
 
-/// Unpacks a frame into little-endian pixels of `bytes` bytes; says how many bytes came where there are too few.
-pub(super) fn decode(packed: &[u8], pixels: usize, bytes: usize) -> Result<Vec<u8>, usize> {
+use super::CodecError;
+
+/// Unpacks a frame into little-endian pixels of `bytes` bytes.
+pub(in crate::dicom) fn decode(packed: &[u8], pixels: usize, bytes: usize) -> Result<Vec<u8>, CodecError> {
     let word = |n: usize| {
         let raw = packed.get(4 * n..4 * n + 4).and_then(|b| b.try_into().ok());
         raw.map_or(0, |raw| u32::from_le_bytes(raw) as usize)
     };
     if word(0) != bytes || pixels.saturating_mul(bytes) > packed.len().saturating_mul(64) {
-        return Err(0);
+        return Err(CodecError::Wrong("its number of byte planes does not fit the pixels"));
     }
     let mut out = vec![0; pixels * bytes];
     for plane in 0..bytes {
@@ -17,7 +19,7 @@ pub(super) fn decode(packed: &[u8], pixels: usize, bytes: usize) -> Result<Vec<u
         let place = bytes - 1 - plane;
         let written = unpack(segment, pixels, |at, value| out[at * bytes + place] = value);
         if written < pixels {
-            return Err(plane * pixels + written);
+            return Err(CodecError::Short(written));
         }
     }
     Ok(out)

@@ -1,0 +1,18 @@
+//! Compressed pictures, one file per compression. Each decoder gives the stored numbers of one frame, row after row.
+
+pub(super) mod jpeg_lossless;
+pub(super) mod jpeg_ls;
+mod marker;
+pub(super) mod rle;
+
+/// Most pixels that a compressed frame may claim.
+const MOST_PIXELS: usize = 1 << 26;
+
+/// Why a frame was not decoded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::dicom) enum CodecError {
+    /// The stream ends after so many pixels.
+    Short(usize),
+    /// Something in the stream is wrong or not supported.
+    Wrong(&'static str),
+}
