@@ -1,4 +1,5 @@
 //! What a user can get wrong: each fault names the file, the field and the remedy, exits with 2 and leaves nothing behind.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use glam::{DAffine3, DVec3, Vec3};
 use std::fs;
@@ -12,7 +13,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
+        Self { folder: tempfile::tempdir().expect("a temporary folder") }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -32,13 +33,13 @@ impl Bench {
                 -1000
             };
         }
-        nifti::write(&self.path(name), &ct).unwrap();
+        nifti::write(&self.path(name), &ct).expect("the CT is written");
         self.path(name)
     }
 
     fn mri(&self, name: &str) -> PathBuf {
         let mri = VoxelVolume::isotropic([32, 32, 32], Vec3::splat(-31.0), 2.0, 80u8);
-        nifti::write(&self.path(name), &mri).unwrap();
+        nifti::write(&self.path(name), &mri).expect("the MRI is written");
         self.path(name)
     }
 

@@ -1,4 +1,5 @@
 //! How a session ends: by a signal, by being killed, by itself; and that a replay of it is the same, bit for bit.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use serde_json::Value;
 use std::fs;

@@ -61,6 +61,8 @@ impl TickRecord {
     pub const STALE: u32 = 1 << 4;
     /// The force was being let go at the end.
     pub const RELEASED: u32 = 1 << 5;
+    /// The device was gone; no force was wanted.
+    pub const LOST: u32 = 1 << 6;
 
     /// Whether every flag of `mask` is set.
     pub fn has(&self, mask: u32) -> bool {
@@ -137,6 +139,34 @@ pub struct EventRecord {
     pub kind: String,
     /// In words, for a reader.
     pub text: String,
+}
+
+/// What a teacher shows a trainee: a second tool, a marker on the anatomy, a pause.
+#[derive(Clone, Copy, Debug)]
+pub struct TeacherRecord {
+    /// Number of the record, from 1.
+    pub seq: u64,
+    /// Where the teacher holds a ghost of the tool, `world_from_tool`.
+    pub ghost: Pose,
+    /// Where the marker is, world mm.
+    pub marker: Vec3,
+    /// See [`TeacherRecord::GHOST`] and its like.
+    pub flags: u32,
+}
+
+impl TeacherRecord {
+    /// The ghost is to be seen.
+    pub const GHOST: u32 = 1;
+    /// The marker is to be seen.
+    pub const MARKER: u32 = 1 << 1;
+    /// The teacher asks for a pause.
+    pub const PAUSE: u32 = 1 << 2;
+}
+
+impl Default for TeacherRecord {
+    fn default() -> Self {
+        Self { seq: 0, ghost: Pose::IDENTITY, marker: Vec3::ZERO, flags: 0 }
+    }
 }
 
 /// What a session was: enough to run it again, and no patient's name, number, date or folder.

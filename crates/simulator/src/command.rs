@@ -19,7 +19,7 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         .without_time()
         .init();
     if options.list_devices {
-        trepan_haptics::list().iter().for_each(|device| println!("{:28} {}", device.name, device.state));
+        trepan_haptics::list().iter().for_each(|device| println!("{:31} {}", device.name, device.state));
         return ExitCode::SUCCESS;
     }
     match Session::open(program, options, built_in).and_then(Session::run) {

@@ -149,7 +149,8 @@ impl HapticStage {
         self.touch_bone(&tool, drilling);
         let sample = self.sample(&tool, input.tick, drilling);
         let held = self.touch_tissue(input.patch, &sample);
-        let wanted = self.wanted(&tool);
+        let lost = input.reading.status == Status::Lost;
+        let wanted = if lost { Wrench::ZERO } else { self.wanted(&tool) };
         let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
         let record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
         self.warn(&record, input.patch, wanted, tell);
@@ -280,6 +281,7 @@ impl HapticStage {
             (sample.drilling, TickRecord::DRILLING),
             (stale, TickRecord::STALE),
             (self.released, TickRecord::RELEASED),
+            (input.reading.status == Status::Lost, TickRecord::LOST),
         ];
         let bone = &self.bone_step.manifold;
         TickRecord {

@@ -224,7 +224,12 @@ fn reading(record: &TickRecord) -> Reading {
         buttons: Buttons(record.buttons),
         time_ms: record.time_ms,
     };
-    Reading { tool, status: if record.has(TickRecord::STALE) { Status::Stale } else { Status::Fresh } }
+    let status = match (record.has(TickRecord::LOST), record.has(TickRecord::STALE)) {
+        (true, _) => Status::Lost,
+        (false, true) => Status::Stale,
+        (false, false) => Status::Fresh,
+    };
+    Reading { tool, status }
 }
 
 fn remember<T>(memory: &mut VecDeque<T>, item: T) {

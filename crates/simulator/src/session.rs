@@ -21,7 +21,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3, units};
-use trepan_haptics::{DeviceName, HapticDevice, mouse, script::Script, simulated};
+use trepan_haptics::{DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, script::Script, simulated};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::{Renderer, SceneData};
@@ -82,21 +82,23 @@ impl Session {
     /// Runs it and writes its files.
     pub fn run(self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-        let (hand, pointer) = self.hand()?;
+        let Hand { device, pointer, watch } = self.hand()?;
+        let peak_n = device.as_ref().map_or(0.0, |device| device.capabilities().peak_force_n);
         let start = self.start();
-        let stages = self.stages(start.state)?;
+        let stages = self.stages(start.state, peak_n)?;
         output::folder(&self.out)?;
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
         let recorder = Recorder::create(&record, &self.header())?;
         let mut graphics = self.graphics();
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
-        let outcome = self.loops(stages, hand, recorder, start, &stop, |eyes| {
+        let outcome = self.loops(stages, device, recorder, start, &stop, |eyes| {
             album = self.picture(eyes, &mut graphics, pointer, &stop);
         });
         let mut remarks = self.scene.remarks.clone();
         remarks.extend(graphics.err());
         remarks.append(&mut album.faults);
+        remarks.extend(watch.and_then(|watch| fault_of(&watch)));
         let summary = Summary::new(self.about(&album, adapter, remarks), &outcome);
         output::write(&self.out, &record, &summary, &outcome, &album.shots, self.drilled())?;
         Ok(Ended { summary, out: self.out, signal: stop.signal() })
@@ -105,40 +107,55 @@ impl Session {
     fn loops(
         &self,
         stages: Stages,
-        hand: Option<Box<dyn HapticDevice>>,
+        device: Option<Box<dyn HapticDevice>>,
         recorder: Recorder,
         start: ToolSample,
         stop: &Stop,
         picture: impl FnOnce(Eyes),
     ) -> Outcome {
-        match (&self.recording, hand) {
+        match (&self.recording, device) {
             (Some(recording), _) => lockstep::run(stages, recording, recorder, start, self.windowed, stop, picture),
-            (None, Some(hand)) => threads::run(stages, hand, recorder, start, self.pace(), stop, picture),
+            (None, Some(device)) => threads::run(stages, device, recorder, start, self.pace(), stop, picture),
             (None, None) => Outcome::default(),
         }
     }
 
-    /// The device, and the window's end of it when it is the mouse. None for a replay, which brings its own hand.
+    /// The device. None for a replay, which brings its own hand.
     fn hand(&self) -> Result<Hand, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| Script::named(name, &self.scene.site, 1e3 * self.options.duration.unwrap_or(20.0));
-        Ok(match &self.device {
-            DeviceName::Script(name) => (Some(Box::new(script(name).map_err(|f| fault(&f))?)), None),
+        let script = |name: &str| {
+            let duration_ms = 1e3 * self.options.duration.unwrap_or(20.0);
+            Script::named(name, &self.scene.site, duration_ms).map_err(|f| fault(&f))
+        };
+        let mut hand = Hand { device: None, pointer: None, watch: None };
+        hand.device = match &self.device {
+            DeviceName::Script(name) => Some(Box::new(script(name)?)),
             DeviceName::Simulated(name) => {
-                let intent = Box::new(script(name).map_err(|f| fault(&f))?);
-                let hand = simulated::Simulated::new(simulated::Config::default(), simulated::Hand::FIRM, intent);
-                (Some(Box::new(hand)), None)
+                let (config, grip) = (simulated::Config::default(), simulated::Hand::FIRM);
+                Some(Box::new(simulated::Simulated::new(config, grip, Box::new(script(name)?))))
             }
             DeviceName::Mouse => {
-                let start = script(self.program.script()).map_err(|f| fault(&f))?.at(0.0);
-                let (handle, hand) = mouse::pair(start.world_from_tool);
-                (Some(Box::new(hand)), Some(handle))
+                let (pointer, mouse) = mouse::pair(script(self.program.script())?.at(0.0).world_from_tool);
+                hand.pointer = Some(pointer);
+                Some(Box::new(mouse))
             }
-            DeviceName::Replay(_) => (None, None),
-            other => {
-                return Err(SessionError::Device(format!("{other} is not there: no driver for it in this version")));
-            }
-        })
+            DeviceName::Replay(_) => None,
+            hardware => match hardware::open(hardware, self.workspace()) {
+                Some(opened) => {
+                    let opened = opened.map_err(|f| fault(&f))?;
+                    hand.watch = Some(opened.watch);
+                    Some(opened.device)
+                }
+                None => None,
+            },
+        };
+        Ok(hand)
+    }
+
+    /// A device's small box in front of the site: its middle 20 mm outside the entry, seen as the picture is.
+    fn workspace(&self) -> Workspace {
+        let site = &self.scene.site;
+        Workspace::facing(site.entry - 20.0 * site.inward, site.inward, Vec3::Z, 1.0)
     }
 
     /// Where the tool waits.
@@ -149,14 +166,16 @@ impl Session {
         ToolSample { tick: 0, state, phase: self.program.phases()[0], drilling: false }
     }
 
-    fn stages(&self, start: ToolState) -> Result<Stages, SessionError> {
+    fn stages(&self, start: ToolState, peak_n: f32) -> Result<Stages, SessionError> {
+        let guard = GuardConfig::default();
+        let limit_n = if peak_n > 0.0 { peak_n.min(guard.max_force_n) } else { guard.max_force_n };
         let config = HapticConfig {
             program: self.program,
             rigid: self.rigid,
             dt_ms: self.tick_ms(),
             bone_force: Viscoelastic { stiffness: 2.0, damping: 0.5 },
             tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
-            guard: GuardConfig::default(),
+            guard: GuardConfig { max_force_n: limit_n, ..guard },
             near_mm: 2.0,
         };
         let bone = self.scene.bone.clone().filter(|_| self.program.has_bone());
@@ -280,8 +299,19 @@ impl Session {
     }
 }
 
-/// A device, where the session brings one, and the window's end of it when it is the mouse.
-type Hand = (Option<Box<dyn HapticDevice>>, Option<mouse::MouseHandle>);
+/// What holds the tool.
+struct Hand {
+    device: Option<Box<dyn HapticDevice>>,
+    /// The window's end of the mouse.
+    pointer: Option<mouse::MouseHandle>,
+    /// The window into a device's faults.
+    watch: Option<Watch>,
+}
+
+fn fault_of(watch: &Watch) -> Option<String> {
+    let last = watch.fault().map_or_else(String::new, |fault| format!("; the last one: {fault}"));
+    (watch.count() > 0).then(|| format!("the device had {} faults{last}", watch.count()))
+}
 
 struct Graphics {
     adapter: String,

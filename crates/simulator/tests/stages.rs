@@ -18,7 +18,7 @@ fn head() -> (Arc<BoneVolume>, Arc<DistanceField>) {
         ct.data[at] = (400.0 + 1000.0 * (3.0 - (z + 3.0).abs())).clamp(-1000.0, 1200.0) as i16;
         mask.data[at] = u8::from(z < -8.0);
     }
-    (Arc::new(BoneVolume::new(&ct, 400).unwrap()), Arc::new(DistanceField::of_mask(&mask)))
+    (Arc::new(BoneVolume::new(&ct, 400).expect("there is bone")), Arc::new(DistanceField::of_mask(&mask)))
 }
 
 fn config(program: Program) -> HapticConfig {
