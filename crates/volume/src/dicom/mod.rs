@@ -5,7 +5,7 @@
 //! values by `RescaleSlope · stored + RescaleIntercept`, which for CT gives HU.
 //!
 //! # Practice
-//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and big-endian, deflated, RLE, lossless JPEG, JPEG-LS; 8, 16 and 32 bits;
+//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and big-endian, deflated, RLE, lossless JPEG, JPEG-LS, JPEG 2000; 8, 16 and 32 bits;
 //! enhanced multi-frame files; oblique and tilted stacks. Of several series in a folder the one with the most slices is taken and a
 //! note says so; [`series`] lists them. Doubled, missing and uneven slices are refused. Only the elements that place and scale voxels
 //! are looked at: no name, date, identifier or free text of a patient is kept or shown.
@@ -14,7 +14,7 @@
 //! NEMA, "DICOM PS3.3 C.7.6.2, C.7.6.16; PS3.5; PS3.10", dicom.nema.org.
 //!
 //! # When not to use it
-//! For colour, ultrasound, and other compressed syntaxes (JPEG baseline, JPEG 2000): the error names the syntax.
+//! For colour, ultrasound, and other compressed syntaxes (JPEG baseline): the error names the syntax.
 
 mod codec;
 mod element;

@@ -1,6 +1,6 @@
 //! Stored pixels into values.
 
-use super::codec::{CodecError, jpeg_lossless, jpeg_ls, rle};
+use super::codec::{CodecError, jpeg_2000, jpeg_lossless, jpeg_ls, rle};
 use super::element::Pixels;
 use super::slice::Slice;
 use crate::ReadError;
@@ -44,6 +44,9 @@ pub(super) fn frame(slice: &Slice, bytes: &[u8], frame: usize, out: &mut Vec<f32
                 }
                 "1.2.840.10008.1.2.4.80" | "1.2.840.10008.1.2.4.81" => {
                     decoded(slice, layout, jpeg_ls::decode(&one).map_err(wrong)?, &mut add)?;
+                }
+                "1.2.840.10008.1.2.4.90" | "1.2.840.10008.1.2.4.91" => {
+                    decoded(slice, layout, jpeg_2000::decode(&one).map_err(wrong)?, &mut add)?;
                 }
                 other => {
                     let found = format!("{other} ({})", name(other));
@@ -169,8 +172,10 @@ fn name(syntax: &str) -> &'static str {
     match syntax {
         "1.2.840.10008.1.2.4.50" => "JPEG baseline",
         "1.2.840.10008.1.2.4.51" => "JPEG extended",
-        "1.2.840.10008.1.2.4.90" => "JPEG 2000 lossless",
-        "1.2.840.10008.1.2.4.91" => "JPEG 2000",
+        "1.2.840.10008.1.2.4.53" => "JPEG spectral selection, retired",
+        "1.2.840.10008.1.2.4.55" => "JPEG progressive, retired",
+        s if s.starts_with("1.2.840.10008.1.2.4.10") => "video",
+        s if s.starts_with("1.2.840.10008.1.2.4.20") => "high-throughput JPEG 2000",
         _ => "unknown here",
     }
 }

@@ -363,7 +363,7 @@ fn each_wrong_field_has_its_own_error() {
     assert_eq!(field(&|s| s.pixels = None), "PixelData");
     assert_eq!(
         field(&|s| {
-            s.syntax = "1.2.840.10008.1.2.4.91".into();
+            s.syntax = "1.2.840.10008.1.2.4.50".into();
             s.pixels = Some(Pixels::Fragments(vec![0..0, 0..4, 4..8, 8..12]));
         }),
         "TransferSyntaxUID"
