@@ -47,6 +47,13 @@ pub fn check(root: &Path) -> Result<()> {
     ensure!(number("/bone_removed_mm3") > 0.0, "the operation removed no bone");
     ensure!(number("/force_n/max") <= 3.3 + 1e-6, "a force over the device's limit: {} N", number("/force_n/max"));
     ensure!(number("/ticks") > 0.0, "no tick ran");
+    ensure!(number("/force_n/end") == 0.0, "the force did not end at zero");
+    ensure!(number("/solver/max_displacement_mm") > 1.0, "the probe did not move the brain");
+    let left = number("/solver/end_displacement_mm");
+    ensure!(left < 0.2 * number("/solver/max_displacement_mm"), "the brain did not come back: {left} mm are left");
+    ensure!(number("/scores/plunge_mm") <= 1.0, "the burr went {} mm into the brain", number("/scores/plunge_mm"));
+    let warned = summary["warnings"].as_array().is_some_and(|all| all.iter().any(|w| w["name"] == "brain-near"));
+    ensure!(warned, "nothing warned before the burr reached the brain");
     for file in ["report.html", "session.mcap", "drilled.nii.gz"] {
         if !out.join(file).is_file() {
             bail!("the operation left no {file}");

@@ -9,8 +9,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
-use trepan_render::{Camera, Frame, Renderer};
+use trepan_render::{Camera, Frame, Renderer, SliceLook};
 
+/// Half the height of what a slice shows around the tool, mm.
+const SLICE_MM: f32 = 60.0;
 /// Pictures that go into the report beside the first and the last.
 const SHOWN: usize = 4;
 
@@ -42,7 +44,7 @@ impl Album {
 pub fn camera(site: &Site) -> Camera {
     let outward = -site.inward;
     let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
-    Camera::viewed_from(site.entry, outward + 0.55 * side + 0.1 * Vec3::Z, 230.0)
+    Camera::viewed_from(site.entry, outward + 0.45 * side + 0.25 * Vec3::Z, 170.0)
 }
 
 /// A frame of the newest state.
@@ -54,6 +56,7 @@ pub fn frame<'a>(camera: Camera, view: &View, brain_positions: Option<&'a [Vec3]
         drilling: view.sample.drilling,
         brain_positions,
         show_bone: bone_shown,
+        slices: SliceLook { half_height_mm: Some(SLICE_MM), ..SliceLook::default() },
         ..Frame::of(camera)
     }
 }
