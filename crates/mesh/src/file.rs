@@ -4,7 +4,7 @@
 //! A file is read whole. A count in a header is compared with the bytes that are left before anything is allocated for it, so a
 //! header cannot ask for more than a few times the file's own size. A new file is written beside its place and then renamed.
 
-use crate::{MeshError, TetMesh};
+use crate::{MeshError, TetMesh, TriMesh};
 use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -48,12 +48,19 @@ pub(crate) struct Reader {
     path: PathBuf,
     bytes: Vec<u8>,
     at: usize,
+    /// From here to the end of its line nothing counts as a word.
+    pub(crate) comment: Option<u8>,
 }
 
 impl Reader {
     pub(crate) fn open(path: &Path) -> Result<Self, FileError> {
         let bytes = std::fs::read(path).map_err(|source| FileError::Io { path: path.into(), source })?;
-        Ok(Self { path: path.into(), bytes, at: 0 })
+        Ok(Self::of(path, bytes))
+    }
+
+    /// The content of a file that is already in memory.
+    pub(crate) fn of(path: &Path, bytes: Vec<u8>) -> Self {
+        Self { path: path.into(), bytes, at: 0, comment: None }
     }
 
     pub(crate) fn error(&self, field: impl Into<String>, got: impl Display, wanted: impl Into<String>) -> FileError {
@@ -77,25 +84,64 @@ impl Reader {
         Some(String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)).into_owned())
     }
 
-    /// The next line that is neither blank nor a comment starting with `comment`, trimmed.
-    pub(crate) fn content_line(&mut self, comment: char) -> Option<String> {
+    /// The next word between blanks.
+    pub(crate) fn word(&mut self) -> Option<&str> {
+        self.skip_blanks();
+        let rest = &self.bytes[self.at..];
+        let ends = |b: &u8| b.is_ascii_whitespace() || Some(*b) == self.comment;
+        let length = rest.iter().position(ends).unwrap_or(rest.len());
+        let from = self.at;
+        self.at += length;
+        if length == 0 { None } else { Some(std::str::from_utf8(&self.bytes[from..self.at]).unwrap_or("?")) }
+    }
+
+    fn skip_blanks(&mut self) {
+        let mut in_comment = false;
+        while let Some(&byte) = self.bytes.get(self.at) {
+            in_comment = (in_comment || Some(byte) == self.comment) && byte != b'\n';
+            if !in_comment && !byte.is_ascii_whitespace() {
+                return;
+            }
+            self.at += 1;
+        }
+    }
+
+    /// Leaves out words as long as they are numbers.
+    pub(crate) fn skip_numbers(&mut self) {
         loop {
-            let line = self.line()?;
-            let content = line.split(comment).next().unwrap_or_default().trim();
-            if !content.is_empty() {
-                return Some(content.to_owned());
+            let at = self.at;
+            if self.word().is_none_or(|word| word.parse::<f64>().is_err()) {
+                self.at = at;
+                return;
             }
         }
     }
 
-    /// The next word between blanks.
-    pub(crate) fn word(&mut self) -> Option<&str> {
-        let rest = &self.bytes[self.at..];
-        let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
-        let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
-        let from = self.at + start;
-        self.at = from + length;
-        if length == 0 { None } else { Some(std::str::from_utf8(&self.bytes[from..from + length]).unwrap_or("?")) }
+    /// Leaves out so many words, or all that there are.
+    pub(crate) fn skip_words(&mut self, count: usize) {
+        for _ in 0..count {
+            if self.word().is_none() {
+                return;
+            }
+        }
+    }
+
+    /// The next words as a position.
+    pub(crate) fn xyz(&mut self, node: usize) -> Result<Vec3, FileError> {
+        let field = format!("node {node}");
+        let mut coordinate = || self.number(&field, "three numbers");
+        let xyz = [coordinate()?, coordinate()?, coordinate()?];
+        self.position(node, xyz)
+    }
+
+    /// Goes on after the next line that starts with `start`; an error at the end of the file.
+    pub(crate) fn skip_past_line(&mut self, start: &str) -> Result<(), FileError> {
+        while let Some(line) = self.line() {
+            if line.starts_with(start) {
+                return Ok(());
+            }
+        }
+        Err(self.error(start, "missing", "at the end of its section; is the file cut off?"))
     }
 
     /// The next word, parsed.
@@ -175,6 +221,22 @@ impl Reader {
         mesh.check_indices().map_err(|source| FileError::Mesh { path: self.path.clone(), source })?;
         Ok(mesh)
     }
+
+    /// The surface, if it has triangles and their indices are in range.
+    pub(crate) fn surface(&self, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<TriMesh, FileError> {
+        if triangles.is_empty() {
+            return Err(self.error("the file", "without a triangle", "a surface"));
+        }
+        let out_of_range = |t: &[u32; 3]| t.iter().any(|&n| n as usize >= positions.len());
+        match triangles.iter().position(out_of_range) {
+            None => Ok(TriMesh { positions, triangles }),
+            Some(t) => Err(self.error(
+                format!("triangle {t}"),
+                format!("{:?}", triangles[t]),
+                format!("of nodes 0 to {}", positions.len().saturating_sub(1)),
+            )),
+        }
+    }
 }
 
 /// Writes a file under a temporary name in the same folder, then renames it: the old file, or the whole new one.
@@ -210,11 +272,9 @@ pub(crate) mod tests {
         mesh
     }
 
-    /// Feeds a reader thousands of damaged copies of a good file: cut, bytes changed, numbers swapped for others. It may
-    /// refuse or read them, but must not panic.
-    pub(crate) fn survive_mutations<T>(good: &[u8], name: &str, read: impl Fn(&Path) -> Result<T, FileError>) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(name);
+    /// Feeds a parser thousands of damaged copies of a good file: cut, bytes changed, bytes lost, numbers swapped for others. It may refuse or read them, but must
+    /// not panic, and a refusal must name the file.
+    pub(crate) fn survive_mutations<T>(good: &[u8], parse: impl Fn(Reader) -> Result<T, FileError>) {
         let mut random = 0x2545_F491_4F6C_DD1Du64;
         let mut next = |n: usize| {
             random ^= random << 13;
@@ -223,19 +283,26 @@ pub(crate) mod tests {
             (random >> 11) as usize % n.max(1)
         };
         let numbers: [&[u8]; 8] = [b"-1", b"0", b"4294967295", b"18446744073709551615", b"nan", b"1e400", b"", b"x"];
-        for round in 0..1500 {
+        for round in 0..20_000 {
             let mut bad = good.to_vec();
             match round % 4 {
                 0 => bad.truncate(next(good.len())),
                 1 => (0..=next(4)).for_each(|_| bad[next(good.len())] = next(256) as u8),
-                2 => drop(bad.splice(next(good.len())..good.len().min(next(good.len()) + 1).max(good.len()), [])),
+                2 => {
+                    let from = next(good.len());
+                    bad.drain(from..good.len().min(from + 1 + next(9)));
+                }
                 _ => replace_number(&mut bad, next(200), numbers[next(numbers.len())]),
             }
-            std::fs::write(&path, &bad).unwrap();
-            if let Err(error) = read(&path) {
-                assert!(error.to_string().contains(name), "{error}");
+            if let Err(error) = parse(Reader::of(Path::new("damaged.file"), bad)) {
+                assert!(error.to_string().contains("damaged.file"), "{error}");
             }
         }
+    }
+
+    /// What a parser says about a text.
+    pub(crate) fn of_text<T>(text: &str, parse: impl Fn(Reader) -> Result<T, FileError>) -> Result<T, FileError> {
+        parse(Reader::of(Path::new("some.file"), text.as_bytes().to_vec()))
     }
 
     /// Replaces the nth run of digits.

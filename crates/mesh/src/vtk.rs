@@ -20,7 +20,11 @@ const TETRAHEDRON: u8 = 10;
 
 /// Reads the tetrahedra of a legacy VTK file. Indices are checked; call [`TetMesh::check`] for the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
-    let mut file = Legacy { reader: Reader::open(path)?, binary: false, offsets: false };
+    parse(Reader::open(path)?)
+}
+
+pub(crate) fn parse(reader: Reader) -> Result<TetMesh, FileError> {
+    let mut file = Legacy { reader, binary: false, offsets: false };
     file.header()?;
     file.body()
 }
@@ -205,7 +209,7 @@ impl Legacy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::file::tests::{octahedron, survive_mutations};
+    use crate::file::tests::{octahedron, of_text, survive_mutations};
 
     fn text(cells: &str) -> String {
         let points = "0 0 0 1 0 0 0 1 0 0 0 1 0.5 0.5 0.5";
@@ -213,10 +217,7 @@ mod tests {
     }
 
     fn read_text(text: &str) -> Result<TetMesh, FileError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh.vtk");
-        std::fs::write(&path, text).unwrap();
-        read(&path)
+        of_text(text, parse)
     }
 
     #[test]
@@ -258,7 +259,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("good.vtk");
         write(&path, &octahedron()).unwrap();
-        survive_mutations(&std::fs::read(&path).unwrap(), "bad.vtk", read);
-        survive_mutations(text("CELLS 2 9\n3 0 1 2\n4 0 1 2 3\nCELL_TYPES 2\n5\n10\n").as_bytes(), "bad.vtk", read);
+        survive_mutations(&std::fs::read(&path).unwrap(), parse);
+        survive_mutations(text("CELLS 2 9\n3 0 1 2\n4 0 1 2 3\nCELL_TYPES 2\n5\n10\n").as_bytes(), parse);
     }
 }

@@ -224,7 +224,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(12))]
+        #![proptest_config(ProptestConfig::with_cases(4))]
         #[test]
         fn rough_masks_still_give_sound_meshes(seed in any::<u64>(), full in 40u64..100) {
             let mut state = seed | 1;

@@ -1,0 +1,383 @@
+//! VTK XML files (`.vtu`) of tetrahedra.
+//!
+//! # Theory
+//! An `UnstructuredGrid` with one `Piece`: `Points`, and `Cells` as `connectivity`, `offsets` and `types` (10 is the 4-node tetrahedron). A `DataArray` is text, or base64 between its tags,
+//! or at an offset in `AppendedData` (base64 or raw). Binary data start with their length, or, when compressed, with the number of blocks, the size of a
+//! block and of the last one, and each block's compressed size.
+//!
+//! # Practice
+//! Reads text, base64 and both kinds of appended data, plain or with zlib, both byte orders; cells of other types and all data on points and cells are left out.
+//! Several pieces, LZ4 and LZMA are refused by name. Writes base64, plain, f32. Positions are mm; corner order is ours.
+//!
+//! # Sources
+//! VTK File Formats, in The VTK User's Guide, 11th edition.
+
+use crate::TetMesh;
+use crate::base64;
+use crate::file::{FileError, Reader, write_atomically};
+use std::io::Read;
+use std::path::Path;
+use trepan_geometry::Vec3;
+
+const TETRAHEDRON: f64 = 10.0;
+
+/// Reads the tetrahedra of a VTK XML file. Indices are checked; call [`TetMesh::check`] for the rest.
+pub fn read(path: &Path) -> Result<TetMesh, FileError> {
+    parse(Reader::open(path)?)
+}
+
+/// Writes a mesh as VTK XML, whole or not at all.
+pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
+    let positions: Vec<u8> = mesh.positions.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect();
+    let connectivity: Vec<u8> = mesh.tets.iter().flatten().flat_map(|n| n.to_le_bytes()).collect();
+    let offsets: Vec<u8> = (1..=mesh.tets.len() as u64).flat_map(|n| (4 * n).to_le_bytes()).collect();
+    let types = vec![TETRAHEDRON as u8; mesh.tets.len()];
+    let inline = |bytes: &[u8]| base64::encode(&[&(bytes.len() as u64).to_le_bytes(), bytes].concat());
+    write_atomically(path, |out| {
+        let (nodes, cells) = (mesh.positions.len(), mesh.tets.len());
+        writeln!(out, "<?xml version=\"1.0\"?>")?;
+        writeln!(
+            out,
+            "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">"
+        )?;
+        writeln!(out, "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{cells}\">\n<Points>")?;
+        writeln!(out, "<DataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\" format=\"binary\">")?;
+        writeln!(out, "{}\n</DataArray>\n</Points>\n<Cells>", inline(&positions))?;
+        for (name, kind, bytes) in
+            [("connectivity", "UInt32", &connectivity), ("offsets", "Int64", &offsets), ("types", "UInt8", &types)]
+        {
+            writeln!(
+                out,
+                "<DataArray type=\"{kind}\" Name=\"{name}\" format=\"binary\">\n{}\n</DataArray>",
+                inline(bytes)
+            )?;
+        }
+        writeln!(out, "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>")
+    })
+}
+
+pub(crate) fn parse(mut reader: Reader) -> Result<TetMesh, FileError> {
+    let bytes = reader.take("the file", reader.size())?.to_vec();
+    Xml::new(&bytes, &reader)?.mesh()
+}
+
+/// The file, and what its first tags say about the arrays.
+struct Xml<'a> {
+    bytes: &'a [u8],
+    reader: &'a Reader,
+    big_endian: bool,
+    long_headers: bool,
+    zlib: bool,
+    /// Where appended data start, and whether they are raw.
+    appended: Option<(usize, bool)>,
+}
+
+/// A tag: its name and attributes as text, and where it ends.
+struct Tag<'a> {
+    text: &'a str,
+    end: usize,
+}
+
+impl<'a> Tag<'a> {
+    /// The next tag from `at` on that is no comment.
+    fn next(bytes: &'a [u8], mut at: usize) -> Option<Self> {
+        loop {
+            let start = at + bytes.get(at..)?.iter().position(|b| *b == b'<')? + 1;
+            let end = start + bytes[start..].iter().position(|b| *b == b'>')?;
+            if !bytes[start..].starts_with(b"!") && !bytes[start..].starts_with(b"?") {
+                return Some(Self { text: std::str::from_utf8(&bytes[start..end]).ok()?, end: end + 1 });
+            }
+            at = end + 1;
+        }
+    }
+
+    fn name(&self) -> &'a str {
+        self.text.split_ascii_whitespace().next().unwrap_or_default()
+    }
+
+    fn attribute(&self, name: &str) -> Option<&'a str> {
+        let from = self.text.match_indices(name).find_map(|(at, _)| {
+            let before = self.text[..at].chars().next_back().is_some_and(char::is_whitespace);
+            let rest = self.text[at + name.len()..].trim_start().strip_prefix('=')?.trim_start();
+            before.then_some(rest)
+        })?;
+        let quote = from.chars().next().filter(|c| *c == '"' || *c == '\'')?;
+        from[1..].split(quote).next()
+    }
+}
+
+impl<'a> Xml<'a> {
+    fn new(bytes: &'a [u8], reader: &'a Reader) -> Result<Self, FileError> {
+        let root = Tag::next(bytes, 0).filter(|t| t.name() == "VTKFile");
+        let root =
+            root.ok_or_else(|| reader.error("the first tag", "not VTKFile", "<VTKFile type=\"UnstructuredGrid\" …>"))?;
+        let kind = root.attribute("type").unwrap_or_default();
+        if kind != "UnstructuredGrid" {
+            return Err(reader.error("the type", kind, "UnstructuredGrid; convert it to tetrahedra"));
+        }
+        let zlib = match root.attribute("compressor") {
+            None => false,
+            Some("vtkZLibDataCompressor") => true,
+            Some(other) => {
+                return Err(reader.error(
+                    "the compressor",
+                    other,
+                    "none or vtkZLibDataCompressor; save it with another",
+                ));
+            }
+        };
+        let big_endian = root.attribute("byte_order") == Some("BigEndian");
+        let long_headers = root.attribute("header_type") == Some("UInt64");
+        Ok(Self { bytes, reader, big_endian, long_headers, zlib, appended: appended(bytes) })
+    }
+
+    fn mesh(&self) -> Result<TetMesh, FileError> {
+        let (mut points, mut connectivity, mut offsets, mut types) = (None, None, None, None);
+        let (mut at, mut section, mut pieces) = (0, "", 0);
+        while let Some(tag) = Tag::next(self.bytes, at) {
+            at = tag.end;
+            match (tag.name(), section, tag.attribute("Name")) {
+                ("AppendedData", ..) => break,
+                ("Piece", ..) => pieces += 1,
+                ("DataArray", "Points", _) => points = Some(self.array(&tag, "Points")?),
+                ("DataArray", "Cells", Some("connectivity")) => connectivity = Some(self.array(&tag, "connectivity")?),
+                ("DataArray", "Cells", Some("offsets")) => offsets = Some(self.array(&tag, "offsets")?),
+                ("DataArray", "Cells", Some("types")) => types = Some(self.array(&tag, "types")?),
+                ("DataArray" | "/DataArray", ..) => {}
+                (name, ..) => section = name,
+            }
+        }
+        if pieces != 1 {
+            return Err(self.reader.error("the number of pieces", pieces, "1; merge them where the file was made"));
+        }
+        let missing = |name: &str| self.reader.error(name, "missing", "a DataArray");
+        let points = points.ok_or_else(|| missing("Points"))?;
+        let positions = points.as_chunks::<3>().0.iter().enumerate().map(|(n, &xyz)| self.reader.position(n, xyz));
+        let (offsets, types) = (offsets.ok_or_else(|| missing("offsets"))?, types.ok_or_else(|| missing("types"))?);
+        let tets = self.tets(&connectivity.ok_or_else(|| missing("connectivity"))?, &offsets, &types)?;
+        self.reader.mesh(positions.collect::<Result<_, _>>()?, tets)
+    }
+
+    fn tets(&self, connectivity: &[f64], offsets: &[f64], types: &[f64]) -> Result<Vec<[u32; 4]>, FileError> {
+        if offsets.len() != types.len() {
+            let got = format!("{} for {} types", offsets.len(), types.len());
+            return Err(self.reader.error("the length of offsets", got, "one for each cell"));
+        }
+        let mut tets = Vec::new();
+        for (cell, _) in types.iter().enumerate().filter(|(_, t)| **t == TETRAHEDRON) {
+            let start = if cell == 0 { 0.0 } else { offsets[cell - 1] };
+            let nodes = connectivity.get(start as usize..offsets[cell] as usize).unwrap_or_default();
+            let corners = <[f64; 4]>::try_from(nodes).ok().map(|n| n.map(|n| n as u32));
+            let wanted = "4 nodes between its offsets";
+            tets.push(corners.ok_or_else(|| self.reader.error(format!("tetrahedron {cell}"), nodes.len(), wanted))?);
+        }
+        Ok(tets)
+    }
+
+    /// The numbers of an array.
+    fn array(&self, tag: &Tag, name: &str) -> Result<Vec<f64>, FileError> {
+        let rest = &self.bytes[tag.end..];
+        let inline = &rest[..rest.iter().position(|b| *b == b'<').unwrap_or(rest.len())];
+        match tag.attribute("format").unwrap_or("ascii") {
+            "ascii" => self.text_array(inline, name),
+            "binary" => {
+                let stream = base64::decode(inline).ok_or_else(|| self.damaged(name, "not base64"))?;
+                self.binary_array(tag, name, &stream)
+            }
+            "appended" => {
+                let offset = tag.attribute("offset").and_then(|o| o.parse::<usize>().ok());
+                let (start, raw) =
+                    self.appended.ok_or_else(|| self.reader.error("AppendedData", "missing", "there"))?;
+                let stream = offset
+                    .and_then(|o| self.bytes.get(start.checked_add(o)?..))
+                    .ok_or_else(|| self.damaged(name, "past the end"))?;
+                if raw {
+                    self.binary_array(tag, name, stream)
+                } else {
+                    self.binary_array(tag, name, &decoded_prefix(stream))
+                }
+            }
+            other => Err(self.reader.error(format!("the format of {name}"), other, "ascii, binary or appended")),
+        }
+    }
+
+    fn damaged(&self, name: &str, got: &str) -> FileError {
+        self.reader.error(format!("the data of {name}"), got, "complete; copy the file again")
+    }
+
+    fn text_array(&self, text: &[u8], name: &str) -> Result<Vec<f64>, FileError> {
+        let text = std::str::from_utf8(text).map_err(|_| self.damaged(name, "not text"))?;
+        let number =
+            |word: &str| word.parse().map_err(|_| self.reader.error(format!("a number of {name}"), word, "a number"));
+        text.split_ascii_whitespace().map(number).collect()
+    }
+
+    fn binary_array(&self, tag: &Tag, name: &str, stream: &[u8]) -> Result<Vec<f64>, FileError> {
+        let bytes = if self.zlib { self.inflated(stream) } else { self.plain(stream) };
+        let bytes = bytes.ok_or_else(|| self.damaged(name, "cut off or damaged"))?;
+        let kind = tag.attribute("type").unwrap_or_default();
+        let (size, of) = number_type(kind).ok_or_else(|| {
+            self.reader.error(format!("the type of {name}"), kind, "Float32, Float64 or Int/UInt of 8 to 64")
+        })?;
+        let number = |raw: &[u8]| {
+            let mut little = [0; 8];
+            little[..size].copy_from_slice(raw);
+            if self.big_endian {
+                little[..size].reverse();
+            }
+            of(little)
+        };
+        Ok(bytes.chunks_exact(size).map(number).collect())
+    }
+
+    /// A length in front of data, and how many bytes it takes.
+    fn length(&self, stream: &[u8], at: usize) -> Option<(usize, usize)> {
+        let size = if self.long_headers { 8 } else { 4 };
+        let mut little = [0; 8];
+        little[..size].copy_from_slice(stream.get(at..at.checked_add(size)?)?);
+        if self.big_endian {
+            little[..size].reverse();
+        }
+        Some((usize::try_from(u64::from_le_bytes(little)).ok()?, size))
+    }
+
+    fn plain(&self, stream: &[u8]) -> Option<Vec<u8>> {
+        let (length, header) = self.length(stream, 0)?;
+        Some(stream.get(header..header.checked_add(length)?)?.to_vec())
+    }
+
+    fn inflated(&self, stream: &[u8]) -> Option<Vec<u8>> {
+        let (blocks, size) = self.length(stream, 0)?;
+        let (block, _) = self.length(stream, size)?;
+        let mut at = blocks.checked_add(3)?.checked_mul(size)?;
+        let mut bytes = Vec::new();
+        for n in 0..blocks {
+            let (compressed, _) = self.length(stream, (3 + n) * size)?;
+            let raw = stream.get(at..at.checked_add(compressed)?)?;
+            let before = bytes.len();
+            flate2::read::ZlibDecoder::new(raw).take(block as u64).read_to_end(&mut bytes).ok()?;
+            if bytes.len() == before {
+                return None;
+            }
+            at += compressed;
+        }
+        Some(bytes)
+    }
+}
+
+/// The number that eight bytes mean.
+type Meaning = fn([u8; 8]) -> f64;
+
+/// Bytes of a number and what they mean, little-endian and filled up with zeros.
+fn number_type(kind: &str) -> Option<(usize, Meaning)> {
+    Some(match kind {
+        "Float32" => (4, |b| f32::from_bits(u64::from_le_bytes(b) as u32).into()),
+        "Float64" => (8, f64::from_le_bytes),
+        "Int8" => (1, |b| f64::from(b[0] as i8)),
+        "UInt8" => (1, |b| b[0].into()),
+        "Int16" => (2, |b| f64::from(u64::from_le_bytes(b) as i16)),
+        "UInt16" => (2, |b| f64::from(u64::from_le_bytes(b) as u16)),
+        "Int32" => (4, |b| f64::from(u64::from_le_bytes(b) as i32)),
+        "UInt32" => (4, |b| f64::from(u64::from_le_bytes(b) as u32)),
+        "Int64" => (8, |b| i64::from_le_bytes(b) as f64),
+        "UInt64" => (8, |b| u64::from_le_bytes(b) as f64),
+        _ => return None,
+    })
+}
+
+/// Where appended data start (after the underscore), and whether they are raw.
+fn appended(bytes: &[u8]) -> Option<(usize, bool)> {
+    let at = bytes.windows(13).position(|w| w == b"<AppendedData")?;
+    let tag = Tag::next(bytes, at)?;
+    let start = tag.end + bytes[tag.end..].iter().position(|b| *b == b'_')? + 1;
+    Some((start, tag.attribute("encoding") == Some("raw")))
+}
+
+/// What decodes as base64 at the start of a stream.
+fn decoded_prefix(stream: &[u8]) -> Vec<u8> {
+    let end = stream.iter().position(|b| *b == b'<').unwrap_or(stream.len());
+    base64::decode(&stream[..end]).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::file::tests::{octahedron, of_text, survive_mutations};
+    use std::io::Write;
+
+    const TEXT: &str = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"BigEndian\">\n<!-- note -->\n<UnstructuredGrid>\n\
+        <Piece NumberOfPoints=\"4\" NumberOfCells=\"2\">\n<PointData><DataArray type=\"Int8\" Name=\"x\">1 2 3 4</DataArray></PointData>\n\
+        <Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>\n\
+        <Cells><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2 0 1 2 3</DataArray>\n\
+        <DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">3 7</DataArray>\n\
+        <DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">5 10</DataArray></Cells>\n</Piece></UnstructuredGrid></VTKFile>\n";
+
+    fn zlib(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    /// [`TEXT`]'s mesh with raw appended, compressed data in two blocks each.
+    fn appended_file() -> Vec<u8> {
+        let points: Vec<u8> = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+            .iter()
+            .flat_map(|c| c.to_le_bytes())
+            .collect();
+        let cells: Vec<u8> = [0i64, 1, 2, 3].iter().flat_map(|c| c.to_le_bytes()).collect();
+        let mut data = Vec::new();
+        let mut offsets = Vec::new();
+        for bytes in [points, cells, 4i64.to_le_bytes().to_vec(), vec![10]] {
+            offsets.push(data.len());
+            let blocks: Vec<Vec<u8>> = bytes.chunks(16).map(zlib).collect();
+            let sizes = [blocks.len(), 16, bytes.len() % 16].into_iter().chain(blocks.iter().map(Vec::len));
+            data.extend(sizes.flat_map(|n| (n as u32).to_le_bytes()));
+            data.extend(blocks.concat());
+        }
+        let array = |n: usize, kind: &str, name: &str| {
+            format!("<DataArray type=\"{kind}\" Name=\"{name}\" format=\"appended\" offset=\"{}\"/>", offsets[n])
+        };
+        let mut file = format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\" compressor=\"vtkZLibDataCompressor\"><UnstructuredGrid>\
+             <Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points>{}</Points><Cells>{}{}{}</Cells></Piece></UnstructuredGrid><AppendedData encoding=\"raw\">_",
+            array(0, "Float32", "Points"), array(1, "Int64", "connectivity"), array(2, "Int64", "offsets"), array(3, "UInt8", "types"),
+        ).into_bytes();
+        file.extend(data);
+        file.extend(b"</AppendedData></VTKFile>");
+        file
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.vtu");
+        write(&path, &octahedron()).unwrap();
+        assert_eq!(read(&path).unwrap(), octahedron());
+        survive_mutations(&std::fs::read(&path).unwrap(), parse);
+    }
+
+    #[test]
+    fn text_and_appended_data_agree() {
+        let text = of_text(TEXT, parse).unwrap();
+        assert_eq!(text.tets, [[0, 1, 2, 3]]);
+        assert_eq!(parse(Reader::of(Path::new("appended"), appended_file())).unwrap(), text);
+    }
+
+    #[test]
+    fn faults_are_named() {
+        let fault = |from: &str, to: &str| of_text(&TEXT.replace(from, to), parse).unwrap_err().to_string();
+        assert!(fault("\"UnstructuredGrid\"", "\"PolyData\"").contains("type is PolyData"));
+        assert!(fault("3 7<", "3 9<").contains("tetrahedron 1"));
+        assert!(fault("0 1 2 3<", "0 1 2 4<").contains("names node 4"));
+        assert!(fault("5 10", "5").contains("length of offsets"));
+        assert!(fault("\"offsets\"", "\"off\"").contains("offsets is missing"));
+        assert!(fault("0 0 0 1<", "0 0 0 z<").contains("a number of Points"));
+        assert!(fault("byte_order", "compressor=\"vtkLZ4DataCompressor\" byte_order").contains("compressor"));
+    }
+
+    #[test]
+    fn damage_is_survived() {
+        survive_mutations(TEXT.as_bytes(), parse);
+        survive_mutations(&appended_file(), parse);
+    }
+}
