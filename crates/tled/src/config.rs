@@ -28,6 +28,9 @@ pub struct Config {
     pub cure_locking: bool,
     /// Stress that fades while the tissue is held.
     pub relaxation: Relaxation,
+    /// Threads that compute elements, 1 to 64, the caller among them; 1 starts none. The result has the same bits for any number. More than the
+    /// cores that are free gains nothing.
+    pub threads: usize,
     /// Which implementation of the element forces; all give the same bytes.
     pub kernel: Kernel,
 }
@@ -43,6 +46,7 @@ impl Default for Config {
             max_displacement: 2.0,
             cure_locking: false,
             relaxation: Relaxation::NONE,
+            threads: 1,
             kernel: Kernel::Fastest,
         }
     }
@@ -86,6 +90,9 @@ impl Config {
             return refuse("max_displacement", self.max_displacement, "over 0 and finite");
         }
         self.relaxation.check()?;
+        if !(1..=64).contains(&self.threads) {
+            return refuse("threads", self.threads as f32, "1 to 64");
+        }
         if !self.kernel.runs_here() {
             return refuse("kernel", 0.0, "a kernel whose instructions this CPU has; Fastest always runs");
         }

@@ -1,136 +1,83 @@
-//! The elements of a body: which law they obey, where their forces go, and what the nodes get of them.
-//!
-//! # Theory
-//! Every (element, corner) pair owns one slot. Slots lie sorted by node, so a node's force is the sum of one contiguous run, always in the
-//! same order: no atomics, no colouring, the same bits whatever computed the slots.
-//!
-//! ```text
-//! elements ──write──▶ slots │ node 0 │ node 1   │ node 2 │ …  ──sum──▶ nodes
-//! ```
+//! The elements of a body and what the nodes get of them.
 
-use crate::block::{Block, Forces, Memory, Quad, Volumes, WIDTH};
+use crate::block::{Quad, WIDTH};
+use crate::config::Config;
 use crate::kernel::{Found, Kernel};
-use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
 use crate::layout::Layout;
-use crate::relaxation::{Fade, Relaxation};
-use std::marker::PhantomData;
-use trepan_soft::{Body, Law};
+use crate::part::{Part, Work};
+use crate::relaxation::Relaxation;
+use crate::team::Team;
+use trepan_soft::Body;
 
-/// The elements of a body and their latest forces.
+/// Parts for every thread: so many that one can take over from another, so few that summing them stays cheap.
+const PARTS_PER_THREAD: usize = 2;
+
+/// The elements of a body and their latest forces on the nodes.
 pub(crate) struct Elements {
-    group: Box<dyn Group>,
-    slots: Vec<Quad>,
-    /// Slots of the node at each place: `starts[place]..starts[place + 1]`.
-    starts: Vec<u32>,
+    team: Team,
+    /// By place: force on the node, N, and volume share.
+    sums: Vec<Quad>,
     inverse_volume: Vec<f32>,
     kernel: Kernel,
     cure_locking: bool,
     relaxation: Relaxation,
 }
 
-/// Elements of one law.
-trait Group: Send {
-    fn forces(&mut self, kernel: Kernel, fade: [Fade; 2], cure_locking: bool, u: &[Quad], slots: &mut [Quad]) -> Found;
-    fn volumes(&self, kernel: Kernel, u: &[Quad], slots: &mut [Quad]);
-    fn forget(&mut self);
-}
-
-struct Of<M, const K: usize, const T: usize> {
-    blocks: Vec<Block<K>>,
-    memory: Vec<Memory<T>>,
-    law: PhantomData<M>,
-}
-
 impl Elements {
-    pub fn of(body: &Body, layout: &Layout, kernel: Kernel, cure_locking: bool, relaxation: Relaxation) -> Self {
-        let places = |t: u32| body.mesh.tets[t as usize].map(|n| layout.place_of[n as usize]);
-        let mut starts = vec![0u32; layout.node_at.len() + 1];
-        layout.tet_at.iter().flat_map(|&t| places(t)).for_each(|place| starts[place as usize + 1] += 1);
-        (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
+    pub fn of(body: &Body, layout: &Layout, config: &Config) -> Self {
         let mut volume = vec![0.0; layout.node_at.len()];
-        for &t in &layout.tet_at {
-            places(t).iter().for_each(|&p| volume[p as usize] += 0.25 * body.mesh.volume_mm3(t as usize));
+        for (t, tet) in body.mesh.tets.iter().enumerate() {
+            tet.iter().for_each(|&n| volume[layout.place_of[n as usize] as usize] += 0.25 * body.mesh.volume_mm3(t));
         }
+        let parts = if config.threads > 1 { PARTS_PER_THREAD * config.threads } else { 1 };
+        let blocks = layout.tet_at.len().div_ceil(WIDTH).div_ceil(parts);
+        let part = |tets: &[u32]| Part::of(body, layout, tets, &config.relaxation);
+        let parts = layout.tet_at.chunks(blocks * WIDTH).map(part).collect();
         Self {
-            group: group(body, layout, &starts, &relaxation),
-            slots: vec![[0.0; 4]; starts[starts.len() - 1] as usize + 1],
-            starts,
+            team: Team::of(parts, volume.len(), config.threads),
+            sums: vec![[0.0; 4]; volume.len()],
             inverse_volume: volume.iter().map(|v| (1.0 / v) as f32).collect(),
-            kernel: kernel.resolved(),
-            cure_locking,
-            relaxation,
+            kernel: config.kernel.resolved(),
+            cure_locking: config.cure_locking,
+            relaxation: config.relaxation,
         }
     }
 
     /// Computes every element's forces from displacements by place, `dt_ms` after the last time.
     pub fn compute(&mut self, u: &mut [Quad], dt_ms: f32) -> Found {
         if self.cure_locking {
-            self.group.volumes(self.kernel, u, &mut self.slots);
-            for place in 0..u.len() {
-                u[place][3] = self.sum(place)[3] * self.inverse_volume[place];
+            self.team.compute(self.kernel, Work::Volumes, u);
+            self.sum();
+            for ((u, sum), inverse) in u.iter_mut().zip(&self.sums).zip(&self.inverse_volume) {
+                u[3] = sum[3] * inverse;
             }
         }
-        let fade = self.relaxation.fade(dt_ms);
-        self.group.forces(self.kernel, fade, self.cure_locking, u, &mut self.slots)
+        let forces = Work::Forces { fade: self.relaxation.fade(dt_ms), cure_locking: self.cure_locking };
+        self.team.compute(self.kernel, forces, u);
+        self.sum()
     }
 
     /// Force of the elements on the node at `place`, N.
     #[inline(always)]
-    pub fn force(&self, place: usize) -> glam::Vec3A {
-        glam::Vec3A::from_vec4(self.sum(place))
+    pub fn force(&self, place: usize) -> glam::Vec3 {
+        let [x, y, z, _] = self.sums[place];
+        glam::Vec3::new(x, y, z)
     }
 
     /// Forgets past stress.
     pub fn forget(&mut self) {
-        self.group.forget();
+        self.team.each(Part::forget);
     }
 
-    #[inline(always)]
-    fn sum(&self, place: usize) -> glam::Vec4 {
-        let run = self.starts[place] as usize..self.starts[place + 1] as usize;
-        self.slots[run].iter().fold(glam::Vec4::ZERO, |sum, slot| sum + glam::Vec4::from_array(*slot))
-    }
-}
-
-/// The group for a body's law. Only the commonest law has a form without memory.
-fn group(body: &Body, layout: &Layout, starts: &[u32], relaxation: &Relaxation) -> Box<dyn Group> {
-    match body.material.law() {
-        Law::NeoHookean(_) if relaxation.is_none() => Box::new(Of::<NeoHookean, 2, 0>::new(body, layout, starts)),
-        Law::NeoHookean(_) => Box::new(Of::<NeoHookean, 2, 2>::new(body, layout, starts)),
-        Law::StVenantKirchhoff { .. } => Box::new(Of::<StVenantKirchhoff, 2, 2>::new(body, layout, starts)),
-        Law::MooneyRivlin { .. } => Box::new(Of::<MooneyRivlin, 3, 2>::new(body, layout, starts)),
-        Law::Ogden { .. } => Box::new(Of::<Ogden, 5, 2>::new(body, layout, starts)),
-    }
-}
-
-impl<M: Constitutive<K>, const K: usize, const T: usize> Of<M, K, T> {
-    fn new(body: &Body, layout: &Layout, starts: &[u32]) -> Self {
-        let (mut next, spare) = (starts.to_vec(), starts[starts.len() - 1]);
-        let mut blocks = vec![Block::empty(spare); layout.tet_at.len().div_ceil(WIDTH)];
-        for (at, &t) in layout.tet_at.iter().enumerate() {
-            let nodes = body.mesh.tets[t as usize].map(|n| layout.place_of[n as usize]);
-            let slots = nodes.map(|place| {
-                next[place as usize] += 1;
-                next[place as usize] - 1
-            });
-            blocks[at / WIDTH].put::<M>(at % WIDTH, &body.shape(t as usize), &body.material, [nodes, slots]);
-        }
-        Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; blocks.len()], blocks, law: PhantomData }
-    }
-}
-
-impl<M: Constitutive<K> + Send, const K: usize, const T: usize> Group for Of<M, K, T> {
-    fn forces(&mut self, kernel: Kernel, fade: [Fade; 2], cure_locking: bool, u: &[Quad], slots: &mut [Quad]) -> Found {
-        let (blocks, memory) = (&self.blocks, &mut self.memory);
-        kernel.run(&mut Forces::<M, K, T> { blocks, memory, fade, u, slots, cure_locking, law: PhantomData })
-    }
-
-    fn volumes(&self, kernel: Kernel, u: &[Quad], slots: &mut [Quad]) {
-        kernel.run(&mut Volumes { blocks: &self.blocks, u, slots });
-    }
-
-    fn forget(&mut self) {
-        self.memory.fill([[[0.0; WIDTH]; 6]; T]);
+    fn sum(&mut self) -> Found {
+        let (sums, mut all) = (&mut self.sums, Found::default());
+        sums.fill([0.0; 4]);
+        self.team.each(|part| {
+            part.add_to(sums);
+            all.inverted += part.found.inverted;
+            all.stiffest = all.stiffest.max(part.found.stiffest);
+        });
+        all
     }
 }
 
@@ -157,18 +104,24 @@ mod tests {
         let layout = Layout::of(&body.mesh);
         let noise = |i: usize| ((i as f32 * 12.9898).sin() * 43758.547).fract() * 3.0;
         let count = layout.node_at.len();
-        let forces = |kernel: Kernel| {
+        let forces = |kernel: Kernel, threads: usize| {
             let mut u: Vec<Quad> =
                 (0..count).map(|n| [noise(3 * n), noise(3 * n + 1), noise(3 * n + 2), 0.0]).collect();
-            let mut elements = Elements::of(body, &layout, kernel, cure, relaxation);
+            let mut elements = Elements::of(
+                body,
+                &layout,
+                &Config { kernel, cure_locking: cure, relaxation, threads, ..Config::default() },
+            );
             let found = (0..3).map(|_| elements.compute(&mut u, 0.7)).last();
             (found, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
         };
-        let scalar = forces(Kernel::Scalar);
+        let scalar = forces(Kernel::Scalar, 1);
         for kernel in Kernel::all().into_iter().filter(|k| k.runs_here()) {
-            assert_eq!(scalar, forces(kernel), "{} {:?}", kernel.name(), body.material);
+            for threads in [1, 2, 3] {
+                assert_eq!(scalar, forces(kernel, threads), "{} {threads} {:?}", kernel.name(), body.material);
+            }
         }
-        let total: glam::Vec3A = scalar.1.iter().map(|f| glam::Vec3A::from_array(*f)).sum();
+        let total: Vec3 = scalar.1.iter().map(|f| Vec3::from_array(*f)).sum();
         let largest = scalar.1.iter().flatten().fold(0.0f32, |m, f| m.max(f.abs()));
         assert!(largest > 0.0 && total.length() < 1e-5 * largest, "{total} {largest}");
     }

@@ -43,9 +43,11 @@ mod lane;
 mod law;
 mod layout;
 mod nodes;
+mod part;
 mod principal;
 mod relaxation;
 mod stiffness;
+mod team;
 mod tled;
 #[cfg(target_arch = "x86_64")]
 mod x86;

@@ -63,7 +63,7 @@ impl Nodes {
             if self.inverse_mass[place] == 0.0 {
                 continue;
             }
-            let force = Vec3::from(elements.force(place)) + self.external[place];
+            let force = elements.force(place) + self.external[place];
             let pull = update.gravity + force * self.inverse_mass[place];
             let carried = match update.rigid {
                 Some(rigid) => {

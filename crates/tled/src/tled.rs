@@ -39,7 +39,7 @@ impl Tled {
         let layout = Layout::of(&body.mesh);
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
         let mut nodes = Nodes::of(body, &layout);
-        let mut elements = Elements::of(body, &layout, config.kernel, config.cure_locking, config.relaxation);
+        let mut elements = Elements::of(body, &layout, config);
         Ok(Self {
             config: *config,
             stiffest_at_rest: elements.compute(&mut nodes.u, 0.0).stiffest,
@@ -73,7 +73,7 @@ impl Tled {
 
     /// Force that the support of a fixed node exerts on it, N, as of the last step; at a free node the force that accelerates it, reversed.
     pub fn support_force(&self, node: u32) -> Vec3 {
-        self.place_of.get(node as usize).map_or(Vec3::ZERO, |&place| -Vec3::from(self.elements.force(place as usize)))
+        self.place_of.get(node as usize).map_or(Vec3::ZERO, |&place| -self.elements.force(place as usize))
     }
 
     /// Puts every node back to its rest position, at rest, and forgets past stress.

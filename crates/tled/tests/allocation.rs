@@ -39,12 +39,13 @@ fn a_step_never_allocates() {
     contact.normalise();
     (contact.normal, contact.stiffness, contact.offset_mm) = (Vec3::Z, 0.3, -38.0);
     let loads = Loads { gravity: Vec3::NEG_Z * 9.81e-3, contact };
-    for held in [true, false] {
+    for (held, threads) in [(true, 1), (true, 2), (false, 1)] {
         if !held {
             body.fixed.clear();
         }
-        let mut tled = Tled::new(&body, &Config::default()).unwrap();
+        let mut tled = Tled::new(&body, &Config { threads, ..Config::default() }).unwrap();
         let dt = tled.stable_dt_ms() * 2.5;
+        tled.step(&loads, dt);
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         let report = (0..50).map(|_| tled.step(&loads, dt)).last().unwrap();
         assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);

@@ -44,17 +44,20 @@ fn press(stiffness: f32, damping: f32) -> Loads {
 }
 
 #[test]
-fn runs_repeat_bit_for_bit_and_kernels_agree_bit_for_bit() {
-    let end = |kernel| {
-        let mut tled = shaken(&Config { kernel, ..Config::default() }, 1.0);
+fn runs_repeat_bit_for_bit_whatever_the_kernel_and_the_number_of_threads() {
+    let end = |kernel, threads| {
+        let mut tled = shaken(&Config { kernel, threads, ..Config::default() }, 1.0);
         let dt = tled.stable_dt_ms();
         (0..500).for_each(|_| _ = tled.step(&press(0.3, 0.1), dt));
         tled.positions().iter().flat_map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>()
     };
-    let first = end(Kernel::Fastest);
-    assert_eq!(first, end(Kernel::Fastest));
+    let first = end(Kernel::Fastest, 1);
+    assert_eq!(first, end(Kernel::Fastest, 1));
     for kernel in Kernel::all().into_iter().filter(|kernel| kernel.runs_here()) {
-        assert!(first == end(kernel), "{}", kernel.name());
+        assert!(first == end(kernel, 1), "{}", kernel.name());
+    }
+    for threads in [2, 3, 8] {
+        assert!(first == end(Kernel::Fastest, threads), "{threads} threads");
     }
 }
 
