@@ -2,10 +2,11 @@
 //!
 //! # Theory
 //! ```text
-//! wanted → finite? → input sound? → passivity → ramp-in → clamp |F|, |τ| → slew → GuardedWrench
+//! wanted → finite? → input sound? → ramp-in → + damping → clamp |F|, |τ| → slew → energy bound → GuardedWrench
 //! ```
 //! Whatever comes in, what goes out is finite, no longer than the limit, and no further from the last wrench than the
-//! slew limit lets it. Vectors are shortened, never clipped by axis: the direction of a force is kept.
+//! slew limit lets it, but for one case: where a held force would give the hand energy that it never put in, the force falls faster.
+//! Vectors are shortened, never clipped by axis: the direction of a force is kept.
 //!
 //! # Practice
 //! Every event is counted in [`GuardCounters`]. A wanted wrench that is not finite, a pose that is not, a tool faster than the
@@ -96,6 +97,8 @@ pub struct GuardCounters {
     pub non_finite: u64,
     /// The passivity controller added damping.
     pub passivity: u64,
+    /// The force was shortened to what the energy account could pay for.
+    pub bounded: u64,
     /// The tool was faster than the cut-out, or jumped.
     pub too_fast: u64,
     /// The sample was older than the limit.
@@ -158,7 +161,8 @@ impl ForceGuard {
             goal.force += damping;
         }
         let goal = self.clamped(goal);
-        self.applied = self.slewed(goal, dt_ms);
+        let slewed = self.slewed(goal, dt_ms);
+        self.applied = self.bounded(slewed);
         GuardedWrench(self.applied)
     }
 
@@ -236,8 +240,8 @@ impl ForceGuard {
         let motion = self.last_tip.map_or(Vec3::ZERO, |last| tool.tip() - last);
         self.last_tip = Some(tool.tip());
         let Some(config) = &self.config.passivity else { return Vec3::ZERO };
-        self.observer.book(self.applied.force, motion, config);
-        let damping = self.observer.damping(motion / dt_ms, dt_ms, config);
+        self.observer.book(motion, config);
+        let damping = self.observer.damping(dt_ms, config);
         if !sound || damping == Vec3::ZERO || !damping.is_finite() {
             return Vec3::ZERO;
         }
@@ -275,6 +279,16 @@ impl ForceGuard {
                 goal.torque
             },
         }
+    }
+
+    /// Shortens the force to what the energy account can pay for.
+    fn bounded(&mut self, wrench: Wrench) -> Wrench {
+        let Some(config) = &self.config.passivity else { return wrench };
+        let share = self.observer.affordable(wrench.force, config);
+        self.counters.bounded += u64::from(share < 1.0);
+        let force = wrench.force * share;
+        self.observer.send(force);
+        Wrench { force, torque: wrench.torque }
     }
 }
 
@@ -422,7 +436,7 @@ mod tests {
             };
             let mut guard = ForceGuard::new(config);
             let limit = *guard.config();
-            let mut last = Wrench::ZERO;
+            let (mut last, mut bounded) = (Wrench::ZERO, 0);
             for (tool, x, release) in ticks {
                 if release { guard.release() } else { guard.resume() }
                 let wanted = Wrench { force: Vec3::new(x[0], x[1], x[2]), torque: Vec3::new(x[3], x[4], x[5]) };
@@ -431,7 +445,10 @@ mod tests {
                 prop_assert!(out.is_finite());
                 prop_assert!(out.force.length() <= limit.max_force_n && out.torque.length() <= limit.max_torque_nmm);
                 let slack = 1.0 + 1e-5;
-                prop_assert!(out.force.distance(last.force) <= limit.slew_n_per_ms * dt * slack + limit.max_force_n * 1e-6);
+                let bound = guard.counters().bounded;
+                let step = out.force.distance(last.force);
+                prop_assert!(step <= limit.slew_n_per_ms * dt * slack + limit.max_force_n * 1e-6 || bound > bounded);
+                bounded = bound;
                 prop_assert!(out.torque.distance(last.torque) <= limit.torque_slew_nmm_per_ms * dt * slack + limit.max_torque_nmm * 1e-6);
                 last = out;
             }

@@ -31,7 +31,12 @@
 //! # When not to use it
 //! For multibody dynamics: there is one tool, and one wrench at its tip.
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}
+
 mod force;
+mod friction;
 mod god_object;
 mod guard;
 mod hooke;
@@ -39,9 +44,11 @@ mod manifold;
 mod nodal;
 mod passivity;
 mod patch;
+mod vibration;
 mod viscoelastic;
 
 pub use force::ForceModel;
+pub use friction::Friction;
 pub use god_object::{GodObject, Plane};
 pub use guard::{ForceGuard, GuardConfig, GuardCounters, GuardedWrench};
 pub use hooke::Hooke;
@@ -49,4 +56,5 @@ pub use manifold::{Contact, ContactManifold, MAX_CONTACTS};
 pub use nodal::{MAX_NODES, NodalContact};
 pub use passivity::{PassivityConfig, PassivityObserver};
 pub use patch::SurfacePatch;
+pub use vibration::Vibration;
 pub use viscoelastic::Viscoelastic;
