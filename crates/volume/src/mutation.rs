@@ -33,7 +33,7 @@ fn mutated(seed: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = seed.to_vec();
     for _ in 0..1 + random.below(4) {
         let length = bytes.len().max(1);
-        let reach = if random.below(4) > 0 { 700 } else { length };
+        let reach = if random.below(4) > 1 { 700 } else { length };
         let at = random.below(length.min(reach));
         match random.below(7) {
             0 => bytes.truncate(random.below(length)),

@@ -418,3 +418,39 @@ fn run_lengths_unpack_to_exactly_the_pixels() {
     assert_eq!(rle::decode(&packed, 8, 1), Err(CodecError::Short(7)));
     assert!(matches!(rle::decode(&packed, 7, 2), Err(CodecError::Wrong(_))));
 }
+
+/// One slice in plain numbers, run lengths, JPEG-LS and JPEG 2000.
+fn compressed() -> [Vec<u8>; 4] {
+    [
+        include_bytes!("../../tests/data/MR_small.dcm").to_vec(),
+        include_bytes!("../../tests/data/MR_small_RLE.dcm").to_vec(),
+        include_bytes!("../../tests/data/MR_small_jpeg_ls_lossless.dcm").to_vec(),
+        include_bytes!("../../tests/data/MR_small_jp2klossless.dcm").to_vec(),
+    ]
+}
+
+/// A single picture, whatever its place.
+fn one_picture(bytes: Vec<u8>) -> Result<Import, ReadError> {
+    let file = Path::new("a");
+    let nothing = || ReadError::Format { file: file.into(), found: "no picture".into() };
+    let slice = Slice::parse(file, &bytes)?.ok_or_else(nothing)?;
+    let mut data = Vec::new();
+    pixels::frame(&slice, &bytes, 0, &mut data)?;
+    let volume = VoxelVolume { dims: [slice.columns, slice.rows, 1], data, world_from_voxel: glam::DAffine3::IDENTITY };
+    Ok(Import::new(volume, Vec::new()))
+}
+
+#[test]
+fn a_real_slice_has_the_same_numbers_in_every_compression() {
+    let [plain, others @ ..] = compressed().map(|bytes| one_picture(bytes).unwrap().volume);
+    let (low, high) = plain.data.iter().fold((f32::MAX, f32::MIN), |(l, h), &v| (l.min(v), h.max(v)));
+    assert!(plain.dims == [64, 64, 1] && low >= 0.0 && high > 500.0, "{low} to {high}");
+    for (n, other) in others.iter().enumerate() {
+        assert!(*other == plain, "compression {n}");
+    }
+}
+
+#[test]
+fn damaged_compressed_pictures_give_errors_and_no_panic() {
+    survives_mutations(&compressed(), one_picture);
+}

@@ -25,8 +25,17 @@ fn decode_trusting(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>), CodecError>
     let decoded = image.decode(&mut context).map_err(damaged)?;
     match decoded.components() {
         [one] if one.samples().len() == rows * columns => {
-            Ok((rows, columns, one.samples().iter().map(|v| v.round() as i32 as u16).collect()))
+            let shift = sign_shift(bytes);
+            Ok((rows, columns, one.samples().iter().map(|v| (v.round() as i32 - shift) as u16).collect()))
         }
         _ => Err(CodecError::Wrong("only one component is read")),
     }
+}
+
+/// What the decoder adds to signed numbers: half the range, which the stream's size segment (SIZ) tells; 0 for unsigned ones.
+fn sign_shift(bytes: &[u8]) -> i32 {
+    const START: [u8; 4] = [0xff, 0x4f, 0xff, 0x51];
+    let start = bytes.windows(4).position(|window| window == START);
+    let depth = start.and_then(|at| bytes.get(at + 42)).copied().unwrap_or(0);
+    if depth & 0x80 == 0 { 0 } else { 1 << (depth & 15) }
 }
