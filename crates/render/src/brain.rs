@@ -14,17 +14,24 @@ use trepan_mesh::{Surface, TetMesh};
 /// The brain's border on the device.
 #[derive(Debug)]
 pub(crate) struct Brain {
+    pub border: Border,
+    device: Device,
+    pipeline: Pipeline,
+}
+
+/// The border of the tetrahedra, as it moves.
+#[derive(Clone, Debug)]
+pub(crate) struct Border {
     /// Border nodes, as indices of the mesh.
     nodes: Vec<u32>,
     /// Triangles over `nodes`.
-    triangles: Vec<[u32; 3]>,
+    pub triangles: Vec<[u32; 3]>,
     /// All nodes at rest, world mm.
     rest: Vec<Vec3>,
     /// Border nodes now, world mm.
     pub places: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    device: Device,
-    pipeline: Pipeline,
+    /// Unit normals of border nodes now.
+    pub normals: Vec<Vec3>,
 }
 
 #[derive(Debug)]
@@ -35,19 +42,50 @@ struct Device {
     corners: Buffer<[u32; 3]>,
 }
 
-impl Brain {
-    pub fn new(gpu: &Gpu, mesh: &TetMesh) -> Result<Self, RenderError> {
+impl Border {
+    pub fn of(mesh: &TetMesh) -> Self {
         let surface = Surface::of(mesh);
         let nodes = surface.nodes();
         // Every corner is in the sorted list of nodes that was made from the corners.
         let local = |n: u32| nodes.partition_point(|&m| m < n) as u32;
         let triangles: Vec<[u32; 3]> = surface.triangles.iter().map(|t| t.map(local)).collect();
         let places: Vec<Vec3> = nodes.iter().map(|&n| mesh.positions[n as usize]).collect();
+        let normals = vec![Vec3::ZERO; nodes.len()];
+        Self { nodes, triangles, rest: mesh.positions.clone(), places, normals }
+    }
+
+    /// Moves the border to where the nodes of the whole mesh are, or back to rest.
+    pub fn follow(&mut self, positions: Option<&[Vec3]>) -> Result<(), RenderError> {
+        let positions = positions.unwrap_or(&self.rest);
+        let (given, wanted) = (positions.len(), self.rest.len());
+        if given != wanted {
+            return Err(RenderError::Nodes { wanted, given });
+        }
+        self.places.iter_mut().zip(&self.nodes).for_each(|(place, &n)| *place = positions[n as usize]);
+        smooth_normals(&self.places, &self.triangles, &mut self.normals);
+        Ok(())
+    }
+
+    /// Where a border node is at rest, world mm.
+    pub fn at_rest(&self, node: u32) -> Vec3 {
+        self.rest[self.nodes[node as usize] as usize]
+    }
+
+    /// The triangles of the border as they are now.
+    pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + Clone + '_ {
+        self.triangles.iter().map(|t| t.map(|n| self.places[n as usize]))
+    }
+}
+
+impl Brain {
+    pub fn new(gpu: &Gpu, mesh: &TetMesh) -> Result<Self, RenderError> {
+        let border = Border::of(mesh);
+        let nodes = border.nodes.len();
         let device = Device {
-            places: Buffer::zeroed(gpu, "brain places", nodes.len())?,
-            normals: Buffer::zeroed(gpu, "brain normals", nodes.len())?,
-            rest: Buffer::from_slice(gpu, "brain at rest", &places.iter().map(|p| p.extend(1.0)).collect::<Vec<_>>())?,
-            corners: Buffer::from_slice(gpu, "brain corners", &triangles)?,
+            places: Buffer::zeroed(gpu, "brain places", nodes)?,
+            normals: Buffer::zeroed(gpu, "brain normals", nodes)?,
+            rest: Buffer::from_slice(gpu, "brain at rest", &wide(&border.places))?,
+            corners: Buffer::from_slice(gpu, "brain corners", &border.triangles)?,
         };
         let slots = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage];
         let pipeline = Pipeline::new(
@@ -62,45 +100,35 @@ impl Brain {
                 topology: Topology::Triangles,
             },
         )?;
-        let normals = vec![Vec3::ZERO; nodes.len()];
-        Ok(Self { nodes, triangles, rest: mesh.positions.clone(), places, normals, device, pipeline })
+        Ok(Self { border, device, pipeline })
     }
 
     /// Moves the border to where the nodes of the whole mesh are, or back to rest.
     pub fn follow(&mut self, gpu: &Gpu, positions: Option<&[Vec3]>) -> Result<(), RenderError> {
-        let positions = positions.unwrap_or(&self.rest);
-        let (given, wanted) = (positions.len(), self.rest.len());
-        if given != wanted {
-            return Err(RenderError::Nodes { wanted, given });
-        }
-        self.places.iter_mut().zip(&self.nodes).for_each(|(place, &n)| *place = positions[n as usize]);
-        smooth_normals(&self.places, &self.triangles, &mut self.normals);
-        let wide = |v: &[Vec3]| v.iter().map(|p| p.extend(1.0)).collect::<Vec<_>>();
-        self.device.places.write(gpu, 0, &wide(&self.places));
-        self.device.normals.write(gpu, 0, &wide(&self.normals));
+        self.border.follow(positions)?;
+        self.device.places.write(gpu, 0, &wide(&self.border.places));
+        self.device.normals.write(gpu, 0, &wide(&self.border.normals));
         Ok(())
-    }
-
-    /// The triangles of the border as they are now.
-    pub fn triangles(&self) -> impl Iterator<Item = [Vec3; 3]> + Clone + '_ {
-        self.triangles.iter().map(|t| t.map(|n| self.places[n as usize]))
     }
 
     /// Binds the pass to the frame's uniform.
     pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Bindings, RenderError> {
         let d = &self.device;
-        Ok(self.pipeline.bind(
-            gpu,
-            &[scene.into(), (&d.places).into(), (&d.normals).into(), (&d.rest).into(), (&d.corners).into()],
-        )?)
+        let all = [scene.into(), (&d.places).into(), (&d.normals).into(), (&d.rest).into(), (&d.corners).into()];
+        Ok(self.pipeline.bind(gpu, &all)?)
     }
 
     /// Draws the border into what was cleared before.
     pub fn draw(&self, recorder: &mut Recorder, bindings: &Bindings, hit: &Texture, rest: &Texture, depth: &Texture) {
         let colours = [Target { texture: hit, clear: Some([0.0; 4]) }, Target { texture: rest, clear: Some([0.0; 4]) }];
         let target = DrawTarget { colours: &colours, depth: Some(Depth { texture: depth, clear: Some(1.0) }) };
-        recorder.draw("brain", &target, |d| d.draw(&self.pipeline, bindings, 3 * self.triangles.len() as u32));
+        let vertices = 3 * self.border.triangles.len() as u32;
+        recorder.draw("brain", &target, |d| d.draw(&self.pipeline, bindings, vertices));
     }
+}
+
+fn wide(vectors: &[Vec3]) -> Vec<Vec4> {
+    vectors.iter().map(|v| v.extend(1.0)).collect()
 }
 
 /// Area-weighted mean of the triangles' normals at every node; zero where all cancel.

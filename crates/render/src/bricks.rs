@@ -9,7 +9,7 @@
 //! One byte a brick. Drilling only makes bricks free; a brick that gets bone back (an undo) makes the distances anew, which costs about 1 ms.
 
 use glam::{IVec3, Vec3};
-use trepan_volume::{AIR_HU, BoneVolume};
+use trepan_volume::{AIR_HU, BRICK, BoneVolume};
 
 /// Edge of a brick of cells; `BRICK` in `bricks.wgsl`. Divides the bone's own brick.
 pub(crate) const LEAP: usize = 4;
@@ -54,6 +54,33 @@ impl Grid {
         self.dims.map(|n| n.div_ceil(BLOCK))
     }
 
+    /// First padded voxel and size of a brick of the bone's own voxels.
+    pub fn voxels_of(&self, brick: [usize; 3]) -> ([usize; 3], [usize; 3]) {
+        let first = brick.map(|b| b * BRICK + 1);
+        (first, [0, 1, 2].map(|a| BRICK.min(self.dims[a] - 1 - first[a])))
+    }
+
+    /// World box that a change of a brick of voxels may change the surface in, mm.
+    pub fn corners_of(&self, brick: [usize; 3]) -> (Vec3, Vec3) {
+        let (first, size) = self.voxels_of(brick);
+        let corner = |voxel: [usize; 3]| self.origin + self.spacing_mm * Vec3::from(voxel.map(|v| v as f32));
+        (corner(first.map(|v| v - 1)), corner([0, 1, 2].map(|a| first[a] + size[a])))
+    }
+
+    /// The blocks that share voxels with a brick of voxels.
+    pub fn blocks_of(&self, brick: [usize; 3]) -> Vec<[usize; 3]> {
+        let (first, size) = self.voxels_of(brick);
+        let low = first.map(|v| v / BLOCK);
+        let high = [0, 1, 2].map(|a| (first[a] + size[a] - 1) / BLOCK);
+        boxed(low, high, self.blocks())
+    }
+
+    /// Shares of bone of all blocks, x fastest.
+    pub fn shares(&self, bone: &BoneVolume) -> Vec<u8> {
+        let [bx, by, bz] = self.blocks();
+        (0..bx * by * bz).map(|at| self.share(bone, [at % bx, at / bx % by, at / (bx * by)])).collect()
+    }
+
     /// Share of bone in a block, 0 to 255.
     pub fn share(&self, bone: &BoneVolume, block: [usize; 3]) -> u8 {
         let count = corners(block.map(|b| b * BLOCK), BLOCK).filter(|&v| bone.is_bone(v - 1)).count();
@@ -66,6 +93,13 @@ pub(crate) fn corners(first: [usize; 3], edge: usize) -> impl Iterator<Item = IV
     let [x, y, z] = first.map(|v| v as i32);
     let edge = edge as i32;
     (0..edge).flat_map(move |k| (0..edge).flat_map(move |j| (0..edge).map(move |i| IVec3::new(x + i, y + j, z + k))))
+}
+
+/// All places from `low` to `high`, both taken, that lie inside `dims`.
+fn boxed(low: [usize; 3], high: [usize; 3], dims: [usize; 3]) -> Vec<[usize; 3]> {
+    let high = [0, 1, 2].map(|a| high[a].min(dims[a] - 1));
+    let rows = (low[2]..=high[2]).flat_map(|z| (low[1]..=high[1]).map(move |y| (y, z)));
+    rows.flat_map(|(y, z)| (low[0]..=high[0]).map(move |x| [x, y, z])).collect()
 }
 
 impl Leaps {
@@ -90,8 +124,17 @@ impl Leaps {
         x + self.bricks[0] * (y + self.bricks[1] * z)
     }
 
+    /// Looks again at the bricks of cells that touch a brick of voxels. Returns them, and whether the distances had to be made anew.
+    pub fn follow(&mut self, bone: &BoneVolume, brick: [usize; 3]) -> (Vec<[usize; 3]>, bool) {
+        let low = brick.map(|b| b * (BRICK / LEAP));
+        let cells = boxed(low, low.map(|v| v + BRICK / LEAP), self.bricks);
+        let mut anew = false;
+        cells.iter().for_each(|&c| anew |= self.refresh(bone, c));
+        (cells, anew)
+    }
+
     /// Looks at a brick of cells again. Whether the distances had to be made anew (else only this brick's entry may differ).
-    pub fn refresh(&mut self, bone: &BoneVolume, brick: [usize; 3]) -> bool {
+    fn refresh(&mut self, bone: &BoneVolume, brick: [usize; 3]) -> bool {
         let at = self.index(brick);
         let held = self.free[at] == 0;
         let holds = may_hold_bone(bone, brick);
@@ -192,12 +235,10 @@ mod tests {
         let mut leaps = Leaps::of(&bone, &grid);
         check(&bone, &leaps, true);
         bone.set_hu(IVec3::new(60, 20, 46), AIR_HU);
-        for brick in corners([14, 4, 10], 3).map(|b| b.to_array().map(|v| v as usize)) {
-            assert!(!leaps.refresh(&bone, brick));
-        }
+        assert!(!leaps.follow(&bone, [7, 2, 5]).1);
         check(&bone, &leaps, false);
         bone.set_hu(IVec3::new(40, 30, 20), 700);
-        assert!(leaps.refresh(&bone, [10, 7, 5]));
+        assert!(leaps.follow(&bone, [5, 3, 2]).1);
         check(&bone, &leaps, true);
     }
 

@@ -18,12 +18,10 @@ pub struct SceneData<'a> {
     pub mri: Option<&'a VoxelVolume<f32>>,
 }
 
-impl SceneData<'_> {
-    /// From the centre of the first voxel to that of the last, world mm.
-    pub fn bounds(&self) -> Aabb {
-        let last = IVec3::from(self.bone.dims().map(|n| n as i32 - 1));
-        Aabb { min: self.bone.origin(), max: self.bone.centre_of(last) }
-    }
+/// From the centre of the first voxel to that of the last, world mm.
+pub(crate) fn bounds(bone: &BoneVolume) -> Aabb {
+    let last = IVec3::from(bone.dims().map(|n| n as i32 - 1));
+    Aabb { min: bone.origin(), max: bone.centre_of(last) }
 }
 
 /// What one picture shows.

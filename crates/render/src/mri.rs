@@ -13,17 +13,32 @@ pub(crate) struct Mri {
     pub texture_from_world: Option<Mat4>,
 }
 
+/// The MRI as grey values.
+#[derive(Clone, Debug)]
+pub(crate) struct Greys {
+    pub dims: [usize; 3],
+    pub values: Vec<u8>,
+    /// Texture coordinates, 0 to 1, of a world point.
+    pub texture_from_world: Mat4,
+}
+
 impl Mri {
     pub fn new(gpu: &Gpu, volume: Option<&VoxelVolume<f32>>) -> Result<Self, RenderError> {
-        let size = volume.map_or([1; 3], |v| v.dims.map(|n| n as u32));
-        let texture = Texture::new(
-            gpu,
-            &TextureSpec { label: "mri", size, volume: true, format: Format::R8Unorm, drawn_to: false },
-        )?;
-        let Some(volume) = volume else { return Ok(Self { texture, texture_from_world: None }) };
+        let greys = volume.map(Greys::of).transpose()?;
+        let size = greys.as_ref().map_or([1; 3], |g| g.dims.map(|n| n as u32));
+        let spec = TextureSpec { label: "mri", size, volume: true, format: Format::R8Unorm, drawn_to: false };
+        let texture = Texture::new(gpu, &spec)?;
+        if let Some(greys) = &greys {
+            texture.write(gpu, [0; 3], size, &greys.values);
+        }
+        Ok(Self { texture, texture_from_world: greys.map(|g| g.texture_from_world) })
+    }
+}
+
+impl Greys {
+    pub fn of(volume: &VoxelVolume<f32>) -> Result<Self, RenderError> {
         let white = white(&volume.data);
-        let grey: Vec<u8> = volume.data.iter().map(|&v| (v / white * 255.0).clamp(0.0, 255.0) as u8).collect();
-        texture.write(gpu, [0; 3], size, &grey);
+        let values = volume.data.iter().map(|&v| (v / white * 255.0).clamp(0.0, 255.0) as u8).collect();
         let voxel_from_world = volume.world_from_voxel.inverse();
         if !voxel_from_world.is_finite() {
             return Err(RenderError::Mri);
@@ -31,7 +46,7 @@ impl Mri {
         let dims = DVec3::from(volume.dims.map(|n| n as f64));
         let texture_from_voxel = DAffine3::from_scale(1.0 / dims) * DAffine3::from_translation(DVec3::splat(0.5));
         let texture_from_world = DMat4::from(texture_from_voxel * voxel_from_world).as_mat4();
-        Ok(Self { texture, texture_from_world: Some(texture_from_world) })
+        Ok(Self { dims: volume.dims, values, texture_from_world })
     }
 }
 

@@ -6,7 +6,7 @@ use crate::camera::View;
 use crate::canvas::{Canvas, Division, Passes};
 use crate::contour::Contour;
 use crate::enlarge::Enlarge;
-use crate::frame::{Frame, SceneData};
+use crate::frame::{Frame, SceneData, bounds};
 use crate::image::Image;
 use crate::layout::Layout;
 use crate::light::Light;
@@ -20,6 +20,9 @@ use trepan_gpu::{Buffer, DrawTarget, Gpu, PassTime, Recorder, Target, Texture, T
 
 /// Changed bricks that one picture takes over, by default: 1 MiB of densities.
 pub const BRICKS_PER_FRAME: usize = 1024;
+
+/// Colour of the brain's outline in the slices.
+pub(crate) const OUTLINE: Vec3 = Vec3::new(1.0, 0.45, 0.55);
 
 /// Least share of the 3-D view's pixels along an edge.
 const LEAST_DETAIL: f32 = 0.05;
@@ -63,12 +66,12 @@ impl Renderer {
             enlarge: Enlarge::new(gpu)?,
         };
         let slices = Slices::new(gpu, &passes.scene, &passes.skull.density, &passes.mri.texture)?;
-        let outline = || Contour::new(gpu, &passes.scene, Vec3::new(1.0, 0.45, 0.55));
+        let outline = || Contour::new(gpu, &passes.scene, OUTLINE);
         let contour = passes.brain.is_some().then(outline).transpose()?;
         let canvas = Canvas::new(gpu, Division { size, slices: true, detail: 1.0 }, &passes)?;
         Ok(Self {
             gpu: gpu.clone(),
-            bounds: data.bounds(),
+            bounds: bounds(&data.bone),
             passes,
             slices,
             contour,
@@ -112,7 +115,7 @@ impl Renderer {
         let pixels_cast = if frame.show_bone {
             passes.skull.cast(recorder, &canvas.skull, view, &canvas.skull_hit)
         } else {
-            passes.skull.forget();
+            passes.skull.recast.forget();
             clear(recorder, &canvas.skull_hit, f64::from(NOTHING));
             0
         };
@@ -142,7 +145,7 @@ impl Renderer {
             Plane::three(frame.world_from_tool.translation, self.bounds, frame.slices.half_height_mm, rectangles);
         self.slices.follow(&self.gpu, &planes, rectangles, &frame.slices);
         match (&mut self.contour, &self.passes.brain) {
-            (Some(contour), Some(brain)) => contour.follow(&self.gpu, &planes, brain.triangles()),
+            (Some(contour), Some(brain)) => contour.follow(&self.gpu, &planes, brain.border.corners()),
             _ => 0,
         }
     }
@@ -161,7 +164,7 @@ impl Renderer {
     fn divide(&mut self, division: Division) -> Result<(), RenderError> {
         if self.canvas.division != division {
             self.canvas = Canvas::new(&self.gpu, division, &self.passes)?;
-            self.passes.skull.forget();
+            self.passes.skull.recast.forget();
         }
         Ok(())
     }

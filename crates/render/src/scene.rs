@@ -10,18 +10,18 @@ use trepan_geometry::{Tool, ToolKind};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Scene {
-    clip_from_world: Mat4,
-    mri_from_world: Mat4,
-    eye: Vec4,
-    right: Vec4,
-    up: Vec4,
-    forward: Vec4,
-    origin: Vec4,
-    dims: Vec4,
-    tip: Vec4,
-    tail: Vec4,
-    light: Vec4,
-    spin: Vec4,
+    pub clip_from_world: Mat4,
+    pub mri_from_world: Mat4,
+    pub eye: Vec4,
+    pub right: Vec4,
+    pub up: Vec4,
+    pub forward: Vec4,
+    pub origin: Vec4,
+    pub dims: Vec4,
+    pub tip: Vec4,
+    pub tail: Vec4,
+    pub light: Vec4,
+    pub spin: Vec4,
 }
 
 impl Scene {
@@ -52,6 +52,21 @@ impl Scene {
             light: towards_light(view).extend(flag(frame.drilling)),
             spin: across.extend(flag(tool.kind == ToolKind::Burr)),
         }
+    }
+
+    /// Unit direction of the ray through the middle of a pixel of the 3-D view.
+    pub fn ray_of(&self, x: usize, y: usize) -> Vec3 {
+        let x = 2.0 * (x as f32 + 0.5) / self.right.w - 1.0;
+        let y = 1.0 - 2.0 * (y as f32 + 0.5) / self.up.w;
+        (self.forward.truncate() + x * self.right.truncate() + y * self.up.truncate()).normalize()
+    }
+
+    /// Distance to the tool's surface, mm: a ball and a capsule.
+    pub fn tool_distance(&self, point: Vec3) -> f32 {
+        let (tip, axis) = (self.tip.truncate(), (self.tail - self.tip).truncate());
+        let along = ((point - tip).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
+        let shaft = point.distance(tip + along * axis) - self.tail.w;
+        shaft.min(point.distance(tip) - self.tip.w)
     }
 }
 

@@ -22,7 +22,7 @@ use trepan_gpu::{
 };
 
 /// Numbers of the letters R L A P S I in the shader's font.
-const LETTERS: [[f32; 4]; 3] = [[0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 4.0, 5.0], [2.0, 3.0, 4.0, 5.0]];
+pub(crate) const LETTERS: [[f32; 4]; 3] = [[0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 4.0, 5.0], [2.0, 3.0, 4.0, 5.0]];
 
 /// To the right and upwards in the picture: axial, coronal, sagittal; +x is the patient's right, +y the front, +z the head.
 const AXES: [[Vec3; 2]; 3] = [[Vec3::NEG_X, Vec3::Y], [Vec3::NEG_X, Vec3::Z], [Vec3::NEG_Y, Vec3::Z]];

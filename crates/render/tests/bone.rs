@@ -3,7 +3,7 @@
 mod scene;
 
 use glam::{DVec3, IVec3, Vec2, Vec3};
-use scene::{ISO, bone, device, renderer, volume};
+use scene::{ISO, alone, bone, device, renderer, volume};
 use std::sync::Arc;
 use trepan_gpu::Faults;
 use trepan_render::{Camera, Frame, Hit, Renderer, SliceLook, View};
@@ -32,7 +32,7 @@ fn a_ball_has_the_silhouette_depth_and_normals_of_a_ball() {
     let Some(gpu) = device() else { return };
     let (radius, distance, size) = (20.0f32, 120.0f32, [96, 96]);
     let bone = bone(56, |p| p.length() - f64::from(radius));
-    let mut renderer = renderer(&gpu, &bone, size);
+    let mut renderer = renderer(&gpu, &alone(&bone), size);
     for towards_eye in [Vec3::Y, Vec3::new(0.3, -0.8, 0.5), Vec3::Z, Vec3::NEG_X] {
         let camera = Camera { fov_rad: 0.5, ..Camera::viewed_from(Vec3::ZERO, towards_eye, distance) };
         let frame = plain(camera);
@@ -65,7 +65,7 @@ fn a_wall_of_one_voxel_is_never_lost() {
     for axis in 0..3 {
         let wall = volume(40, |p| if (p[axis] - 0.5).abs() < 0.1 { f64::from(ISO) + 1.0 } else { -1000.0 });
         let bone = Arc::new(BoneVolume::new(&wall, ISO).unwrap());
-        let mut renderer = renderer(&gpu, &bone, [48, 48]);
+        let mut renderer = renderer(&gpu, &alone(&bone), [48, 48]);
         let normal = Vec3::from(DVec3::AXES[axis].as_vec3());
         for tilt in [Vec3::ZERO, Vec3::new(0.9, 0.4, 0.2), Vec3::new(-0.2, 0.7, -0.8)] {
             let camera = Camera { fov_rad: 0.05, ..Camera::viewed_from(Vec3::ZERO, normal + tilt, 100.0) };
@@ -86,7 +86,7 @@ fn a_wall_of_one_voxel_is_never_lost() {
 fn rays_in_the_faces_of_bricks_and_along_the_axes_hit_like_any_other() {
     let Some(gpu) = device() else { return };
     let slab = bone(40, |p| p.y.abs() - 6.25);
-    let mut renderer = renderer(&gpu, &slab, [3, 3]);
+    let mut renderer = renderer(&gpu, &alone(&slab), [3, 3]);
     // The middle ray runs along an axis, exactly in a face between bricks: padded voxel 8 lies at -12.5 mm.
     for target in [Vec3::new(-12.5, 0.0, -12.5), Vec3::new(-12.5, 0.0, 0.2), Vec3::new(3.5, 0.0, 3.5), Vec3::ZERO] {
         let camera = Camera { fov_rad: 1e-3, ..Camera::viewed_from(target, Vec3::Y, 100.0) };
@@ -100,7 +100,7 @@ fn rays_in_the_faces_of_bricks_and_along_the_axes_hit_like_any_other() {
 fn a_camera_inside_sees_the_far_wall_and_one_in_bone_sees_bone() {
     let Some(gpu) = device() else { return };
     let shell = bone(64, |p| (p.length() - 25.0).abs() - 3.0);
-    let mut renderer = renderer(&gpu, &shell, [32, 24]);
+    let mut renderer = renderer(&gpu, &alone(&shell), [32, 24]);
     let hits = draw(&mut renderer, &plain(Camera::viewed_from(Vec3::new(0.0, -10.0, 0.0), Vec3::Y, 10.0)));
     assert!(hits.iter().all(|h| h.is_some_and(|h| (20.0..30.0).contains(&h.distance_mm))));
     let in_bone = draw(&mut renderer, &plain(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 25.0)));
@@ -112,7 +112,7 @@ fn a_camera_inside_sees_the_far_wall_and_one_in_bone_sees_bone() {
 fn bone_at_the_border_of_the_scan_has_a_closed_surface() {
     let Some(gpu) = device() else { return };
     let full = Arc::new(BoneVolume::new(&volume(20, |_| 1000.0), ISO).unwrap());
-    let mut renderer = renderer(&gpu, &full, [16, 16]);
+    let mut renderer = renderer(&gpu, &alone(&full), [16, 16]);
     let hits =
         draw(&mut renderer, &plain(Camera { fov_rad: 0.02, ..Camera::viewed_from(Vec3::ZERO, Vec3::NEG_X, 100.0) }));
     // From 1000 HU at -9.5 mm to -1000 HU at -10.5 mm: 400 HU lies at -9.8 mm.
@@ -129,7 +129,7 @@ fn odd_sizes_are_drawn_and_none_is_refused() {
     let Some(gpu) = device() else { return };
     let ball = bone(24, |p| p.length() - 8.0);
     for size in [[1, 1], [33, 17], [1, 50], [201, 99]] {
-        let mut renderer = renderer(&gpu, &ball, size);
+        let mut renderer = renderer(&gpu, &alone(&ball), size);
         renderer.draw(&Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 60.0))).unwrap();
         let image = renderer.image().unwrap();
         assert_eq!((image.width, image.height, image.rgba.len()), (size[0], size[1], 4 * (size[0] * size[1]) as usize));
@@ -146,7 +146,7 @@ fn a_drilled_voxel_is_seen_in_the_next_picture_and_nothing_else_changes() {
     let Some(gpu) = device() else { return };
     let block = bone(48, |p| p.abs().max_element() - 18.25);
     let size = [64, 64];
-    let mut renderer = renderer(&gpu, &block, size);
+    let mut renderer = renderer(&gpu, &alone(&block), size);
     let frame = plain(Camera::viewed_from(Vec3::ZERO, Vec3::new(0.2, 1.0, 0.3), 130.0));
     let before = draw(&mut renderer, &frame);
     assert_eq!(renderer.draw(&frame).unwrap().pixels_cast, 0, "a resting picture casts no ray");
@@ -172,7 +172,7 @@ fn a_drilled_voxel_is_seen_in_the_next_picture_and_nothing_else_changes() {
             assert_eq!(Some(b.distance_mm), a.map(|a| a.distance_mm));
         }
     }
-    let mut anew = scene::renderer(&gpu, &block, size);
+    let mut anew = scene::renderer(&gpu, &alone(&block), size);
     assert!(
         draw(&mut renderer, &frame) == draw(&mut anew, &frame),
         "a followed picture equals one that is loaded anew"
@@ -185,7 +185,7 @@ fn a_drilled_voxel_is_seen_in_the_next_picture_and_nothing_else_changes() {
 fn changes_over_the_limit_come_with_the_next_pictures() {
     let Some(gpu) = device() else { return };
     let block = bone(40, |p| p.abs().max_element() - 16.0);
-    let mut renderer = renderer(&gpu, &block, [24, 24]);
+    let mut renderer = renderer(&gpu, &alone(&block), [24, 24]);
     renderer.bricks_per_frame = 30;
     let frame = plain(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 130.0));
     renderer.draw(&frame).unwrap();

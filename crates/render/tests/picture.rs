@@ -1,21 +1,15 @@
 //! Brain, tool and slices in the finished picture.
 
+mod cube;
 mod scene;
 
+use cube::cube;
 use glam::{DAffine3, DVec3, Vec3};
-use scene::{bone, device, renderer};
+use scene::{alone, bone, device, renderer};
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::Faults;
-use trepan_mesh::TetMesh;
 use trepan_render::{Camera, Frame, Image, Layout, RenderError, Renderer, SceneData, SliceLook};
 use trepan_volume::VoxelVolume;
-
-/// A cube of five tetrahedra, from `-r` to `r`.
-fn cube(r: f32) -> TetMesh {
-    let positions =
-        (0..8).map(|n| Vec3::new(n as f32 % 2.0, (n / 2) as f32 % 2.0, (n / 4) as f32) * 2.0 * r - r).collect();
-    TetMesh { positions, tets: vec![[0, 1, 2, 4], [3, 2, 1, 7], [5, 1, 4, 7], [6, 2, 7, 4], [1, 2, 4, 7]] }
-}
 
 fn plain(camera: Camera) -> Frame<'static> {
     Frame { slices: SliceLook { shown: false, ..SliceLook::default() }, ..Frame::of(camera) }
@@ -39,7 +33,7 @@ fn the_brain_is_seen_where_it_is_and_hidden_by_bone() {
     let mesh = cube(8.0);
     assert!((0..5).all(|t| mesh.volume_mm3(t) > 0.0));
     let data = SceneData { bone: lid, brain: Some(&mesh), mri: None };
-    let mut renderer = Renderer::new(&gpu, &data, [64, 64]).unwrap();
+    let mut renderer = renderer(&gpu, &data, [64, 64]);
     let front = plain(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 120.0));
     let at_rest = picture(&mut renderer, &front);
     assert!(redness(&at_rest, 32, 32) > 30 && redness(&at_rest, 4, 32) < 10, "{:?}", at_rest.pixel(32, 32));
@@ -66,7 +60,7 @@ fn the_brain_is_seen_where_it_is_and_hidden_by_bone() {
 fn the_tool_is_where_its_pose_says_and_throws_a_shadow() {
     let Some(gpu) = device() else { return };
     let slab = bone(64, |p| (p.y + 20.0).abs() - 6.0);
-    let mut renderer = renderer(&gpu, &slab, [96, 96]);
+    let mut renderer = renderer(&gpu, &alone(&slab), [96, 96]);
     let frame = plain(Camera { fov_rad: 0.3, ..Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0) });
     let without = picture(&mut renderer, &frame);
     let along_the_sight = Pose::from_parts(Vec3::ZERO, Quat::from_rotation_arc(Vec3::Z, Vec3::NEG_Y));
@@ -111,7 +105,7 @@ fn slices_have_the_patients_right_on_the_left_and_show_density_and_signal() {
         }
     }
     let data = SceneData { bone: lump, brain: None, mri: Some(&mri) };
-    let mut renderer = Renderer::new(&gpu, &data, [200, 150]).unwrap();
+    let mut renderer = renderer(&gpu, &data, [200, 150]);
     let tip = Pose::from_translation(Vec3::new(15.0, 15.0, 15.0));
     let frame = Frame { world_from_tool: tip, ..Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0)) };
     let image = picture(&mut renderer, &frame);
@@ -172,7 +166,7 @@ fn the_same_frame_gives_the_same_bytes() {
         tool: Some(Tool::burr(3.0)),
         ..Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0), 90.0))
     };
-    let draw = || picture(&mut Renderer::new(&gpu, &data, [160, 120]).unwrap(), &frame);
+    let draw = || picture(&mut renderer(&gpu, &data, [160, 120]), &frame);
     assert_eq!(draw(), draw());
     assert_eq!(gpu.faults(), Faults::default());
 }
@@ -181,7 +175,7 @@ fn the_same_frame_gives_the_same_bytes() {
 fn a_coarser_view_looks_like_the_fine_one_and_leaves_the_slices_alone() {
     let Some(gpu) = device() else { return };
     let ball = bone(40, |p| p.length() - 12.0);
-    let mut renderer = renderer(&gpu, &ball, [240, 180]);
+    let mut renderer = renderer(&gpu, &alone(&ball), [240, 180]);
     let frame = Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0), 90.0));
     let fine = picture(&mut renderer, &frame);
     renderer.set_detail(0.5).expect("half the detail");

@@ -36,7 +36,12 @@ pub fn bone(edge: usize, distance: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
     Arc::new(BoneVolume::new(&volume(edge, |p| f64::from(ISO) - 100.0 * distance(p)), ISO).expect("the scene has bone"))
 }
 
-/// A renderer of bone alone.
-pub fn renderer(gpu: &Gpu, bone: &Arc<BoneVolume>, size: [u32; 2]) -> Renderer {
-    Renderer::new(gpu, &SceneData { bone: bone.clone(), brain: None, mri: None }, size).expect("the scene loads")
+/// A scene of bone alone.
+pub fn alone(bone: &Arc<BoneVolume>) -> SceneData<'static> {
+    SceneData { bone: bone.clone(), brain: None, mri: None }
+}
+
+/// A renderer on the device.
+pub fn renderer(gpu: &Gpu, data: &SceneData, size: [u32; 2]) -> Renderer {
+    Renderer::new(gpu, data, size).expect("the scene loads")
 }

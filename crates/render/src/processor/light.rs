@@ -1,0 +1,146 @@
+//! Twin of `light.wgsl`: takes the nearest of bone, brain and tool at a pixel and lights it.
+
+use super::brain::Fragment;
+use super::bricks::trilinear;
+use super::skull::Ray;
+use super::{Inputs, bytes};
+use crate::mri::Greys;
+use crate::scene::Scene;
+use crate::skull::NOTHING;
+use glam::Vec3;
+
+pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
+    let scene = inputs.scene;
+    let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
+    let held = scene.tip.w > 0.0;
+    let tip = if held { ball(eye, along, scene.tip.truncate(), scene.tip.w) } else { NOTHING };
+    let end = if held { ball(eye, along, scene.tail.truncate(), scene.tail.w) } else { NOTHING };
+    let stem = if held { shaft(scene, eye, along).min(end) } else { NOTHING };
+    let t = bone.t.min(brain.t).min(tip).min(stem);
+    let point = eye + t * along;
+    let colour = if t >= NOTHING {
+        let back = (y as f32 + 0.5) / scene.up.w;
+        Vec3::new(0.105, 0.125, 0.155).lerp(Vec3::new(0.035, 0.04, 0.05), back)
+    } else if t == tip || t == stem {
+        shade_tool(scene, point, along, t == tip, t == end)
+    } else if t == brain.t {
+        shade_brain(inputs, point, along, brain)
+    } else {
+        let key = past_tool(scene, point) * f32::from(u8::from(bone.lit));
+        lit(scene, bone_colour(inputs, point, bone.normal), bone.normal, along, bone.open, key, 0.06)
+    };
+    bytes(colour.clamp(Vec3::ZERO, Vec3::ONE).powf(1.0 / 2.2))
+}
+
+fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> Vec3 {
+    let scene = inputs.scene;
+    let (mut open, mut key) = (1.0, past_tool(scene, point));
+    if scene.forward.w > 0.0 {
+        let g = inputs.bricks.grid_of(point);
+        open = inputs.bricks.openness(g, brain.normal);
+        if inputs.bricks.shadowed(g, brain.normal, scene.light.truncate()) {
+            key *= 0.25;
+        }
+    }
+    let colour = brain_colour(inputs.mri, brain.rest - 1.5 * brain.normal);
+    lit(scene, colour, brain.normal, along, open, key, 0.20)
+}
+
+/// Distance along the ray to a ball, or [`NOTHING`].
+fn ball(eye: Vec3, along: Vec3, centre: Vec3, radius: f32) -> f32 {
+    let to = centre - eye;
+    let middle = to.dot(along);
+    let room = radius * radius - (to - middle * along).length_squared();
+    let t = middle - room.max(0.0).sqrt();
+    if room > 0.0 && t > 0.0 { t } else { NOTHING }
+}
+
+/// Distance along the ray to the shaft's mantle, or [`NOTHING`].
+fn shaft(scene: &Scene, eye: Vec3, along: Vec3) -> f32 {
+    let axis = (scene.tail - scene.tip).truncate();
+    let away = eye - scene.tip.truncate();
+    let length2 = axis.length_squared();
+    let a = length2 - axis.dot(along).powi(2);
+    let b = length2 * away.dot(along) - axis.dot(away) * axis.dot(along);
+    let c = length2 * (away.length_squared() - scene.tail.w.powi(2)) - axis.dot(away).powi(2);
+    let room = b * b - a * c;
+    let t = (-b - room.max(0.0).sqrt()) / a.max(1e-9);
+    let at = axis.dot(away) + t * axis.dot(along);
+    if room > 0.0 && t > 0.0 && at > 0.0 && at < length2 { t } else { NOTHING }
+}
+
+pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
+    let s = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    s * s * (3.0 - 2.0 * s)
+}
+
+/// Share of the lamp that passes a body at distance `gap` from the beam, `way` mm on.
+fn pass_by(gap: f32, way: f32) -> f32 {
+    smoothstep(-1.0, 1.0, gap / (0.10 * way + 0.3))
+}
+
+/// Light that passes the tool on its way to a point.
+fn past_tool(scene: &Scene, point: Vec3) -> f32 {
+    if scene.tip.w < 0.0 {
+        return 1.0;
+    }
+    let light = scene.light.truncate();
+    let to = scene.tip.truncate() - point;
+    let way = to.dot(light).max(0.0);
+    let by_ball = pass_by((to - way * light).length() - scene.tip.w, way);
+    let axis = (scene.tail - scene.tip).truncate();
+    let (b, c, d) = (light.dot(axis), axis.length_squared(), -light.dot(to));
+    let on_axis = ((-axis.dot(to) - b * d) / (c - b * b).max(1e-6)).clamp(0.0, 1.0);
+    let on_beam = (b * on_axis - d).max(0.0);
+    let gap = (on_beam * light - to - on_axis * axis).length() - scene.tail.w;
+    by_ball * pass_by(gap, on_beam)
+}
+
+/// Diffuse light from above left and from the sky, and a highlight.
+fn lit(scene: &Scene, albedo: Vec3, normal: Vec3, along: Vec3, open: f32, key: f32, gloss: f32) -> Vec3 {
+    let light = scene.light.truncate();
+    let facing = normal.dot(light).max(0.0) * key;
+    let sky = 0.5 + 0.5 * normal.dot(scene.up.truncate().normalize());
+    let ambient = open * Vec3::new(0.10, 0.09, 0.085).lerp(Vec3::new(0.25, 0.28, 0.33), sky);
+    let head = 0.12 * (0.25 + 0.75 * open) * (-normal.dot(along)).max(0.0);
+    let halfway = (light - along).normalize();
+    let shine = gloss * normal.dot(halfway).max(0.0).powf(48.0) * key * open;
+    albedo * (ambient + head + facing * Vec3::new(0.66, 0.63, 0.57)) + shine
+}
+
+fn bone_colour(inputs: &Inputs, point: Vec3, normal: Vec3) -> Vec3 {
+    let inside = inputs.bricks.hu(inputs.bricks.grid_of(point - normal * 1.2));
+    let isovalue = inputs.scene.dims.w;
+    let dense = smoothstep(isovalue, isovalue + 500.0, inside);
+    Vec3::new(0.80, 0.62, 0.50).lerp(Vec3::new(0.93, 0.89, 0.80), dense)
+}
+
+fn brain_colour(mri: Option<&Greys>, rest: Vec3) -> Vec3 {
+    let shade = mri.map_or(0.85, |greys| 0.45 + 0.85 * signal(greys, greys.texture_from_world.transform_point3(rest)));
+    Vec3::new(0.90, 0.50, 0.45) * shade
+}
+
+/// Grey value at texture coordinates, 0 to 1.
+pub(crate) fn signal(greys: &Greys, at: Vec3) -> f32 {
+    let voxel = at * Vec3::from(greys.dims.map(|n| n as f32)) - 0.5;
+    trilinear(greys.dims, voxel, |n| f32::from(greys.values[n]) / 255.0)
+}
+
+fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, on_ball: bool, on_end: bool) -> Vec3 {
+    let axis = (scene.tail - scene.tip).truncate().normalize();
+    let centre = if on_end { scene.tail } else { scene.tip };
+    let away = point - centre.truncate();
+    let normal = if on_ball || on_end { away } else { away - axis * away.dot(axis) }.normalize();
+    lit(scene, tool_colour(scene, point, axis, on_ball), normal, along, 1.0, 1.0, 0.7)
+}
+
+fn tool_colour(scene: &Scene, point: Vec3, axis: Vec3, on_ball: bool) -> Vec3 {
+    if !on_ball || scene.spin.w < 0.5 {
+        return Vec3::new(0.62, 0.66, 0.72);
+    }
+    let away = point - scene.tip.truncate();
+    let across = scene.spin.truncate();
+    let angle = away.dot(axis.cross(across)).atan2(away.dot(across));
+    let flute = smoothstep(-0.2, 0.5, (8.0 * angle + 3.0 * away.dot(axis) / scene.tip.w).sin());
+    Vec3::new(0.34, 0.36, 0.40).lerp(Vec3::new(0.80, 0.80, 0.78), flute)
+}

@@ -1,0 +1,38 @@
+//! Twin of `skull.wgsl`: the bone's isosurface at a pixel.
+
+use super::bricks::Bricks;
+use crate::scene::Scene;
+use crate::skull::NOTHING;
+use glam::Vec3;
+
+/// What a pixel's ray meets of the bone.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ray {
+    /// Distance, mm, or [`NOTHING`].
+    pub t: f32,
+    /// Unit, outwards.
+    pub normal: Vec3,
+    /// Ambient light that gets there.
+    pub open: f32,
+    /// Whether the lamp's light gets there.
+    pub lit: bool,
+}
+
+impl Ray {
+    pub const NONE: Self = Self { t: NOTHING, normal: Vec3::Z, open: 1.0, lit: false };
+}
+
+pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2]) -> Ray {
+    let along = scene.ray_of(x, y);
+    let o = bricks.grid_of(scene.eye.truncate());
+    let d = along / bricks.grid.spacing_mm;
+    let t = bricks.meet(o, d);
+    if t >= NOTHING {
+        return Ray::NONE;
+    }
+    let g = o + d * t;
+    let normal = bricks.outward_normal(g, along);
+    let towards_light = scene.light.truncate();
+    let lit = normal.dot(towards_light) > 0.0 && !bricks.shadowed(g, normal, towards_light);
+    Ray { t, normal, open: 0.999 * bricks.openness(g, normal), lit }
+}

@@ -1,0 +1,160 @@
+//! The picture without a device: against closed forms, and against the device's.
+
+mod cube;
+mod scene;
+
+use cube::cube;
+use glam::{DVec3, IVec3, Vec3};
+use scene::{alone, bone, device};
+use std::sync::Arc;
+use trepan_geometry::{Pose, Quat, Tool};
+use trepan_gpu::{Faults, GpuError};
+use trepan_mesh::TetMesh;
+use trepan_render::{Camera, Frame, Image, Painter, ProcessorRenderer, RenderError, SceneData};
+use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
+
+/// A shell with a hole that shows the brain in it, and a burr at the hole.
+fn head() -> (Arc<BoneVolume>, TetMesh, VoxelVolume<f32>, Frame<'static>) {
+    let hole = DVec3::new(-6.0, 22.0, 6.0);
+    let shell = bone(64, |p| {
+        let shell = (p.length() - 24.0).abs() - 3.0;
+        shell.max(9.0 - (p - hole).length())
+    });
+    let mut mri = VoxelVolume::isotropic([32; 3], Vec3::splat(-31.0), 2.0, 0.0f32);
+    for at in 0..mri.data.len() {
+        mri.data[at] = (at % 32 * 3 + at / 32 % 32 * 2) as f32;
+    }
+    let towards = Vec3::new(-0.3, 1.0, 0.35);
+    let world_from_tool = Pose::from_parts(
+        Vec3::new(-3.0, 27.0, 9.0),
+        Quat::from_rotation_arc(Vec3::Z, Vec3::new(0.5, 0.6, 0.6).normalize()),
+    );
+    let frame = Frame {
+        tool: Some(Tool::burr(3.0)),
+        world_from_tool,
+        turn_rad: 0.3,
+        ..Frame::of(Camera::viewed_from(Vec3::ZERO, towards, 130.0))
+    };
+    (shell, cube(12.0), mri, frame)
+}
+
+/// Structural similarity of two pictures' green channels over windows of 8x8 pixels (Wang et al. 2004).
+fn similarity(a: &Image, b: &Image) -> f64 {
+    let windows = (0..a.height / 8).flat_map(|y| (0..a.width / 8).map(move |x| (8 * x, 8 * y)));
+    let index = |(x, y): (u32, u32)| {
+        let pixels = (0..64).map(|n| (x + n % 8, y + n / 8));
+        let pairs: Vec<(f64, f64)> = pixels.map(|(x, y)| (a.pixel(x, y)[1].into(), b.pixel(x, y)[1].into())).collect();
+        let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / 64.0;
+        let (ma, mb) = (mean(&|p| p.0), mean(&|p| p.1));
+        let (va, vb) = (mean(&|p| (p.0 - ma).powi(2)), mean(&|p| (p.1 - mb).powi(2)));
+        let cov = mean(&|p| (p.0 - ma) * (p.1 - mb));
+        let (c1, c2) = (6.5025, 58.5225);
+        (2.0 * ma * mb + c1) * (2.0 * cov + c2) / ((ma * ma + mb * mb + c1) * (va + vb + c2))
+    };
+    let all: Vec<f64> = windows.map(index).collect();
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+#[test]
+fn the_processor_draws_the_devices_picture() {
+    let Some(gpu) = device() else { return };
+    let (shell, mesh, mri, frame) = head();
+    let data = SceneData { bone: shell.clone(), brain: Some(&mesh), mri: Some(&mri) };
+    let size = [320, 240];
+    let mut on_device = scene::renderer(&gpu, &data, size);
+    let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
+    for step in 0..3 {
+        if step == 1 {
+            let near = shell.voxel_of(frame.world_from_tool.translation - 4.0 * Vec3::Y);
+            (0..343).for_each(|n| shell.set_hu(near + IVec3::new(n % 7 - 3, n / 7 % 7 - 3, n / 49 - 3), AIR_HU));
+        }
+        let reports = (on_device.draw(&frame).expect("drawn"), on_processor.draw(&frame).expect("drawn"));
+        assert_eq!(reports.0, reports.1);
+        let (device, processor) = (on_device.bone_hits().expect("hits"), on_processor.bone_hits());
+        let differ = device.iter().zip(&processor).filter(|(d, p)| match (d, p) {
+            (Some(d), Some(p)) => {
+                (d.distance_mm - p.distance_mm).abs() > 0.01 || d.normal.angle_between(p.normal) > 0.01
+            }
+            (None, None) => false,
+            _ => true,
+        });
+        let differ = differ.count();
+        assert!(differ * 1000 <= device.len(), "{differ} of {} rays differ in step {step}", device.len());
+        let (device, processor) = (on_device.image().expect("picture"), on_processor.image());
+        let index = similarity(&device, processor);
+        assert!(index > 0.99, "similarity {index} in step {step}");
+    }
+    assert_eq!(gpu.faults(), Faults::default());
+}
+
+#[test]
+fn a_ball_drawn_by_the_processor_is_a_ball() {
+    let ball = bone(56, |p| p.length() - 20.0);
+    let data = alone(&ball);
+    let mut renderer = ProcessorRenderer::new(&data, [90, 60]).expect("the scene loads");
+    let frame = Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::X, 120.0));
+    renderer.draw(&frame).expect("drawn");
+    let view = renderer.view(&frame);
+    let disc = (20.0f32 / 120.0).asin().tan() / view.half.y * 30.0;
+    let seen = renderer.bone_hits().iter().flatten().count() as f32;
+    assert!((seen / (std::f32::consts::PI * disc * disc) - 1.0).abs() < 0.03, "{seen} pixels");
+    let nearest = renderer.bone_hits().iter().flatten().map(|h| h.distance_mm).fold(f32::MAX, f32::min);
+    assert!((nearest - 100.0).abs() < 0.05, "{nearest}");
+}
+
+#[test]
+fn threads_change_nothing_and_neither_does_following() {
+    let (shell, mesh, mri, frame) = head();
+    let data = SceneData { bone: shell.clone(), brain: Some(&mesh), mri: Some(&mri) };
+    let mut one = ProcessorRenderer::new(&data, [160, 120]).expect("the scene loads");
+    one.threads = 1;
+    one.draw(&frame).expect("drawn");
+    shell.set_hu(shell.voxel_of(Vec3::new(0.0, 26.0, -3.0)), AIR_HU);
+    let partial = one.draw(&frame).expect("drawn");
+    assert!(partial.bricks == 1 && partial.pixels_cast < 160 * 60, "{partial:?}");
+    one.draw(&frame).expect("drawn");
+    let mut anew = ProcessorRenderer::new(&data, [160, 120]).expect("the scene loads");
+    anew.threads = 5;
+    anew.draw(&frame).expect("drawn");
+    assert_eq!(one.image(), anew.image());
+}
+
+#[test]
+fn bad_sizes_and_brains_are_refused_and_odd_sizes_drawn() {
+    let (shell, mesh, _, frame) = head();
+    let data = SceneData { bone: shell, brain: Some(&mesh), mri: None };
+    assert_eq!(ProcessorRenderer::new(&data, [0, 4]).unwrap_err(), RenderError::Size(0, 4));
+    for size in [[1, 1], [33, 17], [5, 130]] {
+        let mut renderer = ProcessorRenderer::new(&data, size).expect("the scene loads");
+        renderer.draw(&frame).expect("drawn");
+        assert_eq!(renderer.image().rgba.len(), 4 * (size[0] * size[1]) as usize);
+        let few = Frame { brain_positions: Some(&[Vec3::ZERO]), ..frame };
+        assert_eq!(renderer.draw(&few).unwrap_err(), RenderError::Nodes { wanted: 8, given: 1 });
+    }
+}
+
+#[test]
+fn without_a_device_the_processor_draws_and_says_why() {
+    let (shell, mesh, mri, frame) = head();
+    let data = SceneData { bone: shell, brain: Some(&mesh), mri: Some(&mri) };
+    let mut painter = Painter::on(Err(GpuError::NoAdapter), &data, [120, 100]).expect("the scene loads");
+    assert!(painter.notice().is_some_and(|n| n.contains("mesa-vulkan-drivers")), "{:?}", painter.notice());
+    assert!(painter.name().contains("processor"));
+    let (image, report) = painter.picture(&frame).expect("drawn");
+    assert_eq!(([image.width, image.height], report.pixels_cast), ([120, 100], (120 - 33) * 100));
+    assert!(painter.into_renderer().is_err());
+}
+
+#[test]
+fn a_lost_device_leaves_the_picture_to_the_processor() {
+    let Some(gpu) = device() else { return };
+    let (shell, mesh, mri, frame) = head();
+    let data = SceneData { bone: shell, brain: Some(&mesh), mri: Some(&mri) };
+    let mut painter = Painter::on(Ok(gpu.clone()), &data, [160, 120]).expect("the scene loads");
+    let (before, _) = painter.picture(&frame).expect("drawn");
+    assert_eq!(painter.notice(), None);
+    gpu.device().destroy();
+    let (after, _) = painter.picture(&frame).expect("drawn in spite of the loss");
+    assert!(painter.notice().is_some_and(|n| n.contains("does not answer")), "{:?}", painter.notice());
+    assert!(similarity(&before, &after) > 0.99);
+}
