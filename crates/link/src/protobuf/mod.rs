@@ -21,7 +21,7 @@ pub(crate) use encode::encode;
 pub(crate) use schema::file_descriptor_set;
 
 /// A record that lists its protobuf fields.
-pub(crate) trait Fields: Default + Clone {
+pub trait Fields: Default + Clone {
     /// Message name, with its package.
     const NAME: &'static str;
 
@@ -30,10 +30,10 @@ pub(crate) trait Fields: Default + Clone {
 }
 
 /// The body of a nested message.
-pub(crate) type Nested<'a> = &'a mut dyn FnMut(&mut dyn Visit);
+pub type Nested<'a> = &'a mut dyn FnMut(&mut dyn Visit);
 
 /// Walks the fields of a record.
-pub(crate) trait Visit {
+pub trait Visit {
     fn uint32(&mut self, number: u32, name: &'static str, value: &mut u32);
     fn uint64(&mut self, number: u32, name: &'static str, value: &mut u64);
     fn float(&mut self, number: u32, name: &'static str, value: &mut f32);
@@ -54,7 +54,7 @@ pub(crate) mod wire_type {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TickRecord};
+    use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TeacherRecord, TickRecord};
     use proptest::prelude::*;
 
     /// Bytes of a record that is filled from `seed`, fields of every bit pattern, NaN and -0.0 included.
@@ -105,7 +105,7 @@ mod tests {
         #[test]
         fn every_bit_survives(seed: u64) {
             for (first, second) in [round_trip::<TickRecord>(seed), round_trip::<CollisionRecord>(seed),
-                                    round_trip::<SolverRecord>(seed), round_trip::<EventRecord>(seed)] {
+                                    round_trip::<SolverRecord>(seed), round_trip::<EventRecord>(seed), round_trip::<TeacherRecord>(seed)] {
                 prop_assert!(!first.is_empty());
                 prop_assert_eq!(first, second);
             }

@@ -1,7 +1,7 @@
 //! The fields of each record, numbered. A number, once given, is never given to another field.
 
 use super::{Fields, Visit};
-use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TeacherRecord, TickRecord};
 use trepan_geometry::{Pose, Twist, Vec3, Wrench};
 
 impl Fields for TickRecord {
@@ -62,6 +62,17 @@ impl Fields for EventRecord {
         v.double(2, "time_ms", &mut self.time_ms);
         v.string(3, "kind", &mut self.kind);
         v.string(4, "text", &mut self.text);
+    }
+}
+
+impl Fields for TeacherRecord {
+    const NAME: &'static str = "trepan.Teacher";
+
+    fn visit(&mut self, v: &mut dyn Visit) {
+        v.uint64(1, "seq", &mut self.seq);
+        pose(v, 2, "ghost", &mut self.ghost);
+        vector(v, 3, "marker", &mut self.marker);
+        v.uint32(4, "flags", &mut self.flags);
     }
 }
 

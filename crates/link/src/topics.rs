@@ -1,0 +1,213 @@
+//! Topics between processes on one machine: a teacher who watches a running simulator, and shows things back.
+//!
+//! # Theory
+//! Publish and subscribe through shared memory (iceoryx2): no daemon, no socket. A publisher never waits: a subscriber that
+//! is slow, stopped or dead loses old messages, and nobody else notices.
+//!
+//! ```text
+//!   simulator ──"tick", "event"──> watcher
+//!             <──"teacher"─────────
+//! ```
+//!
+//! # Practice
+//! Messages are the protobuf bytes of the recordings, at most [`MAX_MESSAGE_BYTES`]; publishing one costs a few µs. Publish from the
+//! recorder's thread, not from a haptic tick. [`Subscriber::newest`] says nothing of age: a publisher that died looks like a quiet one,
+//! so watch the sequence numbers against the clock. What a killed process leaves behind is cleared when the next one
+//! joins. Signals stay the program's own.
+//!
+//! # Sources
+//! <https://iceoryx.io>.
+//!
+//! # When not to use it
+//! Inside a process: [`crate::cell`] and [`crate::queue`] are ten times faster. Between machines: use iceoryx2's tunnel.
+
+use crate::protobuf::{decode, encode};
+use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TeacherRecord, TickRecord};
+use iceoryx2::port::publisher::Publisher as Port;
+use iceoryx2::port::subscriber::Subscriber as SubscriberPort;
+use iceoryx2::prelude::{LogLevel, Node, NodeBuilder, ServiceName, SignalHandlingMode, ipc_threadsafe, set_log_level};
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::marker::PhantomData;
+
+/// Longest message, bytes.
+pub const MAX_MESSAGE_BYTES: usize = 4096;
+/// Messages that a subscriber may be behind before it loses the oldest.
+const BUFFER: usize = 256;
+/// Simulators and watchers that may share a topic.
+const MAX_MEMBERS: usize = 16;
+
+type Service = ipc_threadsafe::Service;
+
+/// A record that can be published.
+pub trait Topic: sealed::Sealed {
+    /// Name of its topic within a session.
+    const TOPIC: &'static str;
+}
+
+mod sealed {
+    pub trait Sealed: crate::protobuf::Fields {}
+}
+
+macro_rules! topics {
+    ($($record:ty = $topic:literal),*) => {
+        $(
+            impl sealed::Sealed for $record {}
+            impl Topic for $record {
+                const TOPIC: &'static str = $topic;
+            }
+        )*
+    };
+}
+
+topics!(
+    TickRecord = "tick",
+    CollisionRecord = "collision",
+    SolverRecord = "solver",
+    EventRecord = "event",
+    TeacherRecord = "teacher"
+);
+
+/// A topic could not be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TopicError {
+    /// The session's name is not one.
+    #[error("{name:?} is no name for a session; give one of 1 to 100 letters, digits and hyphens")]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// Shared memory could not be set up.
+    #[error("cannot {what} in session {session:?}: {reason}; see whether /dev/shm is writable and has room")]
+    SharedMemory {
+        /// What was tried.
+        what: &'static str,
+        /// The session.
+        session: String,
+        /// The middleware's own words.
+        reason: String,
+    },
+    /// A message is too long.
+    #[error("a message of {bytes} bytes is too long for topic {topic}; the limit is {MAX_MESSAGE_BYTES}")]
+    TooLong {
+        /// Its length.
+        bytes: usize,
+        /// The topic.
+        topic: &'static str,
+    },
+}
+
+/// A process's seat at a session.
+pub struct Session {
+    node: Node<Service>,
+    name: String,
+}
+
+/// Publishes one sort of record.
+pub struct Publisher<T> {
+    port: Port<Service, [u8], ()>,
+    bytes: Vec<u8>,
+    session: String,
+    record: PhantomData<fn(T)>,
+}
+
+/// Receives one sort of record.
+pub struct Subscriber<T> {
+    port: SubscriberPort<Service, [u8], ()>,
+    garbled: u64,
+    record: PhantomData<fn() -> T>,
+}
+
+impl Session {
+    /// Joins a session by its name, and clears what dead processes left.
+    pub fn join(name: &str) -> Result<Self, TopicError> {
+        let sound = (1..=100).contains(&name.len()) && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-');
+        if !sound {
+            return Err(TopicError::Name { name: name.to_owned() });
+        }
+        set_log_level(LogLevel::Error);
+        let node = NodeBuilder::new()
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<Service>()
+            .map_err(|error| failed("join", name, &error))?;
+        Ok(Self { node, name: name.to_owned() })
+    }
+
+    /// A publisher of `T`.
+    pub fn publisher<T: Topic>(&self) -> Result<Publisher<T>, TopicError> {
+        let port = self.topic::<T>()?.publisher_builder().initial_max_slice_len(MAX_MESSAGE_BYTES).create();
+        let port = port.map_err(|error| failed("publish", &self.name, &error))?;
+        Ok(Publisher { port, bytes: Vec::with_capacity(512), session: self.name.clone(), record: PhantomData })
+    }
+
+    /// A subscriber to `T`, which begins with the newest message if there is one.
+    pub fn subscriber<T: Topic>(&self) -> Result<Subscriber<T>, TopicError> {
+        let port = self.topic::<T>()?.subscriber_builder().create();
+        let port = port.map_err(|error| failed("subscribe", &self.name, &error))?;
+        Ok(Subscriber { port, garbled: 0, record: PhantomData })
+    }
+
+    fn topic<T: Topic>(&self) -> Result<PortFactory<Service, [u8], ()>, TopicError> {
+        let name = format!("trepan/{}/{}", self.name, T::TOPIC);
+        let name = ServiceName::new(&name).map_err(|_| TopicError::Name { name: self.name.clone() })?;
+        self.node
+            .service_builder(&name)
+            .publish_subscribe::<[u8]>()
+            .enable_safe_overflow(true)
+            .history_size(1)
+            .subscriber_max_buffer_size(BUFFER)
+            .max_publishers(MAX_MEMBERS)
+            .max_subscribers(MAX_MEMBERS)
+            .max_nodes(2 * MAX_MEMBERS)
+            .open_or_create()
+            .map_err(|error| failed("open a topic", &self.name, &error))
+    }
+}
+
+impl<T: Topic> Publisher<T> {
+    /// Publishes a record, to however many listen. Never waits.
+    pub fn send(&mut self, record: &T) -> Result<(), TopicError> {
+        self.bytes.clear();
+        encode(record, &mut self.bytes);
+        if self.bytes.len() > MAX_MESSAGE_BYTES {
+            return Err(TopicError::TooLong { bytes: self.bytes.len(), topic: T::TOPIC });
+        }
+        let failed = |error: &dyn std::fmt::Debug| failed("publish", &self.session, error);
+        let sample = self.port.loan_slice_uninit(self.bytes.len()).map_err(|error| failed(&error))?;
+        sample.write_from_slice(&self.bytes).send().map_err(|error| failed(&error))?;
+        Ok(())
+    }
+}
+
+impl<T: Topic> Subscriber<T> {
+    /// The oldest message not yet received.
+    pub fn receive(&mut self) -> Result<Option<T>, TopicError> {
+        while let Some(sample) = self.port.receive().map_err(|error| failed("receive", T::TOPIC, &error))? {
+            match decode(&sample) {
+                Some(record) => return Ok(Some(record)),
+                None => self.garbled += 1,
+            }
+        }
+        Ok(None)
+    }
+
+    /// The newest message, if one came since the last call.
+    pub fn newest(&mut self) -> Result<Option<T>, TopicError> {
+        let mut newest = None;
+        for _ in 0..=BUFFER {
+            match self.receive()? {
+                Some(record) => newest = Some(record),
+                None => break,
+            }
+        }
+        Ok(newest)
+    }
+
+    /// Messages that made no sense, as from another version.
+    pub fn garbled(&self) -> u64 {
+        self.garbled
+    }
+}
+
+fn failed(what: &'static str, session: &str, reason: &dyn std::fmt::Debug) -> TopicError {
+    TopicError::SharedMemory { what, session: session.to_owned(), reason: format!("{reason:?}") }
+}

@@ -1,0 +1,131 @@
+//! Topics between two real processes: what is published arrives, and a death on either side harms nobody.
+#![cfg(feature = "topics")]
+#![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
+
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use trepan_geometry::Vec3;
+use trepan_link::topics::{MAX_MESSAGE_BYTES, Session, TopicError};
+use trepan_link::wire::{EventRecord, TeacherRecord, TickRecord};
+
+const ROLE: &str = "TREPAN_TEST_ROLE";
+
+fn session_name(test: &str) -> String {
+    format!("test-{test}-{}", std::process::id())
+}
+
+/// This test binary again, as another process that runs only [`other_process`].
+fn start(role: &str, session: &str) -> Child {
+    Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "other_process", "--nocapture"])
+        .env(ROLE, format!("{role} {session}"))
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// Tries until it is given something: slow machines wait, broken ones fail.
+fn wait_for<R>(mut attempt: impl FnMut() -> Option<R>) -> R {
+    for _ in 0..10_000 {
+        if let Some(result) = attempt() {
+            return result;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    panic!("nothing came");
+}
+
+/// What the other process does; alone, as an ordinary test, it has nothing to do.
+#[test]
+fn other_process() {
+    let Ok(role) = std::env::var(ROLE) else { return };
+    let (role, name) = role.split_once(' ').unwrap();
+    let session = Session::join(name).unwrap();
+    match role {
+        "simulator" => {
+            let mut ticks = session.publisher::<TickRecord>().unwrap();
+            for tick in 1.. {
+                ticks.send(&TickRecord { tick, depth_mm: 0.1 * tick as f32, ..TickRecord::default() }).unwrap();
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+        _ => {
+            let mut ticks = session.subscriber::<TickRecord>().unwrap();
+            let mut teacher = session.publisher::<TeacherRecord>().unwrap();
+            loop {
+                if let Some(tick) = ticks.newest().unwrap() {
+                    let marker = Vec3::new(tick.depth_mm, 0.0, 0.0);
+                    let flags = TeacherRecord::MARKER;
+                    teacher.send(&TeacherRecord { seq: tick.tick, marker, flags, ..TeacherRecord::default() }).unwrap();
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_watcher_sees_the_simulator_and_survives_its_death() {
+    let name = session_name("watch");
+    let session = Session::join(&name).unwrap();
+    let mut ticks = session.subscriber::<TickRecord>().unwrap();
+    for _ in 0..2 {
+        let mut simulator = start("simulator", &name);
+        let first = wait_for(|| ticks.newest().unwrap());
+        let later = wait_for(|| ticks.newest().unwrap().filter(|t| t.tick > first.tick + 5));
+        assert_eq!(later.depth_mm.to_bits(), (0.1 * later.tick as f32).to_bits());
+        simulator.kill().unwrap();
+        simulator.wait().unwrap();
+        wait_for(|| ticks.newest().unwrap().is_none().then_some(()));
+    }
+}
+
+#[test]
+fn a_simulator_hears_the_teacher_and_does_not_notice_its_death() {
+    let name = session_name("teach");
+    let session = Session::join(&name).unwrap();
+    let mut ticks = session.publisher::<TickRecord>().unwrap();
+    let mut teacher = session.subscriber::<TeacherRecord>().unwrap();
+    let mut watcher = start("watcher", &name);
+    let mut tick = 0;
+    let mut publish = || {
+        tick += 1;
+        ticks.send(&TickRecord { tick, depth_mm: tick as f32, ..TickRecord::default() }).unwrap();
+    };
+    let shown = wait_for(|| {
+        publish();
+        teacher.newest().unwrap()
+    });
+    assert_eq!((shown.marker.x, shown.flags), (shown.seq as f32, TeacherRecord::MARKER));
+    watcher.kill().unwrap();
+    watcher.wait().unwrap();
+    (0..2000).for_each(|_| publish());
+}
+
+#[test]
+fn a_slow_subscriber_loses_the_oldest_and_keeps_the_order() {
+    let session = Session::join(&session_name("slow")).unwrap();
+    let mut subscriber = session.subscriber::<TickRecord>().unwrap();
+    let mut publisher = session.publisher::<TickRecord>().unwrap();
+    for tick in 0..1000 {
+        publisher.send(&TickRecord { tick, ..TickRecord::default() }).unwrap();
+    }
+    let received: Vec<u64> = std::iter::from_fn(|| subscriber.receive().unwrap()).map(|t| t.tick).collect();
+    assert!(received.is_sorted() && received.last() == Some(&999) && received.len() >= 256, "{}", received.len());
+    assert_eq!(subscriber.garbled(), 0);
+}
+
+#[test]
+fn names_and_lengths_are_checked() {
+    for name in ["", "a/b", "ü", &"x".repeat(101)] {
+        assert!(matches!(Session::join(name), Err(TopicError::Name { .. })), "{name}");
+    }
+    let session = Session::join(&session_name("long")).unwrap();
+    let mut events = session.publisher::<EventRecord>().unwrap();
+    let mut received = session.subscriber::<EventRecord>().unwrap();
+    let long = EventRecord { text: "x".repeat(MAX_MESSAGE_BYTES), ..EventRecord::default() };
+    assert!(matches!(events.send(&long), Err(TopicError::TooLong { .. })));
+    let event = EventRecord { tick: 1, time_ms: 2.0, kind: "marker".into(), text: "½ mm".into() };
+    events.send(&event).unwrap();
+    assert_eq!(received.receive().unwrap(), Some(event));
+}
