@@ -13,6 +13,7 @@
 //! The stage has no clock and no device: the same readings and patches give the same wrenches, bit for bit, live or in a
 //! replay. A tick does not allocate, lock, log or panic.
 
+use crate::ahead::bone_ahead_mm;
 use crate::notice::{Notice, Warning, Watch, What};
 use crate::program::{Phase, Program};
 use crate::score::ScoreKeeper;
@@ -28,6 +29,11 @@ use trepan_volume::{BoneVolume, DistanceField};
 pub const FRESH_MS: f32 = 10.0;
 /// From this age on a patch gives no force, ms.
 pub const GONE_MS: f32 = 60.0;
+
+/// Bone this thin ahead of the burr is worth a warning, mm.
+const THIN_MM: f32 = 1.0;
+/// Bone this thin is about to give way, mm.
+const BREAK_MM: f32 = 0.3;
 
 /// What a haptic stage is built from.
 #[derive(Clone, Debug)]
@@ -305,6 +311,18 @@ impl HapticStage {
         }
     }
 
+    /// Bone left ahead of a burr that cuts, mm; infinite when it does not.
+    fn bone_ahead(&self, record: &TickRecord) -> f32 {
+        match &self.bone {
+            Some(bone) if record.has(TickRecord::DRILLING) && self.bone_step.manifold.touches() => {
+                let inward = self.proxy.rotation * Vec3::NEG_Z;
+                let front = self.proxy.translation + self.tool().tip_radius_mm * inward;
+                bone_ahead_mm(bone, front, inward, 2.0 * THIN_MM)
+            }
+            _ => f32::INFINITY,
+        }
+    }
+
     /// From the tool's ball to the brain's rest surface, mm; negative inside, infinite without a brain.
     fn brain_distance(&self, tip: Vec3) -> f32 {
         self.brain.as_ref().map_or(f32::INFINITY, |field| field.sample(tip) - self.tool().tip_radius_mm)
@@ -316,7 +334,10 @@ impl HapticStage {
         let touched = burr && (distance <= 0.0 || self.tissue.depth_mm > 0.0);
         let force = wanted.force.length();
         let age_ms = (record.time_ms - patch.time_ms) as f32;
+        let ahead_mm = self.bone_ahead(record);
         let causes = [
+            (Warning::BoneThin, ahead_mm <= THIN_MM, ahead_mm),
+            (Warning::BreakThrough, ahead_mm <= BREAK_MM, ahead_mm),
             (Warning::BrainNear, burr && distance <= self.config.near_mm, distance),
             (Warning::BrainTouched, touched, distance),
             (Warning::ForceLimit, record.has(TickRecord::CLAMPED), force),

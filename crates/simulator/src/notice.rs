@@ -8,6 +8,10 @@ use crate::program::Phase;
 /// A warning that can stand for a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Warning {
+    /// Less than a millimetre of bone is left ahead of the burr.
+    BoneThin,
+    /// The bone is about to give way.
+    BreakThrough,
     /// The burr is close to the brain.
     BrainNear,
     /// The burr touches the brain.
@@ -22,12 +26,21 @@ pub enum Warning {
 
 impl Warning {
     /// Every warning, in the order of their bits.
-    pub const ALL: [Self; 5] =
-        [Self::BrainNear, Self::BrainTouched, Self::ForceLimit, Self::TissueLate, Self::DeviceStale];
+    pub const ALL: [Self; 7] = [
+        Self::BoneThin,
+        Self::BreakThrough,
+        Self::BrainNear,
+        Self::BrainTouched,
+        Self::ForceLimit,
+        Self::TissueLate,
+        Self::DeviceStale,
+    ];
 
     /// A short name for files.
     pub fn name(self) -> &'static str {
         match self {
+            Self::BoneThin => "bone-thin",
+            Self::BreakThrough => "break-through",
             Self::BrainNear => "brain-near",
             Self::BrainTouched => "brain-touched",
             Self::ForceLimit => "force-limit",
@@ -39,6 +52,8 @@ impl Warning {
     /// What the trainee reads.
     pub fn text(self) -> &'static str {
         match self {
+            Self::BoneThin => "less than a millimetre of bone is left",
+            Self::BreakThrough => "the bone is about to give way",
             Self::BrainNear => "the drill is about to reach the brain",
             Self::BrainTouched => "the drill touches the brain",
             Self::ForceLimit => "the force is at the device's limit",
@@ -77,6 +92,7 @@ impl Notice {
             }
             What::Warning(warning, true, value) => {
                 let unit = match warning {
+                    Warning::BoneThin | Warning::BreakThrough => "mm left",
                     Warning::BrainNear | Warning::BrainTouched => "mm away",
                     Warning::ForceLimit => "N wanted",
                     Warning::TissueLate | Warning::DeviceStale => "ms old",

@@ -1,0 +1,75 @@
+//! How much bone is left ahead of the burr: the warning before the inner table gives way.
+//!
+//! # Theory
+//! A ray from the foremost point of the ball along the tool's axis, the density between voxel centres trilinear: the bone left is the
+//! length from there to where the density falls under the isovalue for good within the reach.
+//!
+//! # Practice
+//! Steps of a quarter voxel with the crossing interpolated: within 0.1 voxel on flat bone. 12 samples a millimetre at 1/3 mm voxels,
+//! 8 loads each: under 1 us for the 2 mm that the warnings ask for.
+//!
+//! # When not to use it
+//! For a burr that cuts with its side: what lies ahead is not what is being cut.
+
+use glam::IVec3;
+use trepan_geometry::Vec3;
+use trepan_volume::BoneVolume;
+
+/// Bone left along `direction` (unit) from `front`, mm, at most `reach_mm`; 0 when there is none.
+pub fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, reach_mm: f32) -> f32 {
+    let step = 0.25 * bone.spacing_mm();
+    let over = |mm: f32| density(bone, front + mm * direction) - f32::from(bone.isovalue());
+    let (mut left, mut last) = (0.0, over(0.0));
+    let steps = (reach_mm / step).ceil().clamp(0.0, 256.0) as usize;
+    for i in 1..=steps {
+        let (from, to) = ((i - 1) as f32 * step, i as f32 * step);
+        let now = over(to);
+        if now >= 0.0 {
+            left = to;
+        } else if last >= 0.0 {
+            left = from + step * last / (last - now);
+        }
+        last = now;
+    }
+    left.min(reach_mm)
+}
+
+/// Trilinear density, HU.
+fn density(bone: &BoneVolume, point: Vec3) -> f32 {
+    let grid = bone.grid_of(point);
+    let low = grid.floor();
+    let t = grid - low;
+    let voxel = low.as_ivec3();
+    let at = |i, j, k| f32::from(bone.hu(voxel + IVec3::new(i, j, k)));
+    let along_x = |j, k| at(0, j, k) + t.x * (at(1, j, k) - at(0, j, k));
+    let along_y = |k| along_x(0, k) + t.y * (along_x(1, k) - along_x(0, k));
+    along_y(0) + t.z * (along_y(1) - along_y(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_volume::VoxelVolume;
+
+    /// Bone from x = -3 to 3 mm, blurred over one voxel.
+    fn slab() -> BoneVolume {
+        let mut ct = VoxelVolume::isotropic([24, 8, 8], Vec3::new(-6.0, -2.0, -2.0), 0.5, 0i16);
+        for at in 0..ct.data.len() {
+            let x = -6.0 + 0.5 * (at % 24) as f32;
+            ct.data[at] = (400.0 + 2000.0 * (3.0 - x.abs())).clamp(-600.0, 1400.0) as i16;
+        }
+        BoneVolume::new(&ct, 400).expect("there is bone")
+    }
+
+    #[test]
+    fn what_is_left_of_a_slab_is_measured_below_the_voxel() {
+        let bone = slab();
+        for depth in [0.1f32, 0.77, 1.5, 3.33, 5.0, 5.9] {
+            let left = bone_ahead_mm(&bone, Vec3::X * (3.0 - depth), Vec3::NEG_X, 10.0);
+            assert!((left - (6.0 - depth)).abs() < 0.05, "{left} at depth {depth}");
+        }
+        assert_eq!(bone_ahead_mm(&bone, Vec3::X * 3.0, Vec3::NEG_X, 2.0), 2.0);
+        assert_eq!(bone_ahead_mm(&bone, Vec3::X * 4.0, Vec3::X, 2.0), 0.0);
+        assert_eq!(bone_ahead_mm(&bone, Vec3::NAN, Vec3::X, 2.0), 0.0);
+    }
+}
