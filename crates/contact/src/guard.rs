@@ -124,7 +124,8 @@ pub struct ForceGuard {
 impl ForceGuard {
     /// A guard that starts at no force and ramps in. Limits that are negative or not numbers count as zero.
     pub fn new(config: GuardConfig) -> Self {
-        let sound = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, 1e6) };
+        // Under a micronewton rounding would pass the limit.
+        let sound = |x: f32| if x > 1e-6 { x.min(1e6) } else { 0.0 };
         let config = GuardConfig {
             max_force_n: sound(config.max_force_n),
             max_torque_nmm: sound(config.max_torque_nmm),
