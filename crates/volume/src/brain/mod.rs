@@ -11,8 +11,8 @@
 //! mask    brain and a rim of 1 mm, brought to the MRI's grid between voxels, less bone
 //! ```
 //!
-//! Without a CT, r starts at 1 mm and grows by 0.5 mm until less than 0.5 % of the brain lies within 6 mm of the skin, where none can be:
-//! the smallest ball at which muscle and scalp let go.
+//! Without a CT, r starts at 1 mm and grows by 0.5 mm until less than 0.5 % of the brain lies within 6 mm of the skin, where none can be,
+//! and the mask is not larger than a brain: the smallest ball at which muscle and scalp let go.
 //!
 //! # Practice
 //! Seconds per head on two cores, linear in the voxels of the working grid. Against masks by other hands: Dice 0.93 to 0.95, the rest
@@ -139,6 +139,10 @@ pub fn brain_mask(
     Ok(mask)
 }
 
+fn millilitres(mask: &VoxelVolume<u8>) -> f64 {
+    mask.data.iter().filter(|&&v| v != 0).count() as f64 * mask.voxel_mm3() * 1e-3
+}
+
 /// Brain inside the skull: what has brain's grey values, opened, closed, within the room.
 fn in_room(mri: &VoxelVolume<f32>, room: &VoxelVolume<u8>, config: &BrainConfig) -> Option<VoxelVolume<u8>> {
     let to_wall = DistanceField::of_mask(room);
@@ -149,7 +153,8 @@ fn in_room(mri: &VoxelVolume<f32>, room: &VoxelVolume<u8>, config: &BrainConfig)
     Some(within(&brain, config.rim_mm, |at| room.data[at] != 0))
 }
 
-/// Brain by the MRI alone: the ball of the opening grows until nothing but a trace of the mask lies right under the skin.
+/// Brain by the MRI alone: the ball of the opening grows until nothing but a trace of the mask lies right under the skin and
+/// the volume is no longer too large.
 fn in_head(mri: &VoxelVolume<f32>, config: &BrainConfig) -> Option<VoxelVolume<u8>> {
     let depth = depth_in_head(mri);
     let levels = Levels::of(mri, |at| is_core(depth.data[at]))?;
@@ -158,9 +163,12 @@ fn in_head(mri: &VoxelVolume<f32>, config: &BrainConfig) -> Option<VoxelVolume<u
         let brain = opened(mri, tissue, config.opening_mm + 0.5 * step as f32)?;
         let inside = brain.data.iter().filter(|&&v| v != 0).count();
         let shallow = brain.data.iter().zip(&depth.data).filter(|&(&v, &d)| v != 0 && d < SHALLOW_MM).count();
-        if (shallow as f64) < LEAK * inside as f64 {
-            let brain = closed(&brain, config.closing_mm);
-            return Some(within(&brain, config.rim_mm, |_| true));
+        if shallow as f64 > LEAK * inside as f64 {
+            continue;
+        }
+        let closed = within(&closed(&brain, config.closing_mm), config.rim_mm, |_| true);
+        if millilitres(&closed) <= config.greatest_ml {
+            return Some(closed);
         }
     }
     None

@@ -72,7 +72,7 @@ impl Scan<'_> {
         if at == first {
             return self.half;
         }
-        let left_border = at % self.columns == 0;
+        let left_border = at.is_multiple_of(self.columns);
         if at < first + self.columns && !left_border {
             return pixels[at - 1];
         }
