@@ -17,7 +17,7 @@
 //! (they may tear), and for several materials with conforming borders: this is one material.
 
 mod bcc;
-mod distance;
+mod blur;
 mod field;
 mod manifold;
 mod stencil;
@@ -176,7 +176,8 @@ mod tests {
         let centre = world_from_voxel.transform_point3(DVec3::new(30.0, 20.0, 10.0));
         let mask = mask_of([60, 40, 20], world_from_voxel, |p| p.distance(centre) < 24.0);
         let mesh = tetrahedra(&mask, &Config { target_tets: 4000, ..Config::default() }).unwrap();
-        assert_sound(&mesh, 4000, 4.0 / 3.0 * std::f64::consts::PI * 24f64.powi(3));
+        let voxels = mask.data.iter().filter(|v| **v != 0).count();
+        assert_sound(&mesh, 4000, voxels as f64 * mask.voxel_mm3());
         assert!((mesh.bounds().centre().as_dvec3() - centre).length() < 1.0);
     }
 
