@@ -2,28 +2,28 @@
 
 use std::path::Path;
 use std::process::{Command, Stdio};
-use trepan_gpu::{Gpu, Prefer};
+use trepan_gpu::{Gpu, GpuError, Prefer};
 
 /// The packages that a Debian-like system needs for software Vulkan.
 const PACKAGES: [&str; 2] = ["libvulkan1", "mesa-vulkan-drivers"];
 
-/// A graphics device, or why there is none and what would help.
-pub fn open() -> Result<Gpu, String> {
-    let fault = match Gpu::open(Prefer::default()) {
-        Ok(gpu) => return Ok(gpu),
-        Err(fault) => fault.to_string(),
-    };
-    let command = format!("apt-get install -y {}", PACKAGES.join(" "));
-    if !Path::new("/usr/bin/apt-get").is_file() {
-        return Err(format!("no picture: {fault}"));
+/// A graphics device. Where there is none: brings the driver if that is allowed, else says what would.
+pub fn open() -> Result<Gpu, GpuError> {
+    let opened = Gpu::open(Prefer::default());
+    if !matches!(opened, Err(GpuError::NoAdapter)) || !Path::new("/usr/bin/apt-get").is_file() {
+        return opened;
     }
+    let command = format!("apt-get install -y {}", PACKAGES.join(" "));
     if !is_root() {
-        return Err(format!("no picture: {fault}; `sudo {command}` brings a software driver"));
+        tracing::warn!("no Vulkan driver here; `sudo {command}` brings a software driver");
+        return opened;
     }
     tracing::info!("no Vulkan driver here: installing Mesa's software driver ({command})");
-    install()?;
+    if !install() {
+        tracing::warn!("`{command}` failed; run it by hand");
+        return opened;
+    }
     Gpu::open(Prefer::default())
-        .map_err(|fault| format!("no picture, although Mesa's software driver was installed: {fault}"))
 }
 
 fn is_root() -> bool {
@@ -32,7 +32,7 @@ fn is_root() -> bool {
 }
 
 /// Installs; asks for fresh package lists only when the known ones do not serve.
-fn install() -> Result<(), String> {
+fn install() -> bool {
     let get = |arguments: &[&str]| {
         Command::new("apt-get")
             .args(arguments)
@@ -44,7 +44,5 @@ fn install() -> Result<(), String> {
             .is_ok_and(|status| status.success())
     };
     let packages: Vec<&str> = ["install", "-y", "--no-install-recommends"].into_iter().chain(PACKAGES).collect();
-    let done = get(&packages) || (get(&["update"]) && get(&packages));
-    done.then_some(())
-        .ok_or_else(|| format!("no picture: `apt-get install -y {}` failed; run it by hand", PACKAGES.join(" ")))
+    get(&packages) || (get(&["update"]) && get(&packages))
 }

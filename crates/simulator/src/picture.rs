@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
-use trepan_render::{Camera, Frame, Renderer, SliceLook};
+use trepan_render::{Camera, Frame, Image, Painter, SliceLook};
 
 /// Half the height of what a slice shows around the tool, mm.
 const SLICE_MM: f32 = 60.0;
@@ -71,7 +71,7 @@ pub fn wait(mut eyes: Eyes, stop: &Stop) {
 /// Draws `per_second` pictures a second into `folder` until the end, and one more then.
 pub fn draw(
     mut eyes: Eyes,
-    mut renderer: Renderer,
+    mut painter: Painter,
     scene: &Scene,
     bone_shown: bool,
     per_second: f64,
@@ -90,8 +90,8 @@ pub fn draw(
             next_ms = clock.now_ms().max(next_ms) + 1e3 / per_second.max(1e-3);
             let soft = eyes.soft.as_mut().map(|soft| soft.latest().0.positions.as_slice());
             let path = folder.join(format!("frame-{:05}.png", album.frames));
-            let drawn = renderer.draw(&frame(camera, &view, soft, bone_shown));
-            match drawn.map_err(|f| f.to_string()).and_then(|_| write(&mut renderer, &path)) {
+            let drawn = painter.picture(&frame(camera, &view, soft, bone_shown));
+            match drawn.map_err(|f| f.to_string()).and_then(|(image, _)| write(&image, &path)) {
                 Ok(()) => {
                     album.frames += 1;
                     candidates.push((view.time_ms * 1e-3, path));
@@ -108,20 +108,19 @@ pub fn draw(
         }
         std::thread::sleep(Duration::from_millis(5));
     }
+    album.faults.extend(painter.notice().map(String::from));
     album.shots = chosen(&candidates);
     album
 }
 
-fn write(renderer: &mut Renderer, path: &Path) -> Result<(), String> {
-    let image = renderer.image().map_err(|fault| fault.to_string())?;
+fn write(image: &Image, path: &Path) -> Result<(), String> {
     image.write_png(path).map_err(|fault| format!("{}: {fault}", path.display()))
 }
 
 /// One picture for the report.
-pub fn snap(renderer: &mut Renderer, frame: &Frame<'_>, folder: &Path, caption: &str) -> Result<Shot, String> {
-    renderer.draw(frame).map_err(|fault| fault.to_string())?;
+pub fn snap(image: &Image, folder: &Path, caption: &str) -> Result<Shot, String> {
     let path = folder.join(format!("frame-{caption}.png"));
-    write(renderer, &path)?;
+    write(image, &path)?;
     Ok(Shot { caption: caption.into(), png: std::fs::read(&path).map_err(|fault| fault.to_string())? })
 }
 

@@ -24,7 +24,7 @@ use trepan_geometry::{ToolState, Vec3, units};
 use trepan_haptics::{DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, script::Script, simulated};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
-use trepan_render::{Renderer, SceneData};
+use trepan_render::{Painter, SceneData};
 use trepan_soft::{Body, Material, SoftSolver};
 
 /// A session that is ready to run.
@@ -212,16 +212,15 @@ impl Session {
             return Err("no picture was asked for".into());
         }
         let bone = self.scene.bone.clone().ok_or("no picture without a CT")?;
-        let gpu = driver::open().inspect_err(|fault| tracing::warn!("{fault}"))?;
         let data = SceneData {
             bone,
             brain: self.scene.brain.as_ref().map(|brain| &brain.mesh),
             mri: self.scene.brain.as_ref().map(|brain| &brain.mri),
         };
         let [width, height] = self.options.picture;
-        let adapter = gpu.name();
-        let renderer = Renderer::new(&gpu, &data, [width, height]).map_err(|fault| fault.to_string())?;
-        Ok(Graphics { adapter, renderer: Some(renderer) })
+        let painter = Painter::on(driver::open(), &data, [width, height]).map_err(|fault| fault.to_string())?;
+        painter.notice().inspect(|notice| tracing::warn!("{notice}"));
+        Ok(Graphics { adapter: painter.name(), painter: Some(painter) })
     }
 
     fn picture(
@@ -231,15 +230,22 @@ impl Session {
         pointer: Option<mouse::MouseHandle>,
         stop: &Stop,
     ) -> Album {
-        let Some(renderer) = graphics.as_mut().ok().and_then(|g| g.renderer.take()) else {
+        let Some(painter) = graphics.as_mut().ok().and_then(|g| g.painter.take()) else {
             picture::wait(eyes, stop);
             return Album::default();
         };
         let (bone_shown, folder) = (self.program.has_bone(), self.out.join("frames"));
-        if self.windowed {
-            return window::show(eyes, renderer, &self.scene, self.program, pointer, &folder, stop);
+        let draw = |eyes, painter| {
+            let per_second = self.options.frames_per_second;
+            picture::draw(eyes, painter, &self.scene, bone_shown, per_second, &folder, stop)
+        };
+        if !self.windowed {
+            return draw(eyes, painter);
         }
-        picture::draw(eyes, renderer, &self.scene, bone_shown, self.options.frames_per_second, &folder, stop)
+        match painter.into_renderer() {
+            Ok(renderer) => window::show(eyes, renderer, &self.scene, self.program, pointer, &folder, stop),
+            Err(painter) => draw(eyes, painter),
+        }
     }
 
     fn pace(&self) -> Pace {
@@ -315,7 +321,7 @@ fn fault_of(watch: &Watch) -> Option<String> {
 
 struct Graphics {
     adapter: String,
-    renderer: Option<Renderer>,
+    painter: Option<Painter>,
 }
 
 const TLED: &str = "tled";

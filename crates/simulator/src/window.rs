@@ -7,6 +7,7 @@
 use crate::notice::Warning;
 use crate::picture::{Album, camera, frame, snap};
 use crate::program::{Phase, Program};
+use crate::report::Shot;
 use crate::run::{Eyes, View};
 use crate::scene::Scene;
 use crate::stop::Stop;
@@ -14,7 +15,7 @@ use std::path::Path;
 use trepan_geometry::{Buttons, Vec3};
 use trepan_haptics::mouse::MouseHandle;
 use trepan_render::window::{self, Panel, Start, WindowInput};
-use trepan_render::{Camera, Frame, Renderer};
+use trepan_render::{Camera, Frame, RenderError, Renderer};
 
 /// Whether a window can be opened here.
 pub fn has_display() -> bool {
@@ -64,19 +65,27 @@ pub fn show(
     let view = *eyes.view.latest().0;
     let eye = camera(&scene.site);
     let bone_shown = scene.bone.is_some() && program.has_bone();
-    album.add(snap(&mut renderer, &frame(eye, &view, None, bone_shown), folder, "before"));
+    album.add(shot(&mut renderer, &frame(eye, &view, None, bone_shown), folder, "before"));
     let start = Start::with(eye, view.sample.state.world_from_tool);
     let (positions, rate) = (Vec::new(), Rate::default());
     let show = Show { eyes, view, positions, bone_shown, pointer, next_until_s: 0.0, rate, stop: stop.clone() };
     let closed = window::run(&format!("Trepan {}", program.name()), renderer, show, start);
     stop.ask();
     let (mut renderer, show) = (closed.renderer, closed.session);
-    album.add(snap(&mut renderer, &window::Session::frame(&show, eye), folder, "after"));
+    album.add(shot(&mut renderer, &window::Session::frame(&show, eye), folder, "after"));
     if let Err(fault) = closed.result {
         tracing::error!("{fault}");
         album.faults.push(fault.to_string());
     }
     album
+}
+
+fn shot(renderer: &mut Renderer, frame: &Frame<'_>, folder: &Path, caption: &str) -> Result<Shot, String> {
+    let draw = |renderer: &mut Renderer| -> Result<_, RenderError> {
+        renderer.draw(frame)?;
+        renderer.image()
+    };
+    snap(&draw(renderer).map_err(|fault| fault.to_string())?, folder, caption)
 }
 
 impl window::Session for Show {
