@@ -11,6 +11,10 @@ pub enum Method {
     Scan,
     /// Points in a uniform grid, every tetrahedron's box against its cells (Teschner et al. 2003, as an array).
     UniformGrid,
+    /// The same with a hash table and time stamps (Teschner et al. 2003).
+    HashedGrid,
+    /// A tree of boxes, refitted bottom-up (van den Bergen 1997).
+    AabbTree,
     /// The thesis's chapter 4: grid, first tetrahedron from the last one found, two rings of neighbours.
     Thesis,
     /// Each point keeps its tetrahedron and walks on through neighbours; only what lies near the tool is looked at.
@@ -22,8 +26,9 @@ impl Method {
     pub const RECOMMENDED: Self = Self::Walk;
 
     /// All methods, the oracle first.
-    pub fn all() -> [Self; 5] {
-        [Self::Brute, Self::Scan, Self::UniformGrid, Self::Thesis, Self::Walk]
+    pub fn all() -> [Self; 7] {
+        use Method::*;
+        [Brute, Scan, UniformGrid, HashedGrid, AabbTree, Thesis, Walk]
     }
 
     /// The name used in files and on command lines.
@@ -32,6 +37,8 @@ impl Method {
             Self::Brute => "brute",
             Self::Scan => "scan",
             Self::UniformGrid => "uniform-grid",
+            Self::HashedGrid => "hashed-grid",
+            Self::AabbTree => "aabb-tree",
             Self::Thesis => "thesis",
             Self::Walk => "walk",
         }

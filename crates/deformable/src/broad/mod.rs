@@ -1,7 +1,11 @@
 //! Broad phases: from moving boxes to few pairs of point and tetrahedron.
 
-pub(crate) mod uniform_grid;
+mod aabb_tree;
+mod hashed_grid;
+mod uniform_grid;
 
+pub use aabb_tree::AabbTree;
+pub use hashed_grid::HashedGrid;
 pub(crate) use uniform_grid::PointCells;
 pub use uniform_grid::UniformGrid;
 

@@ -80,17 +80,13 @@ impl PointCells {
     /// Sorts the points into cells; says whether the cells had to be larger than asked for.
     pub(crate) fn place(&mut self, points: &[Vec3], cell_mm: f32) -> bool {
         let points = &points[..points.len().min(self.sorted.len())];
-        let bounds = Aabb::of_points(points);
+        let bounds = Aabb::of_points(points.iter().filter(|p| p.is_finite()));
         self.dims = [0; 3];
         if bounds.is_empty() || !bounds.size().is_finite() {
             return false;
         }
-        (self.origin, self.bounds, self.cell_mm) = (bounds.min, bounds.into(), cell_mm);
-        while bounds.size().to_array().map(|s| (s / self.cell_mm) as f64 + 1.0).iter().product::<f64>()
-            > UniformGrid::MAX_CELLS as f64
-        {
-            self.cell_mm *= 2.0;
-        }
+        (self.origin, self.bounds) = (bounds.min, bounds.into());
+        self.cell_mm = fitting_cell(cell_mm, &self.bounds);
         self.dims = bounds.size().to_array().map(|s| (s / self.cell_mm) as usize + 1);
         self.count_and_sort(points);
         self.cell_mm != cell_mm
@@ -144,4 +140,16 @@ impl PointCells {
         let at = ((p - self.origin) / self.cell_mm).floor().to_array();
         core::array::from_fn(|axis| (at[axis].max(0.0) as usize).min(self.dims[axis] - 1))
     }
+}
+
+/// The wanted cell, doubled until the box holds no more than [`UniformGrid::MAX_CELLS`] of them.
+pub(crate) fn fitting_cell(wanted_mm: f32, bounds: &Extent) -> f32 {
+    let cells = |cell_mm: f32| -> f64 {
+        (0..3).map(|axis| f64::from((bounds.high[axis] - bounds.low[axis]) / cell_mm) + 1.0).product()
+    };
+    let mut cell_mm = wanted_mm;
+    while cells(cell_mm) > UniformGrid::MAX_CELLS as f64 && cell_mm < f32::MAX / 2.0 {
+        cell_mm *= 2.0;
+    }
+    cell_mm
 }

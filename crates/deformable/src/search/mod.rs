@@ -1,17 +1,18 @@
 //! The searches behind [`Method`](crate::Method): each fills, for every tool point, the tetrahedron that holds it.
 
 mod brute;
-mod gridded;
+mod phased;
 mod thesis;
 mod walk;
 
+use crate::broad::{AabbTree, BroadPhase, HashedGrid, UniformGrid};
 use crate::{Method, narrow::Hits, scene::Scene, surface::MovingSurface};
 use trepan_mesh::TetMesh;
 
 /// One search with its memory.
 pub(crate) enum Search {
     Brute(brute::Brute),
-    Gridded(gridded::Gridded),
+    Phased(phased::Phased),
     Thesis(thesis::Thesis),
     Walk(walk::Walk),
 }
@@ -21,8 +22,10 @@ impl Search {
         let tets = mesh.tets.len();
         match method {
             Method::Brute => Self::Brute(brute::Brute),
-            Method::Scan => Self::Gridded(gridded::Gridded::new(f32::MAX, points, tets)),
-            Method::UniformGrid => Self::Gridded(gridded::Gridded::new(cell_mm, points, tets)),
+            Method::Scan => phased(UniformGrid::new(f32::MAX, points, tets), points),
+            Method::UniformGrid => phased(UniformGrid::new(cell_mm, points, tets), points),
+            Method::HashedGrid => phased(HashedGrid::new(cell_mm, points, tets), points),
+            Method::AabbTree => phased(AabbTree::new(&mesh.positions, &mesh.tets), points),
             Method::Thesis => Self::Thesis(thesis::Thesis::new(cell_mm, points, tets)),
             Method::Walk => Self::Walk(walk::Walk::new(points, tets)),
         }
@@ -32,7 +35,7 @@ impl Search {
     pub(crate) fn find(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
         match self {
             Self::Brute(search) => search.find(scene, hits),
-            Self::Gridded(search) => search.find(scene, hits),
+            Self::Phased(search) => search.find(scene, hits),
             Self::Thesis(search) => search.find(scene, hits),
             Self::Walk(search) => search.find(scene, surface, hits),
         }
@@ -41,9 +44,13 @@ impl Search {
     /// Forgets where the tool was.
     pub(crate) fn reset(&mut self) {
         match self {
-            Self::Brute(_) | Self::Gridded(_) => {}
+            Self::Brute(_) | Self::Phased(_) => {}
             Self::Thesis(search) => search.reset(),
             Self::Walk(search) => search.reset(),
         }
     }
+}
+
+fn phased(phase: impl BroadPhase + 'static, points: usize) -> Search {
+    Search::Phased(phased::Phased::new(phase, points))
 }
