@@ -1,4 +1,4 @@
-//! Soft tissue: the seam that every solver sits behind, materials, a small-strain rival and an f64 implicit reference.
+//! Soft tissue: the seam that every solver sits behind, materials, rival solvers and an f64 implicit reference.
 //!
 //! # Theory
 //! A body is a mesh of 4-node tetrahedra with lumped masses. With nodal positions `x = X + u` every solver here answers the same
@@ -24,6 +24,7 @@
 mod body;
 mod bound;
 pub mod boxes;
+pub mod corotational;
 mod energy;
 mod factor;
 mod law;
@@ -34,6 +35,7 @@ mod operator;
 pub mod reference;
 mod solver;
 mod tetra;
+pub mod xpbd;
 
 pub use body::{Body, BodyError};
 pub use bound::{element_bound_ms, element_omega2, highest_frequency, lowest_frequency, power_bound_ms};

@@ -1,12 +1,16 @@
 //! The closed list of the solvers in this crate, by name, for tests, charts and command lines.
 
-use crate::{Body, BodyError, SoftSolver, linear, reference};
+use crate::{Body, BodyError, SoftSolver, corotational, linear, reference, xpbd};
 
 /// A soft-tissue solver with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
     /// Small strain, explicit.
     Linear(linear::Config),
+    /// Large rotations, implicit.
+    Corotational(corotational::Config),
+    /// Position based, neo-Hookean.
+    Xpbd(xpbd::Config),
     /// Static hyperelastic oracle, f64.
     Reference(reference::Config),
 }
@@ -14,7 +18,12 @@ pub enum Method {
 impl Method {
     /// Every method with its default settings.
     pub fn all() -> Vec<Self> {
-        vec![Self::Linear(linear::Config::default()), Self::Reference(reference::Config::default())]
+        vec![
+            Self::Linear(linear::Config::default()),
+            Self::Corotational(corotational::Config::default()),
+            Self::Xpbd(xpbd::Config::default()),
+            Self::Reference(reference::Config::default()),
+        ]
     }
 
     /// The method of this name.
@@ -26,6 +35,8 @@ impl Method {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Linear(_) => "linear",
+            Self::Corotational(_) => "corotational",
+            Self::Xpbd(_) => "xpbd",
             Self::Reference(_) => "reference",
         }
     }
@@ -34,6 +45,8 @@ impl Method {
     pub fn build(&self, body: &Body) -> Result<Box<dyn SoftSolver>, BodyError> {
         Ok(match self {
             Self::Linear(config) => Box::new(linear::Linear::new(body, config)?),
+            Self::Corotational(config) => Box::new(corotational::Corotational::new(body, config)?),
+            Self::Xpbd(config) => Box::new(xpbd::Xpbd::new(body, config)?),
             Self::Reference(config) => Box::new(reference::Reference::new(body, config)?),
         })
     }

@@ -7,7 +7,7 @@
 //! Serves time-step bounds, vibration frequencies and the linear solver's checks. About 20 ns a tetrahedron.
 
 use crate::{Body, Shape};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// `K x` at the rest state; rows and columns of fixed nodes are taken out.
 pub struct Stiffness {

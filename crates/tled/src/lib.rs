@@ -29,7 +29,7 @@
 //! ```
 //!
 //! # When not to use it
-//! For nearly incompressible tissue (ν over about 0.47): plain 4-node tetrahedra lock. For slow processes (minutes): the step is
+//! For nearly incompressible tissue (ν over about 0.47) without [`Config::cure_locking`]: plain 4-node tetrahedra lock. For slow processes (minutes): the step is
 //! bound by sound, use a static solver.
 
 mod block;
