@@ -1,12 +1,12 @@
-//! Gmsh files (`.msh`), versions 2.2 and 4.1, text and binary.
+//! Gmsh files (`.msh`), versions 1, 2.2 and 4.1, text and binary.
 //!
 //! # Theory
-//! Sections between `$Name` and `$EndName`. Nodes and elements carry their own numbers. Version 2.2 gives each element its type and tags; version 4.1 groups both
+//! Sections between `$Name` and `$EndName` (`$NOD` and `$ELM` in version 1). Nodes and elements carry their own numbers. Version 2.2 gives each element its type and tags; version 4.1 groups both
 //! by geometric entity. Element type 4 is the 4-node tetrahedron, 11 the 10-node one. Binary files hold little-endian i32, u64 and f64 after the counts.
 //!
 //! # Practice
 //! Tetrahedra are kept (of type 11 the corners), other elements and all tags left out. Writes 2.2 as text, with digits that give the same f32 back. Positions are mm;
-//! corner order is ours. Version 1 (`$NOD`) and 4.0 are refused by name.
+//! corner order is ours. Version 4.0 is refused by name.
 //!
 //! # Sources
 //! C. Geuzaine, J.-F. Remacle: Gmsh reference manual, sections MSH file format.
@@ -35,12 +35,11 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
 
 pub(crate) fn parse(mut reader: Reader) -> Result<TetMesh, FileError> {
     let first = reader.line().unwrap_or_default();
+    if first.trim() == "$NOD" {
+        return Gmsh { reader, binary: false, nodes: Numbered::default(), tets: Vec::new() }.version_1();
+    }
     if first.trim() != "$MeshFormat" {
-        return Err(reader.error(
-            "line 1",
-            first,
-            "$MeshFormat (version 1 files start with $NOD: convert them with gmsh)",
-        ));
+        return Err(reader.error("line 1", first, "$MeshFormat, or $NOD in version 1"));
     }
     let version = reader.word().unwrap_or_default().to_owned();
     let newer = match version.as_str() {
@@ -84,6 +83,31 @@ impl Gmsh {
                 _ => {}
             }
         }
+        self.finish()
+    }
+
+    fn version_1(mut self) -> Result<TetMesh, FileError> {
+        self.nodes_2()?;
+        self.reader.skip_past_line("$ELM")?;
+        let count = self.count_line("the count of $ELM", 8, 8)?;
+        for _ in 0..count {
+            let [_, kind, _] = self.entity("the header of an element")?;
+            self.int("the entity of an element")?;
+            let nodes = self.int("the nodes of an element")?;
+            let known = nodes_of(kind).is_some_and(|n| n as u64 == nodes);
+            if !known {
+                return Err(self.reader.error(
+                    "an element",
+                    format!("type {kind} with {nodes} nodes"),
+                    "a type with its number of nodes",
+                ));
+            }
+            self.element(kind, Self::int)?;
+        }
+        self.finish()
+    }
+
+    fn finish(mut self) -> Result<TetMesh, FileError> {
         self.nodes.sort(&self.reader)?;
         let corners = |(t, numbers): (usize, &[u64; 4])| self.nodes.corners(&self.reader, t, *numbers);
         let tets = self.tets.iter().enumerate().map(corners).collect::<Result<_, _>>()?;
@@ -235,6 +259,8 @@ mod tests {
     const NEW: &str = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 0 0\n$EndEntities\n$Nodes\n2 4 7 10\n1 1 1 1\n7\n0 0 0 0.5\n3 1 0 3\n8\n9\n10\n\
                        1 0 0\n0 1 0\n0 0 1\n$EndNodes\n$Elements\n2 2 1 2\n2 1 2 1\n1 7 8 9\n3 1 4 1\n2 7 8 9 10\n$EndElements\n";
 
+    const OLDEST: &str = "$NOD\n4\n7 0 0 0\n8 1 0 0\n9 0 1 0\n10 0 0 1\n$ENDNOD\n$ELM\n2\n1 2 1 1 3 7 8 9\n2 4 1 1 4 7 8 9 10\n$ENDELM\n";
+
     /// The same mesh as [`OLD`] in binary.
     fn old_binary() -> Vec<u8> {
         let ints = |values: &[i32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
@@ -263,13 +289,15 @@ mod tests {
         let old = of_text(OLD, parse).unwrap();
         assert_eq!(old.tets, [[0, 1, 2, 3]]);
         assert_eq!(old, of_text(NEW, parse).unwrap());
+        assert_eq!(old, of_text(OLDEST, parse).unwrap());
         assert_eq!(old, parse(Reader::of(Path::new("binary"), old_binary())).unwrap());
     }
 
     #[test]
     fn faults_are_named() {
         let fault = |text: &str, from: &str, to: &str| of_text(&text.replace(from, to), parse).unwrap_err().to_string();
-        assert!(fault(OLD, "$MeshFormat", "$NOD").contains("$NOD"));
+        assert!(fault(OLD, "$MeshFormat", "$Mesh").contains("$MeshFormat"));
+        assert!(fault(OLDEST, "2 4 1 1 4", "2 4 1 1 5").contains("type 4 with 5 nodes"));
         assert!(fault(OLD, "2.2", "4.0").contains("version is 4.0"));
         assert!(fault(OLD, "$Nodes\n4", "$Nodes\n4000000000").contains("count of $Nodes"));
         assert!(fault(OLD, "7 8 9 10", "7 8 9 11").contains("tetrahedron 0"));
@@ -283,6 +311,7 @@ mod tests {
     fn damage_is_survived() {
         survive_mutations(OLD.as_bytes(), parse);
         survive_mutations(NEW.as_bytes(), parse);
+        survive_mutations(OLDEST.as_bytes(), parse);
         survive_mutations(&old_binary(), parse);
     }
 }

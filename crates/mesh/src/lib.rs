@@ -30,6 +30,7 @@ mod file;
 mod format;
 pub mod gmsh;
 pub mod lattice;
+pub mod materials;
 pub mod medit;
 mod numbered;
 pub mod obj;
