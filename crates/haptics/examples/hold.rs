@@ -9,27 +9,27 @@ use trepan_haptics::replay::Replay;
 use trepan_haptics::simulated::{Config, Hand, Simulated};
 
 fn main() {
-    println!("a wall pressed with 1 N: peak-to-peak motion in the third second, mm");
+    println!("without a passivity controller, a wall pressed with 1 N: peak-to-peak motion in the third second, mm");
     println!("{:>7} | {:>8} {:>8} {:>8} {:>8}", "K N/mm", "0 ticks", "1 tick", "2 ticks", "3 ticks");
     for stiffness in [0.3, 0.8, 1.2, 2.0, 3.0] {
-        let motion = [0, 1, 2, 3].map(|delay_ticks| peak_to_peak(stiffness, delay_ticks, false));
+        let motion = [0, 1, 2, 3].map(|delay_ticks| peak_to_peak(stiffness, delay_ticks));
         print!("{stiffness:>7} |");
         motion.iter().for_each(|m| print!(" {m:>8.3}"));
         println!();
     }
-    println!("the same with the passivity controller, 1 tick: K = 3 N/mm: {:.3} mm", peak_to_peak(3.0, 1, true));
 }
 
 /// The hand means to be so far inside the wall (x < 0) that its spring presses with 1 N.
-fn peak_to_peak(stiffness: f32, delay_ticks: usize, controller: bool) -> f32 {
+fn peak_to_peak(stiffness: f32, delay_ticks: usize) -> f32 {
     let hand = Hand::LIGHT;
     let inside = Pose::from_translation(Vec3::X * -(1.0 / hand.stiffness + 1.0 / stiffness));
     let config = Config { friction_n: 0.0, velocity_filter_ms: 0.0, delay_ticks, ..Config::default() };
     let outside = (0..100).map(|_| ToolState::at(Pose::from_translation(Vec3::X * 2.0)));
     let states = outside.chain([ToolState::at(inside)]).collect();
     let mut device = Simulated::new(config, hand, Box::new(Replay::new(states)));
-    let defaults = GuardConfig { slew_n_per_ms: 10.0, ramp_in_ms: 0.0, ..GuardConfig::default() };
-    let mut guard = ForceGuard::new(if controller { defaults } else { GuardConfig { passivity: None, ..defaults } });
+    let limits =
+        GuardConfig { slew_n_per_ms: 10.0, ramp_in_ms: 0.0, passivity: None, ..device.capabilities().guard_config() };
+    let mut guard = ForceGuard::new(limits);
     let (mut least, mut most) = (f32::MAX, f32::MIN);
     for tick in 0..3000 {
         let tool = device.read(f64::from(tick)).tool;

@@ -1,6 +1,6 @@
 //! The seam of the devices.
 
-use trepan_contact::GuardedWrench;
+use trepan_contact::{GuardConfig, GuardedWrench};
 use trepan_geometry::{ToolState, Vec3};
 
 /// A device that a hand holds, or something that behaves as one.
@@ -57,6 +57,8 @@ pub struct Capabilities {
     pub axes_driven: u8,
     /// Smallest step of position that it senses, mm.
     pub position_resolution_mm: f32,
+    /// Ticks between `apply` and the moment when the hand feels it.
+    pub delay_ticks: u8,
 }
 
 impl Capabilities {
@@ -70,6 +72,29 @@ impl Capabilities {
             workspace_mm: Vec3::INFINITY,
             axes_driven: 0,
             position_resolution_mm: 0.0,
+            delay_ticks: 0,
         }
+    }
+
+    /// The guard's recommended limits, lowered to this device's peak force. A device without motors keeps the recommended
+    /// peak: what it would feel is still shown and recorded.
+    pub fn guard_config(&self) -> GuardConfig {
+        let recommended = GuardConfig::default();
+        let peak_n = if self.peak_force_n > 0.0 { self.peak_force_n } else { recommended.max_force_n };
+        GuardConfig { max_force_n: peak_n.min(recommended.max_force_n), ..recommended }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_guard_knows_the_devices_limits() {
+        let weak = Capabilities { peak_force_n: 2.0, ..Capabilities::passive("weak") };
+        assert_eq!(weak.guard_config().max_force_n, 2.0);
+        let strong = Capabilities { peak_force_n: 20.0, ..weak };
+        assert_eq!(strong.guard_config().max_force_n, GuardConfig::default().max_force_n);
+        assert_eq!(Capabilities::passive("mouse").guard_config(), GuardConfig::default());
     }
 }

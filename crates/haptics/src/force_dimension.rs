@@ -254,5 +254,6 @@ fn capabilities(drd: &Drd, id: i8) -> Capabilities {
         workspace_mm: Vec3::new(workspace_mm.y, workspace_mm.z, workspace_mm.x),
         axes_driven: if drd.has_active_wrist(id) { 6 } else { 3 },
         position_resolution_mm: resolution_mm,
+        delay_ticks: 0,
     }
 }

@@ -186,6 +186,7 @@ impl HapticDevice for Haply {
             workspace_mm: Vec3::splat(300.0),
             axes_driven: 3,
             position_resolution_mm: 0.1,
+            delay_ticks: 2,
         }
     }
 

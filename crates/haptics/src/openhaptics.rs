@@ -256,6 +256,7 @@ fn capabilities(hd: &Hd, drives_torque: bool) -> Capabilities {
         workspace_mm: Vec3::new(box_mm[3] - box_mm[0], box_mm[4] - box_mm[1], box_mm[5] - box_mm[2]),
         axes_driven: if drives_torque { 6 } else { 3 },
         position_resolution_mm: 0.055,
+        delay_ticks: 1,
     };
     hd.drain_errors();
     capabilities

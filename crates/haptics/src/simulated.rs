@@ -207,6 +207,7 @@ impl HapticDevice for Simulated {
             workspace_mm: Vec3::new(160.0, 120.0, 70.0),
             axes_driven: 3,
             position_resolution_mm: self.config.quantum_mm,
+            delay_ticks: self.config.delay_ticks as u8,
         }
     }
 
