@@ -8,10 +8,10 @@ use trepan_volume::{BoneVolume, VoxelVolume};
 fn main() -> Result<(), trepan_volume::BoneError> {
     let head = head();
     println!(
-        "{:<16} {:<6} {:>8} {:>8} {:>8} {:>10} {:>8}",
+        "{:<18} {:<6} {:>8} {:>8} {:>8} {:>10} {:>8}",
         "method", "task", "p50 us", "p99 us", "max us", "N/ms max", "mm³"
     );
-    for method in Method::named("distance-field") {
+    for method in Method::all() {
         for drilling in [false, true] {
             let bone = BoneVolume::new(&head, 400)?;
             stroke(&method, &bone, drilling, if method.name() == "brute" { 50 } else { 2500 });
@@ -60,5 +60,5 @@ fn stroke(method: &Method, bone: &BoneVolume, drilling: bool, ticks: u32) {
     let at = |share: f64| times[(share * (times.len() - 1) as f64) as usize];
     let task = if drilling { "drill" } else { "touch" };
     let (p50, p99, max) = (at(0.5), at(0.99), at(1.0));
-    println!("{:<16} {task:<6} {p50:>8.1} {p99:>8.1} {max:>8.1} {worst:>10.3} {removed:>8.2}", method.name());
+    println!("{:<18} {task:<6} {p50:>8.1} {p99:>8.1} {max:>8.1} {worst:>10.3} {removed:>8.2}", method.name());
 }

@@ -42,6 +42,9 @@ pub mod brute;
 pub mod distance_field;
 mod half_spaces;
 mod method;
+mod penalty;
+pub mod pointshell;
+pub mod ray_trace;
 pub mod removal;
 mod rows;
 mod seam;
@@ -49,6 +52,7 @@ mod surface;
 mod sweep;
 pub mod thesis;
 mod traverse;
+pub mod voxel_sum;
 mod window;
 
 pub use method::Method;

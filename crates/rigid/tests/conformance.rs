@@ -51,7 +51,7 @@ fn a_half_space_pushes_out_along_its_normal() {
 
 #[test]
 fn a_wall_holds_a_slow_tool() {
-    for method in Method::all() {
+    for method in Method::all().into_iter().filter(Method::has_proxy) {
         let wall = bone([28, 28, 28], 0.5, |p| p.z.abs() - 0.6);
         let mut contact = built(&method, &Tool::burr(2.0), Vec3::Z * 4.0);
         let out = walk(contact.as_mut(), &wall, Vec3::Z * 4.0, Vec3::Z * -4.0, 0.05);
@@ -106,7 +106,11 @@ fn drilling_removes_bone_and_only_where_the_burr_has_been() {
                 assert!(balls.iter().any(|b| b.distance(centre) < reach), "{} at {centre}", method.name());
             }
         }
-        assert!(lost > 0 || matches!(method, Method::Thesis(_)), "{} removed nothing", method.name());
+        assert!(
+            lost > 0 || matches!(method, Method::Thesis(_) | Method::Pointshell(_)),
+            "{} removed nothing",
+            method.name()
+        );
         // The per-tick law is too slow to reach the isovalue within this stroke.
         assert!(removed > 0.0 || method.name() == "thesis-printed", "{} counted nothing", method.name());
         assert!(before != after, "{} cut nothing", method.name());

@@ -1,0 +1,99 @@
+//! Rays from the tool's points inwards: how far each point must go back along its normal until it is out of the bone.
+//!
+//! # Theory
+//! A point of the shell in bone marches along its inward normal nᵢ to where the density, trilinear between voxels, falls to the isovalue; the way is
+//! its depth dᵢ.
+//! ```text
+//! n = Σ dᵢ nᵢ / |Σ dᵢ nᵢ| ,   d = max dᵢ (nᵢ·n)
+//! ```
+//!
+//! # Practice
+//! Steps of half a voxel, the last one by linear interpolation; 10 to 30 us. Sees below the voxel, as the isosurface of the picture does.
+//!
+//! # Sources
+//! A. Petersik et al., *Haptic volume interaction with anatomic models at sub-voxel resolution*, HAPTICS 2002; D. Morris et al., *Visuohaptic simulation
+//! of bone surgery for training and evaluation*, IEEE CG&A 26 (2006).
+//!
+//! # When not to use it
+//! For a tool that is wholly in bone: the rays end at its centre, and there is no way out.
+
+use crate::RigidStep;
+use crate::penalty::{Feel, answer};
+use crate::removal::Law;
+use trepan_contact::Contact;
+use trepan_geometry::{Pointshell, Spread, Tool, Vec3};
+use trepan_volume::BoneVolume;
+
+/// How the method is set up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// Points of the shell.
+    pub points: usize,
+    /// What a burr takes away.
+    pub removal: Law,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { points: Pointshell::RIGID_COUNT, removal: Law::RATE }
+    }
+}
+
+pub(crate) struct Rays {
+    shell: Pointshell,
+    radius_mm: f32,
+}
+
+impl Rays {
+    pub fn new(tool: &Tool, config: &Config) -> Self {
+        let shell = Pointshell::sphere(tool.tip_radius_mm, config.points.clamp(8, 20_000), Spread::Fibonacci);
+        Self { shell, radius_mm: tool.tip_radius_mm }
+    }
+
+    /// The way from `point`, which is `over` HU in bone, along `inward` to the isovalue, mm.
+    fn way_out(&self, bone: &BoneVolume, point: Vec3, inward: Vec3, over: f32, visited: &mut u32) -> f32 {
+        let step = 0.5 * bone.spacing_mm();
+        let (mut way, mut before) = (0.0, over);
+        while way < self.radius_mm {
+            *visited += 1;
+            let now = over_iso(bone, point + (way + step) * inward);
+            if now <= 0.0 {
+                return (way + step * before / (before - now)).min(self.radius_mm);
+            }
+            (way, before) = (way + step, now);
+        }
+        self.radius_mm
+    }
+}
+
+impl Feel for Rays {
+    fn feel(&mut self, bone: &BoneVolume, tip: Vec3, out: &mut RigidStep) -> Option<(Vec3, f32)> {
+        let mut push = Vec3::ZERO;
+        for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {
+            let point = tip + *point;
+            let over = over_iso(bone, point);
+            if over > 0.0 {
+                let depth_mm = self.way_out(bone, point, *inward, over, &mut out.voxels_swept);
+                push += depth_mm * *inward;
+                out.points_in_contact += 1;
+                out.manifold.push(Contact { point, normal: *inward, depth_mm });
+            }
+        }
+        out.voxels_swept += self.shell.points.len() as u32;
+        out.voxels_in_contact = out.points_in_contact;
+        let normal = push.normalize_or_zero();
+        let depth = out.manifold.contacts().iter().map(|c| c.depth_mm * c.normal.dot(normal)).fold(0.0, f32::max);
+        answer(push, depth, out)
+    }
+}
+
+/// Trilinear density over the isovalue, HU; positive in bone.
+fn over_iso(bone: &BoneVolume, point: Vec3) -> f32 {
+    let at = bone.grid_of(point);
+    let low = at.floor();
+    let (f, g, corner) = (at - low, 1.0 - (at - low), low.as_ivec3());
+    let hu = |x, y, z| f32::from(bone.hu(corner + glam::IVec3::new(x, y, z)));
+    let along = |y, z| g.x * hu(0, y, z) + f.x * hu(1, y, z);
+    g.z * (g.y * along(0, 0) + f.y * along(1, 0)) + f.z * (g.y * along(0, 1) + f.y * along(1, 1))
+        - f32::from(bone.isovalue())
+}
