@@ -77,6 +77,28 @@ fn after_a_jump_the_contact_is_found_anew() {
     assert!(second.manifold.normal.x < -0.99 && second.points_in_contact == 211);
 }
 
+/// Inner nodes thrown about until tetrahedra lie inside out. The surface is where it was, and every point in it is still covered once more by upright
+/// tetrahedra than by inverted ones, so the contact must not notice.
+#[test]
+fn inverted_tetrahedra_below_an_intact_surface_change_nothing() {
+    let mesh = block([8, 8, 4], 4.0);
+    let is_inner = |p: &Vec3| p.cmpgt(Vec3::splat(0.1)).all() && p.cmplt(Vec3::new(31.9, 31.9, 15.9)).all();
+    let mut collision = collision(&mesh, Method::Walk);
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    let (mut random, mut out, mut skipped) = (Random::new(47), TissueStep::default(), 0);
+    for step in 0..300 {
+        let thrown = |p: &Vec3, by: Vec3| if is_inner(p) { *p + by } else { *p };
+        let positions: Vec<Vec3> = mesh.positions.iter().map(|p| thrown(p, random.cube() * 3.5)).collect();
+        let depth = 0.2 + 0.02 * step as f32;
+        let tip = Vec3::new(15.1, 16.7, 16.0 + RADIUS - depth);
+        collision.step(&positions, &still, &tool_at(tip, Quat::IDENTITY), &mut out);
+        assert!((out.manifold.depth_mm - depth).abs() < 1e-3, "{} at {depth}", out.manifold.depth_mm);
+        assert!(out.manifold.normal.z > 0.999);
+        skipped += out.skipped;
+    }
+    assert!(skipped > 100, "{skipped}");
+}
+
 /// The thesis's rule has the fault that its successor is there to cure: the same push reads shallower further down.
 #[test]
 fn the_printed_rule_loses_depth_on_the_way() {
