@@ -116,7 +116,10 @@ fn bone_colour(inputs: &Inputs, point: Vec3, normal: Vec3) -> Vec3 {
 }
 
 fn brain_colour(mri: Option<&Greys>, rest: Vec3) -> Vec3 {
-    let shade = mri.map_or(0.85, |greys| 0.45 + 0.85 * signal(greys, greys.texture_from_world.transform_point3(rest)));
+    let shade = mri.map_or(0.85, |greys| {
+        let signal = signal(greys, greys.texture_from_world.transform_point3(rest));
+        0.42 + 0.68 * smoothstep(0.05, 0.60, signal)
+    });
     Vec3::new(0.90, 0.50, 0.45) * shade
 }
 

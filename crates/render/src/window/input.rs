@@ -144,4 +144,33 @@ mod tests {
                 && hand.world_from_tool.rotation.is_normalized()
         );
     }
+
+    #[test]
+    fn a_drag_over_the_picture_is_noticed_through_egui() {
+        let context = egui::Context::default();
+        let mut seen = Pointer::default();
+        let mut press = |pos: egui::Pos2, pressed: Option<bool>| {
+            let mut events = vec![egui::Event::PointerMoved(pos)];
+            let button = egui::PointerButton::Primary;
+            events.extend(pressed.map(|pressed| egui::Event::PointerButton {
+                pos,
+                button,
+                pressed,
+                modifiers: Default::default(),
+            }));
+            let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(400.0, 300.0));
+            let input = egui::RawInput { screen_rect: Some(screen), events, ..Default::default() };
+            let mut drawn = context.run_ui(input, |ui| {
+                let (_, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::click_and_drag());
+                seen = Pointer::over(ui, &response);
+            });
+            drawn.textures_delta.clear();
+            seen.left
+        };
+        assert_eq!(press(egui::pos2(100.0, 100.0), None), Vec2::ZERO);
+        press(egui::pos2(100.0, 100.0), Some(true));
+        assert_eq!(press(egui::pos2(130.0, 88.0), None), Vec2::new(30.0, -12.0));
+        press(egui::pos2(130.0, 88.0), Some(false));
+        assert_eq!(press(egui::pos2(170.0, 88.0), None), Vec2::ZERO);
+    }
 }
