@@ -77,3 +77,22 @@ fn a_replay_gives_the_same_forces_bit_for_bit() {
         assert_eq!(a.proxy.translation, b.proxy.translation, "tick {}", a.tick);
     }
 }
+
+#[test]
+fn a_built_case_runs_and_is_not_overwritten() {
+    let home = tempfile::tempdir().unwrap();
+    let case = home.path().join("head");
+    let build = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_integrated"));
+        command.args(["case", "build", "--out"]).arg(&case);
+        command.env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases")).output().unwrap()
+    };
+    assert!(build().status.success());
+    let again = build();
+    assert_eq!(again.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("exists already"));
+    let out = home.path().join("out");
+    assert!(operation(&out, "1", &["--case", case.to_str().unwrap()]).status().unwrap().success());
+    let card: Value = serde_json::from_slice(&fs::read(case.join("case.json")).unwrap()).unwrap();
+    assert_eq!(card["files"].as_object().unwrap().len(), 4);
+}

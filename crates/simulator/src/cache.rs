@@ -12,7 +12,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// Goes up when kept cases change their form or the code that makes them changes its results.
-const FORM: u32 = 1;
+const FORM: u32 = 2;
 
 /// The folder of kept cases.
 #[derive(Clone, Debug)]
@@ -45,7 +45,7 @@ impl Cache {
                 add(&mut hash, &file).map_err(|fault| unreadable(&file, &fault))?;
             }
         }
-        Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+        Ok(hexadecimal(hash))
     }
 
     /// The folder of that name, if it is there.
@@ -67,6 +67,17 @@ impl Cache {
         _ = folder.keep();
         Ok(())
     }
+}
+
+/// SHA-256 of a file's bytes, hexadecimal.
+pub fn digest(file: &Path) -> io::Result<String> {
+    let mut hash = Sha256::new();
+    feed(&mut hash, &mut File::open(file)?)?;
+    Ok(hexadecimal(hash))
+}
+
+fn hexadecimal(hash: Sha256) -> String {
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn unreadable(path: &Path, fault: &io::Error) -> SessionError {
@@ -95,6 +106,10 @@ fn files_of(input: &Path) -> io::Result<Vec<PathBuf>> {
 fn add(hash: &mut Sha256, file: &Path) -> io::Result<()> {
     let mut stream = File::open(file)?;
     hash.update(stream.metadata()?.len().to_le_bytes());
+    feed(hash, &mut stream)
+}
+
+fn feed(hash: &mut Sha256, stream: &mut File) -> io::Result<()> {
     let mut buffer = vec![0; 1 << 16];
     loop {
         match stream.read(&mut buffer)? {

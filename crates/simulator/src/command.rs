@@ -1,6 +1,7 @@
 //! What every program does with its command line: flags, session, exit code.
 
-use crate::{Ended, Inputs, Options, Program, Session, SessionError};
+use crate::options::{CaseTask, Task};
+use crate::{Ended, Inputs, Options, Program, Session, SessionError, build_case};
 use clap::Parser;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
@@ -21,6 +22,15 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     if options.list_devices {
         trepan_haptics::list().iter().for_each(|device| println!("{:31} {}", device.name, device.state));
         return ExitCode::SUCCESS;
+    }
+    if let Some(Task::Case(CaseTask::Build { patient, out })) = &options.task {
+        return match build_case(program, patient, out, built_in) {
+            Ok(name) => {
+                println!("{name} is in {}; open it with --case {}", out.display(), out.display());
+                ExitCode::SUCCESS
+            }
+            Err(fault) => failed(program, &fault),
+        };
     }
     match Session::open(program, options, built_in).and_then(Session::run) {
         Ok(ended) => told(&ended),

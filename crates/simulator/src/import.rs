@@ -6,15 +6,16 @@
 //! A case goes by the first digits of that hash: file names may hold a patient's name.
 
 use crate::cache::Cache;
+use crate::case_folder;
 use crate::error::SessionError;
 use crate::program::Program;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use trepan_mesh::{TetMesh, lattice, vtk};
+use trepan_mesh::{TetMesh, lattice};
 use trepan_volume::{
     AIR_HU, BrainConfig, Grid, Interpolation, MaskError, VoxelVolume, bone_isovalue, brain_mask, check_brain_mask,
-    hounsfield, largest_component, nifti, overlap, resample, skull_only,
+    hounsfield, largest_component, overlap, resample, skull_only,
 };
 
 /// Air around the brain that its grids keep, mm.
@@ -76,15 +77,6 @@ pub struct Brain {
     pub mesh: TetMesh,
 }
 
-/// The small part of a kept case.
-#[derive(Serialize, Deserialize)]
-struct Kept {
-    isovalue_hu: i16,
-    notes: Vec<String>,
-    has_skull: bool,
-    has_brain: bool,
-}
-
 /// Opens a case: from the cache if it was made before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
     needs(program, inputs)?;
@@ -93,15 +85,14 @@ pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -
     let given = [&inputs.ct, &inputs.mri, &inputs.labels].map(Option::is_some);
     let hash = cache.key(&files, &format!("{recipe:?} {given:?}"))?;
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
-    if let Some(mut case) = cache.find(&hash).and_then(|folder| load(&folder)) {
-        (case.name, case.hash, case.cached) = (name, hash, true);
+    if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
         return Ok(case);
     }
     let bar = progress();
     let mut case = build(inputs, recipe, &bar)?;
     (case.name, case.hash) = (name, hash);
     bar.set_message("keeping the case for the next start");
-    if let Err(fault) = cache.keep(&case.hash, |folder| save(&case, folder)) {
+    if let Err(fault) = cache.keep(&case.hash, |folder| case_folder::save(&case, recipe, folder)) {
         case.notes.push(format!("the case could not be kept for the next start: {fault}"));
     }
     bar.finish_and_clear();
@@ -239,43 +230,4 @@ fn cropped(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
     let offset = [0, 1, 2].map(|axis| (low[axis] as i64 - margin) as f64);
     let world_from_voxel = whole.world_from_voxel * glam::DAffine3::from_translation(offset.into());
     resample(&whole, &Grid { dims, world_from_voxel }, Interpolation::Nearest, 0)
-}
-
-fn save(case: &Case, folder: &Path) -> Result<(), String> {
-    let text = |fault: &dyn std::fmt::Display| fault.to_string();
-    if let Some(skull) = &case.skull {
-        nifti::write(&folder.join("skull.nii"), skull).map_err(|f| text(&f))?;
-    }
-    if let Some(brain) = &case.brain {
-        nifti::write(&folder.join("mask.nii"), &brain.mask).map_err(|f| text(&f))?;
-        nifti::write(&folder.join("mri.nii"), &brain.mri).map_err(|f| text(&f))?;
-        vtk::write(&folder.join("brain.vtk"), &brain.mesh).map_err(|f| text(&f))?;
-    }
-    let kept = Kept {
-        isovalue_hu: case.isovalue_hu,
-        notes: case.notes.clone(),
-        has_skull: case.skull.is_some(),
-        has_brain: case.brain.is_some(),
-    };
-    let json = serde_json::to_vec_pretty(&kept).map_err(|f| text(&f))?;
-    std::fs::write(folder.join("case.json"), json).map_err(|f| text(&f))
-}
-
-/// A kept case; `None` when anything of it is missing or broken, so that it is made anew.
-fn load(folder: &Path) -> Option<Case> {
-    let kept: Kept = serde_json::from_slice(&std::fs::read(folder.join("case.json")).ok()?).ok()?;
-    let skull = match kept.has_skull {
-        true => Some(hounsfield(&nifti::read(&folder.join("skull.nii")).ok()?).ok()?),
-        false => None,
-    };
-    let brain = match kept.has_brain {
-        true => Some(Brain {
-            mask: nifti::read(&folder.join("mask.nii")).ok()?.map(|v| v as u8),
-            mri: nifti::read(&folder.join("mri.nii")).ok()?,
-            mesh: vtk::read(&folder.join("brain.vtk")).ok()?,
-        }),
-        false => None,
-    };
-    let (name, hash) = (String::new(), String::new());
-    Some(Case { name, hash, skull, isovalue_hu: kept.isovalue_hu, brain, notes: kept.notes, cached: false })
 }

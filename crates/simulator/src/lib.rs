@@ -20,6 +20,7 @@
 
 mod ahead;
 mod cache;
+mod case_folder;
 mod chart;
 mod clock;
 mod collision_step;
@@ -55,12 +56,12 @@ pub use error::SessionError;
 pub use haptic_tick::{FRESH_MS, GONE_MS, HapticConfig, HapticStage, Tick, TickInput, ToolSample};
 pub use import::{Brain, Case, Inputs, Recipe, open as open_case};
 pub use notice::{Notice, Warning, Watch, What};
-pub use options::Options;
+pub use options::{Options, Patient};
 pub use program::{Phase, Program};
 pub use run::{Cells, Eyes, Outcome, Replayed, SolverOutcome, Stages, Ticks, Times, Tissue, View};
 pub use scene::{RestBrain, Scene};
 pub use score::ScoreKeeper;
-pub use session::{Ended, Session};
+pub use session::{Ended, Session, build_case};
 pub use solver_step::{EACH, SolverStage};
 pub use stop::Stop;
 pub use summary::Summary;

@@ -1,21 +1,21 @@
 //! The command line that the three programs share.
 
-use clap::Parser;
+use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
 /// Flags of every program; names say their unit.
 #[derive(Clone, Debug, Parser)]
-#[command(max_term_width = 120, version)]
+#[command(max_term_width = 120, version, args_conflicts_with_subcommands = true)]
 pub struct Options {
-    /// CT of the patient: a file, or a folder of DICOM slices [default: the built-in case]
-    #[arg(long, value_name = "PATH")]
-    pub ct: Option<PathBuf>,
-    /// MRI of the same patient in the same space
-    #[arg(long, value_name = "PATH")]
-    pub mri: Option<PathBuf>,
-    /// Label volume: what is not 0 is brain [default: found in the MRI]
-    #[arg(long, value_name = "PATH")]
-    pub labels: Option<PathBuf>,
+    /// What to do instead of a session
+    #[command(subcommand)]
+    pub task: Option<Task>,
+    /// A folder that `case build` made
+    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "spacing_mm", "tets", "isovalue_hu"])]
+    pub case: Option<PathBuf>,
+    /// Images, and what is made of them
+    #[command(flatten)]
+    pub patient: Patient,
     /// mouse | script:NAME | replay:FILE | openhaptics[:NAME] | force-dimension | haply [default: mouse with a window, else a script]
     #[arg(long, value_name = "DEVICE")]
     pub device: Option<String>,
@@ -43,15 +43,6 @@ pub struct Options {
     /// List the haptic devices and what each needs, then end
     #[arg(long)]
     pub list_devices: bool,
-    /// Edge of a skull voxel, mm
-    #[arg(long, value_name = "MM", default_value_t = 1.0, allow_negative_numbers = true)]
-    pub spacing_mm: f32,
-    /// Tetrahedra of the brain, met within a tenth
-    #[arg(long, value_name = "N", default_value_t = 12_000)]
-    pub tets: usize,
-    /// Threshold of bone, HU [default: from the histogram, 300 to 500]
-    #[arg(long, value_name = "HU", allow_negative_numbers = true)]
-    pub isovalue_hu: Option<i16>,
     /// Young's modulus of the brain, kPa
     #[arg(long, value_name = "KPA", default_value_t = 3.0)]
     pub young_modulus_kpa: f32,
@@ -66,6 +57,65 @@ pub struct Options {
     pub picture: [u32; 2],
 }
 
+/// A patient's images and what is made of them.
+#[derive(Clone, Debug, Args)]
+pub struct Patient {
+    /// CT of the patient: a file, or a folder of DICOM slices [default: the built-in case]
+    #[arg(long, value_name = "PATH")]
+    pub ct: Option<PathBuf>,
+    /// MRI of the same patient in the same space
+    #[arg(long, value_name = "PATH")]
+    pub mri: Option<PathBuf>,
+    /// Label volume: what is not 0 is brain [default: found in the MRI]
+    #[arg(long, value_name = "PATH")]
+    pub labels: Option<PathBuf>,
+    /// Edge of a skull voxel, mm
+    #[arg(long, value_name = "MM", default_value_t = 1.0, allow_negative_numbers = true)]
+    pub spacing_mm: f32,
+    /// Tetrahedra of the brain, met within a tenth
+    #[arg(long, value_name = "N", default_value_t = 12_000)]
+    pub tets: usize,
+    /// Threshold of bone, HU [default: from the histogram, 300 to 500]
+    #[arg(long, value_name = "HU", allow_negative_numbers = true)]
+    pub isovalue_hu: Option<i16>,
+}
+
+/// What a program can do beside a session.
+#[derive(Clone, Debug, Subcommand)]
+pub enum Task {
+    /// Make and keep cases
+    #[command(subcommand)]
+    Case(CaseTask),
+}
+
+/// What can be done with cases.
+#[derive(Clone, Debug, Subcommand)]
+pub enum CaseTask {
+    /// Make a case folder from images, for --case
+    Build {
+        /// The patient's images
+        #[command(flatten)]
+        patient: Patient,
+        /// The folder to make; it must not exist yet
+        #[arg(long, value_name = "CASE")]
+        out: PathBuf,
+    },
+}
+
+impl Patient {
+    /// Refuses numbers that make no sense.
+    pub fn check(&self) -> Result<(), String> {
+        within("spacing-mm", self.spacing_mm.into(), 0.2, 4.0)?;
+        within("tets", self.tets as f64, 500.0, 1e6)?;
+        within("isovalue-hu", self.isovalue_hu.unwrap_or(0).into(), -900.0, 3000.0)
+    }
+}
+
+fn within(flag: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
+    let good = value.is_finite() && value >= low && value <= high;
+    good.then_some(()).ok_or(format!("--{flag} {value} is out of range: give {low} to {high}"))
+}
+
 fn size(text: &str) -> Result<[u32; 2], String> {
     let remedy = "expected WIDTHxHEIGHT with 16 to 8192 pixels each, as in 960x600";
     let (width, height) = text.split_once('x').ok_or(remedy)?;
@@ -76,14 +126,8 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 impl Options {
     /// Refuses numbers that make no sense, naming the flag and what would be right.
     pub fn check(&self) -> Result<(), String> {
-        let within = |flag: &str, value: f64, low: f64, high: f64| {
-            let good = value.is_finite() && value >= low && value <= high;
-            good.then_some(()).ok_or(format!("--{flag} {value} is out of range: give {low} to {high}"))
-        };
+        self.patient.check()?;
         within("duration", self.duration.unwrap_or(1.0), 0.1, 86_400.0)?;
-        within("spacing-mm", self.spacing_mm.into(), 0.2, 4.0)?;
-        within("tets", self.tets as f64, 500.0, 1e6)?;
-        within("isovalue-hu", self.isovalue_hu.unwrap_or(0).into(), -900.0, 3000.0)?;
         within("young-modulus-kpa", self.young_modulus_kpa.into(), 0.05, 1000.0)?;
         within("rate-hz", self.rate_hz.into(), 100.0, 10_000.0)?;
         within("frames-per-second", self.frames_per_second, 0.0, 120.0)

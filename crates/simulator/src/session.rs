@@ -1,12 +1,13 @@
 //! A session from its flags to its files: open (everything that a user can get wrong), run, write.
 
 use crate::cache::Cache;
+use crate::case_folder;
 use crate::collision_step::CollisionStage;
 use crate::driver;
 use crate::error::SessionError;
 use crate::haptic_tick::{HapticConfig, HapticStage, ToolSample};
-use crate::import::{self, Inputs, Recipe};
-use crate::options::Options;
+use crate::import::{self, Case, Inputs, Recipe};
+use crate::options::{Options, Patient};
 use crate::output;
 use crate::picture::{self, Album};
 use crate::program::Program;
@@ -17,7 +18,7 @@ use crate::stop::Stop;
 use crate::summary::{About, Machine, Summary};
 use crate::threads::{self, Pace};
 use crate::{lockstep, window};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3, units};
@@ -69,8 +70,13 @@ impl Session {
             DeviceName::Replay(path) => Some(Recording::open(path)?),
             _ => None,
         };
-        let recipe = Recipe { spacing_mm: options.spacing_mm, tets: options.tets, isovalue_hu: options.isovalue_hu };
-        let case = import::open(program, &inputs(&options, built_in), &recipe, &Cache::of_user()?)?;
+        let case = match &options.case {
+            Some(folder) => fitting(program, case_folder::load(folder)?)?,
+            None => {
+                let inputs = inputs(&options.patient, built_in);
+                import::open(program, &inputs, &recipe(&options.patient), &Cache::of_user()?)?
+            }
+        };
         tracing::info!("case {} {}", case.name, if case.cached { "from the cache" } else { "imported" });
         let (name, hash) = (case.name.clone(), case.hash.clone());
         let scene = Scene::new(program, case)?;
@@ -267,8 +273,8 @@ impl Session {
             ("rigid", self.rigid.name().to_string()),
             ("solver", self.solver_name()),
             ("rate_hz", self.options.rate_hz.to_string()),
-            ("spacing_mm", self.options.spacing_mm.to_string()),
-            ("tets", self.options.tets.to_string()),
+            ("spacing_mm", self.options.patient.spacing_mm.to_string()),
+            ("tets", self.options.patient.tets.to_string()),
             ("young_modulus_kpa", self.options.young_modulus_kpa.to_string()),
         ];
         SessionHeader {
@@ -326,12 +332,46 @@ struct Graphics {
 
 const TLED: &str = "tled";
 
-fn inputs(options: &Options, built_in: Inputs) -> Inputs {
-    let given = options.ct.is_some() || options.mri.is_some() || options.labels.is_some();
+/// Makes a case folder; returns the case's name.
+pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inputs) -> Result<String, SessionError> {
+    patient.check().map_err(SessionError::Usage)?;
+    if out.exists() {
+        return Err(SessionError::Usage(format!(
+            "--out {} exists already: name a folder that does not",
+            out.display()
+        )));
+    }
+    let recipe = recipe(patient);
+    let case = import::open(program, &inputs(patient, built_in), &recipe, &Cache::of_user()?)?;
+    let parent = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = out.file_name().and_then(|name| name.to_str()).unwrap_or("case");
+    let written = Cache::at(parent.into()).keep(name, |folder| case_folder::save(&case, &recipe, folder));
+    written.map_err(|fault| SessionError::Internal(format!("cannot write {}: {fault}", out.display())))?;
+    Ok(case.name)
+}
+
+/// A case that has what the program needs.
+fn fitting(program: Program, case: Case) -> Result<Case, SessionError> {
+    let lacks = |what| Err(SessionError::Case(format!("{} needs {what}, which {} lacks", program.name(), case.name)));
+    if program.has_bone() && case.skull.is_none() {
+        return lacks("a skull from a CT");
+    }
+    if program.has_tissue() && case.brain.is_none() {
+        return lacks("a brain from an MRI");
+    }
+    Ok(case)
+}
+
+fn recipe(patient: &Patient) -> Recipe {
+    Recipe { spacing_mm: patient.spacing_mm, tets: patient.tets, isovalue_hu: patient.isovalue_hu }
+}
+
+fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
+    let given = patient.ct.is_some() || patient.mri.is_some() || patient.labels.is_some();
     if !given {
         return built_in;
     }
-    Inputs { name: None, ct: options.ct.clone(), mri: options.mri.clone(), labels: options.labels.clone() }
+    Inputs { name: None, ct: patient.ct.clone(), mri: patient.mri.clone(), labels: patient.labels.clone() }
 }
 
 fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {

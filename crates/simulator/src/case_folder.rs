@@ -1,0 +1,140 @@
+//! A case as a folder: volumes, mesh, numbers, and the hash of each file; self-describing, checked when it is opened.
+//!
+//! ```text
+//! CASE/case.json   form, name, hash, isovalue, recipe, remarks, file hashes
+//!      skull.nii   densities in HU, cubes, largest piece of bone only
+//!      mri.nii     the MRI around the brain      mask.nii   1 in the brain
+//!      brain.vtk   tetrahedra
+//! ```
+//!
+//! # Practice
+//! Patient RAS+ mm throughout. Nothing in it names a patient: images are written anew from their voxels, and the name is made from a hash.
+
+use crate::cache::digest;
+use crate::error::SessionError;
+use crate::import::{Brain, Case, Recipe};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use trepan_mesh::vtk;
+use trepan_volume::{hounsfield, nifti};
+
+/// Goes up when the folder's form changes.
+const FORM: u32 = 1;
+const SKULL: &str = "skull.nii";
+const MRI: &str = "mri.nii";
+const MASK: &str = "mask.nii";
+const MESH: &str = "brain.vtk";
+const CARD: &str = "case.json";
+
+/// `case.json`.
+#[derive(Serialize, Deserialize)]
+struct Card {
+    form: u32,
+    name: String,
+    hash: String,
+    isovalue_hu: i16,
+    recipe: Recipe,
+    notes: Vec<String>,
+    /// Each file and its SHA-256.
+    files: BTreeMap<String, String>,
+}
+
+/// Writes a case into an empty folder.
+pub fn save(case: &Case, recipe: &Recipe, folder: &Path) -> Result<(), String> {
+    let text = |fault: &dyn std::fmt::Display| fault.to_string();
+    let mut names = Vec::new();
+    if let Some(skull) = &case.skull {
+        nifti::write(&folder.join(SKULL), skull).map_err(|f| text(&f))?;
+        names.push(SKULL);
+    }
+    if let Some(brain) = &case.brain {
+        nifti::write(&folder.join(MASK), &brain.mask).map_err(|f| text(&f))?;
+        nifti::write(&folder.join(MRI), &brain.mri).map_err(|f| text(&f))?;
+        vtk::write(&folder.join(MESH), &brain.mesh).map_err(|f| text(&f))?;
+        names.extend([MASK, MRI, MESH]);
+    }
+    let mut files = BTreeMap::new();
+    for name in names {
+        files.insert(name.to_string(), digest(&folder.join(name)).map_err(|f| text(&f))?);
+    }
+    let card = Card {
+        form: FORM,
+        name: case.name.clone(),
+        hash: case.hash.clone(),
+        isovalue_hu: case.isovalue_hu,
+        recipe: *recipe,
+        notes: case.notes.clone(),
+        files,
+    };
+    let json = serde_json::to_vec_pretty(&card).map_err(|f| text(&f))?;
+    fs::write(folder.join(CARD), json).map_err(|f| text(&f))
+}
+
+/// Opens a case folder; every file must be there and be what it was when it was written.
+pub fn load(folder: &Path) -> Result<Case, SessionError> {
+    let broken = |file: &str, fault: &dyn std::fmt::Display| {
+        SessionError::Case(format!("{}: {fault}; build the case again with `case build`", folder.join(file).display()))
+    };
+    let json = fs::read(folder.join(CARD)).map_err(|fault| broken(CARD, &fault))?;
+    let card: Card = serde_json::from_slice(&json).map_err(|fault| broken(CARD, &fault))?;
+    if card.form != FORM {
+        return Err(broken(CARD, &format!("form {} is not known, this program knows {FORM}", card.form)));
+    }
+    for (name, hash) in &card.files {
+        let found = digest(&folder.join(name)).map_err(|fault| broken(name, &fault))?;
+        if found != *hash {
+            return Err(broken(name, &"the file is not what it was when the case was built"));
+        }
+    }
+    let volume = |name: &str| nifti::read(&folder.join(name)).map_err(|fault| broken(name, &fault));
+    let skull = match card.files.contains_key(SKULL) {
+        true => Some(hounsfield(&volume(SKULL)?).map_err(|fault| broken(SKULL, &fault))?),
+        false => None,
+    };
+    let brain = match card.files.contains_key(MESH) {
+        true => Some(Brain {
+            mask: volume(MASK)?.map(|v| v as u8),
+            mri: volume(MRI)?,
+            mesh: vtk::read(&folder.join(MESH)).map_err(|fault| broken(MESH, &fault))?,
+        }),
+        false => None,
+    };
+    let (name, hash) = (card.name, card.hash);
+    Ok(Case { name, hash, skull, isovalue_hu: card.isovalue_hu, brain, notes: card.notes, cached: true })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_geometry::Vec3;
+    use trepan_volume::VoxelVolume;
+
+    #[test]
+    fn a_case_comes_back_whole_and_a_changed_file_is_named() {
+        let home = tempfile::tempdir().expect("a temporary folder");
+        let mut skull = VoxelVolume::isotropic([6, 5, 4], Vec3::new(1.0, -2.0, 3.5), 0.75, -1000i16);
+        skull.data[17] = 1234;
+        let case = Case {
+            name: "case-1".into(),
+            hash: "ab".into(),
+            skull: Some(skull.clone()),
+            isovalue_hu: 350,
+            brain: None,
+            notes: vec!["a remark".into()],
+            cached: false,
+        };
+        let recipe = Recipe { spacing_mm: 0.75, tets: 500, isovalue_hu: None };
+        save(&case, &recipe, home.path()).expect("the case is written");
+        let back = load(home.path()).expect("the case is read");
+        assert_eq!((back.skull.as_ref(), back.isovalue_hu, back.notes.len()), (Some(&skull), 350, 1));
+        let mut bytes = fs::read(home.path().join(SKULL)).expect("a skull");
+        bytes[400] ^= 1;
+        fs::write(home.path().join(SKULL), bytes).expect("written");
+        let fault = load(home.path()).expect_err("a changed file").to_string();
+        assert!(fault.contains("skull.nii") && fault.contains("case build"), "{fault}");
+        fs::remove_file(home.path().join(CARD)).expect("removed");
+        assert!(load(home.path()).expect_err("no card").to_string().contains("case.json"));
+    }
+}
