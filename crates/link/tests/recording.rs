@@ -314,6 +314,14 @@ fn a_full_disk_is_an_error_each_time_and_never_a_panic() {
 }
 
 #[test]
+#[cfg(target_os = "linux")]
+fn the_systems_own_full_disk_is_an_error() {
+    let full = Path::new("/dev/full");
+    let error = Recorder::create(full, &header()).and_then(|mut r| record(&mut r, 600)).unwrap_err().to_string();
+    assert!(error.contains("/dev/full") && error.contains("No space left"), "{error}");
+}
+
+#[test]
 fn times_that_are_no_numbers_are_recorded_as_they_are() {
     let mut recorder = Recorder::to(Cursor::new(Vec::new()), Path::new("odd.mcap"), &header()).unwrap();
     for time_ms in [f64::NAN, f64::INFINITY, -5.0, 1e300, 3.0] {
