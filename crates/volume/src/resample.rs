@@ -46,7 +46,8 @@ impl Grid {
 
     /// An axis-aligned RAS grid of cubes that covers the volume's voxels to their outer faces.
     ///
-    /// A volume that already is such a grid gets its own back.
+    /// A volume that already is such a grid gets its own back. The spacing must be over 0; look at [`voxels`](Self::voxels)
+    /// before a small one is used.
     pub fn isotropic_over<T: Copy>(volume: &VoxelVolume<T>, spacing_mm: f32) -> Self {
         let (low, high) = volume.world_corners();
         let spacing = f64::from(spacing_mm);

@@ -86,6 +86,10 @@ fn what_is_no_head_is_refused_with_a_reason() {
     let mut far = ct.clone();
     far.world_from_voxel.translation.x += 900.0;
     assert!(matches!(brain_mask(&mri, Some(&far), &config), Err(MaskError::Apart(_))));
+    for wrong in [0.0, -1.0, f32::NAN, 99.0] {
+        let config = BrainConfig { work_mm: wrong, ..config.clone() };
+        assert!(matches!(brain_mask(&mri, None, &config), Err(MaskError::Work(_))));
+    }
     mri.data[77] = f32::NAN;
     assert_eq!(brain_mask(&mri, None, &config), Err(MaskError::NotANumber { count: 1 }));
     mri.data[77] = 0.0;

@@ -1,9 +1,9 @@
 //! Which grey values are brain in a T1 MRI.
 //!
 //! # Theory
-//! Deep in the head there is white matter, grey matter and CSF only. Otsu's threshold parts CSF from tissue there; with m the
-//! median and w the 90th percentile of the tissue, brain is from 0.55 m (halfway between CSF and grey matter) to 1.3 w
-//! (under fat and contrast agent).
+//! Deep in the head there is white matter, grey matter and little CSF. With m the median and w the 90th percentile of what has
+//! signal there, brain is from 0.62 m (halfway between CSF and grey matter) to 1.3 w (under fat and contrast agent). The head is what
+//! is over half of Otsu's threshold (1979), closed and filled.
 
 use super::morphology::{closed, filled};
 use crate::{DistanceField, VoxelVolume, largest_component};
@@ -11,7 +11,7 @@ use crate::{DistanceField, VoxelVolume, largest_component};
 /// How deep under the skin only brain and its water are, mm.
 const CORE_MM: f32 = 35.0;
 
-/// Grey values of brain tissue.
+/// Grey values of brain signal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Levels {
     pub least: f32,
@@ -25,12 +25,11 @@ impl Levels {
         values.sort_unstable_by(f32::total_cmp);
         let floor = 0.1 * *values.get(values.len() * 99 / 100)?;
         let signal = &values[values.partition_point(|&v| v <= floor)..];
-        let tissue = &signal[signal.partition_point(|&v| v <= otsu(signal))..];
-        if tissue.len() < 1000 {
+        if signal.len() < 1000 {
             return None;
         }
-        let at = |share: f64| tissue[(share * (tissue.len() - 1) as f64) as usize];
-        Some(Self { least: 0.55 * at(0.5), greatest: 1.3 * at(0.9) })
+        let at = |share: f64| signal[(share * (signal.len() - 1) as f64) as usize];
+        Some(Self { least: 0.62 * at(0.5), greatest: 1.3 * at(0.9) })
     }
 
     pub fn hold(self, value: f32) -> bool {

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! room    with a CT: the inside of the skull; without: what lies under the skin
-//! tissue  room ∩ brain's grey values, from Otsu's threshold deep in the room
+//! tissue  room ∩ brain's grey values, from the median deep in the room
 //! core    largest piece of tissue that a ball of radius r can move in          cuts meninges, vessels, nerves
 //! brain   tissue within r + 1 mm of the core, closed by a ball of 8 mm         fills sulci and ventricles
 //! mask    brain and a rim of 1 mm, brought to the MRI's grid between voxels, less bone
@@ -107,6 +107,9 @@ pub enum MaskError {
         /// How many.
         count: usize,
     },
+    /// A setting out of bounds.
+    #[error("work_mm is {0} mm; 0.3 to 6 mm is right")]
+    Work(f32),
     /// CT and MRI lie apart.
     #[error(transparent)]
     Apart(#[from] OverlapError),
@@ -121,6 +124,9 @@ pub fn brain_mask(
     let count = mri.data.iter().filter(|v| !v.is_finite()).count();
     if count > 0 {
         return Err(MaskError::NotANumber { count });
+    }
+    if !(0.3..=6.0).contains(&config.work_mm) {
+        return Err(MaskError::Work(config.work_mm));
     }
     let grid = Grid::isotropic_over(mri, config.work_mm);
     let coarse = resample(mri, &grid, Interpolation::Trilinear, 0.0);
