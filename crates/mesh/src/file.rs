@@ -283,7 +283,7 @@ pub(crate) mod tests {
             (random >> 11) as usize % n.max(1)
         };
         let numbers: [&[u8]; 8] = [b"-1", b"0", b"4294967295", b"18446744073709551615", b"nan", b"1e400", b"", b"x"];
-        for round in 0..20_000 {
+        for round in 0..rounds() {
             let mut bad = good.to_vec();
             match round % 4 {
                 0 => bad.truncate(next(good.len())),
@@ -303,6 +303,11 @@ pub(crate) mod tests {
     /// What a parser says about a text.
     pub(crate) fn of_text<T>(text: &str, parse: impl Fn(Reader) -> Result<T, FileError>) -> Result<T, FileError> {
         parse(Reader::of(Path::new("some.file"), text.as_bytes().to_vec()))
+    }
+
+    /// How many damaged copies; more with TREPAN_MUTATIONS=1000000.
+    fn rounds() -> usize {
+        std::env::var("TREPAN_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(5_000)
     }
 
     /// Replaces the nth run of digits.

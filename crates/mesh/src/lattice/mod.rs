@@ -20,6 +20,7 @@ mod bcc;
 mod blur;
 mod field;
 mod manifold;
+mod polish;
 mod stencil;
 
 use crate::{MeshError, Surface, TetMesh};
@@ -102,6 +103,7 @@ fn search(field: &Field, target: usize) -> Result<TetMesh, MeshError> {
     }
     let nearest = best.1.tets.len();
     let met = nearest.abs_diff(target) * 10 <= target;
+    polish::polish(&mut best.1, spacing);
     if met { Ok(best.1) } else { Err(MeshError::Target { wanted: target, nearest }) }
 }
 

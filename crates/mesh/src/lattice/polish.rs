@@ -1,0 +1,89 @@
+//! Moves nodes inside so that the flattest elements get higher.
+//!
+//! # Theory
+//! The stable step of an explicit solver goes with the smallest height of an element. Where an interior node has a flat element, steps along the axes are tried, each half as long as the
+//! last; a step stays when the smallest height around the node grows and no angle there gets worse than the worst before. So the worst never gets worse, and the
+//! surface is not touched. On a brain this gives half as much height again, and with it half as long a time step.
+
+use crate::quality::{EDGES, volume};
+use crate::{FACES, Surface, TetMesh, Topology};
+use glam::DVec3;
+
+/// Rounds over all nodes.
+const ROUNDS: usize = 8;
+/// Nodes are left alone whose elements are all higher than this share of the spacing (the lattice's own: 0.71).
+const HIGH_ENOUGH: f64 = 0.33;
+
+/// Improves a mesh in place; `spacing` is its lattice spacing, mm.
+pub(super) fn polish(mesh: &mut TetMesh, spacing: f64) {
+    let topology = Topology::of(mesh);
+    let mut inside = vec![true; mesh.positions.len()];
+    Surface::with(mesh, &topology).nodes().iter().for_each(|&n| inside[n as usize] = false);
+    for round in 0..ROUNDS {
+        let step = 0.12 * spacing * 0.7f64.powi(round as i32);
+        for node in (0..inside.len()).filter(|&n| inside[n]) {
+            improve(mesh, node, topology.tets_of_node.row(node), step, HIGH_ENOUGH * spacing);
+        }
+    }
+}
+
+fn improve(mesh: &mut TetMesh, node: usize, around: &[u32], step: f64, high_enough: f64) {
+    let here = mesh.positions[node];
+    let mut best = (worth(mesh, around), here);
+    if best.0.0 > high_enough {
+        return;
+    }
+    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+        for side in [step, -step] {
+            mesh.positions[node] = here + (axis * side).as_vec3();
+            let now = worth(mesh, around);
+            if now.0 > best.0.0 * 1.001 && now.1 >= best.0.1 {
+                best = (now, mesh.positions[node]);
+            }
+        }
+    }
+    mesh.positions[node] = best.1;
+}
+
+/// The smallest height, mm, and minus the largest |cos| of an angle, of some tetrahedra; the least there is when one is inverted.
+fn worth(mesh: &TetMesh, tets: &[u32]) -> (f64, f64) {
+    let mut worst = (f64::INFINITY, 0.0f64);
+    for &tet in tets {
+        let corners = mesh.corners(tet as usize).map(|p| p.as_dvec3());
+        let mm3 = volume(corners);
+        if mm3 <= 0.0 {
+            return (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        }
+        let normals = FACES.map(|[i, j, k]| (corners[j] - corners[i]).cross(corners[k] - corners[i]));
+        let lengths = normals.map(DVec3::length);
+        worst.0 = worst.0.min(6.0 * mm3 / lengths.into_iter().fold(0.0, f64::max));
+        for [f, g, ..] in EDGES {
+            let cos = normals[f].dot(normals[g]) / (lengths[f] * lengths[g]);
+            worst.1 = worst.1.min(-cos.abs());
+        }
+    }
+    worst
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Quality;
+    use trepan_geometry::Vec3;
+
+    #[test]
+    fn a_node_near_a_face_moves_away_and_nothing_else_does() {
+        let mut mesh = TetMesh {
+            positions: vec![Vec3::ZERO, 4.0 * Vec3::X, 4.0 * Vec3::Y, 4.0 * Vec3::Z, Vec3::new(1.0, 1.0, 0.05)],
+            tets: vec![[0, 1, 2, 4], [0, 3, 1, 4], [0, 2, 3, 4], [1, 3, 2, 4]],
+        };
+        let before = mesh.clone();
+        assert_eq!(mesh.check(), Ok(()));
+        polish(&mut mesh, 4.0);
+        assert_eq!(mesh.check(), Ok(()));
+        assert_eq!(mesh.positions[..4], before.positions[..4]);
+        let (was, is) = (Quality::of(&before), Quality::of(&mesh));
+        assert!(is.min_height_mm > 10.0 * was.min_height_mm && is.min_dihedral_deg > was.min_dihedral_deg);
+        assert!((is.total_mm3 - was.total_mm3).abs() < 1e-5);
+    }
+}
