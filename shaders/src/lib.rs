@@ -23,3 +23,5 @@ pub const RENDER_SLICE: &str = picture!("slice.wgsl");
 pub const RENDER_CONTOUR: &str = picture!("contour.wgsl");
 /// A coarser 3-D view, enlarged.
 pub const RENDER_ENLARGE: &str = picture!("enlarge.wgsl");
+/// The brain cut by a slice, as places at rest.
+pub const RENDER_SECTION: &str = picture!("section.wgsl");

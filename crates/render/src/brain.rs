@@ -19,15 +19,19 @@ pub(crate) struct Brain {
     pipeline: Pipeline,
 }
 
-/// The border of the tetrahedra, as it moves.
+/// The tetrahedra and their border, as they move.
 #[derive(Clone, Debug)]
 pub(crate) struct Border {
     /// Border nodes, as indices of the mesh.
     nodes: Vec<u32>,
     /// Triangles over `nodes`.
     pub triangles: Vec<[u32; 3]>,
+    /// The tetrahedra behind the border, over all nodes.
+    pub tets: Vec<[u32; 4]>,
     /// All nodes at rest, world mm.
-    rest: Vec<Vec3>,
+    pub rest: Vec<Vec3>,
+    /// All nodes now, world mm.
+    pub now: Vec<Vec3>,
     /// Border nodes now, world mm.
     pub places: Vec<Vec3>,
     /// Unit normals of border nodes now.
@@ -51,7 +55,8 @@ impl Border {
         let triangles: Vec<[u32; 3]> = surface.triangles.iter().map(|t| t.map(local)).collect();
         let places: Vec<Vec3> = nodes.iter().map(|&n| mesh.positions[n as usize]).collect();
         let normals = vec![Vec3::ZERO; nodes.len()];
-        Self { nodes, triangles, rest: mesh.positions.clone(), places, normals }
+        let (rest, now) = (mesh.positions.clone(), mesh.positions.clone());
+        Self { nodes, triangles, tets: mesh.tets.clone(), rest, now, places, normals }
     }
 
     /// Moves the border to where the nodes of the whole mesh are, or back to rest.
@@ -61,6 +66,7 @@ impl Border {
         if given != wanted {
             return Err(RenderError::Nodes { wanted, given });
         }
+        self.now.copy_from_slice(positions);
         self.places.iter_mut().zip(&self.nodes).for_each(|(place, &n)| *place = positions[n as usize]);
         smooth_normals(&self.places, &self.triangles, &mut self.normals);
         Ok(())

@@ -8,6 +8,7 @@ use crate::light::{Inputs, Light};
 use crate::mri::Mri;
 use crate::scene::Scene;
 use crate::skull::Skull;
+use crate::slice::Slices;
 use trepan_gpu::{Bindings, Buffer, Format, Gpu, Texture, TextureSpec};
 
 /// What the passes of the 3-D view share.
@@ -19,6 +20,7 @@ pub(crate) struct Passes {
     pub mri: Mri,
     pub light: Light,
     pub enlarge: Enlarge,
+    pub slices: Slices,
 }
 
 /// How the picture is divided.
@@ -49,6 +51,9 @@ pub(crate) struct Canvas {
     pub skull: Bindings,
     pub light: Bindings,
     pub brain: Option<Bindings>,
+    pub slices: [Bindings; 3],
+    /// Places at rest of the brain's cuts, the slices one below the other.
+    pub section: Texture,
 }
 
 impl Canvas {
@@ -80,6 +85,9 @@ impl Canvas {
             let bindings = passes.enlarge.bind(gpu, &passes.scene, &texture)?;
             Some((texture, bindings))
         };
+        let column = layout.slices.map_or([1, 1], |s| [s[0][2], height]);
+        let section = sheet("section", column, Format::Rgba16Float)?;
+        let (density, mri) = (&passes.skull.density, &passes.mri.texture);
         Ok(Self {
             division,
             layout,
@@ -90,6 +98,8 @@ impl Canvas {
             skull: passes.skull.bind(gpu, &passes.scene)?,
             light: passes.light.bind(gpu, &passes.scene, &inputs)?,
             brain: passes.brain.as_ref().map(|b| b.bind(gpu, &passes.scene)).transpose()?,
+            slices: passes.slices.bind(gpu, &passes.scene, density, mri, &section)?,
+            section,
             skull_hit,
             brain_hit,
             brain_rest,

@@ -36,6 +36,7 @@ mod processor;
 mod recast;
 mod renderer;
 mod scene;
+mod section;
 mod skull;
 mod slice;
 #[cfg(feature = "window")]

@@ -12,6 +12,7 @@ use crate::layout::Layout;
 use crate::light::Light;
 use crate::mri::Mri;
 use crate::scene::Scene;
+use crate::section::Section;
 use crate::skull::{NOTHING, Skull};
 use crate::slice::{Plane, Slices};
 use glam::Vec3;
@@ -32,7 +33,7 @@ const LEAST_DETAIL: f32 = 0.05;
 pub struct Renderer {
     gpu: Gpu,
     passes: Passes,
-    slices: Slices,
+    section: Option<Section>,
     contour: Option<Contour>,
     canvas: Canvas,
     bounds: Aabb,
@@ -50,7 +51,7 @@ pub struct DrawReport {
     pub bricks_left: u32,
     /// Pixels whose rays through the bone were cast again.
     pub pixels_cast: u32,
-    /// Lines of the brain's outline that found no room.
+    /// Lines of the brain's outline and triangles of its cut that found no room.
     pub lines_left: u32,
 }
 
@@ -64,16 +65,17 @@ impl Renderer {
             mri: Mri::new(gpu, data.mri)?,
             light: Light::new(gpu)?,
             enlarge: Enlarge::new(gpu)?,
+            slices: Slices::new(gpu)?,
         };
-        let slices = Slices::new(gpu, &passes.scene, &passes.skull.density, &passes.mri.texture)?;
-        let outline = || Contour::new(gpu, &passes.scene, OUTLINE);
-        let contour = passes.brain.is_some().then(outline).transpose()?;
+        let moves = passes.brain.is_some();
+        let section = moves.then(|| Section::new(gpu, &passes.scene)).transpose()?;
+        let contour = moves.then(|| Contour::new(gpu, &passes.scene, OUTLINE)).transpose()?;
         let canvas = Canvas::new(gpu, Division { size, slices: true, detail: 1.0 }, &passes)?;
         Ok(Self {
             gpu: gpu.clone(),
             bounds: bounds(&data.bone),
             passes,
-            slices,
+            section,
             contour,
             canvas,
             timer: Timer::new(gpu, 16)?,
@@ -132,7 +134,11 @@ impl Renderer {
 
     fn draw_slices(&self, recorder: &mut Recorder) {
         if let Some(rectangles) = &self.canvas.layout.slices {
-            self.slices.draw(recorder, rectangles, &self.canvas.picture);
+            match &self.section {
+                Some(section) => section.draw(recorder, rectangles, &self.canvas.section),
+                None => clear(recorder, &self.canvas.section, 0.0),
+            }
+            self.passes.slices.draw(recorder, &self.canvas.slices, rectangles, &self.canvas.picture);
             if let Some(contour) = &self.contour {
                 contour.draw(recorder, rectangles, &self.canvas.picture);
             }
@@ -143,11 +149,10 @@ impl Renderer {
         let Some(rectangles) = &self.canvas.layout.slices else { return 0 };
         let planes =
             Plane::three(frame.world_from_tool.translation, self.bounds, frame.slices.half_height_mm, rectangles);
-        self.slices.follow(&self.gpu, &planes, rectangles, &frame.slices);
-        match (&mut self.contour, &self.passes.brain) {
-            (Some(contour), Some(brain)) => contour.follow(&self.gpu, &planes, brain.border.corners()),
-            _ => 0,
-        }
+        self.passes.slices.follow(&self.gpu, &planes, rectangles, &frame.slices);
+        let Some(brain) = &self.passes.brain else { return 0 };
+        let contour = self.contour.as_mut().map_or(0, |c| c.follow(&self.gpu, &planes, brain.border.corners()));
+        contour + self.section.as_mut().map_or(0, |s| s.follow(&self.gpu, &planes, &brain.border))
     }
 
     /// Changes the size of the pictures, width and height.

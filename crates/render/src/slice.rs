@@ -54,7 +54,6 @@ struct Slice {
 pub(crate) struct Slices {
     pipeline: Pipeline,
     uniforms: [Buffer<Slice>; 3],
-    bindings: [Bindings; 3],
 }
 
 impl Plane {
@@ -73,6 +72,12 @@ impl Plane {
         })
     }
 
+    /// Where a point of the plane is in the picture, from -1 to 1.
+    pub fn at(&self, point: Vec3) -> Vec2 {
+        let from = point - self.centre;
+        Vec2::new(from.dot(self.right), from.dot(self.up)) / self.half
+    }
+
     /// Where the plane cuts a triangle, in the picture's coordinates from -1 to 1.
     pub fn cut(&self, triangle: [Vec3; 3]) -> Option<[Vec2; 2]> {
         let normal = self.right.cross(self.up);
@@ -85,19 +90,19 @@ impl Plane {
         let alone = (0..3).find(|&n| over[n] != over[(n + 1) % 3] && over[n] != over[(n + 2) % 3])?;
         let end = |other: usize| {
             let share = height[alone] / (height[alone] - height[other]);
-            let from = triangle[alone].lerp(triangle[other], share) - self.centre;
-            Vec2::new(from.dot(self.right), from.dot(self.up)) / self.half
+            self.at(triangle[alone].lerp(triangle[other], share))
         };
         Some([end((alone + 1) % 3), end((alone + 2) % 3)])
     }
 }
 
 impl Slices {
-    pub fn new(gpu: &Gpu, scene: &Buffer<Scene>, density: &Texture, mri: &Texture) -> Result<Self, RenderError> {
+    pub fn new(gpu: &Gpu) -> Result<Self, RenderError> {
+        let volumes = [Slot::Texture3, Slot::Texture3, Slot::Sampler];
         let spec = PipelineSpec {
             label: "slice",
             wgsl: trepan_shaders::RENDER_SLICE,
-            slots: &[Slot::Uniform, Slot::Uniform, Slot::Texture3, Slot::Texture3, Slot::Sampler],
+            slots: &[&[Slot::Uniform, Slot::Uniform], &volumes[..], &[Slot::Loaded2]].concat(),
             targets: &[Format::Rgba8Unorm],
             depth: false,
             blend: false,
@@ -105,12 +110,24 @@ impl Slices {
         };
         let pipeline = Pipeline::new(gpu, &spec)?;
         let uniform = || Buffer::<Slice>::zeroed(gpu, "slice", 1);
-        let uniforms = [uniform()?, uniform()?, uniform()?];
-        let bind = |slice: &Buffer<Slice>| {
-            pipeline.bind(gpu, &[scene.into(), slice.into(), density.into(), mri.into(), Resource::Linear])
+        Ok(Self { pipeline, uniforms: [uniform()?, uniform()?, uniform()?] })
+    }
+
+    /// Binds the three slices; `section` holds the places at rest of the brain's cuts.
+    pub fn bind(
+        &self,
+        gpu: &Gpu,
+        scene: &Buffer<Scene>,
+        density: &Texture,
+        mri: &Texture,
+        section: &Texture,
+    ) -> Result<[Bindings; 3], RenderError> {
+        let bind = |n: usize| {
+            let uniforms = [scene.into(), (&self.uniforms[n]).into()];
+            let volumes = [density.into(), mri.into(), Resource::Linear, section.into()];
+            self.pipeline.bind(gpu, &[&uniforms[..], &volumes].concat())
         };
-        let bindings = [bind(&uniforms[0])?, bind(&uniforms[1])?, bind(&uniforms[2])?];
-        Ok(Self { pipeline, uniforms, bindings })
+        Ok([bind(0)?, bind(1)?, bind(2)?])
     }
 
     /// Tells the device what the slices show.
@@ -130,12 +147,18 @@ impl Slices {
         }
     }
 
-    pub fn draw(&self, recorder: &mut Recorder, rectangles: &[[u32; 4]; 3], picture: &Texture) {
+    pub fn draw(
+        &self,
+        recorder: &mut Recorder,
+        bindings: &[Bindings; 3],
+        rectangles: &[[u32; 4]; 3],
+        picture: &Texture,
+    ) {
         let colours = [Target { texture: picture, clear: None }];
         recorder.draw("slice", &DrawTarget { colours: &colours, depth: None }, |d| {
             for n in 0..3 {
                 d.viewport(rectangles[n]);
-                d.draw(&self.pipeline, &self.bindings[n], 3);
+                d.draw(&self.pipeline, &bindings[n], 3);
             }
         });
     }

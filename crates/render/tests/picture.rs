@@ -192,3 +192,37 @@ fn a_coarser_view_looks_like_the_fine_one_and_leaves_the_slices_alone() {
     assert_eq!(mean(width..240), 0.0);
     assert_eq!(gpu.faults(), Faults::default());
 }
+
+#[test]
+fn the_mri_moves_with_the_brain_in_the_slices() {
+    let Some(gpu) = device() else { return };
+    let speck = bone(60, |p| (p - DVec3::splat(28.0)).length() - 1.5);
+    let mesh = cube(20.0);
+    let mut mri = VoxelVolume::isotropic([60; 3], Vec3::splat(-29.5), 1.0, 20.0f32);
+    for at in 0..mri.data.len() {
+        if mri.centre_of([at % 60, at / 60 % 60, at / 3600]).distance(DVec3::new(8.0, 0.0, 0.0)) < 7.0 {
+            mri.data[at] = 200.0;
+        }
+    }
+    let data = SceneData { bone: speck, brain: Some(&mesh), mri: Some(&mri) };
+    let mut renderer = renderer(&gpu, &data, [400, 300]);
+    let frame = Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0));
+    // The middle column of the bright ball in the axial slice of 100 pixels for 59 mm and a margin of 4 percent.
+    let bright = |image: &Image| {
+        let [x, y, w, h] = Layout::of(400, 300, true).slices.unwrap()[0];
+        let pixels = (0..w * h).map(|n| (n % w, n / w)).filter(|&(px, py)| {
+            let [r, g, b, _] = image.pixel(x + px, y + py);
+            r > 120 && r == g && g == b
+        });
+        let columns: Vec<u32> = pixels.map(|(px, _)| px).collect();
+        assert!((280..520).contains(&columns.len()), "{} bright pixels", columns.len());
+        columns.iter().sum::<u32>() as f32 / columns.len() as f32 + 0.5
+    };
+    let column = |x_mm: f32| 50.0 - x_mm / (29.5 * 1.04) * 50.0;
+    let rest = bright(&picture(&mut renderer, &frame));
+    assert!((rest - column(8.0)).abs() < 1.5, "{rest} for {}", column(8.0));
+    let moved: Vec<Vec3> = mesh.positions.iter().map(|&p| p + Vec3::new(-6.0, 0.0, 0.0)).collect();
+    let moved = bright(&picture(&mut renderer, &Frame { brain_positions: Some(&moved), ..frame }));
+    assert!((moved - column(2.0)).abs() < 1.5, "{moved} for {}", column(2.0));
+    assert_eq!(gpu.faults(), Faults::default());
+}

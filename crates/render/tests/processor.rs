@@ -63,11 +63,13 @@ fn the_processor_draws_the_devices_picture() {
     let size = [320, 240];
     let mut on_device = scene::renderer(&gpu, &data, size);
     let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
+    let moved: Vec<Vec3> = mesh.positions.iter().map(|&p| 0.9 * p + Vec3::new(2.0, 3.0, -1.0)).collect();
     for step in 0..3 {
         if step == 1 {
             let near = shell.voxel_of(frame.world_from_tool.translation - 4.0 * Vec3::Y);
             (0..343).for_each(|n| shell.set_hu(near + IVec3::new(n % 7 - 3, n / 7 % 7 - 3, n / 49 - 3), AIR_HU));
         }
+        let frame = Frame { brain_positions: (step == 2).then_some(&moved[..]), ..frame };
         let reports = (on_device.draw(&frame).expect("drawn"), on_processor.draw(&frame).expect("drawn"));
         assert_eq!(reports.0, reports.1);
         let (device, processor) = (on_device.bone_hits().expect("hits"), on_processor.bone_hits());

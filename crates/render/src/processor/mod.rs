@@ -16,6 +16,7 @@ mod bricks;
 mod contour;
 mod light;
 mod rows;
+mod section;
 mod skull;
 mod slice;
 
@@ -165,10 +166,14 @@ impl ProcessorRenderer {
         let pixels = bytemuck::cast_slice_mut::<u8, [u8; 4]>(&mut self.picture.rgba);
         for (n, (plane, rectangle)) in planes.iter().zip(&rectangles).enumerate() {
             let [x, y, w, h] = rectangle.map(|n| n as usize);
+            let cut = self.brain.iter().flat_map(|brain| crate::section::triangles(plane, brain));
+            let places = section::places([w, h], cut);
             let rows = rows::of(pixels, width, y..y + h, x..x + w);
             rows::share(self.threads, rows, |row_at, row| {
                 for (column, pixel) in row.iter_mut().enumerate() {
-                    *pixel = slice::fragment(&inputs, plane, n, [w, h], [column, row_at - y], &frame.slices);
+                    let at = [column, row_at - y];
+                    let rest = places[column + w * (row_at - y)];
+                    *pixel = slice::fragment(&inputs, plane, n, [w, h], at, rest, &frame.slices);
                 }
             });
             if let Some(brain) = &self.brain {

@@ -19,6 +19,7 @@ pub(crate) fn fragment(
     n: usize,
     size: [usize; 2],
     at: [usize; 2],
+    rest: Option<Vec3>,
     look: &SliceLook,
 ) -> [u8; 4] {
     let scene = inputs.scene;
@@ -26,7 +27,7 @@ pub(crate) fn fragment(
     let pixel = Vec2::new(at[0] as f32, at[1] as f32) + 0.5;
     let offset = (2.0 * pixel / size - 1.0) * Vec2::new(plane.half.x, -plane.half.y);
     let world = plane.centre + offset.x * plane.right + offset.y * plane.up;
-    let mut colour = tissue(inputs, world, look);
+    let mut colour = tissue(inputs, world, rest.unwrap_or(world), look);
     let mm = 2.0 * plane.half.x / size.x;
     if scene.tip.w > 0.0 {
         let away = world - scene.tip.truncate();
@@ -51,14 +52,14 @@ pub(crate) fn fragment(
     bytes(colour)
 }
 
-fn tissue(inputs: &Inputs, world: Vec3, look: &SliceLook) -> Vec3 {
+fn tissue(inputs: &Inputs, world: Vec3, rest: Vec3, look: &SliceLook) -> Vec3 {
     let g = inputs.bricks.grid_of(world);
     let dims = Vec3::from(inputs.bricks.grid.dims.map(|n| n as f32));
     let inside = (g + 0.5).cmpge(Vec3::ZERO).all() && (g + 0.5).cmple(dims).all();
     let hu = if inside { inputs.bricks.hu(g) } else { f32::from(AIR_HU) };
     let grey = ((hu - (look.level_hu - 0.5 * look.width_hu)) / look.width_hu.max(1.0)).clamp(0.0, 1.0);
     let Some(greys) = inputs.mri else { return Vec3::splat(grey) };
-    let place = greys.texture_from_world.transform_point3(world);
+    let place = greys.texture_from_world.transform_point3(rest);
     let known = place.cmpge(Vec3::ZERO).all() && place.cmple(Vec3::ONE).all();
     let isovalue = inputs.scene.dims.w;
     let share = look.mri_share * (1.0 - smoothstep(isovalue - 150.0, isovalue, hu));

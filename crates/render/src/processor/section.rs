@@ -1,0 +1,29 @@
+//! Twin of `section.wgsl`: where the brain that is at a pixel of a slice is at rest.
+
+use crate::section::Corner;
+use glam::{Vec2, Vec3};
+
+/// The place at rest at every pixel of a slice, row by row; none off the brain.
+pub(crate) fn places([width, height]: [usize; 2], triangles: impl Iterator<Item = [Corner; 3]>) -> Vec<Option<Vec3>> {
+    let mut places = vec![None; width * height];
+    let size = Vec2::new(width as f32, height as f32);
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|corner| (Vec2::new(corner.at.x, -corner.at.y) * 0.5 + 0.5) * size);
+        let double_area = (b - a).perp_dot(c - a);
+        let low = a.min(b).min(c).floor().clamp(Vec2::ZERO, size).as_uvec2();
+        let high = a.max(b).max(c).ceil().clamp(Vec2::ZERO, size).as_uvec2();
+        if double_area == 0.0 {
+            continue;
+        }
+        for (y, x) in (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| (y, x))) {
+            let p = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+            let share =
+                [(c - b).perp_dot(p - b), (a - c).perp_dot(p - c), (b - a).perp_dot(p - a)].map(|w| w / double_area);
+            if share.iter().all(|&w| w >= 0.0) {
+                let rest = (0..3).map(|n| share[n] * triangle[n].rest).sum();
+                places[x as usize + width * y as usize] = Some(rest);
+            }
+        }
+    }
+    places
+}

@@ -1,0 +1,154 @@
+//! The deformed brain cut by the slices: which place at rest, where the MRI was taken, is seen at each pixel.
+//!
+//! # Theory
+//! A plane cuts a tetrahedron in a triangle or a quadrilateral. Deformation is linear in a tetrahedron, so the place at rest is linear over the cut.
+
+use crate::RenderError;
+use crate::brain::Border;
+use crate::scene::Scene;
+use crate::slice::Plane;
+use glam::{Vec2, Vec3, Vec4};
+use trepan_gpu::{
+    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
+};
+
+/// Triangles that one slice may need; a slice of a brain of 100,000 tetrahedra needs about 8,000.
+const MOST_TRIANGLES: usize = 16_384;
+
+/// A corner of a cut: in the slice's picture from -1 to 1, and at rest in world mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Corner {
+    pub at: Vec2,
+    pub rest: Vec3,
+}
+
+/// The pass for three slices.
+#[derive(Debug)]
+pub(crate) struct Section {
+    pipeline: Pipeline,
+    corners: [Buffer<[Vec4; 2]>; 3],
+    bindings: [Bindings; 3],
+    counts: [u32; 3],
+    cut: Vec<[Vec4; 2]>,
+}
+
+impl Section {
+    pub fn new(gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Self, RenderError> {
+        let spec = PipelineSpec {
+            label: "section",
+            wgsl: trepan_shaders::RENDER_SECTION,
+            slots: &[Slot::Uniform, Slot::Storage],
+            targets: &[Format::Rgba16Float],
+            depth: false,
+            blend: false,
+            topology: Topology::Triangles,
+        };
+        let pipeline = Pipeline::new(gpu, &spec)?;
+        let corners = || Buffer::<[Vec4; 2]>::zeroed(gpu, "section", 3 * MOST_TRIANGLES);
+        let corners = [corners()?, corners()?, corners()?];
+        let bind = |corners: &Buffer<[Vec4; 2]>| pipeline.bind(gpu, &[scene.into(), corners.into()]);
+        let bindings = [bind(&corners[0])?, bind(&corners[1])?, bind(&corners[2])?];
+        Ok(Self { pipeline, corners, bindings, counts: [0; 3], cut: Vec::with_capacity(3 * MOST_TRIANGLES) })
+    }
+
+    /// Cuts the brain by three planes. Returns the triangles that found no room.
+    pub fn follow(&mut self, gpu: &Gpu, planes: &[Plane; 3], brain: &Border) -> u32 {
+        let mut left = 0;
+        for (n, plane) in planes.iter().enumerate() {
+            self.cut.clear();
+            for triangle in triangles(plane, brain) {
+                if self.cut.len() < 3 * MOST_TRIANGLES {
+                    self.cut.extend(triangle.map(|c| [c.at.extend(0.0).extend(1.0), c.rest.extend(1.0)]));
+                } else {
+                    left += 1;
+                }
+            }
+            self.counts[n] = self.cut.len() as u32;
+            self.corners[n].write(gpu, 0, &self.cut);
+        }
+        left
+    }
+
+    /// Draws the cuts into `places`, where the slices stand one below the other.
+    pub fn draw(&self, recorder: &mut Recorder, rectangles: &[[u32; 4]; 3], places: &Texture) {
+        let colours = [Target { texture: places, clear: Some([0.0; 4]) }];
+        recorder.draw("section", &DrawTarget { colours: &colours, depth: None }, |d| {
+            for (n, [_, y, width, height]) in rectangles.iter().enumerate() {
+                d.viewport([0, *y, *width, *height]);
+                d.draw(&self.pipeline, &self.bindings[n], self.counts[n]);
+            }
+        });
+    }
+}
+
+/// The cut of the whole brain as triangles.
+pub(crate) fn triangles<'a>(plane: &'a Plane, brain: &'a Border) -> impl Iterator<Item = [Corner; 3]> + 'a {
+    brain.tets.iter().flat_map(move |tet| {
+        let cut = cut(plane, tet.map(|n| brain.now[n as usize]), tet.map(|n| brain.rest[n as usize]));
+        let [a, b, c, d] = cut.map_or([None; 4], |c| c);
+        let triangle = |p: Option<Corner>, q: Option<Corner>, r: Option<Corner>| Some([p?, q?, r?]);
+        [triangle(a, b, c), triangle(a, c, d)].into_iter().flatten()
+    })
+}
+
+/// The corners of a tetrahedron's cut, in order around it: three, four or none.
+fn cut(plane: &Plane, now: [Vec3; 4], rest: [Vec3; 4]) -> Option<[Option<Corner>; 4]> {
+    let height = now.map(|p| (p - plane.centre).dot(plane.right.cross(plane.up)));
+    let over: Vec4 = height.map(|h| f32::from(u8::from(h >= 0.0))).into();
+    let corner = |a: usize, b: usize| {
+        let share = height[a] / (height[a] - height[b]);
+        Some(Corner { at: plane.at(now[a].lerp(now[b], share)), rest: rest[a].lerp(rest[b], share) })
+    };
+    // Which corner, or which pair, is alone on its side.
+    let pair = |a: usize, b: usize, c: usize, d: usize| Some([corner(a, c), corner(a, d), corner(b, d), corner(b, c)]);
+    let one = |a: usize, b: usize, c: usize, d: usize| Some([corner(a, b), corner(a, c), corner(a, d), None]);
+    let bits = (0..4).fold(0, |bits, n| bits | (over[n] as u32) << n);
+    match bits.min(15 - bits) {
+        0b0001 => one(0, 1, 2, 3),
+        0b0010 => one(1, 0, 2, 3),
+        0b0100 => one(2, 0, 1, 3),
+        0b0111 => one(3, 0, 1, 2),
+        0b0011 => pair(0, 1, 2, 3),
+        0b0101 => pair(0, 2, 1, 3),
+        0b0110 => pair(1, 2, 0, 3),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use trepan_mesh::TetMesh;
+
+    fn plane(height: f32) -> Plane {
+        Plane { centre: Vec3::new(0.0, 0.0, height), right: Vec3::X, up: Vec3::Y, half: Vec2::ONE }
+    }
+
+    proptest! {
+        #[test]
+        fn the_area_of_all_cuts_over_height_is_the_volume(p in prop::array::uniform12(-0.9f32..0.9)) {
+            let mesh = TetMesh { positions: p.chunks(3).map(|c| Vec3::new(c[0], c[1], c[2])).collect(), tets: vec![[0, 1, 2, 3]] };
+            let border = Border::of(&mesh);
+            let steps = 400;
+            let area = |k: usize| -> f32 {
+                let plane = plane(-1.0 + (2 * k + 1) as f32 / steps as f32);
+                triangles(&plane, &border).map(|[a, b, c]| 0.5 * (b.at - a.at).perp_dot(c.at - a.at).abs()).sum()
+            };
+            let volume: f32 = (0..steps).map(area).sum::<f32>() * 2.0 / steps as f32;
+            prop_assert!((volume - mesh.volume_mm3(0).abs() as f32).abs() < 0.02, "{volume} for {}", mesh.volume_mm3(0));
+        }
+
+        #[test]
+        fn the_place_at_rest_follows_a_linear_motion(p in prop::array::uniform12(-0.9f32..0.9), height in -0.5f32..0.5) {
+            let mesh = TetMesh { positions: p.chunks(3).map(|c| Vec3::new(c[0], c[1], c[2])).collect(), tets: vec![[0, 1, 2, 3]] };
+            let mut border = Border::of(&mesh);
+            let motion = |v: Vec3| Vec3::new(1.2 * v.x + 0.1 * v.z, v.y - 0.3 * v.x, v.z + 0.2 * v.y) + 0.05;
+            let moved: Vec<Vec3> = mesh.positions.iter().map(|&v| motion(v)).collect();
+            border.follow(Some(&moved)).unwrap();
+            for corner in triangles(&plane(height), &border).flatten() {
+                prop_assert!((motion(corner.rest) - corner.at.extend(height)).length() < 1e-3);
+            }
+        }
+    }
+}
