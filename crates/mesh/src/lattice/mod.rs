@@ -3,10 +3,11 @@
 //! # Theory
 //! Isosurface stuffing (Labelle and Shewchuk 2007) on the smoothed signed distance of the mask. Two unknowns are found together: the lattice spacing a, from the count
 //! asked for (the count goes with a⁻³), and the level of the distance at which the surface is cut, so that the mesh has the mask's volume
-//! (dV/dlevel = area): flat triangles cut off what is convex, and smoothing shrinks it, and the level gives both back.
+//! (dV/dlevel = area): flat triangles cut off what is convex, and smoothing shrinks it, and the level gives both back. At the end nodes move where that makes
+//! the flattest elements higher.
 //!
 //! # Practice
-//! World mm; any affine. All dihedral angles lie between 10° and 165°. 1.4 litres at 1 mm to 15 thousand tetrahedra: about a second on
+//! World mm; any affine. All dihedral angles lie between 9° and 165°, in anatomy between 20° and 150°. 1.4 litres at 1 mm to 15 thousand tetrahedra: about a second on
 //! two cores, most of it the distance. The same mask gives the same bytes, whatever the number of threads.
 //!
 //! # Sources
@@ -80,6 +81,7 @@ fn search(field: &Field, target: usize) -> Result<TetMesh, MeshError> {
     let mut spacing = first_spacing(field.mask_mm3, target);
     let mut level = 0.0;
     let mut best = (f64::INFINITY, TetMesh::default());
+    let mut best_level = 0.0;
     for trial in 0..TRIALS {
         let lattice = Bcc::over(field.min, field.max, spacing, shift(trial));
         let mesh = manifold::repaired(stencil::stuff(&lattice, |p| level - field.sample(p)));
@@ -90,12 +92,14 @@ fn search(field: &Field, target: usize) -> Result<TetMesh, MeshError> {
         let share = mesh.tets.len() as f64 / target as f64;
         let missing_mm3 = field.mask_mm3 - mesh.total_mm3();
         let fault = ((share - 1.0).abs() / COUNT_TOLERANCE).max(missing_mm3.abs() / field.mask_mm3 / VOLUME_TOLERANCE);
+        let this_level = level;
         level += missing_mm3 / Surface::of(&mesh).area_mm2(&mesh.positions);
         if (share - 1.0).abs() > 0.5 * COUNT_TOLERANCE {
             spacing *= share.cbrt().clamp(0.5, 2.0);
         }
         if fault < best.0 {
             best = (fault, mesh);
+            best_level = this_level;
         }
         if fault < 1.0 {
             break;
@@ -103,7 +107,7 @@ fn search(field: &Field, target: usize) -> Result<TetMesh, MeshError> {
     }
     let nearest = best.1.tets.len();
     let met = nearest.abs_diff(target) * 10 <= target;
-    polish::polish(&mut best.1, spacing);
+    polish::polish(&mut best.1, spacing, |p| best_level - field.sample(p));
     if met { Ok(best.1) } else { Err(MeshError::Target { wanted: target, nearest }) }
 }
 
@@ -140,7 +144,7 @@ mod tests {
         assert!(mesh.tets.len().abs_diff(target) * 10 <= target, "{} for {target}", mesh.tets.len());
         assert!((mesh.total_mm3() / mm3 - 1.0).abs() < 0.01, "{}", mesh.total_mm3() / mm3);
         let quality = Quality::of(mesh);
-        assert!(quality.min_dihedral_deg > 10.0 && quality.max_dihedral_deg < 165.0, "{quality:?}");
+        assert!(quality.min_dihedral_deg > 15.0 && quality.max_dihedral_deg < 155.0, "{quality:?}");
     }
 
     #[test]
