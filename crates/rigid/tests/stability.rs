@@ -75,3 +75,36 @@ fn twenty_thousand_ticks_of_nonsense_stay_within_the_world() {
         assert!(contact.proxy().translation.length() < 20.0);
     }
 }
+
+#[test]
+fn a_ball_that_starts_in_bone_is_let_out() {
+    let bone = bone([28, 28, 28], 0.5, |p| p.abs().max_element() - 5.0);
+    let mut contact = Method::RECOMMENDED.build(&Tool::burr(2.0));
+    contact.reset(Pose::IDENTITY);
+    let mut out = RigidStep::default();
+    for t in 0..600 {
+        contact.step(&bone, &at(Vec3::Z * 0.02 * t as f32), false, 1.0, &mut out);
+    }
+    assert!(!out.manifold.touches(), "depth {} mm", out.manifold.depth_mm);
+}
+
+#[test]
+fn a_burr_comes_out_of_its_own_bore() {
+    let bone = bone([28, 28, 32], 0.5, |p| p.z - 3.0);
+    let mut contact = Method::RECOMMENDED.build(&Tool::burr(2.0));
+    contact.reset(Pose::from_translation(Vec3::Z * 5.0));
+    let mut out = RigidStep::default();
+    for _ in 0..4000 {
+        let device = contact.proxy().translation - Vec3::Z * 0.75;
+        contact.step(&bone, &at(device), true, 1.0, &mut out);
+    }
+    let deep = contact.proxy().translation;
+    assert!(deep.z < 2.0, "the bore is deeper than the burr: {deep}");
+    let mut worst = 0.0f32;
+    for t in 0..500 {
+        contact.step(&bone, &at(deep + Vec3::Z * 0.02 * t as f32), false, 1.0, &mut out);
+        worst = worst.max(out.manifold.depth_mm);
+    }
+    println!("bore to {deep}, drag {worst} mm");
+    assert!(!out.manifold.touches() && worst < 0.5, "drag of {worst} mm on the way out");
+}
