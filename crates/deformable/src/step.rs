@@ -29,7 +29,7 @@ pub struct TissueStep {
     pub overflow: u32,
     /// Inverted, flat or non-finite tetrahedra met and skipped; all of them, when the step was refused for lack of sound input.
     pub skipped: u32,
-    /// Boxes of far surface that moved faster than was allowed for; a contact there could be some steps late. 0 up to 30 thousand tetrahedra.
+    /// Boxes of far surface that moved further than was allowed for; a contact there could be some steps late. 0 unless the tissue leaps.
     pub stale: u32,
 }
 

@@ -2,10 +2,10 @@
 //!
 //! # Theory
 //! Border triangles are sorted once along a Morton curve at rest and cut into clusters of 32, each with a box. Every step fits some of the boxes anew to
-//! the moved nodes, in turn and spread over the whole surface, and learns from them how fast the surface moves. A box that is `a` steps old is
-//! taken wider by `a` times twice that speed; only where such a loose box is near enough to matter is it fitted at once. So a step touches what
-//! lies near the tool and a slice of the rest. A box that moved further than its margin is counted as stale: a contact could have come late by a
-//! few steps. Surfaces of up to [`SLICE`] clusters (a brain of 30 thousand tetrahedra) are fitted whole at every step and never stale.
+//! the moved nodes, in turn and spread over the whole surface, and learns from them how far the surface moves between two fits. A box that was
+//! not fitted in this step is taken wider by twice that motion; only where such a loose box is near enough to matter is it fitted at once. So a
+//! step touches what lies near the tool and a slice of the rest. A box that moved further than its margin is counted as stale: a contact there
+//! could have come late by a few steps. Surfaces of up to 1024 triangles are fitted whole at every step and are never stale.
 //!
 //! ```text
 //!   [fit] [loose] [loose] [fit]  ( tool ) -> boxes near it fitted -> their triangles -> exact closest point
@@ -21,9 +21,9 @@ use trepan_mesh::{Csr, Surface, TetMesh};
 /// Triangles in one cluster.
 const CLUSTER: usize = 32;
 /// Clusters fitted at every step at least.
-const SLICE: usize = 128;
-/// Speed that is always allowed for, mm in one step: 0.1 m/s at 1 kHz.
-const LEAST_SPEED: f32 = 0.1;
+const SLICE: usize = 32;
+/// Motion between two fits of a box that is always allowed for, mm.
+const LEAST_MOTION: f32 = 0.5;
 
 /// Closest point on the surface.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +47,7 @@ pub(crate) struct MovingSurface {
     boxes: Vec<Extent>,
     fitted_at: Vec<u32>,
     step: u32,
-    speed: f32,
+    motion: f32,
     /// Where the tool works in this step, and the clusters whose loose box meets it.
     region: Extent,
     close: Vec<u32>,
@@ -71,7 +71,7 @@ impl MovingSurface {
             boxes: vec![Extent::EMPTY; clusters],
             fitted_at: vec![0; clusters],
             step: 0,
-            speed: LEAST_SPEED,
+            motion: LEAST_MOTION,
             region: Extent::EMPTY,
             close: Vec::with_capacity(clusters),
             stale: 0,
@@ -84,7 +84,7 @@ impl MovingSurface {
 
     /// Forgets all boxes; the next step fits them all.
     pub(crate) fn reset(&mut self) {
-        (self.step, self.speed) = (0, LEAST_SPEED);
+        (self.step, self.motion) = (0, LEAST_MOTION);
     }
 
     /// Begins a step: fits a slice of the boxes to the moved nodes, all of them in the first step, and those that meet `region`.
@@ -94,7 +94,7 @@ impl MovingSurface {
         }
         let turns = if self.step == 0 { 1 } else { self.boxes.len().div_ceil(SLICE).max(1) };
         self.step += 1;
-        (self.stale, self.speed) = (0, LEAST_SPEED.max(0.9 * self.speed));
+        (self.stale, self.motion) = (0, LEAST_MOTION.max(0.9 * self.motion));
         for cluster in (self.step as usize % turns..self.boxes.len()).step_by(turns) {
             self.fit(positions, cluster);
         }
@@ -218,8 +218,8 @@ impl MovingSurface {
     /// The box of a cluster, widened by what it may have moved since it was fitted.
     #[inline]
     fn loose(&self, cluster: usize) -> Extent {
-        let age = (self.step - self.fitted_at[cluster]) as f32;
-        self.boxes[cluster].widened(2.0 * self.speed * age)
+        let is_fitted = self.fitted_at[cluster] == self.step;
+        self.boxes[cluster].widened(if is_fitted { 0.0 } else { 2.0 * self.motion })
     }
 
     /// The box of a cluster, fitted in this step.
@@ -233,9 +233,9 @@ impl MovingSurface {
     fn fit(&mut self, positions: &[Vec3], cluster: usize) {
         let fitted = Extent::of(self.nodes_of_cluster.row(cluster).iter().map(|&n| &positions[n as usize]));
         if self.step > 1 {
-            let (moved, age) = (fitted.moved_from(&self.boxes[cluster]), (self.step - self.fitted_at[cluster]) as f32);
-            self.stale += u32::from(age > 1.0 && moved > 2.0 * self.speed * age);
-            self.speed = self.speed.max(moved / age);
+            let moved = fitted.moved_from(&self.boxes[cluster]);
+            self.stale += u32::from(moved > 2.0 * self.motion && self.step - self.fitted_at[cluster] > 1);
+            self.motion = self.motion.max(moved);
         }
         (self.boxes[cluster], self.fitted_at[cluster]) = (fitted, self.step);
     }
