@@ -1,4 +1,4 @@
-//! Extended position-based dynamics with neo-Hookean constraints: small, robust at any step, right only in the limit of small substeps.
+//! Extended position-based dynamics with neo-Hookean constraints: small, forgiving, right in the limit of small substeps.
 //!
 //! # Theory
 //! Energy `μ/2 tr(FᵀF) + λ'/2 (J - γ)²` with `γ = 1 + μ/λ'` and `λ' = κ + μ/3`, so that both moduli at small strain are right. Each substep moves all nodes freely, then
@@ -10,7 +10,8 @@
 //! About 60 ns a tetrahedron and substep; sequential, so the same every time. Elements turned inside out come back: J - γ pulls them through.
 //!
 //! # When not to use it
-//! For forces that must be right: one pass leaves a residual, and stiffness then depends on substep and mesh (soft when substeps are long).
+//! With substeps over about twice the bound of an explicit step ([`crate::power_bound_ms`]), as for a stiff body on a fine mesh: one pass then leaves so
+//! much undone that the body is too soft, and further on it folds into itself.
 
 use crate::{Body, BodyError, Loads, Shape, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DVec3};

@@ -21,7 +21,7 @@ use trepan_soft::{Material, Shape, element_omega2};
 /// Tetrahedra in a block.
 pub(crate) const WIDTH: usize = 16;
 
-/// Four numbers in one aligned 16-byte row: a displacement and `J - 1` of a node, or a force and `V (J - 1) / 4` of an element's corner.
+/// Four numbers in one 16-byte row: a displacement and `J - 1` of a node, or a force and nothing.
 pub(crate) type Quad = [f32; 4];
 
 /// Sixteen tetrahedra with K material constants each. Lanes past the last element have no stiffness and write to the spare slot.
@@ -56,7 +56,8 @@ pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
 pub(crate) struct Volumes<'a, const K: usize> {
     pub blocks: &'a [Block<K>],
     pub u: &'a [Quad],
-    pub slots: &'a mut [Quad],
+    /// `V (J - 1) / 4` of every element's corner, by slot.
+    pub shares: &'a mut [f32],
 }
 
 /// Edges of an element as they moved, and the mean of its nodes' fourth numbers.
@@ -156,14 +157,17 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
 impl<const K: usize> Pass for Volumes<'_, K> {
     #[inline(always)]
     fn run<L: Lane>(&mut self) -> Found {
-        let zero = L::splat(0.0);
         for block in self.blocks {
+            let mut row = [0.0; WIDTH];
             for part in 0..WIDTH / L::LANES {
                 let moved = block.moved::<L>(part, self.u);
                 let d = deformation(&moved.edges, &block.gradients::<L>(part));
                 let share = L::load(&block.quarter_volume, part) * (d.j - L::splat(1.0));
-                for corner in 0..4 {
-                    block.scatter(part, corner, [zero, zero, zero, share], self.slots);
+                share.store(&mut row, part);
+            }
+            for slots in &block.slots {
+                for (slot, share) in slots.iter().zip(&row) {
+                    self.shares[*slot as usize] = *share;
                 }
             }
         }

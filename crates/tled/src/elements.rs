@@ -15,8 +15,10 @@ const PARTS_PER_THREAD: usize = 2;
 /// The elements of a body and their latest forces on the nodes.
 pub(crate) struct Elements {
     team: Team,
-    /// By place: force on the node, N, and volume share.
+    /// By place: force on the node, N.
     sums: Vec<Quad>,
+    /// By place: change of the volume around the node, mm³.
+    shares: Vec<f32>,
     inverse_volume: Vec<f32>,
     kernel: Kernel,
     cure_locking: bool,
@@ -36,6 +38,7 @@ impl Elements {
         Self {
             team: Team::of(parts, volume.len(), config.threads),
             sums: vec![[0.0; 4]; volume.len()],
+            shares: vec![0.0; volume.len()],
             inverse_volume: volume.iter().map(|v| (1.0 / v) as f32).collect(),
             kernel: config.kernel.resolved(),
             cure_locking: config.cure_locking,
@@ -47,9 +50,10 @@ impl Elements {
     pub fn compute(&mut self, u: &mut [Quad], dt_ms: f32) -> Found {
         if self.cure_locking {
             self.team.compute(self.kernel, Work::Volumes, u);
-            self.sum();
-            for ((u, sum), inverse) in u.iter_mut().zip(&self.sums).zip(&self.inverse_volume) {
-                u[3] = sum[3] * inverse;
+            self.shares.fill(0.0);
+            self.team.each(|part| part.add_shares_to(&mut self.shares));
+            for ((u, share), inverse) in u.iter_mut().zip(&self.shares).zip(&self.inverse_volume) {
+                u[3] = share * inverse;
             }
         }
         let forces = Work::Forces { fade: self.relaxation.fade(dt_ms), cure_locking: self.cure_locking };

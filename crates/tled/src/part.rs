@@ -21,6 +21,8 @@ use trepan_soft::{Body, Law};
 pub(crate) struct Part {
     group: Box<dyn Group>,
     slots: Vec<Quad>,
+    /// By slot: corner shares of the volume change, mm³.
+    shares: Vec<f32>,
     /// Place of the first node that it touches.
     first: usize,
     /// Slots of the node at place `first + i`: `starts[i]..starts[i + 1]`.
@@ -41,7 +43,7 @@ pub(crate) enum Work {
 /// Elements of one law.
 trait Group: Send {
     fn forces(&mut self, kernel: Kernel, fade: [Fade; 2], cure_locking: bool, u: &[Quad], slots: &mut [Quad]) -> Found;
-    fn volumes(&self, kernel: Kernel, u: &[Quad], slots: &mut [Quad]);
+    fn volumes(&self, kernel: Kernel, u: &[Quad], shares: &mut [f32]);
     fn forget(&mut self);
 }
 
@@ -64,6 +66,7 @@ impl Part {
         Self {
             group: group(body, layout, tets, (first, &starts), relaxation),
             slots: vec![[0.0; 4]; starts[count] as usize + 1],
+            shares: vec![0.0; starts[count] as usize + 1],
             first,
             starts,
             found: Found::default(),
@@ -73,7 +76,7 @@ impl Part {
     /// Does some work from displacements by place.
     pub fn compute(&mut self, kernel: Kernel, work: Work, u: &[Quad]) {
         match work {
-            Work::Volumes => self.group.volumes(kernel, u, &mut self.slots),
+            Work::Volumes => self.group.volumes(kernel, u, &mut self.shares),
             Work::Forces { fade, cure_locking } => {
                 self.found = self.group.forces(kernel, fade, cure_locking, u, &mut self.slots);
             }
@@ -86,6 +89,13 @@ impl Part {
             let slots = &self.slots[run[0] as usize..run[1] as usize];
             let add = |sum: glam::Vec4, slot: &Quad| sum + glam::Vec4::from_array(*slot);
             *sum = slots.iter().fold(glam::Vec4::from_array(*sum), add).to_array();
+        }
+    }
+
+    /// Adds its shares of the volume change to the sums by place.
+    pub fn add_shares_to(&self, sums: &mut [f32]) {
+        for (run, sum) in self.starts.windows(2).zip(&mut sums[self.first..]) {
+            *sum = self.shares[run[0] as usize..run[1] as usize].iter().fold(*sum, |sum, share| sum + share);
         }
     }
 
@@ -134,8 +144,8 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> Group for Of<M, 
         kernel.run(&mut Forces::<M, K, T> { blocks, memory, fade, u, slots, cure_locking, law: PhantomData })
     }
 
-    fn volumes(&self, kernel: Kernel, u: &[Quad], slots: &mut [Quad]) {
-        kernel.run(&mut Volumes { blocks: &self.blocks, u, slots });
+    fn volumes(&self, kernel: Kernel, u: &[Quad], shares: &mut [f32]) {
+        kernel.run(&mut Volumes { blocks: &self.blocks, u, shares });
     }
 
     fn forget(&mut self) {

@@ -1,12 +1,12 @@
-//! Work on the parts, alone or with helping threads.
+//! Work on the parts, alone or with more threads.
 //!
 //! # Theory
-//! Parts are claimed one after the other from a counter, by the caller and by its helpers alike. A helper that is not running costs nothing:
+//! Parts are claimed one after the other from a counter, by the caller and by its workers alike. A worker that is not running costs nothing:
 //! the caller then claims every part itself, and waits only for parts that someone is in the middle of. So a loaded machine falls back to the speed
 //! of one thread and never stalls. Who computed a part leaves no trace in the result.
 //!
 //! # Practice
-//! Helpers spin for a few microseconds after a round, then yield, then sleep. Without helpers nothing is locked, copied or waited for.
+//! Workers spin for a few microseconds after a round, then yield, then sleep. Without workers nothing is locked, copied or waited for.
 
 use crate::block::Quad;
 use crate::kernel::Kernel;
@@ -21,7 +21,7 @@ const YIELDS: u32 = 64;
 /// The parts and who works on them.
 pub(crate) struct Team {
     shared: Arc<Shared>,
-    helpers: Vec<JoinHandle<()>>,
+    workers: Vec<JoinHandle<()>>,
 }
 
 struct Shared {
@@ -72,8 +72,8 @@ impl Team {
             let shared = Arc::clone(&shared);
             std::thread::Builder::new().name(format!("tled-{number}")).spawn(move || shared.serve()).ok()
         };
-        let helpers = (1..threads).filter_map(start).collect();
-        Self { shared, helpers }
+        let workers = (1..threads).filter_map(start).collect();
+        Self { shared, workers }
     }
 
     /// Does some work on every part.
@@ -85,7 +85,7 @@ impl Team {
             return;
         }
         self.shared.announce(kernel, work, u);
-        self.shared.help();
+        self.shared.work();
         let mut waited = 0;
         while self.shared.done.load(Ordering::Acquire) < self.shared.parts.len() {
             pause(&mut waited);
@@ -107,7 +107,7 @@ impl Drop for Team {
     fn drop(&mut self) {
         self.shared.quit.store(true, Ordering::SeqCst);
         self.shared.start_round();
-        self.helpers.drain(..).for_each(|helper| _ = helper.join());
+        self.workers.drain(..).for_each(|worker| _ = worker.join());
     }
 }
 
@@ -132,7 +132,7 @@ impl Shared {
     }
 
     /// Claims and computes parts until none is left.
-    fn help(&self) {
+    fn work(&self) {
         while let Some(part) = self.parts.get(self.next.fetch_add(1, Ordering::AcqRel)) {
             let _finished = Finished(&self.done);
             let job = self.job.read().unwrap_or_else(PoisonError::into_inner);
@@ -140,11 +140,11 @@ impl Shared {
         }
     }
 
-    /// A helper's life.
+    /// A worker's life.
     fn serve(&self) {
         let mut seen = 0;
         while !self.quit.load(Ordering::SeqCst) {
-            self.help();
+            self.work();
             seen = self.wait_for_round_after(seen);
         }
     }
