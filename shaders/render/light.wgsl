@@ -110,7 +110,7 @@ fn shade_tool(point: vec3f, along: vec3f, on_ball: bool, on_end: bool) -> vec3f 
     } else if t == brain.w {
         let normal = unfold(brain.xy);
         let g = grid_of(point);
-        let rest = textureLoad(brain_rest, at, 0).xyz - 1.5 * normal;
+        let rest = textureLoad(brain_rest, at, 0).xyz - 3.5 * normal;
         var open = 1.0;
         var key = past_tool(point);
         if scene.forward.w > 0.0 {

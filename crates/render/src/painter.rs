@@ -103,10 +103,10 @@ impl Painter {
     }
 
     /// The renderer on the device, for a window; the painter itself if the processor draws.
-    pub fn into_renderer(self) -> Result<Renderer, Self> {
+    pub fn into_renderer(self) -> Result<Renderer, Box<Self>> {
         match self.by {
             By::Device(renderer) => Ok(*renderer),
-            by => Err(Self { by, ..self }),
+            by => Err(Box::new(Self { by, ..self })),
         }
     }
 }

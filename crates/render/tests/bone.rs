@@ -66,7 +66,7 @@ fn a_wall_of_one_voxel_is_never_lost() {
         let wall = volume(40, |p| if (p[axis] - 0.5).abs() < 0.1 { f64::from(ISO) + 1.0 } else { -1000.0 });
         let bone = Arc::new(BoneVolume::new(&wall, ISO).unwrap());
         let mut renderer = renderer(&gpu, &alone(&bone), [48, 48]);
-        let normal = Vec3::from(DVec3::AXES[axis].as_vec3());
+        let normal = DVec3::AXES[axis].as_vec3();
         for tilt in [Vec3::ZERO, Vec3::new(0.9, 0.4, 0.2), Vec3::new(-0.2, 0.7, -0.8)] {
             let camera = Camera { fov_rad: 0.05, ..Camera::viewed_from(Vec3::ZERO, normal + tilt, 100.0) };
             let frame = plain(camera);

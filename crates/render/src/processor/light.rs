@@ -42,7 +42,7 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
             key *= 0.25;
         }
     }
-    let colour = brain_colour(inputs.mri, brain.rest - 1.5 * brain.normal);
+    let colour = brain_colour(inputs.mri, brain.rest - 3.5 * brain.normal);
     lit(scene, colour, brain.normal, along, open, key, 0.20)
 }
 
