@@ -9,9 +9,7 @@ fn main() {
         let spacing: Vec<f32> = shell
             .points
             .iter()
-            .map(|p| {
-                shell.points.iter().map(|q| p.distance(*q)).filter(|&d| d > 0.0).fold(f32::MAX, f32::min)
-            })
+            .map(|p| shell.points.iter().map(|q| p.distance(*q)).filter(|&d| d > 0.0).fold(f32::MAX, f32::min))
             .collect();
         let (low, high) = spacing.iter().fold((f32::MAX, 0.0f32), |(l, h), &d| (l.min(d), h.max(d)));
         println!("{spread:?}: {} points, nearest neighbour {low:.3} to {high:.3} mm", shell.points.len());

@@ -91,7 +91,13 @@ mod tests {
     fn unevenness(shell: &Pointshell) -> f32 {
         let nearest = |i: usize| {
             let p = shell.points[i];
-            shell.points.iter().enumerate().filter(|&(j, _)| j != i).map(|(_, q)| p.distance(*q)).fold(f32::MAX, f32::min)
+            shell
+                .points
+                .iter()
+                .enumerate()
+                .filter(|&(j, _)| j != i)
+                .map(|(_, q)| p.distance(*q))
+                .fold(f32::MAX, f32::min)
         };
         let all: Vec<f32> = (0..shell.points.len()).map(nearest).collect();
         all.iter().copied().fold(0.0, f32::max) / all.iter().copied().fold(f32::MAX, f32::min)

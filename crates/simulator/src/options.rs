@@ -16,7 +16,7 @@ pub struct Options {
     /// Images, and what is made of them
     #[command(flatten)]
     pub patient: Patient,
-    /// mouse | script:NAME | replay:FILE | openhaptics[:NAME] | force-dimension | haply [default: mouse with a window, else a script]
+    /// mouse | script:NAME | replay:FILE | simulated:NAME | openhaptics or openhaptics:NAME | force-dimension | haply [default: mouse with a window, else a script]
     #[arg(long, value_name = "DEVICE")]
     pub device: Option<String>,
     /// Run without a window

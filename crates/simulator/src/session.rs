@@ -250,7 +250,7 @@ impl Session {
         }
         match painter.into_renderer() {
             Ok(renderer) => window::show(eyes, renderer, &self.scene, self.program, pointer, &folder, stop),
-            Err(painter) => draw(eyes, painter),
+            Err(painter) => draw(eyes, *painter),
         }
     }
 
