@@ -22,7 +22,7 @@ enum Task {
     Test,
     /// Run validation suites in release mode; writes SUITE.json and index.html
     Validate {
-        /// Passed on: [SUITE] [--quick] [--shard I/N] [--out DIR]
+        /// Passed on: SUITE, --quick, --shard I/N, --out DIR
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
