@@ -38,6 +38,10 @@
 //! # When not to use it
 //! For tools that are not round at the tip, for soft tissue, or for bones that move: the bone is fixed in the world.
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}
+
 pub mod brute;
 pub mod distance_field;
 mod half_spaces;
