@@ -14,8 +14,8 @@
 //! adds the foot point on the plane through these crossings, `n / |n|²` with `nᵢ = ± 1/aᵢ`, for the voxels within two of it.
 //!
 //! # Practice
-//! Grids of cubes or boxes in any orientation, axes at right angles. Linear in voxels: about 50 ns each and core; 4 bytes
-//! each kept, 12 while building. Slices run in parallel with the same bytes for any number of threads. What lies beyond the grid's
+//! Grids of cubes or boxes in any orientation, axes at right angles. Linear in voxels: about 0.2 µs each and core; 4 bytes
+//! each kept, 16 while building. Slices run in parallel with the same bytes for any number of threads. What lies beyond the grid's
 //! border is unknown: a mask that touches it has no surface there.
 //!
 //! # Sources
@@ -155,12 +155,14 @@ fn squared_distances(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) 
     let crossings = |axis: usize| {
         along(dims, axis, |line, envelope, out| {
             envelope.clear();
+            let mut before = inside(line.at(0));
             for n in 1..line.length {
-                let (a, b) = (inside(line.at(n - 1)), inside(line.at(n)));
-                if (a >= 0.0) != (b >= 0.0) {
-                    let part = Some(a / (a - b)).filter(|t| t.is_finite()).unwrap_or(0.5);
+                let after = inside(line.at(n));
+                if (before >= 0.0) != (after >= 0.0) {
+                    let part = Some(before / (before - after)).filter(|t| t.is_finite()).unwrap_or(0.5);
                     envelope.add(((n - 1) as f64 + f64::from(part)) * spacing[axis], 0.0);
                 }
+                before = after;
             }
             envelope.read(spacing[axis], out);
         })
@@ -277,13 +279,17 @@ impl Envelope {
 
     /// The envelope at whole steps from 0.
     fn read(&self, step: f64, out: &mut [f32]) {
+        if self.parabolas.is_empty() {
+            return out.fill(f32::INFINITY);
+        }
         let mut at = 0;
         for (n, out) in out.iter_mut().enumerate() {
             let x = n as f64 * step;
             while at + 1 < self.parabolas.len() && self.parabolas[at + 1].2 <= x {
                 at += 1;
             }
-            *out = self.parabolas.get(at).map_or(f32::INFINITY, |&(v, h, _)| ((x - v) * (x - v) + h) as f32);
+            let (v, h, _) = self.parabolas[at];
+            *out = ((x - v) * (x - v) + h) as f32;
         }
     }
 }

@@ -9,7 +9,8 @@
 //! # Practice
 //! A point counts as inside up to the outer faces of the border voxels; within the outer half voxel the border value
 //! holds on. Any affine to any affine. Slices run in parallel and each is computed alone: the bytes do not depend on
-//! the number of threads. About 10 ns per target voxel and core trilinear, 50 ns majority.
+//! the number of threads. Per target voxel and core about 10 ns nearest, 40 ns trilinear,
+//! 60 ns majority and more where the target is coarser.
 //!
 //! # When not to use it
 //! Trilinear takes no mean over what a coarser voxel covers: thin bone aliases at spacings far over the source's.
@@ -115,7 +116,7 @@ impl<'a, T: Sample> Source<'a, T> {
     }
 
     fn nearest(&self, point: Vec3) -> T {
-        let voxel = point.clamp(Vec3::ZERO, self.last).round().as_uvec3();
+        let voxel = (point.clamp(Vec3::ZERO, self.last) + 0.5).as_uvec3();
         self.volume.data[self.volume.index([voxel.x as usize, voxel.y as usize, voxel.z as usize])]
     }
 
@@ -123,10 +124,15 @@ impl<'a, T: Sample> Source<'a, T> {
         corners(self.volume.dims, self.last, point)
     }
 
-    /// Voxels of no weight take no part, so that a NaN beside the point does not reach it.
     fn trilinear(&self, point: Vec3) -> T {
-        let parts = self.corners(point).into_iter().filter(|&(_, weight)| weight > 0.0);
-        T::from_f32(parts.map(|(at, weight)| weight * self.volume.data[at].to_f32()).sum())
+        let corners = self.corners(point);
+        let part = |&(at, weight): &(usize, f32)| weight * self.volume.data[at].to_f32();
+        let sum: f32 = corners.iter().map(part).sum();
+        if sum.is_nan() {
+            // Voxels of no weight take no part: a NaN beside the point does not reach it.
+            return T::from_f32(corners.iter().filter(|(_, weight)| *weight > 0.0).map(part).sum());
+        }
+        T::from_f32(sum)
     }
 
     fn majority(&self, centre: Vec3, votes: &mut Votes<T>) -> T {
@@ -150,9 +156,9 @@ impl<'a, T: Sample> Source<'a, T> {
 /// The 8 voxels around a point in continuous indices, with their weights; the point is clamped to the voxel centres.
 pub(crate) fn corners(dims: [usize; 3], last: Vec3, point: Vec3) -> [(usize, f32); 8] {
     let p = point.clamp(Vec3::ZERO, last);
-    let base = p.floor().min((last - 1.0).max(Vec3::ZERO));
-    let f = p - base;
-    let (g, b) = (1.0 - f, base.as_uvec3());
+    let b = p.min((last - 1.0).max(Vec3::ZERO)).as_uvec3();
+    let f = p - b.as_vec3();
+    let g = 1.0 - f;
     let step = dims.map(|n| usize::from(n > 1));
     let at = b.x as usize + dims[0] * (b.y as usize + dims[1] * b.z as usize);
     let (dx, dy, dz) = (step[0], step[1] * dims[0], step[2] * dims[0] * dims[1]);

@@ -36,14 +36,19 @@ macro_rules! sample {
 }
 
 sample! {
-    u8, U8, |v| v.round() as u8;
-    i8, I8, |v| v.round() as i8;
-    u16, U16, |v| v.round() as u16;
-    i16, I16, |v| v.round() as i16;
+    u8, U8, |v| rounded(v) as u8;
+    i8, I8, |v| rounded(v) as i8;
+    u16, U16, |v| rounded(v) as u16;
+    i16, I16, |v| rounded(v) as i16;
     u32, U32, |v| v.round() as u32;
     i32, I32, |v| v.round() as i32;
     f32, F32, |v| v;
     f64, F64, f64::from;
+}
+
+/// The nearest whole number, ties away from 0, as long as it is under 2²²; without a call to the system's `round`.
+fn rounded(value: f32) -> f32 {
+    value + (0.5 - f32::EPSILON / 4.0).copysign(value)
 }
 
 /// A number type as files name it.
@@ -157,6 +162,12 @@ mod tests {
     #[test]
     fn integers_round_and_saturate() {
         assert_eq!(i16::from_f32(-0.5), -1);
+        for n in -40_000..40_000i32 {
+            for off in [-0.5, -0.499_999_97, -0.25, 0.0, 0.25, 0.499_999_97, 0.5] {
+                let value = n as f32 / 8.0 + off;
+                assert_eq!(i16::from_f32(value), value.round() as i16, "{value}");
+            }
+        }
         assert_eq!(i16::from_f32(1e9), i16::MAX);
         assert_eq!(u8::from_f32(-3.0), 0);
         assert_eq!(i16::from_f32(f32::NAN), 0);
