@@ -131,8 +131,7 @@ fn a_loop_that_stops_gets_no_force() {
     run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
     for _ in 0..2000 {
         std::thread::sleep(Duration::from_millis(1));
-        if told_force(&service) == Vec3::ZERO {
-            assert_eq!(device.watch().fault(), Some(Fault::LoopSilent));
+        if told_force(&service) == Vec3::ZERO && device.watch().fault() == Some(Fault::LoopSilent) {
             return;
         }
     }
@@ -151,6 +150,9 @@ fn brakes_tell_through_events_and_release_again() {
     let watch = device.watch();
     run_until(&mut device, &service, Vec3::X, |_, told| told == Vec3::ZERO && watch.fault() == Some(Fault::Braked));
     service.behave(|b| b.event = Some(event("ebrake_released")));
+    run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+    service.behave(|b| b.event = Some(event("stall_detected")));
+    run_until(&mut device, &service, Vec3::X, |_, told| told == Vec3::ZERO);
     run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
 }
 

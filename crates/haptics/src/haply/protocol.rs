@@ -126,14 +126,27 @@ pub(super) fn force(device: &str, force: Vec3) -> String {
     json!({"inverse3": [{"device_id": device, "commands": {"set_cursor_force": {"vector": vector}}}]}).to_string()
 }
 
-/// The fault that an event of the service tells of, if it does.
-pub(super) fn event_fault(message: &str) -> Option<Fault> {
+/// An event of the service that bears on force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Event {
+    /// The emergency brake is on, until it is released.
+    Braked,
+    /// The emergency brake is off.
+    Released,
+    /// The motors stalled.
+    Stalled,
+    /// A device is gone.
+    Disconnected,
+}
+
+/// What an event tells; `None` for the many that do not bear on force, and for unknown ones.
+pub(super) fn event(message: &str) -> Option<Event> {
     let event = object(message).ok()?;
     match (event["name"].as_str()?, event["data"]["safety_type"].as_str()) {
-        ("device-safety-triggered", Some("ebrake_triggered" | "stall_detected")) => Some(Fault::Braked),
-        ("device-disconnected", _) => Some(Fault::Disconnected),
-        ("device-battery-critical", _) => Some(Fault::NoPower),
-        ("device-calibration-failed", _) => Some(Fault::NotCalibrated),
+        ("device-safety-triggered", Some("ebrake_triggered")) => Some(Event::Braked),
+        ("device-safety-triggered", Some("ebrake_released")) => Some(Event::Released),
+        ("device-safety-triggered", Some("stall_detected")) => Some(Event::Stalled),
+        ("device-disconnected", _) => Some(Event::Disconnected),
         _ => None,
     }
 }
@@ -222,17 +235,20 @@ mod tests {
     }
 
     #[test]
-    fn events_that_matter_are_faults_and_others_are_not() {
-        let brake = r#"{"name":"device-safety-triggered","data":{"safety_type":"ebrake_triggered"}}"#;
-        let released = r#"{"name":"device-safety-triggered","data":{"safety_type":"ebrake_released"}}"#;
-        assert_eq!((event_fault(brake), event_fault(released)), (Some(Fault::Braked), None));
-        assert_eq!(event_fault(r#"{"name":"something-new"}"#), None);
+    fn events_that_bear_on_force_are_told_from_others() {
+        let safety =
+            |kind: &str| event(&format!(r#"{{"name":"device-safety-triggered","data":{{"safety_type":"{kind}"}}}}"#));
+        assert_eq!(safety("ebrake_triggered"), Some(Event::Braked));
+        assert_eq!(safety("ebrake_released"), Some(Event::Released));
+        assert_eq!(safety("stall_detected"), Some(Event::Stalled));
+        assert_eq!(event(r#"{"name":"device-disconnected"}"#), Some(Event::Disconnected));
+        assert_eq!((safety("fod_stage_changed"), event(r#"{"name":"something-new"}"#)), (None, None));
     }
 
     proptest! {
         #[test]
         fn any_text_is_read_without_a_panic(text in "\\PC{0,200}") {
-            let _ = (frame(&text, "1"), first_device(&text, None), event_fault(&text));
+            let _ = (frame(&text, "1"), first_device(&text, None), event(&text));
         }
     }
 }

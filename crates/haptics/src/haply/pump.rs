@@ -4,7 +4,7 @@
 //! The loop's `apply` wakes the thread; a loop that is silent for [`SILENT`] gets no force. A reply later than [`LATE`] cuts
 //! the force until it comes; without one for [`GONE`] the device is lost.
 
-use super::protocol::{self, Frame};
+use super::protocol::{self, Event, Frame};
 use super::websocket::WebSocket;
 use crate::{Fault, Watch, ramp::Ramp};
 use std::io;
@@ -44,6 +44,8 @@ pub(super) struct Flags {
     pub lost: AtomicBool,
     /// Brakes as the service's events tell.
     pub braked: AtomicBool,
+    /// The motors stalled, or a device went, since the last look: a rest, once.
+    pub cut_once: AtomicBool,
 }
 
 /// The state of the thread.
@@ -66,8 +68,8 @@ impl Pump {
         while !self.flags.closing.load(Ordering::Acquire) {
             let force = self.next_force(&mut last);
             if self.exchange(force).is_err() {
-                self.flags.lost.store(true, Ordering::Release);
                 self.watch.set(Some(Fault::Disconnected));
+                self.flags.lost.store(true, Ordering::Release);
                 return;
             }
         }
@@ -87,7 +89,7 @@ impl Pump {
         *last = wish.number;
         if let Err(fault) = self.known.status.unwrap_or(Err(Fault::NotCalibrated)) {
             self.ramp.cut(fault);
-        } else if self.flags.braked.load(Ordering::Acquire) {
+        } else if self.flags.braked.load(Ordering::Acquire) || self.flags.cut_once.swap(false, Ordering::AcqRel) {
             self.ramp.cut(Fault::Braked);
         } else if silent && wish.number > 0 {
             self.ramp.cut(Fault::LoopSilent);
@@ -146,14 +148,13 @@ impl Pump {
 pub(super) fn listen(mut events: WebSocket, flags: &Flags) {
     while !flags.closing.load(Ordering::Acquire) && !flags.lost.load(Ordering::Acquire) {
         match events.receive(Duration::from_millis(100)) {
-            Ok(Some(message)) => {
-                if let Some(fault) = protocol::event_fault(&message) {
-                    flags.braked.store(true, Ordering::Release);
-                    flags.lost.fetch_or(fault == Fault::Disconnected, Ordering::AcqRel);
-                } else if message.contains("ebrake_released") {
-                    flags.braked.store(false, Ordering::Release);
-                }
-            }
+            Ok(Some(message)) => match protocol::event(&message) {
+                Some(Event::Braked) => flags.braked.store(true, Ordering::Release),
+                Some(Event::Released) => flags.braked.store(false, Ordering::Release),
+                // Whether it was ours, the next state tells: its list lacks the device.
+                Some(Event::Stalled | Event::Disconnected) => flags.cut_once.store(true, Ordering::Release),
+                None => {}
+            },
             Ok(None) => {}
             Err(_) => return,
         }
