@@ -23,30 +23,18 @@
 //! # Ok::<(), trepan_mesh::MeshError>(())
 //! ```
 
-pub mod abaqus;
-mod base64;
 mod check;
 mod file;
-mod format;
-pub mod gmsh;
 pub mod lattice;
 pub mod materials;
-pub mod medit;
-mod numbered;
-pub mod obj;
 mod quality;
-pub mod stl;
 mod surface;
-pub mod tetgen;
 mod tets;
 mod topology;
 mod triangles;
-pub mod vtk;
-pub mod vtu;
 
 pub use check::MeshError;
-pub use file::FileError;
-pub use format::{read, read_surface, write, write_surface};
+pub use file::{FileError, abaqus, gmsh, medit, obj, read, read_surface, stl, tetgen, vtk, vtu, write, write_surface};
 pub use quality::Quality;
 pub use surface::Surface;
 pub use tets::{FACES, OPPOSITE, TetMesh};

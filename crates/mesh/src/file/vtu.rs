@@ -13,7 +13,7 @@
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
 
 use crate::TetMesh;
-use crate::base64;
+use crate::file::base64;
 use crate::file::{FileError, Reader, write_atomically};
 use std::io::Read;
 use std::path::Path;

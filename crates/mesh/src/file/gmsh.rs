@@ -12,8 +12,8 @@
 //! C. Geuzaine, J.-F. Remacle: Gmsh reference manual, sections MSH file format.
 
 use crate::TetMesh;
+use crate::file::numbered::Numbered;
 use crate::file::{FileError, Reader, write_atomically};
-use crate::numbered::Numbered;
 use std::path::Path;
 
 /// Reads the tetrahedra of a Gmsh file. Indices are checked; call [`TetMesh::check`] for the rest.

@@ -4,6 +4,20 @@
 //! A file is read whole. A count in a header is compared with the bytes that are left before anything is allocated for it, so a
 //! header cannot ask for more than a few times the file's own size. A new file is written beside its place and then renamed.
 
+pub mod abaqus;
+mod base64;
+mod format;
+pub mod gmsh;
+pub mod medit;
+mod numbered;
+pub mod obj;
+pub mod stl;
+pub mod tetgen;
+pub mod vtk;
+pub mod vtu;
+
+pub use format::{read, read_surface, write, write_surface};
+
 use crate::{MeshError, TetMesh, TriMesh};
 use std::fmt::Display;
 use std::io::Write;

@@ -12,8 +12,8 @@
 //! Abaqus Keywords Reference Guide: *NODE, *ELEMENT.
 
 use crate::TetMesh;
+use crate::file::numbered::Numbered;
 use crate::file::{FileError, Reader, write_atomically};
-use crate::numbered::Numbered;
 use std::path::Path;
 
 /// Reads the tetrahedra of an Abaqus file. Indices are checked; call [`TetMesh::check`] for the rest.

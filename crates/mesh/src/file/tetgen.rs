@@ -12,8 +12,8 @@
 //! H. Si: TetGen 1.5 manual, section 5.2.
 
 use crate::TetMesh;
+use crate::file::numbered::Numbered;
 use crate::file::{FileError, Reader, write_atomically};
-use crate::numbered::Numbered;
 use std::path::Path;
 
 /// Reads a pair of TetGen files. Indices are checked; call [`TetMesh::check`] for the rest.
