@@ -14,8 +14,8 @@ struct Corner {
 }
 
 struct Seen {
-    @location(0) hit: vec4f,
-    @location(1) rest: vec4f,
+    @location(0) hit: vec4u,
+    @location(1) rest: vec4u,
 }
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> Corner {
@@ -26,5 +26,5 @@ struct Seen {
 
 @fragment fn fragment(v: Corner) -> Seen {
     let hit = vec4f(fold(normalize(v.normal)), 0.0, distance(v.place, scene.eye.xyz));
-    return Seen(hit, vec4f(v.rest, 1.0));
+    return Seen(packed(hit), packed(vec4f(v.rest, 1.0)));
 }

@@ -1,8 +1,8 @@
 // The 3-D view: takes the nearest of bone, brain and tool at each pixel and lights it.
 
-@group(0) @binding(5) var skull_hit: texture_2d<f32>;
-@group(0) @binding(6) var brain_hit: texture_2d<f32>;
-@group(0) @binding(7) var brain_rest: texture_2d<f32>;
+@group(0) @binding(5) var skull_hit: texture_2d<u32>;
+@group(0) @binding(6) var brain_hit: texture_2d<u32>;
+@group(0) @binding(7) var brain_rest: texture_2d<u32>;
 @group(0) @binding(8) var mri: texture_3d<f32>;
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
@@ -94,8 +94,8 @@ fn shade_tool(point: vec3f, along: vec3f, on_ball: bool, on_end: bool) -> vec3f 
 @fragment fn fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let along = ray_of(pixel.xy);
     let at = vec2i(pixel.xy);
-    let skull = textureLoad(skull_hit, at, 0);
-    var brain = textureLoad(brain_hit, at, 0);
+    let skull = unpacked(textureLoad(skull_hit, at, 0));
+    var brain = unpacked(textureLoad(brain_hit, at, 0));
     brain.w = select(NOTHING, brain.w, brain.w > 0.0);
     let tip = select(NOTHING, ball(scene.eye.xyz, along, scene.tip.xyz, scene.tip.w), scene.tip.w > 0.0);
     let end = ball(scene.eye.xyz, along, scene.tail.xyz, scene.tail.w);
@@ -110,7 +110,7 @@ fn shade_tool(point: vec3f, along: vec3f, on_ball: bool, on_end: bool) -> vec3f 
     } else if t == brain.w {
         let normal = unfold(brain.xy);
         let g = grid_of(point);
-        let rest = textureLoad(brain_rest, at, 0).xyz - 3.5 * normal;
+        let rest = unpacked(textureLoad(brain_rest, at, 0)).xyz - 3.5 * normal;
         var open = 1.0;
         var key = past_tool(point);
         if scene.forward.w > 0.0 {

@@ -19,6 +19,11 @@ struct Scene {
 
 const NOTHING: f32 = 1e30;
 
+// Hits travel between passes as the bits of floats in integer textures: every driver can draw into those.
+fn packed(v: vec4f) -> vec4u { return bitcast<vec4u>(v); }
+
+fn unpacked(v: vec4u) -> vec4f { return bitcast<vec4f>(v); }
+
 // A triangle that covers the viewport.
 fn cover(vertex: u32) -> vec4f {
     return vec4f(f32(vertex & 1u) * 4.0 - 1.0, f32(vertex >> 1u) * 4.0 - 1.0, 0.0, 1.0);

@@ -10,4 +10,4 @@ struct Vertex { @builtin(position) clip: vec4f, @location(0) rest: vec3f }
     return Vertex(vec4f(corners[i].at.xy, 0.0, 1.0), corners[i].rest.xyz);
 }
 
-@fragment fn fragment(v: Vertex) -> @location(0) vec4f { return vec4f(v.rest, 1.0); }
+@fragment fn fragment(v: Vertex) -> @location(0) vec4u { return packed(vec4f(v.rest, 1.0)); }

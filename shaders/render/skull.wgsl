@@ -13,14 +13,14 @@ fn outward_normal(g: vec3f, along: vec3f) -> vec3f {
     return select(-normalize(gradient), -along, dot(gradient, gradient) < 1e-6);
 }
 
-@fragment fn fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
+@fragment fn fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4u {
     let along = ray_of(pixel.xy);
     let o = grid_of(scene.eye.xyz);
     let d = along / scene.origin.w;
     let t = meet(o, d, NOTHING);
-    if t >= NOTHING { return vec4f(0.0, 0.0, 1.0, NOTHING); }
+    if t >= NOTHING { return packed(vec4f(0.0, 0.0, 1.0, NOTHING)); }
     let g = o + d * t;
     let normal = outward_normal(g, along);
     let facing = dot(normal, scene.light.xyz) > 0.0 && !shadowed(g, normal);
-    return vec4f(fold(normal), 0.999 * openness(g, normal) + select(0.0, 1.0, facing), t);
+    return packed(vec4f(fold(normal), 0.999 * openness(g, normal) + select(0.0, 1.0, facing), t));
 }

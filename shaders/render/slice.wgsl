@@ -13,7 +13,7 @@ struct Slice {
 @group(0) @binding(2) var density: texture_3d<f32>;
 @group(0) @binding(3) var mri: texture_3d<f32>;
 @group(0) @binding(4) var linear: sampler;
-@group(0) @binding(5) var section: texture_2d<f32>;   // where the brain that is here now is at rest, world mm; w: 1 in the brain
+@group(0) @binding(5) var section: texture_2d<u32>;   // where the brain that is here now is at rest, world mm; w: 1 in the brain
 
 // Letters of 5 x 5 dots, top row first, leftmost dot in the highest bit: R L A P S I.
 const LETTERS = array<u32, 6>(0x1e8fa51u, 0x108421fu, 0x0e8fe31u, 0x1e8fa10u, 0x0f8383eu, 0x0e2108eu);
@@ -56,7 +56,7 @@ fn tissue(world: vec3f, rest: vec3f) -> vec3f {
     let size = vec2f(slice.up.w, slice.window.w);
     let offset = (2.0 * pixel / size - 1.0) * vec2f(slice.centre.w, -slice.right.w);
     let world = slice.centre.xyz + offset.x * slice.right.xyz + offset.y * slice.up.xyz;
-    let moved = textureLoad(section, vec2i(vec2f(pixel.x, position.y)), 0);
+    let moved = unpacked(textureLoad(section, vec2i(vec2f(pixel.x, position.y)), 0));
     var colour = tissue(world, select(world, moved.xyz, moved.w > 0.5));
     let mm = 2.0 * slice.centre.w / size.x;
     if scene.tip.w > 0.0 {

@@ -15,6 +15,8 @@ pub enum Slot {
     Texture2,
     /// `texture_2d<f32>` of a format that cannot be filtered: only loaded.
     Loaded2,
+    /// `texture_2d<u32>`: only loaded.
+    Integer2,
     /// `texture_3d<f32>`, filtered or loaded.
     Texture3,
     /// `texture_3d<u32>`: only loaded.
@@ -68,6 +70,7 @@ impl Slot {
             Self::Texture2 => texture(float(true), wgpu::TextureViewDimension::D2),
             Self::Loaded2 => texture(float(false), wgpu::TextureViewDimension::D2),
             Self::Texture3 => texture(float(true), wgpu::TextureViewDimension::D3),
+            Self::Integer2 => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
             Self::Integer3 => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D3),
             Self::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
         }

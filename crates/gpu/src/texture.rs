@@ -13,12 +13,14 @@ pub enum Format {
     Rgba8Unorm,
     /// A half-precision number, filterable everywhere.
     R16Float,
-    /// Four half-precision numbers.
+    /// Four half-precision numbers; some GL drivers cannot draw into it.
     Rgba16Float,
     /// A single-precision number, loaded only.
     R32Float,
-    /// Four single-precision numbers, loaded only.
+    /// Four single-precision numbers, loaded only; some GL drivers cannot draw into it.
     Rgba32Float,
+    /// Four integers, or the bits of four single-precision numbers, loaded only; every driver draws into it.
+    Rgba32Uint,
     /// Depth, for hidden surfaces.
     Depth32Float,
 }
@@ -58,6 +60,7 @@ impl Format {
             Self::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
             Self::R32Float => wgpu::TextureFormat::R32Float,
             Self::Rgba32Float => wgpu::TextureFormat::Rgba32Float,
+            Self::Rgba32Uint => wgpu::TextureFormat::Rgba32Uint,
             Self::Depth32Float => wgpu::TextureFormat::Depth32Float,
         }
     }
@@ -69,7 +72,7 @@ impl Format {
             Self::R16Float => 2,
             Self::Rgba8Unorm | Self::R32Float | Self::Depth32Float => 4,
             Self::Rgba16Float => 8,
-            Self::Rgba32Float => 16,
+            Self::Rgba32Float | Self::Rgba32Uint => 16,
         }
     }
 }

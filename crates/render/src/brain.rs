@@ -100,7 +100,7 @@ impl Brain {
                 label: "brain",
                 wgsl: trepan_shaders::RENDER_BRAIN,
                 slots: &slots,
-                targets: &[Format::Rgba32Float, Format::Rgba16Float],
+                targets: &[Format::Rgba32Uint, Format::Rgba32Uint],
                 depth: true,
                 blend: false,
                 topology: Topology::Triangles,

@@ -68,9 +68,9 @@ impl Canvas {
         let sheet = |label, [width, height]: [u32; 2], format| {
             Texture::new(gpu, &TextureSpec { label, size: [width, height, 1], volume: false, format, drawn_to: true })
         };
-        let skull_hit = sheet("skull hit", drawn, Format::Rgba32Float)?;
-        let brain_hit = sheet("brain hit", drawn, Format::Rgba32Float)?;
-        let brain_rest = sheet("brain rest", drawn, Format::Rgba16Float)?;
+        let skull_hit = sheet("skull hit", drawn, Format::Rgba32Uint)?;
+        let brain_hit = sheet("brain hit", drawn, Format::Rgba32Uint)?;
+        let brain_rest = sheet("brain rest", drawn, Format::Rgba32Uint)?;
         let inputs = Inputs {
             skull_hit: &skull_hit,
             brain_hit: &brain_hit,
@@ -86,7 +86,7 @@ impl Canvas {
             Some((texture, bindings))
         };
         let column = layout.slices.map_or([1, 1], |s| [s[0][2], height]);
-        let section = sheet("section", column, Format::Rgba16Float)?;
+        let section = sheet("section", column, Format::Rgba32Uint)?;
         let (density, mri) = (&passes.skull.density, &passes.mri.texture);
         Ok(Self {
             division,

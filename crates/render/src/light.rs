@@ -25,7 +25,7 @@ pub(crate) struct Inputs<'a> {
 
 impl Light {
     pub fn new(gpu: &Gpu) -> Result<Self, RenderError> {
-        let own = [Slot::Loaded2, Slot::Loaded2, Slot::Loaded2, Slot::Texture3];
+        let own = [Slot::Integer2, Slot::Integer2, Slot::Integer2, Slot::Texture3];
         let slots = [&[Slot::Uniform], &VOLUMES[..], &own].concat();
         let spec = PipelineSpec {
             label: "light",

@@ -118,7 +118,7 @@ impl Renderer {
             passes.skull.cast(recorder, &canvas.skull, view, &canvas.skull_hit)
         } else {
             passes.skull.recast.forget();
-            clear(recorder, &canvas.skull_hit, f64::from(NOTHING));
+            clear(recorder, &canvas.skull_hit, f64::from(NOTHING.to_bits()));
             0
         };
         let area = canvas.layout.view;

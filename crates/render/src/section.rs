@@ -38,7 +38,7 @@ impl Section {
             label: "section",
             wgsl: trepan_shaders::RENDER_SECTION,
             slots: &[Slot::Uniform, Slot::Storage],
-            targets: &[Format::Rgba16Float],
+            targets: &[Format::Rgba32Uint],
             depth: false,
             blend: false,
             topology: Topology::Triangles,

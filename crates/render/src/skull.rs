@@ -72,7 +72,7 @@ impl Skull {
                 label: "skull",
                 wgsl: trepan_shaders::RENDER_SKULL,
                 slots: &slots,
-                targets: &[Format::Rgba32Float],
+                targets: &[Format::Rgba32Uint],
                 depth: false,
                 blend: false,
                 topology: Topology::Triangles,

@@ -102,7 +102,7 @@ impl Slices {
         let spec = PipelineSpec {
             label: "slice",
             wgsl: trepan_shaders::RENDER_SLICE,
-            slots: &[&[Slot::Uniform, Slot::Uniform], &volumes[..], &[Slot::Loaded2]].concat(),
+            slots: &[&[Slot::Uniform, Slot::Uniform], &volumes[..], &[Slot::Integer2]].concat(),
             targets: &[Format::Rgba8Unorm],
             depth: false,
             blend: false,
