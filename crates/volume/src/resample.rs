@@ -50,13 +50,16 @@ impl Grid {
     /// A volume that already is such a grid gets its own back. The spacing must be over 0; look at [`voxels`](Self::voxels)
     /// before a small one is used.
     pub fn isotropic_over<T: Copy>(volume: &VoxelVolume<T>, spacing_mm: f32) -> Self {
+        Self::aligned_over(volume, DVec3::splat(spacing_mm.into()))
+    }
+
+    /// The same with an edge for each axis (right, front, head), mm.
+    pub fn aligned_over<T: Copy>(volume: &VoxelVolume<T>, spacing_mm: DVec3) -> Self {
         let (low, high) = volume.world_corners();
-        let spacing = f64::from(spacing_mm);
-        let cells = ((high - low) / spacing - 1e-4).ceil().max(DVec3::ONE);
-        let origin = low + 0.5 * spacing;
+        let cells = ((high - low) / spacing_mm - 1e-4).ceil().max(DVec3::ONE);
         Self {
             dims: [cells.x as usize, cells.y as usize, cells.z as usize],
-            world_from_voxel: DAffine3::from_translation(origin) * DAffine3::from_scale(DVec3::splat(spacing)),
+            world_from_voxel: DAffine3::from_translation(low + 0.5 * spacing_mm) * DAffine3::from_scale(spacing_mm),
         }
     }
 
@@ -259,6 +262,8 @@ mod tests {
         let grid = Grid::isotropic_over(&from, 1.0);
         assert_eq!((grid.dims, grid.voxels()), ([187, 243, 226], 187 * 243 * 226));
         assert_eq!(grid.world_from_voxel.translation, DVec3::new(0.0, 0.0, -0.5));
+        let boxes = Grid::aligned_over(&from, DVec3::new(1.0, 3.0, 4.0));
+        assert_eq!((boxes.dims, boxes.world_from_voxel.translation), ([187, 81, 57], DVec3::new(0.0, 1.0, 1.0)));
         let cubes = VoxelVolume::isotropic([9, 8, 7], Vec3::new(-3.25, 8.0, 1.5), 0.75, 0u8);
         assert_eq!(Grid::isotropic_over(&cubes, 0.75), Grid::of(&cubes));
     }
