@@ -95,10 +95,57 @@ impl Ball<'_> {
 /// The thesis's sweep: looks at one point per voxel edge.
 fn stepped(bone: &BoneVolume, from: Vec3, to: Vec3, visited: &mut u32) -> Option<f32> {
     let (enter, leave) = clipped(from, to, bone.bounds().inflated(bone.spacing_mm()))?;
-    let length = from.distance(to) * (leave - enter);
-    let steps = (length / bone.spacing_mm()).ceil().clamp(1.0, 1e5) as u32;
-    (0..=steps).map(|step| enter + (leave - enter) * step as f32 / steps as f32).find(|&share| {
+    let share_of_step = bone.spacing_mm() / from.distance(to);
+    // Counted from the start of the way, as printed: where it enters the box of the bone makes no difference to what is skipped.
+    let (first, last) = ((enter / share_of_step).floor(), (leave / share_of_step).ceil());
+    let steps = (last - first).clamp(0.0, 1e5) as u32;
+    (0..=steps).map(|step| ((first + step as f32) * share_of_step).min(1.0)).find(|&share| {
         *visited += 1;
         bone.is_bone(bone.voxel_of(from.lerp(to, share)))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_geometry::{Pointshell, Spread};
+    use trepan_volume::VoxelVolume;
+
+    /// Air with bone in the given voxels, 1 mm each.
+    fn bone(voxels: impl IntoIterator<Item = [usize; 3]>) -> BoneVolume {
+        let mut ct = VoxelVolume::isotropic([12, 12, 12], Vec3::ZERO, 1.0, -1000i16);
+        for voxel in voxels {
+            let at = ct.index(voxel);
+            ct.data[at] = 1000;
+        }
+        BoneVolume::new(&ct, 400).expect("there is bone")
+    }
+
+    fn sweep(bone: &BoneVolume, how: Sweep, radius_mm: f32, from: Vec3, to: Vec3) -> Stop {
+        let shell = Pointshell::sphere(radius_mm, 466, Spread::Fibonacci).points;
+        Ball { radius_mm, shell: &shell }.sweep(bone, how, from, to, &mut 0)
+    }
+
+    #[test]
+    fn fixed_steps_skip_a_voxel_at_a_corner_and_traversal_does_not() {
+        let bone = bone([[5, 4, 5]]);
+        // The line cuts 0.2 mm of the corner of voxel (5, 4, 5).
+        let (from, to) = (Vec3::new(2.0, 0.2, 5.0), Vec3::new(8.0, 6.2, 5.0));
+        let missed = (0..20).filter(|&i| {
+            let shift = Vec3::new(0.05, 0.05, 0.0) * i as f32;
+            let line = sweep(&bone, Sweep::Line, 0.01, from + shift, to + shift).hit;
+            line && !sweep(&bone, Sweep::Steps, 0.01, from + shift, to + shift).hit
+        });
+        assert!(missed.count() > 0, "the printed rule must show its fault");
+    }
+
+    #[test]
+    fn only_the_whole_ball_notices_a_gap_narrower_than_itself() {
+        let plate = (0..12).flat_map(|i| (0..12).map(move |j| [i, j, 5])).filter(|v| v[0] != 6);
+        let bone = bone(plate);
+        let (from, to) = (Vec3::new(6.0, 6.0, 9.0), Vec3::new(6.0, 6.0, 1.0));
+        assert!(!sweep(&bone, Sweep::Line, 2.0, from, to).hit);
+        let stop = sweep(&bone, Sweep::Sphere, 2.0, from, to);
+        assert!(stop.hit && (6.5..7.6).contains(&stop.centre.z), "{stop:?}");
+    }
 }
