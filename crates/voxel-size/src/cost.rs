@@ -68,7 +68,7 @@ impl CostModel {
         let k = 3.0 * self.p_nc / (4.0 * self.q() * particle_density(measures) * s * s);
         // The root of x³ − x²/4 = k lies between 1/4 and 1/4 + ∛k.
         let (low, high) = ((0.2 * s).ln(), (s * (0.3 + k.cbrt())).ln());
-        Ok(golden_section(|log| self.cost(measures, log.exp()), low, high).exp())
+        Ok(golden_section(|log| self.cost(measures, log.exp()), low, high, 80).exp())
     }
 
     /// The model, if its numbers make sense.
@@ -99,11 +99,11 @@ fn root(k: f64) -> f64 {
 }
 
 /// The minimum of a function with one valley.
-fn golden_section(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+pub(crate) fn golden_section(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64, steps: usize) -> f64 {
     let golden = 0.5 * (5f64.sqrt() - 1.0);
     let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
     let (mut at_a, mut at_b) = (f(a), f(b));
-    for _ in 0..80 {
+    for _ in 0..steps {
         if at_a < at_b {
             (high, b, at_b) = (b, a, at_a);
             a = high - golden * (high - low);

@@ -68,7 +68,7 @@ pub fn brute_force(boxes: &[Aabb], particles: &[Vec3]) -> Counts {
     }
 }
 
-fn check_finite(boxes: &[Aabb], particles: &[Vec3]) -> Result<(), VoxelSizeError> {
+pub(crate) fn check_finite(boxes: &[Aabb], particles: &[Vec3]) -> Result<(), VoxelSizeError> {
     let bad = particles.iter().find(|p| !p.is_finite()).map(|p| ("a particle's coordinate", p.element_sum()));
     let bad_box = |b: &&Aabb| !(b.is_empty() || b.min.is_finite() && b.max.is_finite());
     let bad = bad.or_else(|| boxes.iter().find(bad_box).map(|b| ("a box's corner", (b.min + b.max).element_sum())));
@@ -76,7 +76,7 @@ fn check_finite(boxes: &[Aabb], particles: &[Vec3]) -> Result<(), VoxelSizeError
 }
 
 /// Particles sorted by cell, and how many lie below and left of each cell.
-struct Table {
+pub(crate) struct Table {
     cell_mm: f64,
     low: I64Vec3,
     dims: [usize; 3],
@@ -88,7 +88,7 @@ struct Table {
 }
 
 impl Table {
-    fn new(particles: &[Vec3], cell_mm: f64) -> Result<Self, VoxelSizeError> {
+    pub(crate) fn new(particles: &[Vec3], cell_mm: f64) -> Result<Self, VoxelSizeError> {
         let bounds = Aabb::of_points(particles);
         let (min, max) = if particles.is_empty() { (Vec3::ZERO, Vec3::ZERO) } else { (bounds.min, bounds.max) };
         let span = (max.as_dvec3() / cell_mm).floor() - (min.as_dvec3() / cell_mm).floor() + 1.0;
@@ -105,7 +105,7 @@ impl Table {
         Ok(table)
     }
 
-    fn cell(&self, p: Vec3) -> I64Vec3 {
+    pub(crate) fn cell(&self, p: Vec3) -> I64Vec3 {
         cell_of(p, self.cell_mm)
     }
 
@@ -146,7 +146,7 @@ impl Table {
         from.cmplt(to).all().then(|| (from.to_array().map(|n| n as usize), to.to_array().map(|n| n as usize)))
     }
 
-    fn particles_in(&self, low: I64Vec3, high: I64Vec3) -> u64 {
+    pub(crate) fn particles_in(&self, low: I64Vec3, high: I64Vec3) -> u64 {
         let Some((from, to)) = self.clipped(low, high) else { return 0 };
         let [nx, ny, _] = self.dims;
         let mut sum = 0i64;
@@ -160,16 +160,21 @@ impl Table {
     }
 
     fn inside(&self, b: &Aabb, low: I64Vec3, high: I64Vec3, particles: &[Vec3]) -> u64 {
-        let Some((from, to)) = self.clipped(low, high) else { return 0 };
         let mut found = 0;
+        self.each_in(low, high, |n| found += u64::from(b.contains(particles[n as usize])));
+        found
+    }
+
+    /// Calls `visit` with each particle in the cells from `low` to `high`.
+    pub(crate) fn each_in(&self, low: I64Vec3, high: I64Vec3, mut visit: impl FnMut(u32)) {
+        let Some((from, to)) = self.clipped(low, high) else { return };
         for k in from[2]..to[2] {
             for j in from[1]..to[1] {
                 let (first, last) = (self.index([from[0], j, k]), self.index([to[0] - 1, j, k]));
                 let row = &self.order[self.starts[first] as usize..self.starts[last + 1] as usize];
-                found += row.iter().filter(|&&n| b.contains(particles[n as usize])).count() as u64;
+                row.iter().for_each(|&n| visit(n));
             }
         }
-        found
     }
 }
 

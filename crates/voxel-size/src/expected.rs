@@ -1,0 +1,163 @@
+//! The work of a grid at any cell size, from the boxes and particles themselves: smooth, without trying each size.
+//!
+//! # Theory
+//! Let the grid lie anywhere with equal chance. On one axis a box of width w covers w/δ + 1 cells of edge δ on average, and sees a particle that lies a gap g away
+//! with chance max(0, 1 − g/δ) (1 inside). The axes are independent, so
+//!
+//! ```text
+//! visits(δ) = Σ boxes  Π (w_d/δ + 1)          tests(δ) = Σ boxes, particles  Π max(0, 1 − g_d/δ)
+//! ```
+//!
+//! exactly, in the mean over placements. The thesis's formula has one box size, s, one cell too many on each axis, and guesses particles from facets;
+//! this takes what is there: a tool's own points, graded meshes, any overlap.
+//!
+//! # Practice
+//! Gaps up to a reach are kept, so δ may be at most that. At most [`MAX_GAPS`] of them: when there are more, every second, third … box stands for its neighbours.
+
+use crate::counts::Table;
+use crate::error::{VoxelSizeError, checked};
+use crate::{Prices, cost::golden_section};
+use glam::Vec3;
+use trepan_geometry::Aabb;
+
+/// Most pairs of a box and a particle that are kept.
+pub const MAX_GAPS: usize = 4_000_000;
+
+/// What the expected work needs to know about boxes and particles.
+#[derive(Clone, Debug)]
+pub struct Expected {
+    /// Σ of 1, w_x + w_y + w_z, w_x w_y + w_y w_z + w_z w_x and w_x w_y w_z over the boxes.
+    moments: [f64; 4],
+    /// Gaps between boxes and particles, mm, 0 inside.
+    gaps: Vec<Vec3>,
+    /// How many pairs each gap stands for.
+    weight: f64,
+    reach_mm: f64,
+}
+
+impl Expected {
+    /// Measures boxes and particles for cells of up to `reach_mm`.
+    pub fn of(boxes: &[Aabb], particles: &[Vec3], reach_mm: f64) -> Result<Self, VoxelSizeError> {
+        checked("reach_mm", reach_mm, reach_mm > 0.0 && reach_mm.is_finite(), "positive and finite")?;
+        crate::counts::check_finite(boxes, particles)?;
+        let table = Table::new(particles, reach_mm)?;
+        let boxes: Vec<Aabb> = boxes.iter().copied().filter(|b| !b.is_empty()).collect();
+        let near = |b: &Aabb| table.particles_in(table.cell(b.min) - 1, table.cell(b.max) + 1) as usize;
+        let stride = boxes.iter().map(near).sum::<usize>().div_ceil(MAX_GAPS).max(1);
+        let mut gaps = Vec::new();
+        for b in boxes.iter().step_by(stride) {
+            table.each_in(table.cell(b.min) - 1, table.cell(b.max) + 1, |n| {
+                let p = particles[n as usize];
+                let gap = (b.min - p).max(p - b.max).max(Vec3::ZERO);
+                if gap.max_element() < reach_mm as f32 {
+                    gaps.push(gap);
+                }
+            });
+        }
+        Ok(Self { moments: moments(&boxes), gaps, weight: stride as f64, reach_mm })
+    }
+
+    /// Expected cells visited with cells of `delta_mm`.
+    pub fn visits(&self, delta_mm: f64) -> f64 {
+        let [n, w, ww, www] = self.moments;
+        n + (w + (ww + www / delta_mm) / delta_mm) / delta_mm
+    }
+
+    /// Expected particles tested with cells of `delta_mm`, at most the reach.
+    pub fn tests(&self, delta_mm: f64) -> f64 {
+        let per_mm = (1.0 / delta_mm) as f32;
+        let chance = |gap: &Vec3| f64::from((Vec3::ONE - *gap * per_mm).max(Vec3::ZERO).element_product());
+        self.weight * self.gaps.iter().map(chance).sum::<f64>()
+    }
+
+    /// Expected time of a pass, in the unit of the prices.
+    pub fn time(&self, prices: &Prices, delta_mm: f64) -> f64 {
+        prices.fixed + prices.visit * self.visits(delta_mm) + prices.test * self.tests(delta_mm)
+    }
+
+    /// The cheapest cell edge from `low_mm` up to the reach, mm.
+    pub fn best(&self, prices: &Prices, low_mm: f64) -> Result<f64, VoxelSizeError> {
+        checked("low_mm", low_mm, low_mm > 0.0 && low_mm < self.reach_mm, "positive and under the reach")?;
+        checked("visit", prices.visit, prices.visit > 0.0 && prices.visit.is_finite(), "positive and finite")?;
+        checked("test", prices.test, prices.test >= 0.0 && prices.test.is_finite(), "0 or more and finite")?;
+        const STEPS: usize = 24;
+        let (low, high) = (low_mm.ln(), self.reach_mm.ln());
+        let at = |n: usize| low + (high - low) * n as f64 / STEPS as f64;
+        let cost = |log: f64| self.time(prices, log.exp());
+        let costs: Vec<f64> = (0..=STEPS).map(|n| cost(at(n))).collect();
+        let cheapest = (0..=STEPS).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).unwrap_or(0);
+        let best = golden_section(cost, at(cheapest.saturating_sub(1)), at((cheapest + 1).min(STEPS)), 24);
+        Ok(best.exp())
+    }
+}
+
+fn moments(boxes: &[Aabb]) -> [f64; 4] {
+    let mut sums = [0.0; 4];
+    for b in boxes {
+        let [x, y, z] = b.size().as_dvec3().to_array();
+        [1.0, x + y + z, x * y + y * z + z * x, x * y * z].iter().zip(&mut sums).for_each(|(m, sum)| *sum += m);
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::counts;
+
+    fn random(seed: &mut u64) -> f32 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*seed >> 40) as f32 / (1 << 24) as f32
+    }
+
+    fn scene() -> (Vec<Aabb>, Vec<Vec3>) {
+        let mut seed = 7;
+        let mut point = |size: f32| size * Vec3::new(random(&mut seed), random(&mut seed), random(&mut seed));
+        let boxes: Vec<(Vec3, Vec3)> = (0..400).map(|_| (point(20.0), point(3.0))).collect();
+        let boxes = boxes.into_iter().map(|(min, size)| Aabb { min, max: min + size }).collect();
+        (boxes, (0..300).map(|_| point(12.0) + Vec3::splat(4.0)).collect())
+    }
+
+    #[test]
+    fn it_is_the_mean_over_placements_of_the_grid() {
+        let (boxes, particles) = scene();
+        let expected = Expected::of(&boxes, &particles, 6.0).unwrap();
+        let mut seed = 3;
+        for delta in [0.7, 1.5, 4.0] {
+            let (mut visits, mut tests) = (0.0, 0.0);
+            for _ in 0..200 {
+                let shift = delta as f32 * Vec3::new(random(&mut seed), random(&mut seed), random(&mut seed));
+                let boxes: Vec<Aabb> = boxes.iter().map(|b| Aabb { min: b.min + shift, max: b.max + shift }).collect();
+                let particles: Vec<Vec3> = particles.iter().map(|p| *p + shift).collect();
+                let counts = counts::grid(&boxes, &particles, delta).unwrap();
+                visits += counts.visits as f64 / 200.0;
+                tests += counts.tests as f64 / 200.0;
+            }
+            assert!((expected.visits(delta) / visits - 1.0).abs() < 0.01, "{} {visits}", expected.visits(delta));
+            assert!((expected.tests(delta) / tests - 1.0).abs() < 0.02, "{} {tests}", expected.tests(delta));
+        }
+    }
+
+    #[test]
+    fn the_best_size_is_no_dearer_than_any_other() {
+        let (boxes, particles) = scene();
+        let expected = Expected::of(&boxes, &particles, 8.0).unwrap();
+        let prices = Prices { fixed: 0.0, visit: 1.0, test: 5.0 };
+        let best = expected.best(&prices, 0.1).unwrap();
+        for n in 1..80 {
+            assert!(expected.time(&prices, 0.1 * n as f64) >= expected.time(&prices, best) * (1.0 - 1e-9));
+        }
+        assert!((expected.best(&Prices { test: 0.0, ..prices }, 0.1).unwrap() - 8.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn bad_numbers_are_named() {
+        let (boxes, particles) = scene();
+        let field = |e: VoxelSizeError| matches!(e, VoxelSizeError::Field { .. });
+        assert!(field(Expected::of(&boxes, &particles, 0.0).unwrap_err()));
+        assert!(field(Expected::of(&boxes, &[Vec3::NAN], 1.0).unwrap_err()));
+        let expected = Expected::of(&boxes, &particles, 2.0).unwrap();
+        assert!(field(expected.best(&Prices { fixed: 0.0, visit: 0.0, test: 1.0 }, 0.1).unwrap_err()));
+        assert!(field(expected.best(&Prices { fixed: 0.0, visit: 1.0, test: 1.0 }, 3.0).unwrap_err()));
+    }
+}
