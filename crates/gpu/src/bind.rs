@@ -13,8 +13,6 @@ pub enum Slot {
     StorageMut,
     /// `texture_2d<f32>`, filtered or loaded.
     Texture2,
-    /// `texture_2d<f32>` of a format that cannot be filtered: only loaded.
-    Loaded2,
     /// `texture_2d<u32>`: only loaded.
     Integer2,
     /// `texture_3d<f32>`, filtered or loaded.
@@ -62,14 +60,13 @@ impl Slot {
             view_dimension,
             multisampled: false,
         };
-        let float = |filterable| wgpu::TextureSampleType::Float { filterable };
+        let float = wgpu::TextureSampleType::Float { filterable: true };
         match self {
             Self::Uniform => buffer(wgpu::BufferBindingType::Uniform),
             Self::Storage => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
             Self::StorageMut => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-            Self::Texture2 => texture(float(true), wgpu::TextureViewDimension::D2),
-            Self::Loaded2 => texture(float(false), wgpu::TextureViewDimension::D2),
-            Self::Texture3 => texture(float(true), wgpu::TextureViewDimension::D3),
+            Self::Texture2 => texture(float, wgpu::TextureViewDimension::D2),
+            Self::Texture3 => texture(float, wgpu::TextureViewDimension::D3),
             Self::Integer2 => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D2),
             Self::Integer3 => texture(wgpu::TextureSampleType::Uint, wgpu::TextureViewDimension::D3),
             Self::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),

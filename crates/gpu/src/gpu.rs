@@ -69,7 +69,7 @@ impl Gpu {
         let adapters = pollster::block_on(instance.enumerate_adapters(backends));
         let adapter = adapters.into_iter().min_by_key(|a| rank(prefer, &a.get_info())).ok_or(GpuError::NoAdapter)?;
         let info = adapter.get_info();
-        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::FLOAT32_FILTERABLE;
+        let wanted = wgpu::Features::TIMESTAMP_QUERY;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("trepan"),
             required_features: adapter.features() & wanted,

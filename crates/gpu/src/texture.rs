@@ -13,12 +13,6 @@ pub enum Format {
     Rgba8Unorm,
     /// A half-precision number, filterable everywhere.
     R16Float,
-    /// Four half-precision numbers; some GL drivers cannot draw into it.
-    Rgba16Float,
-    /// A single-precision number, loaded only.
-    R32Float,
-    /// Four single-precision numbers, loaded only; some GL drivers cannot draw into it.
-    Rgba32Float,
     /// Four integers, or the bits of four single-precision numbers, loaded only; every driver draws into it.
     Rgba32Uint,
     /// Depth, for hidden surfaces.
@@ -57,9 +51,6 @@ impl Format {
             Self::R8Uint => wgpu::TextureFormat::R8Uint,
             Self::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
             Self::R16Float => wgpu::TextureFormat::R16Float,
-            Self::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
-            Self::R32Float => wgpu::TextureFormat::R32Float,
-            Self::Rgba32Float => wgpu::TextureFormat::Rgba32Float,
             Self::Rgba32Uint => wgpu::TextureFormat::Rgba32Uint,
             Self::Depth32Float => wgpu::TextureFormat::Depth32Float,
         }
@@ -70,9 +61,8 @@ impl Format {
         match self {
             Self::R8Unorm | Self::R8Uint => 1,
             Self::R16Float => 2,
-            Self::Rgba8Unorm | Self::R32Float | Self::Depth32Float => 4,
-            Self::Rgba16Float => 8,
-            Self::Rgba32Float | Self::Rgba32Uint => 16,
+            Self::Rgba8Unorm | Self::Depth32Float => 4,
+            Self::Rgba32Uint => 16,
         }
     }
 }

@@ -53,6 +53,7 @@ impl<S: Session> Window<S> {
             seconds: i.time,
         });
         self.panel = shared.session.update(&input);
+        self.panel.leash.into_iter().for_each(|leash| self.hand.hold(leash));
         self.force.push(input.seconds, self.panel.force_n.into());
     }
 

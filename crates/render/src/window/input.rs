@@ -1,5 +1,6 @@
 //! What the user does with mouse and keys, as a camera and a wanted tool pose.
 
+use super::Leash;
 use crate::{Camera, View};
 use eframe::egui;
 use glam::{Quat, Vec2};
@@ -69,6 +70,14 @@ impl Hand {
         self.camera.orbit(-ORBIT_RAD * pointer.right.x, ORBIT_RAD * pointer.right.y);
     }
 
+    /// Brings the hand back to the end of its leash.
+    pub fn hold(&mut self, leash: Leash) {
+        let hand = &mut self.world_from_tool.translation;
+        if leash.tip.is_finite() {
+            *hand = leash.tip + (*hand - leash.tip).clamp_length_max(leash.length_mm);
+        }
+    }
+
     /// Moves the tool by keys.
     pub fn keys(&mut self, input: &egui::InputState, view: &View) {
         let pressed = |key| input.num_presses(key) as f32;
@@ -129,6 +138,18 @@ mod tests {
         assert!((pushed.length() - 1.0).abs() < 1e-4 && pushed.dot(before - view.eye) > 0.0);
         hand.follow(&Pointer { wheel: 50.0, zoom: true, ..Default::default() }, &view, 600.0);
         assert!(hand.camera.distance_mm < 200.0 && hand.world_from_tool.translation == before + pushed);
+    }
+
+    #[test]
+    fn a_leash_holds_the_hand_near_the_tool() {
+        let (mut hand, _) = hand();
+        let at = hand.world_from_tool.translation;
+        hand.hold(Leash { tip: at + Vec3::X, length_mm: 2.0 });
+        assert_eq!(hand.world_from_tool.translation, at);
+        hand.hold(Leash { tip: at + 10.0 * Vec3::X, length_mm: 2.0 });
+        assert!((hand.world_from_tool.translation - (at + 8.0 * Vec3::X)).length() < 1e-5);
+        hand.hold(Leash { tip: Vec3::NAN, length_mm: 2.0 });
+        assert!(hand.world_from_tool.translation.is_finite());
     }
 
     #[test]

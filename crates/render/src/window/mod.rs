@@ -31,7 +31,7 @@ pub use input::WindowInput;
 use crate::{Camera, Frame, Renderer};
 use std::cell::RefCell;
 use std::rc::Rc;
-use trepan_geometry::Pose;
+use trepan_geometry::{Pose, Vec3};
 
 /// What the window shows and drives. Called on the window's thread, once a picture; must not wait.
 pub trait Session {
@@ -61,8 +61,19 @@ pub struct Panel {
     pub values: Vec<(String, String)>,
     /// What must not be missed; shown in a red banner as long as it is here.
     pub warnings: Vec<String>,
+    /// What keeps the hand near the tool; `None` lets it go anywhere.
+    pub leash: Option<Leash>,
     /// Whether the window shall close.
     pub finished: bool,
+}
+
+/// A hand without force feedback would not notice a wall: it is kept this close to where the tool is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leash {
+    /// Where contact lets the tool's tip be, world mm.
+    pub tip: Vec3,
+    /// Longest way from there to the hand, mm.
+    pub length_mm: f32,
 }
 
 /// How the window starts.
