@@ -14,8 +14,11 @@ use crate::stop::Stop;
 use std::path::Path;
 use trepan_geometry::{Buttons, Vec3};
 use trepan_haptics::mouse::MouseHandle;
-use trepan_render::window::{self, Panel, Start, WindowInput};
+use trepan_render::window::{self, Leash, Panel, Start, WindowInput};
 use trepan_render::{Camera, Frame, RenderError, Renderer};
+
+/// How far a mouse may press past a surface, mm: a little over what the device's largest force stands for at 2 N/mm.
+const LEASH_MM: f32 = 2.0;
 
 /// Whether a window can be opened here.
 pub fn has_display() -> bool {
@@ -116,6 +119,7 @@ impl window::Session for Show {
                 value("time", format!("{:.1} s", view.time_ms * 1e-3)),
             ],
             warnings: warnings(view.warnings),
+            leash: self.pointer.as_ref().map(|_| Leash { tip: view.sample.state.tip(), length_mm: LEASH_MM }),
             finished: view.finished || self.stop.asked(),
         }
     }
