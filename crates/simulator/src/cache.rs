@@ -89,17 +89,34 @@ fn unreadable(path: &Path, fault: &io::Error) -> SessionError {
     SessionError::Usage(format!("cannot read {}: {fault}; {remedy}", path.display()))
 }
 
-/// The file itself, or every file under a folder, in a fixed order.
+/// Images that lie in one file.
+const WHOLE: [&str; 5] = ["nii", "gz", "nrrd", "mha", "vtk"];
+
+/// The file itself, or every file under a folder, in a fixed order. A file of another kind may be one of several (a slice of a
+/// series, half of a pair): all that lies beside it counts too.
 fn files_of(input: &Path) -> io::Result<Vec<PathBuf>> {
     if !fs::metadata(input)?.is_dir() {
-        return Ok(vec![input.to_path_buf()]);
+        let whole = input.extension().is_some_and(|e| WHOLE.iter().any(|known| e.eq_ignore_ascii_case(known)));
+        return match input.parent().filter(|_| !whole) {
+            None => Ok(vec![input.to_path_buf()]),
+            Some(folder) => beside(if folder.as_os_str().is_empty() { Path::new(".") } else { folder }),
+        };
     }
     let mut files = Vec::new();
     let mut entries: Vec<_> = fs::read_dir(input)?.collect::<io::Result<_>>()?;
     entries.sort_by_key(|entry| entry.file_name());
     for entry in entries {
-        files.extend(files_of(&entry.path())?);
+        let path = entry.path();
+        files.extend(if path.is_dir() { files_of(&path)? } else { vec![path] });
     }
+    Ok(files)
+}
+
+/// The files of one folder, not of those below it.
+fn beside(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let paths: Vec<PathBuf> = fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()?;
+    let mut files: Vec<PathBuf> = paths.into_iter().filter(|path| path.is_file()).collect();
+    files.sort();
     Ok(files)
 }
 
@@ -142,6 +159,17 @@ mod tests {
         assert_eq!(fs::read_dir(home.path().join("cases")).unwrap().count(), 0);
         cache.keep(&key, |folder| fs::write(folder.join("whole"), b"x").map_err(|f| f.to_string())).unwrap();
         assert!(cache.find(&key).unwrap().join("whole").is_file());
+    }
+
+    #[test]
+    fn one_slice_stands_for_its_series() {
+        let home = tempfile::tempdir().unwrap();
+        let slices = [home.path().join("1.dcm"), home.path().join("2.dcm")];
+        slices.iter().for_each(|slice| fs::write(slice, b"a").unwrap());
+        let cache = Cache::at(home.path().join("cases"));
+        let before = cache.key(&[&slices[0]], "").unwrap();
+        fs::write(&slices[1], b"b").unwrap();
+        assert_ne!(before, cache.key(&[&slices[0]], "").unwrap());
     }
 
     #[test]
