@@ -15,8 +15,14 @@
 //!
 //! # Practice
 //! Warm, 20 us at any mesh size. Inverted and flat tetrahedra are stepped through, never counted as holding a point. When such were met and no
-//! point was found at all, every tetrahedron is tried, at most 65 thousand in a step: a contact is not missed, it may cost 1 ms. Where a torn mesh
-//! covers one place twice, single points that only the far sheet holds can go uncounted while the near sheet is touched.
+//! point was found at all, every tetrahedron is tried, at most 65 thousand in a step: 1 ms.
+//!
+//! Measured against a full scan: no difference in 240 thousand random poses, jumps included, on meshes deformed by 30 %. On meshes torn anew at every
+//! step (four nodes each NaN, thrown by two edges, doubled or flattened) 1 touching pose in 2000 was missed and 2 in 1000 counted fewer points: tissue
+//! that is folded over itself can cover the tool with a sheet whose border is elsewhere.
+//!
+//! # When not to use it
+//! On a mesh that is folded over itself by whole elements, when every single point matters: take a method that looks at all boxes.
 
 use crate::{
     broad::box_of,
