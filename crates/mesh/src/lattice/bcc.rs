@@ -32,6 +32,11 @@ impl Bcc {
         self.cells.iter().map(|n| n + 1).product()
     }
 
+    /// How many cubes there are.
+    pub(super) fn cubes(&self) -> usize {
+        self.cells.iter().fold(1, |n, &c| n.saturating_mul(c))
+    }
+
     /// How many nodes there are: first the corners, then the centres, x fastest.
     pub(super) fn nodes(&self) -> usize {
         self.corners() + self.cells.iter().product::<usize>()
@@ -67,7 +72,7 @@ impl Bcc {
 
     /// All tetrahedra, positively oriented.
     pub(super) fn tets(&self) -> Vec<[u32; 4]> {
-        let mut tets = Vec::with_capacity(12 * self.cells.iter().product::<usize>());
+        let mut tets = Vec::with_capacity(12 * self.cubes());
         for k in 0..self.cells[2] {
             for j in 0..self.cells[1] {
                 for i in 0..self.cells[0] {

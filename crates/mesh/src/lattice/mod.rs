@@ -48,6 +48,8 @@ impl Default for Config {
 
 /// Spacing and level are searched at most this often.
 const TRIALS: usize = 12;
+/// Largest lattice, in cubes for each tetrahedron asked for (a brain takes a fifth of one): some 250 bytes a cube.
+const MAX_CUBES: usize = 10;
 /// What the search tries to reach; 10 % and 2 % are what it promises.
 const COUNT_TOLERANCE: f64 = 0.02;
 const VOLUME_TOLERANCE: f64 = 0.002;
@@ -84,6 +86,9 @@ fn search(field: &Field, target: usize) -> Result<TetMesh, MeshError> {
     let mut best_level = 0.0;
     for trial in 0..TRIALS {
         let lattice = Bcc::over(field.min, field.max, spacing, shift(trial));
+        if lattice.cubes() > MAX_CUBES * target.max(10_000) {
+            break;
+        }
         let mesh = manifold::repaired(stencil::stuff(&lattice, |p| level - field.sample(p)));
         if mesh.tets.is_empty() {
             spacing *= 0.7;
@@ -209,6 +214,14 @@ mod tests {
         });
         let mesh = tetrahedra(&mask, &Config { target_tets: 2000, ..Config::default() }).unwrap();
         assert_sound(&mesh, 2000, 4.0 / 3.0 * std::f64::consts::PI * 12f64.powi(3));
+    }
+
+    #[test]
+    fn a_sheet_that_the_lattice_cannot_hold_is_refused() {
+        let mut sheet = VoxelVolume::filled([120, 120, 3], DAffine3::IDENTITY, 0u8);
+        (14_400..28_800).for_each(|at| sheet.data[at] = 1);
+        let refused = tetrahedra(&sheet, &Config { target_tets: 300, smoothing: 2.0 });
+        assert!(matches!(refused, Err(MeshError::Target { wanted: 300, .. })), "{refused:?}");
     }
 
     #[test]
