@@ -141,8 +141,10 @@ pub struct GuardSummary {
     pub slewed: u64,
     /// Not a number.
     pub non_finite: u64,
-    /// Gave out energy.
+    /// Gave out energy: damped.
     pub passivity: u64,
+    /// Gave out energy that damping could not take: cut.
+    pub bounded: u64,
 }
 
 /// Where it ran.
@@ -240,6 +242,7 @@ impl Summary {
                 slewed: guard.slewed,
                 non_finite: guard.non_finite,
                 passivity: guard.passivity,
+                bounded: guard.bounded,
             },
             frames: about.frames,
             fps: about.frames as f64 / seconds,
