@@ -16,6 +16,7 @@ impl Aabb {
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
     /// The box of a sphere.
+    #[inline]
     pub fn of_sphere(centre: Vec3, radius: f32) -> Self {
         Self { min: centre - radius, max: centre + radius }
     }
@@ -26,41 +27,49 @@ impl Aabb {
     }
 
     /// This box, grown to hold `point`.
+    #[inline]
     pub fn grown(self, point: Vec3) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
     /// This box, moved outwards by `margin` mm on all sides.
+    #[inline]
     pub fn inflated(self, margin: f32) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
     }
 
     /// What two boxes share; empty when they are disjoint.
+    #[inline]
     pub fn intersection(self, other: Self) -> Self {
         Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
 
     /// Whether the box holds no point. A box with a NaN corner is empty.
+    #[inline]
     pub fn is_empty(self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
     /// Whether two boxes touch or overlap: not disjoint on any axis (thesis Eq 2.1, signs restored).
+    #[inline]
     pub fn overlaps(self, other: Self) -> bool {
         !self.intersection(other).is_empty()
     }
 
     /// Whether `point` lies inside or on the border.
+    #[inline]
     pub fn contains(self, point: Vec3) -> bool {
         self.min.cmple(point).all() && point.cmple(self.max).all()
     }
 
     /// Middle of the box, mm.
+    #[inline]
     pub fn centre(self) -> Vec3 {
         (self.min + self.max) * 0.5
     }
 
     /// Edge lengths, mm.
+    #[inline]
     pub fn size(self) -> Vec3 {
         self.max - self.min
     }

@@ -25,6 +25,7 @@ impl Wrench {
     pub const ZERO: Self = Self { force: Vec3::ZERO, torque: Vec3::ZERO };
 
     /// Whether all six numbers are finite.
+    #[inline]
     pub fn is_finite(&self) -> bool {
         self.force.is_finite() && self.torque.is_finite()
     }
@@ -48,6 +49,7 @@ impl Buttons {
     pub const NEXT_TOOL: Self = Self(2);
 
     /// Whether every button of `other` is pressed.
+    #[inline]
     pub fn has(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
@@ -68,16 +70,19 @@ pub struct ToolState {
 
 impl ToolState {
     /// A tool at rest.
+    #[inline]
     pub fn at(world_from_tool: Pose) -> Self {
         Self { world_from_tool, twist: Twist::default(), buttons: Buttons::default(), time_ms: 0.0 }
     }
 
     /// Centre of the tip, world mm.
+    #[inline]
     pub fn tip(&self) -> Vec3 {
         self.world_from_tool.translation
     }
 
     /// Whether pose and velocity are all finite and the rotation is a unit quaternion to 1e-3.
+    #[inline]
     pub fn is_finite(&self) -> bool {
         let pose = &self.world_from_tool;
         pose.translation.is_finite()

@@ -1,10 +1,12 @@
 //! What every program does with its command line: flags, session, exit code.
 
+use crate::measure;
 use crate::options::{CaseTask, Task};
 use crate::{Ended, Inputs, Options, Program, Session, SessionError, build_case};
 use clap::Parser;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
+use trepan_budget::Scene;
 
 /// Runs a program. Exit code 0 for a session that ended, 2 for what the user can put right, 1 for the rest, 128 + n after
 /// signal n.
@@ -23,6 +25,9 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         trepan_haptics::list().iter().for_each(|device| println!("{:31} {}", device.name, device.state));
         return ExitCode::SUCCESS;
     }
+    if let Some(Task::Plan { force_error_n, displacement_mm }) = &options.task {
+        return planned(*force_error_n, *displacement_mm);
+    }
     if let Some(Task::Case(CaseTask::Build { patient, out })) = &options.task {
         return match build_case(program, patient, out, built_in) {
             Ok(name) => {
@@ -35,6 +40,31 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     match Session::open(program, options, built_in).and_then(Session::run) {
         Ok(ended) => told(&ended),
         Err(fault) => failed(program, &fault),
+    }
+}
+
+/// What a scene needs on this machine.
+fn planned(force_error_n: Option<f64>, displacement_mm: Option<f64>) -> ExitCode {
+    let usual = Scene::default();
+    let scene = Scene {
+        force_error_n: force_error_n.unwrap_or(usual.force_error_n),
+        displacement_mm: displacement_mm.unwrap_or(usual.displacement_mm),
+        ..usual
+    };
+    let machine = measure::machine();
+    println!(
+        "this machine: {:.1} ns a tetrahedron and step, {:.1} us a tick on bone, {} threads",
+        machine.ns_per_tet_step, machine.us_per_rigid_tick, machine.threads
+    );
+    match trepan_budget::plan(&machine, &scene) {
+        Ok(plan) => {
+            println!("{plan}");
+            ExitCode::SUCCESS
+        }
+        Err(fault) => {
+            eprintln!("plan: {fault}");
+            ExitCode::from(2)
+        }
     }
 }
 

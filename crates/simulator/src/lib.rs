@@ -31,6 +31,7 @@ mod haptic_tick;
 mod import;
 mod journal;
 pub mod lockstep;
+mod measure;
 mod notice;
 mod options;
 mod output;

@@ -86,6 +86,15 @@ pub enum Task {
     /// Make and keep cases
     #[command(subcommand)]
     Case(CaseTask),
+    /// Measure this machine and say which voxel size, mesh and step a scene needs on it
+    Plan {
+        /// Error of the force that the scene bears, N
+        #[arg(long, value_name = "N")]
+        force_error_n: Option<f64>,
+        /// Error of the brain's surface that the scene bears, mm
+        #[arg(long, value_name = "MM")]
+        displacement_mm: Option<f64>,
+    },
 }
 
 /// What can be done with cases.

@@ -93,6 +93,7 @@ impl BoneVolume {
     }
 
     /// Edge of a voxel, mm.
+    #[inline]
     pub fn spacing_mm(&self) -> f32 {
         self.spacing_mm
     }
@@ -108,6 +109,7 @@ impl BoneVolume {
     }
 
     /// The threshold in HU; at or over it a voxel is bone.
+    #[inline]
     pub fn isovalue(&self) -> i16 {
         self.isovalue
     }
@@ -118,20 +120,24 @@ impl BoneVolume {
     }
 
     /// The voxel that holds a world point (perhaps outside the grid).
+    #[inline]
     pub fn voxel_of(&self, point: Vec3) -> IVec3 {
         self.grid_of(point).round().as_ivec3()
     }
 
     /// Continuous grid coordinates of a world point: voxel centres are at whole numbers.
+    #[inline]
     pub fn grid_of(&self, point: Vec3) -> Vec3 {
         (point - self.origin) / self.spacing_mm
     }
 
     /// World centre of a voxel, mm.
+    #[inline]
     pub fn centre_of(&self, voxel: IVec3) -> Vec3 {
         self.origin + self.spacing_mm * voxel.as_vec3()
     }
 
+    #[inline]
     fn index(&self, voxel: IVec3) -> Option<usize> {
         let [nx, ny, nz] = self.dims;
         let inside = voxel.cmpge(IVec3::ZERO).all() && voxel.cmplt(IVec3::new(nx as i32, ny as i32, nz as i32)).all();
@@ -139,11 +145,13 @@ impl BoneVolume {
     }
 
     /// Density of a voxel, HU; [`AIR_HU`] outside the grid.
+    #[inline]
     pub fn hu(&self, voxel: IVec3) -> i16 {
         self.index(voxel).map_or(AIR_HU, |at| self.hu[at].load(Ordering::Relaxed))
     }
 
     /// Whether a voxel is bone.
+    #[inline]
     pub fn is_bone(&self, voxel: IVec3) -> bool {
         self.hu(voxel) >= self.isovalue
     }
