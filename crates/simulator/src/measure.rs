@@ -3,7 +3,7 @@
 //! # Practice
 //! The median of many calls, one method at a time, on small synthetic scenes that stay in the cache as the real ones do.
 
-use crate::clock::Clock;
+use crate::run::clock::Clock;
 use trepan_budget::Machine;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, units};
 use trepan_rigid::{Method, RigidStep};

@@ -1,23 +1,24 @@
 //! A session from its flags to its files: open (everything that a user can get wrong), run, write.
 
-use crate::cache::Cache;
-use crate::case_folder;
-use crate::collision_step::CollisionStage;
-use crate::driver;
+use crate::case::cache::Cache;
+use crate::case::folder as case_folder;
+use crate::case::import::{self, Case, Inputs, Recipe};
+use crate::case::scene::{RestBrain, Scene};
 use crate::error::SessionError;
-use crate::haptic_tick::{HapticConfig, HapticStage, ToolSample};
-use crate::import::{self, Case, Inputs, Recipe};
 use crate::options::{Options, Patient};
-use crate::output;
-use crate::picture::{self, Album};
 use crate::program::Program;
+use crate::report::output;
+use crate::report::summary::{About, Machine, Summary};
+use crate::run::lockstep;
+use crate::run::stop::Stop;
+use crate::run::threads::{self, Pace};
 use crate::run::{Eyes, Outcome, Stages, Tissue};
-use crate::scene::{RestBrain, Scene};
-use crate::solver_step::SolverStage;
-use crate::stop::Stop;
-use crate::summary::{About, Machine, Summary};
-use crate::threads::{self, Pace};
-use crate::{lockstep, window};
+use crate::show::driver;
+use crate::show::picture::{self, Album};
+use crate::show::window;
+use crate::stages::collision_step::CollisionStage;
+use crate::stages::haptic_tick::{HapticConfig, HapticStage, ToolSample};
+use crate::stages::solver_step::SolverStage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_contact::{GuardConfig, Viscoelastic};

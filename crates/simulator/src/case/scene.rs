@@ -1,9 +1,9 @@
 //! The operating table: a case made ready to be touched, drilled and pressed.
 
+use crate::case::import::{Brain, Case};
+use crate::case::site;
 use crate::error::SessionError;
-use crate::import::{Brain, Case};
 use crate::program::Program;
-use crate::site;
 use std::sync::Arc;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;

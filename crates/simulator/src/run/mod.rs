@@ -1,12 +1,18 @@
 //! What both ways of running share: the stages, what the picture sees, what is known at the end.
 //!
-//! A session runs live on threads ([`crate::threads`]) or again from a recording, step by step ([`crate::lockstep`]).
+//! A session runs live on threads ([`crate::run::threads`]) or again from a recording, step by step ([`crate::run::lockstep`]).
 
-use crate::collision_step::{CollisionStage, SoftFrame};
-use crate::haptic_tick::{HapticStage, Tick, ToolSample};
-use crate::journal::Written;
-use crate::score::ScoreKeeper;
-use crate::solver_step::SolverStage;
+pub(crate) mod clock;
+pub(crate) mod journal;
+pub mod lockstep;
+pub(crate) mod stop;
+pub mod threads;
+
+use crate::run::journal::Written;
+use crate::stages::collision_step::{CollisionStage, SoftFrame};
+use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
+use crate::stages::score::ScoreKeeper;
+use crate::stages::solver_step::SolverStage;
 use hdrhistogram::Histogram;
 use trepan_contact::{GuardCounters, NodalContact, SurfacePatch};
 use trepan_geometry::Vec3;

@@ -4,8 +4,8 @@
 //! While the burr is in the hand the result only warns: the patch goes to the haptic thread, the solver gets no contact
 //! (thesis 6.4). The stage has no clock; the same tools and positions give the same results.
 
-use crate::haptic_tick::ToolSample;
 use crate::program::{Phase, Program};
+use crate::stages::haptic_tick::ToolSample;
 use trepan_contact::{NodalContact, SurfacePatch};
 use trepan_deformable::{Config, ConfigError, TissueCollision, TissueStep};
 use trepan_geometry::Vec3;

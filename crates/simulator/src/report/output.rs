@@ -1,9 +1,9 @@
 //! The files of a session: each appears whole or not at all.
 
 use crate::error::SessionError;
-use crate::report::{self, Shot};
+use crate::report::page::{self, Shot};
+use crate::report::summary::Summary;
 use crate::run::Outcome;
-use crate::summary::Summary;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -38,7 +38,7 @@ pub fn write(
         nifti::write(&path, &volume).map_err(|fault| SessionError::Internal(fault.to_string()))?;
     }
     let recording = Recording::open(record)?;
-    let page = report::html(summary, outcome, &recording, shots).map_err(SessionError::Internal)?;
+    let page = page::html(summary, outcome, &recording, shots).map_err(SessionError::Internal)?;
     whole(&out.join("report.html"), page.as_bytes())
 }
 

@@ -13,10 +13,10 @@
 //! The stage has no clock and no device: the same readings and patches give the same wrenches, bit for bit, live or in a
 //! replay. A tick does not allocate, lock, log or panic.
 
-use crate::ahead::bone_ahead_mm;
-use crate::notice::{Notice, Warning, Watch, What};
 use crate::program::{Phase, Program};
-use crate::score::ScoreKeeper;
+use crate::stages::ahead::bone_ahead_mm;
+use crate::stages::notice::{Notice, Warning, Watch, What};
+use crate::stages::score::ScoreKeeper;
 use std::sync::Arc;
 use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardedWrench, SurfacePatch, Viscoelastic};
 use trepan_geometry::{Buttons, Pose, Tool, ToolKind, ToolState, Vec3, Wrench};

@@ -4,8 +4,8 @@
 //! Rings hold 4 s of ticks; what does not fit is counted and told. Chunks are flushed five times a second, so that a killed
 //! session loses at most the last fifth of a second. A full disk ends the recording, never the session.
 
-use crate::clock::Clock;
-use crate::notice::{Notice, What};
+use crate::run::clock::Clock;
+use crate::stages::notice::{Notice, What};
 use std::time::Duration;
 use trepan_link::queue::{Receiver, Sender, bounded};
 use trepan_link::wire::{CollisionRecord, EventRecord, SolverRecord, TickRecord};

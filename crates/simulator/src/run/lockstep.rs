@@ -14,13 +14,13 @@
 //! # Practice
 //! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by how much.
 
-use crate::clock::Clock;
-use crate::collision_step::SoftFrame;
-use crate::haptic_tick::{HapticStage, TickInput, ToolSample};
-use crate::journal::{Journal, Pens, journal};
+use crate::run::clock::Clock;
+use crate::run::journal::{Journal, Pens, journal};
+use crate::run::stop::Stop;
+use crate::run::threads::outcome;
 use crate::run::{Cells, Eyes, Numbered, Outcome, Replayed, Stages, Ticks, Times, Tissue};
-use crate::stop::Stop;
-use crate::threads::outcome;
+use crate::stages::collision_step::SoftFrame;
+use crate::stages::haptic_tick::{HapticStage, TickInput, ToolSample};
 use std::collections::VecDeque;
 use std::thread;
 use trepan_contact::{NodalContact, SurfacePatch};

@@ -1,8 +1,8 @@
 //! `report.html`: a session on one page that needs nothing else: pictures, curves from the recording, scores, the machine.
 
-use crate::chart::{Curve, histogram, over_time};
+use crate::report::chart::{Curve, histogram, over_time};
+use crate::report::summary::Summary;
 use crate::run::Outcome;
-use crate::summary::Summary;
 use base64::Engine;
 use std::fmt::Write;
 use trepan_link::Recording;

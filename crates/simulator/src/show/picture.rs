@@ -1,10 +1,10 @@
 //! The main thread of a headless run: one picture after another, from the newest state, through the same drawing code as the window.
 
-use crate::clock::Clock;
-use crate::report::Shot;
+use crate::case::scene::Scene;
+use crate::report::page::Shot;
+use crate::run::clock::Clock;
+use crate::run::stop::Stop;
 use crate::run::{Eyes, View};
-use crate::scene::Scene;
-use crate::stop::Stop;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;

@@ -5,7 +5,7 @@
 //! collision results stay stable. A record is made whenever another contact took effect, and every [`EACH`] steps: what a replay needs, no
 //! more.
 
-use crate::collision_step::SoftFrame;
+use crate::stages::collision_step::SoftFrame;
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 use trepan_link::wire::SolverRecord;

@@ -5,8 +5,8 @@
 //! cache. The folder is made beside its final place and moved there whole, so an interrupted import leaves nothing.
 //! A case goes by the first digits of that hash: file names may hold a patient's name.
 
-use crate::cache::Cache;
-use crate::case_folder;
+use crate::case::cache::Cache;
+use crate::case::folder as case_folder;
 use crate::error::SessionError;
 use crate::program::Program;
 use indicatif::{ProgressBar, ProgressStyle};

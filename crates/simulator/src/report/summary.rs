@@ -1,9 +1,9 @@
 //! `summary.json`: what a session did, in numbers.
 
-use crate::notice::What;
 use crate::program::Program;
 use crate::run::{Outcome, Replayed, Times};
-use crate::score::ScoreKeeper;
+use crate::stages::notice::What;
+use crate::stages::score::ScoreKeeper;
 use serde::Serialize;
 use std::fs;
 

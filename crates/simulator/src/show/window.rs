@@ -4,13 +4,13 @@
 //! The window never waits for a loop and no loop waits for it. With the mouse as a device the pose goes to the haptic loop, which
 //! reads it at its own rate; closing the window ends the session.
 
-use crate::notice::Warning;
-use crate::picture::{Album, camera, frame, snap};
+use crate::case::scene::Scene;
 use crate::program::{Phase, Program};
-use crate::report::Shot;
+use crate::report::page::Shot;
+use crate::run::stop::Stop;
 use crate::run::{Eyes, View};
-use crate::scene::Scene;
-use crate::stop::Stop;
+use crate::show::picture::{Album, camera, frame, snap};
+use crate::stages::notice::Warning;
 use std::path::Path;
 use trepan_geometry::{Buttons, Vec3};
 use trepan_haptics::mouse::MouseHandle;

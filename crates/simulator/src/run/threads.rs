@@ -12,11 +12,11 @@
 //! wall time. The operating system's real-time priority is asked for and its refusal remarked. Whatever happens, the device is closed, and
 //! with it the force: also when a loop panics.
 
-use crate::clock::{Clock, Schedule};
-use crate::haptic_tick::{HapticStage, TickInput};
-use crate::journal::{Journal, Pens, journal};
+use crate::run::clock::{Clock, Schedule};
+use crate::run::journal::{Journal, Pens, journal};
+use crate::run::stop::Stop;
 use crate::run::{Cells, Eyes, Numbered, Outcome, SolverOutcome, Stages, Ticks, Times, View};
-use crate::stop::Stop;
+use crate::stages::haptic_tick::{HapticStage, TickInput};
 use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};

@@ -10,9 +10,9 @@
 //! # Practice
 //! Patient RAS+ mm throughout. Nothing in it names a patient: images are written anew from their voxels, and the name is made from a hash.
 
-use crate::cache::digest;
+use crate::case::cache::digest;
+use crate::case::import::{Brain, Case, Recipe};
 use crate::error::SessionError;
-use crate::import::{Brain, Case, Recipe};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,0 +1,6 @@
+//! What is left of a session: summary, page, files.
+
+pub(crate) mod chart;
+pub(crate) mod output;
+pub(crate) mod page;
+pub(crate) mod summary;

@@ -1,0 +1,8 @@
+//! The bodies of the three loops, without clocks or threads.
+
+pub(crate) mod ahead;
+pub(crate) mod collision_step;
+pub(crate) mod haptic_tick;
+pub(crate) mod notice;
+pub(crate) mod score;
+pub(crate) mod solver_step;
