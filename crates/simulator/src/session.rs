@@ -218,9 +218,8 @@ impl Session {
         if !self.windowed && self.options.frames_per_second == 0.0 {
             return Err("no picture was asked for".into());
         }
-        let bone = self.scene.bone.clone().ok_or("no picture without a CT")?;
         let data = SceneData {
-            bone,
+            bone: self.scene.bone.clone(),
             brain: self.scene.brain.as_ref().map(|brain| &brain.mesh),
             mri: self.scene.brain.as_ref().map(|brain| &brain.mri),
         };

@@ -59,9 +59,11 @@ impl Scene {
             remarks.push("without an MRI nothing warns before the burr reaches the brain".into());
         }
         let site = find_site(program, bone.as_deref(), brain.as_ref()).ok_or_else(|| {
-            SessionError::Case(
-                "no ray from above meets bone and then brain: are the CT and the MRI of one head, upright, in one space?".into(),
-            )
+            let fault = match (&bone, &brain) {
+                (Some(_), Some(_)) => "no ray from above meets bone and then brain: are the CT and the MRI of one head, upright, in one space?",
+                _ => "no ray from outside meets a wall of bone up to 30 mm thick: is the CT one of a head, and does the isovalue (--isovalue-hu) fit?",
+            };
+            SessionError::Case(fault.into())
         })?;
         Ok(Self { bone, brain, site, remarks })
     }

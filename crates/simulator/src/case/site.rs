@@ -13,7 +13,7 @@ use trepan_haptics::script::Site;
 use trepan_volume::{BoneVolume, DistanceField};
 
 /// Rays tried.
-const RAYS: usize = 400;
+const RAYS: usize = 800;
 /// Where rays start, mm from the brain's middle.
 const FAR_MM: f32 = 160.0;
 /// Step along a ray, mm.
@@ -32,26 +32,37 @@ pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
     Some(Site { entry: centre + outward * (FAR_MM - depth), inward: -outward, bone_mm: 0.0, brain_mm: 0.0 })
 }
 
-/// A place to drill when there is no brain to look for: towards the middle of the bone, from the same side.
+/// A place to drill when there is no brain to look for: where a ray towards the middle of the bone meets a wall nearest to 6 mm thick,
+/// on the upper right front if there is one, else anywhere.
 pub fn bare_skull(bone: &BoneVolume) -> Option<Site> {
     let centre = bone.bounds().centre();
-    let outward = Vec3::new(0.45, 0.35, 0.82).normalize();
-    let at = |t: f32| bone.is_bone(bone.voxel_of(centre + outward * (FAR_MM - t)));
-    let entry = march(0.0, at)?;
-    let inner = march(entry, |t| !at(t))?;
-    let bone_mm = inner - entry;
-    Some(Site { entry: centre + outward * (FAR_MM - entry), inward: -outward, bone_mm, brain_mm: bone_mm + 5.0 })
+    let site = |outward: Vec3| {
+        let at = |t: f32| bone.is_bone(bone.voxel_of(centre + outward * (FAR_MM - t)));
+        let entry = march(0.0, at)?;
+        let bone_mm = march(entry, |t| !at(t))? - entry;
+        let entry = centre + outward * (FAR_MM - entry);
+        (bone_mm <= 30.0).then_some(Site { entry, inward: -outward, bone_mm, brain_mm: bone_mm + 5.0 })
+    };
+    let best = |sites: &mut dyn Iterator<Item = Site>| {
+        sites.min_by(|a, b| (a.bone_mm - 6.0).abs().total_cmp(&(b.bone_mm - 6.0).abs()))
+    };
+    best(&mut outward_rays().filter_map(site)).or_else(|| best(&mut all_rays().filter_map(site)))
 }
 
 /// Even directions over the upper right front.
 fn outward_rays() -> impl Iterator<Item = Vec3> {
+    all_rays().filter(|d| d.x > 0.25 && d.y > -0.2 && d.z > 0.45)
+}
+
+/// Even directions over the sphere.
+fn all_rays() -> impl Iterator<Item = Vec3> {
     let golden = std::f32::consts::PI * (3.0 - 5.0f32.sqrt());
     let of = move |i: usize| {
-        let z = 1.0 - (i as f32 + 0.5) / RAYS as f32;
+        let z = 1.0 - 2.0 * (i as f32 + 0.5) / RAYS as f32;
         let (sin, cos) = (golden * i as f32).sin_cos();
         Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
     };
-    (0..RAYS).map(of).filter(|d| d.x > 0.25 && d.y > -0.2 && d.z > 0.45)
+    (0..RAYS).map(of)
 }
 
 fn site(bone: &BoneVolume, brain: &DistanceField, centre: Vec3, outward: Vec3) -> Option<(f32, Site)> {
