@@ -39,6 +39,7 @@ impl Session for Drill {
             values: vec![("bone removed".into(), format!("{:.0} mm³", self.removed as f32 * self.bone.voxel_mm3()))],
             warnings: if deep { vec!["The burr is deeper than 12 mm".into()] } else { Vec::new() },
             finished: self.seconds > self.until,
+            leash: None,
         }
     }
 
@@ -74,7 +75,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bone = Arc::new(BoneVolume::new(&ball, 400)?);
     let renderer = Renderer::new(
         &Gpu::open(Prefer::Hardware)?,
-        &SceneData { bone: bone.clone(), brain: None, mri: None },
+        &SceneData { bone: Some(bone.clone()), brain: None, mri: None },
         [640, 480],
     )?;
     let world_from_tool = Pose::from_parts(

@@ -40,7 +40,11 @@ pub(crate) struct Leaps {
 }
 
 impl Grid {
-    pub fn of(bone: &BoneVolume) -> Self {
+    /// The grid of a bone; without any, eight voxels of air.
+    pub fn of(bone: Option<&BoneVolume>) -> Self {
+        let Some(bone) = bone else {
+            return Self { dims: [2; 3], origin: Vec3::ZERO, spacing_mm: 1.0, isovalue: i16::MAX };
+        };
         Self {
             dims: bone.dims().map(|n| n + 2),
             origin: bone.centre_of(IVec3::NEG_ONE),
@@ -76,8 +80,9 @@ impl Grid {
     }
 
     /// Shares of bone of all blocks, x fastest.
-    pub fn shares(&self, bone: &BoneVolume) -> Vec<u8> {
+    pub fn shares(&self, bone: Option<&BoneVolume>) -> Vec<u8> {
         let [bx, by, bz] = self.blocks();
+        let Some(bone) = bone else { return vec![0; bx * by * bz] };
         (0..bx * by * bz).map(|at| self.share(bone, [at % bx, at / bx % by, at / (bx * by)])).collect()
     }
 
@@ -103,9 +108,10 @@ fn boxed(low: [usize; 3], high: [usize; 3], dims: [usize; 3]) -> Vec<[usize; 3]>
 }
 
 impl Leaps {
-    pub fn of(bone: &BoneVolume, grid: &Grid) -> Self {
+    pub fn of(bone: Option<&BoneVolume>, grid: &Grid) -> Self {
         let bricks = grid.dims.map(|n| (n - 1).div_ceil(LEAP));
         let mut leaps = Self { bricks, free: vec![255; bricks.iter().product()] };
+        let Some(bone) = bone else { return leaps };
         for at in 0..leaps.free.len() {
             if may_hold_bone(bone, leaps.place(at)) {
                 leaps.free[at] = 0;
@@ -183,11 +189,12 @@ fn may_hold_bone(bone: &BoneVolume, brick: [usize; 3]) -> bool {
 
 /// Densities of the padded box of `size` voxels from `first`, x fastest, by the given conversion.
 pub(crate) fn densities<T>(
-    bone: &BoneVolume,
+    bone: Option<&BoneVolume>,
     first: [usize; 3],
     size: [usize; 3],
     convert: impl Fn(i16) -> T,
 ) -> Vec<T> {
+    let Some(bone) = bone else { return (0..size.iter().product()).map(|_| convert(AIR_HU)).collect() };
     let [x, y, z] = first.map(|v| v as i32 - 1);
     let mut values = Vec::with_capacity(size.iter().product());
     for k in 0..size[2] as i32 {
@@ -231,8 +238,8 @@ mod tests {
     #[test]
     fn leaps_are_the_distance_to_the_nearest_bone_and_stay_safe_while_it_changes() {
         let bone = bone_at([70, 40, 50], &[[3, 3, 2], [60, 20, 46]]);
-        let grid = Grid::of(&bone);
-        let mut leaps = Leaps::of(&bone, &grid);
+        let grid = Grid::of(Some(&bone));
+        let mut leaps = Leaps::of(Some(&bone), &grid);
         check(&bone, &leaps, true);
         bone.set_hu(IVec3::new(60, 20, 46), AIR_HU);
         assert!(!leaps.follow(&bone, [7, 2, 5]).1);
@@ -245,9 +252,9 @@ mod tests {
     #[test]
     fn a_corner_shared_by_eight_bricks_marks_them_all() {
         let bone = bone_at([20, 20, 20], &[[7, 7, 7]]);
-        let leaps = Leaps::of(&bone, &Grid::of(&bone));
+        let leaps = Leaps::of(Some(&bone), &Grid::of(Some(&bone)));
         assert_eq!(leaps.bricks, [6, 6, 6]);
         assert_eq!(leaps.free.iter().filter(|&&f| f == 0).count(), 8);
-        assert_eq!(Grid::of(&bone).share(&bone, [2, 2, 2]), 255 / 64);
+        assert_eq!(Grid::of(Some(&bone)).share(&bone, [2, 2, 2]), 255 / 64);
     }
 }

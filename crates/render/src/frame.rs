@@ -10,18 +10,30 @@ use trepan_volume::{BoneVolume, VoxelVolume};
 /// What stays for the whole session.
 #[derive(Clone, Debug)]
 pub struct SceneData<'a> {
-    /// The skull; the picture follows its changes.
-    pub bone: Arc<BoneVolume>,
+    /// The skull, if there was a CT; the picture follows its changes.
+    pub bone: Option<Arc<BoneVolume>>,
     /// The brain at rest.
     pub brain: Option<&'a TetMesh>,
     /// The MRI in patient space, any range.
     pub mri: Option<&'a VoxelVolume<f32>>,
 }
 
-/// From the centre of the first voxel to that of the last, world mm.
-pub(crate) fn bounds(bone: &BoneVolume) -> Aabb {
-    let last = IVec3::from(bone.dims().map(|n| n as i32 - 1));
-    Aabb { min: bone.origin(), max: bone.centre_of(last) }
+/// What the slices show, world mm: the box of voxel centres of the CT, else that of the MRI, else the brain.
+pub(crate) fn bounds(data: &SceneData) -> Aabb {
+    let by_bone = data.bone.as_ref().map(|bone| {
+        let last = IVec3::from(bone.dims().map(|n| n as i32 - 1));
+        Aabb { min: bone.origin(), max: bone.centre_of(last) }
+    });
+    let by_mri = || data.mri.map(|mri| Aabb::of_points(&corners(mri)));
+    let by_brain = || data.brain.map(|brain| brain.bounds());
+    by_bone.or_else(by_mri).or_else(by_brain).unwrap_or(Aabb { min: Vec3::splat(-100.0), max: Vec3::splat(100.0) })
+}
+
+/// World centres of a volume's eight outermost voxels.
+fn corners(volume: &VoxelVolume<f32>) -> [Vec3; 8] {
+    let last = volume.dims.map(|n| n.saturating_sub(1));
+    [0, 1, 2, 3, 4, 5, 6, 7]
+        .map(|n| volume.centre_of([0, 1, 2].map(|a| if n >> a & 1 == 1 { last[a] } else { 0 })).as_vec3())
 }
 
 /// What one picture shows.
@@ -31,7 +43,7 @@ pub struct Frame<'a> {
     pub camera: Camera,
     /// The tool, if one is shown.
     pub tool: Option<Tool>,
-    /// Where the tool is; slices pass through its tip.
+    /// Where the tool is; slices pass through its tip, or through the camera's target while the tip is outside the scanned box.
     pub world_from_tool: Pose,
     /// Turn of the burr around its shaft, rad.
     pub turn_rad: f32,
@@ -69,7 +81,20 @@ impl Default for SliceLook {
     }
 }
 
+impl SliceLook {
+    /// The same where there is no CT: the MRI is all there is.
+    pub(crate) fn with_bone(self, bone: bool) -> Self {
+        if bone { self } else { Self { mri_share: 1.0, ..self } }
+    }
+}
+
 impl Frame<'_> {
+    /// Where the slices cross: at the tool's tip, or at what the camera looks at while the tip is outside the box of the volumes.
+    pub(crate) fn focus(&self, bounds: Aabb) -> Vec3 {
+        let tip = self.world_from_tool.translation;
+        if bounds.contains(tip) { tip } else { self.camera.target.clamp(bounds.min, bounds.max) }
+    }
+
     /// A picture without a tool, with everything else shown.
     pub fn of(camera: Camera) -> Self {
         Self {

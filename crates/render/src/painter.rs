@@ -8,12 +8,13 @@
 //! In a window, which shows the device's texture without a copy: use [`Renderer`].
 
 use crate::brain::Border;
-use crate::frame::{Frame, SceneData};
+use crate::frame::{Frame, SceneData, bounds};
 use crate::image::Image;
 use crate::mri::Greys;
 use crate::renderer::DrawReport;
 use crate::{ProcessorRenderer, RenderError, Renderer};
 use std::sync::Arc;
+use trepan_geometry::Aabb;
 use trepan_gpu::{Gpu, GpuError, Prefer};
 use trepan_volume::BoneVolume;
 
@@ -34,7 +35,9 @@ enum By {
 /// What the processor needs if it has to take over.
 #[derive(Clone, Debug)]
 pub(crate) struct Kept {
-    pub bone: Arc<BoneVolume>,
+    pub bone: Option<Arc<BoneVolume>>,
+    /// What the slices show.
+    pub bounds: Aabb,
     pub brain: Option<Border>,
     pub mri: Option<Greys>,
 }
@@ -42,7 +45,7 @@ pub(crate) struct Kept {
 impl Kept {
     pub fn of(data: &SceneData) -> Result<Self, RenderError> {
         let mri = data.mri.map(Greys::of).transpose()?;
-        Ok(Self { bone: data.bone.clone(), brain: data.brain.map(Border::of), mri })
+        Ok(Self { bone: data.bone.clone(), bounds: bounds(data), brain: data.brain.map(Border::of), mri })
     }
 }
 

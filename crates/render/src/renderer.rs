@@ -73,7 +73,7 @@ impl Renderer {
         let canvas = Canvas::new(gpu, Division { size, slices: true, detail: 1.0 }, &passes)?;
         Ok(Self {
             gpu: gpu.clone(),
-            bounds: bounds(&data.bone),
+            bounds: bounds(data),
             passes,
             section,
             contour,
@@ -114,7 +114,7 @@ impl Renderer {
             }
             _ => clear(recorder, &canvas.brain_hit, 0.0),
         }
-        let pixels_cast = if frame.show_bone {
+        let pixels_cast = if frame.show_bone && passes.skull.is_some() {
             passes.skull.cast(recorder, &canvas.skull, view, &canvas.skull_hit)
         } else {
             passes.skull.recast.forget();
@@ -147,9 +147,9 @@ impl Renderer {
 
     fn follow_slices(&mut self, frame: &Frame) -> u32 {
         let Some(rectangles) = &self.canvas.layout.slices else { return 0 };
-        let planes =
-            Plane::three(frame.world_from_tool.translation, self.bounds, frame.slices.half_height_mm, rectangles);
-        self.passes.slices.follow(&self.gpu, &planes, rectangles, &frame.slices);
+        let planes = Plane::three(frame.focus(self.bounds), self.bounds, frame.slices.half_height_mm, rectangles);
+        let look = frame.slices.with_bone(self.passes.skull.is_some());
+        self.passes.slices.follow(&self.gpu, &planes, rectangles, &look);
         let Some(brain) = &self.passes.brain else { return 0 };
         let contour = self.contour.as_mut().map_or(0, |c| c.follow(&self.gpu, &planes, brain.border.corners()));
         contour + self.section.as_mut().map_or(0, |s| s.follow(&self.gpu, &planes, &brain.border))

@@ -33,7 +33,7 @@ pub(crate) const VOLUMES: [Slot; 4] = [Slot::Texture3, Slot::Sampler, Slot::Inte
 /// The skull on the device.
 #[derive(Debug)]
 pub(crate) struct Skull {
-    bone: Arc<BoneVolume>,
+    bone: Option<Arc<BoneVolume>>,
     pub grid: Grid,
     leaps: Leaps,
     seen: Vec<u32>,
@@ -52,10 +52,10 @@ pub(crate) struct Followed {
 }
 
 impl Skull {
-    pub fn new(gpu: &Gpu, bone: Arc<BoneVolume>) -> Result<Self, RenderError> {
-        let grid = Grid::of(&bone);
-        let seen = bone.seen();
-        let leaps = Leaps::of(&bone, &grid);
+    pub fn new(gpu: &Gpu, bone: Option<Arc<BoneVolume>>) -> Result<Self, RenderError> {
+        let grid = Grid::of(bone.as_deref());
+        let seen = bone.as_ref().map_or_else(Vec::new, |bone| bone.seen());
+        let leaps = Leaps::of(bone.as_deref(), &grid);
         let volume = |label, size: [usize; 3], format| {
             Texture::new(
                 gpu,
@@ -83,6 +83,11 @@ impl Skull {
         Ok(skull)
     }
 
+    /// Whether there is any bone to show.
+    pub fn is_some(&self) -> bool {
+        self.bone.is_some()
+    }
+
     /// Hands everything to the device, a few layers at a time.
     fn load(&self, gpu: &Gpu) {
         let [nx, ny, nz] = self.grid.dims;
@@ -93,31 +98,31 @@ impl Skull {
             gpu.record("load").submit();
         }
         self.leap.write(gpu, [0; 3], self.leap.size(), &self.leaps.free);
-        let shares = self.grid.shares(&self.bone);
+        let shares = self.grid.shares(self.bone.as_deref());
         self.crowd.write(gpu, [0; 3], self.crowd.size(), &shares);
     }
 
     fn upload(&self, gpu: &Gpu, first: [usize; 3], size: [usize; 3]) {
-        let values = densities(&self.bone, first, size, |hu| half::f16::from_f32(hu.into()));
+        let values = densities(self.bone.as_deref(), first, size, |hu| half::f16::from_f32(hu.into()));
         self.density.write(gpu, first.map(|v| v as u32), size.map(|v| v as u32), &values);
     }
 
     /// Brings up to `limit` changed bricks to the device.
     pub fn follow(&mut self, gpu: &Gpu, limit: usize) -> Followed {
+        let Some(bone) = self.bone.clone() else { return Followed::default() };
         let mut changed = Vec::new();
-        let bone = self.bone.clone();
         let left = bone.changed(&mut self.seen, limit, |brick| changed.push(brick));
         for &brick in &changed {
-            self.refresh(gpu, brick);
+            self.refresh(gpu, &bone, brick);
         }
         Followed { bricks: changed.len() as u32, left: left as u32 }
     }
 
     /// Brings one brick of voxels to the device, with the bricks of cells and the blocks that it touches.
-    fn refresh(&mut self, gpu: &Gpu, brick: [usize; 3]) {
+    fn refresh(&mut self, gpu: &Gpu, bone: &BoneVolume, brick: [usize; 3]) {
         let (first, size) = self.grid.voxels_of(brick);
         self.upload(gpu, first, size);
-        let (cells, anew) = self.leaps.follow(&self.bone, brick);
+        let (cells, anew) = self.leaps.follow(bone, brick);
         for cells in cells {
             let free = self.leaps.free[self.leaps.index(cells)];
             self.leap.write(gpu, cells.map(|v| v as u32), [1; 3], &[free]);
@@ -126,7 +131,7 @@ impl Skull {
             self.leap.write(gpu, [0; 3], self.leap.size(), &self.leaps.free);
         }
         for block in self.grid.blocks_of(brick) {
-            self.crowd.write(gpu, block.map(|v| v as u32), [1; 3], &[self.grid.share(&self.bone, block)]);
+            self.crowd.write(gpu, block.map(|v| v as u32), [1; 3], &[self.grid.share(bone, block)]);
         }
         let (low, high) = self.grid.corners_of(brick);
         self.recast.note(low, high);

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::{Faults, GpuError};
 use trepan_mesh::TetMesh;
-use trepan_render::{Camera, Frame, Image, Painter, ProcessorRenderer, RenderError, SceneData};
+use trepan_render::{Camera, Frame, Image, Painter, ProcessorRenderer, RenderError, SceneData, SliceLook};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
 /// A shell with a hole that shows the brain in it, and a burr at the hole.
@@ -59,7 +59,7 @@ fn similarity(a: &Image, b: &Image) -> f64 {
 fn the_processor_draws_the_devices_picture() {
     let Some(gpu) = device() else { return };
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: shell.clone(), brain: Some(&mesh), mri: Some(&mri) };
+    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri) };
     let size = [320, 240];
     let mut on_device = scene::renderer(&gpu, &data, size);
     let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
@@ -107,7 +107,7 @@ fn a_ball_drawn_by_the_processor_is_a_ball() {
 #[test]
 fn threads_change_nothing_and_neither_does_following() {
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: shell.clone(), brain: Some(&mesh), mri: Some(&mri) };
+    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri) };
     let mut one = ProcessorRenderer::new(&data, [160, 120]).expect("the scene loads");
     one.threads = 1;
     one.draw(&frame).expect("drawn");
@@ -124,7 +124,7 @@ fn threads_change_nothing_and_neither_does_following() {
 #[test]
 fn bad_sizes_and_brains_are_refused_and_odd_sizes_drawn() {
     let (shell, mesh, _, frame) = head();
-    let data = SceneData { bone: shell, brain: Some(&mesh), mri: None };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: None };
     assert_eq!(ProcessorRenderer::new(&data, [0, 4]).unwrap_err(), RenderError::Size(0, 4));
     for size in [[1, 1], [33, 17], [5, 130]] {
         let mut renderer = ProcessorRenderer::new(&data, size).expect("the scene loads");
@@ -138,7 +138,7 @@ fn bad_sizes_and_brains_are_refused_and_odd_sizes_drawn() {
 #[test]
 fn without_a_device_the_processor_draws_and_says_why() {
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: shell, brain: Some(&mesh), mri: Some(&mri) };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri) };
     let mut painter = Painter::on(Err(GpuError::NoAdapter), &data, [120, 100]).expect("the scene loads");
     assert!(painter.notice().is_some_and(|n| n.contains("mesa-vulkan-drivers")), "{:?}", painter.notice());
     assert!(painter.name().contains("processor"));
@@ -151,7 +151,7 @@ fn without_a_device_the_processor_draws_and_says_why() {
 fn a_lost_device_leaves_the_picture_to_the_processor() {
     let Some(gpu) = device() else { return };
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: shell, brain: Some(&mesh), mri: Some(&mri) };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri) };
     let mut painter = Painter::on(Ok(gpu.clone()), &data, [160, 120]).expect("the scene loads");
     let (before, _) = painter.picture(&frame).expect("drawn");
     assert_eq!(painter.notice(), None);
@@ -159,4 +159,42 @@ fn a_lost_device_leaves_the_picture_to_the_processor() {
     let (after, _) = painter.picture(&frame).expect("drawn in spite of the loss");
     assert!(painter.notice().is_some_and(|n| n.contains("does not answer")), "{:?}", painter.notice());
     assert!(similarity(&before, &after) > 0.99);
+}
+
+#[test]
+fn a_brain_and_its_mri_need_no_ct() {
+    let mesh = cube(20.0);
+    let mut mri = VoxelVolume::isotropic([60; 3], Vec3::splat(-29.5), 1.0, 20.0f32);
+    for at in 0..mri.data.len() {
+        if mri.centre_of([at % 60, at / 60 % 60, at / 3600]).length() < 7.0 {
+            mri.data[at] = 200.0;
+        }
+    }
+    let data = SceneData { bone: None, brain: Some(&mesh), mri: Some(&mri) };
+    let size = [400, 300];
+    let mut processor = ProcessorRenderer::new(&data, size).expect("a scene without a CT loads");
+    let camera = Camera::viewed_from(Vec3::ZERO, Vec3::new(0.5, 1.0, 0.4), 200.0);
+    // A tool far outside the scanned box leaves the slices where the camera looks.
+    let world_from_tool = Pose::from_translation(Vec3::new(0.0, 90.0, 0.0));
+    let slices = SliceLook { half_height_mm: Some(30.0), ..SliceLook::default() };
+    let frame = Frame { tool: Some(Tool::probe(3.0)), world_from_tool, slices, ..Frame::of(camera) };
+    let report = processor.draw(&frame).expect("drawn");
+    assert_eq!((report.pixels_cast, report.bricks), (0, 0));
+    assert!(processor.bone_hits().iter().all(Option::is_none));
+    let image = processor.image().clone();
+    let [r, g, _, _] = image.pixel(150, 150);
+    assert!(r > g + 30, "the brain is in the middle of the 3-D view: {:?}", image.pixel(150, 150));
+    for [x, y, w, h] in processor.layout().slices.expect("there is room for slices") {
+        let (ball, brain) = (image.pixel(x + w / 2 + 6, y + h / 2 + 6), image.pixel(x + 3 * w / 4, y + 3 * h / 4));
+        assert!(ball[0] > 240 && (15..60).contains(&brain[0]) && brain[0] == brain[2], "{ball:?} and {brain:?}");
+    }
+    let alone = SceneData { bone: None, brain: None, mri: None };
+    ProcessorRenderer::new(&alone, size).expect("an empty scene loads").draw(&frame).expect("drawn");
+    let Some(gpu) = device() else { return };
+    let mut renderer = scene::renderer(&gpu, &data, size);
+    assert_eq!(renderer.draw(&frame).expect("drawn").pixels_cast, 0);
+    let index = similarity(&renderer.image().expect("picture"), &image);
+    assert!(index > 0.99, "similarity {index}");
+    scene::renderer(&gpu, &alone, size).draw(&frame).expect("an empty scene is drawn");
+    assert_eq!(gpu.faults(), Faults::default());
 }

@@ -13,7 +13,7 @@ const MOST_STEPS: u32 = 8192;
 /// The skull as rays see it.
 #[derive(Debug)]
 pub(crate) struct Bricks {
-    bone: Arc<BoneVolume>,
+    bone: Option<Arc<BoneVolume>>,
     pub grid: Grid,
     leaps: Leaps,
     seen: Vec<u32>,
@@ -25,35 +25,40 @@ pub(crate) struct Bricks {
 }
 
 impl Bricks {
-    pub fn of(bone: Arc<BoneVolume>) -> Self {
-        let grid = Grid::of(&bone);
-        let seen = bone.seen();
-        let leaps = Leaps::of(&bone, &grid);
-        let density = densities(&bone, [0; 3], grid.dims, |hu| hu);
-        let crowd = grid.shares(&bone);
+    pub fn of(bone: Option<Arc<BoneVolume>>) -> Self {
+        let grid = Grid::of(bone.as_deref());
+        let seen = bone.as_ref().map_or_else(Vec::new, |bone| bone.seen());
+        let leaps = Leaps::of(bone.as_deref(), &grid);
+        let density = densities(bone.as_deref(), [0; 3], grid.dims, |hu| hu);
+        let crowd = grid.shares(bone.as_deref());
         Self { bone, grid, leaps, seen, density, crowd, recast: Recast::default() }
+    }
+
+    /// Whether there is any bone to show.
+    pub fn is_some(&self) -> bool {
+        self.bone.is_some()
     }
 
     /// Takes up to `limit` changed bricks over.
     pub fn follow(&mut self, limit: usize) -> Followed {
+        let Some(bone) = self.bone.clone() else { return Followed::default() };
         let mut changed = Vec::new();
-        let bone = self.bone.clone();
         let left = bone.changed(&mut self.seen, limit, |brick| changed.push(brick));
-        changed.iter().for_each(|&brick| self.refresh(brick));
+        changed.iter().for_each(|&brick| self.refresh(&bone, brick));
         Followed { bricks: changed.len() as u32, left: left as u32 }
     }
 
-    fn refresh(&mut self, brick: [usize; 3]) {
+    fn refresh(&mut self, bone: &BoneVolume, brick: [usize; 3]) {
         let (first, size) = self.grid.voxels_of(brick);
-        let values = densities(&self.bone, first, size, |hu| hu);
+        let values = densities(Some(bone), first, size, |hu| hu);
         for (n, row) in values.chunks_exact(size[0]).enumerate() {
             let at = self.index([first[0], first[1] + n % size[1], first[2] + n / size[1]]);
             self.density[at..at + size[0]].copy_from_slice(row);
         }
-        self.leaps.follow(&self.bone, brick);
+        self.leaps.follow(bone, brick);
         let [bx, by, _] = self.grid.blocks();
         for block in self.grid.blocks_of(brick) {
-            self.crowd[block[0] + bx * (block[1] + by * block[2])] = self.grid.share(&self.bone, block);
+            self.crowd[block[0] + bx * (block[1] + by * block[2])] = self.grid.share(bone, block);
         }
         let (low, high) = self.grid.corners_of(brick);
         self.recast.note(low, high);

@@ -23,7 +23,7 @@ mod slice;
 use crate::RenderError;
 use crate::brain::Border;
 use crate::camera::View;
-use crate::frame::{Frame, SceneData, bounds};
+use crate::frame::{Frame, SceneData};
 use crate::image::Image;
 use crate::layout::Layout;
 use crate::mri::Greys;
@@ -71,7 +71,7 @@ impl ProcessorRenderer {
     /// Takes over what was kept of a scene.
     pub(crate) fn with(kept: Kept, size: [u32; 2]) -> Result<Self, RenderError> {
         let mut renderer = Self {
-            bounds: bounds(&kept.bone),
+            bounds: kept.bounds,
             bricks: Bricks::of(kept.bone),
             brain: kept.brain,
             mri: kept.mri,
@@ -128,7 +128,7 @@ impl ProcessorRenderer {
 
     fn cast(&mut self, frame: &Frame, view: &View, scene: &Scene) -> u32 {
         let [_, _, width, height] = self.layout.view;
-        if !frame.show_bone {
+        if !frame.show_bone || !self.bricks.is_some() {
             self.rays.fill(Ray::NONE);
             self.bricks.recast.forget();
             return 0;
@@ -159,7 +159,8 @@ impl ProcessorRenderer {
 
     fn slices(&mut self, frame: &Frame, scene: &Scene) -> u32 {
         let Some(rectangles) = self.layout.slices else { return 0 };
-        let through = frame.world_from_tool.translation;
+        let through = frame.focus(self.bounds);
+        let look = frame.slices.with_bone(self.bricks.is_some());
         let planes = Plane::three(through, self.bounds, frame.slices.half_height_mm, &rectangles);
         let inputs = Inputs { scene, bricks: &self.bricks, mri: self.mri.as_ref() };
         let width = self.picture.width as usize;
@@ -173,7 +174,7 @@ impl ProcessorRenderer {
                 for (column, pixel) in row.iter_mut().enumerate() {
                     let at = [column, row_at - y];
                     let rest = places[column + w * (row_at - y)];
-                    *pixel = slice::fragment(&inputs, plane, n, [w, h], at, rest, &frame.slices);
+                    *pixel = slice::fragment(&inputs, plane, n, [w, h], at, rest, &look);
                 }
             });
             if let Some(brain) = &self.brain {
