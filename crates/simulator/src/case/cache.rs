@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Goes up when kept cases change their form or the code that makes them changes its results.
 const FORM: u32 = 2;
@@ -57,7 +58,8 @@ impl Cache {
     pub fn keep(&self, key: &str, fill: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), String> {
         let text = |fault: io::Error| format!("{}: {fault}", self.root.display());
         fs::create_dir_all(&self.root).map_err(text)?;
-        let folder = tempfile::Builder::new().prefix(".making-").tempdir_in(&self.root).map_err(text)?;
+        self.sweep();
+        let folder = tempfile::Builder::new().prefix(MAKING).tempdir_in(&self.root).map_err(text)?;
         fill(folder.path())?;
         let place = self.root.join(key);
         if place.is_dir() {
@@ -74,6 +76,25 @@ pub fn digest(file: &Path) -> io::Result<String> {
     let mut hash = Sha256::new();
     feed(&mut hash, &mut File::open(file)?)?;
     Ok(hexadecimal(hash))
+}
+
+/// How folders that are being filled begin.
+const MAKING: &str = ".making-";
+/// A folder that was not touched for so long is no longer being filled.
+const ABANDONED: Duration = Duration::from_secs(3600);
+
+impl Cache {
+    /// Removes what killed programs left.
+    fn sweep(&self) {
+        for entry in fs::read_dir(&self.root).into_iter().flatten().flatten() {
+            let old = || {
+                entry.metadata().and_then(|m| m.modified()).is_ok_and(|t| t.elapsed().is_ok_and(|age| age > ABANDONED))
+            };
+            if entry.file_name().to_string_lossy().starts_with(MAKING) && old() {
+                _ = fs::remove_dir_all(entry.path());
+            }
+        }
+    }
 }
 
 fn hexadecimal(hash: Sha256) -> String {
@@ -159,6 +180,17 @@ mod tests {
         assert_eq!(fs::read_dir(home.path().join("cases")).unwrap().count(), 0);
         cache.keep(&key, |folder| fs::write(folder.join("whole"), b"x").map_err(|f| f.to_string())).unwrap();
         assert!(cache.find(&key).unwrap().join("whole").is_file());
+    }
+
+    #[test]
+    fn what_a_killed_program_left_is_swept_but_not_what_is_being_made() {
+        let home = tempfile::tempdir().unwrap();
+        let (old, new) = (home.path().join(".making-old"), home.path().join(".making-new"));
+        [&old, &new].iter().for_each(|folder| fs::create_dir(folder).unwrap());
+        let long_ago = std::time::SystemTime::now() - 2 * ABANDONED;
+        File::open(&old).unwrap().set_modified(long_ago).unwrap();
+        Cache::at(home.path().into()).keep("case", |_| Ok(())).unwrap();
+        assert!(!old.exists() && new.exists());
     }
 
     #[test]

@@ -83,8 +83,8 @@ fn find_site(program: Program, bone: Option<&BoneVolume>, brain: Option<&RestBra
 fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>) -> RestBrain {
     let mut fixed = bone.map(|bone| held_by_bone(&brain.mesh, bone)).unwrap_or_default();
     if fixed.len() < FEWEST_HELD {
-        remarks.push("too little bone lies under the brain to hold it: its lowest tenth is held instead".into());
-        fixed = below(&brain.mesh, 0.1);
+        remarks.push("too little bone lies under the brain to hold it: its lowest fifth is held instead".into());
+        fixed = below(&brain.mesh, 0.2);
     }
     RestBrain { fixed, field: Arc::new(DistanceField::of_mask(&brain.mask)), mesh: brain.mesh, mri: brain.mri }
 }
