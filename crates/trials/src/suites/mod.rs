@@ -1,5 +1,6 @@
 //! The suites, one file each; one list feeds the command line and the page.
 
+mod mesh;
 mod rigid;
 mod tled;
 mod voxel_size;
@@ -41,6 +42,12 @@ pub struct Suite {
 
 /// Every suite.
 pub const ALL: &[Suite] = &[
+    Suite {
+        name: "mesh",
+        question: "how well do tetrahedra fill a mask, and what does meshing cost",
+        chart: ("mesh_s", "surface_p95_voxel"),
+        run: mesh::run,
+    },
     Suite {
         name: "rigid",
         question: "how right is each way of touching voxel bone, and what does a tick cost",
