@@ -1,5 +1,6 @@
 //! The suites, one file each; one list feeds the command line and the page.
 
+mod deformable;
 mod mesh;
 mod rigid;
 mod tled;
@@ -47,6 +48,12 @@ pub const ALL: &[Suite] = &[
         question: "how well do tetrahedra fill a mask, and what does meshing cost",
         chart: ("mesh_s", "surface_p95_voxel"),
         run: mesh::run,
+    },
+    Suite {
+        name: "deformable",
+        question: "how right is each way of touching moving tissue, and what does a step cost",
+        chart: ("step_p50_us", "depth_error_p95_mm"),
+        run: deformable::run,
     },
     Suite {
         name: "rigid",

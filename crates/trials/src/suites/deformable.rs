@@ -1,0 +1,109 @@
+//! A ball-tipped tool against moving tetrahedra: the thesis's cubes and a brain, its three paths, jumps and broken meshes, against an f64 oracle.
+
+mod published;
+mod ride;
+mod scene;
+mod stability;
+mod truth;
+
+use super::Scope;
+use crate::suite::{Findings, Gate, Row};
+use ride::{Ride, ride};
+use scene::{PATHS, Scene};
+use trepan_deformable::Method;
+use truth::Truth;
+
+/// What the recommended method must gain over looking at every tetrahedron, from 48 thousand of them on.
+const LEAST_RATIO: f64 = 10.0;
+/// How far the depth may jump when a point goes from one tetrahedron into the next, edges.
+const MOST_JUMP: f64 = 1e-4;
+
+/// Every method on every mesh and path, then what breaks them.
+pub fn run(scope: Scope) -> Findings {
+    let mut findings = Findings::default();
+    let cubes = scope.pick(&[7usize, 22][..], &[7, 13, 22, 30, 40, 50, 60][..]);
+    let brains = scope.pick(&[][..], &[12_511usize, 22_076, 50_041][..]);
+    let mut numbers = (0..).map(|number| scope.takes(number));
+    let mut takes = || numbers.next() == Some(true);
+    cubes.iter().filter(|_| takes()).for_each(|&cells| measure(&Scene::cube(cells), scope, &mut findings));
+    brains.iter().filter(|_| takes()).for_each(|&tets| measure(&Scene::brain(tets), scope, &mut findings));
+    if takes() {
+        slide(scope, &mut findings);
+    }
+    if takes() {
+        stability::run(scope, &mut findings);
+    }
+    if takes() {
+        findings.rows.extend(published::rows());
+    }
+    findings
+}
+
+/// All but the oracle, which judges and is too slow to be judged.
+fn methods() -> impl Iterator<Item = Method> {
+    Method::all().into_iter().filter(|&method| method != Method::Brute)
+}
+
+/// Whether the method promises to find every point.
+fn is_complete(method: Method) -> bool {
+    method != Method::Thesis
+}
+
+/// One mesh: every path by every method.
+fn measure(scene: &Scene, scope: Scope, findings: &mut Findings) {
+    for path in PATHS {
+        let steps = if path.jumps { scope.pick(50, 300) } else { scope.pick(150, 1500) };
+        let place = format!("{}, {}", scene.name, path.name);
+        let tips = scene.tips(&path, steps);
+        let truth = Truth::along(scene, &tips);
+        let rides: Vec<Ride> = methods().map(|method| ride(scene, method, &tips, &truth)).collect();
+        let scan_us = rides.iter().find(|r| r.method == Method::Scan).map_or(f64::NAN, Ride::p50_us);
+        findings.rows.extend(rides.iter().map(|ride| ride.row(&place, scene, scan_us)));
+        let complete = rides.iter().filter(|ride| is_complete(ride.method));
+        let wrong = complete.map(|ride| (ride.missed + ride.invented) as f64).sum();
+        findings.gates.push(Gate::at_most(
+            format!("{place}: points missed or invented by complete methods"),
+            wrong,
+            0.0,
+        ));
+        if !path.jumps {
+            speed_gates(&place, scene, scan_us, &rides, findings);
+        }
+    }
+}
+
+/// Nothing beats the recommended method in both time and depth, and it gains on the scan what it promises.
+fn speed_gates(place: &str, scene: &Scene, scan_us: f64, rides: &[Ride], findings: &mut Findings) {
+    let best = Method::RECOMMENDED.name();
+    let beaten = crate::front::dominated(&findings.rows, place, best, "step_p50_us", "depth_error_p95_mm");
+    findings.gates.push(Gate::at_most(format!("{place}: methods that beat {best} in both"), beaten as f64, 0.0));
+    if scene.mesh.tets.len() > 48_000 {
+        let own_us = rides.iter().find(|r| r.method == Method::RECOMMENDED).map_or(f64::NAN, Ride::p50_us);
+        let name = format!("{place}: {best}, times faster than the scan");
+        findings.gates.push(Gate::at_least(name, scan_us / own_us, LEAST_RATIO));
+    }
+}
+
+/// A stroke 0.5 mm deep over a flat side at rest: the true depth never changes, though points go from tetrahedron to tetrahedron.
+fn slide(scope: Scope, findings: &mut Findings) {
+    let scene = Scene::cube_at_rest(13);
+    let (tips, depth_mm) = scene.stroke(scope.pick(800, 4000));
+    let truth = vec![Truth { depth_mm, ..Truth::UNKNOWN }; tips.len()];
+    let (place, mut most_edges) = (format!("{}, flat stroke", scene.name), 0.0f64);
+    for method in methods() {
+        let ride = ride(&scene, method, &tips, &truth);
+        let jump_edges = ride.depth_jump_mm / f64::from(scene.edge_mm);
+        findings.rows.push(ride.row(&place, &scene, f64::NAN).metric("depth_jump_edges", jump_edges));
+        most_edges = most_edges.max(if is_complete(method) { jump_edges } else { 0.0 });
+    }
+    findings.gates.push(Gate::at_most(
+        format!("{place}: jump of depth by complete methods, edges"),
+        most_edges,
+        MOST_JUMP,
+    ));
+}
+
+/// A row without what could not be measured.
+fn finite(row: Row, metrics: &[(&str, f64)]) -> Row {
+    metrics.iter().filter(|(_, value)| value.is_finite()).fold(row, |row, (name, value)| row.metric(name, *value))
+}
