@@ -2,11 +2,11 @@
 //!
 //! # Theory
 //! ```text
-//! wanted → finite? → input sound? → ramp-in → + damping → clamp |F|, |τ| → slew → energy bound → GuardedWrench
+//! wanted → finite? → input sound? → ramp-in → damping → clamp |F|, |τ| → slew → energy bound → GuardedWrench
 //! ```
 //! Whatever comes in, what goes out is finite, no longer than the limit, and no further from the last wrench than the
-//! slew limit lets it, but for one case: where a held force would give the hand energy that it never put in, the force falls faster.
-//! Vectors are shortened, never clipped by axis: the direction of a force is kept.
+//! slew limit lets it, but for one case: where a held force would give the hand energy that it never put in, the force falls faster. A force
+//! that this holds short for long ramps in anew: a wall is never lost for good. Vectors are shortened, never clipped by axis: the direction of a force is kept.
 //!
 //! # Practice
 //! Every event is counted in [`GuardCounters`]. A wanted wrench that is not finite, a pose that is not, a tool faster than the
@@ -95,10 +95,12 @@ pub struct GuardCounters {
     pub slewed: u64,
     /// The wanted wrench, the tool or the tick length was not a usable number.
     pub non_finite: u64,
-    /// The passivity controller added damping.
+    /// The passivity controller damped the force.
     pub passivity: u64,
     /// The force was shortened to what the energy account could pay for.
     pub bounded: u64,
+    /// A force held short by the energy account began anew: its coupling is outside what the controller can hold.
+    pub restarted: u64,
     /// The tool was faster than the cut-out, or jumped.
     pub too_fast: u64,
     /// The sample was older than the limit.
@@ -153,17 +155,18 @@ impl ForceGuard {
     pub fn guard(&mut self, wanted: Wrench, tool: &ToolState, dt_ms: f32) -> GuardedWrench {
         let dt_ms = self.tick_length(dt_ms);
         let sound = self.input_is_sound(&wanted, tool, dt_ms);
-        let damping = self.passivity(sound, tool, dt_ms);
+        self.book(sound && !self.released && wanted.force != Vec3::ZERO, tool, dt_ms);
         let mut goal = Wrench::ZERO;
         if !sound {
             self.ramp_ms = 0.0;
         } else if !self.released {
             goal = self.ramped(wanted, dt_ms);
-            goal.force += damping;
+            goal.force = self.damped(goal.force, dt_ms);
         }
         let goal = self.clamped(goal);
         let slewed = self.slewed(goal, dt_ms);
         self.applied = self.bounded(slewed);
+        self.restart(goal.force, dt_ms);
         GuardedWrench(self.applied)
     }
 
@@ -232,22 +235,33 @@ impl ForceGuard {
         true
     }
 
-    /// Books the tick that has passed and returns the damping force that the controller asks for.
-    fn passivity(&mut self, sound: bool, tool: &ToolState, dt_ms: f32) -> Vec3 {
-        if !tool.tip().is_finite() {
-            self.last_tip = None;
-            return Vec3::ZERO;
+    /// Books the tick that has passed.
+    fn book(&mut self, touching: bool, tool: &ToolState, dt_ms: f32) {
+        let tip = tool.tip();
+        if !tip.is_finite() || self.last_tip.is_none() {
+            self.observer.lose_track();
         }
-        let motion = self.last_tip.map_or(Vec3::ZERO, |last| tool.tip() - last);
-        self.last_tip = Some(tool.tip());
-        let Some(config) = &self.config.passivity else { return Vec3::ZERO };
-        self.observer.book(motion, config);
-        let damping = self.observer.damping(dt_ms, config);
-        if !sound || damping == Vec3::ZERO || !damping.is_finite() {
-            return Vec3::ZERO;
+        self.last_tip = Some(tip).filter(|tip| tip.is_finite());
+        if let (Some(tip), Some(config)) = (self.last_tip, &self.config.passivity) {
+            self.observer.book(tip, touching, dt_ms, config);
         }
-        self.counters.passivity += 1;
-        damping
+    }
+
+    /// The force with the damping that the controller asks for.
+    fn damped(&mut self, force: Vec3, dt_ms: f32) -> Vec3 {
+        let Some(config) = &self.config.passivity else { return force };
+        let damped = self.observer.damped(force, dt_ms, config);
+        self.counters.passivity += u64::from(damped != force);
+        damped
+    }
+
+    /// Ramps the force in anew where it has been held short for long.
+    fn restart(&mut self, goal: Vec3, dt_ms: f32) {
+        let Some(config) = &self.config.passivity else { return };
+        if self.observer.restarts(goal, self.applied.force, dt_ms, config) {
+            self.ramp_ms = 0.0;
+            self.counters.restarted += 1;
+        }
     }
 
     fn ramped(&mut self, wanted: Wrench, dt_ms: f32) -> Wrench {

@@ -1,6 +1,6 @@
 //! The seam of the devices.
 
-use trepan_contact::{GuardConfig, GuardedWrench};
+use trepan_contact::{GuardConfig, GuardedWrench, PassivityConfig};
 use trepan_geometry::{ToolState, Vec3};
 
 /// A device that a hand holds, or something that behaves as one.
@@ -76,12 +76,17 @@ impl Capabilities {
         }
     }
 
-    /// The guard's recommended limits, lowered to this device's peak force. A device without motors keeps the recommended
-    /// peak: what it would feel is still shown and recorded.
+    /// The guard's recommended limits, lowered to this device's peak force, its energy account told of the device's delay and encoder
+    /// step. A device without motors keeps the recommended peak: what it would feel is still shown and recorded.
     pub fn guard_config(&self) -> GuardConfig {
         let recommended = GuardConfig::default();
         let peak_n = if self.peak_force_n > 0.0 { self.peak_force_n } else { recommended.max_force_n };
-        GuardConfig { max_force_n: peak_n.min(recommended.max_force_n), ..recommended }
+        let passivity = PassivityConfig {
+            delay_ticks: self.delay_ticks,
+            quantum_mm: self.position_resolution_mm,
+            ..PassivityConfig::default()
+        };
+        GuardConfig { max_force_n: peak_n.min(recommended.max_force_n), passivity: Some(passivity), ..recommended }
     }
 }
 
@@ -91,10 +96,13 @@ mod tests {
 
     #[test]
     fn the_guard_knows_the_devices_limits() {
-        let weak = Capabilities { peak_force_n: 2.0, ..Capabilities::passive("weak") };
+        let weak = Capabilities { peak_force_n: 2.0, delay_ticks: 2, ..Capabilities::passive("weak") };
         assert_eq!(weak.guard_config().max_force_n, 2.0);
-        let strong = Capabilities { peak_force_n: 20.0, ..weak };
+        let passivity = weak.guard_config().passivity.unwrap();
+        assert_eq!((passivity.delay_ticks, passivity.quantum_mm), (2, 0.0));
+        let strong = Capabilities { peak_force_n: 20.0, position_resolution_mm: 0.01, ..weak };
         assert_eq!(strong.guard_config().max_force_n, GuardConfig::default().max_force_n);
-        assert_eq!(Capabilities::passive("mouse").guard_config(), GuardConfig::default());
+        assert_eq!(strong.guard_config().passivity.unwrap().quantum_mm, 0.01);
+        assert_eq!(Capabilities::passive("mouse").guard_config().max_force_n, GuardConfig::default().max_force_n);
     }
 }
