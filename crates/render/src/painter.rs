@@ -5,14 +5,14 @@
 //! kept for the user to read.
 //!
 //! # When not to use it
-//! In a window, which shows the device's texture without a copy: use [`Renderer`].
+//! Where the device's texture is to be shown without a copy and a lost device is an error: use [`Renderer`].
 
 use crate::brain::Border;
 use crate::frame::{Frame, SceneData, bounds};
 use crate::image::Image;
 use crate::mri::Greys;
-use crate::renderer::DrawReport;
-use crate::{ProcessorRenderer, RenderError, Renderer};
+use crate::renderer::{DrawReport, LEAST_DETAIL};
+use crate::{ProcessorRenderer, RenderError, Renderer, View};
 use std::sync::Arc;
 use trepan_geometry::Aabb;
 use trepan_gpu::{Gpu, GpuError, Prefer};
@@ -92,6 +92,42 @@ impl Painter {
         }
     }
 
+    /// Makes the pictures fit an area of `size` pixels, coarser where `detail`, a share of the pixels along an edge, is under 1. The
+    /// processor then draws smaller pictures; a device draws only the 3-D view with fewer pixels.
+    pub fn fit(&mut self, size: [u32; 2], detail: f32) -> Result<(), RenderError> {
+        match &mut self.by {
+            By::Device(renderer) => renderer.set_detail(detail).and_then(|()| renderer.resize(size)),
+            By::Processor(processor) => {
+                let share = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
+                processor.resize(size.map(|n| ((n as f32 * share).round() as u32).clamp(n.min(1), n)))
+            }
+        }
+    }
+
+    /// The camera of a frame as vectors, for the 3-D view of this picture.
+    pub fn view(&self, frame: &Frame) -> View {
+        match &self.by {
+            By::Device(renderer) => renderer.view(frame),
+            By::Processor(processor) => processor.view(frame),
+        }
+    }
+
+    /// The renderer on the device, if that draws.
+    pub fn renderer(&self) -> Option<&Renderer> {
+        match &self.by {
+            By::Device(renderer) => Some(renderer),
+            By::Processor(_) => None,
+        }
+    }
+
+    /// The same to draw with.
+    pub fn renderer_mut(&mut self) -> Option<&mut Renderer> {
+        match &mut self.by {
+            By::Device(renderer) => Some(renderer),
+            By::Processor(_) => None,
+        }
+    }
+
     /// Who draws, for people.
     pub fn name(&self) -> String {
         match &self.by {
@@ -105,7 +141,7 @@ impl Painter {
         self.notice.as_deref()
     }
 
-    /// The renderer on the device, for a window; the painter itself if the processor draws.
+    /// The renderer on the device; the painter itself if the processor draws.
     pub fn into_renderer(self) -> Result<Renderer, Box<Self>> {
         match self.by {
             By::Device(renderer) => Ok(*renderer),

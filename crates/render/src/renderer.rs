@@ -26,7 +26,7 @@ pub const BRICKS_PER_FRAME: usize = 1024;
 pub(crate) const OUTLINE: Vec3 = Vec3::new(1.0, 0.45, 0.55);
 
 /// Least share of the 3-D view's pixels along an edge.
-const LEAST_DETAIL: f32 = 0.05;
+pub(crate) const LEAST_DETAIL: f32 = 0.05;
 
 /// Draws pictures of one scene into a texture.
 #[derive(Debug)]

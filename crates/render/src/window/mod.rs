@@ -13,25 +13,29 @@
 //! | R | resets the view |
 //! | Q or Escape | closes |
 //!
-//! The picture stays on the device: egui shows the very texture that the renderer draws into. It gets coarser when pictures
-//! take longer than a tenth of a second, and finer again when there is time.
+//! The picture stays on the device: egui shows the very texture that the renderer draws into. Where it cannot (the device is one of GL, cannot
+//! show on this display, or the processor draws) the window opens a device of its own and every picture is copied to it. The picture gets
+//! coarser when pictures take longer than a tenth of a second, and finer again when there is time.
 //!
 //! # When not to use it
 //! Without a display: [`run`] says so and hands everything back, so that the session can go on headless.
 
 mod app;
 mod banner;
+mod draws;
 mod input;
 mod panel;
 mod plot;
 mod quality;
 
+pub use draws::Draws;
 pub use input::WindowInput;
 
 use crate::{Camera, Frame, Renderer};
 use std::cell::RefCell;
 use std::rc::Rc;
 use trepan_geometry::{Pose, Vec3};
+use trepan_gpu::Gpu;
 
 /// What the window shows and drives. Called on the window's thread, once a picture; must not wait.
 pub trait Session {
@@ -109,46 +113,69 @@ pub enum WindowError {
 
 /// Everything that was given to [`run`], back again.
 #[derive(Debug)]
-pub struct Closed<S> {
+pub struct Closed<S, D = Renderer> {
     /// The session.
     pub session: S,
-    /// The renderer.
-    pub renderer: Renderer,
+    /// Who has drawn.
+    pub renderer: D,
     /// Whether the window was shown and closed as it should.
     pub result: Result<(), WindowError>,
 }
 
 /// What the window works on while it is open.
-pub(crate) struct Shared<S> {
+pub(crate) struct Shared<S, D> {
     pub session: S,
-    pub renderer: Renderer,
+    pub renderer: D,
+    /// Whether a picture was shown.
+    pub shown: bool,
     pub fault: Option<String>,
 }
 
 /// Lent to the window, taken back when it is closed.
-pub(crate) type Lent<S> = Rc<RefCell<Option<Shared<S>>>>;
+pub(crate) type Lent<S, D> = Rc<RefCell<Option<Shared<S, D>>>>;
 
 /// Shows the window until it is closed. Must be called on the main thread.
-pub fn run<S: Session + 'static>(title: &str, renderer: Renderer, session: S, start: Start) -> Closed<S> {
-    let gpu = renderer.gpu().clone();
-    let lent: Lent<S> = Rc::new(RefCell::new(Some(Shared { session, renderer, fault: None })));
-    let result = display().and_then(|()| open(title, &gpu, &lent, start));
+pub fn run<S, D>(title: &str, renderer: D, session: S, start: Start) -> Closed<S, D>
+where
+    S: Session + 'static,
+    D: Draws + 'static,
+{
+    let shared = renderer.device().filter(|gpu| gpu.can_be_shared()).cloned();
+    let lent: Lent<S, D> = Rc::new(RefCell::new(Some(Shared { session, renderer, shown: false, fault: None })));
+    let result = display().and_then(|()| open_somehow(title, shared.as_ref(), &lent, start));
     let back = lent.borrow_mut().take();
-    let Some(Shared { session, renderer, fault }) = back else { unreachable!("only this line takes what was lent") };
+    let Some(Shared { session, renderer, fault, .. }) = back else {
+        unreachable!("only this line takes what was lent")
+    };
     Closed { session, renderer, result: fault.map_or(result, |why| Err(WindowError::Failed(why))) }
 }
 
+/// Opens the window on the device that draws; where that shows nothing, on a device of its own.
+fn open_somehow<S, D>(title: &str, gpu: Option<&Gpu>, lent: &Lent<S, D>, start: Start) -> Result<(), WindowError>
+where
+    S: Session + 'static,
+    D: Draws + 'static,
+{
+    let shown = || lent.borrow().as_ref().is_some_and(|shared| shared.shown);
+    match open(title, gpu, lent, start) {
+        Err(WindowError::Failed(why)) if gpu.is_some() && !shown() => {
+            let again = open(title, None, lent, start);
+            if again.is_ok() || shown() { again } else { Err(WindowError::Failed(why)) }
+        }
+        result => result,
+    }
+}
+
 /// Opens the window and stays until it is closed.
-fn open<S: Session + 'static>(
-    title: &str,
-    gpu: &trepan_gpu::Gpu,
-    lent: &Lent<S>,
-    start: Start,
-) -> Result<(), WindowError> {
-    let lent = lent.clone();
+fn open<S, D>(title: &str, gpu: Option<&Gpu>, lent: &Lent<S, D>, start: Start) -> Result<(), WindowError>
+where
+    S: Session + 'static,
+    D: Draws + 'static,
+{
+    let (lent, copies) = (lent.clone(), gpu.is_none());
     let show = || {
         let create: eframe::AppCreator<'_> =
-            Box::new(move |context| Ok(Box::new(app::Window::new(context, lent, start))));
+            Box::new(move |context| Ok(Box::new(app::Window::new(context, lent, start, copies))));
         eframe::run_native(title, options(gpu, &start), create)
     };
     // A missing system library makes the windowing crate panic; that must not take the session along.
@@ -170,7 +197,7 @@ pub fn display() -> Result<(), WindowError> {
     Ok(())
 }
 
-fn options(gpu: &trepan_gpu::Gpu, start: &Start) -> eframe::NativeOptions {
+fn options(gpu: Option<&Gpu>, start: &Start) -> eframe::NativeOptions {
     let [width, height] = start.size;
     let mut options = eframe::NativeOptions {
         viewport: eframe::egui::ViewportBuilder::default()
@@ -179,12 +206,15 @@ fn options(gpu: &trepan_gpu::Gpu, start: &Start) -> eframe::NativeOptions {
         renderer: eframe::Renderer::Wgpu,
         ..Default::default()
     };
-    options.wgpu_options.wgpu_setup = eframe::egui_wgpu::WgpuSetup::Existing(eframe::egui_wgpu::WgpuSetupExisting {
-        instance: gpu.instance().clone(),
-        adapter: gpu.adapter().clone(),
-        device: gpu.device().clone(),
-        queue: gpu.queue().clone(),
-    });
+    if let Some(gpu) = gpu {
+        let shared = eframe::egui_wgpu::WgpuSetupExisting {
+            instance: gpu.instance().clone(),
+            adapter: gpu.adapter().clone(),
+            device: gpu.device().clone(),
+            queue: gpu.queue().clone(),
+        };
+        options.wgpu_options.wgpu_setup = eframe::egui_wgpu::WgpuSetup::Existing(shared);
+    }
     options
 }
 

@@ -1,0 +1,64 @@
+//! Who draws the window's picture, and how it gets there.
+
+use crate::{Frame, Image, Painter, RenderError, Renderer, View};
+use trepan_gpu::{Gpu, Texture};
+
+/// Draws the pictures of a window: a [`Renderer`], or a [`Painter`], which goes on by the processor where no device can.
+pub trait Draws {
+    /// The device that draws now, if one does.
+    fn device(&self) -> Option<&Gpu>;
+
+    /// Draws a frame for an area of `size` pixels into a texture of the device; `detail` is the share of the 3-D view's pixels along an
+    /// edge. Gives the camera as vectors.
+    fn draw(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<View, RenderError>;
+
+    /// The texture that the last picture was drawn into, if a device draws.
+    fn texture(&self) -> Option<&Texture>;
+
+    /// The same as [`draw`](Self::draw) as a finished picture, where the window has another device. It may have fewer pixels.
+    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError>;
+}
+
+impl Draws for Renderer {
+    fn device(&self) -> Option<&Gpu> {
+        Some(self.gpu())
+    }
+
+    fn draw(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<View, RenderError> {
+        self.set_detail(detail)?;
+        self.resize(size)?;
+        Renderer::draw(self, frame).map(|_| self.view(frame))
+    }
+
+    fn texture(&self) -> Option<&Texture> {
+        Some(Renderer::texture(self))
+    }
+
+    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
+        let view = Draws::draw(self, frame, size, detail)?;
+        Ok((view, self.image()?))
+    }
+}
+
+impl Draws for Painter {
+    fn device(&self) -> Option<&Gpu> {
+        self.renderer().map(Renderer::gpu)
+    }
+
+    fn draw(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<View, RenderError> {
+        match self.renderer_mut() {
+            Some(renderer) => Draws::draw(renderer, frame, size, detail),
+            None => Draws::picture(self, frame, size, detail).map(|(view, _)| view),
+        }
+    }
+
+    fn texture(&self) -> Option<&Texture> {
+        self.renderer().map(Renderer::texture)
+    }
+
+    fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
+        self.fit(size, detail)?;
+        let (image, _) = Painter::picture(self, frame)?;
+        Ok((self.view(frame), image))
+    }
+}
