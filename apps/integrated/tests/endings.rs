@@ -96,3 +96,20 @@ fn a_built_case_runs_and_is_not_overwritten() {
     let card: Value = serde_json::from_slice(&fs::read(case.join("case.json")).unwrap()).unwrap();
     assert_eq!(card["files"].as_object().unwrap().len(), 4);
 }
+
+#[test]
+fn a_watcher_follows_and_its_death_changes_nothing() {
+    let name = format!("test-{}", std::process::id());
+    let [trainee, watcher, dead] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    let mut session = operation(trainee.path(), "8", &["--share", &name]).spawn().unwrap();
+    let mut killed = operation(dead.path(), "60", &["--watch", &name]).spawn().unwrap();
+    let following = operation(watcher.path(), "60", &["--watch", &name]).spawn().unwrap();
+    std::thread::sleep(Duration::from_secs(4));
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    assert!(session.wait().unwrap().success());
+    assert!(following.wait_with_output().unwrap().status.success());
+    let [was, seen] = [&trainee, &watcher].map(|out| Recording::open(&out.path().join("session.mcap")).unwrap());
+    let probing = |recording: &Recording| recording.ticks.iter().any(|tick| tick.phase == 1);
+    assert!(probing(&was) && probing(&seen), "the watcher did not follow to the last phase");
+}

@@ -19,6 +19,12 @@ pub struct Options {
     /// mouse | script:NAME | replay:FILE | simulated:NAME | openhaptics or openhaptics:NAME | force-dimension | haply [default: mouse with a window, else a script]
     #[arg(long, value_name = "DEVICE")]
     pub device: Option<String>,
+    /// Let other processes on this machine watch under this name
+    #[arg(long, value_name = "NAME")]
+    pub share: Option<String>,
+    /// Watch the session that runs with --share NAME, with the same case
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["device", "share"])]
+    pub watch: Option<String>,
     /// Run without a window
     #[arg(long)]
     pub headless: bool,

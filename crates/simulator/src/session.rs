@@ -9,9 +9,11 @@ use crate::options::{Options, Patient};
 use crate::program::Program;
 use crate::report::output;
 use crate::report::summary::{About, Machine, Summary};
+use crate::run::journal::Kept;
 use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Pace};
+use crate::run::watch::{Share, Watched};
 use crate::run::{Eyes, Outcome, Stages, Tissue};
 use crate::show::driver;
 use crate::show::picture::{self, Album};
@@ -95,11 +97,12 @@ impl Session {
         let stages = self.stages(start.state, peak_n)?;
         output::folder(&self.out)?;
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
-        let recorder = Recorder::create(&record, &self.header())?;
+        let share = self.options.share.as_deref().map(Share::open).transpose()?;
+        let kept = (Recorder::create(&record, &self.header())?, share);
         let mut graphics = self.graphics();
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
-        let outcome = self.loops(stages, device, recorder, start, &stop, |eyes| {
+        let outcome = self.loops(stages, device, kept, start, &stop, |eyes| {
             album = self.picture(eyes, &mut graphics, pointer, &stop);
         });
         let mut remarks = self.scene.remarks.clone();
@@ -115,14 +118,14 @@ impl Session {
         &self,
         stages: Stages,
         device: Option<Box<dyn HapticDevice>>,
-        recorder: Recorder,
+        kept: Kept,
         start: ToolSample,
         stop: &Stop,
         picture: impl FnOnce(Eyes),
     ) -> Outcome {
         match (&self.recording, device) {
-            (Some(recording), _) => lockstep::run(stages, recording, recorder, start, self.windowed, stop, picture),
-            (None, Some(device)) => threads::run(stages, device, recorder, start, self.pace(), stop, picture),
+            (Some(recording), _) => lockstep::run(stages, recording, kept, start, self.windowed, stop, picture),
+            (None, Some(device)) => threads::run(stages, device, kept, start, self.pace(), stop, picture),
             (None, None) => Outcome::default(),
         }
     }
@@ -135,6 +138,10 @@ impl Session {
             Script::named(name, &self.scene.site, duration_ms).map_err(|f| fault(&f))
         };
         let mut hand = Hand { device: None, pointer: None, watch: None };
+        if let Some(name) = &self.options.watch {
+            hand.device = Some(Box::new(Watched::open(name, script(self.program.script())?.at(0.0))?));
+            return Ok(hand);
+        }
         hand.device = match &self.device {
             DeviceName::Script(name) => Some(Box::new(script(name)?)),
             DeviceName::Simulated(name) => {
@@ -255,7 +262,8 @@ impl Session {
     }
 
     fn pace(&self) -> Pace {
-        let scripted = matches!(self.device, DeviceName::Script(_) | DeviceName::Simulated(_));
+        let scripted =
+            self.options.watch.is_none() && matches!(self.device, DeviceName::Script(_) | DeviceName::Simulated(_));
         let end_ms = self.options.duration.filter(|_| !scripted).map_or(f64::INFINITY, |s| 1e3 * s);
         Pace { tick_ms: self.tick_ms(), collision_ms: 1.0, end_ms }
     }
@@ -292,9 +300,10 @@ impl Session {
         About {
             program: self.program,
             case: self.case.clone(),
-            device: match &self.device {
-                DeviceName::Replay(_) => "replay".into(),
-                other => other.to_string(),
+            device: match (&self.device, &self.options.watch) {
+                (_, Some(_)) => "watch".into(),
+                (DeviceName::Replay(_), _) => "replay".into(),
+                (other, _) => other.to_string(),
             },
             solver: self.solver_name(),
             brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),

@@ -5,11 +5,15 @@
 //! session loses at most the last fifth of a second. A full disk ends the recording, never the session.
 
 use crate::run::clock::Clock;
+use crate::run::watch::Share;
 use crate::stages::notice::{Notice, What};
 use std::time::Duration;
 use trepan_link::queue::{Receiver, Sender, bounded};
 use trepan_link::wire::{CollisionRecord, EventRecord, SolverRecord, TickRecord};
 use trepan_link::{LinkError, Recorder};
+
+/// Where ticks go: into a file, and to who watches.
+pub type Kept = (Recorder, Option<Share>);
 
 const RING: usize = 8192;
 const FLUSH_MS: f64 = 200.0;
@@ -60,12 +64,12 @@ pub fn journal() -> (Pens, Journal) {
 
 impl Journal {
     /// Writes until every loop has dropped its pens and the rings are empty; then closes the recording.
-    pub fn write(mut self, mut recorder: Recorder, clock: Clock) -> Written {
+    pub fn write(mut self, mut recorder: Recorder, mut share: Option<Share>, clock: Clock) -> Written {
         let mut written = Written::default();
         let mut flushed_ms = 0.0;
         loop {
             let over = self.is_over();
-            if let Err(fault) = self.drain(&mut recorder, &mut written) {
+            if let Err(fault) = self.drain(&mut recorder, &mut share, &mut written) {
                 written.fault.get_or_insert(fault);
                 self.discard(&mut written);
             }
@@ -92,8 +96,14 @@ impl Journal {
         self.ticks.is_abandoned() && self.collisions.is_abandoned() && self.solver.is_abandoned()
     }
 
-    fn drain(&mut self, recorder: &mut Recorder, written: &mut Written) -> Result<(), LinkError> {
+    fn drain(
+        &mut self,
+        recorder: &mut Recorder,
+        share: &mut Option<Share>,
+        written: &mut Written,
+    ) -> Result<(), LinkError> {
         while let Some(record) = self.ticks.receive() {
+            share.take_if(|share| !share.tick(&record));
             recorder.tick(&record)?;
         }
         while let Some(record) = self.collisions.receive() {
@@ -106,7 +116,9 @@ impl Journal {
             written.notices.push(notice);
             say(&notice);
             let (kind, text) = notice.words();
-            recorder.event(&EventRecord { tick: notice.tick, time_ms: notice.time_ms, kind: kind.into(), text })?;
+            let record = EventRecord { tick: notice.tick, time_ms: notice.time_ms, kind: kind.into(), text };
+            share.take_if(|share| !share.event(&record));
+            recorder.event(&record)?;
         }
         Ok(())
     }

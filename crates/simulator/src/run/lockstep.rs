@@ -15,6 +15,7 @@
 //! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by how much.
 
 use crate::run::clock::Clock;
+use crate::run::journal::Kept;
 use crate::run::journal::{Journal, Pens, journal};
 use crate::run::stop::Stop;
 use crate::run::threads::outcome;
@@ -26,8 +27,8 @@ use std::thread;
 use trepan_contact::{NodalContact, SurfacePatch};
 use trepan_geometry::{Buttons, ToolState};
 use trepan_haptics::{Reading, Status};
+use trepan_link::Recording;
 use trepan_link::wire::{CollisionRecord, SolverRecord, TickRecord};
-use trepan_link::{Recorder, Recording};
 
 /// Tools and patches of this many past ticks are kept for collision steps that refer to them.
 const MEMORY: usize = 16_384;
@@ -36,7 +37,7 @@ const MEMORY: usize = 16_384;
 pub fn run(
     stages: Stages,
     recording: &Recording,
-    recorder: Recorder,
+    (recorder, share): Kept,
     start: ToolSample,
     paced: bool,
     stop: &Stop,
@@ -47,7 +48,7 @@ pub fn run(
     let (pens, pages) = journal();
     let eyes = Eyes { view: cells.view.1, soft: stages.tissue.is_some().then_some(cells.shown.1) };
     thread::scope(|scope| {
-        let writing = scope.spawn(move || Journal::write(pages, recorder, clock));
+        let writing = scope.spawn(move || Journal::write(pages, recorder, share, clock));
         let (mut view, mut shown) = (cells.view.0, cells.shown.0);
         let replaying = scope.spawn(move || {
             let mut again = Again::new(stages, recording, pens, start);

@@ -7,6 +7,7 @@ pub(crate) mod journal;
 pub mod lockstep;
 pub(crate) mod stop;
 pub mod threads;
+pub(crate) mod watch;
 
 use crate::run::journal::Written;
 use crate::stages::collision_step::{CollisionStage, SoftFrame};

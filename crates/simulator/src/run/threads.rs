@@ -13,6 +13,7 @@
 //! with it the force: also when a loop panics.
 
 use crate::run::clock::{Clock, Schedule};
+use crate::run::journal::Kept;
 use crate::run::journal::{Journal, Pens, journal};
 use crate::run::stop::Stop;
 use crate::run::{Cells, Eyes, Numbered, Outcome, SolverOutcome, Stages, Ticks, Times, View};
@@ -22,7 +23,6 @@ use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
 use trepan_contact::{GuardedWrench, NodalContact, SurfacePatch};
 use trepan_haptics::{HapticDevice, Status};
-use trepan_link::Recorder;
 use trepan_link::cell::{Reader, Writer};
 use trepan_link::queue::Sender;
 use trepan_link::wire::{CollisionRecord, SolverRecord, TickRecord};
@@ -47,7 +47,7 @@ const FADE_TICKS: u64 = 200;
 pub fn run(
     stages: Stages,
     device: Box<dyn HapticDevice>,
-    recorder: Recorder,
+    (recorder, share): Kept,
     start: ToolSample,
     pace: Pace,
     stop: &Stop,
@@ -60,7 +60,7 @@ pub fn run(
     let Stages { haptic, tissue } = stages;
     let eyes = Eyes { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1) };
     thread::scope(|scope| {
-        let writing = scope.spawn(move || Journal::write(pages, recorder, clock));
+        let writing = scope.spawn(move || Journal::write(pages, recorder, share, clock));
         let hand = Hand { device, stop: stop.clone() };
         let ends = HapticEnds { tool: cells.tool.0, view: cells.view.0, patch: cells.patch.1, ticks, notices };
         let feeling = scope.spawn(move || haptic_loop(haptic, hand, ends, clock, pace, stop));

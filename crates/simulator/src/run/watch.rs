@@ -1,0 +1,136 @@
+//! A second process that watches: the running session tells its ticks through shared memory, the watcher follows with its own scene.
+//!
+//! # Theory
+//! The watcher is an ordinary session whose device is the other session's: it reads where the trainee's hand is and runs its own
+//! bone, brain and picture. So a lost tick costs the watcher sharpness, nothing else, and nothing flows back.
+//!
+//! ```text
+//!  trainee: recording thread ──tick──> shared memory ──> watcher: pump thread → cell → haptic loop
+//! ```
+//!
+//! # Practice
+//! Telling costs the recording thread a few µs a tick; the haptic loop knows nothing of it. What was drilled before the watcher came is not
+//! seen. Three seconds of silence end the watching.
+//!
+//! # When not to use it
+//! Across machines: use iceoryx2's own tunnel between them.
+
+use crate::error::SessionError;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use trepan_contact::GuardedWrench;
+use trepan_geometry::{Buttons, ToolState, Vec3};
+use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
+use trepan_link::cell::{Reader, cell};
+use trepan_link::topics::{Publisher, Session, Subscriber, TopicError};
+use trepan_link::wire::{EventRecord, TickRecord};
+
+/// Silence after which a tick counts as old, ms.
+const STALE_MS: f64 = 100.0;
+/// Silence after which the other session counts as over, ms.
+const OVER_MS: f64 = 3000.0;
+/// Pause of the pump between two looks.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// The telling end, for the recording thread.
+pub struct Share {
+    ticks: Publisher<TickRecord>,
+    events: Publisher<EventRecord>,
+    _session: Session,
+}
+
+impl Share {
+    /// Tells under a name.
+    pub fn open(name: &str) -> Result<Self, SessionError> {
+        let open = || -> Result<Self, TopicError> {
+            let session = Session::join(name)?;
+            Ok(Self { ticks: session.publisher()?, events: session.publisher()?, _session: session })
+        };
+        open().map_err(|fault| SessionError::Usage(format!("--share {name}: {fault}")))
+    }
+
+    /// Tells a tick; false when nobody can be told any more.
+    pub fn tick(&mut self, record: &TickRecord) -> bool {
+        self.ticks.send(record).is_ok()
+    }
+
+    /// Tells an event; false when nobody can be told any more.
+    pub fn event(&mut self, record: &EventRecord) -> bool {
+        self.events.send(record).is_ok()
+    }
+}
+
+/// The watching end: another session's hand as a device.
+pub struct Watched {
+    newest: Reader<TickRecord>,
+    seen: u64,
+    heard_ms: Option<f64>,
+    tool: ToolState,
+    reads: u64,
+    open: Arc<AtomicBool>,
+}
+
+impl Watched {
+    /// Watches the session of a name; until it is heard, the tool waits at `start`.
+    pub fn open(name: &str, start: ToolState) -> Result<Self, SessionError> {
+        let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
+        let session = Session::join(name).map_err(fault)?;
+        let mut ticks: Subscriber<TickRecord> = session.subscriber().map_err(fault)?;
+        let (mut writer, newest) = cell(TickRecord::default());
+        let open = Arc::new(AtomicBool::new(true));
+        let pumping = Arc::clone(&open);
+        std::thread::spawn(move || {
+            let _session = session;
+            while pumping.load(Ordering::Relaxed) {
+                if let Ok(Some(record)) = ticks.newest() {
+                    writer.set(record);
+                }
+                std::thread::sleep(LOOK);
+            }
+        });
+        Ok(Self { newest, seen: 0, heard_ms: None, tool: start, reads: 0, open })
+    }
+}
+
+impl HapticDevice for Watched {
+    fn read(&mut self, time_ms: f64) -> Reading {
+        let (record, sequence) = self.newest.latest();
+        if sequence != self.seen {
+            self.seen = sequence;
+            self.heard_ms = Some(time_ms);
+            // A watcher that comes late asks for the tool that is already in the hand.
+            let next = if record.phase > 0 && self.reads.is_multiple_of(2) { Buttons::NEXT_TOOL.0 } else { 0 };
+            let buttons = Buttons(record.buttons | next);
+            self.tool = ToolState { world_from_tool: record.device, twist: record.twist, buttons, time_ms };
+        }
+        self.reads += 1;
+        self.tool.time_ms = time_ms;
+        let silent_ms = self.heard_ms.map_or(0.0, |heard| time_ms - heard);
+        let status = match silent_ms {
+            ms if ms > OVER_MS => Status::Finished,
+            ms if ms > STALE_MS => Status::Stale,
+            _ => Status::Fresh,
+        };
+        Reading { tool: self.tool, status }
+    }
+
+    fn apply(&mut self, _wrench: GuardedWrench) {}
+
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            name: "watch".into(),
+            peak_force_n: 0.0,
+            continuous_force_n: 0.0,
+            rate_hz: 1000.0,
+            workspace_mm: Vec3::INFINITY,
+            axes_driven: 0,
+            position_resolution_mm: 0.0,
+            delay_ticks: 0,
+        }
+    }
+
+    fn close(&mut self) {
+        self.open.store(false, Ordering::Relaxed);
+    }
+}
