@@ -17,13 +17,17 @@
 //! ```
 //!
 //! Projection on a convex set never lengthens a motion, so on flat or convex bone the force changes by no more than k times
-//! the hand's motion. Discs move continuously with the density, also while it is drilled away.
+//! the hand's motion. Discs move continuously with the density, also while it is drilled away; where bone gives way or an edge ends at
+//! once the proxy follows at `yield_mm_per_ms` over the hand's own speed.
+//!
+//! The ball that touches is a little smaller than the tool while a burr cuts (it sits in what it cuts), and where the tool is jammed: where
+//! nothing pushes against the pull of the hand but walls along it. It grows back into free space at once; where it must push itself off the
+//! bone for that, slowly, and only while growing by g moves it by no more than 2.4 g, which is true on a surface and false in a bore.
 //!
 //! # Practice
 //! World mm, f32. For a 3 mm ball in 0.5 mm voxels about 5 us a tick of touch, 40 when the discs are gathered anew, which drilling needs in
-//! each tick. Allocates in `new` only. Where constraints contradict (a slot
-//! narrower than the ball, a start inside bone) the proxy keeps the clearance that it has and gains more at `recover_mm_per_ms`.
-//! Steps past `max_moves` are left for the next tick. Both are counted as fallbacks.
+//! each tick. Allocates in `new` only. A ball that starts in bone keeps the clearance that it has and gains more at
+//! `recover_mm_per_ms`. Steps past `max_moves` are left for the next tick; that, and constraints that contradict, count as fallbacks.
 //!
 //! # Sources
 //! C. B. Zilles, J. K. Salisbury, IROS 1995; D. Ruspini, K. Kolarov, O. Khatib, *The haptic display of complex graphical environments*,
@@ -34,7 +38,8 @@
 //! For tools that are not balls. Where edges sharper than a voxel matter: discs stand out over them by up to
 //! `disc_voxels`.
 
-use crate::half_spaces::{HalfSpace, nearest};
+use crate::ball::{Ball, Limits};
+use crate::half_spaces::HalfSpace;
 use crate::removal::{Burr, Cut, Law};
 use crate::surface::{Disc, Discs};
 use crate::window::Window;
@@ -47,12 +52,16 @@ use trepan_volume::BoneVolume;
 const MAX_DISCS: usize = 8192;
 /// Most voxels that a burr bites at once.
 const MAX_BITES: usize = 16384;
-/// Proxy moves within one gathering.
-const MAX_SLIDES: usize = 12;
-/// A slide shorter than this many voxels is rest.
-const REST: f32 = 2e-4;
 /// Discs this close count as touched, voxels.
 const TOUCH: f32 = 0.05;
+/// Free space that a ball leaves around it when it grows, voxels: more than the unevenness of a bore.
+const MARGIN: f32 = 0.2;
+/// A smaller ball would come on by more than 1/JAM of what it is smaller: jammed. 0.4 is between walls less than 47 degrees apart.
+const JAM: f32 = 0.4;
+/// Growing may move a ball by so many times its growth.
+const PUSHED: f32 = 2.4;
+/// Way beyond that of the hand that rounding may need, mm.
+const ROUNDING_MM: f32 = 1e-4;
 
 /// How the method is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,8 +79,12 @@ pub struct Config {
     pub bite_voxels: f32,
     /// Overlap that a jammed ball may have, voxels: in a bore of its own width the unevenness of opposite walls would lock it.
     pub slop_voxels: f32,
-    /// How fast a ball that overlaps bone is let out, mm/ms.
+    /// How fast the ball sinks in when a burr starts to cut, and grows back, mm/ms. Times the stiffness it is a change of force.
+    pub fit_mm_per_ms: f32,
+    /// How fast a ball that is jammed, or has its centre in bone, is let out, mm/ms.
     pub recover_mm_per_ms: f32,
+    /// How much faster than the hand the proxy comes after it where bone gives way, mm/ms. Times the stiffness it is a change of force.
+    pub yield_mm_per_ms: f32,
     /// What a burr takes away.
     pub removal: Law,
 }
@@ -84,8 +97,10 @@ impl Config {
         ahead_voxels: 0.5,
         max_moves: 1024,
         bite_voxels: 0.15,
-        slop_voxels: 0.2,
+        slop_voxels: 0.3,
+        fit_mm_per_ms: 0.01,
         recover_mm_per_ms: 0.05,
+        yield_mm_per_ms: 0.03,
         removal: Law::RATE,
     };
 }
@@ -105,8 +120,16 @@ pub struct DistanceField {
     placed: bool,
     /// Whether the burr cuts in this tick.
     works: bool,
-    /// How deep the burr sits in the bone now, mm.
-    bite_mm: f32,
+    /// Radius of the ball that touches: up to the tool's, mm.
+    ball_mm: f32,
+    /// Whether only walls along the pull of the hand hold the proxy.
+    jammed: bool,
+    /// Where the hand was in the last tick, world mm.
+    hand: Vec3,
+    /// How far the proxy may still go in this tick, mm.
+    left_mm: f32,
+    /// Free space around the ball that is sure, from the last selection of discs: centre, grid; radius, voxels.
+    sure: (Vec3, f32),
     window: Window,
     known: Known,
     discs: Discs,
@@ -138,7 +161,11 @@ impl DistanceField {
             proxy: Pose::IDENTITY,
             placed: false,
             works: false,
-            bite_mm: 0.0,
+            ball_mm: tool.tip_radius_mm,
+            jammed: false,
+            hand: Vec3::ZERO,
+            left_mm: 0.0,
+            sure: (Vec3::ZERO, 0.0),
             window: Window::new(),
             known: Known::default(),
             discs: Discs::new(MAX_DISCS, config.disc_voxels),
@@ -148,44 +175,84 @@ impl DistanceField {
         }
     }
 
-    /// Radius of the ball that touches, mm.
-    fn radius_mm(&self) -> f32 {
-        self.tool.tip_radius_mm - self.bite_mm
+    /// How deep a burr at work sits in the bone, mm.
+    fn bite_mm(&self, bone: &BoneVolume) -> f32 {
+        let most = (self.config.bite_voxels * bone.spacing_mm()).min(0.5 * self.tool.tip_radius_mm);
+        if self.works { most } else { 0.0 }
     }
 
-    /// Lets the burr sink in while it works, at a rate that a hand does not feel as a jump. It grows back in free space only: in
-    /// its bore there is no room.
-    fn bite(&mut self, bone: &BoneVolume, dt_ms: f32) {
-        if self.works {
-            let depth = (self.config.bite_voxels * bone.spacing_mm()).min(0.5 * self.tool.tip_radius_mm);
-            let change = self.config.recover_mm_per_ms * dt_ms;
-            self.bite_mm += (depth - self.bite_mm).clamp(-change, change);
-        } else if self.near.is_empty() {
-            self.bite_mm = 0.0;
+    /// The ball at the proxy.
+    fn ball(&self, bone: &BoneVolume) -> Ball {
+        let inside = bone.is_bone(bone.voxel_of(self.proxy.translation));
+        Ball { radius: self.ball_mm / bone.spacing_mm(), inside }
+    }
+
+    /// Lets the ball become smaller where it works or is jammed, at a rate that a hand does not feel as a jump.
+    fn shrink(&mut self, bone: &BoneVolume, dt_ms: f32) {
+        let radius = self.tool.tip_radius_mm;
+        let (least, rate) = if self.jammed {
+            let slop = self.config.slop_voxels * bone.spacing_mm();
+            ((radius - slop).max(0.5 * radius), self.config.recover_mm_per_ms)
+        } else {
+            (radius - self.bite_mm(bone), self.config.fit_mm_per_ms)
+        };
+        if self.ball_mm > least {
+            self.ball_mm = least.max(self.ball_mm - rate * dt_ms);
         }
     }
 
-    /// Moves the proxy as near to `device` as the bone lets it.
-    fn follow(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) {
+    /// Lets the ball that rests grow back into free space, or by pushing itself off a surface.
+    fn grow(&mut self, bone: &BoneVolume, motion: Vec3, dt_ms: f32) {
+        let (spacing, full) = (bone.spacing_mm(), self.tool.tip_radius_mm - self.bite_mm(bone));
+        let base = self.discs.base.as_vec3();
+        let grid = bone.grid_of(self.proxy.translation);
+        let ball = self.ball(bone);
+        if self.ball_mm >= full && !ball.inside {
+            return;
+        }
+        let room = (self.sure.1 - grid.distance(self.sure.0)).min(ball.clearance(&self.near, grid - base));
+        self.ball_mm = self.ball_mm.max(full.min(spacing * (room - MARGIN)));
+        if self.jammed || self.proxy.translation == self.hand || self.ball_mm >= full && !ball.inside {
+            return;
+        }
+        let rate = if ball.inside { self.config.recover_mm_per_ms } else { self.config.fit_mm_per_ms };
+        let growth = rate * dt_ms / spacing;
+        let grown = Ball { radius: (self.ball_mm / spacing + growth).min(full / spacing), ..ball };
+        let (from, goal) = (grid - base, bone.grid_of(self.hand) - base);
+        let Some(to) = grown.settle(&self.near, &mut self.spaces, from, goal, growth) else { return };
+        let push = to - from;
+        let most = (PUSHED * growth).min(self.left_mm / spacing);
+        // A hand that draws the tool off is not overtaken.
+        if push.length() <= most && push.dot(motion) <= 0.0 {
+            self.ball_mm = grown.radius * spacing;
+            self.proxy.translation = bone.origin() + spacing * (to + base);
+        }
+    }
+
+    /// Moves the proxy as near to `device` as the bone lets it. Returns whether it got there within `max_moves`.
+    fn follow(&mut self, bone: &BoneVolume, device: Vec3, out: &mut RigidStep) -> bool {
         let margin = self.tool.tip_radius_mm + 2.0 * bone.spacing_mm();
         let way = Aabb::of_points(&[self.proxy.translation, device]).inflated(margin);
         if !way.overlaps(bone.bounds()) {
             self.proxy.translation = device;
+            self.ball_mm = self.tool.tip_radius_mm;
             self.near.clear();
             self.discs.forget();
+            self.sure = (bone.grid_of(device), f32::MAX);
             self.known = Known { fresh: false, clear: true, ..self.known };
-            return;
+            return true;
         }
         for _ in 0..self.config.max_moves {
-            if self.advance(bone, device, dt_ms, out) {
-                return;
+            if self.advance(bone, device, out) {
+                return true;
             }
         }
         out.fallbacks += 1;
+        false
     }
 
     /// One move within what is known of the surface. Returns whether the proxy has come to rest.
-    fn advance(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) -> bool {
+    fn advance(&mut self, bone: &BoneVolume, device: Vec3, out: &mut RigidStep) -> bool {
         let spacing = bone.spacing_mm();
         let start = bone.grid_of(self.proxy.translation);
         if !self.know(bone, start, out) {
@@ -193,16 +260,13 @@ impl DistanceField {
         }
         let base = self.discs.base.as_vec3();
         let (from, goal) = (start - base, bone.grid_of(device) - base);
-        let ball = Ball {
-            radius: self.radius_mm() / spacing,
-            slop: self.config.slop_voxels,
-            inside: bone.is_bone(bone.voxel_of(self.proxy.translation)),
-        };
-        let reach = self.config.move_voxels;
-        let clearance = ball.select(self.discs.list(), from, reach, &mut self.near);
-        self.known.clear = clearance > -0.5;
-        let recover = self.config.recover_mm_per_ms * dt_ms / spacing;
-        let slide = ball.slide(&self.near, &mut self.spaces, from, goal, reach, recover);
+        let (ball, reach, full) = (self.ball(bone), self.config.move_voxels, self.tool.tip_radius_mm / spacing);
+        let nearest = ball.select(self.discs.list(), from, full, reach, &mut self.near);
+        self.sure = (start, full + reach);
+        self.known.clear = nearest > full - 0.5;
+        let limits = Limits { reach, way: self.left_mm / spacing };
+        let slide = ball.slide(&self.near, &mut self.spaces, from, goal, limits);
+        self.left_mm = (self.left_mm - slide.way * spacing).max(0.0);
         out.fallbacks += u32::from(slide.contradiction);
         if slide.to == goal {
             self.proxy.translation = device;
@@ -235,25 +299,29 @@ impl DistanceField {
     }
 
     /// Fills the manifold from where proxy and device are.
-    fn report(&self, bone: &BoneVolume, device: Vec3, out: &mut RigidStep) {
+    fn report(&mut self, bone: &BoneVolume, device: Vec3, out: &mut RigidStep) {
+        self.jammed = false;
         let lifted = self.proxy.translation - device;
         let depth = lifted.length();
         if depth == 0.0 {
             return;
         }
-        let (spacing, radius) = (bone.spacing_mm(), self.radius_mm());
+        let (spacing, radius) = (bone.spacing_mm(), self.ball_mm);
         let base = self.discs.base.as_vec3();
         let centre = bone.grid_of(self.proxy.translation) - base;
-        let ball = Ball { radius: radius / spacing, slop: self.config.slop_voxels, inside: false };
+        let ball = Ball { radius: radius / spacing, inside: false };
+        let mut against = f32::MIN;
         for disc in &self.near {
             let near = ball.nearest(disc, centre);
             if near.distance < ball.radius + TOUCH {
                 let point = bone.origin() + spacing * (centre + base - near.direction * near.distance);
                 let deep = radius - (device - point).dot(near.direction);
                 out.points_in_contact += 1;
+                against = against.max(near.direction.dot(lifted) / depth);
                 out.manifold.push(Contact { point, normal: near.direction, depth_mm: deep.max(0.0) });
             }
         }
+        self.jammed = out.points_in_contact > 0 && against < JAM;
         out.voxels_in_contact = out.points_in_contact.min(self.discs.voxels);
         out.manifold.normal = lifted / depth;
         out.manifold.depth_mm = depth;
@@ -275,12 +343,18 @@ impl RigidContact for DistanceField {
         }
         self.proxy.rotation = tool.world_from_tool.rotation;
         self.works = drilling && self.tool.kind == ToolKind::Burr;
-        self.bite(bone, dt_ms);
-        self.follow(bone, device, dt_ms, out);
+        self.left_mm += device.distance(self.hand) + self.config.yield_mm_per_ms * dt_ms + ROUNDING_MM;
+        let motion = device - self.hand;
+        self.hand = device;
+        self.shrink(bone, dt_ms);
+        if self.follow(bone, device, out) {
+            self.grow(bone, motion, dt_ms);
+            self.left_mm = 0.0;
+        }
         self.report(bone, device, out);
         if self.works {
             let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
-            let depth_mm = device.distance(proxy) + self.bite_mm;
+            let depth_mm = device.distance(proxy) + (radius_mm - self.ball_mm).min(self.bite_mm(bone));
             let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms };
             if self.discs.list().is_empty() {
                 return;
@@ -300,124 +374,12 @@ impl RigidContact for DistanceField {
     fn reset(&mut self, pose: Pose) {
         self.proxy = pose;
         self.placed = pose.translation.is_finite();
-        self.bite_mm = 0.0;
+        (self.ball_mm, self.jammed) = (self.tool.tip_radius_mm, false);
+        (self.hand, self.left_mm) = (pose.translation, 0.0);
         self.known = Known::default();
         self.window.forget();
         self.discs.forget();
         self.near.clear();
         self.burr.reset();
     }
-}
-
-/// A ball among discs; all lengths in voxels, in the discs' frame.
-struct Ball {
-    radius: f32,
-    slop: f32,
-    /// Whether its centre is in bone: then a disc pushes along its own normal, which is the way out.
-    inside: bool,
-}
-
-/// Where a ball sees a disc.
-struct Near {
-    /// Distance from the disc to the centre; negative behind it when the centre is in bone.
-    distance: f32,
-    /// Unit vector from the disc to the centre.
-    direction: Vec3,
-}
-
-/// How a ball has moved.
-struct Slide {
-    to: Vec3,
-    /// Whether it came to rest, not just to the end of what is known.
-    rests: bool,
-    /// Whether the constraints contradicted each other.
-    contradiction: bool,
-}
-
-impl Ball {
-    fn nearest(&self, disc: &Disc, centre: Vec3) -> Near {
-        let from_disc = centre - disc.centre;
-        let height = from_disc.dot(disc.normal);
-        if self.inside {
-            return Near { distance: height, direction: disc.normal };
-        }
-        let sideways = from_disc - height * disc.normal;
-        let off = sideways.length();
-        let rim = from_disc - sideways * (disc.radius / off.max(disc.radius));
-        let distance = rim.length();
-        let direction = if distance > 1e-6 { rim / distance } else { disc.normal };
-        Near { distance, direction }
-    }
-
-    /// Copies those discs to `near` that are within `reach` of the ball at `centre`. Returns the smallest clearance.
-    fn select(&self, discs: &[Disc], centre: Vec3, reach: f32, near: &mut Vec<Disc>) -> f32 {
-        near.clear();
-        let mut clearance = f32::MAX;
-        for disc in discs {
-            // Cheaper than the disc's own distance and never greater.
-            if disc.centre.distance(centre) - disc.radius <= self.radius + reach {
-                let clear = self.nearest(disc, centre).distance - self.radius;
-                clearance = clearance.min(clear);
-                if clear <= reach {
-                    near.push(*disc);
-                }
-            }
-        }
-        clearance
-    }
-
-    /// The half-spaces that keep the ball at `centre` clear of the discs by `radius`. One that is not clear may stay as it is and must
-    /// gain `recover`.
-    fn constrain(&self, discs: &[Disc], centre: Vec3, radius: f32, recover: f32, spaces: &mut Vec<HalfSpace>) {
-        spaces.clear();
-        for disc in discs {
-            let near = self.nearest(disc, centre);
-            let clear = radius.min(near.distance + recover);
-            spaces
-                .push(HalfSpace { normal: near.direction, offset: near.direction.dot(centre) - near.distance + clear });
-        }
-    }
-
-    /// Slides from `from` towards `goal`, no further than `reach`.
-    fn slide(
-        &self,
-        discs: &[Disc],
-        spaces: &mut Vec<HalfSpace>,
-        from: Vec3,
-        goal: Vec3,
-        reach: f32,
-        recover: f32,
-    ) -> Slide {
-        let mut slide = Slide { to: from, rests: false, contradiction: false };
-        for _ in 0..MAX_SLIDES {
-            let at = slide.to;
-            self.constrain(discs, at, self.radius, recover, spaces);
-            let target = nearest(goal, spaces).or_else(|| {
-                slide.contradiction = true;
-                self.constrain(discs, at, self.radius - self.slop, 0.0, spaces);
-                nearest(goal, spaces)
-            });
-            let way = target.unwrap_or(at) - at;
-            let share = share_within(at - from, way, reach);
-            slide.to = if share == 1.0 { target.unwrap_or(at) } else { at + share * way };
-            if share < 1.0 {
-                return slide;
-            }
-            if way.length() < REST {
-                break;
-            }
-        }
-        slide.rests = true;
-        slide
-    }
-}
-
-/// The largest share t ≤ 1 of `way` with `|offset + t way| ≤ reach`.
-fn share_within(offset: Vec3, way: Vec3, reach: f32) -> f32 {
-    let (a, b, c) = (way.length_squared(), offset.dot(way), offset.length_squared() - reach * reach);
-    if (offset + way).length_squared() <= reach * reach || a == 0.0 {
-        return 1.0;
-    }
-    let root = (b * b - a * c).max(0.0).sqrt();
-    ((root - b) / a).clamp(0.0, 1.0)
 }

@@ -42,6 +42,7 @@
 #[doc = include_str!("../README.md")]
 mod readme {}
 
+mod ball;
 pub mod brute;
 pub mod distance_field;
 mod half_spaces;

@@ -1,0 +1,191 @@
+//! A ball that slides among discs towards a goal.
+//!
+//! # Theory
+//! Each disc gives a half-space that the ball's centre must stay in: at its radius from the disc, or where the ball overlaps the disc
+//! already, no nearer than it is. The centre is therefore always allowed to stay, and since the projection of the goal on a
+//! convex set that holds the centre is never further from the goal than the centre, no slide leads away from the goal.
+//!
+//! ```text
+//! g·c ≥ g·y + min(ρ, d + push)      d: distance now, ρ: radius, push: what an overlap must lose
+//! ```
+//!
+//! # Practice
+//! All lengths are voxels, in the discs' frame.
+
+use crate::half_spaces::{HalfSpace, nearest};
+use crate::surface::Disc;
+use trepan_geometry::Vec3;
+
+/// Moves within one set of discs.
+const MAX_SLIDES: usize = 12;
+/// A slide shorter than this is rest.
+const REST: f32 = 2e-4;
+/// Overlap that each slide takes back: more than rounding brings in.
+const PUSH: f32 = 2e-4;
+
+/// A ball among discs.
+pub(crate) struct Ball {
+    /// Radius that touches.
+    pub radius: f32,
+    /// Whether its centre is in bone: then a disc pushes along its own normal, which is the way out.
+    pub inside: bool,
+}
+
+/// Where a ball sees a disc.
+pub(crate) struct Near {
+    /// Distance from the disc to the centre; negative behind it when the centre is in bone.
+    pub distance: f32,
+    /// Unit vector from the disc to the centre.
+    pub direction: Vec3,
+}
+
+/// How far a ball may go.
+#[derive(Clone, Copy)]
+pub(crate) struct Limits {
+    /// From the start, as far as the discs are known.
+    pub reach: f32,
+    /// Along the way.
+    pub way: f32,
+}
+
+/// How a ball has moved.
+pub(crate) struct Slide {
+    /// Where it is.
+    pub to: Vec3,
+    /// Length of its way.
+    pub way: f32,
+    /// Whether it came to rest, not just to the end of what is known.
+    pub rests: bool,
+    /// Whether there was no place to go.
+    pub contradiction: bool,
+}
+
+impl Ball {
+    /// The disc as the ball at `centre` sees it.
+    pub fn nearest(&self, disc: &Disc, centre: Vec3) -> Near {
+        let from_disc = centre - disc.centre;
+        let height = from_disc.dot(disc.normal);
+        if self.inside {
+            return Near { distance: height, direction: disc.normal };
+        }
+        let sideways = from_disc - height * disc.normal;
+        let off = sideways.length();
+        let rim = from_disc - sideways * (disc.radius / off.max(disc.radius));
+        let distance = rim.length();
+        let direction = if distance > 1e-6 { rim / distance } else { disc.normal };
+        Near { distance, direction }
+    }
+
+    /// Copies those discs to `near` that a ball of radius `most` at `centre` has within `reach`. Returns the smallest distance.
+    pub fn select(&self, discs: &[Disc], centre: Vec3, most: f32, reach: f32, near: &mut Vec<Disc>) -> f32 {
+        near.clear();
+        let mut smallest = f32::MAX;
+        for disc in discs {
+            // Cheaper than the disc's own distance and never greater.
+            if disc.centre.distance(centre) - disc.radius <= most + reach {
+                let distance = self.nearest(disc, centre).distance;
+                smallest = smallest.min(distance);
+                if distance <= most + reach {
+                    near.push(*disc);
+                }
+            }
+        }
+        smallest
+    }
+
+    /// Distance of the nearest disc.
+    pub fn clearance(&self, discs: &[Disc], centre: Vec3) -> f32 {
+        discs.iter().map(|disc| self.nearest(disc, centre).distance).fold(f32::MAX, f32::min)
+    }
+
+    /// Where the ball at `centre` is nearest to `goal`, when overlaps must lose `push`; `None` when that is nowhere.
+    pub fn settle(
+        &self,
+        discs: &[Disc],
+        spaces: &mut Vec<HalfSpace>,
+        centre: Vec3,
+        goal: Vec3,
+        push: f32,
+    ) -> Option<Vec3> {
+        spaces.clear();
+        for disc in discs {
+            let near = self.nearest(disc, centre);
+            let clear = self.radius.min(near.distance + push);
+            spaces
+                .push(HalfSpace { normal: near.direction, offset: near.direction.dot(centre) - near.distance + clear });
+        }
+        nearest(goal, spaces)
+    }
+
+    /// Slides from `from` towards `goal`, no further than `limits`.
+    pub fn slide(&self, discs: &[Disc], spaces: &mut Vec<HalfSpace>, from: Vec3, goal: Vec3, limits: Limits) -> Slide {
+        let mut slide = Slide { to: from, way: 0.0, rests: false, contradiction: false };
+        for _ in 0..MAX_SLIDES {
+            let at = slide.to;
+            let no_further = |target: &Vec3| target.distance(goal) <= at.distance(goal) + 4.0 * PUSH;
+            // Between walls even the least push would lever the ball away; without, it has room where it is.
+            let target = self
+                .settle(discs, spaces, at, goal, PUSH)
+                .filter(no_further)
+                .or_else(|| self.settle(discs, spaces, at, goal, -PUSH));
+            slide.contradiction |= target.is_none();
+            let Some(target) = target else { break };
+            let (way, left) = (target - at, limits.way - slide.way);
+            let length = way.length();
+            let share = share_within(at - from, way, limits.reach);
+            let spent = length * share >= left;
+            let share = if spent { left / length.max(1e-12) } else { share };
+            slide.to = if share == 1.0 { target } else { at + share * way };
+            slide.way += share * length;
+            if spent || length < REST {
+                break;
+            }
+            if share < 1.0 {
+                return slide;
+            }
+        }
+        slide.rests = true;
+        slide
+    }
+}
+
+/// The largest share t ≤ 1 of `way` with `|offset + t way| ≤ reach`.
+fn share_within(offset: Vec3, way: Vec3, reach: f32) -> f32 {
+    let (a, b, c) = (way.length_squared(), offset.dot(way), offset.length_squared() - reach * reach);
+    if (offset + way).length_squared() <= reach * reach || a == 0.0 {
+        return 1.0;
+    }
+    let root = (b * b - a * c).max(0.0).sqrt();
+    ((root - b) / a).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn unit(v: [f32; 3]) -> Vec3 {
+        Vec3::from(v).normalize_or(Vec3::Z)
+    }
+
+    proptest! {
+        #[test]
+        fn no_slide_leads_away_from_its_goal(
+            discs in prop::collection::vec((prop::array::uniform3(-4.0f32..4.0), prop::array::uniform3(-1.0f32..1.0)), 1..40),
+            goal in prop::array::uniform3(-3.0f32..3.0), radius in 0.5f32..4.0, way in 0.0f32..1.0,
+        ) {
+            let discs: Vec<Disc> =
+                discs.into_iter().map(|(c, n)| Disc { centre: Vec3::from(c), normal: unit(n), radius: 0.8 }).collect();
+            let (ball, goal) = (Ball { radius, inside: false }, Vec3::from(goal));
+            // Discs through the centre have no side.
+            prop_assume!(ball.clearance(&discs, Vec3::ZERO) > 0.1);
+            let slide = ball.slide(&discs, &mut Vec::new(), Vec3::ZERO, goal, Limits { reach: 0.5, way });
+            prop_assert!(slide.to.distance(goal) <= goal.length() + 0.011, "{} > {}", slide.to.distance(goal), goal.length());
+            prop_assert!(slide.way <= way + 1e-5 && slide.to.length() <= 0.5 + 1e-4);
+            for disc in &discs {
+                let (was, is) = (ball.nearest(disc, Vec3::ZERO).distance, ball.nearest(disc, slide.to).distance);
+                prop_assert!(is >= was.min(radius) - 0.01, "{is} < {was}, radius {radius}");
+            }
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! A burr in its own bore: drilled in, the pedal let go, and drawn straight out.
+
+mod common;
+use common::{ISO, directions};
+use trepan_geometry::{Pose, Tool, ToolState, Vec3};
+use trepan_rigid::{Method, RigidStep};
+use trepan_volume::{BoneVolume, VoxelVolume};
+
+const STIFFNESS: f32 = 2.0;
+const BONE_MM: f32 = 6.0;
+const RADIUS_MM: f32 = 3.0;
+
+/// A skull bone as a CT of 1 mm voxels shows it: hard tables 1.5 mm thick, a light and uneven middle, all blurred by the scanner.
+fn skull(inward: Vec3) -> BoneVolume {
+    const N: usize = 40;
+    let origin = Vec3::splat(-0.5 * (N as f32 - 1.0)) + Vec3::new(0.21, -0.37, 0.13);
+    let mut ct = VoxelVolume::isotropic([N; 3], origin, 1.0, 0i16);
+    let edge = |depth: f32, at: f32| 1.0 / (1.0 + (-(depth - at) / 0.35).exp());
+    for at in 0..ct.data.len() {
+        let p = ct.centre_of([at % N, at / N % N, at / (N * N)]).as_vec3();
+        let depth = p.dot(inward);
+        let solid = edge(depth, 0.0) - edge(depth, BONE_MM);
+        let middle = edge(depth, 1.5) - edge(depth, BONE_MM - 1.5);
+        let grain = 120.0 * ((1.9 * p.x + 0.7 * p.y).sin() + (1.3 * p.z - 2.1 * p.y).cos());
+        ct.data[at] = (-50.0 + solid * 1700.0 - middle * (700.0 + grain)) as i16;
+    }
+    BoneVolume::new(&ct, ISO).expect("there is bone")
+}
+
+/// From 0 to 1 with the smooth speed of a reaching hand: at most 15/8 of the mean.
+fn reach(t: f32) -> f32 {
+    t * t * t * (10.0 + t * (6.0 * t - 15.0))
+}
+
+/// The hand's depth along the bore, mm, and whether the pedal is down.
+fn hand(tick: usize, deepest: f32) -> Option<(f32, bool)> {
+    const DRILL: usize = 6000;
+    const CLEAN: usize = 280;
+    const RETREAT: usize = 2900;
+    let way_out = 43.0 + deepest;
+    match tick {
+        0..DRILL => Some((-4.0 + (deepest + 4.0) * reach(tick as f32 / DRILL as f32), true)),
+        _ if tick < DRILL + CLEAN => Some((deepest, true)),
+        _ if tick < DRILL + CLEAN + RETREAT => {
+            Some((deepest - way_out * reach((tick - DRILL - CLEAN) as f32 / RETREAT as f32), false))
+        }
+        _ => None,
+    }
+}
+
+#[derive(Default, Debug)]
+struct Worst {
+    /// Change of force in a tick while drilling, and afterwards, N.
+    drilling: f32,
+    after: f32,
+    /// How far the proxy came to be ahead of a hand on its way out, mm.
+    ahead: f32,
+    /// Force that holds the hand back on its way out, N.
+    drag: f32,
+    deepest: f32,
+}
+
+fn operate(inward: Vec3, deepest: f32) -> Worst {
+    let bone = skull(inward);
+    let mut contact = Method::RECOMMENDED.build(&Tool::burr(RADIUS_MM));
+    let mut out = RigidStep::default();
+    let (mut worst, mut last, mut lead) = (Worst::default(), Vec3::ZERO, f32::MAX);
+    contact.reset(Pose::from_translation(-4.0 * inward));
+    for tick in 0.. {
+        let Some((depth, pedal)) = hand(tick, deepest) else { break };
+        let device = depth * inward;
+        contact.step(&bone, &ToolState::at(Pose::from_translation(device)), pedal, 1.0, &mut out);
+        let force = STIFFNESS * out.manifold.depth_mm * out.manifold.normal;
+        let change = force.distance(last);
+        last = force;
+        worst.deepest = worst.deepest.max(contact.proxy().translation.dot(inward));
+        if pedal {
+            worst.drilling = worst.drilling.max(change);
+            continue;
+        }
+        worst.after = worst.after.max(change);
+        // A hand that presses starts behind the proxy; from there the lead may only shrink.
+        let now = (device - contact.proxy().translation).dot(inward).max(0.0);
+        worst.ahead = worst.ahead.max(now - lead);
+        lead = lead.min(now);
+        worst.drag = worst.drag.max(force.dot(inward));
+    }
+    worst
+}
+
+#[test]
+fn letting_the_pedal_go_and_drawing_the_burr_out_of_its_bore_is_smooth() {
+    let mut axes = directions(5);
+    axes.extend([Vec3::NEG_Z, Vec3::new(-0.36, -0.48, -0.8)]);
+    for inward in axes {
+        for deepest in [2.5, 6.75] {
+            let worst = operate(inward, deepest);
+            println!("inward {inward} to {deepest}: {worst:?}");
+            assert!(worst.after <= 0.1, "inward {inward} to {deepest} mm: {worst:?}");
+            assert!(worst.ahead <= 0.02, "inward {inward} to {deepest} mm: {worst:?}");
+            assert!(worst.drag <= 0.5, "inward {inward} to {deepest} mm: {worst:?}");
+            assert!(worst.deepest > deepest - 0.05, "inward {inward} to {deepest} mm: {worst:?}");
+            assert!(worst.drilling <= 0.1, "inward {inward} to {deepest} mm: {worst:?}");
+        }
+    }
+}
