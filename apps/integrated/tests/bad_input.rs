@@ -145,5 +145,6 @@ fn names_that_nobody_knows() {
     bench.refuses(&["--solver", "magic"], &["magic", "tled"]);
     bench.refuses(&["--duration", "-3"], &["duration"]);
     bench.refuses(&["--ct", "only.nii"], &["--mri"]);
+    bench.refuses(&["--record", "no/such/folder/x.mcap"], &["no/such/folder"]);
     bench.refuses(&["--case", "no-such-case"], &["no-such-case", "case build"]);
 }

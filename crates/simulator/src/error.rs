@@ -37,7 +37,7 @@ impl SessionError {
     /// 2 for what the user can put right, 1 for the rest.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Output { .. } | Self::Internal(_) => 1,
+            Self::Internal(_) => 1,
             _ => 2,
         }
     }

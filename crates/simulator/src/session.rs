@@ -66,6 +66,7 @@ impl Session {
         if !windowed && !options.headless {
             tracing::info!("no display here: running the scripted operation headless");
         }
+        places(&options)?;
         let device = device_name(program, &options, windowed)?;
         let rigid = rigid_method(&options)?;
         solver_named(&options)?;
@@ -340,6 +341,18 @@ struct Graphics {
 }
 
 const TLED: &str = "tled";
+
+/// Refuses places that cannot be written to before anything is loaded.
+fn places(options: &Options) -> Result<(), SessionError> {
+    if let Some(out) = options.out.as_deref().filter(|out| out.exists() && !out.is_dir()) {
+        return Err(SessionError::Usage(format!("--out {} is a file: name a folder, new or old", out.display())));
+    }
+    let folder = options.record.as_deref().and_then(Path::parent).filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        return Err(SessionError::Usage(format!("--record: there is no folder {}; make it first", folder.display())));
+    }
+    Ok(())
+}
 
 /// Makes a case folder; returns the case's name.
 pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inputs) -> Result<String, SessionError> {
