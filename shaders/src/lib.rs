@@ -1,7 +1,8 @@
 //! Trepan's WGSL shaders as strings: one file per pass, named like the Rust file that runs it.
 //!
 //! # Practice
-//! Passes of the picture start with the text of `scene.wgsl`, which declares what all of them know at binding 0.
+//! Passes of the picture start with the text of `scene.wgsl`, those of a soft-tissue step with `step.wgsl`, which declare what all of them
+//! know at binding 0.
 //! Every entry is checked by naga when its pipeline is made; there is nothing to build and no path to find at run time.
 
 /// The text of `scene.wgsl` before some others.
@@ -25,3 +26,17 @@ pub const RENDER_CONTOUR: &str = picture!("contour.wgsl");
 pub const RENDER_ENLARGE: &str = picture!("enlarge.wgsl");
 /// The brain cut by a slice, as places at rest.
 pub const RENDER_SECTION: &str = picture!("section.wgsl");
+
+/// The text of `step.wgsl` before a pass of a soft-tissue step.
+macro_rules! tled {
+    ($file:literal) => {
+        concat!(include_str!("../tled/step.wgsl"), "\n", include_str!(concat!("../tled/", $file)))
+    };
+}
+
+/// Forces of every tetrahedron on its nodes.
+pub const TLED_FORCES: &str = tled!("forces.wgsl");
+/// The tool's spring on the tissue.
+pub const TLED_PRESS: &str = tled!("press.wgsl");
+/// What nodes gather of the forces, and their motion.
+pub const TLED_UPDATE: &str = tled!("update.wgsl");

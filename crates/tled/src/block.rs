@@ -88,9 +88,7 @@ impl<const K: usize> Block<K> {
         }
         let constants = M::constants(&material.law(), shape.volume_mm3);
         self.constants.iter_mut().zip(constants).for_each(|(row, constant)| row[lane] = constant);
-        let rest = deformation(&[[0.0; 3]; 3], &[[0.0; 3]; 3]);
-        let at_rest = stiffness(&M::stress(&constants, &rest), M::moduli(&constants), &rest);
-        self.omega2[lane] = (element_omega2(shape, material) / f64::from(at_rest)) as f32;
+        self.omega2[lane] = omega2_over_stiffness::<M, K>(shape, material, &constants);
         self.quarter_volume[lane] = (0.25 * shape.volume_mm3) as f32;
         for corner in 0..4 {
             self.nodes[corner][lane] = nodes[corner];
@@ -120,6 +118,17 @@ impl<const K: usize> Block<K> {
         let from = part * L::LANES;
         L::scatter(xyzw, slots, &self.slots[corner][from..from + L::LANES]);
     }
+}
+
+/// ω² of an element over its stiffness, both at rest; times its stiffness at present it is its ω² at present.
+pub(crate) fn omega2_over_stiffness<M: Constitutive<K>, const K: usize>(
+    shape: &Shape,
+    material: &Material,
+    constants: &[f32; K],
+) -> f32 {
+    let rest = deformation(&[[0.0; 3]; 3], &[[0.0; 3]; 3]);
+    let at_rest = stiffness(&M::stress(constants, &rest), M::moduli(constants), &rest);
+    (element_omega2(shape, material) / f64::from(at_rest)) as f32
 }
 
 impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, K, T> {

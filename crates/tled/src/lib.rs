@@ -38,6 +38,8 @@ mod contact;
 mod damping;
 mod element;
 mod elements;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod kernel;
 mod lane;
 mod law;

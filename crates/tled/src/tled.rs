@@ -25,11 +25,11 @@ pub struct Tled {
 }
 
 /// Share of the present bound that a substep may use.
-const BORNE: f32 = 0.95;
+pub(crate) const BORNE: f32 = 0.95;
 /// Keeps rounding from adding a substep.
-const NEARLY: f32 = 1.0 - 1e-5;
+pub(crate) const NEARLY: f32 = 1.0 - 1e-5;
 /// Most that the frequency of the stiffest element is taken to grow by; a state worse than that is on its way to be healed.
-const MOST_GAINED: f32 = 64.0;
+pub(crate) const MOST_GAINED: f32 = 64.0;
 
 impl Tled {
     /// Takes a body at rest: orders it for the cache, precomputes gradients, finds the stable step and the damping.
@@ -160,7 +160,7 @@ impl SoftSolver for Tled {
 }
 
 /// α = 2 ω₁ is critical. A body that is not held has no lowest mode by its supports: its slowest shear wave stands in.
-fn damping_rate(body: &Body, damping: Damping, extent_mm: f32) -> f32 {
+pub(crate) fn damping_rate(body: &Body, damping: Damping, extent_mm: f32) -> f32 {
     match damping {
         Damping::None => 0.0,
         Damping::Rate(rate) => rate,

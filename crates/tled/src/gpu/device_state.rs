@@ -1,0 +1,64 @@
+//! What the device keeps between steps: the nodes' state and the numbers of the step, as `step.wgsl` declares them.
+
+use crate::layout::Layout;
+use trepan_gpu::{Buffer, Gpu, GpuError};
+use trepan_soft::Body;
+
+/// The uniform of every pass; the fields stand in the order of `step.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Step {
+    pub gravity: [f32; 3],
+    pub dt: f32,
+    pub normal: [f32; 3],
+    pub keep: f32,
+    pub gain: f32,
+    pub max_speed: f32,
+    pub max_displacement: f32,
+    pub stiffness: f32,
+    pub damping: f32,
+    pub rest_depth: f32,
+    pub tool_velocity: f32,
+    pub pressed: u32,
+    pub elements: u32,
+    pub nodes: u32,
+    pub unused: [u32; 2],
+}
+
+/// Buffers that several passes share.
+pub(crate) struct DeviceState {
+    pub step: Buffer<Step>,
+    /// Displacements by place, mm.
+    pub u: Buffer<[f32; 4]>,
+    /// Velocities by place, mm/ms.
+    pub v: Buffer<[f32; 4]>,
+    /// 1/m, 1/g, and the share of the tool's pressure, by place.
+    pub nodes: Buffer<[f32; 2]>,
+    /// By place, since it was cleared: inverted elements, times limited, times not finite, bits of the largest ω².
+    pub noticed: Buffer<[u32; 4]>,
+    /// 1/m by place on this side.
+    pub inverse_mass: Vec<f32>,
+}
+
+impl DeviceState {
+    pub fn new(gpu: &Gpu, body: &Body, layout: &Layout) -> Result<Self, GpuError> {
+        let (masses, fixed) = (body.lumped_masses_g(), body.fixed_mask());
+        let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };
+        let inverse_mass: Vec<f32> = layout.node_at.iter().map(inverse).collect();
+        let nodes: Vec<[f32; 2]> = inverse_mass.iter().map(|&m| [m, 0.0]).collect();
+        Ok(Self {
+            step: Buffer::zeroed(gpu, "step", 1)?,
+            u: Buffer::zeroed(gpu, "u", nodes.len())?,
+            v: Buffer::zeroed(gpu, "v", nodes.len())?,
+            noticed: Buffer::zeroed(gpu, "noticed", nodes.len())?,
+            nodes: Buffer::from_slice(gpu, "nodes", &nodes)?,
+            inverse_mass,
+        })
+    }
+
+    /// Gives a node its share of the tool's pressure.
+    pub fn weigh(&mut self, gpu: &Gpu, place: u32, weight: f32) {
+        let place = place as usize;
+        self.nodes.write(gpu, place, &[[self.inverse_mass[place], weight]]);
+    }
+}

@@ -1,0 +1,318 @@
+//! TLED on the graphics device: the same step as three compute passes, many steps to a submission.
+//!
+//! # Theory
+//! ```text
+//! forces   elements ──▶ slots, one a corner, sorted by node
+//! press    touched nodes ──▶ pressure of the tool's spring       (only where the tool touches)
+//! update   slots ──▶ node, in their order; v⁺, u⁺
+//! ```
+//! No atomics and no order that depends on timing: the same input gives the same bytes on the same device. Against the processor's solver
+//! the difference is that of rounding, since drivers may fuse a multiplication and an addition.
+//!
+//! # Practice
+//! [`GpuTled::steps`] only submits; [`GpuTled::read`] waits and copies the state back. On this side of the bus the stable step is checked
+//! against the present deformation at every [`read`](GpuTled::read), not at every step, so read at least every few ms of simulated time.
+//! [`SoftSolver::step`] submits and reads back at once: right, but it waits for the device, so it is no choice for a fast loop.
+//!
+//! ```no_run
+//! use trepan_gpu::{Gpu, Prefer};
+//! use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+//! use trepan_tled::{Config, gpu::GpuTled};
+//!
+//! let mesh = boxes::split_box([8, 8, 8], trepan_geometry::Vec3::splat(80.0));
+//! let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
+//! let gpu = Gpu::open(Prefer::Hardware)?;
+//! let mut tled = GpuTled::new(&gpu, &Body { mesh, fixed, material: Material::BRAIN }, &Config::default())?;
+//! tled.steps(&Loads { gravity: trepan_geometry::Vec3::NEG_Z * 9.81e-3, ..Loads::default() }, 30);
+//! tled.read()?;
+//! println!("{}", tled.positions()[0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # When not to use it
+//! Small meshes (the processor needs 0.3 ms for 22 thousand tetrahedra), other laws than neo-Hookean, the locking cure, relaxation, and bodies
+//! without supports that are damped: these are refused with the field's name, and [`Tled`](crate::Tled) has them.
+
+mod device_state;
+mod forces;
+mod press;
+mod update;
+
+use crate::config::Config;
+use crate::contact::stable_share;
+use crate::layout::Layout;
+use crate::tled::{BORNE, MOST_GAINED, NEARLY, damping_rate};
+use device_state::{DeviceState, Step};
+use forces::Forces;
+use press::Press;
+use trepan_contact::NodalContact;
+use trepan_geometry::Vec3;
+use trepan_gpu::{Gpu, GpuError};
+use trepan_soft::{Body, BodyError, Law, Loads, SoftSolver, StepReport, power_bound_ms};
+use update::Update;
+
+/// Threads in a workgroup, as in the shaders.
+pub(crate) const LANES: u32 = 64;
+/// Most steps in one submission; more are cut, so that no driver takes them for a hang.
+const STEPS_AT_ONCE: u32 = 256;
+
+/// Why a body does not run on the device.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GpuTledError {
+    /// The body or the settings make no sense on any solver.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// The device is missing, too small or gone.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The device's kernels do not have this; the processor's solver does.
+    #[error("{field}: the device has only {right}; use trepan_tled::Tled")]
+    Unsupported {
+        /// The field.
+        field: &'static str,
+        /// What would be right.
+        right: &'static str,
+    },
+}
+
+/// Total Lagrangian explicit solver of one body on the graphics device.
+pub struct GpuTled {
+    gpu: Gpu,
+    config: Config,
+    state: DeviceState,
+    forces: Forces,
+    press: Press,
+    update: Update,
+    layout: Layout,
+    rest: Vec<Vec3>,
+    positions: Vec<Vec3>,
+    velocities: Vec<Vec3>,
+    bound_ms: f32,
+    damping_per_ms: f32,
+    max_displacement_mm: f32,
+    elements: u32,
+    stiffest_at_rest: f32,
+    stiffest: f32,
+    contact_scale: f32,
+    submitted: u32,
+    fault: Option<GpuError>,
+}
+
+impl GpuTled {
+    /// Takes a body at rest to the device.
+    pub fn new(gpu: &Gpu, body: &Body, config: &Config) -> Result<Self, GpuTledError> {
+        body.check()?;
+        config.check()?;
+        let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
+        let damping_per_ms = damping_rate(body, config.damping, extent);
+        refuse(body, config, damping_per_ms)?;
+        let layout = Layout::of(&body.mesh);
+        let state = DeviceState::new(gpu, body, &layout)?;
+        let forces = Forces::new(gpu, body, &layout, &state)?;
+        let press = Press::new(gpu, &state)?;
+        let stiffest = (0..body.mesh.tets.len())
+            .map(|t| trepan_soft::element_omega2(&body.shape(t), &body.material) as f32)
+            .fold(0.0, f32::max);
+        Ok(Self {
+            update: Update::new(gpu, &state, &forces, &press)?,
+            gpu: gpu.clone(),
+            config: *config,
+            rest: body.mesh.positions.clone(),
+            positions: body.mesh.positions.clone(),
+            velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
+            bound_ms: power_bound_ms(body) as f32,
+            max_displacement_mm: config.max_displacement * extent,
+            elements: body.mesh.tets.len() as u32,
+            stiffest_at_rest: stiffest,
+            stiffest,
+            contact_scale: 1.0,
+            submitted: 0,
+            fault: None,
+            damping_per_ms,
+            state,
+            forces,
+            press,
+            layout,
+        })
+    }
+
+    /// Submits `count` steps of the longest stable length under the same loads, and gives that length, ms. Does not wait.
+    pub fn steps(&mut self, loads: &Loads, count: u32) -> f32 {
+        let dt_ms = self.longest_ms();
+        self.submit(loads, dt_ms, count);
+        dt_ms
+    }
+
+    /// Waits for the device and copies positions and velocities back. Counts are of all steps since the last time, inverted elements
+    /// those of every node's worst step.
+    pub fn read(&mut self) -> Result<StepReport, GpuError> {
+        let (u, v) = (self.state.u.read(&self.gpu)?, self.state.v.read(&self.gpu)?);
+        let noticed = self.state.noticed.read(&self.gpu)?;
+        let contact_n = self.press.pressure.read(&self.gpu)?[0];
+        for (place, &node) in self.layout.node_at.iter().enumerate() {
+            self.positions[node as usize] = self.rest[node as usize] + Vec3::from_slice(&u[place]);
+            self.velocities[node as usize] = Vec3::from_slice(&v[place]);
+        }
+        if self.submitted > 0 {
+            self.stiffest = noticed.iter().map(|n| f32::from_bits(n[3])).fold(0.0, f32::max);
+            self.state.noticed.write(&self.gpu, 0, &vec![[0; 4]; noticed.len()]);
+        }
+        let sum = |k: usize| noticed.iter().map(|n| n[k]).sum();
+        Ok(StepReport {
+            inverted: sum(0),
+            limited: sum(1),
+            non_finite: sum(2),
+            substeps: std::mem::take(&mut self.submitted),
+            contact_n,
+            contact_scale: std::mem::replace(&mut self.contact_scale, 1.0),
+            converged: true,
+            ..StepReport::default()
+        })
+    }
+
+    /// Why the device did not answer in the last [`step`](SoftSolver::step), which then left the state as it was.
+    pub fn fault(&self) -> Option<&GpuError> {
+        self.fault.as_ref()
+    }
+
+    /// Length of a step that is just stable at rest, ms, without any margin.
+    pub fn bound_ms(&self) -> f32 {
+        self.bound_ms
+    }
+
+    /// The stable bound as the elements were at the last read.
+    fn bound_now_ms(&self) -> f32 {
+        self.bound_ms / (self.stiffest / self.stiffest_at_rest).sqrt().clamp(1.0, MOST_GAINED)
+    }
+
+    fn longest_ms(&self) -> f32 {
+        self.stable_dt_ms().min(BORNE * self.bound_now_ms())
+    }
+
+    fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
+        let step = self.numbers(loads, dt_ms);
+        self.state.step.write(&self.gpu, 0, &[step]);
+        let (mut left, presses) = (count, step.pressed > 0);
+        if !presses {
+            self.press.pressure.write(&self.gpu, 0, &[0.0]);
+        }
+        while left > 0 {
+            let now = left.min(STEPS_AT_ONCE);
+            let mut recorder = self.gpu.record("tled");
+            recorder.compute("tled", |to| {
+                for _ in 0..now {
+                    self.forces.dispatch(to);
+                    if presses {
+                        self.press.dispatch(to);
+                    }
+                    self.update.dispatch(to);
+                }
+            });
+            recorder.submit();
+            left -= now;
+        }
+        self.submitted += count;
+    }
+
+    /// The uniform of a step.
+    fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> Step {
+        let contact = &loads.contact;
+        let half = 0.5 * self.damping_per_ms * dt_ms;
+        let share = self.share(contact, dt_ms);
+        self.contact_scale = self.contact_scale.min(share);
+        let at_rest = |n: u32| self.rest.get(n as usize).copied().unwrap_or_default();
+        Step {
+            gravity: (loads.gravity - self.config.balanced_gravity).to_array(),
+            dt: dt_ms,
+            normal: contact.normal.to_array(),
+            keep: (1.0 - half) / (1.0 + half),
+            gain: dt_ms / (1.0 + half),
+            max_speed: self.config.max_speed,
+            max_displacement: self.max_displacement_mm,
+            stiffness: share * contact.stiffness,
+            damping: share * contact.damping,
+            rest_depth: contact.offset_mm + contact.mean(at_rest).dot(contact.normal),
+            tool_velocity: contact.tool_normal_velocity,
+            pressed: self.press.touch(&self.gpu, &mut self.state, contact, &self.layout.place_of),
+            elements: self.elements,
+            nodes: self.layout.node_at.len() as u32,
+            unused: [0; 2],
+        }
+    }
+
+    fn share(&self, contact: &NodalContact, dt_ms: f32) -> f32 {
+        let bound_ms = self.bound_now_ms();
+        let place = |n: u32| self.layout.place_of.get(n as usize);
+        let inverse_mass = |n: u32| place(n).map_or(0.0, |&p| self.state.inverse_mass[p as usize]);
+        stable_share(contact, 4.0 / (bound_ms * bound_ms), dt_ms, inverse_mass)
+    }
+}
+
+impl SoftSolver for GpuTled {
+    fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
+        let (dt_ms, most) = (dt_ms.max(0.0), self.config.substeps);
+        let needed = (dt_ms / self.longest_ms() * NEARLY).ceil().max(1.0);
+        let count = if most == 0 { 1.0 } else { needed.min(most as f32) };
+        let each_ms = if most == 0 { dt_ms } else { dt_ms / needed };
+        let before = self.submitted;
+        self.submit(loads, each_ms, count as u32);
+        match self.read() {
+            Ok(mut report) => {
+                report.substeps -= before;
+                let left_ms = dt_ms - each_ms * count;
+                report.skipped_ms = if left_ms > 1e-5 * dt_ms { left_ms } else { 0.0 };
+                self.fault = None;
+                report
+            }
+            Err(fault) => {
+                self.fault = Some(fault);
+                StepReport { skipped_ms: dt_ms, contact_scale: 1.0, ..StepReport::default() }
+            }
+        }
+    }
+
+    fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    fn velocities(&self) -> &[Vec3] {
+        &self.velocities
+    }
+
+    fn stable_dt_ms(&self) -> f32 {
+        self.config.safety * self.bound_ms
+    }
+}
+
+/// Refuses what the kernels lack.
+fn refuse(body: &Body, config: &Config, damping_per_ms: f32) -> Result<(), GpuTledError> {
+    let unsupported = |field, right| Err(GpuTledError::Unsupported { field, right });
+    if !matches!(body.material.law(), Law::NeoHookean(_)) {
+        return unsupported("material", "neo-Hookean tissue");
+    }
+    if config.cure_locking {
+        return unsupported("cure_locking", "plain tetrahedra");
+    }
+    if !config.relaxation.is_none() {
+        return unsupported("relaxation", "elastic tissue");
+    }
+    if damping_per_ms > 0.0 && !body.is_held() {
+        return unsupported("damping", "undamped bodies where no fixed nodes hold them");
+    }
+    Ok(())
+}
+
+/// Refuses more workgroups than the device runs at once.
+pub(crate) fn groups(gpu: &Gpu, label: &str, threads: usize) -> Result<(), GpuError> {
+    let (wanted, limit) = (threads.div_ceil(LANES as usize) as u64, gpu.limits().max_compute_workgroups_per_dimension);
+    if wanted <= u64::from(limit) {
+        return Ok(());
+    }
+    Err(GpuError::TooLarge {
+        label: label.into(),
+        wanted,
+        limit: limit.into(),
+        unit: "workgroups",
+        adapter: gpu.name(),
+    })
+}

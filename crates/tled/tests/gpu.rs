@@ -1,0 +1,143 @@
+//! The device's solver against the processor's. Without an adapter only the error can be tested, and is.
+#![cfg(feature = "gpu")]
+
+use trepan_contact::NodalContact;
+use trepan_geometry::Vec3;
+use trepan_gpu::{Gpu, GpuError, Prefer};
+use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
+use trepan_tled::gpu::{GpuTled, GpuTledError};
+use trepan_tled::{Config, Relaxation, Tled};
+
+/// The device, or `None` after checking that its absence is reported with the remedy.
+fn device() -> Option<Gpu> {
+    match Gpu::open(Prefer::Software) {
+        Ok(gpu) => Some(gpu),
+        Err(error) => {
+            println!("no adapter on this machine: {error}");
+            assert_eq!(error, GpuError::NoAdapter);
+            assert!(error.to_string().contains("mesa-vulkan-drivers"));
+            None
+        }
+    }
+}
+
+fn body() -> Body {
+    let mesh = boxes::split_box([6, 5, 4], Vec3::new(60.0, 50.0, 40.0));
+    Body { fixed: boxes::nodes_where(&mesh, |p| p.z < 1e-3), mesh, material: Material::BRAIN }
+}
+
+/// Gravity sideways and a tool that presses the top by some mm.
+fn loads(body: &Body) -> Loads {
+    let mut contact = NodalContact::none();
+    (contact.normal, contact.stiffness, contact.damping) = (Vec3::Z, 0.2, 0.05);
+    let middle = Vec3::new(30.0, 25.0, 40.0);
+    for n in boxes::nodes_where(&body.mesh, |p| p.distance(middle) < 11.0) {
+        contact.add(n, 1.0);
+    }
+    contact.normalise();
+    contact.offset_mm = 3.0 - contact.mean(|n| body.mesh.positions[n as usize]).z;
+    Loads { gravity: Vec3::new(3e-3, 0.0, -2e-3), contact }
+}
+
+/// Short enough that pressed elements bear the step too, and no solver needs another substep.
+fn config() -> Config {
+    Config { safety: 0.5, ..Config::default() }
+}
+
+fn largest_difference(a: &[Vec3], b: &[Vec3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
+}
+
+#[test]
+fn the_device_agrees_with_the_processor_under_gravity_and_a_pressing_tool() {
+    let Some(gpu) = device() else { return };
+    let (body, steps) = (body(), 600);
+    let loads = loads(&body);
+    let mut device = GpuTled::new(&gpu, &body, &config()).unwrap();
+    let mut cpu = Tled::new(&body, &config()).unwrap();
+    let dt = device.steps(&loads, steps);
+    let report = device.read().unwrap();
+    let mut last = cpu.step(&loads, dt);
+    for _ in 1..steps {
+        last = cpu.step(&loads, dt);
+        assert_eq!(last.substeps, 1);
+    }
+    let largest = largest_difference(cpu.positions(), &body.mesh.positions);
+    let difference = largest_difference(cpu.positions(), device.positions());
+    let force = (report.contact_n - last.contact_n).abs() / last.contact_n;
+    println!("{}: {largest} mm, apart by {:e} of it, force by {force:e}", gpu.name(), difference / largest);
+    assert!(largest > 1.0 && last.contact_n > 1e-3, "{largest} {last:?}");
+    assert!(difference <= 1e-4 * largest, "{difference} of {largest}");
+    assert!(force < 1e-3 && report.contact_scale == last.contact_scale, "{report:?} {last:?}");
+    assert_eq!((report.substeps, report.inverted, report.limited, report.non_finite), (steps, 0, 0, 0));
+    assert_eq!(gpu.faults().count, 0, "{:?}", gpu.faults());
+}
+
+#[test]
+fn runs_repeat_bit_for_bit_however_they_are_submitted() {
+    let Some(gpu) = device() else { return };
+    let body = body();
+    let loads = loads(&body);
+    let run = |chunks: &[u32]| {
+        let mut device = GpuTled::new(&gpu, &body, &Config::default()).unwrap();
+        chunks.iter().for_each(|&n| {
+            device.steps(&loads, n);
+        });
+        device.read().unwrap();
+        let bits = |values: &[Vec3]| values.iter().flat_map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>();
+        (bits(device.positions()), bits(device.velocities()))
+    };
+    let once = run(&[300]);
+    assert!(once == run(&[300]) && once == run(&[100, 1, 199]));
+}
+
+#[test]
+fn the_seam_steps_and_lets_go_like_the_processor() {
+    let Some(gpu) = device() else { return };
+    let body = body();
+    let pressed = loads(&body);
+    let mut device = GpuTled::new(&gpu, &body, &config()).unwrap();
+    let mut cpu = Tled::new(&body, &config()).unwrap();
+    let dt = 1.9 * cpu.stable_dt_ms();
+    for step in 0..60 {
+        let loads = if step < 30 { pressed } else { Loads { gravity: pressed.gravity, ..Loads::default() } };
+        let (by_device, by_cpu) = (device.step(&loads, dt), cpu.step(&loads, dt));
+        assert_eq!((by_device.substeps, by_device.skipped_ms), (by_cpu.substeps, 0.0), "{step}");
+        assert!((by_device.contact_n - by_cpu.contact_n).abs() <= 1e-3 * by_cpu.contact_n, "{step}");
+    }
+    let largest = largest_difference(cpu.positions(), &body.mesh.positions);
+    assert!(largest_difference(cpu.positions(), device.positions()) <= 1e-4 * largest);
+    assert!(device.step(&pressed, 100.0 * dt).skipped_ms > 0.0);
+    assert_eq!((device.fault(), gpu.faults().count), (None, 0));
+}
+
+#[test]
+fn what_is_not_sane_is_held_and_counted() {
+    let Some(gpu) = device() else { return };
+    let body = body();
+    let mut device = GpuTled::new(&gpu, &body, &Config { substeps: 0, ..Config::default() }).unwrap();
+    let (mut limited, mut inverted) = (0, 0);
+    for _ in 0..40 {
+        let report = device.step(&loads(&body), 3.0 * device.bound_ms());
+        (limited, inverted) = (limited + report.limited, inverted + report.inverted);
+        assert!(device.positions().iter().all(|p| p.is_finite()));
+    }
+    assert!(limited > 0 && inverted > 0, "{limited} {inverted}");
+}
+
+#[test]
+fn what_the_kernels_lack_is_refused_by_name() {
+    let Some(gpu) = device() else { return };
+    let held = body();
+    let name = |body: &Body, config: Config| match GpuTled::new(&gpu, body, &config) {
+        Err(GpuTledError::Unsupported { field, .. }) => field,
+        Err(other) => panic!("{other}"),
+        Ok(_) => "nothing",
+    };
+    let (plain, free) = (Config::default(), Body { fixed: vec![], ..held.clone() });
+    assert_eq!(name(&held, Config { cure_locking: true, ..plain }), "cure_locking");
+    assert_eq!(name(&held, Config { relaxation: Relaxation::BRAIN, ..plain }), "relaxation");
+    assert_eq!(name(&Body { material: Material::BRAIN_OGDEN, ..held.clone() }, plain), "material");
+    assert_eq!(name(&free, plain), "damping");
+    assert_eq!(name(&free, Config { damping: trepan_tled::Damping::None, ..plain }), "nothing");
+}

@@ -1,0 +1,58 @@
+// Gathers the forces on a node from its run of slots, in their order, and moves it by central differences.
+//   v⁺ = keep v + gain (g + f/m)    u⁺ = u + dt v⁺
+@group(0) @binding(1) var<storage, read> starts: array<u32>;
+@group(0) @binding(2) var<storage, read> forces: array<vec4f>;
+// 1/m, 0 where the node is fixed, and the share of the tool's pressure.
+@group(0) @binding(3) var<storage, read> nodes: array<vec2f>;
+@group(0) @binding(4) var<storage, read> pressure: array<f32>;
+@group(0) @binding(5) var<storage, read_write> u: array<vec4f>;
+@group(0) @binding(6) var<storage, read_write> v: array<vec4f>;
+// Since they were last cleared: most inverted elements at once, times limited, times not finite, bits of the largest ω².
+@group(0) @binding(7) var<storage, read_write> noticed: array<vec4u>;
+
+fn finite(x: vec3f) -> bool {
+    let exponents = bitcast<vec3u>(x) & vec3u(0x7f800000u);
+    return all(exponents != vec3u(0x7f800000u));
+}
+
+@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {
+    let n = id.x;
+    if n >= now.nodes { return; }
+    var force = vec3f(0.0);
+    var stiffest = 0.0;
+    var inverted = 0u;
+    for (var slot = starts[n]; slot < starts[n + 1u]; slot++) {
+        let f = forces[slot];
+        force += f.xyz;
+        stiffest = max(stiffest, abs(f.w));
+        inverted += select(0u, 1u, f.w < 0.0);
+    }
+    var seen = noticed[n];
+    seen.x = max(seen.x, inverted);
+    seen.w = max(seen.w, bitcast<u32>(stiffest));
+    let node = nodes[n];
+    if node.x > 0.0 {
+        if node.y != 0.0 { force -= now.normal * (pressure[0] * node.y); }
+        let before = u[n].xyz;
+        var velocity = v[n].xyz * now.keep + (now.gravity + force * node.x) * now.gain;
+        let speed = length(velocity);
+        var held = speed > now.max_speed;
+        if held { velocity *= now.max_speed / speed; }
+        var after = before + velocity * now.dt;
+        let far = length(after);
+        if !(finite(velocity) && finite(after)) {
+            velocity = vec3f(0.0);
+            after = before;
+            held = false;
+            seen.z += 1u;
+        } else if far > now.max_displacement {
+            after *= now.max_displacement / far;
+            velocity = vec3f(0.0);
+            held = true;
+        }
+        seen.y += select(0u, 1u, held);
+        u[n] = vec4f(after, 0.0);
+        v[n] = vec4f(velocity, 0.0);
+    }
+    noticed[n] = seen;
+}
