@@ -48,5 +48,5 @@ pub use frame::{Frame, SceneData, SliceLook};
 pub use image::Image;
 pub use layout::Layout;
 pub use painter::Painter;
-pub use processor::ProcessorRenderer;
+pub use processor::{Casting, ProcessorRenderer};
 pub use renderer::{BRICKS_PER_FRAME, DrawReport, Hit, Renderer};

@@ -166,6 +166,11 @@ impl Renderer {
         self.divide(Division { detail, ..self.canvas.division })
     }
 
+    /// Lets rays leap over bricks without bone (the default), or has them walk every cell, to measure what leaping is worth.
+    pub fn set_leaping(&mut self, leaping: bool) {
+        self.passes.skull.set_leaping(&self.gpu, leaping);
+    }
+
     fn divide(&mut self, division: Division) -> Result<(), RenderError> {
         if self.canvas.division != division {
             self.canvas = Canvas::new(&self.gpu, division, &self.passes)?;

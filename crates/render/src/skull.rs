@@ -42,6 +42,7 @@ pub(crate) struct Skull {
     crowd: Texture,
     pipeline: Pipeline,
     pub recast: Recast,
+    leaping: bool,
 }
 
 /// What following the bone came to.
@@ -78,7 +79,8 @@ impl Skull {
                 topology: Topology::Triangles,
             },
         )?;
-        let skull = Self { bone, grid, leaps, seen, density, leap, crowd, pipeline, recast: Recast::default() };
+        let skull =
+            Self { bone, grid, leaps, seen, density, leap, crowd, pipeline, recast: Recast::default(), leaping: true };
         skull.load(gpu);
         Ok(skull)
     }
@@ -86,6 +88,14 @@ impl Skull {
     /// Whether there is any bone to show.
     pub fn is_some(&self) -> bool {
         self.bone.is_some()
+    }
+
+    /// Lets rays leap over bricks without bone, or has them walk every cell.
+    pub fn set_leaping(&mut self, gpu: &Gpu, leaping: bool) {
+        self.leaping = leaping;
+        let free = if leaping { self.leaps.free.clone() } else { vec![0; self.leaps.free.len()] };
+        self.leap.write(gpu, [0; 3], self.leap.size(), &free);
+        self.recast.forget();
     }
 
     /// Hands everything to the device, a few layers at a time.
@@ -123,11 +133,11 @@ impl Skull {
         let (first, size) = self.grid.voxels_of(brick);
         self.upload(gpu, first, size);
         let (cells, anew) = self.leaps.follow(bone, brick);
-        for cells in cells {
+        for cells in cells.into_iter().filter(|_| self.leaping) {
             let free = self.leaps.free[self.leaps.index(cells)];
             self.leap.write(gpu, cells.map(|v| v as u32), [1; 3], &[free]);
         }
-        if anew {
+        if anew && self.leaping {
             self.leap.write(gpu, [0; 3], self.leap.size(), &self.leaps.free);
         }
         for block in self.grid.blocks_of(brick) {

@@ -4,11 +4,28 @@ use crate::bricks::{BLOCK, Grid, LEAP, Leaps, densities};
 use crate::recast::Recast;
 use crate::skull::{Followed, NOTHING};
 use glam::{IVec3, Vec3};
+use std::ops::Range;
 use std::sync::Arc;
 use trepan_volume::BoneVolume;
 
 const NUDGE: f32 = 1e-3;
 const MOST_STEPS: u32 = 8192;
+
+/// How rays go through the bone. The default is what every picture is drawn with; the rest is there to be measured against it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Casting {
+    /// Whether rays leap over bricks without bone; without, they walk every cell.
+    pub leap: bool,
+    /// Samples this far apart, in voxels, instead of the exact root in every cell: thin walls are lost.
+    pub step_voxel: Option<f32>,
+}
+
+impl Default for Casting {
+    /// Leaps and exact roots.
+    fn default() -> Self {
+        Self { leap: true, step_voxel: None }
+    }
+}
 
 /// The skull as rays see it.
 #[derive(Debug)]
@@ -22,6 +39,7 @@ pub(crate) struct Bricks {
     /// Share of bone in blocks, 0 to 255.
     crowd: Vec<u8>,
     pub recast: Recast,
+    pub casting: Casting,
 }
 
 impl Bricks {
@@ -31,7 +49,7 @@ impl Bricks {
         let leaps = Leaps::of(bone.as_deref(), &grid);
         let density = densities(bone.as_deref(), [0; 3], grid.dims, |hu| hu);
         let crowd = grid.shares(bone.as_deref());
-        Self { bone, grid, leaps, seen, density, crowd, recast: Recast::default() }
+        Self { bone, grid, leaps, seen, density, crowd, recast: Recast::default(), casting: Casting::default() }
     }
 
     /// Whether there is any bone to show.
@@ -106,7 +124,12 @@ impl Bricks {
     }
 
     /// Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or [`NOTHING`].
-    pub fn meet(&self, o: Vec3, d: Vec3) -> f32 {
+    fn meet(&self, o: Vec3, d: Vec3) -> f32 {
+        self.trace(o, d).0
+    }
+
+    /// The same, with the number of bricks, cells and samples looked at.
+    pub fn trace(&self, o: Vec3, d: Vec3) -> (f32, u32) {
         let safe = Vec3::select(d.abs().cmplt(Vec3::splat(1e-12)), Vec3::splat(1e-12), d);
         let inverse = safe.recip();
         let dims = Vec3::from(self.grid.dims.map(|n| n as f32));
@@ -121,17 +144,41 @@ impl Bricks {
         while t < end && steps < MOST_STEPS {
             steps += 1;
             let brick = ((o + safe * (t + nudge)) / LEAP as f32).floor().as_ivec3().clamp(IVec3::ZERO, last);
-            let free = self.leaps.free[self.leaps.index(brick.to_array().map(|v| v as usize))];
+            let known = self.leaps.free[self.leaps.index(brick.to_array().map(|v| v as usize))];
+            let free = if self.casting.leap { known } else { 0 };
             let reach = f32::from(free.saturating_sub(1));
             let wall = brick.as_vec3() + Vec3::select(positive, Vec3::splat(reach + 1.0), Vec3::splat(-reach));
             let leave = ((LEAP as f32 * wall - o) * inverse).min_element().max(t + nudge);
             if free == 0 {
-                let hit = self.walk(o, safe, inverse, ahead, t, leave.min(end), &mut steps);
+                let until = leave.min(end);
+                let hit = match self.casting.step_voxel {
+                    None => self.walk(o, safe, inverse, ahead, t, until, &mut steps),
+                    Some(step) => self.sample(o, safe, t..until, step * self.grid.spacing_mm, &mut steps),
+                };
                 if hit < NOTHING {
-                    return hit;
+                    return (hit, steps);
                 }
             }
             t = leave;
+        }
+        (NOTHING, steps)
+    }
+
+    /// Samples a part of a ray every `step` mm, and takes the density as linear between two samples.
+    fn sample(&self, o: Vec3, d: Vec3, part: Range<f32>, step: f32, steps: &mut u32) -> f32 {
+        let isovalue = f32::from(self.grid.isovalue);
+        let (mut t, mut last) = (part.start, None);
+        while *steps < MOST_STEPS {
+            *steps += 1;
+            let over = self.hu(o + d * t) - isovalue;
+            if over >= 0.0 {
+                return last.map_or(t, |(from, under): (f32, f32)| from + (t - from) * under / (under - over));
+            }
+            if t >= part.end {
+                break;
+            }
+            last = Some((t, over));
+            t = (t + step.max(1e-3)).min(part.end);
         }
         NOTHING
     }

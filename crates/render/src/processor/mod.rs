@@ -32,6 +32,8 @@ use crate::renderer::{BRICKS_PER_FRAME, DrawReport, Hit};
 use crate::scene::Scene;
 use crate::slice::Plane;
 use brain::Fragments;
+pub use bricks::Casting;
+
 use bricks::Bricks;
 use glam::Vec3;
 use skull::Ray;
@@ -182,6 +184,17 @@ impl ProcessorRenderer {
             }
         }
         0
+    }
+
+    /// Changes how rays go through the bone, to measure what it is worth.
+    pub fn set_casting(&mut self, casting: Casting) {
+        self.bricks.casting = casting;
+        self.bricks.recast.forget();
+    }
+
+    /// Bricks, cells and samples that a ray of the newest picture has looked at in the mean, without its shadow.
+    pub fn steps_per_ray(&self) -> f64 {
+        self.rays.iter().map(|ray| f64::from(ray.steps)).sum::<f64>() / self.rays.len().max(1) as f64
     }
 
     /// Pixels of the picture, width and height.

@@ -10,6 +10,8 @@ use glam::Vec3;
 pub(crate) struct Ray {
     /// Distance, mm, or [`NOTHING`].
     pub t: f32,
+    /// Bricks, cells and samples looked at.
+    pub steps: u32,
     /// Unit, outwards.
     pub normal: Vec3,
     /// Ambient light that gets there.
@@ -19,20 +21,20 @@ pub(crate) struct Ray {
 }
 
 impl Ray {
-    pub const NONE: Self = Self { t: NOTHING, normal: Vec3::Z, open: 1.0, lit: false };
+    pub const NONE: Self = Self { t: NOTHING, steps: 0, normal: Vec3::Z, open: 1.0, lit: false };
 }
 
 pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2]) -> Ray {
     let along = scene.ray_of(x, y);
     let o = bricks.grid_of(scene.eye.truncate());
     let d = along / bricks.grid.spacing_mm;
-    let t = bricks.meet(o, d);
+    let (t, steps) = bricks.trace(o, d);
     if t >= NOTHING {
-        return Ray::NONE;
+        return Ray { steps, ..Ray::NONE };
     }
     let g = o + d * t;
     let normal = bricks.outward_normal(g, along);
     let towards_light = scene.light.truncate();
     let lit = normal.dot(towards_light) > 0.0 && !bricks.shadowed(g, normal, towards_light);
-    Ray { t, normal, open: 0.999 * bricks.openness(g, normal), lit }
+    Ray { t, steps, normal, open: 0.999 * bricks.openness(g, normal), lit }
 }
