@@ -1,0 +1,113 @@
+//! The scenes: meshes, and particles that touch them in several ways.
+
+use trepan_geometry::{Aabb, Pointshell, Spread, Vec3};
+use trepan_mesh::{TetMesh, lattice};
+use trepan_volume::{Grid, Interpolation, VoxelVolume, resample};
+use trepan_voxel_size::{Measures, counts};
+
+/// Radius of the balls, mm.
+const RADIUS_MM: f32 = 22.0;
+
+/// Boxes of a mesh and what is tested against them.
+pub struct Scene {
+    pub name: String,
+    pub mesh: TetMesh,
+    pub boxes: Vec<Aabb>,
+    pub particles: Vec<Vec3>,
+    /// Row of the thesis's Table 5.2, where it is one of its scenes.
+    pub table_row: Option<usize>,
+}
+
+/// What touches a mesh.
+#[derive(Clone, Copy, Debug)]
+pub enum Touch {
+    /// The nodes of an equal mesh beside it, pressed in until this share of the tetrahedra collide.
+    Twin(f64),
+    /// A ball tool's points at its surface.
+    Tool,
+    /// Points anywhere in its box.
+    Cloud,
+}
+
+/// What is meshed.
+#[derive(Clone, Copy, Debug)]
+pub enum Body {
+    Ball(usize),
+    /// A ball whose elements get smaller towards its middle.
+    Graded(usize),
+    Torus(usize),
+    Brain(usize),
+}
+
+impl Scene {
+    /// A scene of a mesh that is there.
+    pub fn new(body: Body, mesh: &TetMesh, touch: Touch, table_row: Option<usize>) -> Self {
+        let boxes = counts::boxes(mesh);
+        let particles = match touch {
+            Touch::Twin(share) => twin(mesh, &boxes, share),
+            Touch::Tool => tool(mesh),
+            Touch::Cloud => cloud(mesh),
+        };
+        Self { name: format!("{body:?}, {touch:?}").to_lowercase(), mesh: mesh.clone(), boxes, particles, table_row }
+    }
+}
+
+/// The mesh of a body.
+pub fn mesh(body: Body) -> TetMesh {
+    let ball = |p: Vec3| p.length() < RADIUS_MM;
+    match body {
+        Body::Ball(tets) => filled(&mask(ball), tets),
+        Body::Graded(tets) => {
+            let mut mesh = filled(&mask(ball), tets);
+            mesh.positions.iter_mut().for_each(|p| *p *= 0.1 + 0.9 * p.length() / RADIUS_MM);
+            mesh
+        }
+        Body::Torus(tets) => filled(&mask(|p| (p.x.hypot(p.y) - 15.0).hypot(p.z) < 7.0), tets),
+        Body::Brain(tets) => {
+            let file = trepan_fixtures::case_head().labels;
+            let brain = trepan_volume::read(&file).expect("the built-in case can be read").map(|v| u8::from(v > 0.5));
+            filled(&resample(&brain, &Grid::isotropic_over(&brain, 4.0), Interpolation::Majority, 0), tets)
+        }
+    }
+}
+
+fn filled(mask: &VoxelVolume<u8>, target_tets: usize) -> TetMesh {
+    lattice::tetrahedra(mask, &lattice::Config { target_tets, ..Default::default() }).expect("it can be meshed")
+}
+
+fn mask(inside: impl Fn(Vec3) -> bool) -> VoxelVolume<u8> {
+    let n = 48;
+    let mut mask = VoxelVolume::isotropic([n; 3], Vec3::splat(-23.5), 1.0, 0u8);
+    for at in 0..mask.data.len() {
+        mask.data[at] = u8::from(inside(mask.centre_of([at % n, at / n % n, at / (n * n)]).as_vec3()));
+    }
+    mask
+}
+
+fn twin(mesh: &TetMesh, boxes: &[Aabb], share: f64) -> Vec<Vec3> {
+    let moved = |by: f32| mesh.positions.iter().map(|p| *p + Vec3::X * by).collect::<Vec<Vec3>>();
+    let width = mesh.bounds().size().x;
+    let usual = Measures::of(mesh).map_or(1.0, |m| m.traditional_mm());
+    let (mut near, mut far) = (0.3 * width, width + 1.0);
+    for _ in 0..18 {
+        let middle = 0.5 * (near + far);
+        let hit = |c: counts::Counts| c.busy_boxes as f64;
+        if counts::grid(boxes, &moved(middle), usual).map_or(0.0, hit) > share * boxes.len() as f64 {
+            near = middle;
+        } else {
+            far = middle;
+        }
+    }
+    moved(near)
+}
+
+fn tool(mesh: &TetMesh) -> Vec<Vec3> {
+    let right = mesh.positions.iter().copied().max_by(|a, b| a.x.total_cmp(&b.x)).unwrap_or_default();
+    Pointshell::sphere(5.0, 500, Spread::Fibonacci).points.iter().map(|p| *p + right + Vec3::X * 2.0).collect()
+}
+
+fn cloud(mesh: &TetMesh) -> Vec<Vec3> {
+    let mut random = fastrand::Rng::with_seed(11);
+    let bounds = mesh.bounds();
+    (0..2000).map(|_| bounds.min + bounds.size() * Vec3::new(random.f32(), random.f32(), random.f32())).collect()
+}
