@@ -1,7 +1,9 @@
 //! The suites, one file each; one list feeds the command line and the page.
 
 mod deformable;
+mod haptics;
 mod mesh;
+mod render;
 mod rigid;
 mod tled;
 mod voxel_size;
@@ -54,6 +56,18 @@ pub const ALL: &[Suite] = &[
         question: "how right is each way of touching moving tissue, and what does a step cost",
         chart: ("step_p50_us", "depth_error_p95_mm"),
         run: deformable::run,
+    },
+    Suite {
+        name: "haptics",
+        question: "which walls are quiet on which device in which hand, and what force does that cost",
+        chart: ("stiffness_over_gil", "limit_cycle_mm"),
+        run: haptics::run,
+    },
+    Suite {
+        name: "render",
+        question: "is the picture where the bone is, and what does a look cost",
+        chart: ("frame_p50_ms", "image_error_percent"),
+        run: render::run,
     },
     Suite {
         name: "rigid",

@@ -1,0 +1,318 @@
+//! The guarded loop on the simulated device: where it is quiet, where it leaks energy, and what force the guard takes for it.
+//!
+//! # Theory
+//! ```text
+//! Gil, Hulin          stable   K < (b + b_h + B)/(T/2 + d)     hand's damping b_h added
+//! Colgate, Schenkel   passive  K ≤ (b - B)/(T/2 + d)           their bound at d = 0, delay added as to T/2
+//! Abbott, Okamura     K Δ/2 ≤ f_c                              else encoder steps alone keep a small cycle going
+//! ```
+//! Energy to the hand is what the motors give less what the device's friction takes: `b Δx²/T + f_c |Δx|` a tick, a lower bound.
+//!
+//! # Practice
+//! The declared range, to which gates apply: a hand with a grip, walls to 2 N/mm, delays to 2 ticks, `K Δ/2 ≤ f_c`. All other rows are
+//! shown beside; there the guard must act and count it.
+
+use super::Scope;
+use crate::suite::{Findings, Gate, Row};
+use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardCounters, Viscoelastic};
+use trepan_geometry::{Pose, ToolState, Vec3};
+use trepan_haptics::HapticDevice;
+use trepan_haptics::replay::Replay;
+use trepan_haptics::simulated::{Config, Hand, Simulated};
+
+const TICK_MS: f32 = 1.0;
+/// A hand comes this fast, mm/ms.
+const APPROACH: f32 = 0.1;
+const PRESS_TICKS: usize = 3000;
+/// The ticks at the end over which a press is judged.
+const JUDGED_TICKS: usize = 1000;
+const NMM_PER_J: f64 = 1000.0;
+
+/// A device at hand.
+const DEVICES: [(&str, f32, f32); 4] = [
+    ("Touch", 0.26, 0.055),
+    ("exact positions, no friction", 0.0, 0.0),
+    ("10 µm steps, no friction", 0.0, 0.01),
+    ("55 µm steps, no friction", 0.0, 0.055),
+];
+
+/// Light, firm, and a finger that hardly damps.
+const HANDS: [(&str, Hand); 3] = [
+    ("light grip", Hand::LIGHT),
+    ("firm grip", Hand::FIRM),
+    ("loose finger", Hand { mass_g: 10.0, damping: 0.1, stiffness: 0.1 }),
+];
+
+/// One coupling.
+#[derive(Clone, Copy)]
+struct Coupling {
+    device: Config,
+    hand: Hand,
+    wall: Viscoelastic,
+}
+
+impl Coupling {
+    /// Whether the promises hold for it.
+    fn declared(&self) -> bool {
+        let device = &self.device;
+        let grip = self.hand.damping >= Hand::LIGHT.damping;
+        let seen = 0.5 * self.wall.stiffness * device.quantum_mm <= device.friction_n;
+        grip && seen && self.wall.stiffness <= 2.0 && device.delay_ticks <= 2
+    }
+
+    fn late_ms(&self) -> f32 {
+        (0.5 + self.device.delay_ticks as f32) * TICK_MS
+    }
+
+    fn gil(&self) -> f32 {
+        (self.device.damping + self.hand.damping + self.wall.damping) / self.late_ms()
+    }
+
+    fn colgate(&self) -> f32 {
+        (self.device.damping - self.wall.damping).max(0.0) / self.late_ms()
+    }
+}
+
+/// Presses for every coupling with and without the controller, then hands that wander.
+pub fn run(scope: Scope) -> Findings {
+    let mut findings = Findings::default();
+    for (number, (scene, coupling)) in couplings(scope).into_iter().enumerate() {
+        if scope.takes(number) {
+            findings.rows.push(press_row(&scene, &coupling, "guarded", scope));
+            findings.rows.push(press_row(&scene, &coupling, "unguarded", scope));
+            if coupling.declared() && coupling.wall.damping == 0.5 {
+                findings.rows.push(wander_row(&scene, &coupling, number, scope));
+            }
+        }
+    }
+    findings.gates = gates(&findings.rows, scope);
+    findings
+}
+
+fn couplings(scope: Scope) -> Vec<(String, Coupling)> {
+    let stiffnesses = scope.pick(&[0.3f32, 0.8, 2.0, 5.0][..], &[0.1, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0][..]);
+    let dampings = scope.pick(&[0.0f32, 0.5][..], &[0.0, 0.5, 1.0, 2.0][..]);
+    let mut found = Vec::new();
+    for (name, friction_n, quantum_mm) in DEVICES {
+        for (grip, hand) in HANDS {
+            for delay_ticks in [0, 1, 2] {
+                for &stiffness in stiffnesses {
+                    for &damping in dampings {
+                        let device = Config { friction_n, quantum_mm, delay_ticks, ..Config::default() };
+                        let coupling = Coupling { device, hand, wall: Viscoelastic { stiffness, damping } };
+                        found.push((format!("{name}, {grip}, {delay_ticks} ticks late"), coupling));
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+/// What a run was like.
+#[derive(Clone, Copy, Default)]
+struct Run {
+    cycle_mm: f64,
+    lost_percent: f64,
+    to_hand_j: f64,
+    from_motors_j: f64,
+    counters: GuardCounters,
+    ticks: usize,
+}
+
+impl Run {
+    /// The worse of both in each.
+    fn or(self, other: Self) -> Self {
+        let (mut counters, more) = (self.counters, other.counters);
+        counters.passivity += more.passivity;
+        counters.bounded += more.bounded;
+        counters.restarted += more.restarted;
+        Self {
+            cycle_mm: self.cycle_mm.max(other.cycle_mm),
+            lost_percent: self.lost_percent.max(other.lost_percent),
+            to_hand_j: self.to_hand_j.max(other.to_hand_j),
+            from_motors_j: self.from_motors_j.max(other.from_motors_j),
+            counters,
+            ticks: self.ticks + other.ticks,
+        }
+    }
+}
+
+/// The most energy given out above what was taken in.
+#[derive(Default)]
+struct Account {
+    taken_nmm: f64,
+    lowest_nmm: f64,
+}
+
+impl Account {
+    fn book(&mut self, taken_nmm: f32) {
+        self.taken_nmm += f64::from(taken_nmm);
+        self.lowest_nmm = self.lowest_nmm.min(self.taken_nmm);
+    }
+
+    fn given_j(&self) -> f64 {
+        self.lowest_nmm.abs() / NMM_PER_J
+    }
+}
+
+/// The hand's intent tick by tick, against a wall at x ≤ 0.
+fn run_loop(coupling: &Coupling, intent: Vec<ToolState>, ticks: usize, guarded: bool) -> Run {
+    let Coupling { device: config, hand, mut wall } = *coupling;
+    let mut device = Simulated::new(config, hand, Box::new(Replay::new(intent)));
+    let told = device.capabilities().guard_config();
+    let passivity = told.passivity.filter(|_| guarded);
+    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, ..told });
+    let (mut motors, mut to_hand) = (Account::default(), Account::default());
+    let (mut lowest, mut highest, mut wanted_n, mut given_n) = (f32::MAX, f32::MIN, 0.0f32, 0.0f32);
+    for tick in 0..ticks {
+        let (from, motor) = (device.position(), device.motor_force());
+        let tool = device.read(tick as f64 * f64::from(TICK_MS)).tool;
+        let way = if tick == 0 { Vec3::ZERO } else { device.position() - from };
+        motors.book(-motor.dot(way));
+        to_hand
+            .book(-motor.dot(way) + config.damping * way.length_squared() / TICK_MS + config.friction_n * way.length());
+        let wrench = wall.wrench(&tool, &touch(&tool), TICK_MS);
+        let given = guard.guard(wrench, &tool, TICK_MS);
+        device.apply(given);
+        if tick + JUDGED_TICKS >= ticks {
+            lowest = lowest.min(device.position().x);
+            highest = highest.max(device.position().x);
+            wanted_n += wrench.force.length().min(guard.config().max_force_n);
+            given_n += given.force().length();
+        }
+    }
+    Run {
+        cycle_mm: f64::from(highest - lowest),
+        lost_percent: f64::from(100.0 * (1.0 - given_n / wanted_n.max(f32::MIN_POSITIVE))),
+        to_hand_j: to_hand.given_j(),
+        from_motors_j: motors.given_j(),
+        counters: guard.counters(),
+        ticks,
+    }
+}
+
+fn touch(tool: &ToolState) -> ContactManifold {
+    let mut touch = ContactManifold::default();
+    if tool.tip().x < 0.0 {
+        touch.set_single(Contact { point: Vec3::ZERO, normal: Vec3::X, depth_mm: -tool.tip().x });
+    }
+    touch
+}
+
+fn at(x: f32) -> ToolState {
+    ToolState::at(Pose::from_translation(Vec3::X * x))
+}
+
+/// The worst of several presses: the hand comes from 2 mm outside and presses until the wall answers with the press's force.
+fn press_row(scene: &str, coupling: &Coupling, method: &str, scope: Scope) -> Row {
+    let press = |&force_n: &f32| {
+        let depth = force_n / coupling.wall.stiffness + force_n / coupling.hand.stiffness;
+        let steps = ((2.0 + depth) / APPROACH).ceil() as usize;
+        let intent = (0..=steps).map(|step| at((2.0 - APPROACH * step as f32).max(-depth))).collect();
+        run_loop(coupling, intent, PRESS_TICKS, method == "guarded")
+    };
+    let presses = scope.pick(&[1.0f32, 2.0][..], &[0.3, 1.0, 2.0][..]);
+    let worst = presses.iter().map(press).reduce(Run::or).unwrap_or_default();
+    row(scene, coupling, method, &worst)
+        .metric("limit_cycle_mm", worst.cycle_mm)
+        .metric("steady_force_lost_percent", worst.lost_percent)
+}
+
+/// A hand that means to be now here, now there, each for up to a quarter of a second.
+fn wander_row(scene: &str, coupling: &Coupling, seed: usize, scope: Scope) -> Row {
+    let mut random = fastrand::Rng::with_seed(seed as u64);
+    let ticks = scope.pick(5_000, 40_000);
+    let mut intent = Vec::with_capacity(ticks);
+    let (mut aim, mut place) = (2.0f32, 2.0f32);
+    while intent.len() < ticks {
+        if random.u32(0..125) == 0 {
+            aim = 2.0 - 10.0 * random.f32();
+        }
+        place += 0.04 * (aim - place);
+        intent.push(at(place));
+    }
+    let found = run_loop(coupling, intent, ticks, true);
+    row(&format!("wandering: {scene}"), coupling, "guarded", &found)
+}
+
+fn row(scene: &str, coupling: &Coupling, method: &str, run: &Run) -> Row {
+    let Coupling { device, hand, wall } = coupling;
+    Row::new(scene, method)
+        .with("stiffness_n_per_mm", wall.stiffness)
+        .with("damping_n_ms_per_mm", wall.damping)
+        .with("delay_ticks", device.delay_ticks)
+        .with("quantum_mm", device.quantum_mm)
+        .with("friction_n", device.friction_n)
+        .with("hand_damping_n_ms_per_mm", hand.damping)
+        .with("declared", coupling.declared())
+        .metric("gil_n_per_mm", coupling.gil().into())
+        .metric("colgate_n_per_mm", coupling.colgate().into())
+        .metric("stiffness_over_gil", f64::from(wall.stiffness / coupling.gil()))
+        .metric("energy_out_j", run.to_hand_j)
+        .metric("motor_energy_out_j", run.from_motors_j)
+        .metric("damped_percent", 100.0 * run.counters.passivity as f64 / run.ticks as f64)
+        .metric("bounded_percent", 100.0 * run.counters.bounded as f64 / run.ticks as f64)
+        .metric("restarts_count", run.counters.restarted as f64)
+}
+
+fn gates(rows: &[Row], scope: Scope) -> Vec<Gate> {
+    let declared = |row: &&Row| row.method == "guarded" && row.config["declared"] == true;
+    let worst =
+        |name: &str| rows.iter().filter(declared).filter_map(|row| row.metrics.get(name).copied()).fold(0.0, f64::max);
+    let silent = |row: &&Row| {
+        row.method == "guarded"
+            && row.config["declared"] == false
+            && row.metrics.get("limit_cycle_mm").is_some_and(|&cycle| cycle > 0.1)
+            && row.metrics["motor_energy_out_j"] > 1e-4
+            && row.metrics["damped_percent"] + row.metrics["bounded_percent"] == 0.0
+    };
+    let stirred =
+        |row: &&Row| row.method == "unguarded" && row.metrics["limit_cycle_mm"] > 0.1 && row.config["declared"] == true;
+    let count = |found: usize| found as f64;
+    let mut gates = vec![
+        Gate::at_most("declared range: limit cycle, mm", worst("limit_cycle_mm"), 0.1),
+        Gate::at_most("declared range: energy out to the hand, J", worst("energy_out_j"), 1e-4),
+        Gate::at_most("declared range: steady force lost, percent", worst("steady_force_lost_percent"), 5.0),
+        Gate::at_most("declared range: forces lost and restarted", worst("restarts_count"), 0.0),
+        Gate::at_most(
+            "outside it: walls that shake the hand and the guard does not report",
+            count(rows.iter().filter(silent).count()),
+            0.0,
+        ),
+    ];
+    if scope.shard.1 == 1 {
+        let stirred = count(rows.iter().filter(stirred).count());
+        gates.push(Gate::at_least("declared range: couplings that oscillate without the guard", stirred, 1.0));
+    }
+    gates
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn coupling(stiffness: f32, delay_ticks: usize) -> Coupling {
+        let device = Config { friction_n: 0.0, quantum_mm: 0.0, delay_ticks, ..Config::default() };
+        Coupling { device, hand: Hand::LIGHT, wall: Viscoelastic { stiffness, damping: 0.0 } }
+    }
+
+    #[test]
+    fn the_bounds_are_the_papers() {
+        let touch = coupling(1.0, 1);
+        assert!((touch.gil() - 1.4).abs() < 1e-6 && (touch.colgate() - 0.1 / 1.5).abs() < 1e-6);
+        assert!(touch.declared() && !coupling(2.1, 1).declared() && !coupling(1.0, 3).declared());
+        let coarse = Config { quantum_mm: 0.055, ..touch.device };
+        assert!(!Coupling { device: coarse, ..touch }.declared());
+        assert!(Coupling { device: Config { friction_n: 0.26, ..coarse }, ..touch }.declared());
+    }
+
+    #[test]
+    fn beyond_gils_bound_the_bare_loop_swings_and_gives_energy() {
+        let press =
+            |stiffness: f32| run_loop(&coupling(stiffness, 1), vec![at(-1.0 / stiffness - 1.0 / 0.15)], 3000, false);
+        let (quiet, wild) = (press(0.8), press(2.0));
+        assert!(quiet.cycle_mm < 0.05, "{}", quiet.cycle_mm);
+        assert!(wild.cycle_mm > 1.0 && wild.from_motors_j > 1e-3, "{} mm, {} J", wild.cycle_mm, wild.from_motors_j);
+    }
+}
