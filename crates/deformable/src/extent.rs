@@ -23,37 +23,44 @@ impl Extent {
     #[inline]
     pub fn of<'a>(points: impl IntoIterator<Item = &'a Vec3>) -> Self {
         let mut extent = Self::EMPTY;
-        points.into_iter().for_each(|p| extent.grow(*p));
+        for p in points {
+            extent.grow(*p);
+        }
         extent
     }
 
     #[inline]
     pub fn grow(&mut self, p: Vec3) {
-        let p = p.to_array();
-        for axis in 0..3 {
-            self.low[axis] = if p[axis] < self.low[axis] { p[axis] } else { self.low[axis] };
-            self.high[axis] = if p[axis] > self.high[axis] { p[axis] } else { self.high[axis] };
-        }
+        let ([x, y, z], [u, v, w]) = (self.low, self.high);
+        let less = |new: f32, old: f32| if new < old { new } else { old };
+        let more = |new: f32, old: f32| if new > old { new } else { old };
+        self.low = [less(p.x, x), less(p.y, y), less(p.z, z)];
+        self.high = [more(p.x, u), more(p.y, v), more(p.z, w)];
     }
 
     /// The box of two boxes.
     #[inline]
     pub fn merge(&mut self, other: &Self) {
-        for axis in 0..3 {
-            self.low[axis] = self.low[axis].min(other.low[axis]);
-            self.high[axis] = self.high[axis].max(other.high[axis]);
-        }
+        let low = |axis: usize| if other.low[axis] < self.low[axis] { other.low[axis] } else { self.low[axis] };
+        let high = |axis: usize| if other.high[axis] > self.high[axis] { other.high[axis] } else { self.high[axis] };
+        *self = Self { low: [low(0), low(1), low(2)], high: [high(0), high(1), high(2)] };
     }
 
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
-        (0..3).all(|axis| self.low[axis].max(other.low[axis]) <= self.high[axis].min(other.high[axis]))
+        let on = |axis: usize| {
+            (self.low[axis] <= other.high[axis])
+                & (other.low[axis] <= self.high[axis])
+                & (self.low[axis] <= self.high[axis])
+                & (other.low[axis] <= other.high[axis])
+        };
+        on(0) & on(1) & on(2)
     }
 
     #[inline]
     pub fn contains(&self, p: Vec3) -> bool {
-        let p = p.to_array();
-        (0..3).all(|axis| self.low[axis] <= p[axis] && p[axis] <= self.high[axis])
+        let on = |axis: usize, x: f32| (self.low[axis] <= x) & (x <= self.high[axis]);
+        on(0, p.x) & on(1, p.y) & on(2, p.z)
     }
 
     /// Whether `other` lies inside.
@@ -72,7 +79,8 @@ impl Extent {
     /// This box, moved outwards on all sides.
     #[inline]
     pub fn widened(&self, margin: f32) -> Self {
-        Self { low: self.low.map(|x| x - margin), high: self.high.map(|x| x + margin) }
+        let ([x, y, z], [u, v, w]) = (self.low, self.high);
+        Self { low: [x - margin, y - margin, z - margin], high: [u + margin, v + margin, w + margin] }
     }
 
     /// The furthest that a side lies outside where it was; 0 for an empty box, since it holds nothing that could be missed.
@@ -85,9 +93,9 @@ impl Extent {
     /// Squared distance of a point from the box, mm²; infinite for an empty one.
     #[inline]
     pub fn distance2(&self, p: Vec3) -> f32 {
-        let p = p.to_array();
-        let outside = |axis: usize| (self.low[axis] - p[axis]).max(p[axis] - self.high[axis]).max(0.0);
-        (0..3).map(|axis| outside(axis) * outside(axis)).sum()
+        let outside = |axis: usize, x: f32| (self.low[axis] - x).max(x - self.high[axis]).max(0.0);
+        let (x, y, z) = (outside(0, p.x), outside(1, p.y), outside(2, p.z));
+        x * x + y * y + z * z
     }
 }
 

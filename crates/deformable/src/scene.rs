@@ -22,8 +22,10 @@ pub(crate) struct Scene<'a> {
 }
 
 impl Scene<'_> {
+    #[inline]
     pub(crate) fn corners(&self, tet: u32) -> [Vec3; 4] {
-        self.tets[tet as usize].map(|n| self.positions[n as usize])
+        let [a, b, c, d] = self.tets[tet as usize];
+        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize], self.positions[d as usize]]
     }
 
     /// Box of the ball.

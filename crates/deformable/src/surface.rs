@@ -211,8 +211,10 @@ impl MovingSurface {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
+    #[inline]
     pub(crate) fn corners(&self, positions: &[Vec3], t: u32) -> [Vec3; 3] {
-        self.triangles[t as usize].map(|n| positions[n as usize])
+        let [a, b, c] = self.triangles[t as usize];
+        [positions[a as usize], positions[b as usize], positions[c as usize]]
     }
 
     /// The box of a cluster, widened by what it may have moved since it was fitted.
@@ -231,7 +233,10 @@ impl MovingSurface {
     }
 
     fn fit(&mut self, positions: &[Vec3], cluster: usize) {
-        let fitted = Extent::of(self.nodes_of_cluster.row(cluster).iter().map(|&n| &positions[n as usize]));
+        let mut fitted = Extent::EMPTY;
+        for &n in self.nodes_of_cluster.row(cluster) {
+            fitted.grow(positions[n as usize]);
+        }
         if self.step > 1 {
             let moved = fitted.moved_from(&self.boxes[cluster]);
             self.stale += u32::from(moved > 2.0 * self.motion && self.step - self.fitted_at[cluster] > 1);

@@ -26,9 +26,25 @@ pub trait BroadPhase: Send {
 /// Box of a tetrahedron; empty when a corner is not finite.
 #[inline]
 pub(crate) fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Extent {
-    let corners = tet.map(|n| positions[n as usize]);
-    let sum = corners[0] + corners[1] + corners[2] + corners[3];
-    if sum.is_finite() { Extent::of(&corners) } else { Extent::EMPTY }
+    let [a, b, c, d] = *tet;
+    let (a, b, c, d) = (positions[a as usize], positions[b as usize], positions[c as usize], positions[d as usize]);
+    let sum = a + b + c + d;
+    if !sum.is_finite() {
+        return Extent::EMPTY;
+    }
+    Extent { low: lower(lower(a, b), lower(c, d)).to_array(), high: upper(upper(a, b), upper(c, d)).to_array() }
+}
+
+#[inline]
+fn lower(a: Vec3, b: Vec3) -> Vec3 {
+    let less = |a: f32, b: f32| if a < b { a } else { b };
+    Vec3::new(less(a.x, b.x), less(a.y, b.y), less(a.z, b.z))
+}
+
+#[inline]
+fn upper(a: Vec3, b: Vec3) -> Vec3 {
+    let more = |a: f32, b: f32| if a > b { a } else { b };
+    Vec3::new(more(a.x, b.x), more(a.y, b.y), more(a.z, b.z))
 }
 
 /// The boxes of a mesh's tetrahedra that meet a region, in order.

@@ -14,10 +14,9 @@ pub(crate) struct Brute;
 impl Brute {
     pub(crate) fn find(&mut self, scene: &Scene, hits: &mut Hits) {
         for tet in 0..scene.tets.len() as u32 {
-            let corners = scene.corners(tet);
-            for (i, &p) in scene.points.iter().enumerate() {
+            for i in 0..scene.points.len() {
                 if hits.tet[i] == NONE {
-                    hits.test(i, p, tet, corners);
+                    hits.test(scene, i, tet);
                 }
             }
         }

@@ -26,7 +26,7 @@ impl Phased {
         for &[point, tet] in &self.pairs {
             let i = point as usize;
             if hits.tet[i] == NONE {
-                hits.test(i, scene.points[i], tet, scene.corners(tet));
+                hits.test(scene, i, tet);
             }
         }
     }

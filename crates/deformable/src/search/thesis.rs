@@ -90,7 +90,7 @@ impl Thesis {
         self.cells.visit(scene.points, &self.boxes[tet as usize], |point| {
             let i = point as usize;
             if hits.tet[i] == NONE {
-                hits.test(i, scene.points[i], tet, scene.corners(tet));
+                hits.test(scene, i, tet);
             }
             any |= hits.tet[i] == tet;
         });

@@ -146,7 +146,7 @@ impl Walk {
             }
             for (i, &p) in scene.points.iter().enumerate() {
                 if hits.tet[i] == NONE && bounds.contains(p) {
-                    hits.test(i, p, self.looked, scene.corners(self.looked));
+                    hits.test(scene, i, self.looked);
                 }
             }
         }
@@ -174,15 +174,19 @@ impl Walk {
 
     /// Spreads over all tetrahedra that meet `region`, testing the lost points in each.
     fn run_flood(&mut self, scene: &Scene, region: &Extent, hits: &mut Hits) {
-        while let Some(tet) = self.open.pop() {
+        while let Some(tet) = self.open.pop().filter(|_| !self.lost.is_empty()) {
             let bounds = passage(scene, tet);
             if !bounds.overlaps(region) {
                 continue;
             }
-            for k in 0..self.lost.len() {
-                let i = self.lost[k] as usize;
-                if hits.tet[i] == NONE && bounds.contains(scene.points[i]) {
-                    hits.test(i, scene.points[i], tet, scene.corners(tet));
+            let mut k = 0;
+            while let Some(&i) = self.lost.get(k) {
+                if bounds.contains(scene.points[i as usize]) {
+                    hits.test(scene, i as usize, tet);
+                }
+                match hits.tet[i as usize] {
+                    NONE => k += 1,
+                    _ => _ = self.lost.swap_remove(k),
                 }
             }
             for next in scene.neighbours[tet as usize] {
@@ -203,7 +207,7 @@ fn passage(scene: &Scene, tet: u32) -> Extent {
 /// Walks point `i` from `tet`; says whether it arrived.
 fn walk(scene: &Scene, i: usize, mut tet: u32, hits: &mut Hits) -> bool {
     for _ in 0..MAX_STEPS {
-        let Some(weights) = hits.test(i, scene.points[i], tet, scene.corners(tet)) else { return false };
+        let Some(weights) = hits.test(scene, i, tet) else { return false };
         if is_inside(&weights) {
             return true;
         }
