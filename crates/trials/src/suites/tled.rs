@@ -1,11 +1,12 @@
-//! Soft-tissue solvers: a block of brain that hangs from one side under gravity, against the static f64 reference.
+//! Soft-tissue solvers: a block of brain that hangs from one side under gravity, against the static f64 reference; forces against the closed form
+//! of simple shear; the border of the stable step.
 
 use super::Scope;
 use crate::suite::{Findings, Gate, Row};
 use crate::timer::Samples;
 use trepan_geometry::{Vec3, units};
-use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes, linear, reference};
-use trepan_tled::{Config, Kernel, Tled};
+use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes, reference};
+use trepan_tled::{Config, Damping, Kernel, Tled};
 
 /// Edge of the block, mm.
 const BLOCK_MM: Vec3 = Vec3::new(60.0, 20.0, 20.0);
@@ -13,6 +14,11 @@ const BLOCK_MM: Vec3 = Vec3::new(60.0, 20.0, 20.0);
 const GRAVITY_SHARE: f32 = 0.1;
 /// Time until the block rests, ms.
 const SETTLE_MS: f32 = 4000.0;
+
+/// Step of solvers that have no bound, ms.
+const LONGEST_MS: f32 = 10.0;
+/// Shear of the closed form.
+const SHEAR: f64 = 0.3;
 
 /// Every solver on blocks of several sizes.
 pub fn run(scope: Scope) -> Findings {
@@ -23,9 +29,16 @@ pub fn run(scope: Scope) -> Findings {
             block(cells, scope, &mut findings);
         }
     }
-    for (number, &side) in scope.pick(&[10usize][..], &[10, 16, 24][..]).iter().enumerate() {
+    let sides = scope.pick(&[10usize][..], &[10, 16, 24][..]);
+    for (number, &side) in sides.iter().enumerate() {
         if scope.takes(number + cells.len()) {
             kernels(side, scope, &mut findings);
+        }
+    }
+    let rest: [fn(&mut Findings); 2] = [shear, stability];
+    for (number, scene) in rest.into_iter().enumerate() {
+        if scope.takes(number + cells.len() + sides.len()) {
+            scene(&mut findings);
         }
     }
     findings
@@ -47,10 +60,12 @@ fn block(cells: usize, scope: Scope, findings: &mut Findings) {
     truth.step(&loads, 1.0);
     let scene = format!("hanging block, {} tetrahedra", body.mesh.tets.len());
     let tled = Tled::new(&body, &Config::default()).expect("the block is sound");
-    let rival = Method::Linear(linear::Config::default()).build(&body).expect("the block is sound");
-    let solvers: [(&str, Box<dyn SoftSolver>); 2] = [("tled", Box::new(tled)), ("linear", rival)];
+    let mut solvers: Vec<(&str, Box<dyn SoftSolver>)> = vec![("tled", Box::new(tled))];
+    for method in Method::all().into_iter().filter(|m| m.name() != "reference") {
+        solvers.push((method.name(), method.build(&body).expect("the block is sound")));
+    }
     for (name, mut solver) in solvers {
-        let dt_ms = solver.stable_dt_ms();
+        let dt_ms = solver.stable_dt_ms().min(LONGEST_MS);
         let steps = (SETTLE_MS / dt_ms) as usize;
         let mut inverted = 0;
         let times = Samples::of(steps, |_| inverted += solver.step(&loads, dt_ms).inverted);
@@ -112,5 +127,71 @@ fn kernels(side: usize, scope: Scope, findings: &mut Findings) {
                 .metric("ns_per_tetrahedron", 1e3 * step_us / body.mesh.tets.len() as f64)
                 .metric("times_faster_than_scalar", scalar_us / step_us),
         );
+    }
+}
+
+/// Simple shear of a cube: what holds its top, against `τ A` of the closed form. Shear keeps the volume, so J = 1.
+///
+/// ```text
+/// neo-Hookean and Mooney-Rivlin  τ = μ γ          St. Venant-Kirchhoff  τ = μ γ + (λ/2 + μ) γ³
+/// ```
+fn shear(findings: &mut Findings) {
+    let edge_mm = 20.0;
+    let mesh = boxes::split_box([4; 3], Vec3::splat(edge_mm));
+    let density_g_mm3 = units::WATER_G_PER_MM3;
+    let materials = [
+        ("neo-Hookean", Material::NeoHookean { young_mpa: 0.003, poisson: 0.45, density_g_mm3 }),
+        ("St. Venant-Kirchhoff", Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3 }),
+        ("Mooney-Rivlin", Material::MooneyRivlin { c10_mpa: 3e-4, c01_mpa: 2e-4, poisson: 0.45, density_g_mm3 }),
+    ];
+    for (name, material) in materials {
+        let body = Body { mesh: mesh.clone(), fixed: vec![], material };
+        let config = Config { damping: Damping::None, ..Config::default() };
+        let mut solver = Tled::new(&body, &config).expect("the cube is sound");
+        for (n, p) in body.mesh.positions.iter().enumerate() {
+            solver.set_node(n as u32, Vec3::X * (SHEAR as f32 * p.z), Vec3::ZERO);
+        }
+        solver.step(&Loads::default(), 1e-3);
+        let top = boxes::nodes_where(&body.mesh, |p| p.z > edge_mm - 1e-3);
+        let held: f64 = top.iter().map(|&n| f64::from(solver.support_force(n).x)).sum();
+        let (mu, kappa) = (body.material.shear_mpa(), body.material.bulk_mpa());
+        let cubic = if name == "St. Venant-Kirchhoff" { 0.5 * kappa + mu * 2.0 / 3.0 } else { 0.0 };
+        let exact = (mu * SHEAR + cubic * SHEAR.powi(3)) * f64::from(edge_mm * edge_mm);
+        let error = 100.0 * (held / exact - 1.0).abs();
+        let scene = format!("simple shear {SHEAR}, {name}");
+        findings.rows.push(Row::new(&scene, "tled").metric("force_n", held).metric("force_error_percent", error));
+        findings.gates.push(Gate::at_most(format!("{scene}: force against the closed form, percent"), error, 0.5));
+    }
+}
+
+/// Steps of 0.5 to 2 times the true bound, obeyed and guarded: does a kicked undamped block stay as it should?
+fn stability(findings: &mut Findings) {
+    let body = body(3);
+    for share in [0.5f32, 0.8, 0.98, 1.05, 1.5, 2.0] {
+        for (method, substeps) in [("obeyed", 0), ("guarded", Config::default().substeps)] {
+            let config = Config { substeps, damping: Damping::None, ..Config::default() };
+            let mut solver = Tled::new(&body, &config).expect("the block is sound");
+            let dt_ms = share * solver.bound_ms();
+            for (n, p) in body.mesh.positions.iter().enumerate() {
+                solver.set_node(n as u32, Vec3::ZERO, Vec3::Z * (1e-5 * p.x));
+            }
+            let (mut healed, mut skipped_ms) = (0, 0.0);
+            for _ in 0..1500 {
+                let report = solver.step(&Loads::default(), dt_ms);
+                healed += report.inverted + report.limited + report.non_finite;
+                skipped_ms += report.skipped_ms;
+            }
+            let scene = format!("kicked block, {share} of the bound");
+            let stable = f64::from(healed == 0 && skipped_ms == 0.0);
+            findings.rows.push(
+                Row::new(&scene, method)
+                    .with("dt_share_of_bound", f64::from(share))
+                    .metric("stable_verdict", stable)
+                    .metric("healed_count", f64::from(healed)),
+            );
+            let wanted = method == "guarded" || share < 1.0;
+            let name = format!("{scene}, {method}: stable as theory says");
+            findings.gates.push(Gate::at_least(name, f64::from((stable == 1.0) == wanted), 1.0));
+        }
     }
 }
