@@ -3,6 +3,7 @@
 mod deformable;
 mod haptics;
 mod mesh;
+mod render;
 mod rigid;
 mod tled;
 mod voxel_size;
@@ -61,6 +62,12 @@ pub const ALL: &[Suite] = &[
         question: "which walls are quiet on which device in which hand, and what force does that cost",
         chart: ("stiffness_over_gil", "limit_cycle_mm"),
         run: haptics::run,
+    },
+    Suite {
+        name: "render",
+        question: "is the picture where the bone is, and what does a look cost",
+        chart: ("frame_p50_ms", "image_error_percent"),
+        run: render::run,
     },
     Suite {
         name: "rigid",
