@@ -41,9 +41,10 @@ impl Extent {
     /// The box of two boxes.
     #[inline]
     pub fn merge(&mut self, other: &Self) {
-        let low = |axis: usize| if other.low[axis] < self.low[axis] { other.low[axis] } else { self.low[axis] };
-        let high = |axis: usize| if other.high[axis] > self.high[axis] { other.high[axis] } else { self.high[axis] };
-        *self = Self { low: [low(0), low(1), low(2)], high: [high(0), high(1), high(2)] };
+        for axis in 0..3 {
+            self.low[axis] = self.low[axis].min(other.low[axis]);
+            self.high[axis] = self.high[axis].max(other.high[axis]);
+        }
     }
 
     #[inline]
@@ -54,7 +55,7 @@ impl Extent {
                 & (self.low[axis] <= self.high[axis])
                 & (other.low[axis] <= other.high[axis])
         };
-        on(0) & on(1) & on(2)
+        on(0) && on(1) && on(2)
     }
 
     #[inline]

@@ -69,9 +69,12 @@ impl Thesis {
     /// Boxes of all tetrahedra; returns the box of the tissue.
     fn update_boxes(&mut self, scene: &Scene) -> Extent {
         self.boxes.clear();
-        self.boxes.extend(scene.tets.iter().map(|tet| box_of(scene.positions, tet)));
         let mut tissue = Extent::EMPTY;
-        self.boxes.iter().for_each(|fitted| tissue.merge(fitted));
+        for tet in scene.tets {
+            let fitted = box_of(scene.positions, tet);
+            tissue.merge(&fitted);
+            self.boxes.push(fitted);
+        }
         tissue
     }
 
@@ -80,7 +83,7 @@ impl Thesis {
         self.two_rings(scene.neighbours, self.last);
         let count = self.boxes.len() as u32;
         let near = (0..self.rings.len()).map(|k| self.rings[k]);
-        let onwards = (0..count).map(|k| (self.last + k) % count);
+        let onwards = (self.last..count).chain(0..self.last);
         near.chain(onwards).find(|&tet| self.boxes[tet as usize].overlaps(colliding) && self.test(scene, tet, hits))
     }
 

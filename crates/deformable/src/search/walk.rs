@@ -14,7 +14,7 @@
 //! ```
 //!
 //! # Practice
-//! Warm, 20 us at any mesh size. Inverted and flat tetrahedra are stepped through, never counted as holding a point. When such were met and no
+//! Warm, 12 to 31 us from 1.7 to 53 thousand moving tetrahedra, 11 to 20 times less than a scan of 53 thousand in the same run. Inverted and flat tetrahedra are stepped through, never counted as holding a point. When such were met and no
 //! point was found at all, every tetrahedron is tried, at most 65 thousand in a step: 1 ms.
 //!
 //! Measured against a full scan: no difference in 220 thousand random poses, jumps included, on meshes deformed by 30 %. On meshes torn anew at every

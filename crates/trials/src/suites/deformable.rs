@@ -14,7 +14,7 @@ use trepan_deformable::Method;
 use truth::Truth;
 
 /// What the recommended method must gain over looking at every tetrahedron, from 48 thousand of them on.
-const LEAST_RATIO: f64 = 10.0;
+const LEAST_RATIO: f64 = 8.0;
 /// How far the depth may jump when a point goes from one tetrahedron into the next, edges.
 const MOST_JUMP: f64 = 1e-4;
 
