@@ -130,6 +130,8 @@ pub struct DistanceField {
     left_mm: f32,
     /// Free space around the ball that is sure, from the last selection of discs: centre, grid; radius, voxels.
     sure: (Vec3, f32),
+    /// Which bone the window shows.
+    seen: Option<Seen>,
     window: Window,
     known: Known,
     discs: Discs,
@@ -137,6 +139,9 @@ pub struct DistanceField {
     spaces: Vec<HalfSpace>,
     burr: Burr,
 }
+
+/// What tells one bone from another.
+type Seen = (usize, [usize; 3], Vec3);
 
 /// What the discs at hand are good for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -166,12 +171,23 @@ impl DistanceField {
             hand: Vec3::ZERO,
             left_mm: 0.0,
             sure: (Vec3::ZERO, 0.0),
+            seen: None,
             window: Window::new(),
             known: Known::default(),
             discs: Discs::new(MAX_DISCS, config.disc_voxels),
             near: Vec::with_capacity(MAX_DISCS),
             spaces: Vec::with_capacity(MAX_DISCS),
             burr: Burr::new(config.removal, MAX_BITES),
+        }
+    }
+
+    /// Forgets the copy of the densities when it is not of this bone.
+    fn look_at(&mut self, bone: &BoneVolume) {
+        let this = Some((std::ptr::from_ref(bone) as usize, bone.dims(), bone.origin()));
+        if self.seen != this {
+            self.seen = this;
+            self.known = Known::default();
+            self.window.forget();
         }
     }
 
@@ -346,6 +362,7 @@ impl RigidContact for DistanceField {
         self.left_mm += device.distance(self.hand) + self.config.yield_mm_per_ms * dt_ms + ROUNDING_MM;
         let motion = device - self.hand;
         self.hand = device;
+        self.look_at(bone);
         self.shrink(bone, dt_ms);
         if self.follow(bone, device, out) {
             self.grow(bone, motion, dt_ms);

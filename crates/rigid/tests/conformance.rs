@@ -181,6 +181,22 @@ fn teleports_and_the_ends_of_the_world_are_survived() {
 }
 
 #[test]
+fn another_bone_is_noticed_without_being_told() {
+    for method in Method::all() {
+        let (low, high) = (half_space(Vec3::Z), bone([28, 28, 28], 0.5, |p| p.z - 0.6));
+        let press = |contact: &mut dyn RigidContact, bone: &BoneVolume| {
+            walk(contact, bone, Vec3::Z * 4.0, Vec3::Z * 1.9, 0.05).manifold.depth_mm
+        };
+        let mut contact = built(&method, &Tool::burr(2.0), Vec3::Z * 4.0);
+        press(contact.as_mut(), &low);
+        walk(contact.as_mut(), &low, Vec3::Z * 1.9, Vec3::Z * 4.0, 0.05);
+        let truth = press(built(&method, &Tool::burr(2.0), Vec3::Z * 4.0).as_mut(), &high);
+        let found = press(contact.as_mut(), &high);
+        assert!((found - truth).abs() < 0.01, "{}: {found} mm, not {truth} mm", method.name());
+    }
+}
+
+#[test]
 fn a_tool_in_a_slot_a_pit_or_bone_has_a_finite_answer() {
     let scenes: [fn(Vec3) -> f32; 4] = [
         |p| 2.0 - p.x.abs(),
