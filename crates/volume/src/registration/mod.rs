@@ -1,0 +1,273 @@
+//! Where one image of a patient lies in another: rigid registration by mutual information.
+//!
+//! # Theory
+//! Two scanners map tissue to grey values in unrelated ways, but at the right pose one value says most about the other. With the
+//! joint histogram of values at common points, H its entropy and H(F), H(M) those of its margins, the pose that makes
+//! (H(F) + H(M)) / H(F, M) largest is sought; this quotient, unlike H(F) + H(M) - H(F, M), does not grow by mere overlap.
+//! Powell's method climbs it on a pyramid of coarser images, from several rotations, so that its many side peaks do no harm.
+//!
+//! # Practice
+//! Moves up to about 20° and 30 mm are caught; further ones when the heads' middles and tilt tell. `confidence` is l / (l + 0.003), l
+//! the normalised information lost 10 mm beside the result (for turns, 10 mm at 80 mm from the middle) in the least certain of
+//! the six directions: a ball, whose turn nothing shows, has none. A CT and an MRI of one head have about 0.75, noise 0.25.
+//! Shares of the work are fixed, so the bytes do not depend on the number of threads. About 2 s a head on two cores.
+//!
+//! # Sources
+//! Viola and Wells 1997 and Collignon 1995 (mutual information), Studholme, Hill and Hawkes 1999 (the quotient), Powell 1964.
+//!
+//! # When not to use it
+//! For two patients, for a brain that has shifted, or where the images share only a thin slab.
+
+mod information;
+mod powell;
+mod pyramid;
+
+use crate::VoxelVolume;
+use glam::{DAffine3, DQuat, DVec3};
+use information::{Pair, Shared};
+use powell::{Climb, Pose, climb};
+use pyramid::{Level, middle, range};
+use rayon::prelude::*;
+
+/// A turn of one radian counts as this many mm.
+const RADIUS_MM: f64 = 80.0;
+
+/// How far beside the peak the confidence looks, mm.
+const BESIDE_MM: f64 = 10.0;
+
+/// A loss of normalised information that is as likely right as wrong: unrelated images lose up to a third of it.
+const CHANCE: f64 = 0.003;
+
+/// How to register.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegistrationConfig {
+    /// Spacing of the finest level, mm, 0.5 to 8: finer is slower and hardly more exact.
+    pub work_mm: f64,
+    /// Grey values told apart in each image, 8 to 128: fewer is smoother, more tells thin contrasts apart.
+    pub bins: usize,
+    /// Points compared at the finest level, from 1000: more is slower and steadier.
+    pub points: usize,
+    /// Least share of the fixed image's points that must lie in the moving image, 0 to 1.
+    pub least_overlap: f64,
+    /// Under this confidence the result is refused, 0 to 1.
+    pub least_confidence: f64,
+}
+
+impl Default for RegistrationConfig {
+    fn default() -> Self {
+        Self { work_mm: 2.0, bins: 32, points: 100_000, least_overlap: 0.25, least_confidence: 0.5 }
+    }
+}
+
+/// Where the moving image lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Registration {
+    /// Rigid: put before the moving image's `world_from_voxel`, it lies in the fixed image's space.
+    pub fixed_from_moving: DAffine3,
+    /// Normalised mutual information at the result, 1 (none) to 2 (one image gives the other).
+    pub metric: f64,
+    /// The same with the headers' poses; under 1 where they overlap too little.
+    pub start_metric: f64,
+    /// How clear the peak is in its least certain direction, 0 (not at all) to 1; see the module.
+    pub confidence: f64,
+    /// Share of the fixed image that lies in the moving image.
+    pub overlap_share: f64,
+}
+
+/// Why there is no registration.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RegistrationError {
+    /// A number of the configuration is out of its range.
+    #[error("registration: {field} is {found}, but must be {right}")]
+    Config {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        found: f64,
+        /// The range.
+        right: &'static str,
+    },
+    /// An image shows nothing.
+    #[error("registration: the {image} image has no contrast to register by; is it the right file?")]
+    Flat {
+        /// Fixed or moving.
+        image: &'static str,
+    },
+    /// The images do not cover one place.
+    #[error("registration: only {:.0} % of the fixed image lies in the moving one, under the least of {:.0} %", 100.0 * share, 100.0 * least)]
+    Overlap {
+        /// The share found.
+        share: f64,
+        /// The least.
+        least: f64,
+    },
+    /// The result could as well lie elsewhere.
+    #[error(
+        "registration: the confidence of {:.2} is under the least of {:.2} (shared information {:.3}); are both images of one \
+         patient? Register them elsewhere and give files that agree", found.confidence, least, found.metric
+    )]
+    Doubtful {
+        /// What was found, to look at.
+        found: Box<Registration>,
+        /// The least confidence.
+        least: f64,
+    },
+}
+
+/// Finds the rigid move that puts `moving` into the space of `fixed`.
+pub fn register(
+    fixed: &VoxelVolume<f32>,
+    moving: &VoxelVolume<f32>,
+    config: &RegistrationConfig,
+) -> Result<Registration, RegistrationError> {
+    check(config)?;
+    let search = Search::new(fixed, moving, config)?;
+    let found = search.run();
+    if found.overlap_share < config.least_overlap {
+        return Err(RegistrationError::Overlap { share: found.overlap_share, least: config.least_overlap });
+    }
+    if found.confidence < config.least_confidence {
+        return Err(RegistrationError::Doubtful { found: Box::new(found), least: config.least_confidence });
+    }
+    Ok(found)
+}
+
+fn check(config: &RegistrationConfig) -> Result<(), RegistrationError> {
+    let wrong = |field, found, right| Err(RegistrationError::Config { field, found, right });
+    match config {
+        c if !(0.5..=8.0).contains(&c.work_mm) => wrong("work_mm", c.work_mm, "0.5 to 8 mm"),
+        c if !(8..=128).contains(&c.bins) => wrong("bins", c.bins as f64, "8 to 128"),
+        c if c.points < 1000 => wrong("points", c.points as f64, "1000 or more"),
+        c if !(0.01..=1.0).contains(&c.least_overlap) => wrong("least_overlap", c.least_overlap, "0.01 to 1"),
+        c if !(0.0..=1.0).contains(&c.least_confidence) => wrong("least_confidence", c.least_confidence, "0 to 1"),
+        _ => Ok(()),
+    }
+}
+
+/// A pose to climb from: the six numbers are added to a turn and a shift.
+#[derive(Clone, Copy)]
+struct Start {
+    turn: DQuat,
+    shift: DVec3,
+}
+
+struct Search<'a> {
+    config: &'a RegistrationConfig,
+    /// Coarsest first.
+    levels: Vec<(Level, Level)>,
+    /// Turns go about this point of the fixed image.
+    centre: DVec3,
+    /// From the fixed image's middle to the moving one's.
+    between: DVec3,
+}
+
+impl<'a> Search<'a> {
+    fn new(
+        fixed: &VoxelVolume<f32>,
+        moving: &VoxelVolume<f32>,
+        config: &'a RegistrationConfig,
+    ) -> Result<Self, RegistrationError> {
+        let fixed_range = range(fixed).ok_or(RegistrationError::Flat { image: "fixed" })?;
+        let moving_range = range(moving).ok_or(RegistrationError::Flat { image: "moving" })?;
+        let level = |part: f64| {
+            let mm = part * config.work_mm;
+            (Level::new(fixed, mm, fixed_range, config.bins), Level::new(moving, mm, moving_range, config.bins))
+        };
+        let levels: Vec<_> = [4.0, 2.0, 1.0].into_iter().map(level).collect();
+        let (centre, other) = (middle(&levels[0].0), middle(&levels[0].1));
+        Ok(Self { config, levels, centre, between: other - centre })
+    }
+
+    fn run(&self) -> Registration {
+        let header = Start { turn: DQuat::IDENTITY, shift: DVec3::ZERO };
+        let rough = Climb { step: 10.0, tolerance: 1.0, sweeps: 3 };
+        let candidates = self.climb_all(0, 8_000, &self.starts(), rough, 6);
+        let candidates = self.climb_all(0, 30_000, &candidates, Climb { step: 4.0, tolerance: 0.4, sweeps: 8 }, 3);
+        let candidates = self.climb_all(1, 60_000, &candidates, Climb { step: 1.5, tolerance: 0.1, sweeps: 8 }, 1);
+        let fine = Climb { step: 0.5, tolerance: 0.05, sweeps: 8 };
+        let best = self.climb_all(2, self.config.points, &candidates, fine, 1)[0];
+        self.with(2, self.config.points, |pair| {
+            let Shared { normalised, overlap } = pair.at(self.moving_from_fixed(best, &[0.0; 6]));
+            Registration {
+                fixed_from_moving: self.moving_from_fixed(best, &[0.0; 6]).inverse(),
+                metric: normalised,
+                start_metric: pair.at(self.moving_from_fixed(header, &[0.0; 6])).normalised,
+                confidence: self.confidence(pair, best, normalised),
+                overlap_share: overlap,
+            }
+        })
+    }
+
+    /// The headers' pose, the middles put together, and turns of both about the axes and the diagonals.
+    fn starts(&self) -> Vec<Start> {
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z].map(|a| a * 14f64.to_radians());
+        let corner = |n: usize| {
+            let side = |bit: usize| if n >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            DVec3::new(side(0), side(1), side(2)) * 9f64.to_radians()
+        };
+        let turns = std::iter::once(DVec3::ZERO).chain(axes).chain((0..8).map(corner));
+        let shifts = [DVec3::ZERO, self.between];
+        turns.flat_map(|t| shifts.map(|shift| Start { turn: DQuat::from_scaled_axis(t), shift })).collect()
+    }
+
+    /// Climbs from every start on one level; the best few, best first.
+    fn climb_all(&self, level: usize, points: usize, starts: &[Start], how: Climb, keep: usize) -> Vec<Start> {
+        let mut ends: Vec<(Start, f64)> = self.with(level, points, |pair| {
+            let from = |&start: &Start| {
+                let height = |pose: &Pose| pair.at(self.moving_from_fixed(start, pose)).normalised;
+                let (pose, top) = climb(&height, [0.0; 6], how);
+                (start.moved(&pose), top)
+            };
+            starts.par_iter().map(from).collect()
+        });
+        ends.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut kept: Vec<Start> = Vec::new();
+        for (end, _) in ends {
+            if kept.len() < keep && kept.iter().all(|k| k.distance_mm(end) > 3.0) {
+                kept.push(end);
+            }
+        }
+        kept
+    }
+
+    fn with<T>(&self, level: usize, points: usize, then: impl FnOnce(&Pair) -> T) -> T {
+        let (fixed, moving) = &self.levels[level];
+        let points = fixed.points(points);
+        let (bins, least_overlap) = (self.config.bins, self.config.least_overlap);
+        then(&Pair { points: &points, moving, bins, least_overlap })
+    }
+
+    fn moving_from_fixed(&self, start: Start, pose: &Pose) -> DAffine3 {
+        let Start { turn, shift } = start.moved(pose);
+        DAffine3::from_translation(self.centre + shift)
+            * DAffine3::from_quat(turn)
+            * DAffine3::from_translation(-self.centre)
+    }
+
+    /// How much is lost beside the peak along the least certain direction, against what chance loses.
+    fn confidence(&self, pair: &Pair, best: Start, top: f64) -> f64 {
+        let lost = |axis: usize| {
+            let beside = |side: f64| {
+                let pose: Pose = std::array::from_fn(|a| if a == axis { side * BESIDE_MM } else { 0.0 });
+                pair.at(self.moving_from_fixed(best, &pose)).normalised.max(1.0)
+            };
+            top - 0.5 * (beside(-1.0) + beside(1.0))
+        };
+        let least = (0..6).map(lost).fold(f64::INFINITY, f64::min).max(0.0);
+        least / (least + CHANCE)
+    }
+}
+
+impl Start {
+    fn moved(self, pose: &Pose) -> Self {
+        let turn = DQuat::from_scaled_axis(DVec3::new(pose[3], pose[4], pose[5]) / RADIUS_MM);
+        Self { turn: (turn * self.turn).normalize(), shift: self.shift + DVec3::new(pose[0], pose[1], pose[2]) }
+    }
+
+    fn distance_mm(self, other: Self) -> f64 {
+        self.shift.distance(other.shift) + RADIUS_MM * self.turn.angle_between(other.turn)
+    }
+}
+
+#[cfg(test)]
+mod tests;
