@@ -23,7 +23,7 @@ const SHEAR: f64 = 0.3;
 /// Every solver on blocks of several sizes.
 pub fn run(scope: Scope) -> Findings {
     let mut findings = Findings::default();
-    let cells = scope.pick(&[4usize, 6][..], &[4, 6, 8, 11, 16][..]);
+    let cells = scope.pick(&[3usize, 5][..], &[4, 6, 8, 11, 16][..]);
     for (number, &cells) in cells.iter().enumerate() {
         if scope.takes(number) {
             block(cells, scope, &mut findings);
@@ -35,7 +35,7 @@ pub fn run(scope: Scope) -> Findings {
             kernels(side, scope, &mut findings);
         }
     }
-    let rest: [fn(&mut Findings); 2] = [shear, stability];
+    let rest: [fn(&mut Findings); 3] = [shear, locking, stability];
     for (number, scene) in rest.into_iter().enumerate() {
         if scope.takes(number + cells.len() + sides.len()) {
             scene(&mut findings);
@@ -161,6 +161,43 @@ fn shear(findings: &mut Findings) {
         let scene = format!("simple shear {SHEAR}, {name}");
         findings.rows.push(Row::new(&scene, "tled").metric("force_n", held).metric("force_error_percent", error));
         findings.gates.push(Gate::at_most(format!("{scene}: force against the closed form, percent"), error, 0.5));
+    }
+}
+
+/// A cube pressed by a fifth between clamped ends, against quadratic tetrahedra of an independent code (scikit-fem), finest mesh.
+fn locking(findings: &mut Findings) {
+    let mesh = boxes::split_box([8; 3], Vec3::splat(100.0));
+    let top = boxes::nodes_where(&mesh, |p| p.z > 99.0);
+    let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0 || p.z > 99.0);
+    for (poisson, exact_n) in [(0.45, 9.117), (0.49, 9.667)] {
+        for (method, cure_locking) in [("plain", false), ("cured", true)] {
+            let material = Material::NeoHookean { young_mpa: 0.003, poisson, density_g_mm3: units::WATER_G_PER_MM3 };
+            let body = Body { mesh: mesh.clone(), fixed: fixed.clone(), material };
+            let mut solver =
+                Tled::new(&body, &Config { cure_locking, ..Config::default() }).expect("the cube is sound");
+            for (n, p) in body.mesh.positions.iter().enumerate() {
+                solver.set_node(n as u32, Vec3::NEG_Z * (0.2 * p.z), Vec3::ZERO);
+            }
+            let dt_ms = solver.stable_dt_ms();
+            let times = Samples::of((500.0 / dt_ms) as usize, |_| _ = solver.step(&Loads::default(), dt_ms));
+            let held: f64 = top.iter().map(|&n| -f64::from(solver.support_force(n).z)).sum();
+            let error = 100.0 * (held / exact_n - 1.0);
+            let scene = format!("cube pressed by a fifth, ν {poisson}");
+            findings.rows.push(
+                Row::new(&scene, method)
+                    .with("tets", body.mesh.tets.len())
+                    .metric("step_p50_us", times.quantile(0.5))
+                    .metric("force_n", held)
+                    .metric("force_error_percent", error.abs()),
+            );
+            let name = format!("{scene}, {method}: force too stiff by, percent");
+            let gate = match (cure_locking, poisson > 0.47) {
+                (true, _) => Gate::at_most(name, error.abs(), 7.0),
+                (false, true) => Gate::at_least(format!("{name} (locking must show)"), error, 25.0),
+                (false, false) => Gate::at_most(name, error.abs(), 12.0),
+            };
+            findings.gates.push(gate);
+        }
     }
 }
 
