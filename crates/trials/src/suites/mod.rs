@@ -6,6 +6,7 @@ mod mesh;
 mod render;
 mod rigid;
 mod tled;
+mod volume;
 mod voxel_size;
 
 use crate::suite::Findings;
@@ -80,6 +81,12 @@ pub const ALL: &[Suite] = &[
         question: "how right is the brain's motion, and what does a step cost",
         chart: ("step_p50_us", "displacement_error_percent"),
         run: tled::run,
+    },
+    Suite {
+        name: "volume",
+        question: "are images found again, kept exactly and measured rightly, and what does it cost",
+        chart: ("cost_s", "error_p95_mm"),
+        run: volume::run,
     },
     Suite {
         name: "voxel-size",
