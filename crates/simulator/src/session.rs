@@ -25,7 +25,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3, units};
-use trepan_haptics::{DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, script::Script, simulated};
+use trepan_haptics::{
+    Capabilities, DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, script::Script, simulated,
+};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::{Painter, SceneData};
@@ -93,13 +95,13 @@ impl Session {
     pub fn run(self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let Hand { device, pointer, watch } = self.hand()?;
-        let peak_n = device.as_ref().map_or(0.0, |device| device.capabilities().peak_force_n);
+        let feel = device.as_ref().map_or_else(|| self.recorded_feel(), |device| Feel::of(&device.capabilities()));
         let start = self.start();
-        let stages = self.stages(start.state, peak_n)?;
+        let stages = self.stages(start.state, &feel)?;
         output::folder(&self.out)?;
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
         let share = self.options.share.as_deref().map(Share::open).transpose()?;
-        let kept = (Recorder::create(&record, &self.header())?, share);
+        let kept = (Recorder::create(&record, &self.header(&feel))?, share);
         let mut graphics = self.graphics();
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
@@ -167,6 +169,13 @@ impl Session {
         Ok(hand)
     }
 
+    /// What the recorded session knew of its device; nothing where there is no recording.
+    fn recorded_feel(&self) -> Feel {
+        let config = self.recording.as_ref().map(|recording| &recording.header.config);
+        let number = |name: &str| config.and_then(|c| c.get(name)?.parse().ok()).unwrap_or(0.0f32);
+        Feel { peak_force_n: number(PEAK), delay_ticks: number(DELAY) as u8, position_step_mm: number(STEP) }
+    }
+
     /// A device's small box in front of the site: its middle 20 mm outside the entry, seen as the picture is.
     fn workspace(&self) -> Workspace {
         let site = &self.scene.site;
@@ -181,16 +190,14 @@ impl Session {
         ToolSample { tick: 0, state, phase: self.program.phases()[0], drilling: false }
     }
 
-    fn stages(&self, start: ToolState, peak_n: f32) -> Result<Stages, SessionError> {
-        let guard = GuardConfig::default();
-        let limit_n = if peak_n > 0.0 { peak_n.min(guard.max_force_n) } else { guard.max_force_n };
+    fn stages(&self, start: ToolState, feel: &Feel) -> Result<Stages, SessionError> {
         let config = HapticConfig {
             program: self.program,
             rigid: self.rigid,
             dt_ms: self.tick_ms(),
             bone_force: Viscoelastic { stiffness: 2.0, damping: 0.5 },
             tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
-            guard: GuardConfig { max_force_n: limit_n, ..guard },
+            guard: feel.guard(),
             near_mm: 2.0,
         };
         let bone = self.scene.bone.clone().filter(|_| self.program.has_bone());
@@ -277,8 +284,11 @@ impl Session {
         self.options.solver.clone().unwrap_or_else(|| TLED.into())
     }
 
-    fn header(&self) -> SessionHeader {
+    fn header(&self, feel: &Feel) -> SessionHeader {
         let config = [
+            (PEAK, feel.peak_force_n.to_string()),
+            (DELAY, feel.delay_ticks.to_string()),
+            (STEP, feel.position_step_mm.to_string()),
             ("rigid", self.rigid.name().to_string()),
             ("solver", self.solver_name()),
             ("rate_hz", self.options.rate_hz.to_string()),
@@ -318,6 +328,32 @@ impl Session {
     fn drilled(&self) -> Option<trepan_volume::VoxelVolume<i16>> {
         let bone = self.scene.bone.as_ref().filter(|_| self.program.has_bone() && !self.windowed)?;
         Some(bone.snapshot())
+    }
+}
+
+/// What the force guard must know of a device; recorded, so that a replay is guarded alike.
+struct Feel {
+    peak_force_n: f32,
+    delay_ticks: u8,
+    position_step_mm: f32,
+}
+
+const PEAK: &str = "device_peak_force_n";
+const DELAY: &str = "device_delay_ticks";
+const STEP: &str = "device_position_step_mm";
+
+impl Feel {
+    fn of(device: &Capabilities) -> Self {
+        let &Capabilities { peak_force_n, delay_ticks, position_resolution_mm, .. } = device;
+        Self { peak_force_n, delay_ticks, position_step_mm: position_resolution_mm }
+    }
+
+    fn guard(&self) -> GuardConfig {
+        let mut device = Watched::CAPABILITIES;
+        device.peak_force_n = self.peak_force_n;
+        device.delay_ticks = self.delay_ticks;
+        device.position_resolution_mm = self.position_step_mm;
+        device.guard_config()
     }
 }
 

@@ -145,6 +145,8 @@ pub struct GuardSummary {
     pub passivity: u64,
     /// Gave out energy that damping could not take: cut.
     pub bounded: u64,
+    /// Let force through again after it was cut.
+    pub restarted: u64,
 }
 
 /// Where it ran.
@@ -243,6 +245,7 @@ impl Summary {
                 non_finite: guard.non_finite,
                 passivity: guard.passivity,
                 bounded: guard.bounded,
+                restarted: guard.restarted,
             },
             frames: about.frames,
             fps: about.frames as f64 / seconds,

@@ -72,6 +72,18 @@ pub struct Watched {
 }
 
 impl Watched {
+    /// A device without motors or limits.
+    pub const CAPABILITIES: Capabilities = Capabilities {
+        name: String::new(),
+        peak_force_n: 0.0,
+        continuous_force_n: 0.0,
+        rate_hz: 1000.0,
+        workspace_mm: Vec3::INFINITY,
+        axes_driven: 0,
+        position_resolution_mm: 0.0,
+        delay_ticks: 0,
+    };
+
     /// Watches the session of a name; until it is heard, the tool waits at `start`.
     pub fn open(name: &str, start: ToolState) -> Result<Self, SessionError> {
         let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
@@ -118,16 +130,7 @@ impl HapticDevice for Watched {
     fn apply(&mut self, _wrench: GuardedWrench) {}
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            name: "watch".into(),
-            peak_force_n: 0.0,
-            continuous_force_n: 0.0,
-            rate_hz: 1000.0,
-            workspace_mm: Vec3::INFINITY,
-            axes_driven: 0,
-            position_resolution_mm: 0.0,
-            delay_ticks: 0,
-        }
+        Self::CAPABILITIES
     }
 
     fn close(&mut self) {
