@@ -256,17 +256,10 @@ impl Session {
             return Album::default();
         };
         let (bone_shown, folder) = (self.program.has_bone(), self.out.join("frames"));
-        let draw = |eyes, painter| {
-            let per_second = self.options.frames_per_second;
-            picture::draw(eyes, painter, &self.scene, bone_shown, per_second, &folder, stop)
-        };
-        if !self.windowed {
-            return draw(eyes, painter);
+        if self.windowed {
+            return window::show(eyes, painter, &self.scene, self.program, pointer, &folder, stop);
         }
-        match painter.into_renderer() {
-            Ok(renderer) => window::show(eyes, renderer, &self.scene, self.program, pointer, &folder, stop),
-            Err(painter) => draw(eyes, *painter),
-        }
+        picture::draw(eyes, painter, &self.scene, bone_shown, self.options.frames_per_second, &folder, stop)
     }
 
     fn pace(&self) -> Pace {

@@ -15,7 +15,7 @@ use std::path::Path;
 use trepan_geometry::{Buttons, Vec3};
 use trepan_haptics::mouse::MouseHandle;
 use trepan_render::window::{self, Leash, Panel, Start, WindowInput};
-use trepan_render::{Camera, Frame, RenderError, Renderer};
+use trepan_render::{Camera, Frame, Painter};
 
 /// How far a mouse may press past a surface, mm: a little over what the device's largest force stands for at 2 N/mm.
 const LEASH_MM: f32 = 2.0;
@@ -57,7 +57,7 @@ impl Rate {
 /// Shows the session until it ends or the window is closed.
 pub fn show(
     mut eyes: Eyes,
-    mut renderer: Renderer,
+    mut painter: Painter,
     scene: &Scene,
     program: Program,
     pointer: Option<MouseHandle>,
@@ -68,14 +68,14 @@ pub fn show(
     let view = *eyes.view.latest().0;
     let eye = camera(&scene.site);
     let bone_shown = scene.bone.is_some() && program.has_bone();
-    album.add(shot(&mut renderer, &frame(eye, &view, None, bone_shown), folder, "before"));
+    album.add(shot(&mut painter, &frame(eye, &view, None, bone_shown), folder, "before"));
     let start = Start::with(eye, view.sample.state.world_from_tool);
     let (positions, rate) = (Vec::new(), Rate::default());
     let show = Show { eyes, view, positions, bone_shown, pointer, next_until_s: 0.0, rate, stop: stop.clone() };
-    let closed = window::run(&format!("Trepan {}", program.name()), renderer, show, start);
+    let closed = window::run(&format!("Trepan {}", program.name()), painter, show, start);
     stop.ask();
-    let (mut renderer, show) = (closed.renderer, closed.session);
-    album.add(shot(&mut renderer, &window::Session::frame(&show, eye), folder, "after"));
+    let (mut painter, show) = (closed.renderer, closed.session);
+    album.add(shot(&mut painter, &window::Session::frame(&show, eye), folder, "after"));
     if let Err(fault) = closed.result {
         tracing::error!("{fault}");
         album.faults.push(fault.to_string());
@@ -83,12 +83,9 @@ pub fn show(
     album
 }
 
-fn shot(renderer: &mut Renderer, frame: &Frame<'_>, folder: &Path, caption: &str) -> Result<Shot, String> {
-    let draw = |renderer: &mut Renderer| -> Result<_, RenderError> {
-        renderer.draw(frame)?;
-        renderer.image()
-    };
-    snap(&draw(renderer).map_err(|fault| fault.to_string())?, folder, caption)
+fn shot(painter: &mut Painter, frame: &Frame<'_>, folder: &Path, caption: &str) -> Result<Shot, String> {
+    let (image, _) = painter.picture(frame).map_err(|fault| fault.to_string())?;
+    snap(&image, folder, caption)
 }
 
 impl window::Session for Show {
