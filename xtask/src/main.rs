@@ -9,6 +9,9 @@ use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
+/// What is off by default and still checked: the solver on the graphics device.
+const FEATURES: [&str; 2] = ["--features", "trepan-tled/gpu"];
+
 #[derive(Parser)]
 #[command(about = "Trepan's project commands", max_term_width = 120)]
 struct Arguments {
@@ -58,7 +61,10 @@ fn test() -> Result<()> {
     cargo(&["fmt", "--all", "--check"], &[])?;
     report("layers", layers::check(&root())?)?;
     report("tidy", tidy::check(&root())?)?;
-    cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "--deny", "warnings"], &[])?;
+    cargo(
+        &["clippy", "--workspace", "--all-targets", FEATURES[0], FEATURES[1], "--quiet", "--", "--deny", "warnings"],
+        &[],
+    )?;
     operation::check(&root())?;
     tests()?;
     cargo(&["test", "--workspace", "--doc", "--quiet"], &[])?;
@@ -71,9 +77,22 @@ fn test() -> Result<()> {
 fn tests() -> Result<()> {
     let nextest = Command::new("cargo").args(["nextest", "--version"]).output().is_ok_and(|out| out.status.success());
     if nextest {
-        cargo(&["nextest", "run", "--workspace", "--all-targets", "--no-fail-fast", "--status-level", "slow"], &[])
+        cargo(
+            &[
+                "nextest",
+                "run",
+                "--workspace",
+                "--all-targets",
+                FEATURES[0],
+                FEATURES[1],
+                "--no-fail-fast",
+                "--status-level",
+                "slow",
+            ],
+            &[],
+        )
     } else {
-        cargo(&["test", "--workspace", "--all-targets", "--quiet"], &[])
+        cargo(&["test", "--workspace", "--all-targets", FEATURES[0], FEATURES[1], "--quiet"], &[])
     }
 }
 

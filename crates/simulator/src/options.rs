@@ -11,7 +11,7 @@ pub struct Options {
     #[command(subcommand)]
     pub task: Option<Task>,
     /// A folder that `case build` made
-    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "spacing_mm", "tets", "isovalue_hu"])]
+    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "spacing_mm", "tets", "isovalue_hu", "register"])]
     pub case: Option<PathBuf>,
     /// Images, and what is made of them
     #[command(flatten)]
@@ -81,6 +81,9 @@ pub struct Patient {
     /// Tetrahedra of the brain, met within a tenth
     #[arg(long, value_name = "N", default_value_t = 12_000)]
     pub tets: usize,
+    /// Move the MRI (and labels) to where they fit the CT, by mutual information
+    #[arg(long)]
+    pub register: bool,
     /// Threshold of bone, HU [default: from the histogram, 300 to 500]
     #[arg(long, value_name = "HU", allow_negative_numbers = true)]
     pub isovalue_hu: Option<i16>,

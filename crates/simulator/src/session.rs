@@ -414,7 +414,12 @@ fn fitting(program: Program, case: Case) -> Result<Case, SessionError> {
 }
 
 fn recipe(patient: &Patient) -> Recipe {
-    Recipe { spacing_mm: patient.spacing_mm, tets: patient.tets, isovalue_hu: patient.isovalue_hu }
+    Recipe {
+        spacing_mm: patient.spacing_mm,
+        tets: patient.tets,
+        isovalue_hu: patient.isovalue_hu,
+        register: patient.register,
+    }
 }
 
 fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {

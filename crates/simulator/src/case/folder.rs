@@ -21,7 +21,7 @@ use trepan_mesh::vtk;
 use trepan_volume::{hounsfield, nifti};
 
 /// Goes up when the folder's form changes.
-const FORM: u32 = 1;
+const FORM: u32 = 2;
 const SKULL: &str = "skull.nii";
 const MRI: &str = "mri.nii";
 const MASK: &str = "mask.nii";
@@ -125,7 +125,7 @@ mod tests {
             notes: vec!["a remark".into()],
             cached: false,
         };
-        let recipe = Recipe { spacing_mm: 0.75, tets: 500, isovalue_hu: None };
+        let recipe = Recipe { spacing_mm: 0.75, tets: 500, isovalue_hu: None, register: false };
         save(&case, &recipe, home.path()).expect("the case is written");
         let back = load(home.path()).expect("the case is read");
         assert_eq!((back.skull.as_ref(), back.isovalue_hu, back.notes.len()), (Some(&skull), 350, 1));

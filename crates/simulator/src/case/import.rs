@@ -9,13 +9,14 @@ use crate::case::cache::Cache;
 use crate::case::folder as case_folder;
 use crate::error::SessionError;
 use crate::program::Program;
+use glam::DAffine3;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use trepan_mesh::{TetMesh, lattice};
 use trepan_volume::{
-    AIR_HU, BrainConfig, Grid, Interpolation, MaskError, VoxelVolume, bone_isovalue, brain_mask, check_brain_mask,
-    hounsfield, largest_component, overlap, resample, skull_only,
+    AIR_HU, BrainConfig, Grid, Interpolation, MaskError, RegistrationConfig, VoxelVolume, bone_isovalue, brain_mask,
+    check_brain_mask, hounsfield, largest_component, overlap, register, resample, skull_only,
 };
 
 /// Air around the brain that its grids keep, mm.
@@ -45,6 +46,8 @@ pub struct Recipe {
     pub tets: usize,
     /// Threshold of bone, HU; `None` for the histogram's.
     pub isovalue_hu: Option<i16>,
+    /// Whether the MRI, and labels with it, are moved to where they fit the CT.
+    pub register: bool,
 }
 
 /// What a session needs of the patient.
@@ -133,12 +136,19 @@ fn build(inputs: &Inputs, recipe: &Recipe, bar: &ProgressBar) -> Result<Case, Se
     let ct = inputs.ct.as_deref().map(|path| read_ct(path, &mut notes)).transpose()?;
     let isovalue_hu = recipe.isovalue_hu.or(ct.as_ref().map(bone_isovalue)).unwrap_or(400);
     stage(bar, "reading the MRI");
-    let mri = inputs.mri.as_deref().map(|path| read_mri(path, &mut notes)).transpose()?;
+    let mut mri = inputs.mri.as_deref().map(|path| read_mri(path, &mut notes)).transpose()?;
+    let ct_from_mri = match (&ct, &mut mri) {
+        (Some(ct), Some(mri)) if recipe.register => registered(ct, mri, &mut notes)?,
+        _ => DAffine3::IDENTITY,
+    };
     if let (Some(ct), Some(mri)) = (&ct, &mri) {
         overlap(ct, mri).map_err(|fault| SessionError::Case(fault.to_string()))?;
     }
     stage(bar, "finding the brain");
-    let mask = mri.as_ref().map(|mri| find_brain(inputs, mri, ct.as_ref(), isovalue_hu, &mut notes)).transpose()?;
+    let mask = mri
+        .as_ref()
+        .map(|mri| find_brain(inputs, mri, ct_from_mri, ct.as_ref(), isovalue_hu, &mut notes))
+        .transpose()?;
     stage(bar, "resampling the skull");
     let skull = ct.map(|ct| make_skull(&ct, recipe, isovalue_hu)).transpose()?;
     stage(bar, "meshing the brain");
@@ -163,9 +173,32 @@ fn read_mri(path: &Path, notes: &mut Vec<String>) -> Result<VoxelVolume<f32>, Se
     Ok(import.volume)
 }
 
+/// Moves the MRI to where it fits the CT; returns the move.
+fn registered(
+    ct: &VoxelVolume<i16>,
+    mri: &mut VoxelVolume<f32>,
+    notes: &mut Vec<String>,
+) -> Result<DAffine3, SessionError> {
+    let found = register(&ct.map(f32::from), mri, &RegistrationConfig::default());
+    let found = found.map_err(|fault| SessionError::Case(fault.to_string()))?;
+    let (_, turn, _) = found.fixed_from_moving.to_scale_rotation_translation();
+    let middle = mri.centre_of(mri.dims.map(|n| n / 2));
+    let moved_mm = found.fixed_from_moving.transform_point3(middle).distance(middle);
+    mri.world_from_voxel = found.fixed_from_moving * mri.world_from_voxel;
+    notes.push(format!(
+        "the MRI was moved by {moved_mm:.1} mm and turned by {:.1} degrees to fit the CT: shared information {:.3} to {:.3}, confidence {:.2}",
+        turn.to_axis_angle().1.to_degrees(),
+        found.start_metric,
+        found.metric,
+        found.confidence
+    ));
+    Ok(found.fixed_from_moving)
+}
+
 fn find_brain(
     inputs: &Inputs,
     mri: &VoxelVolume<f32>,
+    ct_from_mri: DAffine3,
     ct: Option<&VoxelVolume<i16>>,
     isovalue_hu: i16,
     notes: &mut Vec<String>,
@@ -175,7 +208,8 @@ fn find_brain(
         return brain_mask(mri, ct, &config).map_err(|fault| SessionError::Case(format!("{fault} (--labels PATH)")));
     };
     let case = |fault: String| SessionError::Case(format!("{}: {fault}", path.display()));
-    let labels = trepan_volume::labels(path, &trepan_volume::read(path)?)?;
+    let mut labels = trepan_volume::labels(path, &trepan_volume::read(path)?)?;
+    labels.world_from_voxel = ct_from_mri * labels.world_from_voxel;
     let whole = labels.map(|label| u8::from(label != 0));
     let mask = largest_component(&whole);
     match check_brain_mask(&mask, &config) {
@@ -228,6 +262,6 @@ fn cropped(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
     let margin = (MARGIN_MM / spacing).ceil() as i64;
     let dims = [0, 1, 2].map(|axis| (high[axis] - low[axis] + 1) + 2 * margin as usize);
     let offset = [0, 1, 2].map(|axis| (low[axis] as i64 - margin) as f64);
-    let world_from_voxel = whole.world_from_voxel * glam::DAffine3::from_translation(offset.into());
+    let world_from_voxel = whole.world_from_voxel * DAffine3::from_translation(offset.into());
     resample(&whole, &Grid { dims, world_from_voxel }, Interpolation::Nearest, 0)
 }
