@@ -186,7 +186,7 @@ fn registered(
     let moved_mm = found.fixed_from_moving.transform_point3(middle).distance(middle);
     mri.world_from_voxel = found.fixed_from_moving * mri.world_from_voxel;
     notes.push(format!(
-        "the MRI was moved by {moved_mm:.1} mm and turned by {:.1} degrees to fit the CT: shared information {:.3} to {:.3}, confidence {:.2}",
+        "the MRI was moved by {moved_mm:.1} mm and turned by {:.1} degrees to fit the CT: shared information {:.3} to {:.3}, confidence {:.2}; look at the slices, a confident answer can still be wrong",
         turn.to_axis_angle().1.to_degrees(),
         found.start_metric,
         found.metric,
