@@ -31,8 +31,10 @@ mod show;
 mod stages;
 
 pub use case::cache::Cache;
-pub use case::import::{Brain, Case, Inputs, Recipe, open as open_case};
+pub use case::import::open as open_case;
+pub use case::opening::Opening;
 pub use case::scene::{RestBrain, Scene};
+pub use case::{Brain, Case, Inputs, Recipe};
 pub use command::command;
 pub use error::SessionError;
 pub use options::{Options, Patient};

@@ -11,7 +11,7 @@ pub struct Options {
     #[command(subcommand)]
     pub task: Option<Task>,
     /// A folder that `case build` made
-    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "spacing_mm", "tets", "isovalue_hu", "register"])]
+    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "spacing_mm", "tets", "isovalue_hu", "register", "opening"])]
     pub case: Option<PathBuf>,
     /// Images, and what is made of them
     #[command(flatten)]
@@ -84,6 +84,9 @@ pub struct Patient {
     /// Move the MRI (and labels) to where they fit the CT, by mutual information
     #[arg(long)]
     pub register: bool,
+    /// A point outside the skull over the place to open, RAS mm [default: bone about 6 mm thick on the upper right front]
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    pub opening: Option<[f32; 3]>,
     /// Threshold of bone, HU [default: from the histogram, 300 to 500]
     #[arg(long, value_name = "HU", allow_negative_numbers = true)]
     pub isovalue_hu: Option<i16>,
@@ -134,6 +137,13 @@ fn within(flag: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
     good.then_some(()).ok_or(format!("--{flag} {value} is out of range: give {low} to {high}"))
 }
 
+fn point(text: &str) -> Result<[f32; 3], String> {
+    let remedy = "expected X,Y,Z in mm: right, anterior and superior positive, as in 40,30,120";
+    let numbers: Vec<f32> = text.split(',').map(|s| s.trim().parse().map_err(|_| remedy)).collect::<Result<_, _>>()?;
+    let point: [f32; 3] = numbers.try_into().map_err(|_| remedy)?;
+    if point.iter().all(|v| v.abs() <= 1e4) { Ok(point) } else { Err(remedy.into()) }
+}
+
 fn size(text: &str) -> Result<[u32; 2], String> {
     let remedy = "expected WIDTHxHEIGHT with 16 to 8192 pixels each, as in 960x600";
     let (width, height) = text.split_once('x').ok_or(remedy)?;
@@ -163,6 +173,8 @@ mod tests {
         let fault = parse("x --duration nan").unwrap().check().unwrap_err();
         assert!(fault.contains("--duration") && fault.contains("0.1 to 86400"), "{fault}");
         assert!(parse("x --spacing-mm 0").unwrap().check().is_err());
+        assert_eq!(parse("x --opening -40,30.5,120").unwrap().patient.opening, Some([-40.0, 30.5, 120.0]));
+        assert!(parse("x --opening 1,2").is_err() && parse("x --opening 1,2,nan").is_err());
         assert!(parse("x --picture 960").is_err() && parse("x --picture 0x7").is_err());
     }
 }

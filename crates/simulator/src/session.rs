@@ -2,8 +2,9 @@
 
 use crate::case::cache::Cache;
 use crate::case::folder as case_folder;
-use crate::case::import::{self, Case, Inputs, Recipe};
+use crate::case::import;
 use crate::case::scene::{RestBrain, Scene};
+use crate::case::{Case, Inputs, Recipe};
 use crate::error::SessionError;
 use crate::options::{Options, Patient};
 use crate::program::Program;
@@ -83,7 +84,7 @@ impl Session {
                 import::open(program, &inputs, &recipe(&options.patient), &Cache::of_user()?)?
             }
         };
-        tracing::info!("case {} {}", case.name, if case.cached { "from the cache" } else { "imported" });
+
         let (name, hash) = (case.name.clone(), case.hash.clone());
         let scene = Scene::new(program, case)?;
         scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
@@ -419,6 +420,7 @@ fn recipe(patient: &Patient) -> Recipe {
         tets: patient.tets,
         isovalue_hu: patient.isovalue_hu,
         register: patient.register,
+        opening: patient.opening,
     }
 }
 

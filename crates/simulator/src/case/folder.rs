@@ -1,7 +1,7 @@
 //! A case as a folder: volumes, mesh, numbers, and the hash of each file; self-describing, checked when it is opened.
 //!
 //! ```text
-//! CASE/case.json   form, name, hash, isovalue, recipe, remarks, file hashes
+//! CASE/case.json   form, name, hash of the images, version, isovalue, planned opening, recipe, remarks, file hashes
 //!      skull.nii   densities in HU, cubes, largest piece of bone only
 //!      mri.nii     the MRI around the brain      mask.nii   1 in the brain
 //!      brain.vtk   tetrahedra
@@ -11,7 +11,8 @@
 //! Patient RAS+ mm throughout. Nothing in it names a patient: images are written anew from their voxels, and the name is made from a hash.
 
 use crate::case::cache::digest;
-use crate::case::import::{Brain, Case, Recipe};
+use crate::case::opening::Opening;
+use crate::case::{Brain, Case, Recipe};
 use crate::error::SessionError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -21,7 +22,7 @@ use trepan_mesh::vtk;
 use trepan_volume::{hounsfield, nifti};
 
 /// Goes up when the folder's form changes.
-const FORM: u32 = 2;
+const FORM: u32 = 3;
 const SKULL: &str = "skull.nii";
 const MRI: &str = "mri.nii";
 const MASK: &str = "mask.nii";
@@ -34,7 +35,10 @@ struct Card {
     form: u32,
     name: String,
     hash: String,
+    /// The version that made it.
+    version: String,
     isovalue_hu: i16,
+    opening: Option<Opening>,
     recipe: Recipe,
     notes: Vec<String>,
     /// Each file and its SHA-256.
@@ -63,7 +67,9 @@ pub fn save(case: &Case, recipe: &Recipe, folder: &Path) -> Result<(), String> {
         form: FORM,
         name: case.name.clone(),
         hash: case.hash.clone(),
+        version: env!("CARGO_PKG_VERSION").into(),
         isovalue_hu: case.isovalue_hu,
+        opening: case.opening,
         recipe: *recipe,
         notes: case.notes.clone(),
         files,
@@ -101,8 +107,8 @@ pub fn load(folder: &Path) -> Result<Case, SessionError> {
         }),
         false => None,
     };
-    let (name, hash) = (card.name, card.hash);
-    Ok(Case { name, hash, skull, isovalue_hu: card.isovalue_hu, brain, notes: card.notes, cached: true })
+    let Card { name, hash, isovalue_hu, opening, notes, .. } = card;
+    Ok(Case { name, hash, skull, isovalue_hu, brain, opening, notes, cached: true })
 }
 
 #[cfg(test)]
@@ -121,14 +127,15 @@ mod tests {
             hash: "ab".into(),
             skull: Some(skull.clone()),
             isovalue_hu: 350,
-            brain: None,
+            opening: Some(Opening { entry_mm: [1.0, 2.0, 3.0], inward: [0.0, 0.0, -1.0], bone_mm: 6.5, brain_mm: 8.0 }),
             notes: vec!["a remark".into()],
-            cached: false,
+            ..Case::default()
         };
-        let recipe = Recipe { spacing_mm: 0.75, tets: 500, isovalue_hu: None, register: false };
+        let recipe = Recipe { spacing_mm: 0.75, tets: 500, isovalue_hu: None, register: false, opening: None };
         save(&case, &recipe, home.path()).expect("the case is written");
         let back = load(home.path()).expect("the case is read");
         assert_eq!((back.skull.as_ref(), back.isovalue_hu, back.notes.len()), (Some(&skull), 350, 1));
+        assert_eq!(back.opening, case.opening);
         let mut bytes = fs::read(home.path().join(SKULL)).expect("a skull");
         bytes[400] ^= 1;
         fs::write(home.path().join(SKULL), bytes).expect("written");

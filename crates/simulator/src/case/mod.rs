@@ -1,7 +1,75 @@
 //! From a patient's files to the operating table.
 
+mod anatomy;
 pub(crate) mod cache;
 pub(crate) mod folder;
 pub(crate) mod import;
+pub(crate) mod opening;
 pub(crate) mod scene;
-pub(crate) mod site;
+mod stages;
+
+use crate::case::opening::Opening;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use trepan_mesh::TetMesh;
+use trepan_volume::VoxelVolume;
+
+/// The files of a case.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inputs {
+    /// A name that may be shown; `None` for a user's own files.
+    pub name: Option<&'static str>,
+    /// CT, where there is one.
+    pub ct: Option<PathBuf>,
+    /// MRI, where there is one.
+    pub mri: Option<PathBuf>,
+    /// Labels, where there are some.
+    pub labels: Option<PathBuf>,
+}
+
+/// The numbers that a case depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Recipe {
+    /// Edge of a skull voxel, mm.
+    pub spacing_mm: f32,
+    /// Tetrahedra of the brain.
+    pub tets: usize,
+    /// Threshold of bone, HU; `None` for the histogram's.
+    pub isovalue_hu: Option<i16>,
+    /// Whether the MRI, and labels with it, are moved to where they fit the CT.
+    pub register: bool,
+    /// A point outside the skull over the place to open, RAS mm; `None` for one that is found.
+    pub opening: Option<[f32; 3]>,
+}
+
+/// What a session needs of the patient.
+#[derive(Clone, Debug, Default)]
+pub struct Case {
+    /// A name without a patient in it.
+    pub name: String,
+    /// Hash of inputs and recipe, hexadecimal.
+    pub hash: String,
+    /// Skull densities in HU on a grid of cubes, largest piece only; `None` without a CT.
+    pub skull: Option<VoxelVolume<i16>>,
+    /// Threshold of bone, HU.
+    pub isovalue_hu: i16,
+    /// The brain; `None` without an MRI.
+    pub brain: Option<Brain>,
+    /// Where the skull is to be opened; `None` without one.
+    pub opening: Option<Opening>,
+    /// Remarks of the import.
+    pub notes: Vec<String>,
+    /// Whether it came from the cache.
+    pub cached: bool,
+}
+
+/// The brain of a case.
+#[derive(Clone, Debug)]
+pub struct Brain {
+    /// 1 in the brain, on a grid of cubes around it.
+    pub mask: VoxelVolume<u8>,
+    /// The MRI on the same grid.
+    pub mri: VoxelVolume<f32>,
+    /// Tetrahedra.
+    pub mesh: TetMesh,
+}

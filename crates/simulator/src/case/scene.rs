@@ -1,7 +1,7 @@
 //! The operating table: a case made ready to be touched, drilled and pressed.
 
-use crate::case::import::{Brain, Case};
-use crate::case::site;
+use crate::case::opening::bare_brain;
+use crate::case::{Brain, Case};
 use crate::error::SessionError;
 use crate::program::Program;
 use std::sync::Arc;
@@ -58,7 +58,12 @@ impl Scene {
         if brain.is_none() {
             remarks.push("without an MRI nothing warns before the burr reaches the brain".into());
         }
-        let site = find_site(program, bone.as_deref(), brain.as_ref()).ok_or_else(|| {
+        let site = match (case.opening, &brain) {
+            (Some(opening), _) if program.has_bone() => Some(opening.into()),
+            (_, Some(brain)) if !program.has_bone() => bare_brain(&brain.field, brain.mesh.bounds().centre()),
+            _ => None,
+        };
+        let site = site.ok_or_else(|| {
             let fault = match (&bone, &brain) {
                 (Some(_), Some(_)) => "no ray from above meets bone and then brain: are the CT and the MRI of one head, upright, in one space?",
                 _ => "no ray from outside meets a wall of bone up to 30 mm thick: is the CT one of a head, and does the isovalue (--isovalue-hu) fit?",
@@ -66,17 +71,6 @@ impl Scene {
             SessionError::Case(fault.into())
         })?;
         Ok(Self { bone, brain, site, remarks })
-    }
-}
-
-fn find_site(program: Program, bone: Option<&BoneVolume>, brain: Option<&RestBrain>) -> Option<Site> {
-    match (bone, brain) {
-        (Some(bone), Some(brain)) if program.has_bone() => {
-            site::burr_hole(bone, &brain.field, brain.mesh.bounds().centre())
-        }
-        (_, Some(brain)) => site::bare_brain(&brain.field, brain.mesh.bounds().centre()),
-        (Some(bone), None) => site::bare_skull(bone),
-        (None, None) => None,
     }
 }
 

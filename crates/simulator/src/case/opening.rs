@@ -1,4 +1,4 @@
-//! Where to operate: a place on the skull where the bone is moderately thick, the brain is close below, and the way goes straight in.
+//! Where the skull is opened: bone of moderate thickness with the brain close below, met straight on; or where the user says.
 //!
 //! # Theory
 //! Rays run from outside towards the brain's middle, spread evenly over the upper right front of the head. Along each: the first
@@ -8,9 +8,69 @@
 //! # When not to use it
 //! To plan a real operation: nothing here knows vessels, sinuses or eloquent cortex.
 
+use crate::case::Brain;
+use crate::error::SessionError;
+use serde::{Deserialize, Serialize};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
-use trepan_volume::{BoneVolume, DistanceField};
+use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+
+/// A planned opening, as a case keeps it; the fields are those of a [`Site`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Opening {
+    /// Point on the outer surface of the bone, RAS mm.
+    pub entry_mm: [f32; 3],
+    /// Unit direction into the head.
+    pub inward: [f32; 3],
+    /// Thickness of the bone along `inward`, mm.
+    pub bone_mm: f32,
+    /// Depth of the brain's surface below the entry, mm.
+    pub brain_mm: f32,
+}
+
+impl Opening {
+    /// Where to open a skull: on the way from `wanted` (a point outside, RAS mm) to the middle of the head, else at the best place
+    /// that is found; `None` when there is none.
+    pub fn on(
+        skull: &VoxelVolume<i16>,
+        isovalue_hu: i16,
+        brain: Option<&Brain>,
+        wanted: Option<[f32; 3]>,
+    ) -> Result<Option<Self>, SessionError> {
+        let bone = BoneVolume::new(skull, isovalue_hu);
+        let bone = bone.map_err(|fault| SessionError::Case(format!("the CT: {fault}")))?;
+        let below = brain.map(|brain| (DistanceField::of_mask(&brain.mask), brain.mesh.bounds().centre()));
+        let Some(wanted) = wanted else {
+            let found = below.map_or_else(|| bare_skull(&bone), |(field, centre)| burr_hole(&bone, &field, centre));
+            return Ok(found.map(Self::from));
+        };
+        let centre = below.as_ref().map_or(bone.bounds().centre(), |below| below.1);
+        let outward = (Vec3::from(wanted) - centre).normalize_or_zero();
+        let site = match &below {
+            Some((field, _)) => site(&bone, field, centre, outward).map(|(_, site)| site),
+            None => wall(&bone, centre, outward),
+        };
+        let nothing = || {
+            let what = if below.is_some() { "bone and then brain" } else { "a wall of bone up to 30 mm thick" };
+            SessionError::Case(format!(
+                "--opening: the way from {wanted:?} to the middle of the head at {centre:.0} (RAS mm) does not meet {what}: give a point outside the skull, over the place to open"
+            ))
+        };
+        site.map(|site| Some(site.into())).ok_or_else(nothing)
+    }
+}
+
+impl From<Site> for Opening {
+    fn from(Site { entry, inward, bone_mm, brain_mm }: Site) -> Self {
+        Self { entry_mm: entry.into(), inward: inward.into(), bone_mm, brain_mm }
+    }
+}
+
+impl From<Opening> for Site {
+    fn from(Opening { entry_mm, inward, bone_mm, brain_mm }: Opening) -> Self {
+        Self { entry: entry_mm.into(), inward: inward.into(), bone_mm, brain_mm }
+    }
+}
 
 /// Rays tried.
 const RAYS: usize = 800;
@@ -20,7 +80,7 @@ const FAR_MM: f32 = 160.0;
 const STEP_MM: f32 = 0.1;
 
 /// The best place for a burr hole above a brain with its middle at `centre`; `None` when no ray meets bone and then brain.
-pub fn burr_hole(bone: &BoneVolume, brain: &DistanceField, centre: Vec3) -> Option<Site> {
+fn burr_hole(bone: &BoneVolume, brain: &DistanceField, centre: Vec3) -> Option<Site> {
     let sites = outward_rays().filter_map(|outward| site(bone, brain, centre, outward));
     sites.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, site)| site)
 }
@@ -34,19 +94,22 @@ pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
 
 /// A place to drill when there is no brain to look for: where a ray towards the middle of the bone meets a wall nearest to 6 mm thick,
 /// on the upper right front if there is one, else anywhere.
-pub fn bare_skull(bone: &BoneVolume) -> Option<Site> {
+fn bare_skull(bone: &BoneVolume) -> Option<Site> {
     let centre = bone.bounds().centre();
-    let site = |outward: Vec3| {
-        let at = |t: f32| bone.is_bone(bone.voxel_of(centre + outward * (FAR_MM - t)));
-        let entry = march(0.0, at)?;
-        let bone_mm = march(entry, |t| !at(t))? - entry;
-        let entry = centre + outward * (FAR_MM - entry);
-        (bone_mm <= 30.0).then_some(Site { entry, inward: -outward, bone_mm, brain_mm: bone_mm + 5.0 })
-    };
     let best = |sites: &mut dyn Iterator<Item = Site>| {
         sites.min_by(|a, b| (a.bone_mm - 6.0).abs().total_cmp(&(b.bone_mm - 6.0).abs()))
     };
-    best(&mut outward_rays().filter_map(site)).or_else(|| best(&mut all_rays().filter_map(site)))
+    best(&mut outward_rays().filter_map(|outward| wall(bone, centre, outward)))
+        .or_else(|| best(&mut all_rays().filter_map(|outward| wall(bone, centre, outward))))
+}
+
+/// The first wall of bone on the way in, if it is at most 30 mm thick.
+fn wall(bone: &BoneVolume, centre: Vec3, outward: Vec3) -> Option<Site> {
+    let at = |t: f32| bone.is_bone(bone.voxel_of(centre + outward * (FAR_MM - t)));
+    let entry = march(0.0, at)?;
+    let bone_mm = march(entry, |t| !at(t))? - entry;
+    let entry = centre + outward * (FAR_MM - entry);
+    (bone_mm <= 30.0).then_some(Site { entry, inward: -outward, bone_mm, brain_mm: bone_mm + 5.0 })
 }
 
 /// Even directions over the upper right front.
@@ -130,6 +193,23 @@ mod tests {
         assert!((site.bone_mm - 6.0).abs() < 2.5 && (site.brain_mm - 8.0).abs() < 2.5, "{site:?}");
         assert!(site.inward.dot(-site.entry.normalize()) > 0.999);
         assert!(site.entry.x > 0.0 && site.entry.z > 0.0);
+    }
+
+    #[test]
+    fn an_opening_is_found_or_made_where_it_is_wanted_or_refused() {
+        let (bone, _) = head();
+        let skull = bone.snapshot();
+        let found = Opening::on(&skull, 400, None, None).unwrap().unwrap();
+        assert!((found.bone_mm - 6.0).abs() < 2.5, "{found:?}");
+        let wanted = Opening::on(&skull, 400, None, Some([-120.0, 0.0, 0.0])).unwrap().unwrap();
+        assert!(
+            Vec3::from(wanted.inward).dot(Vec3::X) > 0.999 && (wanted.entry_mm[0] + 86.0).abs() < 2.0,
+            "{wanted:?}"
+        );
+        let mut bowl = skull;
+        bowl.data[96 * 96 * 40..].fill(-1000);
+        let fault = Opening::on(&bowl, 400, None, Some([0.0, 0.0, 120.0])).unwrap_err().to_string();
+        assert!(fault.contains("--opening") && fault.contains("outside the skull"), "{fault}");
     }
 
     #[test]

@@ -1,0 +1,131 @@
+//! What is made of a patient's images: a skull on a grid of cubes, a brain mask, tetrahedra.
+
+use crate::case::{Brain, Inputs, Recipe};
+use crate::error::SessionError;
+use glam::DAffine3;
+use std::path::Path;
+use trepan_mesh::lattice;
+use trepan_volume::{
+    AIR_HU, BrainConfig, Grid, Interpolation, MaskError, RegistrationConfig, VoxelVolume, brain_mask, check_brain_mask,
+    hounsfield, largest_component, overlap, register, resample, skull_only,
+};
+
+/// Air around the brain that its grids keep, mm.
+const MARGIN_MM: f32 = 12.0;
+/// Most voxels of a skull grid.
+const MOST_VOXELS: usize = 600_000_000;
+
+/// A CT in HU, and remarks on it.
+pub fn read_ct(path: &Path, notes: &mut Vec<String>) -> Result<VoxelVolume<i16>, SessionError> {
+    let import = trepan_volume::import(path)?;
+    notes.extend(import.notes.iter().map(|note| format!("CT: {note}")));
+    hounsfield(&import.volume).map_err(|fault| SessionError::Case(format!("{}: {fault}", path.display())))
+}
+
+/// An MRI without holes, and remarks on it.
+pub fn read_mri(path: &Path, notes: &mut Vec<String>) -> Result<VoxelVolume<f32>, SessionError> {
+    let import = trepan_volume::import(path)?;
+    notes.extend(import.notes.iter().map(|note| format!("MRI: {note}")));
+    let bad = import.volume.data.iter().filter(|v| !v.is_finite()).count();
+    if bad > 0 {
+        let fault = MaskError::NotANumber { count: bad };
+        return Err(SessionError::Case(format!("{}: {fault}", path.display())));
+    }
+    Ok(import.volume)
+}
+
+/// Moves the MRI to where it fits the CT; returns the move.
+pub fn registered(
+    ct: &VoxelVolume<i16>,
+    mri: &mut VoxelVolume<f32>,
+    notes: &mut Vec<String>,
+) -> Result<DAffine3, SessionError> {
+    let found = register(&ct.map(f32::from), mri, &RegistrationConfig::default());
+    let found = found.map_err(|fault| SessionError::Case(fault.to_string()))?;
+    let (_, turn, _) = found.fixed_from_moving.to_scale_rotation_translation();
+    let middle = mri.centre_of(mri.dims.map(|n| n / 2));
+    let moved_mm = found.fixed_from_moving.transform_point3(middle).distance(middle);
+    mri.world_from_voxel = found.fixed_from_moving * mri.world_from_voxel;
+    notes.push(format!(
+        "the MRI was moved by {moved_mm:.1} mm and turned by {:.1} degrees to fit the CT: shared information {:.3} to {:.3}, confidence {:.2}; look at the slices, a confident answer can still be wrong",
+        turn.to_axis_angle().1.to_degrees(),
+        found.start_metric,
+        found.metric,
+        found.confidence
+    ));
+    Ok(found.fixed_from_moving)
+}
+
+/// The brain: what is not 0 in the labels, else what the MRI shows.
+pub fn find_brain(
+    inputs: &Inputs,
+    mri: &VoxelVolume<f32>,
+    ct_from_mri: DAffine3,
+    ct: Option<&VoxelVolume<i16>>,
+    isovalue_hu: i16,
+    notes: &mut Vec<String>,
+) -> Result<VoxelVolume<u8>, SessionError> {
+    let config = BrainConfig { isovalue: Some(isovalue_hu), ..BrainConfig::default() };
+    let Some(path) = &inputs.labels else {
+        return brain_mask(mri, ct, &config).map_err(|fault| SessionError::Case(format!("{fault} (--labels PATH)")));
+    };
+    let case = |fault: String| SessionError::Case(format!("{}: {fault}", path.display()));
+    let mut labels = trepan_volume::labels(path, &trepan_volume::read(path)?)?;
+    labels.world_from_voxel = ct_from_mri * labels.world_from_voxel;
+    let whole = labels.map(|label| u8::from(label != 0));
+    let mask = largest_component(&whole);
+    match check_brain_mask(&mask, &config) {
+        Err(fault @ MaskError::Volume { .. }) => notes.push(format!("labels: {fault}")),
+        Err(fault) => return Err(case(fault.to_string())),
+        Ok(()) => {}
+    }
+    overlap(&mask.map(i16::from), mri).map_err(|fault| case(format!("labels (as CT) and MRI lie apart: {fault}")))?;
+    Ok(mask)
+}
+
+/// The largest piece of bone on a grid of cubes.
+pub fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> Result<VoxelVolume<i16>, SessionError> {
+    let grid = Grid::isotropic_over(ct, recipe.spacing_mm);
+    if grid.voxels() > MOST_VOXELS {
+        let text =
+            format!("--spacing-mm {} asks for {} voxels, the limit is {MOST_VOXELS}", recipe.spacing_mm, grid.voxels());
+        return Err(SessionError::Usage(text));
+    }
+    let mut skull = resample(ct, &grid, Interpolation::Trilinear, AIR_HU);
+    skull_only(&mut skull, isovalue_hu);
+    if !skull.data.iter().any(|&hu| hu >= isovalue_hu) {
+        return Err(SessionError::Case(format!(
+            "no voxel of the CT reaches {isovalue_hu} HU: there is no bone; give --isovalue-hu"
+        )));
+    }
+    Ok(skull)
+}
+
+/// Mask and MRI on a grid around the brain, and its tetrahedra.
+pub fn make_brain(mri: &VoxelVolume<f32>, mask: &VoxelVolume<u8>, recipe: &Recipe) -> Result<Brain, SessionError> {
+    let mask = cropped(mask);
+    let mri = resample(mri, &Grid::of(&mask), Interpolation::Trilinear, 0.0);
+    let config = lattice::Config { target_tets: recipe.tets, ..lattice::Config::default() };
+    let mesh = lattice::tetrahedra(&mask, &config)
+        .map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;
+    mesh.check().map_err(|fault| SessionError::Internal(format!("the mesher made a bad mesh: {fault}")))?;
+    Ok(Brain { mask, mri, mesh })
+}
+
+/// The mask on a grid of 1 mm cubes, cut to its content and a margin.
+fn cropped(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
+    let spacing = mask.spacing_mm().min_element().clamp(0.8, 1.5) as f32;
+    let whole = resample(mask, &Grid::isotropic_over(mask, spacing), Interpolation::Nearest, 0);
+    let [nx, ny, _] = whole.dims;
+    let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
+    for (at, _) in whole.data.iter().enumerate().filter(|(_, v)| **v != 0) {
+        for (axis, v) in [at % nx, at / nx % ny, at / (nx * ny)].into_iter().enumerate() {
+            (low[axis], high[axis]) = (low[axis].min(v), high[axis].max(v));
+        }
+    }
+    let margin = (MARGIN_MM / spacing).ceil() as i64;
+    let dims = [0, 1, 2].map(|axis| (high[axis] - low[axis] + 1) + 2 * margin as usize);
+    let offset = [0, 1, 2].map(|axis| (low[axis] as i64 - margin) as f64);
+    let world_from_voxel = whole.world_from_voxel * DAffine3::from_translation(offset.into());
+    resample(&whole, &Grid { dims, world_from_voxel }, Interpolation::Nearest, 0)
+}

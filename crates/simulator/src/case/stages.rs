@@ -1,0 +1,59 @@
+//! The stages of an import: shown while they run, and the share of each when they are done.
+
+use crate::run::clock::Clock;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::fmt::Write;
+use std::time::Duration;
+
+/// A progress bar that remembers how long each stage took.
+pub struct ImportStages {
+    bar: ProgressBar,
+    clock: Clock,
+    /// What began when, ms.
+    began: Vec<(&'static str, f64)>,
+}
+
+impl ImportStages {
+    /// Before the first of `count` stages.
+    pub fn new(count: u64) -> Self {
+        let style = ProgressStyle::with_template("{spinner} [{bar:24}] {pos}/{len} {msg} {elapsed}");
+        let bar = ProgressBar::new(count).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.enable_steady_tick(Duration::from_millis(120));
+        Self { bar, clock: Clock::start(), began: Vec::new() }
+    }
+
+    /// The stage that begins now; the one before it is done.
+    pub fn next(&mut self, what: &'static str) {
+        self.began.push((what, self.clock.now_ms()));
+        self.bar.inc(1);
+        self.bar.set_message(what);
+    }
+
+    /// All are done: "4.5 s: reading the CT 0.9 s (20 %), ...".
+    pub fn finish(self) -> String {
+        let end_ms = self.clock.now_ms();
+        self.bar.finish_and_clear();
+        shares(&self.began, end_ms)
+    }
+}
+
+fn shares(began: &[(&str, f64)], end_ms: f64) -> String {
+    let mut text = format!("{:.1} s", end_ms * 1e-3);
+    for (at, (what, start_ms)) in began.iter().enumerate() {
+        let took_ms = began.get(at + 1).map_or(end_ms, |next| next.1) - start_ms;
+        let mark = if at == 0 { ':' } else { ',' };
+        _ = write!(text, "{mark} {what} {:.1} s ({:.0} %)", took_ms * 1e-3, 100.0 * took_ms / end_ms.max(1e-9));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stage_has_its_share() {
+        let text = shares(&[("reading", 0.0), ("meshing", 1000.0)], 4000.0);
+        assert_eq!(text, "4.0 s: reading 1.0 s (25 %), meshing 3.0 s (75 %)");
+    }
+}
