@@ -1,10 +1,12 @@
 //! The whole operation: drill the skull, change the tool, probe the brain. All four threads.
 
 use std::process::ExitCode;
-use trepan_simulator::{Inputs, Program, command};
+use trepan_simulator::{Inputs, Program, TissueSource, command};
 
 fn main() -> ExitCode {
     let case = trepan_fixtures::case_head();
-    let built_in = Inputs { name: Some(case.name), ct: Some(case.ct), mri: Some(case.mri), labels: Some(case.labels) };
+    let tissues = vec![TissueSource::ventricles_of_aseg(case.aseg)];
+    let (ct, mri, labels) = (Some(case.ct), Some(case.mri), Some(case.labels));
+    let built_in = Inputs { name: Some(case.name), ct, mri, labels, tissues };
     command(Program::Integrated, built_in)
 }

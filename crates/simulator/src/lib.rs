@@ -34,6 +34,7 @@ pub use case::cache::Cache;
 pub use case::import::open as open_case;
 pub use case::opening::Opening;
 pub use case::scene::{RestBrain, Scene};
+pub use case::tissue::{TissueClass, TissueSource};
 pub use case::{Brain, Case, Inputs, Recipe};
 pub use command::command;
 pub use error::SessionError;

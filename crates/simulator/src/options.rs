@@ -1,5 +1,6 @@
 //! The command line that the three programs share.
 
+use crate::case::tissue::TissueSource;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -11,7 +12,7 @@ pub struct Options {
     #[command(subcommand)]
     pub task: Option<Task>,
     /// A folder that `case build` made
-    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "spacing_mm", "tets", "isovalue_hu", "register", "opening"])]
+    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "isovalue_hu", "register", "opening"])]
     pub case: Option<PathBuf>,
     /// Images, and what is made of them
     #[command(flatten)]
@@ -75,6 +76,9 @@ pub struct Patient {
     /// Label volume: what is not 0 is brain [default: found in the MRI]
     #[arg(long, value_name = "PATH")]
     pub labels: Option<PathBuf>,
+    /// Tissue inside the brain, from a label volume: white, grey, ventricle, tumour or vessel; all that is not 0, or only the codes. Repeatable
+    #[arg(long = "tissue", value_name = "CLASS=PATH[:CODE,...]")]
+    pub tissues: Vec<TissueSource>,
     /// Edge of a skull voxel, mm
     #[arg(long, value_name = "MM", default_value_t = 1.0, allow_negative_numbers = true)]
     pub spacing_mm: f32,

@@ -425,11 +425,11 @@ fn recipe(patient: &Patient) -> Recipe {
 }
 
 fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
-    let given = patient.ct.is_some() || patient.mri.is_some() || patient.labels.is_some();
-    if !given {
+    let Patient { ct, mri, labels, tissues, .. } = patient.clone();
+    if ct.is_none() && mri.is_none() && labels.is_none() && tissues.is_empty() {
         return built_in;
     }
-    Inputs { name: None, ct: patient.ct.clone(), mri: patient.mri.clone(), labels: patient.labels.clone() }
+    Inputs { name: None, ct, mri, labels, tissues }
 }
 
 fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {

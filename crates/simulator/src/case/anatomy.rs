@@ -1,10 +1,11 @@
 //! What is made of a patient's images: a skull on a grid of cubes, a brain mask, tetrahedra.
 
+use crate::case::tissue::TissueClass;
 use crate::case::{Brain, Inputs, Recipe};
 use crate::error::SessionError;
 use glam::DAffine3;
 use std::path::Path;
-use trepan_mesh::lattice;
+use trepan_mesh::{TetMesh, lattice, materials::majority};
 use trepan_volume::{
     AIR_HU, BrainConfig, Grid, Interpolation, MaskError, RegistrationConfig, VoxelVolume, brain_mask, check_brain_mask,
     hounsfield, largest_component, overlap, register, resample, skull_only,
@@ -101,15 +102,34 @@ pub fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> R
     Ok(skull)
 }
 
-/// Mask and MRI on a grid around the brain, and its tetrahedra.
-pub fn make_brain(mri: &VoxelVolume<f32>, mask: &VoxelVolume<u8>, recipe: &Recipe) -> Result<Brain, SessionError> {
-    let mask = cropped(mask);
-    let mri = resample(mri, &Grid::of(&mask), Interpolation::Trilinear, 0.0);
+/// Classes and MRI on a grid around the brain, and its tetrahedra.
+pub fn make_brain(
+    inputs: &Inputs,
+    mri: &VoxelVolume<f32>,
+    mask: &VoxelVolume<u8>,
+    ct_from_mri: DAffine3,
+    recipe: &Recipe,
+    notes: &mut Vec<String>,
+) -> Result<Brain, SessionError> {
+    let mut classes = cropped(mask);
+    let mri = resample(mri, &Grid::of(&classes), Interpolation::Trilinear, 0.0);
+    for source in &inputs.tissues {
+        notes.push(source.paint(ct_from_mri, &mut classes)?);
+    }
     let config = lattice::Config { target_tets: recipe.tets, ..lattice::Config::default() };
-    let mesh = lattice::tetrahedra(&mask, &config)
+    let mesh = lattice::tetrahedra(&classes, &config)
         .map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;
     mesh.check().map_err(|fault| SessionError::Internal(format!("the mesher made a bad mesh: {fault}")))?;
-    Ok(Brain { mask, mri, mesh })
+    let class_of_tet = class_of_tets(&mesh, &classes);
+    Ok(Brain { classes, mri, mesh, class_of_tet })
+}
+
+/// The class that most of each tetrahedron is of; its surface reaches out of the brain, so what is outside counts as brain.
+pub fn class_of_tets(mesh: &TetMesh, classes: &VoxelVolume<u8>) -> Vec<u8> {
+    majority(mesh, &classes.map(u16::from))
+        .into_iter()
+        .map(|class| (class as u8).max(TissueClass::Brain.code()))
+        .collect()
 }
 
 /// The mask on a grid of 1 mm cubes, cut to its content and a margin.

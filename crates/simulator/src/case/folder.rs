@@ -10,6 +10,7 @@
 //! # Practice
 //! Patient RAS+ mm throughout. Nothing in it names a patient: images are written anew from their voxels, and the name is made from a hash.
 
+use crate::case::anatomy::class_of_tets;
 use crate::case::cache::digest;
 use crate::case::opening::Opening;
 use crate::case::{Brain, Case, Recipe};
@@ -22,7 +23,7 @@ use trepan_mesh::vtk;
 use trepan_volume::{hounsfield, nifti};
 
 /// Goes up when the folder's form changes.
-const FORM: u32 = 3;
+const FORM: u32 = 4;
 const SKULL: &str = "skull.nii";
 const MRI: &str = "mri.nii";
 const MASK: &str = "mask.nii";
@@ -54,7 +55,7 @@ pub fn save(case: &Case, recipe: &Recipe, folder: &Path) -> Result<(), String> {
         names.push(SKULL);
     }
     if let Some(brain) = &case.brain {
-        nifti::write(&folder.join(MASK), &brain.mask).map_err(|f| text(&f))?;
+        nifti::write(&folder.join(MASK), &brain.classes).map_err(|f| text(&f))?;
         nifti::write(&folder.join(MRI), &brain.mri).map_err(|f| text(&f))?;
         vtk::write(&folder.join(MESH), &brain.mesh).map_err(|f| text(&f))?;
         names.extend([MASK, MRI, MESH]);
@@ -100,11 +101,11 @@ pub fn load(folder: &Path) -> Result<Case, SessionError> {
         false => None,
     };
     let brain = match card.files.contains_key(MESH) {
-        true => Some(Brain {
-            mask: volume(MASK)?.map(|v| v as u8),
-            mri: volume(MRI)?,
-            mesh: vtk::read(&folder.join(MESH)).map_err(|fault| broken(MESH, &fault))?,
-        }),
+        true => {
+            let classes = volume(MASK)?.map(|v| v as u8);
+            let mesh = vtk::read(&folder.join(MESH)).map_err(|fault| broken(MESH, &fault))?;
+            Some(Brain { class_of_tet: class_of_tets(&mesh, &classes), classes, mri: volume(MRI)?, mesh })
+        }
         false => None,
     };
     let Card { name, hash, isovalue_hu, opening, notes, .. } = card;

@@ -20,10 +20,12 @@ use trepan_volume::{bone_isovalue, overlap};
 /// Opens a case: from the cache if it was made before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
     needs(program, inputs)?;
-    let files: Vec<&Path> =
-        [&inputs.ct, &inputs.mri, &inputs.labels].into_iter().flatten().map(PathBuf::as_path).collect();
-    let given = [&inputs.ct, &inputs.mri, &inputs.labels].map(Option::is_some);
-    let hash = cache.key(&files, &format!("{recipe:?} {given:?}"))?;
+    let images = [&inputs.ct, &inputs.mri, &inputs.labels];
+    let tissues = inputs.tissues.iter().map(|source| &source.path);
+    let files: Vec<&Path> = images.into_iter().flatten().chain(tissues).map(PathBuf::as_path).collect();
+    let given = images.map(Option::is_some);
+    let meant: Vec<_> = inputs.tissues.iter().map(|source| (source.class, &source.codes)).collect();
+    let hash = cache.key(&files, &format!("{recipe:?} {given:?} {meant:?}"))?;
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
     if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
         tracing::info!("case {name} from the cache");
@@ -81,7 +83,9 @@ fn build(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<
     stages.next("resampling the skull");
     let skull = ct.map(|ct| make_skull(&ct, recipe, isovalue_hu)).transpose()?;
     stages.next("meshing the brain");
-    let brain = mri.zip(mask).map(|(mri, mask)| make_brain(&mri, &mask, recipe)).transpose()?;
+    let brain = mri.zip(mask);
+    let brain =
+        brain.map(|(mri, mask)| make_brain(inputs, &mri, &mask, ct_from_mri, recipe, &mut notes)).transpose()?;
     stages.next("planning the opening");
     let opening = skull.as_ref().map(|skull| Opening::on(skull, isovalue_hu, brain.as_ref(), recipe.opening));
     Ok(Case { skull, isovalue_hu, brain, opening: opening.transpose()?.flatten(), notes, ..Case::default() })

@@ -7,8 +7,10 @@ pub(crate) mod import;
 pub(crate) mod opening;
 pub(crate) mod scene;
 mod stages;
+pub(crate) mod tissue;
 
 use crate::case::opening::Opening;
+use crate::case::tissue::TissueSource;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use trepan_mesh::TetMesh;
@@ -23,8 +25,10 @@ pub struct Inputs {
     pub ct: Option<PathBuf>,
     /// MRI, where there is one.
     pub mri: Option<PathBuf>,
-    /// Labels, where there are some.
+    /// Labels, where there are some: what is not 0 is brain.
     pub labels: Option<PathBuf>,
+    /// What in the brain is of another kind.
+    pub tissues: Vec<TissueSource>,
 }
 
 /// The numbers that a case depends on.
@@ -66,10 +70,12 @@ pub struct Case {
 /// The brain of a case.
 #[derive(Clone, Debug)]
 pub struct Brain {
-    /// 1 in the brain, on a grid of cubes around it.
-    pub mask: VoxelVolume<u8>,
+    /// 0 outside, a [`TissueClass`](tissue::TissueClass)'s code inside, on a grid of cubes around the brain.
+    pub classes: VoxelVolume<u8>,
     /// The MRI on the same grid.
     pub mri: VoxelVolume<f32>,
     /// Tetrahedra.
     pub mesh: TetMesh,
+    /// Class code of each tetrahedron.
+    pub class_of_tet: Vec<u8>,
 }

@@ -39,7 +39,7 @@ impl Opening {
     ) -> Result<Option<Self>, SessionError> {
         let bone = BoneVolume::new(skull, isovalue_hu);
         let bone = bone.map_err(|fault| SessionError::Case(format!("the CT: {fault}")))?;
-        let below = brain.map(|brain| (DistanceField::of_mask(&brain.mask), brain.mesh.bounds().centre()));
+        let below = brain.map(|brain| (DistanceField::of_mask(&brain.classes), brain.mesh.bounds().centre()));
         let Some(wanted) = wanted else {
             let found = below.map_or_else(|| bare_skull(&bone), |(field, centre)| burr_hole(&bone, &field, centre));
             return Ok(found.map(Self::from));

@@ -80,7 +80,7 @@ fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>
         remarks.push("too little bone lies under the brain to hold it: its lowest fifth is held instead".into());
         fixed = below(&brain.mesh, 0.2);
     }
-    RestBrain { fixed, field: Arc::new(DistanceField::of_mask(&brain.mask)), mesh: brain.mesh, mri: brain.mri }
+    RestBrain { fixed, field: Arc::new(DistanceField::of_mask(&brain.classes)), mesh: brain.mesh, mri: brain.mri }
 }
 
 /// Surface nodes near the skull base.

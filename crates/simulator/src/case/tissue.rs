@@ -1,0 +1,146 @@
+//! Tissue classes inside the brain: which label volumes say so,.
+//!
+//! # Practice
+//! The brain's class volume holds [`TissueClass::code`]s: 0 outside, 1 brain, more where a label volume names it. Later sources lie over
+//! earlier ones. What lies outside the brain is left out and counted.
+
+use crate::error::SessionError;
+use glam::DAffine3;
+use std::path::PathBuf;
+use std::str::FromStr;
+use trepan_volume::{Grid, Interpolation, VoxelVolume, resample};
+
+/// What a part of the brain is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TissueClass {
+    /// Brain of no special kind.
+    Brain,
+    /// White matter.
+    White,
+    /// Grey matter.
+    Grey,
+    /// Ventricles, filled with fluid.
+    Ventricle,
+    /// Tumour, stiffer than the brain around it.
+    Tumour,
+    /// Blood vessels.
+    Vessel,
+}
+
+impl TissueClass {
+    /// All of them; the place in the list is one less than the code.
+    pub const ALL: [Self; 6] = [Self::Brain, Self::White, Self::Grey, Self::Ventricle, Self::Tumour, Self::Vessel];
+
+    /// Its value in a class volume; 0 is outside.
+    pub fn code(self) -> u8 {
+        self as u8 + 1
+    }
+
+    /// Its name in flags and remarks.
+    pub fn name(self) -> &'static str {
+        ["brain", "white", "grey", "ventricle", "tumour", "vessel"][self as usize]
+    }
+}
+
+/// A label volume that says where a class is: `CLASS=PATH`, or `CLASS=PATH:CODE,CODE` where only some codes mean it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TissueSource {
+    /// The class.
+    pub class: TissueClass,
+    /// The label volume.
+    pub path: PathBuf,
+    /// The codes that mean it; none = all that are not 0.
+    pub codes: Vec<u16>,
+}
+
+impl TissueSource {
+    /// The ventricles in a FreeSurfer segmentation (lateral, inferior lateral, third, fourth).
+    pub fn ventricles_of_aseg(path: PathBuf) -> Self {
+        Self { class: TissueClass::Ventricle, path, codes: vec![4, 5, 14, 15, 43, 44] }
+    }
+
+    fn means(&self, code: u16) -> bool {
+        if self.codes.is_empty() { code != 0 } else { self.codes.contains(&code) }
+    }
+
+    /// Writes the class's code where the labels say so and there is brain; returns a remark with its volume.
+    pub fn paint(&self, ct_from_mri: DAffine3, classes: &mut VoxelVolume<u8>) -> Result<String, SessionError> {
+        let read = trepan_volume::labels(&self.path, &trepan_volume::read(&self.path)?)?;
+        let mut here = read.map(|code| u8::from(self.means(code)));
+        here.world_from_voxel = ct_from_mri * here.world_from_voxel;
+        let all = here.data.iter().filter(|&&v| v != 0).count();
+        let all_ml = all as f64 * here.spacing_mm().element_product() * 1e-3;
+        let here = resample(&here, &Grid::of(classes), Interpolation::Majority, 0);
+        let mut painted = 0;
+        for (class, _) in classes.data.iter_mut().zip(&here.data).filter(|(class, here)| **class != 0 && **here != 0) {
+            *class = self.class.code();
+            painted += 1;
+        }
+        let ml = painted as f64 * classes.spacing_mm().element_product() * 1e-3;
+        let name = self.class.name();
+        if painted == 0 {
+            let codes = if self.codes.is_empty() { "what is not 0".into() } else { format!("codes {:?}", self.codes) };
+            return Err(SessionError::Case(format!(
+                "--tissue {name}: {}: {codes} fills {all_ml:.1} ml, none of it in the brain: give labels in the MRI's space, and codes that are in them",
+                self.path.display()
+            )));
+        }
+        Ok(format!("{name}: {ml:.1} ml of the {all_ml:.1} ml that its labels fill lie in the brain"))
+    }
+}
+
+impl FromStr for TissueSource {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = || TissueClass::ALL[1..].iter().map(|class| class.name()).collect::<Vec<_>>().join(", ");
+        let remedy = || format!("expected CLASS=PATH or CLASS=PATH:CODE,CODE with CLASS one of {}", known());
+        let (name, place) = text.split_once('=').ok_or_else(remedy)?;
+        let class = TissueClass::ALL[1..].iter().find(|class| class.name() == name).ok_or_else(remedy)?;
+        let codes = place.rsplit_once(':').and_then(|(path, codes)| {
+            let codes: Option<Vec<u16>> = codes.split(',').map(|code| code.trim().parse().ok()).collect();
+            Some((path, codes?))
+        });
+        let (path, codes) = codes.unwrap_or((place, Vec::new()));
+        if path.is_empty() { Err(remedy()) } else { Ok(Self { class: *class, path: path.into(), codes }) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trepan_geometry::Vec3;
+    use trepan_volume::nifti;
+
+    #[test]
+    fn a_source_is_read_from_its_flag() {
+        let whole: TissueSource = "tumour=a/b.nrrd".parse().unwrap();
+        assert_eq!((whole.class, whole.codes.len()), (TissueClass::Tumour, 0));
+        let some: TissueSource = "ventricle=c:\\x\\aseg.mgz:4,43".parse().unwrap();
+        assert_eq!((some.path, some.codes), (PathBuf::from("c:\\x\\aseg.mgz"), vec![4, 43]));
+        let odd: TissueSource = "grey=c:\\x".parse().unwrap();
+        assert_eq!(odd.path, PathBuf::from("c:\\x"));
+        for bad in ["tumor=x", "tumour", "brain=x", "tumour=", "tumour=:4"] {
+            assert!(bad.parse::<TissueSource>().unwrap_err().contains("ventricle, tumour"), "{bad}");
+        }
+    }
+
+    #[test]
+    fn labels_are_painted_inside_the_brain_only() {
+        let home = tempfile::tempdir().unwrap();
+        let mut labels = VoxelVolume::isotropic([10; 3], Vec3::ZERO, 1.0, 0u8);
+        labels.data[..300].fill(7);
+        labels.data[300..400].fill(9);
+        let path = home.path().join("labels.nii");
+        nifti::write(&path, &labels).unwrap();
+        let mut classes = VoxelVolume::isotropic([10; 3], Vec3::ZERO, 1.0, 0u8);
+        classes.data[200..].fill(1);
+        let source = |codes| TissueSource { class: TissueClass::Tumour, path: path.clone(), codes };
+        let remark = source(vec![7]).paint(DAffine3::IDENTITY, &mut classes).unwrap();
+        assert!(remark.contains("0.1 ml of the 0.3 ml"), "{remark}");
+        let count = |code| classes.data.iter().filter(|&&v| v == code).count();
+        assert_eq!((count(0), count(TissueClass::Tumour.code()), count(1)), (200, 100, 700));
+        let fault = source(vec![8]).paint(DAffine3::IDENTITY, &mut classes).unwrap_err().to_string();
+        assert!(fault.contains("labels.nii") && fault.contains("codes [8]"), "{fault}");
+    }
+}
