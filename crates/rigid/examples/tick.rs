@@ -1,4 +1,5 @@
-//! Strokes over and drills into a synthetic head of 425 x 403 x 283 voxels and prints what a tick costs, for each method.
+//! Strokes over and drills into a synthetic head of 425 x 403 x 283 voxels and prints what a tick costs, for each method
+//! or for the one named.
 
 use std::time::Instant;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
@@ -11,7 +12,8 @@ fn main() -> Result<(), trepan_volume::BoneError> {
         "{:<18} {:<6} {:>8} {:>8} {:>8} {:>10} {:>8}",
         "method", "task", "p50 us", "p99 us", "max us", "N/ms max", "mm³"
     );
-    for method in Method::all() {
+    let only = std::env::args().nth(1);
+    for method in Method::all().into_iter().filter(|m| only.as_ref().is_none_or(|name| m.name() == name)) {
         for drilling in [false, true] {
             let bone = BoneVolume::new(&head, 400)?;
             stroke(&method, &bone, drilling, if method.name() == "brute" { 50 } else { 2500 });

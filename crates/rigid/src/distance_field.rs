@@ -146,8 +146,10 @@ type Seen = (usize, [usize; 3], Vec3);
 /// What the discs at hand are good for.
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
-    /// Whether they are of the bone as it is now.
+    /// Whether the edges that cross are those of the bone as it is now.
     fresh: bool,
+    /// Whether densities have changed since the discs were put on them.
+    worn: bool,
     /// Grid point around which they were gathered.
     centre: Vec3,
     /// How far from there they are good for, voxels.
@@ -277,6 +279,7 @@ impl DistanceField {
         let base = self.discs.base.as_vec3();
         let (from, goal) = (start - base, bone.grid_of(device) - base);
         let (ball, reach, full) = (self.ball(bone), self.config.move_voxels, self.tool.tip_radius_mm / spacing);
+        self.discs.shape(&self.window, from, full + reach);
         let nearest = ball.select(self.discs.list(), from, full, reach, &mut self.near);
         self.sure = (start, full + reach);
         self.known.clear = nearest > full - 0.5;
@@ -296,10 +299,14 @@ impl DistanceField {
     fn know(&mut self, bone: &BoneVolume, at: Vec3, out: &mut RigidStep) -> bool {
         let reach = self.config.move_voxels;
         if self.known.fresh && at.distance(self.known.centre) <= self.known.ahead {
+            if self.known.worn {
+                self.discs.refresh(&self.window);
+                self.known.worn = false;
+                out.voxels_swept += self.discs.visited;
+            }
             return true;
         }
-        // While bone goes away the discs are out of date in the next tick, so none are gathered ahead.
-        let ahead = if self.works { 0.0 } else { self.config.ahead_voxels };
+        let ahead = self.config.ahead_voxels;
         let radius = self.tool.tip_radius_mm / bone.spacing_mm();
         let far = radius + reach + ahead + self.config.disc_voxels;
         let Some(read) = self.window.cover(bone, at.round().as_ivec3(), far.ceil() as i32 + 3) else {
@@ -308,7 +315,7 @@ impl DistanceField {
         };
         let hollow = if self.known.clear { radius - ahead - 1.0 } else { 0.0 };
         self.discs.gather(&self.window, at, hollow, far);
-        self.known = Known { fresh: true, centre: at, ahead, clear: self.known.clear };
+        self.known = Known { fresh: true, worn: false, centre: at, ahead, clear: self.known.clear };
         out.voxels_swept += read + self.discs.visited;
         out.fallbacks += u32::from(self.discs.overflow > 0);
         true
@@ -379,8 +386,9 @@ impl RigidContact for DistanceField {
             out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| self.window.hu(voxel));
             for voxel in self.burr.bitten() {
                 self.window.set(voxel, bone.hu(voxel));
-                self.known.fresh = false;
             }
+            self.known.worn = true;
+            self.known.fresh &= !self.burr.opened();
         }
     }
 

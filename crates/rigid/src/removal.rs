@@ -138,17 +138,24 @@ pub(crate) struct Burr {
     limit: usize,
     /// Cuts so far, for the dither.
     tick: u32,
+    /// Whether the last cut took a voxel under the isovalue.
+    opened: bool,
 }
 
 impl Burr {
     /// A burr that reaches at most `limit` voxels a tick.
     pub fn new(law: Law, limit: usize) -> Self {
-        Self { law, bites: Vec::with_capacity(limit), limit, tick: 0 }
+        Self { law, bites: Vec::with_capacity(limit), limit, tick: 0, opened: false }
     }
 
     /// Starts the dither anew.
     pub fn reset(&mut self) {
         self.tick = 0;
+    }
+
+    /// Whether a voxel was bone before the last cut and is not any more.
+    pub fn opened(&self) -> bool {
+        self.opened
     }
 
     /// The voxels that the last cut may have changed.
@@ -204,11 +211,19 @@ impl Burr {
         let ball = GridBall { centre: proxy, radius: radius + BITE_VOXELS };
         let hole = GridBall { centre: proxy, radius: radius - 2.0 };
         rows(ball, hole, |start, to| {
-            for x in start.x..=to {
+            // Only what is in front.
+            let behind = (start.as_vec3() - proxy).dot(forward) + 1.0;
+            let skipped = (-behind / forward.x).clamp(-1e4, 1e4);
+            let from = if forward.x > 0.0 { start.x + (skipped.ceil() as i32).max(0) } else { start.x };
+            let to = if forward.x < 0.0 { to.min(start.x + skipped.floor() as i32) } else { to };
+            if forward.x == 0.0 && behind < 0.0 {
+                return;
+            }
+            for x in from..=to {
                 let voxel = start.with_x(x);
                 let from_proxy = voxel.as_vec3() - proxy;
                 let along = from_proxy.dot(forward);
-                let hu = if along < -1.0 { AIR_HU } else { read(voxel) };
+                let hu = read(voxel);
                 if hu == AIR_HU || self.bites.len() == self.limit {
                     continue;
                 }
@@ -229,12 +244,14 @@ impl Burr {
         let fraction = |hu: f32| (0.5 + (hu - iso) / PARTIAL_HU).clamp(0.0, 1.0);
         let mut removed = 0.0;
         self.tick = self.tick.wrapping_add(1);
+        self.opened = false;
         for bite in &self.bites {
             let from = f32::from(bite.hu);
             let whole = (loss(bite) + dither(bite.voxel, self.tick)).floor().clamp(0.0, (from - bite.floor_hu).floor());
             if whole >= 1.0 {
                 bone.set_hu(bite.voxel, (from - whole) as i16);
                 removed += fraction(from) - fraction(from - whole);
+                self.opened |= from >= iso && from - whole < iso;
             }
         }
         removed * bone.voxel_mm3()

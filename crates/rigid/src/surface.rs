@@ -28,6 +28,10 @@ const CLAMP_HU: i32 = 1000;
 
 /// How far the rim of a disc may stand out over a surface that bends away, voxels.
 const STAND_OUT: f32 = 0.05;
+/// While bone goes away normals are found anew in turns of so many ticks; in so few a burr takes some hundredths of a voxel.
+const TURNS: usize = 8;
+/// Cosine of the most that a fit may turn the slope's own normal.
+const SAME: f32 = 0.8;
 /// Smallest disc, voxels.
 const SMALLEST: f32 = 0.2;
 
@@ -55,20 +59,36 @@ pub(crate) struct Discs {
     /// Discs that did not fit.
     pub overflow: u32,
     list: Vec<Disc>,
+    /// The edge on which each disc stands.
+    edges: Vec<Edge>,
+    /// Turn of the refreshing of normals.
+    turn: usize,
     limit: usize,
     radius: f32,
+}
+
+/// A grid edge out of the bone.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    /// The bone voxel, from [`Discs::base`].
+    voxel: IVec3,
+    /// Which of its neighbours.
+    to: u8,
+    /// Whether the disc has its normal yet.
+    shaped: bool,
 }
 
 impl Discs {
     /// Room for `limit` discs, each of at most `radius` voxels.
     pub fn new(limit: usize, radius: f32) -> Self {
-        let list = Vec::with_capacity(limit);
-        Self { base: IVec3::ZERO, visited: 0, voxels: 0, overflow: 0, list, limit, radius }
+        let (list, edges) = (Vec::with_capacity(limit), Vec::with_capacity(limit));
+        Self { base: IVec3::ZERO, visited: 0, voxels: 0, overflow: 0, list, edges, turn: 0, limit, radius }
     }
 
     /// Drops all discs.
     pub fn forget(&mut self) {
         self.list.clear();
+        self.edges.clear();
         (self.visited, self.voxels, self.overflow) = (0, 0, 0);
     }
 
@@ -90,29 +110,52 @@ impl Discs {
         });
     }
 
+    /// Moves the discs to where the crossings are now, and turns one in [`TURNS`] of them to its normal. The edges that cross must be the
+    /// same as when they were gathered.
+    pub fn refresh(&mut self, window: &Window) {
+        self.visited = self.list.len() as u32;
+        self.turn = (self.turn + 1) % TURNS;
+        for (at, (known, edge)) in self.list.iter_mut().zip(&self.edges).enumerate() {
+            let step = NEIGHBOURS[usize::from(edge.to)];
+            let x = crossing(window, self.base, edge.voxel, step);
+            if edge.shaped && at % TURNS == self.turn {
+                *known = disc(window, self.base, x, step.as_vec3(), self.radius);
+            } else {
+                known.centre = x;
+            }
+        }
+    }
+
+    /// Gives those discs their normals that have a point within `reach` of `centre`, voxels from [`Self::base`]. The others are of no use.
+    pub fn shape(&mut self, window: &Window, centre: Vec3, reach: f32) {
+        for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
+            if !edge.shaped && known.centre.distance_squared(centre) <= (reach + known.radius).powi(2) {
+                *known = disc(window, self.base, known.centre, known.normal, self.radius);
+                edge.shaped = true;
+            }
+        }
+    }
+
     /// The voxels of one row, from `start` to x = `to`.
     fn row(&mut self, window: &Window, start: IVec3, to: i32, centre: Vec3, reach: f32) {
         let row = window.row(self.base + start);
         for i in start.x..=to {
             let hu = row.hu(self.base.x + i);
             if hu >= window.isovalue {
-                self.voxel(window, start.with_x(i), hu, centre, reach);
+                self.voxel(window, start.with_x(i), centre, reach);
             }
         }
         self.visited += (to - start.x + 1).max(0) as u32;
     }
 
     /// The crossings around one bone voxel.
-    fn voxel(&mut self, window: &Window, local: IVec3, hu: i16, centre: Vec3, reach: f32) {
+    fn voxel(&mut self, window: &Window, local: IVec3, centre: Vec3, reach: f32) {
         let before = self.list.len();
-        let iso = window.isovalue;
-        for step in NEIGHBOURS {
-            let outside = window.hu(self.base + local + step);
-            if outside >= iso {
+        for (to, step) in (0..).zip(NEIGHBOURS) {
+            if window.hu(self.base + local + step) >= window.isovalue {
                 continue;
             }
-            let along = (f32::from(hu) - f32::from(iso)) / (f32::from(hu) - f32::from(outside));
-            let x = local.as_vec3() + along * step.as_vec3();
+            let x = crossing(window, self.base, local, step);
             if x.distance_squared(centre) > reach * reach {
                 continue;
             }
@@ -120,24 +163,93 @@ impl Discs {
                 self.overflow += 1;
                 continue;
             }
-            self.list.push(disc(window, self.base, x, step.as_vec3(), self.radius));
+            self.list.push(Disc { centre: x, normal: step.as_vec3(), radius: self.radius });
+            self.edges.push(Edge { voxel: local, to, shaped: false });
         }
         self.voxels += u32::from(self.list.len() > before);
     }
 }
 
+/// Where the density passes the isovalue on the edge from bone voxel `local` by `step`, voxels from `base`.
+fn crossing(window: &Window, base: IVec3, local: IVec3, step: IVec3) -> Vec3 {
+    let (inside, outside) = (f32::from(window.hu(base + local)), f32::from(window.hu(base + local + step)));
+    let along = (inside - f32::from(window.isovalue)) / (inside - outside);
+    local.as_vec3() + along * step.as_vec3()
+}
+
 /// A disc at `x` (voxels from `base`) on an edge that leads out of the bone along `edge`.
 fn disc(window: &Window, base: IVec3, x: Vec3, edge: Vec3, radius: f32) -> Disc {
-    let shape = Shape::at(window, base, x);
+    let block = Block::read(window, base, x);
+    let shape = Shape::of(&block);
     let size = shape.slope.length();
     // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than its kernel.
     if size < 1.0 || -shape.slope.dot(edge) < -0.5 * size {
         return Disc { centre: x, normal: edge, radius: SMALLEST.min(radius) };
     }
-    let normal = -shape.slope / size;
+    let rough = -shape.slope / size;
+    let normal = block.fitted(rough).unwrap_or(rough);
     let bend = shape.bend(normal) / size;
     let radius = if bend > 0.0 { (2.0 * STAND_OUT / bend).sqrt().clamp(SMALLEST.min(radius), radius) } else { radius };
     Disc { centre: x, normal, radius }
+}
+
+/// The densities around a place over the isovalue, HU, and where the middle one is seen from the place.
+struct Block {
+    hu: [[[f32; 3]; 3]; 3],
+    off: Vec3,
+}
+
+impl Block {
+    fn read(window: &Window, base: IVec3, x: Vec3) -> Self {
+        let middle = x.round();
+        let corner = base + middle.as_ivec3() - 1;
+        let iso = i32::from(window.isovalue);
+        let mut hu = [[[0.0; 3]; 3]; 3];
+        for (k, layer) in (0..).zip(&mut hu) {
+            for (j, cells) in (0..).zip(layer) {
+                let row = window.row(corner + IVec3::new(0, j, k));
+                for (i, cell) in (corner.x..).zip(cells) {
+                    *cell = (i32::from(row.hu(i)) - iso).clamp(-CLAMP_HU, CLAMP_HU) as f32;
+                }
+            }
+        }
+        Self { hu, off: middle - x }
+    }
+
+    fn taps(&self) -> [[[f32; 3]; 3]; 3] {
+        [taps(-self.off.x), taps(-self.off.y), taps(-self.off.z)]
+    }
+
+    /// The normal of the plane through the place that fits the densities within a voxel of the plane of `normal` best; `None` when they do
+    /// not say. A scanner's density rises for a voxel or so about a surface and is flat beyond: what is flat would bend the slope.
+    fn fitted(&self, normal: Vec3) -> Option<Vec3> {
+        let [tx, ty, tz] = self.taps();
+        let (mut square, mut mixed, mut moment) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        for k in 0..3 {
+            for j in 0..3 {
+                let (y, z) = (self.off.y + j as f32 - 1.0, self.off.z + k as f32 - 1.0);
+                let (across, share) = (normal.y * y + normal.z * z, ty[j][0] * tz[k][0]);
+                for i in 0..3 {
+                    let x = self.off.x + i as f32 - 1.0;
+                    let height = normal.x * x + across;
+                    let w = tx[i][0] * share * (1.0 - height * height).max(0.0);
+                    square += w * Vec3::new(x * x, y * y, z * z);
+                    mixed += w * Vec3::new(y * z, x * z, x * y);
+                    moment -= w * self.hu[k][j][i] * Vec3::new(x, y, z);
+                }
+            }
+        }
+        // The inverse of a symmetric matrix but for its determinant, by cofactors: only the direction counts.
+        let straight = Vec3::new(square.y * square.z, square.x * square.z, square.x * square.y) - mixed * mixed;
+        let crossed = Vec3::new(mixed.y * mixed.z, mixed.x * mixed.z, mixed.x * mixed.y) - square * mixed;
+        times(straight, crossed, moment).try_normalize().filter(|found| found.dot(normal) > SAME)
+    }
+}
+
+/// A symmetric matrix of `straight` xx, yy, zz and `mixed` yz, xz, xy, times `v`.
+fn times(straight: Vec3, mixed: Vec3, v: Vec3) -> Vec3 {
+    straight * v
+        + Vec3::new(mixed.z * v.y + mixed.y * v.z, mixed.z * v.x + mixed.x * v.z, mixed.y * v.x + mixed.x * v.y)
 }
 
 /// Slope and bending of the quadratic B-spline of the density, HU per voxel and per voxel².
@@ -150,21 +262,13 @@ struct Shape {
 }
 
 impl Shape {
-    fn at(window: &Window, base: IVec3, x: Vec3) -> Self {
-        let middle = x.round();
-        let (tx, ty, tz) = (taps(x.x - middle.x), taps(x.y - middle.y), taps(x.z - middle.z));
-        let corner = base + middle.as_ivec3() - 1;
-        let iso = i32::from(window.isovalue);
+    fn of(block: &Block) -> Self {
+        let [tx, ty, tz] = block.taps();
         let mut shape = Self { slope: Vec3::ZERO, straight: Vec3::ZERO, mixed: Vec3::ZERO };
-        for (k, z) in (0..).zip(tz) {
-            for (j, y) in (0..).zip(ty) {
-                let (mut even, mut steep, mut bent) = (0.0, 0.0, 0.0);
-                let row = window.row(corner + IVec3::new(0, j, k));
-                for (i, x) in (corner.x..).zip(tx) {
-                    let hu = i32::from(row.hu(i));
-                    let value = (hu - iso).clamp(-CLAMP_HU, CLAMP_HU) as f32;
-                    (even, steep, bent) = (even + value * x[0], steep + value * x[1], bent + value * x[2]);
-                }
+        for (layer, z) in block.hu.iter().zip(tz) {
+            for (row, y) in layer.iter().zip(ty) {
+                let sum = |n: usize| row[0] * tx[0][n] + row[1] * tx[1][n] + row[2] * tx[2][n];
+                let (even, steep, bent) = (sum(0), sum(1), sum(2));
                 shape.slope += Vec3::new(steep * y[0] * z[0], even * y[1] * z[0], even * y[0] * z[1]);
                 shape.straight += Vec3::new(bent * y[0] * z[0], even * y[2] * z[0], even * y[0] * z[2]);
                 shape.mixed += Vec3::new(even * y[1] * z[1], steep * y[0] * z[1], steep * y[1] * z[0]);
@@ -175,14 +279,7 @@ impl Shape {
 
     /// How much the surface bends away from `normal` where it bends most, times the slope; negative where it bends up everywhere.
     fn bend(&self, normal: Vec3) -> f32 {
-        let (s, m) = (self.straight, self.mixed);
-        let times = |v: Vec3| {
-            Vec3::new(
-                s.x * v.x + m.z * v.y + m.y * v.z,
-                m.z * v.x + s.y * v.y + m.x * v.z,
-                m.y * v.x + m.x * v.y + s.z * v.z,
-            )
-        };
+        let times = |v: Vec3| times(self.straight, self.mixed, v);
         let (u, v) = normal.any_orthonormal_pair();
         let (uu, uv, vv) = (u.dot(times(u)), u.dot(times(v)), v.dot(times(v)));
         let (mean, half) = (0.5 * (uu + vv), 0.5 * (uu - vv));
