@@ -190,6 +190,7 @@ impl DistanceField {
             self.seen = this;
             self.known = Known::default();
             self.window.forget();
+            self.discs.renew();
         }
     }
 
@@ -300,7 +301,8 @@ impl DistanceField {
         let reach = self.config.move_voxels;
         if self.known.fresh && at.distance(self.known.centre) <= self.known.ahead {
             if self.known.worn {
-                self.discs.refresh(&self.window);
+                let full = self.tool.tip_radius_mm / bone.spacing_mm();
+                self.discs.refresh(&self.window, at - self.discs.base.as_vec3(), full + reach);
                 self.known.worn = false;
                 out.voxels_swept += self.discs.visited;
             }
@@ -383,7 +385,11 @@ impl RigidContact for DistanceField {
             if self.discs.list().is_empty() {
                 return;
             }
-            out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| self.window.hu(voxel));
+            let window = &self.window;
+            out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| {
+                let row = window.row(voxel);
+                move |x| row.hu(x)
+            });
             for voxel in self.burr.bitten() {
                 self.window.set(voxel, bone.hu(voxel));
             }
@@ -403,7 +409,7 @@ impl RigidContact for DistanceField {
         (self.hand, self.left_mm) = (pose.translation, 0.0);
         self.known = Known::default();
         self.window.forget();
-        self.discs.forget();
+        self.discs.renew();
         self.near.clear();
         self.burr.reset();
     }

@@ -48,10 +48,16 @@ pub(crate) fn nearest(goal: Vec3, spaces: &[HalfSpace]) -> Option<Vec3> {
     let mut active = Active::default();
     let mut x = goal;
     for _ in 0..MAX_EXCHANGES {
-        let worst = spaces.iter().min_by(|a, b| a.height(x).total_cmp(&b.height(x)));
+        let (mut lowest, mut worst) = (-TOLERANCE, None);
+        for space in spaces {
+            let height = space.height(x);
+            if height < lowest {
+                (lowest, worst) = (height, Some(space));
+            }
+        }
         match worst {
-            Some(worst) if worst.height(x) < -TOLERANCE => x = active.exchange(goal, worst)?,
-            _ => return Some(x),
+            Some(worst) => x = active.exchange(goal, worst)?,
+            None => return Some(x),
         }
     }
     None

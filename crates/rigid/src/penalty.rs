@@ -51,7 +51,7 @@ impl<F: Feel> RigidContact for Penalty<F> {
         out.manifold.point = self.proxy.translation - radius_mm * normal;
         if drilling && self.tool.kind == ToolKind::Burr {
             let cut = Cut { device, proxy: self.proxy.translation, radius_mm, depth_mm, dt_ms };
-            out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| bone.hu(voxel));
+            out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)));
         }
     }
 

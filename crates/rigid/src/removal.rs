@@ -34,7 +34,7 @@
 //! `per-tick` for anything but comparison: it removes twice as much at twice the tick rate, and nothing physical drives it.
 
 use crate::rows::{GridBall, rows};
-use glam::IVec3;
+use glam::{IVec3, Vec3Swizzles};
 use trepan_geometry::Vec3;
 use trepan_volume::{AIR_HU, BoneVolume};
 
@@ -165,8 +165,8 @@ impl Burr {
 
     /// Takes bone away and returns how much, mm³.
     ///
-    /// `read` gives densities: the bone's, or those of a copy of it.
-    pub fn cut(&mut self, bone: &BoneVolume, cut: &Cut, read: impl Fn(IVec3) -> i16) -> f32 {
+    /// `read` gives the densities of the row along x through a voxel: the bone's, or those of a copy of it.
+    pub fn cut<R: Fn(i32) -> i16>(&mut self, bone: &BoneVolume, cut: &Cut, read: impl Fn(IVec3) -> R) -> f32 {
         let sound = cut.depth_mm.is_finite() && cut.dt_ms.is_finite();
         if !sound || cut.depth_mm <= 0.0 || cut.dt_ms <= 0.0 {
             return 0.0;
@@ -200,7 +200,7 @@ impl Burr {
     /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device, or on its surface.
     ///
     /// The ball of the device alone would miss the flanks that hold a proxy far behind: the burr would stall.
-    fn find_bites(&mut self, bone: &BoneVolume, cut: &Cut, read: impl Fn(IVec3) -> i16) {
+    fn find_bites<R: Fn(i32) -> i16>(&mut self, bone: &BoneVolume, cut: &Cut, read: impl Fn(IVec3) -> R) {
         self.bites.clear();
         let (device, proxy) = (bone.grid_of(cut.device), bone.grid_of(cut.proxy));
         let radius = cut.radius_mm / bone.spacing_mm();
@@ -210,29 +210,27 @@ impl Burr {
         // Within the proxy there is air, but for the foot of the ramp.
         let ball = GridBall { centre: proxy, radius: radius + BITE_VOXELS };
         let hole = GridBall { centre: proxy, radius: radius - 2.0 };
+        let outer = (radius + 1.0).powi(2);
+        let Self { bites, limit, .. } = self;
         rows(ball, hole, |start, to| {
-            // Only what is in front.
-            let behind = (start.as_vec3() - proxy).dot(forward) + 1.0;
-            let skipped = (-behind / forward.x).clamp(-1e4, 1e4);
-            let from = if forward.x > 0.0 { start.x + (skipped.ceil() as i32).max(0) } else { start.x };
-            let to = if forward.x < 0.0 { to.min(start.x + skipped.floor() as i32) } else { to };
-            if forward.x == 0.0 && behind < 0.0 {
-                return;
-            }
-            for x in from..=to {
-                let voxel = start.with_x(x);
-                let from_proxy = voxel.as_vec3() - proxy;
-                let along = from_proxy.dot(forward);
-                let hu = read(voxel);
-                if hu == AIR_HU || self.bites.len() == self.limit {
+            let first = start.as_vec3() - proxy;
+            let (across, rest) = (first.yz().length_squared(), first.yz().dot(forward.yz()));
+            let row = read(start);
+            for x in start.x..=to {
+                let dx = first.x + (x - start.x) as f32;
+                let along = rest + dx * forward.x;
+                let hu = if along < -1.0 { AIR_HU } else { row(x) };
+                let (apart, passed) = (across + dx * dx, along.clamp(0.0, length));
+                let from_way = apart + passed * (passed - 2.0 * along);
+                if hu == AIR_HU || from_way >= outer {
                     continue;
                 }
-                let outside = from_proxy.distance(along.clamp(0.0, length) * forward) - radius;
+                let outside = from_way.max(0.0).sqrt() - radius;
                 let floor_hu = (iso + RAMP_HU * outside).max(f32::from(AIR_HU));
-                if outside < 1.0 && f32::from(hu) > floor_hu {
-                    let ahead = from_proxy.length() - radius;
-                    let near = ((BITE_VOXELS - ahead) / BITE_VOXELS).clamp(0.0, 1.0);
-                    self.bites.push(Bite { voxel, hu, reach_hu: near * (f32::from(hu) - floor_hu), floor_hu });
+                if f32::from(hu) > floor_hu && bites.len() < *limit {
+                    let near = (1.0 - (apart.sqrt() - radius) / BITE_VOXELS).clamp(0.0, 1.0);
+                    let reach_hu = near * (f32::from(hu) - floor_hu);
+                    bites.push(Bite { voxel: start.with_x(x), hu, reach_hu, floor_hu });
                 }
             }
         });

@@ -32,11 +32,10 @@ pub(crate) fn rows(ball: GridBall, hole: GridBall, mut visit: impl FnMut(IVec3, 
     for k in low.z..=high.z {
         for j in low.y..=high.y {
             let Some(half) = ball.half(j, k) else { continue };
-            let (from, to) = ((ball.centre.x - half).ceil() as i32, (ball.centre.x + half).floor() as i32);
+            let (from, to) = (ceil(ball.centre.x - half), floor(ball.centre.x + half));
             match hole.half(j, k) {
                 Some(skip) => {
-                    let (skip_from, skip_to) =
-                        ((hole.centre.x - skip).ceil() as i32, (hole.centre.x + skip).floor() as i32);
+                    let (skip_from, skip_to) = (ceil(hole.centre.x - skip), floor(hole.centre.x + skip));
                     visit(IVec3::new(from, j, k), to.min(skip_from - 1));
                     visit(IVec3::new(from.max(skip_to + 1).max(skip_from), j, k), to);
                 }
@@ -44,6 +43,17 @@ pub(crate) fn rows(ball: GridBall, hole: GridBall, mut visit: impl FnMut(IVec3, 
             }
         }
     }
+}
+
+/// The greatest whole number up to `x`. Without SSE 4.1 the standard one is a call.
+fn floor(x: f32) -> i32 {
+    let cut = x as i32;
+    cut - i32::from(x < cut as f32)
+}
+
+/// The least whole number from `x` on.
+fn ceil(x: f32) -> i32 {
+    -floor(-x)
 }
 
 #[cfg(test)]

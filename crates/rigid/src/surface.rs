@@ -29,7 +29,9 @@ const CLAMP_HU: i32 = 1000;
 /// How far the rim of a disc may stand out over a surface that bends away, voxels.
 const STAND_OUT: f32 = 0.05;
 /// While bone goes away normals are found anew in turns of so many ticks; in so few a burr takes some hundredths of a voxel.
-const TURNS: usize = 8;
+const TURNS: u32 = 4;
+/// Discs of before that are kept; a power of two.
+const CACHE: usize = 4096;
 /// Cosine of the most that a fit may turn the slope's own normal.
 const SAME: f32 = 0.8;
 /// Smallest disc, voxels.
@@ -61,8 +63,10 @@ pub(crate) struct Discs {
     list: Vec<Disc>,
     /// The edge on which each disc stands.
     edges: Vec<Edge>,
-    /// Turn of the refreshing of normals.
-    turn: usize,
+    /// Discs of before, by edge: a tool that moves on meets most of them again.
+    before: Vec<Before>,
+    /// How often discs have been refreshed.
+    wear: u32,
     limit: usize,
     radius: f32,
 }
@@ -78,11 +82,50 @@ struct Edge {
     shaped: bool,
 }
 
+/// A disc of before.
+#[derive(Clone, Copy, Debug, Default)]
+struct Before {
+    /// Which edge; 0 for none.
+    key: u64,
+    normal: Vec3,
+    radius: f32,
+    /// The value of [`Discs::wear`] when its normal was found.
+    wear: u32,
+}
+
+/// One number for an edge of the grid, never 0.
+fn key(base: IVec3, edge: &Edge) -> u64 {
+    let part = |x: i32| u64::from(x as u32 & 0xF_FFFF);
+    let v = base + edge.voxel;
+    1 << 63 | part(v.x) << 43 | part(v.y) << 23 | part(v.z) << 3 | u64::from(edge.to)
+}
+
+/// Place of a key among the discs of before.
+fn slot(key: u64) -> usize {
+    (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - CACHE.trailing_zeros())) as usize
+}
+
+fn keep(before: &mut [Before], base: IVec3, edge: &Edge, disc: &Disc, wear: u32) {
+    let key = key(base, edge);
+    before[slot(key)] = Before { key, normal: disc.normal, radius: disc.radius, wear };
+}
+
 impl Discs {
     /// Room for `limit` discs, each of at most `radius` voxels.
     pub fn new(limit: usize, radius: f32) -> Self {
         let (list, edges) = (Vec::with_capacity(limit), Vec::with_capacity(limit));
-        Self { base: IVec3::ZERO, visited: 0, voxels: 0, overflow: 0, list, edges, turn: 0, limit, radius }
+        Self {
+            base: IVec3::ZERO,
+            visited: 0,
+            voxels: 0,
+            overflow: 0,
+            list,
+            edges,
+            before: vec![Before::default(); CACHE],
+            wear: 0,
+            limit,
+            radius,
+        }
     }
 
     /// Drops all discs.
@@ -90,6 +133,12 @@ impl Discs {
         self.list.clear();
         self.edges.clear();
         (self.visited, self.voxels, self.overflow) = (0, 0, 0);
+    }
+
+    /// Drops all discs and what is remembered of earlier ones: the bone is another.
+    pub fn renew(&mut self) {
+        self.forget();
+        self.before.fill(Before::default());
     }
 
     /// The discs found.
@@ -110,16 +159,18 @@ impl Discs {
         });
     }
 
-    /// Moves the discs to where the crossings are now, and turns one in [`TURNS`] of them to its normal. The edges that cross must be the
-    /// same as when they were gathered.
-    pub fn refresh(&mut self, window: &Window) {
+    /// Moves the discs to where the crossings are now, and turns one in [`TURNS`] of those with a point within `reach` of `centre` to its normal.
+    /// The edges that cross must be the same as when they were gathered.
+    pub fn refresh(&mut self, window: &Window, centre: Vec3, reach: f32) {
         self.visited = self.list.len() as u32;
-        self.turn = (self.turn + 1) % TURNS;
-        for (at, (known, edge)) in self.list.iter_mut().zip(&self.edges).enumerate() {
+        self.wear = self.wear.wrapping_add(1);
+        for (known, edge) in self.list.iter_mut().zip(&self.edges) {
             let step = NEIGHBOURS[usize::from(edge.to)];
             let x = crossing(window, self.base, edge.voxel, step);
-            if edge.shaped && at % TURNS == self.turn {
+            let turn = (slot(key(self.base, edge)) as u32).wrapping_add(self.wear) % TURNS == 0;
+            if edge.shaped && turn && x.distance_squared(centre) <= (reach + known.radius).powi(2) {
                 *known = disc(window, self.base, x, step.as_vec3(), self.radius);
+                keep(&mut self.before, self.base, edge, known, self.wear);
             } else {
                 known.centre = x;
             }
@@ -130,7 +181,14 @@ impl Discs {
     pub fn shape(&mut self, window: &Window, centre: Vec3, reach: f32) {
         for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
             if !edge.shaped && known.centre.distance_squared(centre) <= (reach + known.radius).powi(2) {
-                *known = disc(window, self.base, known.centre, known.normal, self.radius);
+                let key = key(self.base, edge);
+                let was = &self.before[slot(key)];
+                if was.key == key && self.wear.wrapping_sub(was.wear) < TURNS {
+                    (known.normal, known.radius) = (was.normal, was.radius);
+                } else {
+                    *known = disc(window, self.base, known.centre, known.normal, self.radius);
+                    keep(&mut self.before, self.base, edge, known, self.wear);
+                }
                 edge.shaped = true;
             }
         }

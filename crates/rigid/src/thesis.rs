@@ -197,7 +197,9 @@ impl Thesis {
             Law::Rate { .. } => {
                 let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
                 let depth_mm = device.distance(proxy);
-                self.burr.cut(bone, &Cut { device, proxy, radius_mm, depth_mm, dt_ms }, |voxel| bone.hu(voxel))
+                self.burr.cut(bone, &Cut { device, proxy, radius_mm, depth_mm, dt_ms }, |voxel| {
+                    move |x| bone.hu(voxel.with_x(x))
+                })
             }
         }
     }
