@@ -71,7 +71,7 @@ fn mesh(n: usize) -> Result<(usize, f64), Box<dyn std::error::Error>> {
     let tets = mesh.tets.len();
     let (top, fixed) = (boxes::nodes_where(&mesh, |p| p.z > size - 1e-3), boxes::nodes_where(&mesh, |p| p.z < 1e-3));
     let rest: Vec<f32> = top.iter().map(|&n| mesh.positions[n as usize].x).collect();
-    let body = Body { mesh, fixed, material: Material::BRAIN };
+    let body = Body::uniform(mesh, fixed, Material::BRAIN);
     let mut solver = reference::Reference::new(&body, &Default::default())?;
     solver.step(&Loads { gravity: Vec3::X * 1e-4, ..Loads::default() }, 1.0);
     let moved = top.iter().zip(&rest).map(|(&n, x)| f64::from(solver.positions()[n as usize].x - x));

@@ -37,7 +37,7 @@ fn ns_per_tet_step(clock: &Clock) -> f64 {
     let mesh = boxes::split_box([10; 3], Vec3::splat(100.0));
     let tets = mesh.tets.len();
     let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
-    let body = Body { mesh, fixed, material: Material::BRAIN };
+    let body = Body::uniform(mesh, fixed, Material::BRAIN);
     let mut solver = Tled::new(&body, &Config::default()).expect("a split box is sound");
     let loads = Loads { gravity: Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2, ..Loads::default() };
     let dt_ms = solver.stable_dt_ms();

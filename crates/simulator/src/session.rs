@@ -218,7 +218,7 @@ impl Session {
             poisson: 0.45,
             density_g_mm3: units::WATER_G_PER_MM3,
         };
-        let body = Body { mesh: brain.mesh.clone(), fixed: brain.fixed.clone(), material };
+        let body = Body::uniform(brain.mesh.clone(), brain.fixed.clone(), material);
         let solver: Box<dyn SoftSolver> = match solver_named(&self.options)? {
             None => {
                 let config = trepan_tled::Config { balanced_gravity: gravity, ..Default::default() };

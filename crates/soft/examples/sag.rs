@@ -11,7 +11,7 @@ fn main() -> Result<(), trepan_soft::BodyError> {
             let tip = boxes::nodes_where(&mesh, |p| p.x > 99.9 && (p.truncate().y - 10.0).abs() < 0.1)[1] as usize;
             let fixed = boxes::nodes_where(&mesh, |p| p.x < 1e-3);
             let material = Material::NeoHookean { young_mpa, poisson: 0.3, density_g_mm3: 1e-3 };
-            let body = Body { mesh, fixed, material };
+            let body = Body::uniform(mesh, fixed, material);
             let mut solver = method.build(&body)?;
             let dt = solver.stable_dt_ms().min(1.0);
             let steps = if solver.stable_dt_ms().is_finite() { (3000.0 / dt) as u32 } else { 1 };

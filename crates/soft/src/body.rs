@@ -11,16 +11,41 @@ pub struct Body {
     pub mesh: TetMesh,
     /// Nodes that do not move; order and repeats do not matter.
     pub fixed: Vec<u32>,
-    /// Material of every tetrahedron.
-    pub material: Material,
+    /// What the body is made of, at most 256 materials; one that no tetrahedron has is allowed.
+    pub materials: Vec<Material>,
+    /// Which of `materials` each tetrahedron is of.
+    pub material_of_tet: Vec<u8>,
 }
 
 /// Why a body was refused.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum BodyError {
-    /// The material is not physical.
-    #[error(transparent)]
-    Material(#[from] MaterialError),
+    /// A material is not physical.
+    #[error("materials[{index}]: {source}")]
+    Material {
+        /// Which one.
+        index: usize,
+        /// What is wrong with it.
+        source: MaterialError,
+    },
+    /// Not one material index a tetrahedron.
+    #[error("material_of_tet has {found} entries: it must have one for each of the {tets} tetrahedra")]
+    MaterialCount {
+        /// Entries.
+        found: usize,
+        /// Tetrahedra.
+        tets: usize,
+    },
+    /// A tetrahedron names a material that does not exist.
+    #[error("material_of_tet[{tet}] is {index}, but there are only {materials} materials")]
+    MaterialRange {
+        /// The tetrahedron.
+        tet: usize,
+        /// The material that it names.
+        index: u8,
+        /// Materials of the body.
+        materials: usize,
+    },
     /// There is nothing to simulate.
     #[error("mesh.tets is empty: a body needs at least one tetrahedron")]
     Empty,
@@ -73,14 +98,47 @@ pub enum BodyError {
     },
 }
 
+/// A tetrahedron as solvers need it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Element {
+    pub corners: [u32; 4],
+    pub shape: Shape,
+    /// Index of its material.
+    pub material: u8,
+}
+
 impl Body {
+    /// A body of one material.
+    pub fn uniform(mesh: TetMesh, fixed: Vec<u32>, material: Material) -> Self {
+        Self { material_of_tet: vec![0; mesh.tets.len()], mesh, fixed, materials: vec![material] }
+    }
+
+    /// Material of a tetrahedron.
+    pub fn material(&self, tet: usize) -> &Material {
+        &self.materials[usize::from(self.material_of_tet[tet])]
+    }
+
+    /// The same body of one material throughout.
+    pub fn with_material(self, material: Material) -> Self {
+        Self::uniform(self.mesh, self.fixed, material)
+    }
+
+    pub(crate) fn elements(&self) -> Vec<Element> {
+        let of = |(t, &corners): (usize, &[u32; 4])| Element {
+            corners,
+            shape: self.shape(t),
+            material: self.material_of_tet[t],
+        };
+        self.mesh.tets.iter().enumerate().map(of).collect()
+    }
+
     /// Checks everything that a solver relies on.
     pub fn check(&self) -> Result<(), BodyError> {
-        self.material.check()?;
         let (nodes, tets) = (self.mesh.positions.len(), &self.mesh.tets);
         if tets.is_empty() {
             return Err(BodyError::Empty);
         }
+        self.check_materials()?;
         if let Some(bad) = self.mesh.positions.iter().position(|p| !p.is_finite()) {
             return Err(BodyError::Position(bad));
         }
@@ -103,6 +161,20 @@ impl Body {
         }
     }
 
+    fn check_materials(&self) -> Result<(), BodyError> {
+        for (index, material) in self.materials.iter().enumerate() {
+            material.check().map_err(|source| BodyError::Material { index, source })?;
+        }
+        let (found, tets, materials) = (self.material_of_tet.len(), self.mesh.tets.len(), self.materials.len());
+        if found != tets {
+            return Err(BodyError::MaterialCount { found, tets });
+        }
+        match self.material_of_tet.iter().position(|&m| usize::from(m) >= materials) {
+            Some(tet) => Err(BodyError::MaterialRange { tet, index: self.material_of_tet[tet], materials }),
+            None => Ok(()),
+        }
+    }
+
     /// Rest shape of a tetrahedron, f64.
     pub fn shape(&self, tet: usize) -> Shape {
         Shape::of(self.mesh.corners(tet).map(Vec3::as_dvec3))
@@ -112,7 +184,7 @@ impl Body {
     pub fn lumped_masses_g(&self) -> Vec<f64> {
         let mut masses = vec![0.0; self.mesh.positions.len()];
         for (tet, corners) in self.mesh.tets.iter().enumerate() {
-            let quarter = f64::from(self.material.density_g_mm3()) * self.mesh.volume_mm3(tet) / 4.0;
+            let quarter = f64::from(self.material(tet).density_g_mm3()) * self.mesh.volume_mm3(tet) / 4.0;
             corners.iter().for_each(|&n| masses[n as usize] += quarter);
         }
         masses
@@ -146,13 +218,19 @@ mod tests {
     fn cube() -> Body {
         let mesh = boxes::split_box([2, 2, 2], Vec3::splat(10.0));
         let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
-        Body { mesh, fixed, material: Material::BRAIN }
+        Body::uniform(mesh, fixed, Material::BRAIN)
     }
 
     #[test]
     fn masses_add_up_to_density_times_volume() {
         let total: f64 = cube().lumped_masses_g().iter().sum();
         assert!((total - 1.0).abs() < 1e-6);
+        let mut half = cube();
+        let dense = Material::NeoHookean { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 3e-3 };
+        half.materials.push(dense);
+        half.material_of_tet.iter_mut().step_by(2).for_each(|m| *m = 1);
+        let total: f64 = half.lumped_masses_g().iter().sum();
+        assert!((total - 2.0).abs() < 1e-6, "{total}");
     }
 
     #[test]
@@ -169,6 +247,12 @@ mod tests {
         assert!(matches!(broken(|b| b.mesh.positions[4].y = f32::NAN), BodyError::Position(4)));
         assert!(matches!(broken(|b| b.mesh.positions.push(Vec3::ZERO)), BodyError::Orphan(27)));
         assert!(matches!(broken(|b| b.fixed.push(27)), BodyError::FixedRange { node: 27, .. }));
+        assert!(matches!(broken(|b| _ = b.material_of_tet.pop()), BodyError::MaterialCount { found: 47, tets: 48 }));
+        assert!(matches!(broken(|b| b.material_of_tet[5] = 1), BodyError::MaterialRange { tet: 5, index: 1, .. }));
+        assert!(matches!(broken(|b| b.materials.clear()), BodyError::MaterialRange { tet: 0, materials: 0, .. }));
+        let bad = Material::NeoHookean { young_mpa: -1.0, poisson: 0.3, density_g_mm3: 1e-3 };
+        let body = Body { materials: vec![Material::BRAIN, bad], ..cube() };
+        assert!(body.check().unwrap_err().to_string().starts_with("materials[1]: young_mpa"));
     }
 
     #[test]

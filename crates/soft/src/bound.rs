@@ -16,7 +16,7 @@ const INVERSE_STEPS: usize = 8;
 
 /// Stable step by single elements, ms: safe always, up to twice too careful.
 pub fn element_bound_ms(body: &Body) -> f64 {
-    let omega2 = |t| element_omega2(&body.shape(t), &body.material);
+    let omega2 = |t| element_omega2(&body.shape(t), body.material(t));
     2.0 / (0..body.mesh.tets.len()).map(omega2).fold(0.0, f64::max).sqrt()
 }
 
@@ -131,7 +131,7 @@ mod tests {
     fn beam(cells: [usize; 3]) -> Body {
         let mesh = boxes::split_box(cells, Vec3::new(100.0, 20.0, 20.0));
         let fixed = boxes::nodes_where(&mesh, |p| p.x < 1e-3);
-        Body { mesh, fixed, material: Material::THESIS }
+        Body::uniform(mesh, fixed, Material::THESIS)
     }
 
     #[test]

@@ -15,7 +15,9 @@
 //! # When not to use it
 //! For strains over about 20 %: the stress grows linearly with stretch and does not resist collapse. For vibration: it is damped by the step.
 
-use crate::{Body, BodyError, Loads, Shape, SoftSolver, StepReport, lowest_frequency};
+use crate::body::Element;
+use crate::operator::Hooke;
+use crate::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DQuat, DVec3};
 use trepan_geometry::Vec3;
 
@@ -41,14 +43,14 @@ impl Default for Config {
 /// Corotational solver.
 pub struct Corotational {
     config: Config,
-    tets: Vec<([u32; 4], Shape)>,
+    elements: Vec<Element>,
     turns: Vec<DQuat>,
     rest: Vec<DVec3>,
     u: Vec<DVec3>,
     v: Vec<DVec3>,
     masses: Vec<f64>,
     fixed: Vec<bool>,
-    hooke: Hooke,
+    hooke: Vec<Hooke>,
     damping_per_ms: f64,
     system: System,
     positions: Vec<Vec3>,
@@ -62,21 +64,6 @@ struct System {
     along: Vec<DVec3>,
     product: Vec<DVec3>,
     tool: Vec<DVec3>,
-}
-
-/// Small-strain elasticity.
-#[derive(Clone, Copy)]
-struct Hooke {
-    lambda: f64,
-    mu: f64,
-}
-
-impl Hooke {
-    /// Stress of the symmetric part of a displacement gradient.
-    fn stress(self, h: DMat3) -> DMat3 {
-        let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
-        (h + h.transpose()) * self.mu + DMat3::from_diagonal(DVec3::splat(self.lambda * trace))
-    }
 }
 
 impl Corotational {
@@ -94,19 +81,19 @@ impl Corotational {
                 right: "over 0 and finite",
             });
         }
-        let (nodes, mu) = (body.mesh.positions.len(), body.material.shear_mpa());
+        let nodes = body.mesh.positions.len();
         let zero = || vec![DVec3::ZERO; nodes];
         let critical = || 2.0 * lowest_frequency(body).unwrap_or(0.0);
         Ok(Self {
             config: *config,
-            tets: body.mesh.tets.iter().enumerate().map(|(t, &corners)| (corners, body.shape(t))).collect(),
+            elements: body.elements(),
             turns: vec![DQuat::IDENTITY; body.mesh.tets.len()],
             rest: body.mesh.positions.iter().map(|p| p.as_dvec3()).collect(),
             u: zero(),
             v: zero(),
             masses: body.lumped_masses_g(),
             fixed: body.fixed_mask(),
-            hooke: Hooke { lambda: body.material.bulk_mpa() - mu * 2.0 / 3.0, mu },
+            hooke: body.materials.iter().map(Hooke::of).collect(),
             damping_per_ms: config.damping_per_ms.map_or_else(critical, f64::from),
             system: System { right: zero(), residual: zero(), along: zero(), product: zero(), tool: zero() },
             positions: body.mesh.positions.clone(),
@@ -121,15 +108,16 @@ impl Corotational {
         {
             *right = if *fixed { DVec3::ZERO } else { (*v + gravity * h) * *m };
         }
-        let (mut inverted, hooke) = (0, self.hooke);
-        for ((corners, shape), turn) in self.tets.iter().zip(&mut self.turns) {
+        let mut inverted = 0;
+        for (Element { corners, shape, material }, turn) in self.elements.iter().zip(&mut self.turns) {
             let [a, b, c, d] = corners.map(|n| self.u[n as usize]);
             let f = DMat3::IDENTITY + shape.gradient_of([a, b, c, d]);
             *turn = rotation_of(f, *turn);
             inverted += u32::from(f.determinant() <= 0.0);
             let r = DMat3::from_quat(*turn);
             let strain = r.transpose() * f - DMat3::IDENTITY;
-            scatter(&mut self.system.right, corners, &shape.forces_of(r * hooke.stress(strain)), -h, &self.fixed);
+            let stress = self.hooke[usize::from(*material)].stress(strain);
+            scatter(&mut self.system.right, corners, &shape.forces_of(r * stress), -h, &self.fixed);
         }
         inverted
     }
@@ -140,11 +128,12 @@ impl Corotational {
         for ((y, x), (m, fixed)) in product.iter_mut().zip(along.iter()).zip(self.masses.iter().zip(&self.fixed)) {
             *y = if *fixed { DVec3::ZERO } else { *x * (*m * (1.0 + self.damping_per_ms * h)) };
         }
-        for ((corners, shape), turn) in self.tets.iter().zip(&self.turns) {
+        for (Element { corners, shape, material }, turn) in self.elements.iter().zip(&self.turns) {
             let r = DMat3::from_quat(*turn);
             let [a, b, c, d] = corners.map(|n| along[n as usize]);
             let g = r.transpose() * shape.gradient_of([a, b, c, d]);
-            scatter(product, corners, &shape.forces_of(r * self.hooke.stress(g)), h * h, &self.fixed);
+            let stress = self.hooke[usize::from(*material)].stress(g);
+            scatter(product, corners, &shape.forces_of(r * stress), h * h, &self.fixed);
         }
         if spring > 0.0 {
             let pressed = spring * dot(tool, along);

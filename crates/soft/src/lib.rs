@@ -13,7 +13,7 @@
 //!
 //! let mesh = boxes::split_box([2, 2, 2], trepan_geometry::Vec3::splat(20.0));
 //! let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
-//! let body = Body { mesh, fixed, material: Material::BRAIN };
+//! let body = Body::uniform(mesh, fixed, Material::BRAIN);
 //! let mut solver = Method::named("reference").unwrap().build(&body)?;
 //! let gravity = trepan_geometry::Vec3::new(0.0, 0.0, -9.81e-3);
 //! let report = solver.step(&Loads { gravity, ..Loads::default() }, 1.0);

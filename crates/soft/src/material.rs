@@ -7,6 +7,10 @@
 //! # Sources
 //! Wittek, Miller, Kikinis, Warfield, J. Biomech. 40 (2007): brain shift with 3 kPa. Miller and Chinzei, J. Biomech. 35 (2002):
 //! Ogden's law with 842 Pa and exponent -4.7, for brain in tension and compression. Both near 3 kPa at the strain rates of surgery.
+//! Budday et al., J. Mech. Behav. Biomed. Mater. 46 (2015): white matter 1.895 kPa, grey 1.389 kPa (bovine, indentation); [`Material::WHITE_MATTER`] and
+//! [`Material::GREY_MATTER`] keep their ratio and, in equal shares, the 3 kPa of living brain, since what is dead and slow is softer.
+//! Wittek et al., Prog. Biophys. Mol. Biol. 103 (2010): ventricles as a solid of 10 Pa and ν 0.1, which the fluid can leave.
+//! Torii et al., Comput. Methods Appl. Mech. Eng. 195 (2006): wall of a cerebral artery 1 MPa, ν 0.45.
 //!
 //! # When not to use it
 //! St. Venant-Kirchhoff gives way under compression beyond a stretch of about 0.6 and does not heal when turned inside out: it is here to be
@@ -94,6 +98,18 @@ impl Material {
     /// Brain that answers tension and compression differently (Miller and Chinzei 2002), instantaneous moduli.
     pub const BRAIN_OGDEN: Self =
         Self::Ogden { shear_mpa: [8.42e-4, 0.0], exponent: [-4.7, 1.0], poisson: 0.45, density_g_mm3: 1.0e-3 };
+
+    /// White matter: 1.36 times as stiff as grey, the mean of both [`Material::BRAIN`]'s.
+    pub const WHITE_MATTER: Self = Self::NeoHookean { young_mpa: 0.003_46, poisson: 0.45, density_g_mm3: 1.0e-3 };
+
+    /// Grey matter.
+    pub const GREY_MATTER: Self = Self::NeoHookean { young_mpa: 0.002_54, poisson: 0.45, density_g_mm3: 1.0e-3 };
+
+    /// A ventricle filled with CSF, as a solid so soft and compressible that it neither holds the brain up nor keeps it from closing.
+    pub const VENTRICLE: Self = Self::NeoHookean { young_mpa: 1.0e-5, poisson: 0.1, density_g_mm3: 1.0e-3 };
+
+    /// Wall of a cerebral artery. 300 times as stiff as brain: it shortens the stable step 18 times where elements are as large.
+    pub const VESSEL_WALL: Self = Self::NeoHookean { young_mpa: 1.0, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
     /// A tumour, three times as stiff as the brain around it (reports range from 2 to 10 times).
     pub const TUMOUR: Self = Self::NeoHookean { young_mpa: 0.009, poisson: 0.45, density_g_mm3: 1.0e-3 };
@@ -199,7 +215,10 @@ mod tests {
 
     #[test]
     fn presets_are_accepted_and_the_thesis_wave_speed_is_6_35_m_per_s() {
-        for preset in [Material::BRAIN, Material::BRAIN_OGDEN, Material::TUMOUR, Material::THESIS] {
+        let parts = [Material::WHITE_MATTER, Material::GREY_MATTER, Material::VENTRICLE, Material::VESSEL_WALL];
+        for preset in
+            [Material::BRAIN, Material::BRAIN_OGDEN, Material::TUMOUR, Material::THESIS].into_iter().chain(parts)
+        {
             assert_eq!(preset.check(), Ok(()));
         }
         assert!((Material::THESIS.wave_speed() - 6.35).abs() < 0.01);

@@ -6,24 +6,44 @@
 //! # Practice
 //! Serves time-step bounds, vibration frequencies and the linear solver's checks. About 20 ns a tetrahedron.
 
-use crate::{Body, Shape};
-use glam::DVec3;
+use crate::body::Element;
+use crate::{Body, Material};
+use glam::{DMat3, DVec3};
 
 /// `K x` at the rest state; rows and columns of fixed nodes are taken out.
 pub struct Stiffness {
-    tets: Vec<([u32; 4], Shape)>,
+    elements: Vec<Element>,
     fixed: Vec<bool>,
     masses: Vec<f64>,
-    lambda: f64,
-    mu: f64,
+    hooke: Vec<Hooke>,
+}
+
+/// Small-strain elasticity.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hooke {
+    pub lambda: f64,
+    pub mu: f64,
+}
+
+impl Hooke {
+    pub fn of(material: &Material) -> Self {
+        let (mu, kappa) = (material.shear_mpa(), material.bulk_mpa());
+        Self { lambda: kappa - mu * 2.0 / 3.0, mu }
+    }
+
+    /// Stress of the symmetric part of a displacement gradient.
+    #[inline]
+    pub fn stress(self, h: DMat3) -> DMat3 {
+        let trace = self.lambda * (h.x_axis.x + h.y_axis.y + h.z_axis.z);
+        (h + h.transpose()) * self.mu + DMat3::from_diagonal(DVec3::splat(trace))
+    }
 }
 
 impl Stiffness {
     /// The operator of a body that passed its check.
     pub fn of(body: &Body) -> Self {
-        let tets = body.mesh.tets.iter().enumerate().map(|(t, &corners)| (corners, body.shape(t))).collect();
-        let (mu, kappa) = (body.material.shear_mpa(), body.material.bulk_mpa());
-        Self { tets, fixed: body.fixed_mask(), masses: body.lumped_masses_g(), lambda: kappa - mu * 2.0 / 3.0, mu }
+        let hooke = body.materials.iter().map(Hooke::of).collect();
+        Self { elements: body.elements(), fixed: body.fixed_mask(), masses: body.lumped_masses_g(), hooke }
     }
 
     /// Lumped mass of every node, g.
@@ -39,9 +59,10 @@ impl Stiffness {
     /// Trace of the 3×3 block on K's diagonal at every node, N/mm.
     pub fn diagonal(&self) -> Vec<f64> {
         let mut diagonal = vec![0.0; self.masses.len()];
-        for (corners, shape) in &self.tets {
+        for Element { corners, shape, material } in &self.elements {
+            let Hooke { lambda, mu } = self.hooke[usize::from(*material)];
             for (&n, g) in corners.iter().zip(&shape.gradients) {
-                diagonal[n as usize] += shape.volume_mm3 * g.length_squared() * (self.lambda + 4.0 * self.mu);
+                diagonal[n as usize] += shape.volume_mm3 * g.length_squared() * (lambda + 4.0 * mu);
             }
         }
         diagonal
@@ -50,15 +71,10 @@ impl Stiffness {
     /// `y = K x`, N for mm; zero at fixed nodes, whose x must be zero.
     pub fn apply(&self, x: &[DVec3], y: &mut [DVec3]) {
         y.fill(DVec3::ZERO);
-        for ([a, b, c, d], shape) in &self.tets {
-            let [a, b, c, d] = [*a as usize, *b as usize, *c as usize, *d as usize];
+        for Element { corners, shape, material } in &self.elements {
+            let [a, b, c, d] = corners.map(|n| n as usize);
             let h = shape.gradient_of([x[a], x[b], x[c], x[d]]);
-            let trace = self.lambda * (h.x_axis.x + h.y_axis.y + h.z_axis.z);
-            let mut stress = (h + h.transpose()) * self.mu;
-            stress.x_axis.x += trace;
-            stress.y_axis.y += trace;
-            stress.z_axis.z += trace;
-            let forces = shape.forces_of(stress);
+            let forces = shape.forces_of(self.hooke[usize::from(*material)].stress(h));
             y[a] += forces[0];
             y[b] += forces[1];
             y[c] += forces[2];

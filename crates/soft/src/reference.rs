@@ -13,8 +13,9 @@
 //! # When not to use it
 //! In any loop that must keep a rate. Where several equilibria exist it finds one of them, not the one that dynamics would reach.
 
+use crate::body::Element;
 use crate::factor::Factor;
-use crate::{Body, BodyError, Law, Loads, Shape, SoftSolver, StepReport};
+use crate::{Body, BodyError, Law, Loads, Material, Shape, SoftSolver, StepReport};
 use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;
 
@@ -36,9 +37,9 @@ impl Default for Config {
 /// Static hyperelastic solver.
 pub struct Reference {
     config: Config,
-    law: Law,
+    laws: Vec<Law>,
     stiffness_mpa: f64,
-    tets: Vec<([u32; 4], Shape)>,
+    elements: Vec<Element>,
     rest: Vec<DVec3>,
     masses: Vec<f64>,
     fixed: Vec<bool>,
@@ -66,9 +67,9 @@ impl Reference {
         let nodes = body.mesh.positions.len();
         Ok(Self {
             config: *config,
-            law: body.material.law(),
-            stiffness_mpa: body.material.shear_mpa(),
-            tets: body.mesh.tets.iter().enumerate().map(|(t, &corners)| (corners, body.shape(t))).collect(),
+            laws: body.materials.iter().map(Material::law).collect(),
+            stiffness_mpa: body.materials.iter().map(Material::shear_mpa).fold(0.0, f64::max),
+            elements: body.elements(),
             rest: body.mesh.positions.iter().map(|p| p.as_dvec3()).collect(),
             masses: body.lumped_masses_g(),
             fixed: body.fixed_mask(),
@@ -105,11 +106,12 @@ impl Reference {
             pressing: false,
             contact_n: 0.0,
         };
-        for (corners, shape) in &self.tets {
+        for Element { corners, shape, material } in &self.elements {
+            let law = &self.laws[usize::from(*material)];
             let f = DMat3::IDENTITY + shape.gradient_of(corners.map(|n| u[n as usize]));
-            trial.energy += shape.volume_mm3 * self.law.energy(f);
+            trial.energy += shape.volume_mm3 * law.energy(f);
             trial.inverted += u32::from(f.determinant() <= 0.0);
-            for (&n, force) in corners.iter().zip(shape.forces_of(self.law.stress(f))) {
+            for (&n, force) in corners.iter().zip(shape.forces_of(law.stress(f))) {
                 trial.residual[n as usize] += force;
                 trial.scale = trial.scale.max(force.length());
             }
@@ -148,15 +150,15 @@ impl Reference {
         let mut shift = 0.0;
         for _ in 0..12 {
             self.factor.clear();
-            for (corners, shape) in &self.tets {
+            for Element { corners, shape, material } in &self.elements {
                 let f = DMat3::IDENTITY + shape.gradient_of(corners.map(|n| self.u[n as usize]));
-                add_element(&mut self.factor, &self.law, corners, shape, f);
+                add_element(&mut self.factor, &self.laws[usize::from(*material)], corners, shape, f);
             }
             self.factor.add_diagonal(shift);
             if self.factor.factor() {
                 return true;
             }
-            shift = (4.0 * shift).max(1e-3 * self.stiffness_mpa * self.tets[0].1.volume_mm3.cbrt());
+            shift = (4.0 * shift).max(1e-3 * self.stiffness_mpa * self.elements[0].shape.volume_mm3.cbrt());
         }
         false
     }

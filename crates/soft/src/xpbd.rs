@@ -13,7 +13,8 @@
 //! With substeps over about twice the bound of an explicit step ([`crate::power_bound_ms`]), as for a stiff body on a fine mesh: one pass then leaves so
 //! much undone that the body is too soft, and further on it folds into itself.
 
-use crate::{Body, BodyError, Loads, Shape, SoftSolver, StepReport, lowest_frequency};
+use crate::body::Element;
+use crate::{Body, BodyError, Loads, Material, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;
 
@@ -37,17 +38,30 @@ impl Default for Config {
 /// XPBD solver.
 pub struct Xpbd {
     config: Config,
-    tets: Vec<([u32; 4], Shape)>,
+    elements: Vec<Element>,
     rest: Vec<DVec3>,
     u: Vec<DVec3>,
     before: Vec<DVec3>,
     v: Vec<DVec3>,
     inverse_mass: Vec<f64>,
-    mu: f64,
-    lambda: f64,
+    moduli: Vec<Moduli>,
     damping_per_ms: f64,
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
+}
+
+/// μ and λ' of a material, MPa.
+#[derive(Clone, Copy)]
+struct Moduli {
+    mu: f64,
+    lambda: f64,
+}
+
+impl Moduli {
+    fn of(material: &Material) -> Self {
+        let mu = material.shear_mpa();
+        Self { mu, lambda: material.bulk_mpa() + mu / 3.0 }
+    }
 }
 
 impl Xpbd {
@@ -67,18 +81,16 @@ impl Xpbd {
         }
         let (nodes, fixed) = (body.mesh.positions.len(), body.fixed_mask());
         let inverse = |(m, fixed): (&f64, &bool)| if *fixed { 0.0 } else { 1.0 / m };
-        let (mu, kappa) = (body.material.shear_mpa(), body.material.bulk_mpa());
         let critical = || 2.0 * lowest_frequency(body).unwrap_or(0.0);
         Ok(Self {
             config: *config,
-            tets: body.mesh.tets.iter().enumerate().map(|(t, &corners)| (corners, body.shape(t))).collect(),
+            elements: body.elements(),
             rest: body.mesh.positions.iter().map(|p| p.as_dvec3()).collect(),
             u: vec![DVec3::ZERO; nodes],
             before: vec![DVec3::ZERO; nodes],
             v: vec![DVec3::ZERO; nodes],
             inverse_mass: body.lumped_masses_g().iter().zip(&fixed).map(inverse).collect(),
-            mu,
-            lambda: kappa + mu / 3.0,
+            moduli: body.materials.iter().map(Moduli::of).collect(),
             damping_per_ms: config.damping_per_ms.map_or_else(critical, f64::from),
             positions: body.mesh.positions.clone(),
             velocities: vec![Vec3::ZERO; nodes],
@@ -92,9 +104,8 @@ impl Xpbd {
             self.u[n] += (self.v[n] * keep + loads.gravity.as_dvec3() * h) * h;
         }
         let mut inverted = 0;
-        for t in 0..self.tets.len() {
-            let (corners, shape) = self.tets[t];
-            inverted += u32::from(self.correct(corners, &shape, h) <= 0.0);
+        for t in 0..self.elements.len() {
+            inverted += u32::from(self.correct(self.elements[t], h) <= 0.0);
         }
         report.inverted = report.inverted.max(inverted);
         self.press(loads, h, report);
@@ -107,7 +118,8 @@ impl Xpbd {
     }
 
     /// Moves an element's nodes by both constraints at once; gives its J before.
-    fn correct(&mut self, corners: [u32; 4], shape: &Shape, h: f64) -> f64 {
+    fn correct(&mut self, Element { corners, shape, material }: Element, h: f64) -> f64 {
+        let Moduli { mu, lambda } = self.moduli[usize::from(material)];
         let [a, b, c, d] = corners.map(|n| self.u[n as usize]);
         let f = DMat3::IDENTITY + shape.gradient_of([a, b, c, d]);
         let (j, cofactor) = (f.determinant(), crate::energy::cofactor(f));
@@ -117,8 +129,8 @@ impl Xpbd {
         let weights = corners.map(|n| self.inverse_mass[n as usize]);
         let sum = |p: &[DVec3; 4], q: &[DVec3; 4]| (0..4).map(|i| weights[i] * p[i].dot(q[i])).sum::<f64>();
         let compliance = |stiffness: f64| 1.0 / (stiffness * shape.volume_mm3 * h * h);
-        let (dd, hh) = (sum(&stretch, &stretch) + compliance(self.mu), sum(&volume, &volume) + compliance(self.lambda));
-        let (dh, excess) = (sum(&stretch, &volume), j - 1.0 - self.mu / self.lambda);
+        let (dd, hh) = (sum(&stretch, &stretch) + compliance(mu), sum(&volume, &volume) + compliance(lambda));
+        let (dh, excess) = (sum(&stretch, &volume), j - 1.0 - mu / lambda);
         let determinant = dd * hh - dh * dh;
         let (of_d, of_h) = ((dh * excess - hh * length) / determinant, (dh * length - dd * excess) / determinant);
         for i in (0..4).filter(|&i| weights[i] > 0.0) {

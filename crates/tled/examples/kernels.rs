@@ -10,7 +10,8 @@ const STEPS: usize = 10;
 
 fn main() -> Result<(), BodyError> {
     let mesh = boxes::split_box([18, 17, 12], Vec3::new(144.0, 136.0, 96.0));
-    let body = Body { fixed: boxes::nodes_where(&mesh, |p| p.z < 1.0), mesh, material: Material::BRAIN };
+    let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0);
+    let body = Body::uniform(mesh, fixed, Material::BRAIN);
     println!("{} tetrahedra, {} nodes", body.mesh.tets.len(), body.mesh.positions.len());
     let plain = Config::default();
     let of_kernel = |kernel: Kernel| (kernel.name(), Config { kernel, ..plain });

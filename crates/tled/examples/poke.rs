@@ -8,7 +8,8 @@ use trepan_tled::{Config, Tled};
 fn main() -> Result<(), trepan_soft::BodyError> {
     let mesh = boxes::split_box([12, 12, 10], Vec3::new(120.0, 120.0, 100.0));
     let pressed = boxes::nodes_where(&mesh, |p| p.z > 99.0 && p.distance(Vec3::new(60.0, 60.0, 100.0)) < 12.0);
-    let body = Body { fixed: boxes::nodes_where(&mesh, |p| p.z < 1.0), mesh, material: Material::BRAIN };
+    let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0);
+    let body = Body::uniform(mesh, fixed, Material::BRAIN);
     let mut tled = Tled::new(&body, &Config::default())?;
     let dt = tled.stable_dt_ms();
     println!("{} tetrahedra, step {dt:.3} ms, damping {:.4} /ms", body.mesh.tets.len(), tled.damping_per_ms());

@@ -3,7 +3,7 @@
 use crate::block::{Quad, WIDTH};
 use crate::config::Config;
 use crate::kernel::{Found, Kernel};
-use crate::layout::Layout;
+use crate::layout::{Layout, kind};
 use crate::part::{Part, Work};
 use crate::relaxation::Relaxation;
 use crate::team::Team;
@@ -33,8 +33,9 @@ impl Elements {
         }
         let parts = if config.threads > 1 { PARTS_PER_THREAD * config.threads } else { 1 };
         let blocks = layout.tet_at.len().div_ceil(WIDTH).div_ceil(parts);
+        let of_one_law = layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b));
         let part = |tets: &[u32]| Part::of(body, layout, tets, &config.relaxation);
-        let parts = layout.tet_at.chunks(blocks * WIDTH).map(part).collect();
+        let parts = of_one_law.flat_map(|tets| tets.chunks(blocks * WIDTH)).map(part).collect();
         Self {
             team: Team::of(parts, volume.len(), config.threads),
             sums: vec![[0.0; 4]; volume.len()],
@@ -97,15 +98,20 @@ mod tests {
         let stiff = Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 };
         let mooney = Material::MooneyRivlin { c10_mpa: 3e-4, c01_mpa: 2e-4, poisson: 0.45, density_g_mm3: 1e-3 };
         for material in [Material::BRAIN, stiff, mooney, Material::BRAIN_OGDEN] {
-            let body = Body { mesh: mesh.clone(), fixed: vec![], material };
+            let body = Body::uniform(mesh.clone(), vec![], material);
             for (cure, relaxation) in [(false, Relaxation::NONE), (true, Relaxation::NONE), (true, Relaxation::BRAIN)] {
                 compare(&body, cure, relaxation);
             }
         }
+        let mut mixed = Body::uniform(mesh, vec![], Material::BRAIN);
+        mixed.materials.extend([stiff, mooney, Material::BRAIN_OGDEN, Material::TUMOUR]);
+        mixed.material_of_tet.iter_mut().enumerate().for_each(|(t, m)| *m = (t * 7 % 5) as u8);
+        compare(&mixed, false, Relaxation::NONE);
+        compare(&mixed, true, Relaxation::BRAIN);
     }
 
     fn compare(body: &Body, cure: bool, relaxation: Relaxation) {
-        let layout = Layout::of(&body.mesh);
+        let layout = Layout::of(body);
         let noise = |i: usize| ((i as f32 * 12.9898).sin() * 43758.547).fract() * 3.0;
         let count = layout.node_at.len();
         let forces = |kernel: Kernel, threads: usize| {
@@ -122,7 +128,7 @@ mod tests {
         let scalar = forces(Kernel::Scalar, 1);
         for kernel in Kernel::all().into_iter().filter(|k| k.runs_here()) {
             for threads in [1, 2, 3] {
-                assert_eq!(scalar, forces(kernel, threads), "{} {threads} {:?}", kernel.name(), body.material);
+                assert_eq!(scalar, forces(kernel, threads), "{} {threads} {:?}", kernel.name(), body.materials);
             }
         }
         let total: Vec3 = scalar.1.iter().map(|f| Vec3::from_array(*f)).sum();

@@ -1,10 +1,11 @@
 //! Order of nodes and elements in memory: neighbours in space become neighbours in memory.
 //!
 //! # Theory
-//! Nodes are sorted along a Morton curve, elements by their lowest node. A step then reads nodes that are still in the cache.
+//! Nodes are sorted along a Morton curve, elements by law and then by their lowest node: those of one law run through one kernel, and a step
+//! reads nodes that are still in the cache.
 
 use trepan_geometry::Vec3;
-use trepan_mesh::TetMesh;
+use trepan_soft::{Body, Law};
 
 /// Solver order of nodes and elements.
 pub(crate) struct Layout {
@@ -17,7 +18,8 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    pub fn of(mesh: &TetMesh) -> Self {
+    pub fn of(body: &Body) -> Self {
+        let mesh = &body.mesh;
         let bounds = mesh.bounds();
         let scale = Vec3::splat(1023.0) / (bounds.max - bounds.min).max(Vec3::splat(f32::MIN_POSITIVE));
         let code = |n: &u32| morton((mesh.positions[*n as usize] - bounds.min) * scale);
@@ -29,9 +31,19 @@ impl Layout {
         tet_at.sort_by_cached_key(|&t| {
             let mut places = mesh.tets[t as usize].map(|n| place_of[n as usize]);
             places.sort_unstable();
-            (places, t)
+            (kind(body, t), places, t)
         });
         Self { node_at, place_of, tet_at }
+    }
+}
+
+/// Which law a tetrahedron follows, as a number.
+pub(crate) fn kind(body: &Body, tet: u32) -> u8 {
+    match body.material(tet as usize).law() {
+        Law::NeoHookean(_) => 0,
+        Law::StVenantKirchhoff { .. } => 1,
+        Law::MooneyRivlin { .. } => 2,
+        Law::Ogden { .. } => 3,
     }
 }
 
@@ -44,11 +56,16 @@ fn morton(p: Vec3) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trepan_soft::boxes;
+    use trepan_soft::{Material, boxes};
 
     #[test]
     fn every_node_and_element_has_one_place() {
-        let layout = Layout::of(&boxes::split_box([3, 2, 4], Vec3::new(3.0, 5.0, 7.0)));
+        let mut body =
+            Body::uniform(boxes::split_box([3, 2, 4], Vec3::new(3.0, 5.0, 7.0)), vec![], Material::BRAIN_OGDEN);
+        body.materials.push(Material::BRAIN);
+        body.material_of_tet.iter_mut().step_by(3).for_each(|m| *m = 1);
+        let layout = Layout::of(&body);
+        assert!(layout.tet_at.is_sorted_by_key(|&t| kind(&body, t)));
         assert!(layout.node_at.iter().enumerate().all(|(place, &n)| layout.place_of[n as usize] == place as u32));
         let mut tets = layout.tet_at.clone();
         tets.sort_unstable();

@@ -20,7 +20,7 @@
 //!
 //! let mesh = boxes::split_box([3, 3, 3], trepan_geometry::Vec3::splat(30.0));
 //! let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
-//! let mut tled = Tled::new(&Body { mesh, fixed, material: Material::BRAIN }, &Config::default())?;
+//! let mut tled = Tled::new(&Body::uniform(mesh, fixed, Material::BRAIN), &Config::default())?;
 //! let gravity = trepan_geometry::Vec3::new(0.0, 0.0, -9.81e-3);
 //! let dt = tled.stable_dt_ms();
 //! let report = tled.step(&Loads { gravity, ..Loads::default() }, dt);

@@ -54,7 +54,7 @@ struct Of<M, const K: usize, const T: usize> {
 }
 
 impl Part {
-    /// The elements at `tets` (mesh numbers, in the solver's order).
+    /// The elements at `tets` (mesh numbers, in the solver's order), at least one and all of the same law.
     pub fn of(body: &Body, layout: &Layout, tets: &[u32], relaxation: &Relaxation) -> Self {
         let places =
             || tets.iter().flat_map(|&t| body.mesh.tets[t as usize]).map(|n| layout.place_of[n as usize] as usize);
@@ -105,7 +105,7 @@ impl Part {
     }
 }
 
-/// The group for a body's law. Only the commonest law has a form without memory.
+/// The group for the law of these elements. Only the commonest law has a form without memory.
 fn group(
     body: &Body,
     layout: &Layout,
@@ -113,7 +113,7 @@ fn group(
     starts: (usize, &[u32]),
     relaxation: &Relaxation,
 ) -> Box<dyn Group> {
-    match body.material.law() {
+    match body.material(tets[0] as usize).law() {
         Law::NeoHookean(_) if relaxation.is_none() => Box::new(Of::<NeoHookean, 2, 0>::new(body, layout, tets, starts)),
         Law::NeoHookean(_) => Box::new(Of::<NeoHookean, 2, 2>::new(body, layout, tets, starts)),
         Law::StVenantKirchhoff { .. } => Box::new(Of::<StVenantKirchhoff, 2, 2>::new(body, layout, tets, starts)),
@@ -132,7 +132,7 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Of<M, K, T> {
                 next[place as usize - first] += 1;
                 next[place as usize - first] - 1
             });
-            blocks[at / WIDTH].put::<M>(at % WIDTH, &body.shape(t as usize), &body.material, [nodes, slots]);
+            blocks[at / WIDTH].put::<M>(at % WIDTH, &body.shape(t as usize), body.material(t as usize), [nodes, slots]);
         }
         Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; blocks.len()], blocks, law: PhantomData }
     }

@@ -36,7 +36,7 @@ impl Tled {
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
         body.check()?;
         config.check()?;
-        let layout = Layout::of(&body.mesh);
+        let layout = Layout::of(body);
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
         let mut nodes = Nodes::of(body, &layout);
         let mut elements = Elements::of(body, &layout, config);
@@ -165,7 +165,11 @@ pub(crate) fn damping_rate(body: &Body, damping: Damping, extent_mm: f32) -> f32
         Damping::None => 0.0,
         Damping::Rate(rate) => rate,
         Damping::Critical(share) => {
-            let shear_speed = (body.material.shear_mpa() / f64::from(body.material.density_g_mm3())).sqrt();
+            let total = |of: &dyn Fn(usize) -> f64| -> f64 {
+                (0..body.mesh.tets.len()).map(|t| body.mesh.volume_mm3(t) * of(t)).sum()
+            };
+            let shear = total(&|t| body.material(t).shear_mpa());
+            let shear_speed = (shear / total(&|t| body.material(t).density_g_mm3().into())).sqrt();
             let standing = std::f64::consts::PI * shear_speed / f64::from(extent_mm);
             (f64::from(share) * 2.0 * lowest_frequency(body).unwrap_or(standing)) as f32
         }

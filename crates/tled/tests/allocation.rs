@@ -39,7 +39,8 @@ static ALLOCATOR: Counting = Counting;
 fn a_step_never_allocates() {
     let mesh = boxes::split_box([4, 4, 4], Vec3::splat(40.0));
     let top = boxes::nodes_where(&mesh, |p| p.z > 39.0);
-    let mut body = Body { fixed: boxes::nodes_where(&mesh, |p| p.z < 1.0), mesh, material: Material::BRAIN };
+    let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0);
+    let mut body = Body::uniform(mesh, fixed, Material::BRAIN);
     let mut contact = NodalContact::none();
     top.iter().for_each(|&n| contact.add(n, 1.0));
     contact.normalise();

@@ -21,9 +21,14 @@ fn device() -> Option<Gpu> {
     }
 }
 
+/// A block of brain, the rest of it tumour.
 fn body() -> Body {
     let mesh = boxes::split_box([6, 5, 4], Vec3::new(60.0, 50.0, 40.0));
-    Body { fixed: boxes::nodes_where(&mesh, |p| p.z < 1e-3), mesh, material: Material::BRAIN }
+    let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
+    let mut body = Body::uniform(mesh, fixed, Material::BRAIN);
+    body.materials.push(Material::TUMOUR);
+    body.material_of_tet.iter_mut().skip(300).for_each(|m| *m = 1);
+    body
 }
 
 /// Gravity sideways and a tool that presses the top by some mm.
@@ -137,7 +142,7 @@ fn what_the_kernels_lack_is_refused_by_name() {
     let (plain, free) = (Config::default(), Body { fixed: vec![], ..held.clone() });
     assert_eq!(name(&held, Config { cure_locking: true, ..plain }), "cure_locking");
     assert_eq!(name(&held, Config { relaxation: Relaxation::BRAIN, ..plain }), "relaxation");
-    assert_eq!(name(&Body { material: Material::BRAIN_OGDEN, ..held.clone() }, plain), "material");
+    assert_eq!(name(&held.clone().with_material(Material::BRAIN_OGDEN), plain), "material");
     assert_eq!(name(&free, plain), "damping");
     assert_eq!(name(&free, Config { damping: trepan_tled::Damping::None, ..plain }), "nothing");
 }

@@ -24,7 +24,7 @@ fn every_material_settles_where_the_static_reference_is() {
     for material in materials() {
         let mesh = boxes::split_box([4, 4, 4], Vec3::splat(40.0));
         let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0);
-        let body = Body { mesh, fixed, material };
+        let body = Body::uniform(mesh, fixed, material);
         let mut contact = NodalContact::none();
         boxes::nodes_where(&body.mesh, |p| p.z > 39.0 && p.x < 31.0).iter().for_each(|&n| contact.add(n, 1.0));
         contact.normalise();
@@ -50,7 +50,8 @@ fn every_material_settles_where_the_static_reference_is() {
 /// Force on the top of a block sheared by a fifth, every quarter of a ms, the block turned by `turn` after 20 ms.
 fn sheared(material: Material, relaxation: Relaxation, turn: Quat) -> Vec<f32> {
     let mesh = boxes::split_box([2, 2, 2], Vec3::splat(10.0));
-    let body = Body { fixed: (0..27).collect(), mesh, material };
+    let fixed = (0..27).collect();
+    let body = Body::uniform(mesh, fixed, material);
     let mut tled = Tled::new(&body, &Config { relaxation, ..Config::default() }).expect("a sound body");
     let top = boxes::nodes_where(&body.mesh, |p| p.z > 9.0);
     let place = |tled: &mut Tled, turn: Quat| {
@@ -91,7 +92,7 @@ fn pressed(poisson: f32, cure_locking: bool) -> f32 {
     let ends = boxes::nodes_where(&mesh, |p| p.z < 1.0 || p.z > 99.0);
     let top = boxes::nodes_where(&mesh, |p| p.z > 99.0);
     let material = Material::NeoHookean { young_mpa: 0.003, poisson, density_g_mm3: 1e-3 };
-    let body = Body { fixed: ends, mesh, material };
+    let body = Body::uniform(mesh, ends, material);
     let mut tled = Tled::new(&body, &Config { cure_locking, ..Config::default() }).expect("a sound body");
     for (n, p) in body.mesh.positions.iter().enumerate() {
         tled.set_node(n as u32, Vec3::NEG_Z * (0.2 * p.z), Vec3::ZERO);

@@ -11,7 +11,8 @@ const GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.81e-3);
 
 fn block(cells: [usize; 3], size: Vec3, fixed: impl Fn(Vec3) -> bool) -> Body {
     let mesh = boxes::split_box(cells, size);
-    Body { fixed: boxes::nodes_where(&mesh, fixed), mesh, material: Material::BRAIN }
+    let fixed = boxes::nodes_where(&mesh, fixed);
+    Body::uniform(mesh, fixed, Material::BRAIN)
 }
 
 fn run(solver: &mut dyn SoftSolver, loads: &Loads, ms: f32) {
@@ -27,7 +28,7 @@ fn largest_difference(a: &[Vec3], b: &[Vec3]) -> f32 {
 }
 
 fn law(body: &Body) -> NeoHookean {
-    NeoHookean { mu: body.material.shear_mpa(), kappa: body.material.bulk_mpa() }
+    NeoHookean { mu: body.material(0).shear_mpa(), kappa: body.material(0).bulk_mpa() }
 }
 
 fn deformation(body: &Body, positions: &[Vec3], tet: usize) -> DMat3 {
@@ -240,7 +241,7 @@ fn a_clamped_beam_swings_at_the_frequency_of_an_independent_code() {
     // scikit-fem, consistent masses, split box of 20×4×4 cells: 1.882 and 2.012 Hz for the two bending planes; lumping lowers it a little.
     let mesh = boxes::split_box([20, 4, 4], Vec3::new(100.0, 20.0, 20.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.x < 1e-3);
-    let body = Body { mesh, fixed, material: Material::THESIS };
+    let body = Body::uniform(mesh, fixed, Material::THESIS);
     let mut tled = Tled::new(&body, &Config { damping: Damping::None, ..Config::default() }).unwrap();
     let start: Vec<Vec3> =
         body.mesh.positions.iter().map(|p| Vec3::new(0.0, 0.2, 0.2) * (p.x / 100.0).powi(2)).collect();

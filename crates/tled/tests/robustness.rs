@@ -8,7 +8,8 @@ use trepan_tled::{Config, Kernel, Tled};
 
 fn cube() -> Body {
     let mesh = boxes::split_box([4, 4, 4], Vec3::splat(40.0));
-    Body { fixed: boxes::nodes_where(&mesh, |p| p.z < 1.0), mesh, material: Material::BRAIN }
+    let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0);
+    Body::uniform(mesh, fixed, Material::BRAIN)
 }
 
 fn noise(i: usize) -> f32 {

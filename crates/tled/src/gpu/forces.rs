@@ -83,8 +83,9 @@ fn runs(corners: &[[u32; 4]], places: usize) -> (Vec<u32>, Vec<[u32; 4]>) {
 fn rows(body: &Body, layout: &Layout) -> Vec<[f32; 4]> {
     let of = |&t: &u32| {
         let shape = body.shape(t as usize);
-        let constants = NeoHookean::constants(&body.material.law(), shape.volume_mm3);
-        let omega2 = omega2_over_stiffness::<NeoHookean, 2>(&shape, &body.material, &constants);
+        let material = body.material(t as usize);
+        let constants = NeoHookean::constants(&material.law(), shape.volume_mm3);
+        let omega2 = omega2_over_stiffness::<NeoHookean, 2>(&shape, material, &constants);
         let beside = [constants[0], constants[1], omega2];
         [0, 1, 2].map(|a| shape.gradients[a + 1].as_vec3().extend(beside[a]).to_array())
     };
@@ -99,8 +100,8 @@ mod tests {
     #[test]
     fn every_corner_owns_one_slot_in_the_run_of_its_node() {
         let mesh = boxes::split_box([3, 2, 2], trepan_geometry::Vec3::splat(9.0));
-        let body = Body { mesh, fixed: vec![], material: trepan_soft::Material::BRAIN };
-        let layout = Layout::of(&body.mesh);
+        let body = Body::uniform(mesh, vec![], trepan_soft::Material::BRAIN);
+        let layout = Layout::of(&body);
         let corners = corners(&body, &layout);
         let (starts, slots) = runs(&corners, layout.node_at.len());
         let mut taken = vec![false; 4 * corners.len()];

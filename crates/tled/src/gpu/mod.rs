@@ -22,7 +22,7 @@
 //! let mesh = boxes::split_box([8, 8, 8], trepan_geometry::Vec3::splat(80.0));
 //! let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
 //! let gpu = Gpu::open(Prefer::Hardware)?;
-//! let mut tled = GpuTled::new(&gpu, &Body { mesh, fixed, material: Material::BRAIN }, &Config::default())?;
+//! let mut tled = GpuTled::new(&gpu, &Body::uniform(mesh, fixed, Material::BRAIN), &Config::default())?;
 //! tled.steps(&Loads { gravity: trepan_geometry::Vec3::NEG_Z * 9.81e-3, ..Loads::default() }, 30);
 //! tled.read()?;
 //! println!("{}", tled.positions()[0]);
@@ -106,12 +106,12 @@ impl GpuTled {
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
         let damping_per_ms = damping_rate(body, config.damping, extent);
         refuse(body, config, damping_per_ms)?;
-        let layout = Layout::of(&body.mesh);
+        let layout = Layout::of(body);
         let state = DeviceState::new(gpu, body, &layout)?;
         let forces = Forces::new(gpu, body, &layout, &state)?;
         let press = Press::new(gpu, &state)?;
         let stiffest = (0..body.mesh.tets.len())
-            .map(|t| trepan_soft::element_omega2(&body.shape(t), &body.material) as f32)
+            .map(|t| trepan_soft::element_omega2(&body.shape(t), body.material(t)) as f32)
             .fold(0.0, f32::max);
         Ok(Self {
             update: Update::new(gpu, &state, &forces, &press)?,
@@ -287,7 +287,7 @@ impl SoftSolver for GpuTled {
 /// Refuses what the kernels lack.
 fn refuse(body: &Body, config: &Config, damping_per_ms: f32) -> Result<(), GpuTledError> {
     let unsupported = |field, right| Err(GpuTledError::Unsupported { field, right });
-    if !matches!(body.material.law(), Law::NeoHookean(_)) {
+    if !(0..body.mesh.tets.len()).all(|t| matches!(body.material(t).law(), Law::NeoHookean(_))) {
         return unsupported("material", "neo-Hookean tissue");
     }
     if config.cure_locking {

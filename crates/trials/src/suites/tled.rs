@@ -49,7 +49,7 @@ fn body(cells: usize) -> Body {
     let left = mesh.bounds().min.x + 1e-3;
     let fixed = boxes::nodes_where(&mesh, |p| p.x < left);
     let material = Material::NeoHookean { young_mpa: 0.003, poisson: 0.45, density_g_mm3: units::WATER_G_PER_MM3 };
-    Body { mesh, fixed, material }
+    Body::uniform(mesh, fixed, material)
 }
 
 /// The sag of every solver beside the reference's on the same mesh.
@@ -100,7 +100,7 @@ fn largest_difference(found: &[Vec3], truth: &[Vec3], body: &Body) -> f64 {
 fn kernels(side: usize, scope: Scope, findings: &mut Findings) {
     let mesh = boxes::split_box([side; 3], Vec3::splat(100.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
-    let body = Body { mesh, fixed, material: Material::BRAIN };
+    let body = Body::uniform(mesh, fixed, Material::BRAIN);
     let loads = Loads { gravity: Vec3::new(0.0, 0.0, -units::GRAVITY_MM_PER_MS2), ..Loads::default() };
     let scene = format!("cube, {} tetrahedra", body.mesh.tets.len());
     let mut scalar_us = f64::NAN;
@@ -145,7 +145,7 @@ fn shear(findings: &mut Findings) {
         ("Mooney-Rivlin", Material::MooneyRivlin { c10_mpa: 3e-4, c01_mpa: 2e-4, poisson: 0.45, density_g_mm3 }),
     ];
     for (name, material) in materials {
-        let body = Body { mesh: mesh.clone(), fixed: vec![], material };
+        let body = Body::uniform(mesh.clone(), vec![], material);
         let config = Config { damping: Damping::None, ..Config::default() };
         let mut solver = Tled::new(&body, &config).expect("the cube is sound");
         for (n, p) in body.mesh.positions.iter().enumerate() {
@@ -154,7 +154,7 @@ fn shear(findings: &mut Findings) {
         solver.step(&Loads::default(), 1e-3);
         let top = boxes::nodes_where(&body.mesh, |p| p.z > edge_mm - 1e-3);
         let held: f64 = top.iter().map(|&n| f64::from(solver.support_force(n).x)).sum();
-        let (mu, kappa) = (body.material.shear_mpa(), body.material.bulk_mpa());
+        let (mu, kappa) = (material.shear_mpa(), material.bulk_mpa());
         let cubic = if name == "St. Venant-Kirchhoff" { 0.5 * kappa + mu * 2.0 / 3.0 } else { 0.0 };
         let exact = (mu * SHEAR + cubic * SHEAR.powi(3)) * f64::from(edge_mm * edge_mm);
         let error = 100.0 * (held / exact - 1.0).abs();
@@ -172,7 +172,7 @@ fn locking(findings: &mut Findings) {
     for (poisson, exact_n) in [(0.45, 9.117), (0.49, 9.667)] {
         for (method, cure_locking) in [("plain", false), ("cured", true)] {
             let material = Material::NeoHookean { young_mpa: 0.003, poisson, density_g_mm3: units::WATER_G_PER_MM3 };
-            let body = Body { mesh: mesh.clone(), fixed: fixed.clone(), material };
+            let body = Body::uniform(mesh.clone(), fixed.clone(), material);
             let mut solver =
                 Tled::new(&body, &Config { cure_locking, ..Config::default() }).expect("the cube is sound");
             for (n, p) in body.mesh.positions.iter().enumerate() {
