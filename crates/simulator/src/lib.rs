@@ -21,6 +21,7 @@
 mod case;
 mod command;
 mod error;
+mod hand;
 mod measure;
 mod options;
 mod program;
@@ -31,6 +32,7 @@ mod show;
 mod stages;
 
 pub use case::cache::Cache;
+pub use case::choice::build_case;
 pub use case::import::open as open_case;
 pub use case::opening::Opening;
 pub use case::scene::{RestBrain, Scene};
@@ -45,7 +47,7 @@ pub use run::clock::{Clock, Schedule};
 pub use run::stop::Stop;
 pub use run::{Cells, Eyes, Outcome, Replayed, SolverOutcome, Stages, Ticks, Times, Tissue, View};
 pub use run::{lockstep, threads};
-pub use session::{Ended, Session, build_case};
+pub use session::{Ended, Session};
 pub use stages::collision_step::{CollisionStage, SoftFrame};
 pub use stages::haptic_tick::{FRESH_MS, GONE_MS, HapticConfig, HapticStage, Tick, TickInput, ToolSample};
 pub use stages::notice::{Notice, Warning, Watch, What};

@@ -1,12 +1,12 @@
 //! A session from its flags to its files: open (everything that a user can get wrong), run, write.
 
-use crate::case::cache::Cache;
-use crate::case::folder as case_folder;
-use crate::case::import;
+use crate::case::Inputs;
+use crate::case::choice;
 use crate::case::scene::{RestBrain, Scene};
-use crate::case::{Case, Inputs, Recipe};
+use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
-use crate::options::{Options, Patient};
+use crate::hand::{self, Feel, Hand};
+use crate::options::Options;
 use crate::program::Program;
 use crate::report::output;
 use crate::report::summary::{About, Machine, Summary};
@@ -14,7 +14,7 @@ use crate::run::journal::Kept;
 use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Pace};
-use crate::run::watch::{Share, Watched};
+use crate::run::watch::Share;
 use crate::run::{Eyes, Outcome, Stages, Tissue};
 use crate::show::driver;
 use crate::show::picture::{self, Album};
@@ -24,15 +24,14 @@ use crate::stages::haptic_tick::{HapticConfig, HapticStage, ToolSample};
 use crate::stages::solver_step::SolverStage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use trepan_contact::{GuardConfig, Viscoelastic};
+use trepan_contact::Viscoelastic;
 use trepan_geometry::{ToolState, Vec3, units};
-use trepan_haptics::{
-    Capabilities, DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, script::Script, simulated,
-};
+use trepan_haptics::script::Script;
+use trepan_haptics::{DeviceName, HapticDevice, mouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::{Painter, SceneData};
-use trepan_soft::{Body, Material, SoftSolver};
+use trepan_soft::{Body, SoftSolver};
 
 /// A session that is ready to run.
 pub struct Session {
@@ -70,20 +69,14 @@ impl Session {
             tracing::info!("no display here: running the scripted operation headless");
         }
         places(&options)?;
-        let device = device_name(program, &options, windowed)?;
+        let device = hand::device_name(program, &options, windowed)?;
         let rigid = rigid_method(&options)?;
         solver_named(&options)?;
         let recording = match &device {
             DeviceName::Replay(path) => Some(Recording::open(path)?),
             _ => None,
         };
-        let case = match &options.case {
-            Some(folder) => fitting(program, case_folder::load(folder)?)?,
-            None => {
-                let inputs = inputs(&options.patient, built_in);
-                import::open(program, &inputs, &recipe(&options.patient), &Cache::of_user()?)?
-            }
-        };
+        let case = choice::open_case(program, &options, built_in)?;
 
         let (name, hash) = (case.name.clone(), case.hash.clone());
         let scene = Scene::new(program, case)?;
@@ -95,8 +88,9 @@ impl Session {
     /// Runs it and writes its files.
     pub fn run(self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-        let Hand { device, pointer, watch } = self.hand()?;
-        let feel = device.as_ref().map_or_else(|| self.recorded_feel(), |device| Feel::of(&device.capabilities()));
+        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.scene.site)?;
+        let recorded = || Feel::recorded(self.recording.as_ref());
+        let feel = device.as_ref().map_or_else(recorded, |device| Feel::of(&device.capabilities()));
         let start = self.start();
         let stages = self.stages(start.state, &feel)?;
         output::folder(&self.out)?;
@@ -112,7 +106,7 @@ impl Session {
         let mut remarks = self.scene.remarks.clone();
         remarks.extend(graphics.err());
         remarks.append(&mut album.faults);
-        remarks.extend(watch.and_then(|watch| fault_of(&watch)));
+        remarks.extend(watch.as_ref().and_then(hand::faults));
         let summary = Summary::new(self.about(&album, adapter, remarks), &outcome);
         output::write(&self.out, &record, &summary, &outcome, &album.shots, self.drilled())?;
         Ok(Ended { summary, out: self.out, signal: stop.signal() })
@@ -132,55 +126,6 @@ impl Session {
             (None, Some(device)) => threads::run(stages, device, kept, start, self.pace(), stop, picture),
             (None, None) => Outcome::default(),
         }
-    }
-
-    /// The device. None for a replay, which brings its own hand.
-    fn hand(&self) -> Result<Hand, SessionError> {
-        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| {
-            let duration_ms = 1e3 * self.options.duration.unwrap_or(20.0);
-            Script::named(name, &self.scene.site, duration_ms).map_err(|f| fault(&f))
-        };
-        let mut hand = Hand { device: None, pointer: None, watch: None };
-        if let Some(name) = &self.options.watch {
-            hand.device = Some(Box::new(Watched::open(name, script(self.program.script())?.at(0.0))?));
-            return Ok(hand);
-        }
-        hand.device = match &self.device {
-            DeviceName::Script(name) => Some(Box::new(script(name)?)),
-            DeviceName::Simulated(name) => {
-                let (config, grip) = (simulated::Config::default(), simulated::Hand::FIRM);
-                Some(Box::new(simulated::Simulated::new(config, grip, Box::new(script(name)?))))
-            }
-            DeviceName::Mouse => {
-                let (pointer, mouse) = mouse::pair(script(self.program.script())?.at(0.0).world_from_tool);
-                hand.pointer = Some(pointer);
-                Some(Box::new(mouse))
-            }
-            DeviceName::Replay(_) => None,
-            hardware => match hardware::open(hardware, self.workspace()) {
-                Some(opened) => {
-                    let opened = opened.map_err(|f| fault(&f))?;
-                    hand.watch = Some(opened.watch);
-                    Some(opened.device)
-                }
-                None => None,
-            },
-        };
-        Ok(hand)
-    }
-
-    /// What the recorded session knew of its device; nothing where there is no recording.
-    fn recorded_feel(&self) -> Feel {
-        let config = self.recording.as_ref().map(|recording| &recording.header.config);
-        let number = |name: &str| config.and_then(|c| c.get(name)?.parse().ok()).unwrap_or(0.0f32);
-        Feel { peak_force_n: number(PEAK), delay_ticks: number(DELAY) as u8, position_step_mm: number(STEP) }
-    }
-
-    /// A device's small box in front of the site: its middle 20 mm outside the entry, seen as the picture is.
-    fn workspace(&self) -> Workspace {
-        let site = &self.scene.site;
-        Workspace::facing(site.entry - 20.0 * site.inward, site.inward, Vec3::Z, 1.0)
     }
 
     /// Where the tool waits.
@@ -213,12 +158,13 @@ impl Session {
     fn tissue(&self, brain: &RestBrain) -> Result<Tissue, SessionError> {
         let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(format!("the brain: {fault}"));
         let gravity = Vec3::new(0.0, -units::GRAVITY_MM_PER_MS2, 0.0);
-        let material = Material::NeoHookean {
-            young_mpa: units::mpa_from_kpa(self.options.young_modulus_kpa),
-            poisson: 0.45,
-            density_g_mm3: units::WATER_G_PER_MM3,
+        let young_mpa = units::mpa_from_kpa(self.options.young_modulus_kpa);
+        let body = Body {
+            mesh: brain.mesh.clone(),
+            fixed: brain.fixed.clone(),
+            materials: TissueClass::ALL.map(|class| class.material(young_mpa)).to_vec(),
+            material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
         };
-        let body = Body::uniform(brain.mesh.clone(), brain.fixed.clone(), material);
         let solver: Box<dyn SoftSolver> = match solver_named(&self.options)? {
             None => {
                 let config = trepan_tled::Config { balanced_gravity: gravity, ..Default::default() };
@@ -280,9 +226,6 @@ impl Session {
 
     fn header(&self, feel: &Feel) -> SessionHeader {
         let config = [
-            (PEAK, feel.peak_force_n.to_string()),
-            (DELAY, feel.delay_ticks.to_string()),
-            (STEP, feel.position_step_mm.to_string()),
             ("rigid", self.rigid.name().to_string()),
             ("solver", self.solver_name()),
             ("rate_hz", self.options.rate_hz.to_string()),
@@ -296,7 +239,7 @@ impl Session {
             case: self.case.clone(),
             seed: self.options.seed,
             hashes: [("case".to_string(), self.hash.clone())].into(),
-            config: config.map(|(key, value)| (key.to_string(), value)).into(),
+            config: config.into_iter().chain(feel.entries()).map(|(key, value)| (key.to_string(), value)).collect(),
         }
     }
 
@@ -325,46 +268,6 @@ impl Session {
     }
 }
 
-/// What the force guard must know of a device; recorded, so that a replay is guarded alike.
-struct Feel {
-    peak_force_n: f32,
-    delay_ticks: u8,
-    position_step_mm: f32,
-}
-
-const PEAK: &str = "device_peak_force_n";
-const DELAY: &str = "device_delay_ticks";
-const STEP: &str = "device_position_step_mm";
-
-impl Feel {
-    fn of(device: &Capabilities) -> Self {
-        let &Capabilities { peak_force_n, delay_ticks, position_resolution_mm, .. } = device;
-        Self { peak_force_n, delay_ticks, position_step_mm: position_resolution_mm }
-    }
-
-    fn guard(&self) -> GuardConfig {
-        let mut device = Watched::CAPABILITIES;
-        device.peak_force_n = self.peak_force_n;
-        device.delay_ticks = self.delay_ticks;
-        device.position_resolution_mm = self.position_step_mm;
-        device.guard_config()
-    }
-}
-
-/// What holds the tool.
-struct Hand {
-    device: Option<Box<dyn HapticDevice>>,
-    /// The window's end of the mouse.
-    pointer: Option<mouse::MouseHandle>,
-    /// The window into a device's faults.
-    watch: Option<Watch>,
-}
-
-fn fault_of(watch: &Watch) -> Option<String> {
-    let last = watch.fault().map_or_else(String::new, |fault| format!("; the last one: {fault}"));
-    (watch.count() > 0).then(|| format!("the device had {} faults{last}", watch.count()))
-}
-
 struct Graphics {
     adapter: String,
     painter: Option<Painter>,
@@ -382,71 +285,6 @@ fn places(options: &Options) -> Result<(), SessionError> {
         return Err(SessionError::Usage(format!("--record: there is no folder {}; make it first", folder.display())));
     }
     Ok(())
-}
-
-/// Makes a case folder; returns the case's name.
-pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inputs) -> Result<String, SessionError> {
-    patient.check().map_err(SessionError::Usage)?;
-    if out.exists() {
-        return Err(SessionError::Usage(format!(
-            "--out {} exists already: name a folder that does not",
-            out.display()
-        )));
-    }
-    let recipe = recipe(patient);
-    let case = import::open(program, &inputs(patient, built_in), &recipe, &Cache::of_user()?)?;
-    let parent = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let name = out.file_name().and_then(|name| name.to_str()).unwrap_or("case");
-    let written = Cache::at(parent.into()).keep(name, |folder| case_folder::save(&case, &recipe, folder));
-    written.map_err(|fault| SessionError::Internal(format!("cannot write {}: {fault}", out.display())))?;
-    Ok(case.name)
-}
-
-/// A case that has what the program needs.
-fn fitting(program: Program, case: Case) -> Result<Case, SessionError> {
-    let lacks = |what| Err(SessionError::Case(format!("{} needs {what}, which {} lacks", program.name(), case.name)));
-    if program.has_bone() && case.skull.is_none() {
-        return lacks("a skull from a CT");
-    }
-    if program.has_tissue() && case.brain.is_none() {
-        return lacks("a brain from an MRI");
-    }
-    Ok(case)
-}
-
-fn recipe(patient: &Patient) -> Recipe {
-    Recipe {
-        spacing_mm: patient.spacing_mm,
-        tets: patient.tets,
-        isovalue_hu: patient.isovalue_hu,
-        register: patient.register,
-        opening: patient.opening,
-    }
-}
-
-fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
-    let Patient { ct, mri, labels, tissues, .. } = patient.clone();
-    if ct.is_none() && mri.is_none() && labels.is_none() && tissues.is_empty() {
-        return built_in;
-    }
-    Inputs { name: None, ct, mri, labels, tissues }
-}
-
-fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
-    let script = || DeviceName::Script(program.script().into());
-    let name = match &options.device {
-        Some(text) => {
-            text.parse().map_err(|fault: trepan_haptics::NameError| SessionError::Device(fault.to_string()))?
-        }
-        None if windowed => DeviceName::Mouse,
-        None => script(),
-    };
-    if name == DeviceName::Mouse && !windowed {
-        let text =
-            "the mouse needs a window: leave out --headless on a machine with a display, or give --device script:NAME";
-        return Err(SessionError::Device(text.into()));
-    }
-    Ok(name)
 }
 
 fn rigid_method(options: &Options) -> Result<trepan_rigid::Method, SessionError> {

@@ -2,6 +2,7 @@
 
 mod anatomy;
 pub(crate) mod cache;
+pub(crate) mod choice;
 pub(crate) mod folder;
 pub(crate) mod import;
 pub(crate) mod opening;

@@ -35,6 +35,8 @@ pub struct Scene {
 pub struct RestBrain {
     /// Tetrahedra.
     pub mesh: TetMesh,
+    /// Class code of each tetrahedron.
+    pub class_of_tet: Vec<u8>,
     /// Nodes that do not move.
     pub fixed: Vec<u32>,
     /// Distance to its surface, mm, negative inside.
@@ -80,7 +82,8 @@ fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>
         remarks.push("too little bone lies under the brain to hold it: its lowest fifth is held instead".into());
         fixed = below(&brain.mesh, 0.2);
     }
-    RestBrain { fixed, field: Arc::new(DistanceField::of_mask(&brain.classes)), mesh: brain.mesh, mri: brain.mri }
+    let field = Arc::new(DistanceField::of_mask(&brain.classes));
+    RestBrain { fixed, field, mesh: brain.mesh, class_of_tet: brain.class_of_tet, mri: brain.mri }
 }
 
 /// Surface nodes near the skull base.

@@ -8,6 +8,7 @@ use crate::error::SessionError;
 use glam::DAffine3;
 use std::path::PathBuf;
 use std::str::FromStr;
+use trepan_soft::Material;
 use trepan_volume::{Grid, Interpolation, VoxelVolume, resample};
 
 /// What a part of the brain is.
@@ -39,6 +40,25 @@ impl TissueClass {
     /// Its name in flags and remarks.
     pub fn name(self) -> &'static str {
         ["brain", "white", "grey", "ventricle", "tumour", "vessel"][self as usize]
+    }
+
+    /// What it is made of when brain has this Young's modulus, MPa: the presets of `soft`, scaled alike.
+    ///
+    /// A vessel is ten times as stiff as brain. Its wall is stiffer still ([`Material::VESSEL_WALL`]), but would make every step of
+    /// the solver many times shorter.
+    pub fn material(self, brain_mpa: f32) -> Material {
+        let share = |preset: Material| (preset.young_mpa() / Material::BRAIN.young_mpa()) as f32;
+        let young_mpa = brain_mpa
+            * match self {
+                Self::Brain => 1.0,
+                Self::White => share(Material::WHITE_MATTER),
+                Self::Grey => share(Material::GREY_MATTER),
+                Self::Ventricle => share(Material::VENTRICLE),
+                Self::Tumour => share(Material::TUMOUR),
+                Self::Vessel => 10.0,
+            };
+        let poisson = if self == Self::Ventricle { Material::VENTRICLE.poisson() } else { Material::BRAIN.poisson() };
+        Material::NeoHookean { young_mpa, poisson, density_g_mm3: Material::BRAIN.density_g_mm3() }
     }
 }
 
@@ -142,5 +162,14 @@ mod tests {
         assert_eq!((count(0), count(TissueClass::Tumour.code()), count(1)), (200, 100, 700));
         let fault = source(vec![8]).paint(DAffine3::IDENTITY, &mut classes).unwrap_err().to_string();
         assert!(fault.contains("labels.nii") && fault.contains("codes [8]"), "{fault}");
+    }
+
+    #[test]
+    fn every_class_is_physical_and_has_its_own_code() {
+        for (at, class) in TissueClass::ALL.into_iter().enumerate() {
+            assert_eq!(class.code() as usize, at + 1);
+            class.material(0.003).check().unwrap();
+        }
+        assert!(TissueClass::Tumour.material(0.003).young_mpa() > 2.0 * TissueClass::Brain.material(0.003).young_mpa());
     }
 }

@@ -1,0 +1,132 @@
+//! What holds the tool: the device that the options name, and what the force guard must know of it.
+
+use crate::error::SessionError;
+use crate::options::Options;
+use crate::program::Program;
+use crate::run::watch::Watched;
+use trepan_contact::GuardConfig;
+use trepan_geometry::Vec3;
+use trepan_haptics::script::{Script, Site};
+use trepan_haptics::{Capabilities, DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, simulated};
+use trepan_link::Recording;
+
+/// What holds the tool.
+pub struct Hand {
+    /// For the haptic loop; `None` for a replay, which brings its own hand.
+    pub device: Option<Box<dyn HapticDevice>>,
+    /// The window's end of the mouse.
+    pub pointer: Option<mouse::MouseHandle>,
+    /// The window into a device's faults.
+    pub watch: Option<Watch>,
+}
+
+impl Hand {
+    /// Opens the device.
+    pub fn open(name: &DeviceName, program: Program, options: &Options, site: &Site) -> Result<Self, SessionError> {
+        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
+        let script = |name: &str| {
+            let duration_ms = 1e3 * options.duration.unwrap_or(20.0);
+            Script::named(name, site, duration_ms).map_err(|f| fault(&f))
+        };
+        let mut hand = Self { device: None, pointer: None, watch: None };
+        if let Some(name) = &options.watch {
+            hand.device = Some(Box::new(Watched::open(name, script(program.script())?.at(0.0))?));
+            return Ok(hand);
+        }
+        hand.device = match name {
+            DeviceName::Script(name) => Some(Box::new(script(name)?)),
+            DeviceName::Simulated(name) => {
+                let (config, grip) = (simulated::Config::default(), simulated::Hand::FIRM);
+                Some(Box::new(simulated::Simulated::new(config, grip, Box::new(script(name)?))))
+            }
+            DeviceName::Mouse => {
+                let (pointer, mouse) = mouse::pair(script(program.script())?.at(0.0).world_from_tool);
+                hand.pointer = Some(pointer);
+                Some(Box::new(mouse))
+            }
+            DeviceName::Replay(_) => None,
+            hardware => match hardware::open(hardware, workspace(site)) {
+                Some(opened) => {
+                    let opened = opened.map_err(|f| fault(&f))?;
+                    hand.watch = Some(opened.watch);
+                    Some(opened.device)
+                }
+                None => None,
+            },
+        };
+        Ok(hand)
+    }
+}
+
+/// The faults that a device had, in a sentence.
+pub fn faults(watch: &Watch) -> Option<String> {
+    let last = watch.fault().map_or_else(String::new, |fault| format!("; the last one: {fault}"));
+    (watch.count() > 0).then(|| format!("the device had {} faults{last}", watch.count()))
+}
+
+/// A device's small box in front of the site: its middle 20 mm outside the entry, seen as the picture is.
+fn workspace(site: &Site) -> Workspace {
+    Workspace::facing(site.entry - 20.0 * site.inward, site.inward, Vec3::Z, 1.0)
+}
+
+/// The device that is named; without a name the mouse where there is a window, else the program's script.
+pub fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
+    let script = || DeviceName::Script(program.script().into());
+    let name = match &options.device {
+        Some(text) => {
+            text.parse().map_err(|fault: trepan_haptics::NameError| SessionError::Device(fault.to_string()))?
+        }
+        None if windowed => DeviceName::Mouse,
+        None => script(),
+    };
+    if name == DeviceName::Mouse && !windowed {
+        let text =
+            "the mouse needs a window: leave out --headless on a machine with a display, or give --device script:NAME";
+        return Err(SessionError::Device(text.into()));
+    }
+    Ok(name)
+}
+
+/// What the force guard must know of a device; recorded, so that a replay is guarded alike.
+pub struct Feel {
+    peak_force_n: f32,
+    delay_ticks: u8,
+    position_step_mm: f32,
+}
+
+const PEAK: &str = "device_peak_force_n";
+const DELAY: &str = "device_delay_ticks";
+const STEP: &str = "device_position_step_mm";
+
+impl Feel {
+    /// Of a device at hand.
+    pub fn of(device: &Capabilities) -> Self {
+        let &Capabilities { peak_force_n, delay_ticks, position_resolution_mm, .. } = device;
+        Self { peak_force_n, delay_ticks, position_step_mm: position_resolution_mm }
+    }
+
+    /// What a recorded session knew of its device; nothing where there is no recording.
+    pub fn recorded(recording: Option<&Recording>) -> Self {
+        let config = recording.map(|recording| &recording.header.config);
+        let number = |name: &str| config.and_then(|c| c.get(name)?.parse().ok()).unwrap_or(0.0f32);
+        Self { peak_force_n: number(PEAK), delay_ticks: number(DELAY) as u8, position_step_mm: number(STEP) }
+    }
+
+    /// What [`Feel::recorded`] reads.
+    pub fn entries(&self) -> [(&'static str, String); 3] {
+        [
+            (PEAK, self.peak_force_n.to_string()),
+            (DELAY, self.delay_ticks.to_string()),
+            (STEP, self.position_step_mm.to_string()),
+        ]
+    }
+
+    /// The guard for it.
+    pub fn guard(&self) -> GuardConfig {
+        let mut device = Watched::CAPABILITIES;
+        device.peak_force_n = self.peak_force_n;
+        device.delay_ticks = self.delay_ticks;
+        device.position_resolution_mm = self.position_step_mm;
+        device.guard_config()
+    }
+}
