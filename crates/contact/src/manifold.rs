@@ -28,6 +28,8 @@ pub struct ContactManifold {
     pub depth_mm: f32,
     /// Point of application, world mm.
     pub point: Vec3,
+    /// Moment about `point` for each newton, mm: what is left when a tool touches in several places, tip and shaft. Zero for one place.
+    pub couple_mm: Vec3,
     /// Contacts that did not fit.
     pub overflow: u32,
     count: usize,
@@ -40,6 +42,7 @@ impl Default for ContactManifold {
             normal: Vec3::ZERO,
             depth_mm: 0.0,
             point: Vec3::ZERO,
+            couple_mm: Vec3::ZERO,
             overflow: 0,
             count: 0,
             contacts: [Contact::default(); MAX_CONTACTS],
@@ -65,6 +68,7 @@ impl ContactManifold {
     /// Forgets everything, without touching the whole list.
     pub fn clear(&mut self) {
         (self.normal, self.depth_mm, self.point) = (Vec3::ZERO, 0.0, Vec3::ZERO);
+        self.couple_mm = Vec3::ZERO;
         (self.overflow, self.count) = (0, 0);
     }
 
@@ -91,7 +95,7 @@ impl ContactManifold {
 
     /// Whether every number that a force model reads is finite.
     pub fn is_finite(&self) -> bool {
-        self.normal.is_finite() && self.depth_mm.is_finite() && self.point.is_finite()
+        self.normal.is_finite() && self.depth_mm.is_finite() && self.point.is_finite() && self.couple_mm.is_finite()
     }
 }
 

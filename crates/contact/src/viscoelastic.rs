@@ -56,7 +56,7 @@ impl ForceModel for Viscoelastic {
 /// The wrench of a force of `size` N along the manifold's normal: nothing for no contact, a pull, or what is not finite.
 pub(crate) fn pressed(tool: &ToolState, manifold: &ContactManifold, size: f32) -> Wrench {
     let force = manifold.normal * size;
-    let wrench = Wrench { force, torque: (manifold.point - tool.tip()).cross(force) };
+    let wrench = Wrench { force, torque: (manifold.point - tool.tip()).cross(force) + size * manifold.couple_mm };
     if manifold.touches() && size > 0.0 && wrench.is_finite() { wrench } else { Wrench::ZERO }
 }
 
@@ -96,6 +96,14 @@ mod tests {
     #[test]
     fn a_contact_on_the_shaft_gives_torque() {
         let manifold = ContactManifold::single(Contact { normal: Vec3::X, depth_mm: 0.5, point: Vec3::Z * 20.0 });
+        let wrench = Viscoelastic { stiffness: 2.0, damping: 0.0 }.wrench(&tool(Vec3::ZERO), &manifold, 1.0);
+        assert_eq!((wrench.force, wrench.torque), (Vec3::X, Vec3::Y * 20.0));
+    }
+
+    #[test]
+    fn a_couple_turns_the_tool_in_proportion_to_the_force() {
+        let mut manifold = ContactManifold::single(Contact { normal: Vec3::X, depth_mm: 0.5, point: Vec3::ZERO });
+        manifold.couple_mm = Vec3::Y * 20.0;
         let wrench = Viscoelastic { stiffness: 2.0, damping: 0.0 }.wrench(&tool(Vec3::ZERO), &manifold, 1.0);
         assert_eq!((wrench.force, wrench.torque), (Vec3::X, Vec3::Y * 20.0));
     }

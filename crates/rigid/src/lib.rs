@@ -44,7 +44,10 @@ mod readme {}
 
 mod ball;
 pub mod brute;
+pub mod burr_and_shaft;
+pub mod centre_line;
 pub mod distance_field;
+pub mod exposed_faces;
 mod half_spaces;
 mod method;
 mod penalty;
@@ -53,7 +56,9 @@ pub mod ray_trace;
 pub mod removal;
 mod rows;
 mod seam;
+mod shaft;
 mod surface;
+pub mod surface_vertices;
 mod sweep;
 pub mod thesis;
 mod traverse;

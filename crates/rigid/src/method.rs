@@ -1,7 +1,8 @@
 //! The list of methods: one closed enum feeds tests, charts and command lines.
 
 use crate::penalty::Penalty;
-use crate::{RigidContact, brute, distance_field, pointshell, ray_trace, thesis, voxel_sum};
+use crate::{RigidContact, brute, burr_and_shaft, centre_line, distance_field, exposed_faces};
+use crate::{pointshell, ray_trace, surface_vertices, thesis, voxel_sum};
 use trepan_geometry::Tool;
 
 /// A way to handle a tool against bone, with its configuration.
@@ -13,8 +14,16 @@ pub enum Method {
     Pointshell(pointshell::Config),
     /// Rays from the points inwards to the isosurface.
     RayTrace(ray_trace::Config),
+    /// Tangent planes by the bare faces of voxels at the surface.
+    ExposedFaces(exposed_faces::Config),
     /// Volume and centre of mass of the bone in the ball.
     VoxelSum(voxel_sum::Config),
+    /// Distance of voxels from burr and shaft, with torque.
+    BurrAndShaft(burr_and_shaft::Config),
+    /// Vertices along the axis, each with its own proxy, with torque.
+    CentreLine(centre_line::Config),
+    /// Vertices on burr and shaft, with torque.
+    SurfaceVertices(surface_vertices::Config),
     /// A ball that slides on the density's isosurface: the default.
     DistanceField(distance_field::Config),
     /// The oracle: the same question answered slowly and obviously, in f64.
@@ -33,7 +42,11 @@ impl Method {
             Self::Pointshell(pointshell::Config::SUM),
             Self::Pointshell(pointshell::Config::default()),
             Self::RayTrace(ray_trace::Config::default()),
+            Self::ExposedFaces(exposed_faces::Config::default()),
             Self::VoxelSum(voxel_sum::Config::default()),
+            Self::BurrAndShaft(burr_and_shaft::Config::default()),
+            Self::CentreLine(centre_line::Config::default()),
+            Self::SurfaceVertices(surface_vertices::Config::default()),
             Self::DistanceField(distance_field::Config::default()),
             Self::Brute(brute::Config::default()),
         ]
@@ -47,7 +60,11 @@ impl Method {
             Self::Pointshell(config) if config.combine == pointshell::Combine::Sum => "pointshell-sum",
             Self::Pointshell(_) => "pointshell-average",
             Self::RayTrace(_) => "ray-trace",
+            Self::ExposedFaces(_) => "exposed-faces",
             Self::VoxelSum(_) => "voxel-sum",
+            Self::BurrAndShaft(_) => "burr-and-shaft",
+            Self::CentreLine(_) => "centre-line",
+            Self::SurfaceVertices(_) => "surface-vertices",
             Self::DistanceField(_) => "distance-field",
             Self::Brute(_) => "brute",
         }
@@ -60,7 +77,12 @@ impl Method {
 
     /// Whether the method keeps a proxy on the side of the bone that it came from. One that does not loses thin walls.
     pub fn has_proxy(&self) -> bool {
-        matches!(self, Self::Thesis(_) | Self::DistanceField(_) | Self::Brute(_))
+        matches!(self, Self::Thesis(_) | Self::CentreLine(_) | Self::DistanceField(_) | Self::Brute(_))
+    }
+
+    /// Whether the method feels the tool's shaft too: then the tool must be held as a hand holds it, with its axis out of the bone.
+    pub fn has_shaft(&self) -> bool {
+        matches!(self, Self::BurrAndShaft(_) | Self::CentreLine(_) | Self::SurfaceVertices(_))
     }
 
     /// Makes the method ready for a tool. All memory is taken here.
@@ -71,6 +93,16 @@ impl Method {
                 Box::new(Penalty::new(tool, pointshell::Shell::new(tool, config), config.removal))
             }
             Self::RayTrace(config) => Box::new(Penalty::new(tool, ray_trace::Rays::new(tool, config), config.removal)),
+            Self::ExposedFaces(config) => {
+                Box::new(Penalty::new(tool, exposed_faces::Faces::new(tool, config), config.removal))
+            }
+            Self::BurrAndShaft(config) => {
+                Box::new(Penalty::new(tool, burr_and_shaft::BurrAndShaft::new(tool), config.removal))
+            }
+            Self::CentreLine(config) => Box::new(centre_line::CentreLine::new(tool, *config)),
+            Self::SurfaceVertices(config) => {
+                Box::new(Penalty::new(tool, surface_vertices::Vertices::new(tool, config), config.removal))
+            }
             Self::VoxelSum(config) => Box::new(Penalty::new(tool, voxel_sum::Sum::new(tool), config.removal)),
             Self::Brute(config) => Box::new(brute::Brute::new(tool, *config)),
             Self::DistanceField(config) => Box::new(distance_field::DistanceField::new(tool, *config)),

@@ -17,8 +17,18 @@ const MAX_BITES: usize = 16384;
 
 /// What a penalty method knows to answer.
 pub(crate) trait Feel: Send {
-    /// Normal out of the bone and depth, mm, of the tool's tip at `tip`; `None` without contact. Fills contacts and counts of `out`.
-    fn feel(&mut self, bone: &BoneVolume, tip: Vec3, out: &mut RigidStep) -> Option<(Vec3, f32)>;
+    /// What the tool at `pose` feels; `None` without contact. Fills contacts and counts of `out`.
+    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt>;
+}
+
+/// A contact as a whole.
+pub(crate) struct Felt {
+    /// Unit vector out of the bone.
+    pub normal: Vec3,
+    /// Depth along it, mm.
+    pub depth_mm: f32,
+    /// What the burr alone is pushed, mm: what it cuts with.
+    pub burr: Vec3,
 }
 
 /// A tool handled by a penalty method.
@@ -44,13 +54,13 @@ impl<F: Feel> RigidContact for Penalty<F> {
         }
         self.proxy = tool.world_from_tool;
         let (device, radius_mm) = (tool.tip(), self.tool.tip_radius_mm);
-        let Some((normal, depth_mm)) = self.feel.feel(bone, device, out) else { return };
+        let Some(Felt { normal, depth_mm, burr }) = self.feel.feel(bone, &tool.world_from_tool, out) else { return };
         self.proxy.translation += depth_mm * normal;
         out.manifold.normal = normal;
         out.manifold.depth_mm = depth_mm;
         out.manifold.point = self.proxy.translation - radius_mm * normal;
-        if drilling && self.tool.kind == ToolKind::Burr {
-            let cut = Cut { device, proxy: self.proxy.translation, radius_mm, depth_mm, dt_ms };
+        if drilling && self.tool.kind == ToolKind::Burr && burr != Vec3::ZERO {
+            let cut = Cut { device, proxy: device + burr, radius_mm, depth_mm: burr.length(), dt_ms };
             out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)));
         }
     }
@@ -66,12 +76,12 @@ impl<F: Feel> RigidContact for Penalty<F> {
 }
 
 /// The direction of `push` and `depth`, if both are something.
-pub(crate) fn answer(push: Vec3, depth_mm: f32, out: &mut RigidStep) -> Option<(Vec3, f32)> {
+pub(crate) fn answer(push: Vec3, depth_mm: f32, out: &mut RigidStep) -> Option<Felt> {
     let normal = push.normalize_or_zero();
     if normal == Vec3::ZERO {
         // Opposed contacts cancel: there is no way to push.
         out.fallbacks += u32::from(out.points_in_contact > 0);
         return None;
     }
-    (depth_mm > 0.0 && depth_mm.is_finite()).then_some((normal, depth_mm))
+    (depth_mm > 0.0 && depth_mm.is_finite()).then_some(Felt { normal, depth_mm, burr: depth_mm * normal })
 }

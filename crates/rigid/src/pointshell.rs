@@ -19,10 +19,10 @@
 //! Deeper than a voxel: the depth of a point starts anew in each voxel, so that the force stays as small as at the surface.
 
 use crate::RigidStep;
-use crate::penalty::{Feel, answer};
+use crate::penalty::{Feel, Felt, answer};
 use crate::removal::Law;
 use trepan_contact::Contact;
-use trepan_geometry::{Pointshell, Spread, Tool, Vec3};
+use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
 /// Points up to which the sum is not reduced.
@@ -73,7 +73,8 @@ impl Shell {
 }
 
 impl Feel for Shell {
-    fn feel(&mut self, bone: &BoneVolume, tip: Vec3, out: &mut RigidStep) -> Option<(Vec3, f32)> {
+    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+        let tip = pose.translation;
         let mut push = Vec3::ZERO;
         for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {
             let point = tip + *point;

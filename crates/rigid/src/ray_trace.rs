@@ -18,10 +18,10 @@
 //! For a tool that is wholly in bone: the rays end at its centre, and there is no way out.
 
 use crate::RigidStep;
-use crate::penalty::{Feel, answer};
+use crate::penalty::{Feel, Felt, answer};
 use crate::removal::Law;
 use trepan_contact::Contact;
-use trepan_geometry::{Pointshell, Spread, Tool, Vec3};
+use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
 /// How the method is set up.
@@ -49,31 +49,17 @@ impl Rays {
         let shell = Pointshell::sphere(tool.tip_radius_mm, config.points.clamp(8, 20_000), Spread::Fibonacci);
         Self { shell, radius_mm: tool.tip_radius_mm }
     }
-
-    /// The way from `point`, which is `over` HU in bone, along `inward` to the isovalue, mm.
-    fn way_out(&self, bone: &BoneVolume, point: Vec3, inward: Vec3, over: f32, visited: &mut u32) -> f32 {
-        let step = 0.5 * bone.spacing_mm();
-        let (mut way, mut before) = (0.0, over);
-        while way < self.radius_mm {
-            *visited += 1;
-            let now = over_iso(bone, point + (way + step) * inward);
-            if now <= 0.0 {
-                return (way + step * before / (before - now)).min(self.radius_mm);
-            }
-            (way, before) = (way + step, now);
-        }
-        self.radius_mm
-    }
 }
 
 impl Feel for Rays {
-    fn feel(&mut self, bone: &BoneVolume, tip: Vec3, out: &mut RigidStep) -> Option<(Vec3, f32)> {
+    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+        let tip = pose.translation;
         let mut push = Vec3::ZERO;
         for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {
             let point = tip + *point;
             let over = over_iso(bone, point);
             if over > 0.0 {
-                let depth_mm = self.way_out(bone, point, *inward, over, &mut out.voxels_swept);
+                let depth_mm = way_out(bone, point, *inward, over, self.radius_mm, &mut out.voxels_swept);
                 push += depth_mm * *inward;
                 out.points_in_contact += 1;
                 out.manifold.push(Contact { point, normal: *inward, depth_mm });
@@ -87,8 +73,23 @@ impl Feel for Rays {
     }
 }
 
+/// The way from `point`, which is `over` HU in bone, along `inward` to the isovalue, at most `longest`, mm.
+pub(crate) fn way_out(bone: &BoneVolume, point: Vec3, inward: Vec3, over: f32, longest: f32, visited: &mut u32) -> f32 {
+    let step = 0.5 * bone.spacing_mm();
+    let (mut way, mut before) = (0.0, over);
+    while way < longest {
+        *visited += 1;
+        let now = over_iso(bone, point + (way + step) * inward);
+        if now <= 0.0 {
+            return (way + step * before / (before - now)).min(longest);
+        }
+        (way, before) = (way + step, now);
+    }
+    longest
+}
+
 /// Trilinear density over the isovalue, HU; positive in bone.
-fn over_iso(bone: &BoneVolume, point: Vec3) -> f32 {
+pub(crate) fn over_iso(bone: &BoneVolume, point: Vec3) -> f32 {
     let at = bone.grid_of(point);
     let low = at.floor();
     let (f, g, corner) = (at - low, 1.0 - (at - low), low.as_ivec3());

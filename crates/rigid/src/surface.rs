@@ -167,7 +167,7 @@ impl Discs {
         for (known, edge) in self.list.iter_mut().zip(&self.edges) {
             let step = NEIGHBOURS[usize::from(edge.to)];
             let x = crossing(window, self.base, edge.voxel, step);
-            let turn = (slot(key(self.base, edge)) as u32).wrapping_add(self.wear) % TURNS == 0;
+            let turn = (slot(key(self.base, edge)) as u32).wrapping_add(self.wear).is_multiple_of(TURNS);
             if edge.shaped && turn && x.distance_squared(centre) <= (reach + known.radius).powi(2) {
                 *known = disc(window, self.base, x, step.as_vec3(), self.radius);
                 keep(&mut self.before, self.base, edge, known, self.wear);

@@ -18,12 +18,12 @@
 //! Against edges and thin walls, where there is less bone than a cap has: the depth reads too small.
 
 use crate::RigidStep;
-use crate::penalty::{Feel, answer};
+use crate::penalty::{Feel, Felt, answer};
 use crate::removal::Law;
 use crate::rows::{GridBall, rows};
 use core::f32::consts::PI;
 use trepan_contact::Contact;
-use trepan_geometry::{Tool, Vec3};
+use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
 /// How the method is set up.
@@ -44,7 +44,8 @@ impl Sum {
 }
 
 impl Feel for Sum {
-    fn feel(&mut self, bone: &BoneVolume, tip: Vec3, out: &mut RigidStep) -> Option<(Vec3, f32)> {
+    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+        let tip = pose.translation;
         let centre = bone.grid_of(tip);
         let radius = self.radius_mm / bone.spacing_mm();
         let (ball, none) = (GridBall { centre, radius: radius + 0.5 }, GridBall { centre, radius: -1.0 });
@@ -67,7 +68,7 @@ impl Feel for Sum {
         out.points_in_contact = out.voxels_in_contact;
         let depth = cap_height(volume, radius) * bone.spacing_mm();
         let found = answer(-moment, depth, out);
-        if let Some((normal, depth_mm)) = found {
+        if let Some(Felt { normal, depth_mm, .. }) = found {
             out.manifold.push(Contact { point: tip - self.radius_mm * normal, normal, depth_mm });
         }
         found

@@ -19,7 +19,7 @@
 
 use crate::VoxelVolume;
 use glam::{DVec3, IVec3};
-use std::sync::atomic::{AtomicI16, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, Ordering};
 use trepan_geometry::{Aabb, Vec3};
 
 /// Edge of a brick in voxels.
@@ -39,6 +39,8 @@ pub struct BoneVolume {
     hu: Vec<AtomicI16>,
     bricks: [usize; 3],
     versions: Vec<AtomicU32>,
+    /// Whether a brick has ever held bone.
+    solid: Vec<AtomicBool>,
 }
 
 /// Why a volume cannot be carved.
@@ -70,18 +72,21 @@ impl BoneVolume {
             hu: volume.data.iter().map(|&v| AtomicI16::new(v)).collect(),
             bricks,
             versions: (0..bricks.iter().product()).map(|_| AtomicU32::new(0)).collect(),
+            solid: (0..bricks.iter().product()).map(|_| AtomicBool::new(false)).collect(),
         };
-        bone.bounds = bone.bone_box().ok_or(BoneError::Empty(isovalue))?;
+        bone.bounds = bone.find_bone().ok_or(BoneError::Empty(isovalue))?;
         Ok(bone)
     }
 
-    fn bone_box(&self) -> Option<Aabb> {
+    /// The box of the bone; marks the bricks that hold some.
+    fn find_bone(&self) -> Option<Aabb> {
         let voxels = self.hu.iter().enumerate().filter(|(_, v)| v.load(Ordering::Relaxed) >= self.isovalue);
         let [nx, ny, _] = self.dims;
         let (mut low, mut high) = (IVec3::MAX, IVec3::MIN);
         for (at, _) in voxels {
             let voxel = IVec3::new((at % nx) as i32, (at / nx % ny) as i32, (at / (nx * ny)) as i32);
             (low, high) = (low.min(voxel), high.max(voxel));
+            self.solid[self.brick_of(voxel)].store(true, Ordering::Relaxed);
         }
         let half = Vec3::splat(0.5 * self.spacing_mm);
         (low.x <= high.x).then(|| Aabb { min: self.centre_of(low) - half, max: self.centre_of(high) + half })
@@ -160,10 +165,38 @@ impl BoneVolume {
     pub fn set_hu(&self, voxel: IVec3, hu: i16) {
         if let Some(at) = self.index(voxel) {
             self.hu[at].store(hu, Ordering::Relaxed);
-            let [bx, by, _] = self.bricks;
-            let b = voxel.as_uvec3() / BRICK as u32;
-            self.versions[b.x as usize + bx * (b.y as usize + by * b.z as usize)].fetch_add(1, Ordering::Release);
+            let brick = self.brick_of(voxel);
+            if hu >= self.isovalue {
+                self.solid[brick].store(true, Ordering::Relaxed);
+            }
+            self.versions[brick].fetch_add(1, Ordering::Release);
         }
+    }
+
+    /// Index of the brick of a voxel inside the grid.
+    #[inline]
+    fn brick_of(&self, voxel: IVec3) -> usize {
+        let [bx, by, _] = self.bricks;
+        let b = voxel.as_uvec3() / BRICK as u32;
+        b.x as usize + bx * (b.y as usize + by * b.z as usize)
+    }
+
+    /// Whether there may be bone in the box from voxel `low` to voxel `high`, both included: whether one of its bricks has ever held some.
+    pub fn may_hold_bone(&self, low: IVec3, high: IVec3) -> bool {
+        let last = IVec3::new(self.dims[0] as i32, self.dims[1] as i32, self.dims[2] as i32) - 1;
+        let (low, high) = (low.max(IVec3::ZERO), high.min(last));
+        if low.cmpgt(high).any() {
+            return false;
+        }
+        let [bx, by, _] = self.bricks.map(|n| n as i32);
+        let (first, last) = (low / BRICK as i32, high / BRICK as i32);
+        (first.z..=last.z).any(|k| {
+            (first.y..=last.y).any(|j| {
+                let row = (bx * (j + by * k)) as usize;
+                let row = &self.solid[row + first.x as usize..=row + last.x as usize];
+                row.iter().any(|solid| solid.load(Ordering::Relaxed))
+            })
+        })
     }
 
     /// Bricks along x, y, z; brick (0, 0, 0) starts at voxel (0, 0, 0).
@@ -242,6 +275,11 @@ mod tests {
         assert_eq!(bone.voxel_of(bone.centre_of(voxel) + Vec3::splat(0.24)), voxel);
         assert_eq!(bone.bounds().min, Vec3::new(-9.0 + 4.5 * 0.5, 4.0 + 2.5 * 0.5, 1.0 + 3.5 * 0.5));
         assert_eq!(bone.hu(IVec3::new(0, 0, 40)), AIR_HU);
+        assert!(bone.may_hold_bone(IVec3::splat(-9), IVec3::splat(4)) && bone.may_hold_bone(voxel, voxel));
+        assert!(
+            !bone.may_hold_bone(IVec3::new(16, 0, 0), IVec3::splat(40))
+                && !bone.may_hold_bone(IVec3::splat(30), IVec3::splat(40))
+        );
         assert_eq!(BoneVolume::new(&ball(), 1000).unwrap_err(), BoneError::Empty(1000));
     }
 }

@@ -1,7 +1,7 @@
 //! Synthetic bone with known truth.
 #![allow(dead_code, reason = "each test file uses its share")]
 
-use trepan_geometry::{Pose, ToolState, Vec3};
+use trepan_geometry::{Pose, Quat, ToolState, Vec3};
 use trepan_rigid::{RigidContact, RigidStep};
 use trepan_volume::{BoneVolume, VoxelVolume};
 
@@ -29,12 +29,18 @@ pub fn at(p: Vec3) -> ToolState {
     ToolState::at(Pose::from_translation(p))
 }
 
-/// Steps along a straight line at `mm_per_tick` and returns the last step.
+/// Centre at `p`, shaft along `axis`.
+pub fn held(p: Vec3, axis: Vec3) -> Pose {
+    Pose::from_parts(p, Quat::from_rotation_arc(Vec3::Z, axis))
+}
+
+/// Steps along a straight line at `mm_per_tick`, with the shaft as the proxy has it, and returns the last step.
 pub fn walk(contact: &mut dyn RigidContact, bone: &BoneVolume, from: Vec3, to: Vec3, mm_per_tick: f32) -> RigidStep {
     let mut out = RigidStep::default();
     let ticks = (from.distance(to) / mm_per_tick).ceil().max(1.0) as usize;
     for t in 0..=ticks {
-        contact.step(bone, &at(from.lerp(to, t as f32 / ticks as f32)), false, 1.0, &mut out);
+        let pose = Pose::from_parts(from.lerp(to, t as f32 / ticks as f32), contact.proxy().rotation);
+        contact.step(bone, &ToolState::at(pose), false, 1.0, &mut out);
     }
     out
 }
