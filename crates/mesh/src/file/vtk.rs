@@ -13,6 +13,8 @@
 
 use crate::TetMesh;
 use crate::file::{FileError, Reader, write_atomically};
+use crate::lattice::LabelledMesh;
+use std::io::Write;
 use std::path::Path;
 use trepan_geometry::Vec3;
 
@@ -31,19 +33,32 @@ pub(crate) fn parse(reader: Reader) -> Result<TetMesh, FileError> {
 
 /// Writes a mesh as binary legacy VTK, whole or not at all.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
-    let count = mesh.tets.len();
+    write_atomically(path, |out| write_grid(out, mesh))
+}
+
+/// The same with each tetrahedron's label as the cell data `label`.
+pub fn write_labelled(path: &Path, labelled: &LabelledMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
-        write!(out, "# vtk DataFile Version 3.0\ntetrahedra, mm\nBINARY\nDATASET UNSTRUCTURED_GRID\n")?;
-        writeln!(out, "POINTS {} float", mesh.positions.len())?;
-        mesh.positions.iter().flat_map(Vec3::to_array).try_for_each(|c| out.write_all(&c.to_be_bytes()))?;
-        writeln!(out, "\nCELLS {count} {}", 5 * count)?;
-        for tet in &mesh.tets {
-            [4, tet[0], tet[1], tet[2], tet[3]].iter().try_for_each(|n| out.write_all(&n.to_be_bytes()))?;
-        }
-        writeln!(out, "\nCELL_TYPES {count}")?;
-        (0..count).try_for_each(|_| out.write_all(&u32::from(TETRAHEDRON).to_be_bytes()))?;
+        write_grid(out, &labelled.mesh)?;
+        let labels = &labelled.label_of_tet;
+        write!(out, "CELL_DATA {}\nSCALARS label unsigned_short 1\nLOOKUP_TABLE default\n", labels.len())?;
+        labels.iter().try_for_each(|label| out.write_all(&label.to_be_bytes()))?;
         writeln!(out)
     })
+}
+
+fn write_grid(out: &mut dyn Write, mesh: &TetMesh) -> std::io::Result<()> {
+    let count = mesh.tets.len();
+    write!(out, "# vtk DataFile Version 3.0\ntetrahedra, mm\nBINARY\nDATASET UNSTRUCTURED_GRID\n")?;
+    writeln!(out, "POINTS {} float", mesh.positions.len())?;
+    mesh.positions.iter().flat_map(Vec3::to_array).try_for_each(|c| out.write_all(&c.to_be_bytes()))?;
+    writeln!(out, "\nCELLS {count} {}", 5 * count)?;
+    for tet in &mesh.tets {
+        [4, tet[0], tet[1], tet[2], tet[3]].iter().try_for_each(|n| out.write_all(&n.to_be_bytes()))?;
+    }
+    writeln!(out, "\nCELL_TYPES {count}")?;
+    (0..count).try_for_each(|_| out.write_all(&u32::from(TETRAHEDRON).to_be_bytes()))?;
+    writeln!(out)
 }
 
 struct Legacy {
@@ -226,6 +241,17 @@ mod tests {
         let path = folder.path().join("mesh.vtk");
         write(&path, &octahedron()).unwrap();
         assert_eq!(read(&path).unwrap(), octahedron());
+    }
+
+    #[test]
+    fn labels_follow_the_grid_as_cell_data() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("labelled.vtk");
+        let labelled = LabelledMesh { mesh: octahedron(), label_of_tet: vec![7, 258, 7, 7] };
+        write_labelled(&path, &labelled).unwrap();
+        assert_eq!(read(&path).unwrap(), labelled.mesh);
+        let tail = b"LOOKUP_TABLE default\n\x00\x07\x01\x02\x00\x07\x00\x07\n";
+        assert!(std::fs::read(&path).unwrap().ends_with(tail));
     }
 
     #[test]

@@ -1,44 +1,86 @@
-//! The signed distance of a mask, smoothed: where the lattice finds inside, outside and the surface between.
+//! The distance to the border of one label, smoothed: a function of world space.
 //!
 //! # Theory
-//! The exact distance to the mask's surface ([`DistanceField`]); a Gaussian of width σ then takes out what a lattice of spacing a ≫ σ could only alias.
+//! The exact distance to the label's surface ([`DistanceField`]), positive inside; a Gaussian of width σ then takes out what a lattice of spacing a ≫ σ could only alias.
 //! On a sheared grid the zero set stays right, the slope does not, and only the zero set matters here.
 //!
 //! # Practice
-//! Only the box of the largest 6-connected part, padded, is kept: what touches the grid's border is closed there. 4 bytes a voxel.
+//! Only the box of the label, padded, is kept: what touches the grid's border is closed there. 4 bytes a voxel.
 
 use super::blur::blur;
-use crate::MeshError;
 use glam::{DAffine3, DVec3};
-use trepan_volume::{DistanceField, VoxelVolume, largest_component};
+use trepan_volume::{DistanceField, VoxelVolume};
 
-/// A smooth function of world space: about millimetres to the surface, negative inside.
+/// Where a label lies in its volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Block {
+    low: [usize; 3],
+    high: [usize; 3],
+    /// How many voxels have the label.
+    pub(super) voxels: usize,
+}
+
+impl Block {
+    /// The blocks of all labels but 0, ascending by label.
+    pub(super) fn of_each(labels: &VoxelVolume<u16>) -> Vec<(u16, Self)> {
+        let mut blocks = vec![None::<Self>; usize::from(u16::MAX) + 1];
+        let [nx, ny, _] = labels.dims;
+        for (at, &label) in labels.data.iter().enumerate().filter(|(_, label)| **label != 0) {
+            let voxel = [at % nx, at / nx % ny, at / (nx * ny)];
+            let this = Self { low: voxel, high: voxel, voxels: 1 };
+            let block = &mut blocks[usize::from(label)];
+            *block = Some(block.map_or(this, |block| block.with(&this)));
+        }
+        blocks.iter().enumerate().filter_map(|(label, block)| Some((label as u16, (*block)?))).collect()
+    }
+
+    /// Both together.
+    pub(super) fn with(&self, other: &Self) -> Self {
+        Self {
+            low: std::array::from_fn(|d| self.low[d].min(other.low[d])),
+            high: std::array::from_fn(|d| self.high[d].max(other.high[d])),
+            voxels: self.voxels + other.voxels,
+        }
+    }
+
+    /// World box of the corners of its voxels.
+    pub(super) fn world_box(&self, labels: &VoxelVolume<u16>) -> [DVec3; 2] {
+        let corner = |n: usize| {
+            let end = |d: usize| if n >> d & 1 == 0 { self.low[d] as f64 - 0.5 } else { self.high[d] as f64 + 0.5 };
+            labels.world_from_voxel.transform_point3(DVec3::new(end(0), end(1), end(2)))
+        };
+        let all = (0..8).map(corner);
+        all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[a, b], p| [a.min(p), b.max(p)])
+    }
+}
+
+/// About millimetres to a border, positive inside.
 pub(super) struct Field {
     dims: [usize; 3],
+    spacing_mm: DVec3,
     values: Vec<f32>,
     voxel_from_world: DAffine3,
-    /// World box of the mask's voxels.
-    pub(super) min: DVec3,
-    pub(super) max: DVec3,
-    /// Volume of the mask, mm³.
-    pub(super) mask_mm3: f64,
 }
 
 impl Field {
-    /// The field of the largest part of a mask. `smoothing_mm` gets σ from the volume of that part, mm³.
-    pub(super) fn of_mask(mask: &VoxelVolume<u8>, smoothing_mm: impl FnOnce(f64) -> f64) -> Result<Self, MeshError> {
-        check_volume(mask)?;
-        let part = largest_component(mask);
-        let (low, high) = voxel_box(&part).ok_or(MeshError::EmptyMask)?;
-        let mask_mm3 = part.data.iter().filter(|v| **v != 0).count() as f64 * mask.voxel_mm3();
-        let sigma = (smoothing_mm(mask_mm3) / mask.spacing_mm()).to_array();
-        let pad = sigma.map(|s| 2 + (3.0 * s).ceil() as usize);
-        let padded = padded(&part, low, high, pad);
-        let mut values = DistanceField::of_mask(&padded).values().data.clone();
-        blur(&mut values, padded.dims, sigma);
-        let (min, max) = world_box(mask, low, high);
-        let voxel_from_world = padded.world_from_voxel.inverse();
-        Ok(Self { dims: padded.dims, values, voxel_from_world, min, max, mask_mm3 })
+    /// The distance to the border of what `inside` takes, with a margin for smoothing up to `most_mm`.
+    pub(super) fn of(labels: &VoxelVolume<u16>, block: &Block, most_mm: f64, inside: impl Fn(u16) -> bool) -> Self {
+        let spacing_mm = labels.spacing_mm();
+        let pad = (most_mm / spacing_mm).to_array().map(|sigma| 2 + (3.0 * sigma).ceil() as usize);
+        let mask = padded(labels, block, pad, inside);
+        let values = DistanceField::of_mask(&mask).values().data.iter().map(|d| -d).collect();
+        Self { dims: mask.dims, spacing_mm, values, voxel_from_world: mask.world_from_voxel.inverse() }
+    }
+
+    pub(super) fn smooth(&mut self, sigma_mm: f64) {
+        blur(&mut self.values, self.dims, (sigma_mm / self.spacing_mm).to_array());
+    }
+
+    /// Whether the padded box holds a point.
+    pub(super) fn contains(&self, world: DVec3) -> bool {
+        let at = self.voxel_from_world.transform_point3(world);
+        let last = DVec3::from_array(self.dims.map(|n| (n - 1) as f64));
+        at.cmpge(DVec3::ZERO).all() && at.cmple(last).all()
     }
 
     /// Trilinear; constant beyond the border.
@@ -62,54 +104,19 @@ impl Field {
     }
 }
 
-fn check_volume(mask: &VoxelVolume<u8>) -> Result<(), MeshError> {
-    let wanted = mask.dims.iter().try_fold(1usize, |n, &d| n.checked_mul(d));
-    if wanted != Some(mask.data.len()) {
-        let got = format!("{:?} with {} samples", mask.dims, mask.data.len());
-        return Err(MeshError::Mask { field: "dims", got, wanted: "as many samples as the product of the dimensions" });
-    }
-    let determinant = mask.world_from_voxel.matrix3.determinant();
-    if !mask.world_from_voxel.is_finite() || !determinant.is_finite() || determinant.abs() < 1e-12 {
-        let got = format!("{:?}", mask.world_from_voxel);
-        return Err(MeshError::Mask { field: "world_from_voxel", got, wanted: "finite and invertible" });
-    }
-    Ok(())
-}
-
-/// Lowest and highest voxel that is not 0.
-fn voxel_box(mask: &VoxelVolume<u8>) -> Option<([usize; 3], [usize; 3])> {
-    let [nx, ny, _] = mask.dims;
-    let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
-    for (at, _) in mask.data.iter().enumerate().filter(|(_, v)| **v != 0) {
-        let voxel = [at % nx, at / nx % ny, at / (nx * ny)];
-        for d in 0..3 {
-            (low[d], high[d]) = (low[d].min(voxel[d]), high[d].max(voxel[d]));
-        }
-    }
-    (low[0] <= high[0]).then_some((low, high))
-}
-
-/// The box of a mask and `pad` empty voxels around.
-fn padded(mask: &VoxelVolume<u8>, low: [usize; 3], high: [usize; 3], pad: [usize; 3]) -> VoxelVolume<u8> {
-    let size: [usize; 3] = std::array::from_fn(|d| high[d] - low[d] + 1);
+/// The mask of a block and `pad` empty voxels around.
+fn padded(labels: &VoxelVolume<u16>, block: &Block, pad: [usize; 3], inside: impl Fn(u16) -> bool) -> VoxelVolume<u8> {
+    let size: [usize; 3] = std::array::from_fn(|d| block.high[d] - block.low[d] + 1);
     let dims = std::array::from_fn(|d| size[d] + 2 * pad[d]);
-    let shift = DVec3::from_array(std::array::from_fn(|d| low[d] as f64 - pad[d] as f64));
-    let mut box_of_part = VoxelVolume::filled(dims, mask.world_from_voxel * DAffine3::from_translation(shift), 0);
+    let shift = DVec3::from_array(std::array::from_fn(|d| block.low[d] as f64 - pad[d] as f64));
+    let mut mask = VoxelVolume::filled(dims, labels.world_from_voxel * DAffine3::from_translation(shift), 0);
     for k in 0..size[2] {
         for j in 0..size[1] {
-            let from = mask.index([low[0], low[1] + j, low[2] + k]);
-            let to = box_of_part.index([pad[0], pad[1] + j, pad[2] + k]);
-            box_of_part.data[to..to + size[0]].copy_from_slice(&mask.data[from..from + size[0]]);
+            let from = labels.index([block.low[0], block.low[1] + j, block.low[2] + k]);
+            let to = mask.index([pad[0], pad[1] + j, pad[2] + k]);
+            let row = labels.data[from..from + size[0]].iter().map(|&label| u8::from(inside(label)));
+            mask.data[to..to + size[0]].iter_mut().zip(row).for_each(|(voxel, value)| *voxel = value);
         }
     }
-    box_of_part
-}
-
-/// World box of the corners of a box of voxels.
-fn world_box(mask: &VoxelVolume<u8>, low: [usize; 3], high: [usize; 3]) -> (DVec3, DVec3) {
-    let corner = |n: usize| {
-        let end = |d: usize| if n >> d & 1 == 0 { low[d] as f64 - 0.5 } else { high[d] as f64 + 0.5 };
-        mask.world_from_voxel.transform_point3(DVec3::new(end(0), end(1), end(2)))
-    };
-    (0..8).map(corner).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)))
+    mask
 }

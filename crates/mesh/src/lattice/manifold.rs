@@ -5,10 +5,11 @@
 //! node one face-connected group with one rim; of several, all but the largest go. Where the group has two rims, a path of
 //! tetrahedra from rim to rim goes. Each round takes tetrahedra away, so it ends; angles of the others stay as they are.
 
+use super::LabelledMesh;
 use crate::{NONE, TetMesh, Topology};
 
 /// The largest face-connected part of a mesh, with a surface that is a manifold.
-pub(super) fn repaired(mut mesh: TetMesh) -> TetMesh {
+pub(super) fn repaired(LabelledMesh { mut mesh, mut label_of_tet }: LabelledMesh) -> LabelledMesh {
     loop {
         let topology = Topology::of(&mesh);
         let mut doomed = outside_largest(&mesh, &topology);
@@ -16,10 +17,11 @@ pub(super) fn repaired(mut mesh: TetMesh) -> TetMesh {
             mark_pinches(&mesh, &topology, &mut doomed);
         }
         if !doomed.contains(&true) {
-            return mesh.without_orphans();
+            return LabelledMesh { mesh: mesh.without_orphans(), label_of_tet };
         }
-        let mut keep = doomed.iter().map(|d| !d);
+        let (mut keep, mut keep_label) = (doomed.iter().map(|d| !d), doomed.iter().map(|d| !d));
         mesh.tets.retain(|_| keep.next().unwrap_or(true));
+        label_of_tet.retain(|_| keep_label.next().unwrap_or(true));
     }
 }
 
@@ -193,7 +195,9 @@ mod tests {
     #[test]
     fn of_two_that_share_an_edge_the_larger_stays() {
         let positions = vec![Vec3::ZERO, Vec3::Z, 2.0 * Vec3::X, Vec3::Y, Vec3::NEG_X, Vec3::NEG_Y];
-        let mesh = repaired(TetMesh { positions, tets: vec![[0, 4, 5, 1], [0, 2, 3, 1]] });
+        let mesh = TetMesh { positions, tets: vec![[0, 4, 5, 1], [0, 2, 3, 1]] };
+        let LabelledMesh { mesh, label_of_tet } = repaired(LabelledMesh { mesh, label_of_tet: vec![4, 7] });
+        assert_eq!(label_of_tet, [7]);
         assert_eq!(mesh.tets.len(), 1);
         assert!((mesh.total_mm3() - 2.0 / 6.0).abs() < 1e-6);
         assert!(Surface::of(&mesh).is_closed());

@@ -2,9 +2,11 @@
 //!
 //! # Theory
 //! The stable step of an explicit solver goes with the smallest height of an element. Where a node has a flat element, steps along the axes are tried, shorter each round;
-//! a node of the surface is brought back to it, p ← p − φ ∇φ / |∇φ|². A step stays when the smallest height around the node grows and no angle there gets worse than the
+//! a node on a border is brought back to it, p ← p − φ ∇φ / |∇φ|²; where three labels meet it stays. A step stays when the smallest height around the node grows and no angle there gets worse than the
 //! worst before. So the worst never gets worse. On a brain the lowest element gets twice as high, and the stable time step twice as long.
 
+use super::LabelledMesh;
+use super::regions::Partition;
 use crate::quality::{EDGES, volume};
 use crate::{FACES, Surface, TetMesh, Topology};
 use glam::DVec3;
@@ -14,19 +16,49 @@ const ROUNDS: usize = 8;
 /// Nodes are left alone whose elements are all higher than this share of the spacing (the lattice's own: 0.71).
 const HIGH_ENOUGH: f64 = 0.33;
 
-/// Improves a mesh in place. `surface` is positive inside and 0 on the surface; `spacing` is the lattice's, mm.
-pub(super) fn polish(mesh: &mut TetMesh, spacing: f64, surface: impl Fn(DVec3) -> f64) {
-    let topology = Topology::of(mesh);
-    let mut on_surface = vec![false; mesh.positions.len()];
-    Surface::with(mesh, &topology).nodes().iter().for_each(|&n| on_surface[n as usize] = true);
+/// Where a node may go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Room {
+    /// Inside one label.
+    Free,
+    /// On the border between two.
+    Border(u16, u16),
+    /// Where three labels meet: nowhere.
+    Fixed,
+}
+
+/// Improves a mesh in place; `spacing` is that of the finest cubes, mm.
+pub(super) fn polish(labelled: &mut LabelledMesh, spacing: f64, regions: &impl Partition) {
+    let topology = Topology::of(&labelled.mesh);
+    let rooms = rooms(labelled, &topology);
     for round in 0..ROUNDS {
         let step = 0.12 * spacing * 0.7f64.powi(round as i32);
-        for node in 0..on_surface.len() {
+        for (node, room) in rooms.iter().enumerate().filter(|(_, room)| **room != Room::Fixed) {
+            let place = |p: DVec3| match *room {
+                Room::Border(a, b) => back_to(|p| regions.hold(a, p) - regions.hold(b, p), p, 0.01 * spacing),
+                _ => p,
+            };
             let around = topology.tets_of_node.row(node);
-            let place = |p: DVec3| if on_surface[node] { back_to(&surface, p, 0.01 * spacing) } else { p };
-            improve(mesh, node, around, HIGH_ENOUGH * spacing, |p, axis| place(p + axis * step));
+            improve(&mut labelled.mesh, node, around, HIGH_ENOUGH * spacing, |p, axis| place(p + axis * step));
         }
     }
+}
+
+fn rooms(labelled: &LabelledMesh, topology: &Topology) -> Vec<Room> {
+    let mut outside = vec![false; labelled.mesh.positions.len()];
+    Surface::with(&labelled.mesh, topology).nodes().iter().for_each(|&n| outside[n as usize] = true);
+    let room = |node: usize| {
+        let around = topology.tets_of_node.row(node).iter().map(|&t| labelled.label_of_tet[t as usize]);
+        let mut labels: Vec<u16> = around.chain(outside[node].then_some(0)).collect();
+        labels.sort_unstable();
+        labels.dedup();
+        match labels[..] {
+            [_] => Room::Free,
+            [a, b] => Room::Border(b, a),
+            _ => Room::Fixed,
+        }
+    };
+    (0..outside.len()).map(room).collect()
 }
 
 /// Tries the places that `moved` makes of six directions, and stays at the best.
@@ -89,15 +121,29 @@ mod tests {
         assert!((p.length() - 5.0).abs() < 1e-6);
     }
 
+    struct Nowhere;
+
+    impl Partition for Nowhere {
+        fn hold(&self, _: u16, _: DVec3) -> f64 {
+            f64::NAN
+        }
+
+        fn label_at(&self, _: DVec3) -> u16 {
+            0
+        }
+    }
+
     #[test]
     fn a_node_near_a_face_moves_away_and_nothing_else_does() {
-        let mut mesh = TetMesh {
+        let mesh = TetMesh {
             positions: vec![Vec3::ZERO, 4.0 * Vec3::X, 4.0 * Vec3::Y, 4.0 * Vec3::Z, Vec3::new(1.0, 1.0, 0.05)],
             tets: vec![[0, 1, 2, 4], [0, 3, 1, 4], [0, 2, 3, 4], [1, 3, 2, 4]],
         };
         let before = mesh.clone();
         assert_eq!(mesh.check(), Ok(()));
-        polish(&mut mesh, 4.0, |_| f64::NAN);
+        let mut labelled = LabelledMesh { mesh, label_of_tet: vec![1; 4] };
+        polish(&mut labelled, 4.0, &Nowhere);
+        let mesh = labelled.mesh;
         assert_eq!(mesh.check(), Ok(()));
         assert_eq!(mesh.positions[..4], before.positions[..4]);
         let (was, is) = (Quality::of(&before), Quality::of(&mesh));

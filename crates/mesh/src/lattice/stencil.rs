@@ -1,135 +1,264 @@
-//! Isosurface stuffing: a lattice is warped and cut where a surface passes.
+//! Isosurface stuffing: a lattice is warped and cut where labels meet.
 //!
 //! # Theory
-//! (Labelle and Shewchuk 2007.) Each lattice node has a sign: + inside, − outside, 0 on the surface. An edge between + and − has a cut point on the surface.
-//! A cut point nearer to a node than α times the edge *violates* it; the node is moved to that point, its sign becomes 0, and its
-//! other cut points vanish. No remaining cut is then close to a node, so each remaining tetrahedron falls into one of a few shapes:
+//! (Labelle and Shewchuk 2007; several labels after the idea of Bronson, Levine and Whitaker 2012.) Each lattice node has a label. An edge between two
+//! labels has a cut point where both hold equally. A cut point nearer to a node than α times the edge *violates* it; the node is moved to that point, is from then on
+//! the border of any label, and its other cut points vanish. No remaining cut is then close to a node. Each remaining tetrahedron is divided by its cuts, the
+//! same for both sides of a border (∘ is a node on a border):
 //!
 //! ```text
-//! + and 0 only     kept whole              + + 0 −    a pyramid, two tetrahedra
-//! + and cuts/0     one smaller one         + + − −    a wedge, three          + + + −    a prism, three
+//! A A A A, A ∘ ∘ ∘   whole            A A A B    a prism, three, and a corner
+//! A B ∘ ∘            two corners      A A B B    two wedges, three each, that share four cuts
+//! A A B ∘            a pyramid, two, and a corner
+//! A B C ∘            three corners, and the middle between their cuts
+//! A A B C            two corners, a prism, and a pyramid up to the cut between B and C: the rest is A's
+//! A B C D            four corners, and the octahedron between the six cuts in four
 //! ```
 //!
-//! A face + + − leaves a quadrilateral that two tetrahedra share, so its diagonal is chosen from the face alone: at the cut of the long edge when
-//! there is one, else by the parity rule (at the positive node that lies above the negative one in an even number of coordinates). With α = 0.24999 on long edges and 0.41189 on
-//! short ones the paper proves dihedral angles between 10.7° and 164.8°. Here the violating cut is chosen freely (the nearest), which
-//! allows 9.3° to 161.7° over all extremes of nodes and cuts (a test goes through them); rough noise stays over 10°, anatomy over 14°.
+//! The middle between three or four labels belongs to the one that holds its centre, the rest of A A B C to A: so where three labels meet, their common line is
+//! true to about half a lattice spacing, while every face still has the same triangles on both sides, and no gap or overlap can be.
+//!
+//! A face A A B leaves a quadrilateral that two tetrahedra share, so its diagonal is chosen from the face alone: at the cut of the longer edge, and of
+//! equal ones at the cut of the node with the higher number. That order of edges is total, so no prism meets three diagonals in a cycle, and the two wedges of
+//! A A B B never need different diagonals on their common quadrilateral.
+//!
+//! With α = 0.24999 on long edges and 0.41189 on short ones the paper proves dihedral angles between 10.7° and 164.8° for one label. Here the violating cut is chosen
+//! freely (the nearest), which allows 9.3° to 161.7° for one to four labels, over all extremes of nodes and cuts on cubes of one size (a test goes through them).
+//! Not covered is a tetrahedron with all four nodes on borders: if one of them was outside it is left out, else it stays; on borders of pure noise
+//! such a one has over 12°.
 
-use super::bcc::Bcc;
+use super::LabelledMesh;
+use super::octree::Lattice;
+use super::regions::Partition;
 use crate::TetMesh;
+use crate::quality::{EDGES, volume};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Violation limits of long and short edges, as fractions of the edge.
-const ALPHA_LONG: f64 = 0.24999;
-const ALPHA_SHORT: f64 = 0.41189;
+/// Violation limits along the axes and across, as fractions of the edge.
+pub(super) const ALPHA_LONG: f64 = 0.24999;
+pub(super) const ALPHA_SHORT: f64 = 0.41189;
+/// A short edge of a lattice of one size, in spacings.
+const SHORT: f64 = 0.866_025_403_784_438_6;
 /// Halvings of an edge to find its cut point.
 const HALVINGS: usize = 24;
+/// The label of a node on a border.
+pub(super) const ON: u16 = u16::MAX;
 
-/// The lattice with signs, while it is warped and cut.
-struct Stuffing<'a> {
-    lattice: &'a Bcc,
-    positions: Vec<DVec3>,
-    signs: Vec<i8>,
+/// The lattice with labels, while it is warped and cut.
+pub(super) struct Stuffing<'a, P> {
+    pub(super) lattice: &'a Lattice,
+    pub(super) regions: &'a P,
+    pub(super) positions: Vec<DVec3>,
+    pub(super) labels: Vec<u16>,
+    /// Whether a node was outside before nodes moved.
+    pub(super) outside: Vec<bool>,
     /// Edges with a cut, each `[lower, higher]` node, ascending.
-    edges: Vec<[u32; 2]>,
-    cuts: Vec<DVec3>,
-    tets: Vec<[u32; 4]>,
+    pub(super) edges: Vec<[u32; 2]>,
+    pub(super) cuts: Vec<DVec3>,
+    pub(super) tets: Vec<[u32; 4]>,
 }
 
-/// The tetrahedra of the lattice inside `inside > 0`, cut at the surface.
-pub(super) fn stuff(lattice: &Bcc, inside: impl Fn(DVec3) -> f64 + Sync) -> TetMesh {
-    let mut stuffing = Stuffing::new(lattice, &inside);
+/// Tetrahedra and the label of each.
+#[derive(Default)]
+pub(super) struct Pieces {
+    pub(super) tets: Vec<[u32; 4]>,
+    pub(super) labels: Vec<u16>,
+}
+
+impl Pieces {
+    fn add(&mut self, label: u16, tets: &[[u32; 4]]) {
+        self.tets.extend(tets);
+        self.labels.resize(self.tets.len(), label);
+    }
+}
+
+/// The tetrahedra of the lattice inside any label but 0, cut where labels meet.
+pub(super) fn stuff<P: Partition>(lattice: &Lattice, regions: &P) -> LabelledMesh {
+    let mut stuffing = Stuffing::new(lattice, regions);
     stuffing.warp();
     stuffing.fill()
 }
 
-impl<'a> Stuffing<'a> {
-    fn new(lattice: &'a Bcc, inside: &(impl Fn(DVec3) -> f64 + Sync)) -> Self {
-        let positions: Vec<DVec3> = (0..lattice.nodes()).map(|n| lattice.position(n)).collect();
-        let signs: Vec<i8> = positions.par_iter().map(|&p| sign(inside(p))).collect();
-        let sign_of = |n: u32| signs[n as usize];
-        let mut tets = lattice.tets();
-        tets.retain(|tet| tet.iter().any(|&n| sign_of(n) > 0));
-        let edges = cut_edges(&tets, sign_of);
+impl<'a, P: Partition> Stuffing<'a, P> {
+    fn new(lattice: &'a Lattice, regions: &'a P) -> Self {
+        let positions = lattice.positions();
+        let labels: Vec<u16> = positions.par_iter().map(|&p| regions.label_at(p)).collect();
+        let label_of = |n: u32| labels[n as usize];
+        let mut tets = lattice.tets.clone();
+        tets.retain(|tet| tet.iter().any(|&n| label_of(n) != 0));
+        let edges = cut_edges(&tets, label_of);
         let cut = |&[a, b]: &[u32; 2]| {
-            let (from, to) = if sign_of(a) > 0 { (a, b) } else { (b, a) };
-            crossing(inside, positions[from as usize], positions[to as usize])
+            let [a, b] = if label_of(a) > label_of(b) { [a, b] } else { [b, a] };
+            let beats = |p| regions.hold(label_of(a), p) > regions.hold(label_of(b), p);
+            crossing(beats, positions[a as usize], positions[b as usize])
         };
         let cuts = edges.par_iter().map(cut).collect();
-        Self { lattice, positions, signs, edges, cuts, tets }
+        let outside = labels.iter().map(|&label| label == 0).collect();
+        Self { lattice, regions, positions, labels, outside, edges, cuts, tets }
     }
 
     /// Moves each violated node to its nearest violating cut point.
     fn warp(&mut self) {
         let ends = (0..2 * self.edges.len()).map(|n| (self.edges[n / 2][n % 2], (n / 2) as u32));
         let cuts_of_node = crate::Csr::of_pairs(self.positions.len(), ends);
+        let reach = self.reach();
         for node in 0..self.positions.len() {
-            if let Some(cut) = self.violation(node, cuts_of_node.row(node)) {
+            if let Some(cut) = self.violation(node, reach[node], cuts_of_node.row(node)) {
                 self.positions[node] = cut;
-                self.signs[node] = 0;
+                self.labels[node] = ON;
             }
         }
     }
 
-    /// The nearest violating cut of a node among those that still exist: both ends of their edge have a sign.
-    fn violation(&self, node: usize, cuts: &[u32]) -> Option<DVec3> {
-        if self.signs[node] == 0 {
+    /// For each node the spacing of the finest lattice that its edges belong to, mm.
+    fn reach(&self) -> Vec<f64> {
+        let mut quarters = vec![u64::MAX; self.positions.len()];
+        for tet in &self.tets {
+            for [i, j, ..] in EDGES {
+                let (squared, straight) = self.lattice.edge(tet[i], tet[j]);
+                // A short edge is half the diagonal of a cube: a² = 4/3 of its square.
+                let squared = if straight { 3 * squared } else { 4 * squared };
+                for end in [i, j].map(|n| tet[n] as usize) {
+                    quarters[end] = quarters[end].min(squared);
+                }
+            }
+        }
+        quarters.into_iter().map(|n| self.lattice.spacing * (n as f64 / 12.0).sqrt()).collect()
+    }
+
+    /// The nearest violating cut of a node among those that still exist: both ends of their edge have a label.
+    fn violation(&self, node: usize, reach: f64, cuts: &[u32]) -> Option<DVec3> {
+        if self.labels[node] == ON {
             return None;
         }
         let here = self.positions[node];
         let alive =
-            cuts.iter().map(|&c| c as usize).filter(|&c| self.edges[c].iter().all(|&n| self.signs[n as usize] != 0));
+            cuts.iter().map(|&c| c as usize).filter(|&c| self.edges[c].iter().all(|&n| self.labels[n as usize] != ON));
         let near = alive
             .map(|c| (self.cuts[c].distance(here), c))
-            .filter(|&(distance, c)| distance < self.limit(self.edges[c]));
+            .filter(|&(distance, c)| distance < self.limit(self.edges[c]).min(self.limit_at(reach, self.edges[c])));
         near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, c)| self.cuts[c])
     }
 
-    fn limit(&self, edge: [u32; 2]) -> f64 {
-        let short = 0.75f64.sqrt();
-        self.lattice.spacing * if self.is_long(edge[0], edge[1]) { ALPHA_LONG } else { ALPHA_SHORT * short }
+    /// How far a cut may be from an end of its edge to violate it, mm.
+    fn limit(&self, [a, b]: [u32; 2]) -> f64 {
+        let (squared, straight) = self.lattice.edge(a, b);
+        0.5 * self.lattice.spacing * (squared as f64).sqrt() * if straight { ALPHA_LONG } else { ALPHA_SHORT }
     }
 
-    fn is_long(&self, a: u32, b: u32) -> bool {
-        self.lattice.is_centre(a as usize) == self.lattice.is_centre(b as usize)
+    /// The same for a node whose finest edges are those of a lattice of spacing `reach`.
+    fn limit_at(&self, reach: f64, [a, b]: [u32; 2]) -> f64 {
+        reach * if self.lattice.edge(a, b).1 { ALPHA_LONG } else { ALPHA_SHORT * SHORT }
     }
 
-    fn fill(self) -> TetMesh {
-        let mut tets = Vec::with_capacity(self.tets.len() * 5 / 4);
-        self.tets.iter().for_each(|&tet| self.emit(tet, &mut tets));
-        let corner = |n: u32| {
-            self.positions.get(n as usize).copied().unwrap_or_else(|| self.cuts[n as usize - self.positions.len()])
-        };
-        for tet in &mut tets {
-            if crate::quality::volume(tet.map(corner)) < 0.0 {
+    fn fill(self) -> LabelledMesh {
+        let mut pieces = Pieces::default();
+        self.tets.iter().for_each(|&tet| self.emit(tet, &mut pieces));
+        for tet in &mut pieces.tets {
+            if volume(tet.map(|n| self.place(n))) < 0.0 {
                 tet.swap(2, 3);
             }
         }
         let positions = self.positions.iter().chain(&self.cuts).map(|p| p.as_vec3()).collect();
-        TetMesh { positions, tets }.without_orphans()
+        let mesh = TetMesh { positions, tets: pieces.tets }.without_orphans();
+        LabelledMesh { mesh, label_of_tet: pieces.labels }
     }
 
-    /// The pieces of one tetrahedron.
-    fn emit(&self, tet: [u32; 4], out: &mut Vec<[u32; 4]>) {
-        let with = |wanted: i8| move |n: &u32| self.signs[*n as usize] == wanted;
-        let mut inside = tet.into_iter().filter(with(1));
-        let mut outside = tet.into_iter().filter(with(-1));
-        match (inside.clone().count(), outside.clone().count()) {
-            (0, _) => {}
-            (_, 0) => out.push(tet),
-            (1, _) => {
-                let p = inside.next().unwrap_or_default();
-                out.push(tet.map(|n| if self.signs[n as usize] < 0 { self.cut(p, n) } else { n }));
+    /// Where a node or a cut is.
+    pub(super) fn place(&self, n: u32) -> DVec3 {
+        self.positions.get(n as usize).copied().unwrap_or_else(|| self.cuts[n as usize - self.positions.len()])
+    }
+
+    fn middle<const N: usize>(&self, nodes: [u32; N]) -> DVec3 {
+        nodes.iter().map(|&n| self.place(n)).sum::<DVec3>() / N as f64
+    }
+
+    /// The pieces of one tetrahedron that are not outside.
+    pub(super) fn emit(&self, tet: [u32; 4], out: &mut Pieces) {
+        let mut nodes = tet;
+        nodes.sort_unstable_by_key(|&n| (self.labels[n as usize], n));
+        let label = |n: u32| self.labels[n as usize];
+        let held = nodes.iter().filter(|&&n| label(n) != ON).count();
+        let first = out.tets.len();
+        let (held, on) = nodes.split_at(held);
+        let mut groups = held.chunk_by(|&a, &b| label(a) == label(b));
+        match [groups.next(), groups.next(), groups.next(), groups.next()] {
+            [None, ..] if tet.iter().any(|&n| self.outside[n as usize]) => {}
+            [None, ..] => out.add(self.regions.label_at(self.middle(tet)), &[tet]),
+            [Some(a), None, ..] => out.add(label(a[0]), &[tet]),
+            [Some(a), Some(b), None, _] => {
+                self.side(a, b, on, out);
+                self.side(b, a, on, out);
             }
-            (2, 1) => {
-                let (p, n) = (corners::<2>(&mut inside), corners::<1>(&mut outside)[0]);
-                let zero = tet.into_iter().find(with(0)).unwrap_or_default();
-                out.extend(self.pyramid(zero, p, n));
-            }
-            (2, _) => out.extend(self.wedge(corners(&mut inside), corners(&mut outside))),
-            _ => out.extend(self.prism_under(corners(&mut inside), corners::<1>(&mut outside)[0])),
+            [Some(a), Some(b), Some(c), None] => self.three([a, b, c], on, out),
+            [Some(_), Some(_), Some(_), Some(_)] => self.four(nodes, out),
         }
+        out.keep_inside(first);
+    }
+
+    /// One label's side of a tetrahedron of two.
+    fn side(&self, own: &[u32], other: &[u32], on: &[u32], out: &mut Pieces) {
+        let label = self.labels[own[0] as usize];
+        match (own, other) {
+            (&[p], _) => out.add(label, &[self.corner(p, other, on)]),
+            (&[p, q], &[n]) => out.add(label, &self.pyramid(on[0], [p, q], n)),
+            (&[p, q], _) => out.add(label, &self.wedge([p, q], [other[0], other[1]])),
+            _ => out.add(label, &self.prism_under([own[0], own[1], own[2]], other[0])),
+        }
+    }
+
+    fn three(&self, groups: [&[u32]; 3], on: &[u32], out: &mut Pieces) {
+        let ones: Vec<u32> = groups.iter().filter(|g| g.len() == 1).map(|g| g[0]).collect();
+        let pair = groups.into_iter().find(|g| g.len() == 2);
+        for &p in &ones {
+            let others: Vec<u32> = groups.iter().flat_map(|g| *g).copied().filter(|&n| n != p).collect();
+            out.add(self.labels[p as usize], &[self.corner(p, &others, on)]);
+        }
+        if let Some(&[p, q]) = pair {
+            return self.fork([p, q], [ones[0], ones[1]], out);
+        }
+        let [a, b, c] = [ones[0], ones[1], ones[2]];
+        let cuts = [self.cut(a, b), self.cut(b, c), self.cut(a, c)];
+        let label = self.regions.strongest(&[a, b, c].map(|n| self.labels[n as usize]), self.middle(cuts));
+        out.add(label, &[[on[0], cuts[0], cuts[1], cuts[2]]]);
+    }
+
+    /// What two nodes of one label keep beside one node each of two others.
+    fn fork(&self, [p, q]: [u32; 2], [b, c]: [u32; 2], out: &mut Pieces) {
+        let top = [p, self.cut(p, b), self.cut(p, c)];
+        let bottom = [q, self.cut(q, b), self.cut(q, c)];
+        let (over_b, over_c) = (self.diagonal_at(p, q, b), self.diagonal_at(p, q, c));
+        let free = if over_b == over_c { self.shorter([top[1], bottom[2]], [top[2], bottom[1]]) } else { over_c };
+        let label = self.labels[p as usize];
+        out.add(label, &prism(top, bottom, [over_b, over_c, free]));
+        let apex = self.cut(b, c);
+        let ring = if free { [top[1], top[2], bottom[2], bottom[1]] } else { [top[2], bottom[2], bottom[1], top[1]] };
+        out.add(label, &[[apex, ring[0], ring[1], ring[2]], [apex, ring[0], ring[2], ring[3]]]);
+    }
+
+    /// Four labels: their corners, and the octahedron of the six cuts around its shortest diagonal.
+    fn four(&self, nodes: [u32; 4], out: &mut Pieces) {
+        for p in nodes {
+            let others: Vec<u32> = nodes.into_iter().filter(|&n| n != p).collect();
+            out.add(self.labels[p as usize], &[self.corner(p, &others, &[])]);
+        }
+        let cut = |i: usize, j: usize| self.cut(nodes[i], nodes[j]);
+        let axes = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]];
+        let length = |[i, j, k, l]: [usize; 4]| self.place(cut(i, j)).distance_squared(self.place(cut(k, l)));
+        let shortest = (0..3).min_by(|&a, &b| length(axes[a]).total_cmp(&length(axes[b]))).unwrap_or(0);
+        let [i, j, k, l] = axes[shortest];
+        let ring = [cut(i, k), cut(j, k), cut(j, l), cut(i, l)];
+        let label = self.regions.strongest(&nodes.map(|n| self.labels[n as usize]), self.middle(ring));
+        for n in 0..4 {
+            out.add(label, &[[cut(i, j), cut(k, l), ring[n], ring[(n + 1) % 4]]]);
+        }
+    }
+
+    /// The tetrahedron between a node, its cuts with others, and nodes on a border.
+    fn corner(&self, p: u32, others: &[u32], on: &[u32]) -> [u32; 4] {
+        let mut far = others.iter().map(|&n| self.cut(p, n)).chain(on.iter().copied());
+        [p, far.next().unwrap_or(p), far.next().unwrap_or(p), far.next().unwrap_or(p)]
     }
 
     /// The node of the cut between two lattice nodes.
@@ -138,19 +267,9 @@ impl<'a> Stuffing<'a> {
         (self.positions.len() + at) as u32
     }
 
-    /// Whether the quadrilateral that the face (p, q, −n) leaves gets its diagonal at p (to the cut of q), else at q.
+    /// Whether the quadrilateral that the face (p, q | n) leaves gets its diagonal at p (to the cut of q), else at q.
     fn diagonal_at(&self, p: u32, q: u32, n: u32) -> bool {
-        match (self.is_long(p, n), self.is_long(q, n)) {
-            (false, true) => true,
-            (true, false) => false,
-            _ => self.coordinates_above(p, n).is_multiple_of(2),
-        }
-    }
-
-    /// In how many coordinates one node lies above another. From the two ends of a long edge these counts differ by one.
-    fn coordinates_above(&self, node: u32, other: u32) -> usize {
-        let (a, b) = (self.lattice.halves(node as usize), self.lattice.halves(other as usize));
-        (0..3).filter(|&d| a[d] > b[d]).count()
+        (self.lattice.edge(p, n).0, p) < (self.lattice.edge(q, n).0, q)
     }
 
     fn pyramid(&self, apex: u32, [p, q]: [u32; 2], n: u32) -> [[u32; 4]; 2] {
@@ -162,26 +281,50 @@ impl<'a> Stuffing<'a> {
         }
     }
 
-    /// Three positive nodes over their cuts with one negative.
+    /// Three nodes over their cuts with one of another label.
     fn prism_under(&self, top: [u32; 3], n: u32) -> [[u32; 4]; 3] {
         let beats = |i: usize, j: usize| self.diagonal_at(top[i], top[j], n);
         prism(top, top.map(|p| self.cut(p, n)), [beats(0, 1), beats(0, 2), beats(1, 2)])
     }
 
-    /// Two positive and two negative nodes: a prism between the triangles of the two positive ones.
+    /// Two nodes against two: a prism between the triangles of the two own ones.
     fn wedge(&self, [p, q]: [u32; 2], [m, n]: [u32; 2]) -> [[u32; 4]; 3] {
         let top = [p, self.cut(p, m), self.cut(p, n)];
         let bottom = [q, self.cut(q, m), self.cut(q, n)];
-        let (over_m, over_n) = (self.diagonal_at(p, q, m), self.diagonal_at(p, q, n));
-        // The third quadrilateral lies on the surface: its diagonal is free where it closes no cycle.
-        let free = if over_m == over_n { self.shorter(top[1], bottom[2], top[2], bottom[1]) } else { over_n };
-        prism(top, bottom, [over_m, over_n, free])
+        let wins = [self.diagonal_at(p, q, m), self.diagonal_at(p, q, n), self.border_diagonal([p, q], [m, n])];
+        prism(top, bottom, wins)
     }
 
-    /// Whether a b is shorter than c d.
-    fn shorter(&self, a: u32, b: u32, c: u32, d: u32) -> bool {
-        let cut = |n: u32| self.cuts[n as usize - self.positions.len()];
-        cut(a).distance_squared(cut(b)) < cut(c).distance_squared(cut(d))
+    /// Whether the quadrilateral between two nodes and two of another label is cut from p–m to q–n: as the prism of either side needs it, else the shorter way.
+    fn border_diagonal(&self, [p, q]: [u32; 2], [m, n]: [u32; 2]) -> bool {
+        let own = [self.diagonal_at(p, q, m), self.diagonal_at(p, q, n)];
+        let other = [self.diagonal_at(m, n, p), self.diagonal_at(m, n, q)];
+        match (own[0] == own[1], other[0] == other[1]) {
+            (false, _) => own[1],
+            (_, false) => other[1],
+            _ => self.shorter([self.cut(p, m), self.cut(q, n)], [self.cut(p, n), self.cut(q, m)]),
+        }
+    }
+
+    /// Whether the first of two lines is the shorter one.
+    fn shorter(&self, [a, b]: [u32; 2], [c, d]: [u32; 2]) -> bool {
+        let squared = |a: u32, b: u32| self.place(a).distance_squared(self.place(b));
+        squared(a, b) < squared(c, d)
+    }
+}
+
+impl Pieces {
+    /// Drops the outside's pieces among those from `first` on.
+    fn keep_inside(&mut self, first: usize) {
+        let mut kept = first;
+        for at in first..self.tets.len() {
+            if self.labels[at] != 0 {
+                (self.tets[kept], self.labels[kept]) = (self.tets[at], self.labels[at]);
+                kept += 1;
+            }
+        }
+        self.tets.truncate(kept);
+        self.labels.truncate(kept);
     }
 }
 
@@ -203,158 +346,31 @@ fn prism(top: [u32; 3], bottom: [u32; 3], wins: [bool; 3]) -> [[u32; 4]; 3] {
     ]
 }
 
-/// The first N nodes of an iterator that has as many.
-fn corners<const N: usize>(nodes: &mut impl Iterator<Item = u32>) -> [u32; N] {
-    std::array::from_fn(|_| nodes.next().unwrap_or_default())
-}
-
-fn sign(value: f64) -> i8 {
-    i8::from(value > 0.0) - i8::from(value < 0.0)
-}
-
-/// Edges between + and −, ascending.
-fn cut_edges(tets: &[[u32; 4]], sign_of: impl Fn(u32) -> i8) -> Vec<[u32; 2]> {
+/// Edges between two labels, ascending.
+pub(super) fn cut_edges(tets: &[[u32; 4]], label_of: impl Fn(u32) -> u16) -> Vec<[u32; 2]> {
     let mut edges = Vec::new();
     for tet in tets {
-        for [i, j, ..] in crate::quality::EDGES {
+        for [i, j, ..] in EDGES {
             let (a, b) = (tet[i].min(tet[j]), tet[i].max(tet[j]));
-            if sign_of(a) * sign_of(b) < 0 {
+            if label_of(a) != label_of(b) && label_of(a) != ON && label_of(b) != ON {
                 edges.push([a, b]);
             }
         }
     }
-    edges.sort_unstable();
+    edges.par_sort_unstable();
     edges.dedup();
     edges
 }
 
-/// A point on the surface between an inner and an outer point.
-fn crossing(inside: &impl Fn(DVec3) -> f64, mut inner: DVec3, mut outer: DVec3) -> DVec3 {
+/// A point on the border between a point that `holds` and one that does not.
+fn crossing(holds: impl Fn(DVec3) -> bool, mut inner: DVec3, mut outer: DVec3) -> DVec3 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (inner + outer);
-        if inside(middle) > 0.0 {
+        if holds(middle) {
             inner = middle;
         } else {
             outer = middle;
         }
     }
     0.5 * (inner + outer)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Quality, Surface};
-    use proptest::prelude::*;
-
-    /// A function with an arbitrary value at each cell of a fine hash: as rough as a surface can be.
-    fn noise(seed: u64, p: DVec3) -> f64 {
-        let mut h = seed ^ 0x9E37_79B9_7F4A_7C15;
-        for c in (p * 64.0).floor().to_array() {
-            h = (h ^ (c as i64 as u64)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            h ^= h >> 29;
-        }
-        (h >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(8))]
-        #[test]
-        fn angles_stay_within_the_proven_bounds_whatever_the_surface(seed in any::<u64>()) {
-            let lattice = Bcc::over(DVec3::ZERO, DVec3::splat(20.0), 1.0, DVec3::ZERO);
-            let inner = |p: DVec3| p.cmpgt(DVec3::splat(-0.6)).all() && p.cmplt(DVec3::splat(20.6)).all();
-            let mesh = stuff(&lattice, |p| if inner(p) { noise(seed, p) } else { -1.0 });
-            let quality = Quality::of(&mesh);
-            prop_assert!(quality.min_mm3 > 0.0);
-            prop_assert!(quality.min_dihedral_deg > 9.3 && quality.max_dihedral_deg < 164.8, "{quality:?}");
-        }
-    }
-
-    /// Where a warped node may be at the most: here, or on one of its 14 edges; with the corner of `tet` at the other end.
-    fn extremes(lattice: &Bcc, tet: [u32; 4], node: u32) -> Vec<(DVec3, Option<usize>)> {
-        let here = lattice.position(node as usize);
-        let long = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [axis, -axis]).map(|by| (by, ALPHA_LONG));
-        let half = |n: u32, d: u32| if n >> d & 1 == 0 { 0.5 } else { -0.5 };
-        let short = (0..8).map(|n| (DVec3::new(half(n, 0), half(n, 1), half(n, 2)), ALPHA_SHORT));
-        let corner = |end: DVec3| tet.iter().position(|&n| lattice.position(n as usize).distance(end) < 1e-9);
-        let moved = long.chain(short).map(|(by, alpha)| (here + alpha * by, corner(here + by)));
-        std::iter::once((here, None)).chain(moved).collect()
-    }
-
-    /// Whether warped corners can have moved towards these ends: a cut lies between opposite signs, and serves one of its ends.
-    fn possible(signs: [i8; 4], ends: [Option<usize>; 4]) -> bool {
-        let once = (0..4).all(|n| ends[n].is_none_or(|end| ends[end] != Some(n)));
-        let before = |all: usize, n: usize| if signs[n] != 0 { signs[n] } else { 1 - 2 * (all >> n & 1) as i8 };
-        once && (0..16).any(|all| (0..4).all(|n| ends[n].is_none_or(|end| before(all, n) != before(all, end))))
-    }
-
-    #[test]
-    fn no_extreme_of_warped_nodes_and_cuts_leaves_the_stated_angles() {
-        let lattice = Bcc::over(DVec3::ZERO, DVec3::ONE, 1.0, DVec3::ZERO);
-        let all = lattice.tets();
-        let (mut least, mut most) = (f64::INFINITY, 0.0f64);
-        for &tet in &all[all.len() / 2..all.len() / 2 + 12] {
-            let places = tet.map(|n| extremes(&lattice, tet, n));
-            for code in 0..81usize {
-                let signs: [i8; 4] = std::array::from_fn(|n| (code / 3usize.pow(n as u32) % 3) as i8 - 1);
-                let choices: [usize; 4] = std::array::from_fn(|n| if signs[n] == 0 { 15 } else { 1 });
-                if !signs.contains(&1) {
-                    continue;
-                }
-                for choice in 0..choices.iter().product() {
-                    let turn = |n: usize| choice / choices[..n].iter().product::<usize>() % choices[n];
-                    let chosen: [(DVec3, Option<usize>); 4] = std::array::from_fn(|n| places[n][turn(n)]);
-                    if possible(signs, chosen.map(|c| c.1)) {
-                        let (low, high) = angles_of_all_cuts(&lattice, tet, signs, chosen.map(|c| c.0));
-                        (least, most) = (least.min(low), most.max(high));
-                    }
-                }
-            }
-        }
-        assert!((9.3..9.4).contains(&least) && (161.6..161.7).contains(&most), "{least} to {most} degrees");
-    }
-
-    /// The smallest and largest dihedral angle of the pieces of one tetrahedron, over cuts as near to either end as they may be.
-    fn angles_of_all_cuts(lattice: &Bcc, tet: [u32; 4], signs: [i8; 4], corners: [DVec3; 4]) -> (f64, f64) {
-        let mut all = Stuffing {
-            lattice,
-            positions: (0..lattice.nodes()).map(|n| lattice.position(n)).collect(),
-            signs: vec![0; lattice.nodes()],
-            edges: Vec::new(),
-            cuts: Vec::new(),
-            tets: Vec::new(),
-        };
-        for n in 0..4 {
-            (all.positions[tet[n] as usize], all.signs[tet[n] as usize]) = (corners[n], signs[n]);
-        }
-        all.edges = cut_edges(&[tet], |n| all.signs[n as usize]);
-        let mut found = (f64::INFINITY, 0.0f64);
-        for ends in 0..1usize << all.edges.len() {
-            let cut = |(n, &[a, b]): (usize, &[u32; 2])| {
-                let alpha = if all.is_long(a, b) { ALPHA_LONG } else { ALPHA_SHORT };
-                let share = if ends >> n & 1 == 0 { alpha } else { 1.0 - alpha };
-                all.positions[a as usize].lerp(all.positions[b as usize], share)
-            };
-            all.cuts = all.edges.iter().enumerate().map(cut).collect();
-            let mut pieces = Vec::new();
-            all.emit(tet, &mut pieces);
-            let corner = |n: u32| {
-                all.positions.get(n as usize).copied().unwrap_or_else(|| all.cuts[n as usize - all.positions.len()])
-            };
-            for angle in pieces.iter().flat_map(|piece| crate::quality::dihedrals_deg(piece.map(corner))) {
-                found = (found.0.min(angle), found.1.max(angle));
-            }
-        }
-        found
-    }
-
-    #[test]
-    fn a_ball_is_sound_and_closed() {
-        let lattice = Bcc::over(DVec3::splat(-10.0), DVec3::splat(10.0), 1.7, DVec3::splat(0.3));
-        let mesh = stuff(&lattice, |p| 10.0 - p.length());
-        assert_eq!(mesh.check(), Ok(()));
-        assert!(Surface::of(&mesh).is_closed());
-        let ball = 4.0 / 3.0 * std::f64::consts::PI * 1000.0;
-        assert!((mesh.total_mm3() / ball - 1.0).abs() < 0.02, "{}", mesh.total_mm3() / ball);
-    }
 }

@@ -1,0 +1,132 @@
+//! The labels of a volume as smooth functions of world space: which one holds a point, and by how much.
+//!
+//! # Theory
+//! Each label has a smoothed distance φ (about millimetres, positive inside); the outside has minus that of all labels together. A point belongs to the label with
+//! the largest φ + level, so regions neither overlap nor leave gaps, whatever smoothing does to each. Raising a level moves the label's borders outwards by half of that.
+//!
+//! # Practice
+//! Labels go by their number in ascending order, 1 up; 0 is the outside. Only the largest 6-connected part of what is labelled is kept.
+
+use super::field::{Block, Field};
+use crate::MeshError;
+use glam::DVec3;
+use trepan_volume::{VoxelVolume, largest_component};
+
+/// Most labels in one mesh: a volume with more is an image.
+const MOST_LABELS: usize = 255;
+
+/// Space divided among labels.
+pub(super) trait Partition: Sync {
+    /// How strongly a label holds a point: the largest one has it.
+    fn hold(&self, label: u16, p: DVec3) -> f64;
+
+    /// The label that holds a point.
+    fn label_at(&self, p: DVec3) -> u16;
+
+    /// Of some labels the one that holds a point most; of equals the first.
+    fn strongest(&self, among: &[u16], p: DVec3) -> u16 {
+        let mut best = (f64::NEG_INFINITY, 0);
+        for &label in among {
+            let hold = self.hold(label, p);
+            if hold > best.0 {
+                best = (hold, label);
+            }
+        }
+        best.1
+    }
+}
+
+/// The regions of a label volume.
+pub(super) struct Regions {
+    /// What the volume calls each region; the outside first.
+    pub(super) names: Vec<u16>,
+    /// Volume of each, mm³; of the outside 0.
+    pub(super) mm3: Vec<f64>,
+    /// What is added to each φ, mm; of the outside 0.
+    pub(super) levels: Vec<f64>,
+    /// World box of all that is labelled.
+    pub(super) bounds: [DVec3; 2],
+    /// Of each label, ascending.
+    fields: Vec<Field>,
+    /// Of all labels together, when there are several.
+    union: Option<Field>,
+}
+
+impl Regions {
+    /// The regions with a margin for smoothing up to `most_mm`, not smoothed yet.
+    pub(super) fn of(labels: &VoxelVolume<u16>, most_mm: impl FnOnce(f64) -> f64) -> Result<Self, MeshError> {
+        check_volume(labels)?;
+        let mut labels = labels.clone();
+        let part = largest_component(&labels.map(|l| u8::from(l != 0)));
+        labels.data.iter_mut().zip(&part.data).for_each(|(label, kept)| *label *= u16::from(*kept));
+        let blocks = Block::of_each(&labels);
+        let names: Vec<u16> = std::iter::once(0).chain(blocks.iter().map(|(name, _)| *name)).collect();
+        if blocks.is_empty() {
+            return Err(MeshError::EmptyMask);
+        }
+        if blocks.len() > MOST_LABELS {
+            let got = format!("{} labels", blocks.len());
+            return Err(MeshError::Mask { field: "data", got, wanted: "at most 255 of them; is it an image?" });
+        }
+        let count = |block: &Block| block.voxels as f64 * labels.voxel_mm3();
+        let mm3: Vec<f64> = std::iter::once(0.0).chain(blocks.iter().map(|(_, block)| count(block))).collect();
+        let most_mm = most_mm(mm3.iter().sum());
+        let field = |name: u16, block: &Block| Field::of(&labels, block, most_mm, |label| label == name);
+        let fields = blocks.iter().map(|(name, block)| field(*name, block)).collect();
+        let whole = blocks.iter().skip(1).fold(blocks[0].1, |whole, (_, block)| whole.with(block));
+        let union = (blocks.len() > 1).then(|| Field::of(&labels, &whole, most_mm, |label| label != 0));
+        let levels = vec![0.0; names.len()];
+        Ok(Self { names, mm3, levels, bounds: whole.world_box(&labels), fields, union })
+    }
+
+    /// Smooths all φ with a Gaussian of `sigma_mm`.
+    pub(super) fn smooth(&mut self, sigma_mm: f64) {
+        self.fields.iter_mut().chain(&mut self.union).for_each(|field| field.smooth(sigma_mm));
+    }
+
+    /// About how far a point is from the nearest border, mm, and whether it is outside.
+    pub(super) fn depth(&self, p: DVec3) -> (f64, bool) {
+        let outside = self.hold(0, p);
+        let (mut first, mut second) = (outside, f64::NEG_INFINITY);
+        for label in 1..self.names.len() as u16 {
+            let hold = self.hold(label, p);
+            (first, second) = if hold > first { (hold, first) } else { (first, second.max(hold)) };
+        }
+        (0.5 * (first - second), first == outside)
+    }
+}
+
+impl Partition for Regions {
+    fn hold(&self, label: u16, p: DVec3) -> f64 {
+        if label == 0 {
+            return -self.union.as_ref().unwrap_or(&self.fields[0]).sample(p);
+        }
+        self.fields[label as usize - 1].sample(p) + self.levels[label as usize]
+    }
+
+    fn label_at(&self, p: DVec3) -> u16 {
+        let mut best = (self.hold(0, p), 0);
+        for label in 1..self.names.len() as u16 {
+            let reaches = self.union.is_none() || self.fields[label as usize - 1].contains(p);
+            let hold = if reaches { self.hold(label, p) } else { f64::NEG_INFINITY };
+            if hold > best.0 {
+                best = (hold, label);
+            }
+        }
+        best.1
+    }
+}
+
+fn check_volume(labels: &VoxelVolume<u16>) -> Result<(), MeshError> {
+    let wanted = labels.dims.iter().try_fold(1usize, |n, &d| n.checked_mul(d));
+    if wanted != Some(labels.data.len()) {
+        let got = format!("{:?} with {} samples", labels.dims, labels.data.len());
+        return Err(MeshError::Mask { field: "dims", got, wanted: "as many samples as the product of the dimensions" });
+    }
+    let determinant = labels.world_from_voxel.matrix3.determinant();
+    if !labels.world_from_voxel.is_finite() || !determinant.is_finite() || determinant.abs() < 1e-12 {
+        let got = format!("{:?}", labels.world_from_voxel);
+        return Err(MeshError::Mask { field: "world_from_voxel", got, wanted: "finite and invertible" });
+    }
+    Ok(())
+}

@@ -1,0 +1,208 @@
+//! Finds the spacing that gives the count asked for, and the levels that give each label its volume.
+//!
+//! # Theory
+//! The count goes with a⁻³, where cubes grow inwards with about a^-2.5. Raising the level of label l by x moves its border with k by (x_l − x_k) / 2, so what it lacks asks for
+//! Σ_k A_lk (x_l − x_k) / 2 = missing_l with A the areas between labels: a few sweeps of Gauss and Seidel.
+
+use super::octree::{Cube, Lattice};
+use super::regions::{Partition, Regions};
+use super::{Config, LabelledMesh, manifold, polish, stencil};
+use crate::{FACES, MeshError, NONE, TetMesh, Topology};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Spacing and levels are searched at most this often.
+const TRIALS: usize = 12;
+/// Largest lattice, in cubes for each tetrahedron asked for (a brain takes a fifth of one): some 250 bytes a cube.
+const MAX_CUBES: usize = 10;
+/// What the search tries to reach; 10 % is what it promises.
+const COUNT_TOLERANCE: f64 = 0.02;
+const VOLUME_TOLERANCE: f64 = 0.002;
+const ALL_TOLERANCE: f64 = 0.01;
+/// How far from a border cubes have its size, in their edges beyond their own corners. Over 0.14 all tetrahedra that a border cuts are of one size.
+const MARGIN: f64 = 0.15;
+/// Sweeps over the levels.
+const SWEEPS: usize = 40;
+
+/// The spacing at which 12 tetrahedra a cube, and a fifth more at the surface, fill a volume.
+pub(super) fn uniform_spacing(mm3: f64, tets: usize) -> f64 {
+    (12.0 * 1.2 * mm3 / tets as f64).cbrt()
+}
+
+/// About the spacing of the finest cubes.
+pub(super) fn first_spacing(regions: &Regions, config: &Config) -> f64 {
+    let mut spacing = uniform_spacing(regions.mm3.iter().sum(), config.target_tets);
+    if levels(config) == 0 {
+        return spacing;
+    }
+    for _ in 0..5 {
+        let Some(lattice) = lattice(regions, config, spacing, 0) else { break };
+        let inside: Vec<bool> = lattice.positions().par_iter().map(|&p| regions.label_at(p) != 0).collect();
+        let within = |tet: &&[u32; 4]| tet.iter().any(|&n| inside[n as usize]);
+        let count = lattice.tets.par_iter().filter(within).count();
+        spacing *= (1.1 * count as f64 / config.target_tets as f64).powf(0.4).clamp(0.3, 3.0);
+    }
+    spacing
+}
+
+/// The mesh nearest to what is asked for. Leaves the levels of its borders in `regions`.
+pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -> Result<LabelledMesh, MeshError> {
+    let wanted = config.target_tets;
+    let power = if levels(config) == 0 { 1.0 / 3.0 } else { 0.4 };
+    let mut best = (f64::INFINITY, LabelledMesh::default(), regions.levels.clone(), spacing);
+    let mut stride = Stride::of(regions.names.len());
+    for trial in 0..TRIALS {
+        let Some(lattice) = lattice(regions, config, spacing, trial) else { break };
+        let labelled = manifold::repaired(stencil::stuff(&lattice, regions));
+        if labelled.mesh.tets.is_empty() {
+            spacing *= 0.7;
+            continue;
+        }
+        let share = labelled.mesh.tets.len() as f64 / wanted as f64;
+        let balance = Balance::of(&labelled, regions);
+        let volume_fault = balance.fault(regions, spacing);
+        let fault = ((share - 1.0).abs() / COUNT_TOLERANCE).max(volume_fault);
+        if fault < best.0 {
+            best = (fault, labelled, regions.levels.clone(), spacing);
+        }
+        if fault < 1.0 {
+            break;
+        }
+        stride.go(&mut regions.levels, &balance, spacing);
+        if (share - 1.0).abs() > 0.5 * COUNT_TOLERANCE {
+            spacing *= share.powf(power).clamp(0.5, 2.0);
+        }
+    }
+    let (_, mut labelled, levels, spacing) = best;
+    regions.levels = levels;
+    let nearest = labelled.mesh.tets.len();
+    if nearest.abs_diff(wanted) * 10 > wanted {
+        return Err(MeshError::Target { wanted, nearest });
+    }
+    polish::polish(&mut labelled, spacing, regions);
+    Ok(labelled)
+}
+
+/// How much of what is asked for each level goes: less after each overshoot, which thin labels make.
+struct Stride {
+    gains: Vec<f64>,
+    missing: Vec<f64>,
+}
+
+impl Stride {
+    fn of(count: usize) -> Self {
+        Self { gains: vec![1.0; count], missing: vec![0.0; count] }
+    }
+
+    fn go(&mut self, levels: &mut [f64], balance: &Balance, spacing: f64) {
+        let steps = balance.steps(spacing);
+        for (label, level) in levels.iter_mut().enumerate() {
+            let missing = balance.missing[label];
+            let overshot = missing * self.missing[label] < 0.0;
+            self.gains[label] = if overshot { 0.4 * self.gains[label] } else { (1.3 * self.gains[label]).min(1.0) };
+            self.missing[label] = missing;
+            *level += self.gains[label] * steps[label];
+        }
+    }
+}
+
+/// How often the edge of a cube may double.
+fn levels(config: &Config) -> u32 {
+    config.coarsening + config.fine.map_or(0, |fine| fine.halvings)
+}
+
+fn lattice(regions: &Regions, config: &Config, spacing: f64, trial: usize) -> Option<Lattice> {
+    let most = MAX_CUBES * config.target_tets.max(10_000);
+    let judge = |centre: DVec3, level: u32| judge(regions, config, spacing, centre, level);
+    Lattice::over(regions.bounds, spacing, shift(trial), levels(config), most, judge)
+}
+
+/// Where the lattice lies against the labels, in spacings: another place when the count does not settle (small symmetric masks).
+fn shift(trial: usize) -> DVec3 {
+    let turn = (trial / 4) as f64;
+    DVec3::new(0.13 + 0.21 * turn, 0.29 + 0.17 * turn, 0.41 + 0.11 * turn)
+}
+
+/// Cubes at a border are as fine as their place asks for, others up to `coarsening` doublings larger.
+fn judge(regions: &Regions, config: &Config, spacing: f64, centre: DVec3, level: u32) -> Cube {
+    let edge = spacing * f64::from(1u32 << level);
+    let to_corner = 0.75f64.sqrt() * edge;
+    let (depth, outside) = regions.depth(centre);
+    if outside && depth > 2.0 * edge {
+        return Cube::Drop;
+    }
+    let finest = config.fine.map_or(0, |fine| {
+        let away = centre.distance(fine.centre.as_dvec3()) - to_corner;
+        if away > f64::from(fine.radius_mm) { fine.halvings } else { 0 }
+    });
+    let at_border = depth < to_corner + MARGIN * spacing * f64::from(1u32 << finest);
+    if level > finest + config.coarsening || (level > finest && at_border) { Cube::Split } else { Cube::Keep }
+}
+
+/// What each label lacks, and what lies between labels.
+struct Balance {
+    /// By label, mm³; of the outside nothing.
+    missing: Vec<f64>,
+    /// Areas between labels, mm²: row by row.
+    areas: Vec<f64>,
+}
+
+impl Balance {
+    fn of(labelled: &LabelledMesh, regions: &Regions) -> Self {
+        let LabelledMesh { mesh, label_of_tet } = labelled;
+        let count = regions.names.len();
+        let mut missing = regions.mm3.clone();
+        let mut areas = vec![0.0; count * count];
+        let topology = Topology::of(mesh);
+        for (tet, &label) in label_of_tet.iter().enumerate() {
+            let own = usize::from(label);
+            missing[own] -= mesh.volume_mm3(tet);
+            for (face, &next) in topology.neighbours[tet].iter().enumerate() {
+                let other = if next == NONE { 0 } else { usize::from(label_of_tet[next as usize]) };
+                if other != own {
+                    areas[own * count + other] += area(mesh, tet, face);
+                }
+            }
+        }
+        Self { missing, areas }
+    }
+
+    /// The largest lack or excess of a label that is thicker than about a cube, and that of all together, in what is tolerated.
+    fn fault(&self, regions: &Regions, spacing: f64) -> f64 {
+        let count = self.missing.len();
+        let one = spacing.powi(3) / 12.0;
+        let mut worst = 0.0f64;
+        for label in 1..count {
+            let (missing, mm3) = (self.missing[label].abs(), regions.mm3[label]);
+            let area: f64 = self.areas[label * count..(label + 1) * count].iter().sum();
+            if mm3 > 0.5 * area * spacing && area > 0.0 {
+                worst = worst.max(missing / (VOLUME_TOLERANCE * mm3).max(one));
+            }
+        }
+        let all = regions.mm3.iter().sum::<f64>();
+        worst
+            .max(self.missing.iter().map(|m| m.abs()).sum::<f64>() / (ALL_TOLERANCE * all))
+            .max(self.missing.iter().sum::<f64>().abs() / (VOLUME_TOLERANCE * all))
+    }
+
+    /// By how much to raise each level, mm.
+    fn steps(&self, spacing: f64) -> Vec<f64> {
+        let count = self.missing.len();
+        let mut steps = vec![0.0; count];
+        for _ in 0..SWEEPS {
+            for own in 1..count {
+                let row = &self.areas[own * count..(own + 1) * count];
+                let (area, pull) =
+                    row.iter().zip(&steps).fold((0.0, 0.0), |(a, p), (area, x)| (a + area, p + area * x));
+                let step = (2.0 * self.missing[own] + pull) / area;
+                steps[own] = if step.is_finite() { step.clamp(-0.3 * spacing, 0.3 * spacing) } else { 0.1 * spacing };
+            }
+        }
+        steps
+    }
+}
+
+fn area(mesh: &TetMesh, tet: usize, face: usize) -> f64 {
+    let [a, b, c] = FACES[face].map(|corner| mesh.corners(tet)[corner].as_dvec3());
+    0.5 * (b - a).cross(c - a).length()
+}
