@@ -27,8 +27,13 @@ pub fn element_omega2(shape: &Shape, material: &Material) -> f64 {
 
 /// Stable step by power iteration, ms: the true bound less 1 %, never below the element bound.
 pub fn power_bound_ms(body: &Body) -> f64 {
+    power_bound_of_ms(body, &Stiffness::of(body))
+}
+
+/// The same with the masses of a stiffness, none of them below the body's.
+pub fn power_bound_of_ms(body: &Body, stiffness: &Stiffness) -> f64 {
     let by_element = element_bound_ms(body);
-    let by_power = 2.0 / highest_frequency(&Stiffness::of(body));
+    let by_power = 2.0 / highest_frequency(stiffness);
     if by_power.is_finite() { (0.99 * by_power).max(by_element) } else { by_element }
 }
 
@@ -57,7 +62,11 @@ pub fn highest_frequency(stiffness: &Stiffness) -> f64 {
 
 /// Lowest angular eigenfrequency of the rest state, rad/ms; `None` when the body is not held by its fixed nodes.
 pub fn lowest_frequency(body: &Body) -> Option<f64> {
-    let stiffness = Stiffness::of(body);
+    lowest_frequency_of(body, &Stiffness::of(body))
+}
+
+/// The same with the masses of a stiffness.
+pub fn lowest_frequency_of(body: &Body, stiffness: &Stiffness) -> Option<f64> {
     if !body.is_held() || !stiffness.fixed().contains(&false) {
         return None;
     }
@@ -68,8 +77,8 @@ pub fn lowest_frequency(body: &Body) -> Option<f64> {
     let mut found = f64::MAX;
     for _ in 0..INVERSE_STEPS {
         let before = found;
-        shape = deflect(&stiffness, &inverse, &shape, guess);
-        found = rayleigh(&stiffness, &shape);
+        shape = deflect(stiffness, &inverse, &shape, guess);
+        found = rayleigh(stiffness, &shape);
         if before - found < 1e-3 * found {
             break;
         }

@@ -32,17 +32,22 @@ pub mod linear;
 mod material;
 mod method;
 mod operator;
+mod pressure;
 pub mod reference;
 mod solver;
 mod tetra;
 pub mod xpbd;
 
 pub use body::{Body, BodyError};
-pub use bound::{element_bound_ms, element_omega2, highest_frequency, lowest_frequency, power_bound_ms};
+pub use bound::{
+    element_bound_ms, element_omega2, highest_frequency, lowest_frequency, lowest_frequency_of, power_bound_ms,
+    power_bound_of_ms,
+};
 pub use energy::{FADE_BELOW, NeoHookean};
 pub use law::{LEAST_STRETCH, Law};
 pub use material::{Material, MaterialError};
 pub use method::Method;
 pub use operator::Stiffness;
+pub use pressure::SurfacePressure;
 pub use solver::{Loads, SoftSolver, StepReport};
 pub use tetra::Shape;

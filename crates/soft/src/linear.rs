@@ -71,6 +71,13 @@ impl Linear {
         })
     }
 
+    /// Sets the state of all free nodes by their rest position: displacement, mm, and velocity, mm/ms.
+    pub fn set(&mut self, state: impl Fn(DVec3) -> (DVec3, DVec3)) {
+        for n in (0..self.u.len()).filter(|&n| !self.stiffness.fixed()[n]) {
+            (self.u[n], self.v[n]) = state(self.rest[n].as_dvec3());
+        }
+    }
+
     fn press(&mut self, loads: &Loads) -> f32 {
         let contact = &loads.contact;
         let mean = contact.mean(|n| self.positions.get(n as usize).copied().unwrap_or_default());

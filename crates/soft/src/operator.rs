@@ -46,6 +46,11 @@ impl Stiffness {
         Self { elements: body.elements(), fixed: body.fixed_mask(), masses: body.lumped_masses_g(), hooke }
     }
 
+    /// The same stiffness with other masses at the nodes, g.
+    pub fn with_masses(self, masses: Vec<f64>) -> Self {
+        Self { masses, ..self }
+    }
+
     /// Lumped mass of every node, g.
     pub fn masses_g(&self) -> &[f64] {
         &self.masses

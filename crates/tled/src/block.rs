@@ -79,8 +79,13 @@ impl<const K: usize> Block<K> {
         }
     }
 
-    /// Puts an element into a lane.
-    pub fn put<M: Constitutive<K>>(&mut self, lane: usize, shape: &Shape, material: &Material, at: [[u32; 4]; 2]) {
+    /// Puts an element into a lane, its density scaled.
+    pub fn put<M: Constitutive<K>>(
+        &mut self,
+        lane: usize,
+        (shape, material, density): (&Shape, &Material, f64),
+        at: [[u32; 4]; 2],
+    ) {
         let [nodes, slots] = at;
         for a in 0..3 {
             let gradient = shape.gradients[a + 1].as_vec3();
@@ -88,7 +93,7 @@ impl<const K: usize> Block<K> {
         }
         let constants = M::constants(&material.law(), shape.volume_mm3);
         self.constants.iter_mut().zip(constants).for_each(|(row, constant)| row[lane] = constant);
-        self.omega2[lane] = omega2_over_stiffness::<M, K>(shape, material, &constants);
+        self.omega2[lane] = omega2_over_stiffness::<M, K>(shape, material, &constants) / density as f32;
         self.quarter_volume[lane] = (0.25 * shape.volume_mm3) as f32;
         for corner in 0..4 {
             self.nodes[corner][lane] = nodes[corner];

@@ -20,6 +20,9 @@ pub struct Config {
     /// stress-free: forces `-m g` are added that balance this gravity exactly. Give the same vector in `Loads::gravity` and nothing
     /// sags; turn the head there and only the difference acts. Zero = the mesh is free of load.
     pub balanced_gravity: Vec3,
+    /// Share of the body's mass that may be added to the elements with the shortest stable step, 0 = none. A hundredth is not felt and lengthens the step where a mesh has
+    /// slivers; weight stays as it was. Infinite = all elements get the same bound: only for [`settle`](crate::Tled::settle), whose way to rest does not matter.
+    pub mass_scaling: f32,
     /// Fastest that a node may move, mm/ms (m/s). A surgeon's hand stays under 1; what is over is held to it and counted.
     pub max_speed: f32,
     /// Furthest that a node may get from its rest position, as a share of the body's largest extent; held to it and counted.
@@ -42,6 +45,7 @@ impl Default for Config {
             safety: 0.8,
             substeps: 4,
             balanced_gravity: Vec3::ZERO,
+            mass_scaling: 0.0,
             max_speed: 10.0,
             max_displacement: 2.0,
             cure_locking: false,
@@ -82,6 +86,9 @@ impl Config {
         }
         if !self.balanced_gravity.is_finite() {
             return refuse("balanced_gravity", self.balanced_gravity.length(), "finite, 9.81e-3 mm/ms² on Earth");
+        }
+        if self.mass_scaling.is_nan() || self.mass_scaling < 0.0 {
+            return refuse("mass_scaling", self.mass_scaling, "at least 0; 0.01 is not felt");
         }
         if !(self.max_speed > 0.0 && self.max_speed.is_finite()) {
             return refuse("max_speed", self.max_speed, "over 0 and finite");

@@ -6,6 +6,7 @@ use crate::kernel::{Found, Kernel};
 use crate::layout::{Layout, kind};
 use crate::part::{Part, Work};
 use crate::relaxation::Relaxation;
+use crate::scaling::Scaling;
 use crate::team::Team;
 use trepan_soft::Body;
 
@@ -26,7 +27,7 @@ pub(crate) struct Elements {
 }
 
 impl Elements {
-    pub fn of(body: &Body, layout: &Layout, config: &Config) -> Self {
+    pub fn of(body: &Body, layout: &Layout, scaling: &Scaling, config: &Config) -> Self {
         let mut volume = vec![0.0; layout.node_at.len()];
         for (t, tet) in body.mesh.tets.iter().enumerate() {
             tet.iter().for_each(|&n| volume[layout.place_of[n as usize] as usize] += 0.25 * body.mesh.volume_mm3(t));
@@ -34,7 +35,7 @@ impl Elements {
         let parts = if config.threads > 1 { PARTS_PER_THREAD * config.threads } else { 1 };
         let blocks = layout.tet_at.len().div_ceil(WIDTH).div_ceil(parts);
         let of_one_law = layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b));
-        let part = |tets: &[u32]| Part::of(body, layout, tets, &config.relaxation);
+        let part = |tets: &[u32]| Part::of(body, layout, scaling, tets, &config.relaxation);
         let parts = of_one_law.flat_map(|tets| tets.chunks(blocks * WIDTH)).map(part).collect();
         Self {
             team: Team::of(parts, volume.len(), config.threads),
@@ -120,6 +121,7 @@ mod tests {
             let mut elements = Elements::of(
                 body,
                 &layout,
+                &Scaling::of(body, 0.0),
                 &Config { kernel, cure_locking: cure, relaxation, threads, ..Config::default() },
             );
             let found = (0..3).map(|_| elements.compute(&mut u, 0.7)).last();

@@ -23,6 +23,8 @@ pub(crate) struct Nodes {
     pub velocities: Vec<Vec3>,
     /// 1/m by place, 1/g; 0 for fixed nodes.
     pub inverse_mass: Vec<f32>,
+    /// Share of the mass by place that has weight.
+    weight: Vec<f32>,
     v: Vec<Vec3>,
     rest: Vec<Vec3>,
     node_at: Vec<u32>,
@@ -39,8 +41,9 @@ pub(crate) struct Update {
 }
 
 impl Nodes {
-    pub fn of(body: &Body, layout: &Layout) -> Self {
-        let (masses, fixed) = (body.lumped_masses_g(), body.fixed_mask());
+    /// Nodes at rest, of masses by mesh node, g, which may be more than what their weight comes from.
+    pub fn of(body: &Body, layout: &Layout, masses: &[f64]) -> Self {
+        let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
         let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };
         let count = layout.node_at.len();
         Self {
@@ -49,6 +52,7 @@ impl Nodes {
             positions: body.mesh.positions.clone(),
             velocities: vec![Vec3::ZERO; count],
             inverse_mass: layout.node_at.iter().map(inverse).collect(),
+            weight: layout.node_at.iter().map(|&n| (weights[n as usize] / masses[n as usize]) as f32).collect(),
             v: vec![Vec3::ZERO; count],
             rest: layout.node_at.iter().map(|&n| body.mesh.positions[n as usize]).collect(),
             node_at: layout.node_at.clone(),
@@ -61,10 +65,11 @@ impl Nodes {
         let (keep, gain) = ((1.0 - half) / (1.0 + half), update.dt_ms / (1.0 + half));
         for place in 0..self.u.len() {
             if self.inverse_mass[place] == 0.0 {
+                self.lead(place, update.dt_ms);
                 continue;
             }
             let force = elements.force(place) + self.external[place];
-            let pull = update.gravity + force * self.inverse_mass[place];
+            let pull = update.gravity * self.weight[place] + force * self.inverse_mass[place];
             let carried = match update.rigid {
                 Some(rigid) => {
                     let whole = rigid.at(self.rest[place] + self.displacement(place));
@@ -75,6 +80,14 @@ impl Nodes {
             self.place(place, carried + pull * gain, update, report);
         }
         self.external.fill(Vec3::ZERO);
+    }
+
+    /// Moves a fixed node with the velocity it was given.
+    #[inline(always)]
+    fn lead(&mut self, place: usize, dt_ms: f32) {
+        if self.v[place] != Vec3::ZERO {
+            self.set(place, self.displacement(place) + self.v[place] * dt_ms, self.v[place]);
+        }
     }
 
     /// The body's rigid motion, at present.
@@ -88,7 +101,7 @@ impl Nodes {
         }))
     }
 
-    /// Puts a node somewhere, at rest, from outside (for tests and initial states).
+    /// Puts a node somewhere from outside.
     pub fn set(&mut self, place: usize, displacement: Vec3, velocity: Vec3) {
         self.u[place] = [displacement.x, displacement.y, displacement.z, 0.0];
         self.v[place] = velocity;
@@ -113,8 +126,20 @@ impl Nodes {
         self.set(place, after, velocity);
     }
 
+    /// Velocity of the node at a place, mm/ms.
+    pub fn velocity(&self, place: usize) -> Vec3 {
+        self.v[place]
+    }
+
+    /// Present position of the node at a place, mm.
     #[inline(always)]
-    fn displacement(&self, place: usize) -> Vec3 {
+    pub fn position(&self, place: usize) -> Vec3 {
+        self.rest[place] + self.displacement(place)
+    }
+
+    /// Displacement of the node at a place, mm.
+    #[inline(always)]
+    pub fn displacement(&self, place: usize) -> Vec3 {
         let [x, y, z, _] = self.u[place];
         Vec3::new(x, y, z)
     }

@@ -14,6 +14,7 @@ use crate::kernel::{Found, Kernel};
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
 use crate::layout::Layout;
 use crate::relaxation::{Fade, Relaxation};
+use crate::scaling::Scaling;
 use std::marker::PhantomData;
 use trepan_soft::{Body, Law};
 
@@ -55,7 +56,7 @@ struct Of<M, const K: usize, const T: usize> {
 
 impl Part {
     /// The elements at `tets` (mesh numbers, in the solver's order), at least one and all of the same law.
-    pub fn of(body: &Body, layout: &Layout, tets: &[u32], relaxation: &Relaxation) -> Self {
+    pub fn of(body: &Body, layout: &Layout, scaling: &Scaling, tets: &[u32], relaxation: &Relaxation) -> Self {
         let places =
             || tets.iter().flat_map(|&t| body.mesh.tets[t as usize]).map(|n| layout.place_of[n as usize] as usize);
         let first = places().min().unwrap_or(0);
@@ -64,7 +65,7 @@ impl Part {
         places().for_each(|place| starts[place - first + 1] += 1);
         (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
         Self {
-            group: group(body, layout, tets, (first, &starts), relaxation),
+            group: group((body, layout, scaling), tets, (first, &starts), relaxation),
             slots: vec![[0.0; 4]; starts[count] as usize + 1],
             shares: vec![0.0; starts[count] as usize + 1],
             first,
@@ -107,23 +108,26 @@ impl Part {
 
 /// The group for the law of these elements. Only the commonest law has a form without memory.
 fn group(
-    body: &Body,
-    layout: &Layout,
+    of: (&Body, &Layout, &Scaling),
     tets: &[u32],
     starts: (usize, &[u32]),
     relaxation: &Relaxation,
 ) -> Box<dyn Group> {
-    match body.material(tets[0] as usize).law() {
-        Law::NeoHookean(_) if relaxation.is_none() => Box::new(Of::<NeoHookean, 2, 0>::new(body, layout, tets, starts)),
-        Law::NeoHookean(_) => Box::new(Of::<NeoHookean, 2, 2>::new(body, layout, tets, starts)),
-        Law::StVenantKirchhoff { .. } => Box::new(Of::<StVenantKirchhoff, 2, 2>::new(body, layout, tets, starts)),
-        Law::MooneyRivlin { .. } => Box::new(Of::<MooneyRivlin, 3, 2>::new(body, layout, tets, starts)),
-        Law::Ogden { .. } => Box::new(Of::<Ogden, 5, 2>::new(body, layout, tets, starts)),
+    match of.0.material(tets[0] as usize).law() {
+        Law::NeoHookean(_) if relaxation.is_none() => Box::new(Of::<NeoHookean, 2, 0>::new(of, tets, starts)),
+        Law::NeoHookean(_) => Box::new(Of::<NeoHookean, 2, 2>::new(of, tets, starts)),
+        Law::StVenantKirchhoff { .. } => Box::new(Of::<StVenantKirchhoff, 2, 2>::new(of, tets, starts)),
+        Law::MooneyRivlin { .. } => Box::new(Of::<MooneyRivlin, 3, 2>::new(of, tets, starts)),
+        Law::Ogden { .. } => Box::new(Of::<Ogden, 5, 2>::new(of, tets, starts)),
     }
 }
 
 impl<M: Constitutive<K>, const K: usize, const T: usize> Of<M, K, T> {
-    fn new(body: &Body, layout: &Layout, tets: &[u32], (first, starts): (usize, &[u32])) -> Self {
+    fn new(
+        (body, layout, scaling): (&Body, &Layout, &Scaling),
+        tets: &[u32],
+        (first, starts): (usize, &[u32]),
+    ) -> Self {
         let (mut next, spare) = (starts.to_vec(), starts[starts.len() - 1]);
         let mut blocks = vec![Block::empty(spare); tets.len().div_ceil(WIDTH)];
         for (at, &t) in tets.iter().enumerate() {
@@ -132,7 +136,8 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Of<M, K, T> {
                 next[place as usize - first] += 1;
                 next[place as usize - first] - 1
             });
-            blocks[at / WIDTH].put::<M>(at % WIDTH, &body.shape(t as usize), body.material(t as usize), [nodes, slots]);
+            let tissue = (&body.shape(t as usize), body.material(t as usize), scaling.factor(t));
+            blocks[at / WIDTH].put::<M>(at % WIDTH, tissue, [nodes, slots]);
         }
         Self { memory: vec![[[[0.0; WIDTH]; 6]; T]; blocks.len()], blocks, law: PhantomData }
     }

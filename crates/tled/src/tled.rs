@@ -5,18 +5,26 @@ use crate::contact::stable_share;
 use crate::elements::Elements;
 use crate::layout::Layout;
 use crate::nodes::{Nodes, Update};
+use crate::scaling::Scaling;
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
-use trepan_soft::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency, power_bound_ms};
+use trepan_soft::{
+    Body, BodyError, Loads, SoftSolver, StepReport, Stiffness, SurfacePressure, lowest_frequency_of, power_bound_of_ms,
+};
 
 /// Total Lagrangian explicit solver of one body.
 pub struct Tled {
     config: Config,
-    elements: Elements,
-    nodes: Nodes,
+    pub(crate) elements: Elements,
+    pub(crate) nodes: Nodes,
+    /// Its triangles by place.
+    pressure: SurfacePressure,
     place_of: Vec<u32>,
     bound_ms: f32,
-    damping_per_ms: f32,
+    pub(crate) damping_per_ms: f32,
+    /// Lowest frequency of the rest state, rad/ms, where fixed nodes hold the body.
+    pub(crate) lowest_per_ms: Option<f32>,
+    mass_added: f32,
     max_displacement_mm: f32,
     held: bool,
     stiffest_at_rest: f32,
@@ -38,16 +46,22 @@ impl Tled {
         config.check()?;
         let layout = Layout::of(body);
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
-        let mut nodes = Nodes::of(body, &layout);
-        let mut elements = Elements::of(body, &layout, config);
+        let scaling = Scaling::of(body, config.mass_scaling);
+        let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
+        let lowest_per_ms = lowest_frequency_of(body, &stiffness).map(|w| w as f32);
+        let mut nodes = Nodes::of(body, &layout, stiffness.masses_g());
+        let mut elements = Elements::of(body, &layout, &scaling, config);
         Ok(Self {
             config: *config,
             stiffest_at_rest: elements.compute(&mut nodes.u, 0.0).stiffest,
             elapsed_ms: 0.0,
             elements,
             nodes,
-            bound_ms: power_bound_ms(body) as f32,
-            damping_per_ms: damping_rate(body, config.damping, extent),
+            pressure: SurfacePressure::default(),
+            bound_ms: power_bound_of_ms(body, &stiffness) as f32,
+            damping_per_ms: damping_rate(body, config.damping, lowest_per_ms, extent),
+            lowest_per_ms,
+            mass_added: scaling.added as f32,
             max_displacement_mm: config.max_displacement * extent,
             held: body.is_held(),
             place_of: layout.place_of,
@@ -64,7 +78,20 @@ impl Tled {
         self.damping_per_ms
     }
 
-    /// Sets the state of a node: displacement from rest, mm, and velocity, mm/ms. Fixed nodes take a displacement and keep it.
+    /// Mass added by [`Config::mass_scaling`], as a share of the body's.
+    pub fn mass_added(&self) -> f32 {
+        self.mass_added
+    }
+
+    /// Puts pressure on some triangles, from the next step on; those that name nodes outside the mesh are left out.
+    pub fn set_pressure(&mut self, mut pressure: SurfacePressure) {
+        let place_of = &self.place_of;
+        pressure.triangles.retain(|t| t.iter().all(|&n| (n as usize) < place_of.len()));
+        pressure.triangles.iter_mut().flatten().for_each(|n| *n = place_of[*n as usize]);
+        self.pressure = pressure;
+    }
+
+    /// Sets the state of a node: displacement from rest, mm, and velocity, mm/ms. A fixed node goes on with its velocity until it is given another.
     pub fn set_node(&mut self, node: u32, displacement: Vec3, velocity: Vec3) {
         if let Some(&place) = self.place_of.get(node as usize) {
             self.nodes.set(place as usize, displacement, velocity);
@@ -92,6 +119,7 @@ impl Tled {
         let dt_ms =
             if self.config.substeps == 0 { left_ms } else { left_ms / (left_ms / longest * NEARLY).ceil().max(1.0) };
         self.press(&loads.contact, dt_ms, bound_ms, report);
+        self.push();
         let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.nodes.rigid_motion());
         let update = Update {
             dt_ms,
@@ -104,6 +132,22 @@ impl Tled {
         self.nodes.update(&self.elements, &update, report);
         self.elapsed_ms = dt_ms;
         dt_ms
+    }
+
+    /// Puts the surface's pressure on the nodes.
+    fn push(&mut self) {
+        let Nodes { external, .. } = &mut self.nodes;
+        let mut external = std::mem::take(external);
+        self.pressure
+            .each(|place| self.nodes.position(place as usize), |place, force| external[place as usize] += force);
+        self.nodes.external = external;
+    }
+
+    /// Ends all motion.
+    pub(crate) fn stop(&mut self) {
+        for place in 0..self.place_of.len() {
+            self.nodes.set(place, self.nodes.displacement(place), Vec3::ZERO);
+        }
     }
 
     /// The stable bound as the elements are now: that of the rest state, shortened by what the stiffest element has gained.
@@ -160,7 +204,7 @@ impl SoftSolver for Tled {
 }
 
 /// α = 2 ω₁ is critical. A body that is not held has no lowest mode by its supports: its slowest shear wave stands in.
-pub(crate) fn damping_rate(body: &Body, damping: Damping, extent_mm: f32) -> f32 {
+pub(crate) fn damping_rate(body: &Body, damping: Damping, lowest_per_ms: Option<f32>, extent_mm: f32) -> f32 {
     match damping {
         Damping::None => 0.0,
         Damping::Rate(rate) => rate,
@@ -171,7 +215,7 @@ pub(crate) fn damping_rate(body: &Body, damping: Damping, extent_mm: f32) -> f32
             let shear = total(&|t| body.material(t).shear_mpa());
             let shear_speed = (shear / total(&|t| body.material(t).density_g_mm3().into())).sqrt();
             let standing = std::f64::consts::PI * shear_speed / f64::from(extent_mm);
-            (f64::from(share) * 2.0 * lowest_frequency(body).unwrap_or(standing)) as f32
+            share * 2.0 * lowest_per_ms.unwrap_or(standing as f32)
         }
     }
 }

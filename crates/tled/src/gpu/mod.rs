@@ -48,7 +48,7 @@ use press::Press;
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError};
-use trepan_soft::{Body, BodyError, Law, Loads, SoftSolver, StepReport, power_bound_ms};
+use trepan_soft::{Body, BodyError, Law, Loads, SoftSolver, StepReport, lowest_frequency, power_bound_ms};
 use update::Update;
 
 /// Threads in a workgroup, as in the shaders.
@@ -104,7 +104,7 @@ impl GpuTled {
         body.check()?;
         config.check()?;
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
-        let damping_per_ms = damping_rate(body, config.damping, extent);
+        let damping_per_ms = damping_rate(body, config.damping, lowest_frequency(body).map(|w| w as f32), extent);
         refuse(body, config, damping_per_ms)?;
         let layout = Layout::of(body);
         let state = DeviceState::new(gpu, body, &layout)?;
@@ -295,6 +295,9 @@ fn refuse(body: &Body, config: &Config, damping_per_ms: f32) -> Result<(), GpuTl
     }
     if !config.relaxation.is_none() {
         return unsupported("relaxation", "elastic tissue");
+    }
+    if config.mass_scaling > 0.0 {
+        return unsupported("mass_scaling", "unscaled masses");
     }
     if damping_per_ms > 0.0 && !body.is_held() {
         return unsupported("damping", "undamped bodies where no fixed nodes hold them");
