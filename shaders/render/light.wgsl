@@ -69,9 +69,10 @@ fn bone_colour(point: vec3f, normal: vec3f) -> vec3f {
 
 fn brain_colour(rest: vec3f) -> vec3f {
     let at = (scene.mri_from_world * vec4f(rest, 1.0)).xyz;
-    let signal = textureSampleLevel(mri, linear, at, 0.0).x;
-    let shade = select(0.85, 0.42 + 0.68 * smoothstep(0.05, 0.60, signal), scene.eye.w > 0.0);
-    return vec3f(0.90, 0.50, 0.45) * shade;
+    let signal = textureSampleLevel(mri, linear, at, 0.0);
+    let flesh = vec3f(0.90, 0.50, 0.45);
+    if scene.eye.w == 0.0 { return flesh * 0.85; }
+    return tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal);
 }
 
 fn tool_colour(point: vec3f, on_ball: bool) -> vec3f {

@@ -56,3 +56,9 @@ fn tool_distance(point: vec3f) -> f32 {
     let shaft = distance(point, scene.tip.xyz + along * axis) - scene.tail.w;
     return min(shaft, distance(point, scene.tip.xyz) - scene.tip.w);
 }
+
+// A colour where a mark of the MRI lies over it.
+fn tinted(colour: vec3f, signal: vec4f) -> vec3f {
+    let share = max(signal.x, max(signal.y, signal.z));
+    return mix(colour, signal.xyz / max(share, 1e-3), 0.45 * share);
+}

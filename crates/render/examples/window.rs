@@ -63,7 +63,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ball.data[at] = (400.0 + 300.0 * (40.0 - centre.length())).clamp(-1000.0, 1400.0) as i16;
     }
     let bone = Arc::new(BoneVolume::new(&ball, 400)?);
-    let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None };
+    let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
     let device = if by_processor { Err(GpuError::NoAdapter) } else { Gpu::open(Prefer::Hardware) };
     let painter = Painter::on(device, &data, [640, 480])?;
     let rotation = Quat::from_rotation_arc(Vec3::Z, Vec3::new(0.4, 0.8, 0.5).normalize());

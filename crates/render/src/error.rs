@@ -22,4 +22,12 @@ pub enum RenderError {
     /// The MRI cannot be placed.
     #[error("the MRI's affine cannot be inverted; give one with three independent axes")]
     Mri,
+    /// The tint is not one of this MRI.
+    #[error("the MRI has {wanted} voxels, but {given} tints were given")]
+    Tint {
+        /// Voxels of the MRI.
+        wanted: usize,
+        /// Colours given.
+        given: usize,
+    },
 }

@@ -16,6 +16,8 @@ pub struct SceneData<'a> {
     pub brain: Option<&'a TetMesh>,
     /// The MRI in patient space, any range.
     pub mri: Option<&'a VoxelVolume<f32>>,
+    /// A colour laid over each voxel of the MRI; black for none.
+    pub tint: Option<&'a [[u8; 3]]>,
 }
 
 /// What the slices show, world mm: the box of voxel centres of the CT, else that of the MRI, else the brain.

@@ -1,4 +1,4 @@
-//! The MRI as a texture of grey values.
+//! The MRI as a texture of grey values, with what is marked in it.
 
 use crate::RenderError;
 use glam::{DAffine3, DMat4, DVec3, Mat4};
@@ -13,32 +13,40 @@ pub(crate) struct Mri {
     pub texture_from_world: Option<Mat4>,
 }
 
-/// The MRI as grey values.
+/// The MRI as texels: a colour that marks the place, black for none, and the grey value.
 #[derive(Clone, Debug)]
-pub(crate) struct Greys {
+pub(crate) struct Signals {
     pub dims: [usize; 3],
-    pub values: Vec<u8>,
+    pub texels: Vec<[u8; 4]>,
     /// Texture coordinates, 0 to 1, of a world point.
     pub texture_from_world: Mat4,
 }
 
 impl Mri {
-    pub fn new(gpu: &Gpu, volume: Option<&VoxelVolume<f32>>) -> Result<Self, RenderError> {
-        let greys = volume.map(Greys::of).transpose()?;
-        let size = greys.as_ref().map_or([1; 3], |g| g.dims.map(|n| n as u32));
-        let spec = TextureSpec { label: "mri", size, volume: true, format: Format::R8Unorm, drawn_to: false };
+    pub fn new(gpu: &Gpu, volume: Option<&VoxelVolume<f32>>, tint: Option<&[[u8; 3]]>) -> Result<Self, RenderError> {
+        let signals = volume.map(|volume| Signals::of(volume, tint)).transpose()?;
+        let size = signals.as_ref().map_or([1; 3], |g| g.dims.map(|n| n as u32));
+        let spec = TextureSpec { label: "mri", size, volume: true, format: Format::Rgba8Unorm, drawn_to: false };
         let texture = Texture::new(gpu, &spec)?;
-        if let Some(greys) = &greys {
-            texture.write(gpu, [0; 3], size, &greys.values);
+        if let Some(signals) = &signals {
+            texture.write(gpu, [0; 3], size, &signals.texels);
         }
-        Ok(Self { texture, texture_from_world: greys.map(|g| g.texture_from_world) })
+        Ok(Self { texture, texture_from_world: signals.map(|g| g.texture_from_world) })
     }
 }
 
-impl Greys {
-    pub fn of(volume: &VoxelVolume<f32>) -> Result<Self, RenderError> {
+impl Signals {
+    pub fn of(volume: &VoxelVolume<f32>, tint: Option<&[[u8; 3]]>) -> Result<Self, RenderError> {
+        let wanted = volume.data.len();
+        if let Some(given) = tint.map(<[_]>::len).filter(|&given| given != wanted) {
+            return Err(RenderError::Tint { wanted, given });
+        }
         let white = white(&volume.data);
-        let values = volume.data.iter().map(|&v| (v / white * 255.0).clamp(0.0, 255.0) as u8).collect();
+        let texel = |(at, &v): (usize, &f32)| {
+            let [r, g, b] = tint.map_or([0; 3], |tint| tint[at]);
+            [r, g, b, (v / white * 255.0).clamp(0.0, 255.0) as u8]
+        };
+        let texels = volume.data.iter().enumerate().map(texel).collect();
         let voxel_from_world = volume.world_from_voxel.inverse();
         if !voxel_from_world.is_finite() {
             return Err(RenderError::Mri);
@@ -46,7 +54,7 @@ impl Greys {
         let dims = DVec3::from(volume.dims.map(|n| n as f64));
         let texture_from_voxel = DAffine3::from_scale(1.0 / dims) * DAffine3::from_translation(DVec3::splat(0.5));
         let texture_from_world = DMat4::from(texture_from_voxel * voxel_from_world).as_mat4();
-        Ok(Self { dims: volume.dims, values, texture_from_world })
+        Ok(Self { dims: volume.dims, texels, texture_from_world })
     }
 }
 
@@ -61,6 +69,14 @@ fn white(data: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_tint_of_another_volume_is_refused() {
+        let mri = VoxelVolume::isotropic([2, 1, 1], glam::Vec3::ZERO, 1.0, 100.0f32);
+        let tinted = Signals::of(&mri, Some(&[[0; 3], [9, 8, 7]])).unwrap();
+        assert_eq!(tinted.texels, [[0, 0, 0, 255], [9, 8, 7, 255]]);
+        assert_eq!(Signals::of(&mri, Some(&[[0; 3]])).unwrap_err(), RenderError::Tint { wanted: 2, given: 1 });
+    }
 
     #[test]
     fn white_ignores_a_few_hot_voxels_and_survives_none() {

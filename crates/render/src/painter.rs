@@ -10,7 +10,7 @@
 use crate::brain::Border;
 use crate::frame::{Frame, SceneData, bounds};
 use crate::image::Image;
-use crate::mri::Greys;
+use crate::mri::Signals;
 use crate::renderer::{DrawReport, LEAST_DETAIL};
 use crate::{ProcessorRenderer, RenderError, Renderer, View};
 use std::sync::Arc;
@@ -39,12 +39,12 @@ pub(crate) struct Kept {
     /// What the slices show.
     pub bounds: Aabb,
     pub brain: Option<Border>,
-    pub mri: Option<Greys>,
+    pub mri: Option<Signals>,
 }
 
 impl Kept {
     pub fn of(data: &SceneData) -> Result<Self, RenderError> {
-        let mri = data.mri.map(Greys::of).transpose()?;
+        let mri = data.mri.map(|mri| Signals::of(mri, data.tint)).transpose()?;
         Ok(Self { bone: data.bone.clone(), bounds: bounds(data), brain: data.brain.map(Border::of), mri })
     }
 }

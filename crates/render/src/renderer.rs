@@ -62,7 +62,7 @@ impl Renderer {
             scene: Buffer::zeroed(gpu, "scene", 1)?,
             skull: Skull::new(gpu, data.bone.clone())?,
             brain: data.brain.map(|mesh| Brain::new(gpu, mesh)).transpose()?,
-            mri: Mri::new(gpu, data.mri)?,
+            mri: Mri::new(gpu, data.mri, data.tint)?,
             light: Light::new(gpu)?,
             enlarge: Enlarge::new(gpu)?,
             slices: Slices::new(gpu)?,

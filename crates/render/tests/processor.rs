@@ -59,7 +59,7 @@ fn similarity(a: &Image, b: &Image) -> f64 {
 fn the_processor_draws_the_devices_picture() {
     let Some(gpu) = device() else { return };
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri) };
+    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: None };
     let size = [320, 240];
     let mut on_device = scene::renderer(&gpu, &data, size);
     let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
@@ -107,7 +107,7 @@ fn a_ball_drawn_by_the_processor_is_a_ball() {
 #[test]
 fn threads_change_nothing_and_neither_does_following() {
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri) };
+    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: None };
     let mut one = ProcessorRenderer::new(&data, [160, 120]).expect("the scene loads");
     one.threads = 1;
     one.draw(&frame).expect("drawn");
@@ -124,7 +124,7 @@ fn threads_change_nothing_and_neither_does_following() {
 #[test]
 fn bad_sizes_and_brains_are_refused_and_odd_sizes_drawn() {
     let (shell, mesh, _, frame) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: None };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: None, tint: None };
     assert_eq!(ProcessorRenderer::new(&data, [0, 4]).unwrap_err(), RenderError::Size(0, 4));
     for size in [[1, 1], [33, 17], [5, 130]] {
         let mut renderer = ProcessorRenderer::new(&data, size).expect("the scene loads");
@@ -138,7 +138,7 @@ fn bad_sizes_and_brains_are_refused_and_odd_sizes_drawn() {
 #[test]
 fn without_a_device_the_processor_draws_and_says_why() {
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri) };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
     let mut painter = Painter::on(Err(GpuError::NoAdapter), &data, [120, 100]).expect("the scene loads");
     assert!(painter.notice().is_some_and(|n| n.contains("mesa-vulkan-drivers")), "{:?}", painter.notice());
     assert!(painter.name().contains("processor"));
@@ -154,7 +154,7 @@ fn without_a_device_the_processor_draws_and_says_why() {
 fn a_lost_device_leaves_the_picture_to_the_processor() {
     let Some(gpu) = device() else { return };
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri) };
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
     let mut painter = Painter::on(Ok(gpu.clone()), &data, [160, 120]).expect("the scene loads");
     let (before, _) = painter.picture(&frame).expect("drawn");
     assert_eq!(painter.notice(), None);
@@ -173,7 +173,7 @@ fn a_brain_and_its_mri_need_no_ct() {
             mri.data[at] = 200.0;
         }
     }
-    let data = SceneData { bone: None, brain: Some(&mesh), mri: Some(&mri) };
+    let data = SceneData { bone: None, brain: Some(&mesh), mri: Some(&mri), tint: None };
     let size = [400, 300];
     let mut processor = ProcessorRenderer::new(&data, size).expect("a scene without a CT loads");
     let camera = Camera::viewed_from(Vec3::ZERO, Vec3::new(0.5, 1.0, 0.4), 200.0);
@@ -191,7 +191,7 @@ fn a_brain_and_its_mri_need_no_ct() {
         let (ball, brain) = (image.pixel(x + w / 2 + 6, y + h / 2 + 6), image.pixel(x + 3 * w / 4, y + 3 * h / 4));
         assert!(ball[0] > 240 && (15..60).contains(&brain[0]) && brain[0] == brain[2], "{ball:?} and {brain:?}");
     }
-    let alone = SceneData { bone: None, brain: None, mri: None };
+    let alone = SceneData { bone: None, brain: None, mri: None, tint: None };
     ProcessorRenderer::new(&alone, size).expect("an empty scene loads").draw(&frame).expect("drawn");
     let Some(gpu) = device() else { return };
     let mut renderer = scene::renderer(&gpu, &data, size);

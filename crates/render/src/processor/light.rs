@@ -4,10 +4,10 @@ use super::brain::Fragment;
 use super::bricks::trilinear;
 use super::skull::Ray;
 use super::{Inputs, bytes};
-use crate::mri::Greys;
+use crate::mri::Signals;
 use crate::scene::Scene;
 use crate::skull::NOTHING;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
     let scene = inputs.scene;
@@ -115,18 +115,26 @@ fn bone_colour(inputs: &Inputs, point: Vec3, normal: Vec3) -> Vec3 {
     Vec3::new(0.80, 0.62, 0.50).lerp(Vec3::new(0.93, 0.89, 0.80), dense)
 }
 
-fn brain_colour(mri: Option<&Greys>, rest: Vec3) -> Vec3 {
-    let shade = mri.map_or(0.85, |greys| {
-        let signal = signal(greys, greys.texture_from_world.transform_point3(rest));
-        0.42 + 0.68 * smoothstep(0.05, 0.60, signal)
-    });
-    Vec3::new(0.90, 0.50, 0.45) * shade
+fn brain_colour(mri: Option<&Signals>, rest: Vec3) -> Vec3 {
+    let flesh = Vec3::new(0.90, 0.50, 0.45);
+    mri.map_or(flesh * 0.85, |signals| {
+        let signal = signal(signals, signals.texture_from_world.transform_point3(rest));
+        tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal)
+    })
 }
 
-/// Grey value at texture coordinates, 0 to 1.
-pub(crate) fn signal(greys: &Greys, at: Vec3) -> f32 {
-    let voxel = at * Vec3::from(greys.dims.map(|n| n as f32)) - 0.5;
-    trilinear(greys.dims, voxel, |n| f32::from(greys.values[n]) / 255.0)
+/// Mark and grey value at texture coordinates, 0 to 1.
+pub(crate) fn signal(signals: &Signals, at: Vec3) -> Vec4 {
+    let voxel = at * Vec3::from(signals.dims.map(|n| n as f32)) - 0.5;
+    let channel = |c: usize| trilinear(signals.dims, voxel, |n| f32::from(signals.texels[n][c]) / 255.0);
+    Vec4::new(channel(0), channel(1), channel(2), channel(3))
+}
+
+/// Twin of the shader's `tinted`: a colour where a mark lies over it.
+pub(crate) fn tinted(colour: Vec3, signal: Vec4) -> Vec3 {
+    let mark = signal.truncate();
+    let share = mark.max_element();
+    colour.lerp(mark / share.max(1e-3), 0.45 * share)
 }
 
 fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, on_ball: bool, on_end: bool) -> Vec3 {

@@ -26,7 +26,7 @@ use crate::camera::View;
 use crate::frame::{Frame, SceneData};
 use crate::image::Image;
 use crate::layout::Layout;
-use crate::mri::Greys;
+use crate::mri::Signals;
 use crate::painter::Kept;
 use crate::renderer::{BRICKS_PER_FRAME, DrawReport, Hit};
 use crate::scene::Scene;
@@ -44,7 +44,7 @@ use trepan_geometry::Aabb;
 pub struct ProcessorRenderer {
     bricks: Bricks,
     brain: Option<Border>,
-    mri: Option<Greys>,
+    mri: Option<Signals>,
     bounds: Aabb,
     layout: Layout,
     picture: Image,
@@ -61,7 +61,7 @@ pub struct ProcessorRenderer {
 pub(crate) struct Inputs<'a> {
     pub scene: &'a Scene,
     pub bricks: &'a Bricks,
-    pub mri: Option<&'a Greys>,
+    pub mri: Option<&'a Signals>,
 }
 
 impl ProcessorRenderer {

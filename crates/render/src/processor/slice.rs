@@ -1,6 +1,6 @@
 //! Twin of `slice.wgsl`: one pixel of an orthogonal slice through the tool's tip.
 
-use super::light::{signal, smoothstep};
+use super::light::{signal, smoothstep, tinted};
 use super::{Inputs, bytes};
 use crate::frame::SliceLook;
 use crate::slice::{LETTERS, Plane};
@@ -58,13 +58,17 @@ fn tissue(inputs: &Inputs, world: Vec3, rest: Vec3, look: &SliceLook) -> Vec3 {
     let inside = (g + 0.5).cmpge(Vec3::ZERO).all() && (g + 0.5).cmple(dims).all();
     let hu = if inside { inputs.bricks.hu(g) } else { f32::from(AIR_HU) };
     let grey = ((hu - (look.level_hu - 0.5 * look.width_hu)) / look.width_hu.max(1.0)).clamp(0.0, 1.0);
-    let Some(greys) = inputs.mri else { return Vec3::splat(grey) };
-    let place = greys.texture_from_world.transform_point3(rest);
+    let Some(signals) = inputs.mri else { return Vec3::splat(grey) };
+    let place = signals.texture_from_world.transform_point3(rest);
     let known = place.cmpge(Vec3::ZERO).all() && place.cmple(Vec3::ONE).all();
     let isovalue = inputs.scene.dims.w;
     let share = look.mri_share * (1.0 - smoothstep(isovalue - 150.0, isovalue, hu));
-    let other = if known { signal(greys, place) } else { grey };
-    Vec3::splat(grey + share * (other - grey))
+    let grey = Vec3::splat(grey);
+    if !known {
+        return grey;
+    }
+    let signal = signal(signals, place);
+    grey.lerp(tinted(Vec3::splat(signal.w), signal), share)
 }
 
 fn labelled(slice: usize, pixel: Vec2, size: Vec2) -> bool {

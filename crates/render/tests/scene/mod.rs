@@ -38,7 +38,7 @@ pub fn bone(edge: usize, distance: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
 
 /// A scene of bone alone.
 pub fn alone(bone: &Arc<BoneVolume>) -> SceneData<'static> {
-    SceneData { bone: Some(bone.clone()), brain: None, mri: None }
+    SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None }
 }
 
 /// A renderer on the device.

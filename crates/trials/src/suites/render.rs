@@ -48,7 +48,7 @@ pub fn run(scope: Scope) -> Findings {
 impl By {
     /// The processor, and the device if there is one.
     fn all(bone: &Arc<BoneVolume>, gpu: Option<&Gpu>, size: [u32; 2]) -> Vec<Self> {
-        let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None };
+        let data = SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None };
         let processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
         let device = gpu.map(|gpu| Self::Device(Box::new(Renderer::new(gpu, &data, size).expect("the scene loads"))));
         [Some(Self::Processor(Box::new(processor))), device].into_iter().flatten().collect()
