@@ -13,6 +13,7 @@
 //! All lengths are voxels, in the discs' frame.
 
 use crate::half_spaces::{HalfSpace, nearest};
+use crate::shaft::Shaft;
 use crate::surface::Disc;
 use trepan_geometry::Vec3;
 
@@ -23,12 +24,15 @@ const REST: f32 = 2e-4;
 /// Overlap that each slide takes back: more than rounding brings in.
 const PUSH: f32 = 2e-4;
 
-/// A ball among discs.
+/// A ball among discs, perhaps on a shaft.
+#[derive(Clone, Copy)]
 pub(crate) struct Ball {
     /// Radius that touches.
     pub radius: f32,
     /// Whether its centre is in bone: then a disc pushes along its own normal, which is the way out.
     pub inside: bool,
+    /// The shaft, as seen from the ball's centre.
+    pub shaft: Shaft,
 }
 
 /// Where a ball sees a disc.
@@ -61,11 +65,22 @@ pub(crate) struct Slide {
 }
 
 impl Ball {
-    /// The disc as the ball at `centre` sees it.
+    /// How near a disc may come to the part of the tool that it stands against.
+    pub fn radius_at(&self, disc: &Disc) -> f32 {
+        if disc.shaft { self.shaft.radius } else { self.radius }
+    }
+
+    /// The way from the ball's centre to the place on the shaft's axis that is nearest to a disc at the shaft; none to the ball itself.
+    pub fn arm(&self, disc: &Disc, centre: Vec3) -> Vec3 {
+        if disc.shaft { self.shaft.at(self.shaft.along(disc.centre - centre)) } else { Vec3::ZERO }
+    }
+
+    /// The disc as the tool with its ball at `centre` sees it: the ball, or the place on the shaft's axis that is nearest.
     pub fn nearest(&self, disc: &Disc, centre: Vec3) -> Near {
+        let centre = centre + self.arm(disc, centre);
         let from_disc = centre - disc.centre;
         let height = from_disc.dot(disc.normal);
-        if self.inside {
+        if self.inside && !disc.shaft {
             return Near { distance: height, direction: disc.normal };
         }
         let sideways = from_disc - height * disc.normal;
@@ -93,24 +108,24 @@ impl Ball {
         smallest
     }
 
-    /// Distance of the nearest disc.
+    /// Distance of the nearest disc from the ball's centre.
     pub fn clearance(&self, discs: &[Disc], centre: Vec3) -> f32 {
-        discs.iter().map(|disc| self.nearest(disc, centre).distance).fold(f32::MAX, f32::min)
+        discs.iter().filter(|disc| !disc.shaft).map(|disc| self.nearest(disc, centre).distance).fold(f32::MAX, f32::min)
     }
 
-    /// Where the ball at `centre` is nearest to `goal`, when overlaps must lose `push`; `None` when that is nowhere.
+    /// Where the ball at `centre` is nearest to `goal`, when overlaps must lose `push`, those of the shaft `lean`; `None` when that is nowhere.
     pub fn settle(
         &self,
         discs: &[Disc],
         spaces: &mut Vec<HalfSpace>,
         centre: Vec3,
         goal: Vec3,
-        push: f32,
+        (push, lean): (f32, f32),
     ) -> Option<Vec3> {
         spaces.clear();
         for disc in discs {
             let near = self.nearest(disc, centre);
-            let clear = self.radius.min(near.distance + push);
+            let clear = self.radius_at(disc).min(near.distance + if disc.shaft { lean } else { push });
             spaces
                 .push(HalfSpace { normal: near.direction, offset: near.direction.dot(centre) - near.distance + clear });
         }
@@ -125,9 +140,9 @@ impl Ball {
             let no_further = |target: &Vec3| target.distance(goal) <= at.distance(goal) + 4.0 * PUSH;
             // Between walls even the least push would lever the ball away; without, it has room where it is.
             let target = self
-                .settle(discs, spaces, at, goal, PUSH)
+                .settle(discs, spaces, at, goal, (PUSH, PUSH))
                 .filter(no_further)
-                .or_else(|| self.settle(discs, spaces, at, goal, -PUSH));
+                .or_else(|| self.settle(discs, spaces, at, goal, (-PUSH, -PUSH)));
             slide.contradiction |= target.is_none();
             let Some(target) = target else { break };
             let (way, left) = (target - at, limits.way - slide.way);
@@ -175,8 +190,8 @@ mod tests {
             goal in prop::array::uniform3(-3.0f32..3.0), radius in 0.5f32..4.0, way in 0.0f32..1.0,
         ) {
             let discs: Vec<Disc> =
-                discs.into_iter().map(|(c, n)| Disc { centre: Vec3::from(c), normal: unit(n), radius: 0.8 }).collect();
-            let (ball, goal) = (Ball { radius, inside: false }, Vec3::from(goal));
+                discs.into_iter().map(|(c, n)| Disc { centre: Vec3::from(c), normal: unit(n), radius: 0.8, shaft: false }).collect();
+            let (ball, goal) = (Ball { radius, inside: false, shaft: Shaft::default() }, Vec3::from(goal));
             // Discs through the centre have no side.
             prop_assume!(ball.clearance(&discs, Vec3::ZERO) > 0.1);
             let slide = ball.slide(&discs, &mut Vec::new(), Vec3::ZERO, goal, Limits { reach: 0.5, way });

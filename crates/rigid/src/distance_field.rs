@@ -39,8 +39,10 @@
 //! `disc_voxels`.
 
 use crate::ball::{Ball, Limits};
-use crate::half_spaces::HalfSpace;
+use crate::half_spaces::{HalfSpace, supports};
+use crate::lean::Lean;
 use crate::removal::{Burr, Cut, Law};
+use crate::shaft::Shaft;
 use crate::surface::{Disc, Discs};
 use crate::window::Window;
 use crate::{RigidContact, RigidStep};
@@ -60,6 +62,8 @@ const MARGIN: f32 = 0.2;
 const JAM: f32 = 0.4;
 /// Growing may move a ball by so many times its growth.
 const PUSHED: f32 = 2.4;
+/// A shaft this far in bone gives way, voxels.
+const PRESSED: f32 = 1e-3;
 /// Way beyond that of the hand that rounding may need, mm.
 const ROUNDING_MM: f32 = 1e-4;
 
@@ -83,6 +87,8 @@ pub struct Config {
     pub fit_mm_per_ms: f32,
     /// How fast a ball that is jammed, or has its centre in bone, is let out, mm/ms.
     pub recover_mm_per_ms: f32,
+    /// Whether the shaft is felt too, with torque. The tool must then be held with its axis out of the bone.
+    pub shaft: bool,
     /// How much faster than the hand the proxy comes after it where bone gives way, mm/ms. Times the stiffness it is a change of force.
     pub yield_mm_per_ms: f32,
     /// What a burr takes away.
@@ -101,8 +107,12 @@ impl Config {
         fit_mm_per_ms: 0.01,
         recover_mm_per_ms: 0.05,
         yield_mm_per_ms: 0.03,
+        shaft: false,
         removal: Law::RATE,
     };
+
+    /// With the shaft.
+    pub const WITH_SHAFT: Self = Self { shaft: true, ..Self::RECOMMENDED };
 }
 
 impl Default for Config {
@@ -135,7 +145,12 @@ pub struct DistanceField {
     window: Window,
     known: Known,
     discs: Discs,
+    lean: Lean,
     near: Vec<Disc>,
+    /// What the burr alone is pushed, mm: what it cuts with.
+    pressed: Vec3,
+    /// Of each touching disc, whether it is at the shaft, and the way from the tip to there, mm.
+    arms: Vec<(bool, Vec3)>,
     spaces: Vec<HalfSpace>,
     burr: Burr,
 }
@@ -177,8 +192,11 @@ impl DistanceField {
             window: Window::new(),
             known: Known::default(),
             discs: Discs::new(MAX_DISCS, config.disc_voxels),
-            near: Vec::with_capacity(MAX_DISCS),
-            spaces: Vec::with_capacity(MAX_DISCS),
+            lean: Lean::new(if config.shaft { MAX_DISCS } else { 0 }, config.disc_voxels),
+            near: Vec::with_capacity(2 * MAX_DISCS),
+            pressed: Vec3::ZERO,
+            arms: Vec::with_capacity(2 * MAX_DISCS),
+            spaces: Vec::with_capacity(2 * MAX_DISCS),
             burr: Burr::new(config.removal, MAX_BITES),
         }
     }
@@ -191,6 +209,7 @@ impl DistanceField {
             self.known = Known::default();
             self.window.forget();
             self.discs.renew();
+            self.lean.renew();
         }
     }
 
@@ -203,7 +222,19 @@ impl DistanceField {
     /// The ball at the proxy.
     fn ball(&self, bone: &BoneVolume) -> Ball {
         let inside = bone.is_bone(bone.voxel_of(self.proxy.translation));
-        Ball { radius: self.ball_mm / bone.spacing_mm(), inside }
+        Ball { radius: self.ball_mm / bone.spacing_mm(), inside, shaft: self.shaft(bone) }
+    }
+
+    /// The shaft as seen from the tip, grid units.
+    fn shaft(&self, bone: &BoneVolume) -> Shaft {
+        let Tool { tip_radius_mm, shaft_radius_mm, shaft_length_mm, .. } = self.tool;
+        let spacing = bone.spacing_mm();
+        Shaft {
+            start: Vec3::ZERO,
+            axis: self.proxy.rotation * Vec3::Z,
+            span: (tip_radius_mm / spacing, shaft_length_mm.max(tip_radius_mm) / spacing),
+            radius: shaft_radius_mm / spacing,
+        }
     }
 
     /// Lets the ball become smaller where it works or is jammed, at a rate that a hand does not feel as a jump.
@@ -238,7 +269,7 @@ impl DistanceField {
         let growth = rate * dt_ms / spacing;
         let grown = Ball { radius: (self.ball_mm / spacing + growth).min(full / spacing), ..ball };
         let (from, goal) = (grid - base, bone.grid_of(self.hand) - base);
-        let Some(to) = grown.settle(&self.near, &mut self.spaces, from, goal, growth) else { return };
+        let Some(to) = grown.settle(&self.near, &mut self.spaces, from, goal, (growth, 0.0)) else { return };
         let push = to - from;
         let most = (PUSHED * growth).min(self.left_mm / spacing);
         // A hand that draws the tool off is not overtaken.
@@ -249,9 +280,11 @@ impl DistanceField {
     }
 
     /// Moves the proxy as near to `device` as the bone lets it. Returns whether it got there within `max_moves`.
-    fn follow(&mut self, bone: &BoneVolume, device: Vec3, out: &mut RigidStep) -> bool {
+    fn follow(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) -> bool {
         let margin = self.tool.tip_radius_mm + 2.0 * bone.spacing_mm();
-        let way = Aabb::of_points(&[self.proxy.translation, device]).inflated(margin);
+        let end = self.proxy.rotation * Vec3::Z * if self.config.shaft { self.tool.shaft_length_mm } else { 0.0 };
+        let (from, to) = (self.proxy.translation, device);
+        let way = Aabb::of_points(&[from, to, from + end, to + end]).inflated(margin);
         if !way.overlaps(bone.bounds()) {
             self.proxy.translation = device;
             self.ball_mm = self.tool.tip_radius_mm;
@@ -261,6 +294,7 @@ impl DistanceField {
             self.known = Known { fresh: false, clear: true, ..self.known };
             return true;
         }
+        self.give_way(bone, dt_ms, out);
         for _ in 0..self.config.max_moves {
             if self.advance(bone, device, out) {
                 return true;
@@ -280,8 +314,7 @@ impl DistanceField {
         let base = self.discs.base.as_vec3();
         let (from, goal) = (start - base, bone.grid_of(device) - base);
         let (ball, reach, full) = (self.ball(bone), self.config.move_voxels, self.tool.tip_radius_mm / spacing);
-        self.discs.shape(&self.window, from, full + reach);
-        let nearest = ball.select(self.discs.list(), from, full, reach, &mut self.near);
+        let nearest = self.select(bone, &ball, from, out);
         self.sure = (start, full + reach);
         self.known.clear = nearest > full - 0.5;
         let limits = Limits { reach, way: self.left_mm / spacing };
@@ -294,6 +327,39 @@ impl DistanceField {
             self.proxy.translation = bone.origin() + spacing * (slide.to + base);
         }
         slide.rests
+    }
+
+    /// The discs near the tool with its ball at `from`. Returns the distance of the nearest from the ball's centre.
+    fn select(&mut self, bone: &BoneVolume, ball: &Ball, from: Vec3, out: &mut RigidStep) -> f32 {
+        let (base, reach) = (self.discs.base.as_vec3(), self.config.move_voxels);
+        let full = self.tool.tip_radius_mm / bone.spacing_mm();
+        self.discs.shape(&self.window, |_| from, full + reach);
+        let nearest = ball.select(self.discs.list(), from, full, reach, &mut self.near);
+        if self.config.shaft {
+            let shaft = Shaft { start: base + from, ..ball.shaft };
+            self.lean.select(bone, &shaft, reach, base, &mut self.near, out);
+        }
+        nearest
+    }
+
+    /// Moves the tip aside where the turning hand has pressed the shaft into bone.
+    fn give_way(&mut self, bone: &BoneVolume, dt_ms: f32, out: &mut RigidStep) {
+        let (spacing, start) = (bone.spacing_mm(), bone.grid_of(self.proxy.translation));
+        if !self.config.shaft || !self.know(bone, start, out) {
+            return;
+        }
+        let base = self.discs.base.as_vec3();
+        let (ball, from) = (self.ball(bone), start - base);
+        self.select(bone, &ball, from, out);
+        let pressed = |disc: &Disc| disc.shaft && ball.nearest(disc, from).distance < ball.shaft.radius - PRESSED;
+        if !self.near.iter().any(pressed) {
+            return;
+        }
+        let most = self.config.recover_mm_per_ms * dt_ms / spacing;
+        let Some(to) = ball.settle(&self.near, &mut self.spaces, from, from, (0.0, most)) else { return };
+        if to.distance(from) <= PUSHED * most {
+            self.proxy.translation = bone.origin() + spacing * (to + base);
+        }
     }
 
     /// Makes sure that all discs in reach of the ball at grid point `at` are known; false when the ball is too large for that.
@@ -325,8 +391,8 @@ impl DistanceField {
 
     /// Fills the manifold from where proxy and device are.
     fn report(&mut self, bone: &BoneVolume, device: Vec3, out: &mut RigidStep) {
-        self.jammed = false;
-        let lifted = self.proxy.translation - device;
+        (self.jammed, self.pressed) = (false, self.proxy.translation - device);
+        let lifted = self.pressed;
         let depth = lifted.length();
         if depth == 0.0 {
             return;
@@ -334,13 +400,19 @@ impl DistanceField {
         let (spacing, radius) = (bone.spacing_mm(), self.ball_mm);
         let base = self.discs.base.as_vec3();
         let centre = bone.grid_of(self.proxy.translation) - base;
-        let ball = Ball { radius: radius / spacing, inside: false };
-        let mut against = f32::MIN;
+        let ball = Ball { inside: false, ..self.ball(bone) };
+        let (mut against, mut leans) = (f32::MIN, false);
+        self.spaces.clear();
+        self.arms.clear();
         for disc in &self.near {
             let near = ball.nearest(disc, centre);
-            if near.distance < ball.radius + TOUCH {
-                let point = bone.origin() + spacing * (centre + base - near.direction * near.distance);
-                let deep = radius - (device - point).dot(near.direction);
+            if near.distance < ball.radius_at(disc) + TOUCH {
+                let arm = ball.arm(disc, centre);
+                let point = bone.origin() + spacing * (centre + arm + base - near.direction * near.distance);
+                let deep = spacing * (ball.radius_at(disc) - near.distance) + lifted.dot(near.direction);
+                leans |= disc.shaft;
+                self.spaces.push(HalfSpace { normal: near.direction, offset: near.direction.dot(lifted) });
+                self.arms.push((disc.shaft, spacing * arm));
                 out.points_in_contact += 1;
                 against = against.max(near.direction.dot(lifted) / depth);
                 out.manifold.push(Contact { point, normal: near.direction, depth_mm: deep.max(0.0) });
@@ -351,6 +423,21 @@ impl DistanceField {
         out.manifold.normal = lifted / depth;
         out.manifold.depth_mm = depth;
         out.manifold.point = self.proxy.translation - radius * out.manifold.normal;
+        if leans {
+            self.share_out(depth, out);
+        }
+    }
+
+    /// Shares the push out between burr and shaft.
+    fn share_out(&mut self, depth: f32, out: &mut RigidStep) {
+        let (mut moment, mut pressed) = (Vec3::ZERO, Vec3::ZERO);
+        for (at, size) in supports(Vec3::ZERO, &self.spaces).into_iter().flatten() {
+            let (push, (shaft, arm)) = (size * self.spaces[at].normal, self.arms[at]);
+            moment += arm.cross(push);
+            pressed += if shaft { Vec3::ZERO } else { push };
+        }
+        out.manifold.couple_mm = moment / depth;
+        self.pressed = pressed;
     }
 }
 
@@ -373,15 +460,15 @@ impl RigidContact for DistanceField {
         self.hand = device;
         self.look_at(bone);
         self.shrink(bone, dt_ms);
-        if self.follow(bone, device, out) {
+        if self.follow(bone, device, dt_ms, out) {
             self.grow(bone, motion, dt_ms);
             self.left_mm = 0.0;
         }
         self.report(bone, device, out);
         if self.works {
             let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
-            let depth_mm = device.distance(proxy) + (radius_mm - self.ball_mm).min(self.bite_mm(bone));
-            let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms };
+            let depth_mm = self.pressed.length() + (radius_mm - self.ball_mm).min(self.bite_mm(bone));
+            let cut = Cut { device: proxy - self.pressed, proxy, radius_mm, depth_mm, dt_ms };
             if self.discs.list().is_empty() {
                 return;
             }
@@ -395,6 +482,9 @@ impl RigidContact for DistanceField {
             }
             self.known.worn = true;
             self.known.fresh &= !self.burr.opened();
+            if self.config.shaft && self.burr.opened() {
+                self.lean.opened(radius_mm / bone.spacing_mm() + 4.0);
+            }
         }
     }
 
@@ -410,6 +500,7 @@ impl RigidContact for DistanceField {
         self.known = Known::default();
         self.window.forget();
         self.discs.renew();
+        self.lean.renew();
         self.near.clear();
         self.burr.reset();
     }

@@ -16,7 +16,7 @@
 //! M. Sharir, E. Welzl, *A combinatorial bound for linear programming and related problems*, STACS 1992; R. Seidel,
 //! *Small-dimensional linear programming and convex hulls made easy*, Discrete Comput. Geom. 6 (1991).
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;
 
 /// How far outside a half-space counts as inside.
@@ -45,19 +45,40 @@ impl HalfSpace {
 
 /// The point of all `spaces` nearest to `goal`; `None` when there is none (or rounding hides it).
 pub(crate) fn nearest(goal: Vec3, spaces: &[HalfSpace]) -> Option<Vec3> {
+    Some(solved(goal, spaces)?.0)
+}
+
+/// Which of the half-spaces hold the nearest point off `goal`, and how far each of them: the sum of their normals so weighted is the way from the goal.
+pub(crate) fn supports(goal: Vec3, spaces: &[HalfSpace]) -> Option<impl Iterator<Item = (usize, f32)>> {
+    let (x, active) = solved(goal, spaces)?;
+    let normals: [DVec3; 3] =
+        core::array::from_fn(|i| if i < active.count { active.spaces[i].normal.as_dvec3() } else { DVec3::ZERO });
+    // Normal equations; the rows that are not in use are the identity's.
+    let row = |i: usize| {
+        DVec3::from_array(core::array::from_fn(|j| {
+            normals[i].dot(normals[j]) + f64::from(u8::from(i == j && i >= active.count))
+        }))
+    };
+    let way = (x - goal).as_dvec3();
+    let moments = DVec3::from_array(normals.map(|normal| normal.dot(way)));
+    let sizes = DMat3::from_cols(row(0), row(1), row(2)).inverse() * moments;
+    Some((0..active.count).map(move |i| (active.of[i], sizes[i].max(0.0) as f32)))
+}
+
+fn solved(goal: Vec3, spaces: &[HalfSpace]) -> Option<(Vec3, Active)> {
     let mut active = Active::default();
     let mut x = goal;
     for _ in 0..MAX_EXCHANGES {
         let (mut lowest, mut worst) = (-TOLERANCE, None);
-        for space in spaces {
+        for (at, space) in spaces.iter().enumerate() {
             let height = space.height(x);
             if height < lowest {
-                (lowest, worst) = (height, Some(space));
+                (lowest, worst) = (height, Some(at));
             }
         }
         match worst {
-            Some(worst) => x = active.exchange(goal, worst)?,
-            None => return Some(x),
+            Some(worst) => x = active.exchange(goal, &spaces[worst], worst)?,
+            None => return Some((x, active)),
         }
     }
     None
@@ -67,13 +88,16 @@ pub(crate) fn nearest(goal: Vec3, spaces: &[HalfSpace]) -> Option<Vec3> {
 #[derive(Default)]
 struct Active {
     spaces: [HalfSpace; 3],
+    /// Their places in the list.
+    of: [usize; 3],
     count: usize,
 }
 
 impl Active {
     /// Takes `entering` in and keeps of the others what the new solution needs, which is returned.
-    fn exchange(&mut self, goal: Vec3, entering: &HalfSpace) -> Option<Vec3> {
+    fn exchange(&mut self, goal: Vec3, entering: &HalfSpace, at: usize) -> Option<Vec3> {
         let all = [*entering, self.spaces[0], self.spaces[1], self.spaces[2]];
+        let of = [at, self.of[0], self.of[1], self.of[2]];
         let all = &all[..=self.count];
         // The entering half-space is active for sure: bit 0 is set. Sets of four have no common point.
         let (x, set) = (0..1u32 << self.count)
@@ -86,6 +110,7 @@ impl Active {
         for (i, space) in all.iter().enumerate() {
             if set >> i & 1 == 1 {
                 self.spaces[self.count] = *space;
+                self.of[self.count] = of[i];
                 self.count += 1;
             }
         }
@@ -147,6 +172,15 @@ mod tests {
                 prop_assert!(near);
             }
         }
+    }
+
+    #[test]
+    fn supports_carry_the_way_from_the_goal() {
+        let spaces = [Vec3::Z, Vec3::X, Vec3::new(0.6, 0.0, 0.8)].map(|normal| HalfSpace { normal, offset: 0.0 });
+        let found: Vec<_> = supports(Vec3::new(-1.0, 5.0, -2.0), &spaces).unwrap().collect();
+        let way: Vec3 = found.iter().map(|&(at, size)| size * spaces[at].normal).sum();
+        assert!((way - Vec3::new(1.0, 0.0, 2.0)).length() < 1e-6, "{found:?}");
+        assert_eq!(supports(Vec3::ONE, &spaces).unwrap().count(), 0);
     }
 
     #[test]

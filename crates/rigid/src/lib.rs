@@ -49,6 +49,7 @@ pub mod centre_line;
 pub mod distance_field;
 pub mod exposed_faces;
 mod half_spaces;
+mod lean;
 mod method;
 mod penalty;
 pub mod pointshell;

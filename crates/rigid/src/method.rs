@@ -48,6 +48,7 @@ impl Method {
             Self::CentreLine(centre_line::Config::default()),
             Self::SurfaceVertices(surface_vertices::Config::default()),
             Self::DistanceField(distance_field::Config::default()),
+            Self::DistanceField(distance_field::Config::WITH_SHAFT),
             Self::Brute(brute::Config::default()),
         ]
     }
@@ -65,6 +66,7 @@ impl Method {
             Self::BurrAndShaft(_) => "burr-and-shaft",
             Self::CentreLine(_) => "centre-line",
             Self::SurfaceVertices(_) => "surface-vertices",
+            Self::DistanceField(config) if config.shaft => "distance-field-shaft",
             Self::DistanceField(_) => "distance-field",
             Self::Brute(_) => "brute",
         }
@@ -82,7 +84,11 @@ impl Method {
 
     /// Whether the method feels the tool's shaft too: then the tool must be held as a hand holds it, with its axis out of the bone.
     pub fn has_shaft(&self) -> bool {
-        matches!(self, Self::BurrAndShaft(_) | Self::CentreLine(_) | Self::SurfaceVertices(_))
+        match self {
+            Self::DistanceField(config) => config.shaft,
+            Self::BurrAndShaft(_) | Self::CentreLine(_) | Self::SurfaceVertices(_) => true,
+            _ => false,
+        }
     }
 
     /// Makes the method ready for a tool. All memory is taken here.

@@ -22,7 +22,7 @@ use trepan_volume::BoneVolume;
 const SLICE: f32 = 8.0;
 
 /// A straight shaft in grid coordinates.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Shaft {
     /// A point of the axis.
     pub start: Vec3,

@@ -19,9 +19,11 @@
 //! visited, six per bone voxel, 27 per disc: 3 to 20 us for a ball of 12 voxels. The capacity is fixed; what does not fit is counted.
 
 use crate::rows::{GridBall, rows};
+use crate::shaft::Shaft;
 use crate::window::Window;
 use glam::IVec3;
 use trepan_geometry::Vec3;
+use trepan_volume::BoneVolume;
 
 /// Density differences past this many HU from the isovalue do not bend a normal further.
 const CLAMP_HU: i32 = 1000;
@@ -48,6 +50,47 @@ pub(crate) struct Disc {
     pub normal: Vec3,
     /// Radius, voxels: less where the surface bends away.
     pub radius: f32,
+    /// Whether it is the shaft that it stands against, not the ball.
+    pub shaft: bool,
+}
+
+/// Where densities are read from.
+pub(crate) trait Densities {
+    /// Density from which a voxel is bone, HU.
+    fn isovalue(&self) -> i16;
+    /// Density of a voxel, HU.
+    fn hu(&self, voxel: IVec3) -> i16;
+    /// Densities of a voxel and the next two along x, HU.
+    fn three(&self, voxel: IVec3) -> [i16; 3];
+}
+
+impl Densities for Window {
+    fn isovalue(&self) -> i16 {
+        self.isovalue
+    }
+
+    fn hu(&self, voxel: IVec3) -> i16 {
+        Window::hu(self, voxel)
+    }
+
+    fn three(&self, voxel: IVec3) -> [i16; 3] {
+        let row = self.row(voxel);
+        [row.hu(voxel.x), row.hu(voxel.x + 1), row.hu(voxel.x + 2)]
+    }
+}
+
+impl Densities for BoneVolume {
+    fn isovalue(&self) -> i16 {
+        BoneVolume::isovalue(self)
+    }
+
+    fn hu(&self, voxel: IVec3) -> i16 {
+        BoneVolume::hu(self, voxel)
+    }
+
+    fn three(&self, voxel: IVec3) -> [i16; 3] {
+        core::array::from_fn(|i| BoneVolume::hu(self, voxel.with_x(voxel.x + i as i32)))
+    }
 }
 
 /// The discs near a point, gathered anew for each place of the tool.
@@ -177,21 +220,37 @@ impl Discs {
         }
     }
 
-    /// Gives those discs their normals that have a point within `reach` of `centre`, voxels from [`Self::base`]. The others are of no use.
-    pub fn shape(&mut self, window: &Window, centre: Vec3, reach: f32) {
+    /// Gives those discs their normals that have a point within `reach` of the tool, the part of which nearest to a place is at `centre`, voxels
+    /// from [`Self::base`]. The others are of no use.
+    pub fn shape(&mut self, densities: &impl Densities, centre: impl Fn(Vec3) -> Vec3, reach: f32) {
         for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
-            if !edge.shaped && known.centre.distance_squared(centre) <= (reach + known.radius).powi(2) {
+            let apart = known.centre.distance_squared(centre(known.centre));
+            if !edge.shaped && apart <= (reach + known.radius).powi(2) {
                 let key = key(self.base, edge);
                 let was = &self.before[slot(key)];
                 if was.key == key && self.wear.wrapping_sub(was.wear) < TURNS {
                     (known.normal, known.radius) = (was.normal, was.radius);
                 } else {
-                    *known = disc(window, self.base, known.centre, known.normal, self.radius);
+                    *known = Disc {
+                        shaft: known.shaft,
+                        ..disc(densities, self.base, known.centre, known.normal, self.radius)
+                    };
                     keep(&mut self.before, self.base, edge, known, self.wear);
                 }
                 edge.shaped = true;
             }
         }
+    }
+
+    /// Finds the discs whose centres are at most `reach` voxels from the axis of a shaft, in grid coordinates.
+    pub fn gather_along(&mut self, bone: &BoneVolume, shaft: &Shaft, reach: f32) {
+        self.forget();
+        self.base = shaft.start.round().as_ivec3();
+        let shift = self.base.as_vec3();
+        self.visited = shaft.around(bone, reach + 1.0, |voxel| {
+            let within = |x: Vec3| shaft.at(shaft.along(x + shift)).distance_squared(x + shift) <= reach * reach;
+            self.voxel(bone, voxel - self.base, within, true);
+        });
     }
 
     /// The voxels of one row, from `start` to x = `to`.
@@ -200,28 +259,29 @@ impl Discs {
         for i in start.x..=to {
             let hu = row.hu(self.base.x + i);
             if hu >= window.isovalue {
-                self.voxel(window, start.with_x(i), centre, reach);
+                let within = |x: Vec3| x.distance_squared(centre) <= reach * reach;
+                self.voxel(window, start.with_x(i), within, false);
             }
         }
         self.visited += (to - start.x + 1).max(0) as u32;
     }
 
-    /// The crossings around one bone voxel.
-    fn voxel(&mut self, window: &Window, local: IVec3, centre: Vec3, reach: f32) {
+    /// The crossings around one bone voxel that are `within` reach of the tool.
+    fn voxel(&mut self, window: &impl Densities, local: IVec3, within: impl Fn(Vec3) -> bool, shaft: bool) {
         let before = self.list.len();
         for (to, step) in (0..).zip(NEIGHBOURS) {
-            if window.hu(self.base + local + step) >= window.isovalue {
+            if window.hu(self.base + local + step) >= window.isovalue() {
                 continue;
             }
             let x = crossing(window, self.base, local, step);
-            if x.distance_squared(centre) > reach * reach {
+            if !within(x) {
                 continue;
             }
             if self.list.len() == self.limit {
                 self.overflow += 1;
                 continue;
             }
-            self.list.push(Disc { centre: x, normal: step.as_vec3(), radius: self.radius });
+            self.list.push(Disc { centre: x, normal: step.as_vec3(), radius: self.radius, shaft });
             self.edges.push(Edge { voxel: local, to, shaped: false });
         }
         self.voxels += u32::from(self.list.len() > before);
@@ -229,26 +289,26 @@ impl Discs {
 }
 
 /// Where the density passes the isovalue on the edge from bone voxel `local` by `step`, voxels from `base`.
-fn crossing(window: &Window, base: IVec3, local: IVec3, step: IVec3) -> Vec3 {
+fn crossing(window: &impl Densities, base: IVec3, local: IVec3, step: IVec3) -> Vec3 {
     let (inside, outside) = (f32::from(window.hu(base + local)), f32::from(window.hu(base + local + step)));
-    let along = (inside - f32::from(window.isovalue)) / (inside - outside);
+    let along = (inside - f32::from(window.isovalue())) / (inside - outside);
     local.as_vec3() + along * step.as_vec3()
 }
 
 /// A disc at `x` (voxels from `base`) on an edge that leads out of the bone along `edge`.
-fn disc(window: &Window, base: IVec3, x: Vec3, edge: Vec3, radius: f32) -> Disc {
+fn disc(window: &impl Densities, base: IVec3, x: Vec3, edge: Vec3, radius: f32) -> Disc {
     let block = Block::read(window, base, x);
     let shape = Shape::of(&block);
     let size = shape.slope.length();
     // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than its kernel.
     if size < 1.0 || -shape.slope.dot(edge) < -0.5 * size {
-        return Disc { centre: x, normal: edge, radius: SMALLEST.min(radius) };
+        return Disc { centre: x, normal: edge, radius: SMALLEST.min(radius), shaft: false };
     }
     let rough = -shape.slope / size;
     let normal = block.fitted(rough).unwrap_or(rough);
     let bend = shape.bend(normal) / size;
     let radius = if bend > 0.0 { (2.0 * STAND_OUT / bend).sqrt().clamp(SMALLEST.min(radius), radius) } else { radius };
-    Disc { centre: x, normal, radius }
+    Disc { centre: x, normal, radius, shaft: false }
 }
 
 /// The densities around a place over the isovalue, HU, and where the middle one is seen from the place.
@@ -258,16 +318,16 @@ struct Block {
 }
 
 impl Block {
-    fn read(window: &Window, base: IVec3, x: Vec3) -> Self {
+    fn read(window: &impl Densities, base: IVec3, x: Vec3) -> Self {
         let middle = x.round();
         let corner = base + middle.as_ivec3() - 1;
-        let iso = i32::from(window.isovalue);
+        let iso = i32::from(window.isovalue());
         let mut hu = [[[0.0; 3]; 3]; 3];
         for (k, layer) in (0..).zip(&mut hu) {
             for (j, cells) in (0..).zip(layer) {
-                let row = window.row(corner + IVec3::new(0, j, k));
-                for (i, cell) in (corner.x..).zip(cells) {
-                    *cell = (i32::from(row.hu(i)) - iso).clamp(-CLAMP_HU, CLAMP_HU) as f32;
+                let row = window.three(corner + IVec3::new(0, j, k));
+                for (hu, cell) in row.into_iter().zip(cells) {
+                    *cell = (i32::from(hu) - iso).clamp(-CLAMP_HU, CLAMP_HU) as f32;
                 }
             }
         }
