@@ -70,22 +70,27 @@ impl Ball {
         if disc.shaft { self.shaft.radius } else { self.radius }
     }
 
-    /// The way from the ball's centre to the place on the shaft's axis that is nearest to a disc at the shaft; none to the ball itself.
-    pub fn arm(&self, disc: &Disc, centre: Vec3) -> Vec3 {
-        if disc.shaft { self.shaft.at(self.shaft.along(disc.centre - centre)) } else { Vec3::ZERO }
+    /// The place on the shaft's axis that is nearest to a `point` of a disc at the shaft, all as seen from the ball's centre; for other discs that centre.
+    pub fn arm(&self, disc: &Disc, point: Vec3) -> Vec3 {
+        if disc.shaft { self.shaft.at(self.shaft.along(point)) } else { Vec3::ZERO }
     }
 
     /// The disc as the tool with its ball at `centre` sees it: the ball, or the place on the shaft's axis that is nearest.
     pub fn nearest(&self, disc: &Disc, centre: Vec3) -> Near {
-        let centre = centre + self.arm(disc, centre);
-        let from_disc = centre - disc.centre;
+        let seen = centre + self.arm(disc, disc.centre - centre);
+        let from_disc = seen - disc.centre;
         let height = from_disc.dot(disc.normal);
         if self.inside && !disc.shaft {
             return Near { distance: height, direction: disc.normal };
         }
         let sideways = from_disc - height * disc.normal;
         let off = sideways.length();
-        let rim = from_disc - sideways * (disc.radius / off.max(disc.radius));
+        let mut rim = from_disc - sideways * (disc.radius / off.max(disc.radius));
+        if disc.shaft {
+            // Across the axis from the point of the disc itself.
+            let point = seen - rim - centre;
+            rim = self.arm(disc, point) - point;
+        }
         let distance = rim.length();
         let direction = if distance > 1e-6 { rim / distance } else { disc.normal };
         Near { distance, direction }

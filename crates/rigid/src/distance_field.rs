@@ -407,7 +407,7 @@ impl DistanceField {
         for disc in &self.near {
             let near = ball.nearest(disc, centre);
             if near.distance < ball.radius_at(disc) + TOUCH {
-                let arm = ball.arm(disc, centre);
+                let arm = ball.arm(disc, disc.centre - centre);
                 let point = bone.origin() + spacing * (centre + arm + base - near.direction * near.distance);
                 let deep = spacing * (ball.radius_at(disc) - near.distance) + lifted.dot(near.direction);
                 leans |= disc.shaft;
