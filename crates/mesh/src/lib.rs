@@ -25,6 +25,7 @@
 
 mod check;
 mod file;
+mod isosurface;
 pub mod lattice;
 pub mod materials;
 mod quality;
@@ -35,6 +36,7 @@ mod triangles;
 
 pub use check::MeshError;
 pub use file::{FileError, abaqus, gmsh, medit, obj, read, read_surface, stl, tetgen, vtk, vtu, write, write_surface};
+pub use isosurface::isosurface;
 pub use quality::Quality;
 pub use surface::Surface;
 pub use tets::{FACES, OPPOSITE, TetMesh};
