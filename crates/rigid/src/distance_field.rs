@@ -155,8 +155,8 @@ pub struct DistanceField {
     burr: Burr,
 }
 
-/// What tells one bone from another.
-type Seen = (usize, [usize; 3], Vec3);
+/// What tells one bone from another: its address, its grid, and how often a stroke was undone.
+type Seen = (usize, [usize; 3], Vec3, u32);
 
 /// What the discs at hand are good for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -201,13 +201,18 @@ impl DistanceField {
         }
     }
 
-    /// Forgets the copy of the densities when it is not of this bone.
+    /// Forgets what is not of this bone as it is now.
     fn look_at(&mut self, bone: &BoneVolume) {
-        let this = Some((std::ptr::from_ref(bone) as usize, bone.dims(), bone.origin()));
+        let this = Some((std::ptr::from_ref(bone) as usize, bone.dims(), bone.origin(), bone.undone()));
         if self.seen != this {
             self.seen = this;
             self.known = Known::default();
             self.window.forget();
+            self.discs.renew();
+            self.lean.renew();
+        }
+        if self.window.renew(bone) {
+            self.known.fresh = false;
             self.discs.renew();
             self.lean.renew();
         }
@@ -478,7 +483,7 @@ impl RigidContact for DistanceField {
                 move |x| row.hu(x)
             });
             for voxel in self.burr.bitten() {
-                self.window.set(voxel, bone.hu(voxel));
+                self.window.set(bone, voxel);
             }
             self.known.worn = true;
             self.known.fresh &= !self.burr.opened();

@@ -16,8 +16,8 @@ pub trait RigidContact: Send {
     /// Where the tool is seen: what the hand asks for, held back by the bone.
     fn proxy(&self) -> Pose;
 
-    /// Puts the proxy at `pose` and forgets all history, as after a tool change or a pause. Needed before a step with another bone, and after
-    /// anything else has changed the bone (an undone stroke): a method may keep what it has seen.
+    /// Puts the proxy at `pose` and forgets all history, as after a tool change or a pause. What others change of the bone, an undone
+    /// stroke too, is noticed without it.
     fn reset(&mut self, pose: Pose);
 }
 

@@ -10,14 +10,16 @@
 //! ```
 //!
 //! # Practice
-//! A look costs about a nanosecond, with no test for borders. The window is a copy: its owner is the one who changes the
-//! bone and tells it so ([`Window::set`]); after a change by others it must be forgotten.
+//! A look costs about a nanosecond, with no test for borders. The window is a copy: what its owner changes it is told ([`Window::set`]), what
+//! others change it finds by the versions of the bricks that it meets ([`Window::renew`]), a nanosecond each.
 
 use glam::IVec3;
-use trepan_volume::BoneVolume;
+use trepan_volume::{BRICK, BoneVolume};
 
 /// Largest edge, log2: 128 voxels, 4 MB.
 const MAX_BITS: u32 = 7;
+/// Bricks along an edge for which versions are kept: more than the largest window meets; a power of two.
+const BRICKS: i32 = 32;
 
 pub(crate) struct Window {
     cells: Vec<i16>,
@@ -25,13 +27,16 @@ pub(crate) struct Window {
     /// Lowest voxel held.
     low: IVec3,
     filled: bool,
+    /// Versions of the bricks that it meets; brick (i, j, k) lies at each index mod [`BRICKS`].
+    seen: Vec<u32>,
     /// Density from which a voxel is bone, HU.
     pub isovalue: i16,
 }
 
 impl Window {
     pub fn new() -> Self {
-        Self { cells: vec![0; 1 << (3 * MAX_BITS)], bits: 0, low: IVec3::ZERO, filled: false, isovalue: 0 }
+        let (cells, seen) = (vec![0; 1 << (3 * MAX_BITS)], vec![0; BRICKS.pow(3) as usize]);
+        Self { cells, bits: 0, low: IVec3::ZERO, filled: false, seen, isovalue: 0 }
     }
 
     /// Everything is to be read anew.
@@ -53,6 +58,7 @@ impl Window {
             low = centre - edge / 2;
             (self.bits, self.low, self.filled, self.isovalue) = (bits, low, true, bone.isovalue());
             self.read(bone, low, low + edge);
+            self.bricks(|window, brick| window.see(bone, brick));
             return Some((edge * edge * edge) as u32);
         }
         let mut read = 0;
@@ -70,7 +76,45 @@ impl Window {
                 read += (is - was).abs() * edge * edge;
             }
         }
+        if read > 0 {
+            self.bricks(|window, brick| window.see(bone, brick));
+        }
         Some(read as u32)
+    }
+
+    /// Reads the bricks anew that others have changed. Returns whether there were any.
+    pub fn renew(&mut self, bone: &BoneVolume) -> bool {
+        let mut changed = false;
+        let (low, high) = (self.low, self.low + (1 << self.bits));
+        self.bricks(|window, brick| {
+            if window.seen[place(brick)] != bone.version(brick) {
+                window.see(bone, brick);
+                let from = brick * BRICK as i32;
+                window.read(bone, from.max(low), (from + BRICK as i32).min(high));
+                changed = true;
+            }
+        });
+        changed
+    }
+
+    /// Calls `visit` with each brick that the window meets.
+    fn bricks(&mut self, mut visit: impl FnMut(&mut Self, IVec3)) {
+        if !self.filled {
+            return;
+        }
+        let of = |voxel: IVec3| voxel.div_euclid(IVec3::splat(BRICK as i32));
+        let (first, last) = (of(self.low), of(self.low + (1 << self.bits) - 1));
+        for k in first.z..=last.z {
+            for j in first.y..=last.y {
+                for i in first.x..=last.x {
+                    visit(self, IVec3::new(i, j, k));
+                }
+            }
+        }
+    }
+
+    fn see(&mut self, bone: &BoneVolume, brick: IVec3) {
+        self.seen[place(brick)] = bone.version(brick);
     }
 
     fn read(&mut self, bone: &BoneVolume, from: IVec3, to: IVec3) {
@@ -104,14 +148,21 @@ impl Window {
         Row { cells: &self.cells[start..=start + mask], mask }
     }
 
-    /// Takes note of a new density.
-    pub fn set(&mut self, voxel: IVec3, hu: i16) {
+    /// Takes note of the density that its owner has just given to a voxel.
+    pub fn set(&mut self, bone: &BoneVolume, voxel: IVec3) {
         let inside = voxel.cmpge(self.low).all() && voxel.cmplt(self.low + (1 << self.bits)).all();
         if self.filled && inside {
             let at = self.index(voxel);
-            self.cells[at] = hu;
+            self.cells[at] = bone.hu(voxel);
+            self.see(bone, voxel.div_euclid(IVec3::splat(BRICK as i32)));
         }
     }
+}
+
+/// Index of a brick among the versions.
+fn place(brick: IVec3) -> usize {
+    let b = brick & (BRICKS - 1);
+    (b.x + BRICKS * (b.y + BRICKS * b.z)) as usize
 }
 
 /// One row of the window.
@@ -145,7 +196,12 @@ mod tests {
                 let centre = IVec3::new(x, y, z);
                 prop_assert!(window.cover(&bone, centre, half).is_some());
                 bone.set_hu(centre, 7);
-                window.set(centre, bone.hu(centre));
+                window.set(&bone, centre);
+                let others = centre + IVec3::new(half, -half, 0);
+                bone.set_hu(others, 1000 + half as i16);
+                let within = others.cmpge(IVec3::ZERO).all() && others.cmplt(IVec3::new(9, 10, 11)).all();
+                prop_assert_eq!(window.renew(&bone), within);
+                prop_assert!(!window.renew(&bone));
                 for at in 0..(2 * half + 1).pow(3) {
                     let n = 2 * half + 1;
                     let voxel = centre - half + IVec3::new(at % n, at / n % n, at / n / n);

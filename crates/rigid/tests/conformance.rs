@@ -207,6 +207,31 @@ fn another_bone_is_noticed_without_being_told() {
 }
 
 #[test]
+fn what_others_change_and_an_undone_stroke_are_noticed() {
+    for method in Method::all() {
+        let (bone, name, start) = (half_space(Vec3::Z), method.name(), Vec3::Z * 4.0);
+        let end = Vec3::Z * (1.9 - sinks(&method, 2.0));
+        let touched = |contact: &mut dyn RigidContact| {
+            let depth = walk(contact, &bone, start, end, 0.05).manifold.depth_mm;
+            walk(contact, &bone, end, start, 0.05);
+            depth
+        };
+        let mut contact = built(&method, &Tool::burr(2.0), start);
+        let before = touched(contact.as_mut());
+        bone.begin_stroke();
+        (0..28 * 28 * 28).for_each(|at| {
+            let voxel = [at % 28, at / 28 % 28, at / 784];
+            if voxel[2] > 9 {
+                bone.set_hu(voxel.into(), trepan_volume::AIR_HU);
+            }
+        });
+        assert_eq!(touched(contact.as_mut()), 0.0, "{name} feels what is gone");
+        assert!(matches!(bone.undo_stroke(), trepan_volume::Undone::Bricks(_)));
+        assert_eq!(touched(contact.as_mut()), before, "{name} misses what came back");
+    }
+}
+
+#[test]
 fn a_tool_in_a_slot_a_pit_or_bone_has_a_finite_answer() {
     let scenes: [fn(Vec3) -> f32; 4] = [
         |p| 2.0 - p.x.abs(),

@@ -32,6 +32,7 @@ mod resample;
 mod sample;
 mod skull;
 mod source;
+mod stroke;
 mod volume;
 
 pub use bone::{AIR_HU, BRICK, BoneError, BoneVolume};
@@ -46,6 +47,7 @@ pub use registration::{Registration, RegistrationConfig, RegistrationError, regi
 pub use resample::{Grid, Interpolation, resample};
 pub use sample::{ByteOrder, Number, Sample};
 pub use skull::{GREATEST_ISOVALUE, HounsfieldError, LEAST_ISOVALUE, bone_isovalue, hounsfield, labels, skull_only};
+pub use stroke::{MAX_STROKE_BRICKS, Undone};
 pub use volume::VoxelVolume;
 
 /// The README's example, compiled.
