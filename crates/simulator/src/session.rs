@@ -184,6 +184,7 @@ impl Session {
             bone: self.scene.bone.clone(),
             brain: self.scene.brain.as_ref().map(|brain| &brain.mesh),
             mri: self.scene.brain.as_ref().map(|brain| &brain.mri),
+            tint: self.scene.brain.as_ref().and_then(|brain| brain.tint.as_deref()),
         };
         let [width, height] = self.options.picture;
         let painter = Painter::on(driver::open(), &data, [width, height]).map_err(|fault| fault.to_string())?;

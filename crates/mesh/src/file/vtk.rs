@@ -25,6 +25,15 @@ pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
+/// Reads tetrahedra, and nothing else, with the label of each as the first cell data, `label`: what [`write_labelled`] writes.
+pub fn read_labelled(path: &Path) -> Result<LabelledMesh, FileError> {
+    let mut file = Legacy { reader: Reader::open(path)?, binary: false, offsets: false };
+    file.header()?;
+    let mesh = file.body()?;
+    let label_of_tet = file.labels(mesh.tets.len())?;
+    Ok(LabelledMesh { mesh, label_of_tet })
+}
+
 pub(crate) fn parse(reader: Reader) -> Result<TetMesh, FileError> {
     let mut file = Legacy { reader, binary: false, offsets: false };
     file.header()?;
@@ -121,6 +130,18 @@ impl Legacy {
         self.reader.mesh(positions.unwrap_or_default(), tets)
     }
 
+    /// One label for each cell.
+    fn labels(&mut self, count: usize) -> Result<Vec<u16>, FileError> {
+        let head = format!("CELL_DATA {count} SCALARS label unsigned_short 1 LOOKUP_TABLE default");
+        for wanted in head.split(' ') {
+            let word = self.reader.word().unwrap_or_default().to_owned();
+            if word != wanted {
+                return Err(self.reader.error("the cell data", word, format!("{wanted:?}, as in {head:?}")));
+            }
+        }
+        Ok(self.numbers("label", count, "unsigned_short")?.into_iter().map(|label| label as u16).collect())
+    }
+
     /// Up to the next blank line.
     fn skip_metadata(&mut self) {
         self.reader.line();
@@ -137,6 +158,7 @@ impl Legacy {
     /// Numbers of a VTK type, in whichever encoding the file has.
     fn numbers(&mut self, field: &str, count: usize, kind: &str) -> Result<Vec<f64>, FileError> {
         let (size, of): (usize, fn(&[u8]) -> f64) = match kind {
+            "unsigned_short" => (2, |b| u16::from_be_bytes(b.try_into().unwrap_or_default()).into()),
             "float" => (4, |b| f32::from_be_bytes(b.try_into().unwrap_or_default()).into()),
             "double" => (8, |b| f64::from_be_bytes(b.try_into().unwrap_or_default())),
             "int" => (4, |b| i32::from_be_bytes(b.try_into().unwrap_or_default()).into()),
@@ -229,6 +251,21 @@ mod tests {
     fn text(cells: &str) -> String {
         let points = "0 0 0 1 0 0 0 1 0 0 0 1 0.5 0.5 0.5";
         format!("# vtk DataFile Version 4.2\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 double\n{points}\n{cells}")
+    }
+
+    #[test]
+    fn labels_come_back_and_a_file_without_them_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("labelled.vtk");
+        let mesh = octahedron();
+        let label_of_tet = (0..mesh.tets.len()).map(|tet| 1 + 300 * tet as u16).collect();
+        let labelled = LabelledMesh { mesh, label_of_tet };
+        write_labelled(&path, &labelled).unwrap();
+        let back = read_labelled(&path).unwrap();
+        assert_eq!((&back.mesh, &back.label_of_tet), (&labelled.mesh, &labelled.label_of_tet));
+        assert_eq!(read(&path).unwrap(), labelled.mesh);
+        write(&path, &labelled.mesh).unwrap();
+        assert!(read_labelled(&path).unwrap_err().to_string().contains("CELL_DATA"));
     }
 
     fn read_text(text: &str) -> Result<TetMesh, FileError> {

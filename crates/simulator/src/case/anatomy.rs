@@ -1,11 +1,10 @@
 //! What is made of a patient's images: a skull on a grid of cubes, a brain mask, tetrahedra.
 
-use crate::case::tissue::TissueClass;
 use crate::case::{Brain, Inputs, Recipe};
 use crate::error::SessionError;
 use glam::DAffine3;
 use std::path::Path;
-use trepan_mesh::{TetMesh, lattice, materials::majority};
+use trepan_mesh::lattice::{self, LabelledMesh};
 use trepan_volume::{
     AIR_HU, BrainConfig, Grid, Interpolation, MaskError, RegistrationConfig, VoxelVolume, brain_mask, check_brain_mask,
     hounsfield, largest_component, overlap, register, resample, skull_only,
@@ -117,19 +116,11 @@ pub fn make_brain(
         notes.push(source.paint(ct_from_mri, &mut classes)?);
     }
     let config = lattice::Config { target_tets: recipe.tets, ..lattice::Config::default() };
-    let mesh = lattice::tetrahedra(&classes, &config)
+    let LabelledMesh { mesh, label_of_tet } = lattice::labelled(&classes.map(u16::from), &config)
         .map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;
     mesh.check().map_err(|fault| SessionError::Internal(format!("the mesher made a bad mesh: {fault}")))?;
-    let class_of_tet = class_of_tets(&mesh, &classes);
+    let class_of_tet = label_of_tet.into_iter().map(|label| label as u8).collect();
     Ok(Brain { classes, mri, mesh, class_of_tet })
-}
-
-/// The class that most of each tetrahedron is of; its surface reaches out of the brain, so what is outside counts as brain.
-pub fn class_of_tets(mesh: &TetMesh, classes: &VoxelVolume<u8>) -> Vec<u8> {
-    majority(mesh, &classes.map(u16::from))
-        .into_iter()
-        .map(|class| (class as u8).max(TissueClass::Brain.code()))
-        .collect()
 }
 
 /// The mask on a grid of 1 mm cubes, cut to its content and a margin.

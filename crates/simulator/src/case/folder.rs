@@ -4,13 +4,12 @@
 //! CASE/case.json   form, name, hash of the images, version, isovalue, planned opening, recipe, remarks, file hashes
 //!      skull.nii   densities in HU, cubes, largest piece of bone only
 //!      mri.nii     the MRI around the brain      mask.nii   1 in the brain
-//!      brain.vtk   tetrahedra
+//!      brain.vtk   tetrahedra, with their classes
 //! ```
 //!
 //! # Practice
 //! Patient RAS+ mm throughout. Nothing in it names a patient: images are written anew from their voxels, and the name is made from a hash.
 
-use crate::case::anatomy::class_of_tets;
 use crate::case::cache::digest;
 use crate::case::opening::Opening;
 use crate::case::{Brain, Case, Recipe};
@@ -19,11 +18,11 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use trepan_mesh::vtk;
+use trepan_mesh::{lattice::LabelledMesh, vtk};
 use trepan_volume::{hounsfield, nifti};
 
 /// Goes up when the folder's form changes.
-const FORM: u32 = 4;
+const FORM: u32 = 5;
 const SKULL: &str = "skull.nii";
 const MRI: &str = "mri.nii";
 const MASK: &str = "mask.nii";
@@ -57,7 +56,9 @@ pub fn save(case: &Case, recipe: &Recipe, folder: &Path) -> Result<(), String> {
     if let Some(brain) = &case.brain {
         nifti::write(&folder.join(MASK), &brain.classes).map_err(|f| text(&f))?;
         nifti::write(&folder.join(MRI), &brain.mri).map_err(|f| text(&f))?;
-        vtk::write(&folder.join(MESH), &brain.mesh).map_err(|f| text(&f))?;
+        let label_of_tet = brain.class_of_tet.iter().map(|&class| class.into()).collect();
+        let labelled = LabelledMesh { mesh: brain.mesh.clone(), label_of_tet };
+        vtk::write_labelled(&folder.join(MESH), &labelled).map_err(|f| text(&f))?;
         names.extend([MASK, MRI, MESH]);
     }
     let mut files = BTreeMap::new();
@@ -103,8 +104,9 @@ pub fn load(folder: &Path) -> Result<Case, SessionError> {
     let brain = match card.files.contains_key(MESH) {
         true => {
             let classes = volume(MASK)?.map(|v| v as u8);
-            let mesh = vtk::read(&folder.join(MESH)).map_err(|fault| broken(MESH, &fault))?;
-            Some(Brain { class_of_tet: class_of_tets(&mesh, &classes), classes, mri: volume(MRI)?, mesh })
+            let labelled = vtk::read_labelled(&folder.join(MESH)).map_err(|fault| broken(MESH, &fault))?;
+            let class_of_tet = labelled.label_of_tet.iter().map(|&label| label as u8).collect();
+            Some(Brain { classes, mri: volume(MRI)?, mesh: labelled.mesh, class_of_tet })
         }
         false => None,
     };

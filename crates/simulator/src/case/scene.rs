@@ -1,6 +1,7 @@
 //! The operating table: a case made ready to be touched, drilled and pressed.
 
 use crate::case::opening::bare_brain;
+use crate::case::tissue::TissueClass;
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
 use crate::program::Program;
@@ -43,6 +44,8 @@ pub struct RestBrain {
     pub field: Arc<DistanceField>,
     /// The MRI around it.
     pub mri: VoxelVolume<f32>,
+    /// Colours that mark tissue classes in it; `None` where no class is marked.
+    pub tint: Option<Vec<[u8; 3]>>,
 }
 
 impl Scene {
@@ -82,8 +85,12 @@ fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>
         remarks.push("too little bone lies under the brain to hold it: its lowest fifth is held instead".into());
         fixed = below(&brain.mesh, 0.2);
     }
+    let marked = TissueClass::ALL.map(TissueClass::tint);
+    let tint_of = |&code: &u8| marked.get(usize::from(code).wrapping_sub(1)).copied().unwrap_or([0; 3]);
+    let tint: Vec<[u8; 3]> = brain.classes.data.iter().map(tint_of).collect();
+    let tint = Some(tint).filter(|tint| tint.iter().any(|&colour| colour != [0; 3]));
     let field = Arc::new(DistanceField::of_mask(&brain.classes));
-    RestBrain { fixed, field, mesh: brain.mesh, class_of_tet: brain.class_of_tet, mri: brain.mri }
+    RestBrain { fixed, field, mesh: brain.mesh, class_of_tet: brain.class_of_tet, mri: brain.mri, tint }
 }
 
 /// Surface nodes near the skull base.

@@ -42,6 +42,15 @@ impl TissueClass {
         ["brain", "white", "grey", "ventricle", "tumour", "vessel"][self as usize]
     }
 
+    /// The colour that marks it in pictures; black for none. Vermilion and sky blue look apart to every eye (Okabe and Ito 2008).
+    pub fn tint(self) -> [u8; 3] {
+        match self {
+            Self::Tumour => [213, 94, 0],
+            Self::Vessel => [86, 180, 233],
+            Self::Brain | Self::White | Self::Grey | Self::Ventricle => [0; 3],
+        }
+    }
+
     /// What it is made of when brain has this Young's modulus, MPa: the presets of `soft`, scaled alike.
     ///
     /// A vessel is ten times as stiff as brain. Its wall is stiffer still ([`Material::VESSEL_WALL`]), but would make every step of
