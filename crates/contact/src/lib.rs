@@ -44,6 +44,7 @@ mod manifold;
 mod nodal;
 mod passivity;
 mod patch;
+mod shading;
 mod vibration;
 mod viscoelastic;
 
@@ -56,5 +57,6 @@ pub use manifold::{Contact, ContactManifold, MAX_CONTACTS};
 pub use nodal::{MAX_NODES, NodalContact};
 pub use passivity::{PassivityConfig, PassivityObserver};
 pub use patch::SurfacePatch;
+pub use shading::ForceShading;
 pub use vibration::Vibration;
 pub use viscoelastic::Viscoelastic;

@@ -230,9 +230,8 @@ impl RigidContact for Brute {
         if drilling && self.tool.kind == ToolKind::Burr {
             let (device, proxy, radius_mm) = (tool.tip(), self.proxy.translation, self.tool.tip_radius_mm);
             let depth_mm = device.distance(proxy);
-            out.removed_mm3 = self.burr.cut(bone, &Cut { device, proxy, radius_mm, depth_mm, dt_ms }, |voxel| {
-                move |x| bone.hu(voxel.with_x(x))
-            });
+            let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms };
+            self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
         }
     }
 

@@ -138,7 +138,7 @@ impl RigidContact for CentreLine {
         if drilling && self.tool.kind == ToolKind::Burr && tip != Vec3::ZERO {
             let (device, proxy) = (tool.tip(), tool.tip() + tip);
             let cut = Cut { device, proxy, radius_mm: self.tool.tip_radius_mm, depth_mm: tip.length(), dt_ms };
-            out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)));
+            self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
         }
     }
 

@@ -478,10 +478,11 @@ impl RigidContact for DistanceField {
                 return;
             }
             let window = &self.window;
-            out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| {
+            let read = |voxel| {
                 let row = window.row(voxel);
                 move |x| row.hu(x)
-            });
+            };
+            self.burr.cut(bone, &cut, read, out);
             for voxel in self.burr.bitten() {
                 self.window.set(bone, voxel);
             }

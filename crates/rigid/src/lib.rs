@@ -58,6 +58,7 @@ pub mod removal;
 mod rows;
 mod seam;
 mod shaft;
+pub mod spindle;
 mod surface;
 pub mod surface_vertices;
 mod sweep;

@@ -61,7 +61,7 @@ impl<F: Feel> RigidContact for Penalty<F> {
         out.manifold.point = self.proxy.translation - radius_mm * normal;
         if drilling && self.tool.kind == ToolKind::Burr && burr != Vec3::ZERO {
             let cut = Cut { device, proxy: device + burr, radius_mm, depth_mm: burr.length(), dt_ms };
-            out.removed_mm3 = self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)));
+            self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
         }
     }
 

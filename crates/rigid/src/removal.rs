@@ -3,12 +3,14 @@
 //! # Theory
 //! ```text
 //! per tick:  hu ← hu - 1                                           for every voxel in contact
-//! rate:      V̇ = min(μ F v, P) / u ,   v = ω r                     mm³/ms of bone at the reference density
+//! rate:      V̇ = μ F ω(F) r / u                                    mm³/ms of bone at the reference density
 //! ```
-//! Rate is Archard's and Preston's law of abrasive wear, volume in proportion to load F times sliding speed v, written with a
-//! cutting ratio μ (tangential over normal force) and the specific energy u of the material; P is what the spindle can give.
-//! u grows with density as `(hu + 1000) / 2500`, so that a thin diploë goes faster than the tables. Over dt the volume is V̇ dt, whatever the
-//! tick rate.
+//! Rate is Archard's and Preston's law of abrasive wear, volume in proportion to load F times sliding speed ω r, written with a
+//! cutting ratio μ (tangential over normal force) and the specific energy u of the material. The [`Spindle`] loses speed under the torque μ F r and
+//! stalls; a stalled burr takes nothing. Over dt the volume is V̇ dt, whatever the tick rate.
+//!
+//! The energy to take a voxel from one density to another is `∫ u m(hu) dhu`: m is 1 in cortical bone, less in cancellous bone, linear between
+//! the borders of the dental classes D3 (350 HU) and D1 (1250 HU). It depends on densities only, so that no voxel needs to remember what it was.
 //!
 //! The burr's ball, swept from the proxy to the device, bounds the removal. With s the distance of a voxel from its surface, in voxels, positive outside, no voxel
 //! falls below `iso + 1000 s`: its centre leaves the bone only once it is inside the ball, and the crossing between voxels
@@ -27,13 +29,16 @@
 //!
 //! # Sources
 //! J. F. Archard, *Contact and rubbing of flat surfaces*, J. Appl. Phys. 24 (1953). Specific energy per volume constant per bone: M. Arbabtafti et al.,
-//! *Physics-based haptic simulation of bone machining*, IEEE Trans. Haptics 4 (2011). **The numbers in [`Law::RATE`] are uncalibrated**: they are set so that
+//! *Physics-based haptic simulation of bone machining*, IEEE Trans. Haptics 4 (2011). Classes D1 to D4 by CT number: C. E. Misch, *Contemporary implant
+//! dentistry*, 1999. **The numbers in [`Law::RATE`] are uncalibrated**: they are set so that
 //! 1 to 2 N open a 7 mm skull with a 3 mm burr in 5 to 10 s.
 //!
 //! # When not to use it
 //! `per-tick` for anything but comparison: it removes twice as much at twice the tick rate, and nothing physical drives it.
 
+use crate::RigidStep;
 use crate::rows::{GridBall, rows};
+use crate::spindle::{Spindle, per_ms};
 use glam::{IVec3, Vec3Swizzles};
 use trepan_geometry::Vec3;
 use trepan_volume::{AIR_HU, BoneVolume};
@@ -46,6 +51,12 @@ const PARTIAL_HU: f32 = 500.0;
 const BITE_VOXELS: f32 = 1.5;
 /// Density at which the specific energy is given, HU: dense cortical bone.
 const REFERENCE_HU: f32 = 1500.0;
+/// Density up to which bone is as light as cancellous bone gets: border of D4 to D3.
+const CANCELLOUS_HU: f32 = 350.0;
+/// Density from which bone is dense cortical bone: border of D2 to D1.
+const CORTICAL_HU: f32 = 1250.0;
+/// Free way ahead that tells the far side of a bone from a hollow in it, mm.
+const BEYOND_MM: f32 = 3.0;
 
 /// How much bone goes in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,17 +68,17 @@ pub enum Law {
     },
     /// Volume at a rate from load, speed and specific energy.
     Rate {
-        /// Spindle speed, revolutions per minute.
-        spindle_rpm: f32,
+        /// The motor.
+        spindle: Spindle,
         /// Cutting ratio μ: tangential over normal force.
         cutting_ratio: f32,
         /// Specific energy u at 1500 HU, N/mm² (= J/cm³). Higher is slower.
         specific_energy_mpa: f32,
-        /// Most power of the spindle P, W (= N mm/ms).
-        power_w: f32,
+        /// What the energy to lower the density of cancellous bone is of that for cortical bone. 1 makes no difference between them.
+        cancellous_share: f32,
         /// Stiffness that turns depth into load, N/mm: that of the force model.
         stiffness: f32,
-        /// Load beyond which pressing harder does not cut faster, N.
+        /// Load beyond which pressing harder does not count, N.
         max_load_n: f32,
     },
 }
@@ -76,26 +87,42 @@ impl Law {
     /// The thesis's law: 1 HU a tick.
     pub const PER_TICK: Self = Self::PerTick { decrement_hu: 1.0 };
 
-    /// The default: a pneumatic or electric drill at 60 000/min. Uncalibrated.
+    /// The default. Uncalibrated.
     pub const RATE: Self = Self::Rate {
-        spindle_rpm: 60_000.0,
+        spindle: Spindle::DRILL,
         cutting_ratio: 0.3,
         specific_energy_mpa: 300.0,
-        power_w: 30.0,
+        cancellous_share: 0.5,
         stiffness: 2.0,
-        max_load_n: 10.0,
+        max_load_n: 20.0,
     };
 
     /// Bone of the reference density that a burr of `radius_mm`, pressed `depth_mm` deep, takes in `dt_ms`, mm³; 0 for `PerTick`.
     pub fn volume_mm3(&self, radius_mm: f32, depth_mm: f32, dt_ms: f32) -> f32 {
-        let &Self::Rate { spindle_rpm, cutting_ratio, specific_energy_mpa, power_w, stiffness, max_load_n } = self
-        else {
-            return 0.0;
+        self.turned(radius_mm, depth_mm, dt_ms, &mut false).0
+    }
+
+    /// The volume of [`volume_mm3`](Self::volume_mm3), and the speed of the spindle, 1/min, which may be `stalled` before or after.
+    fn turned(&self, radius_mm: f32, depth_mm: f32, dt_ms: f32, stalled: &mut bool) -> (f32, f32) {
+        let &Self::Rate { spindle, cutting_ratio, specific_energy_mpa, stiffness, max_load_n, .. } = self else {
+            return (0.0, 0.0);
         };
-        let load = (stiffness * depth_mm).min(max_load_n);
-        let speed = core::f32::consts::TAU * spindle_rpm / 60_000.0 * radius_mm;
-        let volume = (cutting_ratio * load * speed).min(power_w) / specific_energy_mpa * dt_ms;
-        if volume.is_finite() { volume.max(0.0) } else { 0.0 }
+        let torque = cutting_ratio * (stiffness * depth_mm).min(max_load_n) * radius_mm;
+        let rpm = spindle.turn(torque, stalled);
+        let volume = torque * per_ms(rpm) / specific_energy_mpa * dt_ms;
+        (if volume.is_finite() { volume.max(0.0) } else { 0.0 }, rpm)
+    }
+
+    /// How hard bone of `hu` is to wear for each HU, where bone of the reference density all the way down to air is 1.
+    fn hardness(&self, hu: f32) -> f32 {
+        let Self::Rate { cancellous_share, .. } = *self else { return 1.0 };
+        let cancellous = cancellous_share.clamp(0.01, 1.0);
+        let air = f32::from(AIR_HU);
+        let whole = cancellous * (CANCELLOUS_HU - air)
+            + 0.5 * (1.0 + cancellous) * (CORTICAL_HU - CANCELLOUS_HU)
+            + (REFERENCE_HU - CORTICAL_HU);
+        let cortical = ((hu - CANCELLOUS_HU) / (CORTICAL_HU - CANCELLOUS_HU)).clamp(0.0, 1.0);
+        (cancellous + (1.0 - cancellous) * cortical) * (REFERENCE_HU - air) / whole
     }
 }
 
@@ -140,17 +167,29 @@ pub(crate) struct Burr {
     tick: u32,
     /// Whether the last cut took a voxel under the isovalue.
     opened: bool,
+    /// Whether the spindle has stalled.
+    stalled: bool,
+    /// Direction of the last cut.
+    forward: Vec3,
 }
 
 impl Burr {
     /// A burr that reaches at most `limit` voxels a tick.
     pub fn new(law: Law, limit: usize) -> Self {
-        Self { law, bites: Vec::with_capacity(limit), limit, tick: 0, opened: false }
+        Self {
+            law,
+            bites: Vec::with_capacity(limit),
+            limit,
+            tick: 0,
+            opened: false,
+            stalled: false,
+            forward: Vec3::ZERO,
+        }
     }
 
-    /// Starts the dither anew.
+    /// Starts the dither and a stalled spindle anew.
     pub fn reset(&mut self) {
-        self.tick = 0;
+        (self.tick, self.stalled) = (0, false);
     }
 
     /// Whether a voxel was bone before the last cut and is not any more.
@@ -163,38 +202,47 @@ impl Burr {
         self.bites.iter().map(|bite| bite.voxel)
     }
 
-    /// Takes bone away and returns how much, mm³.
+    /// Takes bone away and says in `out` how much, how fast the spindle turned and whether it broke through.
     ///
     /// `read` gives the densities of the row along x through a voxel: the bone's, or those of a copy of it.
-    pub fn cut<R: Fn(i32) -> i16>(&mut self, bone: &BoneVolume, cut: &Cut, read: impl Fn(IVec3) -> R) -> f32 {
+    pub fn cut<R: Fn(i32) -> i16>(
+        &mut self,
+        bone: &BoneVolume,
+        cut: &Cut,
+        read: impl Fn(IVec3) -> R,
+        out: &mut RigidStep,
+    ) {
+        (self.opened, self.forward) = (false, (cut.device - cut.proxy).normalize_or_zero());
         let sound = cut.depth_mm.is_finite() && cut.dt_ms.is_finite();
         if !sound || cut.depth_mm <= 0.0 || cut.dt_ms <= 0.0 {
-            return 0.0;
+            return;
         }
         self.find_bites(bone, cut, read);
-        let fraction = match self.law {
-            Law::PerTick { decrement_hu } => {
-                return self.take(bone, |bite| decrement_hu * f32::from(bite.reach_hu > 0.0));
-            }
-            Law::Rate { .. } => {
-                let wanted = self.law.volume_mm3(cut.radius_mm, cut.depth_mm, cut.dt_ms) / bone.voxel_mm3();
-                let within_reach: f32 =
-                    self.bites.iter().map(|b| b.reach_hu).sum::<f32>() / (REFERENCE_HU - f32::from(AIR_HU));
-                if within_reach > wanted { wanted / within_reach } else { 1.0 }
-            }
-        };
-        self.take(bone, |bite| fraction * bite.reach_hu)
+        if let Law::PerTick { decrement_hu } = self.law {
+            self.take(bone, |bite| decrement_hu * f32::from(bite.reach_hu > 0.0), out);
+            return;
+        }
+        let law = self.law;
+        let (volume, rpm) = law.turned(cut.radius_mm, cut.depth_mm, cut.dt_ms, &mut self.stalled);
+        let wanted = volume / bone.voxel_mm3() * (REFERENCE_HU - f32::from(AIR_HU));
+        let within_reach: f32 = self.bites.iter().map(|b| b.reach_hu * law.hardness(f32::from(b.hu))).sum();
+        let fraction = if within_reach > wanted { wanted / within_reach } else { 1.0 };
+        out.spindle_rpm = rpm;
+        if fraction > 0.0 && rpm > 0.0 {
+            self.take(bone, |bite| fraction * bite.reach_hu, out);
+        }
     }
 
-    /// Takes density from `voxels` by the per-tick law, wherever they are, and returns how much, mm³.
-    pub fn wear(&mut self, bone: &BoneVolume, voxels: impl Iterator<Item = IVec3>) -> f32 {
-        let Law::PerTick { decrement_hu } = self.law else { return 0.0 };
+    /// Takes density from `voxels` by the per-tick law, wherever they are.
+    pub fn wear(&mut self, bone: &BoneVolume, voxels: impl Iterator<Item = IVec3>, out: &mut RigidStep) {
+        let Law::PerTick { decrement_hu } = self.law else { return };
+        self.forward = Vec3::ZERO;
         self.bites.clear();
         for voxel in voxels.take(self.limit) {
             let (hu, floor_hu) = (bone.hu(voxel), f32::from(AIR_HU));
             self.bites.push(Bite { voxel, hu, reach_hu: f32::from(hu) - floor_hu, floor_hu });
         }
-        self.take(bone, |_| decrement_hu)
+        self.take(bone, |_| decrement_hu, out);
     }
 
     /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device, or on its surface.
@@ -236,8 +284,8 @@ impl Burr {
         });
     }
 
-    /// Lowers each bite's density by `loss` HU, not below its floor, and returns the volume, mm³.
-    fn take(&mut self, bone: &BoneVolume, loss: impl Fn(&Bite) -> f32) -> f32 {
+    /// Lowers each bite's density by `loss` HU, not below its floor.
+    fn take(&mut self, bone: &BoneVolume, loss: impl Fn(&Bite) -> f32, out: &mut RigidStep) {
         let iso = f32::from(bone.isovalue());
         let fraction = |hu: f32| (0.5 + (hu - iso) / PARTIAL_HU).clamp(0.0, 1.0);
         let mut removed = 0.0;
@@ -249,11 +297,20 @@ impl Burr {
             if whole >= 1.0 {
                 bone.set_hu(bite.voxel, (from - whole) as i16);
                 removed += fraction(from) - fraction(from - whole);
-                self.opened |= from >= iso && from - whole < iso;
+                if from >= iso && from - whole < iso {
+                    self.opened = true;
+                    out.broke_through |= self.forward != Vec3::ZERO && is_free(bone, bite.voxel, self.forward);
+                }
             }
         }
-        removed * bone.voxel_mm3()
+        out.removed_mm3 = removed * bone.voxel_mm3();
     }
+}
+
+/// Whether there is no bone for some way from `voxel` along `forward`.
+fn is_free(bone: &BoneVolume, voxel: IVec3, forward: Vec3) -> bool {
+    let steps = (BEYOND_MM / bone.spacing_mm()).ceil().clamp(1.0, 64.0) as u32;
+    (1..=steps).all(|step| !bone.is_bone((voxel.as_vec3() + step as f32 * forward).round().as_ivec3()))
 }
 
 /// A number in 0..1 that is spread evenly over voxels and ticks, and always the same.

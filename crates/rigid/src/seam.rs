@@ -28,6 +28,10 @@ pub struct RigidStep {
     pub manifold: ContactManifold,
     /// Bone removed in this step, mm³.
     pub removed_mm3: f32,
+    /// Speed of the spindle under the load of the cut, 1/min; 0 when it has stalled or nothing is cut. The per-tick law knows none.
+    pub spindle_rpm: f32,
+    /// Whether the cut came through to where there is no bone for 3 mm ahead: the inner table of a skull drilled from outside.
+    pub broke_through: bool,
     /// Points of the tool's surface that touch, in the method's own sampling.
     pub points_in_contact: u32,
     /// Voxels that are touched.
@@ -42,7 +46,7 @@ impl RigidStep {
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.manifold.clear();
-        (self.removed_mm3, self.fallbacks) = (0.0, 0);
+        (self.removed_mm3, self.spindle_rpm, self.broke_through, self.fallbacks) = (0.0, 0.0, false, 0);
         (self.points_in_contact, self.voxels_in_contact, self.voxels_swept) = (0, 0, 0);
     }
 }

@@ -191,15 +191,14 @@ impl Thesis {
     }
 
     /// Step 4.
-    fn drill(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32) -> f32 {
+    fn drill(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) {
         match self.config.removal {
-            Law::PerTick { .. } => self.burr.wear(bone, self.touched.iter().map(|t| t.voxel)),
+            Law::PerTick { .. } => self.burr.wear(bone, self.touched.iter().map(|t| t.voxel), out),
             Law::Rate { .. } => {
                 let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
                 let depth_mm = device.distance(proxy);
-                self.burr.cut(bone, &Cut { device, proxy, radius_mm, depth_mm, dt_ms }, |voxel| {
-                    move |x| bone.hu(voxel.with_x(x))
-                })
+                let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms };
+                self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
             }
         }
     }
@@ -230,7 +229,7 @@ impl RigidContact for Thesis {
             return;
         }
         if drilling && self.tool.kind == ToolKind::Burr {
-            out.removed_mm3 = self.drill(bone, device, dt_ms);
+            self.drill(bone, device, dt_ms, out);
         }
         let (mut normal, depth) = self.respond(out, bone);
         if normal == Vec3::ZERO {

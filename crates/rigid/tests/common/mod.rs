@@ -12,6 +12,11 @@ pub fn bone(dims: [usize; 3], spacing_mm: f32, distance: impl Fn(Vec3) -> f32) -
     scanned(dims, spacing_mm, |p| distance(p) / spacing_mm, 1.0)
 }
 
+/// Bone of at most `hu` from a signed distance in mm (negative inside), with the same slope at its surface.
+pub fn dense(dims: [usize; 3], spacing_mm: f32, hu: f32, distance: impl Fn(Vec3) -> f32) -> BoneVolume {
+    bone(dims, spacing_mm, |p| distance(p).max((f32::from(ISO) - hu) * 1e-3 * spacing_mm))
+}
+
 /// Bone from a signed distance in voxels (negative inside), blurred linearly over `blur` voxels either side.
 pub fn scanned(dims: [usize; 3], spacing_mm: f32, voxels_out: impl Fn(Vec3) -> f32, blur: f32) -> BoneVolume {
     let origin = -0.5 * spacing_mm * Vec3::new(dims[0] as f32 - 1.0, dims[1] as f32 - 1.0, dims[2] as f32 - 1.0);
