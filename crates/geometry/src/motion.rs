@@ -47,6 +47,8 @@ impl Buttons {
     pub const PEDAL: Self = Self(1);
     /// Ask for the next tool.
     pub const NEXT_TOOL: Self = Self(2);
+    /// Ask for the bone of the last stroke of the burr back.
+    pub const UNDO: Self = Self(4);
 
     /// Whether every button of `other` is pressed.
     #[inline]

@@ -32,7 +32,7 @@ pub struct TickRecord {
     pub depth_mm: f32,
     /// Depth in tissue, mm.
     pub tissue_depth_mm: f32,
-    /// Bone removed in this tick, mm³.
+    /// Bone removed in this tick, mm³; negative where a stroke was undone.
     pub removed_mm3: f32,
     /// Distance from the tip to the brain's surface, mm; negative inside.
     pub brain_distance_mm: f32,

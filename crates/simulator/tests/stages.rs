@@ -72,6 +72,35 @@ const NO_PATCH: SurfacePatch =
     SurfacePatch { time_ms: 0.0, normal: Vec3::ZERO, tip_mm: Vec3::ZERO, depth_mm: 0.0, normal_velocity: 0.0 };
 
 #[test]
+fn an_undone_stroke_gives_its_bone_back_once_the_tool_is_free() {
+    let (bone, brain) = head();
+    let before = bone.snapshot();
+    let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(6.0, 0.0));
+    let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+    let mut removed = 0.0;
+    let mut run = |bench: &mut Bench, z: f32, buttons: u32| {
+        let record = bench.step(ToolState { buttons: Buttons(buttons), ..at(z, 0.0) }, Status::Fresh, &NO_PATCH);
+        removed += record.removed_mm3;
+        removed
+    };
+    let (pedal, undo) = (Buttons::PEDAL.0, Buttons::UNDO.0);
+    (0..400).for_each(|i| _ = run(&mut bench, 6.0 - 0.01 * i as f32, pedal));
+    let drilled = run(&mut bench, 2.0, pedal | undo);
+    assert!(
+        drilled > 0.1 && bone.snapshot() != before,
+        "nothing was drilled, or undone with the pedal down: {drilled}"
+    );
+    (0..200).for_each(|_| _ = run(&mut bench, 12.0, 0));
+    let left = run(&mut bench, 12.0, undo);
+    assert_eq!(bone.snapshot(), before);
+    assert!(left.abs() < 1e-3 * drilled, "{left} mm3 are left in the score");
+    assert!(bench.told.iter().any(|n| matches!(n.what, What::Undone(mm3) if (mm3 - drilled).abs() < 1e-3 * drilled)));
+    (0..400).for_each(|i| _ = run(&mut bench, 6.0 - 0.01 * i as f32, 0));
+    let felt = bench.step(at(2.0, 0.0), Status::Fresh, &NO_PATCH);
+    assert!(felt.depth_mm > 0.5, "the bone that came back is not felt: {} mm", felt.depth_mm);
+}
+
+#[test]
 fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
     let (bone, brain) = head();
     let before = bone.snapshot();

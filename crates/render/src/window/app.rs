@@ -59,6 +59,7 @@ impl<S: Session, D: Draws> Window<S, D> {
             world_from_tool: self.hand.world_from_tool,
             pedal: i.key_down(egui::Key::Space) || self.clicks.pedal,
             next_tool: i.key_pressed(egui::Key::N) || self.clicks.next_tool,
+            undo: i.key_pressed(egui::Key::U) || self.clicks.undo,
             camera: self.hand.camera,
             seconds: i.time,
         });

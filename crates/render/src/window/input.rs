@@ -15,6 +15,8 @@ pub struct WindowInput {
     pub pedal: bool,
     /// Whether the next tool was asked for since the last picture.
     pub next_tool: bool,
+    /// Whether the last stroke was to be undone since the last picture.
+    pub undo: bool,
     /// The view.
     pub camera: Camera,
     /// Since the window opened, s.

@@ -9,6 +9,7 @@ use eframe::egui::{self, Color32, RichText};
 pub(crate) struct Clicks {
     pub pedal: bool,
     pub next_tool: bool,
+    pub undo: bool,
     pub reset: bool,
     pub quit: bool,
 }
@@ -51,7 +52,7 @@ pub(crate) fn show(ui: &mut egui::Ui, panel: &Panel, force: &Trace) -> Clicks {
 }
 
 const KEYS: &str = "left drag: move the tool, with Shift tilt it\nwheel: push it in or pull it out\nright drag: turn the view, Ctrl + wheel: zoom\n\
-                    Space: drill, N: next tool, R: reset the view, Q: quit";
+                    Space: drill, N: next tool, U: undo, R: reset the view, Q: quit";
 
 fn buttons(ui: &mut egui::Ui, panel: &Panel) -> Clicks {
     let wide = egui::vec2(ui.available_width(), 32.0);
@@ -65,7 +66,7 @@ fn buttons(ui: &mut egui::Ui, panel: &Panel) -> Clicks {
         pedal = pedal.fill(ORANGE);
     }
     let mut button = |text: &str| ui.add(egui::Button::new(text).min_size(egui::vec2(wide.x, 26.0))).clicked();
-    let (next_tool, reset, quit) =
-        (button(&format!("Next tool (N): {}", panel.tool)), button("Reset the view (R)"), button("Quit (Q)"));
-    Clicks { pedal: ui.add(pedal).is_pointer_button_down_on(), next_tool, reset, quit }
+    let next_tool = button(&format!("Next tool (N): {}", panel.tool));
+    let (undo, reset, quit) = (button("Undo the last stroke (U)"), button("Reset the view (R)"), button("Quit (Q)"));
+    Clicks { pedal: ui.add(pedal).is_pointer_button_down_on(), next_tool, undo, reset, quit }
 }

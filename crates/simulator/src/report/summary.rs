@@ -260,7 +260,7 @@ impl Summary {
 fn phases(outcome: &Outcome) -> Vec<PhaseStart> {
     let start = |notice: &crate::Notice| match notice.what {
         What::Phase(phase) => Some(PhaseStart { name: phase.name().into(), from_s: notice.time_ms * 1e-3 }),
-        What::Warning(..) => None,
+        _ => None,
     };
     outcome.written.notices.iter().filter_map(start).collect()
 }

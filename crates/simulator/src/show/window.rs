@@ -33,6 +33,7 @@ struct Show {
     bone_shown: bool,
     pointer: Option<MouseHandle>,
     next_until_s: f64,
+    undo_until_s: f64,
     rate: Rate,
     stop: Stop,
 }
@@ -71,7 +72,17 @@ pub fn show(
     album.add(shot(&mut painter, &frame(eye, &view, None, bone_shown), folder, "before"));
     let start = Start::with(eye, view.sample.state.world_from_tool);
     let (positions, rate) = (Vec::new(), Rate::default());
-    let show = Show { eyes, view, positions, bone_shown, pointer, next_until_s: 0.0, rate, stop: stop.clone() };
+    let show = Show {
+        eyes,
+        view,
+        positions,
+        bone_shown,
+        pointer,
+        next_until_s: 0.0,
+        undo_until_s: 0.0,
+        rate,
+        stop: stop.clone(),
+    };
     let closed = window::run(&format!("Trepan {}", program.name()), painter, show, start);
     stop.ask();
     let (mut painter, show) = (closed.renderer, closed.session);
@@ -128,15 +139,19 @@ impl window::Session for Show {
 }
 
 impl Show {
-    /// The user's hand for the haptic loop. A request for the next tool is held for a tenth of a second, so that no tick misses it.
+    /// The user's hand for the haptic loop. A request is held for a tenth of a second, so that no tick misses it.
     fn pass_on(&mut self, input: &WindowInput) {
         let Some(pointer) = &mut self.pointer else { return };
         if input.next_tool {
             self.next_until_s = input.seconds + 0.1;
         }
+        if input.undo {
+            self.undo_until_s = input.seconds + 0.1;
+        }
         let pedal = if input.pedal { Buttons::PEDAL.0 } else { 0 };
         let next = if input.seconds < self.next_until_s { Buttons::NEXT_TOOL.0 } else { 0 };
-        pointer.set(input.world_from_tool, Buttons(pedal | next));
+        let undo = if input.seconds < self.undo_until_s { Buttons::UNDO.0 } else { 0 };
+        pointer.set(input.world_from_tool, Buttons(pedal | next | undo));
     }
 }
 
@@ -149,7 +164,7 @@ fn hint(phase: Phase, mouse: bool) -> &'static str {
     match (phase, mouse) {
         (_, false) => "the operation runs by itself",
         (Phase::Craniotomy, true) => {
-            "drag the burr to the skull, hold Space to drill, turn the wheel to push; N takes the probe"
+            "drag the burr to the skull, hold Space to drill, turn the wheel to push; U undoes the last stroke, N takes the probe"
         }
         (Phase::Brain, true) => "press the probe on the brain: drag it, turn the wheel to push",
     }

@@ -23,7 +23,7 @@ use trepan_geometry::{Buttons, Pose, Tool, ToolKind, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
 use trepan_rigid::{Method, RigidContact, RigidStep};
-use trepan_volume::{BoneVolume, DistanceField};
+use trepan_volume::{BoneVolume, DistanceField, Undone};
 
 /// Up to this age a patch gives its full force, ms.
 pub const FRESH_MS: f32 = 10.0;
@@ -108,6 +108,10 @@ pub struct HapticStage {
     held: ToolState,
     proxy: Pose,
     asked_next: bool,
+    /// Bone removed since the pedal was last pressed, mm³.
+    stroke_mm3: f32,
+    drilled: bool,
+    asked_undo: bool,
     released: bool,
 }
 
@@ -143,6 +147,9 @@ impl HapticStage {
             held: start,
             proxy,
             asked_next: false,
+            stroke_mm3: 0.0,
+            drilled: false,
+            asked_undo: false,
             released: false,
         }
     }
@@ -152,13 +159,15 @@ impl HapticStage {
         let (tool, stale) = self.sound(&input.reading);
         self.change_tool(&tool, input.tick, tell);
         let drilling = self.drills(&tool);
+        let back_mm3 = self.undo(&tool, drilling, input.tick, tell);
         self.touch_bone(&tool, drilling);
         let sample = self.sample(&tool, input.tick, drilling);
         let held = self.touch_tissue(input.patch, &sample);
         let lost = input.reading.status == Status::Lost;
         let wanted = if lost { Wrench::ZERO } else { self.wanted(&tool) };
         let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
-        let record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
+        let mut record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
+        record.removed_mm3 -= back_mm3;
         self.warn(&record, input.patch, wanted, tell);
         self.scores.add(&record, self.config.dt_ms);
         Tick { wrench, sample, record, warnings: self.watch.standing() }
@@ -227,11 +236,33 @@ impl HapticStage {
         self.asked_next = asks;
     }
 
+    /// Begins a stroke when the pedal goes down; gives the last one's bone back when that is asked for and the tool is free. Returns what
+    /// came back, mm³.
+    fn undo(&mut self, tool: &ToolState, drilling: bool, tick: u64, tell: &mut dyn FnMut(Notice)) -> f32 {
+        let Some(bone) = &self.bone else { return 0.0 };
+        if drilling && !self.drilled {
+            bone.begin_stroke();
+            self.stroke_mm3 = 0.0;
+        }
+        self.drilled = drilling;
+        let asks = tool.buttons.has(Buttons::UNDO);
+        let now = asks && !self.asked_undo && !drilling && !self.bone_step.manifold.touches();
+        self.asked_undo = asks;
+        let what = match now.then(|| bone.undo_stroke()) {
+            Some(Undone::Bricks(_)) => What::Undone(std::mem::take(&mut self.stroke_mm3)),
+            Some(Undone::TooLong) => What::Kept,
+            Some(Undone::Nothing) | None => return 0.0,
+        };
+        tell(Notice { tick, time_ms: tool.time_ms, what });
+        if let What::Undone(mm3) = what { mm3 } else { 0.0 }
+    }
+
     fn touch_bone(&mut self, tool: &ToolState, drilling: bool) {
         match (&self.bone, &mut self.rigid[self.phase]) {
             (Some(bone), Some(rigid)) => {
                 rigid.step(bone, tool, drilling, self.config.dt_ms, &mut self.bone_step);
                 self.proxy = rigid.proxy();
+                self.stroke_mm3 += self.bone_step.removed_mm3;
             }
             _ => self.proxy = tool.world_from_tool,
         }

@@ -70,6 +70,10 @@ pub enum What {
     Phase(Phase),
     /// A warning was raised (`true`) or cleared; the number says how near, how strong or how old (mm, N or ms).
     Warning(Warning, bool, f32),
+    /// The last stroke of the burr was undone; the number is the bone that came back, mm³.
+    Undone(f32),
+    /// The last stroke cannot be undone: it changed more bone than is kept.
+    Kept,
 }
 
 /// Something that happened at a tick.
@@ -100,6 +104,8 @@ impl Notice {
                 ("warning", format!("{}: {} ({value:.2} {unit})", warning.name(), warning.text()))
             }
             What::Warning(warning, false, _) => ("cleared", warning.name().to_string()),
+            What::Undone(mm3) => ("undo", format!("the last stroke is undone: {mm3:.1} mm3 of bone are back")),
+            What::Kept => ("undo", "the last stroke was too long to be undone".into()),
         }
     }
 }
