@@ -208,9 +208,11 @@ fn no_identifier_leaves_the_input_files() {
     };
     fs::create_dir(&made).unwrap();
     run(&["case", "build"], "case", &[]);
-    run(&["--headless", "--duration", "1", "--picture", "64x48"], "session", &[]);
+    run(&["--headless", "--duration", "1", "--picture", "64x48", "--stl"], "session", &[]);
     let files = contents(&made);
-    for name in ["case.json", "skull.nii", "session.mcap", "summary.json", "report.html", "drilled.nii.gz"] {
+    for name in
+        ["case.json", "skull.nii", "session.mcap", "summary.json", "report.html", "drilled.nii.gz", "drilled.stl"]
+    {
         assert!(files.iter().any(|(path, _)| path.ends_with(name)), "{name} was not made: the test looks at nothing");
     }
     for (path, bytes) in &files {

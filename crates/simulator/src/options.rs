@@ -38,6 +38,9 @@ pub struct Options {
     /// Folder for summary, report, recording, pictures [default: trepan-out/PROGRAM]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Write the drilled skull's surface too, as drilled.stl; some 50 MB
+    #[arg(long)]
+    pub stl: bool,
     /// Solver of the brain [default: tled]
     #[arg(long, value_name = "NAME")]
     pub solver: Option<String>,

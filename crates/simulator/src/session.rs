@@ -108,7 +108,10 @@ impl Session {
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
         let summary = Summary::new(self.about(&album, adapter, remarks), &outcome);
-        output::write(&self.out, &record, &summary, &outcome, &album.shots, self.drilled())?;
+        output::write(&self.out, &record, &summary, &outcome, &album.shots)?;
+        if let Some(bone) = self.scene.bone.as_ref().filter(|_| self.program.has_bone()) {
+            output::drilled(&self.out, bone, self.options.stl)?;
+        }
         Ok(Ended { summary, out: self.out, signal: stop.signal() })
     }
 
@@ -260,12 +263,6 @@ impl Session {
             remarks,
             machine: Machine::here(adapter),
         }
-    }
-
-    /// The drilled volume, in headless runs of programs that drill.
-    fn drilled(&self) -> Option<trepan_volume::VoxelVolume<i16>> {
-        let bone = self.scene.bone.as_ref().filter(|_| self.program.has_bone() && !self.windowed)?;
-        Some(bone.snapshot())
     }
 }
 

@@ -8,7 +8,8 @@ use std::fs;
 use std::io::Write;
 use std::path::Path;
 use trepan_link::Recording;
-use trepan_volume::{VoxelVolume, nifti};
+use trepan_mesh::{isosurface, stl};
+use trepan_volume::{BoneVolume, nifti};
 
 /// Makes the output folder and its place for pictures, empty of older ones.
 pub fn folder(out: &Path) -> Result<(), SessionError> {
@@ -21,22 +22,29 @@ pub fn folder(out: &Path) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// Writes summary, report and drilled volume.
+/// Writes the skull as it is now, in the scanner's space: densities, and with `surface` its triangles too.
+pub fn drilled(out: &Path, bone: &BoneVolume, surface: bool) -> Result<(), SessionError> {
+    let volume = bone.snapshot();
+    let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(fault.to_string());
+    nifti::write(&out.join("drilled.nii.gz"), &volume).map_err(|fault| internal(&fault))?;
+    if surface {
+        let triangles = isosurface(&volume, bone.isovalue());
+        stl::write(&out.join("drilled.stl"), &triangles).map_err(|fault| internal(&fault))?;
+    }
+    Ok(())
+}
+
+/// Writes summary and report.
 pub fn write(
     out: &Path,
     record: &Path,
     summary: &Summary,
     outcome: &Outcome,
     shots: &[Shot],
-    drilled: Option<VoxelVolume<i16>>,
 ) -> Result<(), SessionError> {
     let json =
         serde_json::to_vec_pretty(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
     whole(&out.join("summary.json"), &json)?;
-    if let Some(volume) = drilled {
-        let path = out.join("drilled.nii.gz");
-        nifti::write(&path, &volume).map_err(|fault| SessionError::Internal(fault.to_string()))?;
-    }
     let recording = Recording::open(record)?;
     let page = page::html(summary, outcome, &recording, shots).map_err(SessionError::Internal)?;
     whole(&out.join("report.html"), page.as_bytes())
