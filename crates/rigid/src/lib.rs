@@ -50,6 +50,7 @@ pub mod distance_field;
 pub mod exposed_faces;
 mod half_spaces;
 mod lean;
+pub mod mesh_shell;
 mod method;
 mod penalty;
 pub mod pointshell;

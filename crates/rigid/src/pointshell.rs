@@ -18,9 +18,9 @@
 //! # When not to use it
 //! Deeper than a voxel: the depth of a point starts anew in each voxel, so that the force stays as small as at the surface.
 
-use crate::RigidStep;
-use crate::penalty::{Feel, Felt, answer};
+use crate::penalty::{Feel, Felt, Penalty, answer};
 use crate::removal::Law;
+use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
 use trepan_volume::BoneVolume;
@@ -60,6 +60,11 @@ impl Default for Config {
     }
 }
 
+/// The method for a tool of any shape, whose surface is `shell` (see [`mesh_shell`](crate::mesh_shell)). A burr cuts with the ball at its tip.
+pub fn with_shell(tool: &Tool, shell: Pointshell, config: &Config) -> Box<dyn RigidContact> {
+    Box::new(Penalty::new(tool, Shell { shell, combine: config.combine }, config.removal))
+}
+
 pub(crate) struct Shell {
     shell: Pointshell,
     combine: Combine,
@@ -74,16 +79,17 @@ impl Shell {
 
 impl Feel for Shell {
     fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
-        let tip = pose.translation;
-        let mut push = Vec3::ZERO;
+        let (mut push, mut moment) = (Vec3::ZERO, Vec3::ZERO);
         for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {
-            let point = tip + *point;
+            let (arm, inward) = (pose.rotation * *point, pose.rotation * *inward);
+            let point = pose.translation + arm;
             let voxel = bone.voxel_of(point);
             if bone.is_bone(voxel) {
-                let depth_mm = (bone.centre_of(voxel) - point).dot(*inward).max(0.0);
-                push += depth_mm * *inward;
+                let depth_mm = (bone.centre_of(voxel) - point).dot(inward).max(0.0);
+                push += depth_mm * inward;
+                moment += arm.cross(depth_mm * inward);
                 out.points_in_contact += 1;
-                out.manifold.push(Contact { point, normal: *inward, depth_mm });
+                out.manifold.push(Contact { point, normal: inward, depth_mm });
             }
         }
         out.voxels_swept = self.shell.points.len() as u32;
@@ -93,6 +99,8 @@ impl Feel for Shell {
             Combine::Sum => (FULL_SUM / touching).min(1.0),
             Combine::Average => touching.recip(),
         };
-        answer(push, push.length() * share, out)
+        let felt = answer(push, push.length() * share, out)?;
+        out.manifold.couple_mm = moment / push.length();
+        Some(felt)
     }
 }

@@ -253,3 +253,21 @@ fn a_tool_in_a_slot_a_pit_or_bone_has_a_finite_answer() {
         }
     }
 }
+
+#[test]
+fn a_tool_of_any_shape_is_pushed_and_turned_where_its_mesh_touches() {
+    // A plate of 8 x 2 x 1 mm from its middle: over the edge of the bone only one half touches.
+    let corner =
+        |n: u32| Vec3::new(if n & 1 == 0 { -4.0 } else { 4.0 }, (n >> 1 & 1) as f32 * 2.0 - 1.0, (n >> 2) as f32);
+    let positions: Vec<Vec3> = (0..8).map(corner).collect();
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles: Vec<[u32; 3]> = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let shell = trepan_rigid::mesh_shell::of_mesh(&positions, &triangles, 0.4).unwrap();
+    let tool = Tool::probe(1.0);
+    let mut contact = trepan_rigid::pointshell::with_shell(&tool, shell, &Default::default());
+    let bone = bone([40, 28, 28], 0.5, |p| p.z.max(-p.x));
+    let out = walk(contact.as_mut(), &bone, Vec3::Z * 2.0, Vec3::Z * -0.45, 0.05);
+    assert!(out.manifold.normal.z > 0.9 && out.manifold.touches(), "{:?}", out.manifold.normal);
+    let arm = out.manifold.couple_mm;
+    assert!((-2.6..-1.4).contains(&arm.y) && arm.x.abs() < 0.5, "a force 2 mm towards +x: {arm}");
+}
