@@ -13,6 +13,7 @@
 
 pub mod front;
 pub mod page;
+pub mod picture;
 pub mod suite;
 pub mod suites;
 pub mod timer;

@@ -1,35 +1,34 @@
 //! `index.html`: every suite's chart, gates and rows on one page that needs nothing else.
 
-use crate::front::front;
+use crate::picture::{Chart, Mark, Outcome};
 use crate::suite::Report;
 use crate::suites::Suite;
+use plotters::coord::CoordTranslate;
+use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use std::fmt::Write;
 
-const SIZE: (u32, u32) = (860, 420);
+const SIZE: (u32, u32) = (960, 420);
+/// Width of the list of methods beside a chart.
+const KEY_WIDTH: u32 = 210;
 /// Colours told apart by readers with any colour vision (Okabe and Ito 2008).
-const COLOURS: [RGBColor; 6] = [
+const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
 ];
-
-/// One point of a chart.
-struct Point {
-    method: String,
-    cost: f64,
-    error: f64,
-}
 
 /// The whole page.
 pub fn html(reports: &[(&Suite, Report)]) -> String {
     let mut page = String::from(
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Trepan: validation</title><style>body{font:15px/1.5 system-ui,sans-serif;\
          max-width:1000px;margin:2em auto;padding:0 1em}table{border-collapse:collapse;font-size:13px}td,th{padding:.15em .6em;border-bottom:1px solid #ccc;\
-         text-align:right}td:first-child,td:nth-child(2),th{text-align:left}svg{max-width:100%;height:auto}.bad{font-weight:bold;background:#fde3d8}</style></head><body><h1>Trepan: validation</h1>",
+         text-align:right}td:first-child,td:nth-child(2),th{text-align:left}svg{max-width:100%;height:auto}.bad{font-weight:bold;background:#fde3d8}.maps{display:flex;flex-wrap:wrap;gap:1em}\
+         figure{margin:0}figcaption{font-size:12px;color:#444;max-width:460px}</style></head><body><h1>Trepan: validation</h1>",
     );
     for (suite, report) in reports {
         _ = write!(
@@ -40,7 +39,8 @@ pub fn html(reports: &[(&Suite, Report)]) -> String {
             report.commit,
             machine(report)
         );
-        page += &chart(suite, report).unwrap_or_else(|fault| format!("<p>No chart: {fault}.</p>"));
+        charts(&mut page, suite, report);
+        maps(&mut page, report);
         gates(&mut page, report);
         rows(&mut page, report);
     }
@@ -73,53 +73,111 @@ fn rows(page: &mut String, report: &Report) {
     *page += "</table></details>";
 }
 
-/// Cost against error, both logarithmic, with the front drawn in.
-fn chart(suite: &Suite, report: &Report) -> Result<String, String> {
+fn charts(page: &mut String, suite: &Suite, report: &Report) {
+    let own = &report.findings.charts;
+    let drawn = if own.is_empty() { vec![chart_of_all(suite, report)] } else { own.clone() };
+    let mut methods: Vec<&str> = Vec::new();
+    for mark in drawn.iter().flat_map(|chart| &chart.marks) {
+        if !methods.contains(&mark.method.as_str()) {
+            methods.push(&mark.method);
+        }
+    }
+    for chart in &drawn {
+        if !chart.title.is_empty() {
+            _ = write!(page, "<h3>{}</h3>", chart.title);
+        }
+        let svg = match chart.marks.is_empty() {
+            true => Err(format!("no row has {} and {}", chart.cost, chart.error)),
+            false => draw(chart, &methods).map_err(|fault| fault.to_string()),
+        };
+        *page += &svg.unwrap_or_else(|fault| format!("<p>No chart: {fault}.</p>"));
+    }
+}
+
+/// The suite's own chart, over all rows.
+fn chart_of_all(suite: &Suite, report: &Report) -> Chart {
     let (cost, error) = suite.chart;
     let of = |row: &crate::suite::Row| {
         let value = |name: &str| row.metrics.get(name).copied().filter(|v| v.is_finite() && *v >= 0.0);
-        Some(Point { method: row.method.clone(), cost: value(cost)?.max(1e-3), error: value(error)?.max(1e-5) })
+        Some(Mark { method: row.method.clone(), cost: value(cost)?, error: value(error)? })
     };
-    let points: Vec<Point> = report.findings.rows.iter().filter_map(of).collect();
-    if points.is_empty() {
-        return Err(format!("no row has {cost} and {error}"));
-    }
-    draw(&points, cost, error).map_err(|fault| fault.to_string())
+    let marks = report.findings.rows.iter().filter_map(of).collect();
+    Chart { cost: cost.into(), error: error.into(), marks, ..Chart::default() }
 }
 
-fn draw(points: &[Point], cost: &str, error: &str) -> Result<String, Box<dyn std::error::Error>> {
-    let span = |values: &dyn Fn(&Point) -> f64| {
-        let (low, high) = points.iter().map(values).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+fn maps(page: &mut String, report: &Report) {
+    if report.findings.maps.is_empty() {
+        return;
+    }
+    let count = |grade: u8| {
+        let cells = report.findings.maps.iter().flat_map(|map| map.cells.iter().flatten());
+        cells.filter(|cell| Outcome::grade(cell) == grade).count()
+    };
+    _ = write!(
+        page,
+        "<h3>Where it works, degrades, fails</h3><p>Green: works ({}); yellow: degrades ({}); red: fails ({}); a letter says why.</p>\
+         <div class=\"maps\">",
+        count(0),
+        count(1),
+        count(2)
+    );
+    report.findings.maps.iter().for_each(|map| *page += &map.svg());
+    *page += "</div>";
+}
+
+/// Cost against error, both logarithmic, with the front and the budget drawn in.
+fn draw(chart: &Chart, methods: &[&str]) -> Result<String, Box<dyn std::error::Error>> {
+    let at_least = |mark: &Mark| (mark.cost.max(1e-3), mark.error.max(1e-5));
+    let span = |values: &mut dyn Iterator<Item = f64>| {
+        let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
         0.6 * low..1.8 * high
     };
+    let budget = chart.budget.as_ref();
+    let mut costs = chart.marks.iter().map(|m| at_least(m).0).chain(budget.map(|b| b.0));
+    let mut errors = chart.marks.iter().map(|m| at_least(m).1);
+    let (x, y) = (span(&mut costs), span(&mut errors));
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         root.fill(&WHITE)?;
-        let (x, y) = (span(&|p| p.cost), span(&|p| p.error));
-        let mut chart = ChartBuilder::on(&root)
+        let (plot, key) = root.split_horizontally(SIZE.0 - KEY_WIDTH);
+        let mut axes = ChartBuilder::on(&plot)
             .margin(10)
             .x_label_area_size(40)
             .y_label_area_size(70)
-            .build_cartesian_2d(x.log_scale(), y.log_scale())?;
-        chart.configure_mesh().x_desc(cost).y_desc(error).light_line_style(WHITE).draw()?;
-        let pairs: Vec<(f64, f64)> = points.iter().map(|p| (p.cost, p.error)).collect();
-        let best: Vec<(f64, f64)> = front(&pairs).into_iter().map(|i| pairs[i]).collect();
-        chart.draw_series(LineSeries::new(best, BLACK.mix(0.4)))?;
-        let mut methods: Vec<&str> = points.iter().map(|p| p.method.as_str()).collect();
-        methods.sort_unstable();
-        methods.dedup();
-        for (at, method) in methods.iter().enumerate() {
-            let colour = COLOURS[at % COLOURS.len()];
-            let dots = points
-                .iter()
-                .filter(|p| p.method == *method)
-                .map(|p| Circle::new((p.cost, p.error), 5, colour.filled()));
-            let drawn = chart.draw_series(dots)?;
-            drawn.label(*method).legend(move |(x, y)| Circle::new((x + 8, y), 5, colour.filled()));
+            .build_cartesian_2d(x.log_scale(), y.clone().log_scale())?;
+        axes.configure_mesh().x_desc(&chart.cost).y_desc(&chart.error).light_line_style(WHITE).draw()?;
+        let best = chart.front().into_iter().map(|(cost, error)| (cost.max(1e-3), error.max(1e-5)));
+        axes.draw_series(LineSeries::new(best, BLACK.mix(0.4)))?;
+        if let Some((cost, name)) = budget {
+            axes.draw_series(LineSeries::new([(*cost, y.start), (*cost, y.end)], RED.mix(0.6)))?;
+            axes.draw_series([Text::new(name.clone(), (*cost, y.end), ("sans-serif", 12))])?;
         }
-        chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw()?;
+        let used = methods.iter().enumerate().filter(|(_, name)| chart.marks.iter().any(|m| m.method == **name));
+        for (line, (at, name)) in used.enumerate() {
+            for mark in chart.marks.iter().filter(|mark| mark.method == *name) {
+                sign(axes.plotting_area(), at, at_least(mark))?;
+            }
+            let (x, y) = (14, 24 + 18 * line as i32);
+            sign(&key, at, (x, y))?;
+            let star = if chart.chosen.as_deref() == Some(*name) { " (recommended)" } else { "" };
+            key.draw(&Text::new(format!("{name}{star}"), (x + 12, y - 6), ("sans-serif", 13)))?;
+        }
         root.present()?;
     }
     Ok(svg)
+}
+
+/// A method's sign: seven colours as discs, then as triangles, then as crosses.
+fn sign<B: DrawingBackend, C: CoordTranslate>(
+    area: &DrawingArea<B, C>,
+    at: usize,
+    place: C::From,
+) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+    let colour = COLOURS[at % COLOURS.len()];
+    match at / COLOURS.len() {
+        0 => area.draw(&Circle::new(place, 5, colour.filled())),
+        1 => area.draw(&TriangleMarker::new(place, 7, colour.filled())),
+        _ => area.draw(&Cross::new(place, 5, colour.stroke_width(2))),
+    }
 }

@@ -4,6 +4,7 @@
 //! A metric's name ends in its unit (`depth_error_voxel`, `step_us`). A gate never hangs on an absolute time: times belong to charts,
 //! as ratios in one run.
 
+use crate::picture::{self, Chart};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -74,6 +75,12 @@ pub struct Findings {
     pub rows: Vec<Row>,
     /// Every promise.
     pub gates: Vec<Gate>,
+    /// Charts for the page; without any it draws the suite's own over all rows.
+    #[serde(skip)]
+    pub charts: Vec<Chart>,
+    /// Maps for the page.
+    #[serde(skip)]
+    pub maps: Vec<picture::Map>,
 }
 
 /// The whole file of a suite.
@@ -132,7 +139,8 @@ mod tests {
     fn a_gate_on_a_nan_fails_and_the_file_has_the_stated_fields() {
         assert!(!Gate::at_most("x", f64::NAN, 1.0).pass && !Gate::at_least("x", f64::NAN, 1.0).pass);
         let row = Row::new("plane", "thesis").with("points", 466).metric("depth_error_voxel", 0.1);
-        let findings = Findings { rows: vec![row], gates: vec![Gate::at_most("depth", 0.1, 0.05)] };
+        let findings =
+            Findings { rows: vec![row], gates: vec![Gate::at_most("depth", 0.1, 0.05)], ..Findings::default() };
         let report = Report::new("rigid", findings);
         assert!(!report.passed());
         let json = serde_json::to_value(&report).unwrap();

@@ -14,15 +14,21 @@ impl Samples {
             call(i);
             start.elapsed().as_secs_f64() * 1e6
         };
-        let mut times: Vec<f64> = (0..count).map(time).collect();
-        times.sort_by(f64::total_cmp);
-        Self(times)
+        Self::from((0..count).map(time).collect::<Vec<f64>>())
     }
 
     /// A quantile, 0 to 1, µs; NaN without samples.
     pub fn quantile(&self, share: f64) -> f64 {
         let last = self.0.len().saturating_sub(1);
         self.0.get((share * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl From<Vec<f64>> for Samples {
+    /// From times in any order, µs.
+    fn from(mut times: Vec<f64>) -> Self {
+        times.sort_by(f64::total_cmp);
+        Self(times)
     }
 }
 

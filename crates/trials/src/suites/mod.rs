@@ -4,7 +4,7 @@ mod deformable;
 mod haptics;
 mod mesh;
 mod render;
-mod rigid;
+pub mod rigid;
 mod tled;
 mod volume;
 mod voxel_size;

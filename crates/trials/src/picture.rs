@@ -1,0 +1,229 @@
+//! Charts of cost against error with their front, and maps of where a method works, degrades or fails, as data.
+//!
+//! # Practice
+//! A suite fills them beside its rows; the page draws them. Both axes of a chart are logarithmic: what is smaller than a thousandth of a unit
+//! of cost or a hundred-thousandth of error is drawn there.
+
+use crate::front::front;
+use std::fmt::Write;
+
+/// One point of a chart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// Whose it is.
+    pub method: String,
+    /// What it costs.
+    pub cost: f64,
+    /// How wrong it is.
+    pub error: f64,
+}
+
+/// Cost against error.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Chart {
+    /// What is charted.
+    pub title: String,
+    /// The metric of cost.
+    pub cost: String,
+    /// The metric of error.
+    pub error: String,
+    /// One for each method, or more.
+    pub marks: Vec<Mark>,
+    /// A cost that must not be passed, with its name.
+    pub budget: Option<(f64, String)>,
+    /// The method that must be on the front; gates ask [`beaten`](Self::beaten).
+    pub chosen: Option<String>,
+}
+
+impl Chart {
+    /// How many other methods' marks are better than this method's first in both; `usize::MAX` where it has none that is a number.
+    pub fn beaten(&self, method: &str) -> usize {
+        let is_number = |mark: &&Mark| mark.cost.is_finite() && mark.error.is_finite();
+        let Some(own) = self.marks.iter().filter(is_number).find(|mark| mark.method == method) else {
+            return usize::MAX;
+        };
+        let better = |mark: &&Mark| mark.method != method && mark.cost < own.cost && mark.error < own.error;
+        self.marks.iter().filter(is_number).filter(better).count()
+    }
+
+    /// The marks that no other beats, cheapest first.
+    pub fn front(&self) -> Vec<(f64, f64)> {
+        let pairs: Vec<(f64, f64)> = self.marks.iter().map(|mark| (mark.cost, mark.error)).collect();
+        front(&pairs).into_iter().map(|at| pairs[at]).collect()
+    }
+}
+
+/// How a method fared in one cell of a map.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// As it should.
+    Works,
+    /// Usable, with this drawback.
+    Degrades(String),
+    /// Not usable, for this reason.
+    Fails(String),
+}
+
+impl Outcome {
+    /// 0 works, 1 degrades, 2 fails.
+    pub fn grade(&self) -> u8 {
+        match self {
+            Self::Works => 0,
+            Self::Degrades(_) => 1,
+            Self::Fails(_) => 2,
+        }
+    }
+
+    /// Why, where it does not work.
+    pub fn reason(&self) -> &str {
+        match self {
+            Self::Works => "",
+            Self::Degrades(reason) | Self::Fails(reason) => reason,
+        }
+    }
+}
+
+/// A grid of conditions, coloured by what came of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Map {
+    /// What is mapped, often the method.
+    pub title: String,
+    /// What the columns are.
+    pub x: String,
+    /// What the rows are.
+    pub y: String,
+    /// Names of the columns, left to right.
+    pub columns: Vec<String>,
+    /// Names of the rows, top to bottom.
+    pub rows: Vec<String>,
+    /// Row by row.
+    pub cells: Vec<Vec<Outcome>>,
+    /// Lines over the cells: name, and points in cells from the upper left corner.
+    pub lines: Vec<(String, Vec<(f64, f64)>)>,
+    /// What else a reader must know, under the map.
+    pub notes: Vec<String>,
+}
+
+const CELL: (usize, usize) = (34, 20);
+const FILL: [&str; 3] = ["#b7e0d2", "#f6dc9a", "#e8a083"];
+const STROKE: [&str; 3] = ["#0072b2", "#000000", "#cc79a7"];
+
+impl Map {
+    /// The map as a figure with the reasons, lettered, under it.
+    pub fn svg(&self) -> String {
+        let reasons = self.reasons();
+        let left = 8 + 7 * self.rows.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(4);
+        let top = 36;
+        let (width, height) = (left + CELL.0 * self.columns.len() + 8, top + CELL.1 * self.rows.len() + 20);
+        let width = width.max(8 * self.title.len().max(self.x.len() + self.y.len() + 8));
+        let mut svg = format!(
+            "<figure><svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+             font-family=\"sans-serif\" font-size=\"11\"><text x=\"2\" y=\"13\" font-weight=\"bold\">{}</text>\
+             <text x=\"2\" y=\"{}\" fill=\"#555\">{} ↓, {} →</text>",
+            self.title,
+            height - 4,
+            self.y,
+            self.x
+        );
+        for (at, name) in self.columns.iter().enumerate() {
+            let x = left + CELL.0 * at + CELL.0 / 2;
+            _ = write!(svg, "<text x=\"{x}\" y=\"{}\" text-anchor=\"middle\">{name}</text>", top - 6);
+        }
+        for (at, (name, cells)) in self.rows.iter().zip(&self.cells).enumerate() {
+            let y = top + CELL.1 * at;
+            _ = write!(svg, "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{name}</text>", left - 5, y + 14);
+            for (column, cell) in cells.iter().enumerate() {
+                draw_cell(&mut svg, (left + CELL.0 * column, y), cell, &reasons);
+            }
+        }
+        self.draw_lines(&mut svg, (left, top));
+        svg += "</svg><figcaption>";
+        self.notes.iter().for_each(|note| _ = write!(svg, "{note}<br>"));
+        for (at, reason) in reasons.iter().enumerate() {
+            _ = write!(svg, "<b>{}</b> {reason}<br>", letter(at));
+        }
+        for (at, (name, _)) in self.lines.iter().enumerate() {
+            _ = write!(svg, "<span style=\"color:{}\">━</span> {name} ", STROKE[at % STROKE.len()]);
+        }
+        svg + "</figcaption></figure>"
+    }
+
+    fn draw_lines(&self, svg: &mut String, (left, top): (usize, usize)) {
+        for (at, (_, points)) in self.lines.iter().enumerate() {
+            let place = |&(x, y): &(f64, f64)| {
+                let (x, y) = (x.clamp(0.0, self.columns.len() as f64), y.clamp(0.0, self.rows.len() as f64));
+                format!("{:.1},{:.1}", left as f64 + x * CELL.0 as f64, top as f64 + y * CELL.1 as f64)
+            };
+            let points: Vec<String> = points.iter().map(place).collect();
+            _ = write!(
+                svg,
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"/>",
+                points.join(" "),
+                STROKE[at % STROKE.len()]
+            );
+        }
+    }
+
+    /// Every reason once, in the order in which they come.
+    fn reasons(&self) -> Vec<&str> {
+        let mut found = Vec::new();
+        for reason in self.cells.iter().flatten().map(Outcome::reason) {
+            if !reason.is_empty() && !found.contains(&reason) {
+                found.push(reason);
+            }
+        }
+        found
+    }
+}
+
+fn draw_cell(svg: &mut String, (x, y): (usize, usize), cell: &Outcome, reasons: &[&str]) {
+    let mark = reasons.iter().position(|reason| *reason == cell.reason()).map(letter).unwrap_or_default();
+    _ = write!(
+        svg,
+        "<rect x=\"{x}\" y=\"{y}\" width=\"{}\" height=\"{}\" fill=\"{}\" stroke=\"white\"><title>{}</title></rect>\
+         <text x=\"{}\" y=\"{}\" text-anchor=\"middle\" pointer-events=\"none\">{mark}</text>",
+        CELL.0,
+        CELL.1,
+        FILL[usize::from(cell.grade())],
+        cell.reason(),
+        x + CELL.0 / 2,
+        y + 14
+    );
+}
+
+/// a, b … z, a1, b1 …
+fn letter(at: usize) -> String {
+    let first = char::from(b'a' + (at % 26) as u8);
+    if at < 26 { first.to_string() } else { format!("{first}{}", at / 26) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_is_better_in_both_beats() {
+        let mark = |method: &str, cost, error| Mark { method: method.into(), cost, error };
+        let marks = vec![mark("a", 1.0, 9.0), mark("b", 2.0, 2.0), mark("c", 3.0, 3.0), mark("d", 1.0, f64::NAN)];
+        let chart = Chart { marks, ..Chart::default() };
+        assert_eq!(["a", "b", "c"].map(|name| chart.beaten(name)), [0, 0, 1]);
+        assert_eq!((chart.beaten("d"), chart.beaten("none")), (usize::MAX, usize::MAX));
+    }
+
+    #[test]
+    fn a_map_letters_each_reason_once() {
+        let fails = |why: &str| Outcome::Fails(why.into());
+        let map = Map {
+            title: "t".into(),
+            columns: vec!["1".into(), "2".into()],
+            rows: vec!["r".into(), "s".into()],
+            cells: vec![vec![Outcome::Works, fails("falls through")], vec![fails("falls through"), fails("shakes")]],
+            lines: vec![("bound".into(), vec![(0.0, 1.0), (9.0, 0.5)])],
+            ..Map::default()
+        };
+        let svg = map.svg();
+        assert_eq!(svg.matches(">a</text>").count(), 2, "{svg}");
+        assert!(svg.contains("<b>b</b> shakes") && svg.contains("polyline"));
+        assert_eq!((Outcome::Works.grade(), letter(27)), (0, "b1".to_string()));
+    }
+}

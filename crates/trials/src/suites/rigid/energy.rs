@@ -1,0 +1,140 @@
+//! Random hands on voxel bone through the guard: what comes out must not be more than what went in. And the same path gives the same bytes.
+//!
+//! # Theory
+//! Energy to the hand is what the motors give less what the device's own friction takes, `b Δx²/T + f_c |Δx|` a tick; the most that ever came out above
+//! what went in is counted, per hand.
+//!
+//! # Practice
+//! A new hand every ten thousand ticks: stiffness 0.1 to 0.5 N/mm, damping 2 to 6 N ms/mm, 40 to 200 g, on a Touch 0 to 2 ticks late, that means to be now here, now
+//! there, up to 6 mm in the bone.
+
+use super::coupling;
+use super::recording::{self, Place, Task};
+use super::solid::{ISO, RADIUS_MM, held};
+use crate::suite::{Findings, Gate, Row};
+use crate::suites::Scope;
+use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
+use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
+use trepan_haptics::HapticDevice;
+use trepan_haptics::replay::Replay;
+use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_rigid::{Method, RigidStep};
+use trepan_volume::BoneVolume;
+
+const HAND_TICKS: usize = 10_000;
+const MOST_J: f64 = 1e-4;
+const NMM_PER_J: f64 = 1000.0;
+
+/// Every method but the oracle; the recommended one for a million ticks.
+pub fn run(scope: Scope, findings: &mut Findings) {
+    let normal = coupling::normal();
+    let bone = coupling::bone(normal);
+    for (number, method) in Method::all().into_iter().filter(|m| m.name() != "brute").enumerate() {
+        if !scope.takes(number) {
+            continue;
+        }
+        let chosen = method == Method::RECOMMENDED;
+        let hands = scope.pick(if chosen { 5 } else { 2 }, if chosen { 100 } else { 20 });
+        let worst = |guarded: bool| {
+            (0..hands).map(|seed| given_j(&method, &bone, normal, seed as u64, guarded)).fold(0.0, f64::max)
+        };
+        let guarded = worst(true);
+        let row = Row::new("random hands", method.name())
+            .with("ticks", hands * HAND_TICKS)
+            .metric("energy_out_j", guarded)
+            .metric("energy_out_unguarded_j", worst(false));
+        findings.rows.push(row);
+        if chosen {
+            findings.gates.push(Gate::at_most("random hands: energy out through the guard, worst J", guarded, MOST_J));
+        }
+    }
+    repeats(scope, findings);
+}
+
+/// The most energy that one hand got above what it gave, J.
+fn given_j(method: &Method, bone: &BoneVolume, normal: Vec3, seed: u64, guarded: bool) -> f64 {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let config = Config { delay_ticks: random.usize(0..3), ..Config::default() };
+    let hand = Hand {
+        mass_g: 40.0 + 160.0 * random.f32(),
+        damping: 2.0 + 4.0 * random.f32(),
+        stiffness: 0.1 + 0.4 * random.f32(),
+    };
+    let intent = wandering(&mut random, normal);
+    let mut device = Simulated::new(config, hand, Box::new(Replay::new(intent)));
+    let told = device.capabilities().guard_config();
+    let passivity = told.passivity.filter(|_| guarded);
+    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, ..told });
+    let (mut contact, mut model) = (method.build(&Tool::burr(RADIUS_MM)), Viscoelastic::BONE);
+    let mut out = RigidStep::default();
+    let (mut taken_nmm, mut lowest_nmm) = (0.0f64, 0.0f64);
+    for tick in 0..HAND_TICKS {
+        let (from, motor) = (device.position(), device.motor_force());
+        let tool = device.read(tick as f64).tool;
+        if tick == 0 {
+            contact.reset(tool.world_from_tool);
+        } else {
+            let way = device.position() - from;
+            let friction = config.damping * way.length_squared() + config.friction_n * way.length();
+            taken_nmm += f64::from(friction - motor.dot(way));
+            lowest_nmm = lowest_nmm.min(taken_nmm);
+        }
+        contact.step(bone, &tool, false, 1.0, &mut out);
+        device.apply(guard.guard(model.wrench(&tool, &out.manifold, 1.0), &tool, 1.0));
+    }
+    -lowest_nmm / NMM_PER_J
+}
+
+fn wandering(random: &mut fastrand::Rng, normal: Vec3) -> Vec<ToolState> {
+    let across = normal.any_orthonormal_vector();
+    let place = |h: f32, s: f32| normal * (RADIUS_MM + h) + across * s;
+    let (mut aim, mut at) = ((2.0f32, 0.0f32), (2.0f32, 0.0f32));
+    (0..HAND_TICKS)
+        .map(|_| {
+            if random.u32(0..125) == 0 {
+                aim = (2.0 - 8.0 * random.f32(), 8.0 * random.f32() - 4.0);
+            }
+            at = (at.0 + 0.03 * (aim.0 - at.0), at.1 + 0.03 * (aim.1 - at.1));
+            held(place(at.0, at.1), normal)
+        })
+        .collect()
+}
+
+/// The recorded drill path twice over, by every method: results and bone must be the same bytes.
+fn repeats(scope: Scope, findings: &mut Findings) {
+    let path = recording::path(Place::Cube, Task::Drill);
+    let ticks = scope.pick(800, path.len());
+    let mut differing = 0;
+    for method in Method::all() {
+        let slow = method.name() == "brute";
+        let part = if slow { &path[400..500] } else { &path[..ticks] };
+        let same = hash(&method, part) == hash(&method, part);
+        differing += u32::from(!same);
+        let row = Row::new("same path again", method.name()).with("ticks", part.len());
+        findings.rows.push(row.metric("differing_runs_count", f64::from(u8::from(!same))));
+    }
+    let promise = "same path again: methods whose results or bone differ";
+    findings.gates.push(Gate::at_most(promise, f64::from(differing), 0.0));
+}
+
+/// FNV-1a over everything that a run answers and leaves.
+fn hash(method: &Method, path: &[ToolState]) -> u64 {
+    let bone = super::solid::voxels(48, 1.0, |p| (p.z - 2.0).max(p.x - 20.0));
+    let lift = Vec3::new(90.0, 0.0, 98.0);
+    let mut contact = method.build(&Tool::burr(RADIUS_MM));
+    let (mut out, mut hash) = (RigidStep::default(), 0xcbf2_9ce4_8422_2325u64);
+    let mut take =
+        |bytes: &[u8]| bytes.iter().for_each(|&b| hash = (hash ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
+    for (at, tool) in path.iter().enumerate() {
+        let mut tool = *tool;
+        tool.world_from_tool.translation -= lift;
+        if at == 0 {
+            contact.reset(tool.world_from_tool);
+        }
+        contact.step(&bone, &tool, tool.buttons.has(Buttons::PEDAL), 1.0, &mut out);
+        take(format!("{out:?} {:?}", contact.proxy()).as_bytes());
+    }
+    bone.snapshot().data.iter().for_each(|hu| take(&hu.to_le_bytes()));
+    debug_assert_eq!(bone.isovalue(), ISO);
+    hash
+}

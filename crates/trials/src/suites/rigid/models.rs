@@ -1,0 +1,271 @@
+//! The thesis's cubes (Table 3.1) and skulls (Table 3.2), touched and drilled along recorded paths: what a whole haptic tick costs there.
+//!
+//! # Practice
+//! A cube's outer voxels are 1800 HU in air, so that the surface lies on its faces at every voxel size and the depth is known in closed form. The
+//! skulls are the built-in CT, 1 x 1 x 2 mm, resampled to the dimensions of the table: its upper 14 cm. A tick is contact with sweep, viscoelastic force,
+//! guard, and drilling where the pedal is down. The path is the hand's as recorded, the same for every model and method: where a burr is slower
+//! than the recorded one, it lags.
+
+use super::recording::{self, Task};
+use super::solid::{ISO, RADIUS_MM};
+use super::{STIFFNESS, published, worst_chart};
+use crate::suite::{Findings, Gate, Row};
+use crate::suites::Scope;
+use crate::timer::Samples;
+use glam::DVec3;
+use std::time::Instant;
+use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
+use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
+use trepan_rigid::{Method, RigidStep};
+use trepan_volume::{
+    AIR_HU, BRICK, BoneVolume, Grid, Interpolation, VoxelVolume, bone_isovalue, hounsfield, read, resample, skull_only,
+};
+
+/// Table 3.1: voxels along an edge of 200 mm.
+const CUBES: [usize; 6] = [100, 200, 300, 400, 450, 500];
+/// Table 3.2: dimensions and voxel edge, mm.
+pub(super) const SKULLS: [([usize; 3], f32); 5] = [
+    ([143, 135, 95], 1.5),
+    ([171, 162, 114], 1.25),
+    ([213, 202, 142], 1.0),
+    ([284, 269, 189], 0.75),
+    ([425, 403, 283], 0.5),
+];
+/// Half of a cube's edge, mm.
+pub(super) const HALF_MM: f64 = 100.0;
+/// Density of the cubes: halfway between a voxel of it and one of air lies the isovalue.
+const CUBE_HU: i16 = 1800;
+/// Edge of the largest grid, voxels.
+const HUGE: usize = 1024;
+/// How much slower the largest grid may be.
+const MOST_RATIO: f64 = 1.5;
+/// Ticks by the oracle, which is slow.
+const ORACLE_TICKS: usize = 400;
+
+/// A cube of Table 3.1 with so many voxels along an edge.
+pub fn cube(voxels: usize) -> VoxelVolume<i16> {
+    let spacing = (2.0 * HALF_MM / voxels as f64) as f32;
+    VoxelVolume::isotropic([voxels; 3], Vec3::splat(0.5 * spacing - HALF_MM as f32), spacing, CUBE_HU)
+}
+
+/// The skull of the built-in case and its isovalue, HU, on the CT's own grid.
+pub fn head() -> (VoxelVolume<i16>, i16) {
+    let ct = read(&trepan_fixtures::case_head().ct).expect("the built-in CT is there");
+    let mut ct = hounsfield(&ct).expect("the built-in CT is in HU");
+    let isovalue = bone_isovalue(&ct);
+    skull_only(&mut ct, isovalue);
+    (ct, isovalue)
+}
+
+/// The top of a head on a grid of such dimensions and voxel edge; what is beyond the CT is air.
+pub fn skull(head: &VoxelVolume<i16>, dims: [usize; 3], voxel_mm: f32) -> VoxelVolume<i16> {
+    let (low, high) = head.world_corners();
+    let size = f64::from(voxel_mm) * DVec3::from(dims.map(|n| n as f64));
+    let corner = (0.5 * (low + high) - 0.5 * size).with_z(high.z - size.z);
+    let origin = (corner + 0.5 * f64::from(voxel_mm)).as_vec3();
+    let grid = Grid::of(&VoxelVolume::isotropic([0; 3], origin, voxel_mm, 0u8));
+    resample(head, &Grid { dims, ..grid }, Interpolation::Trilinear, AIR_HU)
+}
+
+/// Every model, task and method, then the grid of 1024³.
+pub fn run(scope: Scope, findings: &mut Findings) {
+    let (head, isovalue) = head();
+    let cubes = scope.pick(&CUBES[..2], &CUBES[..]);
+    for (number, &voxels) in cubes.iter().enumerate() {
+        if scope.takes(number) {
+            let model = Model { group: "cubes", name: format!("Cube{voxels}"), ct: cube(voxels), isovalue: ISO };
+            model.measure(&Method::all(), scope, findings);
+        }
+    }
+    for (number, &(dims, voxel_mm)) in SKULLS.iter().enumerate() {
+        if scope.takes(number) && (!scope.quick || [0, 2].contains(&number)) {
+            let ct = skull(&head, dims, voxel_mm);
+            let model = Model { group: "skulls", name: format!("Skull{}", number + 1), ct, isovalue };
+            model.measure(&Method::all(), scope, findings);
+        }
+    }
+    findings.rows.extend(published::rows());
+    for (group, title, error) in [
+        ("cubes, touch", "The thesis's cubes, touched: whole tick against depth", "depth_error_p95_voxel"),
+        ("cubes, drill", "The thesis's cubes, drilled: whole tick against jumps of force", "force_change_max_n_per_ms"),
+        (
+            "skulls, touch",
+            "The thesis's skulls, touched: whole tick against jumps of force",
+            "force_change_max_n_per_ms",
+        ),
+        (
+            "skulls, drill",
+            "The thesis's skulls, drilled: whole tick against jumps of force",
+            "force_change_max_n_per_ms",
+        ),
+    ] {
+        let chart = worst_chart(findings, group, title, ("tick_p50_us", error));
+        findings.charts.extend(chart);
+    }
+    if scope.shard.0 == 0 {
+        large(&head, isovalue, scope, findings);
+    }
+}
+
+struct Model {
+    group: &'static str,
+    name: String,
+    ct: VoxelVolume<i16>,
+    isovalue: i16,
+}
+
+impl Model {
+    fn measure(&self, methods: &[Method], scope: Scope, findings: &mut Findings) {
+        let of = if self.group == "cubes" { recording::Place::Cube } else { recording::Place::Skull };
+        for task in [Task::Touch, Task::Drill] {
+            let path = recording::path(of, task);
+            for method in methods {
+                let slow = method.name() == "brute";
+                if slow && (scope.quick || task == Task::Drill) {
+                    continue;
+                }
+                let ticks = if slow { ORACLE_TICKS } else { path.len() };
+                let bone = BoneVolume::new(&self.ct, self.isovalue).expect("the model has bone");
+                let ride = ride(method, &bone, &path[..ticks]);
+                findings.rows.push(self.row(task, method, &bone, &ride));
+            }
+        }
+    }
+
+    fn row(&self, task: Task, method: &Method, bone: &BoneVolume, ride: &Ride) -> Row {
+        let scene = format!("{}, {}", self.name, task.name());
+        let row = ride
+            .row(&scene, method, bone)
+            .with("group", format!("{}, {}", self.group, task.name()))
+            .with("voxel_mm", bone.spacing_mm());
+        if self.group != "cubes" || task != Task::Touch {
+            return row;
+        }
+        let errors: Vec<f64> = ride.felt.iter().filter_map(|felt| felt.error_voxel(bone.spacing_mm())).collect();
+        row.metric("depth_error_p95_voxel", Samples::from(errors).quantile(0.95))
+    }
+}
+
+/// What one tick felt.
+struct Felt {
+    tip: Vec3,
+    depth_mm: f32,
+}
+
+impl Felt {
+    /// Error of the depth on a cube, voxels, where the truth is a touch of 0.2 mm or more and the centre is out of the cube.
+    fn error_voxel(&self, voxel_mm: f32) -> Option<f64> {
+        let out = self.tip.as_dvec3().abs() - HALF_MM;
+        let depth = f64::from(RADIUS_MM) - out.max(DVec3::ZERO).length();
+        let counts = depth >= 0.2 && out.max_element() > 0.0;
+        counts.then(|| (f64::from(self.depth_mm) - depth).abs() / f64::from(voxel_mm))
+    }
+}
+
+/// A path, ridden.
+pub(super) struct Ride {
+    tick_us: Samples,
+    felt: Vec<Felt>,
+    points: u64,
+    voxels_in_contact: u32,
+    voxels: u64,
+    touching: u64,
+    jump_n: f32,
+    removed_mm3: f64,
+}
+
+/// The recommended whole tick: contact, force, guard.
+pub(super) fn ride(method: &Method, bone: &BoneVolume, path: &[ToolState]) -> Ride {
+    let mut contact = method.build(&Tool::burr(RADIUS_MM));
+    let (mut model, mut guard) = (Viscoelastic::BONE, ForceGuard::new(GuardConfig::default()));
+    let (mut out, mut last, mut times) = (RigidStep::default(), Vec3::ZERO, Vec::with_capacity(path.len()));
+    let mut ride = Ride {
+        tick_us: Samples::default(),
+        felt: Vec::with_capacity(path.len()),
+        points: 0,
+        voxels_in_contact: 0,
+        voxels: 0,
+        touching: 0,
+        jump_n: 0.0,
+        removed_mm3: 0.0,
+    };
+    if let Some(first) = path.first() {
+        contact.reset(first.world_from_tool);
+    }
+    for tool in path {
+        let start = Instant::now();
+        contact.step(bone, tool, tool.buttons.has(Buttons::PEDAL), 1.0, &mut out);
+        let wrench = model.wrench(tool, &out.manifold, 1.0);
+        std::hint::black_box(guard.guard(wrench, tool, 1.0));
+        let spent = start.elapsed().as_secs_f64() * 1e6;
+        let force = STIFFNESS * out.manifold.depth_mm * out.manifold.normal;
+        ride.jump_n = ride.jump_n.max(force.distance(last));
+        last = force;
+        if out.manifold.touches() {
+            times.push(spent);
+            ride.touching += 1;
+            ride.points += u64::from(out.points_in_contact);
+            ride.voxels += u64::from(out.voxels_swept);
+            ride.voxels_in_contact = ride.voxels_in_contact.max(out.voxels_in_contact);
+        }
+        ride.removed_mm3 += f64::from(out.removed_mm3);
+        ride.felt.push(Felt { tip: tool.tip(), depth_mm: out.manifold.depth_mm });
+    }
+    ride.tick_us = Samples::from(times);
+    ride
+}
+
+impl Ride {
+    fn row(&self, scene: &str, method: &Method, bone: &BoneVolume) -> Row {
+        let each = |sum: u64| sum as f64 / self.touching.max(1) as f64;
+        let deepest = self.felt.iter().map(|felt| felt.depth_mm).fold(0.0, f32::max);
+        let voxels: usize = bone.dims().iter().product();
+        let bricks: usize = bone.dims().iter().map(|n| n.div_ceil(BRICK)).product();
+        Row::new(scene, method.name())
+            .with("radius_mm", RADIUS_MM)
+            .with("ticks", self.felt.len())
+            .metric("tick_p50_us", self.tick_us.quantile(0.5))
+            .metric("tick_p99_us", self.tick_us.quantile(0.99))
+            .metric("grid_mvoxel", voxels as f64 / 1e6)
+            .metric("grid_mib", (2 * voxels + 4 * bricks) as f64 / f64::from(1 << 20))
+            .metric("touching_percent", 100.0 * self.touching as f64 / self.felt.len().max(1) as f64)
+            .metric("points_in_contact_mean", each(self.points))
+            .metric("voxels_in_contact_max", self.voxels_in_contact.into())
+            .metric("voxels_visited_mean", each(self.voxels))
+            .metric("depth_max_mm", deepest.into())
+            .metric("force_change_max_n_per_ms", self.jump_n.into())
+            .metric("removed_mm3", self.removed_mm3)
+    }
+}
+
+/// The drilling tick of the recommended method in 48.5 million voxels and, where memory allows, in 1024³ of the same edge.
+fn large(head: &VoxelVolume<i16>, isovalue: i16, scope: Scope, findings: &mut Findings) {
+    let path = recording::path(recording::Place::Skull, Task::Drill);
+    let (dims, voxel_mm) = SKULLS[4];
+    let grids = [("48.5 million voxels", dims), ("1024³ voxels", [HUGE; 3])];
+    let mut p50 = Vec::new();
+    for (name, dims) in grids {
+        let voxels: usize = dims.iter().product();
+        if dims[0] == HUGE && (scope.quick || available_mib() < (5 * voxels) >> 20) {
+            continue;
+        }
+        let bone = BoneVolume::new(&skull(head, dims, voxel_mm), isovalue).expect("the skull has bone");
+        let found = ride(&Method::RECOMMENDED, &bone, &path);
+        p50.push(found.tick_us.quantile(0.5));
+        findings.rows.push(found.row(&format!("full drilling tick, {name}"), &Method::RECOMMENDED, &bone));
+        if dims[0] != HUGE && !scope.quick {
+            findings.rows.push(super::soak::row(&bone, &path));
+        }
+    }
+    if let [small, large] = p50[..] {
+        let name = "full drilling tick: 1024³ over 48.5 million voxels, p50";
+        findings.gates.push(Gate::at_most(name, large / small, MOST_RATIO));
+    }
+}
+
+/// Memory that can be had, MiB; 0 where the system does not say.
+fn available_mib() -> usize {
+    let info = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let line = info.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
+    line.and_then(|line| line.split_whitespace().next()?.parse::<usize>().ok()).unwrap_or(0) / 1024
+}
