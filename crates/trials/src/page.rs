@@ -146,7 +146,13 @@ fn draw(chart: &Chart, methods: &[&str]) -> Result<String, Box<dyn std::error::E
             .x_label_area_size(40)
             .y_label_area_size(70)
             .build_cartesian_2d(x.log_scale(), y.clone().log_scale())?;
-        axes.configure_mesh().x_desc(&chart.cost).y_desc(&chart.error).light_line_style(WHITE).draw()?;
+        axes.configure_mesh()
+            .x_desc(&chart.cost)
+            .y_desc(&chart.error)
+            .x_label_formatter(&tick)
+            .y_label_formatter(&tick)
+            .light_line_style(WHITE)
+            .draw()?;
         let best = chart.front().into_iter().map(|(cost, error)| (cost.max(1e-3), error.max(1e-5)));
         axes.draw_series(LineSeries::new(best, BLACK.mix(0.4)))?;
         if let Some((cost, name)) = budget {
@@ -157,6 +163,9 @@ fn draw(chart: &Chart, methods: &[&str]) -> Result<String, Box<dyn std::error::E
         for (line, (at, name)) in used.enumerate() {
             for mark in chart.marks.iter().filter(|mark| mark.method == *name) {
                 sign(axes.plotting_area(), at, at_least(mark))?;
+                if chart.chosen.as_deref() == Some(*name) {
+                    axes.plotting_area().draw(&Circle::new(at_least(mark), 10, BLACK.stroke_width(1)))?;
+                }
             }
             let (x, y) = (14, 24 + 18 * line as i32);
             sign(&key, at, (x, y))?;
@@ -166,6 +175,13 @@ fn draw(chart: &Chart, methods: &[&str]) -> Result<String, Box<dyn std::error::E
         root.present()?;
     }
     Ok(svg)
+}
+
+/// A number at an axis: three digits, however small.
+fn tick(value: &f64) -> String {
+    let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 7.0);
+    let text = format!("{value:.*}", digits as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
 }
 
 /// A method's sign: seven colours as discs, then as triangles, then as crosses.

@@ -5,6 +5,7 @@
 //! forbids (the oracle), which the rows show by their absence.
 
 mod accuracy;
+mod clearance;
 mod coupling;
 mod energy;
 mod faults;
@@ -41,12 +42,16 @@ pub fn run(scope: Scope) -> Findings {
     findings
 }
 
-/// A group's chart, each method at its worst cost and worst error over the group's scenes, and the gate that the recommended one is on
-/// its front.
-fn worst_chart(findings: &mut Findings, group: &str, title: &str, metrics: (&str, &str)) -> Option<Chart> {
+/// A group's chart, each method at its worst cost and worst error over the group's scenes; where it is `gated`, with the gate that
+/// the recommended one is on its front.
+fn worst_chart(findings: &mut Findings, group: &str, title: &str, metrics: (&str, &str), gated: bool) -> Option<Chart> {
     let mut marks: Vec<Mark> = Vec::new();
     for row in findings.rows.iter().filter(|row| row.config.get("group").is_some_and(|g| g == group)) {
         let (Some(&cost), Some(&error)) = (row.metrics.get(metrics.0), row.metrics.get(metrics.1)) else { continue };
+        // A method that never touched has no cost there.
+        if !cost.is_finite() || !error.is_finite() {
+            continue;
+        }
         match marks.iter_mut().find(|mark| mark.method == row.method) {
             Some(mark) => (mark.cost, mark.error) = (mark.cost.max(cost), mark.error.max(error)),
             None => marks.push(Mark { method: row.method.clone(), cost, error }),
@@ -62,7 +67,7 @@ fn worst_chart(findings: &mut Findings, group: &str, title: &str, metrics: (&str
         chosen: Some(name.into()),
     };
     let drawn = !chart.marks.is_empty();
-    if drawn {
+    if drawn && gated {
         let beaten = chart.beaten(name) as f64;
         findings.gates.push(Gate::at_most(format!("{group}: methods that beat {name} in both"), beaten, 0.0));
     }

