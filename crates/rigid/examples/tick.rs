@@ -1,5 +1,5 @@
 //! Strokes over and drills into a synthetic head of 425 x 403 x 283 voxels and prints what a tick costs, for each method
-//! or for the one named.
+//! or for the one named: `tick [METHOD [RADIUS_MM]]`.
 
 use std::time::Instant;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
@@ -13,10 +13,11 @@ fn main() -> Result<(), trepan_volume::BoneError> {
         "method", "task", "p50 us", "p99 us", "max us", "N/ms max", "mm³"
     );
     let only = std::env::args().nth(1);
+    let radius_mm = std::env::args().nth(2).and_then(|text| text.parse().ok()).unwrap_or(3.0);
     for method in Method::all().into_iter().filter(|m| only.as_ref().is_none_or(|name| m.name() == name)) {
         for drilling in [false, true] {
             let bone = BoneVolume::new(&head, 400)?;
-            stroke(&method, &bone, drilling, if method.name() == "brute" { 50 } else { 2500 });
+            stroke(&method, &bone, drilling, radius_mm, if method.name() == "brute" { 50 } else { 2500 });
         }
     }
     Ok(())
@@ -41,8 +42,8 @@ fn head() -> VoxelVolume<i16> {
 /// Radius of the skull along x, mm.
 const SKULL: f32 = 95.0;
 
-fn stroke(method: &Method, bone: &BoneVolume, drilling: bool, ticks: u32) {
-    let mut contact = method.build(&Tool::burr(3.0));
+fn stroke(method: &Method, bone: &BoneVolume, drilling: bool, radius_mm: f32, ticks: u32) {
+    let mut contact = method.build(&Tool::burr(radius_mm));
     let (mut out, mut times, mut worst, mut removed) = (RigidStep::default(), Vec::new(), 0.0f32, 0.0);
     let mut last = Vec3::ZERO;
     for t in 0..ticks {
@@ -50,7 +51,9 @@ fn stroke(method: &Method, bone: &BoneVolume, drilling: bool, ticks: u32) {
         let phase = 0.05 * t as f32 / 20.0;
         let across = Vec3::new(20.0 * phase.sin(), 20.0 * phase.cos(), 0.0);
         let top = 0.65 * (SKULL * SKULL - across.x.powi(2) - (across.y / 0.95).powi(2)).sqrt();
-        let tool = ToolState::at(Pose::from_translation(across + Vec3::Z * (top + if t == 0 { 5.0 } else { 2.5 })));
+        let tool = ToolState::at(Pose::from_translation(
+            across + Vec3::Z * (top + (radius_mm + if t == 0 { 2.0 } else { -0.5 })),
+        ));
         let start = Instant::now();
         contact.step(bone, &tool, drilling, 1.0, &mut out);
         times.push(start.elapsed().as_secs_f64() * 1e6);

@@ -17,6 +17,7 @@
 //! In a haptic tick.
 
 use crate::removal::{Burr, Cut, Law};
+use crate::rows::EVERYWHERE;
 use crate::{RigidContact, RigidStep};
 use glam::{DVec3, IVec3};
 use trepan_contact::Contact;
@@ -230,7 +231,7 @@ impl RigidContact for Brute {
         if drilling && self.tool.kind == ToolKind::Burr {
             let (device, proxy, radius_mm) = (tool.tip(), self.proxy.translation, self.tool.tip_radius_mm);
             let depth_mm = device.distance(proxy);
-            let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms };
+            let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms, within: EVERYWHERE };
             self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
         }
     }

@@ -18,6 +18,7 @@
 
 use crate::ray_trace::over_iso;
 use crate::removal::{Burr, Cut, Law};
+use crate::rows::EVERYWHERE;
 use crate::traverse::first_bone;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
@@ -137,7 +138,14 @@ impl RigidContact for CentreLine {
         }
         if drilling && self.tool.kind == ToolKind::Burr && tip != Vec3::ZERO {
             let (device, proxy) = (tool.tip(), tool.tip() + tip);
-            let cut = Cut { device, proxy, radius_mm: self.tool.tip_radius_mm, depth_mm: tip.length(), dt_ms };
+            let cut = Cut {
+                device,
+                proxy,
+                radius_mm: self.tool.tip_radius_mm,
+                depth_mm: tip.length(),
+                dt_ms,
+                within: EVERYWHERE,
+            };
             self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
         }
     }

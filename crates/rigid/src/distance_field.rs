@@ -56,6 +56,8 @@ const MAX_DISCS: usize = 8192;
 const MAX_BITES: usize = 16384;
 /// Discs this close count as touched, voxels.
 const TOUCH: f32 = 0.05;
+/// Bone in reach of the burr is this near to a disc, voxels.
+const MARGIN_VOXELS: i32 = 2;
 /// Free space that a ball leaves around it when it grows, voxels: more than the unevenness of a bore.
 const MARGIN: f32 = 0.2;
 /// A smaller ball would come on by more than 1/JAM of what it is smaller: jammed. 0.4 is between walls less than 47 degrees apart.
@@ -473,10 +475,11 @@ impl RigidContact for DistanceField {
         if self.works {
             let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
             let depth_mm = self.pressed.length() + (radius_mm - self.ball_mm).min(self.bite_mm(bone));
-            let cut = Cut { device: proxy - self.pressed, proxy, radius_mm, depth_mm, dt_ms };
             if self.discs.list().is_empty() {
                 return;
             }
+            let within = self.discs.bounds(MARGIN_VOXELS);
+            let cut = Cut { device: proxy - self.pressed, proxy, radius_mm, depth_mm, dt_ms, within };
             let window = &self.window;
             let read = |voxel| {
                 let row = window.row(voxel);

@@ -8,6 +8,7 @@
 //! Against thin walls: past the middle of a wall the nearest way out leads to the far side, and a fast tool is through between two ticks.
 
 use crate::removal::{Burr, Cut, Law};
+use crate::rows::EVERYWHERE;
 use crate::{RigidContact, RigidStep};
 use trepan_geometry::{Pose, Tool, ToolKind, ToolState, Vec3};
 use trepan_volume::BoneVolume;
@@ -60,7 +61,8 @@ impl<F: Feel> RigidContact for Penalty<F> {
         out.manifold.depth_mm = depth_mm;
         out.manifold.point = self.proxy.translation - radius_mm * normal;
         if drilling && self.tool.kind == ToolKind::Burr && burr != Vec3::ZERO {
-            let cut = Cut { device, proxy: device + burr, radius_mm, depth_mm: burr.length(), dt_ms };
+            let cut =
+                Cut { device, proxy: device + burr, radius_mm, depth_mm: burr.length(), dt_ms, within: EVERYWHERE };
             self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
         }
     }

@@ -37,7 +37,7 @@
 //! `per-tick` for anything but comparison: it removes twice as much at twice the tick rate, and nothing physical drives it.
 
 use crate::RigidStep;
-use crate::rows::{GridBall, rows};
+use crate::rows::{GridBall, rows_within};
 use crate::spindle::{Spindle, per_ms};
 use glam::{IVec3, Vec3Swizzles};
 use trepan_geometry::Vec3;
@@ -145,6 +145,8 @@ pub(crate) struct Cut {
     pub depth_mm: f32,
     /// Tick, ms.
     pub dt_ms: f32,
+    /// Lowest and highest voxel between which the bone in reach is known to be.
+    pub within: (IVec3, IVec3),
 }
 
 /// One voxel that the burr reaches.
@@ -260,7 +262,7 @@ impl Burr {
         let hole = GridBall { centre: proxy, radius: radius - 2.0 };
         let outer = (radius + 1.0).powi(2);
         let Self { bites, limit, .. } = self;
-        rows(ball, hole, |start, to| {
+        rows_within(ball, hole, cut.within, |start, to| {
             let first = start.as_vec3() - proxy;
             let (across, rest) = (first.yz().length_squared(), first.yz().dot(forward.yz()));
             let row = read(start);

@@ -103,6 +103,8 @@ pub(crate) struct Discs {
     pub voxels: u32,
     /// Discs that did not fit.
     pub overflow: u32,
+    /// Lowest and highest voxel, from [`Self::base`], at an end of a disc's edge.
+    bounds: (IVec3, IVec3),
     list: Vec<Disc>,
     /// The edge on which each disc stands.
     edges: Vec<Edge>,
@@ -162,6 +164,7 @@ impl Discs {
             visited: 0,
             voxels: 0,
             overflow: 0,
+            bounds: (IVec3::MAX, IVec3::MIN),
             list,
             edges,
             before: vec![Before::default(); CACHE],
@@ -176,6 +179,12 @@ impl Discs {
         self.list.clear();
         self.edges.clear();
         (self.visited, self.voxels, self.overflow) = (0, 0, 0);
+        self.bounds = (IVec3::MAX, IVec3::MIN);
+    }
+
+    /// The box in the grid that holds all bone and air within `margin` voxels of a disc; there must be one.
+    pub fn bounds(&self, margin: i32) -> (IVec3, IVec3) {
+        (self.bounds.0 + self.base - margin, self.bounds.1 + self.base + margin)
     }
 
     /// Drops all discs and what is remembered of earlier ones: the bone is another.
@@ -282,6 +291,7 @@ impl Discs {
                 continue;
             }
             self.list.push(Disc { centre: x, normal: step.as_vec3(), radius: self.radius, shaft });
+            self.bounds = (self.bounds.0.min(local.min(local + step)), self.bounds.1.max(local.max(local + step)));
             self.edges.push(Edge { voxel: local, to, shaped: false });
         }
         self.voxels += u32::from(self.list.len() > before);

@@ -27,6 +27,7 @@
 //! For force feedback on a hand: [`distance_field`](crate::distance_field) is smoother and nearer to the surface. It is here for comparison.
 
 use crate::removal::{Burr, Cut, Law};
+use crate::rows::EVERYWHERE;
 use crate::sweep::{Ball, Stop, Sweep};
 use crate::{RigidContact, RigidStep};
 use glam::IVec3;
@@ -197,7 +198,7 @@ impl Thesis {
             Law::Rate { .. } => {
                 let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
                 let depth_mm = device.distance(proxy);
-                let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms };
+                let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms, within: EVERYWHERE };
                 self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
             }
         }
