@@ -71,11 +71,13 @@ impl Ball {
     }
 
     /// The place on the shaft's axis that is nearest to a `point` of a disc at the shaft, all as seen from the ball's centre; for other discs that centre.
+    #[inline]
     pub fn arm(&self, disc: &Disc, point: Vec3) -> Vec3 {
         if disc.shaft { self.shaft.at(self.shaft.along(point)) } else { Vec3::ZERO }
     }
 
     /// The disc as the tool with its ball at `centre` sees it: the ball, or the place on the shaft's axis that is nearest.
+    #[inline(always)]
     pub fn nearest(&self, disc: &Disc, centre: Vec3) -> Near {
         let seen = centre + self.arm(disc, disc.centre - centre);
         let from_disc = seen - disc.centre;
