@@ -36,7 +36,7 @@
 //! ```
 //!
 //! # When not to use it
-//! For tools that are not round at the tip, for soft tissue, or for bones that move: the bone is fixed in the world.
+//! For soft tissue, or for bones that move: the bone is fixed in the world. Tools that are not round at the tip have [`mesh_shell`] and a penalty method only.
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
