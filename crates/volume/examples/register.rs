@@ -6,7 +6,7 @@
 use glam::{DAffine3, DQuat, DVec3};
 use std::path::Path;
 use std::time::Instant;
-use trepan_volume::{Grid, Interpolation, RegistrationConfig, read, register, resample};
+use trepan_volume::{Grid, Interpolation, RegistrationConfig, RegistrationError, read, register, resample};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let paths: Vec<String> = std::env::args().skip(1).collect();
@@ -27,16 +27,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut moving = resample(&still, &grid, Interpolation::Trilinear, still.data[0]);
         moving.world_from_voxel = known * grid.world_from_voxel;
         let start = Instant::now();
-        let found = match register(&fixed, &moving, &RegistrationConfig::default()) {
-            Ok(found) => found,
-            Err(error) => {
-                println!("{error}");
+        let (verdict, found) = match register(&fixed, &moving, &RegistrationConfig::default()) {
+            Ok(found) => ("accepted", found),
+            Err(RegistrationError::Doubtful { found, .. }) => ("refused", *found),
+            Err(other) => {
+                println!("{other}");
                 continue;
             }
         };
         let error = found.fixed_from_moving * known;
         println!(
-            "moved {:.1} mm {:.1}°: off by {:.2} mm {:.2}°, metric {:.4} from {:.4}, confidence {:.2}, overlap {:.2}, {:.2} s",
+            "{verdict}: moved {:.1} mm {:.1}°, off by {:.2} mm {:.2}°, metric {:.4} from {:.4}, confidence {:.2}, overlap {:.2}, halves {:.1} mm, {:.2} s",
             shift.length(),
             turn.to_scaled_axis().length().to_degrees(),
             (error.transform_point3(middle) - middle).length(),
@@ -45,6 +46,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             found.start_metric,
             found.confidence,
             found.overlap_share,
+            found.halves_mm,
             start.elapsed().as_secs_f64()
         );
     }

@@ -5,7 +5,7 @@
 //! values by `RescaleSlope · stored + RescaleIntercept`, which for CT gives HU.
 //!
 //! # Practice
-//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and big-endian, deflated, RLE, lossless JPEG, JPEG-LS, JPEG 2000; 8, 16 and 32 bits;
+//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and big-endian, deflated, RLE, JPEG (8 bits with losses, or lossless), JPEG-LS, JPEG 2000; 8, 16 and 32 bits;
 //! enhanced multi-frame files; oblique and tilted stacks. Of several series in a folder the one with the most slices is taken and a
 //! note says so; [`series`] lists them. Doubled, missing and uneven slices are refused. Only the elements that place and scale voxels
 //! are looked at: no name, date, identifier or free text of a patient is kept or shown.
@@ -14,7 +14,7 @@
 //! NEMA, "DICOM PS3.3 C.7.6.2, C.7.6.16; PS3.5; PS3.10", dicom.nema.org.
 //!
 //! # When not to use it
-//! For colour, ultrasound, and other compressed syntaxes (JPEG baseline): the error names the syntax.
+//! For colour, ultrasound, 12-bit JPEG with losses, and other compressed syntaxes: the error names the syntax.
 
 mod codec;
 mod element;
@@ -32,6 +32,9 @@ const MOST_FILES: usize = 20_000;
 
 /// Folders inside the folder that are looked into.
 const DEEPEST: usize = 4;
+
+/// Pictures that are decoded at a time, so that files and numbers of a few only are in memory beside the volume.
+const BATCH: usize = 16;
 
 /// A stack of pictures of one size and orientation.
 #[derive(Clone, Debug, PartialEq)]
@@ -163,8 +166,11 @@ fn voxels(stack: &stack::Stack) -> Result<VoxelVolume<f32>, ReadError> {
         }
         Ok(values)
     };
-    let pictures: Vec<Vec<f32>> = stack.pictures.par_iter().map(decoded).collect::<Result<_, ReadError>>()?;
-    let data = pictures.concat();
+    let mut data = Vec::new();
+    for batch in stack.pictures.chunks(BATCH) {
+        let pictures: Vec<Vec<f32>> = batch.par_iter().map(decoded).collect::<Result<_, ReadError>>()?;
+        pictures.iter().for_each(|values| data.extend_from_slice(values));
+    }
     let dims = [first.columns, first.rows, stack.pictures.len()];
     Ok(VoxelVolume { dims, data, world_from_voxel: stack.world_from_voxel })
 }

@@ -1,6 +1,6 @@
 //! Stored pixels into values.
 
-use super::codec::{CodecError, jpeg_2000, jpeg_lossless, jpeg_ls, rle};
+use super::codec::{CodecError, jpeg, jpeg_2000, jpeg_lossless, jpeg_ls, rle};
 use super::element::Pixels;
 use super::slice::Slice;
 use crate::ReadError;
@@ -38,6 +38,9 @@ pub(super) fn frame(slice: &Slice, bytes: &[u8], frame: usize, out: &mut Vec<f32
                 "1.2.840.10008.1.2.5" => {
                     let stored = rle::decode(&one, layout.pixels, layout.bytes).map_err(wrong)?;
                     Layout { order: ByteOrder::Little, ..layout }.decode(&stored, &mut add);
+                }
+                "1.2.840.10008.1.2.4.50" | "1.2.840.10008.1.2.4.51" => {
+                    decoded(slice, layout, jpeg::decode(&one).map_err(wrong)?, &mut add)?;
                 }
                 "1.2.840.10008.1.2.4.57" | "1.2.840.10008.1.2.4.70" => {
                     decoded(slice, layout, jpeg_lossless::decode(&one).map_err(wrong)?, &mut add)?;
@@ -170,8 +173,6 @@ impl Layout {
 /// What a transfer syntax is called.
 fn name(syntax: &str) -> &'static str {
     match syntax {
-        "1.2.840.10008.1.2.4.50" => "JPEG baseline",
-        "1.2.840.10008.1.2.4.51" => "JPEG extended",
         "1.2.840.10008.1.2.4.53" => "JPEG spectral selection, retired",
         "1.2.840.10008.1.2.4.55" => "JPEG progressive, retired",
         s if s.starts_with("1.2.840.10008.1.2.4.10") => "video",

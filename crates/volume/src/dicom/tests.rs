@@ -363,7 +363,7 @@ fn each_wrong_field_has_its_own_error() {
     assert_eq!(field(&|s| s.pixels = None), "PixelData");
     assert_eq!(
         field(&|s| {
-            s.syntax = "1.2.840.10008.1.2.4.50".into();
+            s.syntax = "1.2.840.10008.1.2.4.53".into();
             s.pixels = Some(Pixels::Fragments(vec![0..0, 0..4, 4..8, 8..12]));
         }),
         "TransferSyntaxUID"
@@ -419,13 +419,14 @@ fn run_lengths_unpack_to_exactly_the_pixels() {
     assert!(matches!(rle::decode(&packed, 7, 2), Err(CodecError::Wrong(_))));
 }
 
-/// One slice in plain numbers, run lengths, JPEG-LS and JPEG 2000.
-fn compressed() -> [Vec<u8>; 4] {
+/// One slice in plain numbers, run lengths, JPEG-LS and JPEG 2000 without loss, and in 8-bit JPEG.
+fn compressed() -> [Vec<u8>; 5] {
     [
         include_bytes!("../../tests/data/MR_small.dcm").to_vec(),
         include_bytes!("../../tests/data/MR_small_RLE.dcm").to_vec(),
         include_bytes!("../../tests/data/MR_small_jpeg_ls_lossless.dcm").to_vec(),
         include_bytes!("../../tests/data/MR_small_jp2klossless.dcm").to_vec(),
+        include_bytes!("../../tests/data/MR_small_jpeg_baseline.dcm").to_vec(),
     ]
 }
 
@@ -442,12 +443,27 @@ fn one_picture(bytes: Vec<u8>) -> Result<Import, ReadError> {
 
 #[test]
 fn a_real_slice_has_the_same_numbers_in_every_compression() {
-    let [plain, others @ ..] = compressed().map(|bytes| one_picture(bytes).unwrap().volume);
+    let [plain, others @ .., _] = compressed().map(|bytes| one_picture(bytes).unwrap().volume);
     let (low, high) = plain.data.iter().fold((f32::MAX, f32::MIN), |(l, h), &v| (l.min(v), h.max(v)));
     assert!(plain.dims == [64, 64, 1] && low >= 0.0 && high > 500.0, "{low} to {high}");
     for (n, other) in others.iter().enumerate() {
         assert!(*other == plain, "compression {n}");
     }
+}
+
+#[test]
+fn a_jpeg_has_the_values_that_another_decoder_gives() {
+    let [.., jpeg] = compressed();
+    let truth = include_bytes!("../../tests/data/MR_small_jpeg_baseline.u8");
+    let found = one_picture(jpeg.clone()).unwrap().volume;
+    let off = |(a, &b): (&f32, &u8)| (a - f32::from(b)).abs();
+    let worst = found.data.iter().zip(truth).map(off).fold(0.0, f32::max);
+    assert!(found.data.len() == truth.len() && worst <= 2.0, "off by up to {worst}");
+    // The frame header (SOF0) with 12 bits instead of 8: refused by name.
+    let mut extended = jpeg;
+    let at = extended.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
+    (extended[at + 1], extended[at + 4]) = (0xc1, 12);
+    assert!(one_picture(extended).unwrap_err().to_string().contains("more than 8 bits"));
 }
 
 #[test]

@@ -7,10 +7,18 @@
 //! Powell's method climbs it on a pyramid of coarser images, from several rotations, so that its many side peaks do no harm.
 //!
 //! # Practice
-//! Moves up to about 20° and 30 mm are caught; further ones when the heads' middles and tilt tell. `confidence` is l / (l + 0.003), l
-//! the normalised information lost 10 mm beside the result (for turns, 10 mm at 80 mm from the middle) in the least certain of
-//! the six directions: a ball, whose turn nothing shows, has none. One CT and MRI of one head gave 0.75, one noise image 0.25, but also a pair that came out 18 mm off 0.72: look at the overlap before use.
-//! Shares of the work are fixed, so the bytes do not depend on the number of threads. About 2 s a head on two cores.
+//! Moves up to about 20° and 30 mm are caught; further ones when the heads' middles and tilt tell. What fills an image from its border with
+//! one value is padding or cleared air; both are tried. The confidence is
+//!
+//! ```text
+//! l / (l + 0.003) · 1 / (1 + (h / 10 mm)²)
+//! ```
+//!
+//! l: normalised information lost 10 mm beside the result (turns at 80 mm from the middle), in the least certain of the six directions; a ball,
+//! whose turn nothing shows, has none. h: by how much the left, right, back, front, lower and upper half of the fixed image, each registered
+//! alone, contradict the whole; a false edge such as padding pulls one half only. In 120 moves of a real CT and MRI no answer
+//! at or over 0.6, the default, was off by 3 mm or 3° (the README has the figures); under it the answer is refused and comes with the error.
+//! Shares of the work are fixed, so the bytes do not depend on the number of threads. About 3 s a head on two cores, twice that with padding.
 //!
 //! # Sources
 //! Viola and Wells 1997 and Collignon 1995 (mutual information), Studholme, Hill and Hawkes 1999 (the quotient), Powell 1964.
@@ -19,24 +27,24 @@
 //! For two patients, for a brain that has shifted, or where the images share only a thin slab.
 
 mod information;
+mod padding;
 mod powell;
 mod pyramid;
+mod trust;
 
-use crate::VoxelVolume;
+use crate::{Sample, VoxelVolume};
 use glam::{DAffine3, DQuat, DVec3};
 use information::{Pair, Shared};
+use padding::Padding;
 use powell::{Climb, Pose, climb};
-use pyramid::{Level, middle, range};
+use pyramid::{Level, middle, range, reduced};
 use rayon::prelude::*;
 
 /// A turn of one radian counts as this many mm.
 const RADIUS_MM: f64 = 80.0;
 
-/// How far beside the peak the confidence looks, mm.
-const BESIDE_MM: f64 = 10.0;
-
-/// A loss of normalised information that is as likely right as wrong: one noise image lost a third of it.
-const CHANCE: f64 = 0.003;
+/// Halves that disagree by this are as likely wrong as right, mm.
+const CHANCE_MM: f64 = 10.0;
 
 /// How to register.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,7 +63,7 @@ pub struct RegistrationConfig {
 
 impl Default for RegistrationConfig {
     fn default() -> Self {
-        Self { work_mm: 2.0, bins: 32, points: 100_000, least_overlap: 0.25, least_confidence: 0.5 }
+        Self { work_mm: 2.0, bins: 32, points: 100_000, least_overlap: 0.25, least_confidence: 0.6 }
     }
 }
 
@@ -68,10 +76,13 @@ pub struct Registration {
     pub metric: f64,
     /// The same with the headers' poses; under 1 where they overlap too little.
     pub start_metric: f64,
-    /// How clear the peak is in its least certain direction, 0 (not at all) to 1; see the module.
+    /// How far to trust it, 0 (not at all) to 1; see the module.
     pub confidence: f64,
     /// Share of the fixed image that lies in the moving image.
     pub overlap_share: f64,
+    /// How far the answers of the fixed image's left, right, back, front, lower and upper half alone lie from this one: root
+    /// mean square of shift and of turn at 80 mm, mm.
+    pub halves_mm: f64,
 }
 
 /// Why there is no registration.
@@ -104,7 +115,7 @@ pub enum RegistrationError {
     /// The result could as well lie elsewhere.
     #[error(
         "registration: the confidence of {:.2} is under the least of {:.2} (shared information {:.3}); are both images of one \
-         patient? Register them elsewhere and give files that agree", found.confidence, least, found.metric
+         patient? Crop what only one of them shows, or register them by hand elsewhere and give files that agree", found.confidence, least, found.metric
     )]
     Doubtful {
         /// What was found, to look at.
@@ -115,21 +126,33 @@ pub enum RegistrationError {
 }
 
 /// Finds the rigid move that puts `moving` into the space of `fixed`.
-pub fn register(
-    fixed: &VoxelVolume<f32>,
-    moving: &VoxelVolume<f32>,
+///
+/// A constant around an image counts as unseen (padding) and, in a second try, as air; the surer answer is given.
+pub fn register<F: Sample, M: Sample>(
+    fixed: &VoxelVolume<F>,
+    moving: &VoxelVolume<M>,
     config: &RegistrationConfig,
 ) -> Result<Registration, RegistrationError> {
     check(config)?;
-    let search = Search::new(fixed, moving, config)?;
-    let found = search.run();
-    if found.overlap_share < config.least_overlap {
-        return Err(RegistrationError::Overlap { share: found.overlap_share, least: config.least_overlap });
+    let outer = (Padding::of(fixed), Padding::of(moving));
+    let with = |fixed_unseen: &Padding, moving_unseen: &Padding| {
+        let mm = config.work_mm;
+        Search::new(&reduced(fixed, fixed_unseen, mm), &reduced(moving, moving_unseen, mm), config)?.run()
+    };
+    let unseen = with(&outer.0, &outer.1);
+    if outer.0.is_empty() && outer.1.is_empty() {
+        return unseen;
     }
-    if found.confidence < config.least_confidence {
-        return Err(RegistrationError::Doubtful { found: Box::new(found), least: config.least_confidence });
+    let air = with(&Padding::none(), &Padding::none());
+    if surety(&air) > surety(&unseen) { air } else { unseen }
+}
+
+fn surety(answer: &Result<Registration, RegistrationError>) -> f64 {
+    match answer {
+        Ok(found) => found.confidence,
+        Err(RegistrationError::Doubtful { found, .. }) => found.confidence,
+        Err(_) => -1.0,
     }
-    Ok(found)
 }
 
 fn check(config: &RegistrationConfig) -> Result<(), RegistrationError> {
@@ -178,21 +201,40 @@ impl<'a> Search<'a> {
         Ok(Self { config, levels, centre, between: other - centre })
     }
 
-    fn run(&self) -> Registration {
-        let header = Start { turn: DQuat::IDENTITY, shift: DVec3::ZERO };
+    /// The best pose, if it can be trusted.
+    fn run(&self) -> Result<Registration, RegistrationError> {
+        let best = self.best();
+        let found = self.judged(best);
+        let (share, least) = (found.overlap_share, self.config.least_overlap);
+        if share < least {
+            return Err(RegistrationError::Overlap { share, least });
+        }
+        match found.confidence >= self.config.least_confidence {
+            true => Ok(found),
+            false => Err(RegistrationError::Doubtful { found: Box::new(found), least: self.config.least_confidence }),
+        }
+    }
+
+    fn best(&self) -> Start {
         let rough = Climb { step: 10.0, tolerance: 1.0, sweeps: 3 };
         let candidates = self.climb_all(0, 8_000, &self.starts(), rough, 6);
         let candidates = self.climb_all(0, 30_000, &candidates, Climb { step: 4.0, tolerance: 0.4, sweeps: 8 }, 3);
         let candidates = self.climb_all(1, 60_000, &candidates, Climb { step: 1.5, tolerance: 0.1, sweeps: 8 }, 1);
         let fine = Climb { step: 0.5, tolerance: 0.05, sweeps: 8 };
-        let best = self.climb_all(2, self.config.points, &candidates, fine, 1)[0];
+        self.climb_all(2, self.config.points, &candidates, fine, 1)[0]
+    }
+
+    fn judged(&self, best: Start) -> Registration {
+        let header = Start { turn: DQuat::IDENTITY, shift: DVec3::ZERO };
         self.with(2, self.config.points, |pair| {
             let Shared { normalised, overlap } = pair.at(self.moving_from_fixed(best, &[0.0; 6]));
+            let halves_mm = self.halves_mm(best);
             Registration {
                 fixed_from_moving: self.moving_from_fixed(best, &[0.0; 6]).inverse(),
                 metric: normalised,
                 start_metric: pair.at(self.moving_from_fixed(header, &[0.0; 6])).normalised,
-                confidence: self.confidence(pair, best, normalised),
+                confidence: self.sharpness(pair, best, normalised) / (1.0 + (halves_mm / CHANCE_MM).powi(2)),
+                halves_mm,
                 overlap_share: overlap,
             }
         })
@@ -242,19 +284,6 @@ impl<'a> Search<'a> {
         DAffine3::from_translation(self.centre + shift)
             * DAffine3::from_quat(turn)
             * DAffine3::from_translation(-self.centre)
-    }
-
-    /// How much is lost beside the peak along the least certain direction, against what chance loses.
-    fn confidence(&self, pair: &Pair, best: Start, top: f64) -> f64 {
-        let lost = |axis: usize| {
-            let beside = |side: f64| {
-                let pose: Pose = std::array::from_fn(|a| if a == axis { side * BESIDE_MM } else { 0.0 });
-                pair.at(self.moving_from_fixed(best, &pose)).normalised.max(1.0)
-            };
-            top - 0.5 * (beside(-1.0) + beside(1.0))
-        };
-        let least = (0..6).map(lost).fold(f64::INFINITY, f64::min).max(0.0);
-        least / (least + CHANCE)
     }
 }
 

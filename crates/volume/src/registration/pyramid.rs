@@ -1,7 +1,9 @@
 //! An image at a coarser spacing, in bins of grey, and the points at which two images are compared.
 
-use crate::VoxelVolume;
+use super::padding::Padding;
+use crate::component::Components;
 use crate::resample::corners;
+use crate::{Sample, VoxelVolume};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -19,11 +21,26 @@ pub(super) struct Point {
     pub bin: u8,
 }
 
+/// The image with voxels merged until they are about `mm` long; NaN for padding and for what is merged with it.
+pub(super) fn reduced<T: Sample>(image: &VoxelVolume<T>, padding: &Padding, mm: f64) -> VoxelVolume<f32> {
+    let value = |at: usize| if padding.holds(at) { f32::NAN } else { image.data[at].to_f32() };
+    let grid = VoxelVolume { dims: image.dims, data: Vec::<T>::new(), world_from_voxel: image.world_from_voxel };
+    let mut merged = halved(&grid, mm, value).unwrap_or_else(|| VoxelVolume {
+        dims: image.dims,
+        data: (0..image.data.len()).map(value).collect(),
+        world_from_voxel: image.world_from_voxel,
+    });
+    while let Some(smaller) = halved(&merged, mm, |at| merged.data[at]) {
+        merged = smaller;
+    }
+    merged
+}
+
 impl Level {
-    /// The image with voxels merged until they are about `mm` long.
+    /// A reduced image, reduced further until its voxels are about `mm` long.
     pub fn new(image: &VoxelVolume<f32>, mm: f64, range: (f32, f32), bins: usize) -> Self {
-        let mut merged = halved(image, mm).unwrap_or_else(|| image.clone());
-        while let Some(smaller) = halved(&merged, mm) {
+        let mut merged = image.clone();
+        while let Some(smaller) = halved(&merged, mm, |at| merged.data[at]) {
             merged = smaller;
         }
         let scale = (bins - 1) as f32 / (range.1 - range.0);
@@ -49,11 +66,13 @@ impl Level {
     /// show no false peaks where their voxels coincide.
     pub fn points(&self, most: usize) -> Vec<Point> {
         let [nx, ny, _] = self.binned.dims;
-        let stride = (self.binned.data.len() as f64 / most as f64).max(1.0);
-        let count = (self.binned.data.len() as f64 / stride) as usize;
+        let known: Vec<u32> =
+            (0..self.binned.data.len() as u32).filter(|&at| !self.binned.data[at as usize].is_nan()).collect();
+        let stride = (known.len() as f64 / most as f64).max(1.0);
+        let count = (known.len() as f64 / stride) as usize;
         let point = |n: usize| {
             let mut random = fraction(n as u64);
-            let at = ((n as f64 + random() * (1.0 - 1.0 / stride)) * stride) as usize;
+            let at = known[((n as f64 + random() * (1.0 - 1.0 / stride)) * stride) as usize] as usize;
             let centre = DVec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64);
             let voxel = centre + DVec3::new(random(), random(), random()) - 0.5;
             let bin = (self.at(voxel.as_vec3())? + 0.5) as u8;
@@ -76,7 +95,11 @@ fn fraction(seed: u64) -> impl FnMut() -> f64 {
 }
 
 /// The image with pairs of voxels merged along each axis that is finer than `mm`; `None` when there is none.
-fn halved(image: &VoxelVolume<f32>, mm: f64) -> Option<VoxelVolume<f32>> {
+fn halved<T: Copy + Sync>(
+    image: &VoxelVolume<T>,
+    mm: f64,
+    value_of: impl Fn(usize) -> f32 + Sync,
+) -> Option<VoxelVolume<f32>> {
     let spacing = image.spacing_mm();
     let step: [usize; 3] = std::array::from_fn(|a| if 1.5 * spacing[a] <= mm && image.dims[a] > 3 { 2 } else { 1 });
     if step == [1; 3] {
@@ -91,8 +114,9 @@ fn halved(image: &VoxelVolume<f32>, mm: f64) -> Option<VoxelVolume<f32>> {
         let (j, k) = (row % dims[1] * step[1], row / dims[1] * step[2]);
         for n in 0..step[1] * step[2] {
             let start = image.index([0, j + n % step[1], k + n / step[1]]);
-            for (value, from) in values.iter_mut().zip(image.data[start..].chunks_exact(step[0])) {
-                *value += share * from.iter().sum::<f32>();
+            for (i, value) in values.iter_mut().enumerate() {
+                let from = start + i * step[0];
+                *value += share * (from..from + step[0]).map(&value_of).sum::<f32>();
             }
         }
     });
@@ -101,7 +125,7 @@ fn halved(image: &VoxelVolume<f32>, mm: f64) -> Option<VoxelVolume<f32>> {
 
 /// The values under which half a per cent of the image lies and over which half a per cent does; `None` without contrast.
 pub(super) fn range(image: &VoxelVolume<f32>) -> Option<(f32, f32)> {
-    let stride = image.data.len().div_ceil(200_000).max(1);
+    let stride = image.data.len().div_ceil(400_000).max(1);
     let mut values: Vec<f32> = image.data.iter().step_by(stride).copied().filter(|v| v.is_finite()).collect();
     values.sort_unstable_by(f32::total_cmp);
     let low = *values.get(values.len() / 200)?;
@@ -109,16 +133,21 @@ pub(super) fn range(image: &VoxelVolume<f32>) -> Option<(f32, f32)> {
     (high > low && (high - low).is_finite()).then_some((low, high))
 }
 
-/// The middle of what is brighter than the mean, world mm.
+/// The middle of the largest piece that is brighter than the mean, world mm: a head without table and frame.
 pub(super) fn middle(level: &Level) -> DVec3 {
     let image = &level.binned;
-    let known = || image.data.iter().copied().enumerate().filter(|(_, v)| !v.is_nan());
-    let mean = known().map(|(_, v)| f64::from(v)).sum::<f64>() / known().count().max(1) as f64;
+    let known = || image.data.iter().copied().filter(|v| !v.is_nan());
+    let mean = known().map(f64::from).sum::<f64>() / known().count().max(1) as f64;
+    let bright = Components::of(image.dims, |at| f64::from(image.data[at]) > mean);
     let [nx, ny, _] = image.dims;
     let (mut sum, mut count) = (DVec3::ZERO, 0.0);
-    for (at, _) in known().filter(|&(_, v)| f64::from(v) > mean) {
-        sum += DVec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64);
-        count += 1.0;
+    if let Some(head) = bright.largest() {
+        bright.each_run(head, |run| {
+            for at in run {
+                sum += DVec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64);
+                count += 1.0;
+            }
+        });
     }
     image.world_from_voxel.transform_point3(sum / f64::max(count, 1.0))
 }

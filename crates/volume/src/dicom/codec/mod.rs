@@ -1,5 +1,6 @@
 //! Compressed pictures, one file per compression. Each decoder gives the stored numbers of one frame, row after row.
 
+pub(super) mod jpeg;
 pub(super) mod jpeg_2000;
 pub(super) mod jpeg_lossless;
 pub(super) mod jpeg_ls;

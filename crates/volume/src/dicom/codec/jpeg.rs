@@ -1,0 +1,53 @@
+//! JPEG with losses, 8 bits a pixel, decoded by the crate zune-jpeg.
+//!
+//! # Practice
+//! Size, components and precision are looked at before anything is decoded. A panic of the decoder on a damaged stream becomes an error.
+//!
+//! # When not to use it
+//! For JPEG extended with 12 bits a pixel, which is refused by name: no kept crate decodes it.
+
+use super::CodecError;
+use super::marker::{Segments, frame};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+/// Decodes a frame of one component; returns rows, columns and the stored numbers.
+pub(in crate::dicom) fn decode(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>), CodecError> {
+    let (rows, columns) = size(bytes)?;
+    let damaged = CodecError::Wrong("its JPEG stream is damaged");
+    let options = DecoderOptions::default()
+        .set_strict_mode(true)
+        .set_max_width(columns)
+        .set_max_height(rows)
+        .jpeg_set_out_colorspace(ColorSpace::Luma);
+    let decode = || JpegDecoder::new_with_options(ZCursor::new(bytes), options).decode();
+    let pixels = catch_unwind(AssertUnwindSafe(decode)).map_err(|_| damaged)?.map_err(|_| damaged)?;
+    match pixels.len() == rows * columns {
+        true => Ok((rows, columns, pixels.into_iter().map(u16::from).collect())),
+        false => Err(CodecError::Short(pixels.len())),
+    }
+}
+
+/// Rows and columns of the first frame header, where it is one that is decoded.
+fn size(bytes: &[u8]) -> Result<(usize, usize), CodecError> {
+    let mut segments = Segments::of(bytes)?;
+    loop {
+        let segment = segments.next()?;
+        match segment.marker {
+            0xc0..=0xc2 => {
+                let (precision, rows, columns) = frame(segment.body)?;
+                return match precision {
+                    8 => Ok((rows, columns)),
+                    _ => Err(CodecError::Wrong("a JPEG with losses of more than 8 bits a pixel, which is not read")),
+                };
+            }
+            0xc3 | 0xc5..=0xc7 | 0xc9..=0xcf | 0xda => {
+                return Err(CodecError::Wrong("a kind of JPEG that its transfer syntax does not announce"));
+            }
+            _ => {}
+        }
+    }
+}
