@@ -18,6 +18,9 @@
 //! each kept, 16 while building. Slices run in parallel with the same bytes for any number of threads. What lies beyond the grid's
 //! border is unknown: a mask that touches it has no surface there.
 //!
+//! Where voxels change, [`update`](DistanceField::update) recomputes a box: a bite of 2 mm in a skull of 0.5 mm voxels with a reach of 5 mm takes
+//! three thousandths of the whole.
+//!
 //! # Sources
 //! P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012.
 //!
@@ -55,16 +58,41 @@ impl DistanceField {
 
     /// `inside` gives how far a voxel is over the surface's level.
     fn of<T: Sample>(grid: &VoxelVolume<T>, inside: impl Fn(usize) -> f32 + Sync) -> Self {
-        let spacing = grid.spacing_mm();
-        let mut data = squared_distances(grid.dims, spacing, &inside);
-        for (at, foot) in feet(grid.dims, spacing, &inside) {
-            splat(grid.dims, spacing, at, foot, &mut data);
-        }
-        data.par_iter_mut().enumerate().for_each(|(at, d)| {
-            let far = d.sqrt().min(FAR_MM);
-            *d = if inside(at) >= 0.0 { -far } else { far };
-        });
+        let data = signed(grid.dims, grid.spacing_mm(), inside);
         Self::from_values(VoxelVolume { dims: grid.dims, data, world_from_voxel: grid.world_from_voxel })
+    }
+
+    /// Brings the field up to date after voxels from `changed[0]` to `changed[1]` (both included) changed, as when bone is carved.
+    ///
+    /// `inside` gives how far a voxel is over the surface's level now. Afterwards signs are those of a full computation, and so are
+    /// all distances up to `reach_mm`; further ones are at least that. The cost is that of the box with twice the reach around it.
+    pub fn update(&mut self, inside: impl Fn([usize; 3]) -> f32 + Sync, changed: [[usize; 3]; 2], reach_mm: f32) {
+        let (dims, spacing) = (self.values.dims, self.values.spacing_mm());
+        let reach = |axis: usize| (f64::from(reach_mm.clamp(0.0, FAR_MM)) / spacing[axis]).ceil().min(1e9) as usize;
+        // An edge's crossing moves with either end, and a foot point counts for the voxels within two of its own.
+        let around = |more: &dyn Fn(usize) -> usize| -> [std::ops::Range<usize>; 3] {
+            std::array::from_fn(|a| {
+                let end = changed[1][a].saturating_add(more(a) + 1).min(dims[a]);
+                changed[0][a].saturating_sub(more(a)).min(end)..end
+            })
+        };
+        let (set, seen) = (around(&|a| reach(a) + 3), around(&|a| 2 * reach(a) + 7));
+        let size = [0, 1, 2].map(|a| seen[a].len());
+        let place = |at: usize| {
+            [
+                seen[0].start + at % size[0],
+                seen[1].start + at / size[0] % size[1],
+                seen[2].start + at / (size[0] * size[1]),
+            ]
+        };
+        let fresh = signed(size, spacing, |at| inside(place(at)));
+        for k in set[2].clone() {
+            for j in set[1].clone() {
+                let from = set[0].start - seen[0].start + size[0] * (j - seen[1].start + size[1] * (k - seen[2].start));
+                let to = self.values.index([set[0].start, j, k]);
+                self.values.data[to..to + set[0].len()].copy_from_slice(&fresh[from..from + set[0].len()]);
+            }
+        }
     }
 
     fn from_values(values: VoxelVolume<f32>) -> Self {
@@ -110,6 +138,19 @@ impl DistanceField {
 
 /// The distance where there is no surface at all, mm.
 pub const FAR_MM: f32 = 1e6;
+
+/// Distances at the voxels, negative where `inside` is 0 or more, mm.
+fn signed(dims: [usize; 3], spacing: DVec3, inside: impl Fn(usize) -> f32 + Sync) -> Vec<f32> {
+    let mut data = squared_distances(dims, spacing, &inside);
+    for (at, foot) in feet(dims, spacing, &inside) {
+        splat(dims, spacing, at, foot, &mut data);
+    }
+    data.par_iter_mut().enumerate().for_each(|(at, d)| {
+        let far = d.sqrt().min(FAR_MM);
+        *d = if inside(at) >= 0.0 { -far } else { far };
+    });
+    data
+}
 
 /// The foot points: for each voxel with an edge that crosses the surface, from its centre, mm.
 fn feet(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) -> f32 + Sync)) -> Vec<(usize, DVec3)> {
@@ -350,6 +391,41 @@ mod tests {
                 prop_assert!((found.abs() - truth).abs() < 1e-4 * (1.0 + truth.abs()), "{found} for {truth}");
                 let inside = levels.data[at] >= 0.0;
                 prop_assert!(found == 0.0 || inside == (found < 0.0));
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn an_update_is_a_full_computation_up_to_its_reach(
+            seed in 0u64..1000,
+            holes in prop::collection::vec(([0usize..24, 0usize..20, 0usize..18], 0usize..4), 1..4),
+            reach in 0.0f32..9.0,
+        ) {
+            let dims = [24, 20, 18];
+            let affine = DAffine3::from_scale(DVec3::new(0.8, 1.0, 1.3));
+            let mut levels = VoxelVolume::filled(dims, affine, 0f32);
+            for at in 0..levels.data.len() {
+                let p = levels.centre_of([at % 24, at / 24 % 20, at / 480]);
+                levels.data[at] = 7.0 - p.distance(DVec3::splat(9.0)) as f32 + ((at as u64 * 31 + seed) % 17) as f32 / 17.0;
+            }
+            let mut field = DistanceField::of_level(&levels, 0.0);
+            for (centre, radius) in holes {
+                let low = centre.map(|c| c.saturating_sub(radius));
+                let high: [usize; 3] = std::array::from_fn(|a| (centre[a] + radius).min(dims[a] - 1));
+                for at in 0..levels.data.len() {
+                    let p = [at % 24, at / 24 % 20, at / 480];
+                    if (0..3).all(|a| (low[a]..=high[a]).contains(&p[a])) {
+                        levels.data[at] = -5.0;
+                    }
+                }
+                field.update(|p| levels.data[levels.index(p)], [low, high], reach);
+                let whole = DistanceField::of_level(&levels, 0.0);
+                for (found, truth) in field.values().data.iter().zip(&whole.values().data) {
+                    let near = truth.clamp(-reach, reach);
+                    prop_assert!((found.clamp(-reach, reach) - near).abs() < 1e-4, "{found} for {truth}");
+                    prop_assert_eq!(found.is_sign_negative(), truth.is_sign_negative());
+                }
             }
         }
     }
