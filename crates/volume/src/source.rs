@@ -270,7 +270,7 @@ impl Source {
 
     /// The error for a field.
     pub fn field(&self, field: &'static str, found: impl ToString, remedy: &'static str) -> ReadError {
-        ReadError::Field { file: self.file.clone(), field, found: found.to_string(), remedy }
+        ReadError::Field { file: self.file.clone(), field, found: shown(&found.to_string()), remedy }
     }
 
     /// Checks sizes that a header gives: the number of voxels, or what is wrong with them.
@@ -293,6 +293,11 @@ impl Source {
         check_affine(&self.file, field, world_from_voxel)?;
         Ok(VoxelVolume { dims: dims.map(|n| n as usize), data, world_from_voxel })
     }
+}
+
+/// As much of a value as a message shows: one short line, since in a damaged header what comes after may be of a patient.
+fn shown(found: &str) -> String {
+    found.chars().take_while(|c| !c.is_control() && *c != '\\').take(64).collect()
 }
 
 /// Makes room for `more` values: twice what is there, never more than the `limit` in all.
