@@ -66,9 +66,13 @@ fn make(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
         add(0x20, 0x0e, "UI", b"1.2.3.4 ");
         add(0x20, 0x32, "DS", format!("{:<16}", format!("0\\0\\{k}")).as_bytes());
         add(0x20, 0x37, "DS", b"1\\0\\0\\0\\1\\0 ");
-        [(0x02, 1), (0x10, DIMS[1]), (0x11, DIMS[0])].map(|(e, n)| add(0x28, e, "US", &(n as u16).to_le_bytes()));
+        for (element, value) in [(0x02, 1), (0x10, DIMS[1]), (0x11, DIMS[0])] {
+            add(0x28, element, "US", &(value as u16).to_le_bytes());
+        }
         add(0x28, 0x30, "DS", b"0.45\\0.45 ");
-        [(0x100, 16u16), (0x101, 16), (0x102, 15), (0x103, 1)].map(|(e, n)| add(0x28, e, "US", &n.to_le_bytes()));
+        for (element, value) in [(0x100, 16u16), (0x101, 16), (0x102, 15), (0x103, 1)] {
+            add(0x28, element, "US", &value.to_le_bytes());
+        }
         bytes.extend([0xe0, 0x7f, 0x10, 0, b'O', b'W', 0, 0]);
         bytes.extend((2 * plane as u32).to_le_bytes());
         bytes.extend(slice.iter().flat_map(|v| v.to_le_bytes()));

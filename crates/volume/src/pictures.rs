@@ -43,7 +43,7 @@ pub fn overlap_pictures(ct: &VoxelVolume<i16>, mri: &VoxelVolume<f32>, isovalue:
             p[down] = high[down] - y as f64 - 0.5;
             p
         };
-        let hu = |x: usize, y: usize| ct.at(at(x, y), |v| f32::from(v)).is_some_and(|v| v >= f32::from(isovalue));
+        let hu = |x: usize, y: usize| ct.at(at(x, y), f32::from).is_some_and(|v| v >= f32::from(isovalue));
         let bone: Vec<bool> = (0..width * height).map(|n| hu(n % width, n / width)).collect();
         let border = |n: usize| {
             let (x, y) = (n % width, n / width);

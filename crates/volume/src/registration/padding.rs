@@ -23,7 +23,7 @@ impl Padding {
         let [nx, ny, nz] = image.dims;
         let on_border = |run: &std::ops::Range<usize>| {
             let (j, k) = (run.start / nx % ny, run.start / (nx * ny));
-            run.start % nx == 0 || run.end % nx == 0 || j == 0 || j + 1 == ny || k == 0 || k + 1 == nz
+            run.start.is_multiple_of(nx) || run.end.is_multiple_of(nx) || j == 0 || j + 1 == ny || k == 0 || k + 1 == nz
         };
         let mut outer = HashMap::new();
         pieces.every_run(|piece, run| *outer.entry(piece).or_insert(false) |= on_border(&run));

@@ -35,7 +35,7 @@ impl Search<'_> {
             let at = places.len() / 2;
             let middle = if places.is_empty() { 0.0 } else { *places.select_nth_unstable_by(at, f64::total_cmp).1 };
             let points: Vec<_> =
-                points.iter().filter(|p| (p.world[half / 2] < middle) == (half % 2 == 0)).copied().collect();
+                points.iter().filter(|p| (p.world[half / 2] < middle) == half.is_multiple_of(2)).copied().collect();
             let (bins, least_overlap) = (self.config.bins, self.config.least_overlap);
             let pair = Pair { points: &points, moving, bins, least_overlap };
             let height = |pose: &Pose| pair.at(self.moving_from_fixed(best, pose)).normalised;
