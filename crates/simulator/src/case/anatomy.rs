@@ -40,7 +40,7 @@ pub fn registered(
     mri: &mut VoxelVolume<f32>,
     notes: &mut Vec<String>,
 ) -> Result<DAffine3, SessionError> {
-    let found = register(&ct.map(f32::from), mri, &RegistrationConfig::default());
+    let found = register(ct, mri, &RegistrationConfig::default());
     let found = found.map_err(|fault| SessionError::Case(fault.to_string()))?;
     let (_, turn, _) = found.fixed_from_moving.to_scale_rotation_translation();
     let middle = mri.centre_of(mri.dims.map(|n| n / 2));
