@@ -244,7 +244,7 @@ fn scatter(to: &mut [DVec3], corners: &[u32; 4], forces: &[DVec3; 4], scale: f64
 
 /// The rotation nearest to F, from a guess on.
 fn rotation_of(f: DMat3, mut turn: DQuat) -> DQuat {
-    for _ in 0..20 {
+    for _ in 0..80 {
         let r = DMat3::from_quat(turn);
         let twist = r.x_axis.cross(f.x_axis) + r.y_axis.cross(f.y_axis) + r.z_axis.cross(f.z_axis);
         let along = r.x_axis.dot(f.x_axis) + r.y_axis.dot(f.y_axis) + r.z_axis.dot(f.z_axis);
