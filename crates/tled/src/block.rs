@@ -56,8 +56,8 @@ pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
 pub(crate) struct Volumes<'a, const K: usize> {
     pub blocks: &'a [Block<K>],
     pub u: &'a [Quad],
-    /// `V (J - 1) / 4` of every element's corner, by slot.
-    pub shares: &'a mut [f32],
+    /// `V (J - 1) / 4` of every element, by block.
+    pub shares: &'a mut [[f32; WIDTH]],
 }
 
 /// Edges of an element as they moved, and the mean of its nodes' fourth numbers.
@@ -171,18 +171,12 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
 impl<const K: usize> Pass for Volumes<'_, K> {
     #[inline(always)]
     fn run<L: Lane>(&mut self) -> Found {
-        for block in self.blocks {
-            let mut row = [0.0; WIDTH];
+        for (block, row) in self.blocks.iter().zip(self.shares.iter_mut()) {
             for part in 0..WIDTH / L::LANES {
                 let moved = block.moved::<L>(part, self.u);
                 let d = deformation(&moved.edges, &block.gradients::<L>(part));
                 let share = L::load(&block.quarter_volume, part) * (d.j - L::splat(1.0));
-                share.store(&mut row, part);
-            }
-            for slots in &block.slots {
-                for (slot, share) in slots.iter().zip(&row) {
-                    self.shares[*slot as usize] = *share;
-                }
+                share.store(row, part);
             }
         }
         Found::default()

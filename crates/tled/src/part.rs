@@ -22,8 +22,10 @@ use trepan_soft::{Body, Law};
 pub(crate) struct Part {
     group: Box<dyn Group>,
     slots: Vec<Quad>,
-    /// By slot: corner shares of the volume change, mm³.
-    shares: Vec<f32>,
+    /// A quarter of every element's volume change, mm³, by block.
+    shares: Vec<[f32; WIDTH]>,
+    /// By slot: whose it is, number of the element in this part.
+    owners: Vec<u32>,
     /// Place of the first node that it touches.
     first: usize,
     /// Slots of the node at place `first + i`: `starts[i]..starts[i + 1]`.
@@ -35,7 +37,7 @@ pub(crate) struct Part {
 /// What to do with the elements.
 #[derive(Clone, Copy)]
 pub(crate) enum Work {
-    /// Corner shares of the volume change.
+    /// Volume changes.
     Volumes,
     /// Forces.
     Forces { fade: [Fade; 2], cure_locking: bool },
@@ -44,7 +46,7 @@ pub(crate) enum Work {
 /// Elements of one law.
 trait Group: Send {
     fn forces(&mut self, kernel: Kernel, fade: [Fade; 2], cure_locking: bool, u: &[Quad], slots: &mut [Quad]) -> Found;
-    fn volumes(&self, kernel: Kernel, u: &[Quad], shares: &mut [f32]);
+    fn volumes(&self, kernel: Kernel, u: &[Quad], shares: &mut [[f32; WIDTH]]);
     fn forget(&mut self);
 }
 
@@ -67,7 +69,8 @@ impl Part {
         Self {
             group: group((body, layout, scaling), tets, (first, &starts), relaxation),
             slots: vec![[0.0; 4]; starts[count] as usize + 1],
-            shares: vec![0.0; starts[count] as usize + 1],
+            shares: vec![[0.0; WIDTH]; tets.len().div_ceil(WIDTH)],
+            owners: owners(body, layout, tets, (first, &starts)),
             first,
             starts,
             found: Found::default(),
@@ -95,8 +98,10 @@ impl Part {
 
     /// Adds its shares of the volume change to the sums by place.
     pub fn add_shares_to(&self, sums: &mut [f32]) {
+        let shares = self.shares.as_flattened();
         for (run, sum) in self.starts.windows(2).zip(&mut sums[self.first..]) {
-            *sum = self.shares[run[0] as usize..run[1] as usize].iter().fold(*sum, |sum, share| sum + share);
+            let owners = &self.owners[run[0] as usize..run[1] as usize];
+            *sum = owners.iter().fold(*sum, |sum, &owner| sum + shares[owner as usize]);
         }
     }
 
@@ -104,6 +109,20 @@ impl Part {
     pub fn forget(&mut self) {
         self.group.forget();
     }
+}
+
+/// The elements around each node, in the order of its slots.
+fn owners(body: &Body, layout: &Layout, tets: &[u32], (first, starts): (usize, &[u32])) -> Vec<u32> {
+    let mut next = starts.to_vec();
+    let mut owners = vec![0; starts[starts.len() - 1] as usize];
+    for (at, &t) in tets.iter().enumerate() {
+        for n in body.mesh.tets[t as usize] {
+            let place = layout.place_of[n as usize] as usize - first;
+            owners[next[place] as usize] = at as u32;
+            next[place] += 1;
+        }
+    }
+    owners
 }
 
 /// The group for the law of these elements. Only the commonest law has a form without memory.
@@ -149,7 +168,7 @@ impl<M: Constitutive<K> + Send, const K: usize, const T: usize> Group for Of<M, 
         kernel.run(&mut Forces::<M, K, T> { blocks, memory, fade, u, slots, cure_locking, law: PhantomData })
     }
 
-    fn volumes(&self, kernel: Kernel, u: &[Quad], shares: &mut [f32]) {
+    fn volumes(&self, kernel: Kernel, u: &[Quad], shares: &mut [[f32; WIDTH]]) {
         kernel.run(&mut Volumes { blocks: &self.blocks, u, shares });
     }
 
