@@ -29,6 +29,7 @@ mod energy;
 mod factor;
 mod law;
 pub mod linear;
+pub mod mass_spring;
 mod material;
 mod method;
 mod operator;

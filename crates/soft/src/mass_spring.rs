@@ -1,0 +1,226 @@
+//! Masses and springs: the first idea that everybody has, here to be compared with.
+//!
+//! # Theory
+//! Every edge is a spring, `f = k (l - l₀) e`. Springs that point evenly in all directions make a solid with `λ = μ = Σ k l²/(15 V)`, so each tetrahedron
+//! gives each of its six edges `k = 2.5 μ V/l²`. Such a solid has ν = 1/4 whatever is asked for (Cauchy's relation): the tetrahedron adds the
+//! pressure `κ' (J - 1)`, `κ' = κ - 5/3 μ`, that makes up its bulk modulus. Central differences as in [`crate::linear`].
+//!
+//! # Practice
+//! About 20 ns a tetrahedron and step, f64, no allocation.
+//!
+//! # When not to use it
+//! Where a force must be right: edges never point evenly, so stiffness depends on how they lie, and no finer mesh makes it better.
+
+use crate::body::Element;
+use crate::energy::cofactor;
+use crate::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency};
+use glam::{DMat3, DVec3};
+use std::collections::BTreeMap;
+use trepan_geometry::Vec3;
+
+/// Settings of masses and springs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// Mass-proportional damping α, 1/ms; `None` = critical for the lowest mode of the elastic body.
+    pub damping_per_ms: Option<f32>,
+    /// Share of a bound of the stable step that [`SoftSolver::stable_dt_ms`] gives, over 0 and below 1.
+    pub safety: f32,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { damping_per_ms: None, safety: 0.9 }
+    }
+}
+
+/// Mass-spring solver.
+pub struct MassSpring {
+    springs: Vec<Spring>,
+    elements: Vec<Element>,
+    /// κ' by material, MPa.
+    pressures: Vec<f64>,
+    rest: Vec<DVec3>,
+    masses: Vec<f64>,
+    fixed: Vec<bool>,
+    u: Vec<DVec3>,
+    v: Vec<DVec3>,
+    force: Vec<DVec3>,
+    positions: Vec<Vec3>,
+    velocities: Vec<Vec3>,
+    damping_per_ms: f64,
+    stable_dt_ms: f64,
+}
+
+/// An edge.
+struct Spring {
+    ends: [u32; 2],
+    length_mm: f64,
+    stiffness: f64,
+}
+
+impl MassSpring {
+    /// Takes a body at rest.
+    pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
+        body.check()?;
+        if !(config.safety > 0.0 && config.safety < 1.0) {
+            return Err(BodyError::Config { field: "safety", value: config.safety, right: "over 0 and below 1" });
+        }
+        if config.damping_per_ms.is_some_and(|d| d.is_nan() || d < 0.0) {
+            let value = config.damping_per_ms.unwrap_or_default();
+            return Err(BodyError::Config { field: "damping_per_ms", value, right: "at least 0" });
+        }
+        let nodes = body.mesh.positions.len();
+        let critical = || 2.0 * lowest_frequency(body).unwrap_or(0.0);
+        let made_up = |m: &crate::Material| m.bulk_mpa() - m.shear_mpa() * 5.0 / 3.0;
+        let mut solver = Self {
+            springs: springs(body),
+            elements: body.elements(),
+            pressures: body.materials.iter().map(made_up).collect(),
+            rest: body.mesh.positions.iter().map(|p| p.as_dvec3()).collect(),
+            masses: body.lumped_masses_g(),
+            fixed: body.fixed_mask(),
+            u: vec![DVec3::ZERO; nodes],
+            v: vec![DVec3::ZERO; nodes],
+            force: vec![DVec3::ZERO; nodes],
+            positions: body.mesh.positions.clone(),
+            velocities: vec![Vec3::ZERO; nodes],
+            damping_per_ms: config.damping_per_ms.map_or_else(critical, f64::from),
+            stable_dt_ms: 0.0,
+        };
+        solver.stable_dt_ms = f64::from(config.safety) * solver.bound_ms(body);
+        Ok(solver)
+    }
+
+    /// `2/ω` with ω² no less than the largest: Gershgorin's circles for the springs, single elements for the pressure.
+    fn bound_ms(&self, body: &Body) -> f64 {
+        let mut around = vec![0.0; self.masses.len()];
+        self.springs.iter().for_each(|s| s.ends.iter().for_each(|&n| around[n as usize] += 2.0 * s.stiffness));
+        let of_springs = around.iter().zip(&self.masses).map(|(k, m)| k / m).fold(0.0, f64::max);
+        let of_pressure = |t: usize| {
+            let slopes: f64 = self.elements[t].shape.gradients.iter().map(|g| g.length_squared()).sum();
+            let pressure = self.pressures[usize::from(self.elements[t].material)].abs();
+            4.0 * pressure * slopes / f64::from(body.material(t).density_g_mm3())
+        };
+        2.0 / (of_springs + (0..self.elements.len()).map(of_pressure).fold(0.0, f64::max)).sqrt()
+    }
+
+    /// Forces of springs and pressure; gives the number of inverted elements.
+    fn pull(&mut self) -> u32 {
+        self.force.fill(DVec3::ZERO);
+        for Spring { ends: [a, b], length_mm, stiffness } in &self.springs {
+            let [a, b] = [*a as usize, *b as usize];
+            let apart = (self.rest[b] + self.u[b]) - (self.rest[a] + self.u[a]);
+            let length = apart.length().max(1e-9);
+            let force = apart * (stiffness * (1.0 - length_mm / length));
+            self.force[a] += force;
+            self.force[b] -= force;
+        }
+        let mut inverted = 0;
+        for Element { corners, shape, material } in &self.elements {
+            let f = DMat3::IDENTITY + shape.gradient_of(corners.map(|n| self.u[n as usize]));
+            let j = f.determinant();
+            inverted += u32::from(j <= 0.0);
+            let stress = cofactor(f) * (self.pressures[usize::from(*material)] * (j - 1.0));
+            for (&n, force) in corners.iter().zip(shape.forces_of(stress)) {
+                self.force[n as usize] -= force;
+            }
+        }
+        inverted
+    }
+
+    fn press(&mut self, loads: &Loads) -> f32 {
+        let contact = &loads.contact;
+        let mean = contact.mean(|n| self.positions.get(n as usize).copied().unwrap_or_default());
+        let speed = contact.mean(|n| self.velocities.get(n as usize).copied().unwrap_or_default());
+        let pressure = contact.pressure_n(mean, speed);
+        for (n, w) in contact.nodes() {
+            if let Some(force) = self.force.get_mut(n as usize) {
+                *force -= (contact.normal * (pressure * w)).as_dvec3();
+            }
+        }
+        pressure
+    }
+
+    fn advance(&mut self, gravity: DVec3, dt: f64, report: &mut StepReport) {
+        let half = 0.5 * self.damping_per_ms * dt;
+        for n in (0..self.u.len()).filter(|&n| !self.fixed[n]) {
+            let pull = gravity + self.force[n] / self.masses[n];
+            let v = (self.v[n] * (1.0 - half) + pull * dt) / (1.0 + half);
+            let u = self.u[n] + v * dt;
+            let sound = v.is_finite() && u.is_finite() && u.length() < 1e4;
+            (self.v[n], self.u[n]) = if sound { (v, u) } else { (DVec3::ZERO, DVec3::ZERO) };
+            report.non_finite += u32::from(!sound);
+            (self.positions[n], self.velocities[n]) = ((self.rest[n] + self.u[n]).as_vec3(), self.v[n].as_vec3());
+        }
+    }
+}
+
+impl SoftSolver for MassSpring {
+    fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
+        let inverted = self.pull();
+        let contact_n = self.press(loads);
+        let mut report = StepReport {
+            substeps: 1,
+            contact_n,
+            contact_scale: 1.0,
+            converged: true,
+            inverted,
+            ..StepReport::default()
+        };
+        self.advance(loads.gravity.as_dvec3(), f64::from(dt_ms), &mut report);
+        report
+    }
+
+    fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    fn velocities(&self) -> &[Vec3] {
+        &self.velocities
+    }
+
+    fn stable_dt_ms(&self) -> f32 {
+        self.stable_dt_ms as f32
+    }
+}
+
+/// Every edge once, with what all tetrahedra around it give it.
+fn springs(body: &Body) -> Vec<Spring> {
+    let mut edges: BTreeMap<[u32; 2], f64> = BTreeMap::new();
+    for (t, corners) in body.mesh.tets.iter().enumerate() {
+        for (i, &a) in corners.iter().enumerate() {
+            for &b in &corners[i + 1..] {
+                let given = 2.5 * body.material(t).shear_mpa() * body.mesh.volume_mm3(t);
+                *edges.entry([a.min(b), a.max(b)]).or_default() += given;
+            }
+        }
+    }
+    let spring = |(ends, given): ([u32; 2], f64)| {
+        let [a, b] = ends.map(|n| body.mesh.positions[n as usize].as_dvec3());
+        Spring { ends, length_mm: a.distance(b), stiffness: given / a.distance_squared(b) }
+    };
+    edges.into_iter().map(spring).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Material, boxes};
+
+    #[test]
+    fn swelling_has_the_bulk_modulus_of_the_material_and_turning_no_force() {
+        let mesh = boxes::split_box([2; 3], Vec3::splat(20.0));
+        let body = Body::uniform(mesh, vec![], Material::BRAIN);
+        let mut solver = MassSpring::new(&body, &Config::default()).unwrap();
+        let (strain, turn) = (1e-5, DMat3::from_rotation_y(0.7));
+        solver.u = solver.rest.iter().map(|x| *x * strain).collect();
+        solver.pull();
+        // The virial of the nodal forces is -3 p V, p = 3 κ ε.
+        let virial: f64 = solver.rest.iter().zip(&solver.force).map(|(x, f)| x.dot(*f)).sum();
+        let exact = -9.0 * body.material(0).bulk_mpa() * strain * 8000.0;
+        assert!((virial / exact - 1.0).abs() < 1e-3, "{virial} {exact}");
+        solver.u = solver.rest.iter().map(|x| turn * *x - *x).collect();
+        solver.pull();
+        assert!(solver.force.iter().all(|f| f.length() < 1e-12));
+    }
+}
