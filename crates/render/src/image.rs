@@ -1,6 +1,5 @@
 //! A finished picture and its PNG file.
 
-use std::io::Write;
 use std::path::Path;
 
 /// Pixels from the upper left, row by row, sRGB with alpha.
@@ -22,20 +21,21 @@ impl Image {
         if inside { [0, 1, 2, 3].map(|c| self.rgba[at + c]) } else { [0; 4] }
     }
 
-    /// Writes a PNG file: first beside it, then renamed, so that no half file is ever seen.
-    pub fn write_png(&self, path: &Path) -> std::io::Result<()> {
-        let part = path.with_extension("png.part");
-        let mut file = std::io::BufWriter::new(std::fs::File::create(&part)?);
-        let mut encoder = png::Encoder::new(&mut file, self.width, self.height);
+    /// The bytes of a PNG file.
+    pub fn png(&self) -> std::io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        encoder
-            .write_header()
-            .and_then(|mut writer| writer.write_image_data(&self.rgba))
-            .map_err(std::io::Error::other)?;
-        file.flush()?;
-        drop(file);
+        let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&self.rgba));
+        written.map(|()| bytes).map_err(std::io::Error::other)
+    }
+
+    /// Writes a PNG file: first beside it, then renamed, so that no half file is ever seen.
+    pub fn write_png(&self, path: &Path) -> std::io::Result<()> {
+        let part = path.with_extension("png.part");
+        std::fs::write(&part, self.png()?)?;
         std::fs::rename(part, path)
     }
 }

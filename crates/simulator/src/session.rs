@@ -9,6 +9,7 @@ use crate::hand::{self, Feel, Hand};
 use crate::options::Options;
 use crate::program::Program;
 use crate::report::output;
+use crate::report::page::Shot;
 use crate::report::summary::{About, Machine, Summary};
 use crate::run::journal::Kept;
 use crate::run::lockstep;
@@ -108,7 +109,7 @@ impl Session {
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
         let summary = Summary::new(self.about(&album, adapter, remarks), &outcome);
-        output::write(&self.out, &record, &summary, &outcome, &album.shots)?;
+        output::write(&self.out, &record, &summary, &outcome, &self.shots(album.shots))?;
         if let Some(bone) = self.scene.bone.as_ref().filter(|_| self.program.has_bone()) {
             output::drilled(&self.out, bone, self.options.stl)?;
         }
@@ -177,6 +178,14 @@ impl Session {
         };
         let collision = CollisionStage::new(self.program, &brain.mesh, &trepan_deformable::Config::default());
         Ok(Tissue { collision: collision.map_err(|f| internal(&f))?, solver: SolverStage::new(solver, gravity) })
+    }
+
+    /// The pictures of the report: how the images fit, then the session's.
+    fn shots(&self, session: Vec<Shot>) -> Vec<Shot> {
+        let caption =
+            "how CT and MRI fit: the bone's contour over the MRI (with --register above as read, below as moved)";
+        let fit = self.scene.fit_png.clone().map(|png| Shot { caption: caption.into(), png });
+        session.into_iter().chain(fit).collect()
     }
 
     fn graphics(&self) -> Result<Graphics, String> {

@@ -2,7 +2,7 @@
 //!
 //! # Practice
 //! Sagittal, coronal and axial through the middle of the bone, in pixels of 1 mm over the CT's box; rows from head to foot (axial: from front
-//! to back), left to right the patient's back to front (sagittal) or left to right. The bone's contour is orange. Plain RGB bytes:
+//! to back). Radiological convention: the patient's right is on the left; the sagittal picture has the face on the left. The bone's contour is orange. Plain RGB bytes:
 //! writing a picture file is the caller's.
 
 use crate::{VoxelVolume, resample::corners};
@@ -39,7 +39,7 @@ pub fn overlap_pictures(ct: &VoxelVolume<i16>, mri: &VoxelVolume<f32>, isovalue:
         let (width, height) = (size[across] as usize, size[down] as usize);
         let at = |x: usize, y: usize| {
             let mut p = middle;
-            p[across] = low[across] + x as f64 + 0.5;
+            p[across] = high[across] - x as f64 - 0.5;
             p[down] = high[down] - y as f64 - 0.5;
             p
         };
@@ -139,11 +139,11 @@ mod tests {
         assert_eq!([axial.width, axial.height, axial.rgb.len()], [30, 40, 3600]);
         let pixel =
             |p: &Picture, x: usize, y: usize| <[u8; 3]>::try_from(&p.rgb[3 * (x + y * p.width)..][..3]).unwrap();
-        // Row 0 is the head's end, voxel 19; in the sagittal picture x runs from back to front.
-        assert_eq!(pixel(&sagittal, 4, 19 - 10), BONE);
-        assert_eq!(pixel(&coronal, 10, 19 - 14), BONE);
-        assert_eq!(pixel(&axial, 10, 39 - 4), BONE);
-        assert_ne!(pixel(&axial, 15, 39 - 15), BONE, "the inside of bone is not drawn");
+        // Row 0 is the head's end, voxel 19; x runs from front to back or from right to left.
+        assert_eq!(pixel(&sagittal, 39 - 4, 19 - 10), BONE);
+        assert_eq!(pixel(&coronal, 29 - 10, 19 - 14), BONE);
+        assert_eq!(pixel(&axial, 29 - 10, 39 - 4), BONE);
+        assert_ne!(pixel(&axial, 29 - 15, 39 - 15), BONE, "the inside of bone is not drawn");
         assert!(pixel(&sagittal, 1, 0)[0] > pixel(&sagittal, 1, 18)[0], "the head is up");
         mri.world_from_voxel.translation.x += 500.0;
         assert_eq!(pixel(&overlap_pictures(&ct, &mri, 0)[2], 1, 1), [0; 3]);

@@ -4,6 +4,7 @@
 //! CASE/case.json   form, name, hash of the images, version, isovalue, planned opening, recipe, remarks, file hashes
 //!      skull.nii   densities in HU, cubes, largest piece of bone only
 //!      mri.nii     the MRI around the brain      mask.nii   1 in the brain
+//!      fit.png     the bone's contour over the MRI
 //!      brain.vtk   tetrahedra, with their classes
 //! ```
 //!
@@ -22,11 +23,12 @@ use trepan_mesh::{lattice::LabelledMesh, vtk};
 use trepan_volume::{hounsfield, nifti};
 
 /// Goes up when the folder's form changes.
-const FORM: u32 = 5;
+const FORM: u32 = 6;
 const SKULL: &str = "skull.nii";
 const MRI: &str = "mri.nii";
 const MASK: &str = "mask.nii";
 const MESH: &str = "brain.vtk";
+const FIT: &str = "fit.png";
 const CARD: &str = "case.json";
 
 /// `case.json`.
@@ -60,6 +62,10 @@ pub fn save(case: &Case, recipe: &Recipe, folder: &Path) -> Result<(), String> {
         let labelled = LabelledMesh { mesh: brain.mesh.clone(), label_of_tet };
         vtk::write_labelled(&folder.join(MESH), &labelled).map_err(|f| text(&f))?;
         names.extend([MASK, MRI, MESH]);
+    }
+    if let Some(png) = &case.fit_png {
+        fs::write(folder.join(FIT), png).map_err(|f| text(&f))?;
+        names.push(FIT);
     }
     let mut files = BTreeMap::new();
     for name in names {
@@ -110,8 +116,10 @@ pub fn load(folder: &Path) -> Result<Case, SessionError> {
         }
         false => None,
     };
+    let fit_png = card.files.contains_key(FIT).then(|| fs::read(folder.join(FIT))).transpose();
+    let fit_png = fit_png.map_err(|fault| broken(FIT, &fault))?;
     let Card { name, hash, isovalue_hu, opening, notes, .. } = card;
-    Ok(Case { name, hash, skull, isovalue_hu, brain, opening, notes, cached: true })
+    Ok(Case { name, hash, skull, isovalue_hu, brain, opening, fit_png, notes, cached: true })
 }
 
 #[cfg(test)]
@@ -131,6 +139,7 @@ mod tests {
             skull: Some(skull.clone()),
             isovalue_hu: 350,
             opening: Some(Opening { entry_mm: [1.0, 2.0, 3.0], inward: [0.0, 0.0, -1.0], bone_mm: 6.5, brain_mm: 8.0 }),
+            fit_png: Some(vec![1, 2, 3]),
             notes: vec!["a remark".into()],
             ..Case::default()
         };
@@ -138,7 +147,7 @@ mod tests {
         save(&case, &recipe, home.path()).expect("the case is written");
         let back = load(home.path()).expect("the case is read");
         assert_eq!((back.skull.as_ref(), back.isovalue_hu, back.notes.len()), (Some(&skull), 350, 1));
-        assert_eq!(back.opening, case.opening);
+        assert_eq!((back.opening, back.fit_png), (case.opening, case.fit_png));
         let mut bytes = fs::read(home.path().join(SKULL)).expect("a skull");
         bytes[400] ^= 1;
         fs::write(home.path().join(SKULL), bytes).expect("written");

@@ -7,6 +7,7 @@
 
 use crate::case::anatomy::{find_brain, make_brain, make_skull, read_ct, read_mri, registered};
 use crate::case::cache::Cache;
+use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
 use crate::case::opening::Opening;
 use crate::case::stages::ImportStages;
@@ -65,15 +66,15 @@ fn build(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<
     let isovalue_hu = recipe.isovalue_hu.or(ct.as_ref().map(bone_isovalue)).unwrap_or(400);
     stages.next("reading the MRI");
     let mut mri = inputs.mri.as_deref().map(|path| read_mri(path, &mut notes)).transpose()?;
-    let ct_from_mri = match (&ct, &mut mri) {
-        (Some(ct), Some(mri)) if recipe.register => {
+    let (mut fit, mut ct_from_mri) = (Fit::new(), DAffine3::IDENTITY);
+    if let (Some(ct), Some(mri)) = (&ct, &mut mri) {
+        if recipe.register {
             stages.next("fitting the MRI to the CT");
-            registered(ct, mri, &mut notes)?
+            fit.look(ct, mri, isovalue_hu);
+            ct_from_mri = registered(ct, mri, &mut notes)?;
         }
-        _ => DAffine3::IDENTITY,
-    };
-    if let (Some(ct), Some(mri)) = (&ct, &mri) {
         overlap(ct, mri).map_err(|fault| SessionError::Case(fault.to_string()))?;
+        fit.look(ct, mri, isovalue_hu);
     }
     stages.next("finding the brain");
     let mask = mri
@@ -88,5 +89,6 @@ fn build(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<
         brain.map(|(mri, mask)| make_brain(inputs, &mri, &mask, ct_from_mri, recipe, &mut notes)).transpose()?;
     stages.next("planning the opening");
     let opening = skull.as_ref().map(|skull| Opening::on(skull, isovalue_hu, brain.as_ref(), recipe.opening));
-    Ok(Case { skull, isovalue_hu, brain, opening: opening.transpose()?.flatten(), notes, ..Case::default() })
+    let fit_png = fit.png();
+    Ok(Case { fit_png, skull, isovalue_hu, brain, opening: opening.transpose()?.flatten(), notes, ..Case::default() })
 }

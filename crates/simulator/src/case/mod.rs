@@ -3,6 +3,7 @@
 mod anatomy;
 pub(crate) mod cache;
 pub(crate) mod choice;
+mod fit;
 pub(crate) mod folder;
 pub(crate) mod import;
 pub(crate) mod opening;
@@ -62,6 +63,8 @@ pub struct Case {
     pub brain: Option<Brain>,
     /// Where the skull is to be opened; `None` without one.
     pub opening: Option<Opening>,
+    /// How CT and MRI fit, as a PNG file's bytes; `None` without both.
+    pub fit_png: Option<Vec<u8>>,
     /// Remarks of the import.
     pub notes: Vec<String>,
     /// Whether it came from the cache.

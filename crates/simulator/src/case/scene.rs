@@ -27,6 +27,8 @@ pub struct Scene {
     pub brain: Option<RestBrain>,
     /// Where to operate.
     pub site: Site,
+    /// How CT and MRI fit, as a PNG file's bytes.
+    pub fit_png: Option<Vec<u8>>,
     /// Remarks for the user.
     pub remarks: Vec<String>,
 }
@@ -75,7 +77,7 @@ impl Scene {
             };
             SessionError::Case(fault.into())
         })?;
-        Ok(Self { bone, brain, site, remarks })
+        Ok(Self { bone, brain, site, fit_png: case.fit_png, remarks })
     }
 }
 
