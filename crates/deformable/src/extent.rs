@@ -42,20 +42,21 @@ impl Extent {
     #[inline]
     pub fn merge(&mut self, other: &Self) {
         for axis in 0..3 {
-            self.low[axis] = self.low[axis].min(other.low[axis]);
-            self.high[axis] = self.high[axis].max(other.high[axis]);
+            let (low, high) = (other.low[axis], other.high[axis]);
+            self.low[axis] = if low < self.low[axis] { low } else { self.low[axis] };
+            self.high[axis] = if high > self.high[axis] { high } else { self.high[axis] };
         }
     }
 
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
-        let on = |axis: usize| {
-            (self.low[axis] <= other.high[axis])
+        let apart = |axis: usize| {
+            !((self.low[axis] <= other.high[axis])
                 & (other.low[axis] <= self.high[axis])
                 & (self.low[axis] <= self.high[axis])
-                & (other.low[axis] <= other.high[axis])
+                & (other.low[axis] <= other.high[axis]))
         };
-        on(0) && on(1) && on(2)
+        !(apart(0) || apart(1) || apart(2))
     }
 
     #[inline]

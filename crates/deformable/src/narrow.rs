@@ -30,6 +30,8 @@ pub(crate) struct Hits {
     pub tests: u32,
     /// Tetrahedra met that have no positive volume, or none at all.
     pub skipped: u32,
+    /// The last of these.
+    pub last_skipped: u32,
     /// Candidates that did not fit.
     pub overflow: u32,
     /// Frames of this step's last tetrahedra, by their number's last bits.
@@ -49,6 +51,7 @@ impl Hits {
             weights: vec![[0.0; 4]; count],
             tests: 0,
             skipped: 0,
+            last_skipped: 0,
             overflow: 0,
             frames: [(NONE, None); FRAMES],
         }
@@ -70,6 +73,7 @@ impl Hits {
         }
         let Some(frame) = &slot.1 else {
             self.skipped += 1;
+            self.last_skipped = tet;
             return None;
         };
         let weights = frame.weights(scene.points[i]);
@@ -96,7 +100,7 @@ impl Frame {
         let (ab, ac, ad) = (b.as_dvec3() - origin, c.as_dvec3() - origin, d.as_dvec3() - origin);
         let facing_b = ac.cross(ad);
         let volume = ab.dot(facing_b);
-        if !(volume > 0.0 && volume.is_finite()) {
+        if !is_volume(volume) {
             return None;
         }
         let per_volume = 1.0 / volume;
@@ -112,6 +116,18 @@ impl Frame {
         let (b, c, d) = (from_a.dot(*b), from_a.dot(*c), from_a.dot(*d));
         [1.0 - b - c - d, b, c, d]
     }
+}
+
+/// Whether a tetrahedron has positive, finite volume, by the same arithmetic as the exact test.
+#[inline]
+pub(crate) fn is_sound([a, b, c, d]: [Vec3; 4]) -> bool {
+    let origin = a.as_dvec3();
+    is_volume((b.as_dvec3() - origin).dot((c.as_dvec3() - origin).cross(d.as_dvec3() - origin)))
+}
+
+#[inline]
+fn is_volume(volume: f64) -> bool {
+    volume > 0.0 && volume < f64::INFINITY
 }
 
 /// Whether a point with these coordinates lies inside or on the border.

@@ -143,7 +143,7 @@ impl TissueCollision {
 }
 
 /// The surface is kept fitted this many radii around the tip.
-const REACH: f32 = 3.5;
+const REACH: f32 = 2.5;
 
 /// Default cell: this times the mean edge (the thesis's analytic optimum on its spheres).
 const CELL_PER_EDGE: f32 = 1.45;

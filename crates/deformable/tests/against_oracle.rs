@@ -116,6 +116,39 @@ fn degenerate_meshes_lose_nothing_and_give_no_nan() {
     }
 }
 
+/// Nodes thrown, doubled and nowhere, others at every step: the walk finds every point and the same depth as a look at every box.
+#[test]
+fn a_mesh_torn_anew_at_every_step_hides_nothing_from_the_walk() {
+    let mesh = block([5, 5, 5], 5.0);
+    let tool = Tool::probe(2.0);
+    let new = |method| {
+        TissueCollision::new(&mesh, &tool, &Config { method, points: 60, ..Config::default() }).expect("a sound config")
+    };
+    let (mut walk, mut scan) = (new(Method::Walk), new(Method::Scan));
+    let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    let (mut random, mut tip, mut touching) = (Random::new(31), Vec3::splat(12.5), 0);
+    for pose in 0..6000 {
+        let mut positions = deformed(&mesh, 5.0, pose as f32 * 0.01, &mut random);
+        for k in 0..4 {
+            let mut node = || ((random.unit() * still.len() as f32) as usize).min(still.len() - 1);
+            let (thrown, nowhere, doubled, other) = (node(), node(), node(), node());
+            positions[thrown] += random.cube() * 10.0;
+            positions[nowhere] = if (pose + k) % 8 < 3 { Vec3::NAN } else { positions[nowhere] };
+            positions[doubled] = positions[other];
+        }
+        let anywhere = Vec3::splat(12.5) + random.cube() * 16.0;
+        tip = if random.unit() < 0.3 { anywhere } else { tip + random.cube() * 0.5 };
+        let state = tool_at(tip, random.rotation());
+        walk.step(&positions, &still, &state, &mut found);
+        scan.step(&positions, &still, &state, &mut truth);
+        assert_eq!(found.points_in_contact, truth.points_in_contact, "pose {pose}, tip {tip}");
+        assert_eq!(found.manifold.depth_mm, truth.manifold.depth_mm, "pose {pose}, tip {tip}");
+        touching += u32::from(truth.points_in_contact > 0);
+    }
+    assert!(touching > 2000, "{touching}");
+}
+
 #[test]
 fn the_thesis_never_sees_a_point_that_is_not_there() {
     let mesh = block([6, 5, 4], 5.0);

@@ -7,7 +7,7 @@
 //! the far side of a thin structure never takes the contact over, and deeper stays deeper through the whole thickness. A tool that moved by more than R
 //! in one step jumped: q is searched anew.
 //!
-//! The normal is the mean over the centre and every second point inside, each with the blended surface normal at its own closest point (`near.rs`) and weighted
+//! The normal is the mean over the centre and every fourth point inside, each with the blended surface normal at its own closest point (`near.rs`) and weighted
 //! with its own depth: `f = Σ dᵢ nᵢ`, `n = f / |f|`. A weight is zero where a point enters, so nothing jumps. In a groove whose walls push against each
 //! other the coherence `κ = |f| / Σ dᵢ` falls to 0, and the depth is scaled by `min(1, 2κ)`: opposite walls cancel, everything else is left alone.
 //!
@@ -46,8 +46,8 @@ pub(crate) struct Ball {
 const MAX_NEAR: usize = 1024;
 /// A triangle belongs to the touched side when its normal is within 70 degrees of the touched triangle's.
 const SAME_SIDE: f32 = 0.34;
-/// Every second point inside is sampled: the shell is even, so half of it is too.
-const SAMPLE_EVERY: usize = 2;
+/// Every fourth point inside is sampled: the shell is even, so a quarter of it is too.
+const SAMPLE_EVERY: usize = 4;
 /// Normals blend over this many radii.
 const BLEND: f32 = 0.5;
 

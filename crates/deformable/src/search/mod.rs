@@ -1,8 +1,11 @@
 //! The searches behind [`Method`](crate::Method): each fills, for every tool point, the tetrahedron that holds it.
 
 mod brute;
+mod flood;
+mod lost;
 mod phased;
 mod thesis;
+mod unsound;
 mod walk;
 
 use crate::broad::{AabbTree, BroadPhase, HashedGrid, UniformGrid};

@@ -2,30 +2,30 @@
 //!
 //! # Theory
 //! A point that was in a tetrahedron is, a millisecond later, in it or in one close by: step across the face with the most negative
-//! barycentric coordinate until all are 0 or more (Guibas and Stolfi's walk). A point that leaves through the border, or had no tetrahedron, is
-//! looked for by a flood: every tetrahedron that meets the box of such points is reached, through faces inside that box, either from a border triangle in
-//! the box or from a tetrahedron that already holds a point. So the flood misses nothing, however the tool moved.
-//! When that finds no point (the tool jumped deep into the tissue, or is outside), the segment from the centre to the closest surface point holds no other surface, and a
-//! flood along it finds the centre's tetrahedron; all points start there.
+//! barycentric coordinate until all are 0 or more (Guibas and Stolfi's walk). A point that leaves through the border, walks in a circle or had no
+//! tetrahedron is lost. Let R be the box of the lost points. A flood through faces reaches tetrahedra that meet R, from three kinds of seeds in R: border triangles,
+//! unsound tetrahedra (`unsound.rs`), tetrahedra that hold a point.
+//!
+//! *Nothing is missed.* Let C be a set of tetrahedra that meet R, connected through faces inside R, and not reached. Its border does not run through R, so
+//! all points of R are covered by C equally often, upright ones counted +1 and inverted ones -1; and C has no inverted ones, else it would have been
+//! reached. So C covers all of R. Therefore one lost point p says it all: a second flood runs along the ray from p out of the mesh, in a thin box that nothing
+//! covers whole, hence misses nothing, and finds a tetrahedron around p if there is one. If so, R is flooded from there; if not, the lost are outside.
 //!
 //! ```text
-//!   surface ___/\___      o  kept its tetrahedron: walks
-//!           o |/\| x      x  has none: flood from the border triangles in the box of all x
+//!      x   x  ____ →→→→→→→→ ray     o  kept its tetrahedron: walks
+//!   ____o_x__/    surface            x  lost: flood from border and unsound ones in the box of all x
 //! ```
 //!
 //! # Practice
-//! Warm, 12 to 31 us from 1.7 to 53 thousand moving tetrahedra, 11 to 20 times less than a scan of 53 thousand in the same run. Inverted and flat tetrahedra are stepped through, never counted as holding a point. When such were met and no
-//! point was found at all, every tetrahedron is tried, at most 65 thousand in a step: 1 ms.
-//!
-//! Measured against a full scan: no difference in 220 thousand random poses, jumps included, on meshes deformed by 30 %. On meshes torn anew at every
-//! step (four nodes each NaN, thrown by two edges, doubled or flattened) 1 touching pose in 2000 was missed and 2 in 1000 counted fewer points: tissue
-//! that is folded over itself can cover the tool with a sheet whose border is elsewhere.
+//! A step costs what lies near the tool, one pass over the boxes of the surface and a slice of the rest. The proof asks that the surface's boxes
+//! are not stale ([`crate::TissueStep::stale`]) and that the unsound tetrahedra near the tool are known: for nodes that leap in a mesh of over
+//! 2048 tetrahedra that can take some steps.
 //!
 //! # When not to use it
-//! On a mesh that is folded over itself by whole elements, when every single point matters: take a method that looks at all boxes.
+//! On a large mesh that is torn anew at every step: take a method that looks at all boxes.
 
+use super::{flood::Flood, lost::Lost, unsound::Unsound};
 use crate::{
-    broad::box_of,
     extent::Extent,
     narrow::{Hits, NONE, is_inside},
     scene::Scene,
@@ -36,20 +36,15 @@ use trepan_mesh::OPPOSITE;
 /// The tetrahedron of each point, and room for floods.
 pub(crate) struct Walk {
     last: Vec<u32>,
-    lost: Vec<u32>,
+    lost: Lost,
+    alone: Lost,
     near: Vec<u32>,
-    open: Vec<u32>,
-    seen_at: Vec<u32>,
-    flood: u32,
-    looked: u32,
+    flood: Flood,
+    unsound: Unsound,
 }
 
 /// Most tetrahedra crossed by one point in one step.
 const MAX_STEPS: usize = 32;
-/// Most tetrahedra in one flood.
-const MAX_FLOOD: usize = 16_384;
-/// Most tetrahedra tried in one step when degenerate ones hide the tissue: about 1 ms.
-const MAX_LOOKS: u32 = 65_536;
 /// Most border triangles taken as seeds.
 const MAX_SEEDS: usize = 4_096;
 
@@ -57,31 +52,38 @@ impl Walk {
     pub(crate) fn new(points: usize, tets: usize) -> Self {
         Self {
             last: vec![NONE; points],
-            lost: Vec::with_capacity(points),
+            lost: Lost::with_capacity(points),
+            alone: Lost::with_capacity(1),
             near: Vec::with_capacity(MAX_SEEDS),
-            open: Vec::with_capacity(MAX_FLOOD.min(tets)),
-            seen_at: vec![0; tets],
-            flood: 0,
-            looked: 0,
+            flood: Flood::over(tets),
+            unsound: Unsound::among(tets),
         }
     }
 
     pub(crate) fn reset(&mut self) {
         self.last.fill(NONE);
-        self.looked = 0;
+        self.unsound.alarm();
     }
 
     pub(crate) fn find(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
-        if !Extent::from(scene.ball_box()).overlaps(&surface.bounds) {
-            return self.reset();
+        if surface.stale > 0 {
+            self.unsound.alarm();
+        }
+        self.unsound.watch(scene);
+        hits.overflow += self.unsound.overflow;
+        let ball = Extent::from(scene.ball_box());
+        if !ball.overlaps(&surface.bounds) && self.unsound.meeting(ball).next().is_none() {
+            return self.last.fill(NONE);
         }
         self.walk_all(scene, hits);
         self.search_lost(scene, surface, hits);
-        if hits.tet.iter().all(|&t| t == NONE) {
-            self.enter_deep(scene, surface, hits);
+        if !self.lost.is_empty() && hits.skipped > 0 && !self.unsound.knows(hits.last_skipped) {
+            self.unsound.alarm();
+            self.unsound.watch(scene);
+            self.search_lost(scene, surface, hits);
         }
-        if hits.skipped > 0 && hits.tet.iter().all(|&t| t == NONE) {
-            self.look_everywhere(scene, hits);
+        if !self.lost.is_empty() && self.is_covered(scene, surface, hits) {
+            self.search_lost(scene, surface, hits);
         }
         self.last.copy_from_slice(&hits.tet);
     }
@@ -89,120 +91,85 @@ impl Walk {
     /// Every point from where it was; those that do not arrive are lost.
     fn walk_all(&mut self, scene: &Scene, hits: &mut Hits) {
         self.lost.clear();
-        for i in 0..scene.points.len() {
+        for (i, &p) in scene.points.iter().enumerate() {
             if self.last[i] == NONE || !walk(scene, i, self.last[i], hits) {
-                self.lost.push(i as u32);
+                self.lost.push(i as u32, p);
             }
         }
     }
 
-    /// Lost points against every tetrahedron that meets their box.
+    /// Lost points against every tetrahedron that meets their box and can be reached from a seed.
     fn search_lost(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
-        self.near.clear();
         if self.lost.is_empty() {
             return;
         }
-        let region = Extent::of(self.lost.iter().map(|&i| &scene.points[i as usize]));
-        hits.overflow += surface.gather(scene.positions, &region, &mut self.near);
-        self.begin_flood();
-        for k in 0..self.near.len() {
-            self.reach(surface.tet_of_triangle[self.near[k] as usize], hits);
-        }
+        let region = self.lost.bounds();
+        self.seed(&region, scene, surface, hits);
         for i in 0..scene.points.len() {
             if hits.tet[i] != NONE {
-                self.reach(hits.tet[i], hits);
+                self.flood.reach(hits.tet[i], hits);
             }
         }
-        self.run_flood(scene, &region, hits);
+        self.flood.run(scene, &region, &mut self.lost, hits);
     }
 
-    /// No point found: if no border runs through their box, all are inside or all outside, as the centre is.
-    fn enter_deep(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
-        let centre = scene.points[scene.centre()];
-        let Some(foot) = surface.closest(scene.positions, centre) else { return };
-        self.lost.clear();
-        self.lost.push(scene.centre() as u32);
-        self.begin_flood();
-        self.reach(surface.tet_of_triangle[foot.triangle as usize], hits);
-        let rounding = 1e-3 * scene.radius_mm;
-        self.run_flood(scene, &Extent::of(&[foot.point, centre]).widened(rounding), hits);
-        let start = hits.tet[scene.centre()];
+    /// Border triangles and unsound tetrahedra in a region.
+    fn seed(&mut self, region: &Extent, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
+        self.flood.begin();
+        hits.overflow += surface.gather(scene.positions, region, &mut self.near);
+        for &t in &self.near {
+            self.flood.reach(surface.tet_of_triangle[t as usize], hits);
+        }
+        for tet in self.unsound.meeting(*region) {
+            self.flood.reach(tet, hits);
+        }
+    }
+
+    /// Whether the lost points lie under a sheet without border near them: one of them tells, along the shortest ray out of the mesh.
+    fn is_covered(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) -> bool {
+        let mut all = surface.bounds;
+        all.merge(&self.unsound.bounds());
+        let (k, ray) = shortest_ray(&self.lost, &all);
+        let (i, p) = (self.lost.number(k), self.lost.place(k));
+        self.alone.clear();
+        self.alone.push(i, p);
+        self.seed(&ray, scene, surface, hits);
+        self.flood.run(scene, &ray, &mut self.alone, hits);
+        let start = hits.tet[i as usize];
         if start == NONE {
-            return;
+            return false;
         }
-        self.last.fill(start);
-        self.walk_all(scene, hits);
-        self.search_lost(scene, surface, hits);
-    }
-
-    /// Nothing was found, but tetrahedra were met that say nothing: holes and folds can hide the tissue, so all are tried, a slice at each step.
-    fn look_everywhere(&mut self, scene: &Scene, hits: &mut Hits) {
-        let (count, region) = (scene.tets.len() as u32, Extent::from(scene.ball_box()));
-        for _ in 0..count.min(MAX_LOOKS) {
-            self.looked = (self.looked + 1) % count;
-            let bounds = box_of(scene.positions, &scene.tets[self.looked as usize]);
-            if !bounds.overlaps(&region) {
-                continue;
-            }
-            for (i, &p) in scene.points.iter().enumerate() {
-                if hits.tet[i] == NONE && bounds.contains(p) {
-                    hits.test(scene, i, self.looked);
-                }
+        self.lost.swap_remove(k);
+        for k in (0..self.lost.len()).rev() {
+            if walk(scene, self.lost.number(k) as usize, start, hits) {
+                self.lost.swap_remove(k);
             }
         }
-    }
-
-    fn begin_flood(&mut self) {
-        self.open.clear();
-        self.flood = self.flood.wrapping_add(1);
-        if self.flood == 0 {
-            self.seen_at.fill(0);
-            self.flood = 1;
-        }
-    }
-
-    fn reach(&mut self, tet: u32, hits: &mut Hits) {
-        if self.seen_at[tet as usize] == self.flood {
-            return;
-        }
-        self.seen_at[tet as usize] = self.flood;
-        match self.open.len() < self.open.capacity() {
-            true => self.open.push(tet),
-            false => hits.overflow += 1,
-        }
-    }
-
-    /// Spreads over all tetrahedra that meet `region`, testing the lost points in each.
-    fn run_flood(&mut self, scene: &Scene, region: &Extent, hits: &mut Hits) {
-        while let Some(tet) = self.open.pop().filter(|_| !self.lost.is_empty()) {
-            let bounds = passage(scene, tet);
-            if !bounds.overlaps(region) {
-                continue;
-            }
-            let mut k = 0;
-            while let Some(&i) = self.lost.get(k) {
-                if bounds.contains(scene.points[i as usize]) {
-                    hits.test(scene, i as usize, tet);
-                }
-                match hits.tet[i as usize] {
-                    NONE => k += 1,
-                    _ => _ = self.lost.swap_remove(k),
-                }
-            }
-            for next in scene.neighbours[tet as usize] {
-                if next != NONE {
-                    self.reach(next, hits);
-                }
-            }
-        }
+        true
     }
 }
 
-/// Box that a flood passes through: one with a NaN corner is passed always, since its place is unknown.
-fn passage(scene: &Scene, tet: u32) -> Extent {
-    let bounds = box_of(scene.positions, &scene.tets[tet as usize]);
-    if bounds == Extent::EMPTY { Extent::EVERYWHERE } else { bounds }
+/// The lost point that is first on the shortest way out of a box along an axis, and that way.
+fn shortest_ray(lost: &Lost, all: &Extent) -> (usize, Extent) {
+    let region = lost.bounds();
+    let way = |axis: usize, up: bool| match up {
+        true => all.high[axis] - region.high[axis],
+        false => region.low[axis] - all.low[axis],
+    };
+    let ways = (0..3).flat_map(|axis| [(axis, false), (axis, true)]);
+    let (axis, up) = ways.min_by(|a, b| way(a.0, a.1).total_cmp(&way(b.0, b.1))).unwrap_or((0, true));
+    let along = |k: &usize| lost.place(*k).to_array()[axis] * if up { 1.0 } else { -1.0 };
+    let first = (0..lost.len()).max_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or(0);
+    let mut ray = Extent::of(&[lost.place(first)]);
+    match up {
+        true => ray.high[axis] = ray.high[axis].max(all.high[axis] + BEYOND_MM),
+        false => ray.low[axis] = ray.low[axis].min(all.low[axis] - BEYOND_MM),
+    }
+    (first, ray)
 }
+
+/// How far a ray ends outside the mesh's box, mm.
+const BEYOND_MM: f32 = 1.0;
 
 /// Walks point `i` from `tet`; says whether it arrived.
 fn walk(scene: &Scene, i: usize, mut tet: u32, hits: &mut Hits) -> bool {

@@ -1,0 +1,106 @@
+//! Points that still look for their tetrahedron, coordinate by coordinate, so that eight are compared with a box at once.
+
+use crate::extent::Extent;
+use trepan_geometry::Vec3;
+
+/// Numbers and places of lost points.
+pub(crate) struct Lost {
+    numbers: Vec<u32>,
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+}
+
+/// Points compared at once.
+const LANES: usize = 8;
+
+impl Lost {
+    pub(crate) fn with_capacity(points: usize) -> Self {
+        let axis = || Vec::with_capacity(points);
+        Self { numbers: Vec::with_capacity(points), x: axis(), y: axis(), z: axis() }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.numbers.clear();
+        [&mut self.x, &mut self.y, &mut self.z].into_iter().for_each(Vec::clear);
+    }
+
+    pub(crate) fn push(&mut self, number: u32, p: Vec3) {
+        self.numbers.push(number);
+        self.x.push(p.x);
+        self.y.push(p.y);
+        self.z.push(p.z);
+    }
+
+    /// Takes the `k`th away; the last one takes its place.
+    pub(crate) fn swap_remove(&mut self, k: usize) {
+        self.numbers.swap_remove(k);
+        for axis in [&mut self.x, &mut self.y, &mut self.z] {
+            axis.swap_remove(k);
+        }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.numbers.is_empty()
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.numbers.len()
+    }
+
+    pub(crate) fn number(&self, k: usize) -> u32 {
+        self.numbers[k]
+    }
+
+    pub(crate) fn place(&self, k: usize) -> Vec3 {
+        Vec3::new(self.x[k], self.y[k], self.z[k])
+    }
+
+    /// Box of all.
+    pub(crate) fn bounds(&self) -> Extent {
+        let least = |axis: &[f32]| axis.iter().copied().fold(f32::INFINITY, f32::min);
+        let most = |axis: &[f32]| axis.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        Extent {
+            low: [least(&self.x), least(&self.y), least(&self.z)],
+            high: [most(&self.x), most(&self.y), most(&self.z)],
+        }
+    }
+
+    /// The first one from the `k`th on that lies in a box.
+    #[inline]
+    pub(crate) fn next_in(&self, mut k: usize, b: &Extent) -> Option<usize> {
+        let (x, y, z) = (&self.x[..], &self.y[..self.x.len()], &self.z[..self.x.len()]);
+        let inside = |n: usize| {
+            (b.low[0] <= x[n])
+                & (x[n] <= b.high[0])
+                & (b.low[1] <= y[n])
+                & (y[n] <= b.high[1])
+                & (b.low[2] <= z[n])
+                & (z[n] <= b.high[2])
+        };
+        while k + LANES <= x.len() && !(k..k + LANES).fold(false, |any, n| any | inside(n)) {
+            k += LANES;
+        }
+        (k..x.len()).find(|&n| inside(n))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_next_one_in_a_box_is_found_in_any_lane() {
+        let mut lost = Lost::with_capacity(40);
+        (0..37).for_each(|n| lost.push(n, Vec3::new(n as f32, -(n as f32), 0.5 * n as f32)));
+        for n in 0..37 {
+            let at = lost.place(n);
+            let here = Extent::of(&[at]).widened(0.1);
+            assert_eq!((lost.next_in(0, &here), lost.next_in(n, &here)), (Some(n), Some(n)));
+            assert_eq!(lost.next_in(n + 1, &here), None);
+        }
+        assert_eq!(lost.bounds(), Extent::of(&[Vec3::ZERO, Vec3::new(36.0, -36.0, 18.0)]));
+        lost.swap_remove(3);
+        assert_eq!((lost.number(3), lost.len(), lost.place(3).x), (36, 36, 36.0));
+    }
+}
