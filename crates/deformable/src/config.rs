@@ -17,6 +17,10 @@ pub struct Config {
     pub stiffness: f32,
     /// Contact damper along the normal, N ms/mm.
     pub damping: f32,
+    /// Coulomb friction between tool and tissue, 0 to 2. More drags the tissue along before the tool slips; 0 is frictionless, as on a wet brain.
+    pub friction: f32,
+    /// Whether the tool's shaft touches too. Costs little until it comes near the tissue, then up to a few tip contacts.
+    pub shaft: bool,
 }
 
 impl Default for Config {
@@ -28,6 +32,8 @@ impl Default for Config {
             cell_mm: None,
             stiffness: 0.3,
             damping: 0.3,
+            friction: 0.0,
+            shaft: false,
         }
     }
 }
@@ -86,6 +92,9 @@ impl Config {
                 value: self.damping.into(),
                 must: "finite and 0 or more",
             });
+        }
+        if !(0.0..=2.0).contains(&self.friction) {
+            return Err(ConfigError::Value { field: "friction", value: self.friction.into(), must: "0 to 2" });
         }
         if !(1..=MAX_POINTS).contains(&self.points) {
             return Err(ConfigError::Value { field: "points", value: self.points as f64, must: "1 to 65536" });

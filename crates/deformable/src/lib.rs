@@ -6,12 +6,14 @@
 //! spring ([`trepan_contact::NodalContact`]), equal and opposite.
 //!
 //! # Practice
+//! [`MeshCollision`] is for two meshes or one against itself, [`SlidingWall`] for tissue in a hollow.
 //! [`TissueCollision::step`] runs in the collision thread, once for each new state of the tissue; it allocates nothing, and what it found is one
 //! plain struct, [`TissueStep`]. Searches are a closed list, [`Method`], with an f64 oracle among them.
 //!
 //! # When not to use it
-//! For two meshes or a mesh against itself, for the tool's shaft, for cutting: connections of the mesh are fixed.
+//! For cutting: connections of the mesh are fixed.
 
+mod bodies;
 pub mod broad;
 mod config;
 mod extent;
@@ -23,12 +25,15 @@ mod search;
 mod step;
 mod surface;
 mod triangle;
+mod wall;
 
+pub use bodies::{MeshCollision, NodeContact, push_apart, push_itself_apart};
 pub use broad::BroadPhase;
 pub use config::{Config, ConfigError};
 pub use method::Method;
 pub use response::Response;
 pub use step::{TissueCollision, TissueStep};
+pub use wall::SlidingWall;
 
 #[doc = include_str!("../README.md")]
 #[cfg(doctest)]

@@ -13,8 +13,22 @@ pub enum Method {
     UniformGrid,
     /// The same with a hash table and time stamps (Teschner et al. 2003).
     HashedGrid,
+    /// Points in an octree, made anew at every step (Meagher 1982).
+    Octree,
+    /// Points in a k-d tree, made anew at every step (Bentley 1975).
+    KdTree,
     /// A tree of boxes, refitted bottom-up (van den Bergen 1997).
     AabbTree,
+    /// The same of balls (Hubbard 1996).
+    SphereTree,
+    /// The same of polytopes with 18 sides (Klosowski et al. 1998).
+    KDopTree,
+    /// The same of boxes turned as at rest (Gottschalk et al. 1996).
+    ObbTree,
+    /// A tree of boxes, refitted bottom-up above and only where it is looked at below (Larsson and Akenine-Möller 2001).
+    HybridTree,
+    /// The ready-made tree: parry's.
+    ParryTree,
     /// The thesis's chapter 4: grid, first tetrahedron from the last one found, two rings of neighbours.
     Thesis,
     /// Each point keeps its tetrahedron and walks on through neighbours; only what lies near the tool is looked at.
@@ -26,9 +40,24 @@ impl Method {
     pub const RECOMMENDED: Self = Self::Walk;
 
     /// All methods, the oracle first.
-    pub fn all() -> [Self; 7] {
+    pub fn all() -> [Self; 14] {
         use Method::*;
-        [Brute, Scan, UniformGrid, HashedGrid, AabbTree, Thesis, Walk]
+        [
+            Brute,
+            Scan,
+            UniformGrid,
+            HashedGrid,
+            Octree,
+            KdTree,
+            AabbTree,
+            SphereTree,
+            KDopTree,
+            ObbTree,
+            HybridTree,
+            ParryTree,
+            Thesis,
+            Walk,
+        ]
     }
 
     /// The name used in files and on command lines.
@@ -38,7 +67,14 @@ impl Method {
             Self::Scan => "scan",
             Self::UniformGrid => "uniform-grid",
             Self::HashedGrid => "hashed-grid",
+            Self::Octree => "octree",
+            Self::KdTree => "kd-tree",
             Self::AabbTree => "aabb-tree",
+            Self::SphereTree => "sphere-tree",
+            Self::KDopTree => "k-dop-tree",
+            Self::ObbTree => "obb-tree",
+            Self::HybridTree => "hybrid-tree",
+            Self::ParryTree => "parry-tree",
             Self::Thesis => "thesis",
             Self::Walk => "walk",
         }

@@ -3,12 +3,12 @@
 use crate::{
     Config, ConfigError,
     narrow::Hits,
-    response::{Responder, finish},
+    response::{Friction, Responder, Shaft, Spring, finish},
     scene::Scene,
     search::Search,
     surface::MovingSurface,
 };
-use trepan_contact::{ContactManifold, NodalContact, SurfacePatch};
+use trepan_contact::{Contact, ContactManifold, NodalContact, SurfacePatch};
 use trepan_geometry::{Aabb, Pointshell, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::{TetMesh, Topology};
 
@@ -21,6 +21,12 @@ pub struct TissueStep {
     pub patch: SurfacePatch,
     /// The spring that presses on the tissue's nodes, equal and opposite.
     pub nodal: NodalContact,
+    /// Dry friction of the tissue on the tool's tip, N; the nodes take the opposite by the weights of `nodal`.
+    pub friction_n: Vec3,
+    /// The contact of the tool's shaft; depth 0 when it is free or not asked for.
+    pub shaft: Contact,
+    /// The spring with which the shaft presses on the tissue's nodes.
+    pub shaft_nodal: NodalContact,
     /// Tool points inside the tissue.
     pub points_in_contact: u32,
     /// Exact tests of a point in a tetrahedron.
@@ -39,6 +45,19 @@ impl TissueStep {
         self.manifold.clear();
         self.patch = SurfacePatch { time_ms: self.patch.time_ms, tip_mm: self.patch.tip_mm, ..SurfacePatch::default() };
         self.nodal = NodalContact::none();
+        self.friction_n = Vec3::ZERO;
+    }
+
+    /// Adds all forces on the nodes, N: springs of tip and shaft, and friction. Returns the force on the tool, equal and opposite.
+    pub fn push(&self, positions: &[Vec3], velocities: &[Vec3], forces: &mut [Vec3]) -> Vec3 {
+        let mut on_tool = Vec3::ZERO;
+        for (nodal, along) in [(&self.nodal, self.friction_n), (&self.shaft_nodal, Vec3::ZERO)] {
+            let (place, velocity) = (nodal.mean(|n| positions[n as usize]), nodal.mean(|n| velocities[n as usize]));
+            let force = nodal.pressure_n(place, velocity) * nodal.normal + along;
+            nodal.nodes().for_each(|(node, weight)| forces[node as usize] -= weight * force);
+            on_tool += force;
+        }
+        on_tool
     }
 }
 
@@ -57,8 +76,10 @@ pub struct TissueCollision {
     responder: Responder,
     uses_surface: bool,
     hits: Hits,
-    stiffness: f32,
-    damping: f32,
+    spring: Spring,
+    friction: Friction,
+    friction_coefficient: f32,
+    shaft: Option<Shaft>,
 }
 
 impl TissueCollision {
@@ -71,7 +92,8 @@ impl TissueCollision {
         check_mesh(mesh)?;
         let shell = Pointshell::sphere(tool.tip_radius_mm, config.points, Spread::Fibonacci);
         let count = shell.points.len() + 1;
-        let cell_mm = config.cell_mm.unwrap_or_else(|| CELL_PER_EDGE * mean_edge_mm(mesh));
+        let cell_mm = config.cell_mm.unwrap_or_else(|| usual_cell_mm(mesh));
+        let shaft = if config.shaft { Shaft::new(tool, mesh.tets.len()) } else { None };
         let responder = Responder::new(config.response.unwrap_or(config.method.response()));
         Ok(Self {
             neighbours: Topology::of(mesh).neighbours,
@@ -81,12 +103,14 @@ impl TissueCollision {
             points: vec![Vec3::ZERO; count],
             surface: MovingSurface::of(mesh),
             search: Search::new(config.method, mesh, count, cell_mm),
-            uses_surface: responder.needs_surface() || config.method == crate::Method::Walk,
+            uses_surface: responder.needs_surface() || config.method == crate::Method::Walk || config.shaft,
             responder,
             hits: Hits::with_points(count),
             shell,
-            stiffness: config.stiffness,
-            damping: config.damping,
+            spring: Spring { stiffness: config.stiffness, damping: config.damping },
+            friction: Friction::default(),
+            friction_coefficient: config.friction,
+            shaft,
         })
     }
 
@@ -110,8 +134,14 @@ impl TissueCollision {
         self.search.find(&scene, &mut self.surface, &mut self.hits);
         count(&self.hits, out);
         match self.responder.respond(&scene, &self.hits, &mut self.surface, out) {
-            Some(answer) => finish(&scene, &answer, self.stiffness, self.damping, out),
+            Some(answer) => finish(&scene, &answer, self.spring, out),
             None => out.forget_contact(),
+        }
+        out.friction_n = self.friction.drag(&scene, self.friction_coefficient, out);
+        if let Some(shaft) = &mut self.shaft
+            && let Some((contact, nodal)) = shaft.respond(&scene, &mut self.surface, &self.spring, &mut out.overflow)
+        {
+            (out.shaft, out.shaft_nodal) = (contact, nodal);
         }
         out.stale = self.surface.stale;
     }
@@ -121,12 +151,15 @@ impl TissueCollision {
         self.search.reset();
         self.responder.reset();
         self.surface.reset();
+        self.friction.reset();
+        self.shaft.iter_mut().for_each(Shaft::reset);
     }
 
     fn clear(&mut self, tool: &ToolState, out: &mut TissueStep) {
         self.hits.clear();
         out.patch = SurfacePatch { time_ms: tool.time_ms, tip_mm: tool.tip(), ..SurfacePatch::default() };
         out.forget_contact();
+        (out.shaft, out.shaft_nodal) = (Contact::default(), NodalContact::none());
         (out.points_in_contact, out.tests, out.overflow, out.skipped, out.stale) = (0, 0, 0, 0, 0);
     }
 
@@ -155,7 +188,8 @@ fn count(hits: &Hits, out: &mut TissueStep) {
     out.overflow += hits.overflow;
 }
 
-fn check_mesh(mesh: &TetMesh) -> Result<(), ConfigError> {
+/// Refuses a mesh that cannot be collided with.
+pub(crate) fn check_mesh(mesh: &TetMesh) -> Result<(), ConfigError> {
     let nodes = mesh.positions.len();
     if mesh.tets.is_empty() {
         return Err(ConfigError::EmptyMesh);
@@ -168,6 +202,11 @@ fn check_mesh(mesh: &TetMesh) -> Result<(), ConfigError> {
         Some((node, &position)) => Err(ConfigError::NonFinite { node, position }),
         None => Ok(()),
     }
+}
+
+/// Edge of a grid cell for a mesh, mm.
+pub(crate) fn usual_cell_mm(mesh: &TetMesh) -> f32 {
+    CELL_PER_EDGE * mean_edge_mm(mesh)
 }
 
 fn mean_edge_mm(mesh: &TetMesh) -> f32 {

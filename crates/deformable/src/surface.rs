@@ -32,6 +32,8 @@ const LEAST_MOTION: f32 = 0.5;
 pub(crate) struct Foot {
     /// The triangle.
     pub triangle: u32,
+    /// Weights of the point on its corners.
+    pub weights: [f32; 3],
     /// The point on it, world mm.
     pub point: Vec3,
     /// How far away it is, squared, mm².
@@ -241,6 +243,22 @@ impl MovingSurface {
         best
     }
 
+    /// The nodes around a foot, with their weights.
+    pub(crate) fn weights_at(&self, foot: &Foot) -> [(u32, f32); 3] {
+        let nodes = self.triangles[foot.triangle as usize];
+        core::array::from_fn(|c| (nodes[c], foot.weights[c]))
+    }
+
+    /// How many clusters there are.
+    pub(crate) fn clusters(&self) -> usize {
+        self.boxes.len()
+    }
+
+    /// The nodes of a cluster; neighbouring clusters share some.
+    pub(crate) fn nodes_of(&self, cluster: usize) -> &[u32] {
+        self.nodes_of_cluster.row(cluster)
+    }
+
     /// Unit normal of the flat triangle, outwards; zero when it has no area.
     pub(crate) fn flat_normal(&self, positions: &[Vec3], t: u32) -> Vec3 {
         let [a, b, c] = self.corners(positions, t);
@@ -286,7 +304,7 @@ impl MovingSurface {
         let corners = self.corners(positions, t);
         let weights = triangle::closest_weights(corners, to);
         let point = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-        Foot { triangle: t, point, distance2: point.distance_squared(to) }
+        Foot { triangle: t, weights, point, distance2: point.distance_squared(to) }
     }
 
     fn triangles_of(&self, cluster: usize) -> core::ops::Range<u32> {

@@ -1,11 +1,10 @@
-//! Every broad phase gives exactly the pairs whose boxes say so, and counts what does not fit.
+//! Every broad phase gives all pairs that are, none whose boxes say no, and counts what does not fit.
 
 mod common;
 
 use common::{Random, block, deformed};
-use glam::Vec3;
-use trepan_deformable::BroadPhase;
-use trepan_deformable::broad::{AabbTree, HashedGrid, UniformGrid};
+use glam::{DVec3, Vec3};
+use trepan_deformable::broad::*;
 use trepan_geometry::Aabb;
 use trepan_mesh::TetMesh;
 
@@ -14,11 +13,31 @@ fn all(mesh: &TetMesh, cell_mm: f32, points: usize) -> Vec<(&'static str, Box<dy
     vec![
         ("uniform grid", Box::new(UniformGrid::new(cell_mm, points, tets))),
         ("hashed grid", Box::new(HashedGrid::new(cell_mm, points, tets))),
-        ("tree", Box::new(AabbTree::new(&mesh.positions, &mesh.tets))),
+        ("octree", Box::new(Octree::new(points, tets))),
+        ("k-d tree", Box::new(KdTree::new(points, tets))),
+        ("box tree", Box::new(VolumeTree::<Aabox>::new(&mesh.positions, &mesh.tets))),
+        ("ball tree", Box::new(VolumeTree::<Sphere>::new(&mesh.positions, &mesh.tets))),
+        ("k-DOP tree", Box::new(VolumeTree::<KDop>::new(&mesh.positions, &mesh.tets))),
+        ("turned box tree", Box::new(VolumeTree::<Obb>::new(&mesh.positions, &mesh.tets))),
+        ("hybrid tree", Box::new(HybridTree::new(&mesh.positions, &mesh.tets))),
+        ("parry", Box::new(ParryTree::new(&mesh.positions, &mesh.tets))),
     ]
 }
 
-/// Every point against every box, plainly.
+/// Every point in every tetrahedron, plainly and in f64: the pairs that no phase may lose.
+fn inside(mesh: &TetMesh, positions: &[Vec3], points: &[Vec3]) -> Vec<[u32; 2]> {
+    let volume = |c: [DVec3; 4]| (c[1] - c[0]).cross(c[2] - c[0]).dot(c[3] - c[0]);
+    let mut pairs = truth(mesh, positions, points);
+    pairs.retain(|&[point, tet]| {
+        let corners = mesh.tets[tet as usize].map(|n| positions[n as usize].as_dvec3());
+        let with =
+            |k: usize| core::array::from_fn(|c| if c == k { points[point as usize].as_dvec3() } else { corners[c] });
+        (0..4).all(|k| volume(with(k)) * volume(corners) >= 0.0)
+    });
+    pairs
+}
+
+/// Every point against every box, plainly: the pairs that a phase may give.
 fn truth(mesh: &TetMesh, positions: &[Vec3], points: &[Vec3]) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     for (t, tet) in mesh.tets.iter().enumerate() {
@@ -38,14 +57,19 @@ fn points_all_over_a_moving_mesh() {
         for step in 0..5 {
             let positions = deformed(&mesh, 3.0, step as f32, &mut random);
             let points: Vec<Vec3> = (0..300).map(|_| Vec3::splat(8.0) + random.cube() * 14.0).collect();
-            let expected = truth(&mesh, &positions, &points);
+            let (must, may) = (inside(&mesh, &positions, &points), truth(&mesh, &positions, &points));
+            assert!(must.len() > 20);
             let mut out = Vec::with_capacity(20_000);
             for (name, phase) in &mut phases {
                 phase.update(&positions, &mesh.tets, &Aabb::of_points(&points));
                 assert_eq!(phase.pairs(&points, &mut out), 0);
                 assert!(out.is_sorted_by_key(|pair| pair[1]), "{name}: not ascending by tetrahedron");
-                out.sort_unstable_by_key(|&[point, tet]| (tet, point));
-                assert_eq!(out, expected, "{name}, cells of {cell_mm}");
+                assert!(must.iter().all(|pair| out.contains(pair)), "{name}, cells of {cell_mm}: lost a pair");
+                assert!(out.iter().all(|pair| may.contains(pair)), "{name}, cells of {cell_mm}: boxes say no");
+                out.sort_unstable();
+                out.dedup();
+                let tight = ["k-DOP tree", "turned box tree", "ball tree"].contains(name);
+                assert!(out.len() == may.len() || tight, "{name}, cells of {cell_mm}: twice or lost");
             }
         }
     }
@@ -56,8 +80,11 @@ fn what_does_not_fit_is_counted_and_nothing_grows() {
     let mesh = block([4, 4, 4], 3.0);
     let mut random = Random::new(5);
     let points: Vec<Vec3> = (0..100).map(|_| Vec3::splat(6.0) + random.cube() * 6.0).collect();
-    let expected = truth(&mesh, &mesh.positions, &points).len();
     for (name, mut phase) in all(&mesh, 3.0, 100) {
+        let mut out = Vec::with_capacity(10_000);
+        phase.update(&mesh.positions, &mesh.tets, &Aabb::of_points(&points));
+        assert_eq!(phase.pairs(&points, &mut out), 0);
+        let expected = out.len();
         let mut out = Vec::with_capacity(32);
         let room = out.capacity();
         phase.update(&mesh.positions, &mesh.tets, &Aabb::of_points(&points));

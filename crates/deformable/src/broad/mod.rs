@@ -1,13 +1,29 @@
 //! Broad phases: from moving boxes to few pairs of point and tetrahedron.
 
-mod aabb_tree;
+mod aabb;
 mod hashed_grid;
+mod hybrid_tree;
+mod k_dop;
+mod kd_tree;
+mod obb;
+mod octree;
+mod parry_tree;
+mod sphere;
 mod uniform_grid;
+mod volume_tree;
 
-pub use aabb_tree::AabbTree;
+pub use aabb::Aabox;
 pub use hashed_grid::HashedGrid;
+pub use hybrid_tree::HybridTree;
+pub use k_dop::KDop;
+pub use kd_tree::KdTree;
+pub use obb::Obb;
+pub use octree::Octree;
+pub use parry_tree::ParryTree;
+pub use sphere::Sphere;
 pub(crate) use uniform_grid::PointCells;
 pub use uniform_grid::UniformGrid;
+pub use volume_tree::{Volume, VolumeTree};
 
 use crate::extent::Extent;
 use trepan_geometry::{Aabb, Vec3};

@@ -1,8 +1,13 @@
 //! From what was found to one contact: normal, depth, and the nodes that feel it.
 
 mod ball;
+mod friction;
 mod near;
 mod printed;
+mod shaft;
+
+pub(crate) use friction::Friction;
+pub(crate) use shaft::Shaft;
 
 use crate::{narrow::Hits, scene::Scene, step::TissueStep, surface::MovingSurface};
 use trepan_contact::SurfacePatch;
@@ -66,6 +71,15 @@ impl Responder {
     }
 }
 
+/// The spring between tool and tissue.
+#[derive(Clone, Copy)]
+pub(crate) struct Spring {
+    /// N/mm.
+    pub stiffness: f32,
+    /// Along the normal, N ms/mm.
+    pub damping: f32,
+}
+
 /// What every response ends in.
 pub(crate) struct Answer {
     /// Unit vector out of the tissue.
@@ -75,7 +89,7 @@ pub(crate) struct Answer {
 }
 
 /// Writes the answer into manifold, patch and nodal spring, whose nodes are already there; nothing when a number is not finite.
-pub(crate) fn finish(scene: &Scene, answer: &Answer, stiffness: f32, damping: f32, out: &mut TissueStep) {
+pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut TissueStep) {
     out.nodal.normalise();
     let place = out.nodal.mean(|n| scene.positions[n as usize]);
     let tissue_velocity = out.nodal.mean(|n| scene.velocities[n as usize]).dot(answer.normal);
@@ -88,7 +102,7 @@ pub(crate) fn finish(scene: &Scene, answer: &Answer, stiffness: f32, damping: f3
     (out.manifold.normal, out.manifold.depth_mm, out.manifold.point) = (answer.normal, answer.depth_mm, place);
     out.nodal.normal = answer.normal;
     out.nodal.offset_mm = answer.depth_mm - place.dot(answer.normal);
-    (out.nodal.stiffness, out.nodal.damping) = (stiffness, damping);
+    (out.nodal.stiffness, out.nodal.damping) = (spring.stiffness, spring.damping);
     out.nodal.tool_normal_velocity = finite_or_zero(tool_velocity);
     out.patch = SurfacePatch {
         time_ms: scene.tool.time_ms,

@@ -8,7 +8,9 @@ mod thesis;
 mod unsound;
 mod walk;
 
-use crate::broad::{AabbTree, BroadPhase, HashedGrid, UniformGrid};
+pub(crate) use walk::Walk;
+
+use crate::broad::*;
 use crate::{Method, narrow::Hits, scene::Scene, surface::MovingSurface};
 use trepan_mesh::TetMesh;
 
@@ -17,7 +19,7 @@ pub(crate) enum Search {
     Brute(brute::Brute),
     Phased(phased::Phased),
     Thesis(thesis::Thesis),
-    Walk(walk::Walk),
+    Walk(Walk),
 }
 
 impl Search {
@@ -28,9 +30,16 @@ impl Search {
             Method::Scan => phased(UniformGrid::new(f32::MAX, points, tets), points),
             Method::UniformGrid => phased(UniformGrid::new(cell_mm, points, tets), points),
             Method::HashedGrid => phased(HashedGrid::new(cell_mm, points, tets), points),
-            Method::AabbTree => phased(AabbTree::new(&mesh.positions, &mesh.tets), points),
+            Method::Octree => phased(Octree::new(points, tets), points),
+            Method::KdTree => phased(KdTree::new(points, tets), points),
+            Method::AabbTree => phased(tree::<Aabox>(mesh), points),
+            Method::SphereTree => phased(tree::<Sphere>(mesh), points),
+            Method::KDopTree => phased(tree::<KDop>(mesh), points),
+            Method::ObbTree => phased(tree::<Obb>(mesh), points),
+            Method::HybridTree => phased(HybridTree::new(&mesh.positions, &mesh.tets), points),
+            Method::ParryTree => phased(ParryTree::new(&mesh.positions, &mesh.tets), points),
             Method::Thesis => Self::Thesis(thesis::Thesis::new(cell_mm, points, tets)),
-            Method::Walk => Self::Walk(walk::Walk::new(points, tets)),
+            Method::Walk => Self::Walk(Walk::new(points, tets)),
         }
     }
 
@@ -52,6 +61,10 @@ impl Search {
             Self::Walk(search) => search.reset(),
         }
     }
+}
+
+fn tree<V: Volume>(mesh: &TetMesh) -> VolumeTree<V> {
+    VolumeTree::new(&mesh.positions, &mesh.tets)
 }
 
 fn phased(phase: impl BroadPhase + 'static, points: usize) -> Search {

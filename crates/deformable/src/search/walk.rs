@@ -71,8 +71,8 @@ impl Walk {
         }
         self.unsound.watch(scene);
         hits.overflow += self.unsound.overflow;
-        let ball = Extent::from(scene.ball_box());
-        if !ball.overlaps(&surface.bounds) && self.unsound.meeting(ball).next().is_none() {
+        let all = Extent::of(scene.points);
+        if !all.overlaps(&surface.bounds) && self.unsound.meeting(all).next().is_none() {
             return self.last.fill(NONE);
         }
         self.walk_all(scene, hits);

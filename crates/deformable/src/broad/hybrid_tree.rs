@@ -1,0 +1,139 @@
+//! A tree of boxes whose upper half is refitted bottom-up and whose lower half only where it is looked at.
+//!
+//! # Theory
+//! Larsson and Akenine-Möller 2001: most of the lower nodes are never visited in a step. So the nodes half way down are fitted straight to the mesh nodes below
+//! them, the upper ones to their children; below, a node is fitted to its own mesh nodes when the box above it meets the region of interest.
+//!
+//! # Practice
+//! Each mesh node is read once for each half-way box that has it, 1.5 times on average, in place of four corners of about five tetrahedra: so
+//! an update costs a fifth of a scan.
+//!
+//! # When not to use it
+//! When the points are all over the mesh: then every lower node is fitted to all mesh nodes below it, level by level.
+
+use super::{
+    BroadPhase, box_of, push_bounded,
+    volume_tree::{LEAF, Node, halved},
+};
+use crate::extent::Extent;
+use trepan_geometry::{Aabb, Vec3};
+use trepan_mesh::Csr;
+
+/// A binary tree of boxes, lazily fitted below half way.
+#[derive(Debug)]
+pub struct HybridTree {
+    shape: Vec<Node>,
+    order: Vec<u32>,
+    bounds: Vec<Extent>,
+    /// Nodes whose boxes are fitted to the mesh in every update, parents before children.
+    half_way: Vec<u32>,
+    upper: Vec<u32>,
+    mesh_nodes: Csr,
+    /// Tetrahedra below a node that is half way down, at most.
+    below: u32,
+    boxes: Vec<(u32, Extent)>,
+    open: Vec<u32>,
+}
+
+/// Tetrahedra below a node that is half way down: the square root of a leaf times the mesh, at least this many.
+const LEAST_BELOW: usize = 4 * LEAF;
+
+impl HybridTree {
+    /// A tree over a mesh at rest.
+    pub fn new(positions: &[Vec3], tets: &[[u32; 4]]) -> Self {
+        let (shape, order) = halved(positions, tets);
+        let below = (((tets.len() * LEAF) as f64).sqrt() as usize).max(LEAST_BELOW);
+        let (mut half_way, mut upper, mut open) = (Vec::new(), Vec::new(), vec![0u32]);
+        while let Some(at) = open.pop() {
+            let node = shape[at as usize];
+            if node.right == 0 || (node.last - node.first) as usize <= below {
+                half_way.push(at);
+            } else {
+                upper.push(at);
+                open.extend([node.right, at + 1]);
+            }
+        }
+        let mut mesh_nodes = Csr { starts: vec![0], items: Vec::new() };
+        for &at in &half_way {
+            let node = shape[at as usize];
+            let tets = order[node.first as usize..node.last as usize].iter().map(|&t| tets[t as usize]);
+            let mut nodes: Vec<u32> = tets.flatten().collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            mesh_nodes.items.extend(nodes);
+            mesh_nodes.starts.push(mesh_nodes.items.len() as u32);
+        }
+        let bounds = vec![Extent::EMPTY; shape.len()];
+        let (below, boxes) = (below as u32, Vec::with_capacity(tets.len()));
+        let open = Vec::with_capacity(shape.len());
+        Self { shape, order, bounds, half_way, upper, mesh_nodes, below, boxes, open }
+    }
+
+    /// Boxes half way down, then those above.
+    fn fit_upper(&mut self, positions: &[Vec3]) {
+        for (k, &at) in self.half_way.iter().enumerate() {
+            let nodes = self.mesh_nodes.row(k).iter().map(|&n| &positions[n as usize]);
+            self.bounds[at as usize] = Extent::of(nodes.filter(|p| p.is_finite()));
+        }
+        for &at in self.upper.iter().rev() {
+            let mut bounds = self.bounds[at as usize + 1];
+            bounds.merge(&self.bounds[self.shape[at as usize].right as usize]);
+            self.bounds[at as usize] = bounds;
+        }
+    }
+
+    /// Goes down where boxes meet the region, fits what lies below half way, and lists the tetrahedra reached.
+    fn fit_lower(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Extent) {
+        self.open.push(0);
+        while let Some(at) = self.open.pop() {
+            let node = self.shape[at as usize];
+            if !self.bounds[at as usize].overlaps(region) {
+                continue;
+            }
+            if node.right == 0 {
+                let leaf = &self.order[node.first as usize..node.last as usize];
+                let met = leaf.iter().map(|&t| (t, box_of(positions, &tets[t as usize])));
+                self.boxes.extend(met.filter(|(_, b)| b.overlaps(region)));
+                continue;
+            }
+            for child in [node.right, at + 1] {
+                self.fit_below(positions, tets, child, node);
+                self.open.push(child);
+            }
+        }
+    }
+
+    /// A child of a node that was fitted to the mesh itself; children of upper nodes are fitted already.
+    fn fit_below(&mut self, positions: &[Vec3], tets: &[[u32; 4]], child: u32, parent: Node) {
+        if parent.last - parent.first > self.below {
+            return;
+        }
+        let Node { first, last, .. } = self.shape[child as usize];
+        let mut bounds = Extent::EMPTY;
+        for &t in &self.order[first as usize..last as usize] {
+            bounds.merge(&box_of(positions, &tets[t as usize]));
+        }
+        self.bounds[child as usize] = bounds;
+    }
+}
+
+impl BroadPhase for HybridTree {
+    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
+        self.boxes.clear();
+        self.open.clear();
+        self.fit_upper(positions);
+        self.fit_lower(positions, tets, &Extent::from(*region));
+        self.boxes.sort_unstable_by_key(|(t, _)| *t);
+    }
+
+    fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
+        out.clear();
+        let mut overflow = 0;
+        for (t, bounds) in &self.boxes {
+            for (i, _) in points.iter().enumerate().filter(|(_, p)| bounds.contains(**p)) {
+                overflow += push_bounded(out, [i as u32, *t]);
+            }
+        }
+        overflow
+    }
+}

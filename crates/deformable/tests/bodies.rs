@@ -1,0 +1,189 @@
+//! Shaft, friction, two bodies, one folded on itself, and a wall around: closed forms and conserved momentum.
+
+mod common;
+
+use common::{Random, block, deformed, tool_at};
+use glam::{Quat, Vec3};
+use trepan_contact::NodalContact;
+use trepan_deformable::{
+    Config, ConfigError, MeshCollision, NodeContact, SlidingWall, TissueCollision, TissueStep, push_apart,
+    push_itself_apart,
+};
+use trepan_geometry::Tool;
+use trepan_mesh::TetMesh;
+
+fn moved(mesh: &TetMesh, by: Vec3) -> TetMesh {
+    TetMesh { positions: mesh.positions.iter().map(|p| *p + by).collect(), tets: mesh.tets.clone() }
+}
+
+fn with(mesh: &TetMesh, config: Config) -> TissueCollision {
+    TissueCollision::new(mesh, &Tool::probe(2.0), &config).expect("a sound config")
+}
+
+/// A shaft of radius 1.2 lies flat on the block, its tip far out: pressed in, it reads its own depth, until its axis is 3 mm under the top.
+#[test]
+fn a_shaft_pressed_flat_into_the_top_reads_its_depth() {
+    let mesh = block([8, 8, 6], 4.0);
+    let mut collision = with(&mesh, Config { shaft: true, ..Config::default() });
+    let (along_x, still) =
+        (Quat::from_rotation_y(core::f32::consts::FRAC_PI_2), vec![Vec3::ZERO; mesh.positions.len()]);
+    let mut out = TissueStep::default();
+    for k in 1..=140 {
+        let depth = 0.03 * k as f32;
+        let tip = Vec3::new(-20.0, 15.3, 24.0 + 1.2 - depth);
+        collision.step(&mesh.positions, &still, &tool_at(tip, along_x), &mut out);
+        assert!(
+            !out.manifold.touches() && (out.shaft.depth_mm - depth).abs() < 1e-3,
+            "{} at {depth}",
+            out.shaft.depth_mm
+        );
+        assert!(out.shaft.normal.z > 0.99 && (out.shaft.point.y - 15.3).abs() < 4.0);
+        let mut forces = still.clone();
+        let on_tool = out.push(&mesh.positions, &still, &mut forces);
+        assert!(
+            (on_tool + forces.iter().sum::<Vec3>()).length() < 1e-5 && (on_tool.z - 0.3 * depth).abs() < 2e-2 * depth
+        );
+    }
+    let far = tool_at(Vec3::new(-20.0, 15.3, 30.0), along_x);
+    collision.step(&mesh.positions, &still, &far, &mut out);
+    assert!(out.shaft.depth_mm == 0.0 && out.shaft_nodal.is_empty());
+}
+
+/// 1 mm deep: the tool drags until `μ k d`, is carried by moving tissue, and what it feels the nodes take.
+#[test]
+fn friction_sticks_slips_and_is_equal_and_opposite() {
+    let mesh = block([8, 8, 4], 4.0);
+    let mut collision = with(&mesh, Config { friction: 0.4, ..Config::default() });
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    let mut out = TissueStep::default();
+    for k in 0..100 {
+        let way = 0.01 * k as f32;
+        let tool = tool_at(Vec3::new(13.2 + way, 15.1, 17.0), Quat::IDENTITY);
+        collision.step(&mesh.positions, &still, &tool, &mut out);
+        let expected = -0.3 * way.min(0.4);
+        assert!((out.friction_n.x - expected).abs() < 2e-3, "{} after {way}", out.friction_n);
+        let mut forces = still.clone();
+        let on_tool = out.push(&mesh.positions, &still, &mut forces);
+        assert!((on_tool + forces.iter().sum::<Vec3>()).length() < 1e-5 && (on_tool.z - 0.3).abs() < 1e-3);
+    }
+    collision.reset();
+    let tool = tool_at(Vec3::new(13.2, 15.1, 17.0), Quat::IDENTITY);
+    for k in 0..30 {
+        let carried = moved(&mesh, Vec3::X * (0.01 * k as f32));
+        collision.step(&carried.positions, &still, &tool, &mut out);
+        assert!((out.friction_n.x - 0.003 * k as f32).abs() < 1e-3, "{} at {k}", out.friction_n);
+    }
+}
+
+/// Every border node of a block that sinks into another is found, no other, with its true depth; momentum stays.
+#[test]
+fn two_blocks_that_overlap_know_how_deep_and_keep_their_momentum() {
+    let lower = block([6, 6, 5], 4.0);
+    let upper = moved(&block([3, 3, 3], 3.7), Vec3::new(5.3, 6.1, 20.0 - 1.3));
+    let mut collision = MeshCollision::between(&upper, &lower).expect("sound meshes");
+    let mut out = Vec::with_capacity(200);
+    assert_eq!(collision.step(&upper.positions, &lower.positions, &mut out), 0);
+    let inside = |p: &&Vec3| p.z < 20.0;
+    assert_eq!(out.len(), upper.positions.iter().filter(inside).count());
+    assert!(out.iter().all(|c| (c.depth_mm - 1.3).abs() < 1e-4 && c.normal.z > 0.9999));
+    let (on_body, on_other) = forces(&out, &upper, &lower);
+    assert!((on_body.iter().sum::<Vec3>() + on_other.iter().sum::<Vec3>()).length() < 1e-4);
+    assert!((on_body.iter().sum::<Vec3>().z - 0.5 * 1.3 * 16.0).abs() < 1e-3);
+}
+
+/// Both bodies bent and shaken: contacts are finite, and neither momentum nor its moment is made.
+#[test]
+fn deformed_bodies_make_no_momentum() {
+    let (lower, upper) = (block([6, 6, 4], 4.0), moved(&block([4, 4, 3], 4.0), Vec3::new(4.3, 3.1, 14.0)));
+    let mut collision = MeshCollision::between(&upper, &lower).expect("sound meshes");
+    let (mut out, mut random, mut met) = (Vec::with_capacity(400), Random::new(5), 0);
+    for k in 0..60 {
+        let bent = |mesh: &TetMesh, random: &mut Random| TetMesh {
+            positions: deformed(mesh, 4.0, 0.1 * k as f32, random),
+            tets: mesh.tets.clone(),
+        };
+        let (body, other) = (bent(&upper, &mut random), bent(&lower, &mut random));
+        assert_eq!(collision.step(&body.positions, &other.positions, &mut out), 0);
+        met += out.len();
+        let (on_body, on_other) = forces(&out, &body, &other);
+        let moment = |mesh: &TetMesh, forces: &[Vec3]| -> Vec3 {
+            mesh.positions.iter().zip(forces).map(|(p, f)| p.cross(*f)).sum()
+        };
+        let total: Vec3 = on_body.iter().sum::<Vec3>() + on_other.iter().sum::<Vec3>();
+        let turn = moment(&body, &on_body) + moment(&other, &on_other);
+        assert!(total.length() < 1e-3 && turn.length() < 2e-2, "{total} {turn}");
+    }
+    assert!(met > 100, "{met}");
+}
+
+fn forces(contacts: &[NodeContact], body: &TetMesh, other: &TetMesh) -> (Vec<Vec3>, Vec<Vec3>) {
+    let (mut on_body, mut on_other) = (vec![Vec3::ZERO; body.positions.len()], vec![Vec3::ZERO; other.positions.len()]);
+    push_apart(contacts, 0.5, &mut on_body, &mut on_other);
+    (on_body, on_other)
+}
+
+/// A strip bent into more than a full ring meets itself; at rest, and bent a little, it does not.
+#[test]
+fn a_strip_that_is_rolled_up_meets_itself() {
+    let mesh = block([40, 2, 2], 2.0);
+    let mut collision = MeshCollision::itself(&mesh).expect("a sound mesh");
+    let mut out = Vec::with_capacity(800);
+    for (turns, meets) in [(0.0f32, false), (0.5, false), (1.02, true)] {
+        let rolled = |p: &Vec3| {
+            let angle = turns * core::f32::consts::TAU * p.x / 80.0;
+            let radius = if turns == 0.0 { 0.0 } else { 80.0 / (turns * core::f32::consts::TAU) };
+            let (s, c) = angle.sin_cos();
+            let bent = Vec3::new((radius + p.z) * s, p.y, (radius + p.z) * c - radius);
+            if turns == 0.0 { *p } else { bent }
+        };
+        let positions: Vec<Vec3> = mesh.positions.iter().map(rolled).collect();
+        assert_eq!(collision.step(&positions, &positions, &mut out), 0);
+        assert_eq!(!out.is_empty(), meets, "{turns} turns: {}", out.len());
+        let mut forces = vec![Vec3::ZERO; positions.len()];
+        push_itself_apart(&out, 1.0, &mut forces);
+        assert!(forces.iter().sum::<Vec3>().length() < 1e-3);
+    }
+}
+
+/// A block in a spherical hollow, shifted until corners are in the wall: it is pushed back, and nowhere along the wall.
+#[test]
+fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
+    let mesh = moved(&block([5, 5, 5], 4.0), Vec3::splat(-10.0));
+    let wall = SlidingWall::around(&mesh).expect("a sound mesh");
+    let mut out: Vec<NodalContact> = Vec::with_capacity(wall.patches());
+    let hollow = |r: f32| move |p: Vec3| (r - p.length(), -p.normalize_or_zero());
+    assert_eq!(wall.step(&mesh.positions, hollow(18.0), &mut out), 0);
+    assert!(out.is_empty());
+    let shifted = moved(&mesh, Vec3::X * 3.0);
+    assert_eq!(wall.step(&shifted.positions, hollow(18.0), &mut out), 0);
+    let at = |n: u32| shifted.positions[n as usize];
+    assert!(!out.is_empty() && out.iter().all(|c| c.pressure_n(c.mean(at), Vec3::ZERO) > 0.0));
+    assert!(out.iter().flat_map(NodalContact::nodes).all(|(n, w)| at(n).length() > 18.0 && w > 0.0));
+    let force: Vec3 = out.iter().map(|c| c.pressure_n(c.mean(at), Vec3::ZERO) * -c.normal).sum();
+    assert!(force.x < -0.5 && force.y.abs() + force.z.abs() < 1e-3, "{force}");
+    // Sliding along a flat wall changes nothing, sinking by 0.1 mm adds 0.1 mm of spring.
+    let flat = |p: Vec3| (p.z + 9.5, Vec3::Z);
+    wall.step(&mesh.positions, flat, &mut out);
+    let press = |by: Vec3| -> f32 {
+        out.iter().map(|c| c.pressure_n(c.mean(|n| mesh.positions[n as usize] + by), Vec3::ZERO)).sum()
+    };
+    let patches = out.len() as f32;
+    assert!((press(Vec3::X) - press(Vec3::ZERO)).abs() < 1e-4);
+    assert!((press(Vec3::Z * -0.1) - press(Vec3::ZERO) - 0.1 * patches).abs() < 1e-3);
+    assert!(wall.step(&mesh.positions, |_| (f32::NAN, Vec3::NAN), &mut out) == 0 && out.is_empty());
+}
+
+#[test]
+fn bad_bodies_are_refused_and_bad_arrays_give_nothing() {
+    let mesh = block([2, 2, 2], 4.0);
+    assert_eq!(MeshCollision::between(&mesh, &TetMesh::default()).err(), Some(ConfigError::EmptyMesh));
+    assert_eq!(SlidingWall::around(&TetMesh::default()).err(), Some(ConfigError::EmptyMesh));
+    let mut collision = MeshCollision::itself(&mesh).expect("a sound mesh");
+    let mut out = Vec::with_capacity(8);
+    assert!(collision.step(&mesh.positions, &[], &mut out) > 0 && out.is_empty());
+    let nowhere = vec![Vec3::NAN; mesh.positions.len()];
+    assert!(collision.step(&nowhere, &nowhere, &mut out) == 0 && out.is_empty());
+    let tool = Tool::probe(2.0);
+    let refused = TissueCollision::new(&mesh, &tool, &Config { friction: f32::NAN, ..Config::default() }).err();
+    assert!(matches!(refused, Some(ConfigError::Value { field: "friction", .. })));
+}
