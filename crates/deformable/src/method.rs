@@ -28,6 +28,7 @@ pub enum Method {
     /// A tree of boxes, refitted bottom-up above and only where it is looked at below (Larsson and Akenine-Möller 2001).
     HybridTree,
     /// The ready-made tree: parry's.
+    #[cfg(feature = "parry")]
     ParryTree,
     /// The thesis's chapter 4: grid, first tetrahedron from the last one found, two rings of neighbours.
     Thesis,
@@ -35,12 +36,14 @@ pub enum Method {
     Walk,
 }
 
+const METHODS: usize = if cfg!(feature = "parry") { 14 } else { 13 };
+
 impl Method {
     /// The charted choice.
     pub const RECOMMENDED: Self = Self::Walk;
 
     /// All methods, the oracle first.
-    pub fn all() -> [Self; 14] {
+    pub fn all() -> [Self; METHODS] {
         use Method::*;
         [
             Brute,
@@ -54,6 +57,7 @@ impl Method {
             KDopTree,
             ObbTree,
             HybridTree,
+            #[cfg(feature = "parry")]
             ParryTree,
             Thesis,
             Walk,
@@ -74,6 +78,7 @@ impl Method {
             Self::KDopTree => "k-dop-tree",
             Self::ObbTree => "obb-tree",
             Self::HybridTree => "hybrid-tree",
+            #[cfg(feature = "parry")]
             Self::ParryTree => "parry-tree",
             Self::Thesis => "thesis",
             Self::Walk => "walk",

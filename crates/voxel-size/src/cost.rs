@@ -131,7 +131,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn measures(s: f64, facet_mm2: f64) -> Measures {
-        Measures { tets: 1, longest_edge_mm: s, mean_edge_mm: 0.9 * s, facet_mm2 }
+        Measures { elements: 1, longest_edge_mm: s, mean_edge_mm: 0.9 * s, facet_mm2 }
     }
 
     proptest! {

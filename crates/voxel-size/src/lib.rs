@@ -9,7 +9,7 @@
 //! ```
 //!
 //! with s the mean longest edge (mm), A_t the mean area of a facet (mm²), p_nc the share of tetrahedra that touch nothing, r_t = t_p / t_v the price of a test in visits. Its minimum is
-//! the one positive root of a cubic ([`CostModel::analytic`]). [`Expected`] does without its guesses: it takes the boxes and particles that are there. The usual rule, δ = mean edge (Teschner et al. 2003), is [`Measures::traditional_mm`].
+//! the one positive root of a cubic ([`CostModel::analytic`]). [`Expected`] does without its guesses: it takes the boxes and particles that are there. Triangle meshes (Borro et al. 2004) take the same form with their own [`Measures::of_triangles`]; density volumes have [`Bricks`]. The usual rule, δ = mean edge (Teschner et al. 2003), is [`Measures::traditional_mm`].
 //!
 //! # Practice
 //! Lengths in mm. Everything is offline and takes no clock: times come in as numbers ([`fit`]), counts come out ([`counts::grid`]).
@@ -26,6 +26,7 @@
 //! # Ok::<(), trepan_voxel_size::VoxelSizeError>(())
 //! ```
 
+mod bricks;
 mod cost;
 pub mod counts;
 mod error;
@@ -33,6 +34,7 @@ mod expected;
 mod fit;
 mod measures;
 
+pub use bricks::Bricks;
 pub use cost::{CostModel, zone_error};
 pub use error::VoxelSizeError;
 pub use expected::{Expected, MAX_GAPS};

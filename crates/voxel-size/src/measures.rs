@@ -1,18 +1,19 @@
 //! What the cost function needs to know about a mesh.
 
 use crate::error::{VoxelSizeError, checked};
+use trepan_geometry::Vec3;
 use trepan_mesh::{FACES, MeshError, TetMesh};
 
-/// Means over the tetrahedra of a mesh.
+/// Means over the tetrahedra or triangles of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measures {
-    /// How many tetrahedra.
-    pub tets: usize,
-    /// s: mean over tetrahedra of their longest edge, mm. In the worst case that is the edge of their box.
+    /// How many tetrahedra or triangles.
+    pub elements: usize,
+    /// s: mean over the elements of their longest edge, mm. In the worst case that is the edge of their box.
     pub longest_edge_mm: f64,
-    /// Mean over the edges of all tetrahedra, mm.
+    /// Mean over the edges of all elements, mm.
     pub mean_edge_mm: f64,
-    /// A_t: mean area of the facets of all tetrahedra, mm².
+    /// A_t: mean area of the facets, mm².
     pub facet_mm2: f64,
 }
 
@@ -35,7 +36,32 @@ impl Measures {
         }
         let tets = mesh.tets.len();
         let [longest_edge_mm, mean_edge_mm, facet_mm2] = [longest, edges, areas].map(|sum| sum / tets as f64);
-        Self { tets, longest_edge_mm, mean_edge_mm, facet_mm2 }.checked()
+        Self { elements: tets, longest_edge_mm, mean_edge_mm, facet_mm2 }.checked()
+    }
+
+    /// Measures a triangle mesh, for the triangle form of Borro et al. 2004: the same cost with the triangles' own edges and areas. Refuses what [`of`](Self::of)
+    /// refuses.
+    pub fn of_triangles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self, VoxelSizeError> {
+        if triangles.is_empty() {
+            return Err(MeshError::Empty.into());
+        }
+        let known = |n: &u32| (*n as usize) < positions.len();
+        let unknown = triangles.iter().flatten().find(|n| !known(n));
+        let wanted = "a node that is there";
+        checked("a triangle's node", unknown.copied().unwrap_or(0).into(), unknown.is_none(), wanted)?;
+        if let Some(node) = positions.iter().position(|p| !p.is_finite()) {
+            return Err(MeshError::NotFinite(node).into());
+        }
+        let mut sums = [0.0; 3];
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|n| positions[n as usize].as_dvec3());
+            let lengths = [a.distance(b), b.distance(c), c.distance(a)];
+            sums[0] += lengths.into_iter().fold(0.0, f64::max);
+            sums[1] += lengths.iter().sum::<f64>() / 3.0;
+            sums[2] += 0.5 * (b - a).cross(c - a).length();
+        }
+        let [longest_edge_mm, mean_edge_mm, facet_mm2] = sums.map(|sum| sum / triangles.len() as f64);
+        Self { elements: triangles.len(), longest_edge_mm, mean_edge_mm, facet_mm2 }.checked()
     }
 
     /// The same numbers, if they are lengths and areas.
@@ -57,7 +83,6 @@ impl Measures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trepan_geometry::Vec3;
 
     fn corner() -> TetMesh {
         TetMesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z], tets: vec![[0, 1, 2, 3]] }
@@ -70,6 +95,21 @@ mod tests {
         assert!((measures.longest_edge_mm - diagonal).abs() < 1e-12);
         assert!((measures.mean_edge_mm - (3.0 + 3.0 * diagonal) / 6.0).abs() < 1e-12);
         assert!((measures.facet_mm2 - (1.5 + 0.75f64.sqrt()) / 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn triangles_are_measured_exactly_and_their_cells_follow_the_same_cubic() {
+        let positions = [Vec3::ZERO, Vec3::X * 3.0, Vec3::Y * 4.0, Vec3::new(3.0, 4.0, 0.0)];
+        let measures = Measures::of_triangles(&positions, &[[0, 1, 2], [3, 2, 1]]).unwrap();
+        assert_eq!((measures.longest_edge_mm, measures.mean_edge_mm, measures.facet_mm2), (5.0, 4.0, 6.0));
+        let model = crate::CostModel::default();
+        let best = model.analytic(&measures).unwrap();
+        assert!(model.cost(&measures, best) < model.cost(&measures, 1.1 * best).min(model.cost(&measures, 0.9 * best)));
+        assert_eq!(Measures::of_triangles(&positions, &[]), Err(MeshError::Empty.into()));
+        let field = "a triangle's node";
+        assert!(
+            matches!(Measures::of_triangles(&positions, &[[0, 1, 4]]), Err(VoxelSizeError::Field { field: f, .. }) if f == field)
+        );
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod k_dop;
 mod kd_tree;
 mod obb;
 mod octree;
+#[cfg(feature = "parry")]
 mod parry_tree;
 mod sphere;
 mod uniform_grid;
@@ -19,6 +20,7 @@ pub use k_dop::KDop;
 pub use kd_tree::KdTree;
 pub use obb::Obb;
 pub use octree::Octree;
+#[cfg(feature = "parry")]
 pub use parry_tree::ParryTree;
 pub use sphere::Sphere;
 pub(crate) use uniform_grid::PointCells;

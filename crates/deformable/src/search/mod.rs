@@ -37,6 +37,7 @@ impl Search {
             Method::KDopTree => phased(tree::<KDop>(mesh), points),
             Method::ObbTree => phased(tree::<Obb>(mesh), points),
             Method::HybridTree => phased(HybridTree::new(&mesh.positions, &mesh.tets), points),
+            #[cfg(feature = "parry")]
             Method::ParryTree => phased(ParryTree::new(&mesh.positions, &mesh.tets), points),
             Method::Thesis => Self::Thesis(thesis::Thesis::new(cell_mm, points, tets)),
             Method::Walk => Self::Walk(Walk::new(points, tets)),

@@ -17,6 +17,8 @@ pub struct Ride {
     pub invented: u64,
     /// Largest change of depth from one step to the next, mm.
     pub depth_jump_mm: f64,
+    /// Largest fall of depth from one step to the next, mm.
+    pub depth_fall_mm: f64,
     times_us: Vec<f64>,
     depth_errors_mm: Vec<f64>,
     inside: u64,
@@ -46,6 +48,7 @@ pub fn ride(scene: &Scene, method: Method, tips: &[Vec3], truth: &[Truth]) -> Ri
         let force = Viscoelastic::BRAIN.stiffness * depth_mm * out.manifold.normal;
         if let Some((before_mm, before)) = last {
             ride.depth_jump_mm = ride.depth_jump_mm.max(f64::from((depth_mm - before_mm).abs()));
+            ride.depth_fall_mm = ride.depth_fall_mm.max(f64::from(before_mm - depth_mm));
             ride.force_change_n = ride.force_change_n.max(f64::from(force.distance(before)));
         }
         last = Some((depth_mm, force));
@@ -60,6 +63,7 @@ impl Ride {
             missed: 0,
             invented: 0,
             depth_jump_mm: 0.0,
+            depth_fall_mm: 0.0,
             times_us: Vec::new(),
             depth_errors_mm: Vec::new(),
             inside: 0,

@@ -127,6 +127,15 @@ impl Scene {
         ((0..steps).map(|step| start + along * (step as f32 / steps as f32)).collect(), f64::from(depth_mm))
     }
 
+    /// Straight down through the middle of the top of a mesh at rest, to this share of its thickness: tips, and the greatest depth, mm.
+    pub fn push(&self, share: f32) -> (Vec<Vec3>, f32) {
+        let bounds = self.mesh.bounds();
+        let start = bounds.min + bounds.size() * Vec3::new(0.52, 0.47, 1.0) + Vec3::Z * RADIUS_MM;
+        let deepest_mm = share * bounds.size().z;
+        let steps = (deepest_mm / 0.25) as usize;
+        ((0..=steps).map(|k| start - Vec3::Z * (deepest_mm * k as f32 / steps as f32)).collect(), deepest_mm)
+    }
+
     fn furthest_hit(&self, positions: &[Vec3], from: Vec3, towards: Vec3) -> Option<f32> {
         let hits = self.surface.triangles.iter().filter_map(|t| hit(t.map(|n| positions[n as usize]), from, towards));
         hits.max_by(f32::total_cmp)
