@@ -21,7 +21,7 @@ use glam::Vec3;
 use trepan_geometry::Aabb;
 
 /// Most pairs of a box and a particle that are kept.
-pub const MAX_GAPS: usize = 60_000;
+pub const MAX_GAPS: usize = 300_000;
 
 /// What the expected work needs to know about boxes and particles.
 #[derive(Clone, Debug)]
