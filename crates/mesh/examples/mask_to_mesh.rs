@@ -1,21 +1,26 @@
-//! Fills a mask with tetrahedra and prints how good they are: `cargo run --example mask_to_mesh [MASK.nii.gz [TETS [OUT.vtk]]]`.
+//! Fills a mask with tetrahedra and prints how good they are:
+//! `cargo run --example mask_to_mesh [MASK.nii.gz [TETS [COARSENING [X,Y,Z,RADIUS,HALVINGS [OUT.vtk]]]]]`.
 //! Without a mask it takes a ball of 45 mm.
 
 use std::path::Path;
 use std::time::Instant;
 use trepan_geometry::Vec3;
-use trepan_mesh::{Quality, Surface, Topology, lattice, vtk};
+use trepan_mesh::lattice::{self, Fine};
+use trepan_mesh::{Quality, Surface, Topology, vtk};
 use trepan_volume::VoxelVolume;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let mask = match arguments.first() {
+    let mask = match arguments.first().filter(|path| *path != "-") {
         Some(path) => trepan_volume::read(Path::new(path))?.map(|v| u8::from(v > 0.5)),
         None => ball(45.0),
     };
     let target_tets = arguments.get(1).map_or(Ok(15_000), |n| n.parse())?;
+    let coarsening = arguments.get(2).map_or(Ok(0), |n| n.parse())?;
+    let fine = arguments.get(3).map_or(Ok(None), |text| fine(text))?;
+    let config = lattice::Config { target_tets, coarsening, fine, ..Default::default() };
     let start = Instant::now();
-    let mesh = lattice::tetrahedra(&mask, &lattice::Config { target_tets, ..Default::default() })?;
+    let mesh = lattice::tetrahedra(&mask, &config)?;
     let seconds = start.elapsed().as_secs_f64();
     mesh.check()?;
 
@@ -32,11 +37,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let area_cm2 = surface.area_mm2(&mesh.positions) / 100.0;
     println!("surface: {} triangles, {area_cm2:.1} cm2, closed: {}", surface.triangles.len(), surface.is_closed());
     println!("face-connected parts: {}", Topology::of(&mesh).components().1);
-    if let Some(out) = arguments.get(2) {
+    if let Some(out) = arguments.get(4) {
         vtk::write(Path::new(out), &mesh)?;
         println!("written to {out}");
     }
     Ok(())
+}
+
+/// A centre, a radius and a count of halvings; `-` for nothing.
+fn fine(text: &str) -> Result<Option<Fine>, std::num::ParseFloatError> {
+    let numbers = text.split(',').filter(|word| *word != "-").map(str::parse).collect::<Result<Vec<f32>, _>>()?;
+    Ok(match numbers[..] {
+        [x, y, z, radius_mm, halvings] => {
+            Some(Fine { centre: Vec3::new(x, y, z), radius_mm, halvings: halvings as u32 })
+        }
+        _ => None,
+    })
 }
 
 fn ball(radius: f64) -> VoxelVolume<u8> {

@@ -3,7 +3,7 @@
 //! # Theory
 //! The stable step of an explicit solver goes with the smallest height of an element. Where a node has a flat element, steps along the axes are tried, shorter each round;
 //! a node on a border is brought back to it, p ← p − φ ∇φ / |∇φ|²; where three labels meet it stays. A step stays when the smallest height around the node grows and no angle there gets worse than the
-//! worst before. So the worst never gets worse. On a brain the lowest element gets twice as high, and the stable time step twice as long.
+//! worst before. Where an angle is sharp, a step also stays when the worst angle gets better and the height no less. So the worst never gets worse. On a brain the lowest element gets twice as high, and the stable time step twice as long.
 
 use super::LabelledMesh;
 use super::regions::Partition;
@@ -15,6 +15,8 @@ use glam::DVec3;
 const ROUNDS: usize = 8;
 /// Nodes are left alone whose elements are all higher than this share of the spacing (the lattice's own: 0.71).
 const HIGH_ENOUGH: f64 = 0.33;
+/// An angle is sharp when its |cos| is over this (20° and 160°).
+const SHARP: f64 = 0.94;
 
 /// Where a node may go.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,13 +34,14 @@ pub(super) fn polish(labelled: &mut LabelledMesh, spacing: f64, regions: &impl P
     let topology = Topology::of(&labelled.mesh);
     let rooms = rooms(labelled, &topology);
     for round in 0..ROUNDS {
-        let step = 0.12 * spacing * 0.7f64.powi(round as i32);
+        let step = 0.12 * 0.7f64.powi(round as i32);
         for (node, room) in rooms.iter().enumerate().filter(|(_, room)| **room != Room::Fixed) {
             let place = |p: DVec3| match *room {
                 Room::Border(a, b) => back_to(|p| regions.hold(a, p) - regions.hold(b, p), p, 0.01 * spacing),
                 _ => p,
             };
             let around = topology.tets_of_node.row(node);
+            let step = step * shortest_edge(&labelled.mesh, node, around).max(spacing);
             improve(&mut labelled.mesh, node, around, HIGH_ENOUGH * spacing, |p, axis| place(p + axis * step));
         }
     }
@@ -61,17 +64,26 @@ fn rooms(labelled: &LabelledMesh, topology: &Topology) -> Vec<Room> {
     (0..outside.len()).map(room).collect()
 }
 
+/// The length of the shortest edge at a node.
+fn shortest_edge(mesh: &TetMesh, node: usize, around: &[u32]) -> f64 {
+    let ends = around.iter().flat_map(|&t| mesh.tets[t as usize]).filter(|&n| n as usize != node);
+    let length = |n: u32| f64::from(mesh.positions[n as usize].distance(mesh.positions[node]));
+    ends.map(length).fold(f64::INFINITY, f64::min)
+}
+
 /// Tries the places that `moved` makes of six directions, and stays at the best.
 fn improve(mesh: &mut TetMesh, node: usize, around: &[u32], high_enough: f64, moved: impl Fn(DVec3, DVec3) -> DVec3) {
     let here = mesh.positions[node];
     let mut best = (worth(mesh, around), here);
-    if best.0.0 > high_enough {
+    let sharp = -best.0.1 > SHARP;
+    if best.0.0 > high_enough && !sharp {
         return;
     }
     for axis in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z] {
         mesh.positions[node] = moved(here.as_dvec3(), axis).as_vec3();
         let now = worth(mesh, around);
-        if now.0 > best.0.0 * 1.001 && now.1 >= best.0.1 {
+        let higher = now.0 > best.0.0 * 1.001 && now.1 >= best.0.1;
+        if higher || (sharp && now.1 > best.0.1 + 1e-3 && now.0 >= best.0.0) {
             best = (now, mesh.positions[node]);
         }
     }
