@@ -1,5 +1,5 @@
 //! Fills a label volume with tetrahedra that conform to its borders: `cargo run --example labels_to_mesh [LABELS.nii.gz [TETS [OUT.vtk]]]`.
-//! Without a volume it takes a ball of 20 mm in one of 40 mm.
+//! Without a volume (or `-`) it takes a ball of 20 mm in one of 40 mm.
 
 use std::path::Path;
 use std::time::Instant;
@@ -9,7 +9,7 @@ use trepan_volume::VoxelVolume;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let labels = match arguments.first() {
+    let labels = match arguments.first().filter(|path| *path != "-") {
         Some(path) => trepan_volume::labels(Path::new(path), &trepan_volume::read(Path::new(path))?)?,
         None => balls(40.0, 20.0),
     };

@@ -1,6 +1,6 @@
 //! Fills a mask with tetrahedra and prints how good they are:
 //! `cargo run --example mask_to_mesh [MASK.nii.gz [TETS [COARSENING [X,Y,Z,RADIUS,HALVINGS [OUT.vtk]]]]]`.
-//! Without a mask it takes a ball of 45 mm.
+//! Without a mask (or `-`) it takes a ball of 45 mm.
 
 use std::path::Path;
 use std::time::Instant;

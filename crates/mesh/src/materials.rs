@@ -5,7 +5,7 @@
 //! Borders between materials follow the elements, not the labels.
 //!
 //! # When not to use it
-//! Where the border between two materials must be smooth, or thinner than an element: that takes a mesh that conforms to it.
+//! Where the border between two materials must be smooth, or thinner than an element: that takes a mesh that conforms to it ([`labelled`](crate::lattice::labelled)).
 
 use crate::TetMesh;
 use glam::DVec3;

@@ -199,6 +199,47 @@ mod tests {
     }
 
     #[test]
+    fn a_ball_coarse_inside_has_its_count_and_follows_its_surface_more_closely() {
+        let mask = mask_of([64; 3], millimetres(64), |p| p.length() < 28.0);
+        let of = |coarsening| {
+            let config = Config { target_tets: 20_000, coarsening, ..Config::default() };
+            let mesh = tetrahedra(&mask, &config).unwrap();
+            assert_sound(&mesh, 20_000, 4.0 / 3.0 * std::f64::consts::PI * 28f64.powi(3));
+            mesh
+        };
+        let (even, graded) = (of(0), of(3));
+        let triangles = [&even, &graded].map(|mesh| Surface::of(mesh).triangles.len());
+        assert!(triangles[1] * 10 > triangles[0] * 13, "{triangles:?}");
+        assert!(Quality::of(&graded).max_edge_mm > 1.2 * Quality::of(&even).max_edge_mm);
+    }
+
+    #[test]
+    fn a_ball_is_finer_near_a_point() {
+        let mask = mask_of([64; 3], millimetres(64), |p| p.length() < 28.0);
+        let fine = Some(Fine { centre: Vec3::new(0.0, 0.0, 28.0), radius_mm: 10.0, halvings: 2 });
+        let config = Config { target_tets: 15_000, coarsening: 1, fine, ..Config::default() };
+        let mesh = tetrahedra(&mask, &config).unwrap();
+        assert_eq!(mesh.check(), Ok(()));
+        let surface = Surface::of(&mesh);
+        assert!(surface.is_closed());
+        assert!(mesh.tets.len().abs_diff(15_000) < 1500);
+        assert!((mesh.total_mm3() / (4.0 / 3.0 * std::f64::consts::PI * 28f64.powi(3)) - 1.0).abs() < 0.01);
+        let quality = Quality::of(&mesh);
+        assert!(quality.min_dihedral_deg > 5.0 && quality.max_dihedral_deg < 170.0, "{quality:?}");
+        let area = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|n| mesh.positions[n as usize]);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        let mean = |near: bool| {
+            let here = |t: &&[u32; 3]| (mesh.positions[t[0] as usize].z > 20.0) == near;
+            let (count, sum) = surface.triangles.iter().filter(here).fold((0, 0.0), |(n, s), t| (n + 1, s + area(t)));
+            sum / count as f32
+        };
+        // Two halvings: triangles of a sixteenth, but for those across the rim of the ball.
+        assert!(mean(false) > 8.0 * mean(true), "{} {}", mean(false), mean(true));
+    }
+
+    #[test]
     fn three_labels_that_meet_leave_no_gap() {
         let labels = volume_with([50; 3], millimetres(50), |p| {
             if p.length() > 20.0 {
@@ -292,6 +333,17 @@ mod tests {
         assert!(matches!(tetrahedra(&short, &config), Err(MeshError::Mask { field: "dims", .. })));
         let error = |config: Config| tetrahedra(&good, &config).unwrap_err();
         assert!(matches!(error(Config { target_tets: 0, ..config }), MeshError::Config { field: "target_tets", .. }));
+        assert!(matches!(error(Config { coarsening: 7, ..config }), MeshError::Config { field: "coarsening", .. }));
+        let fine = |radius_mm, halvings| Some(Fine { centre: Vec3::ZERO, radius_mm, halvings });
+        let wrong = Config { fine: fine(f32::NAN, 1), ..config };
+        assert!(matches!(error(wrong), MeshError::Config { field: "fine.radius_mm", .. }));
+        assert!(matches!(
+            error(Config { fine: fine(1.0, 0), ..config }),
+            MeshError::Config { field: "fine.halvings", .. }
+        ));
+        let mut image = VoxelVolume::filled([20; 3], DAffine3::IDENTITY, 0u16);
+        image.data.iter_mut().enumerate().for_each(|(n, label)| *label = n as u16);
+        assert!(matches!(labelled(&image, &config), Err(MeshError::Mask { field: "data", .. })));
         assert!(matches!(
             error(Config { smoothing: f64::NAN, ..config }),
             MeshError::Config { field: "smoothing", .. }

@@ -1,7 +1,7 @@
 //! Angles of the cut lattice: over all extremes, and over borders as rough as they can be.
 
-use super::octree::{Cube, Lattice};
 use super::octree::tests::uniform;
+use super::octree::{Cube, Lattice};
 use super::regions::Partition;
 use super::stencil::{ALPHA_LONG, ALPHA_SHORT, ON, Pieces, Stuffing, cut_edges, stuff};
 use crate::{Quality, Surface, Topology};

@@ -44,6 +44,14 @@ pub struct Suite {
     pub run: fn(Scope) -> Findings,
 }
 
+/// Suites that fetch programs of others: run when they are named only.
+pub const ON_REQUEST: &[Suite] = &[Suite {
+    name: "mesh-rivals",
+    question: "how do TetGen and fTetWild fill the same surface (fetched from Python's package index for this run)",
+    chart: ("mesh_s", "min_dihedral_deg"),
+    run: mesh::rivals::run,
+}];
+
 /// Every suite.
 pub const ALL: &[Suite] = &[
     Suite {
