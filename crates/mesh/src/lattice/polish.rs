@@ -37,7 +37,7 @@ pub(super) fn polish(labelled: &mut LabelledMesh, spacing: f64, regions: &impl P
         let step = 0.12 * 0.7f64.powi(round as i32);
         for (node, room) in rooms.iter().enumerate().filter(|(_, room)| **room != Room::Fixed) {
             let place = |p: DVec3| match *room {
-                Room::Border(a, b) => back_to(|p| regions.hold(a, p) - regions.hold(b, p), p, 0.01 * spacing),
+                Room::Border(a, b) => back_to(|p| regions.lead(a, b, p), p, 0.01 * spacing),
                 _ => p,
             };
             let around = topology.tets_of_node.row(node);
@@ -136,7 +136,7 @@ mod tests {
     struct Nowhere;
 
     impl Partition for Nowhere {
-        fn hold(&self, _: u16, _: DVec3) -> f64 {
+        fn lead(&self, _: u16, _: u16, _: DVec3) -> f64 {
             f64::NAN
         }
 

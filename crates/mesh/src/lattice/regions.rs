@@ -1,8 +1,9 @@
 //! The labels of a volume as smooth functions of world space: which one holds a point, and by how much.
 //!
 //! # Theory
-//! Each label has a smoothed distance φ (about millimetres, positive inside); the outside has minus that of all labels together. A point belongs to the label with
-//! the largest φ + level, so regions neither overlap nor leave gaps, whatever smoothing does to each. Raising a level moves the label's borders outwards by half of that.
+//! All labels together have a smoothed distance φ₀ (about millimetres, positive inside), and each label has its own, φ. A point is outside where φ₀ + level₀ is
+//! negative, else it belongs to the label with the largest φ + level: regions neither overlap nor leave gaps, whatever smoothing does to each, and the outer surface is
+//! as smooth where two labels meet as elsewhere. Raising level₀ moves the outer surface outwards by as much, raising a label's level moves its borders by half of that.
 //!
 //! # Practice
 //! Labels go by their number in ascending order, 1 up; 0 is the outside. Only the largest 6-connected part of what is labelled is kept.
@@ -17,22 +18,16 @@ const MOST_LABELS: usize = 255;
 
 /// Space divided among labels.
 pub(super) trait Partition: Sync {
-    /// How strongly a label holds a point: the largest one has it.
-    fn hold(&self, label: u16, p: DVec3) -> f64;
+    /// By how much more one label holds a point than another.
+    fn lead(&self, label: u16, other: u16, p: DVec3) -> f64;
 
     /// The label that holds a point.
     fn label_at(&self, p: DVec3) -> u16;
 
     /// Of some labels the one that holds a point most; of equals the first.
     fn strongest(&self, among: &[u16], p: DVec3) -> u16 {
-        let mut best = (f64::NEG_INFINITY, 0);
-        for &label in among {
-            let hold = self.hold(label, p);
-            if hold > best.0 {
-                best = (hold, label);
-            }
-        }
-        best.1
+        let stronger = |best: u16, &label: &u16| if self.lead(label, best, p) > 0.0 { label } else { best };
+        among.iter().skip(1).fold(among[0], stronger)
     }
 }
 
@@ -42,7 +37,7 @@ pub(super) struct Regions {
     pub(super) names: Vec<u16>,
     /// Volume of each, mm³; of the outside 0.
     pub(super) mm3: Vec<f64>,
-    /// What is added to each φ, mm; of the outside 0.
+    /// What is added to each φ, mm; the first to that of all together.
     pub(super) levels: Vec<f64>,
     /// World box of all that is labelled.
     pub(super) bounds: [DVec3; 2],
@@ -86,29 +81,45 @@ impl Regions {
 
     /// About how far a point is from the nearest border, mm, and whether it is outside.
     pub(super) fn depth(&self, p: DVec3) -> (f64, bool) {
-        let outside = self.hold(0, p);
-        let (mut first, mut second) = (outside, f64::NEG_INFINITY);
-        for label in 1..self.names.len() as u16 {
+        let inside = self.inside(p);
+        let (mut first, mut second) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        let labels = if self.union.is_some() && inside > 0.0 { self.names.len() as u16 } else { 1 };
+        for label in 1..labels {
             let hold = self.hold(label, p);
             (first, second) = if hold > first { (hold, first) } else { (first, second.max(hold)) };
         }
-        (0.5 * (first - second), first == outside)
+        let to_label = if labels > 1 { 0.5 * (first - second) } else { f64::INFINITY };
+        (inside.abs().min(to_label), inside <= 0.0)
+    }
+
+    /// How far a point is inside of all labels together, mm.
+    fn inside(&self, p: DVec3) -> f64 {
+        self.union.as_ref().unwrap_or(&self.fields[0]).sample(p) + self.levels[0]
+    }
+
+    /// How strongly a label holds a point that is inside.
+    fn hold(&self, label: u16, p: DVec3) -> f64 {
+        self.fields[usize::from(label) - 1].sample(p) + self.levels[usize::from(label)]
     }
 }
 
 impl Partition for Regions {
-    fn hold(&self, label: u16, p: DVec3) -> f64 {
-        if label == 0 {
-            return -self.union.as_ref().unwrap_or(&self.fields[0]).sample(p);
+    fn lead(&self, label: u16, other: u16, p: DVec3) -> f64 {
+        match (label, other) {
+            (0, 0) => 0.0,
+            (0, _) => -self.inside(p),
+            (_, 0) => self.inside(p),
+            _ => self.hold(label, p) - self.hold(other, p),
         }
-        self.fields[label as usize - 1].sample(p) + self.levels[label as usize]
     }
 
     fn label_at(&self, p: DVec3) -> u16 {
-        let mut best = (self.hold(0, p), 0);
-        for label in 1..self.names.len() as u16 {
-            let reaches = self.union.is_none() || self.fields[label as usize - 1].contains(p);
-            let hold = if reaches { self.hold(label, p) } else { f64::NEG_INFINITY };
+        if self.inside(p) <= 0.0 {
+            return 0;
+        }
+        let mut best = (f64::NEG_INFINITY, 1);
+        for label in (1..self.names.len() as u16).filter(|&label| self.fields[usize::from(label) - 1].contains(p)) {
+            let hold = self.hold(label, p);
             if hold > best.0 {
                 best = (hold, label);
             }

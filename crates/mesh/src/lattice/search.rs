@@ -1,8 +1,9 @@
 //! Finds the spacing that gives the count asked for, and the levels that give each label its volume.
 //!
 //! # Theory
-//! The count goes with a⁻³, where cubes grow inwards with about a^-2.5. Raising the level of label l by x moves its border with k by (x_l − x_k) / 2, so what it lacks asks for
-//! Σ_k A_lk (x_l − x_k) / 2 = missing_l with A the areas between labels: a few sweeps of Gauss and Seidel.
+//! The count goes with a⁻³, where cubes grow inwards with about a^-2.5. Raising the outer level by x₀ moves the outer surface by x₀, so it takes what all labels
+//! lack over that surface's area. Raising the level of label l by x_l moves its border with k by (x_l − x_k) / 2, so what it still lacks asks for
+//! Σ_k A_lk (x_l − x_k) / 2 = missing_l − A_l0 x₀ with A the areas between labels: a few sweeps of Gauss and Seidel.
 
 use super::octree::{Cube, Lattice};
 use super::regions::{Partition, Regions};
@@ -141,7 +142,7 @@ fn judge(regions: &Regions, config: &Config, spacing: f64, centre: DVec3, level:
 
 /// What each label lacks, and what lies between labels.
 struct Balance {
-    /// By label, mm³; of the outside nothing.
+    /// By label, mm³; the first is the sum.
     missing: Vec<f64>,
     /// Areas between labels, mm²: row by row.
     areas: Vec<f64>,
@@ -164,6 +165,7 @@ impl Balance {
                 }
             }
         }
+        missing[0] = missing[1..].iter().sum();
         Self { missing, areas }
     }
 
@@ -180,22 +182,26 @@ impl Balance {
             }
         }
         let all = regions.mm3.iter().sum::<f64>();
-        worst
-            .max(self.missing.iter().map(|m| m.abs()).sum::<f64>() / (ALL_TOLERANCE * all))
-            .max(self.missing.iter().sum::<f64>().abs() / (VOLUME_TOLERANCE * all))
+        let each = self.missing[1..].iter().map(|m| m.abs()).sum::<f64>();
+        worst.max(each / (ALL_TOLERANCE * all)).max(self.missing[0].abs() / (VOLUME_TOLERANCE * all))
     }
 
     /// By how much to raise each level, mm.
     fn steps(&self, spacing: f64) -> Vec<f64> {
         let count = self.missing.len();
+        let most = 0.3 * spacing;
+        let row = |own: usize| &self.areas[own * count..(own + 1) * count];
+        let outer: f64 = (1..count).map(|own| row(own)[0]).sum();
         let mut steps = vec![0.0; count];
+        steps[0] = (self.missing[0] / outer).clamp(-most, most);
         for _ in 0..SWEEPS {
             for own in 1..count {
-                let row = &self.areas[own * count..(own + 1) * count];
-                let (area, pull) =
-                    row.iter().zip(&steps).fold((0.0, 0.0), |(a, p), (area, x)| (a + area, p + area * x));
-                let step = (2.0 * self.missing[own] + pull) / area;
-                steps[own] = if step.is_finite() { step.clamp(-0.3 * spacing, 0.3 * spacing) } else { 0.1 * spacing };
+                let others = row(own).iter().zip(&steps).skip(1);
+                let (area, pull) = others.fold((0.0, 0.0), |(a, p), (area, x)| (a + area, p + area * x));
+                let lacks = self.missing[own] - row(own)[0] * steps[0];
+                let gone = area + row(own)[0] == 0.0;
+                let step = if area > 0.0 { (2.0 * lacks + pull) / area } else { 0.0 };
+                steps[own] = if gone { 0.1 * spacing } else { step.clamp(-most, most) };
             }
         }
         steps

@@ -90,7 +90,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         let edges = cut_edges(&tets, label_of);
         let cut = |&[a, b]: &[u32; 2]| {
             let [a, b] = if label_of(a) > label_of(b) { [a, b] } else { [b, a] };
-            let beats = |p| regions.hold(label_of(a), p) > regions.hold(label_of(b), p);
+            let beats = |p| regions.lead(label_of(a), label_of(b), p) > 0.0;
             crossing(beats, positions[a as usize], positions[b as usize])
         };
         let cuts = edges.par_iter().map(cut).collect();

@@ -12,7 +12,7 @@ use proptest::prelude::*;
 struct By<F>(F);
 
 impl<F: Fn(DVec3) -> f64 + Sync> Partition for By<F> {
-    fn hold(&self, label: u16, p: DVec3) -> f64 {
+    fn lead(&self, label: u16, _: u16, p: DVec3) -> f64 {
         if label == 0 { -(self.0)(p) } else { (self.0)(p) }
     }
 
@@ -27,7 +27,7 @@ struct Noise {
     labels: u16,
 }
 
-impl Partition for Noise {
+impl Noise {
     fn hold(&self, label: u16, p: DVec3) -> f64 {
         let inner = p.cmpgt(DVec3::splat(-0.6)).all() && p.cmplt(DVec3::splat(20.6)).all();
         if !inner {
@@ -39,6 +39,12 @@ impl Partition for Noise {
             h ^= h >> 29;
         }
         (h >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    }
+}
+
+impl Partition for Noise {
+    fn lead(&self, label: u16, other: u16, p: DVec3) -> f64 {
+        self.hold(label, p) - self.hold(other, p)
     }
 
     fn label_at(&self, p: DVec3) -> u16 {
