@@ -114,7 +114,8 @@ impl Workshop {
         obj::write(&at("surface.obj"), &surface).map_err(|fault| fault.to_string())?;
         let mut command = Command::new(&self.python);
         command.arg(at("rivals.py")).arg(name).arg(at("surface.obj")).arg(target.to_string()).arg(at("filled"));
-        let seconds = said(&mut command)?;
+        // fTetWild leaves a file where it runs.
+        let seconds = said(command.current_dir(self.folder.path()))?;
         let seconds = seconds.lines().find_map(|line| line.strip_prefix("seconds ")?.parse().ok());
         let mesh = read(&at("filled").with_extension(ending))?;
         Ok((mesh, seconds.ok_or("it does not tell its seconds")?))

@@ -48,6 +48,9 @@ pub(super) struct Border {
     pub(super) distance: Option<fn(Vec3) -> f32>,
 }
 
+/// A label and the distance to its border.
+type Known = (u16, fn(Vec3) -> f32);
+
 const OUTER: Border = Border { label: 0, distance: None };
 
 impl Scene {
@@ -201,10 +204,10 @@ fn shape(
     label: impl Fn(Vec3) -> u16,
     target_tets: usize,
     mm3: &[(u16, f64)],
-    borders: &[(u16, fn(Vec3) -> f32)],
+    borders: &[Known],
     euler: f64,
 ) -> Scene {
-    let border = |&(label, distance): &(u16, fn(Vec3) -> f32)| Border { label, distance: Some(distance) };
+    let border = |&(label, distance): &Known| Border { label, distance: Some(distance) };
     Scene {
         name: name.into(),
         labels: voxels(label),
