@@ -3,10 +3,15 @@
 //! # Theory
 //! ```text
 //! wanted → finite? → input sound? → ramp-in → damping → clamp |F|, |τ| → slew → energy bound → GuardedWrench
+//!                                                          ↑ peak, or less when the motors are warm
+//! θ̇ = ((F/Fc)² - θ)/τ      F² ≤ Fc² + (Fp² - Fc²) min((1 - θ)/0.1, 1)
 //! ```
 //! Whatever comes in, what goes out is finite, no longer than the limit, and no further from the last wrench than the
 //! slew limit lets it, but for one case: where a held force would give the hand energy that it never put in, the force falls faster. A force
 //! that this holds short for long ramps in anew: a wall is never lost for good. Vectors are shortened, never clipped by axis: the direction of a force is kept.
+//!
+//! Heat goes with the square of a motor's current, and so of the force: θ = 1 is what the continuous force Fc heats to in the end. The
+//! peak Fp is given until θ = 0.9, then the limit falls towards Fc, which it reaches as θ reaches 1, and never passes.
 //!
 //! # Practice
 //! Every event is counted in [`GuardCounters`]. A wanted wrench that is not finite, a pose that is not, a tool faster than the
@@ -25,6 +30,9 @@ use trepan_geometry::{ToolState, Vec3, Wrench};
 
 /// Longest tick that the slew limit grants, ms: a late tick is not caught up with a jump.
 const MAX_DT_MS: f32 = 5.0;
+
+/// Share of the heat in which the limit falls from peak to continuous force.
+const WARM: f32 = 0.1;
 
 /// A wrench that a device may apply. Only [`ForceGuard`] makes one that is not zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,6 +56,12 @@ impl GuardedWrench {
     pub fn wrench(&self) -> Wrench {
         self.0
     }
+
+    /// Less of it: `share` is taken as 0 to 1, and as 0 if it is not a number.
+    pub fn faded(&self, share: f32) -> Self {
+        let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
+        Self(Wrench { force: self.0.force * share, torque: self.0.torque * share })
+    }
 }
 
 /// Limits of the guard.
@@ -55,6 +69,10 @@ impl GuardedWrench {
 pub struct GuardConfig {
     /// Longest force, N. Set it to the device's peak; 3.3 is the Touch's.
     pub max_force_n: f32,
+    /// Force that the motors bear for any time, N; as long as the peak or longer, there is no heat account. The Touch's is 0.88.
+    pub continuous_force_n: f32,
+    /// Time constant τ of the motors' heat, ms. From cold, the Touch's peak is given for 2 s, 2 N for 6 s.
+    pub heat_ms: f32,
     /// Longest torque, N mm. 188 is the limit of the 6-DOF Premium.
     pub max_torque_nmm: f32,
     /// Largest change of force, N per ms.
@@ -75,6 +93,8 @@ impl Default for GuardConfig {
     fn default() -> Self {
         Self {
             max_force_n: 3.3,
+            continuous_force_n: f32::INFINITY,
+            heat_ms: 30_000.0,
             max_torque_nmm: 188.0,
             slew_n_per_ms: 0.5,
             torque_slew_nmm_per_ms: 20.0,
@@ -91,6 +111,8 @@ impl Default for GuardConfig {
 pub struct GuardCounters {
     /// Force or torque was longer than its limit.
     pub clamped: u64,
+    /// The force was shortened to what warm motors bear.
+    pub heated: u64,
     /// Force or torque changed faster than its limit.
     pub slewed: u64,
     /// The wanted wrench, the tool or the tick length was not a usable number.
@@ -116,6 +138,7 @@ pub struct ForceGuard {
     counters: GuardCounters,
     observer: PassivityObserver,
     applied: Wrench,
+    heat: f32,
     ramp_ms: f32,
     released: bool,
     last_tip: Option<Vec3>,
@@ -130,6 +153,8 @@ impl ForceGuard {
         let sound = |x: f32| if x > 1e-6 { x.min(1e6) } else { 0.0 };
         let config = GuardConfig {
             max_force_n: sound(config.max_force_n),
+            continuous_force_n: sound(config.continuous_force_n),
+            heat_ms: sound(config.heat_ms),
             max_torque_nmm: sound(config.max_torque_nmm),
             slew_n_per_ms: sound(config.slew_n_per_ms),
             torque_slew_nmm_per_ms: sound(config.torque_slew_nmm_per_ms),
@@ -143,6 +168,7 @@ impl ForceGuard {
             counters: GuardCounters::default(),
             observer: PassivityObserver::default(),
             applied: Wrench::ZERO,
+            heat: 0.0,
             ramp_ms: 0.0,
             released: false,
             last_tip: None,
@@ -163,7 +189,7 @@ impl ForceGuard {
             goal = self.ramped(wanted, dt_ms);
             goal.force = self.damped(goal.force, dt_ms);
         }
-        let goal = self.clamped(goal);
+        let goal = self.clamped(goal, dt_ms);
         let slewed = self.slewed(goal, dt_ms);
         self.applied = self.bounded(slewed);
         self.restart(goal.force, dt_ms);
@@ -197,6 +223,11 @@ impl ForceGuard {
     /// The energy account.
     pub fn passivity_observer(&self) -> &PassivityObserver {
         &self.observer
+    }
+
+    /// Heat θ of the motors by their forces so far; 1 is what they bear for any time.
+    pub fn heat(&self) -> f32 {
+        self.heat
     }
 
     /// The limits in force.
@@ -274,11 +305,28 @@ impl ForceGuard {
         Wrench { force: wanted.force * share, torque: wanted.torque * share }
     }
 
-    fn clamped(&mut self, goal: Wrench) -> Wrench {
-        let (force, cut_force) = shortened(goal.force, self.config.max_force_n);
+    fn clamped(&mut self, goal: Wrench, dt_ms: f32) -> Wrench {
+        let (mut force, cut_force) = shortened(goal.force, self.config.max_force_n);
         let (torque, cut_torque) = shortened(goal.torque, self.config.max_torque_nmm);
         self.counters.clamped += u64::from(cut_force || cut_torque);
+        if let Some(bearable_n) = self.bearable_n(dt_ms) {
+            let (cooler, cut) = shortened(force, bearable_n);
+            self.counters.heated += u64::from(cut);
+            force = cooler;
+        }
         Wrench { force, torque }
+    }
+
+    /// Books the heat of the force that was given, and says what the motors bear now; `None` where the peak is for any time.
+    fn bearable_n(&mut self, dt_ms: f32) -> Option<f32> {
+        let (peak, steady) = (self.config.max_force_n, self.config.continuous_force_n);
+        if steady >= peak {
+            return None;
+        }
+        let load = if steady > 0.0 { (self.applied.force.length() / steady).powi(2) } else { 1.0 };
+        self.heat += (load - self.heat) * (dt_ms / self.config.heat_ms).clamp(0.0, 1.0);
+        let spare = ((1.0 - self.heat) / WARM).clamp(0.0, 1.0);
+        Some((steady * steady + (peak * peak - steady * steady) * spare).sqrt())
     }
 
     fn slewed(&mut self, goal: Wrench, dt_ms: f32) -> Wrench {
@@ -391,6 +439,46 @@ mod tests {
         assert_eq!((0..40).map(|_| without_clock.guard(push(1.0), &still(0.0), 1.0).force().z).last(), Some(1.0));
     }
 
+    /// Forces of a Touch from which 3 N are wanted without end, second by second.
+    fn wanted_without_end(seconds: u32) -> (Vec<f32>, ForceGuard) {
+        let mut guard = ready(GuardConfig { continuous_force_n: 0.88, ..GuardConfig::default() });
+        let mut second = |s: u32| {
+            let forces = (1..=1000).map(|t| guard.guard(push(3.0), &still((1000 * s + t).into()), 1.0).force().z);
+            forces.last().unwrap_or(0.0)
+        };
+        ((0..seconds).map(&mut second).collect(), guard)
+    }
+
+    #[test]
+    fn peak_force_lasts_for_a_time_then_falls_to_the_continuous_one() {
+        let (forces, guard) = wanted_without_end(60);
+        // From cold, θ = (F/Fc)² (1 - exp(-t/τ)) is 0.9 after 2.4 s.
+        assert_eq!(forces[1], 3.0, "two seconds are free");
+        assert!(forces.windows(2).all(|f| f[1] <= f[0]) && forces[4] < 2.0, "{forces:?}");
+        assert!((forces[59] - 0.88).abs() < 0.01 && guard.heat() <= 1.0, "{} {}", forces[59], guard.heat());
+        assert!(guard.counters().heated > 50_000 && guard.counters().clamped == 0);
+    }
+
+    #[test]
+    fn motors_cool_at_rest_and_bear_the_peak_again() {
+        let (_, mut guard) = wanted_without_end(10);
+        let mut force = |n: f32, s: u32| {
+            (1..=60_000u32).map(|t| guard.guard(push(n), &still((1000 * s + t).into()), 1.0).force().z).last()
+        };
+        force(0.0, 10);
+        assert!((guard.heat() - (-2.0f32).exp()).abs() < 0.01, "{}", guard.heat());
+        assert_eq!(guard.guard(push(0.4), &still(80_000.0), 1.0).force().z, 0.4);
+    }
+
+    #[test]
+    fn a_faded_wrench_is_never_more() {
+        let mut guard = ready(GuardConfig::default());
+        let whole = guard.guard(push(0.4), &still(1.0), 1.0);
+        for (share, force) in [(0.5, 0.2), (1.0, 0.4), (7.0, 0.4), (-1.0, 0.0), (f32::NAN, 0.0)] {
+            assert_eq!(whole.faded(share).force().z, force);
+        }
+    }
+
     #[test]
     fn a_jump_of_the_tip_is_a_fault_and_is_not_booked_as_work() {
         let mut guard = ready(GuardConfig::default());
@@ -443,11 +531,12 @@ mod tests {
         #[test]
         fn whatever_comes_in_what_goes_out_is_within_limits(
             ticks in prop::collection::vec((any_tool(), prop::collection::vec(any_f32(), 7), any::<bool>()), 1..60),
-            limits in prop::collection::vec(any_f32(), 6),
+            limits in prop::collection::vec(any_f32(), 8),
         ) {
             let config = GuardConfig {
                 max_force_n: limits[0].abs(), max_torque_nmm: limits[1].abs(), slew_n_per_ms: limits[2].abs(),
-                torque_slew_nmm_per_ms: limits[3].abs(), ramp_in_ms: limits[4], max_speed: limits[5], ..GuardConfig::default()
+                torque_slew_nmm_per_ms: limits[3].abs(), ramp_in_ms: limits[4], max_speed: limits[5],
+                continuous_force_n: limits[6], heat_ms: limits[7], ..GuardConfig::default()
             };
             let mut guard = ForceGuard::new(config);
             let limit = *guard.config();

@@ -47,7 +47,7 @@ pub struct Capabilities {
     pub name: String,
     /// Largest force for a short time, N; 0 for a device without motors.
     pub peak_force_n: f32,
-    /// Largest force for any time, N.
+    /// Largest force for any time, N; 0 where it is not known.
     pub continuous_force_n: f32,
     /// Rate at which it wants to be read, Hz.
     pub rate_hz: f32,
@@ -76,8 +76,8 @@ impl Capabilities {
         }
     }
 
-    /// The guard's recommended limits, lowered to this device's peak force, its energy account told of the device's delay and encoder
-    /// step. A device without motors keeps the recommended peak: what it would feel is still shown and recorded.
+    /// The guard's recommended limits, lowered to this device's peak and continuous force, its energy account told of the device's delay
+    /// and encoder step. A device without motors keeps the recommended peak: what it would feel is still shown and recorded.
     pub fn guard_config(&self) -> GuardConfig {
         let recommended = GuardConfig::default();
         let peak_n = if self.peak_force_n > 0.0 { self.peak_force_n } else { recommended.max_force_n };
@@ -86,7 +86,12 @@ impl Capabilities {
             quantum_mm: self.position_resolution_mm,
             ..PassivityConfig::default()
         };
-        GuardConfig { max_force_n: peak_n.min(recommended.max_force_n), passivity: Some(passivity), ..recommended }
+        GuardConfig {
+            max_force_n: peak_n.min(recommended.max_force_n),
+            continuous_force_n: if self.continuous_force_n > 0.0 { self.continuous_force_n } else { f32::INFINITY },
+            passivity: Some(passivity),
+            ..recommended
+        }
     }
 }
 
@@ -103,6 +108,8 @@ mod tests {
         let strong = Capabilities { peak_force_n: 20.0, position_resolution_mm: 0.01, ..weak };
         assert_eq!(strong.guard_config().max_force_n, GuardConfig::default().max_force_n);
         assert_eq!(strong.guard_config().passivity.unwrap().quantum_mm, 0.01);
+        let warm = Capabilities { continuous_force_n: 0.9, ..strong };
+        assert_eq!(warm.guard_config().continuous_force_n, 0.9);
         assert_eq!(Capabilities::passive("mouse").guard_config().max_force_n, GuardConfig::default().max_force_n);
     }
 }

@@ -90,32 +90,40 @@ pub fn device_name(program: Program, options: &Options, windowed: bool) -> Resul
 /// What the force guard must know of a device; recorded, so that a replay is guarded alike.
 pub struct Feel {
     peak_force_n: f32,
+    continuous_force_n: f32,
     delay_ticks: u8,
     position_step_mm: f32,
 }
 
 const PEAK: &str = "device_peak_force_n";
+const CONTINUOUS: &str = "device_continuous_force_n";
 const DELAY: &str = "device_delay_ticks";
 const STEP: &str = "device_position_step_mm";
 
 impl Feel {
     /// Of a device at hand.
     pub fn of(device: &Capabilities) -> Self {
-        let &Capabilities { peak_force_n, delay_ticks, position_resolution_mm, .. } = device;
-        Self { peak_force_n, delay_ticks, position_step_mm: position_resolution_mm }
+        let &Capabilities { peak_force_n, continuous_force_n, delay_ticks, position_resolution_mm, .. } = device;
+        Self { peak_force_n, continuous_force_n, delay_ticks, position_step_mm: position_resolution_mm }
     }
 
     /// What a recorded session knew of its device; nothing where there is no recording.
     pub fn recorded(recording: Option<&Recording>) -> Self {
         let config = recording.map(|recording| &recording.header.config);
         let number = |name: &str| config.and_then(|c| c.get(name)?.parse().ok()).unwrap_or(0.0f32);
-        Self { peak_force_n: number(PEAK), delay_ticks: number(DELAY) as u8, position_step_mm: number(STEP) }
+        Self {
+            peak_force_n: number(PEAK),
+            continuous_force_n: number(CONTINUOUS),
+            delay_ticks: number(DELAY) as u8,
+            position_step_mm: number(STEP),
+        }
     }
 
     /// What [`Feel::recorded`] reads.
-    pub fn entries(&self) -> [(&'static str, String); 3] {
+    pub fn entries(&self) -> [(&'static str, String); 4] {
         [
             (PEAK, self.peak_force_n.to_string()),
+            (CONTINUOUS, self.continuous_force_n.to_string()),
             (DELAY, self.delay_ticks.to_string()),
             (STEP, self.position_step_mm.to_string()),
         ]
@@ -125,6 +133,7 @@ impl Feel {
     pub fn guard(&self) -> GuardConfig {
         let mut device = Watched::CAPABILITIES;
         device.peak_force_n = self.peak_force_n;
+        device.continuous_force_n = self.continuous_force_n;
         device.delay_ticks = self.delay_ticks;
         device.position_resolution_mm = self.position_step_mm;
         device.guard_config()

@@ -6,6 +6,7 @@ use crate::stages::notice::What;
 use crate::stages::score::ScoreKeeper;
 use serde::Serialize;
 use std::fs;
+use trepan_contact::GuardCounters;
 
 /// The whole file.
 #[derive(Clone, Debug, Serialize)]
@@ -137,6 +138,8 @@ pub struct Forces {
 pub struct GuardSummary {
     /// Over the device's limit.
     pub clamped: u64,
+    /// Over what its warm motors bear.
+    pub heated: u64,
     /// Changed too fast.
     pub slewed: u64,
     /// Not a number.
@@ -147,6 +150,20 @@ pub struct GuardSummary {
     pub bounded: u64,
     /// Let force through again after it was cut.
     pub restarted: u64,
+    /// The tool was too fast, or jumped.
+    pub too_fast: u64,
+    /// The device's position was old.
+    pub stale: u64,
+    /// The force was still ramping in.
+    pub ramped: u64,
+}
+
+impl From<&GuardCounters> for GuardSummary {
+    fn from(guard: &GuardCounters) -> Self {
+        let &GuardCounters { clamped, heated, slewed, non_finite, passivity, bounded, restarted, .. } = guard;
+        let &GuardCounters { too_fast, stale, ramped, .. } = guard;
+        Self { clamped, heated, slewed, non_finite, passivity, bounded, restarted, too_fast, stale, ramped }
+    }
 }
 
 /// Where it ran.
@@ -207,7 +224,6 @@ impl Summary {
     /// From all that is known at the end.
     pub fn new(about: About, outcome: &Outcome) -> Self {
         let seconds = outcome.seconds.max(1e-9);
-        let guard = &outcome.guard;
         Self {
             app: about.program.name().into(),
             case: about.case,
@@ -239,14 +255,7 @@ impl Summary {
             bone_removed_mm3: outcome.scores.bone_removed_mm3,
             warnings: warnings(outcome),
             scores: outcome.scores,
-            guard: GuardSummary {
-                clamped: guard.clamped,
-                slewed: guard.slewed,
-                non_finite: guard.non_finite,
-                passivity: guard.passivity,
-                bounded: guard.bounded,
-                restarted: guard.restarted,
-            },
+            guard: (&outcome.guard).into(),
             frames: about.frames,
             fps: about.frames as f64 / seconds,
             replay: outcome.replayed,

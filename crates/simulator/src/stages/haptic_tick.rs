@@ -165,10 +165,12 @@ impl HapticStage {
         let held = self.touch_tissue(input.patch, &sample);
         let lost = input.reading.status == Status::Lost;
         let wanted = if lost { Wrench::ZERO } else { self.wanted(&tool) };
+        let heated = self.guard.counters().heated;
         let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
+        let warm = self.guard.counters().heated > heated;
         let mut record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
         record.removed_mm3 -= back_mm3;
-        self.warn(&record, input.patch, wanted, tell);
+        self.warn(&record, input.patch, wanted, warm, tell);
         self.scores.add(&record, self.config.dt_ms);
         Tick { wrench, sample, record, warnings: self.watch.standing() }
     }
@@ -359,7 +361,14 @@ impl HapticStage {
         self.brain.as_ref().map_or(f32::INFINITY, |field| field.sample(tip) - self.tool().tip_radius_mm)
     }
 
-    fn warn(&mut self, record: &TickRecord, patch: &SurfacePatch, wanted: Wrench, tell: &mut dyn FnMut(Notice)) {
+    fn warn(
+        &mut self,
+        record: &TickRecord,
+        patch: &SurfacePatch,
+        wanted: Wrench,
+        warm: bool,
+        tell: &mut dyn FnMut(Notice),
+    ) {
         let burr = self.phase() == Phase::Craniotomy;
         let distance = record.brain_distance_mm;
         let touched = burr && (distance <= 0.0 || self.tissue.depth_mm > 0.0);
@@ -374,6 +383,7 @@ impl HapticStage {
             (Warning::ForceLimit, record.has(TickRecord::CLAMPED), force),
             (Warning::TissueLate, record.has(TickRecord::HELD), age_ms),
             (Warning::DeviceStale, record.has(TickRecord::STALE), 0.0),
+            (Warning::MotorsWarm, warm, force),
         ];
         for (warning, present, value) in causes {
             if let Some(what) = self.watch.tell(warning, present, value, record.time_ms) {

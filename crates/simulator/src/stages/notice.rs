@@ -22,11 +22,13 @@ pub enum Warning {
     TissueLate,
     /// The device gave no fresh or no finite pose.
     DeviceStale,
+    /// The device's motors are warm; less force than wanted is given.
+    MotorsWarm,
 }
 
 impl Warning {
     /// Every warning, in the order of their bits.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::BoneThin,
         Self::BreakThrough,
         Self::BrainNear,
@@ -34,6 +36,7 @@ impl Warning {
         Self::ForceLimit,
         Self::TissueLate,
         Self::DeviceStale,
+        Self::MotorsWarm,
     ];
 
     /// A short name for files.
@@ -46,6 +49,7 @@ impl Warning {
             Self::ForceLimit => "force-limit",
             Self::TissueLate => "tissue-late",
             Self::DeviceStale => "device-stale",
+            Self::MotorsWarm => "motors-warm",
         }
     }
 
@@ -59,6 +63,7 @@ impl Warning {
             Self::ForceLimit => "the force is at the device's limit",
             Self::TissueLate => "the tissue's answer is late, its force fades",
             Self::DeviceStale => "the device gave no fresh position, the last one is held",
+            Self::MotorsWarm => "the device's motors are warm, its force is reduced: press less",
         }
     }
 }
@@ -98,7 +103,7 @@ impl Notice {
                 let unit = match warning {
                     Warning::BoneThin | Warning::BreakThrough => "mm left",
                     Warning::BrainNear | Warning::BrainTouched => "mm away",
-                    Warning::ForceLimit => "N wanted",
+                    Warning::ForceLimit | Warning::MotorsWarm => "N wanted",
                     Warning::TissueLate | Warning::DeviceStale => "ms old",
                 };
                 ("warning", format!("{}: {} ({value:.2} {unit})", warning.name(), warning.text()))
