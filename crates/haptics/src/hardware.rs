@@ -1,7 +1,7 @@
 //! Opens the devices that are more than software, by the name that a user gave.
 
 use crate::{DeviceError, DeviceName, HapticDevice, Listed, Watch, Workspace};
-use crate::{force_dimension, haply, openhaptics};
+use crate::{force_dimension, haply, openhaptics, spacemouse};
 
 /// A device of metal, and the window into its faults.
 pub struct Hardware {
@@ -30,6 +30,10 @@ pub fn open(name: &DeviceName, workspace: Workspace) -> Option<Result<Hardware, 
             let config = haply::Config { workspace, ..Default::default() };
             Some(haply::Haply::open(&config).map(|d| Hardware { watch: d.watch(), device: Box::new(d) }))
         }
+        DeviceName::SpaceMouse => {
+            let config = spacemouse::Config { workspace, ..Default::default() };
+            Some(spacemouse::SpaceMouse::open(&config).map(|d| Hardware { watch: d.watch(), device: Box::new(d) }))
+        }
         DeviceName::Mouse | DeviceName::Script(_) | DeviceName::Replay(_) | DeviceName::Simulated(_) => None,
     }
 }
@@ -45,6 +49,7 @@ pub(crate) fn list() -> Vec<Listed> {
         listed("openhaptics", openhaptics::probe()),
         listed("force-dimension", force_dimension::probe()),
         listed("haply", haply::probe()),
+        listed("spacemouse", spacemouse::probe()),
     ]
 }
 

@@ -80,7 +80,7 @@ impl Mouse {
 }
 
 /// Axis times angle of the shorter way round.
-fn rotation_vector(q: Quat) -> Vec3 {
+pub(crate) fn rotation_vector(q: Quat) -> Vec3 {
     let q = if q.w < 0.0 { -q } else { q };
     q.to_scaled_axis()
 }

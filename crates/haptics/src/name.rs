@@ -21,6 +21,8 @@ pub enum DeviceName {
     ForceDimension,
     /// `haply`: Inverse3 with VerseGrip, through its service.
     Haply,
+    /// `spacemouse`: a six-axis knob, without force.
+    SpaceMouse,
 }
 
 /// A device name that does not say which device.
@@ -58,7 +60,8 @@ pub enum NameError {
     },
 }
 
-const KNOWN: &str = "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension, haply";
+const KNOWN: &str =
+    "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension, haply, spacemouse";
 
 impl FromStr for DeviceName {
     type Err = NameError;
@@ -77,6 +80,7 @@ impl FromStr for DeviceName {
             "mouse" => plain(Self::Mouse),
             "force-dimension" => plain(Self::ForceDimension),
             "haply" => plain(Self::Haply),
+            "spacemouse" => plain(Self::SpaceMouse),
             "openhaptics" => Ok(Self::OpenHaptics(detail.map(str::to_owned))),
             "replay" => Ok(Self::Replay(detail.ok_or_else(|| incomplete("file", "session.mcap"))?.into())),
             "script" | "simulated" => {
@@ -102,6 +106,7 @@ impl std::fmt::Display for DeviceName {
             Self::OpenHaptics(Some(name)) => write!(f, "openhaptics:{name}"),
             Self::ForceDimension => f.write_str("force-dimension"),
             Self::Haply => f.write_str("haply"),
+            Self::SpaceMouse => f.write_str("spacemouse"),
         }
     }
 }
@@ -141,6 +146,7 @@ mod tests {
             "openhaptics:Left",
             "force-dimension",
             "haply",
+            "spacemouse",
         ];
         for name in names {
             assert_eq!(name.parse::<DeviceName>().unwrap().to_string(), name);

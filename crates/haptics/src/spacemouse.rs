@@ -1,0 +1,227 @@
+//! SpaceMouse: a knob that is pushed and turned, as a tool that moves while it is pushed. It has no motors.
+//!
+//! # Theory
+//! The knob says how far it is pushed, −1 to 1 on each axis; that is a velocity, since it springs back:
+//! ```text
+//! v = s |a| a     ω = r |b| b     position and tilt are their integrals, held within a box and a cone
+//! ```
+//! The square makes small pushes fine and large ones fast.
+//!
+//! # Practice
+//! Through the spacenav daemon where it runs, else straight from the system's HID reports ([`Config::source`]). Both are read without
+//! waiting, at most 64 messages a tick. The knob's axes become x right, y up, z to the user; [`Workspace`] lays them into the patient.
+//! The first button is the pedal, the second asks for the next tool. The knob is silent at rest: after 100 ms without a word it
+//! counts as let go. A lost knob is [`Status::Lost`] until it is opened again.
+//!
+//! # Sources
+//! spacenavd's protocol (its public documentation), the USB HID reports of 3Dconnexion's devices.
+//!
+//! # When not to use it
+//! To judge forces: it feels none.
+
+mod daemon;
+mod hid;
+
+use crate::mouse::rotation_vector;
+use crate::{Capabilities, DeviceError, Fault, HapticDevice, Reading, Status, Watch, Workspace};
+use std::io;
+use std::path::PathBuf;
+use trepan_contact::GuardedWrench;
+use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
+
+/// What a knob reports when it is pushed to its stop.
+const FULL_SCALE: f32 = 350.0;
+/// A knob that says nothing for this long was let go, ms.
+const SILENT_MS: f64 = 100.0;
+/// Longest tick that is integrated, ms.
+const MAX_DT_MS: f64 = 100.0;
+/// Most messages that one read takes in.
+const MAX_MESSAGES: usize = 64;
+
+/// Where the knob is heard, and how it moves the tool.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Where the knob is heard.
+    pub source: Source,
+    /// Speed of a knob pushed to its stop, mm/ms.
+    pub speed: f32,
+    /// Turning speed of a knob turned to its stop, rad/ms.
+    pub turning: f32,
+    /// How far the tool goes from its start on each axis, mm.
+    pub reach_mm: f32,
+    /// How far the tool tilts from its start, rad.
+    pub tilt: f32,
+    /// How device space lies in the patient.
+    pub workspace: Workspace,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            source: Source::Any,
+            speed: 0.05,
+            turning: 1e-3,
+            reach_mm: 60.0,
+            tilt: 1.0,
+            workspace: Workspace::default(),
+        }
+    }
+}
+
+/// Where a knob is heard.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The daemon at its usual place (or at `SPNAV_SOCKET`), else the first HID device of a known kind.
+    Any,
+    /// The daemon's socket.
+    Daemon(PathBuf),
+    /// A device file with HID reports.
+    Hid(PathBuf),
+}
+
+/// The knob as last heard.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Knob {
+    /// Right, up, to the user; counts.
+    push: Vec3,
+    /// About the same axes, right-handed; counts.
+    turn: Vec3,
+    buttons: u32,
+}
+
+/// Where messages come from.
+trait Link: Send {
+    /// Takes in the next message; `Ok(false)` when there is none yet.
+    fn next(&mut self, knob: &mut Knob) -> io::Result<bool>;
+}
+
+/// An open knob.
+pub struct SpaceMouse {
+    link: Option<Box<dyn Link>>,
+    name: &'static str,
+    config: Config,
+    knob: Knob,
+    heard_ms: f64,
+    last_ms: Option<f64>,
+    position: Vec3,
+    tilt: Vec3,
+    last: ToolState,
+    watch: Watch,
+}
+
+impl SpaceMouse {
+    /// Opens the knob; the tool starts in the middle of its box.
+    pub fn open(config: &Config) -> Result<Self, DeviceError> {
+        let (link, name) = link(&config.source)?;
+        Ok(Self {
+            link: Some(link),
+            name,
+            config: config.clone(),
+            knob: Knob::default(),
+            heard_ms: f64::NEG_INFINITY,
+            last_ms: None,
+            position: Vec3::ZERO,
+            tilt: Vec3::ZERO,
+            last: config.workspace.world(&ToolState::at(Pose::IDENTITY)),
+            watch: Watch::default(),
+        })
+    }
+
+    /// Shows what is wrong with the knob while another thread uses it.
+    pub fn watch(&self) -> Watch {
+        self.watch.clone()
+    }
+
+    /// Takes in what the knob said since the last read.
+    fn listen(&mut self, time_ms: f64) {
+        for _ in 0..MAX_MESSAGES {
+            let Some(link) = &mut self.link else { return };
+            match link.next(&mut self.knob) {
+                Ok(true) => self.heard_ms = time_ms,
+                Ok(false) => break,
+                Err(_) => {
+                    self.link = None;
+                    self.knob = Knob::default();
+                    self.watch.set(Some(Fault::Disconnected));
+                }
+            }
+        }
+        if time_ms - self.heard_ms > SILENT_MS {
+            (self.knob.push, self.knob.turn) = (Vec3::ZERO, Vec3::ZERO);
+        }
+    }
+
+    /// The tool after `dt_ms` of the knob's push, in device space.
+    fn moved(&mut self, dt_ms: f32) -> ToolState {
+        let Config { speed, turning, reach_mm, tilt, .. } = self.config;
+        let rate = |counts: Vec3| (counts / FULL_SCALE).clamp(-Vec3::ONE, Vec3::ONE);
+        let squared = |a: Vec3| a.abs() * a;
+        let (from, turned_from) = (self.position, Quat::from_scaled_axis(self.tilt));
+        let way = squared(rate(self.knob.push)) * (speed * dt_ms);
+        self.position = (from + way).clamp(Vec3::splat(-reach_mm), Vec3::splat(reach_mm));
+        self.tilt = (self.tilt + squared(rate(self.knob.turn)) * (turning * dt_ms)).clamp_length_max(tilt);
+        let rotation = Quat::from_scaled_axis(self.tilt);
+        let per_ms = if dt_ms > 0.0 { 1.0 / dt_ms } else { 0.0 };
+        let angular = rotation_vector(rotation * turned_from.inverse()) * per_ms;
+        ToolState {
+            twist: Twist { linear: (self.position - from) * per_ms, angular },
+            buttons: Buttons(self.knob.buttons),
+            ..ToolState::at(Pose::from_parts(self.position, rotation))
+        }
+    }
+}
+
+impl HapticDevice for SpaceMouse {
+    fn read(&mut self, time_ms: f64) -> Reading {
+        self.listen(time_ms);
+        if self.link.is_none() {
+            let tool = ToolState { twist: Twist::default(), time_ms, ..self.last };
+            return Reading { tool, status: Status::Lost };
+        }
+        let dt_ms = (time_ms - self.last_ms.unwrap_or(time_ms)).clamp(0.0, MAX_DT_MS) as f32;
+        self.last_ms = Some(time_ms);
+        let tool = self.moved(dt_ms);
+        self.last = ToolState { time_ms, ..self.config.workspace.world(&tool) };
+        Reading { tool: self.last, status: Status::Fresh }
+    }
+
+    fn apply(&mut self, _wrench: GuardedWrench) {}
+
+    fn capabilities(&self) -> Capabilities {
+        let workspace_mm = Vec3::splat(2.0 * self.config.reach_mm);
+        Capabilities { workspace_mm, position_resolution_mm: 1e-3, ..Capabilities::passive(self.name) }
+    }
+
+    fn close(&mut self) {
+        self.link = None;
+    }
+}
+
+/// Whether a knob can be heard.
+pub(crate) fn probe() -> Result<String, DeviceError> {
+    link(&Source::Any).map(|(_, name)| format!("ready: {name}"))
+}
+
+fn link(source: &Source) -> Result<(Box<dyn Link>, &'static str), DeviceError> {
+    let daemon = |path: PathBuf| match daemon::Daemon::connect(&path) {
+        Ok(link) => Ok((Box::new(link) as Box<dyn Link>, "SpaceMouse, by its daemon")),
+        Err(fault) => Err(not_opened(&format!("the daemon at {}: {fault}", path.display()))),
+    };
+    let hid = |path: PathBuf| match hid::Hid::open(&path) {
+        Ok(link) => Ok((Box::new(link) as Box<dyn Link>, "SpaceMouse, by its HID reports")),
+        Err(fault) => Err(not_opened(&format!("{}: {fault}", path.display()))),
+    };
+    match source {
+        Source::Daemon(path) => daemon(path.clone()),
+        Source::Hid(path) => hid(path.clone()),
+        Source::Any => daemon(daemon::usual_place()).or_else(|fault| hid::find().map_or(Err(fault), hid)),
+    }
+}
+
+fn not_opened(reason: &str) -> DeviceError {
+    DeviceError::Open {
+        device: "spacemouse".to_owned(),
+        reason: reason.to_owned(),
+        remedy: "plug it in, and install and start spacenavd (`apt install spacenavd`), or let your user read its /dev/hidraw file",
+    }
+}
