@@ -13,6 +13,7 @@
 //! # When not to use it
 //! For input that moves a camera or a menu.
 
+mod clutch;
 mod device;
 mod dynamic;
 mod error;
@@ -27,8 +28,10 @@ mod ramp;
 pub mod replay;
 pub mod script;
 pub mod simulated;
+pub mod spacemouse;
 mod workspace;
 
+pub use clutch::Clutch;
 pub use device::{Capabilities, HapticDevice, Reading, Status};
 pub use error::DeviceError;
 pub use fault::{Fault, Watch};

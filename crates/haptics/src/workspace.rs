@@ -55,12 +55,6 @@ impl Workspace {
         let turn = self.world_from_device.rotation.inverse();
         Wrench { force: turn * world.force, torque: turn * world.torque }
     }
-
-    /// The same mapping with its centre moved so that `device` lies at `world`: a clutch.
-    pub fn clutched(&self, device: Vec3, world: Vec3) -> Self {
-        let offset = self.world_from_device.rotation * (device * self.scale);
-        Self { world_from_device: Pose::from_parts(world - offset, self.world_from_device.rotation), ..*self }
-    }
 }
 
 #[cfg(test)]
@@ -113,13 +107,5 @@ mod tests {
         assert!((seen(Vec3::X) - Vec3::NEG_X).length() < 1e-6);
         assert!((seen(Vec3::Y) - Vec3::Z).length() < 1e-6);
         assert!((seen(Vec3::Z) - Vec3::Y).length() < 1e-6);
-    }
-
-    #[test]
-    fn a_clutch_moves_the_tool_without_turning_it() {
-        let map = Workspace::facing(Vec3::ONE, Vec3::X, Vec3::Z, 2.0);
-        let tool = ToolState::at(Pose::from_translation(Vec3::new(4.0, 5.0, 6.0)));
-        let moved = map.clutched(tool.tip(), Vec3::splat(7.0)).world(&tool);
-        assert!((moved.tip() - Vec3::splat(7.0)).length() < 1e-5);
     }
 }

@@ -1,7 +1,8 @@
 //! What every program does with its command line: flags, session, exit code.
 
+use crate::device_test;
 use crate::measure;
-use crate::options::{CaseTask, Task};
+use crate::options::{CaseTask, DeviceTask, Task};
 use crate::{Ended, Inputs, Options, Program, Session, SessionError, build_case};
 use clap::Parser;
 use std::process::ExitCode;
@@ -34,6 +35,12 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
                 println!("{name} is in {}; open it with --case {}", out.display(), out.display());
                 ExitCode::SUCCESS
             }
+            Err(fault) => failed(program, &fault),
+        };
+    }
+    if let Some(Task::Device(DeviceTask::Test { name, out, duration })) = &options.task {
+        return match device_test::run(name, out, *duration) {
+            Ok(signal) => ended_by(signal),
             Err(fault) => failed(program, &fault),
         };
     }
@@ -89,10 +96,11 @@ fn told(ended: &Ended) -> ExitCode {
         );
     }
     println!("report: {}", ended.out.join("report.html").display());
-    match ended.signal {
-        Some(signal) => ExitCode::from(128 + signal as u8),
-        None => ExitCode::SUCCESS,
-    }
+    ended_by(ended.signal)
+}
+
+fn ended_by(signal: Option<i32>) -> ExitCode {
+    signal.map_or(ExitCode::SUCCESS, |signal| ExitCode::from(128 + signal as u8))
 }
 
 fn failed(program: Program, fault: &SessionError) -> ExitCode {

@@ -4,10 +4,10 @@ use crate::error::SessionError;
 use crate::options::Options;
 use crate::program::Program;
 use crate::run::watch::Watched;
-use trepan_contact::GuardConfig;
+use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::{Capabilities, DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, simulated};
+use trepan_haptics::{Capabilities, Clutch, DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, simulated};
 use trepan_link::Recording;
 
 /// What holds the tool.
@@ -45,11 +45,11 @@ impl Hand {
                 Some(Box::new(mouse))
             }
             DeviceName::Replay(_) => None,
-            hardware => match hardware::open(hardware, workspace(site)) {
+            hardware => match hardware::open(hardware, workspace(site, options.device_scale)) {
                 Some(opened) => {
                     let opened = opened.map_err(|f| fault(&f))?;
                     hand.watch = Some(opened.watch);
-                    Some(opened.device)
+                    Some(Box::new(Clutch::new(opened.device)))
                 }
                 None => None,
             },
@@ -65,8 +65,8 @@ pub fn faults(watch: &Watch) -> Option<String> {
 }
 
 /// A device's small box in front of the site: its middle 20 mm outside the entry, seen as the picture is.
-fn workspace(site: &Site) -> Workspace {
-    Workspace::facing(site.entry - 20.0 * site.inward, site.inward, Vec3::Z, 1.0)
+fn workspace(site: &Site, scale: f32) -> Workspace {
+    Workspace::facing(site.entry - 20.0 * site.inward, site.inward, Vec3::Z, scale)
 }
 
 /// The device that is named; without a name the mouse where there is a window, else the program's script.
@@ -92,19 +92,24 @@ pub struct Feel {
     peak_force_n: f32,
     continuous_force_n: f32,
     delay_ticks: u8,
+    /// In the patient.
     position_step_mm: f32,
+    /// World mm per device mm.
+    scale: f32,
 }
 
 const PEAK: &str = "device_peak_force_n";
 const CONTINUOUS: &str = "device_continuous_force_n";
 const DELAY: &str = "device_delay_ticks";
 const STEP: &str = "device_position_step_mm";
+const SCALE: &str = "device_scale";
 
 impl Feel {
-    /// Of a device at hand.
-    pub fn of(device: &Capabilities) -> Self {
+    /// Of a device at hand, whose motion is enlarged by `scale`.
+    pub fn of(device: &Capabilities, scale: f32) -> Self {
         let &Capabilities { peak_force_n, continuous_force_n, delay_ticks, position_resolution_mm, .. } = device;
-        Self { peak_force_n, continuous_force_n, delay_ticks, position_step_mm: position_resolution_mm }
+        let position_step_mm = scale * position_resolution_mm;
+        Self { peak_force_n, continuous_force_n, delay_ticks, position_step_mm, scale }
     }
 
     /// What a recorded session knew of its device; nothing where there is no recording.
@@ -116,16 +121,18 @@ impl Feel {
             continuous_force_n: number(CONTINUOUS),
             delay_ticks: number(DELAY) as u8,
             position_step_mm: number(STEP),
+            scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0),
         }
     }
 
     /// What [`Feel::recorded`] reads.
-    pub fn entries(&self) -> [(&'static str, String); 4] {
+    pub fn entries(&self) -> [(&'static str, String); 5] {
         [
             (PEAK, self.peak_force_n.to_string()),
             (CONTINUOUS, self.continuous_force_n.to_string()),
             (DELAY, self.delay_ticks.to_string()),
             (STEP, self.position_step_mm.to_string()),
+            (SCALE, self.scale.to_string()),
         ]
     }
 
@@ -137,5 +144,11 @@ impl Feel {
         device.delay_ticks = self.delay_ticks;
         device.position_resolution_mm = self.position_step_mm;
         device.guard_config()
+    }
+
+    /// A wall that is no stiffer at the hand for being enlarged.
+    pub fn softened(&self, wall: Viscoelastic) -> Viscoelastic {
+        let enlarged = self.scale.max(1.0);
+        Viscoelastic { stiffness: wall.stiffness / enlarged, damping: wall.damping / enlarged }
     }
 }

@@ -20,6 +20,7 @@
 
 mod case;
 mod command;
+mod device_test;
 mod error;
 mod hand;
 mod measure;

@@ -17,9 +17,12 @@ pub struct Options {
     /// Images, and what is made of them
     #[command(flatten)]
     pub patient: Patient,
-    /// mouse | script:NAME | replay:FILE | simulated:NAME | openhaptics or openhaptics:NAME | force-dimension | haply [default: mouse with a window, else a script]
+    /// mouse | script:NAME | replay:FILE | simulated:NAME | openhaptics or openhaptics:NAME | force-dimension | haply | spacemouse [default: mouse with a window, else a script]
     #[arg(long, value_name = "DEVICE")]
     pub device: Option<String>,
+    /// Millimetres that the tool moves for one of the hand, for devices with a box of their own; over 1, walls are softened alike
+    #[arg(long, value_name = "SCALE", default_value_t = 1.0, allow_negative_numbers = true)]
+    pub device_scale: f32,
     /// Let other processes on this machine watch under this name
     #[arg(long, value_name = "NAME")]
     pub share: Option<String>,
@@ -105,6 +108,9 @@ pub enum Task {
     /// Make and keep cases
     #[command(subcommand)]
     Case(CaseTask),
+    /// Look at haptic devices
+    #[command(subcommand)]
+    Device(DeviceTask),
     /// Measure this machine and say which voxel size, mesh and step a scene needs on it
     Plan {
         /// Error of the force that the scene bears, N
@@ -127,6 +133,23 @@ pub enum CaseTask {
         /// The folder to make; it must not exist yet
         #[arg(long, value_name = "CASE")]
         out: PathBuf,
+    },
+}
+
+/// What can be done with devices.
+#[derive(Clone, Debug, Subcommand)]
+pub enum DeviceTask {
+    /// Try a device before a session: rate, jitter, delay, range and a gentle wall, with a report
+    Test {
+        /// The device, as for --device
+        #[arg(value_name = "NAME")]
+        name: String,
+        /// Folder for device.json and device.html
+        #[arg(long, value_name = "DIR", default_value = "trepan-out/device")]
+        out: PathBuf,
+        /// Length of the test, seconds
+        #[arg(long, value_name = "S", default_value_t = 20.0, allow_negative_numbers = true)]
+        duration: f64,
     },
 }
 
@@ -164,6 +187,7 @@ impl Options {
         self.patient.check()?;
         within("duration", self.duration.unwrap_or(1.0), 0.1, 86_400.0)?;
         within("young-modulus-kpa", self.young_modulus_kpa.into(), 0.05, 1000.0)?;
+        within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
         within("rate-hz", self.rate_hz.into(), 100.0, 10_000.0)?;
         within("frames-per-second", self.frames_per_second, 0.0, 120.0)
     }
@@ -179,6 +203,7 @@ mod tests {
         assert!(parse("x --headless --duration 20 --out demo").unwrap().check().is_ok());
         let fault = parse("x --duration nan").unwrap().check().unwrap_err();
         assert!(fault.contains("--duration") && fault.contains("0.1 to 86400"), "{fault}");
+        assert!(parse("x --device-scale 0").unwrap().check().is_err());
         assert!(parse("x --spacing-mm 0").unwrap().check().is_err());
         assert_eq!(parse("x --opening -40,30.5,120").unwrap().patient.opening, Some([-40.0, 30.5, 120.0]));
         assert!(parse("x --opening 1,2").is_err() && parse("x --opening 1,2,nan").is_err());

@@ -91,7 +91,8 @@ impl Session {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.scene.site)?;
         let recorded = || Feel::recorded(self.recording.as_ref());
-        let feel = device.as_ref().map_or_else(recorded, |device| Feel::of(&device.capabilities()));
+        let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
+        let feel = device.as_ref().map_or_else(recorded, |device| Feel::of(&device.capabilities(), scale));
         let start = self.start();
         let stages = self.stages(start.state, &feel)?;
         output::folder(&self.out)?;
@@ -145,8 +146,8 @@ impl Session {
             program: self.program,
             rigid: self.rigid,
             dt_ms: self.tick_ms(),
-            bone_force: Viscoelastic { stiffness: 2.0, damping: 0.5 },
-            tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
+            bone_force: feel.softened(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
+            tissue_force: feel.softened(Viscoelastic { stiffness: 0.3, damping: 0.3 }),
             guard: feel.guard(),
             near_mm: 2.0,
         };

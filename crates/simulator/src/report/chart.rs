@@ -56,8 +56,41 @@ pub fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Re
     Ok(svg)
 }
 
-/// How often times fell into bins, both axes logarithmic. `bins`: (upper edge in µs, count).
-pub fn histogram(bins: &[(f64, u64)], limit_us: f64) -> Result<String, String> {
+/// Curves in a plane; `axes` name it with units.
+pub fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, String> {
+    let points = || curves.iter().flat_map(|curve| &curve.points).filter(|p| p.0.is_finite() && p.1.is_finite());
+    let span = |of: fn(&(f64, f64)) -> f64| {
+        let low = points().map(of).fold(f64::INFINITY, f64::min);
+        let high = points().map(of).fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
+        let margin = 0.05 * (high - low) + 0.5;
+        low - margin..high + margin
+    };
+    let mut svg = String::new();
+    let text = |fault: &dyn std::fmt::Display| format!("chart of {}: {fault}", axes[1]);
+    {
+        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        root.fill(&WHITE).map_err(|f| text(&f))?;
+        let mut chart = ChartBuilder::on(&root)
+            .margin(8)
+            .x_label_area_size(34)
+            .y_label_area_size(60)
+            .build_cartesian_2d(span(|p| p.0), span(|p| p.1))
+            .map_err(|f| text(&f))?;
+        let mesh = &mut chart.configure_mesh();
+        mesh.x_desc(axes[0]).y_desc(axes[1]).light_line_style(WHITE).draw().map_err(|f| text(&f))?;
+        for (curve, colour) in curves.iter().zip(COLOURS) {
+            let every = curve.points.len().div_ceil(POINTS).max(1);
+            let line = curve.points.iter().step_by(every).copied().filter(|p| p.0.is_finite() && p.1.is_finite());
+            chart.draw_series(LineSeries::new(line, colour.stroke_width(2))).map_err(|f| text(&f))?;
+        }
+        root.present().map_err(|f| text(&f))?;
+    }
+    Ok(svg)
+}
+
+/// How often times fell into bins, both axes logarithmic. `what` names them; `bins`: (upper edge in µs, count).
+pub fn histogram(what: &str, bins: &[(f64, u64)], limit_us: f64) -> Result<String, String> {
     let used: Vec<(f64, f64)> =
         bins.iter().filter(|b| b.1 > 0).map(|&(edge, count)| (edge.max(0.01), count as f64)).collect();
     let low = used.first().map_or(0.1, |b| 0.7 * b.0);
@@ -75,11 +108,7 @@ pub fn histogram(bins: &[(f64, u64)], limit_us: f64) -> Result<String, String> {
             .build_cartesian_2d((low..high).log_scale(), (0.5..2.0 * most).log_scale())
             .map_err(|f| text(&f))?;
         let mesh = &mut chart.configure_mesh();
-        mesh.x_desc("compute time of a tick, µs")
-            .y_desc("ticks")
-            .light_line_style(WHITE)
-            .draw()
-            .map_err(|f| text(&f))?;
+        mesh.x_desc(what).y_desc("ticks").light_line_style(WHITE).draw().map_err(|f| text(&f))?;
         let width = 10f64.powf(-0.1);
         let bars = used.iter().map(|&(x, n)| Rectangle::new([(x * width, 0.5), (x * 0.97, n)], COLOURS[0].filled()));
         chart.draw_series(bars).map_err(|f| text(&f))?;
@@ -115,7 +144,10 @@ mod tests {
         let svg = over_time("force, N", &[curve], Some((3.3, "limit"))).unwrap();
         assert!(svg.contains("force, N") && svg.contains("limit") && svg.contains("bone"));
         assert!(over_time("x", &[], None).unwrap().contains("<svg"));
-        assert!(histogram(&[], 1000.0).unwrap().contains("<svg"));
-        assert!(histogram(&[(5.0, 100), (6.3, 3)], 1000.0).unwrap().contains("ticks"));
+        assert!(histogram("t, µs", &[], 1000.0).unwrap().contains("<svg"));
+        assert!(histogram("t, µs", &[(5.0, 100), (6.3, 3)], 1000.0).unwrap().contains("ticks"));
+        assert!(traces(["x", "y"], &[]).unwrap().contains("<svg"));
+        let broken = Curve { name: "b", points: vec![(f64::NAN, 1.0), (2.0, f64::INFINITY)] };
+        assert!(traces(["x", "y"], &[broken]).unwrap().contains("<svg"));
     }
 }

@@ -50,7 +50,8 @@ pub fn write(
     whole(&out.join("report.html"), page.as_bytes())
 }
 
-fn whole(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
+/// A file that appears whole or not at all.
+pub fn whole(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
     let failed = |fault| SessionError::Output { path: path.into(), fault };
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;

@@ -17,7 +17,8 @@ pub struct Shot {
     pub png: Vec<u8>,
 }
 
-const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#222}\
+/// Style of every page.
+pub const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#222}\
 h1,h2{line-height:1.2}table{border-collapse:collapse}td,th{padding:.2em .8em;border-bottom:1px solid #ccc;text-align:left}\
 td.n{text-align:right;font-variant-numeric:tabular-nums}figure{margin:1em 0}img,svg{max-width:100%;height:auto}\
 figcaption{color:#555}.w{border-left:.4em solid #d55e00;padding-left:.6em}";
@@ -91,7 +92,10 @@ fn curves(page: &mut String, outcome: &Outcome, recording: &Recording) -> Result
             over_time("distance, mm", &[of("tool to brain", &near)], None)?,
         ),
         ("Brain", over_time("displacement, mm", &[moved], None)?),
-        ("Tick compute time (dashed: the 1 ms of the thesis)", histogram(&outcome.ticks.times.bins(), 1000.0)?),
+        (
+            "Tick compute time (dashed: the 1 ms of the thesis)",
+            histogram("compute time of a tick, µs", &outcome.ticks.times.bins(), 1000.0)?,
+        ),
     ];
     *page += "<h2>Curves</h2>";
     for (caption, svg) in charts {
@@ -109,7 +113,8 @@ fn numbers(page: &mut String, summary: &Summary) -> Result<(), String> {
     Ok(())
 }
 
-fn rows(page: &mut String, path: &str, value: &serde_json::Value) {
+/// A value as rows of a table, by their paths.
+pub fn rows(page: &mut String, path: &str, value: &serde_json::Value) {
     use serde_json::Value;
     let under = |key: &str| if path.is_empty() { key.to_string() } else { format!("{path}.{key}") };
     match value {
@@ -131,6 +136,7 @@ fn rows(page: &mut String, path: &str, value: &serde_json::Value) {
     }
 }
 
-fn escaped(text: &str) -> String {
+/// Text as HTML.
+pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -96,9 +96,11 @@ fn fallen(name: &str) -> Outcome {
 }
 
 /// Holds the device; however the thread ends, lets go of the force and ends the session.
-struct Hand {
-    device: Box<dyn HapticDevice>,
-    stop: Stop,
+pub(crate) struct Hand {
+    /// The device.
+    pub device: Box<dyn HapticDevice>,
+    /// Asked when the hand lets go.
+    pub stop: Stop,
 }
 
 impl Drop for Hand {
@@ -241,7 +243,7 @@ pub fn outcome(stage: &SolverStage) -> SolverOutcome {
 }
 
 /// Asks for a first-in-first-out priority; says so when it is refused.
-fn real_time(priority: u8, name: &str) -> Option<String> {
+pub(crate) fn real_time(priority: u8, name: &str) -> Option<String> {
     let value = priority.try_into().ok().map(ThreadPriority::Crossplatform)?;
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     let set = thread_priority::set_thread_priority_and_policy(thread_priority::thread_native_id(), value, policy);

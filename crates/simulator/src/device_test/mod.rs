@@ -1,0 +1,213 @@
+//! `device test NAME`: is the device fit for a session? Rate, jitter, delay, range and a gentle wall, for whoever sits before it.
+//!
+//! # Practice
+//! The device is opened first: what is missing is told before a file is made. The loop is a session's: its own thread, real-time
+//! priority where allowed, deadlines on an absolute grid. Whatever happens, the device is closed, and with it the force.
+
+mod measured;
+mod page;
+mod trial;
+
+use crate::error::SessionError;
+use crate::report::output::whole;
+use crate::report::summary::Machine;
+use crate::run::clock::{Clock, Schedule};
+use crate::run::stop::Stop;
+use crate::run::threads::{Hand, real_time};
+use measured::{Course, Ending, Floor, Measured, Sample, Timing};
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::Duration;
+use trepan_geometry::Vec3;
+use trepan_haptics::script::{Script, Site};
+use trepan_haptics::simulated::{self, Simulated};
+use trepan_haptics::{Capabilities, DeviceName, HapticDevice, NameError, Status, Watch, Workspace, hardware};
+use trial::{Part, Trial};
+
+/// Most ticks for a force to fade at the end.
+const FADE_TICKS: u32 = 200;
+
+/// A device to test.
+struct Subject {
+    name: DeviceName,
+    device: Box<dyn HapticDevice>,
+    watch: Option<Watch>,
+}
+
+/// Tests the device of a name for some seconds; leaves `device.json` and `device.html` in `out`. Gives the signal that ended it.
+pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionError> {
+    if !(8.0..=600.0).contains(&seconds) {
+        return Err(SessionError::Usage(format!("--duration {seconds} is out of range: give 8 to 600")));
+    }
+    if out.exists() && !out.is_dir() {
+        return Err(SessionError::Usage(format!("--out {} is a file: name a folder, new or old", out.display())));
+    }
+    let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
+    let subject = open(name, 1e3 * seconds).map_err(SessionError::Usage)?;
+    let (found, samples) = test(subject, 1e3 * seconds, &stop);
+    write(&found, &samples, out)?;
+    for finding in &found.findings {
+        println!("{} {}", if finding.good { "good " } else { "LOOK:" }, finding.text);
+    }
+    println!("report: {}", out.join("device.html").display());
+    if found.ended == Ending::Lost {
+        return Err(SessionError::Usage(format!("{name} was lost during the test; the report says what was seen")));
+    }
+    Ok(stop.signal())
+}
+
+fn open(name: &str, end_ms: f64) -> Result<Subject, String> {
+    let name: DeviceName = name.parse().map_err(|fault: NameError| fault.to_string())?;
+    let script = |script: &str| {
+        let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Y, bone_mm: 6.0, brain_mm: 8.0 };
+        Script::named(script, &site, end_ms).map_err(|fault| fault.to_string())
+    };
+    let software = |device: Box<dyn HapticDevice>| Ok(Subject { name: name.clone(), device, watch: None });
+    match &name {
+        DeviceName::Script(operation) => software(Box::new(script(operation)?)),
+        DeviceName::Simulated(operation) => {
+            let (config, grip) = (simulated::Config::default(), simulated::Hand::FIRM);
+            software(Box::new(Simulated::new(config, grip, Box::new(script(operation)?))))
+        }
+        _ => match hardware::open(&name, Workspace::default()) {
+            Some(opened) => {
+                let hardware::Hardware { device, watch } = opened.map_err(|fault| fault.to_string())?;
+                Ok(Subject { name, device, watch: Some(watch) })
+            }
+            None => Err(format!("{name} is not a device that can be tested by itself; `--list-devices` names those")),
+        },
+    }
+}
+
+/// What the loop leaves.
+struct Felt {
+    samples: Vec<Sample>,
+    late: u64,
+    ended: Ending,
+    trial: Trial,
+    remarks: Vec<String>,
+}
+
+/// Runs the loop on a thread of its own while this one says what to do.
+fn test(subject: Subject, end_ms: f64, stop: &Stop) -> (Measured, Vec<Sample>) {
+    let Subject { name, device, watch } = subject;
+    let able = device.capabilities();
+    let tick_ms = 1e3 / f64::from(able.rate_hz.clamp(100.0, 4000.0));
+    let over = Stop::default();
+    let hand = Hand { device, stop: over.clone() };
+    let trial = Trial::new(&able, tick_ms as f32, end_ms);
+    let part = AtomicU8::new(Part::Over as u8);
+    println!("testing {name} ({}) for {:.0} s; Ctrl-C ends it without force", able.name, 1e-3 * end_ms);
+    let felt = std::thread::scope(|scope| {
+        let feeling = scope.spawn(|| feel(hand, trial, tick_ms, end_ms, stop, &part));
+        tell(&part, &over);
+        feeling.join().ok()
+    });
+    let felt = felt.unwrap_or_else(|| fallen(Trial::new(&able, tick_ms as f32, end_ms)));
+    let found = measured(name.to_string(), &able, &felt, tick_ms, watch.as_ref());
+    (found, felt.samples)
+}
+
+fn fallen(trial: Trial) -> Felt {
+    let remarks = vec!["the loop fell; the device was closed".to_string()];
+    Felt { samples: Vec::new(), late: 0, ended: Ending::Lost, trial, remarks }
+}
+
+/// Says what the hand shall do, when that changes.
+fn tell(part: &AtomicU8, over: &Stop) {
+    let mut told = Part::Over;
+    while !over.asked() {
+        let now = Part::of(part.load(Ordering::Relaxed));
+        if now != told && now != Part::Over {
+            println!("-> {}", now.words());
+        }
+        told = now;
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// The loop: read, step, apply, note, wait.
+fn feel(mut hand: Hand, mut trial: Trial, tick_ms: f64, end_ms: f64, stop: &Stop, told: &AtomicU8) -> Felt {
+    let remarks = real_time(80, "haptic").into_iter().collect();
+    let mut samples = Vec::with_capacity((1.1 * end_ms / tick_ms) as usize + FADE_TICKS as usize);
+    let (mut late, mut ending, mut fade) = (0, None, FADE_TICKS);
+    let clock = Clock::start();
+    let mut schedule = Schedule::new(tick_ms, clock.now_ms());
+    loop {
+        clock.spin_until(schedule.next_ms());
+        let time_ms = clock.now_ms();
+        let reading = hand.device.read(time_ms);
+        let read_ms = clock.now_ms();
+        let (part, wrench) = trial.step(&reading, time_ms);
+        let before_ms = clock.now_ms();
+        hand.device.apply(wrench);
+        let done_ms = clock.now_ms();
+        told.store(part as u8, Ordering::Relaxed);
+        late += u64::from(schedule.advance(done_ms));
+        if samples.len() < samples.capacity() {
+            samples.push(Sample {
+                time_ms,
+                read_us: ((read_ms - time_ms) * 1e3) as f32,
+                apply_us: ((done_ms - before_ms) * 1e3) as f32,
+                fresh: reading.status == Status::Fresh,
+                part,
+                tip: reading.tool.tip(),
+                force: wrench.force(),
+            });
+        }
+        if let Some(ended) = ending.or_else(|| ends(reading.status, time_ms >= end_ms, stop)) {
+            ending = Some(ended);
+            trial.release();
+            fade -= 1;
+            if wrench.force() == Vec3::ZERO || fade == 0 {
+                return Felt { samples, late, ended, trial, remarks };
+            }
+        }
+    }
+}
+
+fn ends(status: Status, over: bool, stop: &Stop) -> Option<Ending> {
+    match status {
+        _ if stop.asked() => Some(Ending::Stopped),
+        Status::Lost => Some(Ending::Lost),
+        _ if over => Some(Ending::Done),
+        Status::Finished => Some(Ending::Finished),
+        Status::Fresh | Status::Stale => None,
+    }
+}
+
+fn measured(device: String, able: &Capabilities, felt: &Felt, tick_ms: f64, watch: Option<&Watch>) -> Measured {
+    let Felt { samples, late, trial, .. } = felt;
+    let course = Course { samples, tick_ms, late: *late, guard: trial.guard(), floor_y: trial.floor_y() };
+    let mut found = Measured {
+        device,
+        model: able.name.clone(),
+        ended: felt.ended,
+        fault: watch.and_then(Watch::fault).map(|fault| fault.to_string()),
+        faults: watch.map_or(0, Watch::count),
+        findings: Vec::new(),
+        timing: Timing::of(&course),
+        delay_ms: measured::delay_ms(samples),
+        stated_delay_ticks: able.delay_ticks,
+        explored_mm: measured::explored(samples).map(|corner| corner.to_array()),
+        workspace_mm: able.workspace_mm.is_finite().then(|| able.workspace_mm.to_array()),
+        resolution_mm: able.position_resolution_mm,
+        forces_n: [able.peak_force_n, able.continuous_force_n],
+        floor: Floor::of(&course),
+        end_force_n: samples.last().map_or(0.0, |last| last.force.length()),
+        remarks: felt.remarks.clone(),
+        machine: Machine::here(None),
+    };
+    found.findings = measured::findings(&found, able);
+    found
+}
+
+fn write(found: &Measured, samples: &[Sample], out: &Path) -> Result<(), SessionError> {
+    let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(format!("device.json: {fault}"));
+    let json = serde_json::to_vec_pretty(found).map_err(|fault| internal(&fault))?;
+    let page = page::html(found, samples).map_err(SessionError::Internal)?;
+    fs::create_dir_all(out).map_err(|fault| SessionError::Output { path: out.into(), fault })?;
+    whole(&out.join("device.json"), &json)?;
+    whole(&out.join("device.html"), page.as_bytes())
+}
