@@ -12,6 +12,8 @@
 //! The declared range, to which gates apply: a hand with a grip, walls to 2 N/mm, delays to 2 ticks, `K Δ/2 ≤ f_c`. All other rows are
 //! shown beside; there the guard must act and count it.
 
+mod pace;
+
 use super::Scope;
 use crate::suite::{Findings, Gate, Row};
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardCounters, Viscoelastic};
@@ -73,7 +75,7 @@ impl Coupling {
     }
 }
 
-/// Presses for every coupling with and without the controller, then hands that wander.
+/// Presses for every coupling with and without the controller, then hands that wander; last the pace of the loop.
 pub fn run(scope: Scope) -> Findings {
     let mut findings = Findings::default();
     for (number, (scene, coupling)) in couplings(scope).into_iter().enumerate() {
@@ -86,6 +88,9 @@ pub fn run(scope: Scope) -> Findings {
         }
     }
     findings.gates = gates(&findings.rows, scope);
+    if scope.takes(0) {
+        findings.rows.extend(pace::rows(scope));
+    }
     findings
 }
 
