@@ -29,6 +29,7 @@ pub mod replay;
 pub mod script;
 pub mod simulated;
 pub mod spacemouse;
+pub mod template;
 mod workspace;
 
 pub use clutch::Clutch;

@@ -154,7 +154,7 @@ impl Bench {
 fn solve(over: &AtomicBool) -> f64 {
     let mesh = boxes::split_box([12; 3], Vec3::splat(120.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
-    let body = Body { mesh, fixed, material: Material::BRAIN };
+    let body = Body::uniform(mesh, fixed, Material::BRAIN);
     let mut solver = Tled::new(&body, &trepan_tled::Config::default()).expect("a split box is sound");
     let loads = Loads { gravity: Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2, ..Loads::default() };
     let dt_ms = solver.stable_dt_ms();
