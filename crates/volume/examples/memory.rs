@@ -1,5 +1,5 @@
 //! How much memory does a CT take? `memory make FOLDER` writes a made-up head of 512x512x300 voxels as DICOM and NIfTI;
-//! `memory read PATH [SPACING_MM]` goes from the file to the skull on cubes and prints the most memory held (Linux).
+//! `memory read PATH` goes from the file to the skull on cubes and prints the most memory held (Linux).
 
 use std::path::Path;
 use trepan_volume::{
@@ -12,17 +12,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["make", folder] => make(Path::new(folder)),
-        ["read", path] => skull(Path::new(path), 0.55),
-        ["read", path, spacing] => skull(Path::new(path), spacing.parse()?),
-        _ => Err("usage: memory make FOLDER | memory read PATH [SPACING_MM]".into()),
+        ["read", path] => skull(Path::new(path)),
+        _ => Err("usage: memory make FOLDER | memory read PATH".into()),
     }
 }
 
-fn skull(path: &Path, spacing_mm: f32) -> Result<(), Box<dyn std::error::Error>> {
+fn skull(path: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let ct = hounsfield(&read(path)?)?;
     println!("{:?} voxels read: {}", ct.dims, peak());
     let isovalue = bone_isovalue(&ct);
-    let mut skull = resample(&ct, &Grid::isotropic_over(&ct, spacing_mm), Interpolation::Trilinear, AIR_HU);
+    let mut skull = resample(&ct, &Grid::isotropic_over(&ct, 0.55), Interpolation::Trilinear, AIR_HU);
     drop(ct);
     skull_only(&mut skull, isovalue);
     println!("{:?} voxels of skull over {isovalue} HU: {}", skull.dims, peak());
@@ -41,7 +40,6 @@ fn hu([i, j, k]: [usize; 3]) -> i16 {
     let tissue = match p.iter().map(|x| x * x).sum::<f64>().sqrt() {
         r if r < 0.85 => 35,
         r if r < 0.95 => 1100,
-        r if r < 1.0 => 60,
         _ => -1000,
     };
     tissue + noise as i16 - 20
