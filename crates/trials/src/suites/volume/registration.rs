@@ -154,7 +154,8 @@ impl Tally {
             tally.recovered += f64::from(u8::from(right));
             tally.wrong += f64::from(u8::from(!right));
             tally.least_confidence = tally.least_confidence.min(found.confidence);
-            (tally.mm.push(mm), tally.degrees.push(degrees));
+            tally.mm.push(mm);
+            tally.degrees.push(degrees);
         }
         tally
     }
