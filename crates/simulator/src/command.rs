@@ -5,6 +5,7 @@ use crate::measure;
 use crate::options::{CaseTask, DeviceTask, Task};
 use crate::{Ended, Inputs, Options, Program, Session, SessionError, build_case};
 use clap::Parser;
+use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 use trepan_budget::Scene;
@@ -26,28 +27,42 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         trepan_haptics::list().iter().for_each(|device| println!("{:31} {}", device.name, device.state));
         return ExitCode::SUCCESS;
     }
-    if let Some(Task::Plan { force_error_n, displacement_mm }) = &options.task {
-        return planned(*force_error_n, *displacement_mm);
-    }
-    if let Some(Task::Case(CaseTask::Build { patient, out })) = &options.task {
-        return match build_case(program, patient, out, built_in) {
-            Ok(name) => {
-                println!("{name} is in {}; open it with --case {}", out.display(), out.display());
-                ExitCode::SUCCESS
-            }
-            Err(fault) => failed(program, &fault),
-        };
-    }
-    if let Some(Task::Device(DeviceTask::Test { name, out, duration })) = &options.task {
-        return match device_test::run(name, out, *duration) {
-            Ok(signal) => ended_by(signal),
-            Err(fault) => failed(program, &fault),
-        };
+    if let Some(task) = &options.task {
+        return perform(program, task, built_in);
     }
     match Session::open(program, options, built_in).and_then(Session::run) {
         Ok(ended) => told(&ended),
         Err(fault) => failed(program, &fault),
     }
+}
+
+/// Does something else than a session.
+fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
+    let done = match task {
+        Task::Plan { force_error_n, displacement_mm } => return planned(*force_error_n, *displacement_mm),
+        Task::Case(CaseTask::Series { folder }) => list_series(folder),
+        Task::Case(CaseTask::Build { patient, out }) => build_case(program, patient, out, built_in).map(|name| {
+            println!("{name} is in {}; open it with --case {}", out.display(), out.display());
+            ExitCode::SUCCESS
+        }),
+        Task::Device(DeviceTask::Test { name, out, duration }) => device_test::run(name, out, *duration).map(ended_by),
+    };
+    done.unwrap_or_else(|fault| failed(program, &fault))
+}
+
+/// One line for each series of a folder.
+fn list_series(folder: &Path) -> Result<ExitCode, SessionError> {
+    let found = trepan_volume::dicom::series(folder)?;
+    if found.is_empty() {
+        let fault = format!("no DICOM series lies in {}: give a folder of slices", folder.display());
+        return Err(SessionError::Usage(fault));
+    }
+    for (number, series) in found.iter().enumerate() {
+        let [columns, rows] = series.size;
+        let scanner = series.number.map_or_else(String::new, |n| format!(", number {n} at the scanner"));
+        println!("{number}: {}, {} slices of {columns}x{rows}{scanner}", series.modality, series.slices);
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// What a scene needs on this machine.

@@ -79,6 +79,12 @@ pub struct Patient {
     /// MRI of the same patient in the same space
     #[arg(long, value_name = "PATH")]
     pub mri: Option<PathBuf>,
+    /// Which DICOM series of the CT's folder, a number that `case series` lists [default: the one with the most slices]
+    #[arg(long, value_name = "N", requires = "ct")]
+    pub ct_series: Option<usize>,
+    /// Which DICOM series of the MRI's folder
+    #[arg(long, value_name = "N", requires = "mri")]
+    pub mri_series: Option<usize>,
     /// Label volume: what is not 0 is brain [default: found in the MRI]
     #[arg(long, value_name = "PATH")]
     pub labels: Option<PathBuf>,
@@ -125,6 +131,11 @@ pub enum Task {
 /// What can be done with cases.
 #[derive(Clone, Debug, Subcommand)]
 pub enum CaseTask {
+    /// List the DICOM series in a folder, for --ct-series and --mri-series
+    Series {
+        /// The folder, and the folders in it
+        folder: PathBuf,
+    },
     /// Make a case folder from images, for --case
     Build {
         /// The patient's images

@@ -6,8 +6,8 @@ use glam::DAffine3;
 use std::path::Path;
 use trepan_mesh::lattice::{self, LabelledMesh};
 use trepan_volume::{
-    AIR_HU, BrainConfig, Grid, Interpolation, MaskError, RegistrationConfig, VoxelVolume, brain_mask, check_brain_mask,
-    hounsfield, largest_component, overlap, register, resample, skull_only,
+    AIR_HU, BrainConfig, Grid, Import, Interpolation, MaskError, ReadError, RegistrationConfig, VoxelVolume,
+    brain_mask, check_brain_mask, dicom, hounsfield, largest_component, overlap, register, resample, skull_only,
 };
 
 /// Air around the brain that its grids keep, mm.
@@ -15,16 +15,21 @@ const MARGIN_MM: f32 = 12.0;
 /// Most voxels of a skull grid.
 const MOST_VOXELS: usize = 600_000_000;
 
+/// An image, or one series of a folder of several.
+fn image(path: &Path, series: Option<usize>) -> Result<Import, ReadError> {
+    series.map_or_else(|| trepan_volume::import(path), |number| dicom::import_series(path, number))
+}
+
 /// A CT in HU, and remarks on it.
-pub fn read_ct(path: &Path, notes: &mut Vec<String>) -> Result<VoxelVolume<i16>, SessionError> {
-    let import = trepan_volume::import(path)?;
+pub fn read_ct(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<i16>, SessionError> {
+    let import = image(path, series)?;
     notes.extend(import.notes.iter().map(|note| format!("CT: {note}")));
     hounsfield(&import.volume).map_err(|fault| SessionError::Case(format!("{}: {fault}", path.display())))
 }
 
 /// An MRI without holes, and remarks on it.
-pub fn read_mri(path: &Path, notes: &mut Vec<String>) -> Result<VoxelVolume<f32>, SessionError> {
-    let import = trepan_volume::import(path)?;
+pub fn read_mri(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<f32>, SessionError> {
+    let import = image(path, series)?;
     notes.extend(import.notes.iter().map(|note| format!("MRI: {note}")));
     let bad = import.volume.data.iter().filter(|v| !v.is_finite()).count();
     if bad > 0 {

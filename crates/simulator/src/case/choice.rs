@@ -53,6 +53,8 @@ fn recipe(patient: &Patient) -> Recipe {
         spacing_mm: patient.spacing_mm,
         tets: patient.tets,
         isovalue_hu: patient.isovalue_hu,
+        ct_series: patient.ct_series,
+        mri_series: patient.mri_series,
         register: patient.register,
         opening: patient.opening,
     }

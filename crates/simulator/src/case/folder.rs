@@ -143,7 +143,15 @@ mod tests {
             notes: vec!["a remark".into()],
             ..Case::default()
         };
-        let recipe = Recipe { spacing_mm: 0.75, tets: 500, isovalue_hu: None, register: false, opening: None };
+        let recipe = Recipe {
+            spacing_mm: 0.75,
+            tets: 500,
+            isovalue_hu: None,
+            ct_series: None,
+            mri_series: None,
+            register: false,
+            opening: None,
+        };
         save(&case, &recipe, home.path()).expect("the case is written");
         let back = load(home.path()).expect("the case is read");
         assert_eq!((back.skull.as_ref(), back.isovalue_hu, back.notes.len()), (Some(&skull), 350, 1));

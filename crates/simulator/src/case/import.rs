@@ -62,10 +62,10 @@ fn needs(program: Program, inputs: &Inputs) -> Result<(), SessionError> {
 fn build(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<Case, SessionError> {
     let mut notes = Vec::new();
     stages.next("reading the CT");
-    let ct = inputs.ct.as_deref().map(|path| read_ct(path, &mut notes)).transpose()?;
+    let ct = inputs.ct.as_deref().map(|path| read_ct(path, recipe.ct_series, &mut notes)).transpose()?;
     let isovalue_hu = recipe.isovalue_hu.or(ct.as_ref().map(bone_isovalue)).unwrap_or(400);
     stages.next("reading the MRI");
-    let mut mri = inputs.mri.as_deref().map(|path| read_mri(path, &mut notes)).transpose()?;
+    let mut mri = inputs.mri.as_deref().map(|path| read_mri(path, recipe.mri_series, &mut notes)).transpose()?;
     let (mut fit, mut ct_from_mri) = (Fit::new(), DAffine3::IDENTITY);
     if let (Some(ct), Some(mri)) = (&ct, &mut mri) {
         if recipe.register {

@@ -42,6 +42,10 @@ pub struct Recipe {
     pub tets: usize,
     /// Threshold of bone, HU; `None` for the histogram's.
     pub isovalue_hu: Option<i16>,
+    /// Which series of the CT's folder, as [`trepan_volume::dicom::series`] lists them; `None` for the largest.
+    pub ct_series: Option<usize>,
+    /// Which series of the MRI's folder.
+    pub mri_series: Option<usize>,
     /// Whether the MRI, and labels with it, are moved to where they fit the CT.
     pub register: bool,
     /// A point outside the skull over the place to open, RAS mm; `None` for one that is found.
