@@ -94,7 +94,7 @@ fn a_built_case_runs_and_is_not_overwritten() {
     let out = home.path().join("out");
     assert!(operation(&out, "1", &["--case", case.to_str().unwrap()]).status().unwrap().success());
     let card: Value = serde_json::from_slice(&fs::read(case.join("case.json")).unwrap()).unwrap();
-    assert_eq!(card["files"].as_object().unwrap().len(), 4);
+    assert_eq!(card["files"].as_object().unwrap().len(), 5);
 }
 
 #[test]
