@@ -59,7 +59,9 @@ fn similarity(a: &Image, b: &Image) -> f64 {
 fn the_processor_draws_the_devices_picture() {
     let Some(gpu) = device() else { return };
     let (shell, mesh, mri, frame) = head();
-    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    // Blue on one side of the head.
+    let tint: Vec<[u8; 3]> = (0..mri.data.len()).map(|at| [0, 0, if at % 32 < 16 { 255 } else { 0 }]).collect();
+    let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: Some(&tint) };
     let size = [320, 240];
     let mut on_device = scene::renderer(&gpu, &data, size);
     let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
@@ -85,6 +87,9 @@ fn the_processor_draws_the_devices_picture() {
         let (device, processor) = (on_device.image().expect("picture"), on_processor.image());
         let index = similarity(&device, processor);
         assert!(index > 0.99, "similarity {index} in step {step}");
+        let bluish = |image: &Image| image.rgba.chunks_exact(4).filter(|p| p[2] > p[0].saturating_add(40)).count();
+        let (device, processor) = (bluish(&device), bluish(processor));
+        assert!(device > 500 && device.abs_diff(processor) * 50 < device, "{device} and {processor} pixels are tinted");
     }
     assert_eq!(gpu.faults(), Faults::default());
 }
