@@ -2,12 +2,12 @@
 //!
 //! # The guide
 //! 1. **Copy** this file and `tests/template.rs` under your device's name; put `pub mod` into `lib.rs`.
-//! 2. **Write the wire down first**, as the table below, with its units. Two functions know it: [`command`] and [`State::parse`].
+//! 2. **Write the wire down first**, as the table below, with its units. Two functions know it: `command` and `State::parse`.
 //!    They are pure, so that they are tested with known bytes before there is a device.
 //! 3. **Convert at the border**: inside it is mm, ms, N, rad; x right, y up, z to the user. Then [`Workspace`] lays that into the patient.
 //! 4. **Never wait in `read`.** A socket or a file is set non-blocking; a library that waits for longer than a quarter tick gets a
 //!    thread (see `haply`), one with its own loop gets triple buffers (see `openhaptics`).
-//! 5. **Every fault goes to [`Ramp::cut`]**, in the tick in which it is seen: the force is zero at once, rests, and ramps in again.
+//! 5. **Every fault goes to `Ramp::cut`**, in the tick in which it is seen: the force is zero at once, rests, and ramps in again.
 //!    The message of a [`Fault`] says what the user shall do. A loop that dies must leave no force: give the device a watchdog.
 //! 6. **Be honest in [`Capabilities`]**: the guard takes peak and continuous force, delay and encoder step from it.
 //! 7. **Emulate the device in a test** with all that can go wrong: silence, garbage, old counters, faults, unplugging, a hundred sessions.
