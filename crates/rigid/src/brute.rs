@@ -1,8 +1,7 @@
 //! The oracle: a ball on the triangulated isosurface, moved in small steps, in f64.
 //!
 //! # Theory
-//! Each cell of eight voxel centres is cut into six tetrahedra; where the density, linear in each, is the isovalue, there
-//! are one or two triangles. The ball is moved towards the device by a small step, then pushed off the nearest triangle until none is
+//! The surface is that of marching cubes (`cell.rs`). The ball is moved towards the device by a small step, then pushed off the nearest triangle until none is
 //! nearer than its radius; and again, until it comes back to where it was. Its rest is the god-object of the space of
 //! centres by definition: no step towards the device is allowed any more.
 //!
@@ -10,12 +9,12 @@
 //! A millisecond to tenths of a second a tick. Nothing is cached from tick to tick but the ball's place.
 //!
 //! # Sources
-//! A. Doi, A. Koide, *An efficient method of triangulating equi-valued surfaces by using tetrahedral cells*, IEICE Trans. E74 (1991); distance to a
-//! triangle after C. Ericson, *Real-Time Collision Detection*, 2005, section 5.1.5.
+//! Distance to a triangle after C. Ericson, *Real-Time Collision Detection*, 2005, section 5.1.5.
 //!
 //! # When not to use it
 //! In a haptic tick.
 
+use crate::cell;
 use crate::removal::{Burr, Cut, Law};
 use crate::rows::EVERYWHERE;
 use crate::{RigidContact, RigidStep};
@@ -99,41 +98,12 @@ impl Brute {
 
     /// The triangles of the cell whose lowest corner is voxel `cell`.
     fn cell(&mut self, bone: &BoneVolume, cell: IVec3) {
-        // The six ways from (0,0,0) to (1,1,1) along edges: each makes a tetrahedron of the diagonal.
-        const WAYS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-        for way in WAYS {
-            let mut corner = cell;
-            let mut tet = [(DVec3::ZERO, 0.0); 4];
-            for (n, vertex) in tet.iter_mut().enumerate() {
-                if n > 0 {
-                    corner[way[n - 1]] += 1;
-                }
-                let place = bone.origin().as_dvec3() + corner.as_dvec3() * f64::from(bone.spacing_mm());
-                *vertex = (place, f64::from(bone.hu(corner)) - f64::from(bone.isovalue()));
-            }
-            self.tetrahedron(&tet);
-        }
-    }
-
-    fn tetrahedron(&mut self, tet: &[(DVec3, f64); 4]) {
-        let crossing = |a: usize, b: usize| tet[a].0.lerp(tet[b].0, tet[a].1 / (tet[a].1 - tet[b].1));
-        let (mut inside, mut outside, mut counts) = ([0; 4], [0; 4], [0, 0]);
-        for (i, vertex) in tet.iter().enumerate() {
-            let (list, count) = if vertex.1 >= 0.0 { (&mut inside, 0) } else { (&mut outside, 1) };
-            list[counts[count]] = i;
-            counts[count] += 1;
-        }
-        let (i, o) = (inside, outside);
-        match counts[0] {
-            1 => self.add([crossing(i[0], o[0]), crossing(i[0], o[1]), crossing(i[0], o[2])]),
-            3 => self.add([crossing(i[0], o[0]), crossing(i[1], o[0]), crossing(i[2], o[0])]),
-            2 => {
-                let (a, b) = (crossing(i[0], o[0]), crossing(i[1], o[1]));
-                self.add([a, crossing(i[0], o[1]), b]);
-                self.add([a, crossing(i[1], o[0]), b]);
-            }
-            _ => {}
-        }
+        let corner = |c: i32| cell + IVec3::new(c & 1, c >> 1 & 1, c >> 2);
+        let over = |c: usize| f64::from(bone.hu(corner(c as i32))) - f64::from(bone.isovalue());
+        let (origin, spacing) = (bone.origin().as_dvec3(), f64::from(bone.spacing_mm()));
+        cell::triangles(&core::array::from_fn(over), |triangle| {
+            self.add(triangle.map(|p| origin + (cell.as_dvec3() + p) * spacing));
+        });
     }
 
     fn add(&mut self, triangle: [DVec3; 3]) {

@@ -21,7 +21,7 @@
 //! once the proxy follows at `yield_mm_per_ms` over the hand's own speed.
 //!
 //! The ball that touches is a little smaller than the tool while a burr cuts (it sits in what it cuts), and where the tool is jammed: where
-//! nothing pushes against the pull of the hand but walls along it. It grows back into free space at once; where it must push itself off the
+//! its walls push more against each other than against the pull of the hand. It grows back into free space at once; where it must push itself off the
 //! bone for that, slowly, and only while growing by g moves it by no more than 2.4 g, which is true on a surface and false in a bore.
 //!
 //! # Practice
@@ -61,7 +61,8 @@ const TOUCH: f32 = 0.05;
 const MARGIN_VOXELS: i32 = 2;
 /// Free space that a ball leaves around it when it grows, voxels: more than the unevenness of a bore.
 const MARGIN: f32 = 0.2;
-/// A smaller ball would come on by more than 1/JAM of what it is smaller: jammed. 0.4 is between walls less than 47 degrees apart.
+/// A smaller ball would come on by more than 1/JAM of what it is smaller: jammed. That is how many times the sum of what the walls push exceeds the
+/// pull of the hand. 0.4 is between walls less than 47 degrees apart.
 const JAM: f32 = 0.4;
 /// Growing may move a ball by so many times its growth.
 const PUSHED: f32 = 2.4;
@@ -88,11 +89,12 @@ pub struct Config {
     pub slop_voxels: f32,
     /// How fast the ball sinks in when a burr starts to cut, and grows back, mm/ms. Times the stiffness it is a change of force.
     pub fit_mm_per_ms: f32,
-    /// How fast a ball that is jammed, or has its centre in bone, is let out, mm/ms.
+    /// How fast a ball that has its centre in bone is let out, mm/ms.
     pub recover_mm_per_ms: f32,
     /// Whether the shaft is felt too, with torque. The tool must then be held with its axis out of the bone.
     pub shaft: bool,
-    /// How much faster than the hand the proxy comes after it where bone gives way, mm/ms. Times the stiffness it is a change of force.
+    /// How much faster than the hand the proxy comes after it where bone gives way, and how fast a jammed ball gives way, mm/ms. Times the stiffness it is
+    /// a change of force.
     pub yield_mm_per_ms: f32,
     /// What a burr takes away.
     pub removal: Law,
@@ -250,7 +252,7 @@ impl DistanceField {
         let radius = self.tool.tip_radius_mm;
         let (least, rate) = if self.jammed {
             let slop = self.config.slop_voxels * bone.spacing_mm();
-            ((radius - slop).max(0.5 * radius), self.config.recover_mm_per_ms)
+            ((radius - slop).max(0.5 * radius), self.config.yield_mm_per_ms)
         } else {
             (radius - self.bite_mm(bone), self.config.fit_mm_per_ms)
         };
@@ -409,7 +411,7 @@ impl DistanceField {
         let base = self.discs.base.as_vec3();
         let centre = bone.grid_of(self.proxy.translation) - base;
         let ball = Ball { inside: false, ..self.ball(bone) };
-        let (mut against, mut leans) = (f32::MIN, false);
+        let mut leans = false;
         self.spaces.clear();
         self.arms.clear();
         for disc in &self.near {
@@ -422,30 +424,25 @@ impl DistanceField {
                 self.spaces.push(HalfSpace { normal: near.direction, offset: near.direction.dot(lifted) });
                 self.arms.push((disc.shaft, spacing * arm));
                 out.points_in_contact += 1;
-                against = against.max(near.direction.dot(lifted) / depth);
                 out.manifold.push(Contact { point, normal: near.direction, depth_mm: deep.max(0.0) });
             }
         }
-        self.jammed = out.points_in_contact > 0 && against < JAM;
         out.voxels_in_contact = out.points_in_contact.min(self.discs.voxels);
         out.manifold.normal = lifted / depth;
         out.manifold.depth_mm = depth;
         out.manifold.point = self.proxy.translation - radius * out.manifold.normal;
-        if leans {
-            self.share_out(depth, out);
-        }
-    }
-
-    /// Shares the push out between burr and shaft.
-    fn share_out(&mut self, depth: f32, out: &mut RigidStep) {
-        let (mut moment, mut pressed) = (Vec3::ZERO, Vec3::ZERO);
+        let (mut pinch, mut moment, mut pressed) = (0.0, Vec3::ZERO, Vec3::ZERO);
         for (at, size) in supports(Vec3::ZERO, &self.spaces).into_iter().flatten() {
             let (push, (shaft, arm)) = (size * self.spaces[at].normal, self.arms[at]);
+            pinch += size;
             moment += arm.cross(push);
             pressed += if shaft { Vec3::ZERO } else { push };
         }
-        out.manifold.couple_mm = moment / depth;
-        self.pressed = pressed;
+        self.jammed = pinch * JAM > depth;
+        if leans {
+            out.manifold.couple_mm = moment / depth;
+            self.pressed = pressed;
+        }
     }
 }
 

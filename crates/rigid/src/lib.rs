@@ -45,6 +45,7 @@ mod readme {}
 mod ball;
 pub mod brute;
 pub mod burr_and_shaft;
+mod cell;
 pub mod centre_line;
 pub mod distance_field;
 pub mod exposed_faces;
