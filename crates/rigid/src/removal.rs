@@ -23,7 +23,7 @@
 //! ```
 //!
 //! # Practice
-//! F = stiffness · depth, N, up to `max_load_n`. Volume counts by fraction, `½ + (hu - iso)/500` cut to 0..1, so that it is smooth in
+//! F = stiffness · depth, N, up to `max_load_n`. Volume counts by fraction, `½ + (hu - iso)/750` cut to 0..1, so that it is smooth in
 //! time and the same as geometry's after the cut. Densities are whole HU: a fixed dither of voxel and tick rounds them, so that a loss of less than
 //! one HU a tick counts in full over time and the same path gives the same bytes.
 //!
@@ -45,8 +45,9 @@ use trepan_volume::{AIR_HU, BoneVolume};
 
 /// Fall of the ramp at the burr's surface, HU per voxel.
 const RAMP_HU: f32 = 1000.0;
-/// Span of density around the isovalue in which a voxel counts as partly bone, HU. A span as wide as the ramp would count curved cuts too large.
-const PARTIAL_HU: f32 = 500.0;
+/// Span of density around the isovalue in which a voxel counts as partly bone, HU. A span as wide as the ramp would count curved
+/// cuts too large, a narrower one surfaces along the grid: of 40 strokes in as many orientations the worst was 1.2 % off, 1.9 % with either.
+const PARTIAL_HU: f32 = 750.0;
 /// How far in front of the proxy the burr bites, voxels: the first layer, not what lies behind it.
 const BITE_VOXELS: f32 = 1.5;
 /// Density at which the specific energy is given, HU: dense cortical bone.

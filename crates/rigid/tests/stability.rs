@@ -43,7 +43,9 @@ fn noise(p: Vec3) -> f32 {
 
 #[test]
 fn on_rough_bone_it_agrees_with_the_oracle() {
-    let bone = bone([40, 40, 40], 0.5, |p| p.z + 0.4 * noise(0.6 * p));
+    let rough = |p: Vec3| p.z + 0.4 * noise(0.6 * p);
+    // Triangles cut the ridges off, in voxels of half the size by a quarter of it.
+    let (bone, finer) = (bone([40; 3], 0.5, rough), bone([80; 3], 0.25, rough));
     let oracle = Method::named("brute").unwrap();
     let (mut ours, mut truth) = (Method::RECOMMENDED.build(&Tool::burr(2.0)), oracle.build(&Tool::burr(2.0)));
     let (mut a, mut b) = (RigidStep::default(), RigidStep::default());
@@ -52,12 +54,12 @@ fn on_rough_bone_it_agrees_with_the_oracle() {
         let x = 0.1 * t as f32 - 3.0;
         let p = Vec3::new(x, 0.7 * x.sin(), if t == 0 { 4.0 } else { 1.9 });
         ours.step(&bone, &at(p), false, 1.0, &mut a);
-        truth.step(&bone, &at(p), false, 1.0, &mut b);
+        truth.step(&finer, &at(p), false, 1.0, &mut b);
         errors.push(ours.proxy().translation.distance(truth.proxy().translation) / 0.5);
     }
     errors.sort_by(f32::total_cmp);
     println!("proxy off by p50 {} p95 {} max {} voxel", errors[30], errors[57], errors[59]);
-    assert!(errors[30] < 0.1 && errors[57] < 0.3, "{errors:?}");
+    assert!(errors[30] < 0.1 && errors[57] < 0.2, "{errors:?}");
 }
 
 #[test]
