@@ -34,6 +34,8 @@ pub struct TickRecord {
     pub tissue_depth_mm: f32,
     /// Bone removed in this tick, mm³; negative where a stroke was undone.
     pub removed_mm3: f32,
+    /// Speed of the drill's spindle, 1/min: 0 when it is off or has stalled.
+    pub spindle_rpm: f32,
     /// Distance from the tip to the brain's surface, mm; negative inside.
     pub brain_distance_mm: f32,
     /// Sequence number of the surface patch that the tick used.
@@ -63,6 +65,8 @@ impl TickRecord {
     pub const RELEASED: u32 = 1 << 5;
     /// The device was gone; no force was wanted.
     pub const LOST: u32 = 1 << 6;
+    /// The burr came through the bone, for the first time in its stroke.
+    pub const THROUGH: u32 = 1 << 7;
 
     /// Whether every flag of `mask` is set.
     pub fn has(&self, mask: u32) -> bool {
@@ -84,6 +88,7 @@ impl Default for TickRecord {
             depth_mm: 0.0,
             tissue_depth_mm: 0.0,
             removed_mm3: 0.0,
+            spindle_rpm: 0.0,
             brain_distance_mm: 0.0,
             patch_seq: 0,
             compute_us: 0.0,

@@ -60,6 +60,7 @@ fn tick(number: u64) -> TickRecord {
         depth_mm: f32::NAN,
         tissue_depth_mm: -0.0,
         removed_mm3: f32::MIN_POSITIVE / 2.0,
+        spindle_rpm: noise.float(),
         brain_distance_mm: f32::NEG_INFINITY,
         patch_seq: noise.bits(),
         compute_us: noise.float(),
@@ -78,7 +79,7 @@ fn bits(t: &TickRecord) -> Vec<u64> {
         [t.twist.linear, t.twist.angular, t.wrench.force, t.wrench.torque, t.contact_normal]
             .map(|v| v.to_array())
             .concat(),
-        vec![t.depth_mm, t.tissue_depth_mm, t.removed_mm3, t.brain_distance_mm, t.compute_us],
+        vec![t.depth_mm, t.tissue_depth_mm, t.removed_mm3, t.spindle_rpm, t.brain_distance_mm, t.compute_us],
     ]
     .concat();
     let whole =

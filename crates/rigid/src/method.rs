@@ -1,6 +1,7 @@
 //! The list of methods: one closed enum feeds tests, charts and command lines.
 
 use crate::penalty::Penalty;
+use crate::removal::Law;
 use crate::{RigidContact, brute, burr_and_shaft, centre_line, distance_field, exposed_faces};
 use crate::{pointshell, ray_trace, surface_vertices, thesis, voxel_sum};
 use trepan_geometry::Tool;
@@ -88,6 +89,22 @@ impl Method {
             Self::DistanceField(config) => config.shaft,
             Self::BurrAndShaft(_) | Self::CentreLine(_) | Self::SurfaceVertices(_) => true,
             _ => false,
+        }
+    }
+
+    /// What a burr takes away under this method.
+    pub fn removal(&self) -> Law {
+        match self {
+            Self::Thesis(config) => config.removal,
+            Self::Pointshell(config) => config.removal,
+            Self::RayTrace(config) => config.removal,
+            Self::ExposedFaces(config) => config.removal,
+            Self::VoxelSum(config) => config.removal,
+            Self::BurrAndShaft(config) => config.removal,
+            Self::CentreLine(config) => config.removal,
+            Self::SurfaceVertices(config) => config.removal,
+            Self::DistanceField(config) => config.removal,
+            Self::Brute(config) => config.removal,
         }
     }
 

@@ -98,6 +98,14 @@ impl Law {
         max_load_n: 20.0,
     };
 
+    /// The motor; the per-tick law knows none.
+    pub fn spindle(&self) -> Option<Spindle> {
+        match *self {
+            Self::PerTick { .. } => None,
+            Self::Rate { spindle, .. } => Some(spindle),
+        }
+    }
+
     /// Bone of the reference density that a burr of `radius_mm`, pressed `depth_mm` deep, takes in `dt_ms`, mm³; 0 for `PerTick`.
     pub fn volume_mm3(&self, radius_mm: f32, depth_mm: f32, dt_ms: f32) -> f32 {
         self.turned(radius_mm, depth_mm, dt_ms, &mut false).0

@@ -3,7 +3,7 @@
 //! `cargo run --release -p trepan-simulator --example dry_run`
 
 use std::sync::Arc;
-use trepan_contact::{GuardConfig, SurfacePatch, Viscoelastic};
+use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
 use trepan_geometry::Vec3;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::script::{Script, Site};
@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         program: Program::Craniotomy,
         rigid: trepan_rigid::Method::RECOMMENDED,
         dt_ms: 1.0,
-        bone_force: Viscoelastic { stiffness: 2.0, damping: 0.5 },
+        bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
         tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
         guard: GuardConfig::default(),
         near_mm: 2.0,

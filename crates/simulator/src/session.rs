@@ -25,7 +25,7 @@ use crate::stages::haptic_tick::{HapticConfig, HapticStage, ToolSample};
 use crate::stages::solver_step::SolverStage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use trepan_contact::Viscoelastic;
+use trepan_contact::{Vibration, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_haptics::script::Script;
 use trepan_haptics::{DeviceName, HapticDevice, mouse};
@@ -146,7 +146,7 @@ impl Session {
             program: self.program,
             rigid: self.rigid,
             dt_ms: self.tick_ms(),
-            bone_force: feel.softened(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
+            bone_force: Vibration::drill(feel.softened(Viscoelastic { stiffness: 2.0, damping: 0.5 })),
             tissue_force: feel.softened(Viscoelastic { stiffness: 0.3, damping: 0.3 }),
             guard: feel.guard(),
             near_mm: 2.0,

@@ -1,7 +1,7 @@
 //! The stages under faults: nothing that a device, a late thread or an odd script does reaches a hand as a jump, a NaN or a panic.
 
 use std::sync::Arc;
-use trepan_contact::{GuardConfig, SurfacePatch, Viscoelastic};
+use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
 use trepan_geometry::{Buttons, Pose, Quat, Tool, ToolState, Vec3};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
@@ -26,7 +26,7 @@ fn config(program: Program) -> HapticConfig {
         program,
         rigid: trepan_rigid::Method::RECOMMENDED,
         dt_ms: 1.0,
-        bone_force: Viscoelastic { stiffness: 2.0, damping: 0.5 },
+        bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
         tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
         guard: GuardConfig::default(),
         near_mm: 2.0,
@@ -111,12 +111,16 @@ fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
         let mut tool = at((6.0 - 0.001 * i as f32).max(-7.0), -0.001);
         tool.buttons = Buttons::PEDAL;
         let record = bench.step(tool, Status::Fresh, &NO_PATCH);
+        let load = if record.depth_mm > 0.0 { 20_000.0..60_000.0 } else { 60_000.0..60_000.1 };
+        assert!(load.contains(&record.spindle_rpm), "{} 1/min, {} mm deep", record.spindle_rpm, record.depth_mm);
         if bench.raised(Warning::BrainNear).is_none() {
             deepest = deepest.min(record.brain_distance_mm);
         }
     }
     assert!(deepest > 1.9, "no warning although the brain was {deepest} mm away");
     let order = [Warning::BoneThin, Warning::BreakThrough, Warning::BrainTouched].map(|w| bench.raised(w).unwrap());
+    let through: Vec<u64> = bench.told.iter().filter(|n| n.what == What::Through).map(|n| n.tick).collect();
+    assert!(matches!(through[..], [tick] if tick > order[1]), "came through at {through:?}, warned at {order:?}");
     assert!(order.is_sorted() && bench.raised(Warning::BrainNear).unwrap() < order[2], "{order:?}");
     let after = bone.snapshot();
     let removed: Vec<_> = (0..before.data.len()).filter(|&v| after.data[v] != before.data[v]).collect();
@@ -125,6 +129,20 @@ fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
         let centre = before.centre_of([voxel % 48, voxel / 48 % 48, voxel / 2304]).as_vec3();
         assert!(Vec3::new(centre.x - 0.3, centre.y + 0.2, 0.0).length() < 5.0, "bone was lost at {centre}");
     }
+}
+
+#[test]
+fn a_drill_pressed_too_hard_stalls_and_says_so() {
+    let mut bench = Bench::new(Program::Craniotomy);
+    for i in 0..1500 {
+        let tool = ToolState { buttons: Buttons::PEDAL, ..at(6.0 - 0.1 * i.min(130) as f32, 0.0) };
+        bench.step(tool, Status::Fresh, &NO_PATCH);
+    }
+    let stalled = bench.raised(Warning::DrillStalled).expect("a warning");
+    assert!((100..200).contains(&stalled), "tick {stalled}");
+    let record = bench.step(ToolState { buttons: Buttons::PEDAL, ..at(-7.0, 0.0) }, Status::Fresh, &NO_PATCH);
+    assert_eq!((record.spindle_rpm, record.removed_mm3), (0.0, 0.0));
+    assert!(bench.step(at(6.0, 0.0), Status::Fresh, &NO_PATCH).spindle_rpm == 0.0, "it turns without the pedal");
 }
 
 #[test]

@@ -25,6 +25,7 @@ impl Fields for TickRecord {
         v.uint32(15, "flags", &mut self.flags);
         byte(v, 16, "phase", &mut self.phase);
         byte(v, 17, "tool", &mut self.tool);
+        v.float(18, "spindle_rpm", &mut self.spindle_rpm);
     }
 }
 

@@ -18,7 +18,8 @@ use crate::stages::ahead::bone_ahead_mm;
 use crate::stages::notice::{Notice, Warning, Watch, What};
 use crate::stages::score::ScoreKeeper;
 use std::sync::Arc;
-use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardedWrench, SurfacePatch, Viscoelastic};
+use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardedWrench, SurfacePatch};
+use trepan_contact::{Vibration, Viscoelastic};
 use trepan_geometry::{Buttons, Pose, Tool, ToolKind, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
@@ -44,8 +45,8 @@ pub struct HapticConfig {
     pub rigid: Method,
     /// Length of a tick, ms.
     pub dt_ms: f32,
-    /// Force of bone: k in N/mm, b in N ms/mm.
-    pub bone_force: Viscoelastic,
+    /// Force of bone: k in N/mm, b in N ms/mm, with the buzz of the drill.
+    pub bone_force: Vibration<Viscoelastic>,
     /// Force of tissue: k in N/mm, b in N ms/mm.
     pub tissue_force: Viscoelastic,
     /// Limits of the hand.
@@ -111,6 +112,8 @@ pub struct HapticStage {
     /// Bone removed since the pedal was last pressed, mm³.
     stroke_mm3: f32,
     drilled: bool,
+    /// Whether the burr has come through the bone in this stroke.
+    through: bool,
     asked_undo: bool,
     released: bool,
 }
@@ -149,6 +152,7 @@ impl HapticStage {
             asked_next: false,
             stroke_mm3: 0.0,
             drilled: false,
+            through: false,
             asked_undo: false,
             released: false,
         }
@@ -161,15 +165,17 @@ impl HapticStage {
         let drilling = self.drills(&tool);
         let back_mm3 = self.undo(&tool, drilling, input.tick, tell);
         self.touch_bone(&tool, drilling);
+        let came_through = self.came_through(input.tick, tool.time_ms, tell);
         let sample = self.sample(&tool, input.tick, drilling);
         let held = self.touch_tissue(input.patch, &sample);
         let lost = input.reading.status == Status::Lost;
-        let wanted = if lost { Wrench::ZERO } else { self.wanted(&tool) };
+        let wanted = if lost { Wrench::ZERO } else { self.wanted(&tool, drilling) };
         let heated = self.guard.counters().heated;
         let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
         let warm = self.guard.counters().heated > heated;
         let mut record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
         record.removed_mm3 -= back_mm3;
+        record.flags |= if came_through { TickRecord::THROUGH } else { 0 };
         self.warn(&record, input.patch, wanted, warm, tell);
         self.scores.add(&record, self.config.dt_ms);
         Tick { wrench, sample, record, warnings: self.watch.standing() }
@@ -244,7 +250,7 @@ impl HapticStage {
         let Some(bone) = &self.bone else { return 0.0 };
         if drilling && !self.drilled {
             bone.begin_stroke();
-            self.stroke_mm3 = 0.0;
+            (self.stroke_mm3, self.through) = (0.0, false);
         }
         self.drilled = drilling;
         let asks = tool.buttons.has(Buttons::UNDO);
@@ -267,6 +273,25 @@ impl HapticStage {
                 self.stroke_mm3 += self.bone_step.removed_mm3;
             }
             _ => self.proxy = tool.world_from_tool,
+        }
+    }
+
+    /// Whether the burr has come through the bone for the first time in its stroke; tells so.
+    fn came_through(&mut self, tick: u64, time_ms: f64, tell: &mut dyn FnMut(Notice)) -> bool {
+        let first = self.bone_step.broke_through && !self.through;
+        if first {
+            self.through = true;
+            tell(Notice { tick, time_ms, what: What::Through });
+        }
+        first
+    }
+
+    /// Speed of the spindle, 1/min.
+    fn spindle_rpm(&self, drilling: bool) -> f32 {
+        match self.config.rigid.removal().spindle() {
+            Some(_) if drilling && self.bone_step.manifold.touches() => self.bone_step.spindle_rpm,
+            Some(spindle) if drilling => spindle.free_rpm,
+            _ => 0.0,
         }
     }
 
@@ -294,7 +319,9 @@ impl HapticStage {
     }
 
     /// Bone always pushes; tissue pushes in its own phase only (thesis 6.4: while drilling it only warns).
-    fn wanted(&mut self, tool: &ToolState) -> Wrench {
+    fn wanted(&mut self, tool: &ToolState, drilling: bool) -> Wrench {
+        let free = self.config.rigid.removal().spindle().map_or(f32::INFINITY, |spindle| spindle.free_rpm);
+        self.config.bone_force.turn(self.spindle_rpm(drilling) / free);
         let dt_ms = self.config.dt_ms;
         let bone = self.config.bone_force.wrench(tool, &self.bone_step.manifold, dt_ms);
         if self.phase() != Phase::Brain {
@@ -335,6 +362,7 @@ impl HapticStage {
             depth_mm: bone.depth_mm,
             tissue_depth_mm: self.tissue.depth_mm,
             removed_mm3: self.bone_step.removed_mm3,
+            spindle_rpm: self.spindle_rpm(sample.drilling),
             brain_distance_mm: self.brain_distance(sample.state.tip()),
             patch_seq: input.patch_seq,
             compute_us: 0.0,
@@ -361,6 +389,11 @@ impl HapticStage {
         self.brain.as_ref().map_or(f32::INFINITY, |field| field.sample(tip) - self.tool().tip_radius_mm)
     }
 
+    /// Whether the drill stands still under its load.
+    fn stalls(&self, record: &TickRecord) -> bool {
+        record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some()
+    }
+
     fn warn(
         &mut self,
         record: &TickRecord,
@@ -380,6 +413,7 @@ impl HapticStage {
             (Warning::BreakThrough, ahead_mm <= BREAK_MM, ahead_mm),
             (Warning::BrainNear, burr && distance <= self.config.near_mm, distance),
             (Warning::BrainTouched, touched, distance),
+            (Warning::DrillStalled, record.has(TickRecord::DRILLING) && self.stalls(record), force),
             (Warning::ForceLimit, record.has(TickRecord::CLAMPED), force),
             (Warning::TissueLate, record.has(TickRecord::HELD), age_ms),
             (Warning::DeviceStale, record.has(TickRecord::STALE), 0.0),

@@ -16,6 +16,8 @@ pub enum Warning {
     BrainNear,
     /// The burr touches the brain.
     BrainTouched,
+    /// The drill is pressed so hard that it stands still.
+    DrillStalled,
     /// The wanted force is over the device's limit.
     ForceLimit,
     /// The last collision result is old; its force fades.
@@ -28,7 +30,7 @@ pub enum Warning {
 
 impl Warning {
     /// Every warning, in the order of their bits.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::BoneThin,
         Self::BreakThrough,
         Self::BrainNear,
@@ -37,6 +39,7 @@ impl Warning {
         Self::TissueLate,
         Self::DeviceStale,
         Self::MotorsWarm,
+        Self::DrillStalled,
     ];
 
     /// A short name for files.
@@ -50,6 +53,7 @@ impl Warning {
             Self::TissueLate => "tissue-late",
             Self::DeviceStale => "device-stale",
             Self::MotorsWarm => "motors-warm",
+            Self::DrillStalled => "drill-stalled",
         }
     }
 
@@ -64,6 +68,7 @@ impl Warning {
             Self::TissueLate => "the tissue's answer is late, its force fades",
             Self::DeviceStale => "the device gave no fresh position, the last one is held",
             Self::MotorsWarm => "the device's motors are warm, its force is reduced: press less",
+            Self::DrillStalled => "the drill has stalled: press less",
         }
     }
 }
@@ -75,6 +80,8 @@ pub enum What {
     Phase(Phase),
     /// A warning was raised (`true`) or cleared; the number says how near, how strong or how old (mm, N or ms).
     Warning(Warning, bool, f32),
+    /// The burr came through the bone.
+    Through,
     /// The last stroke of the burr was undone; the number is the bone that came back, mm³.
     Undone(f32),
     /// The last stroke cannot be undone: it changed more bone than is kept.
@@ -103,12 +110,13 @@ impl Notice {
                 let unit = match warning {
                     Warning::BoneThin | Warning::BreakThrough => "mm left",
                     Warning::BrainNear | Warning::BrainTouched => "mm away",
-                    Warning::ForceLimit | Warning::MotorsWarm => "N wanted",
+                    Warning::ForceLimit | Warning::MotorsWarm | Warning::DrillStalled => "N wanted",
                     Warning::TissueLate | Warning::DeviceStale => "ms old",
                 };
                 ("warning", format!("{}: {} ({value:.2} {unit})", warning.name(), warning.text()))
             }
             What::Warning(warning, false, _) => ("cleared", warning.name().to_string()),
+            What::Through => ("through", "the burr came through the bone".into()),
             What::Undone(mm3) => ("undo", format!("the last stroke is undone: {mm3:.1} mm3 of bone are back")),
             What::Kept => ("undo", "the last stroke was too long to be undone".into()),
         }

@@ -18,6 +18,8 @@ pub struct ScoreKeeper {
     pub drilling_s: f64,
     /// Bone removed, mm³.
     pub bone_removed_mm3: f64,
+    /// Strokes of the burr that came through the bone.
+    pub times_through: u32,
     /// Deepest place of the burr past the brain's rest surface, mm; 0 when it never got there.
     pub plunge_mm: f32,
     /// Separate touches of the brain with the burr.
@@ -49,6 +51,7 @@ impl ScoreKeeper {
         self.peak_force_step_n = self.peak_force_step_n.max((force - self.last_force).length());
         self.last_force = force;
         self.bone_removed_mm3 += f64::from(record.removed_mm3);
+        self.times_through += u32::from(record.has(TickRecord::THROUGH));
         if record.has(TickRecord::DRILLING) {
             self.drilling_s += f64::from(dt_ms) * 1e-3;
         }
@@ -79,7 +82,7 @@ mod tests {
                 wrench: Wrench { force: Vec3::new(0.0, 0.0, if i < 50 { 1.0 } else { 0.25 }), torque: Vec3::ZERO },
                 removed_mm3: 0.5,
                 brain_distance_mm: if (20..30).contains(&i) || i == 40 { -0.75 } else { 3.0 },
-                flags: TickRecord::DRILLING,
+                flags: TickRecord::DRILLING | if i % 50 == 7 { TickRecord::THROUGH } else { 0 },
                 ..TickRecord::default()
             };
             keeper.add(&record, 1.0);
@@ -88,6 +91,7 @@ mod tests {
         assert!((keeper.drilling_s - 0.101).abs() < 1e-9);
         assert!((keeper.bone_removed_mm3 - 50.5).abs() < 1e-9);
         assert_eq!((keeper.plunge_mm, keeper.burr_touches_of_brain), (0.75, 2));
+        assert_eq!(keeper.times_through, 2);
         assert_eq!((keeper.peak_force_n, keeper.peak_force_step_n), (1.0, 1.0));
     }
 }
