@@ -165,7 +165,7 @@ impl HapticStage {
         let drilling = self.drills(&tool);
         let back_mm3 = self.undo(&tool, drilling, input.tick, tell);
         self.touch_bone(&tool, drilling);
-        let came_through = self.came_through(input.tick, tool.time_ms, tell);
+        let ahead_mm = self.bone_ahead(drilling);
         let sample = self.sample(&tool, input.tick, drilling);
         let held = self.touch_tissue(input.patch, &sample);
         let lost = input.reading.status == Status::Lost;
@@ -175,8 +175,9 @@ impl HapticStage {
         let warm = self.guard.counters().heated > heated;
         let mut record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
         record.removed_mm3 -= back_mm3;
-        record.flags |= if came_through { TickRecord::THROUGH } else { 0 };
-        self.warn(&record, input.patch, wanted, warm, tell);
+        self.warn(&record, input.patch, (wanted, warm, ahead_mm), tell);
+        record.flags |=
+            if self.came_through(ahead_mm, input.tick, tool.time_ms, tell) { TickRecord::THROUGH } else { 0 };
         self.scores.add(&record, self.config.dt_ms);
         Tick { wrench, sample, record, warnings: self.watch.standing() }
     }
@@ -276,9 +277,9 @@ impl HapticStage {
         }
     }
 
-    /// Whether the burr has come through the bone for the first time in its stroke; tells so.
-    fn came_through(&mut self, tick: u64, time_ms: f64, tell: &mut dyn FnMut(Notice)) -> bool {
-        let first = self.bone_step.broke_through && !self.through;
+    /// Whether the burr has come through the bone for the first time in its stroke; tells so. A hole beside bone that is still ahead is a pore.
+    fn came_through(&mut self, ahead_mm: f32, tick: u64, time_ms: f64, tell: &mut dyn FnMut(Notice)) -> bool {
+        let first = self.bone_step.broke_through && ahead_mm <= BREAK_MM && !self.through;
         if first {
             self.through = true;
             tell(Notice { tick, time_ms, what: What::Through });
@@ -372,13 +373,15 @@ impl HapticStage {
         }
     }
 
-    /// Bone left ahead of a burr that cuts, mm; infinite when it does not.
-    fn bone_ahead(&self, record: &TickRecord) -> f32 {
+    /// Bone left ahead of a burr that cuts, along its axis or where it is pressed to, mm; infinite when it does not.
+    fn bone_ahead(&self, drilling: bool) -> f32 {
         match &self.bone {
-            Some(bone) if record.has(TickRecord::DRILLING) && self.bone_step.manifold.touches() => {
-                let inward = self.proxy.rotation * Vec3::NEG_Z;
-                let front = self.proxy.translation + self.tool().tip_radius_mm * inward;
-                bone_ahead_mm(bone, front, inward, 2.0 * THIN_MM)
+            Some(bone) if drilling && self.bone_step.manifold.touches() => {
+                let ahead = |way: Vec3| {
+                    let front = self.proxy.translation + self.tool().tip_radius_mm * way;
+                    bone_ahead_mm(bone, front, way, 2.0 * THIN_MM)
+                };
+                ahead(self.proxy.rotation * Vec3::NEG_Z).min(ahead(-self.bone_step.manifold.normal))
             }
             _ => f32::INFINITY,
         }
@@ -398,8 +401,7 @@ impl HapticStage {
         &mut self,
         record: &TickRecord,
         patch: &SurfacePatch,
-        wanted: Wrench,
-        warm: bool,
+        (wanted, warm, ahead_mm): (Wrench, bool, f32),
         tell: &mut dyn FnMut(Notice),
     ) {
         let burr = self.phase() == Phase::Craniotomy;
@@ -407,7 +409,6 @@ impl HapticStage {
         let touched = burr && (distance <= 0.0 || self.tissue.depth_mm > 0.0);
         let force = wanted.force.length();
         let age_ms = (record.time_ms - patch.time_ms) as f32;
-        let ahead_mm = self.bone_ahead(record);
         let causes = [
             (Warning::BoneThin, ahead_mm <= THIN_MM, ahead_mm),
             (Warning::BreakThrough, ahead_mm <= BREAK_MM, ahead_mm),
