@@ -10,6 +10,9 @@
 //!
 //! # Practice
 //! The swept volume is counted twice: as the method says, and in the bone that is left, by trilinear density at 64 points a voxel before and after.
+//! Voxels cannot hold the swept shape exactly: the hole that a perfect cutter would leave in them is some tenths of a percent off. What a method's hole
+//! differs from that one is its own error, and what the chart shows. No front is asked for: the law of removal is the same for all, and tenths of a percent
+//! are less than voxels hold.
 
 use super::solid::{ISO, directions, held, voxels};
 use super::worst_chart;
@@ -39,18 +42,19 @@ const POINTS: i32 = 4;
 
 /// Every method's strokes and rates.
 pub fn run(scope: Scope, findings: &mut Findings) {
-    let normals = directions(scope.pick(2, 12));
+    let normals = directions(scope.pick(6, 12));
     for (number, method) in Method::all().into_iter().enumerate() {
         if !scope.takes(number) || method.name() == "brute" && scope.quick {
             continue;
         }
-        let few = method.name() == "brute" || scope.quick && method != Method::RECOMMENDED;
+        let few = method.name() == "brute";
         let orientations = if few { 1 } else { normals.len() };
-        let (mut said, mut left, mut times) = (0.0f64, 0.0f64, Vec::new());
+        let (mut said, mut left, mut own, mut times) = (0.0f64, 0.0f64, 0.0f64, Vec::new());
         for normal in &normals[..orientations] {
             let found = stroke(&method, *normal, &mut times);
             said = worse(said, found.0 / swept_mm3() - 1.0);
             left = worse(left, found.1 / swept_mm3() - 1.0);
+            own = worse(own, (found.1 - perfect_mm3(*normal)) / swept_mm3());
         }
         let times = Samples::from(times);
         findings.rows.push(
@@ -62,12 +66,13 @@ pub fn run(scope: Scope, findings: &mut Findings) {
                 .metric("tick_p50_us", times.quantile(0.5))
                 .metric("tick_p99_us", times.quantile(0.99))
                 .metric("removed_error_percent", 100.0 * said.abs())
-                .metric("hole_error_percent", 100.0 * left.abs()),
+                .metric("hole_error_percent", 100.0 * left.abs())
+                .metric("hole_beyond_perfect_percent", 100.0 * own.abs()),
         );
         findings.rows.push(rates(&method, scope));
     }
     let title = "Drilling: tick against error of the removed volume";
-    let chart = worst_chart(findings, "swept volume", title, ("tick_p50_us", "hole_error_percent"), false);
+    let chart = worst_chart(findings, "swept volume", title, ("tick_p50_us", "hole_beyond_perfect_percent"), false);
     findings.charts.extend(chart);
     findings.gates.extend(gates(&findings.rows));
 }
@@ -102,6 +107,16 @@ fn stroke(method: &Method, normal: Vec3, times: &mut Vec<f64>) -> (f64, f64) {
         said += f64::from(out.removed_mm3);
     }
     (said, before - volume_mm3(&bone))
+}
+
+/// The hole of a perfect cutter in the same voxels, mm³.
+fn perfect_mm3(normal: Vec3) -> f64 {
+    let (up, across) = (normal.as_dvec3(), normal.any_orthonormal_vector().as_dvec3());
+    let cut = |p: DVec3| {
+        let middle = up * (R - SUNK_MM) + across * p.dot(across).clamp(-0.5 * ACROSS_MM, 0.5 * ACROSS_MM);
+        p.dot(up).max(R - p.distance(middle))
+    };
+    volume_mm3(&voxels(EDGE, VOXEL_MM, |p| p.dot(up))) - volume_mm3(&voxels(EDGE, VOXEL_MM, cut))
 }
 
 /// Volume where the density, trilinear between voxel centres, reaches the isovalue, mm³.
