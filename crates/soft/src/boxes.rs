@@ -2,7 +2,8 @@
 //!
 //! # Theory
 //! Each cell is cut into the six tetrahedra of Kuhn's split, one for each order of the axes along the way from corner 000 to corner 111:
-//! all cells are alike, so neighbours share their faces' diagonals.
+//! all cells are alike, so neighbours share their faces' diagonals. A centred box has a node in the middle of each cell besides; four tetrahedra lie around the line between two
+//! middles (the body-centred lattice of the mesher), two on every face of the box.
 
 use trepan_geometry::Vec3;
 use trepan_mesh::TetMesh;
@@ -28,12 +29,57 @@ pub fn split_box(cells: [usize; 3], size: Vec3) -> TetMesh {
             mesh.tets.push(kuhn(corner, order).map(node));
         }
     }
+    outside_in(&mut mesh);
+    mesh
+}
+
+/// A box from the origin to `size`, mm, of `cells` cells with a node in the middle of each: about twelve tetrahedra a cell, as the mesher lays them.
+pub fn centred_box(cells: [usize; 3], size: Vec3) -> TetMesh {
+    let TetMesh { positions, .. } = split_box(cells, size);
+    let mut mesh = TetMesh { positions, ..TetMesh::default() };
+    let node = |c: [usize; 3]| ((c[2] * (cells[1] + 1) + c[1]) * (cells[0] + 1) + c[0]) as u32;
+    let first = mesh.positions.len() as u32;
+    let middle = |c: [usize; 3]| first + ((c[2] * cells[1] + c[1]) * cells[0] + c[0]) as u32;
+    let counts: [usize; 3] = cells;
+    let all = || {
+        (0..counts.iter().product())
+            .map(|n: usize| [n % counts[0], n / counts[0] % counts[1], n / (counts[0] * counts[1])])
+    };
+    for c in all() {
+        let share = Vec3::from_array(std::array::from_fn(|k| (c[k] as f32 + 0.5) / counts[k] as f32));
+        mesh.positions.push(share * size);
+    }
+    for (c, axis) in all().flat_map(|c| [0, 1, 2].map(|axis| (c, axis))) {
+        let (second, third) = ((axis + 1) % 3, (axis + 2) % 3);
+        let step = |mut at: [usize; 3], axis: usize| {
+            at[axis] += 1;
+            at
+        };
+        let around = |c: [usize; 3]| [c, step(c, second), step(step(c, second), third), step(c, third)].map(node);
+        if c[axis] == 0 {
+            let [a, b, d, e] = around(c);
+            mesh.tets.extend([[a, b, d, middle(c)], [a, d, e, middle(c)]]);
+        }
+        let far = around(step(c, axis));
+        if c[axis] + 1 == counts[axis] {
+            let [a, b, d, e] = far;
+            mesh.tets.extend([[a, b, d, middle(c)], [a, d, e, middle(c)]]);
+        } else {
+            let next = middle(step(c, axis));
+            mesh.tets.extend((0..4).map(|k| [far[k], far[(k + 1) % 4], next, middle(c)]));
+        }
+    }
+    outside_in(&mut mesh);
+    mesh
+}
+
+/// Swaps corners where a tetrahedron is inside out.
+fn outside_in(mesh: &mut TetMesh) {
     for tet in 0..mesh.tets.len() {
         if mesh.volume_mm3(tet) < 0.0 {
             mesh.tets[tet].swap(2, 3);
         }
     }
-    mesh
 }
 
 /// The nodes whose position satisfies `wanted`.
@@ -54,6 +100,17 @@ fn kuhn(corner: [usize; 3], order: [usize; 3]) -> [[usize; 3]; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_centred_box_is_filled_exactly_once() {
+        let mesh = centred_box([3, 2, 4], Vec3::new(6.0, 5.0, 8.0));
+        // Four around each of the 46 inner faces, two on each of the 52 outer ones.
+        assert_eq!((mesh.tets.len(), mesh.positions.len()), (288, 84));
+        assert!((mesh.total_mm3() - 240.0).abs() < 1e-3);
+        assert!((0..288).all(|t| mesh.volume_mm3(t) > 0.0));
+        let outside = trepan_mesh::Surface::of(&mesh).triangles;
+        assert_eq!(outside.len(), 104);
+    }
 
     #[test]
     fn a_box_is_filled_exactly_once() {

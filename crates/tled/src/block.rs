@@ -1,13 +1,13 @@
 //! Blocks of sixteen tetrahedra, structure of arrays, and the two passes over them.
 //!
 //! # Theory
-//! The force pass turns displacements into forces. Where locking is cured a volume pass goes before it: each node gets the mean `J - 1` of
-//! the elements around it, weighted by volume, and the force pass takes the mean of its four nodes in place of its own. That is the average nodal
-//! pressure of Bonet and Burton 1998 in the form that stays right where materials meet (Joldes, Wittek and Miller 2009): what is
-//! averaged is the volume change, what it is multiplied with is the element's own κ.
+//! The force pass turns displacements into forces. Where locking is cured a volume pass goes before it: each seat at a node gets the mean `J - 1` of
+//! its elements, weighted by volume, and the force pass takes the mean of its four seats in place of its own: the average nodal
+//! pressure of Bonet and Burton 1998, material by material as of Joldes, Wittek and Miller 2009 (see `seats.rs`).
 //!
 //! # Practice
-//! 100 bytes of constants a tetrahedron, 48 more for a memory of past stress.
+//! 84 bytes of constants a tetrahedron, 48 more for a memory of past stress. Nodes are those of the part that the block belongs to. Forces are added lane by lane,
+//! whatever the register's width, so that every kernel sums in the same order.
 
 use crate::element::{deformation, forces};
 use crate::kernel::{Found, Pass};
@@ -24,7 +24,7 @@ pub(crate) const WIDTH: usize = 16;
 /// Four numbers in one 16-byte row: a displacement and `J - 1` of a node, or a force and nothing.
 pub(crate) type Quad = [f32; 4];
 
-/// Sixteen tetrahedra with K material constants each. Lanes past the last element have no stiffness and write to the spare slot.
+/// Sixteen tetrahedra with K material constants each. Lanes without an element have no stiffness and add nothing to node 0.
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(crate) struct Block<const K: usize> {
@@ -35,7 +35,6 @@ pub(crate) struct Block<const K: usize> {
     /// ω² of the element at rest over its stiffness at rest.
     omega2: [f32; WIDTH],
     nodes: [[u32; WIDTH]; 4],
-    slots: [[u32; WIDTH]; 4],
 }
 
 /// Past stress of a block, T terms.
@@ -47,7 +46,7 @@ pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
     pub memory: &'a mut [Memory<T>],
     pub fade: [Fade; 2],
     pub u: &'a [Quad],
-    pub slots: &'a mut [Quad],
+    pub sums: &'a mut [Quad],
     pub cure_locking: bool,
     pub law: PhantomData<M>,
 }
@@ -56,8 +55,8 @@ pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
 pub(crate) struct Volumes<'a, const K: usize> {
     pub blocks: &'a [Block<K>],
     pub u: &'a [Quad],
-    /// `V (J - 1) / 4` of every element, by block.
-    pub shares: &'a mut [[f32; WIDTH]],
+    /// `Σ V (J - 1) / 4` by node.
+    pub shares: &'a mut [f32],
 }
 
 /// Edges of an element as they moved, and the mean of its nodes' fourth numbers.
@@ -68,14 +67,13 @@ struct Moved<L> {
 
 impl<const K: usize> Block<K> {
     /// A block of no elements.
-    pub fn empty(spare: u32) -> Self {
+    pub fn empty() -> Self {
         Self {
             gradients: [[[0.0; WIDTH]; 3]; 3],
             constants: [[0.0; WIDTH]; K],
             quarter_volume: [0.0; WIDTH],
             omega2: [0.0; WIDTH],
             nodes: [[0; WIDTH]; 4],
-            slots: [[spare; WIDTH]; 4],
         }
     }
 
@@ -84,9 +82,8 @@ impl<const K: usize> Block<K> {
         &mut self,
         lane: usize,
         (shape, material, density): (&Shape, &Material, f64),
-        at: [[u32; 4]; 2],
+        nodes: [u32; 4],
     ) {
-        let [nodes, slots] = at;
         for a in 0..3 {
             let gradient = shape.gradients[a + 1].as_vec3();
             (0..3).for_each(|k| self.gradients[a][k][lane] = gradient[k]);
@@ -97,7 +94,6 @@ impl<const K: usize> Block<K> {
         self.quarter_volume[lane] = (0.25 * shape.volume_mm3) as f32;
         for corner in 0..4 {
             self.nodes[corner][lane] = nodes[corner];
-            self.slots[corner][lane] = slots[corner];
         }
     }
 
@@ -109,19 +105,18 @@ impl<const K: usize> Block<K> {
 
     #[inline(always)]
     fn moved<L: Lane>(&self, part: usize, u: &[Quad]) -> Moved<L> {
-        let from = part * L::LANES;
-        let o = L::gather(u, &self.nodes[0][from..from + L::LANES]);
-        let a = L::gather(u, &self.nodes[1][from..from + L::LANES]);
-        let b = L::gather(u, &self.nodes[2][from..from + L::LANES]);
-        let c = L::gather(u, &self.nodes[3][from..from + L::LANES]);
+        let [o, a, b, c] = self.corners::<L>(part);
+        let (o, a, b, c) = (L::gather(u, o), L::gather(u, a), L::gather(u, b), L::gather(u, c));
         let mean = (o[3] + a[3] + b[3] + c[3]) * L::splat(0.25);
         Moved { edges: [minus(&a, &o), minus(&b, &o), minus(&c, &o)], mean }
     }
 
+    /// Nodes of the lanes, corner by corner.
     #[inline(always)]
-    fn scatter<L: Lane>(&self, part: usize, corner: usize, xyzw: [L; 4], slots: &mut [Quad]) {
-        let from = part * L::LANES;
-        L::scatter(xyzw, slots, &self.slots[corner][from..from + L::LANES]);
+    fn corners<L: Lane>(&self, part: usize) -> [&[u32]; 4] {
+        let (from, to) = (part * L::LANES, (part + 1) * L::LANES);
+        let [o, a, b, c] = &self.nodes;
+        [&o[from..to], &a[from..to], &b[from..to], &c[from..to]]
     }
 }
 
@@ -157,10 +152,7 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 let zero = L::splat(0.0);
                 let f0 =
                     [zero - (f1[0] + f2[0] + f3[0]), zero - (f1[1] + f2[1] + f3[1]), zero - (f1[2] + f2[2] + f3[2])];
-                block.scatter(part, 0, [f0[0], f0[1], f0[2], zero], self.slots);
-                block.scatter(part, 1, [f1[0], f1[1], f1[2], zero], self.slots);
-                block.scatter(part, 2, [f2[0], f2[1], f2[2], zero], self.slots);
-                block.scatter(part, 3, [f3[0], f3[1], f3[2], zero], self.slots);
+                L::add_rows([f0, f1, f2, f3], self.sums, block.corners::<L>(part));
                 inverted += d.j.not_positive();
             }
         }
@@ -171,12 +163,16 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
 impl<const K: usize> Pass for Volumes<'_, K> {
     #[inline(always)]
     fn run<L: Lane>(&mut self) -> Found {
-        for (block, row) in self.blocks.iter().zip(self.shares.iter_mut()) {
+        for block in self.blocks {
+            let mut row = [0.0; WIDTH];
             for part in 0..WIDTH / L::LANES {
                 let moved = block.moved::<L>(part, self.u);
                 let d = deformation(&moved.edges, &block.gradients::<L>(part));
                 let share = L::load(&block.quarter_volume, part) * (d.j - L::splat(1.0));
-                share.store(row, part);
+                share.store(&mut row, part);
+            }
+            for (lane, share) in row.into_iter().enumerate() {
+                block.nodes.iter().for_each(|corner| self.shares[corner[lane] as usize] += share);
             }
         }
         Found::default()

@@ -27,8 +27,8 @@ pub struct Config {
     pub max_speed: f32,
     /// Furthest that a node may get from its rest position, as a share of the body's largest extent; held to it and counted.
     pub max_displacement: f32,
-    /// Averages the volume change over nodes, so that nearly incompressible tissue (ν over about 0.47) does not lock. Not where neighbours differ
-    /// in stiffness by more than about a hundred: there it bursts. Costs about half a step.
+    /// Averages the volume change over the elements of one material around each node, so that nearly incompressible tissue (ν over about 0.47) does not lock, and other tissue
+    /// bends less stiffly. Costs about half a step.
     pub cure_locking: bool,
     /// Stress that fades while the tissue is held.
     pub relaxation: Relaxation,

@@ -4,22 +4,24 @@ use crate::block::{Quad, WIDTH};
 use crate::config::Config;
 use crate::kernel::{Found, Kernel};
 use crate::layout::{Layout, kind};
-use crate::part::{Part, Work};
+use crate::part::{Now, Part, Work};
 use crate::relaxation::Relaxation;
 use crate::scaling::Scaling;
+use crate::seats::Seats;
 use crate::team::Team;
 use trepan_soft::Body;
 
-/// Parts for every thread: so many that one can take over from another, so few that summing them stays cheap.
-const PARTS_PER_THREAD: usize = 2;
+/// Elements of a part: enough that adding up its sums is cheap, few enough that its nodes stay in the fastest cache.
+const PART: usize = 64 * WIDTH;
 
 /// The elements of a body and their latest forces on the nodes.
 pub(crate) struct Elements {
     team: Team,
     /// By place: force on the node, N.
     sums: Vec<Quad>,
-    /// By place: change of the volume around the node, mm³.
-    shares: Vec<f32>,
+    /// By seat: mean `J - 1` around it.
+    swelling: Vec<f32>,
+    /// By seat, where locking is cured.
     inverse_volume: Vec<f32>,
     kernel: Kernel,
     cure_locking: bool,
@@ -28,20 +30,17 @@ pub(crate) struct Elements {
 
 impl Elements {
     pub fn of(body: &Body, layout: &Layout, scaling: &Scaling, config: &Config) -> Self {
-        let mut volume = vec![0.0; layout.node_at.len()];
-        for (t, tet) in body.mesh.tets.iter().enumerate() {
-            tet.iter().for_each(|&n| volume[layout.place_of[n as usize] as usize] += 0.25 * body.mesh.volume_mm3(t));
-        }
-        let parts = if config.threads > 1 { PARTS_PER_THREAD * config.threads } else { 1 };
-        let blocks = layout.tet_at.len().div_ceil(WIDTH).div_ceil(parts);
+        let seats = Seats::of(body, layout, config.cure_locking);
+        let inverse_volume = if config.cure_locking { seats.inverse_volumes(body, layout) } else { Vec::new() };
         let of_one_law = layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b));
-        let part = |tets: &[u32]| Part::of(body, layout, scaling, tets, &config.relaxation);
-        let parts = of_one_law.flat_map(|tets| tets.chunks(blocks * WIDTH)).map(part).collect();
+        let part = |tets: &[u32]| Part::of(body, layout, &seats, scaling, tets, &config.relaxation);
+        let parts = of_one_law.flat_map(|tets| tets.chunks(PART)).map(part).collect();
+        let places = layout.node_at.len();
         Self {
-            team: Team::of(parts, volume.len(), config.threads),
-            sums: vec![[0.0; 4]; volume.len()],
-            shares: vec![0.0; volume.len()],
-            inverse_volume: volume.iter().map(|v| (1.0 / v) as f32).collect(),
+            team: Team::of(parts, places, inverse_volume.len(), config.threads),
+            sums: vec![[0.0; 4]; places],
+            swelling: vec![0.0; inverse_volume.len()],
+            inverse_volume,
             kernel: config.kernel.resolved(),
             cure_locking: config.cure_locking,
             relaxation: config.relaxation,
@@ -49,18 +48,21 @@ impl Elements {
     }
 
     /// Computes every element's forces from displacements by place, `dt_ms` after the last time.
-    pub fn compute(&mut self, u: &mut [Quad], dt_ms: f32) -> Found {
+    pub fn compute(&mut self, u: &[Quad], dt_ms: f32) -> Found {
         if self.cure_locking {
-            self.team.compute(self.kernel, Work::Volumes, u);
-            self.shares.fill(0.0);
-            self.team.each(|part| part.add_shares_to(&mut self.shares));
-            for ((u, share), inverse) in u.iter_mut().zip(&self.shares).zip(&self.inverse_volume) {
-                u[3] = share * inverse;
-            }
+            self.average_volumes(u);
         }
         let forces = Work::Forces { fade: self.relaxation.fade(dt_ms), cure_locking: self.cure_locking };
-        self.team.compute(self.kernel, forces, u);
+        self.team.compute(self.kernel, forces, Now { u, swelling: &self.swelling });
         self.sum()
+    }
+
+    fn average_volumes(&mut self, u: &[Quad]) {
+        let swelling = &mut self.swelling;
+        self.team.compute(self.kernel, Work::Volumes, Now { u, swelling });
+        swelling.fill(0.0);
+        self.team.each(|part| part.add_shares_to(swelling));
+        swelling.iter_mut().zip(&self.inverse_volume).for_each(|(swelling, inverse)| *swelling *= inverse);
     }
 
     /// Force of the elements on the node at `place`, N.
@@ -116,15 +118,14 @@ mod tests {
         let noise = |i: usize| ((i as f32 * 12.9898).sin() * 43758.547).fract() * 3.0;
         let count = layout.node_at.len();
         let forces = |kernel: Kernel, threads: usize| {
-            let mut u: Vec<Quad> =
-                (0..count).map(|n| [noise(3 * n), noise(3 * n + 1), noise(3 * n + 2), 0.0]).collect();
+            let u: Vec<Quad> = (0..count).map(|n| [noise(3 * n), noise(3 * n + 1), noise(3 * n + 2), 0.0]).collect();
             let mut elements = Elements::of(
                 body,
                 &layout,
                 &Scaling::of(body, 0.0),
                 &Config { kernel, cure_locking: cure, relaxation, threads, ..Config::default() },
             );
-            let found = (0..3).map(|_| elements.compute(&mut u, 0.7)).last();
+            let found = (0..3).map(|_| elements.compute(&u, 0.7)).last();
             (found, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
         };
         let scalar = forces(Kernel::Scalar, 1);

@@ -21,8 +21,8 @@ pub(crate) trait Lane:
     fn load(row: &[f32; WIDTH], part: usize) -> Self;
     /// The four numbers of one node for each lane.
     fn gather(from: &[Quad], at: &[u32]) -> [Self; 4];
-    /// Writes the four numbers of each lane to its own place.
-    fn scatter(xyzw: [Self; 4], to: &mut [Quad], at: &[u32]);
+    /// Adds the vectors of four corners to their rows, lane by lane and corner by corner.
+    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]);
     /// The larger of each lane and `floor`; `floor` for NaN.
     fn at_least(self, floor: f32) -> Self;
     /// The larger of two; `other` where this one is NaN.
@@ -139,8 +139,11 @@ impl Lane for f32 {
     }
 
     #[inline(always)]
-    fn scatter(xyzw: [Self; 4], to: &mut [Quad], at: &[u32]) {
-        to[at[0] as usize] = xyzw;
+    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+        for (corner, at) in corners.iter().zip(at) {
+            let row = &mut to[at[0] as usize];
+            (0..3).for_each(|k| row[k] += corner[k]);
+        }
     }
 
     #[inline(always)]
@@ -222,10 +225,13 @@ impl Lane for f32x8 {
     }
 
     #[inline(always)]
-    fn scatter(xyzw: [Self; 4], to: &mut [Quad], at: &[u32]) {
-        let [x, y, z, w] = xyzw.map(Self::to_array);
+    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+        let corners = corners.map(|corner| corner.map(Self::to_array));
         for lane in 0..8 {
-            to[at[lane] as usize] = [x[lane], y[lane], z[lane], w[lane]];
+            for (corner, at) in corners.iter().zip(at) {
+                let row = &mut to[at[lane] as usize];
+                (0..3).for_each(|k| row[k] += corner[k][lane]);
+            }
         }
     }
 

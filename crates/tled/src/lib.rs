@@ -49,6 +49,7 @@ mod part;
 mod principal;
 mod relaxation;
 mod scaling;
+mod seats;
 mod settle;
 mod stiffness;
 mod team;

@@ -10,7 +10,7 @@
 
 use crate::block::Quad;
 use crate::kernel::Kernel;
-use crate::part::{Part, Work};
+use crate::part::{Now, Part, Work};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread::JoinHandle;
@@ -40,6 +40,7 @@ struct Shared {
 
 struct Job {
     u: Vec<Quad>,
+    swelling: Vec<f32>,
     kernel: Kernel,
     work: Work,
 }
@@ -55,8 +56,9 @@ impl Drop for Finished<'_> {
 
 impl Team {
     /// A team of `threads`, the caller among them. A thread that cannot be started is done without.
-    pub fn of(parts: Vec<Part>, nodes: usize, threads: usize) -> Self {
-        let job = Job { u: vec![[0.0; 4]; nodes], kernel: Kernel::Scalar, work: Work::Volumes };
+    pub fn of(parts: Vec<Part>, nodes: usize, seats: usize, threads: usize) -> Self {
+        let (u, swelling) = (vec![[0.0; 4]; nodes], vec![0.0; seats]);
+        let job = Job { u, swelling, kernel: Kernel::Scalar, work: Work::Volumes };
         let shared = Arc::new(Shared {
             next: AtomicUsize::new(parts.len()),
             parts: parts.into_iter().map(Mutex::new).collect(),
@@ -77,14 +79,14 @@ impl Team {
     }
 
     /// Does some work on every part.
-    pub fn compute(&mut self, kernel: Kernel, work: Work, u: &[Quad]) {
+    pub fn compute(&mut self, kernel: Kernel, work: Work, now: Now<'_>) {
         if let Some(shared) = Arc::get_mut(&mut self.shared) {
             for part in &mut shared.parts {
-                part.get_mut().unwrap_or_else(PoisonError::into_inner).compute(kernel, work, u);
+                part.get_mut().unwrap_or_else(PoisonError::into_inner).compute(kernel, work, now);
             }
             return;
         }
-        self.shared.announce(kernel, work, u);
+        self.shared.announce(kernel, work, now);
         self.shared.work();
         let mut waited = 0;
         while self.shared.done.load(Ordering::Acquire) < self.shared.parts.len() {
@@ -112,10 +114,11 @@ impl Drop for Team {
 }
 
 impl Shared {
-    fn announce(&self, kernel: Kernel, work: Work, u: &[Quad]) {
+    fn announce(&self, kernel: Kernel, work: Work, now: Now<'_>) {
         {
             let mut job = self.job.write().unwrap_or_else(PoisonError::into_inner);
-            job.u.copy_from_slice(u);
+            job.u.copy_from_slice(now.u);
+            job.swelling.copy_from_slice(now.swelling);
             (job.kernel, job.work) = (kernel, work);
         }
         self.done.store(0, Ordering::Release);
@@ -136,7 +139,7 @@ impl Shared {
         while let Some(part) = self.parts.get(self.next.fetch_add(1, Ordering::AcqRel)) {
             let _finished = Finished(&self.done);
             let job = self.job.read().unwrap_or_else(PoisonError::into_inner);
-            lock(part).compute(job.kernel, job.work, &job.u);
+            lock(part).compute(job.kernel, job.work, Now { u: &job.u, swelling: &job.swelling });
         }
     }
 

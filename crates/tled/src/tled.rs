@@ -49,11 +49,11 @@ impl Tled {
         let scaling = Scaling::of(body, config.mass_scaling);
         let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
         let lowest_per_ms = lowest_frequency_of(body, &stiffness).map(|w| w as f32);
-        let mut nodes = Nodes::of(body, &layout, stiffness.masses_g());
+        let nodes = Nodes::of(body, &layout, stiffness.masses_g());
         let mut elements = Elements::of(body, &layout, &scaling, config);
         Ok(Self {
             config: *config,
-            stiffest_at_rest: elements.compute(&mut nodes.u, 0.0).stiffest,
+            stiffest_at_rest: elements.compute(&nodes.u, 0.0).stiffest,
             elapsed_ms: 0.0,
             elements,
             nodes,
@@ -112,7 +112,7 @@ impl Tled {
 
     /// One substep of at most `left_ms`; gives its length. As long as the elements bear as they are now, and of equal lengths while that stays.
     fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
-        let found = self.elements.compute(&mut self.nodes.u, self.elapsed_ms);
+        let found = self.elements.compute(&self.nodes.u, self.elapsed_ms);
         report.inverted = report.inverted.max(found.inverted);
         let bound_ms = self.bound_now_ms(found.stiffest);
         let longest = self.stable_dt_ms().min(BORNE * bound_ms);

@@ -1,7 +1,7 @@
 //! Eight and sixteen elements at once with the instructions of newer x86 processors, chosen at run time.
 //!
 //! # Theory
-//! Nodes are read as whole 16-byte rows and transposed 4×4 in registers, forces are transposed back and written as rows. The hardware's own
+//! Nodes are read as whole 16-byte rows and transposed 4×4 in registers, forces are transposed back and added as rows. The hardware's own
 //! gather is slower than that, and the compiler does not find it by itself.
 //!
 //! ```text
@@ -85,9 +85,10 @@ fn row(from: &[Quad], at: u32) -> __m128 {
 }
 
 #[inline(always)]
-fn put(row: __m128, to: &mut [Quad], at: u32) {
-    // SAFETY: both are 16 bytes of any bits.
-    to[at as usize] = unsafe { transmute::<__m128, Quad>(row) };
+fn add(row: __m128, to: &mut [Quad], at: u32) {
+    let sum = &mut to[at as usize];
+    // SAFETY: both are 16 bytes of any bits, and every x86-64 has SSE.
+    *sum = unsafe { transmute::<__m128, Quad>(_mm_add_ps(transmute::<Quad, __m128>(*sum), row)) };
 }
 
 impl Lane for Ymm {
@@ -122,23 +123,20 @@ impl Lane for Ymm {
     }
 
     #[inline(always)]
-    fn scatter([x, y, z, w]: [Self; 4], to: &mut [Quad], at: &[u32]) {
-        // SAFETY: called only inside the AVX2 kernel.
-        unsafe {
-            let (t0, t1) = (_mm256_unpacklo_ps(x.0, y.0), _mm256_unpackhi_ps(x.0, y.0));
-            let (s0, s1) = (_mm256_unpacklo_ps(z.0, w.0), _mm256_unpackhi_ps(z.0, w.0));
-            let r0 = _mm256_shuffle_ps::<0x44>(t0, s0);
-            let r1 = _mm256_shuffle_ps::<0xEE>(t0, s0);
-            let r2 = _mm256_shuffle_ps::<0x44>(t1, s1);
-            let r3 = _mm256_shuffle_ps::<0xEE>(t1, s1);
-            put(_mm256_castps256_ps128(r0), to, at[0]);
-            put(_mm256_castps256_ps128(r1), to, at[1]);
-            put(_mm256_castps256_ps128(r2), to, at[2]);
-            put(_mm256_castps256_ps128(r3), to, at[3]);
-            put(_mm256_extractf128_ps::<1>(r0), to, at[4]);
-            put(_mm256_extractf128_ps::<1>(r1), to, at[5]);
-            put(_mm256_extractf128_ps::<1>(r2), to, at[6]);
-            put(_mm256_extractf128_ps::<1>(r3), to, at[7]);
+    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+        let [o, a, b, c] = corners;
+        let corners = [eight_rows(o), eight_rows(a), eight_rows(b), eight_rows(c)];
+        for lane in 0..4 {
+            for (rows, at) in corners.iter().zip(at) {
+                // SAFETY: called only inside the AVX2 kernel.
+                add(unsafe { _mm256_castps256_ps128(rows[lane]) }, to, at[lane]);
+            }
+        }
+        for lane in 0..4 {
+            for (rows, at) in corners.iter().zip(at) {
+                // SAFETY: called only inside the AVX2 kernel.
+                add(unsafe { _mm256_extractf128_ps::<1>(rows[lane]) }, to, at[lane + 4]);
+            }
         }
     }
 
@@ -235,14 +233,48 @@ fn four_rows(from: &[Quad], at: &[u32], i: usize) -> __m512 {
     }
 }
 
+/// Vectors of eight lanes as rows; row i has those of lanes i and i + 4.
 #[inline(always)]
-fn put_four_rows(rows: __m512, to: &mut [Quad], at: &[u32], i: usize) {
+fn eight_rows([x, y, z]: [Ymm; 3]) -> [__m256; 4] {
+    // SAFETY: called only inside the AVX2 kernel.
+    unsafe {
+        let w = _mm256_setzero_ps();
+        let (t0, t1) = (_mm256_unpacklo_ps(x.0, y.0), _mm256_unpackhi_ps(x.0, y.0));
+        let (s0, s1) = (_mm256_unpacklo_ps(z.0, w), _mm256_unpackhi_ps(z.0, w));
+        [
+            _mm256_shuffle_ps::<0x44>(t0, s0),
+            _mm256_shuffle_ps::<0xEE>(t0, s0),
+            _mm256_shuffle_ps::<0x44>(t1, s1),
+            _mm256_shuffle_ps::<0xEE>(t1, s1),
+        ]
+    }
+}
+
+/// Vectors of sixteen lanes as rows; row i has those of lanes i, i + 4, i + 8 and i + 12.
+#[inline(always)]
+fn sixteen_rows([x, y, z]: [Zmm; 3]) -> [__m512; 4] {
     // SAFETY: called only inside the AVX-512 kernel.
     unsafe {
-        put(_mm512_castps512_ps128(rows), to, at[i]);
-        put(_mm512_extractf32x4_ps::<1>(rows), to, at[i + 4]);
-        put(_mm512_extractf32x4_ps::<2>(rows), to, at[i + 8]);
-        put(_mm512_extractf32x4_ps::<3>(rows), to, at[i + 12]);
+        let w = _mm512_setzero_ps();
+        let (t0, t1) = (_mm512_unpacklo_ps(x.0, y.0), _mm512_unpackhi_ps(x.0, y.0));
+        let (s0, s1) = (_mm512_unpacklo_ps(z.0, w), _mm512_unpackhi_ps(z.0, w));
+        [
+            _mm512_shuffle_ps::<0x44>(t0, s0),
+            _mm512_shuffle_ps::<0xEE>(t0, s0),
+            _mm512_shuffle_ps::<0x44>(t1, s1),
+            _mm512_shuffle_ps::<0xEE>(t1, s1),
+        ]
+    }
+}
+
+/// Adds the vectors of lanes 4Q to 4Q + 3.
+#[inline(always)]
+fn add_quarter<const Q: i32>(corners: &[[__m512; 4]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+    for lane in 0..4 {
+        for (rows, at) in corners.iter().zip(at) {
+            // SAFETY: called only inside the AVX-512 kernel.
+            add(unsafe { _mm512_extractf32x4_ps::<Q>(rows[lane]) }, to, at[4 * Q as usize + lane]);
+        }
     }
 }
 
@@ -276,22 +308,13 @@ impl Lane for Zmm {
     }
 
     #[inline(always)]
-    fn scatter([x, y, z, w]: [Self; 4], to: &mut [Quad], at: &[u32]) {
-        // SAFETY: called only inside the AVX-512 kernel.
-        let rows = unsafe {
-            let (t0, t1) = (_mm512_unpacklo_ps(x.0, y.0), _mm512_unpackhi_ps(x.0, y.0));
-            let (s0, s1) = (_mm512_unpacklo_ps(z.0, w.0), _mm512_unpackhi_ps(z.0, w.0));
-            [
-                _mm512_shuffle_ps::<0x44>(t0, s0),
-                _mm512_shuffle_ps::<0xEE>(t0, s0),
-                _mm512_shuffle_ps::<0x44>(t1, s1),
-                _mm512_shuffle_ps::<0xEE>(t1, s1),
-            ]
-        };
-        put_four_rows(rows[0], to, at, 0);
-        put_four_rows(rows[1], to, at, 1);
-        put_four_rows(rows[2], to, at, 2);
-        put_four_rows(rows[3], to, at, 3);
+    fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]) {
+        let [o, a, b, c] = corners;
+        let corners = [sixteen_rows(o), sixteen_rows(a), sixteen_rows(b), sixteen_rows(c)];
+        add_quarter::<0>(&corners, to, at);
+        add_quarter::<1>(&corners, to, at);
+        add_quarter::<2>(&corners, to, at);
+        add_quarter::<3>(&corners, to, at);
     }
 
     #[inline(always)]
