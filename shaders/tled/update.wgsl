@@ -2,9 +2,9 @@
 //   v⁺ = keep v + gain (g + f/m)    u⁺ = u + dt v⁺
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
 @group(0) @binding(2) var<storage, read> forces: array<vec4f>;
-// 1/m, 0 where the node is fixed, and the share of the tool's pressure.
+// 1/m, 0 where the node is fixed, and whether a spring pushes it.
 @group(0) @binding(3) var<storage, read> nodes: array<vec2f>;
-@group(0) @binding(4) var<storage, read> pressure: array<f32>;
+@group(0) @binding(4) var<storage, read> pushed: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> u: array<vec4f>;
 @group(0) @binding(6) var<storage, read_write> v: array<vec4f>;
 // Since they were last cleared: most inverted elements at once, times limited, times not finite, bits of the largest ω².
@@ -32,7 +32,7 @@ fn finite(x: vec3f) -> bool {
     seen.w = max(seen.w, bitcast<u32>(stiffest));
     let node = nodes[n];
     if node.x > 0.0 {
-        if node.y != 0.0 { force -= now.normal * (pressure[0] * node.y); }
+        if node.y != 0.0 { force += pushed[n].xyz; }
         let before = u[n].xyz;
         var velocity = v[n].xyz * now.keep + (now.gravity + force * node.x) * now.gain;
         let speed = length(velocity);

@@ -34,11 +34,30 @@ impl SurfacePatch {
         }
         (self.depth_mm + (self.tip_mm - tip).dot(self.normal)).max(0.0)
     }
+
+    /// With a second contact of the same tool: two equal springs pull like one along the sum of their depths.
+    #[must_use]
+    pub fn with(&self, normal: Vec3, depth_mm: f32) -> Self {
+        let sum = self.normal * self.depth_mm.max(0.0) + normal * depth_mm.max(0.0);
+        let normal = sum.try_normalize().unwrap_or(Vec3::ZERO);
+        let normal_velocity = self.normal_velocity * self.normal.dot(normal);
+        Self { normal, depth_mm: sum.dot(normal), normal_velocity, ..*self }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn two_contacts_pull_like_their_sum() {
+        let tip = SurfacePatch { normal: Vec3::Z, depth_mm: 0.3, normal_velocity: 0.1, ..SurfacePatch::default() };
+        let both = tip.with(Vec3::X, 0.4);
+        assert!((both.normal * both.depth_mm - Vec3::new(0.4, 0.0, 0.3)).length() < 1e-6);
+        assert_eq!((tip.with(Vec3::X, 0.0).depth_mm, tip.with(Vec3::X, 0.0).normal), (0.3, Vec3::Z));
+        assert_eq!(SurfacePatch::default().with(Vec3::X, 0.2).depth_mm, 0.2);
+        assert_eq!(tip.with(Vec3::NEG_Z, 0.3).depth_mm, 0.0);
+    }
 
     #[test]
     fn depth_follows_the_tip_along_the_normal_only() {

@@ -26,6 +26,7 @@ use crate::{
     step::{check_mesh, usual_cell_mm},
     surface::MovingSurface,
 };
+use trepan_contact::NodalContact;
 use trepan_geometry::{Aabb, Pose, ToolState, Vec3};
 use trepan_mesh::TetMesh;
 
@@ -148,6 +149,19 @@ impl MeshCollision {
         let depth_mm = way.length();
         let is_sound = depth_mm > ON_BORDER_MM && depth_mm.is_finite();
         is_sound.then(|| NodeContact { node: self.nodes[i], triangle, weights, normal: way / depth_mm, depth_mm })
+    }
+}
+
+impl NodeContact {
+    /// The spring of a contact of a body with itself, N/mm and N ms/mm, for a solver: between the node and the triangle that it leaves through.
+    pub fn spring(&self, stiffness: f32, damping: f32) -> NodalContact {
+        let mut spring = NodalContact::none();
+        spring.add(self.node, 1.0);
+        for (node, weight) in self.triangle.into_iter().zip(self.weights) {
+            spring.add(node, -weight);
+        }
+        (spring.normal, spring.stiffness, spring.damping) = (-self.normal, stiffness, damping);
+        spring
     }
 }
 

@@ -8,7 +8,7 @@ use crate::{
     search::Search,
     surface::MovingSurface,
 };
-use trepan_contact::{Contact, ContactManifold, NodalContact, SurfacePatch};
+use trepan_contact::{Contact, ContactManifold, NodalContact, NodalContacts, SurfacePatch};
 use trepan_geometry::{Aabb, Pointshell, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::{TetMesh, Topology};
 
@@ -46,6 +46,12 @@ impl TissueStep {
         self.patch = SurfacePatch { time_ms: self.patch.time_ms, tip_mm: self.patch.tip_mm, ..SurfacePatch::default() };
         self.nodal = NodalContact::none();
         self.friction_n = Vec3::ZERO;
+    }
+
+    /// Adds the springs of tip and shaft to a solver's list. Friction is not among them.
+    pub fn springs(&self, out: &mut NodalContacts) {
+        out.push(self.nodal);
+        out.push(self.shaft_nodal);
     }
 
     /// Adds all forces on the nodes, N: springs of tip and shaft, and friction. Returns the force on the tool, equal and opposite.

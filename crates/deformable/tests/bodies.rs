@@ -4,7 +4,7 @@ mod common;
 
 use common::{Random, block, deformed, tool_at};
 use glam::{Quat, Vec3};
-use trepan_contact::NodalContact;
+use trepan_contact::{NodalContact, NodalContacts};
 use trepan_deformable::{
     Config, ConfigError, MeshCollision, NodeContact, SlidingWall, TissueCollision, TissueStep, push_apart,
     push_itself_apart,
@@ -142,6 +142,12 @@ fn a_strip_that_is_rolled_up_meets_itself() {
         let mut forces = vec![Vec3::ZERO; positions.len()];
         push_itself_apart(&out, 1.0, &mut forces);
         assert!(forces.iter().sum::<Vec3>().length() < 1e-3);
+        // The same as springs for a solver.
+        for spring in out.iter().map(|contact| contact.spring(1.0, 0.0)) {
+            let pressure = spring.pressure_n(spring.mean(|n| positions[n as usize]), Vec3::ZERO);
+            spring.nodes().for_each(|(n, w)| forces[n as usize] += pressure * w * spring.normal);
+        }
+        assert!(forces.iter().all(|force| force.length() < 1e-4));
     }
 }
 
@@ -149,13 +155,13 @@ fn a_strip_that_is_rolled_up_meets_itself() {
 #[test]
 fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
     let mesh = moved(&block([5, 5, 5], 4.0), Vec3::splat(-10.0));
-    let wall = SlidingWall::around(&mesh).expect("a sound mesh");
-    let mut out: Vec<NodalContact> = Vec::with_capacity(wall.patches());
+    let wall = SlidingWall::around(&mesh, &[]).expect("a sound mesh");
+    let mut out = NodalContacts::none();
     let hollow = |r: f32| move |p: Vec3| (r - p.length(), -p.normalize_or_zero());
-    assert_eq!(wall.step(&mesh.positions, hollow(18.0), &mut out), 0);
+    wall.step(&mesh.positions, hollow(18.0), &mut out);
     assert!(out.is_empty());
     let shifted = moved(&mesh, Vec3::X * 3.0);
-    assert_eq!(wall.step(&shifted.positions, hollow(18.0), &mut out), 0);
+    wall.step(&shifted.positions, hollow(18.0), &mut out);
     let at = |n: u32| shifted.positions[n as usize];
     assert!(!out.is_empty() && out.iter().all(|c| c.pressure_n(c.mean(at), Vec3::ZERO) > 0.0));
     assert!(out.iter().flat_map(NodalContact::nodes).all(|(n, w)| at(n).length() > 18.0 && w > 0.0));
@@ -163,6 +169,7 @@ fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
     assert!(force.x < -0.5 && force.y.abs() + force.z.abs() < 1e-3, "{force}");
     // Sliding along a flat wall changes nothing, sinking by 0.1 mm adds 0.1 mm of spring.
     let flat = |p: Vec3| (p.z + 9.5, Vec3::Z);
+    out.clear();
     wall.step(&mesh.positions, flat, &mut out);
     let press = |by: Vec3| -> f32 {
         out.iter().map(|c| c.pressure_n(c.mean(|n| mesh.positions[n as usize] + by), Vec3::ZERO)).sum()
@@ -170,14 +177,25 @@ fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
     let patches = out.len() as f32;
     assert!((press(Vec3::X) - press(Vec3::ZERO)).abs() < 1e-4);
     assert!((press(Vec3::Z * -0.1) - press(Vec3::ZERO) - 0.1 * patches).abs() < 1e-3);
-    assert!(wall.step(&mesh.positions, |_| (f32::NAN, Vec3::NAN), &mut out) == 0 && out.is_empty());
+    out.clear();
+    wall.step(&mesh.positions, |_| (f32::NAN, Vec3::NAN), &mut out);
+    assert!(out.is_empty());
+    // Where the body rests in the wall it is left in peace; held nodes are never pushed.
+    let mut at_rest = SlidingWall::around(&mesh, &[]).expect("a sound mesh");
+    at_rest.rest_in(&mesh.positions, flat);
+    at_rest.step(&mesh.positions, flat, &mut out);
+    let held: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    SlidingWall::around(&mesh, &held).expect("a sound mesh").step(&mesh.positions, flat, &mut out);
+    assert!(out.is_empty());
+    at_rest.step(&moved(&mesh, Vec3::Z * -0.1).positions, flat, &mut out);
+    assert_eq!(out.len(), patches as usize);
 }
 
 #[test]
 fn bad_bodies_are_refused_and_bad_arrays_give_nothing() {
     let mesh = block([2, 2, 2], 4.0);
     assert_eq!(MeshCollision::between(&mesh, &TetMesh::default()).err(), Some(ConfigError::EmptyMesh));
-    assert_eq!(SlidingWall::around(&TetMesh::default()).err(), Some(ConfigError::EmptyMesh));
+    assert_eq!(SlidingWall::around(&TetMesh::default(), &[]).err(), Some(ConfigError::EmptyMesh));
     let mut collision = MeshCollision::itself(&mesh).expect("a sound mesh");
     let mut out = Vec::with_capacity(8);
     assert!(collision.step(&mesh.positions, &[], &mut out) > 0 && out.is_empty());

@@ -7,7 +7,7 @@
 //! | stage | reads | gives |
 //! |---|---|---|
 //! | [`HapticStage::tick`] | device, newest patch | wrench, tool, record |
-//! | [`CollisionStage::step`] | newest tool, newest brain | patch, contact, record |
+//! | [`CollisionStage::step`] | newest tool, newest brain | patch, contacts, record |
 //! | [`SolverStage::step`] | newest contact | moved brain, record |
 //!
 //! [`threads`] runs the stages live; [`lockstep`] runs them again from a recording, bit for bit.
@@ -53,4 +53,5 @@ pub use stages::collision_step::{CollisionStage, SoftFrame};
 pub use stages::haptic_tick::{FRESH_MS, GONE_MS, HapticConfig, HapticStage, Tick, TickInput, ToolSample};
 pub use stages::notice::{Notice, Warning, Watch, What};
 pub use stages::score::ScoreKeeper;
+pub use stages::skull_wall::SkullWall;
 pub use stages::solver_step::{EACH, SolverStage};

@@ -22,6 +22,7 @@ use crate::show::picture::{self, Album};
 use crate::show::window;
 use crate::stages::collision_step::CollisionStage;
 use crate::stages::haptic_tick::{HapticConfig, HapticStage, ToolSample};
+use crate::stages::skull_wall::SkullWall;
 use crate::stages::solver_step::SolverStage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -177,7 +178,10 @@ impl Session {
             }
             Some(method) => method.build(&body).map_err(|f| internal(&f))?,
         };
-        let collision = CollisionStage::new(self.program, &brain.mesh, &trepan_deformable::Config::default());
+        let bone = self.scene.bone.clone().filter(|_| self.program.has_bone());
+        let wall = bone.map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed)).transpose();
+        let wall = wall.map_err(|f| internal(&f))?;
+        let collision = CollisionStage::new(self.program, &brain.mesh, &Default::default(), wall);
         Ok(Tissue { collision: collision.map_err(|f| internal(&f))?, solver: SolverStage::new(solver, gravity) })
     }
 

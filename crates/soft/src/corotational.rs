@@ -19,6 +19,7 @@ use crate::body::Element;
 use crate::operator::Hooke;
 use crate::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DQuat, DVec3};
+use trepan_contact::{MAX_SPRINGS, NodalContact};
 use trepan_geometry::Vec3;
 
 /// Settings of the corotational solver.
@@ -57,13 +58,20 @@ pub struct Corotational {
     velocities: Vec<Vec3>,
 }
 
-/// Vectors of conjugate gradients, and the tool's direction.
+/// Vectors of conjugate gradients, and the springs that press.
 struct System {
     right: Vec<DVec3>,
     residual: Vec<DVec3>,
     along: Vec<DVec3>,
     product: Vec<DVec3>,
-    tool: Vec<DVec3>,
+    touches: Vec<Touch>,
+}
+
+/// A spring that presses in this step: `push + rate Σ w n·v` is its force, N.
+struct Touch {
+    spring: NodalContact,
+    push: f64,
+    rate: f64,
 }
 
 impl Corotational {
@@ -95,7 +103,13 @@ impl Corotational {
             fixed: body.fixed_mask(),
             hooke: body.materials.iter().map(Hooke::of).collect(),
             damping_per_ms: config.damping_per_ms.map_or_else(critical, f64::from),
-            system: System { right: zero(), residual: zero(), along: zero(), product: zero(), tool: zero() },
+            system: System {
+                right: zero(),
+                residual: zero(),
+                along: zero(),
+                product: zero(),
+                touches: Vec::with_capacity(MAX_SPRINGS),
+            },
             positions: body.mesh.positions.clone(),
             velocities: vec![Vec3::ZERO; nodes],
         })
@@ -123,8 +137,8 @@ impl Corotational {
     }
 
     /// `product = A along`.
-    fn apply(&mut self, h: f64, spring: f64) {
-        let System { along, product, tool, .. } = &mut self.system;
+    fn apply(&mut self, h: f64) {
+        let System { along, product, touches, .. } = &mut self.system;
         for ((y, x), (m, fixed)) in product.iter_mut().zip(along.iter()).zip(self.masses.iter().zip(&self.fixed)) {
             *y = if *fixed { DVec3::ZERO } else { *x * (*m * (1.0 + self.damping_per_ms * h)) };
         }
@@ -135,16 +149,15 @@ impl Corotational {
             let stress = self.hooke[usize::from(*material)].stress(g);
             scatter(product, corners, &shape.forces_of(r * stress), h * h, &self.fixed);
         }
-        if spring > 0.0 {
-            let pressed = spring * dot(tool, along);
-            product.iter_mut().zip(tool.iter()).for_each(|(y, w)| *y += *w * pressed);
+        for touch in touches {
+            touch.spread(product, h * touch.rate * touch.along(along), &self.fixed);
         }
     }
 
     /// Conjugate gradients for v from its present value; gives iterations and whether it converged.
-    fn solve(&mut self, h: f64, spring: f64) -> (u32, bool) {
+    fn solve(&mut self, h: f64) -> (u32, bool) {
         self.system.along.copy_from_slice(&self.v);
-        self.apply(h, spring);
+        self.apply(h);
         let System { right, residual, along, product, .. } = &mut self.system;
         for ((r, b), y) in residual.iter_mut().zip(right.iter()).zip(product.iter()) {
             *r = *b - *y;
@@ -156,7 +169,7 @@ impl Corotational {
             if rr <= goal {
                 return (iteration, true);
             }
-            self.apply(h, spring);
+            self.apply(h);
             let System { residual, along, product, .. } = &mut self.system;
             let share = rr / dot(along, product);
             self.v.iter_mut().zip(along.iter()).for_each(|(v, p)| *v += *p * share);
@@ -168,19 +181,37 @@ impl Corotational {
         (self.config.iterations, rr <= goal)
     }
 
-    /// Puts the tool's direction down; gives its depth now, mm.
-    fn touch(&mut self, loads: &Loads) -> f64 {
-        let (contact, normal) = (&loads.contact, loads.contact.normal.as_dvec3());
-        self.system.tool.fill(DVec3::ZERO);
-        let mut depth = f64::from(contact.offset_mm);
-        for (n, w) in contact.nodes().filter(|(n, _)| (*n as usize) < self.u.len()) {
-            let (n, w) = (n as usize, f64::from(w));
-            depth += w * (self.rest[n] + self.u[n]).dot(normal);
-            if !self.fixed[n] {
-                self.system.tool[n] += normal * w;
+    /// Takes the springs that press now, and puts what they do at rest into the right side.
+    fn touch(&mut self, loads: &Loads, h: f64) {
+        self.system.touches.clear();
+        for spring in loads.contacts.iter().take(MAX_SPRINGS) {
+            let normal = spring.normal.as_dvec3();
+            let known = spring.nodes().filter(|(n, _)| (*n as usize) < self.u.len());
+            let place: f64 =
+                known.map(|(n, w)| f64::from(w) * (self.rest[n as usize] + self.u[n as usize]).dot(normal)).sum();
+            let depth = f64::from(spring.offset_mm) + place;
+            let (k, b) = (f64::from(spring.stiffness), f64::from(spring.damping));
+            let push = k * depth - b * f64::from(spring.tool_normal_velocity);
+            if depth > 0.0 && !spring.is_empty() {
+                let touch = Touch { spring: *spring, push, rate: h * k + b };
+                touch.spread(&mut self.system.right, -h * push, &self.fixed);
+                self.system.touches.push(touch);
             }
         }
-        if contact.is_empty() { 0.0 } else { depth }
+    }
+
+    /// Lets go of springs that would pull within this step; says whether there were any.
+    fn let_go(&mut self, h: f64) -> bool {
+        let before = self.system.touches.len();
+        let System { touches, right, .. } = &mut self.system;
+        touches.retain(|touch| {
+            let pulls = touch.force(&self.v) < 0.0;
+            if pulls {
+                touch.spread(right, h * touch.push, &self.fixed);
+            }
+            !pulls
+        });
+        touches.len() < before
     }
 
     fn advance(&mut self, h: f64, report: &mut StepReport) {
@@ -199,23 +230,12 @@ impl SoftSolver for Corotational {
         let h = f64::from(dt_ms);
         let mut report = StepReport { substeps: 1, contact_scale: 1.0, ..StepReport::default() };
         report.inverted = self.balance(loads.gravity.as_dvec3(), h);
-        let depth = self.touch(loads);
-        let (k, b) = (f64::from(loads.contact.stiffness), f64::from(loads.contact.damping));
-        let tool_speed = f64::from(loads.contact.tool_normal_velocity);
-        let push = k * depth - b * tool_speed;
-        if depth > 0.0 {
-            self.system.right.iter_mut().zip(&self.system.tool).for_each(|(r, w)| *r -= *w * (h * push));
-            (report.iterations, report.converged) = self.solve(h, h * (h * k + b));
-            let force = push + (h * k + b) * dot(&self.system.tool, &self.v);
-            report.contact_n = force.max(0.0) as f32;
-            if force < 0.0 {
-                // The tool would pull: it has let go within this step.
-                self.system.right.iter_mut().zip(&self.system.tool).for_each(|(r, w)| *r += *w * (h * push));
-                (report.iterations, report.converged) = self.solve(h, 0.0);
-            }
-        } else {
-            (report.iterations, report.converged) = self.solve(h, 0.0);
+        self.touch(loads, h);
+        (report.iterations, report.converged) = self.solve(h);
+        if self.let_go(h) {
+            (report.iterations, report.converged) = self.solve(h);
         }
+        report.contact_n = self.system.touches.iter().map(|touch| touch.force(&self.v).max(0.0)).sum::<f64>() as f32;
         self.advance(h, &mut report);
         report
     }
@@ -230,6 +250,27 @@ impl SoftSolver for Corotational {
 
     fn stable_dt_ms(&self) -> f32 {
         self.config.longest_ms
+    }
+}
+
+impl Touch {
+    /// `Σ w n·x`, mm.
+    fn along(&self, x: &[DVec3]) -> f64 {
+        let known = self.spring.nodes().filter(|(n, _)| (*n as usize) < x.len());
+        let sum: DVec3 = known.map(|(n, w)| x[n as usize] * f64::from(w)).sum();
+        sum.dot(self.spring.normal.as_dvec3())
+    }
+
+    /// Adds `scale` times `w n` to free nodes.
+    fn spread(&self, to: &mut [DVec3], scale: f64, fixed: &[bool]) {
+        for (n, w) in self.spring.nodes().filter(|(n, _)| fixed.get(*n as usize) == Some(&false)) {
+            to[n as usize] += self.spring.normal.as_dvec3() * (f64::from(w) * scale);
+        }
+    }
+
+    /// With nodes at these velocities, N.
+    fn force(&self, v: &[DVec3]) -> f64 {
+        self.push + self.rate * self.along(v)
     }
 }
 

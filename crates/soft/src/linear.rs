@@ -11,6 +11,7 @@
 //! When anything rotates by more than a few degrees or stretches by more than a few percent: a turned part swells, because small strain
 //! takes rotation for strain.
 
+use crate::contact::press;
 use crate::{Body, BodyError, Loads, SoftSolver, StepReport, Stiffness, lowest_frequency, power_bound_ms};
 use glam::DVec3;
 use trepan_geometry::Vec3;
@@ -79,16 +80,9 @@ impl Linear {
     }
 
     fn press(&mut self, loads: &Loads) -> f32 {
-        let contact = &loads.contact;
-        let mean = contact.mean(|n| self.positions.get(n as usize).copied().unwrap_or_default());
-        let speed = contact.mean(|n| self.velocities.get(n as usize).copied().unwrap_or_default());
-        let pressure = contact.pressure_n(mean, speed);
-        for (n, w) in contact.nodes() {
-            if let Some(force) = self.force.get_mut(n as usize) {
-                *force += (contact.normal * (pressure * w)).as_dvec3();
-            }
-        }
-        pressure
+        let state = [&self.positions[..], &self.velocities[..]];
+        let mut add = |n: u32, push: Vec3| self.force[n as usize] -= push.as_dvec3();
+        loads.contacts.iter().map(|spring| press(spring, 1.0, state, &mut add)).sum()
     }
 
     fn advance(&mut self, gravity: DVec3, dt: f64, report: &mut StepReport) {
@@ -111,9 +105,8 @@ impl Linear {
 impl SoftSolver for Linear {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
         self.stiffness.apply(&self.u, &mut self.force);
-        let contact_n = self.press(loads);
-        let mut report =
-            StepReport { substeps: 1, contact_n, contact_scale: 1.0, converged: true, ..StepReport::default() };
+        let mut report = StepReport { substeps: 1, contact_scale: 1.0, converged: true, ..StepReport::default() };
+        report.contact_n = self.press(loads);
         self.advance(loads.gravity.as_dvec3(), f64::from(dt_ms), &mut report);
         report
     }

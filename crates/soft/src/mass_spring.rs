@@ -12,6 +12,7 @@
 //! Where a force must be right: edges never point evenly, so stiffness depends on how they lie, and no finer mesh makes it better.
 
 use crate::body::Element;
+use crate::contact::press;
 use crate::energy::cofactor;
 use crate::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DVec3};
@@ -129,16 +130,9 @@ impl MassSpring {
     }
 
     fn press(&mut self, loads: &Loads) -> f32 {
-        let contact = &loads.contact;
-        let mean = contact.mean(|n| self.positions.get(n as usize).copied().unwrap_or_default());
-        let speed = contact.mean(|n| self.velocities.get(n as usize).copied().unwrap_or_default());
-        let pressure = contact.pressure_n(mean, speed);
-        for (n, w) in contact.nodes() {
-            if let Some(force) = self.force.get_mut(n as usize) {
-                *force -= (contact.normal * (pressure * w)).as_dvec3();
-            }
-        }
-        pressure
+        let state = [&self.positions[..], &self.velocities[..]];
+        let mut add = |n: u32, push: Vec3| self.force[n as usize] += push.as_dvec3();
+        loads.contacts.iter().map(|spring| press(spring, 1.0, state, &mut add)).sum()
     }
 
     fn advance(&mut self, gravity: DVec3, dt: f64, report: &mut StepReport) {
@@ -158,15 +152,9 @@ impl MassSpring {
 impl SoftSolver for MassSpring {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
         let inverted = self.pull();
-        let contact_n = self.press(loads);
-        let mut report = StepReport {
-            substeps: 1,
-            contact_n,
-            contact_scale: 1.0,
-            converged: true,
-            inverted,
-            ..StepReport::default()
-        };
+        let mut report =
+            StepReport { substeps: 1, contact_scale: 1.0, converged: true, inverted, ..StepReport::default() };
+        report.contact_n = self.press(loads);
         self.advance(loads.gravity.as_dvec3(), f64::from(dt_ms), &mut report);
         report
     }

@@ -1,6 +1,6 @@
 //! The seam of the soft-tissue solvers: loads in, nodal state out.
 
-use trepan_contact::NodalContact;
+use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
 
 /// Advances a body under loads. One implementation owns all of a body's nodal state.
@@ -23,12 +23,12 @@ pub trait SoftSolver: Send {
 }
 
 /// What acts on the body during one step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loads {
     /// Acceleration of gravity, mm/ms² (9.81e-3 downwards on Earth; zero = none).
     pub gravity: Vec3,
-    /// The tool's spring on the tissue, evaluated with the solver's own positions.
-    pub contact: NodalContact,
+    /// Springs on the tissue (tool, walls, folds), evaluated with the solver's own positions.
+    pub contacts: NodalContacts,
 }
 
 /// What happened in one step; every count is of this step alone.
@@ -44,9 +44,9 @@ pub struct StepReport {
     pub substeps: u32,
     /// Time that was asked for and not simulated, because it would have taken too many substeps, ms.
     pub skipped_ms: f32,
-    /// Force of the contact spring on the tissue at the end of the step, N.
+    /// Forces of all contact springs on the tissue at the end of the step, summed without their directions, N.
     pub contact_n: f32,
-    /// Share of the contact's stiffness and damping that was used, 1 unless it would have been unstable at this step.
+    /// Least share of a contact's stiffness and damping that was used, 1 unless it would have been unstable at this step.
     pub contact_scale: f32,
     /// Iterations of an implicit or static solver.
     pub iterations: u32,

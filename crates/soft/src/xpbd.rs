@@ -16,6 +16,7 @@
 use crate::body::Element;
 use crate::{Body, BodyError, Loads, Material, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DVec3};
+use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 
 /// Settings of XPBD.
@@ -139,17 +140,21 @@ impl Xpbd {
         j
     }
 
+    /// Each spring in turn; what one moves, the next one sees.
     fn press(&mut self, loads: &Loads, h: f64, report: &mut StepReport) {
-        let (contact, normal) = (&loads.contact, loads.contact.normal.as_dvec3());
+        report.contact_n = loads.contacts.iter().map(|spring| self.press_one(spring, h)).sum();
+    }
+
+    fn press_one(&mut self, contact: &NodalContact, h: f64) -> f32 {
+        let normal = contact.normal.as_dvec3();
         let nodes = || {
             contact.nodes().filter(|(n, _)| (*n as usize) < self.rest.len()).map(|(n, w)| (n as usize, f64::from(w)))
         };
         let mean: DVec3 = nodes().map(|(n, w)| (self.rest[n] + self.u[n]) * w).sum();
         let depth = f64::from(contact.offset_mm) + mean.dot(normal);
         let stiffness = f64::from(contact.stiffness);
-        report.contact_n = 0.0;
         if contact.is_empty() || depth <= 0.0 || stiffness <= 0.0 {
-            return;
+            return 0.0;
         }
         let sum: f64 = nodes().map(|(n, w)| w * w * self.inverse_mass[n]).sum();
         let multiplier = -depth / (sum + 1.0 / (stiffness * h * h));
@@ -157,7 +162,7 @@ impl Xpbd {
             let n = n as usize;
             self.u[n] += normal * (f64::from(w) * self.inverse_mass[n] * multiplier);
         }
-        report.contact_n = (-multiplier / (h * h)) as f32;
+        (-multiplier / (h * h)) as f32
     }
 }
 

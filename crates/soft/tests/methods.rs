@@ -95,9 +95,35 @@ fn probe(body: &Body, depth: f32) -> NodalContact {
 }
 
 #[test]
+fn every_method_adds_springs_up() {
+    let body = block([3, 3, 3], Vec3::splat(40.0), Material::THESIS, |p| p.z < 1e-3);
+    let (whole, mut side, mut half) = (probe(&body, 1.0), probe(&body, 1.0), probe(&body, 1.0));
+    (side.normal, side.offset_mm) = (Vec3::X, -19.5);
+    half.stiffness *= 0.5;
+    let loads = |springs: &[NodalContact]| {
+        let mut loads = Loads::default();
+        springs.iter().for_each(|spring| loads.contacts.push(*spring));
+        loads
+    };
+    for method in Method::all() {
+        let settled = |loads: Loads| {
+            let mut solver = method.build(&body).unwrap();
+            settle(&mut *solver, &loads, 100.0);
+            let force = solver.step(&loads, solver.stable_dt_ms().min(1.0)).contact_n;
+            (force, solver.positions().to_vec())
+        };
+        let (one, halves) = (settled(loads(&[whole, side])), settled(loads(&[half, side, half])));
+        let apart = one.1.iter().zip(&halves.1).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        let moved = one.1.iter().zip(&body.mesh.positions).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        assert!(apart < 5e-3 * moved && moved > 0.05, "{}: {apart} {moved}", method.name());
+        assert!((one.0 / halves.0 - 1.0).abs() < 5e-3, "{}: {} {}", method.name(), one.0, halves.0);
+    }
+}
+
+#[test]
 fn every_method_feels_a_small_poke_alike_and_comes_back() {
     let body = block([4, 4, 4], Vec3::splat(40.0), Material::THESIS, |p| p.z < 1e-3);
-    let loads = Loads { contact: probe(&body, 1.0), ..Loads::default() };
+    let loads = Loads { contacts: probe(&body, 1.0).into(), ..Loads::default() };
     let force = |method: Method| {
         let mut solver = method.build(&body).unwrap();
         settle(&mut *solver, &loads, 300.0);

@@ -17,10 +17,10 @@ fn main() -> Result<(), trepan_soft::BodyError> {
     pressed.iter().for_each(|&n| probe.add(n, 1.0));
     probe.normalise();
     (probe.normal, probe.offset_mm, probe.stiffness) = (Vec3::Z, 5.0 - 100.0, 0.3);
-    let (mut loads, mut time) = (Loads { contact: probe, ..Loads::default() }, 0.0);
+    let (mut loads, mut time) = (Loads { contacts: probe.into(), ..Loads::default() }, 0.0);
     for tenth in 0..20 {
         if tenth == 10 {
-            loads.contact = NodalContact::none();
+            loads.contacts.clear();
         }
         let mut report = tled.step(&loads, dt);
         while time < 100.0 * (tenth + 1) as f32 {

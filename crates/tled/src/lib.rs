@@ -34,7 +34,6 @@
 
 mod block;
 mod config;
-mod contact;
 mod damping;
 mod element;
 mod elements;

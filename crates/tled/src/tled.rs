@@ -1,15 +1,14 @@
 //! The solver: one step, pass by pass.
 
 use crate::config::{Config, Damping};
-use crate::contact::stable_share;
 use crate::elements::Elements;
 use crate::layout::Layout;
 use crate::nodes::{Nodes, Update};
 use crate::scaling::Scaling;
-use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 use trepan_soft::{
-    Body, BodyError, Loads, SoftSolver, StepReport, Stiffness, SurfacePressure, lowest_frequency_of, power_bound_of_ms,
+    Body, BodyError, ContactShares, Loads, SoftSolver, StepBound, StepReport, Stiffness, SurfacePressure,
+    lowest_frequency_of, power_bound_of_ms,
 };
 
 /// Total Lagrangian explicit solver of one body.
@@ -17,6 +16,7 @@ pub struct Tled {
     config: Config,
     pub(crate) elements: Elements,
     pub(crate) nodes: Nodes,
+    shares: ContactShares,
     /// Its triangles by place.
     pressure: SurfacePressure,
     place_of: Vec<u32>,
@@ -57,6 +57,7 @@ impl Tled {
             elapsed_ms: 0.0,
             elements,
             nodes,
+            shares: ContactShares::of_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
             bound_ms: power_bound_of_ms(body, &stiffness) as f32,
             damping_per_ms: damping_rate(body, config.damping, lowest_per_ms, extent),
@@ -118,7 +119,7 @@ impl Tled {
         let longest = self.stable_dt_ms().min(BORNE * bound_ms);
         let dt_ms =
             if self.config.substeps == 0 { left_ms } else { left_ms / (left_ms / longest * NEARLY).ceil().max(1.0) };
-        self.press(&loads.contact, dt_ms, bound_ms, report);
+        self.press(loads, StepBound { dt_ms, omega2: 4.0 / (bound_ms * bound_ms) }, report);
         self.push();
         let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.nodes.rigid_motion());
         let update = Update {
@@ -156,25 +157,11 @@ impl Tled {
         self.bound_ms / gained.clamp(1.0, MOST_GAINED)
     }
 
-    fn press(&mut self, contact: &NodalContact, dt_ms: f32, bound_ms: f32, report: &mut StepReport) {
-        let nodes = &mut self.nodes;
-        let known = |values: &[Vec3], n: u32| values.get(n as usize).copied().unwrap_or_default();
-        let place = |n: u32| self.place_of.get(n as usize).map(|&p| p as usize);
-        let omega2 = 4.0 / (bound_ms * bound_ms);
-        let share = stable_share(contact, omega2, dt_ms, |n| place(n).map_or(0.0, |p| nodes.inverse_mass[p]));
-        let mean = contact.mean(|n| known(&nodes.positions, n));
-        let velocity = contact.mean(|n| known(&nodes.velocities, n));
-        let pressure = share * contact.pressure_n(mean, velocity);
-        (report.contact_n, report.contact_scale) = (pressure, report.contact_scale.min(share));
-        if !pressure.is_finite() {
-            report.contact_n = 0.0;
-            return;
-        }
-        for (n, w) in contact.nodes() {
-            if let Some(p) = place(n) {
-                nodes.external[p] -= contact.normal * (pressure * w);
-            }
-        }
+    fn press(&mut self, loads: &Loads, bound: StepBound, report: &mut StepReport) {
+        let Nodes { positions, velocities, inverse_mass, external, .. } = &mut self.nodes;
+        let place = |n: u32| self.place_of[n as usize] as usize;
+        let add = |n: u32, force: Vec3| external[place(n)] += force;
+        self.shares.press(&loads.contacts, bound, |n| inverse_mass[place(n)], [positions, velocities], report, add);
     }
 }
 

@@ -41,7 +41,18 @@ fn loads(body: &Body) -> Loads {
     }
     contact.normalise();
     contact.offset_mm = 3.0 - contact.mean(|n| body.mesh.positions[n as usize]).z;
-    Loads { gravity: Vec3::new(3e-3, 0.0, -2e-3), contact }
+    let mut loads = Loads { gravity: Vec3::new(3e-3, 0.0, -2e-3), contacts: contact.into() };
+    // A shaft that lies over some of the same nodes, and a wall beside.
+    let slanted = Vec3::new(0.6, 0.0, 0.8);
+    let offset_mm = 1.0 - contact.mean(|n| body.mesh.positions[n as usize]).dot(slanted);
+    (contact.normal, contact.offset_mm) = (slanted, offset_mm);
+    loads.contacts.push(contact);
+    let mut wall = NodalContact::none();
+    (wall.normal, wall.offset_mm, wall.stiffness) = (Vec3::X, -59.5, 0.4);
+    boxes::nodes_where(&body.mesh, |p| p.x > 59.0 && p.z > 15.0).iter().for_each(|&n| wall.add(n, 1.0));
+    wall.normalise();
+    loads.contacts.push(wall);
+    loads
 }
 
 /// Short enough that pressed elements bear the step too, and no solver needs another substep.
@@ -105,7 +116,7 @@ fn the_seam_steps_and_lets_go_like_the_processor() {
     let mut cpu = Tled::new(&body, &config()).unwrap();
     let dt = 1.9 * cpu.stable_dt_ms();
     for step in 0..60 {
-        let loads = if step < 30 { pressed } else { Loads { gravity: pressed.gravity, ..Loads::default() } };
+        let loads = if step < 30 { pressed.clone() } else { Loads { gravity: pressed.gravity, ..Loads::default() } };
         let (by_device, by_cpu) = (device.step(&loads, dt), cpu.step(&loads, dt));
         assert_eq!((by_device.substeps, by_device.skipped_ms), (by_cpu.substeps, 0.0), "{step}");
         assert!((by_device.contact_n - by_cpu.contact_n).abs() <= 1e-3 * by_cpu.contact_n, "{step}");

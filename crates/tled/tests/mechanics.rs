@@ -122,7 +122,7 @@ fn under_gravity_it_settles_where_the_static_reference_is() {
 #[test]
 fn under_the_tool_it_settles_where_the_static_reference_is() {
     let body = block([5, 5, 4], Vec3::new(50.0, 50.0, 40.0), |p| p.z < 1.0);
-    let loads = Loads { contact: probe(&body, 4.0), ..Loads::default() };
+    let loads = Loads { contacts: probe(&body, 4.0).into(), ..Loads::default() };
     let mut exact = Reference::new(&body, &reference::Config::default()).unwrap();
     let found = exact.step(&loads, 1.0);
     assert!(found.converged && found.contact_n > 0.05);
@@ -151,18 +151,18 @@ fn a_poke_dents_the_tissue_and_it_comes_back_within_a_second() {
     let body = block([6, 6, 5], Vec3::new(120.0, 120.0, 100.0), |p| p.z < 1.0);
     let config = Config { balanced_gravity: GRAVITY, ..Config::default() };
     let mut tled = Tled::new(&body, &config).unwrap();
-    let mut loads = Loads { gravity: GRAVITY, contact: NodalContact::none() };
+    let mut loads = Loads { gravity: GRAVITY, ..Loads::default() };
     let mut contact = NodalContact::none();
     boxes::nodes_where(&body.mesh, |p| p.z > 99.0 && (p.truncate() - glam::Vec2::splat(60.0)).length() < 21.0)
         .iter()
         .for_each(|&n| contact.add(n, 1.0));
     contact.normalise();
     (contact.normal, contact.offset_mm, contact.stiffness) = (Vec3::Z, 8.0 - 100.0, 0.3);
-    loads.contact = contact;
+    loads.contacts.push(contact);
     run(&mut tled, &loads, 500.0);
     let dent = largest_difference(tled.positions(), &body.mesh.positions);
     assert!(dent > 3.0, "{dent}");
-    loads.contact = NodalContact::none();
+    loads.contacts.clear();
     run(&mut tled, &loads, 1000.0);
     let left = largest_difference(tled.positions(), &body.mesh.positions);
     assert!(left < 0.02 * dent, "dent {dent} mm, left {left} mm");

@@ -24,7 +24,7 @@ use crate::stages::collision_step::SoftFrame;
 use crate::stages::haptic_tick::{HapticStage, TickInput, ToolSample};
 use std::collections::VecDeque;
 use std::thread;
-use trepan_contact::{NodalContact, SurfacePatch};
+use trepan_contact::{NodalContacts, SurfacePatch};
 use trepan_geometry::{Buttons, ToolState};
 use trepan_haptics::{Reading, Status};
 use trepan_link::Recording;
@@ -85,8 +85,8 @@ struct Again<'a> {
     ticks: Ticks,
     tools: VecDeque<ToolSample>,
     patches: VecDeque<Numbered<SurfacePatch>>,
-    contacts: VecDeque<Numbered<NodalContact>>,
-    contact: Numbered<NodalContact>,
+    contacts: VecDeque<Numbered<NodalContacts>>,
+    contact: Numbered<NodalContacts>,
     frame: SoftFrame,
     step_times: Times,
     collision_times: Times,
@@ -105,8 +105,8 @@ impl<'a> Again<'a> {
             ticks: Ticks::default(),
             tools: VecDeque::from([start]),
             patches: VecDeque::from([(0, SurfacePatch::default())]),
-            contacts: VecDeque::from([(0, NodalContact::none())]),
-            contact: (0, NodalContact::none()),
+            contacts: VecDeque::from([(0, NodalContacts::none())]),
+            contact: (0, NodalContacts::none()),
             frame: SoftFrame::default(),
             step_times: Times::default(),
             collision_times: Times::default(),
@@ -149,7 +149,7 @@ impl<'a> Again<'a> {
             record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
             self.collision_times.add_us(record.compute_us);
             remember(&mut self.patches, (record.seq, *tissue.collision.patch()));
-            remember(&mut self.contacts, (record.seq, tissue.collision.contact()));
+            remember(&mut self.contacts, (record.seq, tissue.collision.contacts().clone()));
             self.pens.collisions.send(record);
         }
     }
@@ -166,8 +166,11 @@ impl<'a> Again<'a> {
         let next = tissue.solver.steps() + 1;
         while let Some(switch) = self.switches.front().copied().filter(|s| s.step <= next) {
             self.switches.pop_front();
-            if let Some(contact) = self.contacts.iter().rev().find(|(seq, _)| *seq == switch.contact_seq) {
-                self.contact = *contact;
+            while self.contacts.front().is_some_and(|(seq, _)| *seq < switch.contact_seq) {
+                self.contacts.pop_front();
+            }
+            if let Some(contact) = self.contacts.front().filter(|(seq, _)| *seq == switch.contact_seq) {
+                self.contact.clone_from(contact);
             }
         }
         let began_ms = clock.now_ms();

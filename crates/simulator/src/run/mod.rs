@@ -15,7 +15,7 @@ use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
 use crate::stages::score::ScoreKeeper;
 use crate::stages::solver_step::SolverStage;
 use hdrhistogram::Histogram;
-use trepan_contact::{GuardCounters, NodalContact, SurfacePatch};
+use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
 use trepan_link::cell::{Reader, Writer, cell};
 
@@ -78,7 +78,7 @@ pub struct Cells {
     /// Collision loop to haptic loop.
     pub patch: (Writer<Numbered<SurfacePatch>>, Reader<Numbered<SurfacePatch>>),
     /// Collision loop to solver loop.
-    pub contact: (Writer<Numbered<NodalContact>>, Reader<Numbered<NodalContact>>),
+    pub contact: (Writer<Numbered<NodalContacts>>, Reader<Numbered<NodalContacts>>),
     /// Solver loop to collision loop.
     pub soft: (Writer<SoftFrame>, Reader<SoftFrame>),
     /// Solver loop to picture.
@@ -107,7 +107,7 @@ impl Cells {
             tool: cell(sample),
             view: cell(view),
             patch: cell((0, SurfacePatch::default())),
-            contact: cell((0, NodalContact::none())),
+            contact: cell((0, NodalContacts::with_room())),
             soft: cell(frame.clone()),
             shown: cell(frame),
         }

@@ -21,7 +21,7 @@ use crate::stages::haptic_tick::{HapticStage, TickInput};
 use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
-use trepan_contact::{GuardedWrench, NodalContact, SurfacePatch};
+use trepan_contact::{GuardedWrench, NodalContacts, SurfacePatch};
 use trepan_haptics::{HapticDevice, Status};
 use trepan_link::cell::{Reader, Writer};
 use trepan_link::queue::Sender;
@@ -166,7 +166,7 @@ struct CollisionEnds {
     tool: Reader<ToolSample>,
     soft: Reader<SoftFrame>,
     patch: Writer<Numbered<SurfacePatch>>,
-    contact: Writer<Numbered<NodalContact>>,
+    contact: Writer<Numbered<NodalContacts>>,
     records: Sender<CollisionRecord>,
 }
 
@@ -181,7 +181,10 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
         let sample = *ends.tool.latest().0;
         let mut record = stage.step(&sample, ends.soft.latest().0);
         ends.patch.set((record.seq, *stage.patch()));
-        ends.contact.set((record.seq, stage.contact()));
+        ends.contact.write(|(seq, contacts)| {
+            *seq = record.seq;
+            contacts.copy_from(stage.contacts());
+        });
         let done_ms = clock.now_ms();
         record.compute_us = ((done_ms - began_ms) * 1e3) as f32;
         times.add_us(record.compute_us);
@@ -192,7 +195,7 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
 }
 
 struct SolverEnds {
-    contact: Reader<Numbered<NodalContact>>,
+    contact: Reader<Numbered<NodalContacts>>,
     soft: Writer<SoftFrame>,
     shown: Writer<SoftFrame>,
     records: Sender<SolverRecord>,
@@ -215,8 +218,8 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
             given_up_ms += behind_ms - LAG_MS;
             thread::yield_now();
         }
-        let &(seq, contact) = ends.contact.latest().0;
-        let record = stage.step(&contact, seq);
+        let (seq, contacts) = ends.contact.latest().0;
+        let record = stage.step(contacts, *seq);
         ends.soft.write(|frame| stage.publish(frame));
         let us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         times.add_us(us);

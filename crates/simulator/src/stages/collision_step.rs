@@ -1,12 +1,13 @@
-//! One collision step: the newest tool and the newest brain in; a surface patch for the hand, a contact for the solver out.
+//! One collision step: the newest tool and the newest brain in; a surface patch for the hand, springs for the solver out.
 //!
 //! # Practice
 //! While the burr is in the hand the result only warns: the patch goes to the haptic thread, the solver gets no contact
-//! (thesis 6.4). The stage has no clock; the same tools and positions give the same results.
+//! (thesis 6.4). The probe touches with tip and shaft, and then the skull holds back what the probe pushes away. The stage has no clock; the same tools and positions give the same results.
 
 use crate::program::{Phase, Program};
 use crate::stages::haptic_tick::ToolSample;
-use trepan_contact::{NodalContact, SurfacePatch};
+use crate::stages::skull_wall::SkullWall;
+use trepan_contact::{NodalContacts, SurfacePatch};
 use trepan_deformable::{Config, ConfigError, TissueCollision, TissueStep};
 use trepan_geometry::Vec3;
 use trepan_link::wire::CollisionRecord;
@@ -27,29 +28,42 @@ pub struct SoftFrame {
 pub struct CollisionStage {
     program: Program,
     tools: Vec<TissueCollision>,
-    phase: Phase,
+    wall: Option<SkullWall>,
+    patch: SurfacePatch,
+    contacts: NodalContacts,
     step: TissueStep,
     seq: u64,
 }
 
 impl CollisionStage {
-    /// One collision pipeline for each tool of the program.
-    pub fn new(program: Program, mesh: &TetMesh, config: &Config) -> Result<Self, ConfigError> {
-        let of_phase = |phase: &Phase| TissueCollision::new(mesh, &phase.tool(), config);
+    /// One collision pipeline for each tool of the program, and the skull around the brain where it is there.
+    pub fn new(
+        program: Program,
+        mesh: &TetMesh,
+        config: &Config,
+        wall: Option<SkullWall>,
+    ) -> Result<Self, ConfigError> {
+        let of_phase = |phase: &Phase| {
+            let config = Config { shaft: *phase == Phase::Brain, ..config.clone() };
+            TissueCollision::new(mesh, &phase.tool(), &config)
+        };
         Ok(Self {
             program,
             tools: program.phases().iter().map(of_phase).collect::<Result<_, _>>()?,
-            phase: program.phases()[0],
+            wall,
+            patch: SurfacePatch::default(),
+            contacts: NodalContacts::with_room(),
             step: TissueStep::default(),
             seq: 0,
         })
     }
 
-    /// The step. Its results stand in [`patch`](Self::patch) and [`contact`](Self::contact) until the next.
+    /// The step. Its results stand in [`patch`](Self::patch) and [`contacts`](Self::contacts) until the next.
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
         let at = self.program.phases().iter().position(|&p| p == sample.phase).unwrap_or(0);
-        self.phase = sample.phase;
         self.tools[at].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
+        self.patch = self.step.patch.with(self.step.shaft.normal, self.step.shaft.depth_mm);
+        self.press(sample.phase, soft);
         self.seq += 1;
         CollisionRecord {
             seq: self.seq,
@@ -63,11 +77,21 @@ impl CollisionStage {
 
     /// For the haptic thread.
     pub fn patch(&self) -> &SurfacePatch {
-        &self.step.patch
+        &self.patch
     }
 
     /// For the solver: nothing while the burr is in the hand.
-    pub fn contact(&self) -> NodalContact {
-        if self.phase == Phase::Brain { self.step.nodal } else { NodalContact::none() }
+    pub fn contacts(&self) -> &NodalContacts {
+        &self.contacts
+    }
+
+    fn press(&mut self, phase: Phase, soft: &SoftFrame) {
+        self.contacts.clear();
+        if phase == Phase::Brain {
+            self.step.springs(&mut self.contacts);
+            if let Some(wall) = &self.wall {
+                wall.press(&soft.positions, &mut self.contacts);
+            }
+        }
     }
 }

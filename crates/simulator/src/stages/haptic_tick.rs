@@ -245,8 +245,8 @@ impl HapticStage {
         self.asked_next = asks;
     }
 
-    /// Begins a stroke when the pedal goes down; gives the last one's bone back when that is asked for and the tool is free. Returns what
-    /// came back, mm³.
+    /// Begins a stroke when the pedal goes down; gives the last one's bone back when that is asked for and the burr is free; the brain
+    /// may bulge into the opening once the probe is in the hand. Returns what came back, mm³.
     fn undo(&mut self, tool: &ToolState, drilling: bool, tick: u64, tell: &mut dyn FnMut(Notice)) -> f32 {
         let Some(bone) = &self.bone else { return 0.0 };
         if drilling && !self.drilled {
@@ -255,7 +255,8 @@ impl HapticStage {
         }
         self.drilled = drilling;
         let asks = tool.buttons.has(Buttons::UNDO);
-        let now = asks && !self.asked_undo && !drilling && !self.bone_step.manifold.touches();
+        let with_burr = self.phase() == Phase::Craniotomy;
+        let now = asks && !self.asked_undo && with_burr && !drilling && !self.bone_step.manifold.touches();
         self.asked_undo = asks;
         let what = match now.then(|| bone.undo_stroke()) {
             Some(Undone::Bricks(_)) => What::Undone(std::mem::take(&mut self.stroke_mm3)),

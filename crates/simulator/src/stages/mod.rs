@@ -5,4 +5,5 @@ pub(crate) mod collision_step;
 pub(crate) mod haptic_tick;
 pub(crate) mod notice;
 pub(crate) mod score;
+pub(crate) mod skull_wall;
 pub(crate) mod solver_step;

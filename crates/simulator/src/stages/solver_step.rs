@@ -1,12 +1,12 @@
-//! One solver step: the newest contact in, moved nodes out.
+//! One solver step: the newest contacts in, moved nodes out.
 //!
 //! # Practice
-//! The contact is a spring between tool and nodes that the solver evaluates with its own positions, so steps between two
+//! Contacts are springs on the nodes that the solver evaluates with its own positions, so steps between two
 //! collision results stay stable. A record is made whenever another contact took effect, and every [`EACH`] steps: what a replay needs, no
 //! more.
 
 use crate::stages::collision_step::SoftFrame;
-use trepan_contact::NodalContact;
+use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
 use trepan_link::wire::SolverRecord;
 use trepan_soft::{Loads, SoftSolver};
@@ -33,7 +33,7 @@ impl SolverStage {
             rest: solver.positions().to_vec(),
             dt_ms: solver.stable_dt_ms(),
             solver,
-            loads: Loads { gravity, contact: NodalContact::none() },
+            loads: Loads { gravity, contacts: NodalContacts::with_room() },
             steps: 0,
             contact_seq: 0,
             inverted: 0,
@@ -42,10 +42,10 @@ impl SolverStage {
     }
 
     /// The step; a record when it is worth one.
-    pub fn step(&mut self, contact: &NodalContact, contact_seq: u64) -> Option<SolverRecord> {
+    pub fn step(&mut self, contacts: &NodalContacts, contact_seq: u64) -> Option<SolverRecord> {
         let switched = contact_seq != self.contact_seq;
         if switched {
-            self.loads.contact = *contact;
+            self.loads.contacts.copy_from(contacts);
             self.contact_seq = contact_seq;
         }
         let report = self.solver.step(&self.loads, self.dt_ms);

@@ -2,7 +2,7 @@
 //!
 //! # Theory
 //! Minimises the potential energy `Π(u) = Σ V W(F) - Σ m g·u + Π_contact(u)`. Each iteration solves `(K + k v vᵀ + τ I) Δu = -∂Π/∂u`,
-//! `v = w ⊗ n` being the tool's spring (a rank-one term, taken in by the Sherman-Morrison formula), τ a shift that grows until the matrix
+//! `v = w ⊗ n` being a contact spring (rank-one terms, taken in one by one by the Sherman-Morrison formula), τ a shift that grows until the matrix
 //! is positive definite; a line search makes sure that Π falls. The loads are not stepped: with an energy that is finite for every state,
 //! descent alone finds the equilibrium. Pressure follows the surface: its forces are held while Π is minimised, then computed anew, until they agree.
 //!
@@ -72,7 +72,8 @@ struct Trial {
     residual: Vec<DVec3>,
     scale: f64,
     inverted: u32,
-    pressing: bool,
+    /// Springs that press, by their place in the loads.
+    pressing: Vec<usize>,
     contact_n: f64,
 }
 
@@ -80,6 +81,25 @@ struct Trial {
 struct Inertia {
     stiffness_per_g: f64,
     ahead: Vec<DVec3>,
+}
+
+/// `k v vᵀ` in the matrix: v, the solution for it without this term, and `1/k + v·solved`.
+struct RankOne {
+    v: Vec<DVec3>,
+    solved: Vec<DVec3>,
+    below: f64,
+}
+
+impl RankOne {
+    /// Takes the term into a solution that lacks it (Sherman and Morrison).
+    fn correct(&self, x: &mut [DVec3]) {
+        let share = dot(&self.v, x) / self.below;
+        x.iter_mut().zip(&self.solved).for_each(|(x, c)| *x -= *c * share);
+    }
+}
+
+fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }
 
 impl Reference {
@@ -163,7 +183,7 @@ impl Reference {
             residual: vec![DVec3::ZERO; u.len()],
             scale: 0.0,
             inverted: 0,
-            pressing: false,
+            pressing: Vec::new(),
             contact_n: 0.0,
         };
         self.cells.cells.iter().for_each(|cell| add_cell(cell, &self.laws[cell.material], u, &mut trial));
@@ -187,18 +207,20 @@ impl Reference {
     }
 
     fn press(&self, u: &[DVec3], loads: &Loads, trial: &mut Trial) {
-        let (contact, normal) = (&loads.contact, loads.contact.normal.as_dvec3());
-        let nodes =
-            || contact.nodes().map(|(n, w)| (n as usize, f64::from(w))).filter(|(n, _)| *n < self.positions.len());
-        let mean: DVec3 = nodes().map(|(n, w)| (self.cells.rest[n] + u[n]) * w).sum();
-        let depth = f64::from(contact.offset_mm) + mean.dot(normal);
-        trial.pressing = !contact.is_empty() && depth > 0.0 && contact.stiffness > 0.0;
-        if trial.pressing {
+        for (place, contact) in loads.contacts.iter().enumerate() {
+            let normal = contact.normal.as_dvec3();
+            let nodes =
+                || contact.nodes().map(|(n, w)| (n as usize, f64::from(w))).filter(|(n, _)| *n < self.positions.len());
+            let mean: DVec3 = nodes().map(|(n, w)| (self.cells.rest[n] + u[n]) * w).sum();
+            let depth = f64::from(contact.offset_mm) + mean.dot(normal);
             let stiffness = f64::from(contact.stiffness);
-            trial.energy += 0.5 * stiffness * depth * depth;
-            trial.contact_n = stiffness * depth;
-            trial.scale = trial.scale.max(trial.contact_n);
-            nodes().for_each(|(n, w)| trial.residual[n] += normal * (stiffness * depth * w));
+            if !contact.is_empty() && depth > 0.0 && stiffness > 0.0 {
+                trial.pressing.push(place);
+                trial.energy += 0.5 * stiffness * depth * depth;
+                trial.contact_n += stiffness * depth;
+                trial.scale = trial.scale.max(stiffness * depth);
+                nodes().for_each(|(n, w)| trial.residual[n] += normal * (stiffness * depth * w));
+            }
         }
     }
 
@@ -221,21 +243,23 @@ impl Reference {
         false
     }
 
-    /// The Newton step for a residual, with the tool's spring in the matrix when it presses.
+    /// The Newton step for a residual, with the springs that press in the matrix: one rank-one term after the other.
     fn newton_step(&mut self, trial: &Trial, loads: &Loads) -> Vec<DVec3> {
-        let mut step: Vec<DVec3> = trial.residual.iter().map(|r| -*r).collect();
-        self.factor.solve(&mut step);
-        if trial.pressing {
-            let mut v = vec![DVec3::ZERO; step.len()];
+        let mut terms: Vec<RankOne> = Vec::with_capacity(trial.pressing.len());
+        for &place in &trial.pressing {
+            let contact = &loads.contacts[place];
             let known = |n: u32| (n as usize) < self.positions.len() && !self.cells.fixed[n as usize];
-            let normal = loads.contact.normal.as_dvec3();
-            loads.contact.nodes().filter(|(n, _)| known(*n)).for_each(|(n, w)| v[n as usize] += normal * f64::from(w));
+            let mut v = vec![DVec3::ZERO; trial.residual.len()];
+            let normal = contact.normal.as_dvec3();
+            contact.nodes().filter(|(n, _)| known(*n)).for_each(|(n, w)| v[n as usize] += normal * f64::from(w));
             let mut solved = v.clone();
             self.factor.solve(&mut solved);
-            let dot = |a: &[DVec3]| a.iter().zip(&v).map(|(a, v)| a.dot(*v)).sum::<f64>();
-            let share = dot(&step) / (1.0 / f64::from(loads.contact.stiffness) + dot(&solved));
-            step.iter_mut().zip(&solved).for_each(|(s, c)| *s -= *c * share);
+            terms.iter().for_each(|term| term.correct(&mut solved));
+            terms.push(RankOne { below: 1.0 / f64::from(contact.stiffness) + dot(&v, &solved), v, solved });
         }
+        let mut step: Vec<DVec3> = trial.residual.iter().map(|r| -*r).collect();
+        self.factor.solve(&mut step);
+        terms.iter().for_each(|term| term.correct(&mut step));
         step
     }
 

@@ -10,19 +10,14 @@ use trepan_soft::Body;
 pub(crate) struct Step {
     pub gravity: [f32; 3],
     pub dt: f32,
-    pub normal: [f32; 3],
     pub keep: f32,
     pub gain: f32,
     pub max_speed: f32,
     pub max_displacement: f32,
-    pub stiffness: f32,
-    pub damping: f32,
-    pub rest_depth: f32,
-    pub tool_velocity: f32,
-    pub pressed: u32,
+    pub springs: u32,
     pub elements: u32,
     pub nodes: u32,
-    pub unused: [u32; 2],
+    pub unused: u32,
 }
 
 /// Buffers that several passes share.
@@ -32,7 +27,7 @@ pub(crate) struct DeviceState {
     pub u: Buffer<[f32; 4]>,
     /// Velocities by place, mm/ms.
     pub v: Buffer<[f32; 4]>,
-    /// 1/m, 1/g, and the share of the tool's pressure, by place.
+    /// 1/m, 1/g, and 1 where a spring pushes, by place.
     pub nodes: Buffer<[f32; 2]>,
     /// By place, since it was cleared: inverted elements, times limited, times not finite, bits of the largest ω².
     pub noticed: Buffer<[u32; 4]>,
@@ -56,9 +51,9 @@ impl DeviceState {
         })
     }
 
-    /// Gives a node its share of the tool's pressure.
-    pub fn weigh(&mut self, gpu: &Gpu, place: u32, weight: f32) {
+    /// Says whether a spring pushes a node.
+    pub fn mark(&mut self, gpu: &Gpu, place: u32, is_pushed: bool) {
         let place = place as usize;
-        self.nodes.write(gpu, place, &[[self.inverse_mass[place], weight]]);
+        self.nodes.write(gpu, place, &[[self.inverse_mass[place], f32::from(u8::from(is_pushed))]]);
     }
 }

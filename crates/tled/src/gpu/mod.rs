@@ -3,7 +3,7 @@
 //! # Theory
 //! ```text
 //! forces   elements ──▶ slots, one a corner, sorted by node
-//! press    touched nodes ──▶ pressure of the tool's spring       (only where the tool touches)
+//! press    touched nodes ──▶ forces of the contact springs       (only where something touches)
 //! update   slots ──▶ node, in their order; v⁺, u⁺
 //! ```
 //! No atomics and no order that depends on timing: the same input gives the same bytes on the same device. Against the processor's solver
@@ -39,16 +39,16 @@ mod press;
 mod update;
 
 use crate::config::Config;
-use crate::contact::stable_share;
 use crate::layout::Layout;
 use crate::tled::{BORNE, MOST_GAINED, NEARLY, damping_rate};
 use device_state::{DeviceState, Step};
 use forces::Forces;
 use press::Press;
-use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError};
-use trepan_soft::{Body, BodyError, Law, Loads, SoftSolver, StepReport, lowest_frequency, power_bound_ms};
+use trepan_soft::{
+    Body, BodyError, ContactShares, Law, Loads, SoftSolver, StepBound, StepReport, lowest_frequency, power_bound_ms,
+};
 use update::Update;
 
 /// Threads in a workgroup, as in the shaders.
@@ -94,6 +94,7 @@ pub struct GpuTled {
     stiffest_at_rest: f32,
     stiffest: f32,
     contact_scale: f32,
+    shares: ContactShares,
     submitted: u32,
     fault: Option<GpuError>,
 }
@@ -126,6 +127,7 @@ impl GpuTled {
             stiffest_at_rest: stiffest,
             stiffest,
             contact_scale: 1.0,
+            shares: ContactShares::of_nodes(body.mesh.positions.len()),
             submitted: 0,
             fault: None,
             damping_per_ms,
@@ -192,7 +194,7 @@ impl GpuTled {
     fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
         let step = self.numbers(loads, dt_ms);
         self.state.step.write(&self.gpu, 0, &[step]);
-        let (mut left, presses) = (count, step.pressed > 0);
+        let (mut left, presses) = (count, step.springs > 0);
         if !presses {
             self.press.pressure.write(&self.gpu, 0, &[0.0]);
         }
@@ -214,37 +216,41 @@ impl GpuTled {
         self.submitted += count;
     }
 
-    /// The uniform of a step.
+    /// The uniform of a step; hands the springs over.
     fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> Step {
-        let contact = &loads.contact;
         let half = 0.5 * self.damping_per_ms * dt_ms;
-        let share = self.share(contact, dt_ms);
-        self.contact_scale = self.contact_scale.min(share);
-        let at_rest = |n: u32| self.rest.get(n as usize).copied().unwrap_or_default();
         Step {
             gravity: (loads.gravity - self.config.balanced_gravity).to_array(),
             dt: dt_ms,
-            normal: contact.normal.to_array(),
             keep: (1.0 - half) / (1.0 + half),
             gain: dt_ms / (1.0 + half),
             max_speed: self.config.max_speed,
             max_displacement: self.max_displacement_mm,
-            stiffness: share * contact.stiffness,
-            damping: share * contact.damping,
-            rest_depth: contact.offset_mm + contact.mean(at_rest).dot(contact.normal),
-            tool_velocity: contact.tool_normal_velocity,
-            pressed: self.press.touch(&self.gpu, &mut self.state, contact, &self.layout.place_of),
+            springs: self.hand_over(loads, dt_ms),
             elements: self.elements,
             nodes: self.layout.node_at.len() as u32,
-            unused: [0; 2],
+            unused: 0,
         }
     }
 
-    fn share(&self, contact: &NodalContact, dt_ms: f32) -> f32 {
+    /// Gives the device the stable share of every spring; says how many there are.
+    fn hand_over(&mut self, loads: &Loads, dt_ms: f32) -> u32 {
         let bound_ms = self.bound_now_ms();
-        let place = |n: u32| self.layout.place_of.get(n as usize);
-        let inverse_mass = |n: u32| place(n).map_or(0.0, |&p| self.state.inverse_mass[p as usize]);
-        stable_share(contact, 4.0 / (bound_ms * bound_ms), dt_ms, inverse_mass)
+        let bound = StepBound { dt_ms, omega2: 4.0 / (bound_ms * bound_ms) };
+        let (place_of, masses) = (&self.layout.place_of, &self.state.inverse_mass);
+        let at_rest = |n: u32| self.rest.get(n as usize).copied().unwrap_or_default();
+        let list = &mut self.press.list;
+        list.clear();
+        self.shares.each(
+            &loads.contacts,
+            bound,
+            |n| masses[place_of[n as usize] as usize],
+            |spring, share| {
+                self.contact_scale = self.contact_scale.min(share);
+                list.add(spring, share, spring.offset_mm + spring.mean(at_rest).dot(spring.normal), place_of);
+            },
+        );
+        self.press.touch(&self.gpu, &mut self.state)
     }
 }
 

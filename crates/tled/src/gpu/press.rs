@@ -1,45 +1,110 @@
-//! The pass of the contact: the tool's spring with the device's own present nodes, one workgroup.
+//! The pass of the contacts: springs with the device's own present nodes, one workgroup.
 
 use crate::gpu::device_state::DeviceState;
-use trepan_contact::{MAX_NODES, NodalContact};
+use trepan_contact::{MAX_NODES, MAX_SPRINGS, NodalContact};
 use trepan_gpu::{Bindings, Buffer, Dispatches, Gpu, GpuError, Kernel, Slot};
 use trepan_shaders::TLED_PRESS;
 
-/// The contact on the device.
+/// The contacts on the device.
 pub(crate) struct Press {
     kernel: Kernel,
     bindings: Bindings,
-    /// Place and bits of the weight of every node that the tool touches.
+    springs: Buffer<Spring>,
     touched: Buffer<[u32; 2]>,
-    /// Pressure of the newest step, N.
+    /// Forces of the springs by place, N; of meaning where a node is marked.
+    pub pushed: Buffer<[f32; 4]>,
+    /// Sum over the springs in the newest step, N.
     pub pressure: Buffer<f32>,
+    /// The springs of the next submission.
+    pub list: List,
     shown: Vec<[u32; 2]>,
+}
+
+/// A spring as `press.wgsl` declares it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Spring {
+    normal: [f32; 3],
+    stiffness: f32,
+    damping: f32,
+    rest_depth: f32,
+    tool_velocity: f32,
+    first: u32,
+    count: u32,
+    unused: [u32; 3],
+}
+
+/// Springs, and place and bits of the weight of every node that they touch.
+pub(crate) struct List {
+    springs: Vec<Spring>,
+    touched: Vec<[u32; 2]>,
+}
+
+impl List {
+    pub fn clear(&mut self) {
+        self.springs.clear();
+        self.touched.clear();
+    }
+
+    /// Adds a share of a spring that is `rest_depth` mm deep where nothing moved. Nodes that the mesh lacks are left out.
+    pub fn add(&mut self, spring: &NodalContact, share: f32, rest_depth: f32, place_of: &[u32]) {
+        let first = self.touched.len();
+        let placed = |(n, w): (u32, f32)| Some([*place_of.get(n as usize)?, w.to_bits()]);
+        self.touched.extend(spring.nodes().filter_map(placed));
+        self.springs.push(Spring {
+            normal: spring.normal.to_array(),
+            stiffness: share * spring.stiffness,
+            damping: share * spring.damping,
+            rest_depth,
+            tool_velocity: spring.tool_normal_velocity,
+            first: first as u32,
+            count: (self.touched.len() - first) as u32,
+            unused: [0; 3],
+        });
+    }
 }
 
 impl Press {
     pub fn new(gpu: &Gpu, state: &DeviceState) -> Result<Self, GpuError> {
-        let wanted = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::Storage, Slot::StorageMut];
+        let mut wanted = [Slot::Storage; 7];
+        wanted[0] = Slot::Uniform;
+        wanted[5..].fill(Slot::StorageMut);
         let kernel = Kernel::new(gpu, "press", TLED_PRESS, "main", &wanted)?;
-        let touched = Buffer::zeroed(gpu, "touched", MAX_NODES)?;
+        // Room for 64 more: idle lanes read past the last spring's nodes.
+        let most = MAX_SPRINGS * MAX_NODES;
+        let touched = Buffer::zeroed(gpu, "touched", most + MAX_NODES)?;
+        let springs = Buffer::zeroed(gpu, "springs", MAX_SPRINGS)?;
+        let pushed = Buffer::zeroed(gpu, "pushed", state.u.len())?;
         let pressure = Buffer::zeroed(gpu, "pressure", 1)?;
         let bindings = kernel.bind(
             gpu,
-            &[(&state.step).into(), (&touched).into(), (&state.u).into(), (&state.v).into(), (&pressure).into()],
+            &[
+                (&state.step).into(),
+                (&springs).into(),
+                (&touched).into(),
+                (&state.u).into(),
+                (&state.v).into(),
+                (&pushed).into(),
+                (&pressure).into(),
+            ],
         )?;
-        Ok(Self { kernel, bindings, touched, pressure, shown: Vec::with_capacity(MAX_NODES) })
+        let list = List { springs: Vec::with_capacity(MAX_SPRINGS), touched: Vec::with_capacity(most) };
+        Ok(Self { kernel, bindings, springs, touched, pushed, pressure, list, shown: Vec::with_capacity(most) })
     }
 
-    /// Hands the touched nodes over, where they changed; gives how many there are. Nodes that the mesh lacks are left out.
-    pub fn touch(&mut self, gpu: &Gpu, state: &mut DeviceState, contact: &NodalContact, place_of: &[u32]) -> u32 {
-        let placed = |(n, w): (u32, f32)| Some([*place_of.get(n as usize)?, w.to_bits()]);
-        if !contact.nodes().filter_map(placed).eq(self.shown.iter().copied()) {
-            self.shown.iter().for_each(|&[place, _]| state.weigh(gpu, place, 0.0));
-            self.shown.clear();
-            self.shown.extend(contact.nodes().filter_map(placed));
-            self.shown.iter().for_each(|&[place, w]| state.weigh(gpu, place, f32::from_bits(w)));
+    /// Hands the list over, and the touched nodes where they changed; gives how many springs there are.
+    pub fn touch(&mut self, gpu: &Gpu, state: &mut DeviceState) -> u32 {
+        let List { springs, touched } = &self.list;
+        if !springs.is_empty() {
+            self.springs.write(gpu, 0, springs);
+        }
+        if *touched != self.shown {
+            self.shown.iter().for_each(|&[place, _]| state.mark(gpu, place, false));
+            self.shown.clone_from(touched);
+            self.shown.iter().for_each(|&[place, _]| state.mark(gpu, place, true));
             self.touched.write(gpu, 0, &self.shown);
         }
-        self.shown.len() as u32
+        springs.len() as u32
     }
 
     /// Adds the pass to a submission.

@@ -28,7 +28,7 @@ impl Update {
                 (&forces.starts).into(),
                 (&forces.slots).into(),
                 (&state.nodes).into(),
-                (&press.pressure).into(),
+                (&press.pushed).into(),
                 (&state.u).into(),
                 (&state.v).into(),
                 (&state.noticed).into(),

@@ -170,7 +170,7 @@ fn hard_contact(findings: &mut Findings) {
         let mut contact = NodalContact::none();
         contact.add(corner, 1.0);
         (contact.normal, contact.offset_mm, contact.stiffness) = (Vec3::Z, 2.0 - 40.0, stiffness);
-        let loads = Loads { contact, ..Loads::default() };
+        let loads = Loads { contacts: contact.into(), ..Loads::default() };
         let unguarded = Method::named("linear").expect("a method").build(&body).expect("the cube is sound");
         let guarded: Box<dyn SoftSolver> = Box::new(solver(&body, Config::default()));
         for (method, mut solver) in [("guarded", guarded), ("linear, unguarded", unguarded)] {
