@@ -58,12 +58,8 @@ impl Lost {
 
     /// Box of all.
     pub(crate) fn bounds(&self) -> Extent {
-        let least = |axis: &[f32]| axis.iter().copied().fold(f32::INFINITY, f32::min);
-        let most = |axis: &[f32]| axis.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        Extent {
-            low: [least(&self.x), least(&self.y), least(&self.z)],
-            high: [most(&self.x), most(&self.y), most(&self.z)],
-        }
+        let [x, y, z] = [range(&self.x), range(&self.y), range(&self.z)];
+        Extent { low: [x.0, y.0, z.0], high: [x.1, y.1, z.1] }
     }
 
     /// The first one from the `k`th on that lies in a box.
@@ -83,6 +79,20 @@ impl Lost {
         }
         (k..x.len()).find(|&n| inside(n))
     }
+}
+
+/// Least and greatest, lane by lane: a plain fold waits for every comparison.
+fn range(axis: &[f32]) -> (f32, f32) {
+    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let (chunks, rest) = axis.as_chunks::<LANES>();
+    for chunk in chunks.iter().map(|chunk| &chunk[..]).chain([rest]) {
+        for ((x, low), high) in chunk.iter().zip(&mut low).zip(&mut high) {
+            *low = if x < low { *x } else { *low };
+            *high = if x > high { *x } else { *high };
+        }
+    }
+    let least = low.into_iter().fold(f32::INFINITY, f32::min);
+    (least, high.into_iter().fold(f32::NEG_INFINITY, f32::max))
 }
 
 #[cfg(test)]
