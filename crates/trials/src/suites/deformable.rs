@@ -2,16 +2,20 @@
 
 mod poses;
 mod published;
+mod recording;
 mod ride;
 mod scene;
 mod stability;
 mod truth;
+
+pub use recording::record_all;
 
 use super::Scope;
 use crate::suite::{Findings, Gate, Row};
 use ride::{Ride, ride};
 use scene::{PATHS, Scene};
 use trepan_deformable::Method;
+use trepan_geometry::Vec3;
 use truth::Truth;
 
 /// What the recommended method must gain over looking at every tetrahedron, from 48 thousand of them on.
@@ -31,6 +35,9 @@ pub fn run(scope: Scope) -> Findings {
     cubes.iter().filter(|_| takes()).for_each(|&cells| measure(&Scene::cube(cells), scope, &mut findings));
     brains.iter().filter(|_| takes()).for_each(|&tets| measure(&Scene::brain(tets), scope, &mut findings));
     if takes() {
+        recorded(scope, &mut findings);
+    }
+    if takes() {
         slide(scope, &mut findings);
     }
     if takes() {
@@ -39,9 +46,7 @@ pub fn run(scope: Scope) -> Findings {
     if takes() {
         stability::run(scope, &mut findings);
     }
-    if takes() {
-        poses::run(scope, &mut findings);
-    }
+    poses::run(scope, &mut takes, &mut findings);
     if takes() {
         findings.rows.extend(published::rows());
     }
@@ -63,25 +68,36 @@ fn measure(scene: &Scene, scope: Scope, findings: &mut Findings) {
     for path in PATHS {
         let steps = if path.jumps { scope.pick(50, 200) } else { scope.pick(150, 1000) };
         let place = format!("{}, {}", scene.name, path.name);
-        let tips = scene.tips(&path, steps);
-        let truth = Truth::along(scene, &tips);
-        // Methods that follow every tetrahedron repeat themselves: on large meshes some steps say all.
-        let enough = (STEPS_TIMES_TETS / scene.mesh.tets.len()).clamp(30, steps);
-        let steps_of = |method| if method == Method::RECOMMENDED { steps } else { enough };
-        let take = |method| ride(scene, method, &tips[..steps_of(method)], &truth);
-        let rides: Vec<Ride> = methods().map(take).collect();
-        let scan_us = rides.iter().find(|r| r.method == Method::Scan).map_or(f64::NAN, Ride::p50_us);
-        findings.rows.extend(rides.iter().map(|ride| ride.row(&place, scene, scan_us)));
-        let complete = rides.iter().filter(|ride| is_complete(ride.method));
-        let wrong = complete.map(|ride| (ride.missed + ride.invented) as f64).sum();
-        findings.gates.push(Gate::at_most(
-            format!("{place}: points missed or invented by complete methods"),
-            wrong,
-            0.0,
-        ));
-        if !path.jumps {
-            speed_gates(&place, scene, scan_us, &rides, findings);
-        }
+        follow(scene, &place, &scene.tips(&path, steps), !path.jumps, findings);
+    }
+}
+
+/// The three recorded paths over the brain that they were recorded on.
+fn recorded(scope: Scope, findings: &mut Findings) {
+    let scene = Scene::brain_at_rest(recording::TETS);
+    for name in recording::NAMES {
+        let tips = recording::tips(name);
+        let tips = &tips[..scope.pick(tips.len() / 10, tips.len())];
+        follow(&scene, &format!("{}, at rest, recorded path {name}", scene.name), tips, false, findings);
+    }
+}
+
+/// One path by every method; `in_time` where nothing may beat the recommended one.
+fn follow(scene: &Scene, place: &str, tips: &[Vec3], in_time: bool, findings: &mut Findings) {
+    let steps = tips.len();
+    let truth = Truth::along(scene, tips);
+    // Methods that follow every tetrahedron repeat themselves: on large meshes some steps say all.
+    let enough = (STEPS_TIMES_TETS / scene.mesh.tets.len()).clamp(30, steps);
+    let steps_of = |method| if method == Method::RECOMMENDED { steps } else { enough };
+    let take = |method| ride(scene, method, &tips[..steps_of(method)], &truth);
+    let rides: Vec<Ride> = methods().map(take).collect();
+    let scan_us = rides.iter().find(|r| r.method == Method::Scan).map_or(f64::NAN, Ride::p50_us);
+    findings.rows.extend(rides.iter().map(|ride| ride.row(place, scene, scan_us)));
+    let complete = rides.iter().filter(|ride| is_complete(ride.method));
+    let wrong = complete.map(|ride| (ride.missed + ride.invented) as f64).sum();
+    findings.gates.push(Gate::at_most(format!("{place}: points missed or invented by complete methods"), wrong, 0.0));
+    if in_time {
+        speed_gates(place, scene, scan_us, &rides, findings);
     }
 }
 

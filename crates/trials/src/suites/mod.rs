@@ -1,6 +1,6 @@
 //! The suites, one file each; one list feeds the command line and the page.
 
-mod deformable;
+pub mod deformable;
 mod haptics;
 mod mesh;
 mod render;

@@ -9,9 +9,11 @@ const CELLS: usize = 6;
 const EDGE_MM: f32 = 5.0;
 const SIZE_MM: f32 = CELLS as f32 * EDGE_MM;
 const RADIUS_MM: f32 = 2.0;
-/// Poses of a million that are made on each kind of mesh.
+/// Poses of a full run, and of a quick one.
 const MILLION: usize = 1_000_000;
 const QUICK: usize = 16_000;
+/// Parts of a full run on each kind of mesh; each has its own seed, so that any of them can be made alone.
+const PARTS: usize = 10;
 
 /// A way to move the nodes, anew at every pose.
 type Motion = fn(usize, &mut fastrand::Rng, &mut [Vec3]);
@@ -63,40 +65,46 @@ struct Tally {
     invented_points: u64,
 }
 
-/// Every kind of mesh by the recommended method.
-pub fn run(scope: Scope, findings: &mut Findings) {
-    let poses = scope.pick(QUICK, MILLION) / KINDS.len();
+/// Every kind of mesh by the recommended method, in parts that shards share out.
+pub fn run(scope: Scope, takes: &mut impl FnMut() -> bool, findings: &mut Findings) {
+    let parts = scope.pick(1, PARTS);
+    let poses = scope.pick(QUICK, MILLION) / KINDS.len() / parts;
     let (mut all, mut wrong) = (0, 0);
     for (name, motion) in KINDS {
-        let tally = taken(motion, poses);
-        (all, wrong) = (all + tally.poses, wrong + tally.missed_contacts + tally.missed_points + tally.invented_points);
-        findings.rows.push(
-            Row::new(format!("random poses: {name}"), Method::RECOMMENDED.name())
-                .with("poses", tally.poses)
-                .metric("touching_count", tally.touching as f64)
-                .metric("missed_contacts_count", tally.missed_contacts as f64)
-                .metric("missed_points_count", tally.missed_points as f64)
-                .metric("invented_points_count", tally.invented_points as f64),
-        );
+        for part in (0..parts).filter(|_| takes()) {
+            let tally = taken(motion, poses, part as u64);
+            (all, wrong) = (all + tally.poses, wrong + tally.wrong());
+            findings.rows.push(
+                Row::new(format!("random poses: {name}, part {} of {parts}", part + 1), Method::RECOMMENDED.name())
+                    .with("poses", tally.poses)
+                    .metric("touching_count", tally.touching as f64)
+                    .metric("missed_contacts_count", tally.missed_contacts as f64)
+                    .metric("missed_points_count", tally.missed_points as f64)
+                    .metric("invented_points_count", tally.invented_points as f64),
+            );
+        }
     }
-    let name = format!("{all} random poses: contacts or points missed or invented");
-    findings.gates.push(Gate::at_most(name, wrong as f64, 0.0));
+    if all > 0 {
+        let name = format!("{all} random poses: contacts or points missed or invented");
+        findings.gates.push(Gate::at_most(name, wrong as f64, 0.0));
+    }
 }
 
 /// Three poses in ten are a jump, the rest a small step.
-fn taken(motion: Motion, poses: usize) -> Tally {
+fn taken(motion: Motion, poses: usize, part: u64) -> Tally {
     let mesh = five_split(CELLS, EDGE_MM);
     let config = Config { method: Method::RECOMMENDED, ..Config::default() };
     let mut collision =
         TissueCollision::new(&mesh, &Tool::probe(RADIUS_MM), &config).expect("the mesh at rest is sound");
     let shell = Pointshell::sphere(RADIUS_MM, config.points, Spread::Fibonacci).points;
     let still = vec![Vec3::ZERO; mesh.positions.len()];
-    let (mut random, mut out, mut tally) = (fastrand::Rng::with_seed(11), TissueStep::default(), Tally::default());
+    let (mut random, mut out, mut tally) =
+        (fastrand::Rng::with_seed(11 + part), TissueStep::default(), Tally::default());
     let (mut positions, mut points) = (mesh.positions.clone(), shell.clone());
     let mut tip = Vec3::splat(0.5 * SIZE_MM);
     for pose in 0..poses {
         positions.copy_from_slice(&mesh.positions);
-        motion(pose, &mut random, &mut positions);
+        motion(part as usize * poses + pose, &mut random, &mut positions);
         let anywhere = Vec3::splat(0.5 * SIZE_MM) + cube(&mut random) * (0.5 * SIZE_MM + 2.0 * RADIUS_MM);
         tip = if random.u8(..10) < 3 { anywhere } else { tip + 0.5 * cube(&mut random) };
         collision.step(&positions, &still, &ToolState::at(Pose::from_translation(tip)), &mut out);
@@ -107,6 +115,10 @@ fn taken(motion: Motion, poses: usize) -> Tally {
 }
 
 impl Tally {
+    fn wrong(&self) -> u64 {
+        self.missed_contacts + self.missed_points + self.invented_points
+    }
+
     fn compare(&mut self, found: u64, (surely, perhaps): (u64, u64)) {
         self.poses += 1;
         self.touching += u64::from(surely > 0);

@@ -76,10 +76,15 @@ impl Scene {
 
     /// The built-in case's brain, moving.
     pub fn brain(target_tets: usize) -> Self {
+        Self { strain: STRAIN, ..Self::brain_at_rest(target_tets) }
+    }
+
+    /// The same, at rest.
+    pub fn brain_at_rest(target_tets: usize) -> Self {
         let mask = trepan_volume::read(&trepan_fixtures::case_head().labels).expect("the built-in case is there");
         let config = lattice::Config { target_tets, ..Default::default() };
         let mesh = lattice::tetrahedra(&mask.map(|v| u8::from(v > 0.5)), &config).expect("the brain can be meshed");
-        Self::of(format!("brain, {} tetrahedra", mesh.tets.len()), mesh, STRAIN)
+        Self::of(format!("brain, {} tetrahedra", mesh.tets.len()), mesh, 0.0)
     }
 
     fn of(name: String, mesh: TetMesh, strain: f32) -> Self {
