@@ -20,13 +20,20 @@ pub struct HashedGrid {
     starts: Vec<u32>,
     bucket_of: Vec<u32>,
     items: Vec<(u64, Vec3)>,
+    cell_mm: f64,
+    offset: DVec3,
 }
 
 impl HashedGrid {
-    /// One pass with cells of `cell_mm` whose corner lies at −`offset`.
-    pub fn pass(&mut self, boxes: &[Aabb], particles: &[Vec3], cell_mm: f64, offset: DVec3) -> Work {
-        let cell = |p: Vec3| ((p.as_dvec3() + offset) / cell_mm).floor().as_ivec3().to_array();
-        self.sort(particles, cell);
+    /// Sorts the particles into cells of `cell_mm` whose corner lies at −`offset`.
+    pub fn place(&mut self, particles: &[Vec3], cell_mm: f64, offset: DVec3) {
+        (self.cell_mm, self.offset) = (cell_mm, offset);
+        self.sort(particles, |p| ((p.as_dvec3() + offset) / cell_mm).floor().as_ivec3().to_array());
+    }
+
+    /// Boxes against the particles in the cells that they cover.
+    pub fn look(&self, boxes: &[Aabb]) -> Work {
+        let cell = |p: Vec3| ((p.as_dvec3() + self.offset) / self.cell_mm).floor().as_ivec3().to_array();
         let mut work = Work::default();
         for b in boxes {
             let (low, high) = (cell(b.min), cell(b.max));
@@ -101,7 +108,8 @@ mod tests {
         let mut grid = HashedGrid::default();
         for cell_mm in [0.7, 2.3, 9.0] {
             let counted = counts::grid(&boxes, &particles, cell_mm).unwrap();
-            let done = grid.pass(&boxes, &particles, cell_mm, DVec3::ZERO);
+            grid.place(&particles, cell_mm, DVec3::ZERO);
+            let done = grid.look(&boxes);
             assert_eq!([done.visits, done.tests, done.inside], [counted.visits, counted.tests, counted.inside]);
         }
     }

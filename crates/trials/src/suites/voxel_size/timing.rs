@@ -1,0 +1,152 @@
+//! Times of a grid's passes that a busy machine does not spoil: the least of many, in turn, slice by slice.
+//!
+//! # Practice
+//! A pass is timed in slices of some 50 us, each far shorter than the turns in which a busy machine shares its cores out; the least time of every
+//! slice over all rounds counts, and a pass takes their sum.
+
+use super::pass::HashedGrid;
+use super::scene::Scene;
+use glam::DVec3;
+use std::time::Instant;
+use trepan_geometry::{Aabb, Vec3};
+use trepan_voxel_size::counts::Counts;
+use trepan_voxel_size::{Prices, fit};
+
+/// Placements of the grid against the scene, over which times are averaged.
+const PLACEMENTS: usize = 3;
+/// Boxes in one slice.
+const SLICE: usize = 512;
+/// Rounds between two looks at whether the halves agree.
+const BLOCK: usize = 8;
+/// Halves of the rounds that differ by no more than this at any size agree.
+const AGREED: f64 = 0.01;
+/// Sizes that are timed for the prices, in mean edges.
+const CALIBRATION: [f64; 7] = [0.4, 0.6, 0.9, 1.3, 1.9, 2.8, 4.0];
+/// Boxes that are timed for the prices; the others cost the same.
+const SAMPLE: usize = 3_000;
+/// Neighbouring boxes that are sampled together.
+const RUN: usize = 128;
+/// Time for the rounds over these sizes, ms, and how many are made at least.
+const CALIBRATION_MS: (f64, usize) = (40.0, 4);
+
+/// The least time of each size, µs: of the even rounds, and of the odd ones.
+pub struct Least {
+    pub choose: Vec<f64>,
+    pub judge: Vec<f64>,
+    pub rounds: usize,
+}
+
+impl Least {
+    /// The largest difference between the two halves, as a share.
+    pub fn apart(&self) -> f64 {
+        self.choose.iter().zip(&self.judge).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
+    }
+}
+
+/// Rounds over all sizes, so that a slow moment of the machine meets every size, until the halves agree or `most` are done.
+///
+/// `calibration` gets a round in each, so that prices and times are of the same moments of the machine.
+pub fn least(scene: &Scene, cells: &[f64], calibration: &mut Calibration, most: usize) -> Least {
+    let mut random = fastrand::Rng::with_seed(23);
+    let places: [DVec3; PLACEMENTS] = std::array::from_fn(|_| DVec3::new(random.f64(), random.f64(), random.f64()));
+    let mut grid = HashedGrid::default();
+    let half = || vec![std::array::from_fn::<_, PLACEMENTS, _>(|_| Slices::default()); cells.len()];
+    let mut halves = [half(), half()];
+    let mut rounds = 0;
+    loop {
+        for (least, cell) in halves[rounds % 2].iter_mut().zip(cells) {
+            for (least, place) in least.iter_mut().zip(places) {
+                least.pass(&mut grid, &scene.boxes, &scene.particles, *cell, place * *cell);
+            }
+        }
+        calibration.round();
+        rounds += 1;
+        if rounds.is_multiple_of(BLOCK) {
+            let mean = |half: &Vec<[Slices; PLACEMENTS]>| {
+                half.iter().map(|places| places.iter().map(Slices::sum_us).sum::<f64>() / PLACEMENTS as f64).collect()
+            };
+            let found = Least { choose: mean(&halves[0]), judge: mean(&halves[1]), rounds };
+            if found.apart() < AGREED || rounds >= most {
+                return found;
+            }
+        }
+    }
+}
+
+/// The least times of a pass so far, µs: of sorting the particles, then of every slice of the boxes.
+#[derive(Clone, Debug, Default)]
+struct Slices(Vec<f64>);
+
+impl Slices {
+    /// Once more; gives the work done.
+    fn pass(&mut self, grid: &mut HashedGrid, boxes: &[Aabb], particles: &[Vec3], cell: f64, offset: DVec3) -> Counts {
+        self.0.resize(1 + boxes.len().div_ceil(SLICE), f64::INFINITY);
+        let mut counts = Counts::default();
+        let start = Instant::now();
+        grid.place(particles, cell, offset);
+        self.0[0] = self.0[0].min(start.elapsed().as_secs_f64() * 1e6);
+        for (least, slice) in self.0[1..].iter_mut().zip(boxes.chunks(SLICE)) {
+            let start = Instant::now();
+            let work = std::hint::black_box(grid.look(slice));
+            *least = least.min(start.elapsed().as_secs_f64() * 1e6);
+            (counts.visits, counts.tests) = (counts.visits + work.visits, counts.tests + work.tests);
+        }
+        counts
+    }
+
+    fn sum_us(&self) -> f64 {
+        self.0.iter().sum()
+    }
+}
+
+/// Passes of a sample of the boxes at a few sizes; the least time counts, against the work that was really done.
+pub struct Calibration<'a> {
+    scene: &'a Scene,
+    usual: f64,
+    sample: Vec<Aabb>,
+    grid: HashedGrid,
+    slices: [Slices; CALIBRATION.len()],
+    counts: [Counts; CALIBRATION.len()],
+}
+
+impl<'a> Calibration<'a> {
+    /// Rounds for [`CALIBRATION_MS`].
+    pub fn of(scene: &'a Scene, usual: f64) -> Self {
+        // Runs of neighbours, spread evenly: single boxes would find neither caches nor branches as a whole pass does.
+        let stride = scene.boxes.len().div_ceil(SAMPLE).max(1);
+        let runs = scene.boxes.chunks(RUN).step_by(stride);
+        let mut calibration = Self {
+            scene,
+            usual,
+            sample: runs.flatten().copied().collect(),
+            grid: HashedGrid::default(),
+            slices: Default::default(),
+            counts: Default::default(),
+        };
+        let (least_ms, least_rounds) = CALIBRATION_MS;
+        let start = Instant::now();
+        let mut rounds = 0;
+        while rounds < least_rounds || start.elapsed().as_secs_f64() * 1e3 < least_ms {
+            calibration.round();
+            rounds += 1;
+        }
+        calibration
+    }
+
+    /// Every size once.
+    fn round(&mut self) {
+        for ((slices, counts), share) in self.slices.iter_mut().zip(&mut self.counts).zip(CALIBRATION) {
+            let cell = share * self.usual;
+            *counts = slices.pass(&mut self.grid, &self.sample, &self.scene.particles, cell, DVec3::splat(0.37 * cell));
+        }
+    }
+
+    /// What the least times of all rounds so far say.
+    pub fn prices(&self) -> Prices {
+        let measured: Vec<_> = self.counts.iter().copied().zip(self.slices.iter().map(Slices::sum_us)).collect();
+        let sort_us = self.slices.iter().map(|slices| slices.0[0]).fold(f64::INFINITY, f64::min);
+        let prices = fit(&measured).unwrap_or(Prices { fixed: 0.0, visit: 1.0, test: 5.0 });
+        let share = self.scene.boxes.len() as f64 / self.sample.len() as f64;
+        Prices { fixed: sort_us + (prices.fixed - sort_us).max(0.0) * share, ..prices }
+    }
+}
