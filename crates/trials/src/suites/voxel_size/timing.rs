@@ -27,7 +27,7 @@ const SAMPLE: usize = 3_000;
 /// Neighbouring boxes that are sampled together.
 const RUN: usize = 128;
 /// Time for the rounds over these sizes, ms, and how many are made at least.
-const CALIBRATION_MS: (f64, usize) = (40.0, 4);
+const CALIBRATION_MS: (f64, usize) = (25.0, 4);
 
 /// The least time of each size, µs: of the even rounds, and of the odd ones.
 pub struct Least {
