@@ -11,6 +11,7 @@ use crate::program::Program;
 use crate::report::output;
 use crate::report::page::Shot;
 use crate::report::summary::{About, Machine, Summary};
+use crate::run::clock::Clock;
 use crate::run::journal::Kept;
 use crate::run::lockstep;
 use crate::run::stop::Stop;
@@ -33,7 +34,7 @@ use trepan_haptics::{DeviceName, HapticDevice, mouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::{Painter, SceneData};
-use trepan_soft::{Body, SoftSolver};
+use trepan_soft::{Body, Loads, SoftSolver};
 
 /// A session that is ready to run.
 pub struct Session {
@@ -174,7 +175,16 @@ impl Session {
         let solver: Box<dyn SoftSolver> = match solver_named(&self.options)? {
             None => {
                 let config = trepan_tled::Config { balanced_gravity: gravity, ..Default::default() };
-                Box::new(trepan_tled::Tled::new(&body, &config).map_err(|f| internal(&f))?)
+                if self.options.solver.as_deref() == Some(FASTEST) {
+                    let (clock, loads) = (Clock::start(), Loads { gravity, ..Loads::default() });
+                    let all = trepan_tled::choice::candidates(&body, &config);
+                    let chosen = trepan_tled::choice::fastest(&all, &loads, 100.0, &|| clock.now_ms());
+                    let chosen = chosen.map_err(|f| internal(&f))?;
+                    tracing::info!("solver {}: {}", chosen.name, chosen.why);
+                    chosen.solver
+                } else {
+                    Box::new(trepan_tled::Tled::new(&body, &config).map_err(|f| internal(&f))?)
+                }
             }
             Some(method) => method.build(&body).map_err(|f| internal(&f))?,
         };
@@ -286,6 +296,8 @@ struct Graphics {
 }
 
 const TLED: &str = "tled";
+/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not have the recorded forces to the last bit.
+const FASTEST: &str = "fastest";
 
 /// Refuses places that cannot be written to before anything is loaded.
 fn places(options: &Options) -> Result<(), SessionError> {
@@ -310,11 +322,11 @@ fn rigid_method(options: &Options) -> Result<trepan_rigid::Method, SessionError>
 /// The rival solver of that name; `None` for TLED.
 fn solver_named(options: &Options) -> Result<Option<trepan_soft::Method>, SessionError> {
     let name = options.solver.as_deref().unwrap_or(TLED);
-    if name == TLED {
+    if name == TLED || name == FASTEST {
         return Ok(None);
     }
     trepan_soft::Method::named(name).map(Some).ok_or_else(|| {
         let known: Vec<_> = trepan_soft::Method::all().iter().map(|method| method.name()).collect();
-        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {}", known.join(", ")))
+        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {FASTEST}, {}", known.join(", ")))
     })
 }

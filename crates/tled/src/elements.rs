@@ -47,17 +47,24 @@ impl Elements {
         }
     }
 
-    /// Computes every element's forces from displacements by place, `dt_ms` after the last time.
+    /// Both passes over the elements.
     pub fn compute(&mut self, u: &[Quad], dt_ms: f32) -> Found {
-        if self.cure_locking {
-            self.average_volumes(u);
-        }
+        self.average_volumes(u);
+        self.find_forces(u, dt_ms)
+    }
+
+    /// Computes every element's forces from displacements by place, `dt_ms` after the last time.
+    pub fn find_forces(&mut self, u: &[Quad], dt_ms: f32) -> Found {
         let forces = Work::Forces { fade: self.relaxation.fade(dt_ms), cure_locking: self.cure_locking };
         self.team.compute(self.kernel, forces, Now { u, swelling: &self.swelling });
         self.sum()
     }
 
-    fn average_volumes(&mut self, u: &[Quad]) {
+    /// Averages the volume change by seat, where locking is cured.
+    pub fn average_volumes(&mut self, u: &[Quad]) {
+        if !self.cure_locking {
+            return;
+        }
         let swelling = &mut self.swelling;
         self.team.compute(self.kernel, Work::Volumes, Now { u, swelling });
         swelling.fill(0.0);

@@ -33,6 +33,7 @@
 //! bound by sound, use a static solver.
 
 mod block;
+pub mod choice;
 mod config;
 mod damping;
 mod element;
@@ -60,4 +61,4 @@ pub use config::{Config, Damping};
 pub use kernel::Kernel;
 pub use relaxation::Relaxation;
 pub use settle::{Settled, Settling};
-pub use tled::Tled;
+pub use tled::{Pass, Tled};

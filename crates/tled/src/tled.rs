@@ -32,6 +32,34 @@ pub struct Tled {
     elapsed_ms: f32,
 }
 
+/// A pass of a step, by the name that it has on the device too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pass {
+    /// Mean volume change around each node, where locking is cured.
+    Volumes,
+    /// Forces of the elements.
+    Forces,
+    /// The tool's spring and the surface's pressure.
+    Press,
+    /// New velocities and positions.
+    Update,
+}
+
+impl Pass {
+    /// Every pass, in the order of a step.
+    pub const ALL: [Self; 4] = [Self::Volumes, Self::Forces, Self::Press, Self::Update];
+
+    /// Its name in charts and benches.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Volumes => "volumes",
+            Self::Forces => "forces",
+            Self::Press => "press",
+            Self::Update => "update",
+        }
+    }
+}
+
 /// Share of the present bound that a substep may use.
 pub(crate) const BORNE: f32 = 0.95;
 /// Keeps rounding from adding a substep.
@@ -111,6 +139,20 @@ impl Tled {
         self.elapsed_ms = 0.0;
     }
 
+    /// Does one pass of a step alone, on the present state: what a bench times. A step is all of them in order.
+    pub fn pass(&mut self, pass: Pass, loads: &Loads, dt_ms: f32) {
+        let mut report = StepReport::default();
+        match pass {
+            Pass::Volumes => self.elements.average_volumes(&self.nodes.u),
+            Pass::Forces => _ = self.elements.find_forces(&self.nodes.u, dt_ms),
+            Pass::Press => {
+                self.press(&loads.contact, dt_ms, self.bound_ms, &mut report);
+                self.push();
+            }
+            Pass::Update => self.update(loads, dt_ms, &mut report),
+        }
+    }
+
     /// One substep of at most `left_ms`; gives its length. As long as the elements bear as they are now, and of equal lengths while that stays.
     fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
         let found = self.elements.compute(&self.nodes.u, self.elapsed_ms);
@@ -121,6 +163,12 @@ impl Tled {
             if self.config.substeps == 0 { left_ms } else { left_ms / (left_ms / longest * NEARLY).ceil().max(1.0) };
         self.press(loads, StepBound { dt_ms, omega2: 4.0 / (bound_ms * bound_ms) }, report);
         self.push();
+        self.update(loads, dt_ms, report);
+        dt_ms
+    }
+
+    /// Moves the nodes.
+    fn update(&mut self, loads: &Loads, dt_ms: f32, report: &mut StepReport) {
         let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.nodes.rigid_motion());
         let update = Update {
             dt_ms,
@@ -132,7 +180,6 @@ impl Tled {
         };
         self.nodes.update(&self.elements, &update, report);
         self.elapsed_ms = dt_ms;
-        dt_ms
     }
 
     /// Puts the surface's pressure on the nodes.

@@ -1,0 +1,140 @@
+//! Which solver steps a body fastest on this machine: not by its name, by trying.
+//!
+//! # Practice
+//! Every candidate is stepped at rest through the seam, as a simulator would, for some ms by the caller's clock; what counts is wall time for a ms of tissue time, so that
+//! a solver with longer steps is not punished for them. The winner is built anew: trying leaves no trace in it.
+
+use crate::{Config, Tled};
+use trepan_soft::{Body, Loads, SoftSolver};
+
+/// A solver that may be chosen.
+pub struct Candidate<'a> {
+    /// Its name.
+    pub name: &'static str,
+    /// Makes it, at rest, or says why not.
+    pub build: Box<dyn Fn() -> Result<Box<dyn SoftSolver>, String> + 'a>,
+}
+
+/// What was chosen.
+pub struct Chosen {
+    /// The solver, at rest.
+    pub solver: Box<dyn SoftSolver>,
+    /// Its name.
+    pub name: &'static str,
+    /// What each candidate cost, in words.
+    pub why: String,
+}
+
+/// TLED on the processor, and on the graphics device where this crate has the feature `gpu`.
+pub fn candidates<'a>(body: &'a Body, config: &'a Config) -> Vec<Candidate<'a>> {
+    let processor = move || Ok(Box::new(Tled::new(body, config).map_err(|f| f.to_string())?) as Box<dyn SoftSolver>);
+    let mut all = vec![Candidate { name: "tled", build: Box::new(processor) }];
+    #[cfg(feature = "gpu")]
+    all.push(Candidate {
+        name: "tled-gpu",
+        build: Box::new(move || {
+            let gpu = trepan_gpu::Gpu::open(trepan_gpu::Prefer::Hardware).map_err(|f| f.to_string())?;
+            Ok(Box::new(crate::gpu::GpuTled::new(&gpu, body, config).map_err(|f| f.to_string())?))
+        }),
+    });
+    if all.len() == 1 {
+        let absent = || Err("this program was built without the feature `gpu`".to_string());
+        all.push(Candidate { name: "tled-gpu", build: Box::new(absent) });
+    }
+    all
+}
+
+/// Steps each under `loads` for `each_ms` of `now_ms` and takes the cheapest; an error tells why none could be built.
+pub fn fastest(
+    candidates: &[Candidate<'_>],
+    loads: &Loads,
+    each_ms: f64,
+    now_ms: &dyn Fn() -> f64,
+) -> Result<Chosen, String> {
+    let (mut words, mut best) = (Vec::new(), None::<(f64, &Candidate<'_>)>);
+    for candidate in candidates {
+        match (candidate.build)() {
+            Ok(mut solver) => {
+                let cost = cost_per_ms(&mut *solver, loads, each_ms, now_ms);
+                words.push(format!("{}: {cost:.3} ms for a ms of tissue", candidate.name));
+                if best.is_none_or(|(least, _)| cost < least) {
+                    best = Some((cost, candidate));
+                }
+            }
+            Err(fault) => words.push(format!("{}: {fault}", candidate.name)),
+        }
+    }
+    let why = words.join("; ");
+    let (_, winner) = best.ok_or_else(|| why.clone())?;
+    Ok(Chosen { solver: (winner.build)()?, name: winner.name, why })
+}
+
+fn cost_per_ms(solver: &mut dyn SoftSolver, loads: &Loads, each_ms: f64, now_ms: &dyn Fn() -> f64) -> f64 {
+    // A solver without a bound of its own takes the simulators' step.
+    let dt_ms = solver.stable_dt_ms().min(1.0);
+    solver.step(loads, dt_ms);
+    let (start, mut steps) = (now_ms(), 0u32);
+    while now_ms() - start < each_ms && steps < 1_000_000 {
+        solver.step(loads, dt_ms);
+        steps += 1;
+    }
+    (now_ms() - start) / (f64::from(steps.max(1)) * f64::from(dt_ms))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use trepan_geometry::Vec3;
+    use trepan_soft::{Material, StepReport, boxes};
+
+    /// Moves the clock on instead of a body.
+    struct Costly(Arc<AtomicU64>, u64, f32);
+
+    impl SoftSolver for Costly {
+        fn step(&mut self, _: &Loads, _: f32) -> StepReport {
+            self.0.fetch_add(self.1, Ordering::Relaxed);
+            StepReport::default()
+        }
+        fn positions(&self) -> &[Vec3] {
+            &[]
+        }
+        fn velocities(&self) -> &[Vec3] {
+            &[]
+        }
+        fn stable_dt_ms(&self) -> f32 {
+            self.2
+        }
+    }
+
+    #[test]
+    fn the_cheapest_for_a_ms_of_tissue_wins_whatever_it_is_called() {
+        let clock = Arc::new(AtomicU64::new(0));
+        let make = |name, cost, dt| {
+            let clock = Arc::clone(&clock);
+            let build = move || Ok(Box::new(Costly(Arc::clone(&clock), cost, dt)) as Box<dyn SoftSolver>);
+            Candidate { name, build: Box::new(build) }
+        };
+        let absent = Candidate { name: "absent", build: Box::new(|| Err("no adapter".into())) };
+        let all = [make("short steps", 2, 0.1), make("long steps", 10, 0.8), absent];
+        let now_ms = || clock.load(Ordering::Relaxed) as f64;
+        let chosen = fastest(&all, &Loads::default(), 200.0, &now_ms).ok().map(|c| (c.name, c.why));
+        let why =
+            "short steps: 20.000 ms for a ms of tissue; long steps: 12.500 ms for a ms of tissue; absent: no adapter";
+        assert_eq!(chosen, Some(("long steps", why.to_string())));
+        assert_eq!(fastest(&all[2..], &Loads::default(), 1.0, &now_ms).err(), Some("absent: no adapter".into()));
+    }
+
+    #[test]
+    fn a_body_gets_a_solver_at_rest_and_the_device_is_mentioned() {
+        let mesh = boxes::split_box([3, 3, 3], Vec3::splat(30.0));
+        let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
+        let body = Body::uniform(mesh, fixed, Material::BRAIN);
+        let (ticks, config) = (AtomicU64::new(0), Config::default());
+        let now_ms = || ticks.fetch_add(1, Ordering::Relaxed) as f64;
+        let chosen = fastest(&candidates(&body, &config), &Loads::default(), 10.0, &now_ms).unwrap();
+        assert!(chosen.why.contains("tled: ") && chosen.why.contains("tled-gpu: "), "{}", chosen.why);
+        assert_eq!(chosen.solver.positions(), &body.mesh.positions[..]);
+    }
+}
