@@ -5,9 +5,12 @@
 //! `κ = 2 μ (1+ν) / (3 (1-2ν))`, `E = 2 μ (1+ν)`.
 //!
 //! # Sources
+//! No preset is calibrated: each takes its number from the paper named, cited from memory and not compared with its text, and none was fitted to data here. Reports of living brain
+//! range over a factor of three; replace the numbers where forces matter.
+//!
 //! Wittek, Miller, Kikinis, Warfield, J. Biomech. 40 (2007): brain shift with 3 kPa. Miller and Chinzei, J. Biomech. 35 (2002):
 //! Ogden's law with 842 Pa and exponent -4.7, for brain in tension and compression. Both near 3 kPa at the strain rates of surgery.
-//! Budday et al., J. Mech. Behav. Biomed. Mater. 46 (2015): white matter 1.895 kPa, grey 1.389 kPa (bovine, indentation); [`Material::WHITE_MATTER`] and
+//! Budday et al., J. Mech. Behav. Biomed. Mater. 46 (2015), 318-330: white matter 1.895 kPa, grey 1.389 kPa (bovine, indentation); [`Material::WHITE_MATTER`] and
 //! [`Material::GREY_MATTER`] keep their ratio and, in equal shares, the 3 kPa of living brain, since what is dead and slow is softer.
 //! Wittek et al., Prog. Biophys. Mol. Biol. 103 (2010): ventricles as a solid of 10 Pa and ν 0.1, which the fluid can leave.
 //! Torii et al., Comput. Methods Appl. Mech. Eng. 195 (2006): wall of a cerebral artery 1 MPa, ν 0.45.
@@ -105,13 +108,13 @@ impl Material {
     /// Grey matter.
     pub const GREY_MATTER: Self = Self::NeoHookean { young_mpa: 0.002_54, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// A ventricle filled with CSF, as a solid so soft and compressible that it neither holds the brain up nor keeps it from closing.
+    /// A ventricle filled with CSF, uncalibrated: as a solid so soft and compressible that it neither holds the brain up nor keeps it from closing.
     pub const VENTRICLE: Self = Self::NeoHookean { young_mpa: 1.0e-5, poisson: 0.1, density_g_mm3: 1.0e-3 };
 
-    /// Wall of a cerebral artery. 300 times as stiff as brain: it shortens the stable step 18 times where elements are as large.
+    /// Wall of a cerebral artery, uncalibrated. 300 times as stiff as brain: it shortens the stable step 18 times where elements are as large.
     pub const VESSEL_WALL: Self = Self::NeoHookean { young_mpa: 1.0, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// A tumour, three times as stiff as the brain around it (reports range from 2 to 10 times).
+    /// A tumour, uncalibrated: three times as stiff as the brain around it (reports range from 2 to 10 times).
     pub const TUMOUR: Self = Self::NeoHookean { young_mpa: 0.009, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
     /// The thesis's Table 6.1 in consistent units: 30 kPa, ν 0.3; ten times stiffer and far more compressible than living brain.

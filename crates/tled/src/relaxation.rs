@@ -34,7 +34,7 @@ impl Relaxation {
     /// No relaxation: elastic.
     pub const NONE: Self = Self { share: [0.0; 2], time_ms: [1.0; 2] };
 
-    /// Brain, Miller and Chinzei 2002: 45 % within half a second, 36.5 % within 50 s.
+    /// Brain as of Miller and Chinzei 2002, uncalibrated: 45 % within half a second, 36.5 % within 50 s.
     pub const BRAIN: Self = Self { share: [0.450, 0.365], time_ms: [500.0, 50_000.0] };
 
     /// Whether anything fades.

@@ -5,6 +5,7 @@
 //! way. What counts as cost is the computing time from the first step to rest, [`SETTLE_MS`] of simulated time.
 
 use super::Scope;
+use crate::picture::{Chart, Mark};
 use crate::suite::{Findings, Gate, Row};
 use std::time::Instant;
 use trepan_geometry::{Vec3, units};
@@ -43,6 +44,14 @@ pub fn run(scope: Scope, findings: &mut Findings) {
             );
         }
     }
+    let mark = |p: &Point| Mark { method: p.method.into(), cost: p.cost_ms, error: p.error_percent };
+    findings.charts.push(Chart {
+        title: "A block hangs down: error over the time from the first step to rest".into(),
+        cost: "time_to_rest_ms".into(),
+        error: "displacement_error_percent".into(),
+        marks: points.iter().map(mark).collect(),
+        ..Chart::default()
+    });
     same_mesh(scope.pick(4, 8), findings);
 }
 

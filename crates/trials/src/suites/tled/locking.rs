@@ -11,6 +11,7 @@
 //! beside it.
 
 use super::Scope;
+use crate::picture::{Chart, Mark};
 use crate::suite::{Findings, Gate, Row};
 use crate::timer::Samples;
 use glam::DVec3;
@@ -133,7 +134,29 @@ pub fn run(scope: Scope, findings: &mut Findings) {
             }
         }
     }
+    chart(
+        "Force under a prescribed displacement: error over the time to rest, all scenes and ν",
+        "force_error_percent",
+        findings,
+    );
 }
+
+fn chart(title: &str, error: &str, findings: &mut Findings) {
+    let mark = |row: &Row| {
+        Some(Mark { method: row.method.clone(), cost: *row.metrics.get(COST)?, error: *row.metrics.get(error)? })
+    };
+    let marks = findings.rows.iter().filter_map(mark).collect();
+    findings.charts.push(Chart {
+        title: title.into(),
+        cost: COST.into(),
+        error: error.into(),
+        marks,
+        ..Chart::default()
+    });
+}
+
+/// The metric of cost.
+const COST: &str = "time_to_rest_ms";
 
 /// Crowds nodes towards both ends of 0 to 1, where clamped edges are singular.
 fn crowded(x: f32) -> f32 {
@@ -177,7 +200,7 @@ fn off_percent(
             .with("tets", body.mesh.tets.len())
             .with("steps_to_rest", settled.steps)
             .metric("step_p50_us", times.quantile(0.5))
-            .metric("time_to_rest_ms", cost_ms)
+            .metric(COST, cost_ms)
             .metric("left_mm", f64::from(settled.left_mm))
             .metric(of, found.length())
             .metric(error_name, error),

@@ -1,11 +1,15 @@
 //! Where solvers of this kind fail: the border, method by method, and what the recommended one does there.
 
 use super::Scope;
+use crate::picture::{Map, Outcome};
 use crate::suite::{Findings, Gate, Row};
 use trepan_contact::NodalContact;
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 use trepan_tled::{Config, Damping, Settling, Tled};
+
+/// Whether a method held, 1 or 0.
+const HELD: &str = "held_verdict";
 
 /// Every row of the map.
 pub fn run(scope: Scope, findings: &mut Findings) {
@@ -17,6 +21,32 @@ pub fn run(scope: Scope, findings: &mut Findings) {
     stiffness_jump(findings);
     slivers(findings);
     drift(scope, findings);
+    draw(findings);
+}
+
+/// One map for each run of scenes that were put to the same methods.
+fn draw(findings: &mut Findings) {
+    let mut scenes: Vec<(&str, Vec<(&str, bool)>)> = Vec::new();
+    for row in &findings.rows {
+        let Some(held) = row.metrics.get(HELD) else { continue };
+        let told = (row.method.as_str(), *held > 0.5);
+        match scenes.last_mut().filter(|(scene, _)| *scene == row.scene) {
+            Some((_, methods)) => methods.push(told),
+            None => scenes.push((&row.scene, vec![told])),
+        }
+    }
+    let names = |methods: &[(&str, bool)]| methods.iter().map(|(name, _)| name.to_string()).collect::<Vec<_>>();
+    let cell = |held: bool| if held { Outcome::Works } else { Outcome::Fails("gives way".into()) };
+    let map = |scenes: &[(&str, Vec<(&str, bool)>)]| Map {
+        title: names(&scenes[0].1).iter().enumerate().map(|(i, name)| format!("{}: {name}  ", i + 1)).collect(),
+        x: "method".into(),
+        y: "scene".into(),
+        columns: (1..=scenes[0].1.len()).map(|i| i.to_string()).collect(),
+        rows: scenes.iter().map(|(scene, _)| scene.to_string()).collect(),
+        cells: scenes.iter().map(|(_, told)| told.iter().map(|(_, held)| cell(*held)).collect()).collect(),
+        ..Map::default()
+    };
+    findings.maps = scenes.chunk_by(|a, b| names(&a.1) == names(&b.1)).map(map).collect();
 }
 
 fn cube(cells: usize, material: Material) -> Body {
@@ -37,7 +67,7 @@ fn offset(solver: &dyn SoftSolver, body: &Body) -> f64 {
 
 /// Records whether a method held, and promises what should be.
 fn verdict(scene: String, method: &str, held: bool, wanted: bool, measured: (&str, f64), findings: &mut Findings) {
-    let row = Row::new(&scene, method).metric("held_verdict", f64::from(held)).metric(measured.0, measured.1);
+    let row = Row::new(&scene, method).metric(HELD, f64::from(held)).metric(measured.0, measured.1);
     findings.rows.push(row);
     let name = format!("{scene}, {method}: {}", if wanted { "holds" } else { "fails (the border is where it is)" });
     findings.gates.push(Gate::at_least(name, f64::from(held == wanted), 1.0));
@@ -97,9 +127,10 @@ fn stretched(findings: &mut Findings) {
             }
             let (left, reported) = released(&mut solver, &body);
             let scene = format!("let go at stretch {stretch}");
-            let row = Row::new(&scene, method).metric("left_mm", left).metric("reported_count", f64::from(reported));
-            findings.rows.push(row);
             let (held, wanted) = (left < 0.2, method == "neo-Hookean");
+            let told = f64::from(held || wanted && reported > 0);
+            let row = Row::new(&scene, method).metric("left_mm", left).metric("reported_count", f64::from(reported));
+            findings.rows.push(row.metric(HELD, told));
             if wanted {
                 let name = format!("{scene}, {method}: comes back or reports");
                 findings.gates.push(Gate::at_least(name, f64::from(held || reported > 0), 1.0));
@@ -139,7 +170,8 @@ fn inverted(findings: &mut Findings) {
             if wanted || percent == 100 {
                 verdict(scene, method, left == 0.0, wanted, ("inverted_share_percent", share), findings);
             } else {
-                findings.rows.push(Row::new(scene, method).metric("inverted_count", left));
+                let row = Row::new(scene, method).metric("inverted_count", left);
+                findings.rows.push(row.metric(HELD, f64::from(left == 0.0)));
             }
         }
     }
@@ -182,6 +214,8 @@ fn hard_contact(findings: &mut Findings) {
             let scene = format!("contact spring of {stiffness} N/mm");
             if wanted || (10.0..1000.0).contains(&stiffness) {
                 verdict(scene, method, held, wanted, ("contact_scale", f64::from(scale)), findings);
+            } else {
+                findings.rows.push(Row::new(scene, method).metric(HELD, f64::from(held)));
             }
         }
     }
