@@ -60,7 +60,7 @@ fn kernels(scope: Scope, findings: &mut Findings) {
     let body = block(BRAIN);
     let scene = format!("block, {} tetrahedra", body.mesh.tets.len());
     let mut runs: Vec<Run> = configs().iter().map(|(name, config)| prepared(*name, &body, config)).collect();
-    race(&mut runs, scope.pick(60, 400));
+    race(&mut runs, scope.pick(200, 1000));
     let bytes = |run: &Run| run.solver.positions().iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>();
     let best_of = |wanted: &str| runs.iter().find(|run| run.name == wanted).map(|run| run.best_us);
     let (scalar, first, plain) = (bytes(&runs[0]), runs[0].best_us, best_of("fastest").unwrap_or(f64::NAN));
