@@ -128,7 +128,11 @@ fn loaded(scope: Scope, findings: &mut Findings) {
     let (over, cores) = (AtomicBool::new(false), std::thread::available_parallelism().map_or(1, usize::from));
     std::thread::scope(|scope_of_threads| {
         for _ in 0..cores {
-            scope_of_threads.spawn(|| while !over.load(Ordering::Relaxed) {});
+            scope_of_threads.spawn(|| {
+                while !over.load(Ordering::Relaxed) {
+                    std::hint::spin_loop()
+                }
+            });
         }
         for _ in 0..scope.pick(20, 100) {
             for (_, run, times) in &mut runs {
