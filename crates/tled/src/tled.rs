@@ -146,7 +146,8 @@ impl Tled {
             Pass::Volumes => self.elements.average_volumes(&self.nodes.u),
             Pass::Forces => _ = self.elements.find_forces(&self.nodes.u, dt_ms),
             Pass::Press => {
-                self.press(&loads.contact, dt_ms, self.bound_ms, &mut report);
+                let omega2 = 4.0 / (self.bound_ms * self.bound_ms);
+                self.press(loads, StepBound { dt_ms, omega2 }, &mut report);
                 self.push();
             }
             Pass::Update => self.update(loads, dt_ms, &mut report),
