@@ -77,7 +77,7 @@ fn recorded(scope: Scope, findings: &mut Findings) {
     let scene = Scene::brain_at_rest(recording::TETS);
     for name in recording::NAMES {
         let tips = recording::tips(name);
-        let tips = &tips[..scope.pick(tips.len() / 10, tips.len())];
+        let tips = &tips[..scope.pick(tips.len() / 50, tips.len())];
         follow(&scene, &format!("{}, at rest, recorded path {name}", scene.name), tips, false, findings);
     }
 }
