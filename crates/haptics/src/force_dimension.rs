@@ -20,7 +20,7 @@
 mod library;
 
 use crate::ramp::Ramp;
-use crate::{Capabilities, DeviceError, Fault, HapticDevice, Reading, Status, Watch, Workspace};
+use crate::{Capabilities, DeviceError, Fault, HapticDevice, Listed, Reading, Status, Watch, Workspace};
 use library::{Drd, Outcome};
 use std::path::PathBuf;
 use trepan_contact::GuardedWrench;
@@ -189,12 +189,17 @@ impl Drop for ForceDimension {
     }
 }
 
-/// Whether the library is there, and how many devices it sees.
-pub(crate) fn probe() -> Result<String, DeviceError> {
-    Drd::load(None).map(|drd| match drd.device_count() {
-        1.. => "ready".to_owned(),
-        _ => "its library is installed; no device is connected".to_owned(),
-    })
+/// Every device that the library sees.
+pub(crate) fn probe() -> Result<Vec<Listed>, DeviceError> {
+    Drd::load(None).map(|drd| found(&drd))
+}
+
+fn found(drd: &Drd) -> Vec<Listed> {
+    let listed = |name: String, state: &str| Listed { name, state: state.to_owned() };
+    match drd.device_count() {
+        count @ 1.. => (0..count).map(|number| listed(format!("force-dimension:{number}"), "ready")).collect(),
+        _ => vec![listed("force-dimension".to_owned(), "its library is installed; no device is connected")],
+    }
 }
 
 fn prepare(drd: &Drd, id: i8, auto_init: bool) -> Result<(), DeviceError> {

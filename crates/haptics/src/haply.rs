@@ -25,7 +25,7 @@ mod pump;
 mod websocket;
 
 use crate::ramp::Ramp;
-use crate::{Capabilities, DeviceError, HapticDevice, Reading, Status, Watch, Workspace};
+use crate::{Capabilities, DeviceError, HapticDevice, Listed, Reading, Status, Watch, Workspace};
 use protocol::{Frame, Garbled};
 use pump::{Flags, News, Pump, Wish};
 use std::sync::Arc;
@@ -206,11 +206,16 @@ impl Drop for Haply {
     }
 }
 
-/// Whether the service is there, and a device with it.
-pub(crate) fn probe() -> Result<String, DeviceError> {
-    let config = Config::default();
+/// Every device that the service has.
+pub(crate) fn probe() -> Result<Vec<Listed>, DeviceError> {
+    list(&Config::default())
+}
+
+/// Every device that a service has, by the name that opens it; an error says what is missing and what to do.
+pub fn list(config: &Config) -> Result<Vec<Listed>, DeviceError> {
     let mut socket = connect(&config.service)?;
-    let found = find(&mut socket, None).map(|device| format!("ready: Inverse3 {device}"));
+    let listed = |id: String| Listed { name: format!("haply:{id}"), state: "ready".to_owned() };
+    let found = devices(&mut socket, None).map(|ids| ids.into_iter().map(listed).collect());
     socket.close();
     found
 }
@@ -220,9 +225,20 @@ fn connect(service: &str) -> Result<WebSocket, DeviceError> {
         .map_err(|error| not_opened(error.to_string(), "install and start Haply's Inverse service"))
 }
 
-/// Reads the inventory, introduces us, and gives the id of the device.
+/// Introduces us to the wanted device, or the first, and gives its id.
 fn find(socket: &mut WebSocket, wanted: Option<&str>) -> Result<String, DeviceError> {
-    let broken = |error: std::io::Error| not_opened(error.to_string(), "restart Haply's Inverse service");
+    let device = devices(socket, wanted)?.swap_remove(0);
+    socket.send(&protocol::hello(&device)).map_err(broken)?;
+    socket.receive(PATIENCE).map_err(broken)?;
+    Ok(device)
+}
+
+fn broken(error: std::io::Error) -> DeviceError {
+    not_opened(error.to_string(), "restart Haply's Inverse service")
+}
+
+/// Reads the inventory: ids of the devices that answer to `wanted`, at least one.
+fn devices(socket: &mut WebSocket, wanted: Option<&str>) -> Result<Vec<String>, DeviceError> {
     let inventory = socket.receive(PATIENCE).map_err(broken)?;
     let Some(inventory) = inventory else {
         return Err(not_opened(
@@ -230,23 +246,20 @@ fn find(socket: &mut WebSocket, wanted: Option<&str>) -> Result<String, DeviceEr
             "restart Haply's Inverse service",
         ));
     };
-    let device = match protocol::first_device(&inventory, wanted) {
-        Ok(Some(device)) => device,
-        Ok(None) => {
+    match protocol::devices(&inventory, wanted) {
+        Ok(devices) if !devices.is_empty() => Ok(devices),
+        Ok(_) => {
             let reason = wanted
                 .map_or_else(|| "no Inverse3 is connected".to_owned(), |id| format!("no Inverse3 {id} is connected"));
-            return Err(not_opened(reason, "plug it in, switch it on and see whether Haply Hub finds it"));
+            Err(not_opened(reason, "plug it in, switch it on and see whether Haply Hub finds it"))
         }
         Err(Garbled::TooOld) => {
-            return Err(not_opened("its service is older than 3.5".to_owned(), "update Haply's Inverse service"));
+            Err(not_opened("its service is older than 3.5".to_owned(), "update Haply's Inverse service"))
         }
         Err(Garbled::NotJson) => {
-            return Err(not_opened("what answers is not Haply's service".to_owned(), "see which program has its port"));
+            Err(not_opened("what answers is not Haply's service".to_owned(), "see which program has its port"))
         }
-    };
-    socket.send(&protocol::hello(&device)).map_err(broken)?;
-    socket.receive(PATIENCE).map_err(broken)?;
-    Ok(device)
+    }
 }
 
 fn not_opened(reason: String, remedy: &'static str) -> DeviceError {

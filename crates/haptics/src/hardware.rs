@@ -19,15 +19,16 @@ pub fn open(name: &DeviceName, workspace: Workspace) -> Option<Result<Hardware, 
             let config = openhaptics::Config { device: device.clone(), workspace, ..Default::default() };
             Some(openhaptics::OpenHaptics::open(&config).map(|d| Hardware { watch: d.watch(), device: Box::new(d) }))
         }
-        DeviceName::ForceDimension => {
-            let config = force_dimension::Config { workspace, ..Default::default() };
+        DeviceName::ForceDimension(number) => {
+            let index = number.unwrap_or(0).cast_signed();
+            let config = force_dimension::Config { index, workspace, ..Default::default() };
             Some(
                 force_dimension::ForceDimension::open(&config)
                     .map(|d| Hardware { watch: d.watch(), device: Box::new(d) }),
             )
         }
-        DeviceName::Haply => {
-            let config = haply::Config { workspace, ..Default::default() };
+        DeviceName::Haply(device) => {
+            let config = haply::Config { device: device.clone(), workspace, ..Default::default() };
             Some(haply::Haply::open(&config).map(|d| Hardware { watch: d.watch(), device: Box::new(d) }))
         }
         DeviceName::SpaceMouse => {
@@ -38,19 +39,22 @@ pub fn open(name: &DeviceName, workspace: Workspace) -> Option<Result<Hardware, 
     }
 }
 
-/// The hardware that a user can ask for, and whether its library or service is there. Devices are not opened: that could
-/// move them.
+/// The hardware that a user can ask for, each device that is found by its own name, and where there is none, what is missing. Devices
+/// are not opened: that could move them.
 pub(crate) fn list() -> Vec<Listed> {
-    let listed = |name: &str, found: Result<String, DeviceError>| Listed {
+    let one = |name: &str, found: Result<String, DeviceError>| Listed {
         name: name.to_owned(),
         state: found.unwrap_or_else(|error| error.to_string()),
     };
-    vec![
-        listed("openhaptics", openhaptics::probe()),
-        listed("force-dimension", force_dimension::probe()),
-        listed("haply", haply::probe()),
-        listed("spacemouse", spacemouse::probe()),
-    ]
+    let mut listed = vec![one("openhaptics", openhaptics::probe())];
+    for (name, found) in [("force-dimension", force_dimension::probe()), ("haply", haply::probe())] {
+        match found {
+            Ok(devices) => listed.extend(devices),
+            Err(error) => listed.push(one(name, Err(error))),
+        }
+    }
+    listed.push(one("spacemouse", spacemouse::probe()));
+    listed
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@
 //! # When not to use it
 //! For input that moves a camera or a menu.
 
+mod aside;
 mod clutch;
 mod device;
 mod dynamic;
@@ -32,6 +33,7 @@ pub mod spacemouse;
 pub mod template;
 mod workspace;
 
+pub use aside::Aside;
 pub use clutch::Clutch;
 pub use device::{Capabilities, HapticDevice, Reading, Status};
 pub use error::DeviceError;

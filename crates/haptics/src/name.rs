@@ -17,10 +17,10 @@ pub enum DeviceName {
     Simulated(String),
     /// `openhaptics[:NAME]`: 3D Systems Touch and its kin, by the name given in the vendor's set-up tool.
     OpenHaptics(Option<String>),
-    /// `force-dimension`: omega, delta, sigma, lambda, Falcon.
-    ForceDimension,
-    /// `haply`: Inverse3 with VerseGrip, through its service.
-    Haply,
+    /// `force-dimension[:N]`: omega, delta, sigma, lambda, Falcon; the first, or by its number from 0.
+    ForceDimension(Option<u8>),
+    /// `haply[:ID]`: Inverse3 with VerseGrip, through its service; the first, or by its four hexadecimal digits.
+    Haply(Option<String>),
     /// `spacemouse`: a six-axis knob, without force.
     SpaceMouse,
 }
@@ -50,6 +50,14 @@ pub enum NameError {
         /// An example of it.
         example: &'static str,
     },
+    /// The device goes by a number.
+    #[error("device {name}:{text} goes by a number; write {name}:N with N from 0 to 127, as --list-devices does")]
+    NoNumber {
+        /// The device.
+        name: String,
+        /// What was after the colon.
+        text: String,
+    },
     /// The device takes nothing after a colon.
     #[error("device {name:?} takes no {extra:?}; write {name}")]
     Superfluous {
@@ -61,7 +69,7 @@ pub enum NameError {
 }
 
 const KNOWN: &str =
-    "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension, haply, spacemouse";
+    "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension[:N], haply[:ID], spacemouse";
 
 impl FromStr for DeviceName {
     type Err = NameError;
@@ -78,9 +86,13 @@ impl FromStr for DeviceName {
         let incomplete = |what, example| NameError::Incomplete { name: driver.to_owned(), what, example };
         match driver {
             "mouse" => plain(Self::Mouse),
-            "force-dimension" => plain(Self::ForceDimension),
-            "haply" => plain(Self::Haply),
             "spacemouse" => plain(Self::SpaceMouse),
+            "haply" => Ok(Self::Haply(detail.map(str::to_owned))),
+            "force-dimension" => match detail.map(|number| (number, number.parse::<u8>())) {
+                None => Ok(Self::ForceDimension(None)),
+                Some((_, Ok(number))) if number < 128 => Ok(Self::ForceDimension(Some(number))),
+                Some((text, _)) => Err(NameError::NoNumber { name: driver.to_owned(), text: text.to_owned() }),
+            },
             "openhaptics" => Ok(Self::OpenHaptics(detail.map(str::to_owned))),
             "replay" => Ok(Self::Replay(detail.ok_or_else(|| incomplete("file", "session.mcap"))?.into())),
             "script" | "simulated" => {
@@ -104,8 +116,10 @@ impl std::fmt::Display for DeviceName {
             Self::Simulated(name) => write!(f, "simulated:{name}"),
             Self::OpenHaptics(None) => f.write_str("openhaptics"),
             Self::OpenHaptics(Some(name)) => write!(f, "openhaptics:{name}"),
-            Self::ForceDimension => f.write_str("force-dimension"),
-            Self::Haply => f.write_str("haply"),
+            Self::ForceDimension(None) => f.write_str("force-dimension"),
+            Self::ForceDimension(Some(number)) => write!(f, "force-dimension:{number}"),
+            Self::Haply(None) => f.write_str("haply"),
+            Self::Haply(Some(id)) => write!(f, "haply:{id}"),
             Self::SpaceMouse => f.write_str("spacemouse"),
         }
     }
@@ -145,7 +159,9 @@ mod tests {
             "openhaptics",
             "openhaptics:Left",
             "force-dimension",
+            "force-dimension:1",
             "haply",
+            "haply:049D",
             "spacemouse",
         ];
         for name in names {
@@ -160,7 +176,8 @@ mod tests {
         assert!(error("script").contains("write script:craniotomy-and-probe"));
         assert!(error("script:x").contains("craniotomy-and-probe, craniotomy, probe"));
         assert!(error("replay:").contains("file"));
-        assert!(error("haply:2").contains("takes no \"2\""));
+        assert!(error("mouse:2").contains("takes no \"2\""));
+        assert!(error("force-dimension:left").contains("0 to 127"));
     }
 
     #[test]

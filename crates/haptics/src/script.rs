@@ -29,7 +29,9 @@ use trepan_contact::GuardedWrench;
 use trepan_geometry::{ToolState, Wrench};
 
 /// The names of the operations that [`Script::named`] knows.
-pub const NAMES: [&str; 3] = ["craniotomy-and-probe", "craniotomy", "probe"];
+///
+/// `aspirate` is for the second hand: its tool comes beside the burr and rests on the bone there.
+pub const NAMES: [&str; 4] = ["craniotomy-and-probe", "craniotomy", "probe", "aspirate"];
 
 /// Duration of an operation when none is asked for, ms.
 pub const DEFAULT_DURATION_MS: f64 = 20_000.0;
@@ -203,6 +205,20 @@ mod tests {
     }
 
     #[test]
+    fn the_aspirator_stays_beside_the_burr_and_presses_no_button() {
+        let (site, plan) = (site(), Plan::default());
+        let burr = Script::named("craniotomy", &site, 20_000.0).unwrap();
+        let aspirator = Script::named("aspirate", &site, 20_000.0).unwrap();
+        let radii = plan.burr_radius_mm + plan.aspirator_radius_mm;
+        for (burr, tool) in ticks(&burr).zip(ticks(&aspirator)) {
+            assert!(tool.tip().distance(burr.tip()) > radii + 1.0, "{} {}", tool.tip(), burr.tip());
+            assert_eq!(tool.buttons.0, 0);
+        }
+        let deepest = ticks(&aspirator).map(|tool| depth(&site, &tool)).fold(f32::MIN, f32::max);
+        assert!(deepest + plan.aspirator_radius_mm > 1.0, "it touches: {deepest}");
+    }
+
+    #[test]
     fn the_next_tool_is_asked_for_once_and_far_from_the_patient() {
         let script = Script::named("craniotomy-and-probe", &site(), 20_000.0).unwrap();
         let all: Vec<ToolState> = ticks(&script).collect();
@@ -243,7 +259,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn motion_is_continuous_and_velocity_is_its_derivative(name in 0usize..3, duration_ms in 50.0f64..60_000.0, at in 0.0f64..1.0) {
+        fn motion_is_continuous_and_velocity_is_its_derivative(name in 0usize..4, duration_ms in 50.0f64..60_000.0, at in 0.0f64..1.0) {
             let script = Script::named(NAMES[name], &site(), duration_ms).unwrap();
             let (t, h) = (at * duration_ms, duration_ms * 1e-4);
             let (a, b) = (script.at(t), script.at(t + h));

@@ -1,7 +1,7 @@
 //! Writes a session to an MCAP file, so that a cut at any byte loses at most the last quarter of a second.
 //!
 //! # Practice
-//! One topic per record type in Trepan's own protobuf schemas (`/tick`, `/collision`, `/solver`, `/event`), and
+//! One topic per record type in Trepan's own protobuf schemas (`/tick`, `/second`, `/collision`, `/solver`, `/event`), and
 //! `/tool` and `/log` in Foxglove's for viewers. Chunks are compressed with LZ4 and closed after [`MAX_CHUNK_BYTES`]
 //! or [`MAX_CHUNK_MS`] of session time, whichever comes first, then handed to the operating system: a killed process
 //! loses the open chunk only. A tick takes 2 µs and 80 to 250 B, but 5 ms when a chunk closes, or as long as the disk
@@ -11,7 +11,7 @@
 //! MCAP: <https://mcap.dev/spec>.
 
 use crate::protobuf::{Fields, encode, file_descriptor_set};
-use crate::wire::{CollisionRecord, EventRecord, SessionHeader, SolverRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TickRecord};
 use crate::{LinkError, viewer};
 use foxglove::Encode;
 use mcap::records::{MessageHeader, Metadata};
@@ -48,8 +48,12 @@ pub struct Recorder<W: Write + Seek = BufWriter<File>> {
     newest_ms: f64,
     chunk_began_ms: f64,
     next_view_ms: f64,
-    sequences: [u32; 6],
+    next_second_view_ms: f64,
+    sequences: [u32; CHANNELS],
 }
+
+/// How many channels there are.
+const CHANNELS: usize = 7;
 
 /// Channel ids.
 struct Channels {
@@ -59,6 +63,7 @@ struct Channels {
     event: u16,
     tool: u16,
     log: u16,
+    second: u16,
 }
 
 impl Recorder {
@@ -85,7 +90,8 @@ impl<W: Write + Seek> Recorder<W> {
             newest_ms: 0.0,
             chunk_began_ms: 0.0,
             next_view_ms: f64::NEG_INFINITY,
-            sequences: [0; 6],
+            next_second_view_ms: f64::NEG_INFINITY,
+            sequences: [0; CHANNELS],
         })
     }
 
@@ -99,6 +105,17 @@ impl<W: Write + Seek> Recorder<W> {
             self.foxglove(self.channels.tool, &viewer::frame(&record.proxy, "tool", time_ns))?;
         }
         self.message(self.channels.tick, record)
+    }
+
+    /// Records a tick of the second hand.
+    pub fn second(&mut self, record: &SecondRecord) -> Result<(), LinkError> {
+        self.advance(record.time_ms)?;
+        if record.time_ms >= self.next_second_view_ms {
+            self.next_second_view_ms = record.time_ms + VIEW_PERIOD_MS;
+            let time_ns = nanoseconds(record.time_ms);
+            self.foxglove(self.channels.tool, &viewer::frame(&record.proxy, "second_tool", time_ns))?;
+        }
+        self.message(self.channels.second, record)
     }
 
     /// Records a collision step, at the session time of the newest tick.
@@ -154,7 +171,7 @@ impl<W: Write + Seek> Recorder<W> {
 
     /// Writes `self.bytes`.
     fn write(&mut self, channel: u16) -> Result<(), LinkError> {
-        let sequence = &mut self.sequences[usize::from(channel - 1) % 6];
+        let sequence = &mut self.sequences[usize::from(channel - 1) % CHANNELS];
         let time_ns = nanoseconds(self.newest_ms);
         let header =
             MessageHeader { channel_id: channel, sequence: *sequence, log_time: time_ns, publish_time: time_ns };
@@ -172,6 +189,7 @@ impl Channels {
             event: own_channel::<EventRecord, W>(mcap, "/event")?,
             tool: foxglove_channel::<foxglove::messages::FrameTransform, W>(mcap, "/tool")?,
             log: foxglove_channel::<foxglove::messages::Log, W>(mcap, "/log")?,
+            second: own_channel::<SecondRecord, W>(mcap, "/second")?,
         })
     }
 }

@@ -14,7 +14,7 @@ pub use repair::{Repaired, repair};
 
 use crate::LinkError;
 use crate::recorder::{FORMAT, FORMAT_KEY, HEADER_KEY, HEADER_NAME};
-use crate::wire::{CollisionRecord, EventRecord, SessionHeader, SolverRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TickRecord};
 use scan::{Cursor, Topic};
 use std::collections::HashMap;
 use std::path::Path;
@@ -26,6 +26,8 @@ pub struct Recording {
     pub header: SessionHeader,
     /// Haptic ticks in the order in which they were recorded.
     pub ticks: Vec<TickRecord>,
+    /// Ticks of the second hand, where there was one.
+    pub second: Vec<SecondRecord>,
     /// Collision steps.
     pub collisions: Vec<CollisionRecord>,
     /// Solver steps.
@@ -60,15 +62,16 @@ impl Recording {
     }
 
     /// How many records of each sort are here: a mark to go back to.
-    fn mark(&self) -> [usize; 4] {
-        [self.ticks.len(), self.collisions.len(), self.solver.len(), self.events.len()]
+    fn mark(&self) -> [usize; 5] {
+        [self.ticks.len(), self.collisions.len(), self.solver.len(), self.events.len(), self.second.len()]
     }
 
-    fn rewind(&mut self, mark: [usize; 4]) {
+    fn rewind(&mut self, mark: [usize; 5]) {
         self.ticks.truncate(mark[0]);
         self.collisions.truncate(mark[1]);
         self.solver.truncate(mark[2]);
         self.events.truncate(mark[3]);
+        self.second.truncate(mark[4]);
     }
 }
 

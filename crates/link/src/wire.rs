@@ -99,6 +99,55 @@ impl Default for TickRecord {
     }
 }
 
+/// One tick of the second hand.
+#[derive(Clone, Copy, Debug)]
+pub struct SecondRecord {
+    /// Number of the tick, as the first hand's.
+    pub tick: u64,
+    /// Session time at which the device was read, ms.
+    pub time_ms: f64,
+    /// Where the device held the tool, `world_from_tool`.
+    pub device: Pose,
+    /// How the device moved it.
+    pub twist: Twist,
+    /// Pressed buttons, one bit each.
+    pub buttons: u32,
+    /// Where contact let the tool be, `world_from_tool`.
+    pub proxy: Pose,
+    /// What went to the hand after the guard.
+    pub wrench: Wrench,
+    /// Depth in bone, mm.
+    pub depth_mm: f32,
+    /// Depth in the brain at rest, mm.
+    pub tissue_depth_mm: f32,
+    /// As in [`TickRecord`]: `STALE`, `LOST`, `RELEASED`, `CLAMPED`.
+    pub flags: u32,
+}
+
+impl SecondRecord {
+    /// Whether every flag of `mask` is set.
+    pub fn has(&self, mask: u32) -> bool {
+        self.flags & mask == mask
+    }
+}
+
+impl Default for SecondRecord {
+    fn default() -> Self {
+        Self {
+            tick: 0,
+            time_ms: 0.0,
+            device: Pose::IDENTITY,
+            twist: Twist::default(),
+            buttons: 0,
+            proxy: Pose::IDENTITY,
+            wrench: Wrench::ZERO,
+            depth_mm: 0.0,
+            tissue_depth_mm: 0.0,
+            flags: 0,
+        }
+    }
+}
+
 /// One step of the collision loop between tool and tissue.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CollisionRecord {

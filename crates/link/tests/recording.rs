@@ -4,7 +4,7 @@
 use std::io::{Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
 use trepan_geometry::{Pose, Quat, Twist, Vec3, Wrench};
-use trepan_link::wire::{CollisionRecord, EventRecord, SessionHeader, SolverRecord, TickRecord};
+use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TickRecord};
 use trepan_link::{LinkError, Recorder, Recording, Repaired, repair};
 
 fn header() -> SessionHeader {
@@ -87,9 +87,15 @@ fn bits(t: &TickRecord) -> Vec<u64> {
     floats.iter().map(|f| u64::from(f.to_bits())).chain(whole).collect()
 }
 
+fn second(number: u64) -> SecondRecord {
+    let TickRecord { tick, time_ms, device, twist, buttons, proxy, wrench, depth_mm, .. } = tick(number);
+    SecondRecord { tick, time_ms, device, twist, buttons, proxy, wrench, depth_mm, tissue_depth_mm: 0.5, flags: 3 }
+}
+
 fn record<W: Write + Seek>(recorder: &mut Recorder<W>, ticks: u64) -> Result<(), LinkError> {
     for number in 0..ticks {
         recorder.tick(&tick(number))?;
+        recorder.second(&second(number))?;
         recorder.collision(&CollisionRecord { seq: number, tick: number, points: 3, ..Default::default() })?;
         if number % 7 == 0 {
             recorder.solver(&SolverRecord { step: number, time_ms: 0.1, inverted: 2, ..Default::default() })?;
@@ -127,6 +133,10 @@ fn every_record_comes_back_bit_for_bit() {
     assert_eq!(recording.ticks.len(), 1000);
     for (number, read) in recording.ticks.iter().enumerate() {
         assert_eq!(bits(read), bits(&tick(number as u64)));
+    }
+    assert_eq!(recording.second.len(), 1000);
+    for (number, read) in recording.second.iter().enumerate() {
+        assert_eq!(format!("{read:?}"), format!("{:?}", second(number as u64)));
     }
     assert_eq!((recording.collisions.len(), recording.solver.len(), recording.events.len()), (1000, 143, 20));
     assert_eq!(recording.solver[1], SolverRecord { step: 7, time_ms: 0.1, inverted: 2, ..Default::default() });

@@ -79,11 +79,11 @@ pub(super) enum Garbled {
     TooOld,
 }
 
-/// Id of the first device, or of `wanted`, in the service's inventory.
-pub(super) fn first_device(message: &str, wanted: Option<&str>) -> Result<Option<String>, Garbled> {
+/// Ids of the devices in the service's inventory; of `wanted` only, if it is given.
+pub(super) fn devices(message: &str, wanted: Option<&str>) -> Result<Vec<String>, Garbled> {
     let message = object(message)?;
     let ids = entries(&message, "inverse3").filter_map(|entry| entry["device_id"].as_str());
-    Ok(ids.filter(|id| wanted.is_none_or(|wanted| wanted.eq_ignore_ascii_case(id))).map(str::to_owned).next())
+    Ok(ids.filter(|id| wanted.is_none_or(|wanted| wanted.eq_ignore_ascii_case(id))).map(str::to_owned).collect())
 }
 
 /// What a message says about `device`. `None` in its place means that the device is not in a list that is there: gone.
@@ -207,7 +207,9 @@ mod tests {
             (frame.status, frame.orientation, frame.buttons),
             (Some(Ok(())), Some(Quat::IDENTITY), Some(Buttons(1)))
         );
-        assert_eq!(first_device(FRAME, Some("049d")), Ok(Some("049D".to_owned())));
+        assert_eq!(devices(FRAME, Some("049d")), Ok(vec!["049D".to_owned()]));
+        assert_eq!(devices(FRAME, None), Ok(vec!["BAD1".to_owned(), "049D".to_owned()]));
+        assert_eq!(devices(FRAME, Some("049E")), Ok(Vec::new()));
     }
 
     #[test]
@@ -248,7 +250,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_text_is_read_without_a_panic(text in "\\PC{0,200}") {
-            let _ = (frame(&text, "1"), first_device(&text, None), event(&text));
+            let _ = (frame(&text, "1"), devices(&text, None), event(&text));
         }
     }
 }

@@ -67,6 +67,8 @@ pub struct Plan {
     pub burr_clearance_mm: f32,
     /// How far the burr's foremost point may go into the brain to make a hole that the probe fits through, mm.
     pub burr_overlap_mm: f32,
+    /// Radius of the aspirator's tip, mm.
+    pub aspirator_radius_mm: f32,
     /// How deep each press of the probe goes into the brain, mm.
     pub presses_mm: [f32; 3],
 }
@@ -81,6 +83,7 @@ impl Default for Plan {
             breakthrough_mm: 0.75,
             burr_clearance_mm: 0.3,
             burr_overlap_mm: 0.8,
+            aspirator_radius_mm: 1.5,
             presses_mm: [4.0, 5.0, 6.0],
         }
     }
@@ -109,6 +112,9 @@ const HANDS_OFF: Buttons = Buttons(0);
 
 /// The way of an operation that [`super::NAMES`] lists.
 pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Path {
+    if name == "aspirate" {
+        return aspirate(site, plan, duration_ms);
+    }
     let moves = match name {
         "craniotomy" => craniotomy(site, plan),
         "probe" => probe(site, plan),
@@ -132,6 +138,31 @@ fn craniotomy(site: &Site, plan: &Plan) -> Vec<Move> {
         Move("clean the hole", 2.0, depth_mm, Buttons::PEDAL),
         Move("retreat", 7.0, -plan.away_mm, HANDS_OFF),
     ]
+}
+
+/// Beside the burr, with the shaft leaning away from it: rests on the bone, follows towards the hole, lifts off and leaves.
+fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
+    const LEAN_RAD: f32 = 0.5;
+    let outward = -site.inward.normalize();
+    let side = -outward.cross(Vec3::Z).try_normalize().unwrap_or(outward.any_orthonormal_vector());
+    let (near_mm, over_mm) = (plan.burr_radius_mm + plan.aspirator_radius_mm + 3.0, -plan.aspirator_radius_mm);
+    let rotation = Quat::from_rotation_arc(Vec3::Z, (outward + LEAN_RAD * side).normalize());
+    let at = |aside_mm: f32, depth_mm: f32| site.below(depth_mm) + aside_mm * side;
+    let stations = [
+        ("approach with the aspirator", 15.0, at(near_mm + 4.0, over_mm - 1.0)),
+        ("touch the bone", 5.0, at(near_mm + 4.0, over_mm + 1.5)),
+        ("follow the burr", 20.0, at(near_mm, over_mm + 1.5)),
+        ("rest on the bone", 30.0, at(near_mm, over_mm + 1.5)),
+        ("lift", 5.0, at(near_mm, over_mm - 2.0)),
+        ("leave", 25.0, at(near_mm + 30.0, -plan.away_mm)),
+    ];
+    let whole: f64 = stations.iter().map(|station| station.1).sum();
+    let mut path = Path::from(at(near_mm + 30.0, -plan.start_mm), rotation);
+    for (label, share, tip) in stations {
+        path.to(label, duration_ms * share / whole, tip, HANDS_OFF);
+    }
+    path.end_at(duration_ms);
+    path
 }
 
 fn change(plan: &Plan) -> Vec<Move> {

@@ -54,7 +54,7 @@ pub(crate) mod wire_type {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TeacherRecord, TickRecord};
+    use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TeacherRecord, TickRecord};
     use proptest::prelude::*;
 
     /// Bytes of a record that is filled from `seed`, fields of every bit pattern, NaN and -0.0 included.
@@ -105,7 +105,8 @@ mod tests {
         #[test]
         fn every_bit_survives(seed: u64) {
             for (first, second) in [round_trip::<TickRecord>(seed), round_trip::<CollisionRecord>(seed),
-                                    round_trip::<SolverRecord>(seed), round_trip::<EventRecord>(seed), round_trip::<TeacherRecord>(seed)] {
+                                    round_trip::<SolverRecord>(seed), round_trip::<EventRecord>(seed), round_trip::<TeacherRecord>(seed),
+                                    round_trip::<SecondRecord>(seed)] {
                 prop_assert!(!first.is_empty());
                 prop_assert_eq!(first, second);
             }

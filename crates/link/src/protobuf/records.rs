@@ -1,7 +1,7 @@
 //! The fields of each record, numbered. A number, once given, is never given to another field.
 
 use super::{Fields, Visit};
-use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TeacherRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TeacherRecord, TickRecord};
 use trepan_geometry::{Pose, Twist, Vec3, Wrench};
 
 impl Fields for TickRecord {
@@ -26,6 +26,23 @@ impl Fields for TickRecord {
         byte(v, 16, "phase", &mut self.phase);
         byte(v, 17, "tool", &mut self.tool);
         v.float(18, "spindle_rpm", &mut self.spindle_rpm);
+    }
+}
+
+impl Fields for SecondRecord {
+    const NAME: &'static str = "trepan.Second";
+
+    fn visit(&mut self, v: &mut dyn Visit) {
+        v.uint64(1, "tick", &mut self.tick);
+        v.double(2, "time_ms", &mut self.time_ms);
+        pose(v, 3, "device", &mut self.device);
+        twist(v, 4, "twist", &mut self.twist);
+        v.uint32(5, "buttons", &mut self.buttons);
+        pose(v, 6, "proxy", &mut self.proxy);
+        wrench(v, 7, "wrench", &mut self.wrench);
+        v.float(8, "depth_mm", &mut self.depth_mm);
+        v.float(9, "tissue_depth_mm", &mut self.tissue_depth_mm);
+        v.uint32(10, "flags", &mut self.flags);
     }
 }
 

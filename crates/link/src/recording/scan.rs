@@ -5,7 +5,7 @@
 
 use super::Recording;
 use crate::protobuf::{Fields, decode};
-use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TickRecord};
+use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
 
 /// Bytes not yet read.
 #[derive(Clone, Copy)]
@@ -23,6 +23,7 @@ pub(super) struct Record<'a> {
 #[derive(Clone, Copy, Default)]
 pub(super) enum Topic {
     Tick,
+    Second,
     Collision,
     Solver,
     Event,
@@ -35,6 +36,7 @@ impl Topic {
     fn of_schema(name: &str) -> Self {
         match name {
             TickRecord::NAME => Self::Tick,
+            SecondRecord::NAME => Self::Second,
             CollisionRecord::NAME => Self::Collision,
             SolverRecord::NAME => Self::Solver,
             EventRecord::NAME => Self::Event,
@@ -45,6 +47,7 @@ impl Topic {
     pub(super) fn read_into(self, message: &[u8], recording: &mut Recording) -> Option<()> {
         match self {
             Self::Tick => recording.ticks.push(decode(message)?),
+            Self::Second => recording.second.push(decode(message)?),
             Self::Collision => recording.collisions.push(decode(message)?),
             Self::Solver => recording.solver.push(decode(message)?),
             Self::Event => recording.events.push(decode(message)?),
