@@ -17,37 +17,48 @@ fn ball(eye: vec3f, along: vec3f, centre: vec3f, radius: f32) -> f32 {
     return select(NOTHING, t, room > 0.0 && t > 0.0);
 }
 
-// Distance along the ray to the shaft's mantle, or NOTHING.
-fn shaft(eye: vec3f, along: vec3f) -> f32 {
-    let axis = scene.tail.xyz - scene.tip.xyz;
-    let away = eye - scene.tip.xyz;
+// Distance along the ray to a shaft's mantle, or NOTHING.
+fn shaft(eye: vec3f, along: vec3f, tip: vec4f, tail: vec4f) -> f32 {
+    let axis = tail.xyz - tip.xyz;
+    let away = eye - tip.xyz;
     let length2 = dot(axis, axis);
     let a = length2 - dot(axis, along) * dot(axis, along);
     let b = length2 * dot(away, along) - dot(axis, away) * dot(axis, along);
-    let c = length2 * (dot(away, away) - scene.tail.w * scene.tail.w) - dot(axis, away) * dot(axis, away);
+    let c = length2 * (dot(away, away) - tail.w * tail.w) - dot(axis, away) * dot(axis, away);
     let room = b * b - a * c;
     let t = (-b - sqrt(max(room, 0.0))) / max(a, 1e-9);
     let at = dot(axis, away) + t * dot(axis, along);
     return select(NOTHING, t, room > 0.0 && t > 0.0 && at > 0.0 && at < length2);
 }
 
+// Distances along the ray to a tool's ball, shaft and far end; NOTHING without a tool.
+fn reach(along: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
+    let eye = scene.eye.xyz;
+    let met = vec3f(ball(eye, along, tip.xyz, tip.w), shaft(eye, along, tip, tail), ball(eye, along, tail.xyz, tail.w));
+    return select(vec3f(NOTHING), met, tip.w > 0.0);
+}
+
 // Share of the lamp that passes a body at distance `gap` from the beam, `way` mm on: the lamp is a disc.
 fn pass_by(gap: f32, way: f32) -> f32 { return smoothstep(-1.0, 1.0, gap / (0.10 * way + 0.3)); }
 
-// Light that passes the tool on its way to a point: 0 in its shadow, 1 far from it.
-fn past_tool(point: vec3f) -> f32 {
-    if scene.tip.w < 0.0 { return 1.0; }
-    let to = scene.tip.xyz - point;
+// Light that passes the tools on its way to a point: 0 in their shadow, 1 far from them.
+fn past_tools(point: vec3f) -> f32 {
+    return past(point, scene.tip, scene.tail) * past(point, scene.second_tip, scene.second_tail);
+}
+
+fn past(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {
+    if tip.w < 0.0 { return 1.0; }
+    let to = tip.xyz - point;
     let way = max(dot(to, scene.light.xyz), 0.0);
-    let ball = pass_by(length(to - way * scene.light.xyz) - scene.tip.w, way);
+    let ball = pass_by(length(to - way * scene.light.xyz) - tip.w, way);
     // Nearest points of the beam and the shaft's axis (Ericson 2005, 5.1.9, with a beam that begins at the point).
-    let axis = scene.tail.xyz - scene.tip.xyz;
+    let axis = tail.xyz - tip.xyz;
     let b = dot(scene.light.xyz, axis);
     let c = dot(axis, axis);
     let d = dot(scene.light.xyz, -to);
     let on_axis = clamp((dot(axis, -to) - b * d) / max(c - b * b, 1e-6), 0.0, 1.0);
     let on_beam = max(b * on_axis - d, 0.0);
-    let gap = length(on_beam * scene.light.xyz - to - on_axis * axis) - scene.tail.w;
+    let gap = length(on_beam * scene.light.xyz - to - on_axis * axis) - tail.w;
     return ball * pass_by(gap, on_beam);
 }
 
@@ -75,9 +86,7 @@ fn brain_colour(rest: vec3f) -> vec3f {
     return tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal);
 }
 
-fn tool_colour(point: vec3f, on_ball: bool) -> vec3f {
-    let steel = vec3f(0.62, 0.66, 0.72);
-    if !on_ball || scene.spin.w < 0.5 { return steel; }
+fn burr_colour(point: vec3f) -> vec3f {
     let axis = normalize(scene.tail.xyz - scene.tip.xyz);
     let away = point - scene.tip.xyz;
     let angle = atan2(dot(away, cross(axis, scene.spin.xyz)), dot(away, scene.spin.xyz));
@@ -85,11 +94,15 @@ fn tool_colour(point: vec3f, on_ball: bool) -> vec3f {
     return mix(vec3f(0.34, 0.36, 0.40), vec3f(0.80, 0.80, 0.78), flute);
 }
 
-fn shade_tool(point: vec3f, along: vec3f, on_ball: bool, on_end: bool) -> vec3f {
-    let axis = normalize(scene.tail.xyz - scene.tip.xyz);
-    let away = point - select(scene.tip.xyz, scene.tail.xyz, on_end);
-    let normal = normalize(select(away - axis * dot(away, axis), away, on_ball || on_end));
-    return lit(tool_colour(point, on_ball), normal, along, 1.0, 1.0, 0.7);
+// A tool where the ray meets it at `met`; `first` may be a burr.
+fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, first: bool) -> vec3f {
+    let t = min(met.x, min(met.y, met.z));
+    let axis = normalize(tail.xyz - tip.xyz);
+    let away = point - select(tip.xyz, tail.xyz, t == met.z);
+    let normal = normalize(select(away - axis * dot(away, axis), away, t == met.x || t == met.z));
+    var colour = vec3f(0.62, 0.66, 0.72);
+    if first && t == met.x && scene.spin.w > 0.5 { colour = burr_colour(point); }
+    return lit(colour, normal, along, 1.0, 1.0, 0.7);
 }
 
 @fragment fn fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
@@ -98,22 +111,24 @@ fn shade_tool(point: vec3f, along: vec3f, on_ball: bool, on_end: bool) -> vec3f 
     let skull = unpacked(textureLoad(skull_hit, at, 0));
     var brain = unpacked(textureLoad(brain_hit, at, 0));
     brain.w = select(NOTHING, brain.w, brain.w > 0.0);
-    let tip = select(NOTHING, ball(scene.eye.xyz, along, scene.tip.xyz, scene.tip.w), scene.tip.w > 0.0);
-    let end = ball(scene.eye.xyz, along, scene.tail.xyz, scene.tail.w);
-    let stem = select(NOTHING, min(shaft(scene.eye.xyz, along), end), scene.tip.w > 0.0);
-    let t = min(min(skull.w, brain.w), min(tip, stem));
+    let first = reach(along, scene.tip, scene.tail);
+    let second = reach(along, scene.second_tip, scene.second_tail);
+    let near = vec2f(min(first.x, min(first.y, first.z)), min(second.x, min(second.y, second.z)));
+    let t = min(min(skull.w, brain.w), min(near.x, near.y));
     let point = scene.eye.xyz + t * along;
     let back = pixel.y / scene.up.w;
     var colour = mix(vec3f(0.105, 0.125, 0.155), vec3f(0.035, 0.04, 0.05), back);
     if t >= NOTHING {
-    } else if t == tip || t == stem {
-        colour = shade_tool(point, along, t == tip, t == end);
+    } else if t == near.x {
+        colour = shade_tool(point, along, scene.tip, scene.tail, first, true);
+    } else if t == near.y {
+        colour = shade_tool(point, along, scene.second_tip, scene.second_tail, second, false);
     } else if t == brain.w {
         let normal = unfold(brain.xy);
         let g = grid_of(point);
         let rest = unpacked(textureLoad(brain_rest, at, 0)).xyz - 3.5 * normal;
         var open = 1.0;
-        var key = past_tool(point);
+        var key = past_tools(point);
         if scene.forward.w > 0.0 {
             open = openness(g, normal);
             key *= select(1.0, 0.25, shadowed(g, normal));
@@ -121,7 +136,7 @@ fn shade_tool(point: vec3f, along: vec3f, on_ball: bool, on_end: bool) -> vec3f 
         colour = lit(brain_colour(rest), normal, along, open, key, 0.20);
     } else {
         let normal = unfold(skull.xy);
-        colour = lit(bone_colour(point, normal), normal, along, fract(skull.z), past_tool(point) * floor(skull.z), 0.06);
+        colour = lit(bone_colour(point, normal), normal, along, fract(skull.z), past_tools(point) * floor(skull.z), 0.06);
     }
     return vec4f(pow(clamp(colour, vec3f(0.0), vec3f(1.0)), vec3f(1.0 / 2.2)), 1.0);
 }

@@ -13,6 +13,8 @@ struct Scene {
     tail: vec4f,              // far end of the shaft; w: its radius
     light: vec4f,             // unit, towards the light; w: 1 while drilling
     spin: vec4f,              // unit, across the shaft: turns with the burr; w: 1 for a burr, 0 for a probe
+    second_tip: vec4f,        // the tool in the other hand, as `tip`
+    second_tail: vec4f,       // as `tail`
 }
 
 @group(0) @binding(0) var<uniform> scene: Scene;
@@ -49,12 +51,17 @@ fn unfold(p: vec2f) -> vec3f {
     return normalize(vec3f(select(p, (1.0 - abs(p.yx)) * signs, z < 0.0), z));
 }
 
-// Distance to the tool's surface, mm: a ball and a capsule.
+// Distance to the nearest tool's surface, mm: a ball and a capsule each.
 fn tool_distance(point: vec3f) -> f32 {
-    let axis = scene.tail.xyz - scene.tip.xyz;
-    let along = clamp(dot(point - scene.tip.xyz, axis) / dot(axis, axis), 0.0, 1.0);
-    let shaft = distance(point, scene.tip.xyz + along * axis) - scene.tail.w;
-    return min(shaft, distance(point, scene.tip.xyz) - scene.tip.w);
+    return min(distance_to(point, scene.tip, scene.tail), distance_to(point, scene.second_tip, scene.second_tail));
+}
+
+fn distance_to(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {
+    if tip.w < 0.0 { return NOTHING; }
+    let axis = tail.xyz - tip.xyz;
+    let along = clamp(dot(point - tip.xyz, axis) / dot(axis, axis), 0.0, 1.0);
+    let shaft = distance(point, tip.xyz + along * axis) - tail.w;
+    return min(shaft, distance(point, tip.xyz) - tip.w);
 }
 
 // A colour where a mark of the MRI lies over it.

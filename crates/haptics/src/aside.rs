@@ -20,7 +20,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use trepan_contact::GuardedWrench;
-use trepan_geometry::{Pose, ToolState};
+use trepan_geometry::ToolState;
 use triple_buffer::{Input, Output, triple_buffer};
 
 /// A device without news for this long is lost, ms.
@@ -155,7 +155,7 @@ mod tests {
     use std::sync::Mutex;
     use std::time::Duration;
     use trepan_contact::{ForceGuard, GuardConfig};
-    use trepan_geometry::{Vec3, Wrench};
+    use trepan_geometry::{Pose, Vec3, Wrench};
 
     /// What the bench's device was told, and how it behaves.
     #[derive(Default)]

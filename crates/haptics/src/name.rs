@@ -71,6 +71,22 @@ pub enum NameError {
 const KNOWN: &str =
     "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension[:N], haply[:ID], spacemouse";
 
+impl DeviceName {
+    /// Whether both names may stand for one device of metal: a name that leaves out which may be any of its kind.
+    pub fn may_be(&self, other: &Self) -> bool {
+        fn meet<T: PartialEq>(one: &Option<T>, other: &Option<T>) -> bool {
+            one.is_none() || other.is_none() || one == other
+        }
+        match (self, other) {
+            (Self::OpenHaptics(one), Self::OpenHaptics(other)) | (Self::Haply(one), Self::Haply(other)) => {
+                meet(one, other)
+            }
+            (Self::ForceDimension(one), Self::ForceDimension(other)) => meet(one, other),
+            _ => *self == Self::SpaceMouse && *other == Self::SpaceMouse,
+        }
+    }
+}
+
 impl FromStr for DeviceName {
     type Err = NameError;
 
@@ -87,7 +103,7 @@ impl FromStr for DeviceName {
         match driver {
             "mouse" => plain(Self::Mouse),
             "spacemouse" => plain(Self::SpaceMouse),
-            "haply" => Ok(Self::Haply(detail.map(str::to_owned))),
+            "haply" => Ok(Self::Haply(detail.map(str::to_uppercase))),
             "force-dimension" => match detail.map(|number| (number, number.parse::<u8>())) {
                 None => Ok(Self::ForceDimension(None)),
                 Some((_, Ok(number))) if number < 128 => Ok(Self::ForceDimension(Some(number))),
@@ -167,6 +183,16 @@ mod tests {
         for name in names {
             assert_eq!(name.parse::<DeviceName>().unwrap().to_string(), name);
         }
+    }
+
+    #[test]
+    fn two_names_of_one_device_are_told() {
+        let may = |one: &str, other: &str| one.parse::<DeviceName>().unwrap().may_be(&other.parse().unwrap());
+        assert!(may("haply", "haply:049D") && may("haply:049d", "haply:049D") && !may("haply:049E", "haply:049D"));
+        assert!(may("force-dimension", "force-dimension:1") && !may("force-dimension:0", "force-dimension:1"));
+        assert!(
+            may("spacemouse", "spacemouse") && !may("haply", "openhaptics") && !may("script:probe", "script:probe")
+        );
     }
 
     #[test]

@@ -171,6 +171,27 @@ fn a_device_that_vanishes_or_a_service_that_hangs_up_is_lost() {
 }
 
 #[test]
+fn a_service_that_only_listens_is_told_to_let_go_before_it_is_lost() {
+    let service = Service::start(Behaviour::default());
+    let mut device = open(&service).unwrap();
+    run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
+    service.behave(|b| b.mute = true);
+    let cut = |reading: &Reading, told| reading.status == Status::Lost || told == Vec3::ZERO;
+    let reading = run_until(&mut device, &service, Vec3::X, cut);
+    assert_ne!(reading.status, Status::Lost);
+    assert_eq!((told_force(&service), device.watch().fault()), (Vec3::ZERO, Some(Fault::ServiceSilent)));
+}
+
+#[test]
+fn every_device_of_the_service_is_listed_by_the_name_that_opens_it() {
+    let service = Service::start(Behaviour::default());
+    let config = Config { service: service.simulation.clone(), ..Config::default() };
+    let names: Vec<String> = trepan_haptics::haply::list(&config).unwrap().into_iter().map(|d| d.name).collect();
+    assert_eq!(names, ["haply:049D"]);
+    assert!(names[0].parse::<trepan_haptics::DeviceName>().is_ok());
+}
+
+#[test]
 fn many_sessions_end_with_a_goodbye() {
     let service = Service::start(Behaviour::default());
     for session in 1..=20 {

@@ -47,6 +47,8 @@ pub struct Frame<'a> {
     pub tool: Option<Tool>,
     /// Where the tool is; slices pass through its tip, or through the camera's target while the tip is outside the scanned box.
     pub world_from_tool: Pose,
+    /// The tool in the other hand, and where it is.
+    pub second: Option<(Tool, Pose)>,
     /// Turn of the burr around its shaft, rad.
     pub turn_rad: f32,
     /// Whether the burr cuts.
@@ -103,6 +105,7 @@ impl Frame<'_> {
             camera,
             tool: None,
             world_from_tool: Pose::from_translation(camera.target),
+            second: None,
             turn_rad: 0.0,
             drilling: false,
             brain_positions: None,

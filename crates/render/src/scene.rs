@@ -4,7 +4,7 @@ use crate::bricks::Grid;
 use crate::camera::View;
 use crate::frame::Frame;
 use glam::{Mat4, Quat, Vec3, Vec4};
-use trepan_geometry::{Tool, ToolKind};
+use trepan_geometry::{Pose, Tool, ToolKind};
 
 /// Twin of the shader's `Scene`.
 #[repr(C)]
@@ -22,20 +22,18 @@ pub(crate) struct Scene {
     pub tail: Vec4,
     pub light: Vec4,
     pub spin: Vec4,
+    pub second_tip: Vec4,
+    pub second_tail: Vec4,
 }
 
 impl Scene {
     /// Gathers what a frame says. `mri_from_world` gives texture coordinates, if there is an MRI.
     pub fn of(frame: &Frame, view: &View, size: [u32; 2], grid: &Grid, mri_from_world: Option<Mat4>) -> Self {
         let [width, height] = size.map(|n| n as f32);
-        let tool = frame.tool.unwrap_or(Tool {
-            kind: ToolKind::Probe,
-            tip_radius_mm: -1.0,
-            shaft_radius_mm: 1.0,
-            shaft_length_mm: 1.0,
-        });
-        let tip = frame.world_from_tool.translation;
-        let tail = frame.world_from_tool * Vec3::new(0.0, 0.0, tool.shaft_length_mm);
+        let tool = frame.tool.unwrap_or(NO_TOOL);
+        let [tip, tail] = ends(&tool, &frame.world_from_tool);
+        let (second, second_pose) = frame.second.unwrap_or((NO_TOOL, Pose::IDENTITY));
+        let [second_tip, second_tail] = ends(&second, &second_pose);
         let across = frame.world_from_tool.rotation * (Quat::from_rotation_z(frame.turn_rad) * Vec3::X);
         let dims = Vec3::from(grid.dims.map(|n| n as f32));
         Self {
@@ -47,8 +45,10 @@ impl Scene {
             forward: view.forward.extend(flag(frame.show_bone)),
             origin: grid.origin.extend(grid.spacing_mm),
             dims: dims.extend(grid.isovalue.into()),
-            tip: tip.extend(tool.tip_radius_mm),
-            tail: tail.extend(tool.shaft_radius_mm),
+            tip,
+            tail,
+            second_tip,
+            second_tail,
             light: towards_light(view).extend(flag(frame.drilling)),
             spin: across.extend(flag(tool.kind == ToolKind::Burr)),
         }
@@ -61,13 +61,31 @@ impl Scene {
         (self.forward.truncate() + x * self.right.truncate() + y * self.up.truncate()).normalize()
     }
 
-    /// Distance to the tool's surface, mm: a ball and a capsule.
-    pub fn tool_distance(&self, point: Vec3) -> f32 {
-        let (tip, axis) = (self.tip.truncate(), (self.tail - self.tip).truncate());
-        let along = ((point - tip).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
-        let shaft = point.distance(tip + along * axis) - self.tail.w;
-        shaft.min(point.distance(tip) - self.tip.w)
+    /// Both tools: tip and tail of each.
+    pub fn tools(&self) -> [[Vec4; 2]; 2] {
+        [[self.tip, self.tail], [self.second_tip, self.second_tail]]
     }
+
+    /// Distance to the nearest tool's surface, mm: a ball and a capsule each.
+    pub fn tool_distance(&self, point: Vec3) -> f32 {
+        let held = self.tools().into_iter().filter(|[tip, _]| tip.w > 0.0);
+        held.map(|[tip, tail]| distance(point, tip, tail)).fold(f32::INFINITY, f32::min)
+    }
+}
+
+const NO_TOOL: Tool = Tool { kind: ToolKind::Probe, tip_radius_mm: -1.0, shaft_radius_mm: 1.0, shaft_length_mm: 1.0 };
+
+/// Centre of the ball and far end of the shaft, with their radii.
+fn ends(tool: &Tool, world_from_tool: &Pose) -> [Vec4; 2] {
+    let tail = *world_from_tool * Vec3::new(0.0, 0.0, tool.shaft_length_mm);
+    [world_from_tool.translation.extend(tool.tip_radius_mm), tail.extend(tool.shaft_radius_mm)]
+}
+
+fn distance(point: Vec3, tip: Vec4, tail: Vec4) -> f32 {
+    let (centre, axis) = (tip.truncate(), (tail - tip).truncate());
+    let along = ((point - centre).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
+    let shaft = point.distance(centre + along * axis) - tail.w;
+    shaft.min(point.distance(centre) - tip.w)
 }
 
 /// The lamp stands above the viewer's left shoulder.

@@ -32,6 +32,7 @@ fn head() -> (Arc<BoneVolume>, TetMesh, VoxelVolume<f32>, Frame<'static>) {
     let frame = Frame {
         tool: Some(Tool::burr(3.0)),
         world_from_tool,
+        second: Some((Tool::probe(1.5), Pose::from_parts(Vec3::new(8.0, 27.0, 4.0), world_from_tool.rotation))),
         turn_rad: 0.3,
         ..Frame::of(Camera::viewed_from(Vec3::ZERO, towards, 130.0))
     };

@@ -1,4 +1,4 @@
-//! What holds the tool: the device that the options name, and what the force guard must know of it.
+//! What holds the tools: the devices that the options name, and what the force guard of each must know of it.
 
 use crate::error::SessionError;
 use crate::options::Options;
@@ -7,7 +7,9 @@ use crate::run::watch::Watched;
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::{Capabilities, Clutch, DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, simulated};
+use trepan_haptics::{
+    Aside, Capabilities, Clutch, DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, simulated,
+};
 use trepan_link::Recording;
 
 /// What holds the tool.
@@ -58,6 +60,66 @@ impl Hand {
     }
 }
 
+/// What the second hand holds.
+pub struct SecondHold {
+    /// For the haptic loop.
+    pub device: Box<dyn HapticDevice>,
+    /// The window into a device's faults.
+    pub watch: Option<Watch>,
+}
+
+impl SecondHold {
+    /// Opens the device. One of metal lives on a thread of its own, so that its link never holds the first hand up.
+    pub fn open(name: &DeviceName, options: &Options, site: &Site) -> Result<Self, SessionError> {
+        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
+        let script = |name: &str| {
+            Script::named(name, site, 1e3 * options.duration.unwrap_or(20.0)).map_err(|found| fault(&found))
+        };
+        let (device, watch): (Box<dyn HapticDevice>, _) = match name {
+            DeviceName::Script(operation) => (Box::new(script(operation)?), None),
+            DeviceName::Simulated(operation) => {
+                let (config, grip) = (simulated::Config::default(), simulated::Hand::FIRM);
+                (Box::new(simulated::Simulated::new(config, grip, Box::new(script(operation)?))), None)
+            }
+            metal => {
+                let mut beside = workspace(site, options.device_scale);
+                // Both hands rest in the middle of their boxes: there the tools stand side by side.
+                beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
+                let opened = hardware::open(metal, beside).ok_or_else(|| unfit(metal))?.map_err(|f| fault(&f))?;
+                (Box::new(Aside::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
+            }
+        };
+        Ok(Self { device, watch })
+    }
+}
+
+/// How far the second hand's box lies to the left of the first one's, mm.
+const SIDE_MM: f32 = 30.0;
+
+/// The second hand's device, if one is named and can stand beside the first.
+pub fn second_name(first: &DeviceName, options: &Options) -> Result<Option<DeviceName>, SessionError> {
+    let Some(text) = &options.second_device else { return Ok(None) };
+    let name: DeviceName =
+        text.parse().map_err(|fault: trepan_haptics::NameError| SessionError::Device(fault.to_string()))?;
+    if matches!(first, DeviceName::Replay(_)) {
+        let text = "a replay brings its second hand along: leave out --second-device";
+        return Err(SessionError::Device(text.into()));
+    }
+    if matches!(name, DeviceName::Mouse | DeviceName::Replay(_)) {
+        return Err(unfit(&name));
+    }
+    if name.may_be(first) {
+        let text = format!("{first} and {name} may be one device: name two as --list-devices does");
+        return Err(SessionError::Device(text));
+    }
+    Ok(Some(name))
+}
+
+fn unfit(name: &DeviceName) -> SessionError {
+    let known = "script:aspirate, simulated:NAME, or a device that --list-devices shows";
+    SessionError::Device(format!("the second hand cannot hold {name}: give {known}"))
+}
+
 /// The faults that a device had, in a sentence.
 pub fn faults(watch: &Watch) -> Option<String> {
     let last = watch.fault().map_or_else(String::new, |fault| format!("; the last one: {fault}"));
@@ -98,11 +160,16 @@ pub struct Feel {
     scale: f32,
 }
 
-const PEAK: &str = "device_peak_force_n";
-const CONTINUOUS: &str = "device_continuous_force_n";
-const DELAY: &str = "device_delay_ticks";
-const STEP: &str = "device_position_step_mm";
-const SCALE: &str = "device_scale";
+/// What the entries of either hand begin with.
+pub const FIRST: &str = "device_";
+/// The second hand's.
+pub const SECOND: &str = "second_device_";
+
+const PEAK: &str = "peak_force_n";
+const CONTINUOUS: &str = "continuous_force_n";
+const DELAY: &str = "delay_ticks";
+const STEP: &str = "position_step_mm";
+const SCALE: &str = "scale";
 
 impl Feel {
     /// Of a device at hand, whose motion is enlarged by `scale`.
@@ -112,10 +179,10 @@ impl Feel {
         Self { peak_force_n, continuous_force_n, delay_ticks, position_step_mm, scale }
     }
 
-    /// What a recorded session knew of its device; nothing where there is no recording.
-    pub fn recorded(recording: Option<&Recording>) -> Self {
+    /// What a recorded session knew of the device of a hand ([`FIRST`], [`SECOND`]); nothing where there is no recording.
+    pub fn recorded(recording: Option<&Recording>, hand: &str) -> Self {
         let config = recording.map(|recording| &recording.header.config);
-        let number = |name: &str| config.and_then(|c| c.get(name)?.parse().ok()).unwrap_or(0.0f32);
+        let number = |name: &str| config.and_then(|c| c.get(&format!("{hand}{name}"))?.parse().ok()).unwrap_or(0.0f32);
         Self {
             peak_force_n: number(PEAK),
             continuous_force_n: number(CONTINUOUS),
@@ -126,7 +193,7 @@ impl Feel {
     }
 
     /// What [`Feel::recorded`] reads.
-    pub fn entries(&self) -> [(&'static str, String); 5] {
+    pub fn entries(&self, hand: &str) -> [(String, String); 5] {
         [
             (PEAK, self.peak_force_n.to_string()),
             (CONTINUOUS, self.continuous_force_n.to_string()),
@@ -134,6 +201,7 @@ impl Feel {
             (STEP, self.position_step_mm.to_string()),
             (SCALE, self.scale.to_string()),
         ]
+        .map(|(name, value)| (format!("{hand}{name}"), value))
     }
 
     /// The guard for it.

@@ -53,5 +53,6 @@ pub use stages::collision_step::{CollisionStage, SoftFrame};
 pub use stages::haptic_tick::{FRESH_MS, GONE_MS, HapticConfig, HapticStage, Tick, TickInput, ToolSample};
 pub use stages::notice::{Notice, Warning, Watch, What};
 pub use stages::score::ScoreKeeper;
+pub use stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 pub use stages::skull_wall::SkullWall;
 pub use stages::solver_step::{EACH, SolverStage};

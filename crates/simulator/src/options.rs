@@ -17,9 +17,12 @@ pub struct Options {
     /// Images, and what is made of them
     #[command(flatten)]
     pub patient: Patient,
-    /// mouse | script:NAME | replay:FILE | simulated:NAME | openhaptics or openhaptics:NAME | force-dimension | haply | spacemouse [default: mouse with a window, else a script]
+    /// mouse | script:NAME | replay:FILE | simulated:NAME | openhaptics or openhaptics:NAME | force-dimension or force-dimension:N | haply or haply:ID | spacemouse [default: mouse with a window, else a script]
     #[arg(long, value_name = "DEVICE")]
     pub device: Option<String>,
+    /// What the second hand holds an aspirator with: script:aspirate | simulated:NAME | a device that --list-devices shows
+    #[arg(long, value_name = "DEVICE", conflicts_with = "watch")]
+    pub second_device: Option<String>,
     /// Millimetres that the tool moves for one of the hand, for devices with a box of their own; over 1, walls are softened alike
     #[arg(long, value_name = "SCALE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub device_scale: f32,

@@ -5,7 +5,7 @@ use crate::case::choice;
 use crate::case::scene::{RestBrain, Scene};
 use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
-use crate::hand::{self, Feel, Hand};
+use crate::hand::{self, Feel, Hand, SecondHold};
 use crate::options::Options;
 use crate::program::Program;
 use crate::report::output;
@@ -15,7 +15,7 @@ use crate::run::clock::Clock;
 use crate::run::journal::Kept;
 use crate::run::lockstep;
 use crate::run::stop::Stop;
-use crate::run::threads::{self, Pace};
+use crate::run::threads::{self, Devices, Pace};
 use crate::run::watch::Share;
 use crate::run::{Eyes, Outcome, Stages, Tissue};
 use crate::show::driver;
@@ -23,6 +23,7 @@ use crate::show::picture::{self, Album};
 use crate::show::window;
 use crate::stages::collision_step::CollisionStage;
 use crate::stages::haptic_tick::{HapticConfig, HapticStage, ToolSample};
+use crate::stages::second_hand::SecondHand;
 use crate::stages::skull_wall::SkullWall;
 use crate::stages::solver_step::SolverStage;
 use std::path::{Path, PathBuf};
@@ -30,7 +31,7 @@ use std::sync::Arc;
 use trepan_contact::{Vibration, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_haptics::script::Script;
-use trepan_haptics::{DeviceName, HapticDevice, mouse};
+use trepan_haptics::{DeviceName, mouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::{Painter, SceneData};
@@ -41,6 +42,7 @@ pub struct Session {
     program: Program,
     options: Options,
     device: DeviceName,
+    second: Option<DeviceName>,
     recording: Option<Recording>,
     case: String,
     hash: String,
@@ -73,6 +75,7 @@ impl Session {
         }
         places(&options)?;
         let device = hand::device_name(program, &options, windowed)?;
+        let second = hand::second_name(&device, &options)?;
         let rigid = rigid_method(&options)?;
         solver_named(&options)?;
         let recording = match &device {
@@ -85,32 +88,38 @@ impl Session {
         let scene = Scene::new(program, case)?;
         scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
         let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
-        Ok(Self { program, options, device, recording, case: name, hash, scene, rigid, out, windowed })
+        Ok(Self { program, options, device, second, recording, case: name, hash, scene, rigid, out, windowed })
     }
 
     /// Runs it and writes its files.
     pub fn run(self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.scene.site)?;
-        let recorded = || Feel::recorded(self.recording.as_ref());
+        let second =
+            self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.scene.site)).transpose()?;
+        let recorded = || Feel::recorded(self.recording.as_ref(), hand::FIRST);
         let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
         let feel = device.as_ref().map_or_else(recorded, |device| Feel::of(&device.capabilities(), scale));
+        let second_feel = self.second_feel(second.as_ref());
         let start = self.start();
-        let stages = self.stages(start.state, &feel)?;
+        let stages = self.stages(start.state, &feel, second_feel.as_ref())?;
         output::folder(&self.out)?;
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
         let share = self.options.share.as_deref().map(Share::open).transpose()?;
-        let kept = (Recorder::create(&record, &self.header(&feel))?, share);
+        let kept = (Recorder::create(&record, &self.header(&feel, second_feel.as_ref()))?, share);
         let mut graphics = self.graphics();
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
-        let outcome = self.loops(stages, device, kept, start, &stop, |eyes| {
+        let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
+        let devices = device.map(|first| Devices { first, second: second_device });
+        let outcome = self.loops(stages, devices, kept, start, &stop, |eyes| {
             album = self.picture(eyes, &mut graphics, pointer, &stop);
         });
         let mut remarks = self.scene.remarks.clone();
         remarks.extend(graphics.err());
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
+        remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
         let summary = Summary::new(self.about(&album, adapter, remarks), &outcome);
         output::write(&self.out, &record, &summary, &outcome, &self.shots(album.shots))?;
         if let Some(bone) = self.scene.bone.as_ref().filter(|_| self.program.has_bone()) {
@@ -122,17 +131,25 @@ impl Session {
     fn loops(
         &self,
         stages: Stages,
-        device: Option<Box<dyn HapticDevice>>,
+        devices: Option<Devices>,
         kept: Kept,
         start: ToolSample,
         stop: &Stop,
         picture: impl FnOnce(Eyes),
     ) -> Outcome {
-        match (&self.recording, device) {
+        match (&self.recording, devices) {
             (Some(recording), _) => lockstep::run(stages, recording, kept, start, self.windowed, stop, picture),
-            (None, Some(device)) => threads::run(stages, device, kept, start, self.pace(), stop, picture),
+            (None, Some(devices)) => threads::run(stages, devices, kept, start, self.pace(), stop, picture),
             (None, None) => Outcome::default(),
         }
+    }
+
+    /// What the second hand's guard must know: of its device, or of the recorded one; `None` without a second hand.
+    fn second_feel(&self, held: Option<&SecondHold>) -> Option<Feel> {
+        let scale = |held: &SecondHold| if held.watch.is_some() { self.options.device_scale } else { 1.0 };
+        let recorded = self.recording.as_ref().filter(|recording| !recording.second.is_empty());
+        held.map(|held| Feel::of(&held.device.capabilities(), scale(held)))
+            .or_else(|| recorded.map(|recording| Feel::recorded(Some(recording), hand::SECOND)))
     }
 
     /// Where the tool waits.
@@ -143,8 +160,8 @@ impl Session {
         ToolSample { tick: 0, state, phase: self.program.phases()[0], drilling: false }
     }
 
-    fn stages(&self, start: ToolState, feel: &Feel) -> Result<Stages, SessionError> {
-        let config = HapticConfig {
+    fn stages(&self, start: ToolState, feel: &Feel, second: Option<&Feel>) -> Result<Stages, SessionError> {
+        let config = |feel: &Feel| HapticConfig {
             program: self.program,
             rigid: self.rigid,
             dt_ms: self.tick_ms(),
@@ -159,7 +176,8 @@ impl Session {
             Some(brain) if self.program.has_tissue() => Some(self.tissue(brain)?),
             _ => None,
         };
-        Ok(Stages { haptic: HapticStage::new(config, bone, field, start), tissue })
+        let second = second.map(|feel| SecondHand::new(config(feel), bone.clone(), field.clone()));
+        Ok(Stages { haptic: HapticStage::new(config(feel), bone, field, start), second, tissue })
     }
 
     fn tissue(&self, brain: &RestBrain) -> Result<Tissue, SessionError> {
@@ -252,7 +270,7 @@ impl Session {
         self.options.solver.clone().unwrap_or_else(|| TLED.into())
     }
 
-    fn header(&self, feel: &Feel) -> SessionHeader {
+    fn header(&self, feel: &Feel, second: Option<&Feel>) -> SessionHeader {
         let config = [
             ("rigid", self.rigid.name().to_string()),
             ("solver", self.solver_name()),
@@ -261,13 +279,15 @@ impl Session {
             ("tets", self.options.patient.tets.to_string()),
             ("young_modulus_kpa", self.options.young_modulus_kpa.to_string()),
         ];
+        let hands = feel.entries(hand::FIRST).into_iter();
+        let hands = hands.chain(second.into_iter().flat_map(|second| second.entries(hand::SECOND)));
         SessionHeader {
             app: self.program.name().into(),
             version: env!("CARGO_PKG_VERSION").into(),
             case: self.case.clone(),
             seed: self.options.seed,
             hashes: [("case".to_string(), self.hash.clone())].into(),
-            config: config.into_iter().chain(feel.entries()).map(|(key, value)| (key.to_string(), value)).collect(),
+            config: config.map(|(key, value)| (key.to_string(), value)).into_iter().chain(hands).collect(),
         }
     }
 
@@ -281,6 +301,7 @@ impl Session {
                 (DeviceName::Replay(_), _) => "replay".into(),
                 (other, _) => other.to_string(),
             },
+            second_device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),
             solver: self.solver_name(),
             brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
             frames: album.frames,

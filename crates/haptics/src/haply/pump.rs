@@ -2,7 +2,7 @@
 //!
 //! # Practice
 //! The loop's `apply` wakes the thread; a loop that is silent for [`SILENT`] gets no force. A reply later than [`LATE`] cuts
-//! the force until it comes; without one for [`GONE`] the device is lost.
+//! the force, on the wire too, until it comes; without one for [`GONE`] the device is lost.
 
 use super::protocol::{self, Event, Frame};
 use super::websocket::WebSocket;
@@ -16,8 +16,10 @@ use trepan_geometry::Vec3;
 use triple_buffer::{Input, Output};
 
 const SILENT: Duration = Duration::from_millis(10);
-const LATE: Duration = Duration::from_millis(20);
+const LATE: Duration = Duration::from_millis(10);
 const GONE: Duration = Duration::from_millis(1000);
+/// How long the listener waits before it looks whether the driver closes.
+const LISTEN: Duration = Duration::from_millis(20);
 /// Messages in a row without sense after which the device is lost.
 const MAX_GARBLED: u32 = 100;
 
@@ -98,13 +100,17 @@ impl Pump {
         if wish.force.is_finite() { wish.force * share } else { Vec3::ZERO }
     }
 
-    /// One message out, one back.
+    /// One message out, one back. While the answer is late the service is told once more that no force is wanted: it may still listen.
     fn exchange(&mut self, force: Vec3) -> io::Result<()> {
         self.socket.send(&protocol::force(&self.device, force))?;
-        let mut garbled = 0;
+        let (mut garbled, mut owed) = (0, 1);
         let mut waited = Duration::ZERO;
-        loop {
+        while owed > 0 {
             let Some(message) = self.socket.receive(LATE)? else {
+                if waited.is_zero() {
+                    self.socket.send(&protocol::force(&self.device, Vec3::ZERO))?;
+                    owed += 1;
+                }
                 waited += LATE;
                 self.ramp.cut(Fault::ServiceSilent);
                 if waited >= GONE || self.flags.closing.load(Ordering::Acquire) {
@@ -115,7 +121,7 @@ impl Pump {
             match protocol::frame(&message, &self.device) {
                 Ok(Some(frame)) => {
                     self.publish(frame);
-                    return Ok(());
+                    owed -= 1;
                 }
                 Ok(None) => return Err(io::ErrorKind::NotConnected.into()),
                 Err(_) => {
@@ -128,6 +134,7 @@ impl Pump {
                 }
             }
         }
+        Ok(())
     }
 
     /// Lays a frame over what is known: what it does not mention stays.
@@ -147,7 +154,7 @@ impl Pump {
 /// Listens to the service's events until the driver closes: brakes and losses show there first.
 pub(super) fn listen(mut events: WebSocket, flags: &Flags) {
     while !flags.closing.load(Ordering::Acquire) && !flags.lost.load(Ordering::Acquire) {
-        match events.receive(Duration::from_millis(100)) {
+        match events.receive(LISTEN) {
             Ok(Some(message)) => match protocol::event(&message) {
                 Some(Event::Braked) => flags.braked.store(true, Ordering::Release),
                 Some(Event::Released) => flags.braked.store(false, Ordering::Release),

@@ -150,9 +150,9 @@ fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     let at = |aside_mm: f32, depth_mm: f32| site.below(depth_mm) + aside_mm * side;
     let stations = [
         ("approach with the aspirator", 15.0, at(near_mm + 4.0, over_mm - 1.0)),
-        ("touch the bone", 5.0, at(near_mm + 4.0, over_mm + 1.5)),
-        ("follow the burr", 20.0, at(near_mm, over_mm + 1.5)),
-        ("rest on the bone", 30.0, at(near_mm, over_mm + 1.5)),
+        ("touch the bone", 5.0, at(near_mm + 4.0, over_mm + 0.5)),
+        ("follow the burr", 20.0, at(near_mm, over_mm + 0.5)),
+        ("rest on the bone", 30.0, at(near_mm, over_mm + 0.5)),
         ("lift", 5.0, at(near_mm, over_mm - 2.0)),
         ("leave", 25.0, at(near_mm + 30.0, -plan.away_mm)),
     ];

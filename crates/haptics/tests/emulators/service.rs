@@ -118,6 +118,7 @@ fn listen(shared: Arc<Shared>, serve: fn(&Shared, TcpStream)) -> (String, JoinHa
                 stream.set_nodelay(true).unwrap();
                 stream.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
                 let shared = shared.clone();
+                serving.retain(|serving: &JoinHandle<()>| !serving.is_finished());
                 serving.push(thread::spawn(move || serve(&shared, stream)));
             }
             thread::sleep(Duration::from_millis(1));
@@ -191,7 +192,9 @@ fn tell_events(shared: &Shared, mut stream: TcpStream) {
         if let Some(event) = shared.behaviour.lock().unwrap().event.take() {
             let _ = send(&mut stream, 0x81, event.as_bytes());
         }
-        thread::sleep(Duration::from_millis(1));
+        if matches!(stream.read(&mut [0; 64]), Ok(0)) {
+            return;
+        }
     }
 }
 

@@ -12,21 +12,20 @@ use glam::{Vec3, Vec4};
 pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
     let scene = inputs.scene;
     let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
-    let held = scene.tip.w > 0.0;
-    let tip = if held { ball(eye, along, scene.tip.truncate(), scene.tip.w) } else { NOTHING };
-    let end = if held { ball(eye, along, scene.tail.truncate(), scene.tail.w) } else { NOTHING };
-    let stem = if held { shaft(scene, eye, along).min(end) } else { NOTHING };
-    let t = bone.t.min(brain.t).min(tip).min(stem);
+    let [first, second] = scene.tools().map(|tool| Met::of(tool, eye, along));
+    let t = bone.t.min(brain.t).min(first.t()).min(second.t());
     let point = eye + t * along;
     let colour = if t >= NOTHING {
         let back = (y as f32 + 0.5) / scene.up.w;
         Vec3::new(0.105, 0.125, 0.155).lerp(Vec3::new(0.035, 0.04, 0.05), back)
-    } else if t == tip || t == stem {
-        shade_tool(scene, point, along, t == tip, t == end)
+    } else if t == first.t() {
+        shade_tool(scene, point, along, &first, true)
+    } else if t == second.t() {
+        shade_tool(scene, point, along, &second, false)
     } else if t == brain.t {
         shade_brain(inputs, point, along, brain)
     } else {
-        let key = past_tool(scene, point) * f32::from(u8::from(bone.lit));
+        let key = past_tools(scene, point) * f32::from(u8::from(bone.lit));
         lit(scene, bone_colour(inputs, point, bone.normal), bone.normal, along, bone.open, key, 0.06)
     };
     bytes(colour.clamp(Vec3::ZERO, Vec3::ONE).powf(1.0 / 2.2))
@@ -34,7 +33,7 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], bone: &Ray, brain: &
 
 fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> Vec3 {
     let scene = inputs.scene;
-    let (mut open, mut key) = (1.0, past_tool(scene, point));
+    let (mut open, mut key) = (1.0, past_tools(scene, point));
     if scene.forward.w > 0.0 {
         let g = inputs.bricks.grid_of(point);
         open = inputs.bricks.openness(g, brain.normal);
@@ -55,14 +54,35 @@ fn ball(eye: Vec3, along: Vec3, centre: Vec3, radius: f32) -> f32 {
     if room > 0.0 && t > 0.0 { t } else { NOTHING }
 }
 
-/// Distance along the ray to the shaft's mantle, or [`NOTHING`].
-fn shaft(scene: &Scene, eye: Vec3, along: Vec3) -> f32 {
-    let axis = (scene.tail - scene.tip).truncate();
-    let away = eye - scene.tip.truncate();
+/// Where a ray meets a tool.
+struct Met {
+    tip: Vec4,
+    tail: Vec4,
+    /// Along the ray to ball, shaft and far end, or [`NOTHING`].
+    at: [f32; 3],
+}
+
+impl Met {
+    fn of([tip, tail]: [Vec4; 2], eye: Vec3, along: Vec3) -> Self {
+        let round = |end: Vec4| ball(eye, along, end.truncate(), end.w);
+        let at = if tip.w > 0.0 { [round(tip), shaft(eye, along, tip, tail), round(tail)] } else { [NOTHING; 3] };
+        Self { tip, tail, at }
+    }
+
+    fn t(&self) -> f32 {
+        let [tip, stem, end] = self.at;
+        tip.min(stem).min(end)
+    }
+}
+
+/// Distance along the ray to a shaft's mantle, or [`NOTHING`].
+fn shaft(eye: Vec3, along: Vec3, tip: Vec4, tail: Vec4) -> f32 {
+    let axis = (tail - tip).truncate();
+    let away = eye - tip.truncate();
     let length2 = axis.length_squared();
     let a = length2 - axis.dot(along).powi(2);
     let b = length2 * away.dot(along) - axis.dot(away) * axis.dot(along);
-    let c = length2 * (away.length_squared() - scene.tail.w.powi(2)) - axis.dot(away).powi(2);
+    let c = length2 * (away.length_squared() - tail.w.powi(2)) - axis.dot(away).powi(2);
     let room = b * b - a * c;
     let t = (-b - room.max(0.0).sqrt()) / a.max(1e-9);
     let at = axis.dot(away) + t * axis.dot(along);
@@ -79,20 +99,23 @@ fn pass_by(gap: f32, way: f32) -> f32 {
     smoothstep(-1.0, 1.0, gap / (0.10 * way + 0.3))
 }
 
-/// Light that passes the tool on its way to a point.
-fn past_tool(scene: &Scene, point: Vec3) -> f32 {
-    if scene.tip.w < 0.0 {
+/// Light that passes the tools on its way to a point.
+fn past_tools(scene: &Scene, point: Vec3) -> f32 {
+    scene.tools().into_iter().map(|[tip, tail]| past(scene.light.truncate(), point, tip, tail)).product()
+}
+
+fn past(light: Vec3, point: Vec3, tip: Vec4, tail: Vec4) -> f32 {
+    if tip.w < 0.0 {
         return 1.0;
     }
-    let light = scene.light.truncate();
-    let to = scene.tip.truncate() - point;
+    let to = tip.truncate() - point;
     let way = to.dot(light).max(0.0);
-    let by_ball = pass_by((to - way * light).length() - scene.tip.w, way);
-    let axis = (scene.tail - scene.tip).truncate();
+    let by_ball = pass_by((to - way * light).length() - tip.w, way);
+    let axis = (tail - tip).truncate();
     let (b, c, d) = (light.dot(axis), axis.length_squared(), -light.dot(to));
     let on_axis = ((-axis.dot(to) - b * d) / (c - b * b).max(1e-6)).clamp(0.0, 1.0);
     let on_beam = (b * on_axis - d).max(0.0);
-    let gap = (on_beam * light - to - on_axis * axis).length() - scene.tail.w;
+    let gap = (on_beam * light - to - on_axis * axis).length() - tail.w;
     by_ball * pass_by(gap, on_beam)
 }
 
@@ -137,18 +160,19 @@ pub(crate) fn tinted(colour: Vec3, signal: Vec4) -> Vec3 {
     colour.lerp(mark / share.max(1e-3), 0.45 * share)
 }
 
-fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, on_ball: bool, on_end: bool) -> Vec3 {
-    let axis = (scene.tail - scene.tip).truncate().normalize();
-    let centre = if on_end { scene.tail } else { scene.tip };
+/// A tool where a ray meets it; `first` may be a burr.
+fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &Met, first: bool) -> Vec3 {
+    let (on_ball, on_end) = (met.t() == met.at[0], met.t() == met.at[2]);
+    let axis = (met.tail - met.tip).truncate().normalize();
+    let centre = if on_end { met.tail } else { met.tip };
     let away = point - centre.truncate();
     let normal = if on_ball || on_end { away } else { away - axis * away.dot(axis) }.normalize();
-    lit(scene, tool_colour(scene, point, axis, on_ball), normal, along, 1.0, 1.0, 0.7)
+    let burr = first && on_ball && scene.spin.w > 0.5;
+    let colour = if burr { burr_colour(scene, point, axis) } else { Vec3::new(0.62, 0.66, 0.72) };
+    lit(scene, colour, normal, along, 1.0, 1.0, 0.7)
 }
 
-fn tool_colour(scene: &Scene, point: Vec3, axis: Vec3, on_ball: bool) -> Vec3 {
-    if !on_ball || scene.spin.w < 0.5 {
-        return Vec3::new(0.62, 0.66, 0.72);
-    }
+fn burr_colour(scene: &Scene, point: Vec3, axis: Vec3) -> Vec3 {
     let away = point - scene.tip.truncate();
     let across = scene.spin.truncate();
     let angle = away.dot(axis.cross(across)).atan2(away.dot(across));

@@ -6,7 +6,7 @@ use crate::run::Outcome;
 use base64::Engine;
 use std::fmt::Write;
 use trepan_link::Recording;
-use trepan_link::wire::TickRecord;
+use trepan_link::wire::{SecondRecord, TickRecord};
 
 /// A picture for the report.
 #[derive(Clone, Debug)]
@@ -78,11 +78,12 @@ fn curves(page: &mut String, outcome: &Outcome, recording: &Recording) -> Result
         name: "largest displacement",
         points: recording.solver.iter().map(|s| (s.time_ms * 1e-3, f64::from(s.max_displacement_mm))).collect(),
     };
+    let forces = match recording.second.is_empty() {
+        true => vec![of("force", &|t| t.wrench.force.length())],
+        false => vec![of("first hand", &|t| t.wrench.force.length()), second(recording)],
+    };
     let charts = [
-        (
-            "Force on the hand",
-            over_time("force, N", &[of("force", &|t| t.wrench.force.length())], Some((3.3, "device limit")))?,
-        ),
+        ("Force on the hand", over_time("force, N", &forces, Some((outcome.force_limit_n.into(), "device limit")))?),
         (
             "Depth of the tool",
             over_time("depth, mm", &[of("in bone", &|t| t.depth_mm), of("in tissue", &|t| t.tissue_depth_mm)], None)?,
@@ -102,6 +103,11 @@ fn curves(page: &mut String, outcome: &Outcome, recording: &Recording) -> Result
         *page += &format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>");
     }
     Ok(())
+}
+
+fn second(recording: &Recording) -> Curve {
+    let point = |t: &SecondRecord| (t.time_ms * 1e-3, f64::from(t.wrench.force.length()));
+    Curve { name: "second hand", points: recording.second.iter().map(point).collect() }
 }
 
 /// Every number of the summary, as a table of paths.

@@ -41,6 +41,8 @@ pub struct Summary {
     pub scores: ScoreKeeper,
     /// Ticks in which the force guard acted, by cause.
     pub guard: GuardSummary,
+    /// The second hand; `null` without.
+    pub second: Option<SecondSummary>,
     /// Pictures drawn.
     pub frames: u64,
     /// Pictures a second.
@@ -166,6 +168,19 @@ impl From<&GuardCounters> for GuardSummary {
     }
 }
 
+/// The second hand.
+#[derive(Clone, Debug, Serialize)]
+pub struct SecondSummary {
+    /// Its device.
+    pub device: String,
+    /// Largest force, N.
+    pub force_max_n: f32,
+    /// Force at the very end, N.
+    pub force_end_n: f32,
+    /// Ticks in which its force guard acted, by cause.
+    pub guard: GuardSummary,
+}
+
 /// Where it ran.
 #[derive(Clone, Debug, Serialize)]
 pub struct Machine {
@@ -208,6 +223,8 @@ pub struct About {
     pub case: String,
     /// The device.
     pub device: String,
+    /// The second hand's device.
+    pub second_device: String,
     /// Name of the solver.
     pub solver: String,
     /// Tetrahedra, nodes, fixed nodes.
@@ -256,6 +273,12 @@ impl Summary {
             warnings: warnings(outcome),
             scores: outcome.scores,
             guard: (&outcome.guard).into(),
+            second: outcome.second.as_ref().map(|second| SecondSummary {
+                device: about.second_device,
+                force_max_n: second.peak_force_n,
+                force_end_n: second.end_force_n,
+                guard: (&second.guard).into(),
+            }),
             frames: about.frames,
             fps: about.frames as f64 / seconds,
             replay: outcome.replayed,

@@ -9,7 +9,7 @@ use crate::run::watch::Share;
 use crate::stages::notice::{Notice, What};
 use std::time::Duration;
 use trepan_link::queue::{Receiver, Sender, bounded};
-use trepan_link::wire::{CollisionRecord, EventRecord, SolverRecord, TickRecord};
+use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_link::{LinkError, Recorder};
 
 /// Where ticks go: into a file, and to who watches.
@@ -23,6 +23,8 @@ const DRAIN: Duration = Duration::from_millis(5);
 pub struct Pens {
     /// For the haptic loop.
     pub ticks: Sender<TickRecord>,
+    /// For the haptic loop, where there is a second hand.
+    pub second: Sender<SecondRecord>,
     /// For the haptic loop.
     pub notices: Sender<Notice>,
     /// For the collision loop.
@@ -34,6 +36,7 @@ pub struct Pens {
 /// The recording thread's ends.
 pub struct Journal {
     ticks: Receiver<TickRecord>,
+    second: Receiver<SecondRecord>,
     notices: Receiver<Notice>,
     collisions: Receiver<CollisionRecord>,
     solver: Receiver<SolverRecord>,
@@ -53,12 +56,19 @@ pub struct Written {
 /// Both ends.
 pub fn journal() -> (Pens, Journal) {
     let (ticks, ticks_in) = bounded(RING);
+    let (second, second_in) = bounded(RING);
     let (notices, notices_in) = bounded(RING / 8);
     let (collisions, collisions_in) = bounded(RING);
     let (solver, solver_in) = bounded(RING);
     (
-        Pens { ticks, notices, collisions, solver },
-        Journal { ticks: ticks_in, notices: notices_in, collisions: collisions_in, solver: solver_in },
+        Pens { ticks, second, notices, collisions, solver },
+        Journal {
+            ticks: ticks_in,
+            second: second_in,
+            notices: notices_in,
+            collisions: collisions_in,
+            solver: solver_in,
+        },
     )
 }
 
@@ -106,6 +116,9 @@ impl Journal {
             share.take_if(|share| !share.tick(&record));
             recorder.tick(&record)?;
         }
+        while let Some(record) = self.second.receive() {
+            recorder.second(&record)?;
+        }
         while let Some(record) = self.collisions.receive() {
             recorder.collision(&record)?;
         }
@@ -126,6 +139,7 @@ impl Journal {
     /// Keeps the rings empty after the recording failed.
     fn discard(&mut self, written: &mut Written) {
         while self.ticks.receive().is_some() {}
+        while self.second.receive().is_some() {}
         while self.collisions.receive().is_some() {}
         while self.solver.receive().is_some() {}
         while let Some(notice) = self.notices.receive() {
@@ -135,7 +149,11 @@ impl Journal {
     }
 
     fn dropped(&self) -> u64 {
-        self.ticks.dropped() + self.collisions.dropped() + self.solver.dropped() + self.notices.dropped()
+        self.ticks.dropped()
+            + self.second.dropped()
+            + self.collisions.dropped()
+            + self.solver.dropped()
+            + self.notices.dropped()
     }
 }
 

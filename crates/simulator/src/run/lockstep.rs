@@ -22,13 +22,14 @@ use crate::run::threads::outcome;
 use crate::run::{Cells, Eyes, Numbered, Outcome, Replayed, Stages, Ticks, Times, Tissue};
 use crate::stages::collision_step::SoftFrame;
 use crate::stages::haptic_tick::{HapticStage, TickInput, ToolSample};
+use crate::stages::second_hand::{SecondHand, SecondView};
 use std::collections::VecDeque;
 use std::thread;
 use trepan_contact::{NodalContacts, SurfacePatch};
-use trepan_geometry::{Buttons, ToolState};
+use trepan_geometry::{Buttons, ToolState, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::Recording;
-use trepan_link::wire::{CollisionRecord, SolverRecord, TickRecord};
+use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
 
 /// Tools and patches of this many past ticks are kept for collision steps that refer to them.
 const MEMORY: usize = 16_384;
@@ -59,8 +60,8 @@ pub fn run(
                 if paced {
                     clock.sleep_until(record.time_ms);
                 }
-                again.tick(record, &clock, |ticks, tick, stage| {
-                    view.set(ticks.view(tick, stage.scores(), false));
+                again.tick(record, &clock, |ticks, tick, stage, second| {
+                    view.set(ticks.view(tick, stage, second, false));
                 });
                 if let Some(tissue) = &again.tissue {
                     shown.write(|frame| tissue.solver.publish(frame));
@@ -78,6 +79,8 @@ pub fn run(
 
 struct Again<'a> {
     haptic: HapticStage,
+    second: Option<SecondHand>,
+    seconds: std::slice::Iter<'a, SecondRecord>,
     tissue: Option<Tissue>,
     collisions: VecDeque<CollisionRecord>,
     switches: VecDeque<SolverRecord>,
@@ -98,6 +101,8 @@ impl<'a> Again<'a> {
     fn new(stages: Stages, recording: &'a Recording, pens: Pens, start: ToolSample) -> Self {
         Self {
             haptic: stages.haptic,
+            second: stages.second,
+            seconds: recording.second.iter(),
             tissue: stages.tissue,
             collisions: recording.collisions.iter().copied().collect(),
             switches: recording.solver.iter().copied().collect(),
@@ -115,25 +120,49 @@ impl<'a> Again<'a> {
         }
     }
 
-    fn tick(&mut self, record: &TickRecord, clock: &Clock, show: impl FnOnce(&Ticks, &crate::Tick, &HapticStage)) {
+    fn tick(
+        &mut self,
+        record: &TickRecord,
+        clock: &Clock,
+        show: impl FnOnce(&Ticks, &crate::Tick, &HapticStage, Option<SecondView>),
+    ) {
         self.collide_up_to(record.patch_seq, clock);
         let &(patch_seq, patch) =
             self.patches.iter().rev().find(|(seq, _)| *seq <= record.patch_seq).unwrap_or(&(0, PATCH));
-        let input = TickInput { tick: record.tick, reading: reading(record), patch: &patch, patch_seq };
+        let input = TickInput { tick: record.tick, reading: reading(record.into()), patch: &patch, patch_seq };
         if record.has(TickRecord::RELEASED) {
             self.haptic.release();
         }
         let began_ms = clock.now_ms();
         let notices = &mut self.pens.notices;
         let mut tick = self.haptic.tick(&input, &mut |notice| _ = notices.send(notice));
+        let second = self.second_tick(record.tick);
         tick.record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         self.ticks.add(&tick);
-        self.compare(record, &tick.record);
+        let same = self.same(record.wrench, tick.record.wrench) & second.is_none_or(|(_, same)| same);
+        self.replayed.ticks += 1;
+        self.replayed.identical += u64::from(same);
         remember(&mut self.tools, tick.sample);
         while !self.pens.ticks.send(tick.record) {
             thread::yield_now();
         }
-        show(&self.ticks, &tick, &self.haptic);
+        show(&self.ticks, &tick, &self.haptic, second.map(|(view, _)| view));
+    }
+
+    /// The second hand's tick of a number, if it was recorded, and whether its force is the recorded one.
+    fn second_tick(&mut self, number: u64) -> Option<(SecondView, bool)> {
+        let record = self.seconds.as_slice().first().filter(|record| record.tick <= number)?;
+        self.seconds.next();
+        let stage = self.second.as_mut()?;
+        if record.has(TickRecord::RELEASED) {
+            stage.release();
+        }
+        let (wrench, again) = stage.tick(record.tick, &reading(record.into()));
+        while !self.pens.second.send(again) {
+            thread::yield_now();
+        }
+        let same = self.same(record.wrench, again.wrench);
+        Some((SecondView { world_from_tool: again.proxy, force: wrench.force() }, same))
     }
 
     /// Every collision step up to a number, each with the tool and the brain that it had.
@@ -183,12 +212,11 @@ impl<'a> Again<'a> {
         }
     }
 
-    fn compare(&mut self, was: &TickRecord, is: &TickRecord) {
-        let bits = |r: &TickRecord| r.wrench.force.to_array().map(f32::to_bits);
-        self.replayed.ticks += 1;
-        self.replayed.identical += u64::from(bits(was) == bits(is));
-        let difference = (was.wrench.force - is.wrench.force).length();
-        self.replayed.max_difference_n = self.replayed.max_difference_n.max(difference);
+    /// Whether a force came out the same, bit for bit; keeps the largest difference.
+    fn same(&mut self, was: Wrench, is: Wrench) -> bool {
+        let bits = |wrench: Wrench| wrench.force.to_array().map(f32::to_bits);
+        self.replayed.max_difference_n = self.replayed.max_difference_n.max((was.force - is.force).length());
+        bits(was) == bits(is)
     }
 
     fn outcome(self) -> Outcome {
@@ -205,6 +233,8 @@ impl<'a> Again<'a> {
             solver,
             scores: *self.haptic.scores(),
             guard: self.haptic.guard().counters(),
+            force_limit_n: self.haptic.guard().config().max_force_n,
+            second: self.second.as_ref().map(SecondHand::outcome),
             end_force_n: last.map_or(0.0, |tick| tick.wrench.force.length()),
             replayed: Some(self.replayed),
             ..Outcome::default()
@@ -220,15 +250,27 @@ const PATCH: SurfacePatch = SurfacePatch {
     normal_velocity: 0.0,
 };
 
+/// What a device said, as either hand's record keeps it.
+struct Said {
+    tool: ToolState,
+    flags: u32,
+}
+
+impl From<&TickRecord> for Said {
+    fn from(&TickRecord { device, twist, buttons, time_ms, flags, .. }: &TickRecord) -> Self {
+        Self { tool: ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms }, flags }
+    }
+}
+
+impl From<&SecondRecord> for Said {
+    fn from(&SecondRecord { device, twist, buttons, time_ms, flags, .. }: &SecondRecord) -> Self {
+        Self { tool: ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms }, flags }
+    }
+}
+
 /// What the device said at a recorded tick.
-fn reading(record: &TickRecord) -> Reading {
-    let tool = ToolState {
-        world_from_tool: record.device,
-        twist: record.twist,
-        buttons: Buttons(record.buttons),
-        time_ms: record.time_ms,
-    };
-    let status = match (record.has(TickRecord::LOST), record.has(TickRecord::STALE)) {
+fn reading(Said { tool, flags }: Said) -> Reading {
+    let status = match (flags & TickRecord::LOST != 0, flags & TickRecord::STALE != 0) {
         (true, _) => Status::Lost,
         (false, true) => Status::Stale,
         (false, false) => Status::Fresh,

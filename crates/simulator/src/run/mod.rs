@@ -13,6 +13,7 @@ use crate::run::journal::Written;
 use crate::stages::collision_step::{CollisionStage, SoftFrame};
 use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
 use crate::stages::score::ScoreKeeper;
+use crate::stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 use crate::stages::solver_step::SolverStage;
 use hdrhistogram::Histogram;
 use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
@@ -23,6 +24,8 @@ use trepan_link::cell::{Reader, Writer, cell};
 pub struct Stages {
     /// Always there.
     pub haptic: HapticStage,
+    /// Where both hands hold something.
+    pub second: Option<SecondHand>,
     /// Where the brain deforms.
     pub tissue: Option<Tissue>,
 }
@@ -44,6 +47,10 @@ pub struct View {
     pub time_ms: f64,
     /// Force on the hand, N.
     pub force: Vec3,
+    /// The longest force that the guard lets through, N.
+    pub force_limit_n: f32,
+    /// The second hand, where there is one.
+    pub second: Option<SecondView>,
     /// Depth in bone and tissue, mm.
     pub depth_mm: [f32; 2],
     /// From the tool's ball to the brain at rest, mm.
@@ -96,6 +103,8 @@ impl Cells {
             sample,
             time_ms: 0.0,
             force: Vec3::ZERO,
+            force_limit_n: stages.haptic.guard().config().max_force_n,
+            second: None,
             depth_mm: [0.0; 2],
             brain_distance_mm: f32::INFINITY,
             warnings: 0,
@@ -173,15 +182,17 @@ impl Ticks {
     }
 
     /// The view after a tick.
-    pub fn view(&self, tick: &Tick, scores: &ScoreKeeper, finished: bool) -> View {
+    pub fn view(&self, tick: &Tick, stage: &HapticStage, second: Option<SecondView>, finished: bool) -> View {
         View {
             sample: tick.sample,
             time_ms: tick.record.time_ms,
             force: tick.wrench.force(),
+            force_limit_n: stage.guard().config().max_force_n,
+            second,
             depth_mm: [tick.record.depth_mm, tick.record.tissue_depth_mm],
             brain_distance_mm: tick.record.brain_distance_mm,
             warnings: tick.warnings,
-            removed_mm3: scores.bone_removed_mm3,
+            removed_mm3: stage.scores().bone_removed_mm3,
             counts: [self.count, self.late, self.held],
             finished,
         }
@@ -214,7 +225,7 @@ pub struct SolverOutcome {
 pub struct Replayed {
     /// Ticks run again.
     pub ticks: u64,
-    /// Ticks whose force came out the same, bit for bit.
+    /// Ticks whose forces came out the same, bit for bit, in both hands where there were two.
     pub identical: u64,
     /// Largest difference of force, N.
     pub max_difference_n: f32,
@@ -233,8 +244,12 @@ pub struct Outcome {
     pub scores: ScoreKeeper,
     /// What the force guard did.
     pub guard: GuardCounters,
+    /// The longest force that it let through, N.
+    pub force_limit_n: f32,
     /// Force at the very end, N: zero.
     pub end_force_n: f32,
+    /// The second hand, where there was one.
+    pub second: Option<SecondOutcome>,
     /// The recording.
     pub written: Written,
     /// Against which recording, in a replay.

@@ -18,6 +18,7 @@ use crate::run::journal::{Journal, Pens, journal};
 use crate::run::stop::Stop;
 use crate::run::{Cells, Eyes, Numbered, Outcome, SolverOutcome, Stages, Ticks, Times, View};
 use crate::stages::haptic_tick::{HapticStage, TickInput};
+use crate::stages::second_hand::{SecondHand, SecondView};
 use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
@@ -25,7 +26,7 @@ use trepan_contact::{GuardedWrench, NodalContacts, SurfacePatch};
 use trepan_haptics::{HapticDevice, Status};
 use trepan_link::cell::{Reader, Writer};
 use trepan_link::queue::Sender;
-use trepan_link::wire::{CollisionRecord, SolverRecord, TickRecord};
+use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
 
 /// Pace of the loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,10 +44,18 @@ const LAG_MS: f64 = 40.0;
 /// Most ticks for the force to fade at the end.
 const FADE_TICKS: u64 = 200;
 
-/// Runs until the device is finished, the time is over or a stop is asked for. `picture` runs on the calling thread.
+/// What the hands hold.
+pub struct Devices {
+    /// The drill's, which also says when the operation is over.
+    pub first: Box<dyn HapticDevice>,
+    /// The aspirator's, for stages with a second hand.
+    pub second: Option<Box<dyn HapticDevice>>,
+}
+
+/// Runs until the first device is finished, the time is over or a stop is asked for. `picture` runs on the calling thread.
 pub fn run(
     stages: Stages,
-    device: Box<dyn HapticDevice>,
+    devices: Devices,
     (recorder, share): Kept,
     start: ToolSample,
     pace: Pace,
@@ -56,14 +65,16 @@ pub fn run(
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
     let (pens, pages) = journal();
-    let Pens { ticks, notices, collisions, solver } = pens;
-    let Stages { haptic, tissue } = stages;
+    let Pens { ticks, second: seconds, notices, collisions, solver } = pens;
+    let Stages { haptic, second, tissue } = stages;
+    let hold = |device| Hand { device, stop: stop.clone() };
+    let hand = hold(devices.first);
+    let second = second.zip(devices.second.map(hold)).map(|(stage, hand)| Second { stage, hand, records: seconds });
     let eyes = Eyes { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1) };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(pages, recorder, share, clock));
-        let hand = Hand { device, stop: stop.clone() };
         let ends = HapticEnds { tool: cells.tool.0, view: cells.view.0, patch: cells.patch.1, ticks, notices };
-        let feeling = scope.spawn(move || haptic_loop(haptic, hand, ends, clock, pace, stop));
+        let feeling = scope.spawn(move || haptic_loop(haptic, hand, second, ends, clock, pace, stop));
         let simulating = tissue.map(|tissue| {
             let ends = CollisionEnds {
                 tool: cells.tool.1,
@@ -119,10 +130,29 @@ struct HapticEnds {
     notices: Sender<Notice>,
 }
 
+/// The second hand: what it holds, and its stage.
+struct Second {
+    stage: SecondHand,
+    hand: Hand,
+    records: Sender<SecondRecord>,
+}
+
+impl Second {
+    /// Its whole tick, after the first hand's of the same number.
+    fn tick(&mut self, tick: u64, now_ms: f64) -> SecondView {
+        let reading = self.hand.device.read(now_ms);
+        let (wrench, record) = self.stage.tick(tick, &reading);
+        self.hand.device.apply(wrench);
+        self.records.send(record);
+        SecondView { world_from_tool: record.proxy, force: wrench.force() }
+    }
+}
+
 /// The haptic loop: read, tick, apply, publish, wait. Late ticks are counted, never caught up.
 fn haptic_loop(
     mut stage: HapticStage,
     mut hand: Hand,
+    mut second: Option<Second>,
     mut ends: HapticEnds,
     clock: Clock,
     pace: Pace,
@@ -140,6 +170,7 @@ fn haptic_loop(
         let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq };
         let mut tick = stage.tick(&input, &mut |notice| _ = ends.notices.send(notice));
         hand.device.apply(tick.wrench);
+        let aside = second.as_mut().map(|second| second.tick(ticks.count + 1, now_ms));
         let done_ms = clock.now_ms();
         tick.record.compute_us = ((done_ms - now_ms) * 1e3) as f32;
         tick.record.flags |= if schedule.advance(done_ms) { TickRecord::LATE } else { 0 };
@@ -147,17 +178,31 @@ fn haptic_loop(
         let over = reading.status == Status::Finished || now_ms >= pace.end_ms || stop.asked();
         if over && ending.is_none() {
             stage.release();
+            second.iter_mut().for_each(|second| second.stage.release());
             ending = Some(ticks.count);
         }
-        let finished = ending.is_some_and(|since| stage.is_at_rest() || ticks.count - since > FADE_TICKS);
+        let at_rest = stage.is_at_rest() && second.as_ref().is_none_or(|second| second.stage.is_at_rest());
+        let finished = ending.is_some_and(|since| at_rest || ticks.count - since > FADE_TICKS);
         ends.tool.set(tick.sample);
-        ends.view.set(ticks.view(&tick, stage.scores(), finished));
+        ends.view.set(ticks.view(&tick, &stage, aside, finished));
         ends.ticks.send(tick.record);
         if finished {
             let seconds = clock.now_ms() * 1e-3;
             let end_force_n = if stage.is_at_rest() { tick.wrench.force().length() } else { 0.0 };
             let (scores, guard) = (*stage.scores(), stage.guard().counters());
-            return Outcome { ticks, seconds, scores, guard, end_force_n, remarks, ..Outcome::default() };
+            let (force_limit_n, second) =
+                (stage.guard().config().max_force_n, second.as_ref().map(|second| second.stage.outcome()));
+            return Outcome {
+                ticks,
+                seconds,
+                scores,
+                guard,
+                force_limit_n,
+                end_force_n,
+                second,
+                remarks,
+                ..Outcome::default()
+            };
         }
     }
 }

@@ -5,6 +5,7 @@ use crate::report::page::Shot;
 use crate::run::clock::Clock;
 use crate::run::stop::Stop;
 use crate::run::{Eyes, View};
+use crate::stages::second_hand::SecondHand;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
@@ -52,6 +53,7 @@ pub fn frame<'a>(camera: Camera, view: &View, brain_positions: Option<&'a [Vec3]
     Frame {
         tool: Some(view.sample.phase.tool()),
         world_from_tool: view.sample.state.world_from_tool,
+        second: view.second.map(|second| (SecondHand::tool(), second.world_from_tool)),
         turn_rad: if view.sample.drilling { view.time_ms as f32 * 0.7 } else { 0.0 },
         drilling: view.sample.drilling,
         brain_positions,

@@ -116,8 +116,8 @@ impl window::Session for Show {
             tool: format!("{:?}", view.sample.phase.tool().kind).to_lowercase(),
             drilling: view.sample.drilling,
             force_n: view.force.length(),
-            force_limit_n: 3.3,
-            values: vec![
+            force_limit_n: view.force_limit_n,
+            values: [
                 value("haptic rate", format!("{rate_hz:.0} Hz")),
                 value("late / held ticks", format!("{late} / {held}")),
                 value("depth in bone", format!("{:.2} mm", view.depth_mm[0])),
@@ -125,7 +125,10 @@ impl window::Session for Show {
                 value("tool to brain", format!("{:.1} mm", view.brain_distance_mm)),
                 value("bone removed", format!("{:.0} mm³", view.removed_mm3)),
                 value("time", format!("{:.1} s", view.time_ms * 1e-3)),
-            ],
+            ]
+            .into_iter()
+            .chain(view.second.map(|second| value("second hand", format!("{:.2} N", second.force.length()))))
+            .collect(),
             warnings: warnings(view.warnings),
             leash: self.pointer.as_ref().map(|_| Leash { tip: view.sample.state.tip(), length_mm: LEASH_MM }),
             finished: view.finished || self.stop.asked(),

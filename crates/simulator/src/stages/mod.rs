@@ -5,5 +5,6 @@ pub(crate) mod collision_step;
 pub(crate) mod haptic_tick;
 pub(crate) mod notice;
 pub(crate) mod score;
+pub(crate) mod second_hand;
 pub(crate) mod skull_wall;
 pub(crate) mod solver_step;
