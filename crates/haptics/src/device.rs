@@ -1,7 +1,11 @@
 //! The seam of the devices.
 
-use trepan_contact::{GuardConfig, GuardedWrench, PassivityConfig};
+use std::f32::consts::PI;
+use trepan_contact::{GuardConfig, GuardedWrench, PassivityConfig, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3};
+
+/// Damping of a light grip, N ms/mm.
+const LIGHT_GRIP: f32 = 2.0;
 
 /// A device that a hand holds, or something that behaves as one.
 pub trait HapticDevice: Send {
@@ -59,6 +63,10 @@ pub struct Capabilities {
     pub position_resolution_mm: f32,
     /// Ticks between `apply` and the moment when the hand feels it.
     pub delay_ticks: u8,
+    /// Mass that the hand moves with it, g; 0 where it is not known.
+    pub moving_mass_g: f32,
+    /// Its own viscous damping, N ms/mm; 0 where it is not known.
+    pub damping: f32,
 }
 
 impl Capabilities {
@@ -73,7 +81,27 @@ impl Capabilities {
             axes_driven: 0,
             position_resolution_mm: 0.0,
             delay_ticks: 0,
+            moving_mass_g: 0.0,
+            damping: 0.0,
         }
+    }
+
+    /// The stiffest coupling to a wall of `wanted` that this device holds stable in a light grip, read every `tick_ms`; a device without
+    /// motors gets what is wanted.
+    ///
+    /// ```text
+    /// K ≤ (b + b_h + B)/(T/2 + d)              Gil, Hulin: d the delay, b_h = 2 N ms/mm a light grip
+    /// B ≤ 0.8 · 2 sin(π/(4n + 2)) m/T          a sampled damper on the mass m alone, n ticks late
+    /// ```
+    pub fn coupled(&self, wanted: Viscoelastic, tick_ms: f32) -> Viscoelastic {
+        if self.axes_driven == 0 {
+            return wanted;
+        }
+        let late_ticks = f32::from(self.delay_ticks);
+        let sampled = 1.6 * (PI / (4.0 * late_ticks + 2.0)).sin() * self.moving_mass_g / tick_ms;
+        let damping = if self.moving_mass_g > 0.0 { wanted.damping.min(sampled) } else { wanted.damping };
+        let passive = (self.damping + LIGHT_GRIP + damping) / (tick_ms * (0.5 + late_ticks));
+        Viscoelastic { stiffness: wanted.stiffness.min(passive), damping }
     }
 
     /// The guard's recommended limits, lowered to this device's peak and continuous force, its energy account told of the device's delay
@@ -98,6 +126,28 @@ impl Capabilities {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_coupling_is_what_delay_mass_and_grip_bear() {
+        let touch = |delay_ticks| Capabilities {
+            axes_driven: 3,
+            moving_mass_g: 45.0,
+            damping: 0.1,
+            delay_ticks,
+            ..Capabilities::passive("Touch")
+        };
+        let hard = Viscoelastic { stiffness: 10.0, damping: 1000.0 };
+        // A pure damper on 45 g is stable to 89, 37 and 24 N ms/mm, 0, 1 and 2 ticks late; a spring of B = 1 in a light grip to 6.2, 2.1, 1.2.
+        for (delay_ticks, damper, spring) in [(0, 89.0, 6.2), (1, 37.0, 2.1), (2, 24.0, 1.3)] {
+            let damping = touch(delay_ticks).coupled(hard, 1.0).damping;
+            assert!(damping <= damper && damping > 0.75 * damper, "{delay_ticks}: {damping}");
+            let stiffness = touch(delay_ticks).coupled(Viscoelastic { damping: 1.0, ..hard }, 1.0).stiffness;
+            assert!(stiffness <= spring && stiffness > 0.8 * spring, "{delay_ticks}: {stiffness}");
+        }
+        let soft = Viscoelastic { stiffness: 0.3, damping: 0.3 };
+        assert_eq!(touch(2).coupled(soft, 1.0), soft);
+        assert_eq!(Capabilities::passive("mouse").coupled(hard, 1.0), hard);
+    }
 
     #[test]
     fn the_guard_knows_the_devices_limits() {

@@ -260,5 +260,7 @@ fn capabilities(drd: &Drd, id: i8) -> Capabilities {
         axes_driven: if drd.has_active_wrist(id) { 6 } else { 3 },
         position_resolution_mm: resolution_mm,
         delay_ticks: 0,
+        moving_mass_g: 0.0,
+        damping: 0.0,
     }
 }

@@ -187,6 +187,8 @@ impl HapticDevice for Haply {
             axes_driven: 3,
             position_resolution_mm: 0.1,
             delay_ticks: 2,
+            moving_mass_g: 0.0,
+            damping: 0.0,
         }
     }
 

@@ -257,6 +257,9 @@ fn capabilities(hd: &Hd, drives_torque: bool) -> Capabilities {
         axes_driven: if drives_torque { 6 } else { 3 },
         position_resolution_mm: 0.055,
         delay_ticks: 1,
+        // The lightest of the family.
+        moving_mass_g: 45.0,
+        damping: 0.1,
     };
     hd.drain_errors();
     capabilities

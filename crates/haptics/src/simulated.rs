@@ -208,6 +208,8 @@ impl HapticDevice for Simulated {
             axes_driven: 3,
             position_resolution_mm: self.config.quantum_mm,
             delay_ticks: self.config.delay_ticks as u8,
+            moving_mass_g: self.config.mass_g,
+            damping: self.config.damping,
         }
     }
 

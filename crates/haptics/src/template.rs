@@ -167,6 +167,8 @@ impl HapticDevice for Template {
             axes_driven: 3,
             position_resolution_mm: 0.01,
             delay_ticks: 1,
+            moving_mass_g: 0.0,
+            damping: 0.0,
         }
     }
 

@@ -149,13 +149,10 @@ pub fn device_name(program: Program, options: &Options, windowed: bool) -> Resul
     Ok(name)
 }
 
-/// What the force guard must know of a device; recorded, so that a replay is guarded alike.
+/// What the force guard and the walls must know of a device; recorded, so that a replay feels alike.
 pub struct Feel {
-    peak_force_n: f32,
-    continuous_force_n: f32,
-    delay_ticks: u8,
-    /// In the patient.
-    position_step_mm: f32,
+    /// Seen in the patient: its encoder step is enlarged as its motion is.
+    device: Capabilities,
     /// World mm per device mm.
     scale: f32,
 }
@@ -169,54 +166,60 @@ const PEAK: &str = "peak_force_n";
 const CONTINUOUS: &str = "continuous_force_n";
 const DELAY: &str = "delay_ticks";
 const STEP: &str = "position_step_mm";
+const AXES: &str = "axes_driven";
+const MASS: &str = "moving_mass_g";
+const DAMPING: &str = "damping_n_ms_per_mm";
 const SCALE: &str = "scale";
 
 impl Feel {
     /// Of a device at hand, whose motion is enlarged by `scale`.
     pub fn of(device: &Capabilities, scale: f32) -> Self {
-        let &Capabilities { peak_force_n, continuous_force_n, delay_ticks, position_resolution_mm, .. } = device;
-        let position_step_mm = scale * position_resolution_mm;
-        Self { peak_force_n, continuous_force_n, delay_ticks, position_step_mm, scale }
+        let position_resolution_mm = scale * device.position_resolution_mm;
+        Self { device: Capabilities { position_resolution_mm, ..device.clone() }, scale }
     }
 
     /// What a recorded session knew of the device of a hand ([`FIRST`], [`SECOND`]); nothing where there is no recording.
     pub fn recorded(recording: Option<&Recording>, hand: &str) -> Self {
         let config = recording.map(|recording| &recording.header.config);
         let number = |name: &str| config.and_then(|c| c.get(&format!("{hand}{name}"))?.parse().ok()).unwrap_or(0.0f32);
-        Self {
+        let device = Capabilities {
             peak_force_n: number(PEAK),
             continuous_force_n: number(CONTINUOUS),
             delay_ticks: number(DELAY) as u8,
-            position_step_mm: number(STEP),
-            scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0),
-        }
+            position_resolution_mm: number(STEP),
+            axes_driven: number(AXES) as u8,
+            moving_mass_g: number(MASS),
+            damping: number(DAMPING),
+            ..Watched::CAPABILITIES
+        };
+        Self { device, scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0) }
     }
 
     /// What [`Feel::recorded`] reads.
-    pub fn entries(&self, hand: &str) -> [(String, String); 5] {
+    pub fn entries(&self, hand: &str) -> [(String, String); 8] {
+        let device = &self.device;
         [
-            (PEAK, self.peak_force_n.to_string()),
-            (CONTINUOUS, self.continuous_force_n.to_string()),
-            (DELAY, self.delay_ticks.to_string()),
-            (STEP, self.position_step_mm.to_string()),
-            (SCALE, self.scale.to_string()),
+            (PEAK, device.peak_force_n),
+            (CONTINUOUS, device.continuous_force_n),
+            (DELAY, device.delay_ticks.into()),
+            (STEP, device.position_resolution_mm),
+            (AXES, device.axes_driven.into()),
+            (MASS, device.moving_mass_g),
+            (DAMPING, device.damping),
+            (SCALE, self.scale),
         ]
-        .map(|(name, value)| (format!("{hand}{name}"), value))
+        .map(|(name, value)| (format!("{hand}{name}"), value.to_string()))
     }
 
     /// The guard for it.
     pub fn guard(&self) -> GuardConfig {
-        let mut device = Watched::CAPABILITIES;
-        device.peak_force_n = self.peak_force_n;
-        device.continuous_force_n = self.continuous_force_n;
-        device.delay_ticks = self.delay_ticks;
-        device.position_resolution_mm = self.position_step_mm;
-        device.guard_config()
+        self.device.guard_config()
     }
 
-    /// A wall that is no stiffer at the hand for being enlarged.
-    pub fn softened(&self, wall: Viscoelastic) -> Viscoelastic {
+    /// A wall that the device holds stable, and that is no stiffer at the hand for being enlarged.
+    pub fn coupled(&self, wall: Viscoelastic, tick_ms: f32) -> Viscoelastic {
         let enlarged = self.scale.max(1.0);
-        Viscoelastic { stiffness: wall.stiffness / enlarged, damping: wall.damping / enlarged }
+        let wall = Viscoelastic { stiffness: wall.stiffness / enlarged, damping: wall.damping / enlarged };
+        self.device.coupled(wall, tick_ms)
     }
 }

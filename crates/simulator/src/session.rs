@@ -165,8 +165,8 @@ impl Session {
             program: self.program,
             rigid: self.rigid,
             dt_ms: self.tick_ms(),
-            bone_force: Vibration::drill(feel.softened(Viscoelastic { stiffness: 2.0, damping: 0.5 })),
-            tissue_force: feel.softened(Viscoelastic { stiffness: 0.3, damping: 0.3 }),
+            bone_force: Vibration::drill(feel.coupled(Viscoelastic { stiffness: 2.0, damping: 0.5 }, self.tick_ms())),
+            tissue_force: feel.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, self.tick_ms()),
             guard: feel.guard(),
             near_mm: 2.0,
         };

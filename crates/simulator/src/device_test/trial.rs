@@ -180,6 +180,8 @@ mod tests {
             axes_driven,
             position_resolution_mm: 0.0,
             delay_ticks: 0,
+            moving_mass_g: 0.0,
+            damping: 0.0,
         }
     }
 

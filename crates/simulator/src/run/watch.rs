@@ -82,6 +82,8 @@ impl Watched {
         axes_driven: 0,
         position_resolution_mm: 0.0,
         delay_ticks: 0,
+        moving_mass_g: 0.0,
+        damping: 0.0,
     };
 
     /// Watches the session of a name; until it is heard, the tool waits at `start`.
