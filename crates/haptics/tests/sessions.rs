@@ -39,6 +39,9 @@ fn session(mut device: Box<dyn HapticDevice>) {
     device.close();
 }
 
+/// A whole session of one driver.
+type Run = Box<dyn FnMut()>;
+
 fn script() -> Box<dyn HapticDevice> {
     let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 };
     Box::new(Script::named("craniotomy", &site, 1000.0).unwrap())
@@ -51,7 +54,7 @@ fn a_hundred_sessions_of_every_driver_leave_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     let socket = folder.path().join("spnav.sock");
     let daemon = UnixListener::bind(&socket).unwrap();
-    let mut drivers: Vec<(&str, Box<dyn FnMut()>)> = vec![
+    let mut drivers: Vec<(&str, Run)> = vec![
         ("openhaptics", {
             let config = openhaptics::Config { library: Some(hd.path().into()), ..Default::default() };
             Box::new(move || session(Box::new(openhaptics::OpenHaptics::open(&config).unwrap())))

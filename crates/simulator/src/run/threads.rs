@@ -9,7 +9,7 @@
 //!
 //! # Practice
 //! Loops: `haptic_loop` at the device's rate, `collision_loop` at 1 kHz, `solver_loop` at the solver's own step, bound to
-//! wall time. The operating system's real-time priority is asked for and its refusal remarked. Whatever happens, the device is closed, and
+//! wall time. A second hand's tick follows the first one's in the haptic loop. The operating system's real-time priority is asked for and its refusal remarked. Whatever happens, the device is closed, and
 //! with it the force: also when a loop panics.
 
 use crate::run::clock::{Clock, Schedule};
