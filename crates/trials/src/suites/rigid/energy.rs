@@ -6,7 +6,7 @@
 //!
 //! # Practice
 //! A new hand every ten thousand ticks: stiffness 0.05 to 0.5 N/mm, damping 0.05 to 6 N ms/mm, 5 to 200 g, on one of three
-//! devices, 0 to 2 ticks late, that means to be now here, now there, up to 6 mm in the bone.
+//! devices, 0 to 2 ticks late and with the wall that it bears, that means to be now here, now there, up to 6 mm in the bone.
 
 use super::coupling;
 use super::recording::{self, Place, Task};
@@ -70,10 +70,11 @@ fn given_j(method: &Method, bone: &BoneVolume, normal: Vec3, seed: u64, guarded:
     let hand = Hand { mass_g: decade(5.0, 200.0), damping: decade(0.05, 6.0), stiffness: decade(0.05, 0.5) };
     let intent = wandering(&mut random, normal);
     let mut device = Simulated::new(config, hand, Box::new(Replay::new(intent)));
-    let told = device.capabilities().guard_config();
+    let capable = device.capabilities();
+    let told = capable.guard_config();
     let passivity = told.passivity.filter(|_| guarded);
     let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, ..told });
-    let (mut contact, mut model) = (method.build(&Tool::burr(RADIUS_MM)), Viscoelastic::BONE);
+    let (mut contact, mut model) = (method.build(&Tool::burr(RADIUS_MM)), capable.coupled(Viscoelastic::BONE, 1.0));
     let mut out = RigidStep::default();
     let (mut taken_nmm, mut lowest_nmm) = (0.0f64, 0.0f64);
     for tick in 0..HAND_TICKS {
