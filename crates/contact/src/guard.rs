@@ -281,7 +281,6 @@ impl ForceGuard {
     /// The force with the damping that the controller asks for.
     fn damped(&mut self, force: Vec3, dt_ms: f32) -> Vec3 {
         let Some(config) = &self.config.passivity else { return force };
-        let force = force * self.observer.bearable();
         let damped = self.observer.damped(force, dt_ms, config);
         self.counters.passivity += u64::from(damped != force);
         damped

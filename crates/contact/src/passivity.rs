@@ -11,12 +11,12 @@
 //! 1 damp     F ← F (1 - clamp(α v·n/|F|, ±1)),  n = F/|F|       along the force alone; it never pulls and never more than doubles F
 //!            α grows by the energy made, stays while in contact, fades in free motion
 //! 2 bound    |F| d ≤ E + ε,   d = (v·n + margin) T              d the way that the hand may go along F in the coming tick
-//! 3 restart  a force held short for a stated time while the scene still wants it: half of it begins anew without debt, counted
+//! 3 restart  a force held short for a stated time while the scene still wants it: account and force begin anew, counted
 //! ```
 //! A damper cannot undo what a held force is about to give, hence the bound (the energy bounding of Kim and Ryu). A damper that stops as
 //! soon as E ≥ 0 lets the oscillation come back at once, hence the memory. A hand at rest gets no power whatever the force, so the
 //! bound is exactly silent there; and a wall that has lost its force inside the hand's reach could never earn it back at F = 0, hence the
-//! restart. A wall whose force is held short so often is too stiff for this hand; until the contact ends it is half as stiff.
+//! restart.
 //!
 //! **Encoder steps.** A staircase spring is conservative, but each trembling across one edge would book `k Δ²`. So E is booked by the
 //! sure way of the hand ([`track`]), which is right to `|F| Δ`. The damper learns from a second account by positions as read, which
@@ -29,7 +29,7 @@
 //!
 //! # Limits
 //! The motors give out at most 0.1 mJ more than they got with exact positions, delays to 2 ticks and walls to 2 N/mm, over any number of
-//! contacts, as long as nothing is restarted or fades. A restart forgives a debt. With encoder steps add what
+//! contacts, as long as nothing is restarted or fades. A restart may give up to `max_stored_nmm`. With encoder steps add what
 //! they hide, `|F| Δ`; an oscillation within one step is not seen at all. It is stilled by the device's own friction if that is at
 //! least `k Δ/2` (Abbott and Okamura), else it stays at about one step. A delay that is declared too small leaks `k v² T` a tick for each.
 //!
@@ -183,13 +183,8 @@ impl PassivityObserver {
         }
         self.restarts += 1;
         (self.short_ms, self.doubted_nmm) = (0.0, 0.0);
-        self.energy_nmm = self.energy_nmm.max(0.0);
+        self.energy_nmm = f64::from(config.max_stored_nmm);
         true
-    }
-
-    /// The share of the scene's force that this hand holds stable: half of it for each restart in this contact.
-    pub fn bearable(&self) -> f32 {
-        0.5f32.powi(self.restarts.min(MAX_DOUBLINGS) as i32)
     }
 
     /// Energy that the wall holds for the hand, N mm; negative when it gave out more than it got.
@@ -340,7 +335,7 @@ mod tests {
         let near = |found: u32, expected: u32| found.abs_diff(expected) <= 3;
         let as_stated = restarts.iter().zip([375, 1125, 2625]).all(|(&found, expected)| near(found, expected));
         assert!(as_stated && restarts.len() == 3, "1, 2 and 4 times 300 ms at a weight of 1 - 0.2: {restarts:?}");
-        assert_eq!((observer.energy_nmm(), observer.bearable()), (0.0, 0.125), "no credit, and an eighth of the wall");
+        assert_eq!(observer.energy_nmm(), 20.0);
         assert!(!observer.restarts(Vec3::ZERO, Vec3::ZERO, 1.0, &EXACT));
         let again = (1..=400).find(|_| observer.restarts(Vec3::Z, Vec3::ZERO, 1.0, &EXACT));
         assert!(again.is_some_and(|again| near(again, 375)), "contact was left: {again:?}");
