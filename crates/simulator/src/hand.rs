@@ -99,25 +99,26 @@ const SIDE_MM: f32 = 30.0;
 /// The second hand's device, if one is named and can stand beside the first.
 pub fn second_name(first: &DeviceName, options: &Options) -> Result<Option<DeviceName>, SessionError> {
     let Some(text) = &options.second_device else { return Ok(None) };
-    let name: DeviceName =
-        text.parse().map_err(|fault: trepan_haptics::NameError| SessionError::Device(fault.to_string()))?;
+    let name: DeviceName = text.parse().map_err(|fault: trepan_haptics::NameError| second(fault.to_string()))?;
     if matches!(first, DeviceName::Replay(_)) {
-        let text = "a replay brings its second hand along: leave out --second-device";
-        return Err(SessionError::Device(text.into()));
+        return Err(second("a replay brings its second hand along: leave this flag out".into()));
     }
     if matches!(name, DeviceName::Mouse | DeviceName::Replay(_)) {
         return Err(unfit(&name));
     }
     if name.may_be(first) {
-        let text = format!("{first} and {name} may be one device: name two as --list-devices does");
-        return Err(SessionError::Device(text));
+        return Err(second(format!("{first} and {name} may be one device: name two as --list-devices does")));
     }
     Ok(Some(name))
 }
 
 fn unfit(name: &DeviceName) -> SessionError {
     let known = "script:aspirate, simulated:NAME, or a device that --list-devices shows";
-    SessionError::Device(format!("the second hand cannot hold {name}: give {known}"))
+    second(format!("the second hand cannot hold {name}: give {known}"))
+}
+
+fn second(fault: String) -> SessionError {
+    SessionError::Usage(format!("--second-device: {fault}"))
 }
 
 /// The faults that a device had, in a sentence.
