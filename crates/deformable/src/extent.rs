@@ -1,23 +1,24 @@
 //! Boxes for the inner loops: built from corners, compared with few instructions.
 //!
 //! # Practice
-//! The same box as [`Aabb`], kept as six numbers and inlined. A comparison with NaN is false, so a NaN corner neither grows a
-//! box nor lies in one.
+//! The same box as [`Aabb`], its corners in four-lane registers: SSE2, NEON or WebAssembly's, by glam. A comparison with NaN is false and a minimum with NaN on the
+//! left is the right side, so a NaN corner neither grows a box nor lies in one.
 
+use glam::Vec3A;
 use trepan_geometry::{Aabb, Vec3};
 
 /// A closed box, mm; empty when a `low` exceeds its `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Extent {
-    pub low: [f32; 3],
-    pub high: [f32; 3],
+    pub low: Vec3A,
+    pub high: Vec3A,
 }
 
 impl Extent {
     /// Holds nothing.
-    pub const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+    pub const EMPTY: Self = Self { low: Vec3A::INFINITY, high: Vec3A::NEG_INFINITY };
     /// Holds every point.
-    pub const EVERYWHERE: Self = Self { low: [f32::NEG_INFINITY; 3], high: [f32::INFINITY; 3] };
+    pub const EVERYWHERE: Self = Self { low: Vec3A::NEG_INFINITY, high: Vec3A::INFINITY };
 
     /// The box of some points.
     #[inline]
@@ -31,79 +32,61 @@ impl Extent {
 
     #[inline]
     pub fn grow(&mut self, p: Vec3) {
-        let ([x, y, z], [u, v, w]) = (self.low, self.high);
-        let less = |new: f32, old: f32| if new < old { new } else { old };
-        let more = |new: f32, old: f32| if new > old { new } else { old };
-        self.low = [less(p.x, x), less(p.y, y), less(p.z, z)];
-        self.high = [more(p.x, u), more(p.y, v), more(p.z, w)];
+        let p = Vec3A::from(p);
+        (self.low, self.high) = (p.min(self.low), p.max(self.high));
     }
 
     /// The box of two boxes.
     #[inline]
     pub fn merge(&mut self, other: &Self) {
-        for axis in 0..3 {
-            let (low, high) = (other.low[axis], other.high[axis]);
-            self.low[axis] = if low < self.low[axis] { low } else { self.low[axis] };
-            self.high[axis] = if high > self.high[axis] { high } else { self.high[axis] };
-        }
+        (self.low, self.high) = (other.low.min(self.low), other.high.max(self.high));
     }
 
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
-        let apart = |axis: usize| {
-            !((self.low[axis] <= other.high[axis])
-                & (other.low[axis] <= self.high[axis])
-                & (self.low[axis] <= self.high[axis])
-                & (other.low[axis] <= other.high[axis]))
-        };
-        !(apart(0) || apart(1) || apart(2))
+        let meet = self.low.cmple(other.high) & other.low.cmple(self.high);
+        (meet & self.low.cmple(self.high) & other.low.cmple(other.high)).all()
     }
 
     #[inline]
     pub fn contains(&self, p: Vec3) -> bool {
-        let on = |axis: usize, x: f32| (self.low[axis] <= x) & (x <= self.high[axis]);
-        on(0, p.x) & on(1, p.y) & on(2, p.z)
+        let p = Vec3A::from(p);
+        (self.low.cmple(p) & p.cmple(self.high)).all()
     }
 
     /// Whether `other` lies inside.
     pub fn holds(&self, other: &Self) -> bool {
-        (0..3).all(|axis| self.low[axis] <= other.low[axis] && other.high[axis] <= self.high[axis])
+        (self.low.cmple(other.low) & other.high.cmple(self.high)).all()
     }
 
     /// What two boxes share.
     pub fn shared(&self, other: &Self) -> Self {
-        Self {
-            low: core::array::from_fn(|axis| self.low[axis].max(other.low[axis])),
-            high: core::array::from_fn(|axis| self.high[axis].min(other.high[axis])),
-        }
+        Self { low: self.low.max(other.low), high: self.high.min(other.high) }
     }
 
     /// This box, moved outwards on all sides.
     #[inline]
     pub fn widened(&self, margin: f32) -> Self {
-        let ([x, y, z], [u, v, w]) = (self.low, self.high);
-        Self { low: [x - margin, y - margin, z - margin], high: [u + margin, v + margin, w + margin] }
+        Self { low: self.low - margin, high: self.high + margin }
     }
 
     /// The furthest that a side lies outside where it was; 0 for an empty box, since it holds nothing that could be missed.
     pub fn moved_from(&self, before: &Self) -> f32 {
-        let outside = |axis: usize| (before.low[axis] - self.low[axis]).max(self.high[axis] - before.high[axis]);
-        let most = (0..3).map(outside).fold(0.0, f32::max);
+        let most = (before.low - self.low).max(self.high - before.high).max_element().max(0.0);
         if most.is_finite() { most } else { 0.0 }
     }
 
     /// Squared distance of a point from the box, mm²; infinite for an empty one.
     #[inline]
     pub fn distance2(&self, p: Vec3) -> f32 {
-        let outside = |axis: usize, x: f32| (self.low[axis] - x).max(x - self.high[axis]).max(0.0);
-        let (x, y, z) = (outside(0, p.x), outside(1, p.y), outside(2, p.z));
-        x * x + y * y + z * z
+        let p = Vec3A::from(p);
+        (self.low - p).max(p - self.high).max(Vec3A::ZERO).length_squared()
     }
 }
 
 impl From<Aabb> for Extent {
     fn from(aabb: Aabb) -> Self {
-        Self { low: aabb.min.to_array(), high: aabb.max.to_array() }
+        Self { low: aabb.min.into(), high: aabb.max.into() }
     }
 }
 

@@ -15,6 +15,7 @@
 //! Cost: 3 ns for each node of a fitted box, 3 ns for each group of 16 clusters, 10 ns for each triangle near the tool. Triangles with a NaN corner are skipped.
 
 use crate::{extent::Extent, narrow::NONE, triangle};
+use glam::Vec3A;
 use trepan_geometry::Vec3;
 use trepan_mesh::{Csr, Surface, TetMesh};
 
@@ -172,9 +173,9 @@ impl MovingSurface {
     /// Box of a triangle; empty when a corner is not finite.
     #[inline]
     fn box_of(&self, positions: &[Vec3], t: u32) -> Extent {
-        let [a, b, c] = self.corners(positions, t);
+        let [a, b, c] = self.corners(positions, t).map(Vec3A::from);
         match (a + b + c).is_finite() {
-            true => Extent { low: a.min(b).min(c).to_array(), high: a.max(b).max(c).to_array() },
+            true => Extent { low: a.min(b).min(c), high: a.max(b).max(c) },
             false => Extent::EMPTY,
         }
     }

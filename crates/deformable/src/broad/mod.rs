@@ -28,6 +28,7 @@ pub use uniform_grid::UniformGrid;
 pub use volume_tree::{Volume, VolumeTree};
 
 use crate::extent::Extent;
+use glam::Vec3A;
 use trepan_geometry::{Aabb, Vec3};
 
 /// Finds which points may lie in which tetrahedra. A pair may be false, a missing pair may not.
@@ -45,24 +46,11 @@ pub trait BroadPhase: Send {
 #[inline]
 pub(crate) fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Extent {
     let [a, b, c, d] = *tet;
-    let (a, b, c, d) = (positions[a as usize], positions[b as usize], positions[c as usize], positions[d as usize]);
-    let sum = a + b + c + d;
-    if !sum.is_finite() {
+    let [a, b, c, d] = [a, b, c, d].map(|node| Vec3A::from(positions[node as usize]));
+    if !(a + b + c + d).is_finite() {
         return Extent::EMPTY;
     }
-    Extent { low: lower(lower(a, b), lower(c, d)).to_array(), high: upper(upper(a, b), upper(c, d)).to_array() }
-}
-
-#[inline]
-fn lower(a: Vec3, b: Vec3) -> Vec3 {
-    let less = |a: f32, b: f32| if a < b { a } else { b };
-    Vec3::new(less(a.x, b.x), less(a.y, b.y), less(a.z, b.z))
-}
-
-#[inline]
-fn upper(a: Vec3, b: Vec3) -> Vec3 {
-    let more = |a: f32, b: f32| if a > b { a } else { b };
-    Vec3::new(more(a.x, b.x), more(a.y, b.y), more(a.z, b.z))
+    Extent { low: a.min(b).min(c.min(d)), high: a.max(b).max(c.max(d)) }
 }
 
 /// The boxes of a mesh's tetrahedra that meet a region, in order.

@@ -29,7 +29,7 @@ impl ParryTree {
 }
 
 fn to_parry(b: &Extent) -> Box3 {
-    Box3::new(b.low.into(), b.high.into())
+    Box3::new(b.low.to_array().into(), b.high.to_array().into())
 }
 
 impl BroadPhase for ParryTree {

@@ -1,6 +1,7 @@
 //! Points that still look for their tetrahedron, coordinate by coordinate, so that eight are compared with a box at once.
 
 use crate::extent::Extent;
+use glam::Vec3A;
 use trepan_geometry::Vec3;
 
 /// Numbers and places of lost points.
@@ -59,20 +60,21 @@ impl Lost {
     /// Box of all.
     pub(crate) fn bounds(&self) -> Extent {
         let [x, y, z] = [range(&self.x), range(&self.y), range(&self.z)];
-        Extent { low: [x.0, y.0, z.0], high: [x.1, y.1, z.1] }
+        Extent { low: Vec3A::new(x.0, y.0, z.0), high: Vec3A::new(x.1, y.1, z.1) }
     }
 
     /// The first one from the `k`th on that lies in a box.
     #[inline]
     pub(crate) fn next_in(&self, mut k: usize, b: &Extent) -> Option<usize> {
         let (x, y, z) = (&self.x[..], &self.y[..self.x.len()], &self.z[..self.x.len()]);
+        let (low, high) = (b.low.to_array(), b.high.to_array());
         let inside = |n: usize| {
-            (b.low[0] <= x[n])
-                & (x[n] <= b.high[0])
-                & (b.low[1] <= y[n])
-                & (y[n] <= b.high[1])
-                & (b.low[2] <= z[n])
-                & (z[n] <= b.high[2])
+            (low[0] <= x[n])
+                & (x[n] <= high[0])
+                & (low[1] <= y[n])
+                & (y[n] <= high[1])
+                & (low[2] <= z[n])
+                & (z[n] <= high[2])
         };
         while k + LANES <= x.len() && !(k..k + LANES).fold(false, |any, n| any | inside(n)) {
             k += LANES;
