@@ -8,7 +8,8 @@
 //! visits(δ) = Σ boxes  Π (w_d/δ + 1)          tests(δ) = Σ boxes, particles  Π max(0, 1 − g_d/δ)
 //! ```
 //!
-//! exactly, in the mean over placements. The thesis's formula has one box size, s, one cell too many on each axis, and guesses particles from facets;
+//! exactly, in the mean over placements. A processor guesses when the loop over a box's cells ends. On one axis there are ⌊w/δ⌋ + 2 cells with chance f = frac(w/δ) and one less
+//! otherwise, so it guesses wrongly with chance min(f, 1 − f), which costs as much as several visits: `doubts(δ) = Σ boxes Σ_d min(f_d, 1 − f_d)`. The thesis's formula has one box size, s, one cell too many on each axis, and guesses particles from facets;
 //! this takes what is there: a tool's own points, graded meshes, any overlap.
 //!
 //! # Practice
@@ -16,12 +17,14 @@
 
 use crate::counts::Table;
 use crate::error::{VoxelSizeError, checked};
-use crate::{Prices, cost::golden_section};
-use glam::Vec3;
+use crate::{Prices, Work, cost::golden_section};
+use glam::{DVec3, Vec3};
 use trepan_geometry::Aabb;
 
 /// Most pairs of a box and a particle that are kept.
 pub const MAX_GAPS: usize = 300_000;
+/// Most sizes of boxes that are kept.
+const MAX_SIZES: usize = 4_096;
 
 /// What the expected work needs to know about boxes and particles.
 #[derive(Clone, Debug)]
@@ -32,6 +35,9 @@ pub struct Expected {
     gaps: Vec<Vec3>,
     /// How many pairs each gap stands for.
     weight: f64,
+    /// Sizes of boxes, mm, and how many boxes each stands for.
+    sizes: Vec<DVec3>,
+    boxes_per_size: f64,
     reach_mm: f64,
 }
 
@@ -54,7 +60,10 @@ impl Expected {
                 }
             });
         }
-        Ok(Self { moments: moments(&boxes), gaps, weight: stride as f64, reach_mm })
+        let every = boxes.len().div_ceil(MAX_SIZES).max(1);
+        let sizes: Vec<DVec3> = boxes.iter().step_by(every).map(|b| b.size().as_dvec3()).collect();
+        let boxes_per_size = boxes.len() as f64 / sizes.len().max(1) as f64;
+        Ok(Self { moments: moments(&boxes), gaps, weight: stride as f64, sizes, boxes_per_size, reach_mm })
     }
 
     /// Expected cells visited with cells of `delta_mm`.
@@ -70,15 +79,27 @@ impl Expected {
         self.weight * self.gaps.iter().map(chance).sum::<f64>()
     }
 
+    /// Expected loops whose end is guessed wrongly, with cells of `delta_mm`.
+    pub fn doubts(&self, delta_mm: f64) -> f64 {
+        let even = |size: &DVec3| (*size / delta_mm).fract();
+        self.boxes_per_size * self.sizes.iter().map(|s| even(s).min(1.0 - even(s)).element_sum()).sum::<f64>()
+    }
+
+    /// Expected work with cells of `delta_mm`, at most the reach.
+    pub fn work(&self, delta_mm: f64) -> Work {
+        Work { visits: self.visits(delta_mm), doubts: self.doubts(delta_mm), tests: self.tests(delta_mm) }
+    }
+
     /// Expected time of a pass, in the unit of the prices.
     pub fn time(&self, prices: &Prices, delta_mm: f64) -> f64 {
-        prices.fixed + prices.visit * self.visits(delta_mm) + prices.test * self.tests(delta_mm)
+        prices.time(&self.work(delta_mm))
     }
 
     /// The cheapest cell edge from `low_mm` up to the reach, mm.
     pub fn best(&self, prices: &Prices, low_mm: f64) -> Result<f64, VoxelSizeError> {
         checked("low_mm", low_mm, low_mm > 0.0 && low_mm < self.reach_mm, "positive and under the reach")?;
         checked("visit", prices.visit, prices.visit > 0.0 && prices.visit.is_finite(), "positive and finite")?;
+        checked("doubt", prices.doubt, prices.doubt >= 0.0 && prices.doubt.is_finite(), "0 or more and finite")?;
         checked("test", prices.test, prices.test >= 0.0 && prices.test.is_finite(), "0 or more and finite")?;
         const STEPS: usize = 24;
         let (low, high) = (low_mm.ln(), self.reach_mm.ln());
@@ -139,10 +160,20 @@ mod tests {
     }
 
     #[test]
+    fn boxes_of_one_size_leave_no_doubt_where_cells_fit_them() {
+        let unit = |at: f32| Aabb { min: Vec3::splat(at), max: Vec3::splat(at + 3.0) };
+        let expected = Expected::of(&[unit(0.0), unit(0.3), unit(7.1)], &[], 6.0).unwrap();
+        for (delta, doubts) in [(1.0, 0.0), (1.5, 0.0), (3.0, 0.0), (2.0, 4.5), (4.0, 2.25)] {
+            assert!((expected.doubts(delta) - doubts).abs() < 1e-5, "{delta}: {}", expected.doubts(delta));
+        }
+        assert_eq!(expected.work(2.0).doubts, expected.doubts(2.0));
+    }
+
+    #[test]
     fn the_best_size_is_no_dearer_than_any_other() {
         let (boxes, particles) = scene();
         let expected = Expected::of(&boxes, &particles, 8.0).unwrap();
-        let prices = Prices { fixed: 0.0, visit: 1.0, test: 5.0 };
+        let prices = Prices { fixed: 0.0, visit: 1.0, doubt: 0.0, test: 5.0 };
         let best = expected.best(&prices, 0.1).unwrap();
         for n in 1..80 {
             assert!(expected.time(&prices, 0.1 * n as f64) >= expected.time(&prices, best) * (1.0 - 1e-9));
@@ -157,7 +188,7 @@ mod tests {
         assert!(field(Expected::of(&boxes, &particles, 0.0).unwrap_err()));
         assert!(field(Expected::of(&boxes, &[Vec3::NAN], 1.0).unwrap_err()));
         let expected = Expected::of(&boxes, &particles, 2.0).unwrap();
-        assert!(field(expected.best(&Prices { fixed: 0.0, visit: 0.0, test: 1.0 }, 0.1).unwrap_err()));
-        assert!(field(expected.best(&Prices { fixed: 0.0, visit: 1.0, test: 1.0 }, 3.0).unwrap_err()));
+        assert!(field(expected.best(&Prices { fixed: 0.0, visit: 0.0, doubt: 0.0, test: 1.0 }, 0.1).unwrap_err()));
+        assert!(field(expected.best(&Prices { fixed: 0.0, visit: 1.0, doubt: 0.0, test: 1.0 }, 3.0).unwrap_err()));
     }
 }

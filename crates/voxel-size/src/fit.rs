@@ -1,16 +1,26 @@
 //! What a visit, a test and the rest cost on a machine, from times that someone else measured.
 //!
 //! # Theory
-//! A pass takes t = t_0 + t_v · visits + t_p · tests, where t_0 holds what no cell size changes (sorting particles, boxes, the narrow phase). With times at several cell
-//! sizes this is linear least squares, solved here with relative weights (each time divided by itself), so that no size dominates.
+//! A pass takes t = t_0 + t_v · visits + t_d · doubts + t_p · tests, where t_0 holds what no cell size changes (sorting particles, boxes, the narrow phase) and t_d
+//! is what a wrongly guessed branch costs. With times at several cell sizes this is linear least squares, solved here with relative weights (each time divided by itself), so that no size dominates.
 //! A negative price, which noise can give, is set to 0 and the rest solved again.
 //!
 //! # Practice
-//! Times in any unit; prices come in the same unit. Three cell sizes are the minimum; five to ten from 0.5 to 4 mean edges do well.
+//! Times in any unit; prices come in the same unit. Four cell sizes are the minimum; seven to twelve from 0.5 to 4 mean edges do well.
 
 use crate::CostModel;
-use crate::counts::Counts;
 use crate::error::{VoxelSizeError, checked};
+
+/// What a pass does besides what no cell size changes: counted, or expected by [`Expected::work`](crate::Expected::work).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Work {
+    /// Cells visited.
+    pub visits: f64,
+    /// Loops over the cells of a box whose number of turns a processor guesses wrongly.
+    pub doubts: f64,
+    /// Particles tested.
+    pub tests: f64,
+}
 
 /// What each part of a pass costs, in the unit of the measured times.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,14 +29,16 @@ pub struct Prices {
     pub fixed: f64,
     /// One cell visited, t_v.
     pub visit: f64,
+    /// One wrong guess.
+    pub doubt: f64,
     /// One particle tested, t_p.
     pub test: f64,
 }
 
 impl Prices {
     /// Predicted time of a pass.
-    pub fn time(&self, counts: &Counts) -> f64 {
-        self.fixed + self.visit * counts.visits as f64 + self.test * counts.tests as f64
+    pub fn time(&self, work: &Work) -> f64 {
+        self.fixed + self.visit * work.visits + self.doubt * work.doubts + self.test * work.tests
     }
 
     /// The cost model with these prices, for a measured share of idle tetrahedra.
@@ -38,84 +50,96 @@ impl Prices {
     }
 }
 
-/// Prices from counts and the times that they took.
-pub fn fit(measured: &[(Counts, f64)]) -> Result<Prices, VoxelSizeError> {
+/// How many prices there are.
+const PRICES: usize = 4;
+
+/// Prices from work and the times that it took.
+pub fn fit(measured: &[(Work, f64)]) -> Result<Prices, VoxelSizeError> {
     for (_, time) in measured {
         checked("a measured time", *time, *time > 0.0 && time.is_finite(), "positive and finite")?;
     }
-    let mut used = [true; 3];
+    let mut used = [true; PRICES];
     loop {
         let prices = least_squares(measured, used)?;
-        match (0..3).filter(|&n| prices[n] < 0.0).min_by(|&a, &b| prices[a].total_cmp(&prices[b])) {
+        match (0..PRICES).filter(|&n| prices[n] < 0.0).min_by(|&a, &b| prices[a].total_cmp(&prices[b])) {
             Some(worst) => used[worst] = false,
-            None => return Ok(Prices { fixed: prices[0], visit: prices[1], test: prices[2] }),
+            None => {
+                let [fixed, visit, doubt, test] = prices;
+                return Ok(Prices { fixed, visit, doubt, test });
+            }
         }
     }
 }
 
 /// Prices of the used columns; 0 for the others.
-fn least_squares(measured: &[(Counts, f64)], used: [bool; 3]) -> Result<[f64; 3], VoxelSizeError> {
-    let wanted = used.iter().filter(|u| **u).count();
+fn least_squares(measured: &[(Work, f64)], mut used: [bool; PRICES]) -> Result<[f64; PRICES], VoxelSizeError> {
     let scale = column_scale(measured);
-    let mut matrix = [[0.0; 4]; 3];
-    for (counts, time) in measured {
-        let row: [f64; 3] = std::array::from_fn(|n| if used[n] { columns(counts)[n] / scale[n] / time } else { 0.0 });
-        for i in 0..3 {
-            (0..3).for_each(|j| matrix[i][j] += row[i] * row[j]);
-            matrix[i][3] += row[i];
+    (0..PRICES).for_each(|n| used[n] &= scale[n] > f64::MIN_POSITIVE);
+    let wanted = used.iter().filter(|u| **u).count();
+    let mut matrix = [[0.0; PRICES + 1]; PRICES];
+    for (work, time) in measured {
+        let row: [f64; PRICES] =
+            std::array::from_fn(|n| if used[n] { columns(work)[n] / scale[n] / time } else { 0.0 });
+        for i in 0..PRICES {
+            (0..PRICES).for_each(|j| matrix[i][j] += row[i] * row[j]);
+            matrix[i][PRICES] += row[i];
         }
     }
-    (0..3).filter(|&n| !used[n]).for_each(|n| matrix[n][n] = 1.0);
+    (0..PRICES).filter(|&n| !used[n]).for_each(|n| matrix[n][n] = 1.0);
     let solved = solve(matrix).filter(|_| measured.len() >= wanted);
     let solved = solved.ok_or(VoxelSizeError::Fit { got: measured.len(), wanted })?;
-    Ok(std::array::from_fn(|n| solved[n] / scale[n]))
+    Ok(std::array::from_fn(|n| if used[n] { solved[n] / scale[n] } else { 0.0 }))
 }
 
-fn columns(counts: &Counts) -> [f64; 3] {
-    [1.0, counts.visits as f64, counts.tests as f64]
+fn columns(work: &Work) -> [f64; PRICES] {
+    [1.0, work.visits, work.doubts, work.tests]
 }
 
 /// The largest of each column over its time, so that the normal matrix is well scaled.
-fn column_scale(measured: &[(Counts, f64)]) -> [f64; 3] {
+fn column_scale(measured: &[(Work, f64)]) -> [f64; PRICES] {
     let largest = |n: usize| measured.iter().map(|(c, t)| columns(c)[n] / t).fold(f64::MIN_POSITIVE, f64::max);
     std::array::from_fn(largest)
 }
 
 /// Gauss's elimination with row pivots; `None` when the matrix is singular to rounding.
-fn solve(mut m: [[f64; 4]; 3]) -> Option<[f64; 3]> {
-    for col in 0..3 {
-        let pivot = (col..3).max_by(|&a, &b| m[a][col].abs().total_cmp(&m[b][col].abs()))?;
+fn solve(mut m: [[f64; PRICES + 1]; PRICES]) -> Option<[f64; PRICES]> {
+    for col in 0..PRICES {
+        let pivot = (col..PRICES).max_by(|&a, &b| m[a][col].abs().total_cmp(&m[b][col].abs()))?;
         m.swap(col, pivot);
         let regular = m[col][col].abs() > 1e-10;
         if !regular {
             return None;
         }
         let pivot_row = m[col];
-        for row in (0..3).filter(|&row| row != col) {
+        for row in (0..PRICES).filter(|&row| row != col) {
             let factor = m[row][col] / pivot_row[col];
-            (col..4).for_each(|n| m[row][n] -= factor * pivot_row[n]);
+            (col..=PRICES).for_each(|n| m[row][n] -= factor * pivot_row[n]);
         }
     }
-    Some(std::array::from_fn(|n| m[n][3] / m[n][n]))
+    Some(std::array::from_fn(|n| m[n][PRICES] / m[n][n]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn measured(prices: &Prices, noise: f64) -> Vec<(Counts, f64)> {
-        let at = |n: u64| Counts { visits: 80_000 / (n * n), tests: 30 * n * n * n, ..Counts::default() };
+    fn measured(prices: &Prices, noise: f64) -> Vec<(Work, f64)> {
+        let at = |n: u64| {
+            let doubts = [900.0, 100.0, 800.0, 300.0, 500.0, 200.0, 700.0][n as usize - 1];
+            Work { visits: 80_000.0 / (n * n) as f64, doubts, tests: (30 * n * n * n) as f64 }
+        };
         (1..8).map(|n| (at(n), prices.time(&at(n)) * (1.0 + noise * (n as f64 * 12.9).sin()))).collect()
     }
 
     #[test]
     fn prices_come_back() {
-        let prices = Prices { fixed: 400.0, visit: 0.8, test: 4.4 };
+        let prices = Prices { fixed: 400.0, visit: 0.8, doubt: 7.0, test: 4.4 };
         let found = fit(&measured(&prices, 0.0)).unwrap();
         assert!(
             (found.visit / 0.8 - 1.0).abs() < 1e-6
                 && (found.test / 4.4 - 1.0).abs() < 1e-6
                 && (found.fixed / 400.0 - 1.0).abs() < 1e-6
+                && (found.doubt / 7.0 - 1.0).abs() < 1e-6
         );
         assert!((found.model(0.99).unwrap().r_t - 5.5).abs() < 1e-5);
         let noisy = fit(&measured(&prices, 0.02)).unwrap();
@@ -124,17 +148,17 @@ mod tests {
 
     #[test]
     fn no_price_is_negative() {
-        let prices = Prices { fixed: 0.0, visit: 1.0, test: 0.0 };
+        let prices = Prices { fixed: 0.0, visit: 1.0, doubt: 0.0, test: 0.0 };
         let found = fit(&measured(&prices, 0.05)).unwrap();
-        assert!(found.fixed >= 0.0 && found.visit > 0.9 && found.test >= 0.0);
+        assert!(found.fixed >= 0.0 && found.visit > 0.9 && found.doubt >= 0.0 && found.test >= 0.0);
     }
 
     #[test]
     fn too_little_is_refused() {
-        let prices = Prices { fixed: 1.0, visit: 1.0, test: 1.0 };
+        let prices = Prices { fixed: 1.0, visit: 1.0, doubt: 1.0, test: 1.0 };
         let all = measured(&prices, 0.0);
-        assert_eq!(fit(&all[..2]), Err(VoxelSizeError::Fit { got: 2, wanted: 3 }));
-        assert_eq!(fit(&[all[0]; 6]), Err(VoxelSizeError::Fit { got: 6, wanted: 3 }));
-        assert!(matches!(fit(&[(Counts::default(), f64::NAN)]), Err(VoxelSizeError::Field { .. })));
+        assert_eq!(fit(&all[..3]), Err(VoxelSizeError::Fit { got: 3, wanted: 4 }));
+        assert_eq!(fit(&[all[0]; 6]), Err(VoxelSizeError::Fit { got: 6, wanted: 4 }));
+        assert!(matches!(fit(&[(Work::default(), f64::NAN)]), Err(VoxelSizeError::Field { .. })));
     }
 }

@@ -38,7 +38,7 @@ pub use bricks::Bricks;
 pub use cost::{CostModel, zone_error};
 pub use error::VoxelSizeError;
 pub use expected::{Expected, MAX_GAPS};
-pub use fit::{Prices, fit};
+pub use fit::{Prices, Work, fit};
 pub use measures::Measures;
 
 /// The examples of the README compile.

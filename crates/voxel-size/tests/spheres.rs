@@ -4,7 +4,7 @@ use glam::DVec3;
 use trepan_geometry::Vec3;
 use trepan_mesh::{TetMesh, lattice};
 use trepan_volume::VoxelVolume;
-use trepan_voxel_size::{CostModel, Expected, Measures, Prices, counts};
+use trepan_voxel_size::{CostModel, Expected, Measures, Prices, Work, counts};
 
 fn ball(target_tets: usize) -> TetMesh {
     let mut mask = VoxelVolume::isotropic([48; 3], Vec3::splat(-23.5), 1.0, 0u8);
@@ -47,7 +47,7 @@ fn the_expected_best_size_has_less_regret_than_the_formula() {
     let mesh = ball(8_000);
     let measures = Measures::of(&mesh).expect("a ball can be measured");
     let edge = measures.mean_edge_mm;
-    let prices = Prices { fixed: 0.0, visit: 1.0, test: 5.0 };
+    let prices = Prices { fixed: 0.0, visit: 1.0, doubt: 0.0, test: 5.0 };
     for apart in [40.0, 42.0, 43.5] {
         let moved = |shift: Vec3| mesh.positions.iter().map(|p| *p + shift).collect::<Vec<Vec3>>();
         let work = |cell: f64| {
@@ -56,7 +56,10 @@ fn the_expected_best_size_has_less_regret_than_the_formula() {
             let time = |shift: Vec3| {
                 let boxes = counts::boxes(&TetMesh { positions: moved(shift), tets: mesh.tets.clone() });
                 let particles = moved(shift + Vec3::new(apart, 0.0, 0.0));
-                prices.time(&counts::grid(&boxes, &particles, cell).expect("a grid that fits"))
+                {
+                    let counts = counts::grid(&boxes, &particles, cell).expect("a grid that fits");
+                    prices.time(&Work { visits: counts.visits as f64, doubts: 0.0, tests: counts.tests as f64 })
+                }
             };
             placements.map(time).sum::<f64>() / 12.0
         };

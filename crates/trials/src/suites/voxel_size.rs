@@ -13,7 +13,7 @@ use crate::suite::{Findings, Gate, Row};
 use scene::{Body, Elements, Scene, Touch};
 use std::time::Instant;
 use timing::Calibration;
-use trepan_voxel_size::{CostModel, Expected, counts, zone_error};
+use trepan_voxel_size::{CostModel, Expected, Prices, counts, zone_error};
 
 /// Tables 5.2 and 5.3 of the thesis, in cells per axis: tetrahedra, low, best, high, analytic, mean edge; errors of the last two.
 const TABLE: [[f64; 8]; 5] = [
@@ -26,11 +26,14 @@ const TABLE: [[f64; 8]; 5] = [
 /// Triangle models: bunny, cow, armadillo.
 const MODELS: [&str; 3] = ["stanford-bunny.obj", "spot.obj", "Armadillo_simplified.obj"];
 /// The name of our rule in the rows.
-const OURS: &str = "expected work";
+const OURS: &str = "expected work, then timed";
 /// Sizes of the ladder, the first in mean edges, and the step between them.
 const LADDER: (usize, f64, f64) = (26, 0.3, 1.11);
 /// A size belongs to the good zone up to this much over the best time.
 const ZONE: f64 = 1.10;
+/// Sizes that are timed on each side of the expected best one at most, the step between them, and how much they may be expected to cost.
+const CANDIDATES: (i32, f64, f64) = (8, 1.07, 1.12);
+
 /// What the scenes found, for the gates over all.
 #[derive(Default)]
 struct Totals {
@@ -74,57 +77,81 @@ fn rules(scene: &Scene, scope: Scope, totals: &mut Totals, findings: &mut Findin
     let usual = measures.traditional_mm();
     let (steps, first, step) = LADDER;
     let ladder: Vec<f64> = (0..steps).map(|i| usual * first * step.powi(i as i32)).collect();
-    let start = Instant::now();
     let reach = ladder[steps - 1] * 1.001;
+    let start = Instant::now();
     let expected = Expected::of(&scene.boxes, &scene.particles, reach).expect("the scene is finite");
     let mut calibration = Calibration::of(scene, usual);
     let prices = calibration.prices();
-    let ours = expected.best(&prices, ladder[0]).unwrap_or(usual);
+    let alone = expected.best(&prices, ladder[0]).unwrap_or(usual);
+    let ours = calibration.cheapest_of(candidates(&expected, &prices, alone, reach), &expected).unwrap_or(alone);
     let calibration_ms = start.elapsed().as_secs_f64() * 1e3;
-    let busy = counts::grid(&scene.boxes, &scene.particles, usual).map_or(0, |c| c.busy_boxes);
-    let p_nc = 1.0 - (busy as f64 / scene.boxes.len() as f64).clamp(1e-4, 1.0);
+    let p_nc = share_without_contact(scene, usual);
     let thesis = CostModel::default().analytic(measures).expect("the default model is sound");
     let priced = prices.model(p_nc).and_then(|model| model.analytic(measures)).unwrap_or(thesis);
-    let mut cells = ladder.clone();
-    cells.extend([thesis, priced, usual, 1.45 * usual, ours]);
+    let rules = [
+        (OURS, ours),
+        ("expected work alone", alone),
+        ("thesis analytic", thesis),
+        ("thesis, measured prices", priced),
+        ("mean edge", usual),
+        ("1.45 x mean edge", 1.45 * usual),
+    ];
+    let cells: Vec<f64> = ladder.iter().copied().chain(rules.map(|rule| rule.1)).collect();
     let measured = timing::least(scene, &cells, &mut calibration, scope.pick(16, 64));
     // The size was chosen with the first prices; the times are predicted with those of the moments in which they were measured.
     let prices = calibration.prices();
     // The best size is chosen on one half of the rounds and every size judged on the other, so that luck does not make it better.
     let timing::Least { choose, judge, .. } = &measured;
     let best = (0..steps).min_by(|&a, &b| choose[a].total_cmp(&choose[b])).unwrap_or(0);
-    let zone = zone(&ladder, &choose[..steps], best);
+    let axis_mm = f64::from(2.0 * scene.size_mm.max_element());
+    let [low, middle, high] = zone(&ladder, &choose[..steps], best).map(|size| axis_mm / size);
+    let predicted: Vec<f64> = cells.iter().map(|cell| expected.time(&prices, cell.min(reach))).collect();
     let number = totals.calibration_ms.len();
     totals.calibration_ms.push(calibration_ms);
-    totals.times.extend((0..steps).map(|n| (number, judge[n], expected.time(&prices, ladder[n]))));
-    totals.regrets.push(judge[steps + 4] / judge[best] - 1.0);
-    let axis_mm = f64::from(2.0 * scene.size_mm.max_element());
-    let names =
-        ["thesis analytic", "thesis, measured prices", "mean edge", "1.45 x mean edge", OURS, "best of the ladder"];
-    for (rule, at) in names.into_iter().zip([steps, steps + 1, steps + 2, steps + 3, steps + 4, best]) {
-        let [low, middle, high] = zone.map(|size| axis_mm / size);
-        findings.rows.push(
-            Row::new(&scene.name, rule)
-                .with("elements", measures.elements)
-                .with("particles", scene.particles.len())
-                .with("cell_mm", cells[at])
-                .with("cells_per_axis", axis_mm / cells[at])
-                .with("zone_cells_per_axis", vec![low, middle, high])
-                .with("colliding_percent", 100.0 * (1.0 - p_nc))
-                .with("visit_ns", 1e3 * prices.visit)
-                .with("test_ns", 1e3 * prices.test)
-                .metric("cost_us", judge[at])
-                .metric("regret_percent", 100.0 * (judge[at] / judge[best] - 1.0))
-                .metric("zone_error", zone_error(axis_mm / cells[at], low, middle, high))
-                .metric("predicted_us", expected.time(&prices, cells[at].min(reach)))
-                .metric("calibration_ms", calibration_ms)
-                .metric("halves_apart_percent", 100.0 * measured.apart())
-                .metric("rounds_count", measured.rounds as f64),
-        );
-    }
+    totals.times.extend((0..steps).map(|n| (number, judge[n], predicted[n])));
+    totals.regrets.push(judge[steps] / judge[best] - 1.0);
+    let named = rules.iter().enumerate().map(|(n, rule)| (rule.0, steps + n)).chain([("best of the ladder", best)]);
+    let row = |(rule, at): (&str, usize)| {
+        Row::new(&scene.name, rule)
+            .with("elements", measures.elements)
+            .with("particles", scene.particles.len())
+            .with("cell_mm", cells[at])
+            .with("cells_per_axis", axis_mm / cells[at])
+            .with("zone_cells_per_axis", vec![low, middle, high])
+            .with("colliding_percent", 100.0 * (1.0 - p_nc))
+            .with("prices_ns", [prices.visit, prices.doubt, prices.test].map(|us| 1e3 * us).to_vec())
+            .metric("cost_us", judge[at])
+            .metric("regret_percent", 100.0 * (judge[at] / judge[best] - 1.0))
+            .metric("zone_error", zone_error(axis_mm / cells[at], low, middle, high))
+            .metric("predicted_us", predicted[at])
+            .metric("calibration_ms", calibration_ms)
+            .metric("halves_apart_percent", 100.0 * measured.apart())
+            .metric("rounds_count", measured.rounds as f64)
+    };
+    findings.rows.extend(named.map(row));
+    let curves = Row::new(&scene.name, "every size of the ladder").with("cells_mm", ladder.clone());
+    let curves = curves.with("measured_us", judge[..steps].to_vec()).with("predicted_us", predicted[..steps].to_vec());
+    findings.rows.push(curves);
     if let Some(row) = scene.table_row {
         beside_the_table(&scene.name, row, thesis / usual, findings);
     }
+}
+
+/// p_nc: the share of boxes without a particle in their cells, at the usual size.
+fn share_without_contact(scene: &Scene, usual: f64) -> f64 {
+    let busy = counts::grid(&scene.boxes, &scene.particles, usual).map_or(0, |c| c.busy_boxes);
+    1.0 - (busy as f64 / scene.boxes.len() as f64).clamp(1e-4, 1.0)
+}
+
+/// Sizes around the expected best one that are expected to cost little more, up to the reach.
+fn candidates(expected: &Expected, prices: &Prices, best: f64, reach: f64) -> impl Iterator<Item = f64> {
+    let (count, step, flat) = CANDIDATES;
+    let enough = flat * expected.time(prices, best);
+    let size = |n: i32| best * step.powi(n);
+    let good = |n: &i32| size(*n) <= reach && expected.time(prices, size(*n)) <= enough;
+    let larger = (0..count).take_while(good).map(size).collect::<Vec<f64>>();
+    let smaller = (1..count).map(|n| -n).take_while(good).map(size).collect::<Vec<f64>>();
+    larger.into_iter().chain(smaller)
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -10,7 +10,7 @@ use glam::DVec3;
 use std::time::Instant;
 use trepan_geometry::{Aabb, Vec3};
 use trepan_voxel_size::counts::Counts;
-use trepan_voxel_size::{Prices, fit};
+use trepan_voxel_size::{Expected, Prices, Work, fit};
 
 /// Placements of the grid against the scene, over which times are averaged.
 const PLACEMENTS: usize = 3;
@@ -26,7 +26,7 @@ const CALIBRATION: [f64; 7] = [0.4, 0.6, 0.9, 1.3, 1.9, 2.8, 4.0];
 const SAMPLE: usize = 3_000;
 /// Neighbouring boxes that are sampled together.
 const RUN: usize = 128;
-/// Time for the rounds over these sizes, ms, and how many are made at least.
+/// Time for the rounds over some sizes, ms, and how many are made at least.
 const CALIBRATION_MS: (f64, usize) = (25.0, 4);
 
 /// The least time of each size, µs: of the even rounds, and of the odd ones.
@@ -102,51 +102,90 @@ impl Slices {
 /// Passes of a sample of the boxes at a few sizes; the least time counts, against the work that was really done.
 pub struct Calibration<'a> {
     scene: &'a Scene,
-    usual: f64,
     sample: Vec<Aabb>,
+    of_sample: Expected,
     grid: HashedGrid,
-    slices: [Slices; CALIBRATION.len()],
-    counts: [Counts; CALIBRATION.len()],
+    sizes: Vec<Timed>,
+}
+
+/// A cell size, what a pass over the sample does with it, and what it took.
+struct Timed {
+    cell_mm: f64,
+    slices: Slices,
+    work: Work,
 }
 
 impl<'a> Calibration<'a> {
-    /// Rounds for [`CALIBRATION_MS`].
+    /// Rounds over [`CALIBRATION`] for [`CALIBRATION_MS`].
     pub fn of(scene: &'a Scene, usual: f64) -> Self {
-        // Runs of neighbours, spread evenly: single boxes would find neither caches nor branches as a whole pass does.
-        let stride = scene.boxes.len().div_ceil(SAMPLE).max(1);
-        let runs = scene.boxes.chunks(RUN).step_by(stride);
-        let mut calibration = Self {
-            scene,
-            usual,
-            sample: runs.flatten().copied().collect(),
-            grid: HashedGrid::default(),
-            slices: Default::default(),
-            counts: Default::default(),
-        };
+        let sample = sample(scene);
+        let of_sample = Expected::of(&sample, &[], usual).expect("the scene is finite");
+        let mut calibration = Self { scene, sample, of_sample, grid: HashedGrid::default(), sizes: Vec::new() };
+        calibration.time(CALIBRATION.map(|share| share * usual).into_iter());
+        calibration
+    }
+
+    /// Times more sizes, and says which of these is the cheapest: what no model knows, such as a lattice that the cells fit, is seen here. The sample says how far
+    /// off the model is at a size, the model what a whole pass does there.
+    pub fn cheapest_of(&mut self, cells: impl Iterator<Item = f64>, of_all: &Expected) -> Option<f64> {
+        let known = self.sizes.len();
+        self.time(cells);
+        let (of_sample, prices) = (self.sample_prices(), self.prices());
+        let whole_us = |t: &Timed| t.slices.sum_us() / of_sample.time(&t.work) * of_all.time(&prices, t.cell_mm);
+        let cheapest = self.sizes[known..].iter().min_by(|a, b| whole_us(a).total_cmp(&whole_us(b)));
+        cheapest.map(|timed| timed.cell_mm)
+    }
+
+    /// Adds sizes, and rounds over them for [`CALIBRATION_MS`].
+    fn time(&mut self, cells: impl Iterator<Item = f64>) {
+        let known = self.sizes.len();
+        self.sizes.extend(cells.map(|cell_mm| Timed { cell_mm, slices: Slices::default(), work: Work::default() }));
         let (least_ms, least_rounds) = CALIBRATION_MS;
         let start = Instant::now();
         let mut rounds = 0;
         while rounds < least_rounds || start.elapsed().as_secs_f64() * 1e3 < least_ms {
-            calibration.round();
+            self.round_from(known);
             rounds += 1;
         }
-        calibration
     }
 
     /// Every size once.
     fn round(&mut self) {
-        for ((slices, counts), share) in self.slices.iter_mut().zip(&mut self.counts).zip(CALIBRATION) {
-            let cell = share * self.usual;
-            *counts = slices.pass(&mut self.grid, &self.sample, &self.scene.particles, cell, DVec3::splat(0.37 * cell));
+        self.round_from(0);
+    }
+
+    fn round_from(&mut self, first: usize) {
+        for Timed { cell_mm, slices, work } in &mut self.sizes[first..] {
+            let offset = DVec3::splat(0.37 * *cell_mm);
+            let counts = slices.pass(&mut self.grid, &self.sample, &self.scene.particles, *cell_mm, offset);
+            let doubts = self.of_sample.doubts(*cell_mm);
+            *work = Work { visits: counts.visits as f64, doubts, tests: counts.tests as f64 };
         }
     }
 
-    /// What the least times of all rounds so far say.
+    /// What the least times of all rounds so far say of the sample.
+    fn sample_prices(&self) -> Prices {
+        let measured: Vec<_> = self.sizes.iter().map(|timed| (timed.work, timed.slices.sum_us())).collect();
+        fit(&measured).unwrap_or(Prices { fixed: 0.0, visit: 1.0, doubt: 0.0, test: 5.0 })
+    }
+
+    /// What they say of the whole scene: the same, but for more boxes.
     pub fn prices(&self) -> Prices {
-        let measured: Vec<_> = self.counts.iter().copied().zip(self.slices.iter().map(Slices::sum_us)).collect();
-        let sort_us = self.slices.iter().map(|slices| slices.0[0]).fold(f64::INFINITY, f64::min);
-        let prices = fit(&measured).unwrap_or(Prices { fixed: 0.0, visit: 1.0, test: 5.0 });
+        let prices = self.sample_prices();
+        let sort_us = self.sizes.iter().map(|timed| timed.slices.0[0]).fold(f64::INFINITY, f64::min);
         let share = self.scene.boxes.len() as f64 / self.sample.len() as f64;
         Prices { fixed: sort_us + (prices.fixed - sort_us).max(0.0) * share, ..prices }
     }
+}
+
+/// Runs of neighbours, half of them from where the particles are, spread evenly: single boxes would find neither caches nor branches as a whole pass does.
+fn sample(scene: &Scene) -> Vec<Aabb> {
+    let touched = Aabb::of_points(&scene.particles);
+    let is_near = |run: &&[Aabb]| run.iter().any(|b| b.overlaps(touched));
+    let (near, far): (Vec<_>, Vec<_>) = scene.boxes.chunks(RUN).partition(is_near);
+    let spread = |runs: Vec<&'_ [Aabb]>| {
+        let stride = (runs.len() * RUN).div_ceil(SAMPLE / 2).max(1);
+        runs.into_iter().step_by(stride).flatten().copied().collect::<Vec<Aabb>>()
+    };
+    [spread(near), spread(far)].concat()
 }
