@@ -1,23 +1,15 @@
-//! What a test found: numbers from its samples, and what they mean for a user.
-//!
-//! # Theory
-//! Delay: a tap pushes the hand, and the first new position along it tells that the force has come. A hand of 0.2 kg needs 2 to 3 ms to
-//! move by an encoder's step, so that this is an upper bound: the driver's, the link's, the motors' and the hand's delay together. The
-//! median of the taps keeps a trembling hand from being taken for an answer.
+//! What a test found: numbers from its samples.
 //!
 //! # Practice
 //! mm, N, ms unless the name says otherwise.
 
-use crate::device_test::trial::{FLOOR_N, FLOOR_N_PER_MM, Part, TAP_MS};
+use crate::device_test::findings::Finding;
+use crate::device_test::trial::{FLOOR_N, FLOOR_N_PER_MM, Part};
 use crate::report::summary::{GuardSummary, Machine, Quantiles};
 use crate::run::Times;
 use serde::Serialize;
 use trepan_contact::ForceGuard;
 use trepan_geometry::Vec3;
-use trepan_haptics::Capabilities;
-
-/// Motion that counts where encoder steps are finer, mm.
-const LEAST_MM: f32 = 0.01;
 
 /// One tick of the test.
 #[derive(Clone, Copy, Debug)]
@@ -89,15 +81,6 @@ pub struct Measured {
     pub remarks: Vec<String>,
     /// The machine.
     pub machine: Machine,
-}
-
-/// Something that a user should know.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
-    /// Whether all is well.
-    pub good: bool,
-    /// In words, with what to do where not.
-    pub text: String,
 }
 
 /// When ticks and positions came.
@@ -214,31 +197,6 @@ pub fn explored(samples: &[Sample]) -> [Vec3; 2] {
     [low, tips().reduce(Vec3::max).unwrap_or(Vec3::ZERO)]
 }
 
-/// From a tap to the first motion along it, ms: the median of the taps; `None` when most of them moved nothing.
-pub fn delay_ms(samples: &[Sample]) -> Option<f64> {
-    let begins = |at: &usize| {
-        let (before, now) = (&samples[at - 1], &samples[*at]);
-        now.part == Part::Tap && before.force == Vec3::ZERO && now.force != Vec3::ZERO
-    };
-    let mut delays: Vec<f64> =
-        (1..samples.len()).filter(begins).map(|at| first_motion_ms(&samples[at..]).unwrap_or(f64::INFINITY)).collect();
-    delays.sort_by(f64::total_cmp);
-    delays.get(delays.len() / 2).copied().filter(|delay| delay.is_finite())
-}
-
-/// When the hand first moved along the tap that begins the samples, half-way between the readings.
-fn first_motion_ms(samples: &[Sample]) -> Option<f64> {
-    let begin = samples[0];
-    let mut last_ms = begin.time_ms;
-    for now in samples[1..].iter().take_while(|s| s.time_ms - begin.time_ms < 2.0 * TAP_MS).filter(|s| s.fresh) {
-        if (now.tip.y - begin.tip.y) * begin.force.y > LEAST_MM * begin.force.y.abs() {
-            return Some(0.5 * (last_ms + now.time_ms) - begin.time_ms);
-        }
-        last_ms = now.time_ms;
-    }
-    None
-}
-
 fn span_ms(samples: &[Sample]) -> f64 {
     samples.last().map_or(0.0, |last| last.time_ms - samples[0].time_ms)
 }
@@ -248,77 +206,8 @@ fn gaps<'a>(samples: impl Iterator<Item = &'a Sample>) -> Vec<f64> {
     times.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
-/// What the numbers mean.
-pub fn findings(measured: &Measured, device: &Capabilities) -> Vec<Finding> {
-    let [rate, pauses] = timing(&measured.timing);
-    let mut found = vec![rate, pauses, range(measured, device), delay(measured, device), floor(&measured.floor)];
-    found.extend(measured.fault.iter().map(|fault| Finding { good: false, text: fault.clone() }));
-    found
-}
-
-/// A text, and what to do where it is not good.
-fn finding(good: bool, text: String, remedy: &str) -> Finding {
-    Finding { good, text: if good { text } else { format!("{text}: {remedy}") } }
-}
-
-fn timing(timing: &Timing) -> [Finding; 2] {
-    let Timing { fresh_hz, asked_hz, gap_us, late_ticks, .. } = timing;
-    let rate = format!("{fresh_hz:.0} new positions a second, {asked_hz:.0} asked for");
-    let (usual_ms, slowest_ms) = (gap_us.p99 * 1e-3, gap_us.max * 1e-3);
-    let pauses = format!(
-        "99 of 100 positions come within {usual_ms:.2} ms, the slowest took {slowest_ms:.1} ms; {late_ticks} ticks were late"
-    );
-    [
-        finding(*fresh_hz >= 0.9 * asked_hz, rate, "close other programs; look at cable and hub"),
-        finding(
-            gap_us.p99 <= 2e6 / asked_hz,
-            pauses,
-            "close other programs, allow real-time priority (`ulimit -r 80`)",
-        ),
-    ]
-}
-
-fn delay(measured: &Measured, device: &Capabilities) -> Finding {
-    match measured.delay_ms {
-        _ if device.axes_driven == 0 => finding(true, "the device has no motors: nothing can be felt".into(), ""),
-        Some(delay) => {
-            finding(delay <= 8.0, format!("motion answers force within {delay:.1} ms"), "stiff walls will buzz")
-        }
-        None => finding(
-            false,
-            "no motion answered the taps".into(),
-            "hold the tool lightly; if you felt none, see whether the force is switched on",
-        ),
-    }
-}
-
-fn range(measured: &Measured, device: &Capabilities) -> Finding {
-    let [low, high] = measured.explored_mm.map(Vec3::from);
-    let (way, whole) = (high - low, device.workspace_mm);
-    let mut text =
-        format!("the hand went through {:.0} x {:.0} x {:.0} mm (right, up, towards you)", way.x, way.y, way.z);
-    if whole.is_finite() {
-        text += &format!(" of {:.0} x {:.0} x {:.0}", whole.x, whole.y, whole.z);
-    }
-    let far = !whole.is_finite() || (way / whole).min_element() >= 0.3;
-    finding(far, text, "move further to see whether the edges are reached")
-}
-
-fn floor(floor: &Floor) -> Finding {
-    if floor.touched_s == 0.0 {
-        return finding(false, "the floor was not touched".into(), "press down when you are asked to");
-    }
-    let ticks = floor.guard.passivity + floor.guard.bounded;
-    let calm = ticks as f64 <= 200.0 * floor.touched_s && floor.guard.restarted == 0;
-    let Floor { touched_s, force_n, depth_mm, energy_out_mj, .. } = floor;
-    let text = format!(
-        "the floor was pressed for {touched_s:.1} s with up to {force_n:.2} N, {depth_mm:.1} mm deep; it gave out {energy_out_mj:.3} mJ"
-    );
-    finding(calm, text, "the guard stilled an oscillation; hold the tool more firmly, look at the delay above")
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::device_test::trial::Trial;
     use trepan_geometry::{Pose, ToolState};
@@ -327,7 +216,7 @@ mod tests {
     use trepan_haptics::simulated::{Config, Hand, Simulated};
 
     /// A whole test of a simulated device whose hand means to be at heights `intent(ms)`, without a clock.
-    fn tested(config: Config, hand: Hand, intent: impl Fn(f64) -> f32) -> (Vec<Sample>, Trial, Capabilities) {
+    pub fn tested(config: Config, hand: Hand, intent: impl Fn(f64) -> f32) -> (Vec<Sample>, Trial, Capabilities) {
         let at = |t: u32| ToolState::at(Pose::from_translation(Vec3::Y * intent(t.into())));
         let mut device = Simulated::new(config, hand, Box::new(Replay::new((0..10_000).map(at).collect())));
         let able = device.capabilities();
@@ -341,29 +230,6 @@ mod tests {
             Sample { time_ms: t.into(), read_us: 2.0, apply_us: 1.0, fresh: true, part, tip, force }
         };
         ((0..10_000).map(sample).collect(), trial, able)
-    }
-
-    #[test]
-    fn taps_find_the_delay_of_the_device() {
-        for (name, hand) in [("light", Hand::LIGHT), ("firm", Hand::FIRM)] {
-            for friction_n in [0.0, 0.26] {
-                let found = [0, 2, 5, 8].map(|delay_ticks| {
-                    let config = Config { delay_ticks, friction_n, ..Config::default() };
-                    delay_ms(&tested(config, hand, |_| 0.0).0).unwrap()
-                });
-                for (found, delay) in found.into_iter().zip([0.0, 2.0, 5.0, 8.0]) {
-                    assert!((1.0..4.0).contains(&(found - delay)), "{name}, {friction_n} N: {found} for {delay}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_device_that_does_not_move_has_no_delay() {
-        let (mut samples, ..) = tested(Config::default(), Hand::FIRM, |_| 0.0);
-        samples.iter_mut().for_each(|s| s.tip = Vec3::ONE);
-        assert_eq!(delay_ms(&samples), None);
-        assert_eq!(delay_ms(&[]), None);
     }
 
     #[test]

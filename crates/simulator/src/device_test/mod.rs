@@ -4,6 +4,8 @@
 //! The device is opened first: what is missing is told before a file is made. The loop is a session's: its own thread, real-time
 //! priority where allowed, deadlines on an absolute grid. Whatever happens, the device is closed, and with it the force.
 
+mod delay;
+mod findings;
 mod measured;
 mod page;
 mod trial;
@@ -188,7 +190,7 @@ fn measured(device: String, able: &Capabilities, felt: &Felt, tick_ms: f64, watc
         faults: watch.map_or(0, Watch::count),
         findings: Vec::new(),
         timing: Timing::of(&course),
-        delay_ms: measured::delay_ms(samples),
+        delay_ms: delay::median_ms(samples),
         stated_delay_ticks: able.delay_ticks,
         explored_mm: measured::explored(samples).map(|corner| corner.to_array()),
         workspace_mm: able.workspace_mm.is_finite().then(|| able.workspace_mm.to_array()),
@@ -199,7 +201,7 @@ fn measured(device: String, able: &Capabilities, felt: &Felt, tick_ms: f64, watc
         remarks: felt.remarks.clone(),
         machine: Machine::here(None),
     };
-    found.findings = measured::findings(&found, able);
+    found.findings = findings::of(&found, able);
     found
 }
 

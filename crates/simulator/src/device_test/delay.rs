@@ -1,0 +1,68 @@
+//! How late the hand feels a force, from taps.
+//!
+//! # Theory
+//! A tap pushes the hand, and the first new position along it tells that the force has come. A hand of 0.2 kg needs 2 to 3 ms to
+//! move by an encoder's step, so that this is an upper bound: the driver's, the link's, the motors' and the hand's delay together. The
+//! median of the taps keeps a trembling hand from being taken for an answer.
+
+use crate::device_test::measured::Sample;
+use crate::device_test::trial::{Part, TAP_MS};
+use trepan_geometry::Vec3;
+
+/// Motion that counts where encoder steps are finer, mm.
+const LEAST_MM: f32 = 0.01;
+
+/// From a tap to the first motion along it, ms: the median of the taps; `None` when most of them moved nothing.
+pub fn median_ms(samples: &[Sample]) -> Option<f64> {
+    let begins = |at: &usize| {
+        let (before, now) = (&samples[at - 1], &samples[*at]);
+        now.part == Part::Tap && before.force == Vec3::ZERO && now.force != Vec3::ZERO
+    };
+    let mut delays: Vec<f64> =
+        (1..samples.len()).filter(begins).map(|at| first_motion_ms(&samples[at..]).unwrap_or(f64::INFINITY)).collect();
+    delays.sort_by(f64::total_cmp);
+    delays.get(delays.len() / 2).copied().filter(|delay| delay.is_finite())
+}
+
+/// When the hand first moved along the tap that begins the samples, half-way between the readings.
+fn first_motion_ms(samples: &[Sample]) -> Option<f64> {
+    let begin = samples[0];
+    let mut last_ms = begin.time_ms;
+    for now in samples[1..].iter().take_while(|s| s.time_ms - begin.time_ms < 2.0 * TAP_MS).filter(|s| s.fresh) {
+        if (now.tip.y - begin.tip.y) * begin.force.y > LEAST_MM * begin.force.y.abs() {
+            return Some(0.5 * (last_ms + now.time_ms) - begin.time_ms);
+        }
+        last_ms = now.time_ms;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device_test::measured::tests::tested;
+    use trepan_haptics::simulated::{Config, Hand};
+
+    #[test]
+    fn taps_find_the_delay_of_the_device() {
+        for (name, hand) in [("light", Hand::LIGHT), ("firm", Hand::FIRM)] {
+            for friction_n in [0.0, 0.26] {
+                let found = [0, 2, 5, 8].map(|delay_ticks| {
+                    let config = Config { delay_ticks, friction_n, ..Config::default() };
+                    median_ms(&tested(config, hand, |_| 0.0).0).unwrap()
+                });
+                for (found, delay) in found.into_iter().zip([0.0, 2.0, 5.0, 8.0]) {
+                    assert!((1.0..4.0).contains(&(found - delay)), "{name}, {friction_n} N: {found} for {delay}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_device_that_does_not_move_has_no_delay() {
+        let (mut samples, ..) = tested(Config::default(), Hand::FIRM, |_| 0.0);
+        samples.iter_mut().for_each(|s| s.tip = Vec3::ONE);
+        assert_eq!(median_ms(&samples), None);
+        assert_eq!(median_ms(&[]), None);
+    }
+}

@@ -1,0 +1,114 @@
+//! What the numbers of a test mean for a user, in words that say what to do.
+
+use crate::device_test::measured::{Floor, Measured, Timing};
+use serde::Serialize;
+use trepan_geometry::Vec3;
+use trepan_haptics::Capabilities;
+
+/// Something that a user should know.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// Whether all is well.
+    pub good: bool,
+    /// In words, with what to do where not.
+    pub text: String,
+}
+
+/// What the numbers mean.
+pub fn of(measured: &Measured, device: &Capabilities) -> Vec<Finding> {
+    let [rate, pauses] = timing(&measured.timing);
+    let mut found = vec![rate, pauses, range(measured, device), delay(measured, device), floor(&measured.floor)];
+    found.extend(measured.fault.iter().map(|fault| Finding { good: false, text: fault.clone() }));
+    found
+}
+
+/// A text, and what to do where it is not good.
+fn finding(good: bool, text: String, remedy: &str) -> Finding {
+    Finding { good, text: if good { text } else { format!("{text}: {remedy}") } }
+}
+
+fn timing(timing: &Timing) -> [Finding; 2] {
+    let Timing { fresh_hz, asked_hz, gap_us, late_ticks, .. } = timing;
+    let rate = format!("{fresh_hz:.0} new positions a second, {asked_hz:.0} asked for");
+    let (usual_ms, slowest_ms) = (gap_us.p99 * 1e-3, gap_us.max * 1e-3);
+    let pauses = format!(
+        "99 of 100 positions come within {usual_ms:.2} ms, the slowest took {slowest_ms:.1} ms; {late_ticks} ticks were late"
+    );
+    [
+        finding(*fresh_hz >= 0.9 * asked_hz, rate, "close other programs; look at cable and hub"),
+        finding(
+            gap_us.p99 <= 2e6 / asked_hz,
+            pauses,
+            "close other programs, allow real-time priority (`ulimit -r 80`)",
+        ),
+    ]
+}
+
+fn delay(measured: &Measured, device: &Capabilities) -> Finding {
+    match measured.delay_ms {
+        _ if device.axes_driven == 0 => finding(true, "the device has no motors: nothing can be felt".into(), ""),
+        Some(delay) => {
+            finding(delay <= 8.0, format!("motion answers force within {delay:.1} ms"), "stiff walls will buzz")
+        }
+        None => finding(
+            false,
+            "no motion answered the taps".into(),
+            "hold the tool lightly; if you felt none, see whether the force is switched on",
+        ),
+    }
+}
+
+fn range(measured: &Measured, device: &Capabilities) -> Finding {
+    let [low, high] = measured.explored_mm.map(Vec3::from);
+    let (way, whole) = (high - low, device.workspace_mm);
+    let mut text =
+        format!("the hand went through {:.0} x {:.0} x {:.0} mm (right, up, towards you)", way.x, way.y, way.z);
+    if whole.is_finite() {
+        text += &format!(" of {:.0} x {:.0} x {:.0}", whole.x, whole.y, whole.z);
+    }
+    let far = !whole.is_finite() || (way / whole).min_element() >= 0.3;
+    finding(far, text, "move further to see whether the edges are reached")
+}
+
+fn floor(floor: &Floor) -> Finding {
+    if floor.touched_s == 0.0 {
+        return finding(false, "the floor was not touched".into(), "press down when you are asked to");
+    }
+    let ticks = floor.guard.passivity + floor.guard.bounded;
+    let calm = ticks as f64 <= 200.0 * floor.touched_s && floor.guard.restarted == 0;
+    let Floor { touched_s, force_n, depth_mm, energy_out_mj, .. } = floor;
+    let text = format!(
+        "the floor was pressed for {touched_s:.1} s with up to {force_n:.2} N, {depth_mm:.1} mm deep; it gave out {energy_out_mj:.3} mJ"
+    );
+    finding(calm, text, "the guard stilled an oscillation; hold the tool more firmly, look at the delay above")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::summary::Quantiles;
+
+    #[test]
+    fn a_fit_pace_is_good_and_a_slow_or_halting_one_is_not() {
+        let pace = |fresh_hz: f64, p99: f64| {
+            let us = |p99| Quantiles { p99, ..Quantiles::default() };
+            let times = |gap_us| Timing {
+                seconds: 10.0,
+                asked_hz: 1000.0,
+                tick_hz: 1000.0,
+                fresh_hz,
+                late_ticks: 0,
+                tick_us: us(1000.0),
+                gap_us,
+                jitter_us: us(10.0),
+                read_us: us(1.0),
+                apply_us: us(1.0),
+            };
+            timing(&times(us(p99))).map(|finding| finding.good)
+        };
+        assert_eq!(
+            [pace(990.0, 1100.0), pace(500.0, 1100.0), pace(990.0, 8000.0)],
+            [[true; 2], [false, true], [true, false]]
+        );
+    }
+}
