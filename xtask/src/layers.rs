@@ -11,7 +11,7 @@ use std::process::Command;
 
 /// Crates by floor, lowest first.
 const FLOORS: [&[&str]; 6] = [
-    &["geometry", "shaders", "fixtures"],
+    &["geometry", "shaders", "fixtures", "emulators"],
     &["volume", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
     &["voxel-size", "budget"],
@@ -36,12 +36,12 @@ const KEPT: [(&str, &[&str]); 8] = [
 
 /// Words in the sources that only some crates may use (tests and examples are free).
 const WORDS: [(&str, &[&str]); 6] = [
-    ("Instant::now", &["simulator", "trials", "gpu", "render"]),
+    ("Instant::now", &["simulator", "trials", "gpu", "render", "emulators"]),
     ("SystemTime", &["simulator", "trials"]),
-    ("thread::sleep", &["simulator", "trials"]),
-    ("thread::spawn", &["simulator", "trials", "tled", "haptics"]),
-    ("std::fs", &["volume", "mesh", "link", "haptics", "render", "simulator", "trials"]),
-    ("unsafe {", &["haptics", "tled", "simulator"]),
+    ("thread::sleep", &["simulator", "trials", "emulators"]),
+    ("thread::spawn", &["simulator", "trials", "tled", "haptics", "emulators"]),
+    ("std::fs", &["volume", "mesh", "link", "haptics", "render", "simulator", "trials", "emulators"]),
+    ("unsafe {", &["haptics", "tled", "simulator", "emulators"]),
 ];
 
 /// All faults found, each one line.

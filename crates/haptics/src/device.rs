@@ -53,7 +53,7 @@ pub struct Capabilities {
     pub peak_force_n: f32,
     /// Largest force for any time, N; 0 where it is not known.
     pub continuous_force_n: f32,
-    /// Rate at which it wants to be read, Hz.
+    /// Highest rate at which it can be read, Hz. Sessions run at 1 kHz unless they are told otherwise.
     pub rate_hz: f32,
     /// Box that the tip can reach, mm.
     pub workspace_mm: Vec3,

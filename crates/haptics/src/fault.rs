@@ -31,9 +31,13 @@ pub enum Fault {
     Garbled = 9,
     /// Power is missing.
     NoPower = 10,
+    /// The device senses nothing new.
+    Stale = 11,
+    /// The maker's software stopped serving the device.
+    Stopped = 12,
 }
 
-const ALL: [Fault; 10] = [
+const ALL: [Fault; 12] = [
     Fault::Disconnected,
     Fault::Overheated,
     Fault::ForceRefused,
@@ -44,6 +48,8 @@ const ALL: [Fault; 10] = [
     Fault::ServiceSilent,
     Fault::Garbled,
     Fault::NoPower,
+    Fault::Stale,
+    Fault::Stopped,
 ];
 
 impl std::fmt::Display for Fault {
@@ -61,6 +67,8 @@ impl std::fmt::Display for Fault {
             Self::ServiceSilent => "the vendor's service does not answer: see whether it runs, then start again",
             Self::Garbled => "the device sends what makes no sense: update its driver or its service",
             Self::NoPower => "the device has no power: plug in its power supply",
+            Self::Stale => "the device sends no new positions: close other programs, check its cable",
+            Self::Stopped => "the maker's software stopped serving the device: close other programs, then start again",
         })
     }
 }
@@ -110,6 +118,6 @@ mod tests {
             assert!(fault.to_string().contains(':'), "{fault}");
         }
         watch.set(None);
-        assert_eq!((watch.fault(), watch.count()), (None, 10));
+        assert_eq!((watch.fault(), watch.count()), (None, ALL.len() as u64));
     }
 }

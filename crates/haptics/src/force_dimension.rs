@@ -2,11 +2,11 @@
 //!
 //! # Theory
 //! The library is driven by calls: a read fetches the pose over USB, an apply sends the force. The firmware has a
-//! watchdog; it is set to 10 ms, so that a haptic loop that dies leaves no force.
+//! watchdog; it is set to 9.5 ms, so that a haptic loop that dies leaves no force.
 //!
 //! # Practice
 //! `read` and `apply` each wait for one USB transfer, about 0.1 to 0.25 ms: the device is the clock of the loop's
-//! shortest tick. The maker's axes (x to the user, y right, z up; m, N m) become x right, y up, z to the user; mm, N mm;
+//! shortest tick, up to 4 kHz by the maker (the Falcon 1 kHz). The maker's axes (x to the user, y right, z up; m, N m) become x right, y up, z to the user; mm, N mm;
 //! [`Workspace`] lays them into the patient. Button 1 is the pedal, button 2 asks for the next tool; devices with one button have
 //! a pedal only. The maker's velocity limit stays as it is. After a fault the force rests, then ramps in; a device
 //! whose link failed is lost until it is opened again.
@@ -20,14 +20,14 @@
 mod library;
 
 use crate::ramp::Ramp;
-use crate::{Capabilities, DeviceError, Fault, HapticDevice, Listed, Reading, Status, Watch, Workspace};
+use crate::{Capabilities, DeviceError, Fault, HapticDevice, Listed, Reading, STALE_MS, Status, Watch, Workspace};
 use library::{Drd, Outcome};
 use std::path::PathBuf;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Mat3, Pose, Quat, ToolState, Twist, Vec3, Wrench};
 
-/// 10 ms in the firmware's steps of 125 µs.
-const WATCHDOG_STEPS: u8 = 80;
+/// 9.5 ms in the firmware's steps of 125 µs: within 10 ms there is no force.
+const WATCHDOG_STEPS: u8 = 76;
 /// Reads between two looks at the status.
 const STATUS_PERIOD: u32 = 8;
 
@@ -58,6 +58,9 @@ pub struct ForceDimension {
     capabilities: Capabilities,
     last: Reading,
     reads: u32,
+    fresh_ms: f64,
+    time_ms: f64,
+    dt_ms: f32,
     lost: bool,
     ramp: Ramp,
     watch: Watch,
@@ -87,6 +90,9 @@ impl ForceDimension {
             capabilities: capabilities(&drd, id),
             last: Reading { tool: start, status: Status::Stale },
             reads: 0,
+            fresh_ms: f64::NAN,
+            time_ms: f64::NAN,
+            dt_ms: 1.0,
             lost: false,
             ramp: Ramp::new(watch.clone()),
             watch,
@@ -143,6 +149,11 @@ impl HapticDevice for ForceDimension {
         let world_from_tool = Pose::from_parts(axes(position) * 1e3, rotation(rows));
         let tool = self.workspace.world(&ToolState { world_from_tool, twist, buttons, time_ms });
         let fresh = outcome == Outcome::Done && tool.is_finite();
+        self.dt_ms = if self.time_ms.is_nan() { 1.0 } else { (time_ms - self.time_ms) as f32 };
+        self.time_ms = time_ms;
+        if fresh || self.fresh_ms.is_nan() {
+            self.fresh_ms = time_ms;
+        }
         if fresh {
             self.last.tool = tool;
         }
@@ -157,10 +168,13 @@ impl HapticDevice for ForceDimension {
 
     fn apply(&mut self, wrench: GuardedWrench) {
         let Some(id) = self.id.filter(|_| !self.lost) else { return };
-        if self.ramp.rest_ends() && self.drd.enable_force(id, true) == Outcome::Failed {
+        if self.ramp.rest_ends(self.dt_ms) && self.drd.enable_force(id, true) == Outcome::Failed {
             return self.lose();
         }
-        let share = self.ramp.share();
+        if self.time_ms - self.fresh_ms > STALE_MS {
+            self.ramp.cut_again_or(Fault::Stale);
+        }
+        let share = self.ramp.share(self.dt_ms);
         let Wrench { force, torque } = self.workspace.device_wrench(wrench.wrench());
         let torque = if self.capabilities.axes_driven == 6 { torque } else { Vec3::ZERO };
         let outcome = self.drd.set_wrench(id, makers_axes(force * share), makers_axes(torque * (share * 1e-3)));
@@ -245,17 +259,18 @@ fn rotation(rows: [[f64; 3]; 3]) -> Quat {
 
 /// Data-sheet numbers by the system's type.
 fn capabilities(drd: &Drd, id: i8) -> Capabilities {
-    let (force_n, workspace_mm, resolution_mm) = match drd.system_type(id) {
-        63 => (20.0, Vec3::new(400.0, 400.0, 260.0), 0.02),
-        104 | 105 | 206 => (20.0, Vec3::new(190.0, 190.0, 130.0), 0.0015),
-        60 => (8.0, Vec3::new(100.0, 100.0, 100.0), 0.06),
-        _ => (12.0, Vec3::new(160.0, 160.0, 110.0), 0.01),
+    let (force_n, workspace_mm, resolution_mm, rate_hz) = match drd.system_type(id) {
+        63 => (20.0, Vec3::new(400.0, 400.0, 260.0), 0.02, 4000.0),
+        104 | 105 | 206 => (20.0, Vec3::new(190.0, 190.0, 130.0), 0.0015, 4000.0),
+        // The Falcon's serial link carries one packet each way in a USB frame.
+        60 => (8.0, Vec3::new(100.0, 100.0, 100.0), 0.06, 1000.0),
+        _ => (12.0, Vec3::new(160.0, 160.0, 110.0), 0.01, 4000.0),
     };
     Capabilities {
         name: drd.system_name(id),
         peak_force_n: force_n,
         continuous_force_n: force_n,
-        rate_hz: 1000.0,
+        rate_hz,
         workspace_mm: Vec3::new(workspace_mm.y, workspace_mm.z, workspace_mm.x),
         axes_driven: if drd.has_active_wrist(id) { 6 } else { 3 },
         position_resolution_mm: resolution_mm,

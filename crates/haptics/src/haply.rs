@@ -81,6 +81,7 @@ pub struct Haply {
     last_news: u64,
     last: Reading,
     fresh_ms: f64,
+    time_ms: f64,
     watch: Watch,
 }
 
@@ -106,6 +107,7 @@ impl Haply {
             ramp: Ramp::new(watch.clone()),
             known: Frame::default(),
             number: 0,
+            garbled: 0,
         };
         let mut threads = vec![thread::spawn(move || pump.run())];
         if let Some(events) = events {
@@ -125,6 +127,7 @@ impl Haply {
             last_news: 0,
             last: Reading { tool: start, status: Status::Stale },
             fresh_ms: f64::NAN,
+            time_ms: f64::NAN,
             watch,
         })
     }
@@ -153,12 +156,14 @@ impl HapticDevice for Haply {
         if self.fresh_ms.is_nan() {
             self.fresh_ms = time_ms;
         }
+        self.time_ms = time_ms;
         let news = *self.news.read();
         self.last.status = Status::Stale;
         if news.number != self.last_news {
-            (self.last_news, self.fresh_ms) = (news.number, time_ms);
+            self.last_news = news.number;
             let tool = self.tool(&news.frame, time_ms);
             if tool.is_finite() {
+                self.fresh_ms = time_ms;
                 self.last = Reading { tool, status: Status::Fresh };
             }
         }
@@ -173,7 +178,7 @@ impl HapticDevice for Haply {
         let Some(pump) = self.threads.first() else { return };
         self.number += 1;
         let force = services_axes(self.workspace.device_wrench(wrench.wrench()).force);
-        self.wishes.write(Wish { number: self.number, force });
+        self.wishes.write(Wish { number: self.number, force, pose_age_ms: self.time_ms - self.fresh_ms });
         pump.thread().unpark();
     }
 

@@ -44,6 +44,9 @@ pub use workspace::Workspace;
 #[doc(no_inline)]
 pub use trepan_contact::GuardedWrench;
 
+/// A driver of metal gives no force that was made for a pose older than this, ms.
+const STALE_MS: f64 = 5.0;
+
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct ReadmeExamples;

@@ -3,46 +3,41 @@
 //! # Theory
 //! libHD owns the servo thread. Its callback publishes what it senses and applies what the haptic loop last asked for;
 //! both pass through triple buffers, so that neither thread waits for the other. That costs up to one tick of delay.
+//! All devices share one callback, which finishes the first device's frame before it begins the second's.
 //!
 //! ```text
-//!   haptic loop: read() <──sample── callback, 1 kHz: begin frame, sense, command, end frame
+//!   haptic loop: read() <──sample── callback, 1 kHz, each device: begin frame, sense, command, end frame
 //!                apply() ──command─>
 //! ```
 //!
 //! # Practice
 //! The device's axes are x right, y up, z towards the user, mm; [`Workspace`] lays them into the patient. Button 1 is the
-//! pedal, button 2 asks for the next tool. Force is off until the device is calibrated. One device at a time. `read` is
-//! [`Status::Lost`] after a fault of the link or 50 ms without a sample. Nothing of the maker's is part of this crate.
+//! pedal, button 2 asks for the next tool. Force is off until the device is calibrated. `read` is [`Status::Lost`] after a fault of
+//! the link or 50 ms without a sample. While a second device is opened or closed the first is without force for a moment, then its force
+//! ramps in. While libHD does not call, its last force stays on the motors; when it calls again there is none. Nothing of the maker's is part of this crate.
 //!
 //! # Sources
 //! OpenHaptics API reference and programmer's guide (3D Systems).
-//!
-//! # When not to use it
-//! For two devices at once: their callbacks would have to be one.
 
 mod codes;
 mod library;
+mod scheduler;
 mod servo;
 
 use crate::ramp::Ramp;
 use crate::{Capabilities, DeviceError, Fault, HapticDevice, Reading, Status, Watch, Workspace};
-use library::{Hd, Scheduled};
+use library::Hd;
 use servo::{Command, Sample, Servo};
 use std::path::PathBuf;
-use std::sync::Mutex;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Mat3, Pose, Quat, ToolState, Twist, Vec3};
 use triple_buffer::{Input, Output, triple_buffer};
 
 /// A device without a sample for this long is lost, ms.
 const LOST_MS: f64 = 50.0;
-const RATE_HZ: u32 = 1000;
 /// Names that the maker's set-up tools give the first device.
 const DEFAULT_NAMES: [Option<&str>; 4] =
     [Some("Default Device"), Some("Default PHANToM"), Some("Default PHANTOM"), None];
-
-/// Libraries that have a device open.
-static IN_USE: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Which device, and where it stands.
 #[derive(Clone, Debug, Default)]
@@ -60,13 +55,14 @@ pub struct OpenHaptics {
     hd: Hd,
     device: u32,
     library: String,
-    scheduled: Option<Scheduled>,
+    open: bool,
     samples: Output<Sample>,
     commands: Input<Command>,
     number: u64,
     last: Reading,
     last_sample: u64,
     fresh_ms: f64,
+    time_ms: f64,
     workspace: Workspace,
     capabilities: Capabilities,
     watch: Watch,
@@ -76,69 +72,45 @@ impl OpenHaptics {
     /// Loads the library, opens the device and starts its servo loop.
     pub fn open(config: &Config) -> Result<Self, DeviceError> {
         let (hd, library) = Hd::load(config.library.as_deref())?;
-        claim(&library)?;
-        let opened = Self::start(hd, &library, config);
-        if opened.is_err() {
-            release(&library);
-        }
-        opened
+        let wanted = config.device.as_deref();
+        let watch = Watch::default();
+        let (sample_in, samples) = triple_buffer(&Sample::default());
+        let (commands, command_out) = triple_buffer(&Command::default());
+        let open = || {
+            let device = init(&hd, wanted)?;
+            hd.make_current(device);
+            let drives_torque = hd.integer(codes::OUTPUT_DOF) >= 6;
+            let capabilities = capabilities(&hd, drives_torque);
+            let calibration_style = lowest_bit(hd.integer(codes::CALIBRATION_STYLE));
+            hd.enable(codes::FORCE_OUTPUT);
+            let ramp = Ramp::new(watch.clone());
+            let servo = Servo::new(device, drives_torque, calibration_style, sample_in, command_out, ramp);
+            Ok((servo, (device, capabilities)))
+        };
+        let refused = |error| not_opened(wanted, hd.describe(error));
+        let (device, capabilities) = scheduler::add(hd, &library, open, refused)?;
+        let start = config.workspace.world(&ToolState::at(Pose::IDENTITY));
+        Ok(Self {
+            hd,
+            device,
+            library,
+            open: true,
+            samples,
+            commands,
+            number: 0,
+            last: Reading { tool: start, status: Status::Stale },
+            last_sample: 0,
+            fresh_ms: f64::NAN,
+            time_ms: f64::NAN,
+            workspace: config.workspace,
+            capabilities,
+            watch,
+        })
     }
 
     /// Shows what is wrong with the device while another thread uses it.
     pub fn watch(&self) -> Watch {
         self.watch.clone()
-    }
-
-    fn start(hd: Hd, library: &str, config: &Config) -> Result<Self, DeviceError> {
-        let device = init(&hd, config.device.as_deref())?;
-        hd.make_current(device);
-        let drives_torque = hd.integer(codes::OUTPUT_DOF) >= 6;
-        let capabilities = capabilities(&hd, drives_torque);
-        hd.enable(codes::FORCE_OUTPUT);
-
-        let watch = Watch::default();
-        let (sample_in, samples) = triple_buffer(&Sample::default());
-        let (commands, command_out) = triple_buffer(&Command::default());
-        let scheduled = hd.schedule(Box::new(Servo {
-            hd,
-            device,
-            drives_torque,
-            calibration_style: lowest_bit(hd.integer(codes::CALIBRATION_STYLE)),
-            samples: sample_in,
-            commands: command_out,
-            ramp: Ramp::new(watch.clone()),
-            number: 0,
-            last_command: 0,
-            silent_ticks: 0,
-        }));
-        hd.set_scheduler_rate(RATE_HZ);
-        hd.drain_errors(); // A rate that the link cannot have leaves the default, which is 1 kHz.
-        hd.start_scheduler();
-        let error = hd.drain_errors();
-        if error != codes::SUCCESS {
-            hd.stop(scheduled);
-            hd.disable_device(device);
-            return Err(not_opened(config.device.as_deref(), hd.describe(error)));
-        }
-        let workspace = config.workspace;
-        let last = Reading { tool: workspace.world(&ToolState::at(Pose::IDENTITY)), status: Status::Stale };
-        let library = library.to_owned();
-        let scheduled = Some(scheduled);
-        Ok(Self {
-            hd,
-            device,
-            library,
-            scheduled,
-            samples,
-            commands,
-            number: 0,
-            last,
-            last_sample: 0,
-            fresh_ms: f64::NAN,
-            workspace,
-            capabilities,
-            watch,
-        })
     }
 }
 
@@ -147,32 +119,29 @@ impl HapticDevice for OpenHaptics {
         if self.fresh_ms.is_nan() {
             self.fresh_ms = time_ms;
         }
+        self.time_ms = time_ms;
         let sample = *self.samples.read();
+        self.last.status = Status::Stale;
         if sample.number != self.last_sample {
-            (self.last_sample, self.fresh_ms) = (sample.number, time_ms);
+            self.last_sample = sample.number;
             let tool = self.workspace.world(&tool(&sample, time_ms));
             if tool.is_finite() {
+                self.fresh_ms = time_ms;
                 self.last = Reading { tool, status: Status::Fresh };
-            } else {
-                self.last.status = Status::Stale;
             }
-        } else {
-            self.last.status = Status::Stale;
         }
-        let lost = self.scheduled.is_none()
-            || self.watch.fault() == Some(Fault::Disconnected)
-            || time_ms - self.fresh_ms > LOST_MS;
-        if lost {
+        let gone = matches!(self.watch.fault(), Some(Fault::Disconnected | Fault::Stopped));
+        if !self.open || gone || time_ms - self.fresh_ms > LOST_MS {
             self.last.status = Status::Lost;
         }
         self.last
     }
 
     fn apply(&mut self, wrench: GuardedWrench) {
-        if self.scheduled.is_some() {
+        if self.open {
             self.number += 1;
             let wrench = self.workspace.device_wrench(wrench.wrench());
-            self.commands.write(Command { number: self.number, wrench });
+            self.commands.write(Command { number: self.number, wrench, pose_age_ms: self.time_ms - self.fresh_ms });
         }
     }
 
@@ -181,16 +150,8 @@ impl HapticDevice for OpenHaptics {
     }
 
     fn close(&mut self) {
-        if let Some(scheduled) = self.scheduled.take() {
-            self.hd.stop(scheduled);
-            self.hd.make_current(self.device);
-            self.hd.begin_frame(self.device);
-            self.hd.set_vector(codes::CURRENT_FORCE, [0.0; 3]);
-            self.hd.end_frame(self.device);
-            self.hd.disable(codes::FORCE_OUTPUT);
-            self.hd.disable_device(self.device);
-            self.hd.drain_errors();
-            release(&self.library);
+        if std::mem::take(&mut self.open) {
+            scheduler::remove(self.hd, &self.library, self.device);
         }
     }
 }
@@ -234,6 +195,9 @@ fn init(hd: &Hd, wanted: Option<&str>) -> Result<u32, DeviceError> {
             None => {}
         }
         reason = hd.describe(error);
+        if error == codes::DEVICE_ALREADY_INITIATED {
+            break;
+        }
     }
     Err(not_opened(wanted, reason))
 }
@@ -242,7 +206,7 @@ fn not_opened(wanted: Option<&str>, reason: String) -> DeviceError {
     DeviceError::Open {
         device: wanted.map_or_else(|| "openhaptics".to_owned(), |name| format!("openhaptics:{name}")),
         reason,
-        remedy: "give the name that the maker's set-up tool shows, and see whether its diagnostic program finds the device",
+        remedy: "give the name that the maker's set-up tool shows, close other programs, and see whether its diagnostic program finds the device",
     }
 }
 
@@ -252,7 +216,7 @@ fn capabilities(hd: &Hd, drives_torque: bool) -> Capabilities {
         name: hd.string(codes::DEVICE_MODEL_TYPE),
         peak_force_n: hd.doubles(codes::NOMINAL_MAX_FORCE)[0] as f32,
         continuous_force_n: hd.doubles(codes::NOMINAL_MAX_CONTINUOUS_FORCE)[0] as f32,
-        rate_hz: RATE_HZ as f32,
+        rate_hz: scheduler::RATE_HZ as f32,
         workspace_mm: Vec3::new(box_mm[3] - box_mm[0], box_mm[4] - box_mm[1], box_mm[5] - box_mm[2]),
         axes_driven: if drives_torque { 6 } else { 3 },
         position_resolution_mm: 0.055,
@@ -269,21 +233,4 @@ fn capabilities(hd: &Hd, drives_torque: bool) -> Capabilities {
 fn lowest_bit(mask: i32) -> u32 {
     let mask = mask.cast_unsigned();
     mask & mask.wrapping_neg()
-}
-
-fn claim(library: &str) -> Result<(), DeviceError> {
-    let mut in_use = IN_USE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    if in_use.iter().any(|used| used == library) {
-        return Err(DeviceError::Open {
-            device: "openhaptics".to_owned(),
-            reason: "this program already has a device of this library open".to_owned(),
-            remedy: "close that one first",
-        });
-    }
-    in_use.push(library.to_owned());
-    Ok(())
-}
-
-fn release(library: &str) {
-    IN_USE.lock().unwrap_or_else(std::sync::PoisonError::into_inner).retain(|used| used != library);
 }

@@ -2,46 +2,58 @@
 
 use crate::{Fault, Watch};
 
-/// Ticks without force after a fault.
-const REST_TICKS: u32 = 200;
-/// Ticks from no force to full force after that, and at the start.
-const RAMP_TICKS: u32 = 300;
+/// Time without force after a fault, ms.
+const REST_MS: f32 = 200.0;
+/// Time from no force to full force after that, and at the start, ms.
+const RAMP_MS: f32 = 300.0;
+/// Longest tick that counts, ms: a pause is no rest.
+const MAX_DT_MS: f32 = 5.0;
 
 /// The share of the force that a device gives.
 #[derive(Clone, Debug)]
 pub(crate) struct Ramp {
-    ticks_left: u32,
+    left_ms: f32,
     watch: Watch,
 }
 
 impl Ramp {
     /// Starts a ramp without a rest. Faults show in `watch`.
     pub(crate) fn new(watch: Watch) -> Self {
-        Self { ticks_left: RAMP_TICKS, watch }
+        Self { left_ms: RAMP_MS, watch }
     }
 
     /// Cuts the force and starts the rest anew.
     pub(crate) fn cut(&mut self, fault: Fault) {
-        self.ticks_left = REST_TICKS + RAMP_TICKS;
+        self.left_ms = REST_MS + RAMP_MS;
         self.watch.set(Some(fault));
     }
 
-    /// The share for this tick, 0 to 1. A fault is over when the ramp begins.
-    pub(crate) fn share(&mut self) -> f32 {
-        if self.ticks_left == 0 {
+    /// Cuts the force for the fault that holds already, or else for a new one.
+    pub(crate) fn cut_again_or(&mut self, fault: Fault) {
+        self.cut(self.watch.fault().unwrap_or(fault));
+    }
+
+    /// Ramps in anew without a fault; a rest goes on.
+    pub(crate) fn restart(&mut self) {
+        self.left_ms = self.left_ms.max(RAMP_MS);
+    }
+
+    /// The share for this tick of `dt_ms`, 0 to 1. A fault is over when the ramp begins.
+    pub(crate) fn share(&mut self, dt_ms: f32) -> f32 {
+        if self.left_ms <= 0.0 {
             return 1.0;
         }
-        self.ticks_left -= 1;
-        if self.ticks_left >= RAMP_TICKS {
+        self.left_ms -= dt_ms.clamp(0.0, MAX_DT_MS);
+        if self.left_ms >= RAMP_MS {
             return 0.0;
         }
         self.watch.set(None);
-        1.0 - self.ticks_left as f32 / RAMP_TICKS as f32
+        1.0 - (self.left_ms / RAMP_MS).max(0.0)
     }
 
-    /// Whether the next share begins the ramp after a rest.
-    pub(crate) fn rest_ends(&self) -> bool {
-        self.ticks_left == RAMP_TICKS
+    /// Whether a share for a tick of `dt_ms` would begin the ramp after a rest.
+    pub(crate) fn rest_ends(&self, dt_ms: f32) -> bool {
+        self.left_ms >= RAMP_MS && self.left_ms - dt_ms.clamp(0.0, MAX_DT_MS) < RAMP_MS && self.watch.fault().is_some()
     }
 }
 
@@ -53,10 +65,12 @@ mod tests {
     fn it_rests_then_ramps_to_one() {
         let watch = Watch::default();
         let mut ramp = Ramp::new(watch.clone());
-        ramp.cut(Fault::TooFast);
-        let shares: Vec<f32> = (0..REST_TICKS + RAMP_TICKS + 5).map(|_| ramp.share()).collect();
-        assert!(shares[..REST_TICKS as usize].iter().all(|s| *s == 0.0));
-        assert!(shares.windows(2).all(|w| w[1] >= w[0] && w[1] - w[0] < 0.004));
-        assert_eq!((shares.last(), watch.fault()), (Some(&1.0), None));
+        for (dt_ms, per_ms) in [(1.0, 1), (0.25, 4)] {
+            ramp.cut(Fault::TooFast);
+            let shares: Vec<f32> = (0..505 * per_ms).map(|_| ramp.share(dt_ms)).collect();
+            assert!(shares[..200 * per_ms].iter().all(|s| *s == 0.0) && shares[201 * per_ms] > 0.0);
+            assert!(shares.windows(2).all(|w| w[1] >= w[0] && w[1] - w[0] < 0.004));
+            assert_eq!((shares.last(), watch.fault()), (Some(&1.0), None));
+        }
     }
 }

@@ -48,20 +48,27 @@ pub struct Config {
     pub peak_force_n: f32,
     /// Time constant of the velocity's low-pass filter, ms; 0 for the plain difference of positions.
     pub velocity_filter_ms: f32,
+    /// Highest rate at which it may be read, Hz.
+    pub rate_hz: f32,
+}
+
+impl Config {
+    /// A Touch, on a link that bears 4 kHz.
+    pub const TOUCH: Self = Self {
+        mass_g: 45.0,
+        damping: 0.1,
+        friction_n: 0.26,
+        quantum_mm: 0.055,
+        delay_ticks: 1,
+        peak_force_n: 3.3,
+        velocity_filter_ms: 5.0,
+        rate_hz: 4000.0,
+    };
 }
 
 impl Default for Config {
-    /// A Touch.
     fn default() -> Self {
-        Self {
-            mass_g: 45.0,
-            damping: 0.1,
-            friction_n: 0.26,
-            quantum_mm: 0.055,
-            delay_ticks: 1,
-            peak_force_n: 3.3,
-            velocity_filter_ms: 5.0,
-        }
+        Self::TOUCH
     }
 }
 
@@ -203,7 +210,7 @@ impl HapticDevice for Simulated {
             name: format!("simulated, {:.0} g, {} ticks late", self.config.mass_g, self.config.delay_ticks),
             peak_force_n: self.config.peak_force_n,
             continuous_force_n: 0.27 * self.config.peak_force_n,
-            rate_hz: 1000.0,
+            rate_hz: self.config.rate_hz,
             workspace_mm: Vec3::new(160.0, 120.0, 70.0),
             axes_driven: 3,
             position_resolution_mm: self.config.quantum_mm,

@@ -31,6 +31,8 @@ use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, ToolState, Twist, Vec3};
 
+/// The device's own tick, ms.
+const TICK_MS: f32 = 1.0;
 /// Ticks of silence after which the force is cut.
 const SILENT_TICKS: u32 = 10;
 /// Ticks of silence after which the device is lost.
@@ -153,7 +155,7 @@ impl HapticDevice for Template {
     }
 
     fn apply(&mut self, wrench: GuardedWrench) {
-        let force = self.workspace.device_wrench(wrench.wrench()).force * self.ramp.share();
+        let force = self.workspace.device_wrench(wrench.wrench()).force * self.ramp.share(TICK_MS);
         self.send(if self.silent_ticks >= SILENT_TICKS { Vec3::ZERO } else { force });
     }
 

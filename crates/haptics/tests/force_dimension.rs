@@ -1,13 +1,8 @@
 //! The Force Dimension driver against an emulator of libdrd: units, axes, and every fault ends without force.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-mod emulators;
-mod keys {
-    include!("emulators/drd_keys.rs");
-}
-
-use emulators::Emulator;
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
+use trepan_emulators::{Library as Emulator, drd as keys};
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Vec3, Wrench};
 use trepan_haptics::force_dimension::{Config, ForceDimension};
 use trepan_haptics::{Fault, HapticDevice, Status, Workspace};
@@ -16,7 +11,7 @@ use trepan_haptics::{Fault, HapticDevice, Status, Workspace};
 const SETTLED: u32 = 600;
 
 fn emulator() -> Emulator {
-    Emulator::build("fake_drd", &[])
+    Emulator::drd()
 }
 
 fn config(emulator: &Emulator) -> Config {
@@ -126,7 +121,7 @@ fn a_dead_loop_is_cut_by_the_firmware_and_a_living_one_comes_back_slowly() {
     assert!(run(&mut device, &emulator, 0, SETTLED, Vec3::X).y > 0.99);
     emulator.set(keys::SILENCE_MS, 9.0);
     assert!(motors(&emulator).y > 0.99);
-    emulator.set(keys::SILENCE_MS, 10.1);
+    emulator.set(keys::SILENCE_MS, 10.0);
     assert_eq!(motors(&emulator), Vec3::ZERO);
     assert_eq!(run(&mut device, &emulator, 1000, 100, Vec3::X), Vec3::ZERO);
     assert_eq!(device.watch().fault(), Some(Fault::LoopSilent));
@@ -188,8 +183,41 @@ fn a_read_too_soon_is_stale() {
 }
 
 #[test]
+fn positions_that_stay_away_for_longer_than_five_milliseconds_cut_the_force() {
+    let emulator = emulator();
+    let mut device = ForceDimension::open(&config(&emulator)).unwrap();
+    run(&mut device, &emulator, 0, SETTLED, Vec3::X);
+    emulator.set(keys::TOO_SOON, 1.0);
+    assert!(run(&mut device, &emulator, 600, 5, Vec3::X).y > 0.99);
+    assert_eq!(run(&mut device, &emulator, 605, 1, Vec3::X), Vec3::ZERO);
+    assert_eq!(device.watch().fault(), Some(Fault::Stale));
+    emulator.set(keys::TOO_SOON, 0.0);
+    assert!(run(&mut device, &emulator, 606, SETTLED, Vec3::X).y > 0.99 && device.watch().fault().is_none());
+}
+
+#[test]
+fn a_device_that_refuses_forces_is_lost_and_one_without_velocity_is_not() {
+    let emulator = emulator();
+    let mut device = ForceDimension::open(&config(&emulator)).unwrap();
+    emulator.set(keys::NO_VELOCITY, 1.0);
+    assert!(run(&mut device, &emulator, 0, SETTLED, Vec3::X).y > 0.99);
+    assert_eq!(device.read(600.0).tool.twist.linear, Vec3::ZERO);
+    emulator.set(keys::REFUSES_FORCE, 1.0);
+    assert_eq!(run(&mut device, &emulator, 601, 1, Vec3::X), Vec3::ZERO);
+    assert_eq!((device.read(602.0).status, device.watch().fault()), (Status::Lost, Some(Fault::Disconnected)));
+}
+
+#[test]
+fn firmware_without_a_watchdog_is_refused() {
+    let emulator = emulator();
+    emulator.set(keys::NO_WATCHDOG, 1.0);
+    assert!(error(&emulator).contains("update the device's firmware"));
+    assert_eq!((emulator.get(keys::OPEN), emulator.get(keys::FORCE_ON)), (0.0, 0.0));
+}
+
+#[test]
 fn an_old_library_does_without_what_it_lacks() {
-    let emulator = Emulator::build("fake_drd", &["--cfg", "old"]);
+    let emulator = Emulator::old_drd();
     let mut device = ForceDimension::open(&config(&emulator)).unwrap();
     assert_eq!((device.read(0.0).tool.twist.angular, device.capabilities().axes_driven), (Vec3::ZERO, 3));
 }

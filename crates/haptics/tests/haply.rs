@@ -1,12 +1,9 @@
 //! The Haply driver against an emulator of its service: units, axes, the protocol, and every fault ends without force.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-#[path = "emulators/service.rs"]
-mod service;
-
-use service::{Behaviour, Service};
 use std::time::Duration;
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
+use trepan_emulators::service::{self, Behaviour, Service};
 use trepan_geometry::{Buttons, Pose, ToolState, Vec3, Wrench};
 use trepan_haptics::haply::{Config, Haply};
 use trepan_haptics::{Fault, HapticDevice, Reading, Status};
@@ -158,14 +155,20 @@ fn brakes_tell_through_events_and_release_again() {
 
 #[test]
 fn a_device_that_vanishes_or_a_service_that_hangs_up_is_lost() {
-    let misbehaviours: [fn(&mut Behaviour); 3] = [|b| b.unplugged = true, |b| b.hang_up = true, |b| b.mute = true];
-    for misbehave in misbehaviours {
+    type Misbehave = fn(&mut Behaviour);
+    let misbehaviours: [(Misbehave, Fault); 4] = [
+        (|b| b.unplugged = true, Fault::Disconnected),
+        (|b| b.hang_up = true, Fault::Disconnected),
+        (|b| b.mute = true, Fault::ServiceSilent),
+        (|b| b.garbage = Some("?".to_owned()), Fault::Garbled),
+    ];
+    for (misbehave, fault) in misbehaviours {
         let service = Service::start(Behaviour::default());
         let mut device = open(&service).unwrap();
         run_until(&mut device, &service, Vec3::X * 0.2, |reading, _| reading.status == Status::Fresh);
         service.behave(misbehave);
         run_until(&mut device, &service, Vec3::X * 0.2, |reading, _| reading.status == Status::Lost);
-        assert_eq!(device.watch().fault(), Some(Fault::Disconnected));
+        assert_eq!(device.watch().fault(), Some(fault));
         device.close();
     }
 }

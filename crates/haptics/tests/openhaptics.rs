@@ -1,13 +1,8 @@
 //! The OpenHaptics driver against an emulator of libHD: units, axes, frame rules, and every fault ends without force.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-mod emulators;
-mod keys {
-    include!("emulators/hd_keys.rs");
-}
-
-use emulators::Emulator;
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
+use trepan_emulators::{Library as Emulator, hd as keys};
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Vec3, Wrench};
 use trepan_haptics::openhaptics::{Config, OpenHaptics};
 use trepan_haptics::{DeviceError, Fault, HapticDevice, Status, Workspace};
@@ -16,7 +11,7 @@ use trepan_haptics::{DeviceError, Fault, HapticDevice, Status, Workspace};
 const SETTLED: u32 = 600;
 
 fn emulator() -> Emulator {
-    Emulator::build("fake_hd", &[])
+    Emulator::hd()
 }
 
 fn config(emulator: &Emulator) -> Config {
@@ -141,14 +136,142 @@ fn a_missing_licence_is_told_in_the_makers_words() {
     assert!(error.contains("Invalid license (error 0600)"), "{error}");
 }
 
-#[test]
-fn two_devices_at_once_are_refused_and_one_after_the_other_is_not() {
+/// A library with two devices, and both of them opened.
+fn two() -> (Emulator, OpenHaptics, OpenHaptics) {
     let emulator = emulator();
-    let first = OpenHaptics::open(&config(&emulator)).unwrap();
+    emulator.set(keys::NAME, 1.0);
+    emulator.set(keys::of_second(keys::NAME), 3.0);
+    let open = |name: &str| OpenHaptics::open(&Config { device: Some(name.to_owned()), ..config(&emulator) }).unwrap();
+    let (left, right) = (open("Left"), open("Right"));
+    (emulator, left, right)
+}
+
+/// Both loops and the servo in turn; gives the forces on both motors along x.
+fn run_two(emulator: &Emulator, hands: &mut [(&mut OpenHaptics, f32)], from: u32, ticks: u32) -> [f32; 2] {
+    for tick in from..from + ticks {
+        for (device, newtons) in hands.iter_mut() {
+            device.read(f64::from(tick));
+            device.apply(guarded(Vec3::X * *newtons, Vec3::ZERO));
+        }
+        emulator.set(keys::TICKS, 1.0);
+    }
+    [keys::FORCE_X, keys::of_second(keys::FORCE_X)].map(|key| emulator.get(key) as f32)
+}
+
+#[test]
+fn two_devices_have_their_own_poses_forces_and_faults() {
+    let (emulator, mut left, mut right) = two();
+    emulator.set(keys::POSITION_X, 10.0);
+    emulator.set(keys::of_second(keys::POSITION_X), -20.0);
+    let [one, other] = run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 0, SETTLED);
+    assert!((one - 0.5).abs() < 1e-6 && (other + 1.0).abs() < 1e-6, "{one} {other}");
+    let tips = [left.read(700.0).tool.tip().x, right.read(700.0).tool.tip().x];
+    assert!((tips[0] - 10.0).abs() < 1e-5 && (tips[1] + 20.0).abs() < 1e-5, "{tips:?}");
+
+    // Warm motors of one are not the other's.
+    emulator.set(keys::of_second(keys::ERROR), f64::from(0x0200));
+    assert_eq!(run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 701, 5), [one, 0.0]);
+    assert_eq!((left.watch().fault(), right.watch().fault()), (None, Some(Fault::Overheated)));
+    // Nor is its silence.
+    emulator.set(keys::of_second(keys::ERROR), 0.0);
+    run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 706, SETTLED);
+    assert_eq!(run_two(&emulator, &mut [(&mut left, 0.5)], 1400, 10), [one, 0.0]);
+    assert_eq!((left.watch().fault(), right.watch().fault()), (None, Some(Fault::LoopSilent)));
+    assert_eq!(emulator.get(keys::MISUSE), 0.0);
+}
+
+#[test]
+fn one_lost_device_leaves_the_other_and_is_opened_again_beside_it() {
+    let (emulator, mut left, mut right) = two();
+    run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 0, SETTLED);
+    emulator.set(keys::ERROR, f64::from(0x0302));
+    let forces = run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 700, 1);
+    assert_eq!(forces[0], 0.0);
+    assert!(forces[1] < -0.99, "{forces:?}");
+    run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 701, 20);
+    assert_eq!((left.read(721.0).status, left.watch().fault()), (Status::Lost, Some(Fault::Disconnected)));
+    assert_ne!(right.read(721.0).status, Status::Lost);
+    assert_eq!((emulator.get(keys::ENABLED), emulator.get(keys::of_second(keys::ENABLED))), (0.0, 1.0));
+
+    left.close();
+    emulator.set(keys::ERROR, 0.0);
+    let mut left = OpenHaptics::open(&Config { device: Some("Left".to_owned()), ..config(&emulator) }).unwrap();
+    let forces = run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 800, SETTLED);
+    assert!(forces[0] > 0.49 && forces[1] < -0.99, "{forces:?}");
+    assert_eq!(emulator.get(keys::MISUSE), 0.0);
+}
+
+#[test]
+fn closing_one_device_leaves_the_other_its_force_which_ramps_in() {
+    let (emulator, mut left, mut right) = two();
+    run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 0, SETTLED);
+    left.close();
+    assert_eq!((emulator.get(keys::OPEN), emulator.get(keys::of_second(keys::OPEN))), (0.0, 1.0));
+    assert_eq!(emulator.get(keys::RUNNING), 1.0);
+    let mut last = 0.0;
+    for tick in 0..400 {
+        let [closed, force] = run_two(&emulator, &mut [(&mut right, -1.0)], 700 + tick, 1);
+        assert!(closed == 0.0 && force <= last && last - force < 0.004, "{last} to {force}");
+        last = force;
+    }
+    assert!(last < -0.99 && right.watch().fault().is_none(), "{last}");
+    right.close();
+    for key in [keys::of_second(keys::OPEN), keys::RUNNING, keys::SCHEDULED, keys::MISUSE] {
+        assert_eq!(emulator.get(key), 0.0, "key {key}");
+    }
+}
+
+#[test]
+fn a_second_device_that_cannot_be_opened_leaves_the_first_alone() {
+    let emulator = emulator();
+    let mut first = OpenHaptics::open(&config(&emulator)).unwrap();
+    for (name, words) in [(None, "Device already initiated (error 0301)"), (Some("Right"), "Device fault (error 0300)")]
+    {
+        let second = OpenHaptics::open(&Config { device: name.map(str::to_owned), ..config(&emulator) });
+        let error = second.err().unwrap().to_string();
+        assert!(error.contains(words) && error.contains("close other programs"), "{error}");
+        assert!(run(&mut first, &emulator, 0, SETTLED, Vec3::X).x > 0.99);
+    }
+    assert_eq!(emulator.get(keys::MISUSE), 0.0);
+}
+
+#[test]
+fn a_scheduler_that_does_not_start_is_told_and_leaves_no_device_open() {
+    let emulator = emulator();
+    emulator.set(keys::STUCK, 1.0);
     let error = OpenHaptics::open(&config(&emulator)).err().unwrap().to_string();
-    assert!(error.contains("close that one first"), "{error}");
-    drop(first);
+    assert!(error.contains("Timer error (error 0304)"), "{error}");
+    assert_eq!((emulator.get(keys::OPEN), emulator.get(keys::SCHEDULED)), (0.0, 0.0));
+    emulator.set(keys::STUCK, 0.0);
     assert!(OpenHaptics::open(&config(&emulator)).is_ok());
+}
+
+#[test]
+fn closing_waits_for_a_running_callback() {
+    let emulator = emulator();
+    for _ in 0..20 {
+        let mut device = OpenHaptics::open(&config(&emulator)).unwrap();
+        std::thread::scope(|scope| {
+            let ticking = scope.spawn(|| emulator.set(keys::TICKS, 2000.0));
+            device.close();
+            ticking.join().unwrap();
+        });
+        assert_eq!((emulator.get(keys::MISUSE), emulator.get(keys::OPEN)), (0.0, 0.0));
+    }
+}
+
+#[test]
+fn after_a_pause_of_the_library_no_old_force_comes_back() {
+    let emulator = emulator();
+    let mut device = OpenHaptics::open(&config(&emulator)).unwrap();
+    assert!(run(&mut device, &emulator, 0, SETTLED, Vec3::X).x > 0.99);
+    for tick in 1000..1200 {
+        device.read(f64::from(tick));
+        device.apply(guarded(Vec3::X, Vec3::ZERO));
+    }
+    emulator.set(keys::TICKS, 1.0);
+    assert_eq!((motors(&emulator), device.watch().fault()), (Vec3::ZERO, Some(Fault::Stale)));
+    assert!(run(&mut device, &emulator, 1200, SETTLED, Vec3::X).x > 0.99);
 }
 
 #[test]
@@ -243,7 +366,7 @@ fn a_hundred_sessions_leave_nothing_behind() {
 
 #[test]
 fn a_library_without_a_needed_function_names_it() {
-    let emulator = Emulator::build("fake_nothing", &[]);
+    let emulator = Emulator::nothing();
     let error = OpenHaptics::open(&config(&emulator)).err().unwrap().to_string();
     assert!(error.contains("hdInitDevice") && error.contains("install"), "{error}");
 }

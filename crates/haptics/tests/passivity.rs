@@ -10,15 +10,7 @@ const HANDS: [(&str, Hand); 2] = [("light", Hand::LIGHT), ("firm", Hand::FIRM)];
 
 /// A Touch whose friction is gone.
 const SLIPPERY: Config = Config { friction_n: 0.0, ..TOUCH };
-const TOUCH: Config = Config {
-    mass_g: 45.0,
-    damping: 0.1,
-    friction_n: 0.26,
-    quantum_mm: 0.055,
-    delay_ticks: 1,
-    peak_force_n: 3.3,
-    velocity_filter_ms: 5.0,
-};
+const TOUCH: Config = Config::TOUCH;
 
 /// A hand that comes from outside and presses a wall with about 1 N, and what the last third of three seconds was like.
 #[derive(Debug)]

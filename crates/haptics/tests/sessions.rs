@@ -4,16 +4,9 @@
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 #![cfg(target_os = "linux")]
 
-#[expect(dead_code, reason = "sessions need no knobs")]
-#[path = "emulators/mod.rs"]
-mod emulators;
-#[expect(dead_code, reason = "sessions need no knobs")]
-#[path = "emulators/service.rs"]
-mod service;
-
-use emulators::Emulator;
 use std::os::unix::net::UnixListener;
 use trepan_contact::{ForceGuard, GuardConfig};
+use trepan_emulators::{Library, service};
 use trepan_geometry::{Pose, ToolState, Vec3, Wrench};
 use trepan_haptics::script::{Script, Site};
 use trepan_haptics::{Aside, HapticDevice, Status, force_dimension, haply, mouse, openhaptics, simulated, spacemouse};
@@ -49,7 +42,7 @@ fn script() -> Box<dyn HapticDevice> {
 
 #[test]
 fn a_hundred_sessions_of_every_driver_leave_nothing_behind() {
-    let (hd, drd) = (Emulator::build("fake_hd", &[]), Emulator::build("fake_drd", &[]));
+    let (hd, drd) = (Library::hd(), Library::drd());
     let haply = service::Service::start(service::Behaviour::default());
     let folder = tempfile::tempdir().unwrap();
     let socket = folder.path().join("spnav.sock");

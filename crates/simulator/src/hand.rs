@@ -50,6 +50,7 @@ impl Hand {
             hardware => match hardware::open(hardware, workspace(site, options.device_scale)) {
                 Some(opened) => {
                     let opened = opened.map_err(|f| fault(&f))?;
+                    bears(&opened.device.capabilities(), options.rate_hz)?;
                     hand.watch = Some(opened.watch);
                     Some(Box::new(Clutch::new(opened.device)))
                 }
@@ -86,11 +87,21 @@ impl SecondHold {
                 // Both hands rest in the middle of their boxes: there the tools stand side by side.
                 beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
                 let opened = hardware::open(metal, beside).ok_or_else(|| unfit(metal))?.map_err(|f| fault(&f))?;
+                bears(&opened.device.capabilities(), options.rate_hz)?;
                 (Box::new(Aside::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
             }
         };
         Ok(Self { device, watch })
     }
+}
+
+/// Refuses more ticks a second than a device bears.
+fn bears(device: &Capabilities, rate_hz: f32) -> Result<(), SessionError> {
+    if rate_hz <= device.rate_hz {
+        return Ok(());
+    }
+    let fault = format!("--rate-hz {rate_hz} is too fast for {}: give at most {}", device.name, device.rate_hz);
+    Err(SessionError::Usage(fault))
 }
 
 /// How far the second hand's box lies to the left of the first one's, mm.

@@ -6,7 +6,7 @@
 
 use super::protocol::{self, Event, Frame};
 use super::websocket::WebSocket;
-use crate::{Fault, Watch, ramp::Ramp};
+use crate::{Fault, STALE_MS, Watch, ramp::Ramp};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,8 +15,12 @@ use std::time::Duration;
 use trepan_geometry::Vec3;
 use triple_buffer::{Input, Output};
 
-const SILENT: Duration = Duration::from_millis(10);
-const LATE: Duration = Duration::from_millis(10);
+/// An exchange counts as so long for the ramp, ms: the service's usual pace.
+const TICK_MS: f32 = 1.0;
+/// Within 10 ms there is no force: the rest is for the message's way.
+const SILENT: Duration = Duration::from_millis(8);
+/// Systems wake a waiting socket up to 4 ms late.
+const LATE: Duration = Duration::from_millis(4);
 const GONE: Duration = Duration::from_millis(1000);
 /// How long the listener waits before it looks whether the driver closes.
 const LISTEN: Duration = Duration::from_millis(20);
@@ -35,6 +39,8 @@ pub(super) struct News {
 pub(super) struct Wish {
     pub number: u64,
     pub force: Vec3,
+    /// Age of the pose that it was made for, ms.
+    pub pose_age_ms: f64,
 }
 
 /// Flags that both threads see.
@@ -61,6 +67,8 @@ pub(super) struct Pump {
     pub ramp: Ramp,
     pub known: Frame,
     pub number: u64,
+    /// Messages without sense in a row.
+    pub garbled: u32,
 }
 
 impl Pump {
@@ -69,8 +77,12 @@ impl Pump {
         let mut last = 0;
         while !self.flags.closing.load(Ordering::Acquire) {
             let force = self.next_force(&mut last);
-            if self.exchange(force).is_err() {
-                self.watch.set(Some(Fault::Disconnected));
+            if let Err(error) = self.exchange(force) {
+                self.watch.set(Some(match error.kind() {
+                    io::ErrorKind::InvalidData => Fault::Garbled,
+                    io::ErrorKind::TimedOut => Fault::ServiceSilent,
+                    _ => Fault::Disconnected,
+                }));
                 self.flags.lost.store(true, Ordering::Release);
                 return;
             }
@@ -95,15 +107,17 @@ impl Pump {
             self.ramp.cut(Fault::Braked);
         } else if silent && wish.number > 0 {
             self.ramp.cut(Fault::LoopSilent);
+        } else if wish.pose_age_ms > STALE_MS {
+            self.ramp.cut_again_or(Fault::Stale);
         }
-        let share = self.ramp.share();
+        let share = self.ramp.share(TICK_MS);
         if wish.force.is_finite() { wish.force * share } else { Vec3::ZERO }
     }
 
     /// One message out, one back. While the answer is late the service is told once more that no force is wanted: it may still listen.
     fn exchange(&mut self, force: Vec3) -> io::Result<()> {
         self.socket.send(&protocol::force(&self.device, force))?;
-        let (mut garbled, mut owed) = (0, 1);
+        let mut owed = 1;
         let mut waited = Duration::ZERO;
         while owed > 0 {
             let Some(message) = self.socket.receive(LATE)? else {
@@ -118,20 +132,18 @@ impl Pump {
                 }
                 continue;
             };
+            owed -= 1;
             match protocol::frame(&message, &self.device) {
                 Ok(Some(frame)) => {
+                    self.garbled = 0;
                     self.publish(frame);
-                    owed -= 1;
                 }
                 Ok(None) => return Err(io::ErrorKind::NotConnected.into()),
-                Err(_) => {
+                Err(_) if self.garbled < MAX_GARBLED => {
+                    self.garbled += 1;
                     self.ramp.cut(Fault::Garbled);
-                    garbled += 1;
-                    if garbled >= MAX_GARBLED {
-                        return Err(io::ErrorKind::InvalidData.into());
-                    }
-                    self.socket.send(&protocol::force(&self.device, Vec3::ZERO))?;
                 }
+                Err(_) => return Err(io::ErrorKind::InvalidData.into()),
             }
         }
         Ok(())

@@ -10,6 +10,9 @@ pub(super) const EXCEEDED_MAX_FORCE: u32 = 0x0201;
 pub(super) const EXCEEDED_MAX_FORCE_IMPULSE: u32 = 0x0202;
 pub(super) const EXCEEDED_MAX_VELOCITY: u32 = 0x0203;
 pub(super) const FORCE_ERROR: u32 = 0x0204;
+pub(super) const DEVICE_FAULT: u32 = 0x0300;
+pub(super) const DEVICE_ALREADY_INITIATED: u32 = 0x0301;
+pub(super) const COMM_ERROR: u32 = 0x0302;
 
 // Values to read.
 pub(super) const CURRENT_BUTTONS: u32 = 0x2000;

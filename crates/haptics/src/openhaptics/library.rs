@@ -5,7 +5,7 @@
 #![expect(unsafe_code, reason = "calls into the vendor's C library")]
 
 use super::codes;
-use super::servo::Servo;
+use super::servo::Rota;
 use crate::DeviceError;
 use crate::dynamic::{Loaded, functions};
 use std::ffi::{CStr, CString, c_char, c_ulong, c_void};
@@ -139,19 +139,18 @@ impl Hd {
         unsafe { owned((self.functions.hdGetString)(what)) }
     }
 
+    /// Takes the newest error from the stack: its code, and the device that it names.
+    pub(super) fn next_error(&self) -> Option<(u32, u32)> {
+        // SAFETY: no arguments.
+        let ErrorInfo { code, device, .. } = unsafe { (self.functions.hdGetError)() };
+        (code != codes::SUCCESS).then_some((code, device))
+    }
+
     /// The newest error's code, after which the stack is empty; `SUCCESS` for none.
     pub(super) fn drain_errors(&self) -> u32 {
-        let mut newest = codes::SUCCESS;
-        for _ in 0..MAX_ERRORS {
-            // SAFETY: no arguments.
-            let ErrorInfo { code, .. } = unsafe { (self.functions.hdGetError)() };
-            if code == codes::SUCCESS {
-                break;
-            }
-            if newest == codes::SUCCESS {
-                newest = code;
-            }
-        }
+        let mut errors = (0..MAX_ERRORS).map_while(|_| self.next_error());
+        let newest = errors.next().map_or(codes::SUCCESS, |(code, _)| code);
+        errors.for_each(drop);
         newest
     }
 
@@ -182,16 +181,16 @@ impl Hd {
         unsafe { (self.functions.hdStartScheduler)() }
     }
 
-    /// Runs `servo` on the library's own thread once per tick, from the scheduler's start until [`Hd::stop`].
-    pub(super) fn schedule(&self, servo: Box<Servo>) -> Scheduled {
-        let data = Box::into_raw(servo);
+    /// Runs `rota` on the library's own thread once per tick, from the scheduler's start until [`Hd::stop`].
+    pub(super) fn schedule(&self, rota: Box<Rota>) -> Scheduled {
+        let data = Box::into_raw(rota);
         // SAFETY: `data` stays allocated until `stop`, which first stops the scheduler.
         let handle = unsafe { (self.functions.hdScheduleAsynchronous)(tick, data.cast(), codes::MAX_PRIORITY) };
         Scheduled { handle, data }
     }
 
-    /// Stops the scheduler, which waits for a running callback, and takes the servo back.
-    pub(super) fn stop(&self, scheduled: Scheduled) -> Box<Servo> {
+    /// Stops the scheduler, which waits for a running callback, and takes the rota back.
+    pub(super) fn stop(&self, scheduled: Scheduled) -> Box<Rota> {
         // SAFETY: after these two calls the library does not use `data` any more; it came from a box in `schedule`.
         unsafe {
             (self.functions.hdStopScheduler)();
@@ -201,20 +200,20 @@ impl Hd {
     }
 }
 
-/// A servo in the library's hands.
+/// A rota in the library's hands.
 pub(super) struct Scheduled {
     handle: c_ulong,
-    data: *mut Servo,
+    data: *mut Rota,
 }
 
-// SAFETY: the pointer is only turned back into the box that it came from, and `Servo` is `Send`.
+// SAFETY: the pointer is only turned back into the box that it came from, and `Rota` is `Send`.
 unsafe impl Send for Scheduled {}
 
 /// What the library calls once per tick.
 extern "system" fn tick(data: *mut c_void) -> u32 {
-    // SAFETY: `data` is the servo given to `schedule`, which nobody else touches until `stop`.
-    let servo = unsafe { &mut *data.cast::<Servo>() };
-    servo.tick()
+    // SAFETY: `data` is the rota given to `schedule`, which nobody else touches until `stop`.
+    let rota = unsafe { &mut *data.cast::<Rota>() };
+    rota.tick()
 }
 
 /// # Safety

@@ -1,17 +1,22 @@
-//! What runs on libHD's own thread, once per millisecond: sense, publish, command.
+//! What runs on libHD's own thread, once per millisecond: sense, publish, command, for one device after the other.
 //!
 //! # Practice
-//! The force is what the haptic loop last asked for, as long as that is younger than [`SILENT_TICKS`] ticks: a loop that died
-//! cannot leave its last force on the motors. After any fault the force rests, then ramps in.
+//! The force is what the haptic loop last asked for, as long as that is younger than [`SILENT_TICKS`] ticks and was thought out for a pose
+//! younger than [`STALE_MS`]: neither a loop that died nor a pause of the library leaves its last force on the motors. After any fault the
+//! force rests, then ramps in. A device that is lost leaves the others alone.
 
 use super::codes;
 use super::library::Hd;
-use crate::{Fault, ramp::Ramp};
+use crate::{Fault, STALE_MS, ramp::Ramp};
 use trepan_geometry::Wrench;
 use triple_buffer::{Input, Output};
 
+/// The servo's tick, ms.
+const TICK_MS: f32 = 1e3 / super::scheduler::RATE_HZ as f32;
 /// Ticks without a new command after which the force is cut.
 pub(super) const SILENT_TICKS: u32 = 10;
+/// Most errors that are taken from the stack at once.
+const MAX_ERRORS: usize = 64;
 
 /// What the device felt, in its own axes: mm, mm/ms, rad/ms.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,64 +34,117 @@ pub(super) struct Sample {
 pub(super) struct Command {
     pub number: u64,
     pub wrench: Wrench,
+    /// Age of the pose that it was made for, ms.
+    pub pose_age_ms: f64,
 }
 
-/// The state of the servo loop.
-pub(super) struct Servo {
+/// All devices of the library, served one after the other.
+pub(super) struct Rota {
     pub hd: Hd,
+    pub servos: Vec<Servo>,
+}
+
+/// The servo loop of one device.
+pub(super) struct Servo {
     pub device: u32,
-    pub drives_torque: bool,
-    pub calibration_style: u32,
-    pub samples: Input<Sample>,
-    pub commands: Output<Command>,
     pub ramp: Ramp,
-    pub number: u64,
-    pub last_command: u64,
-    pub silent_ticks: u32,
+    drives_torque: bool,
+    calibration_style: u32,
+    samples: Input<Sample>,
+    commands: Output<Command>,
+    number: u64,
+    last_command: u64,
+    silent_ticks: u32,
+    /// What the motors were last told.
+    given: Wrench,
+    /// Nothing more can be done for the device.
+    lost: bool,
+}
+
+impl Rota {
+    /// One tick; says whether the library shall call again.
+    pub(super) fn tick(&mut self) -> u32 {
+        for place in 0..self.servos.len() {
+            if !self.servos[place].lost {
+                self.servos[place].frame(&self.hd);
+                self.take_errors(place);
+                self.servos[place].samples.publish();
+            }
+        }
+        if self.servos.iter().all(|servo| servo.lost) { codes::CALLBACK_DONE } else { codes::CALLBACK_CONTINUE }
+    }
+
+    /// Hands every error to the device that it names, or else to the one whose turn it is.
+    fn take_errors(&mut self, place: usize) {
+        for _ in 0..MAX_ERRORS {
+            let Some((error, device)) = self.hd.next_error() else { return };
+            let place = self.servos.iter().position(|servo| servo.device == device).unwrap_or(place);
+            self.servos[place].fault(&self.hd, error);
+        }
+    }
 }
 
 impl Servo {
-    /// One tick; says whether the library shall call again.
-    pub(super) fn tick(&mut self) -> u32 {
-        let calibrated = self.calibrate();
-        self.hd.begin_frame(self.device);
-        self.sense();
-        let wrench = self.wanted(calibrated);
-        self.hd.set_vector(codes::CURRENT_FORCE, wrench.force.to_array().map(f64::from));
-        if self.drives_torque {
-            // mN·m is N mm.
-            self.hd.set_vector(codes::CURRENT_TORQUE, wrench.torque.to_array().map(f64::from));
-        }
-        self.hd.end_frame(self.device);
-        match self.hd.drain_errors() {
-            codes::SUCCESS => {
-                self.samples.publish();
-                codes::CALLBACK_CONTINUE
-            }
-            error => self.fault(error),
+    pub(super) fn new(
+        device: u32,
+        drives_torque: bool,
+        calibration_style: u32,
+        samples: Input<Sample>,
+        commands: Output<Command>,
+        ramp: Ramp,
+    ) -> Self {
+        Self {
+            device,
+            drives_torque,
+            calibration_style,
+            samples,
+            commands,
+            ramp,
+            number: 0,
+            last_command: 0,
+            silent_ticks: 0,
+            given: Wrench::ZERO,
+            lost: false,
         }
     }
 
-    /// Whether the device knows where it is; if not, helps it to, without force.
-    fn calibrate(&mut self) -> bool {
-        match self.hd.check_calibration() {
+    fn frame(&mut self, hd: &Hd) {
+        hd.make_current(self.device);
+        let calibrated = self.calibrate(hd);
+        hd.begin_frame(self.device);
+        self.sense(hd);
+        self.given = self.wanted(calibrated);
+        let wrench = self.given;
+        hd.set_vector(codes::CURRENT_FORCE, wrench.force.to_array().map(f64::from));
+        if self.drives_torque {
+            // mN·m is N mm.
+            hd.set_vector(codes::CURRENT_TORQUE, wrench.torque.to_array().map(f64::from));
+        }
+        hd.end_frame(self.device);
+    }
+
+    /// Whether the device knows where it is; if not, helps it to, once the force is gone: its position jumps.
+    fn calibrate(&mut self, hd: &Hd) -> bool {
+        match hd.check_calibration() {
             codes::CALIBRATION_OK => return true,
-            codes::CALIBRATION_NEEDS_UPDATE => self.hd.update_calibration(self.calibration_style),
+            codes::CALIBRATION_NEEDS_UPDATE if self.given == Wrench::ZERO => {
+                hd.update_calibration(self.calibration_style);
+            }
             _ => {}
         }
         self.ramp.cut(Fault::NotCalibrated);
         false
     }
 
-    fn sense(&mut self) {
+    fn sense(&mut self, hd: &Hd) {
         self.number += 1;
         let per_ms = |values: [f64; 16]| [values[0] * 1e-3, values[1] * 1e-3, values[2] * 1e-3];
         *self.samples.input_buffer_mut() = Sample {
             number: self.number,
-            transform: self.hd.doubles(codes::CURRENT_TRANSFORM),
-            linear: per_ms(self.hd.doubles(codes::CURRENT_VELOCITY)),
-            angular: per_ms(self.hd.doubles(codes::CURRENT_ANGULAR_VELOCITY)),
-            buttons: self.hd.integer(codes::CURRENT_BUTTONS).cast_unsigned(),
+            transform: hd.doubles(codes::CURRENT_TRANSFORM),
+            linear: per_ms(hd.doubles(codes::CURRENT_VELOCITY)),
+            angular: per_ms(hd.doubles(codes::CURRENT_ANGULAR_VELOCITY)),
+            buttons: hd.integer(codes::CURRENT_BUTTONS).cast_unsigned(),
         };
     }
 
@@ -103,27 +161,27 @@ impl Servo {
         }
         if self.last_command > 0 && self.silent_ticks >= SILENT_TICKS {
             self.ramp.cut(Fault::LoopSilent);
-            return Wrench::ZERO;
+        } else if command.pose_age_ms > STALE_MS {
+            self.ramp.cut_again_or(Fault::Stale);
         }
-        let share = self.ramp.share();
+        let share = self.ramp.share(TICK_MS);
         Wrench { force: command.wrench.force * share, torque: command.wrench.torque * share }
     }
 
     /// Force errors rest and go on; anything else means that the device or the loop is gone.
-    fn fault(&mut self, error: u32) -> u32 {
+    fn fault(&mut self, hd: &Hd, error: u32) {
         let fault = match error {
             codes::WARM_MOTORS => Fault::Overheated,
             codes::EXCEEDED_MAX_VELOCITY => Fault::TooFast,
             codes::EXCEEDED_MAX_FORCE | codes::EXCEEDED_MAX_FORCE_IMPULSE | codes::FORCE_ERROR => Fault::ForceRefused,
-            _ => {
-                self.hd.disable(codes::FORCE_OUTPUT);
-                self.hd.drain_errors();
-                self.ramp.cut(Fault::Disconnected);
-                return codes::CALLBACK_DONE;
-            }
+            codes::DEVICE_FAULT | codes::COMM_ERROR => Fault::Disconnected,
+            _ => Fault::Stopped,
         };
         self.ramp.cut(fault);
-        self.samples.publish();
-        codes::CALLBACK_CONTINUE
+        if !self.lost && matches!(fault, Fault::Disconnected | Fault::Stopped) {
+            self.lost = true;
+            hd.make_current(self.device);
+            hd.disable(codes::FORCE_OUTPUT);
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! An emulator of libdrd: the same symbols and numbers, no device, a firmware watchdog, and time that the test lets pass.
 //!
-//! Built with `--cfg old` it lacks what old versions lack.
+//! Built with `--cfg old` it lacks what old versions lack. A device that is unplugged has no power and so no force.
 #![allow(non_snake_case)]
 
 mod keys {
@@ -82,7 +82,7 @@ pub extern "C" fn fake_set(key: u32, value: f64) {
 #[unsafe(no_mangle)]
 pub extern "C" fn fake_get(key: u32) -> f64 {
     with(|f| match key {
-        keys::FORCE_X..=105 if f.force_on => f.wrench[(key - keys::FORCE_X) as usize],
+        keys::FORCE_X..=105 if f.force_on && !f.is(keys::UNPLUGGED) && f.is(keys::POWER) => f.wrench[(key - keys::FORCE_X) as usize],
         keys::FORCE_X..=105 => 0.0,
         keys::OPEN => f64::from(u8::from(f.open)),
         keys::FORCE_ON => f64::from(u8::from(f.force_on)),
@@ -209,6 +209,9 @@ pub unsafe extern "C" fn dhdGetPositionAndOrientationFrame(
 pub unsafe extern "C" fn dhdGetLinearVelocity(x: *mut f64, y: *mut f64, z: *mut f64, id: c_char) -> c_int {
     with(|f| {
         f.call(id, |f| {
+            if f.is(keys::NO_VELOCITY) {
+                return -1;
+            }
             unsafe { (*x, *y, *z) = (f.get(keys::VELOCITY_X), 0.0, 0.0) };
             0
         })
@@ -244,6 +247,13 @@ pub extern "C" fn dhdSetForceAndTorqueAndGripperForce(
 ) -> c_int {
     with(|f| {
         f.call(id, |f| {
+            if [x, y, z, a, b, c].iter().any(|value| !value.is_finite()) {
+                f.misuse += 1;
+            }
+            if f.is(keys::REFUSES_FORCE) {
+                f.wrench = [0.0; 6];
+                return -1;
+            }
             if f.force_on {
                 f.wrench = [x, y, z, a, b, c];
             }
@@ -289,6 +299,9 @@ pub extern "C" fn dhdSetWatchdog(steps: u8, id: c_char) -> c_int {
         f.call(id, |f| {
             if !f.expert {
                 f.misuse += 1;
+                return -1;
+            }
+            if f.is(keys::NO_WATCHDOG) {
                 return -1;
             }
             f.watchdog_ms = f64::from(steps) * 0.125;

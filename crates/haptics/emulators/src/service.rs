@@ -1,17 +1,23 @@
 //! An emulator of the Haply Inverse service: a WebSocket server in this process that answers one for one, and misbehaves on demand.
+//!
+//! # Practice
+//! Forces are one-shot, as the service documents them: a connection that ends leaves none.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What the service says and does.
 #[derive(Clone, Debug)]
 pub struct Behaviour {
+    /// Position, m.
     pub position: [f64; 3],
+    /// Velocity, m/s.
     pub velocity: [f64; 3],
+    /// Status of the device, JSON.
     pub status: String,
     /// Text in place of the first message.
     pub inventory: Option<String>,
@@ -55,43 +61,80 @@ impl Default for Behaviour {
 /// What the service was told.
 #[derive(Clone, Debug, Default)]
 pub struct Told {
+    /// The force on the motors, N.
     pub force: Option<[f64; 3]>,
+    /// How long after the last change of behaviour there was first no force.
+    pub no_force_after: Option<Duration>,
+    /// Messages on the simulation channel.
     pub messages: u32,
+    /// Demands for a state.
     pub probes: u32,
+    /// Who the client says it is.
     pub profile: Option<String>,
+    /// Answers to pings.
     pub pongs: u32,
+    /// Closing frames.
     pub goodbyes: u32,
-    /// Unmasked frames, or messages that are no JSON.
+    /// Unmasked frames, messages that are no JSON, forces that are no numbers.
     pub misuse: u32,
 }
 
-#[derive(Default)]
 struct Shared {
     behaviour: Mutex<Behaviour>,
     told: Mutex<Told>,
+    changed: Mutex<Instant>,
     closing: AtomicBool,
+}
+
+impl Shared {
+    /// A fault begins now.
+    fn begin(&self) {
+        *self.changed.lock().unwrap() = Instant::now();
+        self.told.lock().unwrap().no_force_after = None;
+    }
+
+    /// What the motors do now.
+    fn drive(&self, force: [f64; 3]) {
+        let mut told = self.told.lock().unwrap();
+        told.force = Some(force);
+        if force == [0.0; 3] && told.no_force_after.is_none() {
+            told.no_force_after = Some(self.changed.lock().unwrap().elapsed());
+        }
+    }
 }
 
 /// A running service.
 pub struct Service {
     shared: Arc<Shared>,
+    /// Address of the simulation channel.
     pub simulation: String,
+    /// Address of the event channel.
     pub events: String,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Service {
+    /// Listens on two free ports of this machine.
     pub fn start(behaviour: Behaviour) -> Self {
-        let shared = Arc::new(Shared { behaviour: Mutex::new(behaviour), ..Shared::default() });
+        let shared = Arc::new(Shared {
+            behaviour: Mutex::new(behaviour),
+            told: Mutex::default(),
+            changed: Mutex::new(Instant::now()),
+            closing: AtomicBool::new(false),
+        });
         let (simulation, one) = listen(shared.clone(), simulate);
         let (events, two) = listen(shared.clone(), tell_events);
         Self { shared, simulation, events, threads: vec![one, two] }
     }
 
+    /// Changes how it behaves, from now on.
     pub fn behave(&self, change: impl FnOnce(&mut Behaviour)) {
-        change(&mut self.shared.behaviour.lock().unwrap());
+        let mut behaviour = self.shared.behaviour.lock().unwrap();
+        self.shared.begin();
+        change(&mut behaviour);
     }
 
+    /// What it was told so far.
     pub fn told(&self) -> Told {
         self.shared.told.lock().unwrap().clone()
     }
@@ -151,7 +194,7 @@ fn simulate(shared: &Shared, mut stream: TcpStream) {
     while !shared.closing.load(Ordering::SeqCst) && !behaviour().hang_up {
         let mut bytes = [0; 4096];
         match stream.read(&mut bytes) {
-            Ok(0) => return,
+            Ok(0) => break,
             Ok(count) => received.extend_from_slice(&bytes[..count]),
             Err(_) => continue,
         }
@@ -167,10 +210,20 @@ fn simulate(shared: &Shared, mut stream: TcpStream) {
             }
         }
     }
+    shared.drive([0.0; 3]);
 }
 
+/// A late reply holds up none that comes after it, and the service goes on listening.
 fn reply(stream: &mut TcpStream, b: &Behaviour) {
-    thread::sleep(Duration::from_millis(b.late_ms));
+    if b.late_ms > 0 {
+        let (mut stream, late) = (stream.try_clone().unwrap(), Behaviour { late_ms: 0, ..b.clone() });
+        let wait = Duration::from_millis(b.late_ms);
+        thread::spawn(move || {
+            thread::sleep(wait);
+            reply(&mut stream, &late);
+        });
+        return;
+    }
     let text = b.garbage.clone().unwrap_or_else(|| state(b));
     if b.mute {
     } else if b.fragmented {
@@ -190,6 +243,7 @@ fn tell_events(shared: &Shared, mut stream: TcpStream) {
     shake_hands(&mut stream);
     while !shared.closing.load(Ordering::SeqCst) {
         if let Some(event) = shared.behaviour.lock().unwrap().event.take() {
+            shared.begin();
             let _ = send(&mut stream, 0x81, event.as_bytes());
         }
         if matches!(stream.read(&mut [0; 64]), Ok(0)) {
@@ -228,8 +282,12 @@ fn note(shared: &Shared, payload: &[u8]) {
     }
     told.probes += u32::from(!device["commands"]["probe_position"].is_null());
     let vector = &device["commands"]["set_cursor_force"]["vector"];
-    if let (Some(x), Some(y), Some(z)) = (vector["x"].as_f64(), vector["y"].as_f64(), vector["z"].as_f64()) {
-        told.force = Some([x, y, z]);
+    let force = ["x", "y", "z"].map(|axis| vector[axis].as_f64());
+    if let [Some(x), Some(y), Some(z)] = force {
+        drop(told);
+        shared.drive([x, y, z]);
+    } else if !vector.is_null() {
+        told.misuse += 1;
     }
 }
 

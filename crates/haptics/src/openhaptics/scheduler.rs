@@ -1,0 +1,99 @@
+//! The one scheduler of libHD, which all its devices share.
+//!
+//! # Practice
+//! Of two callbacks only one gets force, so that one callback serves all devices in turn. Devices come and go while the scheduler rests, as the
+//! maker asks: the others are without force for that moment, then their force ramps in again.
+
+use super::codes;
+use super::library::{Hd, Scheduled};
+use super::servo::{Rota, Servo};
+use crate::DeviceError;
+use std::sync::{Mutex, PoisonError};
+
+/// Ticks a second.
+pub(super) const RATE_HZ: u32 = 1000;
+
+/// The scheduler of each library that has a device open.
+static SCHEDULERS: Mutex<Vec<Scheduler>> = Mutex::new(Vec::new());
+
+struct Scheduler {
+    library: String,
+    running: Scheduled,
+}
+
+/// Opens one more device while the scheduler rests, and serves it from then on; gives what `open` says of it. `refused` words a scheduler
+/// that does not start.
+pub(super) fn add<T>(
+    hd: Hd,
+    library: &str,
+    open: impl FnOnce() -> Result<(Servo, T), DeviceError>,
+    refused: impl FnOnce(u32) -> DeviceError,
+) -> Result<T, DeviceError> {
+    let mut schedulers = SCHEDULERS.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut servos = rest(hd, library, &mut schedulers);
+    let (servo, said) = match open() {
+        Ok(opened) => opened,
+        Err(error) => {
+            go_on(hd, library, servos, &mut schedulers);
+            return Err(error);
+        }
+    };
+    let device = servo.device;
+    servos.push(servo);
+    if let Err(error) = start(hd, library, servos, &mut schedulers) {
+        let words = refused(error);
+        without(hd, library, device, &mut schedulers);
+        return Err(words);
+    }
+    Ok(said)
+}
+
+/// Switches a device off and goes on serving the others.
+pub(super) fn remove(hd: Hd, library: &str, device: u32) {
+    let mut schedulers = SCHEDULERS.lock().unwrap_or_else(PoisonError::into_inner);
+    without(hd, library, device, &mut schedulers);
+}
+
+fn without(hd: Hd, library: &str, device: u32, schedulers: &mut Vec<Scheduler>) {
+    let servos = rest(hd, library, schedulers).into_iter().filter(|servo| servo.device != device).collect();
+    switch_off(hd, device);
+    go_on(hd, library, servos, schedulers);
+}
+
+/// Serves the others again. Should the scheduler not start, their missing samples tell.
+fn go_on(hd: Hd, library: &str, servos: Vec<Servo>, schedulers: &mut Vec<Scheduler>) {
+    let _ = start(hd, library, servos, schedulers);
+}
+
+/// Stops the library's scheduler, and gives back whom it served.
+fn rest(hd: Hd, library: &str, schedulers: &mut Vec<Scheduler>) -> Vec<Servo> {
+    let place = schedulers.iter().position(|scheduler| scheduler.library == library);
+    place.map_or_else(Vec::new, |place| hd.stop(schedulers.swap_remove(place).running).servos)
+}
+
+/// Starts the scheduler where there is somebody to serve; the error is the library's.
+fn start(hd: Hd, library: &str, mut servos: Vec<Servo>, schedulers: &mut Vec<Scheduler>) -> Result<(), u32> {
+    if servos.is_empty() {
+        return Ok(());
+    }
+    servos.iter_mut().for_each(|servo| servo.ramp.restart());
+    let running = hd.schedule(Box::new(Rota { hd, servos }));
+    schedulers.push(Scheduler { library: library.to_owned(), running });
+    hd.set_scheduler_rate(RATE_HZ);
+    hd.drain_errors(); // A rate that the link cannot have leaves the default, which is 1 kHz.
+    hd.start_scheduler();
+    match hd.drain_errors() {
+        codes::SUCCESS => Ok(()),
+        error => Err(error),
+    }
+}
+
+fn switch_off(hd: Hd, device: u32) {
+    hd.make_current(device);
+    hd.begin_frame(device);
+    hd.set_vector(codes::CURRENT_FORCE, [0.0; 3]);
+    hd.end_frame(device);
+    hd.disable(codes::FORCE_OUTPUT);
+    hd.disable_device(device);
+    hd.drain_errors();
+}
