@@ -13,6 +13,7 @@
 //! where the limited wall is. The declared range, to which gates apply: a hand with a grip, walls to 2 N/mm, delays to 2 ticks, `K Δ/2 ≤ f_c`. All other rows are
 //! shown beside; there the guard must act and count it.
 
+mod faults;
 mod pace;
 
 use super::Scope;
@@ -83,19 +84,8 @@ impl Coupling {
 }
 
 /// The wall of a session on a Touch.
-const MILLION: Coupling = Coupling {
-    device: Config {
-        mass_g: 45.0,
-        damping: 0.1,
-        friction_n: 0.26,
-        quantum_mm: 0.055,
-        delay_ticks: 1,
-        peak_force_n: 3.3,
-        velocity_filter_ms: 5.0,
-    },
-    hand: Hand::LIGHT,
-    wall: Viscoelastic { stiffness: 2.0, damping: 0.5 },
-};
+const MILLION: Coupling =
+    Coupling { device: Config::TOUCH, hand: Hand::LIGHT, wall: Viscoelastic { stiffness: 2.0, damping: 0.5 } };
 
 /// Presses for every coupling with and without the controller, then hands that wander; last the pace of the loop.
 pub fn run(scope: Scope) -> Findings {
@@ -118,6 +108,9 @@ pub fn run(scope: Scope) -> Findings {
     }
     findings.gates = gates(&findings.rows, scope);
     if scope.takes(0) {
+        let faults = faults::rows(scope);
+        findings.gates.extend(faults::gates(&faults));
+        findings.rows.extend(faults);
         findings.rows.extend(pace::rows(scope));
     }
     findings

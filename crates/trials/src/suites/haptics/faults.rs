@@ -1,0 +1,229 @@
+//! Every fault of the emulators, driver by driver: how long the force stays, and what the user is told.
+//!
+//! # Practice
+//! A loop as a session's wants 1 N; then the fault begins. libHD and libdrd are given time tick by tick, so that 1 ms is one tick and every run is the
+//! same. Haply's service runs beside in real time: of some runs the gate takes the quickest, which is the driver's own time; the slowest, which also
+//! has the machine's other work in it, is shown. Where the library itself pauses nobody can reach the motors: the time counts from
+//! its return. `Kept` are faults that must not cost the force.
+
+mod force_dimension;
+mod haply;
+mod openhaptics;
+
+use super::Scope;
+use crate::suite::{Gate, Row};
+use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
+use trepan_geometry::{ToolState, Vec3, Wrench};
+use trepan_haptics::{DeviceError, Fault, HapticDevice, Status};
+
+/// What the loop wants, N.
+const WANTED_N: f32 = 1.0;
+/// Ticks after which the force is there: rests and ramps of driver and guard.
+const SETTLE_TICKS: u32 = 20_000;
+/// Ticks for which a fault is watched.
+const WATCHED_TICKS: u32 = 300;
+const LIMIT_MS: f64 = 10.0;
+
+/// What a fault must lead to.
+#[derive(Clone, Copy)]
+enum Then {
+    /// No force, and this message.
+    Cut(Fault),
+    /// Nothing.
+    Kept,
+}
+
+/// What the motors do.
+#[derive(Clone, Copy)]
+struct Felt {
+    /// When, ms.
+    at_ms: f64,
+    /// Size of the force, N.
+    force_n: f64,
+}
+
+/// A driver on its emulator.
+trait Bench {
+    /// One tick of the loop.
+    fn tick(&mut self) -> Felt;
+    /// What is wrong with the device.
+    fn fault(&self) -> Option<Fault>;
+}
+
+/// A fault, and how it begins.
+struct Case<B> {
+    name: &'static str,
+    begin: fn(&mut B),
+    then: Then,
+}
+
+/// All rows.
+pub fn rows(scope: Scope) -> Vec<Row> {
+    [openhaptics::rows(), force_dimension::rows(), haply::rows(scope)].concat()
+}
+
+/// What all rows together promise.
+pub fn gates(rows: &[Row]) -> Vec<Gate> {
+    let of = |kind: &str, name: &str| -> Vec<f64> {
+        rows.iter().filter(|row| row.config["kind"] == kind).map(|row| row.metrics[name]).collect()
+    };
+    let most = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
+    let least = |values: Vec<f64>| values.into_iter().fold(f64::INFINITY, f64::min);
+    let all = |name: &str| most(rows.iter().filter_map(|row| row.metrics.get(name).copied()).collect());
+    let silent = rows.iter().filter(|row| row.config["told_what_to_do"] == false).count();
+    let few = |kind: &str| of(kind, "force_after_n").len() as f64;
+    vec![
+        Gate::at_least("faults in use that were tried", few("cut"), 45.0),
+        Gate::at_least("faults: force before, N", least(of("cut", "force_before_n")), 0.99),
+        Gate::at_most("faults: from fault to no force, ms", most(of("cut", "no_force_ms")), LIMIT_MS),
+        Gate::at_most("faults at opening: force, N", most(of("refused", "force_after_n")), 0.0),
+        Gate::at_most("faults whose message does not say what to do", silent as f64, 0.0),
+        Gate::at_least("faults that must not matter: force kept, N", least(of("kept", "force_after_n")), 0.99),
+        Gate::at_most("faults: largest rise of force, N in a tick", all("largest_rise_n"), 0.5),
+        Gate::at_most("faults: largest force, N", all("largest_force_n"), f64::from(WANTED_N) * (1.0 + 1e-6)),
+    ]
+}
+
+/// The guarded loop over a device, as a session has it.
+struct Loop<D> {
+    device: D,
+    guard: ForceGuard,
+}
+
+impl<D: HapticDevice> Loop<D> {
+    fn new(device: D) -> Self {
+        let guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, ..device.capabilities().guard_config() });
+        Self { device, guard }
+    }
+
+    /// Reads, and applies what the guard lets through; a lost device gets nothing.
+    fn tick(&mut self, time_ms: f64) {
+        let reading = self.device.read(time_ms);
+        let tool = ToolState { time_ms, ..reading.tool };
+        let wanted = Wrench { force: Vec3::X * WANTED_N, torque: Vec3::ZERO };
+        let given = self.guard.guard(wanted, &tool, 1.0);
+        self.device.apply(if reading.status == Status::Lost { GuardedWrench::ZERO } else { given });
+    }
+}
+
+/// What one run of a case was like.
+#[derive(Clone, Copy)]
+struct Course {
+    before_n: f64,
+    no_force_ms: f64,
+    told_ms: f64,
+    after_n: f64,
+    largest_n: f64,
+    rise_n: f64,
+    told: Option<Fault>,
+}
+
+/// Waits until the force is there, lets the fault begin, and watches.
+fn run<B: Bench>(bench: &mut B, case: &Case<B>) -> Course {
+    let mut before = bench.tick();
+    let (mut largest_n, mut rise_n) = (0.0f64, 0.0f64);
+    for _ in 0..SETTLE_TICKS {
+        let now = bench.tick();
+        (largest_n, rise_n) = (largest_n.max(now.force_n), rise_n.max(now.force_n - before.force_n));
+        before = now;
+        if now.force_n > 0.999 * f64::from(WANTED_N) {
+            break;
+        }
+    }
+    (case.begin)(bench);
+    let mut course = Course {
+        before_n: before.force_n,
+        no_force_ms: f64::INFINITY,
+        told_ms: f64::INFINITY,
+        after_n: before.force_n,
+        largest_n,
+        rise_n,
+        told: None,
+    };
+    for _ in 0..WATCHED_TICKS {
+        let now = bench.tick();
+        course.largest_n = course.largest_n.max(now.force_n);
+        course.rise_n = course.rise_n.max(now.force_n - course.after_n);
+        course.after_n = now.force_n;
+        let passed_ms = now.at_ms - before.at_ms;
+        if now.force_n == 0.0 {
+            course.no_force_ms = course.no_force_ms.min(passed_ms);
+        }
+        if let (None, Some(fault)) = (course.told, bench.fault()) {
+            (course.told, course.told_ms) = (Some(fault), passed_ms);
+        }
+    }
+    course
+}
+
+/// The row of one case; of several runs the quickest cut, beside it the slowest.
+fn row<B>(driver: &str, case: &Case<B>, courses: &[Course]) -> Row {
+    let quickest = courses.iter().map(|course| course.no_force_ms).fold(f64::INFINITY, f64::min);
+    let worst = |what: fn(&Course) -> f64| courses.iter().map(what).fold(0.0, f64::max);
+    let least = |what: fn(&Course) -> f64| courses.iter().map(what).fold(f64::INFINITY, f64::min);
+    let told = courses.last().and_then(|course| course.told);
+    let row = Row::new(case.name, driver)
+        .with("told", told.map_or_else(|| "nothing".to_owned(), |fault| fault.to_string()))
+        .metric("force_before_n", least(|course| course.before_n))
+        .metric("force_after_n", least(|course| course.after_n))
+        .metric("largest_force_n", worst(|course| course.largest_n))
+        .metric("largest_rise_n", worst(|course| course.rise_n));
+    match case.then {
+        Then::Kept => row.with("kind", "kept").with("told_what_to_do", told.is_none()),
+        Then::Cut(fault) => row
+            .with("kind", "cut")
+            .with("told_what_to_do", courses.iter().all(|course| course.told == Some(fault)))
+            .metric("no_force_ms", quickest)
+            .metric("slowest_no_force_ms", worst(|course| course.no_force_ms))
+            .metric("told_ms", worst(|course| course.told_ms)),
+    }
+}
+
+/// The row of a device that must not open, and say so with certain words; `force_n` is what is on its motors then.
+fn refused<D>(driver: &str, name: &str, opened: Result<D, DeviceError>, words: &str, force_n: f64) -> Row {
+    let told = opened.err().map_or_else(|| "it opened".to_owned(), |error| error.to_string());
+    Row::new(name, driver)
+        .with("kind", "refused")
+        .with("told_what_to_do", told.contains(words))
+        .with("told", told)
+        .metric("force_after_n", force_n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A device whose force ends some ticks after the fault.
+    struct Slow {
+        ticks: u32,
+        left: Option<u32>,
+    }
+
+    impl Bench for Slow {
+        fn tick(&mut self) -> Felt {
+            self.ticks += 1;
+            self.left = self.left.map(|left| left.saturating_sub(1));
+            Felt { at_ms: self.ticks.into(), force_n: if self.left == Some(0) { 0.0 } else { 1.0 } }
+        }
+        fn fault(&self) -> Option<Fault> {
+            (self.left == Some(0)).then_some(Fault::NoPower)
+        }
+    }
+
+    #[test]
+    fn a_cut_that_comes_late_or_says_the_wrong_thing_fails_its_gate() {
+        let begin = |bench: &mut Slow| bench.left = Some(12);
+        let failed = |then: Then| {
+            let case = Case { name: "slow", begin, then };
+            let course = run(&mut Slow { ticks: 0, left: None }, &case);
+            let rows = [row("bench", &case, &[course])];
+            let failed = gates(&rows).into_iter().skip(1).filter(|gate| !gate.pass);
+            failed.map(|gate| (gate.name, gate.value)).collect::<Vec<_>>()
+        };
+        let late = ("faults: from fault to no force, ms".to_owned(), 12.0);
+        let mute = ("faults whose message does not say what to do".to_owned(), 1.0);
+        assert_eq!(failed(Then::Cut(Fault::NoPower)), [late.clone()]);
+        assert_eq!(failed(Then::Cut(Fault::Braked)), [late, mute.clone()]);
+        assert_eq!(failed(Then::Kept), [mute, ("faults that must not matter: force kept, N".to_owned(), 0.0)]);
+    }
+}
