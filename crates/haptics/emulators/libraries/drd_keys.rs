@@ -1,3 +1,5 @@
+//! What a test may set or ask of libdrd's emulator.
+
 /// Position, m, the maker's axes.
 pub const POSITION_X: u32 = 0;
 /// See [`POSITION_X`].

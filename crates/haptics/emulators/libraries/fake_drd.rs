@@ -3,9 +3,8 @@
 //! Built with `--cfg old` it lacks what old versions lack. A device that is unplugged has no power and so no force.
 #![allow(non_snake_case)]
 
-mod keys {
-    include!("drd_keys.rs");
-}
+#[path = "drd_keys.rs"]
+mod keys;
 
 use std::ffi::{c_char, c_int, c_uint};
 use std::sync::Mutex;

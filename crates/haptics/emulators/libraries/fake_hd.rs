@@ -5,9 +5,8 @@
 //! would get no force.
 #![allow(non_snake_case)]
 
-mod keys {
-    include!("hd_keys.rs");
-}
+#[path = "hd_keys.rs"]
+mod keys;
 
 use std::ffi::{CStr, c_char, c_ulong, c_void};
 use std::sync::Mutex;

@@ -1,3 +1,5 @@
+//! What a test may set or ask of libHD's emulator.
+
 // Of the first device; of the second by `of_second`.
 /// Position, mm.
 pub const POSITION_X: u32 = 0;

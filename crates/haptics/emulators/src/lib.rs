@@ -15,14 +15,10 @@
 //! In anything but tests: no device is behind it.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-/// What a test may set or ask of libHD's emulator.
-pub mod hd {
-    include!("../libraries/hd_keys.rs");
-}
-/// What a test may set or ask of libdrd's emulator.
-pub mod drd {
-    include!("../libraries/drd_keys.rs");
-}
+#[path = "../libraries/drd_keys.rs"]
+pub mod drd;
+#[path = "../libraries/hd_keys.rs"]
+pub mod hd;
 mod library;
 pub mod service;
 

@@ -211,7 +211,7 @@ pub(super) mod tests {
     use super::*;
     use crate::device_test::trial::Trial;
     use trepan_geometry::{Pose, ToolState};
-    use trepan_haptics::HapticDevice;
+    use trepan_haptics::{Capabilities, HapticDevice};
     use trepan_haptics::replay::Replay;
     use trepan_haptics::simulated::{Config, Hand, Simulated};
 

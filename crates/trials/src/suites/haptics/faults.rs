@@ -222,8 +222,8 @@ mod tests {
         };
         let late = ("faults: from fault to no force, ms".to_owned(), 12.0);
         let mute = ("faults whose message does not say what to do".to_owned(), 1.0);
-        assert_eq!(failed(Then::Cut(Fault::NoPower)), [late.clone()]);
-        assert_eq!(failed(Then::Cut(Fault::Braked)), [late, mute.clone()]);
+        assert_eq!(failed(Then::Cut(Fault::Braked)), [late.clone(), mute.clone()]);
+        assert_eq!(failed(Then::Cut(Fault::NoPower)), [late]);
         assert_eq!(failed(Then::Kept), [mute, ("faults that must not matter: force kept, N".to_owned(), 0.0)]);
     }
 }
