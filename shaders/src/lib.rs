@@ -29,13 +29,23 @@ pub const RENDER_SECTION: &str = picture!("section.wgsl");
 
 /// The text of `step.wgsl` before a pass of a soft-tissue step.
 macro_rules! tled {
-    ($file:literal) => {
-        concat!(include_str!("../tled/step.wgsl"), "\n", include_str!(concat!("../tled/", $file)))
+    ($($file:literal),+) => {
+        concat!(include_str!("../tled/step.wgsl"), $("\n", include_str!(concat!("../tled/", $file))),+)
     };
 }
 
-/// Forces of every tetrahedron on its nodes.
-pub const TLED_FORCES: &str = tled!("forces.wgsl");
+/// Forces of neo-Hookean tetrahedra on their nodes. This and the other laws' want `const RELAXES` and `const CURES` before them.
+pub const TLED_NEO_HOOKEAN: &str = tled!("element.wgsl", "neo_hookean.wgsl", "forces.wgsl");
+/// Forces of St. Venant-Kirchhoff's.
+pub const TLED_ST_VENANT_KIRCHHOFF: &str = tled!("element.wgsl", "st_venant_kirchhoff.wgsl", "forces.wgsl");
+/// Forces of Mooney-Rivlin's.
+pub const TLED_MOONEY_RIVLIN: &str = tled!("element.wgsl", "mooney_rivlin.wgsl", "forces.wgsl");
+/// Forces of Ogden's.
+pub const TLED_OGDEN: &str = tled!("element.wgsl", "ogden.wgsl", "forces.wgsl");
+/// Volume change of every tetrahedron.
+pub const TLED_VOLUMES: &str = tled!("element.wgsl", "volumes.wgsl");
+/// Mean volume change around the nodes.
+pub const TLED_SEATS: &str = tled!("seats.wgsl");
 /// The tool's spring on the tissue.
 pub const TLED_PRESS: &str = tled!("press.wgsl");
 /// What nodes gather of the forces, and their motion.

@@ -1,25 +1,25 @@
-// Forces of a neo-Hookean tetrahedron on its four nodes, each to its own slot.
-//   F = I + Σ (u_a - u_0) ⊗ ∇N_a    C = cof F    J = det F    f_a = -V P ∇N_a
-//   P = μ g F + (μ/2 g' I₁ + κ (J-1)) C,    g = J^(-2/3), continued linearly below J = 0.3
+// Forces of the elements of one law on their four nodes, each to its own slot.
+//   P = F S + (q + κ (J̄-1)) C    f_a = -V P ∇N_a    J̄ = J, or the mean of the corners' seats where locking is cured
 // The slot of corner 0 also carries the element's present ω², negative where J ≤ 0.
-@group(0) @binding(1) var<storage, read> corners: array<vec4u>;
-@group(0) @binding(2) var<storage, read> slots: array<vec4u>;
-// Three rows an element: ∇N_1..3, and beside them μ V, κ V, ω² over stiffness at rest.
-@group(0) @binding(3) var<storage, read> rows: array<vec4f>;
-@group(0) @binding(4) var<storage, read> u: array<vec4f>;
-@group(0) @binding(5) var<storage, read_write> forces: array<vec4f>;
+struct Range { first: u32, count: u32 }
+@group(0) @binding(4) var<storage, read_write> forces: array<vec4f>;
+// Further constants of the laws that have more than two.
+@group(0) @binding(5) var<storage, read> more: array<vec4f>;
+// Past stress: two terms of six numbers, all elements each.
+@group(0) @binding(6) var<storage, read_write> memory: array<f32>;
+@group(0) @binding(7) var<storage, read> swelling: array<f32>;
+@group(0) @binding(8) var<uniform> range: Range;
 
-// x^(-1/3): the same bits to begin with and the same three Newton steps as on the processor.
-fn inverse_cube_root(x: f32) -> f32 {
-    let bits = bitcast<u32>(x);
-    var third = (bits >> 2u) + (bits >> 4u);
-    third += third >> 4u;
-    third += third >> 8u;
-    var y = bitcast<f32>(0x54A2FA8Cu - third);
-    for (var i = 0; i < 3; i++) {
-        y = y * (4.0 - x * (y * y * y)) * (1.0 / 3.0);
-    }
-    return y;
+// An isochoric stress, times rest volume: V P = F s + q C.
+struct Stress {
+    s: array<f32, 6>,
+    q: f32,
+}
+
+// J^n continued linearly below J = 0.3, and its slope, from `at` = max(J, 0.3)^n.
+fn continued(d: Deformation, at: f32, n: f32) -> vec2f {
+    let slope = n * at * (d.root * d.root * d.root);
+    return vec2f(at + slope * (d.j - d.clamped), slope);
 }
 
 // A bound of the largest eigenvalue of CᵀC.
@@ -31,44 +31,66 @@ fn largest_eigenvalue(c: mat3x3f) -> f32 {
     return mean + 2.0 * sqrt((dot(apart, apart) + 2.0 * dot(off, off)) / 6.0);
 }
 
+// How stiff the element is now, as in the processor's stiffness.rs; `m` is μ V and κ V.
+fn stiffness(stress: Stress, m: vec2f, d: Deformation) -> f32 {
+    let s = stress.s;
+    let off = abs(s[3]) + abs(s[4]) + abs(s[5]);
+    let inverse = d.root * d.root * d.root;
+    let i1 = dot(d.f[0], d.f[0]) + dot(d.f[1], d.f[1]) + dot(d.f[2], d.f[2]);
+    let volume = m.y + 5.0 / 9.0 * m.x * i1 * (inverse * inverse * d.root * d.root);
+    let turning = abs(stress.q + m.y * (d.j - 1.0)) * sqrt(i1);
+    return abs(s[0]) + abs(s[1]) + abs(s[2]) + off + off + volume * largest_eigenvalue(d.cof) + turning;
+}
+
+// Lets the memory take up the isochoric stress and takes the memory off it.
+fn relaxed(e: u32, stress: Stress, d: Deformation) -> Stress {
+    var left = stress;
+    let inverse = d.root * d.root * d.root;
+    let green = squared_rows(d.cof);
+    for (var k = 0u; k < 6u; k++) {
+        let whole = stress.s[k] + stress.q * (green[k] * inverse);
+        for (var term = 0u; term < 2u; term++) {
+            let at = (6u * term + k) * now.elements + e;
+            let kept = now.fade_keep[term] * memory[at] + now.fade_gain[term] * whole;
+            memory[at] = kept;
+            left.s[k] -= kept;
+        }
+    }
+    return left;
+}
+
+// A row of -V P.
+fn pressed(stress: Stress, f: vec3f, c: vec3f) -> vec3f {
+    let s = stress.s;
+    if ROUND && !RELAXES { return -(s[0] * f + stress.q * c); }
+    let along = vec3f(
+        f.x * s[0] + f.y * s[3] + f.z * s[4], f.x * s[3] + f.y * s[1] + f.z * s[5], f.x * s[4] + f.y * s[5] + f.z * s[2]);
+    return -(along + stress.q * c);
+}
+
 @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {
-    let e = id.x;
-    if e >= now.elements { return; }
-    let at = corners[e];
-    let to = slots[e];
-    let a = rows[3u * e];
-    let b = rows[3u * e + 1u];
-    let c = rows[3u * e + 2u];
-    let o = u[at.x].xyz;
-    let ua = u[at.y].xyz - o;
-    let ub = u[at.z].xyz - o;
-    let uc = u[at.w].xyz - o;
-    // Rows of F and of its cofactor.
-    let f0 = vec3f(1.0, 0.0, 0.0) + (ua.x * a.xyz + ub.x * b.xyz + uc.x * c.xyz);
-    let f1 = vec3f(0.0, 1.0, 0.0) + (ua.y * a.xyz + ub.y * b.xyz + uc.y * c.xyz);
-    let f2 = vec3f(0.0, 0.0, 1.0) + (ua.z * a.xyz + ub.z * b.xyz + uc.z * c.xyz);
-    let cof = mat3x3f(cross(f1, f2), cross(f2, f0), cross(f0, f1));
-    let j = dot(f0, cof[0]);
-    let clamped = max(j, 0.3);
-    let root = inverse_cube_root(clamped);
-    let inverse = root * root * root;
-    let mu = a.w;
-    let kappa = b.w;
-    let i1 = dot(f0, f0) + dot(f1, f1) + dot(f2, f2);
-    let slope = -2.0 / 3.0 * root * root * inverse;
-    let s = mu * (root * root + slope * (j - clamped));
-    let q = mu * 0.5 * slope * i1 + kappa * (j - 1.0);
-    let p0 = -(s * f0 + q * cof[0]);
-    let p1 = -(s * f1 + q * cof[1]);
-    let p2 = -(s * f2 + q * cof[2]);
-    let fa = vec3f(dot(p0, a.xyz), dot(p1, a.xyz), dot(p2, a.xyz));
-    let fb = vec3f(dot(p0, b.xyz), dot(p1, b.xyz), dot(p2, b.xyz));
-    let fc = vec3f(dot(p0, c.xyz), dot(p1, c.xyz), dot(p2, c.xyz));
-    // How stiff the element is now, as in the processor's stiffness.rs.
-    let volume = kappa + 5.0 / 9.0 * mu * i1 * inverse * inverse * root * root;
-    let stiff = 3.0 * abs(s) + volume * largest_eigenvalue(cof) + abs(q) * sqrt(i1);
-    let omega2 = c.w * stiff;
-    forces[to.x] = vec4f(-(fa + fb + fc), select(omega2, -omega2, j <= 0.0));
+    if id.x >= range.count { return; }
+    let e = range.first + id.x;
+    let d = deformation(e);
+    let constants = array<f32, 5>(d.a.w, d.b.w, more_of(e).x, more_of(e).y, more_of(e).z);
+    let m = moduli(constants);
+    var found = stress(constants, d);
+    let omega2 = d.c.w * stiffness(found, m, d);
+    if RELAXES { found = relaxed(e, found, d); }
+    var swollen = d.j - 1.0;
+    if CURES {
+        let seat = corners[2u * now.elements + e];
+        swollen = (swelling[seat.x] + swelling[seat.y] + swelling[seat.z] + swelling[seat.w]) * 0.25;
+    }
+    found.q += m.y * swollen;
+    let p0 = pressed(found, d.f[0], d.cof[0]);
+    let p1 = pressed(found, d.f[1], d.cof[1]);
+    let p2 = pressed(found, d.f[2], d.cof[2]);
+    let fa = vec3f(dot(p0, d.a.xyz), dot(p1, d.a.xyz), dot(p2, d.a.xyz));
+    let fb = vec3f(dot(p0, d.b.xyz), dot(p1, d.b.xyz), dot(p2, d.b.xyz));
+    let fc = vec3f(dot(p0, d.c.xyz), dot(p1, d.c.xyz), dot(p2, d.c.xyz));
+    let to = corners[now.elements + e];
+    forces[to.x] = vec4f(-(fa + fb + fc), select(omega2, -omega2, d.j <= 0.0));
     forces[to.y] = vec4f(fa, 0.0);
     forces[to.z] = vec4f(fb, 0.0);
     forces[to.w] = vec4f(fc, 0.0);

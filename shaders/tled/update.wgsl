@@ -1,9 +1,9 @@
 // Gathers the forces on a node from its run of slots, in their order, and moves it by central differences.
-//   v⁺ = keep v + gain (g + f/m)    u⁺ = u + dt v⁺
+//   v⁺ = keep v + gain (w g + f/m)    u⁺ = u + dt v⁺
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
 @group(0) @binding(2) var<storage, read> forces: array<vec4f>;
-// 1/m, 0 where the node is fixed, and whether a spring pushes it.
-@group(0) @binding(3) var<storage, read> nodes: array<vec2f>;
+// 1/m, 0 where the node is fixed; the share of m that has weight; whether a spring pushes it.
+@group(0) @binding(3) var<storage, read> nodes: array<vec4f>;
 @group(0) @binding(4) var<storage, read> pushed: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> u: array<vec4f>;
 @group(0) @binding(6) var<storage, read_write> v: array<vec4f>;
@@ -32,9 +32,9 @@ fn finite(x: vec3f) -> bool {
     seen.w = max(seen.w, bitcast<u32>(stiffest));
     let node = nodes[n];
     if node.x > 0.0 {
-        if node.y != 0.0 { force += pushed[n].xyz; }
+        if node.z != 0.0 { force += pushed[n].xyz; }
         let before = u[n].xyz;
-        var velocity = v[n].xyz * now.keep + (now.gravity + force * node.x) * now.gain;
+        var velocity = v[n].xyz * now.keep + (now.gravity * node.y + force * node.x) * now.gain;
         let speed = length(velocity);
         var held = speed > now.max_speed;
         if held { velocity *= now.max_speed / speed; }

@@ -1,105 +1,111 @@
-//! The elements of a body and what the nodes get of them.
+//! The elements and nodes of a body, and the rounds of work on them.
 
-use crate::block::{Quad, WIDTH};
+use crate::block::WIDTH;
 use crate::config::Config;
-use crate::kernel::{Found, Kernel};
+use crate::handed::Handed;
+use crate::kernel::Found;
 use crate::layout::{Layout, kind};
-use crate::part::{Now, Part, Work};
+use crate::nodes::{Nodes, Update};
+use crate::part::{Forcing, Own, Part};
 use crate::relaxation::Relaxation;
 use crate::scaling::Scaling;
 use crate::seats::Seats;
-use crate::team::Team;
+use crate::team::{Team, Work};
+use trepan_geometry::Vec3;
 use trepan_soft::Body;
 
 /// Elements of a part: enough that adding up its sums is cheap, few enough that its nodes stay in the fastest cache.
 const PART: usize = 64 * WIDTH;
 
-/// The elements of a body and their latest forces on the nodes.
+/// The elements of a body and its nodes.
 pub(crate) struct Elements {
     team: Team,
-    /// By place: force on the node, N.
-    sums: Vec<Quad>,
-    /// By seat: mean `J - 1` around it.
-    swelling: Vec<f32>,
-    /// By seat, where locking is cured.
-    inverse_volume: Vec<f32>,
-    kernel: Kernel,
     cure_locking: bool,
     relaxation: Relaxation,
+    still_mm: f32,
 }
 
 impl Elements {
-    pub fn of(body: &Body, layout: &Layout, scaling: &Scaling, config: &Config) -> Self {
+    pub fn of(body: &Body, layout: &Layout, scaling: &Scaling, nodes: Nodes, config: &Config) -> Self {
         let seats = Seats::of(body, layout, config.cure_locking);
         let inverse_volume = if config.cure_locking { seats.inverse_volumes(body, layout) } else { Vec::new() };
         let of_one_law = layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b));
-        let part = |tets: &[u32]| Part::of(body, layout, &seats, scaling, tets, &config.relaxation);
-        let parts = of_one_law.flat_map(|tets| tets.chunks(PART)).map(part).collect();
-        let places = layout.node_at.len();
+        let groups: Vec<&[u32]> = of_one_law.flat_map(|tets| tets.chunks(PART)).collect();
+        let seats_of = |t: u32| seats.of_tet(body, layout, t);
+        let owned: Vec<Vec<u32>> = groups.iter().map(|tets| sorted(tets.iter().flat_map(|&t| seats_of(t)))).collect();
+        let (handed, slots) = Handed::of(&owned, &seats, layout.node_at.len(), inverse_volume);
+        let part = |((tets, own), slots): ((&&[u32], Vec<u32>), Vec<u32>)| {
+            let places = own.iter().map(|&s| seats.place_of[s as usize]).collect();
+            Part::of(body, scaling, tets, &seats_of, Own { seats: own, places, slots }, &config.relaxation)
+        };
+        let parts = groups.iter().zip(owned).zip(slots).map(part).collect();
         Self {
-            team: Team::of(parts, places, inverse_volume.len(), config.threads),
-            sums: vec![[0.0; 4]; places],
-            swelling: vec![0.0; inverse_volume.len()],
-            inverse_volume,
-            kernel: config.kernel.resolved(),
+            team: Team::of(parts, nodes, handed, config.kernel.resolved(), config.threads),
             cure_locking: config.cure_locking,
             relaxation: config.relaxation,
+            still_mm: config.still_mm,
         }
+    }
+
+    /// The nodes.
+    pub fn nodes(&self) -> &Nodes {
+        self.team.nodes()
     }
 
     /// Both passes over the elements.
-    pub fn compute(&mut self, u: &[Quad], dt_ms: f32) -> Found {
-        self.average_volumes(u);
-        self.find_forces(u, dt_ms)
+    pub fn compute(&mut self, dt_ms: f32) -> Found {
+        self.average_volumes();
+        self.find_forces(dt_ms)
     }
 
-    /// Computes every element's forces from displacements by place, `dt_ms` after the last time.
-    pub fn find_forces(&mut self, u: &[Quad], dt_ms: f32) -> Found {
-        let forces = Work::Forces { fade: self.relaxation.fade(dt_ms), cure_locking: self.cure_locking };
-        self.team.compute(self.kernel, forces, Now { u, swelling: &self.swelling });
-        self.sum()
+    /// Computes every element's forces from the nodes' displacements, `dt_ms` after the last time.
+    pub fn find_forces(&mut self, dt_ms: f32) -> Found {
+        let (relaxation, cure_locking, still_mm) = (self.relaxation, self.cure_locking, self.still_mm);
+        self.team.compute(Work::Forces(Forcing { dt_ms, relaxation, cure_locking, still_mm }));
+        self.team.found()
     }
 
     /// Averages the volume change by seat, where locking is cured.
-    pub fn average_volumes(&mut self, u: &[Quad]) {
-        if !self.cure_locking {
-            return;
+    pub fn average_volumes(&mut self) {
+        if self.cure_locking {
+            self.team.compute(Work::Volumes { still_mm: self.still_mm });
+            self.team.compute(Work::Average);
         }
-        let swelling = &mut self.swelling;
-        self.team.compute(self.kernel, Work::Volumes, Now { u, swelling });
-        swelling.fill(0.0);
-        self.team.each(|part| part.add_shares_to(swelling));
-        swelling.iter_mut().zip(&self.inverse_volume).for_each(|(swelling, inverse)| *swelling *= inverse);
+    }
+
+    /// Moves the nodes.
+    pub fn update(&mut self, update: Update) {
+        self.team.compute(Work::Update(update));
     }
 
     /// Force of the elements on the node at `place`, N.
-    #[inline(always)]
-    pub fn force(&self, place: usize) -> glam::Vec3 {
-        let [x, y, z, _] = self.sums[place];
-        glam::Vec3::new(x, y, z)
+    pub fn force(&self, place: usize) -> Vec3 {
+        self.team.handed().force(place).truncate()
+    }
+
+    /// Share of the elements whose forces were found in the last round.
+    pub fn stepped(&self) -> f32 {
+        let [all, stepped] = self.team.stepped();
+        stepped as f32 / all as f32
     }
 
     /// Forgets past stress.
     pub fn forget(&mut self) {
-        self.team.each(Part::forget);
+        self.team.forget();
     }
+}
 
-    fn sum(&mut self) -> Found {
-        let (sums, mut all) = (&mut self.sums, Found::default());
-        sums.fill([0.0; 4]);
-        self.team.each(|part| {
-            part.add_to(sums);
-            all.inverted += part.found.inverted;
-            all.stiffest = all.stiffest.max(part.found.stiffest);
-        });
-        all
-    }
+fn sorted(values: impl Iterator<Item = u32>) -> Vec<u32> {
+    let mut values: Vec<u32> = values.collect();
+    values.sort_unstable();
+    values.dedup();
+    values
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trepan_geometry::Vec3;
+    use crate::kernel::Kernel;
     use trepan_soft::{Material, boxes};
 
     #[test]
@@ -125,14 +131,11 @@ mod tests {
         let noise = |i: usize| ((i as f32 * 12.9898).sin() * 43758.547).fract() * 3.0;
         let count = layout.node_at.len();
         let forces = |kernel: Kernel, threads: usize| {
-            let u: Vec<Quad> = (0..count).map(|n| [noise(3 * n), noise(3 * n + 1), noise(3 * n + 2), 0.0]).collect();
-            let mut elements = Elements::of(
-                body,
-                &layout,
-                &Scaling::of(body, 0.0),
-                &Config { kernel, cure_locking: cure, relaxation, threads, ..Config::default() },
-            );
-            let found = (0..3).map(|_| elements.compute(&u, 0.7)).last();
+            let nodes = Nodes::of(body, &layout, &body.lumped_masses_g());
+            (0..count).for_each(|n| nodes.set(n, Vec3::from([3 * n, 3 * n + 1, 3 * n + 2].map(noise)), Vec3::ZERO));
+            let config = Config { kernel, cure_locking: cure, relaxation, threads, ..Config::default() };
+            let mut elements = Elements::of(body, &layout, &Scaling::of(body, 0.0), nodes, &config);
+            let found = (0..3).map(|_| elements.compute(0.7)).last();
             (found, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
         };
         let scalar = forces(Kernel::Scalar, 1);

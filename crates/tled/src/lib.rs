@@ -38,8 +38,10 @@ mod config;
 mod damping;
 mod element;
 mod elements;
+mod field;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+mod handed;
 mod kernel;
 mod lane;
 mod law;

@@ -2,35 +2,38 @@
 //!
 //! # Practice
 //! State is kept as displacement from rest, by place in the solver's order: f32 displacements of a few mm are a thousand times finer than
-//! positions of 200 mm. Positions and velocities are written out in the mesh's order.
+//! positions of 200 mm. Any thread moves any run of nodes: what a node becomes depends on itself and its slots only.
 
-use crate::block::Quad;
 use crate::damping::RigidMotion;
-use crate::elements::Elements;
+use crate::field::Field;
+use crate::handed::Handed;
 use crate::layout::Layout;
+use glam::Vec4;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use trepan_geometry::Vec3;
-use trepan_soft::{Body, StepReport};
+use trepan_soft::Body;
 
-/// State of all nodes.
+/// State of all nodes, by place.
 pub(crate) struct Nodes {
-    /// Displacements by place, mm.
-    pub u: Vec<Quad>,
-    /// Forces from outside by place, N; cleared by the update.
-    pub external: Vec<Vec3>,
-    /// Positions by mesh node, mm.
-    pub positions: Vec<Vec3>,
-    /// Velocities by mesh node, mm/ms.
-    pub velocities: Vec<Vec3>,
-    /// 1/m by place, 1/g; 0 for fixed nodes.
+    /// Displacements, mm.
+    pub u: Field,
+    /// Velocities, mm/ms.
+    v: Field,
+    /// Forces from outside, N; cleared by the update.
+    external: Field,
+    /// 1/m, 1/g; 0 for fixed nodes.
     pub inverse_mass: Vec<f32>,
-    /// Share of the mass by place that has weight.
+    /// Share of the mass that has weight.
     weight: Vec<f32>,
-    v: Vec<Vec3>,
-    rest: Vec<Vec3>,
-    node_at: Vec<u32>,
+    rest: Vec<Vec4>,
+    /// Nodes held to a limit, and put back since they were not finite, since this was last asked.
+    limited: AtomicU32,
+    non_finite: AtomicU32,
 }
 
 /// What the update of one substep needs to know.
+#[derive(Clone, Copy)]
 pub(crate) struct Update {
     pub dt_ms: f32,
     pub damping_per_ms: f32,
@@ -45,109 +48,109 @@ impl Nodes {
     pub fn of(body: &Body, layout: &Layout, masses: &[f64]) -> Self {
         let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
         let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };
-        let count = layout.node_at.len();
+        let field = || Field::zeroed(layout.node_at.len());
         Self {
-            u: vec![[0.0; 4]; count],
-            external: vec![Vec3::ZERO; count],
-            positions: body.mesh.positions.clone(),
-            velocities: vec![Vec3::ZERO; count],
+            u: field(),
+            v: field(),
+            external: field(),
             inverse_mass: layout.node_at.iter().map(inverse).collect(),
             weight: layout.node_at.iter().map(|&n| (weights[n as usize] / masses[n as usize]) as f32).collect(),
-            v: vec![Vec3::ZERO; count],
-            rest: layout.node_at.iter().map(|&n| body.mesh.positions[n as usize]).collect(),
-            node_at: layout.node_at.clone(),
+            rest: layout.node_at.iter().map(|&n| body.mesh.positions[n as usize].extend(0.0)).collect(),
+            limited: AtomicU32::new(0),
+            non_finite: AtomicU32::new(0),
         }
     }
 
-    /// Moves every free node by one substep.
-    pub fn update(&mut self, elements: &Elements, update: &Update, report: &mut StepReport) {
+    /// Moves some nodes by one substep.
+    pub fn update(&self, places: Range<usize>, handed: &Handed, update: &Update) {
         let half = 0.5 * update.damping_per_ms * update.dt_ms;
         let (keep, gain) = ((1.0 - half) / (1.0 + half), update.dt_ms / (1.0 + half));
-        for place in 0..self.u.len() {
-            if self.inverse_mass[place] == 0.0 {
-                self.lead(place, update.dt_ms);
+        let (gravity, dt_ms) = (update.gravity.extend(0.0), update.dt_ms);
+        let square = |limit: f32| (limit * limit).min(f32::MAX);
+        let (fastest, furthest) = (square(update.max_speed), square(update.max_displacement_mm));
+        for place in places {
+            let (u, v, inverse_mass) = (self.u.vector(place), self.v.vector(place), self.inverse_mass[place]);
+            if inverse_mass == 0.0 {
+                // A fixed node goes on with the velocity it was given.
+                self.u.set(place, (u + v * dt_ms).to_array());
+                self.external.set(place, [0.0; 4]);
                 continue;
             }
-            let force = elements.force(place) + self.external[place];
-            let pull = update.gravity * self.weight[place] + force * self.inverse_mass[place];
+            let force = handed.force(place) + self.external.vector(place);
+            let pull = gravity * self.weight[place] + force * inverse_mass;
             let carried = match update.rigid {
                 Some(rigid) => {
-                    let whole = rigid.at(self.rest[place] + self.displacement(place));
-                    whole + (self.v[place] - whole) * keep
+                    let whole = rigid.at((self.rest[place] + u).truncate()).extend(0.0);
+                    whole + (v - whole) * keep
                 }
-                None => self.v[place] * keep,
+                None => v * keep,
             };
-            self.place(place, carried + pull * gain, update, report);
+            let velocity = carried + pull * gain;
+            let after = u + velocity * dt_ms;
+            // Not so for what is not a number.
+            let sane = velocity.length_squared() <= fastest && after.length_squared() <= furthest;
+            let (after, velocity) = if sane { (after, velocity) } else { self.held(u, velocity, update) };
+            self.u.set(place, after.to_array());
+            self.v.set(place, velocity.to_array());
+            self.external.set(place, [0.0; 4]);
         }
-        self.external.fill(Vec3::ZERO);
     }
 
-    /// Moves a fixed node with the velocity it was given.
-    #[inline(always)]
-    fn lead(&mut self, place: usize, dt_ms: f32) {
-        if self.v[place] != Vec3::ZERO {
-            self.set(place, self.displacement(place) + self.v[place] * dt_ms, self.v[place]);
+    /// Displacement and velocity of a node that would go too fast, too far or nowhere.
+    #[cold]
+    fn held(&self, before: Vec4, velocity: Vec4, update: &Update) -> (Vec4, Vec4) {
+        let velocity = velocity.clamp_length_max(update.max_speed);
+        let after = before + velocity * update.dt_ms;
+        if !(velocity.is_finite() && after.is_finite()) {
+            self.non_finite.fetch_add(1, Relaxed);
+            return (before, Vec4::ZERO);
         }
+        self.limited.fetch_add(1, Relaxed);
+        if after.length() > update.max_displacement_mm {
+            return (after.clamp_length_max(update.max_displacement_mm), Vec4::ZERO);
+        }
+        (after, velocity)
+    }
+
+    /// How many nodes were held to a limit and how many were not finite since this was last asked.
+    pub fn noticed(&self) -> [u32; 2] {
+        [&self.limited, &self.non_finite].map(|count| count.swap(0, Relaxed))
+    }
+
+    /// Adds a force from outside, N.
+    pub fn push(&self, place: usize, force: Vec3) {
+        self.external.set(place, (self.external.vector(place) + force.extend(0.0)).to_array());
     }
 
     /// The body's rigid motion, at present.
     pub fn rigid_motion(&self) -> RigidMotion {
-        RigidMotion::of((0..self.u.len()).map(|place| {
-            (
-                1.0 / self.inverse_mass[place].max(f32::MIN_POSITIVE),
-                self.rest[place] + self.displacement(place),
-                self.v[place],
-            )
-        }))
+        let of = |place: usize| {
+            (1.0 / self.inverse_mass[place].max(f32::MIN_POSITIVE), self.position(place), self.velocity(place))
+        };
+        RigidMotion::of((0..self.u.len()).map(of))
     }
 
     /// Puts a node somewhere from outside.
-    pub fn set(&mut self, place: usize, displacement: Vec3, velocity: Vec3) {
-        self.u[place] = [displacement.x, displacement.y, displacement.z, 0.0];
-        self.v[place] = velocity;
-        self.publish(place);
-    }
-
-    fn place(&mut self, place: usize, velocity: Vec3, update: &Update, report: &mut StepReport) {
-        let before = self.displacement(place);
-        let speed = velocity.length();
-        let (mut velocity, mut held) = (velocity, false);
-        if speed > update.max_speed {
-            (velocity, held) = (velocity * (update.max_speed / speed), true);
-        }
-        let mut after = before + velocity * update.dt_ms;
-        if !(velocity.is_finite() && after.is_finite()) {
-            (velocity, after, held) = (Vec3::ZERO, before, false);
-            report.non_finite += 1;
-        } else if after.length() > update.max_displacement_mm {
-            (velocity, after, held) = (Vec3::ZERO, after.clamp_length_max(update.max_displacement_mm), true);
-        }
-        report.limited += u32::from(held);
-        self.set(place, after, velocity);
+    pub fn set(&self, place: usize, displacement: Vec3, velocity: Vec3) {
+        self.u.set(place, displacement.extend(0.0).to_array());
+        self.v.set(place, velocity.extend(0.0).to_array());
     }
 
     /// Velocity of the node at a place, mm/ms.
+    #[inline(always)]
     pub fn velocity(&self, place: usize) -> Vec3 {
-        self.v[place]
+        self.v.vector(place).truncate()
     }
 
     /// Present position of the node at a place, mm.
     #[inline(always)]
     pub fn position(&self, place: usize) -> Vec3 {
-        self.rest[place] + self.displacement(place)
+        (self.rest[place] + self.u.vector(place)).truncate()
     }
 
     /// Displacement of the node at a place, mm.
     #[inline(always)]
     pub fn displacement(&self, place: usize) -> Vec3 {
-        let [x, y, z, _] = self.u[place];
-        Vec3::new(x, y, z)
-    }
-
-    #[inline(always)]
-    fn publish(&mut self, place: usize) {
-        let node = self.node_at[place] as usize;
-        self.positions[node] = self.rest[place] + self.displacement(place);
-        self.velocities[node] = self.v[place];
+        self.u.vector(place).truncate()
     }
 }

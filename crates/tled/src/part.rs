@@ -1,57 +1,69 @@
 //! About a thousand neighbouring elements with nodes of their own: what one thread works on at a time.
 //!
 //! # Theory
-//! A part copies the displacements of the nodes that it touches, lets its elements add to sums of its own, and these are added up over all parts: no atomics, no
-//! colouring. Which elements make a part does not depend on the number of threads, and parts add in their own order, so a node's sum has the same bits
+//! A part copies the displacements of the nodes that it touches, lets its elements add to sums of its own, and puts these into slots of its own: no
+//! colouring, nothing added by two. Which elements make a part does not depend on the number of threads, and slots are gathered in their own order, so a node's sum has the same bits
 //! however many threads there are.
 //!
 //! ```text
-//! places ──copy──▶ part: u ──elements──▶ part: sums ──add, part after part──▶ places
+//! places ──copy──▶ part: u ──elements──▶ part: sums ──put──▶ slots ──gather──▶ places
 //! ```
+//!
+//! A part whose nodes all stay within a limit of where they were when its forces were found keeps these forces, as every element's are a function of where its nodes are: so only
+//! what moves is computed, to the edge of the motion and not further. Nodes go on being moved everywhere, so nothing is cut loose.
 //!
 //! # Practice
 //! Copies and sums of a part are 10 kB: they stay in the fastest cache while its elements stream by.
 
 use crate::block::{Block, Forces, Memory, Quad, Volumes, WIDTH};
+use crate::handed::Handed;
 use crate::kernel::{Found, Kernel};
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
-use crate::layout::Layout;
+use crate::nodes::Nodes;
 use crate::relaxation::{Fade, Relaxation};
 use crate::scaling::Scaling;
-use crate::seats::Seats;
 use std::marker::PhantomData;
+use trepan_geometry::Vec3;
 use trepan_soft::{Body, Law};
 
 /// Some elements and what they last added to their nodes.
 pub(crate) struct Part {
     group: Box<dyn Group>,
-    /// Seat of every node of the part, ascending, and its place.
+    /// Seat of every node of the part, ascending, its place, and the slot of what the part hands over.
     seats: Vec<u32>,
     places: Vec<u32>,
+    slots: Vec<u32>,
     u: Vec<Quad>,
     sums: Vec<Quad>,
     /// A quarter of the volume change of the elements around each node, mm³.
     shares: Vec<f32>,
     /// What its last force pass noticed.
     pub found: Found,
+    tets: usize,
+    /// Since its forces were found, ms; `None` where they must be.
+    elapsed_ms: Option<f32>,
+    /// Whether its change of volume was found anew since its forces were.
+    stirred: bool,
+    /// Largest gradient of a shape function: the most strain that a mm of motion is, 1/mm.
+    strain_per_mm: f32,
 }
 
-/// What the nodes know that elements need.
+/// How a round of forces goes.
 #[derive(Clone, Copy)]
-pub(crate) struct Now<'a> {
-    /// Displacements by place, mm.
-    pub u: &'a [Quad],
-    /// `J - 1` by seat, where locking is cured.
-    pub swelling: &'a [f32],
+pub(crate) struct Forcing {
+    /// Since the last round, ms.
+    pub dt_ms: f32,
+    pub relaxation: Relaxation,
+    pub cure_locking: bool,
+    /// How far a node may get before its elements' forces are found anew, mm.
+    pub still_mm: f32,
 }
 
-/// What to do with the elements.
-#[derive(Clone, Copy)]
-pub(crate) enum Work {
-    /// Volume changes.
-    Volumes,
-    /// Forces.
-    Forces { fade: [Fade; 2], cure_locking: bool },
+/// The nodes of a part, ascending by seat.
+pub(crate) struct Own {
+    pub seats: Vec<u32>,
+    pub places: Vec<u32>,
+    pub slots: Vec<u32>,
 }
 
 /// Elements of one law.
@@ -68,71 +80,100 @@ struct Of<M, const K: usize, const T: usize> {
 }
 
 impl Part {
-    /// The elements at `tets` (mesh numbers), at least one and all of the same law.
+    /// The elements at `tets` (mesh numbers), at least one and all of the same law, with the seats of their corners.
     pub fn of(
         body: &Body,
-        layout: &Layout,
-        seats: &Seats,
         scaling: &Scaling,
         tets: &[u32],
+        seats_of: &dyn Fn(u32) -> [u32; 4],
+        own: Own,
         relaxation: &Relaxation,
     ) -> Self {
-        let mut own: Vec<u32> = tets.iter().flat_map(|&t| seats.of_tet(body, layout, t)).collect();
-        own.sort_unstable();
-        own.dedup();
-        let nodes = |t: u32| seats.of_tet(body, layout, t).map(|s| own.partition_point(|&o| o < s) as u32);
+        let Own { seats, places, slots } = own;
+        let nodes = |t: u32| seats_of(t).map(|s| seats.partition_point(|&o| o < s) as u32);
         Self {
             group: group(body, scaling, tets, &nodes, relaxation),
-            places: own.iter().map(|&s| seats.place_of[s as usize]).collect(),
-            u: vec![[0.0; 4]; own.len()],
-            sums: vec![[0.0; 4]; own.len()],
-            shares: vec![0.0; own.len()],
-            seats: own,
+            u: vec![[0.0; 4]; seats.len()],
+            sums: vec![[0.0; 4]; seats.len()],
+            shares: vec![0.0; seats.len()],
             found: Found::default(),
+            tets: tets.len(),
+            elapsed_ms: None,
+            stirred: false,
+            strain_per_mm: tets.iter().map(|&t| steepest(body, t)).fold(0.0, f32::max),
+            seats,
+            places,
+            slots,
         }
     }
 
-    /// Does some work.
-    pub fn compute(&mut self, kernel: Kernel, work: Work, now: Now<'_>) {
-        match work {
-            Work::Volumes => {
-                self.copy(now.u);
-                self.shares.fill(0.0);
-                self.group.volumes(kernel, &self.u, &mut self.shares);
-            }
-            Work::Forces { fade, cure_locking } => {
-                if cure_locking {
-                    self.u.iter_mut().zip(&self.seats).for_each(|(u, &seat)| u[3] = now.swelling[seat as usize]);
-                } else {
-                    self.copy(now.u);
-                }
-                self.sums.fill([0.0; 4]);
-                self.found = self.group.forces(kernel, fade, cure_locking, &self.u, &mut self.sums);
-            }
+    /// Finds the elements' change of volume, unless their nodes rest.
+    pub fn volumes(&mut self, kernel: Kernel, still_mm: f32, nodes: &Nodes, handed: &Handed) {
+        if self.elapsed_ms.is_some() && self.nodes_rest(still_mm, nodes) {
+            return;
         }
+        self.stirred = true;
+        self.copy(nodes);
+        self.shares.fill(0.0);
+        self.group.volumes(kernel, &self.u, &mut self.shares);
+        self.slots.iter().zip(&self.shares).for_each(|(&slot, &share)| handed.shares.set(slot as usize, share));
     }
 
-    fn copy(&mut self, u: &[Quad]) {
-        self.u.iter_mut().zip(&self.places).for_each(|(to, &place)| *to = u[place as usize]);
-    }
-
-    /// Adds its forces to the sums by place.
-    pub fn add_to(&self, sums: &mut [Quad]) {
-        for (&place, mine) in self.places.iter().zip(&self.sums) {
-            let sum = &mut sums[place as usize];
-            *sum = (glam::Vec4::from_array(*sum) + glam::Vec4::from_array(*mine)).to_array();
+    /// Finds the elements' forces, unless nothing changed; where locking is cured after their change of volume was averaged.
+    pub fn forces(&mut self, kernel: Kernel, how: &Forcing, nodes: &Nodes, handed: &Handed) {
+        self.elapsed_ms = self.elapsed_ms.map(|elapsed_ms| elapsed_ms + how.dt_ms);
+        let may_rest = self.elapsed_ms.is_some_and(|elapsed_ms| elapsed_ms <= how.relaxation.brief_ms());
+        if may_rest && self.rests(how, nodes, handed) {
+            return;
         }
+        let fade = how.relaxation.fade(self.elapsed_ms.unwrap_or(0.0));
+        (self.elapsed_ms, self.stirred) = (Some(0.0), false);
+        if how.cure_locking {
+            self.u.iter_mut().zip(&self.seats).for_each(|(u, &seat)| u[3] = handed.swelling.get(seat as usize));
+        } else {
+            self.copy(nodes);
+        }
+        self.sums.fill([0.0; 4]);
+        self.found = self.group.forces(kernel, fade, how.cure_locking, &self.u, &mut self.sums);
+        self.slots.iter().zip(&self.sums).for_each(|(&slot, &sum)| handed.sums.set(slot as usize, sum));
     }
 
-    /// Adds its shares of the volume change to the sums by seat.
-    pub fn add_shares_to(&self, sums: &mut [f32]) {
-        self.seats.iter().zip(&self.shares).for_each(|(&seat, share)| sums[seat as usize] += share);
+    /// How many elements it has, and of how many the forces were found in the last round.
+    pub fn stepped(&self) -> [usize; 2] {
+        [self.tets, if self.elapsed_ms == Some(0.0) { self.tets } else { 0 }]
+    }
+
+    /// Whether everything that forces depend on is where it was when they were found.
+    fn rests(&self, how: &Forcing, nodes: &Nodes, handed: &Handed) -> bool {
+        if !how.cure_locking {
+            return self.nodes_rest(how.still_mm, nodes);
+        }
+        let most = how.still_mm * self.strain_per_mm;
+        let as_before = |(u, &seat): (&Quad, &u32)| (handed.swelling.get(seat as usize) - u[3]).abs() <= most;
+        how.still_mm > 0.0 && !self.stirred && self.u.iter().zip(&self.seats).all(as_before)
+    }
+
+    fn nodes_rest(&self, still_mm: f32, nodes: &Nodes) -> bool {
+        let near = |(&[x, y, z, _], &place): (&Quad, &u32)| {
+            nodes.displacement(place as usize).distance_squared(Vec3::new(x, y, z)) <= still_mm * still_mm
+        };
+        still_mm > 0.0 && self.u.iter().zip(&self.places).all(near)
+    }
+
+    fn copy(&mut self, nodes: &Nodes) {
+        self.u.iter_mut().zip(&self.places).for_each(|(to, &place)| *to = nodes.u.get(place as usize));
     }
 
     /// Forgets past stress.
     pub fn forget(&mut self) {
         self.group.forget();
+        self.elapsed_ms = None;
     }
+}
+
+/// Length of the longest gradient of a tetrahedron's shape functions, 1/mm.
+fn steepest(body: &Body, tet: u32) -> f32 {
+    body.shape(tet as usize).gradients.iter().map(|g| g.length()).fold(0.0, f64::max) as f32
 }
 
 /// The group for the law of these elements. Only the commonest law has a form without memory.

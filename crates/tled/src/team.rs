@@ -1,35 +1,55 @@
-//! Work on the parts, alone or with more threads.
+//! Work on the elements and the nodes, alone or with more threads.
 //!
 //! # Theory
-//! Parts are claimed one after the other from a counter, by the caller and by its workers alike. A worker that is not running costs nothing:
-//! the caller then claims every part itself, and waits only for parts that someone is in the middle of. So a loaded machine falls back to the speed
-//! of one thread and never stalls. Who computed a part leaves no trace in the result.
+//! A round of work falls into tasks, a part of the elements or a run of the nodes each. Tasks are claimed one after the other from a counter, by the caller and by its workers alike. A
+//! worker that is not running costs nothing: the caller then claims every task itself, and waits only for tasks that someone is in the middle of. So a loaded machine falls
+//! back to the speed of one thread and never stalls. Who did a task leaves no trace in the result.
 //!
 //! # Practice
-//! Workers spin for a few microseconds after a round, then yield, then sleep. Without workers nothing is locked, copied or waited for.
+//! Workers spin for a few microseconds after a round, then yield, then sleep.
 
-use crate::block::Quad;
-use crate::kernel::Kernel;
-use crate::part::{Now, Part, Work};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use crate::handed::Handed;
+use crate::kernel::{Found, Kernel};
+use crate::nodes::{Nodes, Update};
+use crate::part::{Forcing, Part};
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicIsize, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread::JoinHandle;
 
 const SPINS: u32 = 4000;
 const YIELDS: u32 = 64;
+/// Nodes, or seats, of a task.
+const RUN: usize = 256;
 
-/// The parts and who works on them.
+/// The parts, the nodes, and who works on them.
 pub(crate) struct Team {
     shared: Arc<Shared>,
     workers: Vec<JoinHandle<()>>,
 }
 
+/// A round of work.
+#[derive(Clone, Copy)]
+pub(crate) enum Work {
+    /// The elements' changes of volume, but for those whose nodes keep this near, mm.
+    Volumes { still_mm: f32 },
+    /// Their means around the nodes.
+    Average,
+    /// The elements' forces.
+    Forces(Forcing),
+    /// The nodes' motion.
+    Update(Update),
+}
+
 struct Shared {
     parts: Vec<Mutex<Part>>,
-    job: RwLock<Job>,
-    /// Number of the next part to be claimed; past the end when none is left.
-    next: AtomicUsize,
-    /// Parts finished in this round.
+    nodes: Nodes,
+    handed: Handed,
+    kernel: Kernel,
+    work: RwLock<Work>,
+    /// Tasks of this round that nobody has claimed; the next one's number is one less. None when not over 0.
+    left: AtomicIsize,
+    /// Tasks finished in this round.
     done: AtomicUsize,
     round: AtomicUsize,
     asleep: AtomicUsize,
@@ -38,14 +58,7 @@ struct Shared {
     quit: AtomicBool,
 }
 
-struct Job {
-    u: Vec<Quad>,
-    swelling: Vec<f32>,
-    kernel: Kernel,
-    work: Work,
-}
-
-/// Counts a part as finished, even one that panicked.
+/// Counts a task as finished, even one that panicked.
 struct Finished<'a>(&'a AtomicUsize);
 
 impl Drop for Finished<'_> {
@@ -56,13 +69,14 @@ impl Drop for Finished<'_> {
 
 impl Team {
     /// A team of `threads`, the caller among them. A thread that cannot be started is done without.
-    pub fn of(parts: Vec<Part>, nodes: usize, seats: usize, threads: usize) -> Self {
-        let (u, swelling) = (vec![[0.0; 4]; nodes], vec![0.0; seats]);
-        let job = Job { u, swelling, kernel: Kernel::Scalar, work: Work::Volumes };
+    pub fn of(parts: Vec<Part>, nodes: Nodes, handed: Handed, kernel: Kernel, threads: usize) -> Self {
         let shared = Arc::new(Shared {
-            next: AtomicUsize::new(parts.len()),
             parts: parts.into_iter().map(Mutex::new).collect(),
-            job: RwLock::new(job),
+            nodes,
+            handed,
+            kernel,
+            work: RwLock::new(Work::Average),
+            left: AtomicIsize::new(0),
             done: AtomicUsize::new(0),
             round: AtomicUsize::new(0),
             asleep: AtomicUsize::new(0),
@@ -78,30 +92,45 @@ impl Team {
         Self { shared, workers }
     }
 
-    /// Does some work on every part.
-    pub fn compute(&mut self, kernel: Kernel, work: Work, now: Now<'_>) {
-        if let Some(shared) = Arc::get_mut(&mut self.shared) {
-            for part in &mut shared.parts {
-                part.get_mut().unwrap_or_else(PoisonError::into_inner).compute(kernel, work, now);
-            }
-            return;
-        }
-        self.shared.announce(kernel, work, now);
+    /// The nodes.
+    pub fn nodes(&self) -> &Nodes {
+        &self.shared.nodes
+    }
+
+    /// What the parts handed to them.
+    pub fn handed(&self) -> &Handed {
+        &self.shared.handed
+    }
+
+    /// Does a round of work.
+    pub fn compute(&mut self, work: Work) {
+        let tasks = self.shared.tasks(work);
+        self.shared.announce(work, tasks);
         self.shared.work();
         let mut waited = 0;
-        while self.shared.done.load(Ordering::Acquire) < self.shared.parts.len() {
+        while self.shared.done.load(Ordering::Acquire) < tasks {
             pause(&mut waited);
         }
     }
 
-    /// Calls `each` with every part, in order.
-    pub fn each(&mut self, mut each: impl FnMut(&mut Part)) {
-        match Arc::get_mut(&mut self.shared) {
-            Some(shared) => {
-                shared.parts.iter_mut().for_each(|part| each(part.get_mut().unwrap_or_else(PoisonError::into_inner)));
-            }
-            None => self.shared.parts.iter().for_each(|part| each(&mut lock(part))),
-        }
+    /// What the elements noticed in the last round of forces.
+    pub fn found(&self) -> Found {
+        let add = |all: Found, part: &Mutex<Part>| {
+            let found = lock(part).found;
+            Found { inverted: all.inverted + found.inverted, stiffest: all.stiffest.max(found.stiffest) }
+        };
+        self.shared.parts.iter().fold(Found::default(), add)
+    }
+
+    /// How many elements there are, and of how many the forces were found in the last round.
+    pub fn stepped(&self) -> [usize; 2] {
+        let add = |[a, b]: [usize; 2], [x, y]: [usize; 2]| [a + x, b + y];
+        self.shared.parts.iter().map(|part| lock(part).stepped()).fold([0; 2], add)
+    }
+
+    /// Forgets past stress.
+    pub fn forget(&mut self) {
+        self.shared.parts.iter().for_each(|part| lock(part).forget());
     }
 }
 
@@ -114,15 +143,19 @@ impl Drop for Team {
 }
 
 impl Shared {
-    fn announce(&self, kernel: Kernel, work: Work, now: Now<'_>) {
-        {
-            let mut job = self.job.write().unwrap_or_else(PoisonError::into_inner);
-            job.u.copy_from_slice(now.u);
-            job.swelling.copy_from_slice(now.swelling);
-            (job.kernel, job.work) = (kernel, work);
+    fn tasks(&self, work: Work) -> usize {
+        match work {
+            Work::Volumes { .. } | Work::Forces(_) => self.parts.len(),
+            Work::Average => self.handed.seats().div_ceil(RUN),
+            Work::Update(_) => self.nodes.u.len().div_ceil(RUN),
         }
+    }
+
+    /// Nobody is in the middle of a task when this is called.
+    fn announce(&self, work: Work, tasks: usize) {
+        *self.work.write().unwrap_or_else(PoisonError::into_inner) = work;
         self.done.store(0, Ordering::Release);
-        self.next.store(0, Ordering::Release);
+        self.left.store(tasks as isize, Ordering::Release);
         self.start_round();
     }
 
@@ -134,12 +167,26 @@ impl Shared {
         }
     }
 
-    /// Claims and computes parts until none is left.
+    /// Claims and does tasks until none is left.
     fn work(&self) {
-        while let Some(part) = self.parts.get(self.next.fetch_add(1, Ordering::AcqRel)) {
+        loop {
+            let left = self.left.fetch_sub(1, Ordering::AcqRel);
+            if left <= 0 {
+                return;
+            }
             let _finished = Finished(&self.done);
-            let job = self.job.read().unwrap_or_else(PoisonError::into_inner);
-            lock(part).compute(job.kernel, job.work, Now { u: &job.u, swelling: &job.swelling });
+            let work = *self.work.read().unwrap_or_else(PoisonError::into_inner);
+            self.task(left as usize - 1, work);
+        }
+    }
+
+    fn task(&self, number: usize, work: Work) {
+        let (nodes, handed, kernel) = (&self.nodes, &self.handed, self.kernel);
+        match work {
+            Work::Volumes { still_mm } => lock(&self.parts[number]).volumes(kernel, still_mm, nodes, handed),
+            Work::Average => handed.average(run(number, handed.seats())),
+            Work::Forces(how) => lock(&self.parts[number]).forces(kernel, &how, nodes, handed),
+            Work::Update(update) => nodes.update(run(number, nodes.u.len()), handed, &update),
         }
     }
 
@@ -169,6 +216,11 @@ impl Shared {
         self.asleep.fetch_sub(1, Ordering::SeqCst);
         self.round.load(Ordering::SeqCst)
     }
+}
+
+/// The numbers of a task out of `count`.
+fn run(number: usize, count: usize) -> Range<usize> {
+    number * RUN..((number + 1) * RUN).min(count)
 }
 
 /// Spins at first, then lets others run.

@@ -15,11 +15,13 @@ use trepan_soft::{
 pub struct Tled {
     config: Config,
     pub(crate) elements: Elements,
-    pub(crate) nodes: Nodes,
+    /// Positions, mm, and velocities, mm/ms, by mesh node.
+    positions: Vec<Vec3>,
+    velocities: Vec<Vec3>,
     shares: ContactShares,
     /// Its triangles by place.
     pressure: SurfacePressure,
-    place_of: Vec<u32>,
+    layout: Layout,
     bound_ms: f32,
     pub(crate) damping_per_ms: f32,
     /// Lowest frequency of the rest state, rad/ms, where fixed nodes hold the body.
@@ -78,13 +80,14 @@ impl Tled {
         let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
         let lowest_per_ms = lowest_frequency_of(body, &stiffness).map(|w| w as f32);
         let nodes = Nodes::of(body, &layout, stiffness.masses_g());
-        let mut elements = Elements::of(body, &layout, &scaling, config);
+        let mut elements = Elements::of(body, &layout, &scaling, nodes, config);
         Ok(Self {
             config: *config,
-            stiffest_at_rest: elements.compute(&nodes.u, 0.0).stiffest,
+            stiffest_at_rest: elements.compute(0.0).stiffest,
             elapsed_ms: 0.0,
             elements,
-            nodes,
+            positions: body.mesh.positions.clone(),
+            velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
             shares: ContactShares::of_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
             bound_ms: power_bound_of_ms(body, &stiffness) as f32,
@@ -93,7 +96,7 @@ impl Tled {
             mass_added: scaling.added as f32,
             max_displacement_mm: config.max_displacement * extent,
             held: body.is_held(),
-            place_of: layout.place_of,
+            layout,
         })
     }
 
@@ -112,9 +115,14 @@ impl Tled {
         self.mass_added
     }
 
+    /// Share of the elements whose forces the last step found anew; under 1 only with [`Config::still_mm`].
+    pub fn stepped_share(&self) -> f32 {
+        self.elements.stepped()
+    }
+
     /// Puts pressure on some triangles, from the next step on; those that name nodes outside the mesh are left out.
     pub fn set_pressure(&mut self, mut pressure: SurfacePressure) {
-        let place_of = &self.place_of;
+        let place_of = &self.layout.place_of;
         pressure.triangles.retain(|t| t.iter().all(|&n| (n as usize) < place_of.len()));
         pressure.triangles.iter_mut().flatten().for_each(|n| *n = place_of[*n as usize]);
         self.pressure = pressure;
@@ -122,19 +130,22 @@ impl Tled {
 
     /// Sets the state of a node: displacement from rest, mm, and velocity, mm/ms. A fixed node goes on with its velocity until it is given another.
     pub fn set_node(&mut self, node: u32, displacement: Vec3, velocity: Vec3) {
-        if let Some(&place) = self.place_of.get(node as usize) {
-            self.nodes.set(place as usize, displacement, velocity);
+        if let Some(&place) = self.layout.place_of.get(node as usize) {
+            self.elements.nodes().set(place as usize, displacement, velocity);
+            self.publish_one(place as usize);
         }
     }
 
     /// Force that the support of a fixed node exerts on it, N, as of the last step; at a free node the force that accelerates it, reversed.
     pub fn support_force(&self, node: u32) -> Vec3 {
-        self.place_of.get(node as usize).map_or(Vec3::ZERO, |&place| -self.elements.force(place as usize))
+        self.layout.place_of.get(node as usize).map_or(Vec3::ZERO, |&place| -self.elements.force(place as usize))
     }
 
     /// Puts every node back to its rest position, at rest, and forgets past stress.
     pub fn reset(&mut self) {
-        (0..self.place_of.len()).for_each(|place| self.nodes.set(place, Vec3::ZERO, Vec3::ZERO));
+        let nodes = self.elements.nodes();
+        (0..nodes.u.len()).for_each(|place| nodes.set(place, Vec3::ZERO, Vec3::ZERO));
+        self.publish();
         self.elements.forget();
         self.elapsed_ms = 0.0;
     }
@@ -143,8 +154,8 @@ impl Tled {
     pub fn pass(&mut self, pass: Pass, loads: &Loads, dt_ms: f32) {
         let mut report = StepReport::default();
         match pass {
-            Pass::Volumes => self.elements.average_volumes(&self.nodes.u),
-            Pass::Forces => _ = self.elements.find_forces(&self.nodes.u, dt_ms),
+            Pass::Volumes => self.elements.average_volumes(),
+            Pass::Forces => _ = self.elements.find_forces(dt_ms),
             Pass::Press => {
                 let omega2 = 4.0 / (self.bound_ms * self.bound_ms);
                 self.press(loads, StepBound { dt_ms, omega2 }, &mut report);
@@ -156,7 +167,7 @@ impl Tled {
 
     /// One substep of at most `left_ms`; gives its length. As long as the elements bear as they are now, and of equal lengths while that stays.
     fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
-        let found = self.elements.compute(&self.nodes.u, self.elapsed_ms);
+        let found = self.elements.compute(self.elapsed_ms);
         report.inverted = report.inverted.max(found.inverted);
         let bound_ms = self.bound_now_ms(found.stiffest);
         let longest = self.stable_dt_ms().min(BORNE * bound_ms);
@@ -170,7 +181,7 @@ impl Tled {
 
     /// Moves the nodes.
     fn update(&mut self, loads: &Loads, dt_ms: f32, report: &mut StepReport) {
-        let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.nodes.rigid_motion());
+        let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.elements.nodes().rigid_motion());
         let update = Update {
             dt_ms,
             damping_per_ms: self.damping_per_ms,
@@ -179,24 +190,36 @@ impl Tled {
             max_displacement_mm: self.max_displacement_mm,
             rigid,
         };
-        self.nodes.update(&self.elements, &update, report);
+        self.elements.update(update);
+        let [limited, non_finite] = self.elements.nodes().noticed();
+        (report.limited, report.non_finite) = (report.limited + limited, report.non_finite + non_finite);
         self.elapsed_ms = dt_ms;
+        self.publish();
     }
 
     /// Puts the surface's pressure on the nodes.
     fn push(&mut self) {
-        let Nodes { external, .. } = &mut self.nodes;
-        let mut external = std::mem::take(external);
-        self.pressure
-            .each(|place| self.nodes.position(place as usize), |place, force| external[place as usize] += force);
-        self.nodes.external = external;
+        let nodes = self.elements.nodes();
+        self.pressure.each(|place| nodes.position(place as usize), |place, force| nodes.push(place as usize, force));
     }
 
     /// Ends all motion.
     pub(crate) fn stop(&mut self) {
-        for place in 0..self.place_of.len() {
-            self.nodes.set(place, self.nodes.displacement(place), Vec3::ZERO);
-        }
+        let nodes = self.elements.nodes();
+        (0..nodes.u.len()).for_each(|place| nodes.set(place, nodes.displacement(place), Vec3::ZERO));
+        self.publish();
+    }
+
+    /// Writes positions and velocities out in the mesh's order.
+    fn publish(&mut self) {
+        (0..self.layout.node_at.len()).for_each(|place| self.publish_one(place));
+    }
+
+    #[inline(always)]
+    fn publish_one(&mut self, place: usize) {
+        let (nodes, node) = (self.elements.nodes(), self.layout.node_at[place] as usize);
+        self.positions[node] = nodes.position(place);
+        self.velocities[node] = nodes.velocity(place);
     }
 
     /// The stable bound as the elements are now: that of the rest state, shortened by what the stiffest element has gained.
@@ -206,10 +229,10 @@ impl Tled {
     }
 
     fn press(&mut self, loads: &Loads, bound: StepBound, report: &mut StepReport) {
-        let Nodes { positions, velocities, inverse_mass, external, .. } = &mut self.nodes;
-        let place = |n: u32| self.place_of[n as usize] as usize;
-        let add = |n: u32, force: Vec3| external[place(n)] += force;
-        self.shares.press(&loads.contacts, bound, |n| inverse_mass[place(n)], [positions, velocities], report, add);
+        let (nodes, state) = (self.elements.nodes(), [&self.positions[..], &self.velocities[..]]);
+        let place = |n: u32| self.layout.place_of[n as usize] as usize;
+        let add = |n: u32, force: Vec3| nodes.push(place(n), force);
+        self.shares.press(&loads.contacts, bound, |n| nodes.inverse_mass[place(n)], state, report, add);
     }
 }
 
@@ -226,11 +249,11 @@ impl SoftSolver for Tled {
     }
 
     fn positions(&self) -> &[Vec3] {
-        &self.nodes.positions
+        &self.positions
     }
 
     fn velocities(&self) -> &[Vec3] {
-        &self.nodes.velocities
+        &self.velocities
     }
 
     fn stable_dt_ms(&self) -> f32 {

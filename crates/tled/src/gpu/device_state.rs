@@ -17,7 +17,9 @@ pub(crate) struct Step {
     pub springs: u32,
     pub elements: u32,
     pub nodes: u32,
-    pub unused: u32,
+    pub seats: u32,
+    pub fade_keep: [f32; 2],
+    pub fade_gain: [f32; 2],
 }
 
 /// Buffers that several passes share.
@@ -27,20 +29,24 @@ pub(crate) struct DeviceState {
     pub u: Buffer<[f32; 4]>,
     /// Velocities by place, mm/ms.
     pub v: Buffer<[f32; 4]>,
-    /// 1/m, 1/g, and 1 where a spring pushes, by place.
-    pub nodes: Buffer<[f32; 2]>,
+    /// By place: 1/m, 1/g; the share of m that has weight; 1 where a spring pushes.
+    pub nodes: Buffer<[f32; 4]>,
     /// By place, since it was cleared: inverted elements, times limited, times not finite, bits of the largest ω².
     pub noticed: Buffer<[u32; 4]>,
     /// 1/m by place on this side.
     pub inverse_mass: Vec<f32>,
+    weight: Vec<f32>,
 }
 
 impl DeviceState {
-    pub fn new(gpu: &Gpu, body: &Body, layout: &Layout) -> Result<Self, GpuError> {
-        let (masses, fixed) = (body.lumped_masses_g(), body.fixed_mask());
+    /// Nodes at rest, of masses by mesh node, g, which may be more than what their weight comes from.
+    pub fn new(gpu: &Gpu, body: &Body, layout: &Layout, masses: &[f64]) -> Result<Self, GpuError> {
+        let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
         let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };
         let inverse_mass: Vec<f32> = layout.node_at.iter().map(inverse).collect();
-        let nodes: Vec<[f32; 2]> = inverse_mass.iter().map(|&m| [m, 0.0]).collect();
+        let share = |&n: &u32| (weights[n as usize] / masses[n as usize]) as f32;
+        let weight: Vec<f32> = layout.node_at.iter().map(share).collect();
+        let nodes: Vec<[f32; 4]> = inverse_mass.iter().zip(&weight).map(|(&m, &w)| [m, w, 0.0, 0.0]).collect();
         Ok(Self {
             step: Buffer::zeroed(gpu, "step", 1)?,
             u: Buffer::zeroed(gpu, "u", nodes.len())?,
@@ -48,12 +54,14 @@ impl DeviceState {
             noticed: Buffer::zeroed(gpu, "noticed", nodes.len())?,
             nodes: Buffer::from_slice(gpu, "nodes", &nodes)?,
             inverse_mass,
+            weight,
         })
     }
 
     /// Says whether a spring pushes a node.
     pub fn mark(&mut self, gpu: &Gpu, place: u32, is_pushed: bool) {
         let place = place as usize;
-        self.nodes.write(gpu, place, &[[self.inverse_mass[place], f32::from(u8::from(is_pushed))]]);
+        let pushed = f32::from(u8::from(is_pushed));
+        self.nodes.write(gpu, place, &[[self.inverse_mass[place], self.weight[place], pushed, 0.0]]);
     }
 }

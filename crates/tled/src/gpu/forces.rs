@@ -1,114 +1,128 @@
-//! The pass of the elements: forces on their nodes, one thread a tetrahedron.
+//! The pass of the elements: forces on their nodes, one thread a tetrahedron, one dispatch a law.
 //!
 //! # Theory
-//! The arithmetic of `law.rs`, `element.rs` and `stiffness.rs` for a neo-Hookean solid. Every corner writes to a slot of its own; slots lie sorted by
-//! node, so the node's pass reads one run in a fixed order and nothing is added by atomics: the same bits in every run.
+//! The arithmetic of `law.rs`, `element.rs` and `stiffness.rs`. Every corner writes to a slot of its own; slots lie sorted by
+//! seat and so by node, so the node's pass reads one run in a fixed order and nothing is added by atomics: the same bits in every run.
 //!
 //! # Practice
-//! 80 bytes read in a row and 64 bytes scattered a tetrahedron and step, besides the displacements of four nodes.
+//! 80 bytes read in a row and 64 bytes scattered a tetrahedron and step, besides the displacements of four nodes; 96 more read and written for a memory of past stress,
+//! 16 more for the cure of locking. What a body does not need is compiled out of its kernels.
 
 use crate::block::omega2_over_stiffness;
+use crate::config::Config;
 use crate::gpu::device_state::DeviceState;
+use crate::gpu::topology::Topology;
 use crate::gpu::{LANES, groups};
-use crate::law::{Constitutive, NeoHookean};
-use crate::layout::Layout;
+use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
+use crate::layout::{Layout, kind};
+use crate::scaling::Scaling;
 use trepan_gpu::{Bindings, Buffer, Dispatches, Gpu, GpuError, Kernel, Slot};
-use trepan_shaders::TLED_FORCES;
-use trepan_soft::Body;
+use trepan_shaders::{TLED_MOONEY_RIVLIN, TLED_NEO_HOOKEAN, TLED_OGDEN, TLED_ST_VENANT_KIRCHHOFF};
+use trepan_soft::{Body, Law};
 
-/// Elements on the device and the kernel of their forces.
+/// Elements on the device and the kernels of their forces.
 pub(crate) struct Forces {
-    kernel: Kernel,
-    bindings: Bindings,
-    count: u32,
-    /// Where a node's run of slots begins, one more than nodes.
-    pub starts: Buffer<u32>,
+    laws: Vec<OfLaw>,
+    /// Gradients, and constants beside them, three rows an element.
+    pub rows: Buffer<[f32; 4]>,
     /// Forces by slot, N.
     pub slots: Buffer<[f32; 4]>,
 }
 
+/// The elements of one law.
+struct OfLaw {
+    kernel: Kernel,
+    bindings: Bindings,
+    count: u32,
+}
+
 impl Forces {
-    pub fn new(gpu: &Gpu, body: &Body, layout: &Layout, state: &DeviceState) -> Result<Self, GpuError> {
+    pub fn new(
+        gpu: &Gpu,
+        (body, layout, scaling): (&Body, &Layout, &Scaling),
+        config: &Config,
+        state: &DeviceState,
+        topology: &Topology,
+    ) -> Result<Self, GpuError> {
         let count = layout.tet_at.len();
         groups(gpu, "forces", count)?;
-        let corners = corners(body, layout);
-        let (starts, slots_of) = runs(&corners, layout.node_at.len());
-        let corners = Buffer::from_slice(gpu, "corners", &corners)?;
-        let slots_of = Buffer::from_slice(gpu, "slots", &slots_of)?;
-        let rows = Buffer::from_slice(gpu, "rows", &rows(body, layout))?;
+        let constants: Vec<([f32; 5], f32)> = layout.tet_at.iter().map(|&t| constants(body, scaling, t)).collect();
+        let rows = Buffer::from_slice(gpu, "rows", &rows(body, layout, &constants))?;
+        let more: Vec<[f32; 4]> = constants.iter().map(|(c, _)| [c[2], c[3], c[4], 0.0]).collect();
+        let wants_more = more.iter().any(|c| *c != [0.0; 4]);
+        let more = Buffer::from_slice(gpu, "more", if wants_more { &more } else { &[[0.0; 4]] })?;
+        let relaxes = !config.relaxation.is_none();
+        let memory = Buffer::<f32>::zeroed(gpu, "memory", if relaxes { 12 * count } else { 1 })?;
         let slots = Buffer::zeroed(gpu, "forces", 4 * count)?;
-        let wanted = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage, Slot::StorageMut];
-        let kernel = Kernel::new(gpu, "forces", TLED_FORCES, "main", &wanted)?;
-        let bindings = kernel.bind(
-            gpu,
-            &[
-                (&state.step).into(),
-                (&corners).into(),
-                (&slots_of).into(),
-                (&rows).into(),
-                (&state.u).into(),
-                (&slots).into(),
-            ],
-        )?;
-        let starts = Buffer::from_slice(gpu, "starts", &starts)?;
-        Ok(Self { kernel, bindings, count: count as u32, starts, slots })
+        let mut wanted = [Slot::Storage; 9];
+        (wanted[0], wanted[4], wanted[6], wanted[8]) =
+            (Slot::Uniform, Slot::StorageMut, Slot::StorageMut, Slot::Uniform);
+        let (mut laws, mut first) = (Vec::new(), 0u32);
+        for tets in layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b)) {
+            let range = Buffer::from_slice(gpu, "range", &[[first, tets.len() as u32, 0, 0]])?;
+            let text = text(body, tets[0], relaxes, config.cure_locking);
+            let kernel = Kernel::new(gpu, "forces", &text, "main", &wanted)?;
+            let bindings = kernel.bind(
+                gpu,
+                &[
+                    (&state.step).into(),
+                    (&topology.corners).into(),
+                    (&rows).into(),
+                    (&state.u).into(),
+                    (&slots).into(),
+                    (&more).into(),
+                    (&memory).into(),
+                    (&topology.swelling).into(),
+                    (&range).into(),
+                ],
+            )?;
+            laws.push(OfLaw { kernel, bindings, count: tets.len() as u32 });
+            first += tets.len() as u32;
+        }
+        Ok(Self { laws, rows, slots })
     }
 
     /// Adds the pass to a submission.
     pub fn dispatch(&self, to: &mut Dispatches) {
-        to.dispatch(&self.kernel, &self.bindings, [self.count.div_ceil(LANES), 1, 1]);
+        for law in &self.laws {
+            to.dispatch(&law.kernel, &law.bindings, [law.count.div_ceil(LANES), 1, 1]);
+        }
     }
 }
 
-/// Places of the corners, elements in the solver's order.
-fn corners(body: &Body, layout: &Layout) -> Vec<[u32; 4]> {
-    layout.tet_at.iter().map(|&t| body.mesh.tets[t as usize].map(|n| layout.place_of[n as usize])).collect()
-}
-
-/// Where the run of each place begins, and the slot of every corner.
-fn runs(corners: &[[u32; 4]], places: usize) -> (Vec<u32>, Vec<[u32; 4]>) {
-    let mut starts = vec![0u32; places + 1];
-    corners.iter().flatten().for_each(|&place| starts[place as usize + 1] += 1);
-    (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
-    let mut next = starts.clone();
-    let mut take = |place: u32| {
-        next[place as usize] += 1;
-        next[place as usize] - 1
+/// The kernel of a tetrahedron's law, with what the body needs.
+fn text(body: &Body, tet: u32, relaxes: bool, cures: bool) -> String {
+    let law = match body.material(tet as usize).law() {
+        Law::NeoHookean(_) => TLED_NEO_HOOKEAN,
+        Law::StVenantKirchhoff { .. } => TLED_ST_VENANT_KIRCHHOFF,
+        Law::MooneyRivlin { .. } => TLED_MOONEY_RIVLIN,
+        Law::Ogden { .. } => TLED_OGDEN,
     };
-    let slots = corners.iter().map(|tet| tet.map(&mut take)).collect();
-    (starts, slots)
+    format!("const RELAXES = {relaxes};\nconst CURES = {cures};\n{law}")
 }
 
-/// Three rows an element: the gradients of corners 1 to 3, and beside them μ V, κ V and ω² over stiffness at rest.
-fn rows(body: &Body, layout: &Layout) -> Vec<[f32; 4]> {
-    let of = |&t: &u32| {
-        let shape = body.shape(t as usize);
-        let material = body.material(t as usize);
-        let constants = NeoHookean::constants(&material.law(), shape.volume_mm3);
-        let omega2 = omega2_over_stiffness::<NeoHookean, 2>(&shape, material, &constants);
-        let beside = [constants[0], constants[1], omega2];
+/// A tetrahedron's constants, and its ω² over stiffness at rest.
+fn constants(body: &Body, scaling: &Scaling, tet: u32) -> ([f32; 5], f32) {
+    match body.material(tet as usize).law() {
+        Law::NeoHookean(_) => constants_of::<NeoHookean, 2>(body, scaling, tet),
+        Law::StVenantKirchhoff { .. } => constants_of::<StVenantKirchhoff, 2>(body, scaling, tet),
+        Law::MooneyRivlin { .. } => constants_of::<MooneyRivlin, 3>(body, scaling, tet),
+        Law::Ogden { .. } => constants_of::<Ogden, 5>(body, scaling, tet),
+    }
+}
+
+fn constants_of<M: Constitutive<K>, const K: usize>(body: &Body, scaling: &Scaling, tet: u32) -> ([f32; 5], f32) {
+    let (shape, material) = (body.shape(tet as usize), body.material(tet as usize));
+    let constants = M::constants(&material.law(), shape.volume_mm3);
+    let omega2 = omega2_over_stiffness::<M, K>(&shape, material, &constants) / scaling.factor(tet) as f32;
+    (std::array::from_fn(|k| constants.get(k).copied().unwrap_or(0.0)), omega2)
+}
+
+/// Three rows an element: the gradients of corners 1 to 3, and beside them two constants and ω² over stiffness at rest.
+fn rows(body: &Body, layout: &Layout, constants: &[([f32; 5], f32)]) -> Vec<[f32; 4]> {
+    let of = |(&t, (constants, omega2)): (&u32, &([f32; 5], f32))| {
+        let (shape, beside) = (body.shape(t as usize), [constants[0], constants[1], *omega2]);
         [0, 1, 2].map(|a| shape.gradients[a + 1].as_vec3().extend(beside[a]).to_array())
     };
-    layout.tet_at.iter().flat_map(of).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use trepan_soft::boxes;
-
-    #[test]
-    fn every_corner_owns_one_slot_in_the_run_of_its_node() {
-        let mesh = boxes::split_box([3, 2, 2], trepan_geometry::Vec3::splat(9.0));
-        let body = Body::uniform(mesh, vec![], trepan_soft::Material::BRAIN);
-        let layout = Layout::of(&body);
-        let corners = corners(&body, &layout);
-        let (starts, slots) = runs(&corners, layout.node_at.len());
-        let mut taken = vec![false; 4 * corners.len()];
-        for (&place, &slot) in corners.iter().flatten().zip(slots.iter().flatten()) {
-            assert!((starts[place as usize]..starts[place as usize + 1]).contains(&slot));
-            assert!(!std::mem::replace(&mut taken[slot as usize], true));
-        }
-        assert!(taken.iter().all(|t| *t));
-    }
+    layout.tet_at.iter().zip(constants).flat_map(of).collect()
 }

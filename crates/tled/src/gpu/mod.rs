@@ -1,12 +1,14 @@
-//! TLED on the graphics device: the same step as three compute passes, many steps to a submission.
+//! TLED on the graphics device: the same step as compute passes, many steps to a submission.
 //!
 //! # Theory
 //! ```text
+//! volumes  elements ──▶ change of volume                          (only where locking is cured)
+//! seats    change of volume ──▶ its mean around each node         (only where locking is cured)
 //! forces   elements ──▶ slots, one a corner, sorted by node
 //! press    touched nodes ──▶ forces of the contact springs       (only where something touches)
 //! update   slots ──▶ node, in their order; v⁺, u⁺
 //! ```
-//! No atomics and no order that depends on timing: the same input gives the same bytes on the same device. Against the processor's solver
+//! Every law, the cure of locking, Prony's relaxation and mass scaling are there, with the processor's arithmetic. No atomics and no order that depends on timing: the same input gives the same bytes on the same device. Against the processor's solver
 //! the difference is that of rounding, since drivers may fuse a multiplication and an addition.
 //!
 //! # Practice
@@ -30,16 +32,20 @@
 //! ```
 //!
 //! # When not to use it
-//! Small meshes (the processor needs 0.3 ms for 22 thousand tetrahedra), other laws than neo-Hookean, the locking cure, relaxation, and bodies
-//! without supports that are damped: these are refused with the field's name, and [`Tled`](crate::Tled) has them.
+//! Small meshes (the processor needs 0.3 ms for 22 thousand tetrahedra). Bodies without supports that are damped: they are refused with the field's name, and
+//! [`Tled`](crate::Tled) has them, as it has pressure on surfaces, moved nodes and [`settle`](crate::Tled::settle).
 
 mod device_state;
 mod forces;
 mod press;
+mod topology;
 mod update;
+mod volumes;
 
 use crate::config::Config;
 use crate::layout::Layout;
+use crate::scaling::Scaling;
+use crate::seats::Seats;
 use crate::tled::{BORNE, MOST_GAINED, NEARLY, damping_rate};
 use device_state::{DeviceState, Step};
 use forces::Forces;
@@ -47,9 +53,12 @@ use press::Press;
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_soft::{
-    Body, BodyError, ContactShares, Law, Loads, SoftSolver, StepBound, StepReport, lowest_frequency, power_bound_ms,
+    Body, BodyError, ContactShares, Loads, SoftSolver, StepBound, StepReport, Stiffness, lowest_frequency_of,
+    power_bound_of_ms,
 };
+use topology::Topology;
 use update::Update;
+use volumes::Volumes;
 
 /// Threads in a workgroup, as in the shaders.
 pub(crate) const LANES: u32 = 64;
@@ -80,6 +89,7 @@ pub struct GpuTled {
     gpu: Gpu,
     config: Config,
     state: DeviceState,
+    volumes: Option<Volumes>,
     forces: Forces,
     press: Press,
     update: Update,
@@ -91,6 +101,9 @@ pub struct GpuTled {
     damping_per_ms: f32,
     max_displacement_mm: f32,
     elements: u32,
+    seats: u32,
+    /// Since forces were computed last, ms.
+    elapsed_ms: f32,
     stiffest_at_rest: f32,
     stiffest: f32,
     contact_scale: f32,
@@ -105,25 +118,32 @@ impl GpuTled {
         body.check()?;
         config.check()?;
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
-        let damping_per_ms = damping_rate(body, config.damping, lowest_frequency(body).map(|w| w as f32), extent);
+        let scaling = Scaling::of(body, config.mass_scaling);
+        let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
+        let lowest_per_ms = lowest_frequency_of(body, &stiffness).map(|w| w as f32);
+        let damping_per_ms = damping_rate(body, config.damping, lowest_per_ms, extent);
         refuse(body, config, damping_per_ms)?;
-        let layout = Layout::of(body);
-        let state = DeviceState::new(gpu, body, &layout)?;
-        let forces = Forces::new(gpu, body, &layout, &state)?;
+        let (layout, cures) = (Layout::of(body), config.cure_locking);
+        let seats = Seats::of(body, &layout, cures);
+        let state = DeviceState::new(gpu, body, &layout, stiffness.masses_g())?;
+        let topology = Topology::new(gpu, body, &layout, &seats, cures)?;
+        let forces = Forces::new(gpu, (body, &layout, &scaling), config, &state, &topology)?;
+        let volumes = || Volumes::new(gpu, (body, &layout, &seats), &state, &topology, &forces);
         let press = Press::new(gpu, &state)?;
-        let stiffest = (0..body.mesh.tets.len())
-            .map(|t| trepan_soft::element_omega2(&body.shape(t), body.material(t)) as f32)
-            .fold(0.0, f32::max);
+        let stiffest = stiffest(body, &scaling);
         Ok(Self {
-            update: Update::new(gpu, &state, &forces, &press)?,
+            volumes: cures.then(volumes).transpose()?,
+            update: Update::new(gpu, &state, &topology, &forces, &press)?,
             gpu: gpu.clone(),
             config: *config,
             rest: body.mesh.positions.clone(),
             positions: body.mesh.positions.clone(),
             velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
-            bound_ms: power_bound_ms(body) as f32,
+            bound_ms: power_bound_of_ms(body, &stiffness) as f32,
             max_displacement_mm: config.max_displacement * extent,
             elements: body.mesh.tets.len() as u32,
+            seats: seats.place_of.len() as u32,
+            elapsed_ms: 0.0,
             stiffest_at_rest: stiffest,
             stiffest,
             contact_scale: 1.0,
@@ -191,18 +211,36 @@ impl GpuTled {
         self.stable_dt_ms().min(BORNE * self.bound_now_ms())
     }
 
+    /// The first of the steps lets past stress fade for as long as the last step took, where that was another length.
     fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
-        let step = self.numbers(loads, dt_ms);
-        self.state.step.write(&self.gpu, 0, &[step]);
-        let (mut left, presses) = (count, step.springs > 0);
-        if !presses {
+        let mut step = self.numbers(loads, dt_ms);
+        if step.springs == 0 {
             self.press.pressure.write(&self.gpu, 0, &[0.0]);
         }
+        let first = u32::from(self.elapsed_ms != dt_ms && !self.config.relaxation.is_none()).min(count);
+        for (elapsed_ms, count) in [(self.elapsed_ms, first), (dt_ms, count - first)] {
+            let [one, two] = self.config.relaxation.fade(elapsed_ms);
+            (step.fade_keep, step.fade_gain) = ([one.keep, two.keep], [one.gain, two.gain]);
+            self.state.step.write(&self.gpu, 0, &[step]);
+            self.run(count, step.springs > 0);
+        }
+        if count > 0 {
+            self.elapsed_ms = dt_ms;
+        }
+        self.submitted += count;
+    }
+
+    /// Submits steps by the numbers that the device has.
+    fn run(&self, count: u32, presses: bool) {
+        let mut left = count;
         while left > 0 {
             let now = left.min(STEPS_AT_ONCE);
             let mut recorder = self.gpu.record("tled");
             recorder.compute("tled", |to| {
                 for _ in 0..now {
+                    if let Some(volumes) = &self.volumes {
+                        volumes.dispatch(to);
+                    }
                     self.forces.dispatch(to);
                     if presses {
                         self.press.dispatch(to);
@@ -213,7 +251,6 @@ impl GpuTled {
             recorder.submit();
             left -= now;
         }
-        self.submitted += count;
     }
 
     /// The uniform of a step; hands the springs over.
@@ -229,7 +266,8 @@ impl GpuTled {
             springs: self.hand_over(loads, dt_ms),
             elements: self.elements,
             nodes: self.layout.node_at.len() as u32,
-            unused: 0,
+            seats: self.seats,
+            ..Step::default()
         }
     }
 
@@ -292,23 +330,20 @@ impl SoftSolver for GpuTled {
 
 /// Refuses what the kernels lack.
 fn refuse(body: &Body, config: &Config, damping_per_ms: f32) -> Result<(), GpuTledError> {
-    let unsupported = |field, right| Err(GpuTledError::Unsupported { field, right });
-    if !(0..body.mesh.tets.len()).all(|t| matches!(body.material(t).law(), Law::NeoHookean(_))) {
-        return unsupported("material", "neo-Hookean tissue");
-    }
-    if config.cure_locking {
-        return unsupported("cure_locking", "plain tetrahedra");
-    }
-    if !config.relaxation.is_none() {
-        return unsupported("relaxation", "elastic tissue");
-    }
-    if config.mass_scaling > 0.0 {
-        return unsupported("mass_scaling", "unscaled masses");
+    if config.still_mm > 0.0 {
+        return Err(GpuTledError::Unsupported { field: "still_mm", right: "every element in every step (0)" });
     }
     if damping_per_ms > 0.0 && !body.is_held() {
-        return unsupported("damping", "undamped bodies where no fixed nodes hold them");
+        let right = "undamped bodies where no fixed nodes hold them";
+        return Err(GpuTledError::Unsupported { field: "damping", right });
     }
     Ok(())
+}
+
+/// Largest ω² of an element at rest, 1/ms².
+fn stiffest(body: &Body, scaling: &Scaling) -> f32 {
+    let of = |t: usize| trepan_soft::element_omega2(&body.shape(t), body.material(t)) / scaling.factor(t as u32);
+    (0..body.mesh.tets.len()).map(of).fold(0.0, f64::max) as f32
 }
 
 /// Refuses more workgroups than the device runs at once.

@@ -3,6 +3,7 @@
 use crate::gpu::device_state::DeviceState;
 use crate::gpu::forces::Forces;
 use crate::gpu::press::Press;
+use crate::gpu::topology::Topology;
 use crate::gpu::{LANES, groups};
 use trepan_gpu::{Bindings, Dispatches, Gpu, GpuError, Kernel, Slot};
 use trepan_shaders::TLED_UPDATE;
@@ -15,7 +16,13 @@ pub(crate) struct Update {
 }
 
 impl Update {
-    pub fn new(gpu: &Gpu, state: &DeviceState, forces: &Forces, press: &Press) -> Result<Self, GpuError> {
+    pub fn new(
+        gpu: &Gpu,
+        state: &DeviceState,
+        topology: &Topology,
+        forces: &Forces,
+        press: &Press,
+    ) -> Result<Self, GpuError> {
         groups(gpu, "update", state.u.len())?;
         let mut wanted = [Slot::Storage; 8];
         wanted[0] = Slot::Uniform;
@@ -25,7 +32,7 @@ impl Update {
             gpu,
             &[
                 (&state.step).into(),
-                (&forces.starts).into(),
+                (&topology.starts).into(),
                 (&forces.slots).into(),
                 (&state.nodes).into(),
                 (&press.pushed).into(),

@@ -4,7 +4,7 @@
 //! The truth is the continuum's: quadratic tetrahedra ([`Order::Quadratic`]), where the middle of the free end comes to rest. The error is the distance from there as a share of the
 //! way. What counts as cost is the computing time from the first step to rest, [`SETTLE_MS`] of simulated time.
 
-use super::Scope;
+use super::{Scene, Scope};
 use crate::picture::{Chart, Mark};
 use crate::suite::{Findings, Gate, Row};
 use std::time::Instant;
@@ -27,8 +27,13 @@ struct Point {
     error_percent: f64,
 }
 
+/// The front, and TLED beside the reference on the same mesh.
+pub fn scenes() -> Vec<Scene> {
+    vec![Box::new(front), Box::new(|scope, findings| same_mesh(scope.pick(4, 8), findings))]
+}
+
 /// Hangs the block by every solver.
-pub fn run(scope: Scope, findings: &mut Findings) {
+fn front(scope: Scope, findings: &mut Findings) {
     let (quick, mut points) = (scope.quick, Vec::new());
     let (truth, way) = if quick { continuum(4, findings) } else { continuum(8, findings) };
     for &across in scope.pick(&[2usize, 4][..], &[2, 4, 6, 8, 12, 16][..]) {
@@ -52,7 +57,6 @@ pub fn run(scope: Scope, findings: &mut Findings) {
         marks: points.iter().map(mark).collect(),
         ..Chart::default()
     });
-    same_mesh(scope.pick(4, 8), findings);
 }
 
 fn block(across: usize) -> (Body, usize) {

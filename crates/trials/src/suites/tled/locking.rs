@@ -10,7 +10,7 @@
 //! The continuum is that of `fixtures/fem/taylor_hood.py`: quadratic displacements and linear pressure, an independent code on its own meshes; the numbers of its meshes and the limit stand
 //! beside it.
 
-use super::Scope;
+use super::{Scene as Task, Scope};
 use crate::picture::{Chart, Mark};
 use crate::suite::{Findings, Gate, Row};
 use crate::timer::Samples;
@@ -38,7 +38,7 @@ struct Scene {
     truth: &'static [(f32, [f64; 3], [usize; 2])],
 }
 
-const SCENES: [Scene; 5] = [
+static SCENES: [Scene; 5] = [
     Scene {
         title: "cantilever 100 mm",
         mesh: |size| boxes::centred_box([40, size, size], Vec3::new(100.0, 20.0, 20.0)),
@@ -124,16 +124,19 @@ const SCENES: [Scene; 5] = [
     },
 ];
 
-/// Every scene with both elements.
-pub fn run(scope: Scope, findings: &mut Findings) {
-    for scene in SCENES {
-        for &(poisson, truth, sizes) in scene.truth {
-            let size = scope.pick(sizes[0], sizes[1]);
-            if size > 0 {
-                judge(&scene, poisson, DVec3::from_array(truth), size, findings);
-            }
-        }
-    }
+/// Every scene at every ν, with both elements.
+pub fn scenes(scope: Scope) -> Vec<Task> {
+    let of = |scene: &'static Scene| {
+        let sized = scene.truth.iter().map(move |&(poisson, truth, sizes)| (poisson, truth, scope.pick(sizes[0], sizes[1])));
+        sized.filter(|(.., size)| *size > 0).map(move |(poisson, truth, size)| -> Task {
+            Box::new(move |_, findings| judge(scene, poisson, DVec3::from_array(truth), size, findings))
+        })
+    };
+    SCENES.iter().flat_map(of).collect()
+}
+
+/// The chart of what was found.
+pub fn draw(findings: &mut Findings) {
     chart(
         "Force under a prescribed displacement: error over the time to rest, all scenes and ν",
         "force_error_percent",

@@ -1,6 +1,6 @@
 //! Motion: the frequency of a beam, the energy of one that nothing damps, and the rest that dynamic relaxation finds.
 
-use super::Scope;
+use super::{Scene, Scope};
 use crate::suite::{Findings, Gate, Row};
 use glam::DMat3;
 use trepan_geometry::{Vec3, units};
@@ -14,10 +14,8 @@ const CONVERGED_HZ: f64 = 1.7328;
 const BEAM_MM: Vec3 = Vec3::new(100.0, 20.0, 20.0);
 
 /// Every scene of motion.
-pub fn run(scope: Scope, findings: &mut Findings) {
-    frequency(scope, findings);
-    energy(findings);
-    relaxation(findings);
+pub fn scenes() -> Vec<Scene> {
+    vec![Box::new(frequency), Box::new(|_, findings| energy(findings)), Box::new(|_, findings| relaxation(findings))]
 }
 
 /// Linear tetrahedra are too stiff by the square of their size: plain ones on two meshes tell the limit, cured ones on the finer one are near it.

@@ -3,7 +3,7 @@
 //! # Theory
 //! `E I θ'' = -ρ g A (L - s) cos θ`, θ(0) = 0, θ'(L) = 0; shear and stretch, which it leaves out, are of the order `(r/L)²`. I and A are those of the mesh, whose section is a polygon.
 
-use super::Scope;
+use super::{Scene, Scope};
 use crate::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
 use trepan_soft::reference::{self, Order, Reference};
@@ -15,7 +15,11 @@ const RADIUS_MM: f32 = 5.0;
 const YOUNG_MPA: f32 = 1.0;
 
 /// Quadratic tetrahedra always; linear ones, which bend too stiffly, on two meshes in a full run.
-pub fn run(scope: Scope, findings: &mut Findings) {
+pub fn scenes() -> Vec<Scene> {
+    vec![Box::new(|_, findings| quadratic(findings)), Box::new(linear)]
+}
+
+fn quadratic(findings: &mut Findings) {
     let (body, along) = cylinder(2, 20);
     let config = reference::Config { order: Order::Quadratic, tolerance: 1e-6, ..reference::Config::default() };
     let mut solver = Reference::new(&body, &config).expect("the cylinder is held");
@@ -23,6 +27,9 @@ pub fn run(scope: Scope, findings: &mut Findings) {
     let error = judge("quadratic", &body, solver.positions()[along], findings);
     let name = "slender cylinder, quadratic tetrahedra: tip against the elastica, percent";
     findings.gates.push(Gate::at_most(name, if settled { error } else { f64::NAN }, 2.0));
+}
+
+fn linear(scope: Scope, findings: &mut Findings) {
     if !scope.quick {
         let errors = [(4, 80), (6, 120)].map(|(across, count)| {
             let (body, along) = cylinder(across, count);

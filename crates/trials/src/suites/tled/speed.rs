@@ -1,6 +1,6 @@
 //! What a step costs, as ratios in one run: kernels and options, an element over the size of the mesh, and more threads than a loaded machine has cores for.
 
-use super::Scope;
+use super::{Scene, Scope};
 use crate::suite::{Findings, Gate, Row};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -20,10 +20,8 @@ struct Run {
 }
 
 /// Every row.
-pub fn run(scope: Scope, findings: &mut Findings) {
-    kernels(scope, findings);
-    sizes(scope, findings);
-    loaded(scope, findings);
+pub fn scenes() -> Vec<Scene> {
+    vec![Box::new(kernels), Box::new(sizes), Box::new(loaded)]
 }
 
 fn block(cells: [usize; 3]) -> Body {

@@ -1,6 +1,6 @@
 //! Where solvers of this kind fail: the border, method by method, and what the recommended one does there.
 
-use super::Scope;
+use super::{Scene, Scope};
 use crate::picture::{Map, Outcome};
 use crate::suite::{Findings, Gate, Row};
 use trepan_contact::NodalContact;
@@ -12,20 +12,16 @@ use trepan_tled::{Config, Damping, Settling, Tled};
 const HELD: &str = "held_verdict";
 
 /// Every row of the map.
-pub fn run(scope: Scope, findings: &mut Findings) {
-    step_length(findings);
-    incompressible(findings);
-    stretched(findings);
-    inverted(findings);
-    hard_contact(findings);
-    stiffness_jump(findings);
-    slivers(findings);
-    drift(scope, findings);
-    draw(findings);
+pub fn scenes() -> Vec<Scene> {
+    let short =
+        [step_length as fn(&mut Findings), incompressible, stretched, inverted, hard_contact, stiffness_jump, slivers].map(|scene| -> Scene {
+            Box::new(move |_, findings| scene(findings))
+        });
+    short.into_iter().chain([Box::new(drift) as Scene]).collect()
 }
 
 /// One map for each run of scenes that were put to the same methods.
-fn draw(findings: &mut Findings) {
+pub fn draw(findings: &mut Findings) {
     let mut scenes: Vec<(&str, Vec<(&str, bool)>)> = Vec::new();
     for row in &findings.rows {
         let Some(held) = row.metrics.get(HELD) else { continue };

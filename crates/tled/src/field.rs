@@ -1,0 +1,59 @@
+//! Numbers that threads hand to each other between rounds, without a lock.
+//!
+//! # Theory
+//! Each number is written by one thread in a round and read by others in later ones; the counters that begin and end a round order them, so the numbers themselves are
+//! loaded and stored without any order, as plain memory is.
+
+use crate::block::Quad;
+use glam::Vec4;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
+
+/// Rows of four numbers.
+pub(crate) struct Field(Vec<[AtomicU64; 2]>);
+
+/// Single numbers.
+pub(crate) struct Scalars(Vec<AtomicU32>);
+
+impl Field {
+    pub fn zeroed(len: usize) -> Self {
+        Self((0..len).map(|_| Default::default()).collect())
+    }
+
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    #[inline(always)]
+    pub fn get(&self, at: usize) -> Quad {
+        let [a, b] = &self.0[at];
+        bytemuck::cast([a.load(Relaxed), b.load(Relaxed)])
+    }
+
+    #[inline(always)]
+    pub fn set(&self, at: usize, row: Quad) {
+        let ([a, b], [x, y]) = (&self.0[at], bytemuck::cast::<Quad, [u64; 2]>(row));
+        a.store(x, Relaxed);
+        b.store(y, Relaxed);
+    }
+
+    #[inline(always)]
+    pub fn vector(&self, at: usize) -> Vec4 {
+        Vec4::from_array(self.get(at))
+    }
+}
+
+impl Scalars {
+    pub fn zeroed(len: usize) -> Self {
+        Self((0..len).map(|_| AtomicU32::default()).collect())
+    }
+
+    #[inline(always)]
+    pub fn get(&self, at: usize) -> f32 {
+        f32::from_bits(self.0[at].load(Relaxed))
+    }
+
+    #[inline(always)]
+    pub fn set(&self, at: usize, value: f32) {
+        self.0[at].store(value.to_bits(), Relaxed);
+    }
+}
