@@ -32,13 +32,13 @@ fn largest_eigenvalue(c: mat3x3f) -> f32 {
 }
 
 // How stiff the element is now, as in the processor's stiffness.rs; `m` is μ V and κ V.
-fn stiffness(stress: Stress, m: vec2f, d: Deformation) -> f32 {
+fn stiffness(stress: Stress, m: vec2f, d: Deformation, swollen: f32) -> f32 {
     let s = stress.s;
     let off = abs(s[3]) + abs(s[4]) + abs(s[5]);
     let inverse = d.root * d.root * d.root;
     let i1 = dot(d.f[0], d.f[0]) + dot(d.f[1], d.f[1]) + dot(d.f[2], d.f[2]);
     let volume = m.y + 5.0 / 9.0 * m.x * i1 * (inverse * inverse * d.root * d.root);
-    let turning = abs(stress.q + m.y * (d.j - 1.0)) * sqrt(i1);
+    let turning = abs(stress.q + m.y * swollen) * sqrt(i1);
     return abs(s[0]) + abs(s[1]) + abs(s[2]) + off + off + volume * largest_eigenvalue(d.cof) + turning;
 }
 
@@ -75,13 +75,13 @@ fn pressed(stress: Stress, f: vec3f, c: vec3f) -> vec3f {
     let constants = array<f32, 5>(d.a.w, d.b.w, more_of(e).x, more_of(e).y, more_of(e).z);
     let m = moduli(constants);
     var found = stress(constants, d);
-    let omega2 = d.c.w * stiffness(found, m, d);
-    if RELAXES { found = relaxed(e, found, d); }
     var swollen = d.j - 1.0;
     if CURES {
         let seat = corners[2u * now.elements + e];
         swollen = (swelling[seat.x] + swelling[seat.y] + swelling[seat.z] + swelling[seat.w]) * 0.25;
     }
+    let omega2 = d.c.w * stiffness(found, m, d, swollen);
+    if RELAXES { found = relaxed(e, found, d); }
     found.q += m.y * swollen;
     let p0 = pressed(found, d.f[0], d.cof[0]);
     let p1 = pressed(found, d.f[1], d.cof[1]);

@@ -8,7 +8,8 @@
 //! ```text
 //! row_c = q_c Σᵢ |w_ci| sᵢ/mᵢ     sᵢ = Σ_d |w_di|, all springs on node i     share_c = min(1, (4 - dt² ω_max²)/row_c)
 //! ```
-//! Springs that share no node do not weaken each other; for a single one the bound is exact.
+//! Springs that share no node do not weaken each other; for a single one the bound is exact. A solver that cuts its step while elements are compressed gives the bound of its uncut step too: a share
+//! that rose with the compression would push back harder than it was pushed, and so swing for ever.
 //!
 //! # Practice
 //! 5 ns for each node of each spring. Nodes outside the mesh are left out.
@@ -41,24 +42,26 @@ impl ContactShares {
         Self { load_of_node: vec![0.0; nodes] }
     }
 
-    /// Gives each spring's stable share of its stiffness and damping to `each`. `inverse_mass` gives 1/m of a node, 1/g, 0 when it is fixed.
+    /// Gives each spring's share of its stiffness and damping that is stable under all `bounds` to `each`. `inverse_mass` gives 1/m of a node, 1/g, 0 when it is fixed.
     pub fn each(
         &mut self,
         springs: &[NodalContact],
-        bound: StepBound,
+        bounds: &[StepBound],
         inverse_mass: impl Fn(u32) -> f32,
         mut each: impl FnMut(&NodalContact, f32),
     ) {
         self.load(springs, |sum, weight| *sum += weight.abs());
-        let StepBound { dt_ms, omega2 } = bound;
-        let room = (LIMIT - dt_ms * dt_ms * omega2).max(0.0);
         for spring in springs {
             let row = |(n, w): (u32, f32)| {
                 self.load_of_node.get(n as usize).map_or(0.0, |sum| w.abs() * sum * inverse_mass(n))
             };
             let compliance: f32 = spring.nodes().map(row).sum();
-            let wanted = (spring.stiffness * dt_ms + 2.0 * spring.damping) * dt_ms * compliance;
-            each(spring, if wanted > room { room / wanted } else { 1.0 });
+            let share = |&StepBound { dt_ms, omega2 }: &StepBound| {
+                let room = (LIMIT - dt_ms * dt_ms * omega2).max(0.0);
+                let wanted = (spring.stiffness * dt_ms + 2.0 * spring.damping) * dt_ms * compliance;
+                if wanted > room { room / wanted } else { 1.0 }
+            };
+            each(spring, bounds.iter().map(share).fold(1.0, f32::min));
         }
         self.load(springs, |sum, _| *sum = 0.0);
     }
@@ -75,14 +78,14 @@ impl ContactShares {
     pub fn press(
         &mut self,
         springs: &[NodalContact],
-        bound: StepBound,
+        bounds: &[StepBound],
         inverse_mass: impl Fn(u32) -> f32,
         state: [&[Vec3]; 2],
         report: &mut StepReport,
         mut add: impl FnMut(u32, Vec3),
     ) {
         report.contact_n = 0.0;
-        self.each(springs, bound, inverse_mass, |spring, share| {
+        self.each(springs, bounds, inverse_mass, |spring, share| {
             report.contact_scale = report.contact_scale.min(share);
             report.contact_n += press(spring, share, state, &mut add);
         });
@@ -123,7 +126,7 @@ mod tests {
     fn shares(springs: &[NodalContact], omega2: f32, dt_ms: f32, inverse_mass: f32) -> Vec<f32> {
         let mut shares = Vec::new();
         let mut sums = ContactShares::of_nodes(8);
-        sums.each(springs, StepBound { dt_ms, omega2 }, |_| inverse_mass, |_, share| shares.push(share));
+        sums.each(springs, &[StepBound { dt_ms, omega2 }], |_| inverse_mass, |_, share| shares.push(share));
         assert!(sums.load_of_node.iter().all(|&sum| sum == 0.0));
         shares
     }

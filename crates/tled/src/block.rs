@@ -127,7 +127,7 @@ pub(crate) fn omega2_over_stiffness<M: Constitutive<K>, const K: usize>(
     constants: &[f32; K],
 ) -> f32 {
     let rest = deformation(&[[0.0; 3]; 3], &[[0.0; 3]; 3]);
-    let at_rest = stiffness(&M::stress(constants, &rest), M::moduli(constants), &rest);
+    let at_rest = stiffness(&M::stress(constants, &rest), M::moduli(constants), &rest, 0.0);
     (element_omega2(shape, material) / f64::from(at_rest)) as f32
 }
 
@@ -141,12 +141,12 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 let (gradients, constants) = (block.gradients::<L>(part), load::<L, K>(&block.constants, part));
                 let d = deformation(&moved.edges, &gradients);
                 let mut stress = M::stress(&constants, &d);
-                let omega2 = L::load(&block.omega2, part) * stiffness(&stress, M::moduli(&constants), &d);
+                let swelling = if self.cure_locking { moved.mean } else { d.j - L::splat(1.0) };
+                let omega2 = L::load(&block.omega2, part) * stiffness(&stress, M::moduli(&constants), &d, swelling);
                 stiffest = omega2.larger(stiffest);
                 if T > 0 {
                     relax::<L, T>(&mut stress, &d.inverse_green(), memory, &self.fade, part);
                 }
-                let swelling = if self.cure_locking { moved.mean } else { d.j - L::splat(1.0) };
                 stress.q = stress.q + M::moduli(&constants).1 * swelling;
                 let [f1, f2, f3] = forces(&stress, M::ROUND && T == 0, &d, &gradients);
                 let zero = L::splat(0.0);

@@ -32,8 +32,8 @@ pub struct Config {
     pub cure_locking: bool,
     /// Stress that fades while the tissue is held.
     pub relaxation: Relaxation,
-    /// How far a node may get from where it was when the forces of the elements around it were found, before they are found anew, mm; 0 = every element in every step. Where a
-    /// tool touches a small part of a body at rest, the rest then costs a tenth. Elements are left out by the thousand, forces are wrong by no more than what a motion of this size does.
+    /// Where no node of some thousand neighbouring elements gets further than this in 50 ms, mm, they fall asleep until one does; 0 = every element in every step. What sleeps costs a
+    /// tenth; what creeps more slowly is stopped some such lengths from where it would rest. Not with `relaxation`, under which everything creeps.
     pub still_mm: f32,
     /// Threads that compute elements, 1 to 64, the caller among them; 1 starts none. The result has the same bits for any number. More than the
     /// cores that are free gains nothing.
@@ -103,6 +103,13 @@ impl Config {
         }
         if !(self.still_mm >= 0.0 && self.still_mm.is_finite()) {
             return refuse("still_mm", self.still_mm, "at least 0 and finite; 0.001 mm is not felt");
+        }
+        if self.still_mm > 0.0 && !self.relaxation.is_none() {
+            return refuse(
+                "still_mm",
+                self.still_mm,
+                "0 where relaxation is not NONE: tissue that relaxes never rests",
+            );
         }
         self.relaxation.check()?;
         if !(1..=64).contains(&self.threads) {

@@ -6,7 +6,7 @@ use crate::handed::Handed;
 use crate::kernel::Found;
 use crate::layout::{Layout, kind};
 use crate::nodes::{Nodes, Update};
-use crate::part::{Forcing, Own, Part};
+use crate::part::{Forcing, Own, Part, Quiet};
 use crate::relaxation::Relaxation;
 use crate::scaling::Scaling;
 use crate::seats::Seats;
@@ -52,25 +52,29 @@ impl Elements {
         self.team.nodes()
     }
 
-    /// Both passes over the elements.
+    /// Both passes over the elements, `dt_ms` after the last time.
     pub fn compute(&mut self, dt_ms: f32) -> Found {
-        self.average_volumes();
+        self.average_volumes(dt_ms);
         self.find_forces(dt_ms)
     }
 
-    /// Computes every element's forces from the nodes' displacements, `dt_ms` after the last time.
+    /// Computes every element's forces from the nodes' displacements.
     pub fn find_forces(&mut self, dt_ms: f32) -> Found {
-        let (relaxation, cure_locking, still_mm) = (self.relaxation, self.cure_locking, self.still_mm);
-        self.team.compute(Work::Forces(Forcing { dt_ms, relaxation, cure_locking, still_mm }));
+        let (fade, cure_locking) = (self.relaxation.fade(dt_ms), self.cure_locking);
+        self.team.compute(Work::Forces(Forcing { fade, cure_locking, quiet: self.quiet(dt_ms) }));
         self.team.found()
     }
 
     /// Averages the volume change by seat, where locking is cured.
-    pub fn average_volumes(&mut self) {
+    pub fn average_volumes(&mut self, dt_ms: f32) {
         if self.cure_locking {
-            self.team.compute(Work::Volumes { still_mm: self.still_mm });
+            self.team.compute(Work::Volumes(self.quiet(dt_ms)));
             self.team.compute(Work::Average);
         }
+    }
+
+    fn quiet(&self, dt_ms: f32) -> Quiet {
+        Quiet { dt_ms, still_mm: self.still_mm }
     }
 
     /// Moves the nodes.
@@ -83,10 +87,17 @@ impl Elements {
         self.team.handed().force(place).truncate()
     }
 
-    /// Share of the elements whose forces were found in the last round.
-    pub fn stepped(&self) -> f32 {
-        let [all, stepped] = self.team.stepped();
-        stepped as f32 / all as f32
+    /// Share of the elements that are awake.
+    pub fn awake(&self) -> f32 {
+        let [all, awake] = self.team.awake();
+        awake as f32 / all as f32
+    }
+
+    /// Wakes all elements.
+    pub fn wake(&mut self) {
+        if self.still_mm > 0.0 {
+            self.team.wake();
+        }
     }
 
     /// Forgets past stress.

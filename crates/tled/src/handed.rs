@@ -15,7 +15,7 @@ use std::ops::Range;
 
 /// The slots and what is in them.
 pub(crate) struct Handed {
-    /// By slot: force of a part's elements on a node, N.
+    /// By slot: force of a part's elements on a node, N, and 1 where the part sleeps.
     pub sums: Field,
     /// By slot: a quarter of the volume change of a part's elements around a seat, mm³; empty where locking is not cured, and so are the next two.
     pub shares: Scalars,
@@ -52,7 +52,7 @@ impl Handed {
         (handed, slots)
     }
 
-    /// Force of the elements on the node at `place`, N.
+    /// Force of the elements on the node at `place`, N, and how many of the parts around it sleep.
     #[inline(always)]
     pub fn force(&self, place: usize) -> Vec4 {
         let slots = self.of_places[place] as usize..self.of_places[place + 1] as usize;

@@ -2,10 +2,10 @@
 //!
 //! # Practice
 //! State is kept as displacement from rest, by place in the solver's order: f32 displacements of a few mm are a thousand times finer than
-//! positions of 200 mm. Any thread moves any run of nodes: what a node becomes depends on itself and its slots only.
+//! positions of 200 mm. A node beside a sleeping part stays until something pushes it. Any thread moves any run of nodes: what a node becomes depends on itself and its slots only.
 
 use crate::damping::RigidMotion;
-use crate::field::Field;
+use crate::field::{Field, Scalars};
 use crate::handed::Handed;
 use crate::layout::Layout;
 use glam::Vec4;
@@ -22,6 +22,8 @@ pub(crate) struct Nodes {
     v: Field,
     /// Forces from outside, N; cleared by the update.
     external: Field,
+    /// 1 where a load, or an awake part beside a sleeping one, pushed in the last step: no part around it may sleep.
+    pub pushed: Scalars,
     /// 1/m, 1/g; 0 for fixed nodes.
     pub inverse_mass: Vec<f32>,
     /// Share of the mass that has weight.
@@ -41,6 +43,8 @@ pub(crate) struct Update {
     pub max_speed: f32,
     pub max_displacement_mm: f32,
     pub rigid: Option<RigidMotion>,
+    /// Nodes beside a sleeping part stay where they are while a step would not move them further than this from rest, mm.
+    pub calm_mm: f32,
 }
 
 impl Nodes {
@@ -53,6 +57,7 @@ impl Nodes {
             u: field(),
             v: field(),
             external: field(),
+            pushed: Scalars::zeroed(layout.node_at.len()),
             inverse_mass: layout.node_at.iter().map(inverse).collect(),
             weight: layout.node_at.iter().map(|&n| (weights[n as usize] / masses[n as usize]) as f32).collect(),
             rest: layout.node_at.iter().map(|&n| body.mesh.positions[n as usize].extend(0.0)).collect(),
@@ -76,8 +81,20 @@ impl Nodes {
                 self.external.set(place, [0.0; 4]);
                 continue;
             }
-            let force = handed.force(place) + self.external.vector(place);
-            let pull = gravity * self.weight[place] + force * inverse_mass;
+            let (mut force, external) = (handed.force(place), self.external.vector(place));
+            let is_beside_sleepers = force.w > 0.0;
+            force.w = 0.0;
+            let pull = gravity * self.weight[place] + (force + external) * inverse_mass;
+            let mut is_pushed = external != Vec4::ZERO;
+            if is_beside_sleepers {
+                is_pushed |= pull.length() * dt_ms * dt_ms > update.calm_mm;
+                if !is_pushed {
+                    self.pushed.set(place, 0.0);
+                    self.v.set(place, [0.0; 4]);
+                    continue;
+                }
+            }
+            self.pushed.set(place, if is_pushed { 1.0 } else { 0.0 });
             let carried = match update.rigid {
                 Some(rigid) => {
                     let whole = rigid.at((self.rest[place] + u).truncate()).extend(0.0);

@@ -9,8 +9,8 @@
 //! places ──copy──▶ part: u ──elements──▶ part: sums ──put──▶ slots ──gather──▶ places
 //! ```
 //!
-//! A part whose nodes all stay within a limit of where they were when its forces were found keeps these forces, as every element's are a function of where its nodes are: so only
-//! what moves is computed, to the edge of the motion and not further. Nodes go on being moved everywhere, so nothing is cut loose.
+//! A part whose nodes all stay within a tenth of a limit for [`DOZE_MS`] falls asleep: its elements keep their forces, and its nodes are held. It wakes when something pushes one of them: a load, or an
+//! awake part beside it. So what is awake has a guard ring, the held nodes at its edge, and what holds still does no work.
 //!
 //! # Practice
 //! Copies and sums of a part are 10 kB: they stay in the fastest cache while its elements stream by.
@@ -22,8 +22,8 @@ use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhof
 use crate::nodes::Nodes;
 use crate::relaxation::{Fade, Relaxation};
 use crate::scaling::Scaling;
+use glam::Vec4;
 use std::marker::PhantomData;
-use trepan_geometry::Vec3;
 use trepan_soft::{Body, Law};
 
 /// Some elements and what they last added to their nodes.
@@ -40,22 +40,30 @@ pub(crate) struct Part {
     /// What its last force pass noticed.
     pub found: Found,
     tets: usize,
-    /// Since its forces were found, ms; `None` where they must be.
-    elapsed_ms: Option<f32>,
-    /// Whether its change of volume was found anew since its forces were.
-    stirred: bool,
-    /// Largest gradient of a shape function: the most strain that a mm of motion is, 1/mm.
-    strain_per_mm: f32,
+    /// Where its nodes were when it last stirred, and how long ago that is, ms; asleep over [`DOZE_MS`].
+    anchor: Vec<Quad>,
+    quiet_ms: f32,
 }
+
+/// How long nothing may move before a part falls asleep, ms.
+const DOZE_MS: f32 = 50.0;
+/// Share of the limit in which it must stay to fall asleep: less than what wakes it, so that one part's waking does not keep its neighbours up.
+pub(crate) const CALM: f32 = 0.1;
 
 /// How a round of forces goes.
 #[derive(Clone, Copy)]
 pub(crate) struct Forcing {
+    pub fade: [Fade; 2],
+    pub cure_locking: bool,
+    pub quiet: Quiet,
+}
+
+/// When a part falls asleep.
+#[derive(Clone, Copy)]
+pub(crate) struct Quiet {
     /// Since the last round, ms.
     pub dt_ms: f32,
-    pub relaxation: Relaxation,
-    pub cure_locking: bool,
-    /// How far a node may get before its elements' forces are found anew, mm.
+    /// How far a node of a part at rest may get, mm; 0 = no part sleeps.
     pub still_mm: f32,
 }
 
@@ -98,66 +106,75 @@ impl Part {
             shares: vec![0.0; seats.len()],
             found: Found::default(),
             tets: tets.len(),
-            elapsed_ms: None,
-            stirred: false,
-            strain_per_mm: tets.iter().map(|&t| steepest(body, t)).fold(0.0, f32::max),
+            anchor: vec![[0.0; 4]; seats.len()],
+            quiet_ms: 0.0,
             seats,
             places,
             slots,
         }
     }
 
-    /// Finds the elements' change of volume, unless their nodes rest.
-    pub fn volumes(&mut self, kernel: Kernel, still_mm: f32, nodes: &Nodes, handed: &Handed) {
-        if self.elapsed_ms.is_some() && self.nodes_rest(still_mm, nodes) {
+    /// Finds the elements' change of volume, unless they sleep.
+    pub fn volumes(&mut self, kernel: Kernel, quiet: Quiet, nodes: &Nodes, handed: &Handed) {
+        if self.sleeps_on(quiet, nodes) {
             return;
         }
-        self.stirred = true;
         self.copy(nodes);
         self.shares.fill(0.0);
         self.group.volumes(kernel, &self.u, &mut self.shares);
         self.slots.iter().zip(&self.shares).for_each(|(&slot, &share)| handed.shares.set(slot as usize, share));
     }
 
-    /// Finds the elements' forces, unless nothing changed; where locking is cured after their change of volume was averaged.
+    /// Finds the elements' forces, unless they sleep; where locking is cured after their change of volume was averaged. The fourth number of what a part that falls asleep hands
+    /// over is 1.
     pub fn forces(&mut self, kernel: Kernel, how: &Forcing, nodes: &Nodes, handed: &Handed) {
-        self.elapsed_ms = self.elapsed_ms.map(|elapsed_ms| elapsed_ms + how.dt_ms);
-        let may_rest = self.elapsed_ms.is_some_and(|elapsed_ms| elapsed_ms <= how.relaxation.brief_ms());
-        if may_rest && self.rests(how, nodes, handed) {
+        let sleeps_on =
+            if how.cure_locking { self.quiet_ms == f32::INFINITY } else { self.sleeps_on(how.quiet, nodes) };
+        if sleeps_on {
             return;
         }
-        let fade = how.relaxation.fade(self.elapsed_ms.unwrap_or(0.0));
-        (self.elapsed_ms, self.stirred) = (Some(0.0), false);
         if how.cure_locking {
             self.u.iter_mut().zip(&self.seats).for_each(|(u, &seat)| u[3] = handed.swelling.get(seat as usize));
         } else {
             self.copy(nodes);
         }
         self.sums.fill([0.0; 4]);
-        self.found = self.group.forces(kernel, fade, how.cure_locking, &self.u, &mut self.sums);
+        self.found = self.group.forces(kernel, how.fade, how.cure_locking, &self.u, &mut self.sums);
+        if self.quiet_ms > DOZE_MS {
+            self.quiet_ms = f32::INFINITY;
+            self.sums.iter_mut().for_each(|sum| sum[3] = 1.0);
+        }
         self.slots.iter().zip(&self.sums).for_each(|(&slot, &sum)| handed.sums.set(slot as usize, sum));
     }
 
-    /// How many elements it has, and of how many the forces were found in the last round.
-    pub fn stepped(&self) -> [usize; 2] {
-        [self.tets, if self.elapsed_ms == Some(0.0) { self.tets } else { 0 }]
+    /// How many elements it has, and how many of them are awake.
+    pub fn awake(&self) -> [usize; 2] {
+        [self.tets, if self.quiet_ms == f32::INFINITY { 0 } else { self.tets }]
     }
 
-    /// Whether everything that forces depend on is where it was when they were found.
-    fn rests(&self, how: &Forcing, nodes: &Nodes, handed: &Handed) -> bool {
-        if !how.cure_locking {
-            return self.nodes_rest(how.still_mm, nodes);
+    /// Wakes it.
+    pub fn wake(&mut self) {
+        self.quiet_ms = 0.0;
+    }
+
+    /// Looks whether the nodes are still quiet; gives whether the part fell asleep before and sleeps on.
+    fn sleeps_on(&mut self, quiet: Quiet, nodes: &Nodes) -> bool {
+        if quiet.still_mm == 0.0 {
+            return false;
         }
-        let most = how.still_mm * self.strain_per_mm;
-        let as_before = |(u, &seat): (&Quad, &u32)| (handed.swelling.get(seat as usize) - u[3]).abs() <= most;
-        how.still_mm > 0.0 && !self.stirred && self.u.iter().zip(&self.seats).all(as_before)
-    }
-
-    fn nodes_rest(&self, still_mm: f32, nodes: &Nodes) -> bool {
-        let near = |(&[x, y, z, _], &place): (&Quad, &u32)| {
-            nodes.displacement(place as usize).distance_squared(Vec3::new(x, y, z)) <= still_mm * still_mm
+        let limit = if self.quiet_ms == f32::INFINITY { quiet.still_mm } else { CALM * quiet.still_mm };
+        let most = limit * limit;
+        let near = |(anchor, &place): (&Quad, &u32)| {
+            let moved = nodes.u.vector(place as usize) - Vec4::from_array(*anchor);
+            moved.length_squared() <= most && nodes.pushed.get(place as usize) == 0.0
         };
-        still_mm > 0.0 && self.u.iter().zip(&self.places).all(near)
+        if self.anchor.iter().zip(&self.places).all(near) {
+            self.quiet_ms += quiet.dt_ms;
+            return self.quiet_ms == f32::INFINITY;
+        }
+        self.anchor.iter_mut().zip(&self.places).for_each(|(to, &place)| *to = nodes.u.get(place as usize));
+        self.quiet_ms = 0.0;
+        false
     }
 
     fn copy(&mut self, nodes: &Nodes) {
@@ -167,13 +184,8 @@ impl Part {
     /// Forgets past stress.
     pub fn forget(&mut self) {
         self.group.forget();
-        self.elapsed_ms = None;
+        self.wake();
     }
-}
-
-/// Length of the longest gradient of a tetrahedron's shape functions, 1/mm.
-fn steepest(body: &Body, tet: u32) -> f32 {
-    body.shape(tet as usize).gradients.iter().map(|g| g.length()).fold(0.0, f64::max) as f32
 }
 
 /// The group for the law of these elements. Only the commonest law has a form without memory.

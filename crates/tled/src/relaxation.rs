@@ -56,12 +56,6 @@ impl Relaxation {
         }
     }
 
-    /// How long nothing fades that could be felt: a hundredth of the shortest time, ms.
-    pub(crate) fn brief_ms(&self) -> f32 {
-        let fading = (0..2).filter(|&i| self.share[i] > 0.0);
-        0.01 * fading.map(|i| self.time_ms[i]).fold(f32::INFINITY, f32::min)
-    }
-
     /// Factors for a step of `dt_ms`; the same bits on every machine.
     pub(crate) fn fade(&self, dt_ms: f32) -> [Fade; 2] {
         [0, 1].map(|i| {

@@ -83,7 +83,9 @@ impl Tled {
     /// Rayleigh's frequency of a change of state; `None` when nothing moved.
     fn frequency_between(&self, before: &[[Vec3; 3]], now: &[[Vec3; 3]]) -> Option<f32> {
         let (mut work, mut swung) = (0.0f64, 0.0f64);
-        for ((a, b), inverse) in before.iter().zip(now).zip(&self.elements.nodes().inverse_mass).filter(|(_, m)| **m > 0.0) {
+        for ((a, b), inverse) in
+            before.iter().zip(now).zip(&self.elements.nodes().inverse_mass).filter(|(_, m)| **m > 0.0)
+        {
             let moved = (b[0] - a[0]).as_dvec3();
             work -= moved.dot((b[2] - a[2]).as_dvec3());
             swung += moved.length_squared() / f64::from(*inverse);

@@ -1,8 +1,8 @@
 //! How much stiffer an element has become by its deformation: what the stable step is checked against while it runs.
 //!
 //! # Theory
-//! The tangent `∂P/∂F` of `P = F S + (q + κ (J-1)) C` is at most
-//! `A = Σ|S_ij| + (κ + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J-1)| √I₁`: the stress itself, the resistance to a change of volume, and its turning.
+//! The tangent `∂P/∂F` of `P = F S + (q + κ (J̄-1)) C` is at most
+//! `A = Σ|S_ij| + (κ + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J̄-1)| √I₁`: the stress itself, the resistance to a change of volume, and its turning.
 //! The largest eigenvalue of a symmetric 3×3 matrix B is at most `m + 2 p`, `m = tr B/3`, `p² = |B - m I|²/6`, and exactly that when two are equal.
 //! The element's ω² at rest grows by `A/A(rest)`.
 //!
@@ -15,7 +15,7 @@ use crate::law::{Deformation, Stress};
 
 /// A, times rest volume, from the isochoric stress and (μ V, κ V).
 #[inline(always)]
-pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &Deformation<L>) -> L {
+pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &Deformation<L>, swelling: L) -> L {
     let [xx, yy, zz, xy, xz, yz] = stress.s;
     let off = magnitude(xy) + magnitude(xz) + magnitude(yz);
     let itself = magnitude(xx) + magnitude(yy) + magnitude(zz) + off + off;
@@ -23,7 +23,7 @@ pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &De
     let power = inverse * inverse * d.root * d.root;
     let i1 = squared(&d.f[0]) + squared(&d.f[1]) + squared(&d.f[2]);
     let volume = kappa + L::splat(5.0 / 9.0) * mu * i1 * power;
-    let turning = magnitude(stress.q + kappa * (d.j - L::splat(1.0))) * i1.sqrt();
+    let turning = magnitude(stress.q + kappa * swelling) * i1.sqrt();
     itself + volume * largest_eigenvalue(&d.c) + turning
 }
 
@@ -70,7 +70,7 @@ mod tests {
             let d = deformation(&[[x[0], x[1], x[2]], [x[3], x[4], x[5]], [x[6], x[7], x[8]]], &unit);
             let law = Law::NeoHookean(trepan_soft::NeoHookean { mu: 1.0, kappa: 9.0 });
             let constants = NeoHookean::constants(&law, 1.0);
-            let bound = stiffness(&NeoHookean::stress(&constants, &d), NeoHookean::moduli(&constants), &d);
+            let bound = stiffness(&NeoHookean::stress(&constants, &d), NeoHookean::moduli(&constants), &d, d.j - 1.0);
             let f = DMat3::from_cols_array(&[
                 d.f[0][0], d.f[1][0], d.f[2][0], d.f[0][1], d.f[1][1], d.f[2][1], d.f[0][2], d.f[1][2], d.f[2][2],
             ].map(f64::from));

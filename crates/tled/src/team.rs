@@ -11,7 +11,7 @@
 use crate::handed::Handed;
 use crate::kernel::{Found, Kernel};
 use crate::nodes::{Nodes, Update};
-use crate::part::{Forcing, Part};
+use crate::part::{Forcing, Part, Quiet};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicIsize, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
@@ -31,8 +31,8 @@ pub(crate) struct Team {
 /// A round of work.
 #[derive(Clone, Copy)]
 pub(crate) enum Work {
-    /// The elements' changes of volume, but for those whose nodes keep this near, mm.
-    Volumes { still_mm: f32 },
+    /// The elements' changes of volume.
+    Volumes(Quiet),
     /// Their means around the nodes.
     Average,
     /// The elements' forces.
@@ -122,10 +122,15 @@ impl Team {
         self.shared.parts.iter().fold(Found::default(), add)
     }
 
-    /// How many elements there are, and of how many the forces were found in the last round.
-    pub fn stepped(&self) -> [usize; 2] {
+    /// How many elements there are, and how many of them are awake.
+    pub fn awake(&self) -> [usize; 2] {
         let add = |[a, b]: [usize; 2], [x, y]: [usize; 2]| [a + x, b + y];
-        self.shared.parts.iter().map(|part| lock(part).stepped()).fold([0; 2], add)
+        self.shared.parts.iter().map(|part| lock(part).awake()).fold([0; 2], add)
+    }
+
+    /// Wakes every part.
+    pub fn wake(&mut self) {
+        self.shared.parts.iter().for_each(|part| lock(part).wake());
     }
 
     /// Forgets past stress.
@@ -145,7 +150,7 @@ impl Drop for Team {
 impl Shared {
     fn tasks(&self, work: Work) -> usize {
         match work {
-            Work::Volumes { .. } | Work::Forces(_) => self.parts.len(),
+            Work::Volumes(_) | Work::Forces(_) => self.parts.len(),
             Work::Average => self.handed.seats().div_ceil(RUN),
             Work::Update(_) => self.nodes.u.len().div_ceil(RUN),
         }
@@ -183,7 +188,7 @@ impl Shared {
     fn task(&self, number: usize, work: Work) {
         let (nodes, handed, kernel) = (&self.nodes, &self.handed, self.kernel);
         match work {
-            Work::Volumes { still_mm } => lock(&self.parts[number]).volumes(kernel, still_mm, nodes, handed),
+            Work::Volumes(quiet) => lock(&self.parts[number]).volumes(kernel, quiet, nodes, handed),
             Work::Average => handed.average(run(number, handed.seats())),
             Work::Forces(how) => lock(&self.parts[number]).forces(kernel, &how, nodes, handed),
             Work::Update(update) => nodes.update(run(number, nodes.u.len()), handed, &update),

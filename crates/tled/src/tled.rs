@@ -4,6 +4,7 @@ use crate::config::{Config, Damping};
 use crate::elements::Elements;
 use crate::layout::Layout;
 use crate::nodes::{Nodes, Update};
+use crate::part::CALM;
 use crate::scaling::Scaling;
 use trepan_geometry::Vec3;
 use trepan_soft::{
@@ -32,6 +33,7 @@ pub struct Tled {
     stiffest_at_rest: f32,
     /// Since the elements' forces were computed last, ms.
     elapsed_ms: f32,
+    gravity: Vec3,
 }
 
 /// A pass of a step, by the name that it has on the device too.
@@ -85,6 +87,7 @@ impl Tled {
             config: *config,
             stiffest_at_rest: elements.compute(0.0).stiffest,
             elapsed_ms: 0.0,
+            gravity: Vec3::ZERO,
             elements,
             positions: body.mesh.positions.clone(),
             velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
@@ -115,9 +118,9 @@ impl Tled {
         self.mass_added
     }
 
-    /// Share of the elements whose forces the last step found anew; under 1 only with [`Config::still_mm`].
-    pub fn stepped_share(&self) -> f32 {
-        self.elements.stepped()
+    /// Share of the elements that are awake; under 1 only with [`Config::still_mm`].
+    pub fn awake_share(&self) -> f32 {
+        self.elements.awake()
     }
 
     /// Puts pressure on some triangles, from the next step on; those that name nodes outside the mesh are left out.
@@ -133,6 +136,7 @@ impl Tled {
         if let Some(&place) = self.layout.place_of.get(node as usize) {
             self.elements.nodes().set(place as usize, displacement, velocity);
             self.publish_one(place as usize);
+            self.elements.wake();
         }
     }
 
@@ -154,26 +158,31 @@ impl Tled {
     pub fn pass(&mut self, pass: Pass, loads: &Loads, dt_ms: f32) {
         let mut report = StepReport::default();
         match pass {
-            Pass::Volumes => self.elements.average_volumes(),
+            Pass::Volumes => self.elements.average_volumes(dt_ms),
             Pass::Forces => _ = self.elements.find_forces(dt_ms),
             Pass::Press => {
                 let omega2 = 4.0 / (self.bound_ms * self.bound_ms);
-                self.press(loads, StepBound { dt_ms, omega2 }, &mut report);
+                self.press(loads, &[StepBound { dt_ms, omega2 }], &mut report);
                 self.push();
             }
             Pass::Update => self.update(loads, dt_ms, &mut report),
         }
     }
 
-    /// One substep of at most `left_ms`; gives its length. As long as the elements bear as they are now, and of equal lengths while that stays.
-    fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
+    /// One substep of at most `left_ms` of a step of `whole_ms`; gives its length. As long as the elements bear as they are now, and of equal lengths while that stays.
+    fn substep(&mut self, loads: &Loads, left_ms: f32, whole_ms: f32, report: &mut StepReport) -> f32 {
+        if std::mem::replace(&mut self.gravity, loads.gravity) != loads.gravity {
+            self.elements.wake();
+        }
         let found = self.elements.compute(self.elapsed_ms);
         report.inverted = report.inverted.max(found.inverted);
         let bound_ms = self.bound_now_ms(found.stiffest);
         let longest = self.stable_dt_ms().min(BORNE * bound_ms);
         let dt_ms =
             if self.config.substeps == 0 { left_ms } else { left_ms / (left_ms / longest * NEARLY).ceil().max(1.0) };
-        self.press(loads, StepBound { dt_ms, omega2: 4.0 / (bound_ms * bound_ms) }, report);
+        let bound = |dt_ms: f32, bound_ms: f32| StepBound { dt_ms, omega2: 4.0 / (bound_ms * bound_ms) };
+        let uncut = bound(whole_ms.min(self.stable_dt_ms()), self.bound_ms);
+        self.press(loads, &[bound(dt_ms, bound_ms), uncut], report);
         self.push();
         self.update(loads, dt_ms, report);
         dt_ms
@@ -189,6 +198,7 @@ impl Tled {
             max_speed: self.config.max_speed,
             max_displacement_mm: self.max_displacement_mm,
             rigid,
+            calm_mm: CALM * self.config.still_mm,
         };
         self.elements.update(update);
         let [limited, non_finite] = self.elements.nodes().noticed();
@@ -228,11 +238,11 @@ impl Tled {
         self.bound_ms / gained.clamp(1.0, MOST_GAINED)
     }
 
-    fn press(&mut self, loads: &Loads, bound: StepBound, report: &mut StepReport) {
+    fn press(&mut self, loads: &Loads, bounds: &[StepBound], report: &mut StepReport) {
         let (nodes, state) = (self.elements.nodes(), [&self.positions[..], &self.velocities[..]]);
         let place = |n: u32| self.layout.place_of[n as usize] as usize;
         let add = |n: u32, force: Vec3| nodes.push(place(n), force);
-        self.shares.press(&loads.contacts, bound, |n| nodes.inverse_mass[place(n)], state, report, add);
+        self.shares.press(&loads.contacts, bounds, |n| nodes.inverse_mass[place(n)], state, report, add);
     }
 }
 
@@ -241,7 +251,7 @@ impl SoftSolver for Tled {
         let mut report = StepReport { contact_scale: 1.0, converged: true, ..StepReport::default() };
         let mut left_ms = dt_ms.max(0.0);
         while left_ms > 1e-5 * dt_ms && report.substeps < self.config.substeps.max(1) {
-            left_ms -= self.substep(loads, left_ms, &mut report);
+            left_ms -= self.substep(loads, left_ms, dt_ms, &mut report);
             report.substeps += 1;
         }
         report.skipped_ms = if left_ms > 1e-5 * dt_ms { left_ms } else { 0.0 };

@@ -90,8 +90,7 @@ fn the_device_agrees_with_the_processor_under_gravity_and_a_pressing_tool() {
 }
 
 const KIRCHHOFF: Material = Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 };
-const MOONEY: Material =
-    Material::MooneyRivlin { c10_mpa: 3e-4, c01_mpa: 2e-4, poisson: 0.45, density_g_mm3: 1e-3 };
+const MOONEY: Material = Material::MooneyRivlin { c10_mpa: 3e-4, c01_mpa: 2e-4, poisson: 0.45, density_g_mm3: 1e-3 };
 const TWO_TERMS: Material =
     Material::Ogden { shear_mpa: [6e-4, 3e-4], exponent: [-4.7, 2.5], poisson: 0.45, density_g_mm3: 1e-3 };
 
@@ -101,8 +100,8 @@ const FADING: Relaxation = Relaxation { share: [0.45, 0.365], time_ms: [20.0, 40
 /// Both solvers through the seam, pressed, then with another step length; gives how far apart they are as a share of the way, and the way.
 fn apart(gpu: &Gpu, body: &Body, config: &Config) -> (f32, f32) {
     let loads = loads(body);
-    let mut device = GpuTled::new(gpu, body, config).unwrap();
-    let mut cpu = Tled::new(body, config).unwrap();
+    let mut device = GpuTled::new(gpu, body, config).expect("the device has these");
+    let mut cpu = Tled::new(body, config).expect("the body is sound");
     for (share, steps) in [(2.9, 30), (1.0, 60), (0.7, 10)] {
         for _ in 0..steps {
             let dt = share * cpu.stable_dt_ms();
@@ -136,8 +135,13 @@ fn a_body_of_every_law_at_once_with_scaled_masses_agrees_too() {
     let mut body = body();
     body.materials = vec![Material::BRAIN, KIRCHHOFF, MOONEY, TWO_TERMS, Material::TUMOUR, Material::VENTRICLE];
     body.material_of_tet.iter_mut().enumerate().for_each(|(t, m)| *m = (t / 17 % 6) as u8);
-    let config =
-        Config { cure_locking: true, relaxation: FADING, mass_scaling: 0.01, balanced_gravity: Vec3::Z * 1e-3, ..config() };
+    let config = Config {
+        cure_locking: true,
+        relaxation: FADING,
+        mass_scaling: 0.01,
+        balanced_gravity: Vec3::Z * 1e-3,
+        ..config()
+    };
     let (apart, way) = apart(&gpu, &body, &config);
     println!("{apart:e} of {way} mm");
     assert!(way > 0.3 && apart <= 1e-4, "{apart} of {way} mm");

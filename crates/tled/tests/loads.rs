@@ -1,6 +1,7 @@
 //! Moving supports, pressure, dynamic relaxation and mass scaling against the f64 reference.
 
 use glam::DVec3;
+use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 use trepan_mesh::Surface;
 use trepan_soft::reference::{self, Reference};
@@ -24,6 +25,29 @@ fn exact(body: &Body, loads: &Loads, set: impl Fn(&mut Reference)) -> Vec<Vec3> 
     set(&mut reference);
     assert!(reference.step(loads, 1.0).converged);
     reference.positions().to_vec()
+}
+
+/// A share of the spring that rose when a pressed body cut its steps would push back harder than it was pushed.
+#[test]
+fn a_tool_that_presses_so_hard_that_steps_are_cut_comes_to_rest() {
+    let mesh = boxes::split_box([12, 8, 6], Vec3::new(48.0, 32.0, 24.0));
+    let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
+    let mut contact = NodalContact::none();
+    (contact.normal, contact.stiffness, contact.damping) = (Vec3::Z, 0.3, 0.05);
+    let under = Vec3::new(16.0, 16.0, 24.0);
+    boxes::nodes_where(&mesh, |p| p.distance(under) < 7.0 && p.z > 23.9).iter().for_each(|&n| contact.add(n, 1.0));
+    contact.normalise();
+    contact.offset_mm = 3.0 - 24.0;
+    let loads = Loads { contacts: contact.into(), ..Loads::default() };
+    for cure_locking in [false, true] {
+        let body = Body::uniform(mesh.clone(), fixed.clone(), Material::BRAIN);
+        let mut tled = Tled::new(&body, &Config { cure_locking, ..Config::default() }).unwrap();
+        let dt_ms = tled.stable_dt_ms();
+        let cut = (0..(1000.0 / dt_ms) as usize).filter(|_| tled.step(&loads, dt_ms).substeps > 1).count();
+        let fastest = tled.velocities().iter().map(|v| v.length()).fold(0.0, f32::max);
+        println!("cure {cure_locking}: {fastest:e} mm/ms, {cut} steps cut");
+        assert!(cut > 0 && fastest < 1e-4, "{cut} {fastest}");
+    }
 }
 
 #[test]

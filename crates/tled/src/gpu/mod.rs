@@ -50,13 +50,13 @@ use crate::tled::{BORNE, MOST_GAINED, NEARLY, damping_rate};
 use device_state::{DeviceState, Step};
 use forces::Forces;
 use press::Press;
+use topology::Topology;
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_soft::{
     Body, BodyError, ContactShares, Loads, SoftSolver, StepBound, StepReport, Stiffness, lowest_frequency_of,
     power_bound_of_ms,
 };
-use topology::Topology;
 use update::Update;
 use volumes::Volumes;
 
@@ -161,7 +161,7 @@ impl GpuTled {
     /// Submits `count` steps of the longest stable length under the same loads, and gives that length, ms. Does not wait.
     pub fn steps(&mut self, loads: &Loads, count: u32) -> f32 {
         let dt_ms = self.longest_ms();
-        self.submit(loads, dt_ms, count);
+        self.submit(loads, dt_ms, self.stable_dt_ms(), count);
         dt_ms
     }
 
@@ -212,8 +212,8 @@ impl GpuTled {
     }
 
     /// The first of the steps lets past stress fade for as long as the last step took, where that was another length.
-    fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
-        let mut step = self.numbers(loads, dt_ms);
+    fn submit(&mut self, loads: &Loads, dt_ms: f32, whole_ms: f32, count: u32) {
+        let mut step = self.numbers(loads, dt_ms, whole_ms);
         if step.springs == 0 {
             self.press.pressure.write(&self.gpu, 0, &[0.0]);
         }
@@ -254,7 +254,7 @@ impl GpuTled {
     }
 
     /// The uniform of a step; hands the springs over.
-    fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> Step {
+    fn numbers(&mut self, loads: &Loads, dt_ms: f32, whole_ms: f32) -> Step {
         let half = 0.5 * self.damping_per_ms * dt_ms;
         Step {
             gravity: (loads.gravity - self.config.balanced_gravity).to_array(),
@@ -263,7 +263,7 @@ impl GpuTled {
             gain: dt_ms / (1.0 + half),
             max_speed: self.config.max_speed,
             max_displacement: self.max_displacement_mm,
-            springs: self.hand_over(loads, dt_ms),
+            springs: self.hand_over(loads, dt_ms, whole_ms),
             elements: self.elements,
             nodes: self.layout.node_at.len() as u32,
             seats: self.seats,
@@ -272,16 +272,17 @@ impl GpuTled {
     }
 
     /// Gives the device the stable share of every spring; says how many there are.
-    fn hand_over(&mut self, loads: &Loads, dt_ms: f32) -> u32 {
+    fn hand_over(&mut self, loads: &Loads, dt_ms: f32, whole_ms: f32) -> u32 {
         let bound_ms = self.bound_now_ms();
-        let bound = StepBound { dt_ms, omega2: 4.0 / (bound_ms * bound_ms) };
+        let bound = |dt_ms: f32, bound_ms: f32| StepBound { dt_ms, omega2: 4.0 / (bound_ms * bound_ms) };
+        let bounds = [bound(dt_ms, bound_ms), bound(whole_ms.min(self.stable_dt_ms()), self.bound_ms)];
         let (place_of, masses) = (&self.layout.place_of, &self.state.inverse_mass);
         let at_rest = |n: u32| self.rest.get(n as usize).copied().unwrap_or_default();
         let list = &mut self.press.list;
         list.clear();
         self.shares.each(
             &loads.contacts,
-            bound,
+            &bounds,
             |n| masses[place_of[n as usize] as usize],
             |spring, share| {
                 self.contact_scale = self.contact_scale.min(share);
@@ -299,7 +300,7 @@ impl SoftSolver for GpuTled {
         let count = if most == 0 { 1.0 } else { needed.min(most as f32) };
         let each_ms = if most == 0 { dt_ms } else { dt_ms / needed };
         let before = self.submitted;
-        self.submit(loads, each_ms, count as u32);
+        self.submit(loads, each_ms, dt_ms, count as u32);
         match self.read() {
             Ok(mut report) => {
                 report.substeps -= before;

@@ -4,7 +4,8 @@
 //! What is driven by a prescribed displacement `u = d s(x)` is judged by the force that works with d, `Σ f·s` over the held nodes; what hangs, by where the middle of its free end goes.
 //!
 //! # Practice
-//! Meshes are centred boxes, as the mesher lays them. Settling with masses scaled until all elements have the same bound: only rest is wanted here.
+//! Meshes are centred boxes, as the mesher lays them, of a size at which cured elements are right; on finer ones plain elements get right too where ν is 0.49 (Cook's membrane: 4.3 % at
+//! 24 thousand tetrahedra). Settling with masses scaled until all elements have the same bound: only rest is wanted here.
 //!
 //! # Sources
 //! The continuum is that of `fixtures/fem/taylor_hood.py`: quadratic displacements and linear pressure, an independent code on its own meshes; the numbers of its meshes and the limit stand
@@ -57,7 +58,7 @@ static SCENES: [Scene; 5] = [
         travel_mm: 0.0,
         tip: Vec3::new(60.0, 10.0, 10.0),
         tolerance_mm: 0.2,
-        truth: &[(0.49, [-2.09, 0.0, -16.09], [6, 6]), (0.499, [-2.08, 0.0, -16.05], [0, 6])],
+        truth: &[(0.49, [-2.09, 0.0, -16.09], [6, 6]), (0.499, [-2.08, 0.0, -16.05], [0, 8])],
     },
     Scene {
         title: "block indented 5 mm",
@@ -101,7 +102,7 @@ static SCENES: [Scene; 5] = [
         tolerance_mm: 0.02,
         truth: &[
             (0.3, [0.0440, 0.0, 0.0], [8, 10]),
-            (0.49, [0.0438, 0.0, 0.0], [6, 10]),
+            (0.49, [0.0438, 0.0, 0.0], [6, 8]),
             (0.499, [0.0439, 0.0, 0.0], [0, 10]),
         ],
     },
@@ -127,7 +128,8 @@ static SCENES: [Scene; 5] = [
 /// Every scene at every ν, with both elements.
 pub fn scenes(scope: Scope) -> Vec<Task> {
     let of = |scene: &'static Scene| {
-        let sized = scene.truth.iter().map(move |&(poisson, truth, sizes)| (poisson, truth, scope.pick(sizes[0], sizes[1])));
+        let sized =
+            scene.truth.iter().map(move |&(poisson, truth, sizes)| (poisson, truth, scope.pick(sizes[0], sizes[1])));
         sized.filter(|(.., size)| *size > 0).map(move |(poisson, truth, size)| -> Task {
             Box::new(move |_, findings| judge(scene, poisson, DVec3::from_array(truth), size, findings))
         })
@@ -158,6 +160,9 @@ fn chart(title: &str, error: &str, findings: &mut Findings) {
     });
 }
 
+/// What hangs and is less compressible than this starts from where tissue of this ν comes to rest: most of the way in a fifth of the steps.
+const EASY: f32 = 0.49;
+
 /// The metric of cost.
 const COST: &str = "time_to_rest_ms";
 
@@ -186,10 +191,16 @@ fn off_percent(
     cure_locking: bool,
     findings: &mut Findings,
 ) -> f64 {
-    let (body, mut solver) = solver(scene, poisson, size, cure_locking);
     let hangs = scene.travel_mm == 0.0;
     let gravity = if hangs { Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2 } else { Vec3::ZERO };
     let (loads, start) = (Loads { gravity, ..Loads::default() }, Instant::now());
+    let (body, mut solver) = solver(scene, poisson, size, cure_locking);
+    if hangs && poisson > EASY {
+        let (easy, mut before) = self::solver(scene, EASY, size, cure_locking);
+        before.settle(&loads, &Settling { tolerance_mm: scene.tolerance_mm, steps: 30_000 });
+        let moved = before.positions().iter().zip(&easy.mesh.positions).map(|(x, rest)| *x - *rest);
+        moved.enumerate().for_each(|(n, u)| solver.set_node(n as u32, u, Vec3::ZERO));
+    }
     let settled = solver.settle(&loads, &Settling { tolerance_mm: scene.tolerance_mm, steps: 30_000 });
     let cost_ms = start.elapsed().as_secs_f64() * 1e3;
     let dt_ms = solver.stable_dt_ms();

@@ -6,17 +6,24 @@ use crate::suite::{Findings, Gate, Row};
 use trepan_contact::NodalContact;
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
-use trepan_tled::{Config, Damping, Settling, Tled};
+use trepan_tled::{Config, Damping, Relaxation, Settling, Tled};
 
 /// Whether a method held, 1 or 0.
 const HELD: &str = "held_verdict";
 
 /// Every row of the map.
 pub fn scenes() -> Vec<Scene> {
-    let short =
-        [step_length as fn(&mut Findings), incompressible, stretched, inverted, hard_contact, stiffness_jump, slivers].map(|scene| -> Scene {
-            Box::new(move |_, findings| scene(findings))
-        });
+    let short = [
+        step_length as fn(&mut Findings),
+        incompressible,
+        stretched,
+        inverted,
+        hard_contact,
+        stiffness_jump,
+        slivers,
+        extremes,
+    ]
+    .map(|scene| -> Scene { Box::new(move |_, findings| scene(findings)) });
     short.into_iter().chain([Box::new(drift) as Scene]).collect()
 }
 
@@ -258,6 +265,44 @@ fn slivers(findings: &mut Findings) {
             verdict(format!("sliver {height_mm} mm high"), method, healed == 0, true, bound, findings);
         }
     }
+}
+
+/// Settings at the ends of their ranges: a block that gravity pulls sideways all at once must neither burst nor swing for ever.
+fn extremes(findings: &mut Findings) {
+    let relaxing = |time_ms| Relaxation { share: [0.5, 0.0], time_ms: [time_ms, 1.0] };
+    let damped = |share| Config { damping: Damping::Critical(share), ..Config::default() };
+    let settings = [
+        ("damping a tenth of critical", damped(0.1), Material::BRAIN),
+        ("damping 100 times critical", damped(100.0), Material::BRAIN),
+        (
+            "relaxation within a thousandth of a step",
+            Config { relaxation: relaxing(5e-4), ..damped(1.0) },
+            Material::BRAIN,
+        ),
+        ("relaxation in a year", Config { relaxation: relaxing(3e10), ..damped(1.0) }, Material::BRAIN),
+        ("Ogden's exponent -4.7", damped(1.0), ogden(-4.7)),
+        ("Ogden's exponent -10", damped(1.0), ogden(-10.0)),
+        ("Ogden's exponent -25", damped(1.0), ogden(-25.0)),
+        ("Ogden's exponent 25", damped(1.0), ogden(25.0)),
+    ];
+    for (scene, config, material) in settings {
+        let body = cube(4, material);
+        let mut solver = solver(&body, config);
+        let loads = Loads { gravity: Vec3::X * units::GRAVITY_MM_PER_MS2, ..Loads::default() };
+        let (dt_ms, mut healed, mut furthest) = (solver.stable_dt_ms(), 0, 0.0f64);
+        for _ in 0..(3000.0 / dt_ms) as usize {
+            let report = solver.step(&loads, dt_ms);
+            healed += report.inverted + report.limited + report.non_finite;
+            furthest = furthest.max(offset(&solver, &body));
+        }
+        let held = healed == 0 && furthest < 20.0 && solver.velocities().iter().all(|v| v.length() < 0.05);
+        verdict(scene.into(), "tled", held, true, ("furthest_mm", furthest), findings);
+    }
+}
+
+/// Ogden's law with one term and the shear modulus of brain.
+fn ogden(exponent: f32) -> Material {
+    Material::Ogden { shear_mpa: [1.03e-3, 0.0], exponent: [exponent, 1.0], poisson: 0.45, density_g_mm3: 1e-3 }
 }
 
 /// Very many steps of a body that swings undamped and one that rests: f32 must not carry either away.
