@@ -10,7 +10,7 @@ use std::sync::Arc;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::{Faults, GpuError};
 use trepan_mesh::TetMesh;
-use trepan_render::{Camera, Frame, Image, Painter, ProcessorRenderer, RenderError, SceneData, SliceLook};
+use trepan_render::{Camera, Casting, Frame, Image, Painter, ProcessorRenderer, RenderError, SceneData, SliceLook};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
 /// A shell with a hole that shows the brain in it, and a burr at the hole.
@@ -108,6 +108,38 @@ fn a_ball_drawn_by_the_processor_is_a_ball() {
     assert!((seen / (std::f32::consts::PI * disc * disc) - 1.0).abs() < 0.03, "{seen} pixels");
     let nearest = renderer.bone_hits().iter().flatten().map(|h| h.distance_mm).fold(f32::MAX, f32::min);
     assert!((nearest - 100.0).abs() < 0.05, "{nearest}");
+}
+
+/// Specks of bone, some alone, seen from all sides, from far off, from the border and from among them: leaping, alone or as a beam for a tile, passes none.
+#[test]
+fn leaping_finds_what_walking_every_cell_finds() {
+    let mut random = fastrand::Rng::with_seed(4);
+    let mut ct = VoxelVolume::isotropic([70, 41, 33], Vec3::new(-40.0, 3.0, 7.0), 1.0, AIR_HU);
+    for _ in 0..300 {
+        let at = random.usize(0..ct.data.len());
+        ct.data[at] = 900;
+    }
+    let bone = Arc::new(BoneVolume::new(&ct, 400).unwrap());
+    let mut renderer = ProcessorRenderer::new(&alone(&bone), [52, 39]).unwrap();
+    let mut met = 0;
+    for n in 0..30 {
+        let towards = Vec3::new(random.f32() - 0.5, random.f32() - 0.5, random.f32() - 0.5);
+        let camera = Camera::viewed_from(bone.bounds().centre(), towards, [15.0, 45.0, 120.0][n % 3]);
+        let mut frame = Frame::of(camera);
+        frame.slices.shown = false;
+        let mut hits = [true, false].map(|leap| {
+            renderer.set_casting(Casting { leap, ..Casting::default() });
+            renderer.draw(&frame).unwrap();
+            renderer.bone_hits()
+        });
+        let [leapt, walked] = &mut hits;
+        met += walked.iter().flatten().count();
+        for (a, b) in leapt.iter().zip(walked.iter()) {
+            let far = a.map_or(f32::INFINITY, |hit| hit.distance_mm) - b.map_or(f32::INFINITY, |hit| hit.distance_mm);
+            assert!(a.is_some() == b.is_some() && (a.is_none() || far.abs() < 1e-3), "{a:?} is not {b:?}");
+        }
+    }
+    assert!(met > 500, "{met}");
 }
 
 #[test]

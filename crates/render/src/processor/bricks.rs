@@ -3,13 +3,16 @@
 use crate::bricks::{BLOCK, Grid, LEAP, Leaps, densities};
 use crate::recast::Recast;
 use crate::skull::{Followed, NOTHING};
-use glam::{IVec3, Vec3};
-use std::ops::Range;
+use glam::{BVec3A, IVec3, Vec3, Vec3A, Vec4};
+use std::array;
+use std::ops::{Add, Mul, Range, Sub};
 use std::sync::Arc;
 use trepan_volume::BoneVolume;
 
 const NUDGE: f32 = 1e-3;
 const MOST_STEPS: u32 = 8192;
+/// A beam that leaps less far than this, in voxels, has come near bone.
+const LEAST_LEAP: f32 = 0.5;
 
 /// How rays go through the bone. The default is what every picture is drawn with; the rest is there to be measured against it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,26 +90,42 @@ impl Bricks {
     }
 
     /// Continuous padded grid coordinates of a world point.
+    #[inline(always)]
     pub fn grid_of(&self, point: Vec3) -> Vec3 {
         (point - self.grid.origin) / self.grid.spacing_mm
     }
 
     /// HU at continuous padded grid coordinates, clamped at the border.
+    #[inline(always)]
     pub fn hu(&self, g: Vec3) -> f32 {
         trilinear(self.grid.dims, g, |at| f32::from(self.density[at]))
     }
 
     /// Unit normal out of the bone at a surface point that a ray `along` has met.
+    #[inline(always)]
     pub fn outward_normal(&self, g: Vec3, along: Vec3) -> Vec3 {
+        let (dims, strides) = (self.grid.dims, self.strides());
+        // Eight points, but only two places along each axis.
+        let pairs: [[(usize, f32); 2]; 3] =
+            array::from_fn(|n| [-1.6, 1.6].map(|by| between(g[n] + by, dims[n], strides[n])));
         let mut gradient = Vec3::ZERO;
         for i in 0..8 {
+            let place = [pairs[0][i & 1], pairs[1][i >> 1 & 1], pairs[2][i >> 2]];
             let corner = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - 1.0;
-            gradient += corner * self.hu(g + 1.6 * corner);
+            gradient += corner * mixed(place, strides, |at| f32::from(self.density[at]));
         }
         if gradient.length_squared() < 1e-6 { -along } else { -gradient.normalize() }
     }
 
+    /// Steps to the next value along each axis.
+    #[inline(always)]
+    fn strides(&self) -> [usize; 3] {
+        let [x, y, _] = self.grid.dims;
+        [1, x, x * y]
+    }
+
     /// Ambient light that reaches a surface point: little where bone crowds in front of it.
+    #[inline(always)]
     pub fn openness(&self, g: Vec3, normal: Vec3) -> f32 {
         let dark: f32 = (0..4)
             .map(|i| {
@@ -119,41 +138,72 @@ impl Bricks {
     }
 
     /// Whether bone stands between a surface point and the light.
+    #[inline(always)]
     pub fn shadowed(&self, g: Vec3, normal: Vec3, towards_light: Vec3) -> bool {
-        self.meet(g + 0.8 * normal, towards_light / self.grid.spacing_mm) < NOTHING
+        self.trace(g + 0.8 * normal, towards_light / self.grid.spacing_mm, 0.0).0 < NOTHING
     }
 
-    /// Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or [`NOTHING`].
-    fn meet(&self, o: Vec3, d: Vec3) -> f32 {
-        self.trace(o, d).0
+    /// Distance up to which no ray o + t·d' meets bone whose d' is nowhere further than `spread` from d; [`NOTHING`] where none ever does.
+    ///
+    /// From a brick the beam leaps to where its edges, o + t·(d ± spread), leave the free cube around it; what is outside the grid is free too.
+    pub fn clear(&self, o: Vec3, d: Vec3, spread: f32) -> f32 {
+        if !self.casting.leap {
+            return 0.0;
+        }
+        let (o, d) = (Vec3A::from(o), Vec3A::from(d));
+        let count = Vec3A::from(self.leaps.bricks.map(|n| n as f32));
+        let last = IVec3::from(self.leaps.bricks.map(|n| n as i32 - 1));
+        let (up, down) = (d + spread, d - spread);
+        // Where the edges meet planes; the beam passes no plane that it goes away from.
+        let reach = |at: Vec3A, edge: Vec3A, passes: BVec3A| {
+            Vec3A::select(passes, (LEAP as f32 * at - o) / edge, Vec3A::splat(NOTHING))
+        };
+        let end = reach(count, down, down.cmpgt(Vec3A::ZERO)).min(reach(Vec3A::ZERO, up, up.cmplt(Vec3A::ZERO)));
+        let (end, mut t) = (end.min_element(), 0.0);
+        for _ in 0..MOST_STEPS {
+            let brick = cell_in((o + d * t) * (1.0 / LEAP as f32), last);
+            let free = self.leaps.free[self.leaps.index(brick.to_array().map(|v| v as usize))];
+            let (low, high) = (brick.as_vec3a() + 1.0 - f32::from(free), brick.as_vec3a() + f32::from(free));
+            let over = reach(high, up, up.cmpgt(Vec3A::ZERO) & high.cmplt(count));
+            let under = reach(low, down, down.cmplt(Vec3A::ZERO) & low.cmpgt(Vec3A::ZERO));
+            let leave = over.min(under).min_element();
+            if free == 0 || leave < t + LEAST_LEAP * self.grid.spacing_mm {
+                return t;
+            }
+            if leave >= end {
+                return NOTHING;
+            }
+            t = leave * (1.0 - 1e-5);
+        }
+        t
     }
 
-    /// The same, with the number of bricks, cells and samples looked at.
-    pub fn trace(&self, o: Vec3, d: Vec3) -> (f32, u32) {
-        let safe = Vec3::select(d.abs().cmplt(Vec3::splat(1e-12)), Vec3::splat(1e-12), d);
-        let inverse = safe.recip();
-        let dims = Vec3::from(self.grid.dims.map(|n| n as f32));
-        let (low, high) = (-o * inverse, (dims - 1.0 - o) * inverse);
-        let mut t = low.min(high).max_element().max(0.0);
+    /// Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or [`NOTHING`], and the number of bricks, cells and samples looked
+    /// at. No bone is nearer than `from`.
+    #[inline(always)]
+    pub fn trace(&self, o: Vec3, d: Vec3, from: f32) -> (f32, u32) {
+        let ray = Line::of(o, d);
+        let dims = Vec3A::from(self.grid.dims.map(|n| n as f32));
+        let (low, high) = (-ray.o * ray.inverse, (dims - 1.0 - ray.o) * ray.inverse);
+        let mut t = greater(low.min(high).max_element(), from);
         let end = low.max(high).min_element();
-        let positive = safe.cmpgt(Vec3::ZERO);
-        let ahead = Vec3::select(positive, Vec3::ONE, Vec3::ZERO);
         let nudge = NUDGE * self.grid.spacing_mm;
         let last = IVec3::from(self.leaps.bricks.map(|n| n as i32 - 1));
         let mut steps = 0;
         while t < end && steps < MOST_STEPS {
             steps += 1;
-            let brick = ((o + safe * (t + nudge)) / LEAP as f32).floor().as_ivec3().clamp(IVec3::ZERO, last);
+            let brick = cell_in(ray.at(t + nudge) * (1.0 / LEAP as f32), last);
             let known = self.leaps.free[self.leaps.index(brick.to_array().map(|v| v as usize))];
             let free = if self.casting.leap { known } else { 0 };
             let reach = f32::from(free.saturating_sub(1));
-            let wall = brick.as_vec3() + Vec3::select(positive, Vec3::splat(reach + 1.0), Vec3::splat(-reach));
-            let leave = ((LEAP as f32 * wall - o) * inverse).min_element().max(t + nudge);
+            // One wall further on where the ray goes up, `reach` more bricks on in its direction.
+            let wall = brick.as_vec3a() + ray.ahead + reach * ray.side;
+            let leave = greater(((LEAP as f32 * wall - ray.o) * ray.inverse).min_element(), t + nudge);
             if free == 0 {
-                let until = leave.min(end);
+                let until = lesser(leave, end);
                 let hit = match self.casting.step_voxel {
-                    None => self.walk(o, safe, inverse, ahead, t, until, &mut steps),
-                    Some(step) => self.sample(o, safe, t..until, step * self.grid.spacing_mm, &mut steps),
+                    None => self.walk(&ray, t, until, &mut steps),
+                    Some(step) => self.sample(o, d, t..until, step * self.grid.spacing_mm, &mut steps),
                 };
                 if hit < NOTHING {
                     return (hit, steps);
@@ -183,95 +233,173 @@ impl Bricks {
         NOTHING
     }
 
-    /// Walks the cells of a ray from `t` to `leave`.
-    fn walk(&self, o: Vec3, d: Vec3, inverse: Vec3, ahead: Vec3, mut t: f32, leave: f32, steps: &mut u32) -> f32 {
+    /// Walks the cells of a ray from `t` to `leave` (Amanatides and Woo 1987).
+    #[inline(always)]
+    fn walk(&self, ray: &Line, mut t: f32, leave: f32, steps: &mut u32) -> f32 {
         let last = IVec3::from(self.grid.dims.map(|n| n as i32 - 2));
-        let mut cell = (o + d * (t + NUDGE * self.grid.spacing_mm)).floor().as_ivec3().clamp(IVec3::ZERO, last);
-        let step = (ahead * 2.0 - 1.0).as_ivec3();
+        let mut cell = cell_in(ray.at(t + NUDGE * self.grid.spacing_mm), last);
+        let mut crossing = (cell.as_vec3a() + ray.ahead - ray.o) * ray.inverse;
+        let across = ray.inverse.abs();
         while t < leave && *steps < MOST_STEPS {
             *steps += 1;
-            let crossing = (cell.as_vec3() + ahead - o) * inverse;
-            let next = crossing.min_element().max(t);
-            let corners = self.corners(cell);
-            if corners.iter().any(|&v| v >= 0.0) {
-                let s = enter(&corners, o + d * t - cell.as_vec3(), o + d * next - cell.as_vec3());
+            let next = greater(crossing.min_element(), t);
+            if let Some(corners) = self.corners(cell) {
+                let low = cell.as_vec3a();
+                let s = enter(&corners, ray.at(t) - low, ray.at(next) - low);
                 if s <= 1.0 {
                     return t + s * (next - t);
                 }
             }
-            t = next;
-            cell += IVec3::select(crossing.cmple(Vec3::splat(next)), step, IVec3::ZERO);
+            let passed = crossing.cmple(Vec3A::splat(next));
+            crossing += Vec3A::select(passed, across, Vec3A::ZERO);
+            let on = passed.bitmask() as i32;
+            cell += ray.step * IVec3::new(on & 1, on >> 1 & 1, on >> 2);
             if cell.cmplt(IVec3::ZERO).any() || cell.cmpgt(last).any() {
                 break;
             }
+            t = next;
         }
         NOTHING
     }
 
-    /// The corners of a cell, x fastest, less the isovalue.
-    fn corners(&self, cell: IVec3) -> [f32; 8] {
+    /// The corners of a cell, x fastest, less the isovalue; `None` where none of them is bone.
+    #[inline(always)]
+    fn corners(&self, cell: IVec3) -> Option<[f32; 8]> {
+        let [_, row, layer] = self.strides();
         let first = self.index(cell.to_array().map(|v| v as usize));
-        let (row, layer) = (self.grid.dims[0], self.grid.dims[0] * self.grid.dims[1]);
-        let starts = [first, first + row, first + layer, first + layer + row];
+        let pair = |at: usize| [self.density[at], self.density[at + 1]];
+        let [[a, b], [c, d]] = [pair(first), pair(first + row)];
+        let [[e, f], [g, h]] = [pair(first + layer), pair(first + layer + row)];
+        let values = [a, b, c, d, e, f, g, h];
+        let most = a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)));
         let isovalue = f32::from(self.grid.isovalue);
-        let mut corners = [0.0; 8];
-        for (pair, start) in corners.chunks_exact_mut(2).zip(starts) {
-            pair[0] = f32::from(self.density[start]) - isovalue;
-            pair[1] = f32::from(self.density[start + 1]) - isovalue;
-        }
-        corners
+        (most >= self.grid.isovalue).then(|| values.map(|v| f32::from(v) - isovalue))
     }
 }
 
-/// Trilinear interpolation between values at whole coordinates, clamped at the border.
-pub(crate) fn trilinear(dims: [usize; 3], at: Vec3, value: impl Fn(usize) -> f32) -> f32 {
-    let most = Vec3::from(dims.map(|n| n as f32 - 1.0));
-    let at = at.clamp(Vec3::ZERO, most);
-    let low = at.floor().min((most - 1.0).max(Vec3::ZERO));
-    let u = at - low;
-    let [x, y, z] = low.to_array().map(|v| v as usize);
-    let first = x + dims[0] * (y + dims[1] * z);
-    // A grid of one layer has no next one.
-    let next = [
-        usize::from(dims[0] > 1),
-        if dims[1] > 1 { dims[0] } else { 0 },
-        if dims[2] > 1 { dims[0] * dims[1] } else { 0 },
-    ];
-    let line = |start: usize| {
-        let (a, b) = (value(start), value(start + next[0]));
-        a + u.x * (b - a)
-    };
-    let plane = |start: usize| {
-        let (a, b) = (line(start), line(start + next[1]));
-        a + u.y * (b - a)
-    };
-    let (a, b) = (plane(first), plane(first + next[2]));
-    a + u.z * (b - a)
+/// A ray o + t·d in padded grid coordinates, and what every step needs of it.
+struct Line {
+    o: Vec3A,
+    d: Vec3A,
+    inverse: Vec3A,
+    /// 1 along the axes on which it goes up, else 0.
+    ahead: Vec3A,
+    /// 1 along these axes, else -1.
+    side: Vec3A,
+    step: IVec3,
 }
 
-/// Trilinear interpolation of a cell's corners.
-fn blend(corners: &[f32; 8], u: Vec3) -> f32 {
-    let mix = |a: f32, b: f32, s: f32| a + s * (b - a);
-    let plane = [0, 1, 2, 3].map(|n| mix(corners[n], corners[n + 4], u.z));
-    mix(mix(plane[0], plane[2], u.y), mix(plane[1], plane[3], u.y), u.x)
+impl Line {
+    #[inline(always)]
+    fn of(o: Vec3, d: Vec3) -> Self {
+        let d = Vec3A::from(d);
+        let d = Vec3A::select(d.abs().cmplt(Vec3A::splat(1e-12)), Vec3A::splat(1e-12), d);
+        let ahead = Vec3A::select(d.cmpgt(Vec3A::ZERO), Vec3A::ONE, Vec3A::ZERO);
+        let side = ahead * 2.0 - 1.0;
+        Self { o: o.into(), d, inverse: d.recip(), ahead, side, step: side.as_ivec3() }
+    }
+
+    #[inline(always)]
+    fn at(&self, t: f32) -> Vec3A {
+        self.o + self.d * t
+    }
+}
+
+/// The lesser of two numbers that are numbers: one instruction, where `min` also answers for NaN.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers that are numbers.
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Trilinear interpolation between values at whole coordinates, clamped at the border.
+#[inline(always)]
+pub(crate) fn trilinear<V: Mix>(dims: [usize; 3], at: Vec3, value: impl Fn(usize) -> V) -> V {
+    let strides = [1, dims[0], dims[0] * dims[1]];
+    let places = array::from_fn(|n| between(at[n], dims[n], strides[n]));
+    // A grid of one layer has no next one.
+    mixed(places, array::from_fn(|n| if dims[n] > 1 { strides[n] } else { 0 }), value)
+}
+
+/// What can be interpolated.
+pub(crate) trait Mix: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<f32, Output = Self> {}
+impl<V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f32, Output = V>> Mix for V {}
+
+/// Where a coordinate lies along an axis of `count` values `stride` apart, clamped: position of the value before it, and the share of the next.
+#[inline(always)]
+fn between(x: f32, count: usize, stride: usize) -> (usize, f32) {
+    let last = count - 1;
+    let x = lesser(greater(x, 0.0), last as f32);
+    // Cutting off is rounding down for what is not negative; the library's `floor` is a call.
+    let low = (x as i32 as usize).min(last.saturating_sub(1));
+    (low * stride, x - low as f32)
+}
+
+/// The values around places along three axes, mixed by their shares.
+#[inline(always)]
+fn mixed<V: Mix>([(x, u), (y, v), (z, w)]: [(usize, f32); 3], next: [usize; 3], value: impl Fn(usize) -> V) -> V {
+    let mix = |a: V, b: V, share: f32| a + (b - a) * share;
+    let line = |start: usize| mix(value(start), value(start + next[0]), u);
+    let plane = |start: usize| mix(line(start), line(start + next[1]), v);
+    mix(plane(x + y + z), plane(x + y + z + next[2]), w)
+}
+
+/// Whole parts, clamped to a box from 0: what lies under 0 becomes 0, so that cutting off is as good as rounding down.
+#[inline(always)]
+fn cell_in(at: Vec3A, last: IVec3) -> IVec3 {
+    at.as_ivec3().clamp(IVec3::ZERO, last)
+}
+
+/// Trilinear interpolation of a cell's corners at four places, given by their coordinates.
+#[inline(always)]
+fn blend(corners: &[f32; 8], [x, y, z]: [Vec4; 3]) -> Vec4 {
+    let line = |n: usize| corners[n] + x * (corners[n + 1] - corners[n]);
+    let plane = |n: usize| {
+        let (a, b) = (line(n), line(n + 2));
+        a + y * (b - a)
+    };
+    let (a, b) = (plane(0), plane(4));
+    a + z * (b - a)
 }
 
 /// Share of the way between two local points of a cell where bone begins, or 2.
-fn enter(corners: &[f32; 8], a: Vec3, b: Vec3) -> f32 {
-    let third = (b - a) / 3.0;
-    first_root([a, a + third, b - third, b].map(|u| blend(corners, u)))
+#[inline(always)]
+fn enter(corners: &[f32; 8], a: Vec3A, b: Vec3A) -> f32 {
+    let shares = Vec4::new(0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0);
+    let axis = |n: usize| a[n] + shares * (b[n] - a[n]);
+    first_root(blend(corners, [axis(0), axis(1), axis(2)]).to_array())
 }
 
 /// First root of the cubic with values `v` at 0, 1/3, 2/3, 1 that rises from below zero, or 2.
+///
+/// Between its extrema the cubic is monotone: Newton's method, kept between two ends of different sign.
+#[inline(always)]
 pub(crate) fn first_root(v: [f32; 4]) -> f32 {
     if v[0] >= 0.0 {
         return 0.0;
     }
+    // The curve lies in the hull of its Bézier points.
+    let second = -5.0 * v[0] + 18.0 * v[1] - 9.0 * v[2] + 2.0 * v[3];
+    let third = 2.0 * v[0] - 9.0 * v[1] + 18.0 * v[2] - 5.0 * v[3];
+    if greater(greater(second, third), v[3]) < 0.0 {
+        return 2.0;
+    }
+    rising_root(v)
+}
+
+/// The same, where there may be a root.
+fn rising_root(v: [f32; 4]) -> f32 {
     let c1 = 0.5 * (-11.0 * v[0] + 18.0 * v[1] - 9.0 * v[2] + 2.0 * v[3]);
     let c2 = 4.5 * (2.0 * v[0] - 5.0 * v[1] + 4.0 * v[2] - v[3]);
     let c3 = 4.5 * (-v[0] + 3.0 * v[1] - 3.0 * v[2] + v[3]);
     let cubic = |s: f32| v[0] + s * (c1 + s * (c2 + s * c3));
-    let roots = (c2 * c2 - 3.0 * c1 * c3).max(0.0).sqrt();
+    let slope = |s: f32| c1 + s * (2.0 * c2 + s * 3.0 * c3);
+    let roots = greater(c2 * c2 - 3.0 * c1 * c3, 0.0).sqrt();
     let q = -(c2 + if c2 >= 0.0 { roots } else { -roots });
     let e1 = if c3.abs() > 1e-20 { q / (3.0 * c3) } else { 2.0 };
     let e2 = if q.abs() > 1e-20 { c1 / q } else { 2.0 };
@@ -285,16 +413,30 @@ pub(crate) fn first_root(v: [f32; 4]) -> f32 {
         }
         if cubic(to) >= 0.0 {
             let (mut low, mut high) = (start, to);
-            for _ in 0..12 {
-                let s = 0.5 * (low + high);
-                if cubic(s) < 0.0 { low = s } else { high = s }
+            let mut s = 0.5 * (low + high);
+            for _ in 0..MOST_NEWTON {
+                let value = cubic(s);
+                if value < 0.0 {
+                    low = s
+                } else {
+                    high = s
+                }
+                let newton = s - value / slope(s);
+                let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+                if (next - s).abs() < 1e-5 {
+                    return next;
+                }
+                s = next;
             }
-            return high;
+            return s;
         }
         start = to;
     }
     2.0
 }
+
+/// Most steps to a root: halving alone gets to 2⁻¹² in as many.
+const MOST_NEWTON: usize = 12;
 
 #[cfg(test)]
 mod tests {

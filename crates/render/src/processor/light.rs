@@ -1,13 +1,14 @@
 //! Twin of `light.wgsl`: takes the nearest of bone, brain and tool at a pixel and lights it.
 
+use super::Inputs;
 use super::brain::Fragment;
 use super::bricks::trilinear;
 use super::skull::Ray;
-use super::{Inputs, bytes};
 use crate::mri::Signals;
 use crate::scene::Scene;
 use crate::skull::NOTHING;
 use glam::{Vec3, Vec4};
+use std::sync::LazyLock;
 
 pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
     let scene = inputs.scene;
@@ -28,7 +29,19 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], bone: &Ray, brain: &
         let key = past_tools(scene, point) * f32::from(u8::from(bone.lit));
         lit(scene, bone_colour(inputs, point, bone.normal), bone.normal, along, bone.open, key, 0.06)
     };
-    bytes(colour.clamp(Vec3::ZERO, Vec3::ONE).powf(1.0 / 2.2))
+    shown(colour)
+}
+
+/// A linear colour as bytes for a screen of gamma 2.2, from a table over the square root, where the curve is nearly straight.
+fn shown(colour: Vec3) -> [u8; 4] {
+    const LAST: usize = 4095;
+    static SHOWN: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        let byte = |n: usize| (n as f32 / LAST as f32).powf(2.0 / 2.2) * 255.0;
+        (0..=LAST).map(|n| byte(n).round() as u8).collect()
+    });
+    let table: &[u8] = &SHOWN;
+    let at = |x: f32| table[((x.clamp(0.0, 1.0).sqrt() * LAST as f32 + 0.5) as usize).min(LAST)];
+    [at(colour.x), at(colour.y), at(colour.z), 255]
 }
 
 fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> Vec3 {
@@ -127,7 +140,7 @@ fn lit(scene: &Scene, albedo: Vec3, normal: Vec3, along: Vec3, open: f32, key: f
     let ambient = open * Vec3::new(0.10, 0.09, 0.085).lerp(Vec3::new(0.25, 0.28, 0.33), sky);
     let head = 0.12 * (0.25 + 0.75 * open) * (-normal.dot(along)).max(0.0);
     let halfway = (light - along).normalize();
-    let shine = gloss * normal.dot(halfway).max(0.0).powf(48.0) * key * open;
+    let shine = gloss * normal.dot(halfway).max(0.0).powi(48) * key * open;
     albedo * (ambient + head + facing * Vec3::new(0.66, 0.63, 0.57)) + shine
 }
 
@@ -149,8 +162,7 @@ fn brain_colour(mri: Option<&Signals>, rest: Vec3) -> Vec3 {
 /// Mark and grey value at texture coordinates, 0 to 1.
 pub(crate) fn signal(signals: &Signals, at: Vec3) -> Vec4 {
     let voxel = at * Vec3::from(signals.dims.map(|n| n as f32)) - 0.5;
-    let channel = |c: usize| trilinear(signals.dims, voxel, |n| f32::from(signals.texels[n][c]) / 255.0);
-    Vec4::new(channel(0), channel(1), channel(2), channel(3))
+    trilinear(signals.dims, voxel, |n| Vec4::from(signals.texels[n].map(f32::from))) / 255.0
 }
 
 /// Twin of the shader's `tinted`: a colour where a mark lies over it.

@@ -36,7 +36,7 @@ pub use bricks::Casting;
 
 use bricks::Bricks;
 use glam::Vec3;
-use skull::Ray;
+use skull::{Ray, TILE};
 use trepan_geometry::Aabb;
 
 /// Draws pictures of one scene on the processor.
@@ -49,6 +49,8 @@ pub struct ProcessorRenderer {
     layout: Layout,
     picture: Image,
     rays: Vec<Ray>,
+    /// Up to where no ray of a tile meets bone, mm.
+    clear: Vec<f32>,
     fragments: Fragments,
     /// Changed bricks that one picture takes over at most; the rest comes with the next pictures.
     pub bricks_per_frame: usize,
@@ -80,6 +82,7 @@ impl ProcessorRenderer {
             layout: Layout::of(0, 0, false),
             picture: Image { width: 0, height: 0, rgba: Vec::new() },
             rays: Vec::new(),
+            clear: Vec::new(),
             fragments: Fragments::default(),
             bricks_per_frame: BRICKS_PER_FRAME,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
@@ -137,10 +140,19 @@ impl ProcessorRenderer {
         }
         let Some(part) = self.bricks.recast.part(view, [width, height]) else { return 0 };
         let [x, y, w, h] = part.map(|n| n as usize);
-        let rows = rows::of(&mut self.rays, width as usize, y..y + h, x..x + w);
         let bricks = &self.bricks;
+        let [columns, lines] = [w, h].map(|n| n.div_ceil(TILE));
+        self.clear.resize(columns * lines, 0.0);
+        rows::share(self.threads, rows::of(&mut self.clear, columns, 0..lines, 0..columns), |line, row| {
+            let first = |n| [x + TILE * n, y + TILE * line];
+            row.iter_mut().enumerate().for_each(|(n, clear)| *clear = skull::clear(bricks, scene, first(n)));
+        });
+        let (clears, top) = (&self.clear, y);
+        let rows = rows::of(&mut self.rays, width as usize, y..y + h, x..x + w);
         rows::share(self.threads, rows, |y, row| {
-            row.iter_mut().enumerate().for_each(|(n, ray)| *ray = skull::cast(bricks, scene, [x + n, y]));
+            let clear = &clears[columns * ((y - top) / TILE)..];
+            let cast = |n: usize| skull::cast(bricks, scene, [x + n, y], clear[n / TILE]);
+            row.iter_mut().enumerate().for_each(|(n, ray)| *ray = cast(n));
         });
         part[2] * part[3]
     }

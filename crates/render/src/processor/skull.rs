@@ -24,11 +24,28 @@ impl Ray {
     pub const NONE: Self = Self { t: NOTHING, steps: 0, normal: Vec3::Z, open: 1.0, lit: false };
 }
 
-pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2]) -> Ray {
+/// Pixels along an edge of a tile.
+pub(crate) const TILE: usize = 8;
+
+/// Distance up to which no ray of the tile with this first pixel meets bone.
+pub(crate) fn clear(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2]) -> f32 {
+    let far = TILE - 1;
+    let corners = [[x, y], [x + far, y], [x, y + far], [x + far, y + far]].map(|[x, y]| scene.ray_of(x, y));
+    let middle = corners.iter().sum::<Vec3>().normalize();
+    let spread = corners.iter().map(|c| c.distance(middle)).fold(0.0, f32::max);
+    let spacing = bricks.grid.spacing_mm;
+    bricks.clear(bricks.grid_of(scene.eye.truncate()), middle / spacing, 1.01 * spread / spacing)
+}
+
+/// The ray of a pixel, which meets no bone before `from`, mm.
+pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32) -> Ray {
+    if from >= NOTHING {
+        return Ray::NONE;
+    }
     let along = scene.ray_of(x, y);
     let o = bricks.grid_of(scene.eye.truncate());
     let d = along / bricks.grid.spacing_mm;
-    let (t, steps) = bricks.trace(o, d);
+    let (t, steps) = bricks.trace(o, d, from);
     if t >= NOTHING {
         return Ray { steps, ..Ray::NONE };
     }
