@@ -211,9 +211,9 @@ pub(super) mod tests {
     use super::*;
     use crate::device_test::trial::Trial;
     use trepan_geometry::{Pose, ToolState};
-    use trepan_haptics::{Capabilities, HapticDevice};
     use trepan_haptics::replay::Replay;
     use trepan_haptics::simulated::{Config, Hand, Simulated};
+    use trepan_haptics::{Capabilities, HapticDevice};
 
     /// A whole test of a simulated device whose hand means to be at heights `intent(ms)`, without a clock.
     pub fn tested(config: Config, hand: Hand, intent: impl Fn(f64) -> f32) -> (Vec<Sample>, Trial, Capabilities) {

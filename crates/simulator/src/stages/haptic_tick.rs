@@ -14,7 +14,7 @@
 //! replay. A tick does not allocate, lock, log or panic.
 
 use crate::program::{Phase, Program};
-use crate::stages::ahead::bone_ahead_mm;
+use crate::stages::drill::{BREAK_MM, Drill, THIN_MM, left_ahead_mm, spindle_rpm};
 use crate::stages::notice::{Notice, Warning, Watch, What};
 use crate::stages::score::ScoreKeeper;
 use std::sync::Arc;
@@ -24,17 +24,12 @@ use trepan_geometry::{Buttons, Pose, Tool, ToolKind, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
 use trepan_rigid::{Method, RigidContact, RigidStep};
-use trepan_volume::{BoneVolume, DistanceField, Undone};
+use trepan_volume::{BoneVolume, DistanceField};
 
 /// Up to this age a patch gives its full force, ms.
 pub const FRESH_MS: f32 = 10.0;
 /// From this age on a patch gives no force, ms.
 pub const GONE_MS: f32 = 60.0;
-
-/// Bone this thin ahead of the burr is worth a warning, mm.
-const THIN_MM: f32 = 1.0;
-/// Bone this thin is about to give way, mm.
-const BREAK_MM: f32 = 0.3;
 
 /// What a haptic stage is built from.
 #[derive(Clone, Debug)]
@@ -109,12 +104,7 @@ pub struct HapticStage {
     held: ToolState,
     proxy: Pose,
     asked_next: bool,
-    /// Bone removed since the pedal was last pressed, mm³.
-    stroke_mm3: f32,
-    drilled: bool,
-    /// Whether the burr has come through the bone in this stroke.
-    through: bool,
-    asked_undo: bool,
+    drill: Drill,
     released: bool,
 }
 
@@ -150,10 +140,7 @@ impl HapticStage {
             held: start,
             proxy,
             asked_next: false,
-            stroke_mm3: 0.0,
-            drilled: false,
-            through: false,
-            asked_undo: false,
+            drill: Drill::default(),
             released: false,
         }
     }
@@ -176,8 +163,10 @@ impl HapticStage {
         let mut record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
         record.removed_mm3 -= back_mm3;
         self.warn(&record, input.patch, (wanted, warm, ahead_mm), tell);
-        record.flags |=
-            if self.came_through(ahead_mm, input.tick, tool.time_ms, tell) { TickRecord::THROUGH } else { 0 };
+        if self.drill.came_through(&self.bone_step, ahead_mm) {
+            record.flags |= TickRecord::THROUGH;
+            tell(Notice { tick: input.tick, time_ms: tool.time_ms, what: What::Through });
+        }
         self.scores.add(&record, self.config.dt_ms);
         Tick { wrench, sample, record, warnings: self.watch.standing() }
     }
@@ -245,26 +234,13 @@ impl HapticStage {
         self.asked_next = asks;
     }
 
-    /// Begins a stroke when the pedal goes down; gives the last one's bone back when that is asked for and the burr is free; the brain
-    /// may bulge into the opening once the probe is in the hand. Returns what came back, mm³.
+    /// Lets the stroke begin or come back. Returns what came back, mm³.
     fn undo(&mut self, tool: &ToolState, drilling: bool, tick: u64, tell: &mut dyn FnMut(Notice)) -> f32 {
         let Some(bone) = &self.bone else { return 0.0 };
-        if drilling && !self.drilled {
-            bone.begin_stroke();
-            (self.stroke_mm3, self.through) = (0.0, false);
-        }
-        self.drilled = drilling;
-        let asks = tool.buttons.has(Buttons::UNDO);
-        let with_burr = self.phase() == Phase::Craniotomy;
-        let now = asks && !self.asked_undo && with_burr && !drilling && !self.bone_step.manifold.touches();
-        self.asked_undo = asks;
-        let what = match now.then(|| bone.undo_stroke()) {
-            Some(Undone::Bricks(_)) => What::Undone(std::mem::take(&mut self.stroke_mm3)),
-            Some(Undone::TooLong) => What::Kept,
-            Some(Undone::Nothing) | None => return 0.0,
-        };
-        tell(Notice { tick, time_ms: tool.time_ms, what });
-        if let What::Undone(mm3) = what { mm3 } else { 0.0 }
+        let may_undo = self.phase() == Phase::Craniotomy && !self.bone_step.manifold.touches();
+        let what = self.drill.stroke(bone, tool, drilling, may_undo);
+        what.into_iter().for_each(|what| tell(Notice { tick, time_ms: tool.time_ms, what }));
+        if let Some(What::Undone(mm3)) = what { mm3 } else { 0.0 }
     }
 
     fn touch_bone(&mut self, tool: &ToolState, drilling: bool) {
@@ -272,29 +248,15 @@ impl HapticStage {
             (Some(bone), Some(rigid)) => {
                 rigid.step(bone, tool, drilling, self.config.dt_ms, &mut self.bone_step);
                 self.proxy = rigid.proxy();
-                self.stroke_mm3 += self.bone_step.removed_mm3;
+                self.drill.removed(self.bone_step.removed_mm3);
             }
             _ => self.proxy = tool.world_from_tool,
         }
     }
 
-    /// Whether the burr has come through the bone for the first time in its stroke; tells so. A hole beside bone that is still ahead is a pore.
-    fn came_through(&mut self, ahead_mm: f32, tick: u64, time_ms: f64, tell: &mut dyn FnMut(Notice)) -> bool {
-        let first = self.bone_step.broke_through && ahead_mm <= BREAK_MM && !self.through;
-        if first {
-            self.through = true;
-            tell(Notice { tick, time_ms, what: What::Through });
-        }
-        first
-    }
-
     /// Speed of the spindle, 1/min.
     fn spindle_rpm(&self, drilling: bool) -> f32 {
-        match self.config.rigid.removal().spindle() {
-            Some(_) if drilling && self.bone_step.manifold.touches() => self.bone_step.spindle_rpm,
-            Some(spindle) if drilling => spindle.free_rpm,
-            _ => 0.0,
-        }
+        spindle_rpm(self.config.rigid.removal().spindle(), &self.bone_step, drilling)
     }
 
     fn sample(&mut self, tool: &ToolState, tick: u64, drilling: bool) -> ToolSample {
@@ -374,15 +336,11 @@ impl HapticStage {
         }
     }
 
-    /// Bone left ahead of a burr that cuts, along its axis or where it is pressed to, mm; infinite when it does not.
+    /// Bone left ahead of a burr that cuts, mm; infinite when it does not.
     fn bone_ahead(&self, drilling: bool) -> f32 {
         match &self.bone {
             Some(bone) if drilling && self.bone_step.manifold.touches() => {
-                let ahead = |way: Vec3| {
-                    let front = self.proxy.translation + self.tool().tip_radius_mm * way;
-                    bone_ahead_mm(bone, front, way, 2.0 * THIN_MM)
-                };
-                ahead(self.proxy.rotation * Vec3::NEG_Z).min(ahead(-self.bone_step.manifold.normal))
+                left_ahead_mm(bone, self.proxy, &self.tool(), self.bone_step.manifold.normal)
             }
             _ => f32::INFINITY,
         }

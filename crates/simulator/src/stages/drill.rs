@@ -1,0 +1,119 @@
+//! What the burr does to the bone from stroke to stroke: what is left ahead, when it comes through, what an undo gives back.
+//!
+//! # Practice
+//! A stroke begins when the pedal goes down. The burr comes through once in a stroke, where it opens the bone and nothing is left ahead: a hole beside bone that
+//! is still ahead is a pore. The last stroke can be undone while the burr is in the hand and free; later the brain may bulge into the opening.
+
+use crate::stages::ahead::bone_ahead_mm;
+use crate::stages::notice::What;
+use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3};
+use trepan_rigid::RigidStep;
+use trepan_rigid::spindle::Spindle;
+use trepan_volume::{BoneVolume, Undone};
+
+/// Bone this thin ahead of the burr is worth a warning, mm.
+pub(crate) const THIN_MM: f32 = 1.0;
+/// Bone this thin is about to give way, mm.
+pub(crate) const BREAK_MM: f32 = 0.3;
+
+/// The stroke at hand.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Drill {
+    /// Bone removed since the pedal was last pressed, mm³.
+    stroke_mm3: f32,
+    drilled: bool,
+    /// Whether the burr has come through the bone in this stroke.
+    through: bool,
+    asked_undo: bool,
+}
+
+impl Drill {
+    /// Begins a stroke when the pedal goes down; gives the last one's bone back when that is asked for and `may_undo`. Says what it did.
+    pub fn stroke(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool, may_undo: bool) -> Option<What> {
+        if drilling && !self.drilled {
+            bone.begin_stroke();
+            (self.stroke_mm3, self.through) = (0.0, false);
+        }
+        self.drilled = drilling;
+        let asks = tool.buttons.has(Buttons::UNDO);
+        let now = asks && !self.asked_undo && !drilling && may_undo;
+        self.asked_undo = asks;
+        match now.then(|| bone.undo_stroke())? {
+            Undone::Bricks(_) => Some(What::Undone(std::mem::take(&mut self.stroke_mm3))),
+            Undone::TooLong => Some(What::Kept),
+            Undone::Nothing => None,
+        }
+    }
+
+    /// Takes note of bone removed in a tick, mm³.
+    pub fn removed(&mut self, mm3: f32) {
+        self.stroke_mm3 += mm3;
+    }
+
+    /// Whether the burr has come through the bone for the first time in its stroke.
+    pub fn came_through(&mut self, step: &RigidStep, ahead_mm: f32) -> bool {
+        let first = step.broke_through && ahead_mm <= BREAK_MM && !self.through;
+        self.through |= first;
+        first
+    }
+}
+
+/// Bone left ahead of a burr that cuts, along its axis or where it is pressed to, mm, at most twice [`THIN_MM`].
+pub(crate) fn left_ahead_mm(bone: &BoneVolume, world_from_tool: Pose, tool: &Tool, normal: Vec3) -> f32 {
+    let ahead = |way: Vec3| {
+        let front = world_from_tool.translation + tool.tip_radius_mm * way;
+        bone_ahead_mm(bone, front, way, 2.0 * THIN_MM)
+    };
+    ahead(world_from_tool.rotation * Vec3::NEG_Z).min(ahead(-normal))
+}
+
+/// Speed of the spindle, 1/min: free in air, as the load lets it in bone; 0 without one or when it rests.
+pub(crate) fn spindle_rpm(spindle: Option<Spindle>, step: &RigidStep, drilling: bool) -> f32 {
+    match spindle {
+        Some(_) if drilling && step.manifold.touches() => step.spindle_rpm,
+        Some(spindle) if drilling => spindle.free_rpm,
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::IVec3;
+    use trepan_volume::{AIR_HU, VoxelVolume};
+
+    fn slab() -> BoneVolume {
+        BoneVolume::new(&VoxelVolume::isotropic([16; 3], Vec3::splat(-7.5), 1.0, 1200i16), 400).expect("all bone")
+    }
+
+    fn pressed(buttons: &[Buttons]) -> ToolState {
+        let mut tool = ToolState::at(Pose::IDENTITY);
+        buttons.iter().for_each(|b| tool.buttons.0 |= b.0);
+        tool
+    }
+
+    #[test]
+    fn a_stroke_comes_back_once_and_only_when_it_may() {
+        let (bone, mut drill) = (slab(), Drill::default());
+        let (pedal, undo) = (pressed(&[Buttons::PEDAL]), pressed(&[Buttons::UNDO]));
+        assert_eq!(drill.stroke(&bone, &pedal, true, true), None);
+        bone.set_hu(IVec3::splat(8), AIR_HU);
+        drill.removed(1.0);
+        assert_eq!(drill.stroke(&bone, &undo, false, false), None);
+        assert_eq!(drill.stroke(&bone, &pressed(&[]), false, true), None);
+        assert_eq!(drill.stroke(&bone, &undo, false, true), Some(What::Undone(1.0)));
+        assert!(bone.is_bone(IVec3::splat(8)));
+        assert_eq!(drill.stroke(&bone, &undo, false, true), None, "held down it asks once");
+    }
+
+    #[test]
+    fn it_comes_through_once_in_a_stroke_and_not_into_a_pore() {
+        let (bone, mut drill) = (slab(), Drill::default());
+        let open = RigidStep { broke_through: true, ..RigidStep::default() };
+        drill.stroke(&bone, &pressed(&[Buttons::PEDAL]), true, true);
+        assert!(!drill.came_through(&open, 1.5) && drill.came_through(&open, 0.1) && !drill.came_through(&open, 0.0));
+        drill.stroke(&bone, &pressed(&[]), false, true);
+        drill.stroke(&bone, &pressed(&[Buttons::PEDAL]), true, true);
+        assert!(drill.came_through(&open, 0.0));
+    }
+}
