@@ -3,7 +3,7 @@
 use std::time::Instant;
 use trepan_geometry::Vec3;
 use trepan_soft::{Body, BodyError, Loads, Material, SoftSolver, boxes};
-use trepan_tled::{Config, Kernel, Relaxation, Tled};
+use trepan_tled::{Config, Kernel, Pass, Relaxation, Tled};
 
 const ROUNDS: usize = 40;
 const STEPS: usize = 10;
@@ -40,7 +40,19 @@ fn main() -> Result<(), BodyError> {
             scalar / best
         );
     }
+    for threads in [1, 2] {
+        let mut tled = Tled::new(&body, &Config { threads, cure_locking: true, ..plain })?;
+        let bests = Pass::ALL.map(|pass| (0..400).map(|_| passed_us(&mut tled, pass)).fold(f64::INFINITY, f64::min));
+        let words: Vec<_> = Pass::ALL.iter().zip(bests).map(|(p, us)| format!("{} {us:.1} us", p.name())).collect();
+        println!("passes of a cured step by {threads} threads, best: {}", words.join(", "));
+    }
     Ok(())
+}
+
+fn passed_us(tled: &mut Tled, pass: Pass) -> f64 {
+    let (dt_ms, start) = (tled.stable_dt_ms(), Instant::now());
+    tled.pass(pass, &Loads::default(), dt_ms);
+    start.elapsed().as_secs_f64() * 1e6
 }
 
 fn timed_us(tled: &mut Tled) -> f64 {

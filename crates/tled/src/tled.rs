@@ -16,7 +16,8 @@ use trepan_soft::{
 pub struct Tled {
     config: Config,
     pub(crate) elements: Elements,
-    /// Positions, mm, and velocities, mm/ms, by mesh node.
+    /// Positions at rest and now, mm, and velocities, mm/ms, by mesh node.
+    rest: Vec<Vec3>,
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
     shares: ContactShares,
@@ -89,6 +90,7 @@ impl Tled {
             elapsed_ms: 0.0,
             gravity: Vec3::ZERO,
             elements,
+            rest: body.mesh.positions.clone(),
             positions: body.mesh.positions.clone(),
             velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
             shares: ContactShares::of_nodes(body.mesh.positions.len()),
@@ -135,7 +137,8 @@ impl Tled {
     pub fn set_node(&mut self, node: u32, displacement: Vec3, velocity: Vec3) {
         if let Some(&place) = self.layout.place_of.get(node as usize) {
             self.elements.nodes().set(place as usize, displacement, velocity);
-            self.publish_one(place as usize);
+            self.positions[node as usize] = self.elements.nodes().position(place as usize);
+            self.velocities[node as usize] = velocity;
             self.elements.wake();
         }
     }
@@ -222,14 +225,11 @@ impl Tled {
 
     /// Writes positions and velocities out in the mesh's order.
     fn publish(&mut self) {
-        (0..self.layout.node_at.len()).for_each(|place| self.publish_one(place));
-    }
-
-    #[inline(always)]
-    fn publish_one(&mut self, place: usize) {
-        let (nodes, node) = (self.elements.nodes(), self.layout.node_at[place] as usize);
-        self.positions[node] = nodes.position(place);
-        self.velocities[node] = nodes.velocity(place);
+        let (nodes, from) = (self.elements.nodes(), self.layout.place_of.iter().zip(&self.rest));
+        for ((&place, rest), (x, v)) in from.zip(self.positions.iter_mut().zip(&mut self.velocities)) {
+            *x = *rest + nodes.displacement(place as usize);
+            *v = nodes.velocity(place as usize);
+        }
     }
 
     /// The stable bound as the elements are now: that of the rest state, shortened by what the stiffest element has gained.
