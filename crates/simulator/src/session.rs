@@ -27,7 +27,7 @@ use crate::stages::second_hand::SecondHand;
 use crate::stages::skull_wall::SkullWall;
 use crate::stages::solver_step::SolverStage;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use trepan_contact::{Vibration, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_haptics::script::Script;
@@ -48,6 +48,8 @@ pub struct Session {
     hash: String,
     scene: Scene,
     rigid: trepan_rigid::Method,
+    /// What `--solver fastest` turned out to be.
+    fastest: OnceLock<&'static str>,
     out: PathBuf,
     windowed: bool,
 }
@@ -88,7 +90,8 @@ impl Session {
         let scene = Scene::new(program, case)?;
         scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
         let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
-        Ok(Self { program, options, device, second, recording, case: name, hash, scene, rigid, out, windowed })
+        let (case, fastest) = (name, OnceLock::new());
+        Ok(Self { program, options, device, second, recording, case, hash, scene, rigid, fastest, out, windowed })
     }
 
     /// Runs it and writes its files.
@@ -199,6 +202,7 @@ impl Session {
                     let chosen = trepan_tled::choice::fastest(&all, &loads, 100.0, &|| clock.now_ms());
                     let chosen = chosen.map_err(|f| internal(&f))?;
                     tracing::info!("solver {}: {}", chosen.name, chosen.why);
+                    let _first = self.fastest.set(chosen.name);
                     chosen.solver
                 } else {
                     Box::new(trepan_tled::Tled::new(&body, &config).map_err(|f| internal(&f))?)
@@ -266,8 +270,10 @@ impl Session {
         1e3 / self.options.rate_hz
     }
 
+    /// What steps the tissue: of `fastest` what that turned out to be.
     fn solver_name(&self) -> String {
-        self.options.solver.clone().unwrap_or_else(|| TLED.into())
+        let named = || self.options.solver.clone().unwrap_or_else(|| TLED.into());
+        self.fastest.get().map_or_else(named, |name| name.to_string())
     }
 
     fn header(&self, feel: &Feel, second: Option<&Feel>) -> SessionHeader {
