@@ -18,7 +18,7 @@ const SETTLE_MS: f32 = 2500.0;
 /// Step of solvers that have no bound, ms.
 const LONGEST_MS: f32 = 4.0;
 /// Finest mesh that all solvers step, cells across; on finer ones some of them take many minutes.
-const RIVALS_ACROSS: usize = 8;
+const RIVALS_ACROSS: usize = 6;
 /// Share of earth's gravity: enough for some mm of sag, little enough that all solvers converge.
 const GRAVITY_SHARE: f32 = 0.1;
 
@@ -38,7 +38,7 @@ pub fn scenes() -> Vec<Scene> {
 fn front(scope: Scope, findings: &mut Findings) {
     let (quick, mut points) = (scope.quick, Vec::new());
     let (truth, way) = if quick { continuum(4, findings) } else { continuum(8, findings) };
-    for &across in scope.pick(&[2usize, 4][..], &[2, 4, 6, 8, 12, 16][..]) {
+    for &across in scope.pick(&[2usize, 4][..], &[2, 4, 6, 8, 12, 18][..]) {
         hang(across, truth, way, findings, &mut points);
     }
     for limit in [5.0, 1.0] {

@@ -29,9 +29,7 @@ pub fn run(scope: Scope) -> Findings {
     let mut findings = Findings::default();
     for (number, scene) in scenes.into_iter().enumerate() {
         if scope.takes(number) {
-            let t = std::time::Instant::now();
             scene(scope, &mut findings);
-            eprintln!("scene {number}: {:.1} s", t.elapsed().as_secs_f64());
         }
     }
     locking::draw(&mut findings);

@@ -58,7 +58,7 @@ fn kernels(scope: Scope, findings: &mut Findings) {
     let body = block(BRAIN);
     let scene = format!("block, {} tetrahedra", body.mesh.tets.len());
     let mut runs: Vec<Run> = configs().iter().map(|(name, config)| prepared(*name, &body, config)).collect();
-    race(&mut runs, scope.pick(200, 1000));
+    race(&mut runs, scope.pick(120, 1000));
     let bytes = |run: &Run| run.solver.positions().iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>();
     let best_of = |wanted: &str| runs.iter().find(|run| run.name == wanted).map(|run| run.best_us);
     let (scalar, first, plain) = (bytes(&runs[0]), runs[0].best_us, best_of("fastest").unwrap_or(f64::NAN));
@@ -110,7 +110,7 @@ fn configs() -> Vec<(&'static str, Config)> {
 fn sizes(scope: Scope, findings: &mut Findings) {
     let mut runs: Vec<Run> =
         [9, 15, 20, 24].iter().map(|&n| prepared("fastest", &block([n; 3]), &Config::default())).collect();
-    race(&mut runs, scope.pick(60, 400));
+    race(&mut runs, scope.pick(40, 400));
     let costs: Vec<f64> = runs.iter().map(|run| run.best_us / run.tets as f64).collect();
     runs.iter().for_each(|run| findings.rows.push(row(&format!("size, {} tetrahedra", run.tets), run)));
     let (low, high) = costs.iter().fold((f64::MAX, 0.0f64), |(l, h), &c| (l.min(c), h.max(c)));
@@ -132,7 +132,7 @@ fn loaded(scope: Scope, findings: &mut Findings) {
                 }
             });
         }
-        for _ in 0..scope.pick(20, 100) {
+        for _ in 0..scope.pick(10, 100) {
             for (_, run, times) in &mut runs {
                 times.extend((0..30).map(|_| step_us(&mut run.solver)));
             }

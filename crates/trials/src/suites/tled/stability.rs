@@ -209,10 +209,14 @@ fn hard_contact(findings: &mut Findings) {
         let unguarded = Method::named("linear").expect("a method").build(&body).expect("the cube is sound");
         let guarded: Box<dyn SoftSolver> = Box::new(solver(&body, Config::default()));
         for (method, mut solver) in [("guarded", guarded), ("linear, unguarded", unguarded)] {
-            let (dt_ms, mut scale) = (solver.stable_dt_ms(), 1.0f32);
-            (0..1500).for_each(|_| scale = scale.min(solver.step(&loads, dt_ms).contact_scale));
+            let (dt_ms, mut scale, mut healed) = (solver.stable_dt_ms(), 1.0f32, 0);
+            for _ in 0..1500 {
+                let report = solver.step(&loads, dt_ms);
+                scale = scale.min(report.contact_scale);
+                healed += report.inverted + report.limited + report.non_finite;
+            }
             let moved = offset(&*solver, &body);
-            let held = moved < 4.0 && solver.velocities().iter().all(|v| v.length() < 0.01);
+            let held = healed == 0 && moved < 4.0 && solver.velocities().iter().all(|v| v.length() < 0.01);
             let wanted = method == "guarded" || stiffness < 0.1;
             let scene = format!("contact spring of {stiffness} N/mm");
             if wanted || (10.0..1000.0).contains(&stiffness) {
@@ -267,7 +271,8 @@ fn slivers(findings: &mut Findings) {
     }
 }
 
-/// Settings at the ends of their ranges: a block that gravity pulls sideways all at once must neither burst nor swing for ever.
+/// Settings at the ends of their ranges: a block that gravity pulls sideways all at once must neither burst nor swing for ever. At rest it
+/// hangs by 12 mm; a start without damping, or half the stiffness relaxed away, doubles that.
 fn extremes(findings: &mut Findings) {
     let relaxing = |time_ms| Relaxation { share: [0.5, 0.0], time_ms: [time_ms, 1.0] };
     let damped = |share| Config { damping: Damping::Critical(share), ..Config::default() };
@@ -295,7 +300,7 @@ fn extremes(findings: &mut Findings) {
             healed += report.inverted + report.limited + report.non_finite;
             furthest = furthest.max(offset(&solver, &body));
         }
-        let held = healed == 0 && furthest < 20.0 && solver.velocities().iter().all(|v| v.length() < 0.05);
+        let held = healed == 0 && furthest < 30.0 && solver.velocities().iter().all(|v| v.length() < 0.05);
         verdict(scene.into(), "tled", held, true, ("furthest_mm", furthest), findings);
     }
 }
