@@ -1,7 +1,8 @@
 //! Work on the elements and the nodes, alone or with more threads.
 //!
 //! # Theory
-//! A round of work falls into tasks, a part of the elements or a run of the nodes each. Tasks are claimed one after the other from a counter, by the caller and by its workers alike. A
+//! A round of work falls into tasks, a part of the elements or a run of the nodes each. The caller and every second worker claim them one after the other from the first on, the rest from the
+//! last on, so that the same thread meets the same elements again and finds them in its cache. A
 //! worker that is not running costs nothing: the caller then claims every task itself, and waits only for tasks that someone is in the middle of. So a loaded machine falls
 //! back to the speed of one thread and never stalls. Who did a task leaves no trace in the result.
 //!
@@ -13,7 +14,7 @@ use crate::kernel::{Found, Kernel};
 use crate::nodes::{Nodes, Update};
 use crate::part::{Forcing, Part, Quiet};
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicIsize, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::thread::JoinHandle;
 
@@ -47,8 +48,7 @@ struct Shared {
     handed: Handed,
     kernel: Kernel,
     work: RwLock<Work>,
-    /// Tasks of this round that nobody has claimed; the next one's number is one less. None when not over 0.
-    left: AtomicIsize,
+    claims: Claims,
     /// Tasks finished in this round.
     done: AtomicUsize,
     round: AtomicUsize,
@@ -56,6 +56,26 @@ struct Shared {
     sleeping: Mutex<()>,
     wake: Condvar,
     quit: AtomicBool,
+}
+
+/// Which tasks of a round are claimed: how many there are, how many from the last on, how many from the first on, 20 bits each. One number, so that nobody sees half of a new round.
+struct Claims(AtomicU64);
+
+/// Most tasks of a round: a thousand million elements, 270 million nodes.
+const MOST: u64 = (1 << 20) - 1;
+
+impl Claims {
+    /// Begins a round.
+    fn start(&self, tasks: usize) {
+        self.0.store((tasks as u64).min(MOST) << 40, Ordering::Release);
+    }
+
+    /// The number of a task that nobody else has; `None` when all are claimed.
+    fn next(&self, from_last: bool) -> Option<usize> {
+        let all = self.0.fetch_add(if from_last { 1 << 20 } else { 1 }, Ordering::AcqRel);
+        let [count, last, first] = [all >> 40, all >> 20 & MOST, all & MOST];
+        (first + last < count).then_some(if from_last { count - 1 - last } else { first } as usize)
+    }
 }
 
 /// Counts a task as finished, even one that panicked.
@@ -76,7 +96,7 @@ impl Team {
             handed,
             kernel,
             work: RwLock::new(Work::Average),
-            left: AtomicIsize::new(0),
+            claims: Claims(AtomicU64::new(0)),
             done: AtomicUsize::new(0),
             round: AtomicUsize::new(0),
             asleep: AtomicUsize::new(0),
@@ -86,7 +106,7 @@ impl Team {
         });
         let start = |number: usize| {
             let shared = Arc::clone(&shared);
-            std::thread::Builder::new().name(format!("tled-{number}")).spawn(move || shared.serve()).ok()
+            std::thread::Builder::new().name(format!("tled-{number}")).spawn(move || shared.serve(number % 2 == 1)).ok()
         };
         let workers = (1..threads).filter_map(start).collect();
         Self { shared, workers }
@@ -106,7 +126,7 @@ impl Team {
     pub fn compute(&mut self, work: Work) {
         let tasks = self.shared.tasks(work);
         self.shared.announce(work, tasks);
-        self.shared.work();
+        self.shared.work(false);
         let mut waited = 0;
         while self.shared.done.load(Ordering::Acquire) < tasks {
             pause(&mut waited);
@@ -160,7 +180,7 @@ impl Shared {
     fn announce(&self, work: Work, tasks: usize) {
         *self.work.write().unwrap_or_else(PoisonError::into_inner) = work;
         self.done.store(0, Ordering::Release);
-        self.left.store(tasks as isize, Ordering::Release);
+        self.claims.start(tasks);
         self.start_round();
     }
 
@@ -173,15 +193,11 @@ impl Shared {
     }
 
     /// Claims and does tasks until none is left.
-    fn work(&self) {
-        loop {
-            let left = self.left.fetch_sub(1, Ordering::AcqRel);
-            if left <= 0 {
-                return;
-            }
+    fn work(&self, from_last: bool) {
+        while let Some(number) = self.claims.next(from_last) {
             let _finished = Finished(&self.done);
             let work = *self.work.read().unwrap_or_else(PoisonError::into_inner);
-            self.task(left as usize - 1, work);
+            self.task(number, work);
         }
     }
 
@@ -196,10 +212,10 @@ impl Shared {
     }
 
     /// A worker's life.
-    fn serve(&self) {
+    fn serve(&self, from_last: bool) {
         let mut seen = 0;
         while !self.quit.load(Ordering::SeqCst) {
-            self.work();
+            self.work(from_last);
             seen = self.wait_for_round_after(seen);
         }
     }
@@ -240,4 +256,25 @@ fn pause(waited: &mut u32) {
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_task_is_claimed_once_from_whichever_end() {
+        let claims = Claims(AtomicU64::new(0));
+        assert_eq!((claims.next(true), claims.next(false)), (None, None));
+        for tasks in [0usize, 1, 2, 7, 100] {
+            claims.start(tasks);
+            let claimed = |from_last: bool| std::iter::from_fn(|| claims.next(from_last)).collect::<Vec<_>>();
+            let mut all = std::thread::scope(|scope| {
+                let workers: Vec<_> = [true, false, true].map(|end| scope.spawn(move || claimed(end))).into();
+                workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect::<Vec<_>>()
+            });
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..tasks));
+        }
+    }
 }

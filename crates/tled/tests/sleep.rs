@@ -50,8 +50,8 @@ fn a_touch_wakes_its_neighbourhood_and_the_answer_is_that_of_a_body_that_never_s
         let share = sleepy.awake_share();
         assert!(share > 0.0 && share < 1.0, "{share}");
         for loads in [&pressed, &free] {
-            run(&mut sleepy, loads, 600.0);
-            run(&mut awake, loads, 600.0);
+            run(&mut sleepy, loads, 300.0);
+            run(&mut awake, loads, 300.0);
             let apart = largest_difference(sleepy.positions(), awake.positions());
             println!("cure {cure}: {share} awake, apart by {apart} mm, then {} awake", sleepy.awake_share());
             assert!(apart < 0.01, "{apart}");

@@ -19,6 +19,8 @@ const SETTLE_MS: f32 = 2500.0;
 const LONGEST_MS: f32 = 4.0;
 /// Finest mesh that all solvers step, cells across; on finer ones some of them take many minutes.
 const RIVALS_ACROSS: usize = 6;
+/// The same for plain elements of TLED.
+const PLAIN_ACROSS: usize = 12;
 /// Share of earth's gravity: enough for some mm of sag, little enough that all solvers converge.
 const GRAVITY_SHARE: f32 = 0.1;
 
@@ -97,7 +99,7 @@ fn continuum(across: usize, findings: &mut Findings) -> (Vec3, f64) {
 fn hang(across: usize, truth: Vec3, way_mm: f64, findings: &mut Findings, points: &mut Vec<Point>) {
     let (body, tip) = block(across);
     let scene = format!("hanging block, {} tetrahedra", body.mesh.tets.len());
-    for (method, mut solver) in solvers(&body, across <= RIVALS_ACROSS) {
+    for (method, mut solver) in solvers(&body, across) {
         let dt_ms = solver.stable_dt_ms().min(LONGEST_MS);
         let (steps, start) = ((SETTLE_MS / dt_ms).ceil() as usize, Instant::now());
         (0..steps).for_each(|_| _ = solver.step(&gravity(), dt_ms));
@@ -115,13 +117,13 @@ fn hang(across: usize, truth: Vec3, way_mm: f64, findings: &mut Findings, points
     }
 }
 
-fn solvers(body: &Body, rivals: bool) -> Vec<(&'static str, Box<dyn SoftSolver>)> {
+fn solvers(body: &Body, across: usize) -> Vec<(&'static str, Box<dyn SoftSolver>)> {
     let tled = |config| Box::new(Tled::new(body, &config).expect("the block is sound")) as Box<dyn SoftSolver>;
-    let mut solvers = vec![
-        ("tled", tled(Config::default())),
-        ("tled cured", tled(Config { cure_locking: true, ..Config::default() })),
-    ];
-    for method in Method::all().into_iter().filter(|m| rivals && m.name() != "reference") {
+    let mut solvers = vec![("tled cured", tled(Config { cure_locking: true, ..Config::default() }))];
+    if across <= PLAIN_ACROSS {
+        solvers.insert(0, ("tled", tled(Config::default())));
+    }
+    for method in Method::all().into_iter().filter(|m| across <= RIVALS_ACROSS && m.name() != "reference") {
         solvers.push((method.name(), method.build(body).expect("the block is sound")));
     }
     solvers
