@@ -4,6 +4,7 @@ pub(crate) mod ahead;
 pub(crate) mod collision_step;
 pub(crate) mod drill;
 pub(crate) mod haptic_tick;
+pub(crate) mod motion;
 pub(crate) mod notice;
 pub(crate) mod score;
 pub(crate) mod second_hand;

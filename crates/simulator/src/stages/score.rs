@@ -1,10 +1,11 @@
 //! The scores so far: what the hand did to bone and brain, summed tick by tick.
 //!
 //! # Theory
-//! Path length `Σ |xₙ - xₙ₋₁|` of the tool's tip, drilling time, volume of bone removed, plunge (how far the burr's ball went past the
-//! brain's rest surface), largest force on the brain, and the number of separate touches of the brain with the burr.
+//! Path, idle time and smoothness of the tool's tip (`motion.rs`), drilling time, volume of bone removed, plunge (how far the burr's ball went past the
+//! brain's rest surface), separate touches of the brain with the burr, time, impulse `∫ F dt` and largest force of the probe on the brain, changes of the tool.
 //! They are plain physical quantities; none is validated against clinical skill.
 
+use crate::stages::motion::Motion;
 use serde::Serialize;
 use trepan_geometry::Vec3;
 use trepan_link::wire::TickRecord;
@@ -14,6 +15,12 @@ use trepan_link::wire::TickRecord;
 pub struct ScoreKeeper {
     /// Path of the tip, mm.
     pub path_mm: f64,
+    /// Time in which the tip was slower than 5 mm/s, s.
+    pub idle_s: f64,
+    /// Smoothness of the tip's movement below 5 Hz, more is smoother; `null` before there was any.
+    pub log_dimensionless_jerk: Option<f64>,
+    /// Tools taken after the first.
+    pub tool_changes: u32,
     /// Time with the burr turning, s.
     pub drilling_s: f64,
     /// Bone removed, mm³.
@@ -24,6 +31,10 @@ pub struct ScoreKeeper {
     pub plunge_mm: f32,
     /// Separate touches of the brain with the burr.
     pub burr_touches_of_brain: u32,
+    /// Time in which the tool pressed on tissue, s.
+    pub tissue_s: f64,
+    /// Force on the hand, summed over the time in which the tool pressed on tissue, N s.
+    pub tissue_impulse_n_s: f64,
     /// Largest force while the tool pressed on tissue, N.
     pub peak_tissue_force_n: f32,
     /// Largest depth of the probe in tissue, mm.
@@ -33,7 +44,9 @@ pub struct ScoreKeeper {
     /// Largest change of force between two ticks, N.
     pub peak_force_step_n: f32,
     #[serde(skip)]
-    last_tip: Option<Vec3>,
+    motion: Motion,
+    #[serde(skip)]
+    phase: u8,
     #[serde(skip)]
     last_force: Vec3,
     #[serde(skip)]
@@ -43,17 +56,19 @@ pub struct ScoreKeeper {
 impl ScoreKeeper {
     /// Adds one tick.
     pub fn add(&mut self, record: &TickRecord, dt_ms: f32) {
-        let tip = record.proxy.translation;
-        let force = record.wrench.force;
-        self.path_mm += self.last_tip.map_or(0.0, |last| f64::from((tip - last).length()));
-        self.last_tip = Some(tip);
+        let (force, seconds) = (record.wrench.force, f64::from(dt_ms) * 1e-3);
+        self.motion.add(record.time_ms, record.proxy.translation);
+        (self.path_mm, self.idle_s) = (self.motion.path_mm, self.motion.idle_s);
+        self.log_dimensionless_jerk = self.motion.log_dimensionless_jerk();
+        self.tool_changes += u32::from(record.phase != self.phase);
+        self.phase = record.phase;
         self.peak_force_n = self.peak_force_n.max(force.length());
         self.peak_force_step_n = self.peak_force_step_n.max((force - self.last_force).length());
         self.last_force = force;
         self.bone_removed_mm3 += f64::from(record.removed_mm3);
         self.times_through += u32::from(record.has(TickRecord::THROUGH));
         if record.has(TickRecord::DRILLING) {
-            self.drilling_s += f64::from(dt_ms) * 1e-3;
+            self.drilling_s += seconds;
         }
         if record.phase == 0 && record.tool == 0 {
             self.plunge_mm = self.plunge_mm.max(-record.brain_distance_mm);
@@ -61,6 +76,8 @@ impl ScoreKeeper {
             self.burr_touches_of_brain += u32::from(touching && !self.touching);
             self.touching = touching;
         } else if record.tissue_depth_mm > 0.0 {
+            self.tissue_s += seconds;
+            self.tissue_impulse_n_s += seconds * f64::from(force.length());
             self.peak_tissue_depth_mm = self.peak_tissue_depth_mm.max(record.tissue_depth_mm);
             self.peak_tissue_force_n = self.peak_tissue_force_n.max(force.length());
         }
@@ -82,16 +99,26 @@ mod tests {
                 wrench: Wrench { force: Vec3::new(0.0, 0.0, if i < 50 { 1.0 } else { 0.25 }), torque: Vec3::ZERO },
                 removed_mm3: 0.5,
                 brain_distance_mm: if (20..30).contains(&i) || i == 40 { -0.75 } else { 3.0 },
+                time_ms: 20.0 * f64::from(i),
                 flags: TickRecord::DRILLING | if i % 50 == 7 { TickRecord::THROUGH } else { 0 },
                 ..TickRecord::default()
             };
             keeper.add(&record, 1.0);
         }
-        assert!((keeper.path_mm - 10.0).abs() < 1e-4);
+        // From the middle of the first step to that of the last.
+        assert!((keeper.path_mm - 9.9).abs() < 1e-4, "{}", keeper.path_mm);
         assert!((keeper.drilling_s - 0.101).abs() < 1e-9);
         assert!((keeper.bone_removed_mm3 - 50.5).abs() < 1e-9);
         assert_eq!((keeper.plunge_mm, keeper.burr_touches_of_brain), (0.75, 2));
         assert_eq!(keeper.times_through, 2);
         assert_eq!((keeper.peak_force_n, keeper.peak_force_step_n), (1.0, 1.0));
+        for i in 0..200u16 {
+            let wrench = Wrench { force: Vec3::Y * 0.5, torque: Vec3::ZERO };
+            let (time_ms, tissue_depth_mm) = (2001.0 + f64::from(i), if i < 80 { 2.0 } else { 0.0 });
+            keeper
+                .add(&TickRecord { time_ms, phase: 1, tool: 1, wrench, tissue_depth_mm, ..TickRecord::default() }, 1.0);
+        }
+        assert_eq!((keeper.tool_changes, keeper.peak_tissue_force_n, keeper.peak_tissue_depth_mm), (1, 0.5, 2.0));
+        assert!((keeper.tissue_s - 0.08).abs() < 1e-9 && (keeper.tissue_impulse_n_s - 0.04).abs() < 1e-9);
     }
 }

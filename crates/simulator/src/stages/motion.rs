@@ -1,0 +1,204 @@
+//! How the tip moved: path, idle time and smoothness, alike at any rate of ticks.
+//!
+//! # Theory
+//! The mean place of the tip is taken over even windows of time, linear between two ticks, so that neither the rate nor an encoder's noise counts. Over windows of 20 ms:
+//!
+//! ```text
+//! path = Σ |xₖ₊₁ - xₖ|          idle = time with |xₖ₊₁ - xₖ| / h < 5 mm/s
+//! ```
+//!
+//! Over windows of 100 ms, with v = Δx / h and the jerk j = Δ³x / h³, the smoothness of the whole movement over T seconds:
+//!
+//! ```text
+//! log dimensionless jerk = -ln( T³ / v_peak² · Σ |j|² h )
+//! ```
+//!
+//! More is smoother: -5.32 = -ln(720/1.875²) for one movement of least jerk, however long and far; every halt and turn lowers it. What moves faster than 5 Hz, as
+//! tremor does, is not in it.
+//!
+//! # Sources
+//! Log dimensionless jerk: Balasubramanian, Melendez-Calderon and Burdet 2012. Least jerk: Flash and Hogan 1985. The limit of idleness is ours.
+
+use glam::DVec3;
+use trepan_geometry::Vec3;
+
+/// Step for path and idle time, ms.
+const FINE_MS: f64 = 20.0;
+/// Step for smoothness, ms.
+const COARSE_MS: f64 = 100.0;
+/// Slower than this the tip is idle, mm/s.
+const IDLE_MM_S: f64 = 5.0;
+/// After a pause in the ticks of more than this the movement begins anew, ms.
+const PAUSE_MS: f64 = 1000.0;
+
+/// Sums over a movement.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Motion {
+    /// Length of the tip's path, mm.
+    pub path_mm: f64,
+    /// Time in which the tip moved slower than 5 mm/s, s.
+    pub idle_s: f64,
+    fine: Grid,
+    last: Option<DVec3>,
+    coarse: Grid,
+    /// The newest places on the coarse grid, the oldest first, and how many there are.
+    places: [DVec3; 4],
+    known: usize,
+    /// Steps of the coarse grid.
+    steps: u64,
+    peak_mm_s: f64,
+    /// Σ |j|² h, mm²/s⁵.
+    jerk2: f64,
+}
+
+/// Windows of time, one after the other, with the mean place in each.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Grid {
+    before: Option<(f64, DVec3)>,
+    /// End of this window, ms, and the place summed over its time so far, mm ms.
+    end_ms: f64,
+    sum: DVec3,
+}
+
+impl Motion {
+    /// Adds where the tip was at a time, ms.
+    pub fn add(&mut self, time_ms: f64, tip: Vec3) {
+        let tip = tip.as_dvec3();
+        let (mut fine, mut coarse) = (self.fine, self.coarse);
+        fine.add(FINE_MS, time_ms, tip, |x| self.step(x));
+        coarse.add(COARSE_MS, time_ms, tip, |x| self.coarse_step(x));
+        (self.fine, self.coarse) = (fine, coarse);
+    }
+
+    /// Smoothness so far; `None` before there was any movement to speak of.
+    pub fn log_dimensionless_jerk(&self) -> Option<f64> {
+        let seconds = self.steps as f64 * COARSE_MS * 1e-3;
+        let value = -(seconds.powi(3) / self.peak_mm_s.powi(2) * self.jerk2).ln();
+        value.is_finite().then_some(value)
+    }
+
+    fn step(&mut self, at: DVec3) {
+        if let Some(last) = self.last {
+            let way = at.distance(last);
+            self.path_mm += way;
+            self.idle_s += if way < IDLE_MM_S * FINE_MS * 1e-3 { FINE_MS * 1e-3 } else { 0.0 };
+        }
+        self.last = Some(at);
+    }
+
+    fn coarse_step(&mut self, at: DVec3) {
+        self.places.rotate_left(1);
+        self.places[3] = at;
+        self.known += 1;
+        let h = COARSE_MS * 1e-3;
+        let [a, b, c, d] = self.places;
+        if self.known > 1 {
+            self.steps += 1;
+            self.peak_mm_s = self.peak_mm_s.max(d.distance(c) / h);
+        }
+        if self.known > 3 {
+            let jerk = (d - 3.0 * c + 3.0 * b - a) / h.powi(3);
+            self.jerk2 += jerk.length_squared() * h;
+        }
+    }
+}
+
+impl Grid {
+    /// Gives the mean places of the windows that end up to this time. A place that is not finite and a time that does not go on are left out.
+    fn add(&mut self, step_ms: f64, time_ms: f64, tip: DVec3, mut each: impl FnMut(DVec3)) {
+        if !tip.is_finite() || !time_ms.is_finite() {
+            return;
+        }
+        match self.before {
+            Some((before_ms, _)) if time_ms <= before_ms => return,
+            Some((before_ms, from)) if time_ms - before_ms < PAUSE_MS => {
+                let at = |ms: f64| from.lerp(tip, (ms - before_ms) / (time_ms - before_ms));
+                let mut done_ms = before_ms;
+                while self.end_ms <= time_ms {
+                    self.sum += (self.end_ms - done_ms) * at(0.5 * (done_ms + self.end_ms));
+                    each(self.sum / step_ms);
+                    (done_ms, self.sum) = (self.end_ms, DVec3::ZERO);
+                    self.end_ms += step_ms;
+                }
+                self.sum += (time_ms - done_ms) * at(0.5 * (done_ms + time_ms));
+            }
+            _ => (self.end_ms, self.sum) = (time_ms + step_ms, DVec3::ZERO),
+        }
+        self.before = Some((time_ms, tip));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A movement of least jerk over `mm` in `seconds`, at `hz`.
+    fn least_jerk(mm: f64, seconds: f64, hz: f64) -> Motion {
+        let mut motion = Motion::default();
+        for n in 0..=(seconds * hz) as usize {
+            let s = n as f64 / hz / seconds;
+            let x = mm * s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s);
+            motion.add(1e3 * n as f64 / hz, Vec3::new(x as f32, 0.0, 3.0));
+        }
+        motion
+    }
+
+    #[test]
+    fn least_jerk_has_its_closed_form() {
+        // The grid leaves the ends out, where the jerk is largest: 0.2 s, little of a long movement.
+        for (mm, seconds) in [(100.0, 40.0), (300.0, 60.0)] {
+            let motion = least_jerk(mm, seconds, 1000.0);
+            assert!((motion.path_mm / mm - 1.0).abs() < 0.01, "{}", motion.path_mm);
+            let smooth = motion.log_dimensionless_jerk().unwrap();
+            assert!((smooth / -(720.0f64 / 1.875 / 1.875).ln() - 1.0).abs() < 0.01, "{smooth}");
+        }
+    }
+
+    #[test]
+    fn idle_time_is_the_time_at_rest() {
+        let mut motion = Motion::default();
+        for ms in 0..3000u16 {
+            motion.add(f64::from(ms), Vec3::X * 0.05 * f32::from(ms.clamp(1000, 2000)));
+        }
+        assert!((motion.idle_s - 2.0).abs() < 0.07 && (motion.path_mm - 50.0).abs() < 0.1, "{motion:?}");
+        assert_eq!(Motion::default().log_dimensionless_jerk(), None);
+    }
+
+    /// Twelve seconds of a curve that never repeats itself, at `hz`.
+    fn curve(hz: f64, mm: f64, turns_s: f64) -> Motion {
+        let mut motion = Motion::default();
+        for n in 0..(12.0 * hz) as usize {
+            let s = n as f64 / hz;
+            let phase = core::f64::consts::TAU * turns_s * s;
+            motion.add(1e3 * s, Vec3::new((mm * phase.sin()) as f32, (0.6 * mm * (1.3 * phase).cos()) as f32, 0.0));
+        }
+        motion
+    }
+
+    #[test]
+    fn the_rate_of_ticks_changes_nothing() {
+        for (mm, turns_s) in [(5.0, 0.3), (12.0, 0.55), (30.0, 0.8)] {
+            let exact = curve(1000.0, mm, turns_s);
+            for hz in [60.0, 87.3, 240.0, 500.0] {
+                let found = curve(hz, mm, turns_s);
+                let apart = |a: f64, b: f64| (a / b - 1.0).abs();
+                assert!(apart(found.path_mm, exact.path_mm) < 0.01, "{hz} Hz: {}", found.path_mm);
+                let [a, b] = [found, exact].map(|m| m.log_dimensionless_jerk().unwrap());
+                assert!(apart(a, b) < 0.01, "{hz} Hz: {a} for {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn gaps_and_nonsense_are_left_out() {
+        let mut motion = Motion::default();
+        motion.add(0.0, Vec3::ZERO);
+        motion.add(1.0, Vec3::NAN);
+        motion.add(f64::NAN, Vec3::ONE);
+        motion.add(0.0, Vec3::splat(50.0));
+        motion.add(40.0, Vec3::X);
+        assert_eq!((motion.path_mm, motion.idle_s), (0.5, 0.0));
+        motion.add(1e9, Vec3::X * 2.0);
+        assert_eq!(motion.path_mm, 0.5);
+    }
+}
