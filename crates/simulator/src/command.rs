@@ -3,6 +3,7 @@
 use crate::device_test;
 use crate::measure;
 use crate::options::{CaseTask, DeviceTask, Task};
+use crate::report::summary::CutOff;
 use crate::{Ended, Inputs, Options, Program, Session, SessionError, build_case};
 use clap::Parser;
 use std::path::Path;
@@ -104,6 +105,10 @@ fn told(ended: &Ended) -> ExitCode {
         summary.warnings.len(),
         summary.frames
     );
+    if summary.cut_off.pieces > 0 {
+        let CutOff { pieces, largest_mm3 } = summary.cut_off;
+        println!("cut off the skull: {pieces} piece(s) of bone, the largest of {largest_mm3:.0} mm3");
+    }
     if let Some(replay) = &summary.replay {
         println!(
             "replay: {} of {} ticks gave the same force, bit for bit; largest difference {:.6} N",

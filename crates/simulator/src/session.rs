@@ -10,7 +10,7 @@ use crate::options::Options;
 use crate::program::Program;
 use crate::report::output;
 use crate::report::page::Shot;
-use crate::report::summary::{About, Machine, Summary};
+use crate::report::summary::{About, CutOff, Machine, Summary};
 use crate::run::clock::Clock;
 use crate::run::journal::Kept;
 use crate::run::lockstep;
@@ -36,6 +36,7 @@ use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::{Painter, SceneData};
 use trepan_soft::{Body, Loads, SoftSolver};
+use trepan_volume::Piece;
 
 /// A session that is ready to run.
 pub struct Session {
@@ -97,6 +98,7 @@ impl Session {
     /// Runs it and writes its files.
     pub fn run(self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
+        let before = self.pieces();
         let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.scene.site)?;
         let second =
             self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.scene.site)).transpose()?;
@@ -123,7 +125,8 @@ impl Session {
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
-        let summary = Summary::new(self.about(&album, adapter, remarks), &outcome);
+        let cut_off = CutOff::of(&before, &self.pieces(), self.scene.bone.as_ref().map_or(0.0, |b| b.voxel_mm3()));
+        let summary = Summary::new(self.about(&album, adapter, cut_off, remarks), &outcome);
         output::write(&self.out, &record, &summary, &outcome, &self.shots(album.shots))?;
         if let Some(bone) = self.scene.bone.as_ref().filter(|_| self.program.has_bone()) {
             output::drilled(&self.out, bone, self.options.stl)?;
@@ -145,6 +148,12 @@ impl Session {
             (None, Some(devices)) => threads::run(stages, devices, kept, start, self.pace(), stop, picture),
             (None, None) => Outcome::default(),
         }
+    }
+
+    /// The bone's pieces as they hang together now.
+    fn pieces(&self) -> Vec<Piece> {
+        let bone = self.scene.bone.as_ref().filter(|_| self.program.has_bone());
+        bone.map_or_else(Vec::new, |bone| Piece::all(bone))
     }
 
     /// What the second hand's guard must know: of its device, or of the recorded one; `None` without a second hand.
@@ -297,7 +306,7 @@ impl Session {
         }
     }
 
-    fn about(&self, album: &Album, adapter: Option<String>, remarks: Vec<String>) -> About {
+    fn about(&self, album: &Album, adapter: Option<String>, cut_off: CutOff, remarks: Vec<String>) -> About {
         let brain = self.scene.brain.as_ref();
         About {
             program: self.program,
@@ -311,6 +320,7 @@ impl Session {
             solver: self.solver_name(),
             brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
             frames: album.frames,
+            cut_off,
             remarks,
             machine: Machine::here(adapter),
         }

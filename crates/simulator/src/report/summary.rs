@@ -7,6 +7,7 @@ use crate::stages::score::ScoreKeeper;
 use serde::Serialize;
 use std::fs;
 use trepan_contact::GuardCounters;
+use trepan_volume::Piece;
 
 /// The whole file.
 #[derive(Clone, Debug, Serialize)]
@@ -35,6 +36,8 @@ pub struct Summary {
     pub force_n: Forces,
     /// Bone removed, mm³.
     pub bone_removed_mm3: f64,
+    /// Bone that was cut off the skull, such as a flap, as it hangs together at the end.
+    pub cut_off: CutOff,
     /// Warnings as they were raised.
     pub warnings: Vec<Raised>,
     /// Scores.
@@ -75,6 +78,24 @@ pub struct Raised {
     pub name: String,
     /// What the trainee read.
     pub text: String,
+}
+
+/// Pieces of bone that hang on nothing any more.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct CutOff {
+    /// How many of at least 1 mm³.
+    pub pieces: usize,
+    /// The largest, mm³.
+    pub largest_mm3: f64,
+}
+
+impl CutOff {
+    /// From the pieces before and now, with the volume of a voxel, mm³.
+    pub fn of(before: &[Piece], now: &[Piece], voxel_mm3: f32) -> Self {
+        let mm3 = |piece: &Piece| piece.voxels as f64 * f64::from(voxel_mm3);
+        let large: Vec<f64> = Piece::cut_off(before, now).iter().map(mm3).filter(|&mm3| mm3 >= 1.0).collect();
+        Self { pieces: large.len(), largest_mm3: large.iter().copied().fold(0.0, f64::max) }
+    }
 }
 
 /// Quantiles of a time, µs.
@@ -231,6 +252,8 @@ pub struct About {
     pub brain: [usize; 3],
     /// Pictures drawn.
     pub frames: u64,
+    /// Bone that was cut off.
+    pub cut_off: CutOff,
     /// Remarks of import and pictures.
     pub remarks: Vec<String>,
     /// The machine.
@@ -270,6 +293,7 @@ impl Summary {
                 end: outcome.end_force_n,
             },
             bone_removed_mm3: outcome.scores.bone_removed_mm3,
+            cut_off: about.cut_off,
             warnings: warnings(outcome),
             scores: outcome.scores,
             guard: (&outcome.guard).into(),

@@ -1,0 +1,82 @@
+//! Pieces of bone: does the flap still hang on the skull?
+//!
+//! # Practice
+//! Voxels hang together by their faces. One pass over the grid, about 0.1 s for 50 million voxels: for the end of a session, not for a tick.
+
+use crate::BoneVolume;
+use crate::component::Components;
+use glam::IVec3;
+
+/// Bone that hangs together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// Its voxels.
+    pub voxels: usize,
+    /// Least voxel of its box.
+    pub low: [usize; 3],
+    /// Greatest voxel of its box, still in it.
+    pub high: [usize; 3],
+}
+
+impl Piece {
+    /// All pieces of a bone, the largest first.
+    pub fn all(bone: &BoneVolume) -> Vec<Self> {
+        let [nx, ny, nz] = bone.dims();
+        let place = |at: usize| [at % nx, at / nx % ny, at / (nx * ny)];
+        let voxel = |at: usize| IVec3::from(place(at).map(|n| n as i32));
+        let components = Components::of([nx, ny, nz], |at| bone.is_bone(voxel(at)));
+        let mut pieces = std::collections::BTreeMap::new();
+        components.every_run(|piece, run| {
+            let none = Self { voxels: 0, low: [usize::MAX; 3], high: [0; 3] };
+            let known: &mut Self = pieces.entry(piece).or_insert(none);
+            known.voxels += run.len();
+            for end in [place(run.start), place(run.end - 1)] {
+                known.low = std::array::from_fn(|n| known.low[n].min(end[n]));
+                known.high = std::array::from_fn(|n| known.high[n].max(end[n]));
+            }
+        });
+        let mut pieces: Vec<Self> = pieces.into_values().collect();
+        pieces.sort_by_key(|piece| std::cmp::Reverse(piece.voxels));
+        pieces
+    }
+
+    /// Pieces that were cut off: all but the largest that were not there before.
+    pub fn cut_off(before: &[Self], now: &[Self]) -> Vec<Self> {
+        now.iter().skip(1).filter(|piece| !before.contains(piece)).copied().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{AIR_HU, VoxelVolume};
+    use trepan_geometry::Vec3;
+
+    /// A plate with a speck beside it.
+    fn plate() -> BoneVolume {
+        let mut ct = VoxelVolume::isotropic([20, 16, 9], Vec3::ZERO, 1.0, AIR_HU);
+        for at in 0..ct.data.len() {
+            let [x, y, z] = [at % 20, at / 20 % 16, at / 320];
+            if (3..6).contains(&z) || [x, y, z] == [1, 1, 8] {
+                ct.data[at] = 1000;
+            }
+        }
+        BoneVolume::new(&ct, 400).unwrap()
+    }
+
+    #[test]
+    fn a_flap_is_cut_off_when_its_last_bridge_is() {
+        let bone = plate();
+        let before = Piece::all(&bone);
+        assert_eq!(before.iter().map(|piece| piece.voxels).collect::<Vec<_>>(), [960, 1]);
+        let drill = |x: i32, y: i32| (3..6).for_each(|z| bone.set_hu(IVec3::new(x, y, z), AIR_HU));
+        // A ring around 6 x 5 columns, but for one of its corners' neighbours.
+        let ring = (4..12).flat_map(|x| (3..10).map(move |y| (x, y)));
+        let ring = ring.filter(|&(x, y)| x == 4 || x == 11 || y == 3 || y == 9).filter(|&at| at != (7, 9));
+        ring.for_each(|(x, y)| drill(x, y));
+        assert_eq!(Piece::cut_off(&before, &Piece::all(&bone)), []);
+        drill(7, 9);
+        let flap = Piece { voxels: 90, low: [5, 4, 3], high: [10, 8, 5] };
+        assert_eq!(Piece::cut_off(&before, &Piece::all(&bone)), [flap]);
+    }
+}
