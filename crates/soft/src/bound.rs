@@ -11,7 +11,7 @@ use crate::{Body, Material, Shape, Stiffness};
 use glam::DVec3;
 
 const POWER_STEPS: usize = 200;
-const GRADIENT_STEPS: usize = 400;
+const GRADIENT_STEPS: usize = 4000;
 const INVERSE_STEPS: usize = 8;
 
 /// Stable step by single elements, ms: safe always, up to twice too careful.

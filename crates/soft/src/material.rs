@@ -95,26 +95,26 @@ pub enum MaterialError {
 }
 
 impl Material {
-    /// Living brain: 3 kPa, ν 0.45 (the most that plain tetrahedra bear), density of water.
+    /// Living brain, uncalibrated: 3 kPa (Wittek et al. 2007), ν 0.45 (the most that plain tetrahedra bear), density of water.
     pub const BRAIN: Self = Self::NeoHookean { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// Brain that answers tension and compression differently (Miller and Chinzei 2002), instantaneous moduli.
+    /// Brain that answers tension and compression differently (Miller and Chinzei 2002), instantaneous moduli, uncalibrated.
     pub const BRAIN_OGDEN: Self =
         Self::Ogden { shear_mpa: [8.42e-4, 0.0], exponent: [-4.7, 1.0], poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// White matter: 1.36 times as stiff as grey, the mean of both [`Material::BRAIN`]'s.
+    /// White matter, uncalibrated: 1.36 times as stiff as grey (Budday et al. 2015), the mean of both [`Material::BRAIN`]'s.
     pub const WHITE_MATTER: Self = Self::NeoHookean { young_mpa: 0.003_46, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// Grey matter.
+    /// Grey matter, uncalibrated (Budday et al. 2015).
     pub const GREY_MATTER: Self = Self::NeoHookean { young_mpa: 0.002_54, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// A ventricle filled with CSF, uncalibrated: as a solid so soft and compressible that it neither holds the brain up nor keeps it from closing.
+    /// A ventricle filled with CSF, uncalibrated (Wittek et al. 2010): as a solid so soft and compressible that it neither holds the brain up nor keeps it from closing.
     pub const VENTRICLE: Self = Self::NeoHookean { young_mpa: 1.0e-5, poisson: 0.1, density_g_mm3: 1.0e-3 };
 
-    /// Wall of a cerebral artery, uncalibrated. 300 times as stiff as brain: it shortens the stable step 18 times where elements are as large.
+    /// Wall of a cerebral artery, uncalibrated (Torii et al. 2006). 300 times as stiff as brain: it shortens the stable step 18 times where elements are as large.
     pub const VESSEL_WALL: Self = Self::NeoHookean { young_mpa: 1.0, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// A tumour, uncalibrated: three times as stiff as the brain around it (reports range from 2 to 10 times).
+    /// A tumour, uncalibrated, without a source: three times as stiff as the brain around it (reports range from 2 to 10 times).
     pub const TUMOUR: Self = Self::NeoHookean { young_mpa: 0.009, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
     /// The thesis's Table 6.1 in consistent units: 30 kPa, ν 0.3; ten times stiffer and far more compressible than living brain.

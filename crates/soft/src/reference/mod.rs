@@ -17,11 +17,13 @@
 //! In any loop that must keep a rate. Where several equilibria exist it finds one of them, not the one that dynamics would reach.
 
 mod cells;
+mod rank_one;
 
 use crate::factor::Factor;
 use crate::{Body, BodyError, Law, Loads, Material, SoftSolver, StepReport, SurfacePressure};
 use cells::{Cell, Cells};
 use glam::{DMat3, DVec3};
+use rank_one::{RankOne, dot};
 use trepan_geometry::Vec3;
 
 pub use cells::Order;
@@ -81,25 +83,6 @@ struct Trial {
 struct Inertia {
     stiffness_per_g: f64,
     ahead: Vec<DVec3>,
-}
-
-/// `k v vᵀ` in the matrix: v, the solution for it without this term, and `1/k + v·solved`.
-struct RankOne {
-    v: Vec<DVec3>,
-    solved: Vec<DVec3>,
-    below: f64,
-}
-
-impl RankOne {
-    /// Takes the term into a solution that lacks it (Sherman and Morrison).
-    fn correct(&self, x: &mut [DVec3]) {
-        let share = dot(&self.v, x) / self.below;
-        x.iter_mut().zip(&self.solved).for_each(|(x, c)| *x -= *c * share);
-    }
-}
-
-fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }
 
 impl Reference {
