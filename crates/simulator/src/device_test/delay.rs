@@ -3,7 +3,7 @@
 //! # Theory
 //! A tap pushes the hand, and the first new position along it tells that the force has come. A hand of 0.2 kg needs 2 to 3 ms to
 //! move by an encoder's step, so that this is an upper bound: the driver's, the link's, the motors' and the hand's delay together. The
-//! median of the taps keeps a trembling hand from being taken for an answer.
+//! median of the taps keeps a trembling hand from being taken for an answer; a tap on a hand that moves by itself is left out.
 
 use crate::device_test::measured::Sample;
 use crate::device_test::trial::{Part, TAP_MS};
@@ -12,16 +12,27 @@ use trepan_geometry::Vec3;
 /// Motion that counts where encoder steps are finer, mm.
 const LEAST_MM: f32 = 0.01;
 
-/// From a tap to the first motion along it, ms: the median of the taps; `None` when most of them moved nothing.
+/// A hand holds still that moved less than this, mm, in the last time, ms, before a tap.
+const STILL: (f32, f64) = (0.15, 20.0);
+
+/// From a tap to the first motion along it, ms: the median of the taps on a hand that held still; `None` when most of them moved nothing.
 pub fn median_ms(samples: &[Sample]) -> Option<f64> {
     let begins = |at: &usize| {
         let (before, now) = (&samples[at - 1], &samples[*at]);
-        now.part == Part::Tap && before.force == Vec3::ZERO && now.force != Vec3::ZERO
+        now.part == Part::Tap && before.force == Vec3::ZERO && now.force != Vec3::ZERO && held_still(&samples[..=*at])
     };
     let mut delays: Vec<f64> =
         (1..samples.len()).filter(begins).map(|at| first_motion_ms(&samples[at..]).unwrap_or(f64::INFINITY)).collect();
     delays.sort_by(f64::total_cmp);
     delays.get(delays.len() / 2).copied().filter(|delay| delay.is_finite())
+}
+
+/// Whether the hand held still before the last sample.
+fn held_still(samples: &[Sample]) -> bool {
+    let (within_mm, time_ms) = STILL;
+    let Some(last) = samples.last() else { return false };
+    let recent = samples.iter().rev().take_while(|s| last.time_ms - s.time_ms < time_ms);
+    recent.map(|s| (s.tip.y - last.tip.y).abs()).fold(0.0, f32::max) < within_mm
 }
 
 /// When the hand first moved along the tap that begins the samples, half-way between the readings.
@@ -56,6 +67,12 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_hand_that_moves_by_itself_tells_no_delay() {
+        let (samples, ..) = tested(Config::default(), Hand::FIRM, |t| 0.02 * t as f32 % 40.0);
+        assert_eq!(median_ms(&samples), None);
     }
 
     #[test]

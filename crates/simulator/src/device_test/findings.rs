@@ -53,7 +53,7 @@ fn delay(measured: &Measured, device: &Capabilities) -> Finding {
         None => finding(
             false,
             "no motion answered the taps".into(),
-            "hold the tool lightly; if you felt none, see whether the force is switched on",
+            "hold the tool lightly and still; if you felt none, see whether the force is switched on",
         ),
     }
 }

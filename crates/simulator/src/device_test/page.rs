@@ -17,7 +17,7 @@ pub fn html(found: &Measured, samples: &[Sample]) -> Result<String, String> {
         page += &format!("<li{class}>{}</li>", escaped(&finding.text));
     }
     page += "</ul>";
-    for (caption, svg) in charts(samples)? {
+    for (caption, svg) in charts(samples, found.timing.asked_hz)? {
         page += &format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>");
     }
     page += "<h2>Numbers</h2><table><tr><th>what</th><th>value</th></tr>";
@@ -27,7 +27,7 @@ pub fn html(found: &Measured, samples: &[Sample]) -> Result<String, String> {
     Ok(page)
 }
 
-fn charts(samples: &[Sample]) -> Result<Vec<(&'static str, String)>, String> {
+fn charts(samples: &[Sample], asked_hz: f64) -> Result<Vec<(&'static str, String)>, String> {
     let over = |name, value: &dyn Fn(&Sample) -> f32| Curve {
         name,
         points: samples.iter().map(|s| (s.time_ms * 1e-3, f64::from(value(s)))).collect(),
@@ -52,6 +52,9 @@ fn charts(samples: &[Sample]) -> Result<Vec<(&'static str, String)>, String> {
         ("Height of the tip", over_time("up, mm", &[over("tip", &|s| s.tip.y)], None)?),
         ("Force: the floor, then taps", over_time("force, N", &[over("up", &|s| s.force.y)], None)?),
         ("The floor: force by height", traces(["up, mm", "force, N"], &[pressed])?),
-        ("Time from tick to tick (dashed: 1 ms)", histogram("from tick to tick, µs", &gaps.bins(), 1000.0)?),
+        (
+            "Time from tick to tick (dashed: as asked for)",
+            histogram("from tick to tick, µs", &gaps.bins(), 1e6 / asked_hz)?,
+        ),
     ])
 }
