@@ -32,9 +32,15 @@ impl Loaded {
                     let name = name.to_string_lossy().into_owned();
                     return Ok(Self { library: Box::leak(Box::new(library)), name, install });
                 }
-                Err(error) => reasons.push(error.to_string()),
+                Err(error) => {
+                    let words = error.to_string();
+                    let own = format!("{}: ", name.to_string_lossy());
+                    reasons.push(words.strip_prefix(&own).unwrap_or(&words).to_owned());
+                }
             }
         }
+        // The loader says the same of every name, or of one what that library in turn lacks.
+        reasons.dedup();
         let library = wanted.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join(" or ");
         Err(DeviceError::Library { library, reason: reasons.join("; "), install })
     }

@@ -50,6 +50,8 @@ pub struct Config {
     pub events: String,
     /// Id of the device, four hexadecimal digits; `None` takes the first.
     pub device: Option<String>,
+    /// Id of the VerseGrip; `None` takes the first that the service lists when the device is opened.
+    pub grip: Option<String>,
     /// How the tool sits on the grip: tool axes seen from the grip's.
     pub grip_from_tool: Quat,
     /// How device space lies in the patient.
@@ -62,6 +64,7 @@ impl Default for Config {
             service: "localhost:10001".to_owned(),
             events: "localhost:10020".to_owned(),
             device: None,
+            grip: None,
             grip_from_tool: Quat::IDENTITY,
             workspace: Workspace::default(),
         }
@@ -89,7 +92,7 @@ impl Haply {
     /// Connects to the service and takes the device.
     pub fn open(config: &Config) -> Result<Self, DeviceError> {
         let mut socket = connect(&config.service)?;
-        let device = find(&mut socket, config.device.as_deref())?;
+        let (device, grip) = find(&mut socket, config.device.as_deref(), config.grip.as_deref())?;
         let events = WebSocket::connect(&config.events, PATIENCE).ok();
 
         let watch = Watch::default();
@@ -100,6 +103,7 @@ impl Haply {
         let pump = Pump {
             socket,
             device,
+            grip,
             news: news_in,
             wishes: wish_out,
             flags: flags.clone(),
@@ -222,7 +226,7 @@ pub(crate) fn probe() -> Result<Vec<Listed>, DeviceError> {
 pub fn list(config: &Config) -> Result<Vec<Listed>, DeviceError> {
     let mut socket = connect(&config.service)?;
     let listed = |id: String| Listed { name: format!("haply:{id}"), state: "ready".to_owned() };
-    let found = devices(&mut socket, None).map(|ids| ids.into_iter().map(listed).collect());
+    let found = devices(&mut socket, None).map(|(ids, _)| ids.into_iter().map(listed).collect());
     socket.close();
     found
 }
@@ -232,20 +236,25 @@ fn connect(service: &str) -> Result<WebSocket, DeviceError> {
         .map_err(|error| not_opened(error.to_string(), "install and start Haply's Inverse service"))
 }
 
-/// Introduces us to the wanted device, or the first, and gives its id.
-fn find(socket: &mut WebSocket, wanted: Option<&str>) -> Result<String, DeviceError> {
-    let device = devices(socket, wanted)?.swap_remove(0);
+/// Introduces us to the wanted device, or the first; gives its id and that of the grip.
+fn find(
+    socket: &mut WebSocket,
+    wanted: Option<&str>,
+    grip: Option<&str>,
+) -> Result<(String, Option<String>), DeviceError> {
+    let (mut devices, inventory) = devices(socket, wanted)?;
+    let (device, grip) = (devices.swap_remove(0), protocol::grip(&inventory, grip));
     socket.send(&protocol::hello(&device)).map_err(broken)?;
     socket.receive(PATIENCE).map_err(broken)?;
-    Ok(device)
+    Ok((device, grip))
 }
 
 fn broken(error: std::io::Error) -> DeviceError {
     not_opened(error.to_string(), "restart Haply's Inverse service")
 }
 
-/// Reads the inventory: ids of the devices that answer to `wanted`, at least one.
-fn devices(socket: &mut WebSocket, wanted: Option<&str>) -> Result<Vec<String>, DeviceError> {
+/// Reads the inventory: ids of the devices that answer to `wanted`, at least one, and its text.
+fn devices(socket: &mut WebSocket, wanted: Option<&str>) -> Result<(Vec<String>, String), DeviceError> {
     let inventory = socket.receive(PATIENCE).map_err(broken)?;
     let Some(inventory) = inventory else {
         return Err(not_opened(
@@ -254,7 +263,7 @@ fn devices(socket: &mut WebSocket, wanted: Option<&str>) -> Result<Vec<String>, 
         ));
     };
     match protocol::devices(&inventory, wanted) {
-        Ok(devices) if !devices.is_empty() => Ok(devices),
+        Ok(devices) if !devices.is_empty() => Ok((devices, inventory)),
         Ok(_) => {
             let reason = wanted
                 .map_or_else(|| "no Inverse3 is connected".to_owned(), |id| format!("no Inverse3 {id} is connected"));

@@ -28,7 +28,10 @@ pub fn open(name: &DeviceName, workspace: Workspace) -> Option<Result<Hardware, 
             )
         }
         DeviceName::Haply(device) => {
-            let config = haply::Config { device: device.clone(), workspace, ..Default::default() };
+            let mut ids =
+                device.iter().flat_map(|ids| ids.split('+')).map(|id| Some(id.to_owned()).filter(|id| !id.is_empty()));
+            let (device, grip) = (ids.next().flatten(), ids.next().flatten());
+            let config = haply::Config { device, grip, workspace, ..Default::default() };
             Some(haply::Haply::open(&config).map(|d| Hardware { watch: d.watch(), device: Box::new(d) }))
         }
         DeviceName::SpaceMouse => {

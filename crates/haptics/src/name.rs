@@ -19,7 +19,7 @@ pub enum DeviceName {
     OpenHaptics(Option<String>),
     /// `force-dimension[:N]`: omega, delta, sigma, lambda, Falcon; the first, or by its number from 0.
     ForceDimension(Option<u8>),
-    /// `haply[:ID]`: Inverse3 with VerseGrip, through its service; the first, or by its four hexadecimal digits.
+    /// `haply[:ID[+GRIP]]`: Inverse3 with VerseGrip, through its service; the first, or by their four hexadecimal digits.
     Haply(Option<String>),
     /// `spacemouse`: a six-axis knob, without force.
     SpaceMouse,
@@ -68,8 +68,7 @@ pub enum NameError {
     },
 }
 
-const KNOWN: &str =
-    "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension[:N], haply[:ID], spacemouse";
+const KNOWN: &str = "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension[:N], haply[:ID[+GRIP]], spacemouse";
 
 impl DeviceName {
     /// Whether both names may stand for one device of metal: a name that leaves out which may be any of its kind.
@@ -77,10 +76,13 @@ impl DeviceName {
         fn meet<T: PartialEq>(one: &Option<T>, other: &Option<T>) -> bool {
             one.is_none() || other.is_none() || one == other
         }
+        /// The device's own id, without its grip's.
+        fn inverse(ids: &Option<String>) -> Option<&str> {
+            ids.as_deref().and_then(|ids| ids.split('+').next()).filter(|id| !id.is_empty())
+        }
         match (self, other) {
-            (Self::OpenHaptics(one), Self::OpenHaptics(other)) | (Self::Haply(one), Self::Haply(other)) => {
-                meet(one, other)
-            }
+            (Self::OpenHaptics(one), Self::OpenHaptics(other)) => meet(one, other),
+            (Self::Haply(one), Self::Haply(other)) => meet(&inverse(one), &inverse(other)),
             (Self::ForceDimension(one), Self::ForceDimension(other)) => meet(one, other),
             _ => *self == Self::SpaceMouse && *other == Self::SpaceMouse,
         }
@@ -178,6 +180,7 @@ mod tests {
             "force-dimension:1",
             "haply",
             "haply:049D",
+            "haply:049D+60BD",
             "spacemouse",
         ];
         for name in names {
@@ -188,6 +191,7 @@ mod tests {
     #[test]
     fn two_names_of_one_device_are_told() {
         let may = |one: &str, other: &str| one.parse::<DeviceName>().unwrap().may_be(&other.parse().unwrap());
+        assert!(may("haply:049D+60BD", "haply:049D+71CE") && !may("haply:049D+60BD", "haply:049E+60BD"));
         assert!(may("haply", "haply:049D") && may("haply:049d", "haply:049D") && !may("haply:049E", "haply:049D"));
         assert!(may("force-dimension", "force-dimension:1") && !may("force-dimension:0", "force-dimension:1"));
         assert!(

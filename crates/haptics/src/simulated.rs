@@ -207,7 +207,7 @@ impl HapticDevice for Simulated {
 
     fn capabilities(&self) -> Capabilities {
         Capabilities {
-            name: format!("simulated, {:.0} g, {} ticks late", self.config.mass_g, self.config.delay_ticks),
+            name: format!("simulated, {:.0} g, delay of {} ticks", self.config.mass_g, self.config.delay_ticks),
             peak_force_n: self.config.peak_force_n,
             continuous_force_n: 0.27 * self.config.peak_force_n,
             rate_hz: self.config.rate_hz,

@@ -86,8 +86,15 @@ pub(super) fn devices(message: &str, wanted: Option<&str>) -> Result<Vec<String>
     Ok(ids.filter(|id| wanted.is_none_or(|wanted| wanted.eq_ignore_ascii_case(id))).map(str::to_owned).collect())
 }
 
-/// What a message says about `device`. `None` in its place means that the device is not in a list that is there: gone.
-pub(super) fn frame(message: &str, device: &str) -> Result<Option<Frame>, Garbled> {
+/// The grip to listen to: the wanted one, or the first that is listed.
+pub(super) fn grip(message: &str, wanted: Option<&str>) -> Option<String> {
+    let message = object(message).ok()?;
+    let listed = grips(&message).find_map(|entry| entry["device_id"].as_str().map(str::to_owned));
+    wanted.map(str::to_uppercase).or(listed)
+}
+
+/// What a message says about `device` and `grip`, without which any grip will do. A grip in several lists is read once. `None` in its place means that the device is not in a list that is there: gone.
+pub(super) fn frame(message: &str, device: &str, grip: Option<&str>) -> Result<Option<Frame>, Garbled> {
     let message = object(message)?;
     let mut frame = Frame::default();
     let listed = entries(&message, "inverse3").find(|entry| entry["device_id"] == device);
@@ -101,8 +108,9 @@ pub(super) fn frame(message: &str, device: &str) -> Result<Option<Frame>, Garble
     } else if message.get("inverse3").is_some() {
         return Ok(None);
     }
-    let grips = ["verse_grip", "wireless_verse_grip", "custom_verse_grip"];
-    let states = grips.iter().flat_map(|kind| entries(&message, kind));
+    let held =
+        |entry: &&Value| grip.is_none_or(|id| entry["device_id"].as_str().is_some_and(|d| d.eq_ignore_ascii_case(id)));
+    let states = grips(&message).filter(held);
     if let Some(grip) = states.filter_map(|entry| GripState::deserialize(&entry["state"]).ok()).next() {
         frame.orientation =
             grip.orientation.as_ref().map(|q| Quat::from_xyzw(q.x, q.y, q.z, q.w)).filter(|q| q.length() > 0.5);
@@ -164,6 +172,10 @@ fn entries<'a>(message: &'a Value, kind: &str) -> impl Iterator<Item = &'a Value
     message[kind].as_array().into_iter().flatten()
 }
 
+fn grips(message: &Value) -> impl Iterator<Item = &Value> {
+    ["verse_grip", "wireless_verse_grip", "custom_verse_grip"].into_iter().flat_map(|kind| entries(message, kind))
+}
+
 impl Vector {
     fn vec3(&self) -> Vec3 {
         Vec3::new(self.x, self.y, self.z)
@@ -201,7 +213,7 @@ mod tests {
 
     #[test]
     fn a_frame_is_read_past_malformed_neighbours() {
-        let frame = frame(FRAME, "049D").unwrap().unwrap();
+        let frame = frame(FRAME, "049D", None).unwrap().unwrap();
         assert_eq!(frame.cursor, Some((Vec3::new(0.01, 0.02, 0.03), Vec3::new(1.0, 2.0, 3.0))));
         assert_eq!(
             (frame.status, frame.orientation, frame.buttons),
@@ -213,23 +225,35 @@ mod tests {
     }
 
     #[test]
+    fn the_wanted_grip_is_heard_wherever_it_is_listed() {
+        let entry = |id: &str, a: bool| format!(r#"{{"device_id":"{id}","state":{{"buttons":{{"a":{a}}}}}}}"#);
+        let (left, right) = (entry("60BD", false), entry("71CE", true));
+        let message = format!(r#"{{"wireless_verse_grip":[{left}],"custom_verse_grip":[{left},{right}]}}"#);
+        let pedal = |grip| frame(&message, "1", grip).unwrap().unwrap().buttons;
+        assert_eq!([None, Some("60bd"), Some("71CE")].map(pedal), [0, 0, 1].map(|bits| Some(Buttons(bits))));
+        assert_eq!(pedal(Some("0000")), None);
+        assert_eq!((grip(&message, None), grip(&message, Some("71ce"))), (Some("60BD".into()), Some("71CE".into())));
+        assert_eq!(grip("{}", None), None);
+    }
+
+    #[test]
     fn absence_of_a_list_is_no_news_and_absence_from_it_is_loss() {
-        assert_eq!(frame("{}", "049D"), Ok(Some(Frame::default())));
-        assert_eq!(frame(r#"{"inverse3":[]}"#, "049D"), Ok(None));
+        assert_eq!(frame("{}", "049D", None), Ok(Some(Frame::default())));
+        assert_eq!(frame(r#"{"inverse3":[]}"#, "049D", None), Ok(None));
     }
 
     #[test]
     fn an_old_service_and_garbage_are_told_apart() {
-        assert_eq!(frame(r#"{"inverse3":{"049D":{}}}"#, "049D"), Err(Garbled::TooOld));
-        assert_eq!(frame("{\"inverse3", "049D"), Err(Garbled::NotJson));
-        assert_eq!(frame("[1]", "049D"), Err(Garbled::NotJson));
+        assert_eq!(frame(r#"{"inverse3":{"049D":{}}}"#, "049D", None), Err(Garbled::TooOld));
+        assert_eq!(frame("{\"inverse3", "049D", None), Err(Garbled::NotJson));
+        assert_eq!(frame("[1]", "049D", None), Err(Garbled::NotJson));
     }
 
     #[test]
     fn force_is_refused_unless_powered_calibrated_and_ready() {
         let status = |text: &str| {
             let message = format!(r#"{{"inverse3":[{{"device_id":"1","status":{{{text}}}}}]}}"#);
-            frame(&message, "1").unwrap().unwrap().status.unwrap()
+            frame(&message, "1", None).unwrap().unwrap().status.unwrap()
         };
         assert_eq!(status(r#""calibrated":true,"ready":true"#), Err(Fault::NoPower));
         assert_eq!(status(r#""power_supply":true,"ready":true"#), Err(Fault::NotCalibrated));
@@ -250,7 +274,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_text_is_read_without_a_panic(text in "\\PC{0,200}") {
-            let _ = (frame(&text, "1"), devices(&text, None), event(&text));
+            let _ = (frame(&text, "1", None), devices(&text, None), event(&text));
         }
     }
 }

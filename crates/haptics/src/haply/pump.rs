@@ -60,6 +60,8 @@ pub(super) struct Flags {
 pub(super) struct Pump {
     pub socket: WebSocket,
     pub device: String,
+    /// Id of the grip; any where there is none.
+    pub grip: Option<String>,
     pub news: Input<News>,
     pub wishes: Output<Wish>,
     pub flags: Arc<Flags>,
@@ -133,7 +135,7 @@ impl Pump {
                 continue;
             };
             owed -= 1;
-            match protocol::frame(&message, &self.device) {
+            match protocol::frame(&message, &self.device, self.grip.as_deref()) {
                 Ok(Some(frame)) => {
                     self.garbled = 0;
                     self.publish(frame);
