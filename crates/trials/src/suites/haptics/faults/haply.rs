@@ -27,7 +27,7 @@ struct Inverse {
 pub fn rows(scope: Scope) -> Vec<Row> {
     let in_use = cases().into_iter().filter_map(|case| {
         let courses: Result<Vec<_>, DeviceError> =
-            (0..scope.pick(2, 5)).map(|_| Ok(run(&mut Inverse::new()?, &case))).collect();
+            (0..scope.pick(3, 5)).map(|_| Ok(run(&mut Inverse::new()?, &case))).collect();
         Some(row(DRIVER, &case, &courses.ok()?))
     });
     in_use.chain(at_opening()).collect()
