@@ -23,13 +23,13 @@
 //! doubts too much rather than too little: damping costs no force at rest.
 //!
 //! # Practice
-//! Energy in N mm (= mJ). What the user has put in is credited up to `max_stored_nmm` only, since a long quiet history would
+//! Energy in N mm (= mJ). What the user has put in is credited up to `max_stored_nmm`, and until the contact ends: a long quiet history would
 //! hide a fresh oscillation (Ryu's problem of the full tank). While the hand rests a negative account fades in `recovery_ms`.
 //! A device that applies forces late is told by `delay_ticks`: the account then books the force that the hand feels.
 //!
 //! # Limits
 //! The motors give out at most 0.1 mJ more than they got with exact positions, delays to 2 ticks and walls to 2 N/mm, over any number of
-//! contacts, as long as nothing is restarted or fades. A restart may give up to `max_stored_nmm`. With encoder steps add what
+//! contacts and over each by itself, as long as nothing is restarted or fades. A restart may give up to `max_stored_nmm`. With encoder steps add what
 //! they hide, `|F| Δ`; an oscillation within one step is not seen at all. It is stilled by the device's own friction if that is at
 //! least `k Δ/2` (Abbott and Okamura), else it stays at about one step. A delay that is declared too small leaks `k v² T` a tick for each.
 //!
@@ -116,7 +116,7 @@ impl PassivityObserver {
     /// `touching`: the scene wants a force.
     pub fn book(&mut self, tip: Vec3, touching: bool, dt_ms: f32, config: &PassivityConfig) {
         let moved = self.track.follow(tip, config.quantum_mm);
-        let felt = self.sent[usize::from(config.delay_ticks).min(MAX_DELAY)].as_dvec3();
+        let felt = self.sent[late(config)].as_dvec3();
         let (sure, seen) = (-felt.dot(moved.sure.as_dvec3()), -felt.dot(moved.seen.as_dvec3()));
         if !sure.is_finite() || !seen.is_finite() {
             return;
@@ -128,6 +128,10 @@ impl PassivityObserver {
             self.energy_nmm *= 1.0 - f64::from(share(dt_ms, config.recovery_ms));
         }
         self.doubted_nmm = (self.doubted_nmm + seen).min(most);
+        if !touching && self.sent[..=late(config)].iter().all(|force| *force == Vec3::ZERO) {
+            // The wall holds nothing: what an earlier contact put in pays for no later one.
+            self.energy_nmm = self.energy_nmm.min(0.0);
+        }
         if !touching {
             self.doubted_nmm *= 1.0 - f64::from(share(dt_ms, config.recovery_ms));
         }
@@ -157,7 +161,7 @@ impl PassivityObserver {
 
     /// The share of `force` that the account can pay for in the coming tick, 0 to 1; always 1 for a hand at rest.
     pub fn affordable(&self, force: Vec3, config: &PassivityConfig) -> f32 {
-        let late = usize::from(config.delay_ticks).min(MAX_DELAY);
+        let late = late(config);
         let motion = self.track.motion();
         // Between encoder steps a change of motion is not known; with exact positions it is the best guess of the next one.
         let change = if config.quantum_mm > 0.0 { 0.0 } else { self.track.unevenness() };
@@ -220,6 +224,11 @@ impl PassivityObserver {
         let needed = (DAMPING_PER_NMM * made) as f32;
         self.damping = self.damping.max(needed.min(config.max_damping));
     }
+}
+
+/// Ticks between a force and the hand.
+fn late(config: &PassivityConfig) -> usize {
+    usize::from(config.delay_ticks).min(MAX_DELAY)
 }
 
 /// The part of `whole_ms` that `dt_ms` is, 0 to 1.
@@ -295,6 +304,15 @@ mod tests {
             hand.tick(Vec3::ZERO, Vec3::ZERO);
         }
         assert!((hand.0.damping() - 10.0 / std::f32::consts::E).abs() < 0.1, "{}", hand.0.damping());
+    }
+
+    #[test]
+    fn what_one_contact_put_in_pays_for_no_later_one() {
+        let mut hand = Hand::new();
+        assert_eq!(hand.tick(Vec3::Z, Vec3::NEG_Z * 0.5).energy_nmm(), 0.5);
+        assert_eq!(hand.tick(Vec3::ZERO, Vec3::ZERO).energy_nmm(), 0.0);
+        hand.tick(Vec3::Z, Vec3::Z * 0.25);
+        assert_eq!(hand.tick(Vec3::ZERO, Vec3::Z).energy_nmm(), -0.25, "a debt stays");
     }
 
     #[test]
