@@ -28,20 +28,24 @@ use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
 use trepan_haptics::simulated::{Config, Hand, Simulated};
 
-const TICK_MS: f32 = 1.0;
 /// A hand comes this fast, mm/ms.
 const APPROACH: f32 = 0.1;
-const PRESS_TICKS: usize = 3000;
-/// The ticks at the end over which a press is judged.
-const JUDGED_TICKS: usize = 1000;
+const PRESS_MS: f32 = 3000.0;
+/// The time at the end over which a press is judged, ms.
+const JUDGED_MS: f32 = 1000.0;
+/// How long a wandering hand keeps an aim on average, and how fast it goes there, ms.
+const AIM_MS: f32 = 125.0;
+const FOLLOW_MS: f32 = 25.0;
 const NMM_PER_J: f64 = 1000.0;
 
-/// A device at hand.
-const DEVICES: [(&str, f32, f32); 4] = [
-    ("Touch", 0.26, 0.055),
-    ("exact positions, no friction", 0.0, 0.0),
-    ("10 µm steps, no friction", 0.0, 0.01),
-    ("55 µm steps, no friction", 0.0, 0.055),
+/// A device at hand: name, friction, encoder step, length of a tick.
+const DEVICES: [(&str, f32, f32, f32); 6] = [
+    ("Touch", 0.26, 0.055, 1.0),
+    ("exact positions, no friction", 0.0, 0.0, 1.0),
+    ("10 µm steps, no friction", 0.0, 0.01, 1.0),
+    ("55 µm steps, no friction", 0.0, 0.055, 1.0),
+    ("Touch at 4 kHz", 0.26, 0.055, 0.25),
+    ("exact positions, no friction, 4 kHz", 0.0, 0.0, 0.25),
 ];
 
 /// Light, firm, and a finger that hardly damps.
@@ -58,6 +62,7 @@ struct Coupling {
     device: Config,
     hand: Hand,
     wall: Viscoelastic,
+    tick_ms: f32,
 }
 
 impl Coupling {
@@ -72,11 +77,15 @@ impl Coupling {
     /// With the wall as a session would give it to this device.
     fn limited(&self) -> Self {
         let device = Simulated::new(self.device, self.hand, Box::new(Replay::new(vec![at(0.0)])));
-        Self { wall: device.capabilities().coupled(self.wall, TICK_MS), ..*self }
+        Self { wall: device.capabilities().coupled(self.wall, self.tick_ms), ..*self }
     }
 
     fn late_ms(&self) -> f32 {
-        (0.5 + self.device.delay_ticks as f32) * TICK_MS
+        (0.5 + self.device.delay_ticks as f32) * self.tick_ms
+    }
+
+    fn ticks(&self, time_ms: f32) -> usize {
+        (time_ms / self.tick_ms).ceil() as usize
     }
 
     fn gil(&self) -> f32 {
@@ -94,6 +103,7 @@ const MILLION: Coupling = Coupling {
     device: Config::TOUCH,
     hand: Hand::LIGHT,
     wall: Viscoelastic { stiffness: 2.0, damping: 0.5 },
+    tick_ms: 1.0,
 };
 
 /// Presses for every coupling with and without the controller, then hands that wander; last the pace of the loop.
@@ -132,14 +142,20 @@ fn couplings(scope: Scope) -> Vec<(String, Coupling)> {
     let stiffnesses = scope.pick(&[0.3f32, 0.8, 2.0, 5.0][..], &[0.1, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0][..]);
     let dampings = scope.pick(&[0.0f32, 0.5][..], &[0.0, 0.5, 1.0, 2.0][..]);
     let mut found = Vec::new();
-    for (name, friction_n, quantum_mm) in DEVICES {
-        for (grip, hand) in HANDS {
-            for delay_ticks in [0, 1, 2] {
+    for (name, friction_n, quantum_mm, tick_ms) in DEVICES {
+        // Four times the ticks: the other rate is tried where it matters.
+        let (hands, delays, dampings) = if tick_ms < 1.0 {
+            (&HANDS[..1], &[1, 2][..], &[0.5f32][..])
+        } else {
+            (&HANDS[..], &[0, 1, 2][..], dampings)
+        };
+        for &(grip, hand) in hands {
+            for &delay_ticks in delays {
                 for &stiffness in stiffnesses {
                     for &damping in dampings {
                         let device = Config { friction_n, quantum_mm, delay_ticks, ..Config::default() };
                         let wall = Viscoelastic { stiffness, damping };
-                        let coupling = Coupling { names: [name, grip], device, hand, wall };
+                        let coupling = Coupling { names: [name, grip], device, hand, wall, tick_ms };
                         found.push((format!("{name}, {grip}, {delay_ticks} ticks late"), coupling));
                     }
                 }
@@ -208,7 +224,8 @@ impl Account {
 
 /// The hand's intent tick by tick, against a wall at x ≤ 0.
 fn run_loop(coupling: &Coupling, intent: Vec<ToolState>, ticks: usize, guarded: bool) -> Run {
-    let Coupling { device: config, hand, mut wall, .. } = *coupling;
+    let Coupling { device: config, hand, mut wall, tick_ms, .. } = *coupling;
+    let judged_ticks = coupling.ticks(JUDGED_MS);
     let mut device = Simulated::new(config, hand, Box::new(Replay::new(intent)));
     let told = device.capabilities().guard_config();
     let passivity = told.passivity.filter(|_| guarded);
@@ -218,16 +235,16 @@ fn run_loop(coupling: &Coupling, intent: Vec<ToolState>, ticks: usize, guarded: 
     let (mut wanted_n, mut given_n) = (0.0f32, 0.0f32);
     for tick in 0..ticks {
         let (from, motor) = (device.position(), device.motor_force());
-        let tool = device.read(tick as f64 * f64::from(TICK_MS)).tool;
+        let tool = device.read(tick as f64 * f64::from(tick_ms)).tool;
         let way = if tick == 0 { Vec3::ZERO } else { device.position() - from };
-        let lost = config.damping * way.length_squared() / TICK_MS + config.friction_n * way.length();
+        let lost = config.damping * way.length_squared() / tick_ms + config.friction_n * way.length();
         motors.book(-motor.dot(way), motor);
         to_hand.book(lost - motor.dot(way), motor);
-        let wrench = wall.wrench(&tool, &touch(&tool), TICK_MS);
-        let given = guard.guard(wrench, &tool, TICK_MS);
+        let wrench = wall.wrench(&tool, &touch(&tool), tick_ms);
+        let given = guard.guard(wrench, &tool, tick_ms);
         device.apply(given);
-        if tick + JUDGED_TICKS >= ticks {
-            let (way, x) = (&mut ways[usize::from(2 * (ticks - tick) <= JUDGED_TICKS)], device.position().x);
+        if tick + judged_ticks >= ticks {
+            let (way, x) = (&mut ways[usize::from(2 * (ticks - tick) <= judged_ticks)], device.position().x);
             *way = (way.0.min(x), way.1.max(x));
             wanted_n += wrench.force.length().min(guard.config().max_force_n);
             given_n += given.force().length();
@@ -263,9 +280,10 @@ fn press_row(scene: &str, wanted: &Coupling, method: &str, scope: Scope) -> Row 
     let coupling = if method == "limited" { &limited } else { wanted };
     let press = |&force_n: &f32| {
         let depth = force_n / coupling.wall.stiffness + force_n / coupling.hand.stiffness;
-        let steps = ((2.0 + depth) / APPROACH).ceil() as usize;
-        let intent = (0..=steps).map(|step| at((2.0 - APPROACH * step as f32).max(-depth))).collect();
-        run_loop(coupling, intent, PRESS_TICKS, method != "unguarded")
+        let way = APPROACH * coupling.tick_ms;
+        let steps = ((2.0 + depth) / way).ceil() as usize;
+        let intent = (0..=steps).map(|step| at((2.0 - way * step as f32).max(-depth))).collect();
+        run_loop(coupling, intent, coupling.ticks(PRESS_MS), method != "unguarded")
     };
     let presses = scope.pick(&[1.0f32, 2.0][..], &[0.3, 1.0, 2.0][..]);
     let worst = presses.iter().map(press).reduce(Run::or).unwrap_or_default();
@@ -282,10 +300,10 @@ fn wander_row(scene: &str, coupling: &Coupling, seed: usize, ticks: usize) -> Ro
     let mut intent = Vec::with_capacity(ticks);
     let (mut aim, mut place) = (2.0f32, 2.0f32);
     while intent.len() < ticks {
-        if random.u32(0..125) == 0 {
+        if random.f32() < coupling.tick_ms / AIM_MS {
             aim = 2.0 - 10.0 * random.f32();
         }
-        place += 0.04 * (aim - place);
+        place += coupling.tick_ms / FOLLOW_MS * (aim - place);
         intent.push(at(place));
     }
     let found = run_loop(coupling, intent, ticks, true);
@@ -293,12 +311,13 @@ fn wander_row(scene: &str, coupling: &Coupling, seed: usize, ticks: usize) -> Ro
 }
 
 fn row(scene: &str, coupling: &Coupling, method: &str, run: &Run) -> Row {
-    let Coupling { names: [name, grip], device, hand, wall } = coupling;
+    let Coupling { names: [name, grip], device, hand, wall, tick_ms } = coupling;
     Row::new(scene, method)
         .with("device", *name)
         .with("hand", *grip)
         .with("stiffness_n_per_mm", wall.stiffness)
         .with("damping_n_ms_per_mm", wall.damping)
+        .with("rate_hz", 1e3 / tick_ms)
         .with("delay_ticks", device.delay_ticks)
         .with("quantum_mm", device.quantum_mm)
         .with("friction_n", device.friction_n)
@@ -353,7 +372,7 @@ mod tests {
     fn coupling(stiffness: f32, delay_ticks: usize) -> Coupling {
         let device = Config { friction_n: 0.0, quantum_mm: 0.0, delay_ticks, ..Config::default() };
         let wall = Viscoelastic { stiffness, damping: 0.0 };
-        Coupling { names: ["bench", "light grip"], device, hand: Hand::LIGHT, wall }
+        Coupling { names: ["bench", "light grip"], device, hand: Hand::LIGHT, wall, tick_ms: 1.0 }
     }
 
     #[test]
