@@ -34,18 +34,15 @@ macro_rules! tled {
     };
 }
 
-/// Forces of neo-Hookean tetrahedra on their nodes. This and the other laws' want `const RELAXES` and `const CURES` before them.
-pub const TLED_NEO_HOOKEAN: &str = tled!("element.wgsl", "neo_hookean.wgsl", "forces.wgsl");
-/// Forces of St. Venant-Kirchhoff's.
-pub const TLED_ST_VENANT_KIRCHHOFF: &str = tled!("element.wgsl", "st_venant_kirchhoff.wgsl", "forces.wgsl");
-/// Forces of Mooney-Rivlin's.
-pub const TLED_MOONEY_RIVLIN: &str = tled!("element.wgsl", "mooney_rivlin.wgsl", "forces.wgsl");
-/// Forces of Ogden's.
-pub const TLED_OGDEN: &str = tled!("element.wgsl", "ogden.wgsl", "forces.wgsl");
-/// Volume change of every tetrahedron.
-pub const TLED_VOLUMES: &str = tled!("element.wgsl", "volumes.wgsl");
-/// Mean volume change around the nodes.
-pub const TLED_SEATS: &str = tled!("seats.wgsl");
+/// Forces of tetrahedra on their nodes by law: neo-Hookean, St. Venant-Kirchhoff, Mooney-Rivlin, Ogden. They want `const RELAXES` and `const CURES` before them.
+pub const TLED_FORCES: [&str; 4] = [
+    tled!("element.wgsl", "neo_hookean.wgsl", "forces.wgsl"),
+    tled!("element.wgsl", "st_venant_kirchhoff.wgsl", "forces.wgsl"),
+    tled!("element.wgsl", "mooney_rivlin.wgsl", "forces.wgsl"),
+    tled!("element.wgsl", "ogden.wgsl", "forces.wgsl"),
+];
+/// Volume change of every tetrahedron, and its mean around the nodes.
+pub const TLED_VOLUMES: [&str; 2] = [tled!("element.wgsl", "volumes.wgsl"), tled!("seats.wgsl")];
 /// The tool's spring on the tissue.
 pub const TLED_PRESS: &str = tled!("press.wgsl");
 /// What nodes gather of the forces, and their motion.

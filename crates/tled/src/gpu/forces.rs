@@ -17,7 +17,7 @@ use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhof
 use crate::layout::{Layout, kind};
 use crate::scaling::Scaling;
 use trepan_gpu::{Bindings, Buffer, Dispatches, Gpu, GpuError, Kernel, Slot};
-use trepan_shaders::{TLED_MOONEY_RIVLIN, TLED_NEO_HOOKEAN, TLED_OGDEN, TLED_ST_VENANT_KIRCHHOFF};
+use trepan_shaders::TLED_FORCES;
 use trepan_soft::{Body, Law};
 
 /// Elements on the device and the kernels of their forces.
@@ -92,12 +92,7 @@ impl Forces {
 
 /// The kernel of a tetrahedron's law, with what the body needs.
 fn text(body: &Body, tet: u32, relaxes: bool, cures: bool) -> String {
-    let law = match body.material(tet as usize).law() {
-        Law::NeoHookean(_) => TLED_NEO_HOOKEAN,
-        Law::StVenantKirchhoff { .. } => TLED_ST_VENANT_KIRCHHOFF,
-        Law::MooneyRivlin { .. } => TLED_MOONEY_RIVLIN,
-        Law::Ogden { .. } => TLED_OGDEN,
-    };
+    let law = TLED_FORCES[usize::from(kind(body, tet))];
     format!("const RELAXES = {relaxes};\nconst CURES = {cures};\n{law}")
 }
 

@@ -10,7 +10,7 @@ use crate::gpu::{LANES, groups};
 use crate::layout::Layout;
 use crate::seats::Seats;
 use trepan_gpu::{Bindings, Buffer, Dispatches, Gpu, GpuError, Kernel, Slot};
-use trepan_shaders::{TLED_SEATS, TLED_VOLUMES};
+use trepan_shaders::TLED_VOLUMES;
 use trepan_soft::Body;
 
 /// The kernels of the cure.
@@ -37,7 +37,7 @@ impl Volumes {
         let inverse = Buffer::from_slice(gpu, "inverse volumes", &seats.inverse_volumes(body, layout))?;
         let mut wanted = [Slot::Storage; 6];
         (wanted[0], wanted[5]) = (Slot::Uniform, Slot::StorageMut);
-        let volumes = Kernel::new(gpu, "volumes", TLED_VOLUMES, "main", &wanted)?;
+        let volumes = Kernel::new(gpu, "volumes", TLED_VOLUMES[0], "main", &wanted)?;
         let step = &state.step;
         let of_volumes = [
             step.into(),
@@ -48,7 +48,7 @@ impl Volumes {
             (&swollen).into(),
         ];
         let of_volumes = volumes.bind(gpu, &of_volumes)?;
-        let means = Kernel::new(gpu, "seats", TLED_SEATS, "main", &wanted)?;
+        let means = Kernel::new(gpu, "seats", TLED_VOLUMES[1], "main", &wanted)?;
         let of_means = [
             step.into(),
             (&starts).into(),
