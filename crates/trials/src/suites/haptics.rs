@@ -16,17 +16,19 @@
 //! where the limited wall is. The declared range, to which gates apply: a hand with a grip, walls to 2 N/mm, delays to 2 ticks, `K Δ/2 ≤ f_c`. All other rows are
 //! shown beside; there the guard must act and count it.
 
+mod coupling;
 mod faults;
 mod maps;
 mod pace;
 
 use super::Scope;
 use crate::suite::{Findings, Gate, Row};
-use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardCounters, Viscoelastic};
+use coupling::{Coupling, MILLION};
+use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardCounters};
 use trepan_geometry::{Pose, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::Simulated;
 
 /// A hand comes this fast, mm/ms.
 const APPROACH: f32 = 0.1;
@@ -38,78 +40,10 @@ const AIM_MS: f32 = 125.0;
 const FOLLOW_MS: f32 = 25.0;
 const NMM_PER_J: f64 = 1000.0;
 
-/// A device at hand: name, friction, encoder step, length of a tick.
-const DEVICES: [(&str, f32, f32, f32); 6] = [
-    ("Touch", 0.26, 0.055, 1.0),
-    ("exact positions, no friction", 0.0, 0.0, 1.0),
-    ("10 µm steps, no friction", 0.0, 0.01, 1.0),
-    ("55 µm steps, no friction", 0.0, 0.055, 1.0),
-    ("Touch at 4 kHz", 0.26, 0.055, 0.25),
-    ("exact positions, no friction, 4 kHz", 0.0, 0.0, 0.25),
-];
-
-/// Light, firm, and a finger that hardly damps.
-const HANDS: [(&str, Hand); 3] = [
-    ("light grip", Hand::LIGHT),
-    ("firm grip", Hand::FIRM),
-    ("loose finger", Hand { mass_g: 10.0, damping: 0.1, stiffness: 0.1 }),
-];
-
-/// One coupling.
-#[derive(Clone, Copy)]
-struct Coupling {
-    names: [&'static str; 2],
-    device: Config,
-    hand: Hand,
-    wall: Viscoelastic,
-    tick_ms: f32,
-}
-
-impl Coupling {
-    /// Whether the promises hold for it.
-    fn declared(&self) -> bool {
-        let device = &self.device;
-        let grip = self.hand.damping >= Hand::LIGHT.damping;
-        let seen = 0.5 * self.wall.stiffness * device.quantum_mm <= device.friction_n;
-        grip && seen && self.wall.stiffness <= 2.0 && device.delay_ticks <= 2
-    }
-
-    /// With the wall as a session would give it to this device.
-    fn limited(&self) -> Self {
-        let device = Simulated::new(self.device, self.hand, Box::new(Replay::new(vec![at(0.0)])));
-        Self { wall: device.capabilities().coupled(self.wall, self.tick_ms), ..*self }
-    }
-
-    fn late_ms(&self) -> f32 {
-        (0.5 + self.device.delay_ticks as f32) * self.tick_ms
-    }
-
-    fn ticks(&self, time_ms: f32) -> usize {
-        (time_ms / self.tick_ms).ceil() as usize
-    }
-
-    fn gil(&self) -> f32 {
-        (self.device.damping + self.hand.damping + self.wall.damping) / self.late_ms()
-    }
-
-    fn colgate(&self) -> f32 {
-        (self.device.damping - self.wall.damping).max(0.0) / self.late_ms()
-    }
-}
-
-/// The wall of a session on a Touch.
-const MILLION: Coupling = Coupling {
-    names: ["Touch", "light grip"],
-    device: Config::TOUCH,
-    hand: Hand::LIGHT,
-    wall: Viscoelastic { stiffness: 2.0, damping: 0.5 },
-    tick_ms: 1.0,
-};
-
 /// Presses for every coupling with and without the controller, then hands that wander; last the pace of the loop.
 pub fn run(scope: Scope) -> Findings {
     let mut findings = Findings::default();
-    for (number, (scene, coupling)) in couplings(scope).into_iter().enumerate() {
+    for (number, (scene, coupling)) in coupling::all(scope).into_iter().enumerate() {
         if scope.takes(number) {
             findings.rows.push(press_row(&scene, &coupling, "guarded", scope));
             findings.rows.push(press_row(&scene, &coupling, "unguarded", scope));
@@ -136,33 +70,6 @@ pub fn run(scope: Scope) -> Findings {
         findings.rows.extend(pace::rows(scope));
     }
     findings
-}
-
-fn couplings(scope: Scope) -> Vec<(String, Coupling)> {
-    let stiffnesses = scope.pick(&[0.3f32, 0.8, 2.0, 5.0][..], &[0.1, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0][..]);
-    let dampings = scope.pick(&[0.0f32, 0.5][..], &[0.0, 0.5, 1.0, 2.0][..]);
-    let mut found = Vec::new();
-    for (name, friction_n, quantum_mm, tick_ms) in DEVICES {
-        // Four times the ticks: the other rate is tried where it matters.
-        let (hands, delays, dampings) = if tick_ms < 1.0 {
-            (&HANDS[..1], &[1, 2][..], &[0.5f32][..])
-        } else {
-            (&HANDS[..], &[0, 1, 2][..], dampings)
-        };
-        for &(grip, hand) in hands {
-            for &delay_ticks in delays {
-                for &stiffness in stiffnesses {
-                    for &damping in dampings {
-                        let device = Config { friction_n, quantum_mm, delay_ticks, ..Config::default() };
-                        let wall = Viscoelastic { stiffness, damping };
-                        let coupling = Coupling { names: [name, grip], device, hand, wall, tick_ms };
-                        found.push((format!("{name}, {grip}, {delay_ticks} ticks late"), coupling));
-                    }
-                }
-            }
-        }
-    }
-    found
 }
 
 /// What a run was like.
@@ -367,13 +274,8 @@ fn gates(rows: &[Row], scope: Scope) -> Vec<Gate> {
 
 #[cfg(test)]
 mod tests {
+    use super::coupling::tests::coupling;
     use super::*;
-
-    fn coupling(stiffness: f32, delay_ticks: usize) -> Coupling {
-        let device = Config { friction_n: 0.0, quantum_mm: 0.0, delay_ticks, ..Config::default() };
-        let wall = Viscoelastic { stiffness, damping: 0.0 };
-        Coupling { names: ["bench", "light grip"], device, hand: Hand::LIGHT, wall, tick_ms: 1.0 }
-    }
 
     #[test]
     fn what_free_motion_lost_pays_for_no_wall() {
@@ -383,16 +285,6 @@ mod tests {
         account.book(-0.1, Vec3::X);
         account.book(0.5, Vec3::X);
         assert!((account.given_j() - 0.3e-3).abs() < 1e-9, "{}", account.given_j());
-    }
-
-    #[test]
-    fn the_bounds_are_the_papers() {
-        let touch = coupling(1.0, 1);
-        assert!((touch.gil() - 1.4).abs() < 1e-6 && (touch.colgate() - 0.1 / 1.5).abs() < 1e-6);
-        assert!(touch.declared() && !coupling(2.1, 1).declared() && !coupling(1.0, 3).declared());
-        let coarse = Config { quantum_mm: 0.055, ..touch.device };
-        assert!(!Coupling { device: coarse, ..touch }.declared());
-        assert!(Coupling { device: Config { friction_n: 0.26, ..coarse }, ..touch }.declared());
     }
 
     #[test]
