@@ -10,7 +10,7 @@ use crate::handed::Handed;
 use crate::layout::Layout;
 use glam::Vec4;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use trepan_geometry::Vec3;
 use trepan_soft::Body;
 
@@ -20,8 +20,9 @@ pub(crate) struct Nodes {
     pub u: Field,
     /// Velocities, mm/ms.
     v: Field,
-    /// Forces from outside, N; cleared by the update.
+    /// Forces from outside, N; cleared by the update, and 0 everywhere while nothing pushes.
     external: Field,
+    is_pushed: AtomicBool,
     /// 1 where a load, or an awake part beside a sleeping one, pushed in the last step: no part around it may sleep.
     pub pushed: Scalars,
     /// 1/m, 1/g; 0 for fixed nodes.
@@ -57,6 +58,7 @@ impl Nodes {
             u: field(),
             v: field(),
             external: field(),
+            is_pushed: AtomicBool::new(false),
             pushed: Scalars::zeroed(layout.node_at.len()),
             inverse_mass: layout.node_at.iter().map(inverse).collect(),
             weight: layout.node_at.iter().map(|&n| (weights[n as usize] / masses[n as usize]) as f32).collect(),
@@ -73,15 +75,17 @@ impl Nodes {
         let (gravity, dt_ms) = (update.gravity.extend(0.0), update.dt_ms);
         let square = |limit: f32| (limit * limit).min(f32::MAX);
         let (fastest, furthest) = (square(update.max_speed), square(update.max_displacement_mm));
+        // What nobody needs is neither read nor written: a step has little more to do for a node than to move 100 bytes.
+        let (anything_pushes, may_sleep) = (self.is_pushed.load(Relaxed), update.calm_mm > 0.0);
         for place in places {
             let (u, v, inverse_mass) = (self.u.vector(place), self.v.vector(place), self.inverse_mass[place]);
             if inverse_mass == 0.0 {
                 // A fixed node goes on with the velocity it was given.
                 self.u.set(place, (u + v * dt_ms).to_array());
-                self.external.set(place, [0.0; 4]);
+                self.take_external(place, anything_pushes);
                 continue;
             }
-            let (mut force, external) = (handed.force(place), self.external.vector(place));
+            let (mut force, external) = (handed.force(place), self.take_external(place, anything_pushes));
             let is_beside_sleepers = force.w > 0.0;
             force.w = 0.0;
             let pull = gravity * self.weight[place] + (force + external) * inverse_mass;
@@ -94,7 +98,9 @@ impl Nodes {
                     continue;
                 }
             }
-            self.pushed.set(place, if is_pushed { 1.0 } else { 0.0 });
+            if may_sleep {
+                self.pushed.set(place, if is_pushed { 1.0 } else { 0.0 });
+            }
             let carried = match update.rigid {
                 Some(rigid) => {
                     let whole = rigid.at((self.rest[place] + u).truncate()).extend(0.0);
@@ -109,8 +115,18 @@ impl Nodes {
             let (after, velocity) = if sane { (after, velocity) } else { self.held(u, velocity, update) };
             self.u.set(place, after.to_array());
             self.v.set(place, velocity.to_array());
-            self.external.set(place, [0.0; 4]);
         }
+    }
+
+    /// Force from outside on the node at a place, N, which is thereby used up.
+    #[inline(always)]
+    fn take_external(&self, place: usize, anything_pushes: bool) -> Vec4 {
+        if !anything_pushes {
+            return Vec4::ZERO;
+        }
+        let external = self.external.vector(place);
+        self.external.set(place, [0.0; 4]);
+        external
     }
 
     /// Displacement and velocity of a node that would go too fast, too far or nowhere.
@@ -129,13 +145,15 @@ impl Nodes {
         (after, velocity)
     }
 
-    /// How many nodes were held to a limit and how many were not finite since this was last asked.
-    pub fn noticed(&self) -> [u32; 2] {
+    /// Ends an update: nothing pushes any more. Gives how many nodes were held to a limit and how many were not finite.
+    pub fn finish(&self) -> [u32; 2] {
+        self.is_pushed.store(false, Relaxed);
         [&self.limited, &self.non_finite].map(|count| count.swap(0, Relaxed))
     }
 
     /// Adds a force from outside, N.
     pub fn push(&self, place: usize, force: Vec3) {
+        self.is_pushed.store(true, Relaxed);
         self.external.set(place, (self.external.vector(place) + force.extend(0.0)).to_array());
     }
 

@@ -204,7 +204,7 @@ impl Tled {
             calm_mm: CALM * self.config.still_mm,
         };
         self.elements.update(update);
-        let [limited, non_finite] = self.elements.nodes().noticed();
+        let [limited, non_finite] = self.elements.nodes().finish();
         (report.limited, report.non_finite) = (report.limited + limited, report.non_finite + non_finite);
         self.elapsed_ms = dt_ms;
         self.publish();
