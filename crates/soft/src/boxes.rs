@@ -51,10 +51,8 @@ pub fn centred_box(cells: [usize; 3], size: Vec3) -> TetMesh {
     }
     for (c, axis) in all().flat_map(|c| [0, 1, 2].map(|axis| (c, axis))) {
         let (second, third) = ((axis + 1) % 3, (axis + 2) % 3);
-        let step = |mut at: [usize; 3], axis: usize| {
-            at[axis] += 1;
-            at
-        };
+        let step =
+            |at: [usize; 3], axis: usize| -> [usize; 3] { std::array::from_fn(|k| at[k] + usize::from(k == axis)) };
         let around = |c: [usize; 3]| [c, step(c, second), step(step(c, second), third), step(c, third)].map(node);
         if c[axis] == 0 {
             let [a, b, d, e] = around(c);
