@@ -25,6 +25,11 @@ use trepan_geometry::Aabb;
 pub const MAX_GAPS: usize = 300_000;
 /// Most sizes of boxes that are kept.
 const MAX_SIZES: usize = 4_096;
+/// Candidates on each side of the best size, and the step between them.
+const CANDIDATES_EACH_WAY: i32 = 8;
+const CANDIDATE_STEP: f64 = 1.07;
+/// A size that is expected to cost at most this much more may be the best one.
+const WORTH_TIMING: f64 = 1.12;
 
 /// What the expected work needs to know about boxes and particles.
 #[derive(Clone, Debug)]
@@ -110,6 +115,18 @@ impl Expected {
         let best = golden_section(cost, at(cheapest.saturating_sub(1)), at((cheapest + 1).min(STEPS)), 24);
         Ok(best.exp())
     }
+
+    /// Sizes around the best one, mm, that are expected to cost little more, the best one first: what is worth timing on a sample of the boxes.
+    ///
+    /// No model knows everything, for example that cells fit a mesh's lattice. The sample tells how far off it is at a size; so take the size with the least
+    /// `measured(sample) / expected(sample) · expected(all)`.
+    pub fn candidates(&self, prices: &Prices, best_mm: f64) -> Vec<f64> {
+        let enough = WORTH_TIMING * self.time(prices, best_mm);
+        let size = |n: i32| best_mm * CANDIDATE_STEP.powi(n);
+        let good = |n: &i32| size(*n) <= self.reach_mm && self.time(prices, size(*n)) <= enough;
+        let larger = (0..CANDIDATES_EACH_WAY).take_while(good);
+        larger.chain((1..CANDIDATES_EACH_WAY).map(|n| -n).take_while(good)).map(size).collect()
+    }
 }
 
 fn moments(boxes: &[Aabb]) -> [f64; 4] {
@@ -179,6 +196,18 @@ mod tests {
             assert!(expected.time(&prices, 0.1 * n as f64) >= expected.time(&prices, best) * (1.0 - 1e-9));
         }
         assert!((expected.best(&Prices { test: 0.0, ..prices }, 0.1).unwrap() - 8.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn candidates_lie_around_the_best_and_cost_little_more() {
+        let (boxes, particles) = scene();
+        let expected = Expected::of(&boxes, &particles, 6.0).unwrap();
+        let prices = Prices { fixed: 50.0, visit: 1.0, doubt: 0.0, test: 5.0 };
+        let best = expected.best(&prices, 0.1).unwrap();
+        let sizes = expected.candidates(&prices, best);
+        assert_eq!(sizes[0], best);
+        assert!(sizes.iter().any(|&s| s > best) && sizes.iter().any(|&s| s < best), "{sizes:?}");
+        assert!(sizes.iter().all(|&s| s <= 6.0 && expected.time(&prices, s) < 1.13 * expected.time(&prices, best)));
     }
 
     #[test]

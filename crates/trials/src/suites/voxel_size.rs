@@ -13,7 +13,7 @@ use crate::suite::{Findings, Gate, Row};
 use scene::{Body, Elements, Scene, Touch};
 use std::time::Instant;
 use timing::Calibration;
-use trepan_voxel_size::{CostModel, Expected, Prices, counts, zone_error};
+use trepan_voxel_size::{CostModel, Expected, counts, zone_error};
 
 /// Tables 5.2 and 5.3 of the thesis, in cells per axis: tetrahedra, low, best, high, analytic, mean edge; errors of the last two.
 const TABLE: [[f64; 8]; 5] = [
@@ -31,9 +31,6 @@ const OURS: &str = "expected work, then timed";
 const LADDER: (usize, f64, f64) = (26, 0.3, 1.11);
 /// A size belongs to the good zone up to this much over the best time.
 const ZONE: f64 = 1.10;
-/// Sizes that are timed on each side of the expected best one at most, the step between them, and how much they may be expected to cost.
-const CANDIDATES: (i32, f64, f64) = (8, 1.07, 1.12);
-
 /// What the scenes found, for the gates over all.
 #[derive(Default)]
 struct Totals {
@@ -83,7 +80,7 @@ fn rules(scene: &Scene, scope: Scope, totals: &mut Totals, findings: &mut Findin
     let mut calibration = Calibration::of(scene, usual);
     let prices = calibration.prices();
     let alone = expected.best(&prices, ladder[0]).unwrap_or(usual);
-    let ours = calibration.cheapest_of(candidates(&expected, &prices, alone, reach), &expected).unwrap_or(alone);
+    let ours = calibration.cheapest_of(&expected.candidates(&prices, alone), &expected).unwrap_or(alone);
     let calibration_ms = start.elapsed().as_secs_f64() * 1e3;
     let p_nc = share_without_contact(scene, usual);
     let thesis = CostModel::default().analytic(measures).expect("the default model is sound");
@@ -141,17 +138,6 @@ fn rules(scene: &Scene, scope: Scope, totals: &mut Totals, findings: &mut Findin
 fn share_without_contact(scene: &Scene, usual: f64) -> f64 {
     let busy = counts::grid(&scene.boxes, &scene.particles, usual).map_or(0, |c| c.busy_boxes);
     1.0 - (busy as f64 / scene.boxes.len() as f64).clamp(1e-4, 1.0)
-}
-
-/// Sizes around the expected best one that are expected to cost little more, up to the reach.
-fn candidates(expected: &Expected, prices: &Prices, best: f64, reach: f64) -> impl Iterator<Item = f64> {
-    let (count, step, flat) = CANDIDATES;
-    let enough = flat * expected.time(prices, best);
-    let size = |n: i32| best * step.powi(n);
-    let good = |n: &i32| size(*n) <= reach && expected.time(prices, size(*n)) <= enough;
-    let larger = (0..count).take_while(good).map(size).collect::<Vec<f64>>();
-    let smaller = (1..count).map(|n| -n).take_while(good).map(size).collect::<Vec<f64>>();
-    larger.into_iter().chain(smaller)
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

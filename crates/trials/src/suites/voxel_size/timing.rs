@@ -127,9 +127,9 @@ impl<'a> Calibration<'a> {
 
     /// Times more sizes, and says which of these is the cheapest: what no model knows, such as a lattice that the cells fit, is seen here. The sample says how far
     /// off the model is at a size, the model what a whole pass does there.
-    pub fn cheapest_of(&mut self, cells: impl Iterator<Item = f64>, of_all: &Expected) -> Option<f64> {
+    pub fn cheapest_of(&mut self, cells: &[f64], of_all: &Expected) -> Option<f64> {
         let known = self.sizes.len();
-        self.time(cells);
+        self.time(cells.iter().copied());
         let (of_sample, prices) = (self.sample_prices(), self.prices());
         let whole_us = |t: &Timed| t.slices.sum_us() / of_sample.time(&t.work) * of_all.time(&prices, t.cell_mm);
         let cheapest = self.sizes[known..].iter().min_by(|a, b| whole_us(a).total_cmp(&whole_us(b)));
