@@ -5,7 +5,8 @@
 //! falls as in `light.wgsl`. So this is the oracle for the shaders, and the picture of machines without a driver.
 //!
 //! # Practice
-//! Rows are shared between as many threads as there are processors. The hits of the last picture are kept, as on the device. Triangles of the brain
+//! Rows are shared between as many threads as there are processors. Before the rays of a tile of 8x8 pixels go, the tile leaps as one beam to where
+//! bone may be (`bricks.rs`), which spares most rays that meet nothing all their steps; the device has no such pass. The hits of the last picture are kept, as on the device. Triangles of the brain
 //! that reach behind the eye are left out.
 //!
 //! # When not to use it
