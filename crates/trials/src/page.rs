@@ -1,7 +1,7 @@
 //! `index.html`: every suite's chart, gates and rows on one page that needs nothing else.
 
 use crate::picture::{Chart, Mark, Outcome};
-use crate::suite::Report;
+use crate::suite::{Report, shown};
 use crate::suites::Suite;
 use plotters::coord::CoordTranslate;
 use plotters::drawing::DrawingAreaErrorKind;
@@ -57,8 +57,11 @@ fn gates(page: &mut String, report: &Report) {
         let (class, word) = if gate.pass { ("", "kept") } else { (" class=\"bad\"", "broken") };
         _ = write!(
             page,
-            "<tr{class}><td>{}</td><td>{:.4}</td><td>{} {}</td><td>{word}</td></tr>",
-            gate.name, gate.value, gate.op, gate.limit
+            "<tr{class}><td>{}</td><td>{}</td><td>{} {}</td><td>{word}</td></tr>",
+            gate.name,
+            shown(gate.value),
+            gate.op,
+            gate.limit
         );
     }
     *page += "</table>";
@@ -67,7 +70,8 @@ fn gates(page: &mut String, report: &Report) {
 fn rows(page: &mut String, report: &Report) {
     *page += "<details><summary>All rows</summary><table><tr><th>scene</th><th>method</th><th>metrics</th></tr>";
     for row in &report.findings.rows {
-        let metrics: Vec<String> = row.metrics.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
+        let metrics: Vec<String> =
+            row.metrics.iter().map(|(name, value)| format!("{name} {}", shown(*value))).collect();
         _ = write!(page, "<tr><td>{}</td><td>{}</td><td>{}</td></tr>", row.scene, row.method, metrics.join("; "));
     }
     *page += "</table></details>";

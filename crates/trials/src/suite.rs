@@ -68,6 +68,14 @@ impl Gate {
     }
 }
 
+/// A number for people: four digits that say something, however small it is.
+pub fn shown(value: f64) -> String {
+    match value.abs() {
+        small if small > 0.0 && small < 0.01 => format!("{value:.3e}"),
+        _ => format!("{value:.4}"),
+    }
+}
+
 /// What a suite found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Findings {
@@ -134,6 +142,11 @@ fn machine() -> BTreeMap<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn small_numbers_keep_their_digits() {
+        assert_eq!([0.0, 0.5, -3.25e-5, 1234.5].map(shown), ["0.0000", "0.5000", "-3.250e-5", "1234.5000"]);
+    }
 
     #[test]
     fn a_gate_on_a_nan_fails_and_the_file_has_the_stated_fields() {

@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use trepan_trials::page;
-use trepan_trials::suite::Report;
+use trepan_trials::suite::{Report, shown};
 use trepan_trials::suites::{ALL, ON_REQUEST, Scope, Suite};
 
 #[derive(Parser)]
@@ -43,7 +43,7 @@ fn main() -> Result<ExitCode> {
         let report = Report::new(suite.name, (suite.run)(scope));
         for gate in &report.findings.gates {
             let word = if gate.pass { "kept  " } else { "BROKEN" };
-            println!("  {word} {}: {:.4} {} {}", gate.name, gate.value, gate.op, gate.limit);
+            println!("  {word} {}: {} {} {}", gate.name, shown(gate.value), gate.op, gate.limit);
         }
         whole(&arguments.out.join(format!("{}.json", suite.name)), &serde_json::to_vec_pretty(&report)?)?;
         reports.push((suite, report));
