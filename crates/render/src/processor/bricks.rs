@@ -422,11 +422,10 @@ fn rising_root(v: [f32; 4]) -> f32 {
                     high = s
                 }
                 let newton = s - value / slope(s);
-                let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-                if (next - s).abs() < 1e-5 {
-                    return next;
+                if (newton - s).abs() < 1e-5 {
+                    return newton.clamp(low, high);
                 }
-                s = next;
+                s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             }
             return s;
         }
@@ -444,6 +443,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
         #[test]
         fn the_first_root_is_the_first_of_a_fine_scan(v in prop::array::uniform4(-1000.0f32..1000.0)) {
             let values = v.map(f64::from);
