@@ -50,10 +50,31 @@ impl Buttons {
     /// Ask for the bone of the last stroke of the burr back.
     pub const UNDO: Self = Self(4);
 
+    /// Ask for the bone flap, once it is free, to be lifted away, or to be put back.
+    pub const FLAP: Self = Self(8);
+
+    /// Ask for a tool of the tray, counted from 0 and up to 254.
+    pub fn take(tool: u8) -> Self {
+        Self((u32::from(tool) + 1) << 8 & 0xff00)
+    }
+
+    /// The tool of the tray that is asked for, counted from 0.
+    pub fn taken(self) -> Option<usize> {
+        ((self.0 >> 8 & 0xff) as usize).checked_sub(1)
+    }
+
     /// Whether every button of `other` is pressed.
     #[inline]
     pub fn has(self, other: Self) -> bool {
         self.0 & other.0 == other.0
+    }
+}
+
+impl std::ops::BitOr for Buttons {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
     }
 }
 

@@ -7,6 +7,33 @@ pub enum ToolKind {
     Burr,
     /// A blunt ball probe: touches, never cuts.
     Probe,
+    /// A wide drill whose clutch lets go where it comes through the bone.
+    Perforator,
+    /// A slender mill that cuts with its side, above a blunt foot that runs under the bone.
+    Craniotome,
+    /// A blunt rounded blade that holds the brain aside with its shaft.
+    Spatula,
+    /// A suction tube: touches, never cuts.
+    Aspirator,
+}
+
+impl ToolKind {
+    /// Whether it takes bone away while the pedal is down.
+    pub fn cuts(self) -> bool {
+        matches!(self, Self::Burr | Self::Perforator | Self::Craniotome)
+    }
+
+    /// Its name, lower case.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Burr => "burr",
+            Self::Probe => "probe",
+            Self::Perforator => "perforator",
+            Self::Craniotome => "craniotome",
+            Self::Spatula => "spatula",
+            Self::Aspirator => "aspirator",
+        }
+    }
 }
 
 /// A tool's shape. In its own frame the tip is a ball around the origin and the shaft runs from there along +z.
@@ -17,6 +44,8 @@ pub enum ToolKind {
 ///        ║
 ///       ( · ) tip: tip_radius_mm, centre at the origin
 /// ```
+///
+/// A craniotome cuts with its shaft, from the tip up to `cutting_mm`, and its tip is blunt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tool {
     /// What it does.
@@ -27,16 +56,44 @@ pub struct Tool {
     pub shaft_radius_mm: f32,
     /// Length of the shaft from the centre of the tip, mm.
     pub shaft_length_mm: f32,
+    /// Length of the shaft, from the centre of the tip, that cuts instead of the tip, mm; 0 for tools that do not cut with it.
+    pub cutting_mm: f32,
 }
 
 impl Tool {
     /// A round burr of the given radius on a 2.4 mm shank, a common size of neurosurgical drills.
     pub fn burr(tip_radius_mm: f32) -> Self {
-        Self { kind: ToolKind::Burr, tip_radius_mm, shaft_radius_mm: 1.2, shaft_length_mm: 70.0 }
+        Self { kind: ToolKind::Burr, tip_radius_mm, shaft_radius_mm: 1.2, shaft_length_mm: 70.0, cutting_mm: 0.0 }
+    }
+
+    /// A cranial perforator, 11 mm wide, here with a round head.
+    pub fn perforator() -> Self {
+        Self { kind: ToolKind::Perforator, shaft_radius_mm: 3.0, ..Self::burr(5.5) }
+    }
+
+    /// A craniotome of 2.4 mm that cuts along 14 mm above its foot.
+    pub fn craniotome() -> Self {
+        Self { kind: ToolKind::Craniotome, cutting_mm: 14.0, ..Self::burr(1.2) }
     }
 
     /// A blunt ball probe of the given radius.
     pub fn probe(tip_radius_mm: f32) -> Self {
-        Self { kind: ToolKind::Probe, tip_radius_mm, shaft_radius_mm: 0.6 * tip_radius_mm, shaft_length_mm: 90.0 }
+        Self {
+            kind: ToolKind::Probe,
+            tip_radius_mm,
+            shaft_radius_mm: 0.6 * tip_radius_mm,
+            shaft_length_mm: 90.0,
+            cutting_mm: 0.0,
+        }
+    }
+
+    /// A spatula, here a round rod of 6 mm with a round end.
+    pub fn spatula() -> Self {
+        Self { kind: ToolKind::Spatula, shaft_radius_mm: 3.0, ..Self::probe(3.0) }
+    }
+
+    /// A suction tube of 3 mm.
+    pub fn aspirator() -> Self {
+        Self { kind: ToolKind::Aspirator, shaft_radius_mm: 1.5, ..Self::probe(1.5) }
     }
 }

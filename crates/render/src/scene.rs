@@ -50,7 +50,7 @@ impl Scene {
             second_tip,
             second_tail,
             light: towards_light(view).extend(flag(frame.drilling)),
-            spin: across.extend(flag(tool.kind == ToolKind::Burr)),
+            spin: across.extend(flag(tool.kind.cuts())),
         }
     }
 
@@ -73,7 +73,8 @@ impl Scene {
     }
 }
 
-const NO_TOOL: Tool = Tool { kind: ToolKind::Probe, tip_radius_mm: -1.0, shaft_radius_mm: 1.0, shaft_length_mm: 1.0 };
+const NO_TOOL: Tool =
+    Tool { kind: ToolKind::Probe, tip_radius_mm: -1.0, shaft_radius_mm: 1.0, shaft_length_mm: 1.0, cutting_mm: 0.0 };
 
 /// Centre of the ball and far end of the shaft, with their radii.
 fn ends(tool: &Tool, world_from_tool: &Pose) -> [Vec4; 2] {

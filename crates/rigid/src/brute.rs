@@ -20,7 +20,7 @@ use crate::rows::EVERYWHERE;
 use crate::{RigidContact, RigidStep};
 use glam::{DVec3, IVec3};
 use trepan_contact::Contact;
-use trepan_geometry::{Aabb, Pose, Tool, ToolKind, ToolState};
+use trepan_geometry::{Aabb, Pose, Tool, ToolState};
 use trepan_volume::BoneVolume;
 
 /// Most triangles in reach; the rest is counted as a fallback.
@@ -198,7 +198,7 @@ impl RigidContact for Brute {
         self.follow(bone, tool.tip().as_dvec3(), out);
         self.proxy = Pose::from_parts(self.centre.as_vec3(), tool.world_from_tool.rotation);
         self.report(tool.tip().as_dvec3(), out);
-        if drilling && self.tool.kind == ToolKind::Burr {
+        if drilling && self.tool.kind.cuts() {
             let (device, proxy, radius_mm) = (tool.tip(), self.proxy.translation, self.tool.tip_radius_mm);
             let depth_mm = device.distance(proxy);
             let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms, within: EVERYWHERE };

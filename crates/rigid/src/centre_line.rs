@@ -22,7 +22,7 @@ use crate::rows::EVERYWHERE;
 use crate::traverse::first_bone;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
-use trepan_geometry::{Pose, Tool, ToolKind, ToolState, Vec3};
+use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_volume::BoneVolume;
 
 /// Most vertices on a shaft.
@@ -136,7 +136,7 @@ impl RigidContact for CentreLine {
             out.manifold.point = tool.tip();
             out.manifold.couple_mm = arm.cross(shaft) / depth;
         }
-        if drilling && self.tool.kind == ToolKind::Burr && tip != Vec3::ZERO {
+        if drilling && self.tool.kind.cuts() && tip != Vec3::ZERO {
             let (device, proxy) = (tool.tip(), tool.tip() + tip);
             let cut = Cut {
                 device,

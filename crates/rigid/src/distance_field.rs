@@ -48,7 +48,7 @@ use crate::surface::{Disc, Discs};
 use crate::window::Window;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
-use trepan_geometry::{Aabb, Pose, Tool, ToolKind, ToolState, Vec3};
+use trepan_geometry::{Aabb, Pose, Tool, ToolState, Vec3};
 use trepan_volume::BoneVolume;
 
 /// Most discs in reach; past it the rest is counted as a fallback.
@@ -459,7 +459,7 @@ impl RigidContact for DistanceField {
             self.reset(tool.world_from_tool);
         }
         self.proxy.rotation = tool.world_from_tool.rotation;
-        self.works = drilling && self.tool.kind == ToolKind::Burr;
+        self.works = drilling && self.tool.kind.cuts();
         self.left_mm += device.distance(self.hand) + self.config.yield_mm_per_ms * dt_ms + ROUNDING_MM;
         let motion = device - self.hand;
         self.hand = device;

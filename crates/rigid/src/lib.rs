@@ -47,6 +47,7 @@ pub mod brute;
 pub mod burr_and_shaft;
 mod cell;
 pub mod centre_line;
+mod chain;
 pub mod distance_field;
 pub mod exposed_faces;
 mod half_spaces;

@@ -1,5 +1,6 @@
 //! The list of methods: one closed enum feeds tests, charts and command lines.
 
+use crate::chain::Chain;
 use crate::penalty::Penalty;
 use crate::removal::Law;
 use crate::{RigidContact, brute, burr_and_shaft, centre_line, distance_field, exposed_faces};
@@ -110,6 +111,9 @@ impl Method {
 
     /// Makes the method ready for a tool. All memory is taken here.
     pub fn build(&self, tool: &Tool) -> Box<dyn RigidContact> {
+        if tool.cutting_mm > 0.0 {
+            return Box::new(Chain::new(tool, self));
+        }
         match self {
             Self::Thesis(config) => Box::new(thesis::Thesis::new(tool, *config)),
             Self::Pointshell(config) => {

@@ -10,7 +10,7 @@
 use crate::removal::{Burr, Cut, Law};
 use crate::rows::EVERYWHERE;
 use crate::{RigidContact, RigidStep};
-use trepan_geometry::{Pose, Tool, ToolKind, ToolState, Vec3};
+use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_volume::BoneVolume;
 
 /// Most voxels that a burr bites at once.
@@ -60,7 +60,7 @@ impl<F: Feel> RigidContact for Penalty<F> {
         out.manifold.normal = normal;
         out.manifold.depth_mm = depth_mm;
         out.manifold.point = self.proxy.translation - radius_mm * normal;
-        if drilling && self.tool.kind == ToolKind::Burr && burr != Vec3::ZERO {
+        if drilling && self.tool.kind.cuts() && burr != Vec3::ZERO {
             let cut =
                 Cut { device, proxy: device + burr, radius_mm, depth_mm: burr.length(), dt_ms, within: EVERYWHERE };
             self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);

@@ -32,7 +32,7 @@ use crate::sweep::{Ball, Stop, Sweep};
 use crate::{RigidContact, RigidStep};
 use glam::IVec3;
 use trepan_contact::{Contact, GodObject, Plane};
-use trepan_geometry::{Aabb, Pointshell, Pose, Spread, Tool, ToolKind, ToolState, Vec3};
+use trepan_geometry::{Aabb, Pointshell, Pose, Spread, Tool, ToolState, Vec3};
 use trepan_volume::BoneVolume;
 
 /// Most voxels that the rate law bites at once.
@@ -229,7 +229,7 @@ impl RigidContact for Thesis {
             self.sweep_decides(bone, device, out);
             return;
         }
-        if drilling && self.tool.kind == ToolKind::Burr {
+        if drilling && self.tool.kind.cuts() {
             self.drill(bone, device, dt_ms, out);
         }
         let (mut normal, depth) = self.respond(out, bone);

@@ -76,9 +76,9 @@ impl SecondHand {
         }
     }
 
-    /// The aspirator: a blunt tube of 3 mm.
+    /// What it holds.
     pub fn tool() -> Tool {
-        Tool { shaft_radius_mm: 1.5, ..Tool::probe(1.5) }
+        Tool::aspirator()
     }
 
     /// The tick, after the first hand's of the same number.
