@@ -1,6 +1,6 @@
 //! How a tool moves and what pushes it: twist, wrench, tool state.
 
-use crate::{Pose, Vec3};
+use crate::{Pose, ToolKind, Vec3};
 
 /// Velocity of a rigid body, world axes, at the tool's origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,14 +53,25 @@ impl Buttons {
     /// Ask for the bone flap, once it is free, to be lifted away, or to be put back.
     pub const FLAP: Self = Self(8);
 
-    /// Ask for a tool of the tray, counted from 0 and up to 254.
-    pub fn take(tool: u8) -> Self {
-        Self((u32::from(tool) + 1) << 8 & 0xff00)
+    /// Ask for a tool of a kind; asked again with one in the hand, for the next of that kind.
+    pub fn take(kind: ToolKind) -> Self {
+        Self((kind as u32 + 1) << 8)
     }
 
-    /// The tool of the tray that is asked for, counted from 0.
-    pub fn taken(self) -> Option<usize> {
-        ((self.0 >> 8 & 0xff) as usize).checked_sub(1)
+    /// The kind of tool that is asked for.
+    pub fn taken(self) -> Option<ToolKind> {
+        let wanted = (self.0 >> 8 & 0xf).checked_sub(1)?;
+        ToolKind::ALL.into_iter().find(|kind| *kind as u32 == wanted)
+    }
+
+    /// Ask for the tool in a slot of the tray, counted from 0; there are at most 15.
+    pub fn slot(slot: usize) -> Self {
+        Self((slot.min(14) as u32 + 1) << 12)
+    }
+
+    /// The slot of the tray that is asked for.
+    pub fn in_slot(self) -> Option<usize> {
+        (self.0 >> 12 & 0xf).checked_sub(1).map(|slot| slot as usize)
     }
 
     /// Whether every button of `other` is pressed.
@@ -130,8 +141,13 @@ mod tests {
 
     #[test]
     fn buttons_combine() {
-        let both = Buttons(3);
+        let both = Buttons::PEDAL | Buttons::NEXT_TOOL;
         assert!(both.has(Buttons::PEDAL) && both.has(Buttons::NEXT_TOOL));
         assert!(!Buttons::PEDAL.has(Buttons(3)));
+        for (at, kind) in ToolKind::ALL.into_iter().enumerate() {
+            let asks = Buttons::take(kind) | Buttons::slot(at) | Buttons::UNDO;
+            assert_eq!((asks.taken(), asks.in_slot(), asks.has(Buttons::PEDAL)), (Some(kind), Some(at), false));
+        }
+        assert_eq!((both.taken(), both.in_slot()), (None, None));
     }
 }

@@ -18,6 +18,10 @@ pub enum ToolKind {
 }
 
 impl ToolKind {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Burr, Self::Probe, Self::Perforator, Self::Craniotome, Self::Spatula, Self::Aspirator];
+
     /// Whether it takes bone away while the pedal is down.
     pub fn cuts(self) -> bool {
         matches!(self, Self::Burr | Self::Perforator | Self::Craniotome)
@@ -62,22 +66,22 @@ pub struct Tool {
 
 impl Tool {
     /// A round burr of the given radius on a 2.4 mm shank, a common size of neurosurgical drills.
-    pub fn burr(tip_radius_mm: f32) -> Self {
+    pub const fn burr(tip_radius_mm: f32) -> Self {
         Self { kind: ToolKind::Burr, tip_radius_mm, shaft_radius_mm: 1.2, shaft_length_mm: 70.0, cutting_mm: 0.0 }
     }
 
     /// A cranial perforator, 11 mm wide, here with a round head.
-    pub fn perforator() -> Self {
+    pub const fn perforator() -> Self {
         Self { kind: ToolKind::Perforator, shaft_radius_mm: 3.0, ..Self::burr(5.5) }
     }
 
     /// A craniotome of 2.4 mm that cuts along 14 mm above its foot.
-    pub fn craniotome() -> Self {
+    pub const fn craniotome() -> Self {
         Self { kind: ToolKind::Craniotome, cutting_mm: 14.0, ..Self::burr(1.2) }
     }
 
     /// A blunt ball probe of the given radius.
-    pub fn probe(tip_radius_mm: f32) -> Self {
+    pub const fn probe(tip_radius_mm: f32) -> Self {
         Self {
             kind: ToolKind::Probe,
             tip_radius_mm,
@@ -88,12 +92,12 @@ impl Tool {
     }
 
     /// A spatula, here a round rod of 6 mm with a round end.
-    pub fn spatula() -> Self {
+    pub const fn spatula() -> Self {
         Self { kind: ToolKind::Spatula, shaft_radius_mm: 3.0, ..Self::probe(3.0) }
     }
 
     /// A suction tube of 3 mm.
-    pub fn aspirator() -> Self {
+    pub const fn aspirator() -> Self {
         Self { kind: ToolKind::Aspirator, shaft_radius_mm: 1.5, ..Self::probe(1.5) }
     }
 }

@@ -191,7 +191,7 @@ mod tests {
     fn three_presses_reach_four_to_six_millimetres() {
         let (site, plan) = (site(), Plan::default());
         let script = Script::named("craniotomy-and-probe", &site, 20_000.0).unwrap();
-        let changed = ticks(&script).position(|tool| tool.buttons.has(Buttons::NEXT_TOOL)).unwrap();
+        let changed = ticks(&script).position(|tool| tool.buttons.taken().is_some()).unwrap();
         let into_brain: Vec<f32> = ticks(&script)
             .skip(changed)
             .map(|tool| depth(&site, &tool) + plan.probe_radius_mm - site.brain_mm)
@@ -222,10 +222,9 @@ mod tests {
     fn the_next_tool_is_asked_for_once_and_far_from_the_patient() {
         let script = Script::named("craniotomy-and-probe", &site(), 20_000.0).unwrap();
         let all: Vec<ToolState> = ticks(&script).collect();
-        let presses =
-            all.windows(2).filter(|w| !w[0].buttons.has(Buttons::NEXT_TOOL) && w[1].buttons.has(Buttons::NEXT_TOOL));
+        let presses = all.windows(2).filter(|w| w[0].buttons.taken().is_none() && w[1].buttons.taken().is_some());
         assert_eq!(presses.count(), 1);
-        assert!(all.iter().filter(|t| t.buttons.has(Buttons::NEXT_TOOL)).all(|t| depth(&site(), t) < -30.0));
+        assert!(all.iter().filter(|t| t.buttons.taken().is_some()).all(|t| depth(&site(), t) < -30.0));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
 use trepan_geometry::Vec3;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::script::{Script, Site};
-use trepan_simulator::{HapticConfig, HapticStage, Program, TickInput};
+use trepan_simulator::{HapticConfig, HapticStage, Limits, Program, TickInput};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -21,7 +21,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
         tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
         guard: GuardConfig::default(),
-        near_mm: 2.0,
+        limits: Limits::default(),
+        opening_needed: true,
     };
     let mut stage = HapticStage::new(config, Some(Arc::new(bone)), Some(Arc::new(brain)), device.at(0.0));
     for tick in 1..=10_000u64 {

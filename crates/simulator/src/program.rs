@@ -1,6 +1,6 @@
 //! The three programs, their phases and their tools.
 
-use trepan_geometry::Tool;
+use trepan_geometry::{Tool, ToolKind};
 
 /// Which simulator runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +42,15 @@ impl Program {
         }
     }
 
+    /// The tools that lie ready, in the order of the phases.
+    pub fn tray(self) -> &'static [Tool] {
+        match self {
+            Self::Craniotomy => &TRAY[..BONE_TOOLS],
+            Self::Brain => &TRAY[BONE_TOOLS..],
+            Self::Integrated => &TRAY,
+        }
+    }
+
     /// The scripted operation that shows the program.
     pub fn script(self) -> &'static str {
         match self {
@@ -71,11 +80,37 @@ impl Phase {
         }
     }
 
-    /// The tool that lies in the hand at first.
-    pub fn tool(self) -> Tool {
-        match self {
-            Self::Craniotomy => Tool::burr(3.0),
-            Self::Brain => Tool::probe(2.0),
+    /// The phase that a tool belongs to.
+    pub fn of(tool: &Tool) -> Self {
+        if tool.kind.cuts() { Self::Craniotomy } else { Self::Brain }
+    }
+}
+
+/// How many of the tray's tools cut bone; they come first.
+const BONE_TOOLS: usize = 4;
+/// Every tool.
+const TRAY: [Tool; 6] =
+    [Tool::burr(3.0), Tool::burr(2.0), Tool::perforator(), Tool::craniotome(), Tool::probe(2.0), Tool::spatula()];
+
+/// What a tool is called in the tray: its kind and width.
+pub fn called(tool: &Tool) -> String {
+    match tool.kind {
+        ToolKind::Burr | ToolKind::Perforator => format!("{} {:.0} mm", tool.kind.name(), 2.0 * tool.tip_radius_mm),
+        kind => kind.name().into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_tray_has_the_tools_of_its_phases_and_begins_with_the_first() {
+        for program in [Program::Craniotomy, Program::Brain, Program::Integrated] {
+            let of_phases = |tool: &Tool| program.phases().contains(&Phase::of(tool));
+            assert!(program.tray().iter().all(of_phases) && program.tray().len() < 15);
+            assert_eq!(Phase::of(&program.tray()[0]), program.phases()[0]);
         }
+        assert_eq!(called(&TRAY[1]), "burr 4 mm");
     }
 }

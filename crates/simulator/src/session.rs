@@ -21,6 +21,7 @@ use crate::run::{Eyes, Outcome, Stages, Tissue};
 use crate::show::driver;
 use crate::show::picture::{self, Album};
 use crate::show::window;
+use crate::stages::alarms::Limits;
 use crate::stages::collision_step::CollisionStage;
 use crate::stages::haptic_tick::{HapticConfig, HapticStage, ToolSample};
 use crate::stages::second_hand::SecondHand;
@@ -169,7 +170,7 @@ impl Session {
         let script = Script::named(self.program.script(), &self.scene.site, 1e4).map(|script| script.at(0.0));
         let first = self.recording.as_ref().and_then(|r| r.ticks.first()).map(|t| ToolState::at(t.device));
         let state = first.or(script.ok()).unwrap_or_else(|| ToolState::at(trepan_geometry::Pose::IDENTITY));
-        ToolSample { tick: 0, state, phase: self.program.phases()[0], drilling: false }
+        ToolSample { tick: 0, state, tool: self.program.tray()[0], slot: 0, drilling: false }
     }
 
     fn stages(&self, start: ToolState, feel: &Feel, second: Option<&Feel>) -> Result<Stages, SessionError> {
@@ -180,7 +181,8 @@ impl Session {
             bone_force: Vibration::drill(feel.coupled(Viscoelastic { stiffness: 2.0, damping: 0.5 }, self.tick_ms())),
             tissue_force: feel.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, self.tick_ms()),
             guard: feel.guard(),
-            near_mm: 2.0,
+            limits: Limits::default(),
+            opening_needed: self.options.watch.is_none(),
         };
         let bone = self.scene.bone.clone().filter(|_| self.program.has_bone());
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
-use trepan_geometry::{Buttons, Pose, Quat, Tool, ToolState, Vec3};
+use trepan_geometry::{Buttons, Pose, Quat, ToolKind, ToolState, Vec3};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{HapticConfig, HapticStage, Notice, Phase, Program, TickInput, Warning, What};
+use trepan_simulator::{HapticConfig, HapticStage, Limits, Notice, Phase, Program, TickInput, Warning, What};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// A flat head: bone from z = -6 to 0 mm, brain under z = -8 mm.
@@ -29,7 +29,8 @@ fn config(program: Program) -> HapticConfig {
         bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
         tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
         guard: GuardConfig::default(),
-        near_mm: 2.0,
+        limits: Limits::default(),
+        opening_needed: true,
     }
 }
 
@@ -197,20 +198,27 @@ fn the_force_of_an_old_patch_fades_and_the_ticks_are_held() {
 
 #[test]
 fn the_tool_changes_once_for_a_press_and_only_when_free() {
-    let mut bench = Bench::new(Program::Integrated);
-    let press = |z: f32| ToolState { buttons: Buttons::NEXT_TOOL, ..at(z, 0.0) };
-    for _ in 0..5 {
-        bench.step(at(2.5, 0.0), Status::Fresh, &NO_PATCH);
+    let asks = Buttons::take(ToolKind::Probe);
+    let press = |z: f32| ToolState { buttons: asks, ..at(z, 0.0) };
+    for needed in [true, false] {
+        let (bone, brain) = head();
+        let config = HapticConfig { opening_needed: needed, ..config(Program::Integrated) };
+        let stage = HapticStage::new(config, Some(bone), Some(brain), at(20.0, 0.0));
+        let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+        for _ in 0..5 {
+            bench.step(at(2.5, 0.0), Status::Fresh, &NO_PATCH);
+        }
+        bench.step(press(2.5), Status::Fresh, &NO_PATCH);
+        assert_eq!(bench.stage.phase(), Phase::Craniotomy, "changed in contact");
+        bench.step(at(20.0, 0.0), Status::Fresh, &NO_PATCH);
+        for _ in 0..50 {
+            bench.step(press(20.0), Status::Fresh, &NO_PATCH);
+        }
+        assert_eq!(bench.stage.phase(), if needed { Phase::Craniotomy } else { Phase::Brain });
+        let told = |what: fn(&What) -> bool| bench.told.iter().filter(|n| what(&n.what)).count();
+        assert_eq!(told(|what| matches!(what, What::Phase(_))), if needed { 1 } else { 2 });
+        assert_eq!(told(|what| *what == What::NotOpen), usize::from(needed));
     }
-    bench.step(press(2.5), Status::Fresh, &NO_PATCH);
-    assert_eq!(bench.stage.phase(), Phase::Craniotomy, "changed in contact");
-    bench.step(at(20.0, 0.0), Status::Fresh, &NO_PATCH);
-    for _ in 0..50 {
-        bench.step(press(20.0), Status::Fresh, &NO_PATCH);
-    }
-    assert_eq!(bench.stage.phase(), Phase::Brain);
-    let phases = bench.told.iter().filter(|n| matches!(n.what, What::Phase(_))).count();
-    assert_eq!((phases, Phase::Brain.tool()), (2, Tool::probe(2.0)));
 }
 
 #[test]

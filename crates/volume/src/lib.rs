@@ -18,6 +18,7 @@ mod component;
 pub mod dicom;
 mod distance;
 mod error;
+mod flap;
 mod keys;
 pub mod metaimage;
 #[cfg(test)]
@@ -42,6 +43,7 @@ pub use brain::{BrainConfig, MaskError, brain_mask, check_brain_mask};
 pub use component::largest_component;
 pub use distance::{DistanceField, FAR_MM};
 pub use error::{ReadError, WriteError};
+pub use flap::{FlapSearch, Found};
 pub use note::{Import, Note};
 pub use overlap::{LEAST_SHARE, OverlapError, overlap};
 pub use pictures::{Picture, overlap_pictures};

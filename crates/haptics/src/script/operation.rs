@@ -2,7 +2,7 @@
 
 use super::ScriptError;
 use super::path::Path;
-use trepan_geometry::{Buttons, Quat, Vec3};
+use trepan_geometry::{Buttons, Quat, ToolKind, Vec3};
 
 /// Where to operate.
 ///
@@ -167,7 +167,7 @@ fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
 
 fn change(plan: &Plan) -> Vec<Move> {
     vec![
-        Move("change the tool", 1.5, -plan.away_mm, Buttons::NEXT_TOOL),
+        Move("change the tool", 1.5, -plan.away_mm, Buttons::take(ToolKind::Probe)),
         Move("take the probe", 1.5, -plan.away_mm, HANDS_OFF),
     ]
 }

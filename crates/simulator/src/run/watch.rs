@@ -113,9 +113,8 @@ impl HapticDevice for Watched {
         if sequence != self.seen {
             self.seen = sequence;
             self.heard_ms = Some(time_ms);
-            // A watcher that comes late asks for the tool that is already in the hand.
-            let next = if record.phase > 0 && self.reads.is_multiple_of(2) { Buttons::NEXT_TOOL.0 } else { 0 };
-            let buttons = Buttons(record.buttons | next);
+            // A watcher that comes late takes the tool that is already in the hand.
+            let buttons = Buttons(record.buttons) | Buttons::slot(record.tool.into());
             self.tool = ToolState { world_from_tool: record.device, twist: record.twist, buttons, time_ms };
         }
         self.reads += 1;

@@ -51,7 +51,7 @@ pub fn camera(site: &Site) -> Camera {
 /// A frame of the newest state.
 pub fn frame<'a>(camera: Camera, view: &View, brain_positions: Option<&'a [Vec3]>, bone_shown: bool) -> Frame<'a> {
     Frame {
-        tool: Some(view.sample.phase.tool()),
+        tool: Some(view.sample.tool),
         world_from_tool: view.sample.state.world_from_tool,
         second: view.second.map(|second| (SecondHand::tool(), second.world_from_tool)),
         turn_rad: if view.sample.drilling { view.time_ms as f32 * 0.7 } else { 0.0 },

@@ -5,7 +5,7 @@
 //! reads it at its own rate; closing the window ends the session.
 
 use crate::case::scene::Scene;
-use crate::program::{Phase, Program};
+use crate::program::{Phase, Program, called};
 use crate::report::page::Shot;
 use crate::run::stop::Stop;
 use crate::run::{Eyes, View};
@@ -111,9 +111,9 @@ impl window::Session for Show {
         let rate_hz = self.rate.follow(view.time_ms, ticks);
         let value = |name: &str, value: String| (name.to_string(), value);
         Panel {
-            phase: view.sample.phase.name().into(),
-            hint: hint(view.sample.phase, self.pointer.is_some()).into(),
-            tool: format!("{:?}", view.sample.phase.tool().kind).to_lowercase(),
+            phase: view.sample.phase().name().into(),
+            hint: hint(view.sample.phase(), self.pointer.is_some()).into(),
+            tool: called(&view.sample.tool),
             drilling: view.sample.drilling,
             force_n: view.force.length(),
             force_limit_n: view.force_limit_n,

@@ -9,7 +9,7 @@ use crate::stages::haptic_tick::ToolSample;
 use crate::stages::skull_wall::SkullWall;
 use trepan_contact::{NodalContacts, SurfacePatch};
 use trepan_deformable::{Config, ConfigError, TissueCollision, TissueStep};
-use trepan_geometry::Vec3;
+use trepan_geometry::{Tool, Vec3};
 use trepan_link::wire::CollisionRecord;
 use trepan_mesh::TetMesh;
 
@@ -26,7 +26,6 @@ pub struct SoftFrame {
 
 /// The state that lives from step to step.
 pub struct CollisionStage {
-    program: Program,
     tools: Vec<TissueCollision>,
     wall: Option<SkullWall>,
     patch: SurfacePatch,
@@ -43,13 +42,12 @@ impl CollisionStage {
         config: &Config,
         wall: Option<SkullWall>,
     ) -> Result<Self, ConfigError> {
-        let of_phase = |phase: &Phase| {
-            let config = Config { shaft: *phase == Phase::Brain, ..config.clone() };
-            TissueCollision::new(mesh, &phase.tool(), &config)
+        let of_tool = |tool: &Tool| {
+            let config = Config { shaft: Phase::of(tool) == Phase::Brain, ..config.clone() };
+            TissueCollision::new(mesh, tool, &config)
         };
         Ok(Self {
-            program,
-            tools: program.phases().iter().map(of_phase).collect::<Result<_, _>>()?,
+            tools: program.tray().iter().map(of_tool).collect::<Result<_, _>>()?,
             wall,
             patch: SurfacePatch::default(),
             contacts: NodalContacts::with_room(),
@@ -60,10 +58,9 @@ impl CollisionStage {
 
     /// The step. Its results stand in [`patch`](Self::patch) and [`contacts`](Self::contacts) until the next.
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
-        let at = self.program.phases().iter().position(|&p| p == sample.phase).unwrap_or(0);
-        self.tools[at].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
+        self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
         self.patch = self.step.patch.with(self.step.shaft.normal, self.step.shaft.depth_mm);
-        self.press(sample.phase, soft);
+        self.press(sample.phase(), soft);
         self.seq += 1;
         CollisionRecord {
             seq: self.seq,

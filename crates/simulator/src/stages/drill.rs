@@ -34,6 +34,7 @@ impl Drill {
             bone.begin_stroke();
             (self.stroke_mm3, self.through) = (0.0, false);
         }
+        self.through &= tool.buttons.has(Buttons::PEDAL);
         self.drilled = drilling;
         let asks = tool.buttons.has(Buttons::UNDO);
         let now = asks && !self.asked_undo && !drilling && may_undo;
@@ -43,6 +44,11 @@ impl Drill {
             Undone::TooLong => Some(What::Kept),
             Undone::Nothing => None,
         }
+    }
+
+    /// Whether the clutch of a perforator lets go: once it is through, until the pedal is up.
+    pub fn lets_go(&self) -> bool {
+        self.through
     }
 
     /// Takes note of bone removed in a tick, mm³.
@@ -58,11 +64,14 @@ impl Drill {
     }
 }
 
-/// Bone left ahead of a burr that cuts, along its axis or where it is pressed to, mm, at most twice [`THIN_MM`].
+/// Farthest that is looked ahead, mm.
+pub(crate) const REACH_MM: f32 = 2.0;
+
+/// Bone left ahead of a burr that cuts, along its axis or where it is pressed to, mm, at most [`REACH_MM`].
 pub(crate) fn left_ahead_mm(bone: &BoneVolume, world_from_tool: Pose, tool: &Tool, normal: Vec3) -> f32 {
     let ahead = |way: Vec3| {
         let front = world_from_tool.translation + tool.tip_radius_mm * way;
-        bone_ahead_mm(bone, front, way, 2.0 * THIN_MM)
+        bone_ahead_mm(bone, front, way, REACH_MM)
     };
     ahead(world_from_tool.rotation * Vec3::NEG_Z).min(ahead(-normal))
 }

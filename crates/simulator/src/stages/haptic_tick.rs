@@ -14,9 +14,12 @@
 //! replay. A tick does not allocate, lock, log or panic.
 
 use crate::program::{Phase, Program};
-use crate::stages::drill::{BREAK_MM, Drill, THIN_MM, left_ahead_mm, spindle_rpm};
-use crate::stages::notice::{Notice, Warning, Watch, What};
+use crate::stages::alarms::{Feed, Limits, Signs};
+use crate::stages::drill::{Drill, REACH_MM, left_ahead_mm, spindle_rpm};
+use crate::stages::flap::Flap;
+use crate::stages::notice::{Notice, Watch, What};
 use crate::stages::score::ScoreKeeper;
+use crate::stages::tray::{Change, Tray};
 use std::sync::Arc;
 use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardedWrench, SurfacePatch};
 use trepan_contact::{Vibration, Viscoelastic};
@@ -24,7 +27,7 @@ use trepan_geometry::{Buttons, Pose, Tool, ToolKind, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
 use trepan_rigid::{Method, RigidContact, RigidStep};
-use trepan_volume::{BoneVolume, DistanceField};
+use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
 
 /// Up to this age a patch gives its full force, ms.
 pub const FRESH_MS: f32 = 10.0;
@@ -46,8 +49,10 @@ pub struct HapticConfig {
     pub tissue_force: Viscoelastic,
     /// Limits of the hand.
     pub guard: GuardConfig,
-    /// Distance from the burr to the brain at which the trainee is warned, mm.
-    pub near_mm: f32,
+    /// At what the trainee is warned.
+    pub limits: Limits,
+    /// Whether tools for the brain wait until the bone is open.
+    pub opening_needed: bool,
 }
 
 /// What one tick is given.
@@ -70,10 +75,19 @@ pub struct ToolSample {
     pub tick: u64,
     /// The tool where contact lets it be, moving as it really moved.
     pub state: ToolState,
-    /// The phase, and with it the tool in the hand.
-    pub phase: Phase,
+    /// The tool in the hand.
+    pub tool: Tool,
+    /// Its place in the tray.
+    pub slot: usize,
     /// Whether the burr turns.
     pub drilling: bool,
+}
+
+impl ToolSample {
+    /// The phase, which is that of the tool in the hand.
+    pub fn phase(&self) -> Phase {
+        Phase::of(&self.tool)
+    }
 }
 
 /// What one tick gives.
@@ -94,7 +108,8 @@ pub struct HapticStage {
     config: HapticConfig,
     bone: Option<Arc<BoneVolume>>,
     brain: Option<Arc<DistanceField>>,
-    phase: usize,
+    forbidden: Option<Arc<DistanceField>>,
+    tray: Tray,
     rigid: Vec<Option<Box<dyn RigidContact>>>,
     bone_step: RigidStep,
     tissue: ContactManifold,
@@ -103,8 +118,9 @@ pub struct HapticStage {
     scores: ScoreKeeper,
     held: ToolState,
     proxy: Pose,
-    asked_next: bool,
     drill: Drill,
+    feed: Feed,
+    flap: Option<Flap>,
     released: bool,
 }
 
@@ -117,32 +133,44 @@ impl HapticStage {
         start: ToolState,
     ) -> Self {
         let proxy = start.world_from_tool;
-        let contact_of = |phase: &Phase| {
+        let contact_of = |tool: &Tool| {
             bone.as_ref().map(|_| {
-                let mut rigid = config.rigid.build(&phase.tool());
+                let mut rigid = config.rigid.build(tool);
                 rigid.reset(proxy);
                 rigid
             })
         };
-        let rigid = config.program.phases().iter().map(contact_of).collect();
+        let rigid = config.program.tray().iter().map(contact_of).collect();
         let guard = ForceGuard::new(config.guard);
         Self {
             rigid,
             guard,
+            tray: Tray::new(config.program),
             config,
             bone,
             brain,
-            phase: 0,
+            forbidden: None,
             bone_step: RigidStep::default(),
             tissue: ContactManifold::default(),
             watch: Watch::default(),
             scores: ScoreKeeper::default(),
             held: start,
             proxy,
-            asked_next: false,
             drill: Drill::default(),
+            feed: Feed::default(),
+            flap: None,
             released: false,
         }
+    }
+
+    /// With a flap that can be lifted once it is cut free.
+    pub fn with_flap(self, search: FlapSearch) -> Self {
+        Self { flap: Some(Flap::new(search)), ..self }
+    }
+
+    /// With structures that no tool may come close to, as the distance to them.
+    pub fn forbidding(self, forbidden: Arc<DistanceField>) -> Self {
+        Self { forbidden: Some(forbidden), ..self }
     }
 
     /// The tick, in the order of its parts.
@@ -152,6 +180,7 @@ impl HapticStage {
         let drilling = self.drills(&tool);
         let back_mm3 = self.undo(&tool, drilling, input.tick, tell);
         self.touch_bone(&tool, drilling);
+        self.follow_flap(&tool, drilling, input.tick, tell);
         let ahead_mm = self.bone_ahead(drilling);
         let sample = self.sample(&tool, input.tick, drilling);
         let held = self.touch_tissue(input.patch, &sample);
@@ -162,7 +191,12 @@ impl HapticStage {
         let warm = self.guard.counters().heated > heated;
         let mut record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
         record.removed_mm3 -= back_mm3;
-        self.warn(&record, input.patch, (wanted, warm, ahead_mm), tell);
+        let signs = self.signs(&record, &sample, ahead_mm, input.patch, (wanted, warm));
+        for (warning, present, value) in signs.causes(&record, &self.config.limits) {
+            if let Some(what) = self.watch.tell(warning, present, value, record.time_ms) {
+                tell(Notice { tick: record.tick, time_ms: record.time_ms, what });
+            }
+        }
         if self.drill.came_through(&self.bone_step, ahead_mm) {
             record.flags |= TickRecord::THROUGH;
             tell(Notice { tick: input.tick, time_ms: tool.time_ms, what: What::Through });
@@ -182,9 +216,9 @@ impl HapticStage {
         self.guard.is_at_rest()
     }
 
-    /// The phase, and with it the tool in the hand.
+    /// The phase, which is that of the tool in the hand.
     pub fn phase(&self) -> Phase {
-        self.config.program.phases()[self.phase]
+        self.tray.phase()
     }
 
     /// The scores so far.
@@ -209,29 +243,59 @@ impl HapticStage {
         (self.held, !fresh)
     }
 
+    /// Whether the tool cuts: a perforator's clutch lets go once it is through.
     fn drills(&self, tool: &ToolState) -> bool {
-        tool.buttons.has(Buttons::PEDAL) && self.tool().kind == ToolKind::Burr
+        let kind = self.tool().kind;
+        let slips = kind == ToolKind::Perforator && self.drill.lets_go();
+        tool.buttons.has(Buttons::PEDAL) && kind.cuts() && !slips
     }
 
     fn tool(&self) -> Tool {
-        self.phase().tool()
+        self.tray.tool()
     }
 
-    /// The next tool comes when it is asked for and the last one touches nothing.
+    /// Whether the tool touches nothing.
+    fn is_free(&self) -> bool {
+        !self.bone_step.manifold.touches() && self.tissue.depth_mm <= 0.0
+    }
+
+    /// Whether there is a way to the brain.
+    fn is_open(&self) -> bool {
+        let lifted = self.flap.as_ref().is_some_and(Flap::is_away);
+        lifted || self.bone.is_none() || self.scores.times_through > 0 || !self.config.opening_needed
+    }
+
+    /// Another tool comes when it is asked for and the last one touches nothing.
     fn change_tool(&mut self, tool: &ToolState, tick: u64, tell: &mut dyn FnMut(Notice)) {
-        if tick <= 1 {
-            tell(Notice { tick, time_ms: tool.time_ms, what: What::Phase(self.phase()) });
-        }
-        let asks = tool.buttons.has(Buttons::NEXT_TOOL);
-        let free = !self.bone_step.manifold.touches() && self.tissue.depth_mm <= 0.0;
-        if asks && !self.asked_next && free && self.phase + 1 < self.config.program.phases().len() {
-            self.phase += 1;
-            if let Some(rigid) = &mut self.rigid[self.phase] {
-                rigid.reset(self.proxy);
+        let mut say = |what| tell(Notice { tick, time_ms: tool.time_ms, what });
+        let before = self.phase();
+        let change = self.tray.change(tool.buttons, self.is_free(), self.is_open());
+        match change {
+            Some(Change::Refused) => say(What::NotOpen),
+            Some(Change::Taken) => {
+                if let Some(rigid) = &mut self.rigid[self.tray.slot()] {
+                    rigid.reset(self.proxy);
+                }
+                self.drill = Drill::default();
             }
-            tell(Notice { tick, time_ms: tool.time_ms, what: What::Phase(self.phase()) });
+            None => {}
         }
-        self.asked_next = asks;
+        if tick <= 1 || before != self.phase() {
+            say(What::Phase(self.phase()));
+        }
+        if tick <= 1 || change == Some(Change::Taken) {
+            say(What::Taken(self.tool()));
+        }
+    }
+
+    /// Looks after the flap.
+    fn follow_flap(&mut self, tool: &ToolState, drilling: bool, tick: u64, tell: &mut dyn FnMut(Notice)) {
+        let free = self.is_free() && self.phase() == Phase::Craniotomy;
+        let cut = self.bone_step.removed_mm3 > 0.0;
+        if let (Some(bone), Some(flap)) = (&self.bone, &mut self.flap) {
+            let what = flap.tick(bone, tool.buttons, drilling, cut, free);
+            what.into_iter().for_each(|what| tell(Notice { tick, time_ms: tool.time_ms, what }));
+        }
     }
 
     /// Lets the stroke begin or come back. Returns what came back, mm³.
@@ -244,7 +308,7 @@ impl HapticStage {
     }
 
     fn touch_bone(&mut self, tool: &ToolState, drilling: bool) {
-        match (&self.bone, &mut self.rigid[self.phase]) {
+        match (&self.bone, &mut self.rigid[self.tray.slot()]) {
             (Some(bone), Some(rigid)) => {
                 rigid.step(bone, tool, drilling, self.config.dt_ms, &mut self.bone_step);
                 self.proxy = rigid.proxy();
@@ -264,7 +328,7 @@ impl HapticStage {
         if self.bone_step.manifold.touches() {
             state.twist = Default::default();
         }
-        ToolSample { tick, state, phase: self.phase(), drilling }
+        ToolSample { tick, state, tool: self.tool(), slot: self.tray.slot(), drilling }
     }
 
     /// Tissue at the present pose; true when the patch is older than fresh.
@@ -331,15 +395,16 @@ impl HapticStage {
             patch_seq: input.patch_seq,
             compute_us: 0.0,
             flags: bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum(),
-            phase: self.phase as u8,
-            tool: self.tool().kind as u8,
+            phase: self.phase() as u8,
+            tool: self.tray.slot() as u8,
         }
     }
 
     /// Bone left ahead of a burr that cuts, mm; infinite when it does not.
     fn bone_ahead(&self, drilling: bool) -> f32 {
         match &self.bone {
-            Some(bone) if drilling && self.bone_step.manifold.touches() => {
+            // A craniotome's foot runs under the bone and keeps what lies there.
+            Some(bone) if drilling && self.tool().cutting_mm == 0.0 && self.bone_step.manifold.touches() => {
                 left_ahead_mm(bone, self.proxy, &self.tool(), self.bone_step.manifold.normal)
             }
             _ => f32::INFINITY,
@@ -356,33 +421,30 @@ impl HapticStage {
         record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some()
     }
 
-    fn warn(
+    /// What this tick knows that may be worth a warning.
+    fn signs(
         &mut self,
         record: &TickRecord,
+        sample: &ToolSample,
+        ahead_mm: f32,
         patch: &SurfacePatch,
-        (wanted, warm, ahead_mm): (Wrench, bool, f32),
-        tell: &mut dyn FnMut(Notice),
-    ) {
-        let burr = self.phase() == Phase::Craniotomy;
-        let distance = record.brain_distance_mm;
-        let touched = burr && (distance <= 0.0 || self.tissue.depth_mm > 0.0);
-        let force = wanted.force.length();
-        let age_ms = (record.time_ms - patch.time_ms) as f32;
-        let causes = [
-            (Warning::BoneThin, ahead_mm <= THIN_MM, ahead_mm),
-            (Warning::BreakThrough, ahead_mm <= BREAK_MM, ahead_mm),
-            (Warning::BrainNear, burr && distance <= self.config.near_mm, distance),
-            (Warning::BrainTouched, touched, distance),
-            (Warning::DrillStalled, record.has(TickRecord::DRILLING) && self.stalls(record), force),
-            (Warning::ForceLimit, record.has(TickRecord::CLAMPED), force),
-            (Warning::TissueLate, record.has(TickRecord::HELD), age_ms),
-            (Warning::DeviceStale, record.has(TickRecord::STALE), 0.0),
-            (Warning::MotorsWarm, warm, force),
-        ];
-        for (warning, present, value) in causes {
-            if let Some(what) = self.watch.tell(warning, present, value, record.time_ms) {
-                tell(Notice { tick: record.tick, time_ms: record.time_ms, what });
-            }
+        (wanted, warm): (Wrench, bool),
+    ) -> Signs {
+        let radius_mm = sample.tool.tip_radius_mm;
+        let forbidden = self.forbidden.as_ref().map(|field| field.sample(sample.state.tip()) - radius_mm);
+        let on_tissue = self.tissue.depth_mm > 0.0;
+        let brain = on_tissue && self.phase() == Phase::Brain;
+        Signs {
+            cutter: self.phase() == Phase::Craniotomy,
+            ahead_mm,
+            breach_ms: self.feed.follow(ahead_mm, REACH_MM, self.config.dt_ms),
+            on_tissue,
+            tissue_n: if brain { record.wrench.force.length() } else { 0.0 },
+            forbidden_mm: forbidden.unwrap_or(f32::INFINITY),
+            wanted_n: wanted.force.length(),
+            stalled: self.stalls(record),
+            age_ms: (record.time_ms - patch.time_ms) as f32,
+            warm,
         }
     }
 }

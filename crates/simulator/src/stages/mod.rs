@@ -1,8 +1,10 @@
 //! The bodies of the three loops, without clocks or threads.
 
 pub(crate) mod ahead;
+pub(crate) mod alarms;
 pub(crate) mod collision_step;
 pub(crate) mod drill;
+pub(crate) mod flap;
 pub(crate) mod haptic_tick;
 pub(crate) mod motion;
 pub(crate) mod notice;
@@ -10,3 +12,4 @@ pub(crate) mod score;
 pub(crate) mod second_hand;
 pub(crate) mod skull_wall;
 pub(crate) mod solver_step;
+pub(crate) mod tray;

@@ -3,7 +3,8 @@
 //! # Practice
 //! A notice is plain data, made inside a tick without allocation; its words are made by whoever shows it.
 
-use crate::program::Phase;
+use crate::program::{Phase, called};
+use trepan_geometry::Tool;
 
 /// A warning that can stand for a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -12,10 +13,16 @@ pub enum Warning {
     BoneThin,
     /// The bone is about to give way.
     BreakThrough,
+    /// At the feed of now the bone gives way in a moment.
+    BreachSoon,
     /// The burr is close to the brain.
     BrainNear,
     /// The burr touches the brain.
     BrainTouched,
+    /// A tool presses hard on the brain.
+    BrainPressed,
+    /// A tool is close to what must not be touched.
+    ForbiddenNear,
     /// The drill is pressed so hard that it stands still.
     DrillStalled,
     /// The wanted force is over the device's limit.
@@ -30,7 +37,7 @@ pub enum Warning {
 
 impl Warning {
     /// Every warning, in the order of their bits.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 12] = [
         Self::BoneThin,
         Self::BreakThrough,
         Self::BrainNear,
@@ -40,6 +47,9 @@ impl Warning {
         Self::DeviceStale,
         Self::MotorsWarm,
         Self::DrillStalled,
+        Self::BreachSoon,
+        Self::BrainPressed,
+        Self::ForbiddenNear,
     ];
 
     /// A short name for files.
@@ -54,6 +64,9 @@ impl Warning {
             Self::DeviceStale => "device-stale",
             Self::MotorsWarm => "motors-warm",
             Self::DrillStalled => "drill-stalled",
+            Self::BreachSoon => "breach-soon",
+            Self::BrainPressed => "brain-pressed",
+            Self::ForbiddenNear => "forbidden-near",
         }
     }
 
@@ -69,6 +82,9 @@ impl Warning {
             Self::DeviceStale => "the device gave no fresh position, the last one is held",
             Self::MotorsWarm => "the device's motors are warm, its force is reduced: press less",
             Self::DrillStalled => "the drill has stalled: press less",
+            Self::BreachSoon => "at this feed the drill is through in a moment",
+            Self::BrainPressed => "the brain is pressed hard: press less",
+            Self::ForbiddenNear => "a structure that must not be touched is close",
         }
     }
 }
@@ -86,6 +102,18 @@ pub enum What {
     Undone(f32),
     /// The last stroke cannot be undone: it changed more bone than is kept.
     Kept,
+    /// A tool was taken into the hand.
+    Taken(Tool),
+    /// A tool for the brain was asked for before the bone was open.
+    NotOpen,
+    /// The planned flap hangs on nothing any more; its bone, mm³.
+    FlapFree(f32),
+    /// The flap was to be lifted, but hangs on the skull.
+    FlapHangs,
+    /// The flap was lifted away; its bone, mm³.
+    FlapLifted(f32),
+    /// The flap was put back.
+    FlapReturned,
 }
 
 /// Something that happened at a tick.
@@ -103,14 +131,15 @@ impl Notice {
     /// Kind and sentence, as recorded.
     pub fn words(&self) -> (&'static str, String) {
         match self.what {
-            What::Phase(phase) => {
-                ("phase", format!("{} begins with the {:?}", phase.name(), phase.tool().kind).to_lowercase())
-            }
+            What::Phase(phase) => ("phase", format!("{} begins", phase.name())),
+            What::Taken(tool) => ("tool", format!("the {} is in the hand", called(&tool))),
             What::Warning(warning, true, value) => {
                 let unit = match warning {
                     Warning::BoneThin | Warning::BreakThrough => "mm left",
-                    Warning::BrainNear | Warning::BrainTouched => "mm away",
+                    Warning::BrainNear | Warning::BrainTouched | Warning::ForbiddenNear => "mm away",
                     Warning::ForceLimit | Warning::MotorsWarm | Warning::DrillStalled => "N wanted",
+                    Warning::BrainPressed => "N",
+                    Warning::BreachSoon => "ms left",
                     Warning::TissueLate | Warning::DeviceStale => "ms old",
                 };
                 ("warning", format!("{}: {} ({value:.2} {unit})", warning.name(), warning.text()))
@@ -119,6 +148,11 @@ impl Notice {
             What::Through => ("through", "the burr came through the bone".into()),
             What::Undone(mm3) => ("undo", format!("the last stroke is undone: {mm3:.1} mm3 of bone are back")),
             What::Kept => ("undo", "the last stroke was too long to be undone".into()),
+            What::NotOpen => ("refused", "the bone is not open: drill through it or lift the flap first".into()),
+            What::FlapFree(mm3) => ("flap", format!("the flap is free: {mm3:.0} mm3 of bone")),
+            What::FlapHangs => ("refused", "the flap still hangs on the skull".into()),
+            What::FlapLifted(mm3) => ("flap", format!("the flap is lifted: {mm3:.0} mm3 of bone")),
+            What::FlapReturned => ("flap", "the flap is back in its place".into()),
         }
     }
 }

@@ -46,7 +46,7 @@ pub struct ScoreKeeper {
     #[serde(skip)]
     motion: Motion,
     #[serde(skip)]
-    phase: u8,
+    tool: u8,
     #[serde(skip)]
     last_force: Vec3,
     #[serde(skip)]
@@ -60,8 +60,8 @@ impl ScoreKeeper {
         self.motion.add(record.time_ms, record.proxy.translation);
         (self.path_mm, self.idle_s) = (self.motion.path_mm, self.motion.idle_s);
         self.log_dimensionless_jerk = self.motion.log_dimensionless_jerk();
-        self.tool_changes += u32::from(record.phase != self.phase);
-        self.phase = record.phase;
+        self.tool_changes += u32::from(record.tool != self.tool);
+        self.tool = record.tool;
         self.peak_force_n = self.peak_force_n.max(force.length());
         self.peak_force_step_n = self.peak_force_step_n.max((force - self.last_force).length());
         self.last_force = force;
@@ -70,7 +70,7 @@ impl ScoreKeeper {
         if record.has(TickRecord::DRILLING) {
             self.drilling_s += seconds;
         }
-        if record.phase == 0 && record.tool == 0 {
+        if record.phase == 0 {
             self.plunge_mm = self.plunge_mm.max(-record.brain_distance_mm);
             let touching = record.brain_distance_mm <= 0.0;
             self.burr_touches_of_brain += u32::from(touching && !self.touching);

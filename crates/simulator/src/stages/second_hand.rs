@@ -178,6 +178,7 @@ impl SecondHand {
 mod tests {
     use super::*;
     use crate::program::Program;
+    use crate::stages::alarms::Limits;
     use trepan_contact::{GuardConfig, Vibration};
     use trepan_volume::VoxelVolume;
 
@@ -198,7 +199,8 @@ mod tests {
             bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
             tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
             guard: GuardConfig { ramp_in_ms: 0.0, passivity: None, ..GuardConfig::default() },
-            near_mm: 2.0,
+            limits: Limits::default(),
+            opening_needed: true,
         };
         let bone = with_bone.then(|| Arc::new(BoneVolume::new(&ct, 400).unwrap()));
         SecondHand::new(config, bone, Some(Arc::new(DistanceField::of_mask(&mask))))
