@@ -1,12 +1,13 @@
 //! What holds the tools: the devices that the options name, and what the force guard of each must know of it.
 
+use crate::case::plan::Plan;
 use crate::error::SessionError;
 use crate::options::Options;
 use crate::program::Program;
 use crate::run::watch::Watched;
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
-use trepan_haptics::script::{Script, Site};
+use trepan_haptics::script::{self, Script, Site};
 use trepan_haptics::{
     Aside, Capabilities, Clutch, DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, simulated,
 };
@@ -24,12 +25,10 @@ pub struct Hand {
 
 impl Hand {
     /// Opens the device.
-    pub fn open(name: &DeviceName, program: Program, options: &Options, site: &Site) -> Result<Self, SessionError> {
+    pub fn open(name: &DeviceName, program: Program, options: &Options, plan: &Plan) -> Result<Self, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| {
-            let duration_ms = 1e3 * options.duration.unwrap_or(20.0);
-            Script::named(name, site, duration_ms).map_err(|f| fault(&f))
-        };
+        let site = &plan.site;
+        let script = |name: &str| scripted(name, options, plan);
         let mut hand = Self { device: None, pointer: None, watch: None };
         if let Some(name) = &options.watch {
             hand.device = Some(Box::new(Watched::open(name, script(program.script())?.at(0.0))?));
@@ -71,11 +70,10 @@ pub struct SecondHold {
 
 impl SecondHold {
     /// Opens the device. One of metal lives on a thread of its own, so that its link never holds the first hand up.
-    pub fn open(name: &DeviceName, options: &Options, site: &Site) -> Result<Self, SessionError> {
+    pub fn open(name: &DeviceName, options: &Options, plan: &Plan) -> Result<Self, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| {
-            Script::named(name, site, 1e3 * options.duration.unwrap_or(20.0)).map_err(|found| fault(&found))
-        };
+        let site = &plan.site;
+        let script = |name: &str| scripted(name, options, plan);
         let (device, watch): (Box<dyn HapticDevice>, _) = match name {
             DeviceName::Script(operation) => (Box::new(script(operation)?), None),
             DeviceName::Simulated(operation) => {
@@ -93,6 +91,17 @@ impl SecondHold {
         };
         Ok(Self { device, watch })
     }
+}
+
+/// Duration of a scripted operation, and of one that cuts a flap, s.
+const SCRIPT_S: (f64, f64) = (20.0, 75.0);
+
+/// A scripted operation after a plan.
+fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, SessionError> {
+    let usual_s = if name == "flap" { SCRIPT_S.1 } else { SCRIPT_S.0 };
+    let how = script::Plan { outline: plan.outline.clone(), ..script::Plan::default() };
+    let script = Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(usual_s), &how);
+    script.map_err(|fault| SessionError::Device(fault.to_string()))
 }
 
 /// Refuses more ticks a second than a device bears.

@@ -1,6 +1,6 @@
 //! The command line that the three programs share.
 
-use crate::case::tissue::TissueSource;
+use crate::case::tissue::{TissueClass, TissueSource};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -62,6 +62,15 @@ pub struct Options {
     /// Young's modulus of the brain, kPa
     #[arg(long, value_name = "KPA", default_value_t = 3.0)]
     pub young_modulus_kpa: f32,
+    /// Diameter of the planned bone flap around the opening, mm; 0 for a burr hole alone [default: 0; 24 with script:flap; a replay's as recorded]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub flap: Option<f32>,
+    /// Share of the lift of the brain's fluid that is lost when the dura is opened, 0 to 1: the brain sinks [default: 0.1; uncalibrated]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    pub fluid_lost: Option<f32>,
+    /// Tissue that no tool may come close to: classes of --tissue, separated by commas [default: vessel]
+    #[arg(long, value_name = "CLASS,...", value_delimiter = ',')]
+    pub forbid: Option<Vec<TissueClass>>,
     /// Haptic ticks a second
     #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
     pub rate_hz: f32,
@@ -202,6 +211,8 @@ impl Options {
         within("duration", self.duration.unwrap_or(1.0), 0.1, 86_400.0)?;
         within("young-modulus-kpa", self.young_modulus_kpa.into(), 0.05, 1000.0)?;
         within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
+        within("flap", self.flap.unwrap_or(0.0).into(), 0.0, 90.0)?;
+        within("fluid-lost", self.fluid_lost.unwrap_or(0.0).into(), 0.0, 1.0)?;
         within("rate-hz", self.rate_hz.into(), 100.0, 10_000.0)?;
         within("frames-per-second", self.frames_per_second, 0.0, 120.0)
     }
@@ -217,6 +228,10 @@ mod tests {
         assert!(parse("x --headless --duration 20 --out demo").unwrap().check().is_ok());
         let fault = parse("x --duration nan").unwrap().check().unwrap_err();
         assert!(fault.contains("--duration") && fault.contains("0.1 to 86400"), "{fault}");
+        assert!(
+            parse("x --flap 91").unwrap().check().is_err() && parse("x --fluid-lost -0.1").unwrap().check().is_err()
+        );
+        assert!(parse("x --forbid bone").unwrap_err().to_string().contains("vessel"));
         assert!(parse("x --device-scale 0").unwrap().check().is_err());
         assert!(parse("x --spacing-mm 0").unwrap().check().is_err());
         assert_eq!(parse("x --opening -40,30.5,120").unwrap().patient.opening, Some([-40.0, 30.5, 120.0]));

@@ -2,10 +2,12 @@
 
 use crate::case::Inputs;
 use crate::case::choice;
+use crate::case::plan::Plan;
 use crate::case::scene::{RestBrain, Scene};
 use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
 use crate::hand::{self, Feel, Hand, SecondHold};
+use crate::operation::Operation;
 use crate::options::Options;
 use crate::program::Program;
 use crate::report::output;
@@ -25,6 +27,7 @@ use crate::stages::alarms::Limits;
 use crate::stages::collision_step::CollisionStage;
 use crate::stages::haptic_tick::{HapticConfig, HapticStage, ToolSample};
 use crate::stages::second_hand::SecondHand;
+use crate::stages::settling::Settling;
 use crate::stages::skull_wall::SkullWall;
 use crate::stages::solver_step::SolverStage;
 use std::path::{Path, PathBuf};
@@ -49,6 +52,8 @@ pub struct Session {
     case: String,
     hash: String,
     scene: Scene,
+    operation: Operation,
+    plan: Plan,
     rigid: trepan_rigid::Method,
     /// What `--solver fastest` turned out to be.
     fastest: OnceLock<&'static str>,
@@ -91,18 +96,34 @@ impl Session {
         let (name, hash) = (case.name.clone(), case.hash.clone());
         let scene = Scene::new(program, case)?;
         scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
+        let operation = Operation::of(&options, &device, recording.as_ref());
+        let plan = planned(&scene, &operation)?;
         let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
         let (case, fastest) = (name, OnceLock::new());
-        Ok(Self { program, options, device, second, recording, case, hash, scene, rigid, fastest, out, windowed })
+        Ok(Self {
+            program,
+            options,
+            device,
+            second,
+            recording,
+            case,
+            hash,
+            scene,
+            operation,
+            plan,
+            rigid,
+            fastest,
+            out,
+            windowed,
+        })
     }
 
     /// Runs it and writes its files.
     pub fn run(self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let before = self.pieces();
-        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.scene.site)?;
-        let second =
-            self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.scene.site)).transpose()?;
+        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.plan)?;
+        let second = self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.plan)).transpose()?;
         let recorded = || Feel::recorded(self.recording.as_ref(), hand::FIRST);
         let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
         let feel = device.as_ref().map_or_else(recorded, |device| Feel::of(&device.capabilities(), scale));
@@ -191,12 +212,16 @@ impl Session {
             _ => None,
         };
         let second = second.map(|feel| SecondHand::new(config(feel), bone.clone(), field.clone()));
-        Ok(Stages { haptic: HapticStage::new(config(feel), bone, field, start), second, tissue })
+        let search = bone.as_ref().and_then(|bone| self.plan.search(bone));
+        let forbidden = self.scene.brain.as_ref().and_then(|brain| brain.distance_to(&self.operation.forbidden));
+        let mut haptic = HapticStage::new(config(feel), bone, field, start);
+        haptic = search.into_iter().fold(haptic, HapticStage::with_flap);
+        haptic = forbidden.map(Arc::new).into_iter().fold(haptic, HapticStage::forbidding);
+        Ok(Stages { haptic, second, tissue })
     }
 
     fn tissue(&self, brain: &RestBrain) -> Result<Tissue, SessionError> {
         let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(format!("the brain: {fault}"));
-        let gravity = Vec3::new(0.0, -units::GRAVITY_MM_PER_MS2, 0.0);
         let young_mpa = units::mpa_from_kpa(self.options.young_modulus_kpa);
         let body = Body {
             mesh: brain.mesh.clone(),
@@ -206,9 +231,9 @@ impl Session {
         };
         let solver: Box<dyn SoftSolver> = match solver_named(&self.options)? {
             None => {
-                let config = trepan_tled::Config { balanced_gravity: gravity, ..Default::default() };
+                let config = trepan_tled::Config::default();
                 if self.options.solver.as_deref() == Some(FASTEST) {
-                    let (clock, loads) = (Clock::start(), Loads { gravity, ..Loads::default() });
+                    let (clock, loads) = (Clock::start(), Loads::default());
                     let all = trepan_tled::choice::candidates(&body, &config);
                     let chosen = trepan_tled::choice::fastest(&all, &loads, 100.0, &|| clock.now_ms());
                     let chosen = chosen.map_err(|f| internal(&f))?;
@@ -225,7 +250,9 @@ impl Session {
         let wall = bone.map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed)).transpose();
         let wall = wall.map_err(|f| internal(&f))?;
         let collision = CollisionStage::new(self.program, &brain.mesh, &Default::default(), wall);
-        Ok(Tissue { collision: collision.map_err(|f| internal(&f))?, solver: SolverStage::new(solver, gravity) })
+        let settling = Settling::new(self.operation.fluid_lost, Vec3::NEG_Y, -self.plan.site.inward);
+        let collision = collision.map_err(|f| internal(&f))?.settling(settling);
+        Ok(Tissue { collision, solver: SolverStage::new(solver) })
     }
 
     /// The pictures of the report: how the images fit, then the session's.
@@ -304,7 +331,12 @@ impl Session {
             case: self.case.clone(),
             seed: self.options.seed,
             hashes: [("case".to_string(), self.hash.clone())].into(),
-            config: config.map(|(key, value)| (key.to_string(), value)).into_iter().chain(hands).collect(),
+            config: config
+                .map(|(key, value)| (key.to_string(), value))
+                .into_iter()
+                .chain(self.operation.entries())
+                .chain(hands)
+                .collect(),
         }
     }
 
@@ -337,6 +369,19 @@ struct Graphics {
 const TLED: &str = "tled";
 /// TLED where it steps faster on this machine, processor or graphics device. A replay then need not have the recorded forces to the last bit.
 const FASTEST: &str = "fastest";
+
+/// What is to be taken away.
+fn planned(scene: &Scene, operation: &Operation) -> Result<Plan, SessionError> {
+    let hole_mm = Program::Craniotomy.tray()[0].tip_radius_mm;
+    let plan = Plan::new(scene.bone.as_deref(), scene.site, hole_mm, 0.5 * operation.flap_mm);
+    plan.ok_or_else(|| {
+        let fault = format!(
+            "--flap {}: the skull does not go all around it: give a smaller one, or another --opening",
+            operation.flap_mm
+        );
+        SessionError::Usage(fault)
+    })
+}
 
 /// Refuses places that cannot be written to before anything is loaded.
 fn places(options: &Options) -> Result<(), SessionError> {

@@ -50,8 +50,17 @@ impl Site {
     }
 }
 
-/// How an operation is done: sizes of the tools and lengths of the ways.
+/// A point of a flap's outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rim {
+    /// On the outer surface of the bone, world mm.
+    pub outer: Vec3,
+    /// Thickness of the bone there along [`Site::inward`], mm.
+    pub bone_mm: f32,
+}
+
+/// How an operation is done: sizes of the tools and lengths of the ways.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Radius of the burr's ball, mm.
     pub burr_radius_mm: f32,
@@ -71,6 +80,10 @@ pub struct Plan {
     pub aspirator_radius_mm: f32,
     /// How deep each press of the probe goes into the brain, mm.
     pub presses_mm: [f32; 3],
+    /// Where the craniotome runs around a flap, closed from the last to the first; empty for a circle of 10 mm on flat bone.
+    pub outline: Vec<Rim>,
+    /// How far the centre of the craniotome's foot runs below the bone, mm.
+    pub foot_mm: f32,
 }
 
 impl Default for Plan {
@@ -85,6 +98,8 @@ impl Default for Plan {
             burr_overlap_mm: 0.8,
             aspirator_radius_mm: 1.5,
             presses_mm: [4.0, 5.0, 6.0],
+            outline: Vec::new(),
+            foot_mm: 0.8,
         }
     }
 }
@@ -112,8 +127,10 @@ const HANDS_OFF: Buttons = Buttons(0);
 
 /// The way of an operation that [`super::NAMES`] lists.
 pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Path {
-    if name == "aspirate" {
-        return aspirate(site, plan, duration_ms);
+    match name {
+        "aspirate" => return aspirate(site, plan, duration_ms),
+        "flap" => return flap(site, plan, duration_ms),
+        _ => {}
     }
     let moves = match name {
         "craniotomy" => craniotomy(site, plan),
@@ -163,6 +180,52 @@ fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     }
     path.end_at(duration_ms);
     path
+}
+
+/// A burr hole at the rim, the craniotome from there around the flap, the flap lifted, the brain pressed in the middle.
+fn flap(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
+    let outline = if plan.outline.is_empty() { circle(site) } else { plan.outline.clone() };
+    let gap_mm = site.brain_mm - site.bone_mm;
+    let hole =
+        Site { entry: outline[0].outer, bone_mm: outline[0].bone_mm, brain_mm: outline[0].bone_mm + gap_mm, ..*site };
+    let foot = |rim: &Rim| rim.outer + site.inward * (rim.bone_mm + plan.foot_mm);
+    let at = |Move(label, share, depth_mm, buttons): Move, site: &Site| (label, share, site.below(depth_mm), buttons);
+    let (out, over) = (outline[0].outer - site.inward * plan.away_mm, outline[0].outer - site.inward * 4.0);
+    let mut moves: Vec<(&str, f64, Vec3, Buttons)> =
+        craniotomy(&hole, plan).into_iter().map(|m| at(m, &hole)).collect();
+    moves[1].1 *= 0.35;
+    moves.extend([
+        ("take the craniotome", 1.5, out, Buttons::take(ToolKind::Craniotome)),
+        ("come to the hole", 3.0, over, HANDS_OFF),
+        ("enter the hole", 4.0, foot(&outline[0]), Buttons::PEDAL),
+    ]);
+    let around = outline.iter().cycle().skip(1).take(outline.len());
+    let share = 60.0 / outline.len() as f64;
+    moves.extend(around.map(|rim| ("cut around the flap", share, foot(rim), Buttons::PEDAL)));
+    moves.extend([
+        ("leave the cut", 4.0, over, HANDS_OFF),
+        ("draw back", 3.0, out, HANDS_OFF),
+        ("lift the flap", 2.0, out, Buttons::FLAP),
+    ]);
+    let brain = [change(plan), probe(site, plan)].into_iter().flatten();
+    moves.extend(brain.map(|m| at(m, site)).map(|m| (m.0, 0.8 * m.1, m.2, m.3)));
+    let whole: f64 = moves.iter().map(|m| m.1).sum();
+    let mut path = Path::from(hole.below(-plan.start_mm), Quat::from_rotation_arc(Vec3::Z, -site.inward.normalize()));
+    for (label, share, tip, buttons) in moves {
+        path.to(label, duration_ms * share / whole, tip, buttons);
+    }
+    path.end_at(duration_ms);
+    path
+}
+
+/// An outline on flat bone.
+fn circle(site: &Site) -> Vec<Rim> {
+    let turn = Quat::from_rotation_arc(Vec3::Z, -site.inward.normalize());
+    let rim = |at: u8| {
+        let (sin, cos) = (f32::from(at) / 24.0 * std::f32::consts::TAU).sin_cos();
+        Rim { outer: site.entry + turn * (10.0 * Vec3::new(cos, sin, 0.0)), bone_mm: site.bone_mm }
+    };
+    (0..24).map(rim).collect()
 }
 
 fn change(plan: &Plan) -> Vec<Move> {

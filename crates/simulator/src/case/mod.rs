@@ -7,6 +7,7 @@ mod fit;
 pub(crate) mod folder;
 pub(crate) mod import;
 pub(crate) mod opening;
+pub(crate) mod plan;
 pub(crate) mod scene;
 mod stages;
 pub(crate) mod tissue;

@@ -44,6 +44,8 @@ pub struct RestBrain {
     pub fixed: Vec<u32>,
     /// Distance to its surface, mm, negative inside.
     pub field: Arc<DistanceField>,
+    /// Class codes around it, 0 outside.
+    pub classes: VoxelVolume<u8>,
     /// The MRI around it.
     pub mri: VoxelVolume<f32>,
     /// Colours that mark tissue classes in it; `None` where no class is marked.
@@ -81,6 +83,14 @@ impl Scene {
     }
 }
 
+impl RestBrain {
+    /// Distance to the tissue of some classes, mm; `None` where there is none of it.
+    pub fn distance_to(&self, wanted: &[TissueClass]) -> Option<DistanceField> {
+        let mask = self.classes.map(|code| u8::from(wanted.iter().any(|class| class.code() == code)));
+        mask.data.contains(&1).then(|| DistanceField::of_mask(&mask))
+    }
+}
+
 fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>) -> RestBrain {
     let mut fixed = bone.map(|bone| held_by_bone(&brain.mesh, bone)).unwrap_or_default();
     if fixed.len() < FEWEST_HELD {
@@ -92,7 +102,8 @@ fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>
     let tint: Vec<[u8; 3]> = brain.classes.data.iter().map(tint_of).collect();
     let tint = Some(tint).filter(|tint| tint.iter().any(|&colour| colour != [0; 3]));
     let field = Arc::new(DistanceField::of_mask(&brain.classes));
-    RestBrain { fixed, field, mesh: brain.mesh, class_of_tet: brain.class_of_tet, mri: brain.mri, tint }
+    let Brain { classes, mri, mesh, class_of_tet } = brain;
+    RestBrain { fixed, field, mesh, class_of_tet, classes, mri, tint }
 }
 
 /// Surface nodes near the skull base.

@@ -42,6 +42,11 @@ impl TissueClass {
         ["brain", "white", "grey", "ventricle", "tumour", "vessel"][self as usize]
     }
 
+    /// The class of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|class| class.name() == name)
+    }
+
     /// The colour that marks it in pictures; black for none. Vermilion and sky blue look apart to every eye (Okabe and Ito 2008).
     pub fn tint(self) -> [u8; 3] {
         match self {
@@ -115,6 +120,15 @@ impl TissueSource {
             )));
         }
         Ok(format!("{name}: {ml:.1} ml of the {all_ml:.1} ml that its labels fill lie in the brain"))
+    }
+}
+
+impl FromStr for TissueClass {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let known = || Self::ALL.map(Self::name).join(", ");
+        Self::named(name).ok_or_else(|| format!("expected one of {}", known()))
     }
 }
 

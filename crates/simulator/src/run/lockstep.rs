@@ -25,11 +25,12 @@ use crate::stages::haptic_tick::{HapticStage, TickInput, ToolSample};
 use crate::stages::second_hand::{SecondHand, SecondView};
 use std::collections::VecDeque;
 use std::thread;
-use trepan_contact::{NodalContacts, SurfacePatch};
+use trepan_contact::SurfacePatch;
 use trepan_geometry::{Buttons, ToolState, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::Recording;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
+use trepan_soft::Loads;
 
 /// Tools and patches of this many past ticks are kept for collision steps that refer to them.
 const MEMORY: usize = 16_384;
@@ -88,8 +89,8 @@ struct Again<'a> {
     ticks: Ticks,
     tools: VecDeque<ToolSample>,
     patches: VecDeque<Numbered<SurfacePatch>>,
-    contacts: VecDeque<Numbered<NodalContacts>>,
-    contact: Numbered<NodalContacts>,
+    loads: VecDeque<Numbered<Loads>>,
+    load: Numbered<Loads>,
     frame: SoftFrame,
     step_times: Times,
     collision_times: Times,
@@ -110,8 +111,8 @@ impl<'a> Again<'a> {
             ticks: Ticks::default(),
             tools: VecDeque::from([start]),
             patches: VecDeque::from([(0, SurfacePatch::default())]),
-            contacts: VecDeque::from([(0, NodalContacts::none())]),
-            contact: (0, NodalContacts::none()),
+            loads: VecDeque::from([(0, Loads::default())]),
+            load: (0, Loads::default()),
             frame: SoftFrame::default(),
             step_times: Times::default(),
             collision_times: Times::default(),
@@ -178,7 +179,7 @@ impl<'a> Again<'a> {
             record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
             self.collision_times.add_us(record.compute_us);
             remember(&mut self.patches, (record.seq, *tissue.collision.patch()));
-            remember(&mut self.contacts, (record.seq, tissue.collision.contacts().clone()));
+            remember(&mut self.loads, (record.seq, tissue.collision.loads().clone()));
             self.pens.collisions.send(record);
         }
     }
@@ -195,15 +196,15 @@ impl<'a> Again<'a> {
         let next = tissue.solver.steps() + 1;
         while let Some(switch) = self.switches.front().copied().filter(|s| s.step <= next) {
             self.switches.pop_front();
-            while self.contacts.front().is_some_and(|(seq, _)| *seq < switch.contact_seq) {
-                self.contacts.pop_front();
+            while self.loads.front().is_some_and(|(seq, _)| *seq < switch.contact_seq) {
+                self.loads.pop_front();
             }
-            if let Some(contact) = self.contacts.front().filter(|(seq, _)| *seq == switch.contact_seq) {
-                self.contact.clone_from(contact);
+            if let Some(load) = self.loads.front().filter(|(seq, _)| *seq == switch.contact_seq) {
+                self.load.clone_from(load);
             }
         }
         let began_ms = clock.now_ms();
-        let record = tissue.solver.step(&self.contact.1, self.contact.0);
+        let record = tissue.solver.step(&self.load.1, self.load.0);
         let us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         self.step_times.add_us(us);
         if let Some(mut record) = record {

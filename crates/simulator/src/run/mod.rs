@@ -19,6 +19,7 @@ use hdrhistogram::Histogram;
 use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
 use trepan_link::cell::{Reader, Writer, cell};
+use trepan_soft::Loads;
 
 /// The three loops' bodies.
 pub struct Stages {
@@ -85,7 +86,7 @@ pub struct Cells {
     /// Collision loop to haptic loop.
     pub patch: (Writer<Numbered<SurfacePatch>>, Reader<Numbered<SurfacePatch>>),
     /// Collision loop to solver loop.
-    pub contact: (Writer<Numbered<NodalContacts>>, Reader<Numbered<NodalContacts>>),
+    pub loads: (Writer<Numbered<Loads>>, Reader<Numbered<Loads>>),
     /// Solver loop to collision loop.
     pub soft: (Writer<SoftFrame>, Reader<SoftFrame>),
     /// Solver loop to picture.
@@ -116,7 +117,7 @@ impl Cells {
             tool: cell(sample),
             view: cell(view),
             patch: cell((0, SurfacePatch::default())),
-            contact: cell((0, NodalContacts::with_room())),
+            loads: cell((0, Loads { contacts: NodalContacts::with_room(), ..Loads::default() })),
             soft: cell(frame.clone()),
             shown: cell(frame),
         }

@@ -22,11 +22,12 @@ use crate::stages::second_hand::{SecondHand, SecondView};
 use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 use std::thread;
 use thread_priority::{RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy};
-use trepan_contact::{GuardedWrench, NodalContacts, SurfacePatch};
+use trepan_contact::{GuardedWrench, SurfacePatch};
 use trepan_haptics::{HapticDevice, Status};
 use trepan_link::cell::{Reader, Writer};
 use trepan_link::queue::Sender;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
+use trepan_soft::Loads;
 
 /// Pace of the loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,12 +81,11 @@ pub fn run(
                 tool: cells.tool.1,
                 soft: cells.soft.1,
                 patch: cells.patch.0,
-                contact: cells.contact.0,
+                loads: cells.loads.0,
                 records: collisions,
             };
             let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
-            let ends =
-                SolverEnds { contact: cells.contact.1, soft: cells.soft.0, shown: cells.shown.0, records: solver };
+            let ends = SolverEnds { loads: cells.loads.1, soft: cells.soft.0, shown: cells.shown.0, records: solver };
             let solving = scope.spawn(move || solver_loop(tissue.solver, ends, clock, stop));
             (colliding, solving)
         });
@@ -211,7 +211,7 @@ struct CollisionEnds {
     tool: Reader<ToolSample>,
     soft: Reader<SoftFrame>,
     patch: Writer<Numbered<SurfacePatch>>,
-    contact: Writer<Numbered<NodalContacts>>,
+    loads: Writer<Numbered<Loads>>,
     records: Sender<CollisionRecord>,
 }
 
@@ -226,9 +226,10 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
         let sample = *ends.tool.latest().0;
         let mut record = stage.step(&sample, ends.soft.latest().0);
         ends.patch.set((record.seq, *stage.patch()));
-        ends.contact.write(|(seq, contacts)| {
+        ends.loads.write(|(seq, loads)| {
             *seq = record.seq;
-            contacts.copy_from(stage.contacts());
+            loads.gravity = stage.loads().gravity;
+            loads.contacts.copy_from(&stage.loads().contacts);
         });
         let done_ms = clock.now_ms();
         record.compute_us = ((done_ms - began_ms) * 1e3) as f32;
@@ -240,7 +241,7 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
 }
 
 struct SolverEnds {
-    contact: Reader<Numbered<NodalContacts>>,
+    loads: Reader<Numbered<Loads>>,
     soft: Writer<SoftFrame>,
     shown: Writer<SoftFrame>,
     records: Sender<SolverRecord>,
@@ -263,8 +264,8 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
             given_up_ms += behind_ms - LAG_MS;
             thread::yield_now();
         }
-        let (seq, contacts) = ends.contact.latest().0;
-        let record = stage.step(contacts, *seq);
+        let (seq, loads) = ends.loads.latest().0;
+        let record = stage.step(loads, *seq);
         ends.soft.write(|frame| stage.publish(frame));
         let us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         times.add_us(us);

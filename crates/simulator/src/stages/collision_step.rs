@@ -1,4 +1,4 @@
-//! One collision step: the newest tool and the newest brain in; a surface patch for the hand, springs for the solver out.
+//! One collision step: the newest tool and the newest brain in; a surface patch for the hand, loads for the solver out.
 //!
 //! # Practice
 //! While the burr is in the hand the result only warns: the patch goes to the haptic thread, the solver gets no contact
@@ -6,12 +6,14 @@
 
 use crate::program::{Phase, Program};
 use crate::stages::haptic_tick::ToolSample;
+use crate::stages::settling::Settling;
 use crate::stages::skull_wall::SkullWall;
 use trepan_contact::{NodalContacts, SurfacePatch};
 use trepan_deformable::{Config, ConfigError, TissueCollision, TissueStep};
 use trepan_geometry::{Tool, Vec3};
 use trepan_link::wire::CollisionRecord;
 use trepan_mesh::TetMesh;
+use trepan_soft::Loads;
 
 /// The brain as the solver last published it.
 #[derive(Clone, Debug, Default)]
@@ -28,8 +30,9 @@ pub struct SoftFrame {
 pub struct CollisionStage {
     tools: Vec<TissueCollision>,
     wall: Option<SkullWall>,
+    settling: Settling,
     patch: SurfacePatch,
-    contacts: NodalContacts,
+    loads: Loads,
     step: TissueStep,
     seq: u64,
 }
@@ -50,16 +53,23 @@ impl CollisionStage {
             tools: program.tray().iter().map(of_tool).collect::<Result<_, _>>()?,
             wall,
             patch: SurfacePatch::default(),
-            contacts: NodalContacts::with_room(),
+            settling: Settling::default(),
+            loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
             step: TissueStep::default(),
             seq: 0,
         })
     }
 
-    /// The step. Its results stand in [`patch`](Self::patch) and [`contacts`](Self::contacts) until the next.
+    /// With a brain that sinks and sways once the dura is open.
+    pub fn settling(self, settling: Settling) -> Self {
+        Self { settling, ..self }
+    }
+
+    /// The step. Its results stand in [`patch`](Self::patch) and [`loads`](Self::loads) until the next.
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
         self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
         self.patch = self.step.patch.with(self.step.shaft.normal, self.step.shaft.depth_mm);
+        self.loads.gravity = self.settling.at(sample.phase(), sample.state.time_ms);
         self.press(sample.phase(), soft);
         self.seq += 1;
         CollisionRecord {
@@ -77,17 +87,17 @@ impl CollisionStage {
         &self.patch
     }
 
-    /// For the solver: nothing while the burr is in the hand.
-    pub fn contacts(&self) -> &NodalContacts {
-        &self.contacts
+    /// For the solver: no contact while a tool for bone is in the hand.
+    pub fn loads(&self) -> &Loads {
+        &self.loads
     }
 
     fn press(&mut self, phase: Phase, soft: &SoftFrame) {
-        self.contacts.clear();
+        self.loads.contacts.clear();
         if phase == Phase::Brain {
-            self.step.springs(&mut self.contacts);
+            self.step.springs(&mut self.loads.contacts);
             if let Some(wall) = &self.wall {
-                wall.press(&soft.positions, &mut self.contacts);
+                wall.press(&soft.positions, &mut self.loads.contacts);
             }
         }
     }

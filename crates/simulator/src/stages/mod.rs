@@ -10,6 +10,7 @@ pub(crate) mod motion;
 pub(crate) mod notice;
 pub(crate) mod score;
 pub(crate) mod second_hand;
+pub(crate) mod settling;
 pub(crate) mod skull_wall;
 pub(crate) mod solver_step;
 pub(crate) mod tray;

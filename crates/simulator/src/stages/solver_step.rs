@@ -1,4 +1,4 @@
-//! One solver step: the newest contacts in, moved nodes out.
+//! One solver step: the newest loads in, moved nodes out.
 //!
 //! # Practice
 //! Contacts are springs on the nodes that the solver evaluates with its own positions, so steps between two
@@ -27,13 +27,13 @@ pub struct SolverStage {
 }
 
 impl SolverStage {
-    /// A stage over a solver at rest.
-    pub fn new(solver: Box<dyn SoftSolver>, gravity: Vec3) -> Self {
+    /// A stage over a solver at rest, whose shape at rest is in balance.
+    pub fn new(solver: Box<dyn SoftSolver>) -> Self {
         Self {
             rest: solver.positions().to_vec(),
             dt_ms: solver.stable_dt_ms(),
             solver,
-            loads: Loads { gravity, contacts: NodalContacts::with_room() },
+            loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
             steps: 0,
             contact_seq: 0,
             inverted: 0,
@@ -42,10 +42,11 @@ impl SolverStage {
     }
 
     /// The step; a record when it is worth one.
-    pub fn step(&mut self, contacts: &NodalContacts, contact_seq: u64) -> Option<SolverRecord> {
+    pub fn step(&mut self, loads: &Loads, contact_seq: u64) -> Option<SolverRecord> {
         let switched = contact_seq != self.contact_seq;
         if switched {
-            self.loads.contacts.copy_from(contacts);
+            self.loads.gravity = loads.gravity;
+            self.loads.contacts.copy_from(&loads.contacts);
             self.contact_seq = contact_seq;
         }
         let report = self.solver.step(&self.loads, self.dt_ms);
