@@ -8,7 +8,7 @@ use trepan_link::Recording;
 /// Diameter of the flap that the script of that name cuts when none is asked for, mm.
 const SCRIPTED_FLAP_MM: f32 = 24.0;
 /// Share of the fluid's lift that is lost when the dura is opened.
-const FLUID_LOST: f32 = 0.1;
+const FLUID_LOST: f32 = 0.05;
 
 /// Settings of an operation.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,7 +60,10 @@ mod tests {
         let parse = |line: &str| Options::try_parse_from(line.split(' ')).unwrap();
         let script = DeviceName::Script("flap".into());
         let usual = Operation::of(&parse("x"), &DeviceName::Mouse, None);
-        assert_eq!((usual.flap_mm, usual.fluid_lost, &usual.forbidden[..]), (0.0, 0.1, &[TissueClass::Vessel][..]));
+        assert_eq!(
+            (usual.flap_mm, usual.fluid_lost, &usual.forbidden[..]),
+            (0.0, FLUID_LOST, &[TissueClass::Vessel][..])
+        );
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
         let asked = Operation::of(&parse("x --flap 30 --forbid tumour,vessel --fluid-lost 0"), &script, None);
         let mut recording = Recording::default();

@@ -65,7 +65,7 @@ pub struct Options {
     /// Diameter of the planned bone flap around the opening, mm; 0 for a burr hole alone [default: 0; 24 with script:flap; a replay's as recorded]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub flap: Option<f32>,
-    /// Share of the lift of the brain's fluid that is lost when the dura is opened, 0 to 1: the brain sinks [default: 0.1; uncalibrated]
+    /// Share of the lift of the brain's fluid that is lost when the dura is opened, 0 to 1: the brain sinks [default: 0.05; uncalibrated]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub fluid_lost: Option<f32>,
     /// Tissue that no tool may come close to: classes of --tissue, separated by commas [default: vessel]

@@ -10,8 +10,10 @@ use crate::hand::{self, Feel, Hand, SecondHold};
 use crate::operation::Operation;
 use crate::options::Options;
 use crate::program::Program;
+use crate::report::against::Against;
 use crate::report::output;
 use crate::report::page::Shot;
+use crate::report::regions::{Region, regions};
 use crate::report::summary::{About, CutOff, Machine, Summary};
 use crate::run::clock::Clock;
 use crate::run::journal::Kept;
@@ -40,7 +42,7 @@ use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::{Painter, SceneData};
 use trepan_soft::{Body, Loads, SoftSolver};
-use trepan_volume::Piece;
+use trepan_volume::{BoneVolume, Piece};
 
 /// A session that is ready to run.
 pub struct Session {
@@ -121,7 +123,7 @@ impl Session {
     /// Runs it and writes its files.
     pub fn run(self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-        let before = self.pieces();
+        let (before, whole) = (self.pieces(), self.bone().map(|bone| bone.snapshot()));
         let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.plan)?;
         let second = self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.plan)).transpose()?;
         let recorded = || Feel::recorded(self.recording.as_ref(), hand::FIRST);
@@ -147,10 +149,16 @@ impl Session {
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
-        let cut_off = CutOff::of(&before, &self.pieces(), self.scene.bone.as_ref().map_or(0.0, |b| b.voxel_mm3()));
-        let summary = Summary::new(self.about(&album, adapter, cut_off, remarks), &outcome);
-        output::write(&self.out, &record, &summary, &outcome, &self.shots(album.shots))?;
-        if let Some(bone) = self.scene.bone.as_ref().filter(|_| self.program.has_bone()) {
+        let recording = Recording::open(&record)?;
+        let about = About {
+            cut_off: CutOff::of(&before, &self.pieces(), self.bone().map_or(0.0, |bone| bone.voxel_mm3())),
+            plan: self.bone().zip(whole).and_then(|(bone, whole)| Against::of(&self.plan, &whole, bone)),
+            regions: self.regions(&recording),
+            ..self.about(&album, adapter, remarks)
+        };
+        let summary = Summary::new(about, &outcome);
+        output::write(&self.out, &recording, &summary, &outcome, &self.shots(album.shots))?;
+        if let Some(bone) = self.bone() {
             output::drilled(&self.out, bone, self.options.stl)?;
         }
         Ok(Ended { summary, out: self.out, signal: stop.signal() })
@@ -172,10 +180,20 @@ impl Session {
         }
     }
 
+    /// The bone, if it is operated on.
+    fn bone(&self) -> Option<&Arc<BoneVolume>> {
+        self.scene.bone.as_ref().filter(|_| self.program.has_bone())
+    }
+
     /// The bone's pieces as they hang together now.
     fn pieces(&self) -> Vec<Piece> {
-        let bone = self.scene.bone.as_ref().filter(|_| self.program.has_bone());
-        bone.map_or_else(Vec::new, |bone| Piece::all(bone))
+        self.bone().map_or_else(Vec::new, |bone| Piece::all(bone))
+    }
+
+    /// Where the brain was pressed.
+    fn regions(&self, recording: &Recording) -> Vec<Region> {
+        let brain = self.scene.brain.as_ref().filter(|_| self.program.has_tissue());
+        brain.map_or_else(Vec::new, |brain| regions(brain, self.program.tray(), &recording.ticks))
     }
 
     /// What the second hand's guard must know: of its device, or of the recorded one; `None` without a second hand.
@@ -205,7 +223,7 @@ impl Session {
             limits: Limits::default(),
             opening_needed: self.options.watch.is_none(),
         };
-        let bone = self.scene.bone.clone().filter(|_| self.program.has_bone());
+        let bone = self.bone().cloned();
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));
         let tissue = match &self.scene.brain {
             Some(brain) if self.program.has_tissue() => Some(self.tissue(brain)?),
@@ -246,7 +264,7 @@ impl Session {
             }
             Some(method) => method.build(&body).map_err(|f| internal(&f))?,
         };
-        let bone = self.scene.bone.clone().filter(|_| self.program.has_bone());
+        let bone = self.bone().cloned();
         let wall = bone.map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed)).transpose();
         let wall = wall.map_err(|f| internal(&f))?;
         let collision = CollisionStage::new(self.program, &brain.mesh, &Default::default(), wall);
@@ -340,7 +358,7 @@ impl Session {
         }
     }
 
-    fn about(&self, album: &Album, adapter: Option<String>, cut_off: CutOff, remarks: Vec<String>) -> About {
+    fn about(&self, album: &Album, adapter: Option<String>, remarks: Vec<String>) -> About {
         let brain = self.scene.brain.as_ref();
         About {
             program: self.program,
@@ -354,7 +372,9 @@ impl Session {
             solver: self.solver_name(),
             brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
             frames: album.frames,
-            cut_off,
+            cut_off: CutOff::default(),
+            plan: None,
+            regions: Vec::new(),
             remarks,
             machine: Machine::here(adapter),
         }

@@ -4,6 +4,7 @@ use crate::error::SessionError;
 use crate::report::page::{self, Shot};
 use crate::report::summary::Summary;
 use crate::run::Outcome;
+use std::fmt::Write as _;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -34,10 +35,10 @@ pub fn drilled(out: &Path, bone: &BoneVolume, surface: bool) -> Result<(), Sessi
     Ok(())
 }
 
-/// Writes summary and report.
+/// Writes summary, scores and report.
 pub fn write(
     out: &Path,
-    record: &Path,
+    recording: &Recording,
     summary: &Summary,
     outcome: &Outcome,
     shots: &[Shot],
@@ -45,9 +46,34 @@ pub fn write(
     let json =
         serde_json::to_vec_pretty(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
     whole(&out.join("summary.json"), &json)?;
-    let recording = Recording::open(record)?;
-    let page = page::html(summary, outcome, &recording, shots).map_err(SessionError::Internal)?;
+    whole(&out.join("scores.csv"), scores(summary).as_bytes())?;
+    let page = page::html(summary, outcome, recording, shots).map_err(SessionError::Internal)?;
     whole(&out.join("report.html"), page.as_bytes())
+}
+
+/// The scores as lines of name and value; each name ends with its unit.
+fn scores(summary: &Summary) -> String {
+    let parts = [
+        ("scores", serde_json::to_value(summary.scores)),
+        ("plan", serde_json::to_value(summary.plan)),
+        ("cut_off", serde_json::to_value(summary.cut_off)),
+    ];
+    let mut csv = String::from("name,value\n");
+    for (part, value) in parts {
+        for (name, value) in value.ok().as_ref().and_then(|value| value.as_object()).into_iter().flatten() {
+            _ = writeln!(csv, "{part}.{name},{value}");
+        }
+    }
+    for region in &summary.regions {
+        let name = region.name.replace(' ', "_");
+        _ = writeln!(csv, "regions.{name}.seconds,{}", region.seconds);
+        _ = writeln!(csv, "regions.{name}.impulse_n_s,{}", region.impulse_n_s);
+        _ = writeln!(csv, "regions.{name}.peak_n,{}", region.peak_n);
+    }
+    for raised in &summary.warnings {
+        _ = writeln!(csv, "warnings.{}_s,{}", raised.name, raised.time_s);
+    }
+    csv
 }
 
 /// A file that appears whole or not at all.

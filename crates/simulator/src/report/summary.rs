@@ -1,6 +1,8 @@
 //! `summary.json`: what a session did, in numbers.
 
 use crate::program::Program;
+use crate::report::against::Against;
+use crate::report::regions::Region;
 use crate::run::{Outcome, Replayed, Times};
 use crate::stages::notice::What;
 use crate::stages::score::ScoreKeeper;
@@ -42,6 +44,10 @@ pub struct Summary {
     pub warnings: Vec<Raised>,
     /// Scores.
     pub scores: ScoreKeeper,
+    /// The bone that went against the plan; `null` without bone.
+    pub plan: Option<Against>,
+    /// Where the brain was pressed, the most first.
+    pub regions: Vec<Region>,
     /// Ticks in which the force guard acted, by cause.
     pub guard: GuardSummary,
     /// The second hand; `null` without.
@@ -254,6 +260,10 @@ pub struct About {
     pub frames: u64,
     /// Bone that was cut off.
     pub cut_off: CutOff,
+    /// Against the plan.
+    pub plan: Option<Against>,
+    /// Where the brain was pressed.
+    pub regions: Vec<Region>,
     /// Remarks of import and pictures.
     pub remarks: Vec<String>,
     /// The machine.
@@ -296,6 +306,8 @@ impl Summary {
             cut_off: about.cut_off,
             warnings: warnings(outcome),
             scores: outcome.scores,
+            plan: about.plan,
+            regions: about.regions,
             guard: (&outcome.guard).into(),
             second: outcome.second.as_ref().map(|second| SecondSummary {
                 device: about.second_device,

@@ -2,11 +2,12 @@
 //!
 //! # Practice
 //! Rings hold 4 s of ticks; what does not fit is counted and told. Chunks are flushed five times a second, so that a killed
-//! session loses at most the last fifth of a second. A full disk ends the recording, never the session.
+//! session loses at most the last fifth of a second. The scores so far are an event `score` five times a second, for whoever watches and for viewers of the file. A full disk ends the recording, never the session.
 
 use crate::run::clock::Clock;
 use crate::run::watch::Share;
 use crate::stages::notice::{Notice, What};
+use crate::stages::score::ScoreKeeper;
 use std::time::Duration;
 use trepan_link::queue::{Receiver, Sender, bounded};
 use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
@@ -17,6 +18,8 @@ pub type Kept = (Recorder, Option<Share>);
 
 const RING: usize = 8192;
 const FLUSH_MS: f64 = 200.0;
+/// Time between two records of the scores so far, ms.
+const SCORES_MS: f64 = 200.0;
 const DRAIN: Duration = Duration::from_millis(5);
 
 /// The loops' ends of the rings.
@@ -77,9 +80,10 @@ impl Journal {
     pub fn write(mut self, mut recorder: Recorder, mut share: Option<Share>, clock: Clock) -> Written {
         let mut written = Written::default();
         let mut flushed_ms = 0.0;
+        let mut scores = ScoreKeeper::default();
         loop {
             let over = self.is_over();
-            if let Err(fault) = self.drain(&mut recorder, &mut share, &mut written) {
+            if let Err(fault) = self.drain(&mut recorder, &mut share, &mut written, &mut scores) {
                 written.fault.get_or_insert(fault);
                 self.discard(&mut written);
             }
@@ -111,10 +115,19 @@ impl Journal {
         recorder: &mut Recorder,
         share: &mut Option<Share>,
         written: &mut Written,
+        scores: &mut ScoreKeeper,
     ) -> Result<(), LinkError> {
         while let Some(record) = self.ticks.receive() {
+            let before_ms = scores.time_ms();
+            scores.add(&record);
             share.take_if(|share| !share.tick(&record));
             recorder.tick(&record)?;
+            if (before_ms / SCORES_MS).floor() < (record.time_ms / SCORES_MS).floor() {
+                let text = serde_json::to_string(scores).unwrap_or_default();
+                let event = EventRecord { tick: record.tick, time_ms: record.time_ms, kind: "score".into(), text };
+                share.take_if(|share| !share.event(&event));
+                recorder.event(&event)?;
+            }
         }
         while let Some(record) = self.second.receive() {
             recorder.second(&record)?;

@@ -201,7 +201,7 @@ impl HapticStage {
             record.flags |= TickRecord::THROUGH;
             tell(Notice { tick: input.tick, time_ms: tool.time_ms, what: What::Through });
         }
-        self.scores.add(&record, self.config.dt_ms);
+        self.scores.add(&record);
         Tick { wrench, sample, record, warnings: self.watch.standing() }
     }
 

@@ -29,8 +29,12 @@ pub struct ScoreKeeper {
     pub times_through: u32,
     /// Deepest place of the burr past the brain's rest surface, mm; 0 when it never got there.
     pub plunge_mm: f32,
-    /// Separate touches of the brain with the burr.
+    /// Separate touches of the brain's rest surface, and so of the dura over it, with a tool for bone.
     pub burr_touches_of_brain: u32,
+    /// Time of these touches, s.
+    pub burr_on_brain_s: f64,
+    /// Largest force on the hand during them, N.
+    pub peak_burr_on_brain_n: f32,
     /// Time in which the tool pressed on tissue, s.
     pub tissue_s: f64,
     /// Force on the hand, summed over the time in which the tool pressed on tissue, N s.
@@ -51,12 +55,24 @@ pub struct ScoreKeeper {
     last_force: Vec3,
     #[serde(skip)]
     touching: bool,
+    #[serde(skip)]
+    last_ms: Option<f64>,
 }
 
+/// A longer pause between two ticks does not count, s.
+const LONGEST_S: f64 = 0.1;
+
 impl ScoreKeeper {
-    /// Adds one tick.
-    pub fn add(&mut self, record: &TickRecord, dt_ms: f32) {
-        let (force, seconds) = (record.wrench.force, f64::from(dt_ms) * 1e-3);
+    /// Time of the newest tick, ms; 0 before the first.
+    pub fn time_ms(&self) -> f64 {
+        self.last_ms.unwrap_or(0.0)
+    }
+
+    /// Adds one tick, which stands for the time since the last.
+    pub fn add(&mut self, record: &TickRecord) {
+        let since_s = self.last_ms.map_or(0.0, |last| 1e-3 * (record.time_ms - last));
+        let (force, seconds) = (record.wrench.force, since_s.clamp(0.0, LONGEST_S));
+        self.last_ms = Some(record.time_ms);
         self.motion.add(record.time_ms, record.proxy.translation);
         (self.path_mm, self.idle_s) = (self.motion.path_mm, self.motion.idle_s);
         self.log_dimensionless_jerk = self.motion.log_dimensionless_jerk();
@@ -74,6 +90,10 @@ impl ScoreKeeper {
             self.plunge_mm = self.plunge_mm.max(-record.brain_distance_mm);
             let touching = record.brain_distance_mm <= 0.0;
             self.burr_touches_of_brain += u32::from(touching && !self.touching);
+            if touching {
+                self.burr_on_brain_s += seconds;
+                self.peak_burr_on_brain_n = self.peak_burr_on_brain_n.max(force.length());
+            }
             self.touching = touching;
         } else if record.tissue_depth_mm > 0.0 {
             self.tissue_s += seconds;
@@ -103,20 +123,20 @@ mod tests {
                 flags: TickRecord::DRILLING | if i % 50 == 7 { TickRecord::THROUGH } else { 0 },
                 ..TickRecord::default()
             };
-            keeper.add(&record, 1.0);
+            keeper.add(&record);
         }
         // From the middle of the first step to that of the last.
         assert!((keeper.path_mm - 9.9).abs() < 1e-4, "{}", keeper.path_mm);
-        assert!((keeper.drilling_s - 0.101).abs() < 1e-9);
+        assert!((keeper.drilling_s - 2.0).abs() < 1e-9);
         assert!((keeper.bone_removed_mm3 - 50.5).abs() < 1e-9);
         assert_eq!((keeper.plunge_mm, keeper.burr_touches_of_brain), (0.75, 2));
+        assert!((keeper.burr_on_brain_s - 0.22).abs() < 1e-9 && keeper.peak_burr_on_brain_n == 1.0);
         assert_eq!(keeper.times_through, 2);
         assert_eq!((keeper.peak_force_n, keeper.peak_force_step_n), (1.0, 1.0));
         for i in 0..200u16 {
             let wrench = Wrench { force: Vec3::Y * 0.5, torque: Vec3::ZERO };
             let (time_ms, tissue_depth_mm) = (2001.0 + f64::from(i), if i < 80 { 2.0 } else { 0.0 });
-            keeper
-                .add(&TickRecord { time_ms, phase: 1, tool: 1, wrench, tissue_depth_mm, ..TickRecord::default() }, 1.0);
+            keeper.add(&TickRecord { time_ms, phase: 1, tool: 1, wrench, tissue_depth_mm, ..TickRecord::default() });
         }
         assert_eq!((keeper.tool_changes, keeper.peak_tissue_force_n, keeper.peak_tissue_depth_mm), (1, 0.5, 2.0));
         assert!((keeper.tissue_s - 0.08).abs() < 1e-9 && (keeper.tissue_impulse_n_s - 0.04).abs() < 1e-9);

@@ -1,0 +1,120 @@
+//! What was taken away against what was planned.
+//!
+//! # Theory
+//! P: voxels of bone that were planned to go, T: those that went.
+//! ```text
+//! Dice = 2 |P ∩ T| / (|P| + |T|)
+//! s₉₅  = the 95th of 100 of { d(p, ∂T) : p ∈ ∂P } ∪ { d(t, ∂P) : t ∈ ∂T }
+//! ```
+//! ∂: voxels of a set with a neighbour outside it; d between centres, mm.
+//!
+//! # Practice
+//! For the end of a session: one pass over the voxels, then pairs of border voxels: 0.1 s for a flap of 24 mm in voxels of 1 mm.
+//!
+//! # Sources
+//! L. R. Dice, Ecology 26 (1945); 95 % Hausdorff distance: D. P. Huttenlocher et al., IEEE PAMI 15 (1993), as in A. A. Taha, A. Hanbury, BMC Medical Imaging 15 (2015).
+
+use crate::case::plan::Plan;
+use serde::Serialize;
+use trepan_geometry::Vec3;
+use trepan_volume::{BoneVolume, VoxelVolume};
+
+/// How well the bone that went is the bone that was to go.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Against {
+    /// Bone that was planned to go, mm³.
+    pub planned_mm3: f64,
+    /// Bone that went, drilled or lifted, mm³.
+    pub taken_mm3: f64,
+    /// Of it what was not planned, mm³.
+    pub beside_mm3: f64,
+    /// Overlap of both, 1 when they are the same.
+    pub dice: f64,
+    /// Distance of their surfaces that 95 of 100 places keep, mm; `null` where nothing went.
+    pub surface_95_mm: Option<f64>,
+}
+
+impl Against {
+    /// The bone as it was `before` against how it is now; `None` without a plan for any of it.
+    pub fn of(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<Self> {
+        let now = bone.snapshot();
+        let isovalue = bone.isovalue();
+        let planned = plan.of(before, isovalue);
+        let taken: Vec<bool> =
+            before.data.iter().zip(&now.data).map(|(was, is)| *was >= isovalue && *is < isovalue).collect();
+        let count = |set: &[bool]| set.iter().filter(|is| **is).count() as f64;
+        let both = planned.iter().zip(&taken).filter(|(p, t)| **p && **t).count() as f64;
+        let (of_plan, gone) = (count(&planned), count(&taken));
+        let mm3 = f64::from(bone.voxel_mm3());
+        (of_plan > 0.0).then(|| Self {
+            planned_mm3: of_plan * mm3,
+            taken_mm3: gone * mm3,
+            beside_mm3: (gone - both) * mm3,
+            dice: 2.0 * both / (of_plan + gone),
+            surface_95_mm: surface_95(&border(before, &planned), &border(before, &taken)),
+        })
+    }
+}
+
+/// Centres of the voxels of a set that have a neighbour outside it, world mm.
+fn border(of: &VoxelVolume<i16>, set: &[bool]) -> Vec<Vec3> {
+    let [nx, ny, nz] = of.dims;
+    let inner = |[x, y, z]: [usize; 3]| x > 0 && y > 0 && z > 0 && x + 1 < nx && y + 1 < ny && z + 1 < nz;
+    let strides = [1, nx, nx * ny];
+    let on_border = |at: usize, place: [usize; 3]| {
+        !inner(place) || strides.iter().any(|stride| !set[at - stride] || !set[at + stride])
+    };
+    let place = |at: usize| [at % nx, at / nx % ny, at / (nx * ny)];
+    let at = (0..set.len()).filter(|&at| set[at] && on_border(at, place(at)));
+    at.map(|at| of.centre_of(place(at)).as_vec3()).collect()
+}
+
+fn surface_95(a: &[Vec3], b: &[Vec3]) -> Option<f64> {
+    let nearest =
+        |p: &Vec3, to: &[Vec3]| to.iter().map(|q| q.distance_squared(*p)).fold(f32::INFINITY, f32::min).sqrt();
+    let mut all: Vec<f32> = a.iter().map(|p| nearest(p, b)).chain(b.iter().map(|p| nearest(p, a))).collect();
+    all.sort_by(f32::total_cmp);
+    let at = (0.95 * all.len() as f64).ceil() as usize;
+    all.get(at.saturating_sub(1)).copied().filter(|mm| mm.is_finite()).map(f64::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::IVec3;
+    use trepan_haptics::script::Site;
+    use trepan_volume::AIR_HU;
+
+    #[test]
+    fn a_hole_beside_the_plan_has_the_dice_and_the_distance_of_two_shifted_cylinders() {
+        let n = 60;
+        let mut ct = VoxelVolume::isotropic([n, n, 10], Vec3::ZERO, 0.5, AIR_HU);
+        ct.data[n * n * 2..n * n * 8].fill(1200);
+        let bone = BoneVolume::new(&ct, 400).unwrap();
+        let before = bone.snapshot();
+        let site = Site { entry: Vec3::new(14.75, 14.75, 3.75), inward: Vec3::NEG_Z, bone_mm: 3.0, brain_mm: 5.0 };
+        let plan = Plan::new(Some(&bone), site, 6.0, 0.0).unwrap();
+        assert_eq!(Against::of(&plan, &before, &bone).unwrap().dice, 0.0);
+        assert_eq!(Against::of(&plan, &before, &bone).unwrap().surface_95_mm, None);
+        let drill = |shift: i32| {
+            for at in 0..n * n * 10 {
+                let voxel = IVec3::new((at % n) as i32, (at / n % n) as i32, (at / (n * n)) as i32);
+                let planned = plan.takes(bone.centre_of(voxel - IVec3::X * shift));
+                bone.set_hu(voxel, if planned { AIR_HU } else { before.data[at] });
+            }
+            Against::of(&plan, &before, &bone).unwrap()
+        };
+        let same = drill(0);
+        assert_eq!((same.dice, same.surface_95_mm, same.beside_mm3), (1.0, Some(0.0), 0.0));
+        let mm3 = std::f64::consts::PI * 36.0 * 3.0;
+        assert!((same.planned_mm3 / mm3 - 1.0).abs() < 0.02 && same.taken_mm3 == same.planned_mm3, "{same:?}");
+        // Overlap of two discs of radius r, d apart: 2 r² acos(d/2r) - d/2 √(4r² - d²).
+        let (r, d) = (6.0f64, 3.0f64);
+        let lens = 2.0 * r * r * (d / (2.0 * r)).acos() - 0.5 * d * (4.0 * r * r - d * d).sqrt();
+        let beside = drill(6);
+        assert!((beside.dice - lens / (std::f64::consts::PI * r * r)).abs() < 0.01, "{beside:?}");
+        // The walls are 3 mm apart where they face the shift, less at the flanks.
+        let apart = beside.surface_95_mm.unwrap();
+        assert!((2.5..=3.0).contains(&apart), "{apart}");
+    }
+}

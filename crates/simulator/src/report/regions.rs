@@ -1,0 +1,106 @@
+//! Where the brain was pressed, and how hard: by the tissue under the tool and the side of the head.
+//!
+//! # Theory
+//! A tick with force counts to the tissue class of the rest place under the tool's ball, one radius and a millimetre in along the contact's normal, or of the nearest
+//! brain within 4 mm of it. Its share is `∫ F dt`. The brain is taken where it lay at rest: a place that was pushed far counts to its neighbour.
+//!
+//! # When not to use it
+//! For functional regions: there is no atlas here.
+
+use crate::case::scene::RestBrain;
+use crate::case::tissue::TissueClass;
+use serde::Serialize;
+use trepan_geometry::{Tool, Vec3};
+use trepan_link::wire::TickRecord;
+
+/// What one region bore.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Region {
+    /// Side and tissue, as in `right grey`.
+    pub name: String,
+    /// Time under force, s.
+    pub seconds: f64,
+    /// Force summed over time, N s.
+    pub impulse_n_s: f64,
+    /// Largest force, N.
+    pub peak_n: f32,
+}
+
+/// How far in along the normal brain is looked for, mm.
+const IN_MM: [f32; 5] = [1.0, 0.0, 2.0, 3.0, 4.0];
+/// A longer pause between two ticks does not count, s.
+const LONGEST_S: f64 = 0.1;
+
+/// Regions that were pressed, the most first.
+pub fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Region> {
+    let middle = brain.mesh.bounds().centre().x;
+    let mut all: Vec<Region> = Vec::new();
+    for pair in ticks.windows(2).filter(|pair| pair[1].tissue_depth_mm > 0.0 && pair[1].phase == 1) {
+        let (before, tick) = (&pair[0], &pair[1]);
+        let tip_mm = tray.get(usize::from(tick.tool)).map_or(0.0, |tool| tool.tip_radius_mm);
+        let (tip, normal) = (tick.proxy.translation, tick.contact_normal);
+        let Some(class) = IN_MM.iter().find_map(|mm| class_at(brain, tip - (tip_mm + mm) * normal)) else { continue };
+        let side = if tip.x > middle { "right" } else { "left" };
+        let name = format!("{side} {}", class.name());
+        let at = all.iter().position(|region| region.name == name).unwrap_or_else(|| {
+            all.push(Region { name, seconds: 0.0, impulse_n_s: 0.0, peak_n: 0.0 });
+            all.len() - 1
+        });
+        let seconds = (1e-3 * (tick.time_ms - before.time_ms)).clamp(0.0, LONGEST_S);
+        let force = tick.wrench.force.length();
+        let region = &mut all[at];
+        region.seconds += seconds;
+        region.impulse_n_s += seconds * f64::from(force);
+        region.peak_n = region.peak_n.max(force);
+    }
+    all.sort_by(|a, b| b.impulse_n_s.total_cmp(&a.impulse_n_s));
+    all
+}
+
+fn class_at(brain: &RestBrain, place: Vec3) -> Option<TissueClass> {
+    let voxel = brain.classes.world_from_voxel.inverse().transform_point3(place.as_dvec3()).round();
+    let inside = voxel.cmpge(glam::DVec3::ZERO).all();
+    let code = inside.then(|| brain.classes.get(voxel.as_usizevec3().to_array())).flatten()?;
+    TissueClass::ALL.into_iter().find(|class| class.code() == code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use trepan_geometry::{Pose, Wrench};
+    use trepan_volume::{DistanceField, VoxelVolume};
+
+    #[test]
+    fn a_press_counts_to_the_tissue_below_and_its_side() {
+        let mut classes = VoxelVolume::isotropic([20; 3], Vec3::splat(-9.5), 1.0, TissueClass::White.code());
+        classes.data[20 * 20 * 10..].fill(TissueClass::Grey.code());
+        classes.data[20 * 20 * 15..].fill(0);
+        let mut mesh = trepan_soft::boxes::split_box([2; 3], Vec3::splat(18.0));
+        mesh.positions.iter_mut().for_each(|p| *p -= 9.0);
+        let field = Arc::new(DistanceField::of_mask(&classes));
+        let mri = classes.map(f32::from);
+        let brain = RestBrain { mesh, class_of_tet: vec![], fixed: vec![], field, classes, mri, tint: None };
+        let press = |ms: u16, x: f32, z: f32, newton: f32| TickRecord {
+            time_ms: f64::from(ms),
+            proxy: Pose::from_translation(Vec3::new(x, 0.0, z)),
+            contact_normal: Vec3::Z,
+            tissue_depth_mm: 1.0,
+            wrench: Wrench { force: newton * Vec3::Z, torque: Vec3::ZERO },
+            phase: 1,
+            ..TickRecord::default()
+        };
+        let ticks = [
+            press(0, 5.0, 6.0, 0.2),
+            press(20, 5.0, 6.0, 0.2),
+            press(40, 5.0, 6.0, 0.4),
+            press(60, -5.0, 1.0, 0.3),
+            TickRecord { tissue_depth_mm: 0.0, ..press(80, 5.0, 6.0, 9.0) },
+        ];
+        let found = regions(&brain, &[Tool::probe(2.0)], &ticks);
+        let names: Vec<&str> = found.iter().map(|r| r.name.as_str()).collect();
+        assert_eq!(names, ["right grey", "left white"]);
+        assert!((found[0].seconds - 0.04).abs() < 1e-9 && (found[0].impulse_n_s - 0.012).abs() < 1e-6);
+        assert_eq!((found[0].peak_n, found[1].peak_n), (0.4, 0.3));
+    }
+}
