@@ -1,5 +1,5 @@
 // The brain's surface where the physics has put it, drawn as triangles with smooth normals.
-// Output 0: folded normal (xy), distance along the ray in mm (w). Output 1: the place at rest, where the MRI was taken.
+// Output 0: folded normal (xy), 1 on a cut (z), distance along the ray in mm (w). Output 1: the place at rest, where the MRI was taken.
 
 @group(0) @binding(1) var<storage, read> places: array<vec4f>;    // now, world mm
 @group(0) @binding(2) var<storage, read> normals: array<vec4f>;   // now, unit
@@ -25,6 +25,7 @@ struct Seen {
 }
 
 @fragment fn fragment(v: Corner) -> Seen {
+    if height(scene.brain_cut, v.place) > 0.0 { discard; }
     let hit = vec4f(fold(normalize(v.normal)), 0.0, distance(v.place, scene.eye.xyz));
     return Seen(packed(hit), packed(vec4f(v.rest, 1.0)));
 }

@@ -86,7 +86,13 @@ fn meet(o: vec3f, d: vec3f, furthest: f32) -> f32 {
     let near = min(-o * inverse, (scene.dims.xyz - 1.0 - o) * inverse);
     let far = max(-o * inverse, (scene.dims.xyz - 1.0 - o) * inverse);
     var t = max(max(max(near.x, near.y), near.z), 0.0);
-    let end = min(min(min(far.x, far.y), far.z), furthest);
+    var end = min(min(min(far.x, far.y), far.z), furthest);
+    // Of the bone only the part under the cut is there.
+    let over = height(scene.bone_cut, scene.origin.xyz + scene.origin.w * o);
+    let rising = scene.origin.w * dot(scene.bone_cut.xyz, d);
+    if rising < 0.0 { t = max(t, -over / rising); }
+    if rising > 0.0 { end = min(end, -over / rising); }
+    if rising == 0.0 && over > 0.0 { return NOTHING; }
     let nudge = NUDGE * scene.origin.w;
     let positive = safe > vec3f(0.0);
     let last = vec3i(scene.dims.xyz) - 2;
@@ -143,11 +149,16 @@ fn openness(g: vec3f, normal: vec3f) -> f32 {
     var dark = 0.0;
     for (var i = 0; i < 4; i++) {
         let reach = 2.5 * exp2(f32(i)) / scene.origin.w;
-        let at = (g + normal * reach + 0.5) / (4.0 * vec3f(textureDimensions(crowd)));
-        dark += textureSampleLevel(crowd, linear, at, 0.0).x;
+        let there = g + normal * reach;
+        let at = (there + 0.5) / (4.0 * vec3f(textureDimensions(crowd)));
+        let cut_away = height(scene.bone_cut, scene.origin.xyz + scene.origin.w * there) > 0.0;
+        dark += select(textureSampleLevel(crowd, linear, at, 0.0).x, 0.0, cut_away);
     }
     return exp(-1.1 * dark);
 }
+
+// Whether a point that a ray has met is where bone is cut.
+fn on_cut(point: vec3f) -> bool { return any(scene.bone_cut.xyz != vec3f(0.0)) && abs(height(scene.bone_cut, point)) < 0.01; }
 
 // Whether bone stands between a surface point and the light.
 fn shadowed(g: vec3f, normal: vec3f) -> bool {

@@ -4,39 +4,10 @@
 @group(0) @binding(6) var brain_hit: texture_2d<u32>;
 @group(0) @binding(7) var brain_rest: texture_2d<u32>;
 @group(0) @binding(8) var mri: texture_3d<f32>;
+@group(0) @binding(9) var bone_coat: texture_3d<f32>;    // colours over bone, alpha multiplied in
+@group(0) @binding(10) var brain_coat: texture_3d<f32>;
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
-
-// Distance along the ray to a ball, or NOTHING.
-fn ball(eye: vec3f, along: vec3f, centre: vec3f, radius: f32) -> f32 {
-    let to = centre - eye;
-    let middle = dot(to, along);
-    let off = to - middle * along;
-    let room = radius * radius - dot(off, off);
-    let t = middle - sqrt(max(room, 0.0));
-    return select(NOTHING, t, room > 0.0 && t > 0.0);
-}
-
-// Distance along the ray to a shaft's mantle, or NOTHING.
-fn shaft(eye: vec3f, along: vec3f, tip: vec4f, tail: vec4f) -> f32 {
-    let axis = tail.xyz - tip.xyz;
-    let away = eye - tip.xyz;
-    let length2 = dot(axis, axis);
-    let a = length2 - dot(axis, along) * dot(axis, along);
-    let b = length2 * dot(away, along) - dot(axis, away) * dot(axis, along);
-    let c = length2 * (dot(away, away) - tail.w * tail.w) - dot(axis, away) * dot(axis, away);
-    let room = b * b - a * c;
-    let t = (-b - sqrt(max(room, 0.0))) / max(a, 1e-9);
-    let at = dot(axis, away) + t * dot(axis, along);
-    return select(NOTHING, t, room > 0.0 && t > 0.0 && at > 0.0 && at < length2);
-}
-
-// Distances along the ray to a tool's ball, shaft and far end; NOTHING without a tool.
-fn reach(along: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
-    let eye = scene.eye.xyz;
-    let met = vec3f(ball(eye, along, tip.xyz, tip.w), shaft(eye, along, tip, tail), ball(eye, along, tail.xyz, tail.w));
-    return select(vec3f(NOTHING), met, tip.w > 0.0);
-}
 
 // Share of the lamp that passes a body at distance `gap` from the beam, `way` mm on: the lamp is a disc.
 fn pass_by(gap: f32, way: f32) -> f32 { return smoothstep(-1.0, 1.0, gap / (0.10 * way + 0.3)); }
@@ -62,17 +33,6 @@ fn past(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {
     return ball * pass_by(gap, on_beam);
 }
 
-// Diffuse light from above left and from the sky, and a highlight.
-fn lit(albedo: vec3f, normal: vec3f, along: vec3f, open: f32, key: f32, gloss: f32) -> vec3f {
-    let facing = max(dot(normal, scene.light.xyz), 0.0) * key;
-    let sky = 0.5 + 0.5 * dot(normal, normalize(scene.up.xyz));
-    let ambient = open * mix(vec3f(0.10, 0.09, 0.085), vec3f(0.25, 0.28, 0.33), sky);
-    let head = 0.12 * (0.25 + 0.75 * open) * max(-dot(normal, along), 0.0);
-    let halfway = normalize(scene.light.xyz - along);
-    let shine = gloss * pow(max(dot(normal, halfway), 0.0), 48.0) * key * open;
-    return albedo * (ambient + head + facing * vec3f(0.66, 0.63, 0.57)) + shine;
-}
-
 fn bone_colour(point: vec3f, normal: vec3f) -> vec3f {
     let inside = hu(grid_of(point - normal * 1.2));
     return mix(vec3f(0.80, 0.62, 0.50), vec3f(0.93, 0.89, 0.80), smoothstep(scene.dims.w, scene.dims.w + 500.0, inside));
@@ -86,6 +46,67 @@ fn brain_colour(rest: vec3f) -> vec3f {
     return tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal);
 }
 
+// The MRI where the brain is cut, as grey as in the slices.
+fn cut_colour(rest: vec3f) -> vec3f {
+    let signal = textureSampleLevel(mri, linear, (scene.mri_from_world * vec4f(rest, 1.0)).xyz, 0.0);
+    if scene.eye.w == 0.0 { return vec3f(0.62, 0.32, 0.29); }
+    return pow(tinted(vec3f(signal.w), signal), vec3f(2.2));
+}
+
+// A colour with paint over it, at a place in the box of the paint, 0 to 1.
+fn painted(colour: vec3f, at: vec3f, paint: vec4f) -> vec3f {
+    let inside = all(at >= vec3f(0.0)) && all(at <= vec3f(1.0));
+    return select(colour, colour * (1.0 - paint.w) + paint.xyz, inside);
+}
+
+fn painted_bone(colour: vec3f, point: vec3f) -> vec3f {
+    if scene.bone_paint[0].w == 0.0 { return colour; }
+    let at = (point - scene.bone_paint[0].xyz) * scene.bone_paint[1].xyz;
+    return painted(colour, at, textureSampleLevel(bone_coat, linear, at, 0.0));
+}
+
+fn painted_brain(colour: vec3f, rest: vec3f) -> vec3f {
+    if scene.brain_paint[0].w == 0.0 { return colour; }
+    let at = (rest - scene.brain_paint[0].xyz) * scene.brain_paint[1].xyz;
+    return painted(colour, at, textureSampleLevel(brain_coat, linear, at, 0.0));
+}
+
+// How wet bone is: while the burr turns, water and blood film what is near it.
+fn wetness(point: vec3f) -> f32 {
+    return scene.light.w * (1.0 - smoothstep(1.0, 7.0, distance(point, scene.tip.xyz) - scene.tip.w));
+}
+
+// Whether a grain of bone dust lies at a point: one cell of 0.5 mm in twelve.
+fn dusty(point: vec3f) -> bool {
+    let cell = vec3u(vec3i(floor(point * 2.0)));
+    let mixed = (cell.x * 73856093u) ^ (cell.y * 19349663u) ^ (cell.z * 83492791u);
+    return ((mixed * 2654435761u) >> 16u) % 12u == 0u;
+}
+
+fn shade_bone(point: vec3f, along: vec3f, skull: vec4f) -> vec3f {
+    let normal = unfold(skull.xy);
+    var colour = painted_bone(bone_colour(point, normal), point);
+    let wet = wetness(point);
+    if wet > 0.0 {
+        colour = mix(colour, colour * vec3f(0.72, 0.48, 0.42), wet);
+        if dusty(point) { colour = mix(colour, vec3f(0.95, 0.92, 0.86), 0.6 * wet); }
+    }
+    return lit(colour, normal, along, fract(skull.z), past_tools(point) * floor(skull.z), 0.06 + 0.4 * wet);
+}
+
+fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, rest: vec3f) -> vec3f {
+    let normal = unfold(brain.xy);
+    var key = past_tools(point);
+    if brain.z > 0.5 { return painted_brain(cut_colour(rest), rest) * (0.6 + 0.4 * key); }
+    let g = grid_of(point);
+    var open = 1.0;
+    if scene.forward.w > 0.0 {
+        open = openness(g, normal);
+        key *= select(1.0, 0.25, shadowed(g, normal));
+    }
+    return lit(painted_brain(brain_colour(rest - 3.5 * normal), rest), normal, along, open, key, 0.20);
+}
+
 fn burr_colour(point: vec3f) -> vec3f {
     let axis = normalize(scene.tail.xyz - scene.tip.xyz);
     let away = point - scene.tip.xyz;
@@ -96,12 +117,13 @@ fn burr_colour(point: vec3f) -> vec3f {
 
 // A tool where the ray meets it at `met`; `first` may be a burr.
 fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, first: bool) -> vec3f {
-    let t = min(met.x, min(met.y, met.z));
-    let axis = normalize(tail.xyz - tip.xyz);
-    let away = point - select(tip.xyz, tail.xyz, t == met.z);
-    let normal = normalize(select(away - axis * dot(away, axis), away, t == met.x || t == met.z));
+    let on_tip = min(met.y, met.z) > met.x;
+    let normal = tool_normal(point, tip, tail, met);
+    let burr = first && scene.spin.w > 0.5;
     var colour = vec3f(0.62, 0.66, 0.72);
-    if first && t == met.x && scene.spin.w > 0.5 { colour = burr_colour(point); }
+    if on_tip && burr { colour = burr_colour(point); }
+    // A tip no wider than its shaft is a tube's mouth.
+    if on_tip && !burr && tip.w <= tail.w && dot(normal, normalize(tip.xyz - tail.xyz)) > 0.75 { colour = vec3f(0.02); }
     return lit(colour, normal, along, 1.0, 1.0, 0.7);
 }
 
@@ -124,19 +146,9 @@ fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, f
     } else if t == near.y {
         colour = shade_tool(point, along, scene.second_tip, scene.second_tail, second, false);
     } else if t == brain.w {
-        let normal = unfold(brain.xy);
-        let g = grid_of(point);
-        let rest = unpacked(textureLoad(brain_rest, at, 0)).xyz - 3.5 * normal;
-        var open = 1.0;
-        var key = past_tools(point);
-        if scene.forward.w > 0.0 {
-            open = openness(g, normal);
-            key *= select(1.0, 0.25, shadowed(g, normal));
-        }
-        colour = lit(brain_colour(rest), normal, along, open, key, 0.20);
+        colour = shade_brain(point, along, brain, unpacked(textureLoad(brain_rest, at, 0)).xyz);
     } else {
-        let normal = unfold(skull.xy);
-        colour = lit(bone_colour(point, normal), normal, along, fract(skull.z), past_tools(point) * floor(skull.z), 0.06);
+        colour = shade_bone(point, along, skull);
     }
     return vec4f(pow(clamp(colour, vec3f(0.0), vec3f(1.0)), vec3f(1.0 / 2.2)), 1.0);
 }

@@ -6,7 +6,7 @@ struct Scene {
     eye: vec4f,               // world mm; w: 1 if there is an MRI
     right: vec4f,             // half the picture's width at distance 1; w: width in pixels
     up: vec4f,                // half its height at distance 1; w: height in pixels
-    forward: vec4f,           // unit; w: 1 if bone is shown
+    forward: vec4f,           // to the picture's middle at distance 1; w: 1 if bone is shown
     origin: vec4f,            // world centre of the padded voxel (0, 0, 0); w: voxel edge, mm
     dims: vec4f,              // padded voxels along x, y, z; w: isovalue, HU
     tip: vec4f,               // centre of the tool's ball; w: its radius (negative: no tool)
@@ -15,6 +15,10 @@ struct Scene {
     spin: vec4f,              // unit, across the shaft: turns with the burr; w: 1 for a burr, 0 for a probe
     second_tip: vec4f,        // the tool in the other hand, as `tip`
     second_tail: vec4f,       // as `tail`
+    brain_cut: vec4f,         // unit normal and offset of the plane over which the brain is cut away; zeroes: none
+    bone_cut: vec4f,          // the same for bone
+    bone_paint: array<vec4f, 2>,    // lower corner of the colours over bone (w: 1 if there are any), one over the box's size
+    brain_paint: array<vec4f, 2>,   // the same over the brain at rest
 }
 
 @group(0) @binding(0) var<uniform> scene: Scene;
@@ -37,6 +41,9 @@ fn ray_of(pixel: vec2f) -> vec3f {
     let y = 1.0 - 2.0 * pixel.y / scene.up.w;
     return normalize(scene.forward.xyz + x * scene.right.xyz + y * scene.up.xyz);
 }
+
+// Height of a point over a plane, mm; 0 where there is no plane.
+fn height(plane: vec4f, point: vec3f) -> f32 { return dot(plane.xyz, point) - plane.w; }
 
 // Unit vectors in two numbers (Cigolle et al. 2014, octahedral).
 fn fold(n: vec3f) -> vec2f {

@@ -20,7 +20,7 @@ fn outward_normal(g: vec3f, along: vec3f) -> vec3f {
     let t = meet(o, d, NOTHING);
     if t >= NOTHING { return packed(vec4f(0.0, 0.0, 1.0, NOTHING)); }
     let g = o + d * t;
-    let normal = outward_normal(g, along);
+    let normal = select(outward_normal(g, along), scene.bone_cut.xyz, on_cut(scene.eye.xyz + t * along));
     let facing = dot(normal, scene.light.xyz) > 0.0 && !shadowed(g, normal);
     return packed(vec4f(fold(normal), 0.999 * openness(g, normal) + select(0.0, 1.0, facing), t));
 }

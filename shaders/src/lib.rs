@@ -17,13 +17,19 @@ pub const RENDER_SKULL: &str = picture!("bricks.wgsl", "skull.wgsl");
 /// The brain's deformed surface.
 pub const RENDER_BRAIN: &str = picture!("brain.wgsl");
 /// Bone, brain and tool together, lit, with the shadows that bone throws on the brain.
-pub const RENDER_LIGHT: &str = picture!("bricks.wgsl", "light.wgsl");
+pub const RENDER_LIGHT: &str = picture!("bricks.wgsl", "tool.wgsl", "light.wgsl");
+/// Arrow, ghost and markers over the 3-D view.
+pub const RENDER_OVERLAY: &str = picture!("tool.wgsl", "overlay.wgsl");
+/// The brain where it is cut open.
+pub const RENDER_CUT: &str = picture!("cut.wgsl");
 /// One orthogonal slice.
 pub const RENDER_SLICE: &str = picture!("slice.wgsl");
 /// The brain's outline in a slice.
 pub const RENDER_CONTOUR: &str = picture!("contour.wgsl");
 /// A coarser 3-D view, enlarged.
 pub const RENDER_ENLARGE: &str = picture!("enlarge.wgsl");
+/// Both eyes' views in one picture.
+pub const RENDER_ANAGLYPH: &str = picture!("anaglyph.wgsl");
 /// The brain cut by a slice, as places at rest.
 pub const RENDER_SECTION: &str = picture!("section.wgsl");
 

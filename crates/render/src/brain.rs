@@ -6,9 +6,7 @@
 use crate::RenderError;
 use crate::scene::Scene;
 use glam::{Vec3, Vec4};
-use trepan_gpu::{
-    Bindings, Buffer, Depth, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
-};
+use trepan_gpu::{Bindings, Buffer, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
 use trepan_mesh::{Surface, TetMesh};
 
 /// The brain's border on the device.
@@ -124,12 +122,9 @@ impl Brain {
         Ok(self.pipeline.bind(gpu, &all)?)
     }
 
-    /// Draws the border into what was cleared before.
-    pub fn draw(&self, recorder: &mut Recorder, bindings: &Bindings, hit: &Texture, rest: &Texture, depth: &Texture) {
-        let colours = [Target { texture: hit, clear: Some([0.0; 4]) }, Target { texture: rest, clear: Some([0.0; 4]) }];
-        let target = DrawTarget { colours: &colours, depth: Some(Depth { texture: depth, clear: Some(1.0) }) };
-        let vertices = 3 * self.border.triangles.len() as u32;
-        recorder.draw("brain", &target, |d| d.draw(&self.pipeline, bindings, vertices));
+    /// Draws the border's triangles.
+    pub fn draw(&self, draws: &mut Draws, bindings: &Bindings) {
+        draws.draw(&self.pipeline, bindings, 3 * self.border.triangles.len() as u32);
     }
 }
 

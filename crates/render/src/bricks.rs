@@ -9,6 +9,7 @@
 //! One byte a brick. Drilling only makes bricks free; a brick that gets bone back (an undo) makes the distances anew, which costs about 1 ms.
 
 use glam::{IVec3, Vec3};
+use trepan_geometry::Aabb;
 use trepan_volume::{AIR_HU, BRICK, BoneVolume};
 
 /// Edge of a brick of cells; `BRICK` in `bricks.wgsl`. Divides the bone's own brick.
@@ -65,10 +66,10 @@ impl Grid {
     }
 
     /// World box that a change of a brick of voxels may change the surface in, mm.
-    pub fn corners_of(&self, brick: [usize; 3]) -> (Vec3, Vec3) {
+    pub fn box_of(&self, brick: [usize; 3]) -> Aabb {
         let (first, size) = self.voxels_of(brick);
         let corner = |voxel: [usize; 3]| self.origin + self.spacing_mm * Vec3::from(voxel.map(|v| v as f32));
-        (corner(first.map(|v| v - 1)), corner([0, 1, 2].map(|a| first[a] + size[a])))
+        Aabb { min: corner(first.map(|v| v - 1)), max: corner([0, 1, 2].map(|a| first[a] + size[a])) }
     }
 
     /// The blocks that share voxels with a brick of voxels.

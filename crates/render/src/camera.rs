@@ -4,7 +4,7 @@
 //! World mm, z up. Elevation stops just short of the poles, so up is always defined. `viewed_from` puts the eye along a direction: seen from in front, the
 //! patient's right is on the left of the picture.
 
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Mat4, Vec2, Vec3, Vec4};
 
 /// Where the eye is and what it looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +34,8 @@ pub struct View {
     pub forward: Vec3,
     /// Half the picture's width and height at distance 1.
     pub half: Vec2,
+    /// How far the picture's middle lies to the left of straight ahead at distance 1: 0 but for one eye of two.
+    pub shear: f32,
 }
 
 const STEEPEST_RAD: f32 = 1.55;
@@ -71,6 +73,7 @@ impl Camera {
             up: back.cross(right),
             forward: -back,
             half: Vec2::new(half * aspect, half),
+            shear: 0.0,
         }
     }
 }
@@ -81,16 +84,28 @@ impl View {
     /// Farthest distance that triangles are drawn at, mm.
     pub const FAR_MM: f32 = 6000.0;
 
+    /// The same picture from an eye `offset_mm` to the right: what is `distance_mm` away stays where it is (an off-axis frustum, without the
+    /// keystones of turned eyes).
+    pub fn from_aside(&self, offset_mm: f32, distance_mm: f32) -> Self {
+        Self { eye: self.eye + offset_mm * self.right, shear: offset_mm / distance_mm.max(Self::NEAR_MM), ..*self }
+    }
+
+    /// Towards the picture's middle; 1 long along `forward`.
+    pub(crate) fn middle(&self) -> Vec3 {
+        self.forward - self.shear * self.right
+    }
+
     /// Unit direction of the ray through a point of the picture, each coordinate from -1 (left, bottom) to 1 (right, top).
     pub fn ray(&self, at: Vec2) -> Vec3 {
-        (self.forward + at.x * self.half.x * self.right + at.y * self.half.y * self.up).normalize()
+        (self.middle() + at.x * self.half.x * self.right + at.y * self.half.y * self.up).normalize()
     }
 
     /// Where a world point is in the picture, from -1 to 1, and its depth along `forward`, mm.
     pub fn project(&self, point: Vec3) -> (Vec2, f32) {
         let from = point - self.eye;
         let depth = from.dot(self.forward);
-        (Vec2::new(from.dot(self.right), from.dot(self.up)) / (self.half * depth), depth)
+        let across = from.dot(self.right) + self.shear * depth;
+        (Vec2::new(across, from.dot(self.up)) / (self.half * depth), depth)
     }
 
     /// The same as a matrix for drawing triangles.
@@ -98,7 +113,8 @@ impl View {
         let aspect = self.half.x / self.half.y;
         let clip_from_eye =
             glam::camera::rh::proj::directx::perspective(2.0 * self.half.y.atan(), aspect, Self::NEAR_MM, Self::FAR_MM);
-        clip_from_eye * glam::camera::rh::view::look_to_mat4(self.eye, self.forward, self.up)
+        let sheared = Mat4::from_cols(Vec4::X, Vec4::Y, Vec4::Z, Vec4::new(self.shear / self.half.x, 0.0, 0.0, 1.0));
+        sheared * clip_from_eye * glam::camera::rh::view::look_to_mat4(self.eye, self.forward, self.up)
     }
 }
 
@@ -124,9 +140,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn matrix_projection_and_ray_agree(azimuth in -3.0f32..3.0, elevation in -1.5f32..1.5, x in -40.0f32..40.0, y in -40.0f32..40.0, z in -40.0f32..40.0) {
+        fn matrix_projection_and_ray_agree(azimuth in -3.0f32..3.0, elevation in -1.5f32..1.5, aside in -9.0f32..9.0, x in -40.0f32..40.0, y in -40.0f32..40.0, z in -40.0f32..40.0) {
             let camera = Camera { target: Vec3::new(3.0, -8.0, 5.0), azimuth_rad: azimuth, elevation_rad: elevation, distance_mm: 200.0, fov_rad: 0.7 };
-            let view = camera.view(1.4);
+            let view = camera.view(1.4).from_aside(aside, camera.distance_mm);
+            prop_assert!(view.project(camera.target).0.length() < 1e-4);
             let point = Vec3::new(x, y, z);
             let (at, depth) = view.project(point);
             let clip = view.clip_from_world() * point.extend(1.0);
@@ -134,6 +151,7 @@ mod tests {
             prop_assert!((depth - clip.w).abs() < 1e-2);
             let along = view.ray(at);
             prop_assert!((point - view.eye).cross(along).length() < 0.02);
+            prop_assert!((view.project(view.eye + 99.0 * along).0 - at).length() < 1e-3);
         }
     }
 }

@@ -2,23 +2,33 @@
 
 use crate::RenderError;
 use crate::brain::Brain;
+use crate::cut::Face;
 use crate::enlarge::Enlarge;
+use crate::eye::Eye;
 use crate::layout::Layout;
-use crate::light::{Inputs, Light};
+use crate::light::Light;
 use crate::mri::Mri;
+use crate::overlay::Shapes;
+use crate::paint::Coat;
 use crate::scene::Scene;
 use crate::skull::Skull;
 use crate::slice::Slices;
+use crate::stereo::StereoLook;
 use trepan_gpu::{Bindings, Buffer, Format, Gpu, Texture, TextureSpec};
 
-/// What the passes of the 3-D view share.
+/// What the passes share.
 #[derive(Debug)]
 pub(crate) struct Passes {
-    pub scene: Buffer<Scene>,
+    /// What each eye knows.
+    pub scenes: [Buffer<Scene>; 2],
     pub skull: Skull,
-    pub brain: Option<Brain>,
+    /// The border, and where it is cut open.
+    pub brain: Option<(Brain, Face)>,
     pub mri: Mri,
+    /// Paint over bone and over the brain.
+    pub coats: [Coat; 2],
     pub light: Light,
+    pub overlay: Shapes,
     pub enlarge: Enlarge,
     pub slices: Slices,
 }
@@ -32,6 +42,8 @@ pub(crate) struct Division {
     pub slices: bool,
     /// Share of the 3-D view's pixels along an edge that are drawn.
     pub detail: f32,
+    /// How two eyes share the 3-D view, if two look.
+    pub stereo: Option<StereoLook>,
 }
 
 /// The textures.
@@ -39,18 +51,11 @@ pub(crate) struct Division {
 pub(crate) struct Canvas {
     pub division: Division,
     pub layout: Layout,
-    /// Width and height that the 3-D view is drawn with, pixels.
-    pub drawn: [u32; 2],
     pub picture: Texture,
-    pub skull_hit: Texture,
-    pub brain_hit: Texture,
-    pub brain_rest: Texture,
-    pub depth: Texture,
-    /// The 3-D view before it is enlarged, where it is drawn with fewer pixels.
-    pub coarse: Option<(Texture, Bindings)>,
-    pub skull: Bindings,
-    pub light: Bindings,
-    pub brain: Option<Bindings>,
+    /// One, or the left and the right.
+    pub eyes: Vec<Eye>,
+    /// Of both eyes' views, where they come into one.
+    pub anaglyph: Option<Bindings>,
     pub slices: [Bindings; 3],
     /// Places at rest of the brain's cuts, the slices one below the other.
     pub section: Texture,
@@ -63,27 +68,19 @@ impl Canvas {
             return Err(RenderError::Size(width, height));
         }
         let layout = Layout::of(width, height, division.slices);
-        let [_, _, w, h] = layout.view;
-        let drawn = [w, h].map(|n| ((n as f32 * division.detail).round() as u32).clamp(1, n));
         let sheet = |label, [width, height]: [u32; 2], format| {
             Texture::new(gpu, &TextureSpec { label, size: [width, height, 1], volume: false, format, drawn_to: true })
         };
-        let skull_hit = sheet("skull hit", drawn, Format::Rgba32Uint)?;
-        let brain_hit = sheet("brain hit", drawn, Format::Rgba32Uint)?;
-        let brain_rest = sheet("brain rest", drawn, Format::Rgba32Uint)?;
-        let inputs = Inputs {
-            skull_hit: &skull_hit,
-            brain_hit: &brain_hit,
-            brain_rest: &brain_rest,
-            mri: &passes.mri.texture,
-            skull: &passes.skull,
-        };
-        let coarse = if drawn == [w, h] {
-            None
-        } else {
-            let texture = sheet("coarse", drawn, Format::Rgba8Unorm)?;
-            let bindings = passes.enlarge.bind(gpu, &passes.scene, &texture)?;
-            Some((texture, bindings))
+        let areas = StereoLook::areas(division.stereo, layout.view);
+        let eye = |(number, area)| Eye::new(gpu, number, area, &division, passes);
+        let eyes = areas.into_iter().enumerate().map(eye).collect::<Result<Vec<_>, _>>()?;
+        let anaglyph = match &eyes[..] {
+            [Eye { apart: Some((left, _)), .. }, Eye { apart: Some((right, _)), .. }]
+                if division.stereo == Some(StereoLook::Anaglyph) =>
+            {
+                Some(passes.enlarge.bind_both(gpu, &passes.scenes[0], [left, right])?)
+            }
+            _ => None,
         };
         let column = layout.slices.map_or([1, 1], |s| [s[0][2], height]);
         let section = sheet("section", column, Format::Rgba32Uint)?;
@@ -91,18 +88,11 @@ impl Canvas {
         Ok(Self {
             division,
             layout,
-            drawn,
             picture: sheet("picture", division.size, Format::Rgba8Unorm)?,
-            depth: sheet("depth", drawn, Format::Depth32Float)?,
-            coarse,
-            skull: passes.skull.bind(gpu, &passes.scene)?,
-            light: passes.light.bind(gpu, &passes.scene, &inputs)?,
-            brain: passes.brain.as_ref().map(|b| b.bind(gpu, &passes.scene)).transpose()?,
-            slices: passes.slices.bind(gpu, &passes.scene, density, mri, &section)?,
+            anaglyph,
+            slices: passes.slices.bind(gpu, &passes.scenes[0], density, mri, &section)?,
+            eyes,
             section,
-            skull_hit,
-            brain_hit,
-            brain_rest,
         })
     }
 }

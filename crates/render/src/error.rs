@@ -1,5 +1,6 @@
 //! What can go wrong while a picture is made.
 
+use glam::Vec3;
 use trepan_gpu::GpuError;
 
 /// Why there is no picture.
@@ -22,6 +23,18 @@ pub enum RenderError {
     /// The MRI cannot be placed.
     #[error("the MRI's affine cannot be inverted; give one with three independent axes")]
     Mri,
+    /// A paint is not a box of colours.
+    #[error(
+        "a paint of {dims:?} texels, {spacing_mm} mm apart, has {given} colours; give one a texel, at least one, and a spacing over 0"
+    )]
+    Paint {
+        /// Texels along x, y, z.
+        dims: [u32; 3],
+        /// Their distances, mm.
+        spacing_mm: Vec3,
+        /// Colours given.
+        given: usize,
+    },
     /// The tint is not one of this MRI.
     #[error("the MRI has {wanted} voxels, but {given} tints were given")]
     Tint {

@@ -1,6 +1,6 @@
 //! What a picture is made of: the scene that stays and the frame that changes.
 
-use crate::Camera;
+use crate::{Camera, Cut, Overlay, Paint, Stereo};
 use glam::{IVec3, Vec3};
 use std::sync::Arc;
 use trepan_geometry::{Aabb, Pose, Tool};
@@ -59,6 +59,16 @@ pub struct Frame<'a> {
     pub show_bone: bool,
     /// Whether the brain is shown in the 3-D view.
     pub show_brain: bool,
+    /// Colours laid over the bone, at the place that is seen.
+    pub bone_paint: Option<&'a Paint>,
+    /// Colours laid over the brain, at the place at rest of what is seen: they move with the tissue.
+    pub brain_paint: Option<&'a Paint>,
+    /// What is drawn over the scene.
+    pub overlay: Overlay<'a>,
+    /// The plane that cuts the brain open.
+    pub cut: Option<Cut>,
+    /// Both eyes' views instead of one.
+    pub stereo: Option<Stereo>,
     /// Grey values of the slices.
     pub slices: SliceLook,
 }
@@ -111,6 +121,11 @@ impl Frame<'_> {
             brain_positions: None,
             show_bone: true,
             show_brain: true,
+            bone_paint: None,
+            brain_paint: None,
+            overlay: Overlay::default(),
+            cut: None,
+            stereo: None,
             slices: SliceLook::default(),
         }
     }

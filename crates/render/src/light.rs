@@ -4,7 +4,8 @@ use crate::RenderError;
 use crate::scene::Scene;
 use crate::skull::{Skull, VOLUMES};
 use trepan_gpu::{
-    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
+    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
+    Topology,
 };
 
 /// The pass.
@@ -21,11 +22,13 @@ pub(crate) struct Inputs<'a> {
     pub brain_rest: &'a Texture,
     pub mri: &'a Texture,
     pub skull: &'a Skull,
+    pub bone_coat: &'a Texture,
+    pub brain_coat: &'a Texture,
 }
 
 impl Light {
     pub fn new(gpu: &Gpu) -> Result<Self, RenderError> {
-        let own = [Slot::Integer2, Slot::Integer2, Slot::Integer2, Slot::Texture3];
+        let own = [[Slot::Integer2; 3], [Slot::Texture3; 3]].concat();
         let slots = [&[Slot::Uniform], &VOLUMES[..], &own].concat();
         let spec = PipelineSpec {
             label: "light",
@@ -40,12 +43,13 @@ impl Light {
     }
 
     pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>, from: &Inputs) -> Result<Bindings, RenderError> {
-        let own = [from.skull_hit.into(), from.brain_hit.into(), from.brain_rest.into(), from.mri.into()];
-        Ok(self.pipeline.bind(gpu, &[&[scene.into()], &from.skull.volumes()[..], &own].concat())?)
+        let hits = [from.skull_hit, from.brain_hit, from.brain_rest].map(Resource::from);
+        let volumes = [from.mri, from.bone_coat, from.brain_coat].map(Resource::from);
+        Ok(self.pipeline.bind(gpu, &[&[scene.into()], &from.skull.volumes()[..], &hits, &volumes].concat())?)
     }
 
     pub fn draw(&self, recorder: &mut Recorder, bindings: &Bindings, view: [u32; 4], picture: &Texture) {
-        let colours = [Target { texture: picture, clear: Some([0.0, 0.0, 0.0, 1.0]) }];
+        let colours = [Target { texture: picture, clear: None }];
         recorder.draw("light", &DrawTarget { colours: &colours, depth: None }, |d| {
             d.viewport(view);
             d.draw(&self.pipeline, bindings, 3);

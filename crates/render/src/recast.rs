@@ -1,7 +1,7 @@
 //! Which rays have to be cast again: all after a move of the camera, else only those that may see a change.
 
 use crate::camera::View;
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use trepan_geometry::Aabb;
 
 /// Around changed bone, where the picture is cast again at once, mm.
@@ -10,7 +10,7 @@ const MARGIN_MM: f32 = 4.0;
 /// What the kept hits are good for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Recast {
-    cast_for: Option<View>,
+    cast_for: Option<(View, Vec4)>,
     changed: Aabb,
     unsettled: bool,
 }
@@ -28,21 +28,21 @@ impl Recast {
     }
 
     /// Takes note of a box in which bone changed, world mm.
-    pub fn note(&mut self, low: Vec3, high: Vec3) {
-        self.changed = self.changed.grown(low).grown(high);
+    pub fn note(&mut self, changed: Aabb) {
+        self.changed = Aabb { min: self.changed.min.min(changed.min), max: self.changed.max.max(changed.max) };
     }
 
-    /// The rectangle `[x, y, width, height]` of pixels to cast for this view, if any. Once the drilling rests everything is cast once more, since
+    /// The rectangle `[x, y, width, height]` of pixels to cast for this view of bone under this plane, if any. Once the drilling rests everything is cast once more, since
     /// shadows and ambient light reach farther than the changed bricks.
-    pub fn part(&mut self, view: &View, [width, height]: [u32; 2]) -> Option<[u32; 4]> {
+    pub fn part(&mut self, view: &View, bone_cut: Vec4, [width, height]: [u32; 2]) -> Option<[u32; 4]> {
         let whole = [0, 0, width, height];
-        let resting = self.cast_for == Some(*view);
+        let resting = self.cast_for == Some((*view, bone_cut));
         let (part, settled) = match (resting, self.changed.is_empty()) {
             (false, _) => (Some(whole), true),
             (true, true) => (self.unsettled.then_some(whole), true),
             (true, false) => (rectangle(view, self.changed.inflated(MARGIN_MM), [width, height]), false),
         };
-        *self = Self { cast_for: Some(*view), changed: Aabb::EMPTY, unsettled: !settled };
+        *self = Self { cast_for: Some((*view, bone_cut)), changed: Aabb::EMPTY, unsettled: !settled };
         part
     }
 }

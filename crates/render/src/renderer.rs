@@ -5,19 +5,24 @@ use crate::brain::Brain;
 use crate::camera::View;
 use crate::canvas::{Canvas, Division, Passes};
 use crate::contour::Contour;
+use crate::cut::{Cut, Face};
 use crate::enlarge::Enlarge;
+use crate::eye::clear;
 use crate::frame::{Frame, SceneData, bounds};
 use crate::image::Image;
 use crate::layout::Layout;
 use crate::light::Light;
 use crate::mri::Mri;
+use crate::overlay::Shapes;
+use crate::paint::Coat;
 use crate::scene::Scene;
 use crate::section::Section;
 use crate::skull::{NOTHING, Skull};
 use crate::slice::{Plane, Slices};
+use crate::stereo::Stereo;
 use glam::Vec3;
 use trepan_geometry::Aabb;
-use trepan_gpu::{Buffer, DrawTarget, Gpu, PassTime, Recorder, Target, Texture, Timer};
+use trepan_gpu::{Buffer, Gpu, PassTime, Recorder, Texture, Timer};
 
 /// Changed bricks that one picture takes over, by default: 1 MiB of densities.
 pub const BRICKS_PER_FRAME: usize = 1024;
@@ -51,26 +56,30 @@ pub struct DrawReport {
     pub bricks_left: u32,
     /// Pixels whose rays through the bone were cast again.
     pub pixels_cast: u32,
-    /// Lines of the brain's outline and triangles of its cut that found no room.
+    /// Lines of the brain's outline, triangles of its cuts and shapes of the overlay that found no room.
     pub lines_left: u32,
 }
 
 impl Renderer {
     /// Loads a scene for pictures of `size` pixels, width and height.
     pub fn new(gpu: &Gpu, data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
+        let scene = || Buffer::zeroed(gpu, "scene", 1);
+        let brain = |mesh| -> Result<_, RenderError> { Ok((Brain::new(gpu, mesh)?, Face::new(gpu)?)) };
         let passes = Passes {
-            scene: Buffer::zeroed(gpu, "scene", 1)?,
+            scenes: [scene()?, scene()?],
             skull: Skull::new(gpu, data.bone.clone())?,
-            brain: data.brain.map(|mesh| Brain::new(gpu, mesh)).transpose()?,
+            brain: data.brain.map(brain).transpose()?,
             mri: Mri::new(gpu, data.mri, data.tint)?,
+            coats: [Coat::new(gpu, "bone paint")?, Coat::new(gpu, "brain paint")?],
             light: Light::new(gpu)?,
+            overlay: Shapes::new(gpu)?,
             enlarge: Enlarge::new(gpu)?,
             slices: Slices::new(gpu)?,
         };
         let moves = passes.brain.is_some();
-        let section = moves.then(|| Section::new(gpu, &passes.scene)).transpose()?;
-        let contour = moves.then(|| Contour::new(gpu, &passes.scene, OUTLINE)).transpose()?;
-        let canvas = Canvas::new(gpu, Division { size, slices: true, detail: 1.0 }, &passes)?;
+        let section = moves.then(|| Section::new(gpu, &passes.scenes[0])).transpose()?;
+        let contour = moves.then(|| Contour::new(gpu, &passes.scenes[0], OUTLINE)).transpose()?;
+        let canvas = Canvas::new(gpu, Division { size, slices: true, detail: 1.0, stereo: None }, &passes)?;
         Ok(Self {
             gpu: gpu.clone(),
             bounds: bounds(data),
@@ -85,49 +94,56 @@ impl Renderer {
 
     /// Draws a picture; does not wait for the device.
     pub fn draw(&mut self, frame: &Frame) -> Result<DrawReport, RenderError> {
-        self.divide(Division { slices: frame.slices.shown, ..self.canvas.division })?;
-        let view = self.view(frame);
+        let stereo = frame.stereo.map(|s| s.look);
+        self.divide(Division { slices: frame.slices.shown, stereo, ..self.canvas.division })?;
         let followed = self.passes.skull.follow(&self.gpu, self.bricks_per_frame);
-        if let Some(brain) = &mut self.passes.brain {
-            brain.follow(&self.gpu, frame.brain_positions)?;
-        }
-        let mri_from_world = self.passes.mri.texture_from_world;
-        let scene = Scene::of(frame, &view, self.canvas.drawn, &self.passes.skull.grid, mri_from_world);
-        self.passes.scene.write(&self.gpu, 0, &[scene]);
-        let lines_left = self.follow_slices(frame);
+        self.canvas.eyes.iter_mut().for_each(|eye| eye.recast.note(followed.changed));
+        let lines_left = self.follow_brain(frame)? + self.follow_slices(frame) + self.follow_looks(frame)?;
         let mut timer = self.timer.take();
         let gpu = self.gpu.clone();
         let mut recorder = gpu.record("picture").timed(timer.as_mut());
-        let pixels_cast = self.draw_view(&mut recorder, frame, &view);
+        let pixels_cast = self.draw_views(&mut recorder, frame);
         self.draw_slices(&mut recorder);
         recorder.submit();
         self.timer = timer;
         Ok(DrawReport { bricks: followed.bricks, bricks_left: followed.left, pixels_cast, lines_left })
     }
 
-    /// The bone, the brain and the tool.
-    fn draw_view(&mut self, recorder: &mut Recorder, frame: &Frame, view: &View) -> u32 {
-        let (canvas, passes) = (&self.canvas, &mut self.passes);
-        match (&passes.brain, &canvas.brain) {
-            (Some(brain), Some(bindings)) if frame.show_brain => {
-                brain.draw(recorder, bindings, &canvas.brain_hit, &canvas.brain_rest, &canvas.depth);
-            }
-            _ => clear(recorder, &canvas.brain_hit, 0.0),
+    /// Moves the brain, and cuts it. Returns the triangles that found no room.
+    fn follow_brain(&mut self, frame: &Frame) -> Result<u32, RenderError> {
+        let Some((brain, face)) = &mut self.passes.brain else { return Ok(0) };
+        brain.follow(&self.gpu, frame.brain_positions)?;
+        Ok(face.follow(&self.gpu, Cut::plane(frame.cut.as_ref()), &brain.border))
+    }
+
+    /// Takes paints and overlay over. Returns the shapes that found no room.
+    fn follow_looks(&mut self, frame: &Frame) -> Result<u32, RenderError> {
+        let mut other = false;
+        for (coat, paint) in self.passes.coats.iter_mut().zip([frame.bone_paint, frame.brain_paint]) {
+            other |= coat.follow(&self.gpu, paint)?;
         }
-        let pixels_cast = if frame.show_bone && passes.skull.is_some() {
-            passes.skull.cast(recorder, &canvas.skull, view, &canvas.skull_hit)
-        } else {
-            passes.skull.recast.forget();
-            clear(recorder, &canvas.skull_hit, f64::from(NOTHING.to_bits()));
-            0
-        };
-        let area = canvas.layout.view;
-        match &canvas.coarse {
-            None => passes.light.draw(recorder, &canvas.light, area, &canvas.picture),
-            Some((coarse, bindings)) => {
-                passes.light.draw(recorder, &canvas.light, [0, 0, canvas.drawn[0], canvas.drawn[1]], coarse);
-                passes.enlarge.draw(recorder, bindings, area, &canvas.picture);
+        for eye in self.canvas.eyes.iter_mut().filter(|_| other) {
+            eye.rebind(&self.gpu, &self.passes)?;
+        }
+        Ok(self.passes.overlay.follow(&self.gpu, &frame.overlay, self.view(frame).eye))
+    }
+
+    /// The bone, the brain, the tools and what lies over them, as each eye sees them. Returns the pixels cast.
+    fn draw_views(&mut self, recorder: &mut Recorder, frame: &Frame) -> u32 {
+        let Canvas { eyes, picture, anaglyph, layout, .. } = &mut self.canvas;
+        let (passes, mri_from_world) = (&self.passes, self.passes.mri.texture_from_world);
+        let mut pixels_cast = 0;
+        for (n, eye) in eyes.iter_mut().enumerate() {
+            let view = eye_view(frame, eye.area, n);
+            let scene = Scene::of(frame, &view, eye.drawn, &passes.skull.grid, mri_from_world);
+            passes.scenes[n].write(&self.gpu, 0, &[scene]);
+            pixels_cast += eye.draw(recorder, passes, frame, &scene, &view, picture);
+            if let (Some((_, bindings)), None) = (&eye.apart, &anaglyph) {
+                passes.enlarge.draw(recorder, bindings, eye.area, picture);
             }
+        }
+        if let Some(bindings) = anaglyph {
+            passes.enlarge.draw_both(recorder, bindings, layout.view, picture);
         }
         pixels_cast
     }
@@ -150,7 +166,7 @@ impl Renderer {
         let planes = Plane::three(frame.focus(self.bounds), self.bounds, frame.slices.half_height_mm, rectangles);
         let look = frame.slices.with_bone(self.passes.skull.is_some());
         self.passes.slices.follow(&self.gpu, &planes, rectangles, &look);
-        let Some(brain) = &self.passes.brain else { return 0 };
+        let Some((brain, _)) = &self.passes.brain else { return 0 };
         let contour = self.contour.as_mut().map_or(0, |c| c.follow(&self.gpu, &planes, brain.border.corners()));
         contour + self.section.as_mut().map_or(0, |s| s.follow(&self.gpu, &planes, &brain.border))
     }
@@ -169,12 +185,12 @@ impl Renderer {
     /// Lets rays leap over bricks without bone (the default), or has them walk every cell, to measure what leaping is worth.
     pub fn set_leaping(&mut self, leaping: bool) {
         self.passes.skull.set_leaping(&self.gpu, leaping);
+        self.canvas.eyes.iter_mut().for_each(|eye| eye.recast.forget());
     }
 
     fn divide(&mut self, division: Division) -> Result<(), RenderError> {
         if self.canvas.division != division {
             self.canvas = Canvas::new(&self.gpu, division, &self.passes)?;
-            self.passes.skull.recast.forget();
         }
         Ok(())
     }
@@ -189,9 +205,9 @@ impl Renderer {
         self.canvas.division.size
     }
 
-    /// Pixels that the 3-D view is drawn with, width and height.
+    /// Pixels that the 3-D view, or the left eye's, is drawn with, width and height.
     pub fn view_size(&self) -> [u32; 2] {
-        self.canvas.drawn
+        self.canvas.eyes[0].drawn
     }
 
     /// Which part of the picture is what.
@@ -199,9 +215,9 @@ impl Renderer {
         self.canvas.layout
     }
 
-    /// The camera of a frame as vectors, for the 3-D view of this picture.
+    /// The camera of a frame as vectors, for the 3-D view of this picture; with two eyes, from between them.
     pub fn view(&self, frame: &Frame) -> View {
-        let [_, _, width, height] = self.canvas.layout.view;
+        let [_, _, width, height] = self.canvas.eyes[0].area;
         frame.camera.view(width as f32 / height as f32)
     }
 
@@ -218,7 +234,7 @@ impl Renderer {
 
     /// Waits for the newest picture and gives the bone at each pixel of its 3-D view ([`view_size`](Self::view_size)), row by row.
     pub fn bone_hits(&self) -> Result<Vec<Option<Hit>>, RenderError> {
-        let hits = self.canvas.skull_hit.read::<[f32; 4]>(&self.gpu)?;
+        let hits = self.canvas.eyes[0].skull_hit.read::<[f32; 4]>(&self.gpu)?;
         let hit = |h: [f32; 4]| (h[3] < NOTHING).then(|| Hit { distance_mm: h[3], normal: unfold([h[0], h[1]]) });
         Ok(hits.into_iter().map(hit).collect())
     }
@@ -227,6 +243,12 @@ impl Renderer {
     pub fn pass_times(&self) -> Result<Vec<PassTime>, RenderError> {
         Ok(self.timer.as_ref().map(|t| t.read(&self.gpu)).transpose()?.unwrap_or_default())
     }
+}
+
+/// The view of the left (0) or the right eye (1) in an area of the picture.
+pub(crate) fn eye_view(frame: &Frame, [_, _, width, height]: [u32; 4], number: usize) -> View {
+    let view = frame.camera.view(width as f32 / height as f32);
+    Stereo::views(frame.stereo.as_ref(), view, frame.camera.distance_mm)[number]
 }
 
 /// Where a ray meets bone.
@@ -243,9 +265,4 @@ fn unfold([x, y]: [f32; 2]) -> Vec3 {
     let z = 1.0 - x.abs() - y.abs();
     let folded = if z < 0.0 { [(1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)] } else { [x, y] };
     Vec3::new(folded[0], folded[1], z).normalize_or(Vec3::Z)
-}
-
-fn clear(recorder: &mut Recorder, texture: &Texture, value: f64) {
-    let colours = [Target { texture, clear: Some([0.0, 0.0, 0.0, value]) }];
-    recorder.draw("clear", &DrawTarget { colours: &colours, depth: None }, |_| ());
 }

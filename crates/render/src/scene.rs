@@ -2,7 +2,9 @@
 
 use crate::bricks::Grid;
 use crate::camera::View;
+use crate::cut::Cut;
 use crate::frame::Frame;
+use crate::paint::Paint;
 use glam::{Mat4, Quat, Vec3, Vec4};
 use trepan_geometry::{Pose, Tool, ToolKind};
 
@@ -24,6 +26,10 @@ pub(crate) struct Scene {
     pub spin: Vec4,
     pub second_tip: Vec4,
     pub second_tail: Vec4,
+    pub brain_cut: Vec4,
+    pub bone_cut: Vec4,
+    pub bone_paint: [Vec4; 2],
+    pub brain_paint: [Vec4; 2],
 }
 
 impl Scene {
@@ -42,13 +48,17 @@ impl Scene {
             eye: view.eye.extend(flag(mri_from_world.is_some())),
             right: (view.right * view.half.x).extend(width),
             up: (view.up * view.half.y).extend(height),
-            forward: view.forward.extend(flag(frame.show_bone)),
+            forward: view.middle().extend(flag(frame.show_bone)),
             origin: grid.origin.extend(grid.spacing_mm),
             dims: dims.extend(grid.isovalue.into()),
             tip,
             tail,
             second_tip,
             second_tail,
+            brain_cut: Cut::plane(frame.cut.as_ref()),
+            bone_cut: Cut::plane(frame.cut.as_ref().filter(|cut| cut.bone)),
+            bone_paint: Paint::placed(frame.bone_paint),
+            brain_paint: Paint::placed(frame.brain_paint),
             light: towards_light(view).extend(flag(frame.drilling)),
             spin: across.extend(flag(tool.kind.cuts())),
         }
@@ -77,7 +87,7 @@ const NO_TOOL: Tool =
     Tool { kind: ToolKind::Probe, tip_radius_mm: -1.0, shaft_radius_mm: 1.0, shaft_length_mm: 1.0, cutting_mm: 0.0 };
 
 /// Centre of the ball and far end of the shaft, with their radii.
-fn ends(tool: &Tool, world_from_tool: &Pose) -> [Vec4; 2] {
+pub(crate) fn ends(tool: &Tool, world_from_tool: &Pose) -> [Vec4; 2] {
     let tail = *world_from_tool * Vec3::new(0.0, 0.0, tool.shaft_length_mm);
     [world_from_tool.translation.extend(tool.tip_radius_mm), tail.extend(tool.shaft_radius_mm)]
 }

@@ -11,10 +11,9 @@
 
 use crate::RenderError;
 use crate::bricks::{Grid, Leaps, densities};
-use crate::camera::View;
-use crate::recast::Recast;
 use crate::scene::Scene;
 use std::sync::Arc;
+use trepan_geometry::Aabb;
 use trepan_gpu::{
     Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
     TextureSpec, Topology,
@@ -41,15 +40,32 @@ pub(crate) struct Skull {
     leap: Texture,
     crowd: Texture,
     pipeline: Pipeline,
-    pub recast: Recast,
     leaping: bool,
 }
 
 /// What following the bone came to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Followed {
     pub bricks: u32,
     pub left: u32,
+    /// Where bone changed, world mm.
+    pub changed: Aabb,
+}
+
+impl Default for Followed {
+    fn default() -> Self {
+        Self { bricks: 0, left: 0, changed: Aabb::EMPTY }
+    }
+}
+
+impl Followed {
+    pub fn of(grid: &Grid, bricks: &[[usize; 3]], left: usize) -> Self {
+        let grow = |all: Aabb, &brick: &[usize; 3]| {
+            let changed = grid.box_of(brick);
+            all.grown(changed.min).grown(changed.max)
+        };
+        Self { bricks: bricks.len() as u32, left: left as u32, changed: bricks.iter().fold(Aabb::EMPTY, grow) }
+    }
 }
 
 impl Skull {
@@ -79,8 +95,7 @@ impl Skull {
                 topology: Topology::Triangles,
             },
         )?;
-        let skull =
-            Self { bone, grid, leaps, seen, density, leap, crowd, pipeline, recast: Recast::default(), leaping: true };
+        let skull = Self { bone, grid, leaps, seen, density, leap, crowd, pipeline, leaping: true };
         skull.load(gpu);
         Ok(skull)
     }
@@ -95,7 +110,6 @@ impl Skull {
         self.leaping = leaping;
         let free = if leaping { self.leaps.free.clone() } else { vec![0; self.leaps.free.len()] };
         self.leap.write(gpu, [0; 3], self.leap.size(), &free);
-        self.recast.forget();
     }
 
     /// Hands everything to the device, a few layers at a time.
@@ -125,7 +139,7 @@ impl Skull {
         for &brick in &changed {
             self.refresh(gpu, &bone, brick);
         }
-        Followed { bricks: changed.len() as u32, left: left as u32 }
+        Followed::of(&self.grid, &changed, left)
     }
 
     /// Brings one brick of voxels to the device, with the bricks of cells and the blocks that it touches.
@@ -143,8 +157,6 @@ impl Skull {
         for block in self.grid.blocks_of(brick) {
             self.crowd.write(gpu, block.map(|v| v as u32), [1; 3], &[self.grid.share(bone, block)]);
         }
-        let (low, high) = self.grid.corners_of(brick);
-        self.recast.note(low, high);
     }
 
     /// What `bricks.wgsl` binds, after the uniform.
@@ -157,15 +169,12 @@ impl Skull {
         Ok(self.pipeline.bind(gpu, &[&[scene.into()], &self.volumes()[..]].concat())?)
     }
 
-    /// Casts what has to be cast again into `hits`. Returns the number of pixels.
-    pub fn cast(&mut self, recorder: &mut Recorder, bindings: &Bindings, view: &View, hits: &Texture) -> u32 {
-        let [width, height, _] = hits.size();
-        let Some(part) = self.recast.part(view, [width, height]) else { return 0 };
+    /// Casts a part of the pixels again into `hits`.
+    pub fn cast(&self, recorder: &mut Recorder, bindings: &Bindings, part: [u32; 4], hits: &Texture) {
         let colours = [Target { texture: hits, clear: None }];
         recorder.draw("skull", &DrawTarget { colours: &colours, depth: None }, |d| {
             d.scissor(part);
             d.draw(&self.pipeline, bindings, 3);
         });
-        part[2] * part[3]
     }
 }

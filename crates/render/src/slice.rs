@@ -72,6 +72,12 @@ impl Plane {
         })
     }
 
+    /// Its unit normal and offset.
+    pub fn level(&self) -> Vec4 {
+        let normal = self.right.cross(self.up);
+        normal.extend(normal.dot(self.centre))
+    }
+
     /// Where a point of the plane is in the picture, from -1 to 1.
     pub fn at(&self, point: Vec3) -> Vec2 {
         let from = point - self.centre;

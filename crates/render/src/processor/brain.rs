@@ -2,8 +2,10 @@
 
 use crate::brain::Border;
 use crate::camera::View;
+use crate::cut::height;
+use crate::section::{self, Corner};
 use crate::skull::NOTHING;
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 
 /// The nearest triangle at every pixel.
 #[derive(Clone, Debug, Default)]
@@ -22,9 +24,11 @@ pub(crate) struct Fragment {
     pub normal: Vec3,
     /// The place at rest, world mm.
     pub rest: Vec3,
+    /// Whether the brain is cut open here.
+    pub cut: bool,
 }
 
-const NONE: Fragment = Fragment { depth: f32::INFINITY, t: NOTHING, normal: Vec3::Z, rest: Vec3::ZERO };
+const NONE: Fragment = Fragment { depth: f32::INFINITY, t: NOTHING, normal: Vec3::Z, rest: Vec3::ZERO, cut: false };
 
 impl Fragments {
     pub fn of(width: usize, height: usize) -> Self {
@@ -35,35 +39,38 @@ impl Fragments {
         &self.nearest[pixel]
     }
 
-    /// Draws the border anew; none clears.
-    pub fn draw(&mut self, border: Option<&Border>, view: &View) {
+    /// Draws the border and its cut anew; none clears.
+    pub fn draw(&mut self, border: Option<&Border>, view: &View, brain_cut: Vec4) {
         self.nearest.fill(NONE);
         let Some(border) = border else { return };
-        let size = Vec2::new(self.width as f32, self.height as f32);
-        let projected: Vec<(Vec2, f32)> = border
-            .places
-            .iter()
-            .map(|&p| {
-                let (at, depth) = view.project(p);
-                ((Vec2::new(at.x, -at.y) * 0.5 + 0.5) * size, depth)
-            })
-            .collect();
+        let vertex = |n: u32| {
+            let place = border.places[n as usize];
+            Vertex { normal: border.normals[n as usize], rest: border.at_rest(n), ..Vertex::seen(view, place) }
+        };
+        let vertices: Vec<Vertex> = (0..border.places.len() as u32).map(vertex).collect();
         for corners in &border.triangles {
-            let points = corners.map(|n| projected[n as usize]);
-            if points.iter().all(|p| p.1 > View::NEAR_MM) {
-                self.triangle(border, corners, &points, view.eye);
+            self.triangle(corners.map(|n| &vertices[n as usize]), view.eye, Some(brain_cut));
+        }
+        if brain_cut != Vec4::ZERO {
+            let corner =
+                |c: Corner| Vertex { normal: brain_cut.truncate(), rest: c.rest, ..Vertex::seen(view, c.place) };
+            for corners in section::triangles(brain_cut, border) {
+                let corners = corners.map(corner);
+                self.triangle(corners.each_ref(), view.eye, None);
             }
         }
     }
 
-    fn triangle(&mut self, border: &Border, corners: &[u32; 3], points: &[(Vec2, f32); 3], eye: Vec3) {
-        let [a, b, c] = points.map(|p| p.0);
+    /// Draws a triangle of the border, of which only what is under the plane is there, or of a cut.
+    fn triangle(&mut self, corners: [&Vertex; 3], eye: Vec3, under: Option<Vec4>) {
+        let [a, b, c] = corners.map(|v| v.at * Vec2::new(self.width as f32, self.height as f32));
         let double_area = (b - a).perp_dot(c - a);
-        let low = a.min(b).min(c).floor().max(Vec2::ZERO);
-        let high = a.max(b).max(c).ceil().min(Vec2::new(self.width as f32, self.height as f32));
-        if double_area == 0.0 {
+        // Neither flat triangles nor those with a place that is not a number have an area.
+        if !corners.iter().all(|v| v.depth > View::NEAR_MM) || !(double_area.abs() > 0.0) {
             return;
         }
+        let low = a.min(b).min(c).floor().max(Vec2::ZERO);
+        let high = a.max(b).max(c).ceil().min(Vec2::new(self.width as f32, self.height as f32));
         for y in low.y as usize..high.y.max(0.0) as usize {
             for x in low.x as usize..high.x.max(0.0) as usize {
                 let p = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
@@ -73,17 +80,40 @@ impl Fragments {
                     continue;
                 }
                 // What is linear in space is linear in the picture after a division by depth.
-                let over = [0, 1, 2].map(|n| flat[n] / points[n].1);
+                let over = [0, 1, 2].map(|n| flat[n] / corners[n].depth);
                 let depth = 1.0 / over.iter().sum::<f32>();
                 let fragment = &mut self.nearest[x + self.width * y];
-                if depth < fragment.depth {
-                    let mean =
-                        |value: &dyn Fn(u32) -> Vec3| (0..3).map(|n| over[n] * depth * value(corners[n])).sum::<Vec3>();
-                    let place = mean(&|n| border.places[n as usize]);
-                    let normal = mean(&|n| border.normals[n as usize]).normalize_or(Vec3::Z);
-                    *fragment = Fragment { depth, t: place.distance(eye), normal, rest: mean(&|n| border.at_rest(n)) };
+                if depth >= fragment.depth {
+                    continue;
+                }
+                let mean =
+                    |value: fn(&Vertex) -> Vec3| (0..3).map(|n| over[n] * depth * value(corners[n])).sum::<Vec3>();
+                let place = mean(|v| v.place);
+                if under.is_none_or(|plane| height(plane, place) <= 0.0) {
+                    let normal = mean(|v| v.normal).normalize_or(Vec3::Z);
+                    let (t, rest) = (place.distance(eye), mean(|v| v.rest));
+                    *fragment = Fragment { depth, t, normal, rest, cut: under.is_none() };
                 }
             }
         }
+    }
+}
+
+/// A corner of a triangle.
+#[derive(Clone, Copy, Debug)]
+struct Vertex {
+    /// In the picture, 0 to 1 from the upper left.
+    at: Vec2,
+    depth: f32,
+    place: Vec3,
+    normal: Vec3,
+    rest: Vec3,
+}
+
+impl Vertex {
+    /// A place as the eye sees it.
+    fn seen(view: &View, place: Vec3) -> Self {
+        let (at, depth) = view.project(place);
+        Self { at: Vec2::new(at.x, -at.y) * 0.5 + 0.5, depth, place, normal: Vec3::ZERO, rest: Vec3::ZERO }
     }
 }

@@ -1,7 +1,8 @@
 //! Twin of `bricks.wgsl`: rays through the padded grid of densities.
 
 use crate::bricks::{BLOCK, Grid, LEAP, Leaps, densities};
-use crate::recast::Recast;
+use crate::cut::height;
+use crate::scene::Scene;
 use crate::skull::{Followed, NOTHING};
 use glam::{BVec3A, IVec3, Vec3, Vec3A, Vec4};
 use std::array;
@@ -41,7 +42,6 @@ pub(crate) struct Bricks {
     density: Vec<i16>,
     /// Share of bone in blocks, 0 to 255.
     crowd: Vec<u8>,
-    pub recast: Recast,
     pub casting: Casting,
 }
 
@@ -52,7 +52,7 @@ impl Bricks {
         let leaps = Leaps::of(bone.as_deref(), &grid);
         let density = densities(bone.as_deref(), [0; 3], grid.dims, |hu| hu);
         let crowd = grid.shares(bone.as_deref());
-        Self { bone, grid, leaps, seen, density, crowd, recast: Recast::default(), casting: Casting::default() }
+        Self { bone, grid, leaps, seen, density, crowd, casting: Casting::default() }
     }
 
     /// Whether there is any bone to show.
@@ -66,7 +66,7 @@ impl Bricks {
         let mut changed = Vec::new();
         let left = bone.changed(&mut self.seen, limit, |brick| changed.push(brick));
         changed.iter().for_each(|&brick| self.refresh(&bone, brick));
-        Followed { bricks: changed.len() as u32, left: left as u32 }
+        Followed::of(&self.grid, &changed, left)
     }
 
     fn refresh(&mut self, bone: &BoneVolume, brick: [usize; 3]) {
@@ -81,8 +81,6 @@ impl Bricks {
         for block in self.grid.blocks_of(brick) {
             self.crowd[block[0] + bx * (block[1] + by * block[2])] = self.grid.share(bone, block);
         }
-        let (low, high) = self.grid.corners_of(brick);
-        self.recast.note(low, high);
     }
 
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
@@ -93,6 +91,11 @@ impl Bricks {
     #[inline(always)]
     pub fn grid_of(&self, point: Vec3) -> Vec3 {
         (point - self.grid.origin) / self.grid.spacing_mm
+    }
+
+    /// World point of continuous padded grid coordinates.
+    fn world_of(&self, g: Vec3) -> Vec3 {
+        self.grid.origin + self.grid.spacing_mm * g
     }
 
     /// HU at continuous padded grid coordinates, clamped at the border.
@@ -126,21 +129,22 @@ impl Bricks {
 
     /// Ambient light that reaches a surface point: little where bone crowds in front of it.
     #[inline(always)]
-    pub fn openness(&self, g: Vec3, normal: Vec3) -> f32 {
-        let dark: f32 = (0..4)
-            .map(|i| {
-                let reach = 2.5 * f32::exp2(i as f32) / self.grid.spacing_mm;
-                let block = (g + normal * reach + 0.5) / BLOCK as f32 - 0.5;
-                trilinear(self.grid.blocks(), block, |at| f32::from(self.crowd[at]) / 255.0)
-            })
-            .sum();
+    pub fn openness(&self, g: Vec3, normal: Vec3, bone_cut: Vec4) -> f32 {
+        let there = (0..4).map(|i| g + normal * (2.5 * f32::exp2(i as f32) / self.grid.spacing_mm));
+        let crowd = |there: Vec3| {
+            let block = (there + 0.5) / BLOCK as f32 - 0.5;
+            trilinear(self.grid.blocks(), block, |at| f32::from(self.crowd[at]) / 255.0)
+        };
+        let dark: f32 = there.filter(|&g| height(bone_cut, self.world_of(g)) <= 0.0).map(crowd).sum();
         (-1.1 * dark).exp()
     }
 
     /// Whether bone stands between a surface point and the light.
     #[inline(always)]
-    pub fn shadowed(&self, g: Vec3, normal: Vec3, towards_light: Vec3) -> bool {
-        self.trace(g + 0.8 * normal, towards_light / self.grid.spacing_mm, 0.0).0 < NOTHING
+    pub fn shadowed(&self, g: Vec3, normal: Vec3, scene: &Scene) -> bool {
+        let (from, light) = (g + 0.8 * normal, scene.light.truncate());
+        let [near, far] = under(scene.bone_cut, self.world_of(from), light);
+        self.trace(from, light / self.grid.spacing_mm, near, far).0 < NOTHING
     }
 
     /// Distance up to which no ray o + t·d' meets bone whose d' is nowhere further than `spread` from d; [`NOTHING`] where none ever does.
@@ -179,14 +183,14 @@ impl Bricks {
     }
 
     /// Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or [`NOTHING`], and the number of bricks, cells and samples looked
-    /// at. No bone is nearer than `from`.
+    /// at. No bone is looked for before `from` and after `until`.
     #[inline(always)]
-    pub fn trace(&self, o: Vec3, d: Vec3, from: f32) -> (f32, u32) {
+    pub fn trace(&self, o: Vec3, d: Vec3, from: f32, until: f32) -> (f32, u32) {
         let ray = Line::of(o, d);
         let dims = Vec3A::from(self.grid.dims.map(|n| n as f32));
         let (low, high) = (-ray.o * ray.inverse, (dims - 1.0 - ray.o) * ray.inverse);
         let mut t = greater(low.min(high).max_element(), from);
-        let end = low.max(high).min_element();
+        let end = lesser(low.max(high).min_element(), until);
         let nudge = NUDGE * self.grid.spacing_mm;
         let last = IVec3::from(self.leaps.bricks.map(|n| n as i32 - 1));
         let mut steps = 0;
@@ -302,6 +306,18 @@ impl Line {
     #[inline(always)]
     fn at(&self, t: f32) -> Vec3A {
         self.o + self.d * t
+    }
+}
+
+/// The part of a ray on the side of a plane that is not cut away, mm: its begin and its end.
+#[inline(always)]
+pub(crate) fn under(cut: Vec4, point: Vec3, along: Vec3) -> [f32; 2] {
+    let (over, rising) = (height(cut, point), cut.truncate().dot(along));
+    let meets = -over / rising;
+    match rising {
+        r if r < 0.0 => [greater(meets, 0.0), NOTHING],
+        r if r > 0.0 => [0.0, meets],
+        _ => [0.0, if over > 0.0 { 0.0 } else { NOTHING }],
     }
 }
 

@@ -4,6 +4,7 @@ use super::Inputs;
 use super::brain::Fragment;
 use super::bricks::trilinear;
 use super::skull::Ray;
+use super::tool::{Met, lit};
 use crate::mri::Signals;
 use crate::scene::Scene;
 use crate::skull::NOTHING;
@@ -26,14 +27,13 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], bone: &Ray, brain: &
     } else if t == brain.t {
         shade_brain(inputs, point, along, brain)
     } else {
-        let key = past_tools(scene, point) * f32::from(u8::from(bone.lit));
-        lit(scene, bone_colour(inputs, point, bone.normal), bone.normal, along, bone.open, key, 0.06)
+        shade_bone(inputs, point, along, bone)
     };
     shown(colour)
 }
 
 /// A linear colour as bytes for a screen of gamma 2.2, from a table over the square root, where the curve is nearly straight.
-fn shown(colour: Vec3) -> [u8; 4] {
+pub(crate) fn shown(colour: Vec3) -> [u8; 4] {
     const LAST: usize = 4095;
     static SHOWN: LazyLock<Vec<u8>> = LazyLock::new(|| {
         let byte = |n: usize| (n as f32 / LAST as f32).powf(2.0 / 2.2) * 255.0;
@@ -44,62 +44,51 @@ fn shown(colour: Vec3) -> [u8; 4] {
     [at(colour.x), at(colour.y), at(colour.z), 255]
 }
 
+fn shade_bone(inputs: &Inputs, point: Vec3, along: Vec3, bone: &Ray) -> Vec3 {
+    let scene = inputs.scene;
+    let colour = bone_colour(inputs, point, bone.normal);
+    let mut colour = inputs.bone_paint.map_or(colour, |paint| paint.over(colour, point));
+    let wet = wetness(scene, point);
+    if wet > 0.0 {
+        colour = colour.lerp(colour * Vec3::new(0.72, 0.48, 0.42), wet);
+        if dusty(point) {
+            colour = colour.lerp(Vec3::new(0.95, 0.92, 0.86), 0.6 * wet);
+        }
+    }
+    let key = past_tools(scene, point) * f32::from(u8::from(bone.lit));
+    lit(scene, colour, bone.normal, along, bone.open, key, 0.06 + 0.4 * wet)
+}
+
+/// How wet bone is: while the burr turns, water and blood film what is near it.
+fn wetness(scene: &Scene, point: Vec3) -> f32 {
+    let away = point.distance(scene.tip.truncate()) - scene.tip.w;
+    scene.light.w * (1.0 - smoothstep(1.0, 7.0, away))
+}
+
+/// Whether a grain of bone dust lies at a point: one cell of 0.5 mm in twelve.
+fn dusty(point: Vec3) -> bool {
+    let [x, y, z] = (point * 2.0).floor().to_array().map(|v| v as i32 as u32);
+    let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663) ^ z.wrapping_mul(83_492_791);
+    (mixed.wrapping_mul(2_654_435_761) >> 16).is_multiple_of(12)
+}
+
 fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> Vec3 {
     let scene = inputs.scene;
-    let (mut open, mut key) = (1.0, past_tools(scene, point));
+    let painted = |colour| inputs.brain_paint.map_or(colour, |paint| paint.over(colour, brain.rest));
+    let mut key = past_tools(scene, point);
+    if brain.cut {
+        return painted(cut_colour(inputs.mri, brain.rest)) * (0.6 + 0.4 * key);
+    }
+    let mut open = 1.0;
     if scene.forward.w > 0.0 {
         let g = inputs.bricks.grid_of(point);
-        open = inputs.bricks.openness(g, brain.normal);
-        if inputs.bricks.shadowed(g, brain.normal, scene.light.truncate()) {
+        open = inputs.bricks.openness(g, brain.normal, scene.bone_cut);
+        if inputs.bricks.shadowed(g, brain.normal, scene) {
             key *= 0.25;
         }
     }
-    let colour = brain_colour(inputs.mri, brain.rest - 3.5 * brain.normal);
+    let colour = painted(brain_colour(inputs.mri, brain.rest - 3.5 * brain.normal));
     lit(scene, colour, brain.normal, along, open, key, 0.20)
-}
-
-/// Distance along the ray to a ball, or [`NOTHING`].
-fn ball(eye: Vec3, along: Vec3, centre: Vec3, radius: f32) -> f32 {
-    let to = centre - eye;
-    let middle = to.dot(along);
-    let room = radius * radius - (to - middle * along).length_squared();
-    let t = middle - room.max(0.0).sqrt();
-    if room > 0.0 && t > 0.0 { t } else { NOTHING }
-}
-
-/// Where a ray meets a tool.
-struct Met {
-    tip: Vec4,
-    tail: Vec4,
-    /// Along the ray to ball, shaft and far end, or [`NOTHING`].
-    at: [f32; 3],
-}
-
-impl Met {
-    fn of([tip, tail]: [Vec4; 2], eye: Vec3, along: Vec3) -> Self {
-        let round = |end: Vec4| ball(eye, along, end.truncate(), end.w);
-        let at = if tip.w > 0.0 { [round(tip), shaft(eye, along, tip, tail), round(tail)] } else { [NOTHING; 3] };
-        Self { tip, tail, at }
-    }
-
-    fn t(&self) -> f32 {
-        let [tip, stem, end] = self.at;
-        tip.min(stem).min(end)
-    }
-}
-
-/// Distance along the ray to a shaft's mantle, or [`NOTHING`].
-fn shaft(eye: Vec3, along: Vec3, tip: Vec4, tail: Vec4) -> f32 {
-    let axis = (tail - tip).truncate();
-    let away = eye - tip.truncate();
-    let length2 = axis.length_squared();
-    let a = length2 - axis.dot(along).powi(2);
-    let b = length2 * away.dot(along) - axis.dot(away) * axis.dot(along);
-    let c = length2 * (away.length_squared() - tail.w.powi(2)) - axis.dot(away).powi(2);
-    let room = b * b - a * c;
-    let t = (-b - room.max(0.0).sqrt()) / a.max(1e-9);
-    let at = axis.dot(away) + t * axis.dot(along);
-    if room > 0.0 && t > 0.0 && at > 0.0 && at < length2 { t } else { NOTHING }
 }
 
 pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
@@ -132,18 +121,6 @@ fn past(light: Vec3, point: Vec3, tip: Vec4, tail: Vec4) -> f32 {
     by_ball * pass_by(gap, on_beam)
 }
 
-/// Diffuse light from above left and from the sky, and a highlight.
-fn lit(scene: &Scene, albedo: Vec3, normal: Vec3, along: Vec3, open: f32, key: f32, gloss: f32) -> Vec3 {
-    let light = scene.light.truncate();
-    let facing = normal.dot(light).max(0.0) * key;
-    let sky = 0.5 + 0.5 * normal.dot(scene.up.truncate().normalize());
-    let ambient = open * Vec3::new(0.10, 0.09, 0.085).lerp(Vec3::new(0.25, 0.28, 0.33), sky);
-    let head = 0.12 * (0.25 + 0.75 * open) * (-normal.dot(along)).max(0.0);
-    let halfway = (light - along).normalize();
-    let shine = gloss * normal.dot(halfway).max(0.0).powi(48) * key * open;
-    albedo * (ambient + head + facing * Vec3::new(0.66, 0.63, 0.57)) + shine
-}
-
 fn bone_colour(inputs: &Inputs, point: Vec3, normal: Vec3) -> Vec3 {
     let inside = inputs.bricks.hu(inputs.bricks.grid_of(point - normal * 1.2));
     let isovalue = inputs.scene.dims.w;
@@ -156,6 +133,14 @@ fn brain_colour(mri: Option<&Signals>, rest: Vec3) -> Vec3 {
     mri.map_or(flesh * 0.85, |signals| {
         let signal = signal(signals, signals.texture_from_world.transform_point3(rest));
         tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal)
+    })
+}
+
+/// The MRI where the brain is cut, as grey as in the slices.
+fn cut_colour(mri: Option<&Signals>, rest: Vec3) -> Vec3 {
+    mri.map_or(Vec3::new(0.62, 0.32, 0.29), |signals| {
+        let signal = signal(signals, signals.texture_from_world.transform_point3(rest));
+        tinted(Vec3::splat(signal.w), signal).powf(2.2)
     })
 }
 
@@ -174,13 +159,18 @@ pub(crate) fn tinted(colour: Vec3, signal: Vec4) -> Vec3 {
 
 /// A tool where a ray meets it; `first` may be a burr.
 fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &Met, first: bool) -> Vec3 {
-    let (on_ball, on_end) = (met.t() == met.at[0], met.t() == met.at[2]);
+    let on_tip = met.t() == met.at[0];
     let axis = (met.tail - met.tip).truncate().normalize();
-    let centre = if on_end { met.tail } else { met.tip };
-    let away = point - centre.truncate();
-    let normal = if on_ball || on_end { away } else { away - axis * away.dot(axis) }.normalize();
-    let burr = first && on_ball && scene.spin.w > 0.5;
-    let colour = if burr { burr_colour(scene, point, axis) } else { Vec3::new(0.62, 0.66, 0.72) };
+    let normal = met.normal(point);
+    let burr = first && scene.spin.w > 0.5;
+    let colour = if on_tip && burr {
+        burr_colour(scene, point, axis)
+    } else if on_tip && met.tip.w <= met.tail.w && normal.dot(-axis) > 0.75 {
+        // A tip no wider than its shaft is a tube's mouth.
+        Vec3::splat(0.02)
+    } else {
+        Vec3::new(0.62, 0.66, 0.72)
+    };
     lit(scene, colour, normal, along, 1.0, 1.0, 0.7)
 }
 

@@ -15,11 +15,14 @@
 mod brain;
 mod bricks;
 mod contour;
+mod eye;
 mod light;
+mod overlay;
 mod rows;
 mod section;
 mod skull;
 mod slice;
+mod tool;
 
 use crate::RenderError;
 use crate::brain::Border;
@@ -28,16 +31,20 @@ use crate::frame::{Frame, SceneData};
 use crate::image::Image;
 use crate::layout::Layout;
 use crate::mri::Signals;
+use crate::overlay::items;
+use crate::paint::Paint;
 use crate::painter::Kept;
-use crate::renderer::{BRICKS_PER_FRAME, DrawReport, Hit};
+use crate::renderer::{BRICKS_PER_FRAME, DrawReport, Hit, eye_view};
 use crate::scene::Scene;
 use crate::slice::Plane;
-use brain::Fragments;
+use crate::stereo::StereoLook;
 pub use bricks::Casting;
+pub(crate) use bricks::trilinear;
 
 use bricks::Bricks;
+use eye::Eye;
 use glam::Vec3;
-use skull::{Ray, TILE};
+use skull::Ray;
 use trepan_geometry::Aabb;
 
 /// Draws pictures of one scene on the processor.
@@ -49,10 +56,9 @@ pub struct ProcessorRenderer {
     bounds: Aabb,
     layout: Layout,
     picture: Image,
-    rays: Vec<Ray>,
-    /// Up to where no ray of a tile meets bone, mm.
-    clear: Vec<f32>,
-    fragments: Fragments,
+    stereo: Option<StereoLook>,
+    /// One, or the left and the right.
+    eyes: Vec<Eye>,
     /// Changed bricks that one picture takes over at most; the rest comes with the next pictures.
     pub bricks_per_frame: usize,
     /// Threads that share the rows of a picture; by default one for each processor.
@@ -65,6 +71,8 @@ pub(crate) struct Inputs<'a> {
     pub scene: &'a Scene,
     pub bricks: &'a Bricks,
     pub mri: Option<&'a Signals>,
+    pub bone_paint: Option<&'a Paint>,
+    pub brain_paint: Option<&'a Paint>,
 }
 
 impl ProcessorRenderer {
@@ -82,113 +90,94 @@ impl ProcessorRenderer {
             mri: kept.mri,
             layout: Layout::of(0, 0, false),
             picture: Image { width: 0, height: 0, rgba: Vec::new() },
-            rays: Vec::new(),
-            clear: Vec::new(),
-            fragments: Fragments::default(),
+            stereo: None,
+            eyes: Vec::new(),
             bricks_per_frame: BRICKS_PER_FRAME,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
         };
-        renderer.divide(size, true)?;
+        renderer.divide(size, true, None)?;
         Ok(renderer)
     }
 
     /// Changes the size of the pictures, width and height.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
-        self.divide(size, self.layout.slices.is_some())
+        self.divide(size, self.layout.slices.is_some(), self.stereo)
     }
 
-    fn divide(&mut self, [width, height]: [u32; 2], slices: bool) -> Result<(), RenderError> {
+    fn divide(
+        &mut self,
+        [width, height]: [u32; 2],
+        slices: bool,
+        stereo: Option<StereoLook>,
+    ) -> Result<(), RenderError> {
         if width == 0 || height == 0 {
             return Err(RenderError::Size(width, height));
         }
         let layout = Layout::of(width, height, slices);
         if (self.picture.width, self.picture.height, self.layout) != (width, height, layout) {
-            let [_, _, w, h] = layout.view.map(|n| n as usize);
             self.layout = layout;
             self.picture = Image { width, height, rgba: vec![0; 4 * width as usize * height as usize] };
-            self.rays = vec![Ray::NONE; w * h];
-            self.fragments = Fragments::of(w, h);
-            self.bricks.recast.forget();
+            self.eyes.clear();
+        }
+        self.stereo = stereo;
+        let areas = StereoLook::areas(stereo, layout.view);
+        if !self.eyes.iter().map(|eye| eye.area).eq(areas.iter().copied()) {
+            self.eyes = areas.into_iter().map(Eye::of).collect();
         }
         Ok(())
     }
 
     /// Draws a picture.
     pub fn draw(&mut self, frame: &Frame) -> Result<DrawReport, RenderError> {
-        self.divide([self.picture.width, self.picture.height], frame.slices.shown)?;
-        let view = self.view(frame);
+        let size = [self.picture.width, self.picture.height];
+        self.divide(size, frame.slices.shown, frame.stereo.map(|s| s.look))?;
+        [frame.bone_paint, frame.brain_paint].into_iter().flatten().try_for_each(Paint::check)?;
         let followed = self.bricks.follow(self.bricks_per_frame);
         if let Some(brain) = &mut self.brain {
             brain.follow(frame.brain_positions)?;
         }
-        let [_, _, width, height] = self.layout.view;
+        let (items, lines_left) = items(&frame.overlay, self.view(frame).eye);
         let mri_from_world = self.mri.as_ref().map(|m| m.texture_from_world);
-        let scene = Scene::of(frame, &view, [width, height], &self.bricks.grid, mri_from_world);
-        let pixels_cast = self.cast(frame, &view, &scene);
-        let shown = self.brain.as_ref().filter(|_| frame.show_brain);
-        self.fragments.draw(shown, &view);
-        self.light(&scene);
-        let lines_left = self.slices(frame, &scene);
+        let mut pixels_cast = 0;
+        let mut eyes = std::mem::take(&mut self.eyes);
+        for (n, eye) in eyes.iter_mut().enumerate() {
+            let view = eye_view(frame, eye.area, n);
+            let scene = Scene::of(frame, &view, eye.size(), &self.bricks.grid, mri_from_world);
+            eye.recast.note(followed.changed);
+            let inputs = self.inputs(frame, &scene);
+            let brain = self.brain.as_ref().filter(|_| frame.show_brain);
+            pixels_cast += eye.draw(&inputs, brain, frame.show_bone, &view, &items, self.threads);
+            let in_one = n > 0 && frame.stereo.is_some_and(|s| s.look == StereoLook::Anaglyph);
+            eye.show(&mut self.picture, in_one);
+            if n == 0 {
+                self.slices(frame, &scene);
+            }
+        }
+        self.eyes = eyes;
         Ok(DrawReport { bricks: followed.bricks, bricks_left: followed.left, pixels_cast, lines_left })
     }
 
-    fn cast(&mut self, frame: &Frame, view: &View, scene: &Scene) -> u32 {
-        let [_, _, width, height] = self.layout.view;
-        if !frame.show_bone || !self.bricks.is_some() {
-            self.rays.fill(Ray::NONE);
-            self.bricks.recast.forget();
-            return 0;
-        }
-        let Some(part) = self.bricks.recast.part(view, [width, height]) else { return 0 };
-        let [x, y, w, h] = part.map(|n| n as usize);
-        let bricks = &self.bricks;
-        let [columns, lines] = [w, h].map(|n| n.div_ceil(TILE));
-        self.clear.resize(columns * lines, 0.0);
-        rows::share(self.threads, rows::of(&mut self.clear, columns, 0..lines, 0..columns), |line, row| {
-            let first = |n| [x + TILE * n, y + TILE * line];
-            row.iter_mut().enumerate().for_each(|(n, clear)| *clear = skull::clear(bricks, scene, first(n)));
-        });
-        let (clears, top) = (&self.clear, y);
-        let rows = rows::of(&mut self.rays, width as usize, y..y + h, x..x + w);
-        rows::share(self.threads, rows, |y, row| {
-            let clear = &clears[columns * ((y - top) / TILE)..];
-            let cast = |n: usize| skull::cast(bricks, scene, [x + n, y], clear[n / TILE]);
-            row.iter_mut().enumerate().for_each(|(n, ray)| *ray = cast(n));
-        });
-        part[2] * part[3]
+    fn inputs<'a>(&'a self, frame: &Frame<'a>, scene: &'a Scene) -> Inputs<'a> {
+        let (bone_paint, brain_paint) = (frame.bone_paint, frame.brain_paint);
+        Inputs { scene, bricks: &self.bricks, mri: self.mri.as_ref(), bone_paint, brain_paint }
     }
 
-    fn light(&mut self, scene: &Scene) {
-        let [_, _, width, height] = self.layout.view.map(|n| n as usize);
-        let inputs = Inputs { scene, bricks: &self.bricks, mri: self.mri.as_ref() };
-        let (rays, fragments) = (&self.rays, &self.fragments);
-        let pixels = bytemuck::cast_slice_mut::<u8, [u8; 4]>(&mut self.picture.rgba);
-        let rows = rows::of(pixels, self.picture.width as usize, 0..height, 0..width);
-        rows::share(self.threads, rows, |y, row| {
-            for (x, pixel) in row.iter_mut().enumerate() {
-                let at = x + width * y;
-                *pixel = light::fragment(&inputs, [x, y], &rays[at], fragments.at(at));
-            }
-        });
-    }
-
-    fn slices(&mut self, frame: &Frame, scene: &Scene) -> u32 {
-        let Some(rectangles) = self.layout.slices else { return 0 };
+    fn slices(&mut self, frame: &Frame, scene: &Scene) {
+        let Some(rectangles) = self.layout.slices else { return };
         let through = frame.focus(self.bounds);
         let look = frame.slices.with_bone(self.bricks.is_some());
         let planes = Plane::three(through, self.bounds, frame.slices.half_height_mm, &rectangles);
-        let inputs = Inputs { scene, bricks: &self.bricks, mri: self.mri.as_ref() };
-        let width = self.picture.width as usize;
+        let (bricks, mri, width) = (&self.bricks, self.mri.as_ref(), self.picture.width as usize);
+        let inputs = Inputs { scene, bricks, mri, bone_paint: None, brain_paint: None };
         let pixels = bytemuck::cast_slice_mut::<u8, [u8; 4]>(&mut self.picture.rgba);
         for (n, (plane, rectangle)) in planes.iter().zip(&rectangles).enumerate() {
             let [x, y, w, h] = rectangle.map(|n| n as usize);
-            let cut = self.brain.iter().flat_map(|brain| crate::section::triangles(plane, brain));
-            let places = section::places([w, h], cut);
+            let places = self.brain.as_ref().map_or_else(Vec::new, |brain| section::places([w, h], plane, brain));
             let rows = rows::of(pixels, width, y..y + h, x..x + w);
             rows::share(self.threads, rows, |row_at, row| {
                 for (column, pixel) in row.iter_mut().enumerate() {
                     let at = [column, row_at - y];
-                    let rest = places[column + w * (row_at - y)];
+                    let rest = places.get(column + w * (row_at - y)).copied().flatten();
                     *pixel = slice::fragment(&inputs, plane, n, [w, h], at, rest, &look);
                 }
             });
@@ -196,18 +185,18 @@ impl ProcessorRenderer {
                 contour::draw(pixels, width, *rectangle, brain.corners().filter_map(|t| plane.cut(t)));
             }
         }
-        0
     }
 
     /// Changes how rays go through the bone, to measure what it is worth.
     pub fn set_casting(&mut self, casting: Casting) {
         self.bricks.casting = casting;
-        self.bricks.recast.forget();
+        self.eyes.iter_mut().for_each(|eye| eye.recast.forget());
     }
 
     /// Bricks, cells and samples that a ray of the newest picture has looked at in the mean, without its shadow.
     pub fn steps_per_ray(&self) -> f64 {
-        self.rays.iter().map(|ray| f64::from(ray.steps)).sum::<f64>() / self.rays.len().max(1) as f64
+        let rays = &self.eyes[0].rays;
+        rays.iter().map(|ray| f64::from(ray.steps)).sum::<f64>() / rays.len().max(1) as f64
     }
 
     /// Pixels of the picture, width and height.
@@ -220,9 +209,9 @@ impl ProcessorRenderer {
         self.layout
     }
 
-    /// The camera of a frame as vectors, for the 3-D view of this picture.
+    /// The camera of a frame as vectors, for the 3-D view of this picture; with two eyes, from between them.
     pub fn view(&self, frame: &Frame) -> View {
-        let [_, _, width, height] = self.layout.view;
+        let [_, _, width, height] = self.eyes[0].area;
         frame.camera.view(width as f32 / height as f32)
     }
 
@@ -234,7 +223,7 @@ impl ProcessorRenderer {
     /// The bone at each pixel of the 3-D view, row by row.
     pub fn bone_hits(&self) -> Vec<Option<Hit>> {
         let hit = |r: &Ray| (r.t < crate::skull::NOTHING).then_some(Hit { distance_mm: r.t, normal: r.normal });
-        self.rays.iter().map(hit).collect()
+        self.eyes[0].rays.iter().map(hit).collect()
     }
 }
 

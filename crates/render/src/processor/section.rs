@@ -1,18 +1,20 @@
 //! Twin of `section.wgsl`: where the brain that is at a pixel of a slice is at rest.
 
-use crate::section::Corner;
+use crate::brain::Border;
+use crate::section::triangles;
+use crate::slice::Plane;
 use glam::{Vec2, Vec3};
 
 /// The place at rest at every pixel of a slice, row by row; none off the brain.
-pub(crate) fn places([width, height]: [usize; 2], triangles: impl Iterator<Item = [Corner; 3]>) -> Vec<Option<Vec3>> {
+pub(crate) fn places([width, height]: [usize; 2], plane: &Plane, brain: &Border) -> Vec<Option<Vec3>> {
     let mut places = vec![None; width * height];
     let size = Vec2::new(width as f32, height as f32);
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|corner| (Vec2::new(corner.at.x, -corner.at.y) * 0.5 + 0.5) * size);
+    for triangle in triangles(plane.level(), brain) {
+        let [a, b, c] = triangle.map(|corner| (plane.at(corner.place) * Vec2::new(0.5, -0.5) + 0.5) * size);
         let double_area = (b - a).perp_dot(c - a);
         let low = a.min(b).min(c).floor().clamp(Vec2::ZERO, size).as_uvec2();
         let high = a.max(b).max(c).ceil().clamp(Vec2::ZERO, size).as_uvec2();
-        if double_area == 0.0 {
+        if !(double_area.abs() > 0.0) {
             continue;
         }
         for (y, x) in (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| (y, x))) {

@@ -1,9 +1,10 @@
 //! Twin of `skull.wgsl`: the bone's isosurface at a pixel.
 
-use super::bricks::Bricks;
+use super::bricks::{Bricks, under};
+use crate::cut::height;
 use crate::scene::Scene;
 use crate::skull::NOTHING;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// What a pixel's ray meets of the bone.
 #[derive(Clone, Copy, Debug)]
@@ -42,16 +43,25 @@ pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32
     if from >= NOTHING {
         return Ray::NONE;
     }
-    let along = scene.ray_of(x, y);
-    let o = bricks.grid_of(scene.eye.truncate());
+    let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
+    let o = bricks.grid_of(eye);
     let d = along / bricks.grid.spacing_mm;
-    let (t, steps) = bricks.trace(o, d, from);
+    let [near, far] = under(scene.bone_cut, eye, along);
+    let (t, steps) = bricks.trace(o, d, near.max(from), far);
     if t >= NOTHING {
         return Ray { steps, ..Ray::NONE };
     }
     let g = o + d * t;
-    let normal = bricks.outward_normal(g, along);
-    let towards_light = scene.light.truncate();
-    let lit = normal.dot(towards_light) > 0.0 && !bricks.shadowed(g, normal, towards_light);
-    Ray { t, steps, normal, open: 0.999 * bricks.openness(g, normal), lit }
+    let normal = if on_cut(scene.bone_cut, eye + t * along) {
+        scene.bone_cut.truncate()
+    } else {
+        bricks.outward_normal(g, along)
+    };
+    let lit = normal.dot(scene.light.truncate()) > 0.0 && !bricks.shadowed(g, normal, scene);
+    Ray { t, steps, normal, open: 0.999 * bricks.openness(g, normal, scene.bone_cut), lit }
+}
+
+/// Whether a point that a ray has met is where bone is cut.
+fn on_cut(bone_cut: Vec4, point: Vec3) -> bool {
+    bone_cut.truncate() != Vec3::ZERO && height(bone_cut, point).abs() < 0.01
 }

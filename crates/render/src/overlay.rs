@@ -1,0 +1,150 @@
+//! What is drawn over the scene: the force as an arrow, a teacher's tool, markers.
+//!
+//! # Theory
+//! Closed forms in boxes: each item is a rectangle of pixels around its box, in which rays meet ball, cylinder or cone exactly. Far items first, mixed by alpha.
+//!
+//! # Practice
+//! World mm. Parts behind bone, brain or tool show faintly, so that an arrow in a hole is not lost. Without items there is no pass.
+
+use crate::RenderError;
+use crate::scene::{Scene, ends};
+use glam::{Vec3, Vec4};
+use trepan_geometry::{Pose, Tool};
+use trepan_gpu::{
+    Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
+};
+
+/// What is drawn over the scene.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Overlay<'a> {
+    /// An arrow from one world point to another, mm.
+    pub force: Option<[Vec3; 2]>,
+    /// A tool that is only shown, and where it is: a teacher's.
+    pub ghost: Option<(Tool, Pose)>,
+    /// World points that are marked by small balls, mm; 256 at most.
+    pub markers: &'a [Vec3],
+}
+
+/// Markers, arrow and ghost that a picture has room for.
+const MOST_ITEMS: usize = 258;
+
+/// Radius of a marker, mm.
+const MARKER_MM: f32 = 1.0;
+
+// Colours that the colour-blind tell apart (Okabe and Ito 2008), with alpha.
+const FORCE: Vec4 = Vec4::new(0.90, 0.60, 0.0, 1.0);
+const GHOST: Vec4 = Vec4::new(0.10, 0.45, 0.80, 0.45);
+const MARKER: Vec4 = Vec4::new(0.80, 0.20, 0.50, 1.0);
+
+/// A shape of the overlay; twin of the shader's `Item`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Item {
+    /// A tool's ball, or an arrow's begin; w: the radius there.
+    pub tip: Vec4,
+    /// The far end of a tool's shaft, or an arrow's point; w: the radius of the shaft, or of the arrow's head.
+    pub tail: Vec4,
+    /// Red, green, blue, alpha.
+    pub colour: Vec4,
+    /// x: 1 for an arrow, 0 for a tool.
+    pub kind: Vec4,
+}
+
+impl Item {
+    fn tool([tip, tail]: [Vec4; 2], colour: Vec4) -> Self {
+        Self { tip, tail, colour, kind: Vec4::ZERO }
+    }
+
+    fn arrow([from, to]: [Vec3; 2]) -> Self {
+        let radius = (0.05 * from.distance(to)).clamp(0.15, 0.8);
+        Self { tip: from.extend(radius), tail: to.extend(2.5 * radius), colour: FORCE, kind: Vec4::X }
+    }
+
+    fn is_sound(&self) -> bool {
+        self.tip.is_finite() && self.tail.is_finite() && (self.kind == Vec4::ZERO || self.length() > 1e-3)
+    }
+
+    fn length(&self) -> f32 {
+        self.tip.truncate().distance(self.tail.truncate())
+    }
+}
+
+/// The shapes of an overlay, far ones first, and how many found no room.
+pub(crate) fn items(overlay: &Overlay, eye: Vec3) -> (Vec<Item>, u32) {
+    let marker = |at: &Vec3| Item::tool([at.extend(MARKER_MM); 2], MARKER);
+    let ghost = overlay.ghost.map(|(tool, pose)| Item::tool(ends(&tool, &pose), GHOST));
+    let all = overlay.force.map(Item::arrow).into_iter().chain(ghost).chain(overlay.markers.iter().map(marker));
+    let mut items: Vec<Item> = all.filter(Item::is_sound).take(MOST_ITEMS).collect();
+    let distance = |item: &Item| (0.5 * (item.tip + item.tail)).truncate().distance(eye);
+    items.sort_by(|a, b| distance(b).total_cmp(&distance(a)));
+    let wanted = overlay.markers.len() + usize::from(overlay.force.is_some()) + usize::from(overlay.ghost.is_some());
+    (items, wanted.saturating_sub(MOST_ITEMS) as u32)
+}
+
+/// The pass.
+#[derive(Debug)]
+pub(crate) struct Shapes {
+    pipeline: Pipeline,
+    items: Buffer<Item>,
+    count: u32,
+}
+
+impl Shapes {
+    pub fn new(gpu: &Gpu) -> Result<Self, RenderError> {
+        let spec = PipelineSpec {
+            label: "overlay",
+            wgsl: trepan_shaders::RENDER_OVERLAY,
+            slots: &[Slot::Uniform, Slot::Storage, Slot::Integer2, Slot::Integer2],
+            targets: &[Format::Rgba8Unorm],
+            depth: false,
+            blend: true,
+            topology: Topology::Triangles,
+        };
+        let items = Buffer::zeroed(gpu, "overlay", MOST_ITEMS)?;
+        Ok(Self { pipeline: Pipeline::new(gpu, &spec)?, items, count: 0 })
+    }
+
+    pub fn bind(
+        &self,
+        gpu: &Gpu,
+        scene: &Buffer<Scene>,
+        skull_hit: &Texture,
+        brain_hit: &Texture,
+    ) -> Result<Bindings, RenderError> {
+        Ok(self.pipeline.bind(gpu, &[scene.into(), (&self.items).into(), skull_hit.into(), brain_hit.into()])?)
+    }
+
+    /// Takes the shapes of a frame over. Returns the number of those that found no room.
+    pub fn follow(&mut self, gpu: &Gpu, overlay: &Overlay, eye: Vec3) -> u32 {
+        let (items, left) = items(overlay, eye);
+        self.items.write(gpu, 0, &items);
+        self.count = items.len() as u32;
+        left
+    }
+
+    pub fn draw(&self, recorder: &mut Recorder, bindings: &Bindings, view: [u32; 4], picture: &Texture) {
+        if self.count > 0 {
+            let colours = [Target { texture: picture, clear: None }];
+            recorder.draw("overlay", &DrawTarget { colours: &colours, depth: None }, |d| {
+                d.viewport(view);
+                d.draw(&self.pipeline, bindings, 6 * self.count);
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn items_come_far_ones_first_and_what_is_not_finite_or_has_no_length_is_left_out() {
+        let markers = [Vec3::X, 5.0 * Vec3::X, Vec3::NAN];
+        let overlay = Overlay { force: Some([Vec3::ONE; 2]), ghost: None, markers: &markers };
+        let (items, left) = items(&overlay, Vec3::ZERO);
+        assert_eq!(items.iter().map(|i| i.tip.x).collect::<Vec<_>>(), [5.0, 1.0]);
+        assert_eq!(left, 0);
+        let many = vec![Vec3::Z; 300];
+        assert_eq!(super::items(&Overlay { markers: &many, ..Overlay::default() }, Vec3::ZERO).1, 42);
+    }
+}

@@ -1,0 +1,138 @@
+//! Colours laid over bone or brain: a plan, distances to the dura, a map of forces, forbidden structures.
+//!
+//! # Theory
+//! A coarse box of colours, sampled trilinearly with the alpha multiplied in first, so that clear texels lend no colour to their neighbours. Alpha mixes over the surface's own
+//! colour before light falls on it.
+//!
+//! # Practice
+//! World mm. The box reaches half a spacing beyond the outer texels and is clear outside. 4 bytes of device memory a texel; uploaded when the version
+//! or the dimensions change.
+//!
+//! # When not to use it
+//! For what changes at every voxel in every picture: that is the bone itself, whose changes are followed brick by brick.
+
+use crate::RenderError;
+use crate::processor::trilinear;
+use glam::{Vec3, Vec4};
+use trepan_gpu::{Format, Gpu, Texture, TextureSpec};
+
+/// A box of colours in world space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Paint {
+    /// World centre of the texel (0, 0, 0), mm.
+    pub origin: Vec3,
+    /// From texel to texel along x, y, z, mm.
+    pub spacing_mm: Vec3,
+    /// Texels along x, y, z.
+    pub dims: [u32; 3],
+    /// Red, green, blue (linear light) and alpha of the texels, x fastest.
+    pub rgba: Vec<[u8; 4]>,
+    /// Another number says that the colours are others.
+    pub version: u64,
+}
+
+impl Paint {
+    /// Refuses what is not a box of colours.
+    pub(crate) fn check(&self) -> Result<(), RenderError> {
+        let wanted = self.dims.map(|n| n as usize).iter().product::<usize>();
+        let sound = self.origin.is_finite() && self.spacing_mm.is_finite() && self.spacing_mm.min_element() > 0.0;
+        if sound && wanted > 0 && wanted == self.rgba.len() {
+            return Ok(());
+        }
+        Err(RenderError::Paint { dims: self.dims, spacing_mm: self.spacing_mm, given: self.rgba.len() })
+    }
+
+    /// Lower corner of the box (w: 1) and one over its size, in the form in which shaders read it; zeroes for none.
+    pub(crate) fn placed(paint: Option<&Self>) -> [Vec4; 2] {
+        paint.map_or([Vec4::ZERO; 2], |p| {
+            let size = p.spacing_mm * Vec3::from(p.dims.map(|n| n as f32));
+            [(p.origin - 0.5 * p.spacing_mm).extend(1.0), size.recip().extend(0.0)]
+        })
+    }
+
+    /// A colour with this paint over it at a world point.
+    pub(crate) fn over(&self, colour: Vec3, point: Vec3) -> Vec3 {
+        let texel = (point - self.origin) / self.spacing_mm;
+        let dims = Vec3::from(self.dims.map(|n| n as f32));
+        if texel.cmplt(Vec3::splat(-0.5)).any() || texel.cmpgt(dims - 0.5).any() {
+            return colour;
+        }
+        let paint = trilinear(self.dims.map(|n| n as usize), texel, |at| premultiplied(self.rgba[at])) / 255.0;
+        colour * (1.0 - paint.w) + paint.truncate()
+    }
+}
+
+/// A colour with its alpha multiplied in, 0 to 255.
+fn premultiplied([r, g, b, a]: [u8; 4]) -> Vec4 {
+    (Vec3::new(r.into(), g.into(), b.into()) * (f32::from(a) / 255.0)).extend(a.into())
+}
+
+/// A paint on the device; one clear texel where there is none.
+#[derive(Debug)]
+pub(crate) struct Coat {
+    label: &'static str,
+    pub texture: Texture,
+    version: Option<u64>,
+}
+
+impl Coat {
+    pub fn new(gpu: &Gpu, label: &'static str) -> Result<Self, RenderError> {
+        Ok(Self { label, texture: texture(gpu, label, [1; 3])?, version: None })
+    }
+
+    /// Takes a paint over if it has changed. Whether the texture is another one, so that it has to be bound anew.
+    pub fn follow(&mut self, gpu: &Gpu, paint: Option<&Paint>) -> Result<bool, RenderError> {
+        let Some(paint) = paint else { return Ok(false) };
+        paint.check()?;
+        let other = self.texture.size() != paint.dims;
+        if other {
+            self.texture = texture(gpu, self.label, paint.dims)?;
+        }
+        if other || self.version != Some(paint.version) {
+            let byte = |v: f32| v.round() as u8;
+            let texels: Vec<[u8; 4]> = paint.rgba.iter().map(|&c| premultiplied(c).to_array().map(byte)).collect();
+            self.texture.write(gpu, [0; 3], paint.dims, &texels);
+            self.version = Some(paint.version);
+        }
+        Ok(other)
+    }
+}
+
+fn texture(gpu: &Gpu, label: &'static str, size: [u32; 3]) -> Result<Texture, RenderError> {
+    Ok(Texture::new(gpu, &TextureSpec { label, size, volume: true, format: Format::Rgba8Unorm, drawn_to: false })?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn paint() -> Paint {
+        let rgba = vec![[200, 100, 0, 255], [0, 0, 0, 0]];
+        Paint { origin: Vec3::ONE, spacing_mm: Vec3::splat(2.0), dims: [2, 1, 1], rgba, version: 0 }
+    }
+
+    #[test]
+    fn alpha_mixes_between_texels_and_nothing_is_painted_outside() {
+        let (paint, white) = (paint(), Vec3::ONE);
+        let solid = Vec3::new(200.0, 100.0, 0.0) / 255.0;
+        for (x, share) in [(0.5, 1.0), (1.0, 1.0), (2.0, 0.5), (2.5, 0.25), (3.0, 0.0), (3.9, 0.0)] {
+            let painted = paint.over(white, Vec3::new(x, 1.5, 0.5));
+            assert!(painted.distance(white.lerp(solid, share)) < 1e-6, "{painted} at {x}");
+        }
+        for out in [Vec3::new(-0.1, 1.0, 1.0), Vec3::new(1.0, 2.1, 1.0), Vec3::new(1.0, 1.0, -0.1)] {
+            assert_eq!(paint.over(white, out), white);
+        }
+    }
+
+    #[test]
+    fn what_is_no_box_of_colours_is_refused() {
+        assert!(paint().check().is_ok());
+        let bad = [
+            Paint { dims: [1; 3], ..paint() },
+            Paint { dims: [0, 1, 1], rgba: Vec::new(), ..paint() },
+            Paint { spacing_mm: Vec3::new(1.0, 0.0, 1.0), ..paint() },
+            Paint { origin: Vec3::NAN, ..paint() },
+        ];
+        assert!(bad.iter().all(|p| matches!(p.check(), Err(RenderError::Paint { .. }))));
+    }
+}

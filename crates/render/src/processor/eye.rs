@@ -1,0 +1,113 @@
+//! What one eye sees: its hits, kept from picture to picture, and its view.
+
+use super::brain::Fragments;
+use super::skull::{Ray, TILE, cast, clear};
+use super::{Inputs, light, overlay, rows};
+use crate::brain::Border;
+use crate::camera::View;
+use crate::image::Image;
+use crate::overlay::Item;
+use crate::recast::Recast;
+
+/// The hits of an eye and what it sees.
+#[derive(Debug)]
+pub(crate) struct Eye {
+    /// Where its view is in the picture.
+    pub area: [u32; 4],
+    pub rays: Vec<Ray>,
+    pub recast: Recast,
+    /// Up to where no ray of a tile meets bone, mm.
+    clear: Vec<f32>,
+    fragments: Fragments,
+    pixels: Vec<[u8; 4]>,
+}
+
+impl Eye {
+    pub fn of(area: [u32; 4]) -> Self {
+        let [_, _, width, height] = area.map(|n| n as usize);
+        Self {
+            area,
+            rays: vec![Ray::NONE; width * height],
+            recast: Recast::default(),
+            clear: Vec::new(),
+            fragments: Fragments::of(width, height),
+            pixels: vec![[0; 4]; width * height],
+        }
+    }
+
+    /// Width and height of its view, pixels.
+    pub fn size(&self) -> [u32; 2] {
+        [self.area[2], self.area[3]]
+    }
+
+    /// Draws bone, brain, tools and overlay. Returns the pixels whose rays were cast again.
+    pub fn draw(
+        &mut self,
+        inputs: &Inputs,
+        brain: Option<&Border>,
+        show_bone: bool,
+        view: &View,
+        items: &[Item],
+        threads: usize,
+    ) -> u32 {
+        let pixels_cast = self.cast(inputs, show_bone, view, threads);
+        self.fragments.draw(brain, view, inputs.scene.brain_cut);
+        let [width, height] = self.size().map(|n| n as usize);
+        let (rays, fragments) = (&self.rays, &self.fragments);
+        rows::share(threads, rows::of(&mut self.pixels, width, 0..height, 0..width), |y, row| {
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let at = x + width * y;
+                *pixel = light::fragment(inputs, [x, y], &rays[at], fragments.at(at));
+            }
+        });
+        let depth = |at: usize| rays[at].t.min(fragments.at(at).t);
+        items.iter().for_each(|item| overlay::draw(item, inputs.scene, view, &mut self.pixels, depth));
+        pixels_cast
+    }
+
+    fn cast(&mut self, inputs: &Inputs, shown: bool, view: &View, threads: usize) -> u32 {
+        let (bricks, scene) = (inputs.bricks, inputs.scene);
+        if !shown || !bricks.is_some() {
+            self.rays.fill(Ray::NONE);
+            self.recast.forget();
+            return 0;
+        }
+        let Some(part) = self.recast.part(view, scene.bone_cut, self.size()) else { return 0 };
+        let [x, y, w, h] = part.map(|n| n as usize);
+        let [columns, lines] = [w, h].map(|n| n.div_ceil(TILE));
+        self.clear.resize(columns * lines, 0.0);
+        rows::share(threads, rows::of(&mut self.clear, columns, 0..lines, 0..columns), |line, row| {
+            let first = |n| [x + TILE * n, y + TILE * line];
+            row.iter_mut().enumerate().for_each(|(n, far)| *far = clear(bricks, scene, first(n)));
+        });
+        let (clears, top) = (&self.clear, y);
+        let rows = rows::of(&mut self.rays, self.area[2] as usize, y..y + h, x..x + w);
+        rows::share(threads, rows, |y, row| {
+            let clear = &clears[columns * ((y - top) / TILE)..];
+            let ray = |n: usize| cast(bricks, scene, [x + n, y], clear[n / TILE]);
+            row.iter_mut().enumerate().for_each(|(n, r)| *r = ray(n));
+        });
+        part[2] * part[3]
+    }
+
+    /// Copies the view into the picture; in one with the other eye's, only green and blue over that one's brightness.
+    pub fn show(&self, picture: &mut Image, in_one: bool) {
+        let [x, y, width, height] = self.area.map(|n| n as usize);
+        let wide = picture.width as usize;
+        let pixels = bytemuck::cast_slice_mut::<u8, [u8; 4]>(&mut picture.rgba);
+        let rows = rows::of(pixels, wide, y..y + height, x..x + width);
+        for ((_, row), seen) in rows.zip(self.pixels.chunks_exact(width)) {
+            if in_one {
+                row.iter_mut().zip(seen).for_each(|(pixel, &seen)| *pixel = anaglyph(*pixel, seen));
+            } else {
+                row.copy_from_slice(seen);
+            }
+        }
+    }
+}
+
+/// Twin of `anaglyph.wgsl`.
+fn anaglyph([r, g, b, _]: [u8; 4], right: [u8; 4]) -> [u8; 4] {
+    let grey = 0.299 * f32::from(r) + 0.587 * f32::from(g) + 0.114 * f32::from(b);
+    [grey.round() as u8, right[1], right[2], 255]
+}

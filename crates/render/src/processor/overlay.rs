@@ -1,0 +1,87 @@
+//! Twin of `overlay.wgsl`: shapes over the picture, each in the rectangle around it.
+
+use super::light::shown;
+use super::tool::{Met, lit, shaft};
+use crate::camera::View;
+use crate::overlay::Item;
+use crate::scene::Scene;
+use crate::skull::NOTHING;
+use glam::{Vec2, Vec3};
+
+/// Share of alpha behind the scene.
+const HIDDEN: f32 = 0.25;
+
+/// Draws a shape over pixels of a picture, behind which the scene is as far as `depth` says.
+pub(crate) fn draw(item: &Item, scene: &Scene, view: &View, pixels: &mut [[u8; 4]], depth: impl Fn(usize) -> f32) {
+    let (width, eye) = (scene.right.w as usize, scene.eye.truncate());
+    let [left, top, right, bottom] = rectangle(item, view, [width, scene.up.w as usize]);
+    for (x, y) in (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y))) {
+        let (along, at) = (scene.ray_of(x, y), x + width * y);
+        let (t, normal) = if item.kind.x > 0.5 { arrow(eye, along, item) } else { tool(eye, along, item) };
+        if t >= NOTHING {
+            continue;
+        }
+        let tools = scene.tools().map(|tool| Met::of(tool, eye, along).t());
+        let hidden = t > depth(at).min(tools[0]).min(tools[1]);
+        let alpha = item.colour.w * if hidden { HIDDEN } else { 1.0 };
+        let colour = shown(lit(scene, item.colour.truncate(), normal, along, 1.0, 1.0, 0.3));
+        for (below, over) in pixels[at].iter_mut().zip(colour).take(3) {
+            *below = (f32::from(over) * alpha + f32::from(*below) * (1.0 - alpha)).round() as u8;
+        }
+    }
+}
+
+/// First and last pixels around an item's box; the whole view where the box reaches behind the eye.
+fn rectangle(item: &Item, view: &View, [width, height]: [usize; 2]) -> [usize; 4] {
+    let radius = item.tip.w.abs().max(item.tail.w.abs());
+    let size = Vec2::new(width as f32, height as f32);
+    let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+    for n in 0..16 {
+        let sides = Vec3::new((n & 1) as f32, (n >> 1 & 1) as f32, (n >> 2 & 1) as f32) * 2.0 - 1.0;
+        let end = if n < 8 { item.tip } else { item.tail };
+        let (at, depth) = view.project(end.truncate() + radius * sides);
+        if depth < View::NEAR_MM {
+            return [0, 0, width, height];
+        }
+        let at = (at * Vec2::new(0.5, -0.5) + 0.5) * size;
+        (low, high) = (low.min(at), high.max(at));
+    }
+    let (low, high) = (low.floor().clamp(Vec2::ZERO, size), high.ceil().clamp(Vec2::ZERO, size));
+    [low.x as usize, low.y as usize, high.x as usize, high.y as usize]
+}
+
+fn tool(eye: Vec3, along: Vec3, item: &Item) -> (f32, Vec3) {
+    let met = Met::of([item.tip, item.tail], eye, along);
+    (met.t(), met.normal(eye + met.t() * along))
+}
+
+fn arrow(eye: Vec3, along: Vec3, item: &Item) -> (f32, Vec3) {
+    let (from, to) = (item.tip.truncate(), item.tail.truncate());
+    let down = (from - to).normalize();
+    let depth = (3.0 * item.tail.w).min(0.6 * to.distance(from));
+    let neck = (to + depth * down).extend(item.tip.w);
+    let t = shaft(eye, along, item.tip, neck);
+    let across = eye + t * along - from;
+    let stem = (t, (across - down * across.dot(down)).normalize_or_zero());
+    head(eye, along, to, down, depth, item.tail.w, stem)
+}
+
+/// The nearer of a surface and the front of an arrow's head: a cone around `down` from its point, as deep as `depth`, as wide as `radius` there.
+fn head(eye: Vec3, along: Vec3, apex: Vec3, down: Vec3, depth: f32, radius: f32, other: (f32, Vec3)) -> (f32, Vec3) {
+    let mut nearest = other;
+    let away = eye - apex;
+    let slope = depth * depth / (depth * depth + radius * radius);
+    let (d, o) = (along.dot(down), away.dot(down));
+    let (a, b, c) = (d * d - slope, d * o - slope * along.dot(away), o * o - slope * away.length_squared());
+    let room = b * b - a * c;
+    for side in [-1.0, 1.0] {
+        let t = (-b + side * room.max(0.0).sqrt()) / a;
+        let deep = o + t * d;
+        if room > 0.0 && t > 0.0 && t < nearest.0 && deep > 0.0 && deep < depth {
+            nearest = (t, (slope * (away + t * along) - deep * down).normalize());
+        }
+    }
+    let t = (depth - o) / d;
+    let flat = away + t * along - depth * down;
+    if t > 0.0 && t < nearest.0 && flat.length_squared() < radius * radius { (t, down) } else { nearest }
+}
