@@ -66,7 +66,7 @@ impl Fragments {
         let [a, b, c] = corners.map(|v| v.at * Vec2::new(self.width as f32, self.height as f32));
         let double_area = (b - a).perp_dot(c - a);
         // Neither flat triangles nor those with a place that is not a number have an area.
-        if !corners.iter().all(|v| v.depth > View::NEAR_MM) || !(double_area.abs() > 0.0) {
+        if !corners.iter().all(|v| v.depth > View::NEAR_MM) || double_area == 0.0 || !double_area.is_finite() {
             return;
         }
         let low = a.min(b).min(c).floor().max(Vec2::ZERO);

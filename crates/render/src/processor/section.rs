@@ -14,7 +14,7 @@ pub(crate) fn places([width, height]: [usize; 2], plane: &Plane, brain: &Border)
         let double_area = (b - a).perp_dot(c - a);
         let low = a.min(b).min(c).floor().clamp(Vec2::ZERO, size).as_uvec2();
         let high = a.max(b).max(c).ceil().clamp(Vec2::ZERO, size).as_uvec2();
-        if !(double_area.abs() > 0.0) {
+        if double_area == 0.0 || !double_area.is_finite() {
             continue;
         }
         for (y, x) in (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| (y, x))) {
