@@ -15,8 +15,8 @@ const FLOORS: [&[&str]; 6] = [
     &["volume", "mesh", "contact", "gpu"],
     &["rigid", "deformable", "soft", "tled", "render", "haptics", "link"],
     &["voxel-size", "budget"],
-    &["simulator", "trials"],
-    &["craniotomy", "brain", "integrated"],
+    &["simulator"],
+    &["trials", "craniotomy", "brain", "integrated"],
 ];
 
 /// Arrows within one floor, from user to used.

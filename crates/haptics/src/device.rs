@@ -71,7 +71,7 @@ pub struct Capabilities {
 
 impl Capabilities {
     /// A device without motors or limits that is read at 1 kHz.
-    pub(crate) fn passive(name: impl Into<String>) -> Self {
+    pub fn passive(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
             peak_force_n: 0.0,

@@ -46,6 +46,8 @@ pub use error::SessionError;
 pub use operation::Operation;
 pub use options::{Options, Patient};
 pub use program::{Phase, Program, called};
+pub use report::against::Against;
+pub use report::regions::{Region, regions};
 pub use report::summary::Summary;
 pub use run::clock::{Clock, Schedule};
 pub use run::stop::Stop;

@@ -98,7 +98,7 @@ fn rim(bone: &BoneVolume, place: Vec3, inward: Vec3) -> Option<Rim> {
     let steps =
         |from: f32, to: f32| (0..((to - from) / STEP_MM) as usize).map(move |step| from + step as f32 * STEP_MM);
     let outer = steps(-OUTSIDE_MM, INSIDE_MM).find(|mm| is_bone(*mm))?;
-    let inner = steps(outer, outer + VAULT_MM).filter(|mm| is_bone(*mm)).last()?;
+    let inner = steps(outer, outer + VAULT_MM).rfind(|mm| is_bone(*mm))?;
     Some(Rim { outer: place + outer * inward, bone_mm: inner - outer })
 }
 

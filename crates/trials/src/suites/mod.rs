@@ -5,6 +5,7 @@ mod haptics;
 mod mesh;
 mod render;
 pub mod rigid;
+mod simulators;
 mod tled;
 mod volume;
 mod voxel_size;
@@ -83,6 +84,12 @@ pub const ALL: &[Suite] = &[
         question: "how right is each way of touching voxel bone, and what does a tick cost",
         chart: ("tick_p50_us", "depth_error_p95_voxel"),
         run: rigid::run,
+    },
+    Suite {
+        name: "simulators",
+        question: "are breaches told before they come, do the scores tell hands apart, is a replay the same",
+        chart: ("lead_p50_ms", "false_percent"),
+        run: simulators::run,
     },
     Suite {
         name: "tled",

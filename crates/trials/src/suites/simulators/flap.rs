@@ -1,0 +1,63 @@
+//! A flap cut by script on the built-in case: found free when its last bridge goes, lifted whole, and near to the plan.
+
+use super::bench::Bench;
+use super::case::Table;
+use crate::suite::{Findings, Gate, Row};
+use trepan_haptics::script::{Plan, Script};
+use trepan_haptics::simulated::Hand;
+use trepan_simulator::{Against, Program, What};
+use trepan_volume::Piece;
+
+/// Duration of the operation, ms.
+const END_MS: f64 = 75_000.0;
+
+/// One row, and its gates.
+pub fn findings(table: &Table) -> Findings {
+    let (bone, brain) = table.fresh();
+    let (before, pieces) = (bone.snapshot(), Piece::all(&bone));
+    let how = Plan { outline: table.flap.outline.clone(), ..Plan::default() };
+    let script = Script::planned("flap", &table.flap.site, END_MS, &how).expect("the site is sound");
+    let search = table.flap.search(&bone);
+    let mut bench = Bench::new(Program::Craniotomy, bone.clone(), brain, search, Hand::FIRM, Box::new(script));
+    // At the tick that finds it free the flood's answer is held against all pieces of the skull.
+    let (mut free, mut cut_off, mut found_mm3) = (0, Vec::new(), 0.0f32);
+    let mut until_ms = 0.0;
+    while until_ms < END_MS {
+        until_ms += 5.0;
+        bench.run(until_ms, |_| false);
+        if free == 0
+            && let Some(notice) = bench.notices.iter().find(|n| matches!(n.what, What::FlapFree(_)))
+        {
+            free = notice.tick;
+            cut_off = Piece::cut_off(&pieces, &Piece::all(&bone));
+            found_mm3 = if let What::FlapFree(mm3) = notice.what { mm3 } else { 0.0 };
+        }
+    }
+    let of_pieces = cut_off.first().map_or(0.0, |piece| piece.voxels as f64 * f64::from(bone.voxel_mm3()));
+    let lifted = bench.notices.iter().any(|notice| matches!(notice.what, What::FlapLifted(_)));
+    let against = Against::of(&table.flap, &before, &bone).expect("a flap is planned");
+    let mut findings = Findings::default();
+    findings.rows.push(
+        Row::new("flap of 24 mm on the built-in case", "craniotome")
+            .metric("free_after_s", 1e-3 * free as f64)
+            .metric("flap_mm3", f64::from(found_mm3))
+            .metric("dice", against.dice)
+            .metric("surface_95_mm", against.surface_95_mm.unwrap_or(f64::NAN))
+            .metric("beside_mm3", against.beside_mm3),
+    );
+    findings.gates.extend([
+        Gate::at_least("flap: found free and lifted", f64::from(u8::from(lifted && free > 0)), 1.0),
+        Gate::at_most(
+            "flap: bone by flooding less that by all pieces, mm3",
+            (f64::from(found_mm3) - of_pieces).abs(),
+            0.0,
+        ),
+        Gate::at_least("flap: Dice with the plan", against.dice, 0.9),
+        Gate::at_most(
+            "flap: 95 % surface distance from the plan, voxels",
+            against.surface_95_mm.unwrap_or(f64::NAN) / f64::from(bone.spacing_mm()),
+            1.5,
+        ),
+    ]);
+    findings
+}
