@@ -1,6 +1,7 @@
-//! The project's own commands: `cargo xtask test | validate | layers | tidy`.
+//! The project's own commands: `cargo xtask test | validate | merge | layers | tidy`.
 
 mod layers;
+mod merge;
 mod operation;
 mod tidy;
 
@@ -29,6 +30,15 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
+    /// Put the summaries of many sessions, from any number of shards, into sessions.csv and sessions.json
+    Merge {
+        /// Folders that sessions, or batches of them, wrote with --out
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+        /// Where the table goes
+        #[arg(long, value_name = "DIR", default_value = "trepan-out/merged")]
+        out: PathBuf,
+    },
     /// Check that every arrow between crates points down and that each crate does only what is its to do
     Layers,
     /// Check module docs, file lengths, READMEs, examples, shader and Rust pairs
@@ -51,6 +61,7 @@ fn run() -> Result<()> {
         Task::Validate { arguments } => {
             cargo(&["run", "--release", "--quiet", "--package", "trepan-trials", "--bin", "validate", "--"], &arguments)
         }
+        Task::Merge { folders, out } => merge::run(&folders, &out),
         Task::Layers => report("layers", layers::check(&root())?),
         Task::Tidy => report("tidy", tidy::check(&root())?),
     }

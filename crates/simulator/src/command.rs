@@ -1,5 +1,6 @@
 //! What every program does with its command line: flags, session, exit code.
 
+use crate::batch;
 use crate::device_test;
 use crate::measure;
 use crate::options::{CaseTask, DeviceTask, Task};
@@ -31,10 +32,20 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     if let Some(task) = &options.task {
         return perform(program, task, built_in);
     }
+    match batch::recordings(&options) {
+        Ok(Some(files)) => return batched(batch::run(program, &options, &built_in, &files), files.len()),
+        Ok(None) => {}
+        Err(fault) => return failed(program, &fault),
+    }
     match Session::open(program, options, built_in).and_then(Session::run) {
         Ok(ended) => told(&ended),
         Err(fault) => failed(program, &fault),
     }
+}
+
+fn batched(failures: usize, files: usize) -> ExitCode {
+    println!("{} of {files} recordings run again", files - failures);
+    if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// Does something else than a session.

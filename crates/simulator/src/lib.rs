@@ -18,6 +18,7 @@
 //! # When not to use it
 //! To use one method in a program of your own: take its crate.
 
+mod batch;
 mod case;
 mod command;
 mod device_test;

@@ -71,6 +71,9 @@ pub struct Options {
     /// Tissue that no tool may come close to: classes of --tissue, separated by commas [default: vessel]
     #[arg(long, value_name = "CLASS,...", value_delimiter = ',')]
     pub forbid: Option<Vec<TissueClass>>,
+    /// Of a folder of recordings (--device replay:FOLDER) run only every Nth again, from the Ith on, as in 2/8
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    pub shard: Option<(usize, usize)>,
     /// Haptic ticks a second
     #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
     pub rate_hz: f32,
@@ -195,6 +198,13 @@ fn point(text: &str) -> Result<[f32; 3], String> {
     let numbers: Vec<f32> = text.split(',').map(|s| s.trim().parse().map_err(|_| remedy)).collect::<Result<_, _>>()?;
     let point: [f32; 3] = numbers.try_into().map_err(|_| remedy)?;
     if point.iter().all(|v| v.abs() <= 1e4) { Ok(point) } else { Err(remedy.into()) }
+}
+
+fn shard(text: &str) -> Result<(usize, usize), String> {
+    let remedy = "expected I/N with 1 <= I <= N, as in 2/8";
+    let (i, n) = text.split_once('/').ok_or(remedy)?;
+    let (i, n): (usize, usize) = (i.parse().map_err(|_| remedy)?, n.parse().map_err(|_| remedy)?);
+    if i >= 1 && i <= n { Ok((i - 1, n)) } else { Err(remedy.into()) }
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {
