@@ -145,3 +145,72 @@ fn a_session_that_was_interrupted_in_contact_replays_to_its_faded_end() {
     let summary: Value = serde_json::from_slice(&fs::read(again.path().join("summary.json")).unwrap()).unwrap();
     assert_eq!(summary["replay"]["ticks"], summary["replay"]["identical"]);
 }
+
+/// Runs the operation with its output in a small disk of its own, and gives its exit code, what it said, and the recording; `None` where the system lets no one mount.
+fn on_disk(options: &str, seconds: &str) -> Option<(Option<i32>, String, Option<Recording>)> {
+    let kept = tempfile::tempdir().unwrap();
+    let disk = kept.path().join("disk");
+    fs::create_dir(&disk).unwrap();
+    let script = format!(
+        "mount -t tmpfs -o {options} none {0} || exit 99; \"$@\" --out {0}/out; code=$?; cp {0}/out/session.mcap {1}/ 2>/dev/null; exit $code",
+        disk.display(),
+        kept.path().display()
+    );
+    let mut command = Command::new("unshare");
+    command.args(["-rm", "sh", "-c", &script, "sh", env!("CARGO_BIN_EXE_integrated")]);
+    command.args(["--headless", "--frames-per-second", "0", "--duration", seconds]);
+    command.env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"));
+    let done = command.output().ok().filter(|done| !matches!(done.status.code(), Some(1 | 99)))?;
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    Some((done.status.code(), said, Recording::open(&kept.path().join("session.mcap")).ok()))
+}
+
+#[test]
+fn a_full_disk_ends_the_recording_with_a_word_and_not_the_session() {
+    let Some((code, said, recording)) = on_disk("size=1500k", "8") else {
+        eprintln!("this system lets no test mount a disk: not tried");
+        return;
+    };
+    assert_eq!(code, Some(2), "{said}");
+    assert!(
+        said.contains("No space left") && said.contains("recording ended early") && said.contains("--out"),
+        "{said}"
+    );
+    // The session went on to its end; what was recorded before is whole.
+    assert!(said.contains("brain begins"), "{said}");
+    let recording = recording.unwrap();
+    assert!(recording.truncated && recording.ticks.len() > 1000, "{} ticks", recording.ticks.len());
+    assert!(recording.ticks.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_named_before_anything_is_moved() {
+    let Some((code, said, recording)) = on_disk("size=1500k,ro", "8") else {
+        eprintln!("this system lets no test mount a disk: not tried");
+        return;
+    };
+    assert_eq!((code, recording.is_none()), (Some(2), true), "{said}");
+    assert!(said.contains("Read-only file system") && said.contains("--out") && !said.contains("begins"), "{said}");
+}
+
+#[test]
+fn a_folder_of_recordings_runs_again_in_shards() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = folder.path().join("runs");
+    fs::create_dir(&runs).unwrap();
+    for name in ["a", "b", "c"] {
+        let record = runs.join(format!("{name}.mcap"));
+        let mut command = operation(&folder.path().join("first"), "1", &["--record"]);
+        assert!(command.arg(&record).status().unwrap().success());
+    }
+    let device = format!("replay:{}", runs.display());
+    let out = folder.path().join("again");
+    for shard in ["1/2", "2/2"] {
+        assert!(operation(&out, "1", &["--device", &device, "--shard", shard]).status().unwrap().success());
+    }
+    for name in ["a", "b", "c"] {
+        let summary: Value = serde_json::from_slice(&fs::read(out.join(name).join("summary.json")).unwrap()).unwrap();
+        assert_eq!(summary["replay"]["ticks"], summary["replay"]["identical"], "{name}");
+    }
+    assert_eq!(operation(&out, "1", &["--shard", "1/2"]).status().unwrap().code(), Some(2));
+}
