@@ -234,3 +234,46 @@ fn a_release_ends_at_zero_and_stays_there() {
     assert!(bench.stage.is_at_rest());
     assert_eq!(bench.step(at(2.0, 0.0), Status::Fresh, &NO_PATCH).wrench.force, Vec3::ZERO);
 }
+
+#[test]
+fn a_perforator_lets_go_where_it_comes_through_until_the_pedal_is_up() {
+    let mut bench = Bench::new(Program::Craniotomy);
+    let pedal = Buttons::take(ToolKind::Perforator) | Buttons::PEDAL;
+    let press = |z: f32, buttons| ToolState { buttons, ..at(z, 0.0) };
+    bench.step(press(20.0, Buttons::take(ToolKind::Perforator)), Status::Fresh, &NO_PATCH);
+    let mut z = 6.0;
+    let through = (0..40_000).find(|_| {
+        z = f32::max(z - 0.002, -4.0);
+        bench.step(press(z, pedal), Status::Fresh, &NO_PATCH).has(TickRecord::THROUGH)
+    });
+    assert!(through.is_some(), "it did not come through");
+    let turns =
+        |bench: &mut Bench, buttons| bench.step(press(z, buttons), Status::Fresh, &NO_PATCH).has(TickRecord::DRILLING);
+    assert!((0..200).all(|_| !turns(&mut bench, pedal)), "the clutch lets go");
+    assert!(!turns(&mut bench, Buttons(0)) && turns(&mut bench, Buttons::PEDAL), "and holds again");
+}
+
+#[test]
+fn what_must_not_be_touched_is_told_from_a_millimetre_on_for_every_tool() {
+    let (bone, brain) = head();
+    let mut mask = VoxelVolume::isotropic([36; 3], Vec3::splat(-17.5), 1.0, 0u8);
+    for at in 0..mask.data.len() {
+        let place = mask.centre_of([at % 36, at / 36 % 36, at / 1296]);
+        mask.data[at] = u8::from((place - glam::DVec3::new(0.3, -0.2, 6.0)).length() < 3.0);
+    }
+    for kind in [ToolKind::Burr, ToolKind::Probe] {
+        let config = HapticConfig { opening_needed: false, ..config(Program::Integrated) };
+        let stage = HapticStage::new(config, Some(bone.clone()), Some(brain.clone()), at(30.0, 0.0));
+        let stage = stage.forbidding(Arc::new(DistanceField::of_mask(&mask)));
+        let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+        let mut told_at = None;
+        for step in 0..2000 {
+            let z = 30.0 - 0.01 * step as f32;
+            bench.step(ToolState { buttons: Buttons::take(kind), ..at(z, 0.0) }, Status::Fresh, &NO_PATCH);
+            told_at = told_at.or(bench.raised(Warning::ForbiddenNear).map(|_| z));
+        }
+        let radius = if kind == ToolKind::Burr { 3.0 } else { 2.0 };
+        let told_at = told_at.unwrap();
+        assert!((told_at - (9.0 + radius + 1.0)).abs() < 0.6, "{kind:?} at {told_at}");
+    }
+}

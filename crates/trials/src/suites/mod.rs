@@ -88,7 +88,7 @@ pub const ALL: &[Suite] = &[
     Suite {
         name: "simulators",
         question: "are breaches told before they come, do the scores tell hands apart, is a replay the same",
-        chart: ("lead_p50_ms", "false_percent"),
+        chart: ("path_mm", "plunge_mm"),
         run: simulators::run,
     },
     Suite {

@@ -1,13 +1,13 @@
 //! The simulators: warnings before breaches, scores that tell hands apart, flaps, replays, tumours that are felt, long sessions.
 
 mod bench;
+mod brain;
 mod case;
 mod flap;
 mod hands;
 mod holes;
 mod rates;
 mod sessions;
-mod tumour;
 
 use super::Scope;
 use crate::suite::{Findings, Gate, Row};
@@ -41,7 +41,7 @@ pub fn run(scope: Scope) -> Findings {
             }
             Err(fault) => add("the built-in case", Err(fault)),
         }
-        add("tumour", tumour::findings());
+        add("the brain", brain::findings());
     }
     if scope.takes(2) {
         add("replays", sessions::replays(scope));
