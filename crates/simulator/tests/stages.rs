@@ -256,7 +256,7 @@ fn a_perforator_lets_go_where_it_comes_through_until_the_pedal_is_up() {
 #[test]
 fn what_must_not_be_touched_is_told_from_a_millimetre_on_for_every_tool() {
     let (bone, brain) = head();
-    let mut mask = VoxelVolume::isotropic([36; 3], Vec3::splat(-17.5), 1.0, 0u8);
+    let mut mask = VoxelVolume::isotropic([36; 3], Vec3::new(-17.5, -17.5, -11.5), 1.0, 0u8);
     for at in 0..mask.data.len() {
         let place = mask.centre_of([at % 36, at / 36 % 36, at / 1296]);
         mask.data[at] = u8::from((place - glam::DVec3::new(0.3, -0.2, 6.0)).length() < 3.0);

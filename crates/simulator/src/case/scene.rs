@@ -5,6 +5,7 @@ use crate::case::tissue::TissueClass;
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
 use crate::program::Program;
+use glam::{DAffine3, IVec3};
 use std::sync::Arc;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
@@ -15,6 +16,8 @@ use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 const HELD_BY_BONE_MM: f32 = 6.0;
 /// The lower part of the brain, as a share of its height.
 const LOWER_PART: f32 = 0.35;
+/// How far around tissue its distance is known, mm: more than the widest tool's radius and what it is warned at.
+const ROOM_MM: f32 = 9.0;
 /// Fewer held nodes than this do not hold a brain.
 const FEWEST_HELD: usize = 12;
 
@@ -84,10 +87,23 @@ impl Scene {
 }
 
 impl RestBrain {
-    /// Distance to the tissue of some classes, mm; `None` where there is none of it.
+    /// Distance to the tissue of some classes, mm, right up to 9 mm and at least that beyond; `None` where there is none of it.
     pub fn distance_to(&self, wanted: &[TissueClass]) -> Option<DistanceField> {
-        let mask = self.classes.map(|code| u8::from(wanted.iter().any(|class| class.code() == code)));
-        mask.data.contains(&1).then(|| DistanceField::of_mask(&mask))
+        let [nx, ny, _] = self.classes.dims;
+        let is = |at: &usize| wanted.iter().any(|class| class.code() == self.classes.data[*at]);
+        let place = |at: usize| IVec3::from([at % nx, at / nx % ny, at / (nx * ny)].map(|n| n as i32));
+        let all: Vec<IVec3> = (0..self.classes.data.len()).filter(is).map(place).collect();
+        let low = all.iter().copied().reduce(IVec3::min)?;
+        let high = all.iter().copied().reduce(IVec3::max)?;
+        let room = (f64::from(ROOM_MM) / self.classes.spacing_mm()).ceil().as_ivec3();
+        let (first, dims) = (low - room, (high - low + 2 * room + 1).as_usizevec3().to_array());
+        let origin = DAffine3::from_translation(first.as_dvec3());
+        let mut mask = VoxelVolume::filled(dims, self.classes.world_from_voxel * origin, 0u8);
+        for voxel in all {
+            let at = mask.index((voxel - first).as_usizevec3().to_array());
+            mask.data[at] = 1;
+        }
+        Some(DistanceField::of_mask(&mask))
     }
 }
 
