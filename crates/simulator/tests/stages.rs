@@ -261,7 +261,8 @@ fn what_must_not_be_touched_is_told_from_a_millimetre_on_for_every_tool() {
         let place = mask.centre_of([at % 36, at / 36 % 36, at / 1296]);
         mask.data[at] = u8::from((place - glam::DVec3::new(0.3, -0.2, 6.0)).length() < 3.0);
     }
-    for kind in [ToolKind::Burr, ToolKind::Probe] {
+    for slot in [0, 1, 4] {
+        let radius = Program::Integrated.tray()[slot].tip_radius_mm;
         let config = HapticConfig { opening_needed: false, ..config(Program::Integrated) };
         let stage = HapticStage::new(config, Some(bone.clone()), Some(brain.clone()), at(30.0, 0.0));
         let stage = stage.forbidding(Arc::new(DistanceField::of_mask(&mask)));
@@ -269,11 +270,10 @@ fn what_must_not_be_touched_is_told_from_a_millimetre_on_for_every_tool() {
         let mut told_at = None;
         for step in 0..2000 {
             let z = 30.0 - 0.01 * step as f32;
-            bench.step(ToolState { buttons: Buttons::take(kind), ..at(z, 0.0) }, Status::Fresh, &NO_PATCH);
+            bench.step(ToolState { buttons: Buttons::slot(slot), ..at(z, 0.0) }, Status::Fresh, &NO_PATCH);
             told_at = told_at.or(bench.raised(Warning::ForbiddenNear).map(|_| z));
         }
-        let radius = if kind == ToolKind::Burr { 3.0 } else { 2.0 };
         let told_at = told_at.unwrap();
-        assert!((told_at - (9.0 + radius + 1.0)).abs() < 0.6, "{kind:?} at {told_at}");
+        assert!((told_at - (9.0 + radius + 1.0)).abs() < 0.6, "tool {slot} at {told_at}");
     }
 }

@@ -145,7 +145,7 @@ fn near_bone(point: Vec3, bone: &BoneVolume) -> bool {
     offsets().any(|k| {
         offsets().any(|j| {
             offsets().any(|i| {
-                let voxel = centre + glam::IVec3::new(i, j, k);
+                let voxel = centre + IVec3::new(i, j, k);
                 bone.is_bone(voxel) && bone.centre_of(voxel).distance(point) <= HELD_BY_BONE_MM
             })
         })
