@@ -53,6 +53,9 @@ impl Buttons {
     /// Ask for the bone flap, once it is free, to be lifted away, or to be put back.
     pub const FLAP: Self = Self(8);
 
+    /// A teacher's pause: no force, and no other button counts.
+    pub const PAUSE: Self = Self(16);
+
     /// Ask for a tool of a kind; asked again with one in the hand, for the next of that kind.
     pub fn take(kind: ToolKind) -> Self {
         Self((kind as u32 + 1) << 8)

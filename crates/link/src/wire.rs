@@ -195,7 +195,7 @@ pub struct EventRecord {
     pub text: String,
 }
 
-/// What a teacher shows a trainee: a second tool, a marker on the anatomy, a pause.
+/// What a teacher shows a trainee and asks of the simulator: a second tool, a marker on the anatomy, a pause, trouble.
 #[derive(Clone, Copy, Debug)]
 pub struct TeacherRecord {
     /// Number of the record, from 1.
@@ -215,6 +215,10 @@ impl TeacherRecord {
     pub const MARKER: u32 = 1 << 1;
     /// The teacher asks for a pause.
     pub const PAUSE: u32 = 1 << 2;
+    /// The drill shall have no power.
+    pub const NO_POWER: u32 = 1 << 3;
+    /// The trainee shall be told that the patient bleeds.
+    pub const BLEEDING: u32 = 1 << 4;
 }
 
 impl Default for TeacherRecord {

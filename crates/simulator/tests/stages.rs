@@ -277,3 +277,23 @@ fn what_must_not_be_touched_is_told_from_a_millimetre_on_for_every_tool() {
         assert!((told_at - (9.0 + radius + 1.0)).abs() < 0.6, "tool {slot} at {told_at}");
     }
 }
+
+#[test]
+fn a_pause_lets_go_and_comes_back_at_the_guards_pace() {
+    let pace = 0.5 + 1e-4;
+    let mut bench = Bench::new(Program::Craniotomy);
+    let mut press = |buttons| bench.step(ToolState { buttons, ..at(2.2, 0.0) }, Status::Fresh, &NO_PATCH);
+    (0..300).for_each(|_| _ = press(Buttons::default()));
+    let felt = press(Buttons::default()).wrench.force.length();
+    let mut last = felt;
+    let mut least = felt;
+    for tick in 0..600 {
+        let paused = (100..400).contains(&tick);
+        let force = press(if paused { Buttons::PAUSE } else { Buttons::default() });
+        let now = force.wrench.force.length();
+        assert!((now - last).abs() < pace, "{last} N, then {now} N in tick {tick}");
+        assert_eq!(force.buttons & Buttons::PAUSE.0 != 0, paused, "a replay must know");
+        (last, least) = (now, least.min(now));
+    }
+    assert!(felt > 0.3 && least == 0.0 && (last - felt).abs() < 0.1 * felt, "{felt} N, {least} N, {last} N");
+}

@@ -184,7 +184,7 @@ impl HapticStage {
         let ahead_mm = self.bone_ahead(drilling);
         let sample = self.sample(&tool, input.tick, drilling);
         let held = self.touch_tissue(input.patch, &sample);
-        let lost = input.reading.status == Status::Lost;
+        let lost = input.reading.status == Status::Lost || tool.buttons.has(Buttons::PAUSE);
         let wanted = if lost { Wrench::ZERO } else { self.wanted(&tool, drilling) };
         let heated = self.guard.counters().heated;
         let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
@@ -229,6 +229,11 @@ impl HapticStage {
     /// What the force guard had to do.
     pub fn guard(&self) -> &ForceGuard {
         &self.guard
+    }
+
+    /// Speed of the spindle in a tick, 1 at its free speed.
+    pub fn spindle_share(&self, record: &TickRecord) -> f32 {
+        self.config.rigid.removal().spindle().map_or(0.0, |spindle| record.spindle_rpm / spindle.free_rpm)
     }
 
     /// The reading, or the last sound one when the device gave nothing usable.

@@ -17,7 +17,7 @@
 use crate::stages::haptic_tick::HapticConfig;
 use std::sync::Arc;
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardCounters, GuardedWrench, Viscoelastic};
-use trepan_geometry::{Pose, Tool, ToolState, Vec3, Wrench};
+use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::{SecondRecord, TickRecord};
 use trepan_rigid::{RigidContact, RigidStep};
@@ -87,7 +87,8 @@ impl SecondHand {
         let proxy = self.touch_bone(&tool);
         self.touch_brain(proxy.translation);
         let lost = reading.status == Status::Lost;
-        let wanted = if lost { Wrench::ZERO } else { self.wanted(&tool) };
+        let let_go = lost || tool.buttons.has(Buttons::PAUSE);
+        let wanted = if let_go { Wrench::ZERO } else { self.wanted(&tool) };
         let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
         self.force_n = wrench.force().length();
         self.peak_force_n = self.peak_force_n.max(self.force_n);

@@ -68,6 +68,11 @@ impl SolverStage {
         }
     }
 
+    /// Where the nodes are, mm.
+    pub fn positions(&self) -> &[Vec3] {
+        self.solver.positions()
+    }
+
     /// Copies the brain as it is now into a frame, without allocating when the frame has the size.
     pub fn publish(&self, frame: &mut SoftFrame) {
         frame.step = self.steps;
