@@ -4,8 +4,8 @@ use glam::{DVec3, IVec3, Vec3};
 use std::sync::Arc;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::{Gpu, GpuError, Prefer};
-use trepan_render::window::{self, Panel, Session, Start, WindowInput};
-use trepan_render::{Camera, Frame, Painter, SceneData};
+use trepan_render::window::{self, Capture, Panel, Session, Start, WindowInput};
+use trepan_render::{Camera, Frame, Image, Painter, SceneData};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
 /// Takes away what the burr touches while the pedal is down.
@@ -33,6 +33,7 @@ impl Session for Drill {
             phase: "Practice".into(),
             hint: "Drill into the ball.".into(),
             tool: "burr 8 mm".into(),
+            by_hand: true,
             drilling: self.drilling,
             force_n: touched.len() as f32 * 0.01,
             force_limit_n: 3.3,
@@ -46,6 +47,10 @@ impl Session for Drill {
     fn frame(&self, camera: Camera) -> Frame<'_> {
         let (tool, turn_rad) = (Some(Tool::burr(RADIUS_MM)), 40.0 * self.seconds as f32);
         Frame { tool, world_from_tool: self.world_from_tool, turn_rad, ..Frame::of(camera) }
+    }
+
+    fn capture(&mut self, _: Capture, picture: Image) {
+        println!("{:?}", picture.write_png("window.png".as_ref()));
     }
 }
 

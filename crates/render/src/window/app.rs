@@ -1,10 +1,13 @@
 //! One picture of the window: input → session → renderer → panel.
 
+use super::capture::Captures;
 use super::input::{Hand, Pointer};
-use super::plot::Trace;
+use super::keys::{self, Command};
+use super::look::Look;
+use super::panel::{self, Clicks, Traces};
 use super::quality::Quality;
-use super::{Draws, Lent, Panel, Session, Shared, Start, WindowInput, banner, panel};
-use crate::{Frame, RenderError, View};
+use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, banner, timeline};
+use crate::{Frame, View};
 use eframe::egui_wgpu::RenderState;
 use eframe::{egui, wgpu};
 use std::time::Duration;
@@ -18,83 +21,152 @@ enum Screen {
 }
 
 /// Width of the side panel, points.
-const PANEL_WIDTH: f32 = 250.0;
+const PANEL_WIDTH: f32 = 270.0;
+/// How much larger large type is.
+const LARGE: f32 = 1.4;
 
 /// The application behind the window.
 pub(super) struct Window<S, D> {
     lent: Lent<S, D>,
     start: Start,
     hand: Hand,
-    force: Trace,
+    traces: Traces,
     panel: Panel,
-    clicks: panel::Clicks,
+    clicks: Clicks,
+    look: Look,
+    captures: Captures,
+    help: bool,
+    large: bool,
+    playback: Option<Playback>,
+    #[cfg(feature = "sound")]
+    ears: super::loudspeaker::Ears,
     screen: Screen,
     quality: Quality,
     drawn_at: f64,
 }
 
 impl<S: Session, D: Draws> Window<S, D> {
-    pub fn new(context: &eframe::CreationContext<'_>, lent: Lent<S, D>, start: Start, copies: bool) -> Self {
-        context.egui_ctx.set_visuals(egui::Visuals::dark());
-        let hand = Hand { world_from_tool: start.world_from_tool, camera: start.camera };
+    pub fn new(lent: Lent<S, D>, start: Start, copies: bool) -> Self {
         let hardware = lent.borrow().as_ref().and_then(|s| s.renderer.device()).is_some_and(|gpu| !gpu.is_software());
-        let quality = Quality::new(!hardware);
-        let force = Trace::over(panel::SECONDS_SHOWN);
         Self {
             lent,
-            start,
-            hand,
-            force,
+            hand: Hand { world_from_tool: start.world_from_tool, camera: start.camera },
+            traces: Traces::default(),
             panel: Panel::default(),
-            clicks: Default::default(),
+            clicks: Clicks::default(),
+            look: Look::with(start.microscope),
+            start,
+            captures: Captures::default(),
+            help: false,
+            large: false,
+            playback: None,
+            #[cfg(feature = "sound")]
+            ears: Default::default(),
             screen: if copies { Screen::Copies(None) } else { Screen::Shares(None) },
-            quality,
+            quality: Quality::new(!hardware),
             drawn_at: 0.0,
         }
     }
 
+    /// One picture of the whole window.
+    pub fn show(&mut self, ui: &mut egui::Ui, state: Option<&RenderState>) {
+        let lent = self.lent.clone();
+        let mut lent = lent.borrow_mut();
+        let Some(shared) = lent.as_mut() else { return };
+        self.captures.turn(ui.ctx(), &mut shared.session);
+        self.react(ui);
+        self.update(ui, shared);
+        egui::Panel::right("panel").exact_size(PANEL_WIDTH).resizable(false).show(ui, |ui| {
+            let (camera, filming) = (&mut self.hand.camera, self.captures.filming());
+            self.clicks = panel::show(ui, &self.panel, &mut self.traces, &mut self.look, camera, filming);
+        });
+        self.playback = self.panel.timeline.as_ref().and_then(|timeline| timeline::show(ui, timeline));
+        let picture = egui::CentralPanel::default().frame(egui::Frame::NONE);
+        let over = picture.show(ui, |ui| self.picture(ui, state, shared)).response.rect;
+        banner::show(ui, over, &self.panel.warnings, &self.panel.news);
+        if self.help {
+            keys::help(ui.ctx(), &self.panel.actions);
+        }
+        if shared.fault.is_some() {
+            ui.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+        ui.request_repaint_after(Duration::from_secs_f32(1.0 / self.start.rate_hz.clamp(1.0, 240.0)));
+    }
+
+    /// Does what keys and clicks since the last picture ask of the window itself.
+    fn react(&mut self, ui: &egui::Ui) {
+        let mut commands = std::mem::take(&mut self.clicks.commands);
+        ui.input(|input| commands.extend(keys::pressed(input)));
+        for &command in &commands {
+            match command {
+                Command::Reset => self.hand.camera = self.look.home(self.start.camera, self.start.microscope),
+                Command::Picture => self.captures.ask(),
+                Command::Film => self.captures.film(),
+                Command::Help => self.help ^= true,
+                Command::LargeType => self.enlarge(ui),
+                #[cfg(feature = "sound")]
+                Command::Mute => self.ears.muted ^= true,
+                Command::Quit if std::mem::take(&mut self.help) => (),
+                Command::Quit => ui.send_viewport_cmd(egui::ViewportCommand::Close),
+                of_view => self.look.react(of_view, &mut self.hand.camera),
+            }
+        }
+        self.clicks.commands = commands;
+    }
+
+    fn enlarge(&mut self, ui: &egui::Ui) {
+        self.large ^= true;
+        ui.set_zoom_factor(if self.large { LARGE } else { 1.0 });
+    }
+
     /// Asks the session what is new.
     fn update(&mut self, ui: &egui::Ui, shared: &mut Shared<S, D>) {
+        let asked = |command| self.clicks.commands.contains(&command);
+        let actions = self.panel.actions.iter().enumerate();
         let input = ui.input(|i| WindowInput {
             world_from_tool: self.hand.world_from_tool,
             pedal: i.key_down(egui::Key::Space) || self.clicks.pedal,
-            next_tool: i.key_pressed(egui::Key::N) || self.clicks.next_tool,
-            undo: i.key_pressed(egui::Key::U) || self.clicks.undo,
+            next_tool: asked(Command::NextTool),
+            undo: asked(Command::Undo),
+            chosen: self.clicks.chosen,
+            actions: actions
+                .filter(|(_, action)| keys::of_action(action).is_some_and(|key| i.key_pressed(key)))
+                .fold(self.clicks.actions, |bits, (at, _)| bits | 1 << at),
+            playback: self.playback,
             camera: self.hand.camera,
             seconds: i.time,
         });
         self.panel = shared.session.update(&input);
+        #[cfg(feature = "sound")]
+        self.panel.values.extend(self.ears.hear(self.panel.sound).map(|why| ("sound".into(), why)));
         self.panel.leash.into_iter().for_each(|leash| self.hand.hold(leash));
-        self.force.push(input.seconds, self.panel.force_n.into());
-    }
-
-    /// Acts on what concerns the window itself.
-    fn react(&mut self, ui: &egui::Ui) {
-        let pressed = |key| ui.input(|i| i.key_pressed(key));
-        if self.clicks.reset || pressed(egui::Key::R) {
-            self.hand.camera = self.start.camera;
-        }
-        if self.clicks.quit || self.panel.finished || pressed(egui::Key::Q) || pressed(egui::Key::Escape) {
-            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+        let now = self.panel.timeline.as_ref().map_or(input.seconds, |timeline| timeline.at_s);
+        self.traces.force.push(now, self.panel.force_n.into());
+        self.traces.rate.push(now, self.panel.rate_hz.into());
+        if self.panel.finished {
+            ui.send_viewport_cmd(egui::ViewportCommand::Close);
         }
     }
 
     /// Draws the picture for an area of the window and shows it there.
-    fn picture(&mut self, ui: &mut egui::Ui, state: &RenderState, shared: &mut Shared<S, D>) {
+    fn picture(&mut self, ui: &mut egui::Ui, state: Option<&RenderState>, shared: &mut Shared<S, D>) {
         let space = ui.available_size().max(egui::vec2(8.0, 8.0));
         let (area, response) = ui.allocate_exact_size(space, egui::Sense::click_and_drag());
         let now = ui.input(|i| i.time);
         self.quality.note(now - self.drawn_at);
         self.drawn_at = now;
-        let scale = ui.ctx().pixels_per_point();
+        let scale = ui.pixels_per_point();
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
-        let frame = shared.session.frame(self.hand.camera);
+        let frame = self.look.on(shared.session.frame(self.hand.camera));
         match self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, self.quality.detail()) {
-            Err(error) => shared.fault = Some(error.to_string()),
+            Err(error) => shared.fault = Some(error),
             Ok((view, id)) => {
                 let pointer = Pointer::over(ui, &response);
                 self.hand.follow(&pointer, &view, space.y);
-                ui.input(|i| self.hand.keys(i, &view));
+                // A slider that has the focus takes the arrow keys.
+                if ui.memory(|memory| memory.focused().is_none()) {
+                    ui.input(|i| self.hand.keys(i, &view));
+                }
                 let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
                 ui.painter().image(id, area, whole, egui::Color32::WHITE);
                 shared.shown = true;
@@ -108,16 +180,16 @@ impl Screen {
     fn show(
         &mut self,
         ui: &egui::Ui,
-        state: &RenderState,
+        state: Option<&RenderState>,
         renderer: &mut impl Draws,
         frame: &Frame<'_>,
         pixels: [u32; 2],
         detail: f32,
-    ) -> Result<(View, egui::TextureId), RenderError> {
+    ) -> Result<(View, egui::TextureId), String> {
         let texture = match self {
             Self::Shares(texture) => texture,
             Self::Copies(copy) => {
-                let (view, image) = renderer.picture(frame, pixels, detail)?;
+                let (view, image) = renderer.picture(frame, pixels, detail).map_err(|fault| fault.to_string())?;
                 let size = [image.width as usize, image.height as usize];
                 let image = egui::ColorImage::from_rgba_unmultiplied(size, &image.rgba);
                 let linear = egui::TextureOptions::LINEAR;
@@ -127,13 +199,14 @@ impl Screen {
                 return Ok((view, copy.id()));
             }
         };
-        let view = renderer.draw(frame, pixels, detail)?;
+        let state = state.ok_or("the window has no graphics device")?;
+        let view = renderer.draw(frame, pixels, detail).map_err(|fault| fault.to_string())?;
         if let Some(drawn) = renderer.texture() {
             return Ok((view, registered(texture, state, drawn.view())));
         }
         // The processor has taken over: from now on its pictures are copied.
         *self = Self::Copies(None);
-        self.show(ui, state, renderer, frame, pixels, detail)
+        self.show(ui, Some(state), renderer, frame, pixels, detail)
     }
 }
 
@@ -156,22 +229,6 @@ fn registered(
 
 impl<S: Session, D: Draws> eframe::App for Window<S, D> {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
-        let lent = self.lent.clone();
-        let mut lent = lent.borrow_mut();
-        let Some(shared) = lent.as_mut() else { return };
-        self.update(ui, shared);
-        self.react(ui);
-        banner::show(ui, &self.panel.warnings);
-        egui::Panel::right("panel").exact_size(PANEL_WIDTH).resizable(false).show(ui, |ui| {
-            self.clicks = panel::show(ui, &self.panel, &self.force);
-        });
-        egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| match frame.wgpu_render_state() {
-            Some(state) => self.picture(ui, state, shared),
-            None => shared.fault = Some("the window has no graphics device".into()),
-        });
-        if shared.fault.is_some() {
-            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
-        }
-        ui.ctx().request_repaint_after(Duration::from_secs_f32(1.0 / self.start.rate_hz.clamp(1.0, 240.0)));
+        self.show(ui, frame.wgpu_render_state());
     }
 }

@@ -1,6 +1,6 @@
 //! What the user does with mouse and keys, as a camera and a wanted tool pose.
 
-use super::Leash;
+use super::{Leash, Playback};
 use crate::{Camera, View};
 use eframe::egui;
 use glam::{Quat, Vec2};
@@ -17,6 +17,12 @@ pub struct WindowInput {
     pub next_tool: bool,
     /// Whether the last stroke was to be undone since the last picture.
     pub undo: bool,
+    /// An option of one of the panel's choices that was picked: the choice, the option.
+    pub chosen: Option<[usize; 2]>,
+    /// The panel's actions that were asked for since the last picture, one bit each.
+    pub actions: u32,
+    /// What was done to the timeline.
+    pub playback: Option<Playback>,
     /// The view.
     pub camera: Camera,
     /// Since the window opened, s.

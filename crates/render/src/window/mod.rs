@@ -7,10 +7,15 @@
 //! | wheel | pushes the tool in or pulls it out along the line of sight; with Ctrl zooms |
 //! | right drag | circles the camera around its target |
 //! | Space (held) | the drill's pedal |
-//! | N | the next tool |
+//! | N, U | the next tool; takes the last stroke back |
 //! | arrows, Page Up, Page Down | move the tool by half a millimetre |
-//! | + and - | zoom |
-//! | R | resets the view |
+//! | + and -, R | zoom; back to the first view |
+//! | M | the microscope: a narrow field straight down on the opening |
+//! | B, T, S, O | skull, brain, slices, colours and arrows on and off |
+//! | C, E | a section through the tool's tip; stereo: off, side by side, red-cyan |
+//! | P, V | a picture of the window for the session to keep; every picture |
+//! | L, F1 or ? | large type; all keys on a page |
+//! | Space, \[ and \] | in a replay: run or stand still, to the event before and after |
 //! | Q or Escape | closes |
 //!
 //! The picture stays on the device: egui shows the very texture that the renderer draws into. Where it cannot (the device is one of GL, cannot
@@ -22,19 +27,33 @@
 
 mod app;
 mod banner;
+mod capture;
 mod draws;
 mod input;
+mod keys;
+mod look;
+#[cfg(feature = "sound")]
+mod loudspeaker;
+mod palette;
 mod panel;
 mod plot;
 mod quality;
+mod said;
+#[cfg(any(feature = "sound", test))]
+mod synthesis;
+#[cfg(test)]
+mod tests;
+mod timeline;
 
+pub use capture::Capture;
 pub use draws::Draws;
 pub use input::WindowInput;
+pub use said::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 
-use crate::{Camera, Frame, Renderer};
+use crate::{Camera, Frame, Image, Renderer};
 use std::cell::RefCell;
 use std::rc::Rc;
-use trepan_geometry::{Pose, Vec3};
+use trepan_geometry::Pose;
 use trepan_gpu::Gpu;
 
 /// What the window shows and drives. Called on the window's thread, once a picture; must not wait.
@@ -44,40 +63,9 @@ pub trait Session {
 
     /// What the picture shows, seen by `camera`.
     fn frame(&self, camera: Camera) -> Frame<'_>;
-}
 
-/// What the side panel shows.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Panel {
-    /// The phase of the operation.
-    pub phase: String,
-    /// What to do next.
-    pub hint: String,
-    /// The tool in hand.
-    pub tool: String,
-    /// Whether the drill runs.
-    pub drilling: bool,
-    /// Largest force since the last picture, N.
-    pub force_n: f32,
-    /// Where the force guard clamps, N; the upper end of the plot.
-    pub force_limit_n: f32,
-    /// Named values, in order, for instance rates.
-    pub values: Vec<(String, String)>,
-    /// What must not be missed; shown in a red banner as long as it is here.
-    pub warnings: Vec<String>,
-    /// What keeps the hand near the tool; `None` lets it go anywhere.
-    pub leash: Option<Leash>,
-    /// Whether the window shall close.
-    pub finished: bool,
-}
-
-/// A hand without force feedback would not notice a wall: it is kept this close to where the tool is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Leash {
-    /// Where contact lets the tool's tip be, world mm.
-    pub tip: Vec3,
-    /// Longest way from there to the hand, mm.
-    pub length_mm: f32,
+    /// Takes a picture of the whole window that the user asked for.
+    fn capture(&mut self, what: Capture, picture: Image);
 }
 
 /// How the window starts.
@@ -85,6 +73,8 @@ pub struct Leash {
 pub struct Start {
     /// The view, to which a reset goes back.
     pub camera: Camera,
+    /// The microscope's view, if there is one.
+    pub microscope: Option<Camera>,
     /// Where the tool is.
     pub world_from_tool: Pose,
     /// Width and height of the window, points.
@@ -96,7 +86,7 @@ pub struct Start {
 impl Start {
     /// 1280 by 800 points at 30 pictures a second.
     pub fn with(camera: Camera, world_from_tool: Pose) -> Self {
-        Self { camera, world_from_tool, size: [1280.0, 800.0], rate_hz: 30.0 }
+        Self { camera, microscope: None, world_from_tool, size: [1280.0, 800.0], rate_hz: 30.0 }
     }
 }
 
@@ -174,8 +164,10 @@ where
 {
     let (lent, copies) = (lent.clone(), gpu.is_none());
     let show = || {
-        let create: eframe::AppCreator<'_> =
-            Box::new(move |context| Ok(Box::new(app::Window::new(context, lent, start, copies))));
+        let create: eframe::AppCreator<'_> = Box::new(move |context| {
+            context.egui_ctx.set_visuals(eframe::egui::Visuals::dark());
+            Ok(Box::new(app::Window::new(lent, start, copies)))
+        });
         eframe::run_native(title, options(gpu, &start), create)
     };
     // A missing system library makes the windowing crate panic; that must not take the session along.

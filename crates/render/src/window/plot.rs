@@ -1,6 +1,8 @@
 //! The last seconds of a value as a line.
 
-use eframe::egui::{self, Color32, Pos2, Stroke};
+use super::palette::{NIGHT, VERMILION};
+use eframe::egui::{self, Color32};
+use egui_plot::{HLine, Line, Plot, PlotPoint, PlotPoints};
 use std::collections::VecDeque;
 
 /// Samples kept at most; at 30 pictures a second more than the seconds shown.
@@ -10,7 +12,20 @@ const MOST_SAMPLES: usize = 1024;
 #[derive(Clone, Debug)]
 pub(crate) struct Trace {
     seconds_shown: f64,
-    samples: VecDeque<[f64; 2]>,
+    samples: VecDeque<PlotPoint>,
+}
+
+/// How a trace is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Drawn<'a> {
+    /// Name of the plot.
+    pub name: &'a str,
+    /// Height, points.
+    pub height: f32,
+    /// A value that is marked and always in sight.
+    pub mark: f64,
+    /// Of the line.
+    pub colour: Color32,
 }
 
 impl Trace {
@@ -18,34 +33,44 @@ impl Trace {
         Self { seconds_shown, samples: VecDeque::with_capacity(MOST_SAMPLES) }
     }
 
+    /// Adds a value at a time, s. A time before the last one, or far after it, begins anew.
     pub fn push(&mut self, seconds: f64, value: f64) {
+        if self.samples.back().is_some_and(|last| seconds < last.x) {
+            self.samples.clear();
+        }
         while self.samples.len() == MOST_SAMPLES
-            || self.samples.front().is_some_and(|s| s[0] < seconds - self.seconds_shown)
+            || self.samples.front().is_some_and(|s| s.x < seconds - self.seconds_shown)
         {
             self.samples.pop_front();
         }
-        self.samples.push_back([seconds, value]);
+        self.samples.push_back(PlotPoint::new(seconds, value));
     }
 
     /// Largest value in sight.
     pub fn most(&self) -> f64 {
-        self.samples.iter().map(|s| s[1]).fold(0.0, f64::max)
+        self.samples.iter().map(|s| s.y).fold(0.0, f64::max)
     }
 
-    /// Draws the line up to `top`, with a mark at `limit`.
-    pub fn show(&self, ui: &mut egui::Ui, height: f32, limit: f64, colour: Color32) {
-        let (_, area) = ui.allocate_space(egui::vec2(ui.available_width(), height));
-        let painter = ui.painter_at(area);
-        painter.rect_filled(area, 2.0, Color32::from_gray(16));
-        let top = (1.1 * limit.max(self.most())).max(1e-6);
-        let now = self.samples.back().map_or(0.0, |s| s[0]);
-        let place = |[seconds, value]: [f64; 2]| {
-            let x = 1.0 - ((now - seconds) / self.seconds_shown) as f32;
-            Pos2::new(area.left() + x * area.width(), area.bottom() - (value / top) as f32 * area.height())
+    /// Draws the line from 0 to a little over the largest value and the mark.
+    pub fn show(&mut self, ui: &mut egui::Ui, drawn: Drawn<'_>) {
+        let top = (1.1 * drawn.mark.max(self.most())).max(1e-6);
+        let now = self.samples.back().map_or(0.0, |s| s.x);
+        let points = PlotPoints::Borrowed(self.samples.make_contiguous());
+        ui.style_mut().visuals.extreme_bg_color = NIGHT;
+        let still = |plot: Plot<'static>| {
+            plot.allow_zoom(false)
+                .allow_drag(false)
+                .allow_scroll(false)
+                .allow_boxed_zoom(false)
+                .show_axes([false, true])
         };
-        let mark = place([now, limit]).y;
-        painter.hline(area.x_range(), mark, Stroke::new(1.0, Color32::from_rgb(150, 60, 50)));
-        painter.line(self.samples.iter().map(|&s| place(s)).collect(), Stroke::new(1.5, colour));
+        let plot = still(Plot::new(drawn.name).height(drawn.height)).y_axis_min_width(32.0).show_x(false);
+        plot.show(ui, |plot| {
+            plot.set_plot_bounds_x(now - self.seconds_shown..=now);
+            plot.set_plot_bounds_y(0.0..=top);
+            plot.hline(HLine::new("limit", drawn.mark).color(VERMILION).style(egui_plot::LineStyle::dashed_loose()));
+            plot.line(Line::new(drawn.name, points).color(drawn.colour).width(1.5));
+        });
     }
 }
 
@@ -63,5 +88,7 @@ mod tests {
         assert_eq!(trace.most(), 6.0);
         trace.push(100.0, 1.0);
         assert_eq!((trace.samples.len(), trace.most()), (1, 1.0));
+        trace.push(3.0, 2.0);
+        assert_eq!((trace.samples.len(), trace.most()), (1, 2.0), "time went back");
     }
 }

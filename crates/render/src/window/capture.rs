@@ -1,0 +1,66 @@
+//! Pictures of the whole window for the session to keep.
+
+use super::Session;
+use crate::Image;
+use eframe::egui::{self, ColorImage};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+/// What a picture of the window is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Capture {
+    /// The user asked for this one.
+    Picture,
+    /// One of a film's, taken this long after the window opened, ms.
+    Film(u64),
+}
+
+/// Asks for pictures and hands on what came.
+pub(crate) struct Captures {
+    filming: bool,
+    asked: bool,
+    sender: Sender<(Capture, Arc<ColorImage>)>,
+    receiver: Receiver<(Capture, Arc<ColorImage>)>,
+}
+
+impl Default for Captures {
+    fn default() -> Self {
+        let (sender, receiver) = channel();
+        Self { filming: false, asked: false, sender, receiver }
+    }
+}
+
+impl Captures {
+    /// Whether every picture is kept.
+    pub fn filming(&self) -> bool {
+        self.filming
+    }
+
+    /// Asks for one picture.
+    pub fn ask(&mut self) {
+        self.asked = true;
+    }
+
+    /// Begins or ends a film.
+    pub fn film(&mut self) {
+        self.filming ^= true;
+    }
+
+    /// Once a picture: hands on what the windowing system took since the last, and asks for what is wanted now.
+    pub fn turn(&mut self, context: &egui::Context, session: &mut impl Session) {
+        for (what, image) in self.receiver.try_iter() {
+            session.capture(what, picture(&image));
+        }
+        let film = self.filming.then(|| Capture::Film((context.input(|i| i.time) * 1e3) as u64));
+        for what in std::mem::take(&mut self.asked).then_some(Capture::Picture).into_iter().chain(film) {
+            let sender = self.sender.clone();
+            // Nobody listens any more once the window is closed.
+            context.request_screenshot(move |image| _ = sender.send((what, image)));
+        }
+    }
+}
+
+fn picture(image: &ColorImage) -> Image {
+    let [width, height] = image.size.map(|n| n as u32);
+    Image { width, height, rgba: image.as_raw().to_vec() }
+}

@@ -1,0 +1,116 @@
+//! What keys and buttons do, in one table, and the page that shows it.
+
+use super::Action;
+use super::palette::SKY;
+use eframe::egui::{self, Key, RichText};
+
+/// What the user asks of the window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Command {
+    NextTool,
+    Undo,
+    Reset,
+    Microscope,
+    Bone,
+    Brain,
+    Slices,
+    Hints,
+    Section,
+    Stereo,
+    Picture,
+    Film,
+    LargeType,
+    #[cfg(feature = "sound")]
+    Mute,
+    Help,
+    Quit,
+}
+
+/// Key, command, words.
+pub(crate) const KEYS: &[(Key, Command, &str)] = &[
+    (Key::N, Command::NextTool, "Next tool"),
+    (Key::U, Command::Undo, "Undo the last stroke"),
+    (Key::R, Command::Reset, "Reset the view"),
+    (Key::M, Command::Microscope, "Microscope"),
+    (Key::B, Command::Bone, "Skull"),
+    (Key::T, Command::Brain, "Brain"),
+    (Key::S, Command::Slices, "Slices"),
+    (Key::O, Command::Hints, "Colours and arrows"),
+    (Key::C, Command::Section, "Section"),
+    (Key::E, Command::Stereo, "Stereo"),
+    (Key::P, Command::Picture, "Save a picture of the window"),
+    (Key::V, Command::Film, "Save every picture of the window"),
+    (Key::L, Command::LargeType, "Large type"),
+    #[cfg(feature = "sound")]
+    (Key::Z, Command::Mute, "No sound"),
+    (Key::F1, Command::Help, "Keys"),
+    (Key::Questionmark, Command::Help, "Keys"),
+    (Key::Q, Command::Quit, "Quit"),
+    (Key::Escape, Command::Quit, "Close the page of keys, or quit"),
+];
+
+/// What the mouse does, and the keys that are not in [`KEYS`].
+const REST: [(&str, &str); 8] = [
+    ("left drag", "Moves the tool; with Shift tilts it"),
+    ("wheel", "Pushes the tool in or pulls it out; with Ctrl zooms"),
+    ("right drag", "Turns the view"),
+    ("arrows, Page Up and Down", "Move the tool by half a millimetre"),
+    ("+ and -", "Zoom"),
+    ("Space, held", "Drills"),
+    ("Space", "In a replay: runs or stands still"),
+    ("[ and ]", "In a replay: to the event before and after"),
+];
+
+/// The commands whose keys were pressed.
+pub(crate) fn pressed(input: &egui::InputState) -> impl Iterator<Item = Command> {
+    KEYS.iter().filter(|(key, ..)| input.key_pressed(*key)).map(|(_, command, _)| *command)
+}
+
+/// Words of a command with its key, for a button.
+pub(crate) fn label(command: Command) -> String {
+    let found = KEYS.iter().find(|(_, c, _)| *c == command);
+    found.map_or_else(String::new, |(key, _, words)| format!("{words} ({})", key.symbol_or_name()))
+}
+
+/// The key of a session's own action.
+pub(crate) fn of_action(action: &Action) -> Option<Key> {
+    action.key.and_then(|key| Key::from_name(key.to_uppercase().to_string().as_str()))
+}
+
+/// The page of keys, over the picture.
+pub(crate) fn help(context: &egui::Context, actions: &[Action]) {
+    let centre = egui::Align2::CENTER_CENTER;
+    let page = egui::Window::new("Keys and mouse").collapsible(false).resizable(false).anchor(centre, [0.0, 0.0]);
+    page.show(context, |ui| {
+        egui::ScrollArea::vertical().show(ui, |ui| {
+            egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
+                let mut row = |key: &str, words: &str| {
+                    ui.label(RichText::new(key).monospace().color(SKY));
+                    ui.label(words);
+                    ui.end_row();
+                };
+                REST.iter().for_each(|(key, words)| row(key, words));
+                KEYS.iter().for_each(|(key, _, words)| row(key.symbol_or_name(), words));
+                for action in actions {
+                    action.key.iter().for_each(|key| row(&key.to_string(), &action.name));
+                }
+            });
+        });
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_has_two_meanings() {
+        for (at, (key, ..)) in KEYS.iter().enumerate() {
+            assert!(KEYS[at + 1..].iter().all(|(other, ..)| other != key), "{key:?}");
+            assert!(![Key::Space, Key::OpenBracket, Key::CloseBracket, Key::Plus, Key::Minus].contains(key));
+        }
+        assert_eq!(label(Command::Undo), "Undo the last stroke (U)");
+        let of = |key| of_action(&Action { key, ..Action::default() });
+        assert_eq!((of(Some('g')), of(Some('¶')), of(None)), (Some(Key::G), None, None));
+    }
+}

@@ -1,0 +1,225 @@
+//! What of the scene the user wants to see, and from where.
+
+use super::keys::{Command, label};
+use crate::{Camera, Cut, Frame, Overlay, SliceLook, Stereo, StereoLook};
+use eframe::egui;
+use glam::Vec3;
+
+/// The view's switches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Look {
+    pub bone: bool,
+    pub brain: bool,
+    /// Whether the session's colours on bone and brain are shown, and its force arrow, ghost tool and markers.
+    pub hints: bool,
+    pub section: Option<Section>,
+    pub stereo: Option<StereoLook>,
+    pub slices: SliceLook,
+    /// Whether the slices show the whole head instead of what is around the tool.
+    pub whole: bool,
+    /// The camera that rests while the other one is used: the microscope's, or the orbiting one.
+    other: Option<Camera>,
+    microscope: bool,
+}
+
+/// A section plane near the tool's tip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Section {
+    /// Which of [`ACROSS`].
+    across: usize,
+    /// From the tip, mm.
+    offset_mm: f32,
+    /// Whether the skull is cut too.
+    bone: bool,
+}
+
+/// What a section looks at, and the way to what it cuts away; `None` is the way to the eye.
+const ACROSS: [(&str, Option<Vec3>); 4] =
+    [("to the eye", None), ("axial", Some(Vec3::Z)), ("coronal", Some(Vec3::Y)), ("sagittal", Some(Vec3::NEG_X))];
+/// So many times as far as the eyes are apart is the target, for comfort.
+const EYES_AWAY: f32 = 30.0;
+
+impl Section {
+    const FIRST: Self = Self { across: 0, offset_mm: 0.0, bone: true };
+
+    fn cut(&self, frame: &Frame<'_>) -> Cut {
+        let towards = ACROSS[self.across].1.unwrap_or(-frame.camera.view(1.0).forward);
+        Cut { point: frame.world_from_tool.translation + self.offset_mm * towards, normal: towards, bone: self.bone }
+    }
+
+    fn show(&mut self, ui: &mut egui::Ui) {
+        ui.horizontal_wrapped(|ui| {
+            for (at, (name, _)) in ACROSS.iter().enumerate() {
+                ui.selectable_value(&mut self.across, at, *name);
+            }
+        });
+        ui.add(egui::Slider::new(&mut self.offset_mm, -60.0..=60.0).step_by(0.5).text("from the tip, mm"));
+        ui.checkbox(&mut self.bone, "through the skull too");
+    }
+}
+
+impl Look {
+    /// Everything, seen by the orbiting camera; there is a microscope where there is a camera for it.
+    pub fn with(microscope: Option<Camera>) -> Self {
+        Self {
+            bone: true,
+            brain: true,
+            hints: true,
+            section: None,
+            stereo: None,
+            slices: SliceLook::default(),
+            whole: false,
+            other: microscope,
+            microscope: false,
+        }
+    }
+
+    /// Leaves out of a session's frame what is not wanted.
+    pub fn on<'a>(&self, frame: Frame<'a>) -> Frame<'a> {
+        let half_height_mm = frame.slices.half_height_mm.filter(|_| !self.whole);
+        let shown = frame.slices.shown && self.slices.shown;
+        let eyes = |look| Stereo { look, eye_distance_mm: frame.camera.distance_mm / EYES_AWAY };
+        Frame {
+            show_bone: frame.show_bone && self.bone,
+            show_brain: frame.show_brain && self.brain,
+            bone_paint: frame.bone_paint.filter(|_| self.hints),
+            brain_paint: frame.brain_paint.filter(|_| self.hints),
+            overlay: if self.hints { frame.overlay } else { Overlay::default() },
+            cut: self.section.map(|section| section.cut(&frame)).or(frame.cut),
+            stereo: self.stereo.map(eyes).or(frame.stereo),
+            slices: SliceLook { half_height_mm, shown, ..self.slices },
+            ..frame
+        }
+    }
+
+    /// Does what a command asks of the view.
+    pub fn react(&mut self, command: Command, camera: &mut Camera) {
+        match command {
+            Command::Bone => self.bone ^= true,
+            Command::Brain => self.brain ^= true,
+            Command::Slices => self.slices.shown ^= true,
+            Command::Hints => self.hints ^= true,
+            Command::Section => self.section = if self.section.is_some() { None } else { Some(Section::FIRST) },
+            Command::Stereo => {
+                self.stereo = match self.stereo {
+                    None => Some(StereoLook::SideBySide),
+                    Some(StereoLook::SideBySide) => Some(StereoLook::Anaglyph),
+                    Some(StereoLook::Anaglyph) => None,
+                }
+            }
+            Command::Microscope => self.change_camera(camera),
+            _ => (),
+        }
+    }
+
+    /// Puts the other eye to the scene.
+    fn change_camera(&mut self, camera: &mut Camera) {
+        if let Some(other) = &mut self.other {
+            std::mem::swap(other, camera);
+            self.microscope ^= true;
+        }
+    }
+
+    /// The camera that a reset goes back to.
+    pub fn home(&self, orbit: Camera, microscope: Option<Camera>) -> Camera {
+        microscope.filter(|_| self.microscope).unwrap_or(orbit)
+    }
+
+    /// The switches in the panel.
+    pub fn show(&mut self, ui: &mut egui::Ui, camera: &mut Camera) {
+        ui.horizontal_wrapped(|ui| {
+            ui.checkbox(&mut self.bone, label(Command::Bone));
+            ui.checkbox(&mut self.brain, label(Command::Brain));
+            ui.checkbox(&mut self.slices.shown, label(Command::Slices));
+            ui.checkbox(&mut self.hints, label(Command::Hints));
+        });
+        let mut microscope = self.microscope;
+        ui.add_enabled_ui(self.other.is_some(), |ui| ui.checkbox(&mut microscope, label(Command::Microscope)));
+        if microscope != self.microscope {
+            self.change_camera(camera);
+        }
+        ui.horizontal_wrapped(|ui| {
+            ui.label(label(Command::Stereo));
+            let ways = [
+                ("off", None),
+                ("side by side", Some(StereoLook::SideBySide)),
+                ("red-cyan", Some(StereoLook::Anaglyph)),
+            ];
+            for (name, look) in ways {
+                ui.selectable_value(&mut self.stereo, look, name);
+            }
+        });
+        let mut cuts = self.section.is_some();
+        if ui.checkbox(&mut cuts, label(Command::Section)).changed() {
+            self.section = cuts.then_some(Section::FIRST);
+        }
+        if let Some(section) = &mut self.section {
+            section.show(ui);
+        }
+        ui.add_enabled_ui(self.slices.shown, |ui| self.grey_values(ui));
+    }
+
+    fn grey_values(&mut self, ui: &mut egui::Ui) {
+        let SliceLook { level_hu, width_hu, mri_share, .. } = &mut self.slices;
+        ui.checkbox(&mut self.whole, "Slices of the whole head");
+        ui.add(egui::Slider::new(level_hu, -1000.0..=2000.0).step_by(10.0).text("level, HU"));
+        ui.add(egui::Slider::new(width_hu, 50.0..=4000.0).step_by(10.0).text("window, HU"));
+        ui.add(egui::Slider::new(mri_share, 0.0..=1.0).fixed_decimals(2).text("MRI over CT"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn a_look_takes_away_and_never_adds() {
+        let camera = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0);
+        let near = SliceLook { half_height_mm: Some(60.0), ..SliceLook::default() };
+        let session = Frame { show_bone: false, slices: near, ..Frame::of(camera) };
+        let mut look = Look::with(None);
+        assert_eq!(look.on(session).slices, near);
+        look.react(Command::Brain, &mut { camera });
+        look.whole = true;
+        let seen = look.on(session);
+        assert!(!seen.show_bone && !seen.show_brain && seen.slices.half_height_mm.is_none());
+    }
+
+    #[test]
+    fn a_section_is_at_the_tip_and_stereo_goes_round() {
+        let mut camera = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 300.0);
+        let mut look = Look::with(None);
+        let frame = Frame::of(camera);
+        look.react(Command::Section, &mut camera);
+        let cut = look.on(frame).cut.unwrap();
+        assert!((cut.normal - Vec3::Y).length() < 1e-5 && cut.point == camera.target && cut.bone);
+        look.section = Some(Section { across: 1, offset_mm: 5.0, bone: false });
+        assert_eq!(look.on(frame).cut, Some(Cut { point: Vec3::Z * 5.0, normal: Vec3::Z, bone: false }));
+        look.react(Command::Section, &mut camera);
+        assert_eq!(look.on(frame).cut, None);
+        let mut round = || {
+            look.react(Command::Stereo, &mut camera);
+            look.on(frame).stereo.map(|stereo| (stereo.look, stereo.eye_distance_mm))
+        };
+        assert_eq!(
+            [round(), round(), round()],
+            [Some((StereoLook::SideBySide, 10.0)), Some((StereoLook::Anaglyph, 10.0)), None]
+        );
+    }
+
+    #[test]
+    fn each_eye_stays_where_it_was_left() {
+        let orbit = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0);
+        let scope = Camera { fov_rad: 0.2, ..Camera::viewed_from(Vec3::ONE, Vec3::Z, 300.0) };
+        let (mut camera, mut look) = (orbit, Look::with(Some(scope)));
+        camera.zoom(2.0);
+        look.react(Command::Microscope, &mut camera);
+        assert_eq!((camera, look.home(orbit, Some(scope))), (scope, scope));
+        look.react(Command::Microscope, &mut camera);
+        assert_eq!((camera.distance_mm, look.home(orbit, Some(scope))), (400.0, orbit));
+        let mut without = Look::with(None);
+        without.react(Command::Microscope, &mut camera);
+        assert_eq!(camera.distance_mm, 400.0);
+    }
+}

@@ -1,0 +1,110 @@
+//! The loudspeaker: takes samples on a thread of the sound system's own and never waits for the window.
+//!
+//! # Practice
+//! What is to be heard travels through one atomic word. A machine without a sound system stays silent and says why in the panel; nothing else depends on it.
+//!
+//! # When not to use it
+//! Without ALSA's headers on Linux: leave the feature `sound` off.
+
+use super::Sound;
+use super::synthesis::Synthesis;
+use cpal::traits::{DeviceTrait, HostTrait, StreamTrait};
+use cpal::{FromSample, SampleFormat, SizedSample, Stream, StreamConfig};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// An open sound device.
+pub(crate) struct Loudspeaker {
+    wanted: Arc<AtomicU64>,
+    /// Sounds as long as it lives.
+    _stream: Stream,
+}
+
+impl Loudspeaker {
+    /// Opens the default device.
+    pub fn open() -> Result<Self, String> {
+        let device = cpal::default_host().default_output_device().ok_or("there is no sound device")?;
+        let config = device.default_output_config().map_err(|fault| fault.to_string())?;
+        let wanted = Arc::new(AtomicU64::new(0));
+        let stream = match config.sample_format() {
+            SampleFormat::F32 => stream::<f32>(&device, config.into(), wanted.clone()),
+            SampleFormat::I16 => stream::<i16>(&device, config.into(), wanted.clone()),
+            SampleFormat::I32 => stream::<i32>(&device, config.into(), wanted.clone()),
+            SampleFormat::U16 => stream::<u16>(&device, config.into(), wanted.clone()),
+            other => return Err(format!("the sound device wants samples of {other}")),
+        };
+        let stream = stream.map_err(|fault| fault.to_string())?;
+        stream.play().map_err(|fault| fault.to_string())?;
+        Ok(Self { wanted, _stream: stream })
+    }
+
+    /// Lets this be heard from now on.
+    pub fn sound(&self, sound: Sound) {
+        self.wanted.store(packed(sound), Ordering::Relaxed);
+    }
+}
+
+/// A loudspeaker that is opened with the first sound, if there is one.
+#[derive(Default)]
+pub(crate) struct Ears {
+    /// Whether nothing shall be heard.
+    pub muted: bool,
+    loudspeaker: Option<Result<Loudspeaker, String>>,
+}
+
+impl Ears {
+    /// Lets this be heard from now on; says why not, if not.
+    pub fn hear(&mut self, sound: Sound) -> Option<String> {
+        let sound = if self.muted { Sound::default() } else { sound };
+        if self.loudspeaker.is_none() && sound == Sound::default() {
+            return None;
+        }
+        match self.loudspeaker.get_or_insert_with(Loudspeaker::open) {
+            Ok(loudspeaker) => loudspeaker.sound(sound),
+            Err(why) => return Some(why.clone()),
+        }
+        None
+    }
+}
+
+fn stream<T: SizedSample + FromSample<f32>>(
+    device: &cpal::Device,
+    config: StreamConfig,
+    wanted: Arc<AtomicU64>,
+) -> Result<Stream, cpal::Error> {
+    let (rate_hz, channels) = (config.sample_rate as f32, usize::from(config.channels).max(1));
+    let mut synthesis = Synthesis::default();
+    let fill = move |data: &mut [T], _: &cpal::OutputCallbackInfo| {
+        let sound = unpacked(wanted.load(Ordering::Relaxed));
+        for frame in data.chunks_mut(channels) {
+            frame.fill(T::from_sample(synthesis.sample(sound, rate_hz)));
+        }
+    };
+    // A device that is unplugged falls silent.
+    device.build_output_stream(config, fill, |_| (), None)
+}
+
+/// Spindle and load in thousandths, and the alarm, in one word.
+fn packed(Sound { spindle, load, alarm }: Sound) -> u64 {
+    let part = |value: f32| (1e3 * value.clamp(0.0, 1.0)) as u64;
+    part(spindle) | part(load) << 16 | u64::from(alarm) << 32
+}
+
+fn unpacked(word: u64) -> Sound {
+    let part = |shift: u32| (word >> shift & 0xffff) as f32 / 1e3;
+    Sound { spindle: part(0), load: part(16), alarm: word >> 32 == 1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sound_passes_through_one_word() {
+        let sound = Sound { spindle: 0.75, load: 0.125, alarm: true };
+        assert_eq!(unpacked(packed(sound)), sound);
+        assert_eq!(unpacked(packed(Sound::default())), Sound::default());
+        let odd = unpacked(packed(Sound { spindle: f32::NAN, load: 9.0, alarm: false }));
+        assert_eq!((odd.spindle, odd.load), (0.0, 1.0));
+    }
+}

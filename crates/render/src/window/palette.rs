@@ -1,0 +1,40 @@
+//! Colours that are told apart by eyes with any colour vision, and bright or dark enough to be read.
+//!
+//! # Sources
+//! Okabe and Ito 2008, "Color universal design". Contrast: WCAG 2.1, at least 4.5 for text.
+
+use eframe::egui::Color32;
+
+pub(crate) const SKY: Color32 = Color32::from_rgb(86, 180, 233);
+pub(crate) const ORANGE: Color32 = Color32::from_rgb(230, 159, 0);
+pub(crate) const GREEN: Color32 = Color32::from_rgb(0, 158, 115);
+pub(crate) const VERMILION: Color32 = Color32::from_rgb(213, 94, 0);
+/// Behind the plots.
+pub(crate) const NIGHT: Color32 = Color32::from_gray(16);
+/// Text that is less important than white text.
+pub(crate) const PALE: Color32 = Color32::from_gray(205);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Contrast of two colours, from 1 to 21.
+    fn contrast(a: Color32, b: Color32) -> f32 {
+        let linear = |c: u8| {
+            let s = f32::from(c) / 255.0;
+            if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
+        };
+        let luminance = |c: Color32| 0.2126 * linear(c.r()) + 0.7152 * linear(c.g()) + 0.0722 * linear(c.b());
+        let (a, b) = (luminance(a) + 0.05, luminance(b) + 0.05);
+        a.max(b) / a.min(b)
+    }
+
+    #[test]
+    fn what_is_written_can_be_read() {
+        assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 0.01);
+        for on_dark in [SKY, ORANGE, GREEN, VERMILION, PALE] {
+            assert!(contrast(on_dark, NIGHT) > 4.5, "{on_dark:?}");
+        }
+        assert!(contrast(Color32::BLACK, VERMILION) > 4.5 && contrast(Color32::BLACK, ORANGE) > 4.5);
+    }
+}
