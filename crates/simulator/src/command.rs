@@ -1,6 +1,7 @@
 //! What every program does with its command line: flags, session, exit code.
 
 use crate::batch;
+use crate::compare::compare;
 use crate::device_test;
 use crate::measure;
 use crate::options::{CaseTask, DeviceTask, Task};
@@ -55,6 +56,10 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
         Task::Case(CaseTask::Series { folder }) => list_series(folder),
         Task::Case(CaseTask::Build { patient, out }) => build_case(program, patient, out, built_in).map(|name| {
             println!("{name} is in {}; open it with --case {}", out.display(), out.display());
+            ExitCode::SUCCESS
+        }),
+        Task::Compare { first, second, out } => compare([first, second], out).map(|page| {
+            println!("side by side: {}", page.display());
             ExitCode::SUCCESS
         }),
         Task::Device(DeviceTask::Test { name, out, duration }) => device_test::run(name, out, *duration).map(ended_by),

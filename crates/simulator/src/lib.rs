@@ -21,6 +21,7 @@
 mod batch;
 mod case;
 mod command;
+mod compare;
 mod device_test;
 mod error;
 mod hand;

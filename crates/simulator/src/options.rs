@@ -132,6 +132,16 @@ pub enum Task {
     /// Look at haptic devices
     #[command(subcommand)]
     Device(DeviceTask),
+    /// Show two recorded sessions side by side: scores, warnings, forces
+    Compare {
+        /// A session.mcap
+        first: PathBuf,
+        /// Another one
+        second: PathBuf,
+        /// Folder for compare.html
+        #[arg(long, value_name = "DIR", default_value = "trepan-out/compare")]
+        out: PathBuf,
+    },
     /// Measure this machine and say which voxel size, mesh and step a scene needs on it
     Plan {
         /// Error of the force that the scene bears, N

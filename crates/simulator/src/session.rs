@@ -16,15 +16,17 @@ use crate::report::page::Shot;
 use crate::report::regions::{Region, regions};
 use crate::report::summary::{About, CutOff, Machine, Summary};
 use crate::run::clock::Clock;
+use crate::run::film::Filming;
 use crate::run::journal::Kept;
+use crate::run::lesson::{Company, Taught, Teacher};
 use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Devices, Pace};
-use crate::run::watch::Share;
+use crate::run::watch::{Asked, Share};
 use crate::run::{Eyes, Outcome, Stages, Tissue};
 use crate::show::driver;
 use crate::show::picture::{self, Album};
-use crate::show::window;
+use crate::show::{player, window};
 use crate::stages::alarms::Limits;
 use crate::stages::collision_step::CollisionStage;
 use crate::stages::haptic_tick::{HapticConfig, HapticStage, ToolSample};
@@ -37,7 +39,7 @@ use std::sync::{Arc, OnceLock};
 use trepan_contact::{Vibration, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_haptics::script::Script;
-use trepan_haptics::{DeviceName, mouse};
+use trepan_haptics::{DeviceName, HapticDevice, mouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_render::{Painter, SceneData};
@@ -54,6 +56,8 @@ pub struct Session {
     case: String,
     hash: String,
     scene: Scene,
+    /// The bone that a replay carves while the window goes back and forth with the scene's.
+    filmed: Option<Arc<BoneVolume>>,
     operation: Operation,
     plan: Plan,
     rigid: trepan_rigid::Method,
@@ -98,6 +102,9 @@ impl Session {
         let (name, hash) = (case.name.clone(), case.hash.clone());
         let scene = Scene::new(program, case)?;
         scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
+        let copy = |bone: &Arc<BoneVolume>| BoneVolume::new(&bone.snapshot(), bone.isovalue()).map(Arc::new);
+        let filmed = scene.bone.as_ref().filter(|_| windowed && recording.is_some()).map(copy).transpose();
+        let filmed = filmed.map_err(|fault| SessionError::Internal(fault.to_string()))?;
         let operation = Operation::of(&options, &device, recording.as_ref());
         let plan = planned(&scene, &operation)?;
         let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
@@ -111,6 +118,7 @@ impl Session {
             case,
             hash,
             scene,
+            filmed,
             operation,
             plan,
             rigid,
@@ -132,17 +140,18 @@ impl Session {
         let second_feel = self.second_feel(second.as_ref());
         let start = self.start();
         let stages = self.stages(start.state, &feel, second_feel.as_ref())?;
+        let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
         output::folder(&self.out)?;
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
-        let share = self.options.share.as_deref().map(Share::open).transpose()?;
+        let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
+        let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         let kept = (Recorder::create(&record, &self.header(&feel, second_feel.as_ref()))?, share);
         let mut graphics = self.graphics();
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
-        let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
         let devices = device.map(|first| Devices { first, second: second_device });
         let outcome = self.loops(stages, devices, kept, start, &stop, |eyes| {
-            album = self.picture(eyes, &mut graphics, pointer, &stop);
+            album = self.picture(eyes, &mut graphics, pointer, std::mem::take(&mut company), &stop);
         });
         let mut remarks = self.scene.remarks.clone();
         remarks.extend(graphics.err());
@@ -164,6 +173,22 @@ impl Session {
         Ok(Ended { summary, out: self.out, signal: stop.signal() })
     }
 
+    /// Lets a teacher have a say in both hands' buttons, where this session is shared; with a window on another's session, this one teaches.
+    fn company(&self, asked: Option<Asked>, mut hands: [Held; 2]) -> Result<(Company, [Held; 2]), SessionError> {
+        let mut company = Company::default();
+        if let Some([first, second, window]) = asked {
+            let taught = |hand: Held, asked| hand.map(|device| Box::new(Taught::new(device, asked)) as _);
+            let [one, other] = hands;
+            hands = [taught(one, first), taught(other, second)];
+            company.asked = Some(window);
+        }
+        if let Some(name) = self.options.watch.as_deref().filter(|_| self.windowed) {
+            let teacher = Teacher::join(name);
+            company.teacher = Some(teacher.map_err(|fault| SessionError::Usage(format!("--watch {name}: {fault}")))?);
+        }
+        Ok((company, hands))
+    }
+
     fn loops(
         &self,
         stages: Stages,
@@ -174,7 +199,11 @@ impl Session {
         picture: impl FnOnce(Eyes),
     ) -> Outcome {
         match (&self.recording, devices) {
-            (Some(recording), _) => lockstep::run(stages, recording, kept, start, self.windowed, stop, picture),
+            (Some(recording), _) => {
+                let length_ms = recording.ticks.last().map_or(0.0, |tick| tick.time_ms);
+                let film = self.windowed.then(|| Filming::new(self.bone().cloned(), length_ms));
+                lockstep::run(stages, recording, kept, start, film, stop, picture)
+            }
             (None, Some(devices)) => threads::run(stages, devices, kept, start, self.pace(), stop, picture),
             (None, None) => Outcome::default(),
         }
@@ -182,7 +211,7 @@ impl Session {
 
     /// The bone, if it is operated on.
     fn bone(&self) -> Option<&Arc<BoneVolume>> {
-        self.scene.bone.as_ref().filter(|_| self.program.has_bone())
+        self.filmed.as_ref().or(self.scene.bone.as_ref()).filter(|_| self.program.has_bone())
     }
 
     /// The bone's pieces as they hang together now.
@@ -299,19 +328,33 @@ impl Session {
 
     fn picture(
         &self,
-        eyes: Eyes,
+        mut eyes: Eyes,
         graphics: &mut Result<Graphics, String>,
         pointer: Option<mouse::MouseHandle>,
+        company: Company,
         stop: &Stop,
     ) -> Album {
         let Some(painter) = graphics.as_mut().ok().and_then(|g| g.painter.take()) else {
             picture::wait(eyes, stop);
             return Album::default();
         };
-        let (bone_shown, folder) = (self.program.has_bone(), self.out.join("frames"));
         if self.windowed {
-            return window::show(eyes, painter, &self.scene, self.program, pointer, &folder, stop);
+            let opened = window::Opened {
+                scene: &self.scene,
+                case: &self.case,
+                program: self.program,
+                out: &self.out,
+                rate_hz: self.options.rate_hz,
+            };
+            return match (eyes.film.take(), &self.recording) {
+                (Some(film), Some(recording)) => {
+                    let until_s = self.options.duration.unwrap_or(f64::INFINITY);
+                    player::show(*eyes.view.latest().0, film, painter, &opened, recording, until_s, stop)
+                }
+                _ => window::show(eyes, painter, &opened, pointer, company, stop),
+            };
         }
+        let (bone_shown, folder) = (self.program.has_bone(), self.out.join("frames"));
         picture::draw(eyes, painter, &self.scene, bone_shown, self.options.frames_per_second, &folder, stop)
     }
 
@@ -380,6 +423,9 @@ impl Session {
         }
     }
 }
+
+/// A device, if a hand holds one.
+type Held = Option<Box<dyn HapticDevice>>;
 
 struct Graphics {
     adapter: String,

@@ -9,7 +9,11 @@ use eframe::egui::{self, Color32, Rect, RichText};
 
 /// Shows warnings and news over an area of the window as long as there are any.
 pub(crate) fn show(ui: &egui::Ui, over: Rect, warnings: &[String], news: &[String]) {
-    let area = egui::Area::new("banner".into()).fixed_pos(over.min).interactable(false).order(egui::Order::Middle);
+    let area = egui::Area::new(egui::Id::unique("banner"))
+        .fixed_pos(over.min)
+        .interactable(false)
+        .fade_in(false)
+        .order(egui::Order::Middle);
     area.show(ui.ctx(), |ui| {
         ui.set_width(over.width());
         ui.spacing_mut().item_spacing.y = 0.0;

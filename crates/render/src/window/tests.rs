@@ -167,7 +167,7 @@ fn the_panel_says_what_the_session_says() {
 fn a_warning_is_a_wide_vermilion_banner_and_goes_when_it_is_over() {
     let wide = |bench: &Bench| {
         bench.window.output().shapes.iter().any(|clipped| match &clipped.shape {
-            egui::Shape::Rect(rect) => rect.fill == palette::VERMILION && rect.rect.width() > 1000.0,
+            egui::Shape::Rect(rect) => rect.fill == palette::VERMILION && rect.rect.width() > 980.0,
             _ => false,
         })
     };

@@ -16,6 +16,7 @@ pub(crate) fn show(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
         ui.add_space(4.0);
         ui.horizontal(|ui| asked = buttons(ui, timeline).or(asked));
         asked = bar(ui, timeline).or(asked);
+        ui.add_space(6.0);
     });
     asked
 }

@@ -43,6 +43,8 @@ pub struct Journal {
     notices: Receiver<Notice>,
     collisions: Receiver<CollisionRecord>,
     solver: Receiver<SolverRecord>,
+    /// Number and time of the newest tick, ms.
+    newest: (u64, f64),
 }
 
 /// What the recording thread knows at the end.
@@ -71,6 +73,7 @@ pub fn journal() -> (Pens, Journal) {
             notices: notices_in,
             collisions: collisions_in,
             solver: solver_in,
+            newest: (0, 0.0),
         },
     )
 }
@@ -83,7 +86,8 @@ impl Journal {
         let mut scores = ScoreKeeper::default();
         loop {
             let over = self.is_over();
-            if let Err(fault) = self.drain(&mut recorder, &mut share, &mut written, &mut scores) {
+            let drained = self.drain(&mut recorder, &mut share, &mut written, &mut scores);
+            if let Err(fault) = drained.and_then(|()| self.listen(&mut recorder, &mut share, clock.now_ms())) {
                 written.fault.get_or_insert(fault);
                 self.discard(&mut written);
             }
@@ -118,6 +122,7 @@ impl Journal {
         scores: &mut ScoreKeeper,
     ) -> Result<(), LinkError> {
         while let Some(record) = self.ticks.receive() {
+            self.newest = (record.tick, record.time_ms);
             let before_ms = scores.time_ms();
             scores.add(&record);
             share.take_if(|share| !share.tick(&record));
@@ -144,6 +149,19 @@ impl Journal {
             let (kind, text) = notice.words();
             let record = EventRecord { tick: notice.tick, time_ms: notice.time_ms, kind: kind.into(), text };
             share.take_if(|share| !share.event(&record));
+            recorder.event(&record)?;
+        }
+        Ok(())
+    }
+
+    /// Records what the teacher asks, at the newest tick.
+    fn listen(&mut self, recorder: &mut Recorder, share: &mut Option<Share>, now_ms: f64) -> Result<(), LinkError> {
+        let Some(sharing) = share else { return Ok(()) };
+        for (begins, text) in sharing.hear(now_ms) {
+            let text = format!("{}: {text}", if begins { "begins" } else { "ends" });
+            tracing::info!("{:7.3} s  teacher: {text}", self.newest.1 * 1e-3);
+            let record = EventRecord { tick: self.newest.0, time_ms: self.newest.1, kind: "teacher".into(), text };
+            // Who watches has asked for it.
             recorder.event(&record)?;
         }
         Ok(())

@@ -12,18 +12,21 @@
 //! ```
 //!
 //! # Practice
-//! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by how much.
+//! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by how much. It runs as fast as it can; for a window that
+//! goes back and forth in time it is filmed meanwhile ([`crate::run::film`]).
 
 use crate::run::clock::Clock;
+use crate::run::film::{Filming, Shot};
 use crate::run::journal::Kept;
 use crate::run::journal::{Journal, Pens, journal};
 use crate::run::stop::Stop;
 use crate::run::threads::outcome;
-use crate::run::{Cells, Eyes, Numbered, Outcome, Replayed, Stages, Ticks, Times, Tissue};
+use crate::run::{Cells, Eyes, Numbered, Outcome, Replayed, Stages, Ticks, Times, Tissue, View};
 use crate::stages::collision_step::SoftFrame;
 use crate::stages::haptic_tick::{HapticStage, TickInput, ToolSample};
 use crate::stages::second_hand::{SecondHand, SecondView};
 use std::collections::VecDeque;
+use std::sync::mpsc::Receiver;
 use std::thread;
 use trepan_contact::SurfacePatch;
 use trepan_geometry::{Buttons, ToolState, Wrench};
@@ -35,40 +38,42 @@ use trepan_soft::Loads;
 /// Tools and patches of this many past ticks are kept for collision steps that refer to them.
 const MEMORY: usize = 16_384;
 
-/// Runs a recording again. `paced`: as fast as it was recorded, for a window; else as fast as it goes.
+/// Runs a recording again. Who is filmed goes on being looked at after the end; else the end asks for a stop.
 pub fn run(
     stages: Stages,
     recording: &Recording,
     (recorder, share): Kept,
     start: ToolSample,
-    paced: bool,
+    film: Option<(Filming, Receiver<Shot>)>,
     stop: &Stop,
     picture: impl FnOnce(Eyes),
 ) -> Outcome {
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
     let (pens, pages) = journal();
-    let eyes = Eyes { view: cells.view.1, soft: stages.tissue.is_some().then_some(cells.shown.1) };
+    let (mut film, shots) = film.unzip();
+    let eyes = Eyes { view: cells.view.1, soft: stages.tissue.is_some().then_some(cells.shown.1), film: shots };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(pages, recorder, share, clock));
         let (mut view, mut shown) = (cells.view.0, cells.shown.0);
         let replaying = scope.spawn(move || {
             let mut again = Again::new(stages, recording, pens, start);
+            let last = recording.ticks.last().map(|record| record.tick);
             for record in &recording.ticks {
                 if stop.asked() {
                     break;
                 }
-                if paced {
-                    clock.sleep_until(record.time_ms);
-                }
-                again.tick(record, &clock, |ticks, tick, stage, second| {
-                    view.set(ticks.view(tick, stage, second, false));
-                });
-                if let Some(tissue) = &again.tissue {
+                let now = again.tick(record, &clock);
+                view.set(now);
+                let brain = || again.tissue.as_ref().map(|tissue| tissue.solver.positions().to_vec());
+                film.take_if(|film| !film.tick(now, last == Some(record.tick), brain));
+                if let Some(tissue) = again.tissue.as_ref().filter(|_| film.is_none()) {
                     shown.write(|frame| tissue.solver.publish(frame));
                 }
             }
-            stop.ask();
+            if film.is_none() {
+                stop.ask();
+            }
             again.outcome()
         });
         picture(eyes);
@@ -121,12 +126,8 @@ impl<'a> Again<'a> {
         }
     }
 
-    fn tick(
-        &mut self,
-        record: &TickRecord,
-        clock: &Clock,
-        show: impl FnOnce(&Ticks, &crate::Tick, &HapticStage, Option<SecondView>),
-    ) {
+    /// One tick, and what it looks like.
+    fn tick(&mut self, record: &TickRecord, clock: &Clock) -> View {
         self.collide_up_to(record.patch_seq, clock);
         let &(patch_seq, patch) =
             self.patches.iter().rev().find(|(seq, _)| *seq <= record.patch_seq).unwrap_or(&(0, PATCH));
@@ -135,8 +136,11 @@ impl<'a> Again<'a> {
             self.haptic.release();
         }
         let began_ms = clock.now_ms();
-        let notices = &mut self.pens.notices;
-        let mut tick = self.haptic.tick(&input, &mut |notice| _ = notices.send(notice));
+        let (notices, ticks) = (&mut self.pens.notices, &mut self.ticks);
+        let mut tick = self.haptic.tick(&input, &mut |notice| {
+            ticks.hear(notice);
+            notices.send(notice);
+        });
         let second = self.second_tick(record.tick);
         tick.record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         self.ticks.add(&tick);
@@ -147,7 +151,7 @@ impl<'a> Again<'a> {
         while !self.pens.ticks.send(tick.record) {
             thread::yield_now();
         }
-        show(&self.ticks, &tick, &self.haptic, second.map(|(view, _)| view));
+        self.ticks.view(&tick, &self.haptic, second.map(|(view, _)| view), false)
     }
 
     /// The second hand's tick of a number, if it was recorded, and whether its force is the recorded one.

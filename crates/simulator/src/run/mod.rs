@@ -3,19 +3,24 @@
 //! A session runs live on threads ([`crate::run::threads`]) or again from a recording, step by step ([`crate::run::lockstep`]).
 
 pub(crate) mod clock;
+pub(crate) mod film;
 pub(crate) mod journal;
+pub(crate) mod lesson;
 pub mod lockstep;
 pub(crate) mod stop;
 pub mod threads;
 pub(crate) mod watch;
 
+use crate::run::film::Shot;
 use crate::run::journal::Written;
 use crate::stages::collision_step::{CollisionStage, SoftFrame};
 use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
+use crate::stages::notice::{Notice, What};
 use crate::stages::score::ScoreKeeper;
 use crate::stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 use crate::stages::solver_step::SolverStage;
 use hdrhistogram::Histogram;
+use std::sync::mpsc::Receiver;
 use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
 use trepan_link::cell::{Reader, Writer, cell};
@@ -58,6 +63,10 @@ pub struct View {
     pub brain_distance_mm: f32,
     /// Standing warnings, bits.
     pub warnings: u32,
+    /// The newest thing that happened beside the warnings.
+    pub news: Option<Notice>,
+    /// Speed of the spindle, 1 at its free speed.
+    pub spindle: f32,
     /// Bone removed so far, mm³.
     pub removed_mm3: f64,
     /// Ticks, late ticks, held ticks so far.
@@ -66,12 +75,35 @@ pub struct View {
     pub finished: bool,
 }
 
+impl View {
+    /// Before the first tick, under a guard that lets this much force through, N.
+    pub fn at(sample: ToolSample, force_limit_n: f32) -> Self {
+        Self {
+            sample,
+            time_ms: 0.0,
+            force: Vec3::ZERO,
+            force_limit_n,
+            second: None,
+            depth_mm: [0.0; 2],
+            brain_distance_mm: f32::INFINITY,
+            warnings: 0,
+            news: None,
+            spindle: 0.0,
+            removed_mm3: 0.0,
+            counts: [0; 3],
+            finished: false,
+        }
+    }
+}
+
 /// Read ends for the picture.
 pub struct Eyes {
     /// Newest tick.
     pub view: Reader<View>,
     /// Newest brain, where there is one.
     pub soft: Option<Reader<SoftFrame>>,
+    /// A recording's film, where it is filmed.
+    pub film: Option<Receiver<Shot>>,
 }
 
 /// A collision result under its number.
@@ -100,19 +132,7 @@ impl Cells {
         if let Some(tissue) = &stages.tissue {
             tissue.solver.publish(&mut frame);
         }
-        let view = View {
-            sample,
-            time_ms: 0.0,
-            force: Vec3::ZERO,
-            force_limit_n: stages.haptic.guard().config().max_force_n,
-            second: None,
-            depth_mm: [0.0; 2],
-            brain_distance_mm: f32::INFINITY,
-            warnings: 0,
-            removed_mm3: 0.0,
-            counts: [0; 3],
-            finished: false,
-        };
+        let view = View::at(sample, stages.haptic.guard().config().max_force_n);
         Self {
             tool: cell(sample),
             view: cell(view),
@@ -170,9 +190,18 @@ pub struct Ticks {
     pub held: u64,
     /// Compute time.
     pub times: Times,
+    /// The newest thing that happened beside the warnings.
+    pub news: Option<Notice>,
 }
 
 impl Ticks {
+    /// Takes note of something that happened.
+    pub fn hear(&mut self, notice: Notice) {
+        if !matches!(notice.what, What::Warning(..)) {
+            self.news = Some(notice);
+        }
+    }
+
     /// Counts one tick.
     pub fn add(&mut self, tick: &Tick) {
         use trepan_link::wire::TickRecord;
@@ -193,6 +222,8 @@ impl Ticks {
             depth_mm: [tick.record.depth_mm, tick.record.tissue_depth_mm],
             brain_distance_mm: tick.record.brain_distance_mm,
             warnings: tick.warnings,
+            news: self.news,
+            spindle: stage.spindle_share(&tick.record),
             removed_mm3: stage.scores().bone_removed_mm3,
             counts: [self.count, self.late, self.held],
             finished,

@@ -71,7 +71,7 @@ pub fn run(
     let hold = |device| Hand { device, stop: stop.clone() };
     let hand = hold(devices.first);
     let second = second.zip(devices.second.map(hold)).map(|(stage, hand)| Second { stage, hand, records: seconds });
-    let eyes = Eyes { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1) };
+    let eyes = Eyes { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1), film: None };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(pages, recorder, share, clock));
         let ends = HapticEnds { tool: cells.tool.0, view: cells.view.0, patch: cells.patch.1, ticks, notices };
@@ -168,7 +168,10 @@ fn haptic_loop(
         let reading = hand.device.read(now_ms);
         let &(patch_seq, patch) = ends.patch.latest().0;
         let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq };
-        let mut tick = stage.tick(&input, &mut |notice| _ = ends.notices.send(notice));
+        let mut tick = stage.tick(&input, &mut |notice| {
+            ticks.hear(notice);
+            ends.notices.send(notice);
+        });
         hand.device.apply(tick.wrench);
         let aside = second.as_mut().map(|second| second.tick(ticks.count + 1, now_ms));
         let done_ms = clock.now_ms();

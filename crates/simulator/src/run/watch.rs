@@ -1,21 +1,24 @@
 //! A second process that watches: the running session tells its ticks through shared memory, the watcher follows with its own scene.
 //!
 //! # Theory
-//! The watcher is an ordinary session whose device is the other session's: it reads where the trainee's hand is and runs its own
-//! bone, brain and picture. So a lost tick costs the watcher sharpness, nothing else, and nothing flows back.
+//! The watcher is an ordinary session whose device is the other session's hand: it reads where the trainee's hand is and runs its own
+//! bone, brain and picture. So a lost tick costs the watcher sharpness, nothing else. What a watcher's window sends back is a [lesson](super::lesson).
 //!
 //! ```text
-//!  trainee: recording thread ──tick──> shared memory ──> watcher: pump thread → cell → haptic loop
+//!  trainee: recording thread ──tick, event──> shared memory ──> watcher: pump thread → cell → haptic loop
+//!                            <────teacher────               <── watcher's window
 //! ```
 //!
 //! # Practice
-//! Telling costs the recording thread a few µs a tick; the haptic loop knows nothing of it. What was drilled before the watcher came is not
+//! Telling and listening cost the recording thread a few µs a tick; the haptic loop knows nothing of it. What was drilled before the watcher came is not
 //! seen. Three seconds of silence end the watching.
 //!
 //! # When not to use it
-//! Across machines: use iceoryx2's own tunnel between them.
+//! As it is, between machines: shared memory ends at the machine. iceoryx2's own tunnel (`iox2 tunnel zenoh`, of its command line tools) on both carries the topics
+//! `trepan/NAME/...` from one to the other; nothing changes here.
 
 use crate::error::SessionError;
+use crate::run::lesson::Listener;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -24,7 +27,7 @@ use trepan_geometry::{Buttons, ToolState, Vec3};
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
 use trepan_link::cell::{Reader, cell};
 use trepan_link::topics::{Publisher, Session, Subscriber, TopicError};
-use trepan_link::wire::{EventRecord, TickRecord};
+use trepan_link::wire::{EventRecord, TeacherRecord, TickRecord};
 
 /// Silence after which a tick counts as old, ms.
 const STALE_MS: f64 = 100.0;
@@ -37,17 +40,27 @@ const LOOK: Duration = Duration::from_millis(1);
 pub struct Share {
     ticks: Publisher<TickRecord>,
     events: Publisher<EventRecord>,
+    teacher: Listener,
     _session: Session,
 }
 
+/// Where a session reads what its teacher asks: either hand, and the window.
+pub type Asked = [Reader<TeacherRecord>; 3];
+
 impl Share {
-    /// Tells under a name.
-    pub fn open(name: &str) -> Result<Self, SessionError> {
-        let open = || -> Result<Self, TopicError> {
+    /// Tells, and listens to a teacher, under a name.
+    pub fn open(name: &str) -> Result<(Self, Asked), SessionError> {
+        let open = || -> Result<(Self, Asked), TopicError> {
             let session = Session::join(name)?;
-            Ok(Self { ticks: session.publisher()?, events: session.publisher()?, _session: session })
+            let (teacher, asked) = Listener::join(&session)?;
+            Ok((Self { ticks: session.publisher()?, events: session.publisher()?, teacher, _session: session }, asked))
         };
         open().map_err(|fault| SessionError::Usage(format!("--share {name}: {fault}")))
+    }
+
+    /// Listens to the teacher; gives what began (`true`) or ended.
+    pub fn hear(&mut self, now_ms: f64) -> impl Iterator<Item = (bool, &'static str)> + use<> {
+        self.teacher.hear(now_ms)
     }
 
     /// Tells a tick; false when nobody can be told any more.

@@ -10,10 +10,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
-use trepan_render::{Camera, Frame, Image, Painter, SliceLook};
+use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
 
 /// Half the height of what a slice shows around the tool, mm.
 const SLICE_MM: f32 = 60.0;
+/// A force under this has no arrow, N.
+const FELT_N: f32 = 0.05;
+/// Length of the arrow, mm for 1 N.
+const MM_PER_N: f32 = 12.0;
 /// Pictures that go into the report beside the first and the last.
 const SHOWN: usize = 4;
 
@@ -48,6 +52,11 @@ pub fn camera(site: &Site) -> Camera {
     Camera::viewed_from(site.entry, outward + 0.45 * side + 0.25 * Vec3::Z, 170.0)
 }
 
+/// The microscope: straight down on the site, from the usual working distance, on a field of some 50 mm.
+pub fn microscope(site: &Site) -> Camera {
+    Camera { fov_rad: 0.2, ..Camera::viewed_from(site.entry, -site.inward, 250.0) }
+}
+
 /// A frame of the newest state.
 pub fn frame<'a>(camera: Camera, view: &View, brain_positions: Option<&'a [Vec3]>, bone_shown: bool) -> Frame<'a> {
     Frame {
@@ -56,11 +65,18 @@ pub fn frame<'a>(camera: Camera, view: &View, brain_positions: Option<&'a [Vec3]
         second: view.second.map(|second| (SecondHand::tool(), second.world_from_tool)),
         turn_rad: if view.sample.drilling { view.time_ms as f32 * 0.7 } else { 0.0 },
         drilling: view.sample.drilling,
+        overlay: Overlay { force: arrow(view), ..Overlay::default() },
         brain_positions,
         show_bone: bone_shown,
         slices: SliceLook { half_height_mm: Some(SLICE_MM), ..SliceLook::default() },
         ..Frame::of(camera)
     }
+}
+
+/// The force on the hand at the tool's tip; none that is too weak to be felt.
+fn arrow(view: &View) -> Option<[Vec3; 2]> {
+    let tip = view.sample.state.tip();
+    (view.force.length() > FELT_N).then(|| [tip, tip + MM_PER_N * view.force])
 }
 
 /// Waits for the end without a picture.

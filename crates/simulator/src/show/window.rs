@@ -5,24 +5,43 @@
 //! reads it at its own rate; closing the window ends the session.
 
 use crate::case::scene::Scene;
-use crate::program::{Phase, Program, called};
+use crate::program::Program;
 use crate::report::page::Shot;
+use crate::run::lesson::{ASKED, Company, Teacher};
 use crate::run::stop::Stop;
 use crate::run::{Eyes, View};
-use crate::show::picture::{Album, camera, frame, snap};
-use crate::stages::notice::Warning;
+use crate::show::keep::Keeper;
+use crate::show::picture::{Album, camera, frame, microscope, snap};
+use crate::show::said;
 use std::path::Path;
-use trepan_geometry::{Buttons, Vec3};
+use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
-use trepan_render::window::{self, Leash, Panel, Start, WindowInput};
-use trepan_render::{Camera, Frame, Painter};
+use trepan_link::wire::TeacherRecord;
+use trepan_render::window::{self, Action, Capture, Leash, Panel, Start, WindowInput};
+use trepan_render::{Camera, Frame, Image, Overlay, Painter};
 
 /// How far a mouse may press past a surface, mm: a little over what the device's largest force stands for at 2 N/mm.
 const LEASH_MM: f32 = 2.0;
+/// A request is held so long that no tick misses it, s.
+const REQUEST_S: f64 = 0.1;
 
 /// Whether a window can be opened here.
 pub fn has_display() -> bool {
     window::display().is_ok()
+}
+
+/// What the window is opened on.
+pub struct Opened<'a> {
+    /// The patient.
+    pub scene: &'a Scene,
+    /// A name for the case that anybody may read.
+    pub case: &'a str,
+    /// Which simulator.
+    pub program: Program,
+    /// Where pictures go.
+    pub out: &'a Path,
+    /// What the tick's rate should be, Hz.
+    pub rate_hz: f32,
 }
 
 /// What the window shows and drives.
@@ -30,12 +49,33 @@ struct Show {
     eyes: Eyes,
     view: View,
     positions: Vec<Vec3>,
+    case: String,
+    program: Program,
+    wanted_rate_hz: f32,
     bone_shown: bool,
     pointer: Option<MouseHandle>,
-    next_until_s: f64,
-    undo_until_s: f64,
+    company: Company,
+    /// What is marked on the anatomy, mm.
+    markers: Vec<Vec3>,
+    /// A tool that is only shown.
+    ghost: Option<Pose>,
+    requests: Requests,
     rate: Rate,
+    keeper: Keeper,
     stop: Stop,
+}
+
+/// What was asked for lately, and until when it counts, s.
+#[derive(Default)]
+struct Requests(Vec<(Buttons, f64)>);
+
+impl Requests {
+    /// Everything that is asked for at a time, with what is new.
+    fn at(&mut self, seconds: f64, new: impl Iterator<Item = Buttons>) -> Buttons {
+        self.0.retain(|(_, until)| seconds < *until);
+        self.0.extend(new.map(|asked| (asked, seconds + REQUEST_S)));
+        self.0.iter().fold(Buttons(0), |all, (asked, _)| all | *asked)
+    }
 }
 
 /// Ticks a second, measured over about a second.
@@ -58,40 +98,56 @@ impl Rate {
 /// Shows the session until it ends or the window is closed.
 pub fn show(
     mut eyes: Eyes,
-    mut painter: Painter,
-    scene: &Scene,
-    program: Program,
+    painter: Painter,
+    opened: &Opened<'_>,
     pointer: Option<MouseHandle>,
-    folder: &Path,
+    company: Company,
     stop: &Stop,
 ) -> Album {
-    let mut album = Album::default();
     let view = *eyes.view.latest().0;
-    let eye = camera(&scene.site);
-    let bone_shown = scene.bone.is_some() && program.has_bone();
-    album.add(shot(&mut painter, &frame(eye, &view, None, bone_shown), folder, "before"));
-    let start = Start::with(eye, view.sample.state.world_from_tool);
-    let (positions, rate) = (Vec::new(), Rate::default());
     let show = Show {
         eyes,
         view,
-        positions,
-        bone_shown,
+        positions: Vec::new(),
+        case: opened.case.into(),
+        program: opened.program,
+        wanted_rate_hz: opened.rate_hz,
+        bone_shown: opened.scene.bone.is_some() && opened.program.has_bone(),
         pointer,
-        next_until_s: 0.0,
-        undo_until_s: 0.0,
-        rate,
+        company,
+        markers: Vec::new(),
+        ghost: None,
+        requests: Requests::default(),
+        rate: Rate::default(),
+        keeper: Keeper::into_folder(&opened.out.join("window")),
         stop: stop.clone(),
     };
-    let closed = window::run(&format!("Trepan {}", program.name()), painter, show, start);
+    let (show, mut album) = run(show, painter, opened, view);
     stop.ask();
-    let (mut painter, show) = (closed.renderer, closed.session);
-    album.add(shot(&mut painter, &window::Session::frame(&show, eye), folder, "after"));
+    album.faults.extend(show.keeper.finish());
+    album
+}
+
+/// Opens the window on a session, with a picture before and one after.
+pub fn run<S: window::Session + 'static>(
+    session: S,
+    mut painter: Painter,
+    opened: &Opened<'_>,
+    at: View,
+) -> (S, Album) {
+    let (mut album, folder) = (Album::default(), opened.out.join("frames"));
+    let eye = camera(&opened.scene.site);
+    album.add(shot(&mut painter, &session.frame(eye), &folder, "before"));
+    let start = Start::with(eye, at.sample.state.world_from_tool);
+    let start = Start { microscope: Some(microscope(&opened.scene.site)), ..start };
+    let closed = window::run(&format!("Trepan {}", opened.program.name()), painter, session, start);
+    let (mut painter, session) = (closed.renderer, closed.session);
+    album.add(shot(&mut painter, &session.frame(eye), &folder, "after"));
     if let Err(fault) = closed.result {
         tracing::error!("{fault}");
         album.faults.push(fault.to_string());
     }
-    album
+    (session, album)
 }
 
 fn shot(painter: &mut Painter, frame: &Frame<'_>, folder: &Path, caption: &str) -> Result<Shot, String> {
@@ -106,69 +162,132 @@ impl window::Session for Show {
             self.positions.clone_from(&soft.latest().0.positions);
         }
         self.pass_on(input);
+        let lesson = self.listen(input);
         let view = &self.view;
-        let [ticks, late, held] = view.counts;
-        let rate_hz = self.rate.follow(view.time_ms, ticks);
-        let value = |name: &str, value: String| (name.to_string(), value);
+        let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
+        let flap = || Action { name: "Lift the flap, or put it back".into(), key: Some('f'), on: false };
+        let mut panel = said::panel(&self.case, self.program, view);
+        panel.warnings.extend(lesson.warnings);
+        if !by_hand {
+            panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
+        }
         Panel {
-            phase: view.sample.phase().name().into(),
-            hint: hint(view.sample.phase(), self.pointer.is_some()).into(),
-            tool: called(&view.sample.tool),
-            drilling: view.sample.drilling,
-            force_n: view.force.length(),
-            force_limit_n: view.force_limit_n,
-            values: [
-                value("haptic rate", format!("{rate_hz:.0} Hz")),
-                value("late / held ticks", format!("{late} / {held}")),
-                value("depth in bone", format!("{:.2} mm", view.depth_mm[0])),
-                value("depth in tissue", format!("{:.2} mm", view.depth_mm[1])),
-                value("tool to brain", format!("{:.1} mm", view.brain_distance_mm)),
-                value("bone removed", format!("{:.0} mm³", view.removed_mm3)),
-                value("time", format!("{:.1} s", view.time_ms * 1e-3)),
-            ]
-            .into_iter()
-            .chain(view.second.map(|second| value("second hand", format!("{:.2} N", second.force.length()))))
-            .collect(),
-            warnings: warnings(view.warnings),
-            leash: self.pointer.as_ref().map(|_| Leash { tip: view.sample.state.tip(), length_mm: LEASH_MM }),
+            hint: if teaches { TEACH } else { said::hint(view.sample.phase(), by_hand) }.into(),
+            by_hand,
+            rate_hz: self.rate.follow(view.time_ms, view.counts[0]) as f32,
+            wanted_rate_hz: self.wanted_rate_hz,
+            actions: (by_hand && self.bone_shown).then(flap).into_iter().chain(lesson.actions).collect(),
+            leash: by_hand.then(|| Leash { tip: view.sample.state.tip(), length_mm: LEASH_MM }),
             finished: view.finished || self.stop.asked(),
+            ..panel
         }
     }
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
         let positions = Some(self.positions.as_slice()).filter(|p| !p.is_empty());
-        frame(camera, &self.view, positions, self.bone_shown)
+        let frame = frame(camera, &self.view, positions, self.bone_shown);
+        let ghost = self.ghost.map(|pose| (self.view.sample.tool, pose));
+        Frame { overlay: Overlay { ghost, markers: &self.markers, ..frame.overlay }, ..frame }
+    }
+
+    fn capture(&mut self, what: Capture, picture: Image) {
+        self.keeper.keep(what, picture);
     }
 }
 
 impl Show {
-    /// The user's hand for the haptic loop. A request is held for a tenth of a second, so that no tick misses it.
+    /// The user's hand for the haptic loop.
     fn pass_on(&mut self, input: &WindowInput) {
         let Some(pointer) = &mut self.pointer else { return };
-        if input.next_tool {
-            self.next_until_s = input.seconds + 0.1;
-        }
-        if input.undo {
-            self.undo_until_s = input.seconds + 0.1;
-        }
-        let pedal = if input.pedal { Buttons::PEDAL.0 } else { 0 };
-        let next = if input.seconds < self.next_until_s { Buttons::NEXT_TOOL.0 } else { 0 };
-        let undo = if input.seconds < self.undo_until_s { Buttons::UNDO.0 } else { 0 };
-        pointer.set(input.world_from_tool, Buttons(pedal | next | undo));
+        let asked = [
+            input.next_tool.then_some(Buttons::NEXT_TOOL),
+            input.undo.then_some(Buttons::UNDO),
+            (input.actions & 1 != 0).then_some(Buttons::FLAP),
+            input.chosen.map(|[_, slot]| Buttons::slot(slot)),
+        ];
+        let asked = self.requests.at(input.seconds, asked.into_iter().flatten());
+        let pedal = if input.pedal { Buttons::PEDAL } else { Buttons(0) };
+        pointer.set(input.world_from_tool, asked | pedal);
     }
 }
 
-fn warnings(bits: u32) -> Vec<String> {
-    let standing = Warning::ALL.iter().enumerate().filter(|(at, _)| bits & (1 << at) != 0);
-    standing.map(|(_, warning)| warning.text().to_string()).collect()
+impl Show {
+    /// What passes between a teacher and a trainee in this picture.
+    fn listen(&mut self, input: &WindowInput) -> Lesson {
+        let (lesson, asks) = match &mut self.company {
+            Company { teacher: Some(teacher), .. } => (taught(teacher, input), *teacher.asks()),
+            Company { asked: Some(asked), .. } => {
+                let asks = *asked.latest().0;
+                (Lesson::asked(asks.flags), asks)
+            }
+            _ => return Lesson::default(),
+        };
+        let shows = |bit| asks.flags & bit != 0;
+        self.ghost = shows(TeacherRecord::GHOST).then_some(asks.ghost);
+        self.markers.clear();
+        self.markers.extend(shows(TeacherRecord::MARKER).then_some(asks.marker));
+        lesson
+    }
 }
 
-fn hint(phase: Phase, mouse: bool) -> &'static str {
-    match (phase, mouse) {
-        (_, false) => "the operation runs by itself",
-        (Phase::Craniotomy, true) => {
-            "drag the burr to the skull, hold Space to drill, turn the wheel to push; U undoes the last stroke, N takes the probe"
+/// What a lesson adds to the panel.
+#[derive(Default)]
+struct Lesson {
+    warnings: Vec<String>,
+    actions: Vec<Action>,
+}
+
+impl Lesson {
+    /// What a trainee is told; of a pause the panel tells by itself.
+    fn asked(flags: u32) -> Self {
+        let trouble = ASKED.into_iter().filter(|(bit, _)| flags & bit & !TeacherRecord::PAUSE != 0);
+        Self { warnings: trouble.map(|(_, text)| text.into()).collect(), ..Self::default() }
+    }
+}
+
+const TEACH: &str = "you watch; your mouse and keys hold a ghost of the tool";
+
+/// A teacher's switches: what they do, their key, and their bit.
+const SWITCHES: [(&str, char, u32); 5] = [
+    ("Show the trainee my tool", 'g', TeacherRecord::GHOST),
+    ("Mark the place of my tool", 'k', TeacherRecord::MARKER),
+    ("Pause the trainee", 'j', TeacherRecord::PAUSE),
+    ("Take the drill's power", 'w', TeacherRecord::NO_POWER),
+    ("Let the patient bleed", 'h', TeacherRecord::BLEEDING),
+];
+
+/// Does what the teacher asks for, tells the trainee, and gives the switches as they are then.
+fn taught(teacher: &mut Teacher, input: &WindowInput) -> Lesson {
+    for (at, (.., bit)) in SWITCHES.into_iter().enumerate().filter(|(at, _)| input.actions >> at & 1 != 0) {
+        if at == 1 && teacher.asks().flags & bit == 0 {
+            teacher.mark(input.world_from_tool.translation);
+        } else {
+            teacher.switch(bit);
         }
-        (Phase::Brain, true) => "press the probe on the brain: drag it, turn the wheel to push",
+    }
+    teacher.tell(input.world_from_tool);
+    let flags = teacher.asks().flags;
+    let switch =
+        |(name, key, bit): (&str, char, u32)| Action { name: name.into(), key: Some(key), on: flags & bit != 0 };
+    Lesson { actions: SWITCHES.map(switch).into(), ..Lesson::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trainee_reads_what_is_asked() {
+        let lesson = Lesson::asked(TeacherRecord::PAUSE | TeacherRecord::BLEEDING | TeacherRecord::GHOST);
+        assert_eq!(lesson.warnings, [ASKED[2].1]);
+    }
+
+    #[test]
+    fn a_request_is_held_for_a_tenth_of_a_second() {
+        let mut requests = Requests::default();
+        let asked = requests.at(1.0, [Buttons::UNDO, Buttons::slot(2)].into_iter());
+        assert!(asked.has(Buttons::UNDO) && asked.in_slot() == Some(2));
+        assert_eq!(requests.at(1.09, std::iter::empty()), asked);
+        assert_eq!(requests.at(1.11, [Buttons::FLAP].into_iter()), Buttons::FLAP);
     }
 }

@@ -1,0 +1,282 @@
+//! A recorded session in the window: a film that runs, stands still, and goes to any time.
+//!
+//! # Practice
+//! The film is made at full speed while it is shown ([`crate::run::film`]); how far it is stands beside the bar. Going somewhere writes the voxels that changed in between, some
+//! 20 ns each, at most [`MOST`] a picture: a jump over more of them takes a few pictures. Between two shots that keep a brain it is drawn in between.
+
+use crate::program::Program;
+use crate::run::View;
+use crate::run::film::Shot;
+use crate::run::stop::Stop;
+use crate::show::keep::Keeper;
+use crate::show::picture::{Album, frame};
+use crate::show::said;
+use crate::show::window::{self, Opened};
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
+use trepan_geometry::Vec3;
+use trepan_link::Recording;
+use trepan_render::window::{Capture, Mark, Panel, Playback, Session, Timeline, WindowInput};
+use trepan_render::{Camera, Frame, Image, Painter};
+use trepan_volume::BoneVolume;
+
+/// Voxels written in a picture at most: some 10 ms.
+const MOST: usize = 500_000;
+/// Events of these kinds are no marks: they come many times a second.
+const STREAMED: [&str; 1] = ["score"];
+
+/// The film, and where it is.
+struct Film {
+    shots: Vec<Shot>,
+    coming: Receiver<Shot>,
+    bone: Option<Arc<BoneVolume>>,
+    /// The shot that is shown.
+    at: usize,
+    /// The brain as it is shown.
+    positions: Vec<Vec3>,
+}
+
+impl Film {
+    fn time_ms(&self, shot: usize) -> f64 {
+        self.shots.get(shot).map_or(0.0, |shot| shot.view.time_ms)
+    }
+
+    /// How far the film is made, ms.
+    fn ready_ms(&self) -> f64 {
+        self.time_ms(self.shots.len().saturating_sub(1))
+    }
+
+    /// Takes in what was made since the last picture.
+    fn grow(&mut self) {
+        self.shots.extend(self.coming.try_iter());
+    }
+
+    /// Goes to the last shot up to a time, or as far towards it as a picture allows.
+    fn go_to(&mut self, time_ms: f64) {
+        let wanted = self.shots.partition_point(|shot| shot.view.time_ms <= time_ms).saturating_sub(1);
+        let mut written = 0;
+        while self.at < wanted && written < MOST {
+            self.at += 1;
+            written += self.write(self.at, true);
+        }
+        while self.at > wanted && written < MOST {
+            written += self.write(self.at, false);
+            self.at -= 1;
+        }
+        self.place_brain();
+    }
+
+    /// Writes the changes of a shot into the skull that is shown; says how many.
+    fn write(&self, shot: usize, forwards: bool) -> usize {
+        let (Some(bone), Some(shot)) = (&self.bone, self.shots.get(shot)) else { return 0 };
+        for change in &shot.changes {
+            bone.set_hu(change.voxel, if forwards { change.after } else { change.before });
+        }
+        shot.changes.len()
+    }
+
+    /// The brain between the shot that kept it last and the next.
+    fn place_brain(&mut self) {
+        let kept = |(at, shot): (usize, &Shot)| shot.positions.is_some().then_some(at);
+        let before = self.shots.iter().enumerate().take(self.at + 1).rev().find_map(kept);
+        let after = self.shots.iter().enumerate().skip(self.at + 1).find_map(kept);
+        let positions = |at: usize| self.shots.get(at).and_then(|shot| shot.positions.as_ref());
+        let Some(from) = before.and_then(positions) else { return };
+        self.positions.clone_from(from);
+        if let (Some(before), Some(after)) = (before, after) {
+            let span_ms = self.time_ms(after) - self.time_ms(before);
+            let share = ((self.time_ms(self.at) - self.time_ms(before)) / span_ms.max(1e-9)) as f32;
+            let to = positions(after).into_iter().flatten();
+            self.positions.iter_mut().zip(to).for_each(|(at, to)| *at = at.lerp(*to, share));
+        }
+    }
+}
+
+/// What the window shows.
+struct Player {
+    film: Film,
+    timeline: Timeline,
+    now_s: Option<f64>,
+    first: View,
+    case: String,
+    program: Program,
+    bone_shown: bool,
+    keeper: Keeper,
+    stop: Stop,
+    /// Closes by itself then, s.
+    until_s: f64,
+}
+
+/// Shows a recording that is being run again, until the window is closed, or for `until_s`.
+pub fn show(
+    first: View,
+    coming: Receiver<Shot>,
+    painter: Painter,
+    opened: &Opened<'_>,
+    recording: &Recording,
+    until_s: f64,
+    stop: &Stop,
+) -> Album {
+    let bone = opened.scene.bone.clone().filter(|_| opened.program.has_bone());
+    let player = Player {
+        timeline: timeline(recording),
+        now_s: None,
+        first,
+        case: opened.case.into(),
+        program: opened.program,
+        bone_shown: bone.is_some(),
+        keeper: Keeper::into_folder(&opened.out.join("window")),
+        stop: stop.clone(),
+        until_s,
+        film: Film { shots: Vec::new(), coming, bone, at: 0, positions: Vec::new() },
+    };
+    let (player, mut album) = window::run(player, painter, opened, first);
+    stop.ask();
+    album.faults.extend(player.keeper.finish());
+    album
+}
+
+/// The whole of a recording, with its events.
+fn timeline(recording: &Recording) -> Timeline {
+    let told =
+        recording.events.iter().filter(|event| event.kind != "cleared" && !STREAMED.contains(&event.kind.as_str()));
+    let mark = |event: &trepan_link::wire::EventRecord| Mark {
+        at_s: event.time_ms * 1e-3,
+        text: event.text.clone(),
+        warning: event.kind == "warning",
+    };
+    let length_s = recording.ticks.last().map_or(0.0, |tick| tick.time_ms * 1e-3);
+    Timeline { at_s: 0.0, length_s, ready_s: 0.0, running: true, speed: 1.0, marks: told.map(mark).collect() }
+}
+
+/// Moves on by the time since the last picture, after what the user asked for.
+fn advance(timeline: &mut Timeline, asked: Option<Playback>, passed_s: f64) {
+    match asked {
+        Some(Playback::Run(running)) => {
+            timeline.running = running;
+            if running && timeline.at_s >= timeline.length_s {
+                timeline.at_s = 0.0;
+            }
+        }
+        Some(Playback::Speed(speed)) => timeline.speed = speed,
+        Some(Playback::Seek(at_s)) => timeline.at_s = at_s.clamp(0.0, timeline.length_s),
+        None => {}
+    }
+    if timeline.running {
+        // Time waits for the film.
+        let next_s = (timeline.at_s + passed_s * f64::from(timeline.speed)).min(timeline.ready_s);
+        timeline.at_s = timeline.at_s.max(next_s);
+        timeline.running = timeline.at_s < timeline.length_s;
+    }
+}
+
+impl Session for Player {
+    fn update(&mut self, input: &WindowInput) -> Panel {
+        self.film.grow();
+        self.timeline.ready_s = self.film.ready_ms() * 1e-3;
+        let passed_s = input.seconds - self.now_s.replace(input.seconds).unwrap_or(input.seconds);
+        advance(&mut self.timeline, input.playback, passed_s);
+        self.film.go_to(self.timeline.at_s * 1e3);
+        let mut panel = said::panel(&self.case, self.program, self.view());
+        panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
+        let finished = self.stop.asked() || input.seconds > self.until_s;
+        let hint = "a recorded session: Space runs it, the bar goes to any time".into();
+        Panel { hint, timeline: Some(self.timeline.clone()), finished, ..panel }
+    }
+
+    fn frame(&self, camera: Camera) -> Frame<'_> {
+        let positions = Some(self.film.positions.as_slice()).filter(|p| !p.is_empty());
+        frame(camera, self.view(), positions, self.bone_shown)
+    }
+
+    fn capture(&mut self, what: Capture, picture: Image) {
+        self.keeper.keep(what, picture);
+    }
+}
+
+impl Player {
+    fn view(&self) -> &View {
+        self.film.shots.get(self.film.at).map_or(&self.first, |shot| &shot.view)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::film::Change;
+    use crate::stages::haptic_tick::ToolSample;
+    use glam::IVec3;
+    use std::sync::mpsc::channel;
+    use trepan_geometry::{Pose, ToolState};
+    use trepan_volume::VoxelVolume;
+
+    fn view(time_ms: f64) -> View {
+        let tool = Program::Craniotomy.tray()[0];
+        let sample = ToolSample { tick: 0, state: ToolState::at(Pose::IDENTITY), tool, slot: 0, drilling: false };
+        View { time_ms, ..View::at(sample, 1.0) }
+    }
+
+    /// A film of `count` shots, 10 ms apart; each takes voxel n away, each other one keeps a brain.
+    fn film(count: usize) -> Film {
+        let bone = VoxelVolume::isotropic([40, 40, 4], Vec3::ZERO, 1.0, 900i16);
+        let bone = Some(Arc::new(BoneVolume::new(&bone, 400).unwrap()));
+        let (sender, coming) = channel();
+        for n in 0..count {
+            let voxel = IVec3::new(n as i32 % 40, n as i32 / 40, 1);
+            let changes = vec![Change { voxel, before: 900, after: -1000 }];
+            let positions = (n % 2 == 0).then(|| vec![Vec3::X * n as f32]);
+            sender.send(Shot { view: view(10.0 * n as f64), changes, positions }).unwrap();
+        }
+        let mut film = Film { shots: Vec::new(), coming, bone, at: 0, positions: Vec::new() };
+        film.grow();
+        film.write(0, true);
+        film
+    }
+
+    #[test]
+    fn the_skull_is_what_it_was_wherever_one_goes() {
+        let mut film = film(200);
+        let bone = film.bone.clone().unwrap();
+        let gone = || (0..200).filter(|n| !bone.is_bone(IVec3::new(n % 40, n / 40, 1))).count();
+        for (time_ms, shot) in [(995.0, 99), (0.0, 0), (1990.0, 199), (501.0, 50), (500.0, 50), (-5.0, 0), (1e9, 199)] {
+            film.go_to(time_ms);
+            assert_eq!((film.at, gone()), (shot, shot + 1), "at {time_ms} ms");
+            assert!((film.positions[0].x - shot as f32).abs() < 1.0 + 1e-3, "{}", film.positions[0].x);
+        }
+        film.go_to(510.0);
+        assert_eq!(film.positions[0].x, 51.0, "between the brains of shots 50 and 52");
+    }
+
+    #[test]
+    fn time_runs_waits_for_the_film_and_stops_at_its_end() {
+        let marks = [].into();
+        let mut t = Timeline { at_s: 0.0, length_s: 10.0, ready_s: 1.0, running: true, speed: 2.0, marks };
+        advance(&mut t, None, 0.25);
+        assert_eq!(t.at_s, 0.5);
+        advance(&mut t, None, 1.0);
+        assert_eq!((t.at_s, t.running), (1.0, true));
+        t.ready_s = 10.0;
+        advance(&mut t, Some(Playback::Seek(20.0)), 0.0);
+        assert_eq!((t.at_s, t.running), (10.0, false));
+        advance(&mut t, Some(Playback::Run(true)), 0.5);
+        assert_eq!((t.at_s, t.running), (1.0, true), "from the start again");
+        advance(&mut t, Some(Playback::Run(false)), 0.5);
+        advance(&mut t, Some(Playback::Speed(0.25)), 0.5);
+        assert_eq!((t.at_s, t.speed), (1.0, 0.25));
+    }
+
+    #[test]
+    fn marks_are_what_happened_and_no_streams() {
+        let event = |kind: &str, text: &str| trepan_link::wire::EventRecord {
+            kind: kind.into(),
+            text: text.into(),
+            time_ms: 1500.0,
+            ..Default::default()
+        };
+        let events =
+            vec![event("score", "{}"), event("warning", "near"), event("cleared", "near"), event("phase", "brain")];
+        let marks = timeline(&Recording { events, ..Recording::default() }).marks;
+        let texts: Vec<_> = marks.iter().map(|mark| (mark.text.as_str(), mark.warning, mark.at_s)).collect();
+        assert_eq!(texts, [("near", true, 1.5), ("brain", false, 1.5)]);
+    }
+}

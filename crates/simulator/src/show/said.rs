@@ -1,0 +1,124 @@
+//! What the window says of a session, live or shown again: phase, tool, forces, warnings, in words.
+
+use crate::program::{Phase, Program, called};
+use crate::run::View;
+use crate::stages::notice::{Notice, Warning};
+use trepan_geometry::Buttons;
+use trepan_render::window::{Choice, Panel, Sound};
+
+/// How long something that happened is shown, ms.
+const NEWS_MS: f64 = 4000.0;
+
+/// Warnings of harm to the patient: the alarm sounds. The others are of device and machine.
+const DANGERS: [Warning; 6] = [
+    Warning::BreakThrough,
+    Warning::BreachSoon,
+    Warning::BrainNear,
+    Warning::BrainTouched,
+    Warning::BrainPressed,
+    Warning::ForbiddenNear,
+];
+
+/// What holds of every session.
+pub fn panel(case: &str, program: Program, view: &View) -> Panel {
+    let value = |name: &str, value: String| (name.to_string(), value);
+    let sample = &view.sample;
+    let [_, late, held] = view.counts;
+    let values = [
+        value("depth in bone", format!("{:.2} mm", view.depth_mm[0])),
+        value("depth in tissue", format!("{:.2} mm", view.depth_mm[1])),
+        value("tool to brain", format!("{:.1} mm", view.brain_distance_mm)),
+        value("bone removed", format!("{:.0} mm³", view.removed_mm3)),
+        value("late / held ticks", format!("{late} / {held}")),
+        value("time", format!("{:.1} s", view.time_ms * 1e-3)),
+    ];
+    let second = view.second.map(|second| value("second hand", format!("{:.2} N", second.force.length())));
+    Panel {
+        case: case.into(),
+        phase: sample.phase().name().into(),
+        tool: called(&sample.tool),
+        drilling: sample.drilling,
+        sound: Sound {
+            spindle: view.spindle,
+            load: view.force.length() / view.force_limit_n.max(1e-3),
+            alarm: standing(view.warnings).any(|warning| DANGERS.contains(&warning)),
+        },
+        force_n: view.force.length(),
+        force_limit_n: view.force_limit_n,
+        choices: vec![tray(program, sample.slot)],
+        values: values.into_iter().chain(second).collect(),
+        warnings: standing(view.warnings).map(|warning| warning.text().into()).collect(),
+        news: news(view),
+        ..Panel::default()
+    }
+}
+
+/// A pause, and what happened lately.
+fn news(view: &View) -> Vec<String> {
+    let pause =
+        view.sample.state.buttons.has(Buttons::PAUSE).then(|| "PAUSED by the teacher: no force, no drill".into());
+    let lately = view.news.filter(|notice| view.time_ms - notice.time_ms < NEWS_MS).map(told);
+    pause.into_iter().chain(lately).collect()
+}
+
+/// The tools, the one in the hand chosen.
+fn tray(program: Program, slot: usize) -> Choice {
+    let options = program.tray().iter().map(|tool| (called(tool), true)).collect();
+    Choice { name: "Tool".into(), options, chosen: slot }
+}
+
+fn standing(bits: u32) -> impl Iterator<Item = Warning> {
+    Warning::ALL.into_iter().enumerate().filter(move |(at, _)| bits & (1 << at) != 0).map(|(_, warning)| warning)
+}
+
+fn told(notice: Notice) -> String {
+    let (kind, text) = notice.words();
+    format!("{kind}: {text}")
+}
+
+/// What to do next.
+pub fn hint(phase: Phase, by_hand: bool) -> &'static str {
+    match (phase, by_hand) {
+        (_, false) => "the operation runs by itself",
+        (Phase::Craniotomy, true) => {
+            "drag the tool to the skull, hold Space to drill, turn the wheel to push; U undoes the last stroke"
+        }
+        (Phase::Brain, true) => "press the tool on the brain: drag it, turn the wheel to push",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::haptic_tick::ToolSample;
+    use crate::stages::notice::What;
+    use trepan_geometry::{Pose, ToolState, Vec3};
+
+    fn view(warnings: u32) -> View {
+        let tool = Program::Integrated.tray()[1];
+        let sample = ToolSample { tick: 1, state: ToolState::at(Pose::IDENTITY), tool, slot: 1, drilling: true };
+        View { warnings, time_ms: 5000.0, spindle: 0.5, force: Vec3::X, ..View::at(sample, 2.0) }
+    }
+
+    #[test]
+    fn dangers_sound_and_the_rest_is_read() {
+        let bit = |warning| 1 << Warning::ALL.iter().position(|w| *w == warning).unwrap();
+        let panel = |bits| panel("composite", Program::Integrated, &view(bits));
+        assert!(panel(bit(Warning::BrainTouched)).sound.alarm);
+        let late = panel(bit(Warning::TissueLate));
+        assert!(!late.sound.alarm && late.warnings == [Warning::TissueLate.text()]);
+        assert_eq!((late.sound.spindle, late.sound.load), (0.5, 0.5));
+        assert_eq!((late.choices[0].chosen, late.choices[0].options[1].0.as_str()), (1, "burr 4 mm"));
+    }
+
+    #[test]
+    fn news_grow_old() {
+        let mut view = view(0);
+        view.news = Some(Notice { tick: 1, time_ms: 4000.0, what: What::NotOpen });
+        assert_eq!(panel("c", Program::Brain, &view).news.len(), 1);
+        view.time_ms = 9000.0;
+        assert_eq!(panel("c", Program::Brain, &view).news.len(), 0);
+        view.sample.state.buttons = Buttons::PAUSE;
+        assert!(panel("c", Program::Brain, &view).news[0].contains("PAUSED"), "in a replay too");
+    }
+}
