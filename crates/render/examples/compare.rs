@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 use trepan_gpu::{Gpu, Prefer};
-use trepan_render::{Camera, Frame, Hit, Painter, ProcessorRenderer, Renderer, SceneData};
+use trepan_render::{Camera, Casting, Frame, Hit, Painter, ProcessorRenderer, Renderer, SceneData};
 use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -27,6 +27,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let ms = start.elapsed().as_secs_f64() * 1e3;
         println!("processor, {} threads: {ms:7.1} ms for {} rays", processor.threads, report.pixels_cast);
         hits.push(processor.bone_hits());
+    }
+    processor.set_casting(Casting { sparse: true, ..Casting::default() });
+    for (frame, exact) in frames.iter().zip(&hits) {
+        let start = Instant::now();
+        processor.draw(frame)?;
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        println!("processor, sparsely: {ms:7.1} ms; {}", apart(&processor.bone_hits(), exact));
     }
     match Gpu::open(Prefer::Hardware) {
         Err(why) => println!("{}", Painter::on(Err(why), &data, size)?.notice().unwrap_or_default()),

@@ -12,7 +12,7 @@ use crate::frame::{Frame, SceneData, bounds};
 use crate::image::Image;
 use crate::mri::Signals;
 use crate::renderer::{DrawReport, LEAST_DETAIL};
-use crate::{ProcessorRenderer, RenderError, Renderer, View};
+use crate::{Casting, ProcessorRenderer, RenderError, Renderer, View};
 use std::sync::Arc;
 use trepan_geometry::Aabb;
 use trepan_gpu::{Gpu, GpuError, Prefer};
@@ -92,13 +92,15 @@ impl Painter {
         }
     }
 
-    /// Makes the pictures fit an area of `size` pixels, coarser where `detail`, a share of the pixels along an edge, is under 1. The
-    /// processor then draws smaller pictures; a device draws only the 3-D view with fewer pixels.
+    /// Makes the pictures fit an area of `size` pixels, coarser where `detail`, a share of the pixels along an edge, is under 1: a device draws the 3-D
+    /// view with fewer pixels; the processor casts every second ray where bone is smooth, and under 1/2 draws smaller pictures.
     pub fn fit(&mut self, size: [u32; 2], detail: f32) -> Result<(), RenderError> {
         match &mut self.by {
             By::Device(renderer) => renderer.set_detail(detail).and_then(|()| renderer.resize(size)),
             By::Processor(processor) => {
-                let share = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
+                let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
+                processor.set_casting(Casting { sparse: detail < 1.0, ..processor.casting() });
+                let share = (2.0 * detail).min(1.0);
                 processor.resize(size.map(|n| ((n as f32 * share).round() as u32).clamp(n.min(1), n)))
             }
         }

@@ -108,8 +108,7 @@ impl Skull {
     /// Lets rays leap over bricks without bone, or has them walk every cell.
     pub fn set_leaping(&mut self, gpu: &Gpu, leaping: bool) {
         self.leaping = leaping;
-        let free = if leaping { self.leaps.free.clone() } else { vec![0; self.leaps.free.len()] };
-        self.leap.write(gpu, [0; 3], self.leap.size(), &free);
+        self.write_leaps(gpu);
     }
 
     /// Hands everything to the device, a few layers at a time.
@@ -121,9 +120,15 @@ impl Skull {
             // Submitting lets the device take the layers over before the next ones come.
             gpu.record("load").submit();
         }
-        self.leap.write(gpu, [0; 3], self.leap.size(), &self.leaps.free);
+        self.write_leaps(gpu);
         let shares = self.grid.shares(self.bone.as_deref());
         self.crowd.write(gpu, [0; 3], self.crowd.size(), &shares);
+    }
+
+    fn write_leaps(&self, gpu: &Gpu) {
+        let free = |at| if self.leaping { self.leaps.free(at) } else { 0 };
+        let free: Vec<u8> = (0..self.leaps.cells.len()).map(free).collect();
+        self.leap.write(gpu, [0; 3], self.leap.size(), &free);
     }
 
     fn upload(&self, gpu: &Gpu, first: [usize; 3], size: [usize; 3]) {
@@ -139,6 +144,9 @@ impl Skull {
         for &brick in &changed {
             self.refresh(gpu, &bone, brick);
         }
+        if self.leaps.settle() {
+            self.write_leaps(gpu);
+        }
         Followed::of(&self.grid, &changed, left)
     }
 
@@ -146,13 +154,9 @@ impl Skull {
     fn refresh(&mut self, gpu: &Gpu, bone: &BoneVolume, brick: [usize; 3]) {
         let (first, size) = self.grid.voxels_of(brick);
         self.upload(gpu, first, size);
-        let (cells, anew) = self.leaps.follow(bone, brick);
-        for cells in cells.into_iter().filter(|_| self.leaping) {
-            let free = self.leaps.free[self.leaps.index(cells)];
+        for cells in self.leaps.follow(bone, brick).into_iter().filter(|_| self.leaping) {
+            let free = self.leaps.free(self.leaps.index(cells));
             self.leap.write(gpu, cells.map(|v| v as u32), [1; 3], &[free]);
-        }
-        if anew && self.leaping {
-            self.leap.write(gpu, [0; 3], self.leap.size(), &self.leaps.free);
         }
         for block in self.grid.blocks_of(brick) {
             self.crowd.write(gpu, block.map(|v| v as u32), [1; 3], &[self.grid.share(bone, block)]);

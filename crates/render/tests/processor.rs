@@ -171,7 +171,7 @@ fn without_a_device_the_processor_draws_and_says_why() {
     assert!(painter.name().contains("processor"));
     let (image, report) = painter.picture(&frame).expect("drawn");
     assert_eq!(([image.width, image.height], report.pixels_cast), ([120, 100], (120 - 33) * 100));
-    painter.fit([120, 100], 0.5).expect("half the detail");
+    painter.fit([120, 100], 0.25).expect("a quarter of the detail");
     let (image, _) = painter.picture(&frame).expect("drawn");
     assert_eq!([image.width, image.height], [60, 50]);
     assert!(painter.renderer().is_none() && painter.into_renderer().is_err());

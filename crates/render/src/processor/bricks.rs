@@ -1,12 +1,14 @@
 //! Twin of `bricks.wgsl`: rays through the padded grid of densities.
 
+use super::mix::{between, greater, greatest, least, lesser, mixed, trilinear};
+use super::root::enter;
 use crate::bricks::{BLOCK, Grid, LEAP, Leaps, densities};
 use crate::cut::height;
 use crate::scene::Scene;
 use crate::skull::{Followed, NOTHING};
 use glam::{BVec3A, IVec3, Vec3, Vec3A, Vec4};
 use std::array;
-use std::ops::{Add, Mul, Range, Sub};
+use std::ops::Range;
 use std::sync::Arc;
 use trepan_volume::BoneVolume;
 
@@ -22,12 +24,14 @@ pub struct Casting {
     pub leap: bool,
     /// Samples this far apart, in voxels, instead of the exact root in every cell: thin walls are lost.
     pub step_voxel: Option<f32>,
+    /// Whether only every second ray along both axes is cast, and those between only where bone is not smooth: twice as fast, for a camera that moves.
+    pub sparse: bool,
 }
 
 impl Default for Casting {
-    /// Leaps and exact roots.
+    /// Leaps, exact roots, and a ray for every pixel.
     fn default() -> Self {
-        Self { leap: true, step_voxel: None }
+        Self { leap: true, step_voxel: None, sparse: false }
     }
 }
 
@@ -66,6 +70,7 @@ impl Bricks {
         let mut changed = Vec::new();
         let left = bone.changed(&mut self.seen, limit, |brick| changed.push(brick));
         changed.iter().for_each(|&brick| self.refresh(&bone, brick));
+        self.leaps.settle();
         Followed::of(&self.grid, &changed, left)
     }
 
@@ -166,7 +171,8 @@ impl Bricks {
         let (end, mut t) = (end.min_element(), 0.0);
         for _ in 0..MOST_STEPS {
             let brick = cell_in((o + d * t) * (1.0 / LEAP as f32), last);
-            let free = self.leaps.free[self.leaps.index(brick.to_array().map(|v| v as usize))];
+            // Rays that lag behind the middle are beside its octants, so the cube around it counts.
+            let free = self.leaps.free(self.leaps.index(brick.to_array().map(|v| v as usize)));
             let (low, high) = (brick.as_vec3a() + 1.0 - f32::from(free), brick.as_vec3a() + f32::from(free));
             let over = reach(high, up, up.cmpgt(Vec3A::ZERO) & high.cmplt(count));
             let under = reach(low, down, down.cmplt(Vec3A::ZERO) & low.cmpgt(Vec3A::ZERO));
@@ -189,24 +195,28 @@ impl Bricks {
         let ray = Line::of(o, d);
         let dims = Vec3A::from(self.grid.dims.map(|n| n as f32));
         let (low, high) = (-ray.o * ray.inverse, (dims - 1.0 - ray.o) * ray.inverse);
-        let mut t = greater(low.min(high).max_element(), from);
-        let end = lesser(low.max(high).min_element(), until);
+        let mut t = greater(greatest(low.min(high)), from);
+        let end = lesser(least(low.max(high)), until);
         let nudge = NUDGE * self.grid.spacing_mm;
         let last = IVec3::from(self.leaps.bricks.map(|n| n as i32 - 1));
         let mut steps = 0;
         while t < end && steps < MOST_STEPS {
             steps += 1;
             let brick = cell_in(ray.at(t + nudge) * (1.0 / LEAP as f32), last);
-            let known = self.leaps.free[self.leaps.index(brick.to_array().map(|v| v as usize))];
-            let free = if self.casting.leap { known } else { 0 };
+            let at = self.leaps.index(brick.to_array().map(|v| v as usize));
+            let (free, cells) = if self.casting.leap {
+                (self.leaps.octants[at][ray.octant], self.leaps.cells[at])
+            } else {
+                (0, u64::MAX)
+            };
             let reach = f32::from(free.saturating_sub(1));
             // One wall further on where the ray goes up, `reach` more bricks on in its direction.
             let wall = brick.as_vec3a() + ray.ahead + reach * ray.side;
-            let leave = greater(((LEAP as f32 * wall - ray.o) * ray.inverse).min_element(), t + nudge);
+            let leave = greater(least((LEAP as f32 * wall - ray.o) * ray.inverse), t + nudge);
             if free == 0 {
                 let until = lesser(leave, end);
                 let hit = match self.casting.step_voxel {
-                    None => self.walk(&ray, t, until, &mut steps),
+                    None => self.walk(&ray, t, until, brick * LEAP as i32, cells, &mut steps),
                     Some(step) => self.sample(o, d, t..until, step * self.grid.spacing_mm, &mut steps),
                 };
                 if hit < NOTHING {
@@ -237,17 +247,22 @@ impl Bricks {
         NOTHING
     }
 
-    /// Walks the cells of a ray from `t` to `leave` (Amanatides and Woo 1987).
+    /// Walks the cells of a ray from `t` to `leave` (Amanatides and Woo 1987) in the brick from `first` on, of which these may hold bone.
     #[inline(always)]
-    fn walk(&self, ray: &Line, mut t: f32, leave: f32, steps: &mut u32) -> f32 {
+    fn walk(&self, ray: &Line, mut t: f32, leave: f32, first: IVec3, cells: u64, steps: &mut u32) -> f32 {
         let last = IVec3::from(self.grid.dims.map(|n| n as i32 - 2));
         let mut cell = cell_in(ray.at(t + NUDGE * self.grid.spacing_mm), last);
         let mut crossing = (cell.as_vec3a() + ray.ahead - ray.o) * ray.inverse;
         let across = ray.inverse.abs();
         while t < leave && *steps < MOST_STEPS {
             *steps += 1;
-            let next = greater(crossing.min_element(), t);
-            if let Some(corners) = self.corners(cell) {
+            let next = greater(least(crossing), t);
+            let local = cell - first;
+            // A cell beside the brick, by rounding, is looked at itself.
+            let beside = (local.x | local.y | local.z) as u32 >= LEAP as u32;
+            let bit = (local.x + LEAP as i32 * (local.y + LEAP as i32 * local.z)) as u32;
+            let may = beside || cells >> (bit & 63) & 1 == 1;
+            if may && let Some(corners) = self.corners(cell) {
                 let low = cell.as_vec3a();
                 let s = enter(&corners, ray.at(t) - low, ray.at(next) - low);
                 if s <= 1.0 {
@@ -291,6 +306,8 @@ struct Line {
     /// 1 along these axes, else -1.
     side: Vec3A,
     step: IVec3,
+    /// Of directions: bit n is set where it goes up along axis n.
+    octant: usize,
 }
 
 impl Line {
@@ -300,7 +317,8 @@ impl Line {
         let d = Vec3A::select(d.abs().cmplt(Vec3A::splat(1e-12)), Vec3A::splat(1e-12), d);
         let ahead = Vec3A::select(d.cmpgt(Vec3A::ZERO), Vec3A::ONE, Vec3A::ZERO);
         let side = ahead * 2.0 - 1.0;
-        Self { o: o.into(), d, inverse: d.recip(), ahead, side, step: side.as_ivec3() }
+        let octant = d.cmpgt(Vec3A::ZERO).bitmask() as usize;
+        Self { o: o.into(), d, inverse: d.recip(), ahead, side, step: side.as_ivec3(), octant }
     }
 
     #[inline(always)]
@@ -321,159 +339,8 @@ pub(crate) fn under(cut: Vec4, point: Vec3, along: Vec3) -> [f32; 2] {
     }
 }
 
-/// The lesser of two numbers that are numbers: one instruction, where `min` also answers for NaN.
-#[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// The greater of two numbers that are numbers.
-#[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-/// Trilinear interpolation between values at whole coordinates, clamped at the border.
-#[inline(always)]
-pub(crate) fn trilinear<V: Mix>(dims: [usize; 3], at: Vec3, value: impl Fn(usize) -> V) -> V {
-    let strides = [1, dims[0], dims[0] * dims[1]];
-    let places = array::from_fn(|n| between(at[n], dims[n], strides[n]));
-    // A grid of one layer has no next one.
-    mixed(places, array::from_fn(|n| if dims[n] > 1 { strides[n] } else { 0 }), value)
-}
-
-/// What can be interpolated.
-pub(crate) trait Mix: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<f32, Output = Self> {}
-impl<V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f32, Output = V>> Mix for V {}
-
-/// Where a coordinate lies along an axis of `count` values `stride` apart, clamped: position of the value before it, and the share of the next.
-#[inline(always)]
-fn between(x: f32, count: usize, stride: usize) -> (usize, f32) {
-    let last = count - 1;
-    let x = lesser(greater(x, 0.0), last as f32);
-    // Cutting off is rounding down for what is not negative; the library's `floor` is a call.
-    let low = (x as i32 as usize).min(last.saturating_sub(1));
-    (low * stride, x - low as f32)
-}
-
-/// The values around places along three axes, mixed by their shares.
-#[inline(always)]
-fn mixed<V: Mix>([(x, u), (y, v), (z, w)]: [(usize, f32); 3], next: [usize; 3], value: impl Fn(usize) -> V) -> V {
-    let mix = |a: V, b: V, share: f32| a + (b - a) * share;
-    let line = |start: usize| mix(value(start), value(start + next[0]), u);
-    let plane = |start: usize| mix(line(start), line(start + next[1]), v);
-    mix(plane(x + y + z), plane(x + y + z + next[2]), w)
-}
-
 /// Whole parts, clamped to a box from 0: what lies under 0 becomes 0, so that cutting off is as good as rounding down.
 #[inline(always)]
 fn cell_in(at: Vec3A, last: IVec3) -> IVec3 {
     at.as_ivec3().clamp(IVec3::ZERO, last)
-}
-
-/// Trilinear interpolation of a cell's corners at four places, given by their coordinates.
-#[inline(always)]
-fn blend(corners: &[f32; 8], [x, y, z]: [Vec4; 3]) -> Vec4 {
-    let line = |n: usize| corners[n] + x * (corners[n + 1] - corners[n]);
-    let plane = |n: usize| {
-        let (a, b) = (line(n), line(n + 2));
-        a + y * (b - a)
-    };
-    let (a, b) = (plane(0), plane(4));
-    a + z * (b - a)
-}
-
-/// Share of the way between two local points of a cell where bone begins, or 2.
-#[inline(always)]
-fn enter(corners: &[f32; 8], a: Vec3A, b: Vec3A) -> f32 {
-    let shares = Vec4::new(0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0);
-    let axis = |n: usize| a[n] + shares * (b[n] - a[n]);
-    first_root(blend(corners, [axis(0), axis(1), axis(2)]).to_array())
-}
-
-/// First root of the cubic with values `v` at 0, 1/3, 2/3, 1 that rises from below zero, or 2.
-///
-/// Between its extrema the cubic is monotone: Newton's method, kept between two ends of different sign.
-#[inline(always)]
-pub(crate) fn first_root(v: [f32; 4]) -> f32 {
-    if v[0] >= 0.0 {
-        return 0.0;
-    }
-    // The curve lies in the hull of its Bézier points.
-    let second = -5.0 * v[0] + 18.0 * v[1] - 9.0 * v[2] + 2.0 * v[3];
-    let third = 2.0 * v[0] - 9.0 * v[1] + 18.0 * v[2] - 5.0 * v[3];
-    if greater(greater(second, third), v[3]) < 0.0 {
-        return 2.0;
-    }
-    rising_root(v)
-}
-
-/// The same, where there may be a root.
-fn rising_root(v: [f32; 4]) -> f32 {
-    let c1 = 0.5 * (-11.0 * v[0] + 18.0 * v[1] - 9.0 * v[2] + 2.0 * v[3]);
-    let c2 = 4.5 * (2.0 * v[0] - 5.0 * v[1] + 4.0 * v[2] - v[3]);
-    let c3 = 4.5 * (-v[0] + 3.0 * v[1] - 3.0 * v[2] + v[3]);
-    let cubic = |s: f32| v[0] + s * (c1 + s * (c2 + s * c3));
-    let slope = |s: f32| c1 + s * (2.0 * c2 + s * 3.0 * c3);
-    let roots = greater(c2 * c2 - 3.0 * c1 * c3, 0.0).sqrt();
-    let q = -(c2 + if c2 >= 0.0 { roots } else { -roots });
-    let e1 = if c3.abs() > 1e-20 { q / (3.0 * c3) } else { 2.0 };
-    let e2 = if q.abs() > 1e-20 { c1 / q } else { 2.0 };
-    let mut start = 0.0;
-    while start < 1.0 {
-        let mut to = 1.0f32;
-        for extremum in [e1, e2] {
-            if extremum > start && extremum < to {
-                to = extremum;
-            }
-        }
-        if cubic(to) >= 0.0 {
-            let (mut low, mut high) = (start, to);
-            let mut s = 0.5 * (low + high);
-            for _ in 0..MOST_NEWTON {
-                let value = cubic(s);
-                if value < 0.0 {
-                    low = s
-                } else {
-                    high = s
-                }
-                let newton = s - value / slope(s);
-                if (newton - s).abs() < 1e-5 {
-                    return newton.clamp(low, high);
-                }
-                s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            }
-            return s;
-        }
-        start = to;
-    }
-    2.0
-}
-
-/// Most steps to a root: halving alone gets to 2⁻¹² in as many.
-const MOST_NEWTON: usize = 12;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(2000))]
-        #[test]
-        fn the_first_root_is_the_first_of_a_fine_scan(v in prop::array::uniform4(-1000.0f32..1000.0)) {
-            let values = v.map(f64::from);
-            let lagrange = |s: f64| {
-                let at = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
-                (0..4).map(|i| (0..4).filter(|&j| j != i).map(|j| (s - at[j]) / (at[i] - at[j])).product::<f64>() * values[i]).sum::<f64>()
-            };
-            let scan = (0..=4000).map(|n| f64::from(n) / 4000.0).find(|&s| lagrange(s) >= 0.0);
-            let root = f64::from(first_root(v));
-            match scan {
-                Some(s) => prop_assert!(root <= s + 3e-4 && (root > s - 6e-4 || lagrange(root) > -0.5), "{root} for {s}"),
-                // A scan may miss a peak between its points, never more than a sliver of one.
-                None => prop_assert!(root == 2.0 || lagrange(root).abs() < 0.5, "{root}"),
-            }
-        }
-    }
 }

@@ -52,14 +52,8 @@ impl Eye {
     ) -> u32 {
         let pixels_cast = self.cast(inputs, show_bone, view, threads);
         self.fragments.draw(brain, view, inputs.scene.brain_cut);
-        let [width, height] = self.size().map(|n| n as usize);
+        self.light(inputs, view, threads);
         let (rays, fragments) = (&self.rays, &self.fragments);
-        rows::share(threads, rows::of(&mut self.pixels, width, 0..height, 0..width), |y, row| {
-            for (x, pixel) in row.iter_mut().enumerate() {
-                let at = x + width * y;
-                *pixel = light::fragment(inputs, [x, y], &rays[at], fragments.at(at));
-            }
-        });
         let depth = |at: usize| rays[at].t.min(fragments.at(at).t);
         items.iter().for_each(|item| overlay::draw(item, inputs.scene, view, &mut self.pixels, depth));
         pixels_cast
@@ -80,14 +74,47 @@ impl Eye {
             let first = |n| [x + TILE * n, y + TILE * line];
             row.iter_mut().enumerate().for_each(|(n, far)| *far = clear(bricks, scene, first(n)));
         });
-        let (clears, top) = (&self.clear, y);
-        let rows = rows::of(&mut self.rays, self.area[2] as usize, y..y + h, x..x + w);
-        rows::share(threads, rows, |y, row| {
-            let clear = &clears[columns * ((y - top) / TILE)..];
-            let ray = |n: usize| cast(bricks, scene, [x + n, y], clear[n / TILE]);
-            row.iter_mut().enumerate().for_each(|(n, r)| *r = ray(n));
-        });
+        let clears = &self.clear;
+        let exact = |[at_x, at_y]: [usize; 2], around: &[Ray]| {
+            cast(bricks, scene, [at_x, at_y], clears[(at_x - x) / TILE + columns * ((at_y - y) / TILE)], around)
+        };
+        let width = self.area[2] as usize;
+        if bricks.casting.sparse && part[2..] == self.area[2..] {
+            let between = |at, around: &[Ray]| Ray::between(scene, at, around);
+            rows::sparsely(threads, &mut self.rays, width, exact, between);
+        } else {
+            rows::share(threads, rows::of(&mut self.rays, width, y..y + h, x..x + w), |y, row| {
+                row.iter_mut().enumerate().for_each(|(n, ray)| *ray = exact([x + n, y], &[]));
+            });
+        }
         part[2] * part[3]
+    }
+
+    /// Lights what every pixel shows.
+    fn light(&mut self, inputs: &Inputs, view: &View, threads: usize) {
+        let [width, height] = self.size().map(|n| n as usize);
+        let (rays, fragments, scene) = (&self.rays, &self.fragments, inputs.scene);
+        let tools = scene.tools().map(|[tip, tail]| overlay::rectangle(tip, tail, view, [width, height]));
+        let near = |at: [usize; 2]| tools.map(|tool| overlay::inside(tool, at));
+        let exact = |[x, y]: [usize; 2], _: &[[u8; 4]]| {
+            let at = x + width * y;
+            light::fragment(inputs, [x, y], near([x, y]), &rays[at], fragments.at(at))
+        };
+        if !inputs.bricks.casting.sparse {
+            return rows::share(threads, rows::of(&mut self.pixels, width, 0..height, 0..width), |y, row| {
+                row.iter_mut().enumerate().for_each(|(x, pixel)| *pixel = exact([x, y], &[]));
+            });
+        }
+        // Colours between those of bone that is smooth and hidden by nothing.
+        let bone = |at: usize| rays[at].t < fragments.at(at).t;
+        rows::sparsely(threads, &mut self.pixels, width, exact, |[x, y], around| {
+            let at = x + width * y;
+            let (aside, off) = (x % 2, y % 2 * width);
+            let corners = || [at - aside - off, at + aside - off, at - aside + off, at + aside + off];
+            let smooth =
+                rays[at].is_between() && near([x, y]) == [false; 2] && bone(at) && corners().into_iter().all(bone);
+            smooth.then(|| mean(around))
+        });
     }
 
     /// Copies the view into the picture; in one with the other eye's, only green and blue over that one's brightness.
@@ -110,4 +137,11 @@ impl Eye {
 fn anaglyph([r, g, b, _]: [u8; 4], right: [u8; 4]) -> [u8; 4] {
     let grey = 0.299 * f32::from(r) + 0.587 * f32::from(g) + 0.114 * f32::from(b);
     [grey.round() as u8, right[1], right[2], 255]
+}
+
+/// The mean of two or four colours.
+fn mean(colours: &[[u8; 4]]) -> [u8; 4] {
+    let sum = |c: usize| colours.iter().map(|colour| u32::from(colour[c])).sum::<u32>();
+    let count = colours.len() as u32;
+    [0, 1, 2, 3].map(|c| ((sum(c) + count / 2) / count) as u8)
 }

@@ -2,7 +2,7 @@
 
 use super::Inputs;
 use super::brain::Fragment;
-use super::bricks::trilinear;
+use super::mix::trilinear;
 use super::skull::Ray;
 use super::tool::{Met, lit};
 use crate::mri::Signals;
@@ -11,10 +11,12 @@ use crate::skull::NOTHING;
 use glam::{Vec3, Vec4};
 use std::sync::LazyLock;
 
-pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
+/// The colour of a pixel; `near` says which tools it may show.
+pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
     let scene = inputs.scene;
     let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
-    let [first, second] = scene.tools().map(|tool| Met::of(tool, eye, along));
+    let meets = |n: usize| if near[n] { Met::of(scene.tools()[n], eye, along) } else { Met::NONE };
+    let [first, second] = [meets(0), meets(1)];
     let t = bone.t.min(brain.t).min(first.t()).min(second.t());
     let point = eye + t * along;
     let colour = if t >= NOTHING {

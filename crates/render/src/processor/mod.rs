@@ -17,7 +17,9 @@ mod bricks;
 mod contour;
 mod eye;
 mod light;
+mod mix;
 mod overlay;
+mod root;
 mod rows;
 mod section;
 mod skull;
@@ -39,7 +41,7 @@ use crate::scene::Scene;
 use crate::slice::Plane;
 use crate::stereo::StereoLook;
 pub use bricks::Casting;
-pub(crate) use bricks::trilinear;
+pub(crate) use mix::trilinear;
 
 use bricks::Bricks;
 use eye::Eye;
@@ -187,10 +189,17 @@ impl ProcessorRenderer {
         }
     }
 
-    /// Changes how rays go through the bone, to measure what it is worth.
+    /// How rays go through the bone.
+    pub fn casting(&self) -> Casting {
+        self.bricks.casting
+    }
+
+    /// Changes how rays go through the bone.
     pub fn set_casting(&mut self, casting: Casting) {
-        self.bricks.casting = casting;
-        self.eyes.iter_mut().for_each(|eye| eye.recast.forget());
+        if self.bricks.casting != casting {
+            self.bricks.casting = casting;
+            self.eyes.iter_mut().for_each(|eye| eye.recast.forget());
+        }
     }
 
     /// Bricks, cells and samples that a ray of the newest picture has looked at in the mean, without its shadow.

@@ -6,7 +6,7 @@ use crate::camera::View;
 use crate::overlay::Item;
 use crate::scene::Scene;
 use crate::skull::NOTHING;
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 
 /// Share of alpha behind the scene.
 const HIDDEN: f32 = 0.25;
@@ -14,7 +14,7 @@ const HIDDEN: f32 = 0.25;
 /// Draws a shape over pixels of a picture, behind which the scene is as far as `depth` says.
 pub(crate) fn draw(item: &Item, scene: &Scene, view: &View, pixels: &mut [[u8; 4]], depth: impl Fn(usize) -> f32) {
     let (width, eye) = (scene.right.w as usize, scene.eye.truncate());
-    let [left, top, right, bottom] = rectangle(item, view, [width, scene.up.w as usize]);
+    let [left, top, right, bottom] = rectangle(item.tip, item.tail, view, [width, scene.up.w as usize]);
     for (x, y) in (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y))) {
         let (along, at) = (scene.ray_of(x, y), x + width * y);
         let (t, normal) = if item.kind.x > 0.5 { arrow(eye, along, item) } else { tool(eye, along, item) };
@@ -31,14 +31,18 @@ pub(crate) fn draw(item: &Item, scene: &Scene, view: &View, pixels: &mut [[u8; 4
     }
 }
 
-/// First and last pixels around an item's box; the whole view where the box reaches behind the eye.
-fn rectangle(item: &Item, view: &View, [width, height]: [usize; 2]) -> [usize; 4] {
-    let radius = item.tip.w.abs().max(item.tail.w.abs());
+/// First pixels, and those behind the last, around a body's box and a pixel more; the whole view where the box reaches behind the eye, and nothing where
+/// there is no body.
+pub(crate) fn rectangle(tip: Vec4, tail: Vec4, view: &View, [width, height]: [usize; 2]) -> [usize; 4] {
+    if tip.w <= 0.0 {
+        return [0; 4];
+    }
+    let radius = tip.w.max(tail.w);
     let size = Vec2::new(width as f32, height as f32);
     let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
     for n in 0..16 {
         let sides = Vec3::new((n & 1) as f32, (n >> 1 & 1) as f32, (n >> 2 & 1) as f32) * 2.0 - 1.0;
-        let end = if n < 8 { item.tip } else { item.tail };
+        let end = if n < 8 { tip } else { tail };
         let (at, depth) = view.project(end.truncate() + radius * sides);
         if depth < View::NEAR_MM {
             return [0, 0, width, height];
@@ -46,8 +50,13 @@ fn rectangle(item: &Item, view: &View, [width, height]: [usize; 2]) -> [usize; 4
         let at = (at * Vec2::new(0.5, -0.5) + 0.5) * size;
         (low, high) = (low.min(at), high.max(at));
     }
-    let (low, high) = (low.floor().clamp(Vec2::ZERO, size), high.ceil().clamp(Vec2::ZERO, size));
+    let (low, high) = ((low - 1.0).floor().clamp(Vec2::ZERO, size), (high + 1.0).ceil().clamp(Vec2::ZERO, size));
     [low.x as usize, low.y as usize, high.x as usize, high.y as usize]
+}
+
+/// Whether a pixel lies in a rectangle.
+pub(crate) fn inside([left, top, right, bottom]: [usize; 4], [x, y]: [usize; 2]) -> bool {
+    (left..right).contains(&x) && (top..bottom).contains(&y)
 }
 
 fn tool(eye: Vec3, along: Vec3, item: &Item) -> (f32, Vec3) {

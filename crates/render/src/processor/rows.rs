@@ -38,6 +38,39 @@ pub(crate) fn share<'a, T: Send + 'a>(
     });
 }
 
+/// Fills a grid sparsely: `exact` values at every second column of every second row, and between these what `between` makes of the values around, or
+/// exact ones, which know these values too, where it makes nothing of them.
+pub(crate) fn sparsely<T: Copy + Send + Sync>(
+    threads: usize,
+    grid: &mut [T],
+    width: usize,
+    exact: impl Fn([usize; 2], &[T]) -> T + Sync,
+    between: impl Fn([usize; 2], &[T]) -> Option<T> + Sync,
+) {
+    let height = grid.len() / width;
+    let rows = grid.chunks_exact_mut(width).enumerate();
+    let (mut first, second): (Vec<_>, Vec<_>) = rows.partition(|(y, _)| y % 2 == 0 || y + 1 == height);
+    let fill = |at, around: &[T]| between(at, around).unwrap_or_else(|| exact(at, around));
+    share(threads, first.iter_mut().map(|(y, row)| (*y, &mut **row)), |y, row| {
+        (0..width).step_by(2).for_each(|x| row[x] = exact([x, y], &[]));
+        for x in (1..width).step_by(2) {
+            row[x] =
+                if x + 1 < width && y % 2 == 0 { fill([x, y], &[row[x - 1], row[x + 1]]) } else { exact([x, y], &[]) };
+        }
+    });
+    let first: Vec<&[T]> = first.into_iter().map(|(_, row)| &*row).collect();
+    share(threads, second.into_iter(), |y, row| {
+        let [above, below] = [first[y / 2], first[y / 2 + 1]];
+        for x in 0..width {
+            row[x] = match x % 2 {
+                0 => fill([x, y], &[above[x], below[x]]),
+                _ if x + 1 == width => exact([x, y], &[]),
+                _ => fill([x, y], &[above[x - 1], above[x + 1], below[x - 1], below[x + 1]]),
+            };
+        }
+    });
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -52,6 +85,28 @@ mod tests {
                 let chosen = (2..6).contains(&y) && (1..5).contains(&x);
                 assert_eq!(*value, if chosen { 1 + y as u32 } else { 0 });
             }
+        }
+    }
+
+    #[test]
+    fn a_plane_is_filled_exactly_from_a_quarter_of_its_values() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        for (width, height) in [(1, 1), (2, 2), (7, 5), (8, 6), (9, 1), (1, 4)] {
+            let asked = AtomicUsize::new(0);
+            let plane = |[x, y]: [usize; 2]| {
+                asked.fetch_add(1, Ordering::Relaxed);
+                (3 * x + 5 * y) as f32
+            };
+            let mean = |_, around: &[f32]| Some(around.iter().sum::<f32>() / around.len() as f32);
+            let mut grid = vec![-1.0; width * height];
+            sparsely(2, &mut grid, width, |at, _| plane(at), mean);
+            assert!(grid.iter().enumerate().all(|(at, &v)| v == plane([at % width, at / width])), "{width}x{height}");
+            // A quarter, and the last row and column where their number is even.
+            let few = width.div_ceil(2) * height.div_ceil(2) + width + height;
+            assert!(asked.load(Ordering::Relaxed) - width * height <= few, "{width}x{height}");
+            let mut exact = vec![-1.0; width * height];
+            sparsely(3, &mut exact, width, |at, _| plane(at), |_, _| None);
+            assert_eq!(exact, grid);
         }
     }
 }

@@ -11,10 +11,12 @@ use glam::{Vec3, Vec4};
 pub(crate) struct Ray {
     /// Distance, mm, or [`NOTHING`].
     pub t: f32,
-    /// Bricks, cells and samples looked at.
+    /// Bricks, cells and samples looked at; none where bone was met between other rays.
     pub steps: u32,
     /// Unit, outwards.
     pub normal: Vec3,
+    /// Height of the surface's tangent plane over the eye along its normal, mm.
+    pub plane: f32,
     /// Ambient light that gets there.
     pub open: f32,
     /// Whether the lamp's light gets there.
@@ -22,7 +24,7 @@ pub(crate) struct Ray {
 }
 
 impl Ray {
-    pub const NONE: Self = Self { t: NOTHING, steps: 0, normal: Vec3::Z, open: 1.0, lit: false };
+    pub const NONE: Self = Self { t: NOTHING, steps: 0, normal: Vec3::Z, plane: 0.0, open: 1.0, lit: false };
 }
 
 /// Pixels along an edge of a tile.
@@ -38,8 +40,8 @@ pub(crate) fn clear(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2]) -> f32 {
     bricks.clear(bricks.grid_of(scene.eye.truncate()), middle / spacing, 1.01 * spread / spacing)
 }
 
-/// The ray of a pixel, which meets no bone before `from`, mm.
-pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32) -> Ray {
+/// The ray of a pixel, which meets no bone before `from`, mm. Between rays that are all lit it is taken as lit.
+pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32, around: &[Ray]) -> Ray {
     if from >= NOTHING {
         return Ray::NONE;
     }
@@ -57,8 +59,50 @@ pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32
     } else {
         bricks.outward_normal(g, along)
     };
-    let lit = normal.dot(scene.light.truncate()) > 0.0 && !bricks.shadowed(g, normal, scene);
-    Ray { t, steps, normal, open: 0.999 * bricks.openness(g, normal, scene.bone_cut), lit }
+    let known = around.iter().any(|ray| ray.lit) && around.iter().all(|ray| ray.lit || ray.t >= NOTHING);
+    let faces = normal.dot(scene.light.truncate()) > 0.0;
+    let lit = faces && (known || !bricks.shadowed(g, normal, scene));
+    let plane = t * along.dot(normal);
+    Ray { t, steps, normal, plane, open: 0.999 * bricks.openness(g, normal, scene.bone_cut), lit }
+}
+
+/// The least cosine of the angle between neighbours' normals on smooth bone.
+const SMOOTH: f32 = 0.95;
+
+/// How far neighbours' tangent planes may be apart on smooth bone, voxels.
+const FLAT_VOXEL: f32 = 0.25;
+
+impl Ray {
+    /// Whether the ray was not cast, but lies between rays that meet smooth bone.
+    pub fn is_between(&self) -> bool {
+        self.steps == 0 && self.t < NOTHING
+    }
+
+    /// What the ray of a pixel meets between others that meet nothing, or smooth bone: then their tangent planes agree.
+    pub fn between(scene: &Scene, [x, y]: [usize; 2], around: &[Self]) -> Option<Self> {
+        let first = around.first()?;
+        if first.t >= NOTHING {
+            return around.iter().all(|ray| ray.t >= NOTHING).then_some(Self::NONE);
+        }
+        let alike = |ray: &Self| ray.t < NOTHING && ray.lit == first.lit && ray.normal.dot(first.normal) > SMOOTH;
+        if !around.iter().all(alike) {
+            return None;
+        }
+        let along = scene.ray_of(x, y);
+        let share = 1.0 / around.len() as f32;
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut mean = Self { t: 0.0, steps: 0, normal: Vec3::ZERO, open: 0.0, ..*first };
+        for ray in around {
+            let t = ray.plane / along.dot(ray.normal);
+            (low, high) = (low.min(t), high.max(t));
+            mean.t += share * t;
+            mean.normal += ray.normal;
+            mean.open += share * ray.open;
+        }
+        let normal = mean.normal.normalize();
+        let flat = high - low < FLAT_VOXEL * scene.origin.w;
+        flat.then(|| Self { normal, plane: mean.t * along.dot(normal), ..mean })
+    }
 }
 
 /// Whether a point that a ray has met is where bone is cut.

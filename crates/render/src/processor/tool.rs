@@ -22,6 +22,8 @@ pub(crate) struct Met {
 }
 
 impl Met {
+    pub const NONE: Self = Self { tip: Vec4::ZERO, tail: Vec4::ZERO, at: [NOTHING; 3] };
+
     pub fn of([tip, tail]: [Vec4; 2], eye: Vec3, along: Vec3) -> Self {
         let round = |end: Vec4| ball(eye, along, end.truncate(), end.w);
         let at = if tip.w > 0.0 { [round(tip), shaft(eye, along, tip, tail), round(tail)] } else { [NOTHING; 3] };

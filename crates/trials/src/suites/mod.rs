@@ -46,12 +46,20 @@ pub struct Suite {
 }
 
 /// Suites that fetch programs of others: run when they are named only.
-pub const ON_REQUEST: &[Suite] = &[Suite {
-    name: "mesh-rivals",
-    question: "how do TetGen and fTetWild fill the same surface (fetched from Python's package index for this run)",
-    chart: ("mesh_s", "min_dihedral_deg"),
-    run: mesh::rivals::run,
-}];
+pub const ON_REQUEST: &[Suite] = &[
+    Suite {
+        name: "render-rivals",
+        question: "how fast is VTK's ray caster at an equal image error (fetched from Python's package index for this run)",
+        chart: ("frame_p50_ms", "image_error_percent"),
+        run: render::rivals::run,
+    },
+    Suite {
+        name: "mesh-rivals",
+        question: "how do TetGen and fTetWild fill the same surface (fetched from Python's package index for this run)",
+        chart: ("mesh_s", "min_dihedral_deg"),
+        run: mesh::rivals::run,
+    },
+];
 
 /// Every suite.
 pub const ALL: &[Suite] = &[

@@ -1,0 +1,140 @@
+//! Side by side with VTK's ray caster for processors, which runs as a program of its own in a throw-away Python environment.
+//!
+//! # Practice
+//! Needs Python 3 with `venv`, and its package index once; without them it says so and finds nothing. `TREPAN_PYTHON` names another Python, one that may have VTK already. Both look at the same
+//! shell from the same eye with all cores, while the camera moves. Each one's error is that of its picture against its own with the finest steps, since their lamps
+//! differ; ours has shadows and ambient light, VTK's has neither. VTK's time is that of the first distance of samples whose error is no larger than ours.
+
+use super::likeness::error_percent;
+use super::scenes::{ISO, frame, head};
+use super::{By, EXACT, SPARSE, Setting};
+use crate::suite::{Findings, Gate, Row};
+use crate::suites::Scope;
+use crate::timer::Samples;
+use glam::Vec3;
+use std::path::Path;
+use std::process::Command;
+use trepan_render::{Casting, Image};
+
+/// Draws with VTK.
+const SCRIPT: &str = include_str!("rivals.py");
+/// The environment variable with another Python.
+const PYTHON: &str = "TREPAN_PYTHON";
+/// Distances between VTK's samples, voxels, finest first; the first is its reference.
+const STEPS: [f64; 5] = [0.0625, 0.125, 0.25, 0.5, 1.0];
+
+/// A shell by both.
+pub fn run(scope: Scope) -> Findings {
+    let mut findings = Findings::default();
+    let size = scope.pick([640, 480], [1680, 1050]);
+    let edge = scope.pick(100, 160);
+    match vtk(edge, size, scope.pick(4, 10)) {
+        Ok(theirs) => compare(edge, size, scope, &theirs, &mut findings),
+        Err(fault) => println!("  left out, since there is no Python with VTK: {fault}"),
+    }
+    findings
+}
+
+/// What VTK took with a distance of samples, and how far its picture is from its finest.
+struct Theirs {
+    step_voxel: f64,
+    ms: f64,
+    error_percent: f64,
+}
+
+fn compare(edge: usize, size: [u32; 2], scope: Scope, theirs: &[Theirs], findings: &mut Findings) {
+    let scene = format!("drilled shell of {edge} voxels at {}x{}", size[0], size[1]);
+    let row = |method: String, ms: f64, error: f64| {
+        Row::new(&scene, method).metric("frame_p50_ms", ms).metric("image_error_percent", error)
+    };
+    for t in theirs {
+        findings.rows.push(row(format!("VTK: samples every {} voxel", t.step_voxel), t.ms, t.error_percent));
+    }
+    let [here, aside] =
+        [0.0, 0.01].map(|turn| frame(Vec3::ZERO, Vec3::new(0.2 + turn, 1.0, 0.5), 1.75 * edge as f32, 0.6));
+    let mut by = By::all(&head(edge), None, size).remove(0);
+    by.set(&Setting { casting: Casting { step_voxel: Some(0.0625), ..EXACT.casting }, ..EXACT }, size);
+    by.draw(&here);
+    let reference = by.image();
+    for setting in [EXACT, SPARSE] {
+        by.set(&setting, size);
+        by.draw(&aside);
+        let times = Samples::of(scope.pick(3, 9), |n| by.draw(if n % 2 == 0 { &here } else { &aside }));
+        let (ms, error) = (1e-3 * times.quantile(0.5), error_percent(&by.image(), &reference));
+        let equal = theirs.iter().rev().find(|t| t.error_percent <= error).unwrap_or(&theirs[0]);
+        let ratio = equal.ms / ms;
+        findings
+            .rows
+            .push(row(format!("processor: {}", setting.name), ms, error).metric("times_as_fast_as_vtk_ratio", ratio));
+        let name = format!("processor, {}: times as fast as VTK at no larger image error", setting.name);
+        findings.gates.push(Gate::at_least(name, ratio, 5.0));
+    }
+}
+
+/// VTK's times and errors, finest samples first.
+fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>, String> {
+    let folder = tempfile::tempdir().map_err(|fault| fault.to_string())?;
+    let python = python(folder.path())?;
+    let at = |name: &str| folder.path().join(name);
+    let bone = head(edge);
+    let [nx, ny, nz] = bone.dims().map(|n| n as i32);
+    let voxels = (0..nx * ny * nz).map(|n| bone.hu(glam::IVec3::new(n % nx, n / nx % ny, n / (nx * ny))));
+    let bytes: Vec<u8> = voxels.flat_map(i16::to_le_bytes).collect();
+    let view = frame(Vec3::ZERO, Vec3::new(0.2, 1.0, 0.5), 1.75 * edge as f32, 0.6).camera.view(1.0);
+    let scene = serde_json::json!({
+        "volume": at("volume.raw"), "dims": [nx, ny, nz], "spacing_mm": bone.spacing_mm(), "origin": bone.origin().to_array(),
+        "isovalue": ISO, "eye": view.eye.to_array(), "target": [0, 0, 0], "up": view.up.to_array(),
+        "fov_deg": 0.6f32.to_degrees(), "size": size, "repeats": repeats, "steps_voxel": STEPS,
+    });
+    let files = [("volume.raw", bytes), ("scene.json", scene.to_string().into()), ("rivals.py", SCRIPT.into())];
+    files
+        .into_iter()
+        .try_for_each(|(name, bytes)| std::fs::write(at(name), bytes))
+        .map_err(|fault| fault.to_string())?;
+    let told = said(Command::new(python).arg(at("rivals.py")).arg(at("scene.json")).arg(at("picture")))?;
+    told.lines().filter(|line| line.starts_with("version")).for_each(|line| println!("  VTK {line}"));
+    let ms = told.lines().filter_map(|line| line.strip_prefix("ms ")?.split_once(' ')?.1.parse::<f64>().ok());
+    let image = |n: usize| read(&at(&format!("picture{n}.rgb")), size);
+    let finest = image(0)?;
+    let theirs = ms
+        .enumerate()
+        .map(|(n, ms)| Ok(Theirs { step_voxel: STEPS[n], ms, error_percent: error_percent(&image(n)?, &finest) }));
+    let theirs = theirs.collect::<Result<Vec<_>, String>>()?;
+    if theirs.len() == STEPS.len() { Ok(theirs) } else { Err(format!("VTK tells {} times", theirs.len())) }
+}
+
+/// A Python with VTK: the one that is named if it has it, else a new environment.
+fn python(folder: &Path) -> Result<std::path::PathBuf, String> {
+    let given = std::env::var_os(PYTHON).unwrap_or_else(|| "python3".into());
+    if said(Command::new(&given).args(["-c", "import vtk, numpy"])).is_ok() {
+        return Ok(given.into());
+    }
+    let environment = folder.join("environment");
+    said(Command::new(given).args(["-m", "venv"]).arg(&environment))?;
+    let python = environment.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
+    said(Command::new(&python).args(["-m", "pip", "install", "--quiet", "--only-binary", ":all:", "vtk", "numpy"]))?;
+    Ok(python)
+}
+
+/// A picture as VTK left it: three bytes a pixel.
+fn read(path: &Path, [width, height]: [u32; 2]) -> Result<Image, String> {
+    let rgb = std::fs::read(path).map_err(|fault| format!("{}: {fault}", path.display()))?;
+    if rgb.len() != 3 * (width * height) as usize {
+        return Err(format!("{} has {} bytes; {width}x{height} pixels have 3 each", path.display(), rgb.len()));
+    }
+    Ok(Image { width, height, rgba: rgb.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect() })
+}
+
+/// What a program prints, or why it failed: the last line of its complaint.
+fn said(command: &mut Command) -> Result<String, String> {
+    let program = command.get_program().to_string_lossy().into_owned();
+    let out = command.output().map_err(|fault| format!("{program}: {fault}"))?;
+    if out.status.success() {
+        return Ok(String::from_utf8_lossy(&out.stdout).into_owned());
+    }
+    let complaint = String::from_utf8_lossy(&out.stderr).into_owned();
+    Err(format!(
+        "{program}: {}",
+        complaint.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("it failed without a word")
+    ))
+}

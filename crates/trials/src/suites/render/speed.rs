@@ -1,0 +1,92 @@
+//! What leaping, sparse rays, steps and resolution cost, against the image error that they make.
+
+use super::likeness::{enlarged, error_percent, similarity};
+use super::scenes::{frame, head};
+use super::{By, EXACT, FINE_VOXEL, SPARSE, Setting};
+use crate::picture::{Chart, Mark};
+use crate::suite::{Findings, Gate, Row};
+use crate::suites::Scope;
+use crate::timer::Samples;
+use glam::Vec3;
+use trepan_gpu::Gpu;
+use trepan_render::Casting;
+
+const fn stepped(name: &'static str, step: f32) -> Setting {
+    Setting { name, casting: Casting { step_voxel: Some(step), ..EXACT.casting }, ..EXACT }
+}
+
+/// The first is what all pictures are drawn with; steps are the processor's alone.
+const SETTINGS: [Setting; 8] = [
+    EXACT,
+    SPARSE,
+    Setting { name: "exact, no leaping", casting: Casting { leap: false, ..EXACT.casting }, ..EXACT },
+    stepped("steps of 1/4 voxel", 0.25),
+    stepped("steps of 1 voxel", 1.0),
+    stepped("steps of 2 voxels", 2.0),
+    Setting { name: "exact, 3/4 of the pixels along an edge", detail: 0.75, ..EXACT },
+    Setting { name: "exact, 1/2 of the pixels along an edge", detail: 0.5, ..EXACT },
+];
+
+/// Time of a picture whose camera moves, against its difference from the processor's picture with steps of 1/16 voxel.
+pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
+    let size = scope.pick([640, 480], [1680, 1050]);
+    let bone = head(160);
+    let here = frame(Vec3::ZERO, Vec3::new(0.2, 1.0, 0.5), 280.0, 0.6);
+    let aside = frame(Vec3::ZERO, Vec3::new(0.21, 1.0, 0.5), 280.0, 0.6);
+    let mut drawers = By::all(&bone, gpu, size);
+    drawers[0].set(&stepped("reference", FINE_VOXEL as f32), size);
+    drawers[0].draw(&here);
+    let reference = drawers[0].image();
+    let mut pictures = Vec::new();
+    let mut chart = Chart {
+        title: format!(
+            "a drilled shell at {}x{}, the camera moves: step, resolution, leaping, sparse rays",
+            size[0], size[1]
+        ),
+        cost: "frame_p50_ms".into(),
+        error: "image_error_percent".into(),
+        budget: Some((1e3 / 14.0, "14 frames/s".into())),
+        ..Chart::default()
+    };
+    for by in &mut drawers {
+        let device = matches!(by, By::Device(_));
+        for setting in SETTINGS.iter().filter(|s| !device || (s.casting.step_voxel.is_none() && !s.casting.sparse)) {
+            by.set(setting, size);
+            by.draw(&aside);
+            // Each picture moves the camera, so every ray is cast; the last one is seen from here.
+            let times = Samples::of(scope.pick(3, 9), |n| by.draw(if n % 2 == 0 { &here } else { &aside }));
+            let image = enlarged(&by.image(), size);
+            let mut row = Row::new(
+                format!("drilled shell at {}x{}", size[0], size[1]),
+                format!("{}: {}", by.name(), setting.name),
+            )
+            .with("machine", by.machine())
+            .metric("frame_p50_ms", 1e-3 * times.quantile(0.5))
+            .metric("frames_per_s", 1e6 / times.quantile(0.5))
+            .metric("image_error_percent", error_percent(&image, &reference))
+            .metric("ssim", similarity(&image, &reference));
+            if let By::Processor(p) = by {
+                row = row.metric("steps_per_ray", p.steps_per_ray());
+            }
+            findings.rows.push(row);
+            chart.marks.push(Mark {
+                method: format!("{}: {}", by.name(), setting.name),
+                cost: 1e-3 * times.quantile(0.5),
+                error: error_percent(&image, &reference),
+            });
+            if setting.name == SPARSE.name {
+                let like = similarity(&image, &reference);
+                findings.gates.push(Gate::at_least("sparse rays: SSIM to steps of 1/16 voxel", like, 0.99));
+            }
+            if setting.name == EXACT.name {
+                let like = similarity(&image, &reference);
+                findings.gates.push(Gate::at_least(format!("{}: SSIM to steps of 1/16 voxel", by.name()), like, 0.99));
+                pictures.push(image);
+            }
+        }
+    }
+    if let [processor, device] = &pictures[..] {
+        findings.gates.push(Gate::at_least("SSIM of device and processor", similarity(device, processor), 0.99));
+    }
+    findings.charts.push(chart);
+}
