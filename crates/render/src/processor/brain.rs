@@ -13,6 +13,7 @@ pub(crate) struct Fragments {
     width: usize,
     height: usize,
     nearest: Vec<Fragment>,
+    drawn: bool,
 }
 
 /// The brain at a pixel.
@@ -32,7 +33,7 @@ const NONE: Fragment = Fragment { depth: f32::INFINITY, t: NOTHING, normal: Vec3
 
 impl Fragments {
     pub fn of(width: usize, height: usize) -> Self {
-        Self { width, height, nearest: vec![NONE; width * height] }
+        Self { width, height, nearest: vec![NONE; width * height], drawn: false }
     }
 
     pub fn at(&self, pixel: usize) -> &Fragment {
@@ -41,7 +42,9 @@ impl Fragments {
 
     /// Draws the border and its cut anew; none clears.
     pub fn draw(&mut self, border: Option<&Border>, view: &View, brain_cut: Vec4) {
-        self.nearest.fill(NONE);
+        if std::mem::replace(&mut self.drawn, border.is_some()) {
+            self.nearest.fill(NONE);
+        }
         let Some(border) = border else { return };
         let vertex = |n: u32| {
             let place = border.places[n as usize];

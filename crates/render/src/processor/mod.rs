@@ -5,9 +5,10 @@
 //! falls as in `light.wgsl`. So this is the oracle for the shaders, and the picture of machines without a driver.
 //!
 //! # Practice
-//! Rows are shared between as many threads as there are processors. Before the rays of a tile of 8x8 pixels go, the tile leaps as one beam to where
-//! bone may be (`bricks.rs`), which spares most rays that meet nothing all their steps; the device has no such pass. The hits of the last picture are kept, as on the device. Triangles of the brain
-//! that reach behind the eye are left out.
+//! Rows are shared between as many threads as there are processors. Three things the device has not: before the rays of a tile of 8x8 pixels go, the tile leaps as
+//! one beam to where bone may be; rays leap by the octant of their direction, and look at a cell only if its bit says that it may hold bone (`bricks.rs`); and while
+//! the camera moves, sparse rays ([`Casting::sparse`]): a quarter of the pixels, and those between them where the tangent planes around do not agree (`skull.rs`).
+//! The hits of the last picture are kept, as on the device. Triangles of the brain that reach behind the eye are left out.
 //!
 //! # When not to use it
 //! Where there is any driver, even a software one: that draws the same picture and serves the window.

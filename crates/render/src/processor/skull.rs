@@ -70,7 +70,7 @@ pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32
 const SMOOTH: f32 = 0.95;
 
 /// How far neighbours' tangent planes may be apart on smooth bone, voxels.
-const FLAT_VOXEL: f32 = 0.25;
+const FLAT_VOXEL: f32 = 0.15;
 
 impl Ray {
     /// Whether the ray was not cast, but lies between rays that meet smooth bone.

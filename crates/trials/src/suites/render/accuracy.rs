@@ -50,7 +50,7 @@ pub fn depth(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
     let size = scope.pick([96, 72], [320, 240]);
     let bone = head(scope.pick(72, 160));
     let frame = frame(Vec3::ZERO, Vec3::new(0.2, 1.0, 0.5), scope.pick(120.0, 260.0), 0.6);
-    sparse(&bone, &frame, size, findings);
+    sparse(&bone, &frame, size.map(|n| 2 * n), findings);
     let mut truth: Option<Hits> = None;
     for mut by in By::all(&bone, gpu, size) {
         by.draw(&frame);
