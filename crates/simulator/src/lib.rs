@@ -34,6 +34,7 @@ mod run;
 mod session;
 mod show;
 mod stages;
+mod table;
 
 pub use case::cache::Cache;
 pub use case::choice::build_case;

@@ -2,9 +2,6 @@
 
 use crate::case::Inputs;
 use crate::case::choice;
-use crate::case::plan::Plan;
-use crate::case::scene::{RestBrain, Scene};
-use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
 use crate::hand::{self, Feel, Hand, SecondHold};
 use crate::operation::Operation;
@@ -13,9 +10,7 @@ use crate::program::Program;
 use crate::report::against::Against;
 use crate::report::output;
 use crate::report::page::Shot;
-use crate::report::regions::{Region, regions};
 use crate::report::summary::{About, CutOff, Machine, Summary};
-use crate::run::clock::Clock;
 use crate::run::film::Filming;
 use crate::run::journal::Kept;
 use crate::run::lesson::{Company, Taught, Teacher};
@@ -23,28 +18,19 @@ use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Devices, Pace};
 use crate::run::watch::{Asked, Share};
-use crate::run::{Eyes, Outcome, Stages, Tissue};
-use crate::show::driver;
+use crate::run::{Eyes, Outcome, Stages};
+use crate::show::graphics::Graphics;
 use crate::show::picture::{self, Album};
 use crate::show::{player, window};
-use crate::stages::alarms::Limits;
-use crate::stages::collision_step::CollisionStage;
-use crate::stages::haptic_tick::{HapticConfig, HapticStage, ToolSample};
-use crate::stages::second_hand::SecondHand;
-use crate::stages::settling::Settling;
-use crate::stages::skull_wall::SkullWall;
-use crate::stages::solver_step::SolverStage;
+use crate::stages::haptic_tick::ToolSample;
+use crate::table::Table;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
-use trepan_contact::{Vibration, Viscoelastic};
-use trepan_geometry::{ToolState, Vec3, units};
+use trepan_geometry::ToolState;
 use trepan_haptics::script::Script;
 use trepan_haptics::{DeviceName, HapticDevice, mouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
-use trepan_render::{Painter, SceneData};
-use trepan_soft::{Body, Loads, SoftSolver};
-use trepan_volume::{BoneVolume, Piece};
+use trepan_volume::VoxelVolume;
 
 /// A session that is ready to run.
 pub struct Session {
@@ -55,14 +41,7 @@ pub struct Session {
     recording: Option<Recording>,
     case: String,
     hash: String,
-    scene: Scene,
-    /// The bone that a replay carves while the window goes back and forth with the scene's.
-    filmed: Option<Arc<BoneVolume>>,
-    operation: Operation,
-    plan: Plan,
-    rigid: trepan_rigid::Method,
-    /// What `--solver fastest` turned out to be.
-    fastest: OnceLock<&'static str>,
+    table: Table,
     out: PathBuf,
     windowed: bool,
 }
@@ -91,55 +70,33 @@ impl Session {
         places(&options)?;
         let device = hand::device_name(program, &options, windowed)?;
         let second = hand::second_name(&device, &options)?;
-        let rigid = rigid_method(&options)?;
-        solver_named(&options)?;
+        Table::check(&options)?;
         let recording = match &device {
             DeviceName::Replay(path) => Some(Recording::open(path)?),
             _ => None,
         };
         let case = choice::open_case(program, &options, built_in)?;
-
         let (name, hash) = (case.name.clone(), case.hash.clone());
-        let scene = Scene::new(program, case)?;
-        scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
-        let copy = |bone: &Arc<BoneVolume>| BoneVolume::new(&bone.snapshot(), bone.isovalue()).map(Arc::new);
-        let filmed = scene.bone.as_ref().filter(|_| windowed && recording.is_some()).map(copy).transpose();
-        let filmed = filmed.map_err(|fault| SessionError::Internal(fault.to_string()))?;
         let operation = Operation::of(&options, &device, recording.as_ref());
-        let plan = planned(&scene, &operation)?;
+        let table = Table::new(program, &options, case, operation, windowed && recording.is_some())?;
         let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
-        let (case, fastest) = (name, OnceLock::new());
-        Ok(Self {
-            program,
-            options,
-            device,
-            second,
-            recording,
-            case,
-            hash,
-            scene,
-            filmed,
-            operation,
-            plan,
-            rigid,
-            fastest,
-            out,
-            windowed,
-        })
+        Ok(Self { program, options, device, second, recording, case: name, hash, table, out, windowed })
     }
 
     /// Runs it and writes its files.
     pub fn run(self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-        let (before, whole) = (self.pieces(), self.bone().map(|bone| bone.snapshot()));
-        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.plan)?;
-        let second = self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.plan)).transpose()?;
+        let (before, whole) = (self.table.pieces(), self.table.bone().map(|bone| bone.snapshot()));
+        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.table.plan)?;
+        let second =
+            self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.table.plan)).transpose()?;
         let recorded = || Feel::recorded(self.recording.as_ref(), hand::FIRST);
         let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
         let feel = device.as_ref().map_or_else(recorded, |device| Feel::of(&device.capabilities(), scale));
         let second_feel = self.second_feel(second.as_ref());
         let start = self.start();
-        let stages = self.stages(start.state, &feel, second_feel.as_ref())?;
+        let opening_needed = self.options.watch.is_none();
+        let stages = self.table.stages(start.state, self.tick_ms(), opening_needed, &feel, second_feel.as_ref())?;
         let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
         output::folder(&self.out)?;
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
@@ -153,21 +110,22 @@ impl Session {
         let outcome = self.loops(stages, devices, kept, start, &stop, |eyes| {
             album = self.picture(eyes, &mut graphics, pointer, std::mem::take(&mut company), &stop);
         });
-        let mut remarks = self.scene.remarks.clone();
+        let recording = Recording::open(&record)?;
+        self.map(&mut album, whole.as_ref(), &recording);
+        let mut remarks = self.table.scene.remarks.clone();
         remarks.extend(graphics.err());
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
-        let recording = Recording::open(&record)?;
         let about = About {
-            cut_off: CutOff::of(&before, &self.pieces(), self.bone().map_or(0.0, |bone| bone.voxel_mm3())),
-            plan: self.bone().zip(whole).and_then(|(bone, whole)| Against::of(&self.plan, &whole, bone)),
-            regions: self.regions(&recording),
+            cut_off: CutOff::of(&before, &self.table.pieces(), self.table.bone().map_or(0.0, |bone| bone.voxel_mm3())),
+            plan: self.table.bone().zip(whole).and_then(|(bone, whole)| Against::of(&self.table.plan, &whole, bone)),
+            regions: self.table.regions(&recording),
             ..self.about(&album, adapter, remarks)
         };
         let summary = Summary::new(about, &outcome);
         output::write(&self.out, &recording, &summary, &outcome, &self.shots(album.shots))?;
-        if let Some(bone) = self.bone() {
+        if let Some(bone) = self.table.bone() {
             output::drilled(&self.out, bone, self.options.stl)?;
         }
         Ok(Ended { summary, out: self.out, signal: stop.signal() })
@@ -201,28 +159,12 @@ impl Session {
         match (&self.recording, devices) {
             (Some(recording), _) => {
                 let length_ms = recording.ticks.last().map_or(0.0, |tick| tick.time_ms);
-                let film = self.windowed.then(|| Filming::new(self.bone().cloned(), length_ms));
+                let film = self.windowed.then(|| Filming::new(self.table.bone().cloned(), length_ms));
                 lockstep::run(stages, recording, kept, start, film, stop, picture)
             }
             (None, Some(devices)) => threads::run(stages, devices, kept, start, self.pace(), stop, picture),
             (None, None) => Outcome::default(),
         }
-    }
-
-    /// The bone, if it is operated on.
-    fn bone(&self) -> Option<&Arc<BoneVolume>> {
-        self.filmed.as_ref().or(self.scene.bone.as_ref()).filter(|_| self.program.has_bone())
-    }
-
-    /// The bone's pieces as they hang together now.
-    fn pieces(&self) -> Vec<Piece> {
-        self.bone().map_or_else(Vec::new, |bone| Piece::all(bone))
-    }
-
-    /// Where the brain was pressed.
-    fn regions(&self, recording: &Recording) -> Vec<Region> {
-        let brain = self.scene.brain.as_ref().filter(|_| self.program.has_tissue());
-        brain.map_or_else(Vec::new, |brain| regions(brain, self.program.tray(), &recording.ticks))
     }
 
     /// What the second hand's guard must know: of its device, or of the recorded one; `None` without a second hand.
@@ -235,95 +177,17 @@ impl Session {
 
     /// Where the tool waits.
     fn start(&self) -> ToolSample {
-        let script = Script::named(self.program.script(), &self.scene.site, 1e4).map(|script| script.at(0.0));
+        let script = Script::named(self.program.script(), &self.table.scene.site, 1e4).map(|script| script.at(0.0));
         let first = self.recording.as_ref().and_then(|r| r.ticks.first()).map(|t| ToolState::at(t.device));
         let state = first.or(script.ok()).unwrap_or_else(|| ToolState::at(trepan_geometry::Pose::IDENTITY));
         ToolSample { tick: 0, state, tool: self.program.tray()[0], slot: 0, drilling: false }
-    }
-
-    fn stages(&self, start: ToolState, feel: &Feel, second: Option<&Feel>) -> Result<Stages, SessionError> {
-        let config = |feel: &Feel| HapticConfig {
-            program: self.program,
-            rigid: self.rigid,
-            dt_ms: self.tick_ms(),
-            bone_force: Vibration::drill(feel.coupled(Viscoelastic { stiffness: 2.0, damping: 0.5 }, self.tick_ms())),
-            tissue_force: feel.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, self.tick_ms()),
-            guard: feel.guard(),
-            limits: Limits::default(),
-            opening_needed: self.options.watch.is_none(),
-        };
-        let bone = self.bone().cloned();
-        let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));
-        let tissue = match &self.scene.brain {
-            Some(brain) if self.program.has_tissue() => Some(self.tissue(brain)?),
-            _ => None,
-        };
-        let second = second.map(|feel| SecondHand::new(config(feel), bone.clone(), field.clone()));
-        let search = bone.as_ref().and_then(|bone| self.plan.search(bone));
-        let forbidden = self.scene.brain.as_ref().and_then(|brain| brain.distance_to(&self.operation.forbidden));
-        let mut haptic = HapticStage::new(config(feel), bone, field, start);
-        haptic = search.into_iter().fold(haptic, HapticStage::with_flap);
-        haptic = forbidden.map(Arc::new).into_iter().fold(haptic, HapticStage::forbidding);
-        Ok(Stages { haptic, second, tissue })
-    }
-
-    fn tissue(&self, brain: &RestBrain) -> Result<Tissue, SessionError> {
-        let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(format!("the brain: {fault}"));
-        let young_mpa = units::mpa_from_kpa(self.options.young_modulus_kpa);
-        let body = Body {
-            mesh: brain.mesh.clone(),
-            fixed: brain.fixed.clone(),
-            materials: TissueClass::ALL.map(|class| class.material(young_mpa)).to_vec(),
-            material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
-        };
-        let solver: Box<dyn SoftSolver> = match solver_named(&self.options)? {
-            None => {
-                let config = trepan_tled::Config::default();
-                if self.options.solver.as_deref() == Some(FASTEST) {
-                    let (clock, loads) = (Clock::start(), Loads::default());
-                    let all = trepan_tled::choice::candidates(&body, &config);
-                    let chosen = trepan_tled::choice::fastest(&all, &loads, 100.0, &|| clock.now_ms());
-                    let chosen = chosen.map_err(|f| internal(&f))?;
-                    tracing::info!("solver {}: {}", chosen.name, chosen.why);
-                    let _first = self.fastest.set(chosen.name);
-                    chosen.solver
-                } else {
-                    Box::new(trepan_tled::Tled::new(&body, &config).map_err(|f| internal(&f))?)
-                }
-            }
-            Some(method) => method.build(&body).map_err(|f| internal(&f))?,
-        };
-        let bone = self.bone().cloned();
-        let wall = bone.map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed)).transpose();
-        let wall = wall.map_err(|f| internal(&f))?;
-        let collision = CollisionStage::new(self.program, &brain.mesh, &Default::default(), wall);
-        let settling = Settling::new(self.operation.fluid_lost, Vec3::NEG_Y, -self.plan.site.inward);
-        let collision = collision.map_err(|f| internal(&f))?.settling(settling);
-        Ok(Tissue { collision, solver: SolverStage::new(solver) })
-    }
-
-    /// The pictures of the report: how the images fit, then the session's.
-    fn shots(&self, session: Vec<Shot>) -> Vec<Shot> {
-        let caption =
-            "how CT and MRI fit: the bone's contour over the MRI (with --register above as read, below as moved)";
-        let fit = self.scene.fit_png.clone().map(|png| Shot { caption: caption.into(), png });
-        session.into_iter().chain(fit).collect()
     }
 
     fn graphics(&self) -> Result<Graphics, String> {
         if !self.windowed && self.options.frames_per_second == 0.0 {
             return Err("no picture was asked for".into());
         }
-        let data = SceneData {
-            bone: self.scene.bone.clone(),
-            brain: self.scene.brain.as_ref().map(|brain| &brain.mesh),
-            mri: self.scene.brain.as_ref().map(|brain| &brain.mri),
-            tint: self.scene.brain.as_ref().and_then(|brain| brain.tint.as_deref()),
-        };
-        let [width, height] = self.options.picture;
-        let painter = Painter::on(driver::open(), &data, [width, height]).map_err(|fault| fault.to_string())?;
-        painter.notice().inspect(|notice| tracing::warn!("{notice}"));
-        Ok(Graphics { adapter: painter.name(), painter: Some(painter) })
+        Graphics::open(&self.table, self.options.picture)
     }
 
     fn picture(
@@ -338,24 +202,36 @@ impl Session {
             picture::wait(eyes, stop);
             return Album::default();
         };
-        if self.windowed {
-            let opened = window::Opened {
-                scene: &self.scene,
-                case: &self.case,
-                program: self.program,
-                out: &self.out,
-                rate_hz: self.options.rate_hz,
-            };
-            return match (eyes.film.take(), &self.recording) {
-                (Some(film), Some(recording)) => {
-                    let until_s = self.options.duration.unwrap_or(f64::INFINITY);
-                    player::show(*eyes.view.latest().0, film, painter, &opened, recording, until_s, stop)
-                }
-                _ => window::show(eyes, painter, &opened, pointer, company, stop),
-            };
+        if !self.windowed {
+            let folder = self.out.join("frames");
+            return picture::draw(eyes, painter, &self.table, self.options.frames_per_second, &folder, stop);
         }
-        let (bone_shown, folder) = (self.program.has_bone(), self.out.join("frames"));
-        picture::draw(eyes, painter, &self.scene, bone_shown, self.options.frames_per_second, &folder, stop)
+        let (table, case, out, rate_hz) = (&self.table, &*self.case, &*self.out, self.options.rate_hz);
+        let opened = window::Opened { table, case, out, rate_hz };
+        match (eyes.film.take(), &self.recording) {
+            (Some(film), Some(recording)) => {
+                let until_s = self.options.duration.unwrap_or(f64::INFINITY);
+                player::show(*eyes.view.latest().0, film, painter, &opened, recording, until_s, stop)
+            }
+            _ => window::show(eyes, painter, &opened, pointer, company, stop),
+        }
+    }
+
+    /// Puts the coloured maps of the end before the session's pictures.
+    fn map(&self, album: &mut Album, before: Option<&VoxelVolume<i16>>, recording: &Recording) {
+        let Some(painter) = &mut album.painter else { return };
+        let maps = self.table.maps(painter, before, recording, &self.out.join("frames"));
+        let of_session = std::mem::take(&mut album.shots);
+        maps.into_iter().for_each(|map| album.add(map));
+        album.shots.extend(of_session);
+    }
+
+    /// The pictures of the report: the session's, then how the images fit.
+    fn shots(&self, session: Vec<Shot>) -> Vec<Shot> {
+        let caption =
+            "how CT and MRI fit: the bone's contour over the MRI (with --register above as read, below as moved)";
+        let fit = self.table.scene.fit_png.clone().map(|png| Shot { caption: caption.into(), png });
+        session.into_iter().chain(fit).collect()
     }
 
     fn pace(&self) -> Pace {
@@ -369,16 +245,10 @@ impl Session {
         1e3 / self.options.rate_hz
     }
 
-    /// What steps the tissue: of `fastest` what that turned out to be.
-    fn solver_name(&self) -> String {
-        let named = || self.options.solver.clone().unwrap_or_else(|| TLED.into());
-        self.fastest.get().map_or_else(named, |name| name.to_string())
-    }
-
     fn header(&self, feel: &Feel, second: Option<&Feel>) -> SessionHeader {
         let config = [
-            ("rigid", self.rigid.name().to_string()),
-            ("solver", self.solver_name()),
+            ("rigid", self.table.rigid.name().to_string()),
+            ("solver", self.table.solver_name().into()),
             ("rate_hz", self.options.rate_hz.to_string()),
             ("spacing_mm", self.options.patient.spacing_mm.to_string()),
             ("tets", self.options.patient.tets.to_string()),
@@ -395,14 +265,14 @@ impl Session {
             config: config
                 .map(|(key, value)| (key.to_string(), value))
                 .into_iter()
-                .chain(self.operation.entries())
+                .chain(self.table.operation.entries())
                 .chain(hands)
                 .collect(),
         }
     }
 
     fn about(&self, album: &Album, adapter: Option<String>, remarks: Vec<String>) -> About {
-        let brain = self.scene.brain.as_ref();
+        let brain = self.table.scene.brain.as_ref();
         About {
             program: self.program,
             case: self.case.clone(),
@@ -412,7 +282,7 @@ impl Session {
                 (other, _) => other.to_string(),
             },
             second_device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),
-            solver: self.solver_name(),
+            solver: self.table.solver_name().into(),
             brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
             frames: album.frames,
             cut_off: CutOff::default(),
@@ -427,28 +297,6 @@ impl Session {
 /// A device, if a hand holds one.
 type Held = Option<Box<dyn HapticDevice>>;
 
-struct Graphics {
-    adapter: String,
-    painter: Option<Painter>,
-}
-
-const TLED: &str = "tled";
-/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not have the recorded forces to the last bit.
-const FASTEST: &str = "fastest";
-
-/// What is to be taken away.
-fn planned(scene: &Scene, operation: &Operation) -> Result<Plan, SessionError> {
-    let hole_mm = Program::Craniotomy.tray()[0].tip_radius_mm;
-    let plan = Plan::new(scene.bone.as_deref(), scene.site, hole_mm, 0.5 * operation.flap_mm);
-    plan.ok_or_else(|| {
-        let fault = format!(
-            "--flap {}: the skull does not go all around it: give a smaller one, or another --opening",
-            operation.flap_mm
-        );
-        SessionError::Usage(fault)
-    })
-}
-
 /// Refuses places that cannot be written to before anything is loaded.
 fn places(options: &Options) -> Result<(), SessionError> {
     if let Some(out) = options.out.as_deref().filter(|out| out.exists() && !out.is_dir()) {
@@ -459,24 +307,4 @@ fn places(options: &Options) -> Result<(), SessionError> {
         return Err(SessionError::Usage(format!("--record: there is no folder {}; make it first", folder.display())));
     }
     Ok(())
-}
-
-fn rigid_method(options: &Options) -> Result<trepan_rigid::Method, SessionError> {
-    let Some(name) = &options.rigid else { return Ok(trepan_rigid::Method::RECOMMENDED) };
-    trepan_rigid::Method::named(name).ok_or_else(|| {
-        let known: Vec<_> = trepan_rigid::Method::all().iter().map(|method| method.name()).collect();
-        SessionError::Usage(format!("--rigid {name} is not known; known are {}", known.join(", ")))
-    })
-}
-
-/// The rival solver of that name; `None` for TLED.
-fn solver_named(options: &Options) -> Result<Option<trepan_soft::Method>, SessionError> {
-    let name = options.solver.as_deref().unwrap_or(TLED);
-    if name == TLED || name == FASTEST {
-        return Ok(None);
-    }
-    trepan_soft::Method::named(name).map(Some).ok_or_else(|| {
-        let known: Vec<_> = trepan_soft::Method::all().iter().map(|method| method.name()).collect();
-        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {FASTEST}, {}", known.join(", ")))
-    })
 }

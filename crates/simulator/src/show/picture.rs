@@ -1,11 +1,12 @@
 //! The main thread of a headless run: one picture after another, from the newest state, through the same drawing code as the window.
 
-use crate::case::scene::Scene;
 use crate::report::page::Shot;
 use crate::run::clock::Clock;
 use crate::run::stop::Stop;
 use crate::run::{Eyes, View};
+use crate::show::colours::Colours;
 use crate::stages::second_hand::SecondHand;
+use crate::table::Table;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
@@ -24,6 +25,8 @@ const SHOWN: usize = 4;
 /// What the pictures came to.
 #[derive(Debug, Default)]
 pub struct Album {
+    /// Who drew them.
+    pub painter: Option<Painter>,
     /// Pictures written.
     pub frames: u64,
     /// Those for the report.
@@ -58,8 +61,16 @@ pub fn microscope(site: &Site) -> Camera {
 }
 
 /// A frame of the newest state.
-pub fn frame<'a>(camera: Camera, view: &View, brain_positions: Option<&'a [Vec3]>, bone_shown: bool) -> Frame<'a> {
+pub fn frame<'a>(
+    camera: Camera,
+    view: &View,
+    brain_positions: Option<&'a [Vec3]>,
+    bone_shown: bool,
+    colours: &'a Colours,
+) -> Frame<'a> {
     Frame {
+        bone_paint: colours.bone.as_ref(),
+        brain_paint: colours.brain.as_ref(),
         tool: Some(view.sample.tool),
         world_from_tool: view.sample.state.world_from_tool,
         second: view.second.map(|second| (SecondHand::tool(), second.world_from_tool)),
@@ -87,19 +98,11 @@ pub fn wait(mut eyes: Eyes, stop: &Stop) {
 }
 
 /// Draws `per_second` pictures a second into `folder` until the end, and one more then.
-pub fn draw(
-    mut eyes: Eyes,
-    mut painter: Painter,
-    scene: &Scene,
-    bone_shown: bool,
-    per_second: f64,
-    folder: &Path,
-    stop: &Stop,
-) -> Album {
+pub fn draw(mut eyes: Eyes, mut painter: Painter, table: &Table, per_second: f64, folder: &Path, stop: &Stop) -> Album {
     let mut album = Album::default();
     let mut candidates: Vec<(f64, PathBuf)> = Vec::new();
     let clock = Clock::start();
-    let camera = camera(&scene.site);
+    let (camera, colours, bone_shown) = (camera(&table.scene.site), table.colours(), table.program.has_bone());
     let mut next_ms = 0.0;
     loop {
         let view = *eyes.view.latest().0;
@@ -108,7 +111,7 @@ pub fn draw(
             next_ms = clock.now_ms().max(next_ms) + 1e3 / per_second.max(1e-3);
             let soft = eyes.soft.as_mut().map(|soft| soft.latest().0.positions.as_slice());
             let path = folder.join(format!("frame-{:05}.png", album.frames));
-            let drawn = painter.picture(&frame(camera, &view, soft, bone_shown));
+            let drawn = painter.picture(&frame(camera, &view, soft, bone_shown, &colours));
             match drawn.map_err(|f| f.to_string()).and_then(|(image, _)| write(&image, &path)) {
                 Ok(()) => {
                     album.frames += 1;
@@ -128,6 +131,7 @@ pub fn draw(
     }
     album.faults.extend(painter.notice().map(String::from));
     album.shots = chosen(&candidates);
+    album.painter = Some(painter);
     album
 }
 
@@ -135,9 +139,10 @@ fn write(image: &Image, path: &Path) -> Result<(), String> {
     image.write_png(path).map_err(|fault| format!("{}: {fault}", path.display()))
 }
 
-/// One picture for the report.
+/// One picture for the report; its file is named after the caption's first words, up to a colon.
 pub fn snap(image: &Image, folder: &Path, caption: &str) -> Result<Shot, String> {
-    let path = folder.join(format!("frame-{caption}.png"));
+    let name = caption.split(':').next().unwrap_or_default().replace(' ', "-");
+    let path = folder.join(format!("frame-{name}.png"));
     write(image, &path)?;
     Ok(Shot { caption: caption.into(), png: std::fs::read(&path).map_err(|fault| fault.to_string())? })
 }

@@ -8,6 +8,7 @@ use crate::program::Program;
 use crate::run::View;
 use crate::run::film::Shot;
 use crate::run::stop::Stop;
+use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::picture::{Album, frame};
 use crate::show::said;
@@ -101,6 +102,7 @@ struct Player {
     case: String,
     program: Program,
     bone_shown: bool,
+    colours: Colours,
     keeper: Keeper,
     stop: Stop,
     /// Closes by itself then, s.
@@ -117,14 +119,15 @@ pub fn show(
     until_s: f64,
     stop: &Stop,
 ) -> Album {
-    let bone = opened.scene.bone.clone().filter(|_| opened.program.has_bone());
+    let bone = opened.table.scene.bone.clone().filter(|_| opened.table.program.has_bone());
     let player = Player {
         timeline: timeline(recording),
         now_s: None,
         first,
         case: opened.case.into(),
-        program: opened.program,
+        program: opened.table.program,
         bone_shown: bone.is_some(),
+        colours: opened.table.colours(),
         keeper: Keeper::into_folder(&opened.out.join("window")),
         stop: stop.clone(),
         until_s,
@@ -186,7 +189,7 @@ impl Session for Player {
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
         let positions = Some(self.film.positions.as_slice()).filter(|p| !p.is_empty());
-        frame(camera, self.view(), positions, self.bone_shown)
+        frame(camera, self.view(), positions, self.bone_shown, &self.colours)
     }
 
     fn capture(&mut self, what: Capture, picture: Image) {

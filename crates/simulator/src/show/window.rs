@@ -4,15 +4,16 @@
 //! The window never waits for a loop and no loop waits for it. With the mouse as a device the pose goes to the haptic loop, which
 //! reads it at its own rate; closing the window ends the session.
 
-use crate::case::scene::Scene;
 use crate::program::Program;
 use crate::report::page::Shot;
 use crate::run::lesson::{ASKED, Company, Teacher};
 use crate::run::stop::Stop;
 use crate::run::{Eyes, View};
+use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
 use crate::show::picture::{Album, camera, frame, microscope, snap};
 use crate::show::said;
+use crate::table::Table;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
@@ -32,12 +33,10 @@ pub fn has_display() -> bool {
 
 /// What the window is opened on.
 pub struct Opened<'a> {
-    /// The patient.
-    pub scene: &'a Scene,
+    /// The patient, the plan, which simulator.
+    pub table: &'a Table,
     /// A name for the case that anybody may read.
     pub case: &'a str,
-    /// Which simulator.
-    pub program: Program,
     /// Where pictures go.
     pub out: &'a Path,
     /// What the tick's rate should be, Hz.
@@ -53,6 +52,7 @@ struct Show {
     program: Program,
     wanted_rate_hz: f32,
     bone_shown: bool,
+    colours: Colours,
     pointer: Option<MouseHandle>,
     company: Company,
     /// What is marked on the anatomy, mm.
@@ -110,9 +110,10 @@ pub fn show(
         view,
         positions: Vec::new(),
         case: opened.case.into(),
-        program: opened.program,
+        program: opened.table.program,
         wanted_rate_hz: opened.rate_hz,
-        bone_shown: opened.scene.bone.is_some() && opened.program.has_bone(),
+        bone_shown: opened.table.bone().is_some(),
+        colours: opened.table.colours(),
         pointer,
         company,
         markers: Vec::new(),
@@ -136,17 +137,18 @@ pub fn run<S: window::Session + 'static>(
     at: View,
 ) -> (S, Album) {
     let (mut album, folder) = (Album::default(), opened.out.join("frames"));
-    let eye = camera(&opened.scene.site);
+    let eye = camera(&opened.table.scene.site);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "before"));
     let start = Start::with(eye, at.sample.state.world_from_tool);
-    let start = Start { microscope: Some(microscope(&opened.scene.site)), ..start };
-    let closed = window::run(&format!("Trepan {}", opened.program.name()), painter, session, start);
+    let start = Start { microscope: Some(microscope(&opened.table.scene.site)), ..start };
+    let closed = window::run(&format!("Trepan {}", opened.table.program.name()), painter, session, start);
     let (mut painter, session) = (closed.renderer, closed.session);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "after"));
     if let Err(fault) = closed.result {
         tracing::error!("{fault}");
         album.faults.push(fault.to_string());
     }
+    album.painter = Some(painter);
     (session, album)
 }
 
@@ -185,7 +187,7 @@ impl window::Session for Show {
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
         let positions = Some(self.positions.as_slice()).filter(|p| !p.is_empty());
-        let frame = frame(camera, &self.view, positions, self.bone_shown);
+        let frame = frame(camera, &self.view, positions, self.bone_shown, &self.colours);
         let ghost = self.ghost.map(|pose| (self.view.sample.tool, pose));
         Frame { overlay: Overlay { ghost, markers: &self.markers, ..frame.overlay }, ..frame }
     }

@@ -1,0 +1,214 @@
+//! Colours over bone and brain: the plan and what lies close below while operating; at the end where the cut missed the plan, and where the brain bore force.
+//!
+//! # Practice
+//! | colour | on bone, while operating | on bone, at the end | on the brain |
+//! |---|---|---|---|
+//! | sky blue | planned outline | planned and left | |
+//! | green | | planned and taken | |
+//! | yellow to vermilion | the brain is 3 to 0 mm below | vermilion: taken and not planned | least to most force over time |
+//! | purple | | | must not be touched |
+//!
+//! Colours of Okabe and Ito (2008), which every kind of colour vision tells apart. A box of some 10⁵ texels, made once; tens of milliseconds.
+
+use crate::case::plan::Plan;
+use trepan_geometry::{Aabb, Tool, Vec3};
+use trepan_link::wire::TickRecord;
+use trepan_render::Paint;
+use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
+
+const SKY: [f32; 3] = [86.0, 180.0, 233.0];
+const GREEN: [f32; 3] = [0.0, 158.0, 115.0];
+const YELLOW: [f32; 3] = [240.0, 228.0, 66.0];
+const VERMILION: [f32; 3] = [213.0, 94.0, 0.0];
+const PURPLE: [f32; 3] = [204.0, 121.0, 167.0];
+
+/// From texel to texel, mm.
+const TEXEL_MM: f32 = 1.0;
+/// Half the width of an outline, mm.
+const LINE_MM: f32 = 0.8;
+/// Distance to the brain from which the bone is coloured, mm.
+const CLOSE_MM: f32 = 3.0;
+/// How far around the plan is painted, mm.
+const AROUND_MM: f32 = 6.0;
+/// How far in is painted, mm.
+const DEEP_MM: f32 = 20.0;
+/// Spread of a touch on the map of forces, mm.
+const SPREAD_MM: f32 = 2.0;
+/// Most texels of a map of forces along an axis.
+const MOST: u32 = 160;
+
+/// What lies over the patient while the operation goes on.
+#[derive(Clone, Debug, Default)]
+pub struct Colours {
+    /// Over the bone.
+    pub bone: Option<Paint>,
+    /// Over the brain.
+    pub brain: Option<Paint>,
+}
+
+/// The plan's outline, and how close the brain lies below what is left of the bone.
+pub fn planned(plan: &Plan, brain: Option<&DistanceField>) -> Paint {
+    let (middle, inward) = (plan.site.entry, plan.site.inward);
+    let reach = plan.hole_mm.max(plan.flap_mm) + AROUND_MM;
+    let around = Aabb::of_points(&[middle - 4.0 * inward, middle + DEEP_MM * inward]).inflated(reach + 4.0);
+    paint(1, around, TEXEL_MM, |place| {
+        let aside = |from: Vec3| (place - from).reject_from(inward).length();
+        let rings = [(plan.hole(), plan.hole_mm), (middle, plan.flap_mm)];
+        let on_line = rings.iter().any(|(from, radius)| *radius > 0.0 && (aside(*from) - radius).abs() < LINE_MM);
+        if on_line {
+            return coloured(SKY, 0.9);
+        }
+        let below = brain.filter(|_| aside(middle) < reach).map_or(f32::INFINITY, |field| field.sample(place));
+        let close = 1.0 - below.max(0.0) / CLOSE_MM;
+        if close > 0.0 { coloured(warm(close), 0.7 * close.sqrt()) } else { CLEAR }
+    })
+}
+
+/// What must not be touched, on the brain.
+pub fn forbidden(field: &DistanceField, around: Aabb) -> Paint {
+    paint(1, around, (around.size().max_element() / MOST as f32).max(TEXEL_MM), |place| {
+        let near = 1.0 - field.sample(place).max(0.0) / 2.0;
+        if near > 0.0 { coloured(PURPLE, 0.85 * near) } else { CLEAR }
+    })
+}
+
+/// The bone that went and the bone that was to go, voxel by voxel around the plan.
+pub fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Paint {
+    let reach = plan.hole_mm.max(plan.flap_mm) + 2.0 * AROUND_MM;
+    let around = Aabb::of_points(&[plan.site.entry, plan.site.entry + DEEP_MM * plan.site.inward]).inflated(reach);
+    let low = bone.centre_of(bone.voxel_of(around.min));
+    paint(2, Aabb { min: low, max: around.max }, bone.spacing_mm(), |place| {
+        let voxel = bone.voxel_of(place);
+        let was = before.get(voxel.max(glam::IVec3::ZERO).as_uvec3().to_array().map(|n| n as usize));
+        if was.is_none_or(|hu| hu < bone.isovalue()) {
+            return CLEAR;
+        }
+        match (plan.takes(place), !bone.is_bone(voxel)) {
+            (true, true) => coloured(GREEN, 0.8),
+            (true, false) => coloured(SKY, 0.9),
+            (false, true) => coloured(VERMILION, 1.0),
+            (false, false) => CLEAR,
+        }
+    })
+}
+
+/// Force over time on the brain, by the place at rest where the tool touched; `None` when it never did.
+pub fn forces(tray: &[Tool], ticks: &[TickRecord]) -> Option<Paint> {
+    let pressed = |tick: &&TickRecord| tick.phase == 1 && tick.tissue_depth_mm > 0.0;
+    let touched = |tick: &TickRecord| {
+        let radius_mm = tray.get(usize::from(tick.tool)).map_or(0.0, |tool| tool.tip_radius_mm);
+        (tick.proxy.translation - radius_mm * tick.contact_normal, tick.wrench.force.length())
+    };
+    // Every 10th tick: a touch spreads over much more than a hand moves in that time.
+    let touches: Vec<(Vec3, f32)> = ticks.iter().filter(pressed).step_by(10).map(touched).collect();
+    let places: Vec<Vec3> = touches.iter().map(|touch| touch.0).collect();
+    if places.is_empty() {
+        return None;
+    }
+    let around = Aabb::of_points(&places).inflated(3.0 * SPREAD_MM);
+    let texel_mm = (around.size().max_element() / MOST as f32).max(TEXEL_MM);
+    let mut sums = vec![0.0f32; dims(around, texel_mm).iter().map(|n| *n as usize).product()];
+    let [nx, ny, _] = dims(around, texel_mm).map(|n| n as usize);
+    let reach = (3.0 * SPREAD_MM / texel_mm).ceil() as i32;
+    for (place, force) in &touches {
+        let middle = ((*place - around.min) / texel_mm).round().as_ivec3();
+        let offsets = || -reach..=reach;
+        for (k, j, i) in offsets().flat_map(|k| offsets().flat_map(move |j| offsets().map(move |i| (k, j, i)))) {
+            let texel = (middle + glam::IVec3::new(i, j, k)).max(glam::IVec3::ZERO).as_usizevec3();
+            let apart = around.min + texel_mm * texel.as_vec3() - *place;
+            if let Some(sum) =
+                sums.get_mut(texel.x + nx * (texel.y + ny * texel.z)).filter(|_| texel.x < nx && texel.y < ny)
+            {
+                *sum += force * (-0.5 * apart.length_squared() / SPREAD_MM.powi(2)).exp();
+            }
+        }
+    }
+    let most = sums.iter().copied().fold(1e-9, f32::max);
+    let mut at = 0;
+    Some(paint(2, around, texel_mm, |_| {
+        at += 1;
+        let share = sums[at - 1] / most;
+        if share > 0.02 { coloured(warm(share), 0.9 * share.sqrt()) } else { CLEAR }
+    }))
+}
+
+const CLEAR: [u8; 4] = [0; 4];
+
+/// From yellow at 0 to vermilion at 1.
+fn warm(share: f32) -> [f32; 3] {
+    std::array::from_fn(|n| YELLOW[n] + share.clamp(0.0, 1.0) * (VERMILION[n] - YELLOW[n]))
+}
+
+/// A colour of a screen in linear light.
+fn coloured(srgb: [f32; 3], alpha: f32) -> [u8; 4] {
+    let linear = |value: f32| (255.0 * (value / 255.0).powf(2.2)).round() as u8;
+    let [r, g, b] = srgb;
+    [linear(r), linear(g), linear(b), (255.0 * alpha.clamp(0.0, 1.0)).round() as u8]
+}
+
+fn dims(around: Aabb, texel_mm: f32) -> [u32; 3] {
+    (around.size() / texel_mm).to_array().map(|n| n.ceil().clamp(1.0, 512.0) as u32 + 1)
+}
+
+/// A box of colours, x fastest; those of the end have another version than those before.
+fn paint(version: u64, around: Aabb, texel_mm: f32, mut colour: impl FnMut(Vec3) -> [u8; 4]) -> Paint {
+    let dims = dims(around, texel_mm);
+    let [nx, ny, nz] = dims;
+    let mut rgba = Vec::with_capacity((nx * ny * nz) as usize);
+    for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
+        rgba.push(colour(around.min + texel_mm * Vec3::new(i as f32, j as f32, k as f32)));
+    }
+    Paint { origin: around.min, spacing_mm: Vec3::splat(texel_mm), dims, rgba, version }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::IVec3;
+    use trepan_geometry::{Pose, Wrench};
+    use trepan_haptics::script::Site;
+    use trepan_volume::AIR_HU;
+
+    fn at(paint: &Paint, place: Vec3) -> [u8; 4] {
+        let texel = ((place - paint.origin) / paint.spacing_mm).round().as_uvec3();
+        paint.rgba[(texel.x + paint.dims[0] * (texel.y + paint.dims[1] * texel.z)) as usize]
+    }
+
+    #[test]
+    fn the_plan_and_the_misses_are_where_they_are() {
+        let mut ct = VoxelVolume::isotropic([50, 50, 14], Vec3::ZERO, 1.0, AIR_HU);
+        ct.data[50 * 50 * 4..50 * 50 * 10].fill(1000);
+        let bone = BoneVolume::new(&ct, 400).unwrap();
+        let before = bone.snapshot();
+        let site = Site { entry: Vec3::new(25.0, 25.0, 9.5), inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 };
+        let plan = Plan::new(Some(&bone), site, 5.0, 0.0).unwrap();
+        let paint = planned(&plan, None);
+        let alpha = |x: f32| at(&paint, Vec3::new(x, 25.0, 9.0))[3];
+        assert!(alpha(30.0) > 200 && alpha(25.0) == 0 && alpha(34.0) == 0);
+        for (x, y) in [(25, 25), (33, 25)] {
+            bone.set_hu(IVec3::new(x, y, 8), AIR_HU);
+        }
+        let map = against(&plan, &before, &bone);
+        let colour = |x: f32| at(&map, Vec3::new(x, 25.0, 8.0));
+        assert_eq!(colour(25.0), coloured(GREEN, 0.8));
+        assert_eq!(colour(33.0), coloured(VERMILION, 1.0));
+        assert_eq!((colour(27.0), colour(35.0)), (coloured(SKY, 0.9), CLEAR));
+    }
+
+    #[test]
+    fn the_map_of_forces_is_hottest_where_the_brain_was_pressed_longest() {
+        let touch = |x: f32| TickRecord {
+            phase: 1,
+            tissue_depth_mm: 1.0,
+            contact_normal: Vec3::Z,
+            proxy: Pose::from_translation(Vec3::new(x, 0.0, 2.0)),
+            wrench: Wrench { force: 0.3 * Vec3::Z, torque: Vec3::ZERO },
+            ..TickRecord::default()
+        };
+        let ticks: Vec<TickRecord> = (0..900).map(|n| touch(if n < 600 { 0.0 } else { 20.0 })).collect();
+        let map = forces(&[Tool::probe(2.0)], &ticks).unwrap();
+        let alpha = |x: f32| at(&map, Vec3::new(x, 0.0, 0.0))[3];
+        assert!(alpha(0.0) > 215 && alpha(20.0) > 120 && alpha(20.0) < alpha(0.0) && alpha(10.0) == 0);
+        assert!(forces(&[], &[]).is_none());
+    }
+}

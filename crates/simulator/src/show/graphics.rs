@@ -1,0 +1,84 @@
+//! Who draws a session's pictures, and the coloured maps at its end.
+
+use crate::report::page::Shot;
+use crate::show::colours::{self, Colours};
+use crate::show::driver;
+use crate::show::picture::snap;
+use crate::table::Table;
+use std::path::Path;
+use trepan_link::Recording;
+use trepan_render::{Camera, Frame, Painter, SceneData, SliceLook};
+use trepan_volume::VoxelVolume;
+
+/// Captions of the maps.
+const OF_BONE: &str = "bone against the plan: green as planned, blue planned and left, red taken beside it";
+const OF_BRAIN: &str = "force on the brain over time: yellow little, red most";
+/// From where the bone is seen, mm, and the brain.
+const NEAR_MM: f32 = 75.0;
+const FAR_MM: f32 = 150.0;
+
+/// The drawing device, and what it is called.
+pub struct Graphics {
+    /// Its name.
+    pub adapter: String,
+    /// The painter, until somebody takes it.
+    pub painter: Option<Painter>,
+}
+
+impl Graphics {
+    /// Opens a painter for pictures of `size` pixels.
+    pub fn open(table: &Table, size: [u32; 2]) -> Result<Self, String> {
+        let brain = table.scene.brain.as_ref();
+        let data = SceneData {
+            bone: table.scene.bone.clone(),
+            brain: brain.map(|brain| &brain.mesh),
+            mri: brain.map(|brain| &brain.mri),
+            tint: brain.and_then(|brain| brain.tint.as_deref()),
+        };
+        let painter = Painter::on(driver::open(), &data, size).map_err(|fault| fault.to_string())?;
+        painter.notice().inspect(|notice| tracing::warn!("{notice}"));
+        Ok(Self { adapter: painter.name(), painter: Some(painter) })
+    }
+}
+
+impl Table {
+    /// Colours over the patient while the operation goes on.
+    pub fn colours(&self) -> Colours {
+        let brain = self.scene.brain.as_ref();
+        let field = brain.map(|brain| &*brain.field);
+        let bone = self.bone().map(|_| colours::planned(&self.plan, field));
+        let forbidden =
+            brain.and_then(|brain| Some((brain.distance_to(&self.operation.forbidden)?, brain.mesh.bounds())));
+        Colours { bone, brain: forbidden.map(|(field, around)| colours::forbidden(&field, around)) }
+    }
+
+    /// The end of a session in colours: bone against the plan, force on the brain. What went wrong stands in place of a picture.
+    pub fn maps(
+        &self,
+        painter: &mut Painter,
+        before: Option<&VoxelVolume<i16>>,
+        recording: &Recording,
+        folder: &Path,
+    ) -> Vec<Result<Shot, String>> {
+        let against = self.bone().zip(before).map(|(bone, before)| colours::against(&self.plan, before, bone));
+        let forces = colours::forces(self.program.tray(), &recording.ticks);
+        let outward = -self.plan.site.inward;
+        let side = outward.any_orthonormal_vector();
+        let eye = |distance_mm| Camera::viewed_from(self.plan.site.entry, outward + 0.35 * side, distance_mm);
+        let frame = |distance_mm| Frame {
+            slices: SliceLook { shown: false, ..SliceLook::default() },
+            ..Frame::of(eye(distance_mm))
+        };
+        let mut draw = |caption: &str, frame: Frame| {
+            let drawn = painter.picture(&frame).map_err(|fault| fault.to_string());
+            drawn.and_then(|(image, _)| snap(&image, folder, caption))
+        };
+        let of_bone = against
+            .as_ref()
+            .map(|paint| draw(OF_BONE, Frame { bone_paint: Some(paint), ..frame(NEAR_MM + 3.0 * self.plan.flap_mm) }));
+        let of_brain = forces
+            .as_ref()
+            .map(|paint| draw(OF_BRAIN, Frame { brain_paint: Some(paint), show_bone: false, ..frame(FAR_MM) }));
+        of_bone.into_iter().chain(of_brain).collect()
+    }
+}

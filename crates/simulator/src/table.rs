@@ -1,0 +1,210 @@
+//! The operating table: patient, plan and methods, and from them the stages that the loops begin with.
+
+use crate::case::Case;
+use crate::case::plan::Plan;
+use crate::case::scene::{RestBrain, Scene};
+use crate::case::tissue::TissueClass;
+use crate::error::SessionError;
+use crate::hand::Feel;
+use crate::operation::Operation;
+use crate::options::Options;
+use crate::program::Program;
+use crate::report::regions::{Region, regions};
+use crate::run::clock::Clock;
+use crate::run::{Stages, Tissue};
+use crate::stages::alarms::Limits;
+use crate::stages::collision_step::CollisionStage;
+use crate::stages::haptic_tick::{HapticConfig, HapticStage};
+use crate::stages::second_hand::SecondHand;
+use crate::stages::settling::Settling;
+use crate::stages::skull_wall::SkullWall;
+use crate::stages::solver_step::SolverStage;
+use std::sync::{Arc, OnceLock};
+use trepan_contact::{Vibration, Viscoelastic};
+use trepan_geometry::{ToolState, Vec3, units};
+use trepan_link::Recording;
+use trepan_soft::{Body, Loads, SoftSolver};
+use trepan_volume::{BoneVolume, Piece};
+
+const TLED: &str = "tled";
+/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not have the recorded forces to the last bit.
+const FASTEST: &str = "fastest";
+
+/// What the operation is done on, and by which methods.
+pub struct Table {
+    /// The simulator.
+    pub program: Program,
+    /// The patient.
+    pub scene: Scene,
+    /// What is to be taken away.
+    pub plan: Plan,
+    /// Settings of the operation.
+    pub operation: Operation,
+    /// How bone is touched.
+    pub rigid: trepan_rigid::Method,
+    /// The bone that a replay carves while the window goes back and forth with the scene's.
+    filmed: Option<Arc<BoneVolume>>,
+    solver: String,
+    young_mpa: f32,
+    /// What the solver `fastest` turned out to be.
+    fastest: OnceLock<&'static str>,
+}
+
+impl Table {
+    /// Lays a case on the table. `filmed`: the window will go to and fro in the bone that is shown, so a second one is carved.
+    pub fn new(
+        program: Program,
+        options: &Options,
+        case: Case,
+        operation: Operation,
+        filmed: bool,
+    ) -> Result<Self, SessionError> {
+        let scene = Scene::new(program, case)?;
+        scene.remarks.iter().for_each(|remark| tracing::warn!("{remark}"));
+        let copy = |bone: &Arc<BoneVolume>| BoneVolume::new(&bone.snapshot(), bone.isovalue()).map(Arc::new);
+        let filmed = scene.bone.as_ref().filter(|_| filmed).map(copy).transpose();
+        Ok(Self {
+            program,
+            plan: planned(&scene, &operation)?,
+            scene,
+            operation,
+            rigid: rigid_method(options)?,
+            filmed: filmed.map_err(|fault| SessionError::Internal(fault.to_string()))?,
+            solver: options.solver.clone().unwrap_or_else(|| TLED.into()),
+            young_mpa: units::mpa_from_kpa(options.young_modulus_kpa),
+            fastest: OnceLock::new(),
+        })
+    }
+
+    /// Refuses names of methods that nobody knows.
+    pub fn check(options: &Options) -> Result<(), SessionError> {
+        rigid_method(options)?;
+        solver_named(options.solver.as_deref().unwrap_or(TLED)).map(drop)
+    }
+
+    /// The bone, if it is operated on.
+    pub fn bone(&self) -> Option<&Arc<BoneVolume>> {
+        self.filmed.as_ref().or(self.scene.bone.as_ref()).filter(|_| self.program.has_bone())
+    }
+
+    /// The brain, if it deforms.
+    fn brain(&self) -> Option<&RestBrain> {
+        self.scene.brain.as_ref().filter(|_| self.program.has_tissue())
+    }
+
+    /// The bone's pieces as they hang together now.
+    pub fn pieces(&self) -> Vec<Piece> {
+        self.bone().map_or_else(Vec::new, |bone| Piece::all(bone))
+    }
+
+    /// Where the brain was pressed.
+    pub fn regions(&self, recording: &Recording) -> Vec<Region> {
+        self.brain().map_or_else(Vec::new, |brain| regions(brain, self.program.tray(), &recording.ticks))
+    }
+
+    /// What steps the tissue: of `fastest` what that turned out to be.
+    pub fn solver_name(&self) -> &str {
+        self.fastest.get().copied().unwrap_or(&self.solver)
+    }
+
+    /// The bodies of the loops, with the tool at `start`.
+    pub fn stages(
+        &self,
+        start: ToolState,
+        tick_ms: f32,
+        opening_needed: bool,
+        feel: &Feel,
+        second: Option<&Feel>,
+    ) -> Result<Stages, SessionError> {
+        let config = |feel: &Feel| HapticConfig {
+            program: self.program,
+            rigid: self.rigid,
+            dt_ms: tick_ms,
+            bone_force: Vibration::drill(feel.coupled(Viscoelastic { stiffness: 2.0, damping: 0.5 }, tick_ms)),
+            tissue_force: feel.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, tick_ms),
+            guard: feel.guard(),
+            limits: Limits::default(),
+            opening_needed,
+        };
+        let bone = self.bone().cloned();
+        let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));
+        let tissue = self.brain().map(|brain| self.tissue(brain)).transpose()?;
+        let second = second.map(|feel| SecondHand::new(config(feel), bone.clone(), field.clone()));
+        let search = bone.as_ref().and_then(|bone| self.plan.search(bone));
+        let forbidden = self.scene.brain.as_ref().and_then(|brain| brain.distance_to(&self.operation.forbidden));
+        let mut haptic = HapticStage::new(config(feel), bone, field, start);
+        haptic = search.into_iter().fold(haptic, HapticStage::with_flap);
+        haptic = forbidden.map(Arc::new).into_iter().fold(haptic, HapticStage::forbidding);
+        Ok(Stages { haptic, second, tissue })
+    }
+
+    fn tissue(&self, brain: &RestBrain) -> Result<Tissue, SessionError> {
+        let body = Body {
+            mesh: brain.mesh.clone(),
+            fixed: brain.fixed.clone(),
+            materials: TissueClass::ALL.map(|class| class.material(self.young_mpa)).to_vec(),
+            material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
+        };
+        let wall = self.bone().cloned().map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed));
+        let wall = wall.transpose().map_err(|fault| of_brain(&fault))?;
+        let collision = CollisionStage::new(self.program, &brain.mesh, &Default::default(), wall);
+        let settling = Settling::new(self.operation.fluid_lost, Vec3::NEG_Y, -self.plan.site.inward);
+        Ok(Tissue {
+            collision: collision.map_err(|fault| of_brain(&fault))?.settling(settling),
+            solver: SolverStage::new(self.solver(&body)?),
+        })
+    }
+
+    fn solver(&self, body: &Body) -> Result<Box<dyn SoftSolver>, SessionError> {
+        if let Some(method) = solver_named(&self.solver)? {
+            return method.build(body).map_err(|fault| of_brain(&fault));
+        }
+        let config = trepan_tled::Config::default();
+        if self.solver != FASTEST {
+            return Ok(Box::new(trepan_tled::Tled::new(body, &config).map_err(|fault| of_brain(&fault))?));
+        }
+        let clock = Clock::start();
+        let all = trepan_tled::choice::candidates(body, &config);
+        let chosen = trepan_tled::choice::fastest(&all, &Loads::default(), 100.0, &|| clock.now_ms());
+        let chosen = chosen.map_err(|fault| of_brain(&fault))?;
+        tracing::info!("solver {}: {}", chosen.name, chosen.why);
+        let _first = self.fastest.set(chosen.name);
+        Ok(chosen.solver)
+    }
+}
+
+fn of_brain(fault: &dyn std::fmt::Display) -> SessionError {
+    SessionError::Internal(format!("the brain: {fault}"))
+}
+
+/// What is to be taken away.
+fn planned(scene: &Scene, operation: &Operation) -> Result<Plan, SessionError> {
+    let hole_mm = Program::Craniotomy.tray()[0].tip_radius_mm;
+    let plan = Plan::new(scene.bone.as_deref(), scene.site, hole_mm, 0.5 * operation.flap_mm);
+    plan.ok_or_else(|| {
+        let fault = format!(
+            "--flap {}: the skull does not go all around it: give a smaller one, or another --opening",
+            operation.flap_mm
+        );
+        SessionError::Usage(fault)
+    })
+}
+
+fn rigid_method(options: &Options) -> Result<trepan_rigid::Method, SessionError> {
+    let Some(name) = &options.rigid else { return Ok(trepan_rigid::Method::RECOMMENDED) };
+    trepan_rigid::Method::named(name).ok_or_else(|| {
+        let known: Vec<_> = trepan_rigid::Method::all().iter().map(|method| method.name()).collect();
+        SessionError::Usage(format!("--rigid {name} is not known; known are {}", known.join(", ")))
+    })
+}
+
+/// The rival solver of that name; `None` for TLED.
+fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
+    if name == TLED || name == FASTEST {
+        return Ok(None);
+    }
+    trepan_soft::Method::named(name).map(Some).ok_or_else(|| {
+        let known: Vec<_> = trepan_soft::Method::all().iter().map(|method| method.name()).collect();
+        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {FASTEST}, {}", known.join(", ")))
+    })
+}
