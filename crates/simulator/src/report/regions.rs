@@ -1,8 +1,8 @@
 //! Where the brain was pressed, and how hard: by the tissue under the tool and the side of the head.
 //!
 //! # Theory
-//! A tick with force counts to the tissue class of the rest place under the tool's ball, one radius and a millimetre in along the contact's normal, or of the nearest
-//! brain within 4 mm of it. Its share is `∫ F dt`. The brain is taken where it lay at rest: a place that was pushed far counts to its neighbour.
+//! The place under the tool's ball is carried back along the contact's normal to the brain's surface at rest, as far as it was pushed in. A tick with force counts to the tissue class
+//! a millimetre below there, or of the nearest brain within 4 mm. Its share is `∫ F dt`. What was pushed aside counts to its neighbour.
 //!
 //! # When not to use it
 //! For functional regions: there is no atlas here.
@@ -12,6 +12,7 @@ use crate::case::tissue::TissueClass;
 use serde::Serialize;
 use trepan_geometry::{Tool, Vec3};
 use trepan_link::wire::TickRecord;
+use trepan_volume::DistanceField;
 
 /// What one region bore.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -37,10 +38,9 @@ pub fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Re
     let mut all: Vec<Region> = Vec::new();
     for pair in ticks.windows(2).filter(|pair| pair[1].tissue_depth_mm > 0.0 && pair[1].phase == 1) {
         let (before, tick) = (&pair[0], &pair[1]);
-        let tip_mm = tray.get(usize::from(tick.tool)).map_or(0.0, |tool| tool.tip_radius_mm);
-        let (tip, normal) = (tick.proxy.translation, tick.contact_normal);
-        let Some(class) = IN_MM.iter().find_map(|mm| class_at(brain, tip - (tip_mm + mm) * normal)) else { continue };
-        let side = if tip.x > middle { "right" } else { "left" };
+        let (place, normal) = (touched(&brain.field, tray, tick), tick.contact_normal);
+        let Some(class) = IN_MM.iter().find_map(|mm| class_at(brain, place - *mm * normal)) else { continue };
+        let side = if place.x > middle { "right" } else { "left" };
         let name = format!("{side} {}", class.name());
         let at = all.iter().position(|region| region.name == name).unwrap_or_else(|| {
             all.push(Region { name, seconds: 0.0, impulse_n_s: 0.0, peak_n: 0.0 });
@@ -57,6 +57,13 @@ pub fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Re
     all
 }
 
+/// Where at rest the brain was that a tick touches, world mm.
+pub fn touched(brain: &DistanceField, tray: &[Tool], tick: &TickRecord) -> Vec3 {
+    let radius_mm = tray.get(usize::from(tick.tool)).map_or(0.0, |tool| tool.tip_radius_mm);
+    let under = tick.proxy.translation - radius_mm * tick.contact_normal;
+    under - brain.sample(under).min(0.0) * tick.contact_normal
+}
+
 fn class_at(brain: &RestBrain, place: Vec3) -> Option<TissueClass> {
     let voxel = brain.classes.world_from_voxel.inverse().transform_point3(place.as_dvec3()).round();
     let inside = voxel.cmpge(glam::DVec3::ZERO).all();
@@ -69,7 +76,7 @@ mod tests {
     use super::*;
     use std::sync::Arc;
     use trepan_geometry::{Pose, Wrench};
-    use trepan_volume::{DistanceField, VoxelVolume};
+    use trepan_volume::VoxelVolume;
 
     #[test]
     fn a_press_counts_to_the_tissue_below_and_its_side() {
@@ -94,7 +101,7 @@ mod tests {
             press(0, 5.0, 6.0, 0.2),
             press(20, 5.0, 6.0, 0.2),
             press(40, 5.0, 6.0, 0.4),
-            press(60, -5.0, 1.0, 0.3),
+            TickRecord { contact_normal: Vec3::NEG_X, ..press(60, -11.0, -5.0, 0.3) },
             TickRecord { tissue_depth_mm: 0.0, ..press(80, 5.0, 6.0, 9.0) },
         ];
         let found = regions(&brain, &[Tool::probe(2.0)], &ticks);

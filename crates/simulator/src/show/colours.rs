@@ -11,6 +11,8 @@
 //! Colours of Okabe and Ito (2008), which every kind of colour vision tells apart. A box of some 10⁵ texels, made once; tens of milliseconds.
 
 use crate::case::plan::Plan;
+use crate::report::regions::touched;
+use glam::IVec3;
 use trepan_geometry::{Aabb, Tool, Vec3};
 use trepan_link::wire::TickRecord;
 use trepan_render::Paint;
@@ -77,28 +79,35 @@ pub fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Pai
     let reach = plan.hole_mm.max(plan.flap_mm) + 2.0 * AROUND_MM;
     let around = Aabb::of_points(&[plan.site.entry, plan.site.entry + DEEP_MM * plan.site.inward]).inflated(reach);
     let low = bone.centre_of(bone.voxel_of(around.min));
+    let was_bone = |voxel: IVec3| {
+        let inside = voxel.cmpge(IVec3::ZERO).all();
+        let was = inside.then(|| before.get(voxel.as_usizevec3().to_array())).flatten();
+        was.is_some_and(|hu| hu >= bone.isovalue())
+    };
     paint(2, Aabb { min: low, max: around.max }, bone.spacing_mm(), |place| {
         let voxel = bone.voxel_of(place);
-        let was = before.get(voxel.max(glam::IVec3::ZERO).as_uvec3().to_array().map(|n| n as usize));
-        if was.is_none_or(|hu| hu < bone.isovalue()) {
+        if !was_bone(voxel) {
             return CLEAR;
         }
-        match (plan.takes(place), !bone.is_bone(voxel)) {
-            (true, true) => coloured(GREEN, 0.8),
+        let gone = |voxel: IVec3| was_bone(voxel) && !bone.is_bone(voxel);
+        let sides = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|side| [voxel + side, voxel - side]);
+        // The rim of what went has its colour, so that the surface there has.
+        let at_rim = |planned: bool| sides.clone().any(|at| gone(at) && plan.takes(bone.centre_of(at)) == planned);
+        match (plan.takes(place), gone(voxel)) {
+            (true, true) => coloured(GREEN, 0.9),
             (true, false) => coloured(SKY, 0.9),
             (false, true) => coloured(VERMILION, 1.0),
+            (false, false) if at_rim(false) => coloured(VERMILION, 1.0),
+            (false, false) if at_rim(true) => coloured(GREEN, 0.9),
             (false, false) => CLEAR,
         }
     })
 }
 
 /// Force over time on the brain, by the place at rest where the tool touched; `None` when it never did.
-pub fn forces(tray: &[Tool], ticks: &[TickRecord]) -> Option<Paint> {
+pub fn forces(brain: &DistanceField, tray: &[Tool], ticks: &[TickRecord]) -> Option<Paint> {
     let pressed = |tick: &&TickRecord| tick.phase == 1 && tick.tissue_depth_mm > 0.0;
-    let touched = |tick: &TickRecord| {
-        let radius_mm = tray.get(usize::from(tick.tool)).map_or(0.0, |tool| tool.tip_radius_mm);
-        (tick.proxy.translation - radius_mm * tick.contact_normal, tick.wrench.force.length())
-    };
+    let touched = |tick: &TickRecord| (touched(brain, tray, tick), tick.wrench.force.length());
     // Every 10th tick: a touch spreads over much more than a hand moves in that time.
     let touches: Vec<(Vec3, f32)> = ticks.iter().filter(pressed).step_by(10).map(touched).collect();
     let places: Vec<Vec3> = touches.iter().map(|touch| touch.0).collect();
@@ -114,7 +123,7 @@ pub fn forces(tray: &[Tool], ticks: &[TickRecord]) -> Option<Paint> {
         let middle = ((*place - around.min) / texel_mm).round().as_ivec3();
         let offsets = || -reach..=reach;
         for (k, j, i) in offsets().flat_map(|k| offsets().flat_map(move |j| offsets().map(move |i| (k, j, i)))) {
-            let texel = (middle + glam::IVec3::new(i, j, k)).max(glam::IVec3::ZERO).as_usizevec3();
+            let texel = (middle + IVec3::new(i, j, k)).max(IVec3::ZERO).as_usizevec3();
             let apart = around.min + texel_mm * texel.as_vec3() - *place;
             if let Some(sum) =
                 sums.get_mut(texel.x + nx * (texel.y + ny * texel.z)).filter(|_| texel.x < nx && texel.y < ny)
@@ -164,7 +173,6 @@ fn paint(version: u64, around: Aabb, texel_mm: f32, mut colour: impl FnMut(Vec3)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::IVec3;
     use trepan_geometry::{Pose, Wrench};
     use trepan_haptics::script::Site;
     use trepan_volume::AIR_HU;
@@ -190,9 +198,9 @@ mod tests {
         }
         let map = against(&plan, &before, &bone);
         let colour = |x: f32| at(&map, Vec3::new(x, 25.0, 8.0));
-        assert_eq!(colour(25.0), coloured(GREEN, 0.8));
+        assert_eq!(colour(25.0), coloured(GREEN, 0.9));
         assert_eq!(colour(33.0), coloured(VERMILION, 1.0));
-        assert_eq!((colour(27.0), colour(35.0)), (coloured(SKY, 0.9), CLEAR));
+        assert_eq!((colour(27.0), colour(34.0), colour(36.0)), (coloured(SKY, 0.9), coloured(VERMILION, 1.0), CLEAR));
     }
 
     #[test]
@@ -206,9 +214,10 @@ mod tests {
             ..TickRecord::default()
         };
         let ticks: Vec<TickRecord> = (0..900).map(|n| touch(if n < 600 { 0.0 } else { 20.0 })).collect();
-        let map = forces(&[Tool::probe(2.0)], &ticks).unwrap();
+        let brain = DistanceField::of_mask(&VoxelVolume::isotropic([4; 3], Vec3::ZERO, 1.0, 0u8));
+        let map = forces(&brain, &[Tool::probe(2.0)], &ticks).unwrap();
         let alpha = |x: f32| at(&map, Vec3::new(x, 0.0, 0.0))[3];
         assert!(alpha(0.0) > 215 && alpha(20.0) > 120 && alpha(20.0) < alpha(0.0) && alpha(10.0) == 0);
-        assert!(forces(&[], &[]).is_none());
+        assert!(forces(&brain, &[], &[]).is_none());
     }
 }

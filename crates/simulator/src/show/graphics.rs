@@ -61,7 +61,8 @@ impl Table {
         folder: &Path,
     ) -> Vec<Result<Shot, String>> {
         let against = self.bone().zip(before).map(|(bone, before)| colours::against(&self.plan, before, bone));
-        let forces = colours::forces(self.program.tray(), &recording.ticks);
+        let field = self.scene.brain.as_ref().map(|brain| &*brain.field);
+        let forces = field.and_then(|field| colours::forces(field, self.program.tray(), &recording.ticks));
         let outward = -self.plan.site.inward;
         let side = outward.any_orthonormal_vector();
         let eye = |distance_mm| Camera::viewed_from(self.plan.site.entry, outward + 0.35 * side, distance_mm);
