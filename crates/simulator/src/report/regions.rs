@@ -83,6 +83,7 @@ mod tests {
         let mut classes = VoxelVolume::isotropic([20; 3], Vec3::splat(-9.5), 1.0, TissueClass::White.code());
         classes.data[20 * 20 * 10..].fill(TissueClass::Grey.code());
         classes.data[20 * 20 * 15..].fill(0);
+        classes.data.iter_mut().step_by(20).for_each(|code| *code = 0);
         let mut mesh = trepan_soft::boxes::split_box([2; 3], Vec3::splat(18.0));
         mesh.positions.iter_mut().for_each(|p| *p -= 9.0);
         let field = Arc::new(DistanceField::of_mask(&classes));
