@@ -14,6 +14,7 @@
 pub mod front;
 pub mod page;
 pub mod picture;
+mod python;
 pub mod suite;
 pub mod suites;
 pub mod timer;

@@ -54,6 +54,12 @@ pub const ON_REQUEST: &[Suite] = &[
         run: render::rivals::run,
     },
     Suite {
+        name: "recording-readers",
+        question: "do the mcap package and Rerun read a recording (fetched from Python's package index for this run)",
+        chart: ("ticks_written", "ticks_decoded"),
+        run: simulators::readers::run,
+    },
+    Suite {
         name: "mesh-rivals",
         question: "how do TetGen and fTetWild fill the same surface (fetched from Python's package index for this run)",
         chart: ("mesh_s", "min_dihedral_deg"),

@@ -7,6 +7,7 @@ mod flap;
 mod hands;
 mod holes;
 mod rates;
+pub mod readers;
 mod sessions;
 
 use super::Scope;

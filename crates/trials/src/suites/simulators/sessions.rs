@@ -15,7 +15,7 @@ use trepan_simulator::{Options, Program, Session, Summary};
 const GROWTH_MB: f64 = 20.0;
 
 /// Runs a session of the built-in case.
-fn run(out: &Path, arguments: &[&str]) -> Result<Summary> {
+pub fn run(out: &Path, arguments: &[&str]) -> Result<Summary> {
     let fixed = ["integrated", "--headless", "--frames-per-second", "0", "--out"].map(std::ffi::OsString::from);
     let arguments = arguments.iter().map(std::ffi::OsString::from);
     let options = Options::try_parse_from(fixed.into_iter().chain([out.into()]).chain(arguments))?;
