@@ -10,7 +10,7 @@
 //! | N, U | the next tool; takes the last stroke back |
 //! | arrows, Page Up, Page Down | move the tool by half a millimetre |
 //! | + and -, R | zoom; back to the first view |
-//! | M | the microscope: a narrow field straight down on the opening |
+//! | M | the microscope: a narrow field down on the opening |
 //! | B, T, S, O | skull, brain, slices, colours and arrows on and off |
 //! | C, E | a section through the tool's tip; stereo: off, side by side, red-cyan |
 //! | P, V | a picture of the window for the session to keep; every picture |

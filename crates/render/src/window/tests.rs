@@ -364,6 +364,15 @@ fn a_timeline_runs_goes_to_events_and_is_dragged() {
     assert_eq!(bench.click("Run (Space)").playback, Some(Playback::Run(true)));
     bench.window.run_steps(2);
     assert_eq!(bench.heard().playback, None);
+    let asked = |bench: &Bench| {
+        let lent = bench.lent.borrow();
+        let heard = &lent.as_ref().unwrap().session.heard;
+        heard.iter().filter(|input| input.playback == Some(Playback::Run(true))).count()
+    };
+    let before = asked(&bench);
+    bench.press(Key::Space);
+    bench.window.run_steps(2);
+    assert_eq!(asked(&bench), before + 1, "Space says it once");
     assert_eq!(bench.click("Event before ([)").playback, Some(Playback::Seek(2.0)));
     bench.press(Key::CloseBracket);
     assert_eq!(bench.heard().playback, Some(Playback::Seek(6.0)));
