@@ -31,7 +31,6 @@ impl Session for Drill {
         }
         Panel {
             phase: "Practice".into(),
-            hint: "Drill into the ball.".into(),
             tool: "burr 8 mm".into(),
             by_hand: true,
             drilling: self.drilling,

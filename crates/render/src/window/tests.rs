@@ -358,9 +358,10 @@ fn pictures_of_the_window_reach_the_session() {
 fn a_timeline_runs_goes_to_events_and_is_dragged() {
     let marks = [(2.0, "burr near the brain", true), (6.0, "brain begins", false)];
     let marks = marks.map(|(at_s, text, warning)| Mark { at_s, text: text.into(), warning }).into();
-    let timeline = Timeline { at_s: 3.0, length_s: 10.0, ready_s: 5.0, running: false, speed: 1.0, marks };
+    let timeline = Timeline { at_s: 3.0123, length_s: 10.0, ready_s: 5.0, running: false, speed: 1.0, marks };
     let mut bench = Bench::with(Panel { timeline: Some(timeline), ..Panel::default() });
-    assert!(bench.sees("50 % made") && bench.sees("burr near the brain"));
+    assert!(bench.lent.borrow().as_ref().unwrap().session.heard.iter().all(|input| input.playback.is_none()));
+    assert!(bench.sees("3.0 / 10.0 s") && bench.sees("50 % made") && bench.sees("burr near the brain"));
     assert_eq!(bench.click("Run (Space)").playback, Some(Playback::Run(true)));
     bench.window.run_steps(2);
     assert_eq!(bench.heard().playback, None);

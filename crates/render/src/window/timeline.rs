@@ -15,7 +15,7 @@ pub(crate) fn show(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     egui::Panel::bottom("timeline").show(ui, |ui| {
         ui.add_space(4.0);
         ui.horizontal(|ui| asked = buttons(ui, timeline).or(asked));
-        asked = bar(ui, timeline).or(asked);
+        asked = asked.or(bar(ui, timeline));
         ui.add_space(6.0);
     });
     asked
@@ -59,22 +59,26 @@ fn buttons(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
             asked = Some(Playback::Speed(speed));
         }
     }
+    let time = format!("{:.1} / {:.1} s", timeline.at_s, timeline.length_s);
+    ui.label(RichText::new(time).monospace());
     if timeline.ready_s < timeline.length_s {
         let share = 100.0 * timeline.ready_s / timeline.length_s.max(1e-9);
         ui.label(RichText::new(format!("{share:.0} % made")).color(ORANGE));
     }
     let last = timeline.marks.iter().rev().find(|mark| mark.at_s <= timeline.at_s + HERE_S);
     if let Some(mark) = last {
-        ui.label(RichText::new(&mark.text).color(if mark.warning { ORANGE } else { PALE }));
+        let text = RichText::new(&mark.text).color(if mark.warning { ORANGE } else { PALE });
+        // A longer row would make the bar longer too.
+        ui.add(egui::Label::new(text).truncate());
     }
     asked
 }
 
-/// The slider with a mark for each event.
+/// The slider with a mark for each event. It shows no number of its own: one with decimals would round the time, and so ask to go there.
 fn bar(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let mut at_s = timeline.at_s;
-    ui.spacing_mut().slider_width = (ui.available_width() - 130.0).max(60.0);
-    let slider = egui::Slider::new(&mut at_s, 0.0..=timeline.length_s.max(1e-3)).fixed_decimals(1).text("time, s");
+    ui.spacing_mut().slider_width = (ui.available_width() - 80.0).max(60.0);
+    let slider = egui::Slider::new(&mut at_s, 0.0..=timeline.length_s.max(1e-3)).show_value(false).text("time, s");
     let response = ui.add(slider);
     let rail =
         egui::Rect::from_min_size(response.rect.min, egui::vec2(ui.spacing().slider_width, response.rect.height()));
