@@ -58,6 +58,16 @@ pub struct Written {
     pub fault: Option<LinkError>,
 }
 
+impl Written {
+    /// Ends the recording with a fault and says so at once; only the first one counts.
+    fn end(&mut self, fault: LinkError) {
+        if self.fault.is_none() {
+            tracing::error!("the recording ended early, the session goes on: {fault}");
+            self.fault = Some(fault);
+        }
+    }
+}
+
 /// Both ends.
 pub fn journal() -> (Pens, Journal) {
     let (ticks, ticks_in) = bounded(RING);
@@ -88,12 +98,12 @@ impl Journal {
             let over = self.is_over();
             let drained = self.drain(&mut recorder, &mut share, &mut written, &mut scores);
             if let Err(fault) = drained.and_then(|()| self.listen(&mut recorder, &mut share, clock.now_ms())) {
-                written.fault.get_or_insert(fault);
+                written.end(fault);
                 self.discard(&mut written);
             }
             if clock.now_ms() - flushed_ms >= FLUSH_MS && written.fault.is_none() {
                 flushed_ms = clock.now_ms();
-                written.fault = recorder.flush().err();
+                recorder.flush().err().into_iter().for_each(|fault| written.end(fault));
             }
             if over {
                 break;
@@ -101,11 +111,7 @@ impl Journal {
             std::thread::sleep(DRAIN);
         }
         written.dropped = self.dropped();
-        let closed = recorder.finish();
-        written.fault = written.fault.or(closed.err());
-        if let Some(fault) = &written.fault {
-            tracing::error!("the recording ended early: {fault}");
-        }
+        recorder.finish().err().into_iter().for_each(|fault| written.end(fault));
         written
     }
 
