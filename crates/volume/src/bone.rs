@@ -204,7 +204,12 @@ impl BoneVolume {
         done
     }
 
-    /// How often a stroke was undone: bone has come back where there was none.
+    /// Says that bone was put back by [`set_hu`](Self::set_hu) where there was none. For the one writer only.
+    pub fn came_back(&self) {
+        self.undone.fetch_add(1, Ordering::Release);
+    }
+
+    /// How often bone has come back where there was none: by an undone stroke, or put back.
     pub fn undone(&self) -> u32 {
         self.undone.load(Ordering::Acquire)
     }

@@ -121,6 +121,7 @@ impl Flap {
     fn put_back(&mut self, bone: &BoneVolume, done: usize) -> Option<What> {
         let end = (done + WRITTEN).min(self.densities.len());
         (done..end).for_each(|at| bone.set_hu(self.search.voxel(at), self.densities[at]));
+        bone.came_back();
         let whole = end == self.densities.len();
         self.at = if whole { At::Cut } else { At::Returning(end) };
         whole.then_some(What::FlapReturned)
@@ -162,6 +163,7 @@ mod tests {
         run(&mut flap, 1, none, false, false);
         assert_eq!(run(&mut flap, 20, Buttons::FLAP, false, false), [What::FlapReturned]);
         assert_eq!(bone.snapshot(), cut);
+        assert!(bone.undone() > 0, "who feels the bone must look anew");
         assert_eq!(run(&mut flap, 50, Buttons::PEDAL, true, true), [], "told once");
         assert_eq!(run(&mut flap, 50, none, false, false), []);
     }
