@@ -107,23 +107,21 @@ fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, rest: vec3f) -> vec3f {
     return lit(painted_brain(brain_colour(rest - 3.5 * normal), rest), normal, along, open, key, 0.20);
 }
 
-fn burr_colour(point: vec3f) -> vec3f {
-    let axis = normalize(scene.tail.xyz - scene.tip.xyz);
-    let away = point - scene.tip.xyz;
+fn burr_colour(point: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
+    let axis = normalize(tail.xyz - tip.xyz);
+    let away = point - tip.xyz;
     let angle = atan2(dot(away, cross(axis, scene.spin.xyz)), dot(away, scene.spin.xyz));
-    let flute = smoothstep(-0.2, 0.5, sin(8.0 * angle + 3.0 * dot(away, axis) / scene.tip.w));
+    let flute = smoothstep(-0.2, 0.5, sin(8.0 * angle + 3.0 * dot(away, axis) / tip.w));
     return mix(vec3f(0.34, 0.36, 0.40), vec3f(0.80, 0.80, 0.78), flute);
 }
 
-// A tool where the ray meets it at `met`; `first` may be a burr.
-fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, first: bool) -> vec3f {
+// A tool where the ray meets it at `met`; `look` is that of its tip.
+fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, look: f32) -> vec3f {
     let on_tip = min(met.y, met.z) > met.x;
     let normal = tool_normal(point, tip, tail, met);
-    let burr = first && scene.spin.w > 0.5;
     var colour = vec3f(0.62, 0.66, 0.72);
-    if on_tip && burr { colour = burr_colour(point); }
-    // A tip no wider than its shaft is a tube's mouth.
-    if on_tip && !burr && tip.w <= tail.w && dot(normal, normalize(tip.xyz - tail.xyz)) > 0.75 { colour = vec3f(0.02); }
+    if on_tip && look == 1.0 { colour = burr_colour(point, tip, tail); }
+    if on_tip && look == 2.0 && dot(normal, normalize(tip.xyz - tail.xyz)) > 0.75 { colour = vec3f(0.02); }
     return lit(colour, normal, along, 1.0, 1.0, 0.7);
 }
 
@@ -142,9 +140,9 @@ fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, f
     var colour = mix(vec3f(0.105, 0.125, 0.155), vec3f(0.035, 0.04, 0.05), back);
     if t >= NOTHING {
     } else if t == near.x {
-        colour = shade_tool(point, along, scene.tip, scene.tail, first, true);
+        colour = shade_tool(point, along, scene.tip, scene.tail, first, scene.tips.x);
     } else if t == near.y {
-        colour = shade_tool(point, along, scene.second_tip, scene.second_tail, second, false);
+        colour = shade_tool(point, along, scene.second_tip, scene.second_tail, second, scene.tips.y);
     } else if t == brain.w {
         colour = shade_brain(point, along, brain, unpacked(textureLoad(brain_rest, at, 0)).xyz);
     } else {

@@ -28,6 +28,7 @@ pub(crate) struct Scene {
     pub second_tail: Vec4,
     pub brain_cut: Vec4,
     pub bone_cut: Vec4,
+    pub tips: Vec4,
     pub bone_paint: [Vec4; 2],
     pub brain_paint: [Vec4; 2],
 }
@@ -57,10 +58,11 @@ impl Scene {
             second_tail,
             brain_cut: Cut::plane(frame.cut.as_ref()),
             bone_cut: Cut::plane(frame.cut.as_ref().filter(|cut| cut.bone)),
+            tips: Vec4::new(look(tool.kind), look(second.kind), 0.0, 0.0),
             bone_paint: Paint::placed(frame.bone_paint),
             brain_paint: Paint::placed(frame.brain_paint),
             light: towards_light(view).extend(flag(frame.drilling)),
-            spin: across.extend(flag(tool.kind.cuts())),
+            spin: across.extend(0.0),
         }
     }
 
@@ -90,6 +92,15 @@ const NO_TOOL: Tool =
 pub(crate) fn ends(tool: &Tool, world_from_tool: &Pose) -> [Vec4; 2] {
     let tail = *world_from_tool * Vec3::new(0.0, 0.0, tool.shaft_length_mm);
     [world_from_tool.translation.extend(tool.tip_radius_mm), tail.extend(tool.shaft_radius_mm)]
+}
+
+/// How a tool's tip looks: fluted, the mouth of a tube, or smooth.
+fn look(kind: ToolKind) -> f32 {
+    match kind {
+        cutting if cutting.cuts() => 1.0,
+        ToolKind::Aspirator => 2.0,
+        _ => 0.0,
+    }
 }
 
 fn distance(point: Vec3, tip: Vec4, tail: Vec4) -> f32 {

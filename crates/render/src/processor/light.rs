@@ -23,9 +23,9 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bon
         let back = (y as f32 + 0.5) / scene.up.w;
         Vec3::new(0.105, 0.125, 0.155).lerp(Vec3::new(0.035, 0.04, 0.05), back)
     } else if t == first.t() {
-        shade_tool(scene, point, along, &first, true)
+        shade_tool(scene, point, along, &first, scene.tips.x)
     } else if t == second.t() {
-        shade_tool(scene, point, along, &second, false)
+        shade_tool(scene, point, along, &second, scene.tips.y)
     } else if t == brain.t {
         shade_brain(inputs, point, along, brain)
     } else {
@@ -159,27 +159,23 @@ pub(crate) fn tinted(colour: Vec3, signal: Vec4) -> Vec3 {
     colour.lerp(mark / share.max(1e-3), 0.45 * share)
 }
 
-/// A tool where a ray meets it; `first` may be a burr.
-fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &Met, first: bool) -> Vec3 {
+/// A tool where a ray meets it; `look` is that of its tip.
+fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &Met, look: f32) -> Vec3 {
     let on_tip = met.t() == met.at[0];
     let axis = (met.tail - met.tip).truncate().normalize();
     let normal = met.normal(point);
-    let burr = first && scene.spin.w > 0.5;
-    let colour = if on_tip && burr {
-        burr_colour(scene, point, axis)
-    } else if on_tip && met.tip.w <= met.tail.w && normal.dot(-axis) > 0.75 {
-        // A tip no wider than its shaft is a tube's mouth.
-        Vec3::splat(0.02)
-    } else {
-        Vec3::new(0.62, 0.66, 0.72)
+    let colour = match look {
+        1.0 if on_tip => burr_colour(scene, point, met, axis),
+        2.0 if on_tip && normal.dot(-axis) > 0.75 => Vec3::splat(0.02),
+        _ => Vec3::new(0.62, 0.66, 0.72),
     };
     lit(scene, colour, normal, along, 1.0, 1.0, 0.7)
 }
 
-fn burr_colour(scene: &Scene, point: Vec3, axis: Vec3) -> Vec3 {
-    let away = point - scene.tip.truncate();
+fn burr_colour(scene: &Scene, point: Vec3, met: &Met, axis: Vec3) -> Vec3 {
+    let away = point - met.tip.truncate();
     let across = scene.spin.truncate();
     let angle = away.dot(axis.cross(across)).atan2(away.dot(across));
-    let flute = smoothstep(-0.2, 0.5, (8.0 * angle + 3.0 * away.dot(axis) / scene.tip.w).sin());
+    let flute = smoothstep(-0.2, 0.5, (8.0 * angle + 3.0 * away.dot(axis) / met.tip.w).sin());
     Vec3::new(0.34, 0.36, 0.40).lerp(Vec3::new(0.80, 0.80, 0.78), flute)
 }
