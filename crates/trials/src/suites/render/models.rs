@@ -71,7 +71,7 @@ fn measure(
         for (how, setting, cut) in ways {
             by.set(&setting, size);
             by.draw(&shown(1, cut));
-            let times = Samples::of(scope.pick(2, 7), |turn| by.draw(&shown(turn, cut)));
+            let times = Samples::of(scope.pick(2, 3), |turn| by.draw(&shown(turn, cut)));
             let ms = 1e-3 * times.quantile(0.5);
             let mut row = Row::new(format!("{scene} at {}x{}", size[0], size[1]), format!("{}{how}", by.name()))
                 .with("machine", by.machine())

@@ -28,7 +28,7 @@ pub fn run(scope: Scope) -> Findings {
     let mut findings = Findings::default();
     let size = scope.pick([640, 480], [1680, 1050]);
     let edge = scope.pick(100, 160);
-    match vtk(edge, size, scope.pick(4, 10)) {
+    match vtk(edge, size, 4) {
         Ok(theirs) => compare(edge, size, scope, &theirs, &mut findings),
         Err(fault) => println!("  left out, since there is no Python with VTK: {fault}"),
     }
