@@ -14,8 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let number = |at: usize, default| arguments.get(at).map_or(Ok(default), |a| a.parse());
     let size = [number(1, 640)?, number(2, 480)?];
     let bone = Arc::new(BoneVolume::new(&ct, 400)?);
-    let middle = bone.bounds().centre();
-    let data = SceneData { bone: Some(bone), brain: None, mri: None, tint: None };
+    let (middle, data) = (bone.bounds().centre(), SceneData { bone: Some(bone), brain: None, mri: None, tint: None });
     let views = [Vec3::Y, Vec3::new(0.7, 0.6, 0.9), Vec3::X, Vec3::new(-0.5, 1.0, 0.2)];
     let frames = views.map(|v| Frame::of(Camera::viewed_from(middle, v, 450.0)));
 
@@ -32,8 +31,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (frame, exact) in frames.iter().zip(&hits) {
         let start = Instant::now();
         processor.draw(frame)?;
-        let ms = start.elapsed().as_secs_f64() * 1e3;
-        println!("processor, sparsely: {ms:7.1} ms; {}", apart(&processor.bone_hits(), exact));
+        let (ms, away) = (start.elapsed().as_secs_f64() * 1e3, apart(&processor.bone_hits(), exact));
+        println!("processor, sparsely: {ms:7.1} ms; {away}");
     }
     match Gpu::open(Prefer::Hardware) {
         Err(why) => println!("{}", Painter::on(Err(why), &data, size)?.notice().unwrap_or_default()),

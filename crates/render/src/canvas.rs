@@ -1,6 +1,7 @@
 //! The textures that one size of picture needs, bound to the passes.
 
 use crate::RenderError;
+use crate::anaglyph::Anaglyph;
 use crate::brain::Brain;
 use crate::cut::Face;
 use crate::enlarge::Enlarge;
@@ -30,6 +31,7 @@ pub(crate) struct Passes {
     pub light: Light,
     pub overlay: Shapes,
     pub enlarge: Enlarge,
+    pub anaglyph: Anaglyph,
     pub slices: Slices,
 }
 
@@ -78,7 +80,7 @@ impl Canvas {
             [Eye { apart: Some((left, _)), .. }, Eye { apart: Some((right, _)), .. }]
                 if division.stereo == Some(StereoLook::Anaglyph) =>
             {
-                Some(passes.enlarge.bind_both(gpu, &passes.scenes[0], [left, right])?)
+                Some(passes.anaglyph.bind(gpu, &passes.scenes[0], [left, right])?)
             }
             _ => None,
         };

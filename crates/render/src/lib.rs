@@ -19,6 +19,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod anaglyph;
 mod brain;
 mod bricks;
 mod camera;

@@ -1,6 +1,7 @@
 //! The picture from its parts: newest poses → changed bricks → brain → rays → light → slices.
 
 use crate::RenderError;
+use crate::anaglyph::Anaglyph;
 use crate::brain::Brain;
 use crate::camera::View;
 use crate::canvas::{Canvas, Division, Passes};
@@ -74,6 +75,7 @@ impl Renderer {
             light: Light::new(gpu)?,
             overlay: Shapes::new(gpu)?,
             enlarge: Enlarge::new(gpu)?,
+            anaglyph: Anaglyph::new(gpu)?,
             slices: Slices::new(gpu)?,
         };
         let moves = passes.brain.is_some();
@@ -143,7 +145,7 @@ impl Renderer {
             }
         }
         if let Some(bindings) = anaglyph {
-            passes.enlarge.draw_both(recorder, bindings, layout.view, picture);
+            passes.anaglyph.draw(recorder, bindings, layout.view, picture);
         }
         pixels_cast
     }
