@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// Fields that every summary has, as paths.
-const FIELDS: [&str; 24] = [
+const FIELDS: [&str; 26] = [
     "/case",
     "/device",
     "/phases",
