@@ -13,7 +13,7 @@
 //!
 //! # Practice
 //! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by how much. It runs as fast as it can; for a window that
-//! goes back and forth in time it is filmed meanwhile ([`crate::run::film`]).
+//! goes back and forth in time it is filmed meanwhile (`run/film.rs`).
 
 use crate::run::clock::Clock;
 use crate::run::film::{Filming, Shot};

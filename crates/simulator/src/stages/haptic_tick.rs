@@ -101,7 +101,7 @@ pub struct Tick {
     pub sample: ToolSample,
     /// For the recording; the time it took is the caller's to fill in.
     pub record: TickRecord,
-    /// The standing warnings, bits as in [`Warning::ALL`].
+    /// The standing warnings, bits as in [`Warning::ALL`](crate::Warning::ALL).
     pub warnings: u32,
 }
 
