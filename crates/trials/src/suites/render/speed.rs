@@ -16,7 +16,7 @@ const fn stepped(name: &'static str, step: f32) -> Setting {
 }
 
 /// The first is what all pictures are drawn with; steps are the processor's alone.
-const SETTINGS: [Setting; 8] = [
+const SETTINGS: [Setting; 9] = [
     EXACT,
     SPARSE,
     Setting { name: "exact, no leaping", casting: Casting { leap: false, ..EXACT.casting }, ..EXACT },
@@ -25,6 +25,7 @@ const SETTINGS: [Setting; 8] = [
     stepped("steps of 2 voxels", 2.0),
     Setting { name: "exact, 3/4 of the pixels along an edge", detail: 0.75, ..EXACT },
     Setting { name: "exact, 1/2 of the pixels along an edge", detail: 0.5, ..EXACT },
+    Setting { name: "sparse rays, 1/2 of the pixels along an edge", detail: 0.5, ..SPARSE },
 ];
 
 /// Time of a picture whose camera moves, against its difference from the processor's picture with steps of 1/16 voxel.
