@@ -4,7 +4,7 @@
 //! The thesis draws 15 to 20 frames a second at 1680x1050 on the graphics card of its day. Times are of whole pictures without slices, to the last pixel.
 
 use super::scenes::{SKULLS, brain, frame, skull, swaying};
-use super::{By, EXACT, SPARSE};
+use super::{By, EXACT, SPARSE, Setting};
 use crate::suite::{Findings, Row};
 use crate::suites::Scope;
 use crate::timer::Samples;
@@ -65,7 +65,13 @@ fn measure(
         let mut ways = vec![("", EXACT, None)];
         match (&by, &data.bone) {
             (_, None) => ways.push((": cut open", EXACT, Some(cut))),
-            (By::Processor(_), Some(_)) => ways.push((": sparse rays", SPARSE, None)),
+            (By::Processor(_), Some(_)) => {
+                let half = Setting { detail: 0.5, ..SPARSE };
+                ways.extend([
+                    (": sparse rays", SPARSE, None),
+                    (": sparse rays, half the pixels along an edge", half, None),
+                ]);
+            }
             (By::Device(_), Some(_)) => (),
         }
         for (how, setting, cut) in ways {
