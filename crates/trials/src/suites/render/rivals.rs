@@ -8,18 +8,16 @@
 use super::likeness::error_percent;
 use super::scenes::{ISO, frame, head};
 use super::{By, EXACT, SPARSE, Setting};
+use crate::python::Workshop;
 use crate::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
 use crate::timer::Samples;
 use glam::Vec3;
 use std::path::Path;
-use std::process::Command;
 use trepan_render::{Casting, Image};
 
 /// Draws with VTK.
 const SCRIPT: &str = include_str!("rivals.py");
-/// The environment variable with another Python.
-const PYTHON: &str = "TREPAN_PYTHON";
 /// Distances between VTK's samples, voxels, finest first; the first is its reference.
 const STEPS: [f64; 5] = [0.0625, 0.125, 0.25, 0.5, 1.0];
 
@@ -73,9 +71,8 @@ fn compare(edge: usize, size: [u32; 2], scope: Scope, theirs: &[Theirs], finding
 
 /// VTK's times and errors, finest samples first.
 fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>, String> {
-    let folder = tempfile::tempdir().map_err(|fault| fault.to_string())?;
-    let python = python(folder.path())?;
-    let at = |name: &str| folder.path().join(name);
+    let workshop = Workshop::with(&[("vtk", "vtk"), ("numpy", "numpy")], SCRIPT)?;
+    let at = |name: &str| workshop.at(name);
     let bone = head(edge);
     let [nx, ny, nz] = bone.dims().map(|n| n as i32);
     let voxels = (0..nx * ny * nz).map(|n| bone.hu(glam::IVec3::new(n % nx, n / nx % ny, n / (nx * ny))));
@@ -86,13 +83,12 @@ fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>, Strin
         "isovalue": ISO, "eye": view.eye.to_array(), "target": [0, 0, 0], "up": view.up.to_array(),
         "fov_deg": 0.6f32.to_degrees(), "size": size, "repeats": repeats, "steps_voxel": STEPS,
     });
-    let files = [("volume.raw", bytes), ("scene.json", scene.to_string().into()), ("rivals.py", SCRIPT.into())];
+    let files = [("volume.raw", bytes), ("scene.json", scene.to_string().into())];
     files
         .into_iter()
         .try_for_each(|(name, bytes)| std::fs::write(at(name), bytes))
         .map_err(|fault| fault.to_string())?;
-    let told = said(Command::new(python).arg(at("rivals.py")).arg(at("scene.json")).arg(at("picture")))?;
-    told.lines().filter(|line| line.starts_with("version")).for_each(|line| println!("  VTK {line}"));
+    let told = workshop.run([at("scene.json"), at("picture")])?;
     let ms = told.lines().filter_map(|line| line.strip_prefix("ms ")?.split_once(' ')?.1.parse::<f64>().ok());
     let image = |n: usize| read(&at(&format!("picture{n}.rgb")), size);
     let finest = image(0)?;
@@ -103,19 +99,6 @@ fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>, Strin
     if theirs.len() == STEPS.len() { Ok(theirs) } else { Err(format!("VTK tells {} times", theirs.len())) }
 }
 
-/// A Python with VTK: the one that is named if it has it, else a new environment.
-fn python(folder: &Path) -> Result<std::path::PathBuf, String> {
-    let given = std::env::var_os(PYTHON).unwrap_or_else(|| "python3".into());
-    if said(Command::new(&given).args(["-c", "import vtk, numpy"])).is_ok() {
-        return Ok(given.into());
-    }
-    let environment = folder.join("environment");
-    said(Command::new(given).args(["-m", "venv"]).arg(&environment))?;
-    let python = environment.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
-    said(Command::new(&python).args(["-m", "pip", "install", "--quiet", "--only-binary", ":all:", "vtk", "numpy"]))?;
-    Ok(python)
-}
-
 /// A picture as VTK left it: three bytes a pixel.
 fn read(path: &Path, [width, height]: [u32; 2]) -> Result<Image, String> {
     let rgb = std::fs::read(path).map_err(|fault| format!("{}: {fault}", path.display()))?;
@@ -123,18 +106,4 @@ fn read(path: &Path, [width, height]: [u32; 2]) -> Result<Image, String> {
         return Err(format!("{} has {} bytes; {width}x{height} pixels have 3 each", path.display(), rgb.len()));
     }
     Ok(Image { width, height, rgba: rgb.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect() })
-}
-
-/// What a program prints, or why it failed: the last line of its complaint.
-fn said(command: &mut Command) -> Result<String, String> {
-    let program = command.get_program().to_string_lossy().into_owned();
-    let out = command.output().map_err(|fault| format!("{program}: {fault}"))?;
-    if out.status.success() {
-        return Ok(String::from_utf8_lossy(&out.stdout).into_owned());
-    }
-    let complaint = String::from_utf8_lossy(&out.stderr).into_owned();
-    Err(format!(
-        "{program}: {}",
-        complaint.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("it failed without a word")
-    ))
 }
