@@ -1,4 +1,4 @@
-//! The project's own commands: `cargo xtask test | validate | merge | layers | tidy`.
+//! The project's own commands: `cargo xtask test | validate | merge | compare | layers | tidy`.
 
 mod layers;
 mod merge;
@@ -30,14 +30,21 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
-    /// Put the summaries of many sessions, from any number of shards, into sessions.csv and sessions.json
+    /// Put shards together: those of `validate` into SUITE.json and index.html, those of sessions into sessions.csv and sessions.json
     Merge {
-        /// Folders that sessions, or batches of them, wrote with --out
+        /// Folders that `validate --shard`, sessions, or batches of sessions wrote with --out
         #[arg(required = true)]
         folders: Vec<PathBuf>,
-        /// Where the table goes
+        /// Where the result goes
         #[arg(long, value_name = "DIR", default_value = "trepan-out/merged")]
         out: PathBuf,
+    },
+    /// Say what got faster, slower, more or less accurate from one validation to another, and how sure that is
+    Compare {
+        /// A folder that `validate` wrote
+        old: PathBuf,
+        /// Another one
+        new: PathBuf,
     },
     /// Check that every arrow between crates points down and that each crate does only what is its to do
     Layers,
@@ -58,13 +65,25 @@ fn main() -> ExitCode {
 fn run() -> Result<()> {
     match Arguments::parse().command {
         Task::Test => test(),
-        Task::Validate { arguments } => {
-            cargo(&["run", "--release", "--quiet", "--package", "trepan-trials", "--bin", "validate", "--"], &arguments)
+        Task::Validate { arguments } => validate(&arguments),
+        Task::Merge { folders, out } if folders.iter().any(|folder| folder.join("parts").is_dir()) => {
+            let mut arguments = vec!["merge".into()];
+            arguments.extend(folders.iter().map(|folder| folder.display().to_string()));
+            arguments.extend(["--out".into(), out.display().to_string()]);
+            validate(&arguments)
         }
         Task::Merge { folders, out } => merge::run(&folders, &out),
+        Task::Compare { old, new } => {
+            validate(&["compare".into(), old.display().to_string(), new.display().to_string()])
+        }
         Task::Layers => report("layers", layers::check(&root())?),
         Task::Tidy => report("tidy", tidy::check(&root())?),
     }
+}
+
+/// The program of all suites, in release mode.
+fn validate(arguments: &[String]) -> Result<()> {
+    cargo(&["run", "--release", "--quiet", "--package", "trepan-trials", "--bin", "validate", "--"], arguments)
 }
 
 /// The steps of CI in the order in which they fail fastest.

@@ -1,8 +1,9 @@
 //! `index.html`: every suite's chart, gates and rows on one page that needs nothing else.
 
+use crate::part::Suite;
 use crate::picture::{Chart, Mark, Outcome};
-use crate::suite::{Report, shown};
-use crate::suites::Suite;
+use crate::report::Report;
+use crate::suite::shown;
 use plotters::coord::CoordTranslate;
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
@@ -36,7 +37,7 @@ pub fn html(reports: &[(&Suite, Report)]) -> String {
             "<h2>{}</h2><p>{}? Commit {}, {}.</p>",
             suite.name,
             suite.question,
-            report.commit,
+            report.making.commit,
             machine(report)
         );
         charts(&mut page, suite, report);
@@ -48,7 +49,7 @@ pub fn html(reports: &[(&Suite, Report)]) -> String {
 }
 
 fn machine(report: &Report) -> String {
-    report.machine.values().cloned().collect::<Vec<_>>().join(", ")
+    report.making.machine.values().cloned().collect::<Vec<_>>().join(", ")
 }
 
 fn gates(page: &mut String, report: &Report) {

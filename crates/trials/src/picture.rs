@@ -5,21 +5,25 @@
 //! of cost or a hundred-thousandth of error is drawn there.
 
 use crate::front::front;
+use crate::suite::number;
+use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
 /// One point of a chart.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
     /// Whose it is.
     pub method: String,
     /// What it costs.
+    #[serde(deserialize_with = "number")]
     pub cost: f64,
     /// How wrong it is.
+    #[serde(deserialize_with = "number")]
     pub error: f64,
 }
 
 /// Cost against error.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Chart {
     /// What is charted.
     pub title: String,
@@ -46,6 +50,27 @@ impl Chart {
         self.marks.iter().filter(is_number).filter(better).count()
     }
 
+    /// How far two runs of one commit may lie apart in cost without changing a front: what shared machines need.
+    pub const SPREAD: f64 = 0.15;
+
+    /// Methods with a mark that no other beats.
+    pub fn on_front(&self) -> Vec<String> {
+        let front = self.front();
+        let on = |mark: &&Mark| front.contains(&(mark.cost, mark.error));
+        let mut names: Vec<String> = self.marks.iter().filter(on).map(|mark| mark.method.clone()).collect();
+        names.sort();
+        names.dedup();
+        names
+    }
+
+    /// Whether a method has a mark that is on the front or would be, were it cheaper by [`SPREAD`](Self::SPREAD).
+    pub fn near_front(&self, method: &str) -> bool {
+        let beats = |other: &Mark, own: &Mark| other.cost < own.cost * (1.0 - Self::SPREAD) && other.error <= own.error;
+        let own =
+            self.marks.iter().filter(|mark| mark.method == method && mark.cost.is_finite() && mark.error.is_finite());
+        own.into_iter().any(|own| !self.marks.iter().any(|other| beats(other, own)))
+    }
+
     /// The marks that no other beats, cheapest first.
     pub fn front(&self) -> Vec<(f64, f64)> {
         let pairs: Vec<(f64, f64)> = self.marks.iter().map(|mark| (mark.cost, mark.error)).collect();
@@ -54,7 +79,8 @@ impl Chart {
 }
 
 /// How a method fared in one cell of a map.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Outcome {
     /// As it should.
     Works,
@@ -62,29 +88,46 @@ pub enum Outcome {
     Degrades(String),
     /// Not usable, for this reason.
     Fails(String),
+    /// Said no before it began, for this reason.
+    Refused(String),
 }
 
 impl Outcome {
-    /// 0 works, 1 degrades, 2 fails.
+    /// 0 works, 1 degrades, 2 fails, 3 refused.
     pub fn grade(&self) -> u8 {
         match self {
             Self::Works => 0,
             Self::Degrades(_) => 1,
             Self::Fails(_) => 2,
+            Self::Refused(_) => 3,
         }
+    }
+
+    /// Its grade in a word.
+    pub fn word(&self) -> &'static str {
+        ["works", "degrades", "fails", "refused"][usize::from(self.grade())]
+    }
+
+    /// Whether another is better: failing is worse than refusing, which is worse than being usable.
+    pub fn worse_than(&self, other: &Self) -> bool {
+        let rank = |outcome: &Self| [0, 1, 3, 2][usize::from(outcome.grade())];
+        rank(self) > rank(other)
     }
 
     /// Why, where it does not work.
     pub fn reason(&self) -> &str {
         match self {
             Self::Works => "",
-            Self::Degrades(reason) | Self::Fails(reason) => reason,
+            Self::Degrades(reason) | Self::Fails(reason) | Self::Refused(reason) => reason,
         }
     }
 }
 
+/// A line over a map: its name and its points.
+pub type Line = (String, Vec<(f64, f64)>);
+
 /// A grid of conditions, coloured by what came of them.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Map {
     /// What is mapped, often the method.
     pub title: String,
@@ -99,16 +142,40 @@ pub struct Map {
     /// Row by row.
     pub cells: Vec<Vec<Outcome>>,
     /// Lines over the cells: name, and points in cells from the upper left corner.
-    pub lines: Vec<(String, Vec<(f64, f64)>)>,
+    #[serde(serialize_with = "within_a_file")]
+    pub lines: Vec<Line>,
     /// What else a reader must know, under the map.
     pub notes: Vec<String>,
 }
 
+/// JSON has no infinity: what is further than any map is drawn at its end all the same.
+fn within_a_file<S: serde::Serializer>(lines: &[Line], to: S) -> Result<S::Ok, S::Error> {
+    let kept = |v: f64| if v.is_nan() { 0.0 } else { v.clamp(-1e6, 1e6) };
+    let line = |(name, points): &Line| {
+        (name.clone(), points.iter().map(|&(x, y)| (kept(x), kept(y))).collect::<Vec<(f64, f64)>>())
+    };
+    lines.iter().map(line).collect::<Vec<Line>>().serialize(to)
+}
+
 const CELL: (usize, usize) = (34, 20);
-const FILL: [&str; 3] = ["#b7e0d2", "#f6dc9a", "#e8a083"];
+/// Apart in lightness too, so that they are told apart without colours.
+const FILL: [&str; 4] = ["#d5efe6", "#f2cf74", "#d9744f", "#9aa5b1"];
 const STROKE: [&str; 3] = ["#0072b2", "#000000", "#cc79a7"];
 
 impl Map {
+    /// Every cell with the names of its row and column.
+    pub fn named_cells(&self) -> impl Iterator<Item = (&str, &str, &Outcome)> {
+        let cells = self.rows.iter().zip(&self.cells);
+        cells.flat_map(|(row, cells)| {
+            self.columns.iter().zip(cells).map(move |(column, cell)| (&**row, &**column, cell))
+        })
+    }
+
+    /// The cell of a row and a column, by name.
+    pub fn cell(&self, row: &str, column: &str) -> Option<&Outcome> {
+        self.named_cells().find(|(r, c, _)| *r == row && *c == column).map(|(.., cell)| cell)
+    }
+
     /// The map as a figure with the reasons, lettered, under it.
     pub fn svg(&self) -> String {
         let reasons = self.reasons();

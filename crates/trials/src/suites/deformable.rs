@@ -10,7 +10,7 @@ mod truth;
 
 pub use recording::record_all;
 
-use super::Scope;
+use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
 use ride::{Ride, ride};
 use scene::{PATHS, Scene};
@@ -26,31 +26,28 @@ const STEPS_TIMES_TETS: usize = 20_000_000;
 const MOST_JUMP: f64 = 1e-4;
 
 /// Every method on every mesh and path, then what breaks them.
-pub fn run(scope: Scope) -> Findings {
-    let mut findings = Findings::default();
+pub fn parts(scope: Scope) -> Vec<Part> {
     let cubes = scope.pick(&[7usize, 22][..], &[7, 13, 22, 30, 40, 50, 60][..]);
     let brains = scope.pick(&[][..], &[12_511usize, 22_076, 50_041][..]);
-    let mut numbers = (0..).map(|number| scope.takes(number));
-    let mut takes = || numbers.next() == Some(true);
-    cubes.iter().filter(|_| takes()).for_each(|&cells| measure(&Scene::cube(cells), scope, &mut findings));
-    brains.iter().filter(|_| takes()).for_each(|&tets| measure(&Scene::brain(tets), scope, &mut findings));
-    if takes() {
-        recorded(scope, &mut findings);
-    }
-    if takes() {
-        slide(scope, &mut findings);
-    }
-    if takes() {
-        press(&mut findings);
-    }
-    if takes() {
-        stability::run(scope, &mut findings);
-    }
-    poses::run(scope, &mut takes, &mut findings);
-    if takes() {
-        findings.rows.extend(published::rows());
-    }
-    findings
+    let cube = |&cells: &usize| {
+        Part::new(format!("cube {cells}"), move |scope, found| measure(&Scene::cube(cells), scope, found))
+    };
+    let brain = |&tets: &usize| {
+        Part::new(format!("brain {tets}"), move |scope, found| measure(&Scene::brain(tets), scope, found))
+    };
+    let mut parts: Vec<Part> = cubes.iter().map(cube).chain(brains.iter().map(brain)).collect();
+    parts.push(Part::new("recorded paths", recorded));
+    parts.push(Part::new("flat stroke", slide));
+    parts.push(Part::new("pressed in", |_, found| press(found)));
+    parts.push(Part::new("stability", stability::run));
+    parts.extend(poses::parts(scope));
+    parts.push(Part::new("published", |_, found| found.rows.extend(published::rows())));
+    parts
+}
+
+/// The promise over all random poses.
+pub fn judge(_: Scope, findings: &mut Findings) {
+    poses::judge(findings);
 }
 
 /// All but the oracle, which judges and is too slow to be judged.

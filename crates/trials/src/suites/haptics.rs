@@ -21,7 +21,7 @@ mod faults;
 mod maps;
 mod pace;
 
-use super::Scope;
+use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
 use coupling::{Coupling, MILLION};
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardCounters};
@@ -40,36 +40,50 @@ const AIM_MS: f32 = 125.0;
 const FOLLOW_MS: f32 = 25.0;
 const NMM_PER_J: f64 = 1000.0;
 
+/// Couplings in one part.
+const TOGETHER: usize = 60;
+
 /// Presses for every coupling with and without the controller, then hands that wander; last the pace of the loop.
-pub fn run(scope: Scope) -> Findings {
-    let mut findings = Findings::default();
-    for (number, (scene, coupling)) in coupling::all(scope).into_iter().enumerate() {
-        if scope.takes(number) {
-            findings.rows.push(press_row(&scene, &coupling, "guarded", scope));
-            findings.rows.push(press_row(&scene, &coupling, "unguarded", scope));
-            let limited = coupling.limited();
-            if limited.wall != coupling.wall {
-                findings.rows.push(press_row(&scene, &coupling, "limited", scope).with("declared", limited.declared()));
-            }
-            if coupling.declared() && coupling.wall.damping == 0.5 {
-                findings.rows.push(wander_row(&scene, &coupling, number, scope.pick(5_000, 40_000)));
-            }
-        }
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let all = coupling::all(scope).len();
+    let some = |first: usize| {
+        Part::new(format!("couplings from {first}"), move |scope, findings: &mut Findings| {
+            let numbered = coupling::all(scope).into_iter().enumerate().skip(first).take(TOGETHER);
+            numbered.for_each(|(number, (scene, coupling))| couple(&scene, &coupling, number, scope, findings));
+        })
+    };
+    let mut parts: Vec<Part> = (0..all).step_by(TOGETHER).map(some).collect();
+    if !scope.quick {
+        parts.push(Part::new("a million ticks", |scope, findings: &mut Findings| {
+            findings.rows.push(wander_row("a million ticks", &MILLION, 1_000_000, 1_000_000, scope));
+        }));
     }
-    if scope.takes(0) && !scope.quick {
-        findings.rows.push(wander_row("a million ticks", &MILLION, 1_000_000, 1_000_000));
+    parts.push(Part::new("faults", |scope, findings: &mut Findings| {
+        findings.rows = faults::rows(scope);
+        findings.gates = faults::gates(&findings.rows);
+    }));
+    parts.push(Part::new("pace", |scope, findings: &mut Findings| findings.rows = pace::rows(scope)));
+    parts
+}
+
+/// Every way of guarding one coupling.
+fn couple(scene: &str, coupling: &Coupling, number: usize, scope: Scope, findings: &mut Findings) {
+    findings.rows.push(press_row(scene, coupling, "guarded", scope));
+    findings.rows.push(press_row(scene, coupling, "unguarded", scope));
+    let limited = coupling.limited();
+    if limited.wall != coupling.wall {
+        findings.rows.push(press_row(scene, coupling, "limited", scope).with("declared", limited.declared()));
     }
-    findings.gates = gates(&findings.rows, scope);
-    if scope.shard.1 == 1 {
-        findings.maps = maps::of(&findings.rows);
+    if coupling.declared() && coupling.wall.damping == 0.5 {
+        findings.rows.push(wander_row(scene, coupling, number, scope.pick(5_000, 40_000), scope));
     }
-    if scope.takes(0) {
-        let faults = faults::rows(scope);
-        findings.gates.extend(faults::gates(&faults));
-        findings.rows.extend(faults);
-        findings.rows.extend(pace::rows(scope));
-    }
-    findings
+}
+
+/// Promises over all couplings, and their maps.
+pub fn judge(_: Scope, findings: &mut Findings) {
+    let coupled: Vec<Row> = findings.rows.iter().filter(|row| row.config.contains_key("declared")).cloned().collect();
+    findings.gates.extend(gates(&coupled));
+    findings.maps.extend(maps::of(&coupled));
 }
 
 /// What a run was like.
@@ -202,8 +216,8 @@ fn press_row(scene: &str, wanted: &Coupling, method: &str, scope: Scope) -> Row 
 }
 
 /// A hand that means to be now here, now there, each for up to a quarter of a second.
-fn wander_row(scene: &str, coupling: &Coupling, seed: usize, ticks: usize) -> Row {
-    let mut random = fastrand::Rng::with_seed(seed as u64);
+fn wander_row(scene: &str, coupling: &Coupling, own: usize, ticks: usize, scope: Scope) -> Row {
+    let mut random = scope.random(own as u64);
     let mut intent = Vec::with_capacity(ticks);
     let (mut aim, mut place) = (2.0f32, 2.0f32);
     while intent.len() < ticks {
@@ -240,7 +254,7 @@ fn row(scene: &str, coupling: &Coupling, method: &str, run: &Run) -> Row {
         .metric("restarts_count", run.counters.restarted as f64)
 }
 
-fn gates(rows: &[Row], scope: Scope) -> Vec<Gate> {
+fn gates(rows: &[Row]) -> Vec<Gate> {
     let declared = |row: &&Row| row.method != "unguarded" && row.config["declared"] == true;
     let worst =
         |name: &str| rows.iter().filter(declared).filter_map(|row| row.metrics.get(name).copied()).fold(0.0, f64::max);
@@ -251,10 +265,13 @@ fn gates(rows: &[Row], scope: Scope) -> Vec<Gate> {
             && row.metrics["motor_energy_out_j"] > 1e-4
             && row.metrics["damped_percent"] + row.metrics["bounded_percent"] == 0.0
     };
-    let stirred =
-        |row: &&Row| row.method == "unguarded" && row.metrics["limit_cycle_mm"] > 0.1 && row.config["declared"] == true;
+    let stirred = |row: &&Row| {
+        let swings = row.metrics.get("limit_cycle_mm").is_some_and(|&cycle| cycle > 0.1);
+        row.method == "unguarded" && swings && row.config["declared"] == true
+    };
     let count = |found: usize| found as f64;
-    let mut gates = vec![
+    let stirred = count(rows.iter().filter(stirred).count());
+    vec![
         Gate::at_most("declared range: limit cycle, mm", worst("limit_cycle_mm"), 0.1),
         Gate::at_most("declared range: energy out to the hand, J", worst("energy_out_j"), 1e-4),
         Gate::at_most("declared range: steady force lost, percent", worst("steady_force_lost_percent"), 5.0),
@@ -264,12 +281,8 @@ fn gates(rows: &[Row], scope: Scope) -> Vec<Gate> {
             count(rows.iter().filter(silent).count()),
             0.0,
         ),
-    ];
-    if scope.shard.1 == 1 {
-        let stirred = count(rows.iter().filter(stirred).count());
-        gates.push(Gate::at_least("declared range: couplings that oscillate without the guard", stirred, 1.0));
-    }
-    gates
+        Gate::at_least("declared range: couplings that oscillate without the guard", stirred, 1.0),
+    ]
 }
 
 #[cfg(test)]

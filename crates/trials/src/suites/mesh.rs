@@ -4,7 +4,7 @@ pub(super) mod rivals;
 mod scenes;
 mod spots;
 
-use super::Scope;
+use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
 use scenes::{Border, Scene};
 use spots::{Spots, faces, quantile, samples};
@@ -20,15 +20,14 @@ const SMALL_VOXEL: f64 = 0.5;
 const PROVEN_DEG: [[f64; 2]; 2] = [[10.7, 164.8], [1.66, 174.72]];
 
 /// Every scene.
-pub fn run(scope: Scope) -> Findings {
-    let mut findings = Findings::default();
-    let (all, searched) = (scenes::all(scope), scenes::searched(scope));
-    for (_, scene) in all.iter().enumerate().filter(|(number, _)| scope.takes(*number)) {
-        measure(scene, &mut findings);
-    }
-    let numbered = searched.iter().enumerate().filter(|(number, _)| scope.takes(all.len() + number));
-    findings.rows.extend(numbered.filter_map(|(_, (scene, range))| least_count(scene, *range)));
-    findings
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let measured = scenes::all(scope)
+        .into_iter()
+        .map(|(name, make)| Part::new(name, move |_, findings: &mut Findings| measure(&make(), findings)));
+    let searched = scenes::searched(scope).into_iter().map(|((name, make), range)| {
+        Part::new(name, move |_, findings: &mut Findings| findings.rows.extend(least_count(&make(), range)))
+    });
+    measured.chain(searched).collect()
 }
 
 /// The least count between two, to about a fifteenth, with which a mesh's border follows the voxels; nothing when not even the larger does.

@@ -8,7 +8,7 @@ pub mod rivals;
 mod scenes;
 mod speed;
 
-use super::Scope;
+use super::{Part, Scope};
 use crate::suite::Findings;
 use std::sync::Arc;
 use trepan_gpu::{Gpu, Prefer};
@@ -43,23 +43,21 @@ const EXACT: Setting =
 const SPARSE: Setting = Setting { name: "sparse rays", casting: Casting { sparse: true, ..EXACT.casting }, ..EXACT };
 
 /// Accuracy on small pictures, speed against image error on large ones, models and failures.
-pub fn run(scope: Scope) -> Findings {
-    let mut findings = Findings::default();
+pub fn parts(_: Scope) -> Vec<Part> {
+    type Subject = fn(Scope, Option<&Gpu>, &mut Findings);
+    let all: [(&str, Subject); 6] = [
+        ("depth", accuracy::depth),
+        ("walls", |_, gpu, found| accuracy::walls(gpu, found)),
+        ("edits", |_, gpu, found| accuracy::edits(gpu, found)),
+        ("faults", |_, gpu, found| faults::run(gpu, found)),
+        ("speed", speed::run),
+        ("models", models::run),
+    ];
     // Without a driver the processor's rows are all there are.
-    let gpu = Gpu::open(Prefer::Hardware).ok();
-    if scope.takes(0) {
-        accuracy::depth(scope, gpu.as_ref(), &mut findings);
-        accuracy::walls(gpu.as_ref(), &mut findings);
-        accuracy::edits(gpu.as_ref(), &mut findings);
-        faults::run(gpu.as_ref(), &mut findings);
-    }
-    if scope.takes(1) {
-        speed::run(scope, gpu.as_ref(), &mut findings);
-    }
-    if scope.takes(2) {
-        models::run(scope, gpu.as_ref(), &mut findings);
-    }
-    findings
+    let drawn = |(name, subject): (&str, Subject)| {
+        Part::new(name, move |scope, found| subject(scope, Gpu::open(Prefer::Hardware).ok().as_ref(), found))
+    };
+    all.map(drawn).into()
 }
 
 impl By {

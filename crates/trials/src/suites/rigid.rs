@@ -19,7 +19,7 @@ mod walls;
 
 pub use recording::record_all;
 
-use super::Scope;
+use super::{Part, Scope};
 use crate::picture::{Chart, Map, Mark};
 use crate::suite::{Findings, Gate, Row};
 use trepan_rigid::Method;
@@ -30,16 +30,22 @@ const STIFFNESS: f32 = 2.0;
 const BUDGET_US: f64 = 1000.0;
 
 /// Every subject.
-pub fn run(scope: Scope) -> Findings {
-    let mut findings = Findings::default();
-    accuracy::run(scope, &mut findings);
-    models::run(scope, &mut findings);
-    removal::run(scope, &mut findings);
-    faults::run(scope, &mut findings);
-    walls::run(scope, &mut findings);
-    coupling::run(scope, &mut findings);
-    energy::run(scope, &mut findings);
-    findings
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let mut parts = accuracy::parts();
+    parts.extend(models::parts(scope));
+    parts.extend(removal::parts(scope));
+    parts.push(Part::new("faults", |_, findings| faults::run(findings)));
+    parts.extend(walls::parts(scope));
+    parts.extend(coupling::parts());
+    parts.extend(energy::parts());
+    parts
+}
+
+/// Charts and promises over all methods.
+pub fn judge(_: Scope, findings: &mut Findings) {
+    accuracy::judge(findings);
+    models::judge(findings);
+    removal::judge(findings);
 }
 
 /// A group's chart, each method at its worst cost and worst error over the group's scenes; where it is `gated`, with the gate that

@@ -3,7 +3,7 @@
 mod files;
 mod registration;
 
-use super::Scope;
+use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
 use std::time::Instant;
 use trepan_fixtures::case_head;
@@ -13,14 +13,18 @@ use trepan_volume::{
 };
 
 /// Every question.
-pub fn run(scope: Scope) -> Findings {
-    let mut findings = Findings::default();
-    let rows: [fn(Scope, &mut Findings); 7] =
-        [registration::mri, registration::ct, files::files, round_trips, distances, carving, brain];
-    for (_, row) in rows.into_iter().enumerate().filter(|(number, _)| scope.takes(number + 1)) {
-        row(scope, &mut findings);
-    }
-    findings
+pub fn parts(_: Scope) -> Vec<Part> {
+    type Question = fn(Scope, &mut Findings);
+    let all: [(&str, Question); 7] = [
+        ("registration of MRI", registration::mri),
+        ("registration of CT", registration::ct),
+        ("files", files::files),
+        ("round trips", round_trips),
+        ("distances", distances),
+        ("carving", carving),
+        ("brain", brain),
+    ];
+    all.map(|(name, question)| Part::new(name, question)).into()
 }
 
 /// The folder of real images that the environment variable `TREPAN_DATA` names; says so where there is none.

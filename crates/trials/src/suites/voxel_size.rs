@@ -8,7 +8,7 @@ mod pass;
 mod scene;
 mod timing;
 
-use super::Scope;
+use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
 use scene::{Body, Elements, Scene, Touch};
 use std::time::Instant;
@@ -31,30 +31,21 @@ const OURS: &str = "expected work, then timed";
 const LADDER: (usize, f64, f64) = (26, 0.3, 1.11);
 /// A size belongs to the good zone up to this much over the best time.
 const ZONE: f64 = 1.10;
-/// What the scenes found, for the gates over all.
-#[derive(Default)]
-struct Totals {
-    regrets: Vec<f64>,
-    /// Measured and predicted times, µs, with their scene's number.
-    times: Vec<(usize, f64, f64)>,
-    calibration_ms: Vec<f64>,
-}
+/// The method of the row that holds a scene's curves.
+const CURVES: &str = "every size of the ladder";
 
 /// Every rule in every scene.
-pub fn run(scope: Scope) -> Findings {
-    let mut findings = Findings::default();
-    let mut totals = Totals::default();
-    for (number, &(body, table_row)) in bodies(scope).iter().enumerate() {
-        if scope.takes(number) {
-            let Some(elements) = Elements::of(body) else { continue };
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let part = |(body, table_row): (Body, Option<usize>)| {
+        Part::new(format!("{body:?}"), move |scope, findings: &mut Findings| {
+            let Some(elements) = Elements::of(body) else { return };
             for touch in [Touch::Twin(0.01), Touch::Twin(0.05), Touch::Tool, Touch::Cloud] {
                 let row = table_row.filter(|_| matches!(touch, Touch::Twin(share) if share < 0.02));
-                rules(&Scene::new(&elements, touch, row), scope, &mut totals, &mut findings);
+                rules(&Scene::new(&elements, touch, row), scope, findings);
             }
-        }
-    }
-    sum_up(&totals, scope, &mut findings);
-    findings
+        })
+    };
+    bodies(scope).into_iter().map(part).collect()
 }
 
 fn bodies(scope: Scope) -> Vec<(Body, Option<usize>)> {
@@ -69,7 +60,7 @@ fn bodies(scope: Scope) -> Vec<(Body, Option<usize>)> {
 }
 
 /// Times the ladder and every rule's size in turn, round by round.
-fn rules(scene: &Scene, scope: Scope, totals: &mut Totals, findings: &mut Findings) {
+fn rules(scene: &Scene, scope: Scope, findings: &mut Findings) {
     let measures = &scene.measures;
     let usual = measures.traditional_mm();
     let (steps, first, step) = LADDER;
@@ -103,10 +94,6 @@ fn rules(scene: &Scene, scope: Scope, totals: &mut Totals, findings: &mut Findin
     let axis_mm = f64::from(2.0 * scene.size_mm.max_element());
     let [low, middle, high] = zone(&ladder, &choose[..steps], best).map(|size| axis_mm / size);
     let predicted: Vec<f64> = cells.iter().map(|cell| expected.time(&prices, cell.min(reach))).collect();
-    let number = totals.calibration_ms.len();
-    totals.calibration_ms.push(calibration_ms);
-    totals.times.extend((0..steps).map(|n| (number, judge[n], predicted[n])));
-    totals.regrets.push(judge[steps] / judge[best] - 1.0);
     let named = rules.iter().enumerate().map(|(n, rule)| (rule.0, steps + n)).chain([("best of the ladder", best)]);
     let row = |(rule, at): (&str, usize)| {
         Row::new(&scene.name, rule)
@@ -126,8 +113,8 @@ fn rules(scene: &Scene, scope: Scope, totals: &mut Totals, findings: &mut Findin
             .metric("rounds_count", measured.rounds as f64)
     };
     findings.rows.extend(named.map(row));
-    let curves = Row::new(&scene.name, "every size of the ladder").with("cells_mm", ladder.clone());
-    let curves = curves.with("measured_us", judge[..steps].to_vec()).with("predicted_us", predicted[..steps].to_vec());
+    let curves = Row::new(&scene.name, CURVES).with("cells_mm", ladder.clone());
+    let curves = curves.with(MEASURED, judge[..steps].to_vec()).with(PREDICTED, predicted[..steps].to_vec());
     findings.rows.push(curves);
     if let Some(row) = scene.table_row {
         beside_the_table(&scene.name, row, thesis / usual, findings);
@@ -170,40 +157,49 @@ fn beside_the_table(scene: &str, row: usize, ratio: f64, findings: &mut Findings
     findings.gates.push(Gate::at_most(format!("{scene}: analytic over mean edge"), ratio, 1.60));
 }
 
-/// Promises over all scenes of this run; wider in a quick one, which has few scenes and few rounds.
-fn sum_up(totals: &Totals, scope: Scope, findings: &mut Findings) {
-    if totals.regrets.is_empty() {
+/// Settings of the row of curves.
+const MEASURED: &str = "measured_us";
+const PREDICTED: &str = "predicted_us";
+
+/// Promises over all scenes of a run; wider in a quick one, which has few scenes and few rounds.
+pub fn judge(scope: Scope, findings: &mut Findings) {
+    let ours = |metric: &str| {
+        let rows = findings.rows.iter().filter(|row| row.method == OURS);
+        rows.filter_map(|row| row.metrics.get(metric).copied()).collect::<Vec<f64>>()
+    };
+    let (regrets, calibration) = (ours("regret_percent"), ours("calibration_ms"));
+    let curves = findings.rows.iter().filter(|row| row.method == CURVES).enumerate();
+    let of_row = |(number, row): (usize, &Row)| {
+        row.numbers(MEASURED)
+            .into_iter()
+            .zip(row.numbers(PREDICTED))
+            .map(move |(m, p)| (number, m, p))
+            .collect::<Vec<_>>()
+    };
+    let times: Vec<(usize, f64, f64)> = curves.flat_map(of_row).collect();
+    if regrets.is_empty() {
         return;
     }
-    let percent = |regret: f64| 100.0 * regret;
-    let worst = totals.regrets.iter().copied().fold(f64::MIN, f64::max);
-    let scenes = totals.regrets.len();
-    let of_scene = |n: usize| r_squared(totals.times.iter().filter(|t| t.0 == n));
-    let (middle, slowest) = (median(totals.regrets.clone()), totals.calibration_ms.iter().copied().fold(0.0, f64::max));
-    let calibration_ms = median(totals.calibration_ms.clone());
+    let worst = regrets.iter().copied().fold(f64::MIN, f64::max);
+    let scenes = regrets.len();
+    let of_scene = |n: usize| r_squared(times.iter().filter(|t| t.0 == n));
+    let (middle, slowest) = (median(regrets), calibration.iter().copied().fold(0.0, f64::max));
+    let calibration_ms = median(calibration);
     findings.gates.push(Gate::at_most("calibration, median over the scenes, ms", calibration_ms, 100.0));
     findings.gates.extend([
-        Gate::at_most(
-            format!("{OURS}: median regret over {scenes} scenes, percent"),
-            percent(middle),
-            scope.pick(15.0, 3.0),
-        ),
-        Gate::at_most(
-            format!("{OURS}: worst regret over {scenes} scenes, percent"),
-            percent(worst),
-            scope.pick(40.0, 10.0),
-        ),
+        Gate::at_most(format!("{OURS}: median regret over {scenes} scenes, percent"), middle, scope.pick(15.0, 3.0)),
+        Gate::at_most(format!("{OURS}: worst regret over {scenes} scenes, percent"), worst, scope.pick(40.0, 10.0)),
         Gate::at_least(
             "predicted against measured time, R squared over all",
-            r_squared(totals.times.iter()),
+            r_squared(times.iter()),
             scope.pick(0.8, 0.95),
         ),
     ]);
     findings.rows.push(
         Row::new("all scenes", OURS)
             .with("scenes", scenes)
-            .metric("median_regret_percent", percent(middle))
-            .metric("worst_regret_percent", percent(worst))
+            .metric("median_regret_percent", middle)
+            .metric("worst_regret_percent", worst)
             .metric("median_r_squared", median((0..scenes).map(of_scene).collect()))
             .metric("worst_r_squared", (0..scenes).map(of_scene).fold(f64::MAX, f64::min))
             .metric("median_calibration_ms", calibration_ms)

@@ -1,6 +1,6 @@
 //! A million random poses against the f64 oracle, on meshes that bend, shake and tear: no contact may be missed.
 
-use super::{Scope, scene::five_split, truth::inside};
+use super::{Part, Scope, scene::five_split, truth::inside};
 use crate::suite::{Findings, Gate, Row};
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
@@ -65,46 +65,58 @@ struct Tally {
     invented_points: u64,
 }
 
-/// Every kind of mesh by the recommended method, in parts that shards share out.
-pub fn run(scope: Scope, takes: &mut impl FnMut() -> bool, findings: &mut Findings) {
-    let parts = scope.pick(1, PARTS);
-    let poses = scope.pick(QUICK, MILLION) / KINDS.len() / parts;
-    let (mut all, mut wrong) = (0, 0);
-    for (name, motion) in KINDS {
-        for part in (0..parts).filter(|_| takes()) {
-            let tally = taken(motion, poses, part as u64);
-            (all, wrong) = (all + tally.poses, wrong + tally.wrong());
+/// Every kind of mesh by the recommended method, in parts.
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let of = scope.pick(1, PARTS);
+    let poses = scope.pick(QUICK, MILLION) / KINDS.len() / of;
+    let part = move |(name, motion): (&'static str, Motion), number: usize| {
+        Part::new(format!("poses {name} {}", number + 1), move |scope, findings: &mut Findings| {
+            let tally = taken(motion, poses, number, scope);
             findings.rows.push(
-                Row::new(format!("random poses: {name}, part {} of {parts}", part + 1), Method::RECOMMENDED.name())
+                Row::new(format!("random poses: {name}, part {} of {of}", number + 1), Method::RECOMMENDED.name())
                     .with("poses", tally.poses)
                     .metric("touching_count", tally.touching as f64)
-                    .metric("missed_contacts_count", tally.missed_contacts as f64)
+                    .metric(MISSED, tally.missed_contacts as f64)
                     .metric("missed_points_count", tally.missed_points as f64)
                     .metric("invented_points_count", tally.invented_points as f64),
             );
-        }
-    }
-    if all > 0 {
-        let name = format!("{all} random poses: contacts or points missed or invented");
-        findings.gates.push(Gate::at_most(name, wrong as f64, 0.0));
-    }
+        })
+    };
+    KINDS.into_iter().flat_map(|kind| (0..of).map(move |number| part(kind, number))).collect()
+}
+
+/// The metric that only these rows have together with `poses`.
+const MISSED: &str = "missed_contacts_count";
+
+/// Nothing may be missed or invented in any part.
+pub fn judge(findings: &mut Findings) {
+    let rows = || findings.rows.iter().filter(|row| row.config.contains_key("poses"));
+    let all: f64 = rows().filter_map(|row| row.config["poses"].as_f64()).sum();
+    let count = |row: &Row| {
+        [MISSED, "missed_points_count", "invented_points_count"].iter().map(|name| row.metrics[*name]).sum::<f64>()
+    };
+    let wrong = rows().map(count).sum();
+    findings.gates.push(Gate::at_most(
+        format!("{all} random poses: contacts or points missed or invented"),
+        wrong,
+        0.0,
+    ));
 }
 
 /// Three poses in ten are a jump, the rest a small step.
-fn taken(motion: Motion, poses: usize, part: u64) -> Tally {
+fn taken(motion: Motion, poses: usize, part: usize, scope: Scope) -> Tally {
     let mesh = five_split(CELLS, EDGE_MM);
     let config = Config { method: Method::RECOMMENDED, ..Config::default() };
     let mut collision =
         TissueCollision::new(&mesh, &Tool::probe(RADIUS_MM), &config).expect("the mesh at rest is sound");
     let shell = Pointshell::sphere(RADIUS_MM, config.points, Spread::Fibonacci).points;
     let still = vec![Vec3::ZERO; mesh.positions.len()];
-    let (mut random, mut out, mut tally) =
-        (fastrand::Rng::with_seed(11 + part), TissueStep::default(), Tally::default());
+    let (mut random, mut out, mut tally) = (scope.random(11 + part as u64), TissueStep::default(), Tally::default());
     let (mut positions, mut points) = (mesh.positions.clone(), shell.clone());
     let mut tip = Vec3::splat(0.5 * SIZE_MM);
     for pose in 0..poses {
         positions.copy_from_slice(&mesh.positions);
-        motion(part as usize * poses + pose, &mut random, &mut positions);
+        motion(part * poses + pose, &mut random, &mut positions);
         let anywhere = Vec3::splat(0.5 * SIZE_MM) + cube(&mut random) * (0.5 * SIZE_MM + 2.0 * RADIUS_MM);
         tip = if random.u8(..10) < 3 { anywhere } else { tip + 0.5 * cube(&mut random) };
         collision.step(&positions, &still, &ToolState::at(Pose::from_translation(tip)), &mut out);
@@ -115,10 +127,6 @@ fn taken(motion: Motion, poses: usize, part: u64) -> Tally {
 }
 
 impl Tally {
-    fn wrong(&self) -> u64 {
-        self.missed_contacts + self.missed_points + self.invented_points
-    }
-
     fn compare(&mut self, found: u64, (surely, perhaps): (u64, u64)) {
         self.poses += 1;
         self.touching += u64::from(surely > 0);

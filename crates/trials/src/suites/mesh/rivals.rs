@@ -5,7 +5,7 @@
 //! the lattice's mesh, so that all three have the same triangles to start from. Nothing of theirs is linked, kept or shipped: TetGen is under the AGPL.
 //! Seconds are those of the mesher alone, each with all cores.
 
-use super::super::Scope;
+use super::super::{Part, Scope};
 use super::scenes::{self, Scene};
 use super::spots::{Spots, faces, quantile, samples};
 use crate::python::Workshop;
@@ -23,7 +23,11 @@ const ALSO: [(&str, &str); 1] = [("pyvista", "pyvista")];
 const SCRIPT: &str = include_str!("rivals.py");
 
 /// A ball and a brain by all three.
-pub fn run(scope: Scope) -> Findings {
+pub fn parts(_: Scope) -> Vec<Part> {
+    vec![Part::new("all", |scope, findings| findings.append(run(scope)))]
+}
+
+fn run(scope: Scope) -> Findings {
     let mut findings = Findings::default();
     let packages: Vec<_> = RIVALS.iter().map(|(_, package, _)| (*package, *package)).chain(ALSO).collect();
     let workshop = match Workshop::with(&packages, SCRIPT) {
@@ -33,7 +37,7 @@ pub fn run(scope: Scope) -> Findings {
             return findings;
         }
     };
-    for (_, scene) in scenes::for_rivals(scope).iter().enumerate().filter(|(number, _)| scope.takes(*number)) {
+    for scene in &scenes::for_rivals(scope) {
         compare(scene, &workshop, &mut findings.rows);
     }
     print_table(&findings.rows);

@@ -73,27 +73,39 @@ impl Scene {
     }
 }
 
-pub(super) fn all(scope: Scope) -> Vec<Scene> {
-    let brain = brain();
+/// A scene that is made when its turn comes, by name.
+pub(super) type Named = (String, Box<dyn FnOnce() -> Scene>);
+
+fn named(name: impl Into<String>, make: impl FnOnce() -> Scene + 'static) -> Named {
+    (name.into(), Box::new(make))
+}
+
+pub(super) fn all(scope: Scope) -> Vec<Named> {
     let mut scenes = Vec::new();
     for &(spacing_mm, one_size, coarse_inside) in scope.pick(&MASKS[2..], MASKS) {
-        let mask =
-            resample(&brain, &Grid::isotropic_over(&brain, spacing_mm), Interpolation::Majority, 0).map(u16::from);
         for ((targets, least), coarsening) in [(one_size, 0), (coarse_inside, 2)] {
             for &target_tets in targets {
                 let config = Config { target_tets, coarsening, ..Config::default() };
                 let inside = if coarsening == 0 { "" } else { ", coarse inside" };
                 let name = format!("brain at {spacing_mm} mm, {target_tets} tetrahedra{inside}");
-                scenes.push(Scene::of_voxels(name, mask.clone(), config, target_tets >= least));
+                let make = move |name| Scene::of_voxels(name, mask(spacing_mm), config, target_tets >= least);
+                scenes.push(named(name.clone(), move || make(name)));
             }
         }
     }
-    scenes.extend([ball(), torus(), ball_in_a_ball()]);
-    scenes.push(opening(&brain, scope.pick(4.0, 1.0), scope.pick(10_000, 60_000)));
+    scenes.extend([named("ball", ball), named("torus", torus), named("ball in a ball", ball_in_a_ball)]);
+    let (spacing_mm, tets) = (scope.pick(4.0, 1.0), scope.pick(10_000, 60_000));
+    scenes.push(named("fine at an opening", move || opening(spacing_mm, tets)));
     if !scope.quick {
-        scenes.push(tissues());
+        scenes.push(named("four tissues", tissues));
     }
     scenes
+}
+
+/// The brain on voxels of an edge.
+fn mask(spacing_mm: f32) -> VoxelVolume<u16> {
+    let brain = brain();
+    resample(&brain, &Grid::isotropic_over(&brain, spacing_mm), Interpolation::Majority, 0).map(u16::from)
 }
 
 /// A ball and a brain for a comparison.
@@ -101,23 +113,20 @@ pub(super) fn for_rivals(scope: Scope) -> Vec<Scene> {
     let mut ball = ball();
     ball.config.target_tets = scope.pick(2000, 8000);
     let (spacing_mm, target_tets) = scope.pick((4.0, 4000), (1.0, 15_000));
-    let brain = brain();
-    let mask = resample(&brain, &Grid::isotropic_over(&brain, spacing_mm), Interpolation::Majority, 0).map(u16::from);
     let config = Config { target_tets, ..Config::default() };
-    vec![ball, Scene::of_voxels(format!("brain at {spacing_mm} mm"), mask, config, false)]
+    vec![ball, Scene::of_voxels(format!("brain at {spacing_mm} mm"), mask(spacing_mm), config, false)]
 }
 
 /// Brains of which the least count is sought that follows their voxels, and between which counts.
-pub(super) fn searched(scope: Scope) -> Vec<(Scene, [usize; 2])> {
-    let brain = brain();
+pub(super) fn searched(scope: Scope) -> Vec<(Named, [usize; 2])> {
     let mut scenes = Vec::new();
     for &(spacing_mm, range) in scope.pick(&SEARCHED[2..], SEARCHED) {
-        let mask =
-            resample(&brain, &Grid::isotropic_over(&brain, spacing_mm), Interpolation::Majority, 0).map(u16::from);
         for coarsening in [0, 2] {
             let name = format!("brain at {spacing_mm} mm, least count within half a voxel");
             let config = Config { coarsening, ..Config::default() };
-            scenes.push((Scene::of_voxels(name, mask.clone(), config, false), range));
+            let part = format!("{name}, coarsening {coarsening}");
+            let make = move || Scene::of_voxels(name, mask(spacing_mm), config, false);
+            scenes.push((named(part, make), range));
         }
     }
     scenes
@@ -135,8 +144,8 @@ fn read(built_in: PathBuf) -> VoxelVolume<u16> {
 }
 
 /// The brain with small elements where a skull is opened: at its highest point, 25 mm wide.
-fn opening(brain: &VoxelVolume<u8>, spacing_mm: f32, target_tets: usize) -> Scene {
-    let mask = resample(brain, &Grid::isotropic_over(brain, spacing_mm), Interpolation::Majority, 0).map(u16::from);
+fn opening(spacing_mm: f32, target_tets: usize) -> Scene {
+    let mask = mask(spacing_mm);
     let [nx, ny, _] = mask.dims;
     let at = |n: usize| mask.centre_of([n % nx, n / nx % ny, n / (nx * ny)]).as_vec3();
     let inside = (0..mask.data.len()).filter(|&n| mask.data[n] != 0).map(at);

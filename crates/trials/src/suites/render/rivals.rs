@@ -10,7 +10,7 @@ use super::scenes::{ISO, frame, head};
 use super::{By, EXACT, SPARSE, Setting};
 use crate::python::Workshop;
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
+use crate::suites::{Part, Scope};
 use crate::timer::Samples;
 use glam::Vec3;
 use std::path::Path;
@@ -22,7 +22,11 @@ const SCRIPT: &str = include_str!("rivals.py");
 const STEPS: [f64; 5] = [0.0625, 0.125, 0.25, 0.5, 1.0];
 
 /// A shell by both.
-pub fn run(scope: Scope) -> Findings {
+pub fn parts(_: Scope) -> Vec<Part> {
+    vec![Part::new("all", |scope, findings| findings.append(run(scope)))]
+}
+
+fn run(scope: Scope) -> Findings {
     let mut findings = Findings::default();
     let size = scope.pick([640, 480], [1680, 1050]);
     let edge = scope.pick(100, 160);

@@ -3,7 +3,7 @@
 use super::solid::{ISO, KINDS, Kind, Moment, RADIUS_MM, Scene, directions};
 use super::{STIFFNESS, worst_chart};
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
+use crate::suites::{Part, Scope};
 use crate::timer::Samples;
 use std::time::Instant;
 use trepan_geometry::{Tool, Vec3};
@@ -17,26 +17,31 @@ const PRESSED_MM: f64 = 0.5;
 /// Orientations by the oracle, which is slow.
 const ORACLE_ORIENTATIONS: usize = 8;
 
-/// Every method on every sort of bone.
-pub fn run(scope: Scope, findings: &mut Findings) {
-    for (number, kind) in KINDS.iter().enumerate() {
-        if !scope.takes(number) {
-            continue;
-        }
-        let (quick, full) = if kind.group == "planes" { (12, 200) } else { (6, 60) };
-        let all = directions(scope.pick(quick, full));
-        let methods = Method::all();
-        let mut errors: Vec<Errors> = methods.iter().map(|_| Errors::default()).collect();
-        for (at, direction) in all.iter().enumerate() {
-            let scene = kind.scene(*direction);
-            for (method, errors) in methods.iter().zip(&mut errors) {
-                if method.name() != "brute" || at < scope.pick(1, ORACLE_ORIENTATIONS) {
-                    stroke(method, &scene, errors);
-                }
+/// Every sort of bone.
+pub fn parts() -> Vec<Part> {
+    let part = |kind: &'static Kind| Part::new(kind.name, move |scope, findings| measure(kind, scope, findings));
+    KINDS.iter().map(part).collect()
+}
+
+/// Every method on a sort of bone.
+fn measure(kind: &Kind, scope: Scope, findings: &mut Findings) {
+    let (quick, full) = if kind.group == "planes" { (12, 200) } else { (6, 60) };
+    let all = directions(scope.pick(quick, full));
+    let methods = Method::all();
+    let mut errors: Vec<Errors> = methods.iter().map(|_| Errors::default()).collect();
+    for (at, direction) in all.iter().enumerate() {
+        let scene = kind.scene(*direction);
+        for (method, errors) in methods.iter().zip(&mut errors) {
+            if method.name() != "brute" || at < scope.pick(1, ORACLE_ORIENTATIONS) {
+                stroke(method, &scene, errors);
             }
         }
-        findings.rows.extend(methods.iter().zip(errors).map(|(method, errors)| errors.row(kind, method)));
     }
+    findings.rows.extend(methods.iter().zip(errors).map(|(method, errors)| errors.row(kind, method)));
+}
+
+/// The charts and what is promised of the recommended method.
+pub fn judge(findings: &mut Findings) {
     for (group, title) in [
         ("planes", "Planes in every orientation, 0.5 and 1 mm voxels"),
         ("solids", "Sphere, cylinder shell from both sides, box over an edge"),
@@ -46,7 +51,8 @@ pub fn run(scope: Scope, findings: &mut Findings) {
         let chart = worst_chart(findings, group, title, ("tick_p50_us", "depth_error_p95_voxel"), true);
         findings.charts.extend(chart);
     }
-    findings.gates.extend(gates(&findings.rows));
+    let gates = gates(&findings.rows);
+    findings.gates.extend(gates);
 }
 
 /// Errors of every tick in every orientation: a share of them is a share of the time that a hand feels them.

@@ -17,7 +17,7 @@ use super::solid::{RADIUS_MM, held, voxels};
 use super::{map_of, passes};
 use crate::picture::{Map, Outcome};
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
+use crate::suites::{Part, Scope};
 use trepan_contact::{Contact, ForceGuard, ForceModel, GuardConfig, Hooke};
 use trepan_geometry::{Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
@@ -69,16 +69,13 @@ enum Wall<'a> {
 }
 
 /// The map of the exact wall and of every method.
-pub fn run(scope: Scope, findings: &mut Findings) {
-    let normal = normal();
-    let bone = bone(normal);
+pub fn parts() -> Vec<Part> {
+    let part = |method: Option<Method>| {
+        let name = format!("coupling {}", method.as_ref().map_or("exact wall", Method::name));
+        Part::new(name, move |scope, found| chart(method.as_ref(), &bone(normal()), normal(), scope, found))
+    };
     let slow = |method: &Method| method.name() == "brute";
-    let named = std::iter::once(None).chain(Method::all().into_iter().filter(|m| !slow(m)).map(Some));
-    for (number, method) in named.enumerate() {
-        if scope.takes(number) {
-            chart(method.as_ref(), &bone, normal, scope, findings);
-        }
-    }
+    std::iter::once(None).chain(Method::all().into_iter().filter(|m| !slow(m)).map(Some)).map(part).collect()
 }
 
 /// The wall's normal: along nothing.

@@ -12,7 +12,7 @@ use super::coupling;
 use super::recording::{self, Place, Task};
 use super::solid::{ISO, RADIUS_MM, held};
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
+use crate::suites::{Part, Scope};
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
@@ -28,41 +28,38 @@ const DEVICES: [(f32, f32); 3] = [(0.0, 0.0), (0.02, 0.01), (0.26, 0.055)];
 const NMM_PER_J: f64 = 1000.0;
 
 /// Every method but the oracle; the recommended one for a million ticks.
-pub fn run(scope: Scope, findings: &mut Findings) {
+pub fn parts() -> Vec<Part> {
+    let part = |method: Method| {
+        Part::new(format!("random hands {}", method.name()), move |scope, found| hands(&method, scope, found))
+    };
+    let quick_enough = Method::all().into_iter().filter(|method| method.name() != "brute");
+    quick_enough.map(part).chain([Part::new("same path again", repeats)]).collect()
+}
+
+fn hands(method: &Method, scope: Scope, findings: &mut Findings) {
     let normal = coupling::normal();
     let bone = coupling::bone(normal);
-    for (number, method) in Method::all().into_iter().filter(|m| m.name() != "brute").enumerate() {
-        if !scope.takes(number) {
-            continue;
-        }
-        let chosen = method == Method::RECOMMENDED;
-        let hands = scope.pick(if chosen { 5 } else { 2 }, if chosen { 100 } else { 20 });
-        let worst = |guarded: bool| {
-            let given = (0..hands).map(|seed| given_j(&method, &bone, normal, seed as u64, guarded));
-            given.fold(0.0, f64::max)
-        };
-        let (guarded, bare) = (worst(true), worst(false));
-        let row = Row::new("random hands", method.name())
-            .with("ticks", hands * HAND_TICKS)
-            .metric("energy_out_j", guarded)
-            .metric("energy_out_unguarded_j", bare);
-        findings.rows.push(row);
-        if chosen {
-            let [guarded, bare] = [guarded, bare].map(|joule| 1000.0 * joule);
-            findings.gates.push(Gate::at_most(
-                "random hands: energy out through the guard, worst mJ",
-                guarded,
-                MOST_MJ,
-            ));
-            findings.gates.push(Gate::at_least("random hands: energy out without the guard, worst mJ", bare, MOST_MJ));
-        }
+    let chosen = *method == Method::RECOMMENDED;
+    let hands = scope.pick(if chosen { 5 } else { 2 }, if chosen { 100 } else { 20 });
+    let worst = |guarded: bool| {
+        let given = (0..hands).map(|own| given_j(method, &bone, normal, scope.random(own as u64), guarded));
+        given.fold(0.0, f64::max)
+    };
+    let (guarded, bare) = (worst(true), worst(false));
+    let row = Row::new("random hands", method.name())
+        .with("ticks", hands * HAND_TICKS)
+        .metric("energy_out_j", guarded)
+        .metric("energy_out_unguarded_j", bare);
+    findings.rows.push(row);
+    if chosen {
+        let [guarded, bare] = [guarded, bare].map(|joule| 1000.0 * joule);
+        findings.gates.push(Gate::at_most("random hands: energy out through the guard, worst mJ", guarded, MOST_MJ));
+        findings.gates.push(Gate::at_least("random hands: energy out without the guard, worst mJ", bare, MOST_MJ));
     }
-    repeats(scope, findings);
 }
 
 /// The most energy that one hand got above what it gave, J.
-fn given_j(method: &Method, bone: &BoneVolume, normal: Vec3, seed: u64, guarded: bool) -> f64 {
-    let mut random = fastrand::Rng::with_seed(seed);
+fn given_j(method: &Method, bone: &BoneVolume, normal: Vec3, mut random: fastrand::Rng, guarded: bool) -> f64 {
     let (friction_n, quantum_mm) = DEVICES[random.usize(0..DEVICES.len())];
     let config = Config { delay_ticks: random.usize(0..3), friction_n, quantum_mm, ..Config::default() };
     // Even over the decades: from a finger that hardly damps to a fist.

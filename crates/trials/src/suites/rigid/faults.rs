@@ -8,7 +8,6 @@ use super::map_of;
 use super::solid::{ISO, RADIUS_MM, held, voxels};
 use crate::picture::{Map, Outcome};
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidContact, RigidStep};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
@@ -40,10 +39,7 @@ pub const CONDITIONS: [Condition; 13] = [
 ];
 
 /// The table of conditions and methods.
-pub fn run(scope: Scope, findings: &mut Findings) {
-    if !scope.takes(0) {
-        return;
-    }
+pub fn run(findings: &mut Findings) {
     let methods = Method::all();
     let cells: Vec<Vec<Outcome>> =
         CONDITIONS.iter().map(|(_, condition)| methods.iter().map(condition).collect()).collect();

@@ -10,7 +10,7 @@ use super::recording::{self, Task};
 use super::solid::{ISO, RADIUS_MM};
 use super::{STIFFNESS, clearance, published, worst_chart};
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
+use crate::suites::{Part, Scope};
 use crate::timer::Samples;
 use glam::DVec3;
 use std::time::Instant;
@@ -69,32 +69,32 @@ pub fn skull(head: &VoxelVolume<i16>, dims: [usize; 3], voxel_mm: f32) -> VoxelV
     resample(head, &Grid { dims, ..grid }, Interpolation::Trilinear, AIR_HU)
 }
 
-/// Every model, task and method, then the grid of 1024³.
-pub fn run(scope: Scope, findings: &mut Findings) {
-    let (head, isovalue) = head();
-    let cubes = scope.pick(&CUBES[1..2], &CUBES[..]);
-    for (number, &voxels) in cubes.iter().enumerate() {
-        if scope.takes(number) {
-            let model = Model { group: "cubes", name: format!("Cube{voxels}"), ct: cube(voxels), isovalue: ISO };
-            model.measure(&Method::all(), scope, findings);
-        }
-    }
-    for (number, &(dims, voxel_mm)) in SKULLS.iter().enumerate() {
-        if scope.takes(number) && (!scope.quick || number == 2) {
+/// Every model, then the grid of 1024³.
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let of_cube = |&voxels: &usize| {
+        let name = format!("Cube{voxels}");
+        Part::new(name.clone(), move |scope, findings| {
+            Model { group: "cubes", name, ct: cube(voxels), isovalue: ISO }.measure(&Method::all(), scope, findings);
+        })
+    };
+    let of_skull = |(number, &(dims, voxel_mm)): (usize, &([usize; 3], f32))| {
+        let name = format!("Skull{}", number + 1);
+        Part::new(name.clone(), move |scope, findings| {
+            let (head, isovalue) = head();
             let ct = skull(&head, dims, voxel_mm);
-            let model = Model { group: "skulls", name: format!("Skull{}", number + 1), ct, isovalue };
-            model.measure(&Method::all(), scope, findings);
-        }
-    }
-    findings.rows.extend(published::rows());
-    charts(findings);
-    if scope.shard.0 == 0 {
-        large(&head, isovalue, scope, findings);
-    }
+            Model { group: "skulls", name, ct, isovalue }.measure(&Method::all(), scope, findings);
+        })
+    };
+    let mut parts: Vec<Part> = scope.pick(&CUBES[1..2], &CUBES[..]).iter().map(of_cube).collect();
+    let skulls = SKULLS.iter().enumerate().filter(|(number, _)| !scope.quick || *number == 2);
+    parts.extend(skulls.map(of_skull));
+    parts.push(Part::new("published", |_, findings| findings.rows.extend(published::rows())));
+    parts.push(Part::new("large", large));
+    parts
 }
 
 /// Two charts a group: against the truth, which the recommended method must lead, and against what the thesis prints of itself.
-fn charts(findings: &mut Findings) {
+pub fn judge(findings: &mut Findings) {
     for group in ["cubes, touch", "cubes, drill", "skulls, touch", "skulls, drill"] {
         let (error, what) = match group {
             "cubes, touch" => ("depth_error_p95_voxel", "depth in closed form"),
@@ -250,7 +250,8 @@ impl Ride {
 }
 
 /// The drilling tick of the recommended method in 48.5 million voxels and, where memory allows, in 1024³ of the same edge.
-fn large(head: &VoxelVolume<i16>, isovalue: i16, scope: Scope, findings: &mut Findings) {
+fn large(scope: Scope, findings: &mut Findings) {
+    let (head, isovalue) = head();
     let path = recording::path(recording::Place::Skull, Task::Drill);
     let (dims, voxel_mm) = SKULLS[4];
     let grids = [("48.5 million voxels", dims), ("1024³ voxels", [HUGE; 3])];
@@ -260,7 +261,7 @@ fn large(head: &VoxelVolume<i16>, isovalue: i16, scope: Scope, findings: &mut Fi
         if dims[0] == HUGE && (scope.quick || available_mib() < (5 * voxels) >> 20) {
             continue;
         }
-        let bone = BoneVolume::new(&skull(head, dims, voxel_mm), isovalue).expect("the skull has bone");
+        let bone = BoneVolume::new(&skull(&head, dims, voxel_mm), isovalue).expect("the skull has bone");
         let found = ride(&Method::RECOMMENDED, &bone, &path, false);
         p50.push(found.tick_us.quantile(0.5));
         findings.rows.push(found.row(&format!("full drilling tick, {name}"), &Method::RECOMMENDED, &bone));

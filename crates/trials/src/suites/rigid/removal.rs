@@ -17,7 +17,7 @@
 use super::solid::{ISO, directions, held, voxels};
 use super::worst_chart;
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
+use crate::suites::{Part, Scope};
 use crate::timer::Samples;
 use glam::{DVec3, IVec3};
 use std::f64::consts::PI;
@@ -41,40 +41,46 @@ const HAND_DAMPING: f32 = 20.0;
 const POINTS: i32 = 4;
 
 /// Every method's strokes and rates.
-pub fn run(scope: Scope, findings: &mut Findings) {
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let part = |method: Method| {
+        Part::new(format!("removal {}", method.name()), move |scope, findings: &mut Findings| {
+            findings.rows.extend([strokes(&method, scope), rates(&method, scope)]);
+        })
+    };
+    Method::all().into_iter().filter(|method| method.name() != "brute" || !scope.quick).map(part).collect()
+}
+
+fn strokes(method: &Method, scope: Scope) -> Row {
     let normals = directions(scope.pick(6, 12));
-    for (number, method) in Method::all().into_iter().enumerate() {
-        if !scope.takes(number) || method.name() == "brute" && scope.quick {
-            continue;
-        }
-        let few = method.name() == "brute";
-        let orientations = if few { 1 } else { normals.len() };
-        let (mut said, mut left, mut own, mut times) = (0.0f64, 0.0f64, 0.0f64, Vec::new());
-        for normal in &normals[..orientations] {
-            let found = stroke(&method, *normal, &mut times);
-            said = worse(said, found.0 / swept_mm3() - 1.0);
-            left = worse(left, found.1 / swept_mm3() - 1.0);
-            own = worse(own, (found.1 - perfect_mm3(*normal)) / swept_mm3());
-        }
-        let times = Samples::from(times);
-        findings.rows.push(
-            Row::new("swept volume", method.name())
-                .with("group", "swept volume")
-                .with("radius_mm", R)
-                .with("swept_mm3", swept_mm3())
-                .with("orientations", orientations)
-                .metric("tick_p50_us", times.quantile(0.5))
-                .metric("tick_p99_us", times.quantile(0.99))
-                .metric("removed_error_percent", 100.0 * said.abs())
-                .metric("hole_error_percent", 100.0 * left.abs())
-                .metric("hole_beyond_perfect_percent", 100.0 * own.abs()),
-        );
-        findings.rows.push(rates(&method, scope));
+    let few = method.name() == "brute";
+    let orientations = if few { 1 } else { normals.len() };
+    let (mut said, mut left, mut own, mut times) = (0.0f64, 0.0f64, 0.0f64, Vec::new());
+    for normal in &normals[..orientations] {
+        let found = stroke(method, *normal, &mut times);
+        said = worse(said, found.0 / swept_mm3() - 1.0);
+        left = worse(left, found.1 / swept_mm3() - 1.0);
+        own = worse(own, (found.1 - perfect_mm3(*normal)) / swept_mm3());
     }
+    let times = Samples::from(times);
+    Row::new("swept volume", method.name())
+        .with("group", "swept volume")
+        .with("radius_mm", R)
+        .with("swept_mm3", swept_mm3())
+        .with("orientations", orientations)
+        .metric("tick_p50_us", times.quantile(0.5))
+        .metric("tick_p99_us", times.quantile(0.99))
+        .metric("removed_error_percent", 100.0 * said.abs())
+        .metric("hole_error_percent", 100.0 * left.abs())
+        .metric("hole_beyond_perfect_percent", 100.0 * own.abs())
+}
+
+/// The chart and what is promised of the recommended method.
+pub fn judge(findings: &mut Findings) {
     let title = "Drilling: tick against error of the removed volume";
     let chart = worst_chart(findings, "swept volume", title, ("tick_p50_us", "hole_beyond_perfect_percent"), false);
     findings.charts.extend(chart);
-    findings.gates.extend(gates(&findings.rows));
+    let gates = gates(&findings.rows);
+    findings.gates.extend(gates);
 }
 
 /// The one further from zero.

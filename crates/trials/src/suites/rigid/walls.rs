@@ -16,7 +16,7 @@ use super::solid::{directions, held, voxels};
 use super::{map_of, passes};
 use crate::picture::{Map, Outcome};
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
+use crate::suites::{Part, Scope};
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::{Method, RigidStep};
 use trepan_volume::BoneVolume;
@@ -46,42 +46,43 @@ pub struct Cell {
 }
 
 /// The grid, by every method.
-pub fn run(scope: Scope, findings: &mut Findings) {
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let part =
+        |method: Method| Part::new(format!("walls {}", method.name()), move |scope, found| by(&method, scope, found));
+    Method::all().into_iter().filter(|method| method.name() != "brute" || !scope.quick).map(part).collect()
+}
+
+fn by(method: &Method, scope: Scope, findings: &mut Findings) {
     let normals = normals(scope.pick(1, 6));
     let speeds = scope.pick(&SPEEDS[1..], &SPEEDS[..]);
-    for (number, method) in Method::all().into_iter().enumerate() {
-        let slow = method.name() == "brute";
-        if !scope.takes(number) || slow && scope.quick {
-            continue;
-        }
-        let used = if slow { &normals[..1] } else { &normals[..] };
-        // The smallest ball is the hardest; the recommended method must hold walls with all.
-        let sizes = if method == Method::RECOMMENDED { &RADII_MM[..] } else { &RADII_MM[..1] };
-        let grids: Vec<Vec<Vec<Outcome>>> = sizes.iter().map(|&r| grid(&method, used, speeds, r)).collect();
-        let all: Vec<&Outcome> = grids.iter().flatten().flatten().collect();
-        let tunnelled = all.iter().filter(|outcome| **outcome != &Outcome::Works).count();
-        let share = 100.0 * tunnelled as f64 / all.len() as f64;
-        let cells = grids.into_iter().next().unwrap_or_default();
-        let map = Map {
-            title: format!("{}: walls, ball of {} mm", method.name(), RADII_MM[0]),
-            x: "speed, mm/s".into(),
-            y: "voxels, angle".into(),
-            columns: speeds.iter().map(|v| format!("{v}")).collect(),
-            rows: THICK.iter().flat_map(|t| ANGLES.map(|a| format!("{t}, {a}°"))).collect(),
-            cells,
-            ..Map::default()
-        };
-        findings.rows.push(
-            passes(Row::new("walls x speed x angle", method.name()), &map)
-                .with("orientations", used.len())
-                .metric("tunnelled_cells_count", tunnelled as f64)
-                .metric("tunnelled_cells_percent", share),
-        );
-        if method == Method::RECOMMENDED {
-            findings.gates.push(Gate::at_most("walls: cells in which the tool tunnels", tunnelled as f64, 0.0));
-        }
-        findings.maps.push(map_of(&method, map));
+    let slow = method.name() == "brute";
+    let used = if slow { &normals[..1] } else { &normals[..] };
+    // The smallest ball is the hardest; the recommended method must hold walls with all.
+    let sizes = if *method == Method::RECOMMENDED { &RADII_MM[..] } else { &RADII_MM[..1] };
+    let grids: Vec<Vec<Vec<Outcome>>> = sizes.iter().map(|&r| grid(method, used, speeds, r)).collect();
+    let all: Vec<&Outcome> = grids.iter().flatten().flatten().collect();
+    let tunnelled = all.iter().filter(|outcome| **outcome != &Outcome::Works).count();
+    let share = 100.0 * tunnelled as f64 / all.len() as f64;
+    let cells = grids.into_iter().next().unwrap_or_default();
+    let map = Map {
+        title: format!("{}: walls, ball of {} mm", method.name(), RADII_MM[0]),
+        x: "speed, mm/s".into(),
+        y: "voxels, angle".into(),
+        columns: speeds.iter().map(|v| format!("{v}")).collect(),
+        rows: THICK.iter().flat_map(|t| ANGLES.map(|a| format!("{t}, {a}°"))).collect(),
+        cells,
+        ..Map::default()
+    };
+    findings.rows.push(
+        passes(Row::new("walls x speed x angle", method.name()), &map)
+            .with("orientations", used.len())
+            .metric("tunnelled_cells_count", tunnelled as f64)
+            .metric("tunnelled_cells_percent", share),
+    );
+    if *method == Method::RECOMMENDED {
+        findings.gates.push(Gate::at_most("walls: cells in which the tool tunnels", tunnelled as f64, 0.0));
     }
+    findings.maps.push(map_of(method, map));
 }
 
 /// Thickness and angle by speed.

@@ -10,7 +10,7 @@
 
 use super::bench::Bench;
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
+use crate::suites::{Part, Scope};
 use std::sync::Arc;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
@@ -58,8 +58,8 @@ struct Outcome {
 }
 
 impl Hole {
-    fn random(seed: u64) -> Self {
-        let mut rng = fastrand::Rng::with_seed(seed);
+    fn random(own: u64, scope: Scope) -> Self {
+        let mut rng = scope.random(own);
         let mut within = |low: f32, high: f32| low + (high - low) * rng.f32();
         let (tilt, turn) = (within(0.0, 0.35), within(0.0, std::f32::consts::TAU));
         Self {
@@ -71,7 +71,7 @@ impl Hole {
             slot: usize::from(within(0.0, 1.0) < 0.5),
             feed_mm_s: within(0.4, 3.0),
             grip: if within(0.0, 1.0) < 0.7 { Hand::FIRM } else { Hand::LIGHT },
-            left_mm: if seed.is_multiple_of(2) { -2.0 } else { within(0.8, 3.0) },
+            left_mm: if own.is_multiple_of(2) { -2.0 } else { within(0.8, 3.0) },
         }
     }
 
@@ -164,44 +164,76 @@ impl HapticDevice for Feed {
     fn close(&mut self) {}
 }
 
-/// One row for those who mean to come through, one for those who do not, and their gates.
-pub fn findings(scope: Scope) -> Findings {
-    let count: u64 = scope.pick(60, 1000);
-    let outcomes: Vec<(Hole, Outcome)> = (0..count).map(Hole::random).map(|hole| (hole, hole.drilled())).collect();
+/// Holes in one part.
+const TOGETHER: u64 = 50;
+/// What a row of a part counts.
+const HOLES: &str = "holes_count";
+const THROUGH: &str = "through_count";
+const NOT_THROUGH: &str = "meant_to_and_not_through_count";
+const TOLD_BREACH: &str = "told_before_breach_count";
+const TOLD_CONTACT: &str = "told_before_contact_count";
+const FALSE: &str = "false_count";
+const LEADS: &str = "lead_ms";
+
+/// A thousand holes, or sixty, each with its own seed.
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let part = |first: u64| {
+        Part::new(format!("holes from {first}"), move |scope: Scope, findings: &mut Findings| {
+            let last = (first + TOGETHER).min(count(scope));
+            findings.rows.push(tally(first, (first..last).map(|own| Hole::random(own, scope)).collect()));
+        })
+    };
+    (0..count(scope)).step_by(TOGETHER as usize).map(part).collect()
+}
+
+fn count(scope: Scope) -> u64 {
+    scope.pick(50, 1000)
+}
+
+fn tally(first: u64, holes: Vec<Hole>) -> Row {
+    let outcomes: Vec<(Hole, Outcome)> = holes.into_iter().map(|hole| (hole, hole.drilled())).collect();
     let through = || outcomes.iter().filter(|(_, outcome)| outcome.through.is_some());
     let short = || outcomes.iter().filter(|(_, outcome)| outcome.through.is_none());
     let before = |outcome: &Outcome, event: Option<u64>| {
         event.is_none_or(|event| outcome.announced.is_some_and(|told| told < event))
     };
-    let share = |part: usize, whole: usize| if whole == 0 { f64::NAN } else { part as f64 / whole as f64 };
-    let told_breach = share(through().filter(|(_, o)| before(o, o.through)).count(), through().count());
-    let told_contact =
-        share(through().filter(|(_, o)| o.announced.is_some() && before(o, o.contact)).count(), through().count());
-    let wrong = short().filter(|(_, o)| o.announced.is_some() && o.left_mm > ABOUT_MM).count();
-    let wrong = share(wrong, short().count());
-    let mut lead: Vec<f64> = through().filter_map(|(_, o)| Some(o.through? as f64 - o.announced? as f64)).collect();
-    lead.sort_by(f64::total_cmp);
-    let quantile = |q: f64| lead.get((q * lead.len() as f64) as usize).copied().unwrap_or(f64::NAN);
-    let mut findings = Findings::default();
-    findings.rows.push(
-        Row::new("holes that come through", "warnings")
-            .with("holes", count)
-            .metric("breaches", through().count() as f64)
-            .metric("not_through", short().filter(|(hole, _)| hole.left_mm < 0.0).count() as f64)
-            .metric("told_before_breach_percent", 100.0 * told_breach)
-            .metric("told_before_contact_percent", 100.0 * told_contact)
-            .metric("lead_p50_ms", quantile(0.5))
-            .metric("lead_p01_ms", quantile(0.01)),
-    );
-    findings.rows.push(
-        Row::new("holes that stop short", "warnings")
-            .with("holes", count)
-            .metric("holes", short().count() as f64)
-            .metric("false_percent", 100.0 * wrong),
-    );
+    let leads: Vec<f64> = through().filter_map(|(_, o)| Some(o.through? as f64 - o.announced? as f64)).collect();
+    let told_contact = through().filter(|(_, o)| o.announced.is_some() && before(o, o.contact));
+    let wrong = short().filter(|(_, o)| o.announced.is_some() && o.left_mm > ABOUT_MM);
+    Row::new(format!("holes from {first}"), "warnings")
+        .with(LEADS, leads)
+        .metric(HOLES, outcomes.len() as f64)
+        .metric(THROUGH, through().count() as f64)
+        .metric(NOT_THROUGH, short().filter(|(hole, _)| hole.left_mm < 0.0).count() as f64)
+        .metric(TOLD_BREACH, through().filter(|(_, o)| before(o, o.through)).count() as f64)
+        .metric(TOLD_CONTACT, told_contact.count() as f64)
+        .metric(FALSE, wrong.count() as f64)
+}
+
+/// One row for those that come through, one for those that do not, and their gates.
+pub fn judge(findings: &mut Findings) {
+    let rows: Vec<&Row> = findings.rows.iter().filter(|row| row.config.contains_key(LEADS)).collect();
+    let sum = |name: &str| rows.iter().map(|row| row.metrics[name]).sum::<f64>();
+    let (holes, through) = (sum(HOLES), sum(THROUGH));
+    let (told_contact, wrong) = (sum(TOLD_CONTACT) / through, sum(FALSE) / (holes - through));
+    let mut leads: Vec<f64> = rows.iter().flat_map(|row| row.numbers(LEADS)).collect();
+    leads.sort_by(f64::total_cmp);
+    let quantile = |q: f64| leads.get((q * leads.len() as f64) as usize).copied().unwrap_or(f64::NAN);
+    let come_through = Row::new("holes that come through", "warnings")
+        .with("holes", holes)
+        .metric("breaches", through)
+        .metric("not_through", sum(NOT_THROUGH))
+        .metric("told_before_breach_percent", 100.0 * sum(TOLD_BREACH) / through)
+        .metric("told_before_contact_percent", 100.0 * told_contact)
+        .metric("lead_p50_ms", quantile(0.5))
+        .metric("lead_p01_ms", quantile(0.01));
+    let stop_short = Row::new("holes that stop short", "warnings")
+        .with("holes", holes)
+        .metric("holes", holes - through)
+        .metric("false_percent", 100.0 * wrong);
+    findings.rows.extend([come_through, stop_short]);
     findings.gates.extend([
         Gate::at_least("holes: share of breaches told before the dura is touched", told_contact, 0.99),
         Gate::at_most("holes: share of false announcements", wrong, 0.01),
     ]);
-    findings
 }

@@ -10,7 +10,7 @@ mod rates;
 pub mod readers;
 mod sessions;
 
-use super::Scope;
+use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
 use anyhow::Result;
 
@@ -18,37 +18,31 @@ use anyhow::Result;
 const LONG_MIN: f64 = 30.0;
 
 /// Every part; one that could not be run is a broken promise.
-pub fn run(scope: Scope) -> Findings {
-    let mut findings = Findings::default();
-    let mut add = |name: &str, part: Result<Findings>| match part {
-        Ok(mut part) => {
-            findings.rows.append(&mut part.rows);
-            findings.gates.append(&mut part.gates);
-        }
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let mut parts = holes::parts(scope);
+    type OnTheTable = fn(&case::Table) -> Findings;
+    let on_the_table: [(&str, OnTheTable); 3] =
+        [("hands", hands::findings), ("rates", rates::findings), ("flap", flap::findings)];
+    parts.extend(on_the_table.map(|(name, found)| tried(name, move |_| case::Table::new().map(|table| found(&table)))));
+    parts.push(tried("brain", |_| brain::findings()));
+    parts.push(tried("replays", sessions::replays));
+    if !scope.quick {
+        parts.push(tried("long session", |_| sessions::soak(LONG_MIN)));
+    }
+    parts
+}
+
+/// The promises over all holes.
+pub fn judge(_: Scope, findings: &mut Findings) {
+    holes::judge(findings);
+}
+
+fn tried(name: &'static str, part: impl FnOnce(Scope) -> Result<Findings> + 'static) -> Part {
+    Part::new(name, move |scope, findings| match part(scope) {
+        Ok(found) => findings.append(found),
         Err(fault) => {
             findings.rows.push(Row::new(name, "not run").with("fault", format!("{fault:#}")));
             findings.gates.push(Gate::at_least(format!("{name}: runs"), 0.0, 1.0));
         }
-    };
-    if scope.takes(0) {
-        add("holes", Ok(holes::findings(scope)));
-    }
-    if scope.takes(1) {
-        match case::Table::new() {
-            Ok(table) => {
-                add("hands", Ok(hands::findings(&table)));
-                add("rates", Ok(rates::findings(&table)));
-                add("flap", Ok(flap::findings(&table)));
-            }
-            Err(fault) => add("the built-in case", Err(fault)),
-        }
-        add("the brain", brain::findings());
-    }
-    if scope.takes(2) {
-        add("replays", sessions::replays(scope));
-    }
-    if scope.takes(3) && !scope.quick {
-        add("long session", sessions::soak(LONG_MIN));
-    }
-    findings
+    })
 }

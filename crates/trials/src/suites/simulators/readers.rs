@@ -3,7 +3,7 @@
 use super::sessions;
 use crate::python::Workshop;
 use crate::suite::{Findings, Gate, Row};
-use crate::suites::Scope;
+use crate::suites::{Part, Scope};
 use std::time::{Duration, Instant};
 use trepan_link::Recording;
 
@@ -14,7 +14,11 @@ const PACKAGES: [(&str, &str); 3] =
 const KNOWN: [(&str, &str); 2] = [("/tool", "foxglove.FrameTransform"), ("/log", "foxglove.Log")];
 
 /// Records a session and has it read.
-pub fn run(_: Scope) -> Findings {
+pub fn parts(_: Scope) -> Vec<Part> {
+    vec![Part::new("all", |scope, findings| findings.append(run(scope)))]
+}
+
+fn run(_: Scope) -> Findings {
     let mut findings = Findings::default();
     match read() {
         Ok(found) => findings = found,

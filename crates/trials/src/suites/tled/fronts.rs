@@ -4,7 +4,7 @@
 //! The truth is the continuum's: quadratic tetrahedra ([`Order::Quadratic`]), where the middle of the free end comes to rest. The error is the distance from there as a share of the
 //! way. What counts as cost is the computing time from the first step to rest, [`SETTLE_MS`] of simulated time.
 
-use super::{Scene, Scope};
+use super::{Part, Scope};
 use crate::picture::{Chart, Mark};
 use crate::suite::{Findings, Gate, Row};
 use std::time::Instant;
@@ -32,8 +32,11 @@ struct Point {
 }
 
 /// The front, and TLED beside the reference on the same mesh.
-pub fn scenes() -> Vec<Scene> {
-    vec![Box::new(front), Box::new(|scope, findings| same_mesh(scope.pick(4, 8), findings))]
+pub fn parts() -> Vec<Part> {
+    vec![
+        Part::new("hanging block", front),
+        Part::new("same mesh", |scope, findings| same_mesh(scope.pick(4, 8), findings)),
+    ]
 }
 
 /// Hangs the block by every solver.

@@ -11,7 +11,7 @@
 //! The continuum is that of `fixtures/fem/taylor_hood.py`: quadratic displacements and linear pressure, an independent code on its own meshes; the numbers of its meshes and the limit stand
 //! beside it.
 
-use super::{Scene as Task, Scope};
+use super::{Part, Scope};
 use crate::picture::{Chart, Mark};
 use crate::suite::{Findings, Gate, Row};
 use crate::timer::Samples;
@@ -126,12 +126,14 @@ static SCENES: [Scene; 5] = [
 ];
 
 /// Every scene at every ν, with both elements.
-pub fn scenes(scope: Scope) -> Vec<Task> {
+pub fn parts(scope: Scope) -> Vec<Part> {
     let of = |scene: &'static Scene| {
         let sized =
             scene.truth.iter().map(move |&(poisson, truth, sizes)| (poisson, truth, scope.pick(sizes[0], sizes[1])));
-        sized.filter(|(.., size)| *size > 0).map(move |(poisson, truth, size)| -> Task {
-            Box::new(move |_, findings| judge(scene, poisson, DVec3::from_array(truth), size, findings))
+        sized.filter(|(.., size)| *size > 0).map(move |(poisson, truth, size)| {
+            Part::new(format!("{}, ν {poisson}", scene.title), move |_, findings| {
+                judge(scene, poisson, DVec3::from_array(truth), size, findings);
+            })
         })
     };
     SCENES.iter().flat_map(of).collect()

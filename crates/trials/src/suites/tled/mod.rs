@@ -10,29 +10,24 @@ mod slender;
 mod speed;
 mod stability;
 
-use super::Scope;
+use super::{Part, Scope};
 use crate::suite::Findings;
 
-/// A scene that stands alone: what a shard takes or leaves.
-type Scene = Box<dyn FnOnce(Scope, &mut Findings)>;
+/// Every scene.
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let mut parts = fronts::parts();
+    parts.push(Part::new("closed forms", |_, findings| closed_forms::run(findings)));
+    parts.extend(locking::parts(scope));
+    parts.extend(motion::parts());
+    parts.extend([Part::new("region", region::run), Part::new("device", device::run)]);
+    parts.extend(slender::parts());
+    parts.extend(speed::parts());
+    parts.extend(stability::parts());
+    parts
+}
 
-/// Every scene, in the order of the shards; then the charts of what was found.
-pub fn run(scope: Scope) -> Findings {
-    let mut scenes = fronts::scenes();
-    scenes.push(Box::new(|_, findings| closed_forms::run(findings)));
-    scenes.extend(locking::scenes(scope));
-    scenes.extend(motion::scenes());
-    scenes.extend([Box::new(region::run) as Scene, Box::new(device::run)]);
-    scenes.extend(slender::scenes());
-    scenes.extend(speed::scenes());
-    scenes.extend(stability::scenes());
-    let mut findings = Findings::default();
-    for (number, scene) in scenes.into_iter().enumerate() {
-        if scope.takes(number) {
-            scene(scope, &mut findings);
-        }
-    }
-    locking::draw(&mut findings);
-    stability::draw(&mut findings);
-    findings
+/// The charts and maps of what was found.
+pub fn judge(_: Scope, findings: &mut Findings) {
+    locking::draw(findings);
+    stability::draw(findings);
 }

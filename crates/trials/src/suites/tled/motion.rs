@@ -1,6 +1,6 @@
 //! Motion: the frequency of a beam, the energy of one that nothing damps, and the rest that dynamic relaxation finds.
 
-use super::{Scene, Scope};
+use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
 use glam::DMat3;
 use trepan_geometry::{Vec3, units};
@@ -14,8 +14,12 @@ const CONVERGED_HZ: f64 = 1.7328;
 const BEAM_MM: Vec3 = Vec3::new(100.0, 20.0, 20.0);
 
 /// Every scene of motion.
-pub fn scenes() -> Vec<Scene> {
-    vec![Box::new(frequency), Box::new(|_, findings| energy(findings)), Box::new(|_, findings| relaxation(findings))]
+pub fn parts() -> Vec<Part> {
+    vec![
+        Part::new("frequency", frequency),
+        Part::new("energy", |_, findings| energy(findings)),
+        Part::new("relaxation", |_, findings| relaxation(findings)),
+    ]
 }
 
 /// Linear tetrahedra are too stiff by the square of their size: plain ones on two meshes tell the limit, cured ones on the finer one are near it.

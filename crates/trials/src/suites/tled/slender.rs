@@ -3,7 +3,7 @@
 //! # Theory
 //! `E I θ'' = -ρ g A (L - s) cos θ`, θ(0) = 0, θ'(L) = 0; shear and stretch, which it leaves out, are of the order `(r/L)²`. I and A are those of the mesh, whose section is a polygon.
 
-use super::{Scene, Scope};
+use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};
 use trepan_soft::reference::{self, Order, Reference};
@@ -15,8 +15,8 @@ const RADIUS_MM: f32 = 5.0;
 const YOUNG_MPA: f32 = 1.0;
 
 /// Quadratic tetrahedra always; linear ones, which bend too stiffly, on two meshes in a full run.
-pub fn scenes() -> Vec<Scene> {
-    vec![Box::new(|_, findings| quadratic(findings)), Box::new(linear)]
+pub fn parts() -> Vec<Part> {
+    vec![Part::new("slender, quadratic", |_, findings| quadratic(findings)), Part::new("slender, linear", linear)]
 }
 
 fn quadratic(findings: &mut Findings) {

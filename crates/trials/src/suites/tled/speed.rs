@@ -1,6 +1,6 @@
 //! What a step costs, as ratios in one run: kernels and options, an element over the size of the mesh, and more threads than a loaded machine has cores for.
 
-use super::{Scene, Scope};
+use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -20,8 +20,8 @@ struct Run {
 }
 
 /// Every row.
-pub fn scenes() -> Vec<Scene> {
-    vec![Box::new(kernels), Box::new(sizes), Box::new(loaded)]
+pub fn parts() -> Vec<Part> {
+    vec![Part::new("kernels", kernels), Part::new("sizes", sizes), Part::new("loaded machine", loaded)]
 }
 
 fn block(cells: [usize; 3]) -> Body {

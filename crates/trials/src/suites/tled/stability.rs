@@ -1,6 +1,6 @@
 //! Where solvers of this kind fail: the border, method by method, and what the recommended one does there.
 
-use super::{Scene, Scope};
+use super::{Part, Scope};
 use crate::picture::{Map, Outcome};
 use crate::suite::{Findings, Gate, Row};
 use trepan_contact::NodalContact;
@@ -12,19 +12,19 @@ use trepan_tled::{Config, Damping, Relaxation, Settling, Tled};
 const HELD: &str = "held_verdict";
 
 /// Every row of the map.
-pub fn scenes() -> Vec<Scene> {
+pub fn parts() -> Vec<Part> {
     let short = [
-        step_length as fn(&mut Findings),
-        incompressible,
-        stretched,
-        inverted,
-        hard_contact,
-        stiffness_jump,
-        slivers,
-        extremes,
+        ("step length", step_length as fn(&mut Findings)),
+        ("incompressible", incompressible),
+        ("stretched", stretched),
+        ("inverted", inverted),
+        ("hard contact", hard_contact),
+        ("stiffness jump", stiffness_jump),
+        ("slivers", slivers),
+        ("extremes", extremes),
     ]
-    .map(|scene| -> Scene { Box::new(move |_, findings| scene(findings)) });
-    short.into_iter().chain([Box::new(drift) as Scene]).collect()
+    .map(|(name, scene)| Part::new(name, move |_, findings| scene(findings)));
+    short.into_iter().chain([Part::new("drift", drift)]).collect()
 }
 
 /// One map for each run of scenes that were put to the same methods.
@@ -49,7 +49,8 @@ pub fn draw(findings: &mut Findings) {
         cells: scenes.iter().map(|(_, told)| told.iter().map(|(_, held)| cell(*held)).collect()).collect(),
         ..Map::default()
     };
-    findings.maps = scenes.chunk_by(|a, b| names(&a.1) == names(&b.1)).map(map).collect();
+    let maps: Vec<Map> = scenes.chunk_by(|a, b| names(&a.1) == names(&b.1)).map(map).collect();
+    findings.maps.extend(maps);
 }
 
 fn cube(cells: usize, material: Material) -> Body {

@@ -1,0 +1,307 @@
+//! Two runs side by side: what got faster, slower, more or less accurate, and how sure that is.
+//!
+//! # Theory
+//! A metric of a method is compared over all scenes that both runs have, as the ratio r = new / old in each. The median of the r is what changed; its 95 % interval is the
+//! bootstrap's (Efron 1979): scenes drawn with repeats, a thousand times. A change counts where the interval leaves out 1 and the median is further from 1 than a
+//! time may wander by itself. How far that is, both runs say together: the spread of the ratios of all times, which a busy or another machine widens.
+//!
+//! # Practice
+//! Times end in `_us`, `_ms`, `_s`, `_ns` or are rates `_per_s`; they are set against the median ratio of all times of the suite, so that a machine that was slower throughout is said once and
+//! not blamed on each method. All else should repeat exactly with the same seed and is compared as it is.
+
+use crate::picture::{Chart, Map, Outcome};
+use crate::report::Report;
+use crate::store;
+use crate::suite::Row;
+use crate::suites::{ALL, ON_REQUEST};
+use anyhow::{Result, bail};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Draws of the bootstrap.
+const DRAWS: usize = 1000;
+/// A time must change by this share at least to be told, however sure it is.
+const LEAST_TIME: f64 = 0.05;
+/// The same for all else.
+const LEAST: f64 = 1e-6;
+
+/// Which way of a metric is better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Better {
+    Less,
+    More,
+    Neither,
+}
+
+/// What a metric's name says of it.
+fn kind(metric: &str) -> (bool, Better) {
+    let ends = |list: &[&str]| list.iter().any(|end| metric.ends_with(end));
+    let has = |list: &[&str]| list.iter().any(|word| metric.contains(word));
+    match () {
+        () if ends(&["_per_s", "speedup"]) => (true, Better::More),
+        () if ends(&["_us", "_ns", "_s"])
+            || ends(&["_ms"]) && has(&["time", "frame", "step", "cost", "calibration"]) =>
+        {
+            (true, Better::Less)
+        }
+        () if has(&[
+            "error",
+            "missed",
+            "invented",
+            "lost",
+            "regret",
+            "drift",
+            "fails",
+            "false",
+            "jump",
+            "differing",
+        ]) =>
+        {
+            (false, Better::Less)
+        }
+        () if has(&["ssim", "dice", "recovered", "works", "held", "told_before"]) => (false, Better::More),
+        () => (false, Better::Neither),
+    }
+}
+
+/// A metric of a method over all scenes of both runs.
+#[derive(Debug)]
+struct Change {
+    method: String,
+    metric: String,
+    scenes: usize,
+    median: f64,
+    low: f64,
+    high: f64,
+}
+
+/// Everything that differs between the reports of two folders, as text.
+pub fn folders(old: &Path, new: &Path) -> Result<String> {
+    let mut text = String::new();
+    for suite in ALL.iter().chain(ON_REQUEST) {
+        if let (Some(old), Some(new)) = (store::report(old, suite.name)?, store::report(new, suite.name)?) {
+            text += &reports(&old, &new);
+        }
+    }
+    if text.is_empty() {
+        bail!("{} and {} have no suite in common: give folders with SUITE.json", old.display(), new.display());
+    }
+    Ok(text)
+}
+
+/// Everything that differs between two reports of one suite.
+pub fn reports(old: &Report, new: &Report) -> String {
+    let mut text = format!("{}: {} -> {}\n", new.suite, old.making.commit, new.making.commit);
+    if old.making.scope() != new.making.scope() {
+        text += "  the runs differ in --quick or --seed: only rows of the same name are compared\n";
+    }
+    if old.making.machine != new.making.machine {
+        text += "  another machine: times say little\n";
+    }
+    gates(&mut text, old, new);
+    metrics(&mut text, &old.findings.rows, &new.findings.rows);
+    charts(&mut text, &old.findings.charts, &new.findings.charts);
+    maps(&mut text, &old.findings.maps, &new.findings.maps);
+    text
+}
+
+fn gates(text: &mut String, old: &Report, new: &Report) {
+    let was: BTreeMap<&str, bool> = old.findings.gates.iter().map(|gate| (gate.name.as_str(), gate.pass)).collect();
+    let both = || new.findings.gates.iter().filter_map(|gate| Some((gate, *was.get(gate.name.as_str())?)));
+    let changed: Vec<_> = both().filter(|(gate, was)| gate.pass != *was).collect();
+    _ = writeln!(text, "  {} promises in both, {} with another verdict", both().count(), changed.len());
+    for (gate, _) in changed {
+        let word = if gate.pass { "now kept" } else { "NOW BROKEN" };
+        _ = writeln!(text, "    {word}: {}: {} {} {}", gate.name, gate.value, gate.op, gate.limit);
+    }
+}
+
+fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
+    let ratios = ratios(old, new);
+    let mut of_times: Vec<f64> = Vec::new();
+    ratios.iter().filter(|((_, metric), _)| kind(metric).0).for_each(|(_, all)| of_times.extend(all));
+    let machine = quantile(&mut of_times, 0.5).unwrap_or(1.0);
+    let mut wander: Vec<f64> = of_times.iter().map(|ratio| (ratio / machine).ln().abs()).collect();
+    let spread = quantile(&mut wander, 0.9).unwrap_or(0.0).exp() - 1.0;
+    if !of_times.is_empty() {
+        _ = writeln!(
+            text,
+            "  {} times: new over old {machine:.3} in the median, nine in ten within {:.0} % of that",
+            of_times.len(),
+            100.0 * spread
+        );
+    }
+    let mut told: BTreeMap<&str, Vec<Change>> = BTreeMap::new();
+    let mut same = 0;
+    for ((method, metric), all) in ratios {
+        let (is_time, better) = kind(&metric);
+        let all: Vec<f64> = if is_time { all.iter().map(|ratio| ratio / machine).collect() } else { all };
+        let change = Change::of(method, metric, all);
+        match change.word(is_time, better) {
+            Some(word) => told.entry(word).or_default().push(change),
+            None => same += 1,
+        }
+    }
+    _ = writeln!(text, "  {same} metrics of methods unchanged within their confidence");
+    for (word, mut changes) in told {
+        changes.sort_by(|a, b| b.median.ln().abs().total_cmp(&a.median.ln().abs()));
+        _ = writeln!(text, "  {word}:");
+        for Change { method, metric, scenes, median, low, high } in changes {
+            _ = writeln!(text, "    {method}, {metric}: x{median:.3} [{low:.3}, {high:.3}] over {scenes} scene(s)");
+        }
+    }
+}
+
+/// New over old of every metric that both have in the same scene, by method and metric. Where both are 0 the ratio is 1.
+fn ratios(old: &[Row], new: &[Row]) -> BTreeMap<(String, String), Vec<f64>> {
+    let key = |row: &Row| (row.scene.clone(), row.method.clone(), format!("{:?}", stable(row)));
+    let was: BTreeMap<_, &Row> = old.iter().map(|row| (key(row), row)).collect();
+    let mut ratios: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
+    for row in new {
+        let Some(before) = was.get(&key(row)) else { continue };
+        for (metric, &value) in &row.metrics {
+            let Some(&old) = before.metrics.get(metric) else { continue };
+            let ratio = if value == old || (value.is_nan() && old.is_nan()) { 1.0 } else { value / old };
+            ratios.entry((row.method.clone(), metric.clone())).or_default().push(ratio);
+        }
+    }
+    ratios
+}
+
+/// Settings that are not measured themselves: no lists, no fractions.
+fn stable(row: &Row) -> Vec<(&String, String)> {
+    let plain = row.config.iter().filter(|(_, value)| value.is_string() || value.is_u64() || value.is_boolean());
+    plain.map(|(name, value)| (name, value.to_string())).collect()
+}
+
+impl Change {
+    fn of(method: String, metric: String, mut all: Vec<f64>) -> Self {
+        let scenes = all.len();
+        let mut random = fastrand::Rng::with_seed(1);
+        let mut draw = || {
+            let mut drawn: Vec<f64> = (0..scenes).map(|_| all[random.usize(..scenes)]).collect();
+            quantile(&mut drawn, 0.5).unwrap_or(1.0)
+        };
+        let mut medians: Vec<f64> = (0..DRAWS).map(|_| draw()).collect();
+        let [low, high] = [0.025, 0.975].map(|share| quantile(&mut medians, share).unwrap_or(1.0));
+        Self { median: quantile(&mut all, 0.5).unwrap_or(1.0), method, metric, scenes, low, high }
+    }
+
+    /// What to call it, if it is a change. A time in a single scene is none: nothing says how sure it is.
+    fn word(&self, is_time: bool, better: Better) -> Option<&'static str> {
+        let least = if is_time { LEAST_TIME } else { LEAST };
+        let sure = self.low > 1.0 || self.high < 1.0 || self.median.is_nan();
+        if !sure || (self.median - 1.0).abs() < least || is_time && self.scenes < 3 {
+            return None;
+        }
+        let grew = self.median > 1.0;
+        Some(match (is_time, better) {
+            (_, Better::Neither) => "other, neither better nor worse by its name",
+            (true, Better::Less) if grew => "SLOWER",
+            (true, Better::More) if !grew => "SLOWER",
+            (true, _) => "faster",
+            (false, Better::Less) if grew => "LESS ACCURATE",
+            (false, Better::More) if !grew => "LESS ACCURATE",
+            (false, _) => "more accurate",
+        })
+    }
+}
+
+fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(((values.len().max(1) - 1) as f64 * share).round() as usize).copied()
+}
+
+/// Who joined or left a front by more than [`Chart::SPREAD`].
+fn charts(text: &mut String, old: &[Chart], new: &[Chart]) {
+    for chart in new {
+        let Some(before) = old.iter().find(|other| other.title == chart.title) else { continue };
+        let [was, is] = [before, chart].map(Chart::on_front);
+        let left = was.iter().filter(|name| !chart.near_front(name));
+        let joined = is.iter().filter(|name| !before.near_front(name));
+        let changed: Vec<String> =
+            left.map(|name| format!("{name} left")).chain(joined.map(|name| format!("{name} joined"))).collect();
+        if !changed.is_empty() {
+            _ = writeln!(text, "  front of {:?}: {}", chart.title, changed.join(", "));
+        }
+    }
+}
+
+fn maps(text: &mut String, old: &[Map], new: &[Map]) {
+    let (mut same, mut changed) = (0, Vec::new());
+    for map in new {
+        let Some(before) = old.iter().find(|other| other.title == map.title) else { continue };
+        for (row, column, cell) in map.named_cells() {
+            match before.cell(row, column) {
+                Some(was) if was.grade() != cell.grade() => changed.push(told(map, row, column, was, cell)),
+                Some(_) => same += 1,
+                None => {}
+            }
+        }
+    }
+    if same + changed.len() > 0 {
+        _ = writeln!(text, "  {same} cells of maps with the same verdict, {} with another", changed.len());
+    }
+    changed.iter().for_each(|line| _ = writeln!(text, "    {line}"));
+}
+
+/// A cell that changed, by name.
+pub fn told(map: &Map, row: &str, column: &str, was: &Outcome, is: &Outcome) -> String {
+    let word = if is.worse_than(was) { "WORSE" } else { "better" };
+    let reason = [is.reason(), was.reason()].into_iter().find(|reason| !reason.is_empty()).unwrap_or_default();
+    format!("{word}: {} | {row} | {column}: {} -> {} ({reason})", map.title, was.word(), is.word())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::part::Scope;
+    use crate::report::Making;
+    use crate::suite::{Findings, Gate};
+
+    fn report(us: impl Fn(usize) -> f64, error: f64, limit: f64) -> Report {
+        let row = |n| {
+            Row::new(format!("scene {n}"), ["a", "b", "c"][n / 10])
+                .metric("tick_p50_us", us(n))
+                .metric("depth_error_mm", error)
+        };
+        let findings = Findings {
+            rows: (0..30).map(row).collect(),
+            gates: vec![Gate::at_most("depth", error, limit)],
+            ..Findings::default()
+        };
+        let making = Making::here(Scope { quick: true, seed: 1 });
+        Report { suite: "s".into(), command: String::new(), making, elsewhere: BTreeMap::new(), findings }
+    }
+
+    #[test]
+    fn a_slower_method_is_told_and_a_slower_machine_is_not_blamed_on_methods() {
+        let wobble = |n: usize| 1.0 + 0.01 * (n as f64 * 1.7).sin();
+        let old = report(wobble, 0.1, 0.2);
+        let slower_machine = reports(&old, &report(|n| 1.5 * wobble(n + 3), 0.1, 0.2));
+        assert!(slower_machine.contains("1.5") && !slower_machine.contains("SLOWER"), "{slower_machine}");
+        let slower_b =
+            reports(&old, &report(|n| wobble(n + 3) * if (10..20).contains(&n) { 1.3 } else { 1.0 }, 0.1, 0.2));
+        assert!(slower_b.contains("SLOWER") && slower_b.contains("b, tick_p50_us"), "{slower_b}");
+        assert!(slower_b.contains("1 promises in both, 0 with another verdict"));
+    }
+
+    #[test]
+    fn an_error_that_grew_and_a_promise_that_broke_are_told() {
+        let [old, new] = [0.1, 0.3].map(|error| report(|_| 1.0, error, 0.2));
+        let text = reports(&old, &new);
+        assert!(text.contains("LESS ACCURATE") && text.contains("NOW BROKEN: depth"), "{text}");
+        assert!(reports(&new, &old).contains("more accurate"));
+        assert!(!reports(&old, &old).contains("ACCURATE"));
+    }
+
+    #[test]
+    fn names_tell_times_from_errors() {
+        assert_eq!(kind("tick_p50_us"), (true, Better::Less));
+        assert_eq!(kind("time_to_rest_ms"), (true, Better::Less));
+        assert_eq!(kind("lead_p50_ms"), (false, Better::Neither));
+        assert_eq!(kind("frames_per_s"), (true, Better::More));
+        assert_eq!(kind("depth_error_p95_mm"), (false, Better::Less));
+    }
+}

@@ -1,0 +1,142 @@
+//! One suite's file: its parts with commit and machine, and what they found together.
+
+use crate::part::{Part, Scope, Suite};
+use crate::suite::Findings;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// How a part was made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Making {
+    /// Commit of the sources, or `unknown`.
+    pub commit: String,
+    /// The machine, by name.
+    pub machine: BTreeMap<String, String>,
+    /// Whether the run was a quick one.
+    pub quick: bool,
+    /// The run's seed.
+    pub seed: u64,
+}
+
+impl Making {
+    /// Here and now.
+    pub fn here(scope: Scope) -> Self {
+        Self { commit: commit(), machine: machine(), quick: scope.quick, seed: scope.seed }
+    }
+
+    /// The scope it was made in.
+    pub fn scope(&self) -> Scope {
+        Scope { quick: self.quick, seed: self.seed }
+    }
+}
+
+/// The whole file of a suite.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Name of the suite.
+    pub suite: String,
+    /// What makes it again.
+    pub command: String,
+    /// How its first part was made.
+    #[serde(flatten)]
+    pub making: Making,
+    /// Parts made on another machine, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub elsewhere: BTreeMap<String, BTreeMap<String, String>>,
+    /// What was found.
+    #[serde(flatten)]
+    pub findings: Findings,
+}
+
+impl Report {
+    /// Parts put together in the order of the suite, and judged. `None` without any part.
+    pub fn of(suite: &Suite, parts: Vec<(String, Making, Findings)>) -> Option<Self> {
+        let making = parts.first()?.1.clone();
+        let away = parts.iter().filter(|(_, made, _)| made.machine != making.machine);
+        let elsewhere = away.map(|(name, made, _)| (name.clone(), made.machine.clone())).collect();
+        let mut findings = Findings::default();
+        parts.into_iter().for_each(|(_, _, found)| findings.append(found));
+        (suite.judge)(making.scope(), &mut findings);
+        let quick = if making.quick { " --quick" } else { "" };
+        let seed = if making.seed == 1 { String::new() } else { format!(" --seed {}", making.seed) };
+        let command = format!("cargo xtask validate {}{quick}{seed}", suite.name);
+        Some(Self { suite: suite.name.into(), command, making, elsewhere, findings })
+    }
+
+    /// Whether every promise was kept.
+    pub fn passed(&self) -> bool {
+        self.findings.gates.iter().all(|gate| gate.pass)
+    }
+}
+
+/// Names of a suite's parts, as files are named.
+pub fn slugs(suite: &Suite, scope: Scope) -> Vec<String> {
+    (suite.parts)(scope).iter().map(Part::slug).collect()
+}
+
+fn commit() -> String {
+    let out = std::process::Command::new("git").args(["describe", "--always", "--dirty", "--abbrev=12"]).output();
+    let said =
+        out.ok().filter(|out| out.status.success()).map(|out| String::from_utf8_lossy(&out.stdout).trim().to_string());
+    said.unwrap_or_else(|| "unknown".into())
+}
+
+fn machine() -> BTreeMap<String, String> {
+    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let cpu =
+        cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':')).map(|(_, name)| name.trim());
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    [
+        ("cpu", cpu.unwrap_or("unknown").to_string()),
+        ("cores", cores.to_string()),
+        ("system", format!("{} {}", std::env::consts::OS, std::env::consts::ARCH)),
+        ("profile", if cfg!(debug_assertions) { "dev" } else { "release" }.to_string()),
+    ]
+    .map(|(name, value)| (name.to_string(), value))
+    .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::part::nothing_more;
+    use crate::suite::{Gate, Row};
+
+    #[test]
+    fn the_file_has_the_stated_fields_and_comes_back() {
+        let suite = Suite {
+            name: "s",
+            question: "q",
+            chart: ("a_us", "b_mm"),
+            parts: |_| {
+                let make = |_, findings: &mut Findings| {
+                    findings
+                        .rows
+                        .push(Row::new("plane", "thesis").with("points", 466).metric("depth_error_voxel", 0.1));
+                    findings.gates.push(Gate::at_most("depth", 0.1, 0.05));
+                };
+                vec![Part::new("one", make)]
+            },
+            judge: nothing_more,
+        };
+        let scope = Scope { quick: true, seed: 2 };
+        let part = (suite.parts)(scope).remove(0);
+        let parts = vec![(part.slug(), Making::here(scope), part.run(scope).0)];
+        let report = Report::of(&suite, parts).unwrap();
+        assert!(!report.passed() && report.command == "cargo xtask validate s --quick --seed 2");
+        let json = serde_json::to_value(&report).unwrap();
+        for field in [
+            "/suite",
+            "/commit",
+            "/machine/cpu",
+            "/seed",
+            "/rows/0/config/points",
+            "/rows/0/metrics/depth_error_voxel",
+            "/gates/0/op",
+        ] {
+            assert!(json.pointer(field).is_some(), "{field} is missing");
+        }
+        assert_eq!(serde_json::from_value::<Report>(json).unwrap(), report);
+        assert!(Report::of(&suite, Vec::new()).is_none());
+    }
+}

@@ -1,0 +1,203 @@
+//! Parts on disk: a run that was stopped goes on where it was, and shards from many machines become one report.
+//!
+//! # Practice
+//! `OUT/parts/SUITE/PART.json` holds one part; each appears whole or not at all. A run takes up parts of the very same program, scope and seed, and leaves all others; it
+//! deletes its parts when the report is written. Merging takes parts of one commit, scope and seed, whoever made them.
+
+use crate::part::{Scope, Suite};
+use crate::report::{Making, Report};
+use crate::suite::Findings;
+use anyhow::{Context, Result, bail};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+const PARTS: &str = "parts";
+
+/// One part's file.
+#[derive(Serialize, Deserialize)]
+pub struct Stored {
+    /// Hash of the program that made it.
+    program: String,
+    /// What it took, s.
+    pub seconds: f64,
+    /// How it was made.
+    pub making: Making,
+    /// What it found.
+    pub findings: Findings,
+}
+
+/// A folder with parts and reports.
+pub struct Store {
+    folder: PathBuf,
+    program: String,
+    scope: Scope,
+}
+
+impl Store {
+    /// In a folder, which is made if need be.
+    pub fn open(folder: &Path, scope: Scope) -> Result<Self> {
+        fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        let program = fs::read(std::env::current_exe()?).context("cannot read this program")?;
+        let hash = Sha256::digest(&program).iter().fold(String::new(), |mut hash, byte| {
+            _ = write!(hash, "{byte:02x}");
+            hash
+        });
+        Ok(Self { folder: folder.into(), program: hash, scope })
+    }
+
+    fn place(&self, suite: &str, part: &str) -> PathBuf {
+        self.folder.join(PARTS).join(suite).join(format!("{part}.json"))
+    }
+
+    /// A part that this very program made in this scope, if it is there.
+    pub fn found(&self, suite: &str, part: &str) -> Option<Stored> {
+        let stored: Stored = serde_json::from_slice(&fs::read(self.place(suite, part)).ok()?).ok()?;
+        (stored.program == self.program && stored.making.scope() == self.scope).then_some(stored)
+    }
+
+    /// Keeps a part.
+    pub fn keep(&self, suite: &str, part: &str, seconds: f64, findings: Findings) -> Result<()> {
+        let stored = Stored { program: self.program.clone(), seconds, making: Making::here(self.scope), findings };
+        whole(&self.place(suite, part), &serde_json::to_vec(&stored)?)
+    }
+
+    /// Deletes a suite's parts: they are in its report.
+    pub fn forget(&self, suite: &str) {
+        _ = fs::remove_dir_all(self.folder.join(PARTS).join(suite));
+        _ = fs::remove_dir(self.folder.join(PARTS));
+    }
+
+    /// Seconds that parts took last time, by `SUITE/PART`.
+    pub fn durations(&self) -> BTreeMap<String, f64> {
+        let read = fs::read(self.folder.join(durations(self.scope))).ok();
+        read.and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
+    }
+
+    /// Remembers what parts took.
+    pub fn remember(&self, all: &BTreeMap<String, f64>) -> Result<()> {
+        whole(&self.folder.join(durations(self.scope)), &serde_json::to_vec_pretty(all)?)
+    }
+}
+
+fn durations(scope: Scope) -> &'static str {
+    scope.pick("durations-quick.json", "durations.json")
+}
+
+/// All parts of a suite in some folders, in the suite's order, judged as one run. `None` where no folder has any.
+pub fn merged(suite: &Suite, folders: &[PathBuf]) -> Result<Option<Report>> {
+    let mut parts: BTreeMap<String, (PathBuf, Stored)> = BTreeMap::new();
+    for folder in folders {
+        let of_suite = folder.join(PARTS).join(suite.name);
+        for entry in fs::read_dir(&of_suite).into_iter().flatten() {
+            let path = entry?.path();
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let read = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+            let stored = serde_json::from_slice(&read).with_context(|| format!("{} is no part", path.display()))?;
+            if let Some((other, _)) = parts.insert(name, (path.clone(), stored)) {
+                bail!("{} and {} are the same part: leave one out", other.display(), path.display());
+            }
+        }
+    }
+    let Some((first, of_first)) = parts.values().next() else { return Ok(None) };
+    let alike = |m: &Making| (m.commit.clone(), m.quick, m.seed);
+    if let Some((path, other)) = parts.values().find(|(_, part)| alike(&part.making) != alike(&of_first.making)) {
+        let told = |m: &Making| format!("commit {}, quick {}, seed {}", m.commit, m.quick, m.seed);
+        let [one, two] = [&of_first.making, &other.making].map(told);
+        bail!("{} is of {one}, {} of {two}: merge parts of one", first.display(), path.display());
+    }
+    let scope = of_first.making.scope();
+    let wanted = crate::report::slugs(suite, scope);
+    let missing: Vec<&String> = wanted.iter().filter(|name| !parts.contains_key(*name)).collect();
+    if !missing.is_empty() {
+        bail!("{}: {} part(s) are missing, such as {}: run their shard first", suite.name, missing.len(), missing[0]);
+    }
+    let take = |name: &String| parts.remove(name).map(|(_, part)| (name.clone(), part.making, part.findings));
+    Ok(Report::of(suite, wanted.iter().filter_map(take).collect()))
+}
+
+/// A report that a folder holds.
+pub fn report(folder: &Path, suite: &str) -> Result<Option<Report>> {
+    let path = folder.join(format!("{suite}.json"));
+    match fs::read(&path) {
+        Ok(bytes) => {
+            let report = serde_json::from_slice(&bytes);
+            Ok(Some(report.with_context(|| format!("{} is no report of a suite", path.display()))?))
+        }
+        Err(_) => Ok(None),
+    }
+}
+
+/// Writes a file whole or not at all, with the folders above it.
+pub fn whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let mut file = tempfile::NamedTempFile::new_in(folder)?;
+    file.write_all(bytes)?;
+    file.persist(path).with_context(|| format!("cannot write {}", path.display()))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::part::Part;
+    use crate::suite::{Gate, Row};
+
+    fn judge(_: Scope, findings: &mut Findings) {
+        let sum = findings.rows.iter().map(|row| row.metrics["value_mm"]).sum();
+        findings.gates.push(Gate::at_most("sum over all parts, mm", sum, 100.0));
+    }
+
+    fn parts(scope: Scope) -> Vec<Part> {
+        let part = |n: u64| {
+            Part::new(format!("part {n}"), move |scope: Scope, findings: &mut Findings| {
+                let value = scope.random(n).f64();
+                findings.rows.push(Row::new("s", format!("m{n}")).metric("value_mm", value));
+            })
+        };
+        (0..scope.pick(5, 9)).map(part).collect()
+    }
+
+    const SUITE: Suite = Suite { name: "made-up", question: "q", chart: ("a", "b"), parts, judge };
+    const SCOPE: Scope = Scope { quick: true, seed: 1 };
+
+    fn run(folder: &Path, takes: impl Fn(usize) -> bool) {
+        let store = Store::open(folder, SCOPE).unwrap();
+        for (_, part) in parts(SCOPE).into_iter().enumerate().filter(|(number, _)| takes(*number)) {
+            let (slug, found) = (part.slug(), part.run(SCOPE).0);
+            store.keep(SUITE.name, &slug, 0.1, found).unwrap();
+        }
+    }
+
+    #[test]
+    fn two_shards_merged_are_the_file_of_one_run() {
+        let all = tempfile::tempdir().unwrap();
+        let [one, even, odd] = ["one", "even", "odd"].map(|name| all.path().join(name));
+        run(&one, |_| true);
+        run(&even, |n| n % 2 == 0);
+        run(&odd, |n| n % 2 == 1);
+        let file = |folders: &[PathBuf]| serde_json::to_string(&merged(&SUITE, folders).unwrap().unwrap()).unwrap();
+        assert_eq!(file(std::slice::from_ref(&one)), file(&[odd.clone(), even.clone()]));
+        let fault = |folders: &[PathBuf]| merged(&SUITE, folders).unwrap_err().to_string();
+        assert!(fault(std::slice::from_ref(&odd)).contains("missing, such as part-0"));
+        assert!(fault(&[one, odd]).contains("the same part"));
+        assert!(merged(&SUITE, &[all.path().join("none")]).unwrap().is_none());
+    }
+
+    #[test]
+    fn a_stopped_run_is_taken_up_and_another_scope_is_not() {
+        let all = tempfile::tempdir().unwrap();
+        run(all.path(), |n| n < 2);
+        let store = Store::open(all.path(), SCOPE).unwrap();
+        assert!(store.found(SUITE.name, "part-1").is_some() && store.found(SUITE.name, "part-2").is_none());
+        let other = Store::open(all.path(), Scope { seed: 2, ..SCOPE }).unwrap();
+        assert!(other.found(SUITE.name, "part-1").is_none());
+        store.forget(SUITE.name);
+        assert!(store.found(SUITE.name, "part-1").is_none());
+    }
+}
