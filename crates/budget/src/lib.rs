@@ -1,19 +1,20 @@
-//! Picks voxel size, point shell, mesh size and solver step for a scene's tolerance and a machine's time.
+//! Picks method, voxel size, mesh size, solver, region of interest and picture quality for a scene's tolerance and a machine's time.
 //!
 //! # Theory
-//! The cheapest model that meets the tolerance, no more. What each choice costs and how far it is off was measured once and stored ([`Rows`]);
-//! a machine scales the costs ([`Machine`]), a scene scales the errors ([`Scene`]). Among the rows that run in time with headroom the
-//! cheapest one within the tolerance is taken; if none is, the most accurate one that runs, and the plan says so.
+//! The cheapest model that meets the tolerance, no more. What each choice costs and how far it is off was measured in many scenes and stored as laws
+//! in a few features of a scene ([`Rows`], [`Law`]); a machine scales the costs ([`Machine`]), a scene the errors ([`Scene`]). Of the choices that run in time with
+//! headroom the cheapest one whose error stays within the tolerance, by the law's bound, is taken; if none is, the most accurate one that runs, and the plan says so.
 //!
 //! # Practice
-//! Runs once at start, microseconds. Nothing here measures: the machine's numbers are passed in, so a plan is the same for the same numbers.
+//! Runs once at start, microseconds. Nothing here measures: the machine's numbers are passed in, so a plan is the same for the same numbers. Costs are cores, CPU
+//! seconds a second, so that they add up.
 //!
 //! ```
 //! use trepan_budget::{Machine, Scene, plan};
 //!
-//! let laptop = Machine { ns_per_tet_step: 20.0, us_per_rigid_tick: 30.0, threads: 4 };
-//! let plan = plan(&laptop, &Scene::default())?;
-//! assert!(plan.mesh.in_time && plan.rigid.in_time);
+//! let machine = Machine { threads: 8, ..Machine::default() };
+//! let plan = plan(&machine, &Scene::default())?;
+//! assert!(plan.in_time() && plan.cores() < 8.0);
 //! println!("{plan}");
 //! # Ok::<(), trepan_budget::PlanError>(())
 //! ```
@@ -21,14 +22,23 @@
 //! # When not to use it
 //! For a scene outside what the rows were measured on: another tissue geometry, tools thinner than a voxel.
 
+mod choice;
+mod display;
+mod law;
 mod machine;
 mod plan;
 mod rows;
+mod scene;
+mod setup;
 mod step;
 
-pub use machine::{Machine, PlanError, Scene};
-pub use plan::{Choice, Plan, plan, plan_with};
-pub use rows::{MeshRow, RigidRow, Rows};
+pub use choice::{Choice, Neighbour};
+pub use law::{COVERED, FEATURES, Law};
+pub use machine::{Machine, PlanError};
+pub use plan::{Plan, bone_cores, bone_error_n, picture_cores, plan, plan_with, tissue_cores};
+pub use rows::{Kind, Row, Rows, read, write};
+pub use scene::Scene;
+pub use setup::{Bone, Picture, Quality, Setup, Tissue};
 pub use step::{edge_mm, stable_dt_ms};
 
 #[doc = include_str!("../README.md")]

@@ -1,116 +1,216 @@
-//! What each choice costs and how far it is off, measured once.
+//! What each choice costs and how far it is off, measured once: tables in `rows/*.csv`.
 //!
 //! # Practice
-//! The stored rows come from `cargo run -p trepan-budget --example rows`, which measures them anew; rows of a caller's own go to
-//! [`plan_with`](crate::plan_with).
-//!
-//! # Sources
-//! Rigid: a ball of 2 mm pressed 0.3 mm into a knob of bone of radius 4 mm, blurred by 0.6 mm as in a clinical CT, from 200 directions; the error is the
-//! root mean square of depth against the closed form. Mesh: a cube of 1.2 l of brain, fixed at the bottom and pulled sideways by its weight, f64 static reference; the error
-//! is that of the top's displacement against the value extrapolated to infinitely many tetrahedra.
+//! A line is a choice, the law of its error and the law of its cost; the README names the command that measures them anew. Rows of a caller's own go
+//! to [`plan_with`](crate::plan_with).
 
-use crate::Scene;
+use crate::law::FEATURES;
+use crate::{Bone, Law, Picture, PlanError, Tissue};
 
-/// One way to represent bone.
+/// Numbers of a law in a table.
+const LAW: usize = FEATURES + 3;
+
+/// One choice.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RigidRow {
-    /// Name of the method in `trepan_rigid`.
-    pub method: &'static str,
-    /// Edge of a voxel, mm.
-    pub spacing_mm: f64,
-    /// Points on the burr, where the method has points.
-    pub points: usize,
-    /// Root mean square error of the depth, mm.
-    pub depth_error_mm: f64,
-    /// Time of a tick over that of the reference row.
-    pub relative_time: f64,
-}
-
-/// One fineness of tissue.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MeshRow {
-    /// Number of tetrahedra.
-    pub tets: usize,
-    /// Error of the displacement, as a share of it.
-    pub relative_error: f64,
+pub struct Row<T> {
+    /// What is chosen.
+    pub what: T,
+    /// Its error: mm of depth on bone, mm of displacement in tissue, percent of white in the picture.
+    pub error: Law,
+    /// Its time over that of the number in [`Machine`](crate::Machine): a tick, a tetrahedron and step (what sleeps included), a pixel of the full picture.
+    pub cost: Law,
 }
 
 /// All there is to choose from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rows {
     /// Ways to represent bone.
-    pub rigid: Vec<RigidRow>,
+    pub bone: Vec<Row<Bone>>,
     /// Ways to represent tissue.
-    pub mesh: Vec<MeshRow>,
-}
-
-impl MeshRow {
-    /// Error in a scene, mm.
-    pub fn error_in(&self, scene: &Scene) -> f64 {
-        self.relative_error * scene.tissue_motion_mm
-    }
+    pub tissue: Vec<Row<Tissue>>,
+    /// Ways to draw.
+    pub picture: Vec<Row<Picture>>,
 }
 
 impl Rows {
-    /// The rows measured by the example: method, voxel in mm, points, depth error in mm, relative time; tetrahedra, relative error.
-    pub fn stored() -> Self {
-        let rigid = |(method, spacing_mm, points, depth_error_mm, relative_time)| RigidRow {
-            method,
-            spacing_mm,
-            points,
-            depth_error_mm,
-            relative_time,
-        };
-        let mesh = |(tets, relative_error)| MeshRow { tets, relative_error };
-        Self { rigid: RIGID.map(rigid).to_vec(), mesh: MESH.map(mesh).to_vec() }
+    /// The rows that were measured and stored.
+    ///
+    /// # Errors
+    /// When a stored table cannot be read, which its test excludes.
+    pub fn stored() -> Result<Self, PlanError> {
+        Ok(Self {
+            bone: read(include_str!("../rows/bone.csv"))?,
+            tissue: read(include_str!("../rows/tissue.csv"))?,
+            picture: read(include_str!("../rows/picture.csv"))?,
+        })
     }
 }
 
-const RIGID: [(&str, f64, usize, f64, f64); 16] = [
-    ("thesis", 1.5, 466, 0.2608, 0.88),
-    ("thesis", 1.0, 466, 0.2474, 1.09),
-    ("thesis", 0.75, 466, 0.1944, 1.12),
-    ("thesis", 0.5, 211, 0.1334, 0.49),
-    ("thesis", 0.5, 466, 0.129, 1.0),
-    ("thesis", 0.35, 211, 0.0942, 0.52),
-    ("thesis", 0.35, 466, 0.0798, 1.05),
-    ("thesis", 0.25, 211, 0.0798, 0.5),
-    ("thesis", 0.25, 466, 0.0576, 1.01),
-    ("thesis", 0.25, 932, 0.0524, 1.99),
-    ("distance-field", 1.5, 0, 0.0655, 2.03),
-    ("distance-field", 1.0, 0, 0.0329, 2.85),
-    ("distance-field", 0.75, 0, 0.0288, 3.71),
-    ("distance-field", 0.5, 0, 0.0178, 5.62),
-    ("distance-field", 0.35, 0, 0.0086, 8.5),
-    ("distance-field", 0.25, 0, 0.0041, 13.89),
-];
+/// A kind of choice as a table has it.
+pub trait Kind: Copy + Sized {
+    /// Name of the table.
+    const TABLE: &'static str;
+    /// Its first columns.
+    const KEYS: &'static [&'static str];
+    /// The features of its laws.
+    const FEATURES: [&'static str; FEATURES];
 
-const MESH: [(usize, f64); 7] = [
-    (3072, 0.1535),
-    (6000, 0.1246),
-    (10_368, 0.1051),
-    (16_464, 0.0913),
-    (24_576, 0.0812),
-    (34_992, 0.0735),
-    (48_000, 0.0674),
-];
+    /// The choice of the first columns; `None` where they make none.
+    fn read(keys: &[&'static str]) -> Option<Self>;
+
+    /// The first columns of the choice.
+    fn write(&self) -> Vec<String>;
+}
+
+/// Reads a table.
+///
+/// # Errors
+/// Names the table and the line that cannot be read.
+pub fn read<T: Kind>(table: &'static str) -> Result<Vec<Row<T>>, PlanError> {
+    let wrong = |line: usize, fault: String| PlanError::Table { table: T::TABLE, line: line + 1, fault };
+    let mut lines = table.lines().enumerate();
+    match lines.next() {
+        Some((_, head)) if head == header::<T>() => {}
+        _ => return Err(wrong(0, format!("expected the columns {}", header::<T>()))),
+    }
+    let row = |(line, text): (usize, &'static str)| {
+        let fields: Vec<&'static str> = text.split(',').collect();
+        let expected = T::KEYS.len() + 2 * LAW;
+        if fields.len() != expected {
+            return Err(wrong(line, format!("{} fields, expected {expected}", fields.len())));
+        }
+        let (keys, laws) = fields.split_at(T::KEYS.len());
+        let what = T::read(keys).ok_or_else(|| wrong(line, format!("no choice: {}", keys.join(","))))?;
+        let law =
+            |from: &[&str]| law(from).ok_or_else(|| wrong(line, format!("not {LAW} numbers: {}", from.join(","))));
+        Ok(Row { what, error: law(&laws[..LAW])?, cost: law(&laws[LAW..])? })
+    };
+    lines.map(row).collect()
+}
+
+/// The table of rows.
+pub fn write<T: Kind>(rows: &[Row<T>]) -> String {
+    let mut text = header::<T>() + "\n";
+    for row in rows {
+        let laws = [row.error, row.cost].into_iter().flat_map(numbers).map(|n| format!("{n:.4}"));
+        text += &row.what.write().into_iter().chain(laws).collect::<Vec<_>>().join(",");
+        text += "\n";
+    }
+    text
+}
+
+fn header<T: Kind>() -> String {
+    let law = |of: &str| {
+        let [a, b, c] = T::FEATURES;
+        [format!("{of}_1"), format!("{of}_{a}"), format!("{of}_{b}"), format!("{of}_{c}")]
+            .into_iter()
+            .chain([format!("{of}_spread"), format!("{of}_bound")])
+            .collect::<Vec<_>>()
+            .join(",")
+    };
+    format!("{},{},{}", T::KEYS.join(","), law("error"), law("cost"))
+}
+
+fn numbers(law: Law) -> [f64; LAW] {
+    let [a, b, c, d] = law.weights;
+    [a, b, c, d, law.spread, law.bound]
+}
+
+fn law(fields: &[&str]) -> Option<Law> {
+    let numbers: Vec<f64> = fields.iter().map(|field| field.parse().ok()).collect::<Option<_>>()?;
+    let [a, b, c, d, spread, bound] = numbers[..] else { return None };
+    Some(Law { weights: [a, b, c, d], spread, bound })
+}
+
+impl Kind for Bone {
+    const TABLE: &'static str = "bone.csv";
+    const KEYS: &'static [&'static str] = &["method", "spacing_mm", "points"];
+    const FEATURES: [&'static str; FEATURES] = ["radius", "press", "finest"];
+
+    fn read(keys: &[&'static str]) -> Option<Self> {
+        let [method, spacing, points] = keys else { return None };
+        Some(Self { method, spacing_mm: spacing.parse().ok()?, points: points.parse().ok()? })
+    }
+
+    fn write(&self) -> Vec<String> {
+        vec![self.method.into(), self.spacing_mm.to_string(), self.points.to_string()]
+    }
+}
+
+impl Kind for Tissue {
+    const TABLE: &'static str = "tissue.csv";
+    const KEYS: &'static [&'static str] = &["solver", "tets", "still_mm"];
+    const FEATURES: [&'static str; FEATURES] = ["motion", "radius", "volume"];
+
+    fn read(keys: &[&'static str]) -> Option<Self> {
+        let [solver, tets, still] = keys else { return None };
+        Some(Self { solver, tets: tets.parse().ok()?, still_mm: still.parse().ok()? })
+    }
+
+    fn write(&self) -> Vec<String> {
+        vec![self.solver.into(), self.tets.to_string(), self.still_mm.to_string()]
+    }
+}
+
+impl Kind for Picture {
+    const TABLE: &'static str = "picture.csv";
+    const KEYS: &'static [&'static str] = &["rays", "detail"];
+    const FEATURES: [&'static str; FEATURES] = ["pixel", "view", "finest"];
+
+    fn read(keys: &[&'static str]) -> Option<Self> {
+        let [rays, detail] = keys else { return None };
+        let sparse = match *rays {
+            "sparse" => true,
+            "every" => false,
+            _ => return None,
+        };
+        Some(Self { sparse, detail: detail.parse().ok()? })
+    }
+
+    fn write(&self) -> Vec<String> {
+        vec![if self.sparse { "sparse" } else { "every" }.into(), self.detail.to_string()]
+    }
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Quality;
 
-    /// Every stored method exists, finer voxels and meshes are never worse, and the reference row costs 1.
+    /// Every stored method exists, no choice is there twice, and every preset is one of them.
     #[test]
     fn the_stored_rows_hang_together() {
-        let rows = Rows::stored();
-        let reference = |r: &RigidRow| r.method == "thesis" && r.spacing_mm == 0.5 && r.points == 466;
-        assert!(rows.rigid.iter().any(|r| reference(r) && r.relative_time == 1.0));
-        for row in &rows.rigid {
-            assert!(trepan_rigid::Method::named(row.method).is_some(), "{}", row.method);
-            let coarser =
-                |r: &&RigidRow| r.method == row.method && r.points == row.points && r.spacing_mm > row.spacing_mm;
-            assert!(rows.rigid.iter().filter(coarser).all(|r| r.depth_error_mm > row.depth_error_mm));
+        let rows = Rows::stored().unwrap();
+        for row in &rows.bone {
+            assert!(trepan_rigid::Method::named(row.what.method).is_some(), "{}", row.what.method);
         }
-        assert!(rows.mesh.windows(2).all(|w| w[0].tets < w[1].tets && w[0].relative_error > w[1].relative_error));
+        for row in &rows.tissue {
+            let solver = row.what.solver;
+            assert!(solver == "tled" || trepan_soft::Method::named(solver).is_some(), "{solver}");
+        }
+        for setup in Quality::ALL.into_iter().filter_map(Quality::preset) {
+            assert_eq!(rows.bone.iter().filter(|row| row.what == setup.bone).count(), 1, "{}", setup.bone);
+            assert_eq!(rows.tissue.iter().filter(|row| row.what == setup.tissue).count(), 1, "{}", setup.tissue);
+            assert_eq!(rows.picture.iter().filter(|row| row.what == setup.picture).count(), 1, "{}", setup.picture);
+        }
+        assert!(rows.picture.iter().any(|row| row.error.at_most(&[0.0; 3]) == 0.0), "the exact picture is exact");
+    }
+
+    #[test]
+    fn a_table_that_is_written_is_read_again() {
+        let rows = Rows::stored().unwrap();
+        assert_eq!(write(&rows.bone), include_str!("../rows/bone.csv"));
+        assert_eq!(write(&rows.tissue), include_str!("../rows/tissue.csv"));
+        assert_eq!(write(&rows.picture), include_str!("../rows/picture.csv"));
+    }
+
+    #[test]
+    fn a_bad_table_is_refused_by_line() {
+        let told = |table| read::<Picture>(table).unwrap_err().to_string();
+        assert!(told("a,b\n").contains("picture.csv, line 1: expected the columns rays,detail"));
+        let table = |line: &str| &*Box::leak(format!("{}\n{line}\n", header::<Picture>()).into_boxed_str());
+        assert!(told(table("every,1")).contains("line 2: 2 fields, expected 14"));
+        assert!(told(table("few,1,0,0,0,0,0,0,0,0,0,0,0,0")).contains("no choice: few,1"));
+        assert!(told(table("every,1,0,x,0,0,0,0,0,0,0,0,0,0")).contains("not 6 numbers"));
     }
 }

@@ -18,7 +18,12 @@ const CALLS: usize = 400;
 pub fn machine() -> Machine {
     let clock = Clock::start();
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
-    Machine { ns_per_tet_step: ns_per_tet_step(&clock), us_per_rigid_tick: us_per_rigid_tick(&clock), threads }
+    Machine {
+        ns_per_tet_step: ns_per_tet_step(&clock),
+        us_per_rigid_tick: us_per_rigid_tick(&clock),
+        threads,
+        ..Machine::default()
+    }
 }
 
 fn median_us(clock: &Clock, mut call: impl FnMut(usize)) -> f64 {

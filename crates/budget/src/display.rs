@@ -1,0 +1,46 @@
+//! What a plan says: what was taken, why, and what its neighbours would cost.
+
+use crate::{Choice, Plan};
+use core::fmt;
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let scene = &self.scene;
+        if let Some(bone) = &self.bone {
+            part(f, "bone", bone, scene.force_error_n, "N")?;
+        }
+        if let Some(tissue) = &self.tissue {
+            part(f, "tissue", tissue, scene.displacement_mm, "mm")?;
+        }
+        if let Some((step_ms, edge_mm)) = self.step_and_edge() {
+            writeln!(f, "  step {step_ms:.2} ms, edge {edge_mm:.1} mm")?;
+        }
+        part(f, "picture", &self.picture, scene.picture_error_percent, "%")?;
+        let (cores, fixed, threads) = (self.cores(), self.fixed_cores, self.machine.threads);
+        writeln!(f, "all: {cores:.2} cores of {threads}, {fixed:.2} of them whatever is chosen")
+    }
+}
+
+fn part<T: fmt::Display>(
+    f: &mut fmt::Formatter<'_>,
+    name: &str,
+    choice: &Choice<T>,
+    tolerance: f64,
+    unit: &str,
+) -> fmt::Result {
+    let Choice { what, error, cost, .. } = choice;
+    let why = match (choice.in_time, choice.meets_tolerance) {
+        (true, true) => "cheapest within the tolerance",
+        (true, false) => "TOLERANCE NOT MET, the most accurate that runs in time",
+        (false, _) => "TOO SLOW even so, the cheapest there is",
+    };
+    writeln!(f, "{name}: {what}")?;
+    writeln!(f, "  {why}: error {error:.3} {unit} of {tolerance:.3} allowed, {cost:.3} cores")?;
+    for (label, neighbour) in [("next better", &choice.better), ("next cheaper", &choice.cheaper)] {
+        if let Some(n) = neighbour {
+            let late = if n.in_time { "" } else { ", too slow here" };
+            writeln!(f, "  {label}: {}: error {:.3} {unit}, {:.3} cores{late}", n.what, n.error, n.cost)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,137 @@
+//! What can be chosen: a way to represent bone, tissue and picture each, and the presets.
+
+use core::fmt;
+
+/// How bone is represented and touched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bone {
+    /// Name of the method in `trepan_rigid`.
+    pub method: &'static str,
+    /// Edge of a voxel, mm.
+    pub spacing_mm: f64,
+    /// Points on the burr; 0 where the method has none to choose.
+    pub points: usize,
+}
+
+/// How tissue is represented and moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tissue {
+    /// `tled`, or the name of a method in `trepan_soft`.
+    pub solver: &'static str,
+    /// Tetrahedra of the whole brain.
+    pub tets: usize,
+    /// Region of interest: what moves less than this in 50 ms sleeps, mm (`still_mm` of `trepan_tled::Config`). 0 = all of it is stepped.
+    pub still_mm: f64,
+}
+
+/// How the 3-D view is drawn by the processor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picture {
+    /// Whether rays are left out where bone is smooth.
+    pub sparse: bool,
+    /// Share of the pixels along an edge, 0 to 1; the picture is enlarged to its full size.
+    pub detail: f64,
+}
+
+/// All that a session needs to be told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setup {
+    /// Bone.
+    pub bone: Bone,
+    /// Tissue.
+    pub tissue: Tissue,
+    /// Picture.
+    pub picture: Picture,
+}
+
+/// How a setup is come by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// The cheapest that meets the scene's tolerances on this machine: [`plan`](crate::plan).
+    #[default]
+    Auto,
+    /// For slow machines and first looks.
+    Draft,
+    /// What sessions had before there was a plan.
+    Usual,
+    /// For fast machines.
+    Fine,
+}
+
+impl Quality {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Auto, Self::Draft, Self::Usual, Self::Fine];
+
+    /// The setup; `None` for [`Auto`](Self::Auto), which needs a scene and a machine.
+    pub fn preset(self) -> Option<Setup> {
+        let setup = |spacing_mm, tets, still_mm, sparse, detail| Setup {
+            bone: Bone { method: "distance-field", spacing_mm, points: 0 },
+            tissue: Tissue { solver: "tled", tets, still_mm },
+            picture: Picture { sparse, detail },
+        };
+        Some(match self {
+            Self::Auto => return None,
+            Self::Draft => setup(1.5, 5_000, 0.01, true, 0.5),
+            Self::Usual => setup(1.0, 12_000, 0.0, false, 1.0),
+            Self::Fine => setup(0.5, 30_000, 0.0, false, 1.0),
+        })
+    }
+
+    /// Its name on a command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Draft => "draft",
+            Self::Usual => "usual",
+            Self::Fine => "fine",
+        }
+    }
+}
+
+impl fmt::Display for Bone {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} on {} mm voxels", self.method, self.spacing_mm)?;
+        if self.points > 0 { write!(f, " with {} points", self.points) } else { Ok(()) }
+    }
+}
+
+impl fmt::Display for Tissue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} with {} tetrahedra", self.solver, self.tets)?;
+        if self.still_mm > 0.0 { write!(f, ", what moves over {} mm", self.still_mm) } else { Ok(()) }
+    }
+}
+
+impl fmt::Display for Picture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rays = if self.sparse { "sparse rays" } else { "every ray" };
+        if self.detail == 1.0 {
+            f.write_str(rays)
+        } else {
+            write!(f, "{rays} at {} of the pixels along an edge", self.detail)
+        }
+    }
+}
+
+impl fmt::Display for Setup {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}; {}; {}", self.bone, self.tissue, self.picture)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_get_finer_and_auto_has_none() {
+        let [auto, draft, usual, fine] = Quality::ALL.map(Quality::preset);
+        assert_eq!(auto, None);
+        let (draft, usual, fine) = (draft.unwrap(), usual.unwrap(), fine.unwrap());
+        assert!(draft.bone.spacing_mm > usual.bone.spacing_mm && usual.bone.spacing_mm > fine.bone.spacing_mm);
+        assert!(draft.tissue.tets < usual.tissue.tets && usual.tissue.tets < fine.tissue.tets);
+        assert_eq!(usual.to_string(), "distance-field on 1 mm voxels; tled with 12000 tetrahedra; every ray");
+        assert_eq!(draft.tissue.to_string(), "tled with 5000 tetrahedra, what moves over 0.01 mm");
+        assert_eq!(draft.picture.to_string(), "sparse rays at 0.5 of the pixels along an edge");
+    }
+}
