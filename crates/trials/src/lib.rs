@@ -12,11 +12,15 @@
 //! # When not to use it
 //! In an app or a simulator: nothing there may depend on it.
 
+pub mod borders;
 pub mod compare;
+mod conditions;
+pub mod families;
 pub mod front;
 pub mod page;
 pub mod part;
 pub mod picture;
+pub mod plot;
 mod python;
 pub mod report;
 pub mod store;

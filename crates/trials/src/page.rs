@@ -1,81 +1,122 @@
-//! `index.html`: every suite's chart, gates and rows on one page that needs nothing else.
+//! `index.html`: every suite's charts, maps, promises and rows on one page that needs nothing else.
 
+use crate::families;
 use crate::part::Suite;
 use crate::picture::{Chart, Mark, Outcome};
+use crate::plot;
 use crate::report::Report;
-use crate::suite::shown;
-use plotters::coord::CoordTranslate;
-use plotters::drawing::DrawingAreaErrorKind;
-use plotters::prelude::*;
+use crate::suite::{Row, shown};
 use std::fmt::Write;
 
-const SIZE: (u32, u32) = (960, 420);
-/// Width of the list of methods beside a chart.
-const KEY_WIDTH: u32 = 210;
-/// Colours told apart by readers with any colour vision (Okabe and Ito 2008).
-const COLOURS: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 0, 0),
-];
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
 
 /// The whole page.
 pub fn html(reports: &[(&Suite, Report)]) -> String {
-    let mut page = String::from(
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Trepan: validation</title><style>body{font:15px/1.5 system-ui,sans-serif;\
-         max-width:1000px;margin:2em auto;padding:0 1em}table{border-collapse:collapse;font-size:13px}td,th{padding:.15em .6em;border-bottom:1px solid #ccc;\
-         text-align:right}td:first-child,td:nth-child(2),th{text-align:left}svg{max-width:100%;height:auto}.bad{font-weight:bold;background:#fde3d8}.maps{display:flex;flex-wrap:wrap;gap:1em}\
-         figure{margin:0}figcaption{font-size:12px;color:#444;max-width:460px}</style></head><body><h1>Trepan: validation</h1>",
+    let mut page = format!(
+        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Trepan: validation</title><style>{STYLE}</style></head><body>\
+         <h1>Trepan: validation</h1><p class=\"tools\"><label>Show rows and promises with <input id=\"filter\" type=\"search\" placeholder=\"walls distance-field\"></label> \
+         <label><input id=\"broken\" type=\"checkbox\"> broken promises only</label></p>"
     );
+    overview(&mut page, reports);
+    families::table(&mut page, reports);
     for (suite, report) in reports {
-        _ = write!(
-            page,
-            "<h2>{}</h2><p>{}? Commit {}, {}.</p>",
-            suite.name,
-            suite.question,
-            report.making.commit,
-            machine(report)
-        );
+        _ = write!(page, "<section id=\"{0}\"><h2>{0}</h2><p>{1}?</p>", suite.name, text(suite.question));
+        making(&mut page, report);
+        regressions(&mut page, report);
         charts(&mut page, suite, report);
         maps(&mut page, report);
         gates(&mut page, report);
         rows(&mut page, report);
+        page += "</section>";
     }
-    page + "</body></html>\n"
+    page + "<script>" + SCRIPT + "</script></body></html>\n"
 }
 
-fn machine(report: &Report) -> String {
-    report.making.machine.values().cloned().collect::<Vec<_>>().join(", ")
+/// Text as HTML.
+pub fn text(plain: &str) -> String {
+    plain.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+fn overview(page: &mut String, reports: &[(&Suite, Report)]) {
+    *page += "<table><tr><th>suite</th><th>promises</th><th>broken</th><th>rows</th><th>command</th><th>commit</th><th>seed</th></tr>";
+    for (suite, report) in reports {
+        let (gates, making) = (&report.findings.gates, &report.making);
+        let broken = gates.iter().filter(|gate| !gate.pass).count();
+        let class = if broken == 0 { "" } else { " class=\"bad\"" };
+        _ = write!(
+            page,
+            "<tr{class}><td><a href=\"#{0}\">{0}</a></td><td>{1}</td><td>{broken}</td><td>{2}</td><td><code>{3}</code></td><td>{4}</td><td>{5}</td></tr>",
+            suite.name,
+            gates.len(),
+            report.findings.rows.len(),
+            text(&report.command),
+            text(&making.commit),
+            making.seed
+        );
+    }
+    *page += "</table>";
+}
+
+/// What made the numbers below, and where.
+fn making(page: &mut String, report: &Report) {
+    let named = |machine: &std::collections::BTreeMap<String, String>| {
+        text(&machine.iter().map(|(name, value)| format!("{name}: {value}")).collect::<Vec<_>>().join(", "))
+    };
+    let made = &report.making;
+    _ = write!(
+        page,
+        "<p class=\"made\"><code>{}</code> at commit {}, seed {}, on {}. One part alone: <code>{}/PART</code>.</p>",
+        text(&report.command),
+        text(&made.commit),
+        made.seed,
+        named(&made.machine),
+        text(&report.command)
+    );
+    for (part, machine) in &report.elsewhere {
+        _ = write!(page, "<p class=\"made\">Part {} on {}.</p>", text(part), named(machine));
+    }
+}
+
+fn regressions(page: &mut String, report: &Report) {
+    for line in &report.findings.regressions {
+        _ = write!(page, "<p class=\"bad\">{}</p>", text(line));
+    }
 }
 
 fn gates(page: &mut String, report: &Report) {
     *page += "<table><tr><th>promise</th><th>found</th><th>limit</th><th></th></tr>";
     for gate in &report.findings.gates {
-        let (class, word) = if gate.pass { ("", "kept") } else { (" class=\"bad\"", "broken") };
+        let (class, word) = if gate.pass { ("row", "kept") } else { ("row bad", "broken") };
         _ = write!(
             page,
-            "<tr{class}><td>{}</td><td>{}</td><td>{} {}</td><td>{word}</td></tr>",
-            gate.name,
+            "<tr class=\"{class}\"><td>{}</td><td>{}</td><td>{} {}</td><td>{word}</td></tr>",
+            text(&gate.name),
             shown(gate.value),
-            gate.op,
+            text(&gate.op.to_string()),
             gate.limit
         );
     }
     *page += "</table>";
 }
 
+/// Rows with the same metrics stand in one table, each metric with its unit in a column.
 fn rows(page: &mut String, report: &Report) {
-    *page += "<details><summary>All rows</summary><table><tr><th>scene</th><th>method</th><th>metrics</th></tr>";
-    for row in &report.findings.rows {
-        let metrics: Vec<String> =
-            row.metrics.iter().map(|(name, value)| format!("{name} {}", shown(*value))).collect();
-        _ = write!(page, "<tr><td>{}</td><td>{}</td><td>{}</td></tr>", row.scene, row.method, metrics.join("; "));
+    *page += "<details><summary>All rows</summary>";
+    let alike = |a: &Row, b: &Row| a.metrics.keys().eq(b.metrics.keys());
+    for group in report.findings.rows.chunk_by(alike) {
+        *page += "<table><tr><th>scene</th><th>method</th>";
+        group[0].metrics.keys().for_each(|name| _ = write!(page, "<th>{}</th>", text(&name.replace('_', " "))));
+        *page += "<th>set</th><th>part</th></tr>";
+        for row in group {
+            _ = write!(page, "<tr class=\"row\"><td>{}</td><td>{}</td>", text(&row.scene), text(&row.method));
+            row.metrics.values().for_each(|value| _ = write!(page, "<td>{}</td>", shown(*value)));
+            let set: Vec<String> = row.config.iter().map(|(name, value)| format!("{name} {value}")).collect();
+            _ = write!(page, "<td class=\"set\">{}</td><td>{}</td></tr>", text(&set.join("; ")), text(&row.part));
+        }
+        *page += "</table>";
     }
-    *page += "</table></details>";
+    *page += "</details>";
 }
 
 fn charts(page: &mut String, suite: &Suite, report: &Report) {
@@ -89,20 +130,20 @@ fn charts(page: &mut String, suite: &Suite, report: &Report) {
     }
     for chart in &drawn {
         if !chart.title.is_empty() {
-            _ = write!(page, "<h3>{}</h3>", chart.title);
+            _ = write!(page, "<h3>{}</h3>", text(&chart.title));
         }
         let svg = match chart.marks.is_empty() {
             true => Err(format!("no row has {} and {}", chart.cost, chart.error)),
-            false => draw(chart, &methods).map_err(|fault| fault.to_string()),
+            false => plot::svg(chart, &methods).map_err(|fault| fault.to_string()),
         };
-        *page += &svg.unwrap_or_else(|fault| format!("<p>No chart: {fault}.</p>"));
+        *page += &svg.unwrap_or_else(|fault| format!("<p>No chart: {}.</p>", text(&fault)));
     }
 }
 
 /// The suite's own chart, over all rows.
 fn chart_of_all(suite: &Suite, report: &Report) -> Chart {
     let (cost, error) = suite.chart;
-    let of = |row: &crate::suite::Row| {
+    let of = |row: &Row| {
         let value = |name: &str| row.metrics.get(name).copied().filter(|v| v.is_finite() && *v >= 0.0);
         Some(Mark { method: row.method.clone(), cost: value(cost)?, error: value(error)? })
     };
@@ -120,85 +161,13 @@ fn maps(page: &mut String, report: &Report) {
     };
     _ = write!(
         page,
-        "<h3>Where it works, degrades, fails</h3><p>Green: works ({}); yellow: degrades ({}); red: fails ({}); a letter says why.</p>\
+        "<h3>Where it works, degrades, fails</h3><p>Light and empty: works ({}). Yellow: degrades ({}), red: fails ({}), grey: refused ({}); a letter says why.</p>\
          <div class=\"maps\">",
         count(0),
         count(1),
-        count(2)
+        count(2),
+        count(3)
     );
     report.findings.maps.iter().for_each(|map| *page += &map.svg());
     *page += "</div>";
-}
-
-/// Cost against error, both logarithmic, with the front and the budget drawn in.
-fn draw(chart: &Chart, methods: &[&str]) -> Result<String, Box<dyn std::error::Error>> {
-    let at_least = |mark: &Mark| (mark.cost.max(1e-3), mark.error.max(1e-5));
-    let span = |values: &mut dyn Iterator<Item = f64>| {
-        let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
-        0.6 * low..1.8 * high
-    };
-    let budget = chart.budget.as_ref();
-    let mut costs = chart.marks.iter().map(|m| at_least(m).0).chain(budget.map(|b| b.0));
-    let mut errors = chart.marks.iter().map(|m| at_least(m).1);
-    let (x, y) = (span(&mut costs), span(&mut errors));
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        root.fill(&WHITE)?;
-        let (plot, key) = root.split_horizontally(SIZE.0 - KEY_WIDTH);
-        let mut axes = ChartBuilder::on(&plot)
-            .margin(10)
-            .x_label_area_size(40)
-            .y_label_area_size(70)
-            .build_cartesian_2d(x.log_scale(), y.clone().log_scale())?;
-        axes.configure_mesh()
-            .x_desc(&chart.cost)
-            .y_desc(&chart.error)
-            .x_label_formatter(&tick)
-            .y_label_formatter(&tick)
-            .light_line_style(WHITE)
-            .draw()?;
-        let best = chart.front().into_iter().map(|(cost, error)| (cost.max(1e-3), error.max(1e-5)));
-        axes.draw_series(LineSeries::new(best, BLACK.mix(0.4)))?;
-        if let Some((cost, name)) = budget {
-            axes.draw_series(LineSeries::new([(*cost, y.start), (*cost, y.end)], RED.mix(0.6)))?;
-            axes.draw_series([Text::new(name.clone(), (*cost, y.end), ("sans-serif", 12))])?;
-        }
-        let used = methods.iter().enumerate().filter(|(_, name)| chart.marks.iter().any(|m| m.method == **name));
-        for (line, (at, name)) in used.enumerate() {
-            for mark in chart.marks.iter().filter(|mark| mark.method == *name) {
-                sign(axes.plotting_area(), at, at_least(mark))?;
-                if chart.chosen.as_deref() == Some(*name) {
-                    axes.plotting_area().draw(&Circle::new(at_least(mark), 10, BLACK.stroke_width(1)))?;
-                }
-            }
-            let (x, y) = (14, 24 + 18 * line as i32);
-            sign(&key, at, (x, y))?;
-            let star = if chart.chosen.as_deref() == Some(*name) { " (recommended)" } else { "" };
-            key.draw(&Text::new(format!("{name}{star}"), (x + 12, y - 6), ("sans-serif", 13)))?;
-        }
-        root.present()?;
-    }
-    Ok(svg)
-}
-
-/// A number at an axis: three digits, however small.
-fn tick(value: &f64) -> String {
-    let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 7.0);
-    let text = format!("{value:.*}", digits as usize);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
-}
-
-/// A method's sign: seven colours as discs, then as triangles, then as crosses.
-fn sign<B: DrawingBackend, C: CoordTranslate>(
-    area: &DrawingArea<B, C>,
-    at: usize,
-    place: C::From,
-) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-    let colour = COLOURS[at % COLOURS.len()];
-    match at / COLOURS.len() {
-        0 => area.draw(&Circle::new(place, 5, colour.filled())),
-        1 => area.draw(&TriangleMarker::new(place, 7, colour.filled())),
-        _ => area.draw(&Cross::new(place, 5, colour.stroke_width(2))),
-    }
 }

@@ -5,6 +5,7 @@
 //! of cost or a hundred-thousandth of error is drawn there.
 
 use crate::front::front;
+use crate::page::text;
 use crate::suite::number;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
@@ -42,11 +43,17 @@ pub struct Chart {
 impl Chart {
     /// How many other methods' marks are better than this method's first in both; `usize::MAX` where it has none that is a number.
     pub fn beaten(&self, method: &str) -> usize {
+        self.beaten_beyond(method, 0.0)
+    }
+
+    /// The same, counting only marks that are cheaper by more than a share.
+    pub fn beaten_beyond(&self, method: &str, share: f64) -> usize {
         let is_number = |mark: &&Mark| mark.cost.is_finite() && mark.error.is_finite();
         let Some(own) = self.marks.iter().filter(is_number).find(|mark| mark.method == method) else {
             return usize::MAX;
         };
-        let better = |mark: &&Mark| mark.method != method && mark.cost < own.cost && mark.error < own.error;
+        let better =
+            |mark: &&Mark| mark.method != method && mark.cost < own.cost * (1.0 - share) && mark.error < own.error;
         self.marks.iter().filter(is_number).filter(better).count()
     }
 
@@ -180,37 +187,44 @@ impl Map {
     pub fn svg(&self) -> String {
         let reasons = self.reasons();
         let left = 8 + 7 * self.rows.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(4);
-        let top = 36;
+        let widest = self.columns.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+        let slanted = widest > 6;
+        let top = if slanted { 30 + 6 * widest } else { 36 };
         let (width, height) = (left + CELL.0 * self.columns.len() + 8, top + CELL.1 * self.rows.len() + 20);
-        let width = width.max(8 * self.title.len().max(self.x.len() + self.y.len() + 8));
+        let width = (width + if slanted { 4 * widest } else { 0 })
+            .max(8 * self.title.len().max(self.x.len() + self.y.len() + 8));
         let mut svg = format!(
             "<figure><svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
              font-family=\"sans-serif\" font-size=\"11\"><text x=\"2\" y=\"13\" font-weight=\"bold\">{}</text>\
              <text x=\"2\" y=\"{}\" fill=\"#555\">{} ↓, {} →</text>",
-            self.title,
+            text(&self.title),
             height - 4,
-            self.y,
-            self.x
+            text(&self.y),
+            text(&self.x)
         );
         for (at, name) in self.columns.iter().enumerate() {
-            let x = left + CELL.0 * at + CELL.0 / 2;
-            _ = write!(svg, "<text x=\"{x}\" y=\"{}\" text-anchor=\"middle\">{name}</text>", top - 6);
+            let (x, y, name) = (left + CELL.0 * at + CELL.0 / 2, top - 6, text(name));
+            if slanted {
+                _ = write!(svg, "<text transform=\"translate({x},{y}) rotate(-60)\">{name}</text>");
+            } else {
+                _ = write!(svg, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\">{name}</text>");
+            }
         }
         for (at, (name, cells)) in self.rows.iter().zip(&self.cells).enumerate() {
             let y = top + CELL.1 * at;
-            _ = write!(svg, "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{name}</text>", left - 5, y + 14);
+            _ = write!(svg, "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>", left - 5, y + 14, text(name));
             for (column, cell) in cells.iter().enumerate() {
                 draw_cell(&mut svg, (left + CELL.0 * column, y), cell, &reasons);
             }
         }
         self.draw_lines(&mut svg, (left, top));
         svg += "</svg><figcaption>";
-        self.notes.iter().for_each(|note| _ = write!(svg, "{note}<br>"));
+        self.notes.iter().for_each(|note| _ = write!(svg, "{}<br>", text(note)));
         for (at, reason) in reasons.iter().enumerate() {
-            _ = write!(svg, "<b>{}</b> {reason}<br>", letter(at));
+            _ = write!(svg, "<b>{}</b> {}<br>", letter(at), text(reason));
         }
         for (at, (name, _)) in self.lines.iter().enumerate() {
-            _ = write!(svg, "<span style=\"color:{}\">━</span> {name} ", STROKE[at % STROKE.len()]);
+            _ = write!(svg, "<span style=\"color:{}\">━</span> {} ", STROKE[at % STROKE.len()], text(name));
         }
         svg + "</figcaption></figure>"
     }
@@ -252,7 +266,7 @@ fn draw_cell(svg: &mut String, (x, y): (usize, usize), cell: &Outcome, reasons: 
         CELL.0,
         CELL.1,
         FILL[usize::from(cell.grade())],
-        cell.reason(),
+        text(cell.reason()),
         x + CELL.0 / 2,
         y + 14
     );

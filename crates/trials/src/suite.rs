@@ -127,6 +127,9 @@ pub struct Findings {
     pub charts: Vec<Chart>,
     /// Maps for the page.
     pub maps: Vec<StabilityMap>,
+    /// Cells of maps that are worse than the kept border, by name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regressions: Vec<String>,
 }
 
 impl Findings {
@@ -136,6 +139,7 @@ impl Findings {
         self.gates.append(&mut other.gates);
         self.charts.append(&mut other.charts);
         self.maps.append(&mut other.maps);
+        self.regressions.append(&mut other.regressions);
     }
 }
 

@@ -12,7 +12,7 @@ use trepan_trials::report::Report;
 use trepan_trials::store::{self, Store, whole};
 use trepan_trials::suite::shown;
 use trepan_trials::suites::{ALL, ON_REQUEST};
-use trepan_trials::{compare, page};
+use trepan_trials::{borders, compare, families, page};
 
 #[derive(Parser)]
 #[command(name = "cargo xtask validate", about = "Run validation suites", max_term_width = 120)]
@@ -37,6 +37,9 @@ struct Run {
     /// Only every Nth part, from the Ith on, as in 2/8; `cargo xtask merge` puts the shards' folders together
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
+    /// Keep the borders of this run's maps as those that later runs are held against (in the sources)
+    #[arg(long, conflicts_with = "shard")]
+    keep_borders: bool,
     /// Name the parts instead of running them
     #[arg(long)]
     list: bool,
@@ -114,10 +117,12 @@ fn run(asked: &Run) -> Result<bool> {
     for suite in whole_suites {
         let report = store::merged(suite, std::slice::from_ref(&asked.out))?.context("no part was made")?;
         passed &= write(suite, &report, &asked.out)?;
+        if asked.keep_borders && !report.findings.maps.is_empty() {
+            borders::keep(suite.name, &report.findings.maps)?;
+        }
         store.forget(suite.name);
     }
-    paged(&asked.out)?;
-    Ok(passed)
+    Ok(paged(&asked.out)? && passed)
 }
 
 /// The parts that are asked for, and the suites that are asked for as a whole.
@@ -209,8 +214,7 @@ fn merge(folders: &[PathBuf], out: &Path) -> Result<bool> {
     if !any {
         bail!("no parts lie in {folders:?}: give the folders that shards wrote with --out");
     }
-    paged(out)?;
-    Ok(passed)
+    Ok(paged(out)? && passed)
 }
 
 /// A suite's file, and its gates for the eye.
@@ -220,12 +224,13 @@ fn write(suite: &Suite, report: &Report, out: &Path) -> Result<bool> {
         let word = if gate.pass { "kept  " } else { "BROKEN" };
         println!("  {word} {}: {} {} {}", gate.name, shown(gate.value), gate.op, gate.limit);
     }
+    report.findings.regressions.iter().for_each(|line| println!("  {line}"));
     whole(&out.join(format!("{}.json", suite.name)), &serde_json::to_vec_pretty(report)?)?;
     Ok(report.passed())
 }
 
-/// The page of every report that lies in the folder.
-fn paged(out: &Path) -> Result<()> {
+/// The page of every report that lies in the folder; whether every method of every family is in it.
+fn paged(out: &Path) -> Result<bool> {
     let mut reports = Vec::new();
     for suite in ALL.iter().chain(ON_REQUEST) {
         reports.extend(store::report(out, suite.name)?.map(|report| (suite, report)));
@@ -233,5 +238,7 @@ fn paged(out: &Path) -> Result<()> {
     let page = out.join("index.html");
     whole(&page, page::html(&reports).as_bytes())?;
     println!("page: {}", page.display());
-    Ok(())
+    let holes = families::holes(&reports);
+    holes.iter().for_each(|hole| println!("  HOLE {hole}"));
+    Ok(holes.is_empty())
 }

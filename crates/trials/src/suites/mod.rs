@@ -1,6 +1,7 @@
 //! The suites, one file each; one list feeds the command line and the page.
 
 pub mod deformable;
+mod force;
 mod haptics;
 mod mesh;
 mod render;
@@ -12,6 +13,7 @@ mod voxel_size;
 
 use crate::part::nothing_more;
 pub use crate::part::{Part, Scope, Suite};
+pub(crate) use voxel_size::RULES;
 
 /// Suites that fetch programs of others: run when they are named only.
 pub const ON_REQUEST: &[Suite] = &[
@@ -53,6 +55,13 @@ pub const ALL: &[Suite] = &[
         chart: ("step_p50_us", "depth_error_p95_mm"),
         parts: deformable::parts,
         judge: deformable::judge,
+    },
+    Suite {
+        name: "force",
+        question: "what does a force model cost, and does a pressed hand come to rest under the right force",
+        chart: ("call_p50_ns", "force_error_rms_n"),
+        parts: force::parts,
+        judge: nothing_more,
     },
     Suite {
         name: "haptics",

@@ -25,7 +25,9 @@ const TABLE: [[f64; 8]; 5] = [
 ];
 /// Triangle models: bunny, cow, armadillo.
 const MODELS: [&str; 3] = ["stanford-bunny.obj", "spot.obj", "Armadillo_simplified.obj"];
-/// The name of our rule in the rows.
+/// The rules in the rows, ours first.
+pub const RULES: [&str; 6] =
+    [OURS, "expected work alone", "thesis analytic", "thesis, measured prices", "mean edge", "1.45 x mean edge"];
 const OURS: &str = "expected work, then timed";
 /// Sizes of the ladder, the first in mean edges, and the step between them.
 const LADDER: (usize, f64, f64) = (26, 0.3, 1.11);
@@ -76,14 +78,8 @@ fn rules(scene: &Scene, scope: Scope, findings: &mut Findings) {
     let p_nc = share_without_contact(scene, usual);
     let thesis = CostModel::default().analytic(measures).expect("the default model is sound");
     let priced = prices.model(p_nc).and_then(|model| model.analytic(measures)).unwrap_or(thesis);
-    let rules = [
-        (OURS, ours),
-        ("expected work alone", alone),
-        ("thesis analytic", thesis),
-        ("thesis, measured prices", priced),
-        ("mean edge", usual),
-        ("1.45 x mean edge", 1.45 * usual),
-    ];
+    let sizes = [ours, alone, thesis, priced, usual, 1.45 * usual];
+    let rules: [(&str, f64); 6] = std::array::from_fn(|at| (RULES[at], sizes[at]));
     let cells: Vec<f64> = ladder.iter().copied().chain(rules.map(|rule| rule.1)).collect();
     let measured = timing::least(scene, &cells, &mut calibration, scope.pick(16, 64));
     // The size was chosen with the first prices; the times are predicted with those of the moments in which they were measured.

@@ -1,6 +1,8 @@
 //! What breaks a search: slivers, torn and inverted meshes, absurd cells, a large tool, meshes that stand still, leap or run away.
 
-use super::{Scope, is_complete, methods, truth::inside};
+use super::{Scope, is_complete, truth::inside};
+use crate::conditions;
+use crate::picture::Outcome;
 use crate::suite::{Findings, Gate, Row};
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
@@ -108,25 +110,35 @@ struct Record {
     skipped: u64,
 }
 
-/// Every condition, every method.
+/// Every condition, every method, the oracle for fewer steps.
 pub fn run(scope: Scope, findings: &mut Findings) {
-    for condition in &CONDITIONS {
-        let steps = scope.pick(150, 2000);
-        let records: Vec<_> = methods().map(|method| (method, endure(condition, method, steps))).collect();
+    let steps = |method: Method| if method == Method::Brute { 50 } else { scope.pick(150, 2000) };
+    let methods: Vec<(&str, Method)> = Method::all().into_iter().map(|method| (method.name(), method)).collect();
+    let mut all: Vec<(usize, Method, Record)> = Vec::new();
+    let verdict = |at: usize, method: &Method| {
+        let record = endure(&CONDITIONS[at], *method, steps(*method), scope);
+        let outcome = record.outcome();
+        all.push((at, *method, record));
+        outcome
+    };
+    conditions::judge("Broken meshes", &CONDITIONS.map(|condition| condition.name), &methods, verdict, findings);
+    for (at, condition) in CONDITIONS.iter().enumerate() {
+        let records: Vec<_> =
+            all.iter().filter(|(of, ..)| *of == at).map(|(_, method, record)| (*method, record)).collect();
         findings.rows.extend(records.iter().map(|(method, record)| record.row(condition, *method)));
         judge(condition, &records, findings);
     }
 }
 
 /// Random poses near the mesh, three in ten a jump; the mesh is made anew at every step.
-fn endure(condition: &Condition, method: Method, steps: usize) -> Record {
+fn endure(condition: &Condition, method: Method, steps: usize, scope: Scope) -> Record {
     let mut mesh = super::scene::five_split(CELLS, EDGE_MM);
     mesh.positions.iter_mut().for_each(|p| *p = (condition.shape)(*p));
     let config = Config { method, cell_mm: condition.cell_edges.map(|c| c * EDGE_MM), ..Config::default() };
     let tool = Tool::probe(condition.radius_mm);
     let mut collision = TissueCollision::new(&mesh, &tool, &config).expect("the mesh at rest is sound");
     let shell = Pointshell::sphere(condition.radius_mm, config.points, Spread::Fibonacci).points;
-    let (mut random, mut out, mut record) = (fastrand::Rng::with_seed(5), TissueStep::default(), Record::default());
+    let (mut random, mut out, mut record) = (scope.random(5), TissueStep::default(), Record::default());
     let still = vec![Vec3::ZERO; mesh.positions.len()];
     let mut local = Vec3::splat(0.5 * SIZE_MM);
     for step in 0..steps {
@@ -147,7 +159,7 @@ fn truth(mesh: &TetMesh, positions: &[Vec3], shell: &[Vec3], tip: Vec3) -> (u64,
 }
 
 /// All complete methods together.
-fn judge(condition: &Condition, records: &[(Method, Record)], findings: &mut Findings) {
+fn judge(condition: &Condition, records: &[(Method, &Record)], findings: &mut Findings) {
     let mut gate = |what: &str, value: f64, limit: f64| {
         findings.gates.push(Gate::at_most(format!("{}: {what}", condition.name), value, limit));
     };
@@ -170,6 +182,16 @@ impl Record {
         self.overflow += u64::from(out.overflow);
         self.stale += u64::from(out.stale);
         self.skipped += u64::from(out.skipped);
+    }
+
+    fn outcome(&self) -> Outcome {
+        match () {
+            () if self.not_finite > 0 => Outcome::Fails("not a number".into()),
+            () if self.missed_contacts > 0 => Outcome::Fails("misses whole contacts".into()),
+            () if self.missed_points > 0 => Outcome::Degrades("misses points".into()),
+            () if self.invented_points > 0 => Outcome::Degrades("invents points".into()),
+            () => Outcome::Works,
+        }
     }
 
     fn row(&self, condition: &Condition, method: Method) -> Row {

@@ -6,7 +6,9 @@
 
 use super::likeness::similarity;
 use super::scenes::{ISO, frame};
-use super::{By, EXACT, Hits, SPARSE};
+use super::speed::{self, SETTINGS};
+use super::{By, EXACT, Hits, Setting};
+use crate::conditions;
 use crate::picture::{Map, Outcome};
 use crate::suite::{Findings, Gate};
 use glam::{DVec3, Vec3};
@@ -20,13 +22,14 @@ const SIZE: [u32; 2] = [97, 61];
 
 /// The map of bone and that of moved meshes.
 pub fn run(gpu: Option<&Gpu>, findings: &mut Findings) {
-    let bone = bone_map(gpu);
-    let mesh = mesh_map(gpu);
-    for map in [&bone, &mesh] {
-        let failed = map.cells.iter().flatten().filter(|cell| cell.grade() == 2).count();
+    bone_map(gpu, findings);
+    findings.maps.push(mesh_map(gpu));
+    for map in &findings.maps {
+        // Long steps and few pixels are in the map to show where they fail; what pictures are drawn with must not.
+        let used = |column: &str| !column.contains("steps") && !column.contains("no leaping");
+        let failed = map.named_cells().filter(|(_, column, cell)| used(column) && cell.grade() == 2).count();
         findings.gates.push(Gate::at_most(format!("{}: conditions that fail", map.title), failed as f64, 0.0));
     }
-    findings.maps.extend([bone, mesh]);
 }
 
 fn made(edge: [usize; 3], hu: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
@@ -77,35 +80,35 @@ fn conditions() -> Vec<Condition> {
     ]
 }
 
-fn bone_map(gpu: Option<&Gpu>) -> Map {
-    let mut map = Map {
-        title: "bone".into(),
-        x: "who draws".into(),
-        y: "condition".into(),
-        columns: ["leaps", "sparse", "device"]
-            .into_iter()
-            .take(2 + usize::from(gpu.is_some()))
-            .map(String::from)
-            .collect(),
-        ..Map::default()
-    };
-    for (name, bone, frame, size) in conditions() {
-        let mut drawers = By::all(&bone, gpu, size);
-        let mut hits = |by: usize, casting: Casting| {
-            drawers[by].set(&super::Setting { casting, ..EXACT }, size);
-            drawers[by].draw(&frame);
+/// All settings of pictures by whoever knows them, named as in the chart.
+fn bone_map(gpu: Option<&Gpu>, findings: &mut Findings) {
+    let conditions = conditions();
+    let names: Vec<&str> = conditions.iter().map(|(name, ..)| *name).collect();
+    let settings = SETTINGS.iter().map(|setting| (format!("processor: {}", setting.name), (0, *setting)));
+    let on_device = SETTINGS.iter().filter(|setting| gpu.is_some() && speed::known_to_device(setting));
+    let on_device = on_device.map(|setting| (format!("device: {}", setting.name), (1, *setting)));
+    let drawers: Vec<(String, (usize, Setting))> = settings.chain(on_device).collect();
+    let drawers: Vec<(&str, (usize, Setting))> = drawers.iter().map(|(name, by)| (name.as_str(), *by)).collect();
+    let verdict = |at: usize, &(by, setting): &(usize, Setting)| {
+        let (_, bone, frame, size) = &conditions[at];
+        let mut drawers = By::all(bone, gpu, *size);
+        let mut hits = |by: usize, setting: &Setting| {
+            drawers[by].set(setting, *size);
+            drawers[by].draw(frame);
             drawers[by].hits()
         };
-        let truth = hits(0, Casting { leap: false, ..EXACT.casting });
-        let mut cells = vec![
-            judged(&hits(0, EXACT.casting), &truth, 0.01, 1e-3),
-            judged(&hits(0, SPARSE.casting), &truth, 0.25, 0.01),
-        ];
-        cells.extend(gpu.map(|_| judged(&hits(1, EXACT.casting), &truth, 0.01, 1e-3)));
-        map.rows.push(name.into());
-        map.cells.push(cells);
-    }
-    map
+        let walked = Setting { casting: Casting { leap: false, ..EXACT.casting }, ..setting };
+        // Fewer pixels are other rays: their truth has as few.
+        let truth =
+            hits(0, &Setting { casting: Casting { step_voxel: None, sparse: false, ..walked.casting }, ..walked });
+        let (most_mm, share) = match setting.casting {
+            Casting { step_voxel: Some(step), .. } => (step.max(0.25), 0.01),
+            Casting { sparse: true, .. } => (0.25, 0.01),
+            _ => (0.01, 1e-3),
+        };
+        judged(&hits(by, &setting), &truth, most_mm, share)
+    };
+    conditions::judge("bone", &names, &drawers, verdict, findings);
 }
 
 /// Whether hits are those of the truth, but for a share of the rays.

@@ -16,7 +16,7 @@ const fn stepped(name: &'static str, step: f32) -> Setting {
 }
 
 /// The first is what all pictures are drawn with; steps are the processor's alone.
-const SETTINGS: [Setting; 9] = [
+pub(super) const SETTINGS: [Setting; 9] = [
     EXACT,
     SPARSE,
     Setting { name: "exact, no leaping", casting: Casting { leap: false, ..EXACT.casting }, ..EXACT },
@@ -27,6 +27,11 @@ const SETTINGS: [Setting; 9] = [
     Setting { name: "exact, 1/2 of the pixels along an edge", detail: 0.5, ..EXACT },
     Setting { name: "sparse rays, 1/2 of the pixels along an edge", detail: 0.5, ..SPARSE },
 ];
+
+/// Steps and sparse rays are the processor's alone.
+pub(super) fn known_to_device(setting: &Setting) -> bool {
+    setting.casting.step_voxel.is_none() && !setting.casting.sparse
+}
 
 /// Time of a picture whose camera moves, against its difference from the processor's picture with steps of 1/16 voxel.
 pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
@@ -51,7 +56,7 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
     };
     for by in &mut drawers {
         let device = matches!(by, By::Device(_));
-        for setting in SETTINGS.iter().filter(|s| !device || (s.casting.step_voxel.is_none() && !s.casting.sparse)) {
+        for setting in SETTINGS.iter().filter(|setting| !device || known_to_device(setting)) {
             by.set(setting, size);
             by.draw(&aside);
             // Each picture moves the camera, so every ray is cast; the last one is seen from here.

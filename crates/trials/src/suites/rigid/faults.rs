@@ -4,10 +4,10 @@
 //! Each condition is one function: it runs a method and says works, degrades or fails, and why. Nothing finite may ever become infinite, and after
 //! the fault an ordinary press must feel as before.
 
-use super::map_of;
 use super::solid::{ISO, RADIUS_MM, held, voxels};
-use crate::picture::{Map, Outcome};
-use crate::suite::{Findings, Gate, Row};
+use crate::conditions;
+use crate::picture::Outcome;
+use crate::suite::{Findings, Gate};
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidContact, RigidStep};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
@@ -40,44 +40,12 @@ pub const CONDITIONS: [Condition; 13] = [
 
 /// The table of conditions and methods.
 pub fn run(findings: &mut Findings) {
-    let methods = Method::all();
-    let cells: Vec<Vec<Outcome>> =
-        CONDITIONS.iter().map(|(_, condition)| methods.iter().map(condition).collect()).collect();
-    for (column, method) in methods.iter().enumerate() {
-        let graded = |grade: u8| cells.iter().filter(|row| row[column].grade() == grade).count() as f64;
-        let mut row = Row::new("faults", method.name())
-            .metric("works_count", graded(0))
-            .metric("degrades_count", graded(1))
-            .metric("fails_count", graded(2));
-        for ((name, _), outcomes) in CONDITIONS.iter().zip(&cells) {
-            row = row.with(
-                name,
-                format!(
-                    "{} {}",
-                    ["works", "degrades", "fails"][usize::from(outcomes[column].grade())],
-                    outcomes[column].reason()
-                )
-                .trim(),
-            );
-        }
-        findings.rows.push(row);
-        if *method == Method::RECOMMENDED {
-            findings.gates.push(Gate::at_most("faults that the recommended method fails", graded(2), 0.0));
-        }
-    }
-    let columns: Vec<String> = (0..methods.len()).map(|at| char::from(b'A' + at as u8).to_string()).collect();
-    let key = columns.iter().zip(&methods).map(|(letter, method)| format!("{letter} {}", method.name()));
-    let map = Map {
-        title: "Faults".into(),
-        x: "method".into(),
-        y: "fault".into(),
-        notes: vec![key.collect::<Vec<_>>().join(", ")],
-        columns,
-        rows: CONDITIONS.iter().map(|(name, _)| name.to_string()).collect(),
-        cells,
-        lines: vec![],
-    };
-    findings.maps.push(map_of(&Method::RECOMMENDED, map));
+    let methods: Vec<(&str, Method)> = Method::all().into_iter().map(|method| (method.name(), method)).collect();
+    let names = CONDITIONS.map(|(name, _)| name);
+    conditions::judge("Faults", &names, &methods, |at, method| CONDITIONS[at].1(method), findings);
+    let own = findings.rows.iter().find(|row| row.scene == "Faults" && row.method == Method::RECOMMENDED.name());
+    let failed = own.map_or(f64::NAN, |row| row.metrics["fails_count"]);
+    findings.gates.push(Gate::at_most("faults that the recommended method fails", failed, 0.0));
 }
 
 fn degrades(reason: &str) -> Outcome {

@@ -1,0 +1,130 @@
+//! Borders of stability: where each method worked when they were last kept, and what is worse now.
+//!
+//! # Practice
+//! One text file a suite, a character a cell, so that a changed border is a changed line in a review. `validate --keep-borders` writes them from a run; a row, a column or a map that is new is
+//! no regression, one that is gone is not either.
+
+use crate::compare::told;
+use crate::picture::{Map, Outcome};
+use crate::store::whole;
+use crate::suite::{Findings, Gate};
+use anyhow::Result;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+
+/// The signs of works, degrades, fails, refused.
+const SIGNS: [char; 4] = ['.', '~', '#', 'x'];
+const BETWEEN: &str = " | ";
+const COLUMNS: &str = "columns: ";
+
+/// The kept files.
+const KEPT: &[(&str, &str)] = &[];
+
+/// Counts the cells that are worse than they were kept, and names them.
+pub fn judge(suite: &str, findings: &mut Findings) {
+    if let Some((_, text)) = KEPT.iter().find(|(name, _)| *name == suite) {
+        let worse = regressions(text, &findings.maps);
+        findings.gates.push(Gate::at_most(
+            "cells of maps that are worse than the kept border",
+            worse.len() as f64,
+            0.0,
+        ));
+        findings.regressions = worse;
+    }
+}
+
+/// Writes a suite's borders into the sources.
+pub fn keep(suite: &str, maps: &[Map]) -> Result<()> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("borders").join(format!("{suite}.txt"));
+    whole(&file, text(maps).as_bytes())?;
+    println!("kept borders: {}", file.display());
+    Ok(())
+}
+
+/// The file of some maps.
+pub fn text(maps: &[Map]) -> String {
+    let mut text = String::from("Where it works (.), degrades (~), fails (#), is refused (x).\n");
+    for map in maps {
+        _ = write!(text, "\n{}\n{COLUMNS}{}\n", line(&map.title), map.columns.join(BETWEEN));
+        for (row, cells) in map.rows.iter().zip(&map.cells) {
+            let signs: String = cells.iter().map(|cell| SIGNS[usize::from(cell.grade())]).collect();
+            _ = writeln!(text, "{signs} {}", line(row));
+        }
+    }
+    text
+}
+
+fn line(name: &str) -> String {
+    name.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Every cell that is worse than in a kept file, by name.
+fn regressions(kept: &str, maps: &[Map]) -> Vec<String> {
+    let kept = cells(kept);
+    let mut worse = Vec::new();
+    for map in maps {
+        for (row, column, cell) in map.named_cells() {
+            let key = (line(&map.title), line(row), column.to_string());
+            if let Some(was) = kept.get(&key).filter(|was| cell.worse_than(was)) {
+                worse.push(told(map, row, column, was, cell));
+            }
+        }
+    }
+    worse
+}
+
+/// Map, row and column, and what was there.
+fn cells(kept: &str) -> BTreeMap<(String, String, String), Outcome> {
+    let mut cells = BTreeMap::new();
+    for block in kept.split("\n\n").skip(1) {
+        let mut lines = block.lines();
+        let (Some(title), Some(columns)) = (lines.next(), lines.next().and_then(|line| line.strip_prefix(COLUMNS)))
+        else {
+            continue;
+        };
+        let columns: Vec<&str> = columns.split(BETWEEN).collect();
+        for (signs, row) in lines.filter_map(|line| line.split_once(' ')) {
+            for (sign, column) in signs.chars().zip(&columns) {
+                let of = [
+                    Outcome::Works,
+                    Outcome::Degrades(String::new()),
+                    Outcome::Fails(String::new()),
+                    Outcome::Refused(String::new()),
+                ];
+                if let Some(outcome) = SIGNS.iter().position(|known| *known == sign).map(|at| of[at].clone()) {
+                    cells.insert((title.to_string(), row.to_string(), column.to_string()), outcome);
+                }
+            }
+        }
+    }
+    cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(cells: [Outcome; 3]) -> Map {
+        let names = |all: [&str; 3]| all.map(String::from).to_vec();
+        Map {
+            title: "walls".into(),
+            rows: vec!["thin  one".into()],
+            columns: names(["a", "b", "c"]),
+            cells: vec![cells.to_vec()],
+            ..Map::default()
+        }
+    }
+
+    #[test]
+    fn what_is_worse_than_kept_is_named_and_what_is_better_is_not() {
+        let (fails, refused) = (Outcome::Fails("falls through".into()), Outcome::Refused("too thin".into()));
+        let kept = text(&[map([Outcome::Works, fails.clone(), refused.clone()])]);
+        assert!(kept.contains("\n.#x thin one\n"), "{kept}");
+        assert!(regressions(&kept, &[map([Outcome::Works, refused.clone(), refused.clone()])]).is_empty());
+        let worse = regressions(&kept, &[map([refused, Outcome::Works, fails])]);
+        assert_eq!(worse.len(), 2);
+        assert!(worse[0].contains("walls | thin  one | a: works -> refused (too thin)"), "{}", worse[0]);
+        assert!(regressions("", &[map([Outcome::Works, Outcome::Works, Outcome::Works])]).is_empty());
+    }
+}

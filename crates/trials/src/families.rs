@@ -1,0 +1,182 @@
+//! Every method of every family: has it been timed, judged and broken, and does the recommended one stand on its front?
+//!
+//! # Practice
+//! The lists are the crates' own; a method that is added there and not measured here is a hole, and a hole fails a run of all suites.
+
+use crate::page::text;
+use crate::part::Suite;
+use crate::picture::Outcome;
+use crate::report::Report;
+use crate::suite::Row;
+use std::fmt::Write;
+
+/// A family of methods that answer the same question.
+struct Family {
+    name: &'static str,
+    suite: &'static str,
+    methods: fn(&Report) -> Vec<String>,
+    speed: &'static [&'static str],
+    accuracy: &'static [&'static str],
+}
+
+fn names(all: impl IntoIterator<Item = &'static str>) -> Vec<String> {
+    all.into_iter().map(String::from).collect()
+}
+
+const FAMILIES: [Family; 6] = [
+    Family {
+        name: "tool and bone (rigid)",
+        suite: "rigid",
+        methods: |_| names(trepan_rigid::Method::all().iter().map(trepan_rigid::Method::name)),
+        speed: &["tick_p50_us"],
+        accuracy: &["depth_error_p95_voxel"],
+    },
+    Family {
+        name: "tool and moving tissue (deformable)",
+        suite: "deformable",
+        methods: |_| names(trepan_deformable::Method::all().iter().map(|method| method.name())),
+        speed: &["step_p50_us"],
+        accuracy: &["depth_error_p95_mm"],
+    },
+    Family {
+        name: "soft tissue (solver)",
+        suite: "tled",
+        methods: |_| {
+            let rivals = trepan_soft::Method::all();
+            names(["tled", "tled cured"].into_iter().chain(rivals.iter().map(trepan_soft::Method::name)))
+        },
+        speed: &["step_p50_us"],
+        accuracy: &["displacement_error_percent"],
+    },
+    Family {
+        name: "contact force",
+        suite: "force",
+        methods: |report| mapped(report, "Force models"),
+        speed: &["call_p50_ns"],
+        accuracy: &["force_error_rms_n"],
+    },
+    Family {
+        name: "voxel size",
+        suite: "voxel-size",
+        methods: |_| names(crate::suites::RULES),
+        speed: &["cost_us"],
+        accuracy: &["regret_percent"],
+    },
+    Family {
+        name: "picture (render)",
+        suite: "render",
+        methods: |report| mapped(report, "bone"),
+        speed: &["frame_p50_ms"],
+        accuracy: &["image_error_percent"],
+    },
+];
+
+/// The columns of a map: what a machine without a graphics device cannot have is not missed.
+fn mapped(report: &Report, title: &str) -> Vec<String> {
+    report.findings.maps.iter().filter(|map| map.title == title).flat_map(|map| map.columns.clone()).collect()
+}
+
+/// What is known of one method.
+struct Known {
+    speed: Vec<f64>,
+    accuracy: Vec<f64>,
+    /// Cells that work, degrade, fail, are refused.
+    cells: [usize; 4],
+}
+
+impl Known {
+    fn of(report: &Report, family: &Family, method: &str) -> Self {
+        let rows = || report.findings.rows.iter().filter(|row| row.method == method);
+        let metric = |row: &Row, wanted: &[&str]| wanted.iter().find_map(|name| row.metrics.get(*name).copied());
+        let all = |wanted| rows().filter_map(|row| metric(row, wanted)).filter(|v| v.is_finite()).collect();
+        let mut cells = [0; 4];
+        for map in &report.findings.maps {
+            // A map is one method's, or has methods for columns.
+            let whole = map.title.starts_with(&format!("{method}:"));
+            let own = map.named_cells().filter(|(_, column, _)| whole || *column == method);
+            own.for_each(|(.., cell)| cells[usize::from(Outcome::grade(cell))] += 1);
+        }
+        Self { speed: all(family.speed), accuracy: all(family.accuracy), cells }
+    }
+
+    fn lacks(&self) -> Vec<&'static str> {
+        let lacks = [
+            (self.speed.is_empty(), "speed"),
+            (self.accuracy.is_empty(), "accuracy"),
+            (self.cells.iter().sum::<usize>() == 0, "stability"),
+        ];
+        lacks.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect()
+    }
+}
+
+/// Methods that a report says nothing of, each with what is lacking.
+pub fn holes(reports: &[(&Suite, Report)]) -> Vec<String> {
+    let mut holes = Vec::new();
+    for family in &FAMILIES {
+        let Some((_, report)) = reports.iter().find(|(suite, _)| suite.name == family.suite) else { continue };
+        for method in (family.methods)(report) {
+            for what in Known::of(report, family, &method).lacks() {
+                holes.push(format!("{}: {method} has no row of {what}", family.name));
+            }
+        }
+    }
+    holes
+}
+
+/// A table over all families that the page has.
+pub fn table(page: &mut String, reports: &[(&Suite, Report)]) {
+    *page += "<h2>Every method</h2><p>Medians over all scenes in which a method was measured, and cells of the maps. Scenes differ: fronts are in the charts.</p>\
+              <table><tr><th>family</th><th>method</th><th>cost</th><th>error</th><th>works</th><th>degrades</th><th>fails</th><th>refused</th></tr>";
+    for family in &FAMILIES {
+        let Some((_, report)) = reports.iter().find(|(suite, _)| suite.name == family.suite) else { continue };
+        for method in (family.methods)(report) {
+            let known = Known::of(report, family, &method);
+            let class = if known.lacks().is_empty() { "row" } else { "row bad" };
+            let shown = |values: &[f64], name: &str| match median(values) {
+                Some(value) => format!("{} {}", crate::suite::shown(value), unit(name)),
+                None => "none".into(),
+            };
+            _ = write!(
+                page,
+                "<tr class=\"{class}\"><td>{}</td><td>{}</td><td>{}</td><td>{}</td>",
+                text(family.name),
+                text(&method),
+                shown(&known.speed, family.speed[0]),
+                shown(&known.accuracy, family.accuracy[0])
+            );
+            known.cells.iter().for_each(|count| _ = write!(page, "<td>{count}</td>"));
+            *page += "</tr>";
+        }
+    }
+    *page += "</table>";
+}
+
+fn unit(metric: &str) -> &str {
+    metric.rsplit('_').next().unwrap_or_default()
+}
+
+fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::part::Scope;
+    use crate::suites::ALL;
+
+    #[test]
+    fn a_family_that_is_measured_has_no_hole_and_one_that_is_not_has_one_for_each_method() {
+        let suite = ALL.iter().find(|suite| suite.name == "force").unwrap();
+        let scope = Scope { quick: true, seed: 1 };
+        let parts = (suite.parts)(scope);
+        let made = |part: crate::part::Part| (part.slug(), crate::report::Making::here(scope), part.run(scope).0);
+        let mut report = Report::of(suite, parts.into_iter().map(made).collect()).unwrap();
+        assert_eq!(holes(&[(suite, report.clone())]), Vec::<String>::new());
+        report.findings.rows.retain(|row| row.method != "friction");
+        let found = holes(&[(suite, report)]);
+        assert_eq!(found.len(), 2, "{found:?}");
+    }
+}
