@@ -4,6 +4,7 @@
 //! Times are the least of many short passes, in rounds over all sizes, until two halves of the rounds agree: what the machine takes when nothing disturbs it. So the verdict
 //! bears a busy machine; only the number of rounds grows. `TREPAN_DATA` may name a folder with triangle meshes in `meshes-collision` (`stanford-bunny.obj`, `spot.obj`, ...).
 
+mod odd;
 mod pass;
 mod scene;
 mod timing;
@@ -47,7 +48,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
             }
         })
     };
-    bodies(scope).into_iter().map(part).collect()
+    bodies(scope).into_iter().map(part).chain([Part::new("odd scenes", |_, findings| odd::run(findings))]).collect()
 }
 
 fn bodies(scope: Scope) -> Vec<(Body, Option<usize>)> {
@@ -81,7 +82,7 @@ fn rules(scene: &Scene, scope: Scope, findings: &mut Findings) {
     let sizes = [ours, alone, thesis, priced, usual, 1.45 * usual];
     let rules: [(&str, f64); 6] = std::array::from_fn(|at| (RULES[at], sizes[at]));
     let cells: Vec<f64> = ladder.iter().copied().chain(rules.map(|rule| rule.1)).collect();
-    let measured = timing::least(scene, &cells, &mut calibration, scope.pick(16, 64));
+    let measured = timing::least(scene, &cells, &mut calibration, scope.pick(8, 64));
     // The size was chosen with the first prices; the times are predicted with those of the moments in which they were measured.
     let prices = calibration.prices();
     // The best size is chosen on one half of the rounds and every size judged on the other, so that luck does not make it better.

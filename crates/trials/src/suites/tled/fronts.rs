@@ -103,7 +103,9 @@ fn hang(across: usize, truth: Vec3, way_mm: f64, findings: &mut Findings, points
     let (body, tip) = block(across);
     let scene = format!("hanging block, {} tetrahedra", body.mesh.tets.len());
     for (method, mut solver) in solvers(&body, across) {
-        let dt_ms = solver.stable_dt_ms().min(LONGEST_MS);
+        // What solves for rest needs one step.
+        let at_once = method == "reference";
+        let dt_ms = solver.stable_dt_ms().min(if at_once { SETTLE_MS } else { LONGEST_MS });
         let (steps, start) = ((SETTLE_MS / dt_ms).ceil() as usize, Instant::now());
         (0..steps).for_each(|_| _ = solver.step(&gravity(), dt_ms));
         let cost_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -126,7 +128,7 @@ fn solvers(body: &Body, across: usize) -> Vec<(&'static str, Box<dyn SoftSolver>
     if across <= PLAIN_ACROSS {
         solvers.insert(0, ("tled", tled(Config::default())));
     }
-    for method in Method::all().into_iter().filter(|m| across <= RIVALS_ACROSS && m.name() != "reference") {
+    for method in Method::all().into_iter().filter(|_| across <= RIVALS_ACROSS) {
         solvers.push((method.name(), method.build(body).expect("the block is sound")));
     }
     solvers

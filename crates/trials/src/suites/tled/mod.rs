@@ -6,6 +6,7 @@ mod fronts;
 mod locking;
 mod motion;
 mod region;
+mod rivals;
 mod slender;
 mod speed;
 mod stability;
@@ -23,6 +24,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts.extend(slender::parts());
     parts.extend(speed::parts());
     parts.extend(stability::parts());
+    parts.push(Part::new("every solver", |_, findings| rivals::run(findings)));
     parts
 }
 

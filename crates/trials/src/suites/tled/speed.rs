@@ -74,7 +74,7 @@ fn kernels(scope: Scope, findings: &mut Findings) {
                 .metric("cost_over_plain", run.best_us / plain),
         );
     }
-    for (kernel, times) in [("avx512", 4.0), ("avx2", 2.5)] {
+    for (kernel, times) in [("avx512", 3.0), ("avx2", 2.0)] {
         if let Some(best) = best_of(kernel) {
             let name = format!("{scene}, one thread: {kernel} faster than the scalar kernel, times");
             findings.gates.push(Gate::at_least(name, first / best, times));

@@ -53,7 +53,7 @@ pub fn draw(findings: &mut Findings) {
     findings.maps.extend(maps);
 }
 
-fn cube(cells: usize, material: Material) -> Body {
+pub(super) fn cube(cells: usize, material: Material) -> Body {
     let mesh = boxes::split_box([cells; 3], Vec3::splat(40.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
     Body::uniform(mesh, fixed, material)
@@ -64,7 +64,7 @@ fn solver(body: &Body, config: Config) -> Tled {
 }
 
 /// Furthest that a node is from its rest position, mm; not a number where one is nowhere.
-fn offset(solver: &dyn SoftSolver, body: &Body) -> f64 {
+pub(super) fn offset(solver: &dyn SoftSolver, body: &Body) -> f64 {
     let all = solver.positions().iter().zip(&body.mesh.positions).map(|(a, b)| f64::from(a.distance(*b)));
     all.fold(0.0, |most, d| if d.is_nan() || most.is_nan() { f64::NAN } else { most.max(d) })
 }

@@ -1,0 +1,107 @@
+//! Scenes that no rule was made for: what each rule says of them, and whether a grid of that size can be built and is near the best.
+
+use super::{OURS, RULES};
+use crate::conditions;
+use crate::picture::Outcome;
+use crate::suite::{Findings, Gate};
+use trepan_geometry::{Aabb, Vec3};
+use trepan_voxel_size::{CostModel, Expected, Measures, Prices, counts};
+
+/// Prices of a usual machine, µs: ratios decide, and they are much the same on all.
+const PRICES: Prices = Prices { fixed: 0.0, visit: 0.004, doubt: 0.006, test: 0.02 };
+/// The thesis's share of boxes that touch nothing.
+const NO_CONTACT: f64 = 0.99;
+/// Work beyond that of the best size, by which a rule degrades, and fails.
+const DEGRADES: f64 = 1.3;
+const FAILS: f64 = 3.0;
+
+/// Boxes and particles.
+type Scene = (Vec<Aabb>, Vec<Vec3>);
+type Condition = (&'static str, fn() -> Scene);
+
+const CONDITIONS: [Condition; 9] = [
+    ("even elements, a cloud", || (row_of_boxes(12, |_| 1.0), cloud(1500, 12.0))),
+    ("one giant element among small ones", || {
+        (row_of_boxes(12, |n| if n == 0 { 12.0 } else { 1.0 }), cloud(1500, 12.0))
+    }),
+    ("edges graded 1:100", || (row_of_boxes(12, |n| 0.05 * 100f32.powf(n as f32 / 1728.0)), cloud(1500, 12.0))),
+    ("all particles in one place", || (row_of_boxes(12, |_| 1.0), vec![Vec3::splat(6.1); 500])),
+    ("one particle", || (row_of_boxes(12, |_| 1.0), vec![Vec3::splat(6.1)])),
+    ("flat elements", || {
+        let flat = |b: Aabb| Aabb { min: b.min, max: Vec3::new(b.max.x, b.max.y, b.min.z) };
+        (row_of_boxes(12, |_| 1.0).into_iter().map(flat).collect(), cloud(1500, 12.0))
+    }),
+    ("one element", || (vec![Aabb { min: Vec3::ZERO, max: Vec3::ONE }], cloud(500, 2.0))),
+    ("no particles", || (row_of_boxes(10, |_| 1.0), Vec::new())),
+    ("particles that are nowhere", || (row_of_boxes(10, |_| 1.0), vec![Vec3::NAN; 100])),
+];
+
+/// The map of all rules.
+pub fn run(findings: &mut Findings) {
+    let names = CONDITIONS.map(|(name, _)| name);
+    let rules = RULES.map(|rule| (rule, rule));
+    conditions::judge("Odd scenes", &names, &rules, |at, rule| verdict(&CONDITIONS[at].1(), rule), findings);
+    let own = findings.rows.iter().find(|row| row.scene == "Odd scenes" && row.method == OURS);
+    let failed = own.map_or(f64::NAN, |row| row.metrics["fails_count"]);
+    findings.gates.push(Gate::at_most(format!("{OURS}: odd scenes in which it fails"), failed, 0.0));
+}
+
+/// Boxes on a lattice that fills a cube of `edge` mm, each of an edge that its number says.
+fn row_of_boxes(edge: usize, size: impl Fn(usize) -> f32) -> Vec<Aabb> {
+    let place = |n: usize| Vec3::new((n % edge) as f32, (n / edge % edge) as f32, (n / (edge * edge)) as f32);
+    (0..edge.pow(3)).map(|n| Aabb { min: place(n), max: place(n) + size(n) }).collect()
+}
+
+fn cloud(count: usize, edge: f32) -> Vec<Vec3> {
+    let mut random = fastrand::Rng::with_seed(3);
+    (0..count).map(|_| Vec3::new(random.f32(), random.f32(), random.f32()) * edge).collect()
+}
+
+/// Counts of work at the rule's size against the least over a ladder of sizes.
+fn verdict((boxes, particles): &Scene, rule: &str) -> Outcome {
+    let edges = boxes.iter().map(|b| f64::from(b.size().max_element())).sum::<f64>() / boxes.len() as f64;
+    let reach = 20.0 * edges;
+    let size = match rule {
+        OURS | "expected work alone" => {
+            match Expected::of(boxes, particles, reach).and_then(|e| e.best(&PRICES, 0.05 * edges)) {
+                Ok(size) => size,
+                Err(fault) => return Outcome::Refused(fault.to_string()),
+            }
+        }
+        "mean edge" => edges,
+        "1.45 x mean edge" => 1.45 * edges,
+        _ => {
+            let model = if rule == "thesis analytic" { Ok(CostModel::default()) } else { PRICES.model(NO_CONTACT) };
+            let all = Measures {
+                elements: boxes.len(),
+                longest_edge_mm: edges,
+                mean_edge_mm: edges,
+                facet_mm2: 0.5 * edges * edges,
+            };
+            let size = all.checked().and_then(|m| model.and_then(|model| model.analytic(&m)));
+            match size {
+                Ok(size) => size,
+                Err(fault) => return Outcome::Refused(fault.to_string()),
+            }
+        }
+    };
+    judged(boxes, particles, size, edges)
+}
+
+fn judged(boxes: &[Aabb], particles: &[Vec3], size: f64, edges: f64) -> Outcome {
+    let at = |size: f64| match counts::grid(boxes, particles, size) {
+        Ok(found) => Ok(PRICES.visit * found.visits as f64 + PRICES.test * found.tests as f64),
+        Err(fault) => Err(fault.to_string()),
+    };
+    let own = match at(size) {
+        Ok(work) => work,
+        Err(fault) => return Outcome::Refused(fault),
+    };
+    let best = (0..18).filter_map(|n| at(0.3 * edges * 1.3f64.powi(n)).ok()).fold(f64::INFINITY, f64::min);
+    match own / best {
+        _ if !size.is_finite() => Outcome::Fails("not a number".into()),
+        ratio if ratio <= DEGRADES || best == 0.0 => Outcome::Works,
+        ratio if ratio <= FAILS => Outcome::Degrades("up to three times the work of the best size".into()),
+        _ => Outcome::Fails("over three times the work of the best size".into()),
+    }
+}
