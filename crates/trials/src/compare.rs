@@ -132,6 +132,10 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
             100.0 * spread
         );
     }
+    let control = |rows: &[Row]| rows.iter().find_map(|row| row.metrics.get("sum_p50_us").copied());
+    if let (Some(old), Some(new)) = (control(old), control(new)) {
+        _ = writeln!(text, "  the machine's own control: new over old {:.3}", new / old);
+    }
     let mut told: BTreeMap<&str, Vec<Change>> = BTreeMap::new();
     let mut same = 0;
     for ((method, metric), all) in ratios {

@@ -6,7 +6,8 @@
 
 use crate::part::{Scope, Suite};
 use crate::report::{Making, Report};
-use crate::suite::Findings;
+use crate::suite::{Findings, Row};
+use crate::timer::{Control, Samples};
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -25,6 +26,8 @@ pub struct Stored {
     program: String,
     /// What it took, s.
     pub seconds: f64,
+    /// What the machine itself took before and after, the worse of both.
+    control: Control,
     /// How it was made.
     pub making: Making,
     /// What it found.
@@ -61,8 +64,9 @@ impl Store {
     }
 
     /// Keeps a part.
-    pub fn keep(&self, suite: &str, part: &str, seconds: f64, findings: Findings) -> Result<()> {
-        let stored = Stored { program: self.program.clone(), seconds, making: Making::here(self.scope), findings };
+    pub fn keep(&self, suite: &str, part: &str, (seconds, control): (f64, Control), findings: Findings) -> Result<()> {
+        let making = Making::here(self.scope);
+        let stored = Stored { program: self.program.clone(), seconds, control, making, findings };
         whole(&self.place(suite, part), &serde_json::to_vec(&stored)?)
     }
 
@@ -116,8 +120,22 @@ pub fn merged(suite: &Suite, folders: &[PathBuf]) -> Result<Option<Report>> {
     if !missing.is_empty() {
         bail!("{}: {} part(s) are missing, such as {}: run their shard first", suite.name, missing.len(), missing[0]);
     }
+    let controls: Vec<Control> = parts.values().map(|(_, part)| part.control).collect();
     let take = |name: &String| parts.remove(name).map(|(_, part)| (name.clone(), part.making, part.findings));
-    Ok(Report::of(suite, wanted.iter().filter_map(take).collect()))
+    let mut report = Report::of(suite, wanted.iter().filter_map(take).collect());
+    report.iter_mut().for_each(|report| report.findings.rows.push(control(&controls)));
+    Ok(report)
+}
+
+/// The machine's own times while the parts were made: medians over the parts, and the worst.
+fn control(all: &[Control]) -> Row {
+    let sorted = |of: fn(&Control) -> f64| Samples::from(all.iter().map(of).collect::<Vec<f64>>());
+    let (middle, slow) = (sorted(|c| c.sum_p50_us), sorted(|c| c.sum_p99_us));
+    Row::new("control of the machine beside every part", "an empty call, a fixed sum")
+        .metric("empty_p99_us", sorted(|c| c.empty_p99_us).quantile(0.5))
+        .metric("sum_p50_us", middle.quantile(0.5))
+        .metric("sum_p99_us", slow.quantile(0.5))
+        .metric("sum_p50_spread_percent", 100.0 * (middle.quantile(0.9) / middle.quantile(0.1) - 1.0))
 }
 
 /// A report that a folder holds.
@@ -170,7 +188,7 @@ mod tests {
         let store = Store::open(folder, SCOPE).unwrap();
         for (_, part) in parts(SCOPE).into_iter().enumerate().filter(|(number, _)| takes(*number)) {
             let (slug, found) = (part.slug(), part.run(SCOPE).0);
-            store.keep(SUITE.name, &slug, 0.1, found).unwrap();
+            store.keep(SUITE.name, &slug, (0.1, Control::default()), found).unwrap();
         }
     }
 

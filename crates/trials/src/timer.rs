@@ -1,6 +1,18 @@
-//! Timing: repeats of one call, and quantiles of their times.
+//! Timing: repeats in turn, quantiles and their spread, ratios with their confidence, and a control that says what the machine itself took.
+//!
+//! # Practice
+//! Contenders are timed in turn, so that a slow moment of the machine meets all of them. A ratio of medians comes with the 95 % interval of the bootstrap. The control is made beside every part: an
+//! empty timed call, and a fixed sum; what they wander is what a time of that run cannot tell apart.
 
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
+
+/// Draws of the bootstrap.
+const DRAWS: usize = 400;
+/// Calls of the control.
+const CALLS: usize = 300;
+/// Numbers that the control adds up: some 10 µs.
+const SUM: u32 = 20_000;
 
 /// Sorted times, µs.
 #[derive(Clone, Debug, Default)]
@@ -17,10 +29,39 @@ impl Samples {
         Self::from((0..count).map(time).collect::<Vec<f64>>())
     }
 
+    /// Times `rounds` calls of each contender, one after the other in every round.
+    pub fn in_turn<C>(rounds: usize, contenders: &mut [C], mut call: impl FnMut(&mut C, usize)) -> Vec<Self> {
+        let mut times = vec![Vec::with_capacity(rounds); contenders.len()];
+        for round in 0..rounds {
+            for (contender, times) in contenders.iter_mut().zip(&mut times) {
+                let start = Instant::now();
+                call(contender, round);
+                times.push(start.elapsed().as_secs_f64() * 1e6);
+            }
+        }
+        times.into_iter().map(Self::from).collect()
+    }
+
     /// A quantile, 0 to 1, µs; NaN without samples.
     pub fn quantile(&self, share: f64) -> f64 {
         let last = self.0.len().saturating_sub(1);
         self.0.get((share * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
+    }
+
+    /// From the first to the third quarter, as a share of the median.
+    pub fn spread(&self) -> f64 {
+        (self.quantile(0.75) - self.quantile(0.25)) / self.quantile(0.5)
+    }
+
+    /// This median over another's: low end, value, high end of the 95 % interval.
+    pub fn over(&self, other: &Self) -> [f64; 3] {
+        let mut random = fastrand::Rng::with_seed(1);
+        let mut drawn = |samples: &Self| {
+            let all = (0..samples.0.len()).map(|_| samples.0[random.usize(..samples.0.len())]);
+            Self::from(all.collect::<Vec<f64>>()).quantile(0.5)
+        };
+        let ratios = Self::from((0..DRAWS).map(|_| drawn(self) / drawn(other)).collect::<Vec<f64>>());
+        [ratios.quantile(0.025), self.quantile(0.5) / other.quantile(0.5), ratios.quantile(0.975)]
     }
 }
 
@@ -29,6 +70,38 @@ impl From<Vec<f64>> for Samples {
     fn from(mut times: Vec<f64>) -> Self {
         times.sort_by(f64::total_cmp);
         Self(times)
+    }
+}
+
+/// What the machine took for nothing and for a fixed sum, µs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Control {
+    /// An empty timed call, in the slowest hundredth.
+    pub empty_p99_us: f64,
+    /// The fixed sum, in the middle.
+    pub sum_p50_us: f64,
+    /// The fixed sum, in the slowest hundredth.
+    pub sum_p99_us: f64,
+}
+
+impl Control {
+    /// The slower of two in each.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            empty_p99_us: self.empty_p99_us.max(other.empty_p99_us),
+            sum_p50_us: self.sum_p50_us.max(other.sum_p50_us),
+            sum_p99_us: self.sum_p99_us.max(other.sum_p99_us),
+        }
+    }
+
+    /// Measured now, in some 5 ms.
+    pub fn now() -> Self {
+        let empty = Samples::of(CALLS, |_| {});
+        let sum = Samples::of(CALLS, |call| {
+            let all = (0..SUM).fold(call as u32, |sum, n| std::hint::black_box(sum.wrapping_mul(31).wrapping_add(n)));
+            std::hint::black_box(all);
+        });
+        Self { empty_p99_us: empty.quantile(0.99), sum_p50_us: sum.quantile(0.5), sum_p99_us: sum.quantile(0.99) }
     }
 }
 
@@ -43,5 +116,21 @@ mod tests {
         });
         assert!(samples.quantile(0.0) <= samples.quantile(0.5) && samples.quantile(0.5) <= samples.quantile(1.0));
         assert!(Samples::default().quantile(0.5).is_nan());
+    }
+
+    #[test]
+    fn a_ratio_lies_in_its_interval_and_contenders_take_turns() {
+        let mut order = Vec::new();
+        let timed = Samples::in_turn(3, &mut ['a', 'b'], |name, round| order.push((*name, round)));
+        assert_eq!(order, [('a', 0), ('b', 0), ('a', 1), ('b', 1), ('a', 2), ('b', 2)]);
+        assert_eq!(timed.len(), 2);
+        let samples =
+            |scale: f64| Samples::from((0..40).map(|n| scale * (10.0 + f64::from(n % 7))).collect::<Vec<_>>());
+        let [low, ratio, high] = samples(2.0).over(&samples(1.0));
+        assert!(
+            low <= ratio && ratio <= high && (ratio - 2.0).abs() < 1e-12 && high / low < 1.5,
+            "{low} {ratio} {high}"
+        );
+        assert!((samples(1.0).spread() - samples(3.0).spread()).abs() < 1e-12);
     }
 }

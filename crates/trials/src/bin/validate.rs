@@ -12,6 +12,7 @@ use trepan_trials::report::Report;
 use trepan_trials::store::{self, Store, whole};
 use trepan_trials::suite::shown;
 use trepan_trials::suites::{ALL, ON_REQUEST};
+use trepan_trials::timer::Control;
 use trepan_trials::{borders, compare, families, page};
 
 #[derive(Parser)]
@@ -175,14 +176,14 @@ fn perform(jobs: Vec<Job>, store: &Store, scope: Scope) -> Result<bool> {
             say(&bar, &format!("{key}: there already"));
             passed &= stored.findings.gates.iter().all(|gate| gate.pass);
         } else {
-            let began = Instant::now();
+            let (before, began) = (Control::now(), Instant::now());
             let (findings, ended) = part.run(scope);
             let seconds = began.elapsed().as_secs_f64();
             let broken = findings.gates.iter().filter(|gate| !gate.pass).count();
             let word = if broken == 0 { String::new() } else { format!(", {broken} promise(s) BROKEN") };
             say(&bar, &format!("{key}: {seconds:.1} s{word}"));
             passed &= broken == 0;
-            store.keep(suite.name, &slug, seconds, findings)?;
+            store.keep(suite.name, &slug, (seconds, before.or(Control::now())), findings)?;
             if ended {
                 durations.insert(key, seconds);
                 store.remember(&durations)?;

@@ -16,7 +16,6 @@ use crate::conditions;
 use crate::picture::{Chart, Mark, Outcome};
 use crate::suite::{Findings, Gate, Row};
 use crate::timer::Samples;
-use std::time::Instant;
 use trepan_contact::{
     Contact, ContactManifold, ForceGuard, ForceModel, ForceShading, Friction, GodObject, GuardConfig, Hooke, Plane,
     Vibration, Viscoelastic,
@@ -69,7 +68,8 @@ pub fn parts(_: Scope) -> Vec<Part> {
 fn press(scope: Scope, findings: &mut Findings) {
     let mut marks = Vec::new();
     let calls = calls(scope.pick(200, 2000));
-    for ((name, model), ns) in models().into_iter().zip(calls) {
+    for ((name, model), ns) in models().into_iter().zip(&calls) {
+        let [low, ratio, high] = ns.over(&calls[0]);
         let (mut worst, mut cycle_mm) = (0.0f64, 0.0f32);
         for stiffness in [0.5f32, 1.0, 2.0] {
             let found = hold(&model, stiffness, 1, None);
@@ -80,6 +80,10 @@ fn press(scope: Scope, findings: &mut Findings) {
             Row::new("pressed wall of 0.5 to 2 N/mm, a tick late", name)
                 .metric("call_p50_ns", ns.quantile(0.5))
                 .metric("call_p99_ns", ns.quantile(0.99))
+                .metric("call_spread_percent", 100.0 * ns.spread())
+                .metric("times_the_thesis", ratio)
+                .metric("times_the_thesis_low", low)
+                .metric("times_the_thesis_high", high)
                 .metric("force_error_rms_n", worst)
                 .metric("limit_cycle_mm", cycle_mm.into()),
         );
@@ -98,23 +102,19 @@ fn press(scope: Scope, findings: &mut Findings) {
     findings.charts.push(chart);
 }
 
+/// Calls that are timed together: a time of theirs in µs is one call's in ns.
+const CALLS: usize = 1000;
+
 /// Times of a call, ns, of all models in turn.
 fn calls(rounds: usize) -> Vec<Samples> {
-    const CALLS: usize = 1000;
     let mut models: Vec<Box<dyn ForceModel>> = models().iter().map(|(_, model)| (model.make)(1.0)).collect();
-    let mut times = vec![Vec::new(); models.len()];
-    for _ in 0..rounds {
-        for (model, times) in models.iter_mut().zip(&mut times) {
-            let start = Instant::now();
-            for call in 0..CALLS {
-                let depth_mm = 0.001 * call as f32;
-                let touch = ContactManifold::single(Contact { point: Vec3::ZERO, normal: Vec3::X, depth_mm });
-                std::hint::black_box(model.wrench(&at(-depth_mm), &touch, 1.0));
-            }
-            times.push(start.elapsed().as_secs_f64() * 1e9 / CALLS as f64);
+    Samples::in_turn(rounds, &mut models, |model, _| {
+        for call in 0..CALLS {
+            let depth_mm = 0.001 * call as f32;
+            let touch = ContactManifold::single(Contact { point: Vec3::ZERO, normal: Vec3::X, depth_mm });
+            std::hint::black_box(model.wrench(&at(-depth_mm), &touch, 1.0));
         }
-    }
-    times.into_iter().map(Samples::from).collect()
+    })
 }
 
 /// What a hand found that pressed.

@@ -20,7 +20,7 @@ pub fn mri(scope: Scope, findings: &mut Findings) {
     let still = image(&case_head().mri);
     let (low, high) = still.world_corners();
     let middle = 0.5 * (low + high);
-    let mut random = fastrand::Rng::with_seed(7);
+    let mut random = scope.random(7);
     let (mut mm, mut degrees, mut seconds) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..trials {
         let known = random_move(middle, &mut random);
@@ -84,7 +84,7 @@ pub fn ct(scope: Scope, findings: &mut Findings) {
     let resampled = image(&pair.join("mri_t1_registered_to_ct.nii.gz"));
     let trials = scope.pick(2, 60);
     for (scene, still) in [("CT and MRI as delivered", moved_back), ("CT and MRI with padding", resampled)] {
-        let tally = Tally::of(&ct, &still, trials);
+        let tally = Tally::of(&ct, &still, trials, scope);
         findings.gates.push(Gate::at_most(
             format!("{scene}: accepted and off by over 3 mm or 3 degrees"),
             tally.wrong,
@@ -100,7 +100,7 @@ pub fn ct(scope: Scope, findings: &mut Findings) {
     }
     let other = image(&case_head().mri);
     let trials = scope.pick(1, 20);
-    let tally = Tally::of(&ct, &other, trials);
+    let tally = Tally::of(&ct, &other, trials, scope);
     findings.gates.push(Gate::at_least("moves of another patient's MRI refused", tally.refused, trials as f64));
     findings.rows.push(tally.row("CT and another patient's MRI", trials));
 }
@@ -129,10 +129,10 @@ struct Tally {
 }
 
 impl Tally {
-    fn of(ct: &VoxelVolume<f32>, still: &VoxelVolume<f32>, trials: usize) -> Self {
+    fn of(ct: &VoxelVolume<f32>, still: &VoxelVolume<f32>, trials: usize, scope: Scope) -> Self {
         let (low, high) = ct.world_corners();
         let middle = 0.5 * (low + high);
-        let mut random = fastrand::Rng::with_seed(11);
+        let mut random = scope.random(11);
         let mut tally = Self { least_confidence: 1.0, ..Self::default() };
         for _ in 0..trials {
             let known = random_move(middle, &mut random);
