@@ -21,6 +21,27 @@ impl Image {
         if inside { [0, 1, 2, 3].map(|c| self.rgba[at + c]) } else { [0; 4] }
     }
 
+    /// The same picture with more pixels, bilinear between the centres of these; itself where it has the size.
+    pub fn enlarged(&self, [width, height]: [u32; 2]) -> Self {
+        if (self.width, self.height) == (width, height) {
+            return self.clone();
+        }
+        let [columns, rows] = [(self.width, width), (self.height, height)].map(|(from, to)| between(from, to));
+        let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
+        for &(y, below) in &rows {
+            for &(x, right) in &columns {
+                let corner = |i, j| self.pixel((x + i).min(self.width - 1), (y + j).min(self.height - 1)).map(f32::from);
+                let (a, b, c, d) = (corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1));
+                let mix = |k: usize| {
+                    let (upper, lower) = (a[k] + right * (b[k] - a[k]), c[k] + right * (d[k] - c[k]));
+                    (upper + below * (lower - upper)).round() as u8
+                };
+                rgba.extend([0, 1, 2, 3].map(mix));
+            }
+        }
+        Self { width, height, rgba }
+    }
+
     /// The bytes of a PNG file.
     pub fn png(&self) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
@@ -40,9 +61,28 @@ impl Image {
     }
 }
 
+/// For each of `to` pixels in a row the pixel of `from` at or before its centre, and how far it lies towards the next.
+fn between(from: u32, to: u32) -> Vec<(u32, f32)> {
+    let share = from as f32 / to.max(1) as f32;
+    let at = |n: u32| ((n as f32 + 0.5) * share - 0.5).clamp(0.0, from.saturating_sub(1) as f32);
+    (0..to).map(at).map(|at| (at as u32, at.fract())).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_enlarged_ramp_is_a_finer_ramp() {
+        let ramp = |n: u32| Image { width: n, height: 2, rgba: (0..2 * n).flat_map(|i| [(i % n * 240 / n) as u8; 4]).collect() };
+        let large = ramp(8).enlarged([32, 6]);
+        assert_eq!((large.width, large.height, large.rgba.len()), (32, 6, 32 * 6 * 4));
+        for x in 2..30 {
+            let expected = ((x as f32 + 0.5) / 4.0 - 0.5) * 30.0;
+            assert!((f32::from(large.pixel(x, 3)[1]) - expected).abs() <= 0.51, "{x}: {:?}", large.pixel(x, 3));
+        }
+        assert_eq!(ramp(8).enlarged([8, 2]), ramp(8));
+    }
 
     #[test]
     fn a_written_picture_reads_back() {

@@ -24,6 +24,27 @@ pub struct Painter {
     by: By,
     kept: Kept,
     notice: Option<String>,
+    quality: Quality,
+}
+
+/// How much of a picture is drawn.
+#[derive(Clone, Copy, Debug)]
+struct Quality {
+    sparse: bool,
+    detail: f32,
+    /// Size of the pictures that are given, pixels.
+    size: [u32; 2],
+}
+
+impl Quality {
+    fn full(size: [u32; 2]) -> Self {
+        Self { sparse: false, detail: 1.0, size }
+    }
+
+    /// Size of what the processor draws.
+    fn drawn(&self) -> [u32; 2] {
+        self.size.map(|n| ((n as f32 * self.detail).round() as u32).clamp(n.min(1), n))
+    }
 }
 
 #[derive(Debug)]
@@ -59,12 +80,38 @@ impl Painter {
     pub fn on(device: Result<Gpu, GpuError>, data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
         let kept = Kept::of(data)?;
         let why = match device.map_err(RenderError::from).and_then(|gpu| Renderer::new(&gpu, data, size)) {
-            Ok(renderer) => return Ok(Self { by: By::Device(Box::new(renderer)), kept, notice: None }),
+            Ok(renderer) => {
+                let (by, quality) = (By::Device(Box::new(renderer)), Quality::full(size));
+                return Ok(Self { by, kept, notice: None, quality });
+            }
             Err(RenderError::Gpu(why)) => why,
             Err(other) => return Err(other),
         };
+        Ok(Self { notice: Some(format!("{why}; the processor draws")), ..Self::processor(kept, size)? })
+    }
+
+    /// Loads a scene for pictures by the processor, whatever devices there are.
+    pub fn by_processor(data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
+        Self::processor(Kept::of(data)?, size)
+    }
+
+    fn processor(kept: Kept, size: [u32; 2]) -> Result<Self, RenderError> {
         let processor = ProcessorRenderer::with(kept.clone(), size)?;
-        Ok(Self { by: By::Processor(Box::new(processor)), kept, notice: Some(format!("{why}; the processor draws")) })
+        Ok(Self { by: By::Processor(Box::new(processor)), kept, notice: None, quality: Quality::full(size) })
+    }
+
+    /// Draws only a share of the pixels along an edge, from [`LEAST_DETAIL`] to 1, and enlarges them to the size that was asked for; `sparse`: the processor casts every second ray where bone
+    /// is smooth. For pictures as they were opened; an area that changes is [`fit`](Self::fit).
+    pub fn set_quality(&mut self, sparse: bool, detail: f32) -> Result<(), RenderError> {
+        let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
+        self.quality = Quality { sparse, detail, ..self.quality };
+        match &mut self.by {
+            By::Device(renderer) => renderer.set_detail(detail),
+            By::Processor(processor) => {
+                processor.set_casting(Casting { sparse, ..processor.casting() });
+                processor.resize(self.quality.drawn())
+            }
+        }
     }
 
     /// Draws a picture and waits for it.
@@ -72,7 +119,7 @@ impl Painter {
         let (why, size) = match &mut self.by {
             By::Processor(processor) => {
                 let report = processor.draw(frame)?;
-                return Ok((processor.image().clone(), report));
+                return Ok((processor.image().enlarged(self.quality.size), report));
             }
             By::Device(renderer) => match on_device(renderer, frame) {
                 Err(RenderError::Gpu(why)) => (why, renderer.size()),
@@ -81,14 +128,16 @@ impl Painter {
         };
         self.notice = Some(format!("{why}; the processor draws from here on"));
         self.by = By::Processor(Box::new(ProcessorRenderer::with(self.kept.clone(), size)?));
+        self.set_quality(self.quality.sparse, self.quality.detail)?;
         self.picture(frame)
     }
 
     /// Changes the size of the pictures, width and height.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
+        self.quality.size = size;
         match &mut self.by {
             By::Device(renderer) => renderer.resize(size),
-            By::Processor(processor) => processor.resize(size),
+            By::Processor(processor) => processor.resize(self.quality.drawn()),
         }
     }
 
@@ -101,7 +150,9 @@ impl Painter {
                 let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
                 processor.set_casting(Casting { sparse: detail < 1.0, ..processor.casting() });
                 let share = (2.0 * detail).min(1.0);
-                processor.resize(size.map(|n| ((n as f32 * share).round() as u32).clamp(n.min(1), n)))
+                // A window enlarges by itself.
+                self.quality = Quality::full(Quality { detail: share, ..Quality::full(size) }.drawn());
+                processor.resize(self.quality.size)
             }
         }
     }

@@ -79,6 +79,26 @@ impl Method {
         Self::all().into_iter().find(|method| method.name() == name)
     }
 
+    /// The method with so many points on the burr; 0, or a method without points to choose, leaves it as it is.
+    pub fn with_points(mut self, points: usize) -> Self {
+        let own = match &mut self {
+            Self::Thesis(config) => &mut config.points,
+            Self::Pointshell(config) => &mut config.points,
+            Self::RayTrace(config) => &mut config.points,
+            Self::ExposedFaces(config) => &mut config.points,
+            Self::SurfaceVertices(config) => &mut config.points,
+            Self::VoxelSum(_)
+            | Self::BurrAndShaft(_)
+            | Self::CentreLine(_)
+            | Self::DistanceField(_)
+            | Self::Brute(_) => return self,
+        };
+        if points > 0 {
+            *own = points;
+        }
+        self
+    }
+
     /// Whether the method keeps a proxy on the side of the bone that it came from. One that does not loses thin walls.
     pub fn has_proxy(&self) -> bool {
         matches!(self, Self::Thesis(_) | Self::CentreLine(_) | Self::DistanceField(_) | Self::Brute(_))

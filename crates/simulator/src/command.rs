@@ -3,15 +3,16 @@
 use crate::batch;
 use crate::compare::compare;
 use crate::device_test;
-use crate::measure;
-use crate::options::{CaseTask, DeviceTask, Task};
+use crate::case::choice::plan_case;
+use crate::models::Wish;
+use crate::options::{CaseTask, DeviceTask, Patient, Task};
 use crate::report::summary::CutOff;
+use crate::show::driver;
 use crate::{Ended, Inputs, Options, Program, Session, SessionError, build_case};
 use clap::Parser;
 use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
-use trepan_budget::Scene;
 
 /// Runs a program. Exit code 0 for a session that ended, 2 for what the user can put right, 1 for the rest, 128 + n after
 /// signal n.
@@ -52,7 +53,11 @@ fn batched(failures: usize, files: usize) -> ExitCode {
 /// Does something else than a session.
 fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
     let done = match task {
-        Task::Plan { force_error_n, displacement_mm } => return planned(*force_error_n, *displacement_mm),
+        Task::Plan { case, patient, tolerances, rate_hz, picture } => {
+            let wish = tolerances.check().map_err(SessionError::Usage);
+            let wish = wish.and_then(|()| Wish::to_plan(program, patient, *tolerances, *rate_hz, *picture));
+            wish.and_then(|wish| planned(program, case.as_deref(), patient, built_in, wish))
+        }
         Task::Case(CaseTask::Series { folder }) => list_series(folder),
         Task::Case(CaseTask::Build { patient, out }) => build_case(program, patient, out, built_in).map(|name| {
             println!("{name} is in {}; open it with --case {}", out.display(), out.display());
@@ -82,29 +87,18 @@ fn list_series(folder: &Path) -> Result<ExitCode, SessionError> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What a scene needs on this machine.
-fn planned(force_error_n: Option<f64>, displacement_mm: Option<f64>) -> ExitCode {
-    let usual = Scene::default();
-    let scene = Scene {
-        force_error_n: force_error_n.unwrap_or(usual.force_error_n),
-        displacement_mm: displacement_mm.unwrap_or(usual.displacement_mm),
-        ..usual
-    };
-    let machine = measure::machine();
-    println!(
-        "this machine: {:.1} ns a tetrahedron and step, {:.1} us a tick on bone, {} threads",
-        machine.ns_per_tet_step, machine.us_per_rigid_tick, machine.threads
-    );
-    match trepan_budget::plan(&machine, &scene) {
-        Ok(plan) => {
-            println!("{plan}");
-            ExitCode::SUCCESS
-        }
-        Err(fault) => {
-            eprintln!("plan: {fault}");
-            ExitCode::from(2)
-        }
-    }
+/// What a case needs on this machine.
+fn planned(
+    program: Program,
+    case: Option<&Path>,
+    patient: &Patient,
+    built_in: Inputs,
+    wish: Wish,
+) -> Result<ExitCode, SessionError> {
+    let card = driver::open().is_ok_and(|gpu| !gpu.is_software());
+    let models = plan_case(program, case, patient, built_in, wish.drawn_by_card(card))?;
+    println!("{}", models.told());
+    Ok(ExitCode::SUCCESS)
 }
 
 fn told(ended: &Ended) -> ExitCode {

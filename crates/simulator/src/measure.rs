@@ -1,33 +1,60 @@
 //! How fast this machine is: the numbers that a plan is made from, measured in about a second.
 //!
 //! # Practice
-//! The median of many calls, one method at a time, on small synthetic scenes that stay in the cache as the real ones do.
+//! The median of many calls, one method at a time, one thread, on small synthetic scenes that stay in the cache as the real ones do. What is not wanted is not
+//! measured and stands as [`Machine::default`] has it.
 
 use crate::run::clock::Clock;
+use std::f32::consts::TAU;
+use std::sync::Arc;
 use trepan_budget::Machine;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, units};
+use trepan_render::{Camera, Frame, ProcessorRenderer, SceneData, SliceLook};
 use trepan_rigid::{Method, RigidStep};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
-use trepan_volume::{BoneVolume, VoxelVolume};
+use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
 /// Calls that a median is taken over.
 const CALLS: usize = 400;
+/// Pictures that a median is taken over.
+const PICTURES: usize = 9;
+/// Edge of a picture, pixels.
+const PIXELS: u32 = 160;
 
-/// This machine.
-pub fn machine() -> Machine {
-    let clock = Clock::start();
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
-    Machine {
-        ns_per_tet_step: ns_per_tet_step(&clock),
-        us_per_rigid_tick: us_per_rigid_tick(&clock),
-        threads,
-        ..Machine::default()
+/// What a plan needs to know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wanted {
+    /// Ticks on bone.
+    pub bone: bool,
+    /// Steps of tissue.
+    pub tissue: bool,
+    /// Rays of the picture.
+    pub picture: bool,
+}
+
+impl Wanted {
+    /// Whether anything is.
+    pub fn any(self) -> bool {
+        self.bone || self.tissue || self.picture
     }
 }
 
-fn median_us(clock: &Clock, mut call: impl FnMut(usize)) -> f64 {
-    let mut times: Vec<f64> = (0..CALLS)
+/// This machine, where a graphics card draws or none.
+pub fn machine(wanted: Wanted, device_draws: bool) -> Machine {
+    let (clock, usual) = (Clock::start(), Machine::default());
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
+    Machine {
+        ns_per_tet_step: if wanted.tissue { ns_per_tet_step(&clock) } else { usual.ns_per_tet_step },
+        us_per_rigid_tick: if wanted.bone { us_per_rigid_tick(&clock) } else { usual.us_per_rigid_tick },
+        ns_per_ray: if wanted.picture && !device_draws { ns_per_ray(&clock) } else { usual.ns_per_ray },
+        threads,
+        device_draws,
+    }
+}
+
+fn median_us(clock: &Clock, calls: usize, mut call: impl FnMut(usize)) -> f64 {
+    let mut times: Vec<f64> = (0..calls)
         .map(|i| {
             let began_ms = clock.now_ms();
             call(i);
@@ -35,7 +62,7 @@ fn median_us(clock: &Clock, mut call: impl FnMut(usize)) -> f64 {
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    times[CALLS / 2]
+    times[calls / 2]
 }
 
 fn ns_per_tet_step(clock: &Clock) -> f64 {
@@ -46,7 +73,7 @@ fn ns_per_tet_step(clock: &Clock) -> f64 {
     let mut solver = Tled::new(&body, &Config::default()).expect("a split box is sound");
     let loads = Loads { gravity: Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2, ..Loads::default() };
     let dt_ms = solver.stable_dt_ms();
-    1e3 * median_us(clock, |_| _ = solver.step(&loads, dt_ms)) / tets as f64
+    1e3 * median_us(clock, CALLS, |_| _ = solver.step(&loads, dt_ms)) / tets as f64
 }
 
 fn us_per_rigid_tick(clock: &Clock) -> f64 {
@@ -60,8 +87,43 @@ fn us_per_rigid_tick(clock: &Clock) -> f64 {
     let mut contact = Method::RECOMMENDED.build(&Tool::burr(3.0));
     contact.reset(Pose::from_translation(Vec3::Z * 4.0));
     let mut out = RigidStep::default();
-    median_us(clock, |i| {
+    median_us(clock, CALLS, |i| {
         let tip = Vec3::new(4.0 * (i as f32 * 0.02).sin(), 0.3, 2.5);
         contact.step(&bone, &ToolState::at(Pose::from_translation(tip)), false, 1.0, &mut out);
     })
+}
+
+/// A wavy shell of bone from all sides: each picture from another one, so that nothing of the last can be used again.
+fn ns_per_ray(clock: &Clock) -> f64 {
+    let n = 96;
+    let mut ct = VoxelVolume::isotropic([n; 3], Vec3::splat(-95.0), 2.0, AIR_HU);
+    for at in 0..ct.data.len() {
+        let p = 2.0 * Vec3::new((at % n) as f32, (at / n % n) as f32, (at / (n * n)) as f32) - 95.0;
+        let depth_mm = (p.length() - 80.0 - 2.0 * (0.15 * p.x).sin() * (0.15 * p.z).cos()).abs();
+        ct.data[at] = (400.0 + 250.0 * (4.0 - depth_mm)).clamp(-1000.0, 1400.0) as i16;
+    }
+    let bone = BoneVolume::new(&ct, 400).expect("the shell is bone");
+    let data = SceneData { bone: Some(Arc::new(bone)), brain: None, mri: None, tint: None };
+    let mut processor = ProcessorRenderer::new(&data, [PIXELS; 2]).expect("a picture has pixels");
+    processor.threads = 1;
+    let us = median_us(clock, PICTURES, |i| {
+        let (sin, cos) = (i as f32 / PICTURES as f32 * TAU).sin_cos();
+        let camera = Camera::viewed_from(Vec3::ZERO, Vec3::new(cos, sin, 0.5), 330.0);
+        let slices = SliceLook { shown: false, ..SliceLook::default() };
+        _ = processor.draw(&Frame { slices, ..Frame::of(camera) });
+    });
+    1e3 * us / f64::from(PIXELS * PIXELS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_wanted_is_not_measured() {
+        let usual = Machine::default();
+        let machine = machine(Wanted { bone: true, tissue: false, picture: true }, true);
+        assert_eq!((machine.ns_per_tet_step, machine.ns_per_ray), (usual.ns_per_tet_step, usual.ns_per_ray));
+        assert!(machine.us_per_rigid_tick > 0.0 && machine.us_per_rigid_tick != usual.us_per_rigid_tick);
+    }
 }

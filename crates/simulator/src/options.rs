@@ -3,6 +3,7 @@
 use crate::case::tissue::{TissueClass, TissueSource};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use trepan_budget::Quality;
 
 /// Flags of every program; names say their unit.
 #[derive(Clone, Debug, Parser)]
@@ -47,10 +48,16 @@ pub struct Options {
     /// Write the drilled skull's surface too, as drilled.stl; some 50 MB
     #[arg(long)]
     pub stl: bool,
-    /// Solver of the brain [default: tled]
+    /// How fine bone, brain and picture are: auto measures this machine and takes the cheapest that keeps the tolerances below; draft, usual and fine are the same everywhere [default: auto; a replay's as recorded]
+    #[arg(long, value_name = "auto|draft|usual|fine", value_parser = quality)]
+    pub quality: Option<Quality>,
+    /// What --quality auto must keep
+    #[command(flatten)]
+    pub tolerances: Tolerances,
+    /// Solver of the brain [default: by --quality]
     #[arg(long, value_name = "NAME")]
     pub solver: Option<String>,
-    /// How bone is touched [default: the recommended method]
+    /// How bone is touched [default: by --quality]
     #[arg(long, value_name = "NAME")]
     pub rigid: Option<String>,
     /// Seed of everything random
@@ -106,12 +113,12 @@ pub struct Patient {
     /// Tissue inside the brain, from a label volume: white, grey, ventricle, tumour or vessel; all that is not 0, or only the codes. Repeatable
     #[arg(long = "tissue", value_name = "CLASS=PATH[:CODE,...]")]
     pub tissues: Vec<TissueSource>,
-    /// Edge of a skull voxel, mm
-    #[arg(long, value_name = "MM", default_value_t = 1.0, allow_negative_numbers = true)]
-    pub spacing_mm: f32,
-    /// Tetrahedra of the brain, met within a tenth
-    #[arg(long, value_name = "N", default_value_t = 12_000)]
-    pub tets: usize,
+    /// Edge of a skull voxel, mm [default: by --quality; 1 for `case build`]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub spacing_mm: Option<f32>,
+    /// Tetrahedra of the brain, met within a tenth [default: by --quality; 12000 for `case build`]
+    #[arg(long, value_name = "N")]
+    pub tets: Option<usize>,
     /// Move the MRI (and labels) to where they fit the CT, by mutual information
     #[arg(long)]
     pub register: bool,
@@ -142,15 +149,47 @@ pub enum Task {
         #[arg(long, value_name = "DIR", default_value = "trepan-out/compare")]
         out: PathBuf,
     },
-    /// Measure this machine and say which voxel size, mesh and step a scene needs on it
+    /// Measure this machine and say what `--quality auto` takes for a case on it, why, and what the next better and the next cheaper would cost
     Plan {
-        /// Error of the force that the scene bears, N
-        #[arg(long, value_name = "N")]
-        force_error_n: Option<f64>,
-        /// Error of the brain's surface that the scene bears, mm
-        #[arg(long, value_name = "MM")]
-        displacement_mm: Option<f64>,
+        /// A folder that `case build` made
+        #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "isovalue_hu", "register", "opening"])]
+        case: Option<PathBuf>,
+        /// The patient's images
+        #[command(flatten)]
+        patient: Patient,
+        /// What must be kept
+        #[command(flatten)]
+        tolerances: Tolerances,
+        /// Haptic ticks a second
+        #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+        rate_hz: f32,
+        /// Width and height of the picture, pixels
+        #[arg(long, value_name = "WxH", default_value = "960x600", value_parser = size)]
+        picture: [u32; 2],
     },
+}
+
+/// Errors that a session bears.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct Tolerances {
+    /// Error of the force on bone that 95 of 100 ticks stay within, N [default: 0.1]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub force_error_n: Option<f64>,
+    /// Error of the brain's displacement near the tool, mm [default: 1]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub displacement_mm: Option<f64>,
+    /// Error of the picture, percent of white [default: 3]
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    pub picture_error_percent: Option<f64>,
+}
+
+impl Tolerances {
+    /// Refuses numbers that make no sense.
+    pub fn check(&self) -> Result<(), String> {
+        within("force-error-n", self.force_error_n.unwrap_or(1.0), 1e-4, 100.0)?;
+        within("displacement-mm", self.displacement_mm.unwrap_or(1.0), 1e-4, 100.0)?;
+        within("picture-error-percent", self.picture_error_percent.unwrap_or(1.0), 1e-3, 100.0)
+    }
 }
 
 /// What can be done with cases.
@@ -192,8 +231,8 @@ pub enum DeviceTask {
 impl Patient {
     /// Refuses numbers that make no sense.
     pub fn check(&self) -> Result<(), String> {
-        within("spacing-mm", self.spacing_mm.into(), 0.2, 4.0)?;
-        within("tets", self.tets as f64, 500.0, 1e6)?;
+        within("spacing-mm", self.spacing_mm.unwrap_or(1.0).into(), 0.2, 4.0)?;
+        within("tets", self.tets.unwrap_or(12_000) as f64, 500.0, 1e6)?;
         within("isovalue-hu", self.isovalue_hu.unwrap_or(0).into(), -900.0, 3000.0)
     }
 }
@@ -208,6 +247,11 @@ fn point(text: &str) -> Result<[f32; 3], String> {
     let numbers: Vec<f32> = text.split(',').map(|s| s.trim().parse().map_err(|_| remedy)).collect::<Result<_, _>>()?;
     let point: [f32; 3] = numbers.try_into().map_err(|_| remedy)?;
     if point.iter().all(|v| v.abs() <= 1e4) { Ok(point) } else { Err(remedy.into()) }
+}
+
+fn quality(text: &str) -> Result<Quality, String> {
+    let names = || Quality::ALL.map(Quality::name).join(", ");
+    Quality::ALL.into_iter().find(|known| known.name() == text).ok_or_else(|| format!("give one of {}", names()))
 }
 
 fn shard(text: &str) -> Result<(usize, usize), String> {
@@ -228,6 +272,7 @@ impl Options {
     /// Refuses numbers that make no sense, naming the flag and what would be right.
     pub fn check(&self) -> Result<(), String> {
         self.patient.check()?;
+        self.tolerances.check()?;
         within("duration", self.duration.unwrap_or(1.0), 0.1, 86_400.0)?;
         within("young-modulus-kpa", self.young_modulus_kpa.into(), 0.05, 1000.0)?;
         within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
@@ -256,6 +301,10 @@ mod tests {
         assert!(parse("x --spacing-mm 0").unwrap().check().is_err());
         assert_eq!(parse("x --opening -40,30.5,120").unwrap().patient.opening, Some([-40.0, 30.5, 120.0]));
         assert!(parse("x --opening 1,2").is_err() && parse("x --opening 1,2,nan").is_err());
+        assert!(parse("x --quality best").unwrap_err().to_string().contains("auto, draft, usual, fine"));
+        assert_eq!(parse("x --quality fine").unwrap().quality, Some(Quality::Fine));
+        assert!(parse("x --force-error-n 0").unwrap().check().unwrap_err().contains("--force-error-n"));
+        assert!(parse("x plan --tets 5000 --displacement-mm 0.5 --spacing-mm 0.7").is_ok());
         assert!(parse("x --picture 960").is_err() && parse("x --picture 0x7").is_err());
     }
 }

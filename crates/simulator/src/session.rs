@@ -4,6 +4,7 @@ use crate::case::Inputs;
 use crate::case::choice;
 use crate::error::SessionError;
 use crate::hand::{self, Feel, Hand, SecondHold};
+use crate::models::Wish;
 use crate::operation::Operation;
 use crate::options::Options;
 use crate::program::Program;
@@ -19,6 +20,7 @@ use crate::run::stop::Stop;
 use crate::run::threads::{self, Devices, Pace};
 use crate::run::watch::{Asked, Share};
 use crate::run::{Eyes, Outcome, Stages};
+use crate::show::driver;
 use crate::show::graphics::Graphics;
 use crate::show::picture::{self, Album};
 use crate::show::{player, window};
@@ -26,6 +28,7 @@ use crate::stages::haptic_tick::ToolSample;
 use crate::table::Table;
 use std::path::{Path, PathBuf};
 use trepan_geometry::ToolState;
+use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Script;
 use trepan_haptics::{DeviceName, HapticDevice, mouse};
 use trepan_link::wire::SessionHeader;
@@ -44,6 +47,8 @@ pub struct Session {
     table: Table,
     out: PathBuf,
     windowed: bool,
+    /// The device that draws, where it was looked for already.
+    drawing: Option<Result<Gpu, GpuError>>,
 }
 
 /// How a session ended.
@@ -70,21 +75,23 @@ impl Session {
         places(&options)?;
         let device = hand::device_name(program, &options, windowed)?;
         let second = hand::second_name(&device, &options)?;
-        Table::check(&options)?;
         let recording = match &device {
             DeviceName::Replay(path) => Some(Recording::open(path)?),
             _ => None,
         };
-        let case = choice::open_case(program, &options, built_in)?;
+        let wish = Wish::of(program, &options, recording.as_ref())?;
+        let drawing = wish.plans_pictures().then(driver::open);
+        let wish = wish.drawn_by_card(matches!(&drawing, Some(Ok(gpu)) if !gpu.is_software()));
+        let (case, models) = choice::open_case(program, &options, built_in, wish)?;
         let (name, hash) = (case.name.clone(), case.hash.clone());
         let operation = Operation::of(&options, &device, recording.as_ref());
-        let table = Table::new(program, &options, case, operation, windowed && recording.is_some())?;
+        let table = Table::new(program, &options, (case, models), operation, windowed && recording.is_some())?;
         let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
-        Ok(Self { program, options, device, second, recording, case: name, hash, table, out, windowed })
+        Ok(Self { program, options, device, second, recording, case: name, hash, table, out, windowed, drawing })
     }
 
     /// Runs it and writes its files.
-    pub fn run(self) -> Result<Ended, SessionError> {
+    pub fn run(mut self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let (before, whole) = (self.table.pieces(), self.table.bone().map(|bone| bone.snapshot()));
         let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.table.plan)?;
@@ -103,7 +110,8 @@ impl Session {
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         let kept = (Recorder::create(&record, &self.header(&feel, second_feel.as_ref()))?, share);
-        let mut graphics = self.graphics();
+        let drawing = self.drawing.take();
+        let mut graphics = self.graphics(drawing);
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
         let devices = device.map(|first| Devices { first, second: second_device });
@@ -113,6 +121,7 @@ impl Session {
         let recording = Recording::open(&record)?;
         self.map(&mut album, whole.as_ref(), &recording);
         let mut remarks = self.table.scene.remarks.clone();
+        remarks.extend(self.table.models.unmet.iter().cloned());
         remarks.extend(graphics.err());
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
@@ -183,11 +192,11 @@ impl Session {
         ToolSample { tick: 0, state, tool: self.program.tray()[0], slot: 0, drilling: false }
     }
 
-    fn graphics(&self) -> Result<Graphics, String> {
+    fn graphics(&self, drawing: Option<Result<Gpu, GpuError>>) -> Result<Graphics, String> {
         if !self.windowed && self.options.frames_per_second == 0.0 {
             return Err("no picture was asked for".into());
         }
-        Graphics::open(&self.table, self.options.picture)
+        Graphics::open(&self.table, self.options.picture, drawing.unwrap_or_else(driver::open), self.windowed)
     }
 
     fn picture(
@@ -247,11 +256,8 @@ impl Session {
 
     fn header(&self, feel: &Feel, second: Option<&Feel>) -> SessionHeader {
         let config = [
-            ("rigid", self.table.rigid.name().to_string()),
-            ("solver", self.table.solver_name().into()),
             ("rate_hz", self.options.rate_hz.to_string()),
-            ("spacing_mm", self.options.patient.spacing_mm.to_string()),
-            ("tets", self.options.patient.tets.to_string()),
+            ("solver_run", self.table.solver_name().into()),
             ("young_modulus_kpa", self.options.young_modulus_kpa.to_string()),
         ];
         let hands = feel.entries(hand::FIRST).into_iter();
@@ -265,6 +271,7 @@ impl Session {
             config: config
                 .map(|(key, value)| (key.to_string(), value))
                 .into_iter()
+                .chain(self.table.models.entries())
                 .chain(self.table.operation.entries())
                 .chain(hands)
                 .collect(),
@@ -282,6 +289,7 @@ impl Session {
                 (other, _) => other.to_string(),
             },
             second_device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),
+            models: self.table.models.summary(),
             solver: self.table.solver_name().into(),
             brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
             frames: album.frames,

@@ -6,12 +6,13 @@ use crate::case::scene::{RestBrain, Scene};
 use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
 use crate::hand::Feel;
+use crate::models::{BONE_STIFFNESS, FASTEST, Models, rigid_of, solver_named};
 use crate::operation::Operation;
 use crate::options::Options;
 use crate::program::Program;
 use crate::report::regions::{Region, regions};
 use crate::run::clock::Clock;
-use crate::run::{Stages, Tissue};
+use crate::run::{self, Stages};
 use crate::stages::alarms::Limits;
 use crate::stages::collision_step::CollisionStage;
 use crate::stages::haptic_tick::{HapticConfig, HapticStage};
@@ -20,15 +21,12 @@ use crate::stages::settling::Settling;
 use crate::stages::skull_wall::SkullWall;
 use crate::stages::solver_step::SolverStage;
 use std::sync::{Arc, OnceLock};
+use trepan_budget::Tissue;
 use trepan_contact::{Vibration, Viscoelastic};
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_link::Recording;
 use trepan_soft::{Body, Loads, SoftSolver};
 use trepan_volume::{BoneVolume, Piece};
-
-const TLED: &str = "tled";
-/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not have the recorded forces to the last bit.
-const FASTEST: &str = "fastest";
 
 /// What the operation is done on, and by which methods.
 pub struct Table {
@@ -40,11 +38,10 @@ pub struct Table {
     pub plan: Plan,
     /// Settings of the operation.
     pub operation: Operation,
-    /// How bone is touched.
-    pub rigid: trepan_rigid::Method,
+    /// By which models.
+    pub models: Models,
     /// The bone that a replay carves while the window goes back and forth with the scene's.
     filmed: Option<Arc<BoneVolume>>,
-    solver: String,
     young_mpa: f32,
     /// What the solver `fastest` turned out to be.
     fastest: OnceLock<&'static str>,
@@ -55,7 +52,7 @@ impl Table {
     pub fn new(
         program: Program,
         options: &Options,
-        case: Case,
+        (case, models): (Case, Models),
         operation: Operation,
         filmed: bool,
     ) -> Result<Self, SessionError> {
@@ -68,18 +65,11 @@ impl Table {
             plan: planned(&scene, &operation)?,
             scene,
             operation,
-            rigid: rigid_method(options)?,
+            models,
             filmed: filmed.map_err(|fault| SessionError::Internal(fault.to_string()))?,
-            solver: options.solver.clone().unwrap_or_else(|| TLED.into()),
             young_mpa: units::mpa_from_kpa(options.young_modulus_kpa),
             fastest: OnceLock::new(),
         })
-    }
-
-    /// Refuses names of methods that nobody knows.
-    pub fn check(options: &Options) -> Result<(), SessionError> {
-        rigid_method(options)?;
-        solver_named(options.solver.as_deref().unwrap_or(TLED)).map(drop)
     }
 
     /// The bone, if it is operated on.
@@ -104,7 +94,7 @@ impl Table {
 
     /// What steps the tissue: of `fastest` what that turned out to be.
     pub fn solver_name(&self) -> &str {
-        self.fastest.get().copied().unwrap_or(&self.solver)
+        self.fastest.get().copied().unwrap_or(self.models.setup.tissue.solver)
     }
 
     /// The bodies of the loops, with the tool at `start`.
@@ -116,11 +106,12 @@ impl Table {
         feel: &Feel,
         second: Option<&Feel>,
     ) -> Result<Stages, SessionError> {
+        let rigid = rigid_of(&self.models.setup.bone)?;
         let config = |feel: &Feel| HapticConfig {
             program: self.program,
-            rigid: self.rigid,
+            rigid,
             dt_ms: tick_ms,
-            bone_force: Vibration::drill(feel.coupled(Viscoelastic { stiffness: 2.0, damping: 0.5 }, tick_ms)),
+            bone_force: Vibration::drill(feel.coupled(Viscoelastic { stiffness: BONE_STIFFNESS, damping: 0.5 }, tick_ms)),
             tissue_force: feel.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, tick_ms),
             guard: feel.guard(),
             limits: Limits::default(),
@@ -138,7 +129,7 @@ impl Table {
         Ok(Stages { haptic, second, tissue })
     }
 
-    fn tissue(&self, brain: &RestBrain) -> Result<Tissue, SessionError> {
+    fn tissue(&self, brain: &RestBrain) -> Result<run::Tissue, SessionError> {
         let body = Body {
             mesh: brain.mesh.clone(),
             fixed: brain.fixed.clone(),
@@ -149,18 +140,19 @@ impl Table {
         let wall = wall.transpose().map_err(|fault| of_brain(&fault))?;
         let collision = CollisionStage::new(self.program, &brain.mesh, &Default::default(), wall);
         let settling = Settling::new(self.operation.fluid_lost, Vec3::NEG_Y, -self.plan.site.inward);
-        Ok(Tissue {
+        Ok(run::Tissue {
             collision: collision.map_err(|fault| of_brain(&fault))?.settling(settling),
             solver: SolverStage::new(self.solver(&body)?),
         })
     }
 
     fn solver(&self, body: &Body) -> Result<Box<dyn SoftSolver>, SessionError> {
-        if let Some(method) = solver_named(&self.solver)? {
+        let Tissue { solver, still_mm, .. } = self.models.setup.tissue;
+        if let Some(method) = solver_named(solver)? {
             return method.build(body).map_err(|fault| of_brain(&fault));
         }
-        let config = trepan_tled::Config::default();
-        if self.solver != FASTEST {
+        let config = trepan_tled::Config { still_mm: still_mm as f32, ..trepan_tled::Config::default() };
+        if solver != FASTEST {
             return Ok(Box::new(trepan_tled::Tled::new(body, &config).map_err(|fault| of_brain(&fault))?));
         }
         let clock = Clock::start();
@@ -187,24 +179,5 @@ fn planned(scene: &Scene, operation: &Operation) -> Result<Plan, SessionError> {
             operation.flap_mm
         );
         SessionError::Usage(fault)
-    })
-}
-
-fn rigid_method(options: &Options) -> Result<trepan_rigid::Method, SessionError> {
-    let Some(name) = &options.rigid else { return Ok(trepan_rigid::Method::RECOMMENDED) };
-    trepan_rigid::Method::named(name).ok_or_else(|| {
-        let known: Vec<_> = trepan_rigid::Method::all().iter().map(|method| method.name()).collect();
-        SessionError::Usage(format!("--rigid {name} is not known; known are {}", known.join(", ")))
-    })
-}
-
-/// The rival solver of that name; `None` for TLED.
-fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
-    if name == TLED || name == FASTEST {
-        return Ok(None);
-    }
-    trepan_soft::Method::named(name).map(Some).ok_or_else(|| {
-        let known: Vec<_> = trepan_soft::Method::all().iter().map(|method| method.name()).collect();
-        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {FASTEST}, {}", known.join(", ")))
     })
 }

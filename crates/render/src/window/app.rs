@@ -63,7 +63,7 @@ impl<S: Session, D: Draws> Window<S, D> {
             #[cfg(feature = "sound")]
             ears: Default::default(),
             screen: if copies { Screen::Copies(None) } else { Screen::Shares(None) },
-            quality: Quality::new(!hardware),
+            quality: Quality::new(!hardware, start.detail),
             drawn_at: 0.0,
         }
     }

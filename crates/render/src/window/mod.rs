@@ -81,12 +81,14 @@ pub struct Start {
     pub size: [f32; 2],
     /// Pictures a second at most.
     pub rate_hz: f32,
+    /// Share of the 3-D view's pixels along an edge in the first pictures; then it follows the time that they take.
+    pub detail: f32,
 }
 
 impl Start {
     /// 1280 by 800 points at 30 pictures a second.
     pub fn with(camera: Camera, world_from_tool: Pose) -> Self {
-        Self { camera, microscope: None, world_from_tool, size: [1280.0, 800.0], rate_hz: 30.0 }
+        Self { camera, microscope: None, world_from_tool, size: [1280.0, 800.0], rate_hz: 30.0, detail: 1.0 }
     }
 }
 

@@ -24,9 +24,10 @@ pub(crate) struct Quality {
 }
 
 impl Quality {
-    /// Starts at the finest on a graphics card, in the middle on a software driver.
-    pub fn new(software: bool) -> Self {
-        Self { step: if software { 2 } else { 0 }, ..Self::default() }
+    /// Starts at the coarser of a detail and the finest on a graphics card, the middle on a software driver.
+    pub fn new(software: bool, detail: f32) -> Self {
+        let wanted = DETAILS.iter().position(|&d| d <= detail).unwrap_or(DETAILS.len() - 1);
+        Self { step: wanted.max(if software { 2 } else { 0 }), ..Self::default() }
     }
 
     /// Takes note of the time from picture to picture.
@@ -53,7 +54,7 @@ mod tests {
 
     /// Detail after some pictures whose time is `full` seconds at the finest and falls with the number of pixels.
     fn settled(full: f64, pictures: u32) -> f32 {
-        let mut quality = Quality::new(false);
+        let mut quality = Quality::new(false, 1.0);
         for _ in 0..pictures {
             quality.note(full * f64::from(quality.detail().powi(2)));
         }
@@ -69,8 +70,14 @@ mod tests {
     }
 
     #[test]
+    fn it_starts_where_it_is_told() {
+        let starts = [(false, 1.0), (true, 1.0), (false, 0.5), (true, 0.35), (false, 0.1)].map(|(s, d)| Quality::new(s, d).detail());
+        assert_eq!(starts, [1.0, 0.55, 0.4, 0.3, 0.3]);
+    }
+
+    #[test]
     fn one_slow_picture_changes_nothing_and_rest_brings_the_finest_back() {
-        let mut quality = Quality::new(true);
+        let mut quality = Quality::new(true, 1.0);
         let start = quality.detail();
         quality.note(1.0);
         quality.note(0.08);

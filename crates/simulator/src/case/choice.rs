@@ -1,21 +1,63 @@
 //! Which case the options mean, and making one to keep.
 
 use crate::case::cache::Cache;
+use crate::case::import::{Facts, volume_mm3};
 use crate::case::{Case, Inputs, Recipe, folder, import};
 use crate::error::SessionError;
+use crate::models::{self, Models, Wish};
 use crate::options::{Options, Patient};
 use crate::program::Program;
 use std::path::Path;
+use trepan_budget::Setup;
 
-/// The case folder that is named, the images that are given, or the built-in case.
-pub fn open_case(program: Program, options: &Options, built_in: Inputs) -> Result<Case, SessionError> {
-    match &options.case {
-        Some(folder) => fitting(program, folder::load(folder)?),
+/// The case folder that is named, the images that are given, or the built-in case; with the models that it is opened for.
+pub fn open_case(
+    program: Program,
+    options: &Options,
+    built_in: Inputs,
+    wish: Wish,
+) -> Result<(Case, Models), SessionError> {
+    if let Some(folder) = &options.case {
+        let case = fitting(program, folder::load(folder)?)?;
+        let models = on_case(wish, &case)?;
+        return Ok((case, models));
+    }
+    let (inputs, mut models) = (inputs(&options.patient, built_in), None);
+    let wanted = recipe(&options.patient);
+    let case = import::open_by(program, &inputs, &wanted, &Cache::of_user()?, |facts| {
+        let Setup { bone, tissue, .. } = models.insert(wish.settle(facts)?).setup;
+        Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, ..wanted })
+    })?;
+    let unsettled = || SessionError::Internal("a case without models".into());
+    Ok((case, models.ok_or_else(unsettled)?))
+}
+
+/// The models for a case, which is not made.
+pub fn plan_case(
+    program: Program,
+    case: Option<&Path>,
+    patient: &Patient,
+    built_in: Inputs,
+    wish: Wish,
+) -> Result<Models, SessionError> {
+    patient.check().map_err(SessionError::Usage)?;
+    match case {
+        Some(folder) => on_case(wish, &fitting(program, folder::load(folder)?)?),
         None => {
-            let inputs = inputs(&options.patient, built_in);
-            import::open(program, &inputs, &recipe(&options.patient), &Cache::of_user()?)
+            let facts = import::facts(program, &inputs(patient, built_in), &recipe(patient), &Cache::of_user()?)?;
+            wish.settle(&facts)
         }
     }
+}
+
+/// The models for a case as it was built.
+fn on_case(wish: Wish, case: &Case) -> Result<Models, SessionError> {
+    let wish = case.recipe.iter().fold(wish, Wish::on);
+    let facts = Facts {
+        ct_voxel_mm: case.skull.as_ref().map(|skull| skull.spacing_mm().element_sum() / 3.0),
+        brain_mm3: case.brain.as_ref().map(|brain| volume_mm3(&brain.classes)),
+    };
+    wish.settle(&facts)
 }
 
 /// Makes a case folder; returns the case's name.
@@ -48,10 +90,12 @@ fn fitting(program: Program, case: Case) -> Result<Case, SessionError> {
     Ok(case)
 }
 
+/// As the flags say; what they leave open as usual, so that a folder is the same wherever it is built.
 fn recipe(patient: &Patient) -> Recipe {
+    let usual = models::usual();
     Recipe {
-        spacing_mm: patient.spacing_mm,
-        tets: patient.tets,
+        spacing_mm: patient.spacing_mm.unwrap_or(usual.bone.spacing_mm as f32),
+        tets: patient.tets.unwrap_or(usual.tissue.tets),
         isovalue_hu: patient.isovalue_hu,
         ct_series: patient.ct_series,
         mri_series: patient.mri_series,

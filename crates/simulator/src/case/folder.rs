@@ -41,14 +41,14 @@ struct Card {
     version: String,
     isovalue_hu: i16,
     opening: Option<Opening>,
-    recipe: Recipe,
+    recipe: Option<Recipe>,
     notes: Vec<String>,
     /// Each file and its SHA-256.
     files: BTreeMap<String, String>,
 }
 
 /// Writes a case into an empty folder.
-pub fn save(case: &Case, recipe: &Recipe, folder: &Path) -> Result<(), String> {
+pub fn save(case: &Case, folder: &Path) -> Result<(), String> {
     let text = |fault: &dyn std::fmt::Display| fault.to_string();
     let mut names = Vec::new();
     if let Some(skull) = &case.skull {
@@ -78,7 +78,7 @@ pub fn save(case: &Case, recipe: &Recipe, folder: &Path) -> Result<(), String> {
         version: env!("CARGO_PKG_VERSION").into(),
         isovalue_hu: case.isovalue_hu,
         opening: case.opening,
-        recipe: *recipe,
+        recipe: case.recipe,
         notes: case.notes.clone(),
         files,
     };
@@ -118,8 +118,8 @@ pub fn load(folder: &Path) -> Result<Case, SessionError> {
     };
     let fit_png = card.files.contains_key(FIT).then(|| fs::read(folder.join(FIT))).transpose();
     let fit_png = fit_png.map_err(|fault| broken(FIT, &fault))?;
-    let Card { name, hash, isovalue_hu, opening, notes, .. } = card;
-    Ok(Case { name, hash, skull, isovalue_hu, brain, opening, fit_png, notes, cached: true })
+    let Card { name, hash, isovalue_hu, opening, recipe, notes, .. } = card;
+    Ok(Case { name, hash, recipe, skull, isovalue_hu, brain, opening, fit_png, notes, cached: true })
 }
 
 #[cfg(test)]
@@ -133,16 +133,6 @@ mod tests {
         let home = tempfile::tempdir().expect("a temporary folder");
         let mut skull = VoxelVolume::isotropic([6, 5, 4], Vec3::new(1.0, -2.0, 3.5), 0.75, -1000i16);
         skull.data[17] = 1234;
-        let case = Case {
-            name: "case-1".into(),
-            hash: "ab".into(),
-            skull: Some(skull.clone()),
-            isovalue_hu: 350,
-            opening: Some(Opening { entry_mm: [1.0, 2.0, 3.0], inward: [0.0, 0.0, -1.0], bone_mm: 6.5, brain_mm: 8.0 }),
-            fit_png: Some(vec![1, 2, 3]),
-            notes: vec!["a remark".into()],
-            ..Case::default()
-        };
         let recipe = Recipe {
             spacing_mm: 0.75,
             tets: 500,
@@ -152,10 +142,21 @@ mod tests {
             register: false,
             opening: None,
         };
-        save(&case, &recipe, home.path()).expect("the case is written");
+        let case = Case {
+            name: "case-1".into(),
+            hash: "ab".into(),
+            skull: Some(skull.clone()),
+            isovalue_hu: 350,
+            opening: Some(Opening { entry_mm: [1.0, 2.0, 3.0], inward: [0.0, 0.0, -1.0], bone_mm: 6.5, brain_mm: 8.0 }),
+            fit_png: Some(vec![1, 2, 3]),
+            notes: vec!["a remark".into()],
+            recipe: Some(recipe),
+            ..Case::default()
+        };
+        save(&case, home.path()).expect("the case is written");
         let back = load(home.path()).expect("the case is read");
         assert_eq!((back.skull.as_ref(), back.isovalue_hu, back.notes.len()), (Some(&skull), 350, 1));
-        assert_eq!((back.opening, back.fit_png), (case.opening, case.fit_png));
+        assert_eq!((back.opening, back.fit_png, back.recipe), (case.opening, case.fit_png, case.recipe));
         let mut bytes = fs::read(home.path().join(SKULL)).expect("a skull");
         bytes[400] ^= 1;
         fs::write(home.path().join(SKULL), bytes).expect("written");

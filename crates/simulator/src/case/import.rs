@@ -4,6 +4,7 @@
 //! What is made depends only on the bytes of the inputs and the numbers in [`Recipe`]; its hash names the folder in the user's
 //! cache. The folder is made beside its final place and moved there whole, so an interrupted import leaves nothing.
 //! A case goes by the first digits of that hash: file names may hold a patient's name.
+//! What the images are ([`Facts`]) is kept too: who chooses the numbers by it need not read them again.
 
 use crate::case::anatomy::{find_brain, make_brain, make_skull, read_ct, read_mri, registered};
 use crate::case::cache::Cache;
@@ -15,32 +16,78 @@ use crate::case::{Case, Inputs, Recipe};
 use crate::error::SessionError;
 use crate::program::Program;
 use glam::DAffine3;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use trepan_volume::{bone_isovalue, overlap};
+use trepan_volume::{VoxelVolume, bone_isovalue, overlap};
 
 /// Opens a case: from the cache if it was made before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
+    open_by(program, inputs, recipe, cache, |_| Ok(*recipe))
+}
+
+/// The same, with the voxel size and the tetrahedra of a recipe that is made when the images are known.
+pub fn open_by(
+    program: Program,
+    inputs: &Inputs,
+    wanted: &Recipe,
+    cache: &Cache,
+    choose: impl FnOnce(&Facts) -> Result<Recipe, SessionError>,
+) -> Result<Case, SessionError> {
+    let key = key_of_images(program, inputs, wanted, cache)?;
+    let mut stages = ImportStages::new(7);
+    let (facts, images) = match Facts::kept(cache, &key) {
+        Some(facts) => (facts, None),
+        None => {
+            let images = read(inputs, wanted, &mut stages)?;
+            (Facts::of(&images).keep(cache, &key), Some(images))
+        }
+    };
+    let recipe = stages.suspend(|| choose(&facts))?;
+    let hash = cache.under(&key, &format!("{} {}", recipe.spacing_mm, recipe.tets));
+    let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
+    if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
+        stages.finish();
+        tracing::info!("case {name} from the cache");
+        return Ok(case);
+    }
+    let images = images.map_or_else(|| read(inputs, wanted, &mut stages), Ok)?;
+    let mut case = build(inputs, images, &recipe, &mut stages)?;
+    (case.name, case.hash) = (name, hash);
+    stages.next("keeping the case");
+    if let Err(fault) = cache.keep(&case.hash, |folder| case_folder::save(&case, folder)) {
+        case.notes.push(format!("the case could not be kept for the next start: {fault}"));
+    }
+    tracing::info!("case {} imported in {}", case.name, stages.finish());
+    Ok(case)
+}
+
+/// What the images of a case are, from the cache if they were read before.
+pub fn facts(program: Program, inputs: &Inputs, wanted: &Recipe, cache: &Cache) -> Result<Facts, SessionError> {
+    let key = key_of_images(program, inputs, wanted, cache)?;
+    if let Some(facts) = Facts::kept(cache, &key) {
+        return Ok(facts);
+    }
+    let mut stages = ImportStages::new(3);
+    let images = read(inputs, wanted, &mut stages)?;
+    stages.finish();
+    Ok(Facts::of(&images).keep(cache, &key))
+}
+
+/// Names the images, and what of a recipe says how they are read.
+fn key_of_images(
+    program: Program,
+    inputs: &Inputs,
+    wanted: &Recipe,
+    cache: &Cache,
+) -> Result<String, SessionError> {
     needs(program, inputs)?;
     let images = [&inputs.ct, &inputs.mri, &inputs.labels];
     let tissues = inputs.tissues.iter().map(|source| &source.path);
     let files: Vec<&Path> = images.into_iter().flatten().chain(tissues).map(PathBuf::as_path).collect();
     let given = images.map(Option::is_some);
     let meant: Vec<_> = inputs.tissues.iter().map(|source| (source.class, &source.codes)).collect();
-    let hash = cache.key(&files, &format!("{recipe:?} {given:?} {meant:?}"))?;
-    let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
-    if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
-        tracing::info!("case {name} from the cache");
-        return Ok(case);
-    }
-    let mut stages = ImportStages::new(7);
-    let mut case = build(inputs, recipe, &mut stages)?;
-    (case.name, case.hash) = (name, hash);
-    stages.next("keeping the case");
-    if let Err(fault) = cache.keep(&case.hash, |folder| case_folder::save(&case, recipe, folder)) {
-        case.notes.push(format!("the case could not be kept for the next start: {fault}"));
-    }
-    tracing::info!("case {} imported in {}", case.name, stages.finish());
-    Ok(case)
+    let of_images = Recipe { spacing_mm: 0.0, tets: 0, ..*wanted };
+    cache.key(&files, &format!("{of_images:?} {given:?} {meant:?}"))
 }
 
 fn needs(program: Program, inputs: &Inputs) -> Result<(), SessionError> {
@@ -59,7 +106,18 @@ fn needs(program: Program, inputs: &Inputs) -> Result<(), SessionError> {
     Ok(())
 }
 
-fn build(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<Case, SessionError> {
+/// The images as they were read, and the brain found in them.
+struct Images {
+    ct: Option<VoxelVolume<i16>>,
+    mri: Option<VoxelVolume<f32>>,
+    mask: Option<VoxelVolume<u8>>,
+    ct_from_mri: DAffine3,
+    isovalue_hu: i16,
+    fit_png: Option<Vec<u8>>,
+    notes: Vec<String>,
+}
+
+fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<Images, SessionError> {
     let mut notes = Vec::new();
     stages.next("reading the CT");
     let ct = inputs.ct.as_deref().map(|path| read_ct(path, recipe.ct_series, &mut notes)).transpose()?;
@@ -81,6 +139,11 @@ fn build(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<
         .as_ref()
         .map(|mri| find_brain(inputs, mri, ct_from_mri, ct.as_ref(), isovalue_hu, &mut notes))
         .transpose()?;
+    Ok(Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png: fit.png(), notes })
+}
+
+fn build(inputs: &Inputs, images: Images, recipe: &Recipe, stages: &mut ImportStages) -> Result<Case, SessionError> {
+    let Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png, mut notes } = images;
     stages.next("resampling the skull");
     let skull = ct.map(|ct| make_skull(&ct, recipe, isovalue_hu)).transpose()?;
     stages.next("meshing the brain");
@@ -89,6 +152,46 @@ fn build(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<
         brain.map(|(mri, mask)| make_brain(inputs, &mri, &mask, ct_from_mri, recipe, &mut notes)).transpose()?;
     stages.next("planning the opening");
     let opening = skull.as_ref().map(|skull| Opening::on(skull, isovalue_hu, brain.as_ref(), recipe.opening));
-    let fit_png = fit.png();
-    Ok(Case { fit_png, skull, isovalue_hu, brain, opening: opening.transpose()?.flatten(), notes, ..Case::default() })
+    let opening = opening.transpose()?.flatten();
+    Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
+}
+
+/// What a choice of voxel size and mesh needs to know of the images.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Facts {
+    /// Edge of the CT's own voxels, the mean of the three, mm. `None` without a CT.
+    pub ct_voxel_mm: Option<f64>,
+    /// Volume of the brain, mm³; `None` without an MRI.
+    pub brain_mm3: Option<f64>,
+}
+
+/// Volume of what is not 0, mm³.
+pub fn volume_mm3(mask: &VoxelVolume<u8>) -> f64 {
+    mask.data.iter().filter(|&&v| v != 0).count() as f64 * mask.spacing_mm().element_product()
+}
+
+/// What the facts are kept in.
+const FACTS: &str = "facts.json";
+
+impl Facts {
+    fn of(images: &Images) -> Self {
+        Self {
+            ct_voxel_mm: images.ct.as_ref().map(|ct| ct.spacing_mm().element_sum() / 3.0),
+            brain_mm3: images.mask.as_ref().map(volume_mm3),
+        }
+    }
+
+    fn kept(cache: &Cache, key: &str) -> Option<Self> {
+        serde_json::from_slice(&std::fs::read(cache.find(key)?.join(FACTS)).ok()?).ok()
+    }
+
+    /// Keeps them where that is possible; where it is not, the images are read once more.
+    fn keep(self, cache: &Cache, key: &str) -> Self {
+        let write = |folder: &Path| {
+            let json = serde_json::to_vec(&self).map_err(|fault| fault.to_string())?;
+            std::fs::write(folder.join(FACTS), json).map_err(|fault| fault.to_string())
+        };
+        cache.keep(key, write).err().into_iter().for_each(|fault| tracing::debug!("facts not kept: {fault}"));
+        self
+    }
 }

@@ -60,6 +60,8 @@ pub struct Case {
     pub name: String,
     /// Hash of inputs and recipe, hexadecimal.
     pub hash: String,
+    /// The numbers that it was made by; `None` only for a case that was put together by hand.
+    pub recipe: Option<Recipe>,
     /// Skull densities in HU on a grid of cubes, largest piece only; `None` without a CT.
     pub skull: Option<VoxelVolume<i16>>,
     /// Threshold of bone, HU.

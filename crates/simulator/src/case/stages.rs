@@ -29,6 +29,11 @@ impl ImportStages {
         self.bar.set_message(what);
     }
 
+    /// Does something that speaks for itself, without the bar in between.
+    pub fn suspend<T>(&self, call: impl FnOnce() -> T) -> T {
+        self.bar.suspend(call)
+    }
+
     /// All are done: "4.5 s: reading the CT 0.9 s (20 %), ...".
     pub fn finish(self) -> String {
         let end_ms = self.clock.now_ms();

@@ -1,6 +1,7 @@
 //! `report.html`: a session on one page that needs nothing else: pictures, curves from the recording, scores, the machine.
 
 use crate::report::chart::{Curve, histogram, over_time};
+use crate::models::ModelSummary;
 use crate::report::summary::Summary;
 use crate::run::Outcome;
 use base64::Engine;
@@ -35,12 +36,29 @@ pub fn html(summary: &Summary, outcome: &Outcome, recording: &Recording, shots: 
         summary.ticks,
         summary.rate_hz
     );
+    models(&mut page, summary);
     warnings(&mut page, summary);
     pictures(&mut page, shots);
     curves(&mut page, outcome, recording)?;
     numbers(&mut page, summary)?;
     page += "</body></html>\n";
     Ok(page)
+}
+
+/// What ran, and why.
+fn models(page: &mut String, summary: &Summary) {
+    let ModelSummary { quality, bone, tissue, picture, .. } = &summary.models;
+    let rays = if picture.sparse { "sparse rays" } else { "every ray" };
+    let parts = [
+        ("Bone", format!("{} on {} mm voxels", bone.method, bone.spacing_mm), &bone.why),
+        ("Tissue", format!("{}, {} tetrahedra", tissue.solver, tissue.tets), &tissue.why),
+        ("Picture", format!("{rays}, detail {}", picture.detail), &picture.why),
+    ];
+    *page += &format!("<h2>Models</h2><p>Quality: {quality}.</p><ul>");
+    for (name, what, why) in parts {
+        *page += &format!("<li>{name}: {} ({})</li>", escaped(&what), escaped(why));
+    }
+    *page += "</ul>";
 }
 
 fn warnings(page: &mut String, summary: &Summary) {

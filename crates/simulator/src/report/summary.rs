@@ -1,5 +1,6 @@
 //! `summary.json`: what a session did, in numbers.
 
+use crate::models::ModelSummary;
 use crate::program::Program;
 use crate::report::against::Against;
 use crate::report::regions::Region;
@@ -20,6 +21,8 @@ pub struct Summary {
     pub case: String,
     /// The device.
     pub device: String,
+    /// Which models ran, and why.
+    pub models: ModelSummary,
     /// Phases as they began.
     pub phases: Vec<PhaseStart>,
     /// Haptic ticks run.
@@ -252,6 +255,8 @@ pub struct About {
     pub device: String,
     /// The second hand's device.
     pub second_device: String,
+    /// Which models ran, and why.
+    pub models: ModelSummary,
     /// Name of the solver.
     pub solver: String,
     /// Tetrahedra, nodes, fixed nodes.
@@ -278,6 +283,7 @@ impl Summary {
             app: about.program.name().into(),
             case: about.case,
             device: about.device,
+            models: about.models,
             phases: phases(outcome),
             ticks: outcome.ticks.count,
             rate_hz: outcome.ticks.count as f64 / seconds,

@@ -2,10 +2,11 @@
 
 use crate::report::page::Shot;
 use crate::show::colours::{self, Colours};
-use crate::show::driver;
 use crate::show::picture::snap;
 use crate::table::Table;
 use std::path::Path;
+use trepan_budget::Picture;
+use trepan_gpu::{Gpu, GpuError};
 use trepan_link::Recording;
 use trepan_render::{Camera, Frame, Painter, SceneData, SliceLook};
 use trepan_volume::VoxelVolume;
@@ -26,8 +27,15 @@ pub struct Graphics {
 }
 
 impl Graphics {
-    /// Opens a painter for pictures of `size` pixels.
-    pub fn open(table: &Table, size: [u32; 2]) -> Result<Self, String> {
+    /// Opens a painter for pictures of `size` pixels on a device that was opened, or not. A window needs the device; without one the processor draws where the models leave out rays or
+    /// pixels that a software driver would draw on the same cores.
+    pub fn open(
+        table: &Table,
+        size: [u32; 2],
+        device: Result<Gpu, GpuError>,
+        windowed: bool,
+    ) -> Result<Self, String> {
+        let Picture { sparse, detail } = table.models.setup.picture;
         let brain = table.scene.brain.as_ref();
         let data = SceneData {
             bone: table.scene.bone.clone(),
@@ -35,7 +43,10 @@ impl Graphics {
             mri: brain.map(|brain| &brain.mri),
             tint: brain.and_then(|brain| brain.tint.as_deref()),
         };
-        let painter = Painter::on(driver::open(), &data, size).map_err(|fault| fault.to_string())?;
+        let spared = !windowed && (sparse || detail < 1.0) && device.as_ref().is_ok_and(Gpu::is_software);
+        let painter = if spared { Painter::by_processor(&data, size) } else { Painter::on(device, &data, size) };
+        let mut painter = painter.map_err(|fault| fault.to_string())?;
+        painter.set_quality(sparse, detail as f32).map_err(|fault| fault.to_string())?;
         painter.notice().inspect(|notice| tracing::warn!("{notice}"));
         Ok(Self { adapter: painter.name(), painter: Some(painter) })
     }

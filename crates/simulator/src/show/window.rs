@@ -140,7 +140,8 @@ pub fn run<S: window::Session + 'static>(
     let eye = camera(&opened.table.scene.site);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "before"));
     let start = Start::with(eye, at.sample.state.world_from_tool);
-    let start = Start { microscope: Some(microscope(&opened.table.scene.site)), ..start };
+    let detail = opened.table.models.setup.picture.detail as f32;
+    let start = Start { microscope: Some(microscope(&opened.table.scene.site)), detail, ..start };
     let closed = window::run(&format!("Trepan {}", opened.table.program.name()), painter, session, start);
     let (mut painter, session) = (closed.renderer, closed.session);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "after"));

@@ -1,0 +1,589 @@
+//! Which models a session runs, and why: what the user gave, else what the recording ran, else what the preset or the plan for this machine says.
+//!
+//! # Theory
+//! Bone, tissue and picture are chosen each for itself. What is given of a part stands; the rest of it is
+//!
+//! ```text
+//! a replay         the recording's, from its header
+//! --quality NAME   the preset's
+//! auto             the plan's, among the rows that have what is given (trepan_budget)
+//! ```
+//!
+//! # Practice
+//! Settled once at start. The machine is measured only for parts that a plan chooses, in under two seconds; a replay, a preset, or a session with everything given
+//! measures nothing, so that it is the same on every machine.
+
+use crate::case::Recipe;
+use crate::case::import::Facts;
+use crate::case::tissue::TissueClass;
+use crate::error::SessionError;
+use crate::measure::{self, Wanted};
+use crate::options::{Options, Patient, Tolerances};
+use crate::program::Program;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use trepan_budget::{Bone, Choice, Picture, Plan, Quality, Rows, Scene, Setup, Tissue};
+use trepan_geometry::{ToolKind, units};
+use trepan_link::Recording;
+use trepan_soft::Material;
+
+/// Total Lagrangian explicit dynamics.
+pub const TLED: &str = "tled";
+/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not have the recorded forces to the last bit.
+pub const FASTEST: &str = "fastest";
+
+/// The models of a session, and why these.
+#[derive(Clone, Debug)]
+pub struct Models {
+    /// What runs.
+    pub setup: Setup,
+    /// How it came about: the name of a quality, or `replay`.
+    pub by: &'static str,
+    /// Why this bone, this tissue, this picture.
+    pub why: [String; 3],
+    /// What of bone and tissue is given.
+    pub given: [Vec<String>; 2],
+    /// The tolerances that nothing keeps here in time.
+    pub unmet: Vec<String>,
+    /// The plan, where something was planned.
+    pub plan: Option<Plan>,
+}
+
+/// What is known of a session's models before its case is open.
+pub struct Wish {
+    program: Program,
+    /// `None` for a replay.
+    quality: Option<Quality>,
+    given: Given,
+    tolerances: Tolerances,
+    young_mpa: f32,
+    rate_hz: f32,
+    /// Pixels of the picture; `None` without pictures.
+    picture: Option<[u32; 2]>,
+    pictures_per_s: f64,
+    device_draws: bool,
+}
+
+/// What is given of each part, and in which words.
+#[derive(Clone, Debug, Default)]
+struct Given {
+    spacing_mm: Option<f64>,
+    rigid: Option<&'static str>,
+    points: Option<usize>,
+    tets: Option<usize>,
+    solver: Option<&'static str>,
+    still_mm: Option<f64>,
+    picture: Option<Picture>,
+    words: [Vec<String>; 2],
+}
+
+/// The method on bone of that name.
+fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
+    trepan_rigid::Method::named(name).ok_or_else(|| {
+        let known: Vec<_> = trepan_rigid::Method::all().iter().map(|method| method.name()).collect();
+        SessionError::Usage(format!("--rigid {name} is not known; known are {}", known.join(", ")))
+    })
+}
+
+/// The method that a part names, with its points.
+pub fn rigid_of(bone: &Bone) -> Result<trepan_rigid::Method, SessionError> {
+    rigid_named(bone.method).map(|method| method.with_points(bone.points))
+}
+
+/// The rival solver of that name; `None` for TLED.
+pub fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
+    if name == TLED || name == FASTEST {
+        return Ok(None);
+    }
+    trepan_soft::Method::named(name).map(Some).ok_or_else(|| {
+        let known: Vec<_> = trepan_soft::Method::all().iter().map(|method| method.name()).collect();
+        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {FASTEST}, {}", known.join(", ")))
+    })
+}
+
+/// A number of a flag as it was written: 0.7 and not 0.699999988.
+fn written(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or(f64::from(number))
+}
+
+impl Given {
+    /// By flags; refuses names that nobody knows.
+    fn flags(patient: &Patient, rigid: Option<&str>, solver: Option<&str>) -> Result<Self, SessionError> {
+        let tled = |name| if name == FASTEST { FASTEST } else { TLED };
+        let named = |name| Ok::<_, SessionError>(solver_named(name)?.map_or(tled(name), |method| method.name()));
+        let words = |flags: [(&str, Option<String>); 2]| {
+            flags.into_iter().filter_map(|(flag, value)| Some(format!("{flag} {} is given", value?))).collect()
+        };
+        Ok(Self {
+            spacing_mm: patient.spacing_mm.map(written),
+            rigid: rigid.map(|name| rigid_named(name).map(|method| method.name())).transpose()?,
+            points: rigid.map(|_| 0),
+            tets: patient.tets,
+            solver: solver.map(named).transpose()?,
+            still_mm: solver.map(|_| 0.0),
+            picture: None,
+            words: [
+                words([
+                    ("--spacing-mm", patient.spacing_mm.map(|mm| mm.to_string())),
+                    ("--rigid", rigid.map(String::from)),
+                ]),
+                words([("--tets", patient.tets.map(|n| n.to_string())), ("--solver", solver.map(String::from))]),
+            ],
+        })
+    }
+
+    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is usual.
+    fn recorded(config: &BTreeMap<String, String>) -> Self {
+        let number = |key: &str| config.get(key)?.parse::<f64>().ok().filter(|value| value.is_finite());
+        let count = |key: &str| config.get(key)?.parse::<usize>().ok();
+        // What was fastest then need not be fastest now: the processor's is the one that can be had again.
+        let solver = |name: &String| trepan_soft::Method::named(name).map_or(TLED, |method| method.name());
+        let detail = number("picture_detail");
+        Self {
+            spacing_mm: number("spacing_mm"),
+            rigid: config.get("rigid").and_then(|name| Some(trepan_rigid::Method::named(name)?.name())),
+            points: count("rigid_points"),
+            tets: count("tets"),
+            solver: config.get("solver").map(solver),
+            still_mm: number("still_mm"),
+            picture: detail.map(|detail| Picture { sparse: config["picture_sparse"] == "true", detail }),
+            words: Default::default(),
+        }
+    }
+
+    /// With what another one leaves open.
+    fn or(self, other: Self) -> Self {
+        Self {
+            spacing_mm: self.spacing_mm.or(other.spacing_mm),
+            points: self.points.or(other.points),
+            rigid: self.rigid.or(other.rigid),
+            tets: self.tets.or(other.tets),
+            still_mm: self.still_mm.or(other.still_mm),
+            solver: self.solver.or(other.solver),
+            picture: self.picture.or(other.picture),
+            words: self.words,
+        }
+    }
+
+    /// A part of a setup, with what is given instead.
+    fn bone(&self, bone: Bone) -> Bone {
+        let points = self.points.unwrap_or(if self.rigid.is_some() { 0 } else { bone.points });
+        let (method, spacing_mm) = (self.rigid.unwrap_or(bone.method), self.spacing_mm.unwrap_or(bone.spacing_mm));
+        Bone { method, spacing_mm, points }
+    }
+
+    fn tissue(&self, tissue: Tissue) -> Tissue {
+        Tissue {
+            solver: self.solver.unwrap_or(tissue.solver),
+            tets: self.tets.unwrap_or(tissue.tets),
+            still_mm: self.still_mm.unwrap_or(tissue.still_mm),
+        }
+    }
+}
+
+impl Wish {
+    /// What the options say, and what the recording ran that is run again; refuses names that nobody knows.
+    pub fn of(program: Program, options: &Options, recording: Option<&Recording>) -> Result<Self, SessionError> {
+        let preset = options.quality.filter(|&quality| quality != Quality::Auto);
+        let recording = recording.filter(|_| preset.is_none());
+        let given = Given::flags(&options.patient, options.rigid.as_deref(), options.solver.as_deref())?;
+        let pictures = !options.headless || options.frames_per_second > 0.0;
+        Ok(Self {
+            program,
+            quality: if recording.is_some() { None } else { Some(preset.unwrap_or_default()) },
+            given: recording.map(|r| Given::recorded(&r.header.config)).into_iter().fold(given, Given::or),
+            tolerances: options.tolerances,
+            young_mpa: units::mpa_from_kpa(options.young_modulus_kpa),
+            rate_hz: options.rate_hz,
+            picture: pictures.then_some(options.picture),
+            pictures_per_s: if options.headless { options.frames_per_second } else { LIVE_HZ },
+            device_draws: false,
+        })
+    }
+
+    /// What a plan is asked for, without a session.
+    pub fn to_plan(
+        program: Program,
+        patient: &Patient,
+        tolerances: Tolerances,
+        rate_hz: f32,
+        picture: [u32; 2],
+    ) -> Result<Self, SessionError> {
+        Ok(Self {
+            program,
+            quality: Some(Quality::Auto),
+            given: Given::flags(patient, None, None)?,
+            tolerances,
+            young_mpa: Material::BRAIN.young_mpa() as f32,
+            rate_hz,
+            picture: Some(picture),
+            pictures_per_s: LIVE_HZ,
+            device_draws: false,
+        })
+    }
+
+    /// With a graphics card that draws, or without.
+    pub fn drawn_by_card(self, device_draws: bool) -> Self {
+        Self { device_draws, ..self }
+    }
+
+    /// Whether it matters who draws.
+    pub fn plans_pictures(&self) -> bool {
+        self.quality == Some(Quality::Auto) && self.picture.is_some()
+    }
+
+    /// With what a case folder was built from: that stands.
+    pub fn on(mut self, recipe: &Recipe) -> Self {
+        let spacing_mm = written(recipe.spacing_mm);
+        let as_built = Given { spacing_mm: Some(spacing_mm), tets: Some(recipe.tets), ..Given::default() };
+        let words = [format!("voxels of {spacing_mm} mm"), format!("{} tetrahedra", recipe.tets)];
+        let of_parts = self.given.words.each_mut().into_iter().zip(words);
+        of_parts.for_each(|(part, what)| part.push(format!("the case folder has {what}")));
+        self.given = Given { words: self.given.words.clone(), ..as_built.or(self.given) };
+        self
+    }
+
+    /// The models for a case with these images.
+    pub fn settle(&self, facts: &Facts) -> Result<Models, SessionError> {
+        let (given, usual) = (&self.given, usual());
+        let preset = self.quality.map_or(Some(usual), Quality::preset);
+        let auto = preset.is_none();
+        let wanted = Wanted {
+            bone: auto && self.program.has_bone() && (given.spacing_mm.is_none() || given.rigid.is_none()),
+            tissue: auto && self.program.has_tissue() && (given.tets.is_none() || given.solver.is_none()),
+            picture: auto && self.picture.is_some(),
+        };
+        let plan = wanted.any().then(|| self.plan(facts, wanted)).transpose()?;
+        let base = preset.unwrap_or_else(|| plan.as_ref().map_or(usual, |plan| of_parts(plan, wanted, usual)));
+        let setup = Setup {
+            bone: given.bone(base.bone),
+            tissue: given.tissue(base.tissue),
+            picture: given.picture.unwrap_or(base.picture),
+        };
+        let (why, unmet) = self.why(plan.as_ref(), wanted);
+        let models = Models { setup, by: self.quality.map_or("replay", Quality::name), why, given: given.words.clone(), unmet, plan };
+        models.say();
+        Ok(models)
+    }
+
+    /// Measures the machine and plans what is wanted, among the rows that have what is given.
+    fn plan(&self, facts: &Facts, wanted: Wanted) -> Result<Plan, SessionError> {
+        let internal = |fault: trepan_budget::PlanError| SessionError::Internal(format!("--quality auto: {fault}"));
+        let (machine, mut rows) = (measure::machine(wanted, self.device_draws), Rows::stored().map_err(internal)?);
+        let near = |a: f64, all: &mut dyn Iterator<Item = f64>| {
+            let off = |b: &f64| (a / b).ln().abs();
+            all.min_by(|x, y| off(x).total_cmp(&off(y)))
+        };
+        let Given { spacing_mm, rigid, tets, solver, .. } = self.given;
+        rows.bone.retain(|row| rigid.is_none_or(|method| row.what.method == method));
+        let spacing_mm = spacing_mm.and_then(|mm| near(mm, &mut rows.bone.iter().map(|row| row.what.spacing_mm)));
+        rows.bone.retain(|row| spacing_mm.is_none_or(|mm| row.what.spacing_mm == mm));
+        rows.tissue.retain(|row| solver.is_none_or(|name| row.what.solver == name));
+        let tets = tets.and_then(|n| near(n as f64, &mut rows.tissue.iter().map(|row| row.what.tets as f64)));
+        rows.tissue.retain(|row| tets.is_none_or(|n| row.what.tets as f64 == n));
+        let scene = Scene {
+            has_bone: wanted.bone && !rows.bone.is_empty(),
+            has_tissue: wanted.tissue && !rows.tissue.is_empty(),
+            ..self.scene(facts)
+        };
+        trepan_budget::plan_with(&machine, &scene, &rows).map_err(internal)
+    }
+
+    /// What the session asks for, with the most demanding of the program's tools.
+    fn scene(&self, facts: &Facts) -> Scene {
+        let usual = Scene::default();
+        let thinnest = |kind: ToolKind| {
+            let of_kind = self.program.tray().iter().filter(|tool| tool.kind == kind);
+            of_kind.map(|tool| f64::from(tool.tip_radius_mm)).reduce(f64::min)
+        };
+        Scene {
+            force_error_n: self.tolerances.force_error_n.unwrap_or(usual.force_error_n),
+            displacement_mm: self.tolerances.displacement_mm.unwrap_or(usual.displacement_mm),
+            picture_error_percent: self.tolerances.picture_error_percent.unwrap_or(usual.picture_error_percent),
+            stiffness: BONE_STIFFNESS.into(),
+            press_mm: PRESS_N / f64::from(BONE_STIFFNESS),
+            tool_radius_mm: thinnest(ToolKind::Burr).unwrap_or(usual.tool_radius_mm),
+            probe_radius_mm: thinnest(ToolKind::Probe).unwrap_or(usual.probe_radius_mm),
+            finest_mm: facts.ct_voxel_mm.unwrap_or(usual.finest_mm),
+            brain_mm3: facts.brain_mm3.unwrap_or(usual.brain_mm3),
+            material: TissueClass::Brain.material(self.young_mpa),
+            device_rate_hz: self.rate_hz.into(),
+            picture_pixels: self.picture.map_or(usual.picture_pixels, view_pixels),
+            view_mm: VIEW_MM,
+            pictures_per_s: self.pictures_per_s,
+            ..usual
+        }
+    }
+
+    /// Why each part, and what is not kept.
+    fn why(&self, plan: Option<&Plan>, wanted: Wanted) -> ([String; 3], Vec<String>) {
+        let rest = match self.quality {
+            None => "as recorded".into(),
+            Some(Quality::Auto) => "as usual".into(),
+            Some(preset) => format!("preset {}", preset.name()),
+        };
+        let mut unmet = Vec::new();
+        let scene = plan.map_or_else(|| self.scene(&Facts::default()), |plan| plan.scene);
+        let (bone, tissue) = (plan.and_then(|p| p.bone.as_ref()), plan.and_then(|p| p.tissue.as_ref()));
+        let picture = plan.map(|p| &p.picture).filter(|_| wanted.picture);
+        let mut part = |name: &str, words: &[String], reason: Option<(String, bool)>| {
+            if let Some((reason, true)) = &reason {
+                unmet.push(format!("{name}: {reason}"));
+            }
+            let reason = reason.map_or_else(|| rest.clone(), |(reason, _)| reason);
+            words.iter().cloned().chain([reason]).collect::<Vec<_>>().join("; ")
+        };
+        let why = [
+            part("bone", &self.given.words[0], bone.map(|choice| reason(choice, scene.force_error_n, "N"))),
+            part("tissue", &self.given.words[1], tissue.map(|choice| reason(choice, scene.displacement_mm, "mm"))),
+            part("picture", &[], picture.map(|choice| reason(choice, scene.picture_error_percent, "%"))),
+        ];
+        (why, unmet)
+    }
+}
+
+/// Stiffness of bone in the hand, N/mm.
+pub const BONE_STIFFNESS: f32 = 2.0;
+/// Height of what the 3-D view shows at the opening, mm.
+const VIEW_MM: f64 = 105.0;
+/// Pictures a second in a window.
+const LIVE_HZ: f64 = 10.0;
+/// How hard a hand presses a burr, N.
+const PRESS_N: f64 = 1.0;
+
+/// What sessions ran before there was a choice.
+pub fn usual() -> Setup {
+    Quality::Usual.preset().expect("only auto has none")
+}
+
+/// A plan's parts where they are wanted.
+fn of_parts(plan: &Plan, wanted: Wanted, usual: Setup) -> Setup {
+    let planned = plan.setup();
+    Setup { picture: if wanted.picture { planned.picture } else { usual.picture }, ..planned }
+}
+
+/// Pixels of the 3-D view in a picture.
+fn view_pixels(picture: [u32; 2]) -> [u32; 2] {
+    let [_, _, width, height] = trepan_render::Layout::of(picture[0], picture[1], true).view;
+    [width, height]
+}
+
+/// Why a choice was made, and whether it leaves something to be wished for.
+fn reason<T: std::fmt::Display>(choice: &Choice<T>, tolerance: f64, unit: &str) -> (String, bool) {
+    let Choice { error, cost, meets_tolerance, in_time, better, cheaper, .. } = choice;
+    let why = match (in_time, meets_tolerance) {
+        (true, true) => "the cheapest within the tolerance",
+        (true, false) => "TOLERANCE NOT MET, the most accurate that runs in time",
+        (false, _) => "TOO SLOW, the cheapest there is",
+    };
+    let mut text = format!("{why}: error {error:.3} {unit} of {tolerance} allowed, {cost:.3} cores");
+    for (label, neighbour) in [("better", better), ("cheaper", cheaper)] {
+        if let Some(n) = neighbour {
+            let late = if n.in_time { "" } else { ", too slow here" };
+            text += &format!("; next {label} {}: {:.3} {unit}, {:.3} cores{late}", n.what, n.error, n.cost);
+        }
+    }
+    (text, !(*in_time && *meets_tolerance))
+}
+
+impl Models {
+    /// One line for each part, and what is not kept as a warning.
+    fn say(&self) {
+        let Setup { bone, tissue, picture } = &self.setup;
+        let parts: [(&str, &dyn std::fmt::Display); 3] = [("bone", bone), ("tissue", tissue), ("picture", picture)];
+        for ((name, what), why) in parts.into_iter().zip(&self.why) {
+            tracing::info!("{name}: {what} ({why})");
+        }
+        if let Some(plan) = &self.plan {
+            tracing::info!("planned: {:.2} cores of {}", plan.cores(), plan.machine.threads);
+        }
+        self.unmet.iter().for_each(|text| tracing::warn!("{text}"));
+    }
+
+    /// All of it for people: what was measured, what was chosen, why, and what lies next to it.
+    pub fn told(&self) -> String {
+        let Setup { bone, tissue, .. } = &self.setup;
+        let Some(plan) = &self.plan else { return format!("all is given, nothing was planned: {}", self.setup) };
+        let machine = &plan.machine;
+        let drawn = if machine.device_draws { "a graphics card draws".into() } else { format!("{:.0} ns a ray", machine.ns_per_ray) };
+        let mut text = format!(
+            "this machine: {:.1} ns a tetrahedron and step, {:.1} us a tick on bone, {drawn}, {} threads\n",
+            machine.ns_per_tet_step, machine.us_per_rigid_tick, machine.threads
+        );
+        text += &format!("this case: CT voxels of {:.2} mm, brain of {:.0} ml\n{plan}", plan.scene.finest_mm, plan.scene.brain_mm3 * 1e-3);
+        for (given, what) in self.given.iter().zip([bone as &dyn std::fmt::Display, tissue]) {
+            if !given.is_empty() {
+                text += &format!("{}: {what}\n", given.join(", "));
+            }
+        }
+        let unmet = self.unmet.iter().map(|text| format!("NOT KEPT: {text}\n"));
+        text + &unmet.collect::<String>()
+    }
+
+    /// As a recording keeps them; a replay takes the first ones back.
+    pub fn entries(&self) -> [(String, String); 12] {
+        let Setup { bone, tissue, picture } = &self.setup;
+        let [bone_why, tissue_why, picture_why] = self.why.clone();
+        [
+            ("rigid", bone.method.to_string()),
+            ("rigid_points", bone.points.to_string()),
+            ("spacing_mm", bone.spacing_mm.to_string()),
+            ("solver", tissue.solver.to_string()),
+            ("tets", tissue.tets.to_string()),
+            ("still_mm", tissue.still_mm.to_string()),
+            ("picture_sparse", picture.sparse.to_string()),
+            ("picture_detail", picture.detail.to_string()),
+            ("quality", self.by.to_string()),
+            ("bone_why", bone_why),
+            ("tissue_why", tissue_why),
+            ("picture_why", picture_why),
+        ]
+        .map(|(key, value)| (key.to_string(), value))
+    }
+
+    /// For the summary.
+    pub fn summary(&self) -> ModelSummary {
+        let Setup { bone, tissue, picture } = self.setup;
+        let [bone_why, tissue_why, picture_why] = self.why.clone();
+        ModelSummary {
+            quality: self.by,
+            bone: BoneSummary { method: bone.method, spacing_mm: bone.spacing_mm, points: bone.points, why: bone_why },
+            tissue: TissueSummary { solver: tissue.solver, tets: tissue.tets, still_mm: tissue.still_mm, why: tissue_why },
+            picture: PictureSummary { sparse: picture.sparse, detail: picture.detail, why: picture_why },
+            planned_cores: self.plan.as_ref().map(Plan::cores),
+        }
+    }
+}
+
+/// The models in `summary.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModelSummary {
+    /// How they came about: a quality, or `replay`.
+    pub quality: &'static str,
+    /// Bone.
+    pub bone: BoneSummary,
+    /// Tissue.
+    pub tissue: TissueSummary,
+    /// Picture.
+    pub picture: PictureSummary,
+    /// CPU seconds a second that the plan counts with; `null` without a plan.
+    pub planned_cores: Option<f64>,
+}
+
+/// How bone is represented and touched.
+#[derive(Clone, Debug, Serialize)]
+pub struct BoneSummary {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Edge of a voxel, mm.
+    pub spacing_mm: f64,
+    /// Points on the burr; 0 for the method's own.
+    pub points: usize,
+    /// Why.
+    pub why: String,
+}
+
+/// How tissue is represented and moved.
+#[derive(Clone, Debug, Serialize)]
+pub struct TissueSummary {
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// Tetrahedra that were asked for.
+    pub tets: usize,
+    /// What moves less in 50 ms sleeps, mm; 0 = nothing does.
+    pub still_mm: f64,
+    /// Why.
+    pub why: String,
+}
+
+/// How pictures are drawn.
+#[derive(Clone, Debug, Serialize)]
+pub struct PictureSummary {
+    /// Whether rays are left out where bone is smooth.
+    pub sparse: bool,
+    /// Share of the pixels along an edge.
+    pub detail: f64,
+    /// Why.
+    pub why: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    fn wish(line: &str, recording: Option<&Recording>) -> Wish {
+        let options = Options::try_parse_from(format!("x --headless {line}").split_whitespace()).unwrap();
+        Wish::of(Program::Integrated, &options, recording).unwrap()
+    }
+
+    const FACTS: Facts = Facts { ct_voxel_mm: Some(1.0), brain_mm3: Some(1.2e6) };
+
+    #[test]
+    fn presets_and_flags_are_taken_without_a_measurement() {
+        for quality in [Quality::Draft, Quality::Usual, Quality::Fine] {
+            let models = wish(&format!("--quality {}", quality.name()), None).settle(&FACTS).unwrap();
+            assert_eq!((Some(models.setup), models.plan.is_none()), (quality.preset(), true));
+        }
+        let models = wish("--quality draft --tets 3000 --rigid thesis", None).settle(&FACTS).unwrap();
+        let draft = Quality::Draft.preset().unwrap();
+        assert_eq!(models.setup.bone, Bone { method: "thesis", points: 0, ..draft.bone });
+        assert_eq!(models.setup.tissue, Tissue { tets: 3000, ..draft.tissue });
+        assert!(models.why[0].contains("--rigid thesis is given; preset draft"), "{}", models.why[0]);
+        let all = "--spacing-mm 0.7 --rigid thesis --tets 4000 --solver xpbd --frames-per-second 0";
+        let models = wish(all, None).settle(&FACTS).unwrap();
+        assert!(models.plan.is_none() && models.setup.bone.spacing_mm == 0.7 && models.setup.tissue.solver == "xpbd");
+    }
+
+    #[test]
+    fn auto_plans_what_is_not_given_and_says_why() {
+        let models = wish("--spacing-mm 0.7 --tets 9000 --frames-per-second 0", None).settle(&FACTS).unwrap();
+        assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.7, 9000));
+        let plan = models.plan.as_ref().unwrap();
+        assert_eq!(plan.bone.unwrap().what.method, models.setup.bone.method);
+        assert!(models.why[0].contains("--spacing-mm 0.7 is given; ") && models.why[0].contains(" N of 0.1 allowed"));
+        assert_eq!(models.why[2], "as usual", "no picture is drawn");
+    }
+
+    #[test]
+    fn what_cannot_be_kept_is_said_and_the_best_that_runs_is_taken() {
+        let models = wish("--force-error-n 0.0001 --displacement-mm 0.0001", None).settle(&FACTS).unwrap();
+        assert!(models.unmet.len() >= 2 && models.unmet[0].contains("TOLERANCE NOT MET"), "{:?}", models.unmet);
+        assert!(models.unmet[0].starts_with("bone: ") && models.unmet[1].starts_with("tissue: "));
+    }
+
+    #[test]
+    fn a_replay_takes_what_was_recorded_and_measures_nothing() {
+        let mut recording = Recording::default();
+        let recorded = wish("--quality fine --spacing-mm 0.85 --rigid thesis", None).settle(&FACTS).unwrap();
+        recording.header.config.extend(recorded.entries());
+        for line in ["", "--quality auto"] {
+            let again = wish(line, Some(&recording)).settle(&FACTS).unwrap();
+            assert_eq!((again.setup, again.by, again.plan.is_none()), (recorded.setup, "replay", true));
+        }
+        let other = wish("--tets 7000 --spacing-mm 2", Some(&recording)).settle(&FACTS).unwrap();
+        assert_eq!((other.setup.tissue.tets, other.setup.bone.spacing_mm), (7000, 2.0));
+        assert_eq!(other.setup.bone.method, "thesis");
+        let draft = wish("--quality draft", Some(&recording)).settle(&FACTS).unwrap();
+        assert_eq!(Some(draft.setup), Quality::Draft.preset());
+        recording.header.config = [("spacing_mm".to_string(), "1".to_string())].into();
+        let older = wish("", Some(&recording)).settle(&FACTS).unwrap();
+        assert_eq!(Some(older.setup), Quality::Usual.preset(), "an older one ran what was usual");
+    }
+
+    #[test]
+    fn a_case_folder_stands() {
+        let recipe = Recipe {
+            spacing_mm: 0.8,
+            tets: 6000,
+            isovalue_hu: None,
+            ct_series: None,
+            mri_series: None,
+            register: false,
+            opening: None,
+        };
+        let models = wish("--quality fine", None).on(&recipe).settle(&FACTS).unwrap();
+        assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.8, 6000));
+        assert!(models.why[0].contains("the case folder has voxels of 0.8 mm; preset fine"), "{}", models.why[0]);
+    }
+}
