@@ -30,7 +30,9 @@ impl Image {
         let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
         for &(y, below) in &rows {
             for &(x, right) in &columns {
-                let corner = |i, j| self.pixel((x + i).min(self.width - 1), (y + j).min(self.height - 1)).map(f32::from);
+                let corner = |i: u32, j: u32| {
+                    self.pixel((x + i).min(self.width - 1), (y + j).min(self.height - 1)).map(f32::from)
+                };
                 let (a, b, c, d) = (corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1));
                 let mix = |k: usize| {
                     let (upper, lower) = (a[k] + right * (b[k] - a[k]), c[k] + right * (d[k] - c[k]));
@@ -74,7 +76,11 @@ mod tests {
 
     #[test]
     fn an_enlarged_ramp_is_a_finer_ramp() {
-        let ramp = |n: u32| Image { width: n, height: 2, rgba: (0..2 * n).flat_map(|i| [(i % n * 240 / n) as u8; 4]).collect() };
+        let ramp = |n: u32| Image {
+            width: n,
+            height: 2,
+            rgba: (0..2 * n).flat_map(|i| [(i % n * 240 / n) as u8; 4]).collect(),
+        };
         let large = ramp(8).enlarged([32, 6]);
         assert_eq!((large.width, large.height, large.rgba.len()), (32, 6, 32 * 6 * 4));
         for x in 2..30 {

@@ -1,9 +1,9 @@
 //! What every program does with its command line: flags, session, exit code.
 
 use crate::batch;
+use crate::case::choice::plan_case;
 use crate::compare::compare;
 use crate::device_test;
-use crate::case::choice::plan_case;
 use crate::models::Wish;
 use crate::options::{CaseTask, DeviceTask, Patient, Task};
 use crate::report::summary::CutOff;

@@ -261,7 +261,14 @@ impl Wish {
             picture: given.picture.unwrap_or(base.picture),
         };
         let (why, unmet) = self.why(plan.as_ref(), wanted);
-        let models = Models { setup, by: self.quality.map_or("replay", Quality::name), why, given: given.words.clone(), unmet, plan };
+        let models = Models {
+            setup,
+            by: self.quality.map_or("replay", Quality::name),
+            why,
+            given: given.words.clone(),
+            unmet,
+            plan,
+        };
         models.say();
         Ok(models)
     }
@@ -405,12 +412,20 @@ impl Models {
         let Setup { bone, tissue, .. } = &self.setup;
         let Some(plan) = &self.plan else { return format!("all is given, nothing was planned: {}", self.setup) };
         let machine = &plan.machine;
-        let drawn = if machine.device_draws { "a graphics card draws".into() } else { format!("{:.0} ns a ray", machine.ns_per_ray) };
+        let drawn = if machine.device_draws {
+            "a graphics card draws".into()
+        } else {
+            format!("{:.0} ns a ray", machine.ns_per_ray)
+        };
         let mut text = format!(
             "this machine: {:.1} ns a tetrahedron and step, {:.1} us a tick on bone, {drawn}, {} threads\n",
             machine.ns_per_tet_step, machine.us_per_rigid_tick, machine.threads
         );
-        text += &format!("this case: CT voxels of {:.2} mm, brain of {:.0} ml\n{plan}", plan.scene.finest_mm, plan.scene.brain_mm3 * 1e-3);
+        text += &format!(
+            "this case: CT voxels of {:.2} mm, brain of {:.0} ml\n{plan}",
+            plan.scene.finest_mm,
+            plan.scene.brain_mm3 * 1e-3
+        );
         for (given, what) in self.given.iter().zip([bone as &dyn std::fmt::Display, tissue]) {
             if !given.is_empty() {
                 text += &format!("{}: {what}\n", given.join(", "));
@@ -448,7 +463,12 @@ impl Models {
         ModelSummary {
             quality: self.by,
             bone: BoneSummary { method: bone.method, spacing_mm: bone.spacing_mm, points: bone.points, why: bone_why },
-            tissue: TissueSummary { solver: tissue.solver, tets: tissue.tets, still_mm: tissue.still_mm, why: tissue_why },
+            tissue: TissueSummary {
+                solver: tissue.solver,
+                tets: tissue.tets,
+                still_mm: tissue.still_mm,
+                why: tissue_why,
+            },
             picture: PictureSummary { sparse: picture.sparse, detail: picture.detail, why: picture_why },
             planned_cores: self.plan.as_ref().map(Plan::cores),
         }

@@ -2,9 +2,10 @@
 
 use crate::case::Inputs;
 use crate::case::choice;
+use crate::case::scene::Scene;
 use crate::error::SessionError;
 use crate::hand::{self, Feel, Hand, SecondHold};
-use crate::models::Wish;
+use crate::models::{Models, Wish};
 use crate::operation::Operation;
 use crate::options::Options;
 use crate::program::Program;
@@ -30,7 +31,7 @@ use std::path::{Path, PathBuf};
 use trepan_geometry::ToolState;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_haptics::script::Script;
-use trepan_haptics::{DeviceName, HapticDevice, mouse};
+use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
 use trepan_volume::VoxelVolume;
@@ -103,7 +104,8 @@ impl Session {
         let second_feel = self.second_feel(second.as_ref());
         let start = self.start();
         let opening_needed = self.options.watch.is_none();
-        let stages = self.table.stages(start.state, self.tick_ms(), opening_needed, &feel, second_feel.as_ref())?;
+        let feels = (&feel, second_feel.as_ref());
+        let stages = self.table.stages(start.state, self.tick_ms(), opening_needed, feels, &Default::default())?;
         let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
         output::folder(&self.out)?;
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
@@ -138,6 +140,22 @@ impl Session {
             output::drilled(&self.out, bone, self.options.stl)?;
         }
         Ok(Ended { summary, out: self.out, signal: stop.signal() })
+    }
+
+    /// The patient as he lies there now.
+    pub fn scene(&self) -> &Scene {
+        &self.table.scene
+    }
+
+    /// Which models run, and why.
+    pub fn models(&self) -> &Models {
+        &self.table.models
+    }
+
+    /// The bodies of the loops for a hand without a device, for who turns them otherwise than [`run`](Self::run). The tool is at `start`; `touch` is how it is tested against tissue.
+    pub fn stages(&self, start: ToolState, touch: &trepan_deformable::Config) -> Result<Stages, SessionError> {
+        let feel = Feel::of(&Capabilities::passive("a script"), 1.0);
+        self.table.stages(start, self.tick_ms(), true, (&feel, None), touch)
     }
 
     /// Lets a teacher have a say in both hands' buttons, where this session is shared; with a window on another's session, this one teaches.

@@ -103,15 +103,17 @@ impl Table {
         start: ToolState,
         tick_ms: f32,
         opening_needed: bool,
-        feel: &Feel,
-        second: Option<&Feel>,
+        (feel, second): (&Feel, Option<&Feel>),
+        touch: &trepan_deformable::Config,
     ) -> Result<Stages, SessionError> {
         let rigid = rigid_of(&self.models.setup.bone)?;
         let config = |feel: &Feel| HapticConfig {
             program: self.program,
             rigid,
             dt_ms: tick_ms,
-            bone_force: Vibration::drill(feel.coupled(Viscoelastic { stiffness: BONE_STIFFNESS, damping: 0.5 }, tick_ms)),
+            bone_force: Vibration::drill(
+                feel.coupled(Viscoelastic { stiffness: BONE_STIFFNESS, damping: 0.5 }, tick_ms),
+            ),
             tissue_force: feel.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, tick_ms),
             guard: feel.guard(),
             limits: Limits::default(),
@@ -119,7 +121,7 @@ impl Table {
         };
         let bone = self.bone().cloned();
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));
-        let tissue = self.brain().map(|brain| self.tissue(brain)).transpose()?;
+        let tissue = self.brain().map(|brain| self.tissue(brain, touch)).transpose()?;
         let second = second.map(|feel| SecondHand::new(config(feel), bone.clone(), field.clone()));
         let search = bone.as_ref().and_then(|bone| self.plan.search(bone));
         let forbidden = self.scene.brain.as_ref().and_then(|brain| brain.distance_to(&self.operation.forbidden));
@@ -129,7 +131,7 @@ impl Table {
         Ok(Stages { haptic, second, tissue })
     }
 
-    fn tissue(&self, brain: &RestBrain) -> Result<run::Tissue, SessionError> {
+    fn tissue(&self, brain: &RestBrain, touch: &trepan_deformable::Config) -> Result<run::Tissue, SessionError> {
         let body = Body {
             mesh: brain.mesh.clone(),
             fixed: brain.fixed.clone(),
@@ -138,7 +140,7 @@ impl Table {
         };
         let wall = self.bone().cloned().map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed));
         let wall = wall.transpose().map_err(|fault| of_brain(&fault))?;
-        let collision = CollisionStage::new(self.program, &brain.mesh, &Default::default(), wall);
+        let collision = CollisionStage::new(self.program, &brain.mesh, touch, wall);
         let settling = Settling::new(self.operation.fluid_lost, Vec3::NEG_Y, -self.plan.site.inward);
         Ok(run::Tissue {
             collision: collision.map_err(|fault| of_brain(&fault))?.settling(settling),

@@ -71,7 +71,8 @@ mod tests {
 
     #[test]
     fn it_starts_where_it_is_told() {
-        let starts = [(false, 1.0), (true, 1.0), (false, 0.5), (true, 0.35), (false, 0.1)].map(|(s, d)| Quality::new(s, d).detail());
+        let starts = [(false, 1.0), (true, 1.0), (false, 0.5), (true, 0.35), (false, 0.1)]
+            .map(|(s, d)| Quality::new(s, d).detail());
         assert_eq!(starts, [1.0, 0.55, 0.4, 0.3, 0.3]);
     }
 

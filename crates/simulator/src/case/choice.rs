@@ -73,7 +73,7 @@ pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inp
     let case = import::open(program, &inputs(patient, built_in), &recipe, &Cache::of_user()?)?;
     let parent = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = out.file_name().and_then(|name| name.to_str()).unwrap_or("case");
-    let written = Cache::at(parent.into()).keep(name, |place| folder::save(&case, &recipe, place));
+    let written = Cache::at(parent.into()).keep(name, |place| folder::save(&case, place));
     written.map_err(|fault| SessionError::Internal(format!("cannot write {}: {fault}", out.display())))?;
     Ok(case.name)
 }

@@ -74,12 +74,7 @@ pub fn facts(program: Program, inputs: &Inputs, wanted: &Recipe, cache: &Cache) 
 }
 
 /// Names the images, and what of a recipe says how they are read.
-fn key_of_images(
-    program: Program,
-    inputs: &Inputs,
-    wanted: &Recipe,
-    cache: &Cache,
-) -> Result<String, SessionError> {
+fn key_of_images(program: Program, inputs: &Inputs, wanted: &Recipe, cache: &Cache) -> Result<String, SessionError> {
     needs(program, inputs)?;
     let images = [&inputs.ct, &inputs.mri, &inputs.labels];
     let tissues = inputs.tissues.iter().map(|source| &source.path);

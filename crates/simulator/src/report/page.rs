@@ -1,7 +1,7 @@
 //! `report.html`: a session on one page that needs nothing else: pictures, curves from the recording, scores, the machine.
 
-use crate::report::chart::{Curve, histogram, over_time};
 use crate::models::ModelSummary;
+use crate::report::chart::{Curve, histogram, over_time};
 use crate::report::summary::Summary;
 use crate::run::Outcome;
 use base64::Engine;

@@ -29,12 +29,7 @@ pub struct Graphics {
 impl Graphics {
     /// Opens a painter for pictures of `size` pixels on a device that was opened, or not. A window needs the device; without one the processor draws where the models leave out rays or
     /// pixels that a software driver would draw on the same cores.
-    pub fn open(
-        table: &Table,
-        size: [u32; 2],
-        device: Result<Gpu, GpuError>,
-        windowed: bool,
-    ) -> Result<Self, String> {
+    pub fn open(table: &Table, size: [u32; 2], device: Result<Gpu, GpuError>, windowed: bool) -> Result<Self, String> {
         let Picture { sparse, detail } = table.models.setup.picture;
         let brain = table.scene.brain.as_ref();
         let data = SceneData {

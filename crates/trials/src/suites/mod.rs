@@ -4,6 +4,7 @@ pub mod deformable;
 mod force;
 mod haptics;
 mod mesh;
+mod operation;
 mod render;
 pub mod rigid;
 mod simulators;
@@ -69,6 +70,13 @@ pub const ALL: &[Suite] = &[
         chart: ("stiffness_over_gil", "limit_cycle_mm"),
         parts: haptics::parts,
         judge: haptics::judge,
+    },
+    Suite {
+        name: "operation",
+        question: "what does the whole operation cost by each setup, and how wrong are force, bone and brain then",
+        chart: ("cpu_s_per_s", "error_over_tolerance"),
+        parts: operation::parts,
+        judge: operation::judge,
     },
     Suite {
         name: "render",

@@ -2,7 +2,7 @@
 
 mod bench;
 mod brain;
-mod case;
+pub mod case;
 mod flap;
 mod hands;
 mod holes;

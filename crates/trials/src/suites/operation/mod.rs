@@ -1,0 +1,113 @@
+//! The whole operation by every setup: what a choice of voxels, tetrahedra and methods costs the processor, and how wrong force, bone and brain then are.
+//!
+//! # Theory
+//! The hand goes the same way in every run: poses and buttons of the scripted operation (drill, open, press the brain), tick by tick at 1 kHz, as the finest setup's plan has them; forces do
+//! not move it. Each run turns the bodies of the loops as if every loop kept pace: a tick, a collision step, solver steps up to the tick's time. So a setup is blamed for its models and never
+//! for the machine's lateness; what a slow one costs stands beside it, as CPU time.
+//!
+//! ```text
+//! path (poses) ──> haptic tick ──> collision step ──> solver steps     every ms, each timed
+//!                      │                                   │
+//!                  force, bone                        shown surface ──> against the finest setup's
+//! ```
+//!
+//! # When not to use it
+//! To judge a method by itself: its own suite does so against closed forms. The truth here is a finer run by the recommended methods, not nature.
+
+mod error;
+mod ride;
+mod setups;
+
+use super::{Part, Scope};
+use crate::picture::{Chart, Mark};
+use crate::suite::{Findings, Gate, Row};
+use anyhow::Result;
+use error::Errors;
+use ride::Ride;
+use setups::Candidate;
+use std::sync::Mutex;
+
+/// Errors that a hand and an eye bear: what an error is measured in where all are one.
+const FORCE_N: f64 = 0.1;
+const SURFACE_MM: f64 = 1.0;
+/// What the rows are called.
+const SCENE: &str = "drill, open, press the brain";
+
+/// One part for each setup.
+pub fn parts(scope: Scope) -> Vec<Part> {
+    let part = |candidate: Candidate| {
+        Part::new(candidate.name, move |scope, findings: &mut Findings| match row(scope, &candidate) {
+            Ok(row) => findings.rows.push(row),
+            Err(fault) => {
+                findings.rows.push(Row::new(candidate.name, "not run").with("fault", format!("{fault:#}")));
+                findings.gates.push(Gate::at_least(format!("{}: runs", candidate.name), 0.0, 1.0));
+            }
+        })
+    };
+    setups::all(scope).into_iter().map(part).collect()
+}
+
+/// The finest run of this process: every part needs it, and it is the same for all.
+static TRUTH: Mutex<Option<(Scope, Ride)>> = Mutex::new(None);
+
+fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
+    let mut kept = TRUTH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    if kept.as_ref().is_none_or(|(of, _)| *of != scope) {
+        *kept = Some((scope, ride::truth(scope)?));
+    }
+    let (_, truth) = kept.as_ref().expect("it was just made");
+    let ride = ride::ride(scope, candidate, Some(truth))?;
+    let errors = Errors::between(&ride, truth);
+    let per_s = |seconds: f64| seconds / ride.seconds;
+    let worst = (errors.bone_p95_n / FORCE_N).max(errors.tissue_p95_n / FORCE_N).max(errors.shown_p95_mm / SURFACE_MM);
+    let mut row = Row::new(SCENE, candidate.name).with("setup", ride.setup.as_str()).with("seconds", ride.seconds);
+    for (name, value) in errors.named() {
+        row = row.metric(name, value);
+    }
+    Ok(row
+        .metric("error_over_tolerance", worst)
+        .metric("cpu_s_per_s", per_s(ride.cpu_s.iter().sum()))
+        .metric("haptic_cpu_s_per_s", per_s(ride.cpu_s[0]))
+        .metric("collision_cpu_s_per_s", per_s(ride.cpu_s[1]))
+        .metric("solver_cpu_s_per_s", per_s(ride.cpu_s[2]))
+        .metric("solver_steps", ride.steps as f64)
+        .metric("memory_mb", ride.memory_mb)
+        .metric("opened", f64::from(u8::from(ride.opened())))
+        .metric("truth_cpu_s_per_s", truth.cpu_s.iter().sum::<f64>() / truth.seconds))
+}
+
+/// Charts of error over CPU time, and what every setup must keep.
+pub fn judge(_: Scope, findings: &mut Findings) {
+    let charts = [
+        ("All errors: the worst over its tolerance (0.1 N, 1 mm)", "error_over_tolerance"),
+        ("Force on bone", "bone_force_error_rms_n"),
+        ("Force on the brain", "tissue_force_error_rms_n"),
+        ("Brain as it is shown, at the opening", "shown_error_p95_mm"),
+    ];
+    let number = |row: &Row, name: &str| row.metrics.get(name).copied().unwrap_or(f64::NAN);
+    let of_scene: Vec<Row> = findings.rows.iter().filter(|row| row.scene == SCENE).cloned().collect();
+    for (title, error) in charts {
+        let mark = |row: &Row| Mark {
+            method: row.method.clone(),
+            cost: number(row, "cpu_s_per_s"),
+            error: number(row, error),
+        };
+        findings.charts.push(Chart {
+            title: format!("The whole operation. {title}"),
+            cost: "cpu_s_per_s".into(),
+            error: error.into(),
+            marks: of_scene.iter().map(mark).collect(),
+            budget: Some((1.0, "one core".into())),
+            chosen: None,
+        });
+    }
+    for row in of_scene.iter().filter(|row| ["auto", "draft", "usual", "fine"].contains(&row.method.as_str())) {
+        findings.gates.push(Gate::at_least(format!("{}: the skull is opened", row.method), number(row, "opened"), 1.0));
+    }
+    let error = |name: &str, metric: &str| of_scene.iter().find(|r| r.method == name).map(|row| number(row, metric));
+    for metric in ["bone_force_error_rms_n", "shown_error_p95_mm"] {
+        if let (Some(fine), Some(draft)) = (error("fine", metric), error("draft", metric)) {
+            findings.gates.push(Gate::at_most(format!("{metric}: fine over draft"), fine / draft, 1.0));
+        }
+    }
+}
