@@ -141,6 +141,8 @@ fn names_that_nobody_knows() {
     bench.refuses(&["--device", "telepathy"], &["telepathy", "force-dimension"]);
     bench.refuses(&["--device", "replay:no-such.mcap"], &["no-such.mcap"]);
     bench.refuses(&["--device", "mouse"], &["window"]);
+    bench.refuses(&["--quality", "best"], &["best", "auto, draft, usual, fine"]);
+    bench.refuses(&["--displacement-mm", "-1"], &["--displacement-mm"]);
     bench.refuses(&["--rigid", "magic"], &["magic", "thesis"]);
     bench.refuses(&["--solver", "magic"], &["magic", "tled"]);
     bench.refuses(&["--duration", "-3"], &["duration"]);

@@ -208,7 +208,7 @@ fn no_identifier_leaves_the_input_files() {
     };
     fs::create_dir(&made).unwrap();
     run(&["case", "build"], "case", &[]);
-    run(&["--headless", "--duration", "1", "--picture", "64x48", "--stl"], "session", &[]);
+    run(&["--headless", "--quality", "usual", "--duration", "1", "--picture", "64x48", "--stl"], "session", &[]);
     let files = contents(&made);
     for name in
         ["case.json", "skull.nii", "session.mcap", "summary.json", "report.html", "drilled.nii.gz", "drilled.stl"]

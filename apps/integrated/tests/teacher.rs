@@ -10,7 +10,7 @@ use trepan_link::wire::{TeacherRecord, TickRecord};
 
 fn program(out: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_integrated"));
-    command.args(["--headless", "--frames-per-second", "0", "--out"]).arg(out).args(arguments);
+    command.args(["--headless", "--quality", "usual", "--frames-per-second", "0", "--out"]).arg(out).args(arguments);
     command.env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"));
     command.stdout(Stdio::null()).stderr(Stdio::null());
     command

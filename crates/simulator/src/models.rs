@@ -196,7 +196,7 @@ impl Wish {
             young_mpa: units::mpa_from_kpa(options.young_modulus_kpa),
             rate_hz: options.rate_hz,
             picture: pictures.then_some(options.picture),
-            pictures_per_s: if options.headless { options.frames_per_second } else { LIVE_HZ },
+            pictures_per_s: if options.headless && pictures { options.frames_per_second } else { LIVE_HZ },
             device_draws: false,
         })
     }

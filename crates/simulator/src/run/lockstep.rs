@@ -12,7 +12,7 @@
 //! ```
 //!
 //! # Practice
-//! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by how much. It runs as fast as it can; for a window that
+//! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by how much. Steps of another length are matched by simulated time. It runs as fast as it can; for a window that
 //! goes back and forth in time it is filmed meanwhile (`run/film.rs`).
 
 use crate::run::clock::Clock;
@@ -101,11 +101,15 @@ struct Again<'a> {
     collision_times: Times,
     replayed: Replayed,
     recording: &'a Recording,
+    /// Steps here for one that was recorded; `None` where they are equally long.
+    pace: Option<f64>,
 }
 
 impl<'a> Again<'a> {
     fn new(stages: Stages, recording: &'a Recording, pens: Pens, start: ToolSample) -> Self {
+        let dt_ms = stages.tissue.as_ref().map(|tissue| tissue.solver.dt_ms());
         Self {
+            pace: dt_ms.and_then(|dt_ms| pace(recording, dt_ms)),
             haptic: stages.haptic,
             second: stages.second,
             seconds: recording.second.iter(),
@@ -188,17 +192,22 @@ impl<'a> Again<'a> {
         }
     }
 
+    /// The step here at the time of a recorded one.
+    fn here(&self, step: u64) -> u64 {
+        self.pace.map_or(step, |pace| (step as f64 * pace).round() as u64)
+    }
+
     /// Every solver step up to a number, each with the contact that it had.
     fn solve_up_to(&mut self, step: u64, clock: &Clock) {
+        let step = self.here(step);
         while self.tissue.as_ref().is_some_and(|tissue| tissue.solver.steps() < step) {
             self.solve(clock);
         }
     }
 
     fn solve(&mut self, clock: &Clock) {
-        let Some(tissue) = &mut self.tissue else { return };
-        let next = tissue.solver.steps() + 1;
-        while let Some(switch) = self.switches.front().copied().filter(|s| s.step <= next) {
+        let Some(next) = self.tissue.as_ref().map(|tissue| tissue.solver.steps() + 1) else { return };
+        while let Some(switch) = self.switches.front().copied().filter(|s| self.here(s.step) <= next) {
             self.switches.pop_front();
             while self.loads.front().is_some_and(|(seq, _)| *seq < switch.contact_seq) {
                 self.loads.pop_front();
@@ -207,6 +216,7 @@ impl<'a> Again<'a> {
                 self.load.clone_from(load);
             }
         }
+        let Some(tissue) = &mut self.tissue else { return };
         let began_ms = clock.now_ms();
         let record = tissue.solver.step(&self.load.1, self.load.0);
         let us = ((clock.now_ms() - began_ms) * 1e3) as f32;
@@ -273,6 +283,13 @@ impl From<&SecondRecord> for Said {
     }
 }
 
+/// How many steps of `dt_ms` are one of a recording's; `None` where they are as long, so that the same steps are taken.
+fn pace(recording: &Recording, dt_ms: f32) -> Option<f64> {
+    let last = recording.solver.last().filter(|last| last.step > 0)?;
+    let recorded_ms = last.time_ms / last.step as f64;
+    (recorded_ms as f32 != dt_ms).then(|| recorded_ms / f64::from(dt_ms))
+}
+
 /// What the device said at a recorded tick.
 fn reading(Said { tool, flags }: Said) -> Reading {
     let status = match (flags & TickRecord::LOST != 0, flags & TickRecord::STALE != 0) {
@@ -288,4 +305,19 @@ fn remember<T>(memory: &mut VecDeque<T>, item: T) {
         memory.pop_front();
     }
     memory.push_back(item);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_another_length_are_matched_by_time() {
+        let dt_ms = 0.837_21f32;
+        let last = SolverRecord { step: 7168, time_ms: 7168.0 * f64::from(dt_ms), ..SolverRecord::default() };
+        let recording = Recording { solver: vec![last], ..Recording::default() };
+        assert_eq!(pace(&recording, dt_ms), None, "the same steps");
+        assert!((pace(&recording, 0.5 * dt_ms).expect("another length") - 2.0).abs() < 1e-9);
+        assert_eq!(pace(&Recording::default(), dt_ms), None);
+    }
 }

@@ -5,7 +5,7 @@ use super::setups::{self, Candidate};
 use crate::suites::simulators::case;
 use anyhow::{Context, Result};
 use clap::Parser;
-use std::time::Instant;
+use cpu_time::ThreadTime;
 use trepan_contact::SurfacePatch;
 use trepan_geometry::{ToolState, Vec3};
 use trepan_haptics::script::{self, Script, Site};
@@ -18,9 +18,10 @@ use trepan_volume::BoneVolume;
 const OPENING: &str = "108,8,84";
 /// Time between two looks at the brain, ms.
 pub const LOOK_MS: u64 = 250;
-/// Radius around the way in within which the brain is looked at and bone is counted, mm.
-const AROUND_MM: i32 = 8;
-/// Distance of two places where bone is looked for, mm.
+/// Radius around the way in within which the brain is looked at, and bone is counted, mm: the hole and its rim.
+const LOOK_RADIUS_MM: f32 = 5.0;
+const BONE_RADIUS_MM: f32 = 8.0;
+/// Distance of two rays, and of two places where bone is looked for, mm.
 pub const PLACE_MM: f32 = 0.5;
 /// Above and below the entry, mm, in which it is.
 const ABOVE_MM: f32 = 4.0;
@@ -36,8 +37,8 @@ pub struct Ride {
     pub forces: Vec<Vec3>,
     /// Whether the probe was in the hand at each tick.
     pub probing: Vec<bool>,
-    /// Depth of the brain's surface along the way in, mm from the entry, at places around it, every [`LOOK_MS`]; NaN beside the brain.
-    pub looks: Vec<Vec<f32>>,
+    /// The brain's surface, every [`LOOK_MS`].
+    pub looks: Vec<Look>,
     /// Whether bone is gone, at places around the entry.
     pub removed: Vec<bool>,
     /// CPU time of haptic, collision and solver loop, s.
@@ -48,6 +49,14 @@ pub struct Ride {
     pub seconds: f64,
     /// Memory that the session held more than the process before, MB.
     pub memory_mb: f64,
+}
+
+/// The brain's surface at one time.
+pub struct Look {
+    /// Where rays along the way in meet it first, mm.
+    pub seen: Vec<Vec3>,
+    /// Its triangles near there.
+    pub triangles: Vec<[Vec3; 3]>,
 }
 
 impl Ride {
@@ -115,14 +124,14 @@ fn run(mut stages: Stages, milliseconds: u64, path: &Script, rays: &Rays, ride: 
         ride.forces.push(tick.wrench.force());
         ride.probing.push(tick.sample.phase() == Phase::Brain);
         if ms % LOOK_MS == 0 {
-            ride.looks.push(rays.depths(&frame.positions));
+            ride.looks.push(rays.look(&frame.positions));
         }
     }
     ride.steps = tissue.solver.steps();
 }
 
 fn timed<T>(seconds: &mut f64, call: impl FnOnce() -> T) -> T {
-    let began = Instant::now();
+    let began = ThreadTime::now();
     let done = call();
     *seconds += began.elapsed().as_secs_f64();
     done
@@ -134,18 +143,19 @@ fn across(site: &Site) -> [Vec3; 2] {
     [right, site.inward.cross(right)]
 }
 
+/// Points of a disc across the way in, from its middle.
+fn disc(site: &Site, radius_mm: f32) -> impl Iterator<Item = Vec3> {
+    let ([right, up], count) = (across(site), (radius_mm / PLACE_MM) as i32);
+    let square = (-count..=count).flat_map(move |i| (-count..=count).map(move |j| (i, j)));
+    let round = square.filter(move |(i, j)| i * i + j * j <= count * count);
+    round.map(move |(i, j)| PLACE_MM * (i as f32 * right + j as f32 * up))
+}
+
 /// Places around the entry, a cylinder along the way in.
 fn places(site: &Site) -> Vec<Vec3> {
-    let [right, up] = across(site);
-    let count = (AROUND_MM as f32 / PLACE_MM) as i32;
-    let disc = (-count..=count).flat_map(|i| (-count..=count).map(move |j| (i, j)));
-    let disc = disc.filter(|(i, j)| i * i + j * j <= count * count);
     let levels = ((ABOVE_MM + BELOW_MM) / PLACE_MM) as i32;
-    let place = |(i, j): (i32, i32), k: i32| {
-        let aside = PLACE_MM * (i as f32 * right + j as f32 * up);
-        site.entry + aside + (PLACE_MM * k as f32 - ABOVE_MM) * site.inward
-    };
-    disc.flat_map(|at| (0..levels).map(move |k| place(at, k))).collect()
+    let level = |k: i32| site.entry + (PLACE_MM * k as f32 - ABOVE_MM) * site.inward;
+    disc(site, BONE_RADIUS_MM).flat_map(|aside| (0..levels).map(move |k| level(k) + aside)).collect()
 }
 
 /// Whether there is bone at some places, by trilinear interpolation.
@@ -162,44 +172,42 @@ fn is_bone(bone: &BoneVolume, places: &[Vec3]) -> Vec<bool> {
     places.iter().map(at).collect()
 }
 
-/// Looks along the way in at the brain's surface, a millimetre apart.
+/// Looks along the way in at the brain's surface.
 struct Rays {
-    /// Origin of each, 30 mm over the entry.
+    /// Origin of each, over the entry.
     origins: Vec<Vec3>,
     inward: Vec3,
     /// Triangles near the way in.
     triangles: Vec<[u32; 3]>,
 }
 
+/// Where rays begin, mm over the entry.
+const OVER_MM: f32 = 30.0;
+/// A triangle is near the way in when a corner is within this, mm: more than an edge and what the brain moves.
+const NEAR_MM: f32 = 25.0;
+
 impl Rays {
     fn new(positions: &[Vec3], triangles: &[[u32; 3]], site: Site) -> Self {
-        let [right, up] = across(&site);
-        let disc = (-AROUND_MM..=AROUND_MM).flat_map(|i| (-AROUND_MM..=AROUND_MM).map(move |j| (i, j)));
-        let disc = disc.filter(|(i, j)| i * i + j * j <= AROUND_MM * AROUND_MM);
-        let over = site.entry - 30.0 * site.inward;
-        // A triangle moves by some mm, and its edges are shorter than this.
-        let near = |triangle: &&[u32; 3]| {
-            triangle.iter().any(|&node| {
-                let from = positions[node as usize] - site.entry;
-                (from - from.dot(site.inward) * site.inward).length() < AROUND_MM as f32 + 25.0
-                    && from.dot(site.inward) < 40.0
-            })
+        let near = |node: &u32| {
+            let from = positions[*node as usize] - site.entry;
+            let along = from.dot(site.inward);
+            (from - along * site.inward).length() < NEAR_MM && (-OVER_MM..OVER_MM).contains(&along)
         };
         Self {
-            origins: disc.map(|(i, j)| over + i as f32 * right + j as f32 * up).collect(),
+            origins: disc(&site, LOOK_RADIUS_MM).map(|aside| site.entry - OVER_MM * site.inward + aside).collect(),
             inward: site.inward,
-            triangles: triangles.iter().filter(near).copied().collect(),
+            triangles: triangles.iter().filter(|corners| corners.iter().any(near)).copied().collect(),
         }
     }
 
-    /// How deep below the entry's level each meets the brain, mm.
-    fn depths(&self, positions: &[Vec3]) -> Vec<f32> {
-        let corners: Vec<[Vec3; 3]> = self.triangles.iter().map(|t| t.map(|node| positions[node as usize])).collect();
+    fn look(&self, positions: &[Vec3]) -> Look {
+        let triangles: Vec<[Vec3; 3]> = self.triangles.iter().map(|t| t.map(|node| positions[node as usize])).collect();
         let first = |origin: &Vec3| {
-            let hits = corners.iter().filter_map(|corners| hit(*origin, self.inward, corners));
-            hits.reduce(f32::min).map_or(f32::NAN, |along| along - 30.0)
+            let hits = triangles.iter().filter_map(|corners| hit(*origin, self.inward, corners));
+            hits.reduce(f32::min).map(|along| *origin + along * self.inward)
         };
-        self.origins.iter().map(first).collect()
+        let seen = self.origins.iter().filter_map(first).collect();
+        Look { seen, triangles }
     }
 }
 
@@ -237,11 +245,11 @@ mod tests {
     }
 
     #[test]
-    fn depths_are_those_of_a_plane() {
+    fn a_plane_is_seen_where_it_lies() {
         let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 };
         let square = [(-20.0, -20.0), (20.0, -20.0), (20.0, 20.0), (-20.0, 20.0)].map(|(x, y)| Vec3::new(x, y, -8.5));
-        let rays = Rays::new(&square, &[[0, 1, 2], [0, 2, 3]], site);
-        let depths = rays.depths(&square);
-        assert!(depths.len() > 190 && depths.iter().all(|depth| (depth - 8.5).abs() < 1e-4));
+        let look = Rays::new(&square, &[[0, 1, 2], [0, 2, 3]], site).look(&square);
+        assert!(look.seen.len() > 300 && look.seen.iter().all(|seen| (seen.z + 8.5).abs() < 1e-4));
+        assert!(look.seen.iter().all(|seen| seen.truncate().length() < LOOK_RADIUS_MM + 1e-3));
     }
 }

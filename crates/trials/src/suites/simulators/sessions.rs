@@ -27,7 +27,7 @@ pub fn replays(scope: Scope) -> Result<Findings> {
     let folder = tempfile::tempdir()?;
     let place = |name: &str| folder.path().join(name);
     let seconds = scope.pick("4", "20");
-    let recorded = run(&place("recorded"), &["--duration", seconds])?;
+    let recorded = run(&place("recorded"), &["--quality", "usual", "--duration", seconds])?;
     let device = format!("replay:{}", place("recorded").join("session.mcap").display());
     let mut findings = Findings::default();
     findings.rows.push(
@@ -82,7 +82,7 @@ pub fn soak(minutes: f64) -> Result<Findings> {
                 }
             }
         });
-        let summary = run(folder.path(), &["--duration", &seconds]);
+        let summary = run(folder.path(), &["--quality", "usual", "--duration", &seconds]);
         over.store(true, Ordering::Relaxed);
         summary
     })?;

@@ -1,0 +1,99 @@
+//! Which models a session runs: presets reach the loops and the picture, a plan is recorded and replayed bit for bit without a new one.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use trepan_link::Recording;
+use trepan_volume::nifti;
+
+fn integrated(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_integrated"));
+    command.args(arguments).env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"));
+    command.output().unwrap()
+}
+
+/// Runs an operation of some seconds; gives its summary and what it said.
+fn operation(out: &Path, seconds: &str, more: &[&str]) -> (Value, String) {
+    let fixed = ["--headless", "--duration", seconds, "--out", out.to_str().unwrap()];
+    let done = integrated(&[&fixed, more].concat());
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success(), "{said}");
+    (serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap(), said)
+}
+
+fn replay_of(out: &Path) -> String {
+    format!("replay:{}", out.join("session.mcap").display())
+}
+
+#[test]
+fn a_preset_reaches_loops_and_picture() {
+    let out = tempfile::tempdir().unwrap();
+    let pictures = ["--quality", "draft", "--frames-per-second", "1", "--picture", "160x96"];
+    let (summary, said) = operation(out.path(), "2", &pictures);
+    let models = &summary["models"];
+    assert_eq!((&models["quality"], &models["planned_cores"]), (&Value::from("draft"), &Value::Null));
+    assert_eq!((models["bone"]["spacing_mm"].as_f64(), models["picture"]["detail"].as_f64()), (Some(1.5), Some(0.5)));
+    assert!(said.contains("bone: distance-field on 1.5 mm voxels (preset draft)"), "{said}");
+    // Not what was wished for: what ran.
+    let tets = summary["solver"]["tets"].as_f64().unwrap();
+    assert!((tets / 5000.0 - 1.0).abs() < 0.1, "{tets} tetrahedra");
+    let skull = nifti::read(&out.path().join("drilled.nii.gz")).unwrap();
+    assert!((skull.spacing_mm().x - 1.5).abs() < 1e-4, "{}", skull.spacing_mm());
+    assert!(summary["frames"].as_u64().unwrap() >= 2);
+    let png = fs::read(out.path().join("frames/frame-00000.png")).unwrap();
+    assert_eq!(
+        (&png[16..20], &png[20..24]),
+        (&160u32.to_be_bytes()[..], &96u32.to_be_bytes()[..]),
+        "enlarged to its size"
+    );
+    assert!(fs::read_to_string(out.path().join("report.html")).unwrap().contains("Quality: draft."));
+}
+
+#[test]
+fn a_planned_session_replays_bit_for_bit_without_a_plan() {
+    let [live, again, other] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    let (was, said) = operation(live.path(), "4", &["--force-error-n", "0.2", "--frames-per-second", "0"]);
+    assert_eq!(was["models"]["quality"], "auto");
+    assert!(said.contains("planned: ") && said.contains(" N of 0.2 allowed"), "{said}");
+    let header = Recording::open(&live.path().join("session.mcap")).unwrap().header;
+    assert_eq!(header.config["quality"], "auto");
+    assert_eq!(was["models"]["tissue"]["tets"].to_string(), header.config["tets"]);
+
+    let device = replay_of(live.path());
+    let (is, said) = operation(again.path(), "4", &["--device", &device, "--frames-per-second", "0"]);
+    assert!(!said.contains("planned: "), "{said}");
+    assert_eq!(
+        (&is["models"]["quality"], &is["replay"]["identical"]),
+        (&Value::from("replay"), &is["replay"]["ticks"])
+    );
+    for part in ["bone", "tissue"] {
+        let without_why = |mut part: Value| {
+            part.as_object_mut().unwrap().remove("why");
+            part
+        };
+        assert_eq!(without_why(is["models"][part].clone()), without_why(was["models"][part].clone()));
+    }
+
+    // By another mesh the same time passes, whatever its steps.
+    let (is, _) = operation(other.path(), "4", &["--device", &device, "--tets", "3000", "--frames-per-second", "0"]);
+    let [was, is] = [was, is].map(|summary| {
+        let solver = &summary["solver"];
+        (solver["real_time_factor"].as_f64().unwrap(), solver["dt_ms"].as_f64().unwrap())
+    });
+    // Live the factor is over wall time, which ends a little after the last tick.
+    assert!((is.0 / was.0 - 1.0).abs() < 0.1, "{is:?} {was:?}");
+}
+
+#[test]
+fn a_plan_is_told_for_the_case_that_is_given() {
+    let told = integrated(&["plan", "--tets", "6000", "--force-error-n", "0.00001"]);
+    assert!(told.status.success());
+    let told = String::from_utf8_lossy(&told.stdout).into_owned();
+    for words in
+        ["this machine: ", "this case: CT voxels of ", "--tets 6000 is given", "next ", "cores", "TOLERANCE NOT MET"]
+    {
+        assert!(told.contains(words), "{words:?} is not in: {told}");
+    }
+}
