@@ -95,8 +95,8 @@ fn planned(
     built_in: Inputs,
     wish: Wish,
 ) -> Result<ExitCode, SessionError> {
-    let card = driver::open().is_ok_and(|gpu| !gpu.is_software());
-    let models = plan_case(program, case, patient, built_in, wish.drawn_by_card(card))?;
+    let card = || driver::open().is_ok_and(|gpu| !gpu.is_software());
+    let models = plan_case(program, case, patient, built_in, wish, card)?;
     println!("{}", models.told());
     Ok(ExitCode::SUCCESS)
 }

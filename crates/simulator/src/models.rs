@@ -61,7 +61,6 @@ pub struct Wish {
     /// Pixels of the picture; `None` without pictures.
     picture: Option<[u32; 2]>,
     pictures_per_s: f64,
-    device_draws: bool,
 }
 
 /// What is given of each part, and in which words.
@@ -197,7 +196,6 @@ impl Wish {
             rate_hz: options.rate_hz,
             picture: pictures.then_some(options.picture),
             pictures_per_s: if options.headless && pictures { options.frames_per_second } else { LIVE_HZ },
-            device_draws: false,
         })
     }
 
@@ -218,18 +216,7 @@ impl Wish {
             rate_hz,
             picture: Some(picture),
             pictures_per_s: LIVE_HZ,
-            device_draws: false,
         })
-    }
-
-    /// With a graphics card that draws, or without.
-    pub fn drawn_by_card(self, device_draws: bool) -> Self {
-        Self { device_draws, ..self }
-    }
-
-    /// Whether it matters who draws.
-    pub fn plans_pictures(&self) -> bool {
-        self.quality == Some(Quality::Auto) && self.picture.is_some()
     }
 
     /// With what a case folder was built from: that stands.
@@ -243,8 +230,8 @@ impl Wish {
         self
     }
 
-    /// The models for a case with these images.
-    pub fn settle(&self, facts: &Facts) -> Result<Models, SessionError> {
+    /// The models for a case with these images. `card` says whether a graphics card draws; it is asked only where that matters.
+    pub fn settle(&self, facts: &Facts, card: impl FnOnce() -> bool) -> Result<Models, SessionError> {
         let (given, usual) = (&self.given, usual());
         let preset = self.quality.map_or(Some(usual), Quality::preset);
         let auto = preset.is_none();
@@ -253,7 +240,7 @@ impl Wish {
             tissue: auto && self.program.has_tissue() && (given.tets.is_none() || given.solver.is_none()),
             picture: auto && self.picture.is_some(),
         };
-        let plan = wanted.any().then(|| self.plan(facts, wanted)).transpose()?;
+        let plan = wanted.any().then(|| self.plan(facts, wanted, wanted.picture && card())).transpose()?;
         let base = preset.unwrap_or_else(|| plan.as_ref().map_or(usual, |plan| of_parts(plan, wanted, usual)));
         let setup = Setup {
             bone: given.bone(base.bone),
@@ -261,22 +248,20 @@ impl Wish {
             picture: given.picture.unwrap_or(base.picture),
         };
         let (why, unmet) = self.why(plan.as_ref(), wanted);
-        let models = Models {
+        Ok(Models {
             setup,
             by: self.quality.map_or("replay", Quality::name),
             why,
             given: given.words.clone(),
             unmet,
             plan,
-        };
-        models.say();
-        Ok(models)
+        })
     }
 
     /// Measures the machine and plans what is wanted, among the rows that have what is given.
-    fn plan(&self, facts: &Facts, wanted: Wanted) -> Result<Plan, SessionError> {
+    fn plan(&self, facts: &Facts, wanted: Wanted, device_draws: bool) -> Result<Plan, SessionError> {
         let internal = |fault: trepan_budget::PlanError| SessionError::Internal(format!("--quality auto: {fault}"));
-        let (machine, mut rows) = (measure::machine(wanted, self.device_draws), Rows::stored().map_err(internal)?);
+        let (machine, mut rows) = (measure::machine(wanted, device_draws), Rows::stored().map_err(internal)?);
         let near = |a: f64, all: &mut dyn Iterator<Item = f64>| {
             let off = |b: &f64| (a / b).ln().abs();
             all.min_by(|x, y| off(x).total_cmp(&off(y)))
@@ -395,7 +380,7 @@ fn reason<T: std::fmt::Display>(choice: &Choice<T>, tolerance: f64, unit: &str) 
 
 impl Models {
     /// One line for each part, and what is not kept as a warning.
-    fn say(&self) {
+    pub fn say(&self) {
         let Setup { bone, tissue, picture } = &self.setup;
         let parts: [(&str, &dyn std::fmt::Display); 3] = [("bone", bone), ("tissue", tissue), ("picture", picture)];
         for ((name, what), why) in parts.into_iter().zip(&self.why) {
@@ -542,22 +527,22 @@ mod tests {
     #[test]
     fn presets_and_flags_are_taken_without_a_measurement() {
         for quality in [Quality::Draft, Quality::Usual, Quality::Fine] {
-            let models = wish(&format!("--quality {}", quality.name()), None).settle(&FACTS).unwrap();
+            let models = wish(&format!("--quality {}", quality.name()), None).settle(&FACTS, || false).unwrap();
             assert_eq!((Some(models.setup), models.plan.is_none()), (quality.preset(), true));
         }
-        let models = wish("--quality draft --tets 3000 --rigid thesis", None).settle(&FACTS).unwrap();
+        let models = wish("--quality draft --tets 3000 --rigid thesis", None).settle(&FACTS, || false).unwrap();
         let draft = Quality::Draft.preset().unwrap();
         assert_eq!(models.setup.bone, Bone { method: "thesis", points: 0, ..draft.bone });
         assert_eq!(models.setup.tissue, Tissue { tets: 3000, ..draft.tissue });
         assert!(models.why[0].contains("--rigid thesis is given; preset draft"), "{}", models.why[0]);
         let all = "--spacing-mm 0.7 --rigid thesis --tets 4000 --solver xpbd --frames-per-second 0";
-        let models = wish(all, None).settle(&FACTS).unwrap();
+        let models = wish(all, None).settle(&FACTS, || false).unwrap();
         assert!(models.plan.is_none() && models.setup.bone.spacing_mm == 0.7 && models.setup.tissue.solver == "xpbd");
     }
 
     #[test]
     fn auto_plans_what_is_not_given_and_says_why() {
-        let models = wish("--spacing-mm 0.7 --tets 9000 --frames-per-second 0", None).settle(&FACTS).unwrap();
+        let models = wish("--spacing-mm 0.7 --tets 9000 --frames-per-second 0", None).settle(&FACTS, || false).unwrap();
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.7, 9000));
         let plan = models.plan.as_ref().unwrap();
         assert_eq!(plan.bone.unwrap().what.method, models.setup.bone.method);
@@ -567,7 +552,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_kept_is_said_and_the_best_that_runs_is_taken() {
-        let models = wish("--force-error-n 0.0001 --displacement-mm 0.0001", None).settle(&FACTS).unwrap();
+        let models = wish("--force-error-n 0.0001 --displacement-mm 0.0001", None).settle(&FACTS, || false).unwrap();
         assert!(models.unmet.len() >= 2 && models.unmet[0].contains("TOLERANCE NOT MET"), "{:?}", models.unmet);
         assert!(models.unmet[0].starts_with("bone: ") && models.unmet[1].starts_with("tissue: "));
     }
@@ -575,19 +560,19 @@ mod tests {
     #[test]
     fn a_replay_takes_what_was_recorded_and_measures_nothing() {
         let mut recording = Recording::default();
-        let recorded = wish("--quality fine --spacing-mm 0.85 --rigid thesis", None).settle(&FACTS).unwrap();
+        let recorded = wish("--quality fine --spacing-mm 0.85 --rigid thesis", None).settle(&FACTS, || false).unwrap();
         recording.header.config.extend(recorded.entries());
         for line in ["", "--quality auto"] {
-            let again = wish(line, Some(&recording)).settle(&FACTS).unwrap();
+            let again = wish(line, Some(&recording)).settle(&FACTS, || false).unwrap();
             assert_eq!((again.setup, again.by, again.plan.is_none()), (recorded.setup, "replay", true));
         }
-        let other = wish("--tets 7000 --spacing-mm 2", Some(&recording)).settle(&FACTS).unwrap();
+        let other = wish("--tets 7000 --spacing-mm 2", Some(&recording)).settle(&FACTS, || false).unwrap();
         assert_eq!((other.setup.tissue.tets, other.setup.bone.spacing_mm), (7000, 2.0));
         assert_eq!(other.setup.bone.method, "thesis");
-        let draft = wish("--quality draft", Some(&recording)).settle(&FACTS).unwrap();
+        let draft = wish("--quality draft", Some(&recording)).settle(&FACTS, || false).unwrap();
         assert_eq!(Some(draft.setup), Quality::Draft.preset());
         recording.header.config = [("spacing_mm".to_string(), "1".to_string())].into();
-        let older = wish("", Some(&recording)).settle(&FACTS).unwrap();
+        let older = wish("", Some(&recording)).settle(&FACTS, || false).unwrap();
         assert_eq!(Some(older.setup), Quality::Usual.preset(), "an older one ran what was usual");
     }
 
@@ -602,7 +587,7 @@ mod tests {
             register: false,
             opening: None,
         };
-        let models = wish("--quality fine", None).on(&recipe).settle(&FACTS).unwrap();
+        let models = wish("--quality fine", None).on(&recipe).settle(&FACTS, || false).unwrap();
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.8, 6000));
         assert!(models.why[0].contains("the case folder has voxels of 0.8 mm; preset fine"), "{}", models.why[0]);
     }

@@ -81,9 +81,9 @@ impl Session {
             _ => None,
         };
         let wish = Wish::of(program, &options, recording.as_ref())?;
-        let drawing = wish.plans_pictures().then(driver::open);
-        let wish = wish.drawn_by_card(matches!(&drawing, Some(Ok(gpu)) if !gpu.is_software()));
-        let (case, models) = choice::open_case(program, &options, built_in, wish)?;
+        let mut drawing = None;
+        let card = || drawing.insert(driver::open()).as_ref().is_ok_and(|gpu| !gpu.is_software());
+        let (case, models) = choice::open_case(program, &options, built_in, wish, card)?;
         let (name, hash) = (case.name.clone(), case.hash.clone());
         let operation = Operation::of(&options, &device, recording.as_ref());
         let table = Table::new(program, &options, (case, models), operation, windowed && recording.is_some())?;

@@ -10,22 +10,26 @@ use crate::program::Program;
 use std::path::Path;
 use trepan_budget::Setup;
 
-/// The case folder that is named, the images that are given, or the built-in case; with the models that it is opened for.
+/// The case folder that is named, the images that are given, or the built-in case; with the models that it is opened for. `card`: whether a graphics card draws.
 pub fn open_case(
     program: Program,
     options: &Options,
     built_in: Inputs,
     wish: Wish,
+    card: impl FnOnce() -> bool,
 ) -> Result<(Case, Models), SessionError> {
     if let Some(folder) = &options.case {
         let case = fitting(program, folder::load(folder)?)?;
-        let models = on_case(wish, &case)?;
+        let models = on_case(wish, &case, card)?;
+        models.say();
         return Ok((case, models));
     }
     let (inputs, mut models) = (inputs(&options.patient, built_in), None);
     let wanted = recipe(&options.patient);
     let case = import::open_by(program, &inputs, &wanted, &Cache::of_user()?, |facts| {
-        let Setup { bone, tissue, .. } = models.insert(wish.settle(facts)?).setup;
+        let settled = models.insert(wish.settle(facts, card)?);
+        settled.say();
+        let Setup { bone, tissue, .. } = settled.setup;
         Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, ..wanted })
     })?;
     let unsettled = || SessionError::Internal("a case without models".into());
@@ -39,25 +43,26 @@ pub fn plan_case(
     patient: &Patient,
     built_in: Inputs,
     wish: Wish,
+    card: impl FnOnce() -> bool,
 ) -> Result<Models, SessionError> {
     patient.check().map_err(SessionError::Usage)?;
     match case {
-        Some(folder) => on_case(wish, &fitting(program, folder::load(folder)?)?),
+        Some(folder) => on_case(wish, &fitting(program, folder::load(folder)?)?, card),
         None => {
             let facts = import::facts(program, &inputs(patient, built_in), &recipe(patient), &Cache::of_user()?)?;
-            wish.settle(&facts)
+            wish.settle(&facts, card)
         }
     }
 }
 
 /// The models for a case as it was built.
-fn on_case(wish: Wish, case: &Case) -> Result<Models, SessionError> {
+fn on_case(wish: Wish, case: &Case, card: impl FnOnce() -> bool) -> Result<Models, SessionError> {
     let wish = case.recipe.iter().fold(wish, Wish::on);
     let facts = Facts {
         ct_voxel_mm: case.skull.as_ref().map(|skull| skull.spacing_mm().element_sum() / 3.0),
         brain_mm3: case.brain.as_ref().map(|brain| volume_mm3(&brain.classes)),
     };
-    wish.settle(&facts)
+    wish.settle(&facts, card)
 }
 
 /// Makes a case folder; returns the case's name.

@@ -141,7 +141,9 @@ mod tests {
     fn errors_are_those_of_hand_made_runs() {
         let errors = Errors::between(&ride(1.3, 8.5, 1.2, 60), &ride(1.0, 8.0, 1.0, 80));
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-5, "{a} and {b}");
-        [errors.bone_rms_n, errors.bone_p95_n, errors.tissue_rms_n, errors.tissue_p95_n].map(|e| near(e, 0.3));
+        [errors.bone_rms_n, errors.bone_p95_n, errors.tissue_rms_n, errors.tissue_p95_n]
+            .into_iter()
+            .for_each(|e| near(e, 0.3));
         near(errors.shown_p95_mm, 0.7);
         near(errors.shown_mean_mm, 0.7);
         near(errors.rest_p95_mm, 0.5);
