@@ -22,6 +22,8 @@ pub struct Errors {
     pub shown_p95_mm: f64,
     /// The same before anything has touched the brain: what the coarser shape alone does.
     pub rest_p95_mm: f64,
+    /// From this run's brain at rest at the opening to the surface of the mask that both were made of, mm.
+    pub mask_p95_mm: f64,
     /// Bone that is gone in one run only, mm³.
     pub bone_mm3: f64,
     /// Overlap of the bone that is gone (Dice 1945).
@@ -49,13 +51,14 @@ impl Errors {
             shown_mean_mm: shown.iter().sum::<f64>() / shown.len() as f64,
             shown_p95_mm: p95(&shown),
             rest_p95_mm: p95(&rest),
+            mask_p95_mm: p95(&ride.from_mask_mm.iter().copied().map(f64::from).collect::<Vec<_>>()),
             bone_mm3: apart * f64::from(PLACE_MM.powi(3)),
             bone_dice: 2.0 * common / (2.0 * common + apart),
         }
     }
 
     /// By their names with units.
-    pub fn named(&self) -> [(&'static str, f64); 9] {
+    pub fn named(&self) -> [(&'static str, f64); 10] {
         [
             ("bone_force_error_rms_n", self.bone_rms_n),
             ("bone_force_error_p95_n", self.bone_p95_n),
@@ -64,6 +67,7 @@ impl Errors {
             ("shown_error_mean_mm", self.shown_mean_mm),
             ("shown_error_p95_mm", self.shown_p95_mm),
             ("rest_error_p95_mm", self.rest_p95_mm),
+            ("rest_from_mask_p95_mm", self.mask_p95_mm),
             ("bone_error_mm3", self.bone_mm3),
             ("bone_dice", self.bone_dice),
         ]
@@ -128,6 +132,7 @@ mod tests {
             forces: vec![Vec3::X * newtons; ticks],
             probing: (0..ticks).map(|tick| tick >= ticks / 2).collect(),
             looks: [0.0, 0.0, dip_mm, dip_mm].map(look).into(),
+            from_mask_mm: vec![0.25],
             removed: (0..100).map(|place| place < gone).collect(),
             cpu_s: [0.0; 3],
             steps: 0,
@@ -147,6 +152,7 @@ mod tests {
         near(errors.shown_p95_mm, 0.7);
         near(errors.shown_mean_mm, 0.7);
         near(errors.rest_p95_mm, 0.5);
+        near(errors.mask_p95_mm, 0.25);
         near(errors.bone_mm3, 20.0 * 0.125);
         near(errors.bone_dice, 120.0 / 140.0);
         let same = Errors::between(&ride(1.0, 8.0, 1.0, 80), &ride(1.0, 8.0, 1.0, 80));

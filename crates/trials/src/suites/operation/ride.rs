@@ -39,6 +39,8 @@ pub struct Ride {
     pub probing: Vec<bool>,
     /// The brain's surface, every [`LOOK_MS`].
     pub looks: Vec<Look>,
+    /// From what is seen of the brain at rest to the surface of its mask, mm.
+    pub from_mask_mm: Vec<f32>,
     /// Whether bone is gone, at places around the entry.
     pub removed: Vec<bool>,
     /// CPU time of haptic, collision and solver loop, s.
@@ -85,12 +87,14 @@ pub fn ride(scope: Scope, candidate: &Candidate, truth: Option<&Ride>) -> Result
     let brain = session.scene().brain.as_ref().context("the built-in case has a brain")?;
     let (places, was) = (places(&site), is_bone(bone, &places(&site)));
     let rays = Rays::new(&brain.mesh.positions, &Surface::of(&brain.mesh).triangles, site);
+    let at_rest = rays.look(&brain.mesh.positions);
     let mut ride = Ride {
         setup: session.models().setup.to_string(),
         site,
         forces: Vec::new(),
         probing: Vec::new(),
         looks: Vec::new(),
+        from_mask_mm: at_rest.seen.iter().map(|seen| brain.field.sample(*seen).abs()).collect(),
         removed: Vec::new(),
         cpu_s: [0.0; 3],
         steps: 0,

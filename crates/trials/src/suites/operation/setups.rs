@@ -16,7 +16,7 @@ pub struct Candidate {
 /// The finest run: voxels and tetrahedra that nothing is held against.
 pub fn truth(scope: Scope) -> Candidate {
     let flags =
-        scope.pick("--quality fine --spacing-mm 0.5 --tets 40000", "--quality fine --spacing-mm 0.4 --tets 60000");
+        scope.pick("--quality fine --spacing-mm 0.5 --tets 40000", "--quality fine --spacing-mm 0.4 --tets 100000");
     Candidate { name: "truth", flags, touch: Config::default() }
 }
 
