@@ -1,5 +1,6 @@
 //! Tetrahedra from masks and labels: a brain at several voxel sizes, a ball, a torus and a ball in a ball, against the voxels' own faces or a closed form.
 
+mod odd;
 pub(super) mod rivals;
 mod scenes;
 mod spots;
@@ -27,7 +28,8 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     let searched = scenes::searched(scope).into_iter().map(|((name, make), range)| {
         Part::new(name, move |_, findings: &mut Findings| findings.rows.extend(least_count(&make(), range)))
     });
-    measured.chain(searched).collect()
+    let odd = || Part::new("odd masks", |_, findings: &mut Findings| odd::run(findings));
+    measured.chain(searched).chain((!scope.quick).then(odd)).collect()
 }
 
 /// The least count between two, to about a fifteenth, with which a mesh's border follows the voxels; nothing when not even the larger does.

@@ -1,6 +1,7 @@
 //! Volumes: known moves of a real MRI found again, files round trips, a ball's distances, the brain of the built-in head.
 
 mod files;
+mod moves;
 mod registration;
 
 use super::{Part, Scope};
@@ -13,7 +14,7 @@ use trepan_volume::{
 };
 
 /// Every question.
-pub fn parts(_: Scope) -> Vec<Part> {
+pub fn parts(scope: Scope) -> Vec<Part> {
     type Question = fn(Scope, &mut Findings);
     let all: [(&str, Question); 7] = [
         ("registration of MRI", registration::mri),
@@ -24,7 +25,11 @@ pub fn parts(_: Scope) -> Vec<Part> {
         ("carving", carving),
         ("brain", brain),
     ];
-    all.map(|(name, question)| Part::new(name, question)).into()
+    let mut parts: Vec<Part> = all.map(|(name, question)| Part::new(name, question)).into();
+    if !scope.quick {
+        parts.push(Part::new("odd moves", moves::run));
+    }
+    parts
 }
 
 /// The folder of real images that the environment variable `TREPAN_DATA` names; says so where there is none.

@@ -56,12 +56,17 @@ fn random_move(middle: DVec3, random: &mut fastrand::Rng) -> DAffine3 {
     };
     let (axis, way) = (direction(), direction());
     let turn = DQuat::from_axis_angle(axis, random.f64() * 20f64.to_radians());
-    DAffine3::from_translation(middle + way * random.f64() * 30.0)
-        * DAffine3::from_quat(turn)
-        * DAffine3::from_translation(-middle)
+    let way = way * random.f64() * 30.0;
+    DAffine3::from_translation(middle + way) * DAffine3::from_quat(turn) * DAffine3::from_translation(-middle)
 }
 
-fn scanned_again(still: &VoxelVolume<f32>, known: DAffine3, random: &mut fastrand::Rng) -> VoxelVolume<f32> {
+/// A turn around the middle and a way along the diagonal.
+pub(super) fn moved_by(middle: DVec3, way_mm: f64, turn: DQuat) -> DAffine3 {
+    let way = DVec3::splat(way_mm / 3f64.sqrt());
+    DAffine3::from_translation(middle + way) * DAffine3::from_quat(turn) * DAffine3::from_translation(-middle)
+}
+
+pub(super) fn scanned_again(still: &VoxelVolume<f32>, known: DAffine3, random: &mut fastrand::Rng) -> VoxelVolume<f32> {
     let mut grid = Grid::isotropic_over(still, 1.2);
     grid.world_from_voxel = known.inverse() * grid.world_from_voxel;
     let mut moving = resample(still, &grid, Interpolation::Trilinear, 0.0);
