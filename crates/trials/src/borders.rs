@@ -1,30 +1,34 @@
 //! Borders of stability: where each method worked when they were last kept, and what is worse now.
 //!
 //! # Practice
-//! One text file a suite, a character a cell, so that a changed border is a changed line in a review. `validate --keep-borders` writes them from a run; a row, a column or a map that is new is
+//! One text file a suite for quick runs and one for full ones, in `borders/` of the sources; a character a cell, so that a changed border is a changed line in a review. `validate --keep-borders` writes them from a run; a row, a column or a map that is new is
 //! no regression, one that is gone is not either.
 
 use crate::compare::told;
+use crate::part::Scope;
 use crate::picture::{Map, Outcome};
 use crate::store::whole;
 use crate::suite::{Findings, Gate};
 use anyhow::Result;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The signs of works, degrades, fails, refused.
 const SIGNS: [char; 4] = ['.', '~', '#', 'x'];
 const BETWEEN: &str = " | ";
 const COLUMNS: &str = "columns: ";
 
-/// The kept files.
-const KEPT: &[(&str, &str)] = &[];
+/// Where a suite's border is kept; a quick run asks less of a cell than a full one, so that each has its own.
+fn place(suite: &str, scope: Scope) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("borders").join(scope.pick("quick", "full"));
+    folder.join(format!("{suite}.txt"))
+}
 
-/// Counts the cells that are worse than they were kept, and names them.
-pub fn judge(suite: &str, findings: &mut Findings) {
-    if let Some((_, text)) = KEPT.iter().find(|(name, _)| *name == suite) {
-        let worse = regressions(text, &findings.maps);
+/// Counts the cells that are worse than they were kept, and names them; nothing where no border is kept.
+pub fn judge(suite: &str, scope: Scope, findings: &mut Findings) {
+    if let Ok(text) = std::fs::read_to_string(place(suite, scope)) {
+        let worse = regressions(&text, &findings.maps);
         findings.gates.push(Gate::at_most(
             "cells of maps that are worse than the kept border",
             worse.len() as f64,
@@ -35,8 +39,8 @@ pub fn judge(suite: &str, findings: &mut Findings) {
 }
 
 /// Writes a suite's borders into the sources.
-pub fn keep(suite: &str, maps: &[Map]) -> Result<()> {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("borders").join(format!("{suite}.txt"));
+pub fn keep(suite: &str, scope: Scope, maps: &[Map]) -> Result<()> {
+    let file = place(suite, scope);
     whole(&file, text(maps).as_bytes())?;
     println!("kept borders: {}", file.display());
     Ok(())

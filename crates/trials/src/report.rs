@@ -58,7 +58,7 @@ impl Report {
         let mut findings = Findings::default();
         parts.into_iter().for_each(|(_, _, found)| findings.append(found));
         (suite.judge)(making.scope(), &mut findings);
-        borders::judge(suite.name, &mut findings);
+        borders::judge(suite.name, making.scope(), &mut findings);
         let quick = if making.quick { " --quick" } else { "" };
         let seed = if making.seed == 1 { String::new() } else { format!(" --seed {}", making.seed) };
         let command = format!("cargo xtask validate {}{quick}{seed}", suite.name);

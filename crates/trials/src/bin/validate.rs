@@ -119,7 +119,7 @@ fn run(asked: &Run) -> Result<bool> {
         let report = store::merged(suite, std::slice::from_ref(&asked.out))?.context("no part was made")?;
         passed &= write(suite, &report, &asked.out)?;
         if asked.keep_borders && !report.findings.maps.is_empty() {
-            borders::keep(suite.name, &report.findings.maps)?;
+            borders::keep(suite.name, scope, &report.findings.maps)?;
         }
         store.forget(suite.name);
     }

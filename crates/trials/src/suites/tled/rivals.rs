@@ -52,7 +52,7 @@ const CONDITIONS: [Condition; 12] = [
     ("gravity", |solver| endured(solver, &brain(), &gravity(1.0), 1.0, BURST_MM)),
     ("gravity, 1.5 times its stable step", |solver| endured(solver, &brain(), &gravity(1.0), 1.5, BURST_MM)),
     ("gravity, 5 times its stable step", |solver| endured(solver, &brain(), &gravity(1.0), 5.0, BURST_MM)),
-    ("five times gravity", |solver| endured(solver, &brain(), &gravity(5.0), 1.0, BURST_MM)),
+    ("beyond a session: five times gravity", |solver| endured(solver, &brain(), &gravity(5.0), 1.0, BURST_MM)),
     ("gravity, ν 0.49", |solver| endured(solver, &cube(4, poisson(0.49)), &gravity(1.0), 1.0, BURST_MM)),
     ("gravity, ν 0.499", |solver| endured(solver, &cube(4, poisson(0.499)), &gravity(1.0), 1.0, BURST_MM)),
     ("contact of 1 N/mm", |solver| endured(solver, &brain(), &pressed(1.0, 2.0), 1.0, 10.0)),
