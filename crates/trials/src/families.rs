@@ -152,7 +152,11 @@ pub fn table(page: &mut String, reports: &[(&Suite, Report)]) {
 }
 
 fn unit(metric: &str) -> &str {
-    metric.rsplit('_').next().unwrap_or_default()
+    match metric.rsplit('_').next().unwrap_or_default() {
+        "percent" => "%",
+        "n" => "N",
+        unit => unit,
+    }
 }
 
 fn median(values: &[f64]) -> Option<f64> {

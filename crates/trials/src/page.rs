@@ -66,12 +66,12 @@ fn making(page: &mut String, report: &Report) {
     let made = &report.making;
     _ = write!(
         page,
-        "<p class=\"made\"><code>{}</code> at commit {}, seed {}, on {}. One part alone: <code>{}/PART</code>.</p>",
+        "<p class=\"made\"><code>{}</code> at commit {}, seed {}, on {}. One part alone: <code>{}</code>.</p>",
         text(&report.command),
         text(&made.commit),
         made.seed,
         named(&made.machine),
-        text(&report.command)
+        text(&report.command.replacen(&report.suite, &format!("{}/PART", report.suite), 1))
     );
     for (part, machine) in &report.elsewhere {
         _ = write!(page, "<p class=\"made\">Part {} on {}.</p>", text(part), named(machine));

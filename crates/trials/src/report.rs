@@ -77,7 +77,8 @@ pub fn slugs(suite: &Suite, scope: Scope) -> Vec<String> {
 }
 
 fn commit() -> String {
-    let out = std::process::Command::new("git").args(["describe", "--always", "--dirty", "--abbrev=12"]).output();
+    let describe = ["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--dirty", "--abbrev=12"];
+    let out = std::process::Command::new("git").args(describe).output();
     let said =
         out.ok().filter(|out| out.status.success()).map(|out| String::from_utf8_lossy(&out.stdout).trim().to_string());
     said.unwrap_or_else(|| "unknown".into())

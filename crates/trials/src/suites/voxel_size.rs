@@ -182,7 +182,6 @@ pub fn judge(scope: Scope, findings: &mut Findings) {
     let of_scene = |n: usize| r_squared(times.iter().filter(|t| t.0 == n));
     let (middle, slowest) = (median(regrets), calibration.iter().copied().fold(0.0, f64::max));
     let calibration_ms = median(calibration);
-    findings.gates.push(Gate::at_most("calibration, median over the scenes, ms", calibration_ms, 100.0));
     findings.gates.extend([
         Gate::at_most(format!("{OURS}: median regret over {scenes} scenes, percent"), middle, scope.pick(15.0, 3.0)),
         Gate::at_most(format!("{OURS}: worst regret over {scenes} scenes, percent"), worst, scope.pick(40.0, 10.0)),
