@@ -88,7 +88,7 @@ fn a_planned_session_replays_bit_for_bit_without_a_plan() {
 
 #[test]
 fn a_plan_is_told_for_the_case_that_is_given() {
-    let told = integrated(&["plan", "--tets", "6000", "--force-error-n", "0.00001"]);
+    let told = integrated(&["plan", "--tets", "6000", "--force-error-n", "0.0001"]);
     assert!(told.status.success());
     let told = String::from_utf8_lossy(&told.stdout).into_owned();
     for words in

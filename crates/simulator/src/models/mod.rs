@@ -13,6 +13,12 @@
 //! Settled once at start. The machine is measured only for parts that a plan chooses, in under two seconds; a replay, a preset, or a session with everything given
 //! measures nothing, so that it is the same on every machine.
 
+mod given;
+mod told;
+
+pub use given::{FASTEST, rigid_of, solver_named};
+pub use told::{BoneSummary, ModelSummary, PictureSummary, TissueSummary};
+
 use crate::case::Recipe;
 use crate::case::import::Facts;
 use crate::case::tissue::TissueClass;
@@ -20,17 +26,11 @@ use crate::error::SessionError;
 use crate::measure::{self, Wanted};
 use crate::options::{Options, Patient, Tolerances};
 use crate::program::Program;
-use serde::Serialize;
-use std::collections::BTreeMap;
-use trepan_budget::{Bone, Choice, Picture, Plan, Quality, Rows, Scene, Setup, Tissue};
+use given::{Given, written};
+use trepan_budget::{Choice, Plan, Quality, Rows, Scene, Setup};
 use trepan_geometry::{ToolKind, units};
 use trepan_link::Recording;
 use trepan_soft::Material;
-
-/// Total Lagrangian explicit dynamics.
-pub const TLED: &str = "tled";
-/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not have the recorded forces to the last bit.
-pub const FASTEST: &str = "fastest";
 
 /// The models of a session, and why these.
 #[derive(Clone, Debug)]
@@ -61,123 +61,6 @@ pub struct Wish {
     /// Pixels of the picture; `None` without pictures.
     picture: Option<[u32; 2]>,
     pictures_per_s: f64,
-}
-
-/// What is given of each part, and in which words.
-#[derive(Clone, Debug, Default)]
-struct Given {
-    spacing_mm: Option<f64>,
-    rigid: Option<&'static str>,
-    points: Option<usize>,
-    tets: Option<usize>,
-    solver: Option<&'static str>,
-    still_mm: Option<f64>,
-    picture: Option<Picture>,
-    words: [Vec<String>; 2],
-}
-
-/// The method on bone of that name.
-fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
-    trepan_rigid::Method::named(name).ok_or_else(|| {
-        let known: Vec<_> = trepan_rigid::Method::all().iter().map(|method| method.name()).collect();
-        SessionError::Usage(format!("--rigid {name} is not known; known are {}", known.join(", ")))
-    })
-}
-
-/// The method that a part names, with its points.
-pub fn rigid_of(bone: &Bone) -> Result<trepan_rigid::Method, SessionError> {
-    rigid_named(bone.method).map(|method| method.with_points(bone.points))
-}
-
-/// The rival solver of that name; `None` for TLED.
-pub fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
-    if name == TLED || name == FASTEST {
-        return Ok(None);
-    }
-    trepan_soft::Method::named(name).map(Some).ok_or_else(|| {
-        let known: Vec<_> = trepan_soft::Method::all().iter().map(|method| method.name()).collect();
-        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {FASTEST}, {}", known.join(", ")))
-    })
-}
-
-/// A number of a flag as it was written: 0.7 and not 0.699999988.
-fn written(number: f32) -> f64 {
-    number.to_string().parse().unwrap_or(f64::from(number))
-}
-
-impl Given {
-    /// By flags; refuses names that nobody knows.
-    fn flags(patient: &Patient, rigid: Option<&str>, solver: Option<&str>) -> Result<Self, SessionError> {
-        let tled = |name| if name == FASTEST { FASTEST } else { TLED };
-        let named = |name| Ok::<_, SessionError>(solver_named(name)?.map_or(tled(name), |method| method.name()));
-        let words = |flags: [(&str, Option<String>); 2]| {
-            flags.into_iter().filter_map(|(flag, value)| Some(format!("{flag} {} is given", value?))).collect()
-        };
-        Ok(Self {
-            spacing_mm: patient.spacing_mm.map(written),
-            rigid: rigid.map(|name| rigid_named(name).map(|method| method.name())).transpose()?,
-            points: rigid.map(|_| 0),
-            tets: patient.tets,
-            solver: solver.map(named).transpose()?,
-            still_mm: solver.map(|_| 0.0),
-            picture: None,
-            words: [
-                words([
-                    ("--spacing-mm", patient.spacing_mm.map(|mm| mm.to_string())),
-                    ("--rigid", rigid.map(String::from)),
-                ]),
-                words([("--tets", patient.tets.map(|n| n.to_string())), ("--solver", solver.map(String::from))]),
-            ],
-        })
-    }
-
-    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is usual.
-    fn recorded(config: &BTreeMap<String, String>) -> Self {
-        let number = |key: &str| config.get(key)?.parse::<f64>().ok().filter(|value| value.is_finite());
-        let count = |key: &str| config.get(key)?.parse::<usize>().ok();
-        // What was fastest then need not be fastest now: the processor's is the one that can be had again.
-        let solver = |name: &String| trepan_soft::Method::named(name).map_or(TLED, |method| method.name());
-        let detail = number("picture_detail");
-        Self {
-            spacing_mm: number("spacing_mm"),
-            rigid: config.get("rigid").and_then(|name| Some(trepan_rigid::Method::named(name)?.name())),
-            points: count("rigid_points"),
-            tets: count("tets"),
-            solver: config.get("solver").map(solver),
-            still_mm: number("still_mm"),
-            picture: detail.map(|detail| Picture { sparse: config["picture_sparse"] == "true", detail }),
-            words: Default::default(),
-        }
-    }
-
-    /// With what another one leaves open.
-    fn or(self, other: Self) -> Self {
-        Self {
-            spacing_mm: self.spacing_mm.or(other.spacing_mm),
-            points: self.points.or(other.points),
-            rigid: self.rigid.or(other.rigid),
-            tets: self.tets.or(other.tets),
-            still_mm: self.still_mm.or(other.still_mm),
-            solver: self.solver.or(other.solver),
-            picture: self.picture.or(other.picture),
-            words: self.words,
-        }
-    }
-
-    /// A part of a setup, with what is given instead.
-    fn bone(&self, bone: Bone) -> Bone {
-        let points = self.points.unwrap_or(if self.rigid.is_some() { 0 } else { bone.points });
-        let (method, spacing_mm) = (self.rigid.unwrap_or(bone.method), self.spacing_mm.unwrap_or(bone.spacing_mm));
-        Bone { method, spacing_mm, points }
-    }
-
-    fn tissue(&self, tissue: Tissue) -> Tissue {
-        Tissue {
-            solver: self.solver.unwrap_or(tissue.solver),
-            tets: self.tets.unwrap_or(tissue.tets),
-            still_mm: self.still_mm.unwrap_or(tissue.still_mm),
-        }
-    }
 }
 
 impl Wish {
@@ -336,10 +219,13 @@ impl Wish {
 
 /// Stiffness of bone in the hand, N/mm.
 pub const BONE_STIFFNESS: f32 = 2.0;
+
 /// Height of what the 3-D view shows at the opening, mm.
 const VIEW_MM: f64 = 105.0;
+
 /// Pictures a second in a window.
 const LIVE_HZ: f64 = 10.0;
+
 /// How hard a hand presses a burr, N.
 const PRESS_N: f64 = 1.0;
 
@@ -378,144 +264,11 @@ fn reason<T: std::fmt::Display>(choice: &Choice<T>, tolerance: f64, unit: &str) 
     (text, !(*in_time && *meets_tolerance))
 }
 
-impl Models {
-    /// One line for each part, and what is not kept as a warning.
-    pub fn say(&self) {
-        let Setup { bone, tissue, picture } = &self.setup;
-        let parts: [(&str, &dyn std::fmt::Display); 3] = [("bone", bone), ("tissue", tissue), ("picture", picture)];
-        for ((name, what), why) in parts.into_iter().zip(&self.why) {
-            tracing::info!("{name}: {what} ({why})");
-        }
-        if let Some(plan) = &self.plan {
-            tracing::info!("planned: {:.2} cores of {}", plan.cores(), plan.machine.threads);
-        }
-        self.unmet.iter().for_each(|text| tracing::warn!("{text}"));
-    }
-
-    /// All of it for people: what was measured, what was chosen, why, and what lies next to it.
-    pub fn told(&self) -> String {
-        let Setup { bone, tissue, .. } = &self.setup;
-        let Some(plan) = &self.plan else { return format!("all is given, nothing was planned: {}", self.setup) };
-        let machine = &plan.machine;
-        let drawn = if machine.device_draws {
-            "a graphics card draws".into()
-        } else {
-            format!("{:.0} ns a ray", machine.ns_per_ray)
-        };
-        let mut text = format!(
-            "this machine: {:.1} ns a tetrahedron and step, {:.1} us a tick on bone, {drawn}, {} threads\n",
-            machine.ns_per_tet_step, machine.us_per_rigid_tick, machine.threads
-        );
-        text += &format!(
-            "this case: CT voxels of {:.2} mm, brain of {:.0} ml\n{plan}",
-            plan.scene.finest_mm,
-            plan.scene.brain_mm3 * 1e-3
-        );
-        for (given, what) in self.given.iter().zip([bone as &dyn std::fmt::Display, tissue]) {
-            if !given.is_empty() {
-                text += &format!("{}: {what}\n", given.join(", "));
-            }
-        }
-        let unmet = self.unmet.iter().map(|text| format!("NOT KEPT: {text}\n"));
-        text + &unmet.collect::<String>()
-    }
-
-    /// As a recording keeps them; a replay takes the first ones back.
-    pub fn entries(&self) -> [(String, String); 12] {
-        let Setup { bone, tissue, picture } = &self.setup;
-        let [bone_why, tissue_why, picture_why] = self.why.clone();
-        [
-            ("rigid", bone.method.to_string()),
-            ("rigid_points", bone.points.to_string()),
-            ("spacing_mm", bone.spacing_mm.to_string()),
-            ("solver", tissue.solver.to_string()),
-            ("tets", tissue.tets.to_string()),
-            ("still_mm", tissue.still_mm.to_string()),
-            ("picture_sparse", picture.sparse.to_string()),
-            ("picture_detail", picture.detail.to_string()),
-            ("quality", self.by.to_string()),
-            ("bone_why", bone_why),
-            ("tissue_why", tissue_why),
-            ("picture_why", picture_why),
-        ]
-        .map(|(key, value)| (key.to_string(), value))
-    }
-
-    /// For the summary.
-    pub fn summary(&self) -> ModelSummary {
-        let Setup { bone, tissue, picture } = self.setup;
-        let [bone_why, tissue_why, picture_why] = self.why.clone();
-        ModelSummary {
-            quality: self.by,
-            bone: BoneSummary { method: bone.method, spacing_mm: bone.spacing_mm, points: bone.points, why: bone_why },
-            tissue: TissueSummary {
-                solver: tissue.solver,
-                tets: tissue.tets,
-                still_mm: tissue.still_mm,
-                why: tissue_why,
-            },
-            picture: PictureSummary { sparse: picture.sparse, detail: picture.detail, why: picture_why },
-            planned_cores: self.plan.as_ref().map(Plan::cores),
-        }
-    }
-}
-
-/// The models in `summary.json`.
-#[derive(Clone, Debug, Serialize)]
-pub struct ModelSummary {
-    /// How they came about: a quality, or `replay`.
-    pub quality: &'static str,
-    /// Bone.
-    pub bone: BoneSummary,
-    /// Tissue.
-    pub tissue: TissueSummary,
-    /// Picture.
-    pub picture: PictureSummary,
-    /// CPU seconds a second that the plan counts with; `null` without a plan.
-    pub planned_cores: Option<f64>,
-}
-
-/// How bone is represented and touched.
-#[derive(Clone, Debug, Serialize)]
-pub struct BoneSummary {
-    /// Name of the method.
-    pub method: &'static str,
-    /// Edge of a voxel, mm.
-    pub spacing_mm: f64,
-    /// Points on the burr; 0 for the method's own.
-    pub points: usize,
-    /// Why.
-    pub why: String,
-}
-
-/// How tissue is represented and moved.
-#[derive(Clone, Debug, Serialize)]
-pub struct TissueSummary {
-    /// Name of the solver.
-    pub solver: &'static str,
-    /// Tetrahedra that were asked for.
-    pub tets: usize,
-    /// What moves less in 50 ms sleeps, mm; 0 = nothing does.
-    pub still_mm: f64,
-    /// Why.
-    pub why: String,
-}
-
-/// How pictures are drawn.
-#[derive(Clone, Debug, Serialize)]
-pub struct PictureSummary {
-    /// Whether rays are left out where bone is smooth.
-    pub sparse: bool,
-    /// Share of the pixels along an edge.
-    pub detail: f64,
-    /// Why.
-    pub why: String,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use clap::Parser;
+    use trepan_budget::{Bone, Tissue};
 
     fn wish(line: &str, recording: Option<&Recording>) -> Wish {
         let options = Options::try_parse_from(format!("x --headless {line}").split_whitespace()).unwrap();

@@ -1,0 +1,129 @@
+//! What of the models is given: by flags, by a recording's header, by a case folder.
+
+use crate::error::SessionError;
+use crate::options::Patient;
+use std::collections::BTreeMap;
+use trepan_budget::{Bone, Picture, Tissue};
+
+/// What is given of each part, and in which words.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Given {
+    pub spacing_mm: Option<f64>,
+    pub rigid: Option<&'static str>,
+    pub points: Option<usize>,
+    pub tets: Option<usize>,
+    pub solver: Option<&'static str>,
+    pub still_mm: Option<f64>,
+    pub picture: Option<Picture>,
+    pub words: [Vec<String>; 2],
+}
+
+impl Given {
+    /// By flags; refuses names that nobody knows.
+    pub fn flags(patient: &Patient, rigid: Option<&str>, solver: Option<&str>) -> Result<Self, SessionError> {
+        let tled = |name| if name == FASTEST { FASTEST } else { TLED };
+        let named = |name| Ok::<_, SessionError>(solver_named(name)?.map_or(tled(name), |method| method.name()));
+        let words = |flags: [(&str, Option<String>); 2]| {
+            flags.into_iter().filter_map(|(flag, value)| Some(format!("{flag} {} is given", value?))).collect()
+        };
+        Ok(Self {
+            spacing_mm: patient.spacing_mm.map(written),
+            rigid: rigid.map(|name| rigid_named(name).map(|method| method.name())).transpose()?,
+            points: rigid.map(|_| 0),
+            tets: patient.tets,
+            solver: solver.map(named).transpose()?,
+            still_mm: solver.map(|_| 0.0),
+            picture: None,
+            words: [
+                words([
+                    ("--spacing-mm", patient.spacing_mm.map(|mm| mm.to_string())),
+                    ("--rigid", rigid.map(String::from)),
+                ]),
+                words([("--tets", patient.tets.map(|n| n.to_string())), ("--solver", solver.map(String::from))]),
+            ],
+        })
+    }
+
+    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is usual.
+    pub fn recorded(config: &BTreeMap<String, String>) -> Self {
+        let number = |key: &str| config.get(key)?.parse::<f64>().ok().filter(|value| value.is_finite());
+        let count = |key: &str| config.get(key)?.parse::<usize>().ok();
+        // What was fastest then need not be fastest now: the processor's is the one that can be had again.
+        let solver = |name: &String| trepan_soft::Method::named(name).map_or(TLED, |method| method.name());
+        let detail = number("picture_detail");
+        Self {
+            spacing_mm: number("spacing_mm"),
+            rigid: config.get("rigid").and_then(|name| Some(trepan_rigid::Method::named(name)?.name())),
+            points: count("rigid_points"),
+            tets: count("tets"),
+            solver: config.get("solver").map(solver),
+            still_mm: number("still_mm"),
+            picture: detail.map(|detail| Picture { sparse: config["picture_sparse"] == "true", detail }),
+            words: Default::default(),
+        }
+    }
+
+    /// With what another one leaves open.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            spacing_mm: self.spacing_mm.or(other.spacing_mm),
+            points: self.points.or(other.points),
+            rigid: self.rigid.or(other.rigid),
+            tets: self.tets.or(other.tets),
+            still_mm: self.still_mm.or(other.still_mm),
+            solver: self.solver.or(other.solver),
+            picture: self.picture.or(other.picture),
+            words: self.words,
+        }
+    }
+
+    /// A part of a setup, with what is given instead.
+    pub fn bone(&self, bone: Bone) -> Bone {
+        let points = self.points.unwrap_or(if self.rigid.is_some() { 0 } else { bone.points });
+        let (method, spacing_mm) = (self.rigid.unwrap_or(bone.method), self.spacing_mm.unwrap_or(bone.spacing_mm));
+        Bone { method, spacing_mm, points }
+    }
+
+    pub fn tissue(&self, tissue: Tissue) -> Tissue {
+        Tissue {
+            solver: self.solver.unwrap_or(tissue.solver),
+            tets: self.tets.unwrap_or(tissue.tets),
+            still_mm: self.still_mm.unwrap_or(tissue.still_mm),
+        }
+    }
+}
+
+/// Total Lagrangian explicit dynamics.
+pub const TLED: &str = "tled";
+
+/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not have the recorded forces to the last bit.
+pub const FASTEST: &str = "fastest";
+
+/// The method on bone of that name.
+fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
+    trepan_rigid::Method::named(name).ok_or_else(|| {
+        let known: Vec<_> = trepan_rigid::Method::all().iter().map(|method| method.name()).collect();
+        SessionError::Usage(format!("--rigid {name} is not known; known are {}", known.join(", ")))
+    })
+}
+
+/// The method that a part names, with its points.
+pub fn rigid_of(bone: &Bone) -> Result<trepan_rigid::Method, SessionError> {
+    rigid_named(bone.method).map(|method| method.with_points(bone.points))
+}
+
+/// The rival solver of that name; `None` for TLED.
+pub fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
+    if name == TLED || name == FASTEST {
+        return Ok(None);
+    }
+    trepan_soft::Method::named(name).map(Some).ok_or_else(|| {
+        let known: Vec<_> = trepan_soft::Method::all().iter().map(|method| method.name()).collect();
+        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {FASTEST}, {}", known.join(", ")))
+    })
+}
+
+/// A number of a flag as it was written: 0.7 and not 0.699999988.
+pub(super) fn written(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or(f64::from(number))
+}

@@ -1,0 +1,139 @@
+//! What is told of the models: in the log, in a recording's header, in `summary.json`, on a terminal.
+
+use super::Models;
+use serde::Serialize;
+use trepan_budget::{Plan, Setup};
+
+/// The models in `summary.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModelSummary {
+    /// How they came about: a quality, or `replay`.
+    pub quality: &'static str,
+    /// Bone.
+    pub bone: BoneSummary,
+    /// Tissue.
+    pub tissue: TissueSummary,
+    /// Picture.
+    pub picture: PictureSummary,
+    /// CPU seconds a second that the plan counts with; `null` without a plan.
+    pub planned_cores: Option<f64>,
+}
+
+/// How bone is represented and touched.
+#[derive(Clone, Debug, Serialize)]
+pub struct BoneSummary {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Edge of a voxel, mm.
+    pub spacing_mm: f64,
+    /// Points on the burr; 0 for the method's own.
+    pub points: usize,
+    /// Why.
+    pub why: String,
+}
+
+/// How tissue is represented and moved.
+#[derive(Clone, Debug, Serialize)]
+pub struct TissueSummary {
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// Tetrahedra that were asked for.
+    pub tets: usize,
+    /// What moves less in 50 ms sleeps, mm; 0 = nothing does.
+    pub still_mm: f64,
+    /// Why.
+    pub why: String,
+}
+
+/// How pictures are drawn.
+#[derive(Clone, Debug, Serialize)]
+pub struct PictureSummary {
+    /// Whether rays are left out where bone is smooth.
+    pub sparse: bool,
+    /// Share of the pixels along an edge.
+    pub detail: f64,
+    /// Why.
+    pub why: String,
+}
+
+impl Models {
+    /// One line for each part, and what is not kept as a warning.
+    pub fn say(&self) {
+        let Setup { bone, tissue, picture } = &self.setup;
+        let parts: [(&str, &dyn std::fmt::Display); 3] = [("bone", bone), ("tissue", tissue), ("picture", picture)];
+        for ((name, what), why) in parts.into_iter().zip(&self.why) {
+            tracing::info!("{name}: {what} ({why})");
+        }
+        if let Some(plan) = &self.plan {
+            tracing::info!("planned: {:.2} cores of {}", plan.cores(), plan.machine.threads);
+        }
+        self.unmet.iter().for_each(|text| tracing::warn!("{text}"));
+    }
+
+    /// All of it for people: what was measured, what was chosen, why, and what lies next to it.
+    pub fn told(&self) -> String {
+        let Setup { bone, tissue, .. } = &self.setup;
+        let Some(plan) = &self.plan else { return format!("all is given, nothing was planned: {}", self.setup) };
+        let machine = &plan.machine;
+        let drawn = if machine.device_draws {
+            "a graphics card draws".into()
+        } else {
+            format!("{:.0} ns a ray", machine.ns_per_ray)
+        };
+        let mut text = format!(
+            "this machine: {:.1} ns a tetrahedron and step, {:.1} us a tick on bone, {drawn}, {} threads\n",
+            machine.ns_per_tet_step, machine.us_per_rigid_tick, machine.threads
+        );
+        text += &format!(
+            "this case: CT voxels of {:.2} mm, brain of {:.0} ml\n{plan}",
+            plan.scene.finest_mm,
+            plan.scene.brain_mm3 * 1e-3
+        );
+        for (given, what) in self.given.iter().zip([bone as &dyn std::fmt::Display, tissue]) {
+            if !given.is_empty() {
+                text += &format!("{}: {what}\n", given.join(", "));
+            }
+        }
+        let unmet = self.unmet.iter().map(|text| format!("NOT KEPT: {text}\n"));
+        text + &unmet.collect::<String>()
+    }
+
+    /// As a recording keeps them; a replay takes the first ones back.
+    pub fn entries(&self) -> [(String, String); 12] {
+        let Setup { bone, tissue, picture } = &self.setup;
+        let [bone_why, tissue_why, picture_why] = self.why.clone();
+        [
+            ("rigid", bone.method.to_string()),
+            ("rigid_points", bone.points.to_string()),
+            ("spacing_mm", bone.spacing_mm.to_string()),
+            ("solver", tissue.solver.to_string()),
+            ("tets", tissue.tets.to_string()),
+            ("still_mm", tissue.still_mm.to_string()),
+            ("picture_sparse", picture.sparse.to_string()),
+            ("picture_detail", picture.detail.to_string()),
+            ("quality", self.by.to_string()),
+            ("bone_why", bone_why),
+            ("tissue_why", tissue_why),
+            ("picture_why", picture_why),
+        ]
+        .map(|(key, value)| (key.to_string(), value))
+    }
+
+    /// For the summary.
+    pub fn summary(&self) -> ModelSummary {
+        let Setup { bone, tissue, picture } = self.setup;
+        let [bone_why, tissue_why, picture_why] = self.why.clone();
+        ModelSummary {
+            quality: self.by,
+            bone: BoneSummary { method: bone.method, spacing_mm: bone.spacing_mm, points: bone.points, why: bone_why },
+            tissue: TissueSummary {
+                solver: tissue.solver,
+                tets: tissue.tets,
+                still_mm: tissue.still_mm,
+                why: tissue_why,
+            },
+            picture: PictureSummary { sparse: picture.sparse, detail: picture.detail, why: picture_why },
+            planned_cores: self.plan.as_ref().map(Plan::cores),
+        }
+    }
+}
