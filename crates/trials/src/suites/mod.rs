@@ -1,5 +1,6 @@
 //! The suites, one file each; one list feeds the command line and the page.
 
+pub mod budget;
 pub mod deformable;
 mod force;
 mod haptics;
@@ -49,6 +50,13 @@ pub const ALL: &[Suite] = &[
         chart: ("mesh_s", "surface_p95_voxel"),
         parts: mesh::parts,
         judge: nothing_more,
+    },
+    Suite {
+        name: "budget",
+        question: "does a plan meet its tolerances, and how near to the cheapest choice that would",
+        chart: ("cost_cores", "error_over_tolerance"),
+        parts: budget::parts,
+        judge: budget::judge,
     },
     Suite {
         name: "deformable",

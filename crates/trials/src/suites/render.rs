@@ -2,7 +2,7 @@
 
 mod accuracy;
 mod faults;
-mod likeness;
+pub(super) mod likeness;
 mod models;
 pub mod rivals;
 mod scenes;

@@ -1,0 +1,134 @@
+//! The judgement over all scenes: how often choices meet their tolerances, and at what cost over the cheapest.
+
+use super::super::Scope;
+use crate::picture::{Chart, Mark};
+use crate::suite::{Findings, Gate, Row};
+use crate::timer::Samples;
+use std::collections::BTreeMap;
+
+const KINDS: [&str; 3] = ["bone", "tissue", "picture"];
+const METHODS: [&str; 5] = ["auto", "draft", "usual", "fine", "cheapest"];
+/// Scenes under which a share of them says nothing.
+const MANY: usize = 50;
+
+/// What one method did for one kind in one scene.
+#[derive(Clone, Copy, Debug, Default)]
+struct Did {
+    /// Error over tolerance.
+    error: f64,
+    cost: f64,
+    /// Whether it said that it would meet the tolerance.
+    said: bool,
+}
+
+impl Did {
+    fn met(&self) -> bool {
+        self.error <= 1.0
+    }
+}
+
+/// One scene: kind and method.
+type Scene = BTreeMap<(String, String), Did>;
+
+/// Summary rows, gates and the chart.
+pub fn judge(_: Scope, findings: &mut Findings) {
+    let scenes = scenes(&findings.rows);
+    if scenes.is_empty() {
+        return;
+    }
+    for kind in KINDS {
+        let row = summary(&scenes, &[kind], &format!("all scenes, {kind}"), findings);
+        findings.rows.extend(row);
+    }
+    let row = summary(&scenes, &KINDS, "all scenes", findings);
+    findings.rows.extend(row);
+    gates(&scenes, findings);
+}
+
+/// What the rows say, by part and scene.
+fn scenes(rows: &[Row]) -> BTreeMap<String, Scene> {
+    let mut scenes: BTreeMap<String, Scene> = BTreeMap::new();
+    for row in rows {
+        let Some(kind) = row.config.get("kind").and_then(|kind| kind.as_str()) else { continue };
+        let Some(name) = row.scene.strip_suffix(&format!(", {kind}")) else { continue };
+        let metric = |name: &str| row.metrics.get(name).copied().unwrap_or(f64::NAN);
+        let did = Did {
+            error: metric("error_over_tolerance"),
+            cost: metric("cost_cores"),
+            said: metric("says_met_count") > 0.5,
+        };
+        let scene = scenes.entry(format!("{}, {name}", row.part)).or_default();
+        scene.insert((kind.into(), row.method.clone()), did);
+    }
+    scenes
+}
+
+fn did(scene: &Scene, kind: &str, method: &str) -> Option<Did> {
+    scene.get(&(kind.to_string(), method.to_string())).copied()
+}
+
+/// Whether some choice meets the tolerances of these kinds.
+fn possible(scene: &Scene, kinds: &[&str]) -> bool {
+    kinds.iter().all(|kind| did(scene, kind, "cheapest").is_some())
+}
+
+/// Share met and cost over the cheapest, over scenes in which the tolerances can be met.
+fn summary(scenes: &BTreeMap<String, Scene>, kinds: &[&str], name: &str, findings: &mut Findings) -> Vec<Row> {
+    let scenes: Vec<&Scene> = scenes.values().filter(|scene| possible(scene, kinds)).collect();
+    let cost = |scene: &Scene, method: &str| {
+        kinds.iter().filter_map(|kind| did(scene, kind, method)).map(|d| d.cost).sum::<f64>()
+    };
+    let total = |method: &str| scenes.iter().map(|scene| cost(scene, method)).sum::<f64>();
+    let mut marks = Vec::new();
+    let row = |method: &&str| {
+        let met = |scene: &&&Scene| kinds.iter().all(|kind| did(scene, kind, method).is_some_and(|d| d.met()));
+        let share = 100.0 * scenes.iter().filter(met).count() as f64 / scenes.len() as f64;
+        let ratios: Samples = scenes.iter().map(|s| cost(s, method) / cost(s, "cheapest")).collect::<Vec<_>>().into();
+        let ratio = total(method) / total("cheapest");
+        marks.push(Mark { method: (*method).into(), cost: ratio, error: 100.0 - share });
+        Row::new(name, *method)
+            .with("scenes", scenes.len())
+            .metric("met_percent", share)
+            .metric("cost_over_cheapest", ratio)
+            .metric("cost_over_cheapest_p50", ratios.quantile(0.5))
+            .metric("cost_over_cheapest_p95", ratios.quantile(0.95))
+            .metric("cost_over_cheapest_worst", ratios.quantile(1.0))
+    };
+    let rows = METHODS.iter().map(row).collect();
+    findings.charts.push(Chart {
+        title: format!("Scenes that miss a tolerance over cost: {name}"),
+        cost: "cost_over_cheapest".into(),
+        error: "missed_percent".into(),
+        marks,
+        ..Chart::default()
+    });
+    rows
+}
+
+fn gates(scenes: &BTreeMap<String, Scene>, findings: &mut Findings) {
+    let auto = |scene: &Scene| KINDS.map(|kind| did(scene, kind, "auto").unwrap_or_default());
+    let can: Vec<&Scene> = scenes.values().filter(|scene| possible(scene, &KINDS)).collect();
+    let silent = |scene: &&Scene| {
+        let silent =
+            |kind: &&str| did(scene, kind, "cheapest").is_none() && did(scene, kind, "auto").is_some_and(|d| d.said);
+        KINDS.iter().any(|kind| silent(&kind))
+    };
+    let silent = scenes.values().filter(silent).count() as f64;
+    let worst = can.iter().flat_map(|scene| auto(scene)).map(|did| did.error).fold(0.0, f64::max);
+    let summary = |metric: &str| {
+        let row = findings.rows.iter().rev().find(|row| row.scene == "all scenes" && row.method == "auto");
+        row.and_then(|row| row.metrics.get(metric).copied()).unwrap_or(f64::NAN)
+    };
+    let count = can.len();
+    let mut gates =
+        vec![Gate::at_most("scenes that no choice meets, in which the plan says that its does", silent, 0.0)];
+    if count < MANY {
+        gates.push(Gate::at_most(format!("auto: worst error over tolerance in {count} scenes"), worst, 2.0));
+    } else {
+        let met = summary("met_percent");
+        gates.push(Gate::at_least(format!("auto: scenes of {count} that meet all tolerances, percent"), met, 95.0));
+        let ratio = summary("cost_over_cheapest");
+        gates.push(Gate::at_most("auto: cost of all scenes over that of the cheapest choices", ratio, 1.25));
+    }
+    findings.gates.extend(gates);
+}
