@@ -5,7 +5,7 @@
 pub struct Choice<T> {
     /// What was taken.
     pub what: T,
-    /// Its error in this scene: what it stays under in 98 of 100 scenes like this.
+    /// Its error in this scene: what it stays under in nearly all scenes like this.
     pub error: f64,
     /// Its cost on this machine, cores: CPU seconds a second.
     pub cost: f64,

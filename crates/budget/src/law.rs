@@ -12,8 +12,8 @@
 
 /// Features of a scene.
 pub const FEATURES: usize = 3;
-/// Share of the scenes in which the error stays under the bound.
-pub const COVERED: f64 = 0.98;
+/// Root mean squares of r that a careful bound is wide at least.
+const WIDE: f64 = 2.5;
 /// Weight of the ridge, in scenes.
 const RIDGE: f64 = 0.3;
 
@@ -24,7 +24,7 @@ pub struct Law {
     pub weights: [f64; FEATURES + 1],
     /// Root mean square of r.
     pub spread: f64,
-    /// What r stays under in [`COVERED`] of the scenes.
+    /// What r stays under in nearly all scenes.
     pub bound: f64,
 }
 
@@ -39,13 +39,13 @@ impl Law {
         (self.weights[0] + self.weights[1..].iter().zip(features).map(|(w, f)| w * f).sum::<f64>()).exp()
     }
 
-    /// What the value stays under in [`COVERED`] of the scenes.
+    /// What the value stays under in nearly all scenes.
     pub fn at_most(&self, features: &[f64; FEATURES]) -> f64 {
         self.expected(features) * self.bound.exp()
     }
 
-    /// The law of measured values, each with its features; `None` without any, or where one is not above 0 and finite.
-    pub fn fit(measured: &[([f64; FEATURES], f64)]) -> Option<Self> {
+    /// The law of measured values, each with its features, and the bound that covers a share of them; `None` without any, or where one is not above 0 and finite.
+    pub fn fit(measured: &[([f64; FEATURES], f64)], covered: f64) -> Option<Self> {
         let sound = |(f, y): &([f64; FEATURES], f64)| *y > 0.0 && y.is_finite() && f.iter().all(|f| f.is_finite());
         if measured.is_empty() || !measured.iter().all(sound) {
             return None;
@@ -59,8 +59,13 @@ impl Law {
         let mut left: Vec<f64> = measured.iter().map(|(f, y)| (y / law.expected(f)).ln()).collect();
         left.sort_by(f64::total_cmp);
         law.spread = (left.iter().map(|r| r * r).sum::<f64>() / count).sqrt();
-        law.bound = left[((COVERED * count).ceil() as usize).clamp(1, left.len()) - 1].max(0.0);
+        law.bound = left[((covered * count).ceil() as usize).clamp(1, left.len()) - 1].max(0.0);
         Some(law)
+    }
+
+    /// With a bound of 2.5 root mean squares at least: where care costs little.
+    pub fn careful(self) -> Self {
+        Self { bound: self.bound.max(WIDE * self.spread), ..self }
     }
 }
 
@@ -101,7 +106,7 @@ mod tests {
     #[test]
     fn a_product_of_powers_is_found_again() {
         let measured = grid(|[a, b, c]| (0.3 + 1.5 * a - 0.5 * b + 0.25 * c).exp());
-        let law = Law::fit(&measured).unwrap();
+        let law = Law::fit(&measured, 0.98).unwrap();
         for (found, true_one) in law.weights.iter().zip([0.3, 1.5, -0.5, 0.25]) {
             assert!((found - true_one).abs() < 0.01, "{law:?}");
         }
@@ -110,7 +115,7 @@ mod tests {
 
     #[test]
     fn a_feature_that_never_varied_has_no_weight() {
-        let law = Law::fit(&[([1.0, 2.0, 3.0], 0.5), ([1.0, 2.0, 3.0], 0.7)]).unwrap();
+        let law = Law::fit(&[([1.0, 2.0, 3.0], 0.5), ([1.0, 2.0, 3.0], 0.7)], 0.98).unwrap();
         assert_eq!(law.weights[1..], [0.0; 3]);
         assert!((law.expected(&[1.0, 2.0, 3.0]) - 0.35f64.sqrt()).abs() < 1e-12);
         assert!((law.at_most(&[1.0, 2.0, 3.0]) - 0.7).abs() < 1e-12);
@@ -118,9 +123,9 @@ mod tests {
 
     #[test]
     fn what_has_no_logarithm_has_no_law() {
-        assert_eq!(Law::fit(&[]), None);
+        assert_eq!(Law::fit(&[], 0.98), None);
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert_eq!(Law::fit(&[([0.0; 3], 1.0), ([0.0; 3], bad)]), None);
+            assert_eq!(Law::fit(&[([0.0; 3], 1.0), ([0.0; 3], bad)], 0.98), None);
         }
         assert_eq!(Law::constant(0.0).at_most(&[1.0; 3]), 0.0);
     }
@@ -129,7 +134,7 @@ mod tests {
         #[test]
         fn the_bound_covers_its_share(noise in prop::collection::vec(-1.0f64..1.0, 100)) {
             let measured: Vec<_> = grid(|[a, _, c]| (a - 0.5 * c).exp()).into_iter().zip(&noise).map(|((f, y), n)| (f, y * n.exp())).collect();
-            let law = Law::fit(&measured).unwrap();
+            let law = Law::fit(&measured, 0.98).unwrap();
             let over = measured.iter().filter(|(f, y)| *y > law.at_most(f) * (1.0 + 1e-9)).count();
             prop_assert!(over <= 2, "{over} of 100 over the bound");
         }

@@ -33,7 +33,7 @@ mod setup;
 mod step;
 
 pub use choice::{Choice, Neighbour};
-pub use law::{COVERED, FEATURES, Law};
+pub use law::{FEATURES, Law};
 pub use machine::{Machine, PlanError};
 pub use plan::{Plan, bone_cores, bone_error_n, picture_cores, plan, plan_with, tissue_cores};
 pub use rows::{Kind, Row, Rows, read, write};

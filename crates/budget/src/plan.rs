@@ -95,11 +95,16 @@ pub fn plan_with(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Plan, 
 
 fn bone(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Choice<Bone>, PlanError> {
     let longest = TICK_SHARE;
-    let judged = rows.bone.iter().map(|row| {
+    let judged = rows.bone.iter().filter(|row| holds_walls(&row.what)).map(|row| {
         let cost = bone_cores(machine, scene, row);
         (row.what, bone_error_n(scene, row), cost, cost <= longest)
     });
     choose(judged, scene.force_error_n).ok_or(PlanError::NoRows("bone"))
+}
+
+/// Whether a method keeps a proxy on the side of the bone that it came from: one that does not loses thin walls, whatever its error on thick ones.
+fn holds_walls(bone: &Bone) -> bool {
+    trepan_rigid::Method::named(bone.method).is_some_and(|method| method.has_proxy())
 }
 
 fn tissue(machine: &Machine, scene: &Scene, rows: &Rows, free: f64) -> Result<Choice<Tissue>, PlanError> {
@@ -155,4 +160,172 @@ fn dt_ms(scene: &Scene, tissue: &Tissue) -> f64 {
 fn solver_cores(free: f64) -> f64 {
     let free = free.max(0.05);
     if free <= 1.0 { free } else { 1.0 + THREAD_GAIN * (free - 1.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Law;
+    use proptest::prelude::*;
+    use trepan_soft::Material;
+
+    const MACHINE: Machine =
+        Machine { ns_per_tet_step: 20.0, us_per_rigid_tick: 40.0, ns_per_ray: 500.0, threads: 2, device_draws: false };
+
+    fn row<T>(what: T, error: f64, cost: f64) -> Row<T> {
+        Row { what, error: Law::constant(error), cost: Law::constant(cost) }
+    }
+
+    fn rows() -> Rows {
+        let bone = |spacing_mm| Bone { method: "distance-field", spacing_mm, points: 0 };
+        let tissue = |tets| Tissue { solver: "tled", tets, still_mm: 0.0 };
+        let picture = |detail| Picture { sparse: detail < 1.0, detail };
+        Rows {
+            bone: vec![row(bone(1.0), 0.1, 0.8), row(bone(0.5), 0.04, 1.0), row(bone(0.25), 0.02, 2.0)],
+            tissue: vec![row(tissue(5_000), 2.0, 1.0), row(tissue(10_000), 1.2, 1.0), row(tissue(20_000), 0.8, 1.0)],
+            picture: vec![row(picture(0.5), 4.0, 0.1), row(picture(0.7), 2.0, 0.25), row(picture(1.0), 0.0, 1.0)],
+        }
+    }
+
+    fn scene() -> Scene {
+        Scene { stiffness: 2.0, picture_pixels: [1000, 800], ..Scene::default() }
+    }
+
+    /// By hand: 2 N/mm · 0.04 mm = 0.08 N is the first under 0.1 N; 40 us · 1000 Hz is 0.04 core. 20 000 tetrahedra: a = 7.985 mm, dt = 0.35 · 6.519/3.373 =
+    /// 0.6766 ms; a step takes 20 000 · 20 ns = 0.4 ms: 0.591 core. 800 000 pixels · 500 ns · 0.25 · 10/s: 1 core, more than the 1.34 that are left allow the full picture.
+    #[test]
+    fn the_cheapest_within_the_tolerance_is_taken() {
+        let plan = plan_with(&MACHINE, &scene(), &rows()).unwrap();
+        let (bone, tissue) = (plan.bone.unwrap(), plan.tissue.unwrap());
+        assert_eq!((bone.what.spacing_mm, tissue.what.tets, plan.picture.what.detail), (0.5, 20_000, 0.7));
+        assert!((bone.error - 0.08).abs() < 1e-12 && (bone.cost - 0.04).abs() < 1e-12);
+        assert!((tissue.cost - 0.5912).abs() < 1e-3 && (plan.picture.cost - 1.0).abs() < 1e-9);
+        assert!((plan.cores() - 0.025 - 1.6312).abs() < 1e-3);
+        assert_eq!(plan.picture.better.map(|n| (n.what.detail, n.in_time)), Some((1.0, false)));
+        assert_eq!(tissue.cheaper.map(|n| n.what.tets), Some(10_000));
+        assert!(plan.meets_tolerances() && plan.in_time());
+        assert_eq!(plan.setup().tissue, tissue.what);
+    }
+
+    #[test]
+    fn a_slow_machine_takes_what_runs_and_says_that_the_tolerance_is_missed() {
+        let slow = Machine { ns_per_tet_step: 60.0, ..MACHINE };
+        let plan = plan_with(&slow, &scene(), &rows()).unwrap();
+        assert_eq!(plan.tissue.unwrap().what.tets, 10_000);
+        assert!(!plan.meets_tolerances() && plan.to_string().contains("TOLERANCE NOT MET"));
+        let hopeless = plan_with(&Machine { ns_per_tet_step: 1e4, ..MACHINE }, &scene(), &rows()).unwrap();
+        assert_eq!(hopeless.tissue.unwrap().what.tets, 5_000);
+        assert!(!hopeless.in_time() && hopeless.to_string().contains("TOO SLOW"));
+    }
+
+    #[test]
+    fn what_a_scene_lacks_costs_nothing_and_a_device_draws_for_nothing() {
+        let bare = Scene { has_bone: false, has_tissue: false, ..scene() };
+        let plan = plan_with(&Machine { device_draws: true, ..MACHINE }, &bare, &rows()).unwrap();
+        assert_eq!((plan.bone, plan.tissue), (None, None));
+        assert_eq!((plan.picture.what.detail, plan.picture.cost), (1.0, 0.0));
+        assert_eq!(plan.cores(), plan.fixed_cores);
+        assert_eq!(plan.setup().bone, Quality::Usual.preset().unwrap().bone);
+    }
+
+    #[test]
+    fn stiffer_tissue_needs_shorter_steps() {
+        let at = |material| plan_with(&MACHINE, &Scene { material, displacement_mm: 2.0, ..scene() }, &rows()).unwrap();
+        let [brain, thesis] = [Material::BRAIN, Material::THESIS].map(|m| at(m).tissue.unwrap().cost);
+        assert!(thesis > 1.2 * brain, "{thesis} {brain}");
+    }
+
+    #[test]
+    fn bad_numbers_are_refused_by_name() {
+        let refused = |machine, scene| plan_with(&machine, &scene, &rows()).unwrap_err().to_string();
+        assert!(refused(Machine { threads: 0, ..MACHINE }, scene()).contains("threads"));
+        assert!(refused(Machine { ns_per_ray: 0.0, ..MACHINE }, scene()).contains("ns_per_ray"));
+        assert!(refused(MACHINE, Scene { headroom: 0.5, ..scene() }).contains("headroom"));
+        assert!(refused(MACHINE, Scene { brain_mm3: f64::NAN, ..scene() }).contains("brain_mm3"));
+        assert!(refused(MACHINE, Scene { picture_pixels: [0, 600], ..scene() }).contains("picture_pixels[0]"));
+        assert_eq!(plan_with(&MACHINE, &scene(), &Rows { bone: vec![], ..rows() }), Err(PlanError::NoRows("bone")));
+    }
+
+    /// Scenes and machines that a session may have.
+    fn any() -> impl Strategy<Value = (Machine, Scene)> {
+        let lengths = (0.5f64..4.0, 0.2f64..2.0, 0.5f64..2.0, 1.0f64..8.0, 2.0f64..5.0, 60.0f64..300.0);
+        let asked = (0.02f64..0.5, 0.1f64..3.0, 0.5f64..15.0, 1u32..64, 300u32..1200);
+        (lengths, asked).prop_map(|((tool, press, finest, motion, probe, view), (n, mm, percent, threads, pixels))| {
+            let scene = Scene {
+                force_error_n: n,
+                displacement_mm: mm,
+                picture_error_percent: percent,
+                tool_radius_mm: tool,
+                press_mm: press,
+                finest_mm: finest,
+                tissue_motion_mm: motion,
+                probe_radius_mm: probe,
+                view_mm: view,
+                picture_pixels: [pixels, pixels],
+                ..Scene::default()
+            };
+            (Machine { threads, ..Machine::default() }, scene)
+        })
+    }
+
+    /// Whether a plan of enough threads for everything; then accuracy alone decides.
+    fn unhurried(machine: &Machine) -> Machine {
+        Machine { threads: 1000, ..*machine }
+    }
+
+    proptest! {
+        #[test]
+        fn a_tighter_tolerance_is_never_cheaper((machine, scene) in any(), share in 0.05f64..1.0) {
+            let machine = unhurried(&machine);
+            let tighter = Scene {
+                force_error_n: share * scene.force_error_n,
+                displacement_mm: share * scene.displacement_mm,
+                picture_error_percent: share * scene.picture_error_percent,
+                ..scene
+            };
+            let (loose, tight) = (plan(&machine, &scene).unwrap(), plan(&machine, &tighter).unwrap());
+            let parts = |p: &Plan| [p.bone.map(|c| (c.cost, c.meets_tolerance)), p.tissue.map(|c| (c.cost, c.meets_tolerance)), Some((p.picture.cost, p.picture.meets_tolerance))];
+            for (loose, tight) in parts(&loose).into_iter().zip(parts(&tight)) {
+                let ((loose, _), (tight, met)) = (loose.unwrap(), tight.unwrap());
+                prop_assert!(!met || tight >= loose, "{tight} under {loose}");
+            }
+        }
+
+        #[test]
+        fn auto_is_never_dearer_than_a_preset_that_meets_the_tolerance((machine, scene) in any()) {
+            let (machine, rows) = (unhurried(&machine), Rows::stored().unwrap());
+            let plan = plan_with(&machine, &scene, &rows).unwrap();
+            for preset in Quality::ALL.into_iter().filter_map(Quality::preset) {
+                let bone = rows.bone.iter().find(|row| row.what == preset.bone).unwrap();
+                if bone_error_n(&scene, bone) <= scene.force_error_n {
+                    prop_assert!(plan.bone.unwrap().cost <= bone_cores(&machine, &scene, bone));
+                }
+                let tissue = rows.tissue.iter().find(|row| row.what == preset.tissue).unwrap();
+                if tissue.error.at_most(&scene.tissue_features()) <= scene.displacement_mm {
+                    prop_assert!(plan.tissue.unwrap().cost <= tissue_cores(&machine, &scene, tissue));
+                }
+                let picture = rows.picture.iter().find(|row| row.what == preset.picture).unwrap();
+                if picture.error.at_most(&scene.picture_features()) <= scene.picture_error_percent {
+                    prop_assert!(plan.picture.cost <= picture_cores(&machine, &scene, picture));
+                }
+            }
+        }
+
+        #[test]
+        fn what_is_chosen_runs_in_time_or_nothing_does((machine, scene) in any()) {
+            let plan = plan(&machine, &scene).unwrap();
+            prop_assert!(!plan.in_time() || plan.cores() <= f64::from(machine.threads) + 1e-9);
+            prop_assert!(plan.cores().is_finite() && plan.to_string().contains("picture: "));
+            let again = super::plan(&machine, &scene).unwrap();
+            prop_assert_eq!(plan, again);
+        }
+
+        #[test]
+        fn more_threads_never_make_tissue_less_accurate((machine, scene) in any()) {
+            let more = Machine { threads: machine.threads + 1, ..machine };
+            let (few, many) = (plan(&machine, &scene).unwrap(), plan(&more, &scene).unwrap());
+            let error = |p: &Plan| p.tissue.unwrap().error.max(scene.displacement_mm);
+            prop_assert!(error(&many) <= error(&few));
+        }
+    }
 }
