@@ -188,7 +188,13 @@ mod tests {
     }
 
     fn scene() -> Scene {
-        Scene { stiffness: 2.0, picture_pixels: [1000, 800], ..Scene::default() }
+        Scene {
+            force_error_n: 0.1,
+            displacement_mm: 1.0,
+            stiffness: 2.0,
+            picture_pixels: [1000, 800],
+            ..Scene::default()
+        }
     }
 
     /// By hand: 2 N/mm · 0.04 mm = 0.08 N is the first under 0.1 N; 40 us · 1000 Hz is 0.04 core. 20 000 tetrahedra: a = 7.985 mm, dt = 0.35 · 6.519/3.373 =

@@ -92,7 +92,10 @@ pub fn read<T: Kind>(table: &'static str) -> Result<Vec<Row<T>>, PlanError> {
 pub fn write<T: Kind>(rows: &[Row<T>]) -> String {
     let mut text = header::<T>() + "\n";
     for row in rows {
-        let laws = [row.error, row.cost].into_iter().flat_map(numbers).map(|n| format!("{n:.4}"));
+        let laws = [row.error, row.cost]
+            .into_iter()
+            .flat_map(numbers)
+            .map(|n| format!("{:.4}", (n * 1e4).round() / 1e4 + 0.0));
         text += &row.what.write().into_iter().chain(laws).collect::<Vec<_>>().join(",");
         text += "\n";
     }

@@ -299,7 +299,7 @@ mod tests {
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.7, 9000));
         let plan = models.plan.as_ref().unwrap();
         assert_eq!(plan.bone.unwrap().what.method, models.setup.bone.method);
-        assert!(models.why[0].contains("--spacing-mm 0.7 is given; ") && models.why[0].contains(" N of 0.1 allowed"));
+        assert!(models.why[0].contains("--spacing-mm 0.7 is given; ") && models.why[0].contains(" N of 0.4 allowed"));
         assert_eq!(models.why[2], "as usual", "no picture is drawn");
     }
 

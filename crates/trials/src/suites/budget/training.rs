@@ -11,11 +11,11 @@ const SEED: u64 = 0x7472_6169_6e00;
 /// Scenes of one part.
 const SCENES: usize = 8;
 /// Parts by case, and how many of them look at tissue too, which takes long.
-const PARTS: [Source; 20] = {
+const PARTS: [Source; 17] = {
     use Source::{BuiltIn, MadeUp, Open};
     [
         BuiltIn, MadeUp, BuiltIn, MadeUp, Open, BuiltIn, MadeUp, MadeUp, MadeUp, MadeUp, BuiltIn, MadeUp, MadeUp, Open,
-        MadeUp, BuiltIn, MadeUp, MadeUp, MadeUp, MadeUp,
+        MadeUp, BuiltIn, MadeUp,
     ]
 };
 const WITH_TISSUE: usize = 8;
