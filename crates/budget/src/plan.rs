@@ -102,8 +102,9 @@ fn bone(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Choice<Bone>, P
     choose(judged, scene.force_error_n).ok_or(PlanError::NoRows("bone"))
 }
 
-/// Whether a method keeps a proxy on the side of the bone that it came from: one that does not loses thin walls, whatever its error on thick ones.
-fn holds_walls(bone: &Bone) -> bool {
+/// Whether a method keeps a proxy on the side of the bone that it came from: one that does not loses thin walls, whatever its error on thick ones. A plan takes
+/// no other.
+pub fn holds_walls(bone: &Bone) -> bool {
     trepan_rigid::Method::named(bone.method).is_some_and(|method| method.has_proxy())
 }
 

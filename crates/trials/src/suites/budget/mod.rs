@@ -1,7 +1,7 @@
 //! No more model than a scene needs: what a plan chooses in random scenes, whether that meets the tolerance, and what the cheapest choice that does would cost.
 //!
 //! # Theory
-//! In each scene every stored choice for bone, tissue and picture is run against a truth of high resolution; the cheapest that meets the tolerance, by stored costs, is found by
+//! In each scene every stored choice for bone, tissue and picture that a session may take (bone: methods that hold thin walls) is run against a truth of high resolution; the cheapest that meets the tolerance, by stored costs, is found by
 //! looking at all. The plan is told the scene's features only. Scenes in which no choice meets a tolerance are counted apart: there the plan must say so.
 //!
 //! # Practice

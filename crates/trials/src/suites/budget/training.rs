@@ -21,9 +21,8 @@ const PARTS: [Source; 17] = {
 const WITH_TISSUE: usize = 8;
 /// Least that counts as an error, mm or percent: less is as good as none.
 const LEAST: f64 = 1e-3;
-/// Share of the scenes that bounds cover, and those of bone.
+/// Share of the scenes that bounds cover.
 const COVERED: f64 = 0.95;
-const COVERED_ON_BONE: f64 = 0.99;
 /// Times that a picture is drawn for its time.
 const DRAWN: usize = 1;
 
@@ -100,8 +99,7 @@ pub fn tables(parts: &[Observed]) -> [(&'static str, String); 3] {
     };
     // Bone costs hundredths of a core: there a wide bound is cheap.
     let careful = |row: Row<Bone>| Row { error: row.error.careful(), ..row };
-    let on_bone =
-        rows(&bone::choices(), &of(|o| &o.bone), COVERED_ON_BONE).into_iter().map(careful).collect::<Vec<_>>();
+    let on_bone = rows(&bone::choices(), &of(|o| &o.bone), COVERED).into_iter().map(careful).collect::<Vec<_>>();
     let drawn = rows(&picture::choices(), &of(|o| &o.picture), COVERED).into_iter().map(exact).collect::<Vec<_>>();
     [table(&on_bone), table(&rows(&tissue::choices(), &of(|o| &o.tissue), COVERED)), table(&drawn)]
 }

@@ -5,7 +5,7 @@ use super::scene::{MACHINE, Situation};
 use super::{picture, tissue};
 use crate::suite::{Findings, Row};
 use std::fmt::Display;
-use trepan_budget::{Kind, Neighbour, Quality, Rows, bone_cores, picture_cores, plan_with, tissue_cores};
+use trepan_budget::{Kind, Neighbour, Quality, Rows, bone_cores, holds_walls, picture_cores, plan_with, tissue_cores};
 
 /// Tetrahedra that a quick run has at most.
 const QUICK_TETS: usize = 12_000;
@@ -29,9 +29,10 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
     }
 }
 
-/// The stored rows; in a quick run without those that take long.
+/// The stored rows that a session may take; in a quick run without those that take long.
 fn stored(quick: bool) -> Rows {
     let mut rows = Rows::stored().expect("the stored tables are sound");
+    rows.bone.retain(|row| holds_walls(&row.what));
     rows.tissue.retain(|row| !quick || row.what.tets <= QUICK_TETS);
     rows
 }
