@@ -8,7 +8,7 @@ use std::fmt::Display;
 use trepan_budget::{Kind, Neighbour, Quality, Rows, bone_cores, holds_walls, picture_cores, plan_with, tissue_cores};
 
 /// Tetrahedra that a quick run has at most.
-const QUICK_TETS: usize = 12_000;
+const QUICK_TETS: usize = 8_000;
 
 /// Scenes of one case.
 pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: bool, findings: &mut Findings) {
