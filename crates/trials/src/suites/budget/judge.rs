@@ -118,7 +118,7 @@ fn gates(scenes: &BTreeMap<String, Scene>, findings: &mut Findings) {
     let silent = |scene: &&Scene| {
         let silent =
             |kind: &&str| did(scene, kind, "cheapest").is_none() && did(scene, kind, "auto").is_some_and(|d| d.said);
-        KINDS.iter().any(|kind| silent(kind))
+        KINDS.iter().any(silent)
     };
     let silent = scenes.values().filter(silent).count() as f64;
     let worst = scenes.values().flat_map(auto).map(|did| did.error).fold(0.0, f64::max);
