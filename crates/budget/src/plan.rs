@@ -192,6 +192,7 @@ mod tests {
         Scene {
             force_error_n: 0.1,
             displacement_mm: 1.0,
+            picture_error_percent: 3.0,
             stiffness: 2.0,
             picture_pixels: [1000, 800],
             ..Scene::default()

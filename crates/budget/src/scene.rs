@@ -44,12 +44,12 @@ pub struct Scene {
 }
 
 impl Default for Scene {
-    /// Tolerances that about the usual setup keeps in an adult's head.
+    /// Tolerances of force and tissue that about the usual setup keeps in an adult's head, and of a picture whose edges are still sharp.
     fn default() -> Self {
         Self {
             force_error_n: 0.4,
             displacement_mm: 2.5,
-            picture_error_percent: 3.0,
+            picture_error_percent: 1.0,
             has_bone: true,
             has_tissue: true,
             stiffness: 1.0,
