@@ -34,16 +34,30 @@ enum Better {
     Neither,
 }
 
+/// What a metric is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Nature {
+    /// A time or a rate: a slower machine changes it.
+    Time,
+    /// Made of times, as a ratio of them is: it wanders as they do, and no machine is to blame.
+    OfTimes,
+    /// The same in every run of one seed.
+    Exact,
+}
+
 /// What a metric's name says of it.
-fn kind(metric: &str) -> (bool, Better) {
+fn kind(metric: &str) -> (Nature, Better) {
     let ends = |list: &[&str]| list.iter().any(|end| metric.ends_with(end));
     let has = |list: &[&str]| list.iter().any(|word| metric.contains(word));
     match () {
-        () if ends(&["_per_s", "speedup"]) => (true, Better::More),
+        () if has(&["spread", "times_", "_over_", "_mb", "share_of", "halves", "predicted"]) => {
+            (Nature::OfTimes, Better::Neither)
+        }
+        () if ends(&["_per_s", "speedup"]) => (Nature::Time, Better::More),
         () if ends(&["_us", "_ns", "_s"])
             || ends(&["_ms"]) && has(&["time", "frame", "step", "cost", "calibration"]) =>
         {
-            (true, Better::Less)
+            (Nature::Time, Better::Less)
         }
         () if has(&[
             "error",
@@ -58,10 +72,10 @@ fn kind(metric: &str) -> (bool, Better) {
             "differing",
         ]) =>
         {
-            (false, Better::Less)
+            (Nature::Exact, Better::Less)
         }
-        () if has(&["ssim", "dice", "recovered", "works", "held", "told_before"]) => (false, Better::More),
-        () => (false, Better::Neither),
+        () if has(&["ssim", "dice", "recovered", "works", "held", "told_before"]) => (Nature::Exact, Better::More),
+        () => (Nature::Exact, Better::Neither),
     }
 }
 
@@ -120,7 +134,7 @@ fn gates(text: &mut String, old: &Report, new: &Report) {
 fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
     let ratios = ratios(old, new);
     let mut of_times: Vec<f64> = Vec::new();
-    ratios.iter().filter(|((_, metric), _)| kind(metric).0).for_each(|(_, all)| of_times.extend(all));
+    ratios.iter().filter(|((_, metric), _)| kind(metric).0 == Nature::Time).for_each(|(_, all)| of_times.extend(all));
     let machine = quantile(&mut of_times, 0.5).unwrap_or(1.0);
     let mut wander: Vec<f64> = of_times.iter().map(|ratio| (ratio / machine).ln().abs()).collect();
     let spread = quantile(&mut wander, 0.9).unwrap_or(0.0).exp() - 1.0;
@@ -139,10 +153,11 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
     let mut told: BTreeMap<&str, Vec<Change>> = BTreeMap::new();
     let mut same = 0;
     for ((method, metric), all) in ratios {
-        let (is_time, better) = kind(&metric);
-        let all: Vec<f64> = if is_time { all.iter().map(|ratio| ratio / machine).collect() } else { all };
+        let (nature, better) = kind(&metric);
+        let all: Vec<f64> =
+            if nature == Nature::Time { all.iter().map(|ratio| ratio / machine).collect() } else { all };
         let change = Change::of(method, metric, all);
-        match change.word(is_time, better) {
+        match change.word(nature, better) {
             Some(word) => told.entry(word).or_default().push(change),
             None => same += 1,
         }
@@ -193,7 +208,8 @@ impl Change {
     }
 
     /// What to call it, if it is a change. A time in a single scene is none: nothing says how sure it is.
-    fn word(&self, is_time: bool, better: Better) -> Option<&'static str> {
+    fn word(&self, nature: Nature, better: Better) -> Option<&'static str> {
+        let is_time = nature != Nature::Exact;
         let least = if is_time { LEAST_TIME } else { LEAST };
         let sure = self.low > 1.0 || self.high < 1.0 || self.median.is_nan();
         if !sure || (self.median - 1.0).abs() < least || is_time && self.scenes < 3 {
@@ -302,10 +318,11 @@ mod tests {
 
     #[test]
     fn names_tell_times_from_errors() {
-        assert_eq!(kind("tick_p50_us"), (true, Better::Less));
-        assert_eq!(kind("time_to_rest_ms"), (true, Better::Less));
-        assert_eq!(kind("lead_p50_ms"), (false, Better::Neither));
-        assert_eq!(kind("frames_per_s"), (true, Better::More));
-        assert_eq!(kind("depth_error_p95_mm"), (false, Better::Less));
+        assert_eq!(kind("tick_p50_us"), (Nature::Time, Better::Less));
+        assert_eq!(kind("time_to_rest_ms"), (Nature::Time, Better::Less));
+        assert_eq!(kind("call_spread_percent"), (Nature::OfTimes, Better::Neither));
+        assert_eq!(kind("lead_p50_ms"), (Nature::Exact, Better::Neither));
+        assert_eq!(kind("frames_per_s"), (Nature::Time, Better::More));
+        assert_eq!(kind("depth_error_p95_mm"), (Nature::Exact, Better::Less));
     }
 }

@@ -76,17 +76,24 @@ fn shard(text: &str) -> Result<(usize, usize), String> {
     if i >= 1 && i <= n { Ok((i - 1, n)) } else { Err(remedy.into()) }
 }
 
-fn main() -> Result<ExitCode> {
+fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let passed = match arguments.task {
-        None => run(&arguments.run)?,
-        Some(Task::Merge { folders, out }) => merge(&folders, &out)?,
-        Some(Task::Compare { old, new }) => {
-            println!("{}", compare::folders(&old, &new)?);
+        None => run(&arguments.run),
+        Some(Task::Merge { folders, out }) => merge(&folders, &out),
+        Some(Task::Compare { old, new }) => compare::folders(&old, &new).map(|text| {
+            println!("{text}");
             true
-        }
+        }),
     };
-    Ok(if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    match passed {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(fault) => {
+            eprintln!("validate: {fault:#}");
+            ExitCode::from(2)
+        }
+    }
 }
 
 /// A part to run.
