@@ -98,7 +98,7 @@ pub fn judge(_: Scope, findings: &mut Findings) {
             error: error.into(),
             marks: of_scene.iter().map(mark).collect(),
             budget: Some((1.0, "one core".into())),
-            chosen: None,
+            chosen: Some("auto".into()),
         });
     }
     gates(&of_scene, &mut findings.gates);
