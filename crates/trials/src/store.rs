@@ -2,7 +2,7 @@
 //!
 //! # Practice
 //! `OUT/parts/SUITE/PART.json` holds one part; each appears whole or not at all. A run takes up parts of the very same program, scope and seed, and leaves all others; it
-//! deletes its parts when the report is written. Merging takes parts of one commit, scope and seed, whoever made them.
+//! deletes its parts when the report is written. Merging takes parts of one program or one commit, of one scope and seed, whoever made them.
 
 use crate::part::{Scope, Suite};
 use crate::report::{Making, Report};
@@ -38,7 +38,8 @@ pub struct Stored {
 pub struct Store {
     folder: PathBuf,
     program: String,
-    scope: Scope,
+    /// As it was when the run began: the sources may change meanwhile.
+    making: Making,
 }
 
 impl Store {
@@ -50,7 +51,7 @@ impl Store {
             _ = write!(hash, "{byte:02x}");
             hash
         });
-        Ok(Self { folder: folder.into(), program: hash, scope })
+        Ok(Self { folder: folder.into(), program: hash, making: Making::here(scope) })
     }
 
     fn place(&self, suite: &str, part: &str) -> PathBuf {
@@ -60,13 +61,13 @@ impl Store {
     /// A part that this very program made in this scope, if it is there.
     pub fn found(&self, suite: &str, part: &str) -> Option<Stored> {
         let stored: Stored = serde_json::from_slice(&fs::read(self.place(suite, part)).ok()?).ok()?;
-        (stored.program == self.program && stored.making.scope() == self.scope).then_some(stored)
+        (stored.program == self.program && stored.making.scope() == self.making.scope()).then_some(stored)
     }
 
     /// Keeps a part.
     pub fn keep(&self, suite: &str, part: &str, (seconds, control): (f64, Control), findings: Findings) -> Result<()> {
-        let making = Making::here(self.scope);
-        let stored = Stored { program: self.program.clone(), seconds, control, making, findings };
+        let (program, making) = (self.program.clone(), self.making.clone());
+        let stored = Stored { program, seconds, control, making, findings };
         whole(&self.place(suite, part), &serde_json::to_vec(&stored)?)
     }
 
@@ -78,13 +79,13 @@ impl Store {
 
     /// Seconds that parts took last time, by `SUITE/PART`.
     pub fn durations(&self) -> BTreeMap<String, f64> {
-        let read = fs::read(self.folder.join(durations(self.scope))).ok();
+        let read = fs::read(self.folder.join(durations(self.making.scope()))).ok();
         read.and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
     }
 
     /// Remembers what parts took.
     pub fn remember(&self, all: &BTreeMap<String, f64>) -> Result<()> {
-        whole(&self.folder.join(durations(self.scope)), &serde_json::to_vec_pretty(all)?)
+        whole(&self.folder.join(durations(self.making.scope())), &serde_json::to_vec_pretty(all)?)
     }
 }
 
@@ -108,8 +109,11 @@ pub fn merged(suite: &Suite, folders: &[PathBuf]) -> Result<Option<Report>> {
         }
     }
     let Some((first, of_first)) = parts.values().next() else { return Ok(None) };
-    let alike = |m: &Making| (m.commit.clone(), m.quick, m.seed);
-    if let Some((path, other)) = parts.values().find(|(_, part)| alike(&part.making) != alike(&of_first.making)) {
+    let alike = |one: &Stored, two: &Stored| {
+        let same_code = one.program == two.program || one.making.commit == two.making.commit;
+        same_code && one.making.scope() == two.making.scope()
+    };
+    if let Some((path, other)) = parts.values().find(|(_, part)| !alike(part, of_first)) {
         let told = |m: &Making| format!("commit {}, quick {}, seed {}", m.commit, m.quick, m.seed);
         let [one, two] = [&of_first.making, &other.making].map(told);
         bail!("{} is of {one}, {} of {two}: merge parts of one", first.display(), path.display());

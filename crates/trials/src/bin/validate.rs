@@ -59,6 +59,9 @@ enum Task {
         /// Where SUITE.json and index.html go
         #[arg(long, value_name = "DIR", default_value = "target/validation")]
         out: PathBuf,
+        /// Keep the borders of the merged maps as those that later runs are held against (in the sources)
+        #[arg(long)]
+        keep_borders: bool,
     },
     /// What got faster, slower, more or less accurate from one run to another
     Compare {
@@ -80,7 +83,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let passed = match arguments.task {
         None => run(&arguments.run),
-        Some(Task::Merge { folders, out }) => merge(&folders, &out),
+        Some(Task::Merge { folders, out, keep_borders }) => merge(&folders, &out, keep_borders),
         Some(Task::Compare { old, new }) => compare::folders(&old, &new).map(|text| {
             println!("{text}");
             true
@@ -125,9 +128,7 @@ fn run(asked: &Run) -> Result<bool> {
     for suite in whole_suites {
         let report = store::merged(suite, std::slice::from_ref(&asked.out))?.context("no part was made")?;
         passed &= write(suite, &report, &asked.out)?;
-        if asked.keep_borders && !report.findings.maps.is_empty() {
-            borders::keep(suite.name, scope, &report.findings.maps)?;
-        }
+        keep(asked.keep_borders, suite, &report)?;
         store.forget(suite.name);
     }
     Ok(paged(&asked.out)? && passed)
@@ -211,11 +212,12 @@ fn say(bar: &ProgressBar, line: &str) {
     }
 }
 
-fn merge(folders: &[PathBuf], out: &Path) -> Result<bool> {
+fn merge(folders: &[PathBuf], out: &Path, keep_borders: bool) -> Result<bool> {
     let (mut passed, mut any) = (true, false);
     for suite in ALL.iter().chain(ON_REQUEST) {
         if let Some(report) = store::merged(suite, folders)? {
             passed &= write(suite, &report, out)?;
+            keep(keep_borders, suite, &report)?;
             any = true;
         }
     }
@@ -223,6 +225,14 @@ fn merge(folders: &[PathBuf], out: &Path) -> Result<bool> {
         bail!("no parts lie in {folders:?}: give the folders that shards wrote with --out");
     }
     Ok(paged(out)? && passed)
+}
+
+/// Keeps the borders of a suite that has maps, where that is asked for.
+fn keep(asked: bool, suite: &Suite, report: &Report) -> Result<()> {
+    if asked && !report.findings.maps.is_empty() {
+        borders::keep(suite.name, report.making.scope(), &report.findings.maps)?;
+    }
+    Ok(())
 }
 
 /// A suite's file, and its gates for the eye.
