@@ -170,7 +170,7 @@ fn on_disk(options: &str, seconds: &str) -> Option<(Option<i32>, String, Option<
 
 #[test]
 fn a_full_disk_ends_the_recording_with_a_word_and_not_the_session() {
-    let Some((code, said, recording)) = on_disk("size=1500k", "8") else {
+    let Some((code, said, recording)) = on_disk("size=900k", "8") else {
         eprintln!("this system lets no test mount a disk: not tried");
         return;
     };

@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn a_plane_is_seen_where_it_lies() {
         let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 };
-        let square = [(-20.0, -20.0), (20.0, -20.0), (20.0, 20.0), (-20.0, 20.0)].map(|(x, y)| Vec3::new(x, y, -8.5));
+        let square = [(-15.0, -15.0), (15.0, -15.0), (15.0, 15.0), (-15.0, 15.0)].map(|(x, y)| Vec3::new(x, y, -8.5));
         let look = Rays::new(&square, &[[0, 1, 2], [0, 2, 3]], site).look(&square);
         assert!(look.seen.len() > 300 && look.seen.iter().all(|seen| (seen.z + 8.5).abs() < 1e-4));
         assert!(look.seen.iter().all(|seen| seen.truncate().length() < LOOK_RADIUS_MM + 1e-3));
