@@ -65,7 +65,7 @@ fn is_complete(method: Method) -> bool {
 /// One mesh: every path by every method.
 fn measure(scene: &Scene, scope: Scope, findings: &mut Findings) {
     for path in PATHS {
-        let steps = if path.jumps { scope.pick(50, 200) } else { scope.pick(150, 1000) };
+        let steps = if path.jumps { scope.pick(30, 200) } else { scope.pick(80, 1000) };
         let place = format!("{}, {}", scene.name, path.name);
         follow(scene, &place, &scene.tips(&path, steps), !path.jumps, findings);
     }

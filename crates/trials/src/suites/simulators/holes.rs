@@ -187,7 +187,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
 }
 
 fn count(scope: Scope) -> u64 {
-    scope.pick(30, 1000)
+    scope.pick(20, 1000)
 }
 
 fn tally(first: u64, holes: Vec<Hole>) -> Row {
