@@ -174,11 +174,10 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
 
 /// New over old of every metric that both have in the same scene, by method and metric. Where both are 0 the ratio is 1.
 fn ratios(old: &[Row], new: &[Row]) -> BTreeMap<(String, String), Vec<f64>> {
-    let key = |row: &Row| (row.scene.clone(), row.method.clone(), format!("{:?}", stable(row)));
-    let was: BTreeMap<_, &Row> = old.iter().map(|row| (key(row), row)).collect();
+    let was: BTreeMap<_, &Row> = keyed(old).collect();
     let mut ratios: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
-    for row in new {
-        let Some(before) = was.get(&key(row)) else { continue };
+    for (key, row) in keyed(new) {
+        let Some(before) = was.get(&key) else { continue };
         for (metric, &value) in &row.metrics {
             let Some(&old) = before.metrics.get(metric) else { continue };
             let ratio = if value == old || (value.is_nan() && old.is_nan()) { 1.0 } else { value / old };
@@ -186,6 +185,17 @@ fn ratios(old: &[Row], new: &[Row]) -> BTreeMap<(String, String), Vec<f64>> {
         }
     }
     ratios
+}
+
+/// Rows by scene, method, settings, and which of those that share all of these: rows come in the same order in every run.
+fn keyed(rows: &[Row]) -> impl Iterator<Item = ((String, usize), &Row)> {
+    let mut met: BTreeMap<String, usize> = BTreeMap::new();
+    rows.iter().map(move |row| {
+        let name = format!("{} | {} | {:?}", row.scene, row.method, stable(row));
+        let count = met.entry(name.clone()).or_default();
+        *count += 1;
+        ((name, *count), row)
+    })
 }
 
 /// Settings that are not measured themselves: no lists, no fractions.
@@ -305,6 +315,13 @@ mod tests {
             reports(&old, &report(|n| wobble(n + 3) * if (10..20).contains(&n) { 1.3 } else { 1.0 }, 0.1, 0.2));
         assert!(slower_b.contains("SLOWER") && slower_b.contains("b, tick_p50_us"), "{slower_b}");
         assert!(slower_b.contains("1 promises in both, 0 with another verdict"));
+    }
+
+    #[test]
+    fn rows_of_one_name_are_told_apart_by_their_order() {
+        let row = |mm: f64| Row::new("s", "m").with("stiffness", mm + 0.5).metric("depth_error_mm", mm);
+        let rows: Vec<Row> = (1..5).map(|n| row(f64::from(n))).collect();
+        assert_eq!(ratios(&rows, &rows)[&("m".to_string(), "depth_error_mm".to_string())], [1.0; 4]);
     }
 
     #[test]
