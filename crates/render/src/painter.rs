@@ -100,7 +100,7 @@ impl Painter {
         Ok(Self { by: By::Processor(Box::new(processor)), kept, notice: None, quality: Quality::full(size) })
     }
 
-    /// Draws only a share of the pixels along an edge, from [`LEAST_DETAIL`] to 1, and enlarges them to the size that was asked for; `sparse`: the processor casts every second ray where bone
+    /// Draws only a share of the pixels along an edge, from 0.05 to 1, and enlarges them to the size that was asked for; `sparse`: the processor casts every second ray where bone
     /// is smooth. For pictures as they were opened; an area that changes is [`fit`](Self::fit).
     pub fn set_quality(&mut self, sparse: bool, detail: f32) -> Result<(), RenderError> {
         let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
