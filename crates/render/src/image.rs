@@ -44,6 +44,13 @@ impl Image {
         Self { width, height, rgba }
     }
 
+    /// How far it is from another one of its size: root mean square difference of all colours, percent of white.
+    pub fn error_percent(&self, other: &Self) -> f64 {
+        let squares = self.rgba.iter().zip(&other.rgba).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2));
+        // The fourth byte never differs.
+        (squares.sum::<f64>() / (0.75 * self.rgba.len() as f64)).sqrt() / 2.55
+    }
+
     /// The bytes of a PNG file.
     pub fn png(&self) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();

@@ -2,7 +2,7 @@
 
 mod accuracy;
 mod faults;
-pub(super) mod likeness;
+mod likeness;
 mod models;
 pub mod rivals;
 mod scenes;

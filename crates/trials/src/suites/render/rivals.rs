@@ -5,7 +5,6 @@
 //! shell from the same eye with all cores, while the camera moves. Each one's error is that of its picture against its own with the finest steps, since their lamps
 //! differ; ours has shadows and ambient light, VTK's has neither. VTK's time is that of the first distance of samples whose error is no larger than ours.
 
-use super::likeness::error_percent;
 use super::scenes::{ISO, frame, head};
 use super::{By, EXACT, SPARSE, Setting};
 use crate::python::Workshop;
@@ -62,7 +61,7 @@ fn compare(edge: usize, size: [u32; 2], scope: Scope, theirs: &[Theirs], finding
         by.set(&setting, size);
         by.draw(&aside);
         let times = Samples::of(scope.pick(3, 9), |n| by.draw(if n % 2 == 0 { &here } else { &aside }));
-        let (ms, error) = (1e-3 * times.quantile(0.5), error_percent(&by.image(), &reference));
+        let (ms, error) = (1e-3 * times.quantile(0.5), by.image().error_percent(&reference));
         let equal = theirs.iter().rev().find(|t| t.error_percent <= error).unwrap_or(&theirs[0]);
         let ratio = equal.ms / ms;
         findings
@@ -98,7 +97,7 @@ fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>, Strin
     let finest = image(0)?;
     let theirs = ms
         .enumerate()
-        .map(|(n, ms)| Ok(Theirs { step_voxel: STEPS[n], ms, error_percent: error_percent(&image(n)?, &finest) }));
+        .map(|(n, ms)| Ok(Theirs { step_voxel: STEPS[n], ms, error_percent: image(n)?.error_percent(&finest) }));
     let theirs = theirs.collect::<Result<Vec<_>, String>>()?;
     if theirs.len() == STEPS.len() { Ok(theirs) } else { Err(format!("VTK tells {} times", theirs.len())) }
 }

@@ -1,6 +1,6 @@
 //! What leaping, sparse rays, steps and resolution cost, against the image error that they make.
 
-use super::likeness::{enlarged, error_percent, similarity};
+use super::likeness::similarity;
 use super::scenes::{frame, head};
 use super::{By, EXACT, FINE_VOXEL, SPARSE, Setting};
 use crate::picture::{Chart, Mark};
@@ -61,7 +61,7 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
             by.draw(&aside);
             // Each picture moves the camera, so every ray is cast; the last one is seen from here.
             let times = Samples::of(scope.pick(3, 9), |n| by.draw(if n % 2 == 0 { &here } else { &aside }));
-            let image = enlarged(&by.image(), size);
+            let image = by.image().enlarged(size);
             let mut row = Row::new(
                 format!("drilled shell at {}x{}", size[0], size[1]),
                 format!("{}: {}", by.name(), setting.name),
@@ -69,7 +69,7 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
             .with("machine", by.machine())
             .metric("frame_p50_ms", 1e-3 * times.quantile(0.5))
             .metric("frames_per_s", 1e6 / times.quantile(0.5))
-            .metric("image_error_percent", error_percent(&image, &reference))
+            .metric("image_error_percent", image.error_percent(&reference))
             .metric("ssim", similarity(&image, &reference));
             if let By::Processor(p) = by {
                 row = row.metric("steps_per_ray", p.steps_per_ray());
@@ -78,7 +78,7 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
             chart.marks.push(Mark {
                 method: format!("{}: {}", by.name(), setting.name),
                 cost: 1e-3 * times.quantile(0.5),
-                error: error_percent(&image, &reference),
+                error: image.error_percent(&reference),
             });
             if setting.name == SPARSE.name {
                 let like = similarity(&image, &reference);
