@@ -58,6 +58,7 @@ fn a_planned_session_replays_bit_for_bit_without_a_plan() {
         operation(live.path(), "4", &["--force-error-n", "0.5", "--displacement-mm", "4", "--frames-per-second", "0"]);
     assert_eq!(was["models"]["quality"], "auto");
     assert!(said.contains("planned: ") && said.contains(" N of 0.5 allowed"), "{said}");
+    assert!(said.contains("error in this case "), "the case itself was measured: {said}");
     let header = Recording::open(&live.path().join("session.mcap")).unwrap().header;
     assert_eq!(header.config["quality"], "auto");
     assert_eq!(was["models"]["tissue"]["tets"].to_string(), header.config["tets"]);
@@ -93,4 +94,11 @@ fn a_plan_is_told_for_the_case_that_is_given() {
     {
         assert!(told.contains(words), "{words:?} is not in: {told}");
     }
+    assert!(told.contains("errors by measuring bone, tissue, picture in it"), "{told}");
+    // What was found is kept: other tolerances choose among the same errors.
+    let again = integrated(&["plan", "--tets", "6000", "--force-error-n", "0.5"]);
+    let again = String::from_utf8_lossy(&again.stdout).into_owned();
+    let of_tissue = |told: &str| told.lines().skip_while(|l| !l.starts_with("tissue: ")).nth(1).map(String::from);
+    let error = |told: &str| of_tissue(told)?.split("error ").nth(1)?.split(" mm").next().map(String::from);
+    assert!(error(&told).is_some() && error(&told) == error(&again), "{told}\n{again}");
 }

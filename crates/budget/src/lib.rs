@@ -35,7 +35,7 @@ mod step;
 pub use choice::{Choice, Neighbour};
 pub use law::{FEATURES, Law};
 pub use machine::{Machine, PlanError};
-pub use plan::{Plan, bone_cores, bone_error_n, holds_walls, picture_cores, plan, plan_with, tissue_cores};
+pub use plan::{Plan, bone_cores, bone_error_n, dt_ms, holds_walls, picture_cores, plan, plan_with, tissue_cores};
 pub use rows::{Kind, Row, Rows, read, write};
 pub use scene::Scene;
 pub use setup::{Bone, Picture, Quality, Setup, Tissue};

@@ -150,7 +150,8 @@ pub fn picture_cores(machine: &Machine, scene: &Scene, row: &Row<Picture>) -> f6
     machine.ns_per_ray * 1e-9 * pixels * row.cost.expected(&scene.picture_features()) * scene.pictures_per_s
 }
 
-fn dt_ms(scene: &Scene, tissue: &Tissue) -> f64 {
+/// Step that a solver takes on a mesh by its number of tetrahedra alone, ms.
+pub fn dt_ms(scene: &Scene, tissue: &Tissue) -> f64 {
     match tissue.solver {
         "corotational" => IMPLICIT_DT_MS,
         _ => stable_dt_ms(scene.brain_mm3, tissue.tets, &scene.material).min(LONGEST_DT_MS),

@@ -17,7 +17,8 @@ pub struct Row<T> {
     pub what: T,
     /// Its error: mm of depth on bone, mm of displacement in tissue, percent of white in the picture.
     pub error: Law,
-    /// Its time over that of the number in [`Machine`](crate::Machine): a tick, a tetrahedron and step (what sleeps included), a pixel of the full picture.
+    /// Its time over that of the number in [`Machine`](crate::Machine): a tick, a tetrahedron and step of the expected length (what sleeps included), a pixel of the full
+    /// picture.
     pub cost: Law,
 }
 

@@ -25,7 +25,7 @@ mod compare;
 mod device_test;
 mod error;
 mod hand;
-mod measure;
+pub mod measure;
 mod models;
 mod operation;
 mod options;

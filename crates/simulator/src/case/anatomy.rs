@@ -129,7 +129,7 @@ pub fn make_brain(
 }
 
 /// The mask on a grid of 1 mm cubes, cut to its content and a margin.
-fn cropped(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
+pub fn cropped(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
     let spacing = mask.spacing_mm().min_element().clamp(0.8, 1.5) as f32;
     let whole = resample(mask, &Grid::isotropic_over(mask, spacing), Interpolation::Nearest, 0);
     let [nx, ny, _] = whole.dims;

@@ -1,9 +1,10 @@
 //! Which case the options mean, and making one to keep.
 
 use crate::case::cache::Cache;
-use crate::case::import::{Facts, volume_mm3};
+use crate::case::import::{Facts, Known, volume_mm3};
 use crate::case::{Case, Inputs, Recipe, folder, import};
 use crate::error::SessionError;
+use crate::measure::Own;
 use crate::models::{self, Models, Wish};
 use crate::options::{Options, Patient};
 use crate::program::Program;
@@ -26,9 +27,10 @@ pub fn open_case(
     }
     let (inputs, mut models) = (inputs(&options.patient, built_in), None);
     let wanted = recipe(&options.patient);
-    let case = import::open_by(program, &inputs, &wanted, &Cache::of_user()?, |facts| {
-        let settled = models.insert(wish.settle(facts, card)?);
-        settled.say();
+    let case = import::open_by(program, &inputs, &wanted, &Cache::of_user()?, |known| {
+        let facts = known.facts;
+        let settled = models.insert(wish.settle(&facts, card, |scene, rows| known.own(scene, rows))?);
+        known.say(|| settled.say());
         let Setup { bone, tissue, .. } = settled.setup;
         Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, ..wanted })
     })?;
@@ -49,8 +51,10 @@ pub fn plan_case(
     match case {
         Some(folder) => on_case(wish, &fitting(program, folder::load(folder)?)?, card),
         None => {
-            let facts = import::facts(program, &inputs(patient, built_in), &recipe(patient), &Cache::of_user()?)?;
-            wish.settle(&facts, card)
+            let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of_user()?);
+            let mut known = Known::of(program, &inputs, &recipe, &cache)?;
+            let facts = known.facts;
+            wish.settle(&facts, card, |scene, rows| known.own(scene, rows))
         }
     }
 }
@@ -62,7 +66,8 @@ fn on_case(wish: Wish, case: &Case, card: impl FnOnce() -> bool) -> Result<Model
         ct_voxel_mm: case.skull.as_ref().map(|skull| skull.spacing_mm().element_sum() / 3.0),
         brain_mm3: case.brain.as_ref().map(|brain| volume_mm3(&brain.classes)),
     };
-    wish.settle(&facts, card)
+    // What the scanner saw is no longer there: the laws must do.
+    wish.settle(&facts, card, |_, _| Ok(Own::default()))
 }
 
 /// Makes a case folder; returns the case's name.

@@ -6,7 +6,7 @@
 //! A case goes by the first digits of that hash: file names may hold a patient's name.
 //! What the images are ([`Facts`]) is kept too: who chooses the numbers by it need not read them again.
 
-use crate::case::anatomy::{find_brain, make_brain, make_skull, read_ct, read_mri, registered};
+use crate::case::anatomy::{cropped, find_brain, make_brain, make_skull, read_ct, read_mri, registered};
 use crate::case::cache::Cache;
 use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
@@ -14,11 +14,19 @@ use crate::case::opening::Opening;
 use crate::case::stages::ImportStages;
 use crate::case::{Case, Inputs, Recipe};
 use crate::error::SessionError;
+use crate::measure::bone::Skull;
+use crate::measure::tissue::Shape;
+use crate::measure::{Own, Sight};
 use crate::program::Program;
+use crate::show::picture::eye;
 use glam::DAffine3;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use trepan_volume::{VoxelVolume, bone_isovalue, overlap};
+use std::sync::Arc;
+use trepan_budget::{Rows, Scene};
+use trepan_haptics::script::Site;
+use trepan_volume::{BoneVolume, DistanceField, VoxelVolume, bone_isovalue, overlap, skull_only};
 
 /// Opens a case: from the cache if it was made before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
@@ -31,18 +39,11 @@ pub fn open_by(
     inputs: &Inputs,
     wanted: &Recipe,
     cache: &Cache,
-    choose: impl FnOnce(&Facts) -> Result<Recipe, SessionError>,
+    choose: impl FnOnce(&mut Known) -> Result<Recipe, SessionError>,
 ) -> Result<Case, SessionError> {
-    let key = key_of_images(program, inputs, wanted, cache)?;
-    let mut stages = ImportStages::new(7);
-    let (facts, images) = match Facts::kept(cache, &key) {
-        Some(facts) => (facts, None),
-        None => {
-            let images = read(inputs, wanted, &mut stages)?;
-            (Facts::of(&images).keep(cache, &key), Some(images))
-        }
-    };
-    let recipe = stages.suspend(|| choose(&facts))?;
+    let mut known = Known::of(program, inputs, wanted, cache)?;
+    let recipe = choose(&mut known)?;
+    let Known { key, images, mut stages, .. } = known;
     let hash = cache.under(&key, &format!("{} {}", recipe.spacing_mm, recipe.tets));
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
     if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
@@ -61,16 +62,87 @@ pub fn open_by(
     Ok(case)
 }
 
-/// What the images of a case are, from the cache if they were read before.
-pub fn facts(program: Program, inputs: &Inputs, wanted: &Recipe, cache: &Cache) -> Result<Facts, SessionError> {
-    let key = key_of_images(program, inputs, wanted, cache)?;
-    if let Some(facts) = Facts::kept(cache, &key) {
-        return Ok(facts);
+/// What is known of a case before it is made.
+pub struct Known<'a> {
+    /// What its images are, from the cache if they were read before.
+    pub facts: Facts,
+    program: Program,
+    inputs: &'a Inputs,
+    wanted: &'a Recipe,
+    cache: &'a Cache,
+    key: String,
+    images: Option<Images>,
+    stages: ImportStages,
+}
+
+impl<'a> Known<'a> {
+    /// Reads the images where they were not read before.
+    pub fn of(
+        program: Program,
+        inputs: &'a Inputs,
+        wanted: &'a Recipe,
+        cache: &'a Cache,
+    ) -> Result<Self, SessionError> {
+        let key = key_of_images(program, inputs, wanted, cache)?;
+        let mut stages = ImportStages::new(7);
+        let (facts, images) = match kept(cache, &key, FACTS) {
+            Some(facts) => (facts, None),
+            None => {
+                let images = read(inputs, wanted, &mut stages)?;
+                let facts = Facts::of(&images);
+                keep(&facts, cache, &key, FACTS);
+                (facts, Some(images))
+            }
+        };
+        Ok(Self { facts, program, inputs, wanted, cache, key, images, stages })
     }
-    let mut stages = ImportStages::new(3);
-    let images = read(inputs, wanted, &mut stages)?;
-    stages.finish();
-    Ok(Facts::of(&images).keep(cache, &key))
+
+    /// How far these choices are off in this case, from the cache if it was looked at before; nothing where there is no place to look at.
+    pub fn own(&mut self, scene: &Scene, rows: &Rows) -> Result<Own, SessionError> {
+        let key = self.cache.under(&self.key, &Own::about(scene, rows));
+        if let Some(own) = kept(self.cache, &key, OWN) {
+            return Ok(own);
+        }
+        if self.images.is_none() {
+            self.images = Some(read(self.inputs, self.wanted, &mut self.stages)?);
+        }
+        self.stages.next("measuring how far models are off in this case");
+        let sight = self.images.as_ref().map(|images| sight(self.program, images, self.wanted, scene)).transpose()?;
+        let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+        let own = sight.flatten().map_or_else(Own::default, |sight| Own::of(&sight, scene, rows, threads));
+        keep(&own, self.cache, &key, OWN);
+        Ok(own)
+    }
+
+    /// Says something that must not meet the progress bar.
+    pub fn say(&self, call: impl FnOnce()) {
+        self.stages.suspend(call);
+    }
+}
+
+/// What of the images a session opens and sees first; `None` where no opening is found.
+fn sight(program: Program, images: &Images, recipe: &Recipe, scene: &Scene) -> Result<Option<Sight>, SessionError> {
+    let classes = images.mask.as_ref().map(cropped);
+    let of_bone = |ct: &VoxelVolume<i16>| {
+        let drawn = make_skull(ct, &Recipe { spacing_mm: LOOK_MM, ..*recipe }, images.isovalue_hu)?;
+        let opening = Opening::on(&drawn, images.isovalue_hu, classes.as_ref(), recipe.opening)?;
+        let bone = BoneVolume::new(&drawn, images.isovalue_hu);
+        let bone = bone.map_err(|fault| SessionError::Case(format!("the CT: {fault}")))?;
+        let mut skull = Skull { ct: ct.clone(), isovalue: images.isovalue_hu };
+        skull_only(&mut skull.ct, skull.isovalue);
+        Ok::<_, SessionError>((opening, (skull, Arc::new(bone))))
+    };
+    let with_bone = images.ct.as_ref().filter(|_| program.has_bone()).map(of_bone).transpose()?;
+    let (opening, skull) = match with_bone {
+        Some((opening, skull)) => (opening, Some(skull)),
+        None => (classes.as_ref().and_then(Opening::on_bare_brain), None),
+    };
+    let brain = classes.map(|mask| Shape { field: DistanceField::of_mask(&mask), mask, material: scene.material });
+    Ok(opening.map(|opening| {
+        let site = Site::from(opening);
+        let brain = brain.map(|shape| (shape, opening.brain()));
+        Sight { skull, entry: site.entry, outward: -site.inward, eye: eye(&site), brain }
+    }))
 }
 
 /// Names the images, and what of a recipe says how they are read.
@@ -146,7 +218,8 @@ fn build(inputs: &Inputs, images: Images, recipe: &Recipe, stages: &mut ImportSt
     let brain =
         brain.map(|(mri, mask)| make_brain(inputs, &mri, &mask, ct_from_mri, recipe, &mut notes)).transpose()?;
     stages.next("planning the opening");
-    let opening = skull.as_ref().map(|skull| Opening::on(skull, isovalue_hu, brain.as_ref(), recipe.opening));
+    let opening =
+        skull.as_ref().map(|skull| Opening::on(skull, isovalue_hu, brain.as_ref().map(|b| &b.classes), recipe.opening));
     let opening = opening.transpose()?.flatten();
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
 }
@@ -167,6 +240,10 @@ pub fn volume_mm3(mask: &VoxelVolume<u8>) -> f64 {
 
 /// What the facts are kept in.
 const FACTS: &str = "facts.json";
+/// What was found in this case is kept in.
+const OWN: &str = "own.json";
+/// Edge of the voxels that are looked at, mm.
+const LOOK_MM: f32 = 1.0;
 
 impl Facts {
     fn of(images: &Images) -> Self {
@@ -175,18 +252,17 @@ impl Facts {
             brain_mm3: images.mask.as_ref().map(volume_mm3),
         }
     }
+}
 
-    fn kept(cache: &Cache, key: &str) -> Option<Self> {
-        serde_json::from_slice(&std::fs::read(cache.find(key)?.join(FACTS)).ok()?).ok()
-    }
+fn kept<T: DeserializeOwned>(cache: &Cache, key: &str, file: &str) -> Option<T> {
+    serde_json::from_slice(&std::fs::read(cache.find(key)?.join(file)).ok()?).ok()
+}
 
-    /// Keeps them where that is possible; where it is not, the images are read once more.
-    fn keep(self, cache: &Cache, key: &str) -> Self {
-        let write = |folder: &Path| {
-            let json = serde_json::to_vec(&self).map_err(|fault| fault.to_string())?;
-            std::fs::write(folder.join(FACTS), json).map_err(|fault| fault.to_string())
-        };
-        cache.keep(key, write).err().into_iter().for_each(|fault| tracing::debug!("facts not kept: {fault}"));
-        self
-    }
+/// Keeps it where that is possible; where it is not, it is found once more.
+fn keep(what: &impl Serialize, cache: &Cache, key: &str, file: &str) {
+    let write = |folder: &Path| {
+        let json = serde_json::to_vec(what).map_err(|fault| fault.to_string())?;
+        std::fs::write(folder.join(file), json).map_err(|fault| fault.to_string())
+    };
+    cache.keep(key, write).err().into_iter().for_each(|fault| tracing::debug!("{file} not kept: {fault}"));
 }

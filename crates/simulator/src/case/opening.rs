@@ -8,7 +8,6 @@
 //! # When not to use it
 //! To plan a real operation: nothing here knows vessels, sinuses or eloquent cortex.
 
-use crate::case::Brain;
 use crate::error::SessionError;
 use serde::{Deserialize, Serialize};
 use trepan_geometry::Vec3;
@@ -34,12 +33,12 @@ impl Opening {
     pub fn on(
         skull: &VoxelVolume<i16>,
         isovalue_hu: i16,
-        brain: Option<&Brain>,
+        brain: Option<&VoxelVolume<u8>>,
         wanted: Option<[f32; 3]>,
     ) -> Result<Option<Self>, SessionError> {
         let bone = BoneVolume::new(skull, isovalue_hu);
         let bone = bone.map_err(|fault| SessionError::Case(format!("the CT: {fault}")))?;
-        let below = brain.map(|brain| (DistanceField::of_mask(&brain.classes), brain.mesh.bounds().centre()));
+        let below = brain.map(|classes| (DistanceField::of_mask(classes), middle(classes)));
         let Some(wanted) = wanted else {
             let found = below.map_or_else(|| bare_skull(&bone), |(field, centre)| burr_hole(&bone, &field, centre));
             return Ok(found.map(Self::from));
@@ -57,6 +56,18 @@ impl Opening {
             ))
         };
         site.map(|site| Some(site.into())).ok_or_else(nothing)
+    }
+}
+
+impl Opening {
+    /// A place to probe a brain without a skull.
+    pub fn on_bare_brain(classes: &VoxelVolume<u8>) -> Option<Self> {
+        bare_brain(&DistanceField::of_mask(classes), middle(classes)).map(Self::from)
+    }
+
+    /// Point on the brain's surface below it.
+    pub fn brain(&self) -> Vec3 {
+        Vec3::from(self.entry_mm) + self.brain_mm * Vec3::from(self.inward)
     }
 }
 
@@ -83,6 +94,15 @@ const STEP_MM: f32 = 0.1;
 fn burr_hole(bone: &BoneVolume, brain: &DistanceField, centre: Vec3) -> Option<Site> {
     let sites = outward_rays().filter_map(|outward| site(bone, brain, centre, outward));
     sites.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, site)| site)
+}
+
+/// Middle of the box around what is not 0.
+fn middle(classes: &VoxelVolume<u8>) -> Vec3 {
+    let [nx, ny, _] = classes.dims;
+    let place = |at: usize| classes.centre_of([at % nx, at / nx % ny, at / (nx * ny)]).as_vec3();
+    let filled = (0..classes.data.len()).filter(|at| classes.data[*at] != 0).map(place).map(|p| [p, p]);
+    let within = filled.reduce(|[low, high], [p, _]| [low.min(p), high.max(p)]);
+    within.map_or(Vec3::ZERO, |[low, high]| 0.5 * (low + high))
 }
 
 /// A place to probe a brain without a skull: straight down from above, a third of the way to the right and front.

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! # Practice
-//! Settled once at start. The machine is measured only for parts that a plan chooses, in under two seconds; a replay, a preset, or a session with everything given
+//! Settled once at start. The machine is measured only for parts that a plan chooses, in under two seconds, and the case in some twenty where it was not before; a replay, a preset, or a session with everything given
 //! measures nothing, so that it is the same on every machine.
 
 mod given;
@@ -23,7 +23,7 @@ use crate::case::Recipe;
 use crate::case::import::Facts;
 use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
-use crate::measure::{self, Wanted};
+use crate::measure::{self, Own, Wanted};
 use crate::options::{Options, Patient, Tolerances};
 use crate::program::Program;
 use given::{Given, written};
@@ -47,6 +47,8 @@ pub struct Models {
     pub unmet: Vec<String>,
     /// The plan, where something was planned.
     pub plan: Option<Plan>,
+    /// Whether it was made from errors of bone, tissue and picture that were found in this very case.
+    pub measured: [bool; 3],
 }
 
 /// What is known of a session's models before its case is open.
@@ -114,7 +116,13 @@ impl Wish {
     }
 
     /// The models for a case with these images. `card` says whether a graphics card draws; it is asked only where that matters.
-    pub fn settle(&self, facts: &Facts, card: impl FnOnce() -> bool) -> Result<Models, SessionError> {
+    /// `own` finds how far rows are off in this very case; it is asked only where a plan is made.
+    pub fn settle(
+        &self,
+        facts: &Facts,
+        card: impl FnOnce() -> bool,
+        own: impl FnOnce(&Scene, &Rows) -> Result<Own, SessionError>,
+    ) -> Result<Models, SessionError> {
         let (given, usual) = (&self.given, usual());
         let preset = self.quality.map_or(Some(usual), Quality::preset);
         let auto = preset.is_none();
@@ -123,14 +131,16 @@ impl Wish {
             tissue: auto && self.program.has_tissue() && (given.tets.is_none() || given.solver.is_none()),
             picture: auto && self.picture.is_some(),
         };
-        let plan = wanted.any().then(|| self.plan(facts, wanted, wanted.picture && card())).transpose()?;
+        let plan = wanted.any().then(|| self.plan(facts, wanted, wanted.picture && card(), own)).transpose()?;
+        let (plan, measured) = plan.unzip();
+        let measured = measured.unwrap_or_default();
         let base = preset.unwrap_or_else(|| plan.as_ref().map_or(usual, |plan| of_parts(plan, wanted, usual)));
         let setup = Setup {
             bone: given.bone(base.bone),
             tissue: given.tissue(base.tissue),
             picture: given.picture.unwrap_or(base.picture),
         };
-        let (why, unmet) = self.why(plan.as_ref(), wanted);
+        let (why, unmet) = self.why(plan.as_ref(), wanted, measured);
         Ok(Models {
             setup,
             by: self.quality.map_or("replay", Quality::name),
@@ -138,11 +148,18 @@ impl Wish {
             given: given.words.clone(),
             unmet,
             plan,
+            measured,
         })
     }
 
-    /// Measures the machine and plans what is wanted, among the rows that have what is given.
-    fn plan(&self, facts: &Facts, wanted: Wanted, device_draws: bool) -> Result<Plan, SessionError> {
+    /// Measures the machine and the case and plans what is wanted, among the rows that have what is given; says what was measured of the case.
+    fn plan(
+        &self,
+        facts: &Facts,
+        wanted: Wanted,
+        device_draws: bool,
+        own: impl FnOnce(&Scene, &Rows) -> Result<Own, SessionError>,
+    ) -> Result<(Plan, [bool; 3]), SessionError> {
         let internal = |fault: trepan_budget::PlanError| SessionError::Internal(format!("--quality auto: {fault}"));
         let (machine, mut rows) = (measure::machine(wanted, device_draws), Rows::stored().map_err(internal)?);
         let near = |a: f64, all: &mut dyn Iterator<Item = f64>| {
@@ -161,7 +178,13 @@ impl Wish {
             has_tissue: wanted.tissue && !rows.tissue.is_empty(),
             ..self.scene(facts)
         };
-        trepan_budget::plan_with(&machine, &scene, &rows).map_err(internal)
+        let mut asked = rows.clone();
+        if !wanted.picture || device_draws {
+            asked.picture.clear();
+        }
+        let own = own(&scene, &asked)?;
+        let plan = trepan_budget::plan_with(&machine, &scene, &own.instead(rows, &scene)).map_err(internal)?;
+        Ok((plan, own.has()))
     }
 
     /// What the session asks for, with the most demanding of the program's tools.
@@ -191,7 +214,7 @@ impl Wish {
     }
 
     /// Why each part, and what is not kept.
-    fn why(&self, plan: Option<&Plan>, wanted: Wanted) -> ([String; 3], Vec<String>) {
+    fn why(&self, plan: Option<&Plan>, wanted: Wanted, measured: [bool; 3]) -> ([String; 3], Vec<String>) {
         let rest = match self.quality {
             None => "as recorded".into(),
             Some(Quality::Auto) => "as usual".into(),
@@ -209,9 +232,17 @@ impl Wish {
             words.iter().cloned().chain([reason]).collect::<Vec<_>>().join("; ")
         };
         let why = [
-            part("bone", &self.given.words[0], bone.map(|choice| reason(choice, scene.force_error_n, "N"))),
-            part("tissue", &self.given.words[1], tissue.map(|choice| reason(choice, scene.displacement_mm, "mm"))),
-            part("picture", &[], picture.map(|choice| reason(choice, scene.picture_error_percent, "%"))),
+            part(
+                "bone",
+                &self.given.words[0],
+                bone.map(|choice| reason(choice, (scene.force_error_n, "N"), measured[0])),
+            ),
+            part(
+                "tissue",
+                &self.given.words[1],
+                tissue.map(|choice| reason(choice, (scene.displacement_mm, "mm"), measured[1])),
+            ),
+            part("picture", &[], picture.map(|choice| reason(choice, (scene.picture_error_percent, "%"), measured[2]))),
         ];
         (why, unmet)
     }
@@ -247,14 +278,15 @@ fn view_pixels(picture: [u32; 2]) -> [u32; 2] {
 }
 
 /// Why a choice was made, and whether it leaves something to be wished for.
-fn reason<T: std::fmt::Display>(choice: &Choice<T>, tolerance: f64, unit: &str) -> (String, bool) {
+fn reason<T: std::fmt::Display>(choice: &Choice<T>, (tolerance, unit): (f64, &str), measured: bool) -> (String, bool) {
     let Choice { error, cost, meets_tolerance, in_time, better, cheaper, .. } = choice;
     let why = match (in_time, meets_tolerance) {
         (true, true) => "the cheapest within the tolerance",
         (true, false) => "TOLERANCE NOT MET, the most accurate that runs in time",
         (false, _) => "TOO SLOW, the cheapest there is",
     };
-    let mut text = format!("{why}: error {error:.3} {unit} of {tolerance} allowed, {cost:.3} cores");
+    let by = if measured { "in this case" } else { "in cases like this" };
+    let mut text = format!("{why}: error {by} {error:.3} {unit} of {tolerance} allowed, {cost:.3} cores");
     for (label, neighbour) in [("better", better), ("cheaper", cheaper)] {
         if let Some(n) = neighbour {
             let late = if n.in_time { "" } else { ", too slow here" };
@@ -270,6 +302,10 @@ mod tests {
     use clap::Parser;
     use trepan_budget::{Bone, Tissue};
 
+    fn by_law(_: &Scene, _: &Rows) -> Result<Own, SessionError> {
+        Ok(Own::default())
+    }
+
     fn wish(line: &str, recording: Option<&Recording>) -> Wish {
         let options = Options::try_parse_from(format!("x --headless {line}").split_whitespace()).unwrap();
         Wish::of(Program::Integrated, &options, recording).unwrap()
@@ -280,22 +316,23 @@ mod tests {
     #[test]
     fn presets_and_flags_are_taken_without_a_measurement() {
         for quality in [Quality::Draft, Quality::Usual, Quality::Fine] {
-            let models = wish(&format!("--quality {}", quality.name()), None).settle(&FACTS, || false).unwrap();
+            let models = wish(&format!("--quality {}", quality.name()), None).settle(&FACTS, || false, by_law).unwrap();
             assert_eq!((Some(models.setup), models.plan.is_none()), (quality.preset(), true));
         }
-        let models = wish("--quality draft --tets 3000 --rigid thesis", None).settle(&FACTS, || false).unwrap();
+        let models = wish("--quality draft --tets 3000 --rigid thesis", None).settle(&FACTS, || false, by_law).unwrap();
         let draft = Quality::Draft.preset().unwrap();
         assert_eq!(models.setup.bone, Bone { method: "thesis", points: 0, ..draft.bone });
         assert_eq!(models.setup.tissue, Tissue { tets: 3000, ..draft.tissue });
         assert!(models.why[0].contains("--rigid thesis is given; preset draft"), "{}", models.why[0]);
         let all = "--spacing-mm 0.7 --rigid thesis --tets 4000 --solver xpbd --frames-per-second 0";
-        let models = wish(all, None).settle(&FACTS, || false).unwrap();
+        let models = wish(all, None).settle(&FACTS, || false, by_law).unwrap();
         assert!(models.plan.is_none() && models.setup.bone.spacing_mm == 0.7 && models.setup.tissue.solver == "xpbd");
     }
 
     #[test]
     fn auto_plans_what_is_not_given_and_says_why() {
-        let models = wish("--spacing-mm 0.7 --tets 9000 --frames-per-second 0", None).settle(&FACTS, || false).unwrap();
+        let models =
+            wish("--spacing-mm 0.7 --tets 9000 --frames-per-second 0", None).settle(&FACTS, || false, by_law).unwrap();
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.7, 9000));
         let plan = models.plan.as_ref().unwrap();
         assert_eq!(plan.bone.unwrap().what.method, models.setup.bone.method);
@@ -305,7 +342,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_kept_is_said_and_the_best_that_runs_is_taken() {
-        let models = wish("--force-error-n 0.0001 --displacement-mm 0.0001", None).settle(&FACTS, || false).unwrap();
+        let models =
+            wish("--force-error-n 0.0001 --displacement-mm 0.0001", None).settle(&FACTS, || false, by_law).unwrap();
         assert!(models.unmet.len() >= 2 && models.unmet[0].contains("TOLERANCE NOT MET"), "{:?}", models.unmet);
         assert!(models.unmet[0].starts_with("bone: ") && models.unmet[1].starts_with("tissue: "));
     }
@@ -313,19 +351,20 @@ mod tests {
     #[test]
     fn a_replay_takes_what_was_recorded_and_measures_nothing() {
         let mut recording = Recording::default();
-        let recorded = wish("--quality fine --spacing-mm 0.85 --rigid thesis", None).settle(&FACTS, || false).unwrap();
+        let recorded =
+            wish("--quality fine --spacing-mm 0.85 --rigid thesis", None).settle(&FACTS, || false, by_law).unwrap();
         recording.header.config.extend(recorded.entries());
         for line in ["", "--quality auto"] {
-            let again = wish(line, Some(&recording)).settle(&FACTS, || false).unwrap();
+            let again = wish(line, Some(&recording)).settle(&FACTS, || false, by_law).unwrap();
             assert_eq!((again.setup, again.by, again.plan.is_none()), (recorded.setup, "replay", true));
         }
-        let other = wish("--tets 7000 --spacing-mm 2", Some(&recording)).settle(&FACTS, || false).unwrap();
+        let other = wish("--tets 7000 --spacing-mm 2", Some(&recording)).settle(&FACTS, || false, by_law).unwrap();
         assert_eq!((other.setup.tissue.tets, other.setup.bone.spacing_mm), (7000, 2.0));
         assert_eq!(other.setup.bone.method, "thesis");
-        let draft = wish("--quality draft", Some(&recording)).settle(&FACTS, || false).unwrap();
+        let draft = wish("--quality draft", Some(&recording)).settle(&FACTS, || false, by_law).unwrap();
         assert_eq!(Some(draft.setup), Quality::Draft.preset());
         recording.header.config = [("spacing_mm".to_string(), "1".to_string())].into();
-        let older = wish("", Some(&recording)).settle(&FACTS, || false).unwrap();
+        let older = wish("", Some(&recording)).settle(&FACTS, || false, by_law).unwrap();
         assert_eq!(Some(older.setup), Quality::Usual.preset(), "an older one ran what was usual");
     }
 
@@ -340,7 +379,7 @@ mod tests {
             register: false,
             opening: None,
         };
-        let models = wish("--quality fine", None).on(&recipe).settle(&FACTS, || false).unwrap();
+        let models = wish("--quality fine", None).on(&recipe).settle(&FACTS, || false, by_law).unwrap();
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.8, 6000));
         assert!(models.why[0].contains("the case folder has voxels of 0.8 mm; preset fine"), "{}", models.why[0]);
     }

@@ -85,9 +85,10 @@ impl Models {
             machine.ns_per_tet_step, machine.us_per_rigid_tick, machine.threads
         );
         text += &format!(
-            "this case: CT voxels of {:.2} mm, brain of {:.0} ml\n{plan}",
+            "this case: CT voxels of {:.2} mm, brain of {:.0} ml; errors by {}\n{plan}",
             plan.scene.finest_mm,
-            plan.scene.brain_mm3 * 1e-3
+            plan.scene.brain_mm3 * 1e-3,
+            self.errors_by()
         );
         for (given, what) in self.given.iter().zip([bone as &dyn std::fmt::Display, tissue]) {
             if !given.is_empty() {
@@ -96,6 +97,16 @@ impl Models {
         }
         let unmet = self.unmet.iter().map(|text| format!("NOT KEPT: {text}\n"));
         text + &unmet.collect::<String>()
+    }
+
+    /// Where the plan's errors come from.
+    fn errors_by(&self) -> String {
+        let all = ["bone", "tissue", "picture"].into_iter().zip(self.measured);
+        let measured: Vec<_> = all.filter(|(_, measured)| *measured).map(|(name, _)| name).collect();
+        match measured[..] {
+            [] => "the laws of cases like this".into(),
+            _ => format!("measuring {} in it, else by the laws of cases like this", measured.join(", ")),
+        }
     }
 
     /// As a recording keeps them; a replay takes the first ones back.

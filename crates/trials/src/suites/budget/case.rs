@@ -4,6 +4,8 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_geometry::Vec3;
+use trepan_simulator::measure::bone::Skull;
+use trepan_simulator::measure::tissue::Shape;
 use trepan_soft::Material;
 use trepan_volume::{
     AIR_HU, BoneVolume, DistanceField, Grid, Interpolation, VoxelVolume, bone_isovalue, hounsfield, largest_component,
@@ -33,19 +35,13 @@ pub struct Case {
     /// Its name.
     pub name: &'static str,
     /// The CT with nothing but the skull, on its own grid.
-    pub ct: VoxelVolume<i16>,
-    /// Where bone begins, HU.
-    pub isovalue: i16,
+    pub skull: Skull,
     /// The skull in voxels of 1 mm.
     pub bone: Arc<BoneVolume>,
-    /// Where there is brain, 0 or 1.
-    pub mask: VoxelVolume<u8>,
-    /// Distance to the brain's surface.
-    pub brain: DistanceField,
+    /// The brain.
+    pub brain: Shape,
     /// Middle and radius of the bone's outer surface, mm, where it is a ball.
     pub ball: Option<(DVec3, f64)>,
-    /// Young's modulus of the brain, MPa.
-    pub young_mpa: f32,
 }
 
 impl Case {
@@ -63,12 +59,8 @@ impl Case {
             },
             Source::MadeUp => Self::made_up(random),
         };
-        Self { young_mpa, ..case }
-    }
-
-    /// What the brain is made of.
-    pub fn material(&self) -> Material {
-        Material::NeoHookean { young_mpa: self.young_mpa, poisson: 0.45, density_g_mm3: 1.0e-3 }
+        let material = Material::NeoHookean { young_mpa, poisson: 0.45, density_g_mm3: 1.0e-3 };
+        Self { brain: Shape { material, ..case.brain }, ..case }
     }
 
     fn loaded(name: &'static str, ct: &Path, labels: &Path) -> Self {
@@ -116,17 +108,18 @@ impl Case {
     ) -> Self {
         let look = resample(&ct, &Grid::isotropic_over(&ct, LOOK_MM), Interpolation::Trilinear, AIR_HU);
         let bone = Arc::new(BoneVolume::new(&look, isovalue).expect("the case has bone"));
-        Self { name, ct, isovalue, bone, brain: DistanceField::of_mask(&mask), mask, ball, young_mpa: 0.003 }
+        let brain = Shape { field: DistanceField::of_mask(&mask), mask, material: Material::BRAIN };
+        Self { name, skull: Skull { ct, isovalue }, bone, brain, ball }
     }
 
     /// Mean edge of the CT's own voxels, mm.
     pub fn finest_mm(&self) -> f64 {
-        self.ct.spacing_mm().element_sum() / 3.0
+        self.skull.ct.spacing_mm().element_sum() / 3.0
     }
 
     /// Volume of the brain, mm³.
     pub fn brain_mm3(&self) -> f64 {
-        self.mask.data.iter().filter(|&&v| v != 0).count() as f64 * self.mask.voxel_mm3()
+        self.brain.mask.data.iter().filter(|&&v| v != 0).count() as f64 * self.brain.mask.voxel_mm3()
     }
 
     /// Outermost place of bone from the middle of its box in a direction, if there is any.
@@ -139,10 +132,10 @@ impl Case {
 
     /// Outermost place of the brain from its middle in a direction.
     pub fn outer_brain(&self, direction: Vec3) -> Vec3 {
-        let bounds = self.mask.world_box();
+        let bounds = self.brain.mask.world_box();
         let (middle, reach) = (bounds.centre(), 0.5 * bounds.size().length());
         let places = (0..(4.0 * reach) as usize).map(|n| middle + (reach - 0.25 * n as f32) * direction);
-        places.into_iter().find(|p| bounds.contains(*p) && self.brain.sample(*p) <= 0.0).unwrap_or(middle)
+        places.into_iter().find(|p| bounds.contains(*p) && self.brain.field.sample(*p) <= 0.0).unwrap_or(middle)
     }
 }
 

@@ -115,20 +115,24 @@ fn gates(scenes: &BTreeMap<String, Scene>, findings: &mut Findings) {
     let auto = |scene: &Scene| {
         possible(scene, &KINDS).into_iter().filter_map(|kind| did(scene, kind, "auto")).collect::<Vec<_>>()
     };
-    let silent = |scene: &&Scene| {
-        let silent =
-            |kind: &&str| did(scene, kind, "cheapest").is_none() && did(scene, kind, "auto").is_some_and(|d| d.said);
-        KINDS.iter().any(silent)
+    // Tolerances that no choice meets, and what the plan says of its own.
+    let hopeless = |kind: &&str| {
+        let of = |scene: &Scene| did(scene, kind, "cheapest").is_none().then(|| did(scene, kind, "auto")).flatten();
+        scenes.values().filter_map(of).map(|auto| auto.said).collect::<Vec<_>>()
     };
-    let silent = scenes.values().filter(silent).count() as f64;
+    let said: Vec<bool> = KINDS.iter().flat_map(hopeless).collect();
+    let silent = 100.0 * said.iter().filter(|said| **said).count() as f64 / said.len().max(1) as f64;
     let worst = scenes.values().flat_map(auto).map(|did| did.error).fold(0.0, f64::max);
     let summary = |metric: &str| {
         let row = findings.rows.iter().rev().find(|row| row.scene == "all scenes" && row.method == "auto");
         row.and_then(|row| row.metrics.get(metric).copied()).unwrap_or(f64::NAN)
     };
     let count = scenes.len();
-    let mut gates =
-        vec![Gate::at_most("scenes that no choice meets, in which the plan says that its does", silent, 0.0)];
+    let mut gates = vec![Gate::at_most(
+        "tolerances that no choice meets, of which the plan says that its does, percent",
+        silent,
+        5.0,
+    )];
     if count < MANY {
         gates.push(Gate::at_most(format!("auto: worst error over tolerance in {count} scenes"), worst, 2.0));
     } else {

@@ -7,12 +7,10 @@
 //! # Practice
 //! Rows of the budget come from other scenes, drawn with other random numbers ([`training`]).
 
-mod bone;
 mod case;
+mod finer;
 mod judge;
-mod picture;
 mod scene;
-mod tissue;
 pub mod training;
 mod trial;
 
@@ -21,6 +19,9 @@ use crate::suite::{Findings, Gate, Row};
 use case::{Case, Source};
 pub use judge::judge;
 use scene::Situation;
+use trepan_budget::Scene;
+use trepan_geometry::Vec3;
+use trepan_simulator::measure::bone::Stretch;
 
 /// Random numbers of the scenes that are judged; those of training lie elsewhere.
 const SEED: u64 = 0x6275_6467_6574;
@@ -47,32 +48,43 @@ pub fn parts(scope: Scope) -> Vec<Part> {
         }
     }
     parts.push(Part::new("truth against the oracle", truth));
+    parts.push(Part::new("finer at the opening", finer::run));
     parts
 }
 
 /// A case and a stretch of its skull with bone enough.
-fn stretch(case: &Case, random: &mut fastrand::Rng) -> (Situation, bone::Stretch) {
+fn stretch(case: &Case, random: &mut fastrand::Rng) -> (Situation, Stretch) {
     let mut draw = || {
         let situation = Situation::draw(case, random);
-        bone::Stretch::of(case, &situation).map(|stretch| (situation, stretch))
+        Stretch::of(&case.skull, &situation.slide()).map(|stretch| (situation, stretch))
     };
     (0..TRIES).find_map(|_| draw()).expect("a skull has places with bone")
 }
 
-/// The truth of bone, by the recommended method on fine voxels, beside the oracle there.
+/// The truth of bone, by the oracle on fine voxels, on made-up heads beside what a ball pushes back with in closed form; and how far the recommended method is off on the same voxels.
 fn truth(scope: Scope, findings: &mut Findings) {
     let mut random = scope.random(SEED + 9000);
-    let case = Case::of(Source::BuiltIn, &mut random);
     let mut worst = 0.0f64;
-    for n in 0..scope.pick(1, 4) {
+    let count = scope.pick(1, 4);
+    for n in 0..2 * count {
+        let case = Case::of(if n < count { Source::BuiltIn } else { Source::MadeUp }, &mut random);
         let (situation, stretch) = stretch(&case, &mut random);
-        let error_mm = stretch.oracle_error_n(scope.pick(24, 8)) / situation.scene.stiffness;
-        worst = worst.max(error_mm);
-        findings.rows.push(
-            Row::new(format!("truth on bone {n}"), "distance-field on 0.25 mm voxels")
-                .with("radius_mm", situation.scene.tool_radius_mm)
-                .metric("depth_error_p95_mm", error_mm),
-        );
+        let Scene { stiffness, tool_radius_mm, .. } = situation.scene;
+        let scene = format!("truth on bone {n}, {}", case.name);
+        let row = |method: &str| Row::new(&scene, method).with("radius_mm", tool_radius_mm);
+        let recommended_mm = stretch.recommended_error_n() / stiffness;
+        findings.rows.push(row("distance-field on 0.25 mm voxels").metric("off_oracle_p95_mm", recommended_mm));
+        if let Some((middle, radius)) = case.ball {
+            let force = |tip: Vec3| {
+                let away = tip.as_dvec3() - middle;
+                let depth = (radius + tool_radius_mm - away.length()).max(0.0);
+                (stiffness * depth * away.normalize()).as_vec3()
+            };
+            let error_mm = stretch.known_error_n(force) / stiffness;
+            worst = worst.max(error_mm);
+            findings.rows.push(row("oracle on 0.25 mm voxels").metric("off_ball_p95_mm", error_mm));
+        }
     }
-    findings.gates.push(Gate::at_most("truth on bone: apart from the oracle on the same voxels, p95 mm", worst, 0.03));
+    let name = "truth on bone: the oracle apart from a ball in closed form, of which a scanner has made voxels, p95 mm";
+    findings.gates.push(Gate::at_most(name, worst, 0.15));
 }

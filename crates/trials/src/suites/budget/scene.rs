@@ -1,8 +1,15 @@
 //! One random scene: opening, tools, push, view and tolerances.
 
 use super::case::Case;
+use std::sync::Arc;
 use trepan_budget::{Machine, Scene};
 use trepan_geometry::Vec3;
+use trepan_simulator::measure::Sight;
+use trepan_simulator::measure::bone::Slide;
+use trepan_simulator::measure::picture::View;
+
+/// How far the eye moves off where it was, as a share of its distance: up to 15 degrees.
+const MOVED: f32 = 0.25;
 
 /// Machine for which choices are priced: enough threads that time never decides, so that accuracy does.
 pub const MACHINE: Machine =
@@ -21,8 +28,10 @@ pub struct Situation {
     pub turn_rad: f32,
     /// How far the tools slide, mm.
     pub slide_mm: f32,
-    /// How far the view is tilted off the normal.
-    pub tilt: Vec3,
+    /// Direction from there to the eye when the session starts.
+    pub eye: Vec3,
+    /// Direction to it later, which the plan is not told.
+    pub eye_later: Vec3,
 }
 
 impl Situation {
@@ -39,7 +48,7 @@ impl Situation {
         let height = log(300.0, 600.0) as u32;
         let scene = Scene {
             force_error_n: log(0.03, 0.3),
-            displacement_mm: log(0.2, 2.0),
+            displacement_mm: log(0.4, 4.0),
             picture_error_percent: log(1.0, 10.0),
             stiffness: log(0.5, 2.0),
             tool_radius_mm: log(0.5, 4.0),
@@ -48,21 +57,40 @@ impl Situation {
             tissue_motion_mm: log(1.0, 8.0),
             probe_radius_mm: log(2.0, 5.0),
             brain_mm3: case.brain_mm3(),
-            material: case.material(),
+            material: case.brain.material,
             picture_pixels: [height * 4 / 3, height],
             view_mm: log(60.0, 300.0),
             pictures_per_s: log(8.0, 30.0),
             ..Scene::default()
         };
         let slide_mm = log(3.0, 8.0) as f32;
-        let tilt = 0.6 * direction(random);
-        Self { scene, towards, bone_site, turn_rad: random.f32() * core::f32::consts::TAU, slide_mm, tilt }
+        let eye = (towards + 0.6 * direction(random)).normalize();
+        let eye_later = eye + MOVED * direction(random);
+        let turn_rad = random.f32() * core::f32::consts::TAU;
+        Self { scene, towards, bone_site, turn_rad, slide_mm, eye, eye_later }
     }
 
-    /// A unit vector at right angles to a normal, along which tools slide.
-    pub fn along(&self, normal: Vec3) -> Vec3 {
-        let (a, b) = normal.any_orthonormal_pair();
-        self.turn_rad.cos() * a + self.turn_rad.sin() * b
+    /// The burr's way over the bone.
+    pub fn slide(&self) -> Slide {
+        let Self { scene, bone_site: place, towards: outward, turn_rad, slide_mm: length_mm, .. } = *self;
+        Slide { scene, place, outward, turn_rad, length_mm }
+    }
+
+    /// The probe's way over the brain.
+    pub fn push(&self, case: &Case) -> Slide {
+        Slide { place: case.outer_brain(self.towards), ..self.slide() }
+    }
+
+    /// What is seen later.
+    pub fn view(&self, case: &Case) -> View {
+        View { bone: Arc::clone(&case.bone), scene: self.scene, target: self.bone_site, eye: self.eye_later }
+    }
+
+    /// What a session could look at before it starts.
+    pub fn sight(&self, case: &Case) -> Sight {
+        let (skull, bone) = (case.skull.clone(), Arc::clone(&case.bone));
+        let brain = Some((case.brain.clone(), case.outer_brain(self.towards)));
+        Sight { skull: Some((skull, bone)), entry: self.bone_site, outward: self.towards, eye: self.eye, brain }
     }
 }
 

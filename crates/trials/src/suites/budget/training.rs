@@ -2,9 +2,10 @@
 
 use super::case::{Case, Source};
 use super::scene::Situation;
-use super::{bone, picture, tissue};
 use serde::{Deserialize, Serialize};
 use trepan_budget::{Bone, FEATURES, Kind, Law, Picture, Row, Tissue, write};
+use trepan_simulator::measure::tissue::{self, Brains, Fineness, Push};
+use trepan_simulator::measure::{self, Wanted, bone, picture};
 
 /// Random numbers of training: far from those of the scenes that are judged.
 const SEED: u64 = 0x7472_6169_6e00;
@@ -23,8 +24,6 @@ const WITH_TISSUE: usize = 8;
 const LEAST: f64 = 1e-3;
 /// Share of the scenes that bounds cover.
 const COVERED: f64 = 0.95;
-/// Times that a picture is drawn for its time.
-const DRAWN: usize = 1;
 
 /// One scene's features, and error and cost of every choice.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -52,19 +51,19 @@ pub fn observe(part: usize) -> Observed {
     let mut random = fastrand::Rng::with_seed(SEED + part as u64);
     let case = Case::of(PARTS[part], &mut random);
     let (bones, tissues, pictures) = (bone::choices(), tissue::choices(), picture::choices());
-    let mut brains = (part < WITH_TISSUE).then(|| tissue::Brains::of(&case, &tissues));
-    let (unit_us, mut observed) = (bone::unit_us(), Observed::default());
+    let brains = (part < WITH_TISSUE).then(|| Brains::of(&case.brain, &tissues).expect("the brain can be filled"));
+    let (unit_us, mut observed) = (unit_us(), Observed::default());
     for _ in 0..SCENES {
         let (situation, stretch) = super::stretch(&case, &mut random);
         let scene = &situation.scene;
-        let found = stretch.measure(&case, &bones);
+        let found = stretch.measure(&case.skull, &bones);
         observed.bone.push(Seen {
             features: scene.bone_features(),
             errors: found.iter().map(|found| found.error_n / scene.stiffness).collect(),
             costs: found.iter().map(|found| found.tick_us / unit_us).collect(),
         });
-        observed.tissue.extend(brains.as_mut().map(|brains| pushed(&case, &situation, &tissues, brains)));
-        let found = picture::measure(&case, &situation, &pictures, DRAWN);
+        observed.tissue.extend(brains.as_ref().map(|brains| pushed(&case, &situation, &tissues, brains)));
+        let found = situation.view(&case).measure(&pictures, 1).expect("the view has pixels");
         let unit_us = found.last().expect("there are choices").us;
         observed.picture.push(Seen {
             features: scene.picture_features(),
@@ -75,17 +74,18 @@ pub fn observe(part: usize) -> Observed {
     observed
 }
 
-fn pushed(case: &Case, situation: &Situation, choices: &[Tissue], brains: &mut tissue::Brains) -> Seen {
-    let found = tissue::Push::of(case, situation, brains).measure(brains);
-    let unit_ns = found[tissue::unit(choices)].ns;
-    let cost = |(found, choice): (&tissue::Found, &Tissue)| match choice.solver {
-        "tled" => found.awake,
-        _ => found.ns / unit_ns,
-    };
+/// A tick as a machine is measured, µs.
+fn unit_us() -> f64 {
+    measure::machine(Wanted { bone: true, tissue: false, picture: false }, false).us_per_rigid_tick
+}
+
+fn pushed(case: &Case, situation: &Situation, choices: &[Tissue], brains: &Brains) -> Seen {
+    let push = Push::of(&case.brain, &situation.push(case), brains, Fineness::JUDGE);
+    let found = push.and_then(|push| push.measure(brains)).expect("the brain is sound");
     Seen {
         features: situation.scene.tissue_features(),
         errors: found.iter().map(|found| found.error_mm).collect(),
-        costs: found.iter().zip(choices).map(cost).collect(),
+        costs: (0..choices.len()).map(|at| tissue::cost(at, choices, &found, &situation.scene)).collect(),
     }
 }
 

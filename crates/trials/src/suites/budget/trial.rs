@@ -2,30 +2,34 @@
 
 use super::case::{Case, Source};
 use super::scene::{MACHINE, Situation};
-use super::{picture, tissue};
 use crate::suite::{Findings, Row};
 use std::fmt::Display;
 use trepan_budget::{Kind, Neighbour, Quality, Rows, bone_cores, holds_walls, picture_cores, plan_with, tissue_cores};
+use trepan_simulator::measure::Own;
+use trepan_simulator::measure::tissue::{Brains, Fineness, Push};
 
 /// Tetrahedra that a quick run has at most.
 const QUICK_TETS: usize = 8_000;
 
 /// Scenes of one case.
 pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: bool, findings: &mut Findings) {
-    let rows = stored(quick);
+    let (rows, truth) = (stored(quick), if quick { Fineness::QUICK } else { Fineness::JUDGE });
     let case = Case::of(source, random);
     let tissues: Vec<_> = rows.tissue.iter().map(|row| row.what).collect();
-    let mut brains = tissue::Brains::of(&case, &tissues);
+    let brains = Brains::of(&case.brain, &tissues).expect("the brain can be filled");
     for number in 0..scenes {
         let (situation, stretch) = super::stretch(&case, random);
         let name = format!("{} {number}", case.name);
         let bones: Vec<_> = rows.bone.iter().map(|row| row.what).collect();
-        let on_bone = stretch.measure(&case, &bones).iter().map(|found| found.error_n).collect();
-        let in_tissue = tissue::Push::of(&case, &situation, &brains).measure(&mut brains);
+        let on_bone = stretch.measure(&case.skull, &bones).iter().map(|found| found.error_n).collect();
+        let push = Push::of(&case.brain, &situation.push(&case), &brains, truth);
+        let in_tissue = push.and_then(|push| push.measure(&brains)).expect("the brain is sound");
         let in_tissue = in_tissue.iter().map(|found| found.error_mm).collect();
         let pictures: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
-        let seen = picture::measure(&case, &situation, &pictures, 1).iter().map(|found| found.error_percent).collect();
-        note(&name, &situation, &rows, [on_bone, in_tissue, seen], findings);
+        let seen = situation.view(&case).measure(&pictures, 1).expect("the view has pixels");
+        let seen = seen.iter().map(|found| found.error_percent).collect();
+        let own = Own::of(&situation.sight(&case), &situation.scene, &rows, 1);
+        note(&name, &situation, &rows, &own, [on_bone, in_tissue, seen], findings);
     }
 }
 
@@ -38,9 +42,9 @@ fn stored(quick: bool) -> Rows {
 }
 
 /// Rows of one scene: for each kind what the plan chose, what presets would have done and what was cheapest.
-fn note(name: &str, situation: &Situation, rows: &Rows, errors: [Vec<f64>; 3], findings: &mut Findings) {
+fn note(name: &str, situation: &Situation, rows: &Rows, own: &Own, errors: [Vec<f64>; 3], findings: &mut Findings) {
     let scene = &situation.scene;
-    let plan = plan_with(&MACHINE, scene, rows).expect("the scene is sound");
+    let plan = plan_with(&MACHINE, scene, &own.instead(rows.clone(), scene)).expect("the scene is sound");
     let (bone, tissue) = (plan.bone.expect("there is bone"), plan.tissue.expect("there is tissue"));
     let presets = Quality::ALL.map(|quality| (quality, quality.preset()));
     let [on_bone, in_tissue, seen] = errors;

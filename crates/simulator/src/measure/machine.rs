@@ -76,6 +76,7 @@ fn ns_per_tet_step(clock: &Clock) -> f64 {
     1e3 * median_us(clock, CALLS, |_| _ = solver.step(&loads, dt_ms)) / tets as f64
 }
 
+/// Median tick of `distance-field` with a burr of 3 mm on 0.5 mm voxels, µs.
 fn us_per_rigid_tick(clock: &Clock) -> f64 {
     let n = 64;
     let mut ct = VoxelVolume::isotropic([n; 3], Vec3::splat(-15.75), 0.5, 0i16);

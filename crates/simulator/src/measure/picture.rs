@@ -1,0 +1,77 @@
+//! Picture: the skull from the opening, with fewer rays or fewer pixels, against every ray of the full picture.
+
+use crate::run::clock::Clock;
+use std::sync::Arc;
+use trepan_budget::{Picture, Scene};
+use trepan_geometry::Vec3;
+use trepan_render::{Camera, Casting, Frame, Image, ProcessorRenderer, RenderError, SceneData, SliceLook};
+use trepan_volume::BoneVolume;
+
+/// Shares of the pixels along an edge.
+const DETAILS: [f64; 9] = [0.25, 0.3, 0.35, 0.42, 0.5, 0.6, 0.7, 0.85, 1.0];
+/// Opening angle of the view, rad.
+const FOV_RAD: f32 = 0.6;
+
+/// Every choice.
+pub fn choices() -> Vec<Picture> {
+    [true, false].iter().flat_map(|&sparse| DETAILS.map(|detail| Picture { sparse, detail })).collect()
+}
+
+/// What a choice came to.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// Root mean square of all colours, percent of white.
+    pub error_percent: f64,
+    /// Time of a picture on one thread, least of those drawn, µs.
+    pub us: f64,
+}
+
+/// A view of a skull.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// What is seen.
+    pub bone: Arc<BoneVolume>,
+    /// Pixels, and the height of what is shown, are taken from here.
+    pub scene: Scene,
+    /// What the eye looks at.
+    pub target: Vec3,
+    /// Direction from there to the eye.
+    pub eye: Vec3,
+}
+
+impl View {
+    /// Every choice, in the order given, each drawn once by so many threads.
+    ///
+    /// # Errors
+    /// When the picture has no pixels or too many.
+    pub fn measure(&self, choices: &[Picture], threads: usize) -> Result<Vec<Found>, RenderError> {
+        let full = self.scene.picture_pixels;
+        let data = SceneData { bone: Some(Arc::clone(&self.bone)), brain: None, mri: None, tint: None };
+        let mut renderer = ProcessorRenderer::new(&data, full)?;
+        renderer.threads = threads;
+        let distance = 0.5 * self.scene.view_mm as f32 / (0.5 * FOV_RAD).tan();
+        let camera = Camera { fov_rad: FOV_RAD, ..Camera::viewed_from(self.target, self.eye, distance) };
+        let frame = Frame { slices: SliceLook { shown: false, ..SliceLook::default() }, ..Frame::of(camera) };
+        let truth = draw(&mut renderer, &frame, full, &Picture { sparse: false, detail: 1.0 })?.0;
+        let one = |choice| {
+            let (image, us) = draw(&mut renderer, &frame, full, choice)?;
+            Ok(Found { error_percent: image.enlarged(full).error_percent(&truth), us })
+        };
+        choices.iter().map(one).collect()
+    }
+}
+
+/// A picture, cast anew, and its time, µs.
+fn draw(
+    renderer: &mut ProcessorRenderer,
+    frame: &Frame,
+    full: [u32; 2],
+    choice: &Picture,
+) -> Result<(Image, f64), RenderError> {
+    let size = full.map(|n| ((f64::from(n) * choice.detail).round() as u32).max(1));
+    renderer.resize(size)?;
+    renderer.set_casting(Casting { sparse: choice.sparse, ..Casting::default() });
+    let clock = Clock::start();
+    renderer.draw(frame)?;
+    Ok((renderer.image().clone(), 1e3 * clock.now_ms()))
+}

@@ -1,0 +1,430 @@
+//! Tissue: a tool presses into the brain and slides, by every solver on every mesh, against a mesh that is fine where the tool is.
+//!
+//! # Theory
+//! The tool's end is a disc that presses on the surface as a spring, deep into the rest shape by so much as the scene says; on every mesh it takes the triangles under it. The truth is
+//! TLED with every element stepped and its cure of locking, on a mesh with an eighth of the edge around the opening. The error is the distance between where material points near the
+//! opening are on both, at the end of the push and of the slide; that which 95 of 100 points stay within counts. Cost is counted: a step of TLED per tetrahedron is 1, a sleeping one
+//! a tenth, times how much shorter a mesh's stable step is than its number of tetrahedra lets expect; of the other solvers it is measured as a ratio in one run.
+
+use super::bone::Slide;
+use super::quantile;
+use crate::error::SessionError;
+use crate::run::clock::Clock;
+use trepan_budget::{Scene, Tissue, dt_ms};
+use trepan_contact::NodalContact;
+use trepan_geometry::Vec3;
+use trepan_mesh::{Surface, TetMesh, lattice};
+use trepan_soft::{Body, Loads, Material, Method, SoftSolver};
+use trepan_tled::{Config, Damping, Tled};
+use trepan_volume::{DistanceField, VoxelVolume};
+
+/// Tetrahedra of the whole brain.
+const TETS: [usize; 7] = [3_000, 5_000, 8_000, 12_000, 20_000, 30_000, 50_000];
+/// Meshes with a region of interest, and its limit of motion, mm.
+const STILL: ([usize; 2], f64) = ([5_000, 12_000], 0.01);
+/// Meshes that rivals of TLED can step in real time.
+const RIVALS_TETS: [usize; 1] = [3_000];
+/// How fine a truth is: tetrahedra, and how often their edge is halved around the opening.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fineness {
+    /// Tetrahedra of the whole brain.
+    pub tets: usize,
+    /// Halvings.
+    pub halvings: u32,
+}
+
+impl Fineness {
+    /// What choices are judged by.
+    pub const JUDGE: Self = Self { tets: 50_000, halvings: 3 };
+    /// What a session can wait for.
+    pub const QUICK: Self = Self { tets: 25_000, halvings: 3 };
+}
+
+/// Radius of what is finer in a mesh that a session could step, mm.
+const OPENING_MM: f32 = 10.0;
+/// Radius of what is finer in a truth, mm.
+const TRUTH_MM: f32 = 14.0;
+/// What a sleeping tetrahedron costs.
+const ASLEEP: f64 = 0.1;
+/// Times of push, rest and slide, ms.
+const TIMES_MS: [f32; 3] = [120.0, 40.0, 120.0];
+/// Time between two places of the tool, ms.
+const TURN_MS: f32 = 8.0;
+/// Longest step, ms; that of the implicit solver.
+const LONGEST_MS: [f32; 2] = [1.0, 4.0];
+/// Points looked at: this far apart and from the opening, mm.
+const POINTS_MM: [f32; 2] = [3.5, 14.0];
+/// The brain is held where its surface lies under this share of its height.
+const HELD: f32 = 0.35;
+
+/// Every choice.
+pub fn choices() -> Vec<Tissue> {
+    let choice = |solver, tets, still_mm| Tissue { solver, tets, still_mm };
+    let names = Method::all().into_iter().filter(|m| m.name() != "reference").map(|m| m.name());
+    let rivals = names.flat_map(|solver| RIVALS_TETS.map(|tets| choice(solver, tets, 0.0)));
+    let tled = TETS.map(|tets| choice("tled", tets, 0.0)).into_iter();
+    tled.chain(STILL.0.map(|tets| choice("tled", tets, STILL.1))).chain(rivals).collect()
+}
+
+/// What a choice came to.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// Error of the displacement, mm.
+    pub error_mm: f64,
+    /// Work of a step over that of one with every tetrahedron awake, TLED; else 1.
+    pub awake: f64,
+    /// Length of its step, ms.
+    pub dt_ms: f64,
+    /// Time of a tetrahedron and step, ns.
+    pub ns: f64,
+}
+
+/// What a choice costs over what a machine's number and the step by the tetrahedra's number alone let expect; `found` is what all choices came to.
+pub fn cost(at: usize, choices: &[Tissue], found: &[Found], scene: &Scene) -> f64 {
+    let (choice, of) = (&choices[at], &found[at]);
+    let of_step = match choice.solver {
+        "tled" => of.awake,
+        _ => of.ns / found[unit(choices)].ns,
+    };
+    of_step * dt_ms(scene, choice) / of.dt_ms
+}
+
+/// The choice whose step is that of a machine's measure, for rivals to be compared with.
+fn unit(choices: &[Tissue]) -> usize {
+    let is = |c: &Tissue| (c.solver, c.tets, c.still_mm) == ("tled", RIVALS_TETS[0], 0.0);
+    choices.iter().position(is).expect("it is a choice")
+}
+
+/// A brain, not yet of tetrahedra.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// Where it is, 0 or 1.
+    pub mask: VoxelVolume<u8>,
+    /// Distance to its surface.
+    pub field: DistanceField,
+    /// What it is made of.
+    pub material: Material,
+}
+
+/// A brain in uniform meshes, for many scenes.
+pub struct Brains {
+    choices: Vec<Tissue>,
+    meshes: Vec<(usize, TetMesh)>,
+    material: Material,
+    /// Of all solvers, 1/ms.
+    damping: Damping,
+}
+
+impl Brains {
+    /// Fills a brain with meshes of every size.
+    ///
+    /// # Errors
+    /// When the mask cannot be filled.
+    pub fn of(shape: &Shape, choices: &[Tissue]) -> Result<Self, SessionError> {
+        let mut meshes: Vec<(usize, TetMesh)> = Vec::new();
+        for choice in choices {
+            if !meshes.iter().any(|(tets, _)| *tets == choice.tets) {
+                meshes.push((choice.tets, filled(shape, choice.tets, None)?));
+            }
+        }
+        let material = shape.material;
+        let mesh = filled(shape, TETS[0], None)?;
+        let body = Body::uniform(mesh.clone(), held(&mesh), material);
+        let damping = Tled::new(&body, &Config::default()).map_err(of_brain)?.damping_per_ms();
+        Ok(Self { choices: choices.to_vec(), meshes, material, damping: Damping::Rate(damping) })
+    }
+
+    /// A solver for a choice on its mesh.
+    fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<Box<dyn Solver>, SessionError> {
+        let body = Body::uniform(mesh.clone(), held(mesh), self.material);
+        match Method::named(choice.solver) {
+            Some(method) => Ok(Box::new(method.build(&body).map_err(of_brain)?)),
+            None => {
+                let config = Config { still_mm: choice.still_mm as f32, damping: self.damping, ..Config::default() };
+                Ok(Box::new(Tled::new(&body, &config).map_err(of_brain)?))
+            }
+        }
+    }
+}
+
+/// TLED with or without its cure of locking.
+fn cured(brains: &Brains, mesh: &TetMesh, cure_locking: bool) -> Result<Tled, SessionError> {
+    let body = Body::uniform(mesh.clone(), held(mesh), brains.material);
+    let config = Config { cure_locking, damping: brains.damping, ..Config::default() };
+    Tled::new(&body, &config).map_err(of_brain)
+}
+
+fn filled(shape: &Shape, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh, SessionError> {
+    let config = lattice::Config { target_tets, fine, ..lattice::Config::default() };
+    lattice::tetrahedra(&shape.mask, &config).map_err(of_brain)
+}
+
+fn of_brain(fault: impl std::fmt::Display) -> SessionError {
+    SessionError::Internal(format!("measuring the brain: {fault}"))
+}
+
+/// A solver of either crate, with the share of the work of a step with every tetrahedron awake.
+trait Solver {
+    fn seam(&mut self) -> &mut dyn SoftSolver;
+
+    fn work(&self) -> f64;
+}
+
+impl Solver for Tled {
+    fn seam(&mut self) -> &mut dyn SoftSolver {
+        self
+    }
+
+    fn work(&self) -> f64 {
+        ASLEEP + (1.0 - ASLEEP) * f64::from(self.awake_share())
+    }
+}
+
+impl Solver for Box<dyn SoftSolver> {
+    fn seam(&mut self) -> &mut dyn SoftSolver {
+        self.as_mut()
+    }
+
+    fn work(&self) -> f64 {
+        1.0
+    }
+}
+
+/// A push and where it takes the tissue.
+pub struct Push {
+    slide: Slide,
+    normal: Vec3,
+    points: Vec<Vec3>,
+    truth: Vec<Vec3>,
+}
+
+impl Push {
+    /// Makes the truth. The slide begins on the brain's surface.
+    ///
+    /// # Errors
+    /// When the mask cannot be filled.
+    pub fn of(shape: &Shape, slide: &Slide, brains: &Brains, truth: Fineness) -> Result<Self, SessionError> {
+        let around = |n: usize| {
+            let turn = core::f32::consts::TAU * n as f32 / 12.0;
+            let (a, b) = slide.outward.any_orthonormal_pair();
+            shape.field.gradient(slide.place + 4.0 * (turn.cos() * a + turn.sin() * b))
+        };
+        let normal = (0..12).map(around).sum::<Vec3>().try_normalize().unwrap_or(slide.outward);
+        let mut push = Self { slide: *slide, normal, points: points(shape, slide.place), truth: Vec::new() };
+        let mesh = push.finer(shape, truth, TRUTH_MM)?;
+        push.truth = push.run(&mesh, &mut cured(brains, &mesh, true)?, LONGEST_MS[0]).0;
+        Ok(push)
+    }
+
+    fn finer(&self, shape: &Shape, fineness: Fineness, radius_mm: f32) -> Result<TetMesh, SessionError> {
+        let Fineness { tets, halvings } = fineness;
+        let fine = lattice::Fine { centre: self.slide.place, radius_mm, halvings };
+        filled(shape, tets, Some(fine).filter(|_| halvings > 0))
+    }
+
+    /// TLED on a mesh that is finer within 10 mm of the opening, with its cure of locking or without.
+    ///
+    /// # Errors
+    /// When the mask cannot be filled.
+    pub fn measure_finer(
+        &self,
+        shape: &Shape,
+        brains: &Brains,
+        fineness: Fineness,
+        cure: bool,
+    ) -> Result<Found, SessionError> {
+        let mesh = self.finer(shape, fineness, OPENING_MM)?;
+        Ok(self.found(&mesh, &mut cured(brains, &mesh, cure)?, LONGEST_MS[0]))
+    }
+
+    /// Every choice, in the order of the brains.
+    ///
+    /// # Errors
+    /// When a solver refuses the brain.
+    pub fn measure(&self, brains: &Brains) -> Result<Vec<Found>, SessionError> {
+        let one = |choice: &Tissue| {
+            let mesh = brains.meshes.iter().find(|(tets, _)| *tets == choice.tets);
+            let (_, mesh) = mesh.ok_or_else(|| of_brain("a mesh is missing"))?;
+            let longest_ms = LONGEST_MS[usize::from(choice.solver == "corotational")];
+            Ok(self.found(mesh, &mut *brains.solver(choice, mesh)?, longest_ms))
+        };
+        brains.choices.iter().map(one).collect()
+    }
+
+    fn found(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Found {
+        let (places, awake, dt_ms, ns) = self.run(mesh, solver, longest_ms);
+        Found { error_mm: self.error_mm(&places), awake, dt_ms, ns }
+    }
+
+    /// A truth beside a finer one: what 95 of 100 points stay within, mm.
+    pub fn apart_mm(&self, finer: &Self) -> f64 {
+        self.error_mm(&finer.truth)
+    }
+
+    fn error_mm(&self, places: &[Vec3]) -> f64 {
+        quantile(places.iter().zip(&self.truth).map(|(a, b)| f64::from(a.distance(*b))).collect(), 0.95)
+    }
+
+    /// Displacements of the points at the end of push and slide, mean work of a step, its length, ms, and ns for each tetrahedron and step.
+    fn run(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> (Vec<Vec3>, f64, f64, f64) {
+        let (seats, touch) = (seats(mesh, &self.points), Touch::of(mesh, self.slide.place));
+        let dt_ms = solver.seam().stable_dt_ms().min(longest_ms);
+        let (mut loads, mut places) = (Loads::default(), Vec::new());
+        let (mut work, mut steps, clock) = (0.0, 0u32, Clock::start());
+        let ends = [TIMES_MS[0] + TIMES_MS[1], TIMES_MS.iter().sum()];
+        let (mut now, mut next) = (0.0f32, 0.0f32);
+        for end in ends {
+            while now < end {
+                if now >= next {
+                    loads.contacts = self.contact(mesh, &touch, now).into();
+                    next += TURN_MS;
+                }
+                solver.seam().step(&loads, dt_ms);
+                work += solver.work();
+                (steps, now) = (steps + 1, now + dt_ms);
+            }
+            places.extend(
+                seats
+                    .iter()
+                    .zip(&self.points)
+                    .map(|(seat, point)| seat.place(mesh, solver.seam().positions()) - *point),
+            );
+        }
+        let ns = clock.now_ms() * 1e6 / (f64::from(steps) * mesh.tets.len() as f64);
+        (places, work / f64::from(steps), dt_ms.into(), ns)
+    }
+
+    /// The tool at a time: its disc's spring on the triangles under it.
+    fn contact(&self, mesh: &TetMesh, touch: &Touch, now_ms: f32) -> NodalContact {
+        let (scene, way) = (&self.slide.scene, (now_ms - TIMES_MS[0] - TIMES_MS[1]) / TIMES_MS[2]);
+        let along = self.slide.along(self.normal);
+        let middle = self.slide.place + way.clamp(0.0, 1.0) * self.slide.length_mm * along;
+        let in_share = (now_ms / TIMES_MS[0]).min(1.0);
+        let depth = scene.tissue_motion_mm as f32 * in_share * in_share * (3.0 - 2.0 * in_share);
+        let mut contact = NodalContact::none();
+        (contact.normal, contact.stiffness, contact.damping) = (self.normal, 0.5, 0.05);
+        let (a, b) = self.normal.any_orthonormal_pair();
+        for n in 0..19 {
+            // Sunflower points: even over a disc.
+            let (far, turn) =
+                (((n as f32 + 0.5) / 19.0).sqrt() * 0.7 * scene.probe_radius_mm as f32, n as f32 * 2.399_963);
+            touch.press(mesh, middle + far * (turn.cos() * a + turn.sin() * b), &mut contact);
+        }
+        contact.normalise();
+        let rest = contact.mean(|n| mesh.positions[n as usize]).dot(self.normal);
+        contact.offset_mm = depth - rest;
+        contact
+    }
+}
+
+/// Surface nodes in the lower part, which the skull holds.
+fn held(mesh: &TetMesh) -> Vec<u32> {
+    let bounds = mesh.bounds();
+    let top = bounds.min.z + HELD * bounds.size().z;
+    Surface::of(mesh).nodes().into_iter().filter(|&n| mesh.positions[n as usize].z <= top).collect()
+}
+
+/// Points of the brain around the opening, on a lattice.
+fn points(shape: &Shape, place: Vec3) -> Vec<Vec3> {
+    let [apart, reach] = POINTS_MM;
+    let n = (reach / apart) as i32;
+    let all = (0..(2 * n + 1).pow(3)).map(|at| {
+        let side = 2 * n + 1;
+        place + apart * glam::IVec3::new(at % side - n, at / side % side - n, at / (side * side) - n).as_vec3()
+    });
+    all.filter(|p| p.distance(place) <= reach && shape.field.sample(*p) < -0.5).collect()
+}
+
+/// Triangles near the opening.
+struct Touch(Vec<[u32; 3]>);
+
+impl Touch {
+    fn of(mesh: &TetMesh, place: Vec3) -> Self {
+        let near = |t: &[u32; 3]| t.iter().any(|&n| mesh.positions[n as usize].distance(place) < 40.0);
+        Self(Surface::of(mesh).triangles.into_iter().filter(near).collect())
+    }
+
+    /// Adds a point's weight to the corners of the nearest triangle.
+    fn press(&self, mesh: &TetMesh, point: Vec3, contact: &mut NodalContact) {
+        let corners = |t: &[u32; 3]| t.map(|n| mesh.positions[n as usize]);
+        let weights = self.0.iter().map(|t| (t, nearest(point, corners(t))));
+        let off = |(t, w): &(&[u32; 3], [f32; 3])| {
+            let at: Vec3 = corners(t).iter().zip(w).map(|(c, w)| *c * *w).sum();
+            at.distance_squared(point)
+        };
+        if let Some((t, w)) = weights.min_by(|a, b| off(a).total_cmp(&off(b))) {
+            t.iter().zip(w).for_each(|(&n, w)| contact.add(n, w));
+        }
+    }
+}
+
+/// Weights of the corners of a triangle at its point nearest to `p`, near enough: the foot on the plane, cut to the triangle.
+fn nearest(p: Vec3, [a, b, c]: [Vec3; 3]) -> [f32; 3] {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d, e, f) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));
+    let (g, h) = (ab.dot(ap), ac.dot(ap));
+    let whole = (d * f - e * e).max(f32::MIN_POSITIVE);
+    let (v, w) = ((f * g - e * h) / whole, (d * h - e * g) / whole);
+    let cut = [1.0 - v - w, v, w].map(|x| x.max(0.0));
+    let sum: f32 = cut.iter().sum();
+    cut.map(|x| x / sum)
+}
+
+/// Where a point sits: a tetrahedron and weights of its corners.
+struct Seat {
+    tet: usize,
+    weights: [f32; 4],
+}
+
+impl Seat {
+    fn place(&self, mesh: &TetMesh, positions: &[Vec3]) -> Vec3 {
+        mesh.tets[self.tet].iter().zip(self.weights).map(|(&n, w)| positions[n as usize] * w).sum()
+    }
+}
+
+/// The tetrahedron of each point; of one outside the mesh that which it is least out of.
+fn seats(mesh: &TetMesh, points: &[Vec3]) -> Vec<Seat> {
+    let middle = points.iter().sum::<Vec3>() / points.len().max(1) as f32;
+    let reach = points.iter().map(|p| p.distance(middle)).fold(0.0, f32::max) + 25.0;
+    let near: Vec<(usize, [Vec3; 4])> =
+        (0..mesh.tets.len()).map(|t| (t, mesh.corners(t))).filter(|(_, c)| c[0].distance(middle) < reach).collect();
+    let seat = |p: &Vec3| {
+        let of = |(t, c): &(usize, [Vec3; 4])| Seat { tet: *t, weights: weights(*p, c) };
+        let least = |seat: &Seat| seat.weights.iter().copied().fold(f32::INFINITY, f32::min);
+        near.iter().map(of).max_by(|a, b| least(a).total_cmp(&least(b))).expect("there is a mesh around the opening")
+    };
+    points.iter().map(seat).collect()
+}
+
+fn weights(p: Vec3, [a, b, c, d]: &[Vec3; 4]) -> [f32; 4] {
+    let volume = |u: Vec3, v: Vec3, w: Vec3| u.cross(v).dot(w);
+    let whole = volume(*b - *a, *c - *a, *d - *a);
+    let q = p - *a;
+    let of_b = volume(q, *c - *a, *d - *a) / whole;
+    let of_c = volume(*b - *a, q, *d - *a) / whole;
+    let of_d = volume(*b - *a, *c - *a, q) / whole;
+    [1.0 - of_b - of_c - of_d, of_b, of_c, of_d]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_keeps_its_place_in_a_linear_field() {
+        let mesh = trepan_soft::boxes::split_box([3, 3, 3], Vec3::splat(30.0));
+        let points = [Vec3::new(4.0, 17.0, 26.0), Vec3::new(15.0, 15.0, 15.0), Vec3::new(29.0, 1.0, 31.0)];
+        let moved: Vec<Vec3> = mesh.positions.iter().map(|p| *p * 2.0 + Vec3::X).collect();
+        for (seat, point) in seats(&mesh, &points).iter().zip(points) {
+            assert!(seat.place(&mesh, &mesh.positions).distance(point) < 1e-4);
+            assert!(seat.place(&mesh, &moved).distance(point * 2.0 + Vec3::X) < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_foot_outside_the_triangle_is_cut_to_it() {
+        let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        assert_eq!(nearest(Vec3::new(0.25, 0.25, 3.0), triangle), [0.5, 0.25, 0.25]);
+        assert_eq!(nearest(Vec3::new(-1.0, -1.0, 0.0), triangle), [1.0, 0.0, 0.0]);
+    }
+}
