@@ -26,6 +26,8 @@ pub struct Stored {
     program: String,
     /// What it took, s.
     pub seconds: f64,
+    /// Whether it came to its end; one that did not is made again.
+    ended: bool,
     /// What the machine itself took before and after, the worse of both.
     control: Control,
     /// How it was made.
@@ -61,13 +63,20 @@ impl Store {
     /// A part that this very program made in this scope, if it is there.
     pub fn found(&self, suite: &str, part: &str) -> Option<Stored> {
         let stored: Stored = serde_json::from_slice(&fs::read(self.place(suite, part)).ok()?).ok()?;
-        (stored.program == self.program && stored.making.scope() == self.making.scope()).then_some(stored)
+        (stored.ended && stored.program == self.program && stored.making.scope() == self.making.scope())
+            .then_some(stored)
     }
 
-    /// Keeps a part.
-    pub fn keep(&self, suite: &str, part: &str, (seconds, control): (f64, Control), findings: Findings) -> Result<()> {
+    /// Keeps a part with what it took, what the machine itself took meanwhile, and whether it came to its end.
+    pub fn keep(
+        &self,
+        suite: &str,
+        part: &str,
+        (seconds, control): (f64, Control),
+        (findings, ended): (Findings, bool),
+    ) -> Result<()> {
         let (program, making) = (self.program.clone(), self.making.clone());
-        let stored = Stored { program, seconds, control, making, findings };
+        let stored = Stored { program, seconds, ended, control, making, findings };
         whole(&self.place(suite, part), &serde_json::to_vec(&stored)?)
     }
 
@@ -191,7 +200,7 @@ mod tests {
     fn run(folder: &Path, takes: impl Fn(usize) -> bool) {
         let store = Store::open(folder, SCOPE).unwrap();
         for (_, part) in parts(SCOPE).into_iter().enumerate().filter(|(number, _)| takes(*number)) {
-            let (slug, found) = (part.slug(), part.run(SCOPE).0);
+            let (slug, found) = (part.slug(), part.run(SCOPE));
             store.keep(SUITE.name, &slug, (0.1, Control::default()), found).unwrap();
         }
     }
@@ -219,7 +228,10 @@ mod tests {
         assert!(store.found(SUITE.name, "part-1").is_some() && store.found(SUITE.name, "part-2").is_none());
         let other = Store::open(all.path(), Scope { seed: 2, ..SCOPE }).unwrap();
         assert!(other.found(SUITE.name, "part-1").is_none());
+        let found = store.found(SUITE.name, "part-1").unwrap().findings;
+        store.keep(SUITE.name, "part-1", (0.1, Control::default()), (found, false)).unwrap();
+        assert!(store.found(SUITE.name, "part-1").is_none(), "a part that panicked is made again");
         store.forget(SUITE.name);
-        assert!(store.found(SUITE.name, "part-1").is_none());
+        assert!(store.found(SUITE.name, "part-0").is_none());
     }
 }

@@ -191,7 +191,7 @@ fn perform(jobs: Vec<Job>, store: &Store, scope: Scope) -> Result<bool> {
             let word = if broken == 0 { String::new() } else { format!(", {broken} promise(s) BROKEN") };
             say(&bar, &format!("{key}: {seconds:.1} s{word}"));
             passed &= broken == 0;
-            store.keep(suite.name, &slug, (seconds, before.or(Control::now())), findings)?;
+            store.keep(suite.name, &slug, (seconds, before.or(Control::now())), (findings, ended))?;
             if ended {
                 durations.insert(key, seconds);
                 store.remember(&durations)?;
