@@ -10,7 +10,7 @@
 
 use super::bone::{Skull, Slide, Stretch};
 use super::picture::View;
-use super::tissue::{Brains, Fineness, Push, Shape};
+use super::tissue::{Brains, Fineness, LEAST_MM, Push, Shape};
 use crate::error::SessionError;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
@@ -148,7 +148,9 @@ fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64
     let slide = Slide { scene: *scene, place: *place, outward: sight.outward, turn_rad: 0.0, length_mm: SLIDE_MM };
     let found = || {
         let brains = Brains::of(shape, &choices)?;
-        Push::of(shape, &slide, &brains, Fineness::QUICK)?.measure(&brains)
+        let push = Push::of(shape, &slide, &brains, Fineness::QUICK)?;
+        // Where the brain is held, every mesh would be found to be right.
+        if push.moved_mm() < LEAST_MM { Ok(Vec::new()) } else { push.measure(&brains) }
     };
     let found = found().unwrap_or_else(|fault: SessionError| {
         tracing::warn!("{fault}");

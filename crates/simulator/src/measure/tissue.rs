@@ -54,6 +54,8 @@ const TURN_MS: f32 = 8.0;
 const LONGEST_MS: [f32; 2] = [1.0, 4.0];
 /// Points looked at: this far apart and from the opening, mm.
 const POINTS_MM: [f32; 2] = [3.5, 14.0];
+/// Motion under which a push says nothing of meshes, mm.
+pub const LEAST_MM: f64 = 0.1;
 /// The brain is held where its surface lies under this share of its height.
 const HELD: f32 = 0.35;
 
@@ -259,6 +261,11 @@ impl Push {
     /// A truth beside a finer one: what 95 of 100 points stay within, mm.
     pub fn apart_mm(&self, finer: &Self) -> f64 {
         self.error_mm(&finer.truth)
+    }
+
+    /// How far the point goes that goes farthest, mm; 0 where the tool finds tissue that is held, or none.
+    pub fn moved_mm(&self) -> f64 {
+        self.truth.iter().map(|moved| f64::from(moved.length())).fold(0.0, f64::max)
     }
 
     fn error_mm(&self, places: &[Vec3]) -> f64 {

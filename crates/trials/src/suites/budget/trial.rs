@@ -6,7 +6,8 @@ use crate::suite::{Findings, Row};
 use std::fmt::Display;
 use trepan_budget::{Kind, Neighbour, Quality, Rows, bone_cores, holds_walls, picture_cores, plan_with, tissue_cores};
 use trepan_simulator::measure::Own;
-use trepan_simulator::measure::tissue::{Brains, Fineness, Push};
+use trepan_simulator::measure::bone::Stretch;
+use trepan_simulator::measure::tissue::{Brains, Fineness, LEAST_MM, Push};
 
 /// Tetrahedra that a quick run has at most.
 const QUICK_TETS: usize = 8_000;
@@ -18,18 +19,28 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
     let tissues: Vec<_> = rows.tissue.iter().map(|row| row.what).collect();
     let brains = Brains::of(&case.brain, &tissues).expect("the brain can be filled");
     for number in 0..scenes {
-        let (situation, stretch) = super::stretch(&case, random);
+        let (situation, stretch, push) = scene(&case, &brains, truth, random);
         let name = format!("{} {number}", case.name);
         let bones: Vec<_> = rows.bone.iter().map(|row| row.what).collect();
         let on_bone = stretch.measure(&case.skull, &bones).iter().map(|found| found.error_n).collect();
-        let push = Push::of(&case.brain, &situation.push(&case), &brains, truth);
-        let in_tissue = push.and_then(|push| push.measure(&brains)).expect("the brain is sound");
+        let in_tissue = push.measure(&brains).expect("the brain is sound");
         let in_tissue = in_tissue.iter().map(|found| found.error_mm).collect();
         let pictures: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
         let seen = situation.view(&case).measure(&pictures, 1).expect("the view has pixels");
         let seen = seen.iter().map(|found| found.error_percent).collect();
         let own = Own::of(&situation.sight(&case), &situation.scene, &rows, 1);
         note(&name, &situation, &rows, &own, [on_bone, in_tissue, seen], findings);
+    }
+}
+
+/// A scene with bone to touch and a brain that moves under the push.
+fn scene(case: &Case, brains: &Brains, truth: Fineness, random: &mut fastrand::Rng) -> (Situation, Stretch, Push) {
+    loop {
+        let (situation, stretch) = super::stretch(case, random);
+        let push = Push::of(&case.brain, &situation.push(case), brains, truth).expect("the brain is sound");
+        if push.moved_mm() >= LEAST_MM {
+            return (situation, stretch, push);
+        }
     }
 }
 
