@@ -49,9 +49,11 @@ pub struct Settled {
 impl Tled {
     /// Goes to rest under `loads`, then stops all motion; damping is afterwards as before. A body that nothing holds does not come to rest, and this says so.
     pub fn settle(&mut self, loads: &Loads, settling: &Settling) -> Settled {
-        let (rate, held) = (self.damping_per_ms, self.lowest_per_ms);
-        let Some(lowest) = held else { return Settled { left_mm: f32::INFINITY, ..Settled::default() } };
+        let (rate, lowest) = (self.damping_per_ms, self.lowest_per_ms);
         let (mut slow, mut settled) = (lowest, Settled { left_mm: f32::INFINITY, ..Settled::default() });
+        if !self.held {
+            return settled;
+        }
         let mut before = self.elements_and_nodes();
         while settled.steps < settling.steps && !settled.converged {
             self.damping_per_ms = 2.0 * slow;

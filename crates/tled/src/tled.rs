@@ -26,11 +26,11 @@ pub struct Tled {
     layout: Layout,
     bound_ms: f32,
     pub(crate) damping_per_ms: f32,
-    /// Lowest frequency of the rest state, rad/ms, where fixed nodes hold the body.
-    pub(crate) lowest_per_ms: Option<f32>,
+    /// Frequency of the slowest motion from rest, rad/ms, or what stands in for it.
+    pub(crate) lowest_per_ms: f32,
     mass_added: f32,
     max_displacement_mm: f32,
-    held: bool,
+    pub(crate) held: bool,
     stiffest_at_rest: f32,
     /// Since the elements' forces were computed last, ms.
     elapsed_ms: f32,
@@ -81,7 +81,7 @@ impl Tled {
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
         let scaling = Scaling::of(body, config.mass_scaling);
         let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
-        let lowest_per_ms = lowest_frequency_of(body, &stiffness).map(|w| w as f32);
+        let lowest_per_ms = lowest_per_ms(body, config.damping, &stiffness);
         let nodes = Nodes::of(body, &layout, stiffness.masses_g());
         let mut elements = Elements::of(body, &layout, &scaling, nodes, config);
         Ok(Self {
@@ -96,7 +96,7 @@ impl Tled {
             shares: ContactShares::of_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
             bound_ms: power_bound_of_ms(body, &stiffness) as f32,
-            damping_per_ms: damping_rate(body, config.damping, lowest_per_ms, extent),
+            damping_per_ms: damping_rate(config.damping, lowest_per_ms),
             lowest_per_ms,
             mass_added: scaling.added as f32,
             max_displacement_mm: config.max_displacement * extent,
@@ -271,19 +271,26 @@ impl SoftSolver for Tled {
     }
 }
 
-/// α = 2 ω₁ is critical. A body that is not held has no lowest mode by its supports: its slowest shear wave stands in.
-pub(crate) fn damping_rate(body: &Body, damping: Damping, lowest_per_ms: Option<f32>, extent_mm: f32) -> f32 {
+/// Frequency of the slowest motion, 1/ms. Where damping does not hang on it, or nothing holds the body, that of its slowest shear wave stands in.
+pub(crate) fn lowest_per_ms(body: &Body, damping: Damping, stiffness: &Stiffness) -> f32 {
+    let asked = matches!(damping, Damping::Critical(_));
+    let found = asked.then(|| lowest_frequency_of(body, stiffness)).flatten();
+    let standing = || {
+        let total = |of: &dyn Fn(usize) -> f64| -> f64 {
+            (0..body.mesh.tets.len()).map(|t| body.mesh.volume_mm3(t) * of(t)).sum()
+        };
+        let shear = total(&|t| body.material(t).shear_mpa());
+        let shear_speed = (shear / total(&|t| body.material(t).density_g_mm3().into())).sqrt();
+        std::f64::consts::PI * shear_speed / f64::from(body.mesh.bounds().size().max_element())
+    };
+    found.unwrap_or_else(standing) as f32
+}
+
+/// α = 2 ω₁ is critical.
+pub(crate) fn damping_rate(damping: Damping, lowest_per_ms: f32) -> f32 {
     match damping {
         Damping::None => 0.0,
         Damping::Rate(rate) => rate,
-        Damping::Critical(share) => {
-            let total = |of: &dyn Fn(usize) -> f64| -> f64 {
-                (0..body.mesh.tets.len()).map(|t| body.mesh.volume_mm3(t) * of(t)).sum()
-            };
-            let shear = total(&|t| body.material(t).shear_mpa());
-            let shear_speed = (shear / total(&|t| body.material(t).density_g_mm3().into())).sqrt();
-            let standing = std::f64::consts::PI * shear_speed / f64::from(extent_mm);
-            share * 2.0 * lowest_per_ms.unwrap_or(standing as f32)
-        }
+        Damping::Critical(share) => share * 2.0 * lowest_per_ms,
     }
 }

@@ -46,7 +46,7 @@ use crate::config::Config;
 use crate::layout::Layout;
 use crate::scaling::Scaling;
 use crate::seats::Seats;
-use crate::tled::{BORNE, MOST_GAINED, NEARLY, damping_rate};
+use crate::tled::{BORNE, MOST_GAINED, NEARLY, damping_rate, lowest_per_ms};
 use device_state::{DeviceState, Step};
 use forces::Forces;
 use press::Press;
@@ -54,8 +54,7 @@ use topology::Topology;
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_soft::{
-    Body, BodyError, ContactShares, Loads, SoftSolver, StepBound, StepReport, Stiffness, lowest_frequency_of,
-    power_bound_of_ms,
+    Body, BodyError, ContactShares, Loads, SoftSolver, StepBound, StepReport, Stiffness, power_bound_of_ms,
 };
 use update::Update;
 use volumes::Volumes;
@@ -120,8 +119,7 @@ impl GpuTled {
         let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
         let scaling = Scaling::of(body, config.mass_scaling);
         let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
-        let lowest_per_ms = lowest_frequency_of(body, &stiffness).map(|w| w as f32);
-        let damping_per_ms = damping_rate(body, config.damping, lowest_per_ms, extent);
+        let damping_per_ms = damping_rate(config.damping, lowest_per_ms(body, config.damping, &stiffness));
         refuse(body, config, damping_per_ms)?;
         let (layout, cures) = (Layout::of(body), config.cure_locking);
         let seats = Seats::of(body, &layout, cures);
