@@ -3,7 +3,8 @@
 //! # Theory
 //! Every edge is a spring, `f = k (l - l₀) e`. Springs that point evenly in all directions make a solid with `λ = μ = Σ k l²/(15 V)`, so each tetrahedron
 //! gives each of its six edges `k = 2.5 μ V/l²`. Such a solid has ν = 1/4 whatever is asked for (Cauchy's relation): the tetrahedron adds the
-//! pressure `κ' (J - 1)`, `κ' = κ - 5/3 μ`, that makes up its bulk modulus. Central differences as in [`crate::linear`].
+//! pressure `κ' (J - 1)`, `κ' = κ - 5/3 μ`, that makes up its bulk modulus; none under ν = 1/4, where κ' would be a pressure that collapses single tetrahedra.
+//! Central differences as in [`crate::linear`].
 //!
 //! # Practice
 //! About 20 ns a tetrahedron and step, f64, no allocation.
@@ -72,7 +73,7 @@ impl MassSpring {
         }
         let nodes = body.mesh.positions.len();
         let critical = || 2.0 * lowest_frequency(body).unwrap_or(0.0);
-        let made_up = |m: &crate::Material| m.bulk_mpa() - m.shear_mpa() * 5.0 / 3.0;
+        let made_up = |m: &crate::Material| (m.bulk_mpa() - m.shear_mpa() * 5.0 / 3.0).max(0.0);
         let mut solver = Self {
             springs: springs(body),
             elements: body.elements(),
@@ -99,7 +100,7 @@ impl MassSpring {
         let of_springs = around.iter().zip(&self.masses).map(|(k, m)| k / m).fold(0.0, f64::max);
         let of_pressure = |t: usize| {
             let slopes: f64 = self.elements[t].shape.gradients.iter().map(|g| g.length_squared()).sum();
-            let pressure = self.pressures[usize::from(self.elements[t].material)].abs();
+            let pressure = self.pressures[usize::from(self.elements[t].material)];
             4.0 * pressure * slopes / f64::from(body.material(t).density_g_mm3())
         };
         2.0 / (of_springs + (0..self.elements.len()).map(of_pressure).fold(0.0, f64::max)).sqrt()
