@@ -23,6 +23,8 @@ const POINTS: [usize; 3] = [211, 466, 932];
 const FINE_MM: f32 = 0.25;
 /// Ticks of going in and of sliding.
 const TICKS: [usize; 2] = [120, 240];
+/// How deep the burr is led while it cuts, mm, and how fast, mm/ms: what a scripted hand does.
+const DRILL: [f32; 2] = [1.5, 1.4e-3];
 /// Half the edge of what is cut out of the skull around the opening, mm.
 const ROOM_MM: f32 = 18.0;
 
@@ -97,29 +99,59 @@ impl Stretch {
         let fine = cut_out(skull, slide.place, FINE_MM)?;
         let path = path(&Surface::of(&fine, slide)?, slide)?;
         let mut stretch = Self { fine, path, truth: Vec::new(), slide: *slide };
-        stretch.truth = stretch.ride(&Method::Brute(Default::default()), &stretch.fine).0;
+        stretch.truth = stretch.ride(&Method::Brute(Default::default()), &stretch.fine, &stretch.path, false).0;
         (stretch.truth.iter().filter(|force| **force != Vec3::ZERO).count() > TICKS[1] / 2).then_some(stretch)
     }
 
-    /// Forces along the path, N, and the median tick, µs.
-    fn ride(&self, method: &Method, bone: &BoneVolume) -> (Vec<Vec3>, f64) {
-        let path = &self.path;
+    /// Straight in from just outside, in the time of a tick each.
+    fn way_in(&self) -> Vec<ToolState> {
+        let [outside, inside] = [&self.path[0], &self.path[TICKS[0] - 1]];
+        let inward = (inside.tip() - outside.tip()).normalize_or_zero();
+        let ticks = ((1.0 + DRILL[0]) / DRILL[1]) as usize;
+        let first = (0.9 / DRILL[1]) as usize;
+        let at = |n: usize| {
+            let Pose { translation, rotation, .. } = outside.world_from_tool;
+            ToolState::at(Pose::from_parts(translation + n as f32 * DRILL[1] * inward, rotation))
+        };
+        (first..ticks).map(at).collect()
+    }
+
+    /// Forces along a path, N, and the median tick, µs. What is cut on the way is there again afterwards.
+    fn ride(&self, method: &Method, bone: &BoneVolume, path: &[ToolState], cuts: bool) -> (Vec<Vec3>, f64) {
         let mut contact = method.build(&Tool::burr(self.slide.scene.tool_radius_mm as f32));
         contact.reset(path[0].world_from_tool);
         let (mut out, mut us, clock) = (RigidStep::default(), Vec::with_capacity(path.len()), Clock::start());
         let stiffness = self.slide.scene.stiffness as f32;
         let tick = |tool: &ToolState| {
             let began_ms = clock.now_ms();
-            contact.step(bone, tool, false, 1.0, &mut out);
+            contact.step(bone, tool, cuts, 1.0, &mut out);
             us.push(1e3 * (clock.now_ms() - began_ms));
             stiffness * out.manifold.depth_mm * out.manifold.normal
         };
+        if cuts {
+            bone.begin_stroke();
+        }
         let forces = path.iter().map(tick).collect();
+        if cuts {
+            bone.undo_stroke();
+        }
         (forces, quantile(us, 0.5))
     }
 
-    /// Every choice, in the order given; the grid of each edge is made once.
+    /// Every choice, in the order given, led in and along the bone.
     pub fn measure(&self, skull: &Skull, choices: &[Bone]) -> Vec<Found> {
+        self.along(skull, choices, (&self.path, &self.truth), false)
+    }
+
+    /// Every choice, in the order given, while it cuts straight in.
+    pub fn measure_drilling(&self, skull: &Skull, choices: &[Bone]) -> Vec<Found> {
+        let path = self.way_in();
+        let truth = self.ride(&Method::Brute(Default::default()), &self.fine, &path, true).0;
+        self.along(skull, choices, (&path, &truth), true)
+    }
+
+    /// Every choice along a path; the grid of each edge is made once.
+    fn along(&self, skull: &Skull, choices: &[Bone], (path, truth): (&[ToolState], &[Vec3]), cuts: bool) -> Vec<Found> {
         let mut grids: Vec<(f64, Option<BoneVolume>)> = Vec::new();
         let mut found = Vec::new();
         for choice in choices {
@@ -130,17 +162,17 @@ impl Stretch {
             let grid = grids.iter().find(|(edge, _)| *edge == choice.spacing_mm);
             // Where a coarse grid holds no voxel of bone, nothing is felt.
             let (forces, tick_us) = match (grid.and_then(|(_, bone)| bone.as_ref()), method(choice)) {
-                (Some(bone), Some(method)) => self.ride(&method, bone),
-                _ => (vec![Vec3::ZERO; self.path.len()], f64::NAN),
+                (Some(bone), Some(method)) => self.ride(&method, bone, path, cuts),
+                _ => (vec![Vec3::ZERO; path.len()], f64::NAN),
             };
-            found.push(Found { error_n: error_n(&forces, &self.truth), tick_us });
+            found.push(Found { error_n: error_n(&forces, truth), tick_us });
         }
         found
     }
 
     /// The recommended method on the truth's own voxels: what 95 of 100 ticks stay within, N.
     pub fn recommended_error_n(&self) -> f64 {
-        error_n(&self.ride(&Method::RECOMMENDED, &self.fine).0, &self.truth)
+        error_n(&self.ride(&Method::RECOMMENDED, &self.fine, &self.path, false).0, &self.truth)
     }
 
     /// The truth beside forces known otherwise, `of` a place of the tool: what 95 of 100 ticks stay within, N.
