@@ -219,7 +219,7 @@ impl<'a> Search<'a> {
         let rough = Climb { step: 10.0, tolerance: 1.0, sweeps: 3 };
         let candidates = self.climb_all(0, 8_000, &self.starts(), rough, 6);
         let candidates = self.climb_all(0, 30_000, &candidates, Climb { step: 4.0, tolerance: 0.4, sweeps: 8 }, 3);
-        let candidates = self.climb_all(1, 60_000, &candidates, Climb { step: 1.5, tolerance: 0.1, sweeps: 8 }, 1);
+        let candidates = self.climb_all(1, 60_000, &candidates, Climb { step: 1.5, tolerance: 0.1, sweeps: 8 }, 3);
         let fine = Climb { step: 0.5, tolerance: 0.05, sweeps: 8 };
         self.climb_all(2, self.config.points, &candidates, fine, 1)[0]
     }
