@@ -67,7 +67,7 @@ impl Own {
         } else {
             (others(1), tissue())
         };
-        Self { bone, tissue, picture }
+        Self { bone: to_millionths(bone), tissue: to_millionths(tissue), picture: to_millionths(picture) }
     }
 
     /// Names all that decides what would be found, beside the case.
@@ -91,6 +91,12 @@ impl Own {
     pub fn has(&self) -> [bool; 3] {
         [!self.bone.is_empty(), !self.tissue.is_empty(), !self.picture.is_empty()]
     }
+}
+
+/// Digits enough, and few enough that a file gives back the very same numbers.
+fn to_millionths(mut found: Vec<(Vec<String>, f64)>) -> Vec<(Vec<String>, f64)> {
+    found.iter_mut().for_each(|(_, error)| *error = (*error * 1e6).round() / 1e6);
+    found
 }
 
 fn names<T: Kind>(rows: &[Row<T>]) -> Vec<Vec<String>> {
