@@ -15,12 +15,13 @@ use crate::error::SessionError;
 use serde::{Deserialize, Serialize};
 use std::f32::consts::TAU;
 use std::sync::Arc;
-use trepan_budget::{FEATURES, Kind, Law, Row, Rows, Scene, holds_walls};
+use trepan_budget::{Bone, FEATURES, Kind, Law, Row, Rows, Scene, holds_walls};
 use trepan_geometry::Vec3;
+use trepan_rigid::Method;
 use trepan_volume::BoneVolume;
 
 /// Goes up when what is found changes for the same case and choices.
-const FORM: u32 = 2;
+const FORM: u32 = 3;
 /// Ways along the bone, evenly around the opening.
 const SLIDES: usize = 3;
 /// Length of each, mm.
@@ -125,7 +126,12 @@ fn put<T: Kind>(found: &[(Vec<String>, f64)], margin: f64, rows: &mut Vec<Row<T>
 }
 
 fn on_bone(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64)> {
-    let choices: Vec<_> = rows.bone.iter().map(|row| row.what).filter(holds_walls).collect();
+    let mut choices: Vec<_> = rows.bone.iter().map(|row| row.what).filter(holds_walls).collect();
+    // What others of them find under one path, such as the thesis's points, says little of the next: where no method is given it is the recommended one.
+    let recommended = |choice: &Bone| choice.method == Method::RECOMMENDED.name();
+    if choices.iter().any(recommended) {
+        choices.retain(recommended);
+    }
     let Some((skull, _)) = sight.skull.as_ref().filter(|_| scene.has_bone && !choices.is_empty()) else {
         return Vec::new();
     };
