@@ -1,7 +1,7 @@
 //! How far the choices are off in this very case: the burr led over the bone where the skull is to be opened, the probe over the brain below, and the view on it drawn.
 //!
 //! # Theory
-//! A law says what a choice's error is in a case like this; here it is looked at. Each choice for bone is led over three slides from the opening and cuts in once, against fine voxels of the same CT; the worst
+//! A law says what a choice's error is in a case like this; here it is looked at. Each choice for bone (of the recommended method, unless another is given) is led over three slides from the opening and cuts in once, against fine voxels of the same CT; the worst
 //! counts. TLED on each mesh is pushed and led along the brain, against a mesh that is eight times finer there. Each choice for the picture is drawn once from where the eye starts, against every ray. The hand will go other ways and the eye will move, so what is found is
 //! believed with a margin. A mesh that is lucky under one slide need not be under the next: of tissue the case says how far all meshes are off, and half of which is better; the laws say the other half.
 //!
