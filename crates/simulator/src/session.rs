@@ -202,11 +202,10 @@ impl Session {
             .or_else(|| recorded.map(|recording| Feel::recorded(Some(recording), hand::SECOND)))
     }
 
-    /// Where the tool waits.
+    /// Where the tool waits for its device: in a replay too, for the first tick's way to the hand begins here.
     fn start(&self) -> ToolSample {
-        let script = Script::named(self.program.script(), &self.table.scene.site, 1e4).map(|script| script.at(0.0));
-        let first = self.recording.as_ref().and_then(|r| r.ticks.first()).map(|t| ToolState::at(t.device));
-        let state = first.or(script.ok()).unwrap_or_else(|| ToolState::at(trepan_geometry::Pose::IDENTITY));
+        let script = Script::named(self.program.script(), &self.table.scene.site, 1e4);
+        let state = script.map_or_else(|_| ToolState::at(trepan_geometry::Pose::IDENTITY), |script| script.at(0.0));
         ToolSample { tick: 0, state, tool: self.program.tray()[0], slot: 0, drilling: false }
     }
 
