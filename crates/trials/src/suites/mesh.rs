@@ -17,7 +17,7 @@ use trepan_volume::VoxelVolume;
 
 /// A distance counts as small up to this many voxels.
 const SMALL_VOXEL: f64 = 0.5;
-/// Dihedral angles that Labelle and Shewchuk prove, degrees: where a border cuts cubes of one size only, and of several.
+/// Dihedral angles that Labelle and Shewchuk prove for their way of cutting, degrees: where a border cuts cubes of one size only, and of several.
 const PROVEN_DEG: [[f64; 2]; 2] = [[10.7, 164.8], [1.66, 174.72]];
 
 /// Every scene.
