@@ -1,25 +1,36 @@
 //! Makes the rows of the budget: runs every choice in scenes of training and writes the tables of what was found.
 //!
-//! `budget_rows WORK OUT` keeps what each part found in WORK, so that it goes on where it was stopped, and writes the tables to OUT. `budget_rows WORK OUT N`
-//! makes part N only. The open heads take part where `TREPAN_DATA` says where they are.
+//! What each part found is kept, so that it goes on where it was stopped. The open heads take part where `TREPAN_DATA` says where they are.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
+use clap::Parser;
 use std::path::PathBuf;
-use trepan_trials::suites::budget::training::{Observed, observe, parts, tables};
+use trepan_trials::suites::budget::training::{Observed, TABLES, observe, parts, tables};
+
+/// Makes the rows of the budget
+#[derive(Parser)]
+struct Arguments {
+    /// Folder for what each part found; of the same tables
+    work: PathBuf,
+    /// Folder that gets the tables
+    out: PathBuf,
+    /// Only this part, from 0 on
+    #[arg(long, value_name = "N")]
+    part: Option<usize>,
+    /// Only these tables
+    #[arg(long, value_name = "TABLE", value_parser = TABLES, default_values = TABLES)]
+    only: Vec<String>,
+}
 
 fn main() -> Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    let mut folder =
-        || arguments.next().map(PathBuf::from).context("give two folders: WORK for what is found, OUT for the tables");
-    let (work, out) = (folder()?, folder()?);
-    let only: Option<usize> = arguments.next().map(|number| number.parse()).transpose()?;
-    std::fs::create_dir_all(&work)?;
-    let file = |part: usize| work.join(format!("part-{part}.json"));
-    for part in (0..parts()).filter(|part| only.is_none_or(|only| only == *part)) {
+    let asked = Arguments::parse();
+    std::fs::create_dir_all(&asked.work)?;
+    let file = |part: usize| asked.work.join(format!("part-{part}.json"));
+    for part in (0..parts()).filter(|part| asked.part.is_none_or(|only| only == *part)) {
         if !file(part).is_file() {
             println!("part {part} of {}", parts());
-            let half = work.join(format!("part-{part}.half"));
-            std::fs::write(&half, serde_json::to_vec(&observe(part))?)?;
+            let half = asked.work.join(format!("part-{part}.half"));
+            std::fs::write(&half, serde_json::to_vec(&observe(part, &asked.only))?)?;
             std::fs::rename(half, file(part))?;
         }
     }
@@ -27,7 +38,7 @@ fn main() -> Result<()> {
     let read = |file: &PathBuf| Ok(serde_json::from_slice(&std::fs::read(file)?)?);
     let found: Vec<Observed> = there.iter().map(read).collect::<Result<_>>()?;
     for (name, text) in tables(&found) {
-        std::fs::write(out.join(name), text)?;
+        std::fs::write(asked.out.join(name), text)?;
     }
     println!("{} of {} parts are in the tables", found.len(), parts());
     Ok(())

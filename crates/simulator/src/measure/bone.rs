@@ -1,8 +1,8 @@
-//! Bone: a ball slides along the skull, by every method on every grid, against fine voxels of the same CT.
+//! Bone: a ball slides along the skull and a burr cuts into it, by every method on every grid, against fine voxels of the same CT.
 //!
 //! # Theory
 //! The truth is the force by the oracle on voxels of 0.25 mm of the same CT, trilinear between its samples. The error of a tick is the length of the difference of both
-//! forces; of a choice it is that which 95 of 100 ticks in touch stay within.
+//! forces; of a choice it is that which 95 of 100 ticks in touch stay within, sliding or cutting, whichever is worse.
 //!
 //! # When not to use it
 //! To know how right the CT is: what the scanner has blurred, nobody knows.
@@ -25,6 +25,8 @@ const FINE_MM: f32 = 0.25;
 const TICKS: [usize; 2] = [120, 240];
 /// How deep the burr is led while it cuts, mm, and how fast, mm/ms: what a scripted hand does.
 const DRILL: [f32; 2] = [1.5, 1.4e-3];
+/// Least radius of a burr whose cut the truth's voxels resolve, mm.
+const LEAST_CUT_MM: f64 = 4.0 * FINE_MM as f64;
 /// Half the edge of what is cut out of the skull around the opening, mm.
 const ROOM_MM: f32 = 18.0;
 
@@ -85,27 +87,37 @@ impl Slide {
     }
 }
 
-/// A stretch of skull, a path over it, and what is felt there.
+/// A stretch of skull, ways over and into it, and what is felt there.
 pub struct Stretch {
     fine: BoneVolume,
-    path: Vec<ToolState>,
-    truth: Vec<Vec3>,
     slide: Slide,
+    ways: Vec<Way>,
+}
+
+/// Where the tool is at each tick, whether it cuts, and the true forces, N.
+struct Way {
+    path: Vec<ToolState>,
+    cuts: bool,
+    truth: Vec<Vec3>,
 }
 
 impl Stretch {
-    /// Cuts it out; `None` where there is too little bone under the path.
+    /// Cuts it out, with a way along it; `None` where there is too little bone under that.
     pub fn of(skull: &Skull, slide: &Slide) -> Option<Self> {
         let fine = cut_out(skull, slide.place, FINE_MM)?;
         let path = path(&Surface::of(&fine, slide)?, slide)?;
-        let mut stretch = Self { fine, path, truth: Vec::new(), slide: *slide };
-        stretch.truth = stretch.ride(&Method::Brute(Default::default()), &stretch.fine, &stretch.path, false).0;
-        (stretch.truth.iter().filter(|force| **force != Vec3::ZERO).count() > TICKS[1] / 2).then_some(stretch)
+        let stretch = Self { fine, slide: *slide, ways: Vec::new() }.with(path, false);
+        let touches = stretch.ways[0].truth.iter().filter(|force| **force != Vec3::ZERO).count();
+        (touches > TICKS[1] / 2).then_some(stretch)
     }
 
-    /// Straight in from just outside, in the time of a tick each.
-    fn way_in(&self) -> Vec<ToolState> {
-        let [outside, inside] = [&self.path[0], &self.path[TICKS[0] - 1]];
+    /// With a cut straight in from just outside; without one for a burr under 1 mm in radius, which the truth's voxels do not resolve.
+    pub fn cutting(self) -> Self {
+        if self.slide.scene.tool_radius_mm < LEAST_CUT_MM {
+            return self;
+        }
+        let path = &self.ways[0].path;
+        let [outside, inside] = [&path[0], &path[TICKS[0] - 1]];
         let inward = (inside.tip() - outside.tip()).normalize_or_zero();
         let ticks = ((1.0 + DRILL[0]) / DRILL[1]) as usize;
         let first = (0.9 / DRILL[1]) as usize;
@@ -113,7 +125,15 @@ impl Stretch {
             let Pose { translation, rotation, .. } = outside.world_from_tool;
             ToolState::at(Pose::from_parts(translation + n as f32 * DRILL[1] * inward, rotation))
         };
-        (first..ticks).map(at).collect()
+        let path = (first..ticks).map(at).collect();
+        self.with(path, true)
+    }
+
+    /// With one more way.
+    fn with(mut self, path: Vec<ToolState>, cuts: bool) -> Self {
+        let truth = self.ride(&Method::Brute(Default::default()), &self.fine, &path, cuts).0;
+        self.ways.push(Way { path, cuts, truth });
+        self
     }
 
     /// Forces along a path, N, and the median tick, µs. What is cut on the way is there again afterwards.
@@ -138,20 +158,8 @@ impl Stretch {
         (forces, quantile(us, 0.5))
     }
 
-    /// Every choice, in the order given, led in and along the bone.
+    /// Every choice, in the order given: the worst error of all ways, the tick of the first. The grid of each edge is made once.
     pub fn measure(&self, skull: &Skull, choices: &[Bone]) -> Vec<Found> {
-        self.along(skull, choices, (&self.path, &self.truth), false)
-    }
-
-    /// Every choice, in the order given, while it cuts straight in.
-    pub fn measure_drilling(&self, skull: &Skull, choices: &[Bone]) -> Vec<Found> {
-        let path = self.way_in();
-        let truth = self.ride(&Method::Brute(Default::default()), &self.fine, &path, true).0;
-        self.along(skull, choices, (&path, &truth), true)
-    }
-
-    /// Every choice along a path; the grid of each edge is made once.
-    fn along(&self, skull: &Skull, choices: &[Bone], (path, truth): (&[ToolState], &[Vec3]), cuts: bool) -> Vec<Found> {
         let mut grids: Vec<(f64, Option<BoneVolume>)> = Vec::new();
         let mut found = Vec::new();
         for choice in choices {
@@ -160,24 +168,30 @@ impl Stretch {
                 grids.push((choice.spacing_mm, cut));
             }
             let grid = grids.iter().find(|(edge, _)| *edge == choice.spacing_mm);
-            // Where a coarse grid holds no voxel of bone, nothing is felt.
-            let (forces, tick_us) = match (grid.and_then(|(_, bone)| bone.as_ref()), method(choice)) {
-                (Some(bone), Some(method)) => self.ride(&method, bone, path, cuts),
-                _ => (vec![Vec3::ZERO; path.len()], f64::NAN),
+            let along = |way: &Way| {
+                // Where a coarse grid holds no voxel of bone, nothing is felt.
+                let (forces, tick_us) = match (grid.and_then(|(_, bone)| bone.as_ref()), method(choice)) {
+                    (Some(bone), Some(method)) => self.ride(&method, bone, &way.path, way.cuts),
+                    _ => (vec![Vec3::ZERO; way.path.len()], f64::NAN),
+                };
+                Found { error_n: error_n(&forces, &way.truth), tick_us }
             };
-            found.push(Found { error_n: error_n(&forces, truth), tick_us });
+            let worse = |a: Found, b: Found| Found { error_n: a.error_n.max(b.error_n), ..a };
+            found.extend(self.ways.iter().map(along).reduce(worse));
         }
         found
     }
 
-    /// The recommended method on the truth's own voxels: what 95 of 100 ticks stay within, N.
+    /// The recommended method on the truth's own voxels, sliding: what 95 of 100 ticks stay within, N.
     pub fn recommended_error_n(&self) -> f64 {
-        error_n(&self.ride(&Method::RECOMMENDED, &self.fine, &self.path, false).0, &self.truth)
+        let Way { path, cuts, truth } = &self.ways[0];
+        error_n(&self.ride(&Method::RECOMMENDED, &self.fine, path, *cuts).0, truth)
     }
 
-    /// The truth beside forces known otherwise, `of` a place of the tool: what 95 of 100 ticks stay within, N.
+    /// The truth beside forces known otherwise, `of` a place of the tool, sliding: what 95 of 100 ticks stay within, N.
     pub fn known_error_n(&self, of: impl Fn(Vec3) -> Vec3) -> f64 {
-        error_n(&self.path.iter().map(|tool| of(tool.tip())).collect::<Vec<_>>(), &self.truth)
+        let Way { path, truth, .. } = &self.ways[0];
+        error_n(&path.iter().map(|tool| of(tool.tip())).collect::<Vec<_>>(), truth)
     }
 }
 

@@ -56,7 +56,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
 fn stretch(case: &Case, random: &mut fastrand::Rng) -> (Situation, Stretch) {
     let mut draw = || {
         let situation = Situation::draw(case, random);
-        Stretch::of(&case.skull, &situation.slide()).map(|stretch| (situation, stretch))
+        Stretch::of(&case.skull, &situation.slide()).map(|stretch| (situation, stretch.cutting()))
     };
     (0..TRIES).find_map(|_| draw()).expect("a skull has places with bone")
 }

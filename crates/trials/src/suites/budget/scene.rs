@@ -47,7 +47,7 @@ impl Situation {
         let mut log = |low: f64, high: f64| low * (high / low).powf(random.f64());
         let height = log(300.0, 600.0) as u32;
         let scene = Scene {
-            force_error_n: log(0.03, 0.3),
+            force_error_n: log(0.06, 0.6),
             displacement_mm: log(0.4, 4.0),
             picture_error_percent: log(1.0, 10.0),
             stiffness: log(0.5, 2.0),

@@ -46,30 +46,39 @@ pub fn parts() -> usize {
     PARTS.len()
 }
 
-/// Runs one part.
-pub fn observe(part: usize) -> Observed {
+/// Runs one part, for the tables of these names.
+pub fn observe(part: usize, tables: &[String]) -> Observed {
+    let wanted = |table: &str| tables.iter().any(|name| name == table);
+    let [with_bone, with_tissue, with_picture] = [Bone::TABLE, Tissue::TABLE, Picture::TABLE].map(wanted);
     let mut random = fastrand::Rng::with_seed(SEED + part as u64);
     let case = Case::of(PARTS[part], &mut random);
     let (bones, tissues, pictures) = (bone::choices(), tissue::choices(), picture::choices());
-    let brains = (part < WITH_TISSUE).then(|| Brains::of(&case.brain, &tissues).expect("the brain can be filled"));
+    let brains = (part < WITH_TISSUE && with_tissue)
+        .then(|| Brains::of(&case.brain, &tissues).expect("the brain can be filled"));
     let (unit_us, mut observed) = (unit_us(), Observed::default());
     for _ in 0..SCENES {
         let (situation, stretch) = super::stretch(&case, &mut random);
         let scene = &situation.scene;
-        let found = stretch.measure(&case.skull, &bones);
-        observed.bone.push(Seen {
-            features: scene.bone_features(),
-            errors: found.iter().map(|found| found.error_n / scene.stiffness).collect(),
-            costs: found.iter().map(|found| found.tick_us / unit_us).collect(),
-        });
+        let on_bone = || {
+            let found = stretch.measure(&case.skull, &bones);
+            Seen {
+                features: scene.bone_features(),
+                errors: found.iter().map(|found| found.error_n / scene.stiffness).collect(),
+                costs: found.iter().map(|found| found.tick_us / unit_us).collect(),
+            }
+        };
+        let drawn = || {
+            let found = situation.view(&case).measure(&pictures, 1).expect("the view has pixels");
+            let unit_us = found.last().expect("there are choices").us;
+            Seen {
+                features: scene.picture_features(),
+                errors: found.iter().map(|found| found.error_percent).collect(),
+                costs: found.iter().map(|found| found.us / unit_us).collect(),
+            }
+        };
+        observed.bone.extend(with_bone.then(on_bone));
         observed.tissue.extend(brains.as_ref().map(|brains| pushed(&case, &situation, &tissues, brains)));
-        let found = situation.view(&case).measure(&pictures, 1).expect("the view has pixels");
-        let unit_us = found.last().expect("there are choices").us;
-        observed.picture.push(Seen {
-            features: scene.picture_features(),
-            errors: found.iter().map(|found| found.error_percent).collect(),
-            costs: found.iter().map(|found| found.us / unit_us).collect(),
-        });
+        observed.picture.extend(with_picture.then(drawn));
     }
     observed
 }
@@ -89,8 +98,11 @@ fn pushed(case: &Case, situation: &Situation, choices: &[Tissue], brains: &Brain
     }
 }
 
-/// The tables of all parts: name and text.
-pub fn tables(parts: &[Observed]) -> [(&'static str, String); 3] {
+/// The names of all tables.
+pub const TABLES: [&str; 3] = [Bone::TABLE, Tissue::TABLE, Picture::TABLE];
+
+/// The tables of which the parts saw anything: name and text.
+pub fn tables(parts: &[Observed]) -> Vec<(&'static str, String)> {
     let of = |kind: fn(&Observed) -> &Vec<Seen>| parts.iter().flat_map(kind).collect::<Vec<_>>();
     let pictures = picture::choices().into_iter().filter(|p| !p.sparse && p.detail == 1.0).collect::<Vec<_>>();
     let exact = |row: Row<Picture>| {
@@ -101,11 +113,12 @@ pub fn tables(parts: &[Observed]) -> [(&'static str, String); 3] {
     let careful = |row: Row<Bone>| Row { error: row.error.careful(), ..row };
     let on_bone = rows(&bone::choices(), &of(|o| &o.bone), COVERED).into_iter().map(careful).collect::<Vec<_>>();
     let drawn = rows(&picture::choices(), &of(|o| &o.picture), COVERED).into_iter().map(exact).collect::<Vec<_>>();
-    [table(&on_bone), table(&rows(&tissue::choices(), &of(|o| &o.tissue), COVERED)), table(&drawn)]
+    let moved = rows(&tissue::choices(), &of(|o| &o.tissue), COVERED);
+    [table(&on_bone), table(&moved), table(&drawn)].into_iter().flatten().collect()
 }
 
-fn table<T: Kind>(rows: &[Row<T>]) -> (&'static str, String) {
-    (T::TABLE, write(rows))
+fn table<T: Kind>(rows: &[Row<T>]) -> Option<(&'static str, String)> {
+    (!rows.is_empty()).then(|| (T::TABLE, write(rows)))
 }
 
 /// The laws of every choice; one that could not be run in all scenes is left out.
