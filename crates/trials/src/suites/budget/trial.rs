@@ -4,7 +4,10 @@ use super::case::{Case, Source};
 use super::scene::{MACHINE, Situation};
 use crate::suite::{Findings, Row};
 use std::fmt::Display;
-use trepan_budget::{Kind, Neighbour, Quality, Rows, bone_cores, holds_walls, picture_cores, plan_with, tissue_cores};
+use trepan_budget::{
+    Choice, FEATURES, Kind, Neighbour, Quality, Row as Laws, Rows, Setup, bone_cores, bone_error_n, holds_walls,
+    picture_cores, plan_with, tissue_cores,
+};
 use trepan_simulator::measure::Own;
 use trepan_simulator::measure::bone::Stretch;
 use trepan_simulator::measure::tissue::{Brains, Fineness, LEAST_MM, Push};
@@ -55,25 +58,23 @@ fn stored(quick: bool) -> Rows {
 /// Rows of one scene: for each kind what the plan chose, what presets would have done and what was cheapest.
 fn note(name: &str, situation: &Situation, rows: &Rows, own: &Own, errors: [Vec<f64>; 3], findings: &mut Findings) {
     let scene = &situation.scene;
-    let plan = plan_with(&MACHINE, scene, &own.instead(rows.clone(), scene)).expect("the scene is sound");
-    let (bone, tissue) = (plan.bone.expect("there is bone"), plan.tissue.expect("there is tissue"));
-    let presets = Quality::ALL.map(|quality| (quality, quality.preset()));
+    let looked_at = own.instead(rows.clone(), scene);
+    let plan = plan_with(&MACHINE, scene, &looked_at).expect("the scene is sound");
+    let (bone, tissue, picture) =
+        (plan.bone.expect("there is bone"), plan.tissue.expect("there is tissue"), plan.picture);
     let [on_bone, in_tissue, seen] = errors;
-    let of = |kind, tolerance| Of { scene: format!("{name}, {kind}"), kind, tolerance };
+    let of = |kind, tolerance, features| Of { scene: format!("{name}, {kind}"), kind, tolerance, features };
     let judged = rows.bone.iter().zip(on_bone).map(|(row, e)| (row.what, e, bone_cores(&MACHINE, scene, row)));
-    let presets_of = presets.map(|(quality, setup)| (quality.name(), setup.map(|s| s.bone)));
-    let said = Said { what: bone.what, bound: bone.error, meets: bone.meets_tolerance };
-    of("bone", scene.force_error_n).note(judged.collect(), said, &presets_of, &scene.bone_features(), findings);
+    let said = Said::of(&bone, &rows.bone, &looked_at.bone, |row| bone_error_n(scene, row));
+    of("bone", scene.force_error_n, scene.bone_features()).note(judged.collect(), said, |setup| setup.bone, findings);
     let judged = rows.tissue.iter().zip(in_tissue).map(|(row, e)| (row.what, e, tissue_cores(&MACHINE, scene, row)));
-    let presets_of = presets.map(|(quality, setup)| (quality.name(), setup.map(|s| s.tissue)));
-    let said = Said { what: tissue.what, bound: tissue.error, meets: tissue.meets_tolerance };
-    of("tissue", scene.displacement_mm).note(judged.collect(), said, &presets_of, &scene.tissue_features(), findings);
+    let features = scene.tissue_features();
+    let said = Said::of(&tissue, &rows.tissue, &looked_at.tissue, |row| row.error.at_most(&features));
+    of("tissue", scene.displacement_mm, features).note(judged.collect(), said, |setup| setup.tissue, findings);
     let judged = rows.picture.iter().zip(seen).map(|(row, e)| (row.what, e, picture_cores(&MACHINE, scene, row)));
-    let presets_of = presets.map(|(quality, setup)| (quality.name(), setup.map(|s| s.picture)));
-    let picture = plan.picture;
-    let said = Said { what: picture.what, bound: picture.error, meets: picture.meets_tolerance };
-    let of = of("picture", scene.picture_error_percent);
-    of.note(judged.collect(), said, &presets_of, &scene.picture_features(), findings);
+    let features = scene.picture_features();
+    let said = Said::of(&picture, &rows.picture, &looked_at.picture, |row| row.error.at_most(&features));
+    of("picture", scene.picture_error_percent, features).note(judged.collect(), said, |setup| setup.picture, findings);
 }
 
 /// A kind of choice in a scene.
@@ -81,13 +82,27 @@ struct Of {
     scene: String,
     kind: &'static str,
     tolerance: f64,
+    features: [f64; FEATURES],
 }
 
-/// What the plan said.
+/// What the plan said, and what it believed of every choice; `None` of those that it left out.
 struct Said<T> {
     what: T,
     bound: f64,
     meets: bool,
+    believed: Vec<Option<f64>>,
+}
+
+impl<T: Kind + PartialEq> Said<T> {
+    fn of(choice: &Choice<T>, rows: &[Laws<T>], looked_at: &[Laws<T>], error: impl Fn(&Laws<T>) -> f64) -> Self {
+        let believed = |row: &Laws<T>| looked_at.iter().find(|seen| seen.what == row.what).map(&error);
+        Self {
+            what: choice.what,
+            bound: choice.error,
+            meets: choice.meets_tolerance,
+            believed: rows.iter().map(believed).collect(),
+        }
+    }
 }
 
 impl Of {
@@ -95,8 +110,7 @@ impl Of {
         &self,
         judged: Vec<(T, f64, f64)>,
         said: Said<T>,
-        presets: &[(&str, Option<T>)],
-        features: &[f64; 3],
+        of_setup: impl Fn(Setup) -> T,
         findings: &mut Findings,
     ) {
         let all: Vec<_> =
@@ -104,7 +118,7 @@ impl Of {
         let of = |what: T| all.iter().find(|n| n.what == what);
         let meeting = all.iter().filter(|n| n.error <= self.tolerance);
         let cheapest = meeting.min_by(|a, b| a.cost.total_cmp(&b.cost));
-        let chosen = presets.iter().map(|&(name, what)| (name, of(what.unwrap_or(said.what))));
+        let chosen = Quality::ALL.iter().map(|q| (q.name(), of(q.preset().map_or(said.what, |setup| of_setup(setup)))));
         for (name, taken) in chosen.chain([("cheapest", cheapest)]) {
             let Some(taken) = taken else { continue };
             findings.rows.push(self.row(name, taken));
@@ -112,7 +126,8 @@ impl Of {
         if let Some(auto) = findings.rows.iter_mut().rev().find(|row| row.method == "auto" && row.scene == self.scene) {
             let four = |x: f64| (x * 1e4).round() / 1e4;
             auto.config.insert("errors".into(), all.iter().map(|n| four(n.error)).collect::<Vec<_>>().into());
-            auto.config.insert("features".into(), features.iter().map(|f| four(*f)).collect::<Vec<_>>().into());
+            auto.config.insert("features".into(), self.features.map(four).to_vec().into());
+            auto.config.insert("believed".into(), said.believed.iter().map(|e| e.map(four)).collect::<Vec<_>>().into());
             auto.metrics.insert("bound_over_tolerance".into(), said.bound / self.tolerance);
             auto.metrics.insert("says_met_count".into(), f64::from(u8::from(said.meets)));
         }
