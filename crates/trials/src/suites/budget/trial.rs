@@ -118,7 +118,7 @@ impl Of {
         let of = |what: T| all.iter().find(|n| n.what == what);
         let meeting = all.iter().filter(|n| n.error <= self.tolerance);
         let cheapest = meeting.min_by(|a, b| a.cost.total_cmp(&b.cost));
-        let chosen = Quality::ALL.iter().map(|q| (q.name(), of(q.preset().map_or(said.what, |setup| of_setup(setup)))));
+        let chosen = Quality::ALL.iter().map(|q| (q.name(), of(q.preset().map_or(said.what, &of_setup))));
         for (name, taken) in chosen.chain([("cheapest", cheapest)]) {
             let Some(taken) = taken else { continue };
             findings.rows.push(self.row(name, taken));
