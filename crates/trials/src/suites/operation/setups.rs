@@ -39,6 +39,7 @@ pub fn all(scope: Scope) -> Vec<Candidate> {
             ("voxels of 2 mm", "--quality usual --spacing-mm 2", Config::default()),
             ("voxels of 0.5 mm", "--quality usual --spacing-mm 0.5", Config::default()),
             ("3000 tetrahedra", "--quality usual --tets 3000", Config::default()),
+            ("8000 tetrahedra", "--quality usual --tets 8000", Config::default()),
             ("24000 tetrahedra", "--quality usual --tets 24000", Config::default()),
             ("position based", "--quality usual --solver xpbd", Config::default()),
             ("masses and springs", "--quality usual --solver mass-spring", Config::default()),
