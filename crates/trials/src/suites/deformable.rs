@@ -90,25 +90,26 @@ fn follow(scene: &Scene, place: &str, tips: &[Vec3], in_time: bool, findings: &m
     let steps_of = |method| if method == Method::RECOMMENDED { steps } else { enough };
     let take = |method| ride(scene, method, &tips[..steps_of(method)], &truth);
     let rides: Vec<Ride> = methods().map(take).collect();
-    let scan_us = rides.iter().find(|r| r.method == Method::Scan).map_or(f64::NAN, Ride::p50_us);
-    findings.rows.extend(rides.iter().map(|ride| ride.row(place, scene, scan_us)));
+    let scan = rides.iter().find(|ride| ride.method == Method::Scan);
+    findings.rows.extend(rides.iter().map(|ride| ride.row(place, scene, scan)));
     let complete = rides.iter().filter(|ride| is_complete(ride.method));
     let wrong = complete.map(|ride| (ride.missed + ride.invented) as f64).sum();
     findings.gates.push(Gate::at_most(format!("{place}: points missed or invented by complete methods"), wrong, 0.0));
     if in_time {
-        speed_gates(place, scene, scan_us, &rides, findings);
+        speed_gates(place, scene, &rides, findings);
     }
 }
 
 /// Nothing beats the recommended method in both time and depth, and it gains on the scan what it promises.
-fn speed_gates(place: &str, scene: &Scene, scan_us: f64, rides: &[Ride], findings: &mut Findings) {
+fn speed_gates(place: &str, scene: &Scene, rides: &[Ride], findings: &mut Findings) {
     let best = Method::RECOMMENDED.name();
     let beaten = crate::front::dominated(&findings.rows, place, best, "step_p50_us", "depth_error_p95_mm");
     findings.gates.push(Gate::at_most(format!("{place}: methods that beat {best} in both"), beaten as f64, 0.0));
     if scene.mesh.tets.len() > 48_000 {
-        let own_us = rides.iter().find(|r| r.method == Method::RECOMMENDED).map_or(f64::NAN, Ride::p50_us);
+        let of = |method| rides.iter().find(|ride| ride.method == method);
+        let faster = of(Method::RECOMMENDED).zip(of(Method::Scan)).map(|(own, scan)| own.times_faster_than(scan));
         let name = format!("{place}: {best}, times faster than the scan");
-        findings.gates.push(Gate::at_least(name, scan_us / own_us, LEAST_RATIO));
+        findings.gates.push(Gate::at_least(name, faster.unwrap_or(f64::NAN), LEAST_RATIO));
     }
 }
 
@@ -122,7 +123,7 @@ fn slide(scope: Scope, findings: &mut Findings) {
         let steps = if method == Method::Brute { ORACLE_STEPS } else { tips.len() };
         let ride = ride(&scene, method, &tips[..steps], &truth);
         let jump_edges = ride.depth_jump_mm / f64::from(scene.edge_mm);
-        findings.rows.push(ride.row(&place, &scene, f64::NAN).metric("depth_jump_edges", jump_edges));
+        findings.rows.push(ride.row(&place, &scene, None).metric("depth_jump_edges", jump_edges));
         most_edges = most_edges.max(if is_complete(method) { jump_edges } else { 0.0 });
     }
     findings.gates.push(Gate::at_most(
@@ -140,7 +141,7 @@ fn press(findings: &mut Findings) {
     let truth = vec![Truth::UNKNOWN; tips.len()];
     for method in methods() {
         let ride = ride(&scene, method, &tips, &truth);
-        findings.rows.push(ride.row(&place, &scene, f64::NAN).metric("depth_fall_mm", ride.depth_fall_mm));
+        findings.rows.push(ride.row(&place, &scene, None).metric("depth_fall_mm", ride.depth_fall_mm));
         if is_complete(method) {
             let name = format!("{place}: {}, largest fall of depth, mm", method.name());
             findings.gates.push(Gate::at_most(name, ride.depth_fall_mm, 1e-4));
