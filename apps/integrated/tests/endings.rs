@@ -124,7 +124,7 @@ fn a_session_that_was_interrupted_in_contact_replays_to_its_faded_end() {
     let pressing = |t: &trepan_link::wire::TickRecord| t.wrench.force.length() > 0.1;
     // This hand rests on the bone for half of its time: a recording that lags behind its session tells the same.
     let mut child = operation(live.path(), "40", &["--device", "script:aspirate"]).spawn().unwrap();
-    let long = |r: &Recording| r.ticks.iter().filter(|t| pressing(t)).count() > 1000;
+    let long = |r: &Recording| r.ticks.iter().filter(|t| pressing(t)).count() > 4000;
     while !Recording::open(&record).is_ok_and(|r| r.ticks.last().is_some_and(pressing) && long(&r)) {
         assert!(child.try_wait().unwrap().is_none(), "the operation ended before it touched bone");
         std::thread::sleep(Duration::from_millis(50));
