@@ -2,10 +2,13 @@
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
-use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
-use std::collections::BTreeMap;
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{BufRead, BufReader, IsTerminal};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Child, Command, ExitCode, Stdio};
+use std::sync::mpsc;
+use std::thread;
 use std::time::{Duration, Instant};
 use trepan_trials::part::{Part, Scope, Suite};
 use trepan_trials::report::Report;
@@ -38,6 +41,9 @@ struct Run {
     /// Only every Nth part, from the Ith on, as in 2/8; `cargo xtask merge` puts the shards' folders together
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
+    /// Processes beside each other, one for each core at most: sooner done, and times that disturb each other [default: 2 with --quick, else 1]
+    #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u8).range(1..))]
+    jobs: Option<u8>,
     /// Keep the borders of this run's maps as those that later runs are held against (in the sources)
     #[arg(long, conflicts_with = "shard")]
     keep_borders: bool,
@@ -119,7 +125,14 @@ fn run(asked: &Run) -> Result<bool> {
         return Ok(true);
     }
     let store = Store::open(&asked.out, scope)?;
-    let kept = perform(jobs, &store, scope)?;
+    let at_once = match asked.shard {
+        Some(_) => 1,
+        None => {
+            thread::available_parallelism()?.get().min(jobs.len()).min(asked.jobs.unwrap_or(scope.pick(2, 1)).into())
+        }
+    };
+    let told = if at_once > 1 { beside(at_once, asked, &jobs, &store)? } else { BTreeSet::new() };
+    let kept = perform(jobs, &store, scope, &told)?;
     if asked.shard.is_some() || whole_suites.is_empty() {
         println!("parts: {}", asked.out.join("parts").display());
         return Ok(kept);
@@ -161,45 +174,114 @@ fn jobs(names: &[String], scope: Scope) -> Result<(Vec<Job>, Vec<&'static Suite>
     Ok((jobs, suites))
 }
 
-/// Runs what is not there yet; gives whether every promise of every part was kept.
-fn perform(jobs: Vec<Job>, store: &Store, scope: Scope) -> Result<bool> {
-    let mut durations = store.durations();
-    let usual = durations.values().sum::<f64>() / durations.len().max(1) as f64;
-    let expected = |key: &str, known: &BTreeMap<String, f64>| known.get(key).copied().unwrap_or(usual);
-    let mut left_s: f64 = jobs.iter().map(|job| expected(&job.key, &durations)).sum();
-    let bar = ProgressBar::new(jobs.len() as u64);
-    bar.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} parts, {msg}")?);
-    bar.enable_steady_tick(Duration::from_millis(250));
+/// How far a run is: parts that are done, and the time that is left by what they took last time.
+struct Progress {
+    bar: ProgressBar,
+    durations: BTreeMap<String, f64>,
+    usual_s: f64,
+    left_s: f64,
+}
+
+impl Progress {
+    fn of(jobs: &[Job], store: &Store, at_once: usize) -> Result<Self> {
+        let durations = store.durations();
+        let usual_s = durations.values().sum::<f64>() / durations.len().max(1) as f64;
+        let bar = ProgressBar::new(jobs.len() as u64);
+        bar.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} parts, {msg}")?);
+        // Lines that go to a file or another process are not to be missed from it.
+        if !std::io::stdout().is_terminal() {
+            bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+        bar.enable_steady_tick(Duration::from_millis(250));
+        let mut progress = Self { bar, durations, usual_s, left_s: 0.0 };
+        progress.left_s = jobs.iter().map(|job| progress.expected_s(&job.key)).sum::<f64>() / at_once as f64;
+        Ok(progress)
+    }
+
+    fn expected_s(&self, key: &str) -> f64 {
+        self.durations.get(key).copied().unwrap_or(self.usual_s)
+    }
+
+    /// Shows a part beside the time that is left.
+    fn show(&self, key: &str) {
+        let left = match self.left_s > 0.0 {
+            true => format!(" about {} left", HumanDuration(Duration::from_secs_f64(self.left_s))),
+            false => String::new(),
+        };
+        self.bar.set_message(format!("{key}{left}"));
+    }
+}
+
+/// Runs the parts as shards in processes beside each other, into one folder, and passes on what they tell of parts; gives the parts of which they told.
+fn beside(at_once: usize, asked: &Run, jobs: &[Job], store: &Store) -> Result<BTreeSet<String>> {
+    let program = std::env::current_exe()?;
+    let start = |number: usize| {
+        let mut shard = Command::new(&program);
+        shard.args(&asked.suites).args(asked.quick.then_some("--quick")).arg("--out").arg(&asked.out);
+        shard.args(["--seed", &asked.seed.to_string(), "--shard", &format!("{}/{at_once}", number + 1)]);
+        shard.stdout(Stdio::piped()).spawn().context("cannot start a process for a shard")
+    };
+    let mut shards = (0..at_once).map(start).collect::<Result<Vec<Child>>>()?;
+    let (mut progress, mut told) = (Progress::of(jobs, store, at_once)?, BTreeSet::new());
+    thread::scope(|scope| {
+        let (say_on, lines) = mpsc::channel();
+        for out in shards.iter_mut().filter_map(|shard| shard.stdout.take()) {
+            let say_on = say_on.clone();
+            scope.spawn(move || {
+                BufReader::new(out).lines().map_while(Result::ok).try_for_each(|line| say_on.send(line))
+            });
+        }
+        drop(say_on);
+        for line in lines {
+            let Some(key) = line.split(": ").next().filter(|key| jobs.iter().any(|job| job.key == *key)) else {
+                continue;
+            };
+            say(&progress.bar, &line);
+            progress.left_s -= progress.expected_s(key) / at_once as f64;
+            progress.bar.inc(1);
+            progress.show(key);
+            told.insert(key.to_string());
+        }
+    });
+    progress.bar.finish_and_clear();
+    for mut shard in shards {
+        shard.wait()?;
+    }
+    Ok(told)
+}
+
+/// Runs what is not there yet; gives whether every promise of every part was kept. Of parts that were `told` of before, nothing is said.
+fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, told: &BTreeSet<String>) -> Result<bool> {
+    let mut progress = Progress::of(&jobs, store, 1)?;
     let mut passed = true;
     for Job { suite, part, key } in jobs {
-        let left = if left_s > 0.0 {
-            format!("about {} left", HumanDuration(Duration::from_secs_f64(left_s)))
-        } else {
-            "".into()
-        };
-        bar.set_message(format!("{key} {left}"));
-        left_s -= expected(&key, &durations);
+        progress.show(&key);
+        progress.left_s -= progress.expected_s(&key);
         let slug = part.slug();
         if let Some(stored) = store.found(suite.name, &slug) {
-            say(&bar, &format!("{key}: there already"));
+            if !told.contains(&key) {
+                say(&progress.bar, &format!("{key}: there already"));
+            }
             passed &= stored.findings.gates.iter().all(|gate| gate.pass);
+            progress.durations.insert(key, stored.seconds);
         } else {
             let (before, began) = (Control::now(), Instant::now());
             let (findings, ended) = part.run(scope);
             let seconds = began.elapsed().as_secs_f64();
             let broken = findings.gates.iter().filter(|gate| !gate.pass).count();
             let word = if broken == 0 { String::new() } else { format!(", {broken} promise(s) BROKEN") };
-            say(&bar, &format!("{key}: {seconds:.1} s{word}"));
+            say(&progress.bar, &format!("{key}: {seconds:.1} s{word}"));
             passed &= broken == 0;
             store.keep(suite.name, &slug, (seconds, before.or(Control::now())), (findings, ended))?;
             if ended {
-                durations.insert(key, seconds);
-                store.remember(&durations)?;
+                progress.durations.insert(key, seconds);
+                store.remember(&progress.durations)?;
             }
         }
-        bar.inc(1);
+        progress.bar.inc(1);
     }
-    bar.finish_and_clear();
+    store.remember(&progress.durations)?;
+    progress.bar.finish_and_clear();
     Ok(passed)
 }
 
