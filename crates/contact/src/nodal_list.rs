@@ -7,8 +7,8 @@
 use crate::NodalContact;
 use core::ops::{Deref, DerefMut};
 
-/// Most springs on one body: a tool's tip and shaft, and the patches that touch a wall or a fold.
-pub const MAX_SPRINGS: usize = 128;
+/// Most springs on one body: the places under a tool's tip, its shaft, and the patches that touch a wall or a fold.
+pub const MAX_SPRINGS: usize = 256;
 
 /// A list of springs, read as a slice.
 #[derive(Debug, Default, PartialEq)]

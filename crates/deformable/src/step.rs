@@ -13,14 +13,17 @@ use trepan_geometry::{Aabb, Pointshell, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::{TetMesh, Topology};
 
 /// What one step found.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TissueStep {
     /// The contact, as force models read it.
     pub manifold: ContactManifold,
     /// The tangent plane that the haptic tick holds on to until the next result.
     pub patch: SurfacePatch,
-    /// The spring that presses on the tissue's nodes, equal and opposite.
+    /// The spring that presses on the tissue's nodes, equal and opposite; where there are `dents`, the one that stands for all of them.
     pub nodal: NodalContact,
+    /// Springs under the ball, one for each triangle, together as strong as `nodal`: each presses along its own normal as deep as the ball is there, so that
+    /// tissue finer than the ball takes its shape. Empty where the response has one spring for all.
+    pub dents: NodalContacts,
     /// Dry friction of the tissue on the tool's tip, N; the nodes take the opposite by the weights of `nodal`.
     pub friction_n: Vec3,
     /// The contact of the tool's shaft; depth 0 when it is free or not asked for.
@@ -39,30 +42,59 @@ pub struct TissueStep {
     pub stale: u32,
 }
 
+impl Default for TissueStep {
+    /// No contact, and room for every spring.
+    fn default() -> Self {
+        Self {
+            manifold: ContactManifold::default(),
+            patch: SurfacePatch::default(),
+            nodal: NodalContact::none(),
+            dents: NodalContacts::with_room(),
+            friction_n: Vec3::ZERO,
+            shaft: Contact::default(),
+            shaft_nodal: NodalContact::none(),
+            points_in_contact: 0,
+            tests: 0,
+            overflow: 0,
+            skipped: 0,
+            stale: 0,
+        }
+    }
+}
+
 impl TissueStep {
     /// Back to no contact, counters kept.
     pub(crate) fn forget_contact(&mut self) {
         self.manifold.clear();
         self.patch = SurfacePatch { time_ms: self.patch.time_ms, tip_mm: self.patch.tip_mm, ..SurfacePatch::default() };
         self.nodal = NodalContact::none();
+        self.dents.clear();
         self.friction_n = Vec3::ZERO;
+    }
+
+    /// The springs of tip and shaft.
+    fn all(&self) -> impl Iterator<Item = &NodalContact> {
+        let tip = if self.dents.is_empty() { core::slice::from_ref(&self.nodal) } else { &self.dents };
+        tip.iter().chain([&self.shaft_nodal])
     }
 
     /// Adds the springs of tip and shaft to a solver's list. Friction is not among them.
     pub fn springs(&self, out: &mut NodalContacts) {
-        out.push(self.nodal);
-        out.push(self.shaft_nodal);
+        self.all().for_each(|spring| out.push(*spring));
     }
 
     /// Adds all forces on the nodes, N: springs of tip and shaft, and friction. Returns the force on the tool, equal and opposite.
     pub fn push(&self, positions: &[Vec3], velocities: &[Vec3], forces: &mut [Vec3]) -> Vec3 {
         let mut on_tool = Vec3::ZERO;
-        for (nodal, along) in [(&self.nodal, self.friction_n), (&self.shaft_nodal, Vec3::ZERO)] {
-            let (place, velocity) = (nodal.mean(|n| positions[n as usize]), nodal.mean(|n| velocities[n as usize]));
-            let force = nodal.pressure_n(place, velocity) * nodal.normal + along;
+        let mut press = |nodal: &NodalContact, force: Vec3| {
             nodal.nodes().for_each(|(node, weight)| forces[node as usize] -= weight * force);
             on_tool += force;
+        };
+        for spring in self.all() {
+            let (place, velocity) = (spring.mean(|n| positions[n as usize]), spring.mean(|n| velocities[n as usize]));
+            press(spring, spring.pressure_n(place, velocity) * spring.normal);
         }
+        press(&self.nodal, self.friction_n);
         on_tool
     }
 }

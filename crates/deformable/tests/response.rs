@@ -184,6 +184,35 @@ fn the_nodal_spring_holds_the_same_depth_and_unit_weight() {
     }
 }
 
+/// Elements of half the ball's radius: many triangles under it, each with its spring, and all of them press as one would.
+#[test]
+fn the_springs_under_a_ball_are_together_as_strong_as_one_and_take_its_shape() {
+    let mesh = block([16, 16, 6], 1.0);
+    let mut collision = collision(&mesh, Method::Walk);
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    let at = |n: u32| mesh.positions[n as usize];
+    for depth in [0.2, 0.7, 1.5, 2.6] {
+        let middle = Vec3::new(8.3, 7.9, 6.0 + RADIUS - depth);
+        let out = step_at(&mut collision, &mesh, middle);
+        let wanted = 0.3 * depth * Vec3::Z;
+        let force = |s: &trepan_contact::NodalContact| s.pressure_n(s.mean(at), Vec3::ZERO) * s.normal;
+        let together: Vec3 = out.dents.iter().map(force).sum();
+        assert!(together.distance(wanted) < 1e-3, "{together} for {wanted}");
+        let mut forces = vec![Vec3::ZERO; mesh.positions.len()];
+        assert!(out.push(&mesh.positions, &still, &mut forces).distance(wanted) < 1e-3);
+        assert!(forces.iter().sum::<Vec3>().distance(-wanted) < 1e-3);
+        assert!(out.dents.iter().all(|s| s.nodes().count() <= 3));
+        // What lies under the ball's middle is pressed deeper than what lies at its rim.
+        let depth_of = |s: &trepan_contact::NodalContact| s.offset_mm + s.mean(at).dot(s.normal);
+        let aside = |s: &trepan_contact::NodalContact| (s.mean(at) - middle).truncate().length();
+        let order = |a: &&_, b: &&_| aside(a).total_cmp(&aside(b));
+        let (inner, outer) = (out.dents.iter().min_by(order).unwrap(), out.dents.iter().max_by(order).unwrap());
+        let apart = depth_of(inner) - depth_of(outer);
+        assert!(out.dents.len() == 1 || apart > 0.0, "{apart} mm between {} springs at {depth}", out.dents.len());
+        assert!(depth < 0.5 || out.dents.len() > 5, "{} springs at {depth}", out.dents.len());
+    }
+}
+
 /// Two blocks with a gap of 3 mm and a ball of 4 mm between: the walls cancel, a shift to one side is pushed back.
 #[test]
 fn in_a_groove_opposite_walls_cancel() {

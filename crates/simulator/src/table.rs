@@ -47,6 +47,9 @@ pub struct Table {
     fastest: OnceLock<&'static str>,
 }
 
+/// Most mass that is added to the elements with the shortest steps, as a share of the brain's.
+const MASS_ADDED: f32 = 0.01;
+
 impl Table {
     /// Lays a case on the table. `filmed`: the window will go to and fro in the bone that is shown, so a second one is carved.
     pub fn new(
@@ -153,7 +156,12 @@ impl Table {
         if let Some(method) = solver_named(solver)? {
             return method.build(body).map_err(|fault| of_brain(&fault));
         }
-        let config = trepan_tled::Config { still_mm: still_mm as f32, ..trepan_tled::Config::default() };
+        let config = trepan_tled::Config {
+            still_mm: still_mm as f32,
+            // Lifts the slivers and the light nodes of what is finer at the opening; weight stays.
+            mass_scaling: MASS_ADDED,
+            ..trepan_tled::Config::default()
+        };
         if solver != FASTEST {
             return Ok(Box::new(trepan_tled::Tled::new(body, &config).map_err(|fault| of_brain(&fault))?));
         }

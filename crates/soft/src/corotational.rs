@@ -228,7 +228,7 @@ impl Corotational {
 impl SoftSolver for Corotational {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
         let h = f64::from(dt_ms);
-        let mut report = StepReport { substeps: 1, contact_scale: 1.0, ..StepReport::default() };
+        let mut report = StepReport { substeps: 1, ..StepReport::default() };
         report.inverted = self.balance(loads.gravity.as_dvec3(), h);
         self.touch(loads, h);
         (report.iterations, report.converged) = self.solve(h);

@@ -82,7 +82,7 @@ impl Linear {
     fn press(&mut self, loads: &Loads) -> f32 {
         let state = [&self.positions[..], &self.velocities[..]];
         let mut add = |n: u32, push: Vec3| self.force[n as usize] -= push.as_dvec3();
-        loads.contacts.iter().map(|spring| press(spring, 1.0, state, &mut add)).sum()
+        loads.contacts.iter().map(|spring| press(spring, state, &mut add)).sum()
     }
 
     fn advance(&mut self, gravity: DVec3, dt: f64, report: &mut StepReport) {
@@ -105,7 +105,7 @@ impl Linear {
 impl SoftSolver for Linear {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
         self.stiffness.apply(&self.u, &mut self.force);
-        let mut report = StepReport { substeps: 1, contact_scale: 1.0, converged: true, ..StepReport::default() };
+        let mut report = StepReport { substeps: 1, converged: true, ..StepReport::default() };
         report.contact_n = self.press(loads);
         self.advance(loads.gravity.as_dvec3(), f64::from(dt_ms), &mut report);
         report

@@ -133,7 +133,7 @@ impl MassSpring {
     fn press(&mut self, loads: &Loads) -> f32 {
         let state = [&self.positions[..], &self.velocities[..]];
         let mut add = |n: u32, push: Vec3| self.force[n as usize] += push.as_dvec3();
-        loads.contacts.iter().map(|spring| press(spring, 1.0, state, &mut add)).sum()
+        loads.contacts.iter().map(|spring| press(spring, state, &mut add)).sum()
     }
 
     fn advance(&mut self, gravity: DVec3, dt: f64, report: &mut StepReport) {
@@ -153,8 +153,7 @@ impl MassSpring {
 impl SoftSolver for MassSpring {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
         let inverted = self.pull();
-        let mut report =
-            StepReport { substeps: 1, contact_scale: 1.0, converged: true, inverted, ..StepReport::default() };
+        let mut report = StepReport { substeps: 1, converged: true, inverted, ..StepReport::default() };
         report.contact_n = self.press(loads);
         self.advance(loads.gravity.as_dvec3(), f64::from(dt_ms), &mut report);
         report

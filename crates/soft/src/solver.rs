@@ -46,8 +46,6 @@ pub struct StepReport {
     pub skipped_ms: f32,
     /// Forces of all contact springs on the tissue at the end of the step, summed without their directions, N.
     pub contact_n: f32,
-    /// Least share of a contact's stiffness and damping that was used, 1 unless it would have been unstable at this step.
-    pub contact_scale: f32,
     /// Iterations of an implicit or static solver.
     pub iterations: u32,
     /// Whether an iterative solver reached its tolerance; explicit solvers always say true.

@@ -171,8 +171,7 @@ impl SoftSolver for Xpbd {
         let wanted = (dt_ms / self.config.substep_ms - 1e-4).ceil().max(1.0);
         let substeps = wanted.min(self.config.substeps.max(1) as f32);
         let h = (dt_ms / wanted).max(0.0);
-        let mut report =
-            StepReport { substeps: substeps as u32, contact_scale: 1.0, converged: true, ..StepReport::default() };
+        let mut report = StepReport { substeps: substeps as u32, converged: true, ..StepReport::default() };
         report.skipped_ms = (wanted - substeps) * h;
         for _ in 0..report.substeps {
             if h > 0.0 {

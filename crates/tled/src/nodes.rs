@@ -48,6 +48,14 @@ pub(crate) struct Update {
     pub calm_mm: f32,
 }
 
+impl Update {
+    /// What multiplies velocity, and acceleration, ms.
+    pub fn keep_and_gain(&self) -> [f32; 2] {
+        let half = 0.5 * self.damping_per_ms * self.dt_ms;
+        [(1.0 - half) / (1.0 + half), self.dt_ms / (1.0 + half)]
+    }
+}
+
 impl Nodes {
     /// Nodes at rest, of masses by mesh node, g, which may be more than what their weight comes from.
     pub fn of(body: &Body, layout: &Layout, masses: &[f64]) -> Self {
@@ -70,8 +78,7 @@ impl Nodes {
 
     /// Moves some nodes by one substep.
     pub fn update(&self, places: Range<usize>, handed: &Handed, update: &Update) {
-        let half = 0.5 * update.damping_per_ms * update.dt_ms;
-        let (keep, gain) = ((1.0 - half) / (1.0 + half), update.dt_ms / (1.0 + half));
+        let [keep, gain] = update.keep_and_gain();
         let (gravity, dt_ms) = (update.gravity.extend(0.0), update.dt_ms);
         let square = |limit: f32| (limit * limit).min(f32::MAX);
         let (fastest, furthest) = (square(update.max_speed), square(update.max_displacement_mm));
@@ -116,6 +123,23 @@ impl Nodes {
             self.u.set(place, after.to_array());
             self.v.set(place, velocity.to_array());
         }
+    }
+
+    /// Velocity that the node at a place would have after a substep under the force of its elements alone, mm/ms; of a fixed node what it has.
+    pub fn free_velocity(&self, place: usize, force: Vec3, update: &Update) -> Vec3 {
+        let (velocity, inverse_mass) = (self.velocity(place), self.inverse_mass[place]);
+        if inverse_mass == 0.0 {
+            return velocity;
+        }
+        let [keep, gain] = update.keep_and_gain();
+        let carried = match update.rigid {
+            Some(rigid) => {
+                let whole = rigid.at(self.position(place));
+                whole + (velocity - whole) * keep
+            }
+            None => velocity * keep,
+        };
+        carried + (update.gravity * self.weight[place] + force * inverse_mass) * gain
     }
 
     /// Force from outside on the node at a place, N, which is thereby used up.

@@ -8,7 +8,7 @@ use crate::part::CALM;
 use crate::scaling::Scaling;
 use trepan_geometry::Vec3;
 use trepan_soft::{
-    Body, BodyError, ContactShares, Loads, SoftSolver, StepBound, StepReport, Stiffness, SurfacePressure,
+    Body, BodyError, FreeNode, Gain, ImplicitSprings, Loads, SoftSolver, StepReport, Stiffness, SurfacePressure,
     lowest_frequency_of, power_bound_of_ms,
 };
 
@@ -20,7 +20,7 @@ pub struct Tled {
     rest: Vec<Vec3>,
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
-    shares: ContactShares,
+    springs: ImplicitSprings,
     /// Its triangles by place.
     pressure: SurfacePressure,
     layout: Layout,
@@ -93,7 +93,7 @@ impl Tled {
             rest: body.mesh.positions.clone(),
             positions: body.mesh.positions.clone(),
             velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
-            shares: ContactShares::of_nodes(body.mesh.positions.len()),
+            springs: ImplicitSprings::on_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
             bound_ms: power_bound_of_ms(body, &stiffness) as f32,
             damping_per_ms: damping_rate(config.damping, lowest_per_ms),
@@ -164,16 +164,16 @@ impl Tled {
             Pass::Volumes => self.elements.average_volumes(dt_ms),
             Pass::Forces => _ = self.elements.find_forces(dt_ms),
             Pass::Press => {
-                let omega2 = 4.0 / (self.bound_ms * self.bound_ms);
-                self.press(loads, &[StepBound { dt_ms, omega2 }], &mut report);
+                let update = self.update_of(loads, dt_ms);
+                self.press(loads, &update, &mut report);
                 self.push();
             }
-            Pass::Update => self.update(loads, dt_ms, &mut report),
+            Pass::Update => self.update(self.update_of(loads, dt_ms), &mut report),
         }
     }
 
-    /// One substep of at most `left_ms` of a step of `whole_ms`; gives its length. As long as the elements bear as they are now, and of equal lengths while that stays.
-    fn substep(&mut self, loads: &Loads, left_ms: f32, whole_ms: f32, report: &mut StepReport) -> f32 {
+    /// One substep of at most `left_ms`; gives its length. As long as the elements bear as they are now, and of equal lengths while that stays.
+    fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
         if std::mem::replace(&mut self.gravity, loads.gravity) != loads.gravity {
             self.elements.wake();
         }
@@ -183,18 +183,17 @@ impl Tled {
         let longest = self.stable_dt_ms().min(BORNE * bound_ms);
         let dt_ms =
             if self.config.substeps == 0 { left_ms } else { left_ms / (left_ms / longest * NEARLY).ceil().max(1.0) };
-        let bound = |dt_ms: f32, bound_ms: f32| StepBound { dt_ms, omega2: 4.0 / (bound_ms * bound_ms) };
-        let uncut = bound(whole_ms.min(self.stable_dt_ms()), self.bound_ms);
-        self.press(loads, &[bound(dt_ms, bound_ms), uncut], report);
+        let update = self.update_of(loads, dt_ms);
+        self.press(loads, &update, report);
         self.push();
-        self.update(loads, dt_ms, report);
+        self.update(update, report);
         dt_ms
     }
 
-    /// Moves the nodes.
-    fn update(&mut self, loads: &Loads, dt_ms: f32, report: &mut StepReport) {
+    /// What a substep does to a node, beside forces.
+    fn update_of(&self, loads: &Loads, dt_ms: f32) -> Update {
         let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.elements.nodes().rigid_motion());
-        let update = Update {
+        Update {
             dt_ms,
             damping_per_ms: self.damping_per_ms,
             gravity: loads.gravity - self.config.balanced_gravity,
@@ -202,11 +201,15 @@ impl Tled {
             max_displacement_mm: self.max_displacement_mm,
             rigid,
             calm_mm: CALM * self.config.still_mm,
-        };
+        }
+    }
+
+    /// Moves the nodes.
+    fn update(&mut self, update: Update, report: &mut StepReport) {
         self.elements.update(update);
         let [limited, non_finite] = self.elements.nodes().finish();
         (report.limited, report.non_finite) = (report.limited + limited, report.non_finite + non_finite);
-        self.elapsed_ms = dt_ms;
+        self.elapsed_ms = update.dt_ms;
         self.publish();
     }
 
@@ -238,20 +241,26 @@ impl Tled {
         self.bound_ms / gained.clamp(1.0, MOST_GAINED)
     }
 
-    fn press(&mut self, loads: &Loads, bounds: &[StepBound], report: &mut StepReport) {
-        let (nodes, state) = (self.elements.nodes(), [&self.positions[..], &self.velocities[..]]);
-        let place = |n: u32| self.layout.place_of[n as usize] as usize;
-        let add = |n: u32, force: Vec3| nodes.push(place(n), force);
-        self.shares.press(&loads.contacts, bounds, |n| nodes.inverse_mass[place(n)], state, report, add);
+    fn press(&mut self, loads: &Loads, update: &Update, report: &mut StepReport) {
+        let (elements, place_of) = (&self.elements, &self.layout.place_of);
+        let nodes = elements.nodes();
+        let place = |n: u32| place_of[n as usize] as usize;
+        let free = |n: u32| FreeNode {
+            position: nodes.position(place(n)),
+            velocity: nodes.free_velocity(place(n), elements.force(place(n)), update),
+            inverse_mass: nodes.inverse_mass[place(n)],
+        };
+        let step = Gain { dt_ms: update.dt_ms, gain_ms: update.keep_and_gain()[1] };
+        report.contact_n = self.springs.press(&loads.contacts, step, free, |n, force| nodes.push(place(n), force));
     }
 }
 
 impl SoftSolver for Tled {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
-        let mut report = StepReport { contact_scale: 1.0, converged: true, ..StepReport::default() };
+        let mut report = StepReport { converged: true, ..StepReport::default() };
         let mut left_ms = dt_ms.max(0.0);
         while left_ms > 1e-5 * dt_ms && report.substeps < self.config.substeps.max(1) {
-            left_ms -= self.substep(loads, left_ms, dt_ms, &mut report);
+            left_ms -= self.substep(loads, left_ms, &mut report);
             report.substeps += 1;
         }
         report.skipped_ms = if left_ms > 1e-5 * dt_ms { left_ms } else { 0.0 };

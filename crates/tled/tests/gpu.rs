@@ -84,7 +84,7 @@ fn the_device_agrees_with_the_processor_under_gravity_and_a_pressing_tool() {
     println!("{}: {largest} mm, apart by {:e} of it, force by {force:e}", gpu.name(), difference / largest);
     assert!(largest > 1.0 && last.contact_n > 1e-3, "{largest} {last:?}");
     assert!(difference <= 1e-4 * largest, "{difference} of {largest}");
-    assert!(force < 1e-3 && report.contact_scale == last.contact_scale, "{report:?} {last:?}");
+    assert!(force < 1e-3, "{report:?} {last:?}");
     assert_eq!((report.substeps, report.inverted, report.limited, report.non_finite), (steps, 0, 0, 0));
     assert_eq!(gpu.faults().count, 0, "{:?}", gpu.faults());
 }

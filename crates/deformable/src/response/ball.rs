@@ -23,7 +23,7 @@
 //! # When not to use it
 //! For a tool that is not a ball at its tip; for a surface that folds within the ball's radius so sharply that one normal says nothing.
 
-use super::{Answer, near::Near, near::Sample};
+use super::{Answer, dent, near::Near, near::Sample};
 use crate::{
     extent::Extent,
     narrow::{Hits, NONE},
@@ -31,7 +31,7 @@ use crate::{
     step::TissueStep,
     surface::{Foot, MovingSurface},
 };
-use trepan_contact::{Contact, MAX_CONTACTS};
+use trepan_contact::{Contact, MAX_CONTACTS, NodalContact};
 use trepan_geometry::{Aabb, Vec3};
 
 /// The triangle touched last, and room for those near the contact.
@@ -40,10 +40,14 @@ pub(crate) struct Ball {
     last_centre: Vec3,
     numbers: Vec<u32>,
     near: Near,
+    /// Triangles that have a spring, in the springs' order.
+    pressed: Vec<u32>,
 }
 
 /// Most triangles near one contact.
 const MAX_NEAR: usize = 1024;
+/// Most triangles with a spring of their own; more than the usual shell has samples.
+const MAX_DENTS: usize = 128;
 /// A triangle belongs to the touched side when its normal is within 70 degrees of the touched triangle's.
 const SAME_SIDE: f32 = 0.34;
 /// Every fourth point inside is sampled: the shell is even, so a quarter of it is too.
@@ -58,6 +62,7 @@ impl Ball {
             last_centre: Vec3::ZERO,
             numbers: Vec::with_capacity(MAX_NEAR),
             near: Near::with_capacity(MAX_NEAR),
+            pressed: Vec::with_capacity(MAX_DENTS),
         }
     }
 
@@ -76,15 +81,16 @@ impl Ball {
         let touch = self.touch(scene, hits, surface, out);
         self.anchor = touch.as_ref().map_or(NONE, |(sample, _)| sample.triangle);
         let (centre, depth_mm) = touch?;
+        self.pressed.clear();
         let mut sum = Sum::default();
         sum.add(depth_mm, centre.normal);
-        press(surface, &centre, depth_mm, out);
+        self.press(surface, &centre, depth_mm, out);
         let stride = points_inside(hits).count().div_ceil(SAMPLE_EVERY * MAX_CONTACTS).max(1);
         for (k, i) in points_inside(hits).filter(|i| i % SAMPLE_EVERY == 0).enumerate() {
             let p = scene.points[i];
             let Some(sample) = self.near.sample(p, BLEND * scene.radius_mm) else { break };
             sum.add(sample.distance, sample.normal);
-            press(surface, &sample, sample.distance, out);
+            self.press(surface, &sample, sample.distance, out);
             if k % stride == 0 {
                 let normal = sample.normal.normalize_or_zero();
                 out.manifold.push(Contact { point: p, normal, depth_mm: sample.distance });
@@ -92,6 +98,26 @@ impl Ball {
         }
         let fallback = surface.flat_normal(scene.positions, centre.triangle);
         Some(sum.answer(depth_mm, fallback))
+    }
+
+    /// Puts load on the nodes under a sample: on the spring for all, and on the triangle's own.
+    fn press(&mut self, surface: &MovingSurface, sample: &Sample, load: f32, out: &mut TissueStep) {
+        let nodes = surface.triangles[sample.triangle as usize];
+        for (node, weight) in nodes.into_iter().zip(sample.weights).filter(|(_, weight)| *weight > 0.0) {
+            out.nodal.add(node, weight * load);
+        }
+        let known = self.pressed.iter().position(|triangle| *triangle == sample.triangle);
+        if let Some(spring) = known.and_then(|at| out.dents.get_mut(at)) {
+            return dent(spring, nodes, sample.weights, load, sample.normal);
+        }
+        if self.pressed.len() == MAX_DENTS {
+            out.overflow += 1;
+            return;
+        }
+        let mut spring = NodalContact::none();
+        dent(&mut spring, nodes, sample.weights, load, sample.normal);
+        out.dents.push(spring);
+        self.pressed.push(sample.triangle);
     }
 
     /// What the surface says about the ball's centre, and the ball's depth there.
@@ -166,14 +192,4 @@ impl Sum {
 /// Numbers of the points inside, the centre not among them.
 fn points_inside(hits: &Hits) -> impl Iterator<Item = usize> + '_ {
     (0..hits.tet.len() - 1).filter(|&i| hits.tet[i] != NONE)
-}
-
-/// Puts load on the nodes under a sample.
-fn press(surface: &MovingSurface, sample: &Sample, load: f32, out: &mut TissueStep) {
-    let nodes = surface.triangles[sample.triangle as usize];
-    for (node, weight) in nodes.into_iter().zip(sample.weights) {
-        if weight > 0.0 {
-            out.nodal.add(node, weight * load);
-        }
-    }
 }

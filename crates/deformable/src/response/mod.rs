@@ -10,7 +10,7 @@ pub(crate) use friction::Friction;
 pub(crate) use shaft::Shaft;
 
 use crate::{narrow::Hits, scene::Scene, step::TissueStep, surface::MovingSurface};
-use trepan_contact::SurfacePatch;
+use trepan_contact::{NodalContact, NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
 
 /// How normal and depth come out of the points inside the tissue.
@@ -104,6 +104,7 @@ pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut T
     out.nodal.offset_mm = answer.depth_mm - place.dot(answer.normal);
     (out.nodal.stiffness, out.nodal.damping) = (spring.stiffness, spring.damping);
     out.nodal.tool_normal_velocity = finite_or_zero(tool_velocity);
+    finish_dents(scene, answer, spring, &mut out.dents);
     out.patch = SurfacePatch {
         time_ms: scene.tool.time_ms,
         normal: answer.normal,
@@ -111,6 +112,36 @@ pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut T
         depth_mm: answer.depth_mm,
         normal_velocity: finite_or_zero(tissue_velocity),
     };
+}
+
+/// Time in which the corners of a pressed triangle come to move alike, ms: what is found anew every millisecond must not make light nodes ring.
+const CALM_MS: f32 = 2.0;
+
+/// Adds a place under the ball to the springs: of a spring's weights, normal and stiffness are the sums over its places so far, of the weights and normals by
+/// depth, of the stiffness by number.
+pub(crate) fn dent(spring: &mut NodalContact, nodes: [u32; 3], weights: [f32; 3], depth_mm: f32, normal: Vec3) {
+    let pressed = nodes.into_iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
+    pressed.for_each(|(node, weight)| spring.add(node, weight * depth_mm));
+    spring.normal += depth_mm * normal;
+    spring.stiffness += 1.0;
+}
+
+/// Makes springs of the sums: each as deep as its places in the mean, and all together as strong as the answer.
+fn finish_dents(scene: &Scene, answer: &Answer, spring: Spring, dents: &mut NodalContacts) {
+    let whole: Vec3 = dents.iter().map(|dent| dent.normal).sum();
+    let parts: f32 = dents.iter().map(|dent| dent.normal.length()).sum();
+    let share = answer.depth_mm / whole.length().max(f32::MIN_POSITIVE);
+    for dent in dents.iter_mut() {
+        let (load_mm, places) = (dent.normal, dent.stiffness);
+        dent.normalise();
+        dent.normal = load_mm.normalize_or_zero();
+        let place = dent.mean(|n| scene.positions[n as usize]);
+        dent.offset_mm = load_mm.length() / places - place.dot(dent.normal);
+        dent.stiffness = spring.stiffness * share * places;
+        dent.damping = spring.damping * load_mm.length() / parts.max(f32::MIN_POSITIVE);
+        dent.calm_ms = CALM_MS;
+        dent.tool_normal_velocity = finite_or_zero(scene.tool_velocity_at(place).dot(dent.normal));
+    }
 }
 
 fn finite_or_zero(x: f32) -> f32 {

@@ -321,7 +321,7 @@ impl Reference {
 
 impl SoftSolver for Reference {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
-        let mut report = StepReport { substeps: 1, contact_scale: 1.0, ..StepReport::default() };
+        let mut report = StepReport { substeps: 1, ..StepReport::default() };
         let count = self.positions.len();
         for (i, &[a, b]) in self.cells.ends.iter().enumerate().filter(|(i, _)| self.cells.fixed[count + i]) {
             self.u[count + i] = (self.u[a as usize] + self.u[b as usize]) * 0.5;

@@ -58,6 +58,11 @@ impl DeviceState {
         })
     }
 
+    /// 1/m of the node at a place, 1/g, and the share of m that has weight.
+    pub fn mass_of(&self, place: u32) -> [f32; 2] {
+        [self.inverse_mass[place as usize], self.weight[place as usize]]
+    }
+
     /// Says whether a spring pushes a node.
     pub fn mark(&mut self, gpu: &Gpu, place: u32, is_pushed: bool) {
         let place = place as usize;

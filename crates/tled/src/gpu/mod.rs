@@ -53,9 +53,7 @@ use press::Press;
 use topology::Topology;
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError};
-use trepan_soft::{
-    Body, BodyError, ContactShares, Loads, SoftSolver, StepBound, StepReport, Stiffness, power_bound_of_ms,
-};
+use trepan_soft::{Body, BodyError, Loads, SoftSolver, StepReport, Stiffness, power_bound_of_ms};
 use update::Update;
 use volumes::Volumes;
 
@@ -105,8 +103,6 @@ pub struct GpuTled {
     elapsed_ms: f32,
     stiffest_at_rest: f32,
     stiffest: f32,
-    contact_scale: f32,
-    shares: ContactShares,
     submitted: u32,
     fault: Option<GpuError>,
 }
@@ -127,7 +123,7 @@ impl GpuTled {
         let topology = Topology::new(gpu, body, &layout, &seats, cures)?;
         let forces = Forces::new(gpu, (body, &layout, &scaling), config, &state, &topology)?;
         let volumes = || Volumes::new(gpu, (body, &layout, &seats), &state, &topology, &forces);
-        let press = Press::new(gpu, &state)?;
+        let press = Press::new(gpu, &state, &topology, &forces)?;
         let stiffest = stiffest(body, &scaling);
         Ok(Self {
             volumes: cures.then(volumes).transpose()?,
@@ -144,8 +140,6 @@ impl GpuTled {
             elapsed_ms: 0.0,
             stiffest_at_rest: stiffest,
             stiffest,
-            contact_scale: 1.0,
-            shares: ContactShares::of_nodes(body.mesh.positions.len()),
             submitted: 0,
             fault: None,
             damping_per_ms,
@@ -159,7 +153,7 @@ impl GpuTled {
     /// Submits `count` steps of the longest stable length under the same loads, and gives that length, ms. Does not wait.
     pub fn steps(&mut self, loads: &Loads, count: u32) -> f32 {
         let dt_ms = self.longest_ms();
-        self.submit(loads, dt_ms, self.stable_dt_ms(), count);
+        self.submit(loads, dt_ms, count);
         dt_ms
     }
 
@@ -184,7 +178,6 @@ impl GpuTled {
             non_finite: sum(2),
             substeps: std::mem::take(&mut self.submitted),
             contact_n,
-            contact_scale: std::mem::replace(&mut self.contact_scale, 1.0),
             converged: true,
             ..StepReport::default()
         })
@@ -210,8 +203,8 @@ impl GpuTled {
     }
 
     /// The first of the steps lets past stress fade for as long as the last step took, where that was another length.
-    fn submit(&mut self, loads: &Loads, dt_ms: f32, whole_ms: f32, count: u32) {
-        let mut step = self.numbers(loads, dt_ms, whole_ms);
+    fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
+        let mut step = self.numbers(loads, dt_ms);
         if step.springs == 0 {
             self.press.pressure.write(&self.gpu, 0, &[0.0]);
         }
@@ -252,7 +245,7 @@ impl GpuTled {
     }
 
     /// The uniform of a step; hands the springs over.
-    fn numbers(&mut self, loads: &Loads, dt_ms: f32, whole_ms: f32) -> Step {
+    fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> Step {
         let half = 0.5 * self.damping_per_ms * dt_ms;
         Step {
             gravity: (loads.gravity - self.config.balanced_gravity).to_array(),
@@ -261,7 +254,7 @@ impl GpuTled {
             gain: dt_ms / (1.0 + half),
             max_speed: self.config.max_speed,
             max_displacement: self.max_displacement_mm,
-            springs: self.hand_over(loads, dt_ms, whole_ms),
+            springs: self.hand_over(loads, dt_ms),
             elements: self.elements,
             nodes: self.layout.node_at.len() as u32,
             seats: self.seats,
@@ -269,24 +262,14 @@ impl GpuTled {
         }
     }
 
-    /// Gives the device the stable share of every spring; says how many there are.
-    fn hand_over(&mut self, loads: &Loads, dt_ms: f32, whole_ms: f32) -> u32 {
-        let bound_ms = self.bound_now_ms();
-        let bound = |dt_ms: f32, bound_ms: f32| StepBound { dt_ms, omega2: 4.0 / (bound_ms * bound_ms) };
-        let bounds = [bound(dt_ms, bound_ms), bound(whole_ms.min(self.stable_dt_ms()), self.bound_ms)];
-        let (place_of, masses) = (&self.layout.place_of, &self.state.inverse_mass);
+    /// Gives the device every spring; says how many there are.
+    fn hand_over(&mut self, loads: &Loads, dt_ms: f32) -> u32 {
         let at_rest = |n: u32| self.rest.get(n as usize).copied().unwrap_or_default();
-        let list = &mut self.press.list;
-        list.clear();
-        self.shares.each(
-            &loads.contacts,
-            &bounds,
-            |n| masses[place_of[n as usize] as usize],
-            |spring, share| {
-                self.contact_scale = self.contact_scale.min(share);
-                list.add(spring, share, spring.offset_mm + spring.mean(at_rest).dot(spring.normal), place_of);
-            },
-        );
+        self.press.list.clear();
+        for spring in loads.contacts.iter() {
+            let rest_depth = spring.offset_mm + spring.mean(at_rest).dot(spring.normal);
+            self.press.list.add(spring, (rest_depth, dt_ms), &self.layout.place_of, &self.state);
+        }
         self.press.touch(&self.gpu, &mut self.state)
     }
 }
@@ -298,7 +281,7 @@ impl SoftSolver for GpuTled {
         let count = if most == 0 { 1.0 } else { needed.min(most as f32) };
         let each_ms = if most == 0 { dt_ms } else { dt_ms / needed };
         let before = self.submitted;
-        self.submit(loads, each_ms, dt_ms, count as u32);
+        self.submit(loads, each_ms, count as u32);
         match self.read() {
             Ok(mut report) => {
                 report.substeps -= before;
@@ -309,7 +292,7 @@ impl SoftSolver for GpuTled {
             }
             Err(fault) => {
                 self.fault = Some(fault);
-                StepReport { skipped_ms: dt_ms, contact_scale: 1.0, ..StepReport::default() }
+                StepReport { skipped_ms: dt_ms, ..StepReport::default() }
             }
         }
     }

@@ -1,6 +1,8 @@
 //! The pass of the contacts: springs with the device's own present nodes, one workgroup.
 
 use crate::gpu::device_state::DeviceState;
+use crate::gpu::forces::Forces;
+use crate::gpu::topology::Topology;
 use trepan_contact::{MAX_NODES, MAX_SPRINGS, NodalContact};
 use trepan_gpu::{Bindings, Buffer, Dispatches, Gpu, GpuError, Kernel, Slot};
 use trepan_shaders::TLED_PRESS;
@@ -10,14 +12,14 @@ pub(crate) struct Press {
     kernel: Kernel,
     bindings: Bindings,
     springs: Buffer<Spring>,
-    touched: Buffer<[u32; 2]>,
+    touched: Buffer<[u32; 4]>,
     /// Forces of the springs by place, N; of meaning where a node is marked.
     pub pushed: Buffer<[f32; 4]>,
     /// Sum over the springs in the newest step, N.
     pub pressure: Buffer<f32>,
     /// The springs of the next submission.
     pub list: List,
-    shown: Vec<[u32; 2]>,
+    shown: Vec<[u32; 4]>,
 }
 
 /// A spring as `press.wgsl` declares it.
@@ -31,13 +33,15 @@ pub(crate) struct Spring {
     tool_velocity: f32,
     first: u32,
     count: u32,
-    unused: [u32; 3],
+    compliance: f32,
+    weight: f32,
+    calm: f32,
 }
 
-/// Springs, and place and bits of the weight of every node that they touch.
+/// Springs, and of every node that they touch its place and the bits of its weight, of 1/m and of the share of m that has weight.
 pub(crate) struct List {
     springs: Vec<Spring>,
-    touched: Vec<[u32; 2]>,
+    touched: Vec<[u32; 4]>,
 }
 
 impl List {
@@ -46,29 +50,43 @@ impl List {
         self.touched.clear();
     }
 
-    /// Adds a share of a spring that is `rest_depth` mm deep where nothing moved. Nodes that the mesh lacks are left out.
-    pub fn add(&mut self, spring: &NodalContact, share: f32, rest_depth: f32, place_of: &[u32]) {
+    /// Adds a spring that is `rest_depth` mm deep where nothing moved, for steps of `dt_ms`. Nodes that the mesh lacks are left out.
+    pub fn add(
+        &mut self,
+        spring: &NodalContact,
+        (rest_depth, dt_ms): (f32, f32),
+        place_of: &[u32],
+        state: &DeviceState,
+    ) {
         let first = self.touched.len();
-        let placed = |(n, w): (u32, f32)| Some([*place_of.get(n as usize)?, w.to_bits()]);
-        self.touched.extend(spring.nodes().filter_map(placed));
+        let (mut compliance, mut free) = (0.0, 0.0);
+        for (n, w) in spring.nodes() {
+            let Some(&place) = place_of.get(n as usize) else { continue };
+            let [inverse_mass, weight] = state.mass_of(place);
+            compliance += w * w * inverse_mass;
+            free += if inverse_mass > 0.0 { w } else { 0.0 };
+            self.touched.push([place, w.to_bits(), inverse_mass.to_bits(), weight.to_bits()]);
+        }
         self.springs.push(Spring {
             normal: spring.normal.to_array(),
-            stiffness: share * spring.stiffness,
-            damping: share * spring.damping,
+            stiffness: spring.stiffness,
+            damping: spring.damping,
             rest_depth,
             tool_velocity: spring.tool_normal_velocity,
             first: first as u32,
             count: (self.touched.len() - first) as u32,
-            unused: [0; 3],
+            compliance,
+            weight: free,
+            calm: trepan_soft::calmed(spring, dt_ms),
         });
     }
 }
 
 impl Press {
-    pub fn new(gpu: &Gpu, state: &DeviceState) -> Result<Self, GpuError> {
-        let mut wanted = [Slot::Storage; 7];
+    pub fn new(gpu: &Gpu, state: &DeviceState, topology: &Topology, forces: &Forces) -> Result<Self, GpuError> {
+        let mut wanted = [Slot::Storage; 9];
         wanted[0] = Slot::Uniform;
-        wanted[5..].fill(Slot::StorageMut);
+        wanted[7..].fill(Slot::StorageMut);
         let kernel = Kernel::new(gpu, "press", TLED_PRESS, "main", &wanted)?;
         // Room for 64 more: idle lanes read past the last spring's nodes.
         let most = MAX_SPRINGS * MAX_NODES;
@@ -84,6 +102,8 @@ impl Press {
                 (&touched).into(),
                 (&state.u).into(),
                 (&state.v).into(),
+                (&topology.starts).into(),
+                (&forces.slots).into(),
                 (&pushed).into(),
                 (&pressure).into(),
             ],
@@ -99,9 +119,9 @@ impl Press {
             self.springs.write(gpu, 0, springs);
         }
         if *touched != self.shown {
-            self.shown.iter().for_each(|&[place, _]| state.mark(gpu, place, false));
+            self.shown.iter().for_each(|&[place, ..]| state.mark(gpu, place, false));
             self.shown.clone_from(touched);
-            self.shown.iter().for_each(|&[place, _]| state.mark(gpu, place, true));
+            self.shown.iter().for_each(|&[place, ..]| state.mark(gpu, place, true));
             self.touched.write(gpu, 0, &self.shown);
         }
         springs.len() as u32
