@@ -62,10 +62,11 @@ impl Plan {
         self.bone.is_none_or(|c| c.in_time) && self.tissue.is_none_or(|c| c.in_time) && self.picture.in_time
     }
 
-    /// Solver step, ms, and mean edge of the tetrahedra, mm.
+    /// Solver step, ms, and mean edge of the tetrahedra, mm, by their number and halvings alone.
     pub fn step_and_edge(&self) -> Option<(f64, f64)> {
         let tissue = self.tissue?.what;
-        Some((dt_ms(&self.scene, &tissue), edge_mm(self.scene.brain_mm3, tissue.tets)))
+        let step_ms = dt_ms(&self.scene, &tissue) / f64::from(1 << tissue.halvings);
+        Some((step_ms, edge_mm(self.scene.brain_mm3, tissue.tets)))
     }
 }
 
@@ -180,7 +181,7 @@ mod tests {
 
     fn rows() -> Rows {
         let bone = |spacing_mm| Bone { method: "distance-field", spacing_mm, points: 0 };
-        let tissue = |tets| Tissue { solver: "tled", tets, still_mm: 0.0 };
+        let tissue = |tets| Tissue { solver: "tled", tets, halvings: 0, still_mm: 0.0 };
         let picture = |detail| Picture { sparse: detail < 1.0, detail };
         Rows {
             bone: vec![row(bone(1.0), 0.1, 0.8), row(bone(0.5), 0.04, 1.0), row(bone(0.25), 0.02, 2.0)],

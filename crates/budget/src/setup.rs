@@ -20,6 +20,8 @@ pub struct Tissue {
     pub solver: &'static str,
     /// Tetrahedra of the whole brain.
     pub tets: usize,
+    /// How often the edges of the tetrahedra are halved around the opening, of those many; 0 = they are alike everywhere.
+    pub halvings: u32,
     /// Region of interest: what moves less than this in 50 ms sleeps, mm (`still_mm` of `trepan_tled::Config`). 0 = all of it is stepped.
     pub still_mm: f64,
 }
@@ -66,7 +68,7 @@ impl Quality {
     pub fn preset(self) -> Option<Setup> {
         let setup = |spacing_mm, tets, still_mm, sparse, detail| Setup {
             bone: Bone { method: "distance-field", spacing_mm, points: 0 },
-            tissue: Tissue { solver: "tled", tets, still_mm },
+            tissue: Tissue { solver: "tled", tets, halvings: 0, still_mm },
             picture: Picture { sparse, detail },
         };
         Some(match self {
@@ -98,6 +100,9 @@ impl fmt::Display for Bone {
 impl fmt::Display for Tissue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} with {} tetrahedra", self.solver, self.tets)?;
+        if self.halvings > 0 {
+            write!(f, ", edges 1/{} at the opening", 1u64 << self.halvings)?;
+        }
         if self.still_mm > 0.0 { write!(f, ", what moves over {} mm", self.still_mm) } else { Ok(()) }
     }
 }
@@ -132,6 +137,8 @@ mod tests {
         assert!(draft.tissue.tets < usual.tissue.tets && usual.tissue.tets < fine.tissue.tets);
         assert_eq!(usual.to_string(), "distance-field on 1 mm voxels; tled with 12000 tetrahedra; every ray");
         assert_eq!(draft.tissue.to_string(), "tled with 5000 tetrahedra, what moves over 0.01 mm");
+        let finer = Tissue { halvings: 2, still_mm: 0.0, ..draft.tissue };
+        assert_eq!(finer.to_string(), "tled with 5000 tetrahedra, edges 1/4 at the opening");
         assert_eq!(draft.picture.to_string(), "sparse rays at 0.5 of the pixels along an edge");
     }
 }

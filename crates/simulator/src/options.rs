@@ -13,7 +13,7 @@ pub struct Options {
     #[command(subcommand)]
     pub task: Option<Task>,
     /// A folder that `case build` made
-    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "isovalue_hu", "register", "opening"])]
+    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "finer", "isovalue_hu", "register", "opening"])]
     pub case: Option<PathBuf>,
     /// Images, and what is made of them
     #[command(flatten)]
@@ -119,6 +119,9 @@ pub struct Patient {
     /// Tetrahedra of the brain, met within a tenth [default: by --quality; 12000 for `case build`]
     #[arg(long, value_name = "N")]
     pub tets: Option<usize>,
+    /// How often their edges are halved within 10 mm of the opening, of the same number [default: by --quality; 0 for `case build`]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=3))]
+    pub finer: Option<u32>,
     /// Move the MRI (and labels) to where they fit the CT, by mutual information
     #[arg(long)]
     pub register: bool,
@@ -152,7 +155,7 @@ pub enum Task {
     /// Measure this machine and say what `--quality auto` takes for a case on it, why, and what the next better and the next cheaper would cost
     Plan {
         /// A folder that `case build` made
-        #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "isovalue_hu", "register", "opening"])]
+        #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "finer", "isovalue_hu", "register", "opening"])]
         case: Option<PathBuf>,
         /// The patient's images
         #[command(flatten)]

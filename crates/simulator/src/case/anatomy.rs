@@ -2,9 +2,11 @@
 
 use crate::case::{Brain, Inputs, Recipe};
 use crate::error::SessionError;
+use crate::measure::tissue::OPENING_MM;
 use glam::DAffine3;
 use std::path::Path;
-use trepan_mesh::lattice::{self, LabelledMesh};
+use trepan_geometry::Vec3;
+use trepan_mesh::lattice::{self, Fine, LabelledMesh};
 use trepan_volume::{
     AIR_HU, BrainConfig, Grid, Import, Interpolation, MaskError, ReadError, RegistrationConfig, VoxelVolume,
     brain_mask, check_brain_mask, dicom, hounsfield, largest_component, overlap, register, resample, skull_only,
@@ -106,21 +108,31 @@ pub fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> R
     Ok(skull)
 }
 
-/// Classes and MRI on a grid around the brain, and its tetrahedra.
-pub fn make_brain(
+/// Classes on a grid around the brain.
+pub fn make_classes(
     inputs: &Inputs,
-    mri: &VoxelVolume<f32>,
     mask: &VoxelVolume<u8>,
     ct_from_mri: DAffine3,
-    recipe: &Recipe,
     notes: &mut Vec<String>,
-) -> Result<Brain, SessionError> {
+) -> Result<VoxelVolume<u8>, SessionError> {
     let mut classes = cropped(mask);
-    let mri = resample(mri, &Grid::of(&classes), Interpolation::Trilinear, 0.0);
     for source in &inputs.tissues {
         notes.push(source.paint(ct_from_mri, &mut classes)?);
     }
-    let config = lattice::Config { target_tets: recipe.tets, ..lattice::Config::default() };
+    Ok(classes)
+}
+
+/// The brain of some classes: the MRI on their grid, and tetrahedra, which may be finer around `place`.
+pub fn make_brain(
+    mri: &VoxelVolume<f32>,
+    classes: VoxelVolume<u8>,
+    place: Option<Vec3>,
+    recipe: &Recipe,
+) -> Result<Brain, SessionError> {
+    let mri = resample(mri, &Grid::of(&classes), Interpolation::Trilinear, 0.0);
+    let halvings = Some(recipe.halvings).filter(|halvings| *halvings > 0);
+    let fine = place.zip(halvings).map(|(centre, halvings)| Fine { centre, radius_mm: OPENING_MM, halvings });
+    let config = lattice::Config { target_tets: recipe.tets, fine, ..lattice::Config::default() };
     let LabelledMesh { mesh, label_of_tet } = lattice::labelled(&classes.map(u16::from), &config)
         .map_err(|fault| SessionError::Case(format!("meshing the brain: {fault}")))?;
     mesh.check().map_err(|fault| SessionError::Internal(format!("the mesher made a bad mesh: {fault}")))?;

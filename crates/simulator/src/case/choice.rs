@@ -32,7 +32,7 @@ pub fn open_case(
         let settled = models.insert(wish.settle(&facts, card, |scene, rows| known.own(scene, rows))?);
         known.say(|| settled.say());
         let Setup { bone, tissue, .. } = settled.setup;
-        Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, ..wanted })
+        Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, halvings: tissue.halvings, ..wanted })
     })?;
     let unsettled = || SessionError::Internal("a case without models".into());
     Ok((case, models.ok_or_else(unsettled)?))
@@ -106,6 +106,7 @@ fn recipe(patient: &Patient) -> Recipe {
     Recipe {
         spacing_mm: patient.spacing_mm.unwrap_or(usual.bone.spacing_mm as f32),
         tets: patient.tets.unwrap_or(usual.tissue.tets),
+        halvings: patient.finer.unwrap_or(usual.tissue.halvings),
         isovalue_hu: patient.isovalue_hu,
         ct_series: patient.ct_series,
         mri_series: patient.mri_series,

@@ -136,6 +136,7 @@ mod tests {
         let recipe = Recipe {
             spacing_mm: 0.75,
             tets: 500,
+            halvings: 1,
             isovalue_hu: None,
             ct_series: None,
             mri_series: None,

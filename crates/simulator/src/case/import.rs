@@ -6,7 +6,7 @@
 //! A case goes by the first digits of that hash: file names may hold a patient's name.
 //! What the images are ([`Facts`]) is kept too: who chooses the numbers by it need not read them again.
 
-use crate::case::anatomy::{cropped, find_brain, make_brain, make_skull, read_ct, read_mri, registered};
+use crate::case::anatomy::{cropped, find_brain, make_brain, make_classes, make_skull, read_ct, read_mri, registered};
 use crate::case::cache::Cache;
 use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
@@ -44,7 +44,7 @@ pub fn open_by(
     let mut known = Known::of(program, inputs, wanted, cache)?;
     let recipe = choose(&mut known)?;
     let Known { key, images, mut stages, .. } = known;
-    let hash = cache.under(&key, &format!("{} {}", recipe.spacing_mm, recipe.tets));
+    let hash = cache.under(&key, &format!("{} {} {}", recipe.spacing_mm, recipe.tets, recipe.halvings));
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
     if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
         stages.finish();
@@ -153,7 +153,7 @@ fn key_of_images(program: Program, inputs: &Inputs, wanted: &Recipe, cache: &Cac
     let files: Vec<&Path> = images.into_iter().flatten().chain(tissues).map(PathBuf::as_path).collect();
     let given = images.map(Option::is_some);
     let meant: Vec<_> = inputs.tissues.iter().map(|source| (source.class, &source.codes)).collect();
-    let of_images = Recipe { spacing_mm: 0.0, tets: 0, ..*wanted };
+    let of_images = Recipe { spacing_mm: 0.0, tets: 0, halvings: 0, ..*wanted };
     cache.key(&files, &format!("{of_images:?} {given:?} {meant:?}"))
 }
 
@@ -213,14 +213,13 @@ fn build(inputs: &Inputs, images: Images, recipe: &Recipe, stages: &mut ImportSt
     let Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png, mut notes } = images;
     stages.next("resampling the skull");
     let skull = ct.map(|ct| make_skull(&ct, recipe, isovalue_hu)).transpose()?;
-    stages.next("meshing the brain");
-    let brain = mri.zip(mask);
-    let brain =
-        brain.map(|(mri, mask)| make_brain(inputs, &mri, &mask, ct_from_mri, recipe, &mut notes)).transpose()?;
     stages.next("planning the opening");
-    let opening =
-        skull.as_ref().map(|skull| Opening::on(skull, isovalue_hu, brain.as_ref().map(|b| &b.classes), recipe.opening));
+    let classes = mask.map(|mask| make_classes(inputs, &mask, ct_from_mri, &mut notes)).transpose()?;
+    let opening = skull.as_ref().map(|skull| Opening::on(skull, isovalue_hu, classes.as_ref(), recipe.opening));
     let opening = opening.transpose()?.flatten();
+    stages.next("meshing the brain");
+    let place = opening.or_else(|| classes.as_ref().and_then(Opening::on_bare_brain)).map(|opening| opening.brain());
+    let brain = mri.zip(classes).map(|(mri, classes)| make_brain(&mri, classes, place, recipe)).transpose()?;
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
 }
 

@@ -41,6 +41,9 @@ pub struct Recipe {
     pub spacing_mm: f32,
     /// Tetrahedra of the brain.
     pub tets: usize,
+    /// How often their edges are halved around the opening.
+    #[serde(default)]
+    pub halvings: u32,
     /// Threshold of bone, HU; `None` for the histogram's.
     pub isovalue_hu: Option<i16>,
     /// Which series of the CT's folder, as [`trepan_volume::dicom::series`] lists them; `None` for the largest.

@@ -22,7 +22,7 @@ use trepan_rigid::Method;
 use trepan_volume::BoneVolume;
 
 /// Goes up when what is found changes for the same case and choices.
-const FORM: u32 = 3;
+const FORM: u32 = 4;
 /// Ways along the bone, evenly around the opening.
 const SLIDES: usize = 3;
 /// Length of each, mm.
@@ -162,7 +162,7 @@ fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64
     let slide = Slide { scene: *scene, place: *place, outward: sight.outward, turn_rad: 0.0, length_mm: SLIDE_MM };
     let found = || {
         let brains = Brains::of(shape, &choices)?;
-        let push = Push::of(shape, &slide, &brains, Fineness::QUICK)?;
+        let push = Push::of(&slide, &brains, Fineness::QUICK)?;
         // Where the brain is held, every mesh would be found to be right.
         if push.moved_mm() < LEAST_MM { Ok(Vec::new()) } else { push.measure(&brains) }
     };

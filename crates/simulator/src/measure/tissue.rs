@@ -41,7 +41,7 @@ impl Fineness {
 }
 
 /// Radius of what is finer in a mesh that a session could step, mm.
-const OPENING_MM: f32 = 10.0;
+pub const OPENING_MM: f32 = 10.0;
 /// Radius of what is finer in a truth, mm.
 const TRUTH_MM: f32 = 14.0;
 /// What a sleeping tetrahedron costs.
@@ -61,7 +61,7 @@ const HELD: f32 = 0.35;
 
 /// Every choice.
 pub fn choices() -> Vec<Tissue> {
-    let choice = |solver, tets, still_mm| Tissue { solver, tets, still_mm };
+    let choice = |solver, tets, still_mm| Tissue { solver, tets, halvings: 0, still_mm };
     let names = Method::all().into_iter().filter(|m| m.name() != "reference").map(|m| m.name());
     let rivals = names.flat_map(|solver| RIVALS_TETS.map(|tets| choice(solver, tets, 0.0)));
     let tled = TETS.map(|tets| choice("tled", tets, 0.0)).into_iter();
@@ -93,7 +93,7 @@ pub fn cost(at: usize, choices: &[Tissue], found: &[Found], scene: &Scene) -> f6
 
 /// The choice whose step is that of a machine's measure, for rivals to be compared with.
 fn unit(choices: &[Tissue]) -> usize {
-    let is = |c: &Tissue| (c.solver, c.tets, c.still_mm) == ("tled", RIVALS_TETS[0], 0.0);
+    let is = |c: &Tissue| (c.solver, c.tets, c.halvings, c.still_mm) == ("tled", RIVALS_TETS[0], 0, 0.0);
     choices.iter().position(is).expect("it is a choice")
 }
 
@@ -108,37 +108,36 @@ pub struct Shape {
     pub material: Material,
 }
 
-/// A brain in uniform meshes, for many scenes.
-pub struct Brains {
+/// A brain in meshes that are alike everywhere, for many scenes; those that are finer at an opening are made for each.
+pub struct Brains<'a> {
+    shape: &'a Shape,
     choices: Vec<Tissue>,
     meshes: Vec<(usize, TetMesh)>,
-    material: Material,
     /// Of all solvers, 1/ms.
     damping: Damping,
 }
 
-impl Brains {
+impl<'a> Brains<'a> {
     /// Fills a brain with meshes of every size.
     ///
     /// # Errors
     /// When the mask cannot be filled.
-    pub fn of(shape: &Shape, choices: &[Tissue]) -> Result<Self, SessionError> {
+    pub fn of(shape: &'a Shape, choices: &[Tissue]) -> Result<Self, SessionError> {
         let mut meshes: Vec<(usize, TetMesh)> = Vec::new();
-        for choice in choices {
+        for choice in choices.iter().filter(|choice| choice.halvings == 0) {
             if !meshes.iter().any(|(tets, _)| *tets == choice.tets) {
                 meshes.push((choice.tets, filled(shape, choice.tets, None)?));
             }
         }
-        let material = shape.material;
         let mesh = filled(shape, TETS[0], None)?;
-        let body = Body::uniform(mesh.clone(), held(&mesh), material);
+        let body = Body::uniform(mesh.clone(), held(&mesh), shape.material);
         let damping = Tled::new(&body, &Config::default()).map_err(of_brain)?.damping_per_ms();
-        Ok(Self { choices: choices.to_vec(), meshes, material, damping: Damping::Rate(damping) })
+        Ok(Self { shape, choices: choices.to_vec(), meshes, damping: Damping::Rate(damping) })
     }
 
     /// A solver for a choice on its mesh.
     fn solver(&self, choice: &Tissue, mesh: &TetMesh) -> Result<Box<dyn Solver>, SessionError> {
-        let body = Body::uniform(mesh.clone(), held(mesh), self.material);
+        let body = Body::uniform(mesh.clone(), held(mesh), self.shape.material);
         match Method::named(choice.solver) {
             Some(method) => Ok(Box::new(method.build(&body).map_err(of_brain)?)),
             None => {
@@ -151,7 +150,7 @@ impl Brains {
 
 /// TLED with or without its cure of locking.
 fn cured(brains: &Brains, mesh: &TetMesh, cure_locking: bool) -> Result<Tled, SessionError> {
-    let body = Body::uniform(mesh.clone(), held(mesh), brains.material);
+    let body = Body::uniform(mesh.clone(), held(mesh), brains.shape.material);
     let config = Config { cure_locking, damping: brains.damping, ..Config::default() };
     Tled::new(&body, &config).map_err(of_brain)
 }
@@ -205,7 +204,8 @@ impl Push {
     ///
     /// # Errors
     /// When the mask cannot be filled.
-    pub fn of(shape: &Shape, slide: &Slide, brains: &Brains, truth: Fineness) -> Result<Self, SessionError> {
+    pub fn of(slide: &Slide, brains: &Brains, truth: Fineness) -> Result<Self, SessionError> {
+        let shape = brains.shape;
         let around = |n: usize| {
             let turn = core::f32::consts::TAU * n as f32 / 12.0;
             let (a, b) = slide.outward.any_orthonormal_pair();
@@ -228,14 +228,8 @@ impl Push {
     ///
     /// # Errors
     /// When the mask cannot be filled.
-    pub fn measure_finer(
-        &self,
-        shape: &Shape,
-        brains: &Brains,
-        fineness: Fineness,
-        cure: bool,
-    ) -> Result<Found, SessionError> {
-        let mesh = self.finer(shape, fineness, OPENING_MM)?;
+    pub fn measure_finer(&self, brains: &Brains, fineness: Fineness, cure: bool) -> Result<Found, SessionError> {
+        let mesh = self.finer(brains.shape, fineness, OPENING_MM)?;
         Ok(self.found(&mesh, &mut cured(brains, &mesh, cure)?, LONGEST_MS[0]))
     }
 
@@ -245,8 +239,11 @@ impl Push {
     /// When a solver refuses the brain.
     pub fn measure(&self, brains: &Brains) -> Result<Vec<Found>, SessionError> {
         let one = |choice: &Tissue| {
-            let mesh = brains.meshes.iter().find(|(tets, _)| *tets == choice.tets);
-            let (_, mesh) = mesh.ok_or_else(|| of_brain("a mesh is missing"))?;
+            let (tets, halvings) = (choice.tets, choice.halvings);
+            let finer = (halvings > 0).then(|| self.finer(brains.shape, Fineness { tets, halvings }, OPENING_MM));
+            let finer = finer.transpose()?;
+            let alike = || brains.meshes.iter().find(|(alike, _)| *alike == tets).map(|(_, mesh)| mesh);
+            let mesh = finer.as_ref().or_else(alike).ok_or_else(|| of_brain("a mesh is missing"))?;
             let longest_ms = LONGEST_MS[usize::from(choice.solver == "corotational")];
             Ok(self.found(mesh, &mut *brains.solver(choice, mesh)?, longest_ms))
         };

@@ -12,6 +12,7 @@ pub(super) struct Given {
     pub rigid: Option<&'static str>,
     pub points: Option<usize>,
     pub tets: Option<usize>,
+    pub halvings: Option<u32>,
     pub solver: Option<&'static str>,
     pub still_mm: Option<f64>,
     pub picture: Option<Picture>,
@@ -23,23 +24,31 @@ impl Given {
     pub fn flags(patient: &Patient, rigid: Option<&str>, solver: Option<&str>) -> Result<Self, SessionError> {
         let tled = |name| if name == FASTEST { FASTEST } else { TLED };
         let named = |name| Ok::<_, SessionError>(solver_named(name)?.map_or(tled(name), |method| method.name()));
-        let words = |flags: [(&str, Option<String>); 2]| {
-            flags.into_iter().filter_map(|(flag, value)| Some(format!("{flag} {} is given", value?))).collect()
+        let words = |flags: &[(&str, Option<String>)]| -> Vec<String> {
+            flags
+                .iter()
+                .filter_map(|(flag, value)| value.as_ref().map(|value| format!("{flag} {value} is given")))
+                .collect()
         };
         Ok(Self {
             spacing_mm: patient.spacing_mm.map(written),
             rigid: rigid.map(|name| rigid_named(name).map(|method| method.name())).transpose()?,
             points: rigid.map(|_| 0),
             tets: patient.tets,
+            halvings: patient.finer,
             solver: solver.map(named).transpose()?,
             still_mm: solver.map(|_| 0.0),
             picture: None,
             words: [
-                words([
+                words(&[
                     ("--spacing-mm", patient.spacing_mm.map(|mm| mm.to_string())),
                     ("--rigid", rigid.map(String::from)),
                 ]),
-                words([("--tets", patient.tets.map(|n| n.to_string())), ("--solver", solver.map(String::from))]),
+                words(&[
+                    ("--tets", patient.tets.map(|n| n.to_string())),
+                    ("--finer", patient.finer.map(|n| n.to_string())),
+                    ("--solver", solver.map(String::from)),
+                ]),
             ],
         })
     }
@@ -56,6 +65,7 @@ impl Given {
             rigid: config.get("rigid").and_then(|name| Some(trepan_rigid::Method::named(name)?.name())),
             points: count("rigid_points"),
             tets: count("tets"),
+            halvings: count("halvings").map(|n| n as u32),
             solver: config.get("solver").map(solver),
             still_mm: number("still_mm"),
             picture: detail.map(|detail| Picture { sparse: config["picture_sparse"] == "true", detail }),
@@ -70,6 +80,7 @@ impl Given {
             points: self.points.or(other.points),
             rigid: self.rigid.or(other.rigid),
             tets: self.tets.or(other.tets),
+            halvings: self.halvings.or(other.halvings),
             still_mm: self.still_mm.or(other.still_mm),
             solver: self.solver.or(other.solver),
             picture: self.picture.or(other.picture),
@@ -88,6 +99,7 @@ impl Given {
         Tissue {
             solver: self.solver.unwrap_or(tissue.solver),
             tets: self.tets.unwrap_or(tissue.tets),
+            halvings: self.halvings.unwrap_or(tissue.halvings),
             still_mm: self.still_mm.unwrap_or(tissue.still_mm),
         }
     }

@@ -107,7 +107,8 @@ impl Wish {
     /// With what a case folder was built from: that stands.
     pub fn on(mut self, recipe: &Recipe) -> Self {
         let spacing_mm = written(recipe.spacing_mm);
-        let as_built = Given { spacing_mm: Some(spacing_mm), tets: Some(recipe.tets), ..Given::default() };
+        let (tets, halvings) = (Some(recipe.tets), Some(recipe.halvings));
+        let as_built = Given { spacing_mm: Some(spacing_mm), tets, halvings, ..Given::default() };
         let words = [format!("voxels of {spacing_mm} mm"), format!("{} tetrahedra", recipe.tets)];
         let of_parts = self.given.words.each_mut().into_iter().zip(words);
         of_parts.for_each(|(part, what)| part.push(format!("the case folder has {what}")));
@@ -166,13 +167,15 @@ impl Wish {
             let off = |b: &f64| (a / b).ln().abs();
             all.min_by(|x, y| off(x).total_cmp(&off(y)))
         };
-        let Given { spacing_mm, rigid, tets, solver, .. } = self.given;
+        let Given { spacing_mm, rigid, tets, halvings, solver, .. } = self.given;
         rows.bone.retain(|row| rigid.is_none_or(|method| row.what.method == method));
         let spacing_mm = spacing_mm.and_then(|mm| near(mm, &mut rows.bone.iter().map(|row| row.what.spacing_mm)));
         rows.bone.retain(|row| spacing_mm.is_none_or(|mm| row.what.spacing_mm == mm));
         rows.tissue.retain(|row| solver.is_none_or(|name| row.what.solver == name));
         let tets = tets.and_then(|n| near(n as f64, &mut rows.tissue.iter().map(|row| row.what.tets as f64)));
         rows.tissue.retain(|row| tets.is_none_or(|n| row.what.tets as f64 == n));
+        let finest = rows.tissue.iter().map(|row| row.what.halvings).max();
+        rows.tissue.retain(|row| halvings.is_none_or(|n| Some(row.what.halvings) == finest.map(|most| n.min(most))));
         let scene = Scene {
             has_bone: wanted.bone && !rows.bone.is_empty(),
             has_tissue: wanted.tissue && !rows.tissue.is_empty(),
@@ -373,6 +376,7 @@ mod tests {
         let recipe = Recipe {
             spacing_mm: 0.8,
             tets: 6000,
+            halvings: 1,
             isovalue_hu: None,
             ct_series: None,
             mri_series: None,
@@ -381,6 +385,7 @@ mod tests {
         };
         let models = wish("--quality fine", None).on(&recipe).settle(&FACTS, || false, by_law).unwrap();
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.8, 6000));
+        assert_eq!(models.setup.tissue.halvings, 1);
         assert!(models.why[0].contains("the case folder has voxels of 0.8 mm; preset fine"), "{}", models.why[0]);
     }
 }

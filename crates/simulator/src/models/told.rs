@@ -39,6 +39,8 @@ pub struct TissueSummary {
     pub solver: &'static str,
     /// Tetrahedra that were asked for.
     pub tets: usize,
+    /// How often their edges are halved around the opening.
+    pub halvings: u32,
     /// What moves less in 50 ms sleeps, mm; 0 = nothing does.
     pub still_mm: f64,
     /// Why.
@@ -110,7 +112,7 @@ impl Models {
     }
 
     /// As a recording keeps them; a replay takes the first ones back.
-    pub fn entries(&self) -> [(String, String); 12] {
+    pub fn entries(&self) -> [(String, String); 13] {
         let Setup { bone, tissue, picture } = &self.setup;
         let [bone_why, tissue_why, picture_why] = self.why.clone();
         [
@@ -119,6 +121,7 @@ impl Models {
             ("spacing_mm", bone.spacing_mm.to_string()),
             ("solver", tissue.solver.to_string()),
             ("tets", tissue.tets.to_string()),
+            ("halvings", tissue.halvings.to_string()),
             ("still_mm", tissue.still_mm.to_string()),
             ("picture_sparse", picture.sparse.to_string()),
             ("picture_detail", picture.detail.to_string()),
@@ -140,6 +143,7 @@ impl Models {
             tissue: TissueSummary {
                 solver: tissue.solver,
                 tets: tissue.tets,
+                halvings: tissue.halvings,
                 still_mm: tissue.still_mm,
                 why: tissue_why,
             },

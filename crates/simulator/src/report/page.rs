@@ -1,11 +1,12 @@
 //! `report.html`: a session on one page that needs nothing else: pictures, curves from the recording, scores, the machine.
 
-use crate::models::ModelSummary;
+use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Curve, histogram, over_time};
 use crate::report::summary::Summary;
 use crate::run::Outcome;
 use base64::Engine;
 use std::fmt::Write;
+use trepan_budget::Tissue;
 use trepan_link::Recording;
 use trepan_link::wire::{SecondRecord, TickRecord};
 
@@ -48,10 +49,11 @@ pub fn html(summary: &Summary, outcome: &Outcome, recording: &Recording, shots: 
 /// What ran, and why.
 fn models(page: &mut String, summary: &Summary) {
     let ModelSummary { quality, bone, tissue, picture, .. } = &summary.models;
+    let TissueSummary { solver, tets, halvings, still_mm, .. } = *tissue;
     let rays = if picture.sparse { "sparse rays" } else { "every ray" };
     let parts = [
         ("Bone", format!("{} on {} mm voxels", bone.method, bone.spacing_mm), &bone.why),
-        ("Tissue", format!("{}, {} tetrahedra", tissue.solver, tissue.tets), &tissue.why),
+        ("Tissue", Tissue { solver, tets, halvings, still_mm }.to_string(), &tissue.why),
         ("Picture", format!("{rays}, detail {}", picture.detail), &picture.why),
     ];
     *page += &format!("<h2>Models</h2><p>Quality: {quality}.</p><ul>");

@@ -4,7 +4,7 @@
 //! Cost is that of the step that the mesh really allows, on the machine for which choices are priced; the cure's as a ratio in one run.
 //!
 //! # Practice
-//! No session takes such a mesh yet: where elements get smaller than the probe's ball, its one spring dents them deeper than one normal can say, and some turn inside out.
+//! A session takes such a mesh when it is given one (`--finer`); no plan does yet.
 
 use super::super::Scope;
 use super::case::{Case, Source};
@@ -28,15 +28,15 @@ pub fn run(scope: Scope, findings: &mut Findings) {
     let mut random = scope.random(super::SEED + 9100);
     for &source in scope.pick(&[Source::BuiltIn][..], &[Source::BuiltIn, Source::MadeUp]) {
         let case = Case::of(source, &mut random);
-        let unit = Tissue { solver: "tled", tets: TETS[0], still_mm: 0.0 };
+        let unit = Tissue { solver: "tled", tets: TETS[0], halvings: 0, still_mm: 0.0 };
         let brains = Brains::of(&case.brain, &[unit]).expect("the brain can be filled");
         for n in 0..scope.pick(1, 4) {
             let (situation, _) = super::stretch(&case, &mut random);
             let truth = if scope.quick { Fineness::QUICK } else { Fineness::JUDGE };
-            let push = Push::of(&case.brain, &situation.push(&case), &brains, truth).expect("the brain is sound");
+            let push = Push::of(&situation.push(&case), &brains, truth).expect("the brain is sound");
             let motion_mm = situation.scene.tissue_motion_mm;
             if n == 0 && !scope.quick {
-                let finer = Push::of(&case.brain, &situation.push(&case), &brains, FINER).expect("the brain is sound");
+                let finer = Push::of(&situation.push(&case), &brains, FINER).expect("the brain is sound");
                 findings.rows.push(
                     Row::new(format!("truth in tissue, {}", case.name), "an eighth of the edge at the opening, cured")
                         .with("motion_mm", motion_mm)
@@ -50,8 +50,7 @@ pub fn run(scope: Scope, findings: &mut Findings) {
                     continue;
                 }
                 let found = [false, true].map(|cure| {
-                    push.measure_finer(&case.brain, &brains, Fineness { tets, halvings }, cure)
-                        .expect("the brain is sound")
+                    push.measure_finer(&brains, Fineness { tets, halvings }, cure).expect("the brain is sound")
                 });
                 let cured_over = (found[1].ns / found[0].ns).max(1.0);
                 for (found, over, cure) in [(found[0], 1.0, ""), (found[1], cured_over, ", cured")] {

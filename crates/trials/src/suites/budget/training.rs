@@ -89,7 +89,7 @@ fn unit_us() -> f64 {
 }
 
 fn pushed(case: &Case, situation: &Situation, choices: &[Tissue], brains: &Brains) -> Seen {
-    let push = Push::of(&case.brain, &situation.push(case), brains, Fineness::JUDGE);
+    let push = Push::of(&situation.push(case), brains, Fineness::JUDGE);
     let found = push.and_then(|push| push.measure(brains)).expect("the brain is sound");
     Seen {
         features: situation.scene.tissue_features(),

@@ -40,7 +40,7 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
 fn scene(case: &Case, brains: &Brains, truth: Fineness, random: &mut fastrand::Rng) -> (Situation, Stretch, Push) {
     loop {
         let (situation, stretch) = super::stretch(case, random);
-        let push = Push::of(&case.brain, &situation.push(case), brains, truth).expect("the brain is sound");
+        let push = Push::of(&situation.push(case), brains, truth).expect("the brain is sound");
         if push.moved_mm() >= LEAST_MM {
             return (situation, stretch, push);
         }

@@ -17,6 +17,7 @@ pub fn recipe() -> Recipe {
     Recipe {
         spacing_mm: 1.0,
         tets: 12_000,
+        halvings: 0,
         isovalue_hu: None,
         ct_series: None,
         mri_series: None,
