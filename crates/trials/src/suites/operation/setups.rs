@@ -15,8 +15,10 @@ pub struct Candidate {
 
 /// The finest run: voxels and tetrahedra that nothing is held against.
 pub fn truth(scope: Scope) -> Candidate {
-    let flags =
-        scope.pick("--quality fine --spacing-mm 0.5 --tets 40000", "--quality fine --spacing-mm 0.4 --tets 100000");
+    let flags = scope.pick(
+        "--quality fine --spacing-mm 0.5 --tets 12000 --finer 2",
+        "--quality fine --spacing-mm 0.4 --tets 50000 --finer 2",
+    );
     Candidate { name: "truth", flags, touch: Config::default() }
 }
 
@@ -41,6 +43,9 @@ pub fn all(scope: Scope) -> Vec<Candidate> {
             ("3000 tetrahedra", "--quality usual --tets 3000", Config::default()),
             ("8000 tetrahedra", "--quality usual --tets 8000", Config::default()),
             ("24000 tetrahedra", "--quality usual --tets 24000", Config::default()),
+            ("3000, edges 1/4 at the opening", "--quality usual --tets 3000 --finer 2", Config::default()),
+            ("8000, edges 1/4 at the opening", "--quality usual --tets 8000 --finer 2", Config::default()),
+            ("24000, edges 1/4 at the opening", "--quality usual --tets 24000 --finer 2", Config::default()),
             ("position based", "--quality usual --solver xpbd", Config::default()),
             ("masses and springs", "--quality usual --solver mass-spring", Config::default()),
         ]);
