@@ -1,4 +1,4 @@
-//! Tissue classes inside the brain: which label volumes say so,.
+//! Tissue classes inside the brain, and which label volumes say so.
 //!
 //! # Practice
 //! The brain's class volume holds [`TissueClass::code`]s: 0 outside, 1 brain, more where a label volume names it. Later sources lie over
