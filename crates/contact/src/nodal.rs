@@ -11,7 +11,7 @@
 //! ```
 //!
 //! # Practice
-//! The spring enters the solver's stable bound: its effective stiffness per node is `k wᵢ`. Weights may have signs: +1 on a node and -wⱼ on the
+//! Explicit solvers take it implicitly, at any stiffness; `linear` and `mass-spring` whole, at the cost of their stability. Weights may have signs: +1 on a node and -wⱼ on the
 //! triangle that it went through make a spring between two parts of the tissue.
 
 use trepan_geometry::Vec3;

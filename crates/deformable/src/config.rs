@@ -13,7 +13,7 @@ pub struct Config {
     pub points: usize,
     /// Edge of a grid cell, mm, for the methods with a grid; `None` takes 1.45 x the mean edge of the mesh.
     pub cell_mm: Option<f32>,
-    /// Contact spring between tool and tissue, N/mm. Higher feels harder and lowers the solver's stable step.
+    /// Contact spring between tool and tissue, N/mm. Higher feels harder.
     pub stiffness: f32,
     /// Contact damper along the normal, N ms/mm.
     pub damping: f32,

@@ -26,7 +26,7 @@ pub struct SlidingWall {
     patches: Vec<Vec<u32>>,
     /// How deep each node may be in the wall without being pushed, mm.
     granted_mm: Vec<f32>,
-    /// Spring between tissue and wall, N/mm for each patch. Higher lets less in, and lowers the solver's stable step.
+    /// Spring between tissue and wall, N/mm for each patch. Higher lets less in.
     pub stiffness: f32,
     /// Damping along the normal, N ms/mm.
     pub damping: f32,

@@ -68,7 +68,7 @@ impl ImplicitSprings {
                 continue;
             }
             self.calm(spring, step, &free, &mut add);
-            let force = self.force_of(spring, step, &free);
+            let force = self.force_of(spring, depth, step, &free);
             sum += force;
             for (n, w) in spring.nodes() {
                 if let Some(moved) = self.moved.get_mut(n as usize) {
@@ -120,7 +120,7 @@ impl ImplicitSprings {
         spring.offset_mm + known.map(|(n, w)| w * free(n).position.dot(spring.normal)).sum::<f32>()
     }
 
-    fn force_of(&self, spring: &NodalContact, step: Gain, free: &impl Fn(u32) -> FreeNode) -> f32 {
+    fn force_of(&self, spring: &NodalContact, depth: f32, step: Gain, free: &impl Fn(u32) -> FreeNode) -> f32 {
         let (mut coming, mut compliance) = (0.0, 0.0);
         for (n, w) in spring.nodes() {
             let Some(moved) = self.moved.get(n as usize) else { continue };
@@ -129,7 +129,7 @@ impl ImplicitSprings {
             compliance += w * w * node.inverse_mass;
         }
         let held = 1.0 + step.gain_ms * (spring.stiffness * step.dt_ms + spring.damping) * compliance;
-        let (depth, closing) = (self.depth_of(spring, free), coming - spring.tool_normal_velocity);
+        let closing = coming - spring.tool_normal_velocity;
         let force = (spring.stiffness * (depth + step.dt_ms * coming) + spring.damping * closing) / held;
         if force.is_finite() && force > 0.0 { force } else { 0.0 }
     }

@@ -10,7 +10,7 @@ pub struct Config {
     /// How motion dies away.
     pub damping: Damping,
     /// Share of the true stable bound that a step may use, over 0 and below 1. The rest is for elements that stiffen as they are
-    /// compressed, and for the tool's spring.
+    /// compressed; springs of contact are implicit and need none of it.
     pub safety: f32,
     /// Most substeps in one call, taken when `dt_ms` is over the stable bound of the body as it is deformed now; a `dt_ms` that needs more is
     /// shortened, and the rest counted as skipped. 0 = obey `dt_ms` even where
