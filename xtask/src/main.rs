@@ -4,6 +4,7 @@ mod layers;
 mod merge;
 mod operation;
 mod tidy;
+mod validation;
 
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
@@ -22,7 +23,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Everything that CI runs: fmt, layers, tidy, clippy, a short headless operation, tests, doc tests, docs
+    /// Everything that CI runs: fmt, layers, tidy, clippy, a short headless operation, tests, doc tests, docs, the quick validation
     Test,
     /// Run validation suites in release mode; writes SUITE.json and index.html
     Validate {
@@ -99,6 +100,7 @@ fn test() -> Result<()> {
     tests()?;
     cargo(&["test", "--workspace", "--doc", "--quiet"], &[])?;
     documentation()?;
+    validation::check(&root())?;
     println!("xtask test: all passed");
     Ok(())
 }

@@ -62,11 +62,14 @@ impl Plan {
         self.bone.is_none_or(|c| c.in_time) && self.tissue.is_none_or(|c| c.in_time) && self.picture.in_time
     }
 
-    /// Solver step, ms, and mean edge of the tetrahedra, mm, by their number and halvings alone.
+    /// Solver step, ms, and mean edge of the tetrahedra, mm, by their number; the step of TLED is what its cost in these rows comes from, light and slender elements included.
     pub fn step_and_edge(&self) -> Option<(f64, f64)> {
-        let tissue = self.tissue?.what;
-        let step_ms = dt_ms(&self.scene, &tissue) / f64::from(1 << tissue.halvings);
-        Some((step_ms, edge_mm(self.scene.brain_mm3, tissue.tets)))
+        let Choice { what, cost, .. } = self.tissue?;
+        let step_ms = match what.solver {
+            "tled" => what.tets as f64 * self.machine.ns_per_tet_step * 1e-6 / cost,
+            _ => dt_ms(&self.scene, &what),
+        };
+        Some((step_ms, edge_mm(self.scene.brain_mm3, what.tets)))
     }
 }
 

@@ -48,7 +48,7 @@ impl Default for Scene {
     fn default() -> Self {
         Self {
             force_error_n: 0.4,
-            displacement_mm: 3.3,
+            displacement_mm: 1.75,
             picture_error_percent: 1.0,
             has_bone: true,
             has_tissue: true,

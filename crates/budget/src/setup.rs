@@ -54,7 +54,7 @@ pub enum Quality {
     Auto,
     /// For slow machines and first looks.
     Draft,
-    /// What sessions had before there was a plan.
+    /// What most machines run with ease.
     Usual,
     /// For fast machines.
     Fine,
@@ -66,16 +66,16 @@ impl Quality {
 
     /// The setup; `None` for [`Auto`](Self::Auto), which needs a scene and a machine.
     pub fn preset(self) -> Option<Setup> {
-        let setup = |spacing_mm, tets, still_mm, sparse, detail| Setup {
+        let setup = |spacing_mm, tets, sparse, detail| Setup {
             bone: Bone { method: "distance-field", spacing_mm, points: 0 },
-            tissue: Tissue { solver: "tled", tets, halvings: 0, still_mm },
+            tissue: Tissue { solver: "tled", tets, halvings: 2, still_mm: 0.0 },
             picture: Picture { sparse, detail },
         };
         Some(match self {
             Self::Auto => return None,
-            Self::Draft => setup(1.5, 5_000, 0.01, true, 0.5),
-            Self::Usual => setup(1.0, 12_000, 0.0, false, 1.0),
-            Self::Fine => setup(0.5, 30_000, 0.0, false, 1.0),
+            Self::Draft => setup(1.5, 3_000, true, 0.5),
+            Self::Usual => setup(1.0, 8_000, false, 1.0),
+            Self::Fine => setup(0.5, 20_000, false, 1.0),
         })
     }
 
@@ -135,10 +135,12 @@ mod tests {
         let (draft, usual, fine) = (draft.unwrap(), usual.unwrap(), fine.unwrap());
         assert!(draft.bone.spacing_mm > usual.bone.spacing_mm && usual.bone.spacing_mm > fine.bone.spacing_mm);
         assert!(draft.tissue.tets < usual.tissue.tets && usual.tissue.tets < fine.tissue.tets);
-        assert_eq!(usual.to_string(), "distance-field on 1 mm voxels; tled with 12000 tetrahedra; every ray");
-        assert_eq!(draft.tissue.to_string(), "tled with 5000 tetrahedra, what moves over 0.01 mm");
-        let finer = Tissue { halvings: 2, still_mm: 0.0, ..draft.tissue };
-        assert_eq!(finer.to_string(), "tled with 5000 tetrahedra, edges 1/4 at the opening");
+        assert_eq!(
+            usual.to_string(),
+            "distance-field on 1 mm voxels; tled with 8000 tetrahedra, edges 1/4 at the opening; every ray"
+        );
+        let alike = Tissue { halvings: 0, still_mm: 0.01, ..draft.tissue };
+        assert_eq!(alike.to_string(), "tled with 3000 tetrahedra, what moves over 0.01 mm");
         assert_eq!(draft.picture.to_string(), "sparse rays at 0.5 of the pixels along an edge");
     }
 }

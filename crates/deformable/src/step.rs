@@ -3,7 +3,7 @@
 use crate::{
     Config, ConfigError,
     narrow::Hits,
-    response::{Friction, Responder, Shaft, Spring, finish},
+    response::{Friction, Responder, Shaft, Spring, finish, finish_waiting},
     scene::Scene,
     search::Search,
     surface::MovingSurface,
@@ -63,12 +63,11 @@ impl Default for TissueStep {
 }
 
 impl TissueStep {
-    /// Back to no contact, counters kept.
+    /// Back to no contact; counters and springs that wait are kept.
     pub(crate) fn forget_contact(&mut self) {
         self.manifold.clear();
         self.patch = SurfacePatch { time_ms: self.patch.time_ms, tip_mm: self.patch.tip_mm, ..SurfacePatch::default() };
         self.nodal = NodalContact::none();
-        self.dents.clear();
         self.friction_n = Vec3::ZERO;
     }
 
@@ -173,7 +172,7 @@ impl TissueCollision {
         count(&self.hits, out);
         match self.responder.respond(&scene, &self.hits, &mut self.surface, out) {
             Some(answer) => finish(&scene, &answer, self.spring, out),
-            None => out.forget_contact(),
+            None => finish_waiting(&scene, self.spring, out),
         }
         out.friction_n = self.friction.drag(&scene, self.friction_coefficient, out);
         if let Some(shaft) = &mut self.shaft
@@ -197,6 +196,7 @@ impl TissueCollision {
         self.hits.clear();
         out.patch = SurfacePatch { time_ms: tool.time_ms, tip_mm: tool.tip(), ..SurfacePatch::default() };
         out.forget_contact();
+        out.dents.clear();
         (out.shaft, out.shaft_nodal) = (Contact::default(), NodalContact::none());
         (out.points_in_contact, out.tests, out.overflow, out.skipped, out.stale) = (0, 0, 0, 0, 0);
     }

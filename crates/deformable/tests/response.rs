@@ -213,6 +213,31 @@ fn the_springs_under_a_ball_are_together_as_strong_as_one_and_take_its_shape() {
     }
 }
 
+/// A triangle that comes back to the ball between two steps meets its spring, whether the ball touches elsewhere or only hovers; where nothing moves it feels nothing.
+#[test]
+fn springs_wait_around_the_ball_and_over_tissue_that_it_does_not_touch() {
+    let mesh = block([16, 16, 6], 1.0);
+    let mut collision = collision(&mesh, Method::Walk);
+    let still = vec![Vec3::ZERO; mesh.positions.len()];
+    let risen: Vec<Vec3> = mesh.positions.iter().map(|p| *p + 0.3 * Vec3::Z).collect();
+    for over_mm in [0.1, -0.2] {
+        let out = step_at(&mut collision, &mesh, Vec3::new(8.3, 7.9, 6.0 + RADIUS + over_mm));
+        let depth_of =
+            |s: &trepan_contact::NodalContact| s.offset_mm + s.mean(|n| mesh.positions[n as usize]).dot(s.normal);
+        let waiting = out.dents.iter().filter(|s| depth_of(s) <= 0.0).count();
+        assert!(waiting >= 4, "{waiting} springs wait {over_mm} mm over the block");
+        assert_eq!(out.manifold.touches(), over_mm < 0.0);
+        let pushed = |positions: &[Vec3]| out.push(positions, &still, &mut vec![Vec3::ZERO; mesh.positions.len()]);
+        let felt = 0.3 * out.manifold.depth_mm;
+        assert!((pushed(&mesh.positions).length() - felt).abs() < 1e-3, "at rest they must not press");
+        let risen_n = pushed(&risen).z;
+        // For the one step until they are found anew they may together be stiffer than the ball's spring, though not much.
+        let linear_n = 0.3 * (0.3 - over_mm);
+        assert!(risen_n > felt + 0.01 && risen_n < 3.0 * linear_n, "{risen_n} N after {felt} N");
+    }
+    assert!(step_at(&mut collision, &mesh, Vec3::new(8.3, 7.9, 6.0 + 1.5 * RADIUS)).dents.is_empty());
+}
+
 /// Two blocks with a gap of 3 mm and a ball of 4 mm between: the walls cancel, a shift to one side is pushed back.
 #[test]
 fn in_a_groove_opposite_walls_cancel() {

@@ -116,10 +116,10 @@ pub struct Patient {
     /// Edge of a skull voxel, mm [default: by --quality; 1 for `case build`]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub spacing_mm: Option<f32>,
-    /// Tetrahedra of the brain, met within a tenth [default: by --quality; 12000 for `case build`]
+    /// Tetrahedra of the brain, met within a tenth [default: by --quality; 8000 for `case build`]
     #[arg(long, value_name = "N")]
     pub tets: Option<usize>,
-    /// How often their edges are halved within 10 mm of the opening, of the same number [default: by --quality; 0 for `case build`]
+    /// How often their edges are halved within 10 mm of the opening, of the same number [default: by --quality; 2 for `case build`]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=3))]
     pub finer: Option<u32>,
     /// Move the MRI (and labels) to where they fit the CT, by mutual information
@@ -178,7 +178,7 @@ pub struct Tolerances {
     /// Error of the force on bone that 95 of 100 ticks stay within, N [default: 0.4]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub force_error_n: Option<f64>,
-    /// Error of the brain's displacement near the tool, mm [default: 3.3]
+    /// Error of the brain's displacement near the tool, mm [default: 1.75]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub displacement_mm: Option<f64>,
     /// Error of the picture, percent of white [default: 1]
@@ -235,7 +235,7 @@ impl Patient {
     /// Refuses numbers that make no sense.
     pub fn check(&self) -> Result<(), String> {
         within("spacing-mm", self.spacing_mm.unwrap_or(1.0).into(), 0.2, 4.0)?;
-        within("tets", self.tets.unwrap_or(12_000) as f64, 500.0, 1e6)?;
+        within("tets", self.tets.unwrap_or(8_000) as f64, 500.0, 1e6)?;
         within("isovalue-hu", self.isovalue_hu.unwrap_or(0).into(), -900.0, 3000.0)
     }
 }

@@ -6,6 +6,7 @@ use crate::case::scene::{RestBrain, Scene};
 use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
 use crate::hand::Feel;
+use crate::measure::tissue::MASS_ADDED;
 use crate::models::{BONE_STIFFNESS, FASTEST, Models, rigid_of, solver_named};
 use crate::operation::Operation;
 use crate::options::Options;
@@ -46,9 +47,6 @@ pub struct Table {
     /// What the solver `fastest` turned out to be.
     fastest: OnceLock<&'static str>,
 }
-
-/// Most mass that is added to the elements with the shortest steps, as a share of the brain's.
-const MASS_ADDED: f32 = 0.01;
 
 impl Table {
     /// Lays a case on the table. `filmed`: the window will go to and fro in the bone that is shown, so a second one is carved.
@@ -158,7 +156,6 @@ impl Table {
         }
         let config = trepan_tled::Config {
             still_mm: still_mm as f32,
-            // Lifts the slivers and the light nodes of what is finer at the opening; weight stays.
             mass_scaling: MASS_ADDED,
             ..trepan_tled::Config::default()
         };

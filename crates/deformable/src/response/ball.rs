@@ -52,6 +52,8 @@ const MAX_DENTS: usize = 128;
 const SAME_SIDE: f32 = 0.34;
 /// Every fourth point inside is sampled: the shell is even, so a quarter of it is too.
 const SAMPLE_EVERY: usize = 4;
+/// How far around the ball triangles get springs, radii.
+const WAITING: f32 = 0.25;
 /// Normals blend over this many radii.
 const BLEND: f32 = 0.5;
 
@@ -70,7 +72,7 @@ impl Ball {
         self.anchor = NONE;
     }
 
-    /// Fills manifold list and nodes; the answer is `None` when the ball does not touch.
+    /// Fills manifold list and nodes; the answer is `None` when the ball does not touch, though springs may wait.
     pub(crate) fn respond(
         &mut self,
         scene: &Scene,
@@ -82,6 +84,10 @@ impl Ball {
         self.anchor = touch.as_ref().map_or(NONE, |(sample, _)| sample.triangle);
         let (centre, depth_mm) = touch?;
         self.pressed.clear();
+        if depth_mm <= 0.0 {
+            self.wait(scene, surface, out);
+            return None;
+        }
         let mut sum = Sum::default();
         sum.add(depth_mm, centre.normal);
         self.press(surface, &centre, depth_mm, out);
@@ -95,6 +101,9 @@ impl Ball {
                 let normal = sample.normal.normalize_or_zero();
                 out.manifold.push(Contact { point: p, normal, depth_mm: sample.distance });
             }
+        }
+        if hits.tet[scene.centre()] == NONE {
+            self.wait(scene, surface, out);
         }
         let fallback = surface.flat_normal(scene.positions, centre.triangle);
         Some(sum.answer(depth_mm, fallback))
@@ -120,7 +129,22 @@ impl Ball {
         self.pressed.push(sample.triangle);
     }
 
-    /// What the surface says about the ball's centre, and the ball's depth there.
+    /// Gives springs to the triangles around those under the samples, as deep as the ball is over each, also where that is a little less than nothing: a triangle that a spring has
+    /// pushed out from under the samples would else be free until the next step, come back, be pushed out again, and the hand would feel it.
+    fn wait(&mut self, scene: &Scene, surface: &MovingSurface, out: &mut TissueStep) {
+        for sample in self.near.within(scene.tool.tip(), (1.0 + WAITING) * scene.radius_mm) {
+            if self.pressed.contains(&sample.triangle) || self.pressed.len() == MAX_DENTS {
+                continue;
+            }
+            let mut spring = NodalContact::none();
+            let nodes = surface.triangles[sample.triangle as usize];
+            dent(&mut spring, nodes, sample.weights, scene.radius_mm - sample.distance, sample.normal);
+            out.dents.push(spring);
+            self.pressed.push(sample.triangle);
+        }
+    }
+
+    /// What the surface says about the ball's centre, and the ball's depth there, which is less than nothing where it only comes near.
     fn touch(
         &mut self,
         scene: &Scene,
@@ -133,7 +157,7 @@ impl Ball {
         let jumped = self.last_centre.distance(centre) > scene.radius_mm;
         self.last_centre = centre;
         let foot = match (inside, self.anchor) {
-            (false, _) => surface.closest_here(positions, centre, scene.radius_mm),
+            (false, _) => surface.closest_here(positions, centre, (1.0 + WAITING) * scene.radius_mm),
             (true, NONE) => surface.closest(positions, centre),
             (true, _) if jumped => surface.closest(positions, centre),
             (true, anchor) => surface.descend(positions, anchor, centre),
@@ -144,7 +168,7 @@ impl Ball {
         self.keep_touched_side(scene, surface, &foot);
         let sample = self.near.sample(centre, BLEND * scene.radius_mm)?;
         let depth_mm = signed(sample.distance);
-        (depth_mm > 0.0).then_some((sample, depth_mm))
+        Some((sample, depth_mm))
     }
 
     /// Where triangles matter: as far from the centre as the closest one, as far from the points inside as they are deep, and further as normals

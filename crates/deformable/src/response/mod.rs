@@ -96,6 +96,7 @@ pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut T
     let sound =
         answer.depth_mm > 0.0 && answer.depth_mm.is_finite() && answer.normal.is_normalized() && place.is_finite();
     if !sound || out.nodal.is_empty() {
+        out.dents.clear();
         return out.forget_contact();
     }
     let tool_velocity = scene.tool_velocity_at(place).dot(answer.normal);
@@ -104,7 +105,8 @@ pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut T
     out.nodal.offset_mm = answer.depth_mm - place.dot(answer.normal);
     (out.nodal.stiffness, out.nodal.damping) = (spring.stiffness, spring.damping);
     out.nodal.tool_normal_velocity = finite_or_zero(tool_velocity);
-    finish_dents(scene, answer, spring, &mut out.dents);
+    let whole: Vec3 = out.dents.iter().map(|dent| dent.normal).sum();
+    finish_dents(scene, answer.depth_mm / whole.length().max(f32::MIN_POSITIVE), spring, &mut out.dents);
     out.patch = SurfacePatch {
         time_ms: scene.tool.time_ms,
         normal: answer.normal,
@@ -117,26 +119,36 @@ pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut T
 /// Time in which the corners of a pressed triangle come to move alike, ms: what is found anew every millisecond must not make light nodes ring.
 const CALM_MS: f32 = 2.0;
 
-/// Adds a place under the ball to the springs: of a spring's weights, normal and stiffness are the sums over its places so far, of the weights and normals by
-/// depth, of the stiffness by number.
+/// Adds a place under the ball to the springs: of a spring's weights, normal, depth and stiffness are the sums over its places so far, of the weights and normals by
+/// depth, of the stiffness by number. A place that is not deep counts for its direction alone.
 pub(crate) fn dent(spring: &mut NodalContact, nodes: [u32; 3], weights: [f32; 3], depth_mm: f32, normal: Vec3) {
+    let load_mm = depth_mm.max(LEAST_LOAD_MM);
     let pressed = nodes.into_iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
-    pressed.for_each(|(node, weight)| spring.add(node, weight * depth_mm));
-    spring.normal += depth_mm * normal;
+    pressed.for_each(|(node, weight)| spring.add(node, weight * load_mm));
+    spring.normal += load_mm * normal;
+    spring.offset_mm += depth_mm;
     spring.stiffness += 1.0;
 }
 
-/// Makes springs of the sums: each as deep as its places in the mean, and all together as strong as the answer.
-fn finish_dents(scene: &Scene, answer: &Answer, spring: Spring, dents: &mut NodalContacts) {
-    let whole: Vec3 = dents.iter().map(|dent| dent.normal).sum();
+/// What a place counts for that is not deep, mm.
+const LEAST_LOAD_MM: f32 = 1e-4;
+
+/// Writes that nothing touches; springs may wait, all together as strong as one.
+pub(crate) fn finish_waiting(scene: &Scene, spring: Spring, out: &mut TissueStep) {
+    out.forget_contact();
+    let places: f32 = out.dents.iter().map(|dent| dent.stiffness).sum();
+    finish_dents(scene, 1.0 / places.max(1.0), spring, &mut out.dents);
+}
+
+/// Makes springs of the sums: each as deep as its places in the mean, and with this share of the stiffness for each place.
+fn finish_dents(scene: &Scene, share: f32, spring: Spring, dents: &mut NodalContacts) {
     let parts: f32 = dents.iter().map(|dent| dent.normal.length()).sum();
-    let share = answer.depth_mm / whole.length().max(f32::MIN_POSITIVE);
     for dent in dents.iter_mut() {
-        let (load_mm, places) = (dent.normal, dent.stiffness);
+        let (load_mm, depth_mm, places) = (dent.normal, dent.offset_mm, dent.stiffness);
         dent.normalise();
         dent.normal = load_mm.normalize_or_zero();
         let place = dent.mean(|n| scene.positions[n as usize]);
-        dent.offset_mm = load_mm.length() / places - place.dot(dent.normal);
+        dent.offset_mm = depth_mm.min(load_mm.length()) / places - place.dot(dent.normal);
         dent.stiffness = spring.stiffness * share * places;
         dent.damping = spring.damping * load_mm.length() / parts.max(f32::MIN_POSITIVE);
         dent.calm_ms = CALM_MS;

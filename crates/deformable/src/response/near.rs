@@ -93,6 +93,17 @@ impl Near {
         Some(Sample { triangle: triangle.number, weights, distance: nearest, normal })
     }
 
+    /// What every triangle within a distance of `p` says by itself, its normal its own.
+    pub(crate) fn within(&self, p: Vec3, reach_mm: f32) -> impl Iterator<Item = Sample> + '_ {
+        let near = self.triangles.iter().filter(move |triangle| triangle.at_least2(p) < reach_mm * reach_mm);
+        let alone = near.map(move |triangle| {
+            let weights = triangle::closest_weights(triangle.corners, p);
+            let distance = triangle.point(weights).distance(p);
+            Sample { triangle: triangle.number, weights, distance, normal: triangle.normal }
+        });
+        alone.filter(move |sample| sample.distance < reach_mm)
+    }
+
     fn blended(&self, nearest: f32, blend_mm: f32) -> Vec3 {
         let (mut sum, mut total) = (Vec3::ZERO, 0.0);
         for &(distance, t) in &self.close {

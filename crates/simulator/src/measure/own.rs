@@ -4,7 +4,7 @@
 //! A law says what a choice's error is in a case like this; here it is looked at. Each choice for bone (of the recommended method, unless another is given) is led over three slides from the opening and cuts in once, against fine voxels of the same CT; the worst
 //! counts. TLED on each mesh is pushed and led along the brain, against a mesh that is eight times finer there. Each choice for the picture is drawn once from where the eye starts, against every ray. The hand will go other ways and the eye will move, so what is found is
 //! believed with a margin. A mesh that is lucky under one slide need not be under the next, nor a voxel size: of tissue and bone the case says how far all choices are off, and half of which is better; the laws say
-//! the other half. The margins are those with which, over 40 scenes and all tolerances of `cargo xtask validate budget --seed 11`, 98 % of what tissue and picture ask is met; more costs more than it mends.
+//! the other half. The margins are those with which, over 40 scenes and all tolerances of `cargo xtask validate budget --seed 11`, 97 % of what tissue asks and 98 % of what the picture asks is met; more costs more than it mends.
 //!
 //! # Practice
 //! 26 s of one core, 17 s of two, tissue beside the rest; what is found does not depend on the tolerances, so it is kept with the case. What cannot be measured is left to the laws.
@@ -22,13 +22,13 @@ use trepan_rigid::Method;
 use trepan_volume::BoneVolume;
 
 /// Goes up when what is found changes for the same case and choices.
-const FORM: u32 = 4;
+const FORM: u32 = 5;
 /// Ways along the bone, evenly around the opening.
 const SLIDES: usize = 3;
 /// Length of each, mm.
 const SLIDE_MM: f32 = 5.0;
 /// How much larger errors may be on other ways: bone costs little, tissue and picture much.
-const MARGIN: [f64; 3] = [1.4, 1.16, 1.15];
+const MARGIN: [f64; 3] = [1.4, 1.3, 1.15];
 
 /// What there is to look at.
 #[derive(Clone, Debug)]

@@ -20,6 +20,8 @@ use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Tetrahedra of the whole brain.
 const TETS: [usize; 7] = [3_000, 5_000, 8_000, 12_000, 20_000, 30_000, 50_000];
+/// Meshes that are finer at the opening: tetrahedra of the whole brain, and how often edges are halved there.
+const FINER: ([usize; 5], [u32; 2]) = ([3_000, 5_000, 8_000, 12_000, 20_000], [1, 2]);
 /// Meshes with a region of interest, and its limit of motion, mm.
 const STILL: ([usize; 2], f64) = ([5_000, 12_000], 0.01);
 /// Meshes that rivals of TLED can step in real time.
@@ -42,6 +44,8 @@ impl Fineness {
 
 /// Radius of what is finer in a mesh that a session could step, mm.
 pub const OPENING_MM: f32 = 10.0;
+/// Most mass that TLED adds to the elements with the shortest steps, slivers and what is finer at the opening, as a share of the brain's; weight stays.
+pub const MASS_ADDED: f32 = 0.01;
 /// Radius of what is finer in a truth, mm.
 const TRUTH_MM: f32 = 14.0;
 /// What a sleeping tetrahedron costs.
@@ -62,10 +66,14 @@ const HELD: f32 = 0.35;
 /// Every choice.
 pub fn choices() -> Vec<Tissue> {
     let choice = |solver, tets, still_mm| Tissue { solver, tets, halvings: 0, still_mm };
+    let finer = |halvings| FINER.0.map(|tets| Tissue { halvings, ..choice("tled", tets, 0.0) });
     let names = Method::all().into_iter().filter(|m| m.name() != "reference").map(|m| m.name());
     let rivals = names.flat_map(|solver| RIVALS_TETS.map(|tets| choice(solver, tets, 0.0)));
     let tled = TETS.map(|tets| choice("tled", tets, 0.0)).into_iter();
-    tled.chain(STILL.0.map(|tets| choice("tled", tets, STILL.1))).chain(rivals).collect()
+    tled.chain(FINER.1.into_iter().flat_map(finer))
+        .chain(STILL.0.map(|tets| choice("tled", tets, STILL.1)))
+        .chain(rivals)
+        .collect()
 }
 
 /// What a choice came to.
@@ -140,19 +148,21 @@ impl<'a> Brains<'a> {
         let body = Body::uniform(mesh.clone(), held(mesh), self.shape.material);
         match Method::named(choice.solver) {
             Some(method) => Ok(Box::new(method.build(&body).map_err(of_brain)?)),
-            None => {
-                let config = Config { still_mm: choice.still_mm as f32, damping: self.damping, ..Config::default() };
-                Ok(Box::new(Tled::new(&body, &config).map_err(of_brain)?))
-            }
+            None => Ok(Box::new(self.tled(&body, Config { still_mm: choice.still_mm as f32, ..Config::default() })?)),
         }
     }
-}
 
-/// TLED with or without its cure of locking.
-fn cured(brains: &Brains, mesh: &TetMesh, cure_locking: bool) -> Result<Tled, SessionError> {
-    let body = Body::uniform(mesh.clone(), held(mesh), brains.shape.material);
-    let config = Config { cure_locking, damping: brains.damping, ..Config::default() };
-    Tled::new(&body, &config).map_err(of_brain)
+    /// TLED with or without its cure of locking.
+    fn cured(&self, mesh: &TetMesh, cure_locking: bool) -> Result<Tled, SessionError> {
+        let body = Body::uniform(mesh.clone(), held(mesh), self.shape.material);
+        self.tled(&body, Config { cure_locking, ..Config::default() })
+    }
+
+    /// TLED as a session steps it.
+    fn tled(&self, body: &Body, config: Config) -> Result<Tled, SessionError> {
+        let config = Config { mass_scaling: MASS_ADDED, damping: self.damping, ..config };
+        Tled::new(body, &config).map_err(of_brain)
+    }
 }
 
 fn filled(shape: &Shape, target_tets: usize, fine: Option<lattice::Fine>) -> Result<TetMesh, SessionError> {
@@ -214,7 +224,7 @@ impl Push {
         let normal = (0..12).map(around).sum::<Vec3>().try_normalize().unwrap_or(slide.outward);
         let mut push = Self { slide: *slide, normal, points: points(shape, slide.place), truth: Vec::new() };
         let mesh = push.finer(shape, truth, TRUTH_MM)?;
-        push.truth = push.run(&mesh, &mut cured(brains, &mesh, true)?, LONGEST_MS[0]).0;
+        push.truth = push.run(&mesh, &mut brains.cured(&mesh, true)?, LONGEST_MS[0]).0;
         Ok(push)
     }
 
@@ -230,7 +240,7 @@ impl Push {
     /// When the mask cannot be filled.
     pub fn measure_finer(&self, brains: &Brains, fineness: Fineness, cure: bool) -> Result<Found, SessionError> {
         let mesh = self.finer(brains.shape, fineness, OPENING_MM)?;
-        Ok(self.found(&mesh, &mut cured(brains, &mesh, cure)?, LONGEST_MS[0]))
+        Ok(self.found(&mesh, &mut brains.cured(&mesh, cure)?, LONGEST_MS[0]))
     }
 
     /// Every choice, in the order of the brains.

@@ -53,7 +53,7 @@ impl Given {
         })
     }
 
-    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is usual.
+    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is usual, but tetrahedra were alike everywhere.
     pub fn recorded(config: &BTreeMap<String, String>) -> Self {
         let number = |key: &str| config.get(key)?.parse::<f64>().ok().filter(|value| value.is_finite());
         let count = |key: &str| config.get(key)?.parse::<usize>().ok();
@@ -65,7 +65,7 @@ impl Given {
             rigid: config.get("rigid").and_then(|name| Some(trepan_rigid::Method::named(name)?.name())),
             points: count("rigid_points"),
             tets: count("tets"),
-            halvings: count("halvings").map(|n| n as u32),
+            halvings: count("halvings").or(count("tets").map(|_| 0)).map(|n| n as u32),
             solver: config.get("solver").map(solver),
             still_mm: number("still_mm"),
             picture: detail.map(|detail| Picture { sparse: config["picture_sparse"] == "true", detail }),

@@ -12,7 +12,7 @@ pub use recording::record_all;
 
 use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
-use ride::{Ride, ride};
+use ride::{Ride, START, ride};
 use scene::{PATHS, Scene};
 use trepan_deformable::Method;
 use trepan_geometry::Vec3;
@@ -85,8 +85,8 @@ fn recorded(scope: Scope, findings: &mut Findings) {
 fn follow(scene: &Scene, place: &str, tips: &[Vec3], in_time: bool, findings: &mut Findings) {
     let steps = tips.len();
     let truth = Truth::along(scene, tips);
-    // Methods that follow every tetrahedron repeat themselves: on large meshes some steps say all.
-    let enough = (STEPS_TIMES_TETS / scene.mesh.tets.len()).clamp(30, steps);
+    // Methods that look at every tetrahedron repeat themselves: on large meshes some warm steps say all.
+    let enough = (STEPS_TIMES_TETS / scene.mesh.tets.len()).max(3 * START).min(steps);
     let steps_of = |method| if method == Method::RECOMMENDED { steps } else { enough };
     let take = |method| ride(scene, method, &tips[..steps_of(method)], &truth);
     let rides: Vec<Ride> = methods().map(take).collect();

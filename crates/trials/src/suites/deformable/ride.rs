@@ -8,7 +8,7 @@ use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
 use trepan_geometry::{Pointshell, Pose, Tool, ToolState, Vec3};
 
 /// Steps in which a method may still get to know the mesh; their time is reported by itself.
-const START: usize = 32;
+pub const START: usize = 32;
 
 /// What one method did along one path.
 pub struct Ride {

@@ -8,11 +8,11 @@ const FELT_N: f32 = 0.02;
 
 /// What differs.
 pub struct Errors {
-    /// Force while the burr is in the hand and one of the two feels bone, N: root mean square, and what 95 of 100 ticks stay under.
+    /// Force while the burr is in the hand, or the probe touches bone in one of the two, and one feels something, N: root mean square, and what 95 of 100 ticks stay under.
     pub bone_rms_n: f64,
     /// See above.
     pub bone_p95_n: f64,
-    /// The same while the probe is in the hand.
+    /// The same while the probe touches no bone in either.
     pub tissue_rms_n: f64,
     /// See above.
     pub tissue_p95_n: f64,
@@ -33,12 +33,13 @@ pub struct Errors {
 impl Errors {
     /// Of a run from the finest one along the same path.
     pub fn between(ride: &Ride, truth: &Ride) -> Self {
-        let felt = |probing: bool| {
-            let ticks = ride.forces.iter().zip(&truth.forces).zip(&truth.probing).filter(|(_, p)| **p == probing);
-            let felt = ticks.filter(|((a, b), _)| a.length() > FELT_N || b.length() > FELT_N);
-            felt.map(|((a, b), _)| f64::from(a.distance(*b))).collect::<Vec<_>>()
+        let on_tissue = |tick: &usize| truth.probing[*tick] && !ride.on_bone[*tick] && !truth.on_bone[*tick];
+        let apart_n = |tick: usize| {
+            let (a, b) = (ride.forces[tick], truth.forces[tick]);
+            (a.length() > FELT_N || b.length() > FELT_N).then(|| f64::from(a.distance(b)))
         };
-        let (bone, tissue) = (felt(false), felt(true));
+        let (tissue, bone): (Vec<usize>, Vec<usize>) = (0..truth.forces.len()).partition(on_tissue);
+        let [bone, tissue] = [bone, tissue].map(|ticks| ticks.into_iter().filter_map(apart_n).collect::<Vec<_>>());
         let (rest, shown) = surfaces(ride, truth);
         let both = ride.removed.iter().zip(&truth.removed);
         let count = |wanted: fn(bool, bool) -> bool| both.clone().filter(|(a, b)| wanted(**a, **b)).count() as f64;
@@ -131,6 +132,7 @@ mod tests {
             site: Site { entry: Vec3::ZERO, inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 },
             forces: vec![Vec3::X * newtons; ticks],
             probing: (0..ticks).map(|tick| tick >= ticks / 2).collect(),
+            on_bone: (0..ticks).map(|tick| tick < ticks / 2).collect(),
             looks: [0.0, 0.0, dip_mm, dip_mm].map(look).into(),
             from_mask_mm: vec![0.25],
             removed: (0..100).map(|place| place < gone).collect(),

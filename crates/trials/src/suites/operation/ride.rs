@@ -37,6 +37,8 @@ pub struct Ride {
     pub forces: Vec<Vec3>,
     /// Whether the probe was in the hand at each tick.
     pub probing: Vec<bool>,
+    /// Whether the tool touched bone at each tick; the probe may touch the rim of the hole.
+    pub on_bone: Vec<bool>,
     /// The brain's surface, every [`LOOK_MS`].
     pub looks: Vec<Look>,
     /// From what is seen of the brain at rest to the surface of its mask, mm.
@@ -93,6 +95,7 @@ pub fn ride(scope: Scope, candidate: &Candidate, truth: Option<&Ride>) -> Result
         site,
         forces: Vec::new(),
         probing: Vec::new(),
+        on_bone: Vec::new(),
         looks: Vec::new(),
         from_mask_mm: at_rest.seen.iter().map(|seen| brain.field.sample(*seen).abs()).collect(),
         removed: Vec::new(),
@@ -127,6 +130,7 @@ fn run(mut stages: Stages, milliseconds: u64, path: &Script, rays: &Rays, ride: 
         tissue.solver.publish(&mut frame);
         ride.forces.push(tick.wrench.force());
         ride.probing.push(tick.sample.phase() == Phase::Brain);
+        ride.on_bone.push(tick.record.depth_mm > 0.0);
         if ms % LOOK_MS == 0 {
             ride.looks.push(rays.look(&frame.positions));
         }

@@ -40,7 +40,7 @@ pub fn replays(scope: Scope) -> Result<Findings> {
         ("as recorded", &[]),
         ("rigid thesis", &["--rigid", "thesis"]),
         ("solver corotational", &["--solver", "corotational"]),
-        ("half the tetrahedra", &["--tets", "6000"]),
+        ("half the tetrahedra", &["--tets", "4000"]),
     ];
     // The corotational solver is far from real time.
     for (name, how) in again.into_iter().filter(|(name, _)| !scope.quick || !name.contains("corotational")) {

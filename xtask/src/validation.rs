@@ -1,0 +1,44 @@
+//! The quick validation, in the profile of the tests.
+
+use anyhow::{Context, Result};
+use serde_json::Value;
+use std::path::Path;
+
+/// Runs every suite quickly. Some promises are ratios of times, which other work on the machine can disturb: what was broken is run once more, by itself, and must then be kept.
+pub fn check(root: &Path) -> Result<()> {
+    let out = root.join("target/xtask-validation");
+    if out.is_dir() {
+        std::fs::remove_dir_all(&out).with_context(|| format!("cannot clear {}", out.display()))?;
+    }
+    let Err(fault) = quick(&out, &[]) else { return Ok(()) };
+    let broken = broken(&out)?;
+    if broken.is_empty() {
+        return Err(fault);
+    }
+    println!("xtask: once more, one at a time: {}", broken.join(", "));
+    quick(&out, &[&broken[..], &["--jobs".into(), "1".into()]].concat())
+}
+
+fn quick(out: &Path, more: &[String]) -> Result<()> {
+    let out = out.display().to_string();
+    crate::cargo(&["run", "--quiet", "--bin", "validate", "--", "--quick", "--out", &out], more)
+}
+
+/// The suites that broke a promise.
+fn broken(out: &Path) -> Result<Vec<String>> {
+    let mut suites = Vec::new();
+    for entry in std::fs::read_dir(out).with_context(|| format!("the validation left no {}", out.display()))? {
+        let path = entry?.path();
+        let Some(name) = path.file_stem().and_then(|name| name.to_str()).map(String::from) else { continue };
+        if path.extension().is_none_or(|ending| ending != "json") {
+            continue;
+        }
+        let report: Value = serde_json::from_slice(&std::fs::read(&path)?).with_context(|| format!("{name}.json"))?;
+        let gates = report["gates"].as_array().into_iter().flatten();
+        if gates.into_iter().any(|gate| gate["pass"] == false) {
+            suites.push(name);
+        }
+    }
+    suites.sort();
+    Ok(suites)
+}
