@@ -4,7 +4,7 @@
 //! Cost is that of the step that the mesh really allows, on the machine for which choices are priced; the cure's as a ratio in one run.
 //!
 //! # Practice
-//! A session takes such a mesh when it is given one (`--finer`); no plan does yet.
+//! Plans and presets take such meshes, without the cure.
 
 use super::super::Scope;
 use super::case::{Case, Source};
