@@ -18,8 +18,8 @@ use trepan_deformable::Method;
 use trepan_geometry::Vec3;
 use truth::Truth;
 
-/// What the recommended method must gain over looking at every tetrahedron, from 48 thousand of them on.
-const LEAST_RATIO: f64 = 12.0;
+/// What the recommended method must gain over looking at every tetrahedron, from 48 thousand of them on: two thirds of the least that a machine busy with other work has shown there.
+const LEAST_RATIO: f64 = 7.0;
 /// How many steps methods that look at every tetrahedron are given.
 const STEPS_TIMES_TETS: usize = 20_000_000;
 /// Steps by the oracle, which is slow.
