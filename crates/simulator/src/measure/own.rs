@@ -7,7 +7,7 @@
 //! the other half. The margins are those with which, over 40 scenes and all tolerances of `cargo xtask validate budget --seed 11`, 97 % of what tissue asks and 98 % of what the picture asks is met; more costs more than it mends.
 //!
 //! # Practice
-//! 26 s of one core, 17 s of two, tissue beside the rest; what is found does not depend on the tolerances, so it is kept with the case. What cannot be measured is left to the laws.
+//! 36 s of one core, 24 s of two with the reading of the case, tissue beside the rest; what is found does not depend on the tolerances, so it is kept with the case. What cannot be measured is left to the laws.
 
 use super::bone::{Skull, Slide, Stretch};
 use super::picture::View;
