@@ -68,6 +68,10 @@ pub(crate) fn check(machine: &Machine, scene: &Scene) -> Result<(), PlanError> {
     if let Some(&(field, value)) = positive.iter().chain(&scene.numbers()).find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
         return Err(PlanError::Value { field, value, must: "finite and above 0" });
     }
+    if scene.tissue_motion_mm > scene.probe_radius_mm {
+        let (field, value) = ("scene.tissue_motion_mm", scene.tissue_motion_mm);
+        return Err(PlanError::Value { field, value, must: "at most scene.probe_radius_mm" });
+    }
     if scene.headroom < 1.0 {
         return Err(PlanError::Value { field: "scene.headroom", value: scene.headroom, must: "finite and 1 or more" });
     }

@@ -255,13 +255,14 @@ mod tests {
         assert!(refused(Machine { ns_per_ray: 0.0, ..MACHINE }, scene()).contains("ns_per_ray"));
         assert!(refused(MACHINE, Scene { headroom: 0.5, ..scene() }).contains("headroom"));
         assert!(refused(MACHINE, Scene { brain_mm3: f64::NAN, ..scene() }).contains("brain_mm3"));
+        assert!(refused(MACHINE, Scene { tissue_motion_mm: 2.5, ..scene() }).contains("at most scene.probe_radius_mm"));
         assert!(refused(MACHINE, Scene { picture_pixels: [0, 600], ..scene() }).contains("picture_pixels[0]"));
         assert_eq!(plan_with(&MACHINE, &scene(), &Rows { bone: vec![], ..rows() }), Err(PlanError::NoRows("bone")));
     }
 
     /// Scenes and machines that a session may have.
     fn any() -> impl Strategy<Value = (Machine, Scene)> {
-        let lengths = (0.5f64..4.0, 0.2f64..2.0, 0.5f64..2.0, 1.0f64..8.0, 2.0f64..5.0, 60.0f64..300.0);
+        let lengths = (0.5f64..4.0, 0.2f64..2.0, 0.5f64..2.0, 0.3f64..1.0, 2.0f64..5.0, 60.0f64..300.0);
         let asked = (0.02f64..0.5, 0.1f64..3.0, 0.5f64..15.0, 1u32..64, 300u32..1200);
         (lengths, asked).prop_map(|((tool, press, finest, motion, probe, view), (n, mm, percent, threads, pixels))| {
             let scene = Scene {
@@ -271,7 +272,7 @@ mod tests {
                 tool_radius_mm: tool,
                 press_mm: press,
                 finest_mm: finest,
-                tissue_motion_mm: motion,
+                tissue_motion_mm: motion * probe,
                 probe_radius_mm: probe,
                 view_mm: view,
                 picture_pixels: [pixels, pixels],

@@ -23,7 +23,7 @@ pub struct Scene {
     pub press_mm: f64,
     /// Edge of the CT's own voxels, the mean of the three, mm: bone is as rough as that.
     pub finest_mm: f64,
-    /// How far a tool pushes the tissue, mm.
+    /// How far a tool pushes the tissue, mm; at most its radius. Deeper, tissue would close around the shaft, and finer and finer meshes do not agree on how it moves.
     pub tissue_motion_mm: f64,
     /// Radius of that tool, mm.
     pub probe_radius_mm: f64,
@@ -48,7 +48,7 @@ impl Default for Scene {
     fn default() -> Self {
         Self {
             force_error_n: 0.4,
-            displacement_mm: 1.75,
+            displacement_mm: 0.4,
             picture_error_percent: 1.0,
             has_bone: true,
             has_tissue: true,
@@ -56,8 +56,8 @@ impl Default for Scene {
             tool_radius_mm: 3.0,
             press_mm: 1.0,
             finest_mm: 1.2,
-            tissue_motion_mm: 5.0,
-            probe_radius_mm: 3.0,
+            tissue_motion_mm: 2.0,
+            probe_radius_mm: 2.0,
             brain_mm3: 1.2e6,
             material: Material::BRAIN,
             device_rate_hz: 1000.0,

@@ -178,7 +178,7 @@ pub struct Tolerances {
     /// Error of the force on bone that 95 of 100 ticks stay within, N [default: 0.4]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub force_error_n: Option<f64>,
-    /// Error of the brain's displacement near the tool, mm [default: 1.75]
+    /// Error of the brain's displacement near the tool, mm [default: 0.4]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub displacement_mm: Option<f64>,
     /// Error of the picture, percent of white [default: 1]

@@ -197,6 +197,7 @@ impl Wish {
             let of_kind = self.program.tray().iter().filter(|tool| tool.kind == kind);
             of_kind.map(|tool| f64::from(tool.tip_radius_mm)).reduce(f64::min)
         };
+        let probe_radius_mm = thinnest(ToolKind::Probe).unwrap_or(usual.probe_radius_mm);
         Scene {
             force_error_n: self.tolerances.force_error_n.unwrap_or(usual.force_error_n),
             displacement_mm: self.tolerances.displacement_mm.unwrap_or(usual.displacement_mm),
@@ -204,7 +205,8 @@ impl Wish {
             stiffness: BONE_STIFFNESS.into(),
             press_mm: PRESS_N / f64::from(BONE_STIFFNESS),
             tool_radius_mm: thinnest(ToolKind::Burr).unwrap_or(usual.tool_radius_mm),
-            probe_radius_mm: thinnest(ToolKind::Probe).unwrap_or(usual.probe_radius_mm),
+            tissue_motion_mm: usual.tissue_motion_mm.min(probe_radius_mm),
+            probe_radius_mm,
             finest_mm: facts.ct_voxel_mm.unwrap_or(usual.finest_mm),
             brain_mm3: facts.brain_mm3.unwrap_or(usual.brain_mm3),
             material: TissueClass::Brain.material(self.young_mpa),

@@ -3,8 +3,7 @@
 //! # Theory
 //! Cost is that of the step that the mesh really allows, on the machine for which choices are priced; the cure's as a ratio in one run.
 //!
-//! The truth is held against a mesh with a third of its edges. Where a push goes deeper than the tool's end is wide, finer meshes go on moving apart: the tissue around the disc is sheared beyond what
-//! an elastic body bears, and there is no truth to come near to.
+//! The truth is held against a mesh with half of its edges under the tool.
 //!
 //! # Practice
 //! Plans and presets take such meshes, without the cure.
@@ -23,7 +22,7 @@ const TETS: [usize; 4] = [3_000, 8_000, 20_000, 50_000];
 const QUICK_TETS: usize = 8_000;
 const MOST_HALVED: usize = 20_000;
 
-/// What the truth is held against: edges about a third of its own under the tool.
+/// What the truth is held against: about half of its own edges under the tool.
 const FINER: Fineness = Fineness { tets: 200_000, halvings: 4, radius_mm: 6.0 };
 
 /// Error and cost of every mesh.
@@ -43,7 +42,7 @@ pub fn run(scope: Scope, findings: &mut Findings) {
                 findings.rows.push(
                     Row::new(
                         format!("truth in tissue, {} {n}", case.name),
-                        "an eighth of the edge at the opening, cured",
+                        "a sixteenth of the edge under the tool, cured",
                     )
                     .with("motion_mm", motion_mm)
                     .with("motion_over_radius", motion_mm / situation.scene.probe_radius_mm)
