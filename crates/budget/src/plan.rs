@@ -255,6 +255,7 @@ mod tests {
         assert!(refused(Machine { ns_per_ray: 0.0, ..MACHINE }, scene()).contains("ns_per_ray"));
         assert!(refused(MACHINE, Scene { headroom: 0.5, ..scene() }).contains("headroom"));
         assert!(refused(MACHINE, Scene { brain_mm3: f64::NAN, ..scene() }).contains("brain_mm3"));
+        assert!(refused(MACHINE, Scene { press_mm: 3.5, ..scene() }).contains("at most scene.tool_radius_mm"));
         assert!(refused(MACHINE, Scene { tissue_motion_mm: 2.5, ..scene() }).contains("at most scene.probe_radius_mm"));
         assert!(refused(MACHINE, Scene { picture_pixels: [0, 600], ..scene() }).contains("picture_pixels[0]"));
         assert_eq!(plan_with(&MACHINE, &scene(), &Rows { bone: vec![], ..rows() }), Err(PlanError::NoRows("bone")));
@@ -270,7 +271,7 @@ mod tests {
                 displacement_mm: mm,
                 picture_error_percent: percent,
                 tool_radius_mm: tool,
-                press_mm: press,
+                press_mm: press.min(tool),
                 finest_mm: finest,
                 tissue_motion_mm: motion * probe,
                 probe_radius_mm: probe,

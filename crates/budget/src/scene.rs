@@ -19,7 +19,7 @@ pub struct Scene {
     pub stiffness: f64,
     /// Radius of the tool on bone, mm.
     pub tool_radius_mm: f64,
-    /// How deep the hand presses that tool into bone, mm: force over stiffness.
+    /// How deep the hand presses that tool into bone, mm: force over stiffness; at most its radius. Deeper, its centre is under the surface, and more than one way out is right.
     pub press_mm: f64,
     /// Edge of the CT's own voxels, the mean of the three, mm: bone is as rough as that.
     pub finest_mm: f64,

@@ -2,7 +2,8 @@
 //!
 //! # Theory
 //! The truth is the force by the oracle on voxels of 0.25 mm of the same CT, trilinear between its samples. The error of a tick is the length of the difference of both
-//! forces; of a choice it is that which 95 of 100 ticks in touch stay within, sliding or cutting, whichever is worse.
+//! forces; of a choice it is that which 95 of 100 ticks in touch stay within, sliding or cutting, whichever is worse. A tool whose centre comes under the surface,
+//! pressed in or led through a ridge, may leave by more ways than one, and methods that are both right choose differently: it is led no deeper than its radius.
 //!
 //! # When not to use it
 //! To know how right the CT is: what the scanner has blurred, nobody knows.
@@ -102,13 +103,14 @@ struct Way {
 }
 
 impl Stretch {
-    /// Cuts it out, with a way along it; `None` where there is too little bone under that.
+    /// Cuts it out, with a way along it; `None` where there is too little bone under that, or so much that the tool's centre comes under the surface.
     pub fn of(skull: &Skull, slide: &Slide) -> Option<Self> {
         let fine = cut_out(skull, slide.place, FINE_MM)?;
         let path = path(&Surface::of(&fine, slide)?, slide)?;
         let stretch = Self { fine, slide: *slide, ways: Vec::new() }.with(path, false);
-        let touches = stretch.ways[0].truth.iter().filter(|force| **force != Vec3::ZERO).count();
-        (touches > TICKS[1] / 2).then_some(stretch)
+        let deep = stretch.ways[0].truth.iter().map(|force| f64::from(force.length()) / slide.scene.stiffness);
+        let (touches, deepest) = (deep.clone().filter(|mm| *mm > 0.0).count(), deep.fold(0.0, f64::max));
+        (touches > TICKS[1] / 2 && deepest <= slide.scene.tool_radius_mm).then_some(stretch)
     }
 
     /// With a cut straight in from just outside; without one for a burr under 1 mm in radius, which the truth's voxels do not resolve.

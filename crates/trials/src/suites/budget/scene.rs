@@ -46,14 +46,14 @@ impl Situation {
         };
         let mut log = |low: f64, high: f64| low * (high / low).powf(random.f64());
         let height = log(300.0, 600.0) as u32;
-        let probe_radius_mm = log(2.0, 5.0);
+        let (tool_radius_mm, probe_radius_mm) = (log(0.5, 4.0), log(2.0, 5.0));
         let scene = Scene {
             force_error_n: log(0.06, 0.6),
             displacement_mm: log(0.2, 2.0),
             picture_error_percent: log(1.0, 10.0),
             stiffness: log(0.5, 2.0),
-            tool_radius_mm: log(0.5, 4.0),
-            press_mm: log(0.2, 2.0),
+            tool_radius_mm,
+            press_mm: log(0.2, tool_radius_mm.min(2.0)),
             finest_mm: case.finest_mm(),
             tissue_motion_mm: probe_radius_mm * log(0.3, 1.0),
             probe_radius_mm,
