@@ -102,6 +102,24 @@ fn an_undone_stroke_gives_its_bone_back_once_the_tool_is_free() {
 }
 
 #[test]
+fn the_stroke_of_a_tool_that_was_laid_down_stays() {
+    let (bone, brain) = head();
+    let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(6.0, 0.0));
+    let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+    let mut run = |z: f32, buttons: Buttons| {
+        bench.step(ToolState { buttons, ..at(z, 0.0) }, Status::Fresh, &NO_PATCH).removed_mm3
+    };
+    let drilled: f32 = (0..400).map(|i| run(6.0 - 0.01 * i as f32, Buttons::PEDAL)).sum();
+    (0..200).for_each(|_| _ = run(12.0, Buttons(0)));
+    let after = bone.snapshot();
+    (0..20).for_each(|_| _ = run(12.0, Buttons::take(ToolKind::Perforator)));
+    assert_eq!((run(12.0, Buttons::UNDO), bone.snapshot() == after), (0.0, true));
+    let told = |what: fn(&What) -> bool| bench.told.iter().filter(|n| what(&n.what)).count();
+    assert!(drilled > 0.1 && told(|what| matches!(what, What::Taken(_))) == 2);
+    assert_eq!(told(|what| matches!(what, What::Undone(_) | What::Kept)), 0);
+}
+
+#[test]
 fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
     let (bone, brain) = head();
     let before = bone.snapshot();

@@ -53,6 +53,11 @@ impl Flap {
         self.at == At::Away
     }
 
+    /// Whether it is on its way: no stroke may come back then.
+    pub fn moves(&self) -> bool {
+        matches!(self.at, At::Lifting(_) | At::Returning(_))
+    }
+
     /// One tick, after the bone was touched; `cut`: whether bone was removed in it, `free`: whether the tool touches nothing. Says what happened.
     pub fn tick(&mut self, bone: &BoneVolume, buttons: Buttons, drilling: bool, cut: bool, free: bool) -> Option<What> {
         let asks = buttons.has(Buttons::FLAP);
@@ -73,7 +78,6 @@ impl Flap {
             At::Skull => asked.then_some(What::FlapHangs),
             At::Searched => self.look(bone, asked),
             At::Cut if asked => {
-                bone.begin_stroke();
                 self.densities.clear();
                 self.at = At::Lifting(0);
                 None
@@ -115,6 +119,10 @@ impl Flap {
         }
         let whole = end == self.search.voxels().min(self.densities.capacity());
         self.at = if whole { At::Away } else { At::Lifting(end) };
+        if whole {
+            // What a hand takes back is a stroke of its burr, not the flap.
+            bone.begin_stroke();
+        }
         whole.then(|| What::FlapLifted(self.mm3(bone)))
     }
 
@@ -123,6 +131,9 @@ impl Flap {
         (done..end).for_each(|at| bone.set_hu(self.search.voxel(at), self.densities[at]));
         bone.came_back();
         let whole = end == self.densities.len();
+        if whole {
+            bone.begin_stroke();
+        }
         self.at = if whole { At::Cut } else { At::Returning(end) };
         whole.then_some(What::FlapReturned)
     }
@@ -159,9 +170,11 @@ mod tests {
         assert_eq!(run(&mut flap, 40, none, false, false), [What::FlapFree(mm3)]);
         let cut = bone.snapshot();
         assert_eq!(run(&mut flap, 20, Buttons::FLAP, false, false), [What::FlapLifted(mm3)]);
+        assert_eq!(bone.undo_stroke(), trepan_volume::Undone::Nothing, "the flap is no stroke");
         assert!(flap.is_away() && !bone.is_bone(IVec3::new(30, 30, 4)) && bone.is_bone(IVec3::new(10, 30, 4)));
         run(&mut flap, 1, none, false, false);
         assert_eq!(run(&mut flap, 20, Buttons::FLAP, false, false), [What::FlapReturned]);
+        assert_eq!(bone.undo_stroke(), trepan_volume::Undone::Nothing);
         assert_eq!(bone.snapshot(), cut);
         assert!(bone.undone() > 0, "who feels the bone must look anew");
         assert_eq!(run(&mut flap, 50, Buttons::PEDAL, true, true), [], "told once");

@@ -39,6 +39,8 @@ impl HapticStage {
                     rigid.reset(self.proxy);
                 }
                 self.drill = Drill::default();
+                // The last stroke was another tool's.
+                self.bone.iter().for_each(|bone| bone.begin_stroke());
             }
             None => {}
         }
@@ -63,7 +65,8 @@ impl HapticStage {
     /// Lets the stroke begin or come back. Returns what came back, mm³.
     pub(super) fn undo(&mut self, tool: &ToolState, drilling: bool, tick: u64, tell: &mut dyn FnMut(Notice)) -> f32 {
         let Some(bone) = &self.bone else { return 0.0 };
-        let may_undo = self.phase() == Phase::Craniotomy && !self.bone_step.manifold.touches();
+        let flap_rests = self.flap.as_ref().is_none_or(|flap| !flap.moves());
+        let may_undo = self.phase() == Phase::Craniotomy && !self.bone_step.manifold.touches() && flap_rests;
         let what = self.drill.stroke(bone, tool, drilling, may_undo);
         what.into_iter().for_each(|what| tell(Notice { tick, time_ms: tool.time_ms, what }));
         if let Some(What::Undone(mm3)) = what { mm3 } else { 0.0 }
