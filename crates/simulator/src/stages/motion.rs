@@ -65,6 +65,9 @@ impl Motion {
     pub fn add(&mut self, time_ms: f64, tip: Vec3) {
         let tip = tip.as_dvec3();
         let (mut fine, mut coarse) = (self.fine, self.coarse);
+        if fine.breaks_off(time_ms) {
+            (self.last, self.known) = (None, 0);
+        }
         fine.add(FINE_MS, time_ms, tip, |x| self.step(x));
         coarse.add(COARSE_MS, time_ms, tip, |x| self.coarse_step(x));
         (self.fine, self.coarse) = (fine, coarse);
@@ -104,6 +107,11 @@ impl Motion {
 }
 
 impl Grid {
+    /// Whether a place at this time comes after a pause: then all begins anew.
+    fn breaks_off(&self, time_ms: f64) -> bool {
+        self.before.is_some_and(|(before_ms, _)| time_ms - before_ms >= PAUSE_MS)
+    }
+
     /// Gives the mean places of the windows that end up to this time. A place that is not finite and a time that does not go on are left out.
     fn add(&mut self, step_ms: f64, time_ms: f64, tip: DVec3, mut each: impl FnMut(DVec3)) {
         if !tip.is_finite() || !time_ms.is_finite() {
@@ -198,7 +206,7 @@ mod tests {
         motion.add(0.0, Vec3::splat(50.0));
         motion.add(40.0, Vec3::X);
         assert_eq!((motion.path_mm, motion.idle_s), (0.5, 0.0));
-        motion.add(1e9, Vec3::X * 2.0);
-        assert_eq!(motion.path_mm, 0.5);
+        (0..300u16).for_each(|ms| motion.add(1e9 + f64::from(ms), Vec3::X * 50.0));
+        assert_eq!((motion.path_mm, motion.peak_mm_s, motion.jerk2), (0.5, 0.0, 0.0), "the way across a pause");
     }
 }
