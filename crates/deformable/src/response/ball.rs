@@ -133,7 +133,11 @@ impl Ball {
     /// pushed out from under the samples would else be free until the next step, come back, be pushed out again, and the hand would feel it.
     fn wait(&mut self, scene: &Scene, surface: &MovingSurface, out: &mut TissueStep) {
         for sample in self.near.within(scene.tool.tip(), (1.0 + WAITING) * scene.radius_mm) {
-            if self.pressed.contains(&sample.triangle) || self.pressed.len() == MAX_DENTS {
+            if self.pressed.contains(&sample.triangle) {
+                continue;
+            }
+            if self.pressed.len() == MAX_DENTS {
+                out.overflow += 1;
                 continue;
             }
             let mut spring = NodalContact::none();

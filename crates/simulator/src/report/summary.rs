@@ -7,6 +7,7 @@ use crate::report::regions::Region;
 use crate::run::{Outcome, Replayed, Times};
 use crate::stages::notice::What;
 use crate::stages::score::ScoreKeeper;
+use crate::stages::solver_step::Mishaps;
 use serde::Serialize;
 use std::fs;
 use trepan_contact::GuardCounters;
@@ -150,8 +151,9 @@ pub struct SolverSummary {
     pub max_displacement_mm: f32,
     /// Largest displacement left at the end, mm.
     pub end_displacement_mm: f32,
-    /// Inverted elements, summed over steps.
-    pub inverted: u64,
+    /// What it had to put right, summed over steps.
+    #[serde(flatten)]
+    pub mishaps: Mishaps,
 }
 
 /// Forces on the hand.
@@ -279,6 +281,7 @@ impl Summary {
     /// From all that is known at the end.
     pub fn new(about: About, outcome: &Outcome) -> Self {
         let seconds = outcome.seconds.max(1e-9);
+        let mishaps = outcome.solver.as_ref().and_then(|solver| solver.mishaps.remark());
         Self {
             app: about.program.name().into(),
             case: about.case,
@@ -301,7 +304,7 @@ impl Summary {
                 real_time_factor: solver.real_time_factor,
                 max_displacement_mm: solver.max_displacement_mm,
                 end_displacement_mm: solver.end_displacement_mm,
-                inverted: solver.inverted,
+                mishaps: solver.mishaps,
             }),
             force_n: Forces {
                 max: outcome.scores.peak_force_n,
@@ -325,7 +328,7 @@ impl Summary {
             fps: about.frames as f64 / seconds,
             replay: outcome.replayed,
             dropped_records: outcome.written.dropped,
-            remarks: about.remarks.into_iter().chain(outcome.remarks.iter().cloned()).collect(),
+            remarks: about.remarks.into_iter().chain(outcome.remarks.iter().cloned()).chain(mishaps).collect(),
             machine: about.machine,
         }
     }

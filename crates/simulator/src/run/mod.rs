@@ -18,7 +18,7 @@ use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
 use crate::stages::notice::{Notice, What};
 use crate::stages::score::ScoreKeeper;
 use crate::stages::second_hand::{SecondHand, SecondOutcome, SecondView};
-use crate::stages::solver_step::SolverStage;
+use crate::stages::solver_step::{Mishaps, SolverStage};
 use hdrhistogram::Histogram;
 use std::sync::mpsc::Receiver;
 use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
@@ -248,8 +248,8 @@ pub struct SolverOutcome {
     pub max_displacement_mm: f32,
     /// Largest displacement left at the end, mm.
     pub end_displacement_mm: f32,
-    /// Inverted elements found, summed over steps.
-    pub inverted: u64,
+    /// What the solver had to put right.
+    pub mishaps: Mishaps,
 }
 
 /// How a replay compares with its recording.

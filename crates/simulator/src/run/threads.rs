@@ -289,7 +289,7 @@ pub fn outcome(stage: &SolverStage) -> SolverOutcome {
         steps: stage.steps(),
         max_displacement_mm: stage.max_displacement_mm(),
         end_displacement_mm: stage.displacement_mm(),
-        inverted: stage.inverted(),
+        mishaps: *stage.mishaps(),
         ..SolverOutcome::default()
     }
 }

@@ -99,6 +99,7 @@ impl CollisionStage {
             if let Some(wall) = &self.wall {
                 wall.press(&soft.positions, &mut self.loads.contacts);
             }
+            self.loads.contacts.overflow += self.step.overflow;
         }
     }
 }

@@ -6,10 +6,11 @@
 //! more.
 
 use crate::stages::collision_step::SoftFrame;
+use serde::Serialize;
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
 use trepan_link::wire::SolverRecord;
-use trepan_soft::{Loads, SoftSolver};
+use trepan_soft::{Loads, SoftSolver, StepReport};
 
 /// Steps between two records when the contact stays.
 pub const EACH: u64 = 32;
@@ -22,8 +23,44 @@ pub struct SolverStage {
     dt_ms: f32,
     steps: u64,
     contact_seq: u64,
-    inverted: u64,
+    mishaps: Mishaps,
     max_displacement_mm: f32,
+}
+
+/// What a solver had to put right, summed over steps; all 0 where nothing was.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Mishaps {
+    /// Inverted elements, which their energy turns back.
+    pub inverted: u64,
+    /// Nodes that hit the limit of speed or displacement and were held to it.
+    pub limited: u64,
+    /// Nodes whose new state was not finite, put back to where they were.
+    pub non_finite: u64,
+    /// Time that was not simulated because it would have taken too many substeps, ms.
+    pub skipped_ms: f64,
+    /// Contacts and springs for which there was no room, summed over the collision steps that took effect.
+    pub contacts_left_out: u64,
+}
+
+impl Mishaps {
+    fn add(&mut self, report: &StepReport) {
+        self.inverted += u64::from(report.inverted);
+        self.limited += u64::from(report.limited);
+        self.non_finite += u64::from(report.non_finite);
+        self.skipped_ms += f64::from(report.skipped_ms);
+    }
+
+    /// What a report should say of them, where the brain did not move as its solver says.
+    pub fn remark(&self) -> Option<String> {
+        let Self { limited, non_finite, skipped_ms, contacts_left_out, .. } = *self;
+        let sound = limited + non_finite + contacts_left_out == 0 && skipped_ms == 0.0;
+        (!sound).then(|| {
+            format!(
+                "the brain's solver held {limited} nodes to a limit, put {non_finite} back that were not finite, left {skipped_ms:.1} ms out \
+                 and {contacts_left_out} contacts for which there was no room: do not trust how it moved"
+            )
+        })
+    }
 }
 
 impl SolverStage {
@@ -36,7 +73,7 @@ impl SolverStage {
             loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
             steps: 0,
             contact_seq: 0,
-            inverted: 0,
+            mishaps: Mishaps::default(),
             max_displacement_mm: 0.0,
         }
     }
@@ -48,10 +85,11 @@ impl SolverStage {
             self.loads.gravity = loads.gravity;
             self.loads.contacts.copy_from(&loads.contacts);
             self.contact_seq = contact_seq;
+            self.mishaps.contacts_left_out += u64::from(loads.contacts.overflow);
         }
         let report = self.solver.step(&self.loads, self.dt_ms);
         self.steps += 1;
-        self.inverted += u64::from(report.inverted);
+        self.mishaps.add(&report);
         (switched || self.steps.is_multiple_of(EACH)).then(|| self.record(report.inverted))
     }
 
@@ -108,8 +146,8 @@ impl SolverStage {
         self.steps as f64 * f64::from(self.dt_ms)
     }
 
-    /// Elements found inverted, summed over steps.
-    pub fn inverted(&self) -> u64 {
-        self.inverted
+    /// What had to be put right so far.
+    pub fn mishaps(&self) -> &Mishaps {
+        &self.mishaps
     }
 }
