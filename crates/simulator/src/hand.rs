@@ -5,6 +5,7 @@ use crate::error::SessionError;
 use crate::options::Options;
 use crate::program::Program;
 use crate::run::watch::Watched;
+use crate::table::Table;
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{self, Script, Site};
@@ -25,9 +26,9 @@ pub struct Hand {
 
 impl Hand {
     /// Opens the device.
-    pub fn open(name: &DeviceName, program: Program, options: &Options, plan: &Plan) -> Result<Self, SessionError> {
+    pub fn open(name: &DeviceName, program: Program, options: &Options, table: &Table) -> Result<Self, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let site = &plan.site;
+        let (plan, site) = (&table.plan, &table.plan.site);
         let script = |name: &str| scripted(name, options, plan);
         let mut hand = Self { device: None, pointer: None, watch: None };
         if let Some(name) = &options.watch {
@@ -49,7 +50,7 @@ impl Hand {
             hardware => match hardware::open(hardware, workspace(site, options.device_scale)) {
                 Some(opened) => {
                     let opened = opened.map_err(|f| fault(&f))?;
-                    bears(&opened.device.capabilities(), options.rate_hz)?;
+                    bears(&opened.device.capabilities(), table.operation.rate_hz)?;
                     hand.watch = Some(opened.watch);
                     Some(Box::new(Clutch::new(opened.device)))
                 }
@@ -70,9 +71,9 @@ pub struct SecondHold {
 
 impl SecondHold {
     /// Opens the device. One of metal lives on a thread of its own, so that its link never holds the first hand up.
-    pub fn open(name: &DeviceName, options: &Options, plan: &Plan) -> Result<Self, SessionError> {
+    pub fn open(name: &DeviceName, options: &Options, table: &Table) -> Result<Self, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let site = &plan.site;
+        let (plan, site) = (&table.plan, &table.plan.site);
         let script = |name: &str| scripted(name, options, plan);
         let (device, watch): (Box<dyn HapticDevice>, _) = match name {
             DeviceName::Script(operation) => (Box::new(script(operation)?), None),
@@ -85,7 +86,7 @@ impl SecondHold {
                 // Both hands rest in the middle of their boxes: there the tools stand side by side.
                 beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
                 let opened = hardware::open(metal, beside).ok_or_else(|| unfit(metal))?.map_err(|f| fault(&f))?;
-                bears(&opened.device.capabilities(), options.rate_hz)?;
+                bears(&opened.device.capabilities(), table.operation.rate_hz)?;
                 (Box::new(Aside::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
             }
         };

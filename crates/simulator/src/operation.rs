@@ -1,7 +1,7 @@
-//! What the operation is: flap, fluid lost, what must not be touched. From the options, else from the recording that is run again, else the usual.
+//! What the operation is: flap, fluid lost, what must not be touched, how stiff the brain is, how fast the ticks come. From the options, else from the recording that is run again, else the usual.
 
 use crate::case::tissue::TissueClass;
-use crate::options::Options;
+use crate::options::{MODULI_KPA, Options, RATES_HZ};
 use trepan_haptics::DeviceName;
 use trepan_link::Recording;
 
@@ -9,6 +9,10 @@ use trepan_link::Recording;
 const SCRIPTED_FLAP_MM: f32 = 24.0;
 /// Share of the fluid's lift that is lost when the dura is opened.
 const FLUID_LOST: f32 = 0.05;
+/// Young's modulus of the brain, kPa.
+const YOUNG_KPA: f32 = 3.0;
+/// Haptic ticks a second.
+const RATE_HZ: f32 = 1000.0;
 
 /// Settings of an operation.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +23,12 @@ pub struct Operation {
     pub fluid_lost: f32,
     /// Tissue that no tool may come close to.
     pub forbidden: Vec<TissueClass>,
+    /// Young's modulus of the brain, kPa.
+    pub young_kpa: f32,
+    /// Haptic ticks a second.
+    pub rate_hz: f32,
+    /// Whether a tool for the brain can be had only once the skull is open; not where another's session is watched.
+    pub opening_needed: bool,
 }
 
 impl Operation {
@@ -26,6 +36,7 @@ impl Operation {
     pub fn of(options: &Options, device: &DeviceName, recording: Option<&Recording>) -> Self {
         let recorded = |key: &str| recording?.header.config.get(key);
         let number = |key: &str| recorded(key)?.parse::<f32>().ok().filter(|value| value.is_finite());
+        let within = |key: &str, [low, high]: [f64; 2]| number(key).filter(|&n| (low..=high).contains(&n.into()));
         let scripted = matches!(device, DeviceName::Script(name) | DeviceName::Simulated(name) if name == "flap");
         let flap = options.flap.or_else(|| number("flap_mm")).or(scripted.then_some(SCRIPTED_FLAP_MM));
         let listed = || {
@@ -36,16 +47,25 @@ impl Operation {
             flap_mm: flap.unwrap_or(0.0),
             fluid_lost: options.fluid_lost.or_else(|| number("fluid_lost")).unwrap_or(FLUID_LOST),
             forbidden: options.forbid.clone().or_else(listed).unwrap_or_else(|| vec![TissueClass::Vessel]),
+            young_kpa: options
+                .young_modulus_kpa
+                .or_else(|| within("young_modulus_kpa", MODULI_KPA))
+                .unwrap_or(YOUNG_KPA),
+            rate_hz: options.rate_hz.or_else(|| within("rate_hz", RATES_HZ)).unwrap_or(RATE_HZ),
+            opening_needed: recorded("opening_needed").map_or(options.watch.is_none(), |needed| needed != "false"),
         }
     }
 
     /// As a recording keeps it.
-    pub fn entries(&self) -> [(String, String); 3] {
+    pub fn entries(&self) -> [(String, String); 6] {
         let forbidden: Vec<&str> = self.forbidden.iter().map(|class| class.name()).collect();
         [
             ("flap_mm".into(), self.flap_mm.to_string()),
             ("fluid_lost".into(), self.fluid_lost.to_string()),
             ("forbidden".into(), forbidden.join(",")),
+            ("young_modulus_kpa".into(), self.young_kpa.to_string()),
+            ("rate_hz".into(), self.rate_hz.to_string()),
+            ("opening_needed".into(), self.opening_needed.to_string()),
         ]
     }
 }
@@ -65,10 +85,19 @@ mod tests {
             (0.0, FLUID_LOST, &[TissueClass::Vessel][..])
         );
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
-        let asked = Operation::of(&parse("x --flap 30 --forbid tumour,vessel --fluid-lost 0"), &script, None);
+        let line =
+            "x --flap 30 --forbid tumour,vessel --fluid-lost 0 --young-modulus-kpa 6 --rate-hz 500 --watch other";
+        let asked = Operation::of(&parse(line), &script, None);
+        assert!(!asked.opening_needed && usual.opening_needed);
         let mut recording = Recording::default();
         recording.header.config.extend(asked.entries());
         assert_eq!(Operation::of(&parse("x"), &DeviceName::Mouse, Some(&recording)), asked);
         assert_eq!(Operation::of(&parse("x --flap 40"), &script, Some(&recording)).flap_mm, 40.0);
+        recording.header.config.insert("rate_hz".into(), "0".into());
+        assert_eq!(
+            Operation::of(&parse("x"), &script, Some(&recording)).rate_hz,
+            RATE_HZ,
+            "no rate that a flag may give"
+        );
     }
 }

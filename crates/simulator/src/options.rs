@@ -5,6 +5,11 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use trepan_budget::Quality;
 
+/// What `--young-modulus-kpa` and `--rate-hz` may be.
+pub const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
+/// See [`MODULI_KPA`].
+pub const RATES_HZ: [f64; 2] = [100.0, 10_000.0];
+
 /// Flags of every program; names say their unit.
 #[derive(Clone, Debug, Parser)]
 #[command(max_term_width = 120, version, args_conflicts_with_subcommands = true)]
@@ -36,7 +41,7 @@ pub struct Options {
     /// Run without a window
     #[arg(long)]
     pub headless: bool,
-    /// Length of a scripted operation, and at most of any other, seconds [default: 20 for a script]
+    /// Length of a scripted operation, and at most of any other, seconds [default: 20 for a script, 75 for script:flap]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// Where to record the session [default: session.mcap in the output folder]
@@ -66,9 +71,9 @@ pub struct Options {
     /// List the haptic devices and what each needs, then end
     #[arg(long)]
     pub list_devices: bool,
-    /// Young's modulus of the brain, kPa
-    #[arg(long, value_name = "KPA", default_value_t = 3.0)]
-    pub young_modulus_kpa: f32,
+    /// Young's modulus of the brain, kPa [default: 3; a replay's as recorded]
+    #[arg(long, value_name = "KPA", allow_negative_numbers = true)]
+    pub young_modulus_kpa: Option<f32>,
     /// Diameter of the planned bone flap around the opening, mm; 0 for a burr hole alone [default: 0; 24 with script:flap; a replay's as recorded]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub flap: Option<f32>,
@@ -81,9 +86,9 @@ pub struct Options {
     /// Of a folder of recordings (--device replay:FOLDER) run only every Nth again, from the Ith on, as in 2/8
     #[arg(long, value_name = "I/N", value_parser = shard)]
     pub shard: Option<(usize, usize)>,
-    /// Haptic ticks a second
-    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
-    pub rate_hz: f32,
+    /// Haptic ticks a second [default: 1000; a replay's as recorded]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub rate_hz: Option<f32>,
     /// Pictures a second in a headless run; 0 for none
     #[arg(long, value_name = "N", default_value_t = 1.0)]
     pub frames_per_second: f64,
@@ -277,11 +282,16 @@ impl Options {
         self.patient.check()?;
         self.tolerances.check()?;
         within("duration", self.duration.unwrap_or(1.0), 0.1, 86_400.0)?;
-        within("young-modulus-kpa", self.young_modulus_kpa.into(), 0.05, 1000.0)?;
+        within(
+            "young-modulus-kpa",
+            self.young_modulus_kpa.map_or(MODULI_KPA[0], f64::from),
+            MODULI_KPA[0],
+            MODULI_KPA[1],
+        )?;
         within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
         within("flap", self.flap.unwrap_or(0.0).into(), 0.0, 90.0)?;
         within("fluid-lost", self.fluid_lost.unwrap_or(0.0).into(), 0.0, 1.0)?;
-        within("rate-hz", self.rate_hz.into(), 100.0, 10_000.0)?;
+        within("rate-hz", self.rate_hz.map_or(RATES_HZ[0], f64::from), RATES_HZ[0], RATES_HZ[1])?;
         within("frames-per-second", self.frames_per_second, 0.0, 120.0)
     }
 }

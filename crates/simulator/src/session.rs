@@ -80,13 +80,13 @@ impl Session {
             DeviceName::Replay(path) => Some(Recording::open(path)?),
             _ => None,
         };
-        let wish = Wish::of(program, &options, recording.as_ref())?;
+        let operation = Operation::of(&options, &device, recording.as_ref());
+        let wish = Wish::of(program, &options, &operation, recording.as_ref())?;
         let mut drawing = None;
         let card = || drawing.insert(driver::open()).as_ref().is_ok_and(|gpu| !gpu.is_software());
         let (case, models) = choice::open_case(program, &options, built_in, wish, card)?;
         let (name, hash) = (case.name.clone(), case.hash.clone());
-        let operation = Operation::of(&options, &device, recording.as_ref());
-        let table = Table::new(program, &options, (case, models), operation, windowed && recording.is_some())?;
+        let table = Table::new(program, (case, models), operation, windowed && recording.is_some())?;
         let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
         Ok(Self { program, options, device, second, recording, case: name, hash, table, out, windowed, drawing })
     }
@@ -95,17 +95,15 @@ impl Session {
     pub fn run(mut self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let (before, whole) = (self.table.pieces(), self.table.bone().map(|bone| bone.snapshot()));
-        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.table.plan)?;
-        let second =
-            self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.table.plan)).transpose()?;
+        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.table)?;
+        let second = self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.table)).transpose()?;
         let recorded = || Feel::recorded(self.recording.as_ref(), hand::FIRST);
         let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
         let feel = device.as_ref().map_or_else(recorded, |device| Feel::of(&device.capabilities(), scale));
         let second_feel = self.second_feel(second.as_ref());
         let start = self.start();
-        let opening_needed = self.options.watch.is_none();
         let feels = (&feel, second_feel.as_ref());
-        let stages = self.table.stages(start.state, self.tick_ms(), opening_needed, feels, &Default::default())?;
+        let stages = self.table.stages(start.state, self.tick_ms(), feels, &Default::default())?;
         let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
         output::folder(&self.out)?;
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
@@ -155,7 +153,7 @@ impl Session {
     /// The bodies of the loops for a hand without a device, for who turns them otherwise than [`run`](Self::run). The tool is at `start`; `touch` is how it is tested against tissue.
     pub fn stages(&self, start: ToolState, touch: &trepan_deformable::Config) -> Result<Stages, SessionError> {
         let feel = Feel::of(&Capabilities::passive("a script"), 1.0);
-        self.table.stages(start, self.tick_ms(), true, (&feel, None), touch)
+        self.table.stages(start, self.tick_ms(), (&feel, None), touch)
     }
 
     /// Lets a teacher have a say in both hands' buttons, where this session is shared; with a window on another's session, this one teaches.
@@ -232,7 +230,7 @@ impl Session {
             let folder = self.out.join("frames");
             return picture::draw(eyes, painter, &self.table, self.options.frames_per_second, &folder, stop);
         }
-        let (table, case, out, rate_hz) = (&self.table, &*self.case, &*self.out, self.options.rate_hz);
+        let (table, case, out, rate_hz) = (&self.table, &*self.case, &*self.out, self.table.operation.rate_hz);
         let opened = window::Opened { table, case, out, rate_hz };
         match (eyes.film.take(), &self.recording) {
             (Some(film), Some(recording)) => {
@@ -268,15 +266,10 @@ impl Session {
     }
 
     fn tick_ms(&self) -> f32 {
-        1e3 / self.options.rate_hz
+        1e3 / self.table.operation.rate_hz
     }
 
     fn header(&self, feel: &Feel, second: Option<&Feel>) -> SessionHeader {
-        let config = [
-            ("rate_hz", self.options.rate_hz.to_string()),
-            ("solver_run", self.table.solver_name().into()),
-            ("young_modulus_kpa", self.options.young_modulus_kpa.to_string()),
-        ];
         let hands = feel.entries(hand::FIRST).into_iter();
         let hands = hands.chain(second.into_iter().flat_map(|second| second.entries(hand::SECOND)));
         SessionHeader {
@@ -285,8 +278,7 @@ impl Session {
             case: self.case.clone(),
             seed: self.options.seed,
             hashes: [("case".to_string(), self.hash.clone())].into(),
-            config: config
-                .map(|(key, value)| (key.to_string(), value))
+            config: [("solver_run".to_string(), self.table.solver_name().into())]
                 .into_iter()
                 .chain(self.table.models.entries())
                 .chain(self.table.operation.entries())

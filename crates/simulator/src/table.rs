@@ -9,7 +9,6 @@ use crate::hand::Feel;
 use crate::measure::tissue::MASS_ADDED;
 use crate::models::{BONE_STIFFNESS, FASTEST, Models, rigid_of, solver_named};
 use crate::operation::Operation;
-use crate::options::Options;
 use crate::program::Program;
 use crate::report::regions::{Region, regions};
 use crate::run::clock::Clock;
@@ -52,7 +51,6 @@ impl Table {
     /// Lays a case on the table. `filmed`: the window will go to and fro in the bone that is shown, so a second one is carved.
     pub fn new(
         program: Program,
-        options: &Options,
         (case, models): (Case, Models),
         operation: Operation,
         filmed: bool,
@@ -64,11 +62,11 @@ impl Table {
         Ok(Self {
             program,
             plan: planned(&scene, &operation)?,
+            young_mpa: units::mpa_from_kpa(operation.young_kpa),
             scene,
             operation,
             models,
             filmed: filmed.map_err(|fault| SessionError::Internal(fault.to_string()))?,
-            young_mpa: units::mpa_from_kpa(options.young_modulus_kpa),
             fastest: OnceLock::new(),
         })
     }
@@ -103,7 +101,6 @@ impl Table {
         &self,
         start: ToolState,
         tick_ms: f32,
-        opening_needed: bool,
         (feel, second): (&Feel, Option<&Feel>),
         touch: &trepan_deformable::Config,
     ) -> Result<Stages, SessionError> {
@@ -118,7 +115,7 @@ impl Table {
             tissue_force: feel.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, tick_ms),
             guard: feel.guard(),
             limits: Limits::default(),
-            opening_needed,
+            opening_needed: self.operation.opening_needed,
         };
         let bone = self.bone().cloned();
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));

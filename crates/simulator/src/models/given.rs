@@ -53,10 +53,11 @@ impl Given {
         })
     }
 
-    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is usual, but tetrahedra were alike everywhere.
+    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is usual, but tetrahedra of a number were alike everywhere.
     pub fn recorded(config: &BTreeMap<String, String>) -> Self {
         let number = |key: &str| config.get(key)?.parse::<f64>().ok().filter(|value| value.is_finite());
         let count = |key: &str| config.get(key)?.parse::<usize>().ok();
+        let flag = |key: &str| config.get(key).is_some_and(|value| value == "true");
         // What was fastest then need not be fastest now: the processor's is the one that can be had again.
         let solver = |name: &String| trepan_soft::Method::named(name).map_or(TLED, |method| method.name());
         let detail = number("picture_detail");
@@ -65,10 +66,10 @@ impl Given {
             rigid: config.get("rigid").and_then(|name| Some(trepan_rigid::Method::named(name)?.name())),
             points: count("rigid_points"),
             tets: count("tets"),
-            halvings: count("halvings").or(count("tets").map(|_| 0)).map(|n| n as u32),
+            halvings: count("halvings").filter(|n| *n <= 3).or(count("tets").map(|_| 0)).map(|n| n as u32),
             solver: config.get("solver").map(solver),
             still_mm: number("still_mm"),
-            picture: detail.map(|detail| Picture { sparse: config["picture_sparse"] == "true", detail }),
+            picture: detail.map(|detail| Picture { sparse: flag("picture_sparse"), detail }),
             words: Default::default(),
         }
     }

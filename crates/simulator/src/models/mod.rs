@@ -24,6 +24,7 @@ use crate::case::import::Facts;
 use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
 use crate::measure::{self, Own, Wanted};
+use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
 use crate::program::Program;
 use given::{Given, written};
@@ -67,7 +68,12 @@ pub struct Wish {
 
 impl Wish {
     /// What the options say, and what the recording ran that is run again; refuses names that nobody knows.
-    pub fn of(program: Program, options: &Options, recording: Option<&Recording>) -> Result<Self, SessionError> {
+    pub fn of(
+        program: Program,
+        options: &Options,
+        operation: &Operation,
+        recording: Option<&Recording>,
+    ) -> Result<Self, SessionError> {
         let preset = options.quality.filter(|&quality| quality != Quality::Auto);
         let recording = recording.filter(|_| preset.is_none());
         let given = Given::flags(&options.patient, options.rigid.as_deref(), options.solver.as_deref())?;
@@ -77,8 +83,8 @@ impl Wish {
             quality: if recording.is_some() { None } else { Some(preset.unwrap_or_default()) },
             given: recording.map(|r| Given::recorded(&r.header.config)).into_iter().fold(given, Given::or),
             tolerances: options.tolerances,
-            young_mpa: units::mpa_from_kpa(options.young_modulus_kpa),
-            rate_hz: options.rate_hz,
+            young_mpa: units::mpa_from_kpa(operation.young_kpa),
+            rate_hz: operation.rate_hz,
             picture: pictures.then_some(options.picture),
             pictures_per_s: if options.headless && pictures { options.frames_per_second } else { LIVE_HZ },
         })
@@ -177,7 +183,7 @@ impl Wish {
         let finest = rows.tissue.iter().map(|row| row.what.halvings).max();
         rows.tissue.retain(|row| halvings.is_none_or(|n| Some(row.what.halvings) == finest.map(|most| n.min(most))));
         let scene = Scene {
-            has_bone: wanted.bone && !rows.bone.is_empty(),
+            has_bone: wanted.bone && rows.bone.iter().any(|row| trepan_budget::holds_walls(&row.what)),
             has_tissue: wanted.tissue && !rows.tissue.is_empty(),
             ..self.scene(facts)
         };
@@ -265,7 +271,7 @@ const LIVE_HZ: f64 = 10.0;
 /// How hard a hand presses a burr, N.
 const PRESS_N: f64 = 1.0;
 
-/// What sessions ran before there was a choice.
+/// What runs where nothing else is said.
 pub fn usual() -> Setup {
     Quality::Usual.preset().expect("only auto has none")
 }
@@ -313,7 +319,8 @@ mod tests {
 
     fn wish(line: &str, recording: Option<&Recording>) -> Wish {
         let options = Options::try_parse_from(format!("x --headless {line}").split_whitespace()).unwrap();
-        Wish::of(Program::Integrated, &options, recording).unwrap()
+        let operation = Operation::of(&options, &trepan_haptics::DeviceName::Mouse, recording);
+        Wish::of(Program::Integrated, &options, &operation, recording).unwrap()
     }
 
     const FACTS: Facts = Facts { ct_voxel_mm: Some(1.0), brain_mm3: Some(1.2e6) };
@@ -343,6 +350,11 @@ mod tests {
         assert_eq!(plan.bone.unwrap().what.method, models.setup.bone.method);
         assert!(models.why[0].contains("--spacing-mm 0.7 is given; ") && models.why[0].contains(" N of 0.4 allowed"));
         assert_eq!(models.why[2], "as usual", "no picture is drawn");
+        let models =
+            wish("--rigid exposed-faces --frames-per-second 0", None).settle(&FACTS, || false, by_law).unwrap();
+        let usual = Quality::Usual.preset().unwrap();
+        let stands = Bone { method: "exposed-faces", points: 0, ..usual.bone };
+        assert_eq!(models.setup.bone, stands, "a method without a proxy is not planned, but can be had");
     }
 
     #[test]
