@@ -49,7 +49,7 @@ pub const TLED_FORCES: [&str; 4] = [
 ];
 /// Volume change of every tetrahedron, and its mean around the nodes.
 pub const TLED_VOLUMES: [&str; 2] = [tled!("element.wgsl", "volumes.wgsl"), tled!("seats.wgsl")];
-/// The tool's spring on the tissue.
+/// The springs of contact on the tissue.
 pub const TLED_PRESS: &str = tled!("press.wgsl");
 /// What nodes gather of the forces, and their motion.
 pub const TLED_UPDATE: &str = tled!("update.wgsl");

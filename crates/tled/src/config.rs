@@ -4,7 +4,7 @@ use crate::{Kernel, Relaxation};
 use trepan_geometry::Vec3;
 use trepan_soft::BodyError;
 
-/// Settings of the TLED solver; `Default` is what the simulators use.
+/// Settings of the TLED solver; `Default` is what the simulators use, but for `mass_scaling`: they add a hundredth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// How motion dies away.

@@ -44,7 +44,7 @@ pub enum Pass {
     Volumes,
     /// Forces of the elements.
     Forces,
-    /// The tool's spring and the surface's pressure.
+    /// The springs of contact and the surface's pressure.
     Press,
     /// New velocities and positions.
     Update,

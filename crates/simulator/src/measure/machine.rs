@@ -1,4 +1,4 @@
-//! How fast this machine is: the numbers that a plan is made from, measured in about a second.
+//! How fast this machine is: the numbers that a plan is made from, measured in under two seconds.
 //!
 //! # Practice
 //! The median of many calls, one method at a time, one thread, on small synthetic scenes that stay in the cache as the real ones do. What is not wanted is not

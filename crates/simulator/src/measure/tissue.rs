@@ -28,7 +28,7 @@ const FINER: ([usize; 5], [u32; 2]) = ([3_000, 5_000, 8_000, 12_000, 20_000], [1
 const STILL: ([usize; 2], f64) = ([5_000, 12_000], 0.01);
 /// Meshes that rivals of TLED can step in real time.
 const RIVALS_TETS: [usize; 1] = [3_000];
-/// How fine a mesh is: tetrahedra of the whole brain, how often their edge is halved around the opening, and how far around it, mm.
+/// How fine a mesh is: tetrahedra of the whole brain, how often their edge is halved around a place, and how far around it, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fineness {
     /// Tetrahedra of the whole brain.

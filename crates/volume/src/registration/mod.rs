@@ -18,7 +18,7 @@
 //! whose turn nothing shows, has none. h: by how much the left, right, back, front, lower and upper half of the fixed image, each registered
 //! alone, contradict the whole; a false edge such as padding pulls one half only. In the moves of a real CT and MRI that the
 //! README lists no answer at or over 0.6, the default, was off by 3 mm or 3°; under it the answer is refused and comes with the error.
-//! Shares of the work are fixed, so the bytes do not depend on the number of threads. About 3 s a head on two cores, twice that with padding.
+//! Shares of the work are fixed, so the bytes do not depend on the number of threads. About 3 s a head on one core, twice that with padding.
 //!
 //! # Sources
 //! Viola and Wells 1997 and Collignon 1995 (mutual information), Studholme, Hill and Hawkes 1999 (the quotient), Powell 1964.

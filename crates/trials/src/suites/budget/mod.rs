@@ -2,7 +2,7 @@
 //!
 //! # Theory
 //! In each scene every stored choice for bone, tissue and picture that a session may take (bone: methods that hold thin walls) is run against a truth of high resolution; the cheapest that meets the tolerance, by stored costs, is found by
-//! looking at all. The plan is told the scene's features only. Scenes in which no choice meets a tolerance are counted apart: there the plan must say so.
+//! looking at all. The plan measures the case as a session does, along other ways and from another eye. Scenes in which no choice meets a tolerance are counted apart: there the plan must say so.
 //!
 //! # Practice
 //! Rows of the budget come from other scenes, drawn with other random numbers ([`training`]).

@@ -22,7 +22,7 @@ pub fn truth(scope: Scope) -> Candidate {
     Candidate { name: "truth", flags, touch: Config::default() }
 }
 
-/// Every setup, the presets first.
+/// Every setup, auto and the presets first.
 pub fn all(scope: Scope) -> Vec<Candidate> {
     let thesis = || Config { method: Method::Thesis, ..Config::default() };
     let mut setups = vec![
