@@ -3,7 +3,7 @@
 //! # Theory
 //! A metric of a method is compared over all scenes that both runs have, as the ratio r = new / old in each. The median of the r is what changed; its 95 % interval is the
 //! bootstrap's (Efron 1979): scenes drawn with repeats, a thousand times. A change counts where the interval leaves out 1 and the median is further from 1 than a
-//! time may wander by itself. How far that is, both runs say together: the spread of the ratios of all times, which a busy or another machine widens.
+//! time may wander by itself. How far that is, both runs say together: the spread of the ratios of all times about their median, which a busy or another machine widens.
 //!
 //! # Practice
 //! Times end in `_us`, `_ms`, `_s`, `_ns` or are rates `_per_s`; they are set against the median ratio of all times of the suite, so that a machine that was slower throughout is said once and
@@ -15,12 +15,14 @@ use crate::store;
 use crate::suite::Row;
 use crate::suites::{ALL, ON_REQUEST};
 use anyhow::{Result, bail};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
 
 /// Draws of the bootstrap.
 const DRAWS: usize = 1000;
+/// Deviation that nine in ten of normal values stay within, over that which half of them do: half the times say it though some methods changed.
+const NINE_IN_TEN: f64 = 2.44;
 /// A time must change by this share at least to be told, however sure it is.
 const LEAST_TIME: f64 = 0.05;
 /// The same for all else.
@@ -50,6 +52,8 @@ fn kind(metric: &str) -> (Nature, Better) {
     let ends = |list: &[&str]| list.iter().any(|end| metric.ends_with(end));
     let has = |list: &[&str]| list.iter().any(|word| metric.contains(word));
     match () {
+        () if metric.starts_with("error_over_") => (Nature::Exact, Better::Less),
+        () if metric == "cpu_s_per_s" => (Nature::Time, Better::Less),
         () if has(&["spread", "times_", "_over_", "_mb", "share_of", "halves", "predicted"]) => {
             (Nature::OfTimes, Better::Neither)
         }
@@ -92,13 +96,21 @@ struct Change {
 
 /// Everything that differs between the reports of two folders, as text.
 pub fn folders(old: &Path, new: &Path) -> Result<String> {
-    let mut text = String::new();
+    let (mut text, mut both) = (String::new(), 0);
     for suite in ALL.iter().chain(ON_REQUEST) {
-        if let (Some(old), Some(new)) = (store::report(old, suite.name)?, store::report(new, suite.name)?) {
-            text += &reports(&old, &new);
+        match (store::report(old, suite.name)?, store::report(new, suite.name)?) {
+            (Some(old), Some(new)) => {
+                both += 1;
+                text += &reports(&old, &new);
+            }
+            (None, None) => {}
+            (there, _) => {
+                let which = if there.is_some() { "old" } else { "new" };
+                _ = writeln!(text, "{}: ONLY IN THE {which} run", suite.name);
+            }
         }
     }
-    if text.is_empty() {
+    if both == 0 {
         bail!("{} and {} have no suite in common: give folders with SUITE.json", old.display(), new.display());
     }
     Ok(text)
@@ -114,6 +126,7 @@ pub fn reports(old: &Report, new: &Report) -> String {
         text += "  another machine: times say little\n";
     }
     gates(&mut text, old, new);
+    alone(&mut text, old, new);
     metrics(&mut text, &old.findings.rows, &new.findings.rows);
     charts(&mut text, &old.findings.charts, &new.findings.charts);
     maps(&mut text, &old.findings.maps, &new.findings.maps);
@@ -131,17 +144,37 @@ fn gates(text: &mut String, old: &Report, new: &Report) {
     }
 }
 
+/// Promises and methods that one of the runs lacks.
+fn alone(text: &mut String, old: &Report, new: &Report) {
+    let promises =
+        |report: &Report| report.findings.gates.iter().map(|gate| gate.name.clone()).collect::<BTreeSet<_>>();
+    let methods = |report: &Report| report.findings.rows.iter().map(|row| row.method.clone()).collect::<BTreeSet<_>>();
+    let all = [("promise", [promises(old), promises(new)]), ("method", [methods(old), methods(new)])];
+    for (what, [was, is]) in all {
+        for (run, name) in was.difference(&is).map(|n| ("old", n)).chain(is.difference(&was).map(|n| ("new", n))) {
+            _ = writeln!(text, "  {what} only in the {run} run: {name}");
+        }
+    }
+}
+
 fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
     let ratios = ratios(old, new);
     let mut of_times: Vec<f64> = Vec::new();
-    ratios.iter().filter(|((_, metric), _)| kind(metric).0 == Nature::Time).for_each(|(_, all)| of_times.extend(all));
+    for ((_, metric), all) in &ratios {
+        match kind(metric) {
+            (Nature::Time, Better::More) => of_times.extend(all.iter().map(|rate| 1.0 / rate)),
+            (Nature::Time, _) => of_times.extend(all),
+            _ => {}
+        }
+    }
+    of_times.retain(|ratio| ratio.is_finite());
     let machine = quantile(&mut of_times, 0.5).unwrap_or(1.0);
     let mut wander: Vec<f64> = of_times.iter().map(|ratio| (ratio / machine).ln().abs()).collect();
-    let spread = quantile(&mut wander, 0.9).unwrap_or(0.0).exp() - 1.0;
+    let spread = (NINE_IN_TEN * quantile(&mut wander, 0.5).unwrap_or(0.0)).exp() - 1.0;
     if !of_times.is_empty() {
         _ = writeln!(
             text,
-            "  {} times: new over old {machine:.3} in the median, nine in ten within {:.0} % of that",
+            "  {} times: new over old {machine:.3} in the median, half of them so near to it that nine in ten should be within {:.0} %",
             of_times.len(),
             100.0 * spread
         );
@@ -154,10 +187,13 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
     let mut same = 0;
     for ((method, metric), all) in ratios {
         let (nature, better) = kind(&metric);
-        let all: Vec<f64> =
-            if nature == Nature::Time { all.iter().map(|ratio| ratio / machine).collect() } else { all };
-        let change = Change::of(method, metric, all);
-        match change.word(nature, better) {
+        let by = match (nature, better) {
+            (Nature::Time, Better::More) => machine,
+            (Nature::Time, _) => 1.0 / machine,
+            _ => 1.0,
+        };
+        let change = Change::of(method, metric, all.iter().map(|ratio| ratio * by).collect());
+        match change.word(nature, better, spread) {
             Some(word) => told.entry(word).or_default().push(change),
             None => same += 1,
         }
@@ -217,11 +253,14 @@ impl Change {
         Self { median: quantile(&mut all, 0.5).unwrap_or(1.0), method, metric, scenes, low, high }
     }
 
-    /// What to call it, if it is a change. A time in a single scene is none: nothing says how sure it is.
-    fn word(&self, nature: Nature, better: Better) -> Option<&'static str> {
+    /// What to call it, if it is a change beyond the `spread` of all times. A time in a single scene is none: nothing says how sure it is.
+    fn word(&self, nature: Nature, better: Better, spread: f64) -> Option<&'static str> {
+        if self.median.is_nan() {
+            return Some("NO NUMBER in one of the runs");
+        }
         let is_time = nature != Nature::Exact;
-        let least = if is_time { LEAST_TIME } else { LEAST };
-        let sure = self.low > 1.0 || self.high < 1.0 || self.median.is_nan();
+        let least = if is_time { spread.max(LEAST_TIME) } else { LEAST };
+        let sure = self.low > 1.0 || self.high < 1.0;
         if !sure || (self.median - 1.0).abs() < least || is_time && self.scenes < 3 {
             return None;
         }
@@ -334,7 +373,31 @@ mod tests {
     }
 
     #[test]
+    fn what_one_run_lacks_and_what_is_no_number_is_told() {
+        let (old, mut new) = (report(|_| 1.0, 0.1, 0.2), report(|_| 1.0, f64::NAN, 0.2));
+        new.findings.gates.push(Gate::at_most("time", 1.0, 2.0));
+        new.findings.rows.retain(|row| row.method != "c");
+        let text = reports(&old, &new);
+        assert!(text.contains("NO NUMBER in one of the runs") && !text.contains("more accurate"), "{text}");
+        assert!(text.contains("promise only in the new run: time") && text.contains("method only in the old run: c"));
+        assert!(!reports(&new, &new).contains("NO NUMBER"));
+    }
+
+    #[test]
+    fn rates_of_a_slower_machine_are_not_blamed_on_methods() {
+        let of = |speed: f64| {
+            let mut report = report(|n| (1.0 + 0.01 * (n as f64).sin()) / speed, 0.1, 0.2);
+            report.findings.rows.iter_mut().for_each(|row| _ = row.metrics.insert("frames_per_s".into(), 30.0 * speed));
+            report
+        };
+        let text = reports(&of(1.0), &of(0.5));
+        assert!(!text.contains("SLOWER") && !text.contains("faster"), "{text}");
+    }
+
+    #[test]
     fn names_tell_times_from_errors() {
+        assert_eq!(kind("error_over_tolerance"), (Nature::Exact, Better::Less));
+        assert_eq!(kind("cpu_s_per_s"), (Nature::Time, Better::Less));
         assert_eq!(kind("tick_p50_us"), (Nature::Time, Better::Less));
         assert_eq!(kind("time_to_rest_ms"), (Nature::Time, Better::Less));
         assert_eq!(kind("call_spread_percent"), (Nature::OfTimes, Better::Neither));

@@ -2,7 +2,7 @@
 //!
 //! # Practice
 //! `OUT/parts/SUITE/PART.json` holds one part; each appears whole or not at all. A run takes up parts of the very same program, scope and seed, and leaves all others; it
-//! deletes its parts when the report is written. Merging takes parts of one program or one commit, of one scope and seed, whoever made them.
+//! deletes its own when the report is written. Merging takes parts of one program or one commit, of one scope and seed, whoever made them.
 
 use crate::part::{Scope, Suite};
 use crate::report::{Making, Report};
@@ -63,8 +63,17 @@ impl Store {
     /// A part that this very program made in this scope, if it is there.
     pub fn found(&self, suite: &str, part: &str) -> Option<Stored> {
         let stored: Stored = serde_json::from_slice(&fs::read(self.place(suite, part)).ok()?).ok()?;
-        (stored.ended && stored.program == self.program && stored.making.scope() == self.making.scope())
-            .then_some(stored)
+        (stored.ended && self.is_own(&stored)).then_some(stored)
+    }
+
+    /// Whether this very program made a part, in this scope.
+    fn is_own(&self, stored: &Stored) -> bool {
+        stored.program == self.program && stored.making.scope() == self.making.scope()
+    }
+
+    /// All parts of a suite that this very program made in this scope, judged as one run. `None` where there is none.
+    pub fn merged(&self, suite: &Suite) -> Result<Option<Report>> {
+        judged(suite, stored(suite.name, std::slice::from_ref(&self.folder))?.filter(|part| self.is_own(&part.2)))
     }
 
     /// Keeps a part with what it took, what the machine itself took meanwhile, and whether it came to its end.
@@ -80,9 +89,11 @@ impl Store {
         whole(&self.place(suite, part), &serde_json::to_vec(&stored)?)
     }
 
-    /// Deletes a suite's parts: they are in its report.
+    /// Deletes a suite's own parts: they are in its report.
     pub fn forget(&self, suite: &str) {
-        _ = fs::remove_dir_all(self.folder.join(PARTS).join(suite));
+        let all = stored(suite, std::slice::from_ref(&self.folder)).into_iter().flatten();
+        all.filter(|part| self.is_own(&part.2)).for_each(|(_, path, _)| _ = fs::remove_file(path));
+        _ = fs::remove_dir(self.folder.join(PARTS).join(suite));
         _ = fs::remove_dir(self.folder.join(PARTS));
     }
 
@@ -104,22 +115,41 @@ fn durations(scope: Scope) -> &'static str {
 
 /// All parts of a suite in some folders, in the suite's order, judged as one run. `None` where no folder has any.
 pub fn merged(suite: &Suite, folders: &[PathBuf]) -> Result<Option<Report>> {
-    let mut parts: BTreeMap<String, (PathBuf, Stored)> = BTreeMap::new();
+    judged(suite, stored(suite.name, folders)?)
+}
+
+/// The parts of a suite that lie in some folders: name, file and part. What a stopped write left is none.
+fn stored(suite: &str, folders: &[PathBuf]) -> Result<impl Iterator<Item = (String, PathBuf, Stored)>> {
+    let mut all = Vec::new();
     for folder in folders {
-        let of_suite = folder.join(PARTS).join(suite.name);
-        for entry in fs::read_dir(&of_suite).into_iter().flatten() {
+        for entry in fs::read_dir(folder.join(PARTS).join(suite)).into_iter().flatten() {
             let path = entry?.path();
+            if path.extension().is_none_or(|ending| ending != "json") {
+                continue;
+            }
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             let read = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-            let stored = serde_json::from_slice(&read).with_context(|| format!("{} is no part", path.display()))?;
-            if let Some((other, _)) = parts.insert(name, (path.clone(), stored)) {
-                bail!("{} and {} are the same part: leave one out", other.display(), path.display());
-            }
+            let part = serde_json::from_slice(&read).with_context(|| format!("{} is no part", path.display()))?;
+            all.push((name, path, part));
+        }
+    }
+    Ok(all.into_iter())
+}
+
+/// Parts of one suite as one run.
+fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, Stored)>) -> Result<Option<Report>> {
+    let mut parts: BTreeMap<String, (PathBuf, Stored)> = BTreeMap::new();
+    for (name, path, part) in all {
+        if let Some((other, _)) = parts.insert(name, (path.clone(), part)) {
+            bail!("{} and {} are the same part: leave one out", other.display(), path.display());
         }
     }
     let Some((first, of_first)) = parts.values().next() else { return Ok(None) };
     let alike = |one: &Stored, two: &Stored| {
-        let same_code = one.program == two.program || one.making.commit == two.making.commit;
+        let [one_commit, two_commit] = [one, two].map(|part| &*part.making.commit);
+        // Of changes that no commit holds, and of sources without one, nobody knows whether they are the same.
+        let is_sure = !one_commit.ends_with("-dirty") && one_commit != "unknown";
+        let same_code = one.program == two.program || is_sure && one_commit == two_commit;
         same_code && one.making.scope() == two.making.scope()
     };
     if let Some((path, other)) = parts.values().find(|(_, part)| !alike(part, of_first)) {
@@ -159,7 +189,8 @@ pub fn report(folder: &Path, suite: &str) -> Result<Option<Report>> {
             let report = serde_json::from_slice(&bytes);
             Ok(Some(report.with_context(|| format!("{} is no report of a suite", path.display()))?))
         }
-        Err(_) => Ok(None),
+        Err(fault) if fault.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(fault) => Err(fault).with_context(|| format!("cannot read {}", path.display())),
     }
 }
 
@@ -231,7 +262,14 @@ mod tests {
         let found = store.found(SUITE.name, "part-1").unwrap().findings;
         store.keep(SUITE.name, "part-1", (0.1, Control::default()), (found, false)).unwrap();
         assert!(store.found(SUITE.name, "part-1").is_none(), "a part that panicked is made again");
+        assert!(store.merged(&SUITE).unwrap_err().to_string().contains("missing, such as part-2"));
+        run(all.path(), |_| true);
+        let larger = Store::open(all.path(), Scope { quick: false, seed: 1 }).unwrap();
+        larger.keep(SUITE.name, "part-8", (0.1, Control::default()), (Findings::default(), true)).unwrap();
+        fs::write(all.path().join("parts/made-up/.tmpXYZ"), "{").unwrap();
+        assert!(store.merged(&SUITE).unwrap().is_some(), "what others and a stopped write left is not asked");
         store.forget(SUITE.name);
-        assert!(store.found(SUITE.name, "part-0").is_none());
+        assert!(store.found(SUITE.name, "part-0").is_none() && store.merged(&SUITE).unwrap().is_none());
+        assert!(larger.found(SUITE.name, "part-8").is_some(), "another run's part is left");
     }
 }

@@ -21,7 +21,7 @@ mod setups;
 use super::{Part, Scope};
 use crate::picture::{Chart, Mark};
 use crate::suite::{Findings, Gate, Row};
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use error::Errors;
 use ride::Ride;
 use setups::Candidate;
@@ -56,6 +56,7 @@ fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
         *kept = Some((scope, ride::truth(scope)?));
     }
     let (_, truth) = kept.as_ref().expect("it was just made");
+    ensure!(truth.opened(), "the truth did not open the skull: nothing can be held against it");
     let ride = ride::ride(scope, candidate, Some(truth))?;
     let errors = Errors::between(&ride, truth);
     let per_s = |seconds: f64| seconds / ride.seconds;
