@@ -40,6 +40,19 @@ pub struct View {
 }
 
 impl View {
+    /// Root mean square of all colours over all views, percent of white, of every choice in the order given.
+    ///
+    /// # Errors
+    /// When the picture has no pixels or too many.
+    pub fn measure_all(views: &[Self], choices: &[Picture], threads: usize) -> Result<Vec<f64>, RenderError> {
+        let mut squares = vec![0.0; choices.len()];
+        for view in views {
+            let found = view.measure(choices, threads)?;
+            squares.iter_mut().zip(found).for_each(|(sum, found)| *sum += found.error_percent.powi(2));
+        }
+        Ok(squares.into_iter().map(|sum| (sum / views.len().max(1) as f64).sqrt()).collect())
+    }
+
     /// Every choice, in the order given, each drawn once by so many threads.
     ///
     /// # Errors

@@ -8,6 +8,8 @@ use trepan_simulator::measure::Sight;
 use trepan_simulator::measure::bone::Slide;
 use trepan_simulator::measure::picture::View;
 
+/// Places that the eye goes to.
+pub const EYES: usize = 3;
 /// How far the eye moves off where it was, as a share of its distance: up to 15 degrees.
 const MOVED: f32 = 0.25;
 
@@ -30,8 +32,8 @@ pub struct Situation {
     pub slide_mm: f32,
     /// Direction from there to the eye when the session starts.
     pub eye: Vec3,
-    /// Direction to it later, which the plan is not told.
-    pub eye_later: Vec3,
+    /// Directions to it later, which the plan is not told.
+    pub eyes_later: [Vec3; EYES],
 }
 
 impl Situation {
@@ -66,9 +68,11 @@ impl Situation {
         };
         let slide_mm = log(3.0, 8.0) as f32;
         let eye = (towards + 0.6 * direction(random)).normalize();
-        let eye_later = eye + MOVED * direction(random);
+        let aside = direction(random);
+        let turned = |n: usize| glam::Quat::from_axis_angle(eye, core::f32::consts::TAU * n as f32 / EYES as f32);
+        let eyes_later = core::array::from_fn(|n| eye + MOVED * (turned(n) * aside));
         let turn_rad = random.f32() * core::f32::consts::TAU;
-        Self { scene, towards, bone_site, turn_rad, slide_mm, eye, eye_later }
+        Self { scene, towards, bone_site, turn_rad, slide_mm, eye, eyes_later }
     }
 
     /// The burr's way over the bone.
@@ -83,8 +87,9 @@ impl Situation {
     }
 
     /// What is seen later.
-    pub fn view(&self, case: &Case) -> View {
-        View { bone: Arc::clone(&case.bone), scene: self.scene, target: self.bone_site, eye: self.eye_later }
+    pub fn views(&self, case: &Case) -> [View; EYES] {
+        let view = |eye| View { bone: Arc::clone(&case.bone), scene: self.scene, target: self.bone_site, eye };
+        self.eyes_later.map(view)
     }
 
     /// What a session could look at before it starts.

@@ -68,7 +68,7 @@ pub fn observe(part: usize, tables: &[String]) -> Observed {
             }
         };
         let drawn = || {
-            let found = situation.view(&case).measure(&pictures, 1).expect("the view has pixels");
+            let found = situation.views(&case)[0].measure(&pictures, 1).expect("the view has pixels");
             let unit_us = found.last().expect("there are choices").us;
             Seen {
                 features: scene.picture_features(),

@@ -10,6 +10,7 @@ use trepan_budget::{
 };
 use trepan_simulator::measure::Own;
 use trepan_simulator::measure::bone::Stretch;
+use trepan_simulator::measure::picture::View;
 use trepan_simulator::measure::tissue::{Brains, Fineness, LEAST_MM, Push};
 
 /// Tetrahedra that a quick run has at most.
@@ -29,8 +30,7 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
         let in_tissue = push.measure(&brains).expect("the brain is sound");
         let in_tissue = in_tissue.iter().map(|found| found.error_mm).collect();
         let pictures: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
-        let seen = situation.view(&case).measure(&pictures, 1).expect("the view has pixels");
-        let seen = seen.iter().map(|found| found.error_percent).collect();
+        let seen = View::measure_all(&situation.views(&case), &pictures, 1).expect("the views have pixels");
         let own = Own::of(&situation.sight(&case), &situation.scene, &rows, 1);
         note(&name, &situation, &rows, &own, [on_bone, in_tissue, seen], findings);
     }
