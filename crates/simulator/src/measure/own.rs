@@ -4,10 +4,10 @@
 //! A law says what a choice's error is in a case like this; here it is looked at. Each choice for bone (of the recommended method, unless another is given) is led over three slides from the opening and cuts in once, against fine voxels of the same CT; the worst
 //! counts. TLED on each mesh is pushed and led along the brain, against a mesh that is sixteen times finer where the probe goes. Each choice for the picture is drawn from where the eye starts and from three places around, against every ray. The hand will go other ways and the eye will move, so what is found is
 //! believed with a margin. A mesh that is lucky under one slide need not be under the next, nor a voxel size: of tissue and bone the case says how far all choices are off, and half of which is better; the laws say
-//! the other half. The margins are those with which, over 40 scenes and all tolerances of `cargo xtask validate budget --seed 11`, 99 % of what tissue and the picture ask is met; more costs more than it mends.
+//! the other half. The margins of tissue and picture are those with which, over 40 scenes and all tolerances of `cargo xtask validate budget --seed 11`, 99 % of what they ask is met; more costs more than it mends.
 //!
 //! # Practice
-//! 36 s of one core, 24 s of two with the reading of the case, tissue beside the rest; what is found does not depend on the tolerances, so it is kept with the case. What cannot be measured is left to the laws.
+//! 46 s of one core, 27 s of two with the reading of the case, tissue beside the rest; what is found does not depend on the tolerances, so it is kept with the case. What cannot be measured is left to the laws.
 
 use super::bone::{Skull, Slide, Stretch};
 use super::picture::View;

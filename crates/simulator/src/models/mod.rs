@@ -10,7 +10,7 @@
 //! ```
 //!
 //! # Practice
-//! Settled once at start. The machine is measured only for parts that a plan chooses, in under two seconds, and the case in some twenty where it was not before; a replay, a preset, or a session with everything given
+//! Settled once at start. The machine is measured only for parts that a plan chooses, in under two seconds, and the case in some thirty where it was not before; a replay, a preset, or a session with everything given
 //! measures nothing, so that it is the same on every machine.
 
 mod given;
