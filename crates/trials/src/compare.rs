@@ -27,6 +27,8 @@ const NINE_IN_TEN: f64 = 2.44;
 const LEAST_TIME: f64 = 0.05;
 /// The same for all else.
 const LEAST: f64 = 1e-6;
+/// So many are named of what only one run has.
+const NAMED: usize = 3;
 
 /// Which way of a metric is better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +55,7 @@ fn kind(metric: &str) -> (Nature, Better) {
     let has = |list: &[&str]| list.iter().any(|word| metric.contains(word));
     match () {
         () if metric.starts_with("error_over_") => (Nature::Exact, Better::Less),
-        () if metric == "cpu_s_per_s" => (Nature::Time, Better::Less),
+        () if ends(&["cpu_s_per_s"]) => (Nature::Time, Better::Less),
         () if has(&["spread", "times_", "_over_", "_mb", "share_of", "halves", "predicted"]) => {
             (Nature::OfTimes, Better::Neither)
         }
@@ -144,15 +146,28 @@ fn gates(text: &mut String, old: &Report, new: &Report) {
     }
 }
 
-/// Promises and methods that one of the runs lacks.
+/// Promises, and methods in scenes, that one of the runs lacks.
 fn alone(text: &mut String, old: &Report, new: &Report) {
-    let promises =
-        |report: &Report| report.findings.gates.iter().map(|gate| gate.name.clone()).collect::<BTreeSet<_>>();
-    let methods = |report: &Report| report.findings.rows.iter().map(|row| row.method.clone()).collect::<BTreeSet<_>>();
-    let all = [("promise", [promises(old), promises(new)]), ("method", [methods(old), methods(new)])];
-    for (what, [was, is]) in all {
-        for (run, name) in was.difference(&is).map(|n| ("old", n)).chain(is.difference(&was).map(|n| ("new", n))) {
-            _ = writeln!(text, "  {what} only in the {run} run: {name}");
+    let promises = |report: &Report| {
+        let names = report.findings.gates.iter().map(|gate| (gate.name.clone(), gate.name.clone()));
+        names.collect::<BTreeMap<_, _>>()
+    };
+    let rows = |report: &Report| {
+        let names = keyed(&report.findings.rows)
+            .map(|((key, n), row)| (format!("{key} {n}"), format!("{} in {}", row.method, row.scene)));
+        names.collect::<BTreeMap<_, _>>()
+    };
+    for (what, was, is) in [("promises", promises(old), promises(new)), ("rows of methods", rows(old), rows(new))] {
+        for (run, of, other) in [("old", &was, &is), ("new", &is, &was)] {
+            let lacking = || of.iter().filter(|(key, _)| !other.contains_key(*key)).map(|(_, name)| name.as_str());
+            let mut names: Vec<&str> = lacking().collect::<BTreeSet<_>>().into_iter().collect();
+            if names.is_empty() {
+                continue;
+            }
+            if names.len() > NAMED {
+                names.splice(NAMED.., ["..."]);
+            }
+            _ = writeln!(text, "  {} {what} ONLY IN THE {run} run: {}", lacking().count(), names.join(", "));
         }
     }
 }
@@ -192,7 +207,15 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
             (Nature::Time, _) => 1.0 / machine,
             _ => 1.0,
         };
-        let change = Change::of(method, metric, all.iter().map(|ratio| ratio * by).collect());
+        let (lost, all): (Vec<f64>, Vec<f64>) = all.into_iter().map(|ratio| ratio * by).partition(|r| r.is_nan());
+        if !lost.is_empty() {
+            let change = Change::of(method.clone(), metric.clone(), lost);
+            told.entry("NO NUMBER in one of the runs").or_default().push(change);
+            if all.is_empty() {
+                continue;
+            }
+        }
+        let change = Change::of(method, metric, all);
         match change.word(nature, better, spread) {
             Some(word) => told.entry(word).or_default().push(change),
             None => same += 1,
@@ -208,7 +231,7 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
     }
 }
 
-/// New over old of every metric that both have in the same scene, by method and metric. Where both are 0 the ratio is 1.
+/// New over old of every metric that both have in the same scene, by method and metric. Where both are 0 the ratio is 1, where one is no number it is none either; where both are none, nothing is compared.
 fn ratios(old: &[Row], new: &[Row]) -> BTreeMap<(String, String), Vec<f64>> {
     let was: BTreeMap<_, &Row> = keyed(old).collect();
     let mut ratios: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
@@ -216,8 +239,10 @@ fn ratios(old: &[Row], new: &[Row]) -> BTreeMap<(String, String), Vec<f64>> {
         let Some(before) = was.get(&key) else { continue };
         for (metric, &value) in &row.metrics {
             let Some(&old) = before.metrics.get(metric) else { continue };
-            let ratio = if value == old || (value.is_nan() && old.is_nan()) { 1.0 } else { value / old };
-            ratios.entry((row.method.clone(), metric.clone())).or_default().push(ratio);
+            let all = ratios.entry((row.method.clone(), metric.clone())).or_default();
+            if !(value.is_nan() && old.is_nan()) {
+                all.push(if value == old { 1.0 } else { value / old });
+            }
         }
     }
     ratios
@@ -255,9 +280,6 @@ impl Change {
 
     /// What to call it, if it is a change beyond the `spread` of all times. A time in a single scene is none: nothing says how sure it is.
     fn word(&self, nature: Nature, better: Better, spread: f64) -> Option<&'static str> {
-        if self.median.is_nan() {
-            return Some("NO NUMBER in one of the runs");
-        }
         let is_time = nature != Nature::Exact;
         let least = if is_time { spread.max(LEAST_TIME) } else { LEAST };
         let sure = self.low > 1.0 || self.high < 1.0;
@@ -379,8 +401,32 @@ mod tests {
         new.findings.rows.retain(|row| row.method != "c");
         let text = reports(&old, &new);
         assert!(text.contains("NO NUMBER in one of the runs") && !text.contains("more accurate"), "{text}");
-        assert!(text.contains("promise only in the new run: time") && text.contains("method only in the old run: c"));
-        assert!(!reports(&new, &new).contains("NO NUMBER"));
+        assert!(text.contains("  1 promises ONLY IN THE new run: time"), "{text}");
+        let lacking = "  10 rows of methods ONLY IN THE old run: c in scene 20, c in scene 21, c in scene 22, ...";
+        assert!(text.contains(lacking), "{text}");
+        assert!(!reports(&new, &new).contains("NO NUMBER") && !reports(&new, &new).contains("ONLY"));
+    }
+
+    #[test]
+    fn a_number_that_one_scene_lost_is_told_and_what_neither_run_has_is_no_change() {
+        let (old, mut new) = (report(|_| 1.0, 0.1, 0.2), report(|_| 1.0, 0.1, 0.2));
+        new.findings.rows[3].metrics.insert("depth_error_mm".into(), f64::NAN);
+        for text in [reports(&old, &new), reports(&new, &old)] {
+            assert!(text.contains("NO NUMBER") && text.contains("a, depth_error_mm: xNaN [NaN, NaN] over 1 scene(s)"));
+        }
+        let slower = |slow: f64| {
+            let mut report = report(|_| slow, 0.1, 0.2);
+            report.findings.rows.iter_mut().for_each(|row| _ = row.metrics.insert("mesh_s".into(), f64::NAN));
+            report
+        };
+        assert!(!reports(&slower(1.0), &slower(1.5)).contains("mesh_s"), "no machine is slower at no number");
+    }
+
+    #[test]
+    fn a_time_within_the_spread_of_all_times_is_no_change() {
+        let change = Change { median: 1.1, low: 1.08, high: 1.12, ..Change::of("a".into(), "us".into(), vec![1.1; 9]) };
+        let word = |spread| change.word(Nature::Time, Better::Less, spread);
+        assert_eq!((word(0.02), word(0.2)), (Some("SLOWER"), None));
     }
 
     #[test]
@@ -397,7 +443,9 @@ mod tests {
     #[test]
     fn names_tell_times_from_errors() {
         assert_eq!(kind("error_over_tolerance"), (Nature::Exact, Better::Less));
+        assert_eq!(kind("error_over_motion"), (Nature::Exact, Better::Less));
         assert_eq!(kind("cpu_s_per_s"), (Nature::Time, Better::Less));
+        assert_eq!(kind("solver_cpu_s_per_s"), (Nature::Time, Better::Less));
         assert_eq!(kind("tick_p50_us"), (Nature::Time, Better::Less));
         assert_eq!(kind("time_to_rest_ms"), (Nature::Time, Better::Less));
         assert_eq!(kind("call_spread_percent"), (Nature::OfTimes, Better::Neither));

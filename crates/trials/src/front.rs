@@ -15,10 +15,11 @@ pub fn dominated(rows: &[Row], scene: &str, method: &str, cost: &str, error: &st
         .count()
 }
 
-/// Indices of the points (cost, error) that no other point beats in both, cheapest first.
+/// Indices of the points (cost, error) that no other point beats in both, cheapest first. What has no number is not among them.
 pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     let beaten = |p: &(f64, f64)| points.iter().any(|q| (q.0 < p.0 && q.1 <= p.1) || (q.0 <= p.0 && q.1 < p.1));
-    let mut best: Vec<usize> = (0..points.len()).filter(|&i| !beaten(&points[i])).collect();
+    let known = |p: &(f64, f64)| !p.0.is_nan() && !p.1.is_nan();
+    let mut best: Vec<usize> = (0..points.len()).filter(|&i| known(&points[i]) && !beaten(&points[i])).collect();
     best.sort_by(|&a, &b| points[a].0.total_cmp(&points[b].0));
     best
 }
@@ -31,6 +32,7 @@ mod tests {
     fn the_front_is_what_nobody_beats() {
         let points = [(1.0, 9.0), (2.0, 4.0), (3.0, 5.0), (4.0, 1.0), (4.5, 1.0)];
         assert_eq!(front(&points), [0, 1, 3]);
+        assert_eq!(front(&[(0.5, f64::NAN), (1.0, 9.0)]), [1]);
         let rows: Vec<Row> = points
             .iter()
             .enumerate()

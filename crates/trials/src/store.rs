@@ -5,7 +5,7 @@
 //! deletes its own when the report is written. Merging takes parts of one program or one commit, of one scope and seed, whoever made them.
 
 use crate::part::{Scope, Suite};
-use crate::report::{Making, Report};
+use crate::report::{Making, Report, slugs};
 use crate::suite::{Findings, Row};
 use crate::timer::{Control, Samples};
 use anyhow::{Context, Result, bail};
@@ -62,18 +62,24 @@ impl Store {
 
     /// A part that this very program made in this scope, if it is there.
     pub fn found(&self, suite: &str, part: &str) -> Option<Stored> {
+        self.own(suite, part).filter(|stored| stored.ended)
+    }
+
+    /// The same, whether it came to its end or not.
+    fn own(&self, suite: &str, part: &str) -> Option<Stored> {
         let stored: Stored = serde_json::from_slice(&fs::read(self.place(suite, part)).ok()?).ok()?;
-        (stored.ended && self.is_own(&stored)).then_some(stored)
+        (stored.program == self.program && stored.making.scope() == self.making.scope()).then_some(stored)
     }
 
-    /// Whether this very program made a part, in this scope.
-    fn is_own(&self, stored: &Stored) -> bool {
-        stored.program == self.program && stored.making.scope() == self.making.scope()
+    /// The parts of a suite that this very program made in this scope: name, file and part. Nothing else in the folder is read.
+    fn all_own(&self, suite: &Suite) -> impl Iterator<Item = (String, PathBuf, Stored)> {
+        let names = slugs(suite, self.making.scope()).into_iter();
+        names.filter_map(|name| Some((name.clone(), self.place(suite.name, &name), self.own(suite.name, &name)?)))
     }
 
-    /// All parts of a suite that this very program made in this scope, judged as one run. `None` where there is none.
+    /// All of these, judged as one run. `None` where there is none.
     pub fn merged(&self, suite: &Suite) -> Result<Option<Report>> {
-        judged(suite, stored(suite.name, std::slice::from_ref(&self.folder))?.filter(|part| self.is_own(&part.2)))
+        judged(suite, self.all_own(suite))
     }
 
     /// Keeps a part with what it took, what the machine itself took meanwhile, and whether it came to its end.
@@ -90,10 +96,9 @@ impl Store {
     }
 
     /// Deletes a suite's own parts: they are in its report.
-    pub fn forget(&self, suite: &str) {
-        let all = stored(suite, std::slice::from_ref(&self.folder)).into_iter().flatten();
-        all.filter(|part| self.is_own(&part.2)).for_each(|(_, path, _)| _ = fs::remove_file(path));
-        _ = fs::remove_dir(self.folder.join(PARTS).join(suite));
+    pub fn forget(&self, suite: &Suite) {
+        self.all_own(suite).for_each(|(_, path, _)| _ = fs::remove_file(path));
+        _ = fs::remove_dir(self.folder.join(PARTS).join(suite.name));
         _ = fs::remove_dir(self.folder.join(PARTS));
     }
 
@@ -155,10 +160,11 @@ fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, Stored)>) -
     if let Some((path, other)) = parts.values().find(|(_, part)| !alike(part, of_first)) {
         let told = |m: &Making| format!("commit {}, quick {}, seed {}", m.commit, m.quick, m.seed);
         let [one, two] = [&of_first.making, &other.making].map(told);
-        bail!("{} is of {one}, {} of {two}: merge parts of one", first.display(), path.display());
+        let remedy = "merge parts of one program, or of one commit without changes";
+        bail!("{} is of {one}, {} of {two}: {remedy}", first.display(), path.display());
     }
     let scope = of_first.making.scope();
-    let wanted = crate::report::slugs(suite, scope);
+    let wanted = slugs(suite, scope);
     let missing: Vec<&String> = wanted.iter().filter(|name| !parts.contains_key(*name)).collect();
     if !missing.is_empty() {
         bail!("{}: {} part(s) are missing, such as {}: run their shard first", suite.name, missing.len(), missing[0]);
@@ -266,10 +272,40 @@ mod tests {
         run(all.path(), |_| true);
         let larger = Store::open(all.path(), Scope { quick: false, seed: 1 }).unwrap();
         larger.keep(SUITE.name, "part-8", (0.1, Control::default()), (Findings::default(), true)).unwrap();
-        fs::write(all.path().join("parts/made-up/.tmpXYZ"), "{").unwrap();
+        for stray in [".tmpXYZ", "part-of-an-older-format.json"] {
+            fs::write(all.path().join("parts/made-up").join(stray), "{").unwrap();
+        }
         assert!(store.merged(&SUITE).unwrap().is_some(), "what others and a stopped write left is not asked");
-        store.forget(SUITE.name);
+        store.forget(&SUITE);
         assert!(store.found(SUITE.name, "part-0").is_none() && store.merged(&SUITE).unwrap().is_none());
         assert!(larger.found(SUITE.name, "part-8").is_some(), "another run's part is left");
+    }
+
+    #[test]
+    fn parts_of_two_programs_are_merged_only_where_one_commit_made_both() {
+        let all = tempfile::tempdir().unwrap();
+        run(all.path(), |_| true);
+        let merged_of = |programs: [&str; 2], commit: &str| {
+            for n in 0..5 {
+                let path = all.path().join(format!("parts/made-up/part-{n}.json"));
+                let mut part: Stored = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+                part.program = programs[n % 2].into();
+                part.making.commit = commit.into();
+                whole(&path, &serde_json::to_vec(&part).unwrap()).unwrap();
+            }
+            merged(&SUITE, &[all.path().into()])
+        };
+        assert!(merged_of(["one", "two"], "0123abc").is_ok() && merged_of(["one", "one"], "0123abc-dirty").is_ok());
+        for unsure in ["0123abc-dirty", "unknown"] {
+            assert!(merged_of(["one", "two"], unsure).unwrap_err().to_string().contains("merge parts of one program"));
+        }
+    }
+
+    #[test]
+    fn a_report_that_cannot_be_read_is_an_error_and_none_is_not() {
+        let all = tempfile::tempdir().unwrap();
+        assert!(report(all.path(), "made-up").unwrap().is_none());
+        fs::create_dir(all.path().join("made-up.json")).unwrap();
+        assert!(report(all.path(), "made-up").unwrap_err().to_string().contains("cannot read"));
     }
 }

@@ -142,7 +142,7 @@ fn run(asked: &Run) -> Result<bool> {
         let report = store.merged(suite)?.context("no part was made")?;
         passed &= write(suite, &report, &asked.out)?;
         keep(asked.keep_borders, suite, &report)?;
-        store.forget(suite.name);
+        store.forget(suite);
     }
     Ok(paged(&asked.out)? && passed)
 }
@@ -344,4 +344,19 @@ fn paged(out: &Path) -> Result<bool> {
     let holes = families::holes(&reports);
     holes.iter().for_each(|hole| println!("  HOLE {hole}"));
     Ok(holes.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_suite_that_is_named_twice_is_run_once() {
+        let count = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+            let (jobs, suites) = jobs(&names, Scope { quick: true, seed: 1 }).unwrap();
+            (jobs.len(), suites.len())
+        };
+        assert_eq!(count(&["rigid", "rigid"]), count(&["rigid"]));
+    }
 }

@@ -60,13 +60,13 @@ fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
     let ride = ride::ride(scope, candidate, Some(truth))?;
     let errors = Errors::between(&ride, truth);
     let per_s = |seconds: f64| seconds / ride.seconds;
-    let worst = (errors.bone_p95_n / FORCE_N).max(errors.tissue_p95_n / FORCE_N).max(errors.shown_p95_mm / SURFACE_MM);
+    let errors_over = [errors.bone_p95_n / FORCE_N, errors.tissue_p95_n / FORCE_N, errors.shown_p95_mm / SURFACE_MM];
     let mut row = Row::new(SCENE, candidate.name).with("setup", ride.setup.as_str()).with("seconds", ride.seconds);
     for (name, value) in errors.named() {
         row = row.metric(name, value);
     }
     Ok(row
-        .metric("error_over_tolerance", worst)
+        .metric("error_over_tolerance", worst(errors_over))
         .metric("cpu_s_per_s", per_s(ride.cpu_s.iter().sum()))
         .metric("haptic_cpu_s_per_s", per_s(ride.cpu_s[0]))
         .metric("collision_cpu_s_per_s", per_s(ride.cpu_s[1]))
@@ -75,6 +75,11 @@ fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
         .metric("memory_mb", ride.memory_mb)
         .metric("opened", f64::from(u8::from(ride.opened())))
         .metric("truth_cpu_s_per_s", truth.cpu_s.iter().sum::<f64>() / truth.seconds))
+}
+
+/// The largest; not a number where one is none.
+fn worst(all: [f64; 3]) -> f64 {
+    all.into_iter().fold(0.0, |most, e| if e.is_nan() || most.is_nan() { f64::NAN } else { most.max(e) })
 }
 
 /// Charts of error over CPU time, and what every setup must keep.
@@ -119,7 +124,31 @@ fn gates(rows: &[Row], gates: &mut Vec<Gate>) {
             number(row, "cpu_s_per_s") < number(auto, "cpu_s_per_s") * (1.0 - Chart::SPREAD)
                 && number(row, error) < number(auto, error) * (1.0 - Chart::SPREAD)
         };
-        let beaten = presets().filter(beats).count() as f64;
+        // Of what has no number nobody knows which is better.
+        let known = |row: &Row| number(row, "cpu_s_per_s").is_finite() && number(row, error).is_finite();
+        let beaten = if presets().chain([auto]).all(known) { presets().filter(beats).count() as f64 } else { f64::NAN };
         gates.push(Gate::at_most(format!("auto: presets that are cheaper and better, by {error}"), beaten, 0.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_that_is_no_number_breaks_its_promise() {
+        assert!(worst([f64::NAN, 1.0, 2.0]).is_nan() && worst([1.0, 2.0, f64::NAN]).is_nan());
+        assert_eq!(worst([1.0, 3.0, 2.0]), 3.0);
+        let row = |name: &str, tissue: f64| {
+            let row = Row::new(SCENE, name).metric("opened", 1.0).metric("cpu_s_per_s", 0.5);
+            let row = row.metric("bone_force_error_rms_n", 0.1).metric("shown_error_p95_mm", 0.5);
+            row.metric("tissue_force_error_rms_n", tissue)
+        };
+        let broken = |auto: f64, draft: f64| {
+            let mut promises = Vec::new();
+            gates(&[row("auto", auto), row("draft", draft)], &mut promises);
+            promises.iter().filter(|gate| !gate.pass).count()
+        };
+        assert_eq!([broken(0.1, 0.1), broken(f64::NAN, 0.1), broken(0.1, f64::NAN)], [0, 1, 1]);
     }
 }
