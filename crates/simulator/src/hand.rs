@@ -5,7 +5,6 @@ use crate::error::SessionError;
 use crate::options::Options;
 use crate::program::Program;
 use crate::run::watch::Watched;
-use crate::table::Table;
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{self, Script, Site};
@@ -26,9 +25,14 @@ pub struct Hand {
 
 impl Hand {
     /// Opens the device.
-    pub fn open(name: &DeviceName, program: Program, options: &Options, table: &Table) -> Result<Self, SessionError> {
+    pub fn open(
+        name: &DeviceName,
+        program: Program,
+        options: &Options,
+        plan: &Plan,
+        rate_hz: f32,
+    ) -> Result<Self, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let (plan, site) = (&table.plan, &table.plan.site);
         let script = |name: &str| scripted(name, options, plan);
         let mut hand = Self { device: None, pointer: None, watch: None };
         if let Some(name) = &options.watch {
@@ -47,10 +51,10 @@ impl Hand {
                 Some(Box::new(mouse))
             }
             DeviceName::Replay(_) => None,
-            hardware => match hardware::open(hardware, workspace(site, options.device_scale)) {
+            hardware => match hardware::open(hardware, workspace(&plan.site, options.device_scale)) {
                 Some(opened) => {
                     let opened = opened.map_err(|f| fault(&f))?;
-                    bears(&opened.device.capabilities(), table.operation.rate_hz)?;
+                    bears(&opened.device.capabilities(), rate_hz)?;
                     hand.watch = Some(opened.watch);
                     Some(Box::new(Clutch::new(opened.device)))
                 }
@@ -71,9 +75,8 @@ pub struct SecondHold {
 
 impl SecondHold {
     /// Opens the device. One of metal lives on a thread of its own, so that its link never holds the first hand up.
-    pub fn open(name: &DeviceName, options: &Options, table: &Table) -> Result<Self, SessionError> {
+    pub fn open(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let (plan, site) = (&table.plan, &table.plan.site);
         let script = |name: &str| scripted(name, options, plan);
         let (device, watch): (Box<dyn HapticDevice>, _) = match name {
             DeviceName::Script(operation) => (Box::new(script(operation)?), None),
@@ -82,11 +85,11 @@ impl SecondHold {
                 (Box::new(simulated::Simulated::new(config, grip, Box::new(script(operation)?))), None)
             }
             metal => {
-                let mut beside = workspace(site, options.device_scale);
+                let mut beside = workspace(&plan.site, options.device_scale);
                 // Both hands rest in the middle of their boxes: there the tools stand side by side.
                 beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
                 let opened = hardware::open(metal, beside).ok_or_else(|| unfit(metal))?.map_err(|f| fault(&f))?;
-                bears(&opened.device.capabilities(), table.operation.rate_hz)?;
+                bears(&opened.device.capabilities(), rate_hz)?;
                 (Box::new(Aside::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
             }
         };

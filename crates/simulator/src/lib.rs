@@ -39,7 +39,7 @@ mod table;
 
 pub use case::cache::Cache;
 pub use case::choice::build_case;
-pub use case::import::{Facts, open as open_case};
+pub use case::import::open as open_case;
 pub use case::opening::Opening;
 pub use case::plan::Plan;
 pub use case::scene::{RestBrain, Scene};
@@ -47,7 +47,7 @@ pub use case::tissue::{TissueClass, TissueSource};
 pub use case::{Brain, Case, Inputs, Recipe};
 pub use command::command;
 pub use error::SessionError;
-pub use models::{BoneSummary, ModelSummary, Models, PictureSummary, TissueSummary};
+pub use models::{BoneSummary, Facts, ModelSummary, Models, PictureSummary, TissueSummary};
 pub use operation::Operation;
 pub use options::{Options, Patient, Tolerances};
 pub use program::{Phase, Program, called};

@@ -95,8 +95,9 @@ impl Session {
     pub fn run(mut self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let (before, whole) = (self.table.pieces(), self.table.bone().map(|bone| bone.snapshot()));
-        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, &self.options, &self.table)?;
-        let second = self.second.as_ref().map(|name| SecondHold::open(name, &self.options, &self.table)).transpose()?;
+        let (options, plan, rate_hz) = (&self.options, &self.table.plan, self.table.operation.rate_hz);
+        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, options, plan, rate_hz)?;
+        let second = self.second.as_ref().map(|name| SecondHold::open(name, options, plan, rate_hz)).transpose()?;
         let recorded = || Feel::recorded(self.recording.as_ref(), hand::FIRST);
         let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
         let feel = device.as_ref().map_or_else(recorded, |device| Feel::of(&device.capabilities(), scale));

@@ -1,11 +1,11 @@
 //! Which case the options mean, and making one to keep.
 
 use crate::case::cache::Cache;
-use crate::case::import::{Facts, Known, volume_mm3};
+use crate::case::import::{Known, volume_mm3};
 use crate::case::{Case, Inputs, Recipe, folder, import};
 use crate::error::SessionError;
 use crate::measure::Own;
-use crate::models::{self, Models, Wish};
+use crate::models::{self, Facts, Models, Wish};
 use crate::options::{Options, Patient};
 use crate::program::Program;
 use std::path::Path;

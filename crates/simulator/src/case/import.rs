@@ -10,18 +10,18 @@ use crate::case::anatomy::{cropped, find_brain, make_brain, make_classes, make_s
 use crate::case::cache::Cache;
 use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
-use crate::case::opening::Opening;
+use crate::case::opening::{Opening, eye};
 use crate::case::stages::ImportStages;
 use crate::case::{Case, Inputs, Recipe};
 use crate::error::SessionError;
 use crate::measure::bone::Skull;
 use crate::measure::tissue::Shape;
 use crate::measure::{Own, Sight};
+use crate::models::Facts;
 use crate::program::Program;
-use crate::show::picture::eye;
 use glam::DAffine3;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_budget::{Rows, Scene};
@@ -89,7 +89,7 @@ impl<'a> Known<'a> {
             Some(facts) => (facts, None),
             None => {
                 let images = read(inputs, wanted, &mut stages)?;
-                let facts = Facts::of(&images);
+                let facts = facts_of(&images);
                 keep(&facts, cache, &key, FACTS);
                 (facts, Some(images))
             }
@@ -223,15 +223,6 @@ fn build(inputs: &Inputs, images: Images, recipe: &Recipe, stages: &mut ImportSt
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
 }
 
-/// What a choice of voxel size and mesh needs to know of the images.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Facts {
-    /// Edge of the CT's own voxels, the mean of the three, mm. `None` without a CT.
-    pub ct_voxel_mm: Option<f64>,
-    /// Volume of the brain, mm³; `None` without an MRI.
-    pub brain_mm3: Option<f64>,
-}
-
 /// Volume of what is not 0, mm³.
 pub fn volume_mm3(mask: &VoxelVolume<u8>) -> f64 {
     mask.data.iter().filter(|&&v| v != 0).count() as f64 * mask.spacing_mm().element_product()
@@ -244,12 +235,10 @@ const OWN: &str = "own.json";
 /// Edge of the voxels that are looked at, mm.
 const LOOK_MM: f32 = 1.0;
 
-impl Facts {
-    fn of(images: &Images) -> Self {
-        Self {
-            ct_voxel_mm: images.ct.as_ref().map(|ct| ct.spacing_mm().element_sum() / 3.0),
-            brain_mm3: images.mask.as_ref().map(volume_mm3),
-        }
+fn facts_of(images: &Images) -> Facts {
+    Facts {
+        ct_voxel_mm: images.ct.as_ref().map(|ct| ct.spacing_mm().element_sum() / 3.0),
+        brain_mm3: images.mask.as_ref().map(volume_mm3),
     }
 }
 

@@ -187,6 +187,13 @@ fn normal(bone: &BoneVolume, point: Vec3) -> Vec3 {
     (-towards_bone).normalize_or_zero()
 }
 
+/// Direction from the site to the eye: a little from behind and from the side, so that hole and tool are both seen.
+pub fn eye(site: &Site) -> Vec3 {
+    let outward = -site.inward;
+    let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
+    outward + 0.45 * side + 0.25 * Vec3::Z
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -20,7 +20,6 @@ pub use given::{FASTEST, rigid_of, solver_named};
 pub use told::{BoneSummary, ModelSummary, PictureSummary, TissueSummary};
 
 use crate::case::Recipe;
-use crate::case::import::Facts;
 use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
 use crate::measure::{self, Own, Wanted};
@@ -28,6 +27,7 @@ use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
 use crate::program::Program;
 use given::{Given, written};
+use serde::{Deserialize, Serialize};
 use trepan_budget::{Choice, Plan, Quality, Rows, Scene, Setup};
 use trepan_geometry::{ToolKind, units};
 use trepan_link::Recording;
@@ -50,6 +50,15 @@ pub struct Models {
     pub plan: Option<Plan>,
     /// Whether it was made from errors of bone, tissue and picture that were found in this very case.
     pub measured: [bool; 3],
+}
+
+/// What a choice of voxel size and mesh needs to know of the images.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Facts {
+    /// Edge of the CT's own voxels, the mean of the three, mm. `None` without a CT.
+    pub ct_voxel_mm: Option<f64>,
+    /// Volume of the brain, mm³; `None` without an MRI.
+    pub brain_mm3: Option<f64>,
 }
 
 /// What is known of a session's models before its case is open.

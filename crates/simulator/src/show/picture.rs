@@ -1,5 +1,6 @@
 //! The main thread of a headless run: one picture after another, from the newest state, through the same drawing code as the window.
 
+use crate::case::opening::eye;
 use crate::report::page::Shot;
 use crate::run::clock::Clock;
 use crate::run::stop::Stop;
@@ -48,16 +49,9 @@ impl Album {
     }
 }
 
-/// The eye over the site: a little from behind and from the side, so that hole and tool are both seen.
+/// The eye over the site.
 pub fn camera(site: &Site) -> Camera {
     Camera::viewed_from(site.entry, eye(site), 170.0)
-}
-
-/// Direction from the site to that eye.
-pub fn eye(site: &Site) -> Vec3 {
-    let outward = -site.inward;
-    let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
-    outward + 0.45 * side + 0.25 * Vec3::Z
 }
 
 /// The microscope: down on the site from the usual working distance, on a field of some 50 mm; aslant by 15 degrees, so that a tool along the way in does not hide its tip.
