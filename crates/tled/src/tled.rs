@@ -126,6 +126,7 @@ impl Tled {
     }
 
     /// Puts pressure on some triangles, from the next step on; those that name nodes outside the mesh are left out.
+    /// A contact's spring on the same nodes does not foresee it: at rest the spring is off by what the pressure moves its nodes in one step.
     pub fn set_pressure(&mut self, mut pressure: SurfacePressure) {
         let place_of = &self.layout.place_of;
         pressure.triangles.retain(|t| t.iter().all(|&n| (n as usize) < place_of.len()));
