@@ -56,7 +56,7 @@ fn kind(metric: &str) -> (Nature, Better) {
     match () {
         () if metric.starts_with("error_over_") => (Nature::Exact, Better::Less),
         () if ends(&["cpu_s_per_s"]) => (Nature::Time, Better::Less),
-        () if has(&["spread", "times_", "_over_", "_mb", "share_of", "halves", "predicted"]) => {
+        () if has(&["spread", "times_", "_over_", "_mb", "share_of", "halves", "predicted", "regret"]) => {
             (Nature::OfTimes, Better::Neither)
         }
         () if ends(&["_per_s", "speedup"]) => (Nature::Time, Better::More),
@@ -65,19 +65,7 @@ fn kind(metric: &str) -> (Nature, Better) {
         {
             (Nature::Time, Better::Less)
         }
-        () if has(&[
-            "error",
-            "missed",
-            "invented",
-            "lost",
-            "regret",
-            "drift",
-            "fails",
-            "false",
-            "jump",
-            "differing",
-        ]) =>
-        {
+        () if has(&["error", "missed", "invented", "lost", "drift", "fails", "false", "jump", "differing"]) => {
             (Nature::Exact, Better::Less)
         }
         () if has(&["ssim", "dice", "recovered", "works", "held", "told_before"]) => (Nature::Exact, Better::More),
