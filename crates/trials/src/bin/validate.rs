@@ -162,16 +162,16 @@ fn jobs(names: &[String], scope: Scope) -> Result<(Vec<Job>, Vec<&'static Suite>
             let known: Vec<_> = all.map(|suite| suite.name).collect();
             bail!("there is no suite {wanted:?}; known are {}", known.join(", "));
         };
-        if part.is_none() && suites.iter().any(|listed: &&Suite| listed.name == suite.name) {
-            continue;
-        }
-        let begins = |job: &Job| job.key.starts_with(name.as_str());
-        let before = jobs.len();
-        jobs.extend(of(suite).filter(begins));
+        let found: Vec<Job> = of(suite).filter(|job| job.key.starts_with(name.as_str())).collect();
         match part {
-            None => suites.push(suite),
-            Some(part) if jobs.len() == before => bail!("{wanted} has no part {part:?}; --list names them"),
-            Some(_) => {}
+            Some(part) if found.is_empty() => bail!("{wanted} has no part {part:?}; --list names them"),
+            None if suites.iter().all(|listed: &&Suite| listed.name != wanted) => suites.push(suite),
+            _ => {}
+        }
+        for job in found {
+            if jobs.iter().all(|listed: &Job| listed.key != job.key) {
+                jobs.push(job);
+            }
         }
     }
     Ok((jobs, suites))
@@ -351,12 +351,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_suite_that_is_named_twice_is_run_once() {
+    fn what_is_named_twice_is_run_once() {
         let count = |names: &[&str]| {
             let names: Vec<String> = names.iter().map(ToString::to_string).collect();
             let (jobs, suites) = jobs(&names, Scope { quick: true, seed: 1 }).unwrap();
             (jobs.len(), suites.len())
         };
         assert_eq!(count(&["rigid", "rigid"]), count(&["rigid"]));
+        assert_eq!(count(&["rigid", "rigid/walls"]), count(&["rigid"]));
+        assert_eq!(count(&["rigid/walls", "rigid"]), count(&["rigid"]));
+        assert_eq!(count(&["rigid/walls"]).1, 0);
     }
 }
