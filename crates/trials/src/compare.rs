@@ -55,8 +55,20 @@ fn kind(metric: &str) -> (Nature, Better) {
     let has = |list: &[&str]| list.iter().any(|word| metric.contains(word));
     match () {
         () if metric.starts_with("error_over_") => (Nature::Exact, Better::Less),
-        () if ends(&["cpu_s_per_s"]) => (Nature::Time, Better::Less),
-        () if has(&["spread", "times_", "_over_", "_mb", "share_of", "halves", "predicted", "regret"]) => {
+        () if ends(&["cpu_s_per_s"]) || metric.starts_with("ns_per_") => (Nature::Time, Better::Less),
+        () if has(&[
+            "spread",
+            "times_",
+            "_over_",
+            "_mb",
+            "share_of",
+            "halves",
+            "predicted",
+            "regret",
+            "late_",
+            "real_time",
+        ]) =>
+        {
             (Nature::OfTimes, Better::Neither)
         }
         () if ends(&["_per_s", "speedup"]) => (Nature::Time, Better::More),
@@ -434,6 +446,8 @@ mod tests {
         assert_eq!(kind("error_over_motion"), (Nature::Exact, Better::Less));
         assert_eq!(kind("cpu_s_per_s"), (Nature::Time, Better::Less));
         assert_eq!(kind("solver_cpu_s_per_s"), (Nature::Time, Better::Less));
+        assert_eq!(kind("ns_per_tetrahedron"), (Nature::Time, Better::Less));
+        assert_eq!(kind("late_ticks"), (Nature::OfTimes, Better::Neither));
         assert_eq!(kind("tick_p50_us"), (Nature::Time, Better::Less));
         assert_eq!(kind("time_to_rest_ms"), (Nature::Time, Better::Less));
         assert_eq!(kind("call_spread_percent"), (Nature::OfTimes, Better::Neither));

@@ -38,9 +38,9 @@ pub fn row(bone: &BoneVolume, path: &[ToolState]) -> Row {
     Row::new("4 kHz, drilling in 48.5 million voxels", Method::RECOMMENDED.name())
         .with("rate_hz", 4000)
         .with("ticks", BLOCK * BLOCKS)
-        .metric("missed_percent", 100.0 * f64::from(missed) / ticks)
-        .metric("missed_empty_loop_percent", 100.0 * f64::from(missed_empty) / ticks)
-        .metric("missed_beyond_empty_count", f64::from(missed) - f64::from(missed_empty))
+        .metric("late_percent", 100.0 * f64::from(missed) / ticks)
+        .metric("late_empty_loop_percent", 100.0 * f64::from(missed_empty) / ticks)
+        .metric("late_beyond_empty_count", f64::from(missed) - f64::from(missed_empty))
 }
 
 /// How many of a block's ticks ended after their deadline. A late tick is not caught up: the next begins anew.
