@@ -1,7 +1,8 @@
 //! The judgement over all scenes: how often choices meet their tolerances, and at what cost over the cheapest.
 //!
 //! # Theory
-//! A scene asks for three tolerances. One that no choice meets is left out of its scene and counted: there the plan must say so.
+//! A scene asks for three tolerances. One that no choice meets is left out of its scene and counted: there the plan must say so. Apart from scenes, what the plan says is held against what its
+//! choices do: a tolerance that it doubts, and misses though some other choice meets it, is a miss but no broken word.
 
 use super::super::Scope;
 use crate::picture::{Chart, Mark};
@@ -120,6 +121,10 @@ fn gates(scenes: &BTreeMap<String, Scene>, findings: &mut Findings) {
         let of = |scene: &Scene| did(scene, kind, "cheapest").is_none().then(|| did(scene, kind, "auto")).flatten();
         scenes.values().filter_map(of).map(|auto| auto.said).collect::<Vec<_>>()
     };
+    // What the plan says that its choices meet, and whether they do.
+    let each = scenes.values().flat_map(|scene| KINDS.iter().filter_map(|kind| did(scene, kind, "auto")));
+    let promised: Vec<bool> = each.filter(|auto| auto.said).map(|auto| auto.met()).collect();
+    let kept = 100.0 * promised.iter().filter(|met| **met).count() as f64 / promised.len().max(1) as f64;
     let said: Vec<bool> = KINDS.iter().flat_map(hopeless).collect();
     let silent = 100.0 * said.iter().filter(|said| **said).count() as f64 / said.len().max(1) as f64;
     let worst = scenes.values().flat_map(auto).map(|did| did.error).fold(0.0, f64::max);
@@ -144,6 +149,8 @@ fn gates(scenes: &BTreeMap<String, Scene>, findings: &mut Findings) {
         ));
         let ratio = summary("cost_over_cheapest");
         gates.push(Gate::at_most("auto: cost of all scenes over that of the cheapest choices", ratio, 1.25));
+        let name = "auto: tolerances that the plan says its choice meets, of which it does, percent";
+        gates.push(Gate::at_least(name, kept, 95.0));
     }
     findings.gates.extend(gates);
 }
