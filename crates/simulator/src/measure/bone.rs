@@ -3,7 +3,8 @@
 //! # Theory
 //! The truth is the force by the oracle on voxels of 0.25 mm of the same CT, trilinear between its samples. The error of a tick is the length of the difference of both
 //! forces; of a choice it is that which 95 of 100 ticks in touch stay within, sliding or cutting, whichever is worse. A tool whose centre comes under the surface,
-//! pressed in or led through a ridge, may leave by more ways than one, and methods that are both right choose differently: it is led no deeper than its radius.
+//! pressed in or led through a ridge, may leave by more ways than one, and methods that are both right choose differently: it is led no deeper than its radius. Nor much deeper
+//! than the scene says: at a ridge a hand gives way, which a path cannot.
 //!
 //! # When not to use it
 //! To know how right the CT is: what the scanner has blurred, nobody knows.
@@ -24,6 +25,8 @@ const POINTS: [usize; 3] = [211, 466, 932];
 const FINE_MM: f32 = 0.25;
 /// Ticks of going in and of sliding.
 const TICKS: [usize; 2] = [120, 240];
+/// How deep it may come where the bone rises into its way, over how deep it is pressed.
+const RIDGE: f64 = 1.5;
 /// How deep the burr is led while it cuts, mm, and how fast, mm/ms: what a scripted hand does.
 const DRILL: [f32; 2] = [1.5, 1.4e-3];
 /// Least radius of a burr whose cut the truth's voxels resolve, mm.
@@ -103,14 +106,15 @@ struct Way {
 }
 
 impl Stretch {
-    /// Cuts it out, with a way along it; `None` where there is too little bone under that, or so much that the tool's centre comes under the surface.
+    /// Cuts it out, with a way along it; `None` where there is too little bone under that, or so much that the tool comes far deeper than it is pressed, or its centre under the surface.
     pub fn of(skull: &Skull, slide: &Slide) -> Option<Self> {
         let fine = cut_out(skull, slide.place, FINE_MM)?;
         let path = path(&Surface::of(&fine, slide)?, slide)?;
         let stretch = Self { fine, slide: *slide, ways: Vec::new() }.with(path, false);
         let deep = stretch.ways[0].truth.iter().map(|force| f64::from(force.length()) / slide.scene.stiffness);
         let (touches, deepest) = (deep.clone().filter(|mm| *mm > 0.0).count(), deep.fold(0.0, f64::max));
-        (touches > TICKS[1] / 2 && deepest <= slide.scene.tool_radius_mm).then_some(stretch)
+        let deepest_allowed = slide.scene.tool_radius_mm.min(RIDGE * slide.scene.press_mm);
+        (touches > TICKS[1] / 2 && deepest <= deepest_allowed).then_some(stretch)
     }
 
     /// With a cut straight in from just outside; without one for a burr under 1 mm in radius, which the truth's voxels do not resolve.

@@ -22,7 +22,7 @@ use trepan_rigid::Method;
 use trepan_volume::BoneVolume;
 
 /// Goes up when what is found changes for the same case and choices.
-const FORM: u32 = 7;
+const FORM: u32 = 8;
 /// Ways along the bone, evenly around the opening.
 const SLIDES: usize = 3;
 /// Length of each, mm.
