@@ -11,6 +11,7 @@ mod openhaptics;
 
 use super::Scope;
 use crate::suite::{Gate, Row};
+use std::path::Path;
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
 use trepan_geometry::{ToolState, Vec3, Wrench};
 use trepan_haptics::{DeviceError, Fault, HapticDevice, Status};
@@ -188,13 +189,30 @@ fn refused<D>(driver: &str, name: &str, opened: Result<D, DeviceError>, words: &
     Row::new(name, driver)
         .with("kind", "refused")
         .with("told_what_to_do", told.contains(words))
-        .with("told", told)
+        .with("told", without_folders(&told))
         .metric("force_after_n", force_n)
+}
+
+/// What was said, with files for paths: a folder of this run is in no other.
+fn without_folders(told: &str) -> String {
+    let file = |word: &str| {
+        let path = Path::new(word);
+        path.file_name()
+            .filter(|_| path.is_absolute())
+            .map_or_else(|| word.into(), |name| name.to_string_lossy().into_owned())
+    };
+    told.split(' ').map(file).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_said_names_no_folder_of_this_run() {
+        let told = format!("{} lacks a/b", std::env::temp_dir().join("run-1").join("lib.so:").display());
+        assert_eq!(without_folders(&told), "lib.so: lacks a/b");
+    }
 
     /// A device whose force ends some ticks after the fault.
     struct Slow {
