@@ -289,3 +289,40 @@ fn path(surface: &Surface, slide: &Slide) -> Option<Vec<ToolState>> {
     let along_it = (0..TICKS[1]).map(|n| at(n as f32 / TICKS[1] as f32, press));
     Some(way_in.chain(along_it).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bone under z = 0, and under z = 3 mm where x is over 3 mm.
+    fn step() -> Skull {
+        let edge = 90;
+        let mut ct = VoxelVolume::isotropic([edge; 3], Vec3::splat(-22.25), 0.5, 0i16);
+        for at in 0..ct.data.len() {
+            let place = ct.centre_of([at % edge, at / edge % edge, at / (edge * edge)]);
+            let over = place.z.min((place.z - 3.0).max(3.0 - place.x));
+            ct.data[at] = (400.0 - 600.0 * over).clamp(-1000.0, 1500.0) as i16;
+        }
+        Skull { ct, isovalue: 400 }
+    }
+
+    #[test]
+    fn a_burr_is_not_led_into_a_step_deeper_than_it_is_pressed() {
+        let skull = step();
+        let led = |turn_rad: f32, press_mm: f64| {
+            let scene = Scene { tool_radius_mm: 2.0, press_mm, ..Scene::default() };
+            Stretch::of(&skull, &Slide { scene, place: Vec3::ZERO, outward: Vec3::Z, turn_rad, length_mm: 5.0 })
+        };
+        let towards_x = |turn: f32| {
+            let (a, b) = Vec3::Z.any_orthonormal_pair();
+            turn.cos() * a.x + turn.sin() * b.x
+        };
+        let turns = [0.0, 0.5, 1.0, 1.5].map(|half| half * core::f32::consts::PI);
+        let (into, away) =
+            (turns.into_iter().find(|t| towards_x(*t) > 0.9), turns.into_iter().find(|t| towards_x(*t) < -0.9));
+        assert!(led(into.unwrap(), 0.5).is_none(), "a wall stands in the way");
+        let flat = led(away.unwrap(), 0.5).expect("flat bone is one");
+        let error_mm = flat.known_error_n(|tip| Vec3::Z * (2.0 - tip.z).max(0.0) * flat.slide.scene.stiffness as f32);
+        assert!(error_mm < 0.1, "{error_mm}");
+    }
+}
