@@ -142,6 +142,8 @@ impl Notice {
                     Warning::BreachSoon => "ms left",
                     Warning::TissueLate | Warning::DeviceStale => "ms old",
                 };
+                // Nothing is -0.00 mm away.
+                let value = (100.0 * value).round() / 100.0 + 0.0;
                 ("warning", format!("{}: {} ({value:.2} {unit})", warning.name(), warning.text()))
             }
             What::Warning(warning, false, _) => ("cleared", warning.name().to_string()),
@@ -207,5 +209,13 @@ mod tests {
         assert_eq!(told[0], (0, What::Warning(Warning::BrainNear, true, 1.5)));
         assert!(matches!(told[1], (240, What::Warning(Warning::BrainNear, false, _))), "{told:?}");
         assert_eq!(watch.standing(), 0);
+    }
+
+    #[test]
+    fn nothing_is_minus_nothing_away() {
+        let words =
+            |value| Notice { tick: 0, time_ms: 0.0, what: What::Warning(Warning::BrainTouched, true, value) }.words().1;
+        assert!(words(-0.001).ends_with("(0.00 mm away)"), "{}", words(-0.001));
+        assert!(words(-0.016).ends_with("(-0.02 mm away)"), "{}", words(-0.016));
     }
 }
