@@ -1,6 +1,7 @@
 // Forces of all springs on the nodes they touch, each implicit, one after the other, with the velocities v that nodes would have without the springs to come:
 //   d = d_rest + Σ w u·n    p = max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + gain (k dt + b) Σ w²/m))
 // What moves against the common velocity of a pressing spring's nodes is calmed.
+// Planes, springs of one node each and no two of the same, follow side by side.
 struct Spring {
     // Unit vector out of the tissue.
     normal: vec3f,
@@ -39,6 +40,11 @@ fn force_of(spring: Spring) -> f32 {
     // As they are calmed, of which each takes the same share.
     let together = carried[0].xyz / max(carried[0].w, 1e-30);
     let coming = (1.0 - spring.calm) * sums[0].y + spring.calm * spring.weight * dot(together, spring.normal);
+    return pressed(spring, depth, coming);
+}
+
+// Force of a spring that is so deep, mm, on nodes that come at this speed, mm/ms.
+fn pressed(spring: Spring, depth: f32, coming: f32) -> f32 {
     let held = 1.0 + now.gain * (spring.stiffness * now.dt + spring.damping) * spring.compliance;
     let force = (spring.stiffness * (depth + now.dt * coming) + spring.damping * (coming - spring.tool_velocity)) / held;
     let finite = (bitcast<u32>(force) & 0x7f800000u) != 0x7f800000u;
@@ -58,6 +64,9 @@ fn free_velocity(at: vec4u) -> vec3f {
     for (var s = 0u; s < now.springs; s++) {
         let spring = springs[s];
         if lane < spring.count { pushed[touched[spring.first + lane].x] = vec4f(0.0); }
+    }
+    for (var s = now.springs + lane; s < now.springs + now.planes; s += 64u) {
+        pushed[touched[springs[s].first].x] = vec4f(0.0);
     }
     storageBarrier();
     var total = 0.0;
@@ -96,5 +105,21 @@ fn free_velocity(at: vec4u) -> vec3f {
         storageBarrier();
         workgroupBarrier();
     }
-    if lane == 0u { pressure[0] = total; }
+    var of_planes = 0.0;
+    for (var s = now.springs + lane; s < now.springs + now.planes; s += 64u) {
+        let plane = springs[s];
+        let at = touched[plane.first];
+        let depth = plane.rest_depth + dot(u[at.x].xyz, plane.normal);
+        let coming = dot(free_velocity(at), plane.normal);
+        let force = pressed(plane, depth, coming);
+        of_planes += force;
+        pushed[at.x] -= vec4f(plane.normal * force, 0.0);
+    }
+    sums[lane] = vec2f(of_planes, 0.0);
+    workgroupBarrier();
+    for (var reach = 32u; reach > 0u; reach >>= 1u) {
+        if lane < reach { sums[lane] += sums[lane + reach]; }
+        workgroupBarrier();
+    }
+    if lane == 0u { pressure[0] = total + sums[0].x; }
 }

@@ -15,5 +15,7 @@ struct Step {
     // What the two terms of past stress keep and take up.
     fade_keep: vec2f,
     fade_gain: vec2f,
+    // Planes, behind the springs in their list.
+    planes: u32,
 }
 @group(0) @binding(0) var<uniform> now: Step;

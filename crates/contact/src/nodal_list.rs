@@ -1,20 +1,25 @@
 //! All springs that press on one body at once: tip, shaft, walls, its own folds.
 //!
 //! # Practice
-//! Holds at most [`MAX_SPRINGS`]; what does not fit is counted. Memory is taken once, for all of them, so that after
-//! [`with_room`](NodalContacts::with_room) neither [`push`](NodalContacts::push) nor [`copy_from`](NodalContacts::copy_from) allocates, and a copy costs what is in use.
+//! Holds at most [`MAX_SPRINGS`] springs and [`MAX_PLANES`] planes; what does not fit is counted. Memory is
+//! taken once, for all of them, so that after [`with_room`](NodalContacts::with_room) neither
+//! [`push`](NodalContacts::push) nor [`copy_from`](NodalContacts::copy_from) allocates, and a copy costs what
+//! is in use.
 
-use crate::NodalContact;
+use crate::{NodalContact, PlaneContact};
 use core::ops::{Deref, DerefMut};
 
-/// Most springs on one body: the places under a tool's tip, its shaft, and the patches that touch a wall or a fold.
+/// Most springs on one body: the places under a tool's tip, its shaft, and what touches a fold.
 pub const MAX_SPRINGS: usize = 256;
+/// Most planes on one body: one for each border node near a wall.
+pub const MAX_PLANES: usize = 8192;
 
-/// A list of springs, read as a slice.
+/// A list of springs, read as a slice, and of planes beside them.
 #[derive(Debug, Default, PartialEq)]
 pub struct NodalContacts {
     springs: Vec<NodalContact>,
-    /// Springs that did not fit.
+    planes: Vec<PlaneContact>,
+    /// Springs and planes that did not fit.
     pub overflow: u32,
 }
 
@@ -26,7 +31,8 @@ impl NodalContacts {
 
     /// No spring, and memory for all that may come.
     pub fn with_room() -> Self {
-        Self { springs: Vec::with_capacity(MAX_SPRINGS), overflow: 0 }
+        let planes = Vec::with_capacity(MAX_PLANES);
+        Self { springs: Vec::with_capacity(MAX_SPRINGS), planes, overflow: 0 }
     }
 
     /// Adds a spring that presses on a node; counts one that does not fit.
@@ -43,9 +49,31 @@ impl NodalContacts {
         }
     }
 
+    /// Adds the plane of a node that has none yet; counts one that does not fit.
+    pub fn push_plane(&mut self, plane: PlaneContact) {
+        match self.planes.len() < MAX_PLANES {
+            true => {
+                self.planes.reserve_exact(MAX_PLANES - self.planes.len());
+                self.planes.push(plane);
+            }
+            false => self.overflow += 1,
+        }
+    }
+
+    /// The planes, each of another node.
+    pub fn planes(&self) -> &[PlaneContact] {
+        &self.planes
+    }
+
+    /// Springs, then planes in the form of springs: for solvers without a way of their own for planes.
+    pub fn all(&self) -> impl Iterator<Item = NodalContact> + '_ {
+        self.springs.iter().copied().chain(self.planes.iter().map(|plane| (*plane).into()))
+    }
+
     /// Back to no spring, counter included.
     pub fn clear(&mut self) {
         self.springs.clear();
+        self.planes.clear();
         self.overflow = 0;
     }
 
@@ -54,6 +82,10 @@ impl NodalContacts {
         self.clear();
         self.springs.reserve_exact(MAX_SPRINGS);
         self.springs.extend_from_slice(&other.springs);
+        if !other.planes.is_empty() {
+            self.planes.reserve_exact(MAX_PLANES);
+            self.planes.extend_from_slice(&other.planes);
+        }
         self.overflow = other.overflow;
     }
 }
@@ -62,7 +94,9 @@ impl Clone for NodalContacts {
     fn clone(&self) -> Self {
         let mut springs = Vec::with_capacity(self.springs.capacity());
         springs.extend_from_slice(&self.springs);
-        Self { springs, overflow: self.overflow }
+        let mut planes = Vec::with_capacity(self.planes.capacity());
+        planes.extend_from_slice(&self.planes);
+        Self { springs, planes, overflow: self.overflow }
     }
 
     fn clone_from(&mut self, other: &Self) {
@@ -72,7 +106,7 @@ impl Clone for NodalContacts {
 
 impl From<NodalContact> for NodalContacts {
     fn from(spring: NodalContact) -> Self {
-        Self { springs: vec![spring], overflow: 0 }
+        Self { springs: vec![spring], ..Self::none() }
     }
 }
 
@@ -110,6 +144,16 @@ mod tests {
         assert_eq!((&copy, copy.overflow, copy.as_ptr()), (&list, 5, place));
         copy.clear();
         assert_eq!((copy.len(), copy.overflow), (0, 0));
+        let place = copy.planes.as_ptr();
+        let plane = |node| PlaneContact { node, ..PlaneContact::default() };
+        (0..MAX_PLANES as u32 + 3).for_each(|node| copy.push_plane(plane(node)));
+        assert_eq!((copy.planes().len(), copy.overflow, copy.planes.as_ptr()), (MAX_PLANES, 3, place));
+        copy.push(spring);
+        assert_eq!((copy.len(), copy.all().count()), (1, 1 + MAX_PLANES));
+        list.copy_from(&copy);
+        assert_eq!(list, copy);
+        list.copy_from(&NodalContacts::none());
+        assert!(list.planes().is_empty());
         assert_eq!(NodalContacts::from(spring)[0], spring);
     }
 }

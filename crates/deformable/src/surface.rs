@@ -250,16 +250,6 @@ impl MovingSurface {
         core::array::from_fn(|c| (nodes[c], foot.weights[c]))
     }
 
-    /// How many clusters there are.
-    pub(crate) fn clusters(&self) -> usize {
-        self.boxes.len()
-    }
-
-    /// The nodes of a cluster; neighbouring clusters share some.
-    pub(crate) fn nodes_of(&self, cluster: usize) -> &[u32] {
-        self.nodes_of_cluster.row(cluster)
-    }
-
     /// Unit normal of the flat triangle, outwards; zero when it has no area.
     pub(crate) fn flat_normal(&self, positions: &[Vec3], t: u32) -> Vec3 {
         let [a, b, c] = self.corners(positions, t);

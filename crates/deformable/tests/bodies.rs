@@ -4,7 +4,7 @@ mod common;
 
 use common::{Random, block, deformed, tool_at};
 use glam::{Quat, Vec3};
-use trepan_contact::{NodalContact, NodalContacts};
+use trepan_contact::{NodalContacts, PlaneContact};
 use trepan_deformable::{
     Config, ConfigError, MeshCollision, NodeContact, SlidingWall, TissueCollision, TissueStep, push_apart,
     push_itself_apart,
@@ -157,38 +157,50 @@ fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
     let mesh = moved(&block([5, 5, 5], 4.0), Vec3::splat(-10.0));
     let wall = SlidingWall::around(&mesh, &[]).expect("a sound mesh");
     let mut out = NodalContacts::none();
-    let hollow = |r: f32| move |p: Vec3| (r - p.length(), -p.normalize_or_zero());
+    let hollow = |r: f32| move |_, p: Vec3| (r - p.length(), -p.normalize_or_zero());
     wall.step(&mesh.positions, hollow(18.0), &mut out);
-    assert!(out.is_empty());
+    assert!(out.planes().is_empty());
     let shifted = moved(&mesh, Vec3::X * 3.0);
     wall.step(&shifted.positions, hollow(18.0), &mut out);
     let at = |n: u32| shifted.positions[n as usize];
-    assert!(!out.is_empty() && out.iter().all(|c| c.pressure_n(c.mean(at), Vec3::ZERO) > 0.0));
-    assert!(out.iter().flat_map(NodalContact::nodes).all(|(n, w)| at(n).length() > 18.0 && w > 0.0));
-    let force: Vec3 = out.iter().map(|c| c.pressure_n(c.mean(at), Vec3::ZERO) * -c.normal).sum();
-    assert!(force.x < -0.5 && force.y.abs() + force.z.abs() < 1e-3, "{force}");
-    // Sliding along a flat wall changes nothing, sinking by 0.1 mm adds 0.1 mm of spring.
-    let flat = |p: Vec3| (p.z + 9.5, Vec3::Z);
+    let deep = |c: &&PlaneContact| c.depth_mm(at(c.node)) > 0.0;
+    assert!(out.planes().iter().filter(deep).count() > 3);
+    assert!(out.planes().iter().filter(deep).all(|c| at(c.node).length() > 18.0));
+    assert!(out.planes().iter().all(|c| at(c.node).length() > 17.5), "far nodes have no plane");
+    let force: Vec3 = out.all().map(|c| c.pressure_n(c.mean(at), Vec3::ZERO) * -c.normal).sum();
+    assert!(force.x < -0.5 && force.y.abs() + force.z.abs() < 0.2 * -force.x, "{force}");
+    // A flat wall under the whole side of 20 x 20 mm: its stiffness is that of the area, on any mesh.
+    let flat = |_, p: Vec3| (p.z + 9.5, Vec3::Z);
+    for cells in [3, 5, 8] {
+        let mesh = moved(&block([cells; 3], 20.0 / cells as f32), Vec3::splat(-10.0));
+        let wall = SlidingWall::around(&mesh, &[]).expect("a sound mesh");
+        out.clear();
+        wall.step(&mesh.positions, flat, &mut out);
+        let press = |by: Vec3| -> f32 {
+            out.all().map(|c| c.pressure_n(c.mean(|n| mesh.positions[n as usize] + by), Vec3::ZERO)).sum()
+        };
+        // The nodes of the rim have a share of the sides too: 400 mm² below, 4 x 20 mm x half a cell beside.
+        let area = 400.0 + 4.0 * 20.0 * 10.0 / cells as f32;
+        assert!((press(Vec3::X) - press(Vec3::ZERO)).abs() < 1e-4, "it slides");
+        let stiffness = (press(Vec3::Z * -0.1) - press(Vec3::ZERO)) / 0.1;
+        assert!((stiffness / (wall.stiffness_per_mm2 * area) - 1.0).abs() < 1e-3, "{cells}: {stiffness} N/mm");
+    }
+    let nowhere = |_, _| (f32::NAN, Vec3::NAN);
     out.clear();
-    wall.step(&mesh.positions, flat, &mut out);
-    let press = |by: Vec3| -> f32 {
-        out.iter().map(|c| c.pressure_n(c.mean(|n| mesh.positions[n as usize] + by), Vec3::ZERO)).sum()
-    };
-    let patches = out.len() as f32;
-    assert!((press(Vec3::X) - press(Vec3::ZERO)).abs() < 1e-4);
-    assert!((press(Vec3::Z * -0.1) - press(Vec3::ZERO) - 0.1 * patches).abs() < 1e-3);
-    out.clear();
-    wall.step(&mesh.positions, |_| (f32::NAN, Vec3::NAN), &mut out);
-    assert!(out.is_empty());
+    wall.step(&mesh.positions, nowhere, &mut out);
+    assert!(out.planes().is_empty());
     // Where the body rests in the wall it is left in peace; held nodes are never pushed.
     let mut at_rest = SlidingWall::around(&mesh, &[]).expect("a sound mesh");
     at_rest.rest_in(&mesh.positions, flat);
     at_rest.step(&mesh.positions, flat, &mut out);
+    assert!(out.planes().iter().all(|c| c.depth_mm(mesh.positions[c.node as usize]) <= 0.0));
+    out.clear();
     let held: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     SlidingWall::around(&mesh, &held).expect("a sound mesh").step(&mesh.positions, flat, &mut out);
-    assert!(out.is_empty());
-    at_rest.step(&moved(&mesh, Vec3::Z * -0.1).positions, flat, &mut out);
-    assert_eq!(out.len(), patches as usize);
+    assert!(out.planes().is_empty());
+    let lower = moved(&mesh, Vec3::Z * -0.1).positions;
+    at_rest.step(&lower, flat, &mut out);
+    assert_eq!(out.planes().iter().filter(|c| c.depth_mm(lower[c.node as usize]) > 0.05).count(), 36);
 }
 
 #[test]

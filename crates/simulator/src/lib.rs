@@ -67,4 +67,4 @@ pub use stages::score::ScoreKeeper;
 pub use stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 pub use stages::settling::Settling;
 pub use stages::skull_wall::SkullWall;
-pub use stages::solver_step::{EACH, SolverStage};
+pub use stages::solver_step::{EACH, Mishaps, REST_MOTION_MM, SolverStage};

@@ -18,7 +18,7 @@
 //! # Practice
 //! 10 ns for each node of each spring. Nodes outside the mesh are left out.
 
-use trepan_contact::NodalContact;
+use trepan_contact::{NodalContact, NodalContacts, PlaneContact};
 use trepan_geometry::Vec3;
 
 /// A node as it would be at the end of a step without springs.
@@ -53,14 +53,16 @@ impl ImplicitSprings {
         Self { moved: vec![Vec3::ZERO; nodes] }
     }
 
-    /// Adds every spring's force to the nodes, `add(node, N)`; gives the sum of all of them without their directions, N.
+    /// Adds every spring's force to the nodes, `add(node, N)`, then every plane's; gives the sum of all of them
+    /// without their directions, N.
     pub fn press(
         &mut self,
-        springs: &[NodalContact],
+        contacts: &NodalContacts,
         step: Gain,
         free: impl Fn(u32) -> FreeNode,
         mut add: impl FnMut(u32, Vec3),
     ) -> f32 {
+        let springs: &[NodalContact] = contacts;
         let mut sum = 0.0;
         for spring in springs {
             let depth = self.depth_of(spring, &free);
@@ -75,6 +77,14 @@ impl ImplicitSprings {
                     *moved -= spring.normal * (force * w * step.gain_ms * free(n).inverse_mass);
                     add(n, spring.normal * -(force * w));
                 }
+            }
+        }
+        for plane in contacts.planes() {
+            let Some(moved) = self.moved.get(plane.node as usize) else { continue };
+            let force = force_of_plane(plane, *moved, step, free(plane.node));
+            if force > 0.0 {
+                sum += force;
+                add(plane.node, plane.normal * -force);
             }
         }
         let touched = springs.iter().flat_map(NodalContact::nodes);
@@ -135,6 +145,18 @@ impl ImplicitSprings {
     }
 }
 
+/// Force of a plane on its node, N, where the springs before it `moved` the node's velocity, mm/ms.
+fn force_of_plane(plane: &PlaneContact, moved: Vec3, step: Gain, node: FreeNode) -> f32 {
+    let depth = plane.depth_mm(node.position);
+    if depth.is_nan() || depth <= 0.0 {
+        return 0.0;
+    }
+    let coming = (node.velocity + moved).dot(plane.normal);
+    let damping = plane.stiffness * step.dt_ms + plane.damping;
+    let force = (plane.stiffness * depth + damping * coming) / (1.0 + step.gain_ms * damping * node.inverse_mass);
+    if force.is_finite() { force.max(0.0) } else { 0.0 }
+}
+
 /// What a spring takes of its nodes' motion against each other in a step.
 pub fn calmed(spring: &NodalContact, dt_ms: f32) -> f32 {
     if spring.calm_ms > 0.0 { 1.0 - (-dt_ms / spring.calm_ms).exp() } else { 0.0 }
@@ -169,8 +191,43 @@ mod tests {
         spring
     }
 
+    fn listed(springs: &[NodalContact]) -> NodalContacts {
+        let mut list = NodalContacts::with_room();
+        springs.iter().for_each(|spring| list.push(*spring));
+        list
+    }
+
+    /// A plane gives the force of the same contact as a spring on one node, before and after other springs.
+    #[test]
+    fn a_plane_is_the_spring_of_one_node() {
+        let plane = |node, damping| PlaneContact { node, normal: Vec3::Z, offset_mm: 0.3, stiffness: 4.0, damping };
+        let first = spring([2.0, 0.5], Vec3::Z, &[(0, 0.5), (1, 0.5)]);
+        let free = |n: u32| FreeNode {
+            position: Vec3::Z * 0.1 * n as f32,
+            velocity: Vec3::new(0.2, 0.0, 0.3),
+            inverse_mass: 1.0 + n as f32,
+        };
+        let step = Gain { dt_ms: 0.5, gain_ms: 0.45 };
+        let pressed = |contacts: &NodalContacts| {
+            let mut forces = [Vec3::ZERO; 4];
+            let add = |n: u32, f: Vec3| forces[n as usize] += f;
+            let sum = ImplicitSprings::on_nodes(4).press(contacts, step, free, add);
+            (forces, sum)
+        };
+        let (mut planes, mut springs) = (NodalContacts::with_room(), NodalContacts::with_room());
+        [&mut planes, &mut springs].into_iter().for_each(|list| list.push(first));
+        for (node, damping) in [(1, 0.0), (2, 3.0), (3, 100.0), (77, 1.0)] {
+            planes.push_plane(plane(node, damping));
+            springs.push(plane(node, damping).into());
+        }
+        let ((by_plane, sum), (by_spring, exact)) = (pressed(&planes), pressed(&springs));
+        assert!((sum / exact - 1.0).abs() < 1e-5 && sum > 1.0, "{sum} N for {exact}");
+        assert!(by_plane.iter().zip(by_spring).all(|(a, b)| a.distance(b) < 1e-5), "{by_plane:?} {by_spring:?}");
+    }
+
     /// Eight masses of 2 g on springs of their own, stepped by leapfrog at `dt² ω² = 3.6` beside contact springs; gives positions, and the forces of a last step.
     fn settled(springs: &[NodalContact], steps: usize) -> (Vec<Vec3>, f32) {
+        let contacts = listed(springs);
         let (dt, inverse_mass, damping) = (0.5f32, 0.5f32, 0.02f32);
         let own = 3.6 / (dt * dt * inverse_mass);
         let (keep, gain) = ((1.0 - 0.5 * damping * dt) / (1.0 + 0.5 * damping * dt), dt / (1.0 + 0.5 * damping * dt));
@@ -180,7 +237,7 @@ mod tests {
             let coming: [Vec3; 8] = std::array::from_fn(|n| v[n] * keep - x[n] * (own * inverse_mass * gain));
             let free = |n: u32| FreeNode { position: x[n as usize], velocity: coming[n as usize], inverse_mass };
             let mut pushed = [Vec3::ZERO; 8];
-            sum = presser.press(springs, Gain { dt_ms: dt, gain_ms: gain }, free, |n, f| pushed[n as usize] += f);
+            sum = presser.press(&contacts, Gain { dt_ms: dt, gain_ms: gain }, free, |n, f| pushed[n as usize] += f);
             for n in 0..8 {
                 v[n] = coming[n] + pushed[n] * (inverse_mass * gain);
                 x[n] += v[n] * dt;
@@ -217,7 +274,7 @@ mod tests {
         let mut press = [spring([1e-6, 0.0], Vec3::Z, &[(0, 0.5), (1, 0.5)])];
         press[0].calm_ms = 2.0;
         let push = |n: u32, f: Vec3| after[n as usize] += f * (0.5 / masses[n as usize]);
-        assert!(ImplicitSprings::on_nodes(2).press(&press, step, free, push) > 0.0);
+        assert!(ImplicitSprings::on_nodes(2).press(&listed(&press), step, free, push) > 0.0);
         let left = (-0.25f32).exp();
         assert!(
             (after[0].x - (1.0 + 3.0 * left)).abs() < 1e-5 && (after[1].x - (1.0 - left)).abs() < 1e-5,

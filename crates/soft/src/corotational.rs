@@ -19,7 +19,7 @@ use crate::body::Element;
 use crate::operator::Hooke;
 use crate::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DQuat, DVec3};
-use trepan_contact::{MAX_SPRINGS, NodalContact};
+use trepan_contact::{MAX_PLANES, MAX_SPRINGS, NodalContact};
 use trepan_geometry::Vec3;
 
 /// Settings of the corotational solver.
@@ -108,7 +108,7 @@ impl Corotational {
                 residual: zero(),
                 along: zero(),
                 product: zero(),
-                touches: Vec::with_capacity(MAX_SPRINGS),
+                touches: Vec::with_capacity(MAX_SPRINGS + MAX_PLANES),
             },
             positions: body.mesh.positions.clone(),
             velocities: vec![Vec3::ZERO; nodes],
@@ -184,7 +184,7 @@ impl Corotational {
     /// Takes the springs that press now, and puts what they do at rest into the right side.
     fn touch(&mut self, loads: &Loads, h: f64) {
         self.system.touches.clear();
-        for spring in loads.contacts.iter().take(MAX_SPRINGS) {
+        for spring in loads.contacts.all().take(MAX_SPRINGS + MAX_PLANES) {
             let normal = spring.normal.as_dvec3();
             let known = spring.nodes().filter(|(n, _)| (*n as usize) < self.u.len());
             let place: f64 =
@@ -193,7 +193,7 @@ impl Corotational {
             let (k, b) = (f64::from(spring.stiffness), f64::from(spring.damping));
             let push = k * depth - b * f64::from(spring.tool_normal_velocity);
             if depth > 0.0 && !spring.is_empty() {
-                let touch = Touch { spring: *spring, push, rate: h * k + b };
+                let touch = Touch { spring, push, rate: h * k + b };
                 touch.spread(&mut self.system.right, -h * push, &self.fixed);
                 self.system.touches.push(touch);
             }

@@ -133,7 +133,7 @@ impl MassSpring {
     fn press(&mut self, loads: &Loads) -> f32 {
         let state = [&self.positions[..], &self.velocities[..]];
         let mut add = |n: u32, push: Vec3| self.force[n as usize] += push.as_dvec3();
-        loads.contacts.iter().map(|spring| press(spring, state, &mut add)).sum()
+        loads.contacts.all().map(|spring| press(&spring, state, &mut add)).sum()
     }
 
     fn advance(&mut self, gravity: DVec3, dt: f64, report: &mut StepReport) {

@@ -142,7 +142,7 @@ impl Xpbd {
 
     /// Each spring in turn; what one moves, the next one sees.
     fn press(&mut self, loads: &Loads, h: f64, report: &mut StepReport) {
-        report.contact_n = loads.contacts.iter().map(|spring| self.press_one(spring, h)).sum();
+        report.contact_n = loads.contacts.all().map(|spring| self.press_one(&spring, h)).sum();
     }
 
     fn press_one(&mut self, contact: &NodalContact, h: f64) -> f32 {

@@ -1,7 +1,7 @@
 //! The device's solver against the processor's. Without an adapter only the error can be tested, and is.
 #![cfg(feature = "gpu")]
 
-use trepan_contact::NodalContact;
+use trepan_contact::{NodalContact, PlaneContact};
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError, Prefer};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
@@ -52,6 +52,12 @@ fn loads(body: &Body) -> Loads {
     boxes::nodes_where(&body.mesh, |p| p.x > 59.0 && p.z > 15.0).iter().for_each(|&n| wall.add(n, 1.0));
     wall.normalise();
     loads.contacts.push(wall);
+    // A wall of planes, under nodes that the springs press too; some only come near.
+    for node in boxes::nodes_where(&body.mesh, |p| p.y > 49.0 && p.z > 5.0) {
+        let offset_mm = -49.6 - 0.05 * (node % 16) as f32;
+        let normal = Vec3::Y;
+        loads.contacts.push_plane(PlaneContact { node, normal, offset_mm, stiffness: 0.1, damping: 0.05 });
+    }
     loads
 }
 

@@ -281,7 +281,7 @@ impl Summary {
     /// From all that is known at the end.
     pub fn new(about: About, outcome: &Outcome) -> Self {
         let seconds = outcome.seconds.max(1e-9);
-        let mishaps = outcome.solver.as_ref().and_then(|solver| solver.mishaps.remark());
+        let mishaps = outcome.solver.iter().flat_map(|solver| solver.mishaps.remarks());
         Self {
             app: about.program.name().into(),
             case: about.case,

@@ -1,8 +1,9 @@
 //! One collision step: the newest tool and the newest brain in; a surface patch for the hand, loads for the solver out.
 //!
 //! # Practice
-//! While the burr is in the hand the result only warns: the patch goes to the haptic thread, the solver gets no contact
-//! (thesis 6.4). The probe touches with tip and shaft, and then the skull holds back what the probe pushes away. The stage has no clock; the same tools and positions give the same results.
+//! While the burr is in the hand the result only warns: the patch goes to the haptic thread, the solver gets no contact of it
+//! (thesis 6.4). The probe touches with tip and shaft. From then on the skull holds back what the probe and
+//! the brain's weight push away. The stage has no clock; the same tools and positions give the same results.
 
 use crate::program::{Phase, Program};
 use crate::stages::haptic_tick::ToolSample;
@@ -87,7 +88,7 @@ impl CollisionStage {
         &self.patch
     }
 
-    /// For the solver: no contact while a tool for bone is in the hand.
+    /// For the solver: no contact of a tool for bone.
     pub fn loads(&self) -> &Loads {
         &self.loads
     }
@@ -96,10 +97,10 @@ impl CollisionStage {
         self.loads.contacts.clear();
         if phase == Phase::Brain {
             self.step.springs(&mut self.loads.contacts);
-            if let Some(wall) = &self.wall {
-                wall.press(&soft.positions, &mut self.loads.contacts);
-            }
             self.loads.contacts.overflow += self.step.overflow;
+        }
+        if let Some(wall) = self.wall.as_mut().filter(|_| self.settling.is_open()) {
+            wall.press(&soft.positions, phase == Phase::Brain, &mut self.loads.contacts);
         }
     }
 }

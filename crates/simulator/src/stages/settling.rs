@@ -38,6 +38,11 @@ impl Settling {
         Self { sinks: lost * weight * down, outward: weight * outward, opened_ms: None }
     }
 
+    /// Whether the dura is open.
+    pub fn is_open(&self) -> bool {
+        self.opened_ms.is_some()
+    }
+
     /// Acceleration at a time of the session, mm/ms².
     pub fn at(&mut self, phase: Phase, time_ms: f64) -> Vec3 {
         if phase == Phase::Brain {

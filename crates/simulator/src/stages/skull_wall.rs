@@ -1,15 +1,18 @@
 //! The inside of the skull as a wall that the brain slides along.
 //!
 //! # Theory
-//! Signed distance to the bone as it was before the operation, on a grid around the brain. Where the burr has opened the skull there is no wall: a node in the
-//! bone is held back only when there is bone now behind the nearest place of the wall.
+//! Signed distance to the bone as it was before the operation, on a grid around the brain. Where the burr
+//! has opened the skull there is no wall: a node is held back only when there is bone now behind the nearest
+//! place of the wall.
 //!
 //! ```text
-//! hollow  φ > 0      x  node, φ < 0      s = x - φ g  place of the wall      s - g·1 mm: still bone?
+//! hollow  φ > 0      x  node      s = x - φ g  place of the wall      s - g·1 mm: still bone?
 //! ```
 //!
 //! # Practice
-//! Used while the probe is in the hand; nobody carves then, so what a step finds depends on its inputs alone. About 30 ns for each border
+//! The bone is read only while the probe is in the hand, when nobody carves, so that what a step finds
+//! depends on its inputs alone. While a tool for bone is back in the hand, the wall stands as it was last
+//! read: a brain that lies on it must not fall through and be thrown out later. About 30 ns for each border
 //! node of the brain.
 
 use std::sync::Arc;
@@ -23,6 +26,8 @@ use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 const SPACING_MM: f32 = 1.5;
 /// The grid reaches this far beyond the brain, mm.
 const MARGIN_MM: f32 = 8.0;
+/// Beyond this distance from the wall a node cannot reach it before the next collision result, mm.
+const NEAR_MM: f32 = 0.5;
 /// Bone this far behind the wall's surface is what holds, mm.
 const BEHIND_MM: f32 = 1.0;
 
@@ -31,6 +36,8 @@ pub struct SkullWall {
     wall: SlidingWall,
     field: DistanceField,
     bone: Arc<BoneVolume>,
+    /// Whether there was bone behind the wall when the bone was last read, by node.
+    stands: Vec<bool>,
 }
 
 impl SkullWall {
@@ -47,25 +54,29 @@ impl SkullWall {
         }
         let field = DistanceField::of_mask(&mask);
         let mut wall = SlidingWall::around(brain, held)?;
-        wall.rest_in(&brain.positions, |p| distance(&field, &bone, p));
-        Ok(Self { wall, field, bone })
+        wall.ahead_mm = NEAR_MM;
+        wall.rest_in(&brain.positions, |_, p| (field.sample(p), Vec3::ZERO));
+        Ok(Self { wall, field, bone, stands: vec![true; brain.positions.len()] })
     }
 
-    /// Adds the springs of what presses on the wall.
-    pub fn press(&self, positions: &[Vec3], out: &mut NodalContacts) {
-        self.wall.step(positions, |p| distance(&self.field, &self.bone, p), out);
+    /// Adds the planes of what is near the wall. `reads_bone`: nobody carves now, so openings may be looked
+    /// for.
+    pub fn press(&mut self, positions: &[Vec3], reads_bone: bool, out: &mut NodalContacts) {
+        let Self { wall, field, bone, stands } = self;
+        let distance = |node: u32, p: Vec3| {
+            let phi = field.sample(p);
+            if phi >= NEAR_MM {
+                return (phi, Vec3::ZERO);
+            }
+            let g = field.gradient(p).normalize_or_zero();
+            let stands = &mut stands[node as usize];
+            if reads_bone {
+                *stands = bone.is_bone(bone.voxel_of(p - (phi + BEHIND_MM) * g));
+            }
+            (phi, if *stands { g } else { Vec3::ZERO })
+        };
+        wall.step(positions, distance, out);
     }
-}
-
-/// Distance to the wall, positive in the hollow, and its direction away from the wall.
-fn distance(field: &DistanceField, bone: &BoneVolume, p: Vec3) -> (f32, Vec3) {
-    let phi = field.sample(p);
-    if phi >= 0.0 {
-        return (phi, Vec3::ZERO);
-    }
-    let g = field.gradient(p).normalize_or_zero();
-    let behind = p - (phi + BEHIND_MM) * g;
-    if bone.is_bone(bone.voxel_of(behind)) { (phi, g) } else { (0.0, Vec3::ZERO) }
 }
 
 #[cfg(test)]
@@ -89,21 +100,22 @@ mod tests {
     #[test]
     fn the_brain_is_held_back_by_bone_and_not_by_the_opening() {
         let (bone, brain) = boxed();
-        let wall = SkullWall::new(Arc::clone(&bone), &brain, &[]).unwrap();
-        let pushed = |by: Vec3| -> Vec3 {
+        let mut wall = SkullWall::new(Arc::clone(&bone), &brain, &[]).unwrap();
+        let mut pushed = |by: Vec3, reads_bone: bool| -> Vec3 {
             let at: Vec<Vec3> = brain.positions.iter().map(|p| *p + by).collect();
             let mut out = NodalContacts::none();
-            wall.press(&at, &mut out);
-            out.iter().map(|c| -c.normal * c.pressure_n(c.mean(|n| at[n as usize]), Vec3::ZERO)).sum()
+            wall.press(&at, reads_bone, &mut out);
+            out.all().map(|c| -c.normal * c.pressure_n(c.mean(|n| at[n as usize]), Vec3::ZERO)).sum()
         };
-        assert_eq!(pushed(Vec3::ZERO), Vec3::ZERO);
-        let (up, down) = (pushed(Vec3::Z * 2.0), pushed(Vec3::Z * -2.0));
+        assert_eq!(pushed(Vec3::ZERO, true), Vec3::ZERO);
+        let (up, down) = (pushed(Vec3::Z * 2.0, true), pushed(Vec3::Z * -2.0, true));
         assert!(up.z < -0.5 && up.truncate().length() < 0.05 * -up.z, "{up}");
         assert!(down.z > 0.5, "{down}");
         for (k, j, i) in (50..68).flat_map(|k| (0..68).flat_map(move |j| (0..68).map(move |i| (k, j, i)))) {
             bone.set_hu(IVec3::new(i, j, k), 0);
         }
-        assert_eq!(pushed(Vec3::Z * 2.0), Vec3::ZERO);
-        assert_eq!(pushed(Vec3::Z * -2.0), down);
+        assert_eq!(pushed(Vec3::Z * 2.0, false), up, "the wall stands as it was read last");
+        assert_eq!(pushed(Vec3::Z * 2.0, true), Vec3::ZERO);
+        assert_eq!(pushed(Vec3::Z * -2.0, true), down);
     }
 }

@@ -14,6 +14,10 @@ use trepan_soft::{Loads, SoftSolver, StepReport};
 
 /// Steps between two records when the contact stays.
 pub const EACH: u64 = 32;
+/// Longest way that a node may go in a step while no tool touches the brain, mm.
+pub const REST_MOTION_MM: f32 = 0.02;
+/// Time after the last touch in which the brain may still move back, ms.
+const MOVES_BACK_MS: f64 = 500.0;
 
 /// The state that lives from step to step.
 pub struct SolverStage {
@@ -25,6 +29,8 @@ pub struct SolverStage {
     contact_seq: u64,
     mishaps: Mishaps,
     max_displacement_mm: f32,
+    /// Simulated time at which a tool touched the brain last, ms.
+    touched_ms: f64,
 }
 
 /// What a solver had to put right, summed over steps; all 0 where nothing was.
@@ -40,6 +46,10 @@ pub struct Mishaps {
     pub skipped_ms: f64,
     /// Contacts and springs for which there was no room, summed over the collision steps that took effect.
     pub contacts_left_out: u64,
+    /// Longest way of a node in one step while no tool touched the brain, nor in the half second before, mm.
+    pub rest_motion_mm: f32,
+    /// Steps in which that was more than 0.02 mm.
+    pub restless_steps: u64,
 }
 
 impl Mishaps {
@@ -50,16 +60,35 @@ impl Mishaps {
         self.skipped_ms += f64::from(report.skipped_ms);
     }
 
+    fn rest(&mut self, motion_mm: f32) {
+        self.rest_motion_mm = self.rest_motion_mm.max(motion_mm);
+        self.restless_steps += u64::from(motion_mm > REST_MOTION_MM);
+    }
+
     /// What a report should say of them, where the brain did not move as its solver says.
-    pub fn remark(&self) -> Option<String> {
-        let Self { limited, non_finite, skipped_ms, contacts_left_out, .. } = *self;
+    pub fn remarks(&self) -> impl Iterator<Item = String> + use<> {
+        let Self { inverted, limited, non_finite, skipped_ms, contacts_left_out, rest_motion_mm, restless_steps } =
+            *self;
         let sound = limited + non_finite + contacts_left_out == 0 && skipped_ms == 0.0;
-        (!sound).then(|| {
+        let held = (!sound).then(|| {
             format!(
-                "the brain's solver held {limited} nodes to a limit, put {non_finite} back that were not finite, left {skipped_ms:.1} ms out \
-                 and {contacts_left_out} contacts for which there was no room: do not trust how it moved"
+                "the brain's solver held {limited} nodes to a limit, put {non_finite} back that were not finite, \
+                 left {skipped_ms:.1} ms out and {contacts_left_out} contacts for which there was no room: do not \
+                 trust how it moved"
             )
-        })
+        });
+        let inverted = (inverted > 0).then(|| {
+            format!(
+                "elements of the brain were inverted {inverted} times: its forces were wrong there; take --quality fine"
+            )
+        });
+        let restless = (restless_steps > 0).then(|| {
+            format!(
+                "the brain moved by itself: up to {rest_motion_mm:.2} mm in a step while nothing touched it, over \
+                 {REST_MOTION_MM} mm in {restless_steps} steps: do not trust its motion; report the case"
+            )
+        });
+        [held, inverted, restless].into_iter().flatten()
     }
 }
 
@@ -75,6 +104,7 @@ impl SolverStage {
             contact_seq: 0,
             mishaps: Mishaps::default(),
             max_displacement_mm: 0.0,
+            touched_ms: f64::NEG_INFINITY,
         }
     }
 
@@ -90,7 +120,17 @@ impl SolverStage {
         let report = self.solver.step(&self.loads, self.dt_ms);
         self.steps += 1;
         self.mishaps.add(&report);
+        if !self.loads.contacts.is_empty() {
+            self.touched_ms = self.time_ms();
+        } else if self.time_ms() - self.touched_ms > MOVES_BACK_MS {
+            self.mishaps.rest(self.fastest() * self.dt_ms);
+        }
         (switched || self.steps.is_multiple_of(EACH)).then(|| self.record(report.inverted))
+    }
+
+    /// Speed of the fastest node, mm/ms.
+    fn fastest(&self) -> f32 {
+        self.solver.velocities().iter().map(|v| v.length_squared()).fold(0.0, f32::max).sqrt()
     }
 
     fn record(&mut self, inverted: u32) -> SolverRecord {

@@ -190,7 +190,7 @@ impl Reference {
     }
 
     fn press(&self, u: &[DVec3], loads: &Loads, trial: &mut Trial) {
-        for (place, contact) in loads.contacts.iter().enumerate() {
+        for (place, contact) in loads.contacts.all().enumerate() {
             let normal = contact.normal.as_dvec3();
             let nodes =
                 || contact.nodes().map(|(n, w)| (n as usize, f64::from(w))).filter(|(n, _)| *n < self.positions.len());
@@ -229,8 +229,8 @@ impl Reference {
     /// The Newton step for a residual, with the springs that press in the matrix: one rank-one term after the other.
     fn newton_step(&mut self, trial: &Trial, loads: &Loads) -> Vec<DVec3> {
         let mut terms: Vec<RankOne> = Vec::with_capacity(trial.pressing.len());
-        for &place in &trial.pressing {
-            let contact = &loads.contacts[place];
+        let pressing = |place: &usize| trial.pressing.contains(place);
+        for contact in loads.contacts.all().enumerate().filter(|(place, _)| pressing(place)).map(|(_, c)| c) {
             let known = |n: u32| (n as usize) < self.positions.len() && !self.cells.fixed[n as usize];
             let mut v = vec![DVec3::ZERO; trial.residual.len()];
             let normal = contact.normal.as_dvec3();

@@ -20,6 +20,8 @@ pub(crate) struct Step {
     pub seats: u32,
     pub fade_keep: [f32; 2],
     pub fade_gain: [f32; 2],
+    pub planes: u32,
+    pub unused: [u32; 3],
 }
 
 /// Buffers that several passes share.

@@ -51,6 +51,7 @@ use device_state::{DeviceState, Step};
 use forces::Forces;
 use press::Press;
 use topology::Topology;
+use trepan_contact::PlaneContact;
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_soft::{Body, BodyError, Loads, SoftSolver, StepReport, Stiffness, power_bound_of_ms};
@@ -205,7 +206,8 @@ impl GpuTled {
     /// The first of the steps lets past stress fade for as long as the last step took, where that was another length.
     fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
         let mut step = self.numbers(loads, dt_ms);
-        if step.springs == 0 {
+        let presses = step.springs + step.planes > 0;
+        if !presses {
             self.press.pressure.write(&self.gpu, 0, &[0.0]);
         }
         let first = u32::from(self.elapsed_ms != dt_ms && !self.config.relaxation.is_none()).min(count);
@@ -213,7 +215,7 @@ impl GpuTled {
             let [one, two] = self.config.relaxation.fade(elapsed_ms);
             (step.fade_keep, step.fade_gain) = ([one.keep, two.keep], [one.gain, two.gain]);
             self.state.step.write(&self.gpu, 0, &[step]);
-            self.run(count, step.springs > 0);
+            self.run(count, presses);
         }
         if count > 0 {
             self.elapsed_ms = dt_ms;
@@ -247,6 +249,7 @@ impl GpuTled {
     /// The uniform of a step; hands the springs over.
     fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> Step {
         let half = 0.5 * self.damping_per_ms * dt_ms;
+        let (springs, planes) = self.hand_over(loads, dt_ms);
         Step {
             gravity: (loads.gravity - self.config.balanced_gravity).to_array(),
             dt: dt_ms,
@@ -254,7 +257,8 @@ impl GpuTled {
             gain: dt_ms / (1.0 + half),
             max_speed: self.config.max_speed,
             max_displacement: self.max_displacement_mm,
-            springs: self.hand_over(loads, dt_ms),
+            springs,
+            planes,
             elements: self.elements,
             nodes: self.layout.node_at.len() as u32,
             seats: self.seats,
@@ -262,15 +266,20 @@ impl GpuTled {
         }
     }
 
-    /// Gives the device every spring; says how many there are.
-    fn hand_over(&mut self, loads: &Loads, dt_ms: f32) -> u32 {
+    /// Gives the device every spring and plane; gives how many springs and planes there are.
+    fn hand_over(&mut self, loads: &Loads, dt_ms: f32) -> (u32, u32) {
         let at_rest = |n: u32| self.rest.get(n as usize).copied().unwrap_or_default();
-        self.press.list.clear();
+        let (list, place_of) = (&mut self.press.list, &self.layout.place_of);
+        list.clear();
         for spring in loads.contacts.iter() {
             let rest_depth = spring.offset_mm + spring.mean(at_rest).dot(spring.normal);
-            self.press.list.add(spring, (rest_depth, dt_ms), &self.layout.place_of, &self.state);
+            list.add(spring, (rest_depth, dt_ms), place_of, &self.state);
         }
-        self.press.touch(&self.gpu, &mut self.state)
+        let added =
+            |plane: &&PlaneContact| list.add_plane(plane, plane.depth_mm(at_rest(plane.node)), place_of, &self.state);
+        let planes = loads.contacts.planes().iter().filter(added).count();
+        self.press.touch(&self.gpu, &mut self.state);
+        (loads.contacts.len() as u32, planes as u32)
     }
 }
 

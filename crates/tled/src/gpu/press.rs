@@ -3,7 +3,7 @@
 use crate::gpu::device_state::DeviceState;
 use crate::gpu::forces::Forces;
 use crate::gpu::topology::Topology;
-use trepan_contact::{MAX_NODES, MAX_SPRINGS, NodalContact};
+use trepan_contact::{MAX_NODES, MAX_PLANES, MAX_SPRINGS, NodalContact, PlaneContact};
 use trepan_gpu::{Bindings, Buffer, Dispatches, Gpu, GpuError, Kernel, Slot};
 use trepan_shaders::TLED_PRESS;
 
@@ -19,7 +19,14 @@ pub(crate) struct Press {
     pub pressure: Buffer<f32>,
     /// The springs of the next submission.
     pub list: List,
-    shown: Vec<[u32; 4]>,
+    marks: Marks,
+}
+
+/// Which places are marked as pushed on the device, and in which hand-over each was last pushed.
+struct Marks {
+    marked: Vec<u32>,
+    pushed_in: Vec<u32>,
+    hand_over: u32,
 }
 
 /// A spring as `press.wgsl` declares it.
@@ -80,6 +87,27 @@ impl List {
             calm: trepan_soft::calmed(spring, dt_ms),
         });
     }
+
+    /// Adds a plane, after all springs, that is `rest_depth` mm deep where nothing moved; false where the
+    /// mesh lacks its node.
+    pub fn add_plane(&mut self, plane: &PlaneContact, rest_depth: f32, place_of: &[u32], state: &DeviceState) -> bool {
+        let Some(&place) = place_of.get(plane.node as usize) else { return false };
+        let [inverse_mass, weight] = state.mass_of(place);
+        let first = self.touched.len() as u32;
+        self.touched.push([place, 1f32.to_bits(), inverse_mass.to_bits(), weight.to_bits()]);
+        self.springs.push(Spring {
+            normal: plane.normal.to_array(),
+            stiffness: plane.stiffness,
+            damping: plane.damping,
+            rest_depth,
+            first,
+            count: 1,
+            compliance: inverse_mass,
+            weight: 1.0,
+            ..Spring::default()
+        });
+        true
+    }
 }
 
 impl Press {
@@ -89,9 +117,9 @@ impl Press {
         wanted[7..].fill(Slot::StorageMut);
         let kernel = Kernel::new(gpu, "press", TLED_PRESS, "main", &wanted)?;
         // Room for 64 more: idle lanes read past the last spring's nodes.
-        let most = MAX_SPRINGS * MAX_NODES;
+        let most = MAX_SPRINGS * MAX_NODES + MAX_PLANES;
         let touched = Buffer::zeroed(gpu, "touched", most + MAX_NODES)?;
-        let springs = Buffer::zeroed(gpu, "springs", MAX_SPRINGS)?;
+        let springs = Buffer::zeroed(gpu, "springs", MAX_SPRINGS + MAX_PLANES)?;
         let pushed = Buffer::zeroed(gpu, "pushed", state.u.len())?;
         let pressure = Buffer::zeroed(gpu, "pressure", 1)?;
         let bindings = kernel.bind(
@@ -108,23 +136,31 @@ impl Press {
                 (&pressure).into(),
             ],
         )?;
-        let list = List { springs: Vec::with_capacity(MAX_SPRINGS), touched: Vec::with_capacity(most) };
-        Ok(Self { kernel, bindings, springs, touched, pushed, pressure, list, shown: Vec::with_capacity(most) })
+        let springs_of = Vec::with_capacity(MAX_SPRINGS + MAX_PLANES);
+        let list = List { springs: springs_of, touched: Vec::with_capacity(most) };
+        let marks = Marks { marked: Vec::with_capacity(most), pushed_in: vec![0; state.u.len()], hand_over: 0 };
+        Ok(Self { kernel, bindings, springs, touched, pushed, pressure, list, marks })
     }
 
-    /// Hands the list over, and the touched nodes where they changed; gives how many springs there are.
-    pub fn touch(&mut self, gpu: &Gpu, state: &mut DeviceState) -> u32 {
+    /// Hands the list over, and marks of the nodes where they changed.
+    pub fn touch(&mut self, gpu: &Gpu, state: &mut DeviceState) {
         let List { springs, touched } = &self.list;
         if !springs.is_empty() {
             self.springs.write(gpu, 0, springs);
+            self.touched.write(gpu, 0, touched);
         }
-        if *touched != self.shown {
-            self.shown.iter().for_each(|&[place, ..]| state.mark(gpu, place, false));
-            self.shown.clone_from(touched);
-            self.shown.iter().for_each(|&[place, ..]| state.mark(gpu, place, true));
-            self.touched.write(gpu, 0, &self.shown);
+        let Marks { marked, pushed_in, hand_over } = &mut self.marks;
+        let before = *hand_over;
+        *hand_over = hand_over.wrapping_add(1).max(1);
+        for &[place, ..] in touched {
+            let last = std::mem::replace(&mut pushed_in[place as usize], *hand_over);
+            if last != *hand_over && (last != before || before == 0) {
+                state.mark(gpu, place, true);
+            }
         }
-        springs.len() as u32
+        marked.retain(|&place| pushed_in[place as usize] != *hand_over);
+        marked.drain(..).for_each(|place| state.mark(gpu, place, false));
+        marked.extend(touched.iter().map(|[place, ..]| *place));
     }
 
     /// Adds the pass to a submission.
