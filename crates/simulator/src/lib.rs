@@ -62,7 +62,7 @@ pub use session::{Ended, Session};
 pub use stages::alarms::Limits;
 pub use stages::collision_step::{CollisionStage, SoftFrame};
 pub use stages::haptic_tick::{FRESH_MS, GONE_MS, HapticConfig, HapticStage, Tick, TickInput, ToolSample};
-pub use stages::notice::{Notice, Warning, Watch, What};
+pub use stages::notice::{Hindrance, Notice, Warning, Watch, What};
 pub use stages::score::ScoreKeeper;
 pub use stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 pub use stages::settling::Settling;

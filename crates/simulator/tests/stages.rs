@@ -5,7 +5,9 @@ use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
 use trepan_geometry::{Buttons, Pose, Quat, ToolKind, ToolState, Vec3};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{HapticConfig, HapticStage, Limits, Notice, Phase, Program, TickInput, Warning, What};
+use trepan_simulator::{
+    HapticConfig, HapticStage, Hindrance, Limits, Notice, Phase, Program, TickInput, Warning, What,
+};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// A flat head: bone from z = -6 to 0 mm, brain under z = -8 mm.
@@ -38,19 +40,26 @@ struct Bench {
     stage: HapticStage,
     tick: u64,
     told: Vec<Notice>,
+    second: Option<Pose>,
 }
 
 impl Bench {
     fn new(program: Program) -> Self {
         let (bone, brain) = head();
         let bone = Some(bone).filter(|_| program.has_bone());
-        Self { stage: HapticStage::new(config(program), bone, Some(brain), at(20.0, 0.0)), tick: 0, told: Vec::new() }
+        Self {
+            stage: HapticStage::new(config(program), bone, Some(brain), at(20.0, 0.0)),
+            tick: 0,
+            told: Vec::new(),
+            second: None,
+        }
     }
 
     fn step(&mut self, tool: ToolState, status: Status, patch: &SurfacePatch) -> TickRecord {
         self.tick += 1;
         let tool = ToolState { time_ms: self.tick as f64, ..tool };
-        let input = TickInput { tick: self.tick, reading: Reading { tool, status }, patch, patch_seq: 1 };
+        let input =
+            TickInput { tick: self.tick, reading: Reading { tool, status }, patch, patch_seq: 1, second: self.second };
         let done = self.stage.tick(&input, &mut |notice| self.told.push(notice));
         let force = done.wrench.force();
         assert!(force.is_finite() && force.length() <= 3.3 + 1e-5, "{force} at tick {}", self.tick);
@@ -77,7 +86,7 @@ fn an_undone_stroke_gives_its_bone_back_once_the_tool_is_free() {
     let (bone, brain) = head();
     let before = bone.snapshot();
     let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(6.0, 0.0));
-    let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
     let mut removed = 0.0;
     let mut run = |bench: &mut Bench, z: f32, buttons: u32| {
         let record = bench.step(ToolState { buttons: Buttons(buttons), ..at(z, 0.0) }, Status::Fresh, &NO_PATCH);
@@ -101,22 +110,81 @@ fn an_undone_stroke_gives_its_bone_back_once_the_tool_is_free() {
     assert!(felt.depth_mm > 0.5, "the bone that came back is not felt: {} mm", felt.depth_mm);
 }
 
-#[test]
-fn the_stroke_of_a_tool_that_was_laid_down_stays() {
-    let (bone, brain) = head();
-    let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(6.0, 0.0));
-    let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+/// A stroke 4 mm down at the pose's place with the pedal, from 6 mm over the bone; then away to 12 mm. Gives what was removed, mm³.
+fn stroke(bench: &mut Bench, turn: Buttons, x: f32) -> f32 {
     let mut run = |z: f32, buttons: Buttons| {
-        bench.step(ToolState { buttons, ..at(z, 0.0) }, Status::Fresh, &NO_PATCH).removed_mm3
+        let mut tool = ToolState { buttons, ..at(z, 0.0) };
+        tool.world_from_tool.translation.x += x;
+        bench.step(tool, Status::Fresh, &NO_PATCH).removed_mm3
     };
-    let drilled: f32 = (0..400).map(|i| run(6.0 - 0.01 * i as f32, Buttons::PEDAL)).sum();
-    (0..200).for_each(|_| _ = run(12.0, Buttons(0)));
-    let after = bone.snapshot();
-    (0..20).for_each(|_| _ = run(12.0, Buttons::take(ToolKind::Perforator)));
-    assert_eq!((run(12.0, Buttons::UNDO), bone.snapshot() == after), (0.0, true));
-    let told = |what: fn(&What) -> bool| bench.told.iter().filter(|n| what(&n.what)).count();
-    assert!(drilled > 0.1 && told(|what| matches!(what, What::Taken(_))) == 2);
-    assert_eq!(told(|what| matches!(what, What::Undone(_) | What::Kept)), 0);
+    (0..5).for_each(|_| _ = run(12.0, turn));
+    (0..300).for_each(|i| _ = run(12.0 - 0.02 * i as f32, Buttons(0)));
+    let drilled = (0..400).map(|i| run(6.0 - 0.01 * i as f32, Buttons::PEDAL)).sum();
+    (0..250).for_each(|_| _ = run(12.0, Buttons(0)));
+    drilled
+}
+
+#[test]
+fn strokes_of_several_tools_come_back_one_by_one() {
+    let (bone, brain) = head();
+    let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(12.0, 0.0));
+    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+    let turns = [Buttons(0), Buttons::take(ToolKind::Perforator), Buttons::take(ToolKind::Burr)];
+    let mut states = Vec::new();
+    let mut drilled = Vec::new();
+    for (turn, x) in turns.into_iter().zip([-8.0, 8.0, 0.0]) {
+        states.push(bone.snapshot());
+        drilled.push(stroke(&mut bench, turn, x));
+        assert!(*drilled.last().unwrap() > 0.1 && bone.snapshot() != *states.last().unwrap());
+    }
+    let press = |buttons| ToolState { buttons, ..at(12.0, 0.0) };
+    for (state, mm3) in states.iter().zip(&drilled).rev() {
+        let back: f32 = (0..20).map(|_| bench.step(press(Buttons::UNDO), Status::Fresh, &NO_PATCH).removed_mm3).sum();
+        bench.step(press(Buttons(0)), Status::Fresh, &NO_PATCH);
+        assert!((back + mm3).abs() < 1e-3 * mm3, "{back} mm3 of {mm3} in the score");
+        assert!(bone.snapshot() == *state);
+    }
+    bench.step(press(Buttons::UNDO), Status::Fresh, &NO_PATCH);
+    assert_eq!(bench.told.last().unwrap().what, What::NotUndone(Hindrance::NoStroke));
+    assert!(bench.stage.scores().bone_removed_mm3.abs() < 1e-2, "{}", bench.stage.scores().bone_removed_mm3);
+}
+
+#[test]
+fn no_bone_comes_back_around_a_tool_of_either_hand() {
+    let (bone, brain) = head();
+    let stage = HapticStage::new(config(Program::Integrated), Some(bone.clone()), Some(brain), at(12.0, 0.0));
+    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+    let before = bone.snapshot();
+    let mut z = 6.0;
+    while !bench.told.iter().any(|n| n.what == What::Through) {
+        z -= 0.002;
+        assert!(z > -9.0, "it does not come through");
+        bench.step(ToolState { buttons: Buttons::PEDAL, ..at(z, 0.0) }, Status::Fresh, &NO_PATCH);
+    }
+    let drilled = bone.snapshot();
+    (0..100).for_each(|_| _ = bench.step(at(z + 1.0, 0.0), Status::Fresh, &NO_PATCH));
+    let peak = bench.stage.scores().peak_force_n;
+    let asks = |bench: &mut Bench, z: f32| {
+        (0..300).for_each(|_| _ = bench.step(at(z, 0.0), Status::Fresh, &NO_PATCH));
+        let undo = ToolState { buttons: Buttons::UNDO, ..at(z, 0.0) };
+        (0..300).for_each(|_| _ = bench.step(undo, Status::Fresh, &NO_PATCH));
+        (0..20).for_each(|_| _ = bench.step(at(z, 0.0), Status::Fresh, &NO_PATCH));
+        let undo = |n: &&Notice| matches!(n.what, What::Undone(_) | What::NotUndone(_));
+        *bench.told.iter().rev().find(undo).unwrap()
+    };
+    let refused = asks(&mut bench, z + 1.0);
+    assert_eq!(refused.what, What::NotUndone(Hindrance::Tool), "the burr lies in the hole");
+    assert!(bone.snapshot() == drilled && bench.stage.scores().peak_force_n == peak);
+    let words = refused.words();
+    assert!(words.0 == "refused" && words.1.contains("draw it out"), "{words:?}");
+    bench.second = Some(at(-3.0, 0.0).world_from_tool);
+    assert_eq!(asks(&mut bench, 20.0).what, What::NotUndone(Hindrance::SecondTool));
+    assert!(bone.snapshot() == drilled);
+    bench.second = Some(at(20.0, 0.0).world_from_tool);
+    assert!(matches!(asks(&mut bench, 20.0).what, What::Undone(_)) && bone.snapshot() == before);
+    let probe = ToolState { buttons: Buttons::take(ToolKind::Probe), ..at(20.0, 0.0) };
+    bench.step(probe, Status::Fresh, &NO_PATCH);
+    assert_eq!(bench.told.last().unwrap().what, What::NotOpen, "the hole is bone again");
 }
 
 #[test]
@@ -124,7 +192,7 @@ fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
     let (bone, brain) = head();
     let before = bone.snapshot();
     let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(20.0, 0.0));
-    let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
     let mut deepest = f32::INFINITY;
     for i in 0..14_000 {
         let mut tool = at((6.0 - 0.001 * i as f32).max(-7.0), -0.001);
@@ -222,7 +290,7 @@ fn the_tool_changes_once_for_a_press_and_only_when_free() {
         let (bone, brain) = head();
         let config = HapticConfig { opening_needed: needed, ..config(Program::Integrated) };
         let stage = HapticStage::new(config, Some(bone), Some(brain), at(20.0, 0.0));
-        let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+        let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
         for _ in 0..5 {
             bench.step(at(2.5, 0.0), Status::Fresh, &NO_PATCH);
         }
@@ -284,7 +352,7 @@ fn what_must_not_be_touched_is_told_from_a_millimetre_on_for_every_tool() {
         let config = HapticConfig { opening_needed: false, ..config(Program::Integrated) };
         let stage = HapticStage::new(config, Some(bone.clone()), Some(brain.clone()), at(30.0, 0.0));
         let stage = stage.forbidding(Arc::new(DistanceField::of_mask(&mask)));
-        let mut bench = Bench { stage, tick: 0, told: Vec::new() };
+        let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
         let mut told_at = None;
         for step in 0..2000 {
             let z = 30.0 - 0.01 * step as f32;

@@ -14,14 +14,17 @@
 //! World is patient RAS+ mm; the grid is axis-aligned and isotropic (the import resamples), so a world point costs three
 //! multiply-adds. 2 bytes a voxel, 4 bytes a brick. Exactly one thread may write at a time; that is the caller's to keep.
 //!
-//! A stroke of the burr, from the pedal's press to its release, can be undone: [`begin_stroke`](BoneVolume::begin_stroke) at the press, and bricks are
-//! kept before they change. To all readers undoing is one more change.
+//! Strokes of the burr, each from the pedal's press to its release, can be undone, newest first:
+//! [`begin_stroke`](BoneVolume::begin_stroke) at the press, and bricks are kept before they change. To all readers undoing is
+//! one more change. A tick undoes a few bricks at a time ([`exchange_brick`](BoneVolume::exchange_brick)).
 //!
 //! # When not to use it
 //! For volumes that do not change: [`VoxelVolume`] is plainer.
 
+mod undo;
+
 use crate::VoxelVolume;
-use crate::stroke::{Stroke, Undone};
+use crate::stroke::Strokes;
 use glam::{DVec3, IVec3};
 use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, Ordering};
 use trepan_geometry::{Aabb, Vec3};
@@ -45,8 +48,8 @@ pub struct BoneVolume {
     versions: Vec<AtomicU32>,
     /// Whether a brick has ever held bone.
     solid: Vec<AtomicBool>,
-    stroke: Stroke,
-    /// Times that a stroke was undone.
+    strokes: Strokes,
+    /// Times that bone came back where there was none.
     undone: AtomicU32,
 }
 
@@ -80,7 +83,7 @@ impl BoneVolume {
             bricks,
             versions: (0..bricks.iter().product()).map(|_| AtomicU32::new(0)).collect(),
             solid: (0..bricks.iter().product()).map(|_| AtomicBool::new(false)).collect(),
-            stroke: Stroke::new(bricks.iter().product()),
+            strokes: Strokes::new(bricks.iter().product()),
             undone: AtomicU32::new(0),
         };
         bone.bounds = bone.find_bone().ok_or(BoneError::Empty(isovalue))?;
@@ -174,8 +177,8 @@ impl BoneVolume {
     pub fn set_hu(&self, voxel: IVec3, hu: i16) {
         if let Some(at) = self.index(voxel) {
             let brick = self.brick_of(voxel);
-            if self.stroke.is_first(brick) {
-                self.stroke.keep(brick, |n| self.hu(self.voxel_in(brick, n)));
+            if self.strokes.is_first(brick) {
+                self.strokes.keep(brick, |n| self.hu(self.voxel_in(brick, n)));
             }
             self.hu[at].store(hu, Ordering::Relaxed);
             if hu >= self.isovalue {
@@ -183,25 +186,6 @@ impl BoneVolume {
             }
             self.versions[brick].fetch_add(1, Ordering::Release);
         }
-    }
-
-    /// From now on changes belong to a new stroke, and [`undo_stroke`](Self::undo_stroke) leads back to here. For the one writer only.
-    pub fn begin_stroke(&self) {
-        self.stroke.begin();
-    }
-
-    /// Puts all bricks back to how they were before the last stroke. For the one writer only; up to a millisecond for the largest stroke.
-    pub fn undo_stroke(&self) -> Undone {
-        let done = self.stroke.undo(|brick, n, hu| {
-            if let Some(at) = self.index(self.voxel_in(brick, n)) {
-                self.hu[at].store(hu, Ordering::Relaxed);
-            }
-            if n + 1 == BRICK * BRICK * BRICK {
-                self.versions[brick].fetch_add(1, Ordering::Release);
-            }
-        });
-        self.undone.fetch_add(u32::from(matches!(done, Undone::Bricks(_))), Ordering::Release);
-        done
     }
 
     /// Says that bone was put back by [`set_hu`](Self::set_hu) where there was none. For the one writer only.
@@ -296,7 +280,6 @@ impl BoneVolume {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::MAX_STROKE_BRICKS;
 
     fn ball() -> VoxelVolume<i16> {
         let mut volume = VoxelVolume::isotropic([20, 18, 17], Vec3::new(-9.0, 4.0, 1.0), 0.5, AIR_HU);
@@ -324,42 +307,6 @@ mod tests {
         assert_eq!(found, [[0, 0, 0], [1, 1, 1]]);
         assert_eq!(bone.changed(&mut seen, 9, |_| panic!("seen")), 0);
         assert_eq!(bone.snapshot().get([5, 3, 4]), Some(AIR_HU));
-    }
-
-    #[test]
-    fn a_stroke_is_undone_to_the_last_voxel_and_readers_notice() {
-        let bone = BoneVolume::new(&ball(), 400).unwrap();
-        bone.set_hu(IVec3::new(6, 4, 5), 100);
-        assert_eq!(bone.undo_stroke(), Undone::Nothing, "no stroke has begun");
-        let before = bone.snapshot();
-        bone.begin_stroke();
-        for at in 0..19 * 17 * 16 {
-            bone.set_hu(IVec3::new(at % 19, at / 19 % 17, at / 323), AIR_HU);
-        }
-        let mut seen = bone.seen();
-        assert_eq!(bone.undo_stroke(), Undone::Bricks(3 * 3 * 2));
-        assert_eq!(bone.snapshot(), before);
-        let mut found = 0;
-        bone.changed(&mut seen, 99, |_| found += 1);
-        assert_eq!((found, bone.undone()), (18, 1));
-        assert_eq!(bone.undo_stroke(), Undone::Nothing);
-        assert!(bone.version(IVec3::ZERO) > 0 && bone.version(IVec3::new(0, 0, 99)) == 0);
-    }
-
-    #[test]
-    fn a_stroke_longer_than_there_is_room_for_is_not_half_undone() {
-        let mut volume = VoxelVolume::isotropic([8, 8, 8 * (MAX_STROKE_BRICKS + 1)], Vec3::ZERO, 1.0, 900i16);
-        volume.data[0] = 0;
-        let bone = BoneVolume::new(&volume, 400).unwrap();
-        bone.begin_stroke();
-        (0..=MAX_STROKE_BRICKS as i32).for_each(|k| bone.set_hu(IVec3::new(0, 0, 8 * k), 7));
-        let drilled = bone.snapshot();
-        assert_eq!(bone.undo_stroke(), Undone::TooLong);
-        assert_eq!(bone.snapshot(), drilled);
-        bone.begin_stroke();
-        bone.set_hu(IVec3::ZERO, AIR_HU);
-        assert_eq!(bone.undo_stroke(), Undone::Bricks(1));
-        assert_eq!(bone.hu(IVec3::ZERO), 7);
     }
 
     #[test]

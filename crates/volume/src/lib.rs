@@ -53,7 +53,7 @@ pub use registration::{Registration, RegistrationConfig, RegistrationError, regi
 pub use resample::{Grid, Interpolation, resample};
 pub use sample::{ByteOrder, Number, Sample};
 pub use skull::{GREATEST_ISOVALUE, HounsfieldError, LEAST_ISOVALUE, bone_isovalue, hounsfield, labels, skull_only};
-pub use stroke::{MAX_STROKE_BRICKS, Undone};
+pub use stroke::{MAX_STROKE_BRICKS, MAX_STROKES, Undone};
 pub use volume::VoxelVolume;
 
 /// The README's example, compiled.

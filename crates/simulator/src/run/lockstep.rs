@@ -29,7 +29,7 @@ use std::collections::VecDeque;
 use std::sync::mpsc::Receiver;
 use std::thread;
 use trepan_contact::SurfacePatch;
-use trepan_geometry::{Buttons, ToolState, Wrench};
+use trepan_geometry::{Buttons, Pose, ToolState, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::Recording;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
@@ -87,6 +87,8 @@ struct Again<'a> {
     haptic: HapticStage,
     second: Option<SecondHand>,
     seconds: std::slice::Iter<'a, SecondRecord>,
+    /// Where the second hand's tool was after the last tick.
+    beside: Option<Pose>,
     tissue: Option<Tissue>,
     collisions: VecDeque<CollisionRecord>,
     switches: VecDeque<SolverRecord>,
@@ -113,6 +115,7 @@ impl<'a> Again<'a> {
             haptic: stages.haptic,
             second: stages.second,
             seconds: recording.second.iter(),
+            beside: None,
             tissue: stages.tissue,
             collisions: recording.collisions.iter().copied().collect(),
             switches: recording.solver.iter().copied().collect(),
@@ -135,7 +138,13 @@ impl<'a> Again<'a> {
         self.collide_up_to(record.patch_seq, clock);
         let &(patch_seq, patch) =
             self.patches.iter().rev().find(|(seq, _)| *seq <= record.patch_seq).unwrap_or(&(0, PATCH));
-        let input = TickInput { tick: record.tick, reading: reading(record.into()), patch: &patch, patch_seq };
+        let input = TickInput {
+            tick: record.tick,
+            reading: reading(record.into()),
+            patch: &patch,
+            patch_seq,
+            second: self.beside,
+        };
         if record.has(TickRecord::RELEASED) {
             self.haptic.release();
         }
@@ -146,6 +155,7 @@ impl<'a> Again<'a> {
             notices.send(notice);
         });
         let second = self.second_tick(record.tick);
+        self.beside = self.second.as_ref().and_then(SecondHand::place);
         tick.record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         self.ticks.add(&tick);
         let same = self.same(record.wrench, tick.record.wrench) & second.is_none_or(|(_, same)| same);

@@ -162,18 +162,20 @@ fn haptic_loop(
     let mut ticks = Ticks::default();
     let mut schedule = Schedule::new(pace.tick_ms.into(), clock.now_ms());
     let mut ending: Option<u64> = None;
+    let mut beside = None;
     loop {
         clock.spin_until(schedule.next_ms());
         let now_ms = clock.now_ms();
         let reading = hand.device.read(now_ms);
         let &(patch_seq, patch) = ends.patch.latest().0;
-        let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq };
+        let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq, second: beside };
         let mut tick = stage.tick(&input, &mut |notice| {
             ticks.hear(notice);
             ends.notices.send(notice);
         });
         hand.device.apply(tick.wrench);
         let aside = second.as_mut().map(|second| second.tick(ticks.count + 1, now_ms));
+        beside = second.as_ref().and_then(|second| second.stage.place());
         let done_ms = clock.now_ms();
         tick.record.compute_us = ((done_ms - now_ms) * 1e3) as f32;
         tick.record.flags |= if schedule.advance(done_ms) { TickRecord::LATE } else { 0 };

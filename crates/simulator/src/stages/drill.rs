@@ -1,15 +1,14 @@
-//! What the burr does to the bone from stroke to stroke: what is left ahead, when it comes through, what an undo gives back.
+//! What the burr does to the bone from stroke to stroke: what is left ahead, when it comes through.
 //!
 //! # Practice
 //! A stroke begins when the pedal goes down. The burr comes through once in a stroke, where it opens the bone and nothing is left ahead: a hole beside bone that
-//! is still ahead is a pore. The last stroke can be undone while the burr is in the hand and free; later the brain may bulge into the opening.
+//! is still ahead is a pore. What undoing gives back is `undo.rs`'s.
 
 use crate::stages::ahead::bone_ahead_mm;
-use crate::stages::notice::What;
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3};
 use trepan_rigid::RigidStep;
 use trepan_rigid::spindle::Spindle;
-use trepan_volume::{BoneVolume, Undone};
+use trepan_volume::BoneVolume;
 
 /// Bone this thin ahead of the burr is worth a warning, mm.
 pub(crate) const THIN_MM: f32 = 1.0;
@@ -19,41 +18,29 @@ pub(crate) const BREAK_MM: f32 = 0.3;
 /// The stroke at hand.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Drill {
-    /// Bone removed since the pedal was last pressed, mm³.
-    stroke_mm3: f32,
     drilled: bool,
     /// Whether the burr has come through the bone in this stroke.
     through: bool,
-    asked_undo: bool,
 }
 
 impl Drill {
-    /// Begins a stroke when the pedal goes down; gives the last one's bone back when that is asked for and `may_undo`. Says what it did.
-    pub fn stroke(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool, may_undo: bool) -> Option<What> {
-        if drilling && !self.drilled {
+    /// Begins a stroke when the pedal goes down, and ends it when it comes up. Returns whether one began.
+    pub fn stroke(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool) -> bool {
+        let begins = drilling && !self.drilled;
+        if begins {
             bone.begin_stroke();
-            (self.stroke_mm3, self.through) = (0.0, false);
+            self.through = false;
+        } else if self.drilled && !drilling {
+            bone.end_stroke();
         }
         self.through &= tool.buttons.has(Buttons::PEDAL);
         self.drilled = drilling;
-        let asks = tool.buttons.has(Buttons::UNDO);
-        let now = asks && !self.asked_undo && !drilling && may_undo;
-        self.asked_undo = asks;
-        match now.then(|| bone.undo_stroke())? {
-            Undone::Bricks(_) => Some(What::Undone(std::mem::take(&mut self.stroke_mm3))),
-            Undone::TooLong => Some(What::Kept),
-            Undone::Nothing => None,
-        }
+        begins
     }
 
     /// Whether the clutch of a perforator lets go: once it is through, until the pedal is up.
     pub fn lets_go(&self) -> bool {
         self.through
-    }
-
-    /// Takes note of bone removed in a tick, mm³.
-    pub fn removed(&mut self, mm3: f32) {
-        self.stroke_mm3 += mm3;
     }
 
     /// Whether the burr has come through the bone for the first time in its stroke.
@@ -102,27 +89,25 @@ mod tests {
     }
 
     #[test]
-    fn a_stroke_comes_back_once_and_only_when_it_may() {
+    fn a_stroke_is_from_the_pedals_press_to_its_release() {
         let (bone, mut drill) = (slab(), Drill::default());
-        let (pedal, undo) = (pressed(&[Buttons::PEDAL]), pressed(&[Buttons::UNDO]));
-        assert_eq!(drill.stroke(&bone, &pedal, true, true), None);
+        let pedal = pressed(&[Buttons::PEDAL]);
+        assert!(drill.stroke(&bone, &pedal, true) && !drill.stroke(&bone, &pedal, true));
         bone.set_hu(IVec3::splat(8), AIR_HU);
-        drill.removed(1.0);
-        assert_eq!(drill.stroke(&bone, &undo, false, false), None);
-        assert_eq!(drill.stroke(&bone, &pressed(&[]), false, true), None);
-        assert_eq!(drill.stroke(&bone, &undo, false, true), Some(What::Undone(1.0)));
-        assert!(bone.is_bone(IVec3::splat(8)));
-        assert_eq!(drill.stroke(&bone, &undo, false, true), None, "held down it asks once");
+        assert!(!drill.stroke(&bone, &pressed(&[]), false));
+        bone.set_hu(IVec3::splat(7), AIR_HU);
+        bone.undo_stroke();
+        assert_eq!([7, 8].map(|v| bone.is_bone(IVec3::splat(v))), [false, true], "what came after it stays");
     }
 
     #[test]
     fn it_comes_through_once_in_a_stroke_and_not_into_a_pore() {
         let (bone, mut drill) = (slab(), Drill::default());
         let open = RigidStep { broke_through: true, ..RigidStep::default() };
-        drill.stroke(&bone, &pressed(&[Buttons::PEDAL]), true, true);
+        drill.stroke(&bone, &pressed(&[Buttons::PEDAL]), true);
         assert!(!drill.came_through(&open, 1.5) && drill.came_through(&open, 0.1) && !drill.came_through(&open, 0.0));
-        drill.stroke(&bone, &pressed(&[]), false, true);
-        drill.stroke(&bone, &pressed(&[Buttons::PEDAL]), true, true);
+        drill.stroke(&bone, &pressed(&[]), false);
+        drill.stroke(&bone, &pressed(&[Buttons::PEDAL]), true);
         assert!(drill.came_through(&open, 0.0));
     }
 }

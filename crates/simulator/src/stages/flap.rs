@@ -58,6 +58,14 @@ impl Flap {
         matches!(self.at, At::Lifting(_) | At::Returning(_))
     }
 
+    /// Takes note of bone that came back: the flap may hang on the skull again.
+    pub fn bone_came_back(&mut self) {
+        self.stroke = true;
+        if matches!(self.at, At::Searched | At::Cut) {
+            self.at = At::Skull;
+        }
+    }
+
     /// One tick, after the bone was touched; `cut`: whether bone was removed in it, `free`: whether the tool touches nothing. Says what happened.
     pub fn tick(&mut self, bone: &BoneVolume, buttons: Buttons, drilling: bool, cut: bool, free: bool) -> Option<What> {
         let asks = buttons.has(Buttons::FLAP);
@@ -119,10 +127,6 @@ impl Flap {
         }
         let whole = end == self.search.voxels().min(self.densities.capacity());
         self.at = if whole { At::Away } else { At::Lifting(end) };
-        if whole {
-            // What a hand takes back is a stroke of its burr, not the flap.
-            bone.begin_stroke();
-        }
         whole.then(|| What::FlapLifted(self.mm3(bone)))
     }
 
@@ -131,9 +135,6 @@ impl Flap {
         (done..end).for_each(|at| bone.set_hu(self.search.voxel(at), self.densities[at]));
         bone.came_back();
         let whole = end == self.densities.len();
-        if whole {
-            bone.begin_stroke();
-        }
         self.at = if whole { At::Cut } else { At::Returning(end) };
         whole.then_some(What::FlapReturned)
     }

@@ -22,6 +22,7 @@ use crate::stages::flap::Flap;
 use crate::stages::notice::{Notice, Watch, What};
 use crate::stages::score::ScoreKeeper;
 use crate::stages::tray::Tray;
+use crate::stages::undo::Undo;
 use std::sync::Arc;
 use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardedWrench, SurfacePatch};
 use trepan_contact::{Vibration, Viscoelastic};
@@ -68,6 +69,8 @@ pub struct TickInput<'a> {
     pub patch: &'a SurfacePatch,
     /// Its sequence number; 0 before the first.
     pub patch_seq: u64,
+    /// Where the second hand's tool was after the last tick; `None` without one.
+    pub second: Option<Pose>,
 }
 
 /// The tool as the other threads see it.
@@ -121,6 +124,9 @@ pub struct HapticStage {
     held: ToolState,
     proxy: Pose,
     drill: Drill,
+    undo: Undo,
+    /// Times that the burr came through, less those that were undone.
+    holes: u32,
     feed: Feed,
     flap: Option<Flap>,
     released: bool,
@@ -159,6 +165,8 @@ impl HapticStage {
             held: start,
             proxy,
             drill: Drill::default(),
+            undo: Undo::default(),
+            holes: 0,
             feed: Feed::default(),
             flap: None,
             released: false,
@@ -180,7 +188,7 @@ impl HapticStage {
         let (tool, stale) = self.sound(&input.reading);
         self.change_tool(&tool, input.tick, tell);
         let drilling = self.drills(&tool);
-        let back_mm3 = self.undo(&tool, drilling, input.tick, tell);
+        let back_mm3 = self.undo(&tool, drilling, input.second, input.tick, tell);
         self.touch_bone(&tool, drilling);
         self.follow_flap(&tool, drilling, input.tick, tell);
         let ahead_mm = self.bone_ahead(drilling);
@@ -201,6 +209,7 @@ impl HapticStage {
         }
         if self.drill.came_through(&self.bone_step, ahead_mm) {
             record.flags |= TickRecord::THROUGH;
+            self.count_hole();
             tell(Notice { tick: input.tick, time_ms: tool.time_ms, what: What::Through });
         }
         self.scores.add(&record);
@@ -259,10 +268,18 @@ impl HapticStage {
             (Some(bone), Some(rigid)) => {
                 rigid.step(bone, tool, drilling, self.config.dt_ms, &mut self.bone_step);
                 self.proxy = rigid.proxy();
-                self.drill.removed(self.bone_step.removed_mm3);
+                if drilling {
+                    self.undo.newest(bone).mm3 += self.bone_step.removed_mm3;
+                }
             }
             _ => self.proxy = tool.world_from_tool,
         }
+    }
+
+    /// Takes note of a hole through the bone.
+    fn count_hole(&mut self) {
+        self.holes += 1;
+        self.bone.iter().for_each(|bone| self.undo.newest(bone).through += 1);
     }
 
     /// Speed of the spindle, 1/min.

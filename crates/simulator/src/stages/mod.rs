@@ -14,3 +14,4 @@ pub(crate) mod settling;
 pub(crate) mod skull_wall;
 pub(crate) mod solver_step;
 pub(crate) mod tray;
+pub(crate) mod undo;

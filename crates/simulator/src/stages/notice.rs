@@ -5,6 +5,7 @@
 
 use crate::program::{Phase, called};
 use trepan_geometry::Tool;
+use trepan_volume::{MAX_STROKE_BRICKS, MAX_STROKES};
 
 /// A warning that can stand for a while.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -100,8 +101,8 @@ pub enum What {
     Through,
     /// The last stroke of the burr was undone; the number is the bone that came back, mm³.
     Undone(f32),
-    /// The last stroke cannot be undone: it changed more bone than is kept.
-    Kept,
+    /// A stroke was to be undone, and was not.
+    NotUndone(Hindrance),
     /// A tool was taken into the hand.
     Taken(Tool),
     /// A tool for the brain was asked for before the bone was open.
@@ -114,6 +115,50 @@ pub enum What {
     FlapLifted(f32),
     /// The flap was put back.
     FlapReturned,
+}
+
+/// Why a stroke is not undone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hindrance {
+    /// The tool in the hand lies in bone that would come back.
+    Tool,
+    /// The second hand's tool does.
+    SecondTool,
+    /// The pedal is down.
+    Pedal,
+    /// A tool for the brain is in the hand.
+    BrainTool,
+    /// The flap is being lifted or put back.
+    FlapMoves,
+    /// The flap is away and was not when the stroke was made.
+    FlapAway,
+    /// The flap is in its place and was not when the stroke was made.
+    FlapThere,
+    /// Nothing was drilled that is not undone.
+    NoStroke,
+    /// What was drilled before is kept no longer.
+    Forgotten,
+}
+
+impl Hindrance {
+    /// What the trainee reads.
+    fn text(self) -> String {
+        let text = match self {
+            Self::Tool => "the tool lies in the bone that would come back: draw it out first",
+            Self::SecondTool => "the second hand's tool lies in the bone that would come back: draw it out first",
+            Self::Pedal => "the pedal is down: let it go first",
+            Self::BrainTool => "a tool for the brain is in the hand: take one for bone first",
+            Self::FlapMoves => "the flap is on its way: wait until it rests",
+            Self::FlapAway => "the flap was in its place at that stroke: put it back first",
+            Self::FlapThere => "the flap was away at that stroke: lift it first",
+            Self::NoStroke => "there is no stroke left",
+            Self::Forgotten => {
+                let room = format!("{MAX_STROKES} strokes, or {MAX_STROKE_BRICKS} blocks of bone that they changed");
+                return format!("earlier strokes are kept no longer: there is room for {room}");
+            }
+        };
+        text.into()
+    }
 }
 
 /// Something that happened at a tick.
@@ -149,7 +194,7 @@ impl Notice {
             What::Warning(warning, false, _) => ("cleared", warning.name().to_string()),
             What::Through => ("through", "the burr came through the bone".into()),
             What::Undone(mm3) => ("undo", format!("the last stroke is undone: {mm3:.1} mm3 of bone are back")),
-            What::Kept => ("undo", "the last stroke was too long to be undone".into()),
+            What::NotUndone(why) => ("refused", format!("no stroke is undone: {}", why.text())),
             What::NotOpen => ("refused", "the bone is not open: drill through it or lift the flap first".into()),
             What::FlapFree(mm3) => ("flap", format!("the flap is free: {mm3:.0} mm3 of bone")),
             What::FlapHangs => ("refused", "the flap still hangs on the skull".into()),

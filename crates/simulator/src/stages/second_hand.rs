@@ -81,6 +81,11 @@ impl SecondHand {
         Tool::aspirator()
     }
 
+    /// Where its tool is; `None` before its device has said where.
+    pub fn place(&self) -> Option<Pose> {
+        self.held.map(|_| self.rigid.proxy())
+    }
+
     /// The tick, after the first hand's of the same number.
     pub fn tick(&mut self, tick: u64, reading: &Reading) -> (GuardedWrench, SecondRecord) {
         let (tool, stale) = self.sound(reading);

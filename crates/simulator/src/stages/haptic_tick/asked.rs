@@ -4,16 +4,23 @@ use super::HapticStage;
 use crate::program::Phase;
 use crate::stages::drill::Drill;
 use crate::stages::flap::Flap;
-use crate::stages::notice::{Notice, What};
+use crate::stages::notice::{Hindrance, Notice, What};
+use crate::stages::second_hand::SecondHand;
 use crate::stages::tray::Change;
-use trepan_geometry::{Buttons, ToolKind, ToolState};
+use crate::stages::undo::{Answer, Place, Stroke};
+use trepan_geometry::{Buttons, Pose, ToolKind, ToolState};
 
 impl HapticStage {
-    /// Whether the tool cuts: a perforator's clutch lets go once it is through.
+    /// Whether the tool cuts: a perforator's clutch lets go once it is through, and nothing cuts while bone is on its way.
     pub(super) fn drills(&self, tool: &ToolState) -> bool {
         let kind = self.tool().kind;
         let slips = kind == ToolKind::Perforator && self.drill.lets_go();
-        tool.buttons.has(Buttons::PEDAL) && kind.cuts() && !slips
+        tool.buttons.has(Buttons::PEDAL) && kind.cuts() && !slips && !self.bone_moves()
+    }
+
+    /// Whether bone is on its way: a stroke that comes back, or the flap.
+    fn bone_moves(&self) -> bool {
+        self.undo.runs() || self.flap.as_ref().is_some_and(Flap::moves)
     }
 
     /// Whether the tool touches nothing.
@@ -24,14 +31,14 @@ impl HapticStage {
     /// Whether there is a way to the brain.
     fn is_open(&self) -> bool {
         let lifted = self.flap.as_ref().is_some_and(Flap::is_away);
-        lifted || self.bone.is_none() || self.scores.times_through > 0 || !self.config.opening_needed
+        lifted || self.bone.is_none() || self.holes > 0 || !self.config.opening_needed
     }
 
     /// Another tool comes when it is asked for and the last one touches nothing.
     pub(super) fn change_tool(&mut self, tool: &ToolState, tick: u64, tell: &mut dyn FnMut(Notice)) {
         let mut say = |what| tell(Notice { tick, time_ms: tool.time_ms, what });
         let before = self.phase();
-        let change = self.tray.change(tool.buttons, self.is_free(), self.is_open());
+        let change = self.tray.change(tool.buttons, self.is_free() && !self.undo.runs(), self.is_open());
         match change {
             Some(Change::Refused) => say(What::NotOpen),
             Some(Change::Taken) => {
@@ -39,8 +46,7 @@ impl HapticStage {
                     rigid.reset(self.proxy);
                 }
                 self.drill = Drill::default();
-                // The last stroke was another tool's.
-                self.bone.iter().for_each(|bone| bone.begin_stroke());
+                self.bone.iter().for_each(|bone| bone.end_stroke());
             }
             None => {}
         }
@@ -54,7 +60,7 @@ impl HapticStage {
 
     /// Looks after the flap.
     pub(super) fn follow_flap(&mut self, tool: &ToolState, drilling: bool, tick: u64, tell: &mut dyn FnMut(Notice)) {
-        let free = self.is_free() && self.phase() == Phase::Craniotomy;
+        let free = self.is_free() && self.phase() == Phase::Craniotomy && !self.undo.runs();
         let cut = self.bone_step.removed_mm3 > 0.0;
         if let (Some(bone), Some(flap)) = (&self.bone, &mut self.flap) {
             let what = flap.tick(bone, tool.buttons, drilling, cut, free);
@@ -62,13 +68,51 @@ impl HapticStage {
         }
     }
 
-    /// Lets the stroke begin or come back. Returns what came back, mm³.
-    pub(super) fn undo(&mut self, tool: &ToolState, drilling: bool, tick: u64, tell: &mut dyn FnMut(Notice)) -> f32 {
+    /// Lets strokes begin, end and come back; `second` is where the second hand's tool is. Returns what came back, mm³.
+    pub(super) fn undo(
+        &mut self,
+        tool: &ToolState,
+        drilling: bool,
+        second: Option<Pose>,
+        tick: u64,
+        tell: &mut dyn FnMut(Notice),
+    ) -> f32 {
+        let hinders = self.hinders_undo(tool);
         let Some(bone) = &self.bone else { return 0.0 };
-        let flap_rests = self.flap.as_ref().is_none_or(|flap| !flap.moves());
-        let may_undo = self.phase() == Phase::Craniotomy && !self.bone_step.manifold.touches() && flap_rests;
-        let what = self.drill.stroke(bone, tool, drilling, may_undo);
-        what.into_iter().for_each(|what| tell(Notice { tick, time_ms: tool.time_ms, what }));
-        if let Some(What::Undone(mm3)) = what { mm3 } else { 0.0 }
+        let flap_away = self.flap.as_ref().is_some_and(Flap::is_away);
+        if self.drill.stroke(bone, tool, drilling) {
+            *self.undo.newest(bone) = Stroke { flap_away, ..Stroke::default() };
+        }
+        let place = |tool, world_from_tool, said| Place { tool, world_from_tool, said };
+        let tools = [
+            Some(place(self.tray.tool(), self.proxy, Hindrance::Tool)),
+            second.map(|pose| place(SecondHand::tool(), pose, Hindrance::SecondTool)),
+        ];
+        let moved = self.undo.runs();
+        let answer = self.undo.tick(bone, tool.buttons.has(Buttons::UNDO), hinders, flap_away, &tools);
+        let Some(answer) = answer else { return 0.0 };
+        if moved || matches!(answer, Answer::Back(_)) {
+            self.flap.iter_mut().for_each(Flap::bone_came_back);
+        }
+        let (what, back_mm3) = match answer {
+            Answer::Back(stroke) => {
+                self.holes = self.holes.saturating_sub(stroke.through);
+                (What::Undone(stroke.mm3), stroke.mm3)
+            }
+            Answer::Not(why) => (What::NotUndone(why), 0.0),
+        };
+        tell(Notice { tick, time_ms: tool.time_ms, what });
+        back_mm3
+    }
+
+    /// Why no stroke may come back now.
+    fn hinders_undo(&self, tool: &ToolState) -> Option<Hindrance> {
+        if self.phase() == Phase::Brain {
+            return Some(Hindrance::BrainTool);
+        }
+        if self.flap.as_ref().is_some_and(Flap::moves) {
+            return Some(Hindrance::FlapMoves);
+        }
+        tool.buttons.has(Buttons::PEDAL).then_some(Hindrance::Pedal)
     }
 }

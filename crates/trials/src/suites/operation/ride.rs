@@ -118,7 +118,7 @@ fn run(mut stages: Stages, milliseconds: u64, path: &Script, rays: &Rays, ride: 
     for ms in 1..=milliseconds {
         let tool = ToolState { time_ms: ms as f64, ..path.at(ms as f64) };
         let reading = Reading { tool, status: Status::Fresh };
-        let input = TickInput { tick: ms, reading, patch: &patch.1, patch_seq: patch.0 };
+        let input = TickInput { tick: ms, reading, patch: &patch.1, patch_seq: patch.0, second: None };
         let tick = timed(&mut ride.cpu_s[0], || stages.haptic.tick(&input, &mut |_| {}));
         let record = timed(&mut ride.cpu_s[1], || tissue.collision.step(&tick.sample, &frame));
         patch = (record.seq, *tissue.collision.patch());

@@ -142,7 +142,8 @@ fn press(brain: &RestBrain, tumour: Option<Vec3>, entry: Vec3, inward: Vec3) -> 
     let end = (1e3 * (DEPTH_MM + 1.0) / PRESS_MM_S) as u64 + 500;
     for tick in 1..=end {
         let reading = Reading { tool: at(tick as f64), status: Status::Fresh };
-        let done = haptic.tick(&TickInput { tick, reading, patch: collision.patch(), patch_seq: seq }, &mut |_| {});
+        let done = haptic
+            .tick(&TickInput { tick, reading, patch: collision.patch(), patch_seq: seq, second: None }, &mut |_| {});
         solver.publish(&mut frame);
         seq = collision.step(&done.sample, &frame).seq;
         while solver.time_ms() < tick as f64 {

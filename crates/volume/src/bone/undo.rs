@@ -1,0 +1,206 @@
+//! Strokes of the burr, and undoing them brick by brick.
+
+use super::{BRICK, BoneVolume};
+use crate::stroke::Undone;
+use std::sync::atomic::{AtomicI16, Ordering};
+use trepan_geometry::Vec3;
+
+impl BoneVolume {
+    /// From now on changes belong to a new stroke, and [`undo_stroke`](Self::undo_stroke) leads back to here. For the one writer only.
+    pub fn begin_stroke(&self) {
+        self.strokes.begin();
+    }
+
+    /// The stroke is over: changes from now on belong to none and stay. For the one writer only.
+    pub fn end_stroke(&self) {
+        self.strokes.end();
+    }
+
+    /// Number of the newest stroke, counted from 1; one that is undone gives its number back.
+    pub fn stroke_number(&self) -> usize {
+        self.strokes.number()
+    }
+
+    /// Strokes that can be undone.
+    pub fn strokes(&self) -> usize {
+        self.strokes.count()
+    }
+
+    /// Whether older strokes than these were forgotten, since there is room for so many only.
+    pub fn forgot_strokes(&self) -> bool {
+        self.strokes.forgot()
+    }
+
+    /// Bricks that the newest stroke changed; 0 without one.
+    pub fn stroke_bricks(&self) -> usize {
+        self.strokes.length()
+    }
+
+    /// Exchanges the `n`th brick of the newest stroke with how it was before; the same again takes that back. For the one writer only; half a
+    /// microsecond.
+    pub fn exchange_brick(&self, n: usize) {
+        let Some((brick, copy)) = self.strokes.kept(n) else { return };
+        for (at, copy) in copy.iter().enumerate().filter_map(|(n, c)| Some((self.index(self.voxel_in(brick, n))?, c))) {
+            let before = copy.swap(self.hu[at].load(Ordering::Relaxed), Ordering::Relaxed);
+            self.hu[at].store(before, Ordering::Relaxed);
+        }
+        self.versions[brick].fetch_add(1, Ordering::Release);
+        self.came_back();
+    }
+
+    /// Whether undoing the `n`th brick of the newest stroke would bring bone back at a place for which `taken` is true. `near` is
+    /// asked first, with the centre of the brick and its half diagonal, mm.
+    pub fn brings_back(&self, n: usize, near: impl Fn(Vec3, f32) -> bool, taken: impl Fn(Vec3) -> bool) -> bool {
+        let Some((brick, copy)) = self.strokes.kept(n) else { return false };
+        let middle = self.centre_of(self.voxel_in(brick, 0)) + Vec3::splat(0.5 * (BRICK - 1) as f32 * self.spacing_mm);
+        let half = 0.5 * 3f32.sqrt() * BRICK as f32 * self.spacing_mm;
+        let comes = |n: usize, copy: &AtomicI16| {
+            let voxel = self.voxel_in(brick, n);
+            let gone = copy.load(Ordering::Relaxed) >= self.isovalue && !self.is_bone(voxel);
+            gone && taken(self.centre_of(voxel))
+        };
+        near(middle, half) && copy.iter().enumerate().any(|(n, copy)| comes(n, copy))
+    }
+
+    /// The newest stroke is undone, brick by brick: the one before it is the newest now. For the one writer only.
+    pub fn drop_stroke(&self) {
+        self.strokes.drop_newest();
+    }
+
+    /// Puts all bricks of the newest stroke back to how they were before it. For the one writer only; up to some milliseconds for the largest
+    /// stroke.
+    pub fn undo_stroke(&self) -> Undone {
+        match self.stroke_bricks() {
+            0 if self.forgot_strokes() => Undone::Forgotten,
+            0 => Undone::Nothing,
+            count => {
+                (0..count).for_each(|n| self.exchange_brick(n));
+                self.drop_stroke();
+                Undone::Bricks(count)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{AIR_HU, MAX_STROKE_BRICKS, MAX_STROKES, VoxelVolume};
+    use glam::IVec3;
+
+    fn block() -> VoxelVolume<i16> {
+        let mut volume = VoxelVolume::isotropic([20, 18, 17], Vec3::new(-9.0, 4.0, 1.0), 0.5, AIR_HU);
+        for k in 4..10 {
+            for j in 3..9 {
+                for i in 5..12 {
+                    let at = volume.index([i, j, k]);
+                    volume.data[at] = 900;
+                }
+            }
+        }
+        volume
+    }
+
+    #[test]
+    fn a_stroke_is_undone_to_the_last_voxel_and_readers_notice() {
+        let bone = BoneVolume::new(&block(), 400).unwrap();
+        bone.set_hu(IVec3::new(6, 4, 5), 100);
+        assert_eq!(bone.undo_stroke(), Undone::Nothing, "no stroke has begun");
+        let before = bone.snapshot();
+        bone.begin_stroke();
+        for at in 0..19 * 17 * 16 {
+            bone.set_hu(IVec3::new(at % 19, at / 19 % 17, at / 323), AIR_HU);
+        }
+        let mut seen = bone.seen();
+        assert_eq!(bone.undo_stroke(), Undone::Bricks(3 * 3 * 2));
+        assert_eq!(bone.snapshot(), before);
+        let mut found = 0;
+        bone.changed(&mut seen, 99, |_| found += 1);
+        assert_eq!((found, bone.undone() > 0), (18, true));
+        assert_eq!(bone.undo_stroke(), Undone::Nothing);
+        assert!(bone.version(IVec3::ZERO) > 0 && bone.version(IVec3::new(0, 0, 99)) == 0);
+    }
+
+    #[test]
+    fn strokes_come_back_one_by_one_and_what_lies_between_them_stays() {
+        let bone = BoneVolume::new(&block(), 400).unwrap();
+        let mut states = Vec::new();
+        for n in 0..5 {
+            states.push(bone.snapshot());
+            bone.begin_stroke();
+            (0..=n).for_each(|x| bone.set_hu(IVec3::new(6 + x, 4, 5 + n), 10 * n as i16));
+            bone.end_stroke();
+        }
+        bone.begin_stroke();
+        bone.begin_stroke();
+        bone.end_stroke();
+        assert_eq!(bone.strokes(), 5, "a stroke through air is none");
+        for state in states.iter().rev() {
+            assert!(matches!(bone.undo_stroke(), Undone::Bricks(_)));
+            assert_eq!(bone.snapshot(), *state);
+        }
+        assert_eq!(bone.undo_stroke(), Undone::Nothing);
+        bone.begin_stroke();
+        bone.set_hu(IVec3::new(6, 4, 5), AIR_HU);
+        bone.end_stroke();
+        bone.set_hu(IVec3::new(7, 4, 5), 77);
+        bone.exchange_brick(0);
+        let back = |bone: &BoneVolume| [6, 7].map(|x| bone.hu(IVec3::new(x, 4, 5)));
+        assert_eq!(back(&bone), [900, 900]);
+        bone.exchange_brick(0);
+        assert_eq!((back(&bone), bone.strokes()), ([AIR_HU, 77], 1), "exchanged twice it is as it was");
+    }
+
+    #[test]
+    fn only_bone_that_comes_back_is_in_the_way() {
+        let bone = BoneVolume::new(&block(), 400).unwrap();
+        let (gone, there, thin) = (IVec3::new(6, 4, 5), IVec3::new(5, 4, 5), IVec3::new(0, 4, 5));
+        bone.begin_stroke();
+        bone.set_hu(gone, AIR_HU);
+        bone.set_hu(thin, -900);
+        let at = |voxel| {
+            let place = bone.centre_of(voxel);
+            bone.brings_back(0, |middle, half| middle.distance(place) <= half, |p| p.distance(place) < 0.1)
+        };
+        assert_eq!([gone, there, thin].map(at), [true, false, false]);
+        assert!(!bone.brings_back(0, |_, _| false, |_| true) && !bone.brings_back(1, |_, _| true, |_| true));
+    }
+
+    #[test]
+    fn the_oldest_strokes_are_forgotten_where_room_runs_out() {
+        let volume = VoxelVolume::isotropic([8, 8, 8 * (MAX_STROKE_BRICKS + 1)], Vec3::ZERO, 1.0, 900i16);
+        let bone = BoneVolume::new(&volume, 400).unwrap();
+        let stroke = |bricks: std::ops::Range<usize>, hu| {
+            bone.begin_stroke();
+            bricks.for_each(|k| bone.set_hu(IVec3::new(0, 0, 8 * k as i32), hu));
+            bone.end_stroke();
+        };
+        stroke(0..10, 1);
+        stroke(0..10, 2);
+        assert!(bone.strokes() == 2 && !bone.forgot_strokes());
+        stroke(0..MAX_STROKE_BRICKS - 5, 3);
+        assert_eq!((bone.strokes(), bone.forgot_strokes()), (1, true), "two made room for the third");
+        assert_eq!(bone.undo_stroke(), Undone::Bricks(MAX_STROKE_BRICKS - 5));
+        assert_eq!((bone.hu(IVec3::ZERO), bone.undo_stroke()), (2, Undone::Forgotten));
+        (0..MAX_STROKES + 3).for_each(|n| stroke(0..1, 100 + n as i16));
+        assert_eq!(bone.strokes(), MAX_STROKES);
+        (0..MAX_STROKES).for_each(|_| assert_eq!(bone.undo_stroke(), Undone::Bricks(1)));
+        assert_eq!((bone.hu(IVec3::ZERO), bone.undo_stroke()), (102, Undone::Forgotten));
+    }
+
+    #[test]
+    fn a_stroke_longer_than_there_is_room_for_is_not_half_undone() {
+        let mut volume = VoxelVolume::isotropic([8, 8, 8 * (MAX_STROKE_BRICKS + 1)], Vec3::ZERO, 1.0, 900i16);
+        volume.data[0] = 0;
+        let bone = BoneVolume::new(&volume, 400).unwrap();
+        bone.begin_stroke();
+        (0..=MAX_STROKE_BRICKS as i32).for_each(|k| bone.set_hu(IVec3::new(0, 0, 8 * k), 7));
+        let drilled = bone.snapshot();
+        assert_eq!(bone.undo_stroke(), Undone::Forgotten);
+        assert_eq!(bone.snapshot(), drilled);
+        bone.begin_stroke();
+        bone.set_hu(IVec3::ZERO, AIR_HU);
+        assert_eq!(bone.undo_stroke(), Undone::Bricks(1));
+        assert_eq!(bone.hu(IVec3::ZERO), 7);
+    }
+}
