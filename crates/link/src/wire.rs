@@ -26,6 +26,8 @@ pub struct TickRecord {
     pub proxy: Pose,
     /// What went to the hand after the guard.
     pub wrench: Wrench,
+    /// The tissue's part of that force, N; only with [`TickRecord::TISSUE`], read it by [`tissue_n`](Self::tissue_n).
+    pub tissue_force: Vec3,
     /// Unit normal of the contact out of the obstacle; zero without contact.
     pub contact_normal: Vec3,
     /// Depth in bone, mm.
@@ -67,10 +69,26 @@ impl TickRecord {
     pub const LOST: u32 = 1 << 6;
     /// The burr came through the bone, for the first time in its stroke.
     pub const THROUGH: u32 = 1 << 7;
+    /// [`tissue_force`](Self::tissue_force) is known; not in recordings of before it was kept.
+    pub const TISSUE: u32 = 1 << 8;
 
     /// Whether every flag of `mask` is set.
     pub fn has(&self, mask: u32) -> bool {
         self.flags & mask == mask
+    }
+
+    /// Force of the tissue on the hand, N. In recordings of before it was kept it is the whole force where no bone was touched, else 0.
+    pub fn tissue_n(&self) -> f32 {
+        match (self.has(Self::TISSUE), self.tissue_depth_mm > 0.0 && self.depth_mm == 0.0) {
+            (true, _) => self.tissue_force.length(),
+            (false, true) => self.wrench.force.length(),
+            (false, false) => 0.0,
+        }
+    }
+
+    /// Unit normal out of the tissue; that of the contact where the tissue gives no force of its own.
+    pub fn tissue_normal(&self) -> Vec3 {
+        self.tissue_force.try_normalize().unwrap_or(self.contact_normal)
     }
 }
 
@@ -84,6 +102,7 @@ impl Default for TickRecord {
             buttons: 0,
             proxy: Pose::IDENTITY,
             wrench: Wrench::ZERO,
+            tissue_force: Vec3::ZERO,
             contact_normal: Vec3::ZERO,
             depth_mm: 0.0,
             tissue_depth_mm: 0.0,

@@ -56,6 +56,7 @@ fn tick(number: u64) -> TickRecord {
         buttons: noise.bits() as u32,
         proxy: noise.pose(),
         wrench: Wrench { force: noise.vector(), torque: noise.vector() },
+        tissue_force: noise.vector(),
         contact_normal: noise.vector(),
         depth_mm: f32::NAN,
         tissue_depth_mm: -0.0,
@@ -76,7 +77,7 @@ fn bits(t: &TickRecord) -> Vec<u64> {
     let floats = [
         pose(&t.device),
         pose(&t.proxy),
-        [t.twist.linear, t.twist.angular, t.wrench.force, t.wrench.torque, t.contact_normal]
+        [t.twist.linear, t.twist.angular, t.wrench.force, t.wrench.torque, t.tissue_force, t.contact_normal]
             .map(|v| v.to_array())
             .concat(),
         vec![t.depth_mm, t.tissue_depth_mm, t.removed_mm3, t.spindle_rpm, t.brain_distance_mm, t.compute_us],
@@ -339,4 +340,21 @@ fn times_that_are_no_numbers_are_recorded_as_they_are() {
         recorder.tick(&TickRecord { time_ms, ..TickRecord::default() }).unwrap();
     }
     recorder.finish().unwrap();
+}
+
+#[test]
+fn recordings_of_before_the_tissues_force_was_kept_still_tell_it_where_only_tissue_was_touched() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/paths");
+    for (name, soft) in [("brain-light", true), ("skull-touch", false)] {
+        let recording = Recording::open(&folder.join(format!("{name}.mcap"))).unwrap();
+        assert!(recording.ticks.len() > 2000 && !recording.truncated);
+        assert!(recording.ticks.iter().all(|tick| !tick.has(TickRecord::TISSUE) && tick.tissue_force == Vec3::ZERO));
+        let peak = recording.ticks.iter().map(|tick| tick.tissue_n()).fold(0.0, f32::max);
+        assert_eq!(peak > 0.0, soft, "{name}: {peak} N");
+    }
+    let tick = TickRecord { tissue_depth_mm: 1.0, wrench: Wrench { force: Vec3::X, torque: Vec3::ZERO }, ..tick(3) };
+    let old = |depth_mm| TickRecord { depth_mm, flags: 0, ..tick };
+    assert_eq!((old(0.0).tissue_n(), old(0.1).tissue_n()), (1.0, 0.0));
+    let new = TickRecord { tissue_force: 0.25 * Vec3::Y, flags: TickRecord::TISSUE, ..old(0.1) };
+    assert_eq!((new.tissue_n(), new.tissue_normal()), (0.25, Vec3::Y));
 }

@@ -283,6 +283,35 @@ fn the_force_of_an_old_patch_fades_and_the_ticks_are_held() {
 }
 
 #[test]
+fn a_probe_that_scrapes_the_rim_does_not_press_the_brain() {
+    let patch = |ms: u64, depth_mm: f32| SurfacePatch {
+        time_ms: ms as f64,
+        normal: Vec3::Z,
+        tip_mm: at(1.0, 0.0).tip(),
+        depth_mm,
+        normal_velocity: 0.0,
+    };
+    let (bone, brain) = head();
+    let config = HapticConfig { opening_needed: false, ..config(Program::Integrated) };
+    let stage = HapticStage::new(config, Some(bone), Some(brain), at(20.0, 0.0));
+    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+    let probe = |z: f32| ToolState { buttons: Buttons::take(ToolKind::Probe), ..at(z, 0.0) };
+    (0..50).for_each(|_| _ = bench.step(probe(20.0), Status::Fresh, &NO_PATCH));
+    let mut last = TickRecord::default();
+    for i in 0..1500u32 {
+        let z = 6.0 - 0.01 * i.min(500) as f32;
+        let soft = SurfacePatch { tip_mm: last.proxy.translation, ..patch(bench.tick + 1, 0.5) };
+        last = bench.step(probe(z), Status::Fresh, &soft);
+    }
+    assert!(last.wrench.force.length() > 1.0 && last.depth_mm > 0.5, "no bone is felt: {last:?}");
+    assert!((0.02..0.16).contains(&last.tissue_n()), "{} N of 0.15 N", last.tissue_n());
+    assert_eq!(bench.raised(Warning::BrainPressed), None);
+    let scores = bench.stage.scores();
+    assert!(scores.peak_tissue_force_n < 0.2 && scores.peak_force_n > 1.0, "{scores:?}");
+    assert!(scores.tissue_impulse_n_s < 0.2 * scores.tissue_s && scores.tissue_s > 1.0, "{scores:?}");
+}
+
+#[test]
 fn the_tool_changes_once_for_a_press_and_only_when_free() {
     let asks = Buttons::take(ToolKind::Probe);
     let press = |z: f32| ToolState { buttons: asks, ..at(z, 0.0) };

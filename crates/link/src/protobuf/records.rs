@@ -26,6 +26,7 @@ impl Fields for TickRecord {
         byte(v, 16, "phase", &mut self.phase);
         byte(v, 17, "tool", &mut self.tool);
         v.float(18, "spindle_rpm", &mut self.spindle_rpm);
+        vector(v, 19, "tissue_force", &mut self.tissue_force);
     }
 }
 

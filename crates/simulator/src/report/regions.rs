@@ -38,7 +38,7 @@ pub fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Re
     let mut all: Vec<Region> = Vec::new();
     for pair in ticks.windows(2).filter(|pair| pair[1].tissue_depth_mm > 0.0 && pair[1].phase == 1) {
         let (before, tick) = (&pair[0], &pair[1]);
-        let (place, normal) = (touched(&brain.field, tray, tick), tick.contact_normal);
+        let (place, normal) = (touched(&brain.field, tray, tick), tick.tissue_normal());
         let Some(class) = IN_MM.iter().find_map(|mm| class_at(brain, place - *mm * normal)) else { continue };
         let side = if place.x > middle { "right" } else { "left" };
         let name = format!("{side} {}", class.name());
@@ -47,7 +47,7 @@ pub fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Re
             all.len() - 1
         });
         let seconds = (1e-3 * (tick.time_ms - before.time_ms)).clamp(0.0, LONGEST_S);
-        let force = tick.wrench.force.length();
+        let force = tick.tissue_n();
         let region = &mut all[at];
         region.seconds += seconds;
         region.impulse_n_s += seconds * f64::from(force);
@@ -60,8 +60,9 @@ pub fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Re
 /// Where at rest the brain was that a tick touches, world mm.
 pub fn touched(brain: &DistanceField, tray: &[Tool], tick: &TickRecord) -> Vec3 {
     let radius_mm = tray.get(usize::from(tick.tool)).map_or(0.0, |tool| tool.tip_radius_mm);
-    let under = tick.proxy.translation - radius_mm * tick.contact_normal;
-    under - brain.sample(under).min(0.0) * tick.contact_normal
+    let normal = tick.tissue_normal();
+    let under = tick.proxy.translation - radius_mm * normal;
+    under - brain.sample(under).min(0.0) * normal
 }
 
 fn class_at(brain: &RestBrain, place: Vec3) -> Option<TissueClass> {

@@ -107,7 +107,7 @@ pub fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Pai
 /// Force over time on the brain, by the place at rest where the tool touched; `None` when it never did.
 pub fn forces(brain: &DistanceField, tray: &[Tool], ticks: &[TickRecord]) -> Option<Paint> {
     let pressed = |tick: &&TickRecord| tick.phase == 1 && tick.tissue_depth_mm > 0.0;
-    let touched = |tick: &TickRecord| (touched(brain, tray, tick), tick.wrench.force.length());
+    let touched = |tick: &TickRecord| (touched(brain, tray, tick), tick.tissue_n());
     // Every 10th tick: a touch spreads over much more than a hand moves in that time.
     let touches: Vec<(Vec3, f32)> = ticks.iter().filter(pressed).step_by(10).map(touched).collect();
     let places: Vec<Vec3> = touches.iter().map(|touch| touch.0).collect();

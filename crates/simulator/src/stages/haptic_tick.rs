@@ -108,6 +108,27 @@ pub struct Tick {
     pub warnings: u32,
 }
 
+/// What bone and tissue want the hand to feel.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wanted {
+    bone: Wrench,
+    /// `None` where tissue only warns.
+    tissue: Option<Wrench>,
+}
+
+impl Wanted {
+    fn sum(&self) -> Wrench {
+        self.tissue.map_or(self.bone, |tissue| self.bone + tissue)
+    }
+
+    /// The tissue's part of the force that the guard let through, N: shortened as the sum was.
+    fn tissue_within(&self, given: Vec3) -> Vec3 {
+        let wanted_n = self.sum().force.length();
+        let share = if wanted_n > 0.0 { (given.length() / wanted_n).min(1.0) } else { 1.0 };
+        share * self.tissue.unwrap_or_default().force
+    }
+}
+
 /// The state that lives from tick to tick.
 pub struct HapticStage {
     config: HapticConfig,
@@ -195,9 +216,9 @@ impl HapticStage {
         let sample = self.sample(&tool, input.tick, drilling);
         let held = self.touch_tissue(input.patch, &sample);
         let lost = input.reading.status == Status::Lost || tool.buttons.has(Buttons::PAUSE);
-        let wanted = if lost { Wrench::ZERO } else { self.wanted(&tool, drilling) };
+        let wanted = if lost { Wanted::default() } else { self.wanted(&tool, drilling) };
         let heated = self.guard.counters().heated;
-        let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
+        let wrench = self.guard.guard(wanted.sum(), &tool, self.config.dt_ms);
         let warm = self.guard.counters().heated > heated;
         let mut record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
         record.removed_mm3 -= back_mm3;
@@ -311,15 +332,14 @@ impl HapticStage {
     }
 
     /// Bone always pushes; tissue pushes in its own phase only (thesis 6.4: while drilling it only warns).
-    fn wanted(&mut self, tool: &ToolState, drilling: bool) -> Wrench {
+    fn wanted(&mut self, tool: &ToolState, drilling: bool) -> Wanted {
         let free = self.config.rigid.removal().spindle().map_or(f32::INFINITY, |spindle| spindle.free_rpm);
         self.config.bone_force.turn(self.spindle_rpm(drilling) / free);
         let dt_ms = self.config.dt_ms;
         let bone = self.config.bone_force.wrench(tool, &self.bone_step.manifold, dt_ms);
-        if self.phase() != Phase::Brain {
-            return bone;
-        }
-        bone + self.config.tissue_force.wrench(tool, &self.tissue, dt_ms)
+        let brain = self.phase() == Phase::Brain;
+        let tissue = brain.then(|| self.config.tissue_force.wrench(tool, &self.tissue, dt_ms));
+        Wanted { bone, tissue }
     }
 
     fn record(
@@ -330,9 +350,9 @@ impl HapticStage {
         wrench: GuardedWrench,
         held: bool,
         stale: bool,
-        wanted: Wrench,
+        wanted: Wanted,
     ) -> TickRecord {
-        let clamped = wanted.force.length() > self.config.guard.max_force_n;
+        let clamped = wanted.sum().force.length() > self.config.guard.max_force_n;
         let bits = [
             (held, TickRecord::HELD),
             (clamped, TickRecord::CLAMPED),
@@ -340,6 +360,7 @@ impl HapticStage {
             (stale, TickRecord::STALE),
             (self.released, TickRecord::RELEASED),
             (input.reading.status == Status::Lost, TickRecord::LOST),
+            (true, TickRecord::TISSUE),
         ];
         let bone = &self.bone_step.manifold;
         TickRecord {
@@ -350,6 +371,7 @@ impl HapticStage {
             buttons: input.reading.tool.buttons.0,
             proxy: self.proxy,
             wrench: wrench.wrench(),
+            tissue_force: wanted.tissue_within(wrench.force()),
             contact_normal: if bone.touches() { bone.normal } else { self.tissue.normal },
             depth_mm: bone.depth_mm,
             tissue_depth_mm: self.tissue.depth_mm,
@@ -392,20 +414,19 @@ impl HapticStage {
         sample: &ToolSample,
         ahead_mm: f32,
         patch: &SurfacePatch,
-        (wanted, warm): (Wrench, bool),
+        (wanted, warm): (Wanted, bool),
     ) -> Signs {
         let radius_mm = sample.tool.tip_radius_mm;
         let forbidden = self.forbidden.as_ref().map(|field| field.sample(sample.state.tip()) - radius_mm);
         let on_tissue = self.tissue.depth_mm > 0.0;
-        let brain = on_tissue && self.phase() == Phase::Brain;
         Signs {
             cutter: self.phase() == Phase::Craniotomy,
             ahead_mm,
             breach_ms: self.feed.follow(ahead_mm, REACH_MM, self.config.dt_ms),
             on_tissue,
-            tissue_n: if brain { record.wrench.force.length() } else { 0.0 },
+            tissue_n: record.tissue_n(),
             forbidden_mm: forbidden.unwrap_or(f32::INFINITY),
-            wanted_n: wanted.force.length(),
+            wanted_n: wanted.sum().force.length(),
             stalled: self.stalls(record),
             age_ms: (record.time_ms - patch.time_ms) as f32,
             warm,

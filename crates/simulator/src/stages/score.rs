@@ -37,9 +37,9 @@ pub struct ScoreKeeper {
     pub peak_burr_on_brain_n: f32,
     /// Time in which the tool pressed on tissue, s.
     pub tissue_s: f64,
-    /// Force on the hand, summed over the time in which the tool pressed on tissue, N s.
+    /// Force of the tissue on the hand, summed over that time, N s; that of bone touched at once is not in it.
     pub tissue_impulse_n_s: f64,
-    /// Largest force while the tool pressed on tissue, N.
+    /// Largest force of the tissue on the hand, N.
     pub peak_tissue_force_n: f32,
     /// Largest depth of the probe in tissue, mm.
     pub peak_tissue_depth_mm: f32,
@@ -97,9 +97,9 @@ impl ScoreKeeper {
             self.touching = touching;
         } else if record.tissue_depth_mm > 0.0 {
             self.tissue_s += seconds;
-            self.tissue_impulse_n_s += seconds * f64::from(force.length());
+            self.tissue_impulse_n_s += seconds * f64::from(record.tissue_n());
             self.peak_tissue_depth_mm = self.peak_tissue_depth_mm.max(record.tissue_depth_mm);
-            self.peak_tissue_force_n = self.peak_tissue_force_n.max(force.length());
+            self.peak_tissue_force_n = self.peak_tissue_force_n.max(record.tissue_n());
         }
     }
 }
