@@ -38,7 +38,7 @@ pub struct TickRecord {
     pub removed_mm3: f32,
     /// Speed of the drill's spindle, 1/min: 0 when it is off or has stalled.
     pub spindle_rpm: f32,
-    /// Distance from the tip to the brain's surface, mm; negative inside.
+    /// Distance from the tip to the brain's surface at rest, mm; negative inside. Of a craniotome, from its cutting part above the foot.
     pub brain_distance_mm: f32,
     /// Sequence number of the surface patch that the tick used.
     pub patch_seq: u64,

@@ -1,5 +1,6 @@
 //! The stages under faults: nothing that a device, a late thread or an odd script does reaches a hand as a jump, a NaN or a panic.
 
+use glam::IVec3;
 use std::sync::Arc;
 use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
 use trepan_geometry::{Buttons, Pose, Quat, ToolKind, ToolState, Vec3};
@@ -215,6 +216,47 @@ fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
     for voxel in removed {
         let centre = before.centre_of([voxel % 48, voxel / 48 % 48, voxel / 2304]).as_vec3();
         assert!(Vec3::new(centre.x - 0.3, centre.y + 0.2, 0.0).length() < 5.0, "bone was lost at {centre}");
+    }
+}
+
+#[test]
+fn a_touch_of_the_brain_is_warned_of_as_it_is_scored_and_a_craniotomes_foot_is_none() {
+    for (kind, foot) in [(ToolKind::Burr, false), (ToolKind::Craniotome, true)] {
+        let (bone, brain) = head();
+        // A hole that either tool goes down without touching.
+        (0..24).for_each(|at| {
+            (0..48 * 48).for_each(|n| bone.set_hu(IVec3::new(n % 48, n / 48, at + 15), trepan_volume::AIR_HU));
+        });
+        let stage = HapticStage::new(config(Program::Craniotomy), Some(bone), Some(brain), at(20.0, 0.0));
+        let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+        let take = |z: f32| ToolState { buttons: Buttons::take(kind), ..at(z, 0.0) };
+        let lift = |bench: &mut Bench, from: f32, to: f32| {
+            (0..=400).for_each(|i| {
+                let z = from + (to - from) * i as f32 / 400.0;
+                // The mesh bulges over the rest surface: that alone is no touch.
+                let patch = SurfacePatch {
+                    time_ms: (bench.tick + 1) as f64,
+                    normal: Vec3::Z,
+                    tip_mm: at(z, 0.0).tip(),
+                    depth_mm: 0.4,
+                    normal_velocity: 0.0,
+                };
+                bench.step(take(z), Status::Fresh, &patch);
+            });
+        };
+        (0..5).for_each(|_| _ = bench.step(take(20.0), Status::Fresh, &NO_PATCH));
+        let radius = Program::Craniotomy.tray().iter().find(|tool| tool.kind == kind).unwrap().tip_radius_mm;
+        lift(&mut bench, 20.0, -8.0 + radius + 0.5);
+        assert_eq!((bench.raised(Warning::BrainTouched), bench.stage.scores().burr_touches_of_brain), (None, 0));
+        lift(&mut bench, -8.0 + radius + 0.5, -8.0 + 0.5 * radius);
+        let touched = bench.raised(Warning::BrainTouched).is_some();
+        assert_eq!((touched, bench.stage.scores().burr_touches_of_brain), (!foot, u32::from(!foot)), "{kind:?}");
+        assert_eq!(bench.raised(Warning::BrainNear).is_some(), !foot);
+        lift(&mut bench, -8.0 + 0.5 * radius, -8.0 - 2.0 * radius);
+        assert!(bench.raised(Warning::BrainTouched).is_some(), "what cuts is in the brain");
+        assert_eq!(bench.stage.scores().burr_touches_of_brain, 1);
+        let words = bench.told.iter().map(|n| n.words().1).find(|text| text.starts_with("brain-touched")).unwrap();
+        assert!(words.ends_with(" mm deep)") && !words.contains("(-"), "{words}");
     }
 }
 

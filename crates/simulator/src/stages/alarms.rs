@@ -9,6 +9,7 @@
 
 use crate::stages::drill::{BREAK_MM, THIN_MM};
 use crate::stages::notice::Warning;
+use crate::stages::score::cuts_into_brain;
 use trepan_link::wire::TickRecord;
 
 /// A breach this near in time is worth a warning, ms.
@@ -48,14 +49,12 @@ impl Feed {
 /// What a tick knows beside its record.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Signs {
-    /// Whether a tool for bone is in the hand.
-    pub cutter: bool,
+    /// Whether a tool for bone is in the hand that has no foot to keep the dura off.
+    pub bare_cutter: bool,
     /// Bone left ahead, mm.
     pub ahead_mm: f32,
     /// Time until it is gone, ms.
     pub breach_ms: f32,
-    /// Whether the tool touches tissue.
-    pub on_tissue: bool,
     /// Force of the tissue, N.
     pub tissue_n: f32,
     /// Distance from the tool to the nearest forbidden structure, mm.
@@ -91,14 +90,14 @@ impl Signs {
     /// Every warning, whether its cause is there, and how near, strong or old it is.
     pub fn causes(&self, record: &TickRecord, limits: &Limits) -> [(Warning, bool, f32); Warning::ALL.len()] {
         let brain_mm = record.brain_distance_mm;
-        let touched = self.cutter && (brain_mm <= 0.0 || self.on_tissue);
+        let near = self.bare_cutter && brain_mm <= limits.near_mm;
         let drilling = record.has(TickRecord::DRILLING);
         [
             (Warning::BoneThin, self.ahead_mm <= THIN_MM, self.ahead_mm),
             (Warning::BreakThrough, self.ahead_mm <= BREAK_MM, self.ahead_mm),
             (Warning::BreachSoon, self.breach_ms <= SOON_MS, self.breach_ms),
-            (Warning::BrainNear, self.cutter && brain_mm <= limits.near_mm, brain_mm),
-            (Warning::BrainTouched, touched, brain_mm),
+            (Warning::BrainNear, near, brain_mm.max(0.0)),
+            (Warning::BrainTouched, cuts_into_brain(record), -brain_mm),
             (Warning::BrainPressed, self.tissue_n > limits.brain_force_n, self.tissue_n),
             (Warning::ForbiddenNear, self.forbidden_mm <= limits.forbidden_mm, self.forbidden_mm),
             (Warning::DrillStalled, drilling && self.stalled, self.wanted_n),

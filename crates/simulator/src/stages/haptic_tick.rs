@@ -377,7 +377,7 @@ impl HapticStage {
             tissue_depth_mm: self.tissue.depth_mm,
             removed_mm3: self.bone_step.removed_mm3,
             spindle_rpm: self.spindle_rpm(sample.drilling),
-            brain_distance_mm: self.brain_distance(sample.state.tip()),
+            brain_distance_mm: self.brain_distance(sample.state.world_from_tool),
             patch_seq: input.patch_seq,
             compute_us: 0.0,
             flags: bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum(),
@@ -397,9 +397,16 @@ impl HapticStage {
         }
     }
 
-    /// From the tool's ball to the brain's rest surface, mm; negative inside, infinite without a brain.
-    fn brain_distance(&self, tip: Vec3) -> f32 {
-        self.brain.as_ref().map_or(f32::INFINITY, |field| field.sample(tip) - self.tool().tip_radius_mm)
+    /// From the tool's ball to the brain's rest surface, mm; negative inside, infinite without a brain. Of a craniotome, whose
+    /// ball is a blunt foot made to run on the dura, from where its cutting part begins above the foot.
+    fn brain_distance(&self, world_from_tool: Pose) -> f32 {
+        let Some(field) = &self.brain else { return f32::INFINITY };
+        let Tool { tip_radius_mm, cutting_mm, .. } = self.tool();
+        let tip = world_from_tool.translation;
+        match cutting_mm > 0.0 {
+            true => field.sample(tip + world_from_tool.rotation * (tip_radius_mm * Vec3::Z)),
+            false => field.sample(tip) - tip_radius_mm,
+        }
     }
 
     /// Whether the drill stands still under its load.
@@ -418,12 +425,10 @@ impl HapticStage {
     ) -> Signs {
         let radius_mm = sample.tool.tip_radius_mm;
         let forbidden = self.forbidden.as_ref().map(|field| field.sample(sample.state.tip()) - radius_mm);
-        let on_tissue = self.tissue.depth_mm > 0.0;
         Signs {
-            cutter: self.phase() == Phase::Craniotomy,
+            bare_cutter: self.phase() == Phase::Craniotomy && sample.tool.cutting_mm == 0.0,
             ahead_mm,
             breach_ms: self.feed.follow(ahead_mm, REACH_MM, self.config.dt_ms),
-            on_tissue,
             tissue_n: record.tissue_n(),
             forbidden_mm: forbidden.unwrap_or(f32::INFINITY),
             wanted_n: wanted.sum().force.length(),

@@ -18,7 +18,7 @@ pub enum Warning {
     BreachSoon,
     /// The burr is close to the brain.
     BrainNear,
-    /// The burr touches the brain.
+    /// What cuts is past the brain's rest surface, where the dura lies; a craniotome's foot may be there.
     BrainTouched,
     /// A tool presses hard on the brain.
     BrainPressed,
@@ -181,13 +181,14 @@ impl Notice {
             What::Warning(warning, true, value) => {
                 let unit = match warning {
                     Warning::BoneThin | Warning::BreakThrough => "mm left",
-                    Warning::BrainNear | Warning::BrainTouched | Warning::ForbiddenNear => "mm away",
+                    Warning::BrainNear | Warning::ForbiddenNear => "mm away",
+                    Warning::BrainTouched => "mm deep",
                     Warning::ForceLimit | Warning::MotorsWarm | Warning::DrillStalled => "N wanted",
                     Warning::BrainPressed => "N",
                     Warning::BreachSoon => "ms left",
                     Warning::TissueLate | Warning::DeviceStale => "ms old",
                 };
-                // Nothing is -0.00 mm away.
+                // Nothing is -0.00 mm deep.
                 let value = (100.0 * value).round() / 100.0 + 0.0;
                 ("warning", format!("{}: {} ({value:.2} {unit})", warning.name(), warning.text()))
             }
@@ -257,10 +258,10 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_minus_nothing_away() {
+    fn nothing_is_minus_nothing_deep() {
         let words =
             |value| Notice { tick: 0, time_ms: 0.0, what: What::Warning(Warning::BrainTouched, true, value) }.words().1;
-        assert!(words(-0.001).ends_with("(0.00 mm away)"), "{}", words(-0.001));
-        assert!(words(-0.016).ends_with("(-0.02 mm away)"), "{}", words(-0.016));
+        assert!(words(-0.001).ends_with("(0.00 mm deep)"), "{}", words(-0.001));
+        assert!(words(0.016).ends_with("(0.02 mm deep)"), "{}", words(0.016));
     }
 }

@@ -27,7 +27,7 @@ pub struct ScoreKeeper {
     pub bone_removed_mm3: f64,
     /// Strokes of the burr that came through the bone.
     pub times_through: u32,
-    /// Deepest place of the burr past the brain's rest surface, mm; 0 when it never got there.
+    /// Deepest place of what cuts past the brain's rest surface, mm; 0 when it never got there. A craniotome's foot does not cut.
     pub plunge_mm: f32,
     /// Separate touches of the brain's rest surface, and so of the dura over it, with a tool for bone.
     pub burr_touches_of_brain: u32,
@@ -62,6 +62,11 @@ pub struct ScoreKeeper {
 /// A longer pause between two ticks does not count, s.
 const LONGEST_S: f64 = 0.1;
 
+/// Whether a tool for bone is past the brain's rest surface: what is warned of, counted and timed as a touch of the brain.
+pub(crate) fn cuts_into_brain(record: &TickRecord) -> bool {
+    record.phase == 0 && record.brain_distance_mm <= 0.0
+}
+
 impl ScoreKeeper {
     /// Time of the newest tick, ms; 0 before the first.
     pub fn time_ms(&self) -> f64 {
@@ -88,7 +93,7 @@ impl ScoreKeeper {
         }
         if record.phase == 0 {
             self.plunge_mm = self.plunge_mm.max(-record.brain_distance_mm);
-            let touching = record.brain_distance_mm <= 0.0;
+            let touching = cuts_into_brain(record);
             self.burr_touches_of_brain += u32::from(touching && !self.touching);
             if touching {
                 self.burr_on_brain_s += seconds;
