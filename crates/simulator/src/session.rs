@@ -1,8 +1,8 @@
 //! A session from its flags to its files: open (everything that a user can get wrong), run, write.
 
-use crate::case::Inputs;
 use crate::case::choice;
 use crate::case::scene::Scene;
+use crate::case::{Inputs, anatomy};
 use crate::error::SessionError;
 use crate::hand::{self, Feel, Hand, SecondHold};
 use crate::models::{Models, Wish};
@@ -10,9 +10,9 @@ use crate::operation::Operation;
 use crate::options::Options;
 use crate::program::Program;
 use crate::report::against::Against;
-use crate::report::output;
 use crate::report::page::Shot;
 use crate::report::summary::{About, CutOff, Machine, Summary};
+use crate::report::{drilled, output};
 use crate::run::film::Filming;
 use crate::run::journal::Kept;
 use crate::run::lesson::{Company, Taught, Teacher};
@@ -34,7 +34,7 @@ use trepan_haptics::script::Script;
 use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
-use trepan_volume::VoxelVolume;
+use trepan_volume::{BoneVolume, VoxelVolume};
 
 /// A session that is ready to run.
 pub struct Session {
@@ -46,6 +46,8 @@ pub struct Session {
     case: String,
     hash: String,
     table: Table,
+    /// What the case was made of; nothing for a case folder.
+    inputs: Inputs,
     out: PathBuf,
     windowed: bool,
     /// The device that draws, where it was looked for already.
@@ -83,12 +85,29 @@ impl Session {
         let operation = Operation::of(&options, &device, recording.as_ref());
         let wish = Wish::of(program, &options, &operation, recording.as_ref())?;
         let mut drawing = None;
+        let inputs = match options.case {
+            Some(_) => Inputs::default(),
+            None => choice::inputs(&options.patient, built_in.clone()),
+        };
         let card = || drawing.insert(driver::open()).as_ref().is_ok_and(|gpu| !gpu.is_software());
         let (case, models) = choice::open_case(program, &options, built_in, wish, card)?;
         let (name, hash) = (case.name.clone(), case.hash.clone());
         let table = Table::new(program, (case, models), operation, windowed && recording.is_some())?;
         let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
-        Ok(Self { program, options, device, second, recording, case: name, hash, table, out, windowed, drawing })
+        Ok(Self {
+            program,
+            options,
+            device,
+            second,
+            recording,
+            case: name,
+            hash,
+            table,
+            inputs,
+            out,
+            windowed,
+            drawing,
+        })
     }
 
     /// Runs it and writes its files.
@@ -126,6 +145,8 @@ impl Session {
         remarks.extend(graphics.err());
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
+        let drilled =
+            self.table.bone().zip(whole.as_ref()).map(|(bone, whole)| self.drilled(bone, whole, &mut remarks));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
         let about = About {
             cut_off: CutOff::of(&before, &self.table.pieces(), self.table.bone().map_or(0.0, |bone| bone.voxel_mm3())),
@@ -135,10 +156,20 @@ impl Session {
         };
         let summary = Summary::new(about, &outcome);
         output::write(&self.out, &recording, &summary, &outcome, &self.shots(album.shots))?;
-        if let Some(bone) = self.table.bone() {
-            output::drilled(&self.out, bone, self.options.stl)?;
+        if let Some((bone, densities)) = self.table.bone().zip(drilled) {
+            output::drilled(&self.out, &densities, bone, self.options.stl)?;
         }
         Ok(Ended { summary, out: self.out, signal: stop.signal() })
+    }
+
+    /// The skull as it is now, in the scanner's voxels; in those of the case, with a remark, where the CT is not at hand.
+    fn drilled(&self, bone: &BoneVolume, whole: &VoxelVolume<i16>, remarks: &mut Vec<String>) -> VoxelVolume<i16> {
+        let ct = anatomy::scanned(&self.inputs, self.options.patient.ct_series).unwrap_or_else(|why| {
+            let edge = bone.spacing_mm();
+            remarks.push(format!("drilled.nii.gz has voxels of {edge} mm instead of the scanner's: {why}"));
+            whole.clone()
+        });
+        drilled::drilled(ct, whole, bone)
     }
 
     /// The patient as he lies there now.

@@ -29,6 +29,12 @@ pub fn read_ct(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> R
     hounsfield(&import.volume).map_err(|fault| SessionError::Case(format!("{}: {fault}", path.display())))
 }
 
+/// The CT of a case's files again, as it was scanned; says why not in a remark.
+pub fn scanned(inputs: &Inputs, series: Option<usize>) -> Result<VoxelVolume<i16>, String> {
+    let path = inputs.ct.as_deref().ok_or("a case folder does not hold the scanner's images")?;
+    read_ct(path, series, &mut Vec::new()).map_err(|fault| format!("the CT cannot be read again: {fault}"))
+}
+
 /// An MRI without holes, and remarks on it.
 pub fn read_mri(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<f32>, SessionError> {
     let import = image(path, series)?;

@@ -115,7 +115,8 @@ fn recipe(patient: &Patient) -> Recipe {
     }
 }
 
-fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
+/// The files that are given; the built-in case's where none is.
+pub fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
     let Patient { ct, mri, labels, tissues, .. } = patient.clone();
     if ct.is_none() && mri.is_none() && labels.is_none() && tissues.is_empty() {
         return built_in;

@@ -1,6 +1,6 @@
 //! From a patient's files to the operating table.
 
-mod anatomy;
+pub(crate) mod anatomy;
 pub(crate) mod cache;
 pub(crate) mod choice;
 mod fit;

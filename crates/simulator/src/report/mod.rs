@@ -2,6 +2,7 @@
 
 pub(crate) mod against;
 pub(crate) mod chart;
+pub(crate) mod drilled;
 pub(crate) mod output;
 pub(crate) mod page;
 pub(crate) mod regions;

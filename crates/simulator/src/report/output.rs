@@ -10,7 +10,7 @@ use std::io::Write;
 use std::path::Path;
 use trepan_link::Recording;
 use trepan_mesh::{isosurface, stl};
-use trepan_volume::{BoneVolume, nifti};
+use trepan_volume::{BoneVolume, VoxelVolume, nifti};
 
 /// Makes the output folder and its place for pictures, empty of older ones.
 pub fn folder(out: &Path) -> Result<(), SessionError> {
@@ -23,13 +23,12 @@ pub fn folder(out: &Path) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// Writes the skull as it is now, in the scanner's space: densities, and with `surface` its triangles too.
-pub fn drilled(out: &Path, bone: &BoneVolume, surface: bool) -> Result<(), SessionError> {
-    let volume = bone.snapshot();
+/// Writes the drilled skull's densities, and with `surface` the triangles of the bone as it was carved.
+pub fn drilled(out: &Path, densities: &VoxelVolume<i16>, bone: &BoneVolume, surface: bool) -> Result<(), SessionError> {
     let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(fault.to_string());
-    nifti::write(&out.join("drilled.nii.gz"), &volume).map_err(|fault| internal(&fault))?;
+    nifti::write(&out.join("drilled.nii.gz"), densities).map_err(|fault| internal(&fault))?;
     if surface {
-        let triangles = isosurface(&volume, bone.isovalue());
+        let triangles = isosurface(&bone.snapshot(), bone.isovalue());
         stl::write(&out.join("drilled.stl"), &triangles).map_err(|fault| internal(&fault))?;
     }
     Ok(())
