@@ -6,7 +6,7 @@ use crate::compare::compare;
 use crate::device_test;
 use crate::models::Wish;
 use crate::options::{CaseTask, DeviceTask, Patient, Task};
-use crate::report::summary::CutOff;
+use crate::report::summary::{CutOff, slow};
 use crate::show::driver;
 use crate::{Ended, Inputs, Options, Program, Session, SessionError, build_case};
 use clap::Parser;
@@ -115,6 +115,9 @@ fn told(ended: &Ended) -> ExitCode {
         summary.warnings.len(),
         summary.frames
     );
+    if summary.replay.is_none() {
+        slow(summary.rate_hz, summary.asked_hz).iter().for_each(|slow| println!("{slow}"));
+    }
     if summary.cut_off.pieces > 0 {
         let CutOff { pieces, largest_mm3 } = summary.cut_off;
         println!("cut off the skull: {pieces} piece(s) of bone, the largest of {largest_mm3:.0} mm3");

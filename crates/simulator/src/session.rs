@@ -333,6 +333,7 @@ impl Session {
             models: self.table.models.summary(),
             solver: self.table.solver_name().into(),
             brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
+            asked_hz: self.table.operation.rate_hz.into(),
             frames: album.frames,
             cut_off: CutOff::default(),
             plan: None,

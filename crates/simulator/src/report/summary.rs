@@ -30,6 +30,8 @@ pub struct Summary {
     pub ticks: u64,
     /// Ticks a second, as measured.
     pub rate_hz: f64,
+    /// Ticks a second that were asked for.
+    pub asked_hz: f64,
     /// Ticks that were not done by the next deadline.
     pub late_ticks: u64,
     /// Ticks that felt an old collision result.
@@ -263,6 +265,8 @@ pub struct About {
     pub solver: String,
     /// Tetrahedra, nodes, fixed nodes.
     pub brain: [usize; 3],
+    /// Haptic ticks a second that were asked for.
+    pub asked_hz: f64,
     /// Pictures drawn.
     pub frames: u64,
     /// Bone that was cut off.
@@ -281,6 +285,8 @@ impl Summary {
     /// From all that is known at the end.
     pub fn new(about: About, outcome: &Outcome) -> Self {
         let seconds = outcome.seconds.max(1e-9);
+        let rate_hz = outcome.ticks.count as f64 / seconds;
+        let slow = outcome.replayed.is_none().then(|| slow(rate_hz, about.asked_hz)).flatten();
         let mishaps = outcome.solver.iter().flat_map(|solver| solver.mishaps.remarks());
         Self {
             app: about.program.name().into(),
@@ -289,7 +295,8 @@ impl Summary {
             models: about.models,
             phases: phases(outcome),
             ticks: outcome.ticks.count,
-            rate_hz: outcome.ticks.count as f64 / seconds,
+            rate_hz,
+            asked_hz: about.asked_hz,
             late_ticks: outcome.ticks.late,
             held_ticks: outcome.ticks.held,
             tick_us: (&outcome.ticks.times).into(),
@@ -328,10 +335,22 @@ impl Summary {
             fps: about.frames as f64 / seconds,
             replay: outcome.replayed,
             dropped_records: outcome.written.dropped,
-            remarks: about.remarks.into_iter().chain(outcome.remarks.iter().cloned()).chain(mishaps).collect(),
+            remarks: slow.into_iter().chain(about.remarks).chain(outcome.remarks.iter().cloned()).chain(mishaps).collect(),
             machine: about.machine,
         }
     }
+}
+
+/// Share of the asked rate under which a session is told to be slow.
+const FULL_RATE: f64 = 0.995;
+
+/// What is to be said of a session whose ticks came slower than they were asked for.
+pub fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
+    (rate_hz < FULL_RATE * asked_hz).then(|| {
+        format!(
+            "SLOW: {rate_hz:.1} ticks a second instead of {asked_hz:.0}: forces came late, so do not compare this session's              feel and times with others; close other programs, or give a lower --rate-hz"
+        )
+    })
 }
 
 fn phases(outcome: &Outcome) -> Vec<PhaseStart> {
@@ -350,4 +369,16 @@ fn warnings(outcome: &Outcome) -> Vec<Raised> {
         _ => None,
     };
     outcome.written.notices.iter().filter_map(raised).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_under_199_of_200_is_told() {
+        let told = slow(992.0, 1000.0).expect("992 Hz are too few");
+        assert!(told.contains("992.0") && told.contains("1000") && told.contains("--rate-hz"), "{told}");
+        assert_eq!((slow(995.1, 1000.0), slow(1000.2, 1000.0), slow(498.0, 500.0)), (None, None, None));
+    }
 }
