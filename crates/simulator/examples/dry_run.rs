@@ -23,6 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         guard: GuardConfig::default(),
         limits: Limits::default(),
         opening_needed: true,
+        force_waits: true,
     };
     let mut stage = HapticStage::new(config, Some(Arc::new(bone)), Some(Arc::new(brain)), device.at(0.0));
     for tick in 1..=10_000u64 {

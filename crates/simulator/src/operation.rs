@@ -29,6 +29,9 @@ pub struct Operation {
     pub rate_hz: f32,
     /// Whether a tool for the brain can be had only once the skull is open; not where another's session is watched.
     pub opening_needed: bool,
+    /// Whether force waits for a deliberate act after a fault of the device; not where another's session is watched, nor in a recording of
+    /// before it did.
+    pub force_waits: bool,
 }
 
 impl Operation {
@@ -53,11 +56,15 @@ impl Operation {
                 .unwrap_or(YOUNG_KPA),
             rate_hz: options.rate_hz.or_else(|| within("rate_hz", RATES_HZ)).unwrap_or(RATE_HZ),
             opening_needed: recorded("opening_needed").map_or(options.watch.is_none(), |needed| needed != "false"),
+            force_waits: match recording {
+                Some(_) => recorded("force_waits").is_some_and(|waits| waits == "true"),
+                None => options.watch.is_none(),
+            },
         }
     }
 
     /// As a recording keeps it.
-    pub fn entries(&self) -> [(String, String); 6] {
+    pub fn entries(&self) -> [(String, String); 7] {
         let forbidden: Vec<&str> = self.forbidden.iter().map(|class| class.name()).collect();
         [
             ("flap_mm".into(), self.flap_mm.to_string()),
@@ -66,6 +73,7 @@ impl Operation {
             ("young_modulus_kpa".into(), self.young_kpa.to_string()),
             ("rate_hz".into(), self.rate_hz.to_string()),
             ("opening_needed".into(), self.opening_needed.to_string()),
+            ("force_waits".into(), self.force_waits.to_string()),
         ]
     }
 }
@@ -90,6 +98,7 @@ mod tests {
         let asked = Operation::of(&parse(line), &script, None);
         assert!(!asked.opening_needed && usual.opening_needed);
         let mut recording = Recording::default();
+        assert!(usual.force_waits && !Operation::of(&parse("x"), &script, Some(&recording)).force_waits);
         recording.header.config.extend(asked.entries());
         assert_eq!(Operation::of(&parse("x"), &DeviceName::Mouse, Some(&recording)), asked);
         assert_eq!(Operation::of(&parse("x --flap 40"), &script, Some(&recording)).flap_mm, 40.0);

@@ -116,6 +116,7 @@ impl Table {
             guard: feel.guard(),
             limits: Limits::default(),
             opening_needed: self.operation.opening_needed,
+            force_waits: self.operation.force_waits,
         };
         let bone = self.bone().cloned();
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));

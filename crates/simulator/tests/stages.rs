@@ -34,6 +34,7 @@ fn config(program: Program) -> HapticConfig {
         guard: GuardConfig::default(),
         limits: Limits::default(),
         opening_needed: true,
+        force_waits: true,
     }
 }
 
@@ -293,6 +294,37 @@ fn a_device_that_gives_nonsense_is_held_and_told() {
     }
     assert!(last.is_finite());
     assert!(bench.raised(Warning::DeviceStale).is_some());
+}
+
+#[test]
+fn after_a_loss_force_and_drill_wait_for_a_deliberate_act() {
+    let mut bench = Bench::new(Program::Craniotomy);
+    let mut run = |ticks: usize, z: f32, buttons: Buttons, status: Status| {
+        let step = |_| bench.step(ToolState { buttons, ..at(z, 0.0) }, status, &NO_PATCH);
+        (0..ticks).map(step).fold((0f32, false), |(peak_n, drilled), record| {
+            let drills = record.has(TickRecord::DRILLING);
+            (peak_n.max(record.wrench.force.length()), drilled | drills)
+        })
+    };
+    let (none, pedal) = (Buttons(0), Buttons::PEDAL);
+    run(50, 6.0, none, Status::Fresh);
+    assert!(run(400, 2.6, none, Status::Fresh).0 > 0.4, "nothing was felt");
+    run(30, 2.6, pedal, Status::Fresh);
+    for (gone, ticks) in [(Status::Lost, 20), (Status::Stale, 200)] {
+        run(ticks, 2.6, pedal, gone);
+        assert_eq!(run(500, 2.2, pedal, Status::Fresh), (0.0, false), "it came back by itself");
+        assert_eq!(run(5, 2.2, none, Status::Fresh), (0.0, false));
+        assert!(run(400, 2.2, Buttons::FLAP, Status::Fresh).0 > 0.2, "a button is an act");
+    }
+    run(30, 2.2, none, Status::Lost);
+    assert_eq!(run(50, 2.2, none, Status::Fresh).0, 0.0);
+    run(300, 6.0, none, Status::Fresh);
+    assert!(run(400, 2.2, none, Status::Fresh).0 > 0.2, "moving clear is an act");
+    let told: Vec<What> = bench.told.iter().map(|n| n.what).filter(|what| matches!(what, What::Force { .. })).collect();
+    let force = |waits| What::Force { waits, second: false };
+    assert_eq!(told, [true, false, true, false, true, false].map(force));
+    let words = bench.told.iter().map(Notice::words).find(|(kind, _)| *kind == "device").unwrap();
+    assert!(words.1.contains("pressed anew"), "{words:?}");
 }
 
 #[test]

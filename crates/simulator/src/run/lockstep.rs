@@ -176,7 +176,11 @@ impl<'a> Again<'a> {
         if record.has(TickRecord::RELEASED) {
             stage.release();
         }
-        let (wrench, again) = stage.tick(record.tick, &reading(record.into()));
+        let (notices, ticks) = (&mut self.pens.notices, &mut self.ticks);
+        let (wrench, again) = stage.tick(record.tick, &reading(record.into()), &mut |notice| {
+            ticks.hear(notice);
+            notices.send(notice);
+        });
         while !self.pens.second.send(again) {
             thread::yield_now();
         }

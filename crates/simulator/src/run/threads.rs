@@ -139,9 +139,9 @@ struct Second {
 
 impl Second {
     /// Its whole tick, after the first hand's of the same number.
-    fn tick(&mut self, tick: u64, now_ms: f64) -> SecondView {
+    fn tick(&mut self, tick: u64, now_ms: f64, tell: &mut dyn FnMut(Notice)) -> SecondView {
         let reading = self.hand.device.read(now_ms);
-        let (wrench, record) = self.stage.tick(tick, &reading);
+        let (wrench, record) = self.stage.tick(tick, &reading, tell);
         self.hand.device.apply(wrench);
         self.records.send(record);
         SecondView { world_from_tool: record.proxy, force: wrench.force() }
@@ -169,12 +169,14 @@ fn haptic_loop(
         let reading = hand.device.read(now_ms);
         let &(patch_seq, patch) = ends.patch.latest().0;
         let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq, second: beside };
-        let mut tick = stage.tick(&input, &mut |notice| {
+        let number = input.tick;
+        let mut tell = |notice| {
             ticks.hear(notice);
             ends.notices.send(notice);
-        });
+        };
+        let mut tick = stage.tick(&input, &mut tell);
         hand.device.apply(tick.wrench);
-        let aside = second.as_mut().map(|second| second.tick(ticks.count + 1, now_ms));
+        let aside = second.as_mut().map(|second| second.tick(number, now_ms, &mut tell));
         beside = second.as_ref().and_then(|second| second.stage.place());
         let done_ms = clock.now_ms();
         tick.record.compute_us = ((done_ms - now_ms) * 1e3) as f32;

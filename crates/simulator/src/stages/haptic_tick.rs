@@ -18,6 +18,7 @@ mod asked;
 use crate::program::{Phase, Program};
 use crate::stages::alarms::{Feed, Limits, Signs};
 use crate::stages::drill::{Drill, REACH_MM, left_ahead_mm, spindle_rpm};
+use crate::stages::fault::{AfterFault, Seen};
 use crate::stages::flap::Flap;
 use crate::stages::notice::{Notice, Watch, What};
 use crate::stages::score::ScoreKeeper;
@@ -56,6 +57,8 @@ pub struct HapticConfig {
     pub limits: Limits,
     /// Whether tools for the brain wait until the bone is open.
     pub opening_needed: bool,
+    /// Whether the force waits for a deliberate act after a fault of the device.
+    pub force_waits: bool,
 }
 
 /// What one tick is given.
@@ -150,6 +153,7 @@ pub struct HapticStage {
     holes: u32,
     feed: Feed,
     flap: Option<Flap>,
+    fault: AfterFault,
     released: bool,
 }
 
@@ -190,6 +194,7 @@ impl HapticStage {
             holes: 0,
             feed: Feed::default(),
             flap: None,
+            fault: AfterFault::default(),
             released: false,
         }
     }
@@ -215,8 +220,10 @@ impl HapticStage {
         let ahead_mm = self.bone_ahead(drilling);
         let sample = self.sample(&tool, input.tick, drilling);
         let held = self.touch_tissue(input.patch, &sample);
-        let lost = input.reading.status == Status::Lost || tool.buttons.has(Buttons::PAUSE);
-        let wanted = if lost { Wanted::default() } else { self.wanted(&tool, drilling) };
+        let lost = input.reading.status == Status::Lost;
+        self.follow_fault(&tool, (lost, stale), input.tick, tell);
+        let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
+        let wanted = if let_go { Wanted::default() } else { self.wanted(&tool, drilling) };
         let heated = self.guard.counters().heated;
         let wrench = self.guard.guard(wanted.sum(), &tool, self.config.dt_ms);
         let warm = self.guard.counters().heated > heated;
@@ -278,6 +285,21 @@ impl HapticStage {
             self.held.twist = Default::default();
         }
         (self.held, !fresh)
+    }
+
+    /// Lets the force go where the device is gone, and come back by a deliberate act only.
+    fn follow_fault(&mut self, tool: &ToolState, (lost, stale): (bool, bool), tick: u64, tell: &mut dyn FnMut(Notice)) {
+        if !self.config.force_waits {
+            return;
+        }
+        let seen = Seen { lost, stale, touches: !self.is_free() };
+        let Some(waits) = self.fault.tick(tool, seen, self.config.dt_ms) else { return };
+        match waits {
+            true => self.guard.release(),
+            false if !self.released => self.guard.resume(),
+            false => {}
+        }
+        tell(Notice { tick, time_ms: tool.time_ms, what: What::Force { waits, second: false } });
     }
 
     fn tool(&self) -> Tool {

@@ -4,6 +4,7 @@ pub(crate) mod ahead;
 pub(crate) mod alarms;
 pub(crate) mod collision_step;
 pub(crate) mod drill;
+pub(crate) mod fault;
 pub(crate) mod flap;
 pub(crate) mod haptic_tick;
 pub(crate) mod motion;

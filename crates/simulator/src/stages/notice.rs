@@ -115,6 +115,13 @@ pub enum What {
     FlapLifted(f32),
     /// The flap was put back.
     FlapReturned,
+    /// After a fault of the device its force waits, or is there again.
+    Force {
+        /// Whether it waits.
+        waits: bool,
+        /// Whether it is the second hand's.
+        second: bool,
+    },
 }
 
 /// Why a stroke is not undone.
@@ -201,6 +208,13 @@ impl Notice {
             What::FlapHangs => ("refused", "the flap still hangs on the skull".into()),
             What::FlapLifted(mm3) => ("flap", format!("the flap is lifted: {mm3:.0} mm3 of bone")),
             What::FlapReturned => ("flap", "the flap is back in its place".into()),
+            What::Force { waits, second } => {
+                let hand = if second { "the second hand's device" } else { "the device" };
+                let act = "until a button is pressed anew, or the tool touches nothing for a moment";
+                let text =
+                    if waits { format!("was gone: no force and no drill {act}") } else { "has its force again".into() };
+                ("device", format!("{hand} {text}"))
+            }
         }
     }
 }

@@ -14,7 +14,9 @@
 //! # When not to use it
 //! To retract the brain: press it with the first hand.
 
+use crate::stages::fault::{AfterFault, Seen};
 use crate::stages::haptic_tick::HapticConfig;
+use crate::stages::notice::{Notice, What};
 use std::sync::Arc;
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardCounters, GuardedWrench, Viscoelastic};
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3, Wrench};
@@ -53,6 +55,7 @@ pub struct SecondHand {
     tissue: ContactManifold,
     guard: ForceGuard,
     held: Option<ToolState>,
+    fault: AfterFault,
     released: bool,
     peak_force_n: f32,
     force_n: f32,
@@ -70,6 +73,7 @@ impl SecondHand {
             step: RigidStep::default(),
             tissue: ContactManifold::default(),
             held: None,
+            fault: AfterFault::default(),
             released: false,
             peak_force_n: 0.0,
             force_n: 0.0,
@@ -87,12 +91,20 @@ impl SecondHand {
     }
 
     /// The tick, after the first hand's of the same number.
-    pub fn tick(&mut self, tick: u64, reading: &Reading) -> (GuardedWrench, SecondRecord) {
+    pub fn tick(
+        &mut self,
+        tick: u64,
+        reading: &Reading,
+        tell: &mut dyn FnMut(Notice),
+    ) -> (GuardedWrench, SecondRecord) {
         let (tool, stale) = self.sound(reading);
         let proxy = self.touch_bone(&tool);
         self.touch_brain(proxy.translation);
         let lost = reading.status == Status::Lost;
-        let let_go = lost || tool.buttons.has(Buttons::PAUSE);
+        if let Some(waits) = self.follow_fault(&tool, lost, stale) {
+            tell(Notice { tick, time_ms: tool.time_ms, what: What::Force { waits, second: true } });
+        }
+        let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
         let wanted = if let_go { Wrench::ZERO } else { self.wanted(&tool) };
         let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
         self.force_n = wrench.force().length();
@@ -155,6 +167,19 @@ impl SecondHand {
         (held, !fresh)
     }
 
+    /// Lets the force go where the device is gone, and come back by a deliberate act only; says when it does.
+    fn follow_fault(&mut self, tool: &ToolState, lost: bool, stale: bool) -> Option<bool> {
+        let touches = self.step.manifold.touches() || self.tissue.depth_mm > 0.0;
+        let seen = self.config.force_waits.then_some(Seen { lost, stale, touches })?;
+        let waits = self.fault.tick(tool, seen, self.config.dt_ms)?;
+        match waits {
+            true => self.guard.release(),
+            false if !self.released => self.guard.resume(),
+            false => {}
+        }
+        Some(waits)
+    }
+
     /// The bone, once the tool is somewhere; gives the proxy.
     fn touch_bone(&mut self, tool: &ToolState) -> Pose {
         let (Some(bone), Some(_)) = (&self.bone, self.held) else { return tool.world_from_tool };
@@ -207,6 +232,7 @@ mod tests {
             guard: GuardConfig { ramp_in_ms: 0.0, passivity: None, ..GuardConfig::default() },
             limits: Limits::default(),
             opening_needed: true,
+            force_waits: true,
         };
         let bone = with_bone.then(|| Arc::new(BoneVolume::new(&ct, 400).unwrap()));
         SecondHand::new(config, bone, Some(Arc::new(DistanceField::of_mask(&mask))))
@@ -220,7 +246,7 @@ mod tests {
             let mut tool = ToolState::at(Pose::from_translation(Vec3::Z * (5.0 + share * (z - 5.0))));
             tool.time_ms = f64::from(tick);
             let status = if tick > 300 { status } else { Status::Fresh };
-            last = hand.tick(tick.into(), &Reading { tool, status }).1;
+            last = hand.tick(tick.into(), &Reading { tool, status }, &mut |_| {}).1;
         }
         last
     }
@@ -245,11 +271,39 @@ mod tests {
     }
 
     #[test]
+    fn after_a_loss_force_waits_for_a_deliberate_act() {
+        let mut hand = hand(true);
+        let mut told = Vec::new();
+        let mut time_ms = 0.0;
+        let mut run = |ticks: u32, z: f32, buttons: Buttons, status: Status| {
+            let mut peak_n = 0f32;
+            for _ in 0..ticks {
+                time_ms += 1.0;
+                let tool = ToolState { buttons, time_ms, ..ToolState::at(Pose::from_translation(Vec3::Z * z)) };
+                let done = hand.tick(time_ms as u64, &Reading { tool, status }, &mut |notice| told.push(notice.what));
+                peak_n = peak_n.max(done.0.force().length());
+            }
+            peak_n
+        };
+        run(50, 5.0, Buttons(0), Status::Fresh);
+        assert!(run(300, 0.8, Buttons(0), Status::Fresh) > 0.5, "it pressed");
+        run(20, 0.8, Buttons(0), Status::Lost);
+        assert_eq!(run(500, 0.8, Buttons(0), Status::Fresh), 0.0, "it came back by itself");
+        assert!(run(300, 0.8, Buttons::NEXT_TOOL, Status::Fresh) > 0.5);
+        run(20, 0.8, Buttons(0), Status::Lost);
+        assert_eq!(run(20, 0.8, Buttons(0), Status::Fresh), 0.0);
+        run(300, 5.0, Buttons(0), Status::Fresh);
+        assert!(run(300, 0.8, Buttons(0), Status::Fresh) > 0.5);
+        let waits: Vec<What> = [true, false, true, false].map(|waits| What::Force { waits, second: true }).into();
+        assert_eq!(told, waits);
+    }
+
+    #[test]
     fn nothing_is_felt_before_the_device_says_where_it_is() {
         let mut hand = hand(true);
         let tool = ToolState::at(Pose::from_translation(Vec3::Z * -5.0));
         for tick in 1..50 {
-            let (wrench, record) = hand.tick(tick, &Reading { tool, status: Status::Stale });
+            let (wrench, record) = hand.tick(tick, &Reading { tool, status: Status::Stale }, &mut |_| {});
             assert_eq!((wrench.force(), record.has(TickRecord::STALE)), (Vec3::ZERO, true));
         }
     }

@@ -11,11 +11,12 @@ use crate::stages::undo::{Answer, Place, Stroke};
 use trepan_geometry::{Buttons, Pose, ToolKind, ToolState};
 
 impl HapticStage {
-    /// Whether the tool cuts: a perforator's clutch lets go once it is through, and nothing cuts while bone is on its way.
+    /// Whether the tool cuts: a perforator's clutch lets go once it is through, and nothing cuts while bone is on its way or the force waits.
     pub(super) fn drills(&self, tool: &ToolState) -> bool {
         let kind = self.tool().kind;
         let slips = kind == ToolKind::Perforator && self.drill.lets_go();
-        tool.buttons.has(Buttons::PEDAL) && kind.cuts() && !slips && !self.bone_moves()
+        let may = !slips && !self.bone_moves() && !self.fault.waits();
+        tool.buttons.has(Buttons::PEDAL) && kind.cuts() && may
     }
 
     /// Whether bone is on its way: a stroke that comes back, or the flap.
@@ -24,7 +25,7 @@ impl HapticStage {
     }
 
     /// Whether the tool touches nothing.
-    fn is_free(&self) -> bool {
+    pub(super) fn is_free(&self) -> bool {
         !self.bone_step.manifold.touches() && self.tissue.depth_mm <= 0.0
     }
 

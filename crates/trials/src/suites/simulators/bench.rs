@@ -84,5 +84,6 @@ pub fn config(program: Program) -> HapticConfig {
         guard: GuardConfig::default(),
         limits: Limits::default(),
         opening_needed: true,
+        force_waits: true,
     }
 }
