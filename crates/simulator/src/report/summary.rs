@@ -26,6 +26,8 @@ pub struct Summary {
     pub models: ModelSummary,
     /// Phases as they began.
     pub phases: Vec<PhaseStart>,
+    /// When a stroke came through the bone, s of session time; those undone later too.
+    pub through_s: Vec<f64>,
     /// Haptic ticks run.
     pub ticks: u64,
     /// Ticks a second, as measured.
@@ -294,6 +296,7 @@ impl Summary {
             device: about.device,
             models: about.models,
             phases: phases(outcome),
+            through_s: through_s(outcome),
             ticks: outcome.ticks.count,
             rate_hz,
             asked_hz: about.asked_hz,
@@ -335,7 +338,12 @@ impl Summary {
             fps: about.frames as f64 / seconds,
             replay: outcome.replayed,
             dropped_records: outcome.written.dropped,
-            remarks: slow.into_iter().chain(about.remarks).chain(outcome.remarks.iter().cloned()).chain(mishaps).collect(),
+            remarks: slow
+                .into_iter()
+                .chain(about.remarks)
+                .chain(outcome.remarks.iter().cloned())
+                .chain(mishaps)
+                .collect(),
             machine: about.machine,
         }
     }
@@ -361,6 +369,11 @@ fn phases(outcome: &Outcome) -> Vec<PhaseStart> {
     outcome.written.notices.iter().filter_map(start).collect()
 }
 
+fn through_s(outcome: &Outcome) -> Vec<f64> {
+    let through = outcome.written.notices.iter().filter(|notice| notice.what == What::Through);
+    through.map(|notice| notice.time_ms * 1e-3).collect()
+}
+
 fn warnings(outcome: &Outcome) -> Vec<Raised> {
     let raised = |notice: &crate::Notice| match notice.what {
         What::Warning(warning, true, _) => {
@@ -374,6 +387,16 @@ fn warnings(outcome: &Outcome) -> Vec<Raised> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_stroke_that_came_through_has_its_time() {
+        let notice = |time_ms: f64, what| crate::Notice { tick: 1, time_ms, what };
+        let mut outcome = Outcome::default();
+        let told =
+            [(10.0, What::Undone(1.0)), (1500.0, What::Through), (1600.0, What::NotOpen), (2500.0, What::Through)];
+        outcome.written.notices = told.map(|(time_ms, what)| notice(time_ms, what)).into();
+        assert_eq!(through_s(&outcome), [1.5, 2.5]);
+    }
 
     #[test]
     fn a_rate_under_199_of_200_is_told() {
