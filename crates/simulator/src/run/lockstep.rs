@@ -324,6 +324,14 @@ fn remember<T>(memory: &mut VecDeque<T>, item: T) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::program::Program;
+    use crate::stages::alarms::Limits;
+    use crate::stages::haptic_tick::HapticConfig;
+    use crate::stages::notice::{Hindrance, What};
+    use std::sync::Arc;
+    use trepan_contact::{GuardConfig, Vibration, Viscoelastic};
+    use trepan_geometry::Vec3;
+    use trepan_volume::{BoneVolume, VoxelVolume};
 
     #[test]
     fn steps_of_another_length_are_matched_by_time() {
@@ -333,5 +341,79 @@ mod tests {
         assert_eq!(pace(&recording, dt_ms), None, "the same steps");
         assert!((pace(&recording, 0.5 * dt_ms).expect("another length") - 2.0).abs() < 1e-9);
         assert_eq!(pace(&Recording::default(), dt_ms), None);
+    }
+
+    fn at(z: f32, buttons: Buttons) -> ToolState {
+        ToolState { buttons, ..ToolState::at(Pose::from_translation(Vec3::new(0.3, -0.2, z))) }
+    }
+
+    /// A slab of bone from z = -6 to 0 mm, and both hands over it.
+    fn both_hands() -> (Arc<BoneVolume>, Stages) {
+        let mut ct = VoxelVolume::isotropic([32; 3], Vec3::new(-15.5, -15.5, -18.5), 1.0, -1000i16);
+        (32 * 32 * 12..32 * 32 * 19).for_each(|voxel| ct.data[voxel] = 1200);
+        let bone = Arc::new(BoneVolume::new(&ct, 400).expect("there is bone"));
+        let config = HapticConfig {
+            program: Program::Craniotomy,
+            rigid: trepan_rigid::Method::RECOMMENDED,
+            dt_ms: 1.0,
+            bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
+            tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
+            guard: GuardConfig::default(),
+            limits: Limits::default(),
+            opening_needed: true,
+            force_waits: true,
+        };
+        let haptic = HapticStage::new(config.clone(), Some(bone.clone()), None, at(20.0, Buttons(0)));
+        let second = Some(SecondHand::new(config, Some(bone.clone()), None));
+        (bone, Stages { haptic, second, tissue: None })
+    }
+
+    /// A stroke through the bone; undone, refused, a device lost and there again, pressed once more.
+    fn hands(tick: u32) -> [Reading; 2] {
+        let way =
+            |from: f32, to: f32, since: u32, ticks: f32| from + (to - from) * ((tick - since) as f32 / ticks).min(1.0);
+        let undo = if tick % 400 > 350 { Buttons::UNDO } else { Buttons(0) };
+        let first = match tick {
+            0..1500 => at(way(6.0, -4.0, 0, 1400.0), Buttons::PEDAL),
+            1500..2000 => at(-2.0, undo),
+            2000..3300 => at(way(-2.0, 12.0, 2000, 300.0), undo),
+            _ => at(way(12.0, 2.0, 3300, 200.0), if tick > 3900 { Buttons::FLAP } else { Buttons(0) }),
+        };
+        let beside = way(12.0, if (1200..2600).contains(&tick) { -1.0 } else { 12.0 }, tick.min(1200), 300.0);
+        let gone = if (3600..3640).contains(&tick) { Status::Lost } else { Status::Fresh };
+        let time_ms = f64::from(tick);
+        let reading = |tool: ToolState, status| Reading { tool: ToolState { time_ms, ..tool }, status };
+        [reading(first, gone), reading(at(beside, Buttons(0)), Status::Fresh)]
+    }
+
+    #[test]
+    fn undone_strokes_and_lost_devices_come_out_the_same_bit_for_bit() {
+        let (bone, Stages { mut haptic, second, .. }) = both_hands();
+        let mut second = second.expect("a second hand");
+        let (mut recording, mut told, mut beside) = (Recording::default(), Vec::new(), None);
+        for tick in 1..4400u32 {
+            let [first, other] = hands(tick);
+            let input = TickInput { tick: tick.into(), reading: first, patch: &PATCH, patch_seq: 0, second: beside };
+            recording.ticks.push(haptic.tick(&input, &mut |notice| told.push(notice)).record);
+            recording.second.push(second.tick(tick.into(), &other, &mut |notice| told.push(notice)).1);
+            beside = second.place();
+        }
+        let undo = |what: &What| matches!(what, What::Undone(_) | What::NotUndone(_));
+        let undos: Vec<What> = told.iter().map(|notice| notice.what).filter(undo).collect();
+        let refused = |why| What::NotUndone(why);
+        assert!(
+            undos.starts_with(&[refused(Hindrance::Tool)]) && undos.contains(&refused(Hindrance::SecondTool)),
+            "{undos:?}"
+        );
+        assert!(undos.iter().any(|what| matches!(what, What::Undone(mm3) if *mm3 > 1.0)), "{undos:?}");
+        assert!(told.iter().any(|notice| matches!(notice.what, What::Force { waits: false, .. })));
+        let (again, stages) = both_hands();
+        let (pens, _pages) = journal();
+        let tool = Program::Craniotomy.tray()[0];
+        let start = ToolSample { tick: 0, state: at(20.0, Buttons(0)), tool, slot: 0, drilling: false };
+        let mut replay = Again::new(stages, &recording, pens, start);
+        recording.ticks.iter().for_each(|record| _ = replay.tick(record, &Clock::start()));
+        assert_eq!((replay.replayed.identical, replay.replayed.ticks), (4399, 4399));
+        assert!(again.snapshot() == bone.snapshot());
     }
 }
