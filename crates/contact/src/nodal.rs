@@ -89,6 +89,13 @@ impl NodalContact {
         }
     }
 
+    /// Gives each node another weight, by its number and the weight that it has.
+    pub fn reweight(&mut self, mut weight_of: impl FnMut(u32, f32) -> f32) {
+        let used = self.count as usize;
+        let pairs = self.nodes[..used].iter().zip(&mut self.weights[..used]);
+        pairs.for_each(|(&node, weight)| *weight = weight_of(node, *weight));
+    }
+
     /// The nodes and their weights.
     pub fn nodes(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
         let used = self.count as usize;

@@ -33,7 +33,7 @@ pub use config::{Config, ConfigError};
 pub use method::Method;
 pub use response::Response;
 pub use step::{TissueCollision, TissueStep};
-pub use wall::SlidingWall;
+pub use wall::{Hollow, SlidingWall};
 
 #[doc = include_str!("../README.md")]
 #[cfg(doctest)]

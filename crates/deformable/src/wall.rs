@@ -5,18 +5,21 @@
 //! wall. Each border node near the wall gets the wall's tangent plane as a spring of its own:
 //!
 //! ```text
-//! n = -g     d = -φ - granted     offset = d - x·n     force on the node: -(k d + b ẋ·n) n, d > 0
+//! n = -g     d = -φ     offset = d - x·n     force on the node: -(k d + b ẋ·n) n, d > 0
 //! ```
 //! k and b are those of the node's share of the border, a third of the triangles around it, so that a finer
 //! mesh meets the same wall. The force is along the normal only, so the tissue slides. Springs that nodes
 //! share are no substitute: their weights change with every collision step, and a node's own force is then
 //! explicit whatever the solver does; nodes of under 0.1 g ring without end.
 //!
+//! A node that rests in the wall or at it keeps one plane for good: the tangent of the tissue's own border
+//! there, through its place at rest. Inside thin bone the field's gradient flips from one side to the other,
+//! and a body that rests in the wall must not be pushed at all.
+//!
 //! # Practice
-//! The field comes as a function, so that the carved skull, an analytic shape or a cached grid all do. One
+//! The field comes as a [`Hollow`], so that the carved skull, an analytic shape or a cached grid all do. One
 //! call for every border node and step. A plane is sent before its node touches ([`SlidingWall::ahead_mm`]),
-//! so that the solver itself finds the moment of contact. A scanned brain may lie in scanned bone:
-//! [`rest_in`](SlidingWall::rest_in) takes that depth for granted.
+//! so that the solver itself finds the moment of contact.
 //!
 //! # When not to use it
 //! Where tissue is tied to the bone (dura at its attachments): fix those nodes.
@@ -25,6 +28,25 @@ use crate::{ConfigError, step::check_mesh};
 use trepan_contact::{NodalContacts, PlaneContact};
 use trepan_geometry::Vec3;
 use trepan_mesh::{Surface, TetMesh};
+
+/// What holds tissue back.
+pub trait Hollow {
+    /// Distance to the wall, positive in the hollow, mm, and its unit gradient, away from the wall.
+    fn distance(&mut self, place: Vec3) -> (f32, Vec3);
+
+    /// Whether the wall is there for a node, at a place of the wall's surface with this way out.
+    fn stands(&mut self, node: u32, place: Vec3, outward: Vec3) -> bool {
+        let _ = (node, place, outward);
+        true
+    }
+}
+
+/// A wall without openings.
+impl<F: FnMut(Vec3) -> (f32, Vec3)> Hollow for F {
+    fn distance(&mut self, place: Vec3) -> (f32, Vec3) {
+        self(place)
+    }
+}
 
 /// The border nodes of a body, each with its share of the border.
 pub struct SlidingWall {
@@ -44,8 +66,10 @@ struct BorderNode {
     node: u32,
     /// Its share of the border at rest, mm².
     area_mm2: f32,
-    /// How deep it may be in the wall without being pushed, mm.
-    granted_mm: f32,
+    /// Unit normal of the border at rest, out of the tissue.
+    normal: Vec3,
+    /// The plane of a node that rests in the wall or at it, along that normal: depth is `x·n` plus this, mm.
+    fixed_mm: Option<f32>,
 }
 
 impl SlidingWall {
@@ -56,39 +80,51 @@ impl SlidingWall {
     /// When the mesh is empty, names a node that is not there, or has one that is nowhere.
     pub fn around(body: &TetMesh, held: &[u32]) -> Result<Self, ConfigError> {
         check_mesh(body)?;
-        let mut area_mm2 = vec![0.0f32; body.positions.len()];
+        let mut shares = vec![(0.0f32, Vec3::ZERO); body.positions.len()];
         for triangle in Surface::of(body).triangles {
             let [a, b, c] = triangle.map(|n| body.positions[n as usize]);
-            let third = (b - a).cross(c - a).length() / 6.0;
-            triangle.iter().for_each(|&n| area_mm2[n as usize] += third);
+            let third = (b - a).cross(c - a) / 6.0;
+            for n in triangle {
+                let (area_mm2, normal) = &mut shares[n as usize];
+                (*area_mm2, *normal) = (*area_mm2 + third.length(), *normal + third);
+            }
         }
-        held.iter().for_each(|&n| area_mm2[n as usize] = 0.0);
-        let border = (0u32..).zip(area_mm2).filter(|(_, area_mm2)| *area_mm2 > 0.0);
-        let border = border.map(|(node, area_mm2)| BorderNode { node, area_mm2, granted_mm: 0.0 }).collect();
-        Ok(Self { border, stiffness_per_mm2: 0.05, damping_per_mm2: 0.1, ahead_mm: 0.5 })
+        held.iter().for_each(|&n| shares[n as usize].0 = 0.0);
+        let border = (0u32..).zip(shares).filter(|(_, (area_mm2, _))| *area_mm2 > 0.0);
+        let border = border.map(|(node, (area_mm2, normal))| BorderNode {
+            node,
+            area_mm2,
+            normal: normal.normalize_or_zero(),
+            fixed_mm: None,
+        });
+        Ok(Self { border: border.collect(), stiffness_per_mm2: 0.05, damping_per_mm2: 0.1, ahead_mm: 0.5 })
     }
 
-    /// Takes it for granted that nodes are as deep in the wall as here, so that a body at rest is not pushed.
-    pub fn rest_in(&mut self, rest: &[Vec3], mut distance: impl FnMut(u32, Vec3) -> (f32, Vec3)) {
-        for BorderNode { node, granted_mm, .. } in &mut self.border {
-            *granted_mm = rest.get(*node as usize).map_or(0.0, |at| (-distance(*node, *at).0).max(0.0));
+    /// Takes this as rest: nodes in the wall, or nearer to it than planes are sent, keep the plane of their
+    /// place here, so that a body at rest is not pushed.
+    pub fn rest_in(&mut self, rest: &[Vec3], mut wall: impl Hollow) {
+        for border in &mut self.border {
+            let Some(&at) = rest.get(border.node as usize) else { continue };
+            let gap_mm = wall.distance(at).0;
+            let near = gap_mm < self.ahead_mm && border.normal != Vec3::ZERO;
+            border.fixed_mm = near.then(|| -at.dot(border.normal) - gap_mm.max(0.0));
         }
     }
 
-    /// Adds a plane for each border node in the wall or near it. `distance` gives φ (mm) and its gradient
-    /// for a node at a world point; a node where either is not finite, or the gradient zero, is left out.
-    pub fn step(
-        &self,
-        positions: &[Vec3],
-        mut distance: impl FnMut(u32, Vec3) -> (f32, Vec3),
-        out: &mut NodalContacts,
-    ) {
-        for &BorderNode { node, area_mm2, granted_mm } in &self.border {
+    /// Adds a plane for each border node in the wall or near it; a node where the distance or its gradient
+    /// is not finite, or the gradient zero, is left out.
+    pub fn step(&self, positions: &[Vec3], mut wall: impl Hollow, out: &mut NodalContacts) {
+        for &BorderNode { node, area_mm2, normal, fixed_mm } in &self.border {
             let Some(&at) = positions.get(node as usize) else { continue };
-            let (phi, gradient) = distance(node, at);
-            let depth_mm = -phi - granted_mm;
-            let Some(normal) = (-gradient).try_normalize() else { continue };
-            if depth_mm > -self.ahead_mm && depth_mm.is_finite() {
+            let (depth_mm, normal) = match fixed_mm {
+                Some(offset_mm) => (offset_mm + at.dot(normal), normal),
+                None => {
+                    let (phi, gradient) = wall.distance(at);
+                    (-phi, (-gradient).normalize_or_zero())
+                }
+            };
+            let near = depth_mm > -self.ahead_mm && depth_mm.is_finite() && normal != Vec3::ZERO;
+            if near && wall.stands(node, at - depth_mm * normal, normal) {
                 out.push_plane(PlaneContact {
                     node,
                     normal,

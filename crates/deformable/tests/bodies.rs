@@ -157,7 +157,7 @@ fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
     let mesh = moved(&block([5, 5, 5], 4.0), Vec3::splat(-10.0));
     let wall = SlidingWall::around(&mesh, &[]).expect("a sound mesh");
     let mut out = NodalContacts::none();
-    let hollow = |r: f32| move |_, p: Vec3| (r - p.length(), -p.normalize_or_zero());
+    let hollow = |r: f32| move |p: Vec3| (r - p.length(), -p.normalize_or_zero());
     wall.step(&mesh.positions, hollow(18.0), &mut out);
     assert!(out.planes().is_empty());
     let shifted = moved(&mesh, Vec3::X * 3.0);
@@ -170,7 +170,7 @@ fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
     let force: Vec3 = out.all().map(|c| c.pressure_n(c.mean(at), Vec3::ZERO) * -c.normal).sum();
     assert!(force.x < -0.5 && force.y.abs() + force.z.abs() < 0.2 * -force.x, "{force}");
     // A flat wall under the whole side of 20 x 20 mm: its stiffness is that of the area, on any mesh.
-    let flat = |_, p: Vec3| (p.z + 9.5, Vec3::Z);
+    let flat = |p: Vec3| (p.z + 9.5, Vec3::Z);
     for cells in [3, 5, 8] {
         let mesh = moved(&block([cells; 3], 20.0 / cells as f32), Vec3::splat(-10.0));
         let wall = SlidingWall::around(&mesh, &[]).expect("a sound mesh");
@@ -185,7 +185,7 @@ fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
         let stiffness = (press(Vec3::Z * -0.1) - press(Vec3::ZERO)) / 0.1;
         assert!((stiffness / (wall.stiffness_per_mm2 * area) - 1.0).abs() < 1e-3, "{cells}: {stiffness} N/mm");
     }
-    let nowhere = |_, _| (f32::NAN, Vec3::NAN);
+    let nowhere = |_: Vec3| (f32::NAN, Vec3::NAN);
     out.clear();
     wall.step(&mesh.positions, nowhere, &mut out);
     assert!(out.planes().is_empty());

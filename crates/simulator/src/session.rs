@@ -1,6 +1,7 @@
 //! A session from its flags to its files: open (everything that a user can get wrong), run, write.
 
 use crate::case::choice;
+use crate::case::plan::Plan;
 use crate::case::scene::Scene;
 use crate::case::{Inputs, anatomy};
 use crate::error::SessionError;
@@ -175,6 +176,11 @@ impl Session {
     /// The patient as he lies there now.
     pub fn scene(&self) -> &Scene {
         &self.table.scene
+    }
+
+    /// What is planned to be taken away.
+    pub fn plan(&self) -> &Plan {
+        &self.table.plan
     }
 
     /// Which models run, and why.

@@ -21,7 +21,7 @@ fn pressed(refresh: u64) -> (f32, f32, f32) {
     let body = slab();
     let wall = SlidingWall::around(&body.mesh, &body.fixed).unwrap();
     let centre = Vec3::new(6.3, 5.8, 60.5);
-    let hollow = |_: u32, p: Vec3| (60.0 - p.distance(centre), (centre - p).normalize());
+    let hollow = |p: Vec3| (60.0 - p.distance(centre), (centre - p).normalize());
     let mut solver = Tled::new(&body, &Config::default()).unwrap();
     let dt_ms = solver.stable_dt_ms();
     let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };

@@ -42,6 +42,17 @@ pub(crate) struct Ball {
     near: Near,
     /// Triangles that have a spring, in the springs' order.
     pressed: Vec<u32>,
+    /// How the springs of the last step and of this one press.
+    before: Vec<Pressed>,
+    now: Vec<Pressed>,
+}
+
+/// How a triangle was pressed.
+#[derive(Clone, Copy)]
+struct Pressed {
+    triangle: u32,
+    weights: [f32; 3],
+    normal: Vec3,
 }
 
 /// Most triangles near one contact.
@@ -54,6 +65,8 @@ const SAME_SIDE: f32 = 0.34;
 const SAMPLE_EVERY: usize = 4;
 /// How far around the ball triangles get springs, radii.
 const WAITING: f32 = 0.25;
+/// Share by which weights and normals of a spring that stays go to what is found, each step.
+const FOLLOWED: f32 = 0.1;
 /// Normals blend over this many radii.
 const BLEND: f32 = 0.5;
 
@@ -65,11 +78,14 @@ impl Ball {
             numbers: Vec::with_capacity(MAX_NEAR),
             near: Near::with_capacity(MAX_NEAR),
             pressed: Vec::with_capacity(MAX_DENTS),
+            before: Vec::with_capacity(MAX_DENTS),
+            now: Vec::with_capacity(MAX_DENTS),
         }
     }
 
     pub(crate) fn reset(&mut self) {
         self.anchor = NONE;
+        self.now.clear();
     }
 
     /// Fills manifold list and nodes; the answer is `None` when the ball does not touch, though springs may wait.
@@ -86,6 +102,7 @@ impl Ball {
         self.pressed.clear();
         if depth_mm <= 0.0 {
             self.wait(scene, surface, out);
+            self.follow_slowly(surface, out);
             return None;
         }
         let mut sum = Sum::default();
@@ -105,6 +122,7 @@ impl Ball {
         if hits.tet[scene.centre()] == NONE {
             self.wait(scene, surface, out);
         }
+        self.follow_slowly(surface, out);
         let fallback = surface.flat_normal(scene.positions, centre.triangle);
         Some(sum.answer(depth_mm, fallback))
     }
@@ -145,6 +163,31 @@ impl Ball {
             dent(&mut spring, nodes, sample.weights, scene.radius_mm - sample.distance, sample.normal);
             out.dents.push(spring);
             self.pressed.push(sample.triangle);
+        }
+    }
+
+    /// Lets weights and normals of springs that stay follow what is found in steps. The solver takes a spring
+    /// implicitly for as long as its weights are what they are; as functions of where the nodes are they make
+    /// each node's own force explicit, and light nodes ring.
+    fn follow_slowly(&mut self, surface: &MovingSurface, out: &mut TissueStep) {
+        let Self { pressed, before, now, .. } = self;
+        std::mem::swap(before, now);
+        now.clear();
+        for (&triangle, spring) in pressed.iter().zip(out.dents.iter_mut()) {
+            let nodes = surface.triangles[triangle as usize];
+            let corner = |node: u32| nodes.iter().position(|n| *n == node).unwrap_or(0);
+            let (load, length) = (spring.nodes().map(|(_, w)| w).sum::<f32>(), spring.normal.length());
+            let mut found = Pressed { triangle, weights: [0.0; 3], normal: spring.normal.normalize_or_zero() };
+            spring.nodes().for_each(|(node, w)| found.weights[corner(node)] = w / load.max(f32::MIN_POSITIVE));
+            if let Some(old) = before.iter().find(|old| old.triangle == triangle) {
+                let weights = found.weights.iter_mut().zip(old.weights);
+                weights.for_each(|(weight, old)| *weight = old + FOLLOWED * (*weight - old));
+                found.normal = old.normal.lerp(found.normal, FOLLOWED).normalize_or(found.normal);
+                nodes.into_iter().for_each(|node| spring.add(node, 0.0));
+                spring.reweight(|node, _| found.weights[corner(node)] * load);
+                spring.normal = found.normal * length;
+            }
+            now.push(found);
         }
     }
 

@@ -2,11 +2,12 @@
 //!
 //! # Theory
 //! Signed distance to the bone as it was before the operation, on a grid around the brain. Where the burr
-//! has opened the skull there is no wall: a node is held back only when there is bone now behind the nearest
-//! place of the wall.
+//! has opened the skull there is no wall: a node is held back unless bone was behind the nearest place of
+//! the wall and is gone. Where the skull never had bone to speak of (thin bone, foramina) the wall stands:
+//! asking whether there is bone now would answer otherwise at every breath of the brain.
 //!
 //! ```text
-//! hollow  φ > 0      x  node      s = x - φ g  place of the wall      s - g·1 mm: still bone?
+//! hollow  φ > 0      x  node      s  place of the wall      0.5, 1, 2 mm behind s: bone that is gone?
 //! ```
 //!
 //! # Practice
@@ -15,9 +16,10 @@
 //! read: a brain that lies on it must not fall through and be thrown out later. About 30 ns for each border
 //! node of the brain.
 
+use glam::IVec3;
 use std::sync::Arc;
 use trepan_contact::NodalContacts;
-use trepan_deformable::{ConfigError, SlidingWall};
+use trepan_deformable::{ConfigError, Hollow, SlidingWall};
 use trepan_geometry::Vec3;
 use trepan_mesh::TetMesh;
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
@@ -28,16 +30,45 @@ const SPACING_MM: f32 = 1.5;
 const MARGIN_MM: f32 = 8.0;
 /// Beyond this distance from the wall a node cannot reach it before the next collision result, mm.
 const NEAR_MM: f32 = 0.5;
-/// Bone this far behind the wall's surface is what holds, mm.
-const BEHIND_MM: f32 = 1.0;
+/// Bone so far behind the wall's surface is what holds, mm; the likeliest first.
+const BEHIND_MM: [f32; 3] = [1.0, 2.0, 0.5];
 
 /// The wall and the bone that it stands on.
 pub struct SkullWall {
     wall: SlidingWall,
     field: DistanceField,
     bone: Arc<BoneVolume>,
-    /// Whether there was bone behind the wall when the bone was last read, by node.
+    /// Where there was bone before the operation.
+    before: BoneMask,
+    /// Whether the wall stood behind a node when the bone was last read.
     stands: Vec<bool>,
+}
+
+/// Which voxels of a volume were bone at one time, a bit each.
+struct BoneMask {
+    dims: [usize; 3],
+    bits: Vec<u64>,
+}
+
+impl BoneMask {
+    fn of(bone: &BoneVolume) -> Self {
+        let dims = bone.dims();
+        let mut bits = vec![0u64; (dims[0] * dims[1] * dims[2]).div_ceil(64)];
+        let mut at = 0;
+        for (k, j) in (0..dims[2] as i32).flat_map(|k| (0..dims[1] as i32).map(move |j| (k, j))) {
+            for i in 0..dims[0] as i32 {
+                bits[at / 64] |= u64::from(bone.is_bone(IVec3::new(i, j, k))) << (at % 64);
+                at += 1;
+            }
+        }
+        Self { dims, bits }
+    }
+
+    fn has(&self, voxel: IVec3) -> bool {
+        let inside = voxel.to_array().into_iter().zip(self.dims).all(|(i, n)| (0..n as i32).contains(&i));
+        let at = || voxel.x as usize + self.dims[0] * (voxel.y as usize + self.dims[1] * voxel.z as usize);
+        inside && self.bits[at() / 64] >> (at() % 64) & 1 == 1
+    }
 }
 
 impl SkullWall {
@@ -55,34 +86,47 @@ impl SkullWall {
         let field = DistanceField::of_mask(&mask);
         let mut wall = SlidingWall::around(brain, held)?;
         wall.ahead_mm = NEAR_MM;
-        wall.rest_in(&brain.positions, |_, p| (field.sample(p), Vec3::ZERO));
-        Ok(Self { wall, field, bone, stands: vec![true; brain.positions.len()] })
+        wall.rest_in(&brain.positions, |p| (field.sample(p), Vec3::ZERO));
+        Ok(Self { wall, field, before: BoneMask::of(&bone), bone, stands: vec![true; brain.positions.len()] })
     }
 
     /// Adds the planes of what is near the wall. `reads_bone`: nobody carves now, so openings may be looked
     /// for.
     pub fn press(&mut self, positions: &[Vec3], reads_bone: bool, out: &mut NodalContacts) {
-        let Self { wall, field, bone, stands } = self;
-        let distance = |node: u32, p: Vec3| {
-            let phi = field.sample(p);
-            if phi >= NEAR_MM {
-                return (phi, Vec3::ZERO);
-            }
-            let g = field.gradient(p).normalize_or_zero();
-            let stands = &mut stands[node as usize];
-            if reads_bone {
-                *stands = bone.is_bone(bone.voxel_of(p - (phi + BEHIND_MM) * g));
-            }
-            (phi, if *stands { g } else { Vec3::ZERO })
-        };
-        wall.step(positions, distance, out);
+        let Self { wall, field, bone, before, stands } = self;
+        wall.step(positions, Carved { field, bone, before, stands, reads_bone }, out);
+    }
+}
+
+/// The skull's inside as it is now.
+struct Carved<'a> {
+    field: &'a DistanceField,
+    bone: &'a BoneVolume,
+    before: &'a BoneMask,
+    stands: &'a mut [bool],
+    reads_bone: bool,
+}
+
+impl Hollow for Carved<'_> {
+    fn distance(&mut self, place: Vec3) -> (f32, Vec3) {
+        let phi = self.field.sample(place);
+        (phi, if phi < NEAR_MM { self.field.gradient(place) } else { Vec3::ZERO })
+    }
+
+    fn stands(&mut self, node: u32, place: Vec3, outward: Vec3) -> bool {
+        let stands = &mut self.stands[node as usize];
+        if self.reads_bone {
+            let behind = BEHIND_MM.map(|mm| self.bone.voxel_of(place + mm * outward));
+            let is_bone = behind.iter().any(|voxel| self.bone.is_bone(*voxel));
+            *stands = is_bone || !behind.iter().any(|voxel| self.before.has(*voxel));
+        }
+        *stands
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::IVec3;
     use trepan_soft::boxes;
 
     /// A cube of 20 mm, a millimetre from walls 6 mm thick all around.
