@@ -35,7 +35,9 @@ mod topology;
 mod triangles;
 
 pub use check::MeshError;
-pub use file::{FileError, abaqus, gmsh, medit, obj, read, read_surface, stl, tetgen, vtk, vtu, write, write_surface};
+pub use file::{
+    FileError, abaqus, gmsh, medit, obj, ply, read, read_surface, stl, tetgen, vtk, vtu, write, write_surface,
+};
 pub use isosurface::isosurface;
 pub use quality::Quality;
 pub use surface::Surface;

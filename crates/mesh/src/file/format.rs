@@ -4,13 +4,15 @@
 //! Reading goes by content first, since `.mesh`, `.msh` and `.vtk` mean different things to different programs; writing goes by the name's ending.
 
 use crate::file::{FileError, Reader};
-use crate::{TetMesh, TriMesh, abaqus, gmsh, medit, obj, stl, tetgen, vtk, vtu};
+use crate::{TetMesh, TriMesh, abaqus, gmsh, medit, obj, ply, stl, tetgen, vtk, vtu};
 use std::path::Path;
 
 type Parse = fn(Reader) -> Result<TetMesh, FileError>;
 
 const VOLUME_FORMATS: &str =
     "legacy VTK (.vtk), VTK XML (.vtu), Gmsh (.msh), Medit (.mesh), TetGen (.node, .ele) or Abaqus (.inp)";
+
+const SURFACE_FORMATS: &str = ".stl, .obj or .ply";
 
 /// Reads tetrahedra from a file of any known format. Indices are checked; call [`TetMesh::check`] for the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
@@ -34,12 +36,13 @@ pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     }
 }
 
-/// Reads a triangle surface: STL or OBJ, by the name's ending.
+/// Reads a triangle surface: STL, OBJ or PLY, by the name's ending.
 pub fn read_surface(path: &Path) -> Result<TriMesh, FileError> {
     match ending(path).as_str() {
         "stl" => stl::read(path),
         "obj" => obj::read(path),
-        other => Err(unknown(path, other, ".stl or .obj")),
+        "ply" => ply::read(path),
+        other => Err(unknown(path, other, SURFACE_FORMATS)),
     }
 }
 
@@ -56,12 +59,13 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     }
 }
 
-/// Writes a triangle surface in the format of the name's ending: STL or OBJ.
+/// Writes a triangle surface in the format of the name's ending: STL, OBJ or PLY.
 pub fn write_surface(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     match ending(path).as_str() {
         "stl" => stl::write(path, mesh),
         "obj" => obj::write(path, mesh),
-        other => Err(unknown(path, other, ".stl or .obj")),
+        "ply" => ply::write(path, mesh),
+        other => Err(unknown(path, other, SURFACE_FORMATS)),
     }
 }
 
@@ -94,7 +98,7 @@ mod tests {
         }
         let mesh = octahedron();
         let surface = Surface::of(&mesh).to_tri_mesh(&mesh.positions);
-        for ending in ["stl", "obj"] {
+        for ending in ["stl", "obj", "ply"] {
             let path = folder.path().join(format!("surface.{ending}"));
             write_surface(&path, &surface).unwrap();
             assert!((read_surface(&path).unwrap().volume_mm3() - mesh.total_mm3()).abs() < 1e-6, "{ending}");

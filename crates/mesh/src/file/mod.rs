@@ -11,6 +11,7 @@ pub mod gmsh;
 pub mod medit;
 mod numbered;
 pub mod obj;
+pub mod ply;
 pub mod stl;
 pub mod tetgen;
 pub mod vtk;
