@@ -41,8 +41,7 @@ pub struct Recording {
 impl Recording {
     /// Reads a file.
     pub fn open(path: &Path) -> Result<Self, LinkError> {
-        let bytes = std::fs::read(path).map_err(|source| LinkError::Read { path: path.to_owned(), source })?;
-        Self::of_bytes(&bytes, path)
+        Self::of_bytes(&bytes_of(path)?, path)
     }
 
     /// Reads a recording in memory; `path` only serves error messages.
@@ -73,6 +72,17 @@ impl Recording {
         self.events.truncate(mark[3]);
         self.second.truncate(mark[4]);
     }
+}
+
+/// The bytes of a regular file. A pipe or a device has no end, and opening it could wait for ever.
+fn bytes_of(path: &Path) -> Result<Vec<u8>, LinkError> {
+    let kind = std::fs::metadata(path).map(|kind| kind.is_file());
+    let bytes = match kind {
+        Ok(false) => Err(std::io::Error::other("it is not a regular file")),
+        Ok(true) => std::fs::read(path),
+        Err(fault) => Err(fault),
+    };
+    bytes.map_err(|source| LinkError::Read { path: path.to_owned(), source })
 }
 
 /// A file part way read.

@@ -1,5 +1,6 @@
 //! What can be wrong with a file, said so that its owner can put it right.
 
+use crate::TooLarge;
 use std::io;
 use std::path::PathBuf;
 
@@ -14,7 +15,7 @@ pub enum ReadError {
         file: PathBuf,
     },
     /// The system refuses to read.
-    #[error("{}: cannot be read ({source})", file.display())]
+    #[error("{}: cannot be read ({source}); give a file or folder that may be read", file.display())]
     Io {
         /// The file.
         file: PathBuf,
@@ -91,6 +92,16 @@ pub enum ReadError {
         /// The unpacker's reason.
         source: io::Error,
     },
+    /// More than fits into memory.
+    #[error("{}: {field}: {source}; crop or resample the volume, or use a machine with more memory", file.display())]
+    TooLarge {
+        /// The file.
+        file: PathBuf,
+        /// The field that gives the size.
+        field: &'static str,
+        /// What it would need.
+        source: TooLarge,
+    },
     /// Slices that do not make a volume.
     #[error("{}: {found}; {remedy}", folder.display())]
     Series {
@@ -128,6 +139,7 @@ impl ReadError {
             | Self::Orientation { file, .. }
             | Self::Truncated { file, .. }
             | Self::Compression { file, .. }
+            | Self::TooLarge { file, .. }
             | Self::Series { folder: file, .. }
             | Self::Volumes { file, .. } => file,
         }

@@ -20,6 +20,7 @@ mod distance;
 mod error;
 mod flap;
 mod keys;
+mod memory;
 pub mod metaimage;
 #[cfg(test)]
 mod mutation;
@@ -31,6 +32,7 @@ mod pictures;
 mod piece;
 mod read;
 mod registration;
+mod regular;
 mod resample;
 mod sample;
 mod skull;
@@ -39,20 +41,24 @@ mod stroke;
 mod volume;
 
 pub use bone::{AIR_HU, BRICK, BoneError, BoneVolume};
-pub use brain::{BrainConfig, MaskError, brain_mask, check_brain_mask};
+pub use brain::{BrainConfig, BrainFit, MaskError, brain_by_mri, brain_fit, brain_mask, check_brain_mask};
 pub use component::largest_component;
 pub use distance::{DistanceField, FAR_MM};
 pub use error::{ReadError, WriteError};
 pub use flap::{FlapSearch, Found};
+pub use memory::{Limit, MOST_VOXELS, TooLarge, room_for, room_for_voxels};
 pub use note::{Import, Note};
 pub use overlap::{LEAST_SHARE, OverlapError, overlap};
 pub use pictures::{Picture, overlap_pictures};
 pub use piece::Piece;
 pub use read::{import, read};
 pub use registration::{Registration, RegistrationConfig, RegistrationError, register};
+pub use regular::{open_regular, read_regular};
 pub use resample::{Grid, Interpolation, resample};
 pub use sample::{ByteOrder, Number, Sample};
-pub use skull::{GREATEST_ISOVALUE, HounsfieldError, LEAST_ISOVALUE, bone_isovalue, hounsfield, labels, skull_only};
+pub use skull::{
+    GREATEST_ISOVALUE, HounsfieldError, LEAST_ISOVALUE, bone_isovalue, hounsfield, is_ct, labels, skull_only,
+};
 pub use stroke::{MAX_STROKE_BRICKS, MAX_STROKES, Undone};
 pub use volume::VoxelVolume;
 

@@ -9,6 +9,8 @@ pub struct Import {
     pub volume: VoxelVolume<f32>,
     /// What the user should know; empty for a plain file.
     pub notes: Vec<Note>,
+    /// CT, MR or another modality's two letters, where the format says it (DICOM).
+    pub modality: Option<String>,
 }
 
 /// Something about a file that is no error and yet matters.
@@ -71,6 +73,6 @@ impl Import {
         if count > 0 {
             notes.push(Note::NotANumber { count });
         }
-        Self { volume, notes }
+        Self { volume, notes, modality: None }
     }
 }

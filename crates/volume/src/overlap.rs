@@ -10,7 +10,7 @@ pub const LEAST_SHARE: f64 = 0.25;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the CT and the MRI do not overlap: only {:.0} % of the smaller one lies in the other. The CT spans {}, the MRI {} (RAS mm). \
-     Are they of one patient and in one space? Register them first",
+     Give images of one patient, in one space or with --register",
     100.0 * share, span(ct), span(mri)
 )]
 pub struct OverlapError {

@@ -31,7 +31,7 @@ pub enum HounsfieldError {
     },
     /// Values that are not HU.
     #[error(
-        "the values go from {low} to {high}, which is not a CT in HU (air -1000, water 0, bone over 300); is this the MRI, or is the rescale intercept lost?"
+        "the values go from {low} to {high}, which is not a CT in HU (air -1000, water 0, bone over 300); is this the MRI, or is the rescale intercept lost? Give the CT with --ct and the MRI with --mri, or export the CT again in HU"
     )]
     Range {
         /// Lowest value.
@@ -52,6 +52,18 @@ pub fn hounsfield(ct: &VoxelVolume<f32>) -> Result<VoxelVolume<i16>, HounsfieldE
         true => Ok(ct.map(i16::from_f32)),
         false => Err(HounsfieldError::Range { low, high }),
     }
+}
+
+/// Values at or under this are air in a CT, HU.
+const AIR_AT_MOST_HU: f32 = -900.0;
+
+/// Least share of a CT's voxels that are air.
+const LEAST_AIR: f64 = 0.05;
+
+/// Whether an image's values are those of a CT: HU with air around the head, which no MRI has.
+pub fn is_ct(image: &VoxelVolume<f32>) -> bool {
+    let air = image.data.iter().filter(|&&v| v <= AIR_AT_MOST_HU).count();
+    hounsfield(image).is_ok() && air as f64 >= LEAST_AIR * image.data.len() as f64
 }
 
 /// A bone threshold from the histogram, HU, within [`LEAST_ISOVALUE`] and [`GREATEST_ISOVALUE`].
@@ -149,6 +161,21 @@ mod tests {
         assert_eq!(hounsfield(&ct([-1000.4, 40.0, 1200.6])).unwrap().data, [-1000, 40, 1201]);
         assert_eq!(hounsfield(&ct([f32::NAN, f32::INFINITY, 0.0])), Err(HounsfieldError::NotANumber { count: 2 }));
         assert_eq!(hounsfield(&ct([0.0, 40.0, 255.0])), Err(HounsfieldError::Range { low: 0.0, high: 255.0 }));
+    }
+
+    #[test]
+    fn a_ct_is_known_by_its_air_and_an_mri_by_none() {
+        let of = |air: f32| {
+            let mut image = VoxelVolume::isotropic([10, 10, 10], Vec3::ZERO, 1.0, 40.0f32);
+            image.data[..100].fill(air);
+            image.data[100..200].fill(1200.0);
+            image
+        };
+        assert!(is_ct(&of(-1000.0)) && is_ct(&of(-3024.0)));
+        assert!(!is_ct(&of(0.0)) && !is_ct(&of(-300.0)));
+        let mut speck = of(0.0);
+        speck.data[..10].fill(-1000.0);
+        assert!(!is_ct(&speck), "a few odd voxels make no CT");
     }
 
     #[test]

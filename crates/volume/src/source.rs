@@ -6,10 +6,9 @@
 //! really arrived.
 
 use crate::sample::{ByteOrder, Number, Scale};
-use crate::{ReadError, VoxelVolume};
+use crate::{ReadError, VoxelVolume, open_regular, room_for_voxels};
 use flate2::read::{MultiGzDecoder, ZlibDecoder};
 use glam::{DAffine3, DVec3};
-use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
@@ -21,6 +20,9 @@ const DEFLATE_LIMIT: u64 = 1032;
 
 /// Longest line of a header, bytes.
 const LONGEST_LINE: usize = 1 << 16;
+
+/// Memory that an image takes while it is read, bytes a voxel: its values, and what is made of them.
+pub(crate) const BYTES_PER_VOXEL: u64 = 8;
 
 /// Bytes that are decoded at a time; a multiple of every number's size.
 const CHUNK: usize = 1 << 16;
@@ -48,15 +50,12 @@ impl Source {
     /// Opens a file whose bytes are to be taken as they are.
     pub fn open_plain(path: &Path) -> Result<Self, ReadError> {
         let io = |source| ReadError::Io { file: path.into(), source };
-        let file = File::open(path).map_err(|source| match source.kind() {
+        let file = open_regular(path).map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => ReadError::Missing { file: path.into() },
             _ => io(source),
         })?;
-        let kind = file.metadata().map_err(io)?;
-        if !kind.is_file() {
-            return Err(io(io::Error::other("it is not a regular file")));
-        }
-        Ok(Self::of_stream(path, Box::new(io::BufReader::with_capacity(CHUNK, file)), kind.len()))
+        let length = file.metadata().map_err(io)?.len();
+        Ok(Self::of_stream(path, Box::new(io::BufReader::with_capacity(CHUNK, file)), length))
     }
 
     /// The same from bytes in memory; `name` stands in messages.
@@ -188,6 +187,10 @@ impl Source {
             if got < buffer.len() {
                 break;
             }
+            // Only the last bytes count; what lies before them is not kept.
+            if all.len() as u64 > count.saturating_mul(2) + CHUNK as u64 {
+                all.drain(..all.len() - count as usize);
+            }
         }
         let found = all.len() as u64;
         let Some(before) = found.checked_sub(count) else { return Err(self.truncated("voxels", count, found)) };
@@ -276,10 +279,13 @@ impl Source {
     /// Checks sizes that a header gives: the number of voxels, or what is wrong with them.
     pub fn voxels(&self, field: &'static str, dims: [i64; 3]) -> Result<u64, ReadError> {
         let wrong = || ReadError::Dimensions { file: self.file.clone(), field, found: format!("{dims:?}") };
-        match dims.iter().all(|&n| (2..=1 << 20).contains(&n)) {
-            true => Ok(dims.iter().map(|&n| n as u64).product()),
-            false => Err(wrong()),
+        if !dims.iter().all(|&n| (2..=1 << 20).contains(&n)) {
+            return Err(wrong());
         }
+        let count = dims.iter().map(|&n| n as u64).product();
+        let file = self.file.clone();
+        room_for_voxels(count, BYTES_PER_VOXEL).map_err(|source| ReadError::TooLarge { file, field, source })?;
+        Ok(count)
     }
 
     /// Checks an affine and puts the volume together.

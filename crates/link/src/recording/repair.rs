@@ -25,7 +25,7 @@ pub struct Repaired {
 
 /// Copies what is sound of the recording `from` to the new file `to`.
 pub fn repair(from: &Path, to: &Path) -> Result<Repaired, LinkError> {
-    let bytes = std::fs::read(from).map_err(|source| LinkError::Read { path: from.to_owned(), source })?;
+    let bytes = super::bytes_of(from)?;
     let body = bytes.strip_prefix(mcap::MAGIC).ok_or_else(|| LinkError::NotARecording { path: from.to_owned() })?;
     if from.canonicalize().ok().is_some_and(|same| to.canonicalize().is_ok_and(|to| to == same)) {
         return Err(LinkError::SameFile { path: to.to_owned() });

@@ -24,6 +24,7 @@ use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use trepan_geometry::Vec3;
+use trepan_volume::read_regular;
 
 /// Why a mesh file could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -69,7 +70,7 @@ pub(crate) struct Reader {
 
 impl Reader {
     pub(crate) fn open(path: &Path) -> Result<Self, FileError> {
-        let bytes = std::fs::read(path).map_err(|source| FileError::Io { path: path.into(), source })?;
+        let bytes = read_regular(path).map_err(|source| FileError::Io { path: path.into(), source })?;
         Ok(Self::of(path, bytes))
     }
 

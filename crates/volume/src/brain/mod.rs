@@ -23,12 +23,15 @@
 //! [`check_brain_mask`].
 
 mod cavity;
+mod fit;
 mod levels;
 mod morphology;
 
+pub use fit::{BrainFit, brain_by_mri, brain_fit};
+
 use crate::component::Components;
 use crate::{AIR_HU, DistanceField, FAR_MM, Grid, Interpolation, LEAST_ISOVALUE, OverlapError, VoxelVolume};
-use crate::{largest_component, overlap, resample};
+use crate::{TooLarge, largest_component, overlap, resample, room_for_voxels};
 use levels::{Levels, depth_in_head, is_core};
 use morphology::{closed, core, within};
 
@@ -110,6 +113,9 @@ pub enum MaskError {
     /// A setting out of bounds.
     #[error("work_mm is {0} mm; 0.3 to 6 mm is right")]
     Work(f32),
+    /// More than fits into memory.
+    #[error("{0}; crop the MRI, or correct its voxel edges")]
+    TooLarge(#[from] TooLarge),
     /// CT and MRI lie apart.
     #[error(transparent)]
     Apart(#[from] OverlapError),
@@ -129,6 +135,8 @@ pub fn brain_mask(
         return Err(MaskError::Work(config.work_mm));
     }
     let grid = Grid::isotropic_over(mri, config.work_mm);
+    room_for_voxels(grid.voxels() as u64, 32)?;
+    room_for_voxels(mri.data.len() as u64, 16)?;
     let coarse = resample(mri, &grid, Interpolation::Trilinear, 0.0);
     let brain = match skull {
         Some(ct) => {

@@ -22,7 +22,8 @@ mod pixels;
 mod slice;
 mod stack;
 
-use crate::{Import, Note, ReadError, VoxelVolume};
+use crate::source::BYTES_PER_VOXEL;
+use crate::{Import, Note, ReadError, VoxelVolume, open_regular, room_for, room_for_voxels};
 use rayon::prelude::*;
 use slice::Slice;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,9 @@ const MOST_FILES: usize = 20_000;
 
 /// Folders inside the folder that are looked into.
 const DEEPEST: usize = 4;
+
+/// How to choose a series.
+const LIST: &str = "`case series FOLDER` lists them with the numbers that --ct-series and --mri-series take";
 
 /// Pictures that are decoded at a time, so that files and numbers of a few only are in memory beside the volume.
 const BATCH: usize = 16;
@@ -58,14 +62,22 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
 pub fn import(path: &Path) -> Result<Import, ReadError> {
     let groups = Groups::of(path)?;
     let wanted = match path.is_dir() {
-        true => groups.largest(),
+        true => Some(groups.largest()),
         false => groups.of_file(path),
     };
-    groups.read(path, wanted)
+    match wanted {
+        Some(wanted) => groups.read(path, wanted),
+        None => Err(no_picture(path)),
+    }
 }
 
-/// Reads the series with a number of [`series`]'s list.
+/// Reads the series with a number of [`series`]'s list, which counts from 0.
 pub fn import_series(folder: &Path, index: usize) -> Result<Import, ReadError> {
+    if folder.is_file() {
+        let found = format!("it is a file, and series {index} is asked for");
+        let remedy = "series are numbered in a folder: give the folder, or the file without a number";
+        return Err(ReadError::Series { folder: folder.into(), found, remedy });
+    }
     Groups::of(folder)?.read(folder, index)
 }
 
@@ -77,6 +89,11 @@ pub fn series(folder: &Path) -> Result<Vec<Series>, ReadError> {
 /// Whether a file's first bytes are those of DICOM.
 pub(crate) fn starts(bytes: &[u8]) -> bool {
     bytes.get(128..132) == Some(b"DICM") || matches!(bytes, [2 | 8, 0, _, 0, ..])
+}
+
+fn no_picture(path: &Path) -> ReadError {
+    let found = "no DICOM picture lies in it".into();
+    ReadError::Series { folder: path.into(), found, remedy: "give the folder that holds the slices, or an image file" }
 }
 
 struct Groups {
@@ -120,17 +137,18 @@ impl Groups {
         (0..self.groups.len()).max_by_key(size).unwrap_or(0)
     }
 
-    fn of_file(&self, path: &Path) -> usize {
-        self.groups.iter().position(|group| group.iter().any(|slice| slice.file == path)).unwrap_or(self.groups.len())
+    fn of_file(&self, path: &Path) -> Option<usize> {
+        self.groups.iter().position(|group| group.iter().any(|slice| slice.file == path))
     }
 
     fn read(&self, path: &Path, index: usize) -> Result<Import, ReadError> {
         let Some(group) = self.groups.get(index) else {
-            return Err(ReadError::Series {
-                folder: path.into(),
-                found: format!("there are {} DICOM series with pictures in it", self.groups.len()),
-                remedy: "give the folder with the slices, or a series' number below that",
-            });
+            let found = match self.groups.len() {
+                0 => return Err(no_picture(path)),
+                1 => format!("there is no series {index}: it holds one, number 0"),
+                n => format!("there is no series {index}: it holds {n}, numbered 0 to {}", n - 1),
+            };
+            return Err(ReadError::Series { folder: path.into(), found, remedy: LIST });
         };
         let mut notes = Vec::new();
         if self.groups.len() > 1 {
@@ -149,13 +167,17 @@ impl Groups {
             "ImagePositionPatient, ImageOrientationPatient or PixelSpacing",
             stack.world_from_voxel,
         )?;
-        let volume = voxels(&stack)?;
-        Ok(Import::new(volume, notes))
+        let volume = voxels(path, &stack)?;
+        let modality = Some(group[0].modality.clone()).filter(|modality| !modality.is_empty());
+        Ok(Import { modality, ..Import::new(volume, notes) })
     }
 }
 
-fn voxels(stack: &stack::Stack) -> Result<VoxelVolume<f32>, ReadError> {
+fn voxels(path: &Path, stack: &stack::Stack) -> Result<VoxelVolume<f32>, ReadError> {
     let first = stack.pictures[0].slice;
+    let count = (first.rows * first.columns) as u64 * stack.pictures.len() as u64;
+    let too_large = |source| ReadError::TooLarge { file: path.into(), field: "Rows, Columns and slices", source };
+    room_for_voxels(count, BYTES_PER_VOXEL).map_err(too_large)?;
     let several = stack.pictures.iter().filter(|p| p.frame == 0 && p.slice.frames > 1).map(|p| &p.slice.file);
     let open = several.map(|file| Ok((file, bytes_of(file)?))).collect::<Result<Vec<_>, ReadError>>()?;
     let decoded = |picture: &stack::Picture| {
@@ -184,7 +206,13 @@ fn looked_at(file: &Path) -> Result<Option<Slice>, ReadError> {
 }
 
 fn bytes_of(file: &Path) -> Result<Vec<u8>, ReadError> {
-    let bytes = std::fs::read(file).map_err(|source| ReadError::Io { file: file.into(), source })?;
+    let io = |source| ReadError::Io { file: file.into(), source };
+    let mut stream = open_regular(file).map_err(io)?;
+    let length = stream.metadata().map_err(io)?.len();
+    let too_large = |source| ReadError::TooLarge { file: file.into(), field: "the file", source };
+    room_for("bytes", length, 1).map_err(too_large)?;
+    let mut bytes = Vec::new();
+    std::io::Read::read_to_end(&mut stream, &mut bytes).map_err(io)?;
     slice::inflated(file, bytes)
 }
 

@@ -1,6 +1,6 @@
 //! Stored pixels into values.
 
-use super::codec::{CodecError, jpeg, jpeg_2000, jpeg_lossless, jpeg_ls, rle};
+use super::codec::{CodecError, MOST_PIXELS, jpeg, jpeg_2000, jpeg_lossless, jpeg_ls, rle};
 use super::element::Pixels;
 use super::slice::Slice;
 use crate::ReadError;
@@ -30,26 +30,39 @@ pub(super) fn frame(slice: &Slice, bytes: &[u8], frame: usize, out: &mut Vec<f32
             let one = joined(slice, fragments, bytes, frame)?;
             let wrong = |error| match error {
                 CodecError::Short(pixels) => truncated(slice, layout.frame_bytes(), pixels * layout.bytes),
+                CodecError::Size(rows, columns) => {
+                    let found = format!(
+                        "{} by {}, but {rows} by {columns} in the compressed picture",
+                        slice.rows, slice.columns
+                    );
+                    field("Rows or Columns", &found, "both must agree; fetch the file again")
+                }
                 CodecError::Wrong(why) => {
                     field("PixelData", why, "the picture cannot be decoded; fetch the file again")
                 }
             };
+            let size = (slice.rows, slice.columns);
+            if layout.pixels > MOST_PIXELS {
+                let found = format!("{} by {}", slice.rows, slice.columns);
+                return Err(field("Rows or Columns", &found, "a compressed picture has at most 64 million pixels"));
+            }
+            let mut add_all = |stored: Vec<u16>| stored.into_iter().for_each(|v| add(layout.value(v.into())));
             match syntax {
                 "1.2.840.10008.1.2.5" => {
                     let stored = rle::decode(&one, layout.pixels, layout.bytes).map_err(wrong)?;
                     Layout { order: ByteOrder::Little, ..layout }.decode(&stored, &mut add);
                 }
                 "1.2.840.10008.1.2.4.50" | "1.2.840.10008.1.2.4.51" => {
-                    decoded(slice, layout, jpeg::decode(&one).map_err(wrong)?, &mut add)?;
+                    add_all(jpeg::decode(&one, size).map_err(wrong)?);
                 }
                 "1.2.840.10008.1.2.4.57" | "1.2.840.10008.1.2.4.70" => {
-                    decoded(slice, layout, jpeg_lossless::decode(&one).map_err(wrong)?, &mut add)?;
+                    add_all(jpeg_lossless::decode(&one, size).map_err(wrong)?);
                 }
                 "1.2.840.10008.1.2.4.80" | "1.2.840.10008.1.2.4.81" => {
-                    decoded(slice, layout, jpeg_ls::decode(&one).map_err(wrong)?, &mut add)?;
+                    add_all(jpeg_ls::decode(&one, size).map_err(wrong)?);
                 }
                 "1.2.840.10008.1.2.4.90" | "1.2.840.10008.1.2.4.91" => {
-                    decoded(slice, layout, jpeg_2000::decode(&one).map_err(wrong)?, &mut add)?;
+                    add_all(jpeg_2000::decode(&one, size).map_err(wrong)?);
                 }
                 other => {
                     let found = format!("{other} ({})", name(other));
@@ -83,24 +96,6 @@ fn joined<'a>(
             remedy: "frames must be compressed one by one; convert the file to Explicit VR Little Endian",
         }),
     }
-}
-
-fn decoded(
-    slice: &Slice,
-    layout: Layout,
-    (rows, columns, stored): (usize, usize, Vec<u16>),
-    add: &mut impl FnMut(i64),
-) -> Result<(), ReadError> {
-    if (rows, columns) != (slice.rows, slice.columns) {
-        return Err(ReadError::Field {
-            file: slice.file.clone(),
-            field: "Rows or Columns",
-            found: format!("{} by {}, but {rows} by {columns} in the compressed picture", slice.rows, slice.columns),
-            remedy: "both must agree; fetch the file again",
-        });
-    }
-    stored.into_iter().for_each(|value| add(layout.value(value.into())));
-    Ok(())
 }
 
 fn truncated(slice: &Slice, expected: usize, found: usize) -> ReadError {

@@ -4,6 +4,7 @@ use super::element::{Found, Pixels, Syntax, Walk};
 use crate::ReadError;
 use crate::sample::ByteOrder;
 use glam::DVec3;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A file with a picture. Holds no name, number, date or free text of a patient.
@@ -137,15 +138,28 @@ fn guessed(bytes: &[u8]) -> Syntax {
     Syntax { explicit: letters, order }
 }
 
+/// Most bytes that a deflated file is unpacked to: over 1000 frames of 512 x 512.
+const MOST_INFLATED: u64 = 1 << 30;
+
 /// The deflated syntax's elements, unpacked behind the meta group; other files are left alone.
 pub(super) fn inflated(file: &Path, bytes: Vec<u8>) -> Result<Vec<u8>, ReadError> {
     let deflated = Start::of(&bytes).filter(|start| start.name == "1.2.840.10008.1.2.1.99");
     let Some(start) = deflated else { return Ok(bytes) };
     let mut out = bytes[..start.at].to_vec();
-    let mut stream = flate2::read::DeflateDecoder::new(&bytes[start.at..]);
-    std::io::Read::read_to_end(&mut stream, &mut out)
+    let stream = flate2::read::DeflateDecoder::new(&bytes[start.at..]);
+    stream
+        .take(MOST_INFLATED)
+        .read_to_end(&mut out)
         .map_err(|source| ReadError::Compression { file: file.into(), source })?;
-    Ok(out)
+    match out.len() as u64 {
+        ..MOST_INFLATED => Ok(out),
+        _ => Err(ReadError::Field {
+            file: file.into(),
+            field: "the deflated data set",
+            found: format!("over {} MiB long", MOST_INFLATED >> 20),
+            remedy: "a picture is smaller; fetch the file again, or convert it to Explicit VR Little Endian",
+        }),
+    }
 }
 
 fn vector(numbers: &[f64]) -> Option<DVec3> {

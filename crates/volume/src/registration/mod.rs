@@ -99,13 +99,18 @@ pub enum RegistrationError {
         right: &'static str,
     },
     /// An image shows nothing.
-    #[error("registration: the {image} image has no contrast to register by; is it the right file?")]
+    #[error(
+        "registration: the {image} image has no contrast to register by; give the image itself, not a mask or a blank one"
+    )]
     Flat {
         /// Fixed or moving.
         image: &'static str,
     },
     /// The images do not cover one place.
-    #[error("registration: only {:.0} % of the fixed image lies in the moving one, under the least of {:.0} %", 100.0 * share, 100.0 * least)]
+    #[error(
+        "registration: only {:.0} % of the fixed image lies in the moving one, under the least of {:.0} %; give images that \
+         show the same part of one patient, or crop the larger one", 100.0 * share, 100.0 * least
+    )]
     Overlap {
         /// The share found.
         share: f64,

@@ -6,17 +6,18 @@
 //! # When not to use it
 //! For JPEG extended with 12 bits a pixel, which is refused by name: no kept crate decodes it.
 
-use super::CodecError;
 use super::marker::{Segments, frame};
+use super::{CodecError, Size};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-/// Decodes a frame of one component; returns rows, columns and the stored numbers.
-pub(in crate::dicom) fn decode(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>), CodecError> {
-    let (rows, columns) = size(bytes)?;
+/// Decodes a frame of one component and that size; returns the stored numbers.
+pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
+    check(bytes, size)?;
+    let (rows, columns) = size;
     let damaged = CodecError::Wrong("its JPEG stream is damaged");
     let options = DecoderOptions::default()
         .set_strict_mode(true)
@@ -26,21 +27,20 @@ pub(in crate::dicom) fn decode(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>),
     let decode = || JpegDecoder::new_with_options(ZCursor::new(bytes), options).decode();
     let pixels = catch_unwind(AssertUnwindSafe(decode)).map_err(|_| damaged)?.map_err(|_| damaged)?;
     match pixels.len() == rows * columns {
-        true => Ok((rows, columns, pixels.into_iter().map(u16::from).collect())),
+        true => Ok(pixels.into_iter().map(u16::from).collect()),
         false => Err(CodecError::Short(pixels.len())),
     }
 }
 
-/// Rows and columns of the first frame header, where it is one that is decoded.
-fn size(bytes: &[u8]) -> Result<(usize, usize), CodecError> {
+/// Refuses a first frame header of another size, or of a kind that is not decoded.
+fn check(bytes: &[u8], size: Size) -> Result<(), CodecError> {
     let mut segments = Segments::of(bytes)?;
     loop {
         let segment = segments.next()?;
         match segment.marker {
             0xc0..=0xc2 => {
-                let (precision, rows, columns) = frame(segment.body)?;
-                return match precision {
-                    8 => Ok((rows, columns)),
+                return match frame(segment.body, size)? {
+                    8 => Ok(()),
                     _ => Err(CodecError::Wrong("a JPEG with losses of more than 8 bits a pixel, which is not read")),
                 };
             }

@@ -3,30 +3,30 @@
 //! # Practice
 //! The size is looked at before anything is decoded. A panic of the decoder on a damaged stream becomes an error.
 
-use super::{CodecError, MOST_PIXELS};
+use super::{CodecError, Size};
 use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Decodes a frame of one component; returns rows, columns and the stored numbers (negative ones in two's complement).
-pub(in crate::dicom) fn decode(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>), CodecError> {
+/// Decodes a frame of one component and that size; returns the stored numbers (negative ones in two's complement).
+pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     let unsafe_to_go_on = |_| CodecError::Wrong("its JPEG 2000 stream is damaged");
-    catch_unwind(AssertUnwindSafe(|| decode_trusting(bytes))).map_err(unsafe_to_go_on)?
+    catch_unwind(AssertUnwindSafe(|| decode_trusting(bytes, size))).map_err(unsafe_to_go_on)?
 }
 
-fn decode_trusting(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>), CodecError> {
+fn decode_trusting(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     let damaged = |_| CodecError::Wrong("its JPEG 2000 stream is damaged");
     let settings = DecodeSettings { resolve_palette_indices: false, strict: true, target_resolution: None };
     let image = Image::new(bytes, &settings).map_err(damaged)?;
     let (rows, columns) = (image.height() as usize, image.width() as usize);
-    if rows.saturating_mul(columns) > MOST_PIXELS {
-        return Err(CodecError::Wrong("its size is over 64 million pixels"));
+    if (rows, columns) != size {
+        return Err(CodecError::Size(rows, columns));
     }
     let mut context = DecoderContext::default();
     let decoded = image.decode(&mut context).map_err(damaged)?;
     match decoded.components() {
         [one] if one.samples().len() == rows * columns => {
             let shift = sign_shift(bytes);
-            Ok((rows, columns, one.samples().iter().map(|v| (v.round() as i32 - shift) as u16).collect()))
+            Ok(one.samples().iter().map(|v| (v.round() as i32 - shift) as u16).collect())
         }
         _ => Err(CodecError::Wrong("only one component is read")),
     }

@@ -5,25 +5,26 @@
 //! (a + b)/2; the first row takes a, the first column b, the first pixel half the range. A code gives the number of bits of the
 //! difference, which follow it.
 
-use super::CodecError;
 use super::marker::{Segments, frame};
+use super::{CodecError, Size};
 
-/// Decodes a frame of one component; returns rows, columns and the stored numbers.
-pub(in crate::dicom) fn decode(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>), CodecError> {
+/// Decodes a frame of one component and that size; returns the stored numbers.
+pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     let mut segments = Segments::of(bytes)?;
     let mut tables: [Option<Table>; 4] = [const { None }; 4];
-    let (mut size, mut restart) = (None, 0);
+    let (mut known, mut restart) = (None, 0);
     loop {
         let segment = segments.next()?;
         match segment.marker {
-            0xc3 => size = Some(frame(segment.body)?),
+            0xc3 => known = Some(frame(segment.body, size)?),
             0xc4 => read_tables(segment.body, &mut tables)?,
             0xdd => restart = segment.body.iter().fold(0, |n, &b| n << 8 | usize::from(b)),
             0xda => {
                 let &[1, _, table, predictor, _, shift] = segment.body else {
                     return Err(CodecError::Wrong("only scans of one component are read"));
                 };
-                let (precision, rows, columns) = size.ok_or(CodecError::Wrong("the frame header (SOF3) is missing"))?;
+                let (rows, columns) = size;
+                let precision = known.ok_or(CodecError::Wrong("the frame header (SOF3) is missing"))?;
                 let table = tables.get(usize::from(table >> 4)).and_then(Option::as_ref);
                 let table = table.ok_or(CodecError::Wrong("a Huffman table is missing"))?;
                 let shift = u32::from(shift & 15);
@@ -33,7 +34,7 @@ pub(in crate::dicom) fn decode(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>),
                 let scan = Scan { columns, predictor, half: 1 << (precision - shift - 1), restart, table };
                 let mut pixels = scan.pixels(&mut Bits::of(segments.rest()), rows * columns)?;
                 pixels.iter_mut().for_each(|p| *p <<= shift);
-                return Ok((rows, columns, pixels));
+                return Ok(pixels);
             }
             0xc0..=0xcf => return Err(CodecError::Wrong("it is another kind of JPEG")),
             0xd9 => return Err(CodecError::Short(0)),
@@ -264,9 +265,9 @@ mod tests {
         #[test]
         fn what_is_encoded_comes_back(pixels in prop::collection::vec(any::<u16>(), 42), predictor in 1u8..8, restart in any::<bool>()) {
             let bytes = encoded(&pixels, 7, predictor, restart);
-            prop_assert_eq!(decode(&bytes), Ok((6, 7, pixels)));
+            prop_assert_eq!(decode(&bytes, (6, 7)), Ok(pixels));
             for length in 0..bytes.len() - 3 {
-                prop_assert!(decode(&bytes[..length]).is_err());
+                prop_assert!(decode(&bytes[..length], (6, 7)).is_err());
             }
         }
     }

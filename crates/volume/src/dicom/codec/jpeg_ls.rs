@@ -8,22 +8,22 @@
 //! # Sources
 //! M. Weinberger, G. Seroussi, G. Sapiro, "The LOCO-I lossless image compression algorithm", IEEE TIP 9, 2000; ITU-T T.87.
 
-use super::CodecError;
 use super::marker::{Segments, frame};
+use super::{CodecError, Size};
 
 /// Lengths of the runs that one bit stands for, as powers of two.
 const RUNS: [u32; 32] =
     [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// Decodes a frame of one component; returns rows, columns and the stored numbers.
-pub(in crate::dicom) fn decode(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>), CodecError> {
+/// Decodes a frame of one component and that size; returns the stored numbers.
+pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     let mut segments = Segments::of(bytes)?;
-    let mut size = None;
+    let mut known = None;
     let mut preset = [0i32; 5];
     loop {
         let segment = segments.next()?;
         match segment.marker {
-            0xf7 => size = Some(frame(segment.body)?),
+            0xf7 => known = Some(frame(segment.body, size)?),
             0xf8 => {
                 let [1, values @ ..] = segment.body else {
                     return Err(CodecError::Wrong("mapping tables are not read"));
@@ -37,12 +37,12 @@ pub(in crate::dicom) fn decode(bytes: &[u8]) -> Result<(usize, usize, Vec<u16>),
                 let &[1, _, _, near, _, shift] = segment.body else {
                     return Err(CodecError::Wrong("only scans of one component are read"));
                 };
-                let (precision, rows, columns) =
-                    size.ok_or(CodecError::Wrong("the frame header (SOF55) is missing"))?;
+                let (rows, columns) = size;
+                let precision = known.ok_or(CodecError::Wrong("the frame header (SOF55) is missing"))?;
                 let mut coder = Coder::new(precision, near.into(), preset)?;
                 let pixels = coder.picture(&mut Bits::of(segments.rest()), rows, columns)?;
                 let shift = u32::from(shift & 15);
-                return Ok((rows, columns, pixels.into_iter().map(|p| p << shift).collect()));
+                return Ok(pixels.into_iter().map(|p| p << shift).collect());
             }
             0xc0..=0xcf => return Err(CodecError::Wrong("it is JPEG, not JPEG-LS")),
             0xd9 => return Err(CodecError::Short(0)),
@@ -353,8 +353,9 @@ mod tests {
         let head = [0xff, 0xd8, 0xff, 0xf7, 0, 11, 8, 0, 2, 0, 4, 1, 1, 0x11, 0, 0xff, 0xda, 0, 8, 1, 1, 0, 0, 0, 0];
         // Eight pixels: runs of 1 four times, then 2 + 2, six ones and padding.
         let bytes = [&head[..], &[0b1111_1100, 0xff, 0xd9]].concat();
-        assert_eq!(decode(&bytes), Ok((2, 4, vec![0; 8])));
-        assert_eq!(decode(&head), Err(CodecError::Short(0)));
-        assert!(matches!(decode(&head[2..]), Err(CodecError::Wrong(_))));
+        assert_eq!(decode(&bytes, (2, 4)), Ok(vec![0; 8]));
+        assert_eq!(decode(&bytes, (4, 2)), Err(CodecError::Size(2, 4)), "before anything is decoded");
+        assert_eq!(decode(&head, (2, 4)), Err(CodecError::Short(0)));
+        assert!(matches!(decode(&head[2..], (2, 4)), Err(CodecError::Wrong(_))));
     }
 }

@@ -1,6 +1,6 @@
 //! The marker segments that JPEG and JPEG-LS streams are made of (ITU-T T.81 annex B).
 
-use super::CodecError;
+use super::{CodecError, Size};
 
 /// A segment: its marker's second byte and what it holds.
 pub(super) struct Segment<'a> {
@@ -44,15 +44,15 @@ impl<'a> Segments<'a> {
     }
 }
 
-/// Precision, rows and columns of a frame header with one component.
-pub(super) fn frame(body: &[u8]) -> Result<(u32, usize, usize), CodecError> {
+/// Precision of a frame header with one component and the size that is announced.
+pub(super) fn frame(body: &[u8], size: Size) -> Result<u32, CodecError> {
     let &[precision, y1, y0, x1, x0, components, ..] = body else { return Err(CodecError::Short(0)) };
     if components != 1 || !(2..=16).contains(&precision) {
         return Err(CodecError::Wrong("only one component of 2 to 16 bits is read"));
     }
     let (rows, columns) = (usize::from(u16::from_be_bytes([y1, y0])), usize::from(u16::from_be_bytes([x1, x0])));
-    match rows > 0 && columns > 0 && rows * columns <= super::MOST_PIXELS {
-        true => Ok((precision.into(), rows, columns)),
-        false => Err(CodecError::Wrong("its size is zero or over 64 million pixels")),
+    match (rows, columns) == size {
+        true => Ok(precision.into()),
+        false => Err(CodecError::Size(rows, columns)),
     }
 }
