@@ -9,13 +9,17 @@ use trepan_geometry::Vec3;
 use trepan_mesh::lattice::{self, Fine, LabelledMesh};
 use trepan_volume::{
     AIR_HU, BrainConfig, Grid, Import, Interpolation, MaskError, ReadError, RegistrationConfig, VoxelVolume,
-    brain_mask, check_brain_mask, dicom, hounsfield, largest_component, overlap, register, resample, skull_only,
+    brain_mask, check_brain_mask, dicom, hounsfield, is_ct, largest_component, overlap, register, resample, room_for,
+    room_for_voxels, skull_only,
 };
 
 /// Air around the brain that its grids keep, mm.
 const MARGIN_MM: f32 = 12.0;
-/// Most voxels of a skull grid.
-const MOST_VOXELS: usize = 600_000_000;
+/// Memory that a skull takes in a session, bytes a voxel: densities, their copies, pieces, picture.
+const SKULL_BYTES: u64 = 12;
+
+/// Memory that the mesher and a solver take for a tetrahedron, bytes.
+const TET_BYTES: u64 = 4096;
 
 /// An image, or one series of a folder of several.
 fn image(path: &Path, series: Option<usize>) -> Result<Import, ReadError> {
@@ -25,6 +29,8 @@ fn image(path: &Path, series: Option<usize>) -> Result<Import, ReadError> {
 /// A CT in HU, and remarks on it.
 pub fn read_ct(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<i16>, SessionError> {
     let import = image(path, series)?;
+    of_modality(path, &import, "CT")?;
+    of_a_patient(path, &import.volume)?;
     notes.extend(import.notes.iter().map(|note| format!("CT: {note}")));
     hounsfield(&import.volume).map_err(|fault| SessionError::Case(format!("{}: {fault}", path.display())))
 }
@@ -38,13 +44,52 @@ pub fn scanned(inputs: &Inputs, series: Option<usize>) -> Result<VoxelVolume<i16
 /// An MRI without holes, and remarks on it.
 pub fn read_mri(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<f32>, SessionError> {
     let import = image(path, series)?;
+    of_modality(path, &import, "MR")?;
+    of_a_patient(path, &import.volume)?;
     notes.extend(import.notes.iter().map(|note| format!("MRI: {note}")));
     let bad = import.volume.data.iter().filter(|v| !v.is_finite()).count();
     if bad > 0 {
         let fault = MaskError::NotANumber { count: bad };
         return Err(SessionError::Case(format!("{}: {fault}", path.display())));
     }
+    if is_ct(&import.volume) {
+        return Err(SessionError::Case(format!(
+            "{}: the values are a CT's (air near -1000, bone over 200): {GIVE}",
+            path.display()
+        )));
+    }
     Ok(import.volume)
+}
+
+/// No scanner's image is longer, mm.
+const LONGEST_MM: f64 = 3000.0;
+
+/// Refuses an image that spans more than a patient: its voxel edges are in another unit.
+fn of_a_patient(path: &Path, image: &VoxelVolume<f32>) -> Result<(), SessionError> {
+    let (low, high) = image.world_corners();
+    let span = (high - low).max_element();
+    if span <= LONGEST_MM {
+        return Ok(());
+    }
+    Err(SessionError::Case(format!(
+        "{}: the image spans {span:.0} mm, its voxel edges are {:.3} mm: no patient is longer than {LONGEST_MM} mm; correct the voxel edges or their unit",
+        path.display(),
+        image.spacing_mm()
+    )))
+}
+
+/// What to do about images that were mixed up.
+const GIVE: &str = "give the CT with --ct and a T1 MRI with --mri";
+
+/// Refuses a series that its scanner calls something else.
+fn of_modality(path: &Path, import: &Import, wanted: &str) -> Result<(), SessionError> {
+    match import.modality.as_deref() {
+        Some(found) if found != wanted && found != "OT" => {
+            let fault = format!("{}: its DICOM modality is {found}, not {wanted}: {GIVE}", path.display());
+            Err(SessionError::Case(fault))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Moves the MRI to where it fits the CT; returns the move.
@@ -99,11 +144,11 @@ pub fn find_brain(
 /// The largest piece of bone on a grid of cubes.
 pub fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> Result<VoxelVolume<i16>, SessionError> {
     let grid = Grid::isotropic_over(ct, recipe.spacing_mm);
-    if grid.voxels() > MOST_VOXELS {
+    room_for_voxels(grid.voxels() as u64, SKULL_BYTES).map_err(|fault| {
         let text =
-            format!("--spacing-mm {} asks for {} voxels, the limit is {MOST_VOXELS}", recipe.spacing_mm, grid.voxels());
-        return Err(SessionError::Usage(text));
-    }
+            format!("the skull at --spacing-mm {}: {fault}; give a larger spacing or crop the CT", recipe.spacing_mm);
+        SessionError::Usage(text)
+    })?;
     let mut skull = resample(ct, &grid, Interpolation::Trilinear, AIR_HU);
     skull_only(&mut skull, isovalue_hu);
     if !skull.data.iter().any(|&hu| hu >= isovalue_hu) {
@@ -121,7 +166,7 @@ pub fn make_classes(
     ct_from_mri: DAffine3,
     notes: &mut Vec<String>,
 ) -> Result<VoxelVolume<u8>, SessionError> {
-    let mut classes = cropped(mask);
+    let mut classes = cropped(mask)?;
     for source in &inputs.tissues {
         notes.push(source.paint(ct_from_mri, &mut classes)?);
     }
@@ -135,6 +180,8 @@ pub fn make_brain(
     place: Option<Vec3>,
     recipe: &Recipe,
 ) -> Result<Brain, SessionError> {
+    room_for("tetrahedra", recipe.tets as u64, TET_BYTES)
+        .map_err(|fault| SessionError::Usage(format!("--tets {}: {fault}; give fewer", recipe.tets)))?;
     let mri = resample(mri, &Grid::of(&classes), Interpolation::Trilinear, 0.0);
     let halvings = Some(recipe.halvings).filter(|halvings| *halvings > 0);
     let fine = place.zip(halvings).map(|(centre, halvings)| Fine { centre, radius_mm: OPENING_MM, halvings });
@@ -147,9 +194,13 @@ pub fn make_brain(
 }
 
 /// The mask on a grid of 1 mm cubes, cut to its content and a margin.
-pub fn cropped(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
+pub fn cropped(mask: &VoxelVolume<u8>) -> Result<VoxelVolume<u8>, SessionError> {
     let spacing = mask.spacing_mm().min_element().clamp(0.8, 1.5) as f32;
-    let whole = resample(mask, &Grid::isotropic_over(mask, spacing), Interpolation::Nearest, 0);
+    let grid = Grid::isotropic_over(mask, spacing);
+    room_for_voxels(grid.voxels() as u64, 16).map_err(|fault| {
+        SessionError::Case(format!("the brain mask on {spacing} mm cubes: {fault}; crop the MRI or the labels"))
+    })?;
+    let whole = resample(mask, &grid, Interpolation::Nearest, 0);
     let [nx, ny, _] = whole.dims;
     let (mut low, mut high) = ([usize::MAX; 3], [0; 3]);
     for (at, _) in whole.data.iter().enumerate().filter(|(_, v)| **v != 0) {
@@ -161,5 +212,5 @@ pub fn cropped(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
     let dims = [0, 1, 2].map(|axis| (high[axis] - low[axis] + 1) + 2 * margin as usize);
     let offset = [0, 1, 2].map(|axis| (low[axis] as i64 - margin) as f64);
     let world_from_voxel = whole.world_from_voxel * DAffine3::from_translation(offset.into());
-    resample(&whole, &Grid { dims, world_from_voxel }, Interpolation::Nearest, 0)
+    Ok(resample(&whole, &Grid { dims, world_from_voxel }, Interpolation::Nearest, 0))
 }

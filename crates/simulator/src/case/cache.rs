@@ -11,9 +11,10 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use trepan_volume::open_regular;
 
 /// Goes up when kept cases change their form or the code that makes them changes its results.
-const FORM: u32 = 8;
+const FORM: u32 = 9;
 
 /// The folder of kept cases.
 #[derive(Clone, Debug)]
@@ -81,7 +82,7 @@ impl Cache {
 /// SHA-256 of a file's bytes, hexadecimal.
 pub fn digest(file: &Path) -> io::Result<String> {
     let mut hash = Sha256::new();
-    feed(&mut hash, &mut File::open(file)?)?;
+    feed(&mut hash, &mut open_regular(file)?)?;
     Ok(hexadecimal(hash))
 }
 
@@ -112,6 +113,7 @@ fn unreadable(path: &Path, fault: &io::Error) -> SessionError {
     let remedy = match fault.kind() {
         io::ErrorKind::NotFound => "give the path of a file, or of a folder of DICOM slices, that exists",
         io::ErrorKind::PermissionDenied => "allow reading it",
+        io::ErrorKind::Other => "give one regular file, or the folder of one series of DICOM slices",
         _ => "check the file and the disk",
     };
     SessionError::Usage(format!("cannot read {}: {fault}; {remedy}", path.display()))
@@ -120,10 +122,18 @@ fn unreadable(path: &Path, fault: &io::Error) -> SessionError {
 /// Images that lie in one file.
 const WHOLE: [&str; 5] = ["nii", "gz", "nrrd", "mha", "vtk"];
 
+/// Most files of a folder; more are no series of slices but a whole disk.
+const MOST_FILES: usize = 20_000;
+
+/// Folders inside a folder that are looked into, as for DICOM series.
+const DEEPEST: usize = 4;
+
 /// The file itself, or every file under a folder, in a fixed order. A file of another kind may be one of several (a slice of a
 /// series, half of a pair): all that lies beside it counts too.
 fn files_of(input: &Path) -> io::Result<Vec<PathBuf>> {
     if !fs::metadata(input)?.is_dir() {
+        // Said before anything is opened: a pipe would wait for its writer.
+        open_regular(input)?;
         let whole = input.extension().is_some_and(|e| WHOLE.iter().any(|known| e.eq_ignore_ascii_case(known)));
         return match input.parent().filter(|_| !whole) {
             None => Ok(vec![input.to_path_buf()]),
@@ -131,13 +141,28 @@ fn files_of(input: &Path) -> io::Result<Vec<PathBuf>> {
         };
     }
     let mut files = Vec::new();
-    let mut entries: Vec<_> = fs::read_dir(input)?.collect::<io::Result<_>>()?;
+    below(input, DEEPEST, &mut files)?;
+    Ok(files)
+}
+
+/// The regular files of a folder and of those in it; links to folders are not followed.
+fn below(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> io::Result<()> {
+    let mut entries: Vec<_> = fs::read_dir(folder)?.collect::<io::Result<_>>()?;
     entries.sort_by_key(|entry| entry.file_name());
     for entry in entries {
         let path = entry.path();
-        files.extend(if path.is_dir() { files_of(&path)? } else { vec![path] });
+        if entry.file_type()?.is_dir() {
+            if depth > 0 {
+                below(&path, depth - 1, files)?;
+            }
+        } else if path.is_file() {
+            files.push(path);
+        }
+        if files.len() > MOST_FILES {
+            return Err(io::Error::other(format!("it holds more than {MOST_FILES} files")));
+        }
     }
-    Ok(files)
+    Ok(())
 }
 
 /// The files of one folder, not of those below it.
@@ -149,7 +174,7 @@ fn beside(folder: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 fn add(hash: &mut Sha256, file: &Path) -> io::Result<()> {
-    let mut stream = File::open(file)?;
+    let mut stream = open_regular(file)?;
     hash.update(stream.metadata()?.len().to_le_bytes());
     feed(hash, &mut stream)
 }
@@ -209,6 +234,24 @@ mod tests {
         let before = cache.key(&[&slices[0]], "").unwrap();
         fs::write(&slices[1], b"b").unwrap();
         assert_ne!(before, cache.key(&[&slices[0]], "").unwrap());
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn pipes_and_circles_in_a_folder_are_passed_over_and_a_named_pipe_is_refused() {
+        let home = tempfile::tempdir().unwrap();
+        let (folder, pipe) = (home.path().join("ct"), home.path().join("ct/pipe"));
+        fs::create_dir(&folder).unwrap();
+        fs::write(folder.join("1.dcm"), b"a").unwrap();
+        let cache = Cache::at(home.path().join("cases"));
+        let before = cache.key(&[&folder], "").unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for name in ["one", "other"] {
+            std::os::unix::fs::symlink(&folder, folder.join(name)).unwrap();
+        }
+        assert_eq!(before, cache.key(&[&folder], "").unwrap());
+        let fault = cache.key(&[&pipe], "").unwrap_err().to_string();
+        assert!(fault.contains("ct/pipe") && fault.contains("a named pipe"), "{fault}");
     }
 
     #[test]

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use trepan_mesh::{lattice::LabelledMesh, vtk};
-use trepan_volume::{hounsfield, nifti};
+use trepan_volume::{hounsfield, nifti, read_regular};
 
 /// Goes up when the folder's form changes.
 const FORM: u32 = 6;
@@ -91,7 +91,7 @@ pub fn load(folder: &Path) -> Result<Case, SessionError> {
     let broken = |file: &str, fault: &dyn std::fmt::Display| {
         SessionError::Case(format!("{}: {fault}; build the case again with `case build`", folder.join(file).display()))
     };
-    let json = fs::read(folder.join(CARD)).map_err(|fault| broken(CARD, &fault))?;
+    let json = read_regular(&folder.join(CARD)).map_err(|fault| broken(CARD, &fault))?;
     let card: Card = serde_json::from_slice(&json).map_err(|fault| broken(CARD, &fault))?;
     if card.form != FORM {
         return Err(broken(CARD, &format!("form {} is not known, this program knows {FORM}", card.form)));

@@ -11,6 +11,7 @@ use crate::case::cache::Cache;
 use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
 use crate::case::opening::{Opening, eye};
+use crate::case::space::Space;
 use crate::case::stages::ImportStages;
 use crate::case::{Case, Inputs, Recipe};
 use crate::error::SessionError;
@@ -43,7 +44,7 @@ pub fn open_by(
 ) -> Result<Case, SessionError> {
     let mut known = Known::of(program, inputs, wanted, cache)?;
     let recipe = choose(&mut known)?;
-    let Known { key, images, mut stages, .. } = known;
+    let Known { facts, key, images, mut stages, .. } = known;
     let hash = cache.under(&key, &format!("{} {} {}", recipe.spacing_mm, recipe.tets, recipe.halvings));
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
     if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
@@ -55,8 +56,11 @@ pub fn open_by(
     let mut case = build(inputs, images, &recipe, &mut stages)?;
     (case.name, case.hash) = (name, hash);
     stages.next("keeping the case");
-    if let Err(fault) = cache.keep(&case.hash, |folder| case_folder::save(&case, folder)) {
-        case.notes.push(format!("the case could not be kept for the next start: {fault}"));
+    // The facts only now: of images that make no case nothing is kept.
+    match cache.keep(&case.hash, |folder| case_folder::save(&case, folder)) {
+        Ok(()) if kept::<Facts>(cache, &key, FACTS).is_none() => keep(&facts, cache, &key, FACTS),
+        Ok(()) => {}
+        Err(fault) => case.notes.push(format!("the case could not be kept for the next start: {fault}")),
     }
     tracing::info!("case {} imported in {}", case.name, stages.finish());
     Ok(case)
@@ -89,12 +93,17 @@ impl<'a> Known<'a> {
             Some(facts) => (facts, None),
             None => {
                 let images = read(inputs, wanted, &mut stages)?;
-                let facts = facts_of(&images);
-                keep(&facts, cache, &key, FACTS);
-                (facts, Some(images))
+                (facts_of(&images), Some(images))
             }
         };
         Ok(Self { facts, program, inputs, wanted, cache, key, images, stages })
+    }
+
+    /// Keeps the facts where they were not kept before.
+    pub fn keep(&self) {
+        if self.images.is_some() {
+            keep(&self.facts, self.cache, &self.key, FACTS);
+        }
     }
 
     /// How far these choices are off in this case, from the cache if it was looked at before; nothing where there is no place to look at.
@@ -122,7 +131,7 @@ impl<'a> Known<'a> {
 
 /// What of the images a session opens and sees first; `None` where no opening is found.
 fn sight(program: Program, images: &Images, recipe: &Recipe, scene: &Scene) -> Result<Option<Sight>, SessionError> {
-    let classes = images.mask.as_ref().map(cropped);
+    let classes = images.mask.as_ref().map(cropped).transpose()?;
     let of_bone = |ct: &VoxelVolume<i16>| {
         let drawn = make_skull(ct, &Recipe { spacing_mm: LOOK_MM, ..*recipe }, images.isovalue_hu)?;
         let opening = Opening::on(&drawn, images.isovalue_hu, classes.as_ref(), recipe.opening)?;
@@ -147,7 +156,7 @@ fn sight(program: Program, images: &Images, recipe: &Recipe, scene: &Scene) -> R
 
 /// Names the images, and what of a recipe says how they are read.
 fn key_of_images(program: Program, inputs: &Inputs, wanted: &Recipe, cache: &Cache) -> Result<String, SessionError> {
-    needs(program, inputs)?;
+    needs(program, inputs, wanted)?;
     let images = [&inputs.ct, &inputs.mri, &inputs.labels];
     let tissues = inputs.tissues.iter().map(|source| &source.path);
     let files: Vec<&Path> = images.into_iter().flatten().chain(tissues).map(PathBuf::as_path).collect();
@@ -157,7 +166,7 @@ fn key_of_images(program: Program, inputs: &Inputs, wanted: &Recipe, cache: &Cac
     cache.key(&files, &format!("{of_images:?} {given:?} {meant:?}"))
 }
 
-fn needs(program: Program, inputs: &Inputs) -> Result<(), SessionError> {
+fn needs(program: Program, inputs: &Inputs, wanted: &Recipe) -> Result<(), SessionError> {
     let lacks = |flag: &str, what: &str| {
         Err(SessionError::Usage(format!(
             "{} needs {what}: give {flag}, or no image at all for the built-in case",
@@ -170,7 +179,18 @@ fn needs(program: Program, inputs: &Inputs) -> Result<(), SessionError> {
     if program.has_tissue() && inputs.mri.is_none() {
         return lacks("--mri PATH", "an MRI");
     }
-    Ok(())
+    let idle = [
+        ("--labels", inputs.labels.is_some() && inputs.mri.is_none(), "--mri PATH"),
+        ("--tissue", !inputs.tissues.is_empty() && inputs.mri.is_none(), "--mri PATH"),
+        ("--register", wanted.register && (inputs.ct.is_none() || inputs.mri.is_none()), "both --ct and --mri"),
+        ("--opening", wanted.opening.is_some() && inputs.ct.is_none(), "--ct PATH"),
+    ];
+    match idle.into_iter().find(|(_, idle, _)| *idle) {
+        Some((flag, _, needed)) => {
+            Err(SessionError::Usage(format!("{flag} does nothing here: give {needed} too, or leave {flag} out")))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The images as they were read, and the brain found in them.
@@ -202,10 +222,17 @@ fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<I
         fit.look(ct, mri, isovalue_hu);
     }
     stages.next("finding the brain");
+    let space = ct.as_ref().map(|ct| Space { ct, isovalue_hu, registered: recipe.register });
+    if let Some((space, mri)) = space.as_ref().zip(mri.as_ref()) {
+        notes.extend(space.check_mri(mri)?);
+    }
     let mask = mri
         .as_ref()
         .map(|mri| find_brain(inputs, mri, ct_from_mri, ct.as_ref(), isovalue_hu, &mut notes))
         .transpose()?;
+    if let Some((space, mask)) = space.zip(mask.as_ref().filter(|_| inputs.labels.is_some())) {
+        notes.extend(space.check("the labels", mask)?);
+    }
     Ok(Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png: fit.png(), notes })
 }
 

@@ -9,6 +9,7 @@ pub(crate) mod import;
 pub(crate) mod opening;
 pub(crate) mod plan;
 pub(crate) mod scene;
+mod space;
 mod stages;
 pub(crate) mod tissue;
 

@@ -55,8 +55,31 @@ impl Opening {
                 "--opening: the way from {wanted:?} to the middle of the head at {centre:.0} (RAS mm) does not meet {what}: give a point outside the skull, over the place to open"
             ))
         };
-        site.map(|site| Some(site.into())).ok_or_else(nothing)
+        let site = site.ok_or_else(nothing)?;
+        near(wanted, centre, site.entry).map_err(SessionError::Case)?;
+        Ok(Some(site.into()))
     }
+}
+
+/// A point may lie this far below the bone's surface and still be meant on it, mm: two voxels.
+const ON_BONE_MM: f32 = 3.0;
+/// A point farther from the bone than this is a slip, mm: no scalp is so thick.
+const FARTHEST_MM: f32 = 150.0;
+
+/// Refuses a point that lies inside the skull or far from it; the bone's surface is at `entry`.
+fn near(wanted: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), String> {
+    let away_mm = Vec3::from(wanted).distance(centre) - entry.distance(centre);
+    let what = if away_mm < -ON_BONE_MM {
+        format!("lies {:.0} mm inside the skull", -away_mm)
+    } else if away_mm > FARTHEST_MM {
+        format!("lies {away_mm:.0} mm away from the skull, over the {FARTHEST_MM} mm that are taken")
+    } else {
+        return Ok(());
+    };
+    let [x, y, z] = entry.to_array();
+    Err(format!(
+        "--opening: {wanted:?} {what}: give a point outside the skull, over the place to open; on the same line the bone begins at {x:.0},{y:.0},{z:.0} (RAS mm)"
+    ))
 }
 
 impl Opening {
@@ -233,7 +256,12 @@ mod tests {
             Vec3::from(wanted.inward).dot(Vec3::X) > 0.999 && (wanted.entry_mm[0] + 86.0).abs() < 2.0,
             "{wanted:?}"
         );
-        let mut bowl = skull;
+        let refused = |wanted| Opening::on(&skull, 400, None, Some(wanted)).unwrap_err().to_string();
+        let inside = refused([-40.0, 0.0, 0.0]);
+        assert!(inside.contains("46 mm inside") && inside.contains("-86,0,0"), "{inside}");
+        let far = refused([0.0, 0.0, 1000.0]);
+        assert!(far.contains("914 mm away") && far.contains("outside the skull"), "{far}");
+        let mut bowl = skull.clone();
         bowl.data[96 * 96 * 40..].fill(-1000);
         let fault = Opening::on(&bowl, 400, None, Some([0.0, 0.0, 120.0])).unwrap_err().to_string();
         assert!(fault.contains("--opening") && fault.contains("outside the skull"), "{fault}");

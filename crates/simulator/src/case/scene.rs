@@ -77,7 +77,7 @@ impl Scene {
         };
         let site = site.ok_or_else(|| {
             let fault = match (&bone, &brain) {
-                (Some(_), Some(_)) => "no ray from above meets bone and then brain: are the CT and the MRI of one head, upright, in one space?",
+                (Some(_), Some(_)) => "no ray from above meets bone and then brain: give a CT and an MRI of one head, upright and in one space (--register moves the MRI to the CT), or the place with --opening",
                 _ => "no ray from outside meets a wall of bone up to 30 mm thick: is the CT one of a head, and does the isovalue (--isovalue-hu) fit?",
             };
             SessionError::Case(fault.into())
