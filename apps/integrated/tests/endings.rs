@@ -82,6 +82,40 @@ fn a_replay_gives_the_same_forces_bit_for_bit() {
 }
 
 #[test]
+fn every_session_has_a_folder_of_its_own_and_an_older_one_is_replaced_only_when_asked() {
+    let home = tempfile::tempdir().unwrap();
+    let run = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_integrated"));
+        command.args(["--headless", "--frames-per-second", "0", "--duration", "1", "--quality", "usual"]).args(more);
+        command.env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"));
+        command.current_dir(home.path()).output().unwrap()
+    };
+    let told = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    for n in 1..=2 {
+        let done = run(&[]);
+        assert!(done.status.success(), "{}", told(&done.stderr));
+        let folders: Vec<_> = fs::read_dir(home.path().join("trepan-out/integrated")).unwrap().flatten().collect();
+        assert_eq!(folders.len(), n);
+        let last = told(&done.stdout).lines().last().unwrap().to_string();
+        assert!(folders.iter().any(|f| last.contains(f.file_name().to_str().unwrap())), "{last}");
+        assert!(folders.iter().all(|f| f.path().join("summary.json").exists()), "{last}");
+    }
+    assert!(run(&["--out", "out"]).status.success());
+    let old = fs::read(home.path().join("out/session.mcap")).unwrap();
+    let again = run(&["--out", "out"]);
+    assert_eq!(again.status.code(), Some(2));
+    assert!(told(&again.stderr).contains("--overwrite"), "{}", told(&again.stderr));
+    assert_eq!(old, fs::read(home.path().join("out/session.mcap")).unwrap());
+    fs::write(home.path().join("out/drilled.stl"), "old").unwrap();
+    assert!(run(&["--out", "out", "--overwrite"]).status.success());
+    assert!(!home.path().join("out/drilled.stl").exists(), "a file of the older session stayed");
+    assert!(home.path().join("out/summary.json").exists());
+    // What is run again is never replaced by its replay.
+    let onto = run(&["--device", "replay:out/session.mcap", "--out", "out", "--overwrite"]);
+    assert_eq!(onto.status.code(), Some(2), "{}", told(&onto.stderr));
+}
+
+#[test]
 fn a_built_case_runs_and_is_not_overwritten() {
     let home = tempfile::tempdir().unwrap();
     let case = home.path().join("head");
@@ -146,7 +180,7 @@ fn on_disk(options: &str, seconds: &str) -> Option<(Option<i32>, String, Option<
     let disk = kept.path().join("disk");
     fs::create_dir(&disk).unwrap();
     let script = format!(
-        "mount -t tmpfs -o {options} none {0} || exit 99; \"$@\" --out {0}/out; code=$?; cp {0}/out/session.mcap {1}/ 2>/dev/null; exit $code",
+        "mount -t tmpfs -o {options} none {0} || exit 99; \"$@\" --out {0}/out; code=$?; cp {0}/out/session.mcap {1}/ 2>/dev/null; ls -AR {0}/out >&2; exit $code",
         disk.display(),
         kept.path().display()
     );
@@ -172,6 +206,9 @@ fn a_full_disk_ends_the_recording_with_a_word_and_not_the_session() {
     );
     // The session went on to its end; what was recorded before is whole.
     assert!(said.contains("brain begins"), "{said}");
+    for half in ["summary.json", "report.html", "scores.csv", "drilled", "frames", ".tmp"] {
+        assert!(!said.contains(half), "{half} was left: {said}");
+    }
     let recording = recording.unwrap();
     assert!(recording.truncated && recording.ticks.len() > 1000, "{} ticks", recording.ticks.len());
     assert!(recording.ticks.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
@@ -194,7 +231,7 @@ fn a_folder_of_recordings_runs_again_in_shards() {
     fs::create_dir(&runs).unwrap();
     for name in ["a", "b", "c"] {
         let record = runs.join(format!("{name}.mcap"));
-        let mut command = operation(&folder.path().join("first"), "1", &["--record"]);
+        let mut command = operation(&folder.path().join(format!("first-{name}")), "1", &["--record"]);
         assert!(command.arg(&record).status().unwrap().success());
     }
     let device = format!("replay:{}", runs.display());

@@ -181,6 +181,19 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     found
 }
 
+/// Asserts that nobody else may look into what a folder holds.
+#[cfg(unix)]
+fn private(folder: &Path) {
+    use std::os::unix::fs::PermissionsExt;
+    for entry in fs::read_dir(folder).unwrap().flatten() {
+        let mode = entry.metadata().unwrap().permissions().mode();
+        assert_eq!(mode & 0o077, 0, "{} has mode {mode:o}", entry.path().display());
+        if entry.path().is_dir() {
+            private(&entry.path());
+        }
+    }
+}
+
 fn told(what: &str, bytes: &[u8]) {
     for secret in SECRETS {
         let found = bytes.windows(secret.len()).any(|window| window == secret.as_bytes());
@@ -209,6 +222,8 @@ fn no_identifier_leaves_the_input_files() {
     fs::create_dir(&made).unwrap();
     run(&["case", "build"], "case", &[]);
     run(&["--headless", "--quality", "usual", "--duration", "1", "--picture", "64x48", "--stl"], "session", &[]);
+    #[cfg(unix)]
+    private(&made);
     let files = contents(&made);
     for name in
         ["case.json", "skull.nii", "session.mcap", "summary.json", "report.html", "drilled.nii.gz", "drilled.stl"]

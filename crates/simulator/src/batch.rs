@@ -4,7 +4,9 @@
 //! Each recording gets a folder of its own under `--out`, named after it; one that fails is told and does not stop the others. Jobs of a cluster take one shard each and
 //! need nothing of one another; `cargo xtask merge` puts their summaries into one table.
 
+use crate::command::printable;
 use crate::error::SessionError;
+use crate::report::output::dated;
 use crate::{Inputs, Options, Program, Session};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -35,14 +37,14 @@ pub fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, SessionErro
 
 /// Runs recordings again, one after the other. Returns how many failed.
 pub fn run(program: Program, options: &Options, built_in: &Inputs, files: &[PathBuf]) -> usize {
-    let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
+    let out = options.out.clone().unwrap_or_else(|| dated(program));
     let failed = |file: &&PathBuf| match one(program, options, built_in, file, &out) {
         Ok(line) => {
-            println!("{}: {line}", file.display());
+            println!("{}: {line}", printable(&file.display().to_string()));
             false
         }
         Err(fault) => {
-            eprintln!("{}: {fault}", file.display());
+            eprintln!("{}", printable(&format!("{}: {fault}", file.display())));
             true
         }
     };

@@ -38,7 +38,7 @@ mod stages;
 mod table;
 
 pub use case::cache::Cache;
-pub use case::choice::build_case;
+pub use case::choice::{Built, build_case};
 pub use case::import::open as open_case;
 pub use case::opening::Opening;
 pub use case::plan::Plan;

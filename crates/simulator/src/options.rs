@@ -47,9 +47,12 @@ pub struct Options {
     /// Where to record the session [default: session.mcap in the output folder]
     #[arg(long, value_name = "FILE.mcap")]
     pub record: Option<PathBuf>,
-    /// Folder for summary, report, recording, pictures [default: trepan-out/PROGRAM]
+    /// Folder for summary, report, recording, pictures [default: trepan-out/PROGRAM/DATE-AND-TIME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Replace the session that --out holds, or the file that --record names
+    #[arg(long)]
+    pub overwrite: bool,
     /// Write the drilled skull's surface too, as drilled.stl; some 50 MB
     #[arg(long)]
     pub stl: bool,
@@ -90,7 +93,7 @@ pub struct Options {
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate_hz: Option<f32>,
     /// Pictures a second in a headless run; 0 for none
-    #[arg(long, value_name = "N", default_value_t = 1.0)]
+    #[arg(long, value_name = "N", default_value_t = 1.0, allow_negative_numbers = true)]
     pub frames_per_second: f64,
     /// Width and height of the picture, pixels
     #[arg(long, value_name = "WxH", default_value = "960x600", value_parser = size)]
@@ -169,7 +172,7 @@ pub enum Task {
         #[command(flatten)]
         tolerances: Tolerances,
         /// Haptic ticks a second
-        #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+        #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
         rate_hz: f32,
         /// Width and height of the picture, pixels
         #[arg(long, value_name = "WxH", default_value = "960x600", value_parser = size)]
@@ -250,6 +253,11 @@ fn within(flag: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
     good.then_some(()).ok_or(format!("--{flag} {value} is out of range: give {low} to {high}"))
 }
 
+/// Refuses ticks that no loop keeps.
+pub fn rate(rate_hz: f64) -> Result<(), String> {
+    within("rate-hz", rate_hz, RATES_HZ[0], RATES_HZ[1])
+}
+
 fn point(text: &str) -> Result<[f32; 3], String> {
     let remedy = "expected X,Y,Z in mm: right, anterior and superior positive, as in 40,30,120";
     let numbers: Vec<f32> = text.split(',').map(|s| s.trim().parse().map_err(|_| remedy)).collect::<Result<_, _>>()?;
@@ -291,7 +299,7 @@ impl Options {
         within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
         within("flap", self.flap.unwrap_or(0.0).into(), 0.0, 90.0)?;
         within("fluid-lost", self.fluid_lost.unwrap_or(0.0).into(), 0.0, 1.0)?;
-        within("rate-hz", self.rate_hz.map_or(RATES_HZ[0], f64::from), RATES_HZ[0], RATES_HZ[1])?;
+        rate(self.rate_hz.map_or(RATES_HZ[0], f64::from))?;
         within("frames-per-second", self.frames_per_second, 0.0, 120.0)
     }
 }

@@ -94,7 +94,7 @@ impl Session {
         let (case, models) = choice::open_case(program, &options, built_in, wish, card)?;
         let (name, hash) = (case.name.clone(), case.hash.clone());
         let table = Table::new(program, (case, models), operation, windowed && recording.is_some())?;
-        let out = options.out.clone().unwrap_or_else(|| PathBuf::from("trepan-out").join(program.name()));
+        let out = options.out.clone().unwrap_or_else(|| output::dated(program));
         Ok(Self {
             program,
             options,
@@ -111,7 +111,7 @@ impl Session {
         })
     }
 
-    /// Runs it and writes its files.
+    /// Runs it and writes its files; where that fails, nothing half-written stays.
     pub fn run(mut self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let (before, whole) = (self.table.pieces(), self.table.bone().map(|bone| bone.snapshot()));
@@ -126,8 +126,8 @@ impl Session {
         let feels = (&feel, second_feel.as_ref());
         let stages = self.table.stages(start.state, self.tick_ms(), feels, &Default::default())?;
         let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
-        output::folder(&self.out)?;
-        let record = self.options.record.clone().unwrap_or_else(|| self.out.join("session.mcap"));
+        let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
+        let place = output::Place::make(&self.out, &record)?;
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         let kept = (Recorder::create(&record, &self.header(&feel, second_feel.as_ref()))?, share);
@@ -160,6 +160,7 @@ impl Session {
         if let Some((bone, densities)) = self.table.bone().zip(drilled) {
             output::drilled(&self.out, &densities, bone, self.options.stl)?;
         }
+        place.keep();
         Ok(Ended { summary, out: self.out, signal: stop.signal() })
     }
 
@@ -353,14 +354,32 @@ impl Session {
 /// A device, if a hand holds one.
 type Held = Option<Box<dyn HapticDevice>>;
 
-/// Refuses places that cannot be written to before anything is loaded.
+/// Refuses places that cannot be written to, or that hold a session, before anything is loaded.
 fn places(options: &Options) -> Result<(), SessionError> {
-    if let Some(out) = options.out.as_deref().filter(|out| out.exists() && !out.is_dir()) {
-        return Err(SessionError::Usage(format!("--out {} is a file: name a folder, new or old", out.display())));
+    let usage = |fault: String| Err(SessionError::Usage(fault));
+    let remedy = "name another, or give --overwrite to replace it";
+    let out = options.out.as_deref();
+    let there = out.and_then(|out| out.ancestors().find(|folder| folder.exists()));
+    if let Some(file) = there.filter(|folder| !folder.is_dir()) {
+        return usage(format!("--out: {} is a file: name a folder, new or old", file.display()));
     }
-    let folder = options.record.as_deref().and_then(Path::parent).filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(out) = out.filter(|out| !options.overwrite && output::holds_session(out)) {
+        return usage(format!("--out {} holds a session already: {remedy}", out.display()));
+    }
+    let record = options.record.as_deref();
+    let folder = record.and_then(Path::parent).filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        return Err(SessionError::Usage(format!("--record: there is no folder {}; make it first", folder.display())));
+        return usage(format!("--record: there is no folder {}; make it first", folder.display()));
     }
-    Ok(())
+    if let Some(record) = record.filter(|record| record.exists() && (!options.overwrite || !record.is_file())) {
+        return usage(format!("--record {} is there already: {remedy}", record.display()));
+    }
+    let source = options.device.as_deref().and_then(|name| name.strip_prefix("replay:"));
+    let source = source.and_then(|source| Path::new(source).canonicalize().ok());
+    let recording = out.map(|out| out.join(output::RECORDING));
+    let mut written = [record, recording.as_deref()].into_iter().flatten();
+    match written.any(|written| source.is_some() && written.canonicalize().ok() == source) {
+        true => usage("--device: the recording that is run again would be overwritten; name another --out".into()),
+        false => Ok(()),
+    }
 }

@@ -2,6 +2,7 @@
 
 use crate::case::cache::Cache;
 use crate::case::import::{Known, volume_mm3};
+use crate::case::tissue::TissueClass;
 use crate::case::{Case, Inputs, Recipe, folder, import};
 use crate::error::SessionError;
 use crate::measure::Own;
@@ -21,11 +22,14 @@ pub fn open_case(
 ) -> Result<(Case, Models), SessionError> {
     if let Some(folder) = &options.case {
         let case = fitting(program, folder::load(folder)?)?;
+        let classes = case.brain.as_ref().map(|brain| &brain.classes.data);
+        guarded(options, |class| classes.is_some_and(|classes| classes.contains(&class.code())))?;
         let models = on_case(wish, &case, card)?;
         models.say();
         return Ok((case, models));
     }
     let (inputs, mut models) = (inputs(&options.patient, built_in), None);
+    guarded(options, |class| class == TissueClass::Brain || inputs.tissues.iter().any(|t| t.class == class))?;
     let wanted = recipe(&options.patient);
     let case = import::open_by(program, &inputs, &wanted, &Cache::of_user()?, |known| {
         let facts = known.facts;
@@ -36,6 +40,19 @@ pub fn open_case(
     })?;
     let unsettled = || SessionError::Internal("a case without models".into());
     Ok((case, models.ok_or_else(unsettled)?))
+}
+
+/// Refuses to guard tissue that is not `there`.
+fn guarded(options: &Options, there: impl Fn(TissueClass) -> bool) -> Result<(), SessionError> {
+    match options.forbid.iter().flatten().find(|class| !there(**class)) {
+        None => Ok(()),
+        Some(class) => {
+            let name = class.name();
+            Err(SessionError::Usage(format!(
+                "--forbid {name}: the case holds no {name}: give its labels with --tissue {name}=PATH, or leave it out"
+            )))
+        }
+    }
 }
 
 /// The models for a case, which is not made.
@@ -54,7 +71,9 @@ pub fn plan_case(
             let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of_user()?);
             let mut known = Known::of(program, &inputs, &recipe, &cache)?;
             let facts = known.facts;
-            wish.settle(&facts, card, |scene, rows| known.own(scene, rows))
+            let models = wish.settle(&facts, card, |scene, rows| known.own(scene, rows))?;
+            known.keep();
+            Ok(models)
         }
     }
 }
@@ -70,8 +89,16 @@ fn on_case(wish: Wish, case: &Case, card: impl FnOnce() -> bool) -> Result<Model
     wish.settle(&facts, card, |_, _| Ok(Own::default()))
 }
 
-/// Makes a case folder; returns the case's name.
-pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inputs) -> Result<String, SessionError> {
+/// A case that was made and kept in a folder.
+pub struct Built {
+    /// Its name.
+    pub name: String,
+    /// Remarks of the import.
+    pub notes: Vec<String>,
+}
+
+/// Makes a case folder.
+pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inputs) -> Result<Built, SessionError> {
     patient.check().map_err(SessionError::Usage)?;
     if out.exists() {
         return Err(SessionError::Usage(format!(
@@ -84,8 +111,11 @@ pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inp
     let parent = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = out.file_name().and_then(|name| name.to_str()).unwrap_or("case");
     let written = Cache::at(parent.into()).keep(name, |place| folder::save(&case, place));
-    written.map_err(|fault| SessionError::Internal(format!("cannot write {}: {fault}", out.display())))?;
-    Ok(case.name)
+    written.map_err(|fault| {
+        let remedy = "give --out in a folder that exists, may be written to and has room";
+        SessionError::Usage(format!("cannot write {}: {fault}; {remedy}", out.display()))
+    })?;
+    Ok(Built { name: case.name, notes: case.notes })
 }
 
 /// A case that has what the program needs.

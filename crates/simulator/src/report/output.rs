@@ -1,35 +1,127 @@
 //! The files of a session: each appears whole or not at all.
 
 use crate::error::SessionError;
+use crate::program::Program;
 use crate::report::page::{self, Shot};
 use crate::report::summary::Summary;
 use crate::run::Outcome;
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
 use trepan_link::Recording;
 use trepan_mesh::{isosurface, stl};
 use trepan_volume::{BoneVolume, VoxelVolume, nifti};
 
-/// Makes the output folder and its place for pictures, empty of older ones.
-pub fn folder(out: &Path) -> Result<(), SessionError> {
-    let frames = out.join("frames");
-    fs::create_dir_all(&frames).map_err(|fault| SessionError::Output { path: out.into(), fault })?;
-    let old = fs::read_dir(&frames).map_err(|fault| SessionError::Output { path: frames.clone(), fault })?;
-    for entry in old.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with("frame-")) {
-        fs::remove_file(entry.path()).map_err(|fault| SessionError::Output { path: entry.path(), fault })?;
+/// Files that a session leaves in its folder, beside pictures.
+const FILES: [&str; 6] = ["summary.json", "scores.csv", "report.html", "drilled.nii.gz", "drilled.stl", RECORDING];
+/// The recording's name, unless `--record` gives another.
+pub const RECORDING: &str = "session.mcap";
+/// Where pictures lie.
+const FRAMES: &str = "frames";
+
+/// Whether a folder holds a session.
+pub fn holds_session(out: &Path) -> bool {
+    FILES.iter().any(|name| out.join(name).exists())
+}
+
+/// A folder below `trepan-out/PROGRAM` that is named after the time (UTC) and is not there yet.
+pub fn dated(program: Program) -> PathBuf {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+    let place = Path::new("trepan-out").join(program.name());
+    let (first, mut nth) = (place.join(date_and_time(now)), 1);
+    let mut folder = first.clone();
+    while folder.exists() {
+        nth += 1;
+        folder = first.with_extension(nth.to_string());
     }
-    Ok(())
+    folder
+}
+
+/// Seconds since 1970 as a date and a time that a file name may hold, UTC; days by Hinnant's
+/// `civil_from_days`.
+fn date_and_time(seconds: u64) -> String {
+    let days = seconds / 86_400 + 719_468;
+    let (era, of_era) = (days / 146_097, days % 146_097);
+    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted = (5 * of_year + 2) / 153;
+    let (day, month) = (of_year - (153 * shifted + 2) / 5 + 1, if shifted < 10 { shifted + 3 } else { shifted - 9 });
+    let year = year_of_era + era * 400 + u64::from(month <= 2);
+    let [h, m, s] = [seconds / 3600 % 24, seconds / 60 % 60, seconds % 60];
+    format!("{year:04}-{month:02}-{day:02}T{h:02}-{m:02}-{s:02}")
+}
+
+/// The folder of a session that is being written. Dropped before [`keep`](Self::keep), it removes
+/// what the session wrote; a recording that can be opened stays, up to its last whole chunk.
+#[derive(Debug)]
+pub struct Place {
+    out: PathBuf,
+    record: PathBuf,
+    /// Folders that were not there before, the deepest first.
+    made: Vec<PathBuf>,
+    kept: bool,
+}
+
+impl Place {
+    /// Makes the folder and its place for pictures, and removes an older session's files.
+    pub fn make(out: &Path, record: &Path) -> Result<Self, SessionError> {
+        let missing = out.ancestors().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+        let made = missing.map(PathBuf::from).collect();
+        let place = Self { out: out.into(), record: record.into(), made, kept: false };
+        let failed = |fault| SessionError::Output { path: out.into(), fault };
+        fs::create_dir_all(out.join(FRAMES)).map_err(failed)?;
+        place.clear()?;
+        Ok(place)
+    }
+
+    /// The session is whole: its files stay.
+    pub fn keep(mut self) {
+        self.kept = true;
+    }
+
+    /// Removes a session's files and pictures, but for what the user kept of the window.
+    fn clear(&self) -> Result<(), SessionError> {
+        let frames = self.out.join(FRAMES);
+        let pictures = fs::read_dir(&frames).into_iter().flatten().flatten();
+        let pictures = pictures.map(|entry| entry.path()).filter(|path| path.extension() == Some(OsStr::new("png")));
+        let files = FILES.iter().map(|name| self.out.join(name)).chain([self.record.clone()]);
+        for path in files.filter(|path| path.exists()).chain(pictures) {
+            fs::remove_file(&path).map_err(|fault| SessionError::Output { path, fault })?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        if self.kept {
+            return;
+        }
+        // Under another name while the rest goes.
+        let ticks = Recording::open(&self.record).map_or(0, |recording| recording.ticks.len());
+        let aside = self.record.with_extension("kept");
+        let saved = ticks > 0 && fs::rename(&self.record, &aside).is_ok();
+        _ = self.clear();
+        if saved && fs::rename(&aside, &self.record).is_ok() {
+            tracing::warn!("of the session only its recording is kept: {ticks} ticks in {}", self.record.display());
+        }
+        _ = fs::remove_dir(self.out.join(FRAMES));
+        for folder in &self.made {
+            _ = fs::remove_dir(folder);
+        }
+    }
 }
 
 /// Writes the drilled skull's densities, and with `surface` the triangles of the bone as it was carved.
 pub fn drilled(out: &Path, densities: &VoxelVolume<i16>, bone: &BoneVolume, surface: bool) -> Result<(), SessionError> {
-    let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(fault.to_string());
-    nifti::write(&out.join("drilled.nii.gz"), densities).map_err(|fault| internal(&fault))?;
+    let failed = |fault: &dyn std::fmt::Display| SessionError::Case(format!("{fault}; give another folder with --out"));
+    nifti::write(&out.join("drilled.nii.gz"), densities).map_err(|fault| failed(&fault))?;
     if surface {
         let triangles = isosurface(&bone.snapshot(), bone.isovalue());
-        stl::write(&out.join("drilled.stl"), &triangles).map_err(|fault| internal(&fault))?;
+        stl::write(&out.join("drilled.stl"), &triangles).map_err(|fault| failed(&fault))?;
     }
     Ok(())
 }
@@ -82,4 +174,40 @@ pub fn whole(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
     file.write_all(bytes).map_err(failed)?;
     file.persist(path).map(drop).map_err(|fault| failed(fault.error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_becomes_a_name_that_sorts() {
+        assert_eq!(date_and_time(0), "1970-01-01T00-00-00");
+        assert_eq!(date_and_time(951_827_696), "2000-02-29T12-34-56");
+        assert_eq!(date_and_time(1_795_418_102), "2026-11-23T07-15-02");
+        assert!(dated(Program::Brain).starts_with("trepan-out/brain"));
+    }
+
+    #[test]
+    fn what_a_failed_session_made_goes_and_what_was_there_stays() {
+        let home = tempfile::tempdir().unwrap();
+        let out = home.path().join("a/b");
+        let half = || {
+            let place = Place::make(&out, &out.join(RECORDING)).unwrap();
+            for name in ["summary.json", RECORDING, "frames/frame-00001.png"] {
+                fs::write(out.join(name), "half").unwrap();
+            }
+            assert!(holds_session(&out));
+            place
+        };
+        drop(half());
+        assert!(!home.path().join("a").exists());
+        fs::create_dir_all(&out).unwrap();
+        fs::write(out.join("mine.txt"), "x").unwrap();
+        drop(half());
+        let left: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(left, ["mine.txt"]);
+        half().keep();
+        assert!(holds_session(&out) && out.join("frames/frame-00001.png").exists());
+    }
 }
