@@ -133,7 +133,7 @@ pub struct Patient {
     /// Move the MRI (and labels) to where they fit the CT, by mutual information
     #[arg(long)]
     pub register: bool,
-    /// A point outside the skull over the place to open, RAS mm [default: bone about 6 mm thick on the upper right front]
+    /// A point outside the skull over the place to open, RAS mm [default: bone about 6 mm thick close over the brain, on the upper right front where it can be; the same for all voxel sizes]
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub opening: Option<[f32; 3]>,
     /// Threshold of bone, HU [default: from the histogram, 300 to 500]

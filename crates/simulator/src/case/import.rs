@@ -10,7 +10,7 @@ use crate::case::anatomy::{cropped, find_brain, make_brain, make_classes, make_s
 use crate::case::cache::Cache;
 use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
-use crate::case::opening::{Opening, eye};
+use crate::case::opening::{Opening, REFERENCE_MM, bone_of, eye};
 use crate::case::space::Space;
 use crate::case::stages::ImportStages;
 use crate::case::{Case, Inputs, Recipe};
@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_budget::{Rows, Scene};
 use trepan_haptics::script::Site;
-use trepan_volume::{BoneVolume, DistanceField, VoxelVolume, bone_isovalue, overlap, skull_only};
+use trepan_volume::{DistanceField, VoxelVolume, bone_isovalue, overlap, skull_only};
 
 /// Opens a case: from the cache if it was made before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
@@ -53,7 +53,7 @@ pub fn open_by(
         return Ok(case);
     }
     let images = images.map_or_else(|| read(inputs, wanted, &mut stages), Ok)?;
-    let mut case = build(inputs, images, &recipe, &mut stages)?;
+    let mut case = build(program, inputs, images, &recipe, &mut stages)?;
     (case.name, case.hash) = (name, hash);
     stages.next("keeping the case");
     // The facts only now: of images that make no case nothing is kept.
@@ -133,17 +133,16 @@ impl<'a> Known<'a> {
 fn sight(program: Program, images: &Images, recipe: &Recipe, scene: &Scene) -> Result<Option<Sight>, SessionError> {
     let classes = images.mask.as_ref().map(cropped).transpose()?;
     let of_bone = |ct: &VoxelVolume<i16>| {
-        let drawn = make_skull(ct, &Recipe { spacing_mm: LOOK_MM, ..*recipe }, images.isovalue_hu)?;
-        let opening = Opening::on(&drawn, images.isovalue_hu, classes.as_ref(), recipe.opening)?;
-        let bone = BoneVolume::new(&drawn, images.isovalue_hu);
-        let bone = bone.map_err(|fault| SessionError::Case(format!("the CT: {fault}")))?;
+        let drawn = make_skull(ct, &Recipe { spacing_mm: REFERENCE_MM, ..*recipe }, images.isovalue_hu)?;
+        let bone = bone_of(&drawn, images.isovalue_hu)?;
+        let opening = Opening::of_patient(&bone, classes.as_ref(), recipe.opening)?;
         let mut skull = Skull { ct: ct.clone(), isovalue: images.isovalue_hu };
         skull_only(&mut skull.ct, skull.isovalue);
         Ok::<_, SessionError>((opening, (skull, Arc::new(bone))))
     };
     let with_bone = images.ct.as_ref().filter(|_| program.has_bone()).map(of_bone).transpose()?;
     let (opening, skull) = match with_bone {
-        Some((opening, skull)) => (opening, Some(skull)),
+        Some((opening, skull)) => (Some(opening), Some(skull)),
         None => (classes.as_ref().and_then(Opening::on_bare_brain), None),
     };
     let brain = classes.map(|mask| Shape { field: DistanceField::of_mask(&mask), mask, material: scene.material });
@@ -236,14 +235,24 @@ fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<I
     Ok(Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png: fit.png(), notes })
 }
 
-fn build(inputs: &Inputs, images: Images, recipe: &Recipe, stages: &mut ImportStages) -> Result<Case, SessionError> {
+fn build(
+    program: Program,
+    inputs: &Inputs,
+    images: Images,
+    recipe: &Recipe,
+    stages: &mut ImportStages,
+) -> Result<Case, SessionError> {
     let Images { ct, mri, mask, ct_from_mri, isovalue_hu, fit_png, mut notes } = images;
     stages.next("resampling the skull");
-    let skull = ct.map(|ct| make_skull(&ct, recipe, isovalue_hu)).transpose()?;
+    let skull = ct.as_ref().map(|ct| make_skull(ct, recipe, isovalue_hu)).transpose()?;
     stages.next("planning the opening");
     let classes = mask.map(|mask| make_classes(inputs, &mask, ct_from_mri, &mut notes)).transpose()?;
-    let opening = skull.as_ref().map(|skull| Opening::on(skull, isovalue_hu, classes.as_ref(), recipe.opening));
-    let opening = opening.transpose()?.flatten();
+    let on_skull = |(ct, skull)| Opening::planned(ct, skull, isovalue_hu, classes.as_ref(), recipe);
+    let opening = match ct.as_ref().zip(skull.as_ref()).map(on_skull).transpose() {
+        // Who drills nothing needs none.
+        Err(_) if !program.has_bone() && recipe.opening.is_none() => None,
+        found => found?,
+    };
     stages.next("meshing the brain");
     let place = opening.or_else(|| classes.as_ref().and_then(Opening::on_bare_brain)).map(|opening| opening.brain());
     let brain = mri.zip(classes).map(|(mri, classes)| make_brain(&mri, classes, place, recipe)).transpose()?;
@@ -259,8 +268,6 @@ pub fn volume_mm3(mask: &VoxelVolume<u8>) -> f64 {
 const FACTS: &str = "facts.json";
 /// What was found in this case is kept in.
 const OWN: &str = "own.json";
-/// Edge of the voxels that are looked at, mm.
-const LOOK_MM: f32 = 1.0;
 
 fn facts_of(images: &Images) -> Facts {
     Facts {
