@@ -1,7 +1,7 @@
 //! What every program does with its command line: flags, session, exit code.
 
 use crate::batch;
-use crate::case::choice::{Built, plan_case};
+use crate::case::choice::{Built, PlannedCase, plan_case};
 use crate::compare::compare;
 use crate::device_test;
 use crate::models::Wish;
@@ -116,8 +116,9 @@ fn planned(
     wish: Wish,
 ) -> Result<ExitCode, SessionError> {
     let card = || driver::open().is_ok_and(|gpu| !gpu.is_software());
-    let models = plan_case(program, case, patient, built_in, wish, card)?;
+    let PlannedCase { models, notes } = plan_case(program, case, patient, built_in, wish, card)?;
     println!("{}", models.told());
+    notes.iter().for_each(|note| println!("note: {note}"));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -41,7 +41,10 @@ mod stroke;
 mod volume;
 
 pub use bone::{AIR_HU, BRICK, BoneError, BoneVolume};
-pub use brain::{BrainConfig, BrainFit, MaskError, brain_by_mri, brain_fit, brain_mask, check_brain_mask};
+pub use brain::{
+    BrainConfidence, BrainConfig, BrainFit, FoundBrain, MaskError, brain_by_mri, brain_fit, brain_mask,
+    check_brain_mask, find_brain,
+};
 pub use component::largest_component;
 pub use distance::{DistanceField, FAR_MM};
 pub use error::{ReadError, WriteError};

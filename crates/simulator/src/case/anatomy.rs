@@ -8,8 +8,8 @@ use std::path::Path;
 use trepan_geometry::Vec3;
 use trepan_mesh::lattice::{self, Fine, LabelledMesh};
 use trepan_volume::{
-    AIR_HU, BrainConfig, Grid, Import, Interpolation, MaskError, ReadError, RegistrationConfig, VoxelVolume,
-    brain_mask, check_brain_mask, dicom, hounsfield, is_ct, largest_component, overlap, register, resample, room_for,
+    AIR_HU, BrainConfidence, BrainConfig, Grid, Import, Interpolation, MaskError, ReadError, RegistrationConfig,
+    VoxelVolume, check_brain_mask, dicom, hounsfield, is_ct, largest_component, overlap, register, resample, room_for,
     room_for_voxels, skull_only,
 };
 
@@ -114,6 +114,15 @@ pub fn registered(
     Ok(found.fixed_from_moving)
 }
 
+/// What a user should know of a brain that was found.
+fn brain_note(confidence: &BrainConfidence) -> String {
+    let doubt = match confidence.is_doubtful() {
+        true => "; DOUBTFUL: look at its border in the slices, or give a label volume with --labels PATH",
+        false => "",
+    };
+    format!("brain found in the MRI: {confidence}{doubt}")
+}
+
 /// The brain: what is not 0 in the labels, else what the MRI shows.
 pub fn find_brain(
     inputs: &Inputs,
@@ -125,7 +134,10 @@ pub fn find_brain(
 ) -> Result<VoxelVolume<u8>, SessionError> {
     let config = BrainConfig { isovalue: Some(isovalue_hu), ..BrainConfig::default() };
     let Some(path) = &inputs.labels else {
-        return brain_mask(mri, ct, &config).map_err(|fault| SessionError::Case(format!("{fault} (--labels PATH)")));
+        let found = trepan_volume::find_brain(mri, ct, &config);
+        let found = found.map_err(|fault| SessionError::Case(format!("{fault} (--labels PATH)")))?;
+        notes.push(brain_note(&found.confidence));
+        return Ok(found.mask);
     };
     let case = |fault: String| SessionError::Case(format!("{}: {fault}", path.display()));
     let mut labels = trepan_volume::labels(path, &trepan_volume::read(path)?)?;
@@ -213,4 +225,28 @@ pub fn cropped(mask: &VoxelVolume<u8>) -> Result<VoxelVolume<u8>, SessionError> 
     let offset = [0, 1, 2].map(|axis| (low[axis] as i64 - margin) as f64);
     let world_from_voxel = whole.world_from_voxel * DAffine3::from_translation(offset.into());
     Ok(resample(&whole, &Grid { dims, world_from_voxel }, Interpolation::Nearest, 0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_doubtful_brain_is_said_to_be_with_the_remedy() {
+        let sure = BrainConfidence {
+            value: 0.9,
+            found_ml: 1400.0,
+            slice_mm: 1.0,
+            volume: 1.0,
+            border: 0.9,
+            shape: 1.0,
+            slices: 1.0,
+            inside: None,
+        };
+        let note = brain_note(&sure);
+        assert!(note.contains("1400 ml, confidence 0.90") && !note.contains("--labels"), "{note}");
+        let leaking = BrainConfidence { value: 0.3, border: 0.3, ..sure };
+        let note = brain_note(&leaking);
+        assert!(note.contains("DOUBTFUL") && note.contains("--labels PATH"), "{note}");
+    }
 }

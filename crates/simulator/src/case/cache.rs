@@ -14,7 +14,7 @@ use std::time::Duration;
 use trepan_volume::open_regular;
 
 /// Goes up when kept cases change their form or the code that makes them changes its results.
-const FORM: u32 = 9;
+const FORM: u32 = 10;
 
 /// The folder of kept cases.
 #[derive(Clone, Debug)]

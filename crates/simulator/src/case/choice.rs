@@ -55,6 +55,14 @@ fn guarded(options: &Options, there: impl Fn(TissueClass) -> bool) -> Result<(),
     }
 }
 
+/// The models for a case that is not made, and what is remarkable about its images.
+pub struct PlannedCase {
+    /// The models.
+    pub models: Models,
+    /// Remarks of the import.
+    pub notes: Vec<String>,
+}
+
 /// The models for a case, which is not made.
 pub fn plan_case(
     program: Program,
@@ -63,17 +71,20 @@ pub fn plan_case(
     built_in: Inputs,
     wish: Wish,
     card: impl FnOnce() -> bool,
-) -> Result<Models, SessionError> {
+) -> Result<PlannedCase, SessionError> {
     patient.check().map_err(SessionError::Usage)?;
     match case {
-        Some(folder) => on_case(wish, &fitting(program, folder::load(folder)?)?, card),
+        Some(folder) => {
+            let case = fitting(program, folder::load(folder)?)?;
+            Ok(PlannedCase { models: on_case(wish, &case, card)?, notes: case.notes })
+        }
         None => {
             let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of_user()?);
             let mut known = Known::of(program, &inputs, &recipe, &cache)?;
-            let facts = known.facts;
+            let (facts, notes) = (known.facts, known.notes.clone());
             let models = wish.settle(&facts, card, |scene, rows| known.own(scene, rows))?;
             known.keep();
-            Ok(models)
+            Ok(PlannedCase { models, notes })
         }
     }
 }

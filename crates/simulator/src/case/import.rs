@@ -21,8 +21,8 @@ use crate::measure::{Own, Sight};
 use crate::models::Facts;
 use crate::program::Program;
 use glam::DAffine3;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trepan_budget::{Rows, Scene};
@@ -44,7 +44,7 @@ pub fn open_by(
 ) -> Result<Case, SessionError> {
     let mut known = Known::of(program, inputs, wanted, cache)?;
     let recipe = choose(&mut known)?;
-    let Known { facts, key, images, mut stages, .. } = known;
+    let Known { facts, notes, key, images, mut stages, .. } = known;
     let hash = cache.under(&key, &format!("{} {} {}", recipe.spacing_mm, recipe.tets, recipe.halvings));
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
     if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
@@ -58,7 +58,7 @@ pub fn open_by(
     stages.next("keeping the case");
     // The facts only now: of images that make no case nothing is kept.
     match cache.keep(&case.hash, |folder| case_folder::save(&case, folder)) {
-        Ok(()) if kept::<Facts>(cache, &key, FACTS).is_none() => keep(&facts, cache, &key, FACTS),
+        Ok(()) if kept::<Seen>(cache, &key, FACTS).is_none() => keep(&Seen { facts, notes }, cache, &key, FACTS),
         Ok(()) => {}
         Err(fault) => case.notes.push(format!("the case could not be kept for the next start: {fault}")),
     }
@@ -66,10 +66,19 @@ pub fn open_by(
     Ok(case)
 }
 
+/// What is kept of images that were read.
+#[derive(Serialize, Deserialize)]
+struct Seen {
+    facts: Facts,
+    notes: Vec<String>,
+}
+
 /// What is known of a case before it is made.
 pub struct Known<'a> {
     /// What its images are, from the cache if they were read before.
     pub facts: Facts,
+    /// Remarks on them.
+    pub notes: Vec<String>,
     program: Program,
     inputs: &'a Inputs,
     wanted: &'a Recipe,
@@ -89,20 +98,20 @@ impl<'a> Known<'a> {
     ) -> Result<Self, SessionError> {
         let key = key_of_images(program, inputs, wanted, cache)?;
         let mut stages = ImportStages::new(7);
-        let (facts, images) = match kept(cache, &key, FACTS) {
-            Some(facts) => (facts, None),
+        let (Seen { facts, notes }, images) = match kept(cache, &key, FACTS) {
+            Some(seen) => (seen, None),
             None => {
                 let images = read(inputs, wanted, &mut stages)?;
-                (facts_of(&images), Some(images))
+                (Seen { facts: facts_of(&images), notes: images.notes.clone() }, Some(images))
             }
         };
-        Ok(Self { facts, program, inputs, wanted, cache, key, images, stages })
+        Ok(Self { facts, notes, program, inputs, wanted, cache, key, images, stages })
     }
 
     /// Keeps the facts where they were not kept before.
     pub fn keep(&self) {
         if self.images.is_some() {
-            keep(&self.facts, self.cache, &self.key, FACTS);
+            keep(&Seen { facts: self.facts, notes: self.notes.clone() }, self.cache, &self.key, FACTS);
         }
     }
 

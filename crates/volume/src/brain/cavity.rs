@@ -14,6 +14,7 @@
 //! # Sources
 //! L. Vincent, P. Soille, "Watersheds in digital spaces", IEEE PAMI 13, 1991.
 
+use super::flood::{INSIDE, OUTSIDE, UNKNOWN, flood};
 use super::morphology::{core, within};
 use crate::component::Components;
 use crate::{AIR_HU, DistanceField, Grid, Interpolation, VoxelVolume, resample};
@@ -24,11 +25,8 @@ const DEEP_MM: f32 = 12.0;
 /// Ball that must fit into the cavity, mm: wider than the spinal canal.
 const BALL_MM: f32 = 11.0;
 
-/// Levels of the flood per millimetre.
-const LEVELS_PER_MM: f32 = 4.0;
-
-/// Levels of the flood: distances over 64 mm count as 64.
-const LEVELS: usize = 256;
+/// Distances over this count as it in the flood, mm.
+const DEEPEST_MM: f32 = 64.0;
 
 /// The space inside the skull on a RAS grid of cubes; `None` where nothing is enclosed.
 pub(super) fn cavity(ct: &VoxelVolume<i16>, isovalue: i16, grid: &Grid) -> Option<VoxelVolume<u8>> {
@@ -46,7 +44,7 @@ pub(super) fn cavity(ct: &VoxelVolume<i16>, isovalue: i16, grid: &Grid) -> Optio
             *label = OUTSIDE;
         }
     }
-    flood(bone.dims, &depth.data, &mut labels);
+    flood(bone.dims, &depth.data, DEEPEST_MM, &mut labels);
     let air = i16::midpoint(AIR_HU, 0);
     let held = |at: usize| labels[at] == INSIDE && depth.data[at] > 0.0 && hu.data[at] > air;
     let space = VoxelVolume {
@@ -57,10 +55,6 @@ pub(super) fn cavity(ct: &VoxelVolume<i16>, isovalue: i16, grid: &Grid) -> Optio
     let core = core(&space, BALL_MM)?;
     Some(within(&core, BALL_MM + 4.0, |at| space.data[at] != 0))
 }
-
-const UNKNOWN: u8 = 0;
-const INSIDE: u8 = 1;
-const OUTSIDE: u8 = 2;
 
 /// In how many of the 6 grid directions each voxel sees bone.
 fn walls(bone: &VoxelVolume<u8>) -> Vec<u8> {
@@ -80,37 +74,4 @@ fn walls(bone: &VoxelVolume<u8>) -> Vec<u8> {
     (0..nx * nz).for_each(|c| sweep(c / nx * nx * ny + c % nx, nx, ny));
     (0..nx * ny).for_each(|c| sweep(c, nx * ny, nz));
     seen
-}
-
-/// Spreads the labels into what is unknown, deepest places first.
-fn flood([nx, ny, nz]: [usize; 3], depth: &[f32], labels: &mut [u8]) {
-    let level_of = |at: usize| ((depth[at] * LEVELS_PER_MM) as usize).min(LEVELS - 1);
-    let mut levels: Vec<Vec<usize>> = vec![Vec::new(); LEVELS];
-    let neighbours = |at: usize| {
-        let (i, j, k) = (at % nx, at / nx % ny, at / (nx * ny));
-        let sides = [
-            (i > 0, at.wrapping_sub(1)),
-            (i + 1 < nx, at + 1),
-            (j > 0, at.wrapping_sub(nx)),
-            (j + 1 < ny, at + nx),
-            (k > 0, at.wrapping_sub(nx * ny)),
-            (k + 1 < nz, at + nx * ny),
-        ];
-        sides.into_iter().filter(|s| s.0).map(|s| s.1)
-    };
-    for at in 0..labels.len() {
-        if labels[at] != UNKNOWN && depth[at] > 0.0 && neighbours(at).any(|n| labels[n] == UNKNOWN) {
-            levels[level_of(at)].push(at);
-        }
-    }
-    for level in (0..LEVELS).rev() {
-        while let Some(at) = levels[level].pop() {
-            for n in neighbours(at) {
-                if labels[n] == UNKNOWN && depth[n] > 0.0 {
-                    labels[n] = labels[at];
-                    levels[level_of(n).min(level)].push(n);
-                }
-            }
-        }
-    }
 }

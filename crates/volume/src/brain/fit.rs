@@ -69,7 +69,7 @@ pub fn brain_by_mri(mri: &VoxelVolume<f32>) -> Result<Option<VoxelVolume<u8>>, T
     let grid = Grid::isotropic_over(mri, WORK_MM);
     room_for_voxels(grid.voxels() as u64, 32)?;
     let coarse = resample(mri, &grid, Interpolation::Trilinear, 0.0);
-    let brain = in_head(&coarse, &BrainConfig::default());
+    let brain = in_head(&coarse, &BrainConfig::default()).map(|(brain, _)| brain);
     Ok(brain.filter(|brain| CREDIBLE_ML.contains(&millilitres(brain))))
 }
 
