@@ -21,6 +21,7 @@ pub mod page;
 pub mod part;
 pub mod picture;
 pub mod plot;
+pub mod population;
 mod python;
 pub mod report;
 pub mod store;

@@ -1,0 +1,219 @@
+//! The real heads that others are made from, and what is measured of them once.
+
+use anyhow::{Context, Result};
+use glam::DVec3;
+use std::ops::{Add, Mul};
+use std::path::{Path, PathBuf};
+use trepan_fixtures::case_head;
+use trepan_volume::{AIR_HU, DistanceField, Grid, Interpolation, VoxelVolume, hounsfield, read, resample};
+
+/// FreeSurfer's codes of the two lateral ventricles.
+const VENTRICLES: [f32; 2] = [4.0, 43.0];
+/// Edge of the voxels that distances are measured on, mm.
+const WORK_MM: f64 = 2.0;
+/// What is at or over it is bone, HU.
+const BONE_HU: i16 = 250;
+/// The cavity is wider than this around its middle, mm: more than half the foramen magnum.
+const WIDE_MM: f32 = 15.0;
+/// Enamel is over it, HU.
+const TEETH_HU: i16 = 1400;
+/// Teeth lie further than this before and under the brain's middle, mm.
+const TEETH_OFF_MM: [f64; 2] = [40.0, 50.0];
+
+/// A real head: CT, MRI and masks in one space.
+pub struct BaseHead {
+    /// A short name without spaces.
+    pub name: &'static str,
+    /// CT, HU.
+    pub ct: VoxelVolume<i16>,
+    /// T1-weighted MRI.
+    pub mri: VoxelVolume<f32>,
+    /// Brain, 0 or 1.
+    pub brain: VoxelVolume<u8>,
+    /// Lateral ventricles, 0 or 1.
+    pub ventricles: VoxelVolume<u8>,
+    pub(super) anatomy: Anatomy,
+}
+
+/// Distances and values that every head of a base needs.
+pub struct Anatomy {
+    /// Distance to the brain mask as it is, mm.
+    pub truth: DistanceField,
+    /// Distance to the brain's smoothed surface, mm.
+    pub brain: DistanceField,
+    /// Distance to the cavity of the skull, mm.
+    pub cavity: DistanceField,
+    /// Distance to the ventricles' smoothed surface, mm.
+    pub ventricles: DistanceField,
+    /// Middle of the brain's box.
+    pub middle: DVec3,
+    /// Half the brain's height, mm.
+    half_height_mm: f64,
+    /// Points of the head, about 4 mm apart.
+    pub head: Vec<DVec3>,
+    /// Where there are teeth, or else the lowest front bone.
+    pub teeth: Vec<DVec3>,
+    /// The MRI's grey value of ventricles.
+    pub fluid: f32,
+    /// The MRI's median grey value in the brain.
+    pub tissue: f32,
+}
+
+/// The built-in head, and the second one where the folder of shared data holds it.
+///
+/// That folder is `data` under what the environment variable `TREPAN_SHARED` names, else under `../shared`
+/// beside the workspace.
+pub fn base_heads() -> Result<Vec<BaseHead>> {
+    let mut heads = vec![BaseHead::built_in()?];
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let second = std::env::var_os("TREPAN_SHARED").map_or(beside, PathBuf::from).join("data/head-second");
+    if !second.is_dir() {
+        eprintln!("population: {} is not there: all heads are made from one", second.display());
+        return Ok(heads);
+    }
+    let mri = |name: &str| second.join("mri").join(name);
+    heads.push(BaseHead::read(
+        "head-second",
+        &second.join("ct/ct_head_hu.nii.gz"),
+        &mri("mri_t1_in_ct_grid.nii.gz"),
+        &mri("brainmask_in_ct_grid.nii.gz"),
+        &mri("tissue_labels_in_ct_grid.nii.gz"),
+    )?);
+    Ok(heads)
+}
+
+impl BaseHead {
+    /// The built-in head.
+    pub fn built_in() -> Result<Self> {
+        let case = case_head();
+        Self::read(case.name, &case.ct, &case.mri, &case.labels, &case.aseg)
+    }
+
+    fn read(name: &'static str, ct: &Path, mri: &Path, brain: &Path, aseg: &Path) -> Result<Self> {
+        let image = |path: &Path| read(path).with_context(|| format!("head {name}"));
+        let ct = hounsfield(&image(ct)?).with_context(|| format!("the CT of head {name}"))?;
+        let brain = image(brain)?.map(|v| u8::from(v != 0.0));
+        let ventricles = image(aseg)?.map(|v| u8::from(VENTRICLES.contains(&v)));
+        Ok(Self::new(name, ct, image(mri)?, brain, ventricles))
+    }
+
+    /// A head of images in one space; brain and ventricles lie on the MRI's grid and are not empty.
+    pub fn new(
+        name: &'static str,
+        ct: VoxelVolume<i16>,
+        mri: VoxelVolume<f32>,
+        brain: VoxelVolume<u8>,
+        ventricles: VoxelVolume<u8>,
+    ) -> Self {
+        let anatomy = Anatomy::of(&ct, &mri, &brain, &ventricles);
+        Self { name, ct, mri, brain, ventricles, anatomy }
+    }
+}
+
+impl Anatomy {
+    fn of(
+        ct: &VoxelVolume<i16>,
+        mri: &VoxelVolume<f32>,
+        brain: &VoxelVolume<u8>,
+        ventricles: &VoxelVolume<u8>,
+    ) -> Self {
+        let grid = Grid::isotropic_over(ct, WORK_MM as f32);
+        let soft = smoothed(&grid, brain, 3);
+        let (low, high) = span(&soft);
+        let middle = 0.5 * (low + high);
+        Self {
+            truth: DistanceField::of_mask(brain),
+            brain: DistanceField::of_level(&soft, 0.5),
+            cavity: cavity(ct, &soft),
+            ventricles: DistanceField::of_level(&smoothed(&grid, ventricles, 1), 0.4),
+            middle,
+            half_height_mm: 0.5 * (high.z - low.z),
+            head: points(ct, |hu| hu > -300, 4.0),
+            teeth: teeth(ct, middle),
+            fluid: quantile(mri, ventricles, 0.25),
+            tissue: quantile(mri, brain, 0.5),
+        }
+    }
+
+    /// How far a point belongs to the vault, 0 to 1: over the ears, where the skull is one shell.
+    pub fn vault(&self, point: DVec3) -> f64 {
+        let height = (point.z - self.middle.z) / self.half_height_mm;
+        let share = ((height + 0.4) / 0.5).clamp(0.0, 1.0);
+        share * share * (3.0 - 2.0 * share)
+    }
+}
+
+/// The space inside the skull: the brain, and what a ball that fits through no hole of the skull reaches from it.
+fn cavity(ct: &VoxelVolume<i16>, brain: &VoxelVolume<f32>) -> DistanceField {
+    let bone = resample(ct, &Grid::of(brain), Interpolation::Trilinear, AIR_HU).map(|hu| u8::from(hu >= BONE_HU));
+    let wide = DistanceField::of_mask(&bone);
+    let mut core = bone.clone();
+    for (at, core) in core.data.iter_mut().enumerate() {
+        *core = u8::from(wide.values().data[at] > WIDE_MM && brain.data[at] >= 0.5);
+    }
+    let near = DistanceField::of_mask(&core);
+    let mut space = brain.clone();
+    for (at, value) in space.data.iter_mut().enumerate() {
+        *value = if near.values().data[at] < WIDE_MM && bone.data[at] == 0 { 1.0 } else { *value };
+    }
+    smooth(&mut space);
+    DistanceField::of_level(&space, 0.5)
+}
+
+/// A mask on another grid as shares of 1, smoothed so many times.
+fn smoothed(grid: &Grid, mask: &VoxelVolume<u8>, times: usize) -> VoxelVolume<f32> {
+    let mut soft = resample(&mask.map(f32::from), grid, Interpolation::Trilinear, 0.0);
+    (0..times).for_each(|_| smooth(&mut soft));
+    soft
+}
+
+/// Weighs each voxel with its neighbours by 1 2 1 along each axis.
+pub fn smooth<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(volume: &mut VoxelVolume<T>) {
+    let [nx, ny, nz] = volume.dims;
+    for (stride, count) in [(1, nx), (nx, ny), (nx * ny, nz)] {
+        let before = volume.data.clone();
+        for (at, value) in volume.data.iter_mut().enumerate() {
+            let place = at / stride % count;
+            let left = before[if place > 0 { at - stride } else { at }];
+            let right = before[if place + 1 < count { at + stride } else { at }];
+            *value = (left + before[at] * 2.0 + right) * 0.25;
+        }
+    }
+}
+
+/// Lowest and highest voxel centre of what is at or over a half, along right, front and head.
+fn span(volume: &VoxelVolume<f32>) -> (DVec3, DVec3) {
+    let inside = points(volume, |v| v >= 0.5, 0.0);
+    inside.iter().fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)))
+}
+
+/// Centres of the voxels of a kind, thinned to about one in so many mm along each axis.
+fn points<T: Copy>(volume: &VoxelVolume<T>, kind: impl Fn(T) -> bool, apart_mm: f64) -> Vec<DVec3> {
+    let skip = (apart_mm / volume.spacing_mm()).floor().max(DVec3::ONE).as_uvec3().to_array().map(|n| n as usize);
+    let [nx, ny, nz] = volume.dims;
+    let mut found = Vec::new();
+    for k in (0..nz).step_by(skip[2]) {
+        for j in (0..ny).step_by(skip[1]) {
+            for i in (0..nx).step_by(skip[0]) {
+                if kind(volume.data[volume.index([i, j, k])]) {
+                    found.push(volume.centre_of([i, j, k]));
+                }
+            }
+        }
+    }
+    found
+}
+
+fn teeth(ct: &VoxelVolume<i16>, middle: DVec3) -> Vec<DVec3> {
+    let [before, below] = TEETH_OFF_MM;
+    let front_below = |p: &DVec3| p.y > middle.y + before && p.z < middle.z - below;
+    let of = |least: i16| -> Vec<DVec3> { points(ct, |hu| hu >= least, 0.0).into_iter().filter(front_below).collect() };
+    let teeth = of(TEETH_HU);
+    if teeth.is_empty() { of(BONE_HU) } else { teeth }
+}
+
+fn quantile(mri: &VoxelVolume<f32>, mask: &VoxelVolume<u8>, share: f64) -> f32 {
+    let mut values: Vec<f32> = mri.data.iter().zip(&mask.data).filter(|(_, m)| **m != 0).map(|(v, _)| *v).collect();
+    values.sort_by(f32::total_cmp);
+    values.get((share * values.len() as f64) as usize).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,200 @@
+//! Local changes of shape: thickness of the vault, atrophy, size of the ventricles.
+//!
+//! # Theory
+//! Each is a velocity along the gradient of a distance d, and the map is where a point flows to in unit time:
+//!
+//! ```text
+//! surface moved by m    speed -m · trapezoid(d), 1 between 0 and m, 0 from both ends on
+//! thickness times f     speed -ln(f) · min(d, S), S = 8 mm · (f - 1) / ln(f):   d to d / f
+//! ```
+//!
+//! Points that flow in one continuous field never meet, so the map cannot fold, however thin a horn of a
+//! ventricle is.
+
+use super::base::{Anatomy, smooth};
+use super::recipe::HeadRecipe;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use trepan_volume::{DistanceField, VoxelVolume};
+
+/// Bone within this distance of the cavity changes its thickness, mm: an adult vault and some more.
+const VAULT_MM: f32 = 8.0;
+/// Atrophy fades out at this depth in the brain, mm.
+const ATROPHY_MM: f32 = 16.0;
+/// Atrophy fades out this far outside the brain, mm.
+const SPACE_MM: f32 = 1.0;
+/// Growth of the ventricles fades out at this distance, mm.
+const AROUND_MM: f32 = 20.0;
+/// Growth of the ventricles fades out this deep inside, mm.
+const INSIDE_MM: f32 = 3.0;
+/// Steps of the flow.
+const STEPS: usize = 6;
+
+/// The local changes of one head.
+pub struct Local {
+    intact: Flow,
+    with_atrophy: Option<Flow>,
+}
+
+impl Local {
+    /// The changes of a recipe, weakened to a share of what it asks for.
+    pub fn new(anatomy: &Anatomy, recipe: &HeadRecipe, share: f64) -> Self {
+        let share = share as f32;
+        let (thickness, ventricles) = (recipe.skull_thickness as f32, share * recipe.ventricles_mm as f32);
+        let thickness = 1.0 + share * (thickness - 1.0);
+        let mut intact = Flow::still(anatomy);
+        if thickness != 1.0 {
+            intact.add(&anatomy.cavity, |point| {
+                let speed = thickening(1.0 + anatomy.vault(point) as f32 * (thickness - 1.0));
+                move |d| speed.of(d)
+            });
+        }
+        if ventricles != 0.0 {
+            let speed = Trapezoid { by: ventricles, low: -INSIDE_MM - ventricles.abs(), high: AROUND_MM };
+            intact.add(&anatomy.ventricles, |_| move |d| speed.of(d));
+        }
+        let atrophy = share * recipe.atrophy_mm as f32;
+        let with_atrophy = (atrophy > 0.0).then(|| {
+            let mut flow = intact.clone();
+            let speed = Trapezoid { by: -atrophy, low: -ATROPHY_MM - atrophy, high: SPACE_MM };
+            flow.add(&anatomy.brain, |_| move |d| speed.of(d));
+            flow
+        });
+        let smoothed = |mut flow: Flow| {
+            flow.smooth();
+            flow
+        };
+        Self { intact: smoothed(intact), with_atrophy: with_atrophy.map(smoothed) }
+    }
+
+    /// Where a point of the head lies in the base.
+    pub fn place(&self, point: DVec3) -> Flown {
+        let intact = self.intact.end(point.as_vec3());
+        match &self.with_atrophy {
+            Some(flow) => Flown { base: flow.end(point.as_vec3()), intact: Some(intact) },
+            None => Flown { base: intact, intact: None },
+        }
+    }
+}
+
+/// Where the flow takes a point.
+pub struct Flown {
+    /// The base's point.
+    pub base: Vec3,
+    /// The base's point without the atrophy, where there is any.
+    pub intact: Option<Vec3>,
+}
+
+/// A steady field of velocities, mm in unit time; nothing moves where it is empty.
+#[derive(Clone)]
+struct Flow {
+    velocities: VoxelVolume<Vec3>,
+    moves: bool,
+}
+
+impl Flow {
+    fn still(anatomy: &Anatomy) -> Self {
+        let grid = anatomy.cavity.values();
+        Self { velocities: VoxelVolume::filled(grid.dims, grid.world_from_voxel, Vec3::ZERO), moves: false }
+    }
+
+    /// Adds a speed along a distance's gradient; the fields lie on one grid.
+    fn add<S: Fn(f32) -> f32>(&mut self, field: &DistanceField, speed_at: impl Fn(DVec3) -> S + Sync) {
+        self.moves = true;
+        let ([nx, ny, _], world) = (self.velocities.dims, self.velocities.world_from_voxel);
+        let distances = &field.values().data;
+        self.velocities.data.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
+            for (i, value) in values.iter_mut().enumerate() {
+                let point = world.transform_point3(DVec3::new(i as f64, (row % ny) as f64, (row / ny) as f64));
+                let speed = speed_at(point)(distances[i + nx * row]);
+                if speed != 0.0 {
+                    *value += speed * field.gradient(point.as_vec3());
+                }
+            }
+        });
+    }
+
+    fn smooth(&mut self) {
+        if self.moves {
+            smooth(&mut self.velocities);
+        }
+    }
+
+    /// Where a point is after unit time, by midpoint steps.
+    fn end(&self, point: Vec3) -> Vec3 {
+        if !self.moves {
+            return point;
+        }
+        let step = 1.0 / STEPS as f32;
+        (0..STEPS).fold(point, |p, _| p + step * self.at(p + 0.5 * step * self.at(p)))
+    }
+
+    fn at(&self, point: Vec3) -> Vec3 {
+        let volume = &self.velocities;
+        let (origin, edge) = (volume.world_from_voxel.translation.as_vec3(), volume.spacing_mm().x as f32);
+        super::warp::between(volume, (point - origin) / edge)
+    }
+}
+
+/// A speed that moves a surface from 0 by a way, mm, and fades out towards two distances.
+#[derive(Clone, Copy)]
+struct Trapezoid {
+    by: f32,
+    low: f32,
+    high: f32,
+}
+
+impl Trapezoid {
+    fn of(self, distance: f32) -> f32 {
+        let (first, last) = (self.by.min(0.0), self.by.max(0.0));
+        let rise = (distance - self.low) / (first - self.low);
+        let fall = (self.high - distance) / (self.high - last);
+        -self.by * rise.min(fall).clamp(0.0, 1.0)
+    }
+}
+
+/// A speed that takes a distance to a part of itself, within the vault.
+#[derive(Clone, Copy)]
+struct Thickening {
+    log: f32,
+    limit_mm: f32,
+}
+
+fn thickening(factor: f32) -> Thickening {
+    let log = factor.ln();
+    Thickening { log, limit_mm: if log.abs() < 1e-3 { VAULT_MM } else { VAULT_MM * (factor - 1.0) / log } }
+}
+
+impl Thickening {
+    fn of(self, distance: f32) -> f32 {
+        -self.log * distance.clamp(0.0, self.limit_mm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where a distance flows to in unit time.
+    fn flown(speed: impl Fn(f32) -> f32, from: f32) -> f32 {
+        (0..1000).fold(from, |d, _| d + 1e-3 * speed(d))
+    }
+
+    #[test]
+    fn surfaces_go_where_they_should_and_far_points_stay() {
+        let near = |a: f32, b: f32| assert!((a - b).abs() < 0.05, "{a} instead of {b}");
+        for by in [-4.0, -2.0, 1.0, 6.0] {
+            let speed = Trapezoid { by, low: -16.0, high: 18.0 };
+            near(flown(|d| speed.of(d), by), 0.0);
+            assert_eq!([-20.0, 20.0].map(|d| flown(|d| speed.of(d), d)), [-20.0, 20.0]);
+            let places: Vec<f32> = (-200..=200).map(|d| flown(|d| speed.of(d), 0.1 * d as f32)).collect();
+            assert!(places.is_sorted_by(|a, b| a < b), "moved by {by}");
+        }
+        for factor in [0.6, 1.6] {
+            let speed = thickening(factor);
+            near(flown(|d| speed.of(d), factor * 6.0), 6.0);
+            near(flown(|d| speed.of(d), 50.0), 50.0 - (factor - 1.0) * VAULT_MM);
+            assert_eq!(flown(|d| speed.of(d), -5.0), -5.0);
+        }
+    }
+}
