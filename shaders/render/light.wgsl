@@ -131,6 +131,8 @@ fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, l
     let skull = unpacked(textureLoad(skull_hit, at, 0));
     var brain = unpacked(textureLoad(brain_hit, at, 0));
     brain.w = select(NOTHING, brain.w, brain.w > 0.0);
+    // Where both are cut by one plane neither is nearer: bone is there, however far the mesh reaches into it.
+    if brain.z > 0.5 && on_cut(scene.eye.xyz + skull.w * along) { brain.w = NOTHING; }
     let first = reach(along, scene.tip, scene.tail);
     let second = reach(along, scene.second_tip, scene.second_tail);
     let near = vec2f(min(first.x, min(first.y, first.z)), min(second.x, min(second.y, second.z)));

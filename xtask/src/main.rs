@@ -82,9 +82,9 @@ fn run() -> Result<()> {
     }
 }
 
-/// The program of all suites, in release mode.
+/// The program of all suites, in release mode. Not quietly: cargo says when it builds or waits for another build.
 fn validate(arguments: &[String]) -> Result<()> {
-    cargo(&["run", "--release", "--quiet", "--package", "trepan-trials", "--bin", "validate", "--"], arguments)
+    cargo(&["run", "--release", "--package", "trepan-trials", "--bin", "validate", "--"], arguments)
 }
 
 /// The steps of CI in the order in which they fail fastest.

@@ -24,7 +24,7 @@ pub fn check(root: &Path) -> Result<()> {
 
 /// Whether every promise was kept. A run that failed otherwise is a fault.
 fn quick(out: &Path, more: &[String]) -> Result<bool> {
-    crate::cargo(&["build", "--workspace", "--bins", crate::FEATURES[0], crate::FEATURES[1], "--quiet"], &[])?;
+    crate::cargo(&["build", "--workspace", "--bins", crate::FEATURES[0], crate::FEATURES[1]], &[])?;
     let program = std::env::current_exe()?.with_file_name("validate");
     println!("xtask: validate --quick {}", more.join(" "));
     let status = Command::new(&program).args(["--quick", "--out"]).arg(out).args(more).status();

@@ -41,7 +41,7 @@ fn a_signal_ends_with_no_force_and_a_whole_recording() {
         let child = operation(out.path(), "60", &[]).spawn().unwrap();
         assert_eq!(signalled(child, &record, signal), Some(code));
         let recording = Recording::open(&record).unwrap();
-        assert!(!recording.truncated && recording.ticks.len() > 100);
+        assert!(recording.losses().is_none() && recording.ticks.len() > 100);
         assert_eq!(recording.ticks.last().unwrap().wrench.force.length(), 0.0, "the force did not end at zero");
         let summary: Value = serde_json::from_slice(&fs::read(out.path().join("summary.json")).unwrap()).unwrap();
         assert_eq!(summary["force_n"]["end"], 0.0);
@@ -55,7 +55,7 @@ fn a_killed_session_is_readable_to_its_last_chunk() {
     let child = operation(out.path(), "60", &[]).spawn().unwrap();
     assert_eq!(signalled(child, &record, "-KILL"), None);
     let recording = Recording::open(&record).unwrap();
-    assert!(recording.truncated && recording.ticks.len() > 100, "{} ticks", recording.ticks.len());
+    assert!(recording.damage.is_some() && recording.ticks.len() > 100, "{} ticks", recording.ticks.len());
     assert!(recording.ticks.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
 }
 
@@ -149,6 +149,21 @@ fn a_watcher_follows_and_its_death_changes_nothing() {
     let [was, seen] = [&trainee, &watcher].map(|out| Recording::open(&out.path().join("session.mcap")).unwrap());
     let probing = |recording: &Recording| recording.ticks.iter().any(|tick| tick.phase == 1);
     assert!(probing(&was) && probing(&seen), "the watcher did not follow to the last phase");
+    let summary: Value = serde_json::from_slice(&fs::read(watcher.path().join("summary.json")).unwrap()).unwrap();
+    assert!(summary["remarks"].to_string().contains(&format!("session {name} has ended")), "{}", summary["remarks"]);
+}
+
+#[test]
+fn a_watcher_of_nobody_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut command = operation(&out, "60", &["--watch", "nobody-shares-this"]);
+    let output = command.stderr(Stdio::piped()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && !out.exists(), "{said}");
+    for word in ["waiting for the session nobody-shares-this", "no session of this name", "--share"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
 }
 
 #[test]
@@ -210,7 +225,7 @@ fn a_full_disk_ends_the_recording_with_a_word_and_not_the_session() {
         assert!(!said.contains(half), "{half} was left: {said}");
     }
     let recording = recording.unwrap();
-    assert!(recording.truncated && recording.ticks.len() > 1000, "{} ticks", recording.ticks.len());
+    assert!(recording.damage.is_some() && recording.ticks.len() > 1000, "{} ticks", recording.ticks.len());
     assert!(recording.ticks.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
 }
 

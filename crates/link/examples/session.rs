@@ -48,12 +48,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         let read = Recording::of_bytes(&bytes[..length], &path)?;
         let same = read.ticks.iter().all(|t| t.wrench.force.to_array() == tick(t.tick).wrench.force.to_array());
         println!(
-            "first {:3.0} %: {} ticks, {} collisions, {} events, truncated: {}, forces the same: {same}",
+            "first {:3.0} %: {} ticks, {} collisions, {} events, damaged: {}, forces the same: {same}",
             share * 100.0,
             read.ticks.len(),
             read.collisions.len(),
             read.events.len(),
-            read.truncated
+            read.damage.is_some()
         );
     }
     Ok(())

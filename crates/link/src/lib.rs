@@ -22,7 +22,7 @@ pub mod wire;
 
 pub use error::LinkError;
 pub use recorder::{MAX_CHUNK_BYTES, MAX_CHUNK_MS, Recorder};
-pub use recording::{Recording, Repaired, repair};
+pub use recording::{Damage, Recording, Repaired, repair};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

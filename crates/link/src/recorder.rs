@@ -33,6 +33,9 @@ pub(crate) const FORMAT: u32 = 1;
 /// Name of the metadata record that holds the session header.
 pub(crate) const HEADER_NAME: &str = "trepan.session";
 pub(crate) const HEADER_KEY: &str = "json";
+/// Name of the metadata record that tells what a repaired file had lost.
+pub(crate) const REPAIR_NAME: &str = "trepan.repair";
+pub(crate) const LOSSES_KEY: &str = "losses";
 pub(crate) const FORMAT_KEY: &str = "format";
 const PROFILE: &str = "trepan";
 

@@ -3,17 +3,20 @@
 //! # Practice
 //! The file is walked record by record from its start; the index at its end is not needed. A chunk counts when it is
 //! complete, its checksum holds and every message in it decodes; reading stops before the first that is not and
-//! [`Recording::truncated`] says so. Everything is held in memory, about 250 B a tick: 15 MB a minute at 1 kHz.
+//! [`Recording::damage`] says so. [`Recording::losses`] also tells ticks that are missing between those read.
+//! Everything is held in memory, about 250 B a tick: 15 MB a minute at 1 kHz.
 //! Memory stays in proportion to the file whatever the bytes claim.
 
 mod chunk;
+mod losses;
 mod repair;
 mod scan;
 
+pub use losses::Damage;
 pub use repair::{Repaired, repair};
 
 use crate::LinkError;
-use crate::recorder::{FORMAT, FORMAT_KEY, HEADER_KEY, HEADER_NAME};
+use crate::recorder::{FORMAT, FORMAT_KEY, HEADER_KEY, HEADER_NAME, LOSSES_KEY, REPAIR_NAME};
 use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SessionHeader, SolverRecord, TickRecord};
 use scan::{Cursor, Topic};
 use std::collections::HashMap;
@@ -34,8 +37,12 @@ pub struct Recording {
     pub solver: Vec<SolverRecord>,
     /// Events.
     pub events: Vec<EventRecord>,
-    /// Whether the file ended, or was damaged, before its regular end: what is here came before.
-    pub truncated: bool,
+    /// Where the file is cut or damaged: what is here came before. `None` for a whole file.
+    pub damage: Option<Damage>,
+    /// What was lost before the file was repaired; `None` for a file that never was.
+    pub repaired: Option<String>,
+    /// Whether the file ends with a sound index, without which other programs refuse it.
+    pub indexed: bool,
 }
 
 impl Recording {
@@ -50,14 +57,15 @@ impl Recording {
             return Err(LinkError::NotARecording { path: path.to_owned() });
         };
         let mut reading = Reading { budget: chunk::budget(bytes.len()), ..Reading::default() };
-        let complete = reading.walk(body).is_some();
+        let end = reading.walk(body);
         let Some((format, header)) = reading.header else {
             return Err(LinkError::NoHeader { path: path.to_owned() });
         };
         if format > FORMAT {
             return Err(LinkError::TooNew { path: path.to_owned(), found: format, known: FORMAT });
         }
-        Ok(Self { header, truncated: !complete, ..reading.recording })
+        let damage = Damage::of(bytes, end, reading.recording.ticks.len() as u64);
+        Ok(Self { header, damage, indexed: scan::index(bytes).is_some(), ..reading.recording })
     }
 
     /// How many records of each sort are here: a mark to go back to.
@@ -97,22 +105,24 @@ struct Reading {
 }
 
 impl Reading {
-    /// Reads records up to the regular end; `None` when the bytes end or make no sense before it.
-    fn walk(&mut self, body: &[u8]) -> Option<()> {
+    /// Reads records up to the regular end; `Err` when the bytes end or make no sense before it. Either says at which
+    /// byte of the file.
+    fn walk(&mut self, body: &[u8]) -> Result<usize, usize> {
         use mcap::records::op;
         let mut rest = Cursor(body);
         loop {
-            let record = rest.record()?;
+            let at = mcap::MAGIC.len() + body.len() - rest.0.len();
+            let record = rest.record().ok_or(at)?;
             match record.opcode {
                 op::CHUNK => {
                     let mark = self.recording.mark();
                     if self.chunk(&record).is_none() {
                         self.recording.rewind(mark);
-                        return None;
+                        return Err(at);
                     }
                 }
-                op::DATA_END => return Some(()),
-                _ => self.record(record.opcode, record.body)?,
+                op::DATA_END => return Ok(at),
+                _ => self.record(record.opcode, record.body).ok_or(at)?,
             }
         }
     }
@@ -150,8 +160,11 @@ impl Reading {
 
     fn metadata(&mut self, body: Cursor<'_>) -> Option<()> {
         let (name, entries) = body.metadata()?;
+        let value = |key| entries.iter().find(|(k, _)| *k == key).map(|(_, v)| *v);
+        if name == REPAIR_NAME {
+            self.recording.repaired = value(LOSSES_KEY).map(str::to_owned);
+        }
         if name == HEADER_NAME {
-            let value = |key| entries.iter().find(|(k, _)| *k == key).map(|(_, v)| *v);
             self.header = Some((value(FORMAT_KEY)?.parse().ok()?, serde_json::from_str(value(HEADER_KEY)?).ok()?));
         }
         Some(())

@@ -130,7 +130,7 @@ fn open(bytes: &[u8]) -> Result<Recording, LinkError> {
 #[test]
 fn every_record_comes_back_bit_for_bit() {
     let recording = open(&file(1000)).unwrap();
-    assert_eq!((&recording.header, recording.truncated), (&header(), false));
+    assert_eq!((&recording.header, recording.losses()), (&header(), None));
     assert_eq!(recording.ticks.len(), 1000);
     for (number, read) in recording.ticks.iter().enumerate() {
         assert_eq!(bits(read), bits(&tick(number as u64)));
@@ -161,7 +161,7 @@ fn a_cut_at_any_byte_leaves_all_complete_chunks() {
                 let count = recording.ticks.len();
                 assert!(count >= last, "cut at {length}: {count} ticks after {last}");
                 assert!(recording.ticks.iter().enumerate().all(|(n, t)| bits(t) == bits(&tick(n as u64))));
-                assert!(recording.truncated || count == 900);
+                assert!(recording.losses().is_some() || count == 900);
                 last = count;
                 steps.insert(count);
             }
@@ -184,7 +184,7 @@ fn a_recorder_that_dies_unfinished_leaves_what_was_flushed() {
     recorder.flush().unwrap();
     std::mem::forget(recorder);
     let recording = Recording::open(&path).unwrap();
-    assert_eq!((recording.ticks.len(), recording.truncated), (250, true));
+    assert_eq!((recording.ticks.len(), recording.damage.is_some()), (250, true));
 }
 
 #[test]
@@ -197,7 +197,7 @@ fn a_repaired_file_is_whole_and_holds_the_same() {
         let before = Recording::open(&cut).unwrap();
         let report = repair(&cut, &repaired).unwrap();
         let after = Recording::open(&repaired).unwrap();
-        assert_eq!((report.was_whole, after.truncated), (length == whole.len(), false));
+        assert_eq!((report.was_whole, after.losses().is_none()), (length == whole.len(), length == whole.len()));
         assert!(report.messages as usize >= after.ticks.len() + after.collisions.len());
         assert_eq!(after.header, before.header);
         assert_eq!(after.ticks.iter().map(bits).collect::<Vec<_>>(), before.ticks.iter().map(bits).collect::<Vec<_>>());
@@ -235,16 +235,125 @@ fn damaged_files_never_panic_and_never_lie() {
         if noise.bits().is_multiple_of(16) {
             std::fs::write(&damaged, &bytes).unwrap();
             if repair(&damaged, &repaired).is_ok() {
-                let same =
-                    |r: Result<Recording, LinkError>| r.ok().map(|r| r.ticks.iter().map(bits).collect::<Vec<_>>());
-                assert_eq!(same(Recording::open(&repaired)), same(open(&bytes)));
+                let (before, after) = (open(&bytes).unwrap(), Recording::open(&repaired).unwrap());
+                assert!(after.damage.is_none() && after.ticks.len() >= before.ticks.len());
+                assert!(after.ticks.iter().all(|t| bits(t) == bits(&tick(t.tick))));
             }
         }
         if let Ok(recording) = open(&bytes) {
             assert!(recording.ticks.len() <= 450);
             // A checksum stands over every tick: what is given is what was recorded.
+            assert!(recording.losses().is_some() || recording.ticks.len() == 450);
             assert!(recording.ticks.iter().enumerate().all(|(n, t)| bits(t) == bits(&tick(n as u64))));
         }
+    }
+}
+
+/// Overwrites 16 bytes in the middle of the chunk of this number, and gives where it begins.
+fn damage_chunk(file: &mut [u8], number: usize) -> usize {
+    let mut at = 8;
+    for chunk in 0.. {
+        at += offset_of(6, &file[at - 8..]) - 8;
+        let length = u64::from_le_bytes(file[at + 1..at + 9].try_into().unwrap()) as usize;
+        if chunk == number {
+            file[at + length / 2..at + length / 2 + 16].fill(0xa5);
+            return at;
+        }
+        at += 9 + length;
+    }
+    unreachable!()
+}
+
+#[test]
+fn a_damaged_file_says_where_and_how_many_ticks_are_lost() {
+    let whole = file(1000);
+    assert_eq!((open(&whole).unwrap().losses(), open(&whole).unwrap().promised_ticks()), (None, 1000));
+
+    let mut damaged = whole.clone();
+    let at = damage_chunk(&mut damaged, 3);
+    let recording = open(&damaged).unwrap();
+    let (read, losses) = (recording.ticks.len(), recording.losses().unwrap());
+    assert!(read > 100 && read < 900, "{read}");
+    assert_eq!(recording.promised_ticks(), 1000, "the index knows");
+    let words = [format!("byte {at} of {}", damaged.len()), format!("{read} of 1000 ticks")];
+    assert!(words.iter().all(|word| losses.contains(word)), "{losses}");
+
+    let cut = open(&whole[..whole.len() * 3 / 4]).unwrap();
+    assert!(cut.losses().unwrap().contains("is not known") && cut.promised_ticks() == cut.ticks.len() as u64);
+
+    // A digit of the header changed: JSON still, and every chunk is sound.
+    let mut changed = whole.clone();
+    let seed = whole.windows(8).position(|bytes| bytes == b"\"seed\":7").unwrap();
+    changed[seed + 7] = b'8';
+    let recording = open(&changed).unwrap();
+    assert_eq!((recording.header.seed, recording.ticks.len()), (8, 1000));
+    assert!(recording.losses().unwrap().contains("its header may have been changed"));
+}
+
+#[test]
+fn ticks_that_a_full_ring_lost_are_missed_by_their_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("gaps.mcap");
+    let mut recorder = Recorder::create(&path, &header()).unwrap();
+    for number in (1..=100).chain(111..=200).chain(206..=300) {
+        recorder.tick(&tick(number)).unwrap();
+    }
+    recorder.finish().unwrap();
+    let recording = Recording::open(&path).unwrap();
+    assert_eq!((recording.damage, recording.promised_ticks()), (None, 300));
+    assert_eq!(recording.losses().unwrap(), "ticks 101 to 110 are missing (15 in all)");
+}
+
+#[test]
+fn a_repair_keeps_the_chunks_behind_a_damaged_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (from, to) = (folder.path().join("damaged.mcap"), folder.path().join("repaired.mcap"));
+    let whole = file(1000);
+    let length_field = |file: &mut [u8]| {
+        let at = damage_chunk(file, 2);
+        file[at + 1..at + 9].copy_from_slice(&u64::MAX.to_le_bytes());
+    };
+    let topics = |file: &mut [u8]| {
+        damage_chunk(file, 0);
+    };
+    let in_chunk = |file: &mut [u8]| {
+        damage_chunk(file, 2);
+    };
+    for (what, damage) in [("chunk", &in_chunk as &dyn Fn(&mut [u8])), ("length", &length_field), ("topics", &topics)] {
+        let mut bytes = whole.clone();
+        damage(&mut bytes);
+        std::fs::write(&from, &bytes).unwrap();
+        assert!(!repair(&from, &to).unwrap().was_whole);
+        let (before, after) = (open(&bytes).unwrap(), Recording::open(&to).unwrap());
+        let lost = 1000 - after.ticks.len();
+        assert!(lost <= 201 && (lost == 0) == (what == "topics"), "{what}: {lost} ticks lost");
+        assert!(after.ticks.len() > before.ticks.len() && after.damage.is_none(), "{what}");
+        assert!(after.ticks.iter().all(|t| bits(t) == bits(&tick(t.tick))));
+        assert_eq!(after.promised_ticks(), 1000, "{what}: gaps are missed");
+        let losses = after.losses().unwrap();
+        assert!(losses.contains("it was repaired; before, it is cut or damaged at byte"), "{losses}");
+        let bytes = std::fs::read(&to).unwrap();
+        let index = mcap::Summary::read(&bytes).unwrap().unwrap();
+        let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).count() as u64;
+        assert_eq!(index.stats.unwrap().message_count, messages);
+    }
+    let mut headless = whole.clone();
+    let at = offset_of(12, &whole);
+    headless[at + 9..at + 40].fill(0xff);
+    std::fs::write(&from, headless).unwrap();
+    std::fs::remove_file(&to).unwrap();
+    assert!(matches!(repair(&from, &to), Err(LinkError::NoHeader { .. })) && !to.exists(), "nothing is left");
+}
+
+#[test]
+fn older_recordings_are_whole() {
+    let paths = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/paths");
+    let files = std::fs::read_dir(paths).unwrap().flatten().map(|entry| entry.path());
+    let files: Vec<_> = files.filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
+    assert!(files.len() >= 7);
+    for file in files {
+        let recording = Recording::open(&file).unwrap();
+        assert!(recording.losses().is_none() && recording.ticks.len() >= 2500, "{}", file.display());
     }
 }
 
@@ -266,7 +375,7 @@ fn claims_of_huge_sizes_are_refused() {
         let mut bytes = whole.clone();
         bytes[first + field..first + field + 8].copy_from_slice(&value.to_le_bytes());
         let recording = open(&bytes).unwrap();
-        assert!(recording.truncated && recording.ticks.is_empty(), "field at {field} = {value}");
+        assert!(recording.damage.is_some() && recording.ticks.is_empty(), "field at {field} = {value}");
     };
     for value in [u64::MAX, 1 << 60, 1 << 40, 17 << 20] {
         claims(1, value); // length of the record
@@ -347,7 +456,7 @@ fn recordings_of_before_the_tissues_force_was_kept_still_tell_it_where_only_tiss
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/paths");
     for (name, soft) in [("brain-light", true), ("skull-touch", false)] {
         let recording = Recording::open(&folder.join(format!("{name}.mcap"))).unwrap();
-        assert!(recording.ticks.len() > 2000 && !recording.truncated);
+        assert!(recording.ticks.len() > 2000 && recording.losses().is_none());
         assert!(recording.ticks.iter().all(|tick| !tick.has(TickRecord::TISSUE) && tick.tissue_force == Vec3::ZERO));
         let peak = recording.ticks.iter().map(|tick| tick.tissue_n()).fold(0.0, f32::max);
         assert_eq!(peak > 0.0, soft, "{name}: {peak} N");

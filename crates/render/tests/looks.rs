@@ -261,6 +261,36 @@ fn bone_under_a_cut_is_hit_in_the_plane_and_over_it_there_is_none() {
 }
 
 #[test]
+fn bone_and_brain_cut_by_one_plane_do_not_show_through_each_other() {
+    let block = bone(48, |p| p.abs().max_element() - 16.25);
+    let (mesh, mri) = (cube(12.0), ball(DVec3::ZERO));
+    let data = SceneData { bone: Some(block), brain: Some(&mesh), mri: Some(&mri), tint: None };
+    let mut processor = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
+    let gpu = device();
+    let mut on_device = gpu.as_ref().map(|gpu| scene::renderer(gpu, &data, SIZE));
+    let normal = Vec3::new(0.1, 1.0, -0.2).normalize();
+    for towards in [normal, Vec3::new(0.3, 1.0, 0.2), Vec3::new(-0.8, 0.5, 0.4)] {
+        let cut = Some(Cut { point: Vec3::new(0.3, 0.7, 0.0), normal, bone: true });
+        let frame = Frame { cut, ..plain(towards) };
+        processor.draw(&frame).expect("drawn");
+        let mut images = vec![processor.image().clone()];
+        if let Some(device) = &mut on_device {
+            device.draw(&frame).expect("drawn");
+            images.push(device.image().expect("picture"));
+        }
+        for image in images {
+            // The MRI is grey, bone and background are not.
+            let grey = count(&image, |[r, g, b]| r == g && g == b && r > 0);
+            assert!(count(&image, |[r, _, b]| r > b + 20) > 2000, "there is bone");
+            assert_eq!(grey, 0, "seen from {towards}");
+        }
+        let alone = Frame { show_bone: false, ..frame };
+        processor.draw(&alone).expect("drawn");
+        assert!(count(processor.image(), |[r, g, b]| r == g && g == b && r > 0) > 1000, "the cut brain is grey");
+    }
+}
+
+#[test]
 fn markers_are_discs_where_they_are_and_faint_behind_bone() {
     let Some(gpu) = device() else { return };
     let slab = bone(48, |p| (p.y + 10.0).abs() - 4.0);

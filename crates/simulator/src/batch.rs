@@ -1,13 +1,13 @@
 //! Many recordings run again as one job: `--device replay:FOLDER`, of which `--shard I/N` takes every Nth.
 //!
 //! # Practice
-//! Each recording gets a folder of its own under `--out`, named after it; one that fails is told and does not stop the others. Jobs of a cluster take one shard each and
+//! Each recording gets a folder of its own under `--out`, named after it; one that fails or is not whole is told and does not stop the others. Jobs of a cluster take one shard each and
 //! need nothing of one another; `cargo xtask merge` puts their summaries into one table.
 
 use crate::command::printable;
 use crate::error::SessionError;
 use crate::report::output::dated;
-use crate::{Inputs, Options, Program, Session};
+use crate::{Ended, Inputs, Options, Program, Session};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use trepan_haptics::DeviceName;
@@ -65,10 +65,11 @@ fn one(
         record: None,
         ..options.clone()
     };
-    let summary = Session::open(program, options, built_in.clone())?.run()?.summary;
+    let Ended { summary, lack, .. } = Session::open(program, options, built_in.clone())?.run()?;
     let replay = summary.replay.unwrap_or_default();
-    Ok(format!(
-        "{} of {} ticks as recorded, {:.1} mm3 removed",
-        replay.identical, replay.ticks, summary.bone_removed_mm3
-    ))
+    let told = format!("{}, {:.1} mm3 removed", replay.told(), summary.bone_removed_mm3);
+    match lack {
+        Some(lack) => Err(SessionError::Usage(format!("{told}; {lack}"))),
+        None => Ok(told),
+    }
 }

@@ -5,7 +5,8 @@ use crate::case::choice::{Built, PlannedCase, plan_case};
 use crate::compare::compare;
 use crate::device_test;
 use crate::models::Wish;
-use crate::options::{CaseTask, DeviceTask, Patient, Task, rate};
+use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, Task, rate};
+use crate::recordings;
 use crate::report::summary::{CutOff, slow};
 use crate::show::driver;
 use crate::{Ended, Inputs, Options, Program, Session, SessionError, build_case};
@@ -15,8 +16,8 @@ use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
-/// Runs a program. Exit code 0 for a session that ended, 2 for what the user can put right, 1 for the rest, 128 + n after
-/// signal n.
+/// Runs a program. Exit code 0 for a session that ended, 2 for what the user can put right, 1 for the rest and for the
+/// replay of a recording that is not whole, 128 + n after signal n.
 ///
 /// `built_in` is the case that is taken when no image is given.
 pub fn command(program: Program, built_in: Inputs) -> ExitCode {
@@ -82,6 +83,8 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
             println!("side by side: {}", printable(&page.display().to_string()));
             ExitCode::SUCCESS
         }),
+        Task::Recording(RecordingTask::Check { file }) => recordings::check(program, file),
+        Task::Recording(RecordingTask::Repair { file, out }) => recordings::mend(file, out),
         Task::Device(DeviceTask::Test { name, out, duration }) => device_test::run(name, out, *duration).map(ended_by),
     };
     done.unwrap_or_else(|fault| failed(program, &fault))
@@ -144,12 +147,13 @@ fn told(ended: &Ended) -> ExitCode {
         println!("cut off the skull: {pieces} piece(s) of bone, the largest of {largest_mm3:.0} mm3");
     }
     if let Some(replay) = &summary.replay {
-        println!(
-            "replay: {} of {} ticks gave the same force, bit for bit; largest difference {:.6} N",
-            replay.identical, replay.ticks, replay.max_difference_n
-        );
+        println!("replay: {}", replay.told());
     }
     println!("report: {}", printable(&ended.out.join("report.html").display().to_string()));
+    if let Some(lack) = &ended.lack {
+        println!("{lack}");
+        return ended.signal.map_or(ExitCode::FAILURE, |_| ended_by(ended.signal));
+    }
     ended_by(ended.signal)
 }
 

@@ -7,6 +7,7 @@
 //! # When not to use it
 //! To ask whether two builds give the same forces: replay one, the summary says so bit by bit.
 
+use crate::case::identity::Identity;
 use crate::error::SessionError;
 use crate::report::chart::{Curve, over_time};
 use crate::report::output::whole;
@@ -54,8 +55,16 @@ fn remarks(page: &mut String, sessions: &[Recording; 2]) {
     if first.app != second.app {
         remark(&format!("Two programs: {} and {}.", first.app, second.app));
     }
-    if first.hashes != second.hashes {
-        remark("Two cases: scores are of different anatomies.");
+    let [of_first, of_second] = [first, second].map(Identity::of);
+    match of_first.is(&of_second) {
+        Some(true) if of_first.case != of_second.case => {
+            remark("One patient, but two cases made of the images: by other voxels, tetrahedra, labels or version.");
+        }
+        Some(true) => {}
+        Some(false) => remark("Two patients: scores are of different anatomies."),
+        None => {
+            remark("Whether both are of one patient cannot be told: an older version recorded at least one of them.")
+        }
     }
     for (key, value) in &first.config {
         let other = second.config.get(key).map_or("nothing", String::as_str);
@@ -64,8 +73,8 @@ fn remarks(page: &mut String, sessions: &[Recording; 2]) {
         }
     }
     for (name, session) in NAMES.into_iter().zip(sessions) {
-        if session.truncated {
-            remark(&format!("The {name} recording ends before its session did."));
+        if let Some(losses) = session.losses() {
+            remark(&format!("The {name} recording is not whole: {losses}."));
         }
     }
 }

@@ -4,7 +4,8 @@ use crate::case::plan::Plan;
 use crate::error::SessionError;
 use crate::options::Options;
 use crate::program::Program;
-use crate::run::watch::Watched;
+use crate::run::stop::Stop;
+use crate::run::watch::{Watched, Watching};
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{self, Script, Site};
@@ -21,6 +22,8 @@ pub struct Hand {
     pub pointer: Option<mouse::MouseHandle>,
     /// The window into a device's faults.
     pub watch: Option<Watch>,
+    /// The session that is watched.
+    pub watching: Option<Watching>,
 }
 
 impl Hand {
@@ -31,12 +34,15 @@ impl Hand {
         options: &Options,
         plan: &Plan,
         rate_hz: f32,
+        stop: &Stop,
     ) -> Result<Self, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
         let script = |name: &str| scripted(name, options, plan);
-        let mut hand = Self { device: None, pointer: None, watch: None };
+        let mut hand = Self { device: None, pointer: None, watch: None, watching: None };
         if let Some(name) = &options.watch {
-            hand.device = Some(Box::new(Watched::open(name, script(program.script())?.at(0.0))?));
+            let (watched, watching) = Watched::open(name, script(program.script())?.at(0.0), stop)?;
+            hand.watching = Some(watching);
+            hand.device = Some(Box::new(watched));
             return Ok(hand);
         }
         hand.device = match name {

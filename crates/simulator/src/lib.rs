@@ -30,6 +30,7 @@ mod models;
 mod operation;
 mod options;
 mod program;
+mod recordings;
 mod report;
 mod run;
 mod session;

@@ -150,6 +150,9 @@ pub enum Task {
     /// Look at haptic devices
     #[command(subcommand)]
     Device(DeviceTask),
+    /// Check recordings, and repair what is cut or damaged
+    #[command(subcommand)]
+    Recording(RecordingTask),
     /// Show two recorded sessions side by side: scores, warnings, forces
     Compare {
         /// A session.mcap
@@ -218,6 +221,23 @@ pub enum CaseTask {
         patient: Patient,
         /// The folder to make; it must not exist yet
         #[arg(long, value_name = "CASE")]
+        out: PathBuf,
+    },
+}
+
+/// What can be done with recordings.
+#[derive(Clone, Debug, Subcommand)]
+pub enum RecordingTask {
+    /// Say how long a recording is, of which case, and what it lacks; exit code 1 where it lacks something
+    Check {
+        /// A session.mcap
+        file: PathBuf,
+    },
+    /// Make a whole recording of what can be read of a cut or damaged one, also behind the damage; other programs open it then
+    Repair {
+        /// The recording that is cut or damaged; it stays as it is
+        file: PathBuf,
+        /// The recording to make; it must not exist yet
         out: PathBuf,
     },
 }

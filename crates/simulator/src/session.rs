@@ -1,6 +1,7 @@
 //! A session from its flags to its files: open (everything that a user can get wrong), run, write.
 
 use crate::case::choice;
+use crate::case::identity::Identity;
 use crate::case::plan::Plan;
 use crate::case::scene::Scene;
 use crate::case::{Inputs, anatomy};
@@ -10,6 +11,7 @@ use crate::models::{Models, Wish};
 use crate::operation::Operation;
 use crate::options::Options;
 use crate::program::Program;
+use crate::recordings;
 use crate::report::against::Against;
 use crate::report::page::Shot;
 use crate::report::summary::{About, CutOff, Machine, Summary};
@@ -44,8 +46,7 @@ pub struct Session {
     device: DeviceName,
     second: Option<DeviceName>,
     recording: Option<Recording>,
-    case: String,
-    hash: String,
+    case: Identity,
     table: Table,
     /// What the case was made of; nothing for a case folder.
     inputs: Inputs,
@@ -64,6 +65,8 @@ pub struct Ended {
     pub out: PathBuf,
     /// The signal that ended it, if one did.
     pub signal: Option<i32>,
+    /// What the recording that was run again lacks, with the remedy.
+    pub lack: Option<String>,
 }
 
 impl Session {
@@ -80,7 +83,7 @@ impl Session {
         let device = hand::device_name(program, &options, windowed)?;
         let second = hand::second_name(&device, &options)?;
         let recording = match &device {
-            DeviceName::Replay(path) => Some(Recording::open(path)?),
+            DeviceName::Replay(path) => Some(recordings::open(program, path, &choice::identity(&options, &built_in)?)?),
             _ => None,
         };
         let operation = Operation::of(&options, &device, recording.as_ref());
@@ -92,23 +95,10 @@ impl Session {
         };
         let card = || drawing.insert(driver::open()).as_ref().is_ok_and(|gpu| !gpu.is_software());
         let (case, models) = choice::open_case(program, &options, built_in, wish, card)?;
-        let (name, hash) = (case.name.clone(), case.hash.clone());
+        let opened = Identity { name: case.name.clone(), case: Some(case.hash.clone()), images: case.images.clone() };
         let table = Table::new(program, (case, models), operation, windowed && recording.is_some())?;
         let out = options.out.clone().unwrap_or_else(|| output::dated(program));
-        Ok(Self {
-            program,
-            options,
-            device,
-            second,
-            recording,
-            case: name,
-            hash,
-            table,
-            inputs,
-            out,
-            windowed,
-            drawing,
-        })
+        Ok(Self { program, options, device, second, recording, case: opened, table, inputs, out, windowed, drawing })
     }
 
     /// Runs it and writes its files; where that fails, nothing half-written stays.
@@ -116,7 +106,8 @@ impl Session {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let (before, whole) = (self.table.pieces(), self.table.bone().map(|bone| bone.snapshot()));
         let (options, plan, rate_hz) = (&self.options, &self.table.plan, self.table.operation.rate_hz);
-        let Hand { device, pointer, watch } = Hand::open(&self.device, self.program, options, plan, rate_hz)?;
+        let hand = Hand::open(&self.device, self.program, options, plan, rate_hz, &stop)?;
+        let Hand { device, pointer, watch, watching } = hand;
         let second = self.second.as_ref().map(|name| SecondHold::open(name, options, plan, rate_hz)).transpose()?;
         let recorded = || Feel::recorded(self.recording.as_ref(), hand::FIRST);
         let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
@@ -126,10 +117,11 @@ impl Session {
         let feels = (&feel, second_feel.as_ref());
         let stages = self.table.stages(start.state, self.tick_ms(), feels, &Default::default())?;
         let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
-        let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
+        let record = self.record();
         let place = output::Place::make(&self.out, &record)?;
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
+        company.watching.clone_from(&watching);
         let kept = (Recorder::create(&record, &self.header(&feel, second_feel.as_ref()))?, share);
         let drawing = self.drawing.take();
         let mut graphics = self.graphics(drawing);
@@ -139,10 +131,14 @@ impl Session {
         let outcome = self.loops(stages, devices, kept, start, &stop, |eyes| {
             album = self.picture(eyes, &mut graphics, pointer, std::mem::take(&mut company), &stop);
         });
+        let ended = watching.and_then(|watching| watching.ended());
+        ended.iter().for_each(|text| tracing::info!("{text}"));
         let recording = Recording::open(&record)?;
         self.map(&mut album, whole.as_ref(), &recording);
         let mut remarks = self.table.scene.remarks.clone();
         remarks.extend(self.table.models.unmet.iter().cloned());
+        let (lack, unlike) = self.against();
+        remarks.extend(lack.iter().cloned().chain(unlike).chain(ended));
         remarks.extend(graphics.err());
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
@@ -161,7 +157,20 @@ impl Session {
             output::drilled(&self.out, &densities, bone, self.options.stl)?;
         }
         place.keep();
-        Ok(Ended { summary, out: self.out, signal: stop.signal() })
+        Ok(Ended { summary, out: self.out, signal: stop.signal(), lack })
+    }
+
+    /// Where it is recorded: not over the recording that is run again.
+    fn record(&self) -> PathBuf {
+        let usual = self.out.join(output::RECORDING);
+        let again = matches!(&self.device, DeviceName::Replay(path) if same_file(path, &usual));
+        self.options.record.clone().unwrap_or(if again { self.out.join("replay.mcap") } else { usual })
+    }
+
+    /// What the recording that is run again lacks, and whether it is of another making of the case.
+    fn against(&self) -> (Option<String>, Option<String>) {
+        let (Some(recording), DeviceName::Replay(path)) = (&self.recording, &self.device) else { return (None, None) };
+        (recordings::not_whole(self.program, path, recording), recordings::unlike(recording, &self.case))
     }
 
     /// The skull as it is now, in the scanner's voxels; in those of the case, with a remark, where the CT is not at hand.
@@ -222,9 +231,10 @@ impl Session {
     ) -> Outcome {
         match (&self.recording, devices) {
             (Some(recording), _) => {
-                let length_ms = recording.ticks.last().map_or(0.0, |tick| tick.time_ms);
+                let end_ms = self.options.duration.map_or(f64::INFINITY, |s| 1e3 * s);
+                let length_ms = lockstep::up_to(recording, end_ms).last().map_or(0.0, |tick| tick.time_ms);
                 let film = self.windowed.then(|| Filming::new(self.table.bone().cloned(), length_ms));
-                lockstep::run(stages, recording, kept, start, film, stop, picture)
+                lockstep::run(stages, (recording, end_ms), kept, start, film, stop, picture)
             }
             (None, Some(devices)) => threads::run(stages, devices, kept, start, self.pace(), stop, picture),
             (None, None) => Outcome::default(),
@@ -269,7 +279,7 @@ impl Session {
             let folder = self.out.join("frames");
             return picture::draw(eyes, painter, &self.table, self.options.frames_per_second, &folder, stop);
         }
-        let (table, case, out, rate_hz) = (&self.table, &*self.case, &*self.out, self.table.operation.rate_hz);
+        let (table, case, out, rate_hz) = (&self.table, &*self.case.name, &*self.out, self.table.operation.rate_hz);
         let opened = window::Opened { table, case, out, rate_hz };
         match (eyes.film.take(), &self.recording) {
             (Some(film), Some(recording)) => {
@@ -314,9 +324,9 @@ impl Session {
         SessionHeader {
             app: self.program.name().into(),
             version: env!("CARGO_PKG_VERSION").into(),
-            case: self.case.clone(),
+            case: self.case.name.clone(),
             seed: self.options.seed,
-            hashes: [("case".to_string(), self.hash.clone())].into(),
+            hashes: self.case.hashes(),
             config: [("solver_run".to_string(), self.table.solver_name().into())]
                 .into_iter()
                 .chain(self.table.models.entries())
@@ -330,7 +340,7 @@ impl Session {
         let brain = self.table.scene.brain.as_ref();
         About {
             program: self.program,
-            case: self.case.clone(),
+            case: self.case.name.clone(),
             device: match (&self.device, &self.options.watch) {
                 (_, Some(_)) => "watch".into(),
                 (DeviceName::Replay(_), _) => "replay".into(),
@@ -342,6 +352,7 @@ impl Session {
             brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
             asked_hz: self.table.operation.rate_hz.into(),
             frames: album.frames,
+            drawn_s: album.seconds,
             cut_off: CutOff::default(),
             plan: None,
             regions: Vec::new(),
@@ -363,6 +374,11 @@ fn places(options: &Options) -> Result<(), SessionError> {
     if let Some(file) = there.filter(|folder| !folder.is_dir()) {
         return usage(format!("--out: {} is a file: name a folder, new or old", file.display()));
     }
+    let again = options.device.as_deref().and_then(|device| device.strip_prefix("replay:"));
+    let over = |record: &&Path| again.is_some_and(|file| same_file(file.as_ref(), record));
+    if let Some(record) = options.record.as_deref().filter(over) {
+        return usage(format!("--record {} is the recording that is run again: give another name", record.display()));
+    }
     if let Some(out) = out.filter(|out| !options.overwrite && output::holds_session(out)) {
         return usage(format!("--out {} holds a session already: {remedy}", out.display()));
     }
@@ -382,4 +398,8 @@ fn places(options: &Options) -> Result<(), SessionError> {
         true => usage("--device: the recording that is run again would be overwritten; name another --out".into()),
         false => Ok(()),
     }
+}
+
+fn same_file(one: &Path, other: &Path) -> bool {
+    one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
 }

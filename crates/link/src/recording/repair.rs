@@ -1,17 +1,17 @@
-//! Makes a sound file of a cut one, so that other programs open it too.
+//! Makes a sound file of a cut or damaged one, so that other programs open it too.
 //!
 //! # Practice
-//! Every complete chunk is copied message by message, with its times, topics and schemas; the index is made anew. What
-//! [`crate::Recording`] reads from the repaired file is what it reads from the cut one.
+//! Every sound chunk is copied message by message, with its times, topics and schemas, also those behind a damaged one;
+//! the index is made anew. [`crate::Recording::losses`] of the repaired file tells what is missing in between, and what
+//! was lost before.
 
-use super::chunk;
-use super::scan::Cursor;
+use super::scan::{Cursor, Record, index};
+use super::{Recording, chunk};
 use crate::LinkError;
-use crate::recorder::{options, write_error};
+use crate::recorder::{LOSSES_KEY, REPAIR_NAME, options, write_error};
 use mcap::McapError;
 use mcap::records::{MessageHeader, Metadata, op};
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 /// What a repair found.
@@ -19,57 +19,84 @@ use std::path::Path;
 pub struct Repaired {
     /// Messages copied, of all topics.
     pub messages: u64,
-    /// Whether the file was whole already.
+    /// Whether the file was whole already, but for its index.
     pub was_whole: bool,
 }
 
-/// Copies what is sound of the recording `from` to the new file `to`.
+/// Copies what is sound of the recording `from` to the new file `to`, which appears whole or not at all.
 pub fn repair(from: &Path, to: &Path) -> Result<Repaired, LinkError> {
     let bytes = super::bytes_of(from)?;
     let body = bytes.strip_prefix(mcap::MAGIC).ok_or_else(|| LinkError::NotARecording { path: from.to_owned() })?;
     if from.canonicalize().ok().is_some_and(|same| to.canonicalize().is_ok_and(|to| to == same)) {
         return Err(LinkError::SameFile { path: to.to_owned() });
     }
-    let file = File::create(to).map_err(|source| LinkError::Create { path: to.to_owned(), source })?;
     let failed = |error: McapError| write_error(to, &error);
-    let mut copy = Copy { mcap: options().create(BufWriter::new(file)).map_err(failed)?, messages: 0 };
+    let mcap = options().create(io::Cursor::new(Vec::new())).map_err(failed)?;
+    let mut copy = Copy { mcap, messages: 0 };
+    // Where the chunk that holds the topics is damaged, the index knows them too.
+    for record in index(&bytes).into_iter().flatten().filter(|r| matches!(r.opcode, op::SCHEMA | op::CHANNEL)) {
+        copy.record(record.opcode, record.body).map_err(failed)?;
+    }
     let was_whole = copy.walk(body, chunk::budget(bytes.len())).map_err(failed)?;
+    if let Some(losses) = Recording::of_bytes(&bytes, from)?.losses() {
+        let metadata = [(LOSSES_KEY.to_owned(), losses)].into();
+        copy.mcap.write_metadata(&Metadata { name: REPAIR_NAME.to_owned(), metadata }).map_err(failed)?;
+    }
     copy.mcap.finish().map_err(failed)?;
-    copy.mcap.into_inner().flush().map_err(|error| failed(McapError::Io(error)))?;
+    whole_file(to, &copy.mcap.into_inner().into_inner())?;
     Ok(Repaired { messages: copy.messages, was_whole })
 }
 
+/// Writes a file that appears whole or not at all.
+fn whole_file(path: &Path, bytes: &[u8]) -> Result<(), LinkError> {
+    let failed = |source| LinkError::Create { path: path.to_owned(), source };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
+    file.write_all(bytes).map_err(|error| write_error(path, &McapError::Io(error)))?;
+    file.persist(path).map(drop).map_err(|error| failed(error.error))
+}
+
 struct Copy {
-    mcap: mcap::Writer<BufWriter<File>>,
+    mcap: mcap::Writer<io::Cursor<Vec<u8>>>,
     messages: u64,
 }
 
 impl Copy {
-    /// Copies records up to the regular end (true) or to where the bytes end or make no sense (false).
+    /// Copies records up to the regular end, passing over what is damaged. Says whether nothing was.
     fn walk(&mut self, body: &[u8], mut budget: u64) -> Result<bool, McapError> {
-        let mut rest = Cursor(body);
-        while let Some(record) = rest.record() {
-            match record.opcode {
-                op::DATA_END => return Ok(true),
-                op::CHUNK => {
-                    // All of a chunk or nothing: its checksum is known at its end.
-                    let mut records = Vec::new();
-                    let sound = chunk::unpack(&record, &mut budget, |opcode, body| {
-                        records.push((opcode, body.to_vec()));
-                        Some(())
-                    });
-                    if sound.is_none() {
-                        return Ok(false);
-                    }
-                    for (opcode, body) in &records {
-                        self.record(*opcode, body)?;
-                    }
-                    self.mcap.flush()?;
-                }
-                opcode => self.record(opcode, record.body)?,
+        let (mut rest, mut whole) = (Cursor(body), true);
+        loop {
+            let here = rest.0;
+            let sound = match rest.record().filter(|record| KNOWN.contains(&record.opcode)) {
+                Some(record) if record.opcode == op::DATA_END => return Ok(whole),
+                Some(record) if record.opcode == op::CHUNK => self.chunk(&record, &mut budget)?,
+                Some(record) => self.record(record.opcode, record.body).map(|()| true)?,
+                None => false,
+            };
+            if !sound {
+                whole = false;
+                let Some(next) = here.get(1..).and_then(next_chunk) else { return Ok(whole) };
+                rest = Cursor(next);
             }
         }
-        Ok(false)
+    }
+
+    /// Copies all of a chunk, or nothing and gives false: its checksum is known at its end.
+    fn chunk(&mut self, chunk: &Record<'_>, budget: &mut u64) -> Result<bool, McapError> {
+        let (mut records, mut left) = (Vec::new(), *budget);
+        let sound = chunk::unpack(chunk, &mut left, |opcode, body| {
+            records.push((opcode, body.to_vec()));
+            Some(())
+        });
+        if sound.is_none() {
+            return Ok(false);
+        }
+        *budget = left;
+        for (opcode, body) in &records {
+            self.record(*opcode, body)?;
+        }
+        self.mcap.flush()?;
+        Ok(true)
     }
 
     /// Copies one record; passes over what is damaged or of no use without its place.
@@ -92,13 +119,29 @@ impl Copy {
                 tolerate(self.mcap.write_to_known_channel(&header, data))
             }
             op::METADATA => {
-                let Some((name, entries)) = body.metadata() else { return Ok(()) };
+                let Some((name, entries)) = body.metadata().filter(|(name, _)| *name != REPAIR_NAME) else {
+                    return Ok(());
+                };
                 let metadata = entries.into_iter().map(|(k, v)| (k.to_owned(), v.to_owned())).collect();
                 self.mcap.write_metadata(&Metadata { name: name.to_owned(), metadata })
             }
             _ => Ok(()),
         }
     }
+}
+
+/// Opcodes of MCAP's records.
+const KNOWN: std::ops::RangeInclusive<u8> = op::HEADER..=op::DATA_END;
+/// How our chunks name their compression: length and text.
+const COMPRESSION: &[u8] = b"\x03\0\0\0lz4";
+/// Bytes of a chunk before that: opcode, length, first and last time, unpacked size, checksum.
+const BEFORE_COMPRESSION: usize = 1 + 8 + 8 + 8 + 8 + 4;
+
+/// The bytes from where the next chunk seems to begin.
+fn next_chunk(bytes: &[u8]) -> Option<&[u8]> {
+    let windows = bytes.windows(COMPRESSION.len()).enumerate().skip(BEFORE_COMPRESSION);
+    let mut places = windows.filter(|(_, window)| *window == COMPRESSION).map(|(at, _)| at - BEFORE_COMPRESSION);
+    places.find(|&at| bytes[at] == op::CHUNK).map(|at| &bytes[at..])
 }
 
 /// Only a failure to write ends a repair; a record that contradicts others is left out.

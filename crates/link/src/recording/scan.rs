@@ -44,6 +44,10 @@ impl Topic {
         }
     }
 
+    pub(super) fn is_tick(self) -> bool {
+        matches!(self, Self::Tick)
+    }
+
     pub(super) fn read_into(self, message: &[u8], recording: &mut Recording) -> Option<()> {
         match self {
             Self::Tick => recording.ticks.push(decode(message)?),
@@ -55,6 +59,27 @@ impl Topic {
         }
         Some(())
     }
+}
+
+/// How many messages of a channel an index counts.
+pub(super) struct MessageCount {
+    pub channel: u16,
+    pub messages: u64,
+}
+
+/// Length of the record that ends an MCAP file before its magic.
+const FOOTER_BYTES: usize = 29;
+
+/// The records of a file's index; `None` where there is none or its checksum does not hold.
+pub(super) fn index(bytes: &[u8]) -> Option<impl Iterator<Item = Record<'_>>> {
+    let body = bytes.strip_suffix(mcap::MAGIC)?;
+    let footer_at = body.len().checked_sub(FOOTER_BYTES)?;
+    let footer = Cursor(&body[footer_at..]).record().filter(|record| record.opcode == mcap::records::op::FOOTER)?;
+    let mut fields = Cursor(footer.body);
+    let (start, _offsets, crc) = (usize::try_from(fields.u64()?).ok()?, fields.u64()?, fields.u32()?);
+    let mut records = Cursor(body.get(start..footer_at).filter(|records| !records.is_empty())?);
+    let sound = crc == 0 || crc == crc32fast::hash(&body[start..body.len() - size_of::<u32>()]);
+    sound.then(|| std::iter::from_fn(move || records.record()))
 }
 
 impl<'a> Cursor<'a> {
@@ -98,6 +123,19 @@ impl<'a> Cursor<'a> {
             entries.push((map.text()?, map.text()?));
         }
         Some(entries)
+    }
+
+    /// How many messages there are of each channel, by the body of a statistics record.
+    pub(super) fn message_counts(mut self) -> Option<Vec<MessageCount>> {
+        // Messages, schemas, channels, attachments, metadata, chunks, first and last time.
+        self.take(8 + 2 + 4 * 4 + 2 * 8)?;
+        let length = usize::try_from(self.u32()?).ok()?;
+        let mut map = Cursor(self.take(length)?);
+        let mut counts = Vec::new();
+        while !map.0.is_empty() {
+            counts.push(MessageCount { channel: map.u16()?, messages: map.u64()? });
+        }
+        Some(counts)
     }
 
     /// Unpacked size that a chunk claims.

@@ -3,7 +3,7 @@
 use super::Inputs;
 use super::brain::Fragment;
 use super::mix::trilinear;
-use super::skull::Ray;
+use super::skull::{Ray, on_cut};
 use super::tool::{Met, lit};
 use crate::mri::Signals;
 use crate::scene::Scene;
@@ -17,7 +17,10 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bon
     let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
     let meets = |n: usize| if near[n] { Met::of(scene.tools()[n], eye, along) } else { Met::NONE };
     let [first, second] = [meets(0), meets(1)];
-    let t = bone.t.min(brain.t).min(first.t()).min(second.t());
+    // Where both are cut by one plane neither is nearer: bone is there, however far the mesh reaches into it.
+    let under_bone = brain.cut && on_cut(scene.bone_cut, eye + bone.t * along);
+    let brain_t = if under_bone { NOTHING } else { brain.t };
+    let t = bone.t.min(brain_t).min(first.t()).min(second.t());
     let point = eye + t * along;
     let colour = if t >= NOTHING {
         let back = (y as f32 + 0.5) / scene.up.w;
@@ -26,7 +29,7 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bon
         shade_tool(scene, point, along, &first, scene.tips.x)
     } else if t == second.t() {
         shade_tool(scene, point, along, &second, scene.tips.y)
-    } else if t == brain.t {
+    } else if t == brain_t {
         shade_brain(inputs, point, along, brain)
     } else {
         shade_bone(inputs, point, along, bone)

@@ -106,6 +106,6 @@ impl Ray {
 }
 
 /// Whether a point that a ray has met is where bone is cut.
-fn on_cut(bone_cut: Vec4, point: Vec3) -> bool {
+pub(crate) fn on_cut(bone_cut: Vec4, point: Vec3) -> bool {
     bone_cut.truncate() != Vec3::ZERO && height(bone_cut, point).abs() < 0.01
 }

@@ -46,13 +46,20 @@ pub(crate) struct Hand {
 }
 
 /// What the pointer did over the 3-D view since the last picture, in points.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Pointer {
     pub left: Vec2,
     pub right: Vec2,
     pub wheel: f32,
     pub tilt: bool,
-    pub zoom: bool,
+    /// How many times larger things are to be seen: egui makes this of the wheel with Ctrl, and of two fingers.
+    pub zoom: f32,
+}
+
+impl Default for Pointer {
+    fn default() -> Self {
+        Self { left: Vec2::ZERO, right: Vec2::ZERO, wheel: 0.0, tilt: false, zoom: 1.0 }
+    }
 }
 
 impl Hand {
@@ -69,12 +76,9 @@ impl Hand {
         } else {
             self.world_from_tool.translation += mm * (drag.x * view.right - drag.y * view.up);
         }
-        if pointer.zoom {
-            self.camera.zoom((-0.002 * pointer.wheel).exp());
-        } else {
-            let sight = (tip - view.eye).normalize_or(view.forward);
-            self.world_from_tool.translation += PUSH_MM * pointer.wheel * sight;
-        }
+        self.camera.zoom(pointer.zoom.max(1e-3).recip());
+        let sight = (tip - view.eye).normalize_or(view.forward);
+        self.world_from_tool.translation += PUSH_MM * pointer.wheel * sight;
         self.camera.orbit(-ORBIT_RAD * pointer.right.x, ORBIT_RAD * pointer.right.y);
     }
 
@@ -110,7 +114,7 @@ impl Pointer {
             right: Vec2::new(right.x, right.y),
             wheel: if hovered { input.smooth_scroll_delta().y } else { 0.0 },
             tilt: input.modifiers.shift,
-            zoom: input.modifiers.ctrl || input.modifiers.command,
+            zoom: if hovered { input.zoom_delta() } else { 1.0 },
         })
     }
 }
@@ -144,7 +148,7 @@ mod tests {
         hand.follow(&Pointer { wheel: 50.0, ..Default::default() }, &view, 600.0);
         let pushed = hand.world_from_tool.translation - before;
         assert!((pushed.length() - 1.0).abs() < 1e-4 && pushed.dot(before - view.eye) > 0.0);
-        hand.follow(&Pointer { wheel: 50.0, zoom: true, ..Default::default() }, &view, 600.0);
+        hand.follow(&Pointer { zoom: 1.25, ..Default::default() }, &view, 600.0);
         assert!(hand.camera.distance_mm < 200.0 && hand.world_from_tool.translation == before + pushed);
     }
 
@@ -172,6 +176,33 @@ mod tests {
             hand.world_from_tool.rotation.angle_between(Quat::IDENTITY) > 0.5
                 && hand.world_from_tool.rotation.is_normalized()
         );
+    }
+
+    #[test]
+    fn the_wheel_with_control_zooms_through_egui_and_pushes_nothing() {
+        let context = egui::Context::default();
+        let turned = |modifiers: egui::Modifiers| {
+            let (mut zoom, mut wheel) = (1.0, 0.0);
+            for turn in [false, true, false, false, false] {
+                let unit = egui::MouseWheelUnit::Line;
+                let (delta, phase) = (egui::vec2(0.0, 1.0), egui::TouchPhase::Move);
+                let turn = turn.then_some(egui::Event::MouseWheel { unit, delta, phase, modifiers });
+                let events = [egui::Event::PointerMoved(egui::pos2(100.0, 100.0))].into_iter().chain(turn).collect();
+                let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(400.0, 300.0));
+                let input = egui::RawInput { screen_rect: Some(screen), events, modifiers, ..Default::default() };
+                let mut drawn = context.run_ui(input, |ui| {
+                    let (_, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::click_and_drag());
+                    let pointer = Pointer::over(ui, &response);
+                    (zoom, wheel) = (zoom * pointer.zoom, wheel + pointer.wheel);
+                });
+                drawn.textures_delta.clear();
+            }
+            (zoom, wheel)
+        };
+        let (zoom, wheel) = turned(egui::Modifiers::COMMAND | egui::Modifiers::CTRL);
+        assert!(zoom > 1.02 && wheel == 0.0, "{zoom} {wheel}");
+        let (zoom, wheel) = turned(egui::Modifiers::NONE);
+        assert!(zoom == 1.0 && wheel > 1.0, "{zoom} {wheel}");
     }
 
     #[test]

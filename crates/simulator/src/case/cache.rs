@@ -40,14 +40,7 @@ impl Cache {
 
     /// The name of what is made from these files (folders with all that lies in them) by this recipe, 64 digits.
     pub fn key(&self, inputs: &[&Path], recipe: &str) -> Result<String, SessionError> {
-        let mut hash = Sha256::new();
-        hash.update(format!("{FORM} {recipe}"));
-        for input in inputs {
-            for file in files_of(input).map_err(|fault| unreadable(input, &fault))? {
-                add(&mut hash, &file).map_err(|fault| unreadable(&file, &fault))?;
-            }
-        }
-        Ok(hexadecimal(hash))
+        digest_of_all(&format!("{FORM} {recipe}"), inputs)
     }
 
     /// The name of what is made by some numbers from what has a name already.
@@ -77,6 +70,18 @@ impl Cache {
         _ = folder.keep();
         Ok(())
     }
+}
+
+/// SHA-256 of a text and of these files (folders with all that lies in them), hexadecimal.
+pub fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, SessionError> {
+    let mut hash = Sha256::new();
+    hash.update(text);
+    for input in inputs {
+        for file in files_of(input).map_err(|fault| unreadable(input, &fault))? {
+            add(&mut hash, &file).map_err(|fault| unreadable(&file, &fault))?;
+        }
+    }
+    Ok(hexadecimal(hash))
 }
 
 /// SHA-256 of a file's bytes, hexadecimal.

@@ -1,6 +1,7 @@
 //! Which case the options mean, and making one to keep.
 
 use crate::case::cache::Cache;
+use crate::case::identity::{self, Identity, USERS};
 use crate::case::import::{Known, volume_mm3};
 use crate::case::tissue::TissueClass;
 use crate::case::{Case, Inputs, Recipe, folder, import};
@@ -51,6 +52,18 @@ fn guarded(options: &Options, there: impl Fn(TissueClass) -> bool) -> Result<(),
             Err(SessionError::Usage(format!(
                 "--forbid {name}: the case holds no {name}: give its labels with --tissue {name}=PATH, or leave it out"
             )))
+        }
+    }
+}
+
+/// Of which patient the case is that the options mean; nothing is made.
+pub fn identity(options: &Options, built_in: &Inputs) -> Result<Identity, SessionError> {
+    match &options.case {
+        Some(folder) => folder::identity(folder),
+        None => {
+            let (inputs, recipe) = (inputs(&options.patient, built_in.clone()), recipe(&options.patient));
+            let name = inputs.name.unwrap_or(USERS).to_string();
+            Ok(Identity { name, case: None, images: identity::images(&inputs, &recipe)? })
         }
     }
 }

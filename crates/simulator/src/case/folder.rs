@@ -12,6 +12,7 @@
 //! Patient RAS+ mm throughout. Nothing in it names a patient: images are written anew from their voxels, and the name is made from a hash.
 
 use crate::case::cache::digest;
+use crate::case::identity::Identity;
 use crate::case::opening::Opening;
 use crate::case::{Brain, Case, Recipe};
 use crate::error::SessionError;
@@ -37,6 +38,8 @@ struct Card {
     form: u32,
     name: String,
     hash: String,
+    #[serde(default)]
+    images: BTreeMap<String, String>,
     /// The version that made it.
     version: String,
     isovalue_hu: i16,
@@ -75,6 +78,7 @@ pub fn save(case: &Case, folder: &Path) -> Result<(), String> {
         form: FORM,
         name: case.name.clone(),
         hash: case.hash.clone(),
+        images: case.images.clone(),
         version: env!("CARGO_PKG_VERSION").into(),
         isovalue_hu: case.isovalue_hu,
         opening: case.opening,
@@ -86,16 +90,30 @@ pub fn save(case: &Case, folder: &Path) -> Result<(), String> {
     fs::write(folder.join(CARD), json).map_err(|f| text(&f))
 }
 
+/// Of which patient the case of a folder is; volumes are not looked at.
+pub fn identity(folder: &Path) -> Result<Identity, SessionError> {
+    card(folder).map(|Card { name, hash, images, .. }| Identity { name, case: Some(hash), images })
+}
+
+/// The numbers of a folder, of the form that this program knows.
+fn card(folder: &Path) -> Result<Card, SessionError> {
+    let json = read_regular(&folder.join(CARD)).map_err(|fault| broken(folder, CARD, &fault))?;
+    let card: Card = serde_json::from_slice(&json).map_err(|fault| broken(folder, CARD, &fault))?;
+    if card.form != FORM {
+        let fault = format!("form {} is not known, this program knows {FORM}", card.form);
+        return Err(broken(folder, CARD, &fault));
+    }
+    Ok(card)
+}
+
+fn broken(folder: &Path, file: &str, fault: &dyn std::fmt::Display) -> SessionError {
+    SessionError::Case(format!("{}: {fault}; build the case again with `case build`", folder.join(file).display()))
+}
+
 /// Opens a case folder; every file must be there and be what it was when it was written.
 pub fn load(folder: &Path) -> Result<Case, SessionError> {
-    let broken = |file: &str, fault: &dyn std::fmt::Display| {
-        SessionError::Case(format!("{}: {fault}; build the case again with `case build`", folder.join(file).display()))
-    };
-    let json = read_regular(&folder.join(CARD)).map_err(|fault| broken(CARD, &fault))?;
-    let card: Card = serde_json::from_slice(&json).map_err(|fault| broken(CARD, &fault))?;
-    if card.form != FORM {
-        return Err(broken(CARD, &format!("form {} is not known, this program knows {FORM}", card.form)));
-    }
+    let card = card(folder)?;
+    let broken = |file: &str, fault: &dyn std::fmt::Display| broken(folder, file, fault);
     for (name, hash) in &card.files {
         let found = digest(&folder.join(name)).map_err(|fault| broken(name, &fault))?;
         if found != *hash {
@@ -118,8 +136,8 @@ pub fn load(folder: &Path) -> Result<Case, SessionError> {
     };
     let fit_png = card.files.contains_key(FIT).then(|| fs::read(folder.join(FIT))).transpose();
     let fit_png = fit_png.map_err(|fault| broken(FIT, &fault))?;
-    let Card { name, hash, isovalue_hu, opening, recipe, notes, .. } = card;
-    Ok(Case { name, hash, recipe, skull, isovalue_hu, brain, opening, fit_png, notes, cached: true })
+    let Card { name, hash, images, isovalue_hu, opening, recipe, notes, .. } = card;
+    Ok(Case { name, hash, images, recipe, skull, isovalue_hu, brain, opening, fit_png, notes, cached: true })
 }
 
 #[cfg(test)]

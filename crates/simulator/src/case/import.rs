@@ -10,6 +10,7 @@ use crate::case::anatomy::{cropped, find_brain, make_brain, make_classes, make_s
 use crate::case::cache::Cache;
 use crate::case::fit::Fit;
 use crate::case::folder as case_folder;
+use crate::case::identity;
 use crate::case::opening::{Opening, REFERENCE_MM, bone_of, eye};
 use crate::case::space::Space;
 use crate::case::stages::ImportStages;
@@ -47,14 +48,15 @@ pub fn open_by(
     let Known { facts, notes, key, images, mut stages, .. } = known;
     let hash = cache.under(&key, &format!("{} {} {}", recipe.spacing_mm, recipe.tets, recipe.halvings));
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
+    let hashes = identity::images(inputs, wanted)?;
     if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
         stages.finish();
         tracing::info!("case {name} from the cache");
-        return Ok(case);
+        return Ok(Case { images: hashes, ..case });
     }
     let images = images.map_or_else(|| read(inputs, wanted, &mut stages), Ok)?;
     let mut case = build(program, inputs, images, &recipe, &mut stages)?;
-    (case.name, case.hash) = (name, hash);
+    (case.name, case.hash, case.images) = (name, hash, hashes);
     stages.next("keeping the case");
     // The facts only now: of images that make no case nothing is kept.
     match cache.keep(&case.hash, |folder| case_folder::save(&case, folder)) {

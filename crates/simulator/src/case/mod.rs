@@ -5,6 +5,7 @@ pub(crate) mod cache;
 pub(crate) mod choice;
 mod fit;
 pub(crate) mod folder;
+pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod opening;
 pub(crate) mod plan;
@@ -16,6 +17,7 @@ pub(crate) mod tissue;
 use crate::case::opening::Opening;
 use crate::case::tissue::TissueSource;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use trepan_mesh::TetMesh;
 use trepan_volume::VoxelVolume;
@@ -64,6 +66,8 @@ pub struct Case {
     pub name: String,
     /// Hash of inputs and recipe, hexadecimal.
     pub hash: String,
+    /// Hash of each of the patient's images, by `ct` and `mri`; empty in folders of older versions.
+    pub images: BTreeMap<String, String>,
     /// The numbers that it was made by; `None` only for a case that was put together by hand.
     pub recipe: Option<Recipe>,
     /// Skull densities in HU on a grid of cubes, largest piece only; `None` without a CT.

@@ -3,7 +3,7 @@
 use crate::device_test::measured::{Measured, Sample};
 use crate::device_test::trial::Part;
 use crate::report::chart::{Curve, histogram, over_time, traces};
-use crate::report::page::{STYLE, escaped, rows};
+use crate::report::page::{STYLE, escaped, rows, table};
 use crate::run::Times;
 
 /// The page.
@@ -20,10 +20,12 @@ pub fn html(found: &Measured, samples: &[Sample]) -> Result<String, String> {
     for (caption, svg) in charts(samples, found.timing.asked_hz)? {
         page += &format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>");
     }
-    page += "<h2>Numbers</h2><table><tr><th>what</th><th>value</th></tr>";
+    page += "<h2>Numbers</h2>";
     let value = serde_json::to_value(found).map_err(|fault| format!("device.json: {fault}"))?;
-    rows(&mut page, "", &value);
-    page += "</table></body></html>\n";
+    let mut numbers = Vec::new();
+    rows("", &value, &mut numbers);
+    table(&mut page, &numbers);
+    page += "</body></html>\n";
     Ok(page)
 }
 

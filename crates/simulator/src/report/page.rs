@@ -38,7 +38,7 @@ pub fn html(summary: &Summary, outcome: &Outcome, recording: &Recording, shots: 
         summary.rate_hz
     );
     models(&mut page, summary);
-    warnings(&mut page, summary);
+    happened(&mut page, outcome, recording);
     pictures(&mut page, shots);
     curves(&mut page, outcome, recording)?;
     numbers(&mut page, summary)?;
@@ -63,15 +63,34 @@ fn models(page: &mut String, summary: &Summary) {
     *page += "</ul>";
 }
 
-fn warnings(page: &mut String, summary: &Summary) {
+/// Everything that was told, in the order of time; what a teacher asked for stands in the recording only.
+fn happened(page: &mut String, outcome: &Outcome, recording: &Recording) {
+    let told = outcome.written.notices.iter().map(|notice| (notice.time_ms, notice.words()));
+    let told = told.filter(|(_, (kind, _))| *kind != "cleared").map(|(time_ms, (kind, text))| Told {
+        time_ms,
+        warns: kind == "warning",
+        text: if kind == "warning" { text } else { format!("{kind}: {text}") },
+    });
+    let taught = recording.events.iter().filter(|event| event.kind == TEACHER);
+    let taught =
+        taught.map(|event| Told { time_ms: event.time_ms, warns: false, text: format!("{TEACHER}: {}", event.text) });
+    let mut all: Vec<Told> = told.chain(taught).collect();
+    all.sort_by(|a, b| a.time_ms.total_cmp(&b.time_ms));
     *page += "<h2>What happened</h2><ul>";
-    for phase in &summary.phases {
-        *page += &format!("<li>{:.2} s: phase {}</li>", phase.from_s, escaped(&phase.name));
-    }
-    for raised in &summary.warnings {
-        *page += &format!("<li class=\"w\">{:.2} s: {}</li>", raised.time_s, escaped(&raised.text));
+    for Told { time_ms, text, warns } in all {
+        let class = if warns { " class=\"w\"" } else { "" };
+        *page += &format!("<li{class}>{:.2} s: {}</li>", time_ms * 1e-3, escaped(&text));
     }
     *page += "</ul>";
+}
+
+/// Kind of the events that a teacher makes.
+const TEACHER: &str = "teacher";
+
+struct Told {
+    time_ms: f64,
+    text: String,
+    warns: bool,
 }
 
 fn pictures(page: &mut String, shots: &[Shot]) {
@@ -130,39 +149,135 @@ fn second(recording: &Recording) -> Curve {
     Curve { name: "second hand", points: recording.second.iter().map(point).collect() }
 }
 
-/// Every number of the summary, as a table of paths.
+/// What of a summary is timing; scores and the rest have tables of their own.
+const TIMINGS: [&str; 11] = [
+    "asked_hz",
+    "rate_hz",
+    "late_ticks",
+    "held_ticks",
+    "tick_us",
+    "solver.dt_ms",
+    "solver.step_us",
+    "solver.collision_us",
+    "solver.real_time_factor",
+    "frames",
+    "fps",
+];
+/// What of it is scores.
+const SCORES: [&str; 5] = ["scores", "bone_removed_mm3", "plan", "cut_off", "force_n"];
+
+/// Every number of the summary, by its path: scores, timings, the rest.
 fn numbers(page: &mut String, summary: &Summary) -> Result<(), String> {
-    *page += "<h2>Numbers</h2><table><tr><th>what</th><th>value</th></tr>";
     let value = serde_json::to_value(summary).map_err(|fault| format!("summary: {fault}"))?;
-    rows(page, "", &value);
-    *page += "</table>";
+    let mut all = Vec::new();
+    rows("", &value, &mut all);
+    let under = |row: &Row, paths: &[&str]| {
+        paths
+            .iter()
+            .any(|path| row.path.strip_prefix(path).is_some_and(|rest| rest.is_empty() || rest.starts_with('.')))
+    };
+    let (scores, all): (Vec<_>, Vec<_>) = all.into_iter().partition(|row| under(row, &SCORES));
+    let (timings, all): (Vec<_>, Vec<_>) = all.into_iter().partition(|row| under(row, &TIMINGS));
+    for (title, rows) in [("Scores", scores), ("Timings", timings), ("Numbers", all)] {
+        *page += &format!("<h2>{title}</h2>");
+        table(page, &rows);
+    }
     Ok(())
 }
 
+/// A number or a word of a file, by its path in it.
+pub struct Row {
+    path: String,
+    value: String,
+}
+
+/// A table of values with their units.
+pub fn table(page: &mut String, rows: &[Row]) {
+    *page += "<table><tr><th>what</th><th>value</th><th>unit</th></tr>";
+    for Row { path, value } in rows {
+        let [path, value] = [path, value].map(|text| escaped(text));
+        _ = write!(page, "<tr><td>{path}</td><td class=\"n\">{value}</td><td>{}</td></tr>", unit(&path));
+    }
+    *page += "</table>";
+}
+
+/// How names end that say their unit; the longer before those that they end with.
+const UNITS: [(&str, &str); 14] = [
+    ("_mm3", "mm³"),
+    ("_n_s", "N s"),
+    ("_n_ms_per_mm", "N ms/mm"),
+    ("_mm", "mm"),
+    ("_ms", "ms"),
+    ("_us", "µs"),
+    ("_kpa", "kPa"),
+    ("_hz", "Hz"),
+    ("_ticks", "ticks"),
+    ("_percent", "%"),
+    ("_s", "s"),
+    ("_n", "N"),
+    ("fps", "1/s"),
+    ("guard", "ticks"),
+];
+
+/// The unit that a path names, in its last part that names one.
+fn unit(path: &str) -> &'static str {
+    let of = |name: &str| UNITS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| *unit);
+    path.rsplit('.').find_map(of).unwrap_or_default()
+}
+
 /// A value as rows of a table, by their paths.
-pub fn rows(page: &mut String, path: &str, value: &serde_json::Value) {
+pub fn rows(path: &str, value: &serde_json::Value, into: &mut Vec<Row>) {
     use serde_json::Value;
     let under = |key: &str| if path.is_empty() { key.to_string() } else { format!("{path}.{key}") };
-    match value {
-        Value::Object(map) => map.iter().for_each(|(key, value)| rows(page, &under(key), value)),
-        Value::Array(list) if list.iter().any(|item| !item.is_string()) => {}
-        Value::Array(list) => {
-            for item in list {
-                rows(page, path, item);
-            }
-        }
-        Value::Number(n) if n.is_f64() => {
-            let number = n.as_f64().unwrap_or_default();
-            _ = write!(page, "<tr><td>{}</td><td class=\"n\">{number:.4}</td></tr>", escaped(path));
-        }
-        other => {
-            let text = other.as_str().map_or_else(|| other.to_string(), String::from);
-            _ = write!(page, "<tr><td>{}</td><td class=\"n\">{}</td></tr>", escaped(path), escaped(&text));
-        }
-    }
+    let text = match value {
+        Value::Object(map) => return map.iter().for_each(|(key, value)| rows(&under(key), value, into)),
+        Value::Array(list) if list.iter().any(|item| !item.is_string()) => return,
+        Value::Array(list) => return list.iter().for_each(|item| rows(path, item, into)),
+        Value::Number(n) if n.is_f64() => format!("{:.4}", n.as_f64().unwrap_or_default()),
+        other => other.as_str().map_or_else(|| other.to_string(), String::from),
+    };
+    into.push(Row { path: path.into(), value: text });
 }
 
 /// Text as HTML.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::notice::{Notice, Warning, What};
+    use trepan_link::wire::EventRecord;
+
+    #[test]
+    fn what_happened_is_in_order_and_complete() {
+        let notice = |time_ms, what| Notice { tick: 0, time_ms, what };
+        let mut outcome = Outcome::default();
+        outcome.written.notices = vec![
+            notice(10.0, What::Phase(crate::Phase::Craniotomy)),
+            notice(4000.0, What::Warning(Warning::BrainNear, true, 1.0)),
+            notice(4500.0, What::Warning(Warning::BrainNear, false, 1.0)),
+            notice(3000.0, What::Through),
+        ];
+        let event = EventRecord { time_ms: 3500.0, kind: "teacher".into(), text: "begins: rest".into(), tick: 0 };
+        let score = EventRecord { time_ms: 3600.0, kind: "score".into(), text: "{}".into(), tick: 0 };
+        let mut page = String::new();
+        happened(&mut page, &outcome, &Recording { events: vec![event, score], ..Recording::default() });
+        let lines: Vec<_> = page.split("<li").skip(1).map(|line| line.split('<').next().unwrap()).collect();
+        assert_eq!(lines.len(), 4, "{page}");
+        assert!(lines[0].contains("0.01 s: phase") && lines[1].contains("3.00 s: through: the burr came through"));
+        assert!(lines[2].contains("3.50 s: teacher: begins") && lines[3].contains("class=\"w\">4.00 s: brain-near"));
+    }
+
+    #[test]
+    fn a_path_names_its_unit() {
+        let units = ["scores.tissue_impulse_n_s", "tick_us.p50", "scores.bone_removed_mm3", "force_n.max_step"];
+        assert_eq!(units.map(unit), ["N s", "µs", "mm³", "N"]);
+        assert_eq!(["scores.idle_s", "scores.tool_changes", "late_ticks"].map(unit), ["s", "", "ticks"]);
+        assert_eq!(["fps", "guard.slewed", "second.guard.slewed"].map(unit), ["1/s", "ticks", "ticks"]);
+        let mut page = String::new();
+        table(&mut page, &[Row { path: "scores.path_mm".into(), value: "1.5".into() }]);
+        assert!(page.contains("<td>scores.path_mm</td><td class=\"n\">1.5</td><td>mm</td>"), "{page}");
+    }
 }

@@ -62,7 +62,7 @@ pub struct Summary {
     pub second: Option<SecondSummary>,
     /// Pictures drawn.
     pub frames: u64,
-    /// Pictures a second.
+    /// Pictures a second of the time in which they were drawn.
     pub fps: f64,
     /// Against its recording, in a replay.
     pub replay: Option<Replayed>,
@@ -271,6 +271,8 @@ pub struct About {
     pub asked_hz: f64,
     /// Pictures drawn.
     pub frames: u64,
+    /// Time in which they were drawn, s.
+    pub drawn_s: f64,
     /// Bone that was cut off.
     pub cut_off: CutOff,
     /// Against the plan.
@@ -335,8 +337,8 @@ impl Summary {
                 guard: (&second.guard).into(),
             }),
             frames: about.frames,
-            fps: about.frames as f64 / seconds,
-            replay: outcome.replayed,
+            fps: if about.frames > 0 { about.frames as f64 / about.drawn_s.max(1e-3) } else { 0.0 },
+            replay: outcome.replayed.clone(),
             dropped_records: outcome.written.dropped,
             remarks: slow
                 .into_iter()

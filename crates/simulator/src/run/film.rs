@@ -1,7 +1,8 @@
 //! A replay as a film: made once at full speed on the replay's thread, shown at any time, forwards and backwards, by the window.
 //!
 //! # Theory
-//! Stages run forwards only; what they change does not. A [`Shot`] is taken thirty times a second of session time and holds what the picture needs: the tick's view, where
+//! Stages run forwards only; what they change does not. A [`Shot`] is taken thirty times a second of session time, and where a warning
+//! comes or goes or something else is told, and holds what the picture needs: the tick's view, where
 //! the brain is, and each voxel that changed since the shot before, with its density before and after. Played forwards the new densities are
 //! written, backwards the old ones: at any shot the skull is, voxel by voxel, what it was then.
 //!
@@ -18,6 +19,7 @@
 //! Headless: nobody goes back and forth there.
 
 use crate::run::View;
+use crate::stages::notice::Notice;
 use glam::IVec3;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -59,6 +61,8 @@ pub struct Filming {
     next_ms: f64,
     brain_every_ms: f64,
     next_brain_ms: f64,
+    /// What the last tick warned of and told.
+    told: (u32, Option<Notice>),
 }
 
 impl Filming {
@@ -66,14 +70,17 @@ impl Filming {
     pub fn new(bone: Option<Arc<BoneVolume>>, length_ms: f64) -> (Self, Receiver<Shot>) {
         let (shots, coming) = channel();
         let brain_every_ms = (length_ms / BRAINS).max(SHOT_MS);
-        (Self { shots, skull: bone.map(Carved::of), next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0 }, coming)
+        let (skull, told) = (bone.map(Carved::of), (0, None));
+        (Self { shots, skull, next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, told }, coming)
     }
 
-    /// Takes a shot of a tick if it is time for one, or if it is the last; `brain` copies the positions of the brain's nodes. False when nobody looks
+    /// Takes a shot of a tick if it is time for one, if something happened in it, or if it is the last; `brain` copies the positions of the brain's nodes. False when nobody looks
     /// any more.
     pub fn tick(&mut self, view: View, last: bool, brain: impl FnOnce() -> Option<Vec<Vec3>>) -> bool {
         let time_ms = view.time_ms;
-        if time_ms < self.next_ms && !last {
+        let told = (view.warnings, view.news);
+        let new = std::mem::replace(&mut self.told, told) != told;
+        if time_ms < self.next_ms && !last && !new {
             return true;
         }
         self.next_ms = time_ms + SHOT_MS;
@@ -165,6 +172,17 @@ mod tests {
         }
         assert_eq!(shown.snapshot(), volume);
         assert_eq!(shots.last().unwrap().positions, Some(vec![Vec3::splat(999.0)]));
+    }
+
+    #[test]
+    fn a_warning_has_a_shot_of_its_own() {
+        let (mut filming, receiver) = Filming::new(None, 1000.0);
+        for ms in 0..30 {
+            let warnings = u32::from((13..20).contains(&ms));
+            assert!(filming.tick(View { warnings, ..view(ms.into()) }, false, || None));
+        }
+        let shots: Vec<_> = receiver.try_iter().map(|shot| (shot.view.time_ms, shot.view.warnings)).collect();
+        assert_eq!(shots, [(0.0, 0), (13.0, 1), (20.0, 0)]);
     }
 
     #[test]

@@ -14,6 +14,7 @@
 //! The haptic loop reads one cell a tick, some ns, and waits for nobody. A teacher that is silent for three seconds has gone: everything that was asked for ends. A replay needs no teacher:
 //! the readings hold what was asked.
 
+use crate::run::watch::Watching;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::{Capabilities, HapticDevice, Reading};
@@ -160,6 +161,8 @@ pub struct Company {
     pub asked: Option<Reader<TeacherRecord>>,
     /// The end by which this session teaches another's trainee.
     pub teacher: Option<Teacher>,
+    /// The session that is watched.
+    pub watching: Option<Watching>,
 }
 
 #[cfg(test)]

@@ -38,10 +38,19 @@ use trepan_soft::Loads;
 /// Tools and patches of this many past ticks are kept for collision steps that refer to them.
 const MEMORY: usize = 16_384;
 
-/// Runs a recording again. Who is filmed goes on being looked at after the end; else the end asks for a stop.
+/// The ticks up to a time, ms, with those in which the force was let go right after it.
+pub fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
+    let ticks = &recording.ticks;
+    let until = ticks.iter().position(|tick| tick.time_ms >= end_ms).map_or(ticks.len(), |at| at + 1);
+    let fading = ticks[until..].iter().take_while(|tick| tick.has(TickRecord::RELEASED)).count();
+    &ticks[..until + fading]
+}
+
+/// Runs a recording again, up to a time, ms. Who is filmed goes on being looked at after the end; else the end asks
+/// for a stop.
 pub fn run(
     stages: Stages,
-    recording: &Recording,
+    (recording, end_ms): (&Recording, f64),
     (recorder, share): Kept,
     start: ToolSample,
     film: Option<(Filming, Receiver<Shot>)>,
@@ -58,8 +67,9 @@ pub fn run(
         let (mut view, mut shown) = (cells.view.0, cells.shown.0);
         let replaying = scope.spawn(move || {
             let mut again = Again::new(stages, recording, pens, start);
-            let last = recording.ticks.last().map(|record| record.tick);
-            for record in &recording.ticks {
+            let ticks = up_to(recording, end_ms);
+            let last = ticks.last().map(|record| record.tick);
+            for record in ticks {
                 if stop.asked() {
                     break;
                 }
@@ -102,7 +112,7 @@ struct Again<'a> {
     step_times: Times,
     collision_times: Times,
     replayed: Replayed,
-    recording: &'a Recording,
+    last: Option<TickRecord>,
     /// Steps here for one that was recorded; `None` where they are equally long.
     pace: Option<f64>,
 }
@@ -128,8 +138,12 @@ impl<'a> Again<'a> {
             frame: SoftFrame::default(),
             step_times: Times::default(),
             collision_times: Times::default(),
-            replayed: Replayed::default(),
-            recording,
+            replayed: Replayed {
+                recorded: recording.promised_ticks(),
+                losses: recording.losses(),
+                ..Replayed::default()
+            },
+            last: None,
         }
     }
 
@@ -159,6 +173,7 @@ impl<'a> Again<'a> {
         tick.record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         self.ticks.add(&tick);
         let same = self.same(record.wrench, tick.record.wrench) & second.is_none_or(|(_, same)| same);
+        self.last = Some(*record);
         self.replayed.ticks += 1;
         self.replayed.identical += u64::from(same);
         remember(&mut self.tools, tick.sample);
@@ -249,7 +264,7 @@ impl<'a> Again<'a> {
     }
 
     fn outcome(self) -> Outcome {
-        let last = self.recording.ticks.last();
+        let last = self.last;
         let solver = self.tissue.as_ref().map(|tissue| {
             let mut solver = outcome(&tissue.solver);
             (solver.times, solver.collision_times) = (self.step_times, self.collision_times);
@@ -415,5 +430,29 @@ mod tests {
         recording.ticks.iter().for_each(|record| _ = replay.tick(record, &Clock::start()));
         assert_eq!((replay.replayed.identical, replay.replayed.ticks), (4399, 4399));
         assert!(again.snapshot() == bone.snapshot());
+    }
+
+    #[test]
+    fn a_part_ends_with_the_fading_of_the_force_that_was_recorded_there() {
+        let tick = |n: u64| TickRecord {
+            tick: n,
+            time_ms: n as f64 + 0.5,
+            flags: if n > 6 { TickRecord::RELEASED } else { 0 },
+            ..TickRecord::default()
+        };
+        let recording = Recording { ticks: (1..=9).map(tick).collect(), ..Recording::default() };
+        let last = |end_ms| up_to(&recording, end_ms).last().map(|tick| tick.tick);
+        assert_eq!([3.0, 3.5, 3.6, 6.0, 20.0, f64::INFINITY].map(last), [3, 3, 4, 9, 9, 9].map(Some));
+        assert!(up_to(&Recording::default(), 1.0).is_empty());
+    }
+
+    #[test]
+    fn a_part_is_never_called_the_same() {
+        let whole = Replayed { ticks: 9, recorded: 9, identical: 9, ..Replayed::default() };
+        assert!(whole.told().starts_with("9 of 9 ticks gave the same force"));
+        let part = Replayed { recorded: 100, ..whole.clone() };
+        assert!(part.told().starts_with("a part only, 9 of 100 ticks"), "{}", part.told());
+        let cut = Replayed { losses: Some("cut".into()), ..whole };
+        assert!(cut.told().starts_with("a part only, 9 of at least 9 ticks"), "{}", cut.told());
     }
 }

@@ -253,14 +253,33 @@ pub struct SolverOutcome {
 }
 
 /// How a replay compares with its recording.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Replayed {
     /// Ticks run again.
     pub ticks: u64,
+    /// Ticks that the session had, as far as its recording says: more where some are lost, or the replay was ended.
+    pub recorded: u64,
+    /// What the recording lacks of its session; `null` when nothing.
+    pub losses: Option<String>,
     /// Ticks whose forces came out the same, bit for bit, in both hands where there were two.
     pub identical: u64,
     /// Largest difference of force, N.
     pub max_difference_n: f32,
+}
+
+impl Replayed {
+    /// How far the replay is like its recording, in a line.
+    pub fn told(&self) -> String {
+        let Self { ticks, recorded, losses, identical, max_difference_n } = self;
+        let more = if losses.is_some() { "at least " } else { "" };
+        let part = match ticks < recorded || losses.is_some() {
+            true => format!("a part only, {ticks} of {more}{recorded} ticks; in this part "),
+            false => String::new(),
+        };
+        format!(
+            "{part}{identical} of {ticks} ticks gave the same force, bit for bit; largest difference {max_difference_n:.6} N"
+        )
+    }
 }
 
 /// All that is known at the end of a run.

@@ -18,7 +18,9 @@
 //! `trepan/NAME/...` from one to the other; nothing changes here.
 
 use crate::error::SessionError;
+use crate::run::clock::Clock;
 use crate::run::lesson::Listener;
+use crate::run::stop::Stop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -33,6 +35,8 @@ use trepan_link::wire::{EventRecord, TeacherRecord, TickRecord};
 const STALE_MS: f64 = 100.0;
 /// Silence after which the other session counts as over, ms.
 const OVER_MS: f64 = 3000.0;
+/// How long a watcher waits for the first tick, s: the other session may still be reading its images.
+const PATIENCE_S: f64 = 20.0;
 /// Pause of the pump between two looks.
 const LOOK: Duration = Duration::from_millis(1);
 
@@ -82,6 +86,38 @@ pub struct Watched {
     tool: ToolState,
     reads: u64,
     open: Arc<AtomicBool>,
+    over: Arc<AtomicBool>,
+}
+
+/// Which session is watched, and whether it is over.
+#[derive(Clone)]
+pub struct Watching {
+    name: String,
+    over: Arc<AtomicBool>,
+}
+
+impl Watching {
+    /// What to tell once the session is over.
+    pub fn ended(&self) -> Option<String> {
+        self.over.load(Ordering::Relaxed).then(|| format!("the watched session {} has ended", self.name))
+    }
+}
+
+/// Waits for a first tick, and says so.
+fn first_tick(name: &str, ticks: &mut Subscriber<TickRecord>, stop: &Stop) -> Result<TickRecord, SessionError> {
+    let (clock, mut told) = (Clock::start(), false);
+    while clock.now_ms() < 1e3 * PATIENCE_S && !stop.asked() {
+        if let Ok(Some(record)) = ticks.newest() {
+            return Ok(record);
+        }
+        if !std::mem::replace(&mut told, true) {
+            tracing::info!("waiting for the session {name}, at most {PATIENCE_S} s");
+        }
+        std::thread::sleep(LOOK);
+    }
+    Err(SessionError::Usage(format!(
+        "--watch {name}: no session of this name is heard: start one on this machine with --share {name}, then watch it"
+    )))
 }
 
 impl Watched {
@@ -99,13 +135,16 @@ impl Watched {
         damping: 0.0,
     };
 
-    /// Watches the session of a name; until it is heard, the tool waits at `start`.
-    pub fn open(name: &str, start: ToolState) -> Result<Self, SessionError> {
+    /// Watches the session of a name, once a tick of it is heard; the tool waits at `start`.
+    pub fn open(name: &str, start: ToolState, stop: &Stop) -> Result<(Self, Watching), SessionError> {
         let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
         let session = Session::join(name).map_err(fault)?;
         let mut ticks: Subscriber<TickRecord> = session.subscriber().map_err(fault)?;
         let (mut writer, newest) = cell(TickRecord::default());
+        writer.set(first_tick(name, &mut ticks, stop)?);
         let open = Arc::new(AtomicBool::new(true));
+        let watching = Watching { name: name.into(), over: Arc::default() };
+        let over = Arc::clone(&watching.over);
         let pumping = Arc::clone(&open);
         std::thread::spawn(move || {
             let _session = session;
@@ -116,7 +155,7 @@ impl Watched {
                 std::thread::sleep(LOOK);
             }
         });
-        Ok(Self { newest, seen: 0, heard_ms: None, tool: start, reads: 0, open })
+        Ok((Self { newest, seen: 0, heard_ms: None, tool: start, reads: 0, open, over }, watching))
     }
 }
 
@@ -134,7 +173,10 @@ impl HapticDevice for Watched {
         self.tool.time_ms = time_ms;
         let silent_ms = self.heard_ms.map_or(0.0, |heard| time_ms - heard);
         let status = match silent_ms {
-            ms if ms > OVER_MS => Status::Finished,
+            ms if ms > OVER_MS => {
+                self.over.store(true, Ordering::Relaxed);
+                Status::Finished
+            }
             ms if ms > STALE_MS => Status::Stale,
             _ => Status::Fresh,
         };
@@ -149,5 +191,50 @@ impl HapticDevice for Watched {
 
     fn close(&mut self) {
         self.open.store(false, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use trepan_geometry::Pose;
+
+    /// A watcher of a session that was shared until it was heard.
+    pub(crate) fn heard(name: &str) -> (Watched, Watching) {
+        let trainee = Session::join(name).unwrap();
+        let mut ticks = trainee.publisher::<TickRecord>().unwrap();
+        let heard = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !heard.load(Ordering::Relaxed) {
+                    ticks.send(&TickRecord { tick: 1, ..TickRecord::default() }).unwrap();
+                    std::thread::sleep(LOOK);
+                }
+            });
+            let opened = Watched::open(name, ToolState::at(Pose::IDENTITY), &Stop::default());
+            heard.store(true, Ordering::Relaxed);
+            opened.unwrap()
+        })
+    }
+
+    #[test]
+    fn a_watched_session_that_falls_silent_has_ended() {
+        let name = format!("watched-{}", std::process::id());
+        let (mut watched, watching) = heard(&name);
+        // The pump takes in what was still on its way.
+        std::thread::sleep(Duration::from_millis(200));
+        assert_eq!((watched.read(0.0).status, watched.read(OVER_MS).status), (Status::Fresh, Status::Stale));
+        assert_eq!(watching.ended(), None);
+        assert_eq!(watched.read(OVER_MS + 1.0).status, Status::Finished);
+        assert_eq!(watching.ended().unwrap(), format!("the watched session {name} has ended"));
+        watched.close();
+    }
+
+    #[test]
+    fn nobody_is_not_watched() {
+        let stop = Stop::default();
+        stop.ask();
+        let fault = Watched::open("nobody-at-all", ToolState::at(Pose::IDENTITY), &stop).err().unwrap().to_string();
+        assert!(fault.contains("nobody-at-all") && fault.contains("--share"), "{fault}");
     }
 }

@@ -30,6 +30,8 @@ pub struct Album {
     pub painter: Option<Painter>,
     /// Pictures written.
     pub frames: u64,
+    /// Time in which they were drawn, s.
+    pub seconds: f64,
     /// Those for the report.
     pub shots: Vec<Shot>,
     /// What went wrong.
@@ -130,6 +132,7 @@ pub fn draw(mut eyes: Eyes, mut painter: Painter, table: &Table, per_second: f64
         }
         std::thread::sleep(Duration::from_millis(5));
     }
+    album.seconds = clock.now_ms() * 1e-3;
     album.faults.extend(painter.notice().map(String::from));
     album.shots = chosen(&candidates);
     album.painter = Some(painter);

@@ -7,6 +7,7 @@
 use crate::program::Program;
 use crate::run::View;
 use crate::run::film::Shot;
+use crate::run::lockstep::up_to;
 use crate::run::stop::Stop;
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
@@ -25,6 +26,8 @@ use trepan_volume::BoneVolume;
 const MOST: usize = 500_000;
 /// Events of these kinds are no marks: they come many times a second.
 const STREAMED: [&str; 1] = ["score"];
+
+const HINT: &str = "a recorded session: Space runs it, the bar goes to any time";
 
 /// The film, and where it is.
 struct Film {
@@ -105,6 +108,7 @@ struct Player {
     colours: Colours,
     keeper: Keeper,
     stop: Stop,
+    hint: String,
     /// Closes by itself then, s.
     until_s: f64,
 }
@@ -121,7 +125,7 @@ pub fn show(
 ) -> Album {
     let bone = opened.table.scene.bone.clone().filter(|_| opened.table.program.has_bone());
     let player = Player {
-        timeline: timeline(recording),
+        timeline: timeline(recording, until_s),
         now_s: None,
         first,
         case: opened.case.into(),
@@ -130,6 +134,7 @@ pub fn show(
         colours: opened.table.colours(),
         keeper: Keeper::into_folder(&opened.out.join("window")),
         stop: stop.clone(),
+        hint: recording.losses().map_or_else(|| HINT.into(), |losses| format!("not a whole recording: {losses}")),
         until_s,
         film: Film { shots: Vec::new(), coming, bone, at: 0, positions: Vec::new() },
     };
@@ -139,8 +144,8 @@ pub fn show(
     album
 }
 
-/// The whole of a recording, with its events.
-fn timeline(recording: &Recording) -> Timeline {
+/// A recording up to a time, s, with its events.
+fn timeline(recording: &Recording, until_s: f64) -> Timeline {
     let told =
         recording.events.iter().filter(|event| event.kind != "cleared" && !STREAMED.contains(&event.kind.as_str()));
     let mark = |event: &trepan_link::wire::EventRecord| Mark {
@@ -148,8 +153,9 @@ fn timeline(recording: &Recording) -> Timeline {
         text: event.text.clone(),
         warning: event.kind == "warning",
     };
-    let length_s = recording.ticks.last().map_or(0.0, |tick| tick.time_ms * 1e-3);
-    Timeline { at_s: 0.0, length_s, ready_s: 0.0, running: true, speed: 1.0, marks: told.map(mark).collect() }
+    let length_s = up_to(recording, 1e3 * until_s).last().map_or(0.0, |tick| tick.time_ms * 1e-3);
+    let marks = told.map(mark).filter(|mark| mark.at_s <= until_s).collect();
+    Timeline { at_s: 0.0, length_s, ready_s: 0.0, running: true, speed: 1.0, marks }
 }
 
 /// Moves on by the time since the last picture, after what the user asked for.
@@ -183,7 +189,7 @@ impl Session for Player {
         let mut panel = said::panel(&self.case, self.program, self.view());
         panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
         let finished = self.stop.asked() || input.seconds > self.until_s;
-        let hint = "a recorded session: Space runs it, the bar goes to any time".into();
+        let hint = self.hint.clone();
         Panel { hint, timeline: Some(self.timeline.clone()), finished, ..panel }
     }
 
@@ -211,6 +217,7 @@ mod tests {
     use glam::IVec3;
     use std::sync::mpsc::channel;
     use trepan_geometry::{Pose, ToolState};
+    use trepan_link::wire::TickRecord;
     use trepan_volume::VoxelVolume;
 
     fn view(time_ms: f64) -> View {
@@ -278,7 +285,11 @@ mod tests {
         };
         let events =
             vec![event("score", "{}"), event("warning", "near"), event("cleared", "near"), event("phase", "brain")];
-        let marks = timeline(&Recording { events, ..Recording::default() }).marks;
+        let tick = |time_ms| TickRecord { time_ms, ..TickRecord::default() };
+        let recording =
+            Recording { events, ticks: vec![tick(500.0), tick(1000.0), tick(3000.0)], ..Recording::default() };
+        assert_eq!((timeline(&recording, 1.0).length_s, timeline(&recording, 1.0).marks.len()), (1.0, 0));
+        let marks = timeline(&recording, f64::INFINITY).marks;
         let texts: Vec<_> = marks.iter().map(|mark| (mark.text.as_str(), mark.warning, mark.at_s)).collect();
         assert_eq!(texts, [("near", true, 1.5), ("brain", false, 1.5)]);
     }

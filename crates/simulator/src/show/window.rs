@@ -8,6 +8,7 @@ use crate::program::Program;
 use crate::report::page::Shot;
 use crate::run::lesson::{ASKED, Company, Teacher};
 use crate::run::stop::Stop;
+use crate::run::watch::Watching;
 use crate::run::{Eyes, View};
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
@@ -142,8 +143,10 @@ pub fn run<S: window::Session + 'static>(
     let start = Start::with(eye, at.sample.state.world_from_tool);
     let detail = opened.table.models.setup.picture.detail as f32;
     let start = Start { microscope: Some(microscope(&opened.table.scene.site)), detail, ..start };
-    let closed = window::run(&format!("Trepan {}", opened.table.program.name()), painter, session, start);
-    let (mut painter, session) = (closed.renderer, closed.session);
+    let counted = Counted { session, pictures: 0, seconds: [0.0; 2] };
+    let closed = window::run(&format!("Trepan {}", opened.table.program.name()), painter, counted, start);
+    let (mut painter, Counted { session, pictures, seconds: [from, to] }) = (closed.renderer, closed.session);
+    (album.frames, album.seconds) = (album.frames + pictures, to - from);
     album.add(shot(&mut painter, &session.frame(eye), &folder, "after"));
     if let Err(fault) = closed.result {
         tracing::error!("{fault}");
@@ -151,6 +154,31 @@ pub fn run<S: window::Session + 'static>(
     }
     album.painter = Some(painter);
     (session, album)
+}
+
+/// A session whose pictures in the window are counted.
+struct Counted<S> {
+    session: S,
+    pictures: u64,
+    /// When the first and the newest of them were drawn, s.
+    seconds: [f64; 2],
+}
+
+impl<S: window::Session> window::Session for Counted<S> {
+    fn update(&mut self, input: &WindowInput) -> Panel {
+        let first = if self.pictures == 0 { input.seconds } else { self.seconds[0] };
+        self.seconds = [first, input.seconds];
+        self.pictures += 1;
+        self.session.update(input)
+    }
+
+    fn frame(&self, camera: Camera) -> Frame<'_> {
+        self.session.frame(camera)
+    }
+
+    fn capture(&mut self, what: Capture, picture: Image) {
+        self.session.capture(what, picture);
+    }
 }
 
 fn shot(painter: &mut Painter, frame: &Frame<'_>, folder: &Path, caption: &str) -> Result<Shot, String> {
@@ -171,6 +199,16 @@ impl window::Session for Show {
         let flap = || Action { name: "Lift the flap, or put it back".into(), key: Some('f'), on: false };
         let mut panel = said::panel(&self.case, self.program, view);
         panel.warnings.extend(lesson.warnings);
+        // Who watches reads that the other session is over, and closes the window in her own time.
+        let over = self.company.watching.as_ref().and_then(Watching::ended);
+        let finished = match over {
+            Some(_) => self.stop.signal().is_some(),
+            None => view.finished || self.stop.asked(),
+        };
+        if let Some(text) = over {
+            panel.warnings.clear();
+            panel.news = vec![format!("{text}: close the window (Q)")];
+        }
         if !by_hand {
             panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
         }
@@ -181,7 +219,7 @@ impl window::Session for Show {
             wanted_rate_hz: self.wanted_rate_hz,
             actions: (by_hand && self.bone_shown).then(flap).into_iter().chain(lesson.actions).collect(),
             leash: by_hand.then(|| Leash { tip: view.sample.state.tip(), length_mm: LEASH_MM }),
-            finished: view.finished || self.stop.asked(),
+            finished,
             ..panel
         }
     }
@@ -278,11 +316,63 @@ fn taught(teacher: &mut Teacher, input: &WindowInput) -> Lesson {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::run::watch::tests::heard;
+    use crate::stages::haptic_tick::ToolSample;
+    use trepan_geometry::ToolState;
+    use trepan_haptics::HapticDevice;
+    use trepan_link::cell::cell;
 
     #[test]
     fn a_trainee_reads_what_is_asked() {
         let lesson = Lesson::asked(TeacherRecord::PAUSE | TeacherRecord::BLEEDING | TeacherRecord::GHOST);
         assert_eq!(lesson.warnings, [ASKED[2].1]);
+    }
+
+    #[test]
+    fn a_window_on_a_session_that_has_ended_says_so_and_stays() {
+        let (mut watched, watching) = heard(&format!("ended-{}", std::process::id()));
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        let start = ToolState::at(Pose::IDENTITY);
+        let sample = ToolSample { tick: 0, state: start, tool: Program::Brain.tray()[0], slot: 0, drilling: false };
+        let (mut writer, view) = cell(View::at(sample, 1.0));
+        let mut show = Show {
+            view: View::at(sample, 1.0),
+            eyes: Eyes { view, soft: None, film: None },
+            positions: Vec::new(),
+            case: "case".into(),
+            program: Program::Brain,
+            wanted_rate_hz: 1000.0,
+            bone_shown: false,
+            colours: Colours::default(),
+            pointer: None,
+            company: Company { watching: Some(watching), ..Company::default() },
+            markers: Vec::new(),
+            ghost: None,
+            requests: Requests::default(),
+            rate: Rate::default(),
+            keeper: Keeper::into_folder(Path::new("nowhere")),
+            stop: Stop::default(),
+        };
+        let input = WindowInput {
+            world_from_tool: Pose::IDENTITY,
+            pedal: false,
+            next_tool: false,
+            undo: false,
+            chosen: None,
+            actions: 0,
+            playback: None,
+            camera: Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0),
+            seconds: 0.0,
+        };
+        assert!(window::Session::update(&mut show, &input).news.is_empty());
+        watched.read(0.0);
+        watched.read(1e4);
+        writer.set(View { finished: true, ..show.view });
+        show.stop.ask();
+        let panel = window::Session::update(&mut show, &input);
+        assert!(!panel.finished && panel.news[0].contains("has ended"), "{:?}", panel.news);
+        show.company.watching = None;
+        assert!(window::Session::update(&mut show, &input).finished, "a session of one's own closes");
     }
 
     #[test]

@@ -86,7 +86,7 @@ mod tests {
     fn the_recorded_paths_are_whole_and_press_as_a_hand_does() {
         for name in NAMES {
             let recording = Recording::open(&trepan_fixtures::recorded_path(name)).unwrap();
-            assert_eq!((recording.ticks.len(), recording.truncated), (TICKS, false));
+            assert_eq!((recording.ticks.len(), recording.losses()), (TICKS, None));
             let depths: Vec<f32> = recording.ticks.iter().map(|tick| tick.tissue_depth_mm).collect();
             let (deepest, touching) =
                 (depths.iter().copied().fold(0.0, f32::max), depths.iter().filter(|d| **d > 0.0).count());

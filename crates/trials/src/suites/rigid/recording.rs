@@ -188,7 +188,7 @@ mod tests {
             for task in [Task::Touch, Task::Drill] {
                 let file = trepan_fixtures::recorded_path(&name(place, task));
                 let recording = Recording::open(&file).unwrap();
-                assert_eq!((recording.ticks.len(), recording.truncated), (place.ticks(), false));
+                assert_eq!((recording.ticks.len(), recording.losses()), (place.ticks(), None));
                 let deepest = recording.ticks.iter().map(|tick| tick.depth_mm).fold(0.0, f32::max);
                 assert!((0.2..1.65).contains(&deepest), "{place:?} {task:?}: {deepest} mm");
                 let removed: f32 = recording.ticks.iter().map(|tick| tick.removed_mm3).sum();

@@ -1,0 +1,172 @@
+//! Recordings that are damaged, cut, or of another case: a replay says so, and a repair keeps what can be read.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use trepan_link::Recording;
+
+fn integrated(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_integrated"));
+    command.env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"));
+    command.args(arguments).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes)).concat()
+}
+
+/// A place for files, with a recorded session of three seconds.
+struct Bench {
+    folder: tempfile::TempDir,
+    whole: Vec<u8>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let bench = Self { folder, whole: Vec::new() };
+        let live = bench.path("live");
+        let run = bench.session(&live, &["--quality", "usual", "--duration", "3"]);
+        assert!(run.status.success(), "{}", said(&run));
+        Self { whole: fs::read(live.join("session.mcap")).unwrap(), ..bench }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn file(&self, name: &str, bytes: &[u8]) -> PathBuf {
+        fs::write(self.path(name), bytes).unwrap();
+        self.path(name)
+    }
+
+    fn session(&self, out: &Path, more: &[&str]) -> Output {
+        let out = out.to_str().unwrap();
+        integrated(&[&["--headless", "--frames-per-second", "0", "--out", out], more].concat())
+    }
+
+    fn again(&self, file: &Path, more: &[&str]) -> (Output, Value) {
+        let out = self.path("again");
+        let device = format!("replay:{}", file.display());
+        let output = self.session(&out, &[&["--device", &device], more].concat());
+        let summary = fs::read(out.join("summary.json")).map_or(Value::Null, |b| serde_json::from_slice(&b).unwrap());
+        (output, summary)
+    }
+}
+
+#[test]
+fn a_replay_of_a_damaged_recording_says_so_and_a_repair_keeps_the_rest() {
+    let bench = Bench::new();
+    let all = Recording::of_bytes(&bench.whole, Path::new("whole")).unwrap().ticks.len();
+    let mut bytes = bench.whole.clone();
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 16].fill(0x5a);
+    let damaged = bench.file("damaged.mcap", &bytes);
+
+    let (output, summary) = bench.again(&damaged, &[]);
+    let text = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    let ran = summary["replay"]["ticks"].as_u64().unwrap() as usize;
+    assert!(ran > 100 && ran < all && summary["replay"]["recorded"] == all, "{}", summary["replay"]);
+    assert!(summary["replay"]["identical"] == ran, "what came before the damage is as recorded");
+    for word in [&format!("replay: a part only, {ran} of at least {all} ticks"), "at byte", "recording repair"] {
+        assert!(text.contains(word), "{word:?} is missing: {text}");
+    }
+    assert!(summary["remarks"].to_string().contains("is not whole"), "{}", summary["remarks"]);
+
+    let repaired = bench.path("repaired.mcap");
+    let [from, to] = [&damaged, &repaired].map(|path| path.to_str().unwrap());
+    let check = |file| integrated(&["recording", "check", file]);
+    assert!(
+        check(from).status.code() == Some(1) && said(&check(from)).contains(&format!("of {all} ticks can be read"))
+    );
+    let mend = integrated(&["recording", "repair", from, to]);
+    assert!(mend.status.success() && said(&mend).contains("are missing"), "{}", said(&mend));
+    let kept = Recording::open(&repaired).unwrap();
+    assert!(kept.indexed && kept.damage.is_none() && kept.ticks.len() > all - 250, "{}", kept.ticks.len());
+    let again = integrated(&["recording", "repair", from, to]);
+    assert!(again.status.code() == Some(2) && said(&again).contains("exists already"));
+    let (output, _) = bench.again(&repaired, &[]);
+    assert_eq!(output.status.code(), Some(1), "ticks are missing: {}", said(&output));
+}
+
+#[test]
+fn a_cut_recording_is_run_as_far_as_it_goes_or_refused() {
+    let bench = Bench::new();
+    let killed = bench.file("killed.mcap", &bench.whole[..bench.whole.len() * 2 / 3]);
+    let (output, summary) = bench.again(&killed, &[]);
+    assert!(output.status.code() == Some(1) && said(&output).contains("a part only"), "{}", said(&output));
+    assert!(summary["replay"]["losses"].as_str().unwrap().contains("cut or damaged"));
+
+    fs::remove_dir_all(bench.path("again")).unwrap();
+    let stump = bench.file("stump.mcap", &bench.whole[..3000]);
+    let (output, _) = bench.again(&stump, &[]);
+    let text = said(&output);
+    assert!(output.status.code() == Some(2) && !bench.path("again").exists(), "{text}");
+    assert!(text.contains("nothing to run again") && text.contains("recording repair"), "{text}");
+
+    let folder = bench.path("runs");
+    fs::create_dir(&folder).unwrap();
+    fs::copy(&killed, folder.join("a.mcap")).unwrap();
+    fs::write(folder.join("b.mcap"), &bench.whole).unwrap();
+    let (output, _) = bench.again(&folder, &[]);
+    assert!(output.status.code() == Some(1) && said(&output).contains("1 of 2 recordings"), "{}", said(&output));
+    assert!(integrated(&["recording", "check", folder.join("b.mcap").to_str().unwrap()]).status.success());
+}
+
+#[test]
+fn a_replay_lasts_no_longer_than_it_was_told() {
+    let bench = Bench::new();
+    let file = bench.file("whole.mcap", &bench.whole);
+    let (output, summary) = bench.again(&file, &["--duration", "1"]);
+    assert!(output.status.success(), "{}", said(&output));
+    let replay = &summary["replay"];
+    let ticks = replay["ticks"].as_u64().unwrap();
+    assert!((800..1010).contains(&ticks) && replay["identical"] == ticks, "{replay}");
+    assert!(replay["recorded"].as_u64().unwrap() > 2000 && said(&output).contains("a part only"), "{replay}");
+    let (output, summary) = bench.again(&file, &["--duration", "3"]);
+    assert!(output.status.success() && summary["replay"]["ticks"] == summary["replay"]["recorded"]);
+}
+
+#[test]
+fn a_recording_is_not_overwritten_by_its_replay() {
+    let bench = Bench::new();
+    let live = bench.path("live");
+    let file = live.join("session.mcap");
+    let device = format!("replay:{}", file.display());
+    let output = bench.session(&live, &["--device", &device, "--duration", "1"]);
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(fs::read(&file).unwrap() == bench.whole && live.join("replay.mcap").exists());
+    let record = ["--device", &device, "--record", file.to_str().unwrap()];
+    assert_eq!(bench.session(&live, &record).status.code(), Some(2));
+}
+
+#[test]
+fn a_recording_of_another_patient_is_refused() {
+    let bench = Bench::new();
+    let file = bench.file("whole.mcap", &bench.whole);
+    let head = trepan_fixtures::case_head();
+    // Another byte behind the voxels: as good as another patient.
+    let mut bytes = fs::read(&head.ct).unwrap();
+    bytes.push(0);
+    let ending: String = head.ct.file_name().unwrap().to_string_lossy().into();
+    let other = bench.file(&format!("other-{ending}"), &bytes);
+    let mri = head.mri.to_str().unwrap();
+    let (output, _) = bench.again(&file, &["--ct", other.to_str().unwrap(), "--mri", mri]);
+    let text = said(&output);
+    assert!(output.status.code() == Some(2) && text.contains("another case") && text.contains("--ct"), "{text}");
+    assert!(!bench.path("again").exists());
+    // The same images with other voxels, and by their own names: the same patient.
+    let own = ["--ct", head.ct.to_str().unwrap(), "--mri", mri, "--spacing-mm", "2", "--duration", "0.5"];
+    let (output, summary) = bench.again(&file, &own);
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(summary["remarks"].to_string().contains("made otherwise"), "{}", summary["remarks"]);
+    let out = bench.path("compare");
+    let coarse = bench.path("again").join("session.mcap");
+    let compared =
+        integrated(&["compare", file.to_str().unwrap(), coarse.to_str().unwrap(), "--out", out.to_str().unwrap()]);
+    let page = fs::read_to_string(out.join("compare.html")).unwrap();
+    assert!(compared.status.success() && page.contains("One patient") && !page.contains("different anatomies"));
+}

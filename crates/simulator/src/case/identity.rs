@@ -1,0 +1,105 @@
+//! Of which patient a session is: told by the hashes of the images, whatever was made of them.
+//!
+//! # Practice
+//! The hash of a case changes with voxel size, tetrahedra and version; those of its images do not. Recordings of older
+//! versions hold the former only: then a name may tell, or nothing.
+
+use crate::case::cache::digest_of_all;
+use crate::case::{Inputs, Recipe};
+use crate::error::SessionError;
+use std::collections::BTreeMap;
+use trepan_link::wire::SessionHeader;
+
+/// How the names of users' own cases begin; digits of the hash follow.
+pub const USERS: &str = "case-";
+/// The entry of a header's hashes that is the case's.
+const CASE: &str = "case";
+
+/// What tells patients apart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Identity {
+    /// Name of the case; empty where it is not known.
+    pub name: String,
+    /// Hash of what was made of the images, where that is known.
+    pub case: Option<String>,
+    /// Hash of each image, by `ct` and `mri`.
+    pub images: BTreeMap<String, String>,
+}
+
+impl Identity {
+    /// As a recording's header keeps it.
+    pub fn of(header: &SessionHeader) -> Self {
+        let mut images = header.hashes.clone();
+        let case = images.remove(CASE);
+        Self { name: header.case.clone(), case, images }
+    }
+
+    /// Whether both are of one patient; `None` where that cannot be told.
+    pub fn is(&self, other: &Self) -> Option<bool> {
+        let mut shared =
+            self.images.iter().filter_map(|(image, hash)| Some(other.images.get(image)? == hash)).peekable();
+        if shared.peek().is_some() {
+            return Some(shared.all(|same| same));
+        }
+        if self.case.is_some() && self.case == other.case {
+            return Some(true);
+        }
+        match (self.built_in()?, other.built_in()?) {
+            (true, true) => Some(self.name == other.name),
+            (false, false) => None,
+            _ => Some(false),
+        }
+    }
+
+    /// As a recording's header keeps it.
+    pub fn hashes(&self) -> BTreeMap<String, String> {
+        let case = self.case.iter().map(|hash| (CASE.to_string(), hash.clone()));
+        self.images.clone().into_iter().chain(case).collect()
+    }
+
+    fn built_in(&self) -> Option<bool> {
+        let digits = |name: &str| name.strip_prefix(USERS).is_some_and(|d| d.bytes().all(|b| b.is_ascii_hexdigit()));
+        (!self.name.is_empty()).then(|| !digits(&self.name))
+    }
+
+    /// In words: the name, and how the hashes of the images begin.
+    pub fn told(&self) -> String {
+        let short = |hash: &str| hash.chars().take(8).collect::<String>();
+        let images = self.images.iter().map(|(image, hash)| format!("{image} {}", short(hash)));
+        let case = self.case.iter().map(|hash| format!("hash {}", short(hash)));
+        let hashes: Vec<String> = if self.images.is_empty() { case.collect() } else { images.collect() };
+        let name = if self.name == USERS { "the images that are given" } else { &self.name };
+        format!("{name} ({})", hashes.join(", "))
+    }
+}
+
+/// The hash of each of the patient's images, by `ct` and `mri`.
+pub fn images(inputs: &Inputs, recipe: &Recipe) -> Result<BTreeMap<String, String>, SessionError> {
+    let images = [("ct", &inputs.ct, recipe.ct_series), ("mri", &inputs.mri, recipe.mri_series)];
+    let given = images.into_iter().filter_map(|(name, path, series)| Some((name, path.as_deref()?, series)));
+    given.map(|(name, path, series)| Ok((name.into(), digest_of_all(&format!("{series:?}"), &[path])?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known(name: &str, case: &str, images: &[(&str, &str)]) -> Identity {
+        let images = images.iter().map(|(image, hash)| (image.to_string(), hash.to_string())).collect();
+        Identity { name: name.into(), case: (!case.is_empty()).then(|| case.into()), images }
+    }
+
+    #[test]
+    fn images_tell_patients_apart_and_older_recordings_only_what_they_can() {
+        let fine = known("case-1", "1", &[("ct", "a"), ("mri", "b")]);
+        assert_eq!(fine.is(&known("case-2", "2", &[("ct", "a"), ("mri", "b")])), Some(true), "another voxel size");
+        assert_eq!(fine.is(&known("case-3", "3", &[("ct", "a")])), Some(true), "drilled only");
+        assert_eq!(fine.is(&known("case-4", "4", &[("ct", "a"), ("mri", "c")])), Some(false));
+        let old = known("case-5", "5", &[]);
+        assert_eq!((old.is(&fine), old.is(&known("case-6", "6", &[])), old.is(&old)), (None, None, Some(true)));
+        assert_eq!(known("case-head", "7", &[]).is(&known("case-head", "8", &[])), Some(true), "built in");
+        assert_eq!(known("case-head", "7", &[]).is(&old), Some(false));
+        assert_eq!(known("", "", &[]).is(&old), None);
+        assert!(fine.told().contains("case-1 (ct a, mri b)") && old.told().contains("hash 5"));
+    }
+}
