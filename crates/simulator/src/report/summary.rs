@@ -389,6 +389,43 @@ fn warnings(outcome: &Outcome) -> Vec<Raised> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::models::{BoneSummary, PictureSummary, TissueSummary};
+
+    fn about() -> About {
+        let why = String::new;
+        About {
+            program: Program::Craniotomy,
+            case: "a case".into(),
+            device: "mouse".into(),
+            second_device: String::new(),
+            models: ModelSummary {
+                quality: "usual",
+                bone: BoneSummary { method: "distance-field", spacing_mm: 1.0, points: 0, why: why() },
+                tissue: TissueSummary { solver: "tled", tets: 0, halvings: 0, still_mm: 0.0, why: why() },
+                picture: PictureSummary { sparse: false, detail: 1.0, why: why() },
+                planned_cores: None,
+            },
+            solver: String::new(),
+            brain: [0; 3],
+            asked_hz: 1000.0,
+            frames: 0,
+            cut_off: CutOff::default(),
+            plan: None,
+            regions: Vec::new(),
+            remarks: vec!["another".into()],
+            machine: Machine::here(None),
+        }
+    }
+
+    #[test]
+    fn a_slow_session_has_a_remark_and_a_replay_has_none() {
+        let mut outcome = Outcome { seconds: 10.0, ..Outcome::default() };
+        outcome.ticks.count = 9920;
+        let live = Summary::new(about(), &outcome);
+        assert!(live.remarks.len() == 2 && live.remarks[0].contains("992.0"), "{:?}", live.remarks);
+        outcome.replayed = Some(Replayed::default());
+        assert_eq!(Summary::new(about(), &outcome).remarks, ["another"]);
+    }
 
     #[test]
     fn each_stroke_that_came_through_has_its_time() {
