@@ -178,7 +178,8 @@ impl BoneVolume {
         if let Some(at) = self.index(voxel) {
             let brick = self.brick_of(voxel);
             if self.strokes.is_first(brick) {
-                self.strokes.keep(brick, |n| self.hu(self.voxel_in(brick, n)));
+                let low = self.low_of(brick);
+                self.strokes.keep(brick, |n| self.hu(low + Self::within(n)));
             }
             self.hu[at].store(hu, Ordering::Relaxed);
             if hu >= self.isovalue {
@@ -207,11 +208,15 @@ impl BoneVolume {
         if inside { self.versions[at()].load(Ordering::Acquire) } else { 0 }
     }
 
-    /// The `n`th voxel of a brick.
-    fn voxel_in(&self, brick: usize, n: usize) -> IVec3 {
+    /// The lowest voxel of a brick.
+    fn low_of(&self, brick: usize) -> IVec3 {
         let [bx, by, _] = self.bricks;
-        let low = [brick % bx, brick / bx % by, brick / (bx * by)].map(|b| (b * BRICK) as i32);
-        IVec3::from(low) + IVec3::new((n % BRICK) as i32, (n / BRICK % BRICK) as i32, (n / (BRICK * BRICK)) as i32)
+        IVec3::from([brick % bx, brick / bx % by, brick / (bx * by)].map(|b| (b * BRICK) as i32))
+    }
+
+    /// The way from the lowest voxel of a brick to its `n`th.
+    fn within(n: usize) -> IVec3 {
+        IVec3::new((n % BRICK) as i32, (n / BRICK % BRICK) as i32, (n / (BRICK * BRICK)) as i32)
     }
 
     /// Index of the brick of a voxel inside the grid.

@@ -11,15 +11,15 @@
 //!
 //! # Practice
 //! A tool counts with its tip and its shaft and a voxel of room around them, where contact lets it be. Nothing cuts, no tool
-//! changes and no flap moves meanwhile. The largest stroke takes a quarter of a second at 1 kHz, a burr hole a few ticks. All of it is a
+//! changes and no flap moves meanwhile. The largest stroke takes half a second at 1 kHz, a burr hole a few ticks. All of it is a
 //! function of the ticks; nothing allocates.
 
 use crate::stages::notice::Hindrance;
 use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_volume::{BoneVolume, MAX_STROKES};
 
-/// Bricks put back in a tick: some 10 us.
-const BRICKS: usize = 16;
+/// Bricks put back in a tick: some 20 us.
+const BRICKS: usize = 8;
 
 /// What is known of a stroke beside its bone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

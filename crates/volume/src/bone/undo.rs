@@ -40,9 +40,14 @@ impl BoneVolume {
     /// microsecond.
     pub fn exchange_brick(&self, n: usize) {
         let Some((brick, copy)) = self.strokes.kept(n) else { return };
-        for (at, copy) in copy.iter().enumerate().filter_map(|(n, c)| Some((self.index(self.voxel_in(brick, n))?, c))) {
-            let before = copy.swap(self.hu[at].load(Ordering::Relaxed), Ordering::Relaxed);
-            self.hu[at].store(before, Ordering::Relaxed);
+        let low = self.low_of(brick);
+        for (n, copy) in copy.iter().enumerate() {
+            if let Some(at) = self.index(low + Self::within(n)) {
+                // Not a swap, which would lock the bus: there is one writer.
+                let before = copy.load(Ordering::Relaxed);
+                copy.store(self.hu[at].load(Ordering::Relaxed), Ordering::Relaxed);
+                self.hu[at].store(before, Ordering::Relaxed);
+            }
         }
         self.versions[brick].fetch_add(1, Ordering::Release);
         self.came_back();
@@ -52,10 +57,11 @@ impl BoneVolume {
     /// asked first, with the centre of the brick and its half diagonal, mm.
     pub fn brings_back(&self, n: usize, near: impl Fn(Vec3, f32) -> bool, taken: impl Fn(Vec3) -> bool) -> bool {
         let Some((brick, copy)) = self.strokes.kept(n) else { return false };
-        let middle = self.centre_of(self.voxel_in(brick, 0)) + Vec3::splat(0.5 * (BRICK - 1) as f32 * self.spacing_mm);
+        let low = self.low_of(brick);
+        let middle = self.centre_of(low) + Vec3::splat(0.5 * (BRICK - 1) as f32 * self.spacing_mm);
         let half = 0.5 * 3f32.sqrt() * BRICK as f32 * self.spacing_mm;
         let comes = |n: usize, copy: &AtomicI16| {
-            let voxel = self.voxel_in(brick, n);
+            let voxel = low + Self::within(n);
             let gone = copy.load(Ordering::Relaxed) >= self.isovalue && !self.is_bone(voxel);
             gone && taken(self.centre_of(voxel))
         };
