@@ -34,9 +34,9 @@ pub trait Hollow {
     /// Distance to the wall, positive in the hollow, mm, and its unit gradient, away from the wall.
     fn distance(&mut self, place: Vec3) -> (f32, Vec3);
 
-    /// Whether the wall is there for a node, at a place of the wall's surface with this way out.
-    fn stands(&mut self, node: u32, place: Vec3, outward: Vec3) -> bool {
-        let _ = (node, place, outward);
+    /// Whether the wall is there for a node that is so deep, mm, at a place of the wall's surface with this way out.
+    fn stands(&mut self, node: u32, depth_mm: f32, place: Vec3, outward: Vec3) -> bool {
+        let _ = (node, depth_mm, place, outward);
         true
     }
 }
@@ -124,7 +124,7 @@ impl SlidingWall {
                 }
             };
             let near = depth_mm > -self.ahead_mm && depth_mm.is_finite() && normal != Vec3::ZERO;
-            if near && wall.stands(node, at - depth_mm * normal, normal) {
+            if near && wall.stands(node, depth_mm, at - depth_mm * normal, normal) {
                 out.push_plane(PlaneContact {
                     node,
                     normal,

@@ -66,7 +66,7 @@ const SAMPLE_EVERY: usize = 4;
 /// How far around the ball triangles get springs, radii.
 const WAITING: f32 = 0.25;
 /// Share by which weights and normals of a spring that stays go to what is found, each step.
-const FOLLOWED: f32 = 0.1;
+const FOLLOWED: f32 = 0.03;
 /// Normals blend over this many radii.
 const BLEND: f32 = 0.5;
 

@@ -24,10 +24,10 @@ pub fn read(path: &Path) -> Result<TriMesh, FileError> {
 /// Writes a surface as binary PLY, whole or not at all.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
-        write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", mesh.positions.len())?;
-        write!(out, "property float x\nproperty float y\nproperty float z\n")?;
-        write!(out, "element face {}\n", mesh.triangles.len())?;
-        write!(out, "property list uchar uint vertex_indices\nend_header\n")?;
+        writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", mesh.positions.len())?;
+        writeln!(out, "property float x\nproperty float y\nproperty float z")?;
+        writeln!(out, "element face {}", mesh.triangles.len())?;
+        writeln!(out, "property list uchar uint vertex_indices\nend_header")?;
         mesh.positions.iter().flat_map(|p| p.to_array()).try_for_each(|c| out.write_all(&c.to_le_bytes()))?;
         for triangle in &mesh.triangles {
             out.write_all(&[3])?;

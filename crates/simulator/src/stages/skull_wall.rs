@@ -113,12 +113,14 @@ impl Hollow for Carved<'_> {
         (phi, if phi < NEAR_MM { self.field.gradient(place) } else { Vec3::ZERO })
     }
 
-    fn stands(&mut self, node: u32, place: Vec3, outward: Vec3) -> bool {
+    fn stands(&mut self, node: u32, depth_mm: f32, place: Vec3, outward: Vec3) -> bool {
         let stands = &mut self.stands[node as usize];
         if self.reads_bone {
             let behind = BEHIND_MM.map(|mm| self.bone.voxel_of(place + mm * outward));
             let is_bone = behind.iter().any(|voxel| self.bone.is_bone(*voxel));
-            *stands = is_bone || !behind.iter().any(|voxel| self.before.has(*voxel));
+            let there = is_bone || !behind.iter().any(|voxel| self.before.has(*voxel));
+            // Who went out through the opening is not caught by its rim.
+            *stands = there && (*stands || depth_mm <= 0.0);
         }
         *stands
     }

@@ -118,7 +118,7 @@ fn a_brain_without_skull_is_touched_at_its_surface() {
 /// A patient's opening on the skull of each preset, and between.
 fn on_every_preset(ct: &Path, brain: &Path, wanted: Option<[f32; 3]>) -> Vec<Opening> {
     let ct = hounsfield(&read(ct).unwrap()).unwrap();
-    let classes = cropped(&largest_component(&read(brain).unwrap().map(|v| u8::from(v != 0.0))));
+    let classes = cropped(&largest_component(&read(brain).unwrap().map(|v| u8::from(v != 0.0)))).unwrap();
     let isovalue = bone_isovalue(&ct);
     let on = |spacing_mm| {
         let recipe = Recipe { spacing_mm, opening: wanted, ..RECIPE };
