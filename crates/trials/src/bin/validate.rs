@@ -30,7 +30,7 @@ struct Arguments {
 
 #[derive(Args)]
 struct Run {
-    /// The suites to run, or one's parts that begin so, as in rigid/walls [default: all but those that fetch programs of others]
+    /// The suites to run, or one's parts that begin so, as in rigid/walls [default: all but those that run when named only]
     suites: Vec<String>,
     /// Fewer and smaller scenes
     #[arg(long)]

@@ -6,6 +6,7 @@ mod force;
 mod haptics;
 mod mesh;
 mod operation;
+mod population;
 mod render;
 pub mod rigid;
 mod simulators;
@@ -17,8 +18,15 @@ use crate::part::nothing_more;
 pub use crate::part::{Part, Scope, Suite};
 pub(crate) use voxel_size::RULES;
 
-/// Suites that fetch programs of others: run when they are named only.
+/// Suites that run when they are named only: they fetch programs of others, or take an hour.
 pub const ON_REQUEST: &[Suite] = &[
+    Suite {
+        name: "population",
+        question: "do heads that no one has seen open, keep still and warn rightly, by every quality",
+        chart: ("displacement_mm", "jump_mm"),
+        parts: population::parts,
+        judge: population::judge,
+    },
     Suite {
         name: "render-rivals",
         question: "how fast is VTK's ray caster at an equal image error (fetched from Python's package index for this run)",
