@@ -180,16 +180,17 @@ mod tests {
 
     #[test]
     fn the_wheel_with_control_zooms_through_egui_and_pushes_nothing() {
-        let context = egui::Context::default();
         let turned = |modifiers: egui::Modifiers| {
+            let context = egui::Context::default();
             let (mut zoom, mut wheel) = (1.0, 0.0);
             for turn in [false, true, false, false, false] {
                 let unit = egui::MouseWheelUnit::Line;
                 let (delta, phase) = (egui::vec2(0.0, 1.0), egui::TouchPhase::Move);
-                let turn = turn.then_some(egui::Event::MouseWheel { unit, delta, phase, modifiers });
+                let source = egui::MouseWheelSource::Unknown;
+                let turn = turn.then_some(egui::Event::MouseWheel { unit, delta, phase, source, modifiers });
                 let events = [egui::Event::PointerMoved(egui::pos2(100.0, 100.0))].into_iter().chain(turn).collect();
                 let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(400.0, 300.0));
-                let input = egui::RawInput { screen_rect: Some(screen), events, modifiers, ..Default::default() };
+                let input = egui::RawInput { screen_rect: Some(screen), events, ..Default::default() };
                 let mut drawn = context.run_ui(input, |ui| {
                     let (_, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::click_and_drag());
                     let pointer = Pointer::over(ui, &response);
