@@ -151,7 +151,7 @@ fn told(ended: &Ended) -> ExitCode {
     }
     println!("report: {}", printable(&ended.out.join("report.html").display().to_string()));
     if let Some(lack) = &ended.lack {
-        println!("{lack}");
+        println!("{}", printable(lack));
         return ended.signal.map_or(ExitCode::FAILURE, |_| ended_by(ended.signal));
     }
     ended_by(ended.signal)

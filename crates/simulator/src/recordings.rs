@@ -1,6 +1,7 @@
 //! `recording check` and `recording repair`: what a recording holds, what it lacks, and a whole one made of the rest.
 
 use crate::case::identity::Identity;
+use crate::command::printable;
 use crate::error::SessionError;
 use crate::program::Program;
 use std::path::Path;
@@ -29,7 +30,7 @@ pub fn open(program: Program, file: &Path, case: &Identity) -> Result<Recording,
         let remedy = "give the --ct and --mri, or the --case, of that one, or none of them for the built-in case";
         return Err(SessionError::Usage(format!("--device: {fault}, this is {}; {remedy}", case.told())));
     }
-    losses.iter().for_each(|losses| tracing::warn!("{losses}"));
+    losses.iter().for_each(|losses| tracing::warn!("{}", printable(losses)));
     Ok(recording)
 }
 
@@ -53,7 +54,7 @@ pub fn unlike(recording: &Recording, case: &Identity) -> Option<String> {
 /// Says what a recording holds and lacks.
 pub fn check(program: Program, file: &Path) -> Result<ExitCode, SessionError> {
     let recording = Recording::open(file)?;
-    println!("{}: {}", file.display(), held(&recording));
+    say(file, &held(&recording));
     let no_index = || {
         let (program, file) = (program.name(), file.display());
         format!(
@@ -62,7 +63,7 @@ pub fn check(program: Program, file: &Path) -> Result<ExitCode, SessionError> {
     };
     let lack = not_whole(program, file, &recording).or_else(|| (!recording.indexed).then(no_index));
     Ok(lack.map_or(ExitCode::SUCCESS, |lack| {
-        println!("{lack}");
+        println!("{}", printable(&lack));
         ExitCode::FAILURE
     }))
 }
@@ -73,13 +74,17 @@ pub fn mend(file: &Path, out: &Path) -> Result<ExitCode, SessionError> {
         return Err(SessionError::Usage(format!("{} exists already: name a file that does not", out.display())));
     }
     if let Some(losses) = Recording::open(file)?.losses() {
-        println!("{}: {losses}", file.display());
+        say(file, &losses);
     }
     let repaired = repair(file, out)?;
     let recording = Recording::open(out)?;
-    println!("{}: {}, {} messages", out.display(), held(&recording), repaired.messages);
-    recording.losses().into_iter().for_each(|losses| println!("{}: {losses}", out.display()));
+    say(out, &format!("{}, {} messages", held(&recording), repaired.messages));
+    recording.losses().into_iter().for_each(|losses| say(out, &losses));
     Ok(ExitCode::SUCCESS)
+}
+
+fn say(file: &Path, text: &str) {
+    println!("{}", printable(&format!("{}: {text}", file.display())));
 }
 
 fn held(recording: &Recording) -> String {

@@ -117,7 +117,7 @@ impl Session {
         let feels = (&feel, second_feel.as_ref());
         let stages = self.table.stages(start.state, self.tick_ms(), feels, &Default::default())?;
         let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
-        let record = self.record();
+        let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
         let place = output::Place::make(&self.out, &record)?;
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
@@ -158,13 +158,6 @@ impl Session {
         }
         place.keep();
         Ok(Ended { summary, out: self.out, signal: stop.signal(), lack })
-    }
-
-    /// Where it is recorded: not over the recording that is run again.
-    fn record(&self) -> PathBuf {
-        let usual = self.out.join(output::RECORDING);
-        let again = matches!(&self.device, DeviceName::Replay(path) if same_file(path, &usual));
-        self.options.record.clone().unwrap_or(if again { self.out.join("replay.mcap") } else { usual })
     }
 
     /// What the recording that is run again lacks, and whether it is of another making of the case.
@@ -374,11 +367,6 @@ fn places(options: &Options) -> Result<(), SessionError> {
     if let Some(file) = there.filter(|folder| !folder.is_dir()) {
         return usage(format!("--out: {} is a file: name a folder, new or old", file.display()));
     }
-    let again = options.device.as_deref().and_then(|device| device.strip_prefix("replay:"));
-    let over = |record: &&Path| again.is_some_and(|file| same_file(file.as_ref(), record));
-    if let Some(record) = options.record.as_deref().filter(over) {
-        return usage(format!("--record {} is the recording that is run again: give another name", record.display()));
-    }
     if let Some(out) = out.filter(|out| !options.overwrite && output::holds_session(out)) {
         return usage(format!("--out {} holds a session already: {remedy}", out.display()));
     }
@@ -398,8 +386,4 @@ fn places(options: &Options) -> Result<(), SessionError> {
         true => usage("--device: the recording that is run again would be overwritten; name another --out".into()),
         false => Ok(()),
     }
-}
-
-fn same_file(one: &Path, other: &Path) -> bool {
-    one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
 }

@@ -409,6 +409,7 @@ mod tests {
             brain: [0; 3],
             asked_hz: 1000.0,
             frames: 0,
+            drawn_s: 0.0,
             cut_off: CutOff::default(),
             plan: None,
             regions: Vec::new(),
