@@ -79,7 +79,7 @@ fn each_wrong_field_has_its_own_error() {
     assert!(matches!(wrong("4 3 2", "4 3 0"), ReadError::Dimensions { .. }));
     assert!(matches!(wrong("4 3 2", "4 3"), ReadError::Dimensions { .. }));
     assert!(matches!(wrong("4 3 2", "4 3 2 5"), ReadError::Volumes { found: 5, .. }));
-    assert!(matches!(wrong("4 3 2", "900000 900000 900000"), ReadError::Truncated { .. }));
+    assert!(matches!(wrong("4 3 2", "900000 900000 900000"), ReadError::TooLarge { .. }));
     assert!(matches!(wrong("0.5 2 3", "0 2 3"), ReadError::Spacing { .. }));
     assert!(matches!(wrong("0.5 2 3", "-0.5 2 3"), ReadError::Spacing { .. }));
     assert!(matches!(wrong("0 1 0 -1", "1 0 0 1"), ReadError::Orientation { .. }));

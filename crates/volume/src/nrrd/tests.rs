@@ -102,7 +102,7 @@ fn each_wrong_field_has_its_own_error() {
         assert!(matches!(&error, ReadError::Field { field: f, .. } if *f == field), "{to}: {error}");
     }
     assert!(matches!(wrong("4 3 2", "4 0 2"), ReadError::Dimensions { .. }));
-    assert!(matches!(wrong("4 3 2", "400000 300000 200000"), ReadError::Truncated { .. }));
+    assert!(matches!(wrong("4 3 2", "400000 300000 200000"), ReadError::TooLarge { .. }));
     assert!(matches!(wrong("4 3 2", "4 3 3"), ReadError::Truncated { .. }));
     assert!(matches!(wrong("(0,2,0)", "(0,0,0)"), ReadError::Spacing { .. }));
     assert!(matches!(wrong("(0,2,0)", "(nan,2,0)"), ReadError::Spacing { .. }));
