@@ -85,7 +85,7 @@ impl Opening {
         opening.on(&bone_of(skull, isovalue_hu)?, brain.is_some())
     }
 
-    /// Where to open a patient's skull, by the skull on voxels of [`REFERENCE_MM`]: on the way from
+    /// Where to open a patient's skull, by the skull on voxels of 1 mm (`REFERENCE_MM`): on the way from
     /// `wanted` (a point outside, RAS mm) to the middle of the head, else at the best place.
     pub fn of_patient(
         reference: &BoneVolume,
