@@ -1,6 +1,6 @@
 // Forces of all springs on the nodes they touch, each implicit, one after the other, with the velocities v that nodes would have without the springs to come:
 //   d = d_rest + Σ w u·n    p = max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + gain (k dt + b) Σ w²/m))
-// What moves against the common velocity of a pressing spring's nodes is calmed.
+// What slides across the normal of a pressing spring is damped, node by node.
 // Planes, springs of one node each and no two of the same, follow side by side.
 struct Spring {
     // Unit vector out of the tissue.
@@ -9,15 +9,14 @@ struct Spring {
     damping: f32,
     rest_depth: f32,
     tool_velocity: f32,
+    // Σ w²/m.
+    compliance: f32,
+    // To what sliding is damped, mm/ms, and how strongly, N ms/mm.
+    lateral_velocity: vec3f,
+    lateral_damping: f32,
     // Of `touched`, up to 64 nodes, each at most once.
     first: u32,
     count: u32,
-    // Σ w²/m.
-    compliance: f32,
-    // Σ w of the nodes that are not fixed; those that are rest.
-    weight: f32,
-    // What it takes of its nodes' motion against each other.
-    calm: f32,
 }
 @group(0) @binding(1) var<storage, read> springs: array<Spring>;
 // Of every node of every spring: place; bits of the weight, of 1/m, of the share of m that has weight.
@@ -32,16 +31,6 @@ struct Spring {
 @group(0) @binding(8) var<storage, read_write> pressure: array<f32>;
 
 var<workgroup> sums: array<vec2f, 64>;
-// Momentum and mass of the nodes of a spring.
-var<workgroup> carried: array<vec4f, 64>;
-
-fn force_of(spring: Spring) -> f32 {
-    let depth = spring.rest_depth + sums[0].x;
-    // As they are calmed, of which each takes the same share.
-    let together = carried[0].xyz / max(carried[0].w, 1e-30);
-    let coming = (1.0 - spring.calm) * sums[0].y + spring.calm * spring.weight * dot(together, spring.normal);
-    return pressed(spring, depth, coming);
-}
 
 // Force of a spring that is so deep, mm, on nodes that come at this speed, mm/ms.
 fn pressed(spring: Spring, depth: f32, coming: f32) -> f32 {
@@ -78,28 +67,24 @@ fn free_velocity(at: vec4u) -> vec3f {
         let inverse_mass = bitcast<f32>(at.z);
         var velocity = vec3f(0.0);
         sums[lane] = vec2f(0.0);
-        carried[lane] = vec4f(0.0);
         if mine {
             velocity = free_velocity(at);
             sums[lane] = weight * vec2f(dot(u[at.x].xyz, spring.normal), dot(velocity, spring.normal));
-            if inverse_mass > 0.0 { carried[lane] = vec4f(velocity, 1.0) / inverse_mass; }
         }
         workgroupBarrier();
         // A tree of fixed shape: the same sum in every run.
         for (var reach = 32u; reach > 0u; reach >>= 1u) {
-            if lane < reach {
-                sums[lane] += sums[lane + reach];
-                carried[lane] += carried[lane + reach];
-            }
+            if lane < reach { sums[lane] += sums[lane + reach]; }
             workgroupBarrier();
         }
-        let force = force_of(spring);
+        let depth = spring.rest_depth + sums[0].x;
+        let force = pressed(spring, depth, sums[0].y);
         total += force;
-        if mine && spring.rest_depth + sums[0].x > 0.0 {
-            var push = -spring.normal * (force * weight);
-            if inverse_mass > 0.0 {
-                push += (carried[0].xyz / carried[0].w - velocity) * (spring.calm / (inverse_mass * now.gain));
-            }
+        if mine && depth > 0.0 {
+            let slip = velocity - spring.lateral_velocity;
+            let sliding = slip - spring.normal * dot(slip, spring.normal);
+            let damping = weight * spring.lateral_damping;
+            let push = -spring.normal * (force * weight) - sliding * (damping / (1.0 + now.gain * inverse_mass * damping));
             pushed[at.x] += vec4f(push, 0.0);
         }
         storageBarrier();

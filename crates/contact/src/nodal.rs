@@ -32,9 +32,10 @@ pub struct NodalContact {
     pub damping: f32,
     /// Normal velocity of the tool, mm/ms, along `normal`.
     pub tool_normal_velocity: f32,
-    /// Time in which its nodes come to move alike while it presses, ms; 0 = they need not. Numerical damping for the light nodes of one triangle; over many triangles it would hold
-    /// tissue back.
-    pub calm_ms: f32,
+    /// Damping across the normal while it presses, N ms/mm, by weight on each node for itself.
+    pub lateral_damping: f32,
+    /// Velocity to which that damping brings the nodes, mm/ms; only what lies across the normal counts.
+    pub lateral_velocity: Vec3,
     /// Nodes that did not fit (their weight is lost; the rest is normalised).
     pub overflow: u32,
     count: u32,
@@ -50,7 +51,8 @@ impl Default for NodalContact {
             stiffness: 0.0,
             damping: 0.0,
             tool_normal_velocity: 0.0,
-            calm_ms: 0.0,
+            lateral_damping: 0.0,
+            lateral_velocity: Vec3::ZERO,
             overflow: 0,
             count: 0,
             nodes: [0; MAX_NODES],

@@ -3,7 +3,7 @@
 //! # Theory
 //! Detection: 211 points on the ball, each in a tetrahedron or in none (thesis chapter 4). Response: one contact whose
 //! normal and depth stay continuous while the points change tetrahedra ([`Response`]). The load goes to the nodes under the contact as springs,
-//! one for each triangle under the ball ([`TissueStep::dents`]), equal and opposite.
+//! one for each node under the ball ([`TissueStep::surface_springs`]), equal and opposite.
 //!
 //! # Practice
 //! [`MeshCollision`] is for two meshes or one against itself, [`SlidingWall`] for tissue in a hollow.

@@ -3,7 +3,7 @@
 use crate::{
     Config, ConfigError,
     narrow::Hits,
-    response::{Friction, Responder, Shaft, Spring, finish, finish_waiting},
+    response::{Friction, Responder, Shaft, Spring, finish},
     scene::Scene,
     search::Search,
     surface::MovingSurface,
@@ -19,11 +19,12 @@ pub struct TissueStep {
     pub manifold: ContactManifold,
     /// The tangent plane that the haptic tick holds on to until the next result.
     pub patch: SurfacePatch,
-    /// The spring that presses on the tissue's nodes, equal and opposite; where there are `dents`, the one that stands for all of them.
+    /// The spring that presses on the tissue's nodes, equal and opposite; where there are `surface_springs`, the one that stands for all of them.
     pub nodal: NodalContact,
-    /// Springs under the ball, one for each triangle, together as strong as `nodal`: each presses along its own normal as deep as the ball is there, so that
-    /// tissue finer than the ball takes its shape. Empty where the response has one spring for all.
-    pub dents: NodalContacts,
+    /// Springs under the ball, one for each node, together as strong as `nodal`: each presses along its own
+    /// normal as deep as the ball is there, so that tissue finer than the ball takes its shape. Empty where
+    /// the response has one spring for all.
+    pub surface_springs: NodalContacts,
     /// Dry friction of the tissue on the tool's tip, N; the nodes take the opposite by the weights of `nodal`.
     pub friction_n: Vec3,
     /// The contact of the tool's shaft; depth 0 when it is free or not asked for.
@@ -49,7 +50,7 @@ impl Default for TissueStep {
             manifold: ContactManifold::default(),
             patch: SurfacePatch::default(),
             nodal: NodalContact::none(),
-            dents: NodalContacts::with_room(),
+            surface_springs: NodalContacts::with_room(),
             friction_n: Vec3::ZERO,
             shaft: Contact::default(),
             shaft_nodal: NodalContact::none(),
@@ -73,7 +74,8 @@ impl TissueStep {
 
     /// The springs of tip and shaft.
     fn all(&self) -> impl Iterator<Item = &NodalContact> {
-        let tip = if self.dents.is_empty() { core::slice::from_ref(&self.nodal) } else { &self.dents };
+        let tip =
+            if self.surface_springs.is_empty() { core::slice::from_ref(&self.nodal) } else { &self.surface_springs };
         tip.iter().chain([&self.shaft_nodal])
     }
 
@@ -131,7 +133,7 @@ impl TissueCollision {
         let count = shell.points.len() + 1;
         let cell_mm = config.cell_mm.unwrap_or_else(|| usual_cell_mm(mesh));
         let shaft = if config.shaft { Shaft::new(tool, mesh.tets.len()) } else { None };
-        let responder = Responder::new(config.response.unwrap_or(config.method.response()));
+        let responder = Responder::new(config.response.unwrap_or(config.method.response()), mesh.positions.len());
         Ok(Self {
             neighbours: Topology::of(mesh).neighbours,
             tets: mesh.tets.clone(),
@@ -170,9 +172,17 @@ impl TissueCollision {
         let scene = Scene { positions, velocities, tets, neighbours, points, tool, radius_mm: self.radius_mm };
         self.search.find(&scene, &mut self.surface, &mut self.hits);
         count(&self.hits, out);
-        match self.responder.respond(&scene, &self.hits, &mut self.surface, out) {
-            Some(answer) => finish(&scene, &answer, self.spring, out),
-            None => finish_waiting(&scene, self.spring, out),
+        let answer = self.responder.respond(&scene, &self.hits, &mut self.surface, out);
+        let contact = match answer {
+            Some(answer) => finish(&scene, &answer, self.spring, out).then_some((answer.normal, answer.depth_mm)),
+            None => {
+                out.forget_contact();
+                Some((Vec3::ZERO, 0.0))
+            }
+        };
+        if let Some(contact) = contact {
+            let springs = &mut out.surface_springs;
+            out.overflow += self.responder.press(&scene, &self.surface, contact, self.spring, springs);
         }
         out.friction_n = self.friction.drag(&scene, self.friction_coefficient, out);
         if let Some(shaft) = &mut self.shaft
@@ -196,7 +206,7 @@ impl TissueCollision {
         self.hits.clear();
         out.patch = SurfacePatch { time_ms: tool.time_ms, tip_mm: tool.tip(), ..SurfacePatch::default() };
         out.forget_contact();
-        out.dents.clear();
+        out.surface_springs.clear();
         (out.shaft, out.shaft_nodal) = (Contact::default(), NodalContact::none());
         (out.points_in_contact, out.tests, out.overflow, out.skipped, out.stale) = (0, 0, 0, 0, 0);
     }

@@ -47,6 +47,8 @@ pub(crate) struct MovingSurface {
     pub triangles: Vec<[u32; 3]>,
     /// The tetrahedron behind each triangle.
     pub tet_of_triangle: Vec<u32>,
+    /// Area of each triangle in the mesh as it was given, mm².
+    pub rest_area_mm2: Vec<f32>,
     nodes_of_cluster: Csr,
     triangles_of_node: Csr,
     boxes: Vec<Extent>,
@@ -70,6 +72,8 @@ impl MovingSurface {
         let order = along_morton_curve(mesh, &surface);
         let triangles: Vec<_> = order.iter().map(|&t| surface.triangles[t as usize]).collect();
         let tet_of_triangle = order.iter().map(|&t| surface.tet_of_triangle[t as usize]).collect();
+        let area = |corners: [Vec3; 3]| 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
+        let rest_area_mm2 = triangles.iter().map(|nodes| area(nodes.map(|n| mesh.positions[n as usize]))).collect();
         let around = triangles.iter().enumerate().flat_map(|(t, nodes)| nodes.map(|n| (n, t as u32)));
         let nodes_of_cluster = nodes_of_clusters(&triangles);
         let clusters = nodes_of_cluster.len();
@@ -86,6 +90,7 @@ impl MovingSurface {
             nodes_of_cluster,
             triangles,
             tet_of_triangle,
+            rest_area_mm2,
             bounds: Extent::EMPTY,
         }
     }

@@ -196,20 +196,25 @@ fn the_springs_under_a_ball_are_together_as_strong_as_one_and_take_its_shape() {
         let out = step_at(&mut collision, &mesh, middle);
         let wanted = 0.3 * depth * Vec3::Z;
         let force = |s: &trepan_contact::NodalContact| s.pressure_n(s.mean(at), Vec3::ZERO) * s.normal;
-        let together: Vec3 = out.dents.iter().map(force).sum();
+        let together: Vec3 = out.surface_springs.iter().map(force).sum();
         assert!(together.distance(wanted) < 1e-3, "{together} for {wanted}");
         let mut forces = vec![Vec3::ZERO; mesh.positions.len()];
         assert!(out.push(&mesh.positions, &still, &mut forces).distance(wanted) < 1e-3);
         assert!(forces.iter().sum::<Vec3>().distance(-wanted) < 1e-3);
-        assert!(out.dents.iter().all(|s| s.nodes().count() <= 3));
+        assert!(out.surface_springs.iter().all(|s| s.nodes().count() == 1));
         // What lies under the ball's middle is pressed deeper than what lies at its rim.
         let depth_of = |s: &trepan_contact::NodalContact| s.offset_mm + s.mean(at).dot(s.normal);
         let aside = |s: &trepan_contact::NodalContact| (s.mean(at) - middle).truncate().length();
         let order = |a: &&_, b: &&_| aside(a).total_cmp(&aside(b));
-        let (inner, outer) = (out.dents.iter().min_by(order).unwrap(), out.dents.iter().max_by(order).unwrap());
+        let (inner, outer) =
+            (out.surface_springs.iter().min_by(order).unwrap(), out.surface_springs.iter().max_by(order).unwrap());
         let apart = depth_of(inner) - depth_of(outer);
-        assert!(out.dents.len() == 1 || apart > 0.0, "{apart} mm between {} springs at {depth}", out.dents.len());
-        assert!(depth < 0.5 || out.dents.len() > 5, "{} springs at {depth}", out.dents.len());
+        assert!(
+            out.surface_springs.len() == 1 || apart > 0.0,
+            "{apart} mm between {} springs at {depth}",
+            out.surface_springs.len()
+        );
+        assert!(depth < 0.5 || out.surface_springs.len() > 5, "{} springs at {depth}", out.surface_springs.len());
     }
 }
 
@@ -224,7 +229,7 @@ fn springs_wait_around_the_ball_and_over_tissue_that_it_does_not_touch() {
         let out = step_at(&mut collision, &mesh, Vec3::new(8.3, 7.9, 6.0 + RADIUS + over_mm));
         let depth_of =
             |s: &trepan_contact::NodalContact| s.offset_mm + s.mean(|n| mesh.positions[n as usize]).dot(s.normal);
-        let waiting = out.dents.iter().filter(|s| depth_of(s) <= 0.0).count();
+        let waiting = out.surface_springs.iter().filter(|s| depth_of(s) <= 0.0).count();
         assert!(waiting >= 4, "{waiting} springs wait {over_mm} mm over the block");
         assert_eq!(out.manifold.touches(), over_mm < 0.0);
         let pushed = |positions: &[Vec3]| out.push(positions, &still, &mut vec![Vec3::ZERO; mesh.positions.len()]);
@@ -235,7 +240,7 @@ fn springs_wait_around_the_ball_and_over_tissue_that_it_does_not_touch() {
         let linear_n = 0.3 * (0.3 - over_mm);
         assert!(risen_n > felt + 0.01 && risen_n < 3.0 * linear_n, "{risen_n} N after {felt} N");
     }
-    assert!(step_at(&mut collision, &mesh, Vec3::new(8.3, 7.9, 6.0 + 1.5 * RADIUS)).dents.is_empty());
+    assert!(step_at(&mut collision, &mesh, Vec3::new(8.3, 7.9, 6.0 + 1.5 * RADIUS)).surface_springs.is_empty());
 }
 
 /// Two blocks with a gap of 3 mm and a ball of 4 mm between: the walls cancel, a shift to one side is pushed back.

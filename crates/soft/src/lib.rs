@@ -45,7 +45,7 @@ pub use bound::{
     element_bound_ms, element_omega2, highest_frequency, lowest_frequency, lowest_frequency_of, power_bound_ms,
     power_bound_of_ms,
 };
-pub use contact::{FreeNode, Gain, ImplicitSprings, calmed};
+pub use contact::{FreeNode, Gain, ImplicitSprings};
 pub use energy::{FADE_BELOW, NeoHookean};
 pub use law::{LEAST_STRETCH, Law};
 pub use material::{Material, MaterialError};

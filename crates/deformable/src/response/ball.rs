@@ -23,7 +23,11 @@
 //! # When not to use it
 //! For a tool that is not a ball at its tip; for a surface that folds within the ball's radius so sharply that one normal says nothing.
 
-use super::{Answer, dent, near::Near, near::Sample};
+use super::{
+    Answer, Spring,
+    foundation::{Foundation, WAITING},
+    near::{Near, Sample},
+};
 use crate::{
     extent::Extent,
     narrow::{Hits, NONE},
@@ -31,7 +35,7 @@ use crate::{
     step::TissueStep,
     surface::{Foot, MovingSurface},
 };
-use trepan_contact::{Contact, MAX_CONTACTS, NodalContact};
+use trepan_contact::{Contact, MAX_CONTACTS, NodalContacts};
 use trepan_geometry::{Aabb, Vec3};
 
 /// The triangle touched last, and room for those near the contact.
@@ -40,52 +44,46 @@ pub(crate) struct Ball {
     last_centre: Vec3,
     numbers: Vec<u32>,
     near: Near,
-    /// Triangles that have a spring, in the springs' order.
-    pressed: Vec<u32>,
-    /// How the springs of the last step and of this one press.
-    before: Vec<Pressed>,
-    now: Vec<Pressed>,
-}
-
-/// How a triangle was pressed.
-#[derive(Clone, Copy)]
-struct Pressed {
-    triangle: u32,
-    weights: [f32; 3],
-    normal: Vec3,
+    foundation: Foundation,
 }
 
 /// Most triangles near one contact.
 const MAX_NEAR: usize = 1024;
-/// Most triangles with a spring of their own; more than the usual shell has samples.
-const MAX_DENTS: usize = 128;
 /// A triangle belongs to the touched side when its normal is within 70 degrees of the touched triangle's.
 const SAME_SIDE: f32 = 0.34;
 /// Every fourth point inside is sampled: the shell is even, so a quarter of it is too.
 const SAMPLE_EVERY: usize = 4;
-/// How far around the ball triangles get springs, radii.
-const WAITING: f32 = 0.25;
-/// Share by which weights and normals of a spring that stays go to what is found, each step.
-const FOLLOWED: f32 = 0.03;
 /// Normals blend over this many radii.
 const BLEND: f32 = 0.5;
 
 impl Ball {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn on_nodes(nodes: usize) -> Self {
         Self {
             anchor: NONE,
             last_centre: Vec3::ZERO,
             numbers: Vec::with_capacity(MAX_NEAR),
             near: Near::with_capacity(MAX_NEAR),
-            pressed: Vec::with_capacity(MAX_DENTS),
-            before: Vec::with_capacity(MAX_DENTS),
-            now: Vec::with_capacity(MAX_DENTS),
+            foundation: Foundation::on_nodes(nodes),
         }
     }
 
     pub(crate) fn reset(&mut self) {
         self.anchor = NONE;
-        self.now.clear();
+    }
+
+    /// Writes the springs of the surface under and around the ball of the last step; returns what did not fit.
+    pub(crate) fn press(
+        &mut self,
+        scene: &Scene,
+        surface: &MovingSurface,
+        contact: (Vec3, f32),
+        spring: Spring,
+        out: &mut NodalContacts,
+    ) -> u32 {
+        match self.anchor {
+            NONE => 0,
+            _ => self.foundation.press(scene, (&self.near, surface), contact, spring, out),
+        }
     }
 
     /// Fills manifold list and nodes; the answer is `None` when the ball does not touch, though springs may wait.
@@ -99,95 +97,32 @@ impl Ball {
         let touch = self.touch(scene, hits, surface, out);
         self.anchor = touch.as_ref().map_or(NONE, |(sample, _)| sample.triangle);
         let (centre, depth_mm) = touch?;
-        self.pressed.clear();
         if depth_mm <= 0.0 {
-            self.wait(scene, surface, out);
-            self.follow_slowly(surface, out);
             return None;
         }
         let mut sum = Sum::default();
         sum.add(depth_mm, centre.normal);
-        self.press(surface, &centre, depth_mm, out);
+        Self::load(surface, &centre, depth_mm, out);
         let stride = points_inside(hits).count().div_ceil(SAMPLE_EVERY * MAX_CONTACTS).max(1);
         for (k, i) in points_inside(hits).filter(|i| i % SAMPLE_EVERY == 0).enumerate() {
             let p = scene.points[i];
             let Some(sample) = self.near.sample(p, BLEND * scene.radius_mm) else { break };
             sum.add(sample.distance, sample.normal);
-            self.press(surface, &sample, sample.distance, out);
+            Self::load(surface, &sample, sample.distance, out);
             if k % stride == 0 {
                 let normal = sample.normal.normalize_or_zero();
                 out.manifold.push(Contact { point: p, normal, depth_mm: sample.distance });
             }
         }
-        if hits.tet[scene.centre()] == NONE {
-            self.wait(scene, surface, out);
-        }
-        self.follow_slowly(surface, out);
         let fallback = surface.flat_normal(scene.positions, centre.triangle);
         Some(sum.answer(depth_mm, fallback))
     }
 
-    /// Puts load on the nodes under a sample: on the spring for all, and on the triangle's own.
-    fn press(&mut self, surface: &MovingSurface, sample: &Sample, load: f32, out: &mut TissueStep) {
+    /// Puts load on the nodes under a sample.
+    fn load(surface: &MovingSurface, sample: &Sample, load: f32, out: &mut TissueStep) {
         let nodes = surface.triangles[sample.triangle as usize];
         for (node, weight) in nodes.into_iter().zip(sample.weights).filter(|(_, weight)| *weight > 0.0) {
             out.nodal.add(node, weight * load);
-        }
-        let known = self.pressed.iter().position(|triangle| *triangle == sample.triangle);
-        if let Some(spring) = known.and_then(|at| out.dents.get_mut(at)) {
-            return dent(spring, nodes, sample.weights, load, sample.normal);
-        }
-        if self.pressed.len() == MAX_DENTS {
-            out.overflow += 1;
-            return;
-        }
-        let mut spring = NodalContact::none();
-        dent(&mut spring, nodes, sample.weights, load, sample.normal);
-        out.dents.push(spring);
-        self.pressed.push(sample.triangle);
-    }
-
-    /// Gives springs to the triangles around those under the samples, as deep as the ball is over each, also where that is a little less than nothing: a triangle that a spring has
-    /// pushed out from under the samples would else be free until the next step, come back, be pushed out again, and the hand would feel it.
-    fn wait(&mut self, scene: &Scene, surface: &MovingSurface, out: &mut TissueStep) {
-        for sample in self.near.within(scene.tool.tip(), (1.0 + WAITING) * scene.radius_mm) {
-            if self.pressed.contains(&sample.triangle) {
-                continue;
-            }
-            if self.pressed.len() == MAX_DENTS {
-                out.overflow += 1;
-                continue;
-            }
-            let mut spring = NodalContact::none();
-            let nodes = surface.triangles[sample.triangle as usize];
-            dent(&mut spring, nodes, sample.weights, scene.radius_mm - sample.distance, sample.normal);
-            out.dents.push(spring);
-            self.pressed.push(sample.triangle);
-        }
-    }
-
-    /// Lets weights and normals of springs that stay follow what is found in steps. The solver takes a spring
-    /// implicitly for as long as its weights are what they are; as functions of where the nodes are they make
-    /// each node's own force explicit, and light nodes ring.
-    fn follow_slowly(&mut self, surface: &MovingSurface, out: &mut TissueStep) {
-        let Self { pressed, before, now, .. } = self;
-        std::mem::swap(before, now);
-        now.clear();
-        for (&triangle, spring) in pressed.iter().zip(out.dents.iter_mut()) {
-            let nodes = surface.triangles[triangle as usize];
-            let corner = |node: u32| nodes.iter().position(|n| *n == node).unwrap_or(0);
-            let (load, length) = (spring.nodes().map(|(_, w)| w).sum::<f32>(), spring.normal.length());
-            let mut found = Pressed { triangle, weights: [0.0; 3], normal: spring.normal.normalize_or_zero() };
-            spring.nodes().for_each(|(node, w)| found.weights[corner(node)] = w / load.max(f32::MIN_POSITIVE));
-            if let Some(old) = before.iter().find(|old| old.triangle == triangle) {
-                let weights = found.weights.iter_mut().zip(old.weights);
-                weights.for_each(|(weight, old)| *weight = old + FOLLOWED * (*weight - old));
-                found.normal = old.normal.lerp(found.normal, FOLLOWED).normalize_or(found.normal);
-                nodes.into_iter().for_each(|node| spring.add(node, 0.0));
-                spring.reweight(|node, _| found.weights[corner(node)] * load);
-                spring.normal = found.normal * length;
-            }
-            now.push(found);
         }
     }
 
@@ -225,7 +160,8 @@ impl Ball {
         let mut points = Extent::EMPTY;
         points_inside(hits).for_each(|i| points.grow(scene.points[i]));
         let mut region = points.widened(depth_mm.max(0.0) + blend_mm);
-        region.merge(&Extent::of(&[scene.tool.tip()]).widened(foot.distance2.sqrt() + blend_mm));
+        let around_mm = (foot.distance2.sqrt() + blend_mm).max((1.0 + WAITING) * scene.radius_mm);
+        region.merge(&Extent::of(&[scene.tool.tip()]).widened(around_mm));
         region.shared(&Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm).into())
     }
 

@@ -1,6 +1,7 @@
 //! From what was found to one contact: normal, depth, and the nodes that feel it.
 
 mod ball;
+mod foundation;
 mod friction;
 mod near;
 mod printed;
@@ -10,7 +11,7 @@ pub(crate) use friction::Friction;
 pub(crate) use shaft::Shaft;
 
 use crate::{narrow::Hits, scene::Scene, step::TissueStep, surface::MovingSurface};
-use trepan_contact::{NodalContact, NodalContacts, SurfacePatch};
+use trepan_contact::{NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
 
 /// How normal and depth come out of the points inside the tissue.
@@ -36,9 +37,9 @@ pub(crate) enum Responder {
 }
 
 impl Responder {
-    pub(crate) fn new(response: Response) -> Self {
+    pub(crate) fn new(response: Response, nodes: usize) -> Self {
         match response {
-            Response::Ball => Self::Ball(ball::Ball::new()),
+            Response::Ball => Self::Ball(ball::Ball::on_nodes(nodes)),
             Response::Printed => Self::Faces(printed::Faces { nearest: false }),
             Response::NearestFace => Self::Faces(printed::Faces { nearest: true }),
         }
@@ -60,6 +61,22 @@ impl Responder {
         match self {
             Self::Ball(ball) => ball.respond(scene, hits, surface, out),
             Self::Faces(faces) => faces.respond(scene, hits, out),
+        }
+    }
+
+    /// Writes the springs of the surface under the tool, if the response has any: together the force of
+    /// `spring` pressed `depth_mm` deep along the normal, waiting where that is 0. Returns what did not fit.
+    pub(crate) fn press(
+        &mut self,
+        scene: &Scene,
+        surface: &MovingSurface,
+        contact: (Vec3, f32),
+        spring: Spring,
+        out: &mut NodalContacts,
+    ) -> u32 {
+        match self {
+            Self::Ball(ball) => ball.press(scene, surface, contact, spring, out),
+            Self::Faces(_) => 0,
         }
     }
 
@@ -88,16 +105,16 @@ pub(crate) struct Answer {
     pub depth_mm: f32,
 }
 
-/// Writes the answer into manifold, patch and nodal spring, whose nodes are already there; nothing when a number is not finite.
-pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut TissueStep) {
+/// Writes the answer into manifold, patch and nodal spring, whose nodes are already there; nothing, and false, when a number is not finite.
+pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut TissueStep) -> bool {
     out.nodal.normalise();
     let place = out.nodal.mean(|n| scene.positions[n as usize]);
     let tissue_velocity = out.nodal.mean(|n| scene.velocities[n as usize]).dot(answer.normal);
     let sound =
         answer.depth_mm > 0.0 && answer.depth_mm.is_finite() && answer.normal.is_normalized() && place.is_finite();
     if !sound || out.nodal.is_empty() {
-        out.dents.clear();
-        return out.forget_contact();
+        out.forget_contact();
+        return false;
     }
     let tool_velocity = scene.tool_velocity_at(place).dot(answer.normal);
     (out.manifold.normal, out.manifold.depth_mm, out.manifold.point) = (answer.normal, answer.depth_mm, place);
@@ -105,8 +122,6 @@ pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut T
     out.nodal.offset_mm = answer.depth_mm - place.dot(answer.normal);
     (out.nodal.stiffness, out.nodal.damping) = (spring.stiffness, spring.damping);
     out.nodal.tool_normal_velocity = finite_or_zero(tool_velocity);
-    let whole: Vec3 = out.dents.iter().map(|dent| dent.normal).sum();
-    finish_dents(scene, answer.depth_mm / whole.length().max(f32::MIN_POSITIVE), spring, &mut out.dents);
     out.patch = SurfacePatch {
         time_ms: scene.tool.time_ms,
         normal: answer.normal,
@@ -114,46 +129,7 @@ pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut T
         depth_mm: answer.depth_mm,
         normal_velocity: finite_or_zero(tissue_velocity),
     };
-}
-
-/// Time in which the corners of a pressed triangle come to move alike, ms: what is found anew every millisecond must not make light nodes ring.
-const CALM_MS: f32 = 2.0;
-
-/// Adds a place under the ball to the springs: of a spring's weights, normal, depth and stiffness are the sums over its places so far, of the weights and normals by
-/// depth, of the stiffness by number. A place that is not deep counts for its direction alone.
-pub(crate) fn dent(spring: &mut NodalContact, nodes: [u32; 3], weights: [f32; 3], depth_mm: f32, normal: Vec3) {
-    let load_mm = depth_mm.max(LEAST_LOAD_MM);
-    let pressed = nodes.into_iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
-    pressed.for_each(|(node, weight)| spring.add(node, weight * load_mm));
-    spring.normal += load_mm * normal;
-    spring.offset_mm += depth_mm;
-    spring.stiffness += 1.0;
-}
-
-/// What a place counts for that is not deep, mm.
-const LEAST_LOAD_MM: f32 = 1e-4;
-
-/// Writes that nothing touches; springs may wait, all together as strong as one.
-pub(crate) fn finish_waiting(scene: &Scene, spring: Spring, out: &mut TissueStep) {
-    out.forget_contact();
-    let places: f32 = out.dents.iter().map(|dent| dent.stiffness).sum();
-    finish_dents(scene, 1.0 / places.max(1.0), spring, &mut out.dents);
-}
-
-/// Makes springs of the sums: each as deep as its places in the mean, and with this share of the stiffness for each place.
-fn finish_dents(scene: &Scene, share: f32, spring: Spring, dents: &mut NodalContacts) {
-    let parts: f32 = dents.iter().map(|dent| dent.normal.length()).sum();
-    for dent in dents.iter_mut() {
-        let (load_mm, depth_mm, places) = (dent.normal, dent.offset_mm, dent.stiffness);
-        dent.normalise();
-        dent.normal = load_mm.normalize_or_zero();
-        let place = dent.mean(|n| scene.positions[n as usize]);
-        dent.offset_mm = depth_mm.min(load_mm.length()) / places - place.dot(dent.normal);
-        dent.stiffness = spring.stiffness * share * places;
-        dent.damping = spring.damping * load_mm.length() / parts.max(f32::MIN_POSITIVE);
-        dent.calm_ms = CALM_MS;
-        dent.tool_normal_velocity = finite_or_zero(scene.tool_velocity_at(place).dot(dent.normal));
-    }
+    true
 }
 
 fn finite_or_zero(x: f32) -> f32 {

@@ -23,8 +23,8 @@ pub(crate) struct Near {
 
 /// One moved triangle with what the bounds need.
 #[derive(Clone, Copy)]
-struct NearTriangle {
-    number: u32,
+pub(crate) struct NearTriangle {
+    pub number: u32,
     corners: [Vec3; 3],
     normal: Vec3,
     bounds: Extent,
@@ -93,15 +93,9 @@ impl Near {
         Some(Sample { triangle: triangle.number, weights, distance: nearest, normal })
     }
 
-    /// What every triangle within a distance of `p` says by itself, its normal its own.
-    pub(crate) fn within(&self, p: Vec3, reach_mm: f32) -> impl Iterator<Item = Sample> + '_ {
-        let near = self.triangles.iter().filter(move |triangle| triangle.at_least2(p) < reach_mm * reach_mm);
-        let alone = near.map(move |triangle| {
-            let weights = triangle::closest_weights(triangle.corners, p);
-            let distance = triangle.point(weights).distance(p);
-            Sample { triangle: triangle.number, weights, distance, normal: triangle.normal }
-        });
-        alone.filter(move |sample| sample.distance < reach_mm)
+    /// The triangles that may come within a distance of `p`.
+    pub(crate) fn within(&self, p: Vec3, reach_mm: f32) -> impl Iterator<Item = &NearTriangle> {
+        self.triangles.iter().filter(move |triangle| triangle.at_least2(p) < reach_mm * reach_mm)
     }
 
     fn blended(&self, nearest: f32, blend_mm: f32) -> Vec3 {
@@ -124,7 +118,8 @@ impl NearTriangle {
         (from_plane * from_plane).max(self.bounds.distance2(p))
     }
 
-    fn point(&self, weights: [f32; 3]) -> Vec3 {
+    /// The point with these weights on the corners, mm.
+    pub(crate) fn point(&self, weights: [f32; 3]) -> Vec3 {
         self.corners[0] * weights[0] + self.corners[1] * weights[1] + self.corners[2] * weights[2]
     }
 }

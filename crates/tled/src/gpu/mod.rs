@@ -249,7 +249,7 @@ impl GpuTled {
     /// The uniform of a step; hands the springs over.
     fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> Step {
         let half = 0.5 * self.damping_per_ms * dt_ms;
-        let (springs, planes) = self.hand_over(loads, dt_ms);
+        let (springs, planes) = self.hand_over(loads);
         Step {
             gravity: (loads.gravity - self.config.balanced_gravity).to_array(),
             dt: dt_ms,
@@ -267,13 +267,13 @@ impl GpuTled {
     }
 
     /// Gives the device every spring and plane; gives how many springs and planes there are.
-    fn hand_over(&mut self, loads: &Loads, dt_ms: f32) -> (u32, u32) {
+    fn hand_over(&mut self, loads: &Loads) -> (u32, u32) {
         let at_rest = |n: u32| self.rest.get(n as usize).copied().unwrap_or_default();
         let (list, place_of) = (&mut self.press.list, &self.layout.place_of);
         list.clear();
         for spring in loads.contacts.iter() {
             let rest_depth = spring.offset_mm + spring.mean(at_rest).dot(spring.normal);
-            list.add(spring, (rest_depth, dt_ms), place_of, &self.state);
+            list.add(spring, rest_depth, place_of, &self.state);
         }
         let added =
             |plane: &&PlaneContact| list.add_plane(plane, plane.depth_mm(at_rest(plane.node)), place_of, &self.state);

@@ -38,11 +38,12 @@ pub(crate) struct Spring {
     damping: f32,
     rest_depth: f32,
     tool_velocity: f32,
+    compliance: f32,
+    lateral_velocity: [f32; 3],
+    lateral_damping: f32,
     first: u32,
     count: u32,
-    compliance: f32,
-    weight: f32,
-    calm: f32,
+    padding: [u32; 2],
 }
 
 /// Springs, and of every node that they touch its place and the bits of its weight, of 1/m and of the share of m that has weight.
@@ -57,21 +58,14 @@ impl List {
         self.touched.clear();
     }
 
-    /// Adds a spring that is `rest_depth` mm deep where nothing moved, for steps of `dt_ms`. Nodes that the mesh lacks are left out.
-    pub fn add(
-        &mut self,
-        spring: &NodalContact,
-        (rest_depth, dt_ms): (f32, f32),
-        place_of: &[u32],
-        state: &DeviceState,
-    ) {
+    /// Adds a spring that is `rest_depth` mm deep where nothing moved. Nodes that the mesh lacks are left out.
+    pub fn add(&mut self, spring: &NodalContact, rest_depth: f32, place_of: &[u32], state: &DeviceState) {
         let first = self.touched.len();
-        let (mut compliance, mut free) = (0.0, 0.0);
+        let mut compliance = 0.0;
         for (n, w) in spring.nodes() {
             let Some(&place) = place_of.get(n as usize) else { continue };
             let [inverse_mass, weight] = state.mass_of(place);
             compliance += w * w * inverse_mass;
-            free += if inverse_mass > 0.0 { w } else { 0.0 };
             self.touched.push([place, w.to_bits(), inverse_mass.to_bits(), weight.to_bits()]);
         }
         self.springs.push(Spring {
@@ -80,11 +74,12 @@ impl List {
             damping: spring.damping,
             rest_depth,
             tool_velocity: spring.tool_normal_velocity,
+            compliance,
+            lateral_velocity: spring.lateral_velocity.to_array(),
+            lateral_damping: spring.lateral_damping,
             first: first as u32,
             count: (self.touched.len() - first) as u32,
-            compliance,
-            weight: free,
-            calm: trepan_soft::calmed(spring, dt_ms),
+            padding: [0; 2],
         });
     }
 
@@ -103,7 +98,6 @@ impl List {
             first,
             count: 1,
             compliance: inverse_mass,
-            weight: 1.0,
             ..Spring::default()
         });
         true
