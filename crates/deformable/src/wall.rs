@@ -34,10 +34,11 @@ pub trait Hollow {
     /// Distance to the wall, positive in the hollow, mm, and its unit gradient, away from the wall.
     fn distance(&mut self, place: Vec3) -> (f32, Vec3);
 
-    /// Whether the wall is there for a node that is so deep, mm, at a place of the wall's surface with this way out.
-    fn stands(&mut self, node: u32, depth_mm: f32, place: Vec3, outward: Vec3) -> bool {
+    /// How far the wall has receded from a node that is so deep, mm, at a place of the wall's surface with this
+    /// way out; `None` where it is gone.
+    fn recession_mm(&mut self, node: u32, depth_mm: f32, place: Vec3, outward: Vec3) -> Option<f32> {
         let _ = (node, depth_mm, place, outward);
-        true
+        Some(0.0)
     }
 }
 
@@ -123,12 +124,14 @@ impl SlidingWall {
                     (-phi, (-gradient).normalize_or_zero())
                 }
             };
-            let near = depth_mm > -self.ahead_mm && depth_mm.is_finite() && normal != Vec3::ZERO;
-            if near && wall.stands(node, depth_mm, at - depth_mm * normal, normal) {
+            if !(depth_mm > -self.ahead_mm && depth_mm.is_finite() && normal != Vec3::ZERO) {
+                continue;
+            }
+            if let Some(back_mm) = wall.recession_mm(node, depth_mm, at - depth_mm * normal, normal) {
                 out.push_plane(PlaneContact {
                     node,
                     normal,
-                    offset_mm: depth_mm - at.dot(normal),
+                    offset_mm: depth_mm - back_mm - at.dot(normal),
                     stiffness: self.stiffness_per_mm2 * area_mm2,
                     damping: self.damping_per_mm2 * area_mm2,
                 });
