@@ -1,4 +1,5 @@
-// Rays through the padded grid of densities: leap over bricks without bone, walk the cells of the others, solve the cubic in a cell exactly.
+// Rays through the padded grid of densities: leap over bricks without bone, walk the cells of the
+// others, solve the cubic in a cell exactly.
 
 @group(0) @binding(1) var density: texture_3d<f32>;   // HU, padded by one voxel of air on all sides
 @group(0) @binding(2) var linear: sampler;
@@ -15,8 +16,9 @@ fn grid_of(point: vec3f) -> vec3f { return (point - scene.origin.xyz) / scene.or
 // HU at continuous padded grid coordinates.
 fn hu(g: vec3f) -> f32 { return textureSampleLevel(density, linear, (g + 0.5) / scene.dims.xyz, 0.0).x; }
 
-// Smallest part s of the way through a cell at which the density reaches the isovalue, or 2. `v` is the density less the isovalue
-// at s = 0, 1/3, 2/3, 1: a trilinear cell is a cubic along a ray (Marmitt et al. 2004: split at the extrema, then refine).
+// Smallest part s of the way through a cell at which the density reaches the isovalue, or 2. `v` is
+// the density less the isovalue at s = 0, 1/3, 2/3, 1: a trilinear cell is a cubic along a ray
+// (Marmitt et al. 2004: split at the extrema, then refine).
 fn first_root(v: vec4f) -> f32 {
     if v.x >= 0.0 { return 0.0; }
     let c1 = 0.5 * (-11.0 * v.x + 18.0 * v.y - 9.0 * v.z + 2.0 * v.w);
@@ -78,8 +80,9 @@ fn enter(c: Corners, a: vec3f, b: vec3f) -> f32 {
     return first_root(v);
 }
 
-// Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or NOTHING.
-// Three loops, each cheap, instead of branches: drivers that run pixels in lockstep skip loops, but pay for all branches.
+// Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or
+// NOTHING. Three loops, each cheap, instead of branches: drivers that run pixels in lockstep skip
+// loops, but pay for all branches.
 fn meet(o: vec3f, d: vec3f, furthest: f32) -> f32 {
     let safe = select(d, vec3f(1e-12), abs(d) < vec3f(1e-12));
     let inverse = 1.0 / safe;
@@ -114,7 +117,8 @@ fn meet(o: vec3f, d: vec3f, furthest: f32) -> f32 {
             leave = max(min(min(exits.x, exits.y), exits.z), t + nudge);
             steps++;
         }
-        // Walk its cells to one with a corner in bone, and solve that; if the ray only passes by, go on behind it.
+        // Walk its cells to one with a corner in bone, and solve that; if the ray only passes by,
+        // go on behind it.
         var cell = clamp(vec3i(floor(o + safe * (t + nudge))), vec3i(0), last);
         while t < leave && t < end && steps < MOST_STEPS {
             var found: Corners;

@@ -1,4 +1,5 @@
-// The brain where it is cut open: triangles in the plane, drawn between those of its surface. Outputs as in `brain.wgsl`.
+// The brain where it is cut open: triangles in the plane, drawn between those of its surface.
+// Outputs as in `brain.wgsl`.
 
 struct Corner { place: vec4f, rest: vec4f }   // now and at rest, world mm
 

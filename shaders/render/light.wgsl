@@ -9,7 +9,8 @@
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
 
-// Share of the lamp that passes a body at distance `gap` from the beam, `way` mm on: the lamp is a disc.
+// Share of the lamp that passes a body at distance `gap` from the beam, `way` mm on: the lamp is a
+// disc.
 fn pass_by(gap: f32, way: f32) -> f32 { return smoothstep(-1.0, 1.0, gap / (0.10 * way + 0.3)); }
 
 // Light that passes the tools on its way to a point: 0 in their shadow, 1 far from them.
@@ -22,7 +23,8 @@ fn past(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {
     let to = tip.xyz - point;
     let way = max(dot(to, scene.light.xyz), 0.0);
     let ball = pass_by(length(to - way * scene.light.xyz) - tip.w, way);
-    // Nearest points of the beam and the shaft's axis (Ericson 2005, 5.1.9, with a beam that begins at the point).
+    // Nearest points of the beam and the shaft's axis (Ericson 2005, 5.1.9, with a beam that begins
+    // at the point).
     let axis = tail.xyz - tip.xyz;
     let b = dot(scene.light.xyz, axis);
     let c = dot(axis, axis);
@@ -131,7 +133,8 @@ fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, l
     let skull = unpacked(textureLoad(skull_hit, at, 0));
     var brain = unpacked(textureLoad(brain_hit, at, 0));
     brain.w = select(NOTHING, brain.w, brain.w > 0.0);
-    // Where both are cut by one plane neither is nearer: bone is there, however far the mesh reaches into it.
+    // Where both are cut by one plane neither is nearer: bone is there, however far the mesh
+    // reaches into it.
     if brain.z > 0.5 && on_cut(scene.eye.xyz + skull.w * along) { brain.w = NOTHING; }
     let first = reach(along, scene.tip, scene.tail);
     let second = reach(along, scene.second_tip, scene.second_tail);

@@ -1,4 +1,5 @@
-// Shapes over the picture: a rectangle around each, in which rays meet it in closed form. Behind the scene it shows faintly.
+// Shapes over the picture: a rectangle around each, in which rays meet it in closed form. Behind
+// the scene it shows faintly.
 
 struct Item {
     tip: vec4f,      // a tool's ball, or an arrow's begin; w: radius
@@ -43,7 +44,8 @@ struct Place {
 
 struct Surface { t: f32, normal: vec3f }
 
-// The nearer of a surface and the front of an arrow's head: a cone around `down` from its point, as deep as `depth`, as wide as `radius` there.
+// The nearer of a surface and the front of an arrow's head: a cone around `down` from its point, as
+// deep as `depth`, as wide as `radius` there.
 fn head(along: vec3f, apex: vec3f, down: vec3f, depth: f32, radius: f32, other: Surface) -> Surface {
     var nearest = other;
     let away = scene.eye.xyz - apex;

@@ -26,7 +26,8 @@ struct Scene {
 
 const NOTHING: f32 = 1e30;
 
-// Hits travel between passes as the bits of floats in integer textures: every driver can draw into those.
+// Hits travel between passes as the bits of floats in integer textures: every driver can draw into
+// those.
 fn packed(v: vec4f) -> vec4u { return bitcast<vec4u>(v); }
 
 fn unpacked(v: vec4u) -> vec4f { return bitcast<vec4f>(v); }

@@ -1,4 +1,5 @@
-// The deformed brain cut by a slice: where each point of the cut is at rest, so that the MRI moves with the brain.
+// The deformed brain cut by a slice: where each point of the cut is at rest, so that the MRI moves
+// with the brain.
 
 struct Corner { at: vec4f, rest: vec4f }   // in the slice's picture, -1 to 1; world mm
 

@@ -1,9 +1,9 @@
 //! Trepan's WGSL shaders as strings: one file per pass, named like the Rust file that runs it.
 //!
 //! # Practice
-//! Passes of the picture start with the text of `scene.wgsl`, those of a soft-tissue step with `step.wgsl`, which declare what all of them
-//! know at binding 0.
-//! Every entry is checked by naga when its pipeline is made; there is nothing to build and no path to find at run time.
+//! Passes of the picture start with the text of `scene.wgsl`, those of a soft-tissue step with
+//! `step.wgsl`, which declare what all of them know at binding 0. Every entry is checked by naga
+//! when its pipeline is made; there is nothing to build and no path to find at run time.
 
 /// The text of `scene.wgsl` before some others.
 macro_rules! picture {
@@ -40,7 +40,8 @@ macro_rules! tled {
     };
 }
 
-/// Forces of tetrahedra on their nodes by law: neo-Hookean, St. Venant-Kirchhoff, Mooney-Rivlin, Ogden. They want `const RELAXES` and `const CURES` before them.
+/// Forces of tetrahedra on their nodes by law: neo-Hookean, St. Venant-Kirchhoff, Mooney-Rivlin,
+/// Ogden. They want `const RELAXES` and `const CURES` before them.
 pub const TLED_FORCES: [&str; 4] = [
     tled!("element.wgsl", "neo_hookean.wgsl", "forces.wgsl"),
     tled!("element.wgsl", "st_venant_kirchhoff.wgsl", "forces.wgsl"),
@@ -48,7 +49,7 @@ pub const TLED_FORCES: [&str; 4] = [
     tled!("element.wgsl", "ogden.wgsl", "forces.wgsl"),
 ];
 /// Volume change of every tetrahedron, and its mean around the nodes.
-pub const TLED_VOLUMES: [&str; 2] = [tled!("element.wgsl", "volumes.wgsl"), tled!("seats.wgsl")];
+pub const TLED_VOLUMES: [&str; 2] = [tled!("element.wgsl", "volumes.wgsl"), tled!("node_groups.wgsl")];
 /// The springs of contact on the tissue.
 pub const TLED_PRESS: &str = tled!("press.wgsl");
 /// What nodes gather of the forces, and their motion.

@@ -1,8 +1,9 @@
-// How an element is deformed; the text before each pass over elements.
-//   F = I + Σ (u_a - u_0) ⊗ ∇N_a    C = cof F    J = det F
-// Places of the corners; then where each corner writes, and the seats where it takes its volume from, all elements each.
+// How an element is deformed; the text before each pass over elements. F = I + Σ (u_a - u_0) ⊗ ∇N_a
+// C = cof F    J = det F Places of the corners; then where each corner writes, and the node_groups
+// where it takes its volume from, all elements each.
 @group(0) @binding(1) var<storage, read> corners: array<vec4u>;
-// Three rows an element: ∇N_1..3, and beside them the law's first two constants and ω² over stiffness at rest.
+// Three rows an element: ∇N_1..3, and beside them the law's first two constants and ω² over
+// stiffness at rest.
 @group(0) @binding(2) var<storage, read> rows: array<vec4f>;
 @group(0) @binding(3) var<storage, read> u: array<vec4f>;
 

@@ -1,6 +1,6 @@
-// Forces of the elements of one law on their four nodes, each to its own slot.
-//   P = F S + (q + κ (J̄-1)) C    f_a = -V P ∇N_a    J̄ = J, or the mean of the corners' seats where locking is cured
-// The slot of corner 0 also carries the element's present ω², negative where J ≤ 0.
+// Forces of the elements of one law on their four nodes, each to its own slot. P = F S + (q + κ
+// (J̄-1)) C    f_a = -V P ∇N_a    J̄ = J, or the mean of the corners' node_groups where locking is
+// cured The slot of corner 0 also carries the element's present ω², negative where J ≤ 0.
 struct Range { first: u32, count: u32 }
 @group(0) @binding(4) var<storage, read_write> forces: array<vec4f>;
 // Further constants of the laws that have more than two.
@@ -77,8 +77,8 @@ fn pressed(stress: Stress, f: vec3f, c: vec3f) -> vec3f {
     var found = stress(constants, d);
     var swollen = d.j - 1.0;
     if CURES {
-        let seat = corners[2u * now.elements + e];
-        swollen = (swelling[seat.x] + swelling[seat.y] + swelling[seat.z] + swelling[seat.w]) * 0.25;
+        let node_group = corners[2u * now.elements + e];
+        swollen = (swelling[node_group.x] + swelling[node_group.y] + swelling[node_group.z] + swelling[node_group.w]) * 0.25;
     }
     let omega2 = d.c.w * stiffness(found, m, d, swollen);
     if RELAXES { found = relaxed(e, found, d); }

@@ -1,7 +1,8 @@
-// Forces of all springs on the nodes they touch, each implicit, one after the other, with the velocities v that nodes would have without the springs to come:
-//   d = d_rest + Σ w u·n    p = max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + gain (k dt + b) Σ w²/m))
-// What slides across the normal of a pressing spring is damped, node by node.
-// Planes, springs of one node each and no two of the same, follow side by side.
+// Forces of all springs on the nodes they touch, each implicit, one after the other, with the
+// velocities v that nodes would have without the springs to come: d = d_rest + Σ w u·n    p =
+// max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + gain (k dt + b) Σ w²/m)) What slides across the
+// normal of a pressing spring is damped, node by node. Planes, springs of one node each and no two
+// of the same, follow side by side.
 struct Spring {
     // Unit vector out of the tissue.
     normal: vec3f,
@@ -19,7 +20,8 @@ struct Spring {
     count: u32,
 }
 @group(0) @binding(1) var<storage, read> springs: array<Spring>;
-// Of every node of every spring: place; bits of the weight, of 1/m, of the share of m that has weight.
+// Of every node of every spring: place; bits of the weight, of 1/m, of the share of m that has
+// weight.
 @group(0) @binding(2) var<storage, read> touched: array<vec4u>;
 @group(0) @binding(3) var<storage, read> u: array<vec4f>;
 @group(0) @binding(4) var<storage, read> v: array<vec4f>;
@@ -40,7 +42,8 @@ fn pressed(spring: Spring, depth: f32, coming: f32) -> f32 {
     return select(0.0, max(force, 0.0), depth > 0.0 && finite);
 }
 
-// Velocity that a node would have after the step under its elements, weight, and the springs so far.
+// Velocity that a node would have after the step under its elements, weight, and the springs so
+// far.
 fn free_velocity(at: vec4u) -> vec3f {
     let inverse_mass = bitcast<f32>(at.z);
     if inverse_mass == 0.0 { return v[at.x].xyz; }

@@ -11,7 +11,7 @@ struct Step {
     springs: u32,
     elements: u32,
     nodes: u32,
-    seats: u32,
+    node_groups: u32,
     // What the two terms of past stress keep and take up.
     fade_keep: vec2f,
     fade_gain: vec2f,

@@ -1,5 +1,5 @@
-// Gathers the forces on a node from its run of slots, in their order, and moves it by central differences.
-//   v⁺ = keep v + gain (w g + f/m)    u⁺ = u + dt v⁺
+// Gathers the forces on a node from its run of slots, in their order, and moves it by central
+// differences. v⁺ = keep v + gain (w g + f/m)    u⁺ = u + dt v⁺
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
 @group(0) @binding(2) var<storage, read> forces: array<vec4f>;
 // 1/m, 0 where the node is fixed; the share of m that has weight; whether a spring pushes it.
@@ -7,7 +7,8 @@
 @group(0) @binding(4) var<storage, read> pushed: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> u: array<vec4f>;
 @group(0) @binding(6) var<storage, read_write> v: array<vec4f>;
-// Since they were last cleared: most inverted elements at once, times limited, times not finite, bits of the largest ω².
+// Since they were last cleared: most inverted elements at once, times limited, times not finite,
+// bits of the largest ω².
 @group(0) @binding(7) var<storage, read_write> noticed: array<vec4u>;
 
 fn finite(x: vec3f) -> bool {

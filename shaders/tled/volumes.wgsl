@@ -1,4 +1,4 @@
-// A quarter of every element's change of volume: what each corner's seat gets of it.
+// A quarter of every element's change of volume: what each corner's node_group gets of it.
 @group(0) @binding(4) var<storage, read> quarters: array<f32>;
 @group(0) @binding(5) var<storage, read_write> swollen: array<f32>;
 

@@ -1,7 +1,7 @@
 //! Checks the floors of the crates and what each crate keeps away from.
 //!
-//! A crate may use only crates on lower floors, and inside floors 1 and 2 the two arrows that the map names. Some
-//! packages and some parts of the standard library belong to a few crates only.
+//! A crate may use only crates on lower floors, and inside floors 1 and 2 the two arrows that the
+//! map names. Some packages and some parts of the standard library belong to a few crates only.
 
 use anyhow::{Context, Result};
 use serde_json::Value;

@@ -23,7 +23,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Everything that CI runs: fmt, layers, tidy, clippy, a short headless operation, tests, doc tests, docs, the quick validation
+    /// Everything that CI runs: fmt, layers, tidy, clippy, a short headless operation, tests, doc
+    /// tests, docs, the quick validation
     Test,
     /// Run validation suites in release mode; writes SUITE.json and index.html
     Validate {
@@ -31,7 +32,8 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
-    /// Put shards together: those of `validate` into SUITE.json and index.html, those of sessions into sessions.csv and sessions.json
+    /// Put shards together: those of `validate` into SUITE.json and index.html, those of sessions
+    /// into sessions.csv and sessions.json
     Merge {
         /// Folders that `validate --shard`, sessions, or batches of sessions wrote with --out
         #[arg(required = true)]
@@ -40,14 +42,16 @@ enum Task {
         #[arg(long, value_name = "DIR", default_value = "trepan-out/merged")]
         out: PathBuf,
     },
-    /// Say what got faster, slower, more or less accurate from one validation to another, and how sure that is
+    /// Say what got faster, slower, more or less accurate from one validation to another, and how
+    /// sure that is
     Compare {
         /// A folder that `validate` wrote
         old: PathBuf,
         /// Another one
         new: PathBuf,
     },
-    /// Check that every arrow between crates points down and that each crate does only what is its to do
+    /// Check that every arrow between crates points down and that each crate does only what is its
+    /// to do
     Layers,
     /// Check module docs, file lengths, READMEs, examples, shader and Rust pairs
     Tidy,
@@ -82,7 +86,8 @@ fn run() -> Result<()> {
     }
 }
 
-/// The program of all suites, in release mode. Not quietly: cargo says when it builds or waits for another build.
+/// The program of all suites, in release mode. Not quietly: cargo says when it builds or waits for
+/// another build.
 fn validate(arguments: &[String]) -> Result<()> {
     cargo(&["run", "--release", "--package", "trepan-trials", "--bin", "validate", "--"], arguments)
 }
@@ -142,7 +147,8 @@ fn documentation() -> Result<()> {
     Ok(())
 }
 
-/// Property tests draw the same in every run, so that what fails here is the change's fault and not the draw's; the environment may name another seed.
+/// Property tests draw the same in every run, so that what fails here is the change's fault and not
+/// the draw's; the environment may name another seed.
 const DRAWS: [&str; 2] = ["PROPTEST_RNG_SEED", "2026"];
 
 fn cargo(arguments: &[&str], more: &[String]) -> Result<()> {

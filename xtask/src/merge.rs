@@ -1,6 +1,7 @@
 //! `cargo xtask merge`: the summaries of many sessions, from any number of shards, as one table.
 //!
-//! Rows stand in the order of the sessions' folders' names, so that shards merged give the table of one run.
+//! Rows stand in the order of the sessions' folders' names, so that shards merged give the table of
+//! one run.
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;

@@ -40,7 +40,7 @@ pub fn check(root: &Path) -> Result<()> {
     let out_text = out.display().to_string();
     // With all its fluid the brain comes back to where it was, but for pulse and breath.
     let arguments =
-        ["--headless", "--quality", "usual", "--duration", "8", "--fluid-lost", "0", "--overwrite", "--out", &out_text];
+        ["--headless", "--quality", "usual", "--duration", "8", "--csf-loss", "0", "--overwrite", "--out", &out_text];
     crate::cargo(&["run", "--bin", "integrated", "--"], &arguments.map(String::from))?;
     let text = std::fs::read_to_string(out.join("summary.json")).context("the operation left no summary.json")?;
     let summary: Value = serde_json::from_str(&text).context("summary.json is not JSON")?;

@@ -1,4 +1,5 @@
-//! Checks the house style that a compiler does not: module docs, lengths, READMEs, examples, shader pairs.
+//! Checks the house style that a compiler does not: module docs, lengths, READMEs, examples, shader
+//! pairs.
 
 use crate::layers::{files, rust_files};
 use anyhow::Result;
@@ -63,7 +64,8 @@ fn crate_folder(root: &Path, folder: &Path) -> Result<Vec<String>> {
     Ok(faults)
 }
 
-/// Every WGSL file is handed out by the shader crate; every constant `CRATE_PASS` there is run by `crates/CRATE/src/**/PASS.rs`.
+/// Every WGSL file is handed out by the shader crate; every constant `CRATE_PASS` there is run by
+/// `crates/CRATE/src/**/PASS.rs`.
 fn shaders(root: &Path) -> Result<Vec<String>> {
     let handed_out = fs::read_to_string(root.join("shaders/src/lib.rs"))?;
     let mut faults = Vec::new();

@@ -5,7 +5,8 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
 
-/// Runs every suite quickly. Some promises are ratios of times, which other work on the machine can disturb: what was broken is run once more, by itself, and must then be kept.
+/// Runs every suite quickly. Some promises are ratios of times, which other work on the machine can
+/// disturb: what was broken is run once more, by itself, and must then be kept.
 pub fn check(root: &Path) -> Result<()> {
     let out = root.join("target/xtask-validation");
     if out.is_dir() {

@@ -1,4 +1,5 @@
-//! Probes a patient's brain, which deforms and pushes back. Threads: main, haptic, collision, simulation.
+//! Probes a patient's brain, which deforms and pushes back. Threads: main, haptic, collision,
+//! simulation.
 
 use std::process::ExitCode;
 use trepan_simulator::{Inputs, Program, TissueSource, command};

@@ -1,4 +1,5 @@
-//! What a user can get wrong: each fault names the file, the field and the remedy, exits with 2 and leaves nothing behind.
+//! What a user can get wrong: each fault names the file, the field and the remedy, exits with 2 and
+//! leaves nothing behind.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use glam::{DAffine3, DVec3, Vec3};

@@ -1,4 +1,5 @@
-//! How a session ends: by a signal, by being killed, by itself; and that a replay of it is the same, bit for bit.
+//! How a session ends: by a signal, by being killed, by itself; and that a replay of it is the
+//! same, bit for bit.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use serde_json::Value;
@@ -171,7 +172,8 @@ fn a_session_that_was_interrupted_in_contact_replays_to_its_faded_end() {
     let [live, again] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let record = live.path().join("session.mcap");
     let pressing = |t: &trepan_link::wire::TickRecord| t.wrench.force.length() > 0.1;
-    // This hand rests on the bone for half of its time: a recording that lags behind its session tells the same.
+    // This hand rests on the bone for half of its time: a recording that lags behind its session
+    // tells the same.
     let mut child = operation(live.path(), "40", &["--device", "script:aspirate"]).spawn().unwrap();
     let long = |r: &Recording| r.ticks.iter().filter(|t| pressing(t)).count() > 4000;
     while !Recording::open(&record).is_ok_and(|r| r.ticks.last().is_some_and(pressing) && long(&r)) {
@@ -189,7 +191,8 @@ fn a_session_that_was_interrupted_in_contact_replays_to_its_faded_end() {
     assert_eq!(summary["replay"]["ticks"], summary["replay"]["identical"]);
 }
 
-/// Runs the operation with its output in a small disk of its own, and gives its exit code, what it said, and the recording; `None` where the system lets no one mount.
+/// Runs the operation with its output in a small disk of its own, and gives its exit code, what it
+/// said, and the recording; `None` where the system lets no one mount.
 fn on_disk(options: &str, seconds: &str) -> Option<(Option<i32>, String, Option<Recording>)> {
     let kept = tempfile::tempdir().unwrap();
     let disk = kept.path().join("disk");

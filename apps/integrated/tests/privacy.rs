@@ -1,4 +1,5 @@
-//! Nothing that names a patient leaves the input files: not into a case, its cache, a recording, a report, a log.
+//! Nothing that names a patient leaves the input files: not into a case, its cache, a recording, a
+//! report, a log.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use glam::Vec3;

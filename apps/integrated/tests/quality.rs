@@ -1,4 +1,5 @@
-//! Which models a session runs: presets reach the loops and the picture, a plan is recorded and replayed bit for bit without a new one.
+//! Which models a session runs: presets reach the loops and the picture, a plan is recorded and
+//! replayed bit for bit without a new one.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use serde_json::Value;
@@ -35,7 +36,7 @@ fn a_preset_reaches_loops_and_picture() {
     let models = &summary["models"];
     assert_eq!((&models["quality"], &models["planned_cores"]), (&Value::from("draft"), &Value::Null));
     assert_eq!((models["bone"]["spacing_mm"].as_f64(), models["picture"]["detail"].as_f64()), (Some(1.5), Some(0.5)));
-    assert!(said.contains("bone: distance-field on 1.5 mm voxels (preset draft)"), "{said}");
+    assert!(said.contains("bone: god-object-sphere on 1.5 mm voxels (preset draft)"), "{said}");
     // Not what was wished for: what ran.
     let tets = summary["solver"]["tets"].as_f64().unwrap();
     assert!((tets / 3000.0 - 1.0).abs() < 0.1, "{tets} tetrahedra");

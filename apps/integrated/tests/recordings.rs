@@ -1,4 +1,5 @@
-//! Recordings that are damaged, cut, or of another case: a replay says so, and a repair keeps what can be read.
+//! Recordings that are damaged, cut, or of another case: a replay says so, and a repair keeps what
+//! can be read.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use serde_json::Value;

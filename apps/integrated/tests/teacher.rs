@@ -1,4 +1,5 @@
-//! A teacher beside a running session: what she asks reaches the hand and the recording, and ends with her.
+//! A teacher beside a running session: what she asks reaches the hand and the recording, and ends
+//! with her.
 
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -1,4 +1,5 @@
-//! Which model does a scene need on which machine? Prints the plan for a fast machine and for a slow one, at three tolerances.
+//! Which model does a scene need on which machine? Prints the plan for a fast machine and for a
+//! slow one, at three tolerances.
 
 use trepan_budget::{Machine, PlanError, Scene, plan};
 

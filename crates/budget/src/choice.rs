@@ -32,8 +32,9 @@ pub struct Neighbour<T> {
     pub in_time: bool,
 }
 
-/// Picks from (what, error, cost, whether it runs in time): of those in time the cheapest within the tolerance; if none is, the most accurate in time; if none
-/// runs in time, the cheapest. Of equals the more accurate or cheaper one.
+/// Picks from (what, error, cost, whether it runs in time): of those in time the cheapest within
+/// the tolerance; if none is, the most accurate in time; if none runs in time, the cheapest. Of
+/// equals the more accurate or cheaper one.
 pub(crate) fn choose<T: Copy>(judged: impl Iterator<Item = (T, f64, f64, bool)>, tolerance: f64) -> Option<Choice<T>> {
     let all: Vec<Neighbour<T>> =
         judged.map(|(what, error, cost, in_time)| Neighbour { what, error, cost, in_time }).collect();

@@ -1,13 +1,17 @@
-//! Picks method, voxel size, mesh size, solver, region of interest and picture quality for a scene's tolerance and a machine's time.
+//! Picks method, voxel size, mesh size, solver, region of interest and picture quality for a
+//! scene's tolerance and a machine's time.
 //!
 //! # Theory
-//! The cheapest model that meets the tolerance, no more. What each choice costs and how far it is off was measured in many scenes and stored as laws
-//! in a few features of a scene ([`Rows`], [`Law`]); a machine scales the costs ([`Machine`]), a scene the errors ([`Scene`]). Of the choices that run in time with
-//! headroom the cheapest one whose error stays within the tolerance, by the law's bound, is taken; if none is, the most accurate one that runs, and the plan says so.
+//! The cheapest model that meets the tolerance, no more. What each choice costs and how far it is
+//! off was measured in many scenes and stored as laws in a few features of a scene ([`Rows`],
+//! [`PowerLaw`]); a machine scales the costs ([`Machine`]), a scene the errors ([`Scene`]). Of the
+//! choices that run in time with headroom the cheapest one whose error stays within the tolerance,
+//! by the law's bound, is taken; if none is, the most accurate one that runs, and the plan says so.
 //!
 //! # Practice
-//! Runs once at start, microseconds. Nothing here measures: the machine's numbers are passed in, so a plan is the same for the same numbers. Costs are cores, CPU
-//! seconds a second, so that they add up.
+//! Runs once at start, microseconds. Nothing here measures: the machine's numbers are passed in, so
+//! a plan is the same for the same numbers. Costs are cores, CPU seconds a second, so that they add
+//! up.
 //!
 //! ```
 //! use trepan_budget::{Machine, Scene, plan};
@@ -20,22 +24,23 @@
 //! ```
 //!
 //! # When not to use it
-//! For a scene outside what the rows were measured on: another tissue geometry, tools thinner than a voxel.
+//! For a scene outside what the rows were measured on: another tissue geometry, tools thinner than
+//! a voxel.
 
 mod choice;
 mod display;
-mod law;
 mod machine;
 mod plan;
+mod power_law;
 mod rows;
 mod scene;
 mod setup;
 mod step;
 
 pub use choice::{Choice, Neighbour};
-pub use law::{FEATURES, Law};
 pub use machine::{Machine, PlanError};
 pub use plan::{Plan, bone_cores, bone_error_n, dt_ms, holds_walls, picture_cores, plan, plan_with, tissue_cores};
+pub use power_law::{FEATURES, PowerLaw};
 pub use rows::{Kind, Row, Rows, read, write};
 pub use scene::Scene;
 pub use setup::{Bone, Picture, Quality, Setup, Tissue};

@@ -8,7 +8,7 @@ use trepan_soft::MaterialError;
 pub struct Machine {
     /// One tetrahedron, one step of TLED, ns.
     pub ns_per_tet_step: f64,
-    /// One rigid tick of `distance-field` with a burr of 3 mm on 0.5 mm voxels, µs.
+    /// One rigid tick of `god-object-sphere` with a burr of 3 mm on 0.5 mm voxels, µs.
     pub us_per_rigid_tick: f64,
     /// One pixel of the 3-D view by the processor with every ray, its light included, ns.
     pub ns_per_ray: f64,

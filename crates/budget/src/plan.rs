@@ -13,7 +13,8 @@ const THREAD_GAIN: f64 = 0.8;
 const LONGEST_DT_MS: f64 = 1.0;
 /// Step of the implicit solver, ms: four haptic ticks at 1 kHz.
 pub(crate) const IMPLICIT_DT_MS: f64 = 4.0;
-/// Time of a haptic tick without bone and of what belongs to it in other threads (device, force model, guard, tissue's collision, recording), µs.
+/// Time of a haptic tick without bone and of what belongs to it in other threads (device, force
+/// model, guard, tissue's collision, recording), µs.
 const FIXED_US_PER_TICK: f64 = 25.0;
 
 /// What to run.
@@ -62,7 +63,8 @@ impl Plan {
         self.bone.is_none_or(|c| c.in_time) && self.tissue.is_none_or(|c| c.in_time) && self.picture.in_time
     }
 
-    /// Solver step, ms, and mean edge of the tetrahedra, mm, by their number; the step of TLED is what its cost in these rows comes from, light and slender elements included.
+    /// Solver step, ms, and mean edge of the tetrahedra, mm, by their number; the step of TLED is
+    /// what its cost in these rows comes from, light and slender elements included.
     pub fn step_and_edge(&self) -> Option<(f64, f64)> {
         let Choice { what, cost, .. } = self.tissue?;
         let step_ms = match what.solver {
@@ -106,8 +108,8 @@ fn bone(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Choice<Bone>, P
     choose(judged, scene.force_error_n).ok_or(PlanError::NoRows("bone"))
 }
 
-/// Whether a method keeps a proxy on the side of the bone that it came from: one that does not loses thin walls, whatever its error on thick ones. A plan takes
-/// no other.
+/// Whether a method keeps a proxy on the side of the bone that it came from: one that does not
+/// loses thin walls, whatever its error on thick ones. A plan takes no other.
 pub fn holds_walls(bone: &Bone) -> bool {
     trepan_rigid::Method::named(bone.method).is_some_and(|method| method.has_proxy())
 }
@@ -171,7 +173,7 @@ fn solver_cores(free: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Law;
+    use crate::PowerLaw;
     use proptest::prelude::*;
     use trepan_soft::Material;
 
@@ -179,11 +181,11 @@ mod tests {
         Machine { ns_per_tet_step: 20.0, us_per_rigid_tick: 40.0, ns_per_ray: 500.0, threads: 2, device_draws: false };
 
     fn row<T>(what: T, error: f64, cost: f64) -> Row<T> {
-        Row { what, error: Law::constant(error), cost: Law::constant(cost) }
+        Row { what, error: PowerLaw::constant(error), cost: PowerLaw::constant(cost) }
     }
 
     fn rows() -> Rows {
-        let bone = |spacing_mm| Bone { method: "distance-field", spacing_mm, points: 0 };
+        let bone = |spacing_mm| Bone { method: "god-object-sphere", spacing_mm, points: 0 };
         let tissue = |tets| Tissue { solver: "tled", tets, halvings: 0, still_mm: 0.0 };
         let picture = |detail| Picture { sparse: detail < 1.0, detail };
         Rows {
@@ -204,8 +206,10 @@ mod tests {
         }
     }
 
-    /// By hand: 2 N/mm · 0.04 mm = 0.08 N is the first under 0.1 N; 40 us · 1000 Hz is 0.04 core. 20 000 tetrahedra: a = 7.985 mm, dt = 0.35 · 6.519/3.373 =
-    /// 0.6766 ms; a step takes 20 000 · 20 ns = 0.4 ms: 0.591 core. 800 000 pixels · 500 ns · 0.25 · 10/s: 1 core, more than the 1.34 that are left allow the full picture.
+    /// By hand: 2 N/mm · 0.04 mm = 0.08 N is the first under 0.1 N; 40 us · 1000 Hz is 0.04 core.
+    /// 20 000 tetrahedra: a = 7.985 mm, dt = 0.35 · 6.519/3.373 = 0.6766 ms; a step takes 20 000 ·
+    /// 20 ns = 0.4 ms: 0.591 core. 800 000 pixels · 500 ns · 0.25 · 10/s: 1 core, more than the
+    /// 1.34 that are left allow the full picture.
     #[test]
     fn the_cheapest_within_the_tolerance_is_taken() {
         let plan = plan_with(&MACHINE, &scene(), &rows()).unwrap();

@@ -1,11 +1,11 @@
 //! What each choice costs and how far it is off, measured once: tables in `rows/*.csv`.
 //!
 //! # Practice
-//! A line is a choice, the law of its error and the law of its cost; the README names the command that measures them anew. Rows of a caller's own go
-//! to [`plan_with`](crate::plan_with).
+//! A line is a choice, the law of its error and the law of its cost; the README names the command
+//! that measures them anew. Rows of a caller's own go to [`plan_with`](crate::plan_with).
 
-use crate::law::FEATURES;
-use crate::{Bone, Law, Picture, PlanError, Tissue};
+use crate::power_law::FEATURES;
+use crate::{Bone, Picture, PlanError, PowerLaw, Tissue};
 
 /// Numbers of a law in a table.
 const LAW: usize = FEATURES + 3;
@@ -15,11 +15,12 @@ const LAW: usize = FEATURES + 3;
 pub struct Row<T> {
     /// What is chosen.
     pub what: T,
-    /// Its error: mm of depth on bone, mm of displacement in tissue, percent of white in the picture.
-    pub error: Law,
-    /// Its time over that of the number in [`Machine`](crate::Machine): a tick, a tetrahedron and step of the expected length (what sleeps included), a pixel of the full
+    /// Its error: mm of depth on bone, mm of displacement in tissue, percent of white in the
     /// picture.
-    pub cost: Law,
+    pub error: PowerLaw,
+    /// Its time over that of the number in [`Machine`](crate::Machine): a tick, a tetrahedron and
+    /// step of the expected length (what sleeps included), a pixel of the full picture.
+    pub cost: PowerLaw,
 }
 
 /// All there is to choose from.
@@ -115,15 +116,15 @@ fn header<T: Kind>() -> String {
     format!("{},{},{}", T::KEYS.join(","), law("error"), law("cost"))
 }
 
-fn numbers(law: Law) -> [f64; LAW] {
+fn numbers(law: PowerLaw) -> [f64; LAW] {
     let [a, b, c, d] = law.weights;
     [a, b, c, d, law.spread, law.bound]
 }
 
-fn law(fields: &[&str]) -> Option<Law> {
+fn law(fields: &[&str]) -> Option<PowerLaw> {
     let numbers: Vec<f64> = fields.iter().map(|field| field.parse().ok()).collect::<Option<_>>()?;
     let [a, b, c, d, spread, bound] = numbers[..] else { return None };
-    Some(Law { weights: [a, b, c, d], spread, bound })
+    Some(PowerLaw { weights: [a, b, c, d], spread, bound })
 }
 
 impl Kind for Bone {

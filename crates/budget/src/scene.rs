@@ -5,7 +5,8 @@ use trepan_soft::Material;
 /// What the scene asks for and what is in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scene {
-    /// Error of the force on bone, as a vector, that 95 of 100 ticks must stay within, N. A hand notices about 0.1 N.
+    /// Error of the force on bone, as a vector, that 95 of 100 ticks must stay within, N. A hand
+    /// notices about 0.1 N.
     pub force_error_n: f64,
     /// Error of the displacement that 95 of 100 places near the tool must stay within, mm.
     pub displacement_mm: f64,
@@ -19,17 +20,20 @@ pub struct Scene {
     pub stiffness: f64,
     /// Radius of the tool on bone, mm.
     pub tool_radius_mm: f64,
-    /// How deep the hand presses that tool into bone, mm: force over stiffness; at most its radius. Deeper, its centre is under the surface, and more than one way out is right.
+    /// How deep the hand presses that tool into bone, mm: force over stiffness; at most its radius.
+    /// Deeper, its centre is under the surface, and more than one way out is right.
     pub press_mm: f64,
     /// Edge of the CT's own voxels, the mean of the three, mm: bone is as rough as that.
     pub finest_mm: f64,
-    /// How far a tool pushes the tissue, mm; at most its radius. Deeper, tissue would close around the shaft, and finer and finer meshes do not agree on how it moves.
+    /// How far a tool pushes the tissue, mm; at most its radius. Deeper, tissue would close around
+    /// the shaft, and finer and finer meshes do not agree on how it moves.
     pub tissue_motion_mm: f64,
     /// Radius of that tool, mm.
     pub probe_radius_mm: f64,
     /// Volume of the brain, mm³.
     pub brain_mm3: f64,
-    /// What it is made of; the softest of several parts decides least, the stiffest shortens the step.
+    /// What it is made of; the softest of several parts decides least, the stiffest shortens the
+    /// step.
     pub material: Material,
     /// Rate of the haptic device, Hz.
     pub device_rate_hz: f64,
@@ -44,7 +48,8 @@ pub struct Scene {
 }
 
 impl Default for Scene {
-    /// Tolerances of force and tissue that about the usual setup keeps in an adult's head, and of a picture whose edges are still sharp.
+    /// Tolerances of force and tissue that about the usual setup keeps in an adult's head, and of a
+    /// picture whose edges are still sharp.
     fn default() -> Self {
         Self {
             force_error_n: 0.4,
@@ -97,12 +102,14 @@ impl Scene {
         [self.tool_radius_mm, self.press_mm, self.finest_mm].map(f64::ln)
     }
 
-    /// What the error of tissue depends on: the logarithms of motion and radius, mm, and of the volume over 1.2 l.
+    /// What the error of tissue depends on: the logarithms of motion and radius, mm, and of the
+    /// volume over 1.2 l.
     pub fn tissue_features(&self) -> [f64; 3] {
         [self.tissue_motion_mm, self.probe_radius_mm, self.brain_mm3 / 1.2e6].map(f64::ln)
     }
 
-    /// What the error of the picture depends on: the logarithms of the mm that a pixel shows, of the mm that the view shows and of the CT's voxels, mm.
+    /// What the error of the picture depends on: the logarithms of the mm that a pixel shows, of
+    /// the mm that the view shows and of the CT's voxels, mm.
     pub fn picture_features(&self) -> [f64; 3] {
         [self.view_mm / f64::from(self.picture_pixels[1]), self.view_mm, self.finest_mm].map(f64::ln)
     }

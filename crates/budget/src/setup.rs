@@ -20,9 +20,11 @@ pub struct Tissue {
     pub solver: &'static str,
     /// Tetrahedra of the whole brain.
     pub tets: usize,
-    /// How often the edges of the tetrahedra are halved around the opening, of those many; 0 = they are alike everywhere.
+    /// How often the edges of the tetrahedra are halved around the opening, of those many; 0 = they
+    /// are alike everywhere.
     pub halvings: u32,
-    /// Region of interest: what moves less than this in 50 ms sleeps, mm (`still_mm` of `trepan_tled::Config`). 0 = all of it is stepped.
+    /// Region of interest: what moves less than this in 50 ms sleeps, mm (`still_mm` of
+    /// `trepan_tled::Config`). 0 = all of it is stepped.
     pub still_mm: f64,
 }
 
@@ -67,7 +69,7 @@ impl Quality {
     /// The setup; `None` for [`Auto`](Self::Auto), which needs a scene and a machine.
     pub fn preset(self) -> Option<Setup> {
         let setup = |spacing_mm, tets, sparse, detail| Setup {
-            bone: Bone { method: "distance-field", spacing_mm, points: 0 },
+            bone: Bone { method: "god-object-sphere", spacing_mm, points: 0 },
             tissue: Tissue { solver: "tled", tets, halvings: 2, still_mm: 0.0 },
             picture: Picture { sparse, detail },
         };
@@ -137,7 +139,7 @@ mod tests {
         assert!(draft.tissue.tets < usual.tissue.tets && usual.tissue.tets < fine.tissue.tets);
         assert_eq!(
             usual.to_string(),
-            "distance-field on 1 mm voxels; tled with 8000 tetrahedra, edges 1/4 at the opening; every ray"
+            "god-object-sphere on 1 mm voxels; tled with 8000 tetrahedra, edges 1/4 at the opening; every ray"
         );
         let alike = Tissue { halvings: 0, still_mm: 0.01, ..draft.tissue };
         assert_eq!(alike.to_string(), "tled with 3000 tetrahedra, what moves over 0.01 mm");

@@ -1,4 +1,5 @@
-//! A hand presses a virtual wall through the guard: prints force, energy and what the guard had to do.
+//! A hand presses a virtual wall through the guard: prints force, energy and what the guard had to
+//! do.
 
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Pose, ToolState, Twist, Vec3};

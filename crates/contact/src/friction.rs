@@ -6,15 +6,17 @@
 //! |kₜ s| ≤ μₛ Fₙ      sticks: the anchor stays
 //! |kₜ s| > μₛ Fₙ      slips: the anchor follows so that |kₜ s| = μ Fₙ, until the tip turns back or rests
 //! ```
-//! The friction cone of Ruspini's proxy, with the anchor in the part of the proxy. The normal part is
-//! [`Viscoelastic`](crate::Viscoelastic).
+//! The friction cone of Ruspini's proxy, with the anchor in the part of the proxy. The normal part
+//! is [`Viscoelastic`](crate::Viscoelastic).
 //!
 //! # Practice
-//! kₜ N/mm; μ without unit. Steel on wet bone is about 0.2 to 0.3 (uncalibrated). The anchor is forgotten when contact ends.
+//! kₜ N/mm; μ without unit. Steel on wet bone is about 0.2 to 0.3 (uncalibrated). The anchor is
+//! forgotten when contact ends.
 //!
 //! # Sources
-//! D. Ruspini, K. Kolarov, O. Khatib, *The haptic display of complex graphical environments*, SIGGRAPH 1997; V. Hayward, B. Armstrong, *A new
-//! computational model of friction applied to haptic rendering*, ISER 1999.
+//! D. Ruspini, K. Kolarov, O. Khatib, *The haptic display of complex graphical environments*,
+//! SIGGRAPH 1997; V. Hayward, B. Armstrong, *A new computational model of friction applied to
+//! haptic rendering*, ISER 1999.
 //!
 //! # When not to use it
 //! For a spinning burr: it cuts and does not stick.

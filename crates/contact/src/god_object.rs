@@ -1,12 +1,14 @@
 //! The god-object: where the tool would be if obstacles were perfectly hard.
 //!
 //! # Theory
-//! Zilles and Salisbury 1995 place the proxy at the point nearest to the device that no active plane forbids:
+//! Zilles and Salisbury 1995 place the proxy at the point nearest to the device that no active
+//! plane forbids:
 //! ```text
 //! minimise ½|x - device|²   subject to   (x - pᵢ)·nᵢ ≥ 0 ,  i ≤ 3 planes
 //! ```
-//! With Lagrange multipliers λ ≥ 0: `x = device + Σ λᵢ nᵢ`, `(nᵢ·nⱼ) λⱼ = (pᵢ - device)·nᵢ`. There are at most 2³ sets of active
-//! planes, so the sets are tried by size, and the nearest point that satisfies all planes wins.
+//! With Lagrange multipliers λ ≥ 0: `x = device + Σ λᵢ nᵢ`, `(nᵢ·nⱼ) λⱼ = (pᵢ - device)·nᵢ`. There
+//! are at most 2³ sets of active planes, so the sets are tried by size, and the nearest point that
+//! satisfies all planes wins.
 //!
 //! ```text
 //!      proxy ●───────── plane
@@ -15,13 +17,16 @@
 //! ```
 //!
 //! # Practice
-//! Closed form, at most 8 small systems; planes in world mm. Planes that are nearly parallel are one constraint.
+//! Closed form, at most 8 small systems; planes in world mm. Planes that are nearly parallel are
+//! one constraint.
 //!
 //! # Sources
-//! C. B. Zilles, J. K. Salisbury, *A constraint-based god-object method for haptic display*, IROS 1995.
+//! C. B. Zilles, J. K. Salisbury, *A constraint-based god-object method for haptic display*,
+//! IROS 1995.
 //!
 //! # When not to use it
-//! Alone against a curved surface: the planes hold only near the proxy, so the caller sweeps from the old place to the new.
+//! Alone against a curved surface: the planes hold only near the proxy, so the caller sweeps from
+//! the old place to the new.
 
 use trepan_geometry::Vec3;
 
@@ -57,8 +62,8 @@ impl GodObject {
         Self { position }
     }
 
-    /// Moves the proxy to the allowed point nearest to `device` and returns it. Planes past the third are ignored; without
-    /// a solution (opposed planes) the proxy stays.
+    /// Moves the proxy to the allowed point nearest to `device` and returns it. Planes past the
+    /// third are ignored; without a solution (opposed planes) the proxy stays.
     pub fn follow(&mut self, device: Vec3, planes: &[Plane]) -> Vec3 {
         let planes = &planes[..planes.len().min(MAX_PLANES)];
         if let Some(goal) = nearest_allowed(device, planes) {
@@ -68,7 +73,8 @@ impl GodObject {
     }
 }
 
-/// The point nearest to `device` over all `planes`; `None` when there is none or input is not finite.
+/// The point nearest to `device` over all `planes`; `None` when there is none or input is not
+/// finite.
 fn nearest_allowed(device: Vec3, planes: &[Plane]) -> Option<Vec3> {
     let allowed = |x: Vec3| x.is_finite() && planes.iter().all(|p| p.height(x) >= -1e-4);
     (0u32..1 << planes.len())
@@ -76,12 +82,14 @@ fn nearest_allowed(device: Vec3, planes: &[Plane]) -> Option<Vec3> {
         .min_by(|a, b| a.distance_squared(device).total_cmp(&b.distance_squared(device)))
 }
 
-/// The point nearest to `device` on the planes whose bit is set in `active`; `None` when they are (nearly) dependent.
+/// The point nearest to `device` on the planes whose bit is set in `active`; `None` when they are
+/// (nearly) dependent.
 fn on_planes(device: Vec3, planes: &[Plane], active: u32) -> Option<Vec3> {
     let mut x = device;
     let mut basis = [Vec3::ZERO; MAX_PLANES];
     for (i, plane) in planes.iter().enumerate().filter(|(i, _)| active >> i & 1 == 1) {
-        // Gram-Schmidt: the part of this normal along which x can still move without leaving the planes before.
+        // Gram-Schmidt: the part of this normal along which x can still move without leaving the
+        // planes before.
         let free = basis.iter().fold(plane.normal, |n, b| n - *b * n.dot(*b));
         let size = free.length();
         if size.is_nan() || size < 1e-3 {

@@ -5,21 +5,25 @@
 //! wanted → finite? → input sound? → ramp-in → damping → clamp |F|, |τ| → slew → energy bound → GuardedWrench
 //!                                                          ↑ peak, or less when the motors are warm
 //! ```
-//! Whatever comes in, what goes out is finite, no longer than the limit, and no further from the last wrench than the
-//! slew limit lets it, but for one case: where a held force would give the hand energy that it never put in, the force falls faster. A force
-//! that this holds short for long ramps in anew: a wall is never lost for good. Vectors are shortened, never clipped by axis: the direction of a force is kept.
+//! Whatever comes in, what goes out is finite, no longer than the limit, and no further from the
+//! last wrench than the slew limit lets it, but for one case: where a held force would give the
+//! hand energy that it never put in, the force falls faster. A force that this holds short for long
+//! ramps in anew: a wall is never lost for good. Vectors are shortened, never clipped by axis: the
+//! direction of a force is kept.
 //!
 //! # Practice
-//! Every event is counted in [`GuardCounters`]. A wanted wrench that is not finite, a pose that is not, a tool faster than the
-//! cut-out, a sample that does not age: each is treated as "no force wanted", which the slew limit turns into a fade.
-//! After such a fault and at the start the force ramps in over `ramp_in_ms`. [`ForceGuard::release`] fades to zero and
-//! stays there until [`ForceGuard::resume`]. Cost: about 0.1 us.
+//! Every event is counted in [`GuardCounters`]. A wanted wrench that is not finite, a pose that is
+//! not, a tool faster than the cut-out, a sample that does not age: each is treated as "no force
+//! wanted", which the slew limit turns into a fade. After such a fault and at the start the force
+//! ramps in over `ramp_in_ms`. [`ForceGuard::release`] fades to zero and stays there until
+//! [`ForceGuard::resume`]. Cost: about 0.1 us.
 //!
-//! The default slew of 0.5 N/ms lies within the thesis's largest measured change (0.4 to 0.6 N a tick), so that force
-//! models which behave never feel it; 3.3 N is the peak of the Touch.
+//! The default slew of 0.5 N/ms lies within the thesis's largest measured change (0.4 to 0.6 N a
+//! tick), so that force models which behave never feel it; 3.3 N is the peak of the Touch.
 //!
 //! # When not to use it
-//! There is no such case: a device takes nothing else. To watch a model's own force, log the wrench before the guard.
+//! There is no such case: a device takes nothing else. To watch a model's own force, log the wrench
+//! before the guard.
 
 mod config;
 mod heat;
@@ -49,10 +53,11 @@ pub struct ForceGuard {
 }
 
 impl ForceGuard {
-    /// A guard that starts at no force and ramps in. Limits that are negative or not numbers count as zero.
+    /// A guard that starts at no force and ramps in. Limits that are negative or not numbers count
+    /// as zero.
     pub fn new(config: GuardConfig) -> Self {
         Self {
-            config: config.sound(),
+            config: config.sanitized(),
             counters: GuardCounters::default(),
             observer: PassivityObserver::default(),
             applied: Wrench::ZERO,
@@ -236,7 +241,8 @@ impl GuardedWrench {
     }
 }
 
-/// `v` shortened to `limit` (a hair less, so that rounding keeps it within), and whether it was longer.
+/// `v` shortened to `limit` (a hair less, so that rounding keeps it within), and whether it was
+/// longer.
 fn shortened(v: Vec3, limit: f32) -> (Vec3, bool) {
     let largest = v.abs().max_element();
     if largest == 0.0 || v.length() <= limit {

@@ -1,11 +1,13 @@
 //! The plain spring: force in proportion to depth.
 //!
 //! # Theory
-//! `F = k p n` (Hooke; thesis Eq 3.2), with stiffness k, depth p and the normal n out of the obstacle.
+//! `F = k p n` (Hooke; thesis Eq 3.2), with stiffness k, depth p and the normal n out of the
+//! obstacle.
 //!
 //! # When not to use it
-//! On a real device at high stiffness: a sampled spring without damping makes energy at every tick (a passive wall needs
-//! device damping `b > K T / 2`). [`Viscoelastic`](crate::Viscoelastic) is the default.
+//! On a real device at high stiffness: a sampled spring without damping makes energy at every tick
+//! (a passive wall needs device damping `b > K T / 2`). [`Viscoelastic`](crate::Viscoelastic) is
+//! the default.
 
 use crate::{ContactManifold, ForceModel, viscoelastic::pressed};
 use trepan_geometry::{ToolState, Wrench};

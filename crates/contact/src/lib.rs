@@ -1,17 +1,18 @@
 //! Contact as plain data, what force it makes, and the guard that stands before every hand.
 //!
 //! # Theory
-//! A collision method fills a [`ContactManifold`]; a [`ForceModel`] turns it into the wrench that the scene wants; the
-//! [`ForceGuard`] turns that into the wrench that a hand may get. Only the guard makes a non-zero [`GuardedWrench`] and
-//! devices take nothing else, so that no path of the program can go round it.
+//! A collision method fills a [`ContactManifold`]; a [`ForceModel`] turns it into the wrench that
+//! the scene wants; the [`ForceGuard`] turns that into the wrench that a hand may get. Only the
+//! guard makes a non-zero [`GuardedWrench`] and devices take nothing else, so that no path of the
+//! program can go round it.
 //!
 //! ```text
 //! pose → collision → ContactManifold → ForceModel → Wrench → ForceGuard → GuardedWrench → device
 //! ```
 //!
 //! # Practice
-//! Everything here is plain data of fixed size: no allocation, lock or clock, well under a microsecond a tick. Units are
-//! mm, ms, g, hence N, N/mm and N ms/mm.
+//! Everything here is plain data of fixed size: no allocation, lock or clock, well under a
+//! microsecond a tick. Units are mm, ms, g, hence N, N/mm and N ms/mm.
 //!
 //! ```
 //! use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, Viscoelastic};

@@ -1,4 +1,5 @@
-//! What one collision test found: a fixed-capacity list of contacts and the one contact that stands for them all.
+//! What one collision test found: a fixed-capacity list of contacts and the one contact that stands
+//! for them all.
 
 use trepan_geometry::Vec3;
 
@@ -18,8 +19,9 @@ pub struct Contact {
 
 /// The contacts of one tool with one obstacle.
 ///
-/// `normal`, `depth_mm` and `point` are the aggregate that force models use; the list behind [`contacts`](Self::contacts) is what it
-/// was made of. An empty manifold has depth 0 and a zero normal. Copying costs 1.8 kB; nothing is allocated.
+/// `normal`, `depth_mm` and `point` are the aggregate that force models use; the list behind
+/// [`contacts`](Self::contacts) is what it was made of. An empty manifold has depth 0 and a zero
+/// normal. Copying costs 1.8 kB; nothing is allocated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactManifold {
     /// Unit vector out of the obstacle, towards the free side; zero when there is no contact.
@@ -28,7 +30,8 @@ pub struct ContactManifold {
     pub depth_mm: f32,
     /// Point of application, world mm.
     pub point: Vec3,
-    /// Moment about `point` for each newton, mm: what is left when a tool touches in several places, tip and shaft. Zero for one place.
+    /// Moment about `point` for each newton, mm: what is left when a tool touches in several
+    /// places, tip and shaft. Zero for one place.
     pub couple_mm: Vec3,
     /// Contacts that did not fit.
     pub overflow: u32,

@@ -1,9 +1,10 @@
 //! How a tool presses on tissue nodes: one spring between the tool and a weighted mean of nodes.
 //!
 //! # Theory
-//! The contact acts on the point `x̄ = Σ wᵢ xᵢ` of the moving tissue. Its depth is `d = offset + x̄·n`, so that tissue which gives way
-//! along `-n` relieves the spring by itself, at every solver step, with the solver's own positions: a late collision result
-//! cannot pump energy into the mesh as a held force would. The force on node i is `-wᵢ k d n`, d > 0 only.
+//! The contact acts on the point `x̄ = Σ wᵢ xᵢ` of the moving tissue. Its depth is
+//! `d = offset + x̄·n`, so that tissue which gives way along `-n` relieves the spring by itself, at
+//! every solver step, with the solver's own positions: a late collision result cannot pump energy
+//! into the mesh as a held force would. The force on node i is `-wᵢ k d n`, d > 0 only.
 //!
 //! ```text
 //!      tool  ↓ -n
@@ -11,15 +12,17 @@
 //! ```
 //!
 //! # Practice
-//! Explicit solvers take it implicitly, at any stiffness; `linear` and `mass-spring` whole, at the cost of their stability. Weights may have signs: +1 on a node and -wⱼ on the
-//! triangle that it went through make a spring between two parts of the tissue.
+//! Explicit solvers take it implicitly, at any stiffness; `linear` and `mass-spring` whole, at the
+//! cost of their stability. Weights may have signs: +1 on a node and -wⱼ on the triangle that it
+//! went through make a spring between two parts of the tissue.
 
 use trepan_geometry::Vec3;
 
 /// Most nodes that one tool presses on; the rest is counted in [`NodalContact::overflow`].
 pub const MAX_NODES: usize = 64;
 
-/// A unilateral spring on a weighted set of nodes. Plain data, about 600 bytes, copied whole between threads.
+/// A unilateral spring on a weighted set of nodes. Plain data, about 600 bytes, copied whole
+/// between threads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodalContact {
     /// Unit vector out of the tissue, towards the tool.
@@ -34,7 +37,8 @@ pub struct NodalContact {
     pub tool_normal_velocity: f32,
     /// Damping across the normal while it presses, N ms/mm, by weight on each node for itself.
     pub lateral_damping: f32,
-    /// Velocity to which that damping brings the nodes, mm/ms; only what lies across the normal counts.
+    /// Velocity to which that damping brings the nodes, mm/ms; only what lies across the normal
+    /// counts.
     pub lateral_velocity: Vec3,
     /// Nodes that did not fit (their weight is lost; the rest is normalised).
     pub overflow: u32,
@@ -114,9 +118,11 @@ impl NodalContact {
         self.nodes().map(|(node, weight)| weight * of(node)).sum()
     }
 
-    /// Force along `-normal` that the tool exerts on the tissue, N, never negative (it pushes, it never pulls).
+    /// Force along `-normal` that the tool exerts on the tissue, N, never negative (it pushes, it
+    /// never pulls).
     ///
-    /// `mean_position` and `mean_velocity` are [`mean`](Self::mean) of the solver's present nodes, mm and mm/ms.
+    /// `mean_position` and `mean_velocity` are [`mean`](Self::mean) of the solver's present nodes,
+    /// mm and mm/ms.
     pub fn pressure_n(&self, mean_position: Vec3, mean_velocity: Vec3) -> f32 {
         let depth = self.offset_mm + mean_position.dot(self.normal);
         if self.is_empty() || depth <= 0.0 {

@@ -1,10 +1,10 @@
 //! All springs that press on one body at once: tip, shaft, walls, its own folds.
 //!
 //! # Practice
-//! Holds at most [`MAX_SPRINGS`] springs and [`MAX_PLANES`] planes; what does not fit is counted. Memory is
-//! taken once, for all of them, so that after [`with_room`](NodalContacts::with_room) neither
-//! [`push`](NodalContacts::push) nor [`copy_from`](NodalContacts::copy_from) allocates, and a copy costs what
-//! is in use.
+//! Holds at most [`MAX_SPRINGS`] springs and [`MAX_PLANES`] planes; what does not fit is counted.
+//! Memory is taken once, for all of them, so that after [`with_room`](NodalContacts::with_room)
+//! neither [`push`](NodalContacts::push) nor [`copy_from`](NodalContacts::copy_from) allocates, and
+//! a copy costs what is in use.
 
 use crate::{NodalContact, PlaneContact};
 use core::ops::{Deref, DerefMut};
@@ -65,7 +65,8 @@ impl NodalContacts {
         &self.planes
     }
 
-    /// Springs, then planes in the form of springs: for solvers without a way of their own for planes.
+    /// Springs, then planes in the form of springs: for solvers without a way of their own for
+    /// planes.
     pub fn all(&self) -> impl Iterator<Item = NodalContact> + '_ {
         self.springs.iter().copied().chain(self.planes.iter().map(|plane| (*plane).into()))
     }

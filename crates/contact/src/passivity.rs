@@ -1,45 +1,55 @@
-//! Passivity observer and controller: the virtual wall must not give out more energy than the hand has put in.
+//! Passivity observer and controller: the virtual wall must not give out more energy than the hand
+//! has put in.
 //!
 //! # Theory
-//! With F the force on the hand, held between two ticks, and x the tip, the energy that the scene has taken up is
+//! With F the force on the hand, held between two ticks, and x the tip, the energy that the scene
+//! has taken up is
 //! ```text
 //! E(n) = E(n-1) - F(n-1)·(x(n) - x(n-1))                     exact for a held force and an exact x
 //! ```
-//! E < 0 means that the wall has made energy: a sampled spring of stiffness k makes `k v² T (T/2 + d)` a tick when the force is d late.
-//! Three answers, from the gentlest on:
+//! E < 0 means that the wall has made energy: a sampled spring of stiffness k makes
+//! `k v² T (T/2 + d)` a tick when the force is d late. Three answers, from the gentlest on:
 //! ```text
 //! 1 damp     F ← F (1 - clamp(α v·n/|F|, ±1)),  n = F/|F|       along the force alone; it never pulls and never more than doubles F
 //!            α grows by the energy made, stays while in contact, fades in free motion
 //! 2 bound    |F| d ≤ E + ε,   d = (v·n + margin) T              d the way that the hand may go along F in the coming tick
 //! 3 restart  a force held short for a stated time while the scene still wants it: account and force begin anew, counted
 //! ```
-//! A damper cannot undo what a held force is about to give, hence the bound (the energy bounding of Kim and Ryu). A damper that stops as
-//! soon as E ≥ 0 lets the oscillation come back at once, hence the memory. A hand at rest gets no power whatever the force, so the
-//! bound is exactly silent there; and a wall that has lost its force inside the hand's reach could never earn it back at F = 0, hence the
-//! restart.
+//! A damper cannot undo what a held force is about to give, hence the bound (the energy bounding of
+//! Kim and Ryu). A damper that stops as soon as E ≥ 0 lets the oscillation come back at once, hence
+//! the memory. A hand at rest gets no power whatever the force, so the bound is exactly silent
+//! there; and a wall that has lost its force inside the hand's reach could never earn it back at
+//! F = 0, hence the restart.
 //!
-//! **Encoder steps.** A staircase spring is conservative, but each trembling across one edge would book `k Δ²`. So E is booked by the
-//! sure way of the hand ([`track`]), which is right to `|F| Δ`. The damper learns from a second account by positions as read, which
-//! doubts too much rather than too little: damping costs no force at rest.
+//! **Encoder steps.** A staircase spring is conservative, but each trembling across one edge would
+//! book `k Δ²`. So E is booked by the sure way of the hand ([`track`]), which is right to `|F| Δ`.
+//! The damper learns from a second account by positions as read, which doubts too much rather than
+//! too little: damping costs no force at rest.
 //!
 //! # Practice
-//! Energy in N mm (= mJ). What the user has put in is credited up to `max_stored_nmm`, and until the contact ends: a long quiet history would
-//! hide a fresh oscillation (Ryu's problem of the full tank). While the hand rests a negative account fades in `recovery_ms`.
-//! A device that applies forces late is told by `delay_ticks`: the account then books the force that the hand feels.
+//! Energy in N mm (= mJ). What the user has put in is credited up to `max_stored_nmm`, and until
+//! the contact ends: a long quiet history would hide a fresh oscillation (Ryu's problem of the full
+//! tank). While the hand rests a negative account fades in `recovery_ms`. A device that applies
+//! forces late is told by `delay_ticks`: the account then books the force that the hand feels.
 //!
 //! # Limits
-//! The motors give out at most 0.1 mJ more than they got with exact positions, delays to 2 ticks and walls to 2 N/mm, over any number of
-//! contacts and over each by itself, as long as nothing is restarted or fades. A restart may give up to `max_stored_nmm`. With encoder steps add what
-//! they hide, `|F| Δ`; an oscillation within one step is not seen at all. It is stilled by the device's own friction if that is at
-//! least `k Δ/2` (Abbott and Okamura), else it stays at about one step. A delay that is declared too small leaks `k v² T` a tick for each.
+//! The motors give out at most 0.1 mJ more than they got with exact positions, delays to 2 ticks
+//! and walls to 2 N/mm, over any number of contacts and over each by itself, as long as nothing is
+//! restarted or fades. A restart may give up to `max_stored_nmm`. With encoder steps add what they
+//! hide, `|F| Δ`; an oscillation within one step is not seen at all. It is stilled by the device's
+//! own friction if that is at least `k Δ/2` (Abbott and Okamura), else it stays at about one step.
+//! A delay that is declared too small leaks `k v² T` a tick for each.
 //!
 //! # Sources
-//! B. Hannaford, J.-H. Ryu, *Time-domain passivity control of haptic interfaces*, IEEE Trans. Robotics and Automation 18 (2002); J.-P. Kim, J. Ryu,
-//! *Robustly stable haptic interaction control using an energy-bounding algorithm*, Int. J. Robotics Research 29 (2010); J. J. Abbott,
-//! A. M. Okamura, *Effects of position quantization and sampling rate on virtual-wall passivity*, IEEE Trans. Robotics 21 (2005).
+//! B. Hannaford, J.-H. Ryu, *Time-domain passivity control of haptic interfaces*, IEEE Trans.
+//! Robotics and Automation 18 (2002); J.-P. Kim, J. Ryu, *Robustly stable haptic interaction
+//! control using an energy-bounding algorithm*, Int. J. Robotics Research 29 (2010); J. J. Abbott,
+//! A. M. Okamura, *Effects of position quantization and sampling rate on virtual-wall passivity*,
+//! IEEE Trans. Robotics 21 (2005).
 //!
 //! # When not to use it
-//! As a replacement for a stable wall: it answers one tick late, and it can only guess what the hand does in the tick to come.
+//! As a replacement for a stable wall: it answers one tick late, and it can only guess what the
+//! hand does in the tick to come.
 
 mod track;
 
@@ -54,7 +64,8 @@ const DAMPING_PER_NMM: f64 = 400.0;
 const SURPRISE: f32 = 0.2;
 /// A force under this share of what is wanted is held short.
 const SHORT: f32 = 0.9;
-/// A force held short for more than this share of the time restarts; held back at each step outwards, it comes and goes.
+/// A force held short for more than this share of the time restarts; held back at each step
+/// outwards, it comes and goes.
 const SHORT_OF_TIME: f32 = 0.2;
 /// Most times that the wait for a restart doubles.
 const MAX_DOUBLINGS: u32 = 5;
@@ -62,22 +73,28 @@ const MAX_DOUBLINGS: u32 = 5;
 /// Limits of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassivityConfig {
-    /// Largest damping that the controller injects, N ms/mm. 10 holds a 2 N/mm wall on a Touch; 0 only observes.
+    /// Largest damping that the controller injects, N ms/mm. 10 holds a 2 N/mm wall on a Touch; 0
+    /// only observes.
     pub max_damping: f32,
-    /// Time in which learnt damping fades while nothing is touched, ms. In contact it stays: else the oscillation would come back.
+    /// Time in which learnt damping fades while nothing is touched, ms. In contact it stays: else
+    /// the oscillation would come back.
     pub damping_memory_ms: f32,
-    /// Most energy that the wall may owe the hand, N mm. A spring of k at the force limit F stores F²/2k: 18 N mm for 0.3 N/mm.
+    /// Most energy that the wall may owe the hand, N mm. A spring of k at the force limit F stores
+    /// F²/2k: 18 N mm for 0.3 N/mm.
     pub max_stored_nmm: f32,
-    /// Energy that may be given out in advance, N mm: what the bound starts from. 0.05 is half of what a hand could ever notice.
+    /// Energy that may be given out in advance, N mm: what the bound starts from. 0.05 is half of
+    /// what a hand could ever notice.
     pub advance_nmm: f32,
-    /// Time in which a negative account fades while the hand rests, and the first wait before a force that is held short restarts,
-    /// ms. Each further restart within one contact waits twice as long.
+    /// Time in which a negative account fades while the hand rests, and the first wait before a
+    /// force that is held short restarts, ms. Each further restart within one contact waits twice
+    /// as long.
     pub recovery_ms: f32,
     /// Speed under which the hand rests and the damper too, mm/ms.
     pub min_speed: f32,
     /// Encoder step Δ, mm; 0 for exact positions. 0.055 is the Touch's.
     pub quantum_mm: f32,
-    /// Ticks between a force and the moment when the device applies it: 0 or 1 for a driver, 1 or 2 across a socket; at most 4.
+    /// Ticks between a force and the moment when the device applies it: 0 or 1 for a driver, 1 or 2
+    /// across a socket; at most 4.
     pub delay_ticks: u8,
 }
 
@@ -112,8 +129,8 @@ pub struct PassivityObserver {
 }
 
 impl PassivityObserver {
-    /// Books the tick that has passed: the tip is now read at `tip`, under the force that was sent `delay_ticks` before the last one.
-    /// `touching`: the scene wants a force.
+    /// Books the tick that has passed: the tip is now read at `tip`, under the force that was sent
+    /// `delay_ticks` before the last one. `touching`: the scene wants a force.
     pub fn book(&mut self, tip: Vec3, touching: bool, dt_ms: f32, config: &PassivityConfig) {
         let moved = self.track.follow(tip, config.quantum_mm);
         let felt = self.sent[late(config)].as_dvec3();
@@ -159,11 +176,13 @@ impl PassivityObserver {
         force * (1.0 - (self.damping * along / size).clamp(-1.0, 1.0))
     }
 
-    /// The share of `force` that the account can pay for in the coming tick, 0 to 1; always 1 for a hand at rest.
+    /// The share of `force` that the account can pay for in the coming tick, 0 to 1; always 1 for a
+    /// hand at rest.
     pub fn affordable(&self, force: Vec3, config: &PassivityConfig) -> f32 {
         let late = late(config);
         let motion = self.track.motion();
-        // Between encoder steps a change of motion is not known; with exact positions it is the best guess of the next one.
+        // Between encoder steps a change of motion is not known; with exact positions it is the
+        // best guess of the next one.
         let change = if config.quantum_mm > 0.0 { 0.0 } else { self.track.unevenness() };
         let surprise = SURPRISE * motion.length() + change;
         let way = |force: Vec3| motion.dot(force) + surprise * force.length();
@@ -174,7 +193,8 @@ impl PassivityObserver {
         if !(price > 0.0 && price > funds) { 1.0 } else { (funds / price).max(0.0) }
     }
 
-    /// Whether the force has been held short for so long that it shall begin anew; the account then already has.
+    /// Whether the force has been held short for so long that it shall begin anew; the account then
+    /// already has.
     pub fn restarts(&mut self, wanted: Vec3, given: Vec3, dt_ms: f32, config: &PassivityConfig) -> bool {
         if wanted == Vec3::ZERO {
             (self.short_ms, self.restarts) = (0.0, 0);

@@ -1,13 +1,16 @@
-//! The tissue's surface near the tool, as the haptic tick needs it between two collision results: a tangent plane.
+//! The tissue's surface near the tool, as the haptic tick needs it between two collision results: a
+//! tangent plane.
 //!
 //! # Theory
-//! The tool moves at 1 kHz and more, a collision step against tissue may take longer. Between two results the tick holds
-//! on to the last tangent plane and measures its own, current depth against it (the intermediate representation of
-//! Adachi, Kumano and Ogino 1995): `depth(tip) = depth₀ + (tip₀ - tip)·n`. So the force follows the hand without the delay of a
+//! The tool moves at 1 kHz and more, a collision step against tissue may take longer. Between two
+//! results the tick holds on to the last tangent plane and measures its own, current depth against
+//! it (the intermediate representation of Adachi, Kumano and Ogino 1995):
+//! `depth(tip) = depth₀ + (tip₀ - tip)·n`. So the force follows the hand without the delay of a
 //! held force.
 //!
 //! # When not to use it
-//! Far from `tip_mm`: past a few tip radii the plane says nothing. A stale plane must fade: its age is the user's to check.
+//! Far from `tip_mm`: past a few tip radii the plane says nothing. A stale plane must fade: its age
+//! is the user's to check.
 
 use trepan_geometry::Vec3;
 
@@ -35,7 +38,8 @@ impl SurfacePatch {
         (self.depth_mm + (self.tip_mm - tip).dot(self.normal)).max(0.0)
     }
 
-    /// With a second contact of the same tool: two equal springs pull like one along the sum of their depths.
+    /// With a second contact of the same tool: two equal springs pull like one along the sum of
+    /// their depths.
     #[must_use]
     pub fn with(&self, normal: Vec3, depth_mm: f32) -> Self {
         let sum = self.normal * self.depth_mm.max(0.0) + normal * depth_mm.max(0.0);

@@ -2,14 +2,14 @@
 //!
 //! # Theory
 //! With x the node's position and n the unit vector out of the tissue, into the wall, the depth is
-//! `d = offset + x·n` and the force on the node `-(k d + b ẋ·n) n`, for d > 0 and never a pull. The plane
-//! is the wall's tangent near the node. Each node has a spring of its own, whose weight never changes:
-//! a spring that several nodes share, with weights found anew in each collision step, passes force from
-//! node to node as the weights move, and light nodes ring.
+//! `d = offset + x·n` and the force on the node `-(k d + b ẋ·n) n`, for d > 0 and never a pull. The
+//! plane is the wall's tangent near the node. Each node has a spring of its own, whose weight never
+//! changes: a spring that several nodes share, with weights found anew in each collision step,
+//! passes force from node to node as the weights move, and light nodes ring.
 //!
 //! # Practice
-//! A plane may be sent before its node touches: a negative depth exerts nothing, and the solver finds the
-//! moment of contact with its own positions, however late the next collision result is.
+//! A plane may be sent before its node touches: a negative depth exerts nothing, and the solver
+//! finds the moment of contact with its own positions, however late the next collision result is.
 
 use crate::NodalContact;
 use trepan_geometry::Vec3;

@@ -1,13 +1,16 @@
 //! Force shading: a force that turns smoothly where the surface under the tool is faceted.
 //!
 //! # Theory
-//! As Phong's shading lends a facet the normals of its vertices, the force is made to point along a normal n* that changes continuously, at the same
-//! size (Ruspini, Kolarov and Khatib 1997). They interpolate over the triangle that the proxy is on. A contact found in voxels has no triangle; it has
-//! the places where the proxy was, so the normals met there are averaged over the way of the contact point:
+//! As Phong's shading lends a facet the normals of its vertices, the force is made to point along a
+//! normal n* that changes continuously, at the same size (Ruspini, Kolarov and Khatib 1997). They
+//! interpolate over the triangle that the proxy is on. A contact found in voxels has no triangle;
+//! it has the places where the proxy was, so the normals met there are averaged over the way of the
+//! contact point:
 //! ```text
 //! n* ← n* + (1 - e^(-w/l)) (n - n*) , normalised;   w: way of the contact point since the last tick,  l: length of a facet
 //! ```
-//! At rest nothing changes, so that no force turns in a hand that holds still; over a facet's length the force has turned.
+//! At rest nothing changes, so that no force turns in a hand that holds still; over a facet's
+//! length the force has turned.
 //!
 //! ```text
 //!  n ↑  ↑   ↗  ↗      n* ↑  ↑ ⇗  ↗
@@ -15,15 +18,18 @@
 //! ```
 //!
 //! # Practice
-//! Put it round another model: `ForceShading::new(Viscoelastic::BONE, 1.0)`. l about a voxel's edge, mm. Its price is a normal that is late by l. The first
-//! normal of a contact is taken as it is.
+//! Put it round another model: `ForceShading::new(Viscoelastic::BONE, 1.0)`. l about a voxel's
+//! edge, mm. Its price is a normal that is late by l. The first normal of a contact is taken as it
+//! is.
 //!
 //! # Sources
-//! D. Ruspini, K. Kolarov, O. Khatib, *The haptic display of complex graphical environments*, SIGGRAPH 1997; H. Morgenbesser, M. Srinivasan, *Force shading
-//! for haptic shape perception*, ASME DSC 58 (1996).
+//! D. Ruspini, K. Kolarov, O. Khatib, *The haptic display of complex graphical environments*,
+//! SIGGRAPH 1997; H. Morgenbesser, M. Srinivasan, *Force shading for haptic shape perception*, ASME
+//! DSC 58 (1996).
 //!
 //! # When not to use it
-//! On methods whose normal is smooth by itself (`distance-field`): it only makes them late. At real edges: it rounds them.
+//! On methods whose normal is smooth by itself (`god-object-sphere`): it only makes them late. At
+//! real edges: it rounds them.
 
 use crate::{ContactManifold, ForceModel};
 use trepan_geometry::{ToolState, Vec3, Wrench};
@@ -33,7 +39,8 @@ use trepan_geometry::{ToolState, Vec3, Wrench};
 pub struct ForceShading<M> {
     /// What makes the force.
     pub model: M,
-    /// Way of the contact over which a normal is taken over, mm: the length of a facet. 0 shades nothing.
+    /// Way of the contact over which a normal is taken over, mm: the length of a facet. 0 shades
+    /// nothing.
     pub length_mm: f32,
     /// The shaded normal and the contact point of the last tick.
     last: Option<(Vec3, Vec3)>,

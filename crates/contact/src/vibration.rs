@@ -1,21 +1,23 @@
 //! The buzz of a drill at work, on top of another force model.
 //!
 //! # Theory
-//! A burr with few flutes, off centre by a little, pushes the hand sideways once a turn and once a flute:
+//! A burr with few flutes, off centre by a little, pushes the hand sideways once a turn and once a
+//! flute:
 //! ```text
 //! F = F₀ + (a/s) |F₀| (t₁ cos φ + t₂ sin φ) ,   φ̇ = 2π f s ,   t₁, t₂ ⊥ n
 //! ```
-//! s is the spindle's speed as a share of its free speed ([`Vibration::turn`]): a slower spindle buzzes lower, and stronger, since each flute then cuts a
-//! thicker chip; one that has stalled is still.
-//! The spindle itself (1000 Hz at 60 000/min) lies above what a hand feels and what a 1 kHz loop can draw, so f is the frequency that chatter
-//! has on the hand, 100 to 300 Hz.
+//! s is the spindle's speed as a share of its free speed ([`Vibration::turn`]): a slower spindle
+//! buzzes lower, and stronger, since each flute then cuts a thicker chip; one that has stalled is
+//! still. The spindle itself (1000 Hz at 60 000/min) lies above what a hand feels and what a 1 kHz
+//! loop can draw, so f is the frequency that chatter has on the hand, 100 to 300 Hz.
 //!
 //! # Practice
-//! Only while the pedal is down and the tool touches. Amplitude and frequency are uncalibrated. The mean over a turn is the
-//! force without vibration.
+//! Only while the pedal is down and the tool touches. Amplitude and frequency are uncalibrated. The
+//! mean over a turn is the force without vibration.
 //!
 //! # Sources
-//! A. Petersik et al., *Realistic haptic interaction in volume sculpting for surgery simulation*, IS4TM 2003: drill vibration at haptic rates.
+//! A. Petersik et al., *Realistic haptic interaction in volume sculpting for surgery simulation*,
+//! IS4TM 2003: drill vibration at haptic rates.
 //!
 //! # When not to use it
 //! Where the force is measured or compared: it adds a known disturbance.

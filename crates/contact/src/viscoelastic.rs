@@ -4,16 +4,19 @@
 //! ```text
 //! F = max(0, k p - b v·n) n        v velocity of the tool at the contact point
 //! ```
-//! The thesis's Eq 3.3 with the sign of the viscous part put right: it opposes the motion. The cut at zero keeps it from
-//! pulling the tool into the surface when the hand leaves fast. Only the normal part is damped, so that sliding stays free.
+//! The thesis's Eq 3.3 with the sign of the viscous part put right: it opposes the motion. The cut
+//! at zero keeps it from pulling the tool into the surface when the hand leaves fast. Only the
+//! normal part is damped, so that sliding stays free.
 //!
 //! # Practice
-//! `k` in N/mm, `b` in N ms/mm (= N s/m). A sampled wall on a device with own damping `b₀` is stable for
-//! `k < (b₀ + b) / (T/2 + delay)`: 2 N/mm at 1 ms without delay asks for 1 N ms/mm. Too much `b` is unstable in its turn.
+//! `k` in N/mm, `b` in N ms/mm (= N s/m). A sampled wall on a device with own damping `b₀` is
+//! stable for `k < (b₀ + b) / (T/2 + delay)`: 2 N/mm at 1 ms without delay asks for 1 N ms/mm. Too
+//! much `b` is unstable in its turn.
 //!
 //! # Sources
-//! J. E. Colgate, G. Schenkel, *Passivity of a class of sampled-data systems*, J. Robotic Systems 14 (1997); J. J. Gil et al.,
-//! *Stability analysis of a 1 DOF haptic interface using the Routh-Hurwitz criterion*, IEEE Trans. Control Syst. Technol. 12 (2004).
+//! J. E. Colgate, G. Schenkel, *Passivity of a class of sampled-data systems*, J. Robotic Systems
+//! 14 (1997); J. J. Gil et al., *Stability analysis of a 1 DOF haptic interface using the
+//! Routh-Hurwitz criterion*, IEEE Trans. Control Syst. Technol. 12 (2004).
 //!
 //! # When not to use it
 //! For friction: it pushes along the normal only.
@@ -53,7 +56,8 @@ impl ForceModel for Viscoelastic {
     fn reset(&mut self) {}
 }
 
-/// The wrench of a force of `size` N along the manifold's normal: nothing for no contact, a pull, or what is not finite.
+/// The wrench of a force of `size` N along the manifold's normal: nothing for no contact, a pull,
+/// or what is not finite.
 pub(crate) fn pressed(tool: &ToolState, manifold: &ContactManifold, size: f32) -> Wrench {
     let force = manifold.normal * size;
     let wrench = Wrench { force, torque: (manifold.point - tool.tip()).cross(force) + size * manifold.couple_mm };

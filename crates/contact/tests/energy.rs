@@ -1,11 +1,13 @@
-//! A simulated hand on a device, pressing a wall through the guard: what comes out must not be more than what went in.
+//! A simulated hand on a device, pressing a wall through the guard: what comes out must not be more
+//! than what went in.
 
 use trepan_contact::{
     Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardCounters, PassivityConfig, Viscoelastic,
 };
 use trepan_geometry::{Pose, ToolState, Twist, Vec3};
 
-/// Device and hand: a mass on a spring and damper whose rest the mind moves. Semi-implicit Euler at 20 us.
+/// Device and hand: a mass on a spring and damper whose rest the mind moves. Semi-implicit Euler at
+/// 20 us.
 #[derive(Clone, Copy)]
 struct Hand {
     mass_g: f32,

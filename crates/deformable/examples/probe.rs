@@ -1,4 +1,5 @@
-//! What does one collision step cost, and what does it find? A probe strokes a bending block of 20 thousand tetrahedra, with each method.
+//! What does one collision step cost, and what does it find? A probe strokes a bending block of 20
+//! thousand tetrahedra, with each method.
 
 use glam::{Quat, Vec3};
 use std::time::Instant;

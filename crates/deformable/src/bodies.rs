@@ -1,9 +1,13 @@
-//! Two moving meshes against each other, and one against itself: which border nodes lie in which tetrahedra, and what pushes them apart.
+//! Two moving meshes against each other, and one against itself: which border nodes lie in which
+//! tetrahedra, and what pushes them apart.
 //!
 //! # Theory
-//! A border node p of one body in a tetrahedron of the other has barycentric coordinates there; with them it is carried back to the other body at rest, to X. The closest
-//! border point of the body at rest, q(X), carried forward again with its triangle, is where p has to leave. Both ways are continuous across tetrahedra, and X
-//! knows how deep it is however the body is bent: the rest-state distance field of Fisher and Lin 2001, without a grid. The depth is `|q - p|`, the normal points from p to q.
+//! A border node p of one body in a tetrahedron of the other has barycentric coordinates there;
+//! with them it is carried back to the other body at rest, to X. The closest border point of the
+//! body at rest, q(X), carried forward again with its triangle, is where p has to leave. Both ways
+//! are continuous across tetrahedra, and X knows how deep it is however the body is bent: the
+//! rest-state distance field of Fisher and Lin 2001, without a grid. The depth is `|q - p|`, the
+//! normal points from p to q.
 //!
 //! ```text
 //!   moving        at rest            A force f n on the node and -f wᵢ n on the triangle's nodes acts along the line through
@@ -12,11 +16,13 @@
 //! ```
 //!
 //! # Practice
-//! The candidates come from a [`BroadPhase`]. Every node is in at most one contact with the other body. Nothing is allocated after `new`. Cost: one pass over all
-//! boxes, and 1 to 3 us for each node inside.
+//! The candidates come from a [`BroadPhase`]. Every node is in at most one contact with the other
+//! body. Nothing is allocated after `new`. Cost: one pass over all boxes, and 1 to 3 us for each
+//! node inside.
 //!
 //! # When not to use it
-//! For edges that cross without a node inside: meshes of like fineness. Through walls thinner than a step's motion.
+//! For edges that cross without a node inside: meshes of like fineness. Through walls thinner than
+//! a step's motion.
 
 use crate::{
     BroadPhase, ConfigError,
@@ -98,8 +104,9 @@ impl MeshCollision {
         Ok(Self { itself: true, ..Self::between(body, body)? })
     }
 
-    /// Finds the nodes inside, given both bodies' moved nodes (mm; the same twice for one body); `out` is cleared and filled up to its capacity.
-    /// Returns how many candidates or contacts did not fit. Arrays of another length than the meshes give no contact and count all nodes.
+    /// Finds the nodes inside, given both bodies' moved nodes (mm; the same twice for one body);
+    /// `out` is cleared and filled up to its capacity. Returns how many candidates or contacts did
+    /// not fit. Arrays of another length than the meshes give no contact and count all nodes.
     pub fn step(&mut self, body: &[Vec3], other: &[Vec3], out: &mut Vec<NodeContact>) -> u32 {
         out.clear();
         if other.len() != self.rest.len() || self.nodes.iter().any(|&n| n as usize >= body.len()) {
@@ -153,7 +160,8 @@ impl MeshCollision {
 }
 
 impl NodeContact {
-    /// The spring of a contact of a body with itself, N/mm and N ms/mm, for a solver: between the node and the triangle that it leaves through.
+    /// The spring of a contact of a body with itself, N/mm and N ms/mm, for a solver: between the
+    /// node and the triangle that it leaves through.
     pub fn spring(&self, stiffness: f32, damping: f32) -> NodalContact {
         let mut spring = NodalContact::none();
         spring.add(self.node, 1.0);
@@ -165,7 +173,8 @@ impl NodeContact {
     }
 }
 
-/// Adds the springs of contacts to nodal forces, N: `stiffness` (N/mm) times depth on each node, and the opposite on the triangle that it leaves through.
+/// Adds the springs of contacts to nodal forces, N: `stiffness` (N/mm) times depth on each node,
+/// and the opposite on the triangle that it leaves through.
 pub fn push_apart(contacts: &[NodeContact], stiffness: f32, on_body: &mut [Vec3], on_other: &mut [Vec3]) {
     for contact in contacts {
         let force = contact.normal * (stiffness * contact.depth_mm);

@@ -7,19 +7,23 @@ use crate::{Method, Response};
 pub struct Config {
     /// How the points inside the tissue are found.
     pub method: Method,
-    /// How normal and depth come out of what was found; `None` takes the one that belongs to the method.
+    /// How normal and depth come out of what was found; `None` takes the one that belongs to the
+    /// method.
     pub response: Option<Response>,
     /// Points on the tool's ball. More points feel smaller features; the time grows in proportion.
     pub points: usize,
-    /// Edge of a grid cell, mm, for the methods with a grid; `None` takes 1.45 x the mean edge of the mesh.
+    /// Edge of a grid cell, mm, for the methods with a grid; `None` takes 1.45 x the mean edge of
+    /// the mesh.
     pub cell_mm: Option<f32>,
     /// Contact spring between tool and tissue, N/mm. Higher feels harder.
     pub stiffness: f32,
     /// Contact damper along the normal, N ms/mm.
     pub damping: f32,
-    /// Coulomb friction between tool and tissue, 0 to 2. More drags the tissue along before the tool slips; 0 is frictionless, as on a wet brain.
+    /// Coulomb friction between tool and tissue, 0 to 2. More drags the tissue along before the
+    /// tool slips; 0 is frictionless, as on a wet brain.
     pub friction: f32,
-    /// Whether the tool's shaft touches too. Costs little until it comes near the tissue, then up to a few tip contacts.
+    /// Whether the tool's shaft touches too. Costs little until it comes near the tissue, then up
+    /// to a few tip contacts.
     pub shaft: bool,
 }
 

@@ -1,8 +1,9 @@
 //! Boxes for the inner loops: built from corners, compared with few instructions.
 //!
 //! # Practice
-//! The same box as [`Aabb`], its corners in four-lane registers: SSE2, NEON or WebAssembly's, by glam. A comparison with NaN is false and a minimum with NaN on the
-//! left is the right side, so a NaN corner neither grows a box nor lies in one.
+//! The same box as [`Aabb`], its corners in four-lane registers: SSE2, NEON or WebAssembly's, by
+//! glam. A comparison with NaN is false and a minimum with NaN on the left is the right side, so a
+//! NaN corner neither grows a box nor lies in one.
 
 use glam::Vec3A;
 use trepan_geometry::{Aabb, Vec3};
@@ -70,7 +71,8 @@ impl Extent {
         Self { low: self.low - margin, high: self.high + margin }
     }
 
-    /// The furthest that a side lies outside where it was; 0 for an empty box, since it holds nothing that could be missed.
+    /// The furthest that a side lies outside where it was; 0 for an empty box, since it holds
+    /// nothing that could be missed.
     pub fn moved_from(&self, before: &Self) -> f32 {
         let most = (before.low - self.low).max(self.high - before.high).max_element().max(0.0);
         if most.is_finite() { most } else { 0.0 }

@@ -1,14 +1,17 @@
-//! A tool's ball against a moving tetrahedral mesh: which points are inside, how deep, and what pushes back.
+//! A tool's ball against a moving tetrahedral mesh: which points are inside, how deep, and what
+//! pushes back.
 //!
 //! # Theory
-//! Detection: 211 points on the ball, each in a tetrahedron or in none (thesis chapter 4). Response: one contact whose
-//! normal and depth stay continuous while the points change tetrahedra ([`Response`]). The load goes to the nodes under the contact as springs,
-//! one for each node under the ball ([`TissueStep::surface_springs`]), equal and opposite.
+//! Detection: 211 points on the ball, each in a tetrahedron or in none (thesis chapter 4).
+//! Response: one contact whose normal and depth stay continuous while the points change tetrahedra
+//! ([`Response`]). The load goes to the nodes under the contact as springs, one for each node under
+//! the ball ([`TissueStep::surface_springs`]), equal and opposite.
 //!
 //! # Practice
-//! [`MeshCollision`] is for two meshes or one against itself, [`SlidingWall`] for tissue in a hollow.
-//! [`TissueCollision::step`] runs in the collision thread, once for each new state of the tissue; it allocates nothing, and what it found is one
-//! plain struct, [`TissueStep`]. Searches are a closed list, [`Method`], with an f64 oracle among them.
+//! [`MeshCollision`] is for two meshes or one against itself, [`SlidingWall`] for tissue in a
+//! hollow. [`TissueCollision::step`] runs in the collision thread, once for each new state of the
+//! tissue; it allocates nothing, and what it found is one plain struct, [`TissueStep`]. Searches
+//! are a closed list, [`Method`], with an f64 oracle among them.
 //!
 //! # When not to use it
 //! For cutting: connections of the mesh are fixed.

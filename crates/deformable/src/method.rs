@@ -9,7 +9,8 @@ pub enum Method {
     Brute,
     /// Every tetrahedron's box against the tool's box, then the exact test: the plain baseline.
     Scan,
-    /// Points in a uniform grid, every tetrahedron's box against its cells (Teschner et al. 2003, as an array).
+    /// Points in a uniform grid, every tetrahedron's box against its cells (Teschner et al. 2003,
+    /// as an array).
     UniformGrid,
     /// The same with a hash table and time stamps (Teschner et al. 2003).
     HashedGrid,
@@ -25,14 +26,17 @@ pub enum Method {
     KDopTree,
     /// The same of boxes turned as at rest (Gottschalk et al. 1996).
     ObbTree,
-    /// A tree of boxes, refitted bottom-up above and only where it is looked at below (Larsson and Akenine-Möller 2001).
+    /// A tree of boxes, refitted bottom-up above and only where it is looked at below (Larsson and
+    /// Akenine-Möller 2001).
     HybridTree,
     /// The ready-made tree: parry's.
     #[cfg(feature = "parry")]
     ParryTree,
-    /// The thesis's chapter 4: grid, first tetrahedron from the last one found, two rings of neighbours.
+    /// The thesis's chapter 4: grid, first tetrahedron from the last one found, two rings of
+    /// neighbours.
     Thesis,
-    /// Each point keeps its tetrahedron and walks on through neighbours; only what lies near the tool is looked at.
+    /// Each point keeps its tetrahedron and walks on through neighbours; only what lies near the
+    /// tool is looked at.
     Walk,
 }
 
@@ -90,7 +94,8 @@ impl Method {
         Self::all().into_iter().find(|method| method.name() == name)
     }
 
-    /// The response that belongs to the method: the thesis's own to the thesis, the recommended one to all others.
+    /// The response that belongs to the method: the thesis's own to the thesis, the recommended one
+    /// to all others.
     pub fn response(&self) -> Response {
         match self {
             Self::Thesis => Response::Printed,

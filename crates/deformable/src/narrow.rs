@@ -1,13 +1,14 @@
 //! The exact test: barycentric coordinates of a point in a tetrahedron.
 //!
 //! # Theory
-//! `p = αa + βb + γc + δd` with `α + β + γ + δ = 1`; the point is inside or on the border when all four are 0 or more (thesis
-//! 4.2.2, Teschner et al. 2003). Each coordinate is a ratio of two triple products.
+//! `p = αa + βb + γc + δd` with `α + β + γ + δ = 1`; the point is inside or on the border when all
+//! four are 0 or more (thesis 4.2.2, Teschner et al. 2003). Each coordinate is a ratio of two
+//! triple products.
 //!
 //! # Practice
-//! In f64 on purpose: the corners are f32, so their differences are exact to rounding 1e-16, all methods decide alike, and a
-//! point on a shared face is never lost between its two tetrahedra. 15 ns for the first point in a tetrahedron, 4 ns for
-//! each further one.
+//! In f64 on purpose: the corners are f32, so their differences are exact to rounding 1e-16, all
+//! methods decide alike, and a point on a shared face is never lost between its two tetrahedra. 15
+//! ns for the first point in a tetrahedron, 4 ns for each further one.
 
 use crate::scene::Scene;
 use glam::DVec3;
@@ -63,7 +64,8 @@ impl Hits {
         self.frames = [(NONE, None); FRAMES];
     }
 
-    /// Tests point `i` against a tetrahedron and keeps it when inside. Returns the coordinates for a walk.
+    /// Tests point `i` against a tetrahedron and keeps it when inside. Returns the coordinates for
+    /// a walk.
     #[inline]
     pub(crate) fn test(&mut self, scene: &Scene, i: usize, tet: u32) -> Option<[f64; 4]> {
         self.tests += 1;

@@ -19,13 +19,15 @@ pub struct TissueStep {
     pub manifold: ContactManifold,
     /// The tangent plane that the haptic tick holds on to until the next result.
     pub patch: SurfacePatch,
-    /// The spring that presses on the tissue's nodes, equal and opposite; where there are `surface_springs`, the one that stands for all of them.
+    /// The spring that presses on the tissue's nodes, equal and opposite; where there are
+    /// `surface_springs`, the one that stands for all of them.
     pub nodal: NodalContact,
-    /// Springs under the ball, one for each node, together as strong as `nodal`: each presses along its own
-    /// normal as deep as the ball is there, so that tissue finer than the ball takes its shape. Empty where
-    /// the response has one spring for all.
+    /// Springs under the ball, one for each node, together as strong as `nodal`: each presses along
+    /// its own normal as deep as the ball is there, so that tissue finer than the ball takes its
+    /// shape. Empty where the response has one spring for all.
     pub surface_springs: NodalContacts,
-    /// Dry friction of the tissue on the tool's tip, N; the nodes take the opposite by the weights of `nodal`.
+    /// Dry friction of the tissue on the tool's tip, N; the nodes take the opposite by the weights
+    /// of `nodal`.
     pub friction_n: Vec3,
     /// The contact of the tool's shaft; depth 0 when it is free or not asked for.
     pub shaft: Contact,
@@ -37,9 +39,11 @@ pub struct TissueStep {
     pub tests: u32,
     /// Candidates, triangles or nodes that did not fit their limits.
     pub overflow: u32,
-    /// Inverted, flat or non-finite tetrahedra met and skipped; all of them, when the step was refused for lack of sound input.
+    /// Inverted, flat or non-finite tetrahedra met and skipped; all of them, when the step was
+    /// refused for lack of sound input.
     pub skipped: u32,
-    /// Boxes of far surface that moved further than was allowed for; a contact there could be some steps late. 0 unless the tissue leaps.
+    /// Boxes of far surface that moved further than was allowed for; a contact there could be some
+    /// steps late. 0 unless the tissue leaps.
     pub stale: u32,
 }
 
@@ -84,7 +88,8 @@ impl TissueStep {
         self.all().for_each(|spring| out.push(*spring));
     }
 
-    /// Adds all forces on the nodes, N: springs of tip and shaft, and friction. Returns the force on the tool, equal and opposite.
+    /// Adds all forces on the nodes, N: springs of tip and shaft, and friction. Returns the force
+    /// on the tool, equal and opposite.
     pub fn push(&self, positions: &[Vec3], velocities: &[Vec3], forces: &mut [Vec3]) -> Vec3 {
         let mut on_tool = Vec3::ZERO;
         let mut press = |nodal: &NodalContact, force: Vec3| {
@@ -155,7 +160,8 @@ impl TissueCollision {
 
     /// One step: where the tissue's nodes are now (mm, mm/ms), where the tool is, what touches.
     ///
-    /// A pose that is not finite, or arrays of another length than the mesh, give no contact and `skipped` counts all tetrahedra.
+    /// A pose that is not finite, or arrays of another length than the mesh, give no contact and
+    /// `skipped` counts all tetrahedra.
     pub fn step(&mut self, positions: &[Vec3], velocities: &[Vec3], tool: &ToolState, out: &mut TissueStep) {
         self.clear(tool, out);
         if !tool.is_finite() || positions.len() != self.nodes || velocities.len() != self.nodes {
@@ -193,7 +199,8 @@ impl TissueCollision {
         out.stale = self.surface.stale;
     }
 
-    /// Forgets where the tool was, as after a tool change. Results do not depend on it, only the next step's time.
+    /// Forgets where the tool was, as after a tool change. Results do not depend on it, only the
+    /// next step's time.
     pub fn reset(&mut self) {
         self.search.reset();
         self.responder.reset();

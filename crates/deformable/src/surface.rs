@@ -1,18 +1,23 @@
-//! The moving surface near the tool: which triangles lie in a box, and which point of them is closest.
+//! The moving surface near the tool: which triangles lie in a box, and which point of them is
+//! closest.
 //!
 //! # Theory
-//! Border triangles are sorted once along a Morton curve at rest and cut into clusters of 32, each with a box. Every step fits some of the boxes anew to
-//! the moved nodes, in turn and spread over the whole surface, and learns from them how far the surface moves between two fits. A box that was
-//! not fitted in this step is taken wider by twice that motion; only where such a loose box is near enough to matter is it fitted at once. So a
-//! step touches what lies near the tool and a slice of the rest. A box that moved further than its margin is counted as stale: a contact there
-//! could have come late by a few steps. Surfaces of up to 1024 triangles are fitted whole at every step and are never stale.
+//! Border triangles are sorted once along a Morton curve at rest and cut into clusters of 32, each
+//! with a box. Every step fits some of the boxes anew to the moved nodes, in turn and spread over
+//! the whole surface, and learns from them how far the surface moves between two fits. A box that
+//! was not fitted in this step is taken wider by twice that motion; only where such a loose box is
+//! near enough to matter is it fitted at once. So a step touches what lies near the tool and a
+//! slice of the rest. A box that moved further than its margin is counted as stale: a contact there
+//! could have come late by a few steps. Surfaces of up to 1024 triangles are fitted whole at every
+//! step and are never stale.
 //!
 //! ```text
 //!   [fit] [loose] [loose] [fit]  ( tool ) -> boxes near it fitted -> their triangles -> exact closest point
 //! ```
 //!
 //! # Practice
-//! Cost: 3 ns for each node of a fitted box, 3 ns for each group of 16 clusters, 10 ns for each triangle near the tool. Triangles with a NaN corner are skipped.
+//! Cost: 3 ns for each node of a fitted box, 3 ns for each group of 16 clusters, 10 ns for each
+//! triangle near the tool. Triangles with a NaN corner are skipped.
 
 use crate::{extent::Extent, narrow::NONE, triangle};
 use glam::Vec3A;
@@ -100,7 +105,8 @@ impl MovingSurface {
         (self.step, self.motion) = (0, LEAST_MOTION);
     }
 
-    /// Begins a step: fits a slice of the boxes to the moved nodes, all of them in the first step, and those that meet `region`.
+    /// Begins a step: fits a slice of the boxes to the moved nodes, all of them in the first step,
+    /// and those that meet `region`.
     pub(crate) fn refit(&mut self, positions: &[Vec3], region: Extent) {
         if self.step == u32::MAX {
             self.reset();
@@ -152,7 +158,8 @@ impl MovingSurface {
         }
     }
 
-    /// Puts the triangles whose boxes meet `region` into `near`, up to its capacity; returns how many did not fit.
+    /// Puts the triangles whose boxes meet `region` into `near`, up to its capacity; returns how
+    /// many did not fit.
     pub(crate) fn gather(&mut self, positions: &[Vec3], region: &Extent, near: &mut Vec<u32>) -> u32 {
         near.clear();
         let mut overflow = 0;
@@ -185,7 +192,8 @@ impl MovingSurface {
         }
     }
 
-    /// The closest point of the surface that lies in the region given to [`refit`](Self::refit) and is nearer than `within` mm.
+    /// The closest point of the surface that lies in the region given to [`refit`](Self::refit) and
+    /// is nearer than `within` mm.
     pub(crate) fn closest_here(&self, positions: &[Vec3], to: Vec3, within: f32) -> Option<Foot> {
         let (mut best, mut bound): (Option<Foot>, _) = (None, within * within);
         for (t, bounds) in &self.here {
@@ -197,7 +205,8 @@ impl MovingSurface {
         best.filter(|b| b.distance2 < within * within)
     }
 
-    /// The closest point of the whole surface; the nearest box first, then only boxes nearer than the best so far.
+    /// The closest point of the whole surface; the nearest box first, then only boxes nearer than
+    /// the best so far.
     pub(crate) fn closest(&mut self, positions: &[Vec3], to: Vec3) -> Option<Foot> {
         let (mut first, mut nearest) = (None, f32::INFINITY);
         for cluster in 0..self.boxes.len() {
@@ -234,7 +243,8 @@ impl MovingSurface {
         })
     }
 
-    /// Walks from a triangle over those that share a node with it to a local minimum of the distance.
+    /// Walks from a triangle over those that share a node with it to a local minimum of the
+    /// distance.
     pub(crate) fn descend(&self, positions: &[Vec3], from: u32, to: Vec3) -> Option<Foot> {
         let mut best = Some(self.foot(positions, from, to)).filter(|f| f.distance2.is_finite());
         for _ in 0..MAX_DESCENT {

@@ -1,8 +1,9 @@
 //! The point of a triangle that is closest to a given one.
 //!
 //! # Theory
-//! Voronoi regions of corners, edges and face, told apart by projections on the two edges from the first corner (Ericson 2005, Real-Time Collision
-//! Detection, 5.1.5). A flat triangle ends in one of its edges or corners.
+//! Voronoi regions of corners, edges and face, told apart by projections on the two edges from the
+//! first corner (Ericson 2005, Real-Time Collision Detection, 5.1.5). A flat triangle ends in one
+//! of its edges or corners.
 
 use trepan_geometry::Vec3;
 

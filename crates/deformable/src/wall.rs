@@ -1,25 +1,27 @@
 //! Tissue inside a hollow body, as the brain in the skull: sliding contact with a distance field.
 //!
 //! # Theory
-//! Let φ be the signed distance to the wall, positive in the hollow, and g its unit gradient, away from the
-//! wall. Each border node near the wall gets the wall's tangent plane as a spring of its own:
+//! Let φ be the signed distance to the wall, positive in the hollow, and g its unit gradient, away
+//! from the wall. Each border node near the wall gets the wall's tangent plane as a spring of its
+//! own:
 //!
 //! ```text
 //! n = -g     d = -φ     offset = d - x·n     force on the node: -(k d + b ẋ·n) n, d > 0
 //! ```
-//! k and b are those of the node's share of the border, a third of the triangles around it, so that a finer
-//! mesh meets the same wall. The force is along the normal only, so the tissue slides. Springs that nodes
-//! share are no substitute: their weights change with every collision step, and a node's own force is then
-//! explicit whatever the solver does; nodes of under 0.1 g ring without end.
+//! k and b are those of the node's share of the border, a third of the triangles around it, so that
+//! a finer mesh meets the same wall. The force is along the normal only, so the tissue slides.
+//! Springs that nodes share are no substitute: their weights change with every collision step, and
+//! a node's own force is then explicit whatever the solver does; nodes of under 0.1 g ring without
+//! end.
 //!
-//! A node that rests in the wall or at it keeps one plane for good: the tangent of the tissue's own border
-//! there, through its place at rest. Inside thin bone the field's gradient flips from one side to the other,
-//! and a body that rests in the wall must not be pushed at all.
+//! A node that rests in the wall or at it keeps one plane for good: the tangent of the tissue's own
+//! border there, through its place at rest. Inside thin bone the field's gradient flips from one
+//! side to the other, and a body that rests in the wall must not be pushed at all.
 //!
 //! # Practice
-//! The field comes as a [`Hollow`], so that the carved skull, an analytic shape or a cached grid all do. One
-//! call for every border node and step. A plane is sent before its node touches ([`SlidingWall::ahead_mm`]),
-//! so that the solver itself finds the moment of contact.
+//! The field comes as a [`Hollow`], so that the carved skull, an analytic shape or a cached grid
+//! all do. One call for every border node and step. A plane is sent before its node touches
+//! ([`SlidingWall::ahead_mm`]), so that the solver itself finds the moment of contact.
 //!
 //! # When not to use it
 //! Where tissue is tied to the bone (dura at its attachments): fix those nodes.
@@ -34,8 +36,8 @@ pub trait Hollow {
     /// Distance to the wall, positive in the hollow, mm, and its unit gradient, away from the wall.
     fn distance(&mut self, place: Vec3) -> (f32, Vec3);
 
-    /// How far the wall has receded from a node that is so deep, mm, at a place of the wall's surface with this
-    /// way out; `None` where it is gone.
+    /// How far the wall has receded from a node that is so deep, mm, at a place of the wall's
+    /// surface with this way out; `None` where it is gone.
     fn recession_mm(&mut self, node: u32, depth_mm: f32, place: Vec3, outward: Vec3) -> Option<f32> {
         let _ = (node, depth_mm, place, outward);
         Some(0.0)
@@ -56,8 +58,8 @@ pub struct SlidingWall {
     pub stiffness_per_mm2: f32,
     /// Damping along the normal, N ms/mm for each mm² of border.
     pub damping_per_mm2: f32,
-    /// Distance from the wall within which a node's plane is sent, mm: more than a node moves between two
-    /// collision results.
+    /// Distance from the wall within which a node's plane is sent, mm: more than a node moves
+    /// between two collision results.
     pub ahead_mm: f32,
 }
 
@@ -69,13 +71,14 @@ struct BorderNode {
     area_mm2: f32,
     /// Unit normal of the border at rest, out of the tissue.
     normal: Vec3,
-    /// The plane of a node that rests in the wall or at it, along that normal: depth is `x·n` plus this, mm.
+    /// The plane of a node that rests in the wall or at it, along that normal: depth is `x·n` plus
+    /// this, mm.
     fixed_mm: Option<f32>,
 }
 
 impl SlidingWall {
-    /// For a body's border without the nodes that are held. Stiffness 0.05 N/mm and damping 0.1 N ms/mm for
-    /// each mm², ahead by 0.5 mm.
+    /// For a body's border without the nodes that are held. Stiffness 0.05 N/mm and damping 0.1 N
+    /// ms/mm for each mm², ahead by 0.5 mm.
     ///
     /// # Errors
     /// When the mesh is empty, names a node that is not there, or has one that is nowhere.
@@ -101,8 +104,8 @@ impl SlidingWall {
         Ok(Self { border: border.collect(), stiffness_per_mm2: 0.05, damping_per_mm2: 0.1, ahead_mm: 0.5 })
     }
 
-    /// Takes this as rest: nodes in the wall, or nearer to it than planes are sent, keep the plane of their
-    /// place here, so that a body at rest is not pushed.
+    /// Takes this as rest: nodes in the wall, or nearer to it than planes are sent, keep the plane
+    /// of their place here, so that a body at rest is not pushed.
     pub fn rest_in(&mut self, rest: &[Vec3], mut wall: impl Hollow) {
         for border in &mut self.border {
             let Some(&at) = rest.get(border.node as usize) else { continue };
@@ -112,8 +115,8 @@ impl SlidingWall {
         }
     }
 
-    /// Adds a plane for each border node in the wall or near it; a node where the distance or its gradient
-    /// is not finite, or the gradient zero, is left out.
+    /// Adds a plane for each border node in the wall or near it; a node where the distance or its
+    /// gradient is not finite, or the gradient zero, is left out.
     pub fn step(&self, positions: &[Vec3], mut wall: impl Hollow, out: &mut NodalContacts) {
         for &BorderNode { node, area_mm2, normal, fixed_mm } in &self.border {
             let Some(&at) = positions.get(node as usize) else { continue };

@@ -1,4 +1,5 @@
-//! Every search against the f64 oracle, over random poses, jumps, deformed, torn and degenerate meshes.
+//! Every search against the f64 oracle, over random poses, jumps, deformed, torn and degenerate
+//! meshes.
 
 mod common;
 
@@ -8,7 +9,8 @@ use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
 use trepan_geometry::Tool;
 use trepan_mesh::TetMesh;
 
-/// Steps all complete methods over the same poses and meshes; at every step all must find what the oracle finds.
+/// Steps all complete methods over the same poses and meshes; at every step all must find what the
+/// oracle finds.
 fn same_points_as_oracle(mesh: &TetMesh, radius: f32, poses: usize, jump: f32, seed: u64) {
     let tool = Tool::probe(radius);
     let new = |method| {
@@ -79,7 +81,8 @@ fn two_blocks_apart() {
     same_points_as_oracle(&mesh, 1.5, 250, 0.1, 19);
 }
 
-/// Inverted, flat and NaN tetrahedra: the searches agree on what is left, count what they skip, and put out no NaN.
+/// Inverted, flat and NaN tetrahedra: the searches agree on what is left, count what they skip, and
+/// put out no NaN.
 #[test]
 fn degenerate_meshes_lose_nothing_and_give_no_nan() {
     let mesh = block([4, 4, 3], 4.0);
@@ -116,7 +119,8 @@ fn degenerate_meshes_lose_nothing_and_give_no_nan() {
     }
 }
 
-/// Nodes thrown, doubled and nowhere, others at every step: the walk finds every point and the same depth as a look at every box.
+/// Nodes thrown, doubled and nowhere, others at every step: the walk finds every point and the same
+/// depth as a look at every box.
 #[test]
 fn a_mesh_torn_anew_at_every_step_hides_nothing_from_the_walk() {
     let mesh = block([5, 5, 5], 5.0);
@@ -173,7 +177,8 @@ fn the_thesis_never_sees_a_point_that_is_not_there() {
     }
 }
 
-/// A plate with more surface than is fitted in one step, waving and shaking: nothing is missed and nothing is stale.
+/// A plate with more surface than is fitted in one step, waving and shaking: nothing is missed and
+/// nothing is stale.
 #[test]
 fn a_surface_too_large_to_fit_whole_at_every_step() {
     let mesh = block([40, 40, 2], 4.0);
@@ -200,7 +205,8 @@ fn a_surface_too_large_to_fit_whole_at_every_step() {
     assert!(touched > 100);
 }
 
-/// One corner of the plate leaps while the rest has been at rest: boxes that could not know are counted.
+/// One corner of the plate leaps while the rest has been at rest: boxes that could not know are
+/// counted.
 #[test]
 fn a_leap_of_far_surface_is_counted() {
     let mesh = block([40, 40, 2], 4.0);

@@ -1,4 +1,5 @@
-//! Shaft, friction, two bodies, one folded on itself, and a wall around: closed forms and conserved momentum.
+//! Shaft, friction, two bodies, one folded on itself, and a wall around: closed forms and conserved
+//! momentum.
 
 mod common;
 
@@ -20,7 +21,8 @@ fn with(mesh: &TetMesh, config: Config) -> TissueCollision {
     TissueCollision::new(mesh, &Tool::probe(2.0), &config).expect("a sound config")
 }
 
-/// A shaft of radius 1.2 lies flat on the block, its tip far out: pressed in, it reads its own depth, until its axis is 3 mm under the top.
+/// A shaft of radius 1.2 lies flat on the block, its tip far out: pressed in, it reads its own
+/// depth, until its axis is 3 mm under the top.
 #[test]
 fn a_shaft_pressed_flat_into_the_top_reads_its_depth() {
     let mesh = block([8, 8, 6], 4.0);
@@ -49,7 +51,8 @@ fn a_shaft_pressed_flat_into_the_top_reads_its_depth() {
     assert!(out.shaft.depth_mm == 0.0 && out.shaft_nodal.is_empty());
 }
 
-/// 1 mm deep: the tool drags until `μ k d`, is carried by moving tissue, and what it feels the nodes take.
+/// 1 mm deep: the tool drags until `μ k d`, is carried by moving tissue, and what it feels the
+/// nodes take.
 #[test]
 fn friction_sticks_slips_and_is_equal_and_opposite() {
     let mesh = block([8, 8, 4], 4.0);
@@ -75,7 +78,8 @@ fn friction_sticks_slips_and_is_equal_and_opposite() {
     }
 }
 
-/// Every border node of a block that sinks into another is found, no other, with its true depth; momentum stays.
+/// Every border node of a block that sinks into another is found, no other, with its true depth;
+/// momentum stays.
 #[test]
 fn two_blocks_that_overlap_know_how_deep_and_keep_their_momentum() {
     let lower = block([6, 6, 5], 4.0);
@@ -151,7 +155,8 @@ fn a_strip_that_is_rolled_up_meets_itself() {
     }
 }
 
-/// A block in a spherical hollow, shifted until corners are in the wall: it is pushed back, and nowhere along the wall.
+/// A block in a spherical hollow, shifted until corners are in the wall: it is pushed back, and
+/// nowhere along the wall.
 #[test]
 fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
     let mesh = moved(&block([5, 5, 5], 4.0), Vec3::splat(-10.0));
@@ -169,7 +174,8 @@ fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
     assert!(out.planes().iter().all(|c| at(c.node).length() > 17.5), "far nodes have no plane");
     let force: Vec3 = out.all().map(|c| c.pressure_n(c.mean(at), Vec3::ZERO) * -c.normal).sum();
     assert!(force.x < -0.5 && force.y.abs() + force.z.abs() < 0.2 * -force.x, "{force}");
-    // A flat wall under the whole side of 20 x 20 mm: its stiffness is that of the area, on any mesh.
+    // A flat wall under the whole side of 20 x 20 mm: its stiffness is that of the area, on any
+    // mesh.
     let flat = |p: Vec3| (p.z + 9.5, Vec3::Z);
     for cells in [3, 5, 8] {
         let mesh = moved(&block([cells; 3], 20.0 / cells as f32), Vec3::splat(-10.0));
@@ -179,7 +185,8 @@ fn a_wall_pushes_back_what_sinks_in_and_lets_it_slide() {
         let press = |by: Vec3| -> f32 {
             out.all().map(|c| c.pressure_n(c.mean(|n| mesh.positions[n as usize] + by), Vec3::ZERO)).sum()
         };
-        // The nodes of the rim have a share of the sides too: 400 mm² below, 4 x 20 mm x half a cell beside.
+        // The nodes of the rim have a share of the sides too: 400 mm² below, 4 x 20 mm x half a
+        // cell beside.
         let area = 400.0 + 4.0 * 20.0 * 10.0 / cells as f32;
         assert!((press(Vec3::X) - press(Vec3::ZERO)).abs() < 1e-4, "it slides");
         let stiffness = (press(Vec3::Z * -0.1) - press(Vec3::ZERO)) / 0.1;

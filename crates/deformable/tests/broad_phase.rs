@@ -1,4 +1,5 @@
-//! Every broad phase gives all pairs that are, none whose boxes say no, and counts what does not fit.
+//! Every broad phase gives all pairs that are, none whose boxes say no, and counts what does not
+//! fit.
 
 mod common;
 

@@ -1,4 +1,5 @@
-//! Normal, depth and nodal spring against closed forms: plane, ball, groove, thin slab, straight pushes and strokes.
+//! Normal, depth and nodal spring against closed forms: plane, ball, groove, thin slab, straight
+//! pushes and strokes.
 
 mod common;
 
@@ -21,7 +22,8 @@ fn step_at(collision: &mut TissueCollision, mesh: &TetMesh, tip: Vec3) -> Tissue
     out
 }
 
-/// A ball of tetrahedra: the block mapped onto a ball of radius `r` around the origin, cube shells onto spheres.
+/// A ball of tetrahedra: the block mapped onto a ball of radius `r` around the origin, cube shells
+/// onto spheres.
 fn ball(cells: usize, r: f32) -> TetMesh {
     let mut mesh = block([cells; 3], 2.0 / cells as f32);
     for p in &mut mesh.positions {
@@ -65,7 +67,8 @@ fn deeper_is_never_less_through_nine_tenths_of_the_thickness() {
     assert!((last - 10.8).abs() < 1e-3);
 }
 
-/// From deep under the top to deep beside the left wall: the contact is the near wall's, not the one that was left.
+/// From deep under the top to deep beside the left wall: the contact is the near wall's, not the
+/// one that was left.
 #[test]
 fn after_a_jump_the_contact_is_found_anew() {
     let mesh = block([8, 8, 8], 4.0);
@@ -77,8 +80,9 @@ fn after_a_jump_the_contact_is_found_anew() {
     assert!(second.manifold.normal.x < -0.99 && second.points_in_contact == 211);
 }
 
-/// Inner nodes thrown about until tetrahedra lie inside out. The surface is where it was, and every point in it is still covered once more by upright
-/// tetrahedra than by inverted ones, so the contact must not notice.
+/// Inner nodes thrown about until tetrahedra lie inside out. The surface is where it was, and every
+/// point in it is still covered once more by upright tetrahedra than by inverted ones, so the
+/// contact must not notice.
 #[test]
 fn inverted_tetrahedra_below_an_intact_surface_change_nothing() {
     let mesh = block([8, 8, 4], 4.0);
@@ -99,7 +103,8 @@ fn inverted_tetrahedra_below_an_intact_surface_change_nothing() {
     assert!(skipped > 100, "{skipped}");
 }
 
-/// The thesis's rule has the fault that its successor is there to cure: the same push reads shallower further down.
+/// The thesis's rule has the fault that its successor is there to cure: the same push reads
+/// shallower further down.
 #[test]
 fn the_printed_rule_loses_depth_on_the_way() {
     let mesh = block([8, 8, 3], 4.0);
@@ -127,7 +132,8 @@ fn on_a_ball_the_normal_points_outwards_and_depth_is_nearly_exact() {
     }
 }
 
-/// A stroke in steps of 0.02 mm over facets, edges and vertices, centre above and below the surface.
+/// A stroke in steps of 0.02 mm over facets, edges and vertices, centre above and below the
+/// surface.
 #[test]
 fn a_stroke_over_facets_changes_depth_and_normal_only_a_little() {
     let mesh = ball(10, 20.0);
@@ -172,7 +178,8 @@ fn the_nodal_spring_holds_the_same_depth_and_unit_weight() {
             assert!((out.nodal.nodes().map(|(_, w)| w).sum::<f32>() - 1.0).abs() < 1e-5);
             assert!(out.nodal.nodes().all(|(_, w)| w >= 0.0));
             assert_eq!((out.nodal.stiffness, out.nodal.normal), (0.3, out.manifold.normal));
-            // Nodal forces sum to the force on the tool, and their moment is that of one force at the manifold's point.
+            // Nodal forces sum to the force on the tool, and their moment is that of one force at
+            // the manifold's point.
             let force = out.nodal.pressure_n(place, Vec3::ZERO) * -out.nodal.normal;
             let total: Vec3 = out.nodal.nodes().map(|(_, w)| w * force).sum();
             let moment: Vec3 = out.nodal.nodes().map(|(n, w)| at(n).cross(w * force)).sum();
@@ -184,7 +191,8 @@ fn the_nodal_spring_holds_the_same_depth_and_unit_weight() {
     }
 }
 
-/// Elements of half the ball's radius: many triangles under it, each with its spring, and all of them press as one would.
+/// Elements of half the ball's radius: many triangles under it, each with its spring, and all of
+/// them press as one would.
 #[test]
 fn the_springs_under_a_ball_are_together_as_strong_as_one_and_take_its_shape() {
     let mesh = block([16, 16, 6], 1.0);
@@ -218,7 +226,8 @@ fn the_springs_under_a_ball_are_together_as_strong_as_one_and_take_its_shape() {
     }
 }
 
-/// A triangle that comes back to the ball between two steps meets its spring, whether the ball touches elsewhere or only hovers; where nothing moves it feels nothing.
+/// A triangle that comes back to the ball between two steps meets its spring, whether the ball
+/// touches elsewhere or only hovers; where nothing moves it feels nothing.
 #[test]
 fn springs_wait_around_the_ball_and_over_tissue_that_it_does_not_touch() {
     let mesh = block([16, 16, 6], 1.0);
@@ -236,14 +245,16 @@ fn springs_wait_around_the_ball_and_over_tissue_that_it_does_not_touch() {
         let felt = 0.3 * out.manifold.depth_mm;
         assert!((pushed(&mesh.positions).length() - felt).abs() < 1e-3, "at rest they must not press");
         let risen_n = pushed(&risen).z;
-        // For the one step until they are found anew they may together be stiffer than the ball's spring, though not much.
+        // For the one step until they are found anew they may together be stiffer than the ball's
+        // spring, though not much.
         let linear_n = 0.3 * (0.3 - over_mm);
         assert!(risen_n > felt + 0.01 && risen_n < 3.0 * linear_n, "{risen_n} N after {felt} N");
     }
     assert!(step_at(&mut collision, &mesh, Vec3::new(8.3, 7.9, 6.0 + 1.5 * RADIUS)).surface_springs.is_empty());
 }
 
-/// Two blocks with a gap of 3 mm and a ball of 4 mm between: the walls cancel, a shift to one side is pushed back.
+/// Two blocks with a gap of 3 mm and a ball of 4 mm between: the walls cancel, a shift to one side
+/// is pushed back.
 #[test]
 fn in_a_groove_opposite_walls_cancel() {
     let mut mesh = block([4, 6, 6], 3.0);

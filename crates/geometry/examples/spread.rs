@@ -1,4 +1,5 @@
-//! How evenly do two ways of spreading points cover a burr? Prints count and nearest-neighbour spacing of each.
+//! How evenly do two ways of spreading points cover a burr? Prints count and nearest-neighbour
+//! spacing of each.
 
 use trepan_geometry::{Pointshell, Spread, Tool};
 

@@ -50,7 +50,8 @@ impl Aabb {
         !self.min.cmple(self.max).all()
     }
 
-    /// Whether two boxes touch or overlap: not disjoint on any axis (thesis Eq 2.1, signs restored).
+    /// Whether two boxes touch or overlap: not disjoint on any axis (thesis Eq 2.1, signs
+    /// restored).
     #[inline]
     pub fn overlaps(self, other: Self) -> bool {
         !self.intersection(other).is_empty()

@@ -95,7 +95,8 @@ impl std::ops::BitOr for Buttons {
 /// The tool at one instant, in world space.
 #[derive(Clone, Copy, Debug)]
 pub struct ToolState {
-    /// Where the tool frame is: origin at the centre of the tip, +z along the shaft, away from the patient.
+    /// Where the tool frame is: origin at the centre of the tip, +z along the shaft, away from the
+    /// patient.
     pub world_from_tool: Pose,
     /// How it moves.
     pub twist: Twist,

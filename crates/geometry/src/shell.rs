@@ -1,14 +1,15 @@
 //! Point shells: points on a tool's surface with inward normals.
 //!
 //! # Theory
-//! McNeely et al. 1999 cover the moving object with points that each carry an inward normal; a voxel that holds a point
-//! gives a contact. The thesis (Eq 3.1) places the points of a sphere at equal steps of latitude and longitude, which
-//! crowds the poles: 10 degree steps give 466 points in principle, with the spacing at the poles many times closer than
-//! at the equator. A Fibonacci lattice (González 2010, Mathematical Geosciences 42, Eq 1) spreads any number evenly.
+//! McNeely et al. 1999 cover the moving object with points that each carry an inward normal; a
+//! voxel that holds a point gives a contact. The thesis (Eq 3.1) places the points of a sphere at
+//! equal steps of latitude and longitude, which crowds the poles: 10 degree steps give 466 points
+//! in principle, with the spacing at the poles many times closer than at the equator. A Fibonacci
+//! lattice (González 2010, Mathematical Geosciences 42, Eq 1) spreads any number evenly.
 //!
 //! # Practice
-//! 466 points for a burr on bone, 211 for a probe on tissue (thesis, 3.4.1 and 4.4). Built once at load time; poses are
-//! applied point by point in the loop.
+//! 466 points for a burr on bone, 211 for a probe on tissue (thesis, 3.4.1 and 4.4). Built once at
+//! load time; poses are applied point by point in the loop.
 
 use crate::Vec3;
 
@@ -37,8 +38,8 @@ impl Pointshell {
     /// Points of the thesis's deformable shell.
     pub const DEFORMABLE_COUNT: usize = 211;
 
-    /// A sphere around the tool's origin. `LatitudeLongitude` rounds `count` to the nearest full grid of rings and the
-    /// two poles.
+    /// A sphere around the tool's origin. `LatitudeLongitude` rounds `count` to the nearest full
+    /// grid of rings and the two poles.
     pub fn sphere(radius_mm: f32, count: usize, spread: Spread) -> Self {
         let directions = match spread {
             Spread::Fibonacci => fibonacci(count),

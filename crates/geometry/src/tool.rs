@@ -40,7 +40,8 @@ impl ToolKind {
     }
 }
 
-/// A tool's shape. In its own frame the tip is a ball around the origin and the shaft runs from there along +z.
+/// A tool's shape. In its own frame the tip is a ball around the origin and the shaft runs from
+/// there along +z.
 ///
 /// ```text
 ///        +z
@@ -60,7 +61,8 @@ pub struct Tool {
     pub shaft_radius_mm: f32,
     /// Length of the shaft from the centre of the tip, mm.
     pub shaft_length_mm: f32,
-    /// Length of the shaft, from the centre of the tip, that cuts instead of the tip, mm; 0 for tools that do not cut with it.
+    /// Length of the shaft, from the centre of the tip, that cuts instead of the tip, mm; 0 for
+    /// tools that do not cut with it.
     pub cutting_mm: f32,
 }
 

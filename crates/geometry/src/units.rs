@@ -10,7 +10,8 @@
 //! | spring, damper | N/mm, N ms/mm | |
 //! | density | g/mm³ | water 1e-3 |
 //!
-//! Files and command lines carry other units in their names (`young_modulus_kpa`) and are converted where they are read.
+//! Files and command lines carry other units in their names (`young_modulus_kpa`) and are converted
+//! where they are read.
 
 /// Standard gravity, mm/ms².
 pub const GRAVITY_MM_PER_MS2: f32 = 9.81e-3;

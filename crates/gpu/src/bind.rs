@@ -34,7 +34,8 @@ pub enum Resource<'a> {
     Linear,
 }
 
-/// Resources bound to the slots of one kernel or pipeline. Resources stay alive as long as this does.
+/// Resources bound to the slots of one kernel or pipeline. Resources stay alive as long as this
+/// does.
 #[derive(Clone, Debug)]
 pub struct Bindings {
     pub(crate) group: wgpu::BindGroup,
@@ -99,7 +100,8 @@ pub(crate) fn bind(
         min_filter: wgpu::FilterMode::Linear,
         ..Default::default()
     });
-    // Whether resources fit the slots is checked by wgpu's validation, which names the binding that does not.
+    // Whether resources fit the slots is checked by wgpu's validation, which names the binding that
+    // does not.
     let mut entries = Vec::with_capacity(resources.len());
     for (binding, resource) in resources.iter().enumerate() {
         let resource = match resource {

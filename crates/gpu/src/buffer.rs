@@ -3,7 +3,8 @@
 use crate::{Gpu, GpuError};
 use core::marker::PhantomData;
 
-/// `len` values of `T` on the device, for storage or uniform slots; written and read whole or from an offset.
+/// `len` values of `T` on the device, for storage or uniform slots; written and read whole or from
+/// an offset.
 #[derive(Clone, Debug)]
 pub struct Buffer<T> {
     raw: wgpu::Buffer,
@@ -45,7 +46,8 @@ impl<T: bytemuck::Pod> Buffer<T> {
         self.len == 0
     }
 
-    /// Overwrites values from `first` on, before the next submission. What would not fit is left out.
+    /// Overwrites values from `first` on, before the next submission. What would not fit is left
+    /// out.
     pub fn write(&self, gpu: &Gpu, first: usize, values: &[T]) {
         let fits = self.len.saturating_sub(first).min(values.len());
         let bytes: &[u8] = bytemuck::cast_slice(&values[..fits]);

@@ -98,7 +98,8 @@ impl Gpu {
         self.inner.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Whether a window can show this device's textures without a copy. One of GL belongs to the display it was opened on, and this one to none.
+    /// Whether a window can show this device's textures without a copy. One of GL belongs to the
+    /// display it was opened on, and this one to none.
     pub fn can_be_shared(&self) -> bool {
         self.inner.info.backend != wgpu::Backend::Gl
     }

@@ -1,4 +1,5 @@
-//! Drawing pipelines. Vertices come from storage buffers by vertex index: there are no vertex layouts.
+//! Drawing pipelines. Vertices come from storage buffers by vertex index: there are no vertex
+//! layouts.
 
 use crate::{Bindings, Format, Gpu, GpuError, Resource, Slot, bind};
 

@@ -2,7 +2,8 @@
 
 use crate::{Bindings, Gpu, Kernel, Pipeline, Texture, Timer};
 
-/// Collects passes; [`submit`](Self::submit) hands them to the device. A pass's name labels it in captures and timings.
+/// Collects passes; [`submit`](Self::submit) hands them to the device. A pass's name labels it in
+/// captures and timings.
 #[derive(Debug)]
 pub struct Recorder<'a> {
     gpu: &'a Gpu,

@@ -13,7 +13,8 @@ pub enum Format {
     Rgba8Unorm,
     /// A half-precision number, filterable everywhere.
     R16Float,
-    /// Four integers, or the bits of four single-precision numbers, loaded only; every driver draws into it.
+    /// Four integers, or the bits of four single-precision numbers, loaded only; every driver draws
+    /// into it.
     Rgba32Uint,
     /// Depth, for hidden surfaces.
     Depth32Float,
@@ -102,7 +103,8 @@ impl Texture {
         self.format
     }
 
-    /// Overwrites the box of `size` texels at `origin`, before the next submission. The box must lie inside and `texels` must fill it.
+    /// Overwrites the box of `size` texels at `origin`, before the next submission. The box must
+    /// lie inside and `texels` must fill it.
     pub fn write<T: bytemuck::Pod>(&self, gpu: &Gpu, origin: [u32; 3], size: [u32; 3], texels: &[T]) {
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,

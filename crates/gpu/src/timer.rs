@@ -11,7 +11,8 @@ pub struct PassTime {
     pub us: f64,
 }
 
-/// Measures up to a fixed number of passes of one recording; passes over that are counted, not timed.
+/// Measures up to a fixed number of passes of one recording; passes over that are counted, not
+/// timed.
 #[derive(Debug)]
 pub struct Timer {
     pub(crate) queries: wgpu::QuerySet,

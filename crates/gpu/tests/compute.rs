@@ -1,4 +1,5 @@
-//! Kernels, textures, pipelines and timing against the processor. Without an adapter only the error can be tested, and is.
+//! Kernels, textures, pipelines and timing against the processor. Without an adapter only the error
+//! can be tested, and is.
 
 use trepan_gpu::*;
 

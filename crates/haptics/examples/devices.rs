@@ -1,11 +1,12 @@
-//! Lists the devices, opens the one named (a scripted craniotomy by default) and prints where its tool goes.
+//! Lists the devices, opens the one named (a scripted craniotomy by default) and prints where its
+//! tool goes.
 //!
 //! `cargo run -p trepan-haptics --example devices [NAME]`
 
 use std::error::Error;
 use trepan_geometry::{Buttons, Vec3};
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_haptics::{DeviceName, GuardedWrench, HapticDevice, Status, Workspace, hardware, list};
 
 const DURATION_MS: f64 = 8000.0;
@@ -44,7 +45,7 @@ fn open(name: &DeviceName, site: &Site) -> Result<Box<dyn HapticDevice>, Box<dyn
         DeviceName::Script(script) => Box::new(Script::named(script, site, DURATION_MS)?),
         DeviceName::Simulated(script) => {
             let intent = Script::named(script, site, DURATION_MS)?;
-            Box::new(Simulated::new(Config::default(), Hand::LIGHT, Box::new(intent)))
+            Box::new(Simulated::new(Config::default(), HandModel::LIGHT, Box::new(intent)))
         }
         _ => return Err(format!("{name} needs a window or a file: this example has neither").into()),
     })

@@ -1,4 +1,5 @@
-//! How stiff a wall may be before a simulated Touch in a light hand begins to buzz, for delays of 0 to 3 ticks.
+//! How stiff a wall may be before a simulated Touch in a light hand begins to buzz, for delays of 0
+//! to 3 ticks.
 //!
 //! `cargo run -p trepan-haptics --example hold`
 
@@ -6,7 +7,7 @@ use trepan_contact::{ForceGuard, GuardConfig};
 use trepan_geometry::{Pose, ToolState, Vec3, Wrench};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 
 fn main() {
     println!("without a passivity controller, a wall pressed with 1 N: peak-to-peak motion in the third second, mm");
@@ -21,7 +22,7 @@ fn main() {
 
 /// The hand means to be so far inside the wall (x < 0) that its spring presses with 1 N.
 fn peak_to_peak(stiffness: f32, delay_ticks: usize) -> f32 {
-    let hand = Hand::LIGHT;
+    let hand = HandModel::LIGHT;
     let inside = Pose::from_translation(Vec3::X * -(1.0 / hand.stiffness + 1.0 / stiffness));
     let config = Config { friction_n: 0.0, velocity_filter_ms: 0.0, delay_ticks, ..Config::default() };
     let outside = (0..100).map(|_| ToolState::at(Pose::from_translation(Vec3::X * 2.0)));

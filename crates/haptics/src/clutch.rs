@@ -1,4 +1,5 @@
-//! A clutch over any device: hold its second button and the tool stays while the hand goes back to the middle of its box.
+//! A clutch over any device: hold its second button and the tool stays while the hand goes back to
+//! the middle of its box.
 //!
 //! # Theory
 //! ```text
@@ -6,11 +7,13 @@
 //!  button  ___╱▔▔╲_______________          button  ___╱▔▔▔▔▔▔▔▔▔▔▔▔▔╲_______
 //!  next tool ____╱▔▔▔╲__________           tool    ~~~~~~~────────────~~~~~~   its tip stays, its shaft turns on
 //! ```
-//! After a long press the tip is where the hand is, plus what the hand moved meanwhile: `t = x + Σ (x_before - x_after)`. So nothing jumps.
+//! After a long press the tip is where the hand is, plus what the hand moved meanwhile:
+//! `t = x + Σ (x_before - x_after)`. So nothing jumps.
 //!
 //! # Practice
-//! The second button asks for the next tool when it is let go within 250 ms, and is the clutch when it is held for longer. The force
-//! fades within 50 ms of the clutch and comes back over 300 ms after it: the wall that was felt is elsewhere then.
+//! The second button asks for the next tool when it is let go within 250 ms, and is the clutch when
+//! it is held for longer. The force fades within 50 ms of the clutch and comes back over 300 ms
+//! after it: the wall that was felt is elsewhere then.
 //!
 //! # When not to use it
 //! Over scripts and replays: their buttons mean what they say.

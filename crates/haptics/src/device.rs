@@ -18,7 +18,8 @@ pub trait HapticDevice: Send {
     /// What the device can do.
     fn capabilities(&self) -> Capabilities;
 
-    /// No force, then lets go of the device. May be called more than once; later calls to `apply` do nothing.
+    /// No force, then lets go of the device. May be called more than once; later calls to `apply`
+    /// do nothing.
     fn close(&mut self);
 }
 
@@ -53,7 +54,8 @@ pub struct Capabilities {
     pub peak_force_n: f32,
     /// Largest force for any time, N; 0 where it is not known.
     pub continuous_force_n: f32,
-    /// Highest rate at which it can be read, Hz. Sessions run at 1 kHz unless they are told otherwise.
+    /// Highest rate at which it can be read, Hz. Sessions run at 1 kHz unless they are told
+    /// otherwise.
     pub rate_hz: f32,
     /// Box that the tip can reach, mm.
     pub workspace_mm: Vec3,
@@ -86,8 +88,8 @@ impl Capabilities {
         }
     }
 
-    /// The stiffest coupling to a wall of `wanted` that this device holds stable in a light grip, read every `tick_ms`; a device without
-    /// motors gets what is wanted.
+    /// The stiffest coupling to a wall of `wanted` that this device holds stable in a light grip,
+    /// read every `tick_ms`; a device without motors gets what is wanted.
     ///
     /// ```text
     /// K ≤ (b + b_h + B)/(T/2 + d)              Gil, Hulin: d the delay, b_h = 2 N ms/mm a light grip
@@ -104,8 +106,9 @@ impl Capabilities {
         Viscoelastic { stiffness: wanted.stiffness.min(passive), damping }
     }
 
-    /// The guard's recommended limits, lowered to this device's peak and continuous force, its energy account told of the device's delay
-    /// and encoder step. A device without motors keeps the recommended peak: what it would feel is still shown and recorded.
+    /// The guard's recommended limits, lowered to this device's peak and continuous force, its
+    /// energy account told of the device's delay and encoder step. A device without motors keeps
+    /// the recommended peak: what it would feel is still shown and recorded.
     pub fn guard_config(&self) -> GuardConfig {
         let recommended = GuardConfig::default();
         let peak_n = if self.peak_force_n > 0.0 { self.peak_force_n } else { recommended.max_force_n };
@@ -137,7 +140,8 @@ mod tests {
             ..Capabilities::passive("Touch")
         };
         let hard = Viscoelastic { stiffness: 10.0, damping: 1000.0 };
-        // A pure damper on 45 g is stable to 89, 37 and 24 N ms/mm, 0, 1 and 2 ticks late; a spring of B = 1 in a light grip to 6.2, 2.1, 1.2.
+        // A pure damper on 45 g is stable to 89, 37 and 24 N ms/mm, 0, 1 and 2 ticks late; a spring
+        // of B = 1 in a light grip to 6.2, 2.1, 1.2.
         for (delay_ticks, damper, spring) in [(0, 89.0, 6.2), (1, 37.0, 2.1), (2, 24.0, 1.3)] {
             let damping = touch(delay_ticks).coupled(hard, 1.0).damping;
             assert!(damping <= damper && damping > 0.75 * damper, "{delay_ticks}: {damping}");

@@ -1,7 +1,9 @@
-//! Vendor libraries, loaded when a device is opened: nothing proprietary is needed to build or to run without them.
+//! Vendor libraries, loaded when a device is opened: nothing proprietary is needed to build or to
+//! run without them.
 //!
 //! # Practice
-//! A library is never unloaded: the vendors' own threads may outlive it, and a second load in one process is known to fail.
+//! A library is never unloaded: the vendors' own threads may outlive it, and a second load in one
+//! process is known to fail.
 #![expect(unsafe_code, reason = "loading a library runs its initialisers, and a symbol's type cannot be checked")]
 
 use crate::DeviceError;
@@ -25,8 +27,8 @@ impl Loaded {
         };
         let mut reasons = Vec::new();
         for name in &wanted {
-            // SAFETY: a vendor's library that the user installed or named; its initialisers are trusted as any
-            // program's that the user installs.
+            // SAFETY: a vendor's library that the user installed or named; its initialisers are
+            // trusted as any program's that the user installs.
             match unsafe { Library::new(name) } {
                 Ok(library) => {
                     let name = name.to_string_lossy().into_owned();
@@ -50,7 +52,8 @@ impl Loaded {
     /// # Safety
     /// `F` must be the function's true type, an `extern "system"` function pointer.
     pub(crate) unsafe fn symbol<F: Copy + 'static>(&self, symbol: &'static str) -> Result<F, DeviceError> {
-        // SAFETY: the caller vouches for the type; the library is never unloaded, so that the pointer stays good.
+        // SAFETY: the caller vouches for the type; the library is never unloaded, so that the
+        // pointer stays good.
         match unsafe { self.library.get::<F>(symbol.as_bytes()) } {
             Ok(function) => Ok(*function),
             Err(error) => Err(DeviceError::Symbol {

@@ -1,8 +1,9 @@
 //! What goes wrong with a device while it runs, and what a user can do about it.
 //!
 //! # Practice
-//! A driver sets a fault where it happens; the force is zero from that tick on. Whoever shows messages holds a [`Watch`],
-//! made before the device is handed to the haptic loop. Both ends are wait-free.
+//! A driver sets a fault where it happens; the force is zero from that tick on. Whoever shows
+//! messages holds a [`Watch`], made before the device is handed to the haptic loop. Both ends are
+//! wait-free.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};

@@ -1,15 +1,17 @@
-//! Force Dimension omega, delta, sigma and lambda, and the Falcon, through the maker's libdrd, loaded when the device is opened.
+//! Force Dimension omega, delta, sigma and lambda, and the Falcon, through the maker's libdrd,
+//! loaded when the device is opened.
 //!
 //! # Theory
-//! The library is driven by calls: a read fetches the pose over USB, an apply sends the force. The firmware has a
-//! watchdog; it is set to 9.5 ms, so that a haptic loop that dies leaves no force.
+//! The library is driven by calls: a read fetches the pose over USB, an apply sends the force. The
+//! firmware has a watchdog; it is set to 9.5 ms, so that a haptic loop that dies leaves no force.
 //!
 //! # Practice
-//! `read` and `apply` each wait for one USB transfer, about 0.1 to 0.25 ms: the device is the clock of the loop's
-//! shortest tick, up to 4 kHz by the maker (the Falcon 1 kHz). The maker's axes (x to the user, y right, z up; m, N m) become x right, y up, z to the user; mm, N mm;
-//! [`Workspace`] lays them into the patient. Button 1 is the pedal, button 2 asks for the next tool; devices with one button have
-//! a pedal only. The maker's velocity limit stays as it is. After a fault the force rests, then ramps in; a device
-//! whose link failed is lost until it is opened again.
+//! `read` and `apply` each wait for one USB transfer, about 0.1 to 0.25 ms: the device is the clock
+//! of the loop's shortest tick, up to 4 kHz by the maker (the Falcon 1 kHz). The maker's axes (x to
+//! the user, y right, z up; m, N m) become x right, y up, z to the user; mm, N mm; [`Workspace`]
+//! lays them into the patient. Button 1 is the pedal, button 2 asks for the next tool; devices with
+//! one button have a pedal only. The maker's velocity limit stays as it is. After a fault the force
+//! rests, then ramps in; a device whose link failed is lost until it is opened again.
 //!
 //! # Sources
 //! Force Dimension SDK 3 reference.
@@ -42,7 +44,8 @@ const FORCE_OFF_CAUSE: usize = 14;
 pub struct Config {
     /// Number of the device, from 0.
     pub index: i8,
-    /// Whether a device that does not know its zero may find it by itself. **It then moves**: hands off.
+    /// Whether a device that does not know its zero may find it by itself. **It then moves**: hands
+    /// off.
     pub auto_init: bool,
     /// The library's file; `None` lets the system search for it.
     pub library: Option<PathBuf>,

@@ -1,8 +1,9 @@
 //! Haply Inverse3 with a VerseGrip, through Haply's own service on the same machine.
 //!
 //! # Theory
-//! The service answers each message with one state: the sender's pace is the loop's. A thread of the driver sends and
-//! receives; the haptic loop exchanges with it through triple buffers and never waits. That costs one to two ticks of delay.
+//! The service answers each message with one state: the sender's pace is the loop's. A thread of
+//! the driver sends and receives; the haptic loop exchanges with it through triple buffers and
+//! never waits. That costs one to two ticks of delay.
 //!
 //! ```text
 //!   haptic loop: apply() ──wish──> thread ──set_cursor_force──> service
@@ -10,12 +11,14 @@
 //! ```
 //!
 //! # Practice
-//! The service's x right, y forward, z up (m) become x right, y up, z to the user (mm); [`Workspace`] lays them into the
-//! patient. Button a, or a wired grip's only one, is the pedal; b asks for the next tool. Force is given only while the service
-//! says calibrated, powered and ready, and no event says braked. Needs service 3.5 or later.
+//! The service's x right, y forward, z up (m) become x right, y up, z to the user (mm);
+//! [`Workspace`] lays them into the patient. Button a, or a wired grip's only one, is the pedal; b
+//! asks for the next tool. Force is given only while the service says calibrated, powered and
+//! ready, and no event says braked. Needs service 3.5 or later.
 //!
 //! # Sources
-//! Haply Inverse SDK documentation, 3.5. The maker's Rust crate brings an asynchronous runtime; this is 300 lines.
+//! Haply Inverse SDK documentation, 3.5. The maker's Rust crate brings an asynchronous runtime;
+//! this is 300 lines.
 //!
 //! # When not to use it
 //! Over a network: the delay makes stiff walls buzz.
@@ -27,7 +30,7 @@ mod websocket;
 use crate::ramp::Ramp;
 use crate::{Capabilities, DeviceError, HapticDevice, Listed, Reading, Status, Watch, Workspace};
 use protocol::{Frame, Garbled};
-use pump::{Flags, News, Pump, Wish};
+use pump::{Command, Flags, News, Pump};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::{self, JoinHandle};
@@ -50,7 +53,8 @@ pub struct Config {
     pub events: String,
     /// Id of the device, four hexadecimal digits; `None` takes the first.
     pub device: Option<String>,
-    /// Id of the VerseGrip; `None` takes the first that the service lists when the device is opened.
+    /// Id of the VerseGrip; `None` takes the first that the service lists when the device is
+    /// opened.
     pub grip: Option<String>,
     /// How the tool sits on the grip: tool axes seen from the grip's.
     pub grip_from_tool: Quat,
@@ -77,7 +81,7 @@ pub struct Haply {
     grip_from_tool: Quat,
     workspace: Workspace,
     news: Output<News>,
-    wishes: Input<Wish>,
+    wishes: Input<Command>,
     flags: Arc<Flags>,
     threads: Vec<JoinHandle<()>>,
     number: u64,
@@ -98,7 +102,7 @@ impl Haply {
         let watch = Watch::default();
         let flags = Arc::new(Flags::default());
         let (news_in, news) = triple_buffer(&News::default());
-        let (wishes, wish_out) = triple_buffer(&Wish::default());
+        let (wishes, wish_out) = triple_buffer(&Command::default());
         let name = format!("Haply {device}");
         let pump = Pump {
             socket,
@@ -182,7 +186,7 @@ impl HapticDevice for Haply {
         let Some(pump) = self.threads.first() else { return };
         self.number += 1;
         let force = services_axes(self.workspace.device_wrench(wrench.wrench()).force);
-        self.wishes.write(Wish { number: self.number, force, pose_age_ms: self.time_ms - self.fresh_ms });
+        self.wishes.write(Command { number: self.number, force, pose_age_ms: self.time_ms - self.fresh_ms });
         pump.thread().unpark();
     }
 
@@ -205,7 +209,8 @@ impl HapticDevice for Haply {
         self.flags.closing.store(true, Ordering::Release);
         for thread in self.threads.drain(..) {
             thread.thread().unpark();
-            // A thread that panicked has no force left to take back: the service drops it with the connection.
+            // A thread that panicked has no force left to take back: the service drops it with the
+            // connection.
             let _ = thread.join();
         }
     }
@@ -222,7 +227,8 @@ pub(crate) fn probe() -> Result<Vec<Listed>, DeviceError> {
     list(&Config::default())
 }
 
-/// Every device that a service has, by the name that opens it; an error says what is missing and what to do.
+/// Every device that a service has, by the name that opens it; an error says what is missing and
+/// what to do.
 pub fn list(config: &Config) -> Result<Vec<Listed>, DeviceError> {
     let mut socket = connect(&config.service)?;
     let listed = |id: String| Listed { name: format!("haply:{id}"), state: "ready".to_owned() };

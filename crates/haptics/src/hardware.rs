@@ -11,8 +11,8 @@ pub struct Hardware {
     pub watch: Watch,
 }
 
-/// Opens the device with the recommended settings; `None` when the name stands for software. `workspace` lays its space
-/// into the patient.
+/// Opens the device with the recommended settings; `None` when the name stands for software.
+/// `workspace` lays its space into the patient.
 pub fn open(name: &DeviceName, workspace: Workspace) -> Option<Result<Hardware, DeviceError>> {
     match name {
         DeviceName::OpenHaptics(device) => {
@@ -42,8 +42,8 @@ pub fn open(name: &DeviceName, workspace: Workspace) -> Option<Result<Hardware, 
     }
 }
 
-/// The hardware that a user can ask for, each device that is found by its own name, and where there is none, what is missing. Devices
-/// are not opened: that could move them.
+/// The hardware that a user can ask for, each device that is found by its own name, and where there
+/// is none, what is missing. Devices are not opened: that could move them.
 pub(crate) fn list() -> Vec<Listed> {
     let one = |name: &str, found: Result<String, DeviceError>| Listed {
         name: name.to_owned(),

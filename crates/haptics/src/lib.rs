@@ -5,15 +5,15 @@
 //! ```
 //!
 //! # Practice
-//! World space is the patient's RAS+ mm; forces are N, torques N mm. Each driver converts from its vendor's units and
-//! axes. A device takes nothing but a [`GuardedWrench`], which only the force guard makes: no path goes round it. `read`
-//! and `apply` are called once per haptic tick; they neither allocate, lock nor wait, unless the device itself is
-//! the clock (documented at the driver).
+//! World space is the patient's RAS+ mm; forces are N, torques N mm. Each driver converts from its
+//! vendor's units and axes. A device takes nothing but a [`GuardedWrench`], which only the force
+//! guard makes: no path goes round it. `read` and `apply` are called once per haptic tick; they
+//! neither allocate, lock nor wait, unless the device itself is the clock (documented at the
+//! driver).
 //!
 //! # When not to use it
 //! For input that moves a camera or a menu.
 
-mod aside;
 mod clutch;
 mod device;
 mod dynamic;
@@ -31,14 +31,15 @@ pub mod script;
 pub mod simulated;
 pub mod spacemouse;
 pub mod template;
+mod threaded;
 mod workspace;
 
-pub use aside::Aside;
 pub use clutch::Clutch;
 pub use device::{Capabilities, HapticDevice, Reading, Status};
 pub use error::DeviceError;
 pub use fault::{Fault, Watch};
 pub use name::{DeviceName, Listed, NameError, list};
+pub use threaded::ThreadedDevice;
 pub use workspace::Workspace;
 
 #[doc(no_inline)]

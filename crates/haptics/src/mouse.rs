@@ -1,15 +1,16 @@
-//! The window's pointer as a device: poses at the picture's rate in, a smooth tool at the haptic rate out.
+//! The window's pointer as a device: poses at the picture's rate in, a smooth tool at the haptic
+//! rate out.
 //!
 //! # Theory
-//! Each axis follows the pointer's pose through a critically damped second-order filter, `ẍ = ω²(u - x) - 2ω ẋ`, solved
-//! exactly over each tick for the pose u held between window events: with e = x - u and
-//! `c = ẋ + ω e`, `e(t) = (e + c t) exp(-ω t)`, `ẋ(t) = (ẋ - ω c t) exp(-ω t)`. It cannot oscillate or overshoot a step, for
-//! any tick length, and its velocity is continuous, as force models want. Rotation follows by the first-order law
-//! `exp(-ω t)` along the shortest arc.
+//! Each axis follows the pointer's pose through a critically damped second-order filter,
+//! `ẍ = ω²(u - x) - 2ω ẋ`, solved exactly over each tick for the pose u held between window events:
+//! with e = x - u and `c = ẋ + ω e`, `e(t) = (e + c t) exp(-ω t)`, `ẋ(t) = (ẋ - ω c t) exp(-ω t)`.
+//! It cannot oscillate or overshoot a step, for any tick length, and its velocity is continuous, as
+//! force models want. Rotation follows by the first-order law `exp(-ω t)` along the shortest arc.
 //!
 //! # Practice
-//! The default ω = 0.08 / ms lags by 25 ms: two pictures. Handle and device exchange values through triple
-//! buffers: neither side ever waits.
+//! The default ω = 0.08 / ms lags by 25 ms: two pictures. Handle and device exchange values through
+//! triple buffers: neither side ever waits.
 //!
 //! # When not to use it
 //! To judge forces: the pointer does not feel them. [`MouseHandle::wrench`] is for drawing them.
@@ -50,7 +51,8 @@ pub fn pair(start: Pose) -> (MouseHandle, Mouse) {
 }
 
 impl MouseHandle {
-    /// Where the tool shall go, `world_from_tool`, and what is pressed. A pose that is not finite is ignored.
+    /// Where the tool shall go, `world_from_tool`, and what is pressed. A pose that is not finite
+    /// is ignored.
     pub fn set(&mut self, pose: Pose, buttons: Buttons) {
         if pose.translation.is_finite() && pose.rotation.is_finite() {
             self.wanted.write((pose, buttons));

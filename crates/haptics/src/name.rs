@@ -13,13 +13,17 @@ pub enum DeviceName {
     Script(String),
     /// `replay:FILE`: the motion of a recorded session.
     Replay(PathBuf),
-    /// `simulated:NAME`: a device with mass, friction and delay, in a springy hand that wants to do a scripted operation.
+    /// `simulated:NAME`: a device with mass, friction and delay, in a springy hand that wants to do
+    /// a scripted operation.
     Simulated(String),
-    /// `openhaptics[:NAME]`: 3D Systems Touch and its kin, by the name given in the vendor's set-up tool.
+    /// `openhaptics[:NAME]`: 3D Systems Touch and its kin, by the name given in the vendor's set-up
+    /// tool.
     OpenHaptics(Option<String>),
-    /// `force-dimension[:N]`: omega, delta, sigma, lambda, Falcon; the first, or by its number from 0.
+    /// `force-dimension[:N]`: omega, delta, sigma, lambda, Falcon; the first, or by its number
+    /// from 0.
     ForceDimension(Option<u8>),
-    /// `haply[:ID[+GRIP]]`: Inverse3 with VerseGrip, through its service; the first, or by their four hexadecimal digits.
+    /// `haply[:ID[+GRIP]]`: Inverse3 with VerseGrip, through its service; the first, or by their
+    /// four hexadecimal digits.
     Haply(Option<String>),
     /// `spacemouse`: a six-axis knob, without force.
     SpaceMouse,
@@ -71,7 +75,8 @@ pub enum NameError {
 const KNOWN: &str = "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension[:N], haply[:ID[+GRIP]], spacemouse";
 
 impl DeviceName {
-    /// Whether both names may stand for one device of metal: a name that leaves out which may be any of its kind.
+    /// Whether both names may stand for one device of metal: a name that leaves out which may be
+    /// any of its kind.
     pub fn may_be(&self, other: &Self) -> bool {
         fn meet<T: PartialEq>(one: &Option<T>, other: &Option<T>) -> bool {
             one.is_none() || other.is_none() || one == other

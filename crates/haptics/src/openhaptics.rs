@@ -1,9 +1,11 @@
-//! 3D Systems Touch, Touch X and Premium (once Phantom, Omni) through the maker's libHD, loaded when the device is opened.
+//! 3D Systems Touch, Touch X and Premium (once Phantom, Omni) through the maker's libHD, loaded
+//! when the device is opened.
 //!
 //! # Theory
-//! libHD owns the servo thread. Its callback publishes what it senses and applies what the haptic loop last asked for;
-//! both pass through triple buffers, so that neither thread waits for the other. That costs up to one tick of delay.
-//! All devices share one callback, which finishes the first device's frame before it begins the second's.
+//! libHD owns the servo thread. Its callback publishes what it senses and applies what the haptic
+//! loop last asked for; both pass through triple buffers, so that neither thread waits for the
+//! other. That costs up to one tick of delay. All devices share one callback, which finishes the
+//! first device's frame before it begins the second's.
 //!
 //! ```text
 //!   haptic loop: read() <──sample── callback, 1 kHz, each device: begin frame, sense, command, end frame
@@ -11,10 +13,12 @@
 //! ```
 //!
 //! # Practice
-//! The device's axes are x right, y up, z towards the user, mm; [`Workspace`] lays them into the patient. Button 1 is the
-//! pedal, button 2 asks for the next tool. Force is off until the device is calibrated. `read` is [`Status::Lost`] after a fault of
-//! the link or 50 ms without a sample. While a second device is opened or closed the first is without force for a moment, then its force
-//! ramps in. While libHD does not call, its last force stays on the motors; when it calls again there is none. Nothing of the maker's is part of this crate.
+//! The device's axes are x right, y up, z towards the user, mm; [`Workspace`] lays them into the
+//! patient. Button 1 is the pedal, button 2 asks for the next tool. Force is off until the device
+//! is calibrated. `read` is [`Status::Lost`] after a fault of the link or 50 ms without a sample.
+//! While a second device is opened or closed the first is without force for a moment, then its
+//! force ramps in. While libHD does not call, its last force stays on the motors; when it calls
+//! again there is none. Nothing of the maker's is part of this crate.
 //!
 //! # Sources
 //! OpenHaptics API reference and programmer's guide (3D Systems).
@@ -167,7 +171,8 @@ pub(crate) fn probe() -> Result<String, DeviceError> {
     Hd::load(None).map(|(_, library)| format!("{library} is installed; the device is looked for when it is opened"))
 }
 
-/// A sample as a tool in device space. The transform's columns drift from orthonormal: they are made so again.
+/// A sample as a tool in device space. The transform's columns drift from orthonormal: they are
+/// made so again.
 fn tool(sample: &Sample, time_ms: f64) -> ToolState {
     let m = sample.transform.map(|value| value as f32);
     let z = Vec3::new(m[8], m[9], m[10]).normalize_or(Vec3::Z);

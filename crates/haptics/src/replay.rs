@@ -1,8 +1,8 @@
 //! Replays recorded tool states: each read gives the next one, whatever the clock says.
 //!
 //! # Practice
-//! One state per read makes a replay give the same forces as the recording, bit for bit, at any speed. The states carry
-//! their recorded times. After the last one the tool rests there.
+//! One state per read makes a replay give the same forces as the recording, bit for bit, at any
+//! speed. The states carry their recorded times. After the last one the tool rests there.
 
 use crate::{Capabilities, HapticDevice, Reading, Status};
 use trepan_contact::GuardedWrench;

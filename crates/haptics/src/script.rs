@@ -1,13 +1,15 @@
-//! Scripted operations: a hand that never tires, for demonstrations, tests and machines without a device.
+//! Scripted operations: a hand that never tires, for demonstrations, tests and machines without a
+//! device.
 //!
 //! # Theory
-//! Between waypoints the tip follows the minimum-jerk law of human reaching (Flash and Hogan 1985, J. Neurosci. 5):
-//! `x(τ) = x₀ + (x₁ - x₀)(10τ³ - 15τ⁴ + 6τ⁵)`, τ = t/T; it starts and ends at rest, its velocity is continuous and
-//! peaks at 15/8 of the mean. Velocities are its exact derivative.
+//! Between waypoints the tip follows the minimum-jerk law of human reaching (Flash and Hogan 1985,
+//! J. Neurosci. 5): `x(τ) = x₀ + (x₁ - x₀)(10τ³ - 15τ⁴ + 6τ⁵)`, τ = t/T; it starts and ends at
+//! rest, its velocity is continuous and peaks at 15/8 of the mean. Velocities are its exact
+//! derivative.
 //!
 //! # Practice
-//! A script is a pure function of time: the same times give the same bits, in any order. The tool's shaft (+z) points out of
-//! the patient along the hole.
+//! A script is a pure function of time: the same times give the same bits, in any order. The tool's
+//! shaft (+z) points out of the patient along the hole.
 //!
 //! ```text
 //!  approach     drill, pedal down     retreat  change  approach   three presses          leave
@@ -15,7 +17,8 @@
 //! ```
 //!
 //! # When not to use it
-//! To judge what a person would feel or do: it does not yield to force. Use [`crate::simulated`] for that.
+//! To judge what a person would feel or do: it does not yield to force. Use [`crate::simulated`]
+//! for that.
 
 mod operation;
 mod path;
@@ -30,8 +33,9 @@ use trepan_geometry::{ToolState, Wrench};
 
 /// The names of the operations that [`Script::named`] knows.
 ///
-/// `aspirate` is for the second hand: its tool comes beside the burr and rests on the bone there. `flap` cuts a flap free with burr and craniotome, lifts it and
-/// probes the brain; give it a minute.
+/// `aspirate` is for the second hand: its tool comes beside the burr and rests on the bone there.
+/// `flap` cuts a flap free with burr and craniotome, lifts it and probes the brain; give it a
+/// minute.
 pub const NAMES: [&str; 5] = ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap"];
 
 /// Duration of an operation when none is asked for, ms.

@@ -1,21 +1,25 @@
-//! A simulated device in a simulated hand: mass, friction, encoder steps and delay, pushed by the force applied.
+//! A simulated device in a simulated hand: mass, friction, encoder steps and delay, pushed by the
+//! force applied.
 //!
 //! # Theory
 //! ```text
 //!   intent u ──[k_h, b_h]── x: mass m ──[b, f_c]── ground        m ẍ = F(t - d) + k_h(u - x) + b_h(u̇ - ẋ) - b ẋ - f_c ẋ/|ẋ|
 //! ```
-//! The hand is a spring and a damper between where it means to be and the device's handle; the handle has the device's
-//! apparent mass, viscous and Coulomb friction; the force arrives d ticks late and what is read is rounded to encoder
-//! steps. These are the parts that decide whether a haptic loop is stable: without a hand, `K < (b + B)/(T/2 + d)` (Gil and
-//! others 2004); a passive wall needs `b > K T/2 + B` (Colgate and Schenkel 1997).
+//! The hand is a spring and a damper between where it means to be and the device's handle; the
+//! handle has the device's apparent mass, viscous and Coulomb friction; the force arrives d ticks
+//! late and what is read is rounded to encoder steps. These are the parts that decide whether a
+//! haptic loop is stable: without a hand, `K < (b + B)/(T/2 + d)` (Gil and others 2004); a passive
+//! wall needs `b > K T/2 + B` (Colgate and Schenkel 1997).
 //!
 //! # Practice
-//! Integrated by symplectic Euler with Coulomb friction as a cap on the momentum that it may take, in steps of at most 20 µs.
-//! Motion is free of torque: rotation follows the intent. Deterministic: the same calls give the same bits.
+//! Integrated by symplectic Euler with Coulomb friction as a cap on the momentum that it may take,
+//! in steps of at most 20 µs. Motion is free of torque: rotation follows the intent. Deterministic:
+//! the same calls give the same bits.
 //!
 //! # Sources
-//! Gil et al. 2004, "Stability analysis of a 1 DOF haptic interface"; Colgate and Schenkel 1997, J. Robotic Systems 14;
-//! preset numbers: maker's data sheet of the Touch, b assumed; hands within the spans of Hajian and Howe 1997.
+//! Gil et al. 2004, "Stability analysis of a 1 DOF haptic interface"; Colgate and Schenkel 1997, J.
+//! Robotic Systems 14; preset numbers: maker's data sheet of the Touch, b assumed; hands within the
+//! spans of Hajian and Howe 1997.
 //!
 //! # When not to use it
 //! To measure a real device.
@@ -46,7 +50,8 @@ pub struct Config {
     pub delay_ticks: usize,
     /// Longest force of the motors, N: more is shortened.
     pub peak_force_n: f32,
-    /// Time constant of the velocity's low-pass filter, ms; 0 for the plain difference of positions.
+    /// Time constant of the velocity's low-pass filter, ms; 0 for the plain difference of
+    /// positions.
     pub velocity_filter_ms: f32,
     /// Highest rate at which it may be read, Hz.
     pub rate_hz: f32,
@@ -74,7 +79,7 @@ impl Default for Config {
 
 /// The hand on the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hand {
+pub struct HandModel {
     /// Mass that moves with the device, g.
     pub mass_g: f32,
     /// Damping b_h between intent and handle, N ms/mm.
@@ -83,7 +88,7 @@ pub struct Hand {
     pub stiffness: f32,
 }
 
-impl Hand {
+impl HandModel {
     /// No hand: the device floats.
     pub const FREE: Self = Self { mass_g: 0.0, damping: 0.0, stiffness: 0.0 };
     /// A light grip.
@@ -95,7 +100,7 @@ impl Hand {
 /// A device whose hand means to go where another device is.
 pub struct Simulated {
     config: Config,
-    hand: Hand,
+    hand: HandModel,
     intent: Box<dyn HapticDevice>,
     position: Vec3,
     velocity: Vec3,
@@ -115,7 +120,7 @@ struct Sample {
 
 impl Simulated {
     /// A device in a hand that follows `intent`, usually a [`crate::script::Script`].
-    pub fn new(config: Config, hand: Hand, intent: Box<dyn HapticDevice>) -> Self {
+    pub fn new(config: Config, hand: HandModel, intent: Box<dyn HapticDevice>) -> Self {
         Self {
             config: Config { delay_ticks: config.delay_ticks.min(MAX_DELAY_TICKS), ..config },
             hand,
@@ -128,7 +133,8 @@ impl Simulated {
         }
     }
 
-    /// True position of the handle, mm; what [`HapticDevice::read`] gives is rounded to encoder steps.
+    /// True position of the handle, mm; what [`HapticDevice::read`] gives is rounded to encoder
+    /// steps.
     pub fn position(&self) -> Vec3 {
         self.position
     }

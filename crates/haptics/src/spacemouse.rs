@@ -1,17 +1,20 @@
-//! SpaceMouse: a knob that is pushed and turned, as a tool that moves while it is pushed. It has no motors.
+//! SpaceMouse: a knob that is pushed and turned, as a tool that moves while it is pushed. It has no
+//! motors.
 //!
 //! # Theory
-//! The knob says how far it is pushed, −1 to 1 on each axis; that is a velocity, since it springs back:
+//! The knob says how far it is pushed, −1 to 1 on each axis; that is a velocity, since it springs
+//! back:
 //! ```text
 //! v = s |a| a     ω = r |b| b     position and tilt are their integrals, held within a box and a cone
 //! ```
 //! The square makes small pushes fine and large ones fast.
 //!
 //! # Practice
-//! Through the spacenav daemon where it runs, else straight from the system's HID reports ([`Config::source`]). Both are read without
-//! waiting, at most 64 messages a tick. The knob's axes become x right, y up, z to the user; [`Workspace`] lays them into the patient.
-//! The first button is the pedal, the second asks for the next tool. The knob is silent at rest: after 100 ms without a word it
-//! counts as let go. A lost knob is [`Status::Lost`] until it is opened again.
+//! Through the spacenav daemon where it runs, else straight from the system's HID reports
+//! ([`Config::source`]). Both are read without waiting, at most 64 messages a tick. The knob's axes
+//! become x right, y up, z to the user; [`Workspace`] lays them into the patient. The first button
+//! is the pedal, the second asks for the next tool. The knob is silent at rest: after 100 ms
+//! without a word it counts as let go. A lost knob is [`Status::Lost`] until it is opened again.
 //!
 //! # Sources
 //! spacenavd's protocol (its public documentation), the USB HID reports of 3Dconnexion's devices.
@@ -71,7 +74,8 @@ impl Default for Config {
 /// Where a knob is heard.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The daemon at its usual place (or at `SPNAV_SOCKET`), else the first HID device of a known kind.
+    /// The daemon at its usual place (or at `SPNAV_SOCKET`), else the first HID device of a known
+    /// kind.
     Any,
     /// The daemon's socket.
     Daemon(PathBuf),

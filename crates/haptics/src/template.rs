@@ -1,20 +1,30 @@
-//! A driver to copy: an imaginary device that speaks datagrams. It is compiled and tested as the others are; no such device is sold.
+//! A driver to copy: an imaginary device that speaks datagrams. It is compiled and tested as the
+//! others are; no such device is sold.
 //!
 //! # The guide
-//! 1. **Copy** this file and `tests/template.rs` under your device's name; put `pub mod` into `lib.rs`.
-//! 2. **Write the wire down first**, as the table below, with its units. Two functions know it: `command` and `State::parse`.
-//!    They are pure, so that they are tested with known bytes before there is a device.
-//! 3. **Convert at the border**: inside it is mm, ms, N, rad; x right, y up, z to the user. Then [`Workspace`] lays that into the patient.
-//! 4. **Never wait in `read`.** A socket or a file is set non-blocking; a library that waits for longer than a quarter tick gets a
-//!    thread (see `haply`), one with its own loop gets triple buffers (see `openhaptics`).
-//! 5. **Every fault goes to `Ramp::cut`**, in the tick in which it is seen: the force is zero at once, rests, and ramps in again.
-//!    The message of a [`Fault`] says what the user shall do. A loop that dies must leave no force: give the device a watchdog.
-//! 6. **Be honest in [`Capabilities`]**: the guard takes peak and continuous force, delay and encoder step from it.
-//! 7. **Emulate the device in a test** with all that can go wrong: silence, garbage, old counters, faults, unplugging, a hundred sessions.
-//! 8. **Name it**: a variant in `name.rs`, a line in `hardware.rs`. `device test NAME` then tries the real one.
+//! 1. **Copy** this file and `tests/template.rs` under your device's name; put `pub mod` into
+//!    `lib.rs`.
+//! 2. **Write the wire down first**, as the table below, with its units. Two functions know it:
+//!    `command` and `State::parse`. They are pure, so that they are tested with known bytes before
+//!    there is a device.
+//! 3. **Convert at the border**: inside it is mm, ms, N, rad; x right, y up, z to the user. Then
+//!    [`Workspace`] lays that into the patient.
+//! 4. **Never wait in `read`.** A socket or a file is set non-blocking; a library that waits for
+//!    longer than a quarter tick gets a thread (see `haply`), one with its own loop gets triple
+//!    buffers (see `openhaptics`).
+//! 5. **Every fault goes to `Ramp::cut`**, in the tick in which it is seen: the force is zero at
+//!    once, rests, and ramps in again. The message of a [`Fault`] says what the user shall do. A
+//!    loop that dies must leave no force: give the device a watchdog.
+//! 6. **Be honest in [`Capabilities`]**: the guard takes peak and continuous force, delay and
+//!    encoder step from it.
+//! 7. **Emulate the device in a test** with all that can go wrong: silence, garbage, old counters,
+//!    faults, unplugging, a hundred sessions.
+//! 8. **Name it**: a variant in `name.rs`, a line in `hardware.rs`. `device test NAME` then tries
+//!    the real one.
 //!
 //! # The imaginary wire
-//! One datagram each way for each tick, numbers little-endian. The device drops its force 10 ms after the last command.
+//! One datagram each way for each tick, numbers little-endian. The device drops its force 10 ms
+//! after the last command.
 //! ```text
 //! to the device     b"TD"  counter u32  force 3 x f32                       N; x to the user, y right, z up
 //! from the device   b"td"  counter u32  position 3 x f32  velocity 3 x f32  flags u32      m, m/s, same axes
@@ -84,7 +94,8 @@ impl Template {
         self.watch.clone()
     }
 
-    /// The newest state that came since the last read. Datagrams may overtake each other: older ones are passed over.
+    /// The newest state that came since the last read. Datagrams may overtake each other: older
+    /// ones are passed over.
     fn newest(&mut self) -> io::Result<Option<State>> {
         let (Some(socket), mut newest) = (&self.socket, None) else { return Err(ErrorKind::NotConnected.into()) };
         for _ in 0..MAX_DATAGRAMS {

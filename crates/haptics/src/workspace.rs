@@ -1,12 +1,13 @@
 //! Where a device's small box lies in the patient, and how much its motion is enlarged.
 //!
 //! # Theory
-//! Positions scale and turn, `x_world = s R x_device + t`; rotations and angular velocities only turn. Forces only
-//! turn as well: a scaled force would change how stiff a surface feels by `s²` instead of `s`, and its limit belongs to
-//! the hand. Torques act at the tip and turn.
+//! Positions scale and turn, `x_world = s R x_device + t`; rotations and angular velocities only
+//! turn. Forces only turn as well: a scaled force would change how stiff a surface feels by `s²`
+//! instead of `s`, and its limit belongs to the hand. Torques act at the tip and turn.
 //!
 //! # Practice
-//! `s` is world mm per device mm. With s > 1 the loop is `s` times stiffer at the hand: lower the coupling stiffness.
+//! `s` is world mm per device mm. With s > 1 the loop is `s` times stiffer at the hand: lower the
+//! coupling stiffness.
 
 use trepan_geometry::{Pose, Quat, ToolState, Twist, Vec3, Wrench};
 
@@ -27,8 +28,8 @@ impl Default for Workspace {
 }
 
 impl Workspace {
-    /// A device space whose origin is at `centre`, with x to the right of someone who looks along `forward` with `up`
-    /// upwards, y up and z towards them, as force-feedback styluses have it.
+    /// A device space whose origin is at `centre`, with x to the right of someone who looks along
+    /// `forward` with `up` upwards, y up and z towards them, as force-feedback styluses have it.
     pub fn facing(centre: Vec3, forward: Vec3, up: Vec3, scale: f32) -> Self {
         let z = (-forward).normalize_or(Vec3::Z);
         let x = up.cross(z).normalize_or(z.any_orthonormal_vector());

@@ -6,7 +6,7 @@ use trepan_geometry::{Pose, ToolState, Vec3, Wrench};
 use trepan_haptics::mouse::{self, MouseHandle};
 use trepan_haptics::replay::Replay;
 use trepan_haptics::script::{self, Script, Site};
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_haptics::{HapticDevice, Status};
 
 fn site() -> Site {
@@ -22,7 +22,7 @@ fn mouse_pair() -> (MouseHandle, mouse::Mouse) {
 }
 
 fn simulated(delay_ticks: usize) -> Simulated {
-    Simulated::new(Config { delay_ticks, ..Config::default() }, Hand::LIGHT, Box::new(script("craniotomy")))
+    Simulated::new(Config { delay_ticks, ..Config::default() }, HandModel::LIGHT, Box::new(script("craniotomy")))
 }
 
 fn replay() -> Replay {

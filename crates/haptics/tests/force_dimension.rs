@@ -1,4 +1,5 @@
-//! The Force Dimension driver against an emulator of libdrd: units, axes, and every fault ends without force.
+//! The Force Dimension driver against an emulator of libdrd: units, axes, and every fault ends
+//! without force.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};

@@ -1,4 +1,5 @@
-//! The Haply driver against an emulator of its service: units, axes, the protocol, and every fault ends without force.
+//! The Haply driver against an emulator of its service: units, axes, the protocol, and every fault
+//! ends without force.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::time::Duration;
@@ -17,7 +18,8 @@ fn guarded(force: Vec3) -> GuardedWrench {
     guard.guard(Wrench { force, torque: Vec3::ZERO }, &ToolState::at(Pose::IDENTITY), 1.0)
 }
 
-/// Runs the haptic loop until something holds. A test that waits in vain fails, but not for being slow.
+/// Runs the haptic loop until something holds. A test that waits in vain fails, but not for being
+/// slow.
 fn run_until(
     device: &mut Haply,
     service: &Service,

@@ -6,7 +6,7 @@ use std::cell::Cell;
 use trepan_contact::{ForceGuard, GuardConfig};
 use trepan_geometry::{Buttons, Pose, Vec3, Wrench};
 use trepan_haptics::script::{NAMES, Script, Site};
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_haptics::{HapticDevice, Workspace, mouse, replay::Replay};
 
 thread_local! {
@@ -15,7 +15,8 @@ thread_local! {
 
 struct Counting;
 
-// SAFETY: passes everything on to the system's allocator; counting touches only a plain thread-local.
+// SAFETY: passes everything on to the system's allocator; counting touches only a plain
+// thread-local.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.with(|count| count.set(count.get() + 1));
@@ -61,6 +62,6 @@ fn a_tick_with_any_virtual_device_allocates_nothing() {
     let (mut handle, mut mouse) = mouse::pair(Pose::IDENTITY);
     handle.set(Pose::from_translation(Vec3::X), Buttons::PEDAL);
     assert_eq!(allocations(|| session(&mut mouse)), 0, "mouse");
-    let mut simulated = Simulated::new(Config::default(), Hand::LIGHT, Box::new(script("probe")));
+    let mut simulated = Simulated::new(Config::default(), HandModel::LIGHT, Box::new(script("probe")));
     assert_eq!(allocations(|| session(&mut simulated)), 0, "simulated");
 }

@@ -1,4 +1,5 @@
-//! The OpenHaptics driver against an emulator of libHD: units, axes, frame rules, and every fault ends without force.
+//! The OpenHaptics driver against an emulator of libHD: units, axes, frame rules, and every fault
+//! ends without force.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
@@ -45,7 +46,8 @@ fn motors(emulator: &Emulator) -> Vec3 {
 #[test]
 fn pose_velocity_buttons_and_force_have_the_right_axes_and_units() {
     let emulator = emulator();
-    // Device x lies along world y, device y along world z, device z along world x, at (5, 6, 7), twice as large.
+    // Device x lies along world y, device y along world z, device z along world x, at (5, 6, 7),
+    // twice as large.
     let axes = Workspace::facing(Vec3::new(5.0, 6.0, 7.0), Vec3::NEG_X, Vec3::Z, 2.0);
     let mut device = OpenHaptics::open(&Config { workspace: axes, ..config(&emulator) }).unwrap();
     for (key, value) in [

@@ -1,18 +1,20 @@
-//! The guard before the simulated device: a quiet wall keeps its force, an unstable one is stilled, a lost one comes back.
+//! The guard before the simulated device: a quiet wall keeps its force, an unstable one is stilled,
+//! a lost one comes back.
 
 use trepan_contact::{ForceGuard, GuardConfig, GuardCounters, PassivityConfig};
 use trepan_geometry::{Pose, ToolState, Vec3, Wrench};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 
-const HANDS: [(&str, Hand); 2] = [("light", Hand::LIGHT), ("firm", Hand::FIRM)];
+const HANDS: [(&str, HandModel); 2] = [("light", HandModel::LIGHT), ("firm", HandModel::FIRM)];
 
 /// A Touch whose friction is gone.
 const SLIPPERY: Config = Config { friction_n: 0.0, ..TOUCH };
 const TOUCH: Config = Config::TOUCH;
 
-/// A hand that comes from outside and presses a wall with about 1 N, and what the last third of three seconds was like.
+/// A hand that comes from outside and presses a wall with about 1 N, and what the last third of
+/// three seconds was like.
 #[derive(Debug)]
 struct Press {
     motion_mm: f32,
@@ -21,7 +23,7 @@ struct Press {
     counters: GuardCounters,
 }
 
-fn press(config: Config, hand: Hand, stiffness: f32, passivity: Option<PassivityConfig>) -> Press {
+fn press(config: Config, hand: HandModel, stiffness: f32, passivity: Option<PassivityConfig>) -> Press {
     let inside = Pose::from_translation(Vec3::X * -(1.0 / hand.stiffness + 1.0 / stiffness));
     let outside = (0..100).map(|_| ToolState::at(Pose::from_translation(Vec3::X * 2.0)));
     let intent = Replay::new(outside.chain([ToolState::at(inside)]).collect());
@@ -62,7 +64,8 @@ fn a_steady_press_keeps_its_force() {
 
 #[test]
 fn an_unstable_wall_is_stilled() {
-    for (grip, hand, delay_ticks, stiffness) in [("light", Hand::LIGHT, 1, 2.0), ("firm", Hand::FIRM, 2, 2.0)] {
+    for (grip, hand, delay_ticks, stiffness) in [("light", HandModel::LIGHT, 1, 2.0), ("firm", HandModel::FIRM, 2, 2.0)]
+    {
         let config = Config { quantum_mm: 0.0, delay_ticks, ..SLIPPERY };
         let told = PassivityConfig { delay_ticks: delay_ticks as u8, quantum_mm: 0.0, ..PassivityConfig::default() };
         let without = press(config, hand, stiffness, None);
@@ -72,7 +75,8 @@ fn an_unstable_wall_is_stilled() {
     }
 }
 
-/// For a second the scene throws energy at the hand; then it is a wall of 0.8 N/mm that the hand means to be inside of.
+/// For a second the scene throws energy at the hand; then it is a wall of 0.8 N/mm that the hand
+/// means to be inside of.
 #[test]
 fn a_wall_that_lost_its_force_gets_it_back() {
     let exact = Config { quantum_mm: 0.0, ..SLIPPERY };

@@ -1,4 +1,5 @@
-//! A hundred sessions of every driver against its emulator: no descriptor, no thread and no memory is left, and nothing hangs.
+//! A hundred sessions of every driver against its emulator: no descriptor, no thread and no memory
+//! is left, and nothing hangs.
 //!
 //! One test, since it counts what the whole process holds.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
@@ -9,7 +10,9 @@ use trepan_contact::{ForceGuard, GuardConfig};
 use trepan_emulators::{Library, service};
 use trepan_geometry::{Pose, ToolState, Vec3, Wrench};
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::{Aside, HapticDevice, Status, force_dimension, haply, mouse, openhaptics, simulated, spacemouse};
+use trepan_haptics::{
+    HapticDevice, Status, ThreadedDevice, force_dimension, haply, mouse, openhaptics, simulated, spacemouse,
+};
 
 /// Descriptors, threads, and memory in kB that the process holds.
 fn held() -> [usize; 3] {
@@ -74,14 +77,14 @@ fn a_hundred_sessions_of_every_driver_leave_nothing_behind() {
         ("mouse", Box::new(|| session(Box::new(mouse::pair(Pose::IDENTITY).1)))),
         ("simulated", {
             Box::new(|| {
-                let (config, grip) = (simulated::Config::default(), simulated::Hand::FIRM);
+                let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
                 session(Box::new(simulated::Simulated::new(config, grip, script())));
             })
         }),
         ("script", Box::new(|| session(script()))),
         ("script on a thread of its own", {
             Box::new(|| {
-                let mut device = Aside::new(script());
+                let mut device = ThreadedDevice::new(script());
                 assert_eq!(device.read(0.0).status, Status::Stale);
                 session(Box::new(device));
             })
@@ -98,7 +101,8 @@ fn a_hundred_sessions_of_every_driver_leave_nothing_behind() {
     }
 }
 
-/// What is held once something is so, or after two seconds: an emulator's own threads end a little later.
+/// What is held once something is so, or after two seconds: an emulator's own threads end a little
+/// later.
 fn settled(so: impl Fn([usize; 3]) -> bool) -> [usize; 3] {
     for _ in 0..200 {
         std::thread::sleep(std::time::Duration::from_millis(10));

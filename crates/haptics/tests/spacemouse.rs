@@ -1,4 +1,5 @@
-//! The SpaceMouse driver against an emulator of its daemon and of its device file: axes, units, limits, and what happens when it goes.
+//! The SpaceMouse driver against an emulator of its daemon and of its device file: axes, units,
+//! limits, and what happens when it goes.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::io::Write;

@@ -4,7 +4,7 @@ use trepan_contact::{ForceGuard, GuardConfig};
 use trepan_geometry::{Pose, ToolState, Vec3, Wrench};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 
 const TICK_MS: f32 = 1.0;
 
@@ -21,8 +21,9 @@ fn open_guard() -> ForceGuard {
     })
 }
 
-/// Mean size of motion in the last fifth over that in the first, for a spring and damper that hold the handle at the origin.
-fn growth(config: Config, hand: Hand, stiffness: f32, damping: f32) -> f32 {
+/// Mean size of motion in the last fifth over that in the first, for a spring and damper that hold
+/// the handle at the origin.
+fn growth(config: Config, hand: HandModel, stiffness: f32, damping: f32) -> f32 {
     let still = Replay::new(vec![ToolState::at(Pose::IDENTITY)]);
     let mut device = Simulated::new(config, hand, Box::new(still));
     let mut guard = open_guard();
@@ -47,7 +48,7 @@ fn growth(config: Config, hand: Hand, stiffness: f32, damping: f32) -> f32 {
 }
 
 /// Largest stiffness at which motion dies away, N/mm.
-fn stable_stiffness(config: Config, hand: Hand, damping: f32) -> f32 {
+fn stable_stiffness(config: Config, hand: HandModel, damping: f32) -> f32 {
     let (mut stable, mut unstable) = (0.001f32, 50.0f32);
     while unstable / stable > 1.01 {
         let middle = (stable * unstable).sqrt();
@@ -75,7 +76,7 @@ fn without_a_hand_the_border_is_gils() {
     {
         let config = bare(delay_ticks);
         let expected = (config.damping + damping) / (TICK_MS / 2.0 + delay_ticks as f32 * TICK_MS);
-        let found = stable_stiffness(config, Hand::FREE, damping);
+        let found = stable_stiffness(config, HandModel::FREE, damping);
         assert!(
             (found / expected - 1.0).abs() < tolerance,
             "{delay_ticks} ticks, B = {damping}: {found}, theory {expected}"
@@ -85,30 +86,30 @@ fn without_a_hand_the_border_is_gils() {
 
 #[test]
 fn a_hand_and_less_delay_widen_the_border() {
-    let light = [0, 1, 2].map(|delay_ticks| stable_stiffness(bare(delay_ticks), Hand::LIGHT, 0.0));
+    let light = [0, 1, 2].map(|delay_ticks| stable_stiffness(bare(delay_ticks), HandModel::LIGHT, 0.0));
     assert!(light[0] > light[1] && light[1] > light[2], "{light:?}");
-    assert!(light[2] > 5.0 * stable_stiffness(bare(2), Hand::FREE, 0.0), "{light:?}");
+    assert!(light[2] > 5.0 * stable_stiffness(bare(2), HandModel::FREE, 0.0), "{light:?}");
 }
 
 #[test]
 fn friction_stills_what_is_unstable_without_it() {
     let rubbing = Config { friction_n: 0.26, ..bare(1) };
-    assert!(growth(bare(1), Hand::FREE, 0.2, 0.0) > 100.0);
+    assert!(growth(bare(1), HandModel::FREE, 0.2, 0.0) > 100.0);
     // It sticks where friction stops it: the motion neither grows nor goes on.
-    assert!(growth(rubbing, Hand::FREE, 0.2, 0.0) < 1.1);
+    assert!(growth(rubbing, HandModel::FREE, 0.2, 0.0) < 1.1);
 }
 
 #[test]
 fn the_hand_gives_way_to_force_as_its_spring_says() {
     let still = Replay::new(vec![ToolState::at(Pose::IDENTITY)]);
-    let mut device = Simulated::new(Config { friction_n: 0.0, ..Config::default() }, Hand::LIGHT, Box::new(still));
+    let mut device = Simulated::new(Config { friction_n: 0.0, ..Config::default() }, HandModel::LIGHT, Box::new(still));
     let mut guard = ForceGuard::new(GuardConfig { passivity: None, ..GuardConfig::default() });
     let mut tool = device.read(0.0).tool;
     for tick in 1..2000 {
         device.apply(guard.guard(Wrench { force: Vec3::Y * 0.6, torque: Vec3::ZERO }, &tool, TICK_MS));
         tool = device.read(f64::from(tick)).tool;
     }
-    assert!((device.position() - Vec3::Y * 0.6 / Hand::LIGHT.stiffness).length() < 0.02, "{}", device.position());
+    assert!((device.position() - Vec3::Y * 0.6 / HandModel::LIGHT.stiffness).length() < 0.02, "{}", device.position());
     assert!((tool.tip() - device.position()).length() <= Config::default().quantum_mm);
 }
 
@@ -117,7 +118,7 @@ fn what_is_read_lies_on_encoder_steps() {
     let quantum_mm = 0.055;
     let moving =
         Replay::new((0..100).map(|i| ToolState::at(Pose::from_translation(Vec3::X * i as f32 * 0.1))).collect());
-    let mut device = Simulated::new(Config { quantum_mm, ..Config::default() }, Hand::FIRM, Box::new(moving));
+    let mut device = Simulated::new(Config { quantum_mm, ..Config::default() }, HandModel::FIRM, Box::new(moving));
     let positions: Vec<f32> = (0..100).map(|tick| device.read(f64::from(tick)).tool.tip().x / quantum_mm).collect();
     assert!(positions.iter().all(|x| (x - x.round()).abs() < 1e-3));
     assert!(*positions.last().unwrap() > 100.0);

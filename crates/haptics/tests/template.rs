@@ -1,4 +1,5 @@
-//! The template driver against an emulator of its imaginary device: units, axes, and every fault ends without force.
+//! The template driver against an emulator of its imaginary device: units, axes, and every fault
+//! ends without force.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::net::{SocketAddr, UdpSocket};
@@ -7,7 +8,8 @@ use trepan_geometry::{Buttons, Pose, ToolState, Vec3, Wrench};
 use trepan_haptics::template::{Config, Template};
 use trepan_haptics::{Fault, HapticDevice, Reading, Status, Workspace};
 
-/// The device, and the driver that speaks to it. Loopback delivers a datagram before `send` returns, so nothing waits.
+/// The device, and the driver that speaks to it. Loopback delivers a datagram before `send`
+/// returns, so nothing waits.
 struct Bench {
     socket: UdpSocket,
     driver: Template,

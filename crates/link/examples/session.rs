@@ -1,4 +1,5 @@
-//! Records 60 s of a 1 kHz session through a ring, cuts the file, reads both, and prints sizes and losses.
+//! Records 60 s of a 1 kHz session through a ring, cuts the file, reads both, and prints sizes and
+//! losses.
 //!
 //! `cargo run -p trepan-link --example session [FILE.mcap]`
 

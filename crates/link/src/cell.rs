@@ -1,9 +1,10 @@
-//! Latest-value cells: one thread writes, another reads the newest value; neither ever waits for the other.
+//! Latest-value cells: one thread writes, another reads the newest value; neither ever waits for
+//! the other.
 //!
 //! # Theory
-//! A triple buffer: the writer owns one slot, the reader owns one, the third changes hands by one atomic swap. Both
-//! sides finish in a bounded number of steps whatever the other does (wait-free), and the reader never sees half a
-//! value.
+//! A triple buffer: the writer owns one slot, the reader owns one, the third changes hands by one
+//! atomic swap. Both sides finish in a bounded number of steps whatever the other does (wait-free),
+//! and the reader never sees half a value.
 //!
 //! ```text
 //!   writer ──[slot a]──╮                 ╭──[slot c]── reader
@@ -11,8 +12,9 @@
 //! ```
 //!
 //! # Practice
-//! A write in place costs what the closure costs and one swap, about 20 ns; reading an unchanged cell is one load, 1 ns.
-//! `T` may own memory (a surface patch): slots are reused, so a closure that overwrites in place never allocates.
+//! A write in place costs what the closure costs and one swap, about 20 ns; reading an unchanged
+//! cell is one load, 1 ns. `T` may own memory (a surface patch): slots are reused, so a closure
+//! that overwrites in place never allocates.
 //!
 //! # When not to use it
 //! When every value counts, as with carving edits or records: use [`crate::queue`].

@@ -1,9 +1,11 @@
-//! Bounded rings: one thread sends, another receives, in order; what does not fit is dropped and counted.
+//! Bounded rings: one thread sends, another receives, in order; what does not fit is dropped and
+//! counted.
 //!
 //! # Practice
-//! One slot is one value; all memory is taken when the ring is made. Sending and receiving are wait-free and cost
-//! about 10 ns plus the copy (60 ns for a tick record, both ends). Size a ring for the longest pause of its receiver: 1 kHz of records and a recorder that
-//! may stall for 2 s need 2048 slots.
+//! One slot is one value; all memory is taken when the ring is made. Sending and receiving are
+//! wait-free and cost about 10 ns plus the copy (60 ns for a tick record, both ends). Size a ring
+//! for the longest pause of its receiver: 1 kHz of records and a recorder that may stall for 2 s
+//! need 2048 slots.
 //!
 //! # When not to use it
 //! When only the newest value counts: use [`crate::cell`].

@@ -1,11 +1,13 @@
-//! Writes a session to an MCAP file, so that a cut at any byte loses at most the last quarter of a second.
+//! Writes a session to an MCAP file, so that a cut at any byte loses at most the last quarter of a
+//! second.
 //!
 //! # Practice
-//! One topic per record type in Trepan's own protobuf schemas (`/tick`, `/second`, `/collision`, `/solver`, `/event`), and
-//! `/tool` and `/log` in Foxglove's for viewers. Chunks are compressed with LZ4 and closed after [`MAX_CHUNK_BYTES`]
-//! or [`MAX_CHUNK_MS`] of session time, whichever comes first, then handed to the operating system: a killed process
-//! loses the open chunk only. A tick takes 2 µs and 80 to 250 B, but 5 ms when a chunk closes, or as long as the disk
-//! needs: a recorder lives on a thread of its own, behind [`crate::queue`].
+//! One topic per record type in Trepan's own protobuf schemas (`/tick`, `/second`, `/collision`,
+//! `/solver`, `/event`), and `/tool` and `/log` in Foxglove's for viewers. Chunks are compressed
+//! with LZ4 and closed after [`MAX_CHUNK_BYTES`] or [`MAX_CHUNK_MS`] of session time, whichever
+//! comes first, then handed to the operating system: a killed process loses the open chunk only. A
+//! tick takes 2 µs and 80 to 250 B, but 5 ms when a chunk closes, or as long as the disk needs: a
+//! recorder lives on a thread of its own, behind [`crate::queue`].
 //!
 //! # Sources
 //! MCAP: <https://mcap.dev/spec>.
@@ -41,8 +43,9 @@ const PROFILE: &str = "trepan";
 
 /// A session file being written.
 ///
-/// After the first error every call fails; what was flushed before stays readable. Dropping a recorder finishes the
-/// file as well as it can; [`Recorder::finish`] also says whether that went well.
+/// After the first error every call fails; what was flushed before stays readable. Dropping a
+/// recorder finishes the file as well as it can; [`Recorder::finish`] also says whether that went
+/// well.
 pub struct Recorder<W: Write + Seek = BufWriter<File>> {
     path: PathBuf,
     mcap: mcap::Writer<W>,
@@ -197,7 +200,8 @@ impl Channels {
     }
 }
 
-/// Chunks are built in memory and written whole: a cut then never leaves a chunk whose length is not yet known.
+/// Chunks are built in memory and written whole: a cut then never leaves a chunk whose length is
+/// not yet known.
 pub(crate) fn options() -> WriteOptions {
     WriteOptions::new()
         .compression(Some(Compression::Lz4))

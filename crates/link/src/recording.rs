@@ -1,11 +1,11 @@
 //! Reads a session file back, whole or cut or damaged at any byte, bit for bit.
 //!
 //! # Practice
-//! The file is walked record by record from its start; the index at its end is not needed. A chunk counts when it is
-//! complete, its checksum holds and every message in it decodes; reading stops before the first that is not and
-//! [`Recording::damage`] says so. [`Recording::losses`] also tells ticks that are missing between those read.
-//! Everything is held in memory, about 250 B a tick: 15 MB a minute at 1 kHz.
-//! Memory stays in proportion to the file whatever the bytes claim.
+//! The file is walked record by record from its start; the index at its end is not needed. A chunk
+//! counts when it is complete, its checksum holds and every message in it decodes; reading stops
+//! before the first that is not and [`Recording::damage`] says so. [`Recording::losses`] also tells
+//! ticks that are missing between those read. Everything is held in memory, about 250 B a tick: 15
+//! MB a minute at 1 kHz. Memory stays in proportion to the file whatever the bytes claim.
 
 mod chunk;
 mod losses;
@@ -105,8 +105,8 @@ struct Reading {
 }
 
 impl Reading {
-    /// Reads records up to the regular end; `Err` when the bytes end or make no sense before it. Either says at which
-    /// byte of the file.
+    /// Reads records up to the regular end; `Err` when the bytes end or make no sense before it.
+    /// Either says at which byte of the file.
     fn walk(&mut self, body: &[u8]) -> Result<usize, usize> {
         use mcap::records::op;
         let mut rest = Cursor(body);

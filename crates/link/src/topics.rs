@@ -1,8 +1,9 @@
-//! Topics between processes on one machine: a teacher who watches a running simulator, and shows things back.
+//! Topics between processes on one machine: a teacher who watches a running simulator, and shows
+//! things back.
 //!
 //! # Theory
-//! Publish and subscribe through shared memory (iceoryx2): no daemon, no socket. A publisher never waits: a subscriber that
-//! is slow, stopped or dead loses old messages, and nobody else notices.
+//! Publish and subscribe through shared memory (iceoryx2): no daemon, no socket. A publisher never
+//! waits: a subscriber that is slow, stopped or dead loses old messages, and nobody else notices.
 //!
 //! ```text
 //!   simulator ──"tick", "event"──> watcher
@@ -10,16 +11,18 @@
 //! ```
 //!
 //! # Practice
-//! Messages are the protobuf bytes of the recordings, at most [`MAX_MESSAGE_BYTES`]; publishing one costs a few µs. Publish from the
-//! recorder's thread, not from a haptic tick. [`Subscriber::newest`] says nothing of age: a publisher that died looks like a quiet one,
-//! so watch the sequence numbers against the clock. What a killed process leaves behind is cleared when the next one
-//! joins. Signals stay the program's own.
+//! Messages are the protobuf bytes of the recordings, at most [`MAX_MESSAGE_BYTES`]; publishing one
+//! costs a few µs. Publish from the recorder's thread, not from a haptic tick.
+//! [`Subscriber::newest`] says nothing of age: a publisher that died looks like a quiet one, so
+//! watch the sequence numbers against the clock. What a killed process leaves behind is cleared
+//! when the next one joins. Signals stay the program's own.
 //!
 //! # Sources
 //! <https://iceoryx.io>.
 //!
 //! # When not to use it
-//! Inside a process: [`crate::cell`] and [`crate::queue`] are ten times faster. Between machines: use iceoryx2's tunnel.
+//! Inside a process: [`crate::cell`] and [`crate::queue`] are ten times faster. Between machines:
+//! use iceoryx2's tunnel.
 
 use crate::protobuf::{decode, encode};
 use crate::wire::{CollisionRecord, EventRecord, SolverRecord, TeacherRecord, TickRecord};

@@ -1,9 +1,10 @@
-//! The records that loops send to one another and to files: one tick, one collision step, one solver step, one event.
+//! The records that loops send to one another and to files: one tick, one collision step, one
+//! solver step, one event.
 //!
 //! # Practice
-//! Plain data in mm, ms, N; world space is the patient's RAS+ mm. Everything but [`EventRecord`] and [`SessionHeader`]
-//! is `Copy` and may be sent from a real-time loop. A record holds what a replay needs to make the same forces again,
-//! bit for bit, and nothing that names a patient.
+//! Plain data in mm, ms, N; world space is the patient's RAS+ mm. Everything but [`EventRecord`]
+//! and [`SessionHeader`] is `Copy` and may be sent from a real-time loop. A record holds what a
+//! replay needs to make the same forces again, bit for bit, and nothing that names a patient.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -26,7 +27,8 @@ pub struct TickRecord {
     pub proxy: Pose,
     /// What went to the hand after the guard.
     pub wrench: Wrench,
-    /// The tissue's part of that force, N; only with [`TickRecord::TISSUE`], read it by [`tissue_n`](Self::tissue_n).
+    /// The tissue's part of that force, N; only with [`TickRecord::TISSUE`], read it by
+    /// [`tissue_n`](Self::tissue_n).
     pub tissue_force: Vec3,
     /// Unit normal of the contact out of the obstacle; zero without contact.
     pub contact_normal: Vec3,
@@ -38,7 +40,8 @@ pub struct TickRecord {
     pub removed_mm3: f32,
     /// Speed of the drill's spindle, 1/min: 0 when it is off or has stalled.
     pub spindle_rpm: f32,
-    /// Distance from the tip to the brain's surface at rest, mm; negative inside. Of a craniotome, from its cutting part above the foot.
+    /// Distance from the tip to the brain's surface at rest, mm; negative inside. Of a craniotome,
+    /// from its cutting part above the foot.
     pub brain_distance_mm: f32,
     /// Sequence number of the surface patch that the tick used.
     pub patch_seq: u64,
@@ -77,7 +80,8 @@ impl TickRecord {
         self.flags & mask == mask
     }
 
-    /// Force of the tissue on the hand, N. In recordings of before it was kept it is the whole force where no bone was touched, else 0.
+    /// Force of the tissue on the hand, N. In recordings of before it was kept it is the whole
+    /// force where no bone was touched, else 0.
     pub fn tissue_n(&self) -> f32 {
         match (self.has(Self::TISSUE), self.tissue_depth_mm > 0.0 && self.depth_mm == 0.0) {
             (true, _) => self.tissue_force.length(),
@@ -86,7 +90,8 @@ impl TickRecord {
         }
     }
 
-    /// Unit normal out of the tissue; that of the contact where the tissue gives no force of its own.
+    /// Unit normal out of the tissue; that of the contact where the tissue gives no force of its
+    /// own.
     pub fn tissue_normal(&self) -> Vec3 {
         self.tissue_force.try_normalize().unwrap_or(self.contact_normal)
     }
@@ -208,13 +213,15 @@ pub struct EventRecord {
     pub tick: u64,
     /// Session time, ms.
     pub time_ms: f64,
-    /// What sort: `phase`, `warning`, `device`, `score`...; `warning` and `error` also set the level that viewers show.
+    /// What sort: `phase`, `warning`, `device`, `score`...; `warning` and `error` also set the
+    /// level that viewers show.
     pub kind: String,
     /// In words, for a reader.
     pub text: String,
 }
 
-/// What a teacher shows a trainee and asks of the simulator: a second tool, a marker on the anatomy, a pause, trouble.
+/// What a teacher shows a trainee and asks of the simulator: a second tool, a marker on the
+/// anatomy, a pause, trouble.
 #[derive(Clone, Copy, Debug)]
 pub struct TeacherRecord {
     /// Number of the record, from 1.

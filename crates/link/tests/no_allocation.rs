@@ -12,7 +12,8 @@ thread_local! {
 
 struct Counting;
 
-// SAFETY: passes everything on to the system's allocator; counting touches only a plain thread-local.
+// SAFETY: passes everything on to the system's allocator; counting touches only a plain
+// thread-local.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.with(|count| count.set(count.get() + 1));

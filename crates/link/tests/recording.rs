@@ -1,4 +1,5 @@
-//! A recording survives what happens to files: a whole read, a cut at any byte, damage, a full disk.
+//! A recording survives what happens to files: a whole read, a cut at any byte, damage, a full
+//! disk.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::io::{Cursor, Seek, SeekFrom, Write};

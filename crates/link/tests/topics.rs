@@ -1,4 +1,5 @@
-//! Topics between two real processes: what is published arrives, and a death on either side harms nobody.
+//! Topics between two real processes: what is published arrives, and a death on either side harms
+//! nobody.
 #![cfg(feature = "topics")]
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 

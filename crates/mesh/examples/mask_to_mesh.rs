@@ -1,6 +1,6 @@
-//! Fills a mask with tetrahedra and prints how good they are:
-//! `cargo run -p trepan-mesh --example mask_to_mesh [MASK.nii.gz [TETS [COARSENING [X,Y,Z,RADIUS,HALVINGS [OUT.vtk]]]]]`.
-//! Without a mask (or `-`) it takes a ball of 45 mm.
+//! Fills a mask with tetrahedra and prints how good they are: `cargo run -p trepan-mesh --example
+//! mask_to_mesh [MASK.nii.gz [TETS [COARSENING [X,Y,Z,RADIUS,HALVINGS
+//! [OUT.vtk]]]]]`. Without a mask (or `-`) it takes a ball of 45 mm.
 
 use std::path::Path;
 use std::time::Instant;

@@ -1,8 +1,10 @@
 //! What a sound tetrahedral mesh is, and the error that says what is wrong with another.
 //!
 //! # Theory
-//! Sound: every index names a node, every node is finite and belongs to a tetrahedron, every volume (b − a) × (c − a) · (d − a) / 6 is positive, and no face
-//! has more than two tetrahedra. The volume is taken in f64 from f32 corners, so its sign is right unless the element is flat to rounding.
+//! Sound: every index names a node, every node is finite and belongs to a tetrahedron, every volume
+//! (b − a) × (c − a) · (d − a) / 6 is positive, and no face has more than two tetrahedra. The
+//! volume is taken in f64 from f32 corners, so its sign is right unless the element is flat to
+//! rounding.
 
 use crate::{TetMesh, Topology};
 

@@ -1,9 +1,12 @@
-//! The surface at a density of a voxel volume as closed triangles: how a drilled skull leaves as STL.
+//! The surface at a density of a voxel volume as closed triangles: how a drilled skull leaves as
+//! STL.
 //!
 //! # Theory
-//! Each cell of eight voxel centres is cut into the six tetrahedra around its diagonal; the density, linear in each, crosses the isovalue
-//! in one triangle or two (Doi and Koide 1991). Neighbouring cells cut their common face alike, so that the triangles close
-//! without the ambiguous cases of marching cubes. Outside the grid there is nothing, so that bone cut by the grid's border is closed there too.
+//! Each cell of eight voxel centres is cut into the six tetrahedra around its diagonal; the
+//! density, linear in each, crosses the isovalue in one triangle or two (Doi and Koide 1991).
+//! Neighbouring cells cut their common face alike, so that the triangles close without the
+//! ambiguous cases of marching cubes. Outside the grid there is nothing, so that bone cut by the
+//! grid's border is closed there too.
 //!
 //! ```text
 //!   •───┄○      • at or over the isovalue
@@ -12,14 +15,16 @@
 //! ```
 //!
 //! # Practice
-//! World mm; vertices are shared, each on its edge of the grid, in the order of the cells: the same volume gives the same bytes. About a second for 50
-//! million voxels and 100 bytes a triangle.
+//! World mm; vertices are shared, each on its edge of the grid, in the order of the cells: the same
+//! volume gives the same bytes. About a second for 50 million voxels and 100 bytes a triangle.
 //!
 //! # Sources
-//! A. Doi, A. Koide, *An efficient method of triangulating equi-valued surfaces by using tetrahedral cells*, IEICE Trans. E74, 1991.
+//! A. Doi, A. Koide, *An efficient method of triangulating equi-valued surfaces by using
+//! tetrahedral cells*, IEICE Trans. E74, 1991.
 //!
 //! # When not to use it
-//! For printing without a look: slender triangles are left as they are. For finite elements: [`lattice`](crate::lattice) makes sound tetrahedra.
+//! For printing without a look: slender triangles are left as they are. For finite elements:
+//! [`lattice`](crate::lattice) makes sound tetrahedra.
 
 use crate::TriMesh;
 use glam::DVec3;
@@ -27,7 +32,8 @@ use std::collections::HashMap;
 use trepan_geometry::Vec3;
 use trepan_volume::VoxelVolume;
 
-/// The six ways from corner 0 to corner 7 along axes, each a tetrahedron, and whether it is a right-handed one.
+/// The six ways from corner 0 to corner 7 along axes, each a tetrahedron, and whether it is a
+/// right-handed one.
 const WAYS: [([usize; 3], bool); 6] = [
     ([0, 1, 2], true),
     ([1, 2, 0], true),
@@ -37,7 +43,8 @@ const WAYS: [([usize; 3], bool); 6] = [
     ([1, 0, 2], false),
 ];
 
-/// The closed surface of what is at or over `isovalue`; triangles are counter-clockwise as seen from outside.
+/// The closed surface of what is at or over `isovalue`; triangles are counter-clockwise as seen
+/// from outside.
 pub fn isosurface(volume: &VoxelVolume<i16>, isovalue: i16) -> TriMesh {
     let mut surface = Surface { volume, isovalue, points: HashMap::new(), mesh: TriMesh::default() };
     let [nx, ny, nz] = volume.dims.map(|n| n as i64);

@@ -1,12 +1,16 @@
-//! Tetrahedral and triangle meshes: what is a sound one, how its parts hang together, how good it is, and how to get one from a mask or a file.
+//! Tetrahedral and triangle meshes: what is a sound one, how its parts hang together, how good it
+//! is, and how to get one from a mask or a file.
 //!
 //! # Theory
-//! A [`TetMesh`] is two arrays: vertices and corner indices. Everything else is derived when needed: [`Topology`] (face neighbours, tetrahedra of
-//! a node), [`Surface`] (border triangles seen from outside), [`Quality`] (angles, volumes, edges). [`lattice`] fills a binary
-//! mask or a label volume with tetrahedra by isosurface stuffing (Labelle and Shewchuk 2007), whose angles are bounded where cubes are of one size.
+//! A [`TetMesh`] is two arrays: vertices and corner indices. Everything else is derived when
+//! needed: [`Topology`] (face neighbours, tetrahedra of a node), [`Surface`] (border triangles seen
+//! from outside), [`Quality`] (angles, volumes, edges). [`lattice`] fills a binary mask or a label
+//! volume with tetrahedra by isosurface stuffing (Labelle and Shewchuk 2007), whose angles are
+//! bounded where cubes are of one size.
 //!
 //! # Practice
-//! World mm, patient RAS+. Everything here runs when a case is loaded, never inside a tick. The same input gives the same bytes on any machine.
+//! World mm, patient RAS+. Everything here runs when a case is loaded, never inside a tick. The
+//! same input gives the same bytes on any machine.
 //!
 //! ```
 //! use trepan_geometry::Vec3;

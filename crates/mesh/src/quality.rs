@@ -1,9 +1,11 @@
 //! How good the elements of a mesh are: angles, radius ratios, volumes, edges, heights.
 //!
 //! # Theory
-//! The dihedral angle at edge e between the other corners k and l is atan2(|u × v|, u · v) with u = e × (k − i), v = e × (l − i). Angles near 0° or 180° spoil the
-//! conditioning of the stiffness matrix and the accuracy of gradients (Shewchuk 2002); the smallest height bounds the explicit time step from above.
-//! The radius ratio 3 r_in / r_circum is 1 for the regular tetrahedron and 0 for a flat one.
+//! The dihedral angle at edge e between the other corners k and l is atan2(|u × v|, u · v) with u =
+//! e × (k − i), v = e × (l − i). Angles near 0° or 180° spoil the conditioning of the stiffness
+//! matrix and the accuracy of gradients (Shewchuk 2002); the smallest height bounds the explicit
+//! time step from above. The radius ratio 3 r_in / r_circum is 1 for the regular tetrahedron and 0
+//! for a flat one.
 //!
 //! # Practice
 //! f64 over f32 corners; linear in the size of the mesh.
@@ -45,7 +47,8 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// The quality of a mesh whose indices are in range; for an empty mesh the minima are +∞, the maxima −∞ and the means NaN.
+    /// The quality of a mesh whose indices are in range; for an empty mesh the minima are +∞, the
+    /// maxima −∞ and the means NaN.
     pub fn of(mesh: &TetMesh) -> Self {
         let mut all = Self::NOTHING;
         for tet in 0..mesh.tets.len() {
@@ -118,7 +121,8 @@ fn min_height(corners: [DVec3; 4]) -> f64 {
     3.0 * volume(corners).abs() / areas(corners).into_iter().fold(0.0, f64::max)
 }
 
-/// 3 r_in / r_circum, with r_in = 3 V / ΣA and 24 V r_circum = √(product of Heron's form over the products of opposite edges).
+/// 3 r_in / r_circum, with r_in = 3 V / ΣA and 24 V r_circum = √(product of Heron's form over the
+/// products of opposite edges).
 pub fn radius_ratio(corners: [DVec3; 4]) -> f64 {
     let v = volume(corners).abs();
     let length = |i: usize, j: usize| corners[i].distance(corners[j]);

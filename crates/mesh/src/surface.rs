@@ -1,8 +1,9 @@
 //! The border of a tetrahedral mesh as triangles over the same nodes.
 //!
 //! # Theory
-//! A face with one tetrahedron is on the border. Seen from outside its corners run counterclockwise. The border is a closed surface
-//! without seams when every edge belongs to exactly two triangles that run through it in opposite directions.
+//! A face with one tetrahedron is on the border. Seen from outside its corners run
+//! counterclockwise. The border is a closed surface without seams when every edge belongs to
+//! exactly two triangles that run through it in opposite directions.
 
 use crate::{FACES, NONE, TetMesh, Topology, TriMesh};
 use trepan_geometry::Vec3;
@@ -34,7 +35,8 @@ impl Surface {
         surface
     }
 
-    /// Whether every edge has exactly two triangles, in opposite directions; not so for an empty surface.
+    /// Whether every edge has exactly two triangles, in opposite directions; not so for an empty
+    /// surface.
     pub fn is_closed(&self) -> bool {
         crate::triangles::is_closed(&self.triangles)
     }
@@ -56,7 +58,8 @@ impl Surface {
         self.triangles.iter().map(area).sum()
     }
 
-    /// Unit outward normal of every node of the mesh at the given positions: its triangles' normals weighted by area; zero off the surface.
+    /// Unit outward normal of every node of the mesh at the given positions: its triangles' normals
+    /// weighted by area; zero off the surface.
     pub fn node_normals(&self, positions: &[Vec3]) -> Vec<Vec3> {
         let mut normals = vec![Vec3::ZERO; positions.len()];
         for triangle in &self.triangles {

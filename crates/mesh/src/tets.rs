@@ -2,10 +2,11 @@
 
 use trepan_geometry::{Aabb, Vec3};
 
-/// Vertices and 4-node tetrahedra. Invariant after a check: indices in range, positive volumes, no orphan node.
+/// Vertices and 4-node tetrahedra. Invariant after a check: indices in range, positive volumes, no
+/// orphan node.
 ///
-/// A tetrahedron `[a, b, c, d]` has positive volume when `(b - a) × (c - a) · (d - a) > 0`; its faces, seen from outside counterclockwise,
-/// are `(a,c,b) (a,b,d) (b,c,d) (a,d,c)`.
+/// A tetrahedron `[a, b, c, d]` has positive volume when `(b - a) × (c - a) · (d - a) > 0`; its
+/// faces, seen from outside counterclockwise, are `(a,c,b) (a,b,d) (b,c,d) (a,d,c)`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TetMesh {
     /// Vertices, world mm.
@@ -14,7 +15,8 @@ pub struct TetMesh {
     pub tets: Vec<[u32; 4]>,
 }
 
-/// The faces of a tetrahedron as corner numbers, counterclockwise from outside; face f lies opposite corner `OPPOSITE[f]`.
+/// The faces of a tetrahedron as corner numbers, counterclockwise from outside; face f lies
+/// opposite corner `OPPOSITE[f]`.
 pub const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 /// The corner that each of [`FACES`] leaves out.
 pub const OPPOSITE: [usize; 4] = [3, 2, 0, 1];

@@ -1,12 +1,13 @@
 //! Which tetrahedra touch which: across faces, and around nodes.
 //!
 //! # Theory
-//! A face is the set of its three nodes. Faces with the same smallest node are put in one bucket and sorted there; equal ones are neighbours. No hash map, so the
-//! result depends on the mesh alone.
+//! A face is the set of its three nodes. Faces with the same smallest node are put in one bucket
+//! and sorted there; equal ones are neighbours. No hash map, so the result depends on the mesh
+//! alone.
 //!
 //! # Practice
-//! 16 bytes a tetrahedron for neighbours, as many for the tetrahedra of nodes. Built once for a mesh; deformation leaves it valid. Indices must
-//! be in range ([`TetMesh::check_indices`]).
+//! 16 bytes a tetrahedron for neighbours, as many for the tetrahedra of nodes. Built once for a
+//! mesh; deformation leaves it valid. Indices must be in range ([`TetMesh::check_indices`]).
 
 use crate::{FACES, TetMesh};
 
@@ -76,7 +77,8 @@ impl Topology {
         Self { neighbours, tets_of_node, crowded_face }
     }
 
-    /// The number of the face-connected part that each tetrahedron belongs to, and how many parts there are; part 0 holds tetrahedron 0.
+    /// The number of the face-connected part that each tetrahedron belongs to, and how many parts
+    /// there are; part 0 holds tetrahedron 0.
     pub fn components(&self) -> (Vec<u32>, usize) {
         let mut part = vec![NONE; self.neighbours.len()];
         let mut parts = 0;
@@ -100,7 +102,8 @@ impl Topology {
         (part, parts as usize)
     }
 
-    /// The tetrahedra at most `rings` faces away from `tet`, itself first, then ring by ring, each ring ascending.
+    /// The tetrahedra at most `rings` faces away from `tet`, itself first, then ring by ring, each
+    /// ring ascending.
     pub fn rings(&self, tet: u32, rings: usize) -> Vec<u32> {
         let mut found = vec![tet];
         let mut ring_start = 0;

@@ -17,7 +17,8 @@ impl TriMesh {
         self.triangles[triangle].map(|n| self.positions[n as usize])
     }
 
-    /// The volume that a closed mesh encloses, mm³ (divergence theorem: Σ a · (b × c) / 6); negative when it is inside out.
+    /// The volume that a closed mesh encloses, mm³ (divergence theorem: Σ a · (b × c) / 6);
+    /// negative when it is inside out.
     pub fn volume_mm3(&self) -> f64 {
         let origin = self.positions.first().map_or(glam::DVec3::ZERO, |p| p.as_dvec3());
         let six = |t: usize| {
@@ -27,7 +28,8 @@ impl TriMesh {
         (0..self.triangles.len()).map(six).sum::<f64>() / 6.0
     }
 
-    /// Whether every edge has exactly two triangles, in opposite directions; not so for an empty mesh.
+    /// Whether every edge has exactly two triangles, in opposite directions; not so for an empty
+    /// mesh.
     pub fn is_closed(&self) -> bool {
         is_closed(&self.triangles)
     }
@@ -37,7 +39,8 @@ impl TriMesh {
         Aabb::of_points(&self.positions)
     }
 
-    /// Vertices at exactly the same place become one; triangles that this makes degenerate go. For formats without shared vertices (STL).
+    /// Vertices at exactly the same place become one; triangles that this makes degenerate go. For
+    /// formats without shared vertices (STL).
     pub fn welded(&self) -> Self {
         let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
         let mut order: Vec<u32> = (0..self.positions.len() as u32).collect();

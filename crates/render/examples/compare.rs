@@ -1,4 +1,5 @@
-//! Who draws faster, the device or the processor, and how far are their pictures apart? `compare [CT [WIDTH HEIGHT]]`.
+//! Who draws faster, the device or the processor, and how far are their pictures apart?
+//! `compare [CT [WIDTH HEIGHT]]`.
 
 use glam::Vec3;
 use std::path::Path;

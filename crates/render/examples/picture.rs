@@ -1,4 +1,5 @@
-//! Draws a skull with a hole in it to a PNG: `picture OUT.png [CT [BRAIN_MASK [MRI]]]`, NIfTI files; without a CT, a made-up one.
+//! Draws a skull with a hole in it to a PNG: `picture OUT.png [CT [BRAIN_MASK [MRI]]]`, NIfTI
+//! files; without a CT, a made-up one.
 
 use glam::{DAffine3, Vec3};
 use std::path::Path;

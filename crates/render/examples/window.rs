@@ -1,4 +1,5 @@
-//! A ball of bone to drill with the mouse in a window: `window [SECONDS [processor]]`; without a display it says so.
+//! A ball of bone to drill with the mouse in a window: `window [SECONDS [processor]]`; without a
+//! display it says so.
 
 use glam::{DVec3, IVec3, Vec3};
 use std::sync::Arc;

@@ -1,7 +1,9 @@
-//! The brain's pass: the border of the tetrahedra where the physics has put it, with smooth normals.
+//! The brain's pass: the border of the tetrahedra where the physics has put it, with smooth
+//! normals.
 //!
 //! # Practice
-//! Only border nodes travel to the device, 32 bytes each a frame. Normals are the area-weighted mean of a node's triangles, made on the processor.
+//! Only border nodes travel to the device, 32 bytes each a frame. Normals are the area-weighted
+//! mean of a node's triangles, made on the processor.
 
 use crate::RenderError;
 use crate::scene::Scene;

@@ -1,13 +1,16 @@
 //! Where bone may be: the padded grid, its bricks, and how far a ray may leap.
 //!
 //! # Theory
-//! The grid is padded by one voxel of air, so that bone at the border has a surface too. Cell (i, j, k) lies between the centres of padded voxels
-//! (i, j, k) and (i+1, j+1, k+1). A brick is 4³ cells. Where no corner of a brick's cells reaches the isovalue, no ray can
-//! enter bone. Free bricks hold, for each octant of directions, the distance to the nearest other one that lies that way, in bricks, the largest of the three axes
-//! counting (Cohen and Sheffer 1994): one behind a ray holds it up no more. Where bone may be, each cell has a bit of its own.
+//! The grid is padded by one voxel of air, so that bone at the border has a surface too. Cell (i,
+//! j, k) lies between the centres of padded voxels (i, j, k) and (i+1, j+1, k+1). A brick is 4³
+//! cells. Where no corner of a brick's cells reaches the isovalue, no ray can enter bone. Free
+//! bricks hold, for each octant of directions, the distance to the nearest other one that lies that
+//! way, in bricks, the largest of the three axes counting (Cohen and Sheffer 1994): one behind a
+//! ray holds it up no more. Where bone may be, each cell has a bit of its own.
 //!
 //! # Practice
-//! 17 bytes a brick of 64 cells. Drilling only makes bricks free; bricks that get bone back (an undo) make the distances anew, which costs about 0.1 µs a brick.
+//! 17 bytes a brick of 64 cells. Drilling only makes bricks free; bricks that get bone back (an
+//! undo) make the distances anew, which costs about 0.1 µs a brick.
 
 use glam::{IVec3, Vec3};
 use trepan_geometry::Aabb;
@@ -37,7 +40,8 @@ pub(crate) struct Grid {
 pub(crate) struct Leaps {
     /// Bricks of cells along x, y, z.
     pub bricks: [usize; 3],
-    /// By octant (bit n is set where the ray goes up along axis n): 0 where bone may be, else the distance to the nearest such brick that way, at most 255.
+    /// By octant (bit n is set where the ray goes up along axis n): 0 where bone may be, else the
+    /// distance to the nearest such brick that way, at most 255.
     pub octants: Vec<[u8; 8]>,
     /// The cells with a corner in bone, x fastest.
     pub cells: Vec<u64>,
@@ -134,12 +138,14 @@ impl Leaps {
         x + self.bricks[0] * (y + self.bricks[1] * z)
     }
 
-    /// The distance to the nearest brick that may hold bone, whichever way it lies; 0 where bone may be.
+    /// The distance to the nearest brick that may hold bone, whichever way it lies; 0 where bone
+    /// may be.
     pub fn free(&self, at: usize) -> u8 {
         self.octants[at].into_iter().fold(u8::MAX, u8::min)
     }
 
-    /// Looks again at the bricks of cells that touch a brick of voxels, and returns them. Rays wait for [`settle`](Self::settle).
+    /// Looks again at the bricks of cells that touch a brick of voxels, and returns them. Rays wait
+    /// for [`settle`](Self::settle).
     pub fn follow(&mut self, bone: &BoneVolume, brick: [usize; 3]) -> Vec<[usize; 3]> {
         let low = brick.map(|b| b * (BRICK / LEAP));
         let touched = boxed(low, low.map(|v| v + BRICK / LEAP), self.bricks);
@@ -165,7 +171,8 @@ impl Leaps {
         false
     }
 
-    /// The distances of an octant, from its far corner back: one more than the least of the seven neighbours that lie that way; exact for this measure.
+    /// The distances of an octant, from its far corner back: one more than the least of the seven
+    /// neighbours that lie that way; exact for this measure.
     fn spread(&mut self, octant: usize) {
         let [nx, ny, nz] = self.bricks;
         let strides = [1, nx, nx * ny];

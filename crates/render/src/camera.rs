@@ -1,8 +1,9 @@
 //! A camera that circles a target.
 //!
 //! # Practice
-//! World mm, z up. Elevation stops just short of the poles, so up is always defined. `viewed_from` puts the eye along a direction: seen from in front, the
-//! patient's right is on the left of the picture.
+//! World mm, z up. Elevation stops just short of the poles, so up is always defined. `viewed_from`
+//! puts the eye along a direction: seen from in front, the patient's right is on the left of the
+//! picture.
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
@@ -34,14 +35,16 @@ pub struct View {
     pub forward: Vec3,
     /// Half the picture's width and height at distance 1.
     pub half: Vec2,
-    /// How far the picture's middle lies to the left of straight ahead at distance 1: 0 but for one eye of two.
+    /// How far the picture's middle lies to the left of straight ahead at distance 1: 0 but for one
+    /// eye of two.
     pub shear: f32,
 }
 
 const STEEPEST_RAD: f32 = 1.55;
 
 impl Camera {
-    /// An eye at `distance_mm` from `target` in the direction `towards_eye` (any length; zero means from in front).
+    /// An eye at `distance_mm` from `target` in the direction `towards_eye` (any length; zero means
+    /// from in front).
     pub fn viewed_from(target: Vec3, towards_eye: Vec3, distance_mm: f32) -> Self {
         let d = towards_eye.try_normalize().unwrap_or(Vec3::Y);
         let azimuth_rad = if d.x.hypot(d.y) < 1e-4 { core::f32::consts::FRAC_PI_2 } else { d.y.atan2(d.x) };
@@ -84,8 +87,8 @@ impl View {
     /// Farthest distance that triangles are drawn at, mm.
     pub const FAR_MM: f32 = 6000.0;
 
-    /// The same picture from an eye `offset_mm` to the right: what is `distance_mm` away stays where it is (an off-axis frustum, without the
-    /// keystones of turned eyes).
+    /// The same picture from an eye `offset_mm` to the right: what is `distance_mm` away stays
+    /// where it is (an off-axis frustum, without the keystones of turned eyes).
     pub fn from_aside(&self, offset_mm: f32, distance_mm: f32) -> Self {
         Self { eye: self.eye + offset_mm * self.right, shear: offset_mm / distance_mm.max(Self::NEAR_MM), ..*self }
     }
@@ -95,7 +98,8 @@ impl View {
         self.forward - self.shear * self.right
     }
 
-    /// Unit direction of the ray through a point of the picture, each coordinate from -1 (left, bottom) to 1 (right, top).
+    /// Unit direction of the ray through a point of the picture, each coordinate from -1 (left,
+    /// bottom) to 1 (right, top).
     pub fn ray(&self, at: Vec2) -> Vec3 {
         (self.middle() + at.x * self.half.x * self.right + at.y * self.half.y * self.up).normalize()
     }

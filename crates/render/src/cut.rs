@@ -1,11 +1,13 @@
 //! A plane that cuts the brain open and shows the MRI inside, as it has moved.
 //!
 //! # Theory
-//! The plane meets the deformed tetrahedra in triangles and quadrilaterals whose corners know their place at rest, and with it the MRI: within a
-//! tetrahedron the deformation is linear, so what lies between the corners is exact (Tejada and Ertl 2005 do the same along rays).
+//! The plane meets the deformed tetrahedra in triangles and quadrilaterals whose corners know their
+//! place at rest, and with it the MRI: within a tetrahedron the deformation is linear, so what lies
+//! between the corners is exact (Tejada and Ertl 2005 do the same along rays).
 //!
 //! # Practice
-//! World mm. All tetrahedra are looked at once a picture; what finds no room is counted in the picture's report.
+//! World mm. All tetrahedra are looked at once a picture; what finds no room is counted in the
+//! picture's report.
 
 use crate::RenderError;
 use crate::brain::Border;
@@ -26,7 +28,8 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// Unit normal n and offset w of the plane n·x = w, in the form in which shaders read it; zeroes cut nothing.
+    /// Unit normal n and offset w of the plane n·x = w, in the form in which shaders read it;
+    /// zeroes cut nothing.
     pub(crate) fn plane(cut: Option<&Self>) -> Vec4 {
         let sound = cut.filter(|c| c.point.is_finite()).and_then(|c| Some((c.point, c.normal.try_normalize()?)));
         sound.map_or(Vec4::ZERO, |(point, normal)| normal.extend(normal.dot(point)))

@@ -1,4 +1,5 @@
-//! Brings a 3-D view that was drawn apart into the picture: with fewer pixels, or for one of two eyes.
+//! Brings a 3-D view that was drawn apart into the picture: with fewer pixels, or for one of two
+//! eyes.
 
 use crate::RenderError;
 use crate::scene::Scene;

@@ -20,7 +20,8 @@ pub struct SceneData<'a> {
     pub tint: Option<&'a [[u8; 3]]>,
 }
 
-/// What the slices show, world mm: the box of voxel centres of the CT, else that of the MRI, else the brain.
+/// What the slices show, world mm: the box of voxel centres of the CT, else that of the MRI, else
+/// the brain.
 pub(crate) fn bounds(data: &SceneData) -> Aabb {
     let by_bone = data.bone.as_ref().map(|bone| {
         let last = IVec3::from(bone.dims().map(|n| n as i32 - 1));
@@ -45,7 +46,8 @@ pub struct Frame<'a> {
     pub camera: Camera,
     /// The tool, if one is shown.
     pub tool: Option<Tool>,
-    /// Where the tool is; slices pass through its tip, or through the camera's target while the tip is outside the scanned box.
+    /// Where the tool is; slices pass through its tip, or through the camera's target while the tip
+    /// is outside the scanned box.
     pub world_from_tool: Pose,
     /// The tool in the other hand, and where it is.
     pub second: Option<(Tool, Pose)>,
@@ -61,7 +63,8 @@ pub struct Frame<'a> {
     pub show_brain: bool,
     /// Colours laid over the bone, at the place that is seen.
     pub bone_paint: Option<&'a Paint>,
-    /// Colours laid over the brain, at the place at rest of what is seen: they move with the tissue.
+    /// Colours laid over the brain, at the place at rest of what is seen: they move with the
+    /// tissue.
     pub brain_paint: Option<&'a Paint>,
     /// What is drawn over the scene.
     pub overlay: Overlay<'a>,
@@ -103,7 +106,8 @@ impl SliceLook {
 }
 
 impl Frame<'_> {
-    /// Where the slices cross: at the tool's tip, or at what the camera looks at while the tip is outside the box of the volumes.
+    /// Where the slices cross: at the tool's tip, or at what the camera looks at while the tip is
+    /// outside the box of the volumes.
     pub(crate) fn focus(&self, bounds: Aabb) -> Vec3 {
         let tip = self.world_from_tool.translation;
         if bounds.contains(tip) { tip } else { self.camera.target.clamp(bounds.min, bounds.max) }

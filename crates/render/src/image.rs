@@ -21,7 +21,8 @@ impl Image {
         if inside { [0, 1, 2, 3].map(|c| self.rgba[at + c]) } else { [0; 4] }
     }
 
-    /// The same picture with more pixels, bilinear between the centres of these; itself where it has the size.
+    /// The same picture with more pixels, bilinear between the centres of these; itself where it
+    /// has the size.
     pub fn enlarged(&self, [width, height]: [u32; 2]) -> Self {
         if (self.width, self.height) == (width, height) {
             return self.clone();
@@ -44,7 +45,8 @@ impl Image {
         Self { width, height, rgba }
     }
 
-    /// How far it is from another one of its size: root mean square difference of all colours, percent of white.
+    /// How far it is from another one of its size: root mean square difference of all colours,
+    /// percent of white.
     pub fn error_percent(&self, other: &Self) -> f64 {
         let squares = self.rgba.iter().zip(&other.rgba).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2));
         // The fourth byte never differs.
@@ -70,7 +72,8 @@ impl Image {
     }
 }
 
-/// For each of `to` pixels in a row the pixel of `from` at or before its centre, and how far it lies towards the next.
+/// For each of `to` pixels in a row the pixel of `from` at or before its centre, and how far it
+/// lies towards the next.
 fn between(from: u32, to: u32) -> Vec<(u32, f32)> {
     let share = from as f32 / to.max(1) as f32;
     let at = |n: u32| ((n as f32 + 0.5) * share - 0.5).clamp(0.0, from.saturating_sub(1) as f32);

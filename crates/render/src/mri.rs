@@ -58,7 +58,8 @@ impl Signals {
     }
 }
 
-/// The signal that is shown white: the 99.5th percentile of what is over zero, from a sample of at most 100,000 voxels.
+/// The signal that is shown white: the 99.5th percentile of what is over zero, from a sample of at
+/// most 100,000 voxels.
 fn white(data: &[f32]) -> f32 {
     let step = (data.len() / 100_000).max(1);
     let mut signal: Vec<f32> = data.iter().step_by(step).copied().filter(|v| v.is_finite() && *v > 0.0).collect();

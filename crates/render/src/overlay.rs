@@ -1,10 +1,12 @@
 //! What is drawn over the scene: the force as an arrow, a teacher's tool, markers.
 //!
 //! # Theory
-//! Closed forms in boxes: each item is a rectangle of pixels around its box, in which rays meet ball, cylinder or cone exactly. Far items first, mixed by alpha.
+//! Closed forms in boxes: each item is a rectangle of pixels around its box, in which rays meet
+//! ball, cylinder or cone exactly. Far items first, mixed by alpha.
 //!
 //! # Practice
-//! World mm. Parts behind bone, brain or tool show faintly, so that an arrow in a hole is not lost. Without items there is no pass.
+//! World mm. Parts behind bone, brain or tool show faintly, so that an arrow in a hole is not lost.
+//! Without items there is no pass.
 
 use crate::RenderError;
 use crate::scene::{Scene, ends};
@@ -42,7 +44,8 @@ const MARKER: Vec4 = Vec4::new(0.80, 0.20, 0.50, 1.0);
 pub(crate) struct Item {
     /// A tool's ball, or an arrow's begin; w: the radius there.
     pub tip: Vec4,
-    /// The far end of a tool's shaft, or an arrow's point; w: the radius of the shaft, or of the arrow's head.
+    /// The far end of a tool's shaft, or an arrow's point; w: the radius of the shaft, or of the
+    /// arrow's head.
     pub tail: Vec4,
     /// Red, green, blue, alpha.
     pub colour: Vec4,

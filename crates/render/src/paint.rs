@@ -1,15 +1,18 @@
-//! Colours laid over bone or brain: a plan, distances to the dura, a map of forces, forbidden structures.
+//! Colours laid over bone or brain: a plan, distances to the dura, a map of forces, forbidden
+//! structures.
 //!
 //! # Theory
-//! A coarse box of colours, sampled trilinearly with the alpha multiplied in first, so that clear texels lend no colour to their neighbours. Alpha mixes over the surface's own
-//! colour before light falls on it.
+//! A coarse box of colours, sampled trilinearly with the alpha multiplied in first, so that clear
+//! texels lend no colour to their neighbours. Alpha mixes over the surface's own colour before
+//! light falls on it.
 //!
 //! # Practice
-//! World mm. The box reaches half a spacing beyond the outer texels and is clear outside. 4 bytes of device memory a texel; uploaded when the version
-//! or the dimensions change.
+//! World mm. The box reaches half a spacing beyond the outer texels and is clear outside. 4 bytes
+//! of device memory a texel; uploaded when the version or the dimensions change.
 //!
 //! # When not to use it
-//! For what changes at every voxel in every picture: that is the bone itself, whose changes are followed brick by brick.
+//! For what changes at every voxel in every picture: that is the bone itself, whose changes are
+//! followed brick by brick.
 
 use crate::RenderError;
 use crate::processor::trilinear;
@@ -42,7 +45,8 @@ impl Paint {
         Err(RenderError::Paint { dims: self.dims, spacing_mm: self.spacing_mm, given: self.rgba.len() })
     }
 
-    /// Lower corner of the box (w: 1) and one over its size, in the form in which shaders read it; zeroes for none.
+    /// Lower corner of the box (w: 1) and one over its size, in the form in which shaders read it;
+    /// zeroes for none.
     pub(crate) fn placed(paint: Option<&Self>) -> [Vec4; 2] {
         paint.map_or([Vec4::ZERO; 2], |p| {
             let size = p.spacing_mm * Vec3::from(p.dims.map(|n| n as f32));
@@ -80,7 +84,8 @@ impl Coat {
         Ok(Self { label, texture: texture(gpu, label, [1; 3])?, version: None })
     }
 
-    /// Takes a paint over if it has changed. Whether the texture is another one, so that it has to be bound anew.
+    /// Takes a paint over if it has changed. Whether the texture is another one, so that it has to
+    /// be bound anew.
     pub fn follow(&mut self, gpu: &Gpu, paint: Option<&Paint>) -> Result<bool, RenderError> {
         let Some(paint) = paint else { return Ok(false) };
         paint.check()?;

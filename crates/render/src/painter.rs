@@ -1,11 +1,13 @@
-//! A picture on every machine: by the graphics device as long as there is one, else by the processor.
+//! A picture on every machine: by the graphics device as long as there is one, else by the
+//! processor.
 //!
 //! # Practice
-//! One call gives a finished picture. When no device opens, or the device is lost on the way, the processor goes on with the same scene and the reason is
-//! kept for the user to read.
+//! One call gives a finished picture. When no device opens, or the device is lost on the way, the
+//! processor goes on with the same scene and the reason is kept for the user to read.
 //!
 //! # When not to use it
-//! Where the device's texture is to be shown without a copy and a lost device is an error: use [`Renderer`].
+//! Where the device's texture is to be shown without a copy and a lost device is an error: use
+//! [`Renderer`].
 
 use crate::brain::Border;
 use crate::frame::{Frame, SceneData, bounds};
@@ -71,7 +73,8 @@ impl Kept {
 }
 
 impl Painter {
-    /// Loads a scene for pictures of `size` pixels onto the best device, or onto the processor where none opens.
+    /// Loads a scene for pictures of `size` pixels onto the best device, or onto the processor
+    /// where none opens.
     pub fn open(prefer: Prefer, data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
         Self::on(Gpu::open(prefer), data, size)
     }
@@ -100,8 +103,9 @@ impl Painter {
         Ok(Self { by: By::Processor(Box::new(processor)), kept, notice: None, quality: Quality::full(size) })
     }
 
-    /// Draws only a share of the pixels along an edge, from 0.05 to 1, and enlarges them to the size that was asked for; `sparse`: the processor casts every second ray where bone
-    /// is smooth. For pictures as they were opened; an area that changes is [`fit`](Self::fit).
+    /// Draws only a share of the pixels along an edge, from 0.05 to 1, and enlarges them to the
+    /// size that was asked for; `sparse`: the processor casts every second ray where bone is
+    /// smooth. For pictures as they were opened; an area that changes is [`fit`](Self::fit).
     pub fn set_quality(&mut self, sparse: bool, detail: f32) -> Result<(), RenderError> {
         let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
         self.quality = Quality { sparse, detail, ..self.quality };
@@ -141,8 +145,9 @@ impl Painter {
         }
     }
 
-    /// Makes the pictures fit an area of `size` pixels, coarser where `detail`, a share of the pixels along an edge, is under 1: a device draws the 3-D
-    /// view with fewer pixels; the processor casts every second ray where bone is smooth, and under 1/2 draws smaller pictures.
+    /// Makes the pictures fit an area of `size` pixels, coarser where `detail`, a share of the
+    /// pixels along an edge, is under 1: a device draws the 3-D view with fewer pixels; the
+    /// processor casts every second ray where bone is smooth, and under 1/2 draws smaller pictures.
     pub fn fit(&mut self, size: [u32; 2], detail: f32) -> Result<(), RenderError> {
         match &mut self.by {
             By::Device(renderer) => renderer.set_detail(detail).and_then(|()| renderer.resize(size)),

@@ -1,4 +1,5 @@
-//! Which rays have to be cast again: all after a move of the camera, else only those that may see a change.
+//! Which rays have to be cast again: all after a move of the camera, else only those that may see a
+//! change.
 
 use crate::camera::View;
 use glam::{Vec2, Vec3, Vec4};
@@ -32,8 +33,9 @@ impl Recast {
         self.changed = Aabb { min: self.changed.min.min(changed.min), max: self.changed.max.max(changed.max) };
     }
 
-    /// The rectangle `[x, y, width, height]` of pixels to cast for this view of bone under this plane, if any. Once the drilling rests everything is cast once more, since
-    /// shadows and ambient light reach farther than the changed bricks.
+    /// The rectangle `[x, y, width, height]` of pixels to cast for this view of bone under this
+    /// plane, if any. Once the drilling rests everything is cast once more, since shadows and
+    /// ambient light reach farther than the changed bricks.
     pub fn part(&mut self, view: &View, bone_cut: Vec4, [width, height]: [u32; 2]) -> Option<[u32; 4]> {
         let whole = [0, 0, width, height];
         let resting = self.cast_for == Some((*view, bone_cut));

@@ -57,7 +57,8 @@ pub struct DrawReport {
     pub bricks_left: u32,
     /// Pixels whose rays through the bone were cast again.
     pub pixels_cast: u32,
-    /// Lines of the brain's outline, triangles of its cuts and shapes of the overlay that found no room.
+    /// Lines of the brain's outline, triangles of its cuts and shapes of the overlay that found no
+    /// room.
     pub lines_left: u32,
 }
 
@@ -130,7 +131,8 @@ impl Renderer {
         Ok(self.passes.overlay.follow(&self.gpu, &frame.overlay, self.view(frame).eye))
     }
 
-    /// The bone, the brain, the tools and what lies over them, as each eye sees them. Returns the pixels cast.
+    /// The bone, the brain, the tools and what lies over them, as each eye sees them. Returns the
+    /// pixels cast.
     fn draw_views(&mut self, recorder: &mut Recorder, frame: &Frame) -> u32 {
         let Canvas { eyes, picture, anaglyph, layout, .. } = &mut self.canvas;
         let (passes, mri_from_world) = (&self.passes, self.passes.mri.texture_from_world);
@@ -178,13 +180,15 @@ impl Renderer {
         self.divide(Division { size, ..self.canvas.division })
     }
 
-    /// Draws only a share of the 3-D view's pixels along an edge and enlarges them: 1 is all, 0.5 a quarter of them. Slices stay fine.
+    /// Draws only a share of the 3-D view's pixels along an edge and enlarges them: 1 is all, 0.5 a
+    /// quarter of them. Slices stay fine.
     pub fn set_detail(&mut self, share: f32) -> Result<(), RenderError> {
         let detail = if share.is_finite() { share.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
         self.divide(Division { detail, ..self.canvas.division })
     }
 
-    /// Lets rays leap over bricks without bone (the default), or has them walk every cell, to measure what leaping is worth.
+    /// Lets rays leap over bricks without bone (the default), or has them walk every cell, to
+    /// measure what leaping is worth.
     pub fn set_leaping(&mut self, leaping: bool) {
         self.passes.skull.set_leaping(&self.gpu, leaping);
         self.canvas.eyes.iter_mut().for_each(|eye| eye.recast.forget());
@@ -217,7 +221,8 @@ impl Renderer {
         self.canvas.layout
     }
 
-    /// The camera of a frame as vectors, for the 3-D view of this picture; with two eyes, from between them.
+    /// The camera of a frame as vectors, for the 3-D view of this picture; with two eyes, from
+    /// between them.
     pub fn view(&self, frame: &Frame) -> View {
         let [_, _, width, height] = self.canvas.eyes[0].area;
         frame.camera.view(width as f32 / height as f32)
@@ -234,14 +239,16 @@ impl Renderer {
         Ok(Image { width, height, rgba: self.canvas.picture.read::<u8>(&self.gpu)? })
     }
 
-    /// Waits for the newest picture and gives the bone at each pixel of its 3-D view ([`view_size`](Self::view_size)), row by row.
+    /// Waits for the newest picture and gives the bone at each pixel of its 3-D view
+    /// ([`view_size`](Self::view_size)), row by row.
     pub fn bone_hits(&self) -> Result<Vec<Option<Hit>>, RenderError> {
         let hits = self.canvas.eyes[0].skull_hit.read::<[f32; 4]>(&self.gpu)?;
         let hit = |h: [f32; 4]| (h[3] < NOTHING).then(|| Hit { distance_mm: h[3], normal: unfold([h[0], h[1]]) });
         Ok(hits.into_iter().map(hit).collect())
     }
 
-    /// Waits for the newest picture and gives the device's time for each pass; empty where it cannot measure.
+    /// Waits for the newest picture and gives the device's time for each pass; empty where it
+    /// cannot measure.
     pub fn pass_times(&self) -> Result<Vec<PassTime>, RenderError> {
         Ok(self.timer.as_ref().map(|t| t.read(&self.gpu)).transpose()?.unwrap_or_default())
     }

@@ -1,7 +1,9 @@
-//! The deformed brain cut by the slices: which place at rest, where the MRI was taken, is seen at each pixel.
+//! The deformed brain cut by the slices: which place at rest, where the MRI was taken, is seen at
+//! each pixel.
 //!
 //! # Theory
-//! A plane cuts a tetrahedron in a triangle or a quadrilateral. Deformation is linear in a tetrahedron, so the place at rest is linear over the cut.
+//! A plane cuts a tetrahedron in a triangle or a quadrilateral. Deformation is linear in a
+//! tetrahedron, so the place at rest is linear over the cut.
 
 use crate::RenderError;
 use crate::brain::Border;

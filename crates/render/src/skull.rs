@@ -1,13 +1,15 @@
-//! The skull's pass: densities on the device, changed bricks followed, rays cast only where something changed.
+//! The skull's pass: densities on the device, changed bricks followed, rays cast only where
+//! something changed.
 //!
 //! # Theory
-//! Within a cell the density is trilinear, so along a ray it is a cubic; its first root is found exactly (Marmitt et al. 2004), and no wall is
-//! too thin to be seen. See `skull.wgsl`.
+//! Within a cell the density is trilinear, so along a ray it is a cubic; its first root is found
+//! exactly (Marmitt et al. 2004), and no wall is too thin to be seen. See `skull.wgsl`.
 //!
 //! # Practice
-//! Half-precision densities: exact for whole HU up to 2048, which holds every useful isovalue. The hits of the last picture are kept: with
-//! a resting camera only the part of the picture that shows changed bricks is cast again, and the whole once the drilling rests (ambient
-//! light reaches farther than a brick).
+//! Half-precision densities: exact for whole HU up to 2048, which holds every useful isovalue. The
+//! hits of the last picture are kept: with a resting camera only the part of the picture that shows
+//! changed bricks is cast again, and the whole once the drilling rests (ambient light reaches
+//! farther than a brick).
 
 use crate::RenderError;
 use crate::bricks::{Grid, Leaps, densities};
@@ -150,7 +152,8 @@ impl Skull {
         Followed::of(&self.grid, &changed, left)
     }
 
-    /// Brings one brick of voxels to the device, with the bricks of cells and the blocks that it touches.
+    /// Brings one brick of voxels to the device, with the bricks of cells and the blocks that it
+    /// touches.
     fn refresh(&mut self, gpu: &Gpu, bone: &BoneVolume, brick: [usize; 3]) {
         let (first, size) = self.grid.voxels_of(brick);
         self.upload(gpu, first, size);

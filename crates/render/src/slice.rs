@@ -1,8 +1,9 @@
 //! The three orthogonal slices through the tool's tip.
 //!
 //! # Practice
-//! Radiological convention: the patient is seen from the feet (axial) and from in front (coronal), so the patient's right, R, is on the left of
-//! the picture. The sagittal slice looks from the patient's left: the face, A, is on the left.
+//! Radiological convention: the patient is seen from the feet (axial) and from in front (coronal),
+//! so the patient's right, R, is on the left of the picture. The sagittal slice looks from the
+//! patient's left: the face, A, is on the left.
 //!
 //! ```text
 //!  axial      coronal    sagittal
@@ -24,7 +25,8 @@ use trepan_gpu::{
 /// Numbers of the letters R L A P S I in the shader's font.
 pub(crate) const LETTERS: [[f32; 4]; 3] = [[0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 4.0, 5.0], [2.0, 3.0, 4.0, 5.0]];
 
-/// To the right and upwards in the picture: axial, coronal, sagittal; +x is the patient's right, +y the front, +z the head.
+/// To the right and upwards in the picture: axial, coronal, sagittal; +x is the patient's right, +y
+/// the front, +z the head.
 const AXES: [[Vec3; 2]; 3] = [[Vec3::NEG_X, Vec3::Y], [Vec3::NEG_X, Vec3::Z], [Vec3::NEG_Y, Vec3::Z]];
 
 /// A slice: a plane and what of it the picture shows.
@@ -57,7 +59,8 @@ pub(crate) struct Slices {
 }
 
 impl Plane {
-    /// The three slices through a point. The whole box is shown, centred, or what is around the point.
+    /// The three slices through a point. The whole box is shown, centred, or what is around the
+    /// point.
     pub fn three(through: Vec3, bounds: Aabb, half_height_mm: Option<f32>, rectangles: &[[u32; 4]; 3]) -> [Self; 3] {
         [0, 1, 2].map(|n| {
             let [right, up] = AXES[n];

@@ -1,8 +1,8 @@
 //! Two eyes: how their views share the picture.
 //!
 //! # Theory
-//! Off-axis frusta: both eyes look in parallel, and their pictures are shifted so that the camera's target has no parallax (Bourke 1999). Turned eyes would give
-//! upright parallax in the corners.
+//! Off-axis frusta: both eyes look in parallel, and their pictures are shifted so that the camera's
+//! target has no parallax (Bourke 1999). Turned eyes would give upright parallax in the corners.
 //!
 //! # When not to use it
 //! Half the frames a second of one eye; anaglyphs lose the red of the tissue.
@@ -14,7 +14,8 @@ use crate::camera::View;
 pub struct Stereo {
     /// How the views share the picture.
     pub look: StereoLook,
-    /// From eye to eye, mm, at the scale of the scene: 1/30 of the distance to the target is comfortable. Negative swaps the eyes.
+    /// From eye to eye, mm, at the scale of the scene: 1/30 of the distance to the target is
+    /// comfortable. Negative swaps the eyes.
     pub eye_distance_mm: f32,
 }
 
@@ -28,7 +29,8 @@ pub enum StereoLook {
 }
 
 impl Stereo {
-    /// The left and the right eye's views for a camera's; the one view where nobody or only one eye looks.
+    /// The left and the right eye's views for a camera's; the one view where nobody or only one eye
+    /// looks.
     pub(crate) fn views(stereo: Option<&Self>, view: View, target_mm: f32) -> [View; 2] {
         let aside = stereo.map(|s| 0.5 * s.eye_distance_mm).filter(|d| d.is_finite()).unwrap_or(0.0);
         [-aside, aside].map(|offset| view.from_aside(offset, target_mm))
@@ -36,7 +38,8 @@ impl Stereo {
 }
 
 impl StereoLook {
-    /// Where the left and the right eye's views are in the picture's area for them; one where there is no room for two.
+    /// Where the left and the right eye's views are in the picture's area for them; one where there
+    /// is no room for two.
     pub(crate) fn areas(look: Option<Self>, [x, y, width, height]: [u32; 4]) -> Vec<[u32; 4]> {
         let half = width / 2;
         match look {

@@ -87,7 +87,8 @@ fn rays_in_the_faces_of_bricks_and_along_the_axes_hit_like_any_other() {
     let Some(gpu) = device() else { return };
     let slab = bone(40, |p| p.y.abs() - 6.25);
     let mut renderer = renderer(&gpu, &alone(&slab), [3, 3]);
-    // The middle ray runs along an axis, exactly in a face between bricks: padded voxel 8 lies at -12.5 mm.
+    // The middle ray runs along an axis, exactly in a face between bricks: padded voxel 8 lies at
+    // -12.5 mm.
     for target in [Vec3::new(-12.5, 0.0, -12.5), Vec3::new(-12.5, 0.0, 0.2), Vec3::new(3.5, 0.0, 3.5), Vec3::ZERO] {
         let camera = Camera { fov_rad: 1e-3, ..Camera::viewed_from(target, Vec3::Y, 100.0) };
         let hits = draw(&mut renderer, &plain(camera));

@@ -1,4 +1,5 @@
-//! Where renderers fail: axis-parallel rays, eyes in odd places, volumes of nothing or of noise, and meshes that are no longer sound.
+//! Where renderers fail: axis-parallel rays, eyes in odd places, volumes of nothing or of noise,
+//! and meshes that are no longer sound.
 
 mod cube;
 mod scene;
@@ -109,7 +110,8 @@ fn sparse_rays_see_a_smooth_surface_where_it_is_and_every_wall() {
     }
 }
 
-/// Pixels of the brain on the processor and, where there is one, on the device, which must not differ by more than `most` along the rim.
+/// Pixels of the brain on the processor and, where there is one, on the device, which must not
+/// differ by more than `most` along the rim.
 fn brain_pixels(gpu: Option<&Gpu>, mesh: &TetMesh, now: &[Vec3], cut: Option<Cut>, most: usize) -> usize {
     let data = SceneData { bone: None, brain: Some(mesh), mri: None, tint: None };
     let camera = Camera::viewed_from(Vec3::ZERO, Vec3::new(0.31, 1.0, 0.17), 90.0);
@@ -153,7 +155,8 @@ fn no_cracks_at_the_borders_of_tetrahedra_in_surface_and_cut() {
     let shaken = inner.iter_mut().filter(|p| p.abs().max_element() < 11.0);
     shaken.for_each(|p| *p += Vec3::new(random.f32(), random.f32(), random.f32()) - 0.5);
     assert_eq!(brain_pixels(gpu.as_ref(), &mesh, &inner, None, 6), whole);
-    // The face of a cut that faces the eye fills the outline of the half that is left: as many pixels as a block that ends there.
+    // The face of a cut that faces the eye fills the outline of the half that is left: as many
+    // pixels as a block that ends there.
     let cut = Cut { point: Vec3::ZERO, normal: Vec3::Y, bone: false };
     let mut half = mesh.clone();
     half.positions.iter_mut().for_each(|p| p.y = 0.5 * (p.y - 12.0));

@@ -97,7 +97,8 @@ fn head() -> (Arc<BoneVolume>, TetMesh, VoxelVolume<f32>) {
     (shell, cube(12.0), ball(DVec3::new(3.0, 4.0, 0.0)))
 }
 
-/// A stored picture. With `TREPAN_GOLDEN=write` in the environment the picture is stored first: look at it before it is kept.
+/// A stored picture. With `TREPAN_GOLDEN=write` in the environment the picture is stored first:
+/// look at it before it is kept.
 fn golden(name: &str, image: &Image) -> Image {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{name}.png"));
     if std::env::var_os("TREPAN_GOLDEN").is_some_and(|v| v == "write") {

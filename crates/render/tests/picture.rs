@@ -20,7 +20,8 @@ fn picture(renderer: &mut Renderer, frame: &Frame) -> Image {
     renderer.image().expect("the picture is read")
 }
 
-/// How much redder than green a pixel is: the brain and its outline are, bone and steel are less so.
+/// How much redder than green a pixel is: the brain and its outline are, bone and steel are less
+/// so.
 fn redness(image: &Image, x: u32, y: u32) -> i32 {
     let [r, g, _, _] = image.pixel(x, y);
     i32::from(r) - i32::from(g)
@@ -143,7 +144,8 @@ fn the_outline_of_the_moved_brain_is_in_the_slices() {
         (columns.iter().copied().min().unwrap(), columns.iter().copied().max().unwrap(), columns.len())
     };
     let (left, right, count) = red(&picture(&mut renderer, &frame));
-    // 60 mm and a margin of 4 percent fill 100 pixels: the square from -12 to 12 mm spans 39 of them.
+    // 60 mm and a margin of 4 percent fill 100 pixels: the square from -12 to 12 mm spans 39 of
+    // them.
     assert!(
         (29..=33).contains(&left) && (67..=71).contains(&right) && (120..200).contains(&count),
         "{left} {right} {count}"
@@ -208,7 +210,8 @@ fn the_mri_moves_with_the_brain_in_the_slices() {
     let data = SceneData { bone: Some(speck), brain: Some(&mesh), mri: Some(&mri), tint: None };
     let mut renderer = renderer(&gpu, &data, [400, 300]);
     let frame = Frame::of(Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0));
-    // The middle column of the bright ball in the axial slice of 100 pixels for 59 mm and a margin of 4 percent.
+    // The middle column of the bright ball in the axial slice of 100 pixels for 59 mm and a margin
+    // of 4 percent.
     let bright = |image: &Image| {
         let [x, y, w, h] = Layout::of(400, 300, true).slices.unwrap()[0];
         let pixels = (0..w * h).map(|n| (n % w, n / w)).filter(|&(px, py)| {

@@ -95,7 +95,8 @@ fn a_ball_drawn_by_the_processor_is_a_ball() {
     assert!((nearest - 100.0).abs() < 0.05, "{nearest}");
 }
 
-/// A few crumbs of bone far apart, seen from all sides, from far off, from the border and from among them: leaping, alone or as a beam for a tile, passes none.
+/// A few crumbs of bone far apart, seen from all sides, from far off, from the border and from
+/// among them: leaping, alone or as a beam for a tile, passes none.
 #[test]
 fn leaping_finds_what_walking_every_cell_finds() {
     let mut random = fastrand::Rng::with_seed(4);

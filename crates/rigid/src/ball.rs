@@ -1,9 +1,10 @@
 //! A ball that slides among discs towards a goal.
 //!
 //! # Theory
-//! Each disc gives a half-space that the ball's centre must stay in: at its radius from the disc, or where the ball overlaps the disc
-//! already, no nearer than it is. The centre is therefore always allowed to stay, and since the projection of the goal on a
-//! convex set that holds the centre is never further from the goal than the centre, no slide leads away from the goal.
+//! Each disc gives a half-space that the ball's centre must stay in: at its radius from the disc,
+//! or where the ball overlaps the disc already, no nearer than it is. The centre is therefore
+//! always allowed to stay, and since the projection of the goal on a convex set that holds the
+//! centre is never further from the goal than the centre, no slide leads away from the goal.
 //!
 //! ```text
 //! g·c ≥ g·y + min(ρ, d + push)      d: distance now, ρ: radius, push: what an overlap must lose
@@ -29,7 +30,8 @@ const PUSH: f32 = 2e-4;
 pub(crate) struct Ball {
     /// Radius that touches.
     pub radius: f32,
-    /// Whether its centre is in bone: then a disc pushes along its own normal, which is the way out.
+    /// Whether its centre is in bone: then a disc pushes along its own normal, which is the way
+    /// out.
     pub inside: bool,
     /// The shaft, as seen from the ball's centre.
     pub shaft: Shaft,
@@ -70,13 +72,15 @@ impl Ball {
         if disc.shaft { self.shaft.radius } else { self.radius }
     }
 
-    /// The place on the shaft's axis that is nearest to a `point` of a disc at the shaft, all as seen from the ball's centre; for other discs that centre.
+    /// The place on the shaft's axis that is nearest to a `point` of a disc at the shaft, all as
+    /// seen from the ball's centre; for other discs that centre.
     #[inline]
     pub fn arm(&self, disc: &Disc, point: Vec3) -> Vec3 {
         if disc.shaft { self.shaft.at(self.shaft.along(point)) } else { Vec3::ZERO }
     }
 
-    /// The disc as the tool with its ball at `centre` sees it: the ball, or the place on the shaft's axis that is nearest.
+    /// The disc as the tool with its ball at `centre` sees it: the ball, or the place on the
+    /// shaft's axis that is nearest.
     #[inline(always)]
     pub fn nearest(&self, disc: &Disc, centre: Vec3) -> Near {
         let seen = centre + self.arm(disc, disc.centre - centre);
@@ -98,7 +102,8 @@ impl Ball {
         Near { distance, direction }
     }
 
-    /// Copies those discs to `near` that a ball of radius `most` at `centre` has within `reach`. Returns the smallest distance.
+    /// Copies those discs to `near` that a ball of radius `most` at `centre` has within `reach`.
+    /// Returns the smallest distance.
     pub fn select(&self, discs: &[Disc], centre: Vec3, most: f32, reach: f32, near: &mut Vec<Disc>) -> f32 {
         near.clear();
         let mut smallest = f32::MAX;
@@ -120,7 +125,8 @@ impl Ball {
         discs.iter().filter(|disc| !disc.shaft).map(|disc| self.nearest(disc, centre).distance).fold(f32::MAX, f32::min)
     }
 
-    /// Where the ball at `centre` is nearest to `goal`, when overlaps must lose `push`, those of the shaft `lean`; `None` when that is nowhere.
+    /// Where the ball at `centre` is nearest to `goal`, when overlaps must lose `push`, those of
+    /// the shaft `lean`; `None` when that is nowhere.
     pub fn settle(
         &self,
         discs: &[Disc],
@@ -145,7 +151,8 @@ impl Ball {
         for _ in 0..MAX_SLIDES {
             let at = slide.to;
             let no_further = |target: &Vec3| target.distance(goal) <= at.distance(goal) + 4.0 * PUSH;
-            // Between walls even the least push would lever the ball away; without, it has room where it is.
+            // Between walls even the least push would lever the ball away; without, it has room
+            // where it is.
             let target = self
                 .settle(discs, spaces, at, goal, (PUSH, PUSH))
                 .filter(no_further)

@@ -1,12 +1,14 @@
 //! The oracle: a ball on the triangulated isosurface, moved in small steps, in f64.
 //!
 //! # Theory
-//! The surface is that of marching cubes (`cell.rs`). The ball is moved towards the device by a small step, then pushed off the nearest triangle until none is
-//! nearer than its radius; and again, until it comes back to where it was. Its rest is the god-object of the space of
-//! centres by definition: no step towards the device is allowed any more.
+//! The surface is that of marching cubes (`cell.rs`). The ball is moved towards the device by a
+//! small step, then pushed off the nearest triangle until none is nearer than its radius; and
+//! again, until it comes back to where it was. Its rest is the god-object of the space of centres
+//! by definition: no step towards the device is allowed any more.
 //!
 //! # Practice
-//! A millisecond to tenths of a second a tick. Nothing is cached from tick to tick but the ball's place.
+//! A millisecond to tenths of a second a tick. Nothing is cached from tick to tick but the ball's
+//! place.
 //!
 //! # Sources
 //! Distance to a triangle after C. Ericson, *Real-Time Collision Detection*, 2005, section 5.1.5.
@@ -15,7 +17,7 @@
 //! In a haptic tick.
 
 use crate::cell;
-use crate::removal::{Burr, Cut, Law};
+use crate::removal::{Burr, Cut, RemovalLaw};
 use crate::rows::EVERYWHERE;
 use crate::{RigidContact, RigidStep};
 use glam::{DVec3, IVec3};
@@ -38,12 +40,12 @@ pub struct Config {
     /// Most steps in one tick.
     pub max_steps: u32,
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { step_voxels: 0.1, max_steps: 20_000, removal: Law::RATE }
+        Self { step_voxels: 0.1, max_steps: 20_000, removal: RemovalLaw::RATE }
     }
 }
 
@@ -60,7 +62,8 @@ pub struct Brute {
 }
 
 impl Brute {
-    /// A ball of the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts at the first tool pose.
+    /// A ball of the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts
+    /// at the first tool pose.
     pub fn new(tool: &Tool, config: Config) -> Self {
         Self {
             config,

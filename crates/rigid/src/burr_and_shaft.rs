@@ -1,8 +1,9 @@
-//! Burr and shaft by their distance from voxels, with torque: a ball and a cylinder against voxel centres.
+//! Burr and shaft by their distance from voxels, with torque: a ball and a cylinder against voxel
+//! centres.
 //!
 //! # Theory
-//! A voxel of bone touches the burr when its centre is nearer to the burr's centre than the radius, and the shaft when it is nearer to
-//! the shaft's axis than the shaft's radius. For each of the two
+//! A voxel of bone touches the burr when its centre is nearer to the burr's centre than the radius,
+//! and the shaft when it is nearer to the shaft's axis than the shaft's radius. For each of the two
 //! ```text
 //! n = Σ dᵢ nᵢ / |Σ dᵢ nᵢ| ,   d = max dᵢ ,   x = Σ dᵢ xᵢ / Σ dᵢ        dᵢ = radius - distance, nᵢ from the voxel to centre or axis
 //! F = k (d n)₁ + k (d n)₂ ,   τ = (x₂ - tip) × k (d n)₂
@@ -10,18 +11,20 @@
 //! Their spring has a damper and friction beside it, which here are the force model's part.
 //!
 //! # Practice
-//! Bricks that have never held bone take the place of their tree of boxes. World mm; 5 to 20 us. The shaft does not cut.
+//! Bricks that have never held bone take the place of their tree of boxes. World mm; 5 to 20 us.
+//! The shaft does not cut.
 //!
 //! # Sources
-//! X. He, Y. Chen, *Bone drilling simulation based on six degree-of-freedom haptic rendering*, EuroHaptics 2006. How the voxels' distances become one
-//! force is our reading.
+//! X. He, Y. Chen, *Bone drilling simulation based on six degree-of-freedom haptic rendering*,
+//! EuroHaptics 2006. How the voxels' distances become one force is our reading.
 //!
 //! # When not to use it
-//! For a steady force: depth is counted from voxel centres, so that it steps by fractions of a voxel. Against thin walls: it has no proxy.
+//! For a steady force: depth is counted from voxel centres, so that it steps by fractions of a
+//! voxel. Against thin walls: it has no proxy.
 
 use crate::RigidStep;
-use crate::penalty::{Feel, Felt, answer};
-use crate::removal::Law;
+use crate::penalty::{Felt, PenaltyProbe, answer};
+use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
 use crate::shaft::Shaft;
 use trepan_contact::Contact;
@@ -32,7 +35,7 @@ use trepan_volume::BoneVolume;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Config {
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 pub(crate) struct BurrAndShaft {
@@ -103,7 +106,7 @@ impl BurrAndShaft {
     }
 }
 
-impl Feel for BurrAndShaft {
+impl PenaltyProbe for BurrAndShaft {
     fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let burr = self.burr(bone, bone.grid_of(pose.translation), &mut out.voxels_swept);
         let shaft = self.shaft(bone, pose, &mut out.voxels_swept);

@@ -1,22 +1,26 @@
 //! The isosurface in one cell of eight voxel centres, as triangles.
 //!
 //! # Theory
-//! The density is linear along the twelve edges of the cell; those with an end in bone and one in air carry a vertex. On each face the vertices are
-//! joined in pairs; where all four edges of a face cross, the face's bilinear density decides which pairs: its saddle is bone or air. The pairs close
-//! to loops around the cell, and a loop is a fan of triangles about its mean. Neighbour cells decide alike on the face that they share, so that the surface
-//! has no holes.
+//! The density is linear along the twelve edges of the cell; those with an end in bone and one in
+//! air carry a vertex. On each face the vertices are joined in pairs; where all four edges of a
+//! face cross, the face's bilinear density decides which pairs: its saddle is bone or air. The
+//! pairs close to loops around the cell, and a loop is a fan of triangles about its mean. Neighbour
+//! cells decide alike on the face that they share, so that the surface has no holes.
 //!
-//! On a plane all vertices of a loop are on it: densities more than a cell's edge away from the surface, clipped as a scanner clips them, do not bend it.
+//! On a plane all vertices of a loop are on it: densities more than a cell's edge away from the
+//! surface, clipped as a scanner clips them, do not bend it.
 //!
 //! # Sources
-//! W. E. Lorensen, H. E. Cline, *Marching cubes*, SIGGRAPH 1987; G. M. Nielson, B. Hamann, *The asymptotic decider*, IEEE Visualization 1991.
+//! W. E. Lorensen, H. E. Cline, *Marching cubes*, SIGGRAPH 1987; G. M. Nielson, B. Hamann, *The
+//! asymptotic decider*, IEEE Visualization 1991.
 
 use glam::DVec3;
 
 /// Places for edges: `8 axis + lower corner`.
 const EDGES: usize = 24;
 
-/// Calls `triangle` with each triangle, in units of the cell's edge from corner 0; `density[c]` is that over the isovalue at the corner whose bits are x, y, z.
+/// Calls `triangle` with each triangle, in units of the cell's edge from corner 0; `density[c]` is
+/// that over the isovalue at the corner whose bits are x, y, z.
 pub(crate) fn triangles(density: &[f64; 8], mut triangle: impl FnMut([DVec3; 3])) {
     if density.iter().all(|&d| d >= 0.0) || density.iter().all(|&d| d < 0.0) {
         return;

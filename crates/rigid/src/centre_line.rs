@@ -1,8 +1,10 @@
-//! The line approximation: a vertex in the burr's centre and some along the shaft's axis, each held by what it met on its way.
+//! The line approximation: a vertex in the burr's centre and some along the shaft's axis, each held
+//! by what it met on its way.
 //!
 //! # Theory
-//! A vertex that moves into bone from one tick to the next leaves its proxy where its way met the bone. From there the proxy follows on
-//! the tangent plane of the density, as far as its way is free; a spring joins the two:
+//! A vertex that moves into bone from one tick to the next leaves its proxy where its way met the
+//! bone. From there the proxy follows on the tangent plane of the density, as far as its way is
+//! free; a spring joins the two:
 //! ```text
 //! F = k (proxy₀ - tip) + k (proxyₛ - xₛ) ,   τ = (xₛ - tip) × k (proxyₛ - xₛ)      s: the shaft's vertex that is held furthest off
 //! ```
@@ -11,13 +13,15 @@
 //! World mm. A few looks per vertex and tick, since only its own way is searched.
 //!
 //! # Sources
-//! F. Asenjo, *Haptic and visual simulation of bone milling*, KTH 2008, "line approximation algorithm", as the thesis tells it (2.3.1).
+//! F. Asenjo, *Haptic and visual simulation of bone milling*, KTH 2008, "line approximation
+//! algorithm", as the thesis tells it (2.3.1).
 //!
 //! # When not to use it
-//! For burrs that are seen: the line has no thickness, so that a burr sinks in to its centre before it touches.
+//! For burrs that are seen: the line has no thickness, so that a burr sinks in to its centre before
+//! it touches.
 
 use crate::ray_trace::over_iso;
-use crate::removal::{Burr, Cut, Law};
+use crate::removal::{Burr, Cut, RemovalLaw};
 use crate::rows::EVERYWHERE;
 use crate::traverse::first_bone;
 use crate::{RigidContact, RigidStep};
@@ -38,12 +42,12 @@ pub struct Config {
     /// Way between two vertices on the axis, mm.
     pub step_mm: f32,
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { step_mm: 2.0, removal: Law::RATE }
+        Self { step_mm: 2.0, removal: RemovalLaw::RATE }
     }
 }
 
@@ -80,7 +84,8 @@ pub struct CentreLine {
 }
 
 impl CentreLine {
-    /// A line of the tool's length. Until [`reset`](RigidContact::reset) puts it somewhere it starts at the first tool pose.
+    /// A line of the tool's length. Until [`reset`](RigidContact::reset) puts it somewhere it
+    /// starts at the first tool pose.
     pub fn new(tool: &Tool, config: Config) -> Self {
         let step_mm = config.step_mm.max(1e-2);
         let heights = (1..MAX_VERTICES).map(|at| tool.tip_radius_mm + at as f32 * step_mm);

@@ -1,12 +1,14 @@
-//! A tool that cuts with its side: balls along the shaft, each a tool of its own for whatever method is used.
+//! A tool that cuts with its side: balls along the shaft, each a tool of its own for whatever
+//! method is used.
 //!
 //! # Theory
-//! Station i stands `sᵢ` above the tip on the shaft and has its own proxy, which lies `oᵢ` from where the hand holds it. The hand feels
+//! Station i stands `sᵢ` above the tip on the shaft and has its own proxy, which lies `oᵢ` from
+//! where the hand holds it. The hand feels
 //! ```text
 //! o = Σ |oᵢ| oᵢ / Σ |oᵢ|         |o| ≤ max |oᵢ|, continuous where a station begins to touch
 //! ```
-//! so that a chain is no stiffer than its balls. The lowest station is blunt: it holds the tool back where the bone is not open below it. The others cut
-//! with the load of their own depth.
+//! so that a chain is no stiffer than its balls. The lowest station is blunt: it holds the tool
+//! back where the bone is not open below it. The others cut with the load of their own depth.
 //!
 //! ```text
 //!  ║(·)║  cutting_mm above the tip
@@ -16,7 +18,8 @@
 //! ```
 //!
 //! # Practice
-//! Costs as many ticks of the method as stations lie in bone; those in the air cost next to nothing. The picture's proxy is moved, not turned.
+//! Costs as many ticks of the method as stations lie in bone; those in the air cost next to
+//! nothing. The picture's proxy is moved, not turned.
 //!
 //! # When not to use it
 //! For torque: a chain turns freely.

@@ -1,27 +1,31 @@
-//! Tangent planes by exposed faces: the modified voxmap point shell of the Intracranial Hematoma Craniotomy simulator.
+//! Tangent planes by exposed faces: the modified voxmap point shell of the Intracranial Hematoma
+//! Craniotomy simulator.
 //!
 //! # Theory
-//! A point of the tool in a bone voxel is followed along its inward normal, a voxel's edge at a time, to a voxel at the surface: one with
-//! faces that no bone covers. Those faces eᵢ (unit vectors to the bare neighbours) make the voxel's tangent plane:
+//! A point of the tool in a bone voxel is followed along its inward normal, a voxel's edge at a
+//! time, to a voxel at the surface: one with faces that no bone covers. Those faces eᵢ (unit
+//! vectors to the bare neighbours) make the voxel's tangent plane:
 //! ```text
 //! n = Σ eᵢ / |Σ eᵢ| ,   plane through  centre + ½ · mean eᵢ ,   d = (plane - p)·n
 //! ```
 //! One bare face is the plane of that face, two cut the edge between them, three the corner.
 //!
 //! # Practice
-//! The normal of the contact is the mean of the points' pushes, its depth that of the deepest point along it. 466 points, six looks at
-//! each voxel at the surface. World mm.
+//! The normal of the contact is the mean of the points' pushes, its depth that of the deepest point
+//! along it. 466 points, six looks at each voxel at the surface. World mm.
 //!
 //! # Sources
-//! E. Acosta, A. Liu, *Real-time volumetric haptic and visual burrhole simulation*, IEEE VR 2007; E. Acosta et al., Stud. Health Technol. Inform.
-//! 125 (2007). How the faces give normal and depth is our reading.
+//! E. Acosta, A. Liu, *Real-time volumetric haptic and visual burrhole simulation*, IEEE VR 2007;
+//! E. Acosta et al., Stud. Health Technol. Inform. 125 (2007). How the faces give normal and depth
+//! is our reading.
 //!
 //! # When not to use it
-//! On oblique bone: a voxel knows 26 normals, so that force turns and jumps at voxel borders. Against thin walls: it has no proxy.
+//! On oblique bone: a voxel knows 26 normals, so that force turns and jumps at voxel borders.
+//! Against thin walls: it has no proxy.
 
 use crate::RigidStep;
-use crate::penalty::{Feel, Felt, answer};
-use crate::removal::Law;
+use crate::penalty::{Felt, PenaltyProbe, answer};
+use crate::removal::RemovalLaw;
 use glam::IVec3;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
@@ -35,12 +39,12 @@ pub struct Config {
     /// Points of the shell.
     pub points: usize,
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { points: Pointshell::RIGID_COUNT, removal: Law::RATE }
+        Self { points: Pointshell::RIGID_COUNT, removal: RemovalLaw::RATE }
     }
 }
 
@@ -55,7 +59,8 @@ impl Faces {
         Self { shell, radius_mm: tool.tip_radius_mm }
     }
 
-    /// The depth of `point`, mm, and its normal, found on the way along `inward`; `None` when there is bone to the tool's centre.
+    /// The depth of `point`, mm, and its normal, found on the way along `inward`; `None` when there
+    /// is bone to the tool's centre.
     fn plane(&self, bone: &BoneVolume, point: Vec3, inward: Vec3, visited: &mut u32) -> Option<(f32, Vec3)> {
         let steps = (self.radius_mm / bone.spacing_mm()).floor().clamp(0.0, 256.0) as u32;
         (0..=steps).find_map(|step| {
@@ -74,7 +79,7 @@ impl Faces {
     }
 }
 
-impl Feel for Faces {
+impl PenaltyProbe for Faces {
     fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let mut push = Vec3::ZERO;
         for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {

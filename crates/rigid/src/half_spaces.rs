@@ -4,17 +4,20 @@
 //! ```text
 //! minimise |x - goal|²   subject to   gᵢ·x ≥ bᵢ
 //! ```
-//! A problem of LP type in three dimensions: at most three half-spaces are active at the solution. Start with none; as long as
-//! some half-space is violated, take the one violated most and find the best active set among it and the (at most three) active ones.
-//! The distance to the goal grows with each exchange, so no set comes back.
+//! A problem of LP type in three dimensions: at most three half-spaces are active at the solution.
+//! Start with none; as long as some half-space is violated, take the one violated most and find the
+//! best active set among it and the (at most three) active ones. The distance to the goal grows
+//! with each exchange, so no set comes back.
 //!
 //! # Practice
-//! Two to six exchanges are usual, each one pass over the half-spaces. Any unit of length; tolerances are in that unit. Active sets are solved in f64, as
-//! their borders may be nearly parallel.
+//! Two to six exchanges are usual, each one pass over the half-spaces. Any unit of length;
+//! tolerances are in that unit. Active sets are solved in f64, as their borders may be nearly
+//! parallel.
 //!
 //! # Sources
-//! M. Sharir, E. Welzl, *A combinatorial bound for linear programming and related problems*, STACS 1992; R. Seidel,
-//! *Small-dimensional linear programming and convex hulls made easy*, Discrete Comput. Geom. 6 (1991).
+//! M. Sharir, E. Welzl, *A combinatorial bound for linear programming and related problems*, STACS
+//! 1992; R. Seidel, *Small-dimensional linear programming and convex hulls made easy*, Discrete
+//! Comput. Geom. 6 (1991).
 
 use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;
@@ -48,7 +51,8 @@ pub(crate) fn nearest(goal: Vec3, spaces: &[HalfSpace]) -> Option<Vec3> {
     Some(solved(goal, spaces)?.0)
 }
 
-/// Which of the half-spaces hold the nearest point off `goal`, and how far each of them: the sum of their normals so weighted is the way from the goal.
+/// Which of the half-spaces hold the nearest point off `goal`, and how far each of them: the sum of
+/// their normals so weighted is the way from the goal.
 pub(crate) fn supports(goal: Vec3, spaces: &[HalfSpace]) -> Option<impl Iterator<Item = (usize, f32)>> {
     let (x, active) = solved(goal, spaces)?;
     let normals: [DVec3; 3] =
@@ -99,7 +103,8 @@ impl Active {
         let all = [*entering, self.spaces[0], self.spaces[1], self.spaces[2]];
         let of = [at, self.of[0], self.of[1], self.of[2]];
         let all = &all[..=self.count];
-        // The entering half-space is active for sure: bit 0 is set. Sets of four have no common point.
+        // The entering half-space is active for sure: bit 0 is set. Sets of four have no common
+        // point.
         let (x, set) = (0..1u32 << self.count)
             .map(|others| 1 | others << 1)
             .filter(|set| set.count_ones() <= 3)
@@ -118,7 +123,8 @@ impl Active {
     }
 }
 
-/// The point nearest to `goal` on the borders of the half-spaces in `set`; `None` when they are nearly dependent.
+/// The point nearest to `goal` on the borders of the half-spaces in `set`; `None` when they are
+/// nearly dependent.
 fn on_borders(goal: Vec3, spaces: &[HalfSpace], set: u32) -> Option<DVec3> {
     let mut x = goal.as_dvec3();
     let mut basis = [DVec3::ZERO; 4];

@@ -1,15 +1,18 @@
 //! What a tool's shaft leans on: the discs around it, kept while the tool moves little.
 //!
 //! # Theory
-//! A disc y against the shaft, nearest to the axis at `c + s a`, gives the tip's centre c a half-space as a disc against the ball does:
+//! A disc y against the shaft, nearest to the axis at `c + s a`, gives the tip's centre c a
+//! half-space as a disc against the ball does:
 //! ```text
 //! g·(c + s a) ≥ g·y + ρ        ρ: radius of the shaft, g: unit vector from the disc to the axis
 //! ```
-//! The orientation is the hand's; only the place of the tip gives way. So the solution's multipliers λᵢ are the contacts' forces, and those of the
-//! shaft turn the tool about its tip: `τ = k Σ λᵢ s a × gᵢ`.
+//! The orientation is the hand's; only the place of the tip gives way. So the solution's
+//! multipliers λᵢ are the contacts' forces, and those of the shaft turn the tool about its tip:
+//! `τ = k Σ λᵢ s a × gᵢ`.
 //!
 //! # Practice
-//! Gathered for [`AHEAD`] voxels of motion, of the tip or of the far end as the tool turns. Nothing happens where no brick near the shaft has ever held bone.
+//! Gathered for [`AHEAD`] voxels of motion, of the tip or of the far end as the tool turns. Nothing
+//! happens where no brick near the shaft has ever held bone.
 
 use crate::RigidStep;
 use crate::shaft::Shaft;
@@ -47,7 +50,8 @@ impl Lean {
         }
     }
 
-    /// Adds the discs that `shaft`, in grid coordinates, has within `reach` to `near`, in the frame shifted to `base`.
+    /// Adds the discs that `shaft`, in grid coordinates, has within `reach` to `near`, in the frame
+    /// shifted to `base`.
     pub fn select(
         &mut self,
         bone: &BoneVolume,

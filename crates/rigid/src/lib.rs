@@ -1,9 +1,9 @@
 //! A round tool against voxel bone: contact, proxy and drilling, by interchangeable methods.
 //!
 //! # Theory
-//! Every method answers one call per haptic tick, [`RigidContact::step`]: where may the tool be (its proxy), how deep does
-//! the hand press it into the bone, along which normal, and what does the burr take away. The answer is a
-//! [`RigidStep`]; a force model makes newtons of it.
+//! Every method answers one call per haptic tick, [`RigidContact::step`]: where may the tool be
+//! (its proxy), how deep does the hand press it into the bone, along which normal, and what does
+//! the burr take away. The answer is a [`RigidStep`]; a force model makes newtons of it.
 //!
 //! ```text
 //! pose ─→ step ─→ manifold (normal, depth, point) ─→ force model
@@ -11,9 +11,9 @@
 //! ```
 //!
 //! # Practice
-//! [`Method`] lists the methods with their configuration; [`Method::RECOMMENDED`] is `distance-field`. A step does not
-//! allocate, lock or wait; the same bone and path give the same bytes. The step is the one writer of the
-//! [`BoneVolume`](trepan_volume::BoneVolume).
+//! [`Method`] lists the methods with their configuration; [`Method::RECOMMENDED`] is
+//! `god-object-sphere`. A step does not allocate, lock or wait; the same bone and path give the
+//! same bytes. The step is the one writer of the [`BoneVolume`](trepan_volume::BoneVolume).
 //!
 //! ```
 //! use trepan_geometry::{Pose, Tool, ToolState, Vec3};
@@ -36,7 +36,8 @@
 //! ```
 //!
 //! # When not to use it
-//! For soft tissue, or for bones that move: the bone is fixed in the world. Tools that are not round at the tip have [`mesh_shell`] and a penalty method only.
+//! For soft tissue, or for bones that move: the bone is fixed in the world. Tools that are not
+//! round at the tip have [`mesh_shell`] and a penalty method only.
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
@@ -48,8 +49,8 @@ pub mod burr_and_shaft;
 mod cell;
 pub mod centre_line;
 mod chain;
-pub mod distance_field;
 pub mod exposed_faces;
+pub mod god_object_sphere;
 mod half_spaces;
 mod lean;
 pub mod mesh_shell;

@@ -1,15 +1,19 @@
 //! Any closed triangle mesh as a point shell: points spread over its surface, with inward normals.
 //!
 //! # Theory
-//! Each triangle is cut into pieces a third of the spacing in size; their centres are candidates. In the order of the triangles a candidate becomes a point
-//! unless a point with a normal to the same side is nearer than 0.7 of the spacing. So no two points crowd, and no place of the surface is further than the spacing from
-//! a point: with a spacing of a voxel's edge nothing of the bone's size slips between them.
+//! Each triangle is cut into pieces a third of the spacing in size; their centres are candidates.
+//! In the order of the triangles a candidate becomes a point unless a point with a normal to the
+//! same side is nearer than 0.7 of the spacing. So no two points crowd, and no place of the surface
+//! is further than the spacing from a point: with a spacing of a voxel's edge nothing of the bone's
+//! size slips between them.
 //!
 //! # Practice
-//! Tool frame, mm: tip at the origin, shaft along +z. At load time; the mesh's own reader is `trepan-mesh`'s. A mesh that is inside out is turned.
+//! Tool frame, mm: tip at the origin, shaft along +z. At load time; the mesh's own reader is
+//! `trepan-mesh`'s. A mesh that is inside out is turned.
 //!
 //! # Sources
-//! W. McNeely, K. Puterbaugh, J. Troy, *Six degree-of-freedom haptic rendering using voxel sampling*, SIGGRAPH 1999, for the shell.
+//! W. McNeely, K. Puterbaugh, J. Troy, *Six degree-of-freedom haptic rendering using voxel
+//! sampling*, SIGGRAPH 1999, for the shell.
 //!
 //! # When not to use it
 //! For balls: [`Pointshell::sphere`] is more even.

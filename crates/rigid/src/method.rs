@@ -2,8 +2,8 @@
 
 use crate::chain::Chain;
 use crate::penalty::Penalty;
-use crate::removal::Law;
-use crate::{RigidContact, brute, burr_and_shaft, centre_line, distance_field, exposed_faces};
+use crate::removal::RemovalLaw;
+use crate::{RigidContact, brute, burr_and_shaft, centre_line, exposed_faces, god_object_sphere};
 use crate::{pointshell, ray_trace, surface_vertices, thesis, voxel_sum};
 use trepan_geometry::Tool;
 
@@ -27,16 +27,17 @@ pub enum Method {
     /// Vertices on burr and shaft, with torque.
     SurfaceVertices(surface_vertices::Config),
     /// A ball that slides on the density's isosurface: the default.
-    DistanceField(distance_field::Config),
+    GodObjectSphere(god_object_sphere::Config),
     /// The oracle: the same question answered slowly and obviously, in f64.
     Brute(brute::Config),
 }
 
 impl Method {
     /// What the simulators use.
-    pub const RECOMMENDED: Self = Self::DistanceField(distance_field::Config::RECOMMENDED);
+    pub const RECOMMENDED: Self = Self::GodObjectSphere(god_object_sphere::Config::RECOMMENDED);
 
-    /// Every method in its default configuration, the thesis's once more as printed, and both ways to combine points.
+    /// Every method in its default configuration, the thesis's once more as printed, and both ways
+    /// to combine points.
     pub fn all() -> Vec<Self> {
         vec![
             Self::Thesis(thesis::Config::default()),
@@ -49,8 +50,8 @@ impl Method {
             Self::BurrAndShaft(burr_and_shaft::Config::default()),
             Self::CentreLine(centre_line::Config::default()),
             Self::SurfaceVertices(surface_vertices::Config::default()),
-            Self::DistanceField(distance_field::Config::default()),
-            Self::DistanceField(distance_field::Config::WITH_SHAFT),
+            Self::GodObjectSphere(god_object_sphere::Config::default()),
+            Self::GodObjectSphere(god_object_sphere::Config::WITH_SHAFT),
             Self::Brute(brute::Config::default()),
         ]
     }
@@ -68,18 +69,25 @@ impl Method {
             Self::BurrAndShaft(_) => "burr-and-shaft",
             Self::CentreLine(_) => "centre-line",
             Self::SurfaceVertices(_) => "surface-vertices",
-            Self::DistanceField(config) if config.shaft => "distance-field-shaft",
-            Self::DistanceField(_) => "distance-field",
+            Self::GodObjectSphere(config) if config.shaft => "god-object-sphere-shaft",
+            Self::GodObjectSphere(_) => "god-object-sphere",
             Self::Brute(_) => "brute",
         }
     }
 
-    /// The method of that name in its default configuration.
+    /// The method of that name in its default configuration. Also takes the names that recordings and
+    /// command lines of version 0.1 have.
     pub fn named(name: &str) -> Option<Self> {
+        let name = match name {
+            "distance-field" => "god-object-sphere",
+            "distance-field-shaft" => "god-object-sphere-shaft",
+            name => name,
+        };
         Self::all().into_iter().find(|method| method.name() == name)
     }
 
-    /// The method with so many points on the burr; 0, or a method without points to choose, leaves it as it is.
+    /// The method with so many points on the burr; 0, or a method without points to choose, leaves
+    /// it as it is.
     pub fn with_points(mut self, points: usize) -> Self {
         let own = match &mut self {
             Self::Thesis(config) => &mut config.points,
@@ -90,7 +98,7 @@ impl Method {
             Self::VoxelSum(_)
             | Self::BurrAndShaft(_)
             | Self::CentreLine(_)
-            | Self::DistanceField(_)
+            | Self::GodObjectSphere(_)
             | Self::Brute(_) => return self,
         };
         if points > 0 {
@@ -99,22 +107,24 @@ impl Method {
         self
     }
 
-    /// Whether the method keeps a proxy on the side of the bone that it came from. One that does not loses thin walls.
+    /// Whether the method keeps a proxy on the side of the bone that it came from. One that does
+    /// not loses thin walls.
     pub fn has_proxy(&self) -> bool {
-        matches!(self, Self::Thesis(_) | Self::CentreLine(_) | Self::DistanceField(_) | Self::Brute(_))
+        matches!(self, Self::Thesis(_) | Self::CentreLine(_) | Self::GodObjectSphere(_) | Self::Brute(_))
     }
 
-    /// Whether the method feels the tool's shaft too: then the tool must be held as a hand holds it, with its axis out of the bone.
+    /// Whether the method feels the tool's shaft too: then the tool must be held as a hand holds
+    /// it, with its axis out of the bone.
     pub fn has_shaft(&self) -> bool {
         match self {
-            Self::DistanceField(config) => config.shaft,
+            Self::GodObjectSphere(config) => config.shaft,
             Self::BurrAndShaft(_) | Self::CentreLine(_) | Self::SurfaceVertices(_) => true,
             _ => false,
         }
     }
 
     /// What a burr takes away under this method.
-    pub fn removal(&self) -> Law {
+    pub fn removal(&self) -> RemovalLaw {
         match self {
             Self::Thesis(config) => config.removal,
             Self::Pointshell(config) => config.removal,
@@ -124,7 +134,7 @@ impl Method {
             Self::BurrAndShaft(config) => config.removal,
             Self::CentreLine(config) => config.removal,
             Self::SurfaceVertices(config) => config.removal,
-            Self::DistanceField(config) => config.removal,
+            Self::GodObjectSphere(config) => config.removal,
             Self::Brute(config) => config.removal,
         }
     }
@@ -152,7 +162,7 @@ impl Method {
             }
             Self::VoxelSum(config) => Box::new(Penalty::new(tool, voxel_sum::Sum::new(tool), config.removal)),
             Self::Brute(config) => Box::new(brute::Brute::new(tool, *config)),
-            Self::DistanceField(config) => Box::new(distance_field::DistanceField::new(tool, *config)),
+            Self::GodObjectSphere(config) => Box::new(god_object_sphere::GodObjectSphere::new(tool, *config)),
         }
     }
 }

@@ -1,13 +1,15 @@
-//! The frame of the penalty methods: feel the bone at the hand's own pose, push back in proportion, remember nothing.
+//! The frame of the penalty methods: feel the bone at the hand's own pose, push back in proportion,
+//! remember nothing.
 //!
 //! # Theory
-//! A [`Feel`] looks at the bone with the tool where the hand has it and answers with a normal and a depth. The proxy is drawn that depth
-//! out along the normal.
+//! A [`PenaltyProbe`] looks at the bone with the tool where the hand has it and answers with a
+//! normal and a depth. The proxy is drawn that depth out along the normal.
 //!
 //! # When not to use it
-//! Against thin walls: past the middle of a wall the nearest way out leads to the far side, and a fast tool is through between two ticks.
+//! Against thin walls: past the middle of a wall the nearest way out leads to the far side, and a
+//! fast tool is through between two ticks.
 
-use crate::removal::{Burr, Cut, Law};
+use crate::removal::{Burr, Cut, RemovalLaw};
 use crate::rows::EVERYWHERE;
 use crate::{RigidContact, RigidStep};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
@@ -17,7 +19,7 @@ use trepan_volume::BoneVolume;
 const MAX_BITES: usize = 16384;
 
 /// What a penalty method knows to answer.
-pub(crate) trait Feel: Send {
+pub(crate) trait PenaltyProbe: Send {
     /// What the tool at `pose` feels; `None` without contact. Fills contacts and counts of `out`.
     fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt>;
 }
@@ -40,13 +42,13 @@ pub(crate) struct Penalty<F> {
     burr: Burr,
 }
 
-impl<F: Feel> Penalty<F> {
-    pub fn new(tool: &Tool, feel: F, removal: Law) -> Self {
+impl<F: PenaltyProbe> Penalty<F> {
+    pub fn new(tool: &Tool, feel: F, removal: RemovalLaw) -> Self {
         Self { feel, tool: *tool, proxy: Pose::IDENTITY, burr: Burr::new(removal, MAX_BITES) }
     }
 }
 
-impl<F: Feel> RigidContact for Penalty<F> {
+impl<F: PenaltyProbe> RigidContact for Penalty<F> {
     fn step(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool, dt_ms: f32, out: &mut RigidStep) {
         out.clear();
         if !tool.is_finite() {

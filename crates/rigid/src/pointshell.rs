@@ -1,7 +1,9 @@
-//! The voxmap point shell: every point of the tool in a bone voxel pushes by its depth under that voxel's tangent plane.
+//! The voxmap point shell: every point of the tool in a bone voxel pushes by its depth under that
+//! voxel's tangent plane.
 //!
 //! # Theory
-//! The tangent plane of a point passes through the centre of its voxel, with the point's own inward normal:
+//! The tangent plane of a point passes through the centre of its voxel, with the point's own inward
+//! normal:
 //! ```text
 //! dᵢ = (centre - pᵢ)·nᵢ ,  dᵢ > 0 only
 //! sum      d n = Σ dᵢ nᵢ · min(1, 10/N)      McNeely et al. 1999: a sum, reduced when more than ten points touch
@@ -12,14 +14,16 @@
 //! 466 points, 3 us. World mm.
 //!
 //! # Sources
-//! W. McNeely, K. Puterbaugh, J. Troy, *Six degree-of-freedom haptic rendering using voxel sampling*, SIGGRAPH 1999; M. Renz et al., *Stable haptic
-//! interaction with virtual environments using an adapted voxmap-pointshell algorithm*, Eurohaptics 2001.
+//! W. McNeely, K. Puterbaugh, J. Troy, *Six degree-of-freedom haptic rendering using voxel
+//! sampling*, SIGGRAPH 1999; M. Renz et al., *Stable haptic interaction with virtual environments
+//! using an adapted voxmap-pointshell algorithm*, Eurohaptics 2001.
 //!
 //! # When not to use it
-//! Deeper than a voxel: the depth of a point starts anew in each voxel, so that the force stays as small as at the surface.
+//! Deeper than a voxel: the depth of a point starts anew in each voxel, so that the force stays as
+//! small as at the surface.
 
-use crate::penalty::{Feel, Felt, Penalty, answer};
-use crate::removal::Law;
+use crate::penalty::{Felt, Penalty, PenaltyProbe, answer};
+use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
@@ -46,12 +50,12 @@ pub struct Config {
     /// How their pushes become one.
     pub combine: Combine,
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 impl Config {
     /// McNeely's sum.
-    pub const SUM: Self = Self { points: Pointshell::RIGID_COUNT, combine: Combine::Sum, removal: Law::RATE };
+    pub const SUM: Self = Self { points: Pointshell::RIGID_COUNT, combine: Combine::Sum, removal: RemovalLaw::RATE };
 }
 
 impl Default for Config {
@@ -60,7 +64,8 @@ impl Default for Config {
     }
 }
 
-/// The method for a tool of any shape, whose surface is `shell` (see [`mesh_shell`](crate::mesh_shell)). A burr cuts with the ball at its tip.
+/// The method for a tool of any shape, whose surface is `shell` (see
+/// [`mesh_shell`](crate::mesh_shell)). A burr cuts with the ball at its tip.
 pub fn with_shell(tool: &Tool, shell: Pointshell, config: &Config) -> Box<dyn RigidContact> {
     Box::new(Penalty::new(tool, Shell { shell, combine: config.combine }, config.removal))
 }
@@ -77,7 +82,7 @@ impl Shell {
     }
 }
 
-impl Feel for Shell {
+impl PenaltyProbe for Shell {
     fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let (mut push, mut moment) = (Vec3::ZERO, Vec3::ZERO);
         for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {

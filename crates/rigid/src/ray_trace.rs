@@ -1,25 +1,28 @@
-//! Rays from the tool's points inwards: how far each point must go back along its normal until it is out of the bone.
+//! Rays from the tool's points inwards: how far each point must go back along its normal until it
+//! is out of the bone.
 //!
 //! # Theory
-//! A point of the shell in bone marches along its inward normal nᵢ to where the density, trilinear between voxels, falls to the isovalue; the way is
-//! its depth dᵢ.
+//! A point of the shell in bone marches along its inward normal nᵢ to where the density, trilinear
+//! between voxels, falls to the isovalue; the way is its depth dᵢ.
 //! ```text
 //! n = Σ dᵢ nᵢ / |Σ dᵢ nᵢ| ,   d = max dᵢ (nᵢ·n)
 //! ```
 //!
 //! # Practice
-//! Steps of half a voxel, the last one by linear interpolation; 10 to 30 us. Sees below the voxel, as the isosurface of the picture does.
+//! Steps of half a voxel, the last one by linear interpolation; 10 to 30 us. Sees below the voxel,
+//! as the isosurface of the picture does.
 //!
 //! # Sources
-//! A. Petersik et al., *Haptic volume interaction with anatomic models at sub-voxel resolution*, HAPTICS 2002; D. Morris et al., *Visuohaptic simulation
-//! of bone surgery for training and evaluation*, IEEE CG&A 26 (2006).
+//! A. Petersik et al., *Haptic volume interaction with anatomic models at sub-voxel resolution*,
+//! HAPTICS 2002; D. Morris et al., *Visuohaptic simulation of bone surgery for training and
+//! evaluation*, IEEE CG&A 26 (2006).
 //!
 //! # When not to use it
 //! For a tool that is wholly in bone: the rays end at its centre, and there is no way out.
 
 use crate::RigidStep;
-use crate::penalty::{Feel, Felt, answer};
-use crate::removal::Law;
+use crate::penalty::{Felt, PenaltyProbe, answer};
+use crate::removal::RemovalLaw;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
 use trepan_volume::BoneVolume;
@@ -30,12 +33,12 @@ pub struct Config {
     /// Points of the shell.
     pub points: usize,
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { points: Pointshell::RIGID_COUNT, removal: Law::RATE }
+        Self { points: Pointshell::RIGID_COUNT, removal: RemovalLaw::RATE }
     }
 }
 
@@ -51,7 +54,7 @@ impl Rays {
     }
 }
 
-impl Feel for Rays {
+impl PenaltyProbe for Rays {
     fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let tip = pose.translation;
         let mut push = Vec3::ZERO;
@@ -73,7 +76,8 @@ impl Feel for Rays {
     }
 }
 
-/// The way from `point`, which is `over` HU in bone, along `inward` to the isovalue, at most `longest`, mm.
+/// The way from `point`, which is `over` HU in bone, along `inward` to the isovalue, at most
+/// `longest`, mm.
 pub(crate) fn way_out(bone: &BoneVolume, point: Vec3, inward: Vec3, over: f32, longest: f32, visited: &mut u32) -> f32 {
     let step = 0.5 * bone.spacing_mm();
     let (mut way, mut before) = (0.0, over);

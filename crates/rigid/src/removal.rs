@@ -5,16 +5,19 @@
 //! per tick:  hu ← hu - 1                                           for every voxel in contact
 //! rate:      V̇ = μ F ω(F) r / u                                    mm³/ms of bone at the reference density
 //! ```
-//! Rate is Archard's and Preston's law of abrasive wear, volume in proportion to load F times sliding speed ω r, written with a
-//! cutting ratio μ (tangential over normal force) and the specific energy u of the material. The [`Spindle`] loses speed under the torque μ F r and
+//! Rate is Archard's and Preston's law of abrasive wear, volume in proportion to load F times
+//! sliding speed ω r, written with a cutting ratio μ (tangential over normal force) and the
+//! specific energy u of the material. The [`Spindle`] loses speed under the torque μ F r and
 //! stalls; a stalled burr takes nothing. Over dt the volume is V̇ dt, whatever the tick rate.
 //!
-//! The energy to take a voxel from one density to another is `∫ u m(hu) dhu`: m is 1 in cortical bone, less in cancellous bone, linear between
-//! the borders of the dental classes D3 (350 HU) and D1 (1250 HU). It depends on densities only, so that no voxel needs to remember what it was.
+//! The energy to take a voxel from one density to another is `∫ u m(hu) dhu`: m is 1 in cortical
+//! bone, less in cancellous bone, linear between the borders of the dental classes D3 (350 HU) and
+//! D1 (1250 HU). It depends on densities only, so that no voxel needs to remember what it was.
 //!
-//! The burr's ball, swept from the proxy to the device, bounds the removal. With s the distance of a voxel from its surface, in voxels, positive outside, no voxel
-//! falls below `iso + 1000 s`: its centre leaves the bone only once it is inside the ball, and the crossing between voxels
-//! ends on the ball itself. So the cut surface is smooth below the size of a voxel.
+//! The burr's ball, swept from the proxy to the device, bounds the removal. With s the distance of
+//! a voxel from its surface, in voxels, positive outside, no voxel falls below `iso + 1000 s`: its
+//! centre leaves the bone only once it is inside the ball, and the crossing between voxels ends on
+//! the ball itself. So the cut surface is smooth below the size of a voxel.
 //!
 //! ```text
 //! hu ┤ • • •╲            the ramp that the burr can cut to: slope 1000 HU a voxel
@@ -23,18 +26,21 @@
 //! ```
 //!
 //! # Practice
-//! F = stiffness · depth, N, up to `max_load_n`. Volume counts by fraction, `½ + (hu - iso)/750` cut to 0..1, so that it is smooth in
-//! time and the same as geometry's after the cut. Densities are whole HU: a fixed dither of voxel and tick rounds them, so that a loss of less than
-//! one HU a tick counts in full over time and the same path gives the same bytes.
+//! F = stiffness · depth, N, up to `max_load_n`. Volume counts by fraction, `½ + (hu - iso)/750`
+//! cut to 0..1, so that it is smooth in time and the same as geometry's after the cut. Densities
+//! are whole HU: a fixed dither of voxel and tick rounds them, so that a loss of less than one HU a
+//! tick counts in full over time and the same path gives the same bytes.
 //!
 //! # Sources
-//! J. F. Archard, *Contact and rubbing of flat surfaces*, J. Appl. Phys. 24 (1953). Specific energy per volume constant per bone: M. Arbabtafti et al.,
-//! *Physics-based haptic simulation of bone machining*, IEEE Trans. Haptics 4 (2011). Classes D1 to D4 by CT number: C. E. Misch, *Contemporary implant
-//! dentistry*, 1999. **The numbers in [`Law::RATE`] are uncalibrated**: they are set so that
-//! 1 to 2 N open a 7 mm skull with a 3 mm burr in 5 to 10 s.
+//! J. F. Archard, *Contact and rubbing of flat surfaces*, J. Appl. Phys. 24 (1953). Specific energy
+//! per volume constant per bone: M. Arbabtafti et al., *Physics-based haptic simulation of bone
+//! machining*, IEEE Trans. Haptics 4 (2011). Classes D1 to D4 by CT number: C. E. Misch,
+//! *Contemporary implant dentistry*, 1999. **The numbers in [`RemovalLaw::RATE`] are
+//! uncalibrated**: they are set so that 1 to 2 N open a 7 mm skull with a 3 mm burr in 5 to 10 s.
 //!
 //! # When not to use it
-//! `per-tick` for anything but comparison: it removes twice as much at twice the tick rate, and nothing physical drives it.
+//! `per-tick` for anything but comparison: it removes twice as much at twice the tick rate, and
+//! nothing physical drives it.
 
 use crate::RigidStep;
 use crate::rows::{GridBall, rows_within};
@@ -45,8 +51,9 @@ use trepan_volume::{AIR_HU, BoneVolume};
 
 /// Fall of the ramp at the burr's surface, HU per voxel.
 const RAMP_HU: f32 = 1000.0;
-/// Span of density around the isovalue in which a voxel counts as partly bone, HU. A span as wide as the ramp would count curved
-/// cuts too large, a narrower one surfaces along the grid: of 40 strokes in as many orientations the worst was 1.2 % off, 1.9 % with either.
+/// Span of density around the isovalue in which a voxel counts as partly bone, HU. A span as wide
+/// as the ramp would count curved cuts too large, a narrower one surfaces along the grid: of 40
+/// strokes in as many orientations the worst was 1.2 % off, 1.9 % with either.
 const PARTIAL_HU: f32 = 750.0;
 /// How far in front of the proxy the burr bites, voxels: the first layer, not what lies behind it.
 const BITE_VOXELS: f32 = 1.5;
@@ -61,7 +68,7 @@ const BEYOND_MM: f32 = 3.0;
 
 /// How much bone goes in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Law {
+pub enum RemovalLaw {
     /// The thesis: every voxel in contact loses a fixed density each tick.
     PerTick {
         /// Loss, HU per tick. The thesis takes 1.
@@ -75,7 +82,8 @@ pub enum Law {
         cutting_ratio: f32,
         /// Specific energy u at 1500 HU, N/mm² (= J/cm³). Higher is slower.
         specific_energy_mpa: f32,
-        /// What the energy to lower the density of cancellous bone is of that for cortical bone. 1 makes no difference between them.
+        /// What the energy to lower the density of cancellous bone is of that for cortical bone. 1
+        /// makes no difference between them.
         cancellous_share: f32,
         /// Stiffness that turns depth into load, N/mm: that of the force model.
         stiffness: f32,
@@ -84,7 +92,7 @@ pub enum Law {
     },
 }
 
-impl Law {
+impl RemovalLaw {
     /// The thesis's law: 1 HU a tick.
     pub const PER_TICK: Self = Self::PerTick { decrement_hu: 1.0 };
 
@@ -106,12 +114,14 @@ impl Law {
         }
     }
 
-    /// Bone of the reference density that a burr of `radius_mm`, pressed `depth_mm` deep, takes in `dt_ms`, mm³; 0 for `PerTick`.
+    /// Bone of the reference density that a burr of `radius_mm`, pressed `depth_mm` deep, takes in
+    /// `dt_ms`, mm³; 0 for `PerTick`.
     pub fn volume_mm3(&self, radius_mm: f32, depth_mm: f32, dt_ms: f32) -> f32 {
         self.turned(radius_mm, depth_mm, dt_ms, &mut false).0
     }
 
-    /// The volume of [`volume_mm3`](Self::volume_mm3), and the speed of the spindle, 1/min, which may be `stalled` before or after.
+    /// The volume of [`volume_mm3`](Self::volume_mm3), and the speed of the spindle, 1/min, which
+    /// may be `stalled` before or after.
     fn turned(&self, radius_mm: f32, depth_mm: f32, dt_ms: f32, stalled: &mut bool) -> (f32, f32) {
         let &Self::Rate { spindle, cutting_ratio, specific_energy_mpa, stiffness, max_load_n, .. } = self else {
             return (0.0, 0.0);
@@ -122,7 +132,8 @@ impl Law {
         (if volume.is_finite() { volume.max(0.0) } else { 0.0 }, rpm)
     }
 
-    /// How hard bone of `hu` is to wear for each HU, where bone of the reference density all the way down to air is 1.
+    /// How hard bone of `hu` is to wear for each HU, where bone of the reference density all the
+    /// way down to air is 1.
     fn hardness(&self, hu: f32) -> f32 {
         let Self::Rate { cancellous_share, .. } = *self else { return 1.0 };
         let cancellous = cancellous_share.clamp(0.01, 1.0);
@@ -135,7 +146,7 @@ impl Law {
     }
 }
 
-impl Default for Law {
+impl Default for RemovalLaw {
     fn default() -> Self {
         Self::RATE
     }
@@ -171,7 +182,7 @@ struct Bite {
 
 /// The cutting side of one tool.
 pub(crate) struct Burr {
-    law: Law,
+    law: RemovalLaw,
     bites: Vec<Bite>,
     limit: usize,
     /// Cuts so far, for the dither.
@@ -186,7 +197,7 @@ pub(crate) struct Burr {
 
 impl Burr {
     /// A burr that reaches at most `limit` voxels a tick.
-    pub fn new(law: Law, limit: usize) -> Self {
+    pub fn new(law: RemovalLaw, limit: usize) -> Self {
         Self {
             law,
             bites: Vec::with_capacity(limit),
@@ -213,9 +224,11 @@ impl Burr {
         self.bites.iter().map(|bite| bite.voxel)
     }
 
-    /// Takes bone away and says in `out` how much, how fast the spindle turned and whether it broke through.
+    /// Takes bone away and says in `out` how much, how fast the spindle turned and whether it broke
+    /// through.
     ///
-    /// `read` gives the densities of the row along x through a voxel: the bone's, or those of a copy of it.
+    /// `read` gives the densities of the row along x through a voxel: the bone's, or those of a
+    /// copy of it.
     pub fn cut<R: Fn(i32) -> i16>(
         &mut self,
         bone: &BoneVolume,
@@ -229,7 +242,7 @@ impl Burr {
             return;
         }
         self.find_bites(bone, cut, read);
-        if let Law::PerTick { decrement_hu } = self.law {
+        if let RemovalLaw::PerTick { decrement_hu } = self.law {
             self.take(bone, |bite| decrement_hu * f32::from(bite.reach_hu > 0.0), out);
             return;
         }
@@ -246,7 +259,7 @@ impl Burr {
 
     /// Takes density from `voxels` by the per-tick law, wherever they are.
     pub fn wear(&mut self, bone: &BoneVolume, voxels: impl Iterator<Item = IVec3>, out: &mut RigidStep) {
-        let Law::PerTick { decrement_hu } = self.law else { return };
+        let RemovalLaw::PerTick { decrement_hu } = self.law else { return };
         self.forward = Vec3::ZERO;
         self.bites.clear();
         for voxel in voxels.take(self.limit) {
@@ -256,9 +269,11 @@ impl Burr {
         self.take(bone, |_| decrement_hu, out);
     }
 
-    /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device, or on its surface.
+    /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device,
+    /// or on its surface.
     ///
-    /// The ball of the device alone would miss the flanks that hold a proxy far behind: the burr would stall.
+    /// The ball of the device alone would miss the flanks that hold a proxy far behind: the burr
+    /// would stall.
     fn find_bites<R: Fn(i32) -> i16>(&mut self, bone: &BoneVolume, cut: &Cut, read: impl Fn(IVec3) -> R) {
         self.bites.clear();
         let (device, proxy) = (bone.grid_of(cut.device), bone.grid_of(cut.proxy));

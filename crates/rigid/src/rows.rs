@@ -1,4 +1,5 @@
-//! Rows of voxels that fill a ball with a ball-shaped hole: what a round tool can touch, without what it has inside.
+//! Rows of voxels that fill a ball with a ball-shaped hole: what a round tool can touch, without
+//! what it has inside.
 //!
 //! ```text
 //!    ┄┄────┄┄

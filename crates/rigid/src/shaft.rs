@@ -1,8 +1,9 @@
 //! The bone voxels around a tool's shaft.
 //!
 //! # Theory
-//! The shaft is long and thin and mostly in the air. It is cut into slices; a slice is looked into only where a brick that it meets has
-//! ever held bone, and there row by row: along x the distance from the axis is the root of a quadratic, so a row's ends are solved for.
+//! The shaft is long and thin and mostly in the air. It is cut into slices; a slice is looked into
+//! only where a brick that it meets has ever held bone, and there row by row: along x the distance
+//! from the axis is the root of a quadratic, so a row's ends are solved for.
 //!
 //! ```text
 //!   ║  ║
@@ -45,7 +46,8 @@ impl Shaft {
         self.start + s * self.axis
     }
 
-    /// Calls `visit` once with each bone voxel whose centre is within `reach` of the axis between the ends. Returns the voxels looked at.
+    /// Calls `visit` once with each bone voxel whose centre is within `reach` of the axis between
+    /// the ends. Returns the voxels looked at.
     pub fn around(&self, bone: &BoneVolume, reach: f32, mut visit: impl FnMut(IVec3)) -> u32 {
         let [nx, ny, nz] = bone.dims().map(|n| n as i32);
         let last = IVec3::new(nx, ny, nz) - 1;

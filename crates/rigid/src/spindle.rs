@@ -5,11 +5,12 @@
 //! ```text
 //! ω = ω₀ (1 - τ/τₛ) ,   P = τ ω ≤ τₛ ω₀ / 4
 //! ```
-//! so that its greatest power gives τₛ. Under a least speed it stalls: it stops at once, and starts again when the load has gone down to half.
+//! so that its greatest power gives τₛ. Under a least speed it stalls: it stops at once, and starts
+//! again when the load has gone down to half.
 //!
 //! # Practice
-//! Speeds in 1/min, torques in N mm, power in W (= N mm/ms). Run-up is not modelled: a burr's inertia is some g mm², which 20 N mm bring to
-//! speed within tens of ms.
+//! Speeds in 1/min, torques in N mm, power in W (= N mm/ms). Run-up is not modelled: a burr's
+//! inertia is some g mm², which 20 N mm bring to speed within tens of ms.
 //!
 //! # When not to use it
 //! For motors with a speed control: they hold ω₀ up to their greatest power and give way at once.
@@ -47,7 +48,8 @@ impl Spindle {
         if rpm >= self.stall_rpm && rpm.is_finite() { rpm } else { 0.0 }
     }
 
-    /// Speed under a torque of a spindle that is perhaps `stalled`, and takes note of whether it is then.
+    /// Speed under a torque of a spindle that is perhaps `stalled`, and takes note of whether it is
+    /// then.
     pub fn turn(&self, torque_nmm: f32, stalled: &mut bool) -> f32 {
         let waits = *stalled && torque_nmm > 0.5 * self.stall_nmm();
         let rpm = if waits { 0.0 } else { self.rpm(torque_nmm) };

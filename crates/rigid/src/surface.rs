@@ -1,15 +1,17 @@
 //! The bone's surface near a point as a set of small discs.
 //!
 //! # Theory
-//! Where a grid edge joins a bone voxel (density ≥ isovalue) to one that is not, the density, linear along the edge, crosses the isovalue
-//! at `x`. There stands a disc. Its normal n starts as the gradient of the density's quadratic B-spline, and is then that of the plane which fits
-//! the densities h of the 27 voxels around best that lie within a voxel of n's plane:
+//! Where a grid edge joins a bone voxel (density ≥ isovalue) to one that is not, the density,
+//! linear along the edge, crosses the isovalue at `x`. There stands a disc. Its normal n starts as
+//! the gradient of the density's quadratic B-spline, and is then that of the plane which fits the
+//! densities h of the 27 voxels around best that lie within a voxel of n's plane:
 //! ```text
 //! minimise Σ w (h - iso + g·d)² ,   w = B(d) · max(0, 1 - (n·d)²) ,   d: from x to the voxel,  n = g/|g|
 //! ```
-//! What is further off is flat bone or flat air, and its gradient that of the grid's corners: the spline alone is up to 2.6 degrees off on planes, the fit
-//! 0.3. All of it is continuous, so that nothing jumps at voxel borders. The distance to a set of discs is 1-Lipschitz by
-//! construction, and each disc is convex: a half-space that just leaves the disc out is a safe constraint.
+//! What is further off is flat bone or flat air, and its gradient that of the grid's corners: the
+//! spline alone is up to 2.6 degrees off on planes, the fit 0.3. All of it is continuous, so that
+//! nothing jumps at voxel borders. The distance to a set of discs is 1-Lipschitz by construction,
+//! and each disc is convex: a half-space that just leaves the disc out is a safe constraint.
 //!
 //! ```text
 //!   ·    ·    ·    ·      · air voxel, • bone voxel
@@ -20,9 +22,11 @@
 //! A wall one voxel thick still has its crossings, which a smoothed isosurface would lose.
 //!
 //! # Practice
-//! Lengths are voxels, in a frame shifted to a whole voxel near the tool ([`Discs::base`]). The cost is one load per voxel
-//! visited, six per bone voxel, 27 per disc that the tool can reach: 3 to 20 us for a ball of 12 voxels. A disc that was there before keeps its normal; while
-//! density goes away the discs move at each tick, and every fourth is turned. The capacity is fixed; what does not fit is counted.
+//! Lengths are voxels, in a frame shifted to a whole voxel near the tool ([`Discs::base`]). The
+//! cost is one load per voxel visited, six per bone voxel, 27 per disc that the tool can reach: 3
+//! to 20 us for a ball of 12 voxels. A disc that was there before keeps its normal; while density
+//! goes away the discs move at each tick, and every fourth is turned. The capacity is fixed; what
+//! does not fit is counted.
 
 use crate::rows::{GridBall, rows};
 use crate::shaft::Shaft;
@@ -36,7 +40,8 @@ const CLAMP_HU: i32 = 1000;
 
 /// How far the rim of a disc may stand out over a surface that bends away, voxels.
 const STAND_OUT: f32 = 0.05;
-/// While bone goes away normals are found anew in turns of so many ticks; in so few a burr takes some hundredths of a voxel.
+/// While bone goes away normals are found anew in turns of so many ticks; in so few a burr takes
+/// some hundredths of a voxel.
 const TURNS: u32 = 4;
 /// Discs of before that are kept; a power of two.
 const CACHE: usize = 4096;
@@ -188,7 +193,8 @@ impl Discs {
         self.bounds = (IVec3::MAX, IVec3::MIN);
     }
 
-    /// The box in the grid that holds all bone and air within `margin` voxels of a disc; there must be one.
+    /// The box in the grid that holds all bone and air within `margin` voxels of a disc; there must
+    /// be one.
     pub fn bounds(&self, margin: i32) -> (IVec3, IVec3) {
         (self.bounds.0 + self.base - margin, self.bounds.1 + self.base + margin)
     }
@@ -204,8 +210,8 @@ impl Discs {
         &self.list
     }
 
-    /// Finds the discs whose centres are at most `reach` voxels from grid point `at`. Voxels nearer than `hollow` are not looked at.
-    /// The window must hold all voxels up to `reach` and two more.
+    /// Finds the discs whose centres are at most `reach` voxels from grid point `at`. Voxels nearer
+    /// than `hollow` are not looked at. The window must hold all voxels up to `reach` and two more.
     pub fn gather(&mut self, window: &Window, at: Vec3, hollow: f32, reach: f32) {
         self.forget();
         self.base = at.round().as_ivec3();
@@ -217,8 +223,9 @@ impl Discs {
         });
     }
 
-    /// Moves the discs to where the crossings are now, and turns one in [`TURNS`] of those with a point within `reach` of `centre` to its normal.
-    /// The edges that cross must be the same as when they were gathered.
+    /// Moves the discs to where the crossings are now, and turns one in [`TURNS`] of those with a
+    /// point within `reach` of `centre` to its normal. The edges that cross must be the same as
+    /// when they were gathered.
     pub fn refresh(&mut self, window: &Window, centre: Vec3, reach: f32) {
         self.visited = self.list.len() as u32;
         self.wear = self.wear.wrapping_add(1);
@@ -235,8 +242,9 @@ impl Discs {
         }
     }
 
-    /// Gives those discs their normals that have a point within `reach` of the tool, the part of which nearest to a place is at `centre`, voxels
-    /// from [`Self::base`]. The others are of no use.
+    /// Gives those discs their normals that have a point within `reach` of the tool, the part of
+    /// which nearest to a place is at `centre`, voxels from [`Self::base`]. The others are of no
+    /// use.
     pub fn shape(&mut self, densities: &impl Densities, centre: impl Fn(Vec3) -> Vec3, reach: f32) {
         for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
             let apart = known.centre.distance_squared(centre(known.centre));
@@ -257,7 +265,8 @@ impl Discs {
         }
     }
 
-    /// Finds the discs whose centres are at most `reach` voxels from the axis of a shaft, in grid coordinates.
+    /// Finds the discs whose centres are at most `reach` voxels from the axis of a shaft, in grid
+    /// coordinates.
     pub fn gather_along(&mut self, bone: &BoneVolume, shaft: &Shaft, reach: f32) {
         self.forget();
         self.base = shaft.start.round().as_ivec3();
@@ -304,7 +313,8 @@ impl Discs {
     }
 }
 
-/// Where the density passes the isovalue on the edge from bone voxel `local` by `step`, voxels from `base`.
+/// Where the density passes the isovalue on the edge from bone voxel `local` by `step`, voxels from
+/// `base`.
 fn crossing(window: &impl Densities, base: IVec3, local: IVec3, step: IVec3) -> Vec3 {
     let (inside, outside) = (f32::from(window.hu(base + local)), f32::from(window.hu(base + local + step)));
     let along = (inside - f32::from(window.isovalue())) / (inside - outside);
@@ -316,7 +326,8 @@ fn disc(window: &impl Densities, base: IVec3, x: Vec3, edge: Vec3, radius: f32) 
     let block = Block::read(window, base, x);
     let shape = Shape::of(&block);
     let size = shape.slope.length();
-    // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than its kernel.
+    // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than
+    // its kernel.
     if size < 1.0 || -shape.slope.dot(edge) < -0.5 * size {
         return Disc { centre: x, normal: edge, radius: SMALLEST.min(radius), shaft: false };
     }
@@ -327,7 +338,8 @@ fn disc(window: &impl Densities, base: IVec3, x: Vec3, edge: Vec3, radius: f32) 
     Disc { centre: x, normal, radius, shaft: false }
 }
 
-/// The densities around a place over the isovalue, HU, and where the middle one is seen from the place.
+/// The densities around a place over the isovalue, HU, and where the middle one is seen from the
+/// place.
 struct Block {
     hu: [[[f32; 3]; 3]; 3],
     off: Vec3,
@@ -354,8 +366,9 @@ impl Block {
         [taps(-self.off.x), taps(-self.off.y), taps(-self.off.z)]
     }
 
-    /// The normal of the plane through the place that fits the densities within a voxel of the plane of `normal` best; `None` when they do
-    /// not say. A scanner's density rises for a voxel or so about a surface and is flat beyond: what is flat would bend the slope.
+    /// The normal of the plane through the place that fits the densities within a voxel of the
+    /// plane of `normal` best; `None` when they do not say. A scanner's density rises for a voxel
+    /// or so about a surface and is flat beyond: what is flat would bend the slope.
     fn fitted(&self, normal: Vec3) -> Option<Vec3> {
         let [tx, ty, tz] = self.taps();
         let (mut square, mut mixed, mut moment) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
@@ -373,7 +386,8 @@ impl Block {
                 }
             }
         }
-        // The inverse of a symmetric matrix but for its determinant, by cofactors: only the direction counts.
+        // The inverse of a symmetric matrix but for its determinant, by cofactors: only the
+        // direction counts.
         let straight = Vec3::new(square.y * square.z, square.x * square.z, square.x * square.y) - mixed * mixed;
         let crossed = Vec3::new(mixed.y * mixed.z, mixed.x * mixed.z, mixed.x * mixed.y) - square * mixed;
         times(straight, crossed, moment).try_normalize().filter(|found| found.dot(normal) > SAME)
@@ -411,7 +425,8 @@ impl Shape {
         shape
     }
 
-    /// How much the surface bends away from `normal` where it bends most, times the slope; negative where it bends up everywhere.
+    /// How much the surface bends away from `normal` where it bends most, times the slope; negative
+    /// where it bends up everywhere.
     fn bend(&self, normal: Vec3) -> f32 {
         let times = |v: Vec3| times(self.straight, self.mixed, v);
         let (u, v) = normal.any_orthonormal_pair();

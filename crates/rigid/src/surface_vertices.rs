@@ -1,26 +1,31 @@
-//! The surface approximation: vertices on burr and shaft, each pushed out of the bone that it is in.
+//! The surface approximation: vertices on burr and shaft, each pushed out of the bone that it is
+//! in.
 //!
 //! # Theory
-//! Vertices lie on the ball and on the cylinder. One whose density is that of bone is pushed inwards, to where the density falls to the
-//! isovalue; force and torque are the mean over the vertices that touch:
+//! Vertices lie on the ball and on the cylinder. One whose density is that of bone is pushed
+//! inwards, to where the density falls to the isovalue; force and torque are the mean over the
+//! vertices that touch:
 //! ```text
 //! d n = Σ dᵢ nᵢ / N ,   τ = k Σ (xᵢ - tip) × dᵢ nᵢ / N
 //! ```
 //!
 //! # Practice
-//! 466 vertices on the ball, rings of eight along the shaft. Vertices whose brick has never held bone cost nothing more. World mm.
+//! 466 vertices on the ball, rings of eight along the shaft. Vertices whose brick has never held
+//! bone cost nothing more. World mm.
 //!
 //! # Sources
-//! F. Asenjo, *Haptic and visual simulation of bone milling*, KTH 2008, "surface approximation algorithm", as the thesis tells it (2.3.1). The way out along
-//! the inward normal and the mean instead of the sum, whose stiffness would depend on the number of vertices, are ours.
+//! F. Asenjo, *Haptic and visual simulation of bone milling*, KTH 2008, "surface approximation
+//! algorithm", as the thesis tells it (2.3.1). The way out along the inward normal and the mean
+//! instead of the sum, whose stiffness would depend on the number of vertices, are ours.
 //!
 //! # When not to use it
-//! Where depth is wanted: a mean over a cap is half of what its deepest vertex has. Against thin walls: it has no proxy.
+//! Where depth is wanted: a mean over a cap is half of what its deepest vertex has. Against thin
+//! walls: it has no proxy.
 
 use crate::RigidStep;
-use crate::penalty::{Feel, Felt, answer};
+use crate::penalty::{Felt, PenaltyProbe, answer};
 use crate::ray_trace::{over_iso, way_out};
-use crate::removal::Law;
+use crate::removal::RemovalLaw;
 use core::f32::consts::TAU;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
@@ -39,12 +44,12 @@ pub struct Config {
     /// Way between two rings of vertices on the shaft, mm.
     pub ring_mm: f32,
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 impl Default for Config {
     fn default() -> Self {
-        Self { points: Pointshell::RIGID_COUNT, ring_mm: 1.0, removal: Law::RATE }
+        Self { points: Pointshell::RIGID_COUNT, ring_mm: 1.0, removal: RemovalLaw::RATE }
     }
 }
 
@@ -73,7 +78,7 @@ impl Vertices {
     }
 }
 
-impl Feel for Vertices {
+impl PenaltyProbe for Vertices {
     fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let (mut push, mut moment, mut burr) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
         for (at, (point, inward)) in self.shell.points.iter().zip(&self.shell.inward_normals).enumerate() {

@@ -1,9 +1,9 @@
 //! How the thesis's proxy moves: along the way towards its goal until bone stands before it.
 //!
 //! # Theory
-//! A ball on its way touches first, if the bone is flat across the way, with the pole that leads. The line rules follow
-//! that pole; the sphere rule tests the whole shell at close steps (thesis, Figure 3.7), which a ball that grazes a wall
-//! or meets a cavity narrower than itself needs.
+//! A ball on its way touches first, if the bone is flat across the way, with the pole that leads.
+//! The line rules follow that pole; the sphere rule tests the whole shell at close steps (thesis,
+//! Figure 3.7), which a ball that grazes a wall or meets a cavity narrower than itself needs.
 //!
 //! # When not to use it
 //! The line rules, for tools wider than a cavity: they pass bone that lies beside the line.
@@ -42,7 +42,8 @@ pub(crate) struct Ball<'a> {
 }
 
 impl Ball<'_> {
-    /// Moves from `from` towards `to`, world mm, and stops in light touch with the first bone. Adds to `visited`.
+    /// Moves from `from` towards `to`, world mm, and stops in light touch with the first bone. Adds
+    /// to `visited`.
     pub fn sweep(&self, bone: &BoneVolume, how: Sweep, from: Vec3, to: Vec3, visited: &mut u32) -> Stop {
         let way = to - from;
         let length = way.length();
@@ -66,7 +67,8 @@ impl Ball<'_> {
         }
     }
 
-    /// Share of the way at which a point of the shell first enters bone. A ball that touches already may move where no more of it touches.
+    /// Share of the way at which a point of the shell first enters bone. A ball that touches
+    /// already may move where no more of it touches.
     fn whole(&self, bone: &BoneVolume, from: Vec3, to: Vec3, visited: &mut u32) -> Option<f32> {
         let (enter, leave) = clipped(from, to, bone.bounds().inflated(self.radius_mm + bone.spacing_mm()))?;
         let steps = (from.distance(to) * (leave - enter) / (0.33 * bone.spacing_mm())).ceil().clamp(1.0, 4096.0) as u32;
@@ -96,7 +98,8 @@ impl Ball<'_> {
 fn stepped(bone: &BoneVolume, from: Vec3, to: Vec3, visited: &mut u32) -> Option<f32> {
     let (enter, leave) = clipped(from, to, bone.bounds().inflated(bone.spacing_mm()))?;
     let share_of_step = bone.spacing_mm() / from.distance(to);
-    // Counted from the start of the way, as printed: where it enters the box of the bone makes no difference to what is skipped.
+    // Counted from the start of the way, as printed: where it enters the box of the bone makes no
+    // difference to what is skipped.
     let (first, last) = ((enter / share_of_step).floor(), (leave / share_of_step).ceil());
     let steps = (last - first).clamp(0.0, 1e5) as u32;
     (0..=steps).map(|step| ((first + step as f32) * share_of_step).min(1.0)).find(|&share| {

@@ -1,32 +1,38 @@
-//! The thesis's method, whole: point shell against voxels, Algorithm 1, sweeps and a god-object on the mean plane.
+//! The thesis's method, whole: point shell against voxels, Algorithm 1, sweeps and a god-object on
+//! the mean plane.
 //!
 //! # Theory
 //! In one tick:
 //! 1. sweep the proxy towards the device, stop in light touch with the first bone voxel;
-//! 2. colliding box = box of the tool ∩ box of the skull; when it is empty, sweep once more: free way, no contact; else the
-//!    normal is against the sweep, with a small preset depth;
+//! 2. colliding box = box of the tool ∩ box of the skull; when it is empty, sweep once more: free
+//!    way, no contact; else the normal is against the sweep, with a small preset depth;
 //! 3. contact set: voxels of bone that hold points of the shell; none: as in 2;
 //! 4. while drilling, each of these voxels loses density;
-//! 5. normal = mean of the voxels' normals (Eq 3.4), depth = the largest of the voxels' mean depths (Algorithm 1), each point's depth being its distance
-//!    under the tangent plane: through the voxel's centre, with the point's normal (McNeely et al. 1999);
-//! 6. god-object on the plane of that normal, reached by one more sweep; if it is not where the device is, the depth is the
-//!    distance between the two.
+//! 5. normal = mean of the voxels' normals (Eq 3.4), depth = the largest of the voxels' mean depths
+//!    (Algorithm 1), each point's depth being its distance under the tangent plane: through the
+//!    voxel's centre, with the point's normal (McNeely et al. 1999);
+//! 6. god-object on the plane of that normal, reached by one more sweep; if it is not where the
+//!    device is, the depth is the distance between the two.
 //!
-//! What is printed and does not hold is an option: even or crowded points, the sweep's steps, Algorithm 1's sum that is never set back
-//! to zero, removal per tick. [`Config::PRINTED`] has them all as printed; the default has them put right.
+//! What is printed and does not hold is an option: even or crowded points, the sweep's steps,
+//! Algorithm 1's sum that is never set back to zero, removal per tick. [`Config::PRINTED`] has them
+//! all as printed; the default has them put right.
 //!
 //! # Practice
-//! 466 points; 5 to 15 us a tick. The depth steps by fractions of a voxel as points enter and leave voxels: the force at 2 N/mm changes by
-//! tenths of a newton from tick to tick, as in the thesis's own figures.
+//! 466 points; 5 to 15 us a tick. The depth steps by fractions of a voxel as points enter and leave
+//! voxels: the force at 2 N/mm changes by tenths of a newton from tick to tick, as in the thesis's
+//! own figures.
 //!
 //! # Sources
-//! Chapter 3 of the thesis; W. McNeely, K. Puterbaugh, J. Troy, *Six degree-of-freedom haptic rendering using voxel sampling*, SIGGRAPH 1999; M. Renz
-//! et al., *Stable haptic interaction with virtual environments using an adapted voxmap-pointshell algorithm*, Eurohaptics 2001.
+//! Chapter 3 of the thesis; W. McNeely, K. Puterbaugh, J. Troy, *Six degree-of-freedom haptic
+//! rendering using voxel sampling*, SIGGRAPH 1999; M. Renz et al., *Stable haptic interaction with
+//! virtual environments using an adapted voxmap-pointshell algorithm*, Eurohaptics 2001.
 //!
 //! # When not to use it
-//! For force feedback on a hand: [`distance_field`](crate::distance_field) is smoother and nearer to the surface. It is here for comparison.
+//! For force feedback on a hand: [`god_object_sphere`](crate::god_object_sphere) is smoother and
+//! nearer to the surface. It is here for comparison.
 
-use crate::removal::{Burr, Cut, Law};
+use crate::removal::{Burr, Cut, RemovalLaw};
 use crate::rows::EVERYWHERE;
 use crate::sweep::{Ball, Stop, Sweep};
 use crate::{RigidContact, RigidStep};
@@ -47,12 +53,13 @@ pub struct Config {
     pub spread: Spread,
     /// How the way of the proxy is searched.
     pub sweep: Sweep,
-    /// Whether Algorithm 1 keeps its sum from voxel to voxel, as printed. Depths then depend on the order of the voxels.
+    /// Whether Algorithm 1 keeps its sum from voxel to voxel, as printed. Depths then depend on the
+    /// order of the voxels.
     pub running_sum: bool,
     /// Depth when only the sweep has met bone, mm.
     pub preset_depth_mm: f32,
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 impl Config {
@@ -63,14 +70,20 @@ impl Config {
         sweep: Sweep::Steps,
         running_sum: true,
         preset_depth_mm: 0.1,
-        removal: Law::PER_TICK,
+        removal: RemovalLaw::PER_TICK,
     };
 }
 
 impl Default for Config {
     /// With the errors put right.
     fn default() -> Self {
-        Self { spread: Spread::Fibonacci, sweep: Sweep::Line, running_sum: false, removal: Law::RATE, ..Self::PRINTED }
+        Self {
+            spread: Spread::Fibonacci,
+            sweep: Sweep::Line,
+            running_sum: false,
+            removal: RemovalLaw::RATE,
+            ..Self::PRINTED
+        }
     }
 }
 
@@ -99,7 +112,8 @@ pub struct Thesis {
 }
 
 impl Thesis {
-    /// A shell on the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts at the first tool pose.
+    /// A shell on the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts
+    /// at the first tool pose.
     pub fn new(tool: &Tool, config: Config) -> Self {
         let config = Config { points: config.points.clamp(8, 20_000), ..config };
         let tool = Tool { tip_radius_mm: tool.tip_radius_mm.clamp(1e-3, 100.0), ..*tool };
@@ -194,8 +208,8 @@ impl Thesis {
     /// Step 4.
     fn drill(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) {
         match self.config.removal {
-            Law::PerTick { .. } => self.burr.wear(bone, self.touched.iter().map(|t| t.voxel), out),
-            Law::Rate { .. } => {
+            RemovalLaw::PerTick { .. } => self.burr.wear(bone, self.touched.iter().map(|t| t.voxel), out),
+            RemovalLaw::Rate { .. } => {
                 let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
                 let depth_mm = device.distance(proxy);
                 let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms, within: EVERYWHERE };
@@ -253,7 +267,8 @@ impl RigidContact for Thesis {
     }
 }
 
-/// The entry of `voxel`, made when it is new. There are never more voxels than points, for which there is room.
+/// The entry of `voxel`, made when it is new. There are never more voxels than points, for which
+/// there is room.
 fn slot<'a>(touched: &'a mut Vec<Touched>, table: &mut [u16], voxel: IVec3) -> &'a mut Touched {
     let mask = table.len() - 1;
     let hash = voxel.x.wrapping_mul(73_856_093) ^ voxel.y.wrapping_mul(19_349_663) ^ voxel.z.wrapping_mul(83_492_791);

@@ -1,8 +1,9 @@
 //! Walks over every voxel that a segment touches, and stops a tool at the first one that is bone.
 //!
 //! # Theory
-//! Amanatides and Woo 1987: keep for each axis the parameter at which the segment crosses into the next voxel, and always
-//! take the nearest. No voxel is skipped, which fixed steps of a voxel's edge (the thesis's sweep) do at corners.
+//! Amanatides and Woo 1987: keep for each axis the parameter at which the segment crosses into the
+//! next voxel, and always take the nearest. No voxel is skipped, which fixed steps of a voxel's
+//! edge (the thesis's sweep) do at corners.
 //!
 //! ```text
 //! a ──●─┐        visited in order of entry
@@ -10,7 +11,8 @@
 //! ```
 //!
 //! # Practice
-//! f64 inside, so that long segments end in the right voxel. The number of visits is bounded by the caller's segment.
+//! f64 inside, so that long segments end in the right voxel. The number of visits is bounded by the
+//! caller's segment.
 //!
 //! # Sources
 //! J. Amanatides, A. Woo, *A fast voxel traversal algorithm for ray tracing*, Eurographics 1987.
@@ -19,8 +21,9 @@ use glam::{DVec3, IVec3};
 use trepan_geometry::{Aabb, Vec3};
 use trepan_volume::BoneVolume;
 
-/// Calls `visit` with each voxel from `from` to `to` (grid coordinates, voxel centres at whole numbers) and the share of the way at
-/// which it is entered, until `visit` returns true or the end is reached. Returns the share at which it was stopped.
+/// Calls `visit` with each voxel from `from` to `to` (grid coordinates, voxel centres at whole
+/// numbers) and the share of the way at which it is entered, until `visit` returns true or the end
+/// is reached. Returns the share at which it was stopped.
 pub(crate) fn traverse(from: Vec3, to: Vec3, mut visit: impl FnMut(IVec3, f32) -> bool) -> Option<f32> {
     let (a, b) = (from.as_dvec3() + 0.5, to.as_dvec3() + 0.5);
     let way = b - a;
@@ -69,7 +72,8 @@ pub(crate) fn clipped(from: Vec3, to: Vec3, bounds: Aabb) -> Option<(f32, f32)> 
     (enter <= leave).then_some((enter, leave))
 }
 
-/// Share of the way from `from` to `to`, world mm, at which a point enters the first bone voxel. Adds the voxels visited to `visited`.
+/// Share of the way from `from` to `to`, world mm, at which a point enters the first bone voxel.
+/// Adds the voxels visited to `visited`.
 pub(crate) fn first_bone(bone: &BoneVolume, from: Vec3, to: Vec3, visited: &mut u32) -> Option<f32> {
     let (enter, leave) = clipped(from, to, bone.bounds().inflated(bone.spacing_mm()))?;
     let (a, b) = (bone.grid_of(from.lerp(to, enter)), bone.grid_of(from.lerp(to, leave)));

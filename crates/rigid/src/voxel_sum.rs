@@ -1,25 +1,29 @@
-//! Contact from the bone inside the ball: its volume gives the depth, its centre of mass the direction.
+//! Contact from the bone inside the ball: its volume gives the depth, its centre of mass the
+//! direction.
 //!
 //! # Theory
-//! The ball overlaps bone of volume V with centre of mass m. Were the bone flat, V would be a spherical cap of height h:
+//! The ball overlaps bone of volume V with centre of mass m. Were the bone flat, V would be a
+//! spherical cap of height h:
 //! ```text
 //! V = π h² (r - h/3) ,   n = (c - m)/|c - m|
 //! ```
-//! so h is the depth. This is the contact of Agus et al., who sum voxels as small spheres and put h into Hertz's law; here the force
-//! model is the caller's.
+//! so h is the depth. This is the contact of Agus et al., who sum voxels as small spheres and put h
+//! into Hertz's law; here the force model is the caller's.
 //!
 //! # Practice
-//! Voxels count by fraction, ½ + (hu - iso)/1000. One load per voxel in the ball: 2 to 5 us for a ball of 12 voxels. Smooth, since it is a sum.
+//! Voxels count by fraction, ½ + (hu - iso)/1000. One load per voxel in the ball: 2 to 5 us for a
+//! ball of 12 voxels. Smooth, since it is a sum.
 //!
 //! # Sources
 //! M. Agus et al., *Real-time haptic and visual simulation of bone dissection*, Presence 12 (2003).
 //!
 //! # When not to use it
-//! Against edges and thin walls, where there is less bone than a cap has: the depth reads too small.
+//! Against edges and thin walls, where there is less bone than a cap has: the depth reads too
+//! small.
 
 use crate::RigidStep;
-use crate::penalty::{Feel, Felt, answer};
-use crate::removal::Law;
+use crate::penalty::{Felt, PenaltyProbe, answer};
+use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
 use core::f32::consts::PI;
 use trepan_contact::Contact;
@@ -30,7 +34,7 @@ use trepan_volume::BoneVolume;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Config {
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 pub(crate) struct Sum {
@@ -43,7 +47,7 @@ impl Sum {
     }
 }
 
-impl Feel for Sum {
+impl PenaltyProbe for Sum {
     fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let tip = pose.translation;
         let centre = bone.grid_of(tip);

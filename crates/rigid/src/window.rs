@@ -1,24 +1,26 @@
 //! The densities around the tool, copied close together.
 //!
 //! # Theory
-//! A ball touches some thousands of voxels of the millions. They are kept in a cube whose edge is a power of two and which
-//! wraps around: voxel (i, j, k) lies at (i mod n, j mod n, k mod n). When the tool moves on by a voxel only the layer that comes
-//! in is read.
+//! A ball touches some thousands of voxels of the millions. They are kept in a cube whose edge is a
+//! power of two and which wraps around: voxel (i, j, k) lies at (i mod n, j mod n, k mod n). When
+//! the tool moves on by a voxel only the layer that comes in is read.
 //!
 //! ```text
 //! │c d a b│  →  │c d e b│     window b..e after a..d: e took a's place
 //! ```
 //!
 //! # Practice
-//! A look costs about a nanosecond, with no test for borders. The window is a copy: what its owner changes it is told ([`Window::set`]), what
-//! others change it finds by the versions of the bricks that it meets ([`Window::renew`]), a nanosecond each.
+//! A look costs about a nanosecond, with no test for borders. The window is a copy: what its owner
+//! changes it is told ([`Window::set`]), what others change it finds by the versions of the bricks
+//! that it meets ([`Window::renew`]), a nanosecond each.
 
 use glam::IVec3;
 use trepan_volume::{BRICK, BoneVolume};
 
 /// Largest edge, log2: 128 voxels, 4 MB.
 const MAX_BITS: u32 = 7;
-/// Bricks along an edge for which versions are kept: more than the largest window meets; a power of two.
+/// Bricks along an edge for which versions are kept: more than the largest window meets; a power of
+/// two.
 const BRICKS: i32 = 32;
 
 pub(crate) struct Window {
@@ -44,14 +46,16 @@ impl Window {
         self.filled = false;
     }
 
-    /// Makes the window hold all voxels within `half` of `centre`. Returns the voxels read, or `None` when that is more than it can hold.
+    /// Makes the window hold all voxels within `half` of `centre`. Returns the voxels read, or
+    /// `None` when that is more than it can hold.
     pub fn cover(&mut self, bone: &BoneVolume, centre: IVec3, half: i32) -> Option<u32> {
         let bits = ((2 * half + 2).max(8) as u32).next_power_of_two().trailing_zeros();
         if bits > MAX_BITS {
             return None;
         }
         let edge = 1 << bits;
-        // The least shift that holds the box: the layers left behind are read again only when the tool comes back.
+        // The least shift that holds the box: the layers left behind are read again only when the
+        // tool comes back.
         let mut low = self.low.clamp(centre + half + 1 - edge, centre - half);
         let far = (low - self.low).abs().max_element() >= edge;
         if !self.filled || bits != self.bits || far || self.isovalue != bone.isovalue() {

@@ -16,7 +16,8 @@ fn built(method: &Method, tool: &Tool, start: Vec3) -> Box<dyn RigidContact> {
     contact
 }
 
-/// How deep a burr of `radius` sits in before the method feels it: the line approximation has no thickness.
+/// How deep a burr of `radius` sits in before the method feels it: the line approximation has no
+/// thickness.
 fn sinks(method: &Method, radius: f32) -> f32 {
     if matches!(method, Method::CentreLine(_)) { radius } else { 0.0 }
 }
@@ -27,6 +28,9 @@ fn names_are_unique_and_found_again() {
         assert_eq!(Method::named(method.name()), Some(method));
     }
     assert_eq!(Method::named("no such method"), None);
+    for (old, now) in [("distance-field", "god-object-sphere"), ("distance-field-shaft", "god-object-sphere-shaft")] {
+        assert_eq!(Method::named(old), Method::named(now), "the name of version 0.1");
+    }
     assert!(Method::all().contains(&Method::RECOMMENDED));
 }
 
@@ -118,7 +122,8 @@ fn drilling_removes_bone_and_only_where_the_burr_has_been() {
                 lost += 1;
                 let voxel = [i % 28, i / 28 % 28, i / 784];
                 let centre = after.centre_of(voxel).as_vec3();
-                // The thesis takes voxels that hold points of the shell: half the diagonal of a voxel more.
+                // The thesis takes voxels that hold points of the shell: half the diagonal of a
+                // voxel more.
                 let reach = 2.001 + if matches!(method, Method::Thesis(_)) { 0.5 * 0.87 } else { 0.0 };
                 assert!(strokes.iter().any(|&s| distance(centre, s) < reach), "{} at {centre}", method.name());
             }
@@ -128,7 +133,8 @@ fn drilling_removes_bone_and_only_where_the_burr_has_been() {
             "{} removed nothing",
             method.name()
         );
-        // The per-tick law, and the small depths of an average, are too slow to reach the isovalue within this stroke.
+        // The per-tick law, and the small depths of an average, are too slow to reach the isovalue
+        // within this stroke.
         let slow = ["thesis-printed", "pointshell-average"].contains(&method.name());
         assert!(removed > 0.0 || slow, "{} counted nothing", method.name());
         assert!(before != after, "{} cut nothing", method.name());

@@ -3,9 +3,10 @@
 mod common;
 use common::{at, bone};
 use trepan_geometry::{Pose, Tool, Vec3};
-use trepan_rigid::{Method, RigidStep, removal::Law};
+use trepan_rigid::{Method, RigidStep, removal::RemovalLaw};
 
-/// Drills for `total_ms` with a spring of 2 N/mm pressing with about `newtons`, and returns the volume, mm³.
+/// Drills for `total_ms` with a spring of 2 N/mm pressing with about `newtons`, and returns the
+/// volume, mm³.
 fn pressed(dt_ms: f32, total_ms: f32, newtons: f32) -> f32 {
     let bone = bone([28, 28, 28], 0.5, |p| p.z);
     let mut contact = Method::RECOMMENDED.build(&Tool::burr(2.0));
@@ -31,9 +32,10 @@ fn the_volume_does_not_depend_on_the_tick_rate() {
 
 #[test]
 fn the_volume_is_what_the_law_says() {
-    // The scene's bone is 1400 HU, 0.93 of the reference in energy; the burr at work sits another 0.15 voxel deeper. Near its surface and at the
-    // foot of the cut there is less than full density, so that somewhat more volume goes than the law gives for whole bone.
-    let law = Law::RATE.volume_mm3(2.0, 0.75 + 0.075, 1500.0) / 0.93;
+    // The scene's bone is 1400 HU, 0.93 of the reference in energy; the burr at work sits another
+    // 0.15 voxel deeper. Near its surface and at the foot of the cut there is less than full
+    // density, so that somewhat more volume goes than the law gives for whole bone.
+    let law = RemovalLaw::RATE.volume_mm3(2.0, 0.75 + 0.075, 1500.0) / 0.93;
     let volume = pressed(1.0, 1500.0, 1.5);
     println!("law {law} removed {volume}");
     assert!((volume / law - 1.0).abs() < 0.15, "law {law} mm³, removed {volume} mm³");
@@ -71,14 +73,16 @@ fn the_hole_has_the_shape_of_the_burr() {
     contact.reset(Pose::from_translation(Vec3::Z * 2.0));
     let mut out = RigidStep::default();
     let mut removed = 0.0;
-    // A stroke so slow that everything in the burr's way goes: the device sinks 1 mm and moves 6 mm across.
+    // A stroke so slow that everything in the burr's way goes: the device sinks 1 mm and moves 6 mm
+    // across.
     for t in 0..6000 {
         let sunk = (t as f32 / 2000.0).min(1.0);
         let across = (t as f32 / 4000.0 - 0.5).clamp(0.0, 1.0) * 6.0 - 3.0;
         contact.step(&bone, &at(Vec3::new(across, 0.0, 2.0 - sunk)), true, 2.0, &mut out);
         removed += out.removed_mm3;
     }
-    // Swept volume below z = 0: a spherical cap (radius 2, height 1) and a segment of a cylinder 6 mm long.
+    // Swept volume below z = 0: a spherical cap (radius 2, height 1) and a segment of a cylinder 6
+    // mm long.
     let (r, h) = (2.0f32, 1.0f32);
     let cap = std::f32::consts::PI * h * h * (3.0 * r - h) / 3.0;
     let segment = r * r * ((r - h) / r).acos() - (r - h) * (2.0 * r * h - h * h).sqrt();
@@ -88,11 +92,12 @@ fn the_hole_has_the_shape_of_the_burr() {
     assert!((removed / truth - 1.0).abs() < 0.02, "removed {removed} mm³ of {truth} mm³");
 }
 
-/// Volume that a burr of 2 mm takes in half a second of bone of `hu`, mm³, and the spindle's last speed.
-fn half_a_second(hu: f32, newtons: f32, law: Law) -> (f32, f32) {
+/// Volume that a burr of 2 mm takes in half a second of bone of `hu`, mm³, and the spindle's last
+/// speed.
+fn half_a_second(hu: f32, newtons: f32, law: RemovalLaw) -> (f32, f32) {
     let bone = common::dense([28, 28, 28], 0.5, hu, |p| p.z);
-    let config = trepan_rigid::distance_field::Config { removal: law, ..Default::default() };
-    let mut contact = Method::DistanceField(config).build(&Tool::burr(2.0));
+    let config = trepan_rigid::god_object_sphere::Config { removal: law, ..Default::default() };
+    let mut contact = Method::GodObjectSphere(config).build(&Tool::burr(2.0));
     contact.reset(Pose::from_translation(Vec3::Z * 2.0));
     let (mut out, mut removed, mut rpm) = (RigidStep::default(), 0.0, 0.0);
     for _ in 0..500 {
@@ -105,21 +110,24 @@ fn half_a_second(hu: f32, newtons: f32, law: Law) -> (f32, f32) {
 
 #[test]
 fn cancellous_bone_goes_faster_than_cortical_and_a_loaded_spindle_slower() {
-    let (light, dense) = (half_a_second(700.0, 1.5, Law::RATE).0, half_a_second(1400.0, 1.5, Law::RATE).0);
+    let (light, dense) =
+        (half_a_second(700.0, 1.5, RemovalLaw::RATE).0, half_a_second(1400.0, 1.5, RemovalLaw::RATE).0);
     println!("cancellous {light} cortical {dense} mm³");
     assert!((1.3..4.0).contains(&(light / dense)), "{light} {dense}");
-    let speeds = [0.5, 1.5, 3.0].map(|newtons| half_a_second(1400.0, newtons, Law::RATE).1);
+    let speeds = [0.5, 1.5, 3.0].map(|newtons| half_a_second(1400.0, newtons, RemovalLaw::RATE).1);
     assert!(speeds.windows(2).all(|pair| pair[1] < pair[0] - 1000.0), "{speeds:?}");
 }
 
 #[test]
 fn a_stalled_burr_cuts_nothing() {
-    let Law::Rate { spindle, cutting_ratio, specific_energy_mpa, cancellous_share, stiffness, max_load_n } = Law::RATE
+    let RemovalLaw::Rate { spindle, cutting_ratio, specific_energy_mpa, cancellous_share, stiffness, max_load_n } =
+        RemovalLaw::RATE
     else {
         unreachable!("the default is a rate")
     };
     let weak = trepan_rigid::spindle::Spindle { power_w: 1.0, ..spindle };
-    let law = Law::Rate { spindle: weak, cutting_ratio, specific_energy_mpa, cancellous_share, stiffness, max_load_n };
+    let law =
+        RemovalLaw::Rate { spindle: weak, cutting_ratio, specific_energy_mpa, cancellous_share, stiffness, max_load_n };
     assert!(half_a_second(1400.0, 0.3, law).0 > 0.0);
     let (removed, rpm) = half_a_second(1400.0, 3.0, law);
     assert_eq!((removed, rpm), (0.0, 0.0));

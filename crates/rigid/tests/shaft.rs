@@ -3,7 +3,7 @@
 mod common;
 use common::{bone, held};
 use trepan_geometry::{Tool, ToolState, Vec3};
-use trepan_rigid::{Method, RigidContact, RigidStep, distance_field};
+use trepan_rigid::{Method, RigidContact, RigidStep, god_object_sphere};
 use trepan_volume::BoneVolume;
 
 const BORE_MM: f32 = 4.0;
@@ -30,7 +30,8 @@ fn lean(contact: &mut dyn RigidContact, bone: &BoneVolume, x: f32, drilling: boo
     (out, removed)
 }
 
-/// Height of the rim's contact over the tip along the shaft, and how deep the rim is in the shaft, for a tip at `x`.
+/// Height of the rim's contact over the tip along the shaft, and how deep the rim is in the shaft,
+/// for a tip at `x`.
 fn rim(x: f32) -> (f32, f32) {
     let rim = Vec3::new(BORE_MM - x, 0.0, 4.0);
     let along = rim.dot(axis(30.0));
@@ -41,10 +42,11 @@ fn rim(x: f32) -> (f32, f32) {
 fn a_shaft_on_the_rim_of_a_bore_turns_the_tool_about_its_tip() {
     let bone = bored();
     for method in Method::all().into_iter().filter(Method::has_shaft) {
-        // The line has no thickness: it meets the rim 1.2 mm later, and with a vertex every 2 mm some way below it.
+        // The line has no thickness: it meets the rim 1.2 mm later, and with a vertex every 2 mm
+        // some way below it.
         let (x, place, arm) = match method {
             // A sharp rim is rounded by a quarter of a voxel.
-            Method::DistanceField(_) => (0.8, 0.13, 0.05),
+            Method::GodObjectSphere(_) => (0.8, 0.13, 0.05),
             Method::CentreLine(_) => (0.8 + SHAFT_MM / axis(30.0).z, 1.0, 0.4),
             _ => (0.8, 0.4, 0.15),
         };
@@ -55,7 +57,7 @@ fn a_shaft_on_the_rim_of_a_bore_turns_the_tool_about_its_tip() {
         assert!((out.manifold.depth_mm - depth).abs() < place, "{name}: {} mm", out.manifold.depth_mm);
         assert!((couple.y / -height - 1.0).abs() < arm, "{name}: {couple}");
         assert!(couple.x.abs() + couple.z.abs() < 0.1 * height, "{name}: {couple}");
-        if let Method::DistanceField(_) = method {
+        if let Method::GodObjectSphere(_) = method {
             assert!(out.manifold.normal.dot(axis(30.0)).abs() < 0.05, "{name}: across the shaft");
         }
     }
@@ -75,7 +77,7 @@ fn a_shaft_does_not_cut() {
 #[test]
 fn a_turning_hand_does_not_press_the_shaft_through_the_rim() {
     let bone = bored();
-    let mut contact = Method::DistanceField(distance_field::Config::WITH_SHAFT).build(&Tool::burr(2.0));
+    let mut contact = Method::GodObjectSphere(god_object_sphere::Config::WITH_SHAFT).build(&Tool::burr(2.0));
     let (mut out, mut deepest, mut last, mut worst) = (RigidStep::default(), 0.0f32, Vec3::ZERO, 0.0f32);
     contact.reset(held(Vec3::new(0.0, 0.0, -4.0), Vec3::Z));
     for t in 0..1000 {

@@ -5,7 +5,8 @@ use common::{at, bone, scanned};
 use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_rigid::{Method, RigidStep};
 
-/// Whether a ball driven through a wall of `voxels` thickness at `mm_per_tick`, `degrees` off its normal, comes out on the far side.
+/// Whether a ball driven through a wall of `voxels` thickness at `mm_per_tick`, `degrees` off its
+/// normal, comes out on the far side.
 fn tunnels(method: &Method, radius: f32, voxels: f32, mm_per_tick: f32, degrees: f32, n: Vec3) -> bool {
     let wall = scanned([48, 48, 48], 0.5, |p| (p.dot(n).abs() / 0.5 - 0.5 * voxels).max(-0.4), 1.0);
     let way = (-n * degrees.to_radians().cos() + n.any_orthonormal_vector() * degrees.to_radians().sin()).normalize();

@@ -1,4 +1,5 @@
-//! A craniotomy on a synthetic head without threads, clock or window: the haptic stage alone, as fast as it goes.
+//! A craniotomy on a synthetic head without threads, clock or window: the haptic stage alone, as
+//! fast as it goes.
 //!
 //! `cargo run --release -p trepan-simulator --example dry_run`
 

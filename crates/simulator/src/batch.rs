@@ -1,8 +1,10 @@
-//! Many recordings run again as one job: `--device replay:FOLDER`, of which `--shard I/N` takes every Nth.
+//! Many recordings run again as one job: `--device replay:FOLDER`, of which `--shard I/N` takes
+//! every Nth.
 //!
 //! # Practice
-//! Each recording gets a folder of its own under `--out`, named after it; one that fails or is not whole is told and does not stop the others. Jobs of a cluster take one shard each and
-//! need nothing of one another; `cargo xtask merge` puts their summaries into one table.
+//! Each recording gets a folder of its own under `--out`, named after it; one that fails or is not
+//! whole is told and does not stop the others. Jobs of a cluster take one shard each and need
+//! nothing of one another; `cargo xtask merge` puts their summaries into one table.
 
 use crate::command::printable;
 use crate::error::SessionError;
@@ -12,7 +14,8 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use trepan_haptics::DeviceName;
 
-/// The recordings of a folder that are this shard's, in the order of their names; `None` when the device is not a folder of recordings.
+/// The recordings of a folder that are this shard's, in the order of their names; `None` when the
+/// device is not a folder of recordings.
 pub fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, SessionError> {
     let named = options.device.as_deref().and_then(|name| name.parse::<DeviceName>().ok());
     let folder = match named {

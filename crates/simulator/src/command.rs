@@ -4,7 +4,7 @@ use crate::batch;
 use crate::case::choice::{Built, PlannedCase, plan_case};
 use crate::compare::compare;
 use crate::device_test;
-use crate::models::Wish;
+use crate::models::ModelRequest;
 use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, Task, rate};
 use crate::recordings;
 use crate::report::summary::{CutOff, slow};
@@ -16,8 +16,8 @@ use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
-/// Runs a program. Exit code 0 for a session that ended, 2 for what the user can put right, 1 for the rest and for the
-/// replay of a recording that is not whole, 128 + n after signal n.
+/// Runs a program. Exit code 0 for a session that ended, 2 for what the user can put right, 1 for
+/// the rest and for the replay of a recording that is not whole, 128 + n after signal n.
 ///
 /// `built_in` is the case that is taken when no image is given.
 pub fn command(program: Program, built_in: Inputs) -> ExitCode {
@@ -67,7 +67,7 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
     let done = match task {
         Task::Plan { case, patient, tolerances, rate_hz, picture } => {
             let wish = tolerances.check().and_then(|()| rate((*rate_hz).into())).map_err(SessionError::Usage);
-            let wish = wish.and_then(|()| Wish::to_plan(program, patient, *tolerances, *rate_hz, *picture));
+            let wish = wish.and_then(|()| ModelRequest::to_plan(program, patient, *tolerances, *rate_hz, *picture));
             wish.and_then(|wish| planned(program, case.as_deref(), patient, built_in, wish))
         }
         Task::Case(CaseTask::Series { folder }) => list_series(folder),
@@ -116,7 +116,7 @@ fn planned(
     case: Option<&Path>,
     patient: &Patient,
     built_in: Inputs,
-    wish: Wish,
+    wish: ModelRequest,
 ) -> Result<ExitCode, SessionError> {
     let card = || driver::open().is_ok_and(|gpu| !gpu.is_software());
     let PlannedCase { models, notes } = plan_case(program, case, patient, built_in, wish, card)?;

@@ -1,8 +1,9 @@
 //! Two recorded sessions side by side on one page: scores, what happened, forces over time.
 //!
 //! # Practice
-//! Scores come from the recorded ticks by the same sums as a session's own, so they need no case and no second run: a minute is read in a second. Files go by
-//! "first" and "second": their names may hold a patient's.
+//! Scores come from the recorded ticks by the same sums as a session's own, so they need no case
+//! and no second run: a minute is read in a second. Files go by "first" and "second": their names
+//! may hold a patient's.
 //!
 //! # When not to use it
 //! To ask whether two builds give the same forces: replay one, the summary says so bit by bit.

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-/// A session that could not begin or end. Everything that the user can put right exits with 2, the rest with 1.
+/// A session that could not begin or end. Everything that the user can put right exits with 2, the
+/// rest with 1.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
     /// A flag or a combination of flags.

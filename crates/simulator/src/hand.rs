@@ -1,4 +1,5 @@
-//! What holds the tools: the devices that the options name, and what the force guard of each must know of it.
+//! What holds the tools: the devices that the options name, and what the force guard of each must
+//! know of it.
 
 use crate::case::plan::Plan;
 use crate::error::SessionError;
@@ -10,12 +11,12 @@ use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{self, Script, Site};
 use trepan_haptics::{
-    Aside, Capabilities, Clutch, DeviceName, HapticDevice, Watch, Workspace, hardware, mouse, simulated,
+    Capabilities, Clutch, DeviceName, HapticDevice, ThreadedDevice, Watch, Workspace, hardware, mouse, simulated,
 };
 use trepan_link::Recording;
 
 /// What holds the tool.
-pub struct Hand {
+pub struct OpenDevice {
     /// For the haptic loop; `None` for a replay, which brings its own hand.
     pub device: Option<Box<dyn HapticDevice>>,
     /// The window's end of the mouse.
@@ -26,7 +27,7 @@ pub struct Hand {
     pub watching: Option<Watching>,
 }
 
-impl Hand {
+impl OpenDevice {
     /// Opens the device.
     pub fn open(
         name: &DeviceName,
@@ -48,7 +49,7 @@ impl Hand {
         hand.device = match name {
             DeviceName::Script(name) => Some(Box::new(script(name)?)),
             DeviceName::Simulated(name) => {
-                let (config, grip) = (simulated::Config::default(), simulated::Hand::FIRM);
+                let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
                 Some(Box::new(simulated::Simulated::new(config, grip, Box::new(script(name)?))))
             }
             DeviceName::Mouse => {
@@ -80,14 +81,15 @@ pub struct SecondHold {
 }
 
 impl SecondHold {
-    /// Opens the device. One of metal lives on a thread of its own, so that its link never holds the first hand up.
+    /// Opens the device. One of metal lives on a thread of its own, so that its link never holds
+    /// the first hand up.
     pub fn open(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
         let script = |name: &str| scripted(name, options, plan);
         let (device, watch): (Box<dyn HapticDevice>, _) = match name {
             DeviceName::Script(operation) => (Box::new(script(operation)?), None),
             DeviceName::Simulated(operation) => {
-                let (config, grip) = (simulated::Config::default(), simulated::Hand::FIRM);
+                let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
                 (Box::new(simulated::Simulated::new(config, grip, Box::new(script(operation)?))), None)
             }
             metal => {
@@ -96,7 +98,7 @@ impl SecondHold {
                 beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
                 let opened = hardware::open(metal, beside).ok_or_else(|| unfit(metal))?.map_err(|f| fault(&f))?;
                 bears(&opened.device.capabilities(), rate_hz)?;
-                (Box::new(Aside::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
+                (Box::new(ThreadedDevice::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
             }
         };
         Ok(Self { device, watch })
@@ -157,12 +159,14 @@ pub fn faults(watch: &Watch) -> Option<String> {
     (watch.count() > 0).then(|| format!("the device had {} faults{last}", watch.count()))
 }
 
-/// A device's small box in front of the site: its middle 20 mm outside the entry, seen as the picture is.
+/// A device's small box in front of the site: its middle 20 mm outside the entry, seen as the
+/// picture is.
 fn workspace(site: &Site, scale: f32) -> Workspace {
     Workspace::facing(site.entry - 20.0 * site.inward, site.inward, Vec3::Z, scale)
 }
 
-/// The device that is named; without a name the mouse where there is a window, else the program's script.
+/// The device that is named; without a name the mouse where there is a window, else the program's
+/// script.
 pub fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
     let script = || DeviceName::Script(program.script().into());
     let name = match &options.device {
@@ -180,8 +184,9 @@ pub fn device_name(program: Program, options: &Options, windowed: bool) -> Resul
     Ok(name)
 }
 
-/// What the force guard and the walls must know of a device; recorded, so that a replay feels alike.
-pub struct Feel {
+/// What the force guard and the walls must know of a device; recorded, so that a replay feels
+/// alike.
+pub struct DeviceLimits {
     /// Seen in the patient: its encoder step is enlarged as its motion is.
     device: Capabilities,
     /// World mm per device mm.
@@ -202,14 +207,15 @@ const MASS: &str = "moving_mass_g";
 const DAMPING: &str = "damping_n_ms_per_mm";
 const SCALE: &str = "scale";
 
-impl Feel {
+impl DeviceLimits {
     /// Of a device at hand, whose motion is enlarged by `scale`.
     pub fn of(device: &Capabilities, scale: f32) -> Self {
         let position_resolution_mm = scale * device.position_resolution_mm;
         Self { device: Capabilities { position_resolution_mm, ..device.clone() }, scale }
     }
 
-    /// What a recorded session knew of the device of a hand ([`FIRST`], [`SECOND`]); nothing where there is no recording.
+    /// What a recorded session knew of the device of a hand ([`FIRST`], [`SECOND`]); nothing where
+    /// there is no recording.
     pub fn recorded(recording: Option<&Recording>, hand: &str) -> Self {
         let config = recording.map(|recording| &recording.header.config);
         let number = |name: &str| config.and_then(|c| c.get(&format!("{hand}{name}"))?.parse().ok()).unwrap_or(0.0f32);
@@ -226,7 +232,7 @@ impl Feel {
         Self { device, scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0) }
     }
 
-    /// What [`Feel::recorded`] reads.
+    /// What [`DeviceLimits::recorded`] reads.
     pub fn entries(&self, hand: &str) -> [(String, String); 8] {
         let device = &self.device;
         [

@@ -1,8 +1,10 @@
-//! The simulators: threads, clocks, phases, warnings, scores, and a session from its flags to its files.
+//! The simulators: threads, clocks, phases, warnings, scores, and a session from its flags to its
+//! files.
 //!
 //! # Theory
-//! Three loops turn side by side and exchange newest values without waiting: the haptic tick at 1 kHz or more, the
-//! collision step, the solver step; a fourth thread draws. Each loop's body is a stage without a clock:
+//! Three loops turn side by side and exchange newest values without waiting: the haptic tick at 1
+//! kHz or more, the collision step, the solver step; a fourth thread draws. Each loop's body is a
+//! stage without a clock:
 //!
 //! | stage | reads | gives |
 //! |---|---|---|
@@ -13,7 +15,8 @@
 //! [`threads`] runs the stages live; [`lockstep`] runs them again from a recording, bit for bit.
 //!
 //! # Practice
-//! [`Session::open`] finds everything that a user can get wrong before anything is written; [`Session::run`] runs and writes.
+//! [`Session::open`] finds everything that a user can get wrong before anything is written;
+//! [`Session::run`] runs and writes.
 //!
 //! # When not to use it
 //! To use one method in a program of your own: take its crate.
@@ -34,9 +37,9 @@ mod recordings;
 mod report;
 mod run;
 mod session;
+mod session_setup;
 mod show;
 mod stages;
-mod table;
 
 pub use case::cache::Cache;
 pub use case::choice::{Built, build_case};
@@ -52,12 +55,12 @@ pub use models::{BoneSummary, Facts, ModelSummary, Models, PictureSummary, Tissu
 pub use operation::Operation;
 pub use options::{Options, Patient, Tolerances};
 pub use program::{Phase, Program, called};
-pub use report::against::Against;
+pub use report::plan_comparison::PlanComparison;
 pub use report::regions::{Region, regions};
 pub use report::summary::Summary;
 pub use run::clock::{Clock, Schedule};
 pub use run::stop::Stop;
-pub use run::{Cells, Eyes, Outcome, Replayed, SolverOutcome, Stages, Ticks, Times, Tissue, View};
+pub use run::{Cells, Outcome, RenderInputs, Replayed, SolverOutcome, Stages, Ticks, Times, Tissue, View};
 pub use run::{lockstep, threads};
 pub use session::{Ended, Session};
 pub use stages::alarms::Limits;
@@ -68,4 +71,4 @@ pub use stages::score::ScoreKeeper;
 pub use stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 pub use stages::settling::Settling;
 pub use stages::skull_wall::SkullWall;
-pub use stages::solver_step::{EACH, Mishaps, REST_MOTION_MM, SolverStage};
+pub use stages::solver_step::{EACH, REST_MOTION_MM, SolverFaults, SolverStage};

@@ -1,4 +1,6 @@
-//! What the operation is: flap, fluid lost, what must not be touched, how stiff the brain is, how fast the ticks come. From the options, else from the recording that is run again, else the usual.
+//! What the operation is: flap, fluid lost, what must not be touched, how stiff the brain is, how
+//! fast the ticks come. From the options, else from the recording that is run again, else the
+//! usual.
 
 use crate::case::tissue::TissueClass;
 use crate::options::{MODULI_KPA, Options, RATES_HZ};
@@ -8,7 +10,7 @@ use trepan_link::Recording;
 /// Diameter of the flap that the script of that name cuts when none is asked for, mm.
 const SCRIPTED_FLAP_MM: f32 = 24.0;
 /// Share of the fluid's lift that is lost when the dura is opened.
-const FLUID_LOST: f32 = 0.05;
+const CSF_LOSS: f32 = 0.05;
 /// Young's modulus of the brain, kPa.
 const YOUNG_KPA: f32 = 3.0;
 /// Haptic ticks a second.
@@ -20,17 +22,18 @@ pub struct Operation {
     /// Diameter of the planned flap, mm; 0 for a burr hole alone.
     pub flap_mm: f32,
     /// Share of the lift of the brain's fluid that is lost when the dura is opened, 0 to 1.
-    pub fluid_lost: f32,
+    pub csf_loss: f32,
     /// Tissue that no tool may come close to.
     pub forbidden: Vec<TissueClass>,
     /// Young's modulus of the brain, kPa.
     pub young_kpa: f32,
     /// Haptic ticks a second.
     pub rate_hz: f32,
-    /// Whether a tool for the brain can be had only once the skull is open; not where another's session is watched.
+    /// Whether a tool for the brain can be had only once the skull is open; not where another's
+    /// session is watched.
     pub opening_needed: bool,
-    /// Whether force waits for a deliberate act after a fault of the device; not where another's session is watched, nor in a recording of
-    /// before it did.
+    /// Whether force waits for a deliberate act after a fault of the device; not where another's
+    /// session is watched, nor in a recording of before it did.
     pub force_waits: bool,
 }
 
@@ -48,7 +51,10 @@ impl Operation {
         };
         Self {
             flap_mm: flap.unwrap_or(0.0),
-            fluid_lost: options.fluid_lost.or_else(|| number("fluid_lost")).unwrap_or(FLUID_LOST),
+            csf_loss: options
+                .csf_loss
+                .or_else(|| number("csf_loss").or_else(|| number("fluid_lost")))
+                .unwrap_or(CSF_LOSS),
             forbidden: options.forbid.clone().or_else(listed).unwrap_or_else(|| vec![TissueClass::Vessel]),
             young_kpa: options
                 .young_modulus_kpa
@@ -68,7 +74,7 @@ impl Operation {
         let forbidden: Vec<&str> = self.forbidden.iter().map(|class| class.name()).collect();
         [
             ("flap_mm".into(), self.flap_mm.to_string()),
-            ("fluid_lost".into(), self.fluid_lost.to_string()),
+            ("csf_loss".into(), self.csf_loss.to_string()),
             ("forbidden".into(), forbidden.join(",")),
             ("young_modulus_kpa".into(), self.young_kpa.to_string()),
             ("rate_hz".into(), self.rate_hz.to_string()),
@@ -88,13 +94,9 @@ mod tests {
         let parse = |line: &str| Options::try_parse_from(line.split(' ')).unwrap();
         let script = DeviceName::Script("flap".into());
         let usual = Operation::of(&parse("x"), &DeviceName::Mouse, None);
-        assert_eq!(
-            (usual.flap_mm, usual.fluid_lost, &usual.forbidden[..]),
-            (0.0, FLUID_LOST, &[TissueClass::Vessel][..])
-        );
+        assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, CSF_LOSS, &[TissueClass::Vessel][..]));
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
-        let line =
-            "x --flap 30 --forbid tumour,vessel --fluid-lost 0 --young-modulus-kpa 6 --rate-hz 500 --watch other";
+        let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --young-modulus-kpa 6 --rate-hz 500 --watch other";
         let asked = Operation::of(&parse(line), &script, None);
         assert!(!asked.opening_needed && usual.opening_needed);
         let mut recording = Recording::default();
@@ -102,6 +104,11 @@ mod tests {
         recording.header.config.extend(asked.entries());
         assert_eq!(Operation::of(&parse("x"), &DeviceName::Mouse, Some(&recording)), asked);
         assert_eq!(Operation::of(&parse("x --flap 40"), &script, Some(&recording)).flap_mm, 40.0);
+        let older = |line: &str| Operation::of(&parse(line), &script, Some(&recording)).csf_loss;
+        assert_eq!((older("x"), older("x --fluid-lost 0.2")), (0.0, 0.2), "the flag of version 0.1");
+        let lost = recording.header.config.remove("csf_loss").unwrap();
+        recording.header.config.insert("fluid_lost".into(), lost);
+        assert_eq!(Operation::of(&parse("x"), &script, Some(&recording)).csf_loss, 0.0, "the key of version 0.1");
         recording.header.config.insert("rate_hz".into(), "0".into());
         assert_eq!(
             Operation::of(&parse("x"), &script, Some(&recording)).rate_hz,

@@ -18,18 +18,22 @@ pub struct Options {
     #[command(subcommand)]
     pub task: Option<Task>,
     /// A folder that `case build` made
-    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "finer", "isovalue_hu", "register", "opening"])]
+    #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "opening_refinement", "isovalue_hu", "register", "opening"])]
     pub case: Option<PathBuf>,
     /// Images, and what is made of them
     #[command(flatten)]
     pub patient: Patient,
-    /// mouse | script:NAME | replay:FILE | simulated:NAME | openhaptics or openhaptics:NAME | force-dimension or force-dimension:N | haply or haply:ID | spacemouse [default: mouse with a window, else a script]
+    /// mouse | script:NAME | replay:FILE | simulated:NAME | openhaptics or openhaptics:NAME |
+    /// force-dimension or force-dimension:N | haply or haply:ID | spacemouse [default: mouse with a
+    /// window, else a script]
     #[arg(long, value_name = "DEVICE")]
     pub device: Option<String>,
-    /// What the second hand holds an aspirator with: script:aspirate | simulated:NAME | a device that --list-devices shows
+    /// What the second hand holds an aspirator with: script:aspirate | simulated:NAME | a device
+    /// that --list-devices shows
     #[arg(long, value_name = "DEVICE", conflicts_with = "watch")]
     pub second_device: Option<String>,
-    /// Millimetres that the tool moves for one of the hand, for devices with a box of their own; over 1, walls are softened alike
+    /// Millimetres that the tool moves for one of the hand, for devices with a box of their own;
+    /// over 1, walls are softened alike
     #[arg(long, value_name = "SCALE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub device_scale: f32,
     /// Let other processes on this machine watch under this name
@@ -41,7 +45,8 @@ pub struct Options {
     /// Run without a window
     #[arg(long)]
     pub headless: bool,
-    /// Length of a scripted operation, and at most of any other, seconds [default: 20 for a script, 75 for script:flap]
+    /// Length of a scripted operation, and at most of any other, seconds [default: 20 for a script,
+    /// 75 for script:flap]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// Where to record the session [default: session.mcap in the output folder]
@@ -56,7 +61,9 @@ pub struct Options {
     /// Write the drilled skull's surface too, as drilled.stl; some 50 MB
     #[arg(long)]
     pub stl: bool,
-    /// How fine bone, brain and picture are: auto measures this machine and takes the cheapest that keeps the tolerances below; draft, usual and fine are the same everywhere [default: auto; a replay's as recorded]
+    /// How fine bone, brain and picture are: auto measures this machine and takes the cheapest that
+    /// keeps the tolerances below; draft, usual and fine are the same everywhere [default: auto; a
+    /// replay's as recorded]
     #[arg(long, value_name = "auto|draft|usual|fine", value_parser = quality)]
     pub quality: Option<Quality>,
     /// What --quality auto must keep
@@ -77,16 +84,20 @@ pub struct Options {
     /// Young's modulus of the brain, kPa [default: 3; a replay's as recorded]
     #[arg(long, value_name = "KPA", allow_negative_numbers = true)]
     pub young_modulus_kpa: Option<f32>,
-    /// Diameter of the planned bone flap around the opening, mm; 0 for a burr hole alone [default: 0; 24 with script:flap; a replay's as recorded]
+    /// Diameter of the planned bone flap around the opening, mm; 0 for a burr hole alone [default:
+    /// 0; 24 with script:flap; a replay's as recorded]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub flap: Option<f32>,
-    /// Share of the lift of the brain's fluid that is lost when the dura is opened, 0 to 1: the brain sinks [default: 0.05; uncalibrated]
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
-    pub fluid_lost: Option<f32>,
-    /// Tissue that no tool may come close to: classes of --tissue, separated by commas [default: vessel]
+    /// Share of the lift of the brain's fluid that is lost when the dura is opened, 0 to 1: the
+    /// brain sinks [default: 0.05; uncalibrated]
+    #[arg(long, alias = "fluid-lost", value_name = "SHARE", allow_negative_numbers = true)]
+    pub csf_loss: Option<f32>,
+    /// Tissue that no tool may come close to: classes of --tissue, separated by commas [default:
+    /// vessel]
     #[arg(long, value_name = "CLASS,...", value_delimiter = ',')]
     pub forbid: Option<Vec<TissueClass>>,
-    /// Of a folder of recordings (--device replay:FOLDER) run only every Nth again, from the Ith on, as in 2/8
+    /// Of a folder of recordings (--device replay:FOLDER) run only every Nth again, from the Ith
+    /// on, as in 2/8
     #[arg(long, value_name = "I/N", value_parser = shard)]
     pub shard: Option<(usize, usize)>,
     /// Haptic ticks a second [default: 1000; a replay's as recorded]
@@ -109,7 +120,8 @@ pub struct Patient {
     /// MRI of the same patient in the same space
     #[arg(long, value_name = "PATH")]
     pub mri: Option<PathBuf>,
-    /// Which DICOM series of the CT's folder, a number that `case series` lists [default: the one with the most slices]
+    /// Which DICOM series of the CT's folder, a number that `case series` lists [default: the one
+    /// with the most slices]
     #[arg(long, value_name = "N", requires = "ct")]
     pub ct_series: Option<usize>,
     /// Which DICOM series of the MRI's folder
@@ -118,7 +130,8 @@ pub struct Patient {
     /// Label volume: what is not 0 is brain [default: found in the MRI]
     #[arg(long, value_name = "PATH")]
     pub labels: Option<PathBuf>,
-    /// Tissue inside the brain, from a label volume: white, grey, ventricle, tumour or vessel; all that is not 0, or only the codes. Repeatable
+    /// Tissue inside the brain, from a label volume: white, grey, ventricle, tumour or vessel; all
+    /// that is not 0, or only the codes. Repeatable
     #[arg(long = "tissue", value_name = "CLASS=PATH[:CODE,...]")]
     pub tissues: Vec<TissueSource>,
     /// Edge of a skull voxel, mm [default: by --quality; 1 for `case build`]
@@ -127,13 +140,16 @@ pub struct Patient {
     /// Tetrahedra of the brain, met within a tenth [default: by --quality; 8000 for `case build`]
     #[arg(long, value_name = "N")]
     pub tets: Option<usize>,
-    /// How often their edges are halved within 10 mm of the opening, of the same number [default: by --quality; 2 for `case build`]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=3))]
-    pub finer: Option<u32>,
+    /// How often their edges are halved within 10 mm of the opening, of the same number [default:
+    /// by --quality; 2 for `case build`]
+    #[arg(long, alias = "finer", value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=3))]
+    pub opening_refinement: Option<u32>,
     /// Move the MRI (and labels) to where they fit the CT, by mutual information
     #[arg(long)]
     pub register: bool,
-    /// A point outside the skull over the place to open, RAS mm [default: bone about 6 mm thick close over the brain, on the upper right front where it can be; the same for all voxel sizes]
+    /// A point outside the skull over the place to open, RAS mm [default: bone about 6 mm thick
+    /// close over the brain, on the upper right front where it can be; the same for all voxel
+    /// sizes]
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub opening: Option<[f32; 3]>,
     /// Threshold of bone, HU [default: from the histogram, 300 to 500]
@@ -163,10 +179,11 @@ pub enum Task {
         #[arg(long, value_name = "DIR", default_value = "trepan-out/compare")]
         out: PathBuf,
     },
-    /// Measure this machine and say what `--quality auto` takes for a case on it, why, and what the next better and the next cheaper would cost
+    /// Measure this machine and say what `--quality auto` takes for a case on it, why, and what the
+    /// next better and the next cheaper would cost
     Plan {
         /// A folder that `case build` made
-        #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "finer", "isovalue_hu", "register", "opening"])]
+        #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "opening_refinement", "isovalue_hu", "register", "opening"])]
         case: Option<PathBuf>,
         /// The patient's images
         #[command(flatten)]
@@ -228,12 +245,14 @@ pub enum CaseTask {
 /// What can be done with recordings.
 #[derive(Clone, Debug, Subcommand)]
 pub enum RecordingTask {
-    /// Say how long a recording is, of which case, and what it lacks; exit code 1 where it lacks something
+    /// Say how long a recording is, of which case, and what it lacks; exit code 1 where it lacks
+    /// something
     Check {
         /// A session.mcap
         file: PathBuf,
     },
-    /// Make a whole recording of what can be read of a cut or damaged one, also behind the damage; other programs open it then
+    /// Make a whole recording of what can be read of a cut or damaged one, also behind the damage;
+    /// other programs open it then
     Repair {
         /// The recording that is cut or damaged; it stays as it is
         file: PathBuf,
@@ -318,7 +337,7 @@ impl Options {
         )?;
         within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
         within("flap", self.flap.unwrap_or(0.0).into(), 0.0, 90.0)?;
-        within("fluid-lost", self.fluid_lost.unwrap_or(0.0).into(), 0.0, 1.0)?;
+        within("csf-loss", self.csf_loss.unwrap_or(0.0).into(), 0.0, 1.0)?;
         rate(self.rate_hz.map_or(RATES_HZ[0], f64::from))?;
         within("frames-per-second", self.frames_per_second, 0.0, 120.0)
     }
@@ -334,9 +353,7 @@ mod tests {
         assert!(parse("x --headless --duration 20 --out demo").unwrap().check().is_ok());
         let fault = parse("x --duration nan").unwrap().check().unwrap_err();
         assert!(fault.contains("--duration") && fault.contains("0.1 to 86400"), "{fault}");
-        assert!(
-            parse("x --flap 91").unwrap().check().is_err() && parse("x --fluid-lost -0.1").unwrap().check().is_err()
-        );
+        assert!(parse("x --flap 91").unwrap().check().is_err() && parse("x --csf-loss -0.1").unwrap().check().is_err());
         assert!(parse("x --forbid bone").unwrap_err().to_string().contains("vessel"));
         assert!(parse("x --device-scale 0").unwrap().check().is_err());
         assert!(parse("x --spacing-mm 0").unwrap().check().is_err());

@@ -1,4 +1,5 @@
-//! `recording check` and `recording repair`: what a recording holds, what it lacks, and a whole one made of the rest.
+//! `recording check` and `recording repair`: what a recording holds, what it lacks, and a whole one
+//! made of the rest.
 
 use crate::case::identity::Identity;
 use crate::command::printable;
@@ -15,7 +16,8 @@ pub fn not_whole(program: Program, file: &Path, recording: &Recording) -> Option
     Some(format!("{file} is not whole: {losses}{}", if recording.damage.is_some() { &remedy } else { "" }))
 }
 
-/// Opens a recording to run it again on a case; refuses one of another patient, or with nothing to run.
+/// Opens a recording to run it again on a case; refuses one of another patient, or with nothing to
+/// run.
 pub fn open(program: Program, file: &Path, case: &Identity) -> Result<Recording, SessionError> {
     let recording = Recording::open(file)?;
     let losses = not_whole(program, file, &recording);
@@ -34,7 +36,8 @@ pub fn open(program: Program, file: &Path, case: &Identity) -> Result<Recording,
     Ok(recording)
 }
 
-/// Says where a recording was made on the case as it was made of the images otherwise, or perhaps on other images.
+/// Says where a recording was made on the case as it was made of the images otherwise, or perhaps
+/// on other images.
 pub fn unlike(recording: &Recording, case: &Identity) -> Option<String> {
     let recorded = Identity::of(&recording.header);
     let made_alike = recorded.case.is_none() || recorded.case == case.case;

@@ -6,14 +6,14 @@ use crate::case::plan::Plan;
 use crate::case::scene::Scene;
 use crate::case::{Inputs, anatomy};
 use crate::error::SessionError;
-use crate::hand::{self, Feel, Hand, SecondHold};
-use crate::models::{Models, Wish};
+use crate::hand::{self, DeviceLimits, OpenDevice, SecondHold};
+use crate::models::{ModelRequest, Models};
 use crate::operation::Operation;
 use crate::options::Options;
 use crate::program::Program;
 use crate::recordings;
-use crate::report::against::Against;
 use crate::report::page::Shot;
+use crate::report::plan_comparison::PlanComparison;
 use crate::report::summary::{About, CutOff, Machine, Summary};
 use crate::report::{drilled, output};
 use crate::run::film::Filming;
@@ -23,13 +23,13 @@ use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Devices, Pace};
 use crate::run::watch::{Asked, Share};
-use crate::run::{Eyes, Outcome, Stages};
+use crate::run::{Outcome, RenderInputs, Stages};
+use crate::session_setup::SessionSetup;
 use crate::show::driver;
 use crate::show::graphics::Graphics;
 use crate::show::picture::{self, Album};
 use crate::show::{player, window};
 use crate::stages::haptic_tick::ToolSample;
-use crate::table::Table;
 use std::path::{Path, PathBuf};
 use trepan_geometry::ToolState;
 use trepan_gpu::{Gpu, GpuError};
@@ -47,7 +47,7 @@ pub struct Session {
     second: Option<DeviceName>,
     recording: Option<Recording>,
     case: Identity,
-    table: Table,
+    table: SessionSetup,
     /// What the case was made of; nothing for a case folder.
     inputs: Inputs,
     out: PathBuf,
@@ -87,7 +87,7 @@ impl Session {
             _ => None,
         };
         let operation = Operation::of(&options, &device, recording.as_ref());
-        let wish = Wish::of(program, &options, &operation, recording.as_ref())?;
+        let wish = ModelRequest::of(program, &options, &operation, recording.as_ref())?;
         let mut drawing = None;
         let inputs = match options.case {
             Some(_) => Inputs::default(),
@@ -96,7 +96,7 @@ impl Session {
         let card = || drawing.insert(driver::open()).as_ref().is_ok_and(|gpu| !gpu.is_software());
         let (case, models) = choice::open_case(program, &options, built_in, wish, card)?;
         let opened = Identity { name: case.name.clone(), case: Some(case.hash.clone()), images: case.images.clone() };
-        let table = Table::new(program, (case, models), operation, windowed && recording.is_some())?;
+        let table = SessionSetup::new(program, (case, models), operation, windowed && recording.is_some())?;
         let out = options.out.clone().unwrap_or_else(|| output::dated(program));
         Ok(Self { program, options, device, second, recording, case: opened, table, inputs, out, windowed, drawing })
     }
@@ -106,12 +106,12 @@ impl Session {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
         let (before, whole) = (self.table.pieces(), self.table.bone().map(|bone| bone.snapshot()));
         let (options, plan, rate_hz) = (&self.options, &self.table.plan, self.table.operation.rate_hz);
-        let hand = Hand::open(&self.device, self.program, options, plan, rate_hz, &stop)?;
-        let Hand { device, pointer, watch, watching } = hand;
+        let hand = OpenDevice::open(&self.device, self.program, options, plan, rate_hz, &stop)?;
+        let OpenDevice { device, pointer, watch, watching } = hand;
         let second = self.second.as_ref().map(|name| SecondHold::open(name, options, plan, rate_hz)).transpose()?;
-        let recorded = || Feel::recorded(self.recording.as_ref(), hand::FIRST);
+        let recorded = || DeviceLimits::recorded(self.recording.as_ref(), hand::FIRST);
         let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
-        let feel = device.as_ref().map_or_else(recorded, |device| Feel::of(&device.capabilities(), scale));
+        let feel = device.as_ref().map_or_else(recorded, |device| DeviceLimits::of(&device.capabilities(), scale));
         let second_feel = self.second_feel(second.as_ref());
         let start = self.start();
         let feels = (&feel, second_feel.as_ref());
@@ -147,7 +147,11 @@ impl Session {
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
         let about = About {
             cut_off: CutOff::of(&before, &self.table.pieces(), self.table.bone().map_or(0.0, |bone| bone.voxel_mm3())),
-            plan: self.table.bone().zip(whole).and_then(|(bone, whole)| Against::of(&self.table.plan, &whole, bone)),
+            plan: self
+                .table
+                .bone()
+                .zip(whole)
+                .and_then(|(bone, whole)| PlanComparison::of(&self.table.plan, &whole, bone)),
             regions: self.table.regions(&recording),
             ..self.about(&album, adapter, remarks)
         };
@@ -166,7 +170,8 @@ impl Session {
         (recordings::not_whole(self.program, path, recording), recordings::unlike(recording, &self.case))
     }
 
-    /// The skull as it is now, in the scanner's voxels; in those of the case, with a remark, where the CT is not at hand.
+    /// The skull as it is now, in the scanner's voxels; in those of the case, with a remark, where
+    /// the CT is not at hand.
     fn drilled(&self, bone: &BoneVolume, whole: &VoxelVolume<i16>, remarks: &mut Vec<String>) -> VoxelVolume<i16> {
         let ct = anatomy::scanned(&self.inputs, self.options.patient.ct_series).unwrap_or_else(|why| {
             let edge = bone.spacing_mm();
@@ -191,13 +196,15 @@ impl Session {
         &self.table.models
     }
 
-    /// The bodies of the loops for a hand without a device, for who turns them otherwise than [`run`](Self::run). The tool is at `start`; `touch` is how it is tested against tissue.
+    /// The bodies of the loops for a hand without a device, for who turns them otherwise than
+    /// [`run`](Self::run). The tool is at `start`; `touch` is how it is tested against tissue.
     pub fn stages(&self, start: ToolState, touch: &trepan_deformable::Config) -> Result<Stages, SessionError> {
-        let feel = Feel::of(&Capabilities::passive("a script"), 1.0);
+        let feel = DeviceLimits::of(&Capabilities::passive("a script"), 1.0);
         self.table.stages(start, self.tick_ms(), (&feel, None), touch)
     }
 
-    /// Lets a teacher have a say in both hands' buttons, where this session is shared; with a window on another's session, this one teaches.
+    /// Lets a teacher have a say in both hands' buttons, where this session is shared; with a
+    /// window on another's session, this one teaches.
     fn company(&self, asked: Option<Asked>, mut hands: [Held; 2]) -> Result<(Company, [Held; 2]), SessionError> {
         let mut company = Company::default();
         if let Some([first, second, window]) = asked {
@@ -220,7 +227,7 @@ impl Session {
         kept: Kept,
         start: ToolSample,
         stop: &Stop,
-        picture: impl FnOnce(Eyes),
+        picture: impl FnOnce(RenderInputs),
     ) -> Outcome {
         match (&self.recording, devices) {
             (Some(recording), _) => {
@@ -234,15 +241,17 @@ impl Session {
         }
     }
 
-    /// What the second hand's guard must know: of its device, or of the recorded one; `None` without a second hand.
-    fn second_feel(&self, held: Option<&SecondHold>) -> Option<Feel> {
+    /// What the second hand's guard must know: of its device, or of the recorded one; `None`
+    /// without a second hand.
+    fn second_feel(&self, held: Option<&SecondHold>) -> Option<DeviceLimits> {
         let scale = |held: &SecondHold| if held.watch.is_some() { self.options.device_scale } else { 1.0 };
         let recorded = self.recording.as_ref().filter(|recording| !recording.second.is_empty());
-        held.map(|held| Feel::of(&held.device.capabilities(), scale(held)))
-            .or_else(|| recorded.map(|recording| Feel::recorded(Some(recording), hand::SECOND)))
+        held.map(|held| DeviceLimits::of(&held.device.capabilities(), scale(held)))
+            .or_else(|| recorded.map(|recording| DeviceLimits::recorded(Some(recording), hand::SECOND)))
     }
 
-    /// Where the tool waits for its device: in a replay too, for the first tick's way to the hand begins here.
+    /// Where the tool waits for its device: in a replay too, for the first tick's way to the hand
+    /// begins here.
     fn start(&self) -> ToolSample {
         let script = Script::named(self.program.script(), &self.table.scene.site, 1e4);
         let state = script.map_or_else(|_| ToolState::at(trepan_geometry::Pose::IDENTITY), |script| script.at(0.0));
@@ -258,7 +267,7 @@ impl Session {
 
     fn picture(
         &self,
-        mut eyes: Eyes,
+        mut eyes: RenderInputs,
         graphics: &mut Result<Graphics, String>,
         pointer: Option<mouse::MouseHandle>,
         company: Company,
@@ -311,7 +320,7 @@ impl Session {
         1e3 / self.table.operation.rate_hz
     }
 
-    fn header(&self, feel: &Feel, second: Option<&Feel>) -> SessionHeader {
+    fn header(&self, feel: &DeviceLimits, second: Option<&DeviceLimits>) -> SessionHeader {
         let hands = feel.entries(hand::FIRST).into_iter();
         let hands = hands.chain(second.into_iter().flat_map(|second| second.entries(hand::SECOND)));
         SessionHeader {

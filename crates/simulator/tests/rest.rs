@@ -1,4 +1,5 @@
-//! Tissue that a wall presses comes to rest, however light its nodes and however seldom the wall is looked at.
+//! Tissue that a wall presses comes to rest, however light its nodes and however seldom the wall is
+//! looked at.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use trepan_contact::NodalContacts;
@@ -15,8 +16,8 @@ fn slab() -> Body {
     Body::uniform(mesh, fixed, Material::BRAIN)
 }
 
-/// Half a millimetre deep in a gently rounded wall; gives the largest change of a node's velocity in a step,
-/// mm/ms, in the first 20 ms and in the last 20 of 400 ms, and the wall's force then, N.
+/// Half a millimetre deep in a gently rounded wall; gives the largest change of a node's velocity
+/// in a step, mm/ms, in the first 20 ms and in the last 20 of 400 ms, and the wall's force then, N.
 fn pressed(refresh: u64) -> (f32, f32, f32) {
     let body = slab();
     let wall = SlidingWall::around(&body.mesh, &body.fixed).unwrap();
@@ -58,10 +59,14 @@ fn motion_without_touch_is_counted_and_told() {
     let mut stage = SolverStage::new(Box::new(Tled::new(&body, &Config::default()).unwrap()));
     let mut loads = Loads::default();
     (0..200).for_each(|_| _ = stage.step(&loads, 1));
-    assert_eq!((stage.mishaps().restless_steps, stage.mishaps().rest_motion_mm), (0, 0.0));
-    assert_eq!(stage.mishaps().remarks().count(), 0);
+    assert_eq!((stage.solver_faults().restless_steps, stage.solver_faults().rest_motion_mm), (0, 0.0));
+    assert_eq!(stage.solver_faults().remarks().count(), 0);
     loads.gravity = Vec3::X * 3.0;
     (0..200).for_each(|_| _ = stage.step(&loads, 2));
-    assert!(stage.mishaps().restless_steps > 0 && stage.mishaps().rest_motion_mm > 0.02, "{:?}", stage.mishaps());
-    assert!(stage.mishaps().remarks().any(|remark| remark.contains("moved by itself")));
+    assert!(
+        stage.solver_faults().restless_steps > 0 && stage.solver_faults().rest_motion_mm > 0.02,
+        "{:?}",
+        stage.solver_faults()
+    );
+    assert!(stage.solver_faults().remarks().any(|remark| remark.contains("moved by itself")));
 }

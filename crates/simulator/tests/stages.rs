@@ -1,4 +1,5 @@
-//! The stages under faults: nothing that a device, a late thread or an odd script does reaches a hand as a jump, a NaN or a panic.
+//! The stages under faults: nothing that a device, a late thread or an odd script does reaches a
+//! hand as a jump, a NaN or a panic.
 
 use glam::IVec3;
 use std::sync::Arc;
@@ -112,7 +113,8 @@ fn an_undone_stroke_gives_its_bone_back_once_the_tool_is_free() {
     assert!(felt.depth_mm > 0.5, "the bone that came back is not felt: {} mm", felt.depth_mm);
 }
 
-/// A stroke 4 mm down at the pose's place with the pedal, from 6 mm over the bone; then away to 12 mm. Gives what was removed, mm³.
+/// A stroke 4 mm down at the pose's place with the pedal, from 6 mm over the bone; then away to 12
+/// mm. Gives what was removed, mm³.
 fn stroke(bench: &mut Bench, turn: Buttons, x: f32) -> f32 {
     let mut run = |z: f32, buttons: Buttons| {
         let mut tool = ToolState { buttons, ..at(z, 0.0) };

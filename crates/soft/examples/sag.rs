@@ -1,4 +1,5 @@
-//! How far does a beam sag under its own weight, by every method? The stiffer the beam, the more they agree.
+//! How far does a beam sag under its own weight, by every method? The stiffer the beam, the more
+//! they agree.
 
 use trepan_geometry::Vec3;
 use trepan_soft::{Body, Loads, Material, Method, boxes};

@@ -1,11 +1,14 @@
-//! How long a step may be and how slow the body swings: highest and lowest eigenfrequency of the rest state.
+//! How long a step may be and how slow the body swings: highest and lowest eigenfrequency of the
+//! rest state.
 //!
 //! # Theory
-//! Central differences are stable for `dt ≤ 2/ω_max`, `ω²` being the eigenvalues of `M⁻¹K`. The true `ω_max` comes from power
-//! iteration, from below; it never exceeds the largest of the single elements' (Irons and Treharne 1971), and for one tetrahedron with
-//! lumped mass `ω² ≤ 4 (λ+2μ)/ρ Σ_a |∇N_a|²`.
-//! The lowest frequency is the least of Rayleigh's quotient `ω² = uᵀKu / uᵀMu`, found by conjugate gradients with the diagonal as preconditioner
-//! (Bradbury and Fletcher 1966): one product with K a step, and about as many steps as one solution of `K u = f` takes. An upper bound, within about 1 %.
+//! Central differences are stable for `dt ≤ 2/ω_max`, `ω²` being the eigenvalues of `M⁻¹K`. The
+//! true `ω_max` comes from power iteration, from below; it never exceeds the largest of the single
+//! elements' (Irons and Treharne 1971), and for one tetrahedron with lumped mass
+//! `ω² ≤ 4 (λ+2μ)/ρ Σ_a |∇N_a|²`. The lowest frequency is the least of Rayleigh's quotient
+//! `ω² = uᵀKu / uᵀMu`, found by conjugate gradients with the diagonal as preconditioner (Bradbury
+//! and Fletcher 1966): one product with K a step, and about as many steps as one solution of
+//! `K u = f` takes. An upper bound, within about 1 %.
 
 use crate::{Body, Material, Shape, Stiffness};
 use glam::DVec3;
@@ -62,7 +65,8 @@ pub fn highest_frequency(stiffness: &Stiffness) -> f64 {
     found.sqrt()
 }
 
-/// Lowest angular eigenfrequency of the rest state, rad/ms; `None` when the body is not held by its fixed nodes.
+/// Lowest angular eigenfrequency of the rest state, rad/ms; `None` when the body is not held by its
+/// fixed nodes.
 pub fn lowest_frequency(body: &Body) -> Option<f64> {
     lowest_frequency_of(body, &Stiffness::of(body))
 }
@@ -112,7 +116,8 @@ pub fn lowest_frequency_of(body: &Body, stiffness: &Stiffness) -> Option<f64> {
     Some(omega2.sqrt())
 }
 
-/// Where along u + a w Rayleigh's quotient is least, from the products `[uKu, uKw, wKw]` and `[uMu, uMw, wMw]`; `None` where it is nowhere.
+/// Where along u + a w Rayleigh's quotient is least, from the products `[uKu, uKw, wKw]` and
+/// `[uMu, uMw, wMw]`; `None` where it is nowhere.
 fn lowest_along([uku, ukw, wkw]: [f64; 3], [umu, umw, wmw]: [f64; 3]) -> Option<f64> {
     // Its derivative's numerator: p a² + q a + r.
     let (p, q, r) = (wkw * umw - ukw * wmw, wkw * umu - uku * wmw, ukw * umu - uku * umw);
@@ -157,7 +162,8 @@ mod tests {
 
     #[test]
     fn a_clamped_beam_swings_at_the_frequency_of_an_independent_code() {
-        // scikit-fem, same split, consistent masses: 2.2329 Hz; lumping and Rayleigh's quotient move it a little.
+        // scikit-fem, same split, consistent masses: 2.2329 Hz; lumping and Rayleigh's quotient
+        // move it a little.
         let hertz = lowest_frequency(&beam([10, 2, 2])).unwrap() / (2.0 * std::f64::consts::PI) * 1000.0;
         assert!((hertz / 2.2329 - 1.0).abs() < 0.05, "{hertz}");
     }

@@ -1,9 +1,11 @@
 //! Boxes of tetrahedra for tests, examples and validation scenes, and picking their nodes.
 //!
 //! # Theory
-//! Each cell is cut into the six tetrahedra of Kuhn's split, one for each order of the axes along the way from corner 000 to corner 111:
-//! all cells are alike, so neighbours share their faces' diagonals. A centred box has a node in the middle of each cell besides; four tetrahedra lie around the line between two
-//! middles (the body-centred lattice of the mesher), two on every face of the box.
+//! Each cell is cut into the six tetrahedra of Kuhn's split, one for each order of the axes along
+//! the way from corner 000 to corner 111: all cells are alike, so neighbours share their faces'
+//! diagonals. A centred box has a node in the middle of each cell besides; four tetrahedra lie
+//! around the line between two middles (the body-centred lattice of the mesher), two on every face
+//! of the box.
 
 use trepan_geometry::Vec3;
 use trepan_mesh::TetMesh;
@@ -33,7 +35,8 @@ pub fn split_box(cells: [usize; 3], size: Vec3) -> TetMesh {
     mesh
 }
 
-/// A box from the origin to `size`, mm, of `cells` cells with a node in the middle of each: about twelve tetrahedra a cell, as the mesher lays them.
+/// A box from the origin to `size`, mm, of `cells` cells with a node in the middle of each: about
+/// twelve tetrahedra a cell, as the mesher lays them.
 pub fn centred_box(cells: [usize; 3], size: Vec3) -> TetMesh {
     let TetMesh { positions, .. } = split_box(cells, size);
     let mut mesh = TetMesh { positions, ..TetMesh::default() };

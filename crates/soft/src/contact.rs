@@ -1,19 +1,25 @@
-//! Springs on the tissue, with the solver's present nodes: each implicit, one after the other, in an explicit step.
+//! Springs on the tissue, with the solver's present nodes: each implicit, one after the other, in
+//! an explicit step.
 //!
 //! # Theory
-//! A tool's spring with its damper is stiffer than an explicit step bears on light nodes. To use less of it would break action and reaction: the hand feels all of it. So spring c is
-//! taken by backward Euler, on what the step would do without it. With v the velocities that loads and springs before it would give the nodes by the end of the step,
-//! x̄ = Σ wᵢ xᵢ, v̄ = Σ wᵢ vᵢ·n, d = offset + x̄·n and γ the velocity that a force gives a mass (dt where nothing damps):
+//! A tool's spring with its damper is stiffer than an explicit step bears on light nodes. To use
+//! less of it would break action and reaction: the hand feels all of it. So spring c is taken by
+//! backward Euler, on what the step would do without it. With v the velocities that loads and
+//! springs before it would give the nodes by the end of the step, x̄ = Σ wᵢ xᵢ, v̄ = Σ wᵢ vᵢ·n, d =
+//! offset + x̄·n and γ the velocity that a force gives a mass (dt where nothing damps):
 //!
 //! ```text
 //! v̄⁺ = v̄ - γ p Σ wᵢ²/mᵢ     p = k (d + dt v̄⁺) + b (v̄⁺ - v_tool)
 //! p = max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + γ (k dt + b) Σ wᵢ²/mᵢ))
 //! ```
-//! At rest v̄ is what undoes p in a step, so p = k d: stiffness, masses and step move the way there and not the end. With the mesh's own ω and q = γ (k dt + b) Σ wᵢ²/mᵢ the step stays stable
-//! for `dt² ω² ≤ 4 + 2 q`: never for less than without the spring, however stiff and damped it is. Springs that share nodes see what those before them did.
+//! At rest v̄ is what undoes p in a step, so p = k d: stiffness, masses and step move the way there
+//! and not the end. With the mesh's own ω and q = γ (k dt + b) Σ wᵢ²/mᵢ the step stays stable for
+//! `dt² ω² ≤ 4 + 2 q`: never for less than without the spring, however stiff and damped it is.
+//! Springs that share nodes see what those before them did.
 //!
-//! A spring's damping across its normal is taken implicitly too, node by node: a contact that is found anew
-//! every millisecond follows a node's sliding late, and what is late drives light nodes. It changes no rest.
+//! A spring's damping across its normal is taken implicitly too, node by node: a contact that is
+//! found anew every millisecond follows a node's sliding late, and what is late drives light nodes.
+//! It changes no rest.
 //!
 //! # Practice
 //! 10 ns for each node of each spring. Nodes outside the mesh are left out.
@@ -53,8 +59,8 @@ impl ImplicitSprings {
         Self { moved: vec![Vec3::ZERO; nodes] }
     }
 
-    /// Adds every spring's force to the nodes, `add(node, N)`, then every plane's; gives the sum of all of them
-    /// without their directions, N.
+    /// Adds every spring's force to the nodes, `add(node, N)`, then every plane's; gives the sum of
+    /// all of them without their directions, N.
     pub fn press(
         &mut self,
         contacts: &NodalContacts,
@@ -149,7 +155,8 @@ fn force_of_plane(plane: &PlaneContact, moved: Vec3, step: Gain, node: FreeNode)
     if force.is_finite() { force.max(0.0) } else { 0.0 }
 }
 
-/// Adds a spring's force to the nodes at these positions and velocities, `add(node, N)`, whole and explicit; gives it, N.
+/// Adds a spring's force to the nodes at these positions and velocities, `add(node, N)`, whole and
+/// explicit; gives it, N.
 pub(crate) fn press(
     spring: &NodalContact,
     [positions, velocities]: [&[Vec3]; 2],
@@ -184,7 +191,8 @@ mod tests {
         list
     }
 
-    /// A plane gives the force of the same contact as a spring on one node, before and after other springs.
+    /// A plane gives the force of the same contact as a spring on one node, before and after other
+    /// springs.
     #[test]
     fn a_plane_is_the_spring_of_one_node() {
         let plane = |node, damping| PlaneContact { node, normal: Vec3::Z, offset_mm: 0.3, stiffness: 4.0, damping };
@@ -213,7 +221,8 @@ mod tests {
         assert!(by_plane.iter().zip(by_spring).all(|(a, b)| a.distance(b) < 1e-5), "{by_plane:?} {by_spring:?}");
     }
 
-    /// Eight masses of 2 g on springs of their own, stepped by leapfrog at `dt² ω² = 3.6` beside contact springs; gives positions, and the forces of a last step.
+    /// Eight masses of 2 g on springs of their own, stepped by leapfrog at `dt² ω² = 3.6` beside
+    /// contact springs; gives positions, and the forces of a last step.
     fn settled(springs: &[NodalContact], steps: usize) -> (Vec<Vec3>, f32) {
         let contacts = listed(springs);
         let (dt, inverse_mass, damping) = (0.5f32, 0.5f32, 0.02f32);
@@ -235,7 +244,8 @@ mod tests {
         (x.to_vec(), sum)
     }
 
-    /// A spring of k under a depth of 2 mm against a mass's own spring K: `k K/(k + K)` times 2 mm, however stiff and damped it is.
+    /// A spring of k under a depth of 2 mm against a mass's own spring K: `k K/(k + K)` times 2 mm,
+    /// however stiff and damped it is.
     #[test]
     fn at_rest_the_tissue_bears_all_of_what_the_spring_says() {
         let own = 3.6f32 / (0.25 * 0.5);
@@ -247,8 +257,8 @@ mod tests {
         }
     }
 
-    /// By hand: b = 2 N ms/mm on 1 g and 3 g in half a millisecond leaves 1/(1 + b dt w/m) of the sliding, and all of
-    /// what goes along the normal.
+    /// By hand: b = 2 N ms/mm on 1 g and 3 g in half a millisecond leaves 1/(1 + b dt w/m) of the
+    /// sliding, and all of what goes along the normal.
     #[test]
     fn lateral_damping_slows_what_slides_under_a_pressing_spring() {
         let masses = [1.0f32, 3.0];

@@ -1,19 +1,23 @@
 //! Corotational elasticity with implicit steps: large rotations, moderate strain, any step length.
 //!
 //! # Theory
-//! Each element carries its own rotation R, so that strain is measured in a frame that turns with it: `P = R (2 μ ε + λ tr ε I)`,
-//! `ε = sym(RᵀF) - I` (Müller and Gross 2004). A step of backward Euler with R held solves
+//! Each element carries its own rotation R, so that strain is measured in a frame that turns with
+//! it: `P = R (2 μ ε + λ tr ε I)`, `ε = sym(RᵀF) - I` (Müller and Gross 2004). A step of backward
+//! Euler with R held solves
 //! ```text
 //! (M (1 + α h) + h² K_R + (h² k + h b) w wᵀ) v⁺ = M v + h (f_ext - f_int)        K_R = Σ R K Rᵀ
 //! ```
-//! by conjugate gradients, the tool's spring (k, b, w = weights ⊗ normal) in the matrix. R comes from a few steps of Müller, Bender, Chentanez
-//! and Macklin 2016, which also find a rotation for an inverted element.
+//! by conjugate gradients, the tool's spring (k, b, w = weights ⊗ normal) in the matrix. R comes
+//! from a few steps of Müller, Bender, Chentanez and Macklin 2016, which also find a rotation for
+//! an inverted element.
 //!
 //! # Practice
-//! No matrix is stored; about 20 ns a tetrahedron and iteration, some tens of iterations a step, no allocation. Backward Euler damps fast motion of itself.
+//! No matrix is stored; about 20 ns a tetrahedron and iteration, some tens of iterations a step, no
+//! allocation. Backward Euler damps fast motion of itself.
 //!
 //! # When not to use it
-//! For strains over about 20 %: the stress grows linearly with stretch and does not resist collapse. For vibration: it is damped by the step.
+//! For strains over about 20 %: the stress grows linearly with stretch and does not resist
+//! collapse. For vibration: it is damped by the step.
 
 use crate::body::Element;
 use crate::operator::Hooke;
@@ -31,7 +35,8 @@ pub struct Config {
     pub iterations: u32,
     /// Done when the residual is below this share of the right side, without unit.
     pub tolerance: f64,
-    /// Step length that [`SoftSolver::stable_dt_ms`] gives, ms. Stability sets no limit; rotations lag by one step.
+    /// Step length that [`SoftSolver::stable_dt_ms`] gives, ms. Stability sets no limit; rotations
+    /// lag by one step.
     pub longest_ms: f32,
 }
 
@@ -115,7 +120,8 @@ impl Corotational {
         })
     }
 
-    /// Turns every element's frame and puts `M v + h (f_ext - f_int)` into the right side; gives the number of inverted elements.
+    /// Turns every element's frame and puts `M v + h (f_ext - f_int)` into the right side; gives
+    /// the number of inverted elements.
     fn balance(&mut self, gravity: DVec3, h: f64) -> u32 {
         for ((right, v), (m, fixed)) in
             self.system.right.iter_mut().zip(&self.v).zip(self.masses.iter().zip(&self.fixed))

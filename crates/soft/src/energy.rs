@@ -5,12 +5,13 @@
 //! W(F) = μ/2 (g(J) I₁ - 3) + κ/2 (J-1)²      g(J) = J^(-2/3) for J ≥ J₀, its tangent line below
 //! P    = ∂W/∂F = μ g F + q C                   q = μ/2 g' I₁ + κ (J-1),   C = cof F = ∂J/∂F
 //! ```
-//! With `g = J^(-2/3)` throughout, W is infinite at J = 0 and undefined beyond. Continued linearly below `J₀ = 0.3` it stays once
-//! differentiable, and its force always pushes J back towards 1: an inverted element heals by itself.
+//! With `g = J^(-2/3)` throughout, W is infinite at J = 0 and undefined beyond. Continued linearly
+//! below `J₀ = 0.3` it stays once differentiable, and its force always pushes J back towards 1: an
+//! inverted element heals by itself.
 //!
 //! # Sources
-//! The split energy is the one of Miller, Joldes, Lance and Wittek 2007 (TLED); continuing an energy linearly beyond a threshold
-//! follows the idea of Irving, Teran and Fedkiw 2004.
+//! The split energy is the one of Miller, Joldes, Lance and Wittek 2007 (TLED); continuing an
+//! energy linearly beyond a threshold follows the idea of Irving, Teran and Fedkiw 2004.
 
 use glam::{DMat3, DVec3};
 

@@ -1,8 +1,9 @@
 //! A sparse symmetric matrix over the free nodes of a body, factored by faer's supernodal Cholesky.
 //!
 //! # Practice
-//! Pattern and fill-reducing order are found once; [`Factor::factor`] reuses them. One thread (`Par::Seq`). Neither factoring nor solving
-//! allocates. Supernodal on purpose: 14 thousand unknowns factor in about 0.35 s and solve in 16 ms.
+//! Pattern and fill-reducing order are found once; [`Factor::factor`] reuses them. One thread
+//! (`Par::Seq`). Neither factoring nor solving allocates. Supernodal on purpose: 14 thousand
+//! unknowns factor in about 0.35 s and solve in 16 ms.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, factorize_symbolic_cholesky};
@@ -25,7 +26,8 @@ pub(crate) struct Factor {
 }
 
 impl Factor {
-    /// The pattern of the stiffness of cells, given by their nodes, without fixed nodes; `None` when all are fixed or memory is out.
+    /// The pattern of the stiffness of cells, given by their nodes, without fixed nodes; `None`
+    /// when all are fixed or memory is out.
     pub fn of<'a>(fixed: &[bool], cells: impl Iterator<Item = &'a [u32]>) -> Option<Self> {
         let (first_of_node, size) = number(fixed);
         let (starts, rows) = pattern(cells, &first_of_node, size);

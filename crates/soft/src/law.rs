@@ -1,4 +1,5 @@
-//! Every material's energy, stress and tangent in f64: what the fast solvers are checked against and what the reference solves.
+//! Every material's energy, stress and tangent in f64: what the fast solvers are checked against
+//! and what the reference solves.
 //!
 //! # Theory
 //! ```text
@@ -7,8 +8,9 @@
 //! Mooney-Rivlin           W = c₁₀ (J^(-2/3) I₁ - 3) + c₀₁ (J^(-4/3) I₂ - 3) + κ/2 (J-1)²
 //! Ogden                   W = Σ_p 2 μ_p/α_p² (Σ_i (J^(-1/3) λ_i)^α_p - 3) + κ/2 (J-1)²
 //! ```
-//! λ_i² are the eigenvalues of FᵀF. Powers of J continue linearly below 0.3 ([`crate::FADE_BELOW`]), principal stretches stop at 0.1, so that every
-//! energy is finite for every F.
+//! λ_i² are the eigenvalues of FᵀF. Powers of J continue linearly below 0.3
+//! ([`crate::FADE_BELOW`]), principal stretches stop at 0.1, so that every energy is finite for
+//! every F.
 
 use crate::energy::{NeoHookean, cofactor, cofactor_change, dot, power, squared};
 use glam::{DMat3, DVec3};
@@ -120,7 +122,8 @@ impl Law {
         }
     }
 
-    /// Whether an incompressible specimen gets stiffer against more pull, `dT/dλ > 0` for stretches 0.5 to 2, uniaxial and equibiaxial.
+    /// Whether an incompressible specimen gets stiffer against more pull, `dT/dλ > 0` for stretches
+    /// 0.5 to 2, uniaxial and equibiaxial.
     pub fn is_stable(&self) -> bool {
         let pulls = |along: fn(f64) -> DVec3| {
             let work = |stretch: f64| self.energy(DMat3::from_diagonal(along(stretch)));

@@ -1,12 +1,15 @@
-//! Soft tissue: the seam that every solver sits behind, materials, rival solvers and an f64 implicit reference.
+//! Soft tissue: the seam that every solver sits behind, materials, rival solvers and an f64
+//! implicit reference.
 //!
 //! # Theory
-//! A body is a mesh of 4-node tetrahedra with lumped masses. With nodal positions `x = X + u` every solver here answers the same
-//! semi-discrete equation `M ü + C u̇ + f_int(u) = f_ext`, or its static limit.
+//! A body is a mesh of 4-node tetrahedra with lumped masses. With nodal positions `x = X + u` every
+//! solver here answers the same semi-discrete equation `M ü + C u̇ + f_int(u) = f_ext`, or its
+//! static limit.
 //!
 //! # Practice
-//! Units mm, ms, g: stiffness in MPa, forces in N, densities in g/mm³. [`SoftSolver`] is the seam, [`Method`] the list of solvers in this
-//! crate; the fast explicit solver lives in `trepan-tled` behind the same seam. Nothing here does I/O, reads a clock or starts a thread.
+//! Units mm, ms, g: stiffness in MPa, forces in N, densities in g/mm³. [`SoftSolver`] is the seam,
+//! [`Method`] the list of solvers in this crate; the fast explicit solver lives in `trepan-tled`
+//! behind the same seam. Nothing here does I/O, reads a clock or starts a thread.
 //!
 //! ```
 //! use trepan_soft::{Body, Loads, Material, Method, boxes};

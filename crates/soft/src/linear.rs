@@ -1,15 +1,17 @@
-//! Small-strain elasticity with central differences: the cheapest right answer while nothing turns or stretches much.
+//! Small-strain elasticity with central differences: the cheapest right answer while nothing turns
+//! or stretches much.
 //!
 //! # Theory
 //! `M ü + α M u̇ + K u = f` with the constant stiffness of the rest state. Leapfrog:
 //! `v⁺ = ((1 - α dt/2) v + dt M⁻¹ (f - K u)) / (1 + α dt/2)`, `u⁺ = u + dt v⁺`.
 //!
 //! # Practice
-//! About 20 ns a tetrahedron and step, f64, no allocation. Damping is critical for the lowest mode unless set.
+//! About 20 ns a tetrahedron and step, f64, no allocation. Damping is critical for the lowest mode
+//! unless set.
 //!
 //! # When not to use it
-//! When anything rotates by more than a few degrees or stretches by more than a few percent: a turned part swells, because small strain
-//! takes rotation for strain.
+//! When anything rotates by more than a few degrees or stretches by more than a few percent: a
+//! turned part swells, because small strain takes rotation for strain.
 
 use crate::contact::press;
 use crate::{Body, BodyError, Loads, SoftSolver, StepReport, Stiffness, lowest_frequency, power_bound_ms};
@@ -72,7 +74,8 @@ impl Linear {
         })
     }
 
-    /// Sets the state of all free nodes by their rest position: displacement, mm, and velocity, mm/ms.
+    /// Sets the state of all free nodes by their rest position: displacement, mm, and velocity,
+    /// mm/ms.
     pub fn set(&mut self, state: impl Fn(DVec3) -> (DVec3, DVec3)) {
         for n in (0..self.u.len()).filter(|&n| !self.stiffness.fixed()[n]) {
             (self.u[n], self.v[n]) = state(self.rest[n].as_dvec3());

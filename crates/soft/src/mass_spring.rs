@@ -1,16 +1,19 @@
 //! Masses and springs: the first idea that everybody has, here to be compared with.
 //!
 //! # Theory
-//! Every edge is a spring, `f = k (l - l₀) e`. Springs that point evenly in all directions make a solid with `λ = μ = Σ k l²/(15 V)`, so each tetrahedron
-//! gives each of its six edges `k = 2.5 μ V/l²`. Such a solid has ν = 1/4 whatever is asked for (Cauchy's relation): the tetrahedron adds the
-//! pressure `κ' (J - 1)`, `κ' = κ - 5/3 μ`, that makes up its bulk modulus; none under ν = 1/4, where κ' would be a pressure that collapses single tetrahedra.
-//! Central differences as in [`crate::linear`].
+//! Every edge is a spring, `f = k (l - l₀) e`. Springs that point evenly in all directions make a
+//! solid with `λ = μ = Σ k l²/(15 V)`, so each tetrahedron gives each of its six edges
+//! `k = 2.5 μ V/l²`. Such a solid has ν = 1/4 whatever is asked for (Cauchy's relation): the
+//! tetrahedron adds the pressure `κ' (J - 1)`, `κ' = κ - 5/3 μ`, that makes up its bulk modulus;
+//! none under ν = 1/4, where κ' would be a pressure that collapses single tetrahedra. Central
+//! differences as in [`crate::linear`].
 //!
 //! # Practice
 //! About 20 ns a tetrahedron and step, f64, no allocation.
 //!
 //! # When not to use it
-//! Where a force must be right: edges never point evenly, so stiffness depends on how they lie, and no finer mesh makes it better.
+//! Where a force must be right: edges never point evenly, so stiffness depends on how they lie, and
+//! no finer mesh makes it better.
 
 use crate::body::Element;
 use crate::contact::press;
@@ -23,9 +26,11 @@ use trepan_geometry::Vec3;
 /// Settings of masses and springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// Mass-proportional damping α, 1/ms; `None` = critical for the lowest mode of the elastic body.
+    /// Mass-proportional damping α, 1/ms; `None` = critical for the lowest mode of the elastic
+    /// body.
     pub damping_per_ms: Option<f32>,
-    /// Share of a bound of the stable step that [`SoftSolver::stable_dt_ms`] gives, over 0 and below 1.
+    /// Share of a bound of the stable step that [`SoftSolver::stable_dt_ms`] gives, over 0 and
+    /// below 1.
     pub safety: f32,
 }
 
@@ -93,7 +98,8 @@ impl MassSpring {
         Ok(solver)
     }
 
-    /// `2/ω` with ω² no less than the largest: Gershgorin's circles for the springs, single elements for the pressure.
+    /// `2/ω` with ω² no less than the largest: Gershgorin's circles for the springs, single
+    /// elements for the pressure.
     fn bound_ms(&self, body: &Body) -> f64 {
         let mut around = vec![0.0; self.masses.len()];
         self.springs.iter().for_each(|s| s.ends.iter().for_each(|&n| around[n as usize] += 2.0 * s.stiffness));

@@ -1,23 +1,28 @@
-//! What the tissue is made of: hyperelastic laws with their parameters, checked, and presets with their source.
+//! What the tissue is made of: hyperelastic laws with their parameters, checked, and presets with
+//! their source.
 //!
 //! # Theory
-//! The equations are in [`Law`]. At small strain every law has a shear modulus μ and a bulk modulus κ, tied by Poisson's ratio:
-//! `κ = 2 μ (1+ν) / (3 (1-2ν))`, `E = 2 μ (1+ν)`.
+//! The equations are in [`Law`]. At small strain every law has a shear modulus μ and a bulk modulus
+//! κ, tied by Poisson's ratio: `κ = 2 μ (1+ν) / (3 (1-2ν))`, `E = 2 μ (1+ν)`.
 //!
 //! # Sources
-//! No preset is calibrated: each takes its number from the paper named, cited from memory and not compared with its text, and none was fitted to data here. Reports of living brain
-//! range over a factor of three; replace the numbers where forces matter.
+//! No preset is calibrated: each takes its number from the paper named, cited from memory and not
+//! compared with its text, and none was fitted to data here. Reports of living brain range over a
+//! factor of three; replace the numbers where forces matter.
 //!
-//! Wittek, Miller, Kikinis, Warfield, J. Biomech. 40 (2007): brain shift with 3 kPa. Miller and Chinzei, J. Biomech. 35 (2002):
-//! Ogden's law with 842 Pa and exponent -4.7, for brain in tension and compression. Both near 3 kPa at the strain rates of surgery.
-//! Budday et al., J. Mech. Behav. Biomed. Mater. 46 (2015), 318-330: white matter 1.895 kPa, grey 1.389 kPa (bovine, indentation); [`Material::WHITE_MATTER`] and
-//! [`Material::GREY_MATTER`] keep their ratio and, in equal shares, the 3 kPa of living brain, since what is dead and slow is softer.
-//! Wittek et al., Prog. Biophys. Mol. Biol. 103 (2010): ventricles as a solid of 10 Pa and ν 0.1, which the fluid can leave.
-//! Torii et al., Comput. Methods Appl. Mech. Eng. 195 (2006): wall of a cerebral artery 1 MPa, ν 0.45.
+//! Wittek, Miller, Kikinis, Warfield, J. Biomech. 40 (2007): brain shift with 3 kPa. Miller and
+//! Chinzei, J. Biomech. 35 (2002): Ogden's law with 842 Pa and exponent -4.7, for brain in tension
+//! and compression. Both near 3 kPa at the strain rates of surgery. Budday et al., J. Mech. Behav.
+//! Biomed. Mater. 46 (2015), 318-330: white matter 1.895 kPa, grey 1.389 kPa (bovine, indentation);
+//! [`Material::WHITE_MATTER`] and [`Material::GREY_MATTER`] keep their ratio and, in equal shares,
+//! the 3 kPa of living brain, since what is dead and slow is softer. Wittek et al., Prog. Biophys.
+//! Mol. Biol. 103 (2010): ventricles as a solid of 10 Pa and ν 0.1, which the fluid can leave.
+//! Torii et al., Comput. Methods Appl. Mech. Eng. 195 (2006): wall of a cerebral artery 1 MPa, ν
+//! 0.45.
 //!
 //! # When not to use it
-//! St. Venant-Kirchhoff gives way under compression beyond a stretch of about 0.6 and does not heal when turned inside out: it is here to be
-//! compared with.
+//! St. Venant-Kirchhoff gives way under compression beyond a stretch of about 0.6 and does not heal
+//! when turned inside out: it is here to be compared with.
 
 use crate::{Law, NeoHookean};
 
@@ -28,7 +33,8 @@ pub enum Material {
     NeoHookean {
         /// Young's modulus at small strain E, MPa (3 kPa = 0.003).
         young_mpa: f32,
-        /// Poisson's ratio ν at small strain, 0 ≤ ν < 0.5. Over about 0.47 plain 4-node tetrahedra lock.
+        /// Poisson's ratio ν at small strain, 0 ≤ ν < 0.5. Over about 0.47 plain 4-node tetrahedra
+        /// lock.
         poisson: f32,
         /// Density of the rest state, g/mm³ (water 1e-3).
         density_g_mm3: f32,
@@ -95,29 +101,36 @@ pub enum MaterialError {
 }
 
 impl Material {
-    /// Living brain, uncalibrated: 3 kPa (Wittek et al. 2007), ν 0.45 (the most that plain tetrahedra bear), density of water.
+    /// Living brain, uncalibrated: 3 kPa (Wittek et al. 2007), ν 0.45 (the most that plain
+    /// tetrahedra bear), density of water.
     pub const BRAIN: Self = Self::NeoHookean { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// Brain that answers tension and compression differently (Miller and Chinzei 2002), instantaneous moduli, uncalibrated.
+    /// Brain that answers tension and compression differently (Miller and Chinzei 2002),
+    /// instantaneous moduli, uncalibrated.
     pub const BRAIN_OGDEN: Self =
         Self::Ogden { shear_mpa: [8.42e-4, 0.0], exponent: [-4.7, 1.0], poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// White matter, uncalibrated: 1.36 times as stiff as grey (Budday et al. 2015), the mean of both [`Material::BRAIN`]'s.
+    /// White matter, uncalibrated: 1.36 times as stiff as grey (Budday et al. 2015), the mean of
+    /// both [`Material::BRAIN`]'s.
     pub const WHITE_MATTER: Self = Self::NeoHookean { young_mpa: 0.003_46, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
     /// Grey matter, uncalibrated (Budday et al. 2015).
     pub const GREY_MATTER: Self = Self::NeoHookean { young_mpa: 0.002_54, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// A ventricle filled with CSF, uncalibrated (Wittek et al. 2010): as a solid so soft and compressible that it neither holds the brain up nor keeps it from closing.
+    /// A ventricle filled with CSF, uncalibrated (Wittek et al. 2010): as a solid so soft and
+    /// compressible that it neither holds the brain up nor keeps it from closing.
     pub const VENTRICLE: Self = Self::NeoHookean { young_mpa: 1.0e-5, poisson: 0.1, density_g_mm3: 1.0e-3 };
 
-    /// Wall of a cerebral artery, uncalibrated (Torii et al. 2006). 300 times as stiff as brain: it shortens the stable step 18 times where elements are as large.
+    /// Wall of a cerebral artery, uncalibrated (Torii et al. 2006). 300 times as stiff as brain: it
+    /// shortens the stable step 18 times where elements are as large.
     pub const VESSEL_WALL: Self = Self::NeoHookean { young_mpa: 1.0, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// A tumour, uncalibrated, without a source: three times as stiff as the brain around it (reports range from 2 to 10 times).
+    /// A tumour, uncalibrated, without a source: three times as stiff as the brain around it
+    /// (reports range from 2 to 10 times).
     pub const TUMOUR: Self = Self::NeoHookean { young_mpa: 0.009, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// The thesis's Table 6.1 in consistent units: 30 kPa, ν 0.3; ten times stiffer and far more compressible than living brain.
+    /// The thesis's Table 6.1 in consistent units: 30 kPa, ν 0.3; ten times stiffer and far more
+    /// compressible than living brain.
     pub const THESIS: Self = Self::NeoHookean { young_mpa: 0.030, poisson: 0.3, density_g_mm3: 1.0e-3 };
 
     /// Refuses parameters that no material has, and fits that are not convex.

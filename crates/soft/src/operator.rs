@@ -4,7 +4,8 @@
 //! Per element with displacement gradient H: `σ = λ tr(H) I + μ (H + Hᵀ)`, nodal forces `V σ ∇N_a`.
 //!
 //! # Practice
-//! Serves time-step bounds, vibration frequencies and the linear solver's checks. About 20 ns a tetrahedron.
+//! Serves time-step bounds, vibration frequencies and the linear solver's checks. About 20 ns a
+//! tetrahedron.
 
 use crate::body::Element;
 use crate::{Body, Material};

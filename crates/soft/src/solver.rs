@@ -6,10 +6,12 @@ use trepan_geometry::Vec3;
 /// Advances a body under loads. One implementation owns all of a body's nodal state.
 ///
 /// # Practice
-/// The real-time solvers neither allocate, lock, wait nor panic in [`step`](Self::step); a solver that does (the reference) says so.
-/// Nodes are numbered as in the mesh that the solver was made from.
+/// The real-time solvers neither allocate, lock, wait nor panic in [`step`](Self::step); a solver
+/// that does (the reference) says so. Nodes are numbered as in the mesh that the solver was made
+/// from.
 pub trait SoftSolver: Send {
-    /// Advances by `dt_ms`. Whatever goes wrong is healed and counted in the report; positions stay finite.
+    /// Advances by `dt_ms`. Whatever goes wrong is healed and counted in the report; positions stay
+    /// finite.
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport;
 
     /// Present node positions, world mm.
@@ -42,9 +44,11 @@ pub struct StepReport {
     pub limited: u32,
     /// Steps actually made, over 1 when `dt_ms` was over the stable bound.
     pub substeps: u32,
-    /// Time that was asked for and not simulated, because it would have taken too many substeps, ms.
+    /// Time that was asked for and not simulated, because it would have taken too many substeps,
+    /// ms.
     pub skipped_ms: f32,
-    /// Forces of all contact springs on the tissue at the end of the step, summed without their directions, N.
+    /// Forces of all contact springs on the tissue at the end of the step, summed without their
+    /// directions, N.
     pub contact_n: f32,
     /// Iterations of an implicit or static solver.
     pub iterations: u32,

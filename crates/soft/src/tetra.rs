@@ -1,8 +1,9 @@
 //! One 4-node tetrahedron in f64: volume and the constant gradients of its shape functions.
 //!
 //! # Theory
-//! With edge vectors `e_a = X_a - X_0` the gradients are the dual basis, `∇N_a · e_b = δ_ab` for a, b in 1..3, and
-//! `∇N_0 = -(∇N_1 + ∇N_2 + ∇N_3)`. The deformation gradient of nodal displacements u is `F = I + Σ u_a ⊗ ∇N_a`.
+//! With edge vectors `e_a = X_a - X_0` the gradients are the dual basis, `∇N_a · e_b = δ_ab` for a,
+//! b in 1..3, and `∇N_0 = -(∇N_1 + ∇N_2 + ∇N_3)`. The deformation gradient of nodal displacements u
+//! is `F = I + Σ u_a ⊗ ∇N_a`.
 
 use glam::{DMat3, DVec3};
 
@@ -16,7 +17,8 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// The shape of a tetrahedron with these rest corners, mm. Gradients are not finite for a flat one.
+    /// The shape of a tetrahedron with these rest corners, mm. Gradients are not finite for a flat
+    /// one.
     pub fn of(corners: [DVec3; 4]) -> Self {
         let [a, b, c] = [1, 2, 3].map(|i| corners[i] - corners[0]);
         let six_volumes = a.cross(b).dot(c);

@@ -1,17 +1,22 @@
-//! Extended position-based dynamics with neo-Hookean constraints: small, forgiving, right in the limit of small substeps.
+//! Extended position-based dynamics with neo-Hookean constraints: small, forgiving, right in the
+//! limit of small substeps.
 //!
 //! # Theory
-//! Energy `μ/2 tr(FᵀF) + λ'/2 (J - γ)²` with `γ = 1 + μ/λ'` and `λ' = κ + μ/3`, so that both moduli at small strain are right. Each substep moves all nodes freely, then
-//! goes once through the elements and moves their nodes along the gradients of two constraints, `C_D = √tr(FᵀF)` and `C_H = J - γ`:
-//! `(∇C W ∇Cᵀ + 1/(k V h²)) Δλ = -C`, `Δx = W ∇Cᵀ Δλ`, W = 1/m (Macklin and Müller 2021). Both at once, a 2×2 system: one after the other they
-//! would stir a body at rest, where neither is zero and only their forces cancel. The tool's spring is one more such constraint.
+//! Energy `μ/2 tr(FᵀF) + λ'/2 (J - γ)²` with `γ = 1 + μ/λ'` and `λ' = κ + μ/3`, so that both moduli
+//! at small strain are right. Each substep moves all nodes freely, then goes once through the
+//! elements and moves their nodes along the gradients of two constraints, `C_D = √tr(FᵀF)` and
+//! `C_H = J - γ`: `(∇C W ∇Cᵀ + 1/(k V h²)) Δλ = -C`, `Δx = W ∇Cᵀ Δλ`, W = 1/m (Macklin and Müller
+//! 2021). Both at once, a 2×2 system: one after the other they would stir a body at rest, where
+//! neither is zero and only their forces cancel. The tool's spring is one more such constraint.
 //!
 //! # Practice
-//! About 60 ns a tetrahedron and substep; sequential, so the same every time. Elements turned inside out come back: J - γ pulls them through.
+//! About 60 ns a tetrahedron and substep; sequential, so the same every time. Elements turned
+//! inside out come back: J - γ pulls them through.
 //!
 //! # When not to use it
-//! With substeps over about twice the bound of an explicit step ([`crate::power_bound_ms`]), as for a stiff body on a fine mesh: one pass then leaves so
-//! much undone that the body is too soft, and further on it folds into itself.
+//! With substeps over about twice the bound of an explicit step ([`crate::power_bound_ms`]), as for
+//! a stiff body on a fine mesh: one pass then leaves so much undone that the body is too soft, and
+//! further on it folds into itself.
 
 use crate::body::Element;
 use crate::{Body, BodyError, Loads, Material, SoftSolver, StepReport, lowest_frequency};

@@ -67,7 +67,8 @@ fn the_reference_passes_the_patch_test_and_gives_the_closed_form_reaction() {
 
 #[test]
 fn the_reference_is_where_an_independent_code_is() {
-    // scikit-fem, split box of 10×2×2 cells, 30 kPa, ν 0.3, own weight: the tip hangs 55.458 mm down, 17.374 mm back and 7.062 mm aside.
+    // scikit-fem, split box of 10×2×2 cells, 30 kPa, ν 0.3, own weight: the tip hangs 55.458 mm
+    // down, 17.374 mm back and 7.062 mm aside.
     let body = block([10, 2, 2], Vec3::new(100.0, 20.0, 20.0), Material::THESIS, |p| p.x < 1e-3);
     let mut solver = Reference::new(&body, &reference::Config::default()).unwrap();
     let report = solver.step(&Loads { gravity: GRAVITY, ..Loads::default() }, 1.0);

@@ -24,7 +24,8 @@ fn column(cells: [usize; 3], lower: Material, upper: Material) -> Body {
 
 #[test]
 fn a_column_of_two_materials_sags_as_its_parts_in_series_in_every_method() {
-    // Without lateral strain (ν = 0): sag = g/E₁ (ρ₁ h²/2 + ρ₂ h h) + g/E₂ ρ₂ h²/2 for halves of height h.
+    // Without lateral strain (ν = 0): sag = g/E₁ (ρ₁ h²/2 + ρ₂ h h) + g/E₂ ρ₂ h²/2 for halves of
+    // height h.
     let (h, g, gravity) = (30.0, 1e-4, Vec3::NEG_Z * 1e-4);
     let body = column([2, 2, 6], elastic(0.01, 1e-3), elastic(0.03, 2e-3));
     let exact = g / 0.01 * (1e-3 * h * h / 2.0 + 2e-3 * h * h) + g / 0.03 * 2e-3 * h * h / 2.0;

@@ -1,4 +1,5 @@
-//! The reference with quadratic elements, in motion and under pressure, against independent codes and closed forms.
+//! The reference with quadratic elements, in motion and under pressure, against independent codes
+//! and closed forms.
 
 use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;
@@ -29,7 +30,8 @@ fn quadratic_elements_are_where_an_independent_code_is() {
 
 #[test]
 fn a_pressed_cube_of_quadratic_elements_does_not_lock() {
-    // scikit-fem, quadratic tetrahedra, 4³ cells, top pressed by a fifth: 10.0159 N at ν 0.49; linear ones 17.598 N.
+    // scikit-fem, quadratic tetrahedra, 4³ cells, top pressed by a fifth: 10.0159 N at ν 0.49;
+    // linear ones 17.598 N.
     let mesh = boxes::split_box([4; 3], Vec3::splat(100.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1.0 || p.z > 99.0);
     let top = boxes::nodes_where(&mesh, |p| p.z > 99.0);
@@ -63,7 +65,8 @@ fn motion_keeps_energy_and_has_the_period_of_the_explicit_solver() {
         loop {
             solver.step(&Loads::default(), dt);
             time += dt;
-            // The part of the motion along the start: higher modes are small in the start and smaller by its square here.
+            // The part of the motion along the start: higher modes are small in the start and
+            // smaller by its square here.
             let parts = solver.positions().iter().zip(&body.mesh.positions);
             let now: f32 = parts.map(|(x, rest)| (x.z - rest.z) * (rest.x / 60.0).powi(2)).sum();
             if now < 0.0 {

@@ -53,7 +53,7 @@ fn threads(bencher: Bencher<'_, '_>, threads: usize) {
 
 #[divan::bench]
 fn cure(bencher: Bencher<'_, '_>) {
-    steps(bencher, BRAIN, &Config { cure_locking: true, ..Config::default() });
+    steps(bencher, BRAIN, &Config { averaged_pressure: true, ..Config::default() });
 }
 
 #[divan::bench]
@@ -63,14 +63,14 @@ fn prony(bencher: Bencher<'_, '_>) {
 
 #[divan::bench]
 fn cure_and_prony(bencher: Bencher<'_, '_>) {
-    steps(bencher, BRAIN, &Config { cure_locking: true, relaxation: Relaxation::BRAIN, ..Config::default() });
+    steps(bencher, BRAIN, &Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..Config::default() });
 }
 
 /// One pass alone, of a step with the cure.
 #[divan::bench(args = Pass::ALL.map(Pass::name))]
 fn pass(bencher: Bencher<'_, '_>, name: &str) {
     let pass = Pass::ALL.into_iter().find(|p| p.name() == name).expect("a pass of that name");
-    let mut tled = Tled::new(&body(BRAIN), &Config { cure_locking: true, ..Config::default() }).expect("sound");
+    let mut tled = Tled::new(&body(BRAIN), &Config { averaged_pressure: true, ..Config::default() }).expect("sound");
     let (loads, dt_ms) = (loads(), tled.stable_dt_ms());
     tled.step(&loads, dt_ms);
     bencher.bench_local(|| tled.pass(pass, &loads, dt_ms));

@@ -1,4 +1,5 @@
-//! How long does a step take at 22 thousand tetrahedra? Prints best and median of each kernel and option, and the ratio to the scalar kernel.
+//! How long does a step take at 22 thousand tetrahedra? Prints best and median of each kernel and
+//! option, and the ratio to the scalar kernel.
 
 use std::time::Instant;
 use trepan_geometry::Vec3;
@@ -17,9 +18,9 @@ fn main() -> Result<(), BodyError> {
     let of_kernel = |kernel: Kernel| (kernel.name(), Config { kernel, ..plain });
     let mut runs: Vec<_> = Kernel::all().into_iter().filter(|kernel| kernel.runs_here()).map(of_kernel).collect();
     runs.push(("two threads", Config { threads: 2, ..plain }));
-    runs.push(("locking cure", Config { cure_locking: true, ..plain }));
+    runs.push(("locking cure", Config { averaged_pressure: true, ..plain }));
     runs.push(("Prony terms", Config { relaxation: Relaxation::BRAIN, ..plain }));
-    runs.push(("cure and Prony", Config { cure_locking: true, relaxation: Relaxation::BRAIN, ..plain }));
+    runs.push(("cure and Prony", Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..plain }));
     let mut solvers = Vec::new();
     for (name, config) in &runs {
         solvers.push((*name, Tled::new(&body, config)?, Vec::new()));
@@ -41,7 +42,7 @@ fn main() -> Result<(), BodyError> {
         );
     }
     for threads in [1, 2] {
-        let mut tled = Tled::new(&body, &Config { threads, cure_locking: true, ..plain })?;
+        let mut tled = Tled::new(&body, &Config { threads, averaged_pressure: true, ..plain })?;
         let bests = Pass::ALL.map(|pass| (0..400).map(|_| passed_us(&mut tled, pass)).fold(f64::INFINITY, f64::min));
         let words: Vec<_> = Pass::ALL.iter().zip(bests).map(|(p, us)| format!("{} {us:.1} us", p.name())).collect();
         println!("passes of a cured step by {threads} threads, best: {}", words.join(", "));

@@ -1,4 +1,5 @@
-//! Pokes a block of brain tissue with a probe and lets go: prints dent, force and how it comes back.
+//! Pokes a block of brain tissue with a probe and lets go: prints dent, force and how it comes
+//! back.
 
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;

@@ -1,16 +1,19 @@
 //! Blocks of sixteen tetrahedra, structure of arrays, and the two passes over them.
 //!
 //! # Theory
-//! The force pass turns displacements into forces. Where locking is cured a volume pass goes before it: each seat at a node gets the mean `J - 1` of
-//! its elements, weighted by volume, and the force pass takes the mean of its four seats in place of its own: the average nodal
-//! pressure of Bonet and Burton 1998, material by material as of Joldes, Wittek and Miller 2009 (see `seats.rs`).
+//! The force pass turns displacements into forces. Where locking is cured a volume pass goes before
+//! it: each group at a node gets the mean `J - 1` of its elements, weighted by volume, and the
+//! force pass takes the mean of its four node_groups in place of its own: the average nodal
+//! pressure of Bonet and Burton 1998, material by material as of Joldes, Wittek and Miller 2009
+//! (see `node_groups.rs`).
 //!
 //! # Practice
-//! 84 bytes of constants a tetrahedron, 48 more for a memory of past stress. Nodes are those of the part that the block belongs to. Forces are added lane by lane,
-//! whatever the register's width, so that every kernel sums in the same order.
+//! 84 bytes of constants a tetrahedron, 48 more for a memory of past stress. Nodes are those of the
+//! part that the block belongs to. Forces are added lane by lane, whatever the register's width, so
+//! that every kernel sums in the same order.
 
 use crate::element::{deformation, forces};
-use crate::kernel::{Found, Pass};
+use crate::kernel::{Pass, PassReport};
 use crate::lane::Lane;
 use crate::law::{Constitutive, Stress};
 use crate::relaxation::Fade;
@@ -24,7 +27,8 @@ pub(crate) const WIDTH: usize = 16;
 /// Four numbers in one 16-byte row: a displacement and `J - 1` of a node, or a force and nothing.
 pub(crate) type Quad = [f32; 4];
 
-/// Sixteen tetrahedra with K material constants each. Lanes without an element have no stiffness and add nothing to node 0.
+/// Sixteen tetrahedra with K material constants each. Lanes without an element have no stiffness
+/// and add nothing to node 0.
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(crate) struct Block<const K: usize> {
@@ -47,7 +51,7 @@ pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
     pub fade: [Fade; 2],
     pub u: &'a [Quad],
     pub sums: &'a mut [Quad],
-    pub cure_locking: bool,
+    pub averaged_pressure: bool,
     pub law: PhantomData<M>,
 }
 
@@ -120,7 +124,8 @@ impl<const K: usize> Block<K> {
     }
 }
 
-/// ω² of an element over its stiffness, both at rest; times its stiffness at present it is its ω² at present.
+/// ω² of an element over its stiffness, both at rest; times its stiffness at present it is its ω²
+/// at present.
 pub(crate) fn omega2_over_stiffness<M: Constitutive<K>, const K: usize>(
     shape: &Shape,
     material: &Material,
@@ -133,7 +138,7 @@ pub(crate) fn omega2_over_stiffness<M: Constitutive<K>, const K: usize>(
 
 impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, K, T> {
     #[inline(always)]
-    fn run<L: Lane>(&mut self) -> Found {
+    fn run<L: Lane>(&mut self) -> PassReport {
         let (mut inverted, mut stiffest) = (0, L::splat(0.0));
         for (block, memory) in self.blocks.iter().zip(self.memory.iter_mut()) {
             for part in 0..WIDTH / L::LANES {
@@ -141,7 +146,7 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 let (gradients, constants) = (block.gradients::<L>(part), load::<L, K>(&block.constants, part));
                 let d = deformation(&moved.edges, &gradients);
                 let mut stress = M::stress(&constants, &d);
-                let swelling = if self.cure_locking { moved.mean } else { d.j - L::splat(1.0) };
+                let swelling = if self.averaged_pressure { moved.mean } else { d.j - L::splat(1.0) };
                 let omega2 = L::load(&block.omega2, part) * stiffness(&stress, M::moduli(&constants), &d, swelling);
                 stiffest = omega2.larger(stiffest);
                 if T > 0 {
@@ -156,13 +161,13 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 inverted += d.j.not_positive();
             }
         }
-        Found { inverted, stiffest: stiffest.largest() }
+        PassReport { inverted, stiffest: stiffest.largest() }
     }
 }
 
 impl<const K: usize> Pass for Volumes<'_, K> {
     #[inline(always)]
-    fn run<L: Lane>(&mut self) -> Found {
+    fn run<L: Lane>(&mut self) -> PassReport {
         for block in self.blocks {
             let mut row = [0.0; WIDTH];
             for part in 0..WIDTH / L::LANES {
@@ -175,7 +180,7 @@ impl<const K: usize> Pass for Volumes<'_, K> {
                 block.nodes.iter().for_each(|corner| self.shares[corner[lane] as usize] += share);
             }
         }
-        Found::default()
+        PassReport::default()
     }
 }
 

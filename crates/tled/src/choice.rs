@@ -1,8 +1,9 @@
 //! Which solver steps a body fastest on this machine: not by its name, by trying.
 //!
 //! # Practice
-//! Every candidate is stepped at rest through the seam, as a simulator would, for some ms by the caller's clock; what counts is wall time for a ms of tissue time, so that
-//! a solver with longer steps is not punished for them. The winner is built anew: trying leaves no trace in it.
+//! Every candidate is stepped at rest through the seam, as a simulator would, for some ms by the
+//! caller's clock; what counts is wall time for a ms of tissue time, so that a solver with longer
+//! steps is not punished for them. The winner is built anew: trying leaves no trace in it.
 
 use crate::{Config, Tled};
 use trepan_soft::{Body, Loads, SoftSolver};
@@ -44,7 +45,8 @@ pub fn candidates<'a>(body: &'a Body, config: &'a Config) -> Vec<Candidate<'a>> 
     all
 }
 
-/// Steps each under `loads` for `each_ms` of `now_ms` and takes the cheapest; an error tells why none could be built.
+/// Steps each under `loads` for `each_ms` of `now_ms` and takes the cheapest; an error tells why
+/// none could be built.
 pub fn fastest(
     candidates: &[Candidate<'_>],
     loads: &Loads,

@@ -1,8 +1,9 @@
 //! A body's own rigid motion, which damping must not brake.
 //!
 //! # Theory
-//! The rigid motion with the same momentum and angular momentum: `V = Σ m v / Σ m`, `ω = Θ⁻¹ L` about the mass centre, with
-//! `L = Σ m r × v`, `Θ = Σ m (r² I - r rᵀ)`. What is left, `v - V - ω × r`, carries neither, so damping it conserves both.
+//! The rigid motion with the same momentum and angular momentum: `V = Σ m v / Σ m`, `ω = Θ⁻¹ L`
+//! about the mass centre, with `L = Σ m r × v`, `Θ = Σ m (r² I - r rᵀ)`. What is left,
+//! `v - V - ω × r`, carries neither, so damping it conserves both.
 
 use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;

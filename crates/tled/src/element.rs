@@ -5,7 +5,8 @@
 //! H = Σ_a (u_a - u_0) ⊗ ∇N_a, a = 1..3     F = I + H     C = cof F     J = det F
 //! P = F S + (q + κ (J̄ - 1)) C               f_a = -V P ∇N_a, a = 1..3        f_0 = -(f_1 + f_2 + f_3)
 //! ```
-//! S and q come from the material; J̄ is J, or the mean of the nodes' volume ratios where locking is cured.
+//! S and q come from the material; J̄ is J, or the mean of the nodes' volume ratios where locking
+//! is cured.
 
 use crate::lane::Lane;
 use crate::law::{Deformation, Stress};

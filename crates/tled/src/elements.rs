@@ -2,46 +2,55 @@
 
 use crate::block::WIDTH;
 use crate::config::Config;
-use crate::handed::Handed;
-use crate::kernel::Found;
+use crate::force_slots::ForceSlots;
+use crate::kernel::PassReport;
 use crate::layout::{Layout, kind};
+use crate::node_groups::NodeGroups;
 use crate::nodes::{Nodes, Update};
-use crate::part::{Forcing, Own, Part, Quiet};
+use crate::part::{Forcing, Part, PartGroups, Quiet};
 use crate::relaxation::Relaxation;
 use crate::scaling::Scaling;
-use crate::seats::Seats;
 use crate::team::{Team, Work};
 use trepan_geometry::Vec3;
 use trepan_soft::Body;
 
-/// Elements of a part: enough that adding up its sums is cheap, few enough that its nodes stay in the fastest cache.
+/// Elements of a part: enough that adding up its sums is cheap, few enough that its nodes stay in
+/// the fastest cache.
 const PART: usize = 64 * WIDTH;
 
 /// The elements of a body and its nodes.
 pub(crate) struct Elements {
     team: Team,
-    cure_locking: bool,
+    averaged_pressure: bool,
     relaxation: Relaxation,
     still_mm: f32,
 }
 
 impl Elements {
     pub fn of(body: &Body, layout: &Layout, scaling: &Scaling, nodes: Nodes, config: &Config) -> Self {
-        let seats = Seats::of(body, layout, config.cure_locking);
-        let inverse_volume = if config.cure_locking { seats.inverse_volumes(body, layout) } else { Vec::new() };
+        let node_groups = NodeGroups::of(body, layout, config.averaged_pressure);
+        let inverse_volume =
+            if config.averaged_pressure { node_groups.inverse_volumes(body, layout) } else { Vec::new() };
         let of_one_law = layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b));
         let groups: Vec<&[u32]> = of_one_law.flat_map(|tets| tets.chunks(PART)).collect();
-        let seats_of = |t: u32| seats.of_tet(body, layout, t);
-        let owned: Vec<Vec<u32>> = groups.iter().map(|tets| sorted(tets.iter().flat_map(|&t| seats_of(t)))).collect();
-        let (handed, slots) = Handed::of(&owned, &seats, layout.node_at.len(), inverse_volume);
+        let groups_of = |t: u32| node_groups.of_tet(body, layout, t);
+        let owned: Vec<Vec<u32>> = groups.iter().map(|tets| sorted(tets.iter().flat_map(|&t| groups_of(t)))).collect();
+        let (force_slots, slots) = ForceSlots::of(&owned, &node_groups, layout.node_at.len(), inverse_volume);
         let part = |((tets, own), slots): ((&&[u32], Vec<u32>), Vec<u32>)| {
-            let places = own.iter().map(|&s| seats.place_of[s as usize]).collect();
-            Part::of(body, scaling, tets, &seats_of, Own { seats: own, places, slots }, &config.relaxation)
+            let places = own.iter().map(|&s| node_groups.place_of[s as usize]).collect();
+            Part::of(
+                body,
+                scaling,
+                tets,
+                &groups_of,
+                PartGroups { node_groups: own, places, slots },
+                &config.relaxation,
+            )
         };
         let parts = groups.iter().zip(owned).zip(slots).map(part).collect();
         Self {
-            team: Team::of(parts, nodes, handed, config.kernel.resolved(), config.threads),
-            cure_locking: config.cure_locking,
+            team: Team::of(parts, nodes, force_slots, config.kernel.resolved(), config.threads),
+            averaged_pressure: config.averaged_pressure,
             relaxation: config.relaxation,
             still_mm: config.still_mm,
         }
@@ -53,21 +62,21 @@ impl Elements {
     }
 
     /// Both passes over the elements, `dt_ms` after the last time.
-    pub fn compute(&mut self, dt_ms: f32) -> Found {
+    pub fn compute(&mut self, dt_ms: f32) -> PassReport {
         self.average_volumes(dt_ms);
         self.find_forces(dt_ms)
     }
 
     /// Computes every element's forces from the nodes' displacements.
-    pub fn find_forces(&mut self, dt_ms: f32) -> Found {
-        let (fade, cure_locking) = (self.relaxation.fade(dt_ms), self.cure_locking);
-        self.team.compute(Work::Forces(Forcing { fade, cure_locking, quiet: self.quiet(dt_ms) }));
+    pub fn find_forces(&mut self, dt_ms: f32) -> PassReport {
+        let (fade, averaged_pressure) = (self.relaxation.fade(dt_ms), self.averaged_pressure);
+        self.team.compute(Work::Forces(Forcing { fade, averaged_pressure, quiet: self.quiet(dt_ms) }));
         self.team.found()
     }
 
-    /// Averages the volume change by seat, where locking is cured.
+    /// Averages the volume change by group, where locking is cured.
     pub fn average_volumes(&mut self, dt_ms: f32) {
-        if self.cure_locking {
+        if self.averaged_pressure {
             self.team.compute(Work::Volumes(self.quiet(dt_ms)));
             self.team.compute(Work::Average);
         }
@@ -84,7 +93,7 @@ impl Elements {
 
     /// Force of the elements on the node at `place`, N.
     pub fn force(&self, place: usize) -> Vec3 {
-        self.team.handed().force(place).truncate()
+        self.team.force_slots().force(place).truncate()
     }
 
     /// Share of the elements that are awake.
@@ -144,7 +153,7 @@ mod tests {
         let forces = |kernel: Kernel, threads: usize| {
             let nodes = Nodes::of(body, &layout, &body.lumped_masses_g());
             (0..count).for_each(|n| nodes.set(n, Vec3::from([3 * n, 3 * n + 1, 3 * n + 2].map(noise)), Vec3::ZERO));
-            let config = Config { kernel, cure_locking: cure, relaxation, threads, ..Config::default() };
+            let config = Config { kernel, averaged_pressure: cure, relaxation, threads, ..Config::default() };
             let mut elements = Elements::of(body, &layout, &Scaling::of(body, 0.0), nodes, &config);
             let found = (0..3).map(|_| elements.compute(0.7)).last();
             (found, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())

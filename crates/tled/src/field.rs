@@ -1,8 +1,9 @@
 //! Numbers that threads hand to each other between rounds, without a lock.
 //!
 //! # Theory
-//! Each number is written by one thread in a round and read by others in later ones; the counters that begin and end a round order them, so the numbers themselves are
-//! loaded and stored without any order, as plain memory is.
+//! Each number is written by one thread in a round and read by others in later ones; the counters
+//! that begin and end a round order them, so the numbers themselves are loaded and stored without
+//! any order, as plain memory is.
 
 use crate::block::Quad;
 use glam::Vec4;

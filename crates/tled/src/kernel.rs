@@ -23,12 +23,12 @@ pub enum Kernel {
 /// Work over all blocks, written once for every width. Implementations inline always.
 pub(crate) trait Pass {
     /// Does the work with registers of kind L.
-    fn run<L: Lane>(&mut self) -> Found;
+    fn run<L: Lane>(&mut self) -> PassReport;
 }
 
 /// What a pass noticed on its way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Found {
+pub(crate) struct PassReport {
     /// Elements with J ≤ 0.
     pub inverted: u32,
     /// Largest ω² of a single element as it is deformed now, 1/ms².
@@ -75,7 +75,7 @@ impl Kernel {
 
     /// Runs a pass with this kernel.
     #[inline]
-    pub(crate) fn run<P: Pass>(self, pass: &mut P) -> Found {
+    pub(crate) fn run<P: Pass>(self, pass: &mut P) -> PassReport {
         match self {
             Self::Scalar => pass.run::<f32>(),
             #[cfg(target_arch = "x86_64")]

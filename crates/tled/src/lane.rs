@@ -1,7 +1,9 @@
-//! One number per element, for one element or for several at once: the arithmetic of the kernels is written once.
+//! One number per element, for one element or for several at once: the arithmetic of the kernels is
+//! written once.
 //!
 //! # Practice
-//! Only operations that IEEE 754 rounds exactly, and no fused ones, so every width gives the same bits on every machine.
+//! Only operations that IEEE 754 rounds exactly, and no fused ones, so every width gives the same
+//! bits on every machine.
 
 use crate::block::{Quad, WIDTH};
 use std::ops::{Add, Div, Mul, Sub};
@@ -9,7 +11,8 @@ use wide::{f32x8, u32x8};
 
 /// A register of f32, one lane per element.
 ///
-/// Implementations inline always: for the registers of [`x86`](crate::x86) the instructions exist only in their kernel.
+/// Implementations inline always: for the registers of [`x86`](crate::x86) the instructions exist
+/// only in their kernel.
 pub(crate) trait Lane:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {

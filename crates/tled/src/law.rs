@@ -8,7 +8,8 @@
 //! Mooney-Rivlin        S = (2 c₁₀ g + 2 c₀₁ h I₁) I - 2 c₀₁ h FᵀF       q_iso = c₁₀ g' I₁ + c₀₁ h' I₂
 //! Ogden                S = Σ_i s_i n_i n_iᵀ, s_i = Σ_p μ_p'/α_p g_p λ_i^(α_p-2)   (μ' = 2 μ)
 //! ```
-//! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3 as in `trepan_soft::Law`, the f64 twin of this file.
+//! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3 as in
+//! `trepan_soft::Law`, the f64 twin of this file.
 
 use crate::lane::Lane;
 use crate::principal::principal;
@@ -42,7 +43,8 @@ pub(crate) trait Constitutive<const K: usize> {
     fn constants(law: &Law, volume_mm3: f64) -> [f32; K];
     /// Its stress without the part of the volume.
     fn stress<L: Lane>(constants: &[L; K], d: &Deformation<L>) -> Stress<L>;
-    /// μ V and κ V, N mm. κ multiplies `J - 1` in the part of the volume; it is zero where the law is not split.
+    /// μ V and κ V, N mm. κ multiplies `J - 1` in the part of the volume; it is zero where the law
+    /// is not split.
     fn moduli<L: Lane>(constants: &[L; K]) -> (L, L);
     /// Whether s is a number times the unit tensor, so that its other entries need no arithmetic.
     const ROUND: bool = false;

@@ -1,8 +1,8 @@
 //! Order of nodes and elements in memory: neighbours in space become neighbours in memory.
 //!
 //! # Theory
-//! Nodes are sorted along a Morton curve, elements by law and then by their lowest node: those of one law run through one kernel, and a step
-//! reads nodes that are still in the cache.
+//! Nodes are sorted along a Morton curve, elements by law and then by their lowest node: those of
+//! one law run through one kernel, and a step reads nodes that are still in the cache.
 
 use trepan_geometry::Vec3;
 use trepan_soft::{Body, Law};

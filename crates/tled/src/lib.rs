@@ -1,18 +1,21 @@
-//! Total Lagrangian Explicit Dynamics: large deformations of soft tissue in real time on a plain CPU.
+//! Total Lagrangian Explicit Dynamics: large deformations of soft tissue in real time on a plain
+//! CPU.
 //!
 //! # Theory
 //! ```text
 //! M ü + α M u̇ + f_int(u) = f_ext            F = I + Σ u_a ⊗ ∇N_a,   f_int,a = V P(F) ∇N_a
 //! v⁺ = ((1 - α dt/2) v + dt M⁻¹ (f_ext - f_int)) / (1 + α dt/2)          u⁺ = u + dt v⁺
 //! ```
-//! Everything refers to the rest state, so shape-function gradients are computed once (Miller, Joldes, Lance and Wittek 2007). A step is
-//! four passes: element forces, contact, node update, bookkeeping; no equation is solved.
+//! Everything refers to the rest state, so shape-function gradients are computed once (Miller,
+//! Joldes, Lance and Wittek 2007). A step is four passes: element forces, contact, node update,
+//! bookkeeping; no equation is solved.
 //!
 //! # Practice
-//! One step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms); a longer one is cut into substeps, and so is one that
-//! elements do not bear as they are deformed now. Elements sit in blocks of sixteen with one
-//! lane each; their forces are kept and gathered per node in a fixed order, so the same input gives the same bytes on every machine and with
-//! every kernel. A step neither allocates, locks, waits nor panics.
+//! One step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms); a longer one
+//! is cut into substeps, and so is one that elements do not bear as they are deformed now. Elements
+//! sit in blocks of sixteen with one lane each; their forces are kept and gathered per node in a
+//! fixed order, so the same input gives the same bytes on every machine and with every kernel. A
+//! step neither allocates, locks, waits nor panics.
 //!
 //! ```
 //! use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
@@ -29,8 +32,9 @@
 //! ```
 //!
 //! # When not to use it
-//! For nearly incompressible tissue (ν over about 0.47) without [`Config::cure_locking`]: plain 4-node tetrahedra lock. For slow processes (minutes): the step is
-//! bound by sound, use a static solver.
+//! For nearly incompressible tissue (ν over about 0.47) without [`Config::averaged_pressure`]:
+//! plain 4-node tetrahedra lock. For slow processes (minutes): the step is bound by sound, use a
+//! static solver.
 
 mod block;
 pub mod choice;
@@ -39,19 +43,19 @@ mod damping;
 mod element;
 mod elements;
 mod field;
+mod force_slots;
 #[cfg(feature = "gpu")]
 pub mod gpu;
-mod handed;
 mod kernel;
 mod lane;
 mod law;
 mod layout;
+mod node_groups;
 mod nodes;
 mod part;
 mod principal;
 mod relaxation;
 mod scaling;
-mod seats;
 mod settle;
 mod stiffness;
 mod team;

@@ -1,12 +1,14 @@
 //! The nodes' state and its update by central differences, with what keeps it sane.
 //!
 //! # Practice
-//! State is kept as displacement from rest, by place in the solver's order: f32 displacements of a few mm are a thousand times finer than
-//! positions of 200 mm. A node beside a sleeping part stays until something pushes it. Any thread moves any run of nodes: what a node becomes depends on itself and its slots only.
+//! State is kept as displacement from rest, by place in the solver's order: f32 displacements of a
+//! few mm are a thousand times finer than positions of 200 mm. A node beside a sleeping part stays
+//! until something pushes it. Any thread moves any run of nodes: what a node becomes depends on
+//! itself and its slots only.
 
 use crate::damping::RigidMotion;
 use crate::field::{Field, Scalars};
-use crate::handed::Handed;
+use crate::force_slots::ForceSlots;
 use crate::layout::Layout;
 use glam::Vec4;
 use std::ops::Range;
@@ -23,7 +25,8 @@ pub(crate) struct Nodes {
     /// Forces from outside, N; cleared by the update, and 0 everywhere while nothing pushes.
     external: Field,
     is_pushed: AtomicBool,
-    /// 1 where a load, or an awake part beside a sleeping one, pushed in the last step: no part around it may sleep.
+    /// 1 where a load, or an awake part beside a sleeping one, pushed in the last step: no part
+    /// around it may sleep.
     pub pushed: Scalars,
     /// 1/m, 1/g; 0 for fixed nodes.
     pub inverse_mass: Vec<f32>,
@@ -44,7 +47,8 @@ pub(crate) struct Update {
     pub max_speed: f32,
     pub max_displacement_mm: f32,
     pub rigid: Option<RigidMotion>,
-    /// Nodes beside a sleeping part stay where they are while a step would not move them further than this from rest, mm.
+    /// Nodes beside a sleeping part stay where they are while a step would not move them further
+    /// than this from rest, mm.
     pub calm_mm: f32,
 }
 
@@ -57,7 +61,8 @@ impl Update {
 }
 
 impl Nodes {
-    /// Nodes at rest, of masses by mesh node, g, which may be more than what their weight comes from.
+    /// Nodes at rest, of masses by mesh node, g, which may be more than what their weight comes
+    /// from.
     pub fn of(body: &Body, layout: &Layout, masses: &[f64]) -> Self {
         let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
         let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };
@@ -77,12 +82,13 @@ impl Nodes {
     }
 
     /// Moves some nodes by one substep.
-    pub fn update(&self, places: Range<usize>, handed: &Handed, update: &Update) {
+    pub fn update(&self, places: Range<usize>, force_slots: &ForceSlots, update: &Update) {
         let [keep, gain] = update.keep_and_gain();
         let (gravity, dt_ms) = (update.gravity.extend(0.0), update.dt_ms);
         let square = |limit: f32| (limit * limit).min(f32::MAX);
         let (fastest, furthest) = (square(update.max_speed), square(update.max_displacement_mm));
-        // What nobody needs is neither read nor written: a step has little more to do for a node than to move 100 bytes.
+        // What nobody needs is neither read nor written: a step has little more to do for a node
+        // than to move 100 bytes.
         let (anything_pushes, may_sleep) = (self.is_pushed.load(Relaxed), update.calm_mm > 0.0);
         for place in places {
             let (u, v, inverse_mass) = (self.u.vector(place), self.v.vector(place), self.inverse_mass[place]);
@@ -92,7 +98,7 @@ impl Nodes {
                 self.take_external(place, anything_pushes);
                 continue;
             }
-            let (mut force, external) = (handed.force(place), self.take_external(place, anything_pushes));
+            let (mut force, external) = (force_slots.force(place), self.take_external(place, anything_pushes));
             let is_beside_sleepers = force.w > 0.0;
             force.w = 0.0;
             let pull = gravity * self.weight[place] + (force + external) * inverse_mass;
@@ -125,7 +131,8 @@ impl Nodes {
         }
     }
 
-    /// Velocity that the node at a place would have after a substep under the force of its elements alone, mm/ms; of a fixed node what it has.
+    /// Velocity that the node at a place would have after a substep under the force of its elements
+    /// alone, mm/ms; of a fixed node what it has.
     pub fn free_velocity(&self, place: usize, force: Vec3, update: &Update) -> Vec3 {
         let (velocity, inverse_mass) = (self.velocity(place), self.inverse_mass[place]);
         if inverse_mass == 0.0 {
@@ -169,7 +176,8 @@ impl Nodes {
         (after, velocity)
     }
 
-    /// Ends an update: nothing pushes any more. Gives how many nodes were held to a limit and how many were not finite.
+    /// Ends an update: nothing pushes any more. Gives how many nodes were held to a limit and how
+    /// many were not finite.
     pub fn finish(&self) -> [u32; 2] {
         self.is_pushed.store(false, Relaxed);
         [&self.limited, &self.non_finite].map(|count| count.swap(0, Relaxed))

@@ -1,8 +1,9 @@
 //! Eigenvalues and eigenvectors of symmetric 3×3 matrices, several at once, without a branch.
 //!
 //! # Theory
-//! Jacobi's method: each rotation makes one off-diagonal entry zero, `t = 2 a_pq / (d ± √(d² + 4 a_pq²))`, `d = a_qq - a_pp`, with the
-//! sign of d; four sweeps reach f32 precision. Equal eigenvalues need no special case.
+//! Jacobi's method: each rotation makes one off-diagonal entry zero,
+//! `t = 2 a_pq / (d ± √(d² + 4 a_pq²))`, `d = a_qq - a_pp`, with the sign of d; four sweeps reach
+//! f32 precision. Equal eigenvalues need no special case.
 
 use crate::lane::Lane;
 use crate::law::Symmetric;

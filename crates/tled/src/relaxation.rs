@@ -5,11 +5,13 @@
 //! ```text
 //! S(t) - Σ_i Υ_i(t)      Υ_i' = (g_i S - Υ_i)/τ_i      Υ⁺ = e^(-dt/τ) Υ + g (1 - e^(-dt/τ)) S
 //! ```
-//! exact for a stress that is constant over the step, stable for any dt. The material's moduli are the instantaneous ones; held for long
-//! the isochoric part falls to `1 - Σ g_i`. S is taken in the rest frame (second Piola-Kirchhoff), so rotation does not mix it.
+//! exact for a stress that is constant over the step, stable for any dt. The material's moduli are
+//! the instantaneous ones; held for long the isochoric part falls to `1 - Σ g_i`. S is taken in the
+//! rest frame (second Piola-Kirchhoff), so rotation does not mix it.
 //!
 //! # Sources
-//! Taylor, Comas, Cheng, Passenger, Hawkes, Atkinson, Ourselin, Med. Image Anal. 13 (2009). Brain: Miller and Chinzei 2002.
+//! Taylor, Comas, Cheng, Passenger, Hawkes, Atkinson, Ourselin, Med. Image Anal. 13 (2009). Brain:
+//! Miller and Chinzei 2002.
 
 use crate::lane::Lane;
 use trepan_soft::BodyError;
@@ -17,7 +19,8 @@ use trepan_soft::BodyError;
 /// Two Prony terms; a share of 0 = no term.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Relaxation {
-    /// Share g_i of the instantaneous isochoric stress that fades, without unit; at least 0, together below 1.
+    /// Share g_i of the instantaneous isochoric stress that fades, without unit; at least 0,
+    /// together below 1.
     pub share: [f32; 2],
     /// Time τ_i in which it fades to 1/e, ms.
     pub time_ms: [f32; 2],
@@ -34,7 +37,8 @@ impl Relaxation {
     /// No relaxation: elastic.
     pub const NONE: Self = Self { share: [0.0; 2], time_ms: [1.0; 2] };
 
-    /// Brain as of Miller and Chinzei 2002, uncalibrated: 45 % within half a second, 36.5 % within 50 s.
+    /// Brain as of Miller and Chinzei 2002, uncalibrated: 45 % within half a second, 36.5 % within
+    /// 50 s.
     pub const BRAIN: Self = Self { share: [0.450, 0.365], time_ms: [500.0, 50_000.0] };
 
     /// Whether anything fades.

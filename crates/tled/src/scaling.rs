@@ -1,9 +1,10 @@
 //! Mass added to the few elements that set the stable step.
 //!
 //! # Theory
-//! An element's bound is `2/ω`, `ω² ∝ 1/ρ`. Raising ρ by `max(ω²/ω_t², 1)` brings every element down to ω_t; ω_t is the lowest for which the mass added stays
-//! within what is allowed. On a brain mesh a hundredth of its mass lifts the slivers that would otherwise set everybody's step. Weight is not scaled, so that
-//! equilibrium stays where it was; motion is slower where mass was added.
+//! An element's bound is `2/ω`, `ω² ∝ 1/ρ`. Raising ρ by `max(ω²/ω_t², 1)` brings every element
+//! down to ω_t; ω_t is the lowest for which the mass added stays within what is allowed. On a brain
+//! mesh a hundredth of its mass lifts the slivers that would otherwise set everybody's step. Weight
+//! is not scaled, so that equilibrium stays where it was; motion is slower where mass was added.
 
 use trepan_soft::{Body, element_omega2};
 
@@ -15,7 +16,8 @@ pub(crate) struct Scaling {
 }
 
 impl Scaling {
-    /// Adds at most the share `most` of the body's mass; 0 = none, infinity = until all elements have the same bound.
+    /// Adds at most the share `most` of the body's mass; 0 = none, infinity = until all elements
+    /// have the same bound.
     pub fn of(body: &Body, most: f32) -> Self {
         let count = body.mesh.tets.len();
         if most <= 0.0 {

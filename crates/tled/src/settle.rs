@@ -1,13 +1,16 @@
-//! Dynamic relaxation: from here to rest under given loads in the fewest steps, as for the sag under gravity or the shift of a brain.
+//! Dynamic relaxation: from here to rest under given loads in the fewest steps, as for the sag
+//! under gravity or the shift of a brain.
 //!
 //! # Theory
-//! Steps of the longest stable length, damped critically for the slowest motion that is still going on, `α = 2 ω`: what is left falls by `e^(-ω dt)` a step, so about
-//! `10/(ω dt)` steps end it. ω comes from the motion itself, Rayleigh's quotient of what nodes and forces changed by over some steps,
-//! `ω² = -Σ Δu·Δf / Σ m Δu²` (Joldes, Wittek and Miller 2009), held near that of the rest state. What is left is estimated from velocity and acceleration by
-//! `|v|/ω + |a|/ω²`.
+//! Steps of the longest stable length, damped critically for the slowest motion that is still going
+//! on, `α = 2 ω`: what is left falls by `e^(-ω dt)` a step, so about `10/(ω dt)` steps end it. ω
+//! comes from the motion itself, Rayleigh's quotient of what nodes and forces changed by over some
+//! steps, `ω² = -Σ Δu·Δf / Σ m Δu²` (Joldes, Wittek and Miller 2009), held near that of the rest
+//! state. What is left is estimated from velocity and acceleration by `|v|/ω + |a|/ω²`.
 //!
 //! # Practice
-//! With `Config::mass_scaling` infinite all elements have the same bound: fewest steps where rest, and not the way there, is wanted.
+//! With `Config::mass_scaling` infinite all elements have the same bound: fewest steps where rest,
+//! and not the way there, is wanted.
 
 use crate::tled::Tled;
 use trepan_geometry::Vec3;
@@ -47,7 +50,8 @@ pub struct Settled {
 }
 
 impl Tled {
-    /// Goes to rest under `loads`, then stops all motion; damping is afterwards as before. A body that nothing holds does not come to rest, and this says so.
+    /// Goes to rest under `loads`, then stops all motion; damping is afterwards as before. A body
+    /// that nothing holds does not come to rest, and this says so.
     pub fn settle(&mut self, loads: &Loads, settling: &Settling) -> Settled {
         let (rate, lowest) = (self.damping_per_ms, self.lowest_per_ms);
         let (mut slow, mut settled) = (lowest, Settled { left_mm: f32::INFINITY, ..Settled::default() });

@@ -1,14 +1,16 @@
-//! How much stiffer an element has become by its deformation: what the stable step is checked against while it runs.
+//! How much stiffer an element has become by its deformation: what the stable step is checked
+//! against while it runs.
 //!
 //! # Theory
 //! The tangent `∂P/∂F` of `P = F S + (q + κ (J̄-1)) C` is at most
-//! `A = Σ|S_ij| + (κ + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J̄-1)| √I₁`: the stress itself, the resistance to a change of volume, and its turning.
-//! The largest eigenvalue of a symmetric 3×3 matrix B is at most `m + 2 p`, `m = tr B/3`, `p² = |B - m I|²/6`, and exactly that when two are equal.
-//! The element's ω² at rest grows by `A/A(rest)`.
+//! `A = Σ|S_ij| + (κ + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J̄-1)| √I₁`: the stress itself, the
+//! resistance to a change of volume, and its turning. The largest eigenvalue of a symmetric 3×3
+//! matrix B is at most `m + 2 p`, `m = tr B/3`, `p² = |B - m I|²/6`, and exactly that when two are
+//! equal. The element's ω² at rest grows by `A/A(rest)`.
 //!
 //! # Practice
-//! About 50 operations an element. For Ogden's and Mooney-Rivlin's laws the second term is that of a neo-Hookean solid with the same moduli; their own
-//! stiffening shows in the first.
+//! About 50 operations an element. For Ogden's and Mooney-Rivlin's laws the second term is that of
+//! a neo-Hookean solid with the same moduli; their own stiffening shows in the first.
 
 use crate::lane::Lane;
 use crate::law::{Deformation, Stress};

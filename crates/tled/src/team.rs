@@ -1,16 +1,18 @@
 //! Work on the elements and the nodes, alone or with more threads.
 //!
 //! # Theory
-//! A round of work falls into tasks, a part of the elements or a run of the nodes each. The caller and every second worker claim them one after the other from the first on, the rest from the
-//! last on, so that the same thread meets the same elements again and finds them in its cache. A
-//! worker that is not running costs nothing: the caller then claims every task itself, and waits only for tasks that someone is in the middle of. So a loaded machine falls
-//! back to the speed of one thread and never stalls. Who did a task leaves no trace in the result.
+//! A round of work falls into tasks, a part of the elements or a run of the nodes each. The caller
+//! and every second worker claim them one after the other from the first on, the rest from the last
+//! on, so that the same thread meets the same elements again and finds them in its cache. A worker
+//! that is not running costs nothing: the caller then claims every task itself, and waits only for
+//! tasks that someone is in the middle of. So a loaded machine falls back to the speed of one
+//! thread and never stalls. Who did a task leaves no trace in the result.
 //!
 //! # Practice
 //! Workers spin for a few microseconds after a round, then yield, then sleep.
 
-use crate::handed::Handed;
-use crate::kernel::{Found, Kernel};
+use crate::force_slots::ForceSlots;
+use crate::kernel::{Kernel, PassReport};
 use crate::nodes::{Nodes, Update};
 use crate::part::{Forcing, Part, Quiet};
 use std::ops::Range;
@@ -20,7 +22,7 @@ use std::thread::JoinHandle;
 
 const SPINS: u32 = 4000;
 const YIELDS: u32 = 64;
-/// Nodes, or seats, of a task.
+/// Nodes, or node_groups, of a task.
 const RUN: usize = 256;
 
 /// The parts, the nodes, and who works on them.
@@ -45,7 +47,7 @@ pub(crate) enum Work {
 struct Shared {
     parts: Vec<Mutex<Part>>,
     nodes: Nodes,
-    handed: Handed,
+    force_slots: ForceSlots,
     kernel: Kernel,
     work: RwLock<Work>,
     claims: Claims,
@@ -58,7 +60,8 @@ struct Shared {
     quit: AtomicBool,
 }
 
-/// Which tasks of a round are claimed: how many there are, how many from the last on, how many from the first on, 20 bits each. One number, so that nobody sees half of a new round.
+/// Which tasks of a round are claimed: how many there are, how many from the last on, how many from
+/// the first on, 20 bits each. One number, so that nobody sees half of a new round.
 struct Claims(AtomicU64);
 
 /// Most tasks of a round: a thousand million elements, 270 million nodes.
@@ -89,11 +92,11 @@ impl Drop for Finished<'_> {
 
 impl Team {
     /// A team of `threads`, the caller among them. A thread that cannot be started is done without.
-    pub fn of(parts: Vec<Part>, nodes: Nodes, handed: Handed, kernel: Kernel, threads: usize) -> Self {
+    pub fn of(parts: Vec<Part>, nodes: Nodes, force_slots: ForceSlots, kernel: Kernel, threads: usize) -> Self {
         let shared = Arc::new(Shared {
             parts: parts.into_iter().map(Mutex::new).collect(),
             nodes,
-            handed,
+            force_slots,
             kernel,
             work: RwLock::new(Work::Average),
             claims: Claims(AtomicU64::new(0)),
@@ -117,9 +120,9 @@ impl Team {
         &self.shared.nodes
     }
 
-    /// What the parts handed to them.
-    pub fn handed(&self) -> &Handed {
-        &self.shared.handed
+    /// What the parts force_slots to them.
+    pub fn force_slots(&self) -> &ForceSlots {
+        &self.shared.force_slots
     }
 
     /// Does a round of work.
@@ -134,12 +137,12 @@ impl Team {
     }
 
     /// What the elements noticed in the last round of forces.
-    pub fn found(&self) -> Found {
-        let add = |all: Found, part: &Mutex<Part>| {
+    pub fn found(&self) -> PassReport {
+        let add = |all: PassReport, part: &Mutex<Part>| {
             let found = lock(part).found;
-            Found { inverted: all.inverted + found.inverted, stiffest: all.stiffest.max(found.stiffest) }
+            PassReport { inverted: all.inverted + found.inverted, stiffest: all.stiffest.max(found.stiffest) }
         };
-        self.shared.parts.iter().fold(Found::default(), add)
+        self.shared.parts.iter().fold(PassReport::default(), add)
     }
 
     /// How many elements there are, and how many of them are awake.
@@ -171,7 +174,7 @@ impl Shared {
     fn tasks(&self, work: Work) -> usize {
         match work {
             Work::Volumes(_) | Work::Forces(_) => self.parts.len(),
-            Work::Average => self.handed.seats().div_ceil(RUN),
+            Work::Average => self.force_slots.node_groups().div_ceil(RUN),
             Work::Update(_) => self.nodes.u.len().div_ceil(RUN),
         }
     }
@@ -202,12 +205,12 @@ impl Shared {
     }
 
     fn task(&self, number: usize, work: Work) {
-        let (nodes, handed, kernel) = (&self.nodes, &self.handed, self.kernel);
+        let (nodes, force_slots, kernel) = (&self.nodes, &self.force_slots, self.kernel);
         match work {
-            Work::Volumes(quiet) => lock(&self.parts[number]).volumes(kernel, quiet, nodes, handed),
-            Work::Average => handed.average(run(number, handed.seats())),
-            Work::Forces(how) => lock(&self.parts[number]).forces(kernel, &how, nodes, handed),
-            Work::Update(update) => nodes.update(run(number, nodes.u.len()), handed, &update),
+            Work::Volumes(quiet) => lock(&self.parts[number]).volumes(kernel, quiet, nodes, force_slots),
+            Work::Average => force_slots.average(run(number, force_slots.node_groups())),
+            Work::Forces(how) => lock(&self.parts[number]).forces(kernel, &how, nodes, force_slots),
+            Work::Update(update) => nodes.update(run(number, nodes.u.len()), force_slots, &update),
         }
     }
 

@@ -66,14 +66,16 @@ impl Pass {
 }
 
 /// Share of the present bound that a substep may use.
-pub(crate) const BORNE: f32 = 0.95;
+pub(crate) const SUBSTEP_SAFETY: f32 = 0.95;
 /// Keeps rounding from adding a substep.
 pub(crate) const NEARLY: f32 = 1.0 - 1e-5;
-/// Most that the frequency of the stiffest element is taken to grow by; a state worse than that is on its way to be healed.
-pub(crate) const MOST_GAINED: f32 = 64.0;
+/// Most that the frequency of the stiffest element is taken to grow by; a state worse than that is
+/// on its way to be healed.
+pub(crate) const MAX_STIFFENING: f32 = 64.0;
 
 impl Tled {
-    /// Takes a body at rest: orders it for the cache, precomputes gradients, finds the stable step and the damping.
+    /// Takes a body at rest: orders it for the cache, precomputes gradients, finds the stable step
+    /// and the damping.
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
         body.check()?;
         config.check()?;
@@ -125,8 +127,9 @@ impl Tled {
         self.elements.awake()
     }
 
-    /// Puts pressure on some triangles, from the next step on; those that name nodes outside the mesh are left out.
-    /// A contact's spring on the same nodes does not foresee it: at rest the spring is off by what the pressure moves its nodes in one step.
+    /// Puts pressure on some triangles, from the next step on; those that name nodes outside the
+    /// mesh are left out. A contact's spring on the same nodes does not foresee it: at rest the
+    /// spring is off by what the pressure moves its nodes in one step.
     pub fn set_pressure(&mut self, mut pressure: SurfacePressure) {
         let place_of = &self.layout.place_of;
         pressure.triangles.retain(|t| t.iter().all(|&n| (n as usize) < place_of.len()));
@@ -134,7 +137,8 @@ impl Tled {
         self.pressure = pressure;
     }
 
-    /// Sets the state of a node: displacement from rest, mm, and velocity, mm/ms. A fixed node goes on with its velocity until it is given another.
+    /// Sets the state of a node: displacement from rest, mm, and velocity, mm/ms. A fixed node goes
+    /// on with its velocity until it is given another.
     pub fn set_node(&mut self, node: u32, displacement: Vec3, velocity: Vec3) {
         if let Some(&place) = self.layout.place_of.get(node as usize) {
             self.elements.nodes().set(place as usize, displacement, velocity);
@@ -144,7 +148,8 @@ impl Tled {
         }
     }
 
-    /// Force that the support of a fixed node exerts on it, N, as of the last step; at a free node the force that accelerates it, reversed.
+    /// Force that the support of a fixed node exerts on it, N, as of the last step; at a free node
+    /// the force that accelerates it, reversed.
     pub fn support_force(&self, node: u32) -> Vec3 {
         self.layout.place_of.get(node as usize).map_or(Vec3::ZERO, |&place| -self.elements.force(place as usize))
     }
@@ -158,7 +163,8 @@ impl Tled {
         self.elapsed_ms = 0.0;
     }
 
-    /// Does one pass of a step alone, on the present state: what a bench times. A step is all of them in order.
+    /// Does one pass of a step alone, on the present state: what a bench times. A step is all of
+    /// them in order.
     pub fn pass(&mut self, pass: Pass, loads: &Loads, dt_ms: f32) {
         let mut report = StepReport::default();
         match pass {
@@ -173,7 +179,8 @@ impl Tled {
         }
     }
 
-    /// One substep of at most `left_ms`; gives its length. As long as the elements bear as they are now, and of equal lengths while that stays.
+    /// One substep of at most `left_ms`; gives its length. As long as the elements bear as they are
+    /// now, and of equal lengths while that stays.
     fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
         if std::mem::replace(&mut self.gravity, loads.gravity) != loads.gravity {
             self.elements.wake();
@@ -181,7 +188,7 @@ impl Tled {
         let found = self.elements.compute(self.elapsed_ms);
         report.inverted = report.inverted.max(found.inverted);
         let bound_ms = self.bound_now_ms(found.stiffest);
-        let longest = self.stable_dt_ms().min(BORNE * bound_ms);
+        let longest = self.stable_dt_ms().min(SUBSTEP_SAFETY * bound_ms);
         let dt_ms =
             if self.config.substeps == 0 { left_ms } else { left_ms / (left_ms / longest * NEARLY).ceil().max(1.0) };
         let update = self.update_of(loads, dt_ms);
@@ -236,10 +243,11 @@ impl Tled {
         }
     }
 
-    /// The stable bound as the elements are now: that of the rest state, shortened by what the stiffest element has gained.
+    /// The stable bound as the elements are now: that of the rest state, shortened by what the
+    /// stiffest element has gained.
     fn bound_now_ms(&self, stiffest: f32) -> f32 {
         let gained = (stiffest / self.stiffest_at_rest).sqrt();
-        self.bound_ms / gained.clamp(1.0, MOST_GAINED)
+        self.bound_ms / gained.clamp(1.0, MAX_STIFFENING)
     }
 
     fn press(&mut self, loads: &Loads, update: &Update, report: &mut StepReport) {
@@ -281,7 +289,8 @@ impl SoftSolver for Tled {
     }
 }
 
-/// Frequency of the slowest motion, 1/ms. Where damping does not hang on it, or nothing holds the body, that of its slowest shear wave stands in.
+/// Frequency of the slowest motion, 1/ms. Where damping does not hang on it, or nothing holds the
+/// body, that of its slowest shear wave stands in.
 pub(crate) fn lowest_per_ms(body: &Body, damping: Damping, stiffness: &Stiffness) -> f32 {
     let asked = matches!(damping, Damping::Critical(_));
     let found = asked.then(|| lowest_frequency_of(body, stiffness)).flatten();

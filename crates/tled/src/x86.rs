@@ -1,8 +1,10 @@
-//! Eight and sixteen elements at once with the instructions of newer x86 processors, chosen at run time.
+//! Eight and sixteen elements at once with the instructions of newer x86 processors, chosen at run
+//! time.
 //!
 //! # Theory
-//! Nodes are read as whole 16-byte rows and transposed 4×4 in registers, forces are transposed back and added as rows. The hardware's own
-//! gather is slower than that, and the compiler does not find it by itself.
+//! Nodes are read as whole 16-byte rows and transposed 4×4 in registers, forces are transposed back
+//! and added as rows. The hardware's own gather is slower than that, and the compiler does not find
+//! it by itself.
 //!
 //! ```text
 //! rows 4q+i (x y z 0)  ── r_i, one 128-bit part q each ──▶  unpack, shuffle  ──▶  x, y, z of lanes 4q..4q+3
@@ -16,7 +18,7 @@
 )]
 
 use crate::block::{Quad, WIDTH};
-use crate::kernel::{Found, Pass};
+use crate::kernel::{Pass, PassReport};
 use crate::lane::{BIASED, FRACTION, Lane, ONE, ROOT_BITS, SIGN, WHOLE};
 use std::arch::x86_64::*;
 use std::mem::transmute;
@@ -41,10 +43,10 @@ pub(crate) fn has_avx512() -> bool {
 }
 
 /// A pass over some blocks, eight elements at once.
-pub(crate) fn avx2<P: Pass>(pass: &mut P) -> Found {
+pub(crate) fn avx2<P: Pass>(pass: &mut P) -> PassReport {
     assert!(has_avx2());
     #[target_feature(enable = "avx2")]
-    fn run<P: Pass>(pass: &mut P) -> Found {
+    fn run<P: Pass>(pass: &mut P) -> PassReport {
         pass.run::<Ymm>()
     }
     // SAFETY: the CPU has AVX2, asserted above.
@@ -52,10 +54,10 @@ pub(crate) fn avx2<P: Pass>(pass: &mut P) -> Found {
 }
 
 /// A pass over some blocks, sixteen elements at once.
-pub(crate) fn avx512<P: Pass>(pass: &mut P) -> Found {
+pub(crate) fn avx512<P: Pass>(pass: &mut P) -> PassReport {
     assert!(has_avx512());
     #[target_feature(enable = "avx512f")]
-    fn run<P: Pass>(pass: &mut P) -> Found {
+    fn run<P: Pass>(pass: &mut P) -> PassReport {
         pass.run::<Zmm>()
     }
     // SAFETY: the CPU has AVX-512F, asserted above.
@@ -68,7 +70,8 @@ macro_rules! arithmetic {
             type Output = Self;
             #[inline(always)]
             fn $name(self, other: Self) -> Self {
-                // SAFETY: a register of this kind exists only inside its kernel, which has the instruction.
+                // SAFETY: a register of this kind exists only inside its kernel, which has the
+                // instruction.
                 Self(unsafe { $instruction(self.0, other.0) })
             }
         }

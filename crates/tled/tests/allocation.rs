@@ -56,7 +56,8 @@ fn a_step_never_allocates() {
         let (before, mine) = (ALLOCATIONS.load(Ordering::Relaxed), MINE.get());
         let report = (0..300).map(|_| tled.step(&loads, dt)).last().unwrap();
         assert_eq!(MINE.get(), mine, "the caller allocated");
-        // Other threads: the worker's start, whenever that is, and the test harness; not 900 substeps.
+        // Other threads: the worker's start, whenever that is, and the test harness; not 900
+        // substeps.
         assert!(ALLOCATIONS.load(Ordering::Relaxed) - before < 100, "a worker allocated");
         assert_eq!(report.substeps, 3);
     }

@@ -1,4 +1,5 @@
-//! The device's solver against the processor's. Without an adapter only the error can be tested, and is.
+//! The device's solver against the processor's. Without an adapter only the error can be tested,
+//! and is.
 #![cfg(feature = "gpu")]
 
 use trepan_contact::{NodalContact, PlaneContact};
@@ -103,7 +104,8 @@ const TWO_TERMS: Material =
 /// Relaxes within what a test lasts.
 const FADING: Relaxation = Relaxation { share: [0.45, 0.365], time_ms: [20.0, 400.0] };
 
-/// Both solvers through the seam, pressed, then with another step length; gives how far apart they are as a share of the way, and the way.
+/// Both solvers through the seam, pressed, then with another step length; gives how far apart they
+/// are as a share of the way, and the way.
 fn apart(gpu: &Gpu, body: &Body, config: &Config) -> (f32, f32) {
     let loads = loads(body);
     let mut device = GpuTled::new(gpu, body, config).expect("the device has these");
@@ -126,10 +128,10 @@ fn every_law_with_cure_and_relaxation_agrees_with_the_processor() {
     let laws = [Material::BRAIN, KIRCHHOFF, MOONEY, Material::BRAIN_OGDEN, TWO_TERMS];
     for (material, name) in laws.into_iter().zip(["neo-Hookean", "Kirchhoff", "Mooney", "Ogden", "two terms"]) {
         let body = Body { materials: vec![material, Material::TUMOUR], ..body() };
-        for (cure_locking, relaxation) in [(false, Relaxation::NONE), (true, Relaxation::NONE), (true, FADING)] {
-            let (apart, way) = apart(&gpu, &body, &Config { cure_locking, relaxation, ..config() });
-            println!("{name}, cure {cure_locking}, fading {}: {apart:e} of {way} mm", !relaxation.is_none());
-            assert!(way > 0.3 && apart <= 1e-4, "{name} {cure_locking} {relaxation:?}: {apart} of {way} mm");
+        for (averaged_pressure, relaxation) in [(false, Relaxation::NONE), (true, Relaxation::NONE), (true, FADING)] {
+            let (apart, way) = apart(&gpu, &body, &Config { averaged_pressure, relaxation, ..config() });
+            println!("{name}, cure {averaged_pressure}, fading {}: {apart:e} of {way} mm", !relaxation.is_none());
+            assert!(way > 0.3 && apart <= 1e-4, "{name} {averaged_pressure} {relaxation:?}: {apart} of {way} mm");
         }
     }
     assert_eq!(gpu.faults().count, 0, "{:?}", gpu.faults());
@@ -142,7 +144,7 @@ fn a_body_of_every_law_at_once_with_scaled_masses_agrees_too() {
     body.materials = vec![Material::BRAIN, KIRCHHOFF, MOONEY, TWO_TERMS, Material::TUMOUR, Material::VENTRICLE];
     body.material_of_tet.iter_mut().enumerate().for_each(|(t, m)| *m = (t / 17 % 6) as u8);
     let config = Config {
-        cure_locking: true,
+        averaged_pressure: true,
         relaxation: FADING,
         mass_scaling: 0.01,
         balanced_gravity: Vec3::Z * 1e-3,
@@ -158,7 +160,7 @@ fn runs_repeat_bit_for_bit_however_they_are_submitted() {
     let Some(gpu) = device() else { return };
     let body = body();
     let loads = loads(&body);
-    let config = Config { cure_locking: true, relaxation: FADING, ..Config::default() };
+    let config = Config { averaged_pressure: true, relaxation: FADING, ..Config::default() };
     let run = |chunks: &[u32]| {
         let mut device = GpuTled::new(&gpu, &body, &config).unwrap();
         chunks.iter().for_each(|&n| {

@@ -27,7 +27,8 @@ fn exact(body: &Body, loads: &Loads, set: impl Fn(&mut Reference)) -> Vec<Vec3> 
     reference.positions().to_vec()
 }
 
-/// A share of the spring that rose when a pressed body cut its steps would push back harder than it was pushed.
+/// A share of the spring that rose when a pressed body cut its steps would push back harder than it
+/// was pushed.
 #[test]
 fn a_tool_that_presses_so_hard_that_steps_are_cut_comes_to_rest() {
     let mesh = boxes::split_box([12, 8, 6], Vec3::new(48.0, 32.0, 24.0));
@@ -39,13 +40,13 @@ fn a_tool_that_presses_so_hard_that_steps_are_cut_comes_to_rest() {
     contact.normalise();
     contact.offset_mm = 3.0 - 24.0;
     let loads = Loads { contacts: contact.into(), ..Loads::default() };
-    for cure_locking in [false, true] {
+    for averaged_pressure in [false, true] {
         let body = Body::uniform(mesh.clone(), fixed.clone(), Material::BRAIN);
-        let mut tled = Tled::new(&body, &Config { cure_locking, ..Config::default() }).unwrap();
+        let mut tled = Tled::new(&body, &Config { averaged_pressure, ..Config::default() }).unwrap();
         let dt_ms = tled.stable_dt_ms();
         let cut = (0..(1000.0 / dt_ms) as usize).filter(|_| tled.step(&loads, dt_ms).substeps > 1).count();
         let fastest = tled.velocities().iter().map(|v| v.length()).fold(0.0, f32::max);
-        println!("cure {cure_locking}: {fastest:e} mm/ms, {cut} steps cut");
+        println!("cure {averaged_pressure}: {fastest:e} mm/ms, {cut} steps cut");
         assert!(cut > 0 && fastest < 1e-4, "{cut} {fastest}");
     }
 }

@@ -1,4 +1,5 @@
-//! Every material against the f64 reference, relaxation against its curve, and locking with and without its cure.
+//! Every material against the f64 reference, relaxation against its curve, and locking with and
+//! without its cure.
 
 use glam::{Quat, Vec3};
 use trepan_contact::NodalContact;
@@ -36,7 +37,8 @@ fn every_material_settles_where_the_static_reference_is() {
         let mut tled = Tled::new(&body, &Config::default()).unwrap();
         let dt = tled.stable_dt_ms();
         for i in 0..(1500.0 / dt) as usize {
-            // Slowly: St. Venant-Kirchhoff snaps through when an element is hit down to 0.6 of its height.
+            // Slowly: St. Venant-Kirchhoff snaps through when an element is hit down to 0.6 of its
+            // height.
             let mut now = loads.clone();
             now.contacts[0].offset_mm = -40.0 + (0.01 * dt * i as f32).min(3.0);
             tled.step(&now, dt);
@@ -47,7 +49,8 @@ fn every_material_settles_where_the_static_reference_is() {
     }
 }
 
-/// Force on the top of a block sheared by a fifth, every quarter of a ms, the block turned by `turn` after 20 ms.
+/// Force on the top of a block sheared by a fifth, every quarter of a ms, the block turned by
+/// `turn` after 20 ms.
 fn sheared(material: Material, relaxation: Relaxation, turn: Quat) -> Vec<f32> {
     let mesh = boxes::split_box([2, 2, 2], Vec3::splat(10.0));
     let fixed = (0..27).collect();
@@ -87,13 +90,13 @@ fn a_held_shear_relaxes_along_the_curve_whatever_way_it_is_turned() {
 }
 
 /// Force that presses a 100 mm cube of 8³ cells down by a fifth, ends clamped.
-fn pressed(poisson: f32, cure_locking: bool) -> f32 {
+fn pressed(poisson: f32, averaged_pressure: bool) -> f32 {
     let mesh = boxes::split_box([8, 8, 8], Vec3::splat(100.0));
     let ends = boxes::nodes_where(&mesh, |p| p.z < 1.0 || p.z > 99.0);
     let top = boxes::nodes_where(&mesh, |p| p.z > 99.0);
     let material = Material::NeoHookean { young_mpa: 0.003, poisson, density_g_mm3: 1e-3 };
     let body = Body::uniform(mesh, ends, material);
-    let mut tled = Tled::new(&body, &Config { cure_locking, ..Config::default() }).expect("a sound body");
+    let mut tled = Tled::new(&body, &Config { averaged_pressure, ..Config::default() }).expect("a sound body");
     for (n, p) in body.mesh.positions.iter().enumerate() {
         tled.set_node(n as u32, Vec3::NEG_Z * (0.2 * p.z), Vec3::ZERO);
     }
@@ -104,7 +107,8 @@ fn pressed(poisson: f32, cure_locking: bool) -> f32 {
 
 #[test]
 fn the_plain_element_is_the_independent_codes_and_the_cured_one_does_not_lock() {
-    // scikit-fem, same cells: linear tetrahedra 9.961 N (ν 0.45) and 12.905 N (0.49); quadratic ones, finest, 9.117 and 9.667 N.
+    // scikit-fem, same cells: linear tetrahedra 9.961 N (ν 0.45) and 12.905 N (0.49); quadratic
+    // ones, finest, 9.117 and 9.667 N.
     let (plain_45, plain_49) = (pressed(0.45, false), pressed(0.49, false));
     assert!((plain_45 / 9.961 - 1.0).abs() < 0.02 && (plain_49 / 12.905 - 1.0).abs() < 0.02, "{plain_45} {plain_49}");
     let (cured_45, cured_49) = (pressed(0.45, true), pressed(0.49, true));

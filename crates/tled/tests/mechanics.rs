@@ -71,7 +71,8 @@ fn a_patch_takes_the_affine_deformation_of_its_border() {
 
 #[test]
 fn uniaxial_stretch_has_the_stress_of_the_closed_form() {
-    // Free sides in the f32 solver: stretch z by L and x, y by the T that makes the lateral stress vanish.
+    // Free sides in the f32 solver: stretch z by L and x, y by the T that makes the lateral stress
+    // vanish.
     let body = block([2, 2, 2], Vec3::splat(10.0), |_| false);
     for stretch in [0.7f64, 0.9, 1.2, 1.5] {
         let law = law(&body);
@@ -195,7 +196,8 @@ fn without_damping_energy_is_kept() {
         let before = tled.velocities().to_vec();
         tled.step(&Loads::default(), dt);
         if step % 500 == 0 {
-            // Velocities live half a step away: the mean of two is the one at the positions between them.
+            // Velocities live half a step away: the mean of two is the one at the positions between
+            // them.
             let earlier: Vec<Vec3> =
                 tled.positions().iter().zip(tled.velocities()).map(|(x, v)| *x - *v * dt).collect();
             let middle: Vec<Vec3> = before.iter().zip(tled.velocities()).map(|(a, b)| (*a + *b) * 0.5).collect();
@@ -238,7 +240,8 @@ fn damping_stops_the_wobble_of_a_free_body_and_not_its_flight() {
 
 #[test]
 fn a_clamped_beam_swings_at_the_frequency_of_an_independent_code() {
-    // scikit-fem, consistent masses, split box of 20×4×4 cells: 1.882 and 2.012 Hz for the two bending planes; lumping lowers it a little.
+    // scikit-fem, consistent masses, split box of 20×4×4 cells: 1.882 and 2.012 Hz for the two
+    // bending planes; lumping lowers it a little.
     let mesh = boxes::split_box([20, 4, 4], Vec3::new(100.0, 20.0, 20.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.x < 1e-3);
     let body = Body::uniform(mesh, fixed, Material::THESIS);
@@ -251,7 +254,8 @@ fn a_clamped_beam_swings_at_the_frequency_of_an_independent_code() {
     while crossings.len() < 5 && time < 3000.0 {
         tled.step(&Loads::default(), dt);
         time += dt;
-        // The part of the motion along the start: higher modes are small in the start and smaller by its square here.
+        // The part of the motion along the start: higher modes are small in the start and smaller
+        // by its square here.
         let parts = tled.positions().iter().zip(&body.mesh.positions).zip(&start);
         let now: f32 = parts.map(|((x, rest), along)| (*x - *rest).dot(*along)).sum();
         if before.signum() != now.signum() {

@@ -71,8 +71,8 @@ fn a_stretched_bar_of_two_materials_has_one_stress_and_two_strains() {
     for tet in 0..body.mesh.tets.len() {
         body.material_of_tet[tet] = u8::from(body.mesh.corners(tet).iter().map(|p| p.z).sum::<f32>() > 120.0);
     }
-    for cure_locking in [false, true] {
-        let mut tled = Tled::new(&body, &Config { cure_locking, ..Config::default() }).unwrap();
+    for averaged_pressure in [false, true] {
+        let mut tled = Tled::new(&body, &Config { averaged_pressure, ..Config::default() }).unwrap();
         body.fixed.iter().for_each(|&n| tled.set_node(n, u(body.mesh.positions[n as usize]), Vec3::ZERO));
         let dt = tled.stable_dt_ms();
         (0..(400.0 / dt) as usize).for_each(|_| _ = tled.step(&Loads::default(), dt));
@@ -90,8 +90,8 @@ fn the_cure_bears_a_jump_in_stiffness_of_a_thousand() {
     let stiff = Material::NeoHookean { young_mpa: 3.0, poisson: 0.45, density_g_mm3: 1e-3 };
     let body = inclusion(Material::BRAIN, stiff);
     let loads = Loads { gravity: Vec3::X * 9.81e-3, ..Loads::default() };
-    let [plain, cured] = [false, true].map(|cure_locking| {
-        let mut tled = Tled::new(&body, &Config { cure_locking, ..Config::default() }).unwrap();
+    let [plain, cured] = [false, true].map(|averaged_pressure| {
+        let mut tled = Tled::new(&body, &Config { averaged_pressure, ..Config::default() }).unwrap();
         let dt = tled.stable_dt_ms();
         for _ in 0..4000 {
             let report = tled.step(&loads, dt);

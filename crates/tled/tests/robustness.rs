@@ -1,4 +1,5 @@
-//! TLED where such solvers fail: too long steps, elements turned over, hard contact; and the same bytes every time.
+//! TLED where such solvers fail: too long steps, elements turned over, hard contact; and the same
+//! bytes every time.
 
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
@@ -109,7 +110,8 @@ fn elements_turned_over_heal() {
 
 #[test]
 fn a_body_squashed_flat_or_to_a_point_comes_back() {
-    // A mirror image or a point may come out twisted by half a turn about the clamped base, which is an equilibrium too: whole elements suffice there.
+    // A mirror image or a point may come out twisted by half a turn about the clamped base, which
+    // is an equilibrium too: whole elements suffice there.
     for (squash, to_rest) in [(Vec3::new(1.0, 1.0, 0.0), true), (Vec3::new(0.05, 1.0, 1.0), true), (Vec3::ZERO, false)]
     {
         let body = cube();
@@ -130,7 +132,8 @@ fn a_body_squashed_flat_or_to_a_point_comes_back() {
 
 #[test]
 fn a_hard_hit_at_the_full_step_is_survived_by_substeps() {
-    // 3 N at once, 6 mm deep into 10 mm elements: they are squeezed until the step of the rest state is too long for them.
+    // 3 N at once, 6 mm deep into 10 mm elements: they are squeezed until the step of the rest
+    // state is too long for them.
     let body = cube();
     let mut tled = Tled::new(&body, &Config::default()).unwrap();
     let mut contact = NodalContact::none();
@@ -161,7 +164,8 @@ fn a_contact_stiffer_than_the_step_bears_is_stable() {
     }
 }
 
-/// A probe beside a wall on the same light nodes, both damped beyond what an explicit step bears: at rest the tissue bears all of what a hand on the spring feels.
+/// A probe beside a wall on the same light nodes, both damped beyond what an explicit step bears:
+/// at rest the tissue bears all of what a hand on the spring feels.
 #[test]
 fn what_the_hand_feels_the_tissue_gets() {
     let body = cube();

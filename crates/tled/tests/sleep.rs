@@ -1,4 +1,5 @@
-//! What rests falls asleep, what is touched wakes, and neither is far from the body that never sleeps.
+//! What rests falls asleep, what is touched wakes, and neither is far from the body that never
+//! sleeps.
 
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
@@ -23,8 +24,8 @@ fn tool(body: &Body) -> Loads {
     Loads { contacts: contact.into(), ..Loads::default() }
 }
 
-fn config(cure_locking: bool) -> Config {
-    Config { still_mm: 0.003, cure_locking, ..Config::default() }
+fn config(averaged_pressure: bool) -> Config {
+    Config { still_mm: 0.003, averaged_pressure, ..Config::default() }
 }
 
 fn run(solver: &mut Tled, loads: &Loads, ms: f32) {
@@ -42,7 +43,7 @@ fn a_touch_wakes_its_neighbourhood_and_the_answer_is_that_of_a_body_that_never_s
         let (body, free) = (mat(), Loads::default());
         let pressed = tool(&body);
         let mut sleepy = Tled::new(&body, &config(cure)).unwrap();
-        let mut awake = Tled::new(&body, &Config { cure_locking: cure, ..Config::default() }).unwrap();
+        let mut awake = Tled::new(&body, &Config { averaged_pressure: cure, ..Config::default() }).unwrap();
         run(&mut sleepy, &free, 60.0);
         assert_eq!(sleepy.awake_share(), 0.0);
         run(&mut sleepy, &pressed, 5.0);

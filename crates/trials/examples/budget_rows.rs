@@ -1,6 +1,8 @@
-//! Makes the rows of the budget: runs every choice in scenes of training and writes the tables of what was found.
+//! Makes the rows of the budget: runs every choice in scenes of training and writes the tables of
+//! what was found.
 //!
-//! What each part found is kept, so that it goes on where it was stopped. The open heads take part where `TREPAN_DATA` says where they are.
+//! What each part found is kept, so that it goes on where it was stopped. The open heads take part
+//! where `TREPAN_DATA` says where they are.
 
 use anyhow::Result;
 use clap::Parser;

@@ -1,4 +1,5 @@
-//! Which way of touching bone is worth its cost: the quick rigid suite's charts as tables, the front marked.
+//! Which way of touching bone is worth its cost: the quick rigid suite's charts as tables, the
+//! front marked.
 //!
 //! `cargo run --release -p trepan-trials --example front`
 

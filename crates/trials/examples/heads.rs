@@ -1,8 +1,8 @@
 //! Writes heads of a made population and one picture of all of them.
 //!
-//! `cargo run -p trepan-trials --example heads -- N FOLDER [SEED]`: the folder gets one folder a head and
-//! `heads.png`. A row is a head: CT from above and from the side, MRI from above, the side and the front;
-//! green the true brain's border, red the tumour's.
+//! `cargo run -p trepan-trials --example heads -- N FOLDER [SEED]`: the folder gets one folder a
+//! head and `heads.png`. A row is a head: CT from above and from the side, MRI from above, the side
+//! and the front; green the true brain's border, red the tumour's.
 
 use anyhow::{Context, Result};
 use glam::{DAffine3, DMat3, DVec3};

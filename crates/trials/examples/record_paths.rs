@@ -1,4 +1,5 @@
-//! Records the paths of the rigid and the deformable suite into the fixtures; name a suite to record only its own.
+//! Records the paths of the rigid and the deformable suite into the fixtures; name a suite to
+//! record only its own.
 //!
 //! Recordings made anew have other bytes: figures before and after are not comparable.
 //!

@@ -1,8 +1,10 @@
 //! Borders of stability: where each method worked when they were last kept, and what is worse now.
 //!
 //! # Practice
-//! One text file a suite for quick runs and one for full ones, in `borders/` of the sources; a character a cell, so that a changed border is a changed line in a review. `validate --keep-borders` writes them from a run; a row, a column or a map that is new is
-//! no regression, one that is gone is not either.
+//! One text file a suite for quick runs and one for full ones, in `borders/` of the sources; a
+//! character a cell, so that a changed border is a changed line in a review.
+//! `validate --keep-borders` writes them from a run; a row, a column or a map that is new is no
+//! regression, one that is gone is not either.
 
 use crate::compare::told;
 use crate::part::Scope;
@@ -19,13 +21,15 @@ const SIGNS: [char; 4] = ['.', '~', '#', 'x'];
 const BETWEEN: &str = " | ";
 const COLUMNS: &str = "columns: ";
 
-/// Where a suite's border is kept; a quick run asks less of a cell than a full one, so that each has its own.
+/// Where a suite's border is kept; a quick run asks less of a cell than a full one, so that each
+/// has its own.
 fn place(suite: &str, scope: Scope) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("borders").join(scope.pick("quick", "full"));
     folder.join(format!("{suite}.txt"))
 }
 
-/// Counts the cells that are worse than they were kept, and names them; nothing where no border is kept.
+/// Counts the cells that are worse than they were kept, and names them; nothing where no border is
+/// kept.
 pub fn judge(suite: &str, scope: Scope, findings: &mut Findings) {
     if let Ok(text) = std::fs::read_to_string(place(suite, scope)) {
         let worse = regressions(&text, &findings.maps);

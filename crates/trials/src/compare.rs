@@ -1,13 +1,18 @@
 //! Two runs side by side: what got faster, slower, more or less accurate, and how sure that is.
 //!
 //! # Theory
-//! A metric of a method is compared over all scenes that both runs have, as the ratio r = new / old in each. The median of the r is what changed; its 95 % interval is the
-//! bootstrap's (Efron 1979): scenes drawn with repeats, a thousand times. A change counts where the interval leaves out 1 and the median is further from 1 than a
-//! time may wander by itself. How far that is, both runs say together: the spread of the ratios of all times about their median, which a busy or another machine widens.
+//! A metric of a method is compared over all scenes that both runs have, as the ratio r = new / old
+//! in each. The median of the r is what changed; its 95 % interval is the bootstrap's (Efron 1979):
+//! scenes drawn with repeats, a thousand times. A change counts where the interval leaves out 1 and
+//! the median is further from 1 than a time may wander by itself. How far that is, both runs say
+//! together: the spread of the ratios of all times about their median, which a busy or another
+//! machine widens.
 //!
 //! # Practice
-//! Times end in `_us`, `_ms`, `_s`, `_ns` or are rates `_per_s`; they are set against the median ratio of all times of the suite, so that a machine that was slower throughout is said once and
-//! not blamed on each method. All else should repeat exactly with the same seed and is compared as it is.
+//! Times end in `_us`, `_ms`, `_s`, `_ns` or are rates `_per_s`; they are set against the median
+//! ratio of all times of the suite, so that a machine that was slower throughout is said once and
+//! not blamed on each method. All else should repeat exactly with the same seed and is compared as
+//! it is.
 
 use crate::picture::{Chart, Map, Outcome};
 use crate::report::Report;
@@ -21,7 +26,8 @@ use std::path::Path;
 
 /// Draws of the bootstrap.
 const DRAWS: usize = 1000;
-/// Deviation that nine in ten of normal values stay within, over that which half of them do: half the times say it though some methods changed.
+/// Deviation that nine in ten of normal values stay within, over that which half of them do: half
+/// the times say it though some methods changed.
 const NINE_IN_TEN: f64 = 2.44;
 /// A time must change by this share at least to be told, however sure it is.
 const LEAST_TIME: f64 = 0.05;
@@ -231,7 +237,9 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
     }
 }
 
-/// New over old of every metric that both have in the same scene, by method and metric. Where both are 0 the ratio is 1, where one is no number it is none either; where both are none, nothing is compared.
+/// New over old of every metric that both have in the same scene, by method and metric. Where both
+/// are 0 the ratio is 1, where one is no number it is none either; where both are none, nothing is
+/// compared.
 fn ratios(old: &[Row], new: &[Row]) -> BTreeMap<(String, String), Vec<f64>> {
     let was: BTreeMap<_, &Row> = keyed(old).collect();
     let mut ratios: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
@@ -248,7 +256,8 @@ fn ratios(old: &[Row], new: &[Row]) -> BTreeMap<(String, String), Vec<f64>> {
     ratios
 }
 
-/// Rows by scene, method, settings, and which of those that share all of these: rows come in the same order in every run.
+/// Rows by scene, method, settings, and which of those that share all of these: rows come in the
+/// same order in every run.
 fn keyed(rows: &[Row]) -> impl Iterator<Item = ((String, usize), &Row)> {
     let mut met: BTreeMap<String, usize> = BTreeMap::new();
     rows.iter().map(move |row| {
@@ -278,7 +287,8 @@ impl Change {
         Self { median: quantile(&mut all, 0.5).unwrap_or(1.0), method, metric, scenes, low, high }
     }
 
-    /// What to call it, if it is a change beyond the `spread` of all times. A time in a single scene is none: nothing says how sure it is.
+    /// What to call it, if it is a change beyond the `spread` of all times. A time in a single
+    /// scene is none: nothing says how sure it is.
     fn word(&self, nature: Nature, better: Better, spread: f64) -> Option<&'static str> {
         let is_time = nature != Nature::Exact;
         let least = if is_time { spread.max(LEAST_TIME) } else { LEAST };

@@ -1,4 +1,5 @@
-//! The one engine of stability: conditions put to methods, a verdict for each, a map, and a row for every method.
+//! The one engine of stability: conditions put to methods, a verdict for each, a map, and a row for
+//! every method.
 
 use crate::picture::{Map, Outcome};
 use crate::suite::{Findings, Row};

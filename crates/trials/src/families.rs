@@ -1,7 +1,9 @@
-//! Every method of every family: has it been timed, judged and broken, and does the recommended one stand on its front?
+//! Every method of every family: has it been timed, judged and broken, and does the recommended one
+//! stand on its front?
 //!
 //! # Practice
-//! The lists are the crates' own; a method that is added there and not measured here is a hole, and a hole fails a run of all suites.
+//! The lists are the crates' own; a method that is added there and not measured here is a hole, and
+//! a hole fails a run of all suites.
 
 use crate::page::text;
 use crate::part::Suite;

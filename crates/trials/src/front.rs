@@ -2,7 +2,8 @@
 
 use crate::suite::Row;
 
-/// How many rows of a scene beat a method's in both metrics. Rows with a missing or non-finite metric beat nobody.
+/// How many rows of a scene beat a method's in both metrics. Rows with a missing or non-finite
+/// metric beat nobody.
 pub fn dominated(rows: &[Row], scene: &str, method: &str, cost: &str, error: &str) -> usize {
     let value = |row: &Row, name: &str| row.metrics.get(name).copied().filter(|v| v.is_finite());
     let pair = |row: &Row| Some((value(row, cost)?, value(row, error)?));
@@ -15,7 +16,8 @@ pub fn dominated(rows: &[Row], scene: &str, method: &str, cost: &str, error: &st
         .count()
 }
 
-/// Indices of the points (cost, error) that no other point beats in both, cheapest first. What has no number is not among them.
+/// Indices of the points (cost, error) that no other point beats in both, cheapest first. What has
+/// no number is not among them.
 pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     let beaten = |p: &(f64, f64)| points.iter().any(|q| (q.0 < p.0 && q.1 <= p.1) || (q.0 <= p.0 && q.1 < p.1));
     let known = |p: &(f64, f64)| !p.0.is_nan() && !p.1.is_nan();

@@ -1,13 +1,16 @@
 //! How right is each method, and what does it cost: scenes with known truth, rows, gates, charts.
 //!
 //! # Theory
-//! Methods never grade themselves. A suite puts every method of a family into the same scenes, measures error against a closed form or an f64
-//! oracle and cost in the same run, and charts one against the other. A method that another beats in both is not worth its code.
+//! Methods never grade themselves. A suite puts every method of a family into the same scenes,
+//! measures error against a closed form or an f64 oracle and cost in the same run, and charts one
+//! against the other. A method that another beats in both is not worth its code.
 //!
 //! # Practice
-//! `cargo xtask validate [SUITE[/PART]] [--quick] [--shard I/N] [--out DIR]`. A suite is a list of parts that stand alone: a run that is stopped goes on where it was, and
-//! `cargo xtask merge` puts shards together. It gives `SUITE.json` and a section of `index.html`; a broken promise makes the command fail. Times are medians and quantiles of many
-//! calls; compare them only within one run, or by `cargo xtask compare`, which knows how far two runs are apart.
+//! `cargo xtask validate [SUITE[/PART]] [--quick] [--shard I/N] [--out DIR]`. A suite is a list of
+//! parts that stand alone: a run that is stopped goes on where it was, and `cargo xtask merge` puts
+//! shards together. It gives `SUITE.json` and a section of `index.html`; a broken promise makes the
+//! command fail. Times are medians and quantiles of many calls; compare them only within one run,
+//! or by `cargo xtask compare`, which knows how far two runs are apart.
 //!
 //! # When not to use it
 //! In an app or a simulator: nothing there may depend on it.

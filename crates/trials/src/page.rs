@@ -15,7 +15,7 @@ const SCRIPT: &str = include_str!("page.js");
 pub fn html(reports: &[(&Suite, Report)]) -> String {
     let mut page = format!(
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Trepan: validation</title><style>{STYLE}</style></head><body>\
-         <h1>Trepan: validation</h1><p class=\"tools\"><label>Show rows and promises with <input id=\"filter\" type=\"search\" placeholder=\"walls distance-field\"></label> \
+         <h1>Trepan: validation</h1><p class=\"tools\"><label>Show rows and promises with <input id=\"filter\" type=\"search\" placeholder=\"walls god-object-sphere\"></label> \
          <label><input id=\"broken\" type=\"checkbox\"> broken promises only</label></p>"
     );
     overview(&mut page, reports);

@@ -1,8 +1,9 @@
 //! Parts: what stands alone in a suite, so that any machine can make it at any time.
 //!
 //! # Theory
-//! A suite is a list of parts and a judgement. A part makes rows from nothing but its scope; the judgement reads rows only. So parts may be made in any order, by
-//! any number of processes, one a second time after a crash, and the judgement over all of them is that of one run.
+//! A suite is a list of parts and a judgement. A part makes rows from nothing but its scope; the
+//! judgement reads rows only. So parts may be made in any order, by any number of processes, one a
+//! second time after a crash, and the judgement over all of them is that of one run.
 
 use crate::suite::{Findings, Gate, Row};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -51,7 +52,8 @@ impl Part {
         slug.split('-').filter(|word| !word.is_empty()).collect::<Vec<_>>().join("-")
     }
 
-    /// Runs it. A panic is a broken promise, not the end of the run; the second value says whether it came to its end.
+    /// Runs it. A panic is a broken promise, not the end of the run; the second value says whether
+    /// it came to its end.
     pub fn run(self, scope: Scope) -> (Findings, bool) {
         let (slug, mut findings) = (self.slug(), Findings::default());
         let ended = catch_unwind(AssertUnwindSafe(|| (self.run)(scope, &mut findings))).is_ok();

@@ -1,8 +1,10 @@
-//! Charts of cost against error with their front, and maps of where a method works, degrades or fails, as data.
+//! Charts of cost against error with their front, and maps of where a method works, degrades or
+//! fails, as data.
 //!
 //! # Practice
-//! A suite fills them beside its rows; the page draws them. Both axes of a chart are logarithmic: what is smaller than a thousandth of a unit
-//! of cost or a hundred-thousandth of error is drawn there.
+//! A suite fills them beside its rows; the page draws them. Both axes of a chart are logarithmic:
+//! what is smaller than a thousandth of a unit of cost or a hundred-thousandth of error is drawn
+//! there.
 
 use crate::front::front;
 use crate::page::text;
@@ -41,7 +43,8 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// How many other methods' marks are better than this method's first in both; `usize::MAX` where it has none that is a number.
+    /// How many other methods' marks are better than this method's first in both; `usize::MAX`
+    /// where it has none that is a number.
     pub fn beaten(&self, method: &str) -> usize {
         self.beaten_beyond(method, 0.0)
     }
@@ -57,7 +60,8 @@ impl Chart {
         self.marks.iter().filter(is_number).filter(better).count()
     }
 
-    /// How far two runs of one commit may lie apart in cost without changing a front: what shared machines need.
+    /// How far two runs of one commit may lie apart in cost without changing a front: what shared
+    /// machines need.
     pub const SPREAD: f64 = 0.15;
 
     /// Methods with a mark that no other beats.
@@ -70,7 +74,8 @@ impl Chart {
         names
     }
 
-    /// Whether a method has a mark that is on the front or would be, were it cheaper by [`SPREAD`](Self::SPREAD).
+    /// Whether a method has a mark that is on the front or would be, were it cheaper by
+    /// [`SPREAD`](Self::SPREAD).
     pub fn near_front(&self, method: &str) -> bool {
         let beats = |other: &Mark, own: &Mark| other.cost < own.cost * (1.0 - Self::SPREAD) && other.error <= own.error;
         let own =

@@ -1,7 +1,8 @@
 //! A chart of cost against error as SVG.
 //!
 //! # Practice
-//! Both axes are logarithmic. The front is a line, the budget another one, the recommended method stands in a ring; methods differ in colour and in shape.
+//! Both axes are logarithmic. The front is a line, the budget another one, the recommended method
+//! stands in a ring; methods differ in colour and in shape.
 
 use crate::picture::{Chart, Mark};
 use plotters::coord::CoordTranslate;
@@ -22,7 +23,8 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// The chart; `methods` are all of the page's section, so that a method has the same sign in each of its charts.
+/// The chart; `methods` are all of the page's section, so that a method has the same sign in each
+/// of its charts.
 pub fn svg(chart: &Chart, methods: &[&str]) -> Result<String, Box<dyn std::error::Error>> {
     let at_least = |mark: &Mark| (mark.cost.max(1e-3), mark.error.max(1e-5));
     let span = |values: &mut dyn Iterator<Item = f64>| {

@@ -1,8 +1,10 @@
-//! Packages of others as programs of their own: a Python environment that is made for a run and goes with it.
+//! Packages of others as programs of their own: a Python environment that is made for a run and
+//! goes with it.
 //!
 //! # Practice
-//! Needs Python 3 with `venv`, and its package index once. `TREPAN_PYTHON` names another Python; if that has the packages already, it is used as it is. Nothing of theirs is
-//! linked, kept or shipped.
+//! Needs Python 3 with `venv`, and its package index once. `TREPAN_PYTHON` names another Python; if
+//! that has the packages already, it is used as it is. Nothing of theirs is linked, kept or
+//! shipped.
 
 use std::ffi::OsStr;
 use std::path::PathBuf;
@@ -18,7 +20,8 @@ pub struct Workshop {
 }
 
 impl Workshop {
-    /// With packages, as (name to import, name in the index), and a script to run; says which versions they are.
+    /// With packages, as (name to import, name in the index), and a script to run; says which
+    /// versions they are.
     pub fn with(packages: &[(&str, &str)], script: &str) -> Result<Self, String> {
         let folder = tempfile::tempdir().map_err(|fault| fault.to_string())?;
         std::fs::write(folder.path().join("script.py"), script).map_err(|fault| fault.to_string())?;

@@ -1,8 +1,11 @@
-//! Parts on disk: a run that was stopped goes on where it was, and shards from many machines become one report.
+//! Parts on disk: a run that was stopped goes on where it was, and shards from many machines become
+//! one report.
 //!
 //! # Practice
-//! `OUT/parts/SUITE/PART.json` holds one part; each appears whole or not at all. A run takes up parts of the very same program, scope and seed, and leaves all others; it
-//! deletes its own when the report is written. Merging takes parts of one program or one commit, of one scope and seed, whoever made them.
+//! `OUT/parts/SUITE/PART.json` holds one part; each appears whole or not at all. A run takes up
+//! parts of the very same program, scope and seed, and leaves all others; it deletes its own when
+//! the report is written. Merging takes parts of one program or one commit, of one scope and seed,
+//! whoever made them.
 
 use crate::part::{Scope, Suite};
 use crate::report::{Making, Report, slugs};
@@ -71,7 +74,8 @@ impl Store {
         (stored.program == self.program && stored.making.scope() == self.making.scope()).then_some(stored)
     }
 
-    /// The parts of a suite that this very program made in this scope: name, file and part. Nothing else in the folder is read.
+    /// The parts of a suite that this very program made in this scope: name, file and part. Nothing
+    /// else in the folder is read.
     fn all_own(&self, suite: &Suite) -> impl Iterator<Item = (String, PathBuf, Stored)> {
         let names = slugs(suite, self.making.scope()).into_iter();
         names.filter_map(|name| Some((name.clone(), self.place(suite.name, &name), self.own(suite.name, &name)?)))
@@ -82,7 +86,8 @@ impl Store {
         judged(suite, self.all_own(suite))
     }
 
-    /// Keeps a part with what it took, what the machine itself took meanwhile, and whether it came to its end.
+    /// Keeps a part with what it took, what the machine itself took meanwhile, and whether it came
+    /// to its end.
     pub fn keep(
         &self,
         suite: &str,
@@ -118,12 +123,14 @@ fn durations(scope: Scope) -> &'static str {
     scope.pick("durations-quick.json", "durations.json")
 }
 
-/// All parts of a suite in some folders, in the suite's order, judged as one run. `None` where no folder has any.
+/// All parts of a suite in some folders, in the suite's order, judged as one run. `None` where no
+/// folder has any.
 pub fn merged(suite: &Suite, folders: &[PathBuf]) -> Result<Option<Report>> {
     judged(suite, stored(suite.name, folders)?)
 }
 
-/// The parts of a suite that lie in some folders: name, file and part. What a stopped write left is none.
+/// The parts of a suite that lie in some folders: name, file and part. What a stopped write left is
+/// none.
 fn stored(suite: &str, folders: &[PathBuf]) -> Result<impl Iterator<Item = (String, PathBuf, Stored)>> {
     let mut all = Vec::new();
     for folder in folders {
@@ -152,7 +159,8 @@ fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, Stored)>) -
     let Some((first, of_first)) = parts.values().next() else { return Ok(None) };
     let alike = |one: &Stored, two: &Stored| {
         let [one_commit, two_commit] = [one, two].map(|part| &*part.making.commit);
-        // Of changes that no commit holds, and of sources without one, nobody knows whether they are the same.
+        // Of changes that no commit holds, and of sources without one, nobody knows whether they
+        // are the same.
         let is_sure = !one_commit.ends_with("-dirty") && one_commit != "unknown";
         let same_code = one.program == two.program || is_sure && one_commit == two_commit;
         same_code && one.making.scope() == two.making.scope()

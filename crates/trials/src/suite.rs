@@ -1,8 +1,8 @@
 //! What a suite finds: rows of metrics, gates, charts and maps.
 //!
 //! # Practice
-//! A metric's name ends in its unit (`depth_error_voxel`, `step_us`). A gate never hangs on an absolute time: times belong to charts,
-//! as ratios in one run.
+//! A metric's name ends in its unit (`depth_error_voxel`, `step_us`). A gate never hangs on an
+//! absolute time: times belong to charts, as ratios in one run.
 
 use crate::picture::{Chart, Map as StabilityMap};
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,11 @@
-//! Timing: repeats in turn, quantiles and their spread, ratios with their confidence, and a control that says what the machine itself took.
+//! Timing: repeats in turn, quantiles and their spread, ratios with their confidence, and a control
+//! that says what the machine itself took.
 //!
 //! # Practice
-//! Contenders are timed in turn, so that a slow moment of the machine meets all of them. A ratio of medians comes with the 95 % interval of the bootstrap. The control is made beside every part: an
-//! empty timed call, and a fixed sum; what they wander is what a time of that run cannot tell apart.
+//! Contenders are timed in turn, so that a slow moment of the machine meets all of them. A ratio of
+//! medians comes with the 95 % interval of the bootstrap. The control is made beside every part: an
+//! empty timed call, and a fixed sum; what they wander is what a time of that run cannot tell
+//! apart.
 
 use serde::{Deserialize, Serialize};
 use std::time::Instant;

@@ -1,4 +1,5 @@
-//! What does an image file hold? `inspect FILE|FOLDER...` prints size, spacing, orientation, range and notes of each.
+//! What does an image file hold? `inspect FILE|FOLDER...` prints size, spacing, orientation, range
+//! and notes of each.
 
 use std::path::Path;
 use trepan_volume::import;

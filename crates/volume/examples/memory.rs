@@ -1,5 +1,6 @@
-//! How much memory does a CT take? `memory make FOLDER` writes a made-up head of 512x512x300 voxels as DICOM and NIfTI;
-//! `memory read PATH` goes from the file to the skull on cubes and prints the most memory held (Linux).
+//! How much memory does a CT take? `memory make FOLDER` writes a made-up head of 512x512x300 voxels
+//! as DICOM and NIfTI; `memory read PATH` goes from the file to the skull on cubes and prints the
+//! most memory held (Linux).
 
 use std::path::Path;
 use trepan_volume::{

@@ -1,5 +1,5 @@
-//! How do CT and MRI lie? `overlap CT MRI OUT.png` registers them and draws the bone's contour over the MRI, as read above, as moved
-//! below.
+//! How do CT and MRI lie? `overlap CT MRI OUT.png` registers them and draws the bone's contour over
+//! the MRI, as read above, as moved below.
 
 use std::path::Path;
 use trepan_volume::{

@@ -1,5 +1,5 @@
-//! How well are known moves found again? `register FIXED MOVING [TRIALS]` moves the second image at random,
-//! onto a turned grid, and registers it to the first.
+//! How well are known moves found again? `register FIXED MOVING [TRIALS]` moves the second image at
+//! random, onto a turned grid, and registers it to the first.
 //!
 //! Errors are against the pose that the files' headers give.
 

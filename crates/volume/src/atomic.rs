@@ -4,7 +4,8 @@ use crate::{Sample, WriteError};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes beside `path` and renames at the end, so that neither a crash nor a full disk leaves half a file or loses the old one.
+/// Writes beside `path` and renames at the end, so that neither a crash nor a full disk leaves half
+/// a file or loses the old one.
 pub(crate) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> io::Result<()>,

@@ -1,9 +1,10 @@
 //! The skull while it is being drilled: one writer, any number of readers, no locks.
 //!
 //! # Theory
-//! Densities live in a flat grid of atomics, so the haptic tick can take bone away while the picture and the distance field read.
-//! Each brick of 8³ voxels has a version that goes up after a write. A reader keeps the versions that it has seen and
-//! so finds what changed since, however late it looks: there is no queue that could overflow.
+//! Densities live in a flat grid of atomics, so the haptic tick can take bone away while the
+//! picture and the distance field read. Each brick of 8³ voxels has a version that goes up after a
+//! write. A reader keeps the versions that it has seen and so finds what changed since, however
+//! late it looks: there is no queue that could overflow.
 //!
 //! ```text
 //! writer: store density (relaxed) → version += 1 (release)
@@ -11,12 +12,14 @@
 //! ```
 //!
 //! # Practice
-//! World is patient RAS+ mm; the grid is axis-aligned and isotropic (the import resamples), so a world point costs three
-//! multiply-adds. 2 bytes a voxel, 4 bytes a brick. Exactly one thread may write at a time; that is the caller's to keep.
+//! World is patient RAS+ mm; the grid is axis-aligned and isotropic (the import resamples), so a
+//! world point costs three multiply-adds. 2 bytes a voxel, 4 bytes a brick. Exactly one thread may
+//! write at a time; that is the caller's to keep.
 //!
 //! Strokes of the burr, each from the pedal's press to its release, can be undone, newest first:
-//! [`begin_stroke`](BoneVolume::begin_stroke) at the press, and bricks are kept before they change. To all readers undoing is
-//! one more change. A tick undoes a few bricks at a time ([`exchange_brick`](BoneVolume::exchange_brick)).
+//! [`begin_stroke`](BoneVolume::begin_stroke) at the press, and bricks are kept before they change.
+//! To all readers undoing is one more change. A tick undoes a few bricks at a time
+//! ([`exchange_brick`](BoneVolume::exchange_brick)).
 //!
 //! # When not to use it
 //! For volumes that do not change: [`VoxelVolume`] is plainer.
@@ -189,7 +192,8 @@ impl BoneVolume {
         }
     }
 
-    /// Says that bone was put back by [`set_hu`](Self::set_hu) where there was none. For the one writer only.
+    /// Says that bone was put back by [`set_hu`](Self::set_hu) where there was none. For the one
+    /// writer only.
     pub fn came_back(&self) {
         self.undone.fetch_add(1, Ordering::Release);
     }
@@ -199,7 +203,8 @@ impl BoneVolume {
         self.undone.load(Ordering::Acquire)
     }
 
-    /// Version of the brick that starts at 8 times `brick`, voxels: it goes up after each change. Always 0 outside the grid.
+    /// Version of the brick that starts at 8 times `brick`, voxels: it goes up after each change.
+    /// Always 0 outside the grid.
     #[inline]
     pub fn version(&self, brick: IVec3) -> u32 {
         let [bx, by, bz] = self.bricks;
@@ -227,7 +232,8 @@ impl BoneVolume {
         b.x as usize + bx * (b.y as usize + by * b.z as usize)
     }
 
-    /// Whether there may be bone in the box from voxel `low` to voxel `high`, both included: whether one of its bricks has ever held some.
+    /// Whether there may be bone in the box from voxel `low` to voxel `high`, both included:
+    /// whether one of its bricks has ever held some.
     pub fn may_hold_bone(&self, low: IVec3, high: IVec3) -> bool {
         let last = IVec3::new(self.dims[0] as i32, self.dims[1] as i32, self.dims[2] as i32) - 1;
         let (low, high) = (low.max(IVec3::ZERO), high.min(last));
@@ -250,12 +256,14 @@ impl BoneVolume {
         self.bricks
     }
 
-    /// A reader's memory of what it has seen, for [`changed`](Self::changed): everything so far counts as seen.
+    /// A reader's memory of what it has seen, for [`changed`](Self::changed): everything so far
+    /// counts as seen.
     pub fn seen(&self) -> Vec<u32> {
         self.versions.iter().map(|v| v.load(Ordering::Acquire)).collect()
     }
 
-    /// Calls `visit` with the coordinates of up to `limit` bricks that changed since `seen`, and marks them seen. Returns how many were left.
+    /// Calls `visit` with the coordinates of up to `limit` bricks that changed since `seen`, and
+    /// marks them seen. Returns how many were left.
     ///
     /// Cost: one load and compare per brick; no allocation. The rest comes with the next call.
     pub fn changed(&self, seen: &mut [u32], limit: usize, mut visit: impl FnMut([usize; 3])) -> usize {

@@ -1,16 +1,17 @@
 //! Connected pieces of a mask.
 //!
 //! # Theory
-//! Two voxels are connected when they share a face (6-neighbourhood). Each row is cut into runs of set voxels; a run joins
-//! the runs that it overlaps in the row before and in the slice before, kept in a forest with path halving
-//! (Tarjan 1975; Rosenfeld and Pfaltz 1966 for the scan).
+//! Two voxels are connected when they share a face (6-neighbourhood). Each row is cut into runs of
+//! set voxels; a run joins the runs that it overlaps in the row before and in the slice before,
+//! kept in a forest with path halving (Tarjan 1975; Rosenfeld and Pfaltz 1966 for the scan).
 //!
 //! # Practice
 //! One pass over the voxels, memory for the runs alone: about 10 ms for 10 million voxels.
 
 use crate::VoxelVolume;
 
-/// The largest 6-connected piece of what is not 0, as a mask of 0 and 1. Of equals, the one met first.
+/// The largest 6-connected piece of what is not 0, as a mask of 0 and 1. Of equals, the one met
+/// first.
 pub fn largest_component(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
     let pieces = Components::of(mask.dims, |at| mask.data[at] != 0);
     let mut out = VoxelVolume::filled(mask.dims, mask.world_from_voxel, 0u8);
@@ -111,7 +112,8 @@ fn push_runs(runs: &mut Vec<Run>, start: usize, length: usize, set: &impl Fn(usi
     }
 }
 
-/// Joins the runs from `new` on with those of an earlier row, `before..until`, which lies `apart` places back.
+/// Joins the runs from `new` on with those of an earlier row, `before..until`, which lies `apart`
+/// places back.
 fn join(runs: &mut [Run], before: usize, until: usize, new: usize, apart: usize) {
     let (mut a, mut b) = (before, new);
     while a < until && b < runs.len() {

@@ -1,31 +1,36 @@
 //! Signed distance to the surface of a mask or of a density level.
 //!
 //! # Theory
-//! The surface is known where grid edges cross it: between an inside voxel a and an outside voxel b at the fraction
-//! `t = (v_a - level) / (v_a - v_b)` of the edge (1/2 for a mask). The field is the exact Euclidean distance to the nearest such
-//! crossing, `D(p) = min_s |p - s|`, negative inside. Squared distances separate by axis, and each axis is a lower envelope of parabolas
-//! (Felzenszwalb and Huttenlocher 2012), here with vertices at fractional places along the edge's own axis:
+//! The surface is known where grid edges cross it: between an inside voxel a and an outside voxel b
+//! at the fraction `t = (v_a - level) / (v_a - v_b)` of the edge (1/2 for a mask). The field is the
+//! exact Euclidean distance to the nearest such crossing, `D(p) = min_s |p - s|`, negative inside.
+//! Squared distances separate by axis, and each axis is a lower envelope of parabolas (Felzenszwalb
+//! and Huttenlocher 2012), here with vertices at fractional places along the edge's own axis:
 //!
 //! ```text
 //! D² = min( Z·Y·X̂, Z·X·Ŷ, Y·X·Ẑ )     X̂: parabolas at the crossings of x-edges; X: envelope over x of what is there
 //! ```
 //!
-//! Between the crossings the surface is nearer than they are. So each voxel whose own edges cross it, at distances aᵢ along the axes,
-//! adds the foot point on the plane through these crossings, `n / |n|²` with `nᵢ = ± 1/aᵢ`, for the voxels within two of it.
+//! Between the crossings the surface is nearer than they are. So each voxel whose own edges cross
+//! it, at distances aᵢ along the axes, adds the foot point on the plane through these crossings,
+//! `n / |n|²` with `nᵢ = ± 1/aᵢ`, for the voxels within two of it.
 //!
 //! # Practice
-//! Grids of cubes or boxes in any orientation, axes at right angles. Linear in voxels: about 0.2 µs each and core; 4 bytes
-//! each kept, 16 while building. Slices run in parallel with the same bytes for any number of threads. What lies beyond the grid's
-//! border is unknown: a mask that touches it has no surface there.
+//! Grids of cubes or boxes in any orientation, axes at right angles. Linear in voxels: about 0.2 µs
+//! each and core; 4 bytes each kept, 16 while building. Slices run in parallel with the same bytes
+//! for any number of threads. What lies beyond the grid's border is unknown: a mask that touches it
+//! has no surface there.
 //!
-//! Where voxels change, [`update`](DistanceField::update) recomputes a box: a bite of 2 mm in a skull of 0.5 mm voxels with a reach of 5 mm takes
-//! three thousandths of the whole.
+//! Where voxels change, [`update`](DistanceField::update) recomputes a box: a bite of 2 mm in a
+//! skull of 0.5 mm voxels with a reach of 5 mm takes three thousandths of the whole.
 //!
 //! # Sources
-//! P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012.
+//! P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", Theory of
+//! Computing 8, 2012.
 //!
 //! # When not to use it
-//! For single queries near a surface: looking at the voxels around is cheaper. On sheared grids the distances are only near.
+//! For single queries near a surface: looking at the voxels around is cheaper. On sheared grids the
+//! distances are only near.
 
 use crate::resample::corners;
 use crate::{Sample, VoxelVolume};
@@ -51,7 +56,8 @@ impl DistanceField {
         Self::of(mask, |at| if mask.data[at] != 0 { 1.0 } else { -1.0 })
     }
 
-    /// The distance to the surface where values reach `level`; inside is at or over it. Finer than the voxels.
+    /// The distance to the surface where values reach `level`; inside is at or over it. Finer than
+    /// the voxels.
     pub fn of_level<T: Sample>(volume: &VoxelVolume<T>, level: f32) -> Self {
         Self::of(volume, |at| volume.data[at].to_f32() - level)
     }
@@ -62,14 +68,17 @@ impl DistanceField {
         Self::from_values(VoxelVolume { dims: grid.dims, data, world_from_voxel: grid.world_from_voxel })
     }
 
-    /// Brings the field up to date after voxels from `changed[0]` to `changed[1]` (both included) changed, as when bone is carved.
+    /// Brings the field up to date after voxels from `changed[0]` to `changed[1]` (both included)
+    /// changed, as when bone is carved.
     ///
-    /// `inside` gives how far a voxel is over the surface's level now. Afterwards signs are those of a full computation, and so are
-    /// all distances up to `reach_mm`; further ones are at least that. The cost is that of the box with twice the reach around it.
+    /// `inside` gives how far a voxel is over the surface's level now. Afterwards signs are those
+    /// of a full computation, and so are all distances up to `reach_mm`; further ones are at least
+    /// that. The cost is that of the box with twice the reach around it.
     pub fn update(&mut self, inside: impl Fn([usize; 3]) -> f32 + Sync, changed: [[usize; 3]; 2], reach_mm: f32) {
         let (dims, spacing) = (self.values.dims, self.values.spacing_mm());
         let reach = |axis: usize| (f64::from(reach_mm.clamp(0.0, FAR_MM)) / spacing[axis]).ceil().min(1e9) as usize;
-        // An edge's crossing moves with either end, and a foot point counts for the voxels within two of its own.
+        // An edge's crossing moves with either end, and a foot point counts for the voxels within
+        // two of its own.
         let around = |more: &dyn Fn(usize) -> usize| -> [std::ops::Range<usize>; 3] {
             std::array::from_fn(|a| {
                 let end = changed[1][a].saturating_add(more(a) + 1).min(dims[a]);
@@ -115,9 +124,11 @@ impl DistanceField {
         self.at(self.voxel_of(world))
     }
 
-    /// The field's slope at a world point, over one voxel each way: about 1 long and pointing outwards, away from the mask.
+    /// The field's slope at a world point, over one voxel each way: about 1 long and pointing
+    /// outwards, away from the mask.
     ///
-    /// Shorter where the nearest surface changes, and towards the outside of the grid, where the field is flat.
+    /// Shorter where the nearest surface changes, and towards the outside of the grid, where the
+    /// field is flat.
     pub fn gradient(&self, world: Vec3) -> Vec3 {
         let p = self.voxel_of(world);
         let slope = |step: Vec3| self.at(p + step) - self.at(p - step);
@@ -175,7 +186,8 @@ fn feet(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) -> f32 + Sync
     (0..dims.iter().product()).into_par_iter().filter_map(foot).collect()
 }
 
-/// Lowers the squared distances of the voxels within two of a foot point's to that to the foot point.
+/// Lowers the squared distances of the voxels within two of a foot point's to that to the foot
+/// point.
 fn splat(dims: [usize; 3], spacing: DVec3, at: usize, foot: DVec3, squared: &mut [f32]) {
     let place = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
     let range = |axis: usize| place[axis].saturating_sub(2)..(place[axis] + 3).min(dims[axis]);
@@ -341,7 +353,8 @@ mod tests {
     use glam::{DMat3, DVec3};
     use proptest::prelude::*;
 
-    /// The nearest crossing of any grid edge, or foot point within two voxels, by looking at all of them.
+    /// The nearest crossing of any grid edge, or foot point within two voxels, by looking at all of
+    /// them.
     fn slow(levels: &VoxelVolume<f32>, from: [usize; 3]) -> f64 {
         let mut best = f64::INFINITY;
         let here = levels.centre_of(from);

@@ -1,8 +1,9 @@
 //! Does the bone flap still hang on the skull, asked a little in every tick.
 //!
 //! # Theory
-//! From a voxel in the middle of the flap the bone is flooded by faces, breadth first. Bone that reaches the border of a box around the operation hangs on the skull;
-//! a flood that ends inside has found the whole piece.
+//! From a voxel in the middle of the flap the bone is flooded by faces, breadth first. Bone that
+//! reaches the border of a box around the operation hangs on the skull; a flood that ends inside
+//! has found the whole piece.
 //!
 //! ```text
 //!  ┌───────────────┐ box
@@ -11,8 +12,9 @@
 //! ```
 //!
 //! # Practice
-//! [`FlapSearch::step`] visits a number of voxels and returns, so that a search of a flap of 40 mm takes some 30 ms of ticks and none of them notices it. It must begin anew after the
-//! bone has changed. A voxel costs about 50 ns. All memory is taken in `new`.
+//! [`FlapSearch::step`] visits a number of voxels and returns, so that a search of a flap of 40 mm
+//! takes some 30 ms of ticks and none of them notices it. It must begin anew after the bone has
+//! changed. A voxel costs about 50 ns. All memory is taken in `new`.
 //!
 //! # When not to use it
 //! For every piece of a skull at once: [`Piece::all`](crate::Piece::all).
@@ -25,7 +27,7 @@ const MOST: usize = 1 << 20;
 
 /// How far the search is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Found {
+pub enum FlapState {
     /// It goes on.
     NotYet,
     /// The bone there hangs on the skull, or there is none.
@@ -44,12 +46,13 @@ pub struct FlapSearch {
     /// Flooded voxels; those from `next` on have neighbours to look at.
     piece: Vec<u32>,
     next: usize,
-    found: Found,
+    found: FlapState,
     begun: bool,
 }
 
 impl FlapSearch {
-    /// Searches the box of `reach_mm` around `centre` for the piece that holds the first bone on the way from `from` to `to`, world mm.
+    /// Searches the box of `reach_mm` around `centre` for the piece that holds the first bone on
+    /// the way from `from` to `to`, world mm.
     pub fn new(bone: &BoneVolume, centre: Vec3, reach_mm: f32, from: Vec3, to: Vec3) -> Self {
         let last = IVec3::from(bone.dims().map(|n| n as i32 - 1));
         let low = bone.voxel_of(centre - reach_mm).clamp(IVec3::ZERO, last);
@@ -62,18 +65,18 @@ impl FlapSearch {
         let voxels = dims.as_usizevec3().element_product();
         let piece = Vec::with_capacity(voxels.min(MOST));
         let seen = vec![0; voxels.div_ceil(64)];
-        Self { low, dims, seeds, seen, piece, next: 0, found: Found::NotYet, begun: false }
+        Self { low, dims, seeds, seen, piece, next: 0, found: FlapState::NotYet, begun: false }
     }
 
     /// Begins anew, at a cost in the next steps.
     pub fn restart(&mut self) {
-        (self.begun, self.found) = (false, Found::NotYet);
+        (self.begun, self.found) = (false, FlapState::NotYet);
     }
 
     /// Goes on for at most `visits` voxels.
-    pub fn step(&mut self, bone: &BoneVolume, visits: usize) -> Found {
+    pub fn step(&mut self, bone: &BoneVolume, visits: usize) -> FlapState {
         for _ in 0..visits {
-            if self.found != Found::NotYet {
+            if self.found != FlapState::NotYet {
                 break;
             }
             if self.begun { self.flood(bone) } else { self.begin(bone) }
@@ -83,7 +86,7 @@ impl FlapSearch {
 
     /// The voxels of the piece, once it is found free.
     pub fn voxels(&self) -> usize {
-        if self.found == Found::Free { self.piece.len() } else { 0 }
+        if self.found == FlapState::Free { self.piece.len() } else { 0 }
     }
 
     /// A voxel of the piece.
@@ -104,7 +107,7 @@ impl FlapSearch {
                 (self.begun, self.next) = (true, 0);
                 match self.seeds.iter().copied().find(|seed| bone.is_bone(*seed)) {
                     Some(seed) => self.take(seed),
-                    None => self.found = Found::Hanging,
+                    None => self.found = FlapState::Hanging,
                 }
             }
         }
@@ -113,7 +116,7 @@ impl FlapSearch {
     /// Looks at the neighbours of the next voxel.
     fn flood(&mut self, bone: &BoneVolume) {
         let Some(&index) = self.piece.get(self.next) else {
-            self.found = Found::Free;
+            self.found = FlapState::Free;
             return;
         };
         self.next += 1;
@@ -130,7 +133,7 @@ impl FlapSearch {
     fn take(&mut self, voxel: IVec3) {
         let at = voxel - self.low;
         if at.cmplt(IVec3::ZERO).any() || at.cmpge(self.dims).any() || self.piece.len() == self.piece.capacity() {
-            self.found = Found::Hanging;
+            self.found = FlapState::Hanging;
             return;
         }
         let index = (at.x + self.dims.x * (at.y + self.dims.y * at.z)) as u32;
@@ -157,8 +160,8 @@ mod tests {
         (3..6).for_each(|z| bone.set_hu(IVec3::new(x, y, z), AIR_HU));
     }
 
-    fn run(search: &mut FlapSearch, bone: &BoneVolume) -> (Found, usize) {
-        let steps = (1..10_000).find(|_| search.step(bone, 7) != Found::NotYet);
+    fn run(search: &mut FlapSearch, bone: &BoneVolume) -> (FlapState, usize) {
+        let steps = (1..10_000).find(|_| search.step(bone, 7) != FlapState::NotYet);
         (search.found, steps.unwrap())
     }
 
@@ -168,7 +171,7 @@ mod tests {
         let before = Piece::all(&bone);
         let (from, to) = (Vec3::new(15.0, 15.0, 8.0), Vec3::new(15.0, 15.0, 0.0));
         let mut search = FlapSearch::new(&bone, Vec3::new(15.0, 15.0, 4.0), 14.0, from, to);
-        assert_eq!(run(&mut search, &bone).0, Found::Hanging);
+        assert_eq!(run(&mut search, &bone).0, FlapState::Hanging);
         let ring = |x: i32, y: i32| (10..=20).contains(&x) && (9..=21).contains(&y);
         let rim = |x: i32, y: i32| ring(x, y) && !(x > 10 && x < 20 && y > 9 && y < 21);
         for (x, y) in
@@ -177,18 +180,18 @@ mod tests {
             drill(&bone, x, y);
         }
         search.restart();
-        assert_eq!(run(&mut search, &bone).0, Found::Hanging, "a bridge is left");
+        assert_eq!(run(&mut search, &bone).0, FlapState::Hanging, "a bridge is left");
         drill(&bone, 20, 14);
         for _ in 0..2 {
             search.restart();
-            assert_eq!(run(&mut search, &bone).0, Found::Free);
+            assert_eq!(run(&mut search, &bone).0, FlapState::Free);
             assert_eq!(search.voxels(), 9 * 11 * 3);
             assert_eq!(search.voxels(), Piece::cut_off(&before, &Piece::all(&bone))[0].voxels);
         }
         assert!((0..search.voxels()).all(|at| bone.is_bone(search.voxel(at))));
         (0..search.voxels()).for_each(|at| bone.set_hu(search.voxel(at), AIR_HU));
         search.restart();
-        assert_eq!(run(&mut search, &bone).0, Found::Hanging, "nothing is there");
+        assert_eq!(run(&mut search, &bone).0, FlapState::Hanging, "nothing is there");
     }
 
     #[test]
@@ -196,6 +199,6 @@ mod tests {
         let bone = plate();
         let far = Vec3::splat(500.0);
         let mut search = FlapSearch::new(&bone, far, 5.0, far, far + 3.0);
-        assert_eq!(run(&mut search, &bone), (Found::Hanging, 1));
+        assert_eq!(run(&mut search, &bone), (FlapState::Hanging, 1));
     }
 }

@@ -1,12 +1,14 @@
 //! Voxel volumes with patient orientation: files in, resampling, masks, distance fields, carving.
 //!
 //! # Theory
-//! An image is a box of samples and the affine that puts voxel indices into the patient's RAS+ mm ([`VoxelVolume`]). Everything that
-//! a file format says about axes, units and stored numbers is settled when it is read; after that there is one form.
+//! An image is a box of samples and the affine that puts voxel indices into the patient's RAS+ mm
+//! ([`VoxelVolume`]). Everything that a file format says about axes, units and stored numbers is
+//! settled when it is read; after that there is one form.
 //!
 //! # Practice
-//! [`read`] finds the format by content. A CT becomes [`hounsfield`] values and, with [`bone_isovalue`] and [`skull_only`], the
-//! [`BoneVolume`] that a burr carves; an MRI becomes a [`brain_mask`]; a mask becomes a [`DistanceField`].
+//! [`read`] finds the format by content. A CT becomes [`hounsfield`] values and, with
+//! [`bone_isovalue`] and [`skull_only`], the [`BoneVolume`] that a burr carves; an MRI becomes a
+//! [`brain_mask`]; a mask becomes a [`DistanceField`].
 //!
 //! # When not to use it
 //! For pictures in time or colour: only real-valued volumes are read.
@@ -48,7 +50,7 @@ pub use brain::{
 pub use component::largest_component;
 pub use distance::{DistanceField, FAR_MM};
 pub use error::{ReadError, WriteError};
-pub use flap::{FlapSearch, Found};
+pub use flap::{FlapSearch, FlapState};
 pub use memory::{Limit, MOST_VOXELS, TooLarge, room_for, room_for_voxels};
 pub use note::{Import, Note};
 pub use overlap::{LEAST_SHARE, OverlapError, overlap};

@@ -2,7 +2,8 @@
 
 use crate::{Import, ReadError};
 
-/// Feeds mutated copies of valid files to a reader: it must return, and a volume must hold as many samples as its sizes say.
+/// Feeds mutated copies of valid files to a reader: it must return, and a volume must hold as many
+/// samples as its sizes say.
 ///
 /// `TREPAN_MUTATIONS` gives the number of executions; a few thousand by default.
 pub(crate) fn survives_mutations(seeds: &[Vec<u8>], read: impl Fn(Vec<u8>) -> Result<Import, ReadError>) {

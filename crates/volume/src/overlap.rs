@@ -22,7 +22,8 @@ pub struct OverlapError {
     pub mri: (DVec3, DVec3),
 }
 
-/// Refuses a CT and an MRI whose world boxes share less than [`LEAST_SHARE`] of the smaller; returns the share.
+/// Refuses a CT and an MRI whose world boxes share less than [`LEAST_SHARE`] of the smaller;
+/// returns the share.
 pub fn overlap<A: Copy, B: Copy>(ct: &VoxelVolume<A>, mri: &VoxelVolume<B>) -> Result<f64, OverlapError> {
     let (ct, mri) = (ct.world_corners(), mri.world_corners());
     let size = |(low, high): (DVec3, DVec3)| (high - low).max(DVec3::ZERO).element_product();

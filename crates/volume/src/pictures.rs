@@ -1,9 +1,11 @@
-//! CT and MRI over each other, to look at: the bone's contour drawn on the MRI's grey, in three planes.
+//! CT and MRI over each other, to look at: the bone's contour drawn on the MRI's grey, in three
+//! planes.
 //!
 //! # Practice
-//! Sagittal, coronal and axial through the middle of the bone, in pixels of 1 mm over the CT's box; rows from head to foot (axial: from front
-//! to back). Radiological convention: the patient's right is on the left; the sagittal picture has the face on the left. The bone's contour is orange. Plain RGB bytes:
-//! writing a picture file is the caller's.
+//! Sagittal, coronal and axial through the middle of the bone, in pixels of 1 mm over the CT's box;
+//! rows from head to foot (axial: from front to back). Radiological convention: the patient's right
+//! is on the left; the sagittal picture has the face on the left. The bone's contour is orange.
+//! Plain RGB bytes: writing a picture file is the caller's.
 
 use crate::{VoxelVolume, resample::corners};
 use glam::{DVec3, Vec3};
@@ -25,9 +27,11 @@ pub struct Picture {
     pub rgb: Vec<u8>,
 }
 
-/// The contour of what reaches `isovalue` HU in the CT over the MRI as it lies, sagittal, coronal and axial.
+/// The contour of what reaches `isovalue` HU in the CT over the MRI as it lies, sagittal, coronal
+/// and axial.
 ///
-/// For a look before and after registration call it with the MRI's `world_from_voxel` as read and as moved.
+/// For a look before and after registration call it with the MRI's `world_from_voxel` as read and
+/// as moved.
 pub fn overlap_pictures(ct: &VoxelVolume<i16>, mri: &VoxelVolume<f32>, isovalue: i16) -> [Picture; 3] {
     let (low, high) = ct.world_corners();
     let middle = bone_middle(ct, isovalue).unwrap_or(0.5 * (low + high));

@@ -1,7 +1,8 @@
 //! Pieces of bone: does the flap still hang on the skull?
 //!
 //! # Practice
-//! Voxels hang together by their faces. One pass over the grid, about 0.1 s for 50 million voxels: for the end of a session, not for a tick.
+//! Voxels hang together by their faces. One pass over the grid, about 0.1 s for 50 million voxels:
+//! for the end of a session, not for a tick.
 
 use crate::BoneVolume;
 use crate::component::Components;

@@ -1,19 +1,22 @@
 //! The same image on another grid.
 //!
 //! # Theory
-//! A target voxel's centre x goes through `from_voxel_from_to_voxel = from.world_from_voxel⁻¹ · to.world_from_voxel` into the source's
-//! continuous indices. Trilinear weighs the 8 voxels around it, nearest takes one. Majority lets labels vote: each target
-//! voxel is split into as many sub-points as source voxels fit into it along each axis, each sub-point gives its trilinear
-//! weights to the labels around it, and the label with the most wins (the first met on a tie).
+//! A target voxel's centre x goes through
+//! `from_voxel_from_to_voxel = from.world_from_voxel⁻¹ · to.world_from_voxel` into the source's
+//! continuous indices. Trilinear weighs the 8 voxels around it, nearest takes one. Majority lets
+//! labels vote: each target voxel is split into as many sub-points as source voxels fit into it
+//! along each axis, each sub-point gives its trilinear weights to the labels around it, and the
+//! label with the most wins (the first met on a tie).
 //!
 //! # Practice
-//! A point counts as inside up to the outer faces of the border voxels; within the outer half voxel the border value
-//! holds on. Any affine to any affine. Slices run in parallel and each is computed alone: the bytes do not depend on
-//! the number of threads. Per target voxel and core about 10 ns nearest, 40 ns trilinear,
-//! 60 ns majority and more where the target is coarser.
+//! A point counts as inside up to the outer faces of the border voxels; within the outer half voxel
+//! the border value holds on. Any affine to any affine. Slices run in parallel and each is computed
+//! alone: the bytes do not depend on the number of threads. Per target voxel and core about 10 ns
+//! nearest, 40 ns trilinear, 60 ns majority and more where the target is coarser.
 //!
 //! # When not to use it
-//! Trilinear takes no mean over what a coarser voxel covers: thin bone aliases at spacings far over the source's.
+//! Trilinear takes no mean over what a coarser voxel covers: thin bone aliases at spacings far over
+//! the source's.
 
 use crate::{Sample, VoxelVolume};
 use glam::{DAffine3, DVec3, UVec3, Vec3};
@@ -47,8 +50,8 @@ impl Grid {
 
     /// An axis-aligned RAS grid of cubes that covers the volume's voxels to their outer faces.
     ///
-    /// A volume that already is such a grid gets its own back. The spacing must be over 0; look at [`voxels`](Self::voxels)
-    /// before a small one is used.
+    /// A volume that already is such a grid gets its own back. The spacing must be over 0; look at
+    /// [`voxels`](Self::voxels) before a small one is used.
     pub fn isotropic_over<T: Copy>(volume: &VoxelVolume<T>, spacing_mm: f32) -> Self {
         Self::aligned_over(volume, DVec3::splat(spacing_mm.into()))
     }
@@ -156,7 +159,8 @@ impl<'a, T: Sample> Source<'a, T> {
     }
 }
 
-/// The 8 voxels around a point in continuous indices, with their weights; the point is clamped to the voxel centres.
+/// The 8 voxels around a point in continuous indices, with their weights; the point is clamped to
+/// the voxel centres.
 pub(crate) fn corners(dims: [usize; 3], last: Vec3, point: Vec3) -> [(usize, f32); 8] {
     let p = point.clamp(Vec3::ZERO, last);
     let b = p.min((last - 1.0).max(Vec3::ZERO)).as_uvec3();

@@ -46,7 +46,8 @@ sample! {
     f64, F64, f64::from;
 }
 
-/// The nearest whole number, ties away from 0, as long as it is under 2²²; without a call to the system's `round`.
+/// The nearest whole number, ties away from 0, as long as it is under 2²²; without a call to the
+/// system's `round`.
 fn rounded(value: f32) -> f32 {
     value + (0.5 - f32::EPSILON / 4.0).copysign(value)
 }
@@ -107,7 +108,8 @@ impl Number {
         }
     }
 
-    /// Decodes whole numbers from `bytes` (a multiple of [`bytes`](Self::bytes) long), scaled in f64, to the end of `out`.
+    /// Decodes whole numbers from `bytes` (a multiple of [`bytes`](Self::bytes) long), scaled in
+    /// f64, to the end of `out`.
     pub(crate) fn decode(self, bytes: &[u8], order: ByteOrder, scale: Scale, out: &mut Vec<f32>) {
         macro_rules! each {
             ($type:ty) => {{

@@ -2,8 +2,9 @@
 //!
 //! # Theory
 //! The threshold is Otsu's (1979) on the histogram from 100 to 2000 HU: the t that makes
-//! `w₀(t) · w₁(t) · (μ₀(t) - μ₁(t))²` largest, kept within the 300 to 500 HU that cortical bone is segmented at. The skull is the largest
-//! piece at or over it: table, head rest and teeth that touch nothing fall away.
+//! `w₀(t) · w₁(t) · (μ₀(t) - μ₁(t))²` largest, kept within the 300 to 500 HU that cortical bone is
+//! segmented at. The skull is the largest piece at or over it: table, head rest and teeth that
+//! touch nothing fall away.
 //!
 //! # Sources
 //! N. Otsu, "A threshold selection method from gray-level histograms", IEEE SMC 9, 1979.
@@ -93,7 +94,8 @@ pub fn bone_isovalue(ct: &VoxelVolume<i16>) -> i16 {
     (best.1 as i16).clamp(LEAST_ISOVALUE, GREATEST_ISOVALUE)
 }
 
-/// Leaves only the skull: what is at or over the isovalue but not in the largest piece becomes one HU under it.
+/// Leaves only the skull: what is at or over the isovalue but not in the largest piece becomes one
+/// HU under it.
 pub fn skull_only(ct: &mut VoxelVolume<i16>, isovalue: i16) {
     let pieces = Components::of(ct.dims, |at| ct.data[at] >= isovalue);
     let Some(skull) = pieces.largest() else { return };
@@ -106,7 +108,8 @@ pub fn skull_only(ct: &mut VoxelVolume<i16>, isovalue: i16) {
     });
 }
 
-/// A label volume's values as whole numbers. Refuses what is no label: NaN, negative, fractional, over 65535.
+/// A label volume's values as whole numbers. Refuses what is no label: NaN, negative, fractional,
+/// over 65535.
 pub fn labels(file: &Path, volume: &VoxelVolume<f32>) -> Result<VoxelVolume<u16>, ReadError> {
     let wrong = volume.data.iter().find(|&&v| v.round() != v || !(0.0..=65535.0).contains(&v));
     match wrong {

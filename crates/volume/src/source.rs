@@ -1,9 +1,9 @@
 //! Bytes of a file, plain or compressed, that are never trusted to be as many as a header says.
 //!
 //! # Practice
-//! Compression is found by content. A file can honestly give at most its own length, or, compressed, that length times
-//! deflate's limit of 1032; whatever asks for more is refused before memory is taken, and memory grows with what has
-//! really arrived.
+//! Compression is found by content. A file can honestly give at most its own length, or,
+//! compressed, that length times deflate's limit of 1032; whatever asks for more is refused before
+//! memory is taken, and memory grows with what has really arrived.
 
 use crate::sample::{ByteOrder, Number, Scale};
 use crate::{ReadError, VoxelVolume, open_regular, room_for_voxels};
@@ -21,7 +21,8 @@ const DEFLATE_LIMIT: u64 = 1032;
 /// Longest line of a header, bytes.
 const LONGEST_LINE: usize = 1 << 16;
 
-/// Memory that an image takes while it is read, bytes a voxel: its values, and what is made of them.
+/// Memory that an image takes while it is read, bytes a voxel: its values, and what is made of
+/// them.
 pub(crate) const BYTES_PER_VOXEL: u64 = 8;
 
 /// Bytes that are decoded at a time; a multiple of every number's size.
@@ -301,7 +302,8 @@ impl Source {
     }
 }
 
-/// As much of a value as a message shows: one short line, since in a damaged header what comes after may be of a patient.
+/// As much of a value as a message shows: one short line, since in a damaged header what comes
+/// after may be of a patient.
 fn shown(found: &str) -> String {
     found.chars().take_while(|c| !c.is_control() && *c != '\\').take(64).collect()
 }
@@ -334,7 +336,8 @@ fn read_up_to(stream: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
     Ok(got)
 }
 
-/// Refuses axes that no scanner makes: not finite, flat, with edges outside 0.0001 to 1000 mm, or further than 10 m away.
+/// Refuses axes that no scanner makes: not finite, flat, with edges outside 0.0001 to 1000 mm, or
+/// further than 10 m away.
 pub(crate) fn check_affine(file: &Path, field: &'static str, affine: DAffine3) -> Result<(), ReadError> {
     let m = affine.matrix3;
     let edges = DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());

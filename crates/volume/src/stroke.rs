@@ -1,17 +1,20 @@
-//! What bricks held before the last strokes: enough to undo them one by one, in memory that is bounded and taken beforehand.
+//! What bricks held before the last strokes: enough to undo them one by one, in memory that is
+//! bounded and taken beforehand.
 //!
 //! # Theory
-//! A brick is copied whole before its first change in a stroke; a stamp per brick says for which stroke that has been done. Undoing
-//! exchanges brick and copy, newest stroke first; the same exchange again takes it back. The copies of all strokes lie in
-//! one ring: where room runs out, the oldest stroke is forgotten. One stroke that alone needs more room than there is
-//! cannot be undone, nor can any before it.
+//! A brick is copied whole before its first change in a stroke; a stamp per brick says for which
+//! stroke that has been done. Undoing exchanges brick and copy, newest stroke first; the same
+//! exchange again takes it back. The copies of all strokes lie in one ring: where room runs out,
+//! the oldest stroke is forgotten. One stroke that alone needs more room than there is cannot be
+//! undone, nor can any before it.
 //!
 //! ```text
 //! ring of copies   │ forgotten │ stroke 3 │ stroke 4 │ stroke 5, open │ free │
 //! ```
 //!
 //! # Practice
-//! Atomics without order: one thread writes, records and undoes. A copy is 1 kB and costs a quarter of a microsecond.
+//! Atomics without order: one thread writes, records and undoes. A copy is 1 kB and costs a quarter
+//! of a microsecond.
 
 use crate::bone::BRICK;
 use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, AtomicUsize, Ordering::Relaxed};
@@ -30,7 +33,8 @@ pub enum Undone {
     Bricks(usize),
     /// There is no stroke, or all have been undone already.
     Nothing,
-    /// What was done before is kept no longer: over [`MAX_STROKES`] strokes, or over [`MAX_STROKE_BRICKS`] bricks.
+    /// What was done before is kept no longer: over [`MAX_STROKES`] strokes, or over
+    /// [`MAX_STROKE_BRICKS`] bricks.
     Forgotten,
 }
 
@@ -43,7 +47,8 @@ pub(crate) struct Strokes {
     stamp: AtomicU32,
     /// The stroke in which each brick was copied last.
     stamps: Vec<AtomicU32>,
-    /// Strokes from `oldest` up to before `next` are kept; their first copies, by number in the ring.
+    /// Strokes from `oldest` up to before `next` are kept; their first copies, by number in the
+    /// ring.
     starts: Vec<AtomicUsize>,
     oldest: AtomicUsize,
     next: AtomicUsize,
@@ -151,7 +156,8 @@ impl Strokes {
         &self.copies[slot * BRICK_VOXELS..][..BRICK_VOXELS]
     }
 
-    /// The `n`th brick of the newest stroke, and what is kept of it, voxel by voxel; `None` from [`length`](Self::length) on.
+    /// The `n`th brick of the newest stroke, and what is kept of it, voxel by voxel; `None` from
+    /// [`length`](Self::length) on.
     pub fn kept(&self, n: usize) -> Option<(usize, &[AtomicI16])> {
         let length = self.length();
         let slot = || (self.copied.load(Relaxed) - length + n) % self.bricks.len();

@@ -3,10 +3,12 @@
 use glam::{DAffine3, DVec3};
 use trepan_geometry::{Aabb, Vec3};
 
-/// Samples on a regular grid, x fastest, with the affine that puts voxel indices into patient RAS+ mm.
+/// Samples on a regular grid, x fastest, with the affine that puts voxel indices into patient RAS+
+/// mm.
 ///
-/// Voxel `(i, j, k)` has its **centre** at `world_from_voxel · (i, j, k)`; the affine may be oblique, anisotropic or mirrored.
-/// Invariant: `data.len() = dims.x · dims.y · dims.z`, the affine is finite and invertible (readers refuse the rest).
+/// Voxel `(i, j, k)` has its **centre** at `world_from_voxel · (i, j, k)`; the affine may be
+/// oblique, anisotropic or mirrored. Invariant: `data.len() = dims.x · dims.y · dims.z`, the affine
+/// is finite and invertible (readers refuse the rest).
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelVolume<T> {
     /// Voxels along i, j, k.

@@ -1,4 +1,5 @@
-//! The brain of a made-up head: nested ellipsoids with a foramen, a neck, orbits of air and a scalp as bright as fat.
+//! The brain of a made-up head: nested ellipsoids with a foramen, a neck, orbits of air and a scalp
+//! as bright as fat.
 
 use std::path::Path;
 use trepan_geometry::Vec3;
@@ -100,7 +101,8 @@ fn a_doubtful_brain_is_given_with_doubt() {
         assert!(found.value > 0.8 && !found.is_doubtful(), "{found}");
         assert_eq!(found.inside.is_some(), skull.is_some());
     }
-    // On the upper right no dark layer lies between brain and scalp: the mask leaks up to the scalp.
+    // On the upper right no dark layer lies between brain and scalp: the mask leaks up to the
+    // scalp.
     let mut leaking = mri.clone();
     for at in 0..mri.data.len() {
         let p = mri.centre_of([at % 80, at / 80 % 99, at / 7920]).as_vec3();

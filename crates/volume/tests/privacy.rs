@@ -1,4 +1,5 @@
-//! Nothing of a patient comes through: files full of identifiers, whole, cut and damaged; whatever the readers give back or say is searched.
+//! Nothing of a patient comes through: files full of identifiers, whole, cut and damaged; whatever
+//! the readers give back or say is searched.
 
 use std::path::Path;
 use trepan_volume::{dicom, import};
@@ -16,7 +17,8 @@ const SECRETS: [&str; 9] = [
     "1.2.826.0.1.31415926",
 ];
 
-/// Text for every element of the patient, study, institution and staff, in every VR that holds text or a date.
+/// Text for every element of the patient, study, institution and staff, in every VR that holds text
+/// or a date.
 const TEXTS: [(u32, &[u8; 2], &str); 38] = [
     (0x0008_0005, b"CS", "ISO_IR 100"),
     (0x0008_0014, b"UI", "1.2.826.0.1.31415926.1"),
@@ -141,7 +143,8 @@ fn a_dicom_series_full_of_identifiers_gives_none_of_them_away() {
     let numbers = [0x0020_0011, 0x0020_0032, 0x0020_0037, 0x0028_0030, 0x0028_1052];
     for (tag, secret) in numbers.into_iter().flat_map(|tag| SECRETS.map(|secret| (tag, secret))) {
         std::fs::write(file(1), slice(1, Some((tag, secret)))).unwrap();
-        // A series number, a place or a spacing is a number that is shown: only text is a secret there.
+        // A series number, a place or a spacing is a number that is shown: only text is a secret
+        // there.
         if secret.chars().any(char::is_alphabetic) {
             is_clean(&said(folder.path()), "a secret where a number belongs");
             is_clean(&said(&file(1)), "a secret where a number belongs");

@@ -1,18 +1,21 @@
 //! How large the bricks of a density volume should be, when a tool looks at them and carves them.
 //!
 //! # Theory
-//! A volume of voxels of edge h is stored in bricks of edge δ. A tool whose box is w wide covers `(w/δ + 1)³` bricks on average over its places; each costs one
-//! visit, t_v (look-up, version check). What it changed, it changed in the same box: whole bricks are copied on (to the picture, to the next thread),
-//! `(w/δ + 1)³ (δ/h)³` voxels at t_p each. So
+//! A volume of voxels of edge h is stored in bricks of edge δ. A tool whose box is w wide covers
+//! `(w/δ + 1)³` bricks on average over its places; each costs one visit, t_v (look-up, version
+//! check). What it changed, it changed in the same box: whole bricks are copied on (to the picture,
+//! to the next thread), `(w/δ + 1)³ (δ/h)³` voxels at t_p each. So
 //!
 //! ```text
 //! z(δ) = t_v (w/δ + 1)³ + t_p ((w + δ)/h)³        dz/dδ = 0   ⇔   δ⁴ = w h³ t_v / t_p
 //! ```
 //!
-//! z falls before that one root and rises after it. It answers the question that the thesis leaves open (7.2): chapter 5's sequence of steps for volumes.
+//! z falls before that one root and rises after it. It answers the question that the thesis leaves
+//! open (7.2): chapter 5's sequence of steps for volumes.
 //!
 //! # Practice
-//! Bricks have whole voxels, often a power of two: [`Bricks::best_of`] compares those that are on offer.
+//! Bricks have whole voxels, often a power of two: [`Bricks::best_of`] compares those that are on
+//! offer.
 //!
 //! # When not to use it
 //! When nothing is copied (t_p = 0): then larger is always better, up to the memory.

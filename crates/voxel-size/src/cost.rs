@@ -1,18 +1,22 @@
-//! The cost function of a cell size and its minimum (thesis, 5.3, with r_t = t_p / t_v and without the ceiling).
+//! The cost function of a cell size and its minimum (thesis, 5.3, with r_t = t_p / t_v and without
+//! the ceiling).
 //!
 //! # Theory
-//! With q = (1 − p_nc) r_t and c = 3√3 / (2 A_t), setting dz/dδ = 0 and dividing by (s/δ + 2)²/δ² > 0 gives
+//! With q = (1 − p_nc) r_t and c = 3√3 / (2 A_t), setting dz/dδ = 0 and dividing by (s/δ + 2)²/δ² >
+//! 0 gives
 //!
 //! ```text
 //! 4 q c δ³ − s q c δ² − 3 s p_nc = 0
 //! ```
 //!
-//! Its coefficients change sign once, so it has one positive root, and z falls before it and rises after it. The root is written with Cardano's formula in its stable hyperbolic
-//! form and polished with Newton; [`CostModel::minimised`] finds the same place without the derivative.
+//! Its coefficients change sign once, so it has one positive root, and z falls before it and rises
+//! after it. The root is written with Cardano's formula in its stable hyperbolic form and polished
+//! with Newton; [`CostModel::minimised`] finds the same place without the derivative.
 //!
 //! # When not to use it
-//! To predict a time: only the place of the minimum means something. The area of facets stands for the number of particles; where particles do not lie on the
-//! mesh's own nodes (a tool's point shell), use counts ([`crate::counts`]).
+//! To predict a time: only the place of the minimum means something. The area of facets stands for
+//! the number of particles; where particles do not lie on the mesh's own nodes (a tool's point
+//! shell), use counts ([`crate::counts`]).
 
 use crate::Measures;
 use crate::error::{VoxelSizeError, checked};
@@ -20,9 +24,11 @@ use crate::error::{VoxelSizeError, checked};
 /// The two constants of the cost function.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CostModel {
-    /// Share of tetrahedra that collide with nothing, 0 to 1 (1 excluded). More makes larger cells better. Thesis: 0.98 to 0.99.
+    /// Share of tetrahedra that collide with nothing, 0 to 1 (1 excluded). More makes larger cells
+    /// better. Thesis: 0.98 to 0.99.
     pub p_nc: f64,
-    /// Cost of testing one particle in visits of one cell, t_p / t_v. More makes smaller cells better. Thesis: about 5; measure it.
+    /// Cost of testing one particle in visits of one cell, t_p / t_v. More makes smaller cells
+    /// better. Thesis: about 5; measure it.
     pub r_t: f64,
 }
 
@@ -39,7 +45,8 @@ impl CostModel {
         self.with_cells(measures, delta_mm, (measures.longest_edge_mm / delta_mm + 2.0).powi(3))
     }
 
-    /// z(δ) with whole cells, as Eq 5.4 is printed: right for a count, but it has steps, so do not minimise it.
+    /// z(δ) with whole cells, as Eq 5.4 is printed: right for a count, but it has steps, so do not
+    /// minimise it.
     pub fn cost_in_whole_cells(&self, measures: &Measures, delta_mm: f64) -> f64 {
         self.with_cells(measures, delta_mm, (measures.longest_edge_mm / delta_mm + 2.0).ceil().powi(3))
     }
@@ -117,7 +124,8 @@ pub(crate) fn golden_section(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64
     0.5 * (low + high)
 }
 
-/// The error of Eq 5.9: how far a size lies from the best one, in units of the good zone on its side: 0 at the best, 1 at the zone's border.
+/// The error of Eq 5.9: how far a size lies from the best one, in units of the good zone on its
+/// side: 0 at the best, 1 at the zone's border.
 ///
 /// All four in the same measure (the thesis: cells per axis).
 pub fn zone_error(value: f64, low: f64, best: f64, high: f64) -> f64 {

@@ -1,11 +1,14 @@
-//! What a uniform grid really does at a cell size: cells visited, particles tested, boxes hit. Counts, no times.
+//! What a uniform grid really does at a cell size: cells visited, particles tested, boxes hit.
+//! Counts, no times.
 //!
 //! # Theory
-//! Algorithm of 5.2 (Teschner et al. 2003): particles are sorted into cells; each box looks through the cells it covers and tests their particles. The sum of
-//! particles over a block of cells comes from a summed-volume table in eight look-ups, so counting costs far less than doing.
+//! Algorithm of 5.2 (Teschner et al. 2003): particles are sorted into cells; each box looks through
+//! the cells it covers and tests their particles. The sum of particles over a block of cells comes
+//! from a summed-volume table in eight look-ups, so counting costs far less than doing.
 //!
 //! # Practice
-//! Cells are `floor(x / cell)`, with a world origin of 0, half open. At most [`MAX_CELLS`] cells around the particles; visits outside them count too.
+//! Cells are `floor(x / cell)`, with a world origin of 0, half open. At most [`MAX_CELLS`] cells
+//! around the particles; visits outside them count too.
 
 use crate::error::{VoxelSizeError, checked};
 use glam::{DVec3, I64Vec3};
@@ -26,7 +29,8 @@ pub struct Counts {
     pub visits: u64,
     /// Particles tested against a box: Σ over visited cells of the particles in them.
     pub tests: u64,
-    /// Tests that a particle inside the box passed (the narrow phase's work); the same at any cell size.
+    /// Tests that a particle inside the box passed (the narrow phase's work); the same at any cell
+    /// size.
     pub inside: u64,
     /// Boxes with at least one test.
     pub busy_boxes: u64,
@@ -138,7 +142,8 @@ impl Table {
         }
     }
 
-    /// Cells from `low` to `high` inside the table, as half-open ranges; `None` when there are none.
+    /// Cells from `low` to `high` inside the table, as half-open ranges; `None` when there are
+    /// none.
     fn clipped(&self, low: I64Vec3, high: I64Vec3) -> Option<([usize; 3], [usize; 3])> {
         let dims = I64Vec3::from_array(self.dims.map(|n| n as i64));
         let from = (low - self.low).max(I64Vec3::ZERO);

@@ -1,19 +1,25 @@
-//! The work of a grid at any cell size, from the boxes and particles themselves: smooth, without trying each size.
+//! The work of a grid at any cell size, from the boxes and particles themselves: smooth, without
+//! trying each size.
 //!
 //! # Theory
-//! Let the grid lie anywhere with equal chance. On one axis a box of width w covers w/δ + 1 cells of edge δ on average, and sees a particle that lies a gap g away
-//! with chance max(0, 1 − g/δ) (1 inside). The axes are independent, so
+//! Let the grid lie anywhere with equal chance. On one axis a box of width w covers w/δ + 1 cells
+//! of edge δ on average, and sees a particle that lies a gap g away with chance max(0, 1 − g/δ) (1
+//! inside). The axes are independent, so
 //!
 //! ```text
 //! visits(δ) = Σ boxes  Π (w_d/δ + 1)          tests(δ) = Σ boxes, particles  Π max(0, 1 − g_d/δ)
 //! ```
 //!
-//! exactly, in the mean over placements. A processor guesses when the loop over a box's cells ends. On one axis there are ⌊w/δ⌋ + 2 cells with chance f = frac(w/δ) and one less
-//! otherwise, so it guesses wrongly with chance min(f, 1 − f), which costs as much as several visits: `doubts(δ) = Σ boxes Σ_d min(f_d, 1 − f_d)`. The thesis's formula has one box size, s, one cell too many on each axis, and guesses particles from facets;
-//! this takes what is there: a tool's own points, graded meshes, any overlap.
+//! exactly, in the mean over placements. A processor guesses when the loop over a box's cells ends.
+//! On one axis there are ⌊w/δ⌋ + 2 cells with chance f = frac(w/δ) and one less otherwise, so it
+//! guesses wrongly with chance min(f, 1 − f), which costs as much as several visits:
+//! `doubts(δ) = Σ boxes Σ_d min(f_d, 1 − f_d)`. The thesis's formula has one box size, s, one cell
+//! too many on each axis, and guesses particles from facets; this takes what is there: a tool's own
+//! points, graded meshes, any overlap.
 //!
 //! # Practice
-//! Gaps up to a reach are kept, so δ may be at most that. At most [`MAX_GAPS`] of them: when there are more, every second, third … box stands for its neighbours.
+//! Gaps up to a reach are kept, so δ may be at most that. At most [`MAX_GAPS`] of them: when there
+//! are more, every second, third … box stands for its neighbours.
 
 use crate::counts::Table;
 use crate::error::{VoxelSizeError, checked};
@@ -116,9 +122,11 @@ impl Expected {
         Ok(best.exp())
     }
 
-    /// Sizes around the best one, mm, that are expected to cost little more, the best one first: what is worth timing on a sample of the boxes.
+    /// Sizes around the best one, mm, that are expected to cost little more, the best one first:
+    /// what is worth timing on a sample of the boxes.
     ///
-    /// No model knows everything, for example that cells fit a mesh's lattice. The sample tells how far off it is at a size; so take the size with the least
+    /// No model knows everything, for example that cells fit a mesh's lattice. The sample tells how
+    /// far off it is at a size; so take the size with the least
     /// `measured(sample) / expected(sample) · expected(all)`.
     pub fn candidates(&self, prices: &Prices, best_mm: f64) -> Vec<f64> {
         let enough = WORTH_TIMING * self.time(prices, best_mm);

@@ -1,17 +1,21 @@
 //! What a visit, a test and the rest cost on a machine, from times that someone else measured.
 //!
 //! # Theory
-//! A pass takes t = t_0 + t_v · visits + t_d · doubts + t_p · tests, where t_0 holds what no cell size changes (sorting particles, boxes, the narrow phase) and t_d
-//! is what a wrongly guessed branch costs. With times at several cell sizes this is linear least squares, solved here with relative weights (each time divided by itself), so that no size dominates.
-//! A negative price, which noise can give, is set to 0 and the rest solved again.
+//! A pass takes t = t_0 + t_v · visits + t_d · doubts + t_p · tests, where t_0 holds what no cell
+//! size changes (sorting particles, boxes, the narrow phase) and t_d is what a wrongly guessed
+//! branch costs. With times at several cell sizes this is linear least squares, solved here with
+//! relative weights (each time divided by itself), so that no size dominates. A negative price,
+//! which noise can give, is set to 0 and the rest solved again.
 //!
 //! # Practice
-//! Times in any unit; prices come in the same unit. Four cell sizes are the minimum; seven to twelve from 0.5 to 4 mean edges do well.
+//! Times in any unit; prices come in the same unit. Four cell sizes are the minimum; seven to
+//! twelve from 0.5 to 4 mean edges do well.
 
 use crate::CostModel;
 use crate::error::{VoxelSizeError, checked};
 
-/// What a pass does besides what no cell size changes: counted, or expected by [`Expected::work`](crate::Expected::work).
+/// What a pass does besides what no cell size changes: counted, or expected by
+/// [`Expected::work`](crate::Expected::work).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Work {
     /// Cells visited.

@@ -9,7 +9,8 @@ use trepan_mesh::{FACES, MeshError, TetMesh};
 pub struct Measures {
     /// How many tetrahedra or triangles.
     pub elements: usize,
-    /// s: mean over the elements of their longest edge, mm. In the worst case that is the edge of their box.
+    /// s: mean over the elements of their longest edge, mm. In the worst case that is the edge of
+    /// their box.
     pub longest_edge_mm: f64,
     /// Mean over the edges of all elements, mm.
     pub mean_edge_mm: f64,
@@ -18,7 +19,8 @@ pub struct Measures {
 }
 
 impl Measures {
-    /// Measures a mesh. Refuses one without tetrahedra, with indices out of range, with a coordinate that is not finite, or without extent.
+    /// Measures a mesh. Refuses one without tetrahedra, with indices out of range, with a
+    /// coordinate that is not finite, or without extent.
     pub fn of(mesh: &TetMesh) -> Result<Self, VoxelSizeError> {
         mesh.check_indices()?;
         if let Some(node) = mesh.positions.iter().position(|p| !p.is_finite()) {
@@ -39,8 +41,8 @@ impl Measures {
         Self { elements: tets, longest_edge_mm, mean_edge_mm, facet_mm2 }.checked()
     }
 
-    /// Measures a triangle mesh, for the triangle form of Borro et al. 2004: the same cost with the triangles' own edges and areas. Refuses what [`of`](Self::of)
-    /// refuses.
+    /// Measures a triangle mesh, for the triangle form of Borro et al. 2004: the same cost with the
+    /// triangles' own edges and areas. Refuses what [`of`](Self::of) refuses.
     pub fn of_triangles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self, VoxelSizeError> {
         if triangles.is_empty() {
             return Err(MeshError::Empty.into());

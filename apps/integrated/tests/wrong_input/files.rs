@@ -62,7 +62,8 @@ pub fn gz(bytes: &[u8]) -> Vec<u8> {
     gzip.finish().unwrap()
 }
 
-/// A file of zeros that unpacks to `mib` MiB behind `head`, made of one packed piece again and again.
+/// A file of zeros that unpacks to `mib` MiB behind `head`, made of one packed piece again and
+/// again.
 fn bomb(head: &[u8], mib: usize) -> Vec<u8> {
     let piece = gz(&vec![0; 16 << 20]);
     let mut bytes = gz(head);

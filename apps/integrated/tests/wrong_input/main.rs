@@ -1,5 +1,5 @@
-//! What a user can get wrong, as a table: each case exits with 2 within seconds and 4 GB, says what,
-//! where and the remedy, shows no panic, and leaves nothing behind.
+//! What a user can get wrong, as a table: each case exits with 2 within seconds and 4 GB, says
+//! what, where and the remedy, shows no panic, and leaves nothing behind.
 #![cfg(unix)]
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -7,9 +7,11 @@ use crate::passivity::PassivityConfig;
 pub struct GuardConfig {
     /// Longest force, N. Set it to the device's peak; 3.3 is the Touch's.
     pub max_force_n: f32,
-    /// Force that the motors bear for any time, N; as long as the peak or longer, there is no heat account. The Touch's is 0.88.
+    /// Force that the motors bear for any time, N; as long as the peak or longer, there is no heat
+    /// account. The Touch's is 0.88.
     pub continuous_force_n: f32,
-    /// Time constant τ of the motors' heat, ms. From cold, the Touch's peak is given for 2 s, 2 N for 6 s.
+    /// Time constant τ of the motors' heat, ms. From cold, the Touch's peak is given for 2 s, 2 N
+    /// for 6 s.
     pub heat_ms: f32,
     /// Longest torque, N mm. 188 is the limit of the 6-DOF Premium.
     pub max_torque_nmm: f32,
@@ -19,9 +21,11 @@ pub struct GuardConfig {
     pub torque_slew_nmm_per_ms: f32,
     /// Time from no force to full force at the start and after a fault, ms.
     pub ramp_in_ms: f32,
-    /// Tip speed over which the force is cut, mm/ms. 1 m/s is out of reach of a hand in contact: a fault or a flight.
+    /// Tip speed over which the force is cut, mm/ms. 1 m/s is out of reach of a hand in contact: a
+    /// fault or a flight.
     pub max_speed: f32,
-    /// Age of the newest sample at which the force fades, ms. A tool whose `time_ms` stays 0 has no clock and is exempt.
+    /// Age of the newest sample at which the force fades, ms. A tool whose `time_ms` stays 0 has no
+    /// clock and is exempt.
     pub stale_ms: f32,
     /// The passivity controller; `None` switches it off.
     pub passivity: Option<PassivityConfig>,
@@ -46,7 +50,7 @@ impl Default for GuardConfig {
 
 impl GuardConfig {
     /// With limits that are negative or not numbers as zero.
-    pub(super) fn sound(self) -> Self {
+    pub(super) fn sanitized(self) -> Self {
         // Under a micronewton rounding would pass the limit.
         let sound = |x: f32| if x > 1e-6 { x.min(1e6) } else { 0.0 };
         Self {
@@ -79,7 +83,8 @@ pub struct GuardCounters {
     pub passivity: u64,
     /// The force was shortened to what the energy account could pay for.
     pub bounded: u64,
-    /// A force held short by the energy account began anew: its coupling is outside what the controller can hold.
+    /// A force held short by the energy account began anew: its coupling is outside what the
+    /// controller can hold.
     pub restarted: u64,
     /// The tool was faster than the cut-out, or jumped.
     pub too_fast: u64,

@@ -1,8 +1,9 @@
 //! What warm motors bear.
 //!
 //! # Theory
-//! Heat goes with the square of a motor's current, and so of the force: θ = 1 is what the continuous force Fc heats to in the end. The
-//! peak Fp is given until θ = 0.9, then the limit falls towards Fc, which it reaches as θ reaches 1, and never passes.
+//! Heat goes with the square of a motor's current, and so of the force: θ = 1 is what the
+//! continuous force Fc heats to in the end. The peak Fp is given until θ = 0.9, then the limit
+//! falls towards Fc, which it reaches as θ reaches 1, and never passes.
 //! ```text
 //! θ̇ = ((F/Fc)² - θ)/τ      F² ≤ Fc² + (Fp² - Fc²) min((1 - θ)/0.1, 1)
 //! ```
@@ -17,7 +18,8 @@ const WARM: f32 = 0.1;
 pub(super) struct Heat(pub f32);
 
 impl Heat {
-    /// Books the force that was given, N, and says what the motors bear now; `None` where the peak is for any time.
+    /// Books the force that was given, N, and says what the motors bear now; `None` where the peak
+    /// is for any time.
     pub(super) fn bearable_n(&mut self, given_n: f32, dt_ms: f32, config: &GuardConfig) -> Option<f32> {
         let (peak, steady) = (config.max_force_n, config.continuous_force_n);
         if steady >= peak {

@@ -1,8 +1,8 @@
 //! The hand's motion as far as encoder steps let one know it.
 //!
 //! # Theory
-//! An encoder of step Δ shows x as a staircase: a hand that trembles across one edge seems to jump by Δ, a slow hand seems to rest and
-//! to leap. Two estimates answer that:
+//! An encoder of step Δ shows x as a staircase: a hand that trembles across one edge seems to jump
+//! by Δ, a slow hand seems to rest and to leap. Two estimates answer that:
 //! ```text
 //! sure way   x̂ ← x̂ while |x - x̂| ≤ Δ/2, else the point at Δ/2 from x towards x̂    a play: at each step it is where the edge is
 //! velocity   (x(n) - x(n-L))/L, L the longest window whose chord passes all samples within Δ
@@ -10,8 +10,8 @@
 //! The window is short for a fast hand and long for a slow one.
 //!
 //! # Sources
-//! F. Janabi-Sharifi, V. Hayward, C.-S. J. Chen, *Discrete-time adaptive windowing for velocity estimation*, IEEE Trans. Control Systems
-//! Technology 8 (2000).
+//! F. Janabi-Sharifi, V. Hayward, C.-S. J. Chen, *Discrete-time adaptive windowing for velocity
+//! estimation*, IEEE Trans. Control Systems Technology 8 (2000).
 
 use trepan_geometry::Vec3;
 

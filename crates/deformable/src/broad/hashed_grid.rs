@@ -1,16 +1,20 @@
 //! Points in a hashed grid with time stamps, tetrahedra looked up through the cells of their boxes.
 //!
 //! # Theory
-//! Teschner et al. 2003: the cell `(i, j, k)` of a point is hashed, `(73856093 i) xor (19349663 j) xor (83492791 k)` modulo the size of the table, and the point goes into
-//! that bucket. A bucket written at an earlier step is empty: its time stamp says so, and nothing is ever cleared. A tetrahedron asks the
-//! buckets of all cells that its box meets. Two cells may share a bucket, so a point counts only for its own cell, once.
+//! Teschner et al. 2003: the cell `(i, j, k)` of a point is hashed,
+//! `(73856093 i) xor (19349663 j) xor (83492791 k)` modulo the size of the table, and the point
+//! goes into that bucket. A bucket written at an earlier step is empty: its time stamp says so, and
+//! nothing is ever cleared. A tetrahedron asks the buckets of all cells that its box meets. Two
+//! cells may share a bucket, so a point counts only for its own cell, once.
 //!
 //! # Practice
-//! Memory depends on the number of points alone, however small the cells and however far apart the points. As in the uniform grid, cells
-//! that a box would have to ask in too great a number are doubled, and counted in [`HashedGrid::coarsened`].
+//! Memory depends on the number of points alone, however small the cells and however far apart the
+//! points. As in the uniform grid, cells that a box would have to ask in too great a number are
+//! doubled, and counted in [`HashedGrid::coarsened`].
 //!
 //! # When not to use it
-//! When the points lie close together, as on a tool: the array of [`UniformGrid`](super::UniformGrid) is as small and needs no hash.
+//! When the points lie close together, as on a tool: the array of
+//! [`UniformGrid`](super::UniformGrid) is as small and needs no hash.
 
 use super::{BroadPhase, TetBoxes, push_bounded, uniform_grid::fitting_cell};
 use crate::extent::Extent;

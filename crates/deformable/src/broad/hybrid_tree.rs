@@ -1,15 +1,19 @@
-//! A tree of boxes whose upper half is refitted bottom-up and whose lower half only where it is looked at.
+//! A tree of boxes whose upper half is refitted bottom-up and whose lower half only where it is
+//! looked at.
 //!
 //! # Theory
-//! Larsson and Akenine-Möller 2001: most of the lower nodes are never visited in a step. So the nodes half way down are fitted straight to the mesh nodes below
-//! them, the upper ones to their children; below, a node is fitted to its own mesh nodes when the box above it meets the region of interest.
+//! Larsson and Akenine-Möller 2001: most of the lower nodes are never visited in a step. So the
+//! nodes half way down are fitted straight to the mesh nodes below them, the upper ones to their
+//! children; below, a node is fitted to its own mesh nodes when the box above it meets the region
+//! of interest.
 //!
 //! # Practice
-//! Each mesh node is read once for each half-way box that has it, 1.5 times on average, in place of four corners of about five tetrahedra: so
-//! an update costs a fifth of a scan.
+//! Each mesh node is read once for each half-way box that has it, 1.5 times on average, in place of
+//! four corners of about five tetrahedra: so an update costs a fifth of a scan.
 //!
 //! # When not to use it
-//! When the points are all over the mesh: then every lower node is fitted to all mesh nodes below it, level by level.
+//! When the points are all over the mesh: then every lower node is fitted to all mesh nodes below
+//! it, level by level.
 
 use super::{
     BroadPhase, box_of, push_bounded,
@@ -35,7 +39,8 @@ pub struct HybridTree {
     open: Vec<u32>,
 }
 
-/// Tetrahedra below a node that is half way down: the square root of a leaf times the mesh, at least this many.
+/// Tetrahedra below a node that is half way down: the square root of a leaf times the mesh, at
+/// least this many.
 const LEAST_BELOW: usize = 4 * LEAF;
 
 impl HybridTree {
@@ -82,7 +87,8 @@ impl HybridTree {
         }
     }
 
-    /// Goes down where boxes meet the region, fits what lies below half way, and lists the tetrahedra reached.
+    /// Goes down where boxes meet the region, fits what lies below half way, and lists the
+    /// tetrahedra reached.
     fn fit_lower(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Extent) {
         self.open.push(0);
         while let Some(at) = self.open.pop() {
@@ -103,7 +109,8 @@ impl HybridTree {
         }
     }
 
-    /// A child of a node that was fitted to the mesh itself; children of upper nodes are fitted already.
+    /// A child of a node that was fitted to the mesh itself; children of upper nodes are fitted
+    /// already.
     fn fit_below(&mut self, positions: &[Vec3], tets: &[[u32; 4]], child: u32, parent: Node) {
         if parent.last - parent.first > self.below {
             return;

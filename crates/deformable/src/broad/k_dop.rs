@@ -1,11 +1,13 @@
 //! Discrete oriented polytopes with 18 sides as bounding volumes (Klosowski et al. 1998).
 //!
 //! # Theory
-//! The slabs between the least and the greatest value of `x·d` along nine fixed directions: the three axes and the six diagonals of their planes. The
-//! hull of two is the wider slab along each direction.
+//! The slabs between the least and the greatest value of `x·d` along nine fixed directions: the
+//! three axes and the six diagonals of their planes. The hull of two is the wider slab along each
+//! direction.
 //!
 //! # Practice
-//! 72 bytes; a refit costs three times that of boxes, a test up to nine slabs; holds slanted parts more tightly.
+//! 72 bytes; a refit costs three times that of boxes, a test up to nine slabs; holds slanted parts
+//! more tightly.
 
 use super::volume_tree::Volume;
 use trepan_geometry::Vec3;
@@ -21,7 +23,8 @@ const SLABS: usize = 9;
 
 const EMPTY: KDop = KDop { low: [f32::INFINITY; SLABS], high: [f32::NEG_INFINITY; SLABS] };
 
-/// A point along the nine directions. Corners and points take the same sums, so rounding loses nothing along one direction.
+/// A point along the nine directions. Corners and points take the same sums, so rounding loses
+/// nothing along one direction.
 #[inline]
 fn along(p: Vec3) -> [f32; SLABS] {
     let Vec3 { x, y, z } = p;

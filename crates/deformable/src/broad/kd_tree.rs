@@ -1,8 +1,9 @@
 //! Points in a k-d tree, made anew at every step; tetrahedra go down where their boxes lie.
 //!
 //! # Theory
-//! Bentley 1975: the median point along one axis splits the rest in two, and so on, the axes in turn. The tree needs no memory of its own: the middle of each
-//! range of the sorted list is its node. A box goes to the side or sides of the split that it reaches.
+//! Bentley 1975: the median point along one axis splits the rest in two, and so on, the axes in
+//! turn. The tree needs no memory of its own: the middle of each range of the sorted list is its
+//! node. A box goes to the side or sides of the split that it reaches.
 //!
 //! ```text
 //!   list   [ . . . L . . .  M  . . . R . . . ]     M splits along x, L and R along y, …

@@ -38,7 +38,8 @@ pub trait BroadPhase: Send {
     /// Takes the tetrahedra of a moved mesh; only those whose box meets `region` matter.
     fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb);
 
-    /// Clears `out` and fills it, up to its capacity, with `[point, tetrahedron]` pairs, ascending by tetrahedron; returns how many did not fit.
+    /// Clears `out` and fills it, up to its capacity, with `[point, tetrahedron]` pairs, ascending
+    /// by tetrahedron; returns how many did not fit.
     fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32;
 }
 

@@ -1,11 +1,13 @@
 //! Turned boxes as bounding volumes (Gottschalk et al. 1996), their directions taken at rest.
 //!
 //! # Theory
-//! Directions: eigenvectors of the covariance of a node's corners at rest, found by Jacobi's rotations. A refit keeps them and takes the extents anew: of a
-//! leaf from its corners, of a parent from the eight corners of each child's box.
+//! Directions: eigenvectors of the covariance of a node's corners at rest, found by Jacobi's
+//! rotations. A refit keeps them and takes the extents anew: of a leaf from its corners, of a
+//! parent from the eight corners of each child's box.
 //!
 //! # Practice
-//! 60 bytes. Extents through the children's corners grow from level to level; taking them from all nodes below would be tight, but O(n log n).
+//! 60 bytes. Extents through the children's corners grow from level to level; taking them from all
+//! nodes below would be tight, but O(n log n).
 //!
 //! # When not to use it
 //! Where the mesh turns: directions from rest then fit no better than those of the axes.

@@ -1,8 +1,10 @@
-//! Points in an octree, made anew at every step; tetrahedra look through the cells that their boxes meet.
+//! Points in an octree, made anew at every step; tetrahedra look through the cells that their boxes
+//! meet.
 //!
 //! # Theory
-//! Meagher 1982: a cube is cut into eight until few points are left in each. Here the cubes are the tight boxes of their points' half spaces, so empty octants cost
-//! nothing. The points are few and the tetrahedra many: so the tree is made of the points, and the boxes ask it.
+//! Meagher 1982: a cube is cut into eight until few points are left in each. Here the cubes are the
+//! tight boxes of their points' half spaces, so empty octants cost nothing. The points are few and
+//! the tetrahedra many: so the tree is made of the points, and the boxes ask it.
 //!
 //! # When not to use it
 //! For points that lie evenly, as on a ball: a grid finds their cell without going down.

@@ -1,8 +1,9 @@
 //! The ready-made tree: parry's `Bvh`, each leaf one tetrahedron's box.
 //!
 //! # Practice
-//! Built by parry's binned surface-area heuristic, leaves updated in place, refitted without rebuilding. A leaf whose tetrahedron is nowhere keeps its last box and
-//! gives no pair. Nothing is allocated after `new`.
+//! Built by parry's binned surface-area heuristic, leaves updated in place, refitted without
+//! rebuilding. A leaf whose tetrahedron is nowhere keeps its last box and gives no pair. Nothing is
+//! allocated after `new`.
 //!
 //! # When not to use it
 //! For one small tool, as all trees that follow every tetrahedron.

@@ -1,11 +1,14 @@
-//! Balls as bounding volumes (Hubbard 1996; refitted as in James and Pai 2004's BD-tree, but bottom-up).
+//! Balls as bounding volumes (Hubbard 1996; refitted as in James and Pai 2004's BD-tree, but
+//! bottom-up).
 //!
 //! # Theory
-//! The ball of two balls with centres a distance d apart: the larger one, when it holds the other (r ≥ d + s), else one of radius (d + r + s)/2 on the line
-//! through both centres. A tetrahedron's ball is round its centroid.
+//! The ball of two balls with centres a distance d apart: the larger one, when it holds the other
+//! (r ≥ d + s), else one of radius (d + r + s)/2 on the line through both centres. A tetrahedron's
+//! ball is round its centroid.
 //!
 //! # Practice
-//! 16 bytes and one distance for each test, the same in every direction; each merge loosens the ball, so the upper levels are much larger than what they hold.
+//! 16 bytes and one distance for each test, the same in every direction; each merge loosens the
+//! ball, so the upper levels are much larger than what they hold.
 
 use super::volume_tree::Volume;
 use trepan_geometry::Vec3;

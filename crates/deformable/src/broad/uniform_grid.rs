@@ -1,13 +1,16 @@
 //! Points in a uniform grid of cells, tetrahedra looked up through the cells of their boxes.
 //!
 //! # Theory
-//! Teschner et al. 2003 with an array in place of the hash, as in the thesis 4.2.2: a point belongs to the one cell
-//! `floor((x - origin) / cell)`, a tetrahedron asks every cell that its box meets. Each pair is found once, since a point has one cell.
+//! Teschner et al. 2003 with an array in place of the hash, as in the thesis 4.2.2: a point belongs
+//! to the one cell `floor((x - origin) / cell)`, a tetrahedron asks every cell that its box meets.
+//! Each pair is found once, since a point has one cell.
 //!
 //! # Practice
-//! The array spans only the box of the points, so a mesh that leaves any preset world box does no harm. `cell_mm` trades
-//! cells visited against points per cell: see `trepan-voxel-size`. When the points' box asks for more than [`UniformGrid::MAX_CELLS`] cells, the
-//! cells of that step are doubled until they fit, and [`UniformGrid::coarsened`] counts it. O(tetrahedra + points + cells) in each step.
+//! The array spans only the box of the points, so a mesh that leaves any preset world box does no
+//! harm. `cell_mm` trades cells visited against points per cell: see `trepan-voxel-size`. When the
+//! points' box asks for more than [`UniformGrid::MAX_CELLS`] cells, the cells of that step are
+//! doubled until they fit, and [`UniformGrid::coarsened`] counts it. O(tetrahedra + points + cells)
+//! in each step.
 //!
 //! # When not to use it
 //! For a small tool in a large mesh: it still looks at every tetrahedron's box.

@@ -1,8 +1,10 @@
-//! A tree of bounding volumes over the tetrahedra, built at rest, refitted bottom-up to the moved mesh.
+//! A tree of bounding volumes over the tetrahedra, built at rest, refitted bottom-up to the moved
+//! mesh.
 //!
 //! # Theory
-//! Van den Bergen 1997: in a deforming body the tree keeps its shape, only its volumes follow, children before parents. The tree is made by halving
-//! the tetrahedra at the median of their centres along the longest side. A point goes down every branch whose volume holds it.
+//! Van den Bergen 1997: in a deforming body the tree keeps its shape, only its volumes follow,
+//! children before parents. The tree is made by halving the tetrahedra at the median of their
+//! centres along the longest side. A point goes down every branch whose volume holds it.
 //!
 //! ```text
 //!      [0]         one volume for each node, of any kind: box, ball, k-DOP, turned box
@@ -13,11 +15,13 @@
 //! ```
 //!
 //! # Practice
-//! O(tetrahedra) for each refit, O(log tetrahedra) for a point as long as volumes overlap little; large deformation makes them overlap more, never
-//! wrong. The last test is against the tetrahedron's own box, so that all kinds give the same pairs.
+//! O(tetrahedra) for each refit, O(log tetrahedra) for a point as long as volumes overlap little;
+//! large deformation makes them overlap more, never wrong. The last test is against the
+//! tetrahedron's own box, so that all kinds give the same pairs.
 //!
 //! # When not to use it
-//! For one small tool: the refit costs more than a scan over all boxes. It pays with many points that lie far apart.
+//! For one small tool: the refit costs more than a scan over all boxes. It pays with many points
+//! that lie far apart.
 
 use super::{BroadPhase, box_of, push_bounded};
 use crate::extent::Extent;
@@ -25,7 +29,8 @@ use trepan_geometry::{Aabb, Vec3};
 
 /// Something that holds points, and can be made to hold more.
 pub trait Volume: Copy + Send {
-    /// An empty volume for these points at rest; one with directions takes them from here and keeps them.
+    /// An empty volume for these points at rest; one with directions takes them from here and keeps
+    /// them.
     fn for_points(points: &[Vec3]) -> Self;
 
     /// Holds nothing any more.
@@ -51,7 +56,8 @@ pub struct VolumeTree<V> {
     boxes: Vec<Extent>,
 }
 
-/// What a node stands for: `order[first..last]`; a leaf when `right` is 0. The left child is the next node.
+/// What a node stands for: `order[first..last]`; a leaf when `right` is 0. The left child is the
+/// next node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
     pub first: u32,

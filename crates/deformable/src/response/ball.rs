@@ -1,15 +1,19 @@
 //! The tool's ball against the moving surface: one depth, one smooth normal.
 //!
 //! # Theory
-//! Let c be the ball's centre, R its radius, q the closest surface point, s = +1 outside and -1 inside. Then `depth = R - s |c - q|`: a
-//! distance, so it never jumps when a point crosses a border between tetrahedra, and one millimetre of push is one millimetre of depth. While the
-//! centre is inside, q is not searched anew but followed: from the last triangle downhill, and only over triangles that face the same way. So
-//! the far side of a thin structure never takes the contact over, and deeper stays deeper through the whole thickness. A tool that moved by more than R
-//! in one step jumped: q is searched anew.
+//! Let c be the ball's centre, R its radius, q the closest surface point, s = +1 outside and -1
+//! inside. Then `depth = R - s |c - q|`: a distance, so it never jumps when a point crosses a
+//! border between tetrahedra, and one millimetre of push is one millimetre of depth. While the
+//! centre is inside, q is not searched anew but followed: from the last triangle downhill, and only
+//! over triangles that face the same way. So the far side of a thin structure never takes the
+//! contact over, and deeper stays deeper through the whole thickness. A tool that moved by more
+//! than R in one step jumped: q is searched anew.
 //!
-//! The normal is the mean over the centre and every fourth point inside, each with the blended surface normal at its own closest point (`near.rs`) and weighted
-//! with its own depth: `f = Σ dᵢ nᵢ`, `n = f / |f|`. A weight is zero where a point enters, so nothing jumps. In a groove whose walls push against each
-//! other the coherence `κ = |f| / Σ dᵢ` falls to 0, and the depth is scaled by `min(1, 2κ)`: opposite walls cancel, everything else is left alone.
+//! The normal is the mean over the centre and every fourth point inside, each with the blended
+//! surface normal at its own closest point (`near.rs`) and weighted with its own depth:
+//! `f = Σ dᵢ nᵢ`, `n = f / |f|`. A weight is zero where a point enters, so nothing jumps. In a
+//! groove whose walls push against each other the coherence `κ = |f| / Σ dᵢ` falls to 0, and the
+//! depth is scaled by `min(1, 2κ)`: opposite walls cancel, everything else is left alone.
 //!
 //! ```text
 //!        ( c )           n  from the points inside, weighted with depth
@@ -18,10 +22,12 @@
 //! ```
 //!
 //! # Sources
-//! Followed closest feature: after Ho, Basdogan and Srinivasan 1999. Blended normals: the aim of force shading (Morgenbesser and Srinivasan 1996).
+//! Followed closest feature: after Ho, Basdogan and Srinivasan 1999. Blended normals: the aim of
+//! force shading (Morgenbesser and Srinivasan 1996).
 //!
 //! # When not to use it
-//! For a tool that is not a ball at its tip; for a surface that folds within the ball's radius so sharply that one normal says nothing.
+//! For a tool that is not a ball at its tip; for a surface that folds within the ball's radius so
+//! sharply that one normal says nothing.
 
 use super::{
     Answer, Spring,
@@ -49,7 +55,8 @@ pub(crate) struct Ball {
 
 /// Most triangles near one contact.
 const MAX_NEAR: usize = 1024;
-/// A triangle belongs to the touched side when its normal is within 70 degrees of the touched triangle's.
+/// A triangle belongs to the touched side when its normal is within 70 degrees of the touched
+/// triangle's.
 const SAME_SIDE: f32 = 0.34;
 /// Every fourth point inside is sampled: the shell is even, so a quarter of it is too.
 const SAMPLE_EVERY: usize = 4;
@@ -71,7 +78,8 @@ impl Ball {
         self.anchor = NONE;
     }
 
-    /// Writes the springs of the surface under and around the ball of the last step; returns what did not fit.
+    /// Writes the springs of the surface under and around the ball of the last step; returns what
+    /// did not fit.
     pub(crate) fn press(
         &mut self,
         scene: &Scene,
@@ -86,7 +94,8 @@ impl Ball {
         }
     }
 
-    /// Fills manifold list and nodes; the answer is `None` when the ball does not touch, though springs may wait.
+    /// Fills manifold list and nodes; the answer is `None` when the ball does not touch, though
+    /// springs may wait.
     pub(crate) fn respond(
         &mut self,
         scene: &Scene,
@@ -126,7 +135,8 @@ impl Ball {
         }
     }
 
-    /// What the surface says about the ball's centre, and the ball's depth there, which is less than nothing where it only comes near.
+    /// What the surface says about the ball's centre, and the ball's depth there, which is less
+    /// than nothing where it only comes near.
     fn touch(
         &mut self,
         scene: &Scene,
@@ -153,8 +163,9 @@ impl Ball {
         Some((sample, depth_mm))
     }
 
-    /// Where triangles matter: as far from the centre as the closest one, as far from the points inside as they are deep, and further as normals
-    /// blend; never beyond a diameter around the foot.
+    /// Where triangles matter: as far from the centre as the closest one, as far from the points
+    /// inside as they are deep, and further as normals blend; never beyond a diameter around the
+    /// foot.
     fn region(&self, scene: &Scene, hits: &Hits, foot: &Foot, depth_mm: f32) -> Extent {
         let blend_mm = BLEND * scene.radius_mm;
         let mut points = Extent::EMPTY;
@@ -165,7 +176,8 @@ impl Ball {
         region.shared(&Aabb::of_sphere(foot.point, 2.0 * scene.radius_mm).into())
     }
 
-    /// Takes triangles that the centre sees from outside, and those that face as the touched one does.
+    /// Takes triangles that the centre sees from outside, and those that face as the touched one
+    /// does.
     fn keep_touched_side(&mut self, scene: &Scene, surface: &MovingSurface, foot: &Foot) {
         let touched = surface.flat_normal(scene.positions, foot.triangle);
         let centre = scene.tool.tip();

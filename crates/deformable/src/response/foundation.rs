@@ -1,25 +1,28 @@
-//! The tissue's surface as an elastic foundation under the ball: how deep it is pressed at each node.
+//! The tissue's surface as an elastic foundation under the ball: how deep it is pressed at each
+//! node.
 //!
 //! # Theory
-//! Points q with fixed weights wᵢ on the corners of their triangle cover the surface; each stands for
-//! the area A_q that it has at rest. With c the ball's centre, R its radius and m a margin, q is pressed by
-//! `e = R + m - |x_q - c|` along `n = (c - x_q)/|c - x_q|`, where e > 0:
+//! Points q with fixed weights wᵢ on the corners of their triangle cover the surface; each stands
+//! for the area A_q that it has at rest. With c the ball's centre, R its radius and m a margin, q
+//! is pressed by `e = R + m - |x_q - c|` along `n = (c - x_q)/|c - x_q|`, where e > 0:
 //!
 //! ```text
 //! fᵢ = -K Σ wᵢ A_q e n        K such that |Σ K A_q e n| is the force that the hand feels
 //! ```
-//! Nothing in it jumps or wanders as the tissue moves: weights and areas are constants of the mesh, e is
-//! continuous, and without K the forces are the gradient of one energy. Each node is given as one spring of
-//! weight 1, with the row sums of the foundation's stiffness, twice the ball's in all. Row sums exceed the
-//! matrix that they stand for (Hughes 2000), so what solvers take implicitly is never too little.
+//! Nothing in it jumps or wanders as the tissue moves: weights and areas are constants of the mesh,
+//! e is continuous, and without K the forces are the gradient of one energy. Each node is given as
+//! one spring of weight 1, with the row sums of the foundation's stiffness, twice the ball's in
+//! all. Row sums exceed the matrix that they stand for (Hughes 2000), so what solvers take
+//! implicitly is never too little.
 //!
 //! # Practice
-//! Triangles larger than half a radius have several points. A ball pressed deeper than half its radius
-//! grows upwards, its lowest point fixed, so that its centre never comes down to the surface.
+//! Triangles larger than half a radius have several points. A ball pressed deeper than half its
+//! radius grows upwards, its lowest point fixed, so that its centre never comes down to the
+//! surface.
 //!
 //! # Sources
-//! Elastic foundation: K. L. Johnson, Contact Mechanics, 1985, section 4.3. Row sums: T. J. R. Hughes,
-//! The Finite Element Method, 2000, section 7.3.2.
+//! Elastic foundation: K. L. Johnson, Contact Mechanics, 1985, section 4.3. Row sums: T. J. R.
+//! Hughes, The Finite Element Method, 2000, section 7.3.2.
 
 use super::{
     Spring, finite_or_zero,
@@ -68,8 +71,9 @@ impl Foundation {
         Self { springs: Vec::with_capacity(MAX_SPRINGS), spring_of: vec![NONE; nodes] }
     }
 
-    /// Writes the springs of the ball on the triangles near it: together the force of `spring` pressed
-    /// `depth_mm` deep along `normal`; at depth 0 all wait. Returns how many nodes did not fit.
+    /// Writes the springs of the ball on the triangles near it: together the force of `spring`
+    /// pressed `depth_mm` deep along `normal`; at depth 0 all wait. Returns how many nodes did not
+    /// fit.
     pub(crate) fn press(
         &mut self,
         scene: &Scene,

@@ -1,16 +1,19 @@
-//! Dry friction between tool and tissue: the slip since the touch, held by a tangential spring up to the cone.
+//! Dry friction between tool and tissue: the slip since the touch, held by a tangential spring up
+//! to the cone.
 //!
 //! # Theory
 //! ```text
 //! s ← s + (motion of the tool - motion of the tissue under it), tangential part
 //! |k s| ≤ μ Fₙ   sticks        |k s| > μ Fₙ   slips: s is shortened to μ Fₙ / k
 //! ```
-//! The tissue's motion is that of the nodes that carried the load one step ago, so a tool that rests on moving tissue is carried along and feels it. The tool's
-//! is that of the point of its body that lay at the contact, so a turning tool rubs.
+//! The tissue's motion is that of the nodes that carried the load one step ago, so a tool that
+//! rests on moving tissue is carried along and feels it. The tool's is that of the point of its
+//! body that lay at the contact, so a turning tool rubs.
 //!
 //! # Practice
-//! k is the contact's normal stiffness. The force on the tool is `-k s`; the nodes take the same, opposite, by the weights of the normal load, so that momentum is
-//! conserved. Forgotten when contact ends. For a hand at 1 kHz, `trepan_contact::Friction` does the same in the tick.
+//! k is the contact's normal stiffness. The force on the tool is `-k s`; the nodes take the same,
+//! opposite, by the weights of the normal load, so that momentum is conserved. Forgotten when
+//! contact ends. For a hand at 1 kHz, `trepan_contact::Friction` does the same in the tick.
 //!
 //! # Sources
 //! Ruspini, Kolarov and Khatib 1997 (the cone); stick and slip as Hayward and Armstrong 1999.

@@ -19,7 +19,8 @@ use trepan_geometry::Vec3;
 pub enum Response {
     /// The ball against the moving surface: continuous, and deeper is more.
     Ball,
-    /// The thesis's Algorithm 2 as printed: the greatest distance to any surface face of the tetrahedra hit.
+    /// The thesis's Algorithm 2 as printed: the greatest distance to any surface face of the
+    /// tetrahedra hit.
     Printed,
     /// Algorithm 2 with each point measured against the nearest surface face of its tetrahedron.
     NearestFace,
@@ -50,7 +51,8 @@ impl Responder {
         matches!(self, Self::Ball(_))
     }
 
-    /// Fills the list and the nodes; normal and depth are the answer, `None` when nothing is touched.
+    /// Fills the list and the nodes; normal and depth are the answer, `None` when nothing is
+    /// touched.
     pub(crate) fn respond(
         &mut self,
         scene: &Scene,
@@ -64,8 +66,9 @@ impl Responder {
         }
     }
 
-    /// Writes the springs of the surface under the tool, if the response has any: together the force of
-    /// `spring` pressed `depth_mm` deep along the normal, waiting where that is 0. Returns what did not fit.
+    /// Writes the springs of the surface under the tool, if the response has any: together the
+    /// force of `spring` pressed `depth_mm` deep along the normal, waiting where that is 0. Returns
+    /// what did not fit.
     pub(crate) fn press(
         &mut self,
         scene: &Scene,
@@ -105,7 +108,8 @@ pub(crate) struct Answer {
     pub depth_mm: f32,
 }
 
-/// Writes the answer into manifold, patch and nodal spring, whose nodes are already there; nothing, and false, when a number is not finite.
+/// Writes the answer into manifold, patch and nodal spring, whose nodes are already there; nothing,
+/// and false, when a number is not finite.
 pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut TissueStep) -> bool {
     out.nodal.normalise();
     let place = out.nodal.mean(|n| scene.positions[n as usize]);

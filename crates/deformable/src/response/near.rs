@@ -1,13 +1,16 @@
 //! The triangles near one contact, side by side in memory, and a normal that never jumps.
 //!
 //! # Theory
-//! For a sample point p let `d_t` be its distance to triangle t and `d = min d_t`. The normal there is the mean of the flat normals, each with the
-//! weight `(1 - (d_t - d)/r)·min(A_t, r²)`, over all t with `d_t < d + r`. Every `d_t` is continuous in p and a weight is zero where a
-//! triangle joins, so the mean is continuous too, also where the closest triangle changes; further than r from an edge it is the flat normal.
-//! Where walls oppose, the mean is shorter than 1; its length says how far they cancel.
+//! For a sample point p let `d_t` be its distance to triangle t and `d = min d_t`. The normal there
+//! is the mean of the flat normals, each with the weight `(1 - (d_t - d)/r)·min(A_t, r²)`, over all
+//! t with `d_t < d + r`. Every `d_t` is continuous in p and a weight is zero where a triangle
+//! joins, so the mean is continuous too, also where the closest triangle changes; further than r
+//! from an edge it is the flat normal. Where walls oppose, the mean is shorter than 1; its length
+//! says how far they cancel.
 //!
 //! # Practice
-//! Two bounds (plane distance, box) spare most exact distances: 2 ns each, against 15 ns; the closest triangle of the last point is tried first.
+//! Two bounds (plane distance, box) spare most exact distances: 2 ns each, against 15 ns; the
+//! closest triangle of the last point is tried first.
 
 use crate::{extent::Extent, surface::MovingSurface, triangle};
 use trepan_geometry::Vec3;
@@ -48,7 +51,8 @@ impl Near {
         Self { triangles: Vec::with_capacity(triangles), close: Vec::with_capacity(triangles), hint: 0 }
     }
 
-    /// Takes the numbered triangles for which `keep(normal, corner)` holds; flat ones say nothing and are left out.
+    /// Takes the numbered triangles for which `keep(normal, corner)` holds; flat ones say nothing
+    /// and are left out.
     pub(crate) fn fill(
         &mut self,
         surface: &MovingSurface,

@@ -1,13 +1,15 @@
 //! The thesis's response: mean face normal, and Algorithm 2 for the depth.
 //!
 //! # Theory
-//! Normal: mean of the unit normals of the surface faces of the tetrahedra hit. Depth: over all points inside and all surface faces of
-//! their tetrahedra, the greatest distance from point to face plane (thesis 4.3). A corner tetrahedron's far face counts too, as printed; the
-//! other form measures each point against the nearest surface face of its tetrahedron.
+//! Normal: mean of the unit normals of the surface faces of the tetrahedra hit. Depth: over all
+//! points inside and all surface faces of their tetrahedra, the greatest distance from point to
+//! face plane (thesis 4.3). A corner tetrahedron's far face counts too, as printed; the other form
+//! measures each point against the nearest surface face of its tetrahedron.
 //!
 //! # When not to use it
-//! Wherever the tool goes deeper than one layer of tetrahedra: a point in an inner tetrahedron adds no depth, so deeper can read
-//! shallower, and the depth jumps at every border. Kept for comparison.
+//! Wherever the tool goes deeper than one layer of tetrahedra: a point in an inner tetrahedron adds
+//! no depth, so deeper can read shallower, and the depth jumps at every border. Kept for
+//! comparison.
 
 use super::Answer;
 use crate::{

@@ -1,12 +1,15 @@
 //! The tool's shaft against the moving surface: a row of balls along its axis.
 //!
 //! # Theory
-//! The axis behind the tip is sampled every half shaft radius r, so that the row lies within 0.04 r of the cylinder. Each sample is a ball: outside, its
-//! depth is `r - |c - q|` with q the closest surface point; inside, `r + |c - q|`. The contact is the depth-weighted mean of the directions out of the tissue, its depth
-//! that of the deepest sample, its load lies on the nodes under the samples by their depths.
+//! The axis behind the tip is sampled every half shaft radius r, so that the row lies within 0.04 r
+//! of the cylinder. Each sample is a ball: outside, its depth is `r - |c - q|` with q the closest
+//! surface point; inside, `r + |c - q|`. The contact is the depth-weighted mean of the directions
+//! out of the tissue, its depth that of the deepest sample, its load lies on the nodes under the
+//! samples by their depths.
 //!
 //! # Practice
-//! Samples far from the tissue cost a comparison of boxes for every eight of them. Which samples are inside is found by a walk of their own.
+//! Samples far from the tissue cost a comparison of boxes for every eight of them. Which samples
+//! are inside is found by a walk of their own.
 //!
 //! # When not to use it
 //! For a shaft that has pierced the tissue: it is pushed back the way it came.
@@ -63,7 +66,8 @@ impl Shaft {
         self.walk.reset();
     }
 
-    /// The contact of the whole shaft and its nodal spring; nothing when it is free. `overflow` counts what did not fit.
+    /// The contact of the whole shaft and its nodal spring; nothing when it is free. `overflow`
+    /// counts what did not fit.
     pub(crate) fn respond(
         &mut self,
         scene: &Scene,
@@ -102,7 +106,8 @@ impl Shaft {
         }
     }
 
-    /// Closest surface point, direction out of the tissue, and depth of one sample; `None` when it is free.
+    /// Closest surface point, direction out of the tissue, and depth of one sample; `None` when it
+    /// is free.
     fn sample(&self, k: usize, scene: &Scene, surface: &mut MovingSurface) -> Option<(Foot, Vec3, f32)> {
         let c = self.points[k];
         let inside = self.hits.tet[k] != NONE;

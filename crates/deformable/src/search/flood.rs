@@ -72,7 +72,8 @@ impl Flood {
     }
 }
 
-/// Box that a flood passes through: one with a NaN corner is passed always, since its place is unknown.
+/// Box that a flood passes through: one with a NaN corner is passed always, since its place is
+/// unknown.
 pub(crate) fn passage(scene: &Scene, tet: u32) -> Extent {
     let bounds = box_of(scene.positions, &scene.tets[tet as usize]);
     if bounds == Extent::EMPTY { Extent::EVERYWHERE } else { bounds }

@@ -1,4 +1,5 @@
-//! Points that still look for their tetrahedron, coordinate by coordinate, so that eight are compared with a box at once.
+//! Points that still look for their tetrahedron, coordinate by coordinate, so that eight are
+//! compared with a box at once.
 
 use crate::extent::Extent;
 use glam::Vec3A;

@@ -1,11 +1,12 @@
-//! The searches behind [`Method`](crate::Method): each fills, for every tool point, the tetrahedron that holds it.
+//! The searches behind [`Method`](crate::Method): each fills, for every tool point, the tetrahedron
+//! that holds it.
 
 mod brute;
+mod degenerate;
 mod flood;
 mod lost;
 mod phased;
 mod thesis;
-mod unsound;
 mod walk;
 
 pub(crate) use walk::Walk;

@@ -1,9 +1,12 @@
-//! The thesis's search: first colliding tetrahedron from the last one found, then its neighbours and theirs.
+//! The thesis's search: first colliding tetrahedron from the last one found, then its neighbours
+//! and theirs.
 //!
 //! # Theory
-//! Chapter 4.2.2 in its improved form (4.4.1). Points go into the uniform grid, the boxes of all tetrahedra are updated, the colliding
-//! box of tool and tissue is formed; when it is empty the step ends. Else tetrahedra are tried from the last one found onwards until one holds a
-//! point: box test, then barycentric coordinates. After that only its face neighbours and theirs are tried.
+//! Chapter 4.2.2 in its improved form (4.4.1). Points go into the uniform grid, the boxes of all
+//! tetrahedra are updated, the colliding box of tool and tissue is formed; when it is empty the
+//! step ends. Else tetrahedra are tried from the last one found onwards until one holds a point:
+//! box test, then barycentric coordinates. After that only its face neighbours and theirs are
+//! tried.
 //!
 //! ```text
 //!      . . 2 . .        1  first found
@@ -12,8 +15,9 @@
 //! ```
 //!
 //! # When not to use it
-//! With a tool larger than two rings of tetrahedra: points beyond them are missed. For meshes over 22 thousand tetrahedra: all boxes are
-//! updated at every step, and a lost contact costs a search over all of them.
+//! With a tool larger than two rings of tetrahedra: points beyond them are missed. For meshes over
+//! 22 thousand tetrahedra: all boxes are updated at every step, and a lost contact costs a search
+//! over all of them.
 
 use crate::{
     broad::{PointCells, box_of},

@@ -1,30 +1,36 @@
 //! Points that keep their tetrahedron and walk on through neighbours in the moving mesh.
 //!
 //! # Theory
-//! A point that was in a tetrahedron is, a millisecond later, in it or in one close by: step across the face with the most negative
-//! barycentric coordinate until all are 0 or more (Guibas and Stolfi's walk). A point that leaves through the border, walks in a circle or had no
-//! tetrahedron is lost. Let R be the box of the lost points. A flood through faces reaches tetrahedra that meet R, from three kinds of seeds in R: border triangles,
-//! unsound tetrahedra (`unsound.rs`), tetrahedra that hold a point.
+//! A point that was in a tetrahedron is, a millisecond later, in it or in one close by: step across
+//! the face with the most negative barycentric coordinate until all are 0 or more (Guibas and
+//! Stolfi's walk). A point that leaves through the border, walks in a circle or had no tetrahedron
+//! is lost. Let R be the box of the lost points. A flood through faces reaches tetrahedra that meet
+//! R, from three kinds of seeds in R: border triangles, degenerate tetrahedra (`degenerate.rs`),
+//! tetrahedra that hold a point.
 //!
-//! *Nothing is missed.* Let C be a set of tetrahedra that meet R, connected through faces inside R, and not reached. Its border does not run through R, so
-//! all points of R are covered by C equally often, upright ones counted +1 and inverted ones -1; and C has no inverted ones, else it would have been
-//! reached. So C covers all of R. Therefore one lost point p says it all: a second flood runs along the ray from p out of the mesh, in a thin box that nothing
-//! covers whole, hence misses nothing, and finds a tetrahedron around p if there is one. If so, R is flooded from there; if not, the lost are outside.
+//! *Nothing is missed.* Let C be a set of tetrahedra that meet R, connected through faces inside R,
+//! and not reached. Its border does not run through R, so all points of R are covered by C equally
+//! often, upright ones counted +1 and inverted ones -1; and C has no inverted ones, else it would
+//! have been reached. So C covers all of R. Therefore one lost point p says it all: a second flood
+//! runs along the ray from p out of the mesh, in a thin box that nothing covers whole, hence misses
+//! nothing, and finds a tetrahedron around p if there is one. If so, R is flooded from there; if
+//! not, the lost are outside.
 //!
 //! ```text
 //!      x   x  ____ →→→→→→→→ ray     o  kept its tetrahedron: walks
-//!   ____o_x__/    surface            x  lost: flood from border and unsound ones in the box of all x
+//!   ____o_x__/    surface            x  lost: flood from border and degenerate ones in the box of all x
 //! ```
 //!
 //! # Practice
-//! A step costs what lies near the tool, one pass over the boxes of the surface and a slice of the rest. The proof asks that the surface's boxes
-//! are not stale ([`crate::TissueStep::stale`]) and that the unsound tetrahedra near the tool are known: for nodes that leap in a mesh of over
+//! A step costs what lies near the tool, one pass over the boxes of the surface and a slice of the
+//! rest. The proof asks that the surface's boxes are not stale ([`crate::TissueStep::stale`]) and
+//! that the degenerate tetrahedra near the tool are known: for nodes that leap in a mesh of over
 //! 2048 tetrahedra that can take some steps.
 //!
 //! # When not to use it
 //! On a large mesh that is torn anew at every step: take a method that looks at all boxes.
 
-use super::{flood::Flood, lost::Lost, unsound::Unsound};
+use super::{degenerate::Degenerate, flood::Flood, lost::Lost};
 use crate::{
     extent::Extent,
     narrow::{Hits, NONE, is_inside},
@@ -40,7 +46,7 @@ pub(crate) struct Walk {
     alone: Lost,
     near: Vec<u32>,
     flood: Flood,
-    unsound: Unsound,
+    degenerate: Degenerate,
 }
 
 /// Most tetrahedra crossed by one point in one step.
@@ -56,30 +62,30 @@ impl Walk {
             alone: Lost::with_capacity(1),
             near: Vec::with_capacity(MAX_SEEDS),
             flood: Flood::over(tets),
-            unsound: Unsound::among(tets),
+            degenerate: Degenerate::among(tets),
         }
     }
 
     pub(crate) fn reset(&mut self) {
         self.last.fill(NONE);
-        self.unsound.alarm();
+        self.degenerate.alarm();
     }
 
     pub(crate) fn find(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
         if surface.stale > 0 {
-            self.unsound.alarm();
+            self.degenerate.alarm();
         }
-        self.unsound.watch(scene);
-        hits.overflow += self.unsound.overflow;
+        self.degenerate.watch(scene);
+        hits.overflow += self.degenerate.overflow;
         let all = Extent::of(scene.points);
-        if !all.overlaps(&surface.bounds) && self.unsound.meeting(all).next().is_none() {
+        if !all.overlaps(&surface.bounds) && self.degenerate.meeting(all).next().is_none() {
             return self.last.fill(NONE);
         }
         self.walk_all(scene, hits);
         self.search_lost(scene, surface, hits);
-        if !self.lost.is_empty() && hits.skipped > 0 && !self.unsound.knows(hits.last_skipped) {
-            self.unsound.alarm();
-            self.unsound.watch(scene);
+        if !self.lost.is_empty() && hits.skipped > 0 && !self.degenerate.knows(hits.last_skipped) {
+            self.degenerate.alarm();
+            self.degenerate.watch(scene);
             self.search_lost(scene, surface, hits);
         }
         if !self.lost.is_empty() && self.is_covered(scene, surface, hits) {
@@ -113,22 +119,23 @@ impl Walk {
         self.flood.run(scene, &region, &mut self.lost, hits);
     }
 
-    /// Border triangles and unsound tetrahedra in a region.
+    /// Border triangles and degenerate tetrahedra in a region.
     fn seed(&mut self, region: &Extent, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
         self.flood.begin();
         hits.overflow += surface.gather(scene.positions, region, &mut self.near);
         for &t in &self.near {
             self.flood.reach(surface.tet_of_triangle[t as usize], hits);
         }
-        for tet in self.unsound.meeting(*region) {
+        for tet in self.degenerate.meeting(*region) {
             self.flood.reach(tet, hits);
         }
     }
 
-    /// Whether the lost points lie under a sheet without border near them: one of them tells, along the shortest ray out of the mesh.
+    /// Whether the lost points lie under a sheet without border near them: one of them tells, along
+    /// the shortest ray out of the mesh.
     fn is_covered(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) -> bool {
         let mut all = surface.bounds;
-        all.merge(&self.unsound.bounds());
+        all.merge(&self.degenerate.bounds());
         let (k, ray) = shortest_ray(&self.lost, &all);
         let (i, p) = (self.lost.number(k), self.lost.place(k));
         self.alone.clear();

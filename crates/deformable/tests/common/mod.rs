@@ -32,7 +32,8 @@ impl Random {
     }
 }
 
-/// A block of `cells` cubes of `edge` mm from the origin, each cut into six tetrahedra around its diagonal.
+/// A block of `cells` cubes of `edge` mm from the origin, each cut into six tetrahedra around its
+/// diagonal.
 pub fn block(cells: [usize; 3], edge: f32) -> TetMesh {
     let [nx, ny, nz] = cells.map(|c| c + 1);
     let node = |x: usize, y: usize, z: usize| ((z * ny + y) * nx + x) as u32;

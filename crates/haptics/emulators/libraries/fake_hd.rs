@@ -1,8 +1,10 @@
-//! An emulator of libHD: the same symbols and numbers, up to two devices, one scheduler, and a clock that the test turns.
+//! An emulator of libHD: the same symbols and numbers, up to two devices, one scheduler, and a
+//! clock that the test turns.
 //!
-//! It keeps the library's rules, so that a driver which breaks them fails its test: see `MISUSE`. Frames and values belong to the current
-//! device, a frame begins once per device and tick, devices come and go while the scheduler rests, and one callback serves all: of two, one
-//! would get no force.
+//! It keeps the library's rules, so that a driver which breaks them fails its test: see `MISUSE`.
+//! Frames and values belong to the current device, a frame begins once per device and tick, devices
+//! come and go while the scheduler rests, and one callback serves all: of two, one would get no
+//! force.
 #![allow(non_snake_case)]
 
 #[path = "hd_keys.rs"]

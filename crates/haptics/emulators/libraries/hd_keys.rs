@@ -19,7 +19,8 @@ pub const CALIBRATION: u32 = 6;
 pub const OUTPUT_DOF: u32 = 7;
 /// An error that each end of a frame raises, until it is set to 0.
 pub const ERROR: u32 = 8;
-/// The name that the device answers to: 0 `Default Device`, 1 `Left`, 2 only no name at all, 3 `Right`; -1 for no device.
+/// The name that the device answers to: 0 `Default Device`, 1 `Left`, 2 only no name at all, 3
+/// `Right`; -1 for no device.
 pub const NAME: u32 = 9;
 /// Factor on the transform's columns, as drift.
 pub const DRIFT: u32 = 10;

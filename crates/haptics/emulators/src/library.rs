@@ -3,7 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// A copy of an emulated library of its own: a library that the loader has not seen keeps its own state.
+/// A copy of an emulated library of its own: a library that the loader has not seen keeps its own
+/// state.
 pub struct Library {
     library: libloading::Library,
     path: PathBuf,

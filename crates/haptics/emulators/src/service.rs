@@ -1,4 +1,5 @@
-//! An emulator of the Haply Inverse service: a WebSocket server in this process that answers one for one, and misbehaves on demand.
+//! An emulator of the Haply Inverse service: a WebSocket server in this process that answers one
+//! for one, and misbehaves on demand.
 //!
 //! # Practice
 //! Forces are one-shot, as the service documents them: a connection that ends leaves none.

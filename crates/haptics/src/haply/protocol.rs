@@ -1,7 +1,8 @@
 //! The messages of the Haply Inverse service, version 3.5.
 //!
 //! # Practice
-//! Entries are read one by one: a bad one does not lose the others. A missing array means "no news".
+//! Entries are read one by one: a bad one does not lose the others. A missing array means "no
+//! news".
 //!
 //! # Sources
 //! Haply Inverse SDK documentation: WebSocket protocol, control commands, events.
@@ -93,7 +94,9 @@ pub(super) fn grip(message: &str, wanted: Option<&str>) -> Option<String> {
     wanted.map(str::to_uppercase).or(listed)
 }
 
-/// What a message says about `device` and `grip`, without which any grip will do. A grip in several lists is read once. `None` in its place means that the device is not in a list that is there: gone.
+/// What a message says about `device` and `grip`, without which any grip will do. A grip in several
+/// lists is read once. `None` in its place means that the device is not in a list that is there:
+/// gone.
 pub(super) fn frame(message: &str, device: &str, grip: Option<&str>) -> Result<Option<Frame>, Garbled> {
     let message = object(message)?;
     let mut frame = Frame::default();

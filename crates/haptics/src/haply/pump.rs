@@ -1,8 +1,9 @@
 //! The thread that talks to the service: one message out, one back, at the haptic loop's pace.
 //!
 //! # Practice
-//! The loop's `apply` wakes the thread; a loop that is silent for [`SILENT`] gets no force. A reply later than [`LATE`] cuts
-//! the force, on the wire too, until it comes; without one for [`GONE`] the device is lost.
+//! The loop's `apply` wakes the thread; a loop that is silent for [`SILENT`] gets no force. A reply
+//! later than [`LATE`] cuts the force, on the wire too, until it comes; without one for [`GONE`]
+//! the device is lost.
 
 use super::protocol::{self, Event, Frame};
 use super::websocket::WebSocket;
@@ -36,7 +37,7 @@ pub(super) struct News {
 
 /// What the loop last asked for, N, service axes.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Wish {
+pub(super) struct Command {
     pub number: u64,
     pub force: Vec3,
     /// Age of the pose that it was made for, ms.
@@ -63,7 +64,7 @@ pub(super) struct Pump {
     /// Id of the grip; any where there is none.
     pub grip: Option<String>,
     pub news: Input<News>,
-    pub wishes: Output<Wish>,
+    pub wishes: Output<Command>,
     pub flags: Arc<Flags>,
     pub watch: Watch,
     pub ramp: Ramp,
@@ -116,7 +117,8 @@ impl Pump {
         if wish.force.is_finite() { wish.force * share } else { Vec3::ZERO }
     }
 
-    /// One message out, one back. While the answer is late the service is told once more that no force is wanted: it may still listen.
+    /// One message out, one back. While the answer is late the service is told once more that no
+    /// force is wanted: it may still listen.
     fn exchange(&mut self, force: Vec3) -> io::Result<()> {
         self.socket.send(&protocol::force(&self.device, force))?;
         let mut owed = 1;

@@ -1,8 +1,9 @@
-//! A WebSocket client for a service on the same machine: text messages, one thread, every length bounded.
+//! A WebSocket client for a service on the same machine: text messages, one thread, every length
+//! bounded.
 //!
 //! # Practice
-//! The handshake's nonce is the standard's own example and masks come from a counter: their randomness guards caches
-//! between machines, and there are none on loopback.
+//! The handshake's nonce is the standard's own example and masks come from a counter: their
+//! randomness guards caches between machines, and there are none on loopback.
 //!
 //! # Sources
 //! RFC 6455.

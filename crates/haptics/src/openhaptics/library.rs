@@ -1,11 +1,12 @@
 //! The functions of libHD behind safe methods.
 //!
 //! # Sources
-//! OpenHaptics programmer's guide and API reference (HDAPI 3): names, argument types and numbers only.
+//! OpenHaptics programmer's guide and API reference (HDAPI 3): names, argument types and numbers
+//! only.
 #![expect(unsafe_code, reason = "calls into the vendor's C library")]
 
 use super::codes;
-use super::servo::Rota;
+use super::servo::ServoGroup;
 use crate::DeviceError;
 use crate::dynamic::{Loaded, functions};
 use std::ffi::{CStr, CString, c_char, c_ulong, c_void};
@@ -181,8 +182,9 @@ impl Hd {
         unsafe { (self.functions.hdStartScheduler)() }
     }
 
-    /// Runs `rota` on the library's own thread once per tick, from the scheduler's start until [`Hd::stop`].
-    pub(super) fn schedule(&self, rota: Box<Rota>) -> Scheduled {
+    /// Runs `rota` on the library's own thread once per tick, from the scheduler's start until
+    /// [`Hd::stop`].
+    pub(super) fn schedule(&self, rota: Box<ServoGroup>) -> Scheduled {
         let data = Box::into_raw(rota);
         // SAFETY: `data` stays allocated until `stop`, which first stops the scheduler.
         let handle = unsafe { (self.functions.hdScheduleAsynchronous)(tick, data.cast(), codes::MAX_PRIORITY) };
@@ -190,8 +192,9 @@ impl Hd {
     }
 
     /// Stops the scheduler, which waits for a running callback, and takes the rota back.
-    pub(super) fn stop(&self, scheduled: Scheduled) -> Box<Rota> {
-        // SAFETY: after these two calls the library does not use `data` any more; it came from a box in `schedule`.
+    pub(super) fn stop(&self, scheduled: Scheduled) -> Box<ServoGroup> {
+        // SAFETY: after these two calls the library does not use `data` any more; it came from a
+        // box in `schedule`.
         unsafe {
             (self.functions.hdStopScheduler)();
             (self.functions.hdUnschedule)(scheduled.handle);
@@ -203,16 +206,17 @@ impl Hd {
 /// A rota in the library's hands.
 pub(super) struct Scheduled {
     handle: c_ulong,
-    data: *mut Rota,
+    data: *mut ServoGroup,
 }
 
-// SAFETY: the pointer is only turned back into the box that it came from, and `Rota` is `Send`.
+// SAFETY: the pointer is only turned back into the box that it came from, and `ServoGroup` is
+// `Send`.
 unsafe impl Send for Scheduled {}
 
 /// What the library calls once per tick.
 extern "system" fn tick(data: *mut c_void) -> u32 {
     // SAFETY: `data` is the rota given to `schedule`, which nobody else touches until `stop`.
-    let rota = unsafe { &mut *data.cast::<Rota>() };
+    let rota = unsafe { &mut *data.cast::<ServoGroup>() };
     rota.tick()
 }
 

@@ -1,12 +1,13 @@
 //! The one scheduler of libHD, which all its devices share.
 //!
 //! # Practice
-//! Of two callbacks only one gets force, so that one callback serves all devices in turn. Devices come and go while the scheduler rests, as the
-//! maker asks: the others are without force for that moment, then their force ramps in again.
+//! Of two callbacks only one gets force, so that one callback serves all devices in turn. Devices
+//! come and go while the scheduler rests, as the maker asks: the others are without force for that
+//! moment, then their force ramps in again.
 
 use super::codes;
 use super::library::{Hd, Scheduled};
-use super::servo::{Rota, Servo};
+use super::servo::{Servo, ServoGroup};
 use crate::DeviceError;
 use std::sync::{Mutex, PoisonError};
 
@@ -21,8 +22,8 @@ struct Scheduler {
     running: Scheduled,
 }
 
-/// Opens one more device while the scheduler rests, and serves it from then on; gives what `open` says of it. `refused` words a scheduler
-/// that does not start.
+/// Opens one more device while the scheduler rests, and serves it from then on; gives what `open`
+/// says of it. `refused` words a scheduler that does not start.
 pub(super) fn add<T>(
     hd: Hd,
     library: &str,
@@ -77,7 +78,7 @@ fn start(hd: Hd, library: &str, mut servos: Vec<Servo>, schedulers: &mut Vec<Sch
         return Ok(());
     }
     servos.iter_mut().for_each(|servo| servo.ramp.restart());
-    let running = hd.schedule(Box::new(Rota { hd, servos }));
+    let running = hd.schedule(Box::new(ServoGroup { hd, servos }));
     schedulers.push(Scheduler { library: library.to_owned(), running });
     hd.set_scheduler_rate(RATE_HZ);
     hd.drain_errors(); // A rate that the link cannot have leaves the default, which is 1 kHz.

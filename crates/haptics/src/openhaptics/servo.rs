@@ -1,8 +1,10 @@
-//! What runs on libHD's own thread, once per millisecond: sense, publish, command, for one device after the other.
+//! What runs on libHD's own thread, once per millisecond: sense, publish, command, for one device
+//! after the other.
 //!
 //! # Practice
-//! The force is what the haptic loop last asked for, as long as that is younger than [`SILENT_TICKS`] ticks and was thought out for a pose
-//! younger than [`STALE_MS`]: neither a loop that died nor a pause of the library leaves its last force on the motors. After any fault the
+//! The force is what the haptic loop last asked for, as long as that is younger than
+//! [`SILENT_TICKS`] ticks and was thought out for a pose younger than [`STALE_MS`]: neither a loop
+//! that died nor a pause of the library leaves its last force on the motors. After any fault the
 //! force rests, then ramps in. A device that is lost leaves the others alone.
 
 use super::codes;
@@ -39,7 +41,7 @@ pub(super) struct Command {
 }
 
 /// All devices of the library, served one after the other.
-pub(super) struct Rota {
+pub(super) struct ServoGroup {
     pub hd: Hd,
     pub servos: Vec<Servo>,
 }
@@ -61,7 +63,7 @@ pub(super) struct Servo {
     lost: bool,
 }
 
-impl Rota {
+impl ServoGroup {
     /// One tick; says whether the library shall call again.
     pub(super) fn tick(&mut self) -> u32 {
         for place in 0..self.servos.len() {
@@ -113,7 +115,7 @@ impl Servo {
         let calibrated = self.calibrate(hd);
         hd.begin_frame(self.device);
         self.sense(hd);
-        self.given = self.wanted(calibrated);
+        self.given = self.desired_wrench(calibrated);
         let wrench = self.given;
         hd.set_vector(codes::CURRENT_FORCE, wrench.force.to_array().map(f64::from));
         if self.drives_torque {
@@ -123,7 +125,8 @@ impl Servo {
         hd.end_frame(self.device);
     }
 
-    /// Whether the device knows where it is; if not, helps it to, once the force is gone: its position jumps.
+    /// Whether the device knows where it is; if not, helps it to, once the force is gone: its
+    /// position jumps.
     fn calibrate(&mut self, hd: &Hd) -> bool {
         match hd.check_calibration() {
             codes::CALIBRATION_OK => return true,
@@ -148,8 +151,9 @@ impl Servo {
         };
     }
 
-    /// The newest command, or nothing when it is old, when there is a fault, or part of it after one.
-    fn wanted(&mut self, calibrated: bool) -> Wrench {
+    /// The newest command, or nothing when it is old, when there is a fault, or part of it after
+    /// one.
+    fn desired_wrench(&mut self, calibrated: bool) -> Wrench {
         let command = *self.commands.read();
         if command.number != self.last_command {
             (self.last_command, self.silent_ticks) = (command.number, 0);

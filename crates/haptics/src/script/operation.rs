@@ -74,13 +74,15 @@ pub struct Plan {
     pub breakthrough_mm: f32,
     /// How far the burr's foremost point stays from the brain where there is room, mm.
     pub burr_clearance_mm: f32,
-    /// How far the burr's foremost point may go into the brain to make a hole that the probe fits through, mm.
+    /// How far the burr's foremost point may go into the brain to make a hole that the probe fits
+    /// through, mm.
     pub burr_overlap_mm: f32,
     /// Radius of the aspirator's tip, mm.
     pub aspirator_radius_mm: f32,
     /// How deep each press of the probe goes into the brain, mm.
     pub presses_mm: [f32; 3],
-    /// Where the craniotome runs around a flap, closed from the last to the first; empty for a circle of 10 mm on flat bone.
+    /// Where the craniotome runs around a flap, closed from the last to the first; empty for a
+    /// circle of 10 mm on flat bone.
     pub outline: Vec<Rim>,
     /// How far the centre of the craniotome's foot runs below the bone, mm.
     pub foot_mm: f32,
@@ -107,8 +109,9 @@ impl Default for Plan {
 impl Plan {
     /// Where the burr's centre ends, mm below the entry.
     ///
-    /// It goes `breakthrough_mm` past the bone, unless the brain is nearer; then it stops before the brain, unless the hole
-    /// at the bone's inner side would be too narrow for the probe; then it goes on, into the brain by the overlap at most.
+    /// It goes `breakthrough_mm` past the bone, unless the brain is nearer; then it stops before
+    /// the brain, unless the hole at the bone's inner side would be too narrow for the probe; then
+    /// it goes on, into the brain by the overlap at most.
     pub fn burr_depth_mm(&self, site: &Site) -> f32 {
         const ROOM_MM: f32 = 0.5;
         let wanted = site.bone_mm + self.breakthrough_mm;
@@ -157,7 +160,8 @@ fn craniotomy(site: &Site, plan: &Plan) -> Vec<Move> {
     ]
 }
 
-/// Beside the burr, with the shaft leaning away from it: rests on the bone, follows towards the hole, lifts off and leaves.
+/// Beside the burr, with the shaft leaning away from it: rests on the bone, follows towards the
+/// hole, lifts off and leaves.
 fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     const LEAN_RAD: f32 = 0.5;
     let outward = -site.inward.normalize();
@@ -182,7 +186,8 @@ fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     path
 }
 
-/// A burr hole at the rim, the craniotome from there around the flap, the flap lifted, the brain pressed in the middle.
+/// A burr hole at the rim, the craniotome from there around the flap, the flap lifted, the brain
+/// pressed in the middle.
 fn flap(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     let outline = if plan.outline.is_empty() { circle(site) } else { plan.outline.clone() };
     let gap_mm = site.brain_mm - site.bone_mm;

@@ -15,7 +15,8 @@ pub struct Waypoint {
     pub buttons: Buttons,
 }
 
-/// A way through waypoints in one orientation. There is at least one waypoint and times never decrease.
+/// A way through waypoints in one orientation. There is at least one waypoint and times never
+/// decrease.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
     waypoints: Vec<Waypoint>,

@@ -1,12 +1,14 @@
-//! Bytes to a record; any bytes, without a panic or an allocation beyond the strings that they hold.
+//! Bytes to a record; any bytes, without a panic or an allocation beyond the strings that they
+//! hold.
 
 use super::{Fields, Nested, Visit, wire_type};
 
 /// Field numbers below this are looked at, others skipped.
 const MAX_FIELDS: usize = 32;
 
-/// The record in `bytes`; `None` when they are not a whole message or hold a field of another type. Fields that are
-/// missing keep their default, unknown ones are skipped, so files of earlier and later versions stay readable.
+/// The record in `bytes`; `None` when they are not a whole message or hold a field of another type.
+/// Fields that are missing keep their default, unknown ones are skipped, so files of earlier and
+/// later versions stay readable.
 pub(crate) fn decode<T: Fields>(bytes: &[u8]) -> Option<T> {
     let mut record = T::default();
     let mut decoder = Decoder { values: parse(bytes)?, sound: true };

@@ -1,12 +1,15 @@
-//! Protobuf messages from one list of fields per record: it makes the bytes, reads them back, and describes itself.
+//! Protobuf messages from one list of fields per record: it makes the bytes, reads them back, and
+//! describes itself.
 //!
 //! # Theory
-//! A record lists its fields once, in [`Fields::visit`]. The [`encode`], [`decode`] and [`schema`] visitors walk that
-//! list. Every field is written, zero or not, so that -0.0 keeps its sign, and floats pass as their bits, so that a NaN
-//! keeps its payload: generated proto3 code drops the first.
+//! A record lists its fields once, in [`Fields::visit`]. The [`encode`], [`decode`] and [`schema`]
+//! visitors walk that list. Every field is written, zero or not, so that -0.0 keeps its sign, and
+//! floats pass as their bits, so that a NaN keeps its payload: generated proto3 code drops the
+//! first.
 //!
 //! # Practice
-//! Records are flat up to one level of nesting; nested messages are shorter than 128 bytes (one length byte).
+//! Records are flat up to one level of nesting; nested messages are shorter than 128 bytes (one
+//! length byte).
 //!
 //! # Sources
 //! Protocol Buffers encoding: <https://protobuf.dev/programming-guides/encoding/>.
@@ -57,7 +60,8 @@ mod tests {
     use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TeacherRecord, TickRecord};
     use proptest::prelude::*;
 
-    /// Bytes of a record that is filled from `seed`, fields of every bit pattern, NaN and -0.0 included.
+    /// Bytes of a record that is filled from `seed`, fields of every bit pattern, NaN and -0.0
+    /// included.
     fn round_trip<T: Fields>(seed: u64) -> (Vec<u8>, Vec<u8>) {
         let mut record = T::default();
         record.visit(&mut Noise(seed));

@@ -1,7 +1,9 @@
-//! A record's description as a protobuf `FileDescriptorSet`, which viewers read from the file itself.
+//! A record's description as a protobuf `FileDescriptorSet`, which viewers read from the file
+//! itself.
 //!
 //! # Sources
-//! `google/protobuf/descriptor.proto`; MCAP's registry of schema encodings: <https://mcap.dev/spec/registry>.
+//! `google/protobuf/descriptor.proto`; MCAP's registry of schema encodings:
+//! <https://mcap.dev/spec/registry>.
 
 use super::encode::{put_bytes, put_number};
 use super::{Fields, Nested, Visit};

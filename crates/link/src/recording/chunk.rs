@@ -6,14 +6,14 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 /// Largest chunk that is read, unpacked; ours have 256 KiB and one record more.
 const MAX_CHUNK_BYTES: u64 = 16 << 20;
 
-/// Bytes that all chunks of a file of `length` bytes may unpack to: recordings shrink about threefold under LZ4, whose
-/// format allows 255-fold.
+/// Bytes that all chunks of a file of `length` bytes may unpack to: recordings shrink about
+/// threefold under LZ4, whose format allows 255-fold.
 pub(super) fn budget(length: usize) -> u64 {
     (length as u64).saturating_mul(32).max(MAX_CHUNK_BYTES)
 }
 
-/// Calls `each` with opcode and body of the records in a chunk. `None` when anything is wrong; `each` may have been
-/// called by then.
+/// Calls `each` with opcode and body of the records in a chunk. `None` when anything is wrong;
+/// `each` may have been called by then.
 pub(super) fn unpack(
     chunk: &Record<'_>,
     budget: &mut u64,

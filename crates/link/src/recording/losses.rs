@@ -1,8 +1,9 @@
 //! What a recording lacks of its session: where the file is damaged, which ticks are missing.
 //!
 //! # Theory
-//! A file says in three places how many ticks there were: chunks carry checksums, so that damage is found where it is;
-//! the index at the end counts the messages of each topic; and ticks are numbered without gaps.
+//! A file says in three places how many ticks there were: chunks carry checksums, so that damage is
+//! found where it is; the index at the end counts the messages of each topic; and ticks are
+//! numbered without gaps.
 
 use super::scan::{Cursor, index};
 use super::{Reading, Recording};
@@ -10,8 +11,8 @@ use super::{Reading, Recording};
 /// Where a file is cut or damaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Damage {
-    /// The byte at which reading ended; `None` where every chunk is sound and yet the checksum of the file does not
-    /// hold: then its header may have been changed.
+    /// The byte at which reading ended; `None` where every chunk is sound and yet the checksum of
+    /// the file does not hold: then its header may have been changed.
     pub at_byte: Option<u64>,
     /// Length of the file, bytes.
     pub of_bytes: u64,
@@ -20,7 +21,8 @@ pub struct Damage {
 }
 
 impl Damage {
-    /// Of a file that was read up to its regular `end` (`Ok`) or to where it makes no sense (`Err`).
+    /// Of a file that was read up to its regular `end` (`Ok`) or to where it makes no sense
+    /// (`Err`).
     pub(super) fn of(bytes: &[u8], end: Result<usize, usize>, ticks: u64) -> Option<Self> {
         let indexed_ticks = indexed_ticks(bytes);
         let at_byte = match end {
@@ -53,7 +55,8 @@ fn indexed_ticks(bytes: &[u8]) -> Option<u64> {
     Some(counts.iter().filter(|count| is_tick(&count.channel)).map(|count| count.messages).sum())
 }
 
-/// Numbers that are missing in a row that ought to have none missing: the first such, and how many in all.
+/// Numbers that are missing in a row that ought to have none missing: the first such, and how many
+/// in all.
 struct Gap {
     from: u64,
     to: u64,
@@ -76,7 +79,8 @@ impl Gap {
 }
 
 impl Recording {
-    /// Ticks that the session had, as far as the file says: read, missing between those, and counted in its index.
+    /// Ticks that the session had, as far as the file says: read, missing between those, and
+    /// counted in its index.
     pub fn promised_ticks(&self) -> u64 {
         let missing = self.missing_ticks().map_or(0, |gap| gap.missing);
         let indexed = self.damage.and_then(|damage| damage.indexed_ticks).unwrap_or(0);

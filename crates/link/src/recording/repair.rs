@@ -1,9 +1,9 @@
 //! Makes a sound file of a cut or damaged one, so that other programs open it too.
 //!
 //! # Practice
-//! Every sound chunk is copied message by message, with its times, topics and schemas, also those behind a damaged one;
-//! the index is made anew. [`crate::Recording::losses`] of the repaired file tells what is missing in between, and what
-//! was lost before.
+//! Every sound chunk is copied message by message, with its times, topics and schemas, also those
+//! behind a damaged one; the index is made anew. [`crate::Recording::losses`] of the repaired file
+//! tells what is missing in between, and what was lost before.
 
 use super::scan::{Cursor, Record, index};
 use super::{Recording, chunk};
@@ -23,7 +23,8 @@ pub struct Repaired {
     pub was_whole: bool,
 }
 
-/// Copies what is sound of the recording `from` to the new file `to`, which appears whole or not at all.
+/// Copies what is sound of the recording `from` to the new file `to`, which appears whole or not at
+/// all.
 pub fn repair(from: &Path, to: &Path) -> Result<Repaired, LinkError> {
     let bytes = super::bytes_of(from)?;
     let body = bytes.strip_prefix(mcap::MAGIC).ok_or_else(|| LinkError::NotARecording { path: from.to_owned() })?;
@@ -62,7 +63,8 @@ struct Copy {
 }
 
 impl Copy {
-    /// Copies records up to the regular end, passing over what is damaged. Says whether nothing was.
+    /// Copies records up to the regular end, passing over what is damaged. Says whether nothing
+    /// was.
     fn walk(&mut self, body: &[u8], mut budget: u64) -> Result<bool, McapError> {
         let (mut rest, mut whole) = (Cursor(body), true);
         loop {

@@ -1,12 +1,14 @@
 //! Abaqus input files (`.inp`): their nodes and tetrahedra.
 //!
 //! # Theory
-//! Keyword lines start with `*`, comments with `**`; data rows follow, with commas. `*NODE` has "number, x, y, z", `*ELEMENT, TYPE=C3D4` has "number, a, b, c, d"; a row
-//! that ends in a comma goes on in the next.
+//! Keyword lines start with `*`, comments with `**`; data rows follow, with commas. `*NODE` has
+//! "number, x, y, z", `*ELEMENT, TYPE=C3D4` has "number, a, b, c, d"; a row that ends in a comma
+//! goes on in the next.
 //!
 //! # Practice
-//! Reads C3D4 and the corners of C3D10 (with their variants: C3D10M, C3D4H …); other elements, sets, materials and steps are left out, one part is assumed.
-//! Writes nodes, elements and nothing else. Positions are mm; corner order is ours.
+//! Reads C3D4 and the corners of C3D10 (with their variants: C3D10M, C3D4H …); other elements,
+//! sets, materials and steps are left out, one part is assumed. Writes nodes, elements and nothing
+//! else. Positions are mm; corner order is ours.
 //!
 //! # Sources
 //! Abaqus Keywords Reference Guide: *NODE, *ELEMENT.
@@ -16,7 +18,8 @@ use crate::file::numbered::Numbered;
 use crate::file::{FileError, Reader, write_atomically};
 use std::path::Path;
 
-/// Reads the tetrahedra of an Abaqus file. Indices are checked; call [`TetMesh::check`] for the rest.
+/// Reads the tetrahedra of an Abaqus file. Indices are checked; call [`TetMesh::check`] for the
+/// rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(path)?)
 }

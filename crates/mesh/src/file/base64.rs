@@ -1,4 +1,5 @@
-//! Base64 (RFC 4648) as VTK uses it: several encodings may follow one another, each with its own padding.
+//! Base64 (RFC 4648) as VTK uses it: several encodings may follow one another, each with its own
+//! padding.
 
 const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 

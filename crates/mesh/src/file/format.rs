@@ -1,7 +1,8 @@
 //! Any mesh file: which format it is, and the reader or writer for it.
 //!
 //! # Practice
-//! Reading goes by content first, since `.mesh`, `.msh` and `.vtk` mean different things to different programs; writing goes by the name's ending.
+//! Reading goes by content first, since `.mesh`, `.msh` and `.vtk` mean different things to
+//! different programs; writing goes by the name's ending.
 
 use crate::file::{FileError, Reader};
 use crate::{TetMesh, TriMesh, abaqus, gmsh, medit, obj, ply, stl, tetgen, vtk, vtu};
@@ -14,7 +15,8 @@ const VOLUME_FORMATS: &str =
 
 const SURFACE_FORMATS: &str = ".stl, .obj or .ply";
 
-/// Reads tetrahedra from a file of any known format. Indices are checked; call [`TetMesh::check`] for the rest.
+/// Reads tetrahedra from a file of any known format. Indices are checked; call [`TetMesh::check`]
+/// for the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     let ending = ending(path);
     if ["node", "ele"].contains(&ending.as_str()) {

@@ -1,12 +1,15 @@
 //! Gmsh files (`.msh`), versions 1, 2.2 and 4.1, text and binary.
 //!
 //! # Theory
-//! Sections between `$Name` and `$EndName` (`$NOD` and `$ELM` in version 1). Nodes and elements carry their own numbers. Version 2.2 gives each element its type and tags; version 4.1 groups both
-//! by geometric entity. Element type 4 is the 4-node tetrahedron, 11 the 10-node one. Binary files hold little-endian i32, u64 and f64 after the counts.
+//! Sections between `$Name` and `$EndName` (`$NOD` and `$ELM` in version 1). Nodes and elements
+//! carry their own numbers. Version 2.2 gives each element its type and tags; version 4.1 groups
+//! both by geometric entity. Element type 4 is the 4-node tetrahedron, 11 the 10-node one. Binary
+//! files hold little-endian i32, u64 and f64 after the counts.
 //!
 //! # Practice
-//! Tetrahedra are kept (of type 11 the corners), other elements and all tags left out. Writes 2.2 as text, with digits that give the same f32 back. Positions are mm;
-//! corner order is ours. Version 4.0 is refused by name.
+//! Tetrahedra are kept (of type 11 the corners), other elements and all tags left out. Writes 2.2
+//! as text, with digits that give the same f32 back. Positions are mm; corner order is ours.
+//! Version 4.0 is refused by name.
 //!
 //! # Sources
 //! C. Geuzaine, J.-F. Remacle: Gmsh reference manual, sections MSH file format.
@@ -194,7 +197,8 @@ impl Gmsh {
         let count = self.count_line("the count of $Elements", 8, 12)?;
         let mut read = 0;
         while read < count {
-            // Text has one header for each element: number, type, tags; binary one for several: type, how many, tags.
+            // Text has one header for each element: number, type, tags; binary one for several:
+            // type, how many, tags.
             let [first, second, tags] = self.entity("the header of an element")?;
             let (kind, elements) = if self.binary { (first, second) } else { (second, 1) };
             let elements = self.reader.checked_count("the elements under a header", elements, 4)?;

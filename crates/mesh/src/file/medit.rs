@@ -1,11 +1,13 @@
 //! Medit text files (`.mesh`) of tetrahedra.
 //!
 //! # Theory
-//! A list of sections, each a keyword, a count and that many rows: `Vertices` (x y z reference) and `Tetrahedra` (four nodes from 1, reference). What else
-//! there is (triangles, corners, ridges) is numbers up to the next keyword.
+//! A list of sections, each a keyword, a count and that many rows: `Vertices` (x y z reference) and
+//! `Tetrahedra` (four nodes from 1, reference). What else there is (triangles, corners, ridges) is
+//! numbers up to the next keyword.
 //!
 //! # Practice
-//! Reads the text form, dimension 3; references are left out. Writes version 2 with as many digits as give the same f32 back. Positions are mm; corner order is ours.
+//! Reads the text form, dimension 3; references are left out. Writes version 2 with as many digits
+//! as give the same f32 back. Positions are mm; corner order is ours.
 //!
 //! # Sources
 //! P. Frey: MEDIT, an interactive mesh visualization software, INRIA RT-0253, 2001.

@@ -1,8 +1,10 @@
-//! What all mesh files share: errors that name file, field and remedy, a reader that never trusts a count, and writing without leaving half a file.
+//! What all mesh files share: errors that name file, field and remedy, a reader that never trusts a
+//! count, and writing without leaving half a file.
 //!
 //! # Practice
-//! A file is read whole. A count in a header is compared with the bytes that are left before anything is allocated for it, so a
-//! header cannot ask for more than a few times the file's own size. A new file is written beside its place and then renamed.
+//! A file is read whole. A count in a header is compared with the bytes that are left before
+//! anything is allocated for it, so a header cannot ask for more than a few times the file's own
+//! size. A new file is written beside its place and then renamed.
 
 pub mod abaqus;
 mod base64;
@@ -166,7 +168,8 @@ impl Reader {
         word.parse().map_err(|_| self.error(field, &word, wanted))
     }
 
-    /// The next word as a count of things that each take at least `bytes_each` in the rest of the file.
+    /// The next word as a count of things that each take at least `bytes_each` in the rest of the
+    /// file.
     pub(crate) fn count(&mut self, field: &str, bytes_each: usize) -> Result<usize, FileError> {
         let count: u64 = self.number(field, "a count")?;
         self.checked_count(field, count, bytes_each)
@@ -255,7 +258,8 @@ impl Reader {
     }
 }
 
-/// Writes a file under a temporary name in the same folder, then renames it: the old file, or the whole new one.
+/// Writes a file under a temporary name in the same folder, then renames it: the old file, or the
+/// whole new one.
 pub(crate) fn write_atomically(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -288,8 +292,9 @@ pub(crate) mod tests {
         mesh
     }
 
-    /// Feeds a parser thousands of damaged copies of a good file: cut, bytes changed, bytes lost, numbers swapped for others. It may refuse or read them, but must
-    /// not panic, and a refusal must name the file.
+    /// Feeds a parser thousands of damaged copies of a good file: cut, bytes changed, bytes lost,
+    /// numbers swapped for others. It may refuse or read them, but must not panic, and a refusal
+    /// must name the file.
     pub(crate) fn survive_mutations<T>(good: &[u8], parse: impl Fn(Reader) -> Result<T, FileError>) {
         let mut random = 0x2545_F491_4F6C_DD1Du64;
         let mut next = |n: usize| {

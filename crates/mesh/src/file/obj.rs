@@ -1,10 +1,12 @@
 //! Wavefront OBJ surfaces (`.obj`).
 //!
 //! # Theory
-//! `v x y z` is a vertex, `f a b c …` a polygon of vertex numbers from 1, or from the last one backwards when negative; `a/t/n` adds texture and normal.
+//! `v x y z` is a vertex, `f a b c …` a polygon of vertex numbers from 1, or from the last one
+//! backwards when negative; `a/t/n` adds texture and normal.
 //!
 //! # Practice
-//! Polygons become fans of triangles; texture, normals, groups and materials are left out. Writes vertices and triangles with digits that give the same f32 back.
+//! Polygons become fans of triangles; texture, normals, groups and materials are left out. Writes
+//! vertices and triangles with digits that give the same f32 back.
 
 use crate::TriMesh;
 use crate::file::{FileError, Reader, write_atomically};

@@ -1,11 +1,13 @@
 //! STL surfaces (`.stl`).
 //!
 //! # Theory
-//! Triangles without shared vertices: as text (`solid … facet normal … vertex …`), or 80 bytes of anything, a little-endian count and 50 bytes for each.
+//! Triangles without shared vertices: as text (`solid … facet normal … vertex …`), or 80 bytes of
+//! anything, a little-endian count and 50 bytes for each.
 //!
 //! # Practice
-//! Both are read, told apart by size and not by the word `solid`, which binary files start with too. Corners at the same place become one vertex; normals
-//! are left out, since the corner order says them. Writes binary. Positions are mm; STL has no unit.
+//! Both are read, told apart by size and not by the word `solid`, which binary files start with
+//! too. Corners at the same place become one vertex; normals are left out, since the corner order
+//! says them. Writes binary. Positions are mm; STL has no unit.
 
 use crate::TriMesh;
 use crate::file::{FileError, Reader, write_atomically};

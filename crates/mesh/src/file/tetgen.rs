@@ -1,12 +1,14 @@
 //! TetGen files: nodes in `.node`, tetrahedra in `.ele`.
 //!
 //! # Theory
-//! `.node`: a row "count 3 attributes markers", then "number x y z …" for each node. `.ele`: "count corners attributes", then "number a b c d …". Numbers
-//! start at 0 or 1, whichever the first node has. `#` starts a comment.
+//! `.node`: a row "count 3 attributes markers", then "number x y z …" for each node. `.ele`: "count
+//! corners attributes", then "number a b c d …". Numbers start at 0 or 1, whichever the first node
+//! has. `#` starts a comment.
 //!
 //! # Practice
-//! Give either file; the other lies beside it. Attributes and markers are left out, of 10-node elements the corners are taken. Corner order is ours; a file
-//! whose elements are all negative has the other order and is turned. Writes numbers from 1 and digits that give the same f32 back.
+//! Give either file; the other lies beside it. Attributes and markers are left out, of 10-node
+//! elements the corners are taken. Corner order is ours; a file whose elements are all negative has
+//! the other order and is turned. Writes numbers from 1 and digits that give the same f32 back.
 //!
 //! # Sources
 //! H. Si: TetGen 1.5 manual, section 5.2.

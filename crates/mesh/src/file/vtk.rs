@@ -1,12 +1,14 @@
 //! Legacy VTK files (`.vtk`) of tetrahedra.
 //!
 //! # Theory
-//! Four header lines, then `POINTS`, `CELLS` and `CELL_TYPES` of an unstructured grid, as text or as big-endian binary. Up to version 4 a cell is a count and its
-//! nodes in one list; version 5 splits that into `OFFSETS` and `CONNECTIVITY`. Cell type 10 is the 4-node tetrahedron.
+//! Four header lines, then `POINTS`, `CELLS` and `CELL_TYPES` of an unstructured grid, as text or
+//! as big-endian binary. Up to version 4 a cell is a count and its nodes in one list; version 5
+//! splits that into `OFFSETS` and `CONNECTIVITY`. Cell type 10 is the 4-node tetrahedron.
 //!
 //! # Practice
-//! Reads both encodings and both layouts; cells of other types are left out, point and cell data are not read. Writes version 3.0, binary, f32, which every
-//! version of VTK reads. Positions are mm; VTK has no unit. Corner order is ours.
+//! Reads both encodings and both layouts; cells of other types are left out, point and cell data
+//! are not read. Writes version 3.0, binary, f32, which every version of VTK reads. Positions are
+//! mm; VTK has no unit. Corner order is ours.
 //!
 //! # Sources
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
@@ -20,12 +22,14 @@ use trepan_geometry::Vec3;
 
 const TETRAHEDRON: u8 = 10;
 
-/// Reads the tetrahedra of a legacy VTK file. Indices are checked; call [`TetMesh::check`] for the rest.
+/// Reads the tetrahedra of a legacy VTK file. Indices are checked; call [`TetMesh::check`] for the
+/// rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
-/// Reads tetrahedra, and nothing else, with the label of each as the first cell data, `label`: what [`write_labelled`] writes.
+/// Reads tetrahedra, and nothing else, with the label of each as the first cell data, `label`: what
+/// [`write_labelled`] writes.
 pub fn read_labelled(path: &Path) -> Result<LabelledMesh, FileError> {
     let mut file = Legacy { reader: Reader::open(path)?, binary: false, offsets: false };
     file.header()?;

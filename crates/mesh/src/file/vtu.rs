@@ -1,13 +1,16 @@
 //! VTK XML files (`.vtu`) of tetrahedra.
 //!
 //! # Theory
-//! An `UnstructuredGrid` with one `Piece`: `Points`, and `Cells` as `connectivity`, `offsets` and `types` (10 is the 4-node tetrahedron). A `DataArray` is text, or base64 between its tags,
-//! or at an offset in `AppendedData` (base64 or raw). Binary data start with their length, or, when compressed, with the number of blocks, the size of a
-//! block and of the last one, and each block's compressed size.
+//! An `UnstructuredGrid` with one `Piece`: `Points`, and `Cells` as `connectivity`, `offsets` and
+//! `types` (10 is the 4-node tetrahedron). A `DataArray` is text, or base64 between its tags, or at
+//! an offset in `AppendedData` (base64 or raw). Binary data start with their length, or, when
+//! compressed, with the number of blocks, the size of a block and of the last one, and each block's
+//! compressed size.
 //!
 //! # Practice
-//! Reads text, base64 and both kinds of appended data, plain or with zlib, both byte orders; cells of other types and all data on points and cells are left out.
-//! Several pieces, LZ4 and LZMA are refused by name. Writes base64, plain, f32. Positions are mm; corner order is ours.
+//! Reads text, base64 and both kinds of appended data, plain or with zlib, both byte orders; cells
+//! of other types and all data on points and cells are left out. Several pieces, LZ4 and LZMA are
+//! refused by name. Writes base64, plain, f32. Positions are mm; corner order is ours.
 //!
 //! # Sources
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
@@ -21,7 +24,8 @@ use trepan_geometry::Vec3;
 
 const TETRAHEDRON: f64 = 10.0;
 
-/// Reads the tetrahedra of a VTK XML file. Indices are checked; call [`TetMesh::check`] for the rest.
+/// Reads the tetrahedra of a VTK XML file. Indices are checked; call [`TetMesh::check`] for the
+/// rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(path)?)
 }

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-/// Smooths with a Gaussian of `sigma` voxels along each axis, cut off at 3 σ; the border value goes on outside.
+/// Smooths with a Gaussian of `sigma` voxels along each axis, cut off at 3 σ; the border value goes
+/// on outside.
 pub(super) fn blur(values: &mut [f32], dims: [usize; 3], sigma: [f64; 3]) {
     for axis in (0..3).filter(|&axis| sigma[axis] > 0.05) {
         let kernel = gaussian(sigma[axis]);

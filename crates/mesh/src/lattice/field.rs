@@ -1,11 +1,13 @@
 //! The distance to the border of one label, smoothed: a function of world space.
 //!
 //! # Theory
-//! The exact distance to the label's surface ([`DistanceField`]), positive inside; a Gaussian of width σ then takes out what a lattice of spacing a ≫ σ could only alias.
-//! On a sheared grid the zero set stays right, the slope does not, and only the zero set matters here.
+//! The exact distance to the label's surface ([`DistanceField`]), positive inside; a Gaussian of
+//! width σ then takes out what a lattice of spacing a ≫ σ could only alias. On a sheared grid the
+//! zero set stays right, the slope does not, and only the zero set matters here.
 //!
 //! # Practice
-//! Only the box of the label, padded, is kept: what touches the grid's border is closed there. 4 bytes a voxel.
+//! Only the box of the label, padded, is kept: what touches the grid's border is closed there. 4
+//! bytes a voxel.
 
 use super::blur::blur;
 use glam::{DAffine3, DVec3};
@@ -63,7 +65,8 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// The distance to the border of what `inside` takes, with a margin for smoothing up to `most_mm`.
+    /// The distance to the border of what `inside` takes, with a margin for smoothing up to
+    /// `most_mm`.
     pub(super) fn of(labels: &VoxelVolume<u16>, block: &Block, most_mm: f64, inside: impl Fn(u16) -> bool) -> Self {
         let spacing_mm = labels.spacing_mm();
         let pad = (most_mm / spacing_mm).to_array().map(|sigma| 2 + (3.0 * sigma).ceil() as usize);

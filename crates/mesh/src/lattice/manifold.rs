@@ -1,9 +1,11 @@
 //! Takes away what keeps a mesh from having one closed surface without pinches.
 //!
 //! # Theory
-//! Where the surface passes through lattice nodes, tetrahedra may meet in an edge or a node only. Around each edge they should form one fan, around each
-//! node one face-connected group with one rim; of several, all but the largest go. Where the group has two rims, a path of
-//! tetrahedra from rim to rim goes. Each round takes tetrahedra away, so it ends; angles of the others stay as they are.
+//! Where the surface passes through lattice nodes, tetrahedra may meet in an edge or a node only.
+//! Around each edge they should form one fan, around each node one face-connected group with one
+//! rim; of several, all but the largest go. Where the group has two rims, a path of tetrahedra from
+//! rim to rim goes. Each round takes tetrahedra away, so it ends; angles of the others stay as they
+//! are.
 
 use super::LabelledMesh;
 use crate::{NONE, TetMesh, Topology};
@@ -127,7 +129,8 @@ impl Star<'_> {
         faces
     }
 
-    /// The tetrahedra around the edge to `other`, in fans that hang together through faces at that edge.
+    /// The tetrahedra around the edge to `other`, in fans that hang together through faces at that
+    /// edge.
     fn fans(&self, other: u32) -> Vec<Vec<u32>> {
         let at_edge = |t: u32| self.mesh.tets[t as usize].contains(&other);
         let tets: Vec<u32> = self.tets.iter().copied().filter(|&t| at_edge(t)).collect();

@@ -1,22 +1,25 @@
 //! Tetrahedra from a mask or a label volume: a warped and cut body-centred cubic lattice.
 //!
 //! # Theory
-//! Isosurface stuffing (Labelle and Shewchuk 2007) on smoothed signed distances, one for each label: cubes are as fine as [`Config`] says, and where labels meet,
-//! the lattice is warped and cut, so that both sides share the triangles of the border. Two kinds of unknowns are found together: the lattice spacing a, from the count
-//! asked for, and for each label the level of its distance at which its border is cut, so that it has the volume of its voxels
-//! (dV/dlevel = area): flat triangles cut off what is convex, and smoothing shrinks it, and the level gives both back. At the end nodes move where that makes
-//! the flattest elements higher.
+//! Isosurface stuffing (Labelle and Shewchuk 2007) on smoothed signed distances, one for each
+//! label: cubes are as fine as [`Config`] says, and where labels meet, the lattice is warped and
+//! cut, so that both sides share the triangles of the border. Two kinds of unknowns are found
+//! together: the lattice spacing a, from the count asked for, and for each label the level of its
+//! distance at which its border is cut, so that it has the volume of its voxels (dV/dlevel = area):
+//! flat triangles cut off what is convex, and smoothing shrinks it, and the level gives both back.
+//! At the end nodes move where that makes the flattest elements higher.
 //!
 //! # Practice
 //! World mm; any affine. The same labels give the same bytes, whatever the number of threads.
 //!
 //! # Sources
-//! F. Labelle, J. R. Shewchuk: Isosurface stuffing, ACM Transactions on Graphics 26(3), 2007.
-//! J. Bronson, J. A. Levine, R. Whitaker: Lattice cleaving, International Meshing Roundtable 21, 2012.
+//! F. Labelle, J. R. Shewchuk: Isosurface stuffing, ACM Transactions on Graphics 26(3), 2007. J.
+//! Bronson, J. A. Levine, R. Whitaker: Lattice cleaving, International Meshing Roundtable 21, 2012.
 //!
 //! # When not to use it
-//! For sharp edges or surfaces that must interpolate given points (they are rounded at the scale of a), and for layers thinner than about 2 a
-//! (they may tear). Where three labels meet, their common line is true to about half of a only.
+//! For sharp edges or surfaces that must interpolate given points (they are rounded at the scale of
+//! a), and for layers thinner than about 2 a (they may tear). Where three labels meet, their common
+//! line is true to about half of a only.
 
 mod blur;
 mod field;
@@ -39,10 +42,12 @@ use trepan_volume::VoxelVolume;
 pub struct Config {
     /// How many tetrahedra to aim at, 100 to 20 million; met within 10 %. More is finer.
     pub target_tets: usize,
-    /// Width of the Gaussian over the distance field, in lattice spacings, 0 to 2. More rounds off what the lattice cannot follow; less keeps it, raggedly.
+    /// Width of the Gaussian over the distance field, in lattice spacings, 0 to 2. More rounds off
+    /// what the lattice cannot follow; less keeps it, raggedly.
     pub smoothing: f64,
-    /// How often the edge of the cubes may double from the borders of labels to the depth of a label, 0 to 6. More follows the borders better for the same count, with
-    /// smaller elements there: an explicit solver's step shrinks with them.
+    /// How often the edge of the cubes may double from the borders of labels to the depth of a
+    /// label, 0 to 6. More follows the borders better for the same count, with smaller elements
+    /// there: an explicit solver's step shrinks with them.
     pub coarsening: u32,
     /// Where borders are followed more finely than elsewhere.
     pub fine: Option<Fine>,
@@ -55,7 +60,8 @@ pub struct Fine {
     pub centre: Vec3,
     /// Its radius, mm, over 0. Beyond it, elements grow over about twice their size.
     pub radius_mm: f32,
-    /// How often the edge of the cubes at a border is halved inside, 1 to 4: 2 makes them four times finer.
+    /// How often the edge of the cubes at a border is halved inside, 1 to 4: 2 makes them four
+    /// times finer.
     pub halvings: u32,
 }
 
@@ -71,7 +77,8 @@ pub struct LabelledMesh {
 }
 
 impl Default for Config {
-    /// A brain for the whole operation: fine enough to deform smoothly, coarse enough for real time on a CPU.
+    /// A brain for the whole operation: fine enough to deform smoothly, coarse enough for real time
+    /// on a CPU.
     fn default() -> Self {
         Self { target_tets: 15_000, smoothing: 0.3, coarsening: 0, fine: None }
     }
@@ -79,15 +86,18 @@ impl Default for Config {
 
 /// Fills the largest 6-connected part of a mask (voxels that are not 0) with tetrahedra.
 ///
-/// The result passes [`TetMesh::check`], is face-connected, and its surface is closed without seams.
+/// The result passes [`TetMesh::check`], is face-connected, and its surface is closed without
+/// seams.
 pub fn tetrahedra(mask: &VoxelVolume<u8>, config: &Config) -> Result<TetMesh, MeshError> {
     labelled(&mask.map(|v| u16::from(v != 0)), config).map(|labelled| labelled.mesh)
 }
 
-/// Fills the largest 6-connected part of what is labelled (voxels that are not 0) with tetrahedra of one label each.
+/// Fills the largest 6-connected part of what is labelled (voxels that are not 0) with tetrahedra
+/// of one label each.
 ///
-/// The mesh is as sound as that of [`tetrahedra`]. Borders between labels follow the voxels as the outer surface does; each label has the volume of its voxels
-/// within 0.2 % or one tetrahedron where the lattice can hold it. A label smaller than some cubes may be lost.
+/// The mesh is as sound as that of [`tetrahedra`]. Borders between labels follow the voxels as the
+/// outer surface does; each label has the volume of its voxels within 0.2 % or one tetrahedron
+/// where the lattice can hold it. A label smaller than some cubes may be lost.
 pub fn labelled(labels: &VoxelVolume<u16>, config: &Config) -> Result<LabelledMesh, MeshError> {
     check_config(config)?;
     let mut regions = Regions::of(labels, |mm3| config.smoothing * search::uniform_spacing(mm3, config.target_tets))?;

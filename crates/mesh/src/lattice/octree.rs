@@ -1,20 +1,24 @@
 //! The background lattice: body-centred cubic, over cubes of one size or of several.
 //!
 //! # Theory
-//! Nodes are the corners and centres of cubes. Between two cubes of one size a tetrahedron takes one edge of their common face and both centres: 12 for each cube,
-//! all congruent, with two long edges (dihedral angle 90°) and four short ones, √3/2 as long (60°).
+//! Nodes are the corners and centres of cubes. Between two cubes of one size a tetrahedron takes
+//! one edge of their common face and both centres: 12 for each cube, all congruent, with two long
+//! edges (dihedral angle 90°) and four short ones, √3/2 as long (60°).
 //!
 //! ```text
 //!   q ───────── q'      centres of two cubes that share a face
 //!    ╲  c ── c' ╱       one edge of that face: the tetrahedron is q q' c c'
 //! ```
 //!
-//! Cubes of several sizes form an octree in which cubes that touch differ by one doubling at the most. Where smaller cubes put a node into the middle of the edge c c', the
-//! tetrahedron is halved there. Where a cube meets a smaller one, the square between them is cut along the diagonal to the middle of the larger
-//! face, and each half is joined to both centres. All angles lie between 45° and 120° (Labelle and Shewchuk 2007, section 4).
+//! Cubes of several sizes form an octree in which cubes that touch differ by one doubling at the
+//! most. Where smaller cubes put a node into the middle of the edge c c', the tetrahedron is halved
+//! there. Where a cube meets a smaller one, the square between them is cut along the diagonal to
+//! the middle of the larger face, and each half is joined to both centres. All angles lie between
+//! 45° and 120° (Labelle and Shewchuk 2007, section 4).
 //!
 //! # Practice
-//! Places are whole numbers of half the smallest edge, so no two tetrahedra disagree about a node. 16 bytes a cube, 12 a node, 16 a tetrahedron.
+//! Places are whole numbers of half the smallest edge, so no two tetrahedra disagree about a node.
+//! 16 bytes a cube, 12 a node, 16 a tetrahedron.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -45,9 +49,11 @@ pub(super) enum Cube {
 }
 
 impl Lattice {
-    /// Covers the box with cubes of edge `spacing · 2^level`, level 0 to `levels`, the middle of the box `shift` spacings (0 to 1) off a corner of the largest.
+    /// Covers the box with cubes of edge `spacing · 2^level`, level 0 to `levels`, the middle of
+    /// the box `shift` spacings (0 to 1) off a corner of the largest.
     ///
-    /// `judge` is given the centre of a cube and its level. Nothing when that takes more than `most` cubes.
+    /// `judge` is given the centre of a cube and its level. Nothing when that takes more than
+    /// `most` cubes.
     pub(super) fn over(
         [min, max]: [DVec3; 2],
         spacing: f64,
@@ -80,7 +86,8 @@ impl Lattice {
         self.halves.iter().map(|h| self.origin + 0.5 * self.spacing * DVec3::from_array(h.map(f64::from))).collect()
     }
 
-    /// Square of the distance of two nodes, in quarters of a squared spacing, exactly; and whether they lie along an axis.
+    /// Square of the distance of two nodes, in quarters of a squared spacing, exactly; and whether
+    /// they lie along an axis.
     pub(super) fn edge(&self, a: u32, b: u32) -> (u64, bool) {
         let [a, b] = [a, b].map(|n| self.halves[n as usize]);
         let by: [u64; 3] = std::array::from_fn(|d| u64::from(a[d].abs_diff(b[d])));
@@ -235,7 +242,8 @@ fn number(nodes: &[u64], halves: [u32; 3]) -> u32 {
     nodes.binary_search(&packed(halves)).unwrap_or_default() as u32
 }
 
-/// The tetrahedra around the line between two centres: one for each edge of the face, two where the edge has a node in its middle.
+/// The tetrahedra around the line between two centres: one for each edge of the face, two where the
+/// edge has a node in its middle.
 fn between_equals(nodes: &[u64], [near, far]: [u32; 2], face: [[u32; 3]; 4]) -> impl Iterator<Item = [u32; 4]> {
     (0..4).flat_map(move |n| {
         let (from, to) = (face[n], face[(n + 1) % 4]);
@@ -246,7 +254,8 @@ fn between_equals(nodes: &[u64], [near, far]: [u32; 2], face: [[u32; 3]; 4]) -> 
     })
 }
 
-/// The four tetrahedra between the centres of a cube and of a larger one, and the halves of the smaller one's face.
+/// The four tetrahedra between the centres of a cube and of a larger one, and the halves of the
+/// smaller one's face.
 fn between_sizes(nodes: &[u64], apexes: [u32; 2], face: [[u32; 3]; 4], larger: [u32; 3]) -> [[u32; 4]; 4] {
     let off = |corner: [u32; 3]| (0..3).map(|d| corner[d].abs_diff(larger[d])).sum::<u32>();
     let first = (0..4).min_by_key(|&n| off(face[n])).unwrap_or(0);

@@ -1,9 +1,13 @@
 //! Moves nodes so that the flattest elements get higher.
 //!
 //! # Theory
-//! The stable step of an explicit solver goes with the smallest height of an element. Where a node has a flat element, steps along the axes are tried, shorter each round;
-//! a node on a border is brought back to it, p ← p − φ ∇φ / |∇φ|²; where three labels meet it stays. A step stays when the smallest height around the node grows and no angle there gets worse than the
-//! worst before. Where an angle is sharp, a step also stays when the worst angle gets better and the height no less. So the worst never gets worse. On a brain the lowest element gets twice as high, and the stable time step twice as long.
+//! The stable step of an explicit solver goes with the smallest height of an element. Where a node
+//! has a flat element, steps along the axes are tried, shorter each round; a node on a border is
+//! brought back to it, p ← p − φ ∇φ / |∇φ|²; where three labels meet it stays. A step stays when
+//! the smallest height around the node grows and no angle there gets worse than the worst before.
+//! Where an angle is sharp, a step also stays when the worst angle gets better and the height no
+//! less. So the worst never gets worse. On a brain the lowest element gets twice as high, and the
+//! stable time step twice as long.
 
 use super::LabelledMesh;
 use super::regions::Partition;
@@ -13,7 +17,8 @@ use glam::DVec3;
 
 /// Rounds over all nodes.
 const ROUNDS: usize = 8;
-/// Nodes are left alone whose elements are all higher than this share of the spacing (the lattice's own: 0.71).
+/// Nodes are left alone whose elements are all higher than this share of the spacing (the lattice's
+/// own: 0.71).
 const HIGH_ENOUGH: f64 = 0.33;
 /// An angle is sharp when its |cos| is over this (20° and 160°).
 const SHARP: f64 = 0.94;
@@ -100,7 +105,8 @@ fn back_to(surface: impl Fn(DVec3) -> f64, mut p: DVec3, h: f64) -> DVec3 {
     p
 }
 
-/// The smallest height, mm, and minus the largest |cos| of an angle, of some tetrahedra; −∞ when one is inverted.
+/// The smallest height, mm, and minus the largest |cos| of an angle, of some tetrahedra; −∞ when
+/// one is inverted.
 fn worth(mesh: &TetMesh, tets: &[u32]) -> (f64, f64) {
     let mut worst = (f64::INFINITY, 0.0f64);
     for &tet in tets {

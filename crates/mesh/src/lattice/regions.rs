@@ -1,12 +1,17 @@
-//! The labels of a volume as smooth functions of world space: which one holds a point, and by how much.
+//! The labels of a volume as smooth functions of world space: which one holds a point, and by how
+//! much.
 //!
 //! # Theory
-//! All labels together have a smoothed distance φ₀ (about millimetres, positive inside), and each label has its own, φ. A point is outside where φ₀ + level₀ is
-//! negative, else it belongs to the label with the largest φ + level: regions neither overlap nor leave gaps, whatever smoothing does to each, and the outer surface is
-//! as smooth where two labels meet as elsewhere. Raising level₀ moves the outer surface outwards by as much, raising a label's level moves its borders by half of that.
+//! All labels together have a smoothed distance φ₀ (about millimetres, positive inside), and each
+//! label has its own, φ. A point is outside where φ₀ + level₀ is negative, else it belongs to the
+//! label with the largest φ + level: regions neither overlap nor leave gaps, whatever smoothing
+//! does to each, and the outer surface is as smooth where two labels meet as elsewhere. Raising
+//! level₀ moves the outer surface outwards by as much, raising a label's level moves its borders by
+//! half of that.
 //!
 //! # Practice
-//! Labels go by their number in ascending order, 1 up; 0 is the outside. Only the largest 6-connected part of what is labelled is kept.
+//! Labels go by their number in ascending order, 1 up; 0 is the outside. Only the largest
+//! 6-connected part of what is labelled is kept.
 
 use super::field::{Block, Field};
 use crate::MeshError;

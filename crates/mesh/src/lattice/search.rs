@@ -1,9 +1,12 @@
-//! Finds the spacing that gives the count asked for, and the levels that give each label its volume.
+//! Finds the spacing that gives the count asked for, and the levels that give each label its
+//! volume.
 //!
 //! # Theory
-//! The count goes with a⁻³, where cubes grow inwards with about a^-2.5. Raising the outer level by x₀ moves the outer surface by x₀, so it takes what all labels
-//! lack over that surface's area. Raising the level of label l by x_l moves its border with k by (x_l − x_k) / 2, so what it still lacks asks for
-//! Σ_k A_lk (x_l − x_k) / 2 = missing_l − A_l0 x₀ with A the areas between labels: a few sweeps of Gauss and Seidel.
+//! The count goes with a⁻³, where cubes grow inwards with about a^-2.5. Raising the outer level by
+//! x₀ moves the outer surface by x₀, so it takes what all labels lack over that surface's area.
+//! Raising the level of label l by x_l moves its border with k by (x_l − x_k) / 2, so what it still
+//! lacks asks for Σ_k A_lk (x_l − x_k) / 2 = missing_l − A_l0 x₀ with A the areas between labels: a
+//! few sweeps of Gauss and Seidel.
 
 use super::octree::{Cube, Lattice};
 use super::regions::{Partition, Regions};
@@ -14,13 +17,15 @@ use rayon::prelude::*;
 
 /// Spacing and levels are searched at most this often.
 const TRIALS: usize = 12;
-/// Largest lattice, in cubes for each tetrahedron asked for (a brain takes a fifth of one): some 250 bytes a cube.
+/// Largest lattice, in cubes for each tetrahedron asked for (a brain takes a fifth of one): some
+/// 250 bytes a cube.
 const MAX_CUBES: usize = 10;
 /// What the search tries to reach; 10 % is what it promises.
 const COUNT_TOLERANCE: f64 = 0.02;
 const VOLUME_TOLERANCE: f64 = 0.002;
 const ALL_TOLERANCE: f64 = 0.01;
-/// How far from a border cubes have its size, in their edges beyond their own corners. Over 0.14 all tetrahedra that a border cuts are of one size.
+/// How far from a border cubes have its size, in their edges beyond their own corners. Over 0.14
+/// all tetrahedra that a border cuts are of one size.
 const MARGIN: f64 = 0.15;
 /// Sweeps over the levels.
 const SWEEPS: usize = 40;
@@ -84,7 +89,8 @@ pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -
     Ok(labelled)
 }
 
-/// How much of what is asked for each level goes: less after each overshoot, which thin labels make.
+/// How much of what is asked for each level goes: less after each overshoot, which thin labels
+/// make.
 struct Stride {
     gains: Vec<f64>,
     missing: Vec<f64>,
@@ -118,13 +124,15 @@ fn lattice(regions: &Regions, config: &Config, spacing: f64, trial: usize) -> Op
     Lattice::over(regions.bounds, spacing, shift(trial), levels(config), most, judge)
 }
 
-/// Where the lattice lies against the labels, in spacings: another place when the count does not settle (small symmetric masks).
+/// Where the lattice lies against the labels, in spacings: another place when the count does not
+/// settle (small symmetric masks).
 fn shift(trial: usize) -> DVec3 {
     let turn = (trial / 4) as f64;
     DVec3::new(0.13 + 0.21 * turn, 0.29 + 0.17 * turn, 0.41 + 0.11 * turn)
 }
 
-/// Cubes at a border are as fine as their place asks for, others up to `coarsening` doublings larger.
+/// Cubes at a border are as fine as their place asks for, others up to `coarsening` doublings
+/// larger.
 fn judge(regions: &Regions, config: &Config, spacing: f64, centre: DVec3, level: u32) -> Cube {
     let edge = spacing * f64::from(1u32 << level);
     let to_corner = 0.75f64.sqrt() * edge;
@@ -169,7 +177,8 @@ impl Balance {
         Self { missing, areas }
     }
 
-    /// The largest lack or excess of a label that is thicker than about a cube, and that of all together, in what is tolerated.
+    /// The largest lack or excess of a label that is thicker than about a cube, and that of all
+    /// together, in what is tolerated.
     fn fault(&self, regions: &Regions, spacing: f64) -> f64 {
         let count = self.missing.len();
         let one = spacing.powi(3) / 12.0;

@@ -1,9 +1,11 @@
 //! Isosurface stuffing: a lattice is warped and cut where labels meet.
 //!
 //! # Theory
-//! (Labelle and Shewchuk 2007; several labels after the idea of Bronson, Levine and Whitaker 2012.) Each lattice node has a label. An edge between two
-//! labels has a cut point where both hold equally. A cut point nearer to a node than α times the edge *violates* it; the node is moved to that point, is from then on
-//! the border of any label, and its other cut points vanish. No remaining cut is then close to a node. Each remaining tetrahedron is divided by its cuts, the
+//! (Labelle and Shewchuk 2007; several labels after the idea of Bronson, Levine and Whitaker 2012.)
+//! Each lattice node has a label. An edge between two labels has a cut point where both hold
+//! equally. A cut point nearer to a node than α times the edge *violates* it; the node is moved to
+//! that point, is from then on the border of any label, and its other cut points vanish. No
+//! remaining cut is then close to a node. Each remaining tetrahedron is divided by its cuts, the
 //! same for both sides of a border (∘ is a node on a border):
 //!
 //! ```text
@@ -15,17 +17,22 @@
 //! A B C D            four corners, and the octahedron between the six cuts in four
 //! ```
 //!
-//! The middle between three or four labels belongs to the one that holds its centre, the rest of A A B C to A: so where three labels meet, their common line is
-//! true to about half a lattice spacing, while every face still has the same triangles on both sides, and no gap or overlap can be.
+//! The middle between three or four labels belongs to the one that holds its centre, the rest of A
+//! A B C to A: so where three labels meet, their common line is true to about half a lattice
+//! spacing, while every face still has the same triangles on both sides, and no gap or overlap can
+//! be.
 //!
-//! A face A A B leaves a quadrilateral that two tetrahedra share, so its diagonal is chosen from the face alone: at the cut of the longer edge, and of
-//! equal ones at the cut of the node with the higher number. That order of edges is total, so no prism meets three diagonals in a cycle, and the two wedges of
-//! A A B B never need different diagonals on their common quadrilateral.
+//! A face A A B leaves a quadrilateral that two tetrahedra share, so its diagonal is chosen from
+//! the face alone: at the cut of the longer edge, and of equal ones at the cut of the node with the
+//! higher number. That order of edges is total, so no prism meets three diagonals in a cycle, and
+//! the two wedges of A A B B never need different diagonals on their common quadrilateral.
 //!
-//! With α = 0.24999 on long edges and 0.41189 on short ones the paper proves dihedral angles between 10.7° and 164.8° for one label. Here the violating cut is chosen
-//! freely (the nearest), which allows 9.3° to 161.7° for one to four labels, over all extremes of nodes and cuts on cubes of one size (a test goes through them).
-//! Not covered is a tetrahedron with all four nodes on borders: if one of them was outside it is left out, else it stays; on borders of pure noise
-//! such a one has over 12°.
+//! With α = 0.24999 on long edges and 0.41189 on short ones the paper proves dihedral angles
+//! between 10.7° and 164.8° for one label. Here the violating cut is chosen freely (the nearest),
+//! which allows 9.3° to 161.7° for one to four labels, over all extremes of nodes and cuts on cubes
+//! of one size (a test goes through them). Not covered is a tetrahedron with all four nodes on
+//! borders: if one of them was outside it is left out, else it stays; on borders of pure noise such
+//! a one has over 12°.
 
 use super::LabelledMesh;
 use super::octree::Lattice;
@@ -127,7 +134,8 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         quarters.into_iter().map(|n| self.lattice.spacing * (n as f64 / 12.0).sqrt()).collect()
     }
 
-    /// The nearest violating cut of a node among those that still exist: both ends of their edge have a label.
+    /// The nearest violating cut of a node among those that still exist: both ends of their edge
+    /// have a label.
     fn violation(&self, node: usize, reach: f64, cuts: &[u32]) -> Option<DVec3> {
         if self.labels[node] == ON {
             return None;
@@ -267,7 +275,8 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         (self.positions.len() + at) as u32
     }
 
-    /// Whether the quadrilateral that the face (p, q | n) leaves gets its diagonal at p (to the cut of q), else at q.
+    /// Whether the quadrilateral that the face (p, q | n) leaves gets its diagonal at p (to the cut
+    /// of q), else at q.
     fn diagonal_at(&self, p: u32, q: u32, n: u32) -> bool {
         (self.lattice.edge(p, n).0, p) < (self.lattice.edge(q, n).0, q)
     }
@@ -295,7 +304,8 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         prism(top, bottom, wins)
     }
 
-    /// Whether the quadrilateral between two nodes and two of another label is cut from p–m to q–n: as the prism of either side needs it, else the shorter way.
+    /// Whether the quadrilateral between two nodes and two of another label is cut from p–m to q–n:
+    /// as the prism of either side needs it, else the shorter way.
     fn border_diagonal(&self, [p, q]: [u32; 2], [m, n]: [u32; 2]) -> bool {
         let own = [self.diagonal_at(p, q, m), self.diagonal_at(p, q, n)];
         let other = [self.diagonal_at(m, n, p), self.diagonal_at(m, n, q)];
@@ -328,8 +338,9 @@ impl Pieces {
     }
 }
 
-/// Splits a prism into three. `wins` says for the pairs (0,1), (0,2), (1,2) whether the diagonal between them starts at the top of the first
-/// (else of the second). A cycle cannot be split, so the pairs must give an order.
+/// Splits a prism into three. `wins` says for the pairs (0,1), (0,2), (1,2) whether the diagonal
+/// between them starts at the top of the first (else of the second). A cycle cannot be split, so
+/// the pairs must give an order.
 fn prism(top: [u32; 3], bottom: [u32; 3], wins: [bool; 3]) -> [[u32; 4]; 3] {
     let score = [
         usize::from(wins[0]) + usize::from(wins[1]),

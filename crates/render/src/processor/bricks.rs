@@ -17,14 +17,17 @@ const MOST_STEPS: u32 = 8192;
 /// A beam that leaps less far than this, in voxels, has come near bone.
 const LEAST_LEAP: f32 = 0.5;
 
-/// How rays go through the bone. The default is what every picture is drawn with; the rest is there to be measured against it.
+/// How rays go through the bone. The default is what every picture is drawn with; the rest is there
+/// to be measured against it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Casting {
     /// Whether rays leap over bricks without bone; without, they walk every cell.
     pub leap: bool,
-    /// Samples this far apart, in voxels, instead of the exact root in every cell: thin walls are lost.
+    /// Samples this far apart, in voxels, instead of the exact root in every cell: thin walls are
+    /// lost.
     pub step_voxel: Option<f32>,
-    /// Whether only every second ray along both axes is cast, and those between only where bone is not smooth: twice as fast, for a camera that moves.
+    /// Whether only every second ray along both axes is cast, and those between only where bone is
+    /// not smooth: twice as fast, for a camera that moves.
     pub sparse: bool,
 }
 
@@ -152,9 +155,11 @@ impl Bricks {
         self.trace(from, light / self.grid.spacing_mm, near, far).0 < NOTHING
     }
 
-    /// Distance up to which no ray o + t·d' meets bone whose d' is nowhere further than `spread` from d; [`NOTHING`] where none ever does.
+    /// Distance up to which no ray o + t·d' meets bone whose d' is nowhere further than `spread`
+    /// from d; [`NOTHING`] where none ever does.
     ///
-    /// From a brick the beam leaps to where its edges, o + t·(d ± spread), leave the free cube around it; what is outside the grid is free too.
+    /// From a brick the beam leaps to where its edges, o + t·(d ± spread), leave the free cube
+    /// around it; what is outside the grid is free too.
     pub fn clear(&self, o: Vec3, d: Vec3, spread: f32) -> f32 {
         if !self.casting.leap {
             return 0.0;
@@ -188,8 +193,9 @@ impl Bricks {
         t
     }
 
-    /// Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or [`NOTHING`], and the number of bricks, cells and samples looked
-    /// at. No bone is looked for before `from` and after `until`.
+    /// Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or
+    /// [`NOTHING`], and the number of bricks, cells and samples looked at. No bone is looked for
+    /// before `from` and after `until`.
     #[inline(always)]
     pub fn trace(&self, o: Vec3, d: Vec3, from: f32, until: f32) -> (f32, u32) {
         let ray = Line::of(o, d);
@@ -228,7 +234,8 @@ impl Bricks {
         (NOTHING, steps)
     }
 
-    /// Samples a part of a ray every `step` mm, and takes the density as linear between two samples.
+    /// Samples a part of a ray every `step` mm, and takes the density as linear between two
+    /// samples.
     fn sample(&self, o: Vec3, d: Vec3, part: Range<f32>, step: f32, steps: &mut u32) -> f32 {
         let isovalue = f32::from(self.grid.isovalue);
         let (mut t, mut last) = (part.start, None);
@@ -247,7 +254,8 @@ impl Bricks {
         NOTHING
     }
 
-    /// Walks the cells of a ray from `t` to `leave` (Amanatides and Woo 1987) in the brick from `first` on, of which these may hold bone.
+    /// Walks the cells of a ray from `t` to `leave` (Amanatides and Woo 1987) in the brick from
+    /// `first` on, of which these may hold bone.
     #[inline(always)]
     fn walk(&self, ray: &Line, mut t: f32, leave: f32, first: IVec3, cells: u64, steps: &mut u32) -> f32 {
         let last = IVec3::from(self.grid.dims.map(|n| n as i32 - 2));
@@ -339,7 +347,8 @@ pub(crate) fn under(cut: Vec4, point: Vec3, along: Vec3) -> [f32; 2] {
     }
 }
 
-/// Whole parts, clamped to a box from 0: what lies under 0 becomes 0, so that cutting off is as good as rounding down.
+/// Whole parts, clamped to a box from 0: what lies under 0 becomes 0, so that cutting off is as
+/// good as rounding down.
 #[inline(always)]
 fn cell_in(at: Vec3A, last: IVec3) -> IVec3 {
     at.as_ivec3().clamp(IVec3::ZERO, last)

@@ -117,7 +117,8 @@ impl Eye {
         });
     }
 
-    /// Copies the view into the picture; in one with the other eye's, only green and blue over that one's brightness.
+    /// Copies the view into the picture; in one with the other eye's, only green and blue over that
+    /// one's brightness.
     pub fn show(&self, picture: &mut Image, in_one: bool) {
         let [x, y, width, height] = self.area.map(|n| n as usize);
         let wide = picture.width as usize;

@@ -17,7 +17,8 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bon
     let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
     let meets = |n: usize| if near[n] { Met::of(scene.tools()[n], eye, along) } else { Met::NONE };
     let [first, second] = [meets(0), meets(1)];
-    // Where both are cut by one plane neither is nearer: bone is there, however far the mesh reaches into it.
+    // Where both are cut by one plane neither is nearer: bone is there, however far the mesh
+    // reaches into it.
     let under_bone = brain.cut && on_cut(scene.bone_cut, eye + bone.t * along);
     let brain_t = if under_bone { NOTHING } else { brain.t };
     let t = bone.t.min(brain_t).min(first.t()).min(second.t());
@@ -37,7 +38,8 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bon
     shown(colour)
 }
 
-/// A linear colour as bytes for a screen of gamma 2.2, from a table over the square root, where the curve is nearly straight.
+/// A linear colour as bytes for a screen of gamma 2.2, from a table over the square root, where the
+/// curve is nearly straight.
 pub(crate) fn shown(colour: Vec3) -> [u8; 4] {
     const LAST: usize = 4095;
     static SHOWN: LazyLock<Vec<u8>> = LazyLock::new(|| {

@@ -41,7 +41,8 @@ pub(crate) fn trilinear<V: Mix>(dims: [usize; 3], at: Vec3, value: impl Fn(usize
 pub(crate) trait Mix: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<f32, Output = Self> {}
 impl<V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f32, Output = V>> Mix for V {}
 
-/// Where a coordinate lies along an axis of `count` values `stride` apart, clamped: position of the value before it, and the share of the next.
+/// Where a coordinate lies along an axis of `count` values `stride` apart, clamped: position of the
+/// value before it, and the share of the next.
 #[inline(always)]
 pub(crate) fn between(x: f32, count: usize, stride: usize) -> (usize, f32) {
     let last = count - 1;

@@ -1,17 +1,22 @@
 //! The same picture without any graphics device: every pass again in plain Rust.
 //!
 //! # Theory
-//! Each file here is the twin of a shader of the same name and reads the same [`Scene`]: the rays leap and solve cubics as `bricks.wgsl` does, light
-//! falls as in `light.wgsl`. So this is the oracle for the shaders, and the picture of machines without a driver.
+//! Each file here is the twin of a shader of the same name and reads the same [`Scene`]: the rays
+//! leap and solve cubics as `bricks.wgsl` does, light falls as in `light.wgsl`. So this is the
+//! oracle for the shaders, and the picture of machines without a driver.
 //!
 //! # Practice
-//! Rows are shared between as many threads as there are processors. Three things the device has not: before the rays of a tile of 8x8 pixels go, the tile leaps as
-//! one beam to where bone may be; rays leap by the octant of their direction, and look at a cell only if its bit says that it may hold bone (`bricks.rs`); and while
-//! the camera moves, sparse rays ([`Casting::sparse`]): a quarter of the pixels, and those between them where the tangent planes around do not agree (`skull.rs`).
-//! The hits of the last picture are kept, as on the device. Triangles of the brain that reach behind the eye are left out.
+//! Rows are shared between as many threads as there are processors. Three things the device has
+//! not: before the rays of a tile of 8x8 pixels go, the tile leaps as one beam to where bone may
+//! be; rays leap by the octant of their direction, and look at a cell only if its bit says that it
+//! may hold bone (`bricks.rs`); and while the camera moves, sparse rays ([`Casting::sparse`]): a
+//! quarter of the pixels, and those between them where the tangent planes around do not agree
+//! (`skull.rs`). The hits of the last picture are kept, as on the device. Triangles of the brain
+//! that reach behind the eye are left out.
 //!
 //! # When not to use it
-//! Where there is any driver, even a software one: that draws the same picture and serves the window.
+//! Where there is any driver, even a software one: that draws the same picture and serves the
+//! window.
 
 mod brain;
 mod bricks;
@@ -203,7 +208,8 @@ impl ProcessorRenderer {
         }
     }
 
-    /// Bricks, cells and samples that a ray of the newest picture has looked at in the mean, without its shadow.
+    /// Bricks, cells and samples that a ray of the newest picture has looked at in the mean,
+    /// without its shadow.
     pub fn steps_per_ray(&self) -> f64 {
         let rays = &self.eyes[0].rays;
         rays.iter().map(|ray| f64::from(ray.steps)).sum::<f64>() / rays.len().max(1) as f64
@@ -219,7 +225,8 @@ impl ProcessorRenderer {
         self.layout
     }
 
-    /// The camera of a frame as vectors, for the 3-D view of this picture; with two eyes, from between them.
+    /// The camera of a frame as vectors, for the 3-D view of this picture; with two eyes, from
+    /// between them.
     pub fn view(&self, frame: &Frame) -> View {
         let [_, _, width, height] = self.eyes[0].area;
         frame.camera.view(width as f32 / height as f32)

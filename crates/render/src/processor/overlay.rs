@@ -31,8 +31,8 @@ pub(crate) fn draw(item: &Item, scene: &Scene, view: &View, pixels: &mut [[u8; 4
     }
 }
 
-/// First pixels, and those behind the last, around a body's box and a pixel more; the whole view where the box reaches behind the eye, and nothing where
-/// there is no body.
+/// First pixels, and those behind the last, around a body's box and a pixel more; the whole view
+/// where the box reaches behind the eye, and nothing where there is no body.
 pub(crate) fn rectangle(tip: Vec4, tail: Vec4, view: &View, [width, height]: [usize; 2]) -> [usize; 4] {
     if tip.w <= 0.0 {
         return [0; 4];
@@ -75,7 +75,8 @@ fn arrow(eye: Vec3, along: Vec3, item: &Item) -> (f32, Vec3) {
     head(eye, along, to, down, depth, item.tail.w, stem)
 }
 
-/// The nearer of a surface and the front of an arrow's head: a cone around `down` from its point, as deep as `depth`, as wide as `radius` there.
+/// The nearer of a surface and the front of an arrow's head: a cone around `down` from its point,
+/// as deep as `depth`, as wide as `radius` there.
 fn head(eye: Vec3, along: Vec3, apex: Vec3, down: Vec3, depth: f32, radius: f32, other: (f32, Vec3)) -> (f32, Vec3) {
     let mut nearest = other;
     let away = eye - apex;

@@ -1,8 +1,8 @@
 //! Where a ray enters bone within a cell.
 //!
 //! # Theory
-//! The density of a cell is trilinear, so along a ray it is a cubic (Marmitt et al. 2004). Between its extrema a cubic is monotone: Newton's method, kept between
-//! two ends of different sign.
+//! The density of a cell is trilinear, so along a ray it is a cubic (Marmitt et al. 2004). Between
+//! its extrema a cubic is monotone: Newton's method, kept between two ends of different sign.
 
 use super::mix::greater;
 use glam::{Vec3A, Vec4};
@@ -29,7 +29,8 @@ pub(crate) fn enter(corners: &[f32; 8], a: Vec3A, b: Vec3A) -> f32 {
 
 /// First root of the cubic with values `v` at 0, 1/3, 2/3, 1 that rises from below zero, or 2.
 ///
-/// Between its extrema the cubic is monotone: Newton's method, kept between two ends of different sign.
+/// Between its extrema the cubic is monotone: Newton's method, kept between two ends of different
+/// sign.
 #[inline(always)]
 pub(crate) fn first_root(v: [f32; 4]) -> f32 {
     if v[0] >= 0.0 {

@@ -38,8 +38,9 @@ pub(crate) fn share<'a, T: Send + 'a>(
     });
 }
 
-/// Fills a grid sparsely: `exact` values at every second column of every second row, and between these what `between` makes of the values around, or
-/// exact ones, which know these values too, where it makes nothing of them.
+/// Fills a grid sparsely: `exact` values at every second column of every second row, and between
+/// these what `between` makes of the values around, or exact ones, which know these values too,
+/// where it makes nothing of them.
 pub(crate) fn sparsely<T: Copy + Send + Sync>(
     threads: usize,
     grid: &mut [T],

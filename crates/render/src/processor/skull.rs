@@ -40,7 +40,8 @@ pub(crate) fn clear(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2]) -> f32 {
     bricks.clear(bricks.grid_of(scene.eye.truncate()), middle / spacing, 1.01 * spread / spacing)
 }
 
-/// The ray of a pixel, which meets no bone before `from`, mm. Between rays that are all lit it is taken as lit.
+/// The ray of a pixel, which meets no bone before `from`, mm. Between rays that are all lit it is
+/// taken as lit.
 pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32, around: &[Ray]) -> Ray {
     if from >= NOTHING {
         return Ray::NONE;
@@ -78,7 +79,8 @@ impl Ray {
         self.steps == 0 && self.t < NOTHING
     }
 
-    /// What the ray of a pixel meets between others that meet nothing, or smooth bone: then their tangent planes agree.
+    /// What the ray of a pixel meets between others that meet nothing, or smooth bone: then their
+    /// tangent planes agree.
     pub fn between(scene: &Scene, [x, y]: [usize; 2], around: &[Self]) -> Option<Self> {
         let first = around.first()?;
         if first.t >= NOTHING {

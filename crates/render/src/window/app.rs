@@ -1,7 +1,7 @@
 //! One picture of the window: input → session → renderer → panel.
 
 use super::capture::Captures;
-use super::input::{Hand, Pointer};
+use super::input::{Pointer, ViewAndTool};
 use super::keys::{self, Command};
 use super::look::Look;
 use super::panel::{self, Clicks, Traces};
@@ -29,7 +29,7 @@ const LARGE: f32 = 1.4;
 pub(super) struct Window<S, D> {
     lent: Lent<S, D>,
     start: Start,
-    hand: Hand,
+    hand: ViewAndTool,
     traces: Traces,
     panel: Panel,
     clicks: Clicks,
@@ -50,7 +50,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         let hardware = lent.borrow().as_ref().and_then(|s| s.renderer.device()).is_some_and(|gpu| !gpu.is_software());
         Self {
             lent,
-            hand: Hand { world_from_tool: start.world_from_tool, camera: start.camera },
+            hand: ViewAndTool { world_from_tool: start.world_from_tool, camera: start.camera },
             traces: Traces::default(),
             panel: Panel::default(),
             clicks: Clicks::default(),

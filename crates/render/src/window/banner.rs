@@ -1,8 +1,10 @@
-//! Warnings that cannot be missed: large black letters on vermilion across the picture, with the word itself, so that colour is not
-//! needed to see them. What is only to be known, such as a pause, stands on sky blue below.
+//! Warnings that cannot be missed: large black letters on vermilion across the picture, with the
+//! word itself, so that colour is not needed to see them. What is only to be known, such as a
+//! pause, stands on sky blue below.
 //!
 //! # Practice
-//! They lie over the picture's upper edge: a picture that made room for them would have to be cast anew each time.
+//! They lie over the picture's upper edge: a picture that made room for them would have to be cast
+//! anew each time.
 
 use super::palette::{SKY, VERMILION};
 use eframe::egui::{self, Color32, Rect, RichText};

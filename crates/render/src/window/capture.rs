@@ -46,7 +46,8 @@ impl Captures {
         self.filming ^= true;
     }
 
-    /// Once a picture: hands on what the windowing system took since the last, and asks for what is wanted now.
+    /// Once a picture: hands on what the windowing system took since the last, and asks for what is
+    /// wanted now.
     pub fn turn(&mut self, context: &egui::Context, session: &mut impl Session) {
         for (what, image) in self.receiver.try_iter() {
             session.capture(what, picture(&image));

@@ -40,7 +40,7 @@ const KEY_MM: f32 = 0.5;
 
 /// The hand and the eye, as they are moved.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Hand {
+pub(crate) struct ViewAndTool {
     pub world_from_tool: Pose,
     pub camera: Camera,
 }
@@ -52,7 +52,8 @@ pub(crate) struct Pointer {
     pub right: Vec2,
     pub wheel: f32,
     pub tilt: bool,
-    /// How many times larger things are to be seen: egui makes this of the wheel with Ctrl, and of two fingers.
+    /// How many times larger things are to be seen: egui makes this of the wheel with Ctrl, and of
+    /// two fingers.
     pub zoom: f32,
 }
 
@@ -62,7 +63,7 @@ impl Default for Pointer {
     }
 }
 
-impl Hand {
+impl ViewAndTool {
     /// Moves hand and eye. `height` is that of the 3-D view in points.
     pub fn follow(&mut self, pointer: &Pointer, view: &View, height: f32) {
         let tip = self.world_from_tool.translation;
@@ -124,10 +125,10 @@ mod tests {
     use super::*;
     use glam::Vec3;
 
-    fn hand() -> (Hand, View) {
+    fn hand() -> (ViewAndTool, View) {
         let camera = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0);
         let world_from_tool = Pose::from_translation(Vec3::new(5.0, 20.0, 3.0));
-        (Hand { world_from_tool, camera }, camera.view(1.5))
+        (ViewAndTool { world_from_tool, camera }, camera.view(1.5))
     }
 
     #[test]

@@ -10,7 +10,8 @@ use glam::Vec3;
 pub(crate) struct Look {
     pub bone: bool,
     pub brain: bool,
-    /// Whether the session's colours on bone and brain are shown, and its force arrow, ghost tool and markers.
+    /// Whether the session's colours on bone and brain are shown, and its force arrow, ghost tool
+    /// and markers.
     pub hints: bool,
     pub section: Option<Section>,
     pub stereo: Option<StereoLook>,
@@ -59,7 +60,8 @@ impl Section {
 }
 
 impl Look {
-    /// Everything, seen by the orbiting camera; there is a microscope where there is a camera for it.
+    /// Everything, seen by the orbiting camera; there is a microscope where there is a camera for
+    /// it.
     pub fn with(microscope: Option<Camera>) -> Self {
         Self {
             bone: true,

@@ -1,7 +1,9 @@
-//! The loudspeaker: takes samples on a thread of the sound system's own and never waits for the window.
+//! The loudspeaker: takes samples on a thread of the sound system's own and never waits for the
+//! window.
 //!
 //! # Practice
-//! What is to be heard travels through one atomic word. A machine without a sound system stays silent and says why in the panel; nothing else depends on it.
+//! What is to be heard travels through one atomic word. A machine without a sound system stays
+//! silent and says why in the panel; nothing else depends on it.
 //!
 //! # When not to use it
 //! Without ALSA's headers on Linux: leave the feature `sound` off.

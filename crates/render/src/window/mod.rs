@@ -18,12 +18,14 @@
 //! | Space, \[ and \] | in a replay: run or stand still, to the event before and after |
 //! | Q or Escape | closes |
 //!
-//! The picture stays on the device: egui shows the very texture that the renderer draws into. Where it cannot (the device is one of GL, cannot
-//! show on this display, or the processor draws) the window opens a device of its own and every picture is copied to it. The picture gets
-//! coarser when pictures take longer than a tenth of a second, and finer again when there is time.
+//! The picture stays on the device: egui shows the very texture that the renderer draws into. Where
+//! it cannot (the device is one of GL, cannot show on this display, or the processor draws) the
+//! window opens a device of its own and every picture is copied to it. The picture gets coarser
+//! when pictures take longer than a tenth of a second, and finer again when there is time.
 //!
 //! # When not to use it
-//! Without a display: [`run`] says so and hands everything back, so that the session can go on headless.
+//! Without a display: [`run`] says so and hands everything back, so that the session can go on
+//! headless.
 
 mod app;
 mod banner;
@@ -36,9 +38,9 @@ mod look;
 mod loudspeaker;
 mod palette;
 mod panel;
+mod panel_text;
 mod plot;
 mod quality;
-mod said;
 #[cfg(any(feature = "sound", test))]
 mod synthesis;
 #[cfg(test)]
@@ -48,7 +50,7 @@ mod timeline;
 pub use capture::Capture;
 pub use draws::Draws;
 pub use input::WindowInput;
-pub use said::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
+pub use panel_text::{Action, Choice, Leash, Mark, Panel, Playback, Sound, Timeline};
 
 use crate::{Camera, Frame, Image, Renderer};
 use std::cell::RefCell;
@@ -81,7 +83,8 @@ pub struct Start {
     pub size: [f32; 2],
     /// Pictures a second at most.
     pub rate_hz: f32,
-    /// Share of the 3-D view's pixels along an edge in the first pictures; then it follows the time that they take.
+    /// Share of the 3-D view's pixels along an edge in the first pictures; then it follows the time
+    /// that they take.
     pub detail: f32,
 }
 
@@ -172,7 +175,8 @@ where
         });
         eframe::run_native(title, options(gpu, &start), create)
     };
-    // A missing system library makes the windowing crate panic; that must not take the session along.
+    // A missing system library makes the windowing crate panic; that must not take the session
+    // along.
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(show)) {
         Ok(Ok(())) => Ok(()),
         Ok(Err(eframe::Error::WinitEventLoop(e))) => Err(WindowError::NoDisplay(e.to_string())),

@@ -1,4 +1,5 @@
-//! Colours that are told apart by eyes with any colour vision, and bright or dark enough to be read.
+//! Colours that are told apart by eyes with any colour vision, and bright or dark enough to be
+//! read.
 //!
 //! # Sources
 //! Okabe and Ito 2008, "Color universal design". Contrast: WCAG 2.1, at least 4.5 for text.

@@ -35,7 +35,8 @@ impl Default for Traces {
     }
 }
 
-/// Shows the panel and says what was clicked. `filming`: whether the pictures of the window are kept.
+/// Shows the panel and says what was clicked. `filming`: whether the pictures of the window are
+/// kept.
 pub(crate) fn show(
     ui: &mut egui::Ui,
     panel: &Panel,

@@ -1,4 +1,5 @@
-//! Picture quality that follows the time a picture takes: coarser when the hand waits for the eye, finer when there is time.
+//! Picture quality that follows the time a picture takes: coarser when the hand waits for the eye,
+//! finer when there is time.
 
 /// Shares of the 3-D view's pixels along an edge.
 const DETAILS: [f32; 5] = [1.0, 0.75, 0.55, 0.4, 0.3];
@@ -24,7 +25,8 @@ pub(crate) struct Quality {
 }
 
 impl Quality {
-    /// Starts at the coarser of a detail and the finest on a graphics card, the middle on a software driver.
+    /// Starts at the coarser of a detail and the finest on a graphics card, the middle on a
+    /// software driver.
     pub fn new(software: bool, detail: f32) -> Self {
         let wanted = DETAILS.iter().position(|&d| d <= detail).unwrap_or(DETAILS.len() - 1);
         Self { step: wanted.max(if software { 2 } else { 0 }), ..Self::default() }
@@ -52,7 +54,8 @@ impl Quality {
 mod tests {
     use super::*;
 
-    /// Detail after some pictures whose time is `full` seconds at the finest and falls with the number of pixels.
+    /// Detail after some pictures whose time is `full` seconds at the finest and falls with the
+    /// number of pixels.
     fn settled(full: f64, pictures: u32) -> f32 {
         let mut quality = Quality::new(false, 1.0);
         for _ in 0..pictures {

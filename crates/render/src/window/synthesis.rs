@@ -1,7 +1,8 @@
 //! What the drill and the alarm sound like, sample by sample.
 //!
 //! # Theory
-//! A drill hums at its spindle's speed with overtones; load slows the spindle, so the pitch falls, and pushes the wave into saturation:
+//! A drill hums at its spindle's speed with overtones; load slows the spindle, so the pitch falls,
+//! and pushes the wave into saturation:
 //!
 //! ```text
 //! hum(φ) = tanh(g (sin φ + sin(2φ)/2 + sin(3φ)/3))     φ̇ = 2π · 420 Hz · spindle      g = 0.6 + 2.4 load
@@ -9,8 +10,9 @@
 //! ```
 //!
 //! # Practice
-//! Both together stay within ±1. Pitch and loudness follow within some 10 ms, so that nothing clicks; with the spindle at rest and no
-//! alarm there is silence. Nothing is allocated: the loudspeaker's own thread runs it.
+//! Both together stay within ±1. Pitch and loudness follow within some 10 ms, so that nothing
+//! clicks; with the spindle at rest and no alarm there is silence. Nothing is allocated: the
+//! loudspeaker's own thread runs it.
 
 use super::Sound;
 use std::f32::consts::TAU;
@@ -56,7 +58,8 @@ impl Synthesis {
         self.tone = (self.tone + dt_s * tone_hz).fract();
         let wave = |turn: f32| (TAU * turn).sin();
         let hum = wave(self.hum) + wave(2.0 * self.hum) / 2.0 + wave(3.0 * self.hum) / 3.0;
-        // A spindle under a tenth of its speed is not heard, so that no crackle is left of a slow one.
+        // A spindle under a tenth of its speed is not heard, so that no crackle is left of a slow
+        // one.
         let loud = HUM * (10.0 * spindle).min(1.0);
         loud * ((0.6 + 2.4 * load) * hum).tanh() + ALARM * alarm * wave(self.tone)
     }
@@ -73,7 +76,8 @@ mod tests {
         (0..(RATE_HZ * seconds) as usize).map(|_| synthesis.sample(wanted, RATE_HZ)).collect()
     }
 
-    /// The strongest frequency between 100 and 2000 Hz of the last half second, by the sums of a discrete Fourier transform.
+    /// The strongest frequency between 100 and 2000 Hz of the last half second, by the sums of a
+    /// discrete Fourier transform.
     fn pitch_hz(samples: &[f32]) -> f32 {
         let last = &samples[samples.len() - (RATE_HZ / 2.0) as usize..];
         let power = |hz: f32| {

@@ -1,4 +1,5 @@
-//! The window as a user meets it: found by its words, worked by mouse and keys, its pictures drawn by the processor.
+//! The window as a user meets it: found by its words, worked by mouse and keys, its pictures drawn
+//! by the processor.
 
 use super::app::Window;
 use super::*;

@@ -74,7 +74,8 @@ fn buttons(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     asked
 }
 
-/// The slider with a mark for each event. It shows no number of its own: one with decimals would round the time, and so ask to go there.
+/// The slider with a mark for each event. It shows no number of its own: one with decimals would
+/// round the time, and so ask to go there.
 fn bar(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let mut at_s = timeline.at_s;
     ui.spacing_mut().slider_width = (ui.available_width() - 80.0).max(60.0);

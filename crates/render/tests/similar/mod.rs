@@ -2,7 +2,8 @@
 
 use trepan_render::Image;
 
-/// Structural similarity of two pictures' green channels over windows of 8x8 pixels (Wang et al. 2004).
+/// Structural similarity of two pictures' green channels over windows of 8x8 pixels (Wang et al.
+/// 2004).
 pub fn similarity(a: &Image, b: &Image) -> f64 {
     let windows = (0..a.height / 8).flat_map(|y| (0..a.width / 8).map(move |x| (8 * x, 8 * y)));
     let index = |(x, y): (u32, u32)| {

@@ -185,7 +185,8 @@ pub fn make_classes(
     Ok(classes)
 }
 
-/// The brain of some classes: the MRI on their grid, and tetrahedra, which may be finer around `place`.
+/// The brain of some classes: the MRI on their grid, and tetrahedra, which may be finer around
+/// `place`.
 pub fn make_brain(
     mri: &VoxelVolume<f32>,
     classes: VoxelVolume<u8>,

@@ -1,8 +1,9 @@
 //! Derived data in the user's cache folder, named by the hash of what it was made from.
 //!
 //! # Practice
-//! A folder appears whole or not at all: it is filled beside its place and then renamed. Two programs that make the same case
-//! at once both succeed; the second keeps the first's. `TREPAN_CACHE` names another place.
+//! A folder appears whole or not at all: it is filled beside its place and then renamed. Two
+//! programs that make the same case at once both succeed; the second keeps the first's.
+//! `TREPAN_CACHE` names another place.
 
 use crate::error::SessionError;
 use etcetera::{BaseStrategy, choose_base_strategy};
@@ -38,7 +39,8 @@ impl Cache {
         Self { root }
     }
 
-    /// The name of what is made from these files (folders with all that lies in them) by this recipe, 64 digits.
+    /// The name of what is made from these files (folders with all that lies in them) by this
+    /// recipe, 64 digits.
     pub fn key(&self, inputs: &[&Path], recipe: &str) -> Result<String, SessionError> {
         digest_of_all(&format!("{FORM} {recipe}"), inputs)
     }
@@ -133,8 +135,8 @@ const MOST_FILES: usize = 20_000;
 /// Folders inside a folder that are looked into, as for DICOM series.
 const DEEPEST: usize = 4;
 
-/// The file itself, or every file under a folder, in a fixed order. A file of another kind may be one of several (a slice of a
-/// series, half of a pair): all that lies beside it counts too.
+/// The file itself, or every file under a folder, in a fixed order. A file of another kind may be
+/// one of several (a slice of a series, half of a pair): all that lies beside it counts too.
 fn files_of(input: &Path) -> io::Result<Vec<PathBuf>> {
     if !fs::metadata(input)?.is_dir() {
         // Said before anything is opened: a pipe would wait for its writer.

@@ -6,19 +6,20 @@ use crate::case::import::{Known, volume_mm3};
 use crate::case::tissue::TissueClass;
 use crate::case::{Case, Inputs, Recipe, folder, import};
 use crate::error::SessionError;
-use crate::measure::Own;
-use crate::models::{self, Facts, Models, Wish};
+use crate::measure::CaseErrors;
+use crate::models::{self, Facts, ModelRequest, Models};
 use crate::options::{Options, Patient};
 use crate::program::Program;
 use std::path::Path;
 use trepan_budget::Setup;
 
-/// The case folder that is named, the images that are given, or the built-in case; with the models that it is opened for. `card`: whether a graphics card draws.
+/// The case folder that is named, the images that are given, or the built-in case; with the models
+/// that it is opened for. `card`: whether a graphics card draws.
 pub fn open_case(
     program: Program,
     options: &Options,
     built_in: Inputs,
-    wish: Wish,
+    wish: ModelRequest,
     card: impl FnOnce() -> bool,
 ) -> Result<(Case, Models), SessionError> {
     if let Some(folder) = &options.case {
@@ -82,7 +83,7 @@ pub fn plan_case(
     case: Option<&Path>,
     patient: &Patient,
     built_in: Inputs,
-    wish: Wish,
+    wish: ModelRequest,
     card: impl FnOnce() -> bool,
 ) -> Result<PlannedCase, SessionError> {
     patient.check().map_err(SessionError::Usage)?;
@@ -103,14 +104,14 @@ pub fn plan_case(
 }
 
 /// The models for a case as it was built.
-fn on_case(wish: Wish, case: &Case, card: impl FnOnce() -> bool) -> Result<Models, SessionError> {
-    let wish = case.recipe.iter().fold(wish, Wish::on);
+fn on_case(wish: ModelRequest, case: &Case, card: impl FnOnce() -> bool) -> Result<Models, SessionError> {
+    let wish = case.recipe.iter().fold(wish, ModelRequest::on);
     let facts = Facts {
         ct_voxel_mm: case.skull.as_ref().map(|skull| skull.spacing_mm().element_sum() / 3.0),
         brain_mm3: case.brain.as_ref().map(|brain| volume_mm3(&brain.classes)),
     };
     // What the scanner saw is no longer there: the laws must do.
-    wish.settle(&facts, card, |_, _| Ok(Own::default()))
+    wish.settle(&facts, card, |_, _| Ok(CaseErrors::default()))
 }
 
 /// A case that was made and kept in a folder.
@@ -154,13 +155,14 @@ fn fitting(program: Program, case: Case) -> Result<Case, SessionError> {
     Ok(case)
 }
 
-/// As the flags say; what they leave open as usual, so that a folder is the same wherever it is built.
+/// As the flags say; what they leave open as usual, so that a folder is the same wherever it is
+/// built.
 fn recipe(patient: &Patient) -> Recipe {
     let usual = models::usual();
     Recipe {
         spacing_mm: patient.spacing_mm.unwrap_or(usual.bone.spacing_mm as f32),
         tets: patient.tets.unwrap_or(usual.tissue.tets),
-        halvings: patient.finer.unwrap_or(usual.tissue.halvings),
+        halvings: patient.opening_refinement.unwrap_or(usual.tissue.halvings),
         isovalue_hu: patient.isovalue_hu,
         ct_series: patient.ct_series,
         mri_series: patient.mri_series,

@@ -1,4 +1,5 @@
-//! The picture that shows whether CT and MRI fit: the bone's contour over the MRI, as it was read above, as it is used below.
+//! The picture that shows whether CT and MRI fit: the bone's contour over the MRI, as it was read
+//! above, as it is used below.
 
 use trepan_render::Image;
 use trepan_volume::{Picture, VoxelVolume, overlap_pictures};

@@ -1,4 +1,5 @@
-//! A case as a folder: volumes, mesh, numbers, and the hash of each file; self-describing, checked when it is opened.
+//! A case as a folder: volumes, mesh, numbers, and the hash of each file; self-describing, checked
+//! when it is opened.
 //!
 //! ```text
 //! CASE/case.json   form, name, hash of the images, version, isovalue, planned opening, recipe, remarks, file hashes
@@ -9,7 +10,8 @@
 //! ```
 //!
 //! # Practice
-//! Patient RAS+ mm throughout. Nothing in it names a patient: images are written anew from their voxels, and the name is made from a hash.
+//! Patient RAS+ mm throughout. Nothing in it names a patient: images are written anew from their
+//! voxels, and the name is made from a hash.
 
 use crate::case::cache::digest;
 use crate::case::identity::Identity;

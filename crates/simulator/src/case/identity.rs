@@ -1,8 +1,8 @@
 //! Of which patient a session is: told by the hashes of the images, whatever was made of them.
 //!
 //! # Practice
-//! The hash of a case changes with voxel size, tetrahedra and version; those of its images do not. Recordings of older
-//! versions hold the former only: then a name may tell, or nothing.
+//! The hash of a case changes with voxel size, tetrahedra and version; those of its images do not.
+//! Recordings of older versions hold the former only: then a name may tell, or nothing.
 
 use crate::case::cache::digest_of_all;
 use crate::case::{Inputs, Recipe};

@@ -1,10 +1,12 @@
-//! From the scanner's files to a case: skull grid, brain mask, brain mesh, opening, each made once and kept by content.
+//! From the scanner's files to a case: skull grid, brain mask, brain mesh, opening, each made once
+//! and kept by content.
 //!
 //! # Practice
-//! What is made depends only on the bytes of the inputs and the numbers in [`Recipe`]; its hash names the folder in the user's
-//! cache. The folder is made beside its final place and moved there whole, so an interrupted import leaves nothing.
-//! A case goes by the first digits of that hash: file names may hold a patient's name.
-//! What the images are ([`Facts`]) is kept too: who chooses the numbers by it need not read them again.
+//! What is made depends only on the bytes of the inputs and the numbers in [`Recipe`]; its hash
+//! names the folder in the user's cache. The folder is made beside its final place and moved there
+//! whole, so an interrupted import leaves nothing. A case goes by the first digits of that hash:
+//! file names may hold a patient's name. What the images are ([`Facts`]) is kept too: who chooses
+//! the numbers by it need not read them again.
 
 use crate::case::anatomy::{cropped, find_brain, make_brain, make_classes, make_skull, read_ct, read_mri, registered};
 use crate::case::cache::Cache;
@@ -18,7 +20,7 @@ use crate::case::{Case, Inputs, Recipe};
 use crate::error::SessionError;
 use crate::measure::bone::Skull;
 use crate::measure::tissue::Shape;
-use crate::measure::{Own, Sight};
+use crate::measure::{CaseErrors, Sight};
 use crate::models::Facts;
 use crate::program::Program;
 use glam::DAffine3;
@@ -35,7 +37,8 @@ pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -
     open_by(program, inputs, recipe, cache, |_| Ok(*recipe))
 }
 
-/// The same, with the voxel size and the tetrahedra of a recipe that is made when the images are known.
+/// The same, with the voxel size and the tetrahedra of a recipe that is made when the images are
+/// known.
 pub fn open_by(
     program: Program,
     inputs: &Inputs,
@@ -117,9 +120,10 @@ impl<'a> Known<'a> {
         }
     }
 
-    /// How far these choices are off in this case, from the cache if it was looked at before; nothing where there is no place to look at.
-    pub fn own(&mut self, scene: &Scene, rows: &Rows) -> Result<Own, SessionError> {
-        let key = self.cache.under(&self.key, &Own::about(scene, rows));
+    /// How far these choices are off in this case, from the cache if it was looked at before;
+    /// nothing where there is no place to look at.
+    pub fn own(&mut self, scene: &Scene, rows: &Rows) -> Result<CaseErrors, SessionError> {
+        let key = self.cache.under(&self.key, &CaseErrors::about(scene, rows));
         if let Some(own) = kept(self.cache, &key, OWN) {
             return Ok(own);
         }
@@ -129,7 +133,8 @@ impl<'a> Known<'a> {
         self.stages.next("measuring how far models are off in this case");
         let sight = self.images.as_ref().map(|images| sight(self.program, images, self.wanted, scene)).transpose()?;
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-        let own = sight.flatten().map_or_else(Own::default, |sight| Own::of(&sight, scene, rows, threads));
+        let own =
+            sight.flatten().map_or_else(CaseErrors::default, |sight| CaseErrors::of(&sight, scene, rows, threads));
         keep(&own, self.cache, &key, OWN);
         Ok(own)
     }

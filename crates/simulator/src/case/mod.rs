@@ -49,7 +49,8 @@ pub struct Recipe {
     pub halvings: u32,
     /// Threshold of bone, HU; `None` for the histogram's.
     pub isovalue_hu: Option<i16>,
-    /// Which series of the CT's folder, as [`trepan_volume::dicom::series`] lists them; `None` for the largest.
+    /// Which series of the CT's folder, as [`trepan_volume::dicom::series`] lists them; `None` for
+    /// the largest.
     pub ct_series: Option<usize>,
     /// Which series of the MRI's folder.
     pub mri_series: Option<usize>,
@@ -89,7 +90,8 @@ pub struct Case {
 /// The brain of a case.
 #[derive(Clone, Debug)]
 pub struct Brain {
-    /// 0 outside, a [`TissueClass`](tissue::TissueClass)'s code inside, on a grid of cubes around the brain.
+    /// 0 outside, a [`TissueClass`](tissue::TissueClass)'s code inside, on a grid of cubes around
+    /// the brain.
     pub classes: VoxelVolume<u8>,
     /// The MRI on the same grid.
     pub mri: VoxelVolume<f32>,

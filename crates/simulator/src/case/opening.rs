@@ -2,11 +2,11 @@
 //! on; or where the user says.
 //!
 //! # Theory
-//! The place is the patient's alone: it is looked for on a skull of 1 mm voxels
-//! ([`REFERENCE_MM`]), whatever the session's are. Rays run from outside towards the brain's middle,
-//! spread evenly over the upper right front of the head, else over the whole vault. Around each,
-//! parallel lines within the hole and at a flap's rim pass outer table, inner table and brain; see
-//! [`search`]. What the session drills is then measured along the chosen line on its own skull.
+//! The place is the patient's alone: it is looked for on a skull of 1 mm voxels ([`REFERENCE_MM`]),
+//! whatever the session's are. Rays run from outside towards the brain's middle, spread evenly over
+//! the upper right front of the head, else over the whole vault. Around each, parallel lines within
+//! the hole and at a flap's rim pass outer table, inner table and brain; see [`search`]. What the
+//! session drills is then measured along the chosen line on its own skull.
 //!
 //! # When not to use it
 //! To plan a real operation: nothing here knows vessels, venous sinuses or eloquent cortex.
@@ -85,8 +85,8 @@ impl Opening {
         opening.on(&bone_of(skull, isovalue_hu)?, brain.is_some())
     }
 
-    /// Where to open a patient's skull, by the skull on voxels of 1 mm (`REFERENCE_MM`): on the way from
-    /// `wanted` (a point outside, RAS mm) to the middle of the head, else at the best place.
+    /// Where to open a patient's skull, by the skull on voxels of 1 mm (`REFERENCE_MM`): on the way
+    /// from `wanted` (a point outside, RAS mm) to the middle of the head, else at the best place.
     pub fn of_patient(
         reference: &BoneVolume,
         brain: Option<&VoxelVolume<u8>>,
@@ -161,7 +161,8 @@ fn middle(classes: &VoxelVolume<u8>) -> Vec3 {
     within.map_or(Vec3::ZERO, |[low, high]| 0.5 * (low + high))
 }
 
-/// A place to probe a brain without a skull: straight down from above, a third of the way to the right and front.
+/// A place to probe a brain without a skull: straight down from above, a third of the way to the
+/// right and front.
 pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
     let outward = Vec3::new(0.45, 0.35, 0.82).normalize();
     let from = centre + search::FAR_MM * outward;
@@ -169,7 +170,8 @@ pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
     Some(Site { entry: from - depth * outward, inward: -outward, bone_mm: 0.0, brain_mm: 0.0 })
 }
 
-/// Direction from the site to the eye: a little from behind and from the side, so that hole and tool are both seen.
+/// Direction from the site to the eye: a little from behind and from the side, so that hole and
+/// tool are both seen.
 pub fn eye(site: &Site) -> Vec3 {
     let outward = -site.inward;
     let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);

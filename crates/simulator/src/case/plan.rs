@@ -1,8 +1,10 @@
 //! What is planned to be taken away: a burr hole, or a flap with a burr hole at its rim.
 //!
 //! # Theory
-//! The flap is a round piece: rays parallel to the way in, on a circle around it, meet the outer table and leave the inner one; these points are its outline. The cut
-//! runs along it, from the burr hole at its first point. The planned volume is all bone within half a cut of the outline, and within the hole, along the way in.
+//! The flap is a round piece: rays parallel to the way in, on a circle around it, meet the outer
+//! table and leave the inner one; these points are its outline. The cut runs along it, from the
+//! burr hole at its first point. The planned volume is all bone within half a cut of the outline,
+//! and within the hole, along the way in.
 //!
 //! # When not to use it
 //! To plan a real operation: it knows no vessels, sinuses or eloquent cortex.
@@ -39,7 +41,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A hole of `hole_mm` radius at the site, or at the rim of a flap of `flap_mm` radius around the site. `None` when the skull does not go all around the flap.
+    /// A hole of `hole_mm` radius at the site, or at the rim of a flap of `flap_mm` radius around
+    /// the site. `None` when the skull does not go all around the flap.
     pub fn new(bone: Option<&BoneVolume>, site: Site, hole_mm: f32, flap_mm: f32) -> Option<Self> {
         let outline = match bone.filter(|_| flap_mm > 0.0) {
             Some(bone) => outline(bone, &site, flap_mm)?,

@@ -16,7 +16,8 @@ use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 const HELD_BY_BONE_MM: f32 = 6.0;
 /// The lower part of the brain, as a share of its height.
 const LOWER_PART: f32 = 0.35;
-/// How far around tissue its distance is known, mm: more than the widest tool's radius and what it is warned at.
+/// How far around tissue its distance is known, mm: more than the widest tool's radius and what it
+/// is warned at.
 const ROOM_MM: f32 = 9.0;
 /// Fewer held nodes than this do not hold a brain.
 const FEWEST_HELD: usize = 12;
@@ -87,7 +88,8 @@ impl Scene {
 }
 
 impl RestBrain {
-    /// Distance to the tissue of some classes, mm, right up to 9 mm and at least that beyond; `None` where there is none of it.
+    /// Distance to the tissue of some classes, mm, right up to 9 mm and at least that beyond;
+    /// `None` where there is none of it.
     pub fn distance_to(&self, wanted: &[TissueClass]) -> Option<DistanceField> {
         let [nx, ny, _] = self.classes.dims;
         let is = |at: &usize| wanted.iter().any(|class| class.code() == self.classes.data[*at]);

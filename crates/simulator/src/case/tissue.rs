@@ -1,8 +1,9 @@
 //! Tissue classes inside the brain, and which label volumes say so.
 //!
 //! # Practice
-//! The brain's class volume holds [`TissueClass::code`]s: 0 outside, 1 brain, more where a label volume names it. Later sources lie over
-//! earlier ones. What lies outside the brain is left out and counted.
+//! The brain's class volume holds [`TissueClass::code`]s: 0 outside, 1 brain, more where a label
+//! volume names it. Later sources lie over earlier ones. What lies outside the brain is left out
+//! and counted.
 
 use crate::error::SessionError;
 use glam::DAffine3;
@@ -47,7 +48,8 @@ impl TissueClass {
         Self::ALL.into_iter().find(|class| class.name() == name)
     }
 
-    /// The colour that marks it in pictures; black for none. Vermilion and sky blue look apart to every eye (Okabe and Ito 2008).
+    /// The colour that marks it in pictures; black for none. Vermilion and sky blue look apart to
+    /// every eye (Okabe and Ito 2008).
     pub fn tint(self) -> [u8; 3] {
         match self {
             Self::Tumour => [213, 94, 0],
@@ -56,10 +58,11 @@ impl TissueClass {
         }
     }
 
-    /// What it is made of when brain has this Young's modulus, MPa: the presets of `soft`, scaled alike.
+    /// What it is made of when brain has this Young's modulus, MPa: the presets of `soft`, scaled
+    /// alike.
     ///
-    /// A vessel is ten times as stiff as brain. Its wall is stiffer still ([`Material::VESSEL_WALL`]), but would make every step of
-    /// the solver many times shorter.
+    /// A vessel is ten times as stiff as brain. Its wall is stiffer still
+    /// ([`Material::VESSEL_WALL`]), but would make every step of the solver many times shorter.
     pub fn material(self, brain_mpa: f32) -> Material {
         let share = |preset: Material| (preset.young_mpa() / Material::BRAIN.young_mpa()) as f32;
         let young_mpa = brain_mpa
@@ -76,7 +79,8 @@ impl TissueClass {
     }
 }
 
-/// A label volume that says where a class is: `CLASS=PATH`, or `CLASS=PATH:CODE,CODE` where only some codes mean it.
+/// A label volume that says where a class is: `CLASS=PATH`, or `CLASS=PATH:CODE,CODE` where only
+/// some codes mean it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TissueSource {
     /// The class.
@@ -97,7 +101,8 @@ impl TissueSource {
         if self.codes.is_empty() { code != 0 } else { self.codes.contains(&code) }
     }
 
-    /// Writes the class's code where the labels say so and there is brain; returns a remark with its volume.
+    /// Writes the class's code where the labels say so and there is brain; returns a remark with
+    /// its volume.
     pub fn paint(&self, ct_from_mri: DAffine3, classes: &mut VoxelVolume<u8>) -> Result<String, SessionError> {
         let read = trepan_volume::labels(&self.path, &trepan_volume::read(&self.path)?)?;
         let mut here = read.map(|code| u8::from(self.means(code)));

@@ -1,9 +1,10 @@
 //! How late the hand feels a force, from taps.
 //!
 //! # Theory
-//! A tap pushes the hand, and the first new position along it tells that the force has come. A hand of 0.2 kg needs 2 to 3 ms to
-//! move by an encoder's step, so that this is an upper bound: the driver's, the link's, the motors' and the hand's delay together. The
-//! median of the taps keeps a trembling hand from being taken for an answer; a tap on a hand that moves by itself is left out.
+//! A tap pushes the hand, and the first new position along it tells that the force has come. A hand
+//! of 0.2 kg needs 2 to 3 ms to move by an encoder's step, so that this is an upper bound: the
+//! driver's, the link's, the motors' and the hand's delay together. The median of the taps keeps a
+//! trembling hand from being taken for an answer; a tap on a hand that moves by itself is left out.
 
 use crate::device_test::measured::Sample;
 use crate::device_test::trial::{Part, TAP_MS};
@@ -15,7 +16,8 @@ const LEAST_MM: f32 = 0.01;
 /// A hand holds still that moved less than this, mm, in the last time, ms, before a tap.
 const STILL: (f32, f64) = (0.15, 20.0);
 
-/// From a tap to the first motion along it, ms: the median of the taps on a hand that held still; `None` when most of them moved nothing.
+/// From a tap to the first motion along it, ms: the median of the taps on a hand that held still;
+/// `None` when most of them moved nothing.
 pub fn median_ms(samples: &[Sample]) -> Option<f64> {
     let begins = |at: &usize| {
         let (before, now) = (&samples[at - 1], &samples[*at]);
@@ -52,11 +54,11 @@ fn first_motion_ms(samples: &[Sample]) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::device_test::measured::tests::tested;
-    use trepan_haptics::simulated::{Config, Hand};
+    use trepan_haptics::simulated::{Config, HandModel};
 
     #[test]
     fn taps_find_the_delay_of_the_device() {
-        for (name, hand) in [("light", Hand::LIGHT), ("firm", Hand::FIRM)] {
+        for (name, hand) in [("light", HandModel::LIGHT), ("firm", HandModel::FIRM)] {
             for friction_n in [0.0, 0.26] {
                 let found = [0, 2, 5, 8].map(|delay_ticks| {
                     let config = Config { delay_ticks, friction_n, ..Config::default() };
@@ -71,13 +73,13 @@ mod tests {
 
     #[test]
     fn a_hand_that_moves_by_itself_tells_no_delay() {
-        let (samples, ..) = tested(Config::default(), Hand::FIRM, |t| 0.02 * t as f32 % 40.0);
+        let (samples, ..) = tested(Config::default(), HandModel::FIRM, |t| 0.02 * t as f32 % 40.0);
         assert_eq!(median_ms(&samples), None);
     }
 
     #[test]
     fn a_device_that_does_not_move_has_no_delay() {
-        let (mut samples, ..) = tested(Config::default(), Hand::FIRM, |_| 0.0);
+        let (mut samples, ..) = tested(Config::default(), HandModel::FIRM, |_| 0.0);
         samples.iter_mut().for_each(|s| s.tip = Vec3::ONE);
         assert_eq!(median_ms(&samples), None);
         assert_eq!(median_ms(&[]), None);

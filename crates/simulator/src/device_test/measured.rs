@@ -61,7 +61,8 @@ pub struct Measured {
     pub findings: Vec<Finding>,
     /// The loop.
     pub timing: Timing,
-    /// From applied force to seen motion at most, ms; `null` where the device has no motors or nothing moved.
+    /// From applied force to seen motion at most, ms; `null` where the device has no motors or
+    /// nothing moved.
     pub delay_ms: Option<f64>,
     /// Ticks of delay that the driver states.
     pub stated_delay_ticks: u8,
@@ -212,11 +213,12 @@ pub(super) mod tests {
     use crate::device_test::trial::Trial;
     use trepan_geometry::{Pose, ToolState};
     use trepan_haptics::replay::Replay;
-    use trepan_haptics::simulated::{Config, Hand, Simulated};
+    use trepan_haptics::simulated::{Config, HandModel, Simulated};
     use trepan_haptics::{Capabilities, HapticDevice};
 
-    /// A whole test of a simulated device whose hand means to be at heights `intent(ms)`, without a clock.
-    pub fn tested(config: Config, hand: Hand, intent: impl Fn(f64) -> f32) -> (Vec<Sample>, Trial, Capabilities) {
+    /// A whole test of a simulated device whose hand means to be at heights `intent(ms)`, without a
+    /// clock.
+    pub fn tested(config: Config, hand: HandModel, intent: impl Fn(f64) -> f32) -> (Vec<Sample>, Trial, Capabilities) {
         let at = |t: u32| ToolState::at(Pose::from_translation(Vec3::Y * intent(t.into())));
         let mut device = Simulated::new(config, hand, Box::new(Replay::new((0..10_000).map(at).collect())));
         let able = device.capabilities();
@@ -239,7 +241,7 @@ pub(super) mod tests {
             t if t < 4000.0 => 20.0 * (t * 2e-3).sin() as f32,
             t => (20.0 - 0.07 * (t - 4000.0) as f32).max(-15.0),
         };
-        let (samples, trial, able) = tested(Config::default(), Hand::FIRM, hand);
+        let (samples, trial, able) = tested(Config::default(), HandModel::FIRM, hand);
         let [low, high] = explored(&samples);
         assert!((high.y - 20.0).abs() < 2.0 && (low.y + 20.0).abs() < 2.0, "{low} {high}");
         let course =
@@ -255,7 +257,7 @@ pub(super) mod tests {
 
     #[test]
     fn gaps_are_between_new_positions() {
-        let (mut samples, trial, _) = tested(Config::default(), Hand::FIRM, |_| 0.0);
+        let (mut samples, trial, _) = tested(Config::default(), HandModel::FIRM, |_| 0.0);
         samples.iter_mut().enumerate().for_each(|(at, s)| s.fresh = at % 4 == 0);
         let course = Course { samples: &samples, tick_ms: 1.0, late: 7, guard: trial.guard(), floor_y: None };
         let timing = Timing::of(&course);

@@ -1,8 +1,10 @@
-//! `device test NAME`: is the device fit for a session? Rate, jitter, delay, range and a gentle wall, for whoever sits before it.
+//! `device test NAME`: is the device fit for a session? Rate, jitter, delay, range and a gentle
+//! wall, for whoever sits before it.
 //!
 //! # Practice
-//! The device is opened first: what is missing is told before a file is made. The loop is a session's: its own thread, real-time
-//! priority where allowed, deadlines on an absolute grid. Whatever happens, the device is closed, and with it the force.
+//! The device is opened first: what is missing is told before a file is made. The loop is a
+//! session's: its own thread, real-time priority where allowed, deadlines on an absolute grid.
+//! Whatever happens, the device is closed, and with it the force.
 
 mod delay;
 mod findings;
@@ -15,7 +17,7 @@ use crate::report::output::whole;
 use crate::report::summary::Machine;
 use crate::run::clock::{Clock, Schedule};
 use crate::run::stop::Stop;
-use crate::run::threads::{Hand, real_time};
+use crate::run::threads::{HapticDeviceOwner, real_time};
 use measured::{Course, Ending, Floor, Measured, Sample, Timing};
 use std::fs;
 use std::path::Path;
@@ -37,7 +39,8 @@ struct Subject {
     watch: Option<Watch>,
 }
 
-/// Tests the device of a name for some seconds; leaves `device.json` and `device.html` in `out`. Gives the signal that ended it.
+/// Tests the device of a name for some seconds; leaves `device.json` and `device.html` in `out`.
+/// Gives the signal that ended it.
 pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionError> {
     if !(8.0..=600.0).contains(&seconds) {
         return Err(SessionError::Usage(format!("--duration {seconds} is out of range: give 8 to 600")));
@@ -69,7 +72,7 @@ fn open(name: &str, end_ms: f64) -> Result<Subject, String> {
     match &name {
         DeviceName::Script(operation) => software(Box::new(script(operation)?)),
         DeviceName::Simulated(operation) => {
-            let (config, grip) = (simulated::Config::default(), simulated::Hand::FIRM);
+            let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
             software(Box::new(Simulated::new(config, grip, Box::new(script(operation)?))))
         }
         _ => match hardware::open(&name, Workspace::default()) {
@@ -97,7 +100,7 @@ fn test(subject: Subject, end_ms: f64, stop: &Stop) -> (Measured, Vec<Sample>) {
     let able = device.capabilities();
     let tick_ms = 1e3 / f64::from(able.rate_hz.clamp(100.0, 4000.0));
     let over = Stop::default();
-    let hand = Hand { device, stop: over.clone() };
+    let hand = HapticDeviceOwner { device, stop: over.clone() };
     let trial = Trial::new(&able, tick_ms as f32, end_ms);
     let part = AtomicU8::new(Part::Over as u8);
     println!("testing {name} ({}) for {:.0} s; Ctrl-C ends it without force", able.name, 1e-3 * end_ms);
@@ -130,7 +133,14 @@ fn tell(part: &AtomicU8, over: &Stop) {
 }
 
 /// The loop: read, step, apply, note, wait.
-fn feel(mut hand: Hand, mut trial: Trial, tick_ms: f64, end_ms: f64, stop: &Stop, told: &AtomicU8) -> Felt {
+fn feel(
+    mut hand: HapticDeviceOwner,
+    mut trial: Trial,
+    tick_ms: f64,
+    end_ms: f64,
+    stop: &Stop,
+    told: &AtomicU8,
+) -> Felt {
     let remarks = real_time(80, "haptic").into_iter().collect();
     let mut samples = Vec::with_capacity((1.1 * end_ms / tick_ms) as usize + FADE_TICKS as usize);
     let (mut late, mut ending, mut fade) = (0, None, FADE_TICKS);

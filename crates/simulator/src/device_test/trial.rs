@@ -5,12 +5,13 @@
 //!  explore ──────> floor: F = k (y₀ - y) up, where y < y₀ ──────> tap ± ± ± ±
 //!  no force        0.3 N/mm, at most 1 N                          0.8 N, 25 ms each
 //! ```
-//! The floor lies at three tenths of the height that the hand explored, but never over the hand: force begins at zero.
+//! The floor lies at three tenths of the height that the hand explored, but never over the hand:
+//! force begins at zero.
 //!
 //! # Practice
-//! No clock and no device: a function of readings and times. Device axes: x right, y up, z to the user. Every force passes a guard; the
-//! taps' is without energy account, since a tap gives energy by intent: at most 0.8 N over the fraction of a millimetre that a hand
-//! yields in 25 ms.
+//! No clock and no device: a function of readings and times. Device axes: x right, y up, z to the
+//! user. Every force passes a guard; the taps' is without energy account, since a tap gives energy
+//! by intent: at most 0.8 N over the fraction of a millimetre that a hand yields in 25 ms.
 
 use serde::Serialize;
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};

@@ -1,10 +1,13 @@
-//! Bone: a ball slides along the skull and a burr cuts into it, by every method on every grid, against fine voxels of the same CT.
+//! Bone: a ball slides along the skull and a burr cuts into it, by every method on every grid,
+//! against fine voxels of the same CT.
 //!
 //! # Theory
-//! The truth is the force by the oracle on voxels of 0.25 mm of the same CT, trilinear between its samples. The error of a tick is the length of the difference of both
-//! forces; of a choice it is that which 95 of 100 ticks in touch stay within, sliding or cutting, whichever is worse. A tool whose centre comes under the surface,
-//! pressed in or led through a ridge, may leave by more ways than one, and methods that are both right choose differently: it is led no deeper than its radius. Nor much deeper
-//! than the scene says: at a ridge a hand gives way, which a path cannot.
+//! The truth is the force by the oracle on voxels of 0.25 mm of the same CT, trilinear between its
+//! samples. The error of a tick is the length of the difference of both forces; of a choice it is
+//! that which 95 of 100 ticks in touch stay within, sliding or cutting, whichever is worse. A tool
+//! whose centre comes under the surface, pressed in or led through a ridge, may leave by more ways
+//! than one, and methods that are both right choose differently: it is led no deeper than its
+//! radius. Nor much deeper than the scene says: at a ridge a hand gives way, which a path cannot.
 //!
 //! # When not to use it
 //! To know how right the CT is: what the scanner has blurred, nobody knows.
@@ -52,7 +55,7 @@ fn method(bone: &Bone) -> Option<Method> {
 
 /// What a choice came to.
 #[derive(Clone, Copy, Debug)]
-pub struct Found {
+pub struct Measurement {
     /// Error of the force, N.
     pub error_n: f64,
     /// Median tick, µs.
@@ -106,7 +109,8 @@ struct Way {
 }
 
 impl Stretch {
-    /// Cuts it out, with a way along it; `None` where there is too little bone under that, or so much that the tool comes far deeper than it is pressed, or its centre under the surface.
+    /// Cuts it out, with a way along it; `None` where there is too little bone under that, or so
+    /// much that the tool comes far deeper than it is pressed, or its centre under the surface.
     pub fn of(skull: &Skull, slide: &Slide) -> Option<Self> {
         let fine = cut_out(skull, slide.place, FINE_MM)?;
         let path = path(&Surface::of(&fine, slide)?, slide)?;
@@ -117,7 +121,8 @@ impl Stretch {
         (touches > TICKS[1] / 2 && deepest <= deepest_allowed).then_some(stretch)
     }
 
-    /// With a cut straight in from just outside; without one for a burr under 1 mm in radius, which the truth's voxels do not resolve.
+    /// With a cut straight in from just outside; without one for a burr under 1 mm in radius, which
+    /// the truth's voxels do not resolve.
     pub fn cutting(self) -> Self {
         if self.slide.scene.tool_radius_mm < LEAST_CUT_MM {
             return self;
@@ -142,7 +147,8 @@ impl Stretch {
         self
     }
 
-    /// Forces along a path, N, and the median tick, µs. What is cut on the way is there again afterwards.
+    /// Forces along a path, N, and the median tick, µs. What is cut on the way is there again
+    /// afterwards.
     fn ride(&self, method: &Method, bone: &BoneVolume, path: &[ToolState], cuts: bool) -> (Vec<Vec3>, f64) {
         let mut contact = method.build(&Tool::burr(self.slide.scene.tool_radius_mm as f32));
         contact.reset(path[0].world_from_tool);
@@ -164,8 +170,9 @@ impl Stretch {
         (forces, quantile(us, 0.5))
     }
 
-    /// Every choice, in the order given: the worst error of all ways, the tick of the first. The grid of each edge is made once.
-    pub fn measure(&self, skull: &Skull, choices: &[Bone]) -> Vec<Found> {
+    /// Every choice, in the order given: the worst error of all ways, the tick of the first. The
+    /// grid of each edge is made once.
+    pub fn measure(&self, skull: &Skull, choices: &[Bone]) -> Vec<Measurement> {
         let mut grids: Vec<(f64, Option<BoneVolume>)> = Vec::new();
         let mut found = Vec::new();
         for choice in choices {
@@ -180,21 +187,23 @@ impl Stretch {
                     (Some(bone), Some(method)) => self.ride(&method, bone, &way.path, way.cuts),
                     _ => (vec![Vec3::ZERO; way.path.len()], f64::NAN),
                 };
-                Found { error_n: error_n(&forces, &way.truth), tick_us }
+                Measurement { error_n: error_n(&forces, &way.truth), tick_us }
             };
-            let worse = |a: Found, b: Found| Found { error_n: a.error_n.max(b.error_n), ..a };
+            let worse = |a: Measurement, b: Measurement| Measurement { error_n: a.error_n.max(b.error_n), ..a };
             found.extend(self.ways.iter().map(along).reduce(worse));
         }
         found
     }
 
-    /// The recommended method on the truth's own voxels, sliding: what 95 of 100 ticks stay within, N.
+    /// The recommended method on the truth's own voxels, sliding: what 95 of 100 ticks stay within,
+    /// N.
     pub fn recommended_error_n(&self) -> f64 {
         let Way { path, cuts, truth } = &self.ways[0];
         error_n(&self.ride(&Method::RECOMMENDED, &self.fine, path, *cuts).0, truth)
     }
 
-    /// The truth beside forces known otherwise, `of` a place of the tool, sliding: what 95 of 100 ticks stay within, N.
+    /// The truth beside forces known otherwise, `of` a place of the tool, sliding: what 95 of 100
+    /// ticks stay within, N.
     pub fn known_error_n(&self, of: impl Fn(Vec3) -> Vec3) -> f64 {
         let Way { path, truth, .. } = &self.ways[0];
         error_n(&path.iter().map(|tool| of(tool.tip())).collect::<Vec<_>>(), truth)

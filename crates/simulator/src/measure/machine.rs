@@ -1,8 +1,9 @@
 //! How fast this machine is: the numbers that a plan is made from, measured in under two seconds.
 //!
 //! # Practice
-//! The median of many calls, one method at a time, one thread, on small synthetic scenes that stay in the cache as the real ones do. What is not wanted is not
-//! measured and stands as [`Machine::default`] has it.
+//! The median of many calls, one method at a time, one thread, on small synthetic scenes that stay
+//! in the cache as the real ones do. What is not wanted is not measured and stands as
+//! [`Machine::default`] has it.
 
 use crate::run::clock::Clock;
 use std::f32::consts::TAU;
@@ -76,7 +77,7 @@ fn ns_per_tet_step(clock: &Clock) -> f64 {
     1e3 * median_us(clock, CALLS, |_| _ = solver.step(&loads, dt_ms)) / tets as f64
 }
 
-/// Median tick of `distance-field` with a burr of 3 mm on 0.5 mm voxels, µs.
+/// Median tick of `god-object-sphere` with a burr of 3 mm on 0.5 mm voxels, µs.
 fn us_per_rigid_tick(clock: &Clock) -> f64 {
     let n = 64;
     let mut ct = VoxelVolume::isotropic([n; 3], Vec3::splat(-15.75), 0.5, 0i16);
@@ -94,7 +95,8 @@ fn us_per_rigid_tick(clock: &Clock) -> f64 {
     })
 }
 
-/// A wavy shell of bone from all sides: each picture from another one, so that nothing of the last can be used again.
+/// A wavy shell of bone from all sides: each picture from another one, so that nothing of the last
+/// can be used again.
 fn ns_per_ray(clock: &Clock) -> f64 {
     let n = 96;
     let mut ct = VoxelVolume::isotropic([n; 3], Vec3::splat(-95.0), 2.0, AIR_HU);

@@ -1,13 +1,14 @@
-//! What a plan is made from and no table can say: how fast this machine is, and how far each choice is off in this very case.
+//! What a plan is made from and no table can say: how fast this machine is, and how far each choice
+//! is off in this very case.
 
 pub mod bone;
+mod case_errors;
 mod machine;
-mod own;
 pub mod picture;
 pub mod tissue;
 
+pub use case_errors::{CaseErrors, Sight};
 pub use machine::{Wanted, machine};
-pub use own::{Own, Sight};
 
 /// A quantile of values in any order, 0 to 1; NaN without any.
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {

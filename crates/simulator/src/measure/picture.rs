@@ -1,4 +1,5 @@
-//! Picture: the skull from the opening, with fewer rays or fewer pixels, against every ray of the full picture.
+//! Picture: the skull from the opening, with fewer rays or fewer pixels, against every ray of the
+//! full picture.
 
 use crate::run::clock::Clock;
 use std::sync::Arc;
@@ -19,7 +20,7 @@ pub fn choices() -> Vec<Picture> {
 
 /// What a choice came to.
 #[derive(Clone, Copy, Debug)]
-pub struct Found {
+pub struct Measurement {
     /// Root mean square of all colours, percent of white.
     pub error_percent: f64,
     /// Time of a picture on one thread, least of those drawn, µs.
@@ -40,7 +41,8 @@ pub struct View {
 }
 
 impl View {
-    /// Root mean square of all colours over all views, percent of white, of every choice in the order given.
+    /// Root mean square of all colours over all views, percent of white, of every choice in the
+    /// order given.
     ///
     /// # Errors
     /// When the picture has no pixels or too many.
@@ -57,7 +59,7 @@ impl View {
     ///
     /// # Errors
     /// When the picture has no pixels or too many.
-    pub fn measure(&self, choices: &[Picture], threads: usize) -> Result<Vec<Found>, RenderError> {
+    pub fn measure(&self, choices: &[Picture], threads: usize) -> Result<Vec<Measurement>, RenderError> {
         let full = self.scene.picture_pixels;
         let data = SceneData { bone: Some(Arc::clone(&self.bone)), brain: None, mri: None, tint: None };
         let mut renderer = ProcessorRenderer::new(&data, full)?;
@@ -68,7 +70,7 @@ impl View {
         let truth = draw(&mut renderer, &frame, full, &Picture { sparse: false, detail: 1.0 })?.0;
         let one = |choice| {
             let (image, us) = draw(&mut renderer, &frame, full, choice)?;
-            Ok(Found { error_percent: image.enlarged(full).error_percent(&truth), us })
+            Ok(Measurement { error_percent: image.enlarged(full).error_percent(&truth), us })
         };
         choices.iter().map(one).collect()
     }

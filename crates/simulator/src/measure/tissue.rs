@@ -1,11 +1,17 @@
-//! Tissue: a tool presses into the brain and slides, by every solver on every mesh, against a mesh that is fine where the tool is.
+//! Tissue: a tool presses into the brain and slides, by every solver on every mesh, against a mesh
+//! that is fine where the tool is.
 //!
 //! # Theory
-//! The tool's end is a ball that goes into the rest shape by so much as the scene says, at most up to its equator; on every mesh each triangle under it is pressed by a spring, as deep as the ball is
-//! there. (One spring on the mean of all sinks the deeper the finer the mesh is; a flat end shears the tissue at its rim without bound.) The truth is TLED with every element stepped and its cure of
-//! locking, on a mesh with a sixteenth of the edge where the ball goes. The error is the distance between where material points near the
-//! opening are on both, at the end of the push and of the slide; that which 95 of 100 points stay within counts. Cost is counted: a step of TLED per tetrahedron is 1, a sleeping one
-//! a tenth, times how much shorter a mesh's stable step is than its number of tetrahedra lets expect; of the other solvers it is measured as a ratio in one run.
+//! The tool's end is a ball that goes into the rest shape by so much as the scene says, at most up
+//! to its equator; on every mesh each triangle under it is pressed by a spring, as deep as the ball
+//! is there. (One spring on the mean of all sinks the deeper the finer the mesh is; a flat end
+//! shears the tissue at its rim without bound.) The truth is TLED with every element stepped and
+//! its cure of locking, on a mesh with a sixteenth of the edge where the ball goes. The error is
+//! the distance between where material points near the opening are on both, at the end of the push
+//! and of the slide; that which 95 of 100 points stay within counts. Cost is counted: a step of
+//! TLED per tetrahedron is 1, a sleeping one a tenth, times how much shorter a mesh's stable step
+//! is than its number of tetrahedra lets expect; of the other solvers it is measured as a ratio in
+//! one run.
 
 use super::bone::Slide;
 use super::quantile;
@@ -22,13 +28,15 @@ use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Tetrahedra of the whole brain.
 const TETS: [usize; 7] = [3_000, 5_000, 8_000, 12_000, 20_000, 30_000, 50_000];
-/// Meshes that are finer at the opening: tetrahedra of the whole brain, and how often edges are halved there.
+/// Meshes that are finer at the opening: tetrahedra of the whole brain, and how often edges are
+/// halved there.
 const FINER: ([usize; 5], [u32; 2]) = ([3_000, 5_000, 8_000, 12_000, 20_000], [1, 2]);
 /// Meshes with a region of interest, and its limit of motion, mm.
 const STILL: ([usize; 2], f64) = ([5_000, 12_000], 0.01);
 /// Meshes that rivals of TLED can step in real time.
 const RIVALS_TETS: [usize; 1] = [3_000];
-/// How fine a mesh is: tetrahedra of the whole brain, how often their edge is halved around a place, and how far around it, mm.
+/// How fine a mesh is: tetrahedra of the whole brain, how often their edge is halved around a
+/// place, and how far around it, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fineness {
     /// Tetrahedra of the whole brain.
@@ -53,11 +61,13 @@ impl Fineness {
 
 /// Radius of what is finer in a mesh that a session could step, mm.
 pub const OPENING_MM: f32 = 10.0;
-/// Most mass that TLED adds to the elements with the shortest steps, slivers and what is finer at the opening, as a share of the brain's; weight stays.
+/// Most mass that TLED adds to the elements with the shortest steps, slivers and what is finer at
+/// the opening, as a share of the brain's; weight stays.
 pub const MASS_ADDED: f32 = 0.01;
 /// What a sleeping tetrahedron costs.
 const ASLEEP: f64 = 0.1;
-/// Places of the ball's surface, each on the triangle under it: nearer to each other than the nodes of a truth.
+/// Places of the ball's surface, each on the triangle under it: nearer to each other than the nodes
+/// of a truth.
 const PLACES: u32 = 199;
 /// Share of the ball's radius that they lie in, as seen from above.
 const WIDTH: f32 = 0.98;
@@ -91,7 +101,7 @@ pub fn choices() -> Vec<Tissue> {
 
 /// What a choice came to.
 #[derive(Clone, Copy, Debug)]
-pub struct Found {
+pub struct Measurement {
     /// Error of the displacement, mm.
     pub error_mm: f64,
     /// Work of a step over that of one with every tetrahedron awake, TLED; else 1.
@@ -102,8 +112,9 @@ pub struct Found {
     pub ns: f64,
 }
 
-/// What a choice costs over what a machine's number and the step by the tetrahedra's number alone let expect; `found` is what all choices came to.
-pub fn cost(at: usize, choices: &[Tissue], found: &[Found], scene: &Scene) -> f64 {
+/// What a choice costs over what a machine's number and the step by the tetrahedra's number alone
+/// let expect; `found` is what all choices came to.
+pub fn cost(at: usize, choices: &[Tissue], found: &[Measurement], scene: &Scene) -> f64 {
     let (choice, of) = (&choices[at], &found[at]);
     let of_step = match choice.solver {
         "tled" => of.awake,
@@ -129,7 +140,8 @@ pub struct Shape {
     pub material: Material,
 }
 
-/// A brain in meshes that are alike everywhere, for many scenes; those that are finer at an opening are made for each.
+/// A brain in meshes that are alike everywhere, for many scenes; those that are finer at an opening
+/// are made for each.
 pub struct Brains<'a> {
     shape: &'a Shape,
     choices: Vec<Tissue>,
@@ -166,9 +178,9 @@ impl<'a> Brains<'a> {
     }
 
     /// TLED with or without its cure of locking.
-    fn cured(&self, mesh: &TetMesh, cure_locking: bool) -> Result<Tled, SessionError> {
+    fn cured(&self, mesh: &TetMesh, averaged_pressure: bool) -> Result<Tled, SessionError> {
         let body = Body::uniform(mesh.clone(), held(mesh), self.shape.material);
-        self.tled(&body, Config { cure_locking, ..Config::default() })
+        self.tled(&body, Config { averaged_pressure, ..Config::default() })
     }
 
     /// TLED as a session steps it.
@@ -252,7 +264,7 @@ impl Push {
     ///
     /// # Errors
     /// When the mask cannot be filled.
-    pub fn measure_finer(&self, brains: &Brains, fineness: Fineness, cure: bool) -> Result<Found, SessionError> {
+    pub fn measure_finer(&self, brains: &Brains, fineness: Fineness, cure: bool) -> Result<Measurement, SessionError> {
         let mesh = self.finer(brains.shape, fineness, 0.0)?;
         Ok(self.found(&mesh, &mut brains.cured(&mesh, cure)?, LONGEST_MS[0]))
     }
@@ -261,7 +273,7 @@ impl Push {
     ///
     /// # Errors
     /// When a solver refuses the brain.
-    pub fn measure(&self, brains: &Brains) -> Result<Vec<Found>, SessionError> {
+    pub fn measure(&self, brains: &Brains) -> Result<Vec<Measurement>, SessionError> {
         let one = |choice: &Tissue| {
             let (tets, halvings) = (choice.tets, choice.halvings);
             let finer = (halvings > 0).then(|| self.finer(brains.shape, Fineness::stepped(tets, halvings), 0.0));
@@ -274,9 +286,9 @@ impl Push {
         brains.choices.iter().map(one).collect()
     }
 
-    fn found(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Found {
+    fn found(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> Measurement {
         let (places, awake, dt_ms, ns) = self.run(mesh, solver, longest_ms);
-        Found { error_mm: self.error_mm(&places), awake, dt_ms, ns }
+        Measurement { error_mm: self.error_mm(&places), awake, dt_ms, ns }
     }
 
     /// A truth beside a finer one: what 95 of 100 points stay within, mm.
@@ -284,7 +296,8 @@ impl Push {
         self.error_mm(&finer.truth)
     }
 
-    /// How far the point goes that goes farthest, mm; 0 where the tool finds tissue that is held, or none.
+    /// How far the point goes that goes farthest, mm; 0 where the tool finds tissue that is held,
+    /// or none.
     pub fn moved_mm(&self) -> f64 {
         self.truth.iter().map(|moved| f64::from(moved.length())).fold(0.0, f64::max)
     }
@@ -293,7 +306,8 @@ impl Push {
         quantile(places.iter().zip(&self.truth).map(|(a, b)| f64::from(a.distance(*b))).collect(), 0.95)
     }
 
-    /// Displacements of the points at the end of push and slide, mean work of a step, its length, ms, and ns for each tetrahedron and step.
+    /// Displacements of the points at the end of push and slide, mean work of a step, its length,
+    /// ms, and ns for each tetrahedron and step.
     fn run(&self, mesh: &TetMesh, solver: &mut dyn Solver, longest_ms: f32) -> (Vec<Vec3>, f64, f64, f64) {
         let (seats, touch) = (seats(mesh, &self.points), Touch::of(mesh, self.slide.place));
         let dt_ms = solver.seam().stable_dt_ms().min(longest_ms);
@@ -329,7 +343,8 @@ impl Push {
         self.slide.place + share * self.slide.length_mm * self.slide.along(self.normal)
     }
 
-    /// The tool at a time: a spring on each triangle under its ball, as deep into the rest shape as the ball is there.
+    /// The tool at a time: a spring on each triangle under its ball, as deep into the rest shape as
+    /// the ball is there.
     fn press(&self, mesh: &TetMesh, touch: &Touch, now_ms: f32, out: &mut NodalContacts) {
         let (scene, way) = (&self.slide.scene, (now_ms - TIMES_MS[0] - TIMES_MS[1]) / TIMES_MS[2]);
         let (middle, radius) = (self.on_way(way.clamp(0.0, 1.0)), scene.probe_radius_mm as f32);
@@ -401,7 +416,8 @@ impl Touch {
     }
 }
 
-/// Weights of the corners of a triangle at its point nearest to `p`, near enough: the foot on the plane, cut to the triangle.
+/// Weights of the corners of a triangle at its point nearest to `p`, near enough: the foot on the
+/// plane, cut to the triangle.
 fn nearest(p: Vec3, [a, b, c]: [Vec3; 3]) -> [f32; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d, e, f) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));

@@ -1,7 +1,9 @@
-//! Which models a session runs, and why: what the user gave, else what the recording ran, else what the preset or the plan for this machine says.
+//! Which models a session runs, and why: what the user gave, else what the recording ran, else what
+//! the preset or the plan for this machine says.
 //!
 //! # Theory
-//! Bone, tissue and picture are chosen each for itself. What is given of a part stands; the rest of it is
+//! Bone, tissue and picture are chosen each for itself. What is given of a part stands; the rest of
+//! it is
 //!
 //! ```text
 //! a replay         the recording's, from its header
@@ -10,23 +12,24 @@
 //! ```
 //!
 //! # Practice
-//! Settled once at start. The machine is measured only for parts that a plan chooses, in under two seconds, and the case in some thirty where it was not before; a replay, a preset, or a session with everything given
-//! measures nothing, so that it is the same on every machine.
+//! Settled once at start. The machine is measured only for parts that a plan chooses, in under two
+//! seconds, and the case in some thirty where it was not before; a replay, a preset, or a session
+//! with everything given measures nothing, so that it is the same on every machine.
 
-mod given;
-mod told;
+mod describe;
+mod overrides;
 
-pub use given::{FASTEST, rigid_of, solver_named};
-pub use told::{BoneSummary, ModelSummary, PictureSummary, TissueSummary};
+pub use describe::{BoneSummary, ModelSummary, PictureSummary, TissueSummary};
+pub use overrides::{FASTEST, rigid_of, solver_named};
 
 use crate::case::Recipe;
 use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
-use crate::measure::{self, Own, Wanted};
+use crate::measure::{self, CaseErrors, Wanted};
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
 use crate::program::Program;
-use given::{Given, written};
+use overrides::{Overrides, written};
 use serde::{Deserialize, Serialize};
 use trepan_budget::{Choice, Plan, Quality, Rows, Scene, Setup};
 use trepan_geometry::{ToolKind, units};
@@ -48,7 +51,8 @@ pub struct Models {
     pub unmet: Vec<String>,
     /// The plan, where something was planned.
     pub plan: Option<Plan>,
-    /// Whether it was made from errors of bone, tissue and picture that were found in this very case.
+    /// Whether it was made from errors of bone, tissue and picture that were found in this very
+    /// case.
     pub measured: [bool; 3],
 }
 
@@ -62,11 +66,11 @@ pub struct Facts {
 }
 
 /// What is known of a session's models before its case is open.
-pub struct Wish {
+pub struct ModelRequest {
     program: Program,
     /// `None` for a replay.
     quality: Option<Quality>,
-    given: Given,
+    given: Overrides,
     tolerances: Tolerances,
     young_mpa: f32,
     rate_hz: f32,
@@ -75,8 +79,9 @@ pub struct Wish {
     pictures_per_s: f64,
 }
 
-impl Wish {
-    /// What the options say, and what the recording ran that is run again; refuses names that nobody knows.
+impl ModelRequest {
+    /// What the options say, and what the recording ran that is run again; refuses names that
+    /// nobody knows.
     pub fn of(
         program: Program,
         options: &Options,
@@ -85,12 +90,12 @@ impl Wish {
     ) -> Result<Self, SessionError> {
         let preset = options.quality.filter(|&quality| quality != Quality::Auto);
         let recording = recording.filter(|_| preset.is_none());
-        let given = Given::flags(&options.patient, options.rigid.as_deref(), options.solver.as_deref())?;
+        let given = Overrides::flags(&options.patient, options.rigid.as_deref(), options.solver.as_deref())?;
         let pictures = !options.headless || options.frames_per_second > 0.0;
         Ok(Self {
             program,
             quality: if recording.is_some() { None } else { Some(preset.unwrap_or_default()) },
-            given: recording.map(|r| Given::recorded(&r.header.config)).into_iter().fold(given, Given::or),
+            given: recording.map(|r| Overrides::recorded(&r.header.config)).into_iter().fold(given, Overrides::or),
             tolerances: options.tolerances,
             young_mpa: units::mpa_from_kpa(operation.young_kpa),
             rate_hz: operation.rate_hz,
@@ -110,7 +115,7 @@ impl Wish {
         Ok(Self {
             program,
             quality: Some(Quality::Auto),
-            given: Given::flags(patient, None, None)?,
+            given: Overrides::flags(patient, None, None)?,
             tolerances,
             young_mpa: Material::BRAIN.young_mpa() as f32,
             rate_hz,
@@ -123,21 +128,22 @@ impl Wish {
     pub fn on(mut self, recipe: &Recipe) -> Self {
         let spacing_mm = written(recipe.spacing_mm);
         let (tets, halvings) = (Some(recipe.tets), Some(recipe.halvings));
-        let as_built = Given { spacing_mm: Some(spacing_mm), tets, halvings, ..Given::default() };
+        let as_built = Overrides { spacing_mm: Some(spacing_mm), tets, halvings, ..Overrides::default() };
         let words = [format!("voxels of {spacing_mm} mm"), format!("{} tetrahedra", recipe.tets)];
         let of_parts = self.given.words.each_mut().into_iter().zip(words);
         of_parts.for_each(|(part, what)| part.push(format!("the case folder has {what}")));
-        self.given = Given { words: self.given.words.clone(), ..as_built.or(self.given) };
+        self.given = Overrides { words: self.given.words.clone(), ..as_built.or(self.given) };
         self
     }
 
-    /// The models for a case with these images. `card` says whether a graphics card draws; it is asked only where that matters.
-    /// `own` finds how far rows are off in this very case; it is asked only where a plan is made.
+    /// The models for a case with these images. `card` says whether a graphics card draws; it is
+    /// asked only where that matters. `own` finds how far rows are off in this very case; it is
+    /// asked only where a plan is made.
     pub fn settle(
         &self,
         facts: &Facts,
         card: impl FnOnce() -> bool,
-        own: impl FnOnce(&Scene, &Rows) -> Result<Own, SessionError>,
+        own: impl FnOnce(&Scene, &Rows) -> Result<CaseErrors, SessionError>,
     ) -> Result<Models, SessionError> {
         let (given, usual) = (&self.given, usual());
         let preset = self.quality.map_or(Some(usual), Quality::preset);
@@ -168,13 +174,14 @@ impl Wish {
         })
     }
 
-    /// Measures the machine and the case and plans what is wanted, among the rows that have what is given; says what was measured of the case.
+    /// Measures the machine and the case and plans what is wanted, among the rows that have what is
+    /// given; says what was measured of the case.
     fn plan(
         &self,
         facts: &Facts,
         wanted: Wanted,
         device_draws: bool,
-        own: impl FnOnce(&Scene, &Rows) -> Result<Own, SessionError>,
+        own: impl FnOnce(&Scene, &Rows) -> Result<CaseErrors, SessionError>,
     ) -> Result<(Plan, [bool; 3]), SessionError> {
         let internal = |fault: trepan_budget::PlanError| SessionError::Internal(format!("--quality auto: {fault}"));
         let (machine, mut rows) = (measure::machine(wanted, device_draws), Rows::stored().map_err(internal)?);
@@ -182,7 +189,7 @@ impl Wish {
             let off = |b: &f64| (a / b).ln().abs();
             all.min_by(|x, y| off(x).total_cmp(&off(y)))
         };
-        let Given { spacing_mm, rigid, tets, halvings, solver, .. } = self.given;
+        let Overrides { spacing_mm, rigid, tets, halvings, solver, .. } = self.given;
         rows.bone.retain(|row| rigid.is_none_or(|method| row.what.method == method));
         let spacing_mm = spacing_mm.and_then(|mm| near(mm, &mut rows.bone.iter().map(|row| row.what.spacing_mm)));
         rows.bone.retain(|row| spacing_mm.is_none_or(|mm| row.what.spacing_mm == mm));
@@ -322,14 +329,14 @@ mod tests {
     use clap::Parser;
     use trepan_budget::{Bone, Tissue};
 
-    fn by_law(_: &Scene, _: &Rows) -> Result<Own, SessionError> {
-        Ok(Own::default())
+    fn by_law(_: &Scene, _: &Rows) -> Result<CaseErrors, SessionError> {
+        Ok(CaseErrors::default())
     }
 
-    fn wish(line: &str, recording: Option<&Recording>) -> Wish {
+    fn wish(line: &str, recording: Option<&Recording>) -> ModelRequest {
         let options = Options::try_parse_from(format!("x --headless {line}").split_whitespace()).unwrap();
         let operation = Operation::of(&options, &trepan_haptics::DeviceName::Mouse, recording);
-        Wish::of(Program::Integrated, &options, &operation, recording).unwrap()
+        ModelRequest::of(Program::Integrated, &options, &operation, recording).unwrap()
     }
 
     const FACTS: Facts = Facts { ct_voxel_mm: Some(1.0), brain_mm3: Some(1.2e6) };

@@ -89,7 +89,8 @@ pub fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, String> {
     Ok(svg)
 }
 
-/// How often times fell into bins, both axes logarithmic. `what` names them; `bins`: (upper edge in µs, count).
+/// How often times fell into bins, both axes logarithmic. `what` names them; `bins`: (upper edge in
+/// µs, count).
 pub fn histogram(what: &str, bins: &[(f64, u64)], limit_us: f64) -> Result<String, String> {
     let used: Vec<(f64, f64)> =
         bins.iter().filter(|b| b.1 > 0).map(|&(edge, count)| (edge.max(0.01), count as f64)).collect();

@@ -1,9 +1,10 @@
 //! The drilled skull in the scanner's own voxels: the CT as it was read, with air where bone went.
 //!
 //! # Theory
-//! Of a voxel of the CT the share `r` of its bone went, counted at points spread evenly through it, each in the voxel of the carved grid that
-//! holds it: `V' = V + r (air - V)`. Dense voxels without bone of the carved grid, such as half-filled ones at the rim of a
-//! piece and marrow within it, go with the nearest bone:
+//! Of a voxel of the CT the share `r` of its bone went, counted at points spread evenly through it,
+//! each in the voxel of the carved grid that holds it: `V' = V + r (air - V)`. Dense voxels without
+//! bone of the carved grid, such as half-filled ones at the rim of a piece and marrow within it, go
+//! with the nearest bone:
 //!
 //! ```text
 //! r = gone / (gone + left)                   where the carved grid has bone
@@ -41,7 +42,8 @@ pub fn drilled(mut ct: VoxelVolume<i16>, before: &VoxelVolume<i16>, bone: &BoneV
     ct
 }
 
-/// What became of a voxel of the carved grid: whether its bone is gone; `None` where it had none that is known.
+/// What became of a voxel of the carved grid: whether its bone is gone; `None` where it had none
+/// that is known.
 fn fate(was: i16, is: i16, isovalue: i16) -> Option<bool> {
     match was {
         _ if was >= isovalue => Some(is < isovalue),
@@ -125,7 +127,8 @@ fn share(ct: &VoxelVolume<i16>, voxel: USizeVec3, before: &VoxelVolume<i16>, bon
     (gone + left > 0).then(|| f32::from(gone) / f32::from(gone + left))
 }
 
-/// Gives dense voxels without a share that of the nearest with one, along dense voxels; bone that is left comes first where both are as near.
+/// Gives dense voxels without a share that of the nearest with one, along dense voxels; bone that
+/// is left comes first where both are as near.
 fn spread(ct: &VoxelVolume<i16>, part: &Part, shares: &mut [Option<f32>]) {
     let edges = ct.spacing_mm();
     let steps = [(IVec3::X, edges.x), (IVec3::Y, edges.y), (IVec3::Z, edges.z)];
@@ -157,7 +160,8 @@ mod tests {
     use glam::{DAffine3, DMat3};
     use trepan_volume::{Grid, Interpolation, resample};
 
-    /// A plate of bone 6 mm thick with marrow in its middle and soft tissue around it, blurred as a scanner does, on an oblique grid.
+    /// A plate of bone 6 mm thick with marrow in its middle and soft tissue around it, blurred as a
+    /// scanner does, on an oblique grid.
     fn ct() -> VoxelVolume<i16> {
         let matrix3 = DMat3::from_rotation_x(0.2) * DMat3::from_diagonal(DVec3::new(-0.6, 0.6, 1.1));
         let affine = DAffine3 { matrix3, translation: DVec3::new(24.0, -22.0, -16.0) };

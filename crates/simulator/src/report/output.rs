@@ -115,7 +115,8 @@ impl Drop for Place {
     }
 }
 
-/// Writes the drilled skull's densities, and with `surface` the triangles of the bone as it was carved.
+/// Writes the drilled skull's densities, and with `surface` the triangles of the bone as it was
+/// carved.
 pub fn drilled(out: &Path, densities: &VoxelVolume<i16>, bone: &BoneVolume, surface: bool) -> Result<(), SessionError> {
     let failed = |fault: &dyn std::fmt::Display| SessionError::Case(format!("{fault}; give another folder with --out"));
     nifti::write(&out.join("drilled.nii.gz"), densities).map_err(|fault| failed(&fault))?;

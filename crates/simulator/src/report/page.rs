@@ -1,4 +1,5 @@
-//! `report.html`: a session on one page that needs nothing else: pictures, curves from the recording, scores, the machine.
+//! `report.html`: a session on one page that needs nothing else: pictures, curves from the
+//! recording, scores, the machine.
 
 use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Curve, histogram, over_time};
@@ -63,7 +64,8 @@ fn models(page: &mut String, summary: &Summary) {
     *page += "</ul>";
 }
 
-/// Everything that was told, in the order of time; what a teacher asked for stands in the recording only.
+/// Everything that was told, in the order of time; what a teacher asked for stands in the recording
+/// only.
 fn happened(page: &mut String, outcome: &Outcome, recording: &Recording) {
     let told = outcome.written.notices.iter().map(|notice| (notice.time_ms, notice.words()));
     let told = told.filter(|(_, (kind, _))| *kind != "cleared").map(|(time_ms, (kind, text))| Told {

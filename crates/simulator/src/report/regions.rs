@@ -1,8 +1,11 @@
-//! Where the brain was pressed, and how hard: by the tissue under the tool and the side of the head.
+//! Where the brain was pressed, and how hard: by the tissue under the tool and the side of the
+//! head.
 //!
 //! # Theory
-//! The place under the tool's ball is carried back along the contact's normal to the brain's surface at rest, as far as it was pushed in. A tick with force counts to the tissue class
-//! a millimetre below there, or of the nearest brain within 4 mm. Its share is `∫ F dt`. What was pushed aside counts to its neighbour.
+//! The place under the tool's ball is carried back along the contact's normal to the brain's
+//! surface at rest, as far as it was pushed in. A tick with force counts to the tissue class a
+//! millimetre below there, or of the nearest brain within 4 mm. Its share is `∫ F dt`. What was
+//! pushed aside counts to its neighbour.
 //!
 //! # When not to use it
 //! For functional regions: there is no atlas here.

@@ -2,12 +2,12 @@
 
 use crate::models::ModelSummary;
 use crate::program::Program;
-use crate::report::against::Against;
+use crate::report::plan_comparison::PlanComparison;
 use crate::report::regions::Region;
 use crate::run::{Outcome, Replayed, Times};
 use crate::stages::notice::What;
 use crate::stages::score::ScoreKeeper;
-use crate::stages::solver_step::Mishaps;
+use crate::stages::solver_step::SolverFaults;
 use serde::Serialize;
 use std::fs;
 use trepan_contact::GuardCounters;
@@ -53,7 +53,7 @@ pub struct Summary {
     /// Scores.
     pub scores: ScoreKeeper,
     /// The bone that went against the plan; `null` without bone.
-    pub plan: Option<Against>,
+    pub plan: Option<PlanComparison>,
     /// Where the brain was pressed, the most first.
     pub regions: Vec<Region>,
     /// Ticks in which the force guard acted, by cause.
@@ -64,7 +64,7 @@ pub struct Summary {
     pub frames: u64,
     /// Pictures a second of the time in which they were drawn.
     pub fps: f64,
-    /// Against its recording, in a replay.
+    /// PlanComparison its recording, in a replay.
     pub replay: Option<Replayed>,
     /// Records that the recording lost.
     pub dropped_records: u64,
@@ -157,7 +157,7 @@ pub struct SolverSummary {
     pub end_displacement_mm: f32,
     /// What it had to put right, summed over steps.
     #[serde(flatten)]
-    pub mishaps: Mishaps,
+    pub solver_faults: SolverFaults,
 }
 
 /// Forces on the hand.
@@ -275,8 +275,8 @@ pub struct About {
     pub drawn_s: f64,
     /// Bone that was cut off.
     pub cut_off: CutOff,
-    /// Against the plan.
-    pub plan: Option<Against>,
+    /// PlanComparison the plan.
+    pub plan: Option<PlanComparison>,
     /// Where the brain was pressed.
     pub regions: Vec<Region>,
     /// Remarks of import and pictures.
@@ -291,7 +291,7 @@ impl Summary {
         let seconds = outcome.seconds.max(1e-9);
         let rate_hz = outcome.ticks.count as f64 / seconds;
         let slow = outcome.replayed.is_none().then(|| slow(rate_hz, about.asked_hz)).flatten();
-        let mishaps = outcome.solver.iter().flat_map(|solver| solver.mishaps.remarks());
+        let solver_faults = outcome.solver.iter().flat_map(|solver| solver.solver_faults.remarks());
         Self {
             app: about.program.name().into(),
             case: about.case,
@@ -316,7 +316,7 @@ impl Summary {
                 real_time_factor: solver.real_time_factor,
                 max_displacement_mm: solver.max_displacement_mm,
                 end_displacement_mm: solver.end_displacement_mm,
-                mishaps: solver.mishaps,
+                solver_faults: solver.solver_faults,
             }),
             force_n: Forces {
                 max: outcome.scores.peak_force_n,
@@ -344,7 +344,7 @@ impl Summary {
                 .into_iter()
                 .chain(about.remarks)
                 .chain(outcome.remarks.iter().cloned())
-                .chain(mishaps)
+                .chain(solver_faults)
                 .collect(),
             machine: about.machine,
         }
@@ -400,7 +400,7 @@ mod tests {
             second_device: String::new(),
             models: ModelSummary {
                 quality: "usual",
-                bone: BoneSummary { method: "distance-field", spacing_mm: 1.0, points: 0, why: why() },
+                bone: BoneSummary { method: "god-object-sphere", spacing_mm: 1.0, points: 0, why: why() },
                 tissue: TissueSummary { solver: "tled", tets: 0, halvings: 0, still_mm: 0.0, why: why() },
                 picture: PictureSummary { sparse: false, detail: 1.0, why: why() },
                 planned_cores: None,

@@ -1,9 +1,10 @@
 //! The session's clock, and waiting for the next tick.
 //!
 //! # Practice
-//! A sleeping thread wakes late by the kernel's timer slack (about 0.06 ms) and more on a busy machine, so the wait
-//! sleeps to just before the deadline and spins for the rest. Deadlines are absolute: a late tick does not push
-//! later ones back, and lost ticks are counted, never caught up.
+//! A sleeping thread wakes late by the kernel's timer slack (about 0.06 ms) and more on a busy
+//! machine, so the wait sleeps to just before the deadline and spins for the rest. Deadlines are
+//! absolute: a late tick does not push later ones back, and lost ticks are counted, never caught
+//! up.
 
 use std::time::{Duration, Instant};
 

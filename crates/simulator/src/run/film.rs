@@ -1,10 +1,12 @@
-//! A replay as a film: made once at full speed on the replay's thread, shown at any time, forwards and backwards, by the window.
+//! A replay as a film: made once at full speed on the replay's thread, shown at any time, forwards
+//! and backwards, by the window.
 //!
 //! # Theory
-//! Stages run forwards only; what they change does not. A [`Shot`] is taken thirty times a second of session time, and where a warning
-//! comes or goes or something else is told, and holds what the picture needs: the tick's view, where
-//! the brain is, and each voxel that changed since the shot before, with its density before and after. Played forwards the new densities are
-//! written, backwards the old ones: at any shot the skull is, voxel by voxel, what it was then.
+//! Stages run forwards only; what they change does not. A [`Shot`] is taken thirty times a second
+//! of session time, and where a warning comes or goes or something else is told, and holds what the
+//! picture needs: the tick's view, where the brain is, and each voxel that changed since the shot
+//! before, with its density before and after. Played forwards the new densities are written,
+//! backwards the old ones: at any shot the skull is, voxel by voxel, what it was then.
 //!
 //! ```text
 //!  stages ── carve a skull of their own ──┐
@@ -12,8 +14,9 @@
 //! ```
 //!
 //! # Practice
-//! The stages run on a copy of the skull, so memory is that of three skulls (copy, and what the last shot saw) and of a brain for each of at most [`BRAINS`] shots: 12 bytes a node. A
-//! minute of craniotomy is made in a second; with the brain, in about the time that the solver needs.
+//! The stages run on a copy of the skull, so memory is that of three skulls (copy, and what the
+//! last shot saw) and of a brain for each of at most [`BRAINS`] shots: 12 bytes a node. A minute of
+//! craniotomy is made in a second; with the brain, in about the time that the solver needs.
 //!
 //! # When not to use it
 //! Headless: nobody goes back and forth there.
@@ -74,8 +77,8 @@ impl Filming {
         (Self { shots, skull, next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, told }, coming)
     }
 
-    /// Takes a shot of a tick if it is time for one, if something happened in it, or if it is the last; `brain` copies the positions of the brain's nodes. False when nobody looks
-    /// any more.
+    /// Takes a shot of a tick if it is time for one, if something happened in it, or if it is the
+    /// last; `brain` copies the positions of the brain's nodes. False when nobody looks any more.
     pub fn tick(&mut self, view: View, last: bool, brain: impl FnOnce() -> Option<Vec<Vec3>>) -> bool {
         let time_ms = view.time_ms;
         let told = (view.warnings, view.news);

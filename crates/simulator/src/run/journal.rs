@@ -1,8 +1,11 @@
-//! The recording thread: takes what the loops send through rings and writes it, so that no loop ever touches a file.
+//! The recording thread: takes what the loops send through rings and writes it, so that no loop
+//! ever touches a file.
 //!
 //! # Practice
-//! Rings hold 4 s of ticks; what does not fit is counted and told. Chunks are flushed five times a second, so that a killed
-//! session loses at most the last fifth of a second. The scores so far are an event `score` five times a second, for whoever watches and for viewers of the file. A full disk ends the recording, never the session.
+//! Rings hold 4 s of ticks; what does not fit is counted and told. Chunks are flushed five times a
+//! second, so that a killed session loses at most the last fifth of a second. The scores so far are
+//! an event `score` five times a second, for whoever watches and for viewers of the file. A full
+//! disk ends the recording, never the session.
 
 use crate::run::clock::Clock;
 use crate::run::watch::Share;
@@ -23,7 +26,7 @@ const SCORES_MS: f64 = 200.0;
 const DRAIN: Duration = Duration::from_millis(5);
 
 /// The loops' ends of the rings.
-pub struct Pens {
+pub struct JournalSenders {
     /// For the haptic loop.
     pub ticks: Sender<TickRecord>,
     /// For the haptic loop, where there is a second hand.
@@ -69,14 +72,14 @@ impl Written {
 }
 
 /// Both ends.
-pub fn journal() -> (Pens, Journal) {
+pub fn journal() -> (JournalSenders, Journal) {
     let (ticks, ticks_in) = bounded(RING);
     let (second, second_in) = bounded(RING);
     let (notices, notices_in) = bounded(RING / 8);
     let (collisions, collisions_in) = bounded(RING);
     let (solver, solver_in) = bounded(RING);
     (
-        Pens { ticks, second, notices, collisions, solver },
+        JournalSenders { ticks, second, notices, collisions, solver },
         Journal {
             ticks: ticks_in,
             second: second_in,
@@ -89,7 +92,8 @@ pub fn journal() -> (Pens, Journal) {
 }
 
 impl Journal {
-    /// Writes until every loop has dropped its pens and the rings are empty; then closes the recording.
+    /// Writes until every loop has dropped its senders and the rings are empty; then closes the
+    /// recording.
     pub fn write(mut self, mut recorder: Recorder, mut share: Option<Share>, clock: Clock) -> Written {
         let mut written = Written::default();
         let mut flushed_ms = 0.0;

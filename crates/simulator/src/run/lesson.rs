@@ -1,8 +1,10 @@
-//! What a teacher asks of a running session: a ghost of the tool, a marker, a pause, trouble with the drill or the patient.
+//! What a teacher asks of a running session: a ghost of the tool, a marker, a pause, trouble with
+//! the drill or the patient.
 //!
 //! # Theory
-//! A pause is a button that the teacher holds: it comes into the hand's reading before the tick sees it, and so into the recording. The tick lets the
-//! force go at the guard's pace, and no other button counts. A drill without power is a pedal that does nothing.
+//! A pause is a button that the teacher holds: it comes into the hand's reading before the tick
+//! sees it, and so into the recording. The tick lets the force go at the guard's pace, and no other
+//! button counts. A drill without power is a pedal that does nothing.
 //!
 //! ```text
 //!  teacher's window ──shared memory──> recording thread ──cells──┬─> the hand's device: pause, no pedal
@@ -11,8 +13,9 @@
 //! ```
 //!
 //! # Practice
-//! The haptic loop reads one cell a tick, some ns, and waits for nobody. A teacher that is silent for three seconds has gone: everything that was asked for ends. A replay needs no teacher:
-//! the readings hold what was asked.
+//! The haptic loop reads one cell a tick, some ns, and waits for nobody. A teacher that is silent
+//! for three seconds has gone: everything that was asked for ends. A replay needs no teacher: the
+//! readings hold what was asked.
 
 use crate::run::watch::Watching;
 use trepan_contact::GuardedWrench;
@@ -145,7 +148,8 @@ impl Teacher {
         &self.record
     }
 
-    /// Tells the trainee, and where the teacher holds the ghost of the tool; often, since silence ends everything.
+    /// Tells the trainee, and where the teacher holds the ghost of the tool; often, since silence
+    /// ends everything.
     pub fn tell(&mut self, ghost: Pose) {
         self.record.seq += 1;
         self.record.ghost = ghost;

@@ -1,9 +1,10 @@
 //! A recorded session run again: the same stages in the recorded order, on one thread.
 //!
 //! # Theory
-//! Live, three loops race; what each of them did depends only on which results of the others it had seen. The recording names
-//! them: a tick its patch, a collision step its tick and its solver step, a solver step its contact. Run again in any order
-//! that respects these names, every stage sees what it saw, so every number comes out the same, bit for bit:
+//! Live, three loops race; what each of them did depends only on which results of the others it had
+//! seen. The recording names them: a tick its patch, a collision step its tick and its solver step,
+//! a solver step its contact. Run again in any order that respects these names, every stage sees
+//! what it saw, so every number comes out the same, bit for bit:
 //!
 //! ```text
 //! tick t      ← patch p                          collisions up to p first
@@ -12,16 +13,17 @@
 //! ```
 //!
 //! # Practice
-//! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by how much. Steps of another length are matched by simulated time. It runs as fast as it can; for a window that
-//! goes back and forth in time it is filmed meanwhile (`run/film.rs`).
+//! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by
+//! how much. Steps of another length are matched by simulated time. It runs as fast as it can; for
+//! a window that goes back and forth in time it is filmed meanwhile (`run/film.rs`).
 
 use crate::run::clock::Clock;
 use crate::run::film::{Filming, Shot};
 use crate::run::journal::Kept;
-use crate::run::journal::{Journal, Pens, journal};
+use crate::run::journal::{Journal, JournalSenders, journal};
 use crate::run::stop::Stop;
 use crate::run::threads::outcome;
-use crate::run::{Cells, Eyes, Numbered, Outcome, Replayed, Stages, Ticks, Times, Tissue, View};
+use crate::run::{Cells, Numbered, Outcome, RenderInputs, Replayed, Stages, Ticks, Times, Tissue, View};
 use crate::stages::collision_step::SoftFrame;
 use crate::stages::haptic_tick::{HapticStage, TickInput, ToolSample};
 use crate::stages::second_hand::{SecondHand, SecondView};
@@ -46,8 +48,8 @@ pub fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
     &ticks[..until + fading]
 }
 
-/// Runs a recording again, up to a time, ms. Who is filmed goes on being looked at after the end; else the end asks
-/// for a stop.
+/// Runs a recording again, up to a time, ms. Who is filmed goes on being looked at after the end;
+/// else the end asks for a stop.
 pub fn run(
     stages: Stages,
     (recording, end_ms): (&Recording, f64),
@@ -55,18 +57,18 @@ pub fn run(
     start: ToolSample,
     film: Option<(Filming, Receiver<Shot>)>,
     stop: &Stop,
-    picture: impl FnOnce(Eyes),
+    picture: impl FnOnce(RenderInputs),
 ) -> Outcome {
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
-    let (pens, pages) = journal();
+    let (senders, pages) = journal();
     let (mut film, shots) = film.unzip();
-    let eyes = Eyes { view: cells.view.1, soft: stages.tissue.is_some().then_some(cells.shown.1), film: shots };
+    let eyes = RenderInputs { view: cells.view.1, soft: stages.tissue.is_some().then_some(cells.shown.1), film: shots };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(pages, recorder, share, clock));
         let (mut view, mut shown) = (cells.view.0, cells.shown.0);
         let replaying = scope.spawn(move || {
-            let mut again = Again::new(stages, recording, pens, start);
+            let mut again = Again::new(stages, recording, senders, start);
             let ticks = up_to(recording, end_ms);
             let last = ticks.last().map(|record| record.tick);
             for record in ticks {
@@ -102,7 +104,7 @@ struct Again<'a> {
     tissue: Option<Tissue>,
     collisions: VecDeque<CollisionRecord>,
     switches: VecDeque<SolverRecord>,
-    pens: Pens,
+    senders: JournalSenders,
     ticks: Ticks,
     tools: VecDeque<ToolSample>,
     patches: VecDeque<Numbered<SurfacePatch>>,
@@ -118,7 +120,7 @@ struct Again<'a> {
 }
 
 impl<'a> Again<'a> {
-    fn new(stages: Stages, recording: &'a Recording, pens: Pens, start: ToolSample) -> Self {
+    fn new(stages: Stages, recording: &'a Recording, senders: JournalSenders, start: ToolSample) -> Self {
         let dt_ms = stages.tissue.as_ref().map(|tissue| tissue.solver.dt_ms());
         Self {
             pace: dt_ms.and_then(|dt_ms| pace(recording, dt_ms)),
@@ -129,7 +131,7 @@ impl<'a> Again<'a> {
             tissue: stages.tissue,
             collisions: recording.collisions.iter().copied().collect(),
             switches: recording.solver.iter().copied().collect(),
-            pens,
+            senders,
             ticks: Ticks::default(),
             tools: VecDeque::from([start]),
             patches: VecDeque::from([(0, SurfacePatch::default())]),
@@ -163,7 +165,7 @@ impl<'a> Again<'a> {
             self.haptic.release();
         }
         let began_ms = clock.now_ms();
-        let (notices, ticks) = (&mut self.pens.notices, &mut self.ticks);
+        let (notices, ticks) = (&mut self.senders.notices, &mut self.ticks);
         let mut tick = self.haptic.tick(&input, &mut |notice| {
             ticks.hear(notice);
             notices.send(notice);
@@ -177,13 +179,14 @@ impl<'a> Again<'a> {
         self.replayed.ticks += 1;
         self.replayed.identical += u64::from(same);
         remember(&mut self.tools, tick.sample);
-        while !self.pens.ticks.send(tick.record) {
+        while !self.senders.ticks.send(tick.record) {
             thread::yield_now();
         }
         self.ticks.view(&tick, &self.haptic, second.map(|(view, _)| view), false)
     }
 
-    /// The second hand's tick of a number, if it was recorded, and whether its force is the recorded one.
+    /// The second hand's tick of a number, if it was recorded, and whether its force is the
+    /// recorded one.
     fn second_tick(&mut self, number: u64) -> Option<(SecondView, bool)> {
         let record = self.seconds.as_slice().first().filter(|record| record.tick <= number)?;
         self.seconds.next();
@@ -191,12 +194,12 @@ impl<'a> Again<'a> {
         if record.has(TickRecord::RELEASED) {
             stage.release();
         }
-        let (notices, ticks) = (&mut self.pens.notices, &mut self.ticks);
+        let (notices, ticks) = (&mut self.senders.notices, &mut self.ticks);
         let (wrench, again) = stage.tick(record.tick, &reading(record.into()), &mut |notice| {
             ticks.hear(notice);
             notices.send(notice);
         });
-        while !self.pens.second.send(again) {
+        while !self.senders.second.send(again) {
             thread::yield_now();
         }
         let same = self.same(record.wrench, again.wrench);
@@ -217,7 +220,7 @@ impl<'a> Again<'a> {
             self.collision_times.add_us(record.compute_us);
             remember(&mut self.patches, (record.seq, *tissue.collision.patch()));
             remember(&mut self.loads, (record.seq, tissue.collision.loads().clone()));
-            self.pens.collisions.send(record);
+            self.senders.collisions.send(record);
         }
     }
 
@@ -252,7 +255,7 @@ impl<'a> Again<'a> {
         self.step_times.add_us(us);
         if let Some(mut record) = record {
             record.compute_us = us;
-            self.pens.solver.send(record);
+            self.senders.solver.send(record);
         }
     }
 
@@ -312,7 +315,8 @@ impl From<&SecondRecord> for Said {
     }
 }
 
-/// How many steps of `dt_ms` are one of a recording's; `None` where they are as long, so that the same steps are taken.
+/// How many steps of `dt_ms` are one of a recording's; `None` where they are as long, so that the
+/// same steps are taken.
 fn pace(recording: &Recording, dt_ms: f32) -> Option<f64> {
     let last = recording.solver.last().filter(|last| last.step > 0)?;
     let recorded_ms = last.time_ms / last.step as f64;
@@ -383,7 +387,8 @@ mod tests {
         (bone, Stages { haptic, second, tissue: None })
     }
 
-    /// A stroke through the bone; undone, refused, a device lost and there again, pressed once more.
+    /// A stroke through the bone; undone, refused, a device lost and there again, pressed once
+    /// more.
     fn hands(tick: u32) -> [Reading; 2] {
         let way =
             |from: f32, to: f32, since: u32, ticks: f32| from + (to - from) * ((tick - since) as f32 / ticks).min(1.0);
@@ -423,10 +428,10 @@ mod tests {
         assert!(undos.iter().any(|what| matches!(what, What::Undone(mm3) if *mm3 > 1.0)), "{undos:?}");
         assert!(told.iter().any(|notice| matches!(notice.what, What::Force { waits: false, .. })));
         let (again, stages) = both_hands();
-        let (pens, _pages) = journal();
+        let (senders, _pages) = journal();
         let tool = Program::Craniotomy.tray()[0];
         let start = ToolSample { tick: 0, state: at(20.0, Buttons(0)), tool, slot: 0, drilling: false };
-        let mut replay = Again::new(stages, &recording, pens, start);
+        let mut replay = Again::new(stages, &recording, senders, start);
         recording.ticks.iter().for_each(|record| _ = replay.tick(record, &Clock::start()));
         assert_eq!((replay.replayed.identical, replay.replayed.ticks), (4399, 4399));
         assert!(again.snapshot() == bone.snapshot());

@@ -1,6 +1,7 @@
 //! What both ways of running share: the stages, what the picture sees, what is known at the end.
 //!
-//! A session runs live on threads ([`crate::run::threads`]) or again from a recording, step by step ([`crate::run::lockstep`]).
+//! A session runs live on threads ([`crate::run::threads`]) or again from a recording, step by step
+//! ([`crate::run::lockstep`]).
 
 pub(crate) mod clock;
 pub(crate) mod film;
@@ -18,7 +19,7 @@ use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
 use crate::stages::notice::{Notice, What};
 use crate::stages::score::ScoreKeeper;
 use crate::stages::second_hand::{SecondHand, SecondOutcome, SecondView};
-use crate::stages::solver_step::{Mishaps, SolverStage};
+use crate::stages::solver_step::{SolverFaults, SolverStage};
 use hdrhistogram::Histogram;
 use std::sync::mpsc::Receiver;
 use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
@@ -97,7 +98,7 @@ impl View {
 }
 
 /// Read ends for the picture.
-pub struct Eyes {
+pub struct RenderInputs {
     /// Newest tick.
     pub view: Reader<View>,
     /// Newest brain, where there is one.
@@ -249,7 +250,7 @@ pub struct SolverOutcome {
     /// Largest displacement left at the end, mm.
     pub end_displacement_mm: f32,
     /// What the solver had to put right.
-    pub mishaps: Mishaps,
+    pub solver_faults: SolverFaults,
 }
 
 /// How a replay compares with its recording.
@@ -257,7 +258,8 @@ pub struct SolverOutcome {
 pub struct Replayed {
     /// Ticks run again.
     pub ticks: u64,
-    /// Ticks that the session had, as far as its recording says: more where some are lost, or the replay was ended.
+    /// Ticks that the session had, as far as its recording says: more where some are lost, or the
+    /// replay was ended.
     pub recorded: u64,
     /// What the recording lacks of its session; `null` when nothing.
     pub losses: Option<String>,
@@ -303,7 +305,7 @@ pub struct Outcome {
     pub second: Option<SecondOutcome>,
     /// The recording.
     pub written: Written,
-    /// Against which recording, in a replay.
+    /// PlanComparison which recording, in a replay.
     pub replayed: Option<Replayed>,
     /// What the operating system did not allow.
     pub remarks: Vec<String>,

@@ -1,4 +1,5 @@
-//! A live session: the threads of the thesis (6.2), exchanging newest values, never waiting for one another.
+//! A live session: the threads of the thesis (6.2), exchanging newest values, never waiting for one
+//! another.
 //!
 //! ```text
 //!            tool                    contact
@@ -8,15 +9,16 @@
 //! ```
 //!
 //! # Practice
-//! Loops: `haptic_loop` at the device's rate, `collision_loop` at 1 kHz, `solver_loop` at the solver's own step, bound to
-//! wall time. A second hand's tick follows the first one's in the haptic loop. The operating system's real-time priority is asked for and its refusal remarked. Whatever happens, the device is closed, and
-//! with it the force: also when a loop panics.
+//! Loops: `haptic_loop` at the device's rate, `collision_loop` at 1 kHz, `solver_loop` at the
+//! solver's own step, bound to wall time. A second hand's tick follows the first one's in the
+//! haptic loop. The operating system's real-time priority is asked for and its refusal remarked.
+//! Whatever happens, the device is closed, and with it the force: also when a loop panics.
 
 use crate::run::clock::{Clock, Schedule};
 use crate::run::journal::Kept;
-use crate::run::journal::{Journal, Pens, journal};
+use crate::run::journal::{Journal, JournalSenders, journal};
 use crate::run::stop::Stop;
-use crate::run::{Cells, Eyes, Numbered, Outcome, SolverOutcome, Stages, Ticks, Times, View};
+use crate::run::{Cells, Numbered, Outcome, RenderInputs, SolverOutcome, Stages, Ticks, Times, View};
 use crate::stages::haptic_tick::{HapticStage, TickInput};
 use crate::stages::second_hand::{SecondHand, SecondView};
 use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
@@ -53,7 +55,8 @@ pub struct Devices {
     pub second: Option<Box<dyn HapticDevice>>,
 }
 
-/// Runs until the first device is finished, the time is over or a stop is asked for. `picture` runs on the calling thread.
+/// Runs until the first device is finished, the time is over or a stop is asked for. `picture` runs
+/// on the calling thread.
 pub fn run(
     stages: Stages,
     devices: Devices,
@@ -61,17 +64,17 @@ pub fn run(
     start: ToolSample,
     pace: Pace,
     stop: &Stop,
-    picture: impl FnOnce(Eyes),
+    picture: impl FnOnce(RenderInputs),
 ) -> Outcome {
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
-    let (pens, pages) = journal();
-    let Pens { ticks, second: seconds, notices, collisions, solver } = pens;
+    let (senders, pages) = journal();
+    let JournalSenders { ticks, second: seconds, notices, collisions, solver } = senders;
     let Stages { haptic, second, tissue } = stages;
-    let hold = |device| Hand { device, stop: stop.clone() };
+    let hold = |device| HapticDeviceOwner { device, stop: stop.clone() };
     let hand = hold(devices.first);
     let second = second.zip(devices.second.map(hold)).map(|(stage, hand)| Second { stage, hand, records: seconds });
-    let eyes = Eyes { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1), film: None };
+    let eyes = RenderInputs { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1), film: None };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(pages, recorder, share, clock));
         let ends = HapticEnds { tool: cells.tool.0, view: cells.view.0, patch: cells.patch.1, ticks, notices };
@@ -107,14 +110,14 @@ fn fallen(name: &str) -> Outcome {
 }
 
 /// Holds the device; however the thread ends, lets go of the force and ends the session.
-pub(crate) struct Hand {
+pub(crate) struct HapticDeviceOwner {
     /// The device.
     pub device: Box<dyn HapticDevice>,
     /// Asked when the hand lets go.
     pub stop: Stop,
 }
 
-impl Drop for Hand {
+impl Drop for HapticDeviceOwner {
     fn drop(&mut self) {
         self.device.apply(GuardedWrench::ZERO);
         self.device.close();
@@ -133,7 +136,7 @@ struct HapticEnds {
 /// The second hand: what it holds, and its stage.
 struct Second {
     stage: SecondHand,
-    hand: Hand,
+    hand: HapticDeviceOwner,
     records: Sender<SecondRecord>,
 }
 
@@ -151,7 +154,7 @@ impl Second {
 /// The haptic loop: read, tick, apply, publish, wait. Late ticks are counted, never caught up.
 fn haptic_loop(
     mut stage: HapticStage,
-    mut hand: Hand,
+    mut hand: HapticDeviceOwner,
     mut second: Option<Second>,
     mut ends: HapticEnds,
     clock: Clock,
@@ -293,7 +296,7 @@ pub fn outcome(stage: &SolverStage) -> SolverOutcome {
         steps: stage.steps(),
         max_displacement_mm: stage.max_displacement_mm(),
         end_displacement_mm: stage.displacement_mm(),
-        mishaps: *stage.mishaps(),
+        solver_faults: *stage.solver_faults(),
         ..SolverOutcome::default()
     }
 }

@@ -1,8 +1,10 @@
-//! A second process that watches: the running session tells its ticks through shared memory, the watcher follows with its own scene.
+//! A second process that watches: the running session tells its ticks through shared memory, the
+//! watcher follows with its own scene.
 //!
 //! # Theory
-//! The watcher is an ordinary session whose device is the other session's hand: it reads where the trainee's hand is and runs its own
-//! bone, brain and picture. So a lost tick costs the watcher sharpness, nothing else. What a watcher's window sends back is a [lesson](super::lesson).
+//! The watcher is an ordinary session whose device is the other session's hand: it reads where the
+//! trainee's hand is and runs its own bone, brain and picture. So a lost tick costs the watcher
+//! sharpness, nothing else. What a watcher's window sends back is a [lesson](super::lesson).
 //!
 //! ```text
 //!  trainee: recording thread ──tick, event──> shared memory ──> watcher: pump thread → cell → haptic loop
@@ -10,12 +12,14 @@
 //! ```
 //!
 //! # Practice
-//! Telling and listening cost the recording thread a few µs a tick; the haptic loop knows nothing of it. What was drilled before the watcher came is not
-//! seen. Three seconds of silence end the watching.
+//! Telling and listening cost the recording thread a few µs a tick; the haptic loop knows nothing
+//! of it. What was drilled before the watcher came is not seen. Three seconds of silence end the
+//! watching.
 //!
 //! # When not to use it
-//! As it is, between machines: shared memory ends at the machine. iceoryx2's own tunnel (`iox2 tunnel zenoh`, of its command line tools) on both carries the topics
-//! `trepan/NAME/...` from one to the other; nothing changes here.
+//! As it is, between machines: shared memory ends at the machine. iceoryx2's own tunnel
+//! (`iox2 tunnel zenoh`, of its command line tools) on both carries the topics `trepan/NAME/...`
+//! from one to the other; nothing changes here.
 
 use crate::error::SessionError;
 use crate::run::clock::Clock;
@@ -35,7 +39,8 @@ use trepan_link::wire::{EventRecord, TeacherRecord, TickRecord};
 const STALE_MS: f64 = 100.0;
 /// Silence after which the other session counts as over, ms.
 const OVER_MS: f64 = 3000.0;
-/// How long a watcher waits for the first tick, s: the other session may still be reading its images.
+/// How long a watcher waits for the first tick, s: the other session may still be reading its
+/// images.
 const PATIENCE_S: f64 = 20.0;
 /// Pause of the pump between two looks.
 const LOOK: Duration = Duration::from_millis(1);

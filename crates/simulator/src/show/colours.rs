@@ -1,4 +1,5 @@
-//! Colours over bone and brain: the plan and what lies close below while operating; at the end where the cut missed the plan, and where the brain bore force.
+//! Colours over bone and brain: the plan and what lies close below while operating; at the end
+//! where the cut missed the plan, and where the brain bore force.
 //!
 //! # Practice
 //! | colour | on bone, while operating | on bone, at the end | on the brain |
@@ -8,7 +9,8 @@
 //! | yellow to vermilion | the brain is 3 to 0 mm below | vermilion: taken and not planned | least to most force over time |
 //! | purple | | | must not be touched |
 //!
-//! Colours of Okabe and Ito (2008), which every kind of colour vision tells apart. A box of some 10⁵ texels, made once; tens of milliseconds.
+//! Colours of Okabe and Ito (2008), which every kind of colour vision tells apart. A box of some
+//! 10⁵ texels, made once; tens of milliseconds.
 
 use crate::case::plan::Plan;
 use crate::report::regions::touched;
@@ -104,7 +106,8 @@ pub fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Pai
     })
 }
 
-/// Force over time on the brain, by the place at rest where the tool touched; `None` when it never did.
+/// Force over time on the brain, by the place at rest where the tool touched; `None` when it never
+/// did.
 pub fn forces(brain: &DistanceField, tray: &[Tool], ticks: &[TickRecord]) -> Option<Paint> {
     let pressed = |tick: &&TickRecord| tick.phase == 1 && tick.tissue_depth_mm > 0.0;
     let touched = |tick: &TickRecord| (touched(brain, tray, tick), tick.tissue_n());

@@ -1,4 +1,5 @@
-//! Graphics for the picture: opens an adapter, and brings Mesa's software driver where there is none and that is allowed.
+//! Graphics for the picture: opens an adapter, and brings Mesa's software driver where there is
+//! none and that is allowed.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -7,7 +8,8 @@ use trepan_gpu::{Gpu, GpuError, Prefer};
 /// The packages that a Debian-like system needs for software Vulkan.
 const PACKAGES: [&str; 2] = ["libvulkan1", "mesa-vulkan-drivers"];
 
-/// A graphics device. Where there is none: brings the driver if that is allowed, else says what would.
+/// A graphics device. Where there is none: brings the driver if that is allowed, else says what
+/// would.
 pub fn open() -> Result<Gpu, GpuError> {
     let opened = Gpu::open(Prefer::default());
     if !matches!(opened, Err(GpuError::NoAdapter)) || !Path::new("/usr/bin/apt-get").is_file() {

@@ -1,9 +1,9 @@
 //! Who draws a session's pictures, and the coloured maps at its end.
 
 use crate::report::page::Shot;
+use crate::session_setup::SessionSetup;
 use crate::show::colours::{self, Colours};
 use crate::show::picture::snap;
-use crate::table::Table;
 use std::path::Path;
 use trepan_budget::Picture;
 use trepan_gpu::{Gpu, GpuError};
@@ -27,9 +27,15 @@ pub struct Graphics {
 }
 
 impl Graphics {
-    /// Opens a painter for pictures of `size` pixels on a device that was opened, or not. A window needs the device; without one the processor draws where the models leave out rays or
-    /// pixels that a software driver would draw on the same cores.
-    pub fn open(table: &Table, size: [u32; 2], device: Result<Gpu, GpuError>, windowed: bool) -> Result<Self, String> {
+    /// Opens a painter for pictures of `size` pixels on a device that was opened, or not. A window
+    /// needs the device; without one the processor draws where the models leave out rays or pixels
+    /// that a software driver would draw on the same cores.
+    pub fn open(
+        table: &SessionSetup,
+        size: [u32; 2],
+        device: Result<Gpu, GpuError>,
+        windowed: bool,
+    ) -> Result<Self, String> {
         let Picture { sparse, detail } = table.models.setup.picture;
         let brain = table.scene.brain.as_ref();
         let data = SceneData {
@@ -47,7 +53,7 @@ impl Graphics {
     }
 }
 
-impl Table {
+impl SessionSetup {
     /// Colours over the patient while the operation goes on.
     pub fn colours(&self) -> Colours {
         let brain = self.scene.brain.as_ref();
@@ -58,7 +64,8 @@ impl Table {
         Colours { bone, brain: forbidden.map(|(field, around)| colours::forbidden(&field, around)) }
     }
 
-    /// The end of a session in colours: bone against the plan, force on the brain. What went wrong stands in place of a picture.
+    /// The end of a session in colours: bone against the plan, force on the brain. What went wrong
+    /// stands in place of a picture.
     pub fn maps(
         &self,
         painter: &mut Painter,

@@ -1,8 +1,10 @@
 //! Keeps pictures of the window: single ones, and films as numbered pictures.
 //!
 //! # Practice
-//! A thread of its own turns them into PNG files (some 30 ms each), so that the window never waits. At most a second of pictures is waiting; what comes on top of
-//! that is left out, counted and told. Beside a film's pictures lies a list with the time of each, for `ffmpeg -i film.ffconcat film.mp4`.
+//! A thread of its own turns them into PNG files (some 30 ms each), so that the window never waits.
+//! At most a second of pictures is waiting; what comes on top of that is left out, counted and
+//! told. Beside a film's pictures lies a list with the time of each, for
+//! `ffmpeg -i film.ffconcat film.mp4`.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

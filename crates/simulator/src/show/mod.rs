@@ -4,7 +4,7 @@ pub(crate) mod colours;
 pub(crate) mod driver;
 pub(crate) mod graphics;
 mod keep;
+mod notice_text;
 pub(crate) mod picture;
 pub(crate) mod player;
-mod said;
 pub(crate) mod window;

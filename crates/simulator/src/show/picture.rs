@@ -1,13 +1,14 @@
-//! The main thread of a headless run: one picture after another, from the newest state, through the same drawing code as the window.
+//! The main thread of a headless run: one picture after another, from the newest state, through the
+//! same drawing code as the window.
 
 use crate::case::opening::eye;
 use crate::report::page::Shot;
 use crate::run::clock::Clock;
 use crate::run::stop::Stop;
-use crate::run::{Eyes, View};
+use crate::run::{RenderInputs, View};
+use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use crate::stages::second_hand::SecondHand;
-use crate::table::Table;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use trepan_geometry::Vec3;
@@ -56,7 +57,8 @@ pub fn camera(site: &Site) -> Camera {
     Camera::viewed_from(site.entry, eye(site), 170.0)
 }
 
-/// The microscope: down on the site from the usual working distance, on a field of some 50 mm; aslant by 15 degrees, so that a tool along the way in does not hide its tip.
+/// The microscope: down on the site from the usual working distance, on a field of some 50 mm;
+/// aslant by 15 degrees, so that a tool along the way in does not hide its tip.
 pub fn microscope(site: &Site) -> Camera {
     let outward = -site.inward;
     let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
@@ -94,14 +96,21 @@ fn arrow(view: &View) -> Option<[Vec3; 2]> {
 }
 
 /// Waits for the end without a picture.
-pub fn wait(mut eyes: Eyes, stop: &Stop) {
+pub fn wait(mut eyes: RenderInputs, stop: &Stop) {
     while !stop.asked() && !eyes.view.latest().0.finished {
         std::thread::sleep(Duration::from_millis(5));
     }
 }
 
 /// Draws `per_second` pictures a second into `folder` until the end, and one more then.
-pub fn draw(mut eyes: Eyes, mut painter: Painter, table: &Table, per_second: f64, folder: &Path, stop: &Stop) -> Album {
+pub fn draw(
+    mut eyes: RenderInputs,
+    mut painter: Painter,
+    table: &SessionSetup,
+    per_second: f64,
+    folder: &Path,
+    stop: &Stop,
+) -> Album {
     let mut album = Album::default();
     let mut candidates: Vec<(f64, PathBuf)> = Vec::new();
     let clock = Clock::start();

@@ -1,8 +1,10 @@
 //! A recorded session in the window: a film that runs, stands still, and goes to any time.
 //!
 //! # Practice
-//! The film is made at full speed while it is shown ([`crate::run::film`]); how far it is stands beside the bar. Going somewhere writes the voxels that changed in between, some
-//! 20 ns each, at most [`MOST`] a picture: a jump over more of them takes a few pictures. Between two shots that keep a brain it is drawn in between.
+//! The film is made at full speed while it is shown ([`crate::run::film`]); how far it is stands
+//! beside the bar. Going somewhere writes the voxels that changed in between, some 20 ns each, at
+//! most [`MOST`] a picture: a jump over more of them takes a few pictures. Between two shots that
+//! keep a brain it is drawn in between.
 
 use crate::program::Program;
 use crate::run::View;
@@ -11,8 +13,8 @@ use crate::run::lockstep::up_to;
 use crate::run::stop::Stop;
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
+use crate::show::notice_text;
 use crate::show::picture::{Album, frame};
-use crate::show::said;
 use crate::show::window::{self, Opened};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -186,7 +188,7 @@ impl Session for Player {
         let passed_s = input.seconds - self.now_s.replace(input.seconds).unwrap_or(input.seconds);
         advance(&mut self.timeline, input.playback, passed_s);
         self.film.go_to(self.timeline.at_s * 1e3);
-        let mut panel = said::panel(&self.case, self.program, self.view());
+        let mut panel = notice_text::panel(&self.case, self.program, self.view());
         panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
         let finished = self.stop.asked() || input.seconds > self.until_s;
         let hint = self.hint.clone();

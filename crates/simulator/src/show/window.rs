@@ -1,20 +1,20 @@
 //! The main thread of a session with a window: newest state in, what the user does out.
 //!
 //! # Practice
-//! The window never waits for a loop and no loop waits for it. With the mouse as a device the pose goes to the haptic loop, which
-//! reads it at its own rate; closing the window ends the session.
+//! The window never waits for a loop and no loop waits for it. With the mouse as a device the pose
+//! goes to the haptic loop, which reads it at its own rate; closing the window ends the session.
 
 use crate::program::Program;
 use crate::report::page::Shot;
 use crate::run::lesson::{ASKED, Company, Teacher};
 use crate::run::stop::Stop;
 use crate::run::watch::Watching;
-use crate::run::{Eyes, View};
+use crate::run::{RenderInputs, View};
+use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;
 use crate::show::keep::Keeper;
+use crate::show::notice_text;
 use crate::show::picture::{Album, camera, frame, microscope, snap};
-use crate::show::said;
-use crate::table::Table;
 use std::path::Path;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::mouse::MouseHandle;
@@ -22,7 +22,8 @@ use trepan_link::wire::TeacherRecord;
 use trepan_render::window::{self, Action, Capture, Leash, Panel, Start, WindowInput};
 use trepan_render::{Camera, Frame, Image, Overlay, Painter};
 
-/// How far a mouse may press past a surface, mm: a little over what the device's largest force stands for at 2 N/mm.
+/// How far a mouse may press past a surface, mm: a little over what the device's largest force
+/// stands for at 2 N/mm.
 const LEASH_MM: f32 = 2.0;
 /// A request is held so long that no tick misses it, s.
 const REQUEST_S: f64 = 0.1;
@@ -35,7 +36,7 @@ pub fn has_display() -> bool {
 /// What the window is opened on.
 pub struct Opened<'a> {
     /// The patient, the plan, which simulator.
-    pub table: &'a Table,
+    pub table: &'a SessionSetup,
     /// A name for the case that anybody may read.
     pub case: &'a str,
     /// Where pictures go.
@@ -46,7 +47,7 @@ pub struct Opened<'a> {
 
 /// What the window shows and drives.
 struct Show {
-    eyes: Eyes,
+    eyes: RenderInputs,
     view: View,
     positions: Vec<Vec3>,
     case: String,
@@ -98,7 +99,7 @@ impl Rate {
 
 /// Shows the session until it ends or the window is closed.
 pub fn show(
-    mut eyes: Eyes,
+    mut eyes: RenderInputs,
     painter: Painter,
     opened: &Opened<'_>,
     pointer: Option<MouseHandle>,
@@ -197,7 +198,7 @@ impl window::Session for Show {
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
         let flap = || Action { name: "Lift the flap, or put it back".into(), key: Some('f'), on: false };
-        let mut panel = said::panel(&self.case, self.program, view);
+        let mut panel = notice_text::panel(&self.case, self.program, view);
         panel.warnings.extend(lesson.warnings);
         // Who watches reads that the other session is over, and closes the window in her own time.
         let over = self.company.watching.as_ref().and_then(Watching::ended);
@@ -213,7 +214,7 @@ impl window::Session for Show {
             panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
         }
         Panel {
-            hint: if teaches { TEACH } else { said::hint(view.sample.phase(), by_hand) }.into(),
+            hint: if teaches { TEACH } else { notice_text::hint(view.sample.phase(), by_hand) }.into(),
             by_hand,
             rate_hz: self.rate.follow(view.time_ms, view.counts[0]) as f32,
             wanted_rate_hz: self.wanted_rate_hz,
@@ -337,7 +338,7 @@ mod tests {
         let (mut writer, view) = cell(View::at(sample, 1.0));
         let mut show = Show {
             view: View::at(sample, 1.0),
-            eyes: Eyes { view, soft: None, film: None },
+            eyes: RenderInputs { view, soft: None, film: None },
             positions: Vec::new(),
             case: "case".into(),
             program: Program::Brain,

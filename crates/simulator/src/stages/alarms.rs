@@ -1,11 +1,13 @@
 //! Which causes of warnings a tick finds.
 //!
 //! # Theory
-//! Of the bone ahead `a` and its change the breach is foreseen: `t = a / v`, v the rate at which a falls, smoothed over 50 ms. So a fast feed is told as early as a
-//! slow one, though less bone is left.
+//! Of the bone ahead `a` and its change the breach is foreseen: `t = a / v`, v the rate at which a
+//! falls, smoothed over 50 ms. So a fast feed is told as early as a slow one, though less bone is
+//! left.
 //!
 //! # Sources
-//! Forces on brain tissue in neurosurgery are mostly under 0.3 N: H. J. Marcus et al., *Forces exerted during microneurosurgery*, Neurosurgery 2014.
+//! Forces on brain tissue in neurosurgery are mostly under 0.3 N: H. J. Marcus et al., *Forces
+//! exerted during microneurosurgery*, Neurosurgery 2014.
 
 use crate::stages::drill::{BREAK_MM, THIN_MM};
 use crate::stages::notice::Warning;
@@ -30,7 +32,8 @@ pub(crate) struct Feed {
 }
 
 impl Feed {
-    /// Takes note of the bone left ahead, mm, of which `reach_mm` and more count alike; gives the time until the breach, ms, infinite while the bone does not give way.
+    /// Takes note of the bone left ahead, mm, of which `reach_mm` and more count alike; gives the
+    /// time until the breach, ms, infinite while the bone does not give way.
     pub fn follow(&mut self, ahead_mm: f32, reach_mm: f32, dt_ms: f32) -> f32 {
         let known = Some(ahead_mm).filter(|mm| *mm < reach_mm);
         let (Some(last), Some(now)) = (self.last_mm, known) else {

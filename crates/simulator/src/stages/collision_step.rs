@@ -1,9 +1,11 @@
-//! One collision step: the newest tool and the newest brain in; a surface patch for the hand, loads for the solver out.
+//! One collision step: the newest tool and the newest brain in; a surface patch for the hand, loads
+//! for the solver out.
 //!
 //! # Practice
-//! While the burr is in the hand the result only warns: the patch goes to the haptic thread, the solver gets no contact of it
-//! (thesis 6.4). The probe touches with tip and shaft. From then on the skull holds back what the probe and
-//! the brain's weight push away. The stage has no clock; the same tools and positions give the same results.
+//! While the burr is in the hand the result only warns: the patch goes to the haptic thread, the
+//! solver gets no contact of it (thesis 6.4). The probe touches with tip and shaft. From then on
+//! the skull holds back what the probe and the brain's weight push away. The stage has no clock;
+//! the same tools and positions give the same results.
 
 use crate::program::{Phase, Program};
 use crate::stages::haptic_tick::ToolSample;
@@ -39,7 +41,8 @@ pub struct CollisionStage {
 }
 
 impl CollisionStage {
-    /// One collision pipeline for each tool of the program, and the skull around the brain where it is there.
+    /// One collision pipeline for each tool of the program, and the skull around the brain where it
+    /// is there.
     pub fn new(
         program: Program,
         mesh: &TetMesh,
@@ -66,7 +69,8 @@ impl CollisionStage {
         Self { settling, ..self }
     }
 
-    /// The step. Its results stand in [`patch`](Self::patch) and [`loads`](Self::loads) until the next.
+    /// The step. Its results stand in [`patch`](Self::patch) and [`loads`](Self::loads) until the
+    /// next.
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
         self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
         self.patch = self.step.patch.with(self.step.shaft.normal, self.step.shaft.depth_mm);

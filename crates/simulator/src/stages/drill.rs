@@ -1,8 +1,9 @@
 //! What the burr does to the bone from stroke to stroke: what is left ahead, when it comes through.
 //!
 //! # Practice
-//! A stroke begins when the pedal goes down. The burr comes through once in a stroke, where it opens the bone and nothing is left ahead: a hole beside bone that
-//! is still ahead is a pore. What undoing gives back is `undo.rs`'s.
+//! A stroke begins when the pedal goes down. The burr comes through once in a stroke, where it
+//! opens the bone and nothing is left ahead: a hole beside bone that is still ahead is a pore. What
+//! undoing gives back is `undo.rs`'s.
 
 use crate::stages::ahead::bone_ahead_mm;
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3};
@@ -24,7 +25,8 @@ pub(crate) struct Drill {
 }
 
 impl Drill {
-    /// Begins a stroke when the pedal goes down, and ends it when it comes up. Returns whether one began.
+    /// Begins a stroke when the pedal goes down, and ends it when it comes up. Returns whether one
+    /// began.
     pub fn stroke(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool) -> bool {
         let begins = drilling && !self.drilled;
         if begins {
@@ -54,8 +56,9 @@ impl Drill {
 /// Farthest that is looked ahead, mm.
 pub(crate) const REACH_MM: f32 = 2.0;
 
-/// Bone left ahead of a burr that cuts, along its axis or where it is pressed to, mm, at most [`REACH_MM`].
-pub(crate) fn left_ahead_mm(bone: &BoneVolume, world_from_tool: Pose, tool: &Tool, normal: Vec3) -> f32 {
+/// Bone left ahead of a burr that cuts, along its axis or where it is pressed to, mm, at most
+/// [`REACH_MM`].
+pub(crate) fn remaining_thickness_mm(bone: &BoneVolume, world_from_tool: Pose, tool: &Tool, normal: Vec3) -> f32 {
     let ahead = |way: Vec3| {
         let front = world_from_tool.translation + tool.tip_radius_mm * way;
         bone_ahead_mm(bone, front, way, REACH_MM)
@@ -63,7 +66,8 @@ pub(crate) fn left_ahead_mm(bone: &BoneVolume, world_from_tool: Pose, tool: &Too
     ahead(world_from_tool.rotation * Vec3::NEG_Z).min(ahead(-normal))
 }
 
-/// Speed of the spindle, 1/min: free in air, as the load lets it in bone; 0 without one or when it rests.
+/// Speed of the spindle, 1/min: free in air, as the load lets it in bone; 0 without one or when it
+/// rests.
 pub(crate) fn spindle_rpm(spindle: Option<Spindle>, step: &RigidStep, drilling: bool) -> f32 {
     match spindle {
         Some(_) if drilling && step.manifold.touches() => step.spindle_rpm,

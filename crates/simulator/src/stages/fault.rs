@@ -4,12 +4,13 @@
 //! ```text
 //! lost, or stale for 100 ms ─→ waits ─→ a button pressed anew, or nothing touched for 200 ms ─→ force again
 //! ```
-//! The hand may have let the device go meanwhile, or rest somewhere else: a force that comes back by itself would push what it does
-//! not expect. A button that was down before, or went down while nothing could be read, is no act.
+//! The hand may have let the device go meanwhile, or rest somewhere else: a force that comes back
+//! by itself would push what it does not expect. A button that was down before, or went down while
+//! nothing could be read, is no act.
 //!
 //! # Practice
-//! While it waits nothing drills either. The guard lets go and ramps in anew. A device that has never been there waits for
-//! nothing.
+//! While it waits nothing drills either. The guard lets go and ramps in anew. A device that has
+//! never been there waits for nothing.
 
 use trepan_geometry::{Buttons, ToolState};
 

@@ -1,13 +1,14 @@
 //! The planned bone flap: found free after the stroke that frees it, lifted away and put back.
 //!
 //! # Practice
-//! After each stroke of a cutting tool the bone in the middle of the flap is flooded, a few hundred voxels a tick, while nothing cuts
-//! ([`FlapSearch`]). Lifting and putting back write as many voxels a tick as fit beside the rest of it. All of it is a function of the ticks: a replay lifts the same voxels.
-//! Bone of less than the isovalue at the flap's rim stays where it is.
+//! After each stroke of a cutting tool the bone in the middle of the flap is flooded, a few hundred
+//! voxels a tick, while nothing cuts ([`FlapSearch`]). Lifting and putting back write as many
+//! voxels a tick as fit beside the rest of it. All of it is a function of the ticks: a replay lifts
+//! the same voxels. Bone of less than the isovalue at the flap's rim stays where it is.
 
 use crate::stages::notice::What;
 use trepan_geometry::Buttons;
-use trepan_volume::{AIR_HU, BoneVolume, FlapSearch, Found};
+use trepan_volume::{AIR_HU, BoneVolume, FlapSearch, FlapState};
 
 /// Voxels flooded in a tick: some 15 us.
 const FLOODED: usize = 300;
@@ -66,7 +67,8 @@ impl Flap {
         }
     }
 
-    /// One tick, after the bone was touched; `cut`: whether bone was removed in it, `free`: whether the tool touches nothing. Says what happened.
+    /// One tick, after the bone was touched; `cut`: whether bone was removed in it, `free`: whether
+    /// the tool touches nothing. Says what happened.
     pub fn tick(&mut self, bone: &BoneVolume, buttons: Buttons, drilling: bool, cut: bool, free: bool) -> Option<What> {
         let asks = buttons.has(Buttons::FLAP);
         let before = std::mem::replace(&mut self.asked, asks);
@@ -106,12 +108,12 @@ impl Flap {
 
     fn look(&mut self, bone: &BoneVolume, asked: bool) -> Option<What> {
         match self.search.step(bone, FLOODED) {
-            Found::NotYet => None,
-            Found::Hanging => {
+            FlapState::NotYet => None,
+            FlapState::Hanging => {
                 (self.at, self.told) = (At::Skull, false);
                 asked.then_some(What::FlapHangs)
             }
-            Found::Free => {
+            FlapState::Free => {
                 self.at = At::Cut;
                 (!std::mem::replace(&mut self.told, true)).then(|| What::FlapFree(self.mm3(bone)))
             }

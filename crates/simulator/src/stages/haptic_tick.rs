@@ -5,19 +5,20 @@
 //! device pose → bone contact (proxy, drilling) ─╮
 //! newest surface patch → tissue depth ──────────┴→ force models → force guard → wrench
 //! ```
-//! The seven steps of rigid handling (thesis, 3.2 to 3.4) run inside [`RigidContact`]; tissue is felt through the tangent plane of
-//! the last collision result at the tick's own pose, so that a slow collision thread costs sharpness, not stability. A patch
-//! that grows old fades: full force up to [`FRESH_MS`], none after [`GONE_MS`].
+//! The seven steps of rigid handling (thesis, 3.2 to 3.4) run inside [`RigidContact`]; tissue is
+//! felt through the tangent plane of the last collision result at the tick's own pose, so that a
+//! slow collision thread costs sharpness, not stability. A patch that grows old fades: full force
+//! up to [`FRESH_MS`], none after [`GONE_MS`].
 //!
 //! # Practice
-//! The stage has no clock and no device: the same readings and patches give the same wrenches, bit for bit, live or in a
-//! replay. A tick does not allocate, lock, log or panic.
+//! The stage has no clock and no device: the same readings and patches give the same wrenches, bit
+//! for bit, live or in a replay. A tick does not allocate, lock, log or panic.
 
 mod asked;
 
 use crate::program::{Phase, Program};
 use crate::stages::alarms::{Feed, Limits, Signs};
-use crate::stages::drill::{Drill, REACH_MM, left_ahead_mm, spindle_rpm};
+use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm, spindle_rpm};
 use crate::stages::fault::{AfterFault, Seen};
 use crate::stages::flap::Flap;
 use crate::stages::notice::{Notice, Watch, What};
@@ -113,13 +114,13 @@ pub struct Tick {
 
 /// What bone and tissue want the hand to feel.
 #[derive(Clone, Copy, Debug, Default)]
-struct Wanted {
+struct DesiredWrench {
     bone: Wrench,
     /// `None` where tissue only warns.
     tissue: Option<Wrench>,
 }
 
-impl Wanted {
+impl DesiredWrench {
     fn sum(&self) -> Wrench {
         self.tissue.map_or(self.bone, |tissue| self.bone + tissue)
     }
@@ -158,7 +159,8 @@ pub struct HapticStage {
 }
 
 impl HapticStage {
-    /// A stage with the tool at `start`. Without bone nothing rigid is felt; without a brain nothing warns of it.
+    /// A stage with the tool at `start`. Without bone nothing rigid is felt; without a brain
+    /// nothing warns of it.
     pub fn new(
         config: HapticConfig,
         bone: Option<Arc<BoneVolume>>,
@@ -211,7 +213,7 @@ impl HapticStage {
 
     /// The tick, in the order of its parts.
     pub fn tick(&mut self, input: &TickInput<'_>, tell: &mut dyn FnMut(Notice)) -> Tick {
-        let (tool, stale) = self.sound(&input.reading);
+        let (tool, stale) = self.last_valid_state(&input.reading);
         self.change_tool(&tool, input.tick, tell);
         let drilling = self.drills(&tool);
         let back_mm3 = self.undo(&tool, drilling, input.second, input.tick, tell);
@@ -223,7 +225,7 @@ impl HapticStage {
         let lost = input.reading.status == Status::Lost;
         self.follow_fault(&tool, (lost, stale), input.tick, tell);
         let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
-        let wanted = if let_go { Wanted::default() } else { self.wanted(&tool, drilling) };
+        let wanted = if let_go { DesiredWrench::default() } else { self.desired_wrench(&tool, drilling) };
         let heated = self.guard.counters().heated;
         let wrench = self.guard.guard(wanted.sum(), &tool, self.config.dt_ms);
         let warm = self.guard.counters().heated > heated;
@@ -276,7 +278,7 @@ impl HapticStage {
     }
 
     /// The reading, or the last sound one when the device gave nothing usable.
-    fn sound(&mut self, reading: &Reading) -> (ToolState, bool) {
+    fn last_valid_state(&mut self, reading: &Reading) -> (ToolState, bool) {
         let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
         if fresh {
             self.held = reading.tool;
@@ -353,15 +355,16 @@ impl HapticStage {
         age_ms > FRESH_MS
     }
 
-    /// Bone always pushes; tissue pushes in its own phase only (thesis 6.4: while drilling it only warns).
-    fn wanted(&mut self, tool: &ToolState, drilling: bool) -> Wanted {
+    /// Bone always pushes; tissue pushes in its own phase only (thesis 6.4: while drilling it only
+    /// warns).
+    fn desired_wrench(&mut self, tool: &ToolState, drilling: bool) -> DesiredWrench {
         let free = self.config.rigid.removal().spindle().map_or(f32::INFINITY, |spindle| spindle.free_rpm);
         self.config.bone_force.turn(self.spindle_rpm(drilling) / free);
         let dt_ms = self.config.dt_ms;
         let bone = self.config.bone_force.wrench(tool, &self.bone_step.manifold, dt_ms);
         let brain = self.phase() == Phase::Brain;
         let tissue = brain.then(|| self.config.tissue_force.wrench(tool, &self.tissue, dt_ms));
-        Wanted { bone, tissue }
+        DesiredWrench { bone, tissue }
     }
 
     fn record(
@@ -372,7 +375,7 @@ impl HapticStage {
         wrench: GuardedWrench,
         held: bool,
         stale: bool,
-        wanted: Wanted,
+        wanted: DesiredWrench,
     ) -> TickRecord {
         let clamped = wanted.sum().force.length() > self.config.guard.max_force_n;
         let bits = [
@@ -413,14 +416,15 @@ impl HapticStage {
         match &self.bone {
             // A craniotome's foot runs under the bone and keeps what lies there.
             Some(bone) if drilling && self.tool().cutting_mm == 0.0 && self.bone_step.manifold.touches() => {
-                left_ahead_mm(bone, self.proxy, &self.tool(), self.bone_step.manifold.normal)
+                remaining_thickness_mm(bone, self.proxy, &self.tool(), self.bone_step.manifold.normal)
             }
             _ => f32::INFINITY,
         }
     }
 
-    /// From the tool's ball to the brain's rest surface, mm; negative inside, infinite without a brain. Of a craniotome, whose
-    /// ball is a blunt foot made to run on the dura, from where its cutting part begins above the foot.
+    /// From the tool's ball to the brain's rest surface, mm; negative inside, infinite without a
+    /// brain. Of a craniotome, whose ball is a blunt foot made to run on the dura, from where its
+    /// cutting part begins above the foot.
     fn brain_distance(&self, world_from_tool: Pose) -> f32 {
         let Some(field) = &self.brain else { return f32::INFINITY };
         let Tool { tip_radius_mm, cutting_mm, .. } = self.tool();
@@ -443,7 +447,7 @@ impl HapticStage {
         sample: &ToolSample,
         ahead_mm: f32,
         patch: &SurfacePatch,
-        (wanted, warm): (Wanted, bool),
+        (wanted, warm): (DesiredWrench, bool),
     ) -> Signs {
         let radius_mm = sample.tool.tip_radius_mm;
         let forbidden = self.forbidden.as_ref().map(|field| field.sample(sample.state.tip()) - radius_mm);

@@ -1,23 +1,26 @@
 //! How the tip moved: path, idle time and smoothness, alike at any rate of ticks.
 //!
 //! # Theory
-//! The mean place of the tip is taken over even windows of time, linear between two ticks, so that neither the rate nor an encoder's noise counts. Over windows of 20 ms:
+//! The mean place of the tip is taken over even windows of time, linear between two ticks, so that
+//! neither the rate nor an encoder's noise counts. Over windows of 20 ms:
 //!
 //! ```text
 //! path = Σ |xₖ₊₁ - xₖ|          idle = time with |xₖ₊₁ - xₖ| / h < 5 mm/s
 //! ```
 //!
-//! Over windows of 100 ms, with v = Δx / h and the jerk j = Δ³x / h³, the smoothness of the whole movement over T seconds:
+//! Over windows of 100 ms, with v = Δx / h and the jerk j = Δ³x / h³, the smoothness of the whole
+//! movement over T seconds:
 //!
 //! ```text
 //! log dimensionless jerk = -ln( T³ / v_peak² · Σ |j|² h )
 //! ```
 //!
-//! More is smoother: -5.32 = -ln(720/1.875²) for one movement of least jerk, however long and far; every halt and turn lowers it. What moves faster than 5 Hz, as
-//! tremor does, is not in it.
+//! More is smoother: -5.32 = -ln(720/1.875²) for one movement of least jerk, however long and far;
+//! every halt and turn lowers it. What moves faster than 5 Hz, as tremor does, is not in it.
 //!
 //! # Sources
-//! Log dimensionless jerk: Balasubramanian, Melendez-Calderon and Burdet 2012. Least jerk: Flash and Hogan 1985. The limit of idleness is ours.
+//! Log dimensionless jerk: Balasubramanian, Melendez-Calderon and Burdet 2012. Least jerk: Flash
+//! and Hogan 1985. The limit of idleness is ours.
 
 use glam::DVec3;
 use trepan_geometry::Vec3;
@@ -112,7 +115,8 @@ impl Grid {
         self.before.is_some_and(|(before_ms, _)| time_ms - before_ms >= PAUSE_MS)
     }
 
-    /// Gives the mean places of the windows that end up to this time. A place that is not finite and a time that does not go on are left out.
+    /// Gives the mean places of the windows that end up to this time. A place that is not finite
+    /// and a time that does not go on are left out.
     fn add(&mut self, step_ms: f64, time_ms: f64, tip: DVec3, mut each: impl FnMut(DVec3)) {
         if !tip.is_finite() || !time_ms.is_finite() {
             return;
@@ -153,7 +157,8 @@ mod tests {
 
     #[test]
     fn least_jerk_has_its_closed_form() {
-        // The grid leaves the ends out, where the jerk is largest: 0.2 s, little of a long movement.
+        // The grid leaves the ends out, where the jerk is largest: 0.2 s, little of a long
+        // movement.
         for (mm, seconds) in [(100.0, 40.0), (300.0, 60.0)] {
             let motion = least_jerk(mm, seconds, 1000.0);
             assert!((motion.path_mm / mm - 1.0).abs() < 0.01, "{}", motion.path_mm);

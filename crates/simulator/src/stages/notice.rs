@@ -1,7 +1,8 @@
 //! What the session says while it runs: phase and tool changes, warnings raised and cleared.
 //!
 //! # Practice
-//! A notice is plain data, made inside a tick without allocation; its words are made by whoever shows it.
+//! A notice is plain data, made inside a tick without allocation; its words are made by whoever
+//! shows it.
 
 use crate::program::{Phase, called};
 use trepan_geometry::Tool;
@@ -18,7 +19,8 @@ pub enum Warning {
     BreachSoon,
     /// The burr is close to the brain.
     BrainNear,
-    /// What cuts is past the brain's rest surface, where the dura lies; a craniotome's foot may be there.
+    /// What cuts is past the brain's rest surface, where the dura lies; a craniotome's foot may be
+    /// there.
     BrainTouched,
     /// A tool presses hard on the brain.
     BrainPressed,
@@ -95,7 +97,8 @@ impl Warning {
 pub enum What {
     /// A phase began.
     Phase(Phase),
-    /// A warning was raised (`true`) or cleared; the number says how near, how strong or how old (mm, N or ms).
+    /// A warning was raised (`true`) or cleared; the number says how near, how strong or how old
+    /// (mm, N or ms).
     Warning(Warning, bool, f32),
     /// The burr came through the bone.
     Through,

@@ -1,9 +1,11 @@
 //! The scores so far: what the hand did to bone and brain, summed tick by tick.
 //!
 //! # Theory
-//! Path, idle time and smoothness of the tool's tip (`motion.rs`), drilling time, volume of bone removed, plunge (how far the burr's ball went past the
-//! brain's rest surface), separate touches of the brain with the burr, time, impulse `∫ F dt` and largest force of the probe on the brain, changes of the tool.
-//! They are plain physical quantities; none is validated against clinical skill.
+//! Path, idle time and smoothness of the tool's tip (`motion.rs`), drilling time, volume of bone
+//! removed, plunge (how far the burr's ball went past the brain's rest surface), separate touches
+//! of the brain with the burr, time, impulse `∫ F dt` and largest force of the probe on the brain,
+//! changes of the tool. They are plain physical quantities; none is validated against clinical
+//! skill.
 
 use crate::stages::motion::Motion;
 use serde::Serialize;
@@ -27,9 +29,11 @@ pub struct ScoreKeeper {
     pub bone_removed_mm3: f64,
     /// Strokes of the burr that came through the bone.
     pub times_through: u32,
-    /// Deepest place of what cuts past the brain's rest surface, mm; 0 when it never got there. A craniotome's foot does not cut.
+    /// Deepest place of what cuts past the brain's rest surface, mm; 0 when it never got there. A
+    /// craniotome's foot does not cut.
     pub plunge_mm: f32,
-    /// Separate touches of the brain's rest surface, and so of the dura over it, with a tool for bone.
+    /// Separate touches of the brain's rest surface, and so of the dura over it, with a tool for
+    /// bone.
     pub burr_touches_of_brain: u32,
     /// Time of these touches, s.
     pub burr_on_brain_s: f64,
@@ -37,7 +41,8 @@ pub struct ScoreKeeper {
     pub peak_burr_on_brain_n: f32,
     /// Time in which the tool pressed on tissue, s.
     pub tissue_s: f64,
-    /// Force of the tissue on the hand, summed over that time, N s; that of bone touched at once is not in it.
+    /// Force of the tissue on the hand, summed over that time, N s; that of bone touched at once is
+    /// not in it.
     pub tissue_impulse_n_s: f64,
     /// Largest force of the tissue on the hand, N.
     pub peak_tissue_force_n: f32,
@@ -62,7 +67,8 @@ pub struct ScoreKeeper {
 /// A longer pause between two ticks does not count, s.
 const LONGEST_S: f64 = 0.1;
 
-/// Whether a tool for bone is past the brain's rest surface: what is warned of, counted and timed as a touch of the brain.
+/// Whether a tool for bone is past the brain's rest surface: what is warned of, counted and timed
+/// as a touch of the brain.
 pub(crate) fn cuts_into_brain(record: &TickRecord) -> bool {
     record.phase == 0 && record.brain_distance_mm <= 0.0
 }

@@ -7,9 +7,10 @@
 //! ```
 //!
 //! # Practice
-//! Its tick follows the first hand's in the same loop, so that it meets the bone that the burr has left in that very tick: a replay meets
-//! the same. A tick does not allocate, lock, log or panic. The brain is met where it lies at rest: this hand neither moves it
-//! nor feels it move. The hands do not feel each other.
+//! Its tick follows the first hand's in the same loop, so that it meets the bone that the burr has
+//! left in that very tick: a replay meets the same. A tick does not allocate, lock, log or panic.
+//! The brain is met where it lies at rest: this hand neither moves it nor feels it move. The hands
+//! do not feel each other.
 //!
 //! # When not to use it
 //! To retract the brain: press it with the first hand.
@@ -62,7 +63,8 @@ pub struct SecondHand {
 }
 
 impl SecondHand {
-    /// A hand whose tool is wherever its device first says. Of the configuration it takes method, forces, guard and tick.
+    /// A hand whose tool is wherever its device first says. Of the configuration it takes method,
+    /// forces, guard and tick.
     pub fn new(config: HapticConfig, bone: Option<Arc<BoneVolume>>, brain: Option<Arc<DistanceField>>) -> Self {
         Self {
             rigid: config.rigid.build(&Self::tool()),
@@ -97,7 +99,7 @@ impl SecondHand {
         reading: &Reading,
         tell: &mut dyn FnMut(Notice),
     ) -> (GuardedWrench, SecondRecord) {
-        let (tool, stale) = self.sound(reading);
+        let (tool, stale) = self.last_valid_state(reading);
         let proxy = self.touch_bone(&tool);
         self.touch_brain(proxy.translation);
         let lost = reading.status == Status::Lost;
@@ -105,7 +107,7 @@ impl SecondHand {
             tell(Notice { tick, time_ms: tool.time_ms, what: What::Force { waits, second: true } });
         }
         let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
-        let wanted = if let_go { Wrench::ZERO } else { self.wanted(&tool) };
+        let wanted = if let_go { Wrench::ZERO } else { self.desired_wrench(&tool) };
         let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
         self.force_n = wrench.force().length();
         self.peak_force_n = self.peak_force_n.max(self.force_n);
@@ -148,8 +150,9 @@ impl SecondHand {
         SecondOutcome { peak_force_n: self.peak_force_n, guard, end_force_n: self.force_n }
     }
 
-    /// The reading, or the last sound one when the device gave nothing usable. The first one says where the tool begins.
-    fn sound(&mut self, reading: &Reading) -> (ToolState, bool) {
+    /// The reading, or the last sound one when the device gave nothing usable. The first one says
+    /// where the tool begins.
+    fn last_valid_state(&mut self, reading: &Reading) -> (ToolState, bool) {
         let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
         let begins = self.held.is_none();
         let last = self.held.unwrap_or(ToolState::at(Pose::IDENTITY));
@@ -167,7 +170,8 @@ impl SecondHand {
         (held, !fresh)
     }
 
-    /// Lets the force go where the device is gone, and come back by a deliberate act only; says when it does.
+    /// Lets the force go where the device is gone, and come back by a deliberate act only; says
+    /// when it does.
     fn follow_fault(&mut self, tool: &ToolState, lost: bool, stale: bool) -> Option<bool> {
         let touches = self.step.manifold.touches() || self.tissue.depth_mm > 0.0;
         let seen = self.config.force_waits.then_some(Seen { lost, stale, touches })?;
@@ -198,7 +202,7 @@ impl SecondHand {
         }
     }
 
-    fn wanted(&mut self, tool: &ToolState) -> Wrench {
+    fn desired_wrench(&mut self, tool: &ToolState) -> Wrench {
         let HapticConfig { bone_force, tissue_force, dt_ms, .. } = &mut self.config;
         let bone: &mut Viscoelastic = &mut bone_force.mean;
         bone.wrench(tool, &self.step.manifold, *dt_ms) + tissue_force.wrench(tool, &self.tissue, *dt_ms)

@@ -1,19 +1,23 @@
 //! The brain's weight once the dura is open: it sinks, and moves with pulse and breath.
 //!
 //! # Theory
-//! In the scanner the brain floats in its fluid: its shape at rest is in balance. With the dura open, fluid runs off and the part `c` of its weight that the fluid no longer
-//! carries acts on it, as a body force; pulse and breath act as two more along the way out of the opening:
+//! In the scanner the brain floats in its fluid: its shape at rest is in balance. With the dura
+//! open, fluid runs off and the part `c` of its weight that the fluid no longer carries acts on it,
+//! as a body force; pulse and breath act as two more along the way out of the opening:
 //! ```text
 //! a(t) = r(t) (c g  +  o (0.008 sin 2π 0.25 t + 0.003 sin 2π 1.2 t) 9.81e-3)        r: from 0 to 1 in 2 s
 //! ```
 //! mm/ms², t in s, o the outward unit vector.
 //!
 //! # Practice
-//! The dura counts as open from the first tool for the brain on. A function of the ticks' times alone, so that a replay has the same loads. **Uncalibrated**: shares of
-//! the weight are chosen for motions of the order of those seen at craniotomies: some 0.3 mm of breath, 0.1 mm of pulse, millimetres of shift.
+//! The dura counts as open from the first tool for the brain on. A function of the ticks' times
+//! alone, so that a replay has the same loads. **Uncalibrated**: shares of the weight are chosen
+//! for motions of the order of those seen at craniotomies: some 0.3 mm of breath, 0.1 mm of pulse,
+//! millimetres of shift.
 //!
 //! # Sources
-//! Brain shift under gravity after loss of fluid: M. I. Miga et al., *In vivo quantification of a homogeneous brain deformation model*, IEEE TMI 18 (1999).
+//! Brain shift under gravity after loss of fluid: M. I. Miga et al., *In vivo quantification of a
+//! homogeneous brain deformation model*, IEEE TMI 18 (1999).
 
 use crate::program::Phase;
 use trepan_geometry::{Vec3, units};
@@ -32,7 +36,8 @@ pub struct Settling {
 }
 
 impl Settling {
-    /// With the share `lost` of the fluid's lift gone once the dura is open, gravity along `down` and the opening towards `outward`, unit vectors.
+    /// With the share `lost` of the fluid's lift gone once the dura is open, gravity along `down`
+    /// and the opening towards `outward`, unit vectors.
     pub fn new(lost: f32, down: Vec3, outward: Vec3) -> Self {
         let weight = units::GRAVITY_MM_PER_MS2;
         Self { sinks: lost * weight * down, outward: weight * outward, opened_ms: None }

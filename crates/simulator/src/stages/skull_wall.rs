@@ -1,22 +1,22 @@
 //! The inside of the skull as a wall that the brain slides along.
 //!
 //! # Theory
-//! Signed distance to the bone as it was before the operation, on a grid around the brain. Where the burr
-//! has opened the skull there is no wall: a node is held back unless bone was behind the nearest place of
-//! the wall and is gone. Where the skull never had bone to speak of (thin bone, foramina) the wall stands:
-//! asking whether there is bone now would answer otherwise at every breath of the brain. A node that the wall
-//! holds when its bone goes, or that slides past the rim of the opening, is let go gradually: its plane recedes,
-//! at last by 0.005 mm in a collision step.
+//! Signed distance to the bone as it was before the operation, on a grid around the brain. Where
+//! the burr has opened the skull there is no wall: a node is held back unless bone was behind the
+//! nearest place of the wall and is gone. Where the skull never had bone to speak of (thin bone,
+//! foramina) the wall stands: asking whether there is bone now would answer otherwise at every
+//! breath of the brain. A node that the wall holds when its bone goes, or that slides past the rim
+//! of the opening, is let go gradually: its plane recedes, at last by 0.005 mm in a collision step.
 //!
 //! ```text
 //! hollow  φ > 0      x  node      s  place of the wall      0.5, 1, 2 mm behind s: bone that is gone?
 //! ```
 //!
 //! # Practice
-//! The bone is read only while the probe is in the hand, when nobody carves, so that what a step finds
-//! depends on its inputs alone. While a tool for bone is back in the hand, the wall stands as it was last
-//! read: a brain that lies on it must not fall through and be thrown out later. About 30 ns for each border
-//! node of the brain.
+//! The bone is read only while the probe is in the hand, when nobody carves, so that what a step
+//! finds depends on its inputs alone. While a tool for bone is back in the hand, the wall stands as
+//! it was last read: a brain that lies on it must not fall through and be thrown out later. About
+//! 30 ns for each border node of the brain.
 
 use glam::IVec3;
 use std::sync::Arc;
@@ -35,8 +35,8 @@ const NEAR_MM: f32 = 0.5;
 /// Bone so far behind the wall's surface is what holds, mm; the likeliest first.
 const BEHIND_MM: [f32; 3] = [1.0, 2.0, 0.5];
 
-/// How far the wall recedes in a collision step from a node that it held where bone is gone, mm: in the first
-/// step, by how much of its way faster in each, and at most.
+/// How far the wall recedes in a collision step from a node that it held where bone is gone, mm: in
+/// the first step, by how much of its way faster in each, and at most.
 const FIRST_MM: f32 = 1e-4;
 /// See above.
 const GROWTH: f32 = 0.02;
@@ -50,7 +50,8 @@ pub struct SkullWall {
     bone: Arc<BoneVolume>,
     /// Where there was bone before the operation.
     before: BoneMask,
-    /// How far the wall had receded from each node when the bone was last read, mm; infinite where it is gone.
+    /// How far the wall had receded from each node when the bone was last read, mm; infinite where
+    /// it is gone.
     receded_mm: Vec<f32>,
 }
 
@@ -100,8 +101,8 @@ impl SkullWall {
         Ok(Self { wall, field, before: BoneMask::of(&bone), bone, receded_mm: vec![0.0; brain.positions.len()] })
     }
 
-    /// Adds the planes of what is near the wall. `reads_bone`: nobody carves now, so openings may be looked
-    /// for.
+    /// Adds the planes of what is near the wall. `reads_bone`: nobody carves now, so openings may
+    /// be looked for.
     pub fn press(&mut self, positions: &[Vec3], reads_bone: bool, out: &mut NodalContacts) {
         let Self { wall, field, bone, before, receded_mm } = self;
         wall.step(positions, Carved { field, bone, before, receded_mm, reads_bone }, out);
@@ -175,7 +176,8 @@ mod tests {
             bone.set_hu(IVec3::new(i, j, k), 0);
         }
         assert_eq!(pushed(Vec3::Z * 2.0, false), up, "the wall stands as it was read last");
-        // The nodes are 0.75 mm deep and the wall recedes by at most 0.005 mm in a step: by 0.7% of the force.
+        // The nodes are 0.75 mm deep and the wall recedes by at most 0.005 mm in a step: by 0.7% of
+        // the force.
         let let_go: Vec<f32> = (0..500).map(|_| -pushed(Vec3::Z * 2.0, true).z).collect();
         assert_eq!(let_go[499], 0.0, "the opening holds nothing in the end");
         let steps = std::iter::once(-up.z).chain(let_go.iter().copied()).zip(&let_go);

@@ -1,9 +1,9 @@
 //! One solver step: the newest loads in, moved nodes out.
 //!
 //! # Practice
-//! Contacts are springs on the nodes that the solver evaluates with its own positions, so steps between two
-//! collision results stay stable. A record is made whenever another contact took effect, and every [`EACH`] steps: what a replay needs, no
-//! more.
+//! Contacts are springs on the nodes that the solver evaluates with its own positions, so steps
+//! between two collision results stay stable. A record is made whenever another contact took
+//! effect, and every [`EACH`] steps: what a replay needs, no more.
 
 use crate::stages::collision_step::SoftFrame;
 use serde::Serialize;
@@ -27,7 +27,7 @@ pub struct SolverStage {
     dt_ms: f32,
     steps: u64,
     contact_seq: u64,
-    mishaps: Mishaps,
+    solver_faults: SolverFaults,
     max_displacement_mm: f32,
     /// Simulated time at which a tool touched the brain last, ms.
     touched_ms: f64,
@@ -35,7 +35,7 @@ pub struct SolverStage {
 
 /// What a solver had to put right, summed over steps; all 0 where nothing was.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Mishaps {
+pub struct SolverFaults {
     /// Inverted elements, which their energy turns back.
     pub inverted: u64,
     /// Nodes that hit the limit of speed or displacement and were held to it.
@@ -44,15 +44,17 @@ pub struct Mishaps {
     pub non_finite: u64,
     /// Time that was not simulated because it would have taken too many substeps, ms.
     pub skipped_ms: f64,
-    /// Contacts and springs for which there was no room, summed over the collision steps that took effect.
+    /// Contacts and springs for which there was no room, summed over the collision steps that took
+    /// effect.
     pub contacts_left_out: u64,
-    /// Longest way of a node in one step while no tool touched the brain, nor in the half second before, mm.
+    /// Longest way of a node in one step while no tool touched the brain, nor in the half second
+    /// before, mm.
     pub rest_motion_mm: f32,
     /// Steps in which that was more than 0.02 mm.
     pub restless_steps: u64,
 }
 
-impl Mishaps {
+impl SolverFaults {
     fn add(&mut self, report: &StepReport) {
         self.inverted += u64::from(report.inverted);
         self.limited += u64::from(report.limited);
@@ -102,7 +104,7 @@ impl SolverStage {
             loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
             steps: 0,
             contact_seq: 0,
-            mishaps: Mishaps::default(),
+            solver_faults: SolverFaults::default(),
             max_displacement_mm: 0.0,
             touched_ms: f64::NEG_INFINITY,
         }
@@ -115,15 +117,15 @@ impl SolverStage {
             self.loads.gravity = loads.gravity;
             self.loads.contacts.copy_from(&loads.contacts);
             self.contact_seq = contact_seq;
-            self.mishaps.contacts_left_out += u64::from(loads.contacts.overflow);
+            self.solver_faults.contacts_left_out += u64::from(loads.contacts.overflow);
         }
         let report = self.solver.step(&self.loads, self.dt_ms);
         self.steps += 1;
-        self.mishaps.add(&report);
+        self.solver_faults.add(&report);
         if !self.loads.contacts.is_empty() {
             self.touched_ms = self.time_ms();
         } else if self.time_ms() - self.touched_ms > MOVES_BACK_MS {
-            self.mishaps.rest(self.fastest() * self.dt_ms);
+            self.solver_faults.rest(self.fastest() * self.dt_ms);
         }
         (switched || self.steps.is_multiple_of(EACH)).then(|| self.record(report.inverted))
     }
@@ -187,7 +189,7 @@ impl SolverStage {
     }
 
     /// What had to be put right so far.
-    pub fn mishaps(&self) -> &Mishaps {
-        &self.mishaps
+    pub fn solver_faults(&self) -> &SolverFaults {
+        &self.solver_faults
     }
 }

@@ -1,8 +1,10 @@
 //! Which tool is in the hand, and when another may be taken.
 //!
 //! # Practice
-//! A tool is laid down only while it touches nothing. From bone to brain there is a guard: the bone must be open, by a stroke that came through or a flap that was
-//! lifted. Back to the bone there is none. A request counts once, however long it is held; a slot that is asked for is tried until the tool is free.
+//! A tool is laid down only while it touches nothing. From bone to brain there is a guard: the bone
+//! must be open, by a stroke that came through or a flap that was lifted. Back to the bone there is
+//! none. A request counts once, however long it is held; a slot that is asked for is tried until
+//! the tool is free.
 
 use crate::program::{Phase, Program};
 use trepan_geometry::{Buttons, Tool, ToolKind};
@@ -45,7 +47,8 @@ impl Tray {
         Phase::of(&self.tool())
     }
 
-    /// Changes the tool if that is asked for, the tool is `free`, and the bone `open` where it must be.
+    /// Changes the tool if that is asked for, the tool is `free`, and the bone `open` where it must
+    /// be.
     pub fn change(&mut self, buttons: Buttons, free: bool, open: bool) -> Option<Change> {
         let asks = (buttons.has(Buttons::NEXT_TOOL), buttons.taken(), buttons.in_slot());
         let before = std::mem::replace(&mut self.asked, asks);

@@ -1,8 +1,10 @@
-//! Taking strokes of the burr back, the newest first: when it may be, a few bricks in a tick, and why not.
+//! Taking strokes of the burr back, the newest first: when it may be, a few bricks in a tick, and
+//! why not.
 //!
 //! # Theory
-//! The bricks of a stroke are exchanged with what was kept of them. Where a tool of either hand lies in bone that would come
-//! back, what has come back goes again, and the trainee is told which tool is in the way:
+//! The bricks of a stroke are exchanged with what was kept of them. Where a tool of either hand
+//! lies in bone that would come back, what has come back goes again, and the trainee is told which
+//! tool is in the way:
 //!
 //! ```text
 //! asked ─→ returning ──(all bricks)──→ back
@@ -10,9 +12,10 @@
 //! ```
 //!
 //! # Practice
-//! A tool counts with its tip and its shaft and a voxel of room around them, where contact lets it be. Nothing cuts, no tool
-//! changes and no flap moves meanwhile. The largest stroke takes half a second at 1 kHz, a burr hole a few ticks. All of it is a
-//! function of the ticks; nothing allocates.
+//! A tool counts with its tip and its shaft and a voxel of room around them, where contact lets it
+//! be. Nothing cuts, no tool changes and no flap moves meanwhile. The largest stroke takes half a
+//! second at 1 kHz, a burr hole a few ticks. All of it is a function of the ticks; nothing
+//! allocates.
 
 use crate::stages::notice::Hindrance;
 use trepan_geometry::{Pose, Tool, Vec3};
@@ -89,7 +92,8 @@ impl Undo {
         &mut self.strokes[bone.stroke_number() % MAX_STROKES]
     }
 
-    /// One tick. `hinders`: why no stroke may come back now; `flap_away`: whether the flap is; `tools`: those in the hands.
+    /// One tick. `hinders`: why no stroke may come back now; `flap_away`: whether the flap is;
+    /// `tools`: those in the hands.
     pub fn tick(
         &mut self,
         bone: &BoneVolume,

@@ -1,9 +1,12 @@
 //! Linear and quadratic tetrahedra by their integration points.
 //!
 //! # Theory
-//! With barycentric coordinates L the quadratic tetrahedron has the shape functions `L_i (2 L_i - 1)` at its corners and `4 L_i L_j` in the middle of its edges;
-//! edges are straight at rest. Walkington's 14 points integrate its energy (degree 5; fewer would soften nearly incompressible tissue by half a percent). Its weight acts consistently, -1/20 at a corner and 1/5 at an edge;
-//! its mass is lumped in proportion to the diagonal of the consistent matrix (Hinton, Rock and Zienkiewicz 1976): 1/36 and 4/27.
+//! With barycentric coordinates L the quadratic tetrahedron has the shape functions
+//! `L_i (2 L_i - 1)` at its corners and `4 L_i L_j` in the middle of its edges; edges are straight
+//! at rest. Walkington's 14 points integrate its energy (degree 5; fewer would soften nearly
+//! incompressible tissue by half a percent). Its weight acts consistently, -1/20 at a corner and
+//! 1/5 at an edge; its mass is lumped in proportion to the diagonal of the consistent matrix
+//! (Hinton, Rock and Zienkiewicz 1976): 1/36 and 4/27.
 
 use crate::{Body, Shape};
 use glam::{DMat3, DVec3};
@@ -12,7 +15,8 @@ use std::collections::BTreeMap;
 /// Corners of the six edges, in the order of the nodes in their middle.
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
-/// Walkington's rule of 14 points: (coordinate, share of the volume) of four points near corners, twice, and of six near edges.
+/// Walkington's rule of 14 points: (coordinate, share of the volume) of four points near corners,
+/// twice, and of six near edges.
 const CORNERS: [(f64, f64); 2] =
     [(0.310_885_919_263_300_6, 0.112_687_925_718_015_85), (0.092_735_250_310_891_22, 0.073_493_043_116_361_95)];
 const EDGE: f64 = 0.045_503_704_125_649_65;

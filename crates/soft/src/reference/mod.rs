@@ -1,20 +1,26 @@
-//! The oracle: equilibrium or motion of a hyperelastic body, f64, Newton's method with an exact tangent and a sparse Cholesky factor.
+//! The oracle: equilibrium or motion of a hyperelastic body, f64, Newton's method with an exact
+//! tangent and a sparse Cholesky factor.
 //!
 //! # Theory
-//! Minimises the potential energy `Π(u) = Σ V W(F) - Σ m g·u + Π_contact(u)`. Each iteration solves `(K + k v vᵀ + τ I) Δu = -∂Π/∂u`,
-//! `v = w ⊗ n` being a contact spring (rank-one terms, taken in one by one by the Sherman-Morrison formula), τ a shift that grows until the matrix
-//! is positive definite; a line search makes sure that Π falls. The loads are not stepped: with an energy that is finite for every state,
-//! descent alone finds the equilibrium. Pressure follows the surface: its forces are held while Π is minimised, then computed anew, until they agree.
+//! Minimises the potential energy `Π(u) = Σ V W(F) - Σ m g·u + Π_contact(u)`. Each iteration solves
+//! `(K + k v vᵀ + τ I) Δu = -∂Π/∂u`, `v = w ⊗ n` being a contact spring (rank-one terms, taken in
+//! one by one by the Sherman-Morrison formula), τ a shift that grows until the matrix is positive
+//! definite; a line search makes sure that Π falls. The loads are not stepped: with an energy that
+//! is finite for every state, descent alone finds the equilibrium. Pressure follows the surface:
+//! its forces are held while Π is minimised, then computed anew, until they agree.
 //!
-//! In motion ([`Config::motion`]) a step of length h minimises `Π + Σ m/(2 β h²) |u - ũ|²`, Newmark's method with β = 1/4, γ = 1/2: second order, and of itself
-//! undamped. `ũ = u + h v + h² a/4`, `a⁺ = (u⁺ - ũ)/(β h²)`, `v⁺ = v + h (a + a⁺)/2`.
+//! In motion ([`Config::motion`]) a step of length h minimises `Π + Σ m/(2 β h²) |u - ũ|²`,
+//! Newmark's method with β = 1/4, γ = 1/2: second order, and of itself undamped.
+//! `ũ = u + h v + h² a/4`, `a⁺ = (u⁺ - ũ)/(β h²)`, `v⁺ = v + h (a + a⁺)/2`.
 //!
 //! # Practice
-//! At rest a "step" goes all the way to equilibrium under the loads, whatever `dt_ms` is; velocities are zero. About 0.1 s an iteration at
-//! 5,000 linear tetrahedra. Prescribed displacements: [`Reference::prescribe`].
+//! At rest a "step" goes all the way to equilibrium under the loads, whatever `dt_ms` is;
+//! velocities are zero. About 0.1 s an iteration at 5,000 linear tetrahedra. Prescribed
+//! displacements: [`Reference::prescribe`].
 //!
 //! # When not to use it
-//! In any loop that must keep a rate. Where several equilibria exist it finds one of them, not the one that dynamics would reach.
+//! In any loop that must keep a rate. Where several equilibria exist it finds one of them, not the
+//! one that dynamics would reach.
 
 mod cells;
 mod rank_one;
@@ -109,14 +115,16 @@ impl Reference {
         })
     }
 
-    /// Moves a fixed node to `displacement` from its rest position, mm; the next step finds the equilibrium around it.
+    /// Moves a fixed node to `displacement` from its rest position, mm; the next step finds the
+    /// equilibrium around it.
     pub fn prescribe(&mut self, node: u32, displacement: DVec3) {
         if self.cells.fixed.get(node as usize) == Some(&true) && (node as usize) < self.positions.len() {
             self.u[node as usize] = displacement;
         }
     }
 
-    /// Sets the state of all nodes of the mesh by their rest position: displacement, mm, and velocity, mm/ms. Fixed nodes stay.
+    /// Sets the state of all nodes of the mesh by their rest position: displacement, mm, and
+    /// velocity, mm/ms. Fixed nodes stay.
     pub fn set(&mut self, state: impl Fn(DVec3) -> (DVec3, DVec3)) {
         for n in (0..self.u.len()).filter(|&n| !self.cells.fixed[n]) {
             (self.u[n], self.velocity[n]) = state(self.cells.rest[n]);
@@ -136,7 +144,8 @@ impl Reference {
         &self.u[..self.positions.len()]
     }
 
-    /// Force that the support exerts on each node of the mesh, N; zero at free nodes in equilibrium.
+    /// Force that the support exerts on each node of the mesh, N; zero at free nodes in
+    /// equilibrium.
     pub fn reactions(&self, loads: &Loads) -> Vec<DVec3> {
         let mut reactions = self.trial(&self.u, loads, None, false).residual;
         let middles = reactions.split_off(self.positions.len());
@@ -226,7 +235,8 @@ impl Reference {
         false
     }
 
-    /// The Newton step for a residual, with the springs that press in the matrix: one rank-one term after the other.
+    /// The Newton step for a residual, with the springs that press in the matrix: one rank-one term
+    /// after the other.
     fn newton_step(&mut self, trial: &Trial, loads: &Loads) -> Vec<DVec3> {
         let mut terms: Vec<RankOne> = Vec::with_capacity(trial.pressing.len());
         let pressing = |place: &usize| trial.pressing.contains(place);
@@ -281,7 +291,8 @@ impl Reference {
         (report.inverted, report.contact_n) = (trial.inverted, trial.contact_n as f32);
     }
 
-    /// Computes the forces of pressure anew; gives by how much they changed, as a share of the largest.
+    /// Computes the forces of pressure anew; gives by how much they changed, as a share of the
+    /// largest.
     fn push(&mut self) -> f64 {
         let count = self.positions.len();
         let now: Vec<DVec3> = self.cells.rest[..count].iter().zip(&self.u).map(|(x, u)| *x + *u).collect();

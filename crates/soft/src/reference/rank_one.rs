@@ -1,4 +1,5 @@
-//! A spring on many nodes beside a sparse matrix: one rank-one term, taken in after the solution (Sherman and Morrison 1950).
+//! A spring on many nodes beside a sparse matrix: one rank-one term, taken in after the solution
+//! (Sherman and Morrison 1950).
 
 use glam::DVec3;
 

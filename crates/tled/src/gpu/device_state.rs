@@ -1,4 +1,5 @@
-//! What the device keeps between steps: the nodes' state and the numbers of the step, as `step.wgsl` declares them.
+//! What the device keeps between steps: the nodes' state and the numbers of the step, as
+//! `step.wgsl` declares them.
 
 use crate::layout::Layout;
 use trepan_gpu::{Buffer, Gpu, GpuError};
@@ -17,7 +18,7 @@ pub(crate) struct Step {
     pub springs: u32,
     pub elements: u32,
     pub nodes: u32,
-    pub seats: u32,
+    pub node_groups: u32,
     pub fade_keep: [f32; 2],
     pub fade_gain: [f32; 2],
     pub planes: u32,
@@ -33,7 +34,8 @@ pub(crate) struct DeviceState {
     pub v: Buffer<[f32; 4]>,
     /// By place: 1/m, 1/g; the share of m that has weight; 1 where a spring pushes.
     pub nodes: Buffer<[f32; 4]>,
-    /// By place, since it was cleared: inverted elements, times limited, times not finite, bits of the largest ω².
+    /// By place, since it was cleared: inverted elements, times limited, times not finite, bits of
+    /// the largest ω².
     pub noticed: Buffer<[u32; 4]>,
     /// 1/m by place on this side.
     pub inverse_mass: Vec<f32>,
@@ -41,7 +43,8 @@ pub(crate) struct DeviceState {
 }
 
 impl DeviceState {
-    /// Nodes at rest, of masses by mesh node, g, which may be more than what their weight comes from.
+    /// Nodes at rest, of masses by mesh node, g, which may be more than what their weight comes
+    /// from.
     pub fn new(gpu: &Gpu, body: &Body, layout: &Layout, masses: &[f64]) -> Result<Self, GpuError> {
         let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
         let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };

@@ -1,12 +1,14 @@
 //! The pass of the elements: forces on their nodes, one thread a tetrahedron, one dispatch a law.
 //!
 //! # Theory
-//! The arithmetic of `law.rs`, `element.rs` and `stiffness.rs`. Every corner writes to a slot of its own; slots lie sorted by
-//! seat and so by node, so the node's pass reads one run in a fixed order and nothing is added by atomics: the same bits in every run.
+//! The arithmetic of `law.rs`, `element.rs` and `stiffness.rs`. Every corner writes to a slot of
+//! its own; slots lie sorted by group and so by node, so the node's pass reads one run in a fixed
+//! order and nothing is added by atomics: the same bits in every run.
 //!
 //! # Practice
-//! 80 bytes read in a row and 64 bytes scattered a tetrahedron and step, besides the displacements of four nodes; 96 more read and written for a memory of past stress,
-//! 16 more for the cure of locking. What a body does not need is compiled out of its kernels.
+//! 80 bytes read in a row and 64 bytes scattered a tetrahedron and step, besides the displacements
+//! of four nodes; 96 more read and written for a memory of past stress, 16 more for the cure of
+//! locking. What a body does not need is compiled out of its kernels.
 
 use crate::block::omega2_over_stiffness;
 use crate::config::Config;
@@ -60,7 +62,7 @@ impl Forces {
         let (mut laws, mut first) = (Vec::new(), 0u32);
         for tets in layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b)) {
             let range = Buffer::from_slice(gpu, "range", &[[first, tets.len() as u32, 0, 0]])?;
-            let text = text(body, tets[0], relaxes, config.cure_locking);
+            let text = text(body, tets[0], relaxes, config.averaged_pressure);
             let kernel = Kernel::new(gpu, "forces", &text, "main", &wanted)?;
             let bindings = kernel.bind(
                 gpu,
@@ -113,7 +115,8 @@ fn constants_of<M: Constitutive<K>, const K: usize>(body: &Body, scaling: &Scali
     (std::array::from_fn(|k| constants.get(k).copied().unwrap_or(0.0)), omega2)
 }
 
-/// Three rows an element: the gradients of corners 1 to 3, and beside them two constants and ω² over stiffness at rest.
+/// Three rows an element: the gradients of corners 1 to 3, and beside them two constants and ω²
+/// over stiffness at rest.
 fn rows(body: &Body, layout: &Layout, constants: &[([f32; 5], f32)]) -> Vec<[f32; 4]> {
     let of = |(&t, (constants, omega2)): (&u32, &([f32; 5], f32))| {
         let (shape, beside) = (body.shape(t as usize), [constants[0], constants[1], *omega2]);

@@ -3,18 +3,22 @@
 //! # Theory
 //! ```text
 //! volumes  elements ──▶ change of volume                          (only where locking is cured)
-//! seats    change of volume ──▶ its mean around each node         (only where locking is cured)
+//! node_groups    change of volume ──▶ its mean around each node         (only where locking is cured)
 //! forces   elements ──▶ slots, one a corner, sorted by node
 //! press    touched nodes ──▶ forces of the contact springs       (only where something touches)
 //! update   slots ──▶ node, in their order; v⁺, u⁺
 //! ```
-//! Every law, the cure of locking, Prony's relaxation and mass scaling are there, with the processor's arithmetic. No atomics and no order that depends on timing: the same input gives the same bytes on the same device. Against the processor's solver
-//! the difference is that of rounding, since drivers may fuse a multiplication and an addition.
+//! Every law, the cure of locking, Prony's relaxation and mass scaling are there, with the
+//! processor's arithmetic. No atomics and no order that depends on timing: the same input gives the
+//! same bytes on the same device. Against the processor's solver the difference is that of
+//! rounding, since drivers may fuse a multiplication and an addition.
 //!
 //! # Practice
-//! [`GpuTled::steps`] only submits; [`GpuTled::read`] waits and copies the state back. On this side of the bus the stable step is checked
-//! against the present deformation at every [`read`](GpuTled::read), not at every step, so read at least every few ms of simulated time.
-//! [`SoftSolver::step`] submits and reads back at once: right, but it waits for the device, so it is no choice for a fast loop.
+//! [`GpuTled::steps`] only submits; [`GpuTled::read`] waits and copies the state back. On this side
+//! of the bus the stable step is checked against the present deformation at every
+//! [`read`](GpuTled::read), not at every step, so read at least every few ms of simulated time.
+//! [`SoftSolver::step`] submits and reads back at once: right, but it waits for the device, so it
+//! is no choice for a fast loop.
 //!
 //! ```no_run
 //! use trepan_gpu::{Gpu, Prefer};
@@ -32,8 +36,9 @@
 //! ```
 //!
 //! # When not to use it
-//! Small meshes (the processor needs 0.3 ms for 22 thousand tetrahedra). Bodies without supports that are damped: they are refused with the field's name, and
-//! [`Tled`](crate::Tled) has them, as it has pressure on surfaces, moved nodes and [`settle`](crate::Tled::settle).
+//! Small meshes (the processor needs 0.3 ms for 22 thousand tetrahedra). Bodies without supports
+//! that are damped: they are refused with the field's name, and [`Tled`](crate::Tled) has them, as
+//! it has pressure on surfaces, moved nodes and [`settle`](crate::Tled::settle).
 
 mod device_state;
 mod forces;
@@ -44,9 +49,9 @@ mod volumes;
 
 use crate::config::Config;
 use crate::layout::Layout;
+use crate::node_groups::NodeGroups;
 use crate::scaling::Scaling;
-use crate::seats::Seats;
-use crate::tled::{BORNE, MOST_GAINED, NEARLY, damping_rate, lowest_per_ms};
+use crate::tled::{MAX_STIFFENING, NEARLY, SUBSTEP_SAFETY, damping_rate, lowest_per_ms};
 use device_state::{DeviceState, Step};
 use forces::Forces;
 use press::Press;
@@ -99,7 +104,7 @@ pub struct GpuTled {
     damping_per_ms: f32,
     max_displacement_mm: f32,
     elements: u32,
-    seats: u32,
+    node_groups: u32,
     /// Since forces were computed last, ms.
     elapsed_ms: f32,
     stiffest_at_rest: f32,
@@ -118,12 +123,12 @@ impl GpuTled {
         let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
         let damping_per_ms = damping_rate(config.damping, lowest_per_ms(body, config.damping, &stiffness));
         refuse(body, config, damping_per_ms)?;
-        let (layout, cures) = (Layout::of(body), config.cure_locking);
-        let seats = Seats::of(body, &layout, cures);
+        let (layout, cures) = (Layout::of(body), config.averaged_pressure);
+        let node_groups = NodeGroups::of(body, &layout, cures);
         let state = DeviceState::new(gpu, body, &layout, stiffness.masses_g())?;
-        let topology = Topology::new(gpu, body, &layout, &seats, cures)?;
+        let topology = Topology::new(gpu, body, &layout, &node_groups, cures)?;
         let forces = Forces::new(gpu, (body, &layout, &scaling), config, &state, &topology)?;
-        let volumes = || Volumes::new(gpu, (body, &layout, &seats), &state, &topology, &forces);
+        let volumes = || Volumes::new(gpu, (body, &layout, &node_groups), &state, &topology, &forces);
         let press = Press::new(gpu, &state, &topology, &forces)?;
         let stiffest = stiffest(body, &scaling);
         Ok(Self {
@@ -137,7 +142,7 @@ impl GpuTled {
             bound_ms: power_bound_of_ms(body, &stiffness) as f32,
             max_displacement_mm: config.max_displacement * extent,
             elements: body.mesh.tets.len() as u32,
-            seats: seats.place_of.len() as u32,
+            node_groups: node_groups.place_of.len() as u32,
             elapsed_ms: 0.0,
             stiffest_at_rest: stiffest,
             stiffest,
@@ -151,15 +156,16 @@ impl GpuTled {
         })
     }
 
-    /// Submits `count` steps of the longest stable length under the same loads, and gives that length, ms. Does not wait.
+    /// Submits `count` steps of the longest stable length under the same loads, and gives that
+    /// length, ms. Does not wait.
     pub fn steps(&mut self, loads: &Loads, count: u32) -> f32 {
         let dt_ms = self.longest_ms();
         self.submit(loads, dt_ms, count);
         dt_ms
     }
 
-    /// Waits for the device and copies positions and velocities back. Counts are of all steps since the last time, inverted elements
-    /// those of every node's worst step.
+    /// Waits for the device and copies positions and velocities back. Counts are of all steps since
+    /// the last time, inverted elements those of every node's worst step.
     pub fn read(&mut self) -> Result<StepReport, GpuError> {
         let (u, v) = (self.state.u.read(&self.gpu)?, self.state.v.read(&self.gpu)?);
         let noticed = self.state.noticed.read(&self.gpu)?;
@@ -184,7 +190,8 @@ impl GpuTled {
         })
     }
 
-    /// Why the device did not answer in the last [`step`](SoftSolver::step), which then left the state as it was.
+    /// Why the device did not answer in the last [`step`](SoftSolver::step), which then left the
+    /// state as it was.
     pub fn fault(&self) -> Option<&GpuError> {
         self.fault.as_ref()
     }
@@ -196,14 +203,15 @@ impl GpuTled {
 
     /// The stable bound as the elements were at the last read.
     fn bound_now_ms(&self) -> f32 {
-        self.bound_ms / (self.stiffest / self.stiffest_at_rest).sqrt().clamp(1.0, MOST_GAINED)
+        self.bound_ms / (self.stiffest / self.stiffest_at_rest).sqrt().clamp(1.0, MAX_STIFFENING)
     }
 
     fn longest_ms(&self) -> f32 {
-        self.stable_dt_ms().min(BORNE * self.bound_now_ms())
+        self.stable_dt_ms().min(SUBSTEP_SAFETY * self.bound_now_ms())
     }
 
-    /// The first of the steps lets past stress fade for as long as the last step took, where that was another length.
+    /// The first of the steps lets past stress fade for as long as the last step took, where that
+    /// was another length.
     fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
         let mut step = self.numbers(loads, dt_ms);
         let presses = step.springs + step.planes > 0;
@@ -261,7 +269,7 @@ impl GpuTled {
             planes,
             elements: self.elements,
             nodes: self.layout.node_at.len() as u32,
-            seats: self.seats,
+            node_groups: self.node_groups,
             ..Step::default()
         }
     }

@@ -46,7 +46,8 @@ pub(crate) struct Spring {
     padding: [u32; 2],
 }
 
-/// Springs, and of every node that they touch its place and the bits of its weight, of 1/m and of the share of m that has weight.
+/// Springs, and of every node that they touch its place and the bits of its weight, of 1/m and of
+/// the share of m that has weight.
 pub(crate) struct List {
     springs: Vec<Spring>,
     touched: Vec<[u32; 4]>,
@@ -58,7 +59,8 @@ impl List {
         self.touched.clear();
     }
 
-    /// Adds a spring that is `rest_depth` mm deep where nothing moved. Nodes that the mesh lacks are left out.
+    /// Adds a spring that is `rest_depth` mm deep where nothing moved. Nodes that the mesh lacks
+    /// are left out.
     pub fn add(&mut self, spring: &NodalContact, rest_depth: f32, place_of: &[u32], state: &DeviceState) {
         let first = self.touched.len();
         let mut compliance = 0.0;
@@ -83,8 +85,8 @@ impl List {
         });
     }
 
-    /// Adds a plane, after all springs, that is `rest_depth` mm deep where nothing moved; false where the
-    /// mesh lacks its node.
+    /// Adds a plane, after all springs, that is `rest_depth` mm deep where nothing moved; false
+    /// where the mesh lacks its node.
     pub fn add_plane(&mut self, plane: &PlaneContact, rest_depth: f32, place_of: &[u32], state: &DeviceState) -> bool {
         let Some(&place) = place_of.get(plane.node as usize) else { return false };
         let [inverse_mass, weight] = state.mass_of(place);

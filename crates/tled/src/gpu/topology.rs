@@ -1,25 +1,26 @@
 //! Which corners meet at which node, and in what order their numbers lie on the device.
 //!
 //! # Theory
-//! Every corner of every element owns a slot. Slots lie sorted by seat (see `seats.rs`), seats by place, so that one run of slots belongs to a seat and a longer one to a node.
+//! Every corner of every element owns a slot. Slots lie sorted by group (see `node_groups.rs`),
+//! node_groups by place, so that one run of slots belongs to a group and a longer one to a node.
 //!
 //! ```text
-//! slots   │ seat 0 │ seat 1 │ seat 2 │ …         a seat: the elements of one material around a node, where locking is cured
+//! slots   │ group 0 │ group 1 │ group 2 │ …         a group: the elements of one material around a node, where locking is cured
 //!         │ place 0│     place 1     │ …         a place: a node
 //! ```
 
 use crate::layout::Layout;
-use crate::seats::Seats;
+use crate::node_groups::NodeGroups;
 use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_soft::Body;
 
 /// The mesh on the device.
 pub(crate) struct Topology {
-    /// Places of every element's corners, then their slots, then their seats.
+    /// Places of every element's corners, then their slots, then their node_groups.
     pub corners: Buffer<[u32; 4]>,
     /// Where a place's run of slots begins, one more than places.
     pub starts: Buffer<u32>,
-    /// By seat: mean `J - 1` around it; one number where locking is not cured.
+    /// By group: mean `J - 1` around it; one number where locking is not cured.
     pub swelling: Buffer<f32>,
     /// The same on this side, for the cure of locking.
     pub runs: Runs,
@@ -27,8 +28,8 @@ pub(crate) struct Topology {
 
 /// Slots of the corners, and the runs that they make.
 pub(crate) struct Runs {
-    /// Where a seat's run of slots begins, one more than seats.
-    pub of_seats: Vec<u32>,
+    /// Where a group's run of slots begins, one more than node_groups.
+    pub of_groups: Vec<u32>,
     /// The element of every slot.
     pub owners: Vec<u32>,
     of_places: Vec<u32>,
@@ -36,42 +37,48 @@ pub(crate) struct Runs {
 }
 
 impl Topology {
-    pub fn new(gpu: &Gpu, body: &Body, layout: &Layout, seats: &Seats, cures: bool) -> Result<Self, GpuError> {
-        let seats_of: Vec<[u32; 4]> = layout.tet_at.iter().map(|&t| seats.of_tet(body, layout, t)).collect();
-        let runs = Runs::of(&seats_of, seats, layout.node_at.len());
-        let place = |seat: u32| seats.place_of[seat as usize];
-        let mut corners: Vec<[u32; 4]> = seats_of.iter().map(|tet| tet.map(place)).collect();
+    pub fn new(
+        gpu: &Gpu,
+        body: &Body,
+        layout: &Layout,
+        node_groups: &NodeGroups,
+        cures: bool,
+    ) -> Result<Self, GpuError> {
+        let groups_of: Vec<[u32; 4]> = layout.tet_at.iter().map(|&t| node_groups.of_tet(body, layout, t)).collect();
+        let runs = Runs::of(&groups_of, node_groups, layout.node_at.len());
+        let place = |group: u32| node_groups.place_of[group as usize];
+        let mut corners: Vec<[u32; 4]> = groups_of.iter().map(|tet| tet.map(place)).collect();
         corners.extend_from_slice(&runs.slots);
         if cures {
-            corners.extend_from_slice(&seats_of);
+            corners.extend_from_slice(&groups_of);
         }
         Ok(Self {
             corners: Buffer::from_slice(gpu, "corners", &corners)?,
             starts: Buffer::from_slice(gpu, "starts", &runs.of_places)?,
-            swelling: Buffer::zeroed(gpu, "swelling", if cures { seats.place_of.len() } else { 1 })?,
+            swelling: Buffer::zeroed(gpu, "swelling", if cures { node_groups.place_of.len() } else { 1 })?,
             runs,
         })
     }
 }
 
 impl Runs {
-    fn of(seats_of: &[[u32; 4]], seats: &Seats, places: usize) -> Self {
-        let mut of_seats = vec![0u32; seats.place_of.len() + 1];
-        seats_of.iter().flatten().for_each(|&seat| of_seats[seat as usize + 1] += 1);
-        (1..of_seats.len()).for_each(|i| of_seats[i] += of_seats[i - 1]);
-        let (mut next, mut owners) = (of_seats.clone(), vec![0u32; 4 * seats_of.len()]);
-        let mut slots = Vec::with_capacity(seats_of.len());
-        for (element, tet) in seats_of.iter().enumerate() {
-            slots.push(tet.map(|seat| {
-                let slot = next[seat as usize];
-                next[seat as usize] += 1;
+    fn of(groups_of: &[[u32; 4]], node_groups: &NodeGroups, places: usize) -> Self {
+        let mut of_groups = vec![0u32; node_groups.place_of.len() + 1];
+        groups_of.iter().flatten().for_each(|&group| of_groups[group as usize + 1] += 1);
+        (1..of_groups.len()).for_each(|i| of_groups[i] += of_groups[i - 1]);
+        let (mut next, mut owners) = (of_groups.clone(), vec![0u32; 4 * groups_of.len()]);
+        let mut slots = Vec::with_capacity(groups_of.len());
+        for (element, tet) in groups_of.iter().enumerate() {
+            slots.push(tet.map(|group| {
+                let slot = next[group as usize];
+                next[group as usize] += 1;
                 owners[slot as usize] = element as u32;
                 slot
             }));
         }
-        let first_of = |place: usize| of_seats[seats.place_of.partition_point(|&p| (p as usize) < place)];
+        let first_of = |place: usize| of_groups[node_groups.place_of.partition_point(|&p| (p as usize) < place)];
         let of_places = (0..=places).map(first_of).collect();
-        Self { of_seats, owners, of_places, slots }
+        Self { of_groups, owners, of_places, slots }
     }
 }
 
@@ -88,14 +95,15 @@ mod tests {
         body.material_of_tet.iter_mut().step_by(3).for_each(|m| *m = 1);
         let layout = Layout::of(&body);
         for apart in [false, true] {
-            let seats = Seats::of(&body, &layout, apart);
-            let seats_of: Vec<[u32; 4]> = layout.tet_at.iter().map(|&t| seats.of_tet(&body, &layout, t)).collect();
-            let runs = Runs::of(&seats_of, &seats, layout.node_at.len());
-            let mut taken = vec![false; 4 * seats_of.len()];
-            for (element, (tet, slots)) in seats_of.iter().zip(&runs.slots).enumerate() {
-                for (&seat, &slot) in tet.iter().zip(slots) {
-                    let place = seats.place_of[seat as usize] as usize;
-                    assert!((runs.of_seats[seat as usize]..runs.of_seats[seat as usize + 1]).contains(&slot));
+            let node_groups = NodeGroups::of(&body, &layout, apart);
+            let groups_of: Vec<[u32; 4]> =
+                layout.tet_at.iter().map(|&t| node_groups.of_tet(&body, &layout, t)).collect();
+            let runs = Runs::of(&groups_of, &node_groups, layout.node_at.len());
+            let mut taken = vec![false; 4 * groups_of.len()];
+            for (element, (tet, slots)) in groups_of.iter().zip(&runs.slots).enumerate() {
+                for (&group, &slot) in tet.iter().zip(slots) {
+                    let place = node_groups.place_of[group as usize] as usize;
+                    assert!((runs.of_groups[group as usize]..runs.of_groups[group as usize + 1]).contains(&slot));
                     assert!((runs.of_places[place]..runs.of_places[place + 1]).contains(&slot));
                     assert_eq!(runs.owners[slot as usize] as usize, element);
                     assert!(!std::mem::replace(&mut taken[slot as usize], true));

@@ -1,4 +1,5 @@
-//! The pass of the nodes: forces gathered, contact added, motion by central differences, what is not sane held.
+//! The pass of the nodes: forces gathered, contact added, motion by central differences, what is
+//! not sane held.
 
 use crate::gpu::device_state::DeviceState;
 use crate::gpu::forces::Forces;

@@ -1,4 +1,5 @@
-//! `cargo xtask validate`, `merge` and `compare`: runs suites, puts shards together, sets two runs side by side.
+//! `cargo xtask validate`, `merge` and `compare`: runs suites, puts shards together, sets two runs
+//! side by side.
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
@@ -30,7 +31,8 @@ struct Arguments {
 
 #[derive(Args)]
 struct Run {
-    /// The suites to run, or one's parts that begin so, as in rigid/walls [default: all but those that run when named only]
+    /// The suites to run, or one's parts that begin so, as in rigid/walls [default: all but those
+    /// that run when named only]
     suites: Vec<String>,
     /// Fewer and smaller scenes
     #[arg(long)]
@@ -38,13 +40,16 @@ struct Run {
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     seed: u64,
-    /// Only every Nth part, from the Ith on, as in 2/8; `cargo xtask merge` puts the shards' folders together
+    /// Only every Nth part, from the Ith on, as in 2/8; `cargo xtask merge` puts the shards'
+    /// folders together
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
-    /// Processes beside each other, one for each core at most: sooner done, and times that disturb each other [default: 2 with --quick, else 1]
+    /// Processes beside each other, one for each core at most: sooner done, and times that disturb
+    /// each other [default: 2 with --quick, else 1]
     #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u8).range(1..))]
     jobs: Option<u8>,
-    /// Keep the borders of this run's maps as those that later runs are held against (in the sources)
+    /// Keep the borders of this run's maps as those that later runs are held against (in the
+    /// sources)
     #[arg(long, conflicts_with = "shard")]
     keep_borders: bool,
     /// Name the parts instead of running them
@@ -65,7 +70,8 @@ enum Task {
         /// Where SUITE.json and index.html go
         #[arg(long, value_name = "DIR", default_value = "target/validation")]
         out: PathBuf,
-        /// Keep the borders of the merged maps as those that later runs are held against (in the sources)
+        /// Keep the borders of the merged maps as those that later runs are held against (in the
+        /// sources)
         #[arg(long)]
         keep_borders: bool,
     },
@@ -215,7 +221,8 @@ impl Progress {
     }
 }
 
-/// Runs the parts as shards in processes beside each other, into one folder, and passes on what they tell of parts; gives the parts of which they told.
+/// Runs the parts as shards in processes beside each other, into one folder, and passes on what
+/// they tell of parts; gives the parts of which they told.
 fn beside(at_once: usize, asked: &Run, jobs: &[Job], store: &Store) -> Result<BTreeSet<String>> {
     let program = std::env::current_exe()?;
     let start = |number: usize| {
@@ -253,7 +260,8 @@ fn beside(at_once: usize, asked: &Run, jobs: &[Job], store: &Store) -> Result<BT
     Ok(told)
 }
 
-/// Runs what is not there yet; gives whether every promise of every part was kept. Of parts that were `told` of before, nothing is said.
+/// Runs what is not there yet; gives whether every promise of every part was kept. Of parts that
+/// were `told` of before, nothing is said.
 fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, told: &BTreeSet<String>) -> Result<bool> {
     let mut progress = Progress::of(&jobs, store, 1)?;
     let mut passed = true;

@@ -61,8 +61,8 @@ pub struct Anatomy {
 
 /// The built-in head, and the second one where the folder of shared data holds it.
 ///
-/// That folder is `data` under what the environment variable `TREPAN_SHARED` names, else under `../shared`
-/// beside the workspace.
+/// That folder is `data` under what the environment variable `TREPAN_SHARED` names, else under
+/// `../shared` beside the workspace.
 pub fn base_heads() -> Result<Vec<BaseHead>> {
     let mut heads = vec![BaseHead::built_in()?];
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
@@ -143,7 +143,8 @@ impl Anatomy {
     }
 }
 
-/// The space inside the skull: the brain, and what a ball that fits through no hole of the skull reaches from it.
+/// The space inside the skull: the brain, and what a ball that fits through no hole of the skull
+/// reaches from it.
 fn cavity(ct: &VoxelVolume<i16>, brain: &VoxelVolume<f32>) -> DistanceField {
     let bone = resample(ct, &Grid::of(brain), Interpolation::Trilinear, AIR_HU).map(|hu| u8::from(hu >= BONE_HU));
     let wide = DistanceField::of_mask(&bone);

@@ -1,15 +1,16 @@
 //! Local changes of shape: thickness of the vault, atrophy, size of the ventricles.
 //!
 //! # Theory
-//! Each is a velocity along the gradient of a distance d, and the map is where a point flows to in unit time:
+//! Each is a velocity along the gradient of a distance d, and the map is where a point flows to in
+//! unit time:
 //!
 //! ```text
 //! surface moved by m    speed -m · trapezoid(d), 1 between 0 and m, 0 from both ends on
 //! thickness times f     speed -ln(f) · min(d, S), S = 8 mm · (f - 1) / ln(f):   d to d / f
 //! ```
 //!
-//! Points that flow in one continuous field never meet, so the map cannot fold, however thin a horn of a
-//! ventricle is.
+//! Points that flow in one continuous field never meet, so the map cannot fold, however thin a horn
+//! of a ventricle is.
 
 use super::base::{Anatomy, smooth};
 use super::recipe::HeadRecipe;

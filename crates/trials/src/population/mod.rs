@@ -1,4 +1,5 @@
-//! A population of heads: real heads made different in size, shape, bone, scan and illness, with the truth kept.
+//! A population of heads: real heads made different in size, shape, bone, scan and illness, with
+//! the truth kept.
 //!
 //! # Theory
 //! A head is a real one looked up through a map. A point of the new head goes back to the base by
@@ -7,14 +8,15 @@
 //! base = local(q + spline(q)),   q = A⁻¹ · point
 //! ```
 //!
-//! A is affine (size, shear, turn, shift), the spline cubic with control points 30 mm apart, and `local`
-//! moves along the gradients of three distance fields: away from the cavity (thickness of the vault),
-//! into the brain (atrophy), around the ventricles. CT, MRI and masks go through one map, so that the
-//! truth stays true. The scan comes after it: voxels, gantry tilt, noise, metal, bias field.
+//! A is affine (size, shear, turn, shift), the spline cubic with control points 30 mm apart, and
+//! `local` moves along the gradients of three distance fields: away from the cavity (thickness of
+//! the vault), into the brain (atrophy), around the ventricles. CT, MRI and masks go through one
+//! map, so that the truth stays true. The scan comes after it: voxels, gantry tilt, noise, metal,
+//! bias field.
 //!
 //! # Practice
-//! [`base_heads`] reads the real heads, [`HeadRecipe::of_run`] draws recipes, [`Head::make`] makes a
-//! head: the same recipe gives the same bits for any number of threads.
+//! [`base_heads`] reads the real heads, [`HeadRecipe::of_run`] draws recipes, [`Head::make`] makes
+//! a head: the same recipe gives the same bits for any number of threads.
 //!
 //! # When not to use it
 //! For anatomy that a map of a healthy head cannot give: fractures, missing bone, infants.

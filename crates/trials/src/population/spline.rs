@@ -4,7 +4,8 @@ use glam::DVec3;
 
 /// Cubic B-spline on a grid of control points; beyond the grid the border holds on.
 ///
-/// The basis is a partition of one with weights over 0, so no value leaves the range of the coefficients.
+/// The basis is a partition of one with weights over 0, so no value leaves the range of the
+/// coefficients.
 pub struct Spline {
     low: DVec3,
     spacing_mm: f64,

@@ -126,7 +126,8 @@ impl Warp {
         })
     }
 
-    /// The smallest determinant of the map's Jacobian over the affine's: over 0, the map folds nowhere.
+    /// The smallest determinant of the map's Jacobian over the affine's: over 0, the map folds
+    /// nowhere.
     pub fn least_jacobian(&self) -> f64 {
         let [nx, ny, nz] = self.nodes.dims;
         let whole = self.base_from_head.matrix3.determinant();

@@ -1,4 +1,5 @@
-//! A ball-tipped tool against moving tetrahedra: the thesis's cubes and a brain, its three paths, jumps and broken meshes, against an f64 oracle.
+//! A ball-tipped tool against moving tetrahedra: the thesis's cubes and a brain, its three paths,
+//! jumps and broken meshes, against an f64 oracle.
 
 mod poses;
 mod published;
@@ -18,7 +19,8 @@ use trepan_deformable::Method;
 use trepan_geometry::Vec3;
 use truth::Truth;
 
-/// What the recommended method must gain over looking at every tetrahedron, from 48 thousand of them on: two thirds of the least that a machine busy with other work has shown there.
+/// What the recommended method must gain over looking at every tetrahedron, from 48 thousand of
+/// them on: two thirds of the least that a machine busy with other work has shown there.
 const LEAST_RATIO: f64 = 7.0;
 /// How many steps methods that look at every tetrahedron are given.
 const STEPS_TIMES_TETS: usize = 20_000_000;
@@ -85,7 +87,8 @@ fn recorded(scope: Scope, findings: &mut Findings) {
 fn follow(scene: &Scene, place: &str, tips: &[Vec3], in_time: bool, findings: &mut Findings) {
     let steps = tips.len();
     let truth = Truth::along(scene, tips);
-    // Methods that look at every tetrahedron repeat themselves: on large meshes some warm steps say all.
+    // Methods that look at every tetrahedron repeat themselves: on large meshes some warm steps say
+    // all.
     let enough = (STEPS_TIMES_TETS / scene.mesh.tets.len()).max(3 * START).min(steps);
     let steps_of = |method| if method == Method::RECOMMENDED { steps } else { enough };
     let take = |method| ride(scene, method, &tips[..steps_of(method)], &truth);
@@ -100,7 +103,8 @@ fn follow(scene: &Scene, place: &str, tips: &[Vec3], in_time: bool, findings: &m
     }
 }
 
-/// Nothing beats the recommended method in both time and depth, and it gains on the scan what it promises.
+/// Nothing beats the recommended method in both time and depth, and it gains on the scan what it
+/// promises.
 fn speed_gates(place: &str, scene: &Scene, rides: &[Ride], findings: &mut Findings) {
     let best = Method::RECOMMENDED.name();
     let beaten = crate::front::dominated(&findings.rows, place, best, "step_p50_us", "depth_error_p95_mm");
@@ -113,7 +117,8 @@ fn speed_gates(place: &str, scene: &Scene, rides: &[Ride], findings: &mut Findin
     }
 }
 
-/// A stroke 0.5 mm deep over a flat side at rest: the true depth never changes, though points go from tetrahedron to tetrahedron.
+/// A stroke 0.5 mm deep over a flat side at rest: the true depth never changes, though points go
+/// from tetrahedron to tetrahedron.
 fn slide(scope: Scope, findings: &mut Findings) {
     let scene = Scene::cube_at_rest(13);
     let (tips, depth_mm) = scene.stroke(scope.pick(800, 4000));
@@ -133,7 +138,8 @@ fn slide(scope: Scope, findings: &mut Findings) {
     ));
 }
 
-/// Straight down into a slab to 0.9 of its thickness: the depth, and with it the force, must never fall.
+/// Straight down into a slab to 0.9 of its thickness: the depth, and with it the force, must never
+/// fall.
 fn press(findings: &mut Findings) {
     let scene = Scene::cube_at_rest(7);
     let (tips, deepest_mm) = scene.push(0.9);

@@ -1,15 +1,18 @@
-//! Force models: what a call costs, how near a pressed hand comes to the force that it should feel, and where each model gives way.
+//! Force models: what a call costs, how near a pressed hand comes to the force that it should feel,
+//! and where each model gives way.
 //!
 //! # Theory
 //! A hand of stiffness K_h that means to be d deep in a wall of stiffness K must come to rest under
 //! ```text
 //! F = K K_h / (K + K_h) · d
 //! ```
-//! The error is the root mean square from F over the second after the press: a model that swings never comes there. The device has no friction and exact positions, so
-//! that nothing but the model damps; it answers a tick late.
+//! The error is the root mean square from F over the second after the press: a model that swings
+//! never comes there. The device has no friction and exact positions, so that nothing but the model
+//! damps; it answers a tick late.
 //!
 //! # Practice
-//! No guard: it would hide what is asked. `god-object` is the damped spring on a contact found by the proxy under planes; all others take the nearest face.
+//! No guard: it would hide what is asked. `god-object` is the damped spring on a contact found by
+//! the proxy under planes; all others take the nearest face.
 
 use super::{Part, Scope};
 use crate::conditions;
@@ -23,7 +26,7 @@ use trepan_contact::{
 use trepan_geometry::{Pose, ToolState, Twist, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 
 /// Damping of all damped walls, N ms/mm.
 const DAMPING: f32 = 0.5;
@@ -134,7 +137,7 @@ struct Held {
 
 /// A hand goes into a wall of x ≤ 0, `thick` mm thick or without end, and stays.
 fn hold(model: &Model, stiffness: f32, delay_ticks: usize, thick_mm: Option<f32>) -> Held {
-    let hand = Hand::LIGHT;
+    let hand = HandModel::LIGHT;
     let goal = thick_mm.map_or(MEANT_MM, |thick| thick + 2.0);
     let intent = (0..TICKS).map(|tick| at((2.0 - 0.05 * tick as f32).max(-goal))).collect();
     let config = Config { delay_ticks, friction_n: 0.0, quantum_mm: 0.0, ..Config::default() };
@@ -239,7 +242,8 @@ fn finite(model: &Model, dt_ms: f32, depth_mm: f32) -> Outcome {
     let mut force = (model.make)(1.0);
     let touch = ContactManifold::single(Contact { point: Vec3::ZERO, normal: Vec3::X, depth_mm });
     let given: Vec<Vec3> = (0..10).map(|_| force.wrench(&at(-0.5), &touch, dt_ms).force).collect();
-    // The guard takes what is not finite for no force; a model that leaves it to the guard is usable.
+    // The guard takes what is not finite for no force; a model that leaves it to the guard is
+    // usable.
     if given.iter().all(|force| force.is_finite()) {
         Outcome::Works
     } else {

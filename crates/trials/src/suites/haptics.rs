@@ -1,4 +1,5 @@
-//! The guarded loop on the simulated device: where it is quiet, where it leaks energy, and what force the guard takes for it.
+//! The guarded loop on the simulated device: where it is quiet, where it leaks energy, and what
+//! force the guard takes for it.
 //!
 //! # Theory
 //! ```text
@@ -6,15 +7,19 @@
 //! Colgate, Schenkel   passive  K ≤ (b - B)/(T/2 + d)           their bound at d = 0, delay added as to T/2
 //! Abbott, Okamura     K Δ/2 ≤ f_c                              else encoder steps alone keep a small cycle going
 //! ```
-//! A device is passive if the hand cannot get more out of it than it put in, so that its own losses count (Colgate and Schenkel; Abbott and Okamura).
-//! Energy out is therefore what the motors give less what the device's friction takes, `b Δx²/T + f_c |Δx|` a tick, which is a lower bound of that. Friction
-//! that a long free motion took must not pay for a wall: each contact is an account of its own, and the whole run is one more; the worst counts. What the
-//! motors alone give is shown beside: encoder steps hide up to `|F| Δ` from every controller, on a Touch 0.18 mJ, and a stuck handle its next start.
+//! A device is passive if the hand cannot get more out of it than it put in, so that its own losses
+//! count (Colgate and Schenkel; Abbott and Okamura). Energy out is therefore what the motors give
+//! less what the device's friction takes, `b Δx²/T + f_c |Δx|` a tick, which is a lower bound of
+//! that. Friction that a long free motion took must not pay for a wall: each contact is an account
+//! of its own, and the whole run is one more; the worst counts. What the motors alone give is shown
+//! beside: encoder steps hide up to `|F| Δ` from every controller, on a Touch 0.18 mJ, and a stuck
+//! handle its next start.
 //!
 //! # Practice
-//! `limited`: guarded, and the wall no stiffer than the device's own coupling limit (`Capabilities::coupled`), as sessions have it; it is declared
-//! where the limited wall is. The declared range, to which gates apply: a hand with a grip, walls to 2 N/mm, delays to 2 ticks, `K Δ/2 ≤ f_c`. All other rows are
-//! shown beside; there the guard must act and count it.
+//! `limited`: guarded, and the wall no stiffer than the device's own coupling limit
+//! (`Capabilities::coupled`), as sessions have it; it is declared where the limited wall is. The
+//! declared range, to which gates apply: a hand with a grip, walls to 2 N/mm, delays to 2 ticks,
+//! `K Δ/2 ≤ f_c`. All other rows are shown beside; there the guard must act and count it.
 
 mod coupling;
 mod faults;
@@ -43,7 +48,8 @@ const NMM_PER_J: f64 = 1000.0;
 /// Couplings in one part.
 const TOGETHER: usize = 60;
 
-/// Presses for every coupling with and without the controller, then hands that wander; last the pace of the loop.
+/// Presses for every coupling with and without the controller, then hands that wander; last the
+/// pace of the loop.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let all = coupling::all(scope).len();
     let some = |first: usize| {
@@ -90,7 +96,8 @@ pub fn judge(_: Scope, findings: &mut Findings) {
 #[derive(Clone, Copy, Default)]
 struct Run {
     cycle_mm: f64,
-    /// The cycle in the second half of the judged time over that in the first: under 1 it dies away.
+    /// The cycle in the second half of the judged time over that in the first: under 1 it dies
+    /// away.
     growth: f64,
     lost_percent: f64,
     to_hand_j: f64,
@@ -195,7 +202,8 @@ fn at(x: f32) -> ToolState {
     ToolState::at(Pose::from_translation(Vec3::X * x))
 }
 
-/// The worst of several presses: the hand comes from 2 mm outside and presses until the wall answers with the press's force.
+/// The worst of several presses: the hand comes from 2 mm outside and presses until the wall
+/// answers with the press's force.
 fn press_row(scene: &str, wanted: &Coupling, method: &str, scope: Scope) -> Row {
     let limited = wanted.limited();
     let coupling = if method == "limited" { &limited } else { wanted };

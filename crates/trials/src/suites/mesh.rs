@@ -1,4 +1,5 @@
-//! Tetrahedra from masks and labels: a brain at several voxel sizes, a ball, a torus and a ball in a ball, against the voxels' own faces or a closed form.
+//! Tetrahedra from masks and labels: a brain at several voxel sizes, a ball, a torus and a ball in
+//! a ball, against the voxels' own faces or a closed form.
 
 mod odd;
 pub(super) mod rivals;
@@ -17,7 +18,8 @@ use trepan_volume::VoxelVolume;
 
 /// A distance counts as small up to this many voxels.
 const SMALL_VOXEL: f64 = 0.5;
-/// Dihedral angles that Labelle and Shewchuk prove for their way of cutting, degrees: where a border cuts cubes of one size only, and of several.
+/// Dihedral angles that Labelle and Shewchuk prove for their way of cutting, degrees: where a
+/// border cuts cubes of one size only, and of several.
 const PROVEN_DEG: [[f64; 2]; 2] = [[10.7, 164.8], [1.66, 174.72]];
 
 /// Every scene.
@@ -32,7 +34,8 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     measured.chain(searched).chain((!scope.quick).then(odd)).collect()
 }
 
-/// The least count between two, to about a fifteenth, with which a mesh's border follows the voxels; nothing when not even the larger does.
+/// The least count between two, to about a fifteenth, with which a mesh's border follows the
+/// voxels; nothing when not even the larger does.
 fn least_count(scene: &Scene, [mut low, mut high]: [usize; 2]) -> Option<Row> {
     let at = |target_tets: usize| {
         let labelled = lattice::labelled(&scene.labels, &lattice::Config { target_tets, ..scene.config }).ok()?;
@@ -76,7 +79,7 @@ fn measure(scene: &Scene, findings: &mut Findings) {
     findings.gates.extend([
         at_most("volume error of a label, percent", volume_percent, scene.volume_limit_percent),
         at_most("elements beside the target, percent", count_percent, 10.0),
-        at_most("faults (unsound, open, in parts, sum of labels)", faults(&labelled, &surface), 0.0),
+        at_most("faults (degenerate, open, in parts, sum of labels)", faults(&labelled, &surface), 0.0),
         at_most("largest dihedral angle, degrees", quality.max_dihedral_deg, most),
         Gate::at_least(format!("{}: smallest dihedral angle, degrees", scene.name), quality.min_dihedral_deg, least),
     ]);
@@ -114,7 +117,8 @@ fn mm3(labelled: &LabelledMesh, label: u16) -> f64 {
     tets.map(|t| labelled.mesh.volume_mm3(t)).sum()
 }
 
-/// How many of soundness (no gap, no overlap), closedness, connectedness and the sum of all labels fail.
+/// How many of soundness (no gap, no overlap), closedness, connectedness and the sum of all labels
+/// fail.
 fn faults(labelled: &LabelledMesh, surface: &Surface) -> f64 {
     let mesh = &labelled.mesh;
     let parts = Topology::of(mesh).components().1;
@@ -125,7 +129,8 @@ fn faults(labelled: &LabelledMesh, surface: &Surface) -> f64 {
     all.into_iter().filter(|bad| *bad).count() as f64
 }
 
-/// From the mesh's borders to the truth, and from the borders of the voxels to the mesh's: 95 % are nearer, in voxels; of several borders the worst.
+/// From the mesh's borders to the truth, and from the borders of the voxels to the mesh's: 95 % are
+/// nearer, in voxels; of several borders the worst.
 fn distances(scene: &Scene, labelled: &LabelledMesh) -> [f64; 2] {
     let of_border = |border: &Border| {
         let holds = |label: u16| if border.label == 0 { label != 0 } else { label == border.label };

@@ -1,4 +1,5 @@
-//! The picture: rays against a brute-force f64 march, device against processor, what leaping, sparse rays, steps and resolution are worth, and where it fails.
+//! The picture: rays against a brute-force f64 march, device against processor, what leaping,
+//! sparse rays, steps and resolution are worth, and where it fails.
 
 mod accuracy;
 mod faults;

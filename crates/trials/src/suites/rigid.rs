@@ -1,8 +1,9 @@
-//! Ways of touching voxel bone: bone with a closed form, the thesis's cubes and skulls, what a burr takes, and where each method fails.
+//! Ways of touching voxel bone: bone with a closed form, the thesis's cubes and skulls, what a burr
+//! takes, and where each method fails.
 //!
 //! # Practice
-//! One file a subject. Each adds its rows, charts, maps and gates; every method of `Method::all` is in all of them but where its cost
-//! forbids (the oracle), which the rows show by their absence.
+//! One file a subject. Each adds its rows, charts, maps and gates; every method of `Method::all` is
+//! in all of them but where its cost forbids (the oracle), which the rows show by their absence.
 
 mod accuracy;
 mod clearance;
@@ -48,8 +49,8 @@ pub fn judge(_: Scope, findings: &mut Findings) {
     removal::judge(findings);
 }
 
-/// A group's chart, each method at its worst cost and worst error over the group's scenes; where it is `gated`, with the gate that
-/// the recommended one is on its front.
+/// A group's chart, each method at its worst cost and worst error over the group's scenes; where it
+/// is `gated`, with the gate that the recommended one is on its front.
 fn worst_chart(findings: &mut Findings, group: &str, title: &str, metrics: (&str, &str), gated: bool) -> Option<Chart> {
     let mut marks: Vec<Mark> = Vec::new();
     for row in findings.rows.iter().filter(|row| row.config.get("group").is_some_and(|g| g == group)) {

@@ -1,4 +1,5 @@
-//! Volumes: known moves of a real MRI found again, files round trips, a ball's distances, the brain of the built-in head.
+//! Volumes: known moves of a real MRI found again, files round trips, a ball's distances, the brain
+//! of the built-in head.
 
 mod files;
 mod moves;
@@ -32,7 +33,8 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// The folder of real images that the environment variable `TREPAN_DATA` names; says so where there is none.
+/// The folder of real images that the environment variable `TREPAN_DATA` names; says so where there
+/// is none.
 fn data_folder() -> Option<std::path::PathBuf> {
     let folder = std::env::var_os("TREPAN_DATA").map(std::path::PathBuf::from).filter(|folder| folder.is_dir());
     if folder.is_none() {
@@ -98,7 +100,8 @@ fn distances(scope: Scope, findings: &mut Findings) {
     }
 }
 
-/// Bites out of a skull, the distance to what is left brought up to date around them and computed anew.
+/// Bites out of a skull, the distance to what is left brought up to date around them and computed
+/// anew.
 fn carving(scope: Scope, findings: &mut Findings) {
     const REACH_MM: f32 = 5.0;
     let edge = scope.pick(96, 192);

@@ -1,8 +1,11 @@
-//! The best cell edge of a uniform grid: the thesis's formula, the usual rule and our model against a ladder of measured sizes.
+//! The best cell edge of a uniform grid: the thesis's formula, the usual rule and our model against
+//! a ladder of measured sizes.
 //!
 //! # Practice
-//! Times are the least of many short passes, in rounds over all sizes, until two halves of the rounds agree: what the machine takes when nothing disturbs it. So the verdict
-//! bears a busy machine; only the number of rounds grows. `TREPAN_DATA` may name a folder with triangle meshes in `meshes-collision` (`stanford-bunny.obj`, `spot.obj`, ...).
+//! Times are the least of many short passes, in rounds over all sizes, until two halves of the
+//! rounds agree: what the machine takes when nothing disturbs it. So the verdict bears a busy
+//! machine; only the number of rounds grows. `TREPAN_DATA` may name a folder with triangle meshes
+//! in `meshes-collision` (`stanford-bunny.obj`, `spot.obj`, ...).
 
 mod odd;
 mod pass;
@@ -16,7 +19,8 @@ use std::time::Instant;
 use timing::Calibration;
 use trepan_voxel_size::{CostModel, Expected, counts, zone_error};
 
-/// Tables 5.2 and 5.3 of the thesis, in cells per axis: tetrahedra, low, best, high, analytic, mean edge; errors of the last two.
+/// Tables 5.2 and 5.3 of the thesis, in cells per axis: tetrahedra, low, best, high, analytic, mean
+/// edge; errors of the last two.
 const TABLE: [[f64; 8]; 5] = [
     [41_937.0, 20.0, 28.33, 39.0, 28.73, 41.90, 0.038, 1.272],
     [52_326.0, 22.0, 28.16, 38.0, 30.94, 45.16, 0.283, 1.727],
@@ -83,9 +87,11 @@ fn rules(scene: &Scene, scope: Scope, findings: &mut Findings) {
     let rules: [(&str, f64); 6] = std::array::from_fn(|at| (RULES[at], sizes[at]));
     let cells: Vec<f64> = ladder.iter().copied().chain(rules.map(|rule| rule.1)).collect();
     let measured = timing::least(scene, &cells, &mut calibration, scope.pick(8, 64));
-    // The size was chosen with the first prices; the times are predicted with those of the moments in which they were measured.
+    // The size was chosen with the first prices; the times are predicted with those of the moments
+    // in which they were measured.
     let prices = calibration.prices();
-    // The best size is chosen on one half of the rounds and every size judged on the other, so that luck does not make it better.
+    // The best size is chosen on one half of the rounds and every size judged on the other, so that
+    // luck does not make it better.
     let timing::Least { choose, judge, .. } = &measured;
     let best = (0..steps).min_by(|&a, &b| choose[a].total_cmp(&choose[b])).unwrap_or(0);
     let axis_mm = f64::from(2.0 * scene.size_mm.max_element());
@@ -129,7 +135,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// Largest, best and smallest cell of the good zone, mm: so lowest, best and highest count of cells.
+/// Largest, best and smallest cell of the good zone, mm: so lowest, best and highest count of
+/// cells.
 fn zone(ladder: &[f64], times: &[f64], best: usize) -> [f64; 3] {
     let good = |n: &usize| times[*n] <= ZONE * times[best];
     let low = (0..best).rev().take_while(good).last().unwrap_or(best).saturating_sub(1);

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicI16, Ordering};
 use trepan_geometry::Vec3;
 
 impl BoneVolume {
-    /// From now on changes belong to a new stroke, and [`undo_stroke`](Self::undo_stroke) leads back to here. For the one writer only.
+    /// From now on changes belong to a new stroke, and [`undo_stroke`](Self::undo_stroke) leads
+    /// back to here. For the one writer only.
     pub fn begin_stroke(&self) {
         self.strokes.begin();
     }
@@ -36,8 +37,8 @@ impl BoneVolume {
         self.strokes.length()
     }
 
-    /// Exchanges the `n`th brick of the newest stroke with how it was before; the same again takes that back. For the one writer only; half a
-    /// microsecond.
+    /// Exchanges the `n`th brick of the newest stroke with how it was before; the same again takes
+    /// that back. For the one writer only; half a microsecond.
     pub fn exchange_brick(&self, n: usize) {
         let Some((brick, copy)) = self.strokes.kept(n) else { return };
         let low = self.low_of(brick);
@@ -53,8 +54,9 @@ impl BoneVolume {
         self.came_back();
     }
 
-    /// Whether undoing the `n`th brick of the newest stroke would bring bone back at a place for which `taken` is true. `near` is
-    /// asked first, with the centre of the brick and its half diagonal, mm.
+    /// Whether undoing the `n`th brick of the newest stroke would bring bone back at a place for
+    /// which `taken` is true. `near` is asked first, with the centre of the brick and its half
+    /// diagonal, mm.
     pub fn brings_back(&self, n: usize, near: impl Fn(Vec3, f32) -> bool, taken: impl Fn(Vec3) -> bool) -> bool {
         let Some((brick, copy)) = self.strokes.kept(n) else { return false };
         let low = self.low_of(brick);
@@ -68,13 +70,14 @@ impl BoneVolume {
         near(middle, half) && copy.iter().enumerate().any(|(n, copy)| comes(n, copy))
     }
 
-    /// The newest stroke is undone, brick by brick: the one before it is the newest now. For the one writer only.
+    /// The newest stroke is undone, brick by brick: the one before it is the newest now. For the
+    /// one writer only.
     pub fn drop_stroke(&self) {
         self.strokes.drop_newest();
     }
 
-    /// Puts all bricks of the newest stroke back to how they were before it. For the one writer only; up to some milliseconds for the largest
-    /// stroke.
+    /// Puts all bricks of the newest stroke back to how they were before it. For the one writer
+    /// only; up to some milliseconds for the largest stroke.
     pub fn undo_stroke(&self) -> Undone {
         match self.stroke_bricks() {
             0 if self.forgot_strokes() => Undone::Forgotten,

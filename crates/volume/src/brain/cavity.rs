@@ -1,15 +1,17 @@
 //! The inside of the skull in a CT.
 //!
 //! # Theory
-//! The skull has holes, up to the 3 cm of the foramen magnum, so no flood stops at bone alone. Instead, with d the distance to
-//! bone, the space around it is divided at its necks by a watershed of -d (Vincent and Soille 1991) from two markers:
+//! The skull has holes, up to the 3 cm of the foramen magnum, so no flood stops at bone alone.
+//! Instead, with d the distance to bone, the space around it is divided at its necks by a watershed
+//! of -d (Vincent and Soille 1991) from two markers:
 //!
 //! ```text
 //! inside   the largest piece with d > 12 mm that sees bone in at least 4 of the 6 grid directions
 //! outside  what sees bone in at most 2 of them: air, face, neck
 //! ```
 //!
-//! What hangs on the cavity by less than a ball of 11 mm (the spinal canal, the optic canals) is cut off in the end.
+//! What hangs on the cavity by less than a ball of 11 mm (the spinal canal, the optic canals) is
+//! cut off in the end.
 //!
 //! # Sources
 //! L. Vincent, P. Soille, "Watersheds in digital spaces", IEEE PAMI 13, 1991.

@@ -1,9 +1,10 @@
 //! Which grey values are brain in a T1 MRI.
 //!
 //! # Theory
-//! Deep in the head there is white matter, grey matter and little CSF. With m the median and w the 90th percentile of what has
-//! signal there, brain is from 0.62 m (halfway between CSF and grey matter) to 1.3 w (under fat and contrast agent). The head is what
-//! is over half of Otsu's threshold (1979), closed and filled.
+//! Deep in the head there is white matter, grey matter and little CSF. With m the median and w the
+//! 90th percentile of what has signal there, brain is from 0.62 m (halfway between CSF and grey
+//! matter) to 1.3 w (under fat and contrast agent). The head is what is over half of Otsu's
+//! threshold (1979), closed and filled.
 
 use super::morphology::{closed, filled};
 use crate::{DistanceField, VoxelVolume, largest_component};

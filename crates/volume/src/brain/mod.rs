@@ -1,4 +1,5 @@
-//! The brain in a T1 MRI, by threshold, morphology and the largest piece; inside the skull where a CT is given.
+//! The brain in a T1 MRI, by threshold, morphology and the largest piece; inside the skull where a
+//! CT is given.
 //!
 //! # Theory
 //! All on a grid of cubes (1.5 mm by default), with balls of any radius from distance fields:
@@ -12,18 +13,21 @@
 //! mask    what lies within, brought to the MRI's grid between voxels, less bone
 //! ```
 //!
-//! The mask is the brain with the water in and around it up to about the dura, as other hands draw it.
+//! The mask is the brain with the water in and around it up to about the dura, as other hands draw
+//! it.
 //!
-//! Without a CT, r starts at 1 mm and grows by 0.5 mm until less than 0.5 % of the brain lies within 6 mm of the skin, where none can be,
-//! and the mask is not larger than a brain: the smallest ball at which muscle and scalp let go.
+//! Without a CT, r starts at 1 mm and grows by 0.5 mm until less than 0.5 % of the brain lies
+//! within 6 mm of the skin, where none can be, and the mask is not larger than a brain: the
+//! smallest ball at which muscle and scalp let go.
 //!
 //! # Practice
-//! Seconds per head on two cores, linear in the voxels of the working grid. Against masks by other hands: Dice 0.96 to 0.97 (README).
-//! [`find_brain`] says how sure it is ([`BrainConfidence`]): look at that.
+//! Seconds per head on two cores, linear in the voxels of the working grid. Against masks by other
+//! hands: Dice 0.96 to 0.97 (README). [`find_brain`] says how sure it is ([`BrainConfidence`]):
+//! look at that.
 //!
 //! # When not to use it
-//! For T2, for infants, for brains open to the outside, or when a label volume is at hand: give that and check it with
-//! [`check_brain_mask`].
+//! For T2, for infants, for brains open to the outside, or when a label volume is at hand: give
+//! that and check it with [`check_brain_mask`].
 
 mod border;
 mod cavity;
@@ -61,11 +65,14 @@ const SPECK_ML: f64 = 5.0;
 /// How the brain is found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrainConfig {
-    /// Bone threshold in the CT, HU; `None` takes the lowest, [`LEAST_ISOVALUE`], which leaves the fewest holes in thin bone.
+    /// Bone threshold in the CT, HU; `None` takes the lowest, [`LEAST_ISOVALUE`], which leaves the
+    /// fewest holes in thin bone.
     pub isovalue: Option<i16>,
-    /// Edge of the voxels that the search runs on, mm: smaller is slower and follows the surface closer.
+    /// Edge of the voxels that the search runs on, mm: smaller is slower and follows the surface
+    /// closer.
     pub work_mm: f32,
-    /// Radius of the ball that must fit into brain, mm: parts that hang on something thinner are cut off. Grows by itself without a CT.
+    /// Radius of the ball that must fit into brain, mm: parts that hang on something thinner are
+    /// cut off. Grows by itself without a CT.
     pub opening_mm: f32,
     /// Radius of the ball that closes gaps, mm: sulci narrower than twice this are filled.
     pub closing_mm: f32,
@@ -144,7 +151,8 @@ pub struct FoundBrain {
     pub confidence: BrainConfidence,
 }
 
-/// Finds the brain in a T1 MRI: 1 in the brain, 0 elsewhere, on the MRI's grid. `skull` is a CT in HU on any grid.
+/// Finds the brain in a T1 MRI: 1 in the brain, 0 elsewhere, on the MRI's grid. `skull` is a CT in
+/// HU on any grid.
 pub fn brain_mask(
     mri: &VoxelVolume<f32>,
     skull: Option<&VoxelVolume<i16>>,
@@ -153,8 +161,8 @@ pub fn brain_mask(
     find_brain(mri, skull, config).map(|found| found.mask)
 }
 
-/// The same, with how sure it is. A mask of a doubtful volume is given with low confidence; one that
-/// no brain has is refused.
+/// The same, with how sure it is. A mask of a doubtful volume is given with low confidence; one
+/// that no brain has is refused.
 pub fn find_brain(
     mri: &VoxelVolume<f32>,
     skull: Option<&VoxelVolume<i16>>,
@@ -219,8 +227,8 @@ fn in_room(mri: &VoxelVolume<f32>, room: &VoxelVolume<u8>, config: &BrainConfig)
     Some((mask, levels))
 }
 
-/// Brain by the MRI alone: the ball of the opening grows until nothing but a trace of the mask lies right under the skin and
-/// the volume is no longer too large.
+/// Brain by the MRI alone: the ball of the opening grows until nothing but a trace of the mask lies
+/// right under the skin and the volume is no longer too large.
 fn in_head(mri: &VoxelVolume<f32>, config: &BrainConfig) -> Option<(VoxelVolume<u8>, Levels)> {
     let depth = depth_in_head(mri);
     let levels = Levels::of(mri, |at| is_core(depth.data[at]))?;
@@ -243,7 +251,8 @@ fn in_head(mri: &VoxelVolume<f32>, config: &BrainConfig) -> Option<(VoxelVolume<
     None
 }
 
-/// The largest piece that a ball of the radius can move in, and what is within 1 mm of the ball's places.
+/// The largest piece that a ball of the radius can move in, and what is within 1 mm of the ball's
+/// places.
 fn opened(mri: &VoxelVolume<f32>, tissue: impl Fn(usize) -> bool, radius_mm: f32) -> Option<VoxelVolume<u8>> {
     let mask = VoxelVolume {
         dims: mri.dims,
@@ -253,7 +262,8 @@ fn opened(mri: &VoxelVolume<f32>, tissue: impl Fn(usize) -> bool, radius_mm: f32
     Some(within(&core(&mask, radius_mm)?, radius_mm + 1.0, |at| mask.data[at] != 0))
 }
 
-/// The mask on the MRI's grid, its surface between the coarse voxels, without bone; the largest piece.
+/// The mask on the MRI's grid, its surface between the coarse voxels, without bone; the largest
+/// piece.
 fn refined(brain: &VoxelVolume<u8>, mri: &VoxelVolume<f32>, bone: Option<(&VoxelVolume<i16>, i16)>) -> VoxelVolume<u8> {
     let field = DistanceField::of_mask(brain);
     let fine = resample(field.values(), &Grid::of(mri), Interpolation::Trilinear, FAR_MM);
@@ -265,7 +275,8 @@ fn refined(brain: &VoxelVolume<u8>, mri: &VoxelVolume<f32>, bone: Option<(&Voxel
     largest_component(&mask)
 }
 
-/// Checks a brain mask, also one that was given as a label volume: not empty, one piece but for specks, an adult's volume.
+/// Checks a brain mask, also one that was given as a label volume: not empty, one piece but for
+/// specks, an adult's volume.
 pub fn check_brain_mask(mask: &VoxelVolume<u8>, config: &BrainConfig) -> Result<(), MaskError> {
     let pieces = Components::of(mask.dims, |at| mask.data[at] != 0);
     let ml = |voxels: usize| voxels as f64 * mask.voxel_mm3() * 1e-3;

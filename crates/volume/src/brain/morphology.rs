@@ -1,8 +1,9 @@
 //! Erosion, dilation, opening and closing by balls of any radius, from distance fields.
 //!
 //! # Theory
-//! With D the signed distance to a mask (negative inside), the erosion by a ball of radius r is `D < -r` and the dilation `D < r`
-//! (Serra 1982), both exact for any r and at the cost of one distance transform.
+//! With D the signed distance to a mask (negative inside), the erosion by a ball of radius r is
+//! `D < -r` and the dilation `D < r` (Serra 1982), both exact for any r and at the cost of one
+//! distance transform.
 
 use crate::component::Components;
 use crate::{DistanceField, VoxelVolume, largest_component};

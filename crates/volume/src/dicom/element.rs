@@ -1,8 +1,9 @@
 //! Walking through the data elements of a DICOM file.
 //!
 //! # Theory
-//! PS3.5 of the standard: an element is a tag (group, element), in explicit syntaxes a value representation (VR) of two letters, a length, and
-//! the value. Sequences hold items that hold elements again; a length of 0xFFFFFFFF means "until the delimiter".
+//! PS3.5 of the standard: an element is a tag (group, element), in explicit syntaxes a value
+//! representation (VR) of two letters, a length, and the value. Sequences hold items that hold
+//! elements again; a length of 0xFFFFFFFF means "until the delimiter".
 
 use crate::sample::ByteOrder;
 
@@ -23,7 +24,8 @@ const DEEPEST: usize = 12;
 /// VRs whose length takes four bytes, after two that are reserved.
 const LONG: [&[u8; 2]; 12] = [b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT"];
 
-/// Sequences that are looked into also where the syntax is implicit and their length is given: functional groups and their parts.
+/// Sequences that are looked into also where the syntax is implicit and their length is given:
+/// functional groups and their parts.
 const SEQUENCES: [Tag; 6] = [0x5200_9229, 0x5200_9230, 0x0020_9113, 0x0020_9116, 0x0028_9110, 0x0028_9145];
 
 /// How elements are written.
@@ -34,7 +36,7 @@ pub(super) struct Syntax {
 }
 
 /// A value, seen while walking.
-pub(super) struct Found<'a> {
+pub(super) struct Element<'a> {
     pub tag: Tag,
     pub value: &'a [u8],
     pub order: ByteOrder,
@@ -67,14 +69,14 @@ pub(super) struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     /// Calls `visit` for every value outside private groups.
-    pub fn run(&mut self, visit: &mut dyn FnMut(Found<'a>)) -> Result<(), Broken> {
+    pub fn run(&mut self, visit: &mut dyn FnMut(Element<'a>)) -> Result<(), Broken> {
         self.elements(self.bytes.len(), 0, None, visit)
     }
 
     /// The next element, which is no sequence.
-    pub fn plain_element(&mut self) -> Result<Found<'a>, Broken> {
+    pub fn plain_element(&mut self) -> Result<Element<'a>, Broken> {
         let (tag, _, length) = self.head()?;
-        Ok(Found { tag, value: self.take(length)?, order: self.syntax.order, within: None })
+        Ok(Element { tag, value: self.take(length)?, order: self.syntax.order, within: None })
     }
 
     fn elements(
@@ -82,7 +84,7 @@ impl<'a> Walk<'a> {
         end: usize,
         depth: usize,
         within: Option<(Tag, usize)>,
-        visit: &mut dyn FnMut(Found<'a>),
+        visit: &mut dyn FnMut(Element<'a>),
     ) -> Result<(), Broken> {
         while self.at < end.min(self.bytes.len()) {
             let start = self.at;
@@ -110,7 +112,7 @@ impl<'a> Walk<'a> {
             }
             let value = self.take(length)?;
             if tag >> 16 & 1 == 0 {
-                visit(Found { tag, value, order: self.syntax.order, within });
+                visit(Element { tag, value, order: self.syntax.order, within });
             }
         }
         Ok(())
@@ -122,7 +124,7 @@ impl<'a> Walk<'a> {
         length: u32,
         depth: usize,
         within: Option<(Tag, usize)>,
-        visit: &mut dyn FnMut(Found<'a>),
+        visit: &mut dyn FnMut(Element<'a>),
     ) -> Result<(), Broken> {
         let end = self.end_of(length)?;
         let mut number = 0;
@@ -208,7 +210,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-impl Found<'_> {
+impl Element<'_> {
     /// The first number of a value of VR US.
     pub fn u16(&self) -> Option<u16> {
         let raw = self.value.get(..2)?.try_into().ok()?;

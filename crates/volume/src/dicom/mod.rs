@@ -1,20 +1,24 @@
 //! DICOM series: what the scanner sends, a file per slice or all slices in one.
 //!
 //! # Theory
-//! Files are grouped by series, orientation and size; see the stack for how slices find their order and place. Stored numbers become
-//! values by `RescaleSlope · stored + RescaleIntercept`, which for CT gives HU.
+//! Files are grouped by series, orientation and size; see the stack for how slices find their order
+//! and place. Stored numbers become values by `RescaleSlope · stored + RescaleIntercept`, which for
+//! CT gives HU.
 //!
 //! # Practice
-//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and big-endian, deflated, RLE, JPEG (8 bits with losses, or lossless), JPEG-LS, JPEG 2000; 8, 16 and 32 bits;
-//! enhanced multi-frame files; oblique and tilted stacks. Of several series in a folder the one with the most slices is taken and a
-//! note says so; [`series`] lists them. Doubled, missing and uneven slices are refused. Only the elements that place and scale voxels
-//! are looked at: no name, date, identifier or free text of a patient is kept or shown.
+//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and
+//! big-endian, deflated, RLE, JPEG (8 bits with losses, or lossless), JPEG-LS, JPEG 2000; 8, 16 and
+//! 32 bits; enhanced multi-frame files; oblique and tilted stacks. Of several series in a folder
+//! the one with the most slices is taken and a note says so; [`series`] lists them. Doubled,
+//! missing and uneven slices are refused. Only the elements that place and scale voxels are looked
+//! at: no name, date, identifier or free text of a patient is kept or shown.
 //!
 //! # Sources
 //! NEMA, "DICOM PS3.3 C.7.6.2, C.7.6.16; PS3.5; PS3.10", dicom.nema.org.
 //!
 //! # When not to use it
-//! For colour, ultrasound, 12-bit JPEG with losses, and other compressed syntaxes: the error names the syntax.
+//! For colour, ultrasound, 12-bit JPEG with losses, and other compressed syntaxes: the error names
+//! the syntax.
 
 mod codec;
 mod element;
@@ -37,7 +41,8 @@ const DEEPEST: usize = 4;
 /// How to choose a series.
 const LIST: &str = "`case series FOLDER` lists them with the numbers that --ct-series and --mri-series take";
 
-/// Pictures that are decoded at a time, so that files and numbers of a few only are in memory beside the volume.
+/// Pictures that are decoded at a time, so that files and numbers of a few only are in memory
+/// beside the volume.
 const BATCH: usize = 16;
 
 /// A stack of pictures of one size and orientation.
@@ -58,7 +63,8 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
     import(path).map(|import| import.volume)
 }
 
-/// Reads the largest series of a folder, or the one that a file belongs to, with what there is to say about it.
+/// Reads the largest series of a folder, or the one that a file belongs to, with what there is to
+/// say about it.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
     let groups = Groups::of(path)?;
     let wanted = match path.is_dir() {

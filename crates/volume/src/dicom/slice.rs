@@ -1,6 +1,7 @@
-//! What one DICOM file says about its picture: only the few elements that place and scale voxels are ever kept.
+//! What one DICOM file says about its picture: only the few elements that place and scale voxels
+//! are ever kept.
 
-use super::element::{Found, Pixels, Syntax, Walk};
+use super::element::{Element, Pixels, Syntax, Walk};
 use crate::ReadError;
 use crate::sample::ByteOrder;
 use glam::DVec3;
@@ -66,7 +67,7 @@ impl Slice {
         Ok(picture.then_some(slice))
     }
 
-    fn keep(&mut self, found: &Found, slopes: &mut Vec<(usize, f64)>, intercepts: &mut Vec<(usize, f64)>) {
+    fn keep(&mut self, found: &Element, slopes: &mut Vec<(usize, f64)>, intercepts: &mut Vec<(usize, f64)>) {
         let frame = match found.within {
             None => 0,
             Some((0x5200_9229, _)) => 0,
@@ -107,7 +108,8 @@ struct Start {
 const EXPLICIT: Syntax = Syntax { explicit: true, order: ByteOrder::Little };
 
 impl Start {
-    /// With the preamble, the meta group says the syntax; without, the first element must look like one.
+    /// With the preamble, the meta group says the syntax; without, the first element must look like
+    /// one.
     fn of(bytes: &[u8]) -> Option<Self> {
         let meta = if bytes.get(128..132) == Some(b"DICM") { 132 } else { 0 };
         let mut name = String::new();
@@ -131,7 +133,8 @@ impl Start {
     }
 }
 
-/// Explicit where two capital letters follow the first tag; big-endian where the group's zero comes first.
+/// Explicit where two capital letters follow the first tag; big-endian where the group's zero comes
+/// first.
 fn guessed(bytes: &[u8]) -> Syntax {
     let letters = bytes.get(4..6).is_some_and(|vr| vr.iter().all(u8::is_ascii_uppercase));
     let order = if bytes.first() == Some(&0) { ByteOrder::Big } else { ByteOrder::Little };

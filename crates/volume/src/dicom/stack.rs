@@ -1,8 +1,9 @@
 //! Slices into a stack: by where they lie, never by what they are called.
 //!
 //! # Theory
-//! With the row direction r and the column direction c, n = r × c is the slices' normal and `n · position` their order. The step
-//! s = (last - first) / (count - 1) is the third axis; where the gantry was tilted it leans against n, and the affine is sheared:
+//! With the row direction r and the column direction c, n = r × c is the slices' normal and
+//! `n · position` their order. The step s = (last - first) / (count - 1) is the third axis; where
+//! the gantry was tilted it leans against n, and the affine is sheared:
 //!
 //! ```text
 //! world = diag(-1, -1, 1) · ( i · column spacing · r + j · row spacing · c + k · s + first )       DICOM is LPS, the world RAS

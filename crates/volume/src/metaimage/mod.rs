@@ -1,12 +1,15 @@
-//! MetaImage: a text header of "Key = value" lines and the voxels, in one file (.mha) or two (.mhd with .raw or .zraw).
+//! MetaImage: a text header of "Key = value" lines and the voxels, in one file (.mha) or two (.mhd
+//! with .raw or .zraw).
 //!
 //! # Theory
-//! `TransformMatrix` lists the direction of each axis one after the other, `ElementSpacing` the edges, `Offset` the centre of the first voxel,
-//! all in LPS; so `world = diag(-1, -1, 1) · (direction · spacing | offset)`.
+//! `TransformMatrix` lists the direction of each axis one after the other, `ElementSpacing` the
+//! edges, `Offset` the centre of the first voxel, all in LPS; so
+//! `world = diag(-1, -1, 1) · (direction · spacing | offset)`.
 //!
 //! # Practice
-//! Read: raw, zlib and text voxels; both byte orders; headers in the voxels' file to skip (`HeaderSize`, also -1); the intensity function.
-//! `AnatomicalOrientation` is not looked at: writers disagree about it and the matrix says the same.
+//! Read: raw, zlib and text voxels; both byte orders; headers in the voxels' file to skip
+//! (`HeaderSize`, also -1); the intensity function. `AnatomicalOrientation` is not looked at:
+//! writers disagree about it and the matrix says the same.
 //!
 //! # Sources
 //! Kitware, "MetaIO/Documentation", itk.org/Wiki/ITK/MetaIO/Documentation.

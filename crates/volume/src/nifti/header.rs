@@ -149,7 +149,8 @@ impl Header {
         DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) }
     }
 
-    /// R(a, b, c, d) · diag(spacing with the third mirrored where pixdim\[0\] < 0), a = √(1 - b² - c² - d²).
+    /// R(a, b, c, d) · diag(spacing with the third mirrored where pixdim\[0\] < 0), a = √(1 - b² -
+    /// c² - d²).
     fn qform(&self, spacing: DVec3) -> DAffine3 {
         let v = self.quaternion;
         let rest = 1.0 - v.length_squared();
@@ -160,7 +161,8 @@ impl Header {
         DAffine3 { matrix3: DMat3::from_quat(q) * scale, translation: self.qoffset * self.mm_per_unit }
     }
 
-    /// A note where sform and qform put a corner of the volume more than a tenth of a millimetre apart.
+    /// A note where sform and qform put a corner of the volume more than a tenth of a millimetre
+    /// apart.
     fn difference(&self, sform: DAffine3, qform: DAffine3) -> Option<Note> {
         let by_mm = (0..8)
             .map(|corner| {

@@ -1,21 +1,24 @@
 //! NIfTI-1 and NIfTI-2: the format of brain imaging.
 //!
 //! # Theory
-//! A header of 348 (version 1) or 540 bytes (version 2), then voxels with i fastest. The header's `sform` is the affine to
-//! RAS+ mm; the older `qform` gives it as a quaternion, spacings and an offset. Stored numbers become values by
-//! `scl_slope · stored + scl_inter`, unless the slope is 0.
+//! A header of 348 (version 1) or 540 bytes (version 2), then voxels with i fastest. The header's
+//! `sform` is the affine to RAS+ mm; the older `qform` gives it as a quaternion, spacings and an
+//! offset. Stored numbers become values by `scl_slope · stored + scl_inter`, unless the slope is 0.
 //!
 //! # Practice
-//! Read: both versions, both byte orders, gzip found by content, `.nii` or `.hdr` with `.img`, every real number type. `sform` goes
-//! before `qform`; with neither, i, j, k are taken as right, front, head, and a note says so. World units other than mm are
-//! converted. NaN voxels stay NaN: [`import`] counts them and [`hounsfield`](crate::hounsfield) refuses them. Written: version 1, single
-//! file, little-endian, both forms; a file appears whole or not at all.
+//! Read: both versions, both byte orders, gzip found by content, `.nii` or `.hdr` with `.img`,
+//! every real number type. `sform` goes before `qform`; with neither, i, j, k are taken as right,
+//! front, head, and a note says so. World units other than mm are converted. NaN voxels stay NaN:
+//! [`import`] counts them and [`hounsfield`](crate::hounsfield) refuses them. Written: version 1,
+//! single file, little-endian, both forms; a file appears whole or not at all.
 //!
 //! # Sources
-//! R. W. Cox et al., "A (sort of) new image data format standard: NIfTI-1", 2004; the NIfTI-1 and NIfTI-2 C headers, nifti.nimh.nih.gov.
+//! R. W. Cox et al., "A (sort of) new image data format standard: NIfTI-1", 2004; the NIfTI-1 and
+//! NIfTI-2 C headers, nifti.nimh.nih.gov.
 //!
 //! # When not to use it
-//! Version 1 keeps the affine in f32: where an orientation must survive to the last bit of an f64, write [`nrrd`](crate::nrrd).
+//! Version 1 keeps the affine in f32: where an orientation must survive to the last bit of an f64,
+//! write [`nrrd`](crate::nrrd).
 
 mod header;
 mod write;
@@ -38,7 +41,8 @@ pub fn import(path: &Path) -> Result<Import, ReadError> {
     read_one(path, None)
 }
 
-/// Reads volume number `index` (from 0) of a file with several: time points, directions, vector components.
+/// Reads volume number `index` (from 0) of a file with several: time points, directions, vector
+/// components.
 pub fn import_volume(path: &Path, index: u64) -> Result<Import, ReadError> {
     read_one(path, Some(index))
 }

@@ -1,13 +1,15 @@
 //! NRRD: nearly raw raster data, a text header and the voxels, in one file or two.
 //!
 //! # Theory
-//! Each axis has a direction vector (its length is the spacing) in a named space; the affine's columns are these vectors and
-//! the origin, turned into RAS+: `world = diag(±1) · (space directions | space origin)`.
+//! Each axis has a direction vector (its length is the spacing) in a named space; the affine's
+//! columns are these vectors and the origin, turned into RAS+:
+//! `world = diag(±1) · (space directions | space origin)`.
 //!
 //! # Practice
-//! Read: attached and detached, raw, text, gzip; both byte orders; line skip and byte skip (also -1, voxels at the end); further axes of
-//! size 1. Without a space, i, j, k are taken as right, front, head and a note says so. Written: attached, gzip, with numbers
-//! in full length, so that an f64 affine comes back to the last bit.
+//! Read: attached and detached, raw, text, gzip; both byte orders; line skip and byte skip (also
+//! -1, voxels at the end); further axes of size 1. Without a space, i, j, k are taken as right,
+//! front, head and a note says so. Written: attached, gzip, with numbers in full length, so that an
+//! f64 affine comes back to the last bit.
 //!
 //! # Sources
 //! G. Kindlmann, "Definition of NRRD file format", teem.sourceforge.net/nrrd/format.html.

@@ -1,10 +1,12 @@
-//! How much one image says about the other at a pose: normalised mutual information of their joint histogram.
+//! How much one image says about the other at a pose: normalised mutual information of their joint
+//! histogram.
 
 use super::pyramid::{Level, Point};
 use glam::DAffine3;
 use rayon::prelude::*;
 
-/// Points that one thread takes at a time; the sums' order, and with it their bytes, depends on this alone.
+/// Points that one thread takes at a time; the sums' order, and with it their bytes, depends on
+/// this alone.
 const CHUNK: usize = 16_384;
 
 /// Two images at one level of the pyramid.

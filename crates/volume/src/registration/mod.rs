@@ -1,27 +1,34 @@
 //! Where one image of a patient lies in another: rigid registration by mutual information.
 //!
 //! # Theory
-//! Two scanners map tissue to grey values in unrelated ways, but at the right pose one value says most about the other. With the
-//! joint histogram of values at common points, H its entropy and H(F), H(M) those of its margins, the pose that makes
-//! (H(F) + H(M)) / H(F, M) largest is sought; this quotient, unlike H(F) + H(M) - H(F, M), does not grow by mere overlap.
-//! Powell's method climbs it on a pyramid of coarser images, from several rotations, so that its many side peaks do no harm.
+//! Two scanners map tissue to grey values in unrelated ways, but at the right pose one value says
+//! most about the other. With the joint histogram of values at common points, H its entropy and
+//! H(F), H(M) those of its margins, the pose that makes (H(F) + H(M)) / H(F, M) largest is sought;
+//! this quotient, unlike H(F) + H(M) - H(F, M), does not grow by mere overlap. Powell's method
+//! climbs it on a pyramid of coarser images, from several rotations, so that its many side peaks do
+//! no harm.
 //!
 //! # Practice
-//! Moves up to about 20° and 30 mm are caught; further ones when the heads' middles and tilt tell. What fills an image from its border with
-//! one value is padding or cleared air; both are tried. The confidence is
+//! Moves up to about 20° and 30 mm are caught; further ones when the heads' middles and tilt tell.
+//! What fills an image from its border with one value is padding or cleared air; both are tried.
+//! The confidence is
 //!
 //! ```text
 //! l / (l + 0.003) · 1 / (1 + (h / 10 mm)²)
 //! ```
 //!
-//! l: normalised information lost 10 mm beside the result (turns at 80 mm from the middle), in the least certain of the six directions; a ball,
-//! whose turn nothing shows, has none. h: by how much the left, right, back, front, lower and upper half of the fixed image, each registered
-//! alone, contradict the whole; a false edge such as padding pulls one half only. In the moves of a real CT and MRI that the
-//! README lists no answer at or over 0.6, the default, was off by 3 mm or 3°; under it the answer is refused and comes with the error.
-//! Shares of the work are fixed, so the bytes do not depend on the number of threads. About 3 s a head on one core, twice that with padding.
+//! l: normalised information lost 10 mm beside the result (turns at 80 mm from the middle), in the
+//! least certain of the six directions; a ball, whose turn nothing shows, has none. h: by how much
+//! the left, right, back, front, lower and upper half of the fixed image, each registered alone,
+//! contradict the whole; a false edge such as padding pulls one half only. In the moves of a real
+//! CT and MRI that the README lists no answer at or over 0.6, the default, was off by 3 mm or 3°;
+//! under it the answer is refused and comes with the error. Shares of the work are fixed, so the
+//! bytes do not depend on the number of threads. About 3 s a head on one core, twice that with
+//! padding.
 //!
 //! # Sources
-//! Viola and Wells 1997 and Collignon 1995 (mutual information), Studholme, Hill and Hawkes 1999 (the quotient), Powell 1964.
+//! Viola and Wells 1997 and Collignon 1995 (mutual information), Studholme, Hill and Hawkes 1999
+//! (the quotient), Powell 1964.
 //!
 //! # When not to use it
 //! For two patients, for a brain that has shifted, or where the images share only a thin slab.
@@ -51,7 +58,8 @@ const CHANCE_MM: f64 = 10.0;
 pub struct RegistrationConfig {
     /// Spacing of the finest level, mm, 0.5 to 8: finer is slower and hardly more exact.
     pub work_mm: f64,
-    /// Grey values told apart in each image, 8 to 128: fewer is smoother, more tells thin contrasts apart.
+    /// Grey values told apart in each image, 8 to 128: fewer is smoother, more tells thin contrasts
+    /// apart.
     pub bins: usize,
     /// Points compared at the finest level, from 1000: more is slower and steadier.
     pub points: usize,
@@ -80,8 +88,8 @@ pub struct Registration {
     pub confidence: f64,
     /// Share of the fixed image that lies in the moving image.
     pub overlap_share: f64,
-    /// How far the answers of the fixed image's left, right, back, front, lower and upper half alone lie from this one: root
-    /// mean square of shift and of turn at 80 mm, mm.
+    /// How far the answers of the fixed image's left, right, back, front, lower and upper half
+    /// alone lie from this one: root mean square of shift and of turn at 80 mm, mm.
     pub halves_mm: f64,
 }
 
@@ -132,7 +140,8 @@ pub enum RegistrationError {
 
 /// Finds the rigid move that puts `moving` into the space of `fixed`.
 ///
-/// A constant around an image counts as unseen (padding) and, in a second try, as air; the surer answer is given.
+/// A constant around an image counts as unseen (padding) and, in a second try, as air; the surer
+/// answer is given.
 pub fn register<F: Sample, M: Sample>(
     fixed: &VoxelVolume<F>,
     moving: &VoxelVolume<M>,
@@ -245,7 +254,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// The headers' pose, the middles put together, and turns of both about the axes and the diagonals.
+    /// The headers' pose, the middles put together, and turns of both about the axes and the
+    /// diagonals.
     fn starts(&self) -> Vec<Start> {
         let axes = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z].map(|a| a * 14f64.to_radians());
         let corner = |n: usize| {

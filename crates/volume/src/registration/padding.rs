@@ -1,9 +1,10 @@
 //! Voxels that no scanner saw: the one value that fills an image from its border inwards.
 //!
 //! # Theory
-//! Resampling, cropping and round fields of view leave a constant around the picture. Taken for air it is a false
-//! edge that mutual information follows. Padding is what hangs on the border through faces and holds exactly the border's commonest
-//! value, where that value makes up a twentieth of the border.
+//! Resampling, cropping and round fields of view leave a constant around the picture. Taken for air
+//! it is a false edge that mutual information follows. Padding is what hangs on the border through
+//! faces and holds exactly the border's commonest value, where that value makes up a twentieth of
+//! the border.
 
 use crate::component::Components;
 use crate::{Sample, VoxelVolume};

@@ -1,4 +1,5 @@
-//! Climbing to a peak without derivatives: Powell's conjugate directions (1964) with parabolic line searches.
+//! Climbing to a peak without derivatives: Powell's conjugate directions (1964) with parabolic line
+//! searches.
 
 /// A pose's six numbers: three of translation, three of rotation, all in mm.
 pub(super) type Pose = [f64; 6];
@@ -44,7 +45,8 @@ pub(super) fn climb(height: &impl Fn(&Pose) -> f64, start: Pose, how: Climb) -> 
     (pose, top)
 }
 
-/// The highest place found along a direction: a bracket by doubled steps, then parabolas through its three places.
+/// The highest place found along a direction: a bracket by doubled steps, then parabolas through
+/// its three places.
 fn line(height: &impl Fn(&Pose) -> f64, pose: Pose, top: f64, direction: &Pose, step: f64) -> (Pose, f64) {
     let place = |t: f64| -> Pose { std::array::from_fn(|a| pose[a] + t * direction[a]) };
     let at = |t: f64| (t, height(&place(t)));

@@ -21,7 +21,8 @@ pub(super) struct Point {
     pub bin: u8,
 }
 
-/// The image with voxels merged until they are about `mm` long; NaN for padding and for what is merged with it.
+/// The image with voxels merged until they are about `mm` long; NaN for padding and for what is
+/// merged with it.
 pub(super) fn reduced<T: Sample>(image: &VoxelVolume<T>, padding: &Padding, mm: f64) -> VoxelVolume<f32> {
     let value = |at: usize| if padding.holds(at) { f32::NAN } else { image.data[at].to_f32() };
     let grid = VoxelVolume { dims: image.dims, data: Vec::<T>::new(), world_from_voxel: image.world_from_voxel };
@@ -62,8 +63,8 @@ impl Level {
         (!value.is_nan()).then_some(value)
     }
 
-    /// At most `most` points spread over the image, each a little off its voxel's centre: grids of a like spacing then
-    /// show no false peaks where their voxels coincide.
+    /// At most `most` points spread over the image, each a little off its voxel's centre: grids of
+    /// a like spacing then show no false peaks where their voxels coincide.
     pub fn points(&self, most: usize) -> Vec<Point> {
         let [nx, ny, _] = self.binned.dims;
         let known: Vec<u32> =
@@ -94,7 +95,8 @@ fn fraction(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// The image with pairs of voxels merged along each axis that is finer than `mm`; `None` when there is none.
+/// The image with pairs of voxels merged along each axis that is finer than `mm`; `None` when there
+/// is none.
 fn halved<T: Copy + Sync>(
     image: &VoxelVolume<T>,
     mm: f64,
@@ -123,7 +125,8 @@ fn halved<T: Copy + Sync>(
     Some(out)
 }
 
-/// The values under which half a per cent of the image lies and over which half a per cent does; `None` without contrast.
+/// The values under which half a per cent of the image lies and over which half a per cent does;
+/// `None` without contrast.
 pub(super) fn range(image: &VoxelVolume<f32>) -> Option<(f32, f32)> {
     let stride = image.data.len().div_ceil(400_000).max(1);
     let mut values: Vec<f32> = image.data.iter().step_by(stride).copied().filter(|v| v.is_finite()).collect();
@@ -133,7 +136,8 @@ pub(super) fn range(image: &VoxelVolume<f32>) -> Option<(f32, f32)> {
     (high > low && (high - low).is_finite()).then_some((low, high))
 }
 
-/// The middle of the largest piece that is brighter than the mean, world mm: a head without table and frame.
+/// The middle of the largest piece that is brighter than the mean, world mm: a head without table
+/// and frame.
 pub(super) fn middle(level: &Level) -> DVec3 {
     let image = &level.binned;
     let known = || image.data.iter().copied().filter(|v| !v.is_nan());

@@ -1,4 +1,5 @@
-//! How far a pose can be trusted: how clear its peak is, and whether each half of the image says the same.
+//! How far a pose can be trusted: how clear its peak is, and whether each half of the image says
+//! the same.
 
 use super::information::Pair;
 use super::powell::{Climb, Pose, climb};
@@ -7,11 +8,13 @@ use super::{Search, Start};
 /// How far beside the peak its sharpness is looked for, mm.
 const BESIDE_MM: f64 = 10.0;
 
-/// A loss of normalised information that is as likely right as wrong: one noise image lost a third of it.
+/// A loss of normalised information that is as likely right as wrong: one noise image lost a third
+/// of it.
 const CHANCE: f64 = 0.003;
 
 impl Search<'_> {
-    /// How much is lost beside the peak along the least certain direction, against what chance loses: 0 to 1.
+    /// How much is lost beside the peak along the least certain direction, against what chance
+    /// loses: 0 to 1.
     pub(super) fn sharpness(&self, pair: &Pair, best: Start, top: f64) -> f64 {
         let lost = |axis: usize| {
             let beside = |side: f64| {
@@ -24,7 +27,8 @@ impl Search<'_> {
         least / (least + CHANCE)
     }
 
-    /// Root mean square of how far the answers of the fixed image's six halves, each climbed from `best`, lie from it, mm.
+    /// Root mean square of how far the answers of the fixed image's six halves, each climbed from
+    /// `best`, lie from it, mm.
     pub(super) fn halves_mm(&self, best: Start) -> f64 {
         let (fixed, moving) = &self.levels[1];
         let there = moving.voxel_from_world * self.moving_from_fixed(best, &[0.0; 6]);

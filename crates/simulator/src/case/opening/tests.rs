@@ -72,7 +72,8 @@ fn an_opening_is_found_or_made_where_it_is_wanted_or_refused() {
 
 #[test]
 fn thin_bone_air_and_deep_brain_are_passed_by() {
-    // Right front: bone of 2 mm but for a small spot. Left front: a sinus. Right back is what remains.
+    // Right front: bone of 2 mm but for a small spot. Left front: a sinus. Right back is what
+    // remains.
     let bone = |r: f32, d: Vec3| match (d.x > 0.0, d.y > -0.1) {
         (true, true) => wall(r, if d.distance(Vec3::new(0.7, 0.3, 0.65)) < 0.03 { 6.0 } else { 1.5 }),
         (false, true) if (82.0..84.5).contains(&r) => -900.0,

@@ -11,7 +11,8 @@ use crate::stages::undo::{Answer, Place, Stroke};
 use trepan_geometry::{Buttons, Pose, ToolKind, ToolState};
 
 impl HapticStage {
-    /// Whether the tool cuts: a perforator's clutch lets go once it is through, and nothing cuts while bone is on its way or the force waits.
+    /// Whether the tool cuts: a perforator's clutch lets go once it is through, and nothing cuts
+    /// while bone is on its way or the force waits.
     pub(super) fn drills(&self, tool: &ToolState) -> bool {
         let kind = self.tool().kind;
         let slips = kind == ToolKind::Perforator && self.drill.lets_go();
@@ -69,7 +70,8 @@ impl HapticStage {
         }
     }
 
-    /// Lets strokes begin, end and come back; `second` is where the second hand's tool is. Returns what came back, mm³.
+    /// Lets strokes begin, end and come back; `second` is where the second hand's tool is. Returns
+    /// what came back, mm³.
     pub(super) fn undo(
         &mut self,
         tool: &ToolState,

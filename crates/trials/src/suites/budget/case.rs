@@ -1,4 +1,5 @@
-//! The heads that scenes are drawn from: the built-in one, made-up ones in closed form, and open ones where they are at hand.
+//! The heads that scenes are drawn from: the built-in one, made-up ones in closed form, and open
+//! ones where they are at hand.
 
 use glam::DVec3;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,11 @@
-//! The judgement over all scenes: how often choices meet their tolerances, and at what cost over the cheapest.
+//! The judgement over all scenes: how often choices meet their tolerances, and at what cost over
+//! the cheapest.
 //!
 //! # Theory
-//! A scene asks for three tolerances. One that no choice meets is left out of its scene and counted: there the plan must say so. Apart from scenes, what the plan says is held against what its
-//! choices do: a tolerance that it doubts, and misses though some other choice meets it, is a miss but no broken word.
+//! A scene asks for three tolerances. One that no choice meets is left out of its scene and
+//! counted: there the plan must say so. Apart from scenes, what the plan says is held against what
+//! its choices do: a tolerance that it doubts, and misses though some other choice meets it, is a
+//! miss but no broken word.
 
 use super::super::Scope;
 use crate::picture::{Chart, Mark};
@@ -76,7 +79,8 @@ fn possible<'a>(scene: &Scene, kinds: &[&'a str]) -> Vec<&'a str> {
     kinds.iter().copied().filter(|kind| did(scene, kind, "cheapest").is_some()).collect()
 }
 
-/// Share of scenes that meet every tolerance that some choice meets, and cost over the cheapest there.
+/// Share of scenes that meet every tolerance that some choice meets, and cost over the cheapest
+/// there.
 fn summary(scenes: &BTreeMap<String, Scene>, kinds: &[&str], name: &str, findings: &mut Findings) -> Vec<Row> {
     let scenes: Vec<(&Scene, Vec<&str>)> = scenes.values().map(|scene| (scene, possible(scene, kinds))).collect();
     let scenes: Vec<_> = scenes.into_iter().filter(|(_, kinds)| !kinds.is_empty()).collect();

@@ -1,15 +1,19 @@
-//! No more model than a scene needs: what a plan chooses in random scenes, whether that meets the tolerance, and what the cheapest choice that does would cost.
+//! No more model than a scene needs: what a plan chooses in random scenes, whether that meets the
+//! tolerance, and what the cheapest choice that does would cost.
 //!
 //! # Theory
-//! In each scene every stored choice for bone, tissue and picture that a session may take (bone: methods that hold thin walls) is run against a truth of high resolution; the cheapest that meets the tolerance, by stored costs, is found by
-//! looking at all. The plan measures the case as a session does, along other ways and from another eye. Scenes in which no choice meets a tolerance are counted apart: there the plan must say so.
+//! In each scene every stored choice for bone, tissue and picture that a session may take (bone:
+//! methods that hold thin walls) is run against a truth of high resolution; the cheapest that meets
+//! the tolerance, by stored costs, is found by looking at all. The plan measures the case as a
+//! session does, along other ways and from another eye. Scenes in which no choice meets a tolerance
+//! are counted apart: there the plan must say so.
 //!
 //! # Practice
 //! Rows of the budget come from other scenes, drawn with other random numbers ([`training`]).
 
 mod case;
-mod finer;
 mod judge;
+mod refinement;
 mod scene;
 pub mod training;
 mod trial;
@@ -48,7 +52,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
         }
     }
     parts.push(Part::new("truth against the oracle", truth));
-    parts.push(Part::new("finer at the opening", finer::run));
+    parts.push(Part::new("finer at the opening", refinement::run));
     parts
 }
 
@@ -61,7 +65,9 @@ fn stretch(case: &Case, random: &mut fastrand::Rng) -> (Situation, Stretch) {
     (0..TRIES).find_map(|_| draw()).expect("a skull has places with bone")
 }
 
-/// The truth of bone, by the oracle on fine voxels, on made-up heads beside what a ball pushes back with in closed form; how far the recommended method is off on the same voxels, and the oracle on half as large ones.
+/// The truth of bone, by the oracle on fine voxels, on made-up heads beside what a ball pushes back
+/// with in closed form; how far the recommended method is off on the same voxels, and the oracle on
+/// half as large ones.
 fn truth(scope: Scope, findings: &mut Findings) {
     let mut random = scope.random(SEED + 9000);
     let mut worst = 0.0f64;
@@ -73,7 +79,7 @@ fn truth(scope: Scope, findings: &mut Findings) {
         let scene = format!("truth on bone {n}, {}", case.name);
         let row = |method: &str| Row::new(&scene, method).with("radius_mm", tool_radius_mm);
         let recommended_mm = stretch.recommended_error_n() / stiffness;
-        findings.rows.push(row("distance-field on 0.25 mm voxels").metric("off_oracle_p95_mm", recommended_mm));
+        findings.rows.push(row("god-object-sphere on 0.25 mm voxels").metric("off_oracle_p95_mm", recommended_mm));
         if !scope.quick {
             let halved = Bone { method: "brute", spacing_mm: 0.125, points: 0 };
             let apart_mm = stretch.measure(&case.skull, &[halved])[0].error_n / stiffness;

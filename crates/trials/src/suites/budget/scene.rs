@@ -13,7 +13,8 @@ pub const EYES: usize = 3;
 /// How far the eye moves off where it was, as a share of its distance: up to 15 degrees.
 const MOVED: f32 = 0.25;
 
-/// Machine for which choices are priced: enough threads that time never decides, so that accuracy does.
+/// Machine for which choices are priced: enough threads that time never decides, so that accuracy
+/// does.
 pub const MACHINE: Machine =
     Machine { ns_per_tet_step: 13.0, us_per_rigid_tick: 6.0, ns_per_ray: 450.0, threads: 64, device_draws: false };
 

@@ -1,9 +1,10 @@
-//! Where the stored rows come from: every choice in scenes of training, and the laws of what was found.
+//! Where the stored rows come from: every choice in scenes of training, and the laws of what was
+//! found.
 
 use super::case::{Case, Source};
 use super::scene::Situation;
 use serde::{Deserialize, Serialize};
-use trepan_budget::{Bone, FEATURES, Kind, Law, Picture, Row, Tissue, write};
+use trepan_budget::{Bone, FEATURES, Kind, Picture, PowerLaw, Row, Tissue, write};
 use trepan_simulator::measure::tissue::{self, Brains, Fineness, Push};
 use trepan_simulator::measure::{self, Wanted, bone, picture};
 
@@ -106,7 +107,7 @@ pub fn tables(parts: &[Observed]) -> Vec<(&'static str, String)> {
     let of = |kind: fn(&Observed) -> &Vec<Seen>| parts.iter().flat_map(kind).collect::<Vec<_>>();
     let pictures = picture::choices().into_iter().filter(|p| !p.sparse && p.detail == 1.0).collect::<Vec<_>>();
     let exact = |row: Row<Picture>| {
-        let error = if pictures.contains(&row.what) { Law::constant(0.0) } else { row.error };
+        let error = if pictures.contains(&row.what) { PowerLaw::constant(0.0) } else { row.error };
         Row { error, ..row }
     };
     // Bone costs hundredths of a core: there a wide bound is cheap.
@@ -124,7 +125,7 @@ fn table<T: Kind>(rows: &[Row<T>]) -> Option<(&'static str, String)> {
 /// The laws of every choice; one that could not be run in all scenes is left out.
 fn rows<T: Kind>(choices: &[T], seen: &[&Seen], covered: f64) -> Vec<Row<T>> {
     let fit = |of: &dyn Fn(&Seen) -> f64| {
-        Law::fit(&seen.iter().map(|seen| (seen.features, of(seen))).collect::<Vec<_>>(), covered)
+        PowerLaw::fit(&seen.iter().map(|seen| (seen.features, of(seen))).collect::<Vec<_>>(), covered)
     };
     let row = |(n, what): (usize, &T)| {
         let error = fit(&|seen| seen.errors[n].max(LEAST))?;

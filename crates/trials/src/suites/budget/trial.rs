@@ -8,7 +8,7 @@ use trepan_budget::{
     Choice, FEATURES, Kind, Neighbour, Quality, Row as Laws, Rows, Setup, bone_cores, bone_error_n, holds_walls,
     picture_cores, plan_with, tissue_cores,
 };
-use trepan_simulator::measure::Own;
+use trepan_simulator::measure::CaseErrors;
 use trepan_simulator::measure::bone::Stretch;
 use trepan_simulator::measure::picture::View;
 use trepan_simulator::measure::tissue::{Brains, Fineness, LEAST_MM, Push};
@@ -31,7 +31,7 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
         let in_tissue = in_tissue.iter().map(|found| found.error_mm).collect();
         let pictures: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
         let seen = View::measure_all(&situation.views(&case), &pictures, 1).expect("the views have pixels");
-        let own = Own::of(&situation.sight(&case), &situation.scene, &rows, 1);
+        let own = CaseErrors::of(&situation.sight(&case), &situation.scene, &rows, 1);
         note(&name, &situation, &rows, &own, [on_bone, in_tissue, seen], findings);
     }
 }
@@ -55,8 +55,16 @@ fn stored(quick: bool) -> Rows {
     rows
 }
 
-/// Rows of one scene: for each kind what the plan chose, what presets would have done and what was cheapest.
-fn note(name: &str, situation: &Situation, rows: &Rows, own: &Own, errors: [Vec<f64>; 3], findings: &mut Findings) {
+/// Rows of one scene: for each kind what the plan chose, what presets would have done and what was
+/// cheapest.
+fn note(
+    name: &str,
+    situation: &Situation,
+    rows: &Rows,
+    own: &CaseErrors,
+    errors: [Vec<f64>; 3],
+    findings: &mut Findings,
+) {
     let scene = &situation.scene;
     let looked_at = own.instead(rows.clone(), scene);
     let plan = plan_with(&MACHINE, scene, &looked_at).expect("the scene is sound");

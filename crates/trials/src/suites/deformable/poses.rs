@@ -1,4 +1,5 @@
-//! A million random poses against the f64 oracle, on meshes that bend, shake and tear: no contact may be missed.
+//! A million random poses against the f64 oracle, on meshes that bend, shake and tear: no contact
+//! may be missed.
 
 use super::{Part, Scope, scene::five_split, truth::inside};
 use crate::suite::{Findings, Gate, Row};
@@ -12,7 +13,8 @@ const RADIUS_MM: f32 = 2.0;
 /// Poses of a full run, and of a quick one.
 const MILLION: usize = 1_000_000;
 const QUICK: usize = 16_000;
-/// Parts of a full run on each kind of mesh; each has its own seed, so that any of them can be made alone.
+/// Parts of a full run on each kind of mesh; each has its own seed, so that any of them can be made
+/// alone.
 const PARTS: usize = 10;
 
 /// A way to move the nodes, anew at every pose.

@@ -1,8 +1,11 @@
-//! The three recorded paths over a brain (thesis, Table 4.3): how they are read, and how they are made.
+//! The three recorded paths over a brain (thesis, Table 4.3): how they are read, and how they are
+//! made.
 //!
 //! # Practice
-//! A simulated Touch in a firm simulated hand that means to follow one of [`PATHS`] over the built-in brain, held back by the guarded force of the recommended
-//! method; what the device reads is kept, a tick a millisecond. `cargo run -p trepan-trials --example record_paths` makes them anew.
+//! A simulated Touch in a firm simulated hand that means to follow one of [`PATHS`] over the
+//! built-in brain, held back by the guarded force of the recommended method; what the device reads
+//! is kept, a tick a millisecond. `cargo run -p trepan-trials --example record_paths` makes them
+//! anew.
 
 use super::scene::{PATHS, RADIUS_MM, Scene};
 use std::path::{Path, PathBuf};
@@ -11,7 +14,7 @@ use trepan_deformable::{Config, TissueCollision, TissueStep};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{self, Hand, Simulated};
+use trepan_haptics::simulated::{self, HandModel, Simulated};
 use trepan_link::wire::{SessionHeader, TickRecord};
 use trepan_link::{Recorder, Recording};
 
@@ -43,7 +46,7 @@ fn record(scene: &Scene, meant: &[Vec3], name: &str, file: &Path) -> anyhow::Res
     let state =
         |(tick, tip): (usize, &Vec3)| ToolState { time_ms: tick as f64, ..ToolState::at(Pose::from_translation(*tip)) };
     let intent = Replay::new(meant.iter().enumerate().map(state).collect());
-    let mut device = Simulated::new(simulated::Config::default(), Hand::FIRM, Box::new(intent));
+    let mut device = Simulated::new(simulated::Config::default(), HandModel::FIRM, Box::new(intent));
     let told = device.capabilities().guard_config();
     let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, ..told });
     let (mut collision, mut model) =

@@ -132,7 +132,8 @@ impl Scene {
         ((0..steps).map(|step| start + along * (step as f32 / steps as f32)).collect(), f64::from(depth_mm))
     }
 
-    /// Straight down through the middle of the top of a mesh at rest, to this share of its thickness: tips, and the greatest depth, mm.
+    /// Straight down through the middle of the top of a mesh at rest, to this share of its
+    /// thickness: tips, and the greatest depth, mm.
     pub fn push(&self, share: f32) -> (Vec<Vec3>, f32) {
         let bounds = self.mesh.bounds();
         let start = bounds.min + bounds.size() * Vec3::new(0.52, 0.47, 1.0) + Vec3::Z * RADIUS_MM;

@@ -1,4 +1,5 @@
-//! What breaks a search: slivers, torn and inverted meshes, absurd cells, a large tool, meshes that stand still, leap or run away.
+//! What breaks a search: slivers, torn and inverted meshes, absurd cells, a large tool, meshes that
+//! stand still, leap or run away.
 
 use super::{Scope, is_complete, truth::inside};
 use crate::conditions;

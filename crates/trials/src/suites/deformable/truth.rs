@@ -1,4 +1,5 @@
-//! The oracle: which points lie in which tetrahedra and how deep the ball is, in f64 and with nothing clever.
+//! The oracle: which points lie in which tetrahedra and how deep the ball is, in f64 and with
+//! nothing clever.
 
 use super::scene::{RADIUS_MM, Scene};
 use glam::DVec3;
@@ -40,7 +41,8 @@ impl Truth {
     }
 }
 
-/// How many points lie surely, and how many perhaps, in a tetrahedron of positive and finite volume.
+/// How many points lie surely, and how many perhaps, in a tetrahedron of positive and finite
+/// volume.
 pub fn inside(mesh: &TetMesh, positions: &[Vec3], points: &[Vec3]) -> (u64, u64) {
     let mut best = vec![f64::NEG_INFINITY; points.len()];
     let region = Aabb::of_points(points);
@@ -57,7 +59,8 @@ pub fn inside(mesh: &TetMesh, positions: &[Vec3], points: &[Vec3]) -> (u64, u64)
     (over(ROUNDING), over(-ROUNDING))
 }
 
-/// The smallest of the four sub-volumes that a point makes with a tetrahedron's faces, over its volume.
+/// The smallest of the four sub-volumes that a point makes with a tetrahedron's faces, over its
+/// volume.
 fn least_share(corners: [Vec3; 4], p: Vec3) -> f64 {
     let volume = |c: [DVec3; 4]| (c[1] - c[0]).cross(c[2] - c[0]).dot(c[3] - c[0]);
     let corners = corners.map(Vec3::as_dvec3);

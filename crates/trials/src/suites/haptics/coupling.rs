@@ -4,7 +4,7 @@ use super::{Scope, at};
 use trepan_contact::Viscoelastic;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 
 /// A device at hand: name, friction, encoder step, length of a tick.
 const DEVICES: [(&str, f32, f32, f32); 6] = [
@@ -17,10 +17,10 @@ const DEVICES: [(&str, f32, f32, f32); 6] = [
 ];
 
 /// Light, firm, and a finger that hardly damps.
-const HANDS: [(&str, Hand); 3] = [
-    ("light grip", Hand::LIGHT),
-    ("firm grip", Hand::FIRM),
-    ("loose finger", Hand { mass_g: 10.0, damping: 0.1, stiffness: 0.1 }),
+const HANDS: [(&str, HandModel); 3] = [
+    ("light grip", HandModel::LIGHT),
+    ("firm grip", HandModel::FIRM),
+    ("loose finger", HandModel { mass_g: 10.0, damping: 0.1, stiffness: 0.1 }),
 ];
 
 /// One coupling.
@@ -29,7 +29,7 @@ pub struct Coupling {
     /// Device and hand.
     pub names: [&'static str; 2],
     pub device: Config,
-    pub hand: Hand,
+    pub hand: HandModel,
     pub wall: Viscoelastic,
     pub tick_ms: f32,
 }
@@ -38,7 +38,7 @@ impl Coupling {
     /// Whether the promises hold for it.
     pub fn declared(&self) -> bool {
         let device = &self.device;
-        let grip = self.hand.damping >= Hand::LIGHT.damping;
+        let grip = self.hand.damping >= HandModel::LIGHT.damping;
         let seen = 0.5 * self.wall.stiffness * device.quantum_mm <= device.friction_n;
         grip && seen && self.wall.stiffness <= 2.0 && device.delay_ticks <= 2
     }
@@ -70,7 +70,7 @@ impl Coupling {
 pub const MILLION: Coupling = Coupling {
     names: ["Touch", "light grip"],
     device: Config::TOUCH,
-    hand: Hand::LIGHT,
+    hand: HandModel::LIGHT,
     wall: Viscoelastic { stiffness: 2.0, damping: 0.5 },
     tick_ms: 1.0,
 };
@@ -110,7 +110,7 @@ pub mod tests {
     pub fn coupling(stiffness: f32, delay_ticks: usize) -> Coupling {
         let device = Config { friction_n: 0.0, quantum_mm: 0.0, delay_ticks, ..Config::default() };
         let wall = Viscoelastic { stiffness, damping: 0.0 };
-        Coupling { names: ["bench", "light grip"], device, hand: Hand::LIGHT, wall, tick_ms: 1.0 }
+        Coupling { names: ["bench", "light grip"], device, hand: HandModel::LIGHT, wall, tick_ms: 1.0 }
     }
 
     #[test]

@@ -1,9 +1,12 @@
-//! Every fault of the emulators, driver by driver: how long the force stays, and what the user is told.
+//! Every fault of the emulators, driver by driver: how long the force stays, and what the user is
+//! told.
 //!
 //! # Practice
-//! A loop as a session's wants 1 N; then the fault begins. libHD and libdrd are given time tick by tick, so that 1 ms is one tick and every run is the
-//! same. Haply's service runs beside in real time: of some runs the gates take the one that the machine disturbed least; the slowest is shown. Where the library itself pauses nobody can reach the motors: the time counts from
-//! its return. `Kept` are faults that must not cost the force.
+//! A loop as a session's wants 1 N; then the fault begins. libHD and libdrd are given time tick by
+//! tick, so that 1 ms is one tick and every run is the same. Haply's service runs beside in real
+//! time: of some runs the gates take the one that the machine disturbed least; the slowest is
+//! shown. Where the library itself pauses nobody can reach the motors: the time counts from its
+//! return. `Kept` are faults that must not cost the force.
 
 mod force_dimension;
 mod haply;
@@ -156,7 +159,8 @@ fn run<B: Bench>(bench: &mut B, case: &Case<B>) -> Course {
     course
 }
 
-/// The row of one case, by the run that the machine disturbed least: the quickest cut, or the one that kept most force.
+/// The row of one case, by the run that the machine disturbed least: the quickest cut, or the one
+/// that kept most force.
 fn row<B>(driver: &str, case: &Case<B>, courses: &[Course]) -> Row {
     let worst = |what: fn(&Course) -> f64| courses.iter().map(what).fold(0.0, f64::max);
     let disturbed = |course: &Course| match case.then {
@@ -183,7 +187,8 @@ fn row<B>(driver: &str, case: &Case<B>, courses: &[Course]) -> Row {
     }
 }
 
-/// The row of a device that must not open, and say so with certain words; `force_n` is what is on its motors then.
+/// The row of a device that must not open, and say so with certain words; `force_n` is what is on
+/// its motors then.
 fn refused<D>(driver: &str, name: &str, opened: Result<D, DeviceError>, words: &str, force_n: f64) -> Row {
     let told = opened.err().map_or_else(|| "it opened".to_owned(), |error| error.to_string());
     Row::new(name, driver)

@@ -1,4 +1,5 @@
-//! Where a wall is quiet: stiffness by delay and damping, one map for each device, hand and way of guarding, with the bounds of theory.
+//! Where a wall is quiet: stiffness by delay and damping, one map for each device, hand and way of
+//! guarding, with the bounds of theory.
 
 use crate::picture::{Map, Outcome};
 use crate::suite::Row;
@@ -94,7 +95,8 @@ fn outcome(row: &Row) -> Outcome {
     }
 }
 
-/// Place of a stiffness among the columns, whose middles are theirs; between two of them by its logarithm.
+/// Place of a stiffness among the columns, whose middles are theirs; between two of them by its
+/// logarithm.
 fn column(stiffnesses: &[f64], bound: f64) -> f64 {
     let after = stiffnesses.partition_point(|k| *k < bound);
     match (after.checked_sub(1).map(|at| stiffnesses[at]), stiffnesses.get(after)) {

@@ -1,10 +1,12 @@
-//! The haptic loop at 1 and 4 kHz beside a solver and a picture: how late, beside a loop that does nothing, in the same run.
+//! The haptic loop at 1 and 4 kHz beside a solver and a picture: how late, beside a loop that does
+//! nothing, in the same run.
 //!
 //! # Practice
-//! Slices of half a second alternate between both loops, so that whatever else the machine does falls on both. The tick is a session's:
-//! simulated device, burr on a plane of bone, force model, guard. The solver is TLED with 10 368 tetrahedra in real time; the picture shows the
-//! same bone and the solver's newest nodes, 640 x 400, at most sixty times a second, on what device there is, else on the processor.
-//! Counts and times are shown, none is a gate.
+//! Slices of half a second alternate between both loops, so that whatever else the machine does
+//! falls on both. The tick is a session's: simulated device, burr on a plane of bone, force model,
+//! guard. The solver is TLED with 10 368 tetrahedra in real time; the picture shows the same bone
+//! and the solver's newest nodes, 640 x 400, at most sixty times a second, on what device there is,
+//! else on the processor. Counts and times are shown, none is a gate.
 
 use super::Scope;
 use crate::suite::Row;
@@ -19,7 +21,7 @@ use trepan_geometry::{Pose, Tool, ToolState, Vec3, units};
 use trepan_gpu::Prefer;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_link::cell::{Reader, Writer, cell};
 use trepan_mesh::TetMesh;
 use trepan_render::{Camera, Frame, Painter, SceneData};
@@ -102,7 +104,8 @@ fn row(rate_hz: u32, method: &str, pace: Pace, real_time: bool, beside: &Beside)
         .metric("pictures_count", beside.pictures)
 }
 
-/// Half a second of ticks on an absolute grid; a tick that misses its end is late, and what it missed is given up.
+/// Half a second of ticks on an absolute grid; a tick that misses its end is late, and what it
+/// missed is given up.
 fn slice(pace: &mut Pace, rate_hz: u32, mut tick: impl FnMut()) {
     let length = Duration::from_secs(1) / rate_hz;
     let mut next = Instant::now() + length;
@@ -158,7 +161,7 @@ impl Bench {
         let turn = 0.01 * f64::from(dt_ms);
         let hand = |t: u32| ToolState::at(Pose::from_translation(Vec3::Z * (3.0 + (f64::from(t) * turn).sin() as f32)));
         let intent = Replay::new((0..100_000).map(hand).collect());
-        let device = Simulated::new(Config::default(), Hand::FIRM, Box::new(intent));
+        let device = Simulated::new(Config::default(), HandModel::FIRM, Box::new(intent));
         let device_wall = device.capabilities().coupled(Viscoelastic { stiffness: 2.0, damping: 0.5 }, dt_ms);
         let mut rigid = Method::RECOMMENDED.build(&Tool::burr(3.0));
         rigid.reset(Pose::from_translation(Vec3::Z * 5.0));
@@ -183,7 +186,8 @@ impl Bench {
     }
 }
 
-/// Steps a brain in real time and tells its nodes sixty times a second; gives simulated over wall time.
+/// Steps a brain in real time and tells its nodes sixty times a second; gives simulated over wall
+/// time.
 fn solve(mesh: &TetMesh, mut nodes: Writer<Vec<Vec3>>, over: &AtomicBool) -> f64 {
     let fixed = boxes::nodes_where(mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
     let body = Body::uniform(mesh.clone(), fixed, Material::BRAIN);

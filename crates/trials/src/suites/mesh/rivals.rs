@@ -1,9 +1,11 @@
-//! Side by side with TetGen and fTetWild, which run as programs of their own in a throw-away Python environment.
+//! Side by side with TetGen and fTetWild, which run as programs of their own in a throw-away Python
+//! environment.
 //!
 //! # Practice
-//! Needs Python 3 with `venv`, and its package index once; without them it says so and finds nothing. The lattice fills a mask; the others fill the surface of
-//! the lattice's mesh, so that all three have the same triangles to start from. Nothing of theirs is linked, kept or shipped: TetGen is under the AGPL.
-//! Seconds are those of the mesher alone, each with all cores.
+//! Needs Python 3 with `venv`, and its package index once; without them it says so and finds
+//! nothing. The lattice fills a mask; the others fill the surface of the lattice's mesh, so that
+//! all three have the same triangles to start from. Nothing of theirs is linked, kept or shipped:
+//! TetGen is under the AGPL. Seconds are those of the mesher alone, each with all cores.
 
 use super::super::{Part, Scope};
 use super::scenes::{self, Scene};
@@ -100,6 +102,6 @@ fn fill(workshop: &Workshop, name: &str, ending: &str, own: &TetMesh, target: us
 
 fn read(path: &Path) -> Result<TetMesh, String> {
     let mesh = trepan_mesh::read(path).map_err(|fault| fault.to_string())?;
-    mesh.check().map_err(|fault| format!("its mesh is unsound: {fault}"))?;
+    mesh.check().map_err(|fault| format!("its mesh is degenerate: {fault}"))?;
     Ok(mesh)
 }

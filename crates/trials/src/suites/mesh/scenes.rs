@@ -1,4 +1,5 @@
-//! What is meshed: the built-in case's brain or a given label volume, and bodies with a closed form.
+//! What is meshed: the built-in case's brain or a given label volume, and bodies with a closed
+//! form.
 
 use super::super::Scope;
 use std::path::PathBuf;
@@ -11,7 +12,8 @@ const BALL_MM: f32 = 28.0;
 const INNER_MM: f32 = 14.0;
 const TORUS_MM: [f32; 2] = [20.0, 8.0];
 
-/// Voxel edges, mm, and counts asked for with cubes of one size and coarser inside; the second is the least that can follow the voxels.
+/// Voxel edges, mm, and counts asked for with cubes of one size and coarser inside; the second is
+/// the least that can follow the voxels.
 type Counts = (&'static [usize], usize);
 const MASKS: &[(f32, Counts, Counts)] = &[
     (1.0, (&[15_000, 100_000, 200_000, 300_000], 200_000), (&[60_000, 100_000, 200_000], 100_000)),
@@ -36,7 +38,8 @@ pub(super) struct Scene {
     pub(super) euler: Option<f64>,
     /// What is measured for distance.
     pub(super) borders: Vec<Border>,
-    /// Whether the elements are small enough to follow the voxels, so that the distance is promised.
+    /// Whether the elements are small enough to follow the voxels, so that the distance is
+    /// promised.
     pub(super) follows: bool,
 }
 
@@ -156,7 +159,8 @@ fn opening(spacing_mm: f32, target_tets: usize) -> Scene {
     Scene::of_voxels(name, mask, config, true)
 }
 
-/// Brain tissue, ventricles, cerebellum and brain stem (FreeSurfer's numbers), each with its border.
+/// Brain tissue, ventricles, cerebellum and brain stem (FreeSurfer's numbers), each with its
+/// border.
 fn tissues() -> Scene {
     let labels = read(trepan_fixtures::case_head().aseg);
     let tissue = |label: u16| match label {

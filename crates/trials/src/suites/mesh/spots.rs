@@ -28,7 +28,8 @@ pub(super) fn samples<T>(grid: &VoxelVolume<T>, triangles: &[[u32; 3]], position
     points
 }
 
-/// The faces between voxels of a kind that `parted` tells apart, as (middle in voxel indices, axis across).
+/// The faces between voxels of a kind that `parted` tells apart, as (middle in voxel indices, axis
+/// across).
 pub(super) fn faces<T: Copy + Default>(volume: &VoxelVolume<T>, parted: impl Fn(T, T) -> bool) -> Vec<(Vec3, usize)> {
     let [nx, ny, nz] = volume.dims;
     let mut found = Vec::new();

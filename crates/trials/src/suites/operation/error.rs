@@ -8,7 +8,8 @@ const FELT_N: f32 = 0.02;
 
 /// What differs.
 pub struct Errors {
-    /// Force while the burr is in the hand, or the probe touches bone in one of the two, and one feels something, N: root mean square, and what 95 of 100 ticks stay under.
+    /// Force while the burr is in the hand, or the probe touches bone in one of the two, and one
+    /// feels something, N: root mean square, and what 95 of 100 ticks stay under.
     pub bone_rms_n: f64,
     /// See above.
     pub bone_p95_n: f64,
@@ -16,13 +17,15 @@ pub struct Errors {
     pub tissue_rms_n: f64,
     /// See above.
     pub tissue_p95_n: f64,
-    /// From where the finest run shows the brain at the opening to the nearest place of this run's brain, while the probe is in the hand, mm.
+    /// From where the finest run shows the brain at the opening to the nearest place of this run's
+    /// brain, while the probe is in the hand, mm.
     pub shown_mean_mm: f64,
     /// See above: what 95 of 100 places and looks stay under.
     pub shown_p95_mm: f64,
     /// The same before anything has touched the brain: what the coarser shape alone does.
     pub rest_p95_mm: f64,
-    /// From this run's brain at rest at the opening to the surface of the mask that both were made of, mm.
+    /// From this run's brain at rest at the opening to the surface of the mask that both were made
+    /// of, mm.
     pub mask_p95_mm: f64,
     /// Bone that is gone in one run only, mm³.
     pub bone_mm3: f64,
@@ -85,7 +88,8 @@ fn surfaces(ride: &Ride, truth: &Ride) -> (Vec<f64>, Vec<f64>) {
     (apart(0).collect(), (0..truth.looks.len()).filter(|&look| probing(look)).flat_map(apart).collect())
 }
 
-/// From a point to a triangle, mm: to its plane where the foot lies inside, else to the nearest edge.
+/// From a point to a triangle, mm: to its plane where the foot lies inside, else to the nearest
+/// edge.
 fn distance_mm(point: Vec3, &[a, b, c]: &[Vec3; 3]) -> f64 {
     let to_edge = |(from, to): (Vec3, Vec3)| {
         let share = (point - from).dot(to - from) / (to - from).length_squared().max(f32::MIN_POSITIVE);
@@ -143,7 +147,8 @@ mod tests {
         }
     }
 
-    /// By hand: 0.3 N everywhere; surface off by 0.5 mm at rest and 0.7 mm when it is pressed; 60 against 80 places gone.
+    /// By hand: 0.3 N everywhere; surface off by 0.5 mm at rest and 0.7 mm when it is pressed; 60
+    /// against 80 places gone.
     #[test]
     fn errors_are_those_of_hand_made_runs() {
         let errors = Errors::between(&ride(1.3, 8.5, 1.2, 60), &ride(1.0, 8.0, 1.0, 80));

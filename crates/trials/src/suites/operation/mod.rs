@@ -1,9 +1,12 @@
-//! The whole operation by every setup: what a choice of voxels, tetrahedra and methods costs the processor, and how wrong force, bone and brain then are.
+//! The whole operation by every setup: what a choice of voxels, tetrahedra and methods costs the
+//! processor, and how wrong force, bone and brain then are.
 //!
 //! # Theory
-//! The hand goes the same way in every run: poses and buttons of the scripted operation (drill, open, press the brain), tick by tick at 1 kHz, as the finest setup's plan has them; forces do
-//! not move it. Each run turns the bodies of the loops as if every loop kept pace: a tick, a collision step, solver steps up to the tick's time. So a setup is blamed for its models and never
-//! for the machine's lateness; what a slow one costs stands beside it, as CPU time.
+//! The hand goes the same way in every run: poses and buttons of the scripted operation (drill,
+//! open, press the brain), tick by tick at 1 kHz, as the finest setup's plan has them; forces do
+//! not move it. Each run turns the bodies of the loops as if every loop kept pace: a tick, a
+//! collision step, solver steps up to the tick's time. So a setup is blamed for its models and
+//! never for the machine's lateness; what a slow one costs stands beside it, as CPU time.
 //!
 //! ```text
 //! path (poses) ──> haptic tick ──> collision step ──> solver steps     every ms, each timed
@@ -12,7 +15,8 @@
 //! ```
 //!
 //! # When not to use it
-//! To judge a method by itself: its own suite does so against closed forms. The truth here is a finer run by the recommended methods, not nature.
+//! To judge a method by itself: its own suite does so against closed forms. The truth here is a
+//! finer run by the recommended methods, not nature.
 
 mod error;
 mod ride;
@@ -110,7 +114,8 @@ pub fn judge(_: Scope, findings: &mut Findings) {
     gates(&of_scene, &mut findings.gates);
 }
 
-/// What is promised: every choice opens the skull, and no fixed preset is both cheaper and more accurate than what is chosen for this machine.
+/// What is promised: every choice opens the skull, and no fixed preset is both cheaper and more
+/// accurate than what is chosen for this machine.
 fn gates(rows: &[Row], gates: &mut Vec<Gate>) {
     let number = |row: &Row, name: &str| row.metrics.get(name).copied().unwrap_or(f64::NAN);
     let presets = || rows.iter().filter(|row| ["draft", "usual", "fine"].contains(&row.method.as_str()));

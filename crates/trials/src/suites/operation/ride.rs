@@ -1,4 +1,5 @@
-//! The operation along one path by one setup: what the hand felt, what is gone of the bone, where the brain was shown, and what it cost.
+//! The operation along one path by one setup: what the hand felt, what is gone of the bone, where
+//! the brain was shown, and what it cost.
 
 use super::Scope;
 use super::setups::{self, Candidate};
@@ -18,7 +19,8 @@ use trepan_volume::BoneVolume;
 const OPENING: &str = "108,8,84";
 /// Time between two looks at the brain, ms.
 pub const LOOK_MS: u64 = 250;
-/// Radius around the way in within which the brain is looked at, and bone is counted, mm: the hole and its rim.
+/// Radius around the way in within which the brain is looked at, and bone is counted, mm: the hole
+/// and its rim.
 const LOOK_RADIUS_MM: f32 = 5.0;
 const BONE_RADIUS_MM: f32 = 8.0;
 /// Distance of two rays, and of two places where bone is looked for, mm.
@@ -191,7 +193,8 @@ struct Rays {
 
 /// Where rays begin, mm over the entry.
 const OVER_MM: f32 = 30.0;
-/// A triangle is near the way in when a corner is within this, mm: more than an edge and what the brain moves.
+/// A triangle is near the way in when a corner is within this, mm: more than an edge and what the
+/// brain moves.
 const NEAR_MM: f32 = 25.0;
 
 impl Rays {

@@ -1,4 +1,5 @@
-//! Which setups the operation is done by: the presets, what is chosen for this machine, the thesis's own methods, and single steps away from the usual.
+//! Which setups the operation is done by: the presets, what is chosen for this machine, the
+//! thesis's own methods, and single steps away from the usual.
 
 use super::Scope;
 use trepan_deformable::{Config, Method};
@@ -16,8 +17,8 @@ pub struct Candidate {
 /// The finest run: voxels and tetrahedra that nothing is held against.
 pub fn truth(scope: Scope) -> Candidate {
     let flags = scope.pick(
-        "--quality fine --spacing-mm 0.5 --tets 12000 --finer 2",
-        "--quality fine --spacing-mm 0.4 --tets 50000 --finer 2",
+        "--quality fine --spacing-mm 0.5 --tets 12000 --opening-refinement 2",
+        "--quality fine --spacing-mm 0.4 --tets 50000 --opening-refinement 2",
     );
     Candidate { name: "truth", flags, touch: Config::default() }
 }
@@ -42,9 +43,9 @@ pub fn all(scope: Scope) -> Vec<Candidate> {
             ("voxels of 0.5 mm", "--quality usual --spacing-mm 0.5", Config::default()),
             ("3000 tetrahedra", "--quality usual --tets 3000", Config::default()),
             ("24000 tetrahedra", "--quality usual --tets 24000", Config::default()),
-            ("3000, alike everywhere", "--quality usual --tets 3000 --finer 0", Config::default()),
-            ("12000, alike everywhere", "--quality usual --tets 12000 --finer 0", Config::default()),
-            ("24000, alike everywhere", "--quality usual --tets 24000 --finer 0", Config::default()),
+            ("3000, alike everywhere", "--quality usual --tets 3000 --opening-refinement 0", Config::default()),
+            ("12000, alike everywhere", "--quality usual --tets 12000 --opening-refinement 0", Config::default()),
+            ("24000, alike everywhere", "--quality usual --tets 24000 --opening-refinement 0", Config::default()),
             ("position based", "--quality usual --solver xpbd", Config::default()),
             ("masses and springs", "--quality usual --solver mass-spring", Config::default()),
         ]);

@@ -1,17 +1,19 @@
-//! Heads that no one has seen: made from real ones by a seed, each imported, opened, drilled, pressed.
+//! Heads that no one has seen: made from real ones by a seed, each imported, opened, drilled,
+//! pressed.
 //!
 //! # Theory
-//! A program that was made on one head is judged on others. Each head is a real one after warps, other
-//! scanners and other illnesses ([`crate::population`]); its brain is known, since the real one's is. Each
-//! goes through the import, then through an operation at several places by every quality: drilled by a
-//! simulated hand, left alone while the brain sinks, pressed by up to 8 mm, left again. What must hold is
-//! the same for all: the bone opens, the brain is quiet where nothing touches it, no element is inverted,
-//! and no warning is raised without its cause.
+//! A program that was made on one head is judged on others. Each head is a real one after warps,
+//! other scanners and other illnesses ([`crate::population`]); its brain is known, since the real
+//! one's is. Each goes through the import, then through an operation at several places by every
+//! quality: drilled by a simulated hand, left alone while the brain sinks, pressed by up to 8 mm,
+//! left again. What must hold is the same for all: the bone opens, the brain is quiet where nothing
+//! touches it, no element is inverted, and no warning is raised without its cause.
 //!
 //! # Practice
-//! One part for each head. Heads are synthetic variations of few people: they show where the program
-//! breaks, not how often it would in a clinic. `auto` measures its case on every tenth head, as a session
-//! does; on the others it chooses by the laws of `trepan-budget`, which costs half a minute less.
+//! One part for each head. Heads are synthetic variations of few people: they show where the
+//! program breaks, not how often it would in a clinic. `auto` measures its case on every tenth
+//! head, as a session does; on the others it chooses by the laws of `trepan-budget`, which costs
+//! half a minute less.
 
 mod ride;
 
@@ -36,10 +38,12 @@ const MEASURED_EACH: u64 = 10;
 const JUMP_MM: f64 = 0.05;
 /// Least overlap of the brain that is found with the one that is known.
 const DICE: f64 = 0.9;
-/// Over which places of the head it is opened, beside the default: directions from the brain's middle.
+/// Over which places of the head it is opened, beside the default: directions from the brain's
+/// middle.
 const PLACES: [(&str, Vec3); 2] =
     [("left front", Vec3::new(-0.62, 0.42, 0.66)), ("right back", Vec3::new(0.6, -0.45, 0.66))];
-/// Distance of the point that an opening is asked for at, mm from the brain's middle: outside every head.
+/// Distance of the point that an opening is asked for at, mm from the brain's middle: outside every
+/// head.
 const OUTSIDE_MM: f32 = 130.0;
 /// What the rows of the import are called.
 const IMPORT: &str = "import";
@@ -136,7 +140,8 @@ fn open(flags: Vec<String>, quality: &str) -> Result<Session> {
     Ok(Session::open(Program::Integrated, Options::try_parse_from(flags)?, Inputs::default())?)
 }
 
-/// Overlap (Dice 1945) of a mask that was found with the one that is known, on the grid of the latter.
+/// Overlap (Dice 1945) of a mask that was found with the one that is known, on the grid of the
+/// latter.
 fn dice(found: &VoxelVolume<u8>, known: &VoxelVolume<u8>) -> f64 {
     let grid = trepan_volume::Grid::of(known);
     let found = resample(found, &grid, trepan_volume::Interpolation::Majority, 0);
@@ -192,7 +197,7 @@ fn by_laws(imported: &Imported) -> Result<Vec<String>> {
         ("--spacing-mm", bone.spacing_mm.to_string()),
         ("--rigid", bone.method.into()),
         ("--tets", tissue.tets.to_string()),
-        ("--finer", tissue.halvings.to_string()),
+        ("--opening-refinement", tissue.halvings.to_string()),
     ];
     Ok(flags.into_iter().flat_map(|(flag, value)| [flag.to_string(), value]).collect())
 }
@@ -224,10 +229,10 @@ fn row_of_ride(head: &str, place: &str, quality: &str, session: Result<Session>,
         .metric("opened", f64::from(u8::from(ride.opened)))
         .metric("jump_mm", ride.jump_mm.into())
         .metric("held_jump_mm", ride.held_jump_mm.into())
-        .metric("rest_motion_mm", ride.mishaps.rest_motion_mm.into())
-        .metric("inverted", ride.mishaps.inverted as f64)
-        .metric("non_finite", ride.mishaps.non_finite as f64)
-        .metric("contacts_left_out", ride.mishaps.contacts_left_out as f64)
+        .metric("rest_motion_mm", ride.solver_faults.rest_motion_mm.into())
+        .metric("inverted", ride.solver_faults.inverted as f64)
+        .metric("non_finite", ride.solver_faults.non_finite as f64)
+        .metric("contacts_left_out", ride.solver_faults.contacts_left_out as f64)
         .metric("falsely_pressed", ride.falsely_pressed.into())
         .metric("pressed", ride.pressed.into())
         .metric("drill_on_brain_warned", ride.touched.into())

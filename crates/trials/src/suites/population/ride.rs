@@ -1,25 +1,28 @@
-//! One operation on one head: drill by a simulated hand, leave the brain alone, press it, leave it again.
+//! One operation on one head: drill by a simulated hand, leave the brain alone, press it, leave it
+//! again.
 //!
 //! # Practice
-//! The loops turn on one thread as if each kept pace, as in the suite `operation`. Before the dura is open
-//! nothing acts on the brain, so its solver waits until then. What is measured of the untouched brain is
-//! measured over every millisecond in which no tool touched it, nor in the half second before.
+//! The loops turn on one thread as if each kept pace, as in the suite `operation`. Before the dura
+//! is open nothing acts on the brain, so its solver waits until then. What is measured of the
+//! untouched brain is measured over every millisecond in which no tool touched it, nor in the half
+//! second before.
 
 use anyhow::{Context, Result};
 use trepan_contact::SurfacePatch;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::script::{Plan, Script};
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{Mishaps, Notice, Phase, Session, SoftFrame, Stages, TickInput, Warning, What};
+use trepan_simulator::{Notice, Phase, Session, SoftFrame, SolverFaults, Stages, TickInput, Warning, What};
 use trepan_soft::Loads;
 
 /// Presses of the probe, mm.
 const PRESSES_MM: [f32; 3] = [4.0, 6.0, 8.0];
 /// Time after a touch in which the brain still moves back, ms.
 const MOVES_BACK_MS: f64 = 500.0;
-/// A hand that leans on its drill: what it means and where it is differ by a millimetre under 1.5 N.
-const SURGEON: Hand = Hand { mass_g: 250.0, damping: 8.0, stiffness: 1.5 };
+/// A hand that leans on its drill: what it means and where it is differ by a millimetre under 1.5
+/// N.
+const SURGEON: HandModel = HandModel { mass_g: 250.0, damping: 8.0, stiffness: 1.5 };
 /// A tool that is slower stands still, mm/ms.
 const STILL_MM_PER_MS: f32 = 2e-3;
 /// Time in which tissue comes to rest under a tool that stands still, ms.
@@ -55,8 +58,9 @@ pub struct Ride {
     /// Longest way of a node in a millisecond in which nothing touched the brain, mm.
     pub jump_mm: f32,
     /// What the solver had to put right.
-    pub mishaps: Mishaps,
-    /// Longest way of a node in a millisecond in which a probe that stood still pressed the brain, mm.
+    pub solver_faults: SolverFaults,
+    /// Longest way of a node in a millisecond in which a probe that stood still pressed the brain,
+    /// mm.
     pub held_jump_mm: f32,
     /// Largest displacement, mm.
     pub most_mm: f32,
@@ -152,7 +156,7 @@ fn operate(mut stages: Stages, mut device: Box<dyn HapticDevice>, milliseconds: 
             ride.held_jump_mm = ride.held_jump_mm.max(moved_mm);
         }
     }
-    ride.mishaps = *tissue.solver.mishaps();
+    ride.solver_faults = *tissue.solver.solver_faults();
     ride.most_mm = tissue.solver.max_displacement_mm();
     ride.touches = stages.haptic.scores().burr_touches_of_brain;
     Some(())

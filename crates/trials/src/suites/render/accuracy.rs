@@ -1,4 +1,5 @@
-//! Hits against a brute-force f64 march, with leaping against without, sparse rays against all, and walls that no ray may pass.
+//! Hits against a brute-force f64 march, with leaping against without, sparse rays against all, and
+//! walls that no ray may pass.
 
 use super::scenes::{ISO, frame, head};
 use super::{By, EXACT, FINE_VOXEL, Hits, SPARSE, Setting};
@@ -16,7 +17,8 @@ fn rays(view: &View, [width, height]: [u32; 2]) -> impl Iterator<Item = Vec3> {
     pixels.map(move |p| view.ray(Vec2::new(2.0 * p.x / width as f32 - 1.0, 1.0 - 2.0 * p.y / height as f32)))
 }
 
-/// Distance to bone along a ray by small steps through the trilinear density in f64, mm: no bricks, no cells, no roots.
+/// Distance to bone along a ray by small steps through the trilinear density in f64, mm: no bricks,
+/// no cells, no roots.
 fn march(bone: &BoneVolume, eye: Vec3, along: Vec3) -> Option<f64> {
     let spacing = f64::from(bone.spacing_mm());
     let (start, step) = (bone.grid_of(eye).as_dvec3(), along.as_dvec3());
@@ -109,7 +111,8 @@ fn sparse(bone: &Arc<BoneVolume>, frame: &Frame, size: [u32; 2], findings: &mut 
     ]);
 }
 
-/// Voxels drilled between two pictures: in the second one every ray is where a picture of the drilled bone that is loaded anew has it.
+/// Voxels drilled between two pictures: in the second one every ray is where a picture of the
+/// drilled bone that is loaded anew has it.
 pub fn edits(gpu: Option<&Gpu>, findings: &mut Findings) {
     let size = [96, 72];
     let frame = frame(Vec3::ZERO, Vec3::new(0.2, 1.0, 0.5), 120.0, 0.6);

@@ -1,8 +1,9 @@
 //! Where ray casters and meshes fail: each condition by each drawer, as a map.
 //!
 //! # Practice
-//! Bone counts as right where the rays hit what rays hit that walk every cell, to 0.01 voxel; sparse rays to 0.25 voxel, 1 ray in 100 aside. A moved mesh counts as right
-//! where device and processor show it alike (SSIM 0.99) and, where it has a silhouette, as large as it is.
+//! Bone counts as right where the rays hit what rays hit that walk every cell, to 0.01 voxel;
+//! sparse rays to 0.25 voxel, 1 ray in 100 aside. A moved mesh counts as right where device and
+//! processor show it alike (SSIM 0.99) and, where it has a silhouette, as large as it is.
 
 use super::likeness::similarity;
 use super::scenes::{ISO, frame};
@@ -25,7 +26,8 @@ pub fn run(gpu: Option<&Gpu>, findings: &mut Findings) {
     bone_map(gpu, findings);
     findings.maps.push(mesh_map(gpu));
     for map in &findings.maps {
-        // Long steps and few pixels are in the map to show where they fail; what pictures are drawn with must not.
+        // Long steps and few pixels are in the map to show where they fail; what pictures are drawn
+        // with must not.
         let used = |column: &str| !["steps", "no leaping", "of the pixels"].iter().any(|other| column.contains(other));
         let failed = map.named_cells().filter(|(_, column, cell)| used(column) && cell.grade() == 2).count();
         findings.gates.push(Gate::at_most(format!("{}: conditions that fail", map.title), failed as f64, 0.0));
@@ -104,7 +106,8 @@ fn bone_map(gpu: Option<&Gpu>, findings: &mut Findings) {
         };
         let walked = Setting { casting: Casting { leap: false, ..EXACT.casting }, ..setting };
         let walked = Setting { casting: Casting { step_voxel: None, sparse: false, ..walked.casting }, ..walked };
-        // Fewer pixels are other rays, and the device places them otherwise: their truth has as few, by whoever draws.
+        // Fewer pixels are other rays, and the device places them otherwise: their truth has as
+        // few, by whoever draws.
         let truth = hits(if setting.detail < 1.0 { by } else { 0 }, &walked);
         let (most_mm, share) = match setting.casting {
             Casting { step_voxel: Some(step), .. } => (step.max(0.25), 0.01),

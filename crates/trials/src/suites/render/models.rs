@@ -1,7 +1,9 @@
-//! Frames a second for the skulls of the thesis (Table 3.2) and for a brain of 22,000 tetrahedra, each by processor and device; the camera moves.
+//! Frames a second for the skulls of the thesis (Table 3.2) and for a brain of 22,000 tetrahedra,
+//! each by processor and device; the camera moves.
 //!
 //! # Practice
-//! The thesis draws 15 to 20 frames a second at 1680x1050 on the graphics card of its day. Times are of whole pictures without slices, to the last pixel.
+//! The thesis draws 15 to 20 frames a second at 1680x1050 on the graphics card of its day. Times
+//! are of whole pictures without slices, to the last pixel.
 
 use super::scenes::{SKULLS, brain, frame, skull, swaying};
 use super::{By, EXACT, SPARSE, Setting};
@@ -41,7 +43,8 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
     );
 }
 
-/// A scene from a camera that moves, with a brain that sways; a brain without a skull also cut in the middle.
+/// A scene from a camera that moves, with a brain that sways; a brain without a skull also cut in
+/// the middle.
 fn measure(
     scene: &str,
     data: &SceneData,

@@ -1,9 +1,13 @@
-//! Side by side with VTK's ray caster for processors, which runs as a program of its own in a throw-away Python environment.
+//! Side by side with VTK's ray caster for processors, which runs as a program of its own in a
+//! throw-away Python environment.
 //!
 //! # Practice
-//! Needs Python 3 with `venv`, and its package index once; without them it says so and finds nothing. `TREPAN_PYTHON` names another Python, one that may have VTK already. Both look at the same
-//! shell from the same eye with all cores, while the camera moves. Each one's error is that of its picture against its own with the finest steps, since their lamps
-//! differ; ours has shadows and ambient light, VTK's has neither. VTK's time is that of the first distance of samples whose error is no larger than ours.
+//! Needs Python 3 with `venv`, and its package index once; without them it says so and finds
+//! nothing. `TREPAN_PYTHON` names another Python, one that may have VTK already. Both look at the
+//! same shell from the same eye with all cores, while the camera moves. Each one's error is that of
+//! its picture against its own with the finest steps, since their lamps differ; ours has shadows
+//! and ambient light, VTK's has neither. VTK's time is that of the first distance of samples whose
+//! error is no larger than ours.
 
 use super::scenes::{ISO, frame, head};
 use super::{By, EXACT, SPARSE, Setting};

@@ -33,7 +33,8 @@ pub(super) fn known_to_device(setting: &Setting) -> bool {
     setting.casting.step_voxel.is_none() && !setting.casting.sparse
 }
 
-/// Time of a picture whose camera moves, against its difference from the processor's picture with steps of 1/16 voxel.
+/// Time of a picture whose camera moves, against its difference from the processor's picture with
+/// steps of 1/16 voxel.
 pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
     let size = scope.pick([640, 480], [1680, 1050]);
     let bone = head(160);

@@ -11,8 +11,9 @@ use trepan_rigid::{Method, RigidStep};
 
 /// From this depth on a touch counts, mm: the least that the thesis measured (0.2 to 0.8 mm).
 const TOUCH_MM: f64 = 0.2;
-/// From this depth on the normal's angle counts, mm. A proxy that is off sideways by e turns the normal by e / depth, so that the angle of a
-/// lighter touch says less of the method than of the depth; there the sideways error itself is measured, and in force as N/ms.
+/// From this depth on the normal's angle counts, mm. A proxy that is off sideways by e turns the
+/// normal by e / depth, so that the angle of a lighter touch says less of the method than of the
+/// depth; there the sideways error itself is measured, and in force as N/ms.
 const PRESSED_MM: f64 = 0.5;
 /// Orientations by the oracle, which is slow.
 const ORACLE_ORIENTATIONS: usize = 8;
@@ -55,7 +56,8 @@ pub fn judge(findings: &mut Findings) {
     findings.gates.extend(gates);
 }
 
-/// Errors of every tick in every orientation: a share of them is a share of the time that a hand feels them.
+/// Errors of every tick in every orientation: a share of them is a share of the time that a hand
+/// feels them.
 #[derive(Default)]
 struct Errors {
     orientations: usize,
@@ -160,7 +162,8 @@ fn gates(rows: &[Row]) -> Vec<Gate> {
         gate(row, "change of force beyond the true one, worst N/ms", "force_change_beyond_truth_max_n_per_ms", 0.1);
     }
     for row in own().filter(|row| row.config.get("group").is_some_and(|group| group == "solids")) {
-        // A box's edge is sharper than a voxel: on its grid no method knows where it is, so its normal is shown and not promised.
+        // A box's edge is sharper than a voxel: on its grid no method knows where it is, so its
+        // normal is shown and not promised.
         if !row.scene.starts_with("box") {
             gate(row, "normal, p95 degrees", "normal_error_p95_deg", 5.0);
         }

@@ -1,9 +1,11 @@
 //! How far a held ball is from the bone's isosurface: a truth for bone that has no closed form.
 //!
 //! # Theory
-//! Where a ball is held, it touches: the nearest point of the surface is at its radius. The surface of the trilinear density crosses the edges between voxel
-//! centres exactly where linear interpolation says; the nearest of these crossings is at most some hundredths of a voxel further than the nearest
-//! point, for points are half a voxel apart at most and the ball is several voxels large.
+//! Where a ball is held, it touches: the nearest point of the surface is at its radius. The surface
+//! of the trilinear density crosses the edges between voxel centres exactly where linear
+//! interpolation says; the nearest of these crossings is at most some hundredths of a voxel further
+//! than the nearest point, for points are half a voxel apart at most and the ball is several voxels
+//! large.
 
 use super::solid::RADIUS_MM;
 use glam::{DVec3, IVec3};
@@ -14,7 +16,8 @@ use trepan_volume::BoneVolume;
 /// How far beyond the ball a surface is looked for, voxels: what is further counts as that far.
 const REACH: f64 = 3.0;
 
-/// Gap or overlap, voxels, of the ball that a method holds where the manifold says; overlap only, where it feels nothing. `None` in the open.
+/// Gap or overlap, voxels, of the ball that a method holds where the manifold says; overlap only,
+/// where it feels nothing. `None` in the open.
 pub fn error_voxel(bone: &BoneVolume, tip: Vec3, manifold: &ContactManifold) -> Option<f64> {
     let held = tip + manifold.depth_mm * manifold.normal;
     let gap = gap_voxel(bone, held);
@@ -25,7 +28,8 @@ pub fn error_voxel(bone: &BoneVolume, tip: Vec3, manifold: &ContactManifold) -> 
     }
 }
 
-/// Distance from the ball's surface to the bone's, voxels, negative for an overlap; `None` where none is near.
+/// Distance from the ball's surface to the bone's, voxels, negative for an overlap; `None` where
+/// none is near.
 fn gap_voxel(bone: &BoneVolume, centre: Vec3) -> Option<f64> {
     let (spacing, iso) = (f64::from(bone.spacing_mm()), f64::from(bone.isovalue()));
     let at = (centre.as_dvec3() - bone.origin().as_dvec3()) / spacing;

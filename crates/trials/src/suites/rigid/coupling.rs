@@ -1,17 +1,20 @@
-//! Stiffness, device damping, delay and encoder steps: which walls of voxels stay quiet under a simulated device and hand, by every method.
+//! Stiffness, device damping, delay and encoder steps: which walls of voxels stay quiet under a
+//! simulated device and hand, by every method.
 //!
 //! # Theory
 //! ```text
 //! Gil, Hulin; Colgate at B = 0      K < b / (T/2 + d)
 //! Abbott, Okamura; Diolaiti         K ≤ 2 f_c / Δ
 //! ```
-//! with the device's damping b, delay d, Coulomb friction f_c and encoder step Δ. The hand here is a spring without damping, so that nothing but the device
-//! damps: the bounds' own case. A contact method whose depth jumps or whose normal turns adds energy that no bound knows; one that is exact keeps the
-//! border of the exact wall, which is mapped first.
+//! with the device's damping b, delay d, Coulomb friction f_c and encoder step Δ. The hand here is
+//! a spring without damping, so that nothing but the device damps: the bounds' own case. A contact
+//! method whose depth jumps or whose normal turns adds energy that no bound knows; one that is
+//! exact keeps the border of the exact wall, which is mapped first.
 //!
 //! # Practice
-//! Quiet: the handle moves less than 0.1 mm in the last 600 ms of a press of 1 N, at both encoder steps. Quiet with a clamp at 3.3 N alone: works. Quiet only with the guard's
-//! passivity controller: degrades. Else: fails.
+//! Quiet: the handle moves less than 0.1 mm in the last 600 ms of a press of 1 N, at both encoder
+//! steps. Quiet with a clamp at 3.3 N alone: works. Quiet only with the guard's passivity
+//! controller: degrades. Else: fails.
 
 use super::solid::{RADIUS_MM, held, voxels};
 use super::{map_of, passes};
@@ -22,7 +25,7 @@ use trepan_contact::{Contact, ForceGuard, ForceModel, GuardConfig, Hooke};
 use trepan_geometry::{Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_rigid::{Method, RigidContact, RigidStep};
 use trepan_volume::BoneVolume;
 
@@ -33,8 +36,8 @@ const STIFFNESS: [f32; 7] = [10.0, 5.0, 2.0, 1.0, 0.5, 0.25, 0.1];
 const DAMPING: [f32; 3] = [0.5, 2.0, 5.0];
 const DELAY: [usize; 4] = [0, 1, 2, 5];
 const QUANTUM_MM: [f32; 2] = [0.02, 0.055];
-/// Hand that adds no damping.
-const HAND: Hand = Hand { mass_g: 50.0, damping: 0.0, stiffness: 0.15 };
+/// HandModel that adds no damping.
+const HAND: HandModel = HandModel { mass_g: 50.0, damping: 0.0, stiffness: 0.15 };
 const FORCE_N: f32 = 1.0;
 const APPROACH: f32 = 0.1;
 const TICKS: usize = 1800;
@@ -137,7 +140,8 @@ fn chart(method: Option<&Method>, bone: &BoneVolume, normal: Vec3, scope: Scope,
     });
 }
 
-/// Where a stiffness lies among the rows, in cells from above: rows are at their middles, in between by logarithm.
+/// Where a stiffness lies among the rows, in cells from above: rows are at their middles, in
+/// between by logarithm.
 fn height(rows: &[f32], k: f32) -> f64 {
     let log = |k: f32| f64::from(k).log2();
     for (at, pair) in rows.windows(2).enumerate() {
@@ -148,7 +152,8 @@ fn height(rows: &[f32], k: f32) -> f64 {
     rows.len() as f64
 }
 
-/// How a wall of one coupling fares, at the worst of the encoder steps. Without a method: the exact wall.
+/// How a wall of one coupling fares, at the worst of the encoder steps. Without a method: the exact
+/// wall.
 pub fn judge(method: Option<&Method>, bone: &BoneVolume, normal: Vec3, cell: Cell, quanta: &[f32]) -> Outcome {
     let worst = |guarded: bool| {
         quanta.iter().map(|&quantum| cycle_mm(method, bone, normal, cell, quantum, guarded)).fold(0.0, f32::max)
@@ -181,7 +186,8 @@ fn cycle_mm(
     let mut device = Simulated::new(config, HAND, Box::new(Replay::new(intent.collect())));
     let told = device.capabilities().guard_config();
     let passivity = told.passivity.filter(|_| guarded);
-    // Without the controller only the clamp is left: no slew limit, which would damp or feed an oscillation.
+    // Without the controller only the clamp is left: no slew limit, which would damp or feed an
+    // oscillation.
     let slew = if guarded { told.slew_n_per_ms } else { 1e3 };
     let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, passivity, slew_n_per_ms: slew, ..told });
     let mut wall = match method {

@@ -1,12 +1,15 @@
-//! Random hands on voxel bone through the guard: what comes out must not be more than what went in. And the same path gives the same bytes.
+//! Random hands on voxel bone through the guard: what comes out must not be more than what went in.
+//! And the same path gives the same bytes.
 //!
 //! # Theory
-//! Energy to the hand is what the motors give less what the device's own friction takes, `b Δx²/T + f_c |Δx|` a tick; the most that ever came out above
-//! what went in is counted, per hand.
+//! Energy to the hand is what the motors give less what the device's own friction takes,
+//! `b Δx²/T + f_c |Δx|` a tick; the most that ever came out above what went in is counted, per
+//! hand.
 //!
 //! # Practice
-//! A new hand every ten thousand ticks: stiffness 0.05 to 0.5 N/mm, damping 0.05 to 6 N ms/mm, 5 to 200 g, on one of three
-//! devices, 0 to 2 ticks late and with the wall that it bears, that means to be now here, now there, up to 6 mm in the bone.
+//! A new hand every ten thousand ticks: stiffness 0.05 to 0.5 N/mm, damping 0.05 to 6 N ms/mm, 5 to
+//! 200 g, on one of three devices, 0 to 2 ticks late and with the wall that it bears, that means to
+//! be now here, now there, up to 6 mm in the bone.
 
 use super::coupling;
 use super::recording::{self, Place, Task};
@@ -17,13 +20,14 @@ use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_rigid::{Method, RigidStep};
 use trepan_volume::BoneVolume;
 
 const HAND_TICKS: usize = 10_000;
 const MOST_MJ: f64 = 0.1;
-/// Coulomb friction, N, and encoder step, mm: exact, fine, and a Touch's. A step must be seen by the friction, K Δ/2 ≤ f_c.
+/// Coulomb friction, N, and encoder step, mm: exact, fine, and a Touch's. A step must be seen by
+/// the friction, K Δ/2 ≤ f_c.
 const DEVICES: [(f32, f32); 3] = [(0.0, 0.0), (0.02, 0.01), (0.26, 0.055)];
 const NMM_PER_J: f64 = 1000.0;
 
@@ -64,7 +68,7 @@ fn given_j(method: &Method, bone: &BoneVolume, normal: Vec3, mut random: fastran
     let config = Config { delay_ticks: random.usize(0..3), friction_n, quantum_mm, ..Config::default() };
     // Even over the decades: from a finger that hardly damps to a fist.
     let mut decade = |low: f32, high: f32| low * (high / low).powf(random.f32());
-    let hand = Hand { mass_g: decade(5.0, 200.0), damping: decade(0.05, 6.0), stiffness: decade(0.05, 0.5) };
+    let hand = HandModel { mass_g: decade(5.0, 200.0), damping: decade(0.05, 6.0), stiffness: decade(0.05, 0.5) };
     let intent = wandering(&mut random, normal);
     let mut device = Simulated::new(config, hand, Box::new(Replay::new(intent)));
     let capable = device.capabilities();

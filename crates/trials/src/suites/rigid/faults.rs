@@ -1,8 +1,10 @@
-//! What no hand should do and every session meets: teleports, the end of the volume, opposed contacts, poses that are no numbers, a flickering pedal.
+//! What no hand should do and every session meets: teleports, the end of the volume, opposed
+//! contacts, poses that are no numbers, a flickering pedal.
 //!
 //! # Practice
-//! Each condition is one function: it runs a method and says works, degrades or fails, and why. Nothing finite may ever become infinite, and after
-//! the fault an ordinary press must feel as before.
+//! Each condition is one function: it runs a method and says works, degrades or fails, and why.
+//! Nothing finite may ever become infinite, and after the fault an ordinary press must feel as
+//! before.
 
 use super::solid::{ISO, RADIUS_MM, held, voxels};
 use crate::conditions;
@@ -237,7 +239,8 @@ fn odd_ticks(method: &Method) -> Outcome {
     let mut run = Run::new(method, half_space(), Vec3::Z * 4.0);
     let press = Vec3::Z * (RADIUS_MM - PRESS_MM);
     run.go(Vec3::Z * 4.0, press);
-    // All bone that the burr could ever take here: its cap below the surface, and the voxels that it only scrapes.
+    // All bone that the burr could ever take here: its cap below the surface, and the voxels that
+    // it only scrapes.
     let cap = 2.0 * core::f32::consts::PI * PRESS_MM * PRESS_MM * RADIUS_MM;
     for dt_ms in [0.0, -1.0, f32::NAN, f32::INFINITY, 1000.0] {
         run.step(&held(press, Vec3::Z), true, dt_ms);
@@ -335,7 +338,8 @@ fn all_bone(method: &Method) -> Outcome {
 mod tests {
     use super::*;
 
-    /// The border: what the thesis's and the penalty methods do not survive, the recommended one does.
+    /// The border: what the thesis's and the penalty methods do not survive, the recommended one
+    /// does.
     #[test]
     fn the_recommended_method_survives_what_others_do_not() {
         for (name, condition) in CONDITIONS {

@@ -1,10 +1,13 @@
-//! The thesis's cubes (Table 3.1) and skulls (Table 3.2), touched and drilled along recorded paths: what a whole haptic tick costs there.
+//! The thesis's cubes (Table 3.1) and skulls (Table 3.2), touched and drilled along recorded paths:
+//! what a whole haptic tick costs there.
 //!
 //! # Practice
-//! A cube's outer voxels are 1800 HU in air, so that the surface lies on its faces at every voxel size and the depth is known in closed form. The
-//! skulls are the built-in CT, 1 x 1 x 2 mm, resampled to the dimensions of the table: its upper 14 cm. A tick is contact with sweep, viscoelastic force,
-//! guard, and drilling where the pedal is down. The path is the hand's as recorded, the same for every model and method: where a burr is slower
-//! than the recorded one, it lags.
+//! A cube's outer voxels are 1800 HU in air, so that the surface lies on its faces at every voxel
+//! size and the depth is known in closed form. The skulls are the built-in CT, 1 x 1 x 2 mm,
+//! resampled to the dimensions of the table: its upper 14 cm. A tick is contact with sweep,
+//! viscoelastic force, guard, and drilling where the pedal is down. The path is the hand's as
+//! recorded, the same for every model and method: where a burr is slower than the recorded one, it
+//! lags.
 
 use super::recording::{self, Task};
 use super::solid::{ISO, RADIUS_MM};
@@ -93,7 +96,8 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// Two charts a group: against the truth, which the recommended method must lead, and against what the thesis prints of itself.
+/// Two charts a group: against the truth, which the recommended method must lead, and against what
+/// the thesis prints of itself.
 pub fn judge(findings: &mut Findings) {
     for group in ["cubes, touch", "cubes, drill", "skulls, touch", "skulls, drill"] {
         let (error, what) = match group {
@@ -158,7 +162,8 @@ struct Felt {
 }
 
 impl Felt {
-    /// Error of the depth on a cube, voxels, where the truth is a touch of 0.2 mm or more and the centre is out of the cube.
+    /// Error of the depth on a cube, voxels, where the truth is a touch of 0.2 mm or more and the
+    /// centre is out of the cube.
     fn error_voxel(&self, voxel_mm: f32) -> Option<f64> {
         let out = self.tip.as_dvec3().abs() - HALF_MM;
         let depth = f64::from(RADIUS_MM) - out.max(DVec3::ZERO).length();
@@ -249,7 +254,8 @@ impl Ride {
     }
 }
 
-/// The drilling tick of the recommended method in 48.5 million voxels and, where memory allows, in 1024³ of the same edge.
+/// The drilling tick of the recommended method in 48.5 million voxels and, where memory allows, in
+/// 1024³ of the same edge.
 fn large(scope: Scope, findings: &mut Findings) {
     let (head, isovalue) = head();
     let path = recording::path(recording::Place::Skull, Task::Drill);

@@ -1,9 +1,10 @@
 //! What the thesis prints of its own rigid handling, as rows beside ours.
 //!
 //! # Sources
-//! Thesis, section 3.6: 466 points, a Phantom Omni at 1 kHz, k = 2 N/mm. Bounds, not quantiles: touching "all below 1 ms" for every cube and skull; drilling
-//! over 1 ms for the finest cubes and "on a few occasions" for Skull5; forces change by less than 0.6 N a tick when touching and at most
-//! 0.4 N when drilling. The machine is of 2012: compare the ratio to `thesis`, not these.
+//! Thesis, section 3.6: 466 points, a Phantom Omni at 1 kHz, k = 2 N/mm. Bounds, not quantiles:
+//! touching "all below 1 ms" for every cube and skull; drilling over 1 ms for the finest cubes and
+//! "on a few occasions" for Skull5; forces change by less than 0.6 N a tick when touching and at
+//! most 0.4 N when drilling. The machine is of 2012: compare the ratio to `thesis`, not these.
 
 use super::BUDGET_US;
 use crate::suite::Row;

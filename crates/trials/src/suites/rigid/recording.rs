@@ -1,9 +1,11 @@
 //! The recorded paths: how they are read, and how they are made.
 //!
 //! # Practice
-//! A simulated Touch in a firm simulated hand, that means to stroke over the bone or to follow the scripted craniotomy, is held back by the guarded force of
-//! the recommended method; what the device reads is kept, a tick a millisecond. So the poses are such as a hand takes, pressed
-//! some tenths of a millimetre deep. `cargo run -p trepan-trials --example record_paths` makes them anew.
+//! A simulated Touch in a firm simulated hand, that means to stroke over the bone or to follow the
+//! scripted craniotomy, is held back by the guarded force of the recommended method; what the
+//! device reads is kept, a tick a millisecond. So the poses are such as a hand takes, pressed some
+//! tenths of a millimetre deep. `cargo run -p trepan-trials --example record_paths` makes them
+//! anew.
 
 use super::models::{self, HALF_MM, SKULLS};
 use super::solid::{RADIUS_MM, held};
@@ -13,7 +15,7 @@ use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_link::wire::{SessionHeader, TickRecord};
 use trepan_link::{Recorder, Recording};
 use trepan_rigid::{Method, RigidStep};
@@ -115,7 +117,7 @@ fn record(bone: &BoneVolume, place: Place, task: Task, file: &Path) -> anyhow::R
             Box::new(Script::named("craniotomy", &site, place.ticks() as f64)?)
         }
     };
-    let mut device = Simulated::new(Config::default(), Hand::FIRM, intent);
+    let mut device = Simulated::new(Config::default(), HandModel::FIRM, intent);
     let told = device.capabilities().guard_config();
     let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, ..told });
     let (mut contact, mut model) = (Method::RECOMMENDED.build(&Tool::burr(RADIUS_MM)), Viscoelastic::BONE);

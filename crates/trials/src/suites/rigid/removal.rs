@@ -1,18 +1,21 @@
 //! What a burr takes: against the volume that it swept, in closed form, and at four tick rates.
 //!
 //! # Theory
-//! A ball of radius r that sinks h into flat bone and then goes l across sweeps a spherical cap and a segment of a cylinder:
+//! A ball of radius r that sinks h into flat bone and then goes l across sweeps a spherical cap and
+//! a segment of a cylinder:
 //! ```text
 //! V = π h² (3r - h)/3 + l (r² acos((r - h)/r) - (r - h) √(2rh - h²))
 //! ```
-//! The stroke is so slow that a burr takes all that is in its way. A second burr is pressed with a constant load; what it takes in a given time must not
-//! depend on the length of a tick.
+//! The stroke is so slow that a burr takes all that is in its way. A second burr is pressed with a
+//! constant load; what it takes in a given time must not depend on the length of a tick.
 //!
 //! # Practice
-//! The swept volume is counted twice: as the method says, and in the bone that is left, by trilinear density at 64 points a voxel before and after.
-//! Voxels cannot hold the swept shape exactly: the hole that a perfect cutter would leave in them is some tenths of a percent off. What a method's hole
-//! differs from that one is its own error, and what the chart shows. No front is asked for: the law of removal is the same for all, and tenths of a percent
-//! are less than voxels hold.
+//! The swept volume is counted twice: as the method says, and in the bone that is left, by
+//! trilinear density at 64 points a voxel before and after. Voxels cannot hold the swept shape
+//! exactly: the hole that a perfect cutter would leave in them is some tenths of a percent off.
+//! What a method's hole differs from that one is its own error, and what the chart shows. No front
+//! is asked for: the law of removal is the same for all, and tenths of a percent are less than
+//! voxels hold.
 
 use super::solid::{ISO, directions, held, voxels};
 use super::worst_chart;
@@ -171,7 +174,8 @@ fn rates(method: &Method, scope: Scope) -> Row {
     names.iter().zip(volumes).fold(row, |row, (name, volume)| row.metric(name, volume))
 }
 
-/// Presses for a time: what went, mm³, and how far the hand sank, mm. A method that cannot hold the load lets it fall into the bone.
+/// Presses for a time: what went, mm³, and how far the hand sank, mm. A method that cannot hold the
+/// load lets it fall into the bone.
 fn pressed(method: &Method, dt_ms: f64, total_ms: f64) -> (f64, f64) {
     let bone = voxels(EDGE, VOXEL_MM, |p| p.z);
     let mut contact = method.build(&Tool::burr(R as f32));
@@ -219,7 +223,8 @@ mod tests {
         assert!((said / swept_mm3() - 1.0).abs() < 0.02 && (left / swept_mm3() - 1.0).abs() < 0.02, "{said} {left}");
     }
 
-    /// The border: the thesis's law doubles at twice the rate, the recommended one does not know it.
+    /// The border: the thesis's law doubles at twice the rate, the recommended one does not know
+    /// it.
     #[test]
     fn only_the_rate_law_is_free_of_the_tick() {
         let change = |name: &str| {

@@ -1,4 +1,5 @@
-//! Whether 4 kHz can be held: deadlines missed by the drilling tick, beyond those that an empty loop misses on the same machine.
+//! Whether 4 kHz can be held: deadlines missed by the drilling tick, beyond those that an empty
+//! loop misses on the same machine.
 
 use super::solid::RADIUS_MM;
 use crate::suite::Row;
@@ -23,7 +24,8 @@ pub fn row(bone: &BoneVolume, path: &[ToolState]) -> Row {
     for _ in 0..BLOCKS {
         missed_empty += misses(|| {});
         missed += misses(|| {
-            // Four ticks to each recorded one; at the end the path begins anew, without a jump that counts as a way.
+            // Four ticks to each recorded one; at the end the path begins anew, without a jump that
+            // counts as a way.
             let tool = &path[at / 4 % path.len()];
             if at % (4 * path.len()) == 0 {
                 contact.reset(tool.world_from_tool);
@@ -43,7 +45,8 @@ pub fn row(bone: &BoneVolume, path: &[ToolState]) -> Row {
         .metric("late_beyond_empty_count", f64::from(missed) - f64::from(missed_empty))
 }
 
-/// How many of a block's ticks ended after their deadline. A late tick is not caught up: the next begins anew.
+/// How many of a block's ticks ended after their deadline. A late tick is not caught up: the next
+/// begins anew.
 fn misses(mut work: impl FnMut()) -> u32 {
     let mut missed = 0;
     let mut due = Instant::now() + TICK;

@@ -1,16 +1,19 @@
-//! Bone with a closed form: its voxels, a way of the hand over it, and what a ball must feel there, in f64.
+//! Bone with a closed form: its voxels, a way of the hand over it, and what a ball must feel there,
+//! in f64.
 //!
 //! # Theory
-//! A ball of radius r whose centre c is pressed past the surface is held at the nearest place where the distance d to the bone is r. Where that place
-//! is unique,
+//! A ball of radius r whose centre c is pressed past the surface is held at the nearest place where
+//! the distance d to the bone is r. Where that place is unique,
 //! ```text
 //! depth = r - d(c),   normal = ∇d(c)
 //! ```
-//! A slot as wide as the ball leaves it a plane, a round pit a smaller pit: there the nearest place is given directly.
+//! A slot as wide as the ball leaves it a plane, a round pit a smaller pit: there the nearest place
+//! is given directly.
 //!
 //! # Practice
-//! Densities fall by 1000 HU a voxel through the surface, over one voxel either side, as in a scanner's blur. The hand comes along the normal and
-//! slides, both at 50 mm/s; the shaft stands along the normal, or along the axis where a normal would lead it into bone.
+//! Densities fall by 1000 HU a voxel through the surface, over one voxel either side, as in a
+//! scanner's blur. The hand comes along the normal and slides, both at 50 mm/s; the shaft stands
+//! along the normal, or along the axis where a normal would lead it into bone.
 
 use glam::DVec3;
 use trepan_geometry::{Pointshell, Pose, Quat, Spread, ToolState, Vec3};

@@ -1,8 +1,9 @@
 //! Walls of 1 to 5 voxels against fast tools: who lets one through.
 //!
 //! # Theory
-//! A ball that goes v a tick meets a wall of thickness w at an angle. Methods that look where the hand is see bone on its near or far side, or none; methods with a
-//! proxy sweep the way. Two questions a cell:
+//! A ball that goes v a tick meets a wall of thickness w at an angle. Methods that look where the
+//! hand is see bone on its near or far side, or none; methods with a proxy sweep the way. Two
+//! questions a cell:
 //! ```text
 //! pressed   the hand stops 1.65 mm past the wall's face: what 3.3 N, a Touch's peak, are at 2 N/mm
 //! pierced   the hand goes on to 6 mm past it: no device could stop it, but a picture of the tool must stay outside
@@ -122,7 +123,8 @@ pub fn judge(method: &Method, walls: &[(Vec3, BoneVolume)], cell: Cell) -> Outco
     }
 }
 
-/// Why the wall does not hold a tool whose foremost point goes `past` mm beyond its face; `None` when it does.
+/// Why the wall does not hold a tool whose foremost point goes `past` mm beyond its face; `None`
+/// when it does.
 fn lost(method: &Method, wall: &BoneVolume, normal: Vec3, cell: Cell, past: f32) -> Option<&'static str> {
     let (sin, cos) = cell.angle.to_radians().sin_cos();
     let way = normal.any_orthonormal_vector() * sin - normal * cos;
@@ -153,7 +155,8 @@ fn lost(method: &Method, wall: &BoneVolume, normal: Vec3, cell: Cell, past: f32)
 mod tests {
     use super::*;
 
-    /// The border: thin walls that methods without a proxy lose at any speed, and the recommended one holds at 12 m/s.
+    /// The border: thin walls that methods without a proxy lose at any speed, and the recommended
+    /// one holds at 12 m/s.
     #[test]
     fn methods_without_a_proxy_lose_thin_walls_and_the_recommended_one_holds_them() {
         let normal = normals(1)[0];

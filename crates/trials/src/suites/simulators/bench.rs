@@ -4,7 +4,7 @@ use std::sync::Arc;
 use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
 use trepan_geometry::ToolState;
 use trepan_haptics::HapticDevice;
-use trepan_haptics::simulated::{Config, Hand, Simulated};
+use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_link::wire::TickRecord;
 use trepan_simulator::{HapticConfig, HapticStage, Limits, Notice, Program, TickInput, Warning, What};
 use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
@@ -37,7 +37,7 @@ impl Bench {
         bone: Arc<BoneVolume>,
         brain: Arc<DistanceField>,
         search: Option<FlapSearch>,
-        grip: Hand,
+        grip: HandModel,
         mut intent: Box<dyn HapticDevice>,
     ) -> Self {
         let start = intent.read(0.0).tool;

@@ -1,10 +1,13 @@
-//! The built-in brain in the simulator's own loops: is a tumour felt, how far does the brain sink and breathe, what does a spatula hold?
+//! The built-in brain in the simulator's own loops: is a tumour felt, how far does the brain sink
+//! and breathe, what does a spatula hold?
 //!
 //! # Practice
-//! A tumour is a ball of its class's stiffness under the place that the probe presses. Shift, breath and retraction are shown, not judged: they are uncalibrated.
+//! A tumour is a ball of its class's stiffness under the place that the probe presses. Shift,
+//! breath and retraction are shown, not judged: they are uncalibrated.
 //!
 //! # Sources
-//! Least difference of force that a hand notices, 7 %: X. D. Pang, H. Z. Tan, N. I. Durlach, *Manual discrimination of force*, Perception & Psychophysics 49 (1991).
+//! Least difference of force that a hand notices, 7 %: X. D. Pang, H. Z. Tan, N. I. Durlach,
+//! *Manual discrimination of force*, Perception & Psychophysics 49 (1991).
 
 use super::bench::config;
 use super::case;
@@ -117,7 +120,7 @@ fn sinking(brain: &RestBrain, entry: Vec3, inward: Vec3, lost: f32) -> Result<Ro
     let [low, high] = [f32::min, f32::max].map(|pick| out.iter().copied().reduce(pick).unwrap_or(f32::NAN));
     let mean = places.iter().sum::<Vec3>() / places.len().max(1) as f32;
     Ok(Row::new("the brain with the dura open", "tled")
-        .with("fluid_lost", lost)
+        .with("csf_loss", lost)
         .metric("shift_mm", mean.length().into())
         .metric("breath_and_pulse_mm", (high - low).into()))
 }

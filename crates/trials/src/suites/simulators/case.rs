@@ -27,7 +27,7 @@ pub fn recipe() -> Recipe {
 }
 
 /// An operating table whose skull can be had whole again.
-pub struct Table {
+pub struct CaseFixture {
     /// What is planned: the burr hole.
     pub plan: Plan,
     /// The same with a flap.
@@ -37,7 +37,7 @@ pub struct Table {
     brain: Arc<DistanceField>,
 }
 
-impl Table {
+impl CaseFixture {
     /// Imports the built-in case.
     pub fn new() -> Result<Self> {
         let case = open_case(Program::Integrated, &inputs(), &recipe(), &Cache::of_user()?)?;

@@ -1,24 +1,25 @@
-//! A flap cut by script on the built-in case: found free when its last bridge goes, lifted whole, and near to the plan.
+//! A flap cut by script on the built-in case: found free when its last bridge goes, lifted whole,
+//! and near to the plan.
 
 use super::bench::Bench;
-use super::case::Table;
+use super::case::CaseFixture;
 use crate::suite::{Findings, Gate, Row};
 use trepan_haptics::script::{Plan, Script};
-use trepan_haptics::simulated::Hand;
-use trepan_simulator::{Against, Program, What};
+use trepan_haptics::simulated::HandModel;
+use trepan_simulator::{PlanComparison, Program, What};
 use trepan_volume::Piece;
 
 /// Duration of the operation, ms.
 const END_MS: f64 = 75_000.0;
 
 /// One row, and its gates.
-pub fn findings(table: &Table) -> Findings {
+pub fn findings(table: &CaseFixture) -> Findings {
     let (bone, brain) = table.fresh();
     let (before, pieces) = (bone.snapshot(), Piece::all(&bone));
     let how = Plan { outline: table.flap.outline.clone(), ..Plan::default() };
     let script = Script::planned("flap", &table.flap.site, END_MS, &how).expect("the site is sound");
     let search = table.flap.search(&bone);
-    let mut bench = Bench::new(Program::Craniotomy, bone.clone(), brain, search, Hand::FIRM, Box::new(script));
+    let mut bench = Bench::new(Program::Craniotomy, bone.clone(), brain, search, HandModel::FIRM, Box::new(script));
     // At the tick that finds it free the flood's answer is held against all pieces of the skull.
     let (mut free, mut cut_off, mut found_mm3) = (0, Vec::new(), 0.0f32);
     let mut until_ms = 0.0;
@@ -35,7 +36,7 @@ pub fn findings(table: &Table) -> Findings {
     }
     let of_pieces = cut_off.first().map_or(0.0, |piece| piece.voxels as f64 * f64::from(bone.voxel_mm3()));
     let lifted = bench.notices.iter().any(|notice| matches!(notice.what, What::FlapLifted(_)));
-    let against = Against::of(&table.flap, &before, &bone).expect("a flap is planned");
+    let against = PlanComparison::of(&table.flap, &before, &bone).expect("a flap is planned");
     let mut findings = Findings::default();
     findings.rows.push(
         Row::new("flap of 24 mm on the built-in case", "craniotome")
@@ -43,7 +44,7 @@ pub fn findings(table: &Table) -> Findings {
             .metric("flap_mm3", f64::from(found_mm3))
             .metric("dice", against.dice)
             .metric("surface_95_mm", against.surface_95_mm.unwrap_or(f64::NAN))
-            .metric("beside_mm3", against.beside_mm3),
+            .metric("outside_plan_mm3", against.outside_plan_mm3),
     );
     findings.gates.extend([
         Gate::at_least("flap: found free and lifted", f64::from(u8::from(lifted && free > 0)), 1.0),

@@ -1,19 +1,21 @@
-//! A novice and an expert operate on the built-in case: do the scores tell them apart, does every warning come once and in time?
+//! A novice and an expert operate on the built-in case: do the scores tell them apart, does every
+//! warning come once and in time?
 //!
 //! # Practice
-//! Both hands are scripts in a simulated grip; the novice's plunges deeper, presses harder, hesitates and trembles. So this is **synthetic** validity: that the
-//! scores measure what they are named for, not that they measure surgeons.
+//! Both hands are scripts in a simulated grip; the novice's plunges deeper, presses harder,
+//! hesitates and trembles. So this is **synthetic** validity: that the scores measure what they are
+//! named for, not that they measure surgeons.
 
 use super::bench::Bench;
-use super::case::Table;
+use super::case::CaseFixture;
 use crate::suite::{Findings, Gate, Row};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Plan, Script};
-use trepan_haptics::simulated::Hand;
+use trepan_haptics::simulated::HandModel;
 use trepan_haptics::{Capabilities, HapticDevice, Reading};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{Against, Limits, Program, ScoreKeeper, Warning, What};
+use trepan_simulator::{Limits, PlanComparison, Program, ScoreKeeper, Warning, What};
 
 /// Duration of an operation, ms.
 const END_MS: f64 = 20_000.0;
@@ -48,7 +50,7 @@ impl HapticDevice for Novice {
 }
 
 /// Rows of both, and their gates.
-pub fn findings(table: &Table) -> Findings {
+pub fn findings(table: &CaseFixture) -> Findings {
     let mut findings = Findings::default();
     let deep = deep();
     let novice = |seed: f32| Operated::by(table, &deep, 0.25 + 0.1 * seed);
@@ -61,7 +63,7 @@ pub fn findings(table: &Table) -> Findings {
         ("smoothness", all(&|n| n.jerk() < expert.jerk() - 0.5)),
         ("plunge", all(&|n| n.scores.plunge_mm > expert.scores.plunge_mm + 1.0)),
         ("time on the dura", all(&|n| n.scores.burr_on_brain_s > 1.2 * expert.scores.burr_on_brain_s)),
-        ("bone beside the plan", all(&|n| n.against.beside_mm3 > expert.against.beside_mm3)),
+        ("bone beside the plan", all(&|n| n.against.outside_plan_mm3 > expert.against.outside_plan_mm3)),
     ] {
         findings.gates.push(Gate::at_least(
             format!("novices whose {name} is worse than the expert's, of 3"),
@@ -84,25 +86,25 @@ pub fn deep() -> Plan {
 /// How an operation went.
 struct Operated {
     scores: ScoreKeeper,
-    against: Against,
+    against: PlanComparison,
     warnings: usize,
     late_ticks: u64,
     odd_warnings: u64,
 }
 
 impl Operated {
-    fn by(table: &Table, plan: &Plan, tremor_mm: f32) -> Self {
+    fn by(table: &CaseFixture, plan: &Plan, tremor_mm: f32) -> Self {
         let (bone, brain) = table.fresh();
         let before = bone.snapshot();
         let script = Script::planned("craniotomy", &table.plan.site, END_MS, plan).expect("the site is sound");
         let hand = Box::new(Novice { script, tremor_mm });
-        let mut bench = Bench::new(Program::Craniotomy, bone.clone(), brain, None, Hand::FIRM, hand);
+        let mut bench = Bench::new(Program::Craniotomy, bone.clone(), brain, None, HandModel::FIRM, hand);
         bench.run(END_MS, |_| false);
         let (late_ticks, odd_warnings) = checked(&bench);
         let raised = |what: &What| matches!(what, What::Warning(_, true, _));
         Self {
             scores: *bench.stage.scores(),
-            against: Against::of(&table.plan, &before, &bone).expect("a hole is planned"),
+            against: PlanComparison::of(&table.plan, &before, &bone).expect("a hole is planned"),
             warnings: bench.notices.iter().filter(|notice| raised(&notice.what)).count(),
             late_ticks,
             odd_warnings,
@@ -122,7 +124,7 @@ impl Operated {
             .metric("burr_on_brain_s", self.scores.burr_on_brain_s)
             .metric("dice", self.against.dice)
             .metric("surface_95_mm", self.against.surface_95_mm.unwrap_or(f64::NAN))
-            .metric("beside_mm3", self.against.beside_mm3)
+            .metric("outside_plan_mm3", self.against.outside_plan_mm3)
             .metric("warnings", self.warnings as f64)
     }
 }
@@ -130,7 +132,8 @@ impl Operated {
 /// What in a tick calls for a warning.
 type Cause<'a> = &'a dyn Fn(&TickRecord) -> bool;
 
-/// Whether the warnings that a record alone can justify came with their causes: most ticks late, and how many came without one, twice or not at all.
+/// Whether the warnings that a record alone can justify came with their causes: most ticks late,
+/// and how many came without one, twice or not at all.
 fn checked(bench: &Bench) -> (u64, u64) {
     let near_mm = Limits::default().near_mm;
     let causes: [(Warning, Cause); 4] = [

@@ -1,8 +1,9 @@
 //! Generated holes: is every breach told before it comes, and no other?
 //!
 //! # Theory
-//! A skull is a spherical shell with known radii, so that the truth is geometry: the burr's ball is through when it reaches below the inner table, and on the dura when
-//! it reaches the brain's sphere. Half of the hands mean to come through, half stop 0.8 to 3 mm before.
+//! A skull is a spherical shell with known radii, so that the truth is geometry: the burr's ball is
+//! through when it reaches below the inner table, and on the dura when it reaches the brain's
+//! sphere. Half of the hands mean to come through, half stop 0.8 to 3 mm before.
 //!
 //! ```text
 //!  C ·············· R - t - g  brain ·· R - t  inner table ▒▒▒▒ R  outer table      reach = |c - C| - r of the ball
@@ -14,7 +15,7 @@ use crate::suites::{Part, Scope};
 use std::sync::Arc;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
-use trepan_haptics::simulated::Hand;
+use trepan_haptics::simulated::HandModel;
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
 use trepan_link::wire::TickRecord;
 use trepan_simulator::{Program, Warning};
@@ -26,7 +27,8 @@ const EDGE_MM: f32 = 30.0;
 const WAIT_MS: (f64, f64) = (3000.0, 40_000.0);
 /// How long a hand stays that has come through, ms.
 const AFTER_MS: f64 = 1500.0;
-/// A breach that was announced and did not come is no false alarm where less bone than this was left when the hand gave up, mm.
+/// A breach that was announced and did not come is no false alarm where less bone than this was
+/// left when the hand gave up, mm.
 const ABOUT_MM: f32 = 0.5;
 /// What counts as an announcement of a breach.
 const ANNOUNCE: [Warning; 2] = [Warning::BreachSoon, Warning::BreakThrough];
@@ -42,7 +44,7 @@ struct Hole {
     outward: Vec3,
     slot: usize,
     feed_mm_s: f32,
-    grip: Hand,
+    grip: HandModel,
     /// Bone that the hand means to leave, mm; negative to come through.
     left_mm: f32,
 }
@@ -70,7 +72,7 @@ impl Hole {
             outward: Quat::from_rotation_z(turn) * Vec3::new(tilt.sin(), 0.0, tilt.cos()),
             slot: usize::from(within(0.0, 1.0) < 0.5),
             feed_mm_s: within(0.4, 3.0),
-            grip: if within(0.0, 1.0) < 0.7 { Hand::FIRM } else { Hand::LIGHT },
+            grip: if within(0.0, 1.0) < 0.7 { HandModel::FIRM } else { HandModel::LIGHT },
             left_mm: if own.is_multiple_of(2) { -2.0 } else { within(0.8, 3.0) },
         }
     }

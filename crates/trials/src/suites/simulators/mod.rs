@@ -1,4 +1,5 @@
-//! The simulators: warnings before breaches, scores that tell hands apart, flaps, replays, tumours that are felt, long sessions.
+//! The simulators: warnings before breaches, scores that tell hands apart, flaps, replays, tumours
+//! that are felt, long sessions.
 
 mod bench;
 mod brain;
@@ -20,10 +21,12 @@ const LONG_MIN: f64 = 30.0;
 /// Every part; one that could not be run is a broken promise.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let mut parts = holes::parts(scope);
-    type OnTheTable = fn(&case::Table) -> Findings;
-    let on_the_table: [(&str, OnTheTable); 3] =
+    type OnTheCase = fn(&case::CaseFixture) -> Findings;
+    let on_the_table: [(&str, OnTheCase); 3] =
         [("hands", hands::findings), ("rates", rates::findings), ("flap", flap::findings)];
-    parts.extend(on_the_table.map(|(name, found)| tried(name, move |_| case::Table::new().map(|table| found(&table)))));
+    parts.extend(
+        on_the_table.map(|(name, found)| tried(name, move |_| case::CaseFixture::new().map(|table| found(&table)))),
+    );
     parts.push(tried("brain", |_| brain::findings()));
     parts.push(tried("replays", sessions::replays));
     if !scope.quick {

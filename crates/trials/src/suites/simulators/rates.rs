@@ -1,11 +1,11 @@
 //! One operation, its ticks thinned to lower rates: are the scores the same?
 
 use super::bench::Bench;
-use super::case::Table;
+use super::case::CaseFixture;
 use super::hands::deep;
 use crate::suite::{Findings, Gate, Row};
 use trepan_haptics::script::Script;
-use trepan_haptics::simulated::Hand;
+use trepan_haptics::simulated::HandModel;
 use trepan_link::wire::TickRecord;
 use trepan_simulator::{Program, ScoreKeeper};
 
@@ -13,10 +13,10 @@ use trepan_simulator::{Program, ScoreKeeper};
 const RATES_HZ: [usize; 5] = [1000, 500, 250, 125, 60];
 
 /// A row for each rate, and the gate.
-pub fn findings(table: &Table) -> Findings {
+pub fn findings(table: &CaseFixture) -> Findings {
     let (bone, brain) = table.fresh();
     let script = Script::planned("craniotomy", &table.plan.site, 20_000.0, &deep()).expect("the site is sound");
-    let mut bench = Bench::new(Program::Craniotomy, bone, brain, None, Hand::FIRM, Box::new(script));
+    let mut bench = Bench::new(Program::Craniotomy, bone, brain, None, HandModel::FIRM, Box::new(script));
     bench.run(20_000.0, |_| false);
     let truth = scores(&bench.records);
     let mut findings = Findings::default();

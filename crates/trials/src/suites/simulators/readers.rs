@@ -1,4 +1,5 @@
-//! Can others read a recording: the `mcap` package with its schemas, and Rerun, in a throw-away Python environment.
+//! Can others read a recording: the `mcap` package with its schemas, and Rerun, in a throw-away
+//! Python environment.
 
 use super::sessions;
 use crate::python::Workshop;

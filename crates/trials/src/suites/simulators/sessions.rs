@@ -1,4 +1,5 @@
-//! Whole sessions in this process: recorded, run again, run again by other methods and meshes, and half an hour of it.
+//! Whole sessions in this process: recorded, run again, run again by other methods and meshes, and
+//! half an hour of it.
 
 use super::case;
 use crate::suite::{Findings, Gate, Row};

@@ -1,9 +1,10 @@
 //! Homogeneous deformations of a cube by every law: what holds a face, against the closed form.
 //!
 //! # Theory
-//! With principal stretches λ and Kirchhoff stress `τ_i = λ_i ∂W/∂λ_i` the force on a face is `τ/λ` times its area at rest. Simple shear of amount γ keeps the volume and needs
-//! `τ_xz = μ γ` for neo-Hookean and Mooney-Rivlin tissue, `μ γ + (λ/2 + μ) γ³` for St. Venant-Kirchhoff's; Ogden's has the principal stretches `r, 1/r` with `r - 1/r = γ`
-//! and `(τ_r - τ_1/r)/(r + 1/r)`.
+//! With principal stretches λ and Kirchhoff stress `τ_i = λ_i ∂W/∂λ_i` the force on a face is `τ/λ`
+//! times its area at rest. Simple shear of amount γ keeps the volume and needs `τ_xz = μ γ` for
+//! neo-Hookean and Mooney-Rivlin tissue, `μ γ + (λ/2 + μ) γ³` for St. Venant-Kirchhoff's; Ogden's
+//! has the principal stretches `r, 1/r` with `r - 1/r = γ` and `(τ_r - τ_1/r)/(r + 1/r)`.
 
 use crate::suite::{Findings, Gate, Row};
 use trepan_geometry::{Vec3, units};

@@ -1,7 +1,9 @@
-//! The step on the graphics device: agreement with the processor's, and what a step costs from 5 thousand tetrahedra to a million.
+//! The step on the graphics device: agreement with the processor's, and what a step costs from 5
+//! thousand tetrahedra to a million.
 //!
 //! # Practice
-//! Without any adapter it says so and judges nothing. A software driver steps the two smallest sizes only, since its times say nothing of a graphics card.
+//! Without any adapter it says so and judges nothing. A software driver steps the two smallest
+//! sizes only, since its times say nothing of a graphics card.
 
 use super::Scope;
 use crate::suite::{Findings, Gate, Row};
@@ -12,7 +14,8 @@ use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::gpu::GpuTled;
 use trepan_tled::{Config, Relaxation, Tled};
 
-/// Bytes that a step reads and writes a tetrahedron: corners and slots 32, rows 48, displacements 64, forces written and read 128; nodes are a fifth as many, 128 each.
+/// Bytes that a step reads and writes a tetrahedron: corners and slots 32, rows 48, displacements
+/// 64, forces written and read 128; nodes are a fifth as many, 128 each.
 const BYTES: f64 = 32.0 + 48.0 + 64.0 + 128.0 + 26.0;
 
 /// Every size, and agreement on the smallest.
@@ -39,10 +42,13 @@ fn gravity() -> Loads {
 }
 
 fn agreement(gpu: &Gpu, findings: &mut Findings) {
-    // Short enough that the processor never takes a substep of its own, as the device looks at its elements only between submissions.
+    // Short enough that the processor never takes a substep of its own, as the device looks at its
+    // elements only between submissions.
     let plain = Config { safety: 0.5, ..Config::default() };
-    let options =
-        [("plain", plain), ("cure and Prony", Config { cure_locking: true, relaxation: Relaxation::BRAIN, ..plain })];
+    let options = [
+        ("plain", plain),
+        ("cure and Prony", Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..plain }),
+    ];
     for (name, config) in options {
         for (law, material) in [("neo-Hookean", Material::BRAIN), ("Ogden", Material::BRAIN_OGDEN)] {
             let body = block([6, 5, 4]).with_material(material);

@@ -1,14 +1,19 @@
-//! Bending, indentation, Cook's membrane and a pressed cube, from compressible to nearly incompressible: plain elements and cured ones against the continuum.
+//! Bending, indentation, Cook's membrane and a pressed cube, from compressible to nearly
+//! incompressible: plain elements and cured ones against the continuum.
 //!
 //! # Theory
-//! What is driven by a prescribed displacement `u = d s(x)` is judged by the force that works with d, `Σ f·s` over the held nodes; what hangs, by where the middle of its free end goes.
+//! What is driven by a prescribed displacement `u = d s(x)` is judged by the force that works with
+//! d, `Σ f·s` over the held nodes; what hangs, by where the middle of its free end goes.
 //!
 //! # Practice
-//! Meshes are centred boxes, as the mesher lays them, of a size at which cured elements are right; on finer ones plain elements get right too where ν is 0.49 (Cook's membrane: 4.3 % at
-//! 24 thousand tetrahedra). Settling with masses scaled until all elements have the same bound: only rest is wanted here.
+//! Meshes are centred boxes, as the mesher lays them, of a size at which cured elements are right;
+//! on finer ones plain elements get right too where ν is 0.49 (Cook's membrane: 4.3 % at 24
+//! thousand tetrahedra). Settling with masses scaled until all elements have the same bound: only
+//! rest is wanted here.
 //!
 //! # Sources
-//! The continuum is that of `fixtures/fem/taylor_hood.py`: quadratic displacements and linear pressure, an independent code on its own meshes; the numbers of its meshes and the limit stand
+//! The continuum is that of `fixtures/fem/taylor_hood.py`: quadratic displacements and linear
+//! pressure, an independent code on its own meshes; the numbers of its meshes and the limit stand
 //! beside it.
 
 use super::{Part, Scope};
@@ -35,7 +40,8 @@ struct Scene {
     /// What is read of a body that hangs: the displacement here.
     tip: Vec3,
     tolerance_mm: f32,
-    /// Poisson's ratio, what the continuum answers (N, or mm), and the sizes of a quick and of a full run.
+    /// Poisson's ratio, what the continuum answers (N, or mm), and the sizes of a quick and of a
+    /// full run.
     truth: &'static [(f32, [f64; 3], [usize; 2])],
 }
 
@@ -162,7 +168,8 @@ fn chart(title: &str, error: &str, findings: &mut Findings) {
     });
 }
 
-/// What hangs and is less compressible than this starts from where tissue of this ν comes to rest: most of the way in a fifth of the steps.
+/// What hangs and is less compressible than this starts from where tissue of this ν comes to rest:
+/// most of the way in a fifth of the steps.
 const EASY: f32 = 0.49;
 
 /// The metric of cost.
@@ -190,15 +197,15 @@ fn off_percent(
     poisson: f32,
     truth: DVec3,
     size: usize,
-    cure_locking: bool,
+    averaged_pressure: bool,
     findings: &mut Findings,
 ) -> f64 {
     let hangs = scene.travel_mm == 0.0;
     let gravity = if hangs { Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2 } else { Vec3::ZERO };
     let (loads, start) = (Loads { gravity, ..Loads::default() }, Instant::now());
-    let (body, mut solver) = solver(scene, poisson, size, cure_locking);
+    let (body, mut solver) = solver(scene, poisson, size, averaged_pressure);
     if hangs && poisson > EASY {
-        let (easy, mut before) = self::solver(scene, EASY, size, cure_locking);
+        let (easy, mut before) = self::solver(scene, EASY, size, averaged_pressure);
         before.settle(&loads, &Settling { tolerance_mm: scene.tolerance_mm, steps: 30_000 });
         let moved = before.positions().iter().zip(&easy.mesh.positions).map(|(x, rest)| *x - *rest);
         moved.enumerate().for_each(|(n, u)| solver.set_node(n as u32, u, Vec3::ZERO));
@@ -212,7 +219,7 @@ fn off_percent(
     let (of, error_name) =
         if hangs { ("moved_mm", "displacement_error_percent") } else { ("force_n", "force_error_percent") };
     findings.rows.push(
-        Row::new(title, if cure_locking { "tled cured" } else { "tled" })
+        Row::new(title, if averaged_pressure { "tled cured" } else { "tled" })
             .with("tets", body.mesh.tets.len())
             .with("steps_to_rest", settled.steps)
             .metric("step_p50_us", times.quantile(0.5))
@@ -225,12 +232,12 @@ fn off_percent(
 }
 
 /// The body in its held state; what is driven from above starts as if it were pressed evenly.
-fn solver(scene: &Scene, poisson: f32, size: usize, cure_locking: bool) -> (Body, Tled) {
+fn solver(scene: &Scene, poisson: f32, size: usize, averaged_pressure: bool) -> (Body, Tled) {
     let mesh = (scene.mesh)(size);
     let fixed = boxes::nodes_where(&mesh, |p| (scene.held)(p).is_some());
     let material = Material::NeoHookean { young_mpa: scene.young_mpa, poisson, density_g_mm3: units::WATER_G_PER_MM3 };
     let body = Body::uniform(mesh, fixed, material);
-    let config = Config { cure_locking, mass_scaling: f32::INFINITY, ..Config::default() };
+    let config = Config { averaged_pressure, mass_scaling: f32::INFINITY, ..Config::default() };
     let mut solver = Tled::new(&body, &config).expect("the body is sound");
     if scene.travel_mm > 0.0 {
         drive(scene, &body, &mut solver);

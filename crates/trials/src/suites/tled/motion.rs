@@ -1,4 +1,5 @@
-//! Motion: the frequency of a beam, the energy of one that nothing damps, and the rest that dynamic relaxation finds.
+//! Motion: the frequency of a beam, the energy of one that nothing damps, and the rest that dynamic
+//! relaxation finds.
 
 use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
@@ -9,7 +10,8 @@ use trepan_soft::reference::{self, Reference};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Damping, Settling, Tled};
 
-/// First frequency of the beam by quadratic tetrahedra of an independent code (scikit-fem, 30×6×6 cells), Hz.
+/// First frequency of the beam by quadratic tetrahedra of an independent code (scikit-fem, 30×6×6
+/// cells), Hz.
 const CONVERGED_HZ: f64 = 1.7328;
 const BEAM_MM: Vec3 = Vec3::new(100.0, 20.0, 20.0);
 
@@ -22,7 +24,8 @@ pub fn parts() -> Vec<Part> {
     ]
 }
 
-/// Linear tetrahedra are too stiff by the square of their size: plain ones on two meshes tell the limit, cured ones on the finer one are near it.
+/// Linear tetrahedra are too stiff by the square of their size: plain ones on two meshes tell the
+/// limit, cured ones on the finer one are near it.
 fn frequency(scope: Scope, findings: &mut Findings) {
     let (coarse, fine) = scope.pick((4, 6), (6, 12));
     let split = |across: usize| boxes::split_box([5 * across, across, across], BEAM_MM);
@@ -46,10 +49,10 @@ fn frequency(scope: Scope, findings: &mut Findings) {
 }
 
 /// Frequency of the beam let go bent, undamped, Hz.
-fn swing_hz(mesh: TetMesh, cure_locking: bool, findings: &mut Findings) -> f64 {
+fn swing_hz(mesh: TetMesh, averaged_pressure: bool, findings: &mut Findings) -> f64 {
     let fixed = boxes::nodes_where(&mesh, |p| p.x < 1e-3);
     let body = Body::uniform(mesh, fixed, Material::THESIS);
-    let config = Config { damping: Damping::None, cure_locking, ..Config::default() };
+    let config = Config { damping: Damping::None, averaged_pressure, ..Config::default() };
     let mut solver = Tled::new(&body, &config).expect("the beam is sound");
     let start: Vec<Vec3> =
         body.mesh.positions.iter().map(|p| Vec3::new(0.0, 0.2, -0.2) * (p.x / 100.0).powi(2)).collect();
@@ -59,7 +62,8 @@ fn swing_hz(mesh: TetMesh, cure_locking: bool, findings: &mut Findings) -> f64 {
     while crossings.len() < 3 && time < 3000.0 {
         solver.step(&Loads::default(), dt_ms);
         time += f64::from(dt_ms);
-        // The part of the motion along the start: higher modes are small in the start and smaller by its square here.
+        // The part of the motion along the start: higher modes are small in the start and smaller
+        // by its square here.
         let parts = solver.positions().iter().zip(&body.mesh.positions).zip(&start);
         let now: f32 = parts.map(|((x, rest), along)| (*x - *rest).dot(*along)).sum();
         if before.signum() != now.signum() {
@@ -69,7 +73,7 @@ fn swing_hz(mesh: TetMesh, cure_locking: bool, findings: &mut Findings) -> f64 {
     }
     let hertz = if crossings.len() < 3 { f64::NAN } else { 1000.0 / (crossings[2] - crossings[0]) };
     findings.rows.push(
-        Row::new("clamped beam swings", if cure_locking { "tled cured" } else { "tled" })
+        Row::new("clamped beam swings", if averaged_pressure { "tled cured" } else { "tled" })
             .with("tets", body.mesh.tets.len())
             .metric("frequency_hz", hertz)
             .metric("frequency_error_percent", 100.0 * (hertz / CONVERGED_HZ - 1.0).abs()),
@@ -98,7 +102,8 @@ fn energy(findings: &mut Findings) {
         }
         solver.step(&Loads::default(), dt_ms);
         if watched {
-            // Velocities live half a step away: the mean of two is the one at the positions between them.
+            // Velocities live half a step away: the mean of two is the one at the positions between
+            // them.
             let moved = solver.positions().iter().zip(solver.velocities());
             let earlier: Vec<Vec3> = moved.map(|(x, v)| *x - *v * dt_ms).collect();
             let middle: Vec<Vec3> = before.iter().zip(solver.velocities()).map(|(a, b)| (*a + *b) * 0.5).collect();
@@ -122,7 +127,8 @@ fn elastic(body: &Body, positions: &[Vec3]) -> f64 {
     (0..body.mesh.tets.len()).map(of).sum()
 }
 
-/// Sag under gravity and the shift of a turned head, by dynamic relaxation, against the static reference.
+/// Sag under gravity and the shift of a turned head, by dynamic relaxation, against the static
+/// reference.
 fn relaxation(findings: &mut Findings) {
     let mesh = boxes::split_box([6, 6, 6], Vec3::splat(60.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);

@@ -1,8 +1,11 @@
-//! Only what moves is stepped: a tool dents one corner of a large block, and elements whose nodes rest fall asleep. What that saves, and how wrong it is.
+//! Only what moves is stepped: a tool dents one corner of a large block, and elements whose nodes
+//! rest fall asleep. What that saves, and how wrong it is.
 //!
 //! # Theory
-//! What creeps more slowly than the limit of motion ([`Config::still_mm`]) in 50 ms is stopped where it is; the error is the largest distance from the block with every element stepped, at any
-//! time, as a share of the dent. What is saved is counted in elements, which no busy machine changes.
+//! What creeps more slowly than the limit of motion ([`Config::still_mm`]) in 50 ms is stopped
+//! where it is; the error is the largest distance from the block with every element stepped, at any
+//! time, as a share of the dent. What is saved is counted in elements, which no busy machine
+//! changes.
 
 use super::Scope;
 use crate::picture::{Chart, Mark};

@@ -1,8 +1,10 @@
 //! Every solver under the conditions in which solvers of its kind give way.
 //!
 //! # Practice
-//! A cube of 40 mm of brain on its base, a second of simulated time. Each solver takes its own stable step, at most 4 ms, or the multiple of it that the condition says. Works: rests where it should
-//! without a node put back or held; degrades: usable, with that drawback; fails: bursts, shakes or leaves numbers that are none.
+//! A cube of 40 mm of brain on its base, a second of simulated time. Each solver takes its own
+//! stable step, at most 4 ms, or the multiple of it that the condition says. Works: rests where it
+//! should without a node put back or held; degrades: usable, with that drawback; fails: bursts,
+//! shakes or leaves numbers that are none.
 
 use super::stability::{cube, offset};
 use crate::conditions;
@@ -33,7 +35,7 @@ impl Solver {
     fn build(&self, body: &Body) -> Box<dyn SoftSolver> {
         match self {
             Self::Tled { cured } => {
-                let config = Config { cure_locking: *cured, ..Config::default() };
+                let config = Config { averaged_pressure: *cured, ..Config::default() };
                 Box::new(Tled::new(body, &config).expect("the cube is sound"))
             }
             Self::Rival(method) => method.build(body).expect("the cube is sound"),
@@ -147,7 +149,8 @@ fn endured(of: &Solver, body: &Body, loads: &Loads, step_share: f32, most_mm: f6
     }
 }
 
-/// A plate comes down to a depth at a speed, mm/ms, stays for half a second, and is gone: back at rest two seconds later.
+/// A plate comes down to a depth at a speed, mm/ms, stays for half a second, and is gone: back at
+/// rest two seconds later.
 fn let_go(of: &Solver, depth_mm: f32, speed: f32) -> Outcome {
     let body = brain();
     let mut solver = of.build(&body);

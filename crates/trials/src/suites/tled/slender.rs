@@ -1,7 +1,9 @@
-//! A long thin cylinder, clamped level at one end, hangs under its own weight: against the elastica.
+//! A long thin cylinder, clamped level at one end, hangs under its own weight: against the
+//! elastica.
 //!
 //! # Theory
-//! `E I θ'' = -ρ g A (L - s) cos θ`, θ(0) = 0, θ'(L) = 0; shear and stretch, which it leaves out, are of the order `(r/L)²`. I and A are those of the mesh, whose section is a polygon.
+//! `E I θ'' = -ρ g A (L - s) cos θ`, θ(0) = 0, θ'(L) = 0; shear and stretch, which it leaves out,
+//! are of the order `(r/L)²`. I and A are those of the mesh, whose section is a polygon.
 
 use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
@@ -47,7 +49,8 @@ fn gravity() -> Loads {
     Loads { gravity: Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2, ..Loads::default() }
 }
 
-/// The cylinder along x and the node at the middle of its free end; squares of the section become rings.
+/// The cylinder along x and the node at the middle of its free end; squares of the section become
+/// rings.
 fn cylinder(across: usize, count: usize) -> (Body, usize) {
     let mut mesh = boxes::split_box([count, across, across], Vec3::new(LENGTH_MM, 2.0, 2.0));
     for p in &mut mesh.positions {
@@ -97,7 +100,8 @@ fn elastica(body: &Body) -> (f64, f64) {
     shoot(low, weight / bending, length).0
 }
 
-/// The rod that leaves its clamp with the curvature `bend`: its free end, and the curvature there, which should be none.
+/// The rod that leaves its clamp with the curvature `bend`: its free end, and the curvature there,
+/// which should be none.
 fn shoot(bend: f64, load: f64, length: f64) -> ((f64, f64), f64) {
     let steps = 2000;
     let h = length / f64::from(steps);

@@ -1,4 +1,5 @@
-//! What a step costs, as ratios in one run: kernels and options, an element over the size of the mesh, and more threads than a loaded machine has cores for.
+//! What a step costs, as ratios in one run: kernels and options, an element over the size of the
+//! mesh, and more threads than a loaded machine has cores for.
 
 use super::{Part, Scope};
 use crate::suite::{Findings, Gate, Row};
@@ -39,7 +40,8 @@ fn prepared(name: impl Into<String>, body: &Body, config: &Config) -> Run {
     Run { name: name.into(), solver, tets: body.mesh.tets.len(), best_us: f64::INFINITY }
 }
 
-/// Round by round, so that a busy moment of the machine hits all alike; the best of each is compared.
+/// Round by round, so that a busy moment of the machine hits all alike; the best of each is
+/// compared.
 fn race(runs: &mut [Run], rounds: usize) {
     for _ in 0..rounds {
         for run in runs.iter_mut() {
@@ -81,7 +83,8 @@ fn kernels(scope: Scope, findings: &mut Findings) {
         }
     }
     let both = best_of("+cure+Prony").unwrap_or(f64::NAN) / plain;
-    // 1.27 to 1.75 by how the memory of one process happens to lie; 2.06 was seen beside another process.
+    // 1.27 to 1.75 by how the memory of one process happens to lie; 2.06 was seen beside another
+    // process.
     findings.gates.push(Gate::at_most(format!("{scene}: cure and Prony over the plain step"), both, 2.5));
 }
 
@@ -99,9 +102,9 @@ fn configs() -> Vec<(&'static str, Config)> {
     configs.extend([
         ("two threads", Config { threads: 2, ..plain }),
         ("avx2, two threads", Config { threads: 2, kernel: Kernel::Avx2, ..plain }),
-        ("+cure", Config { cure_locking: true, ..plain }),
+        ("+cure", Config { averaged_pressure: true, ..plain }),
         ("+Prony", Config { relaxation: Relaxation::BRAIN, ..plain }),
-        ("+cure+Prony", Config { cure_locking: true, relaxation: Relaxation::BRAIN, ..plain }),
+        ("+cure+Prony", Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..plain }),
     ]);
     configs.retain(|(_, config)| config.kernel.runs_here());
     configs
@@ -118,7 +121,8 @@ fn sizes(scope: Scope, findings: &mut Findings) {
     findings.gates.push(Gate::at_most("cost of an element, 5 to 80 thousand: dearest over cheapest", high / low, 1.3));
 }
 
-/// Four threads beside one busy thread a core: the mean step must not be dearer than that of one thread on the same loaded machine.
+/// Four threads beside one busy thread a core: the mean step must not be dearer than that of one
+/// thread on the same loaded machine.
 fn loaded(scope: Scope, findings: &mut Findings) {
     let body = block(BRAIN);
     let mut runs = [1usize, 4].map(|threads| {

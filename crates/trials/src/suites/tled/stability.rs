@@ -1,4 +1,5 @@
-//! Where solvers of this kind fail: the border, method by method, and what the recommended one does there.
+//! Where solvers of this kind fail: the border, method by method, and what the recommended one does
+//! there.
 
 use super::{Part, Scope};
 use crate::picture::{Map, Outcome};
@@ -81,7 +82,8 @@ fn noise(i: usize) -> f32 {
     ((i as f32 * 12.9898).sin() * 43758.547).fract()
 }
 
-/// Steps of 0.5 to 2 times the true bound, obeyed and guarded: does a kicked undamped block stay as it should?
+/// Steps of 0.5 to 2 times the true bound, obeyed and guarded: does a kicked undamped block stay as
+/// it should?
 fn step_length(findings: &mut Findings) {
     let body = cube(4, Material::BRAIN);
     for share in [0.5f32, 0.9, 0.99, 1.05, 1.5, 2.0] {
@@ -104,14 +106,15 @@ fn step_length(findings: &mut Findings) {
     }
 }
 
-/// Ever less compressible tissue under gravity: both elements stay stable, the cured one keeps its volume.
+/// Ever less compressible tissue under gravity: both elements stay stable, the cured one keeps its
+/// volume.
 fn incompressible(findings: &mut Findings) {
     for poisson in [0.3f32, 0.45, 0.49, 0.499, 0.4999] {
         let material = Material::NeoHookean { young_mpa: 0.003, poisson, density_g_mm3: units::WATER_G_PER_MM3 };
         let body = cube(4, material);
         let loads = Loads { gravity: Vec3::X * units::GRAVITY_MM_PER_MS2, ..Loads::default() };
-        for (method, cure_locking) in [("plain", false), ("cured", true)] {
-            let mut solver = solver(&body, Config { cure_locking, ..Config::default() });
+        for (method, averaged_pressure) in [("plain", false), ("cured", true)] {
+            let mut solver = solver(&body, Config { averaged_pressure, ..Config::default() });
             let settled = solver.settle(&loads, &Settling { tolerance_mm: 0.05, ..Settling::default() });
             let moved = offset(&solver, &body);
             verdict(format!("gravity, ν {poisson}"), method, settled.converged, true, ("moved_mm", moved), findings);
@@ -119,7 +122,8 @@ fn incompressible(findings: &mut Findings) {
     }
 }
 
-/// A block squeezed or drawn to a multiple of its height, then let go: back at rest after a second, or said to have been turned over or held on the way.
+/// A block squeezed or drawn to a multiple of its height, then let go: back at rest after a second,
+/// or said to have been turned over or held on the way.
 fn stretched(findings: &mut Findings) {
     for stretch in [0.05f32, 0.1, 0.5, 2.0, 5.0] {
         let kirchhoff = Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 };
@@ -146,7 +150,8 @@ fn stretched(findings: &mut Findings) {
     }
 }
 
-/// One second of simulated time; gives how far from rest it ends and how often something was reported on the way.
+/// One second of simulated time; gives how far from rest it ends and how often something was
+/// reported on the way.
 fn released(solver: &mut Tled, body: &Body) -> (f64, u32) {
     let (dt_ms, mut reported) = (0.5 * solver.stable_dt_ms(), 0u32);
     for _ in 0..(1000.0 / dt_ms) as usize {
@@ -238,11 +243,12 @@ fn stiffness_jump(findings: &mut Findings) {
             body.material_of_tet[tet] = u8::from((middle - Vec3::splat(20.0)).abs().max_element() < 7.0);
         }
         let loads = Loads { gravity: Vec3::X * units::GRAVITY_MM_PER_MS2, ..Loads::default() };
-        for (method, cure_locking) in [("plain", false), ("cured", true)] {
-            let mut solver = solver(&body, Config { cure_locking, ..Config::default() });
+        for (method, averaged_pressure) in [("plain", false), ("cured", true)] {
+            let mut solver = solver(&body, Config { averaged_pressure, ..Config::default() });
             let settled = solver.settle(&loads, &Settling { tolerance_mm: 0.02, steps: 10_000 });
             let scene = format!("stiffness jump 1:{ratio}");
-            // At 1:1000 ten thousand steps are too few for rest, and `converged` says so; what must not happen is that it bursts.
+            // At 1:1000 ten thousand steps are too few for rest, and `converged` says so; what must
+            // not happen is that it bursts.
             let sound = settled.last.inverted + settled.last.non_finite + settled.last.limited == 0;
             let held = sound && (settled.converged || ratio > 100.0) && offset(&solver, &body) < 40.0;
             verdict(scene, method, held, true, ("left_mm", f64::from(settled.left_mm)), findings);
@@ -250,7 +256,8 @@ fn stiffness_jump(findings: &mut Findings) {
     }
 }
 
-/// A node moved nearly onto its neighbour: the bound falls, the solver keeps to it, a hundredth of mass wins some of it back.
+/// A node moved nearly onto its neighbour: the bound falls, the solver keeps to it, a hundredth of
+/// mass wins some of it back.
 fn slivers(findings: &mut Findings) {
     for height_mm in [5.0f32, 1.0, 0.1] {
         let mut body = cube(4, Material::BRAIN);
@@ -271,8 +278,9 @@ fn slivers(findings: &mut Findings) {
     }
 }
 
-/// Settings at the ends of their ranges: a block that gravity pulls sideways all at once must neither burst nor swing for ever. At rest it
-/// hangs by 12 mm; a start without damping, or half the stiffness relaxed away, doubles that.
+/// Settings at the ends of their ranges: a block that gravity pulls sideways all at once must
+/// neither burst nor swing for ever. At rest it hangs by 12 mm; a start without damping, or half
+/// the stiffness relaxed away, doubles that.
 fn extremes(findings: &mut Findings) {
     let relaxing = |time_ms| Relaxation { share: [0.5, 0.0], time_ms: [time_ms, 1.0] };
     let damped = |share| Config { damping: Damping::Critical(share), ..Config::default() };
@@ -310,7 +318,8 @@ fn ogden(exponent: f32) -> Material {
     Material::Ogden { shear_mpa: [1.03e-3, 0.0], exponent: [exponent, 1.0], poisson: 0.45, density_g_mm3: 1e-3 }
 }
 
-/// Very many steps of a body that swings undamped and one that rests: f32 must not carry either away.
+/// Very many steps of a body that swings undamped and one that rests: f32 must not carry either
+/// away.
 fn drift(scope: Scope, findings: &mut Findings) {
     let body = cube(2, Material::BRAIN);
     let steps = scope.pick(200_000, 10_000_000);

@@ -1,4 +1,5 @@
-//! Real image files against what is written beside them: size, spacing, orientation and value range.
+//! Real image files against what is written beside them: size, spacing, orientation and value
+//! range.
 
 use super::super::Scope;
 use super::data_folder;
@@ -138,7 +139,8 @@ fn values_of(entry: &Value) -> Vec<(DVec3, f64)> {
     values.filter_map(|(key, value)| Some((voxel(key)?, value.as_f64()?))).collect()
 }
 
-/// Whether the values stand in the volume where the affine puts their voxels; those that lie outside it do not count.
+/// Whether the values stand in the volume where the affine puts their voxels; those that lie
+/// outside it do not count.
 fn holds(volume: &VoxelVolume<f32>, affine: DAffine3, values: &[(DVec3, f64)]) -> bool {
     let voxel_from_expected = volume.world_from_voxel.inverse() * affine;
     let mut seen = 0;
@@ -168,7 +170,8 @@ fn odd_nifti(folder: &Path) -> (usize, usize) {
             continue;
         }
         tried += 1;
-        // A file without sform and qform has no place in the world, and expected.json gives another program's guess: voxels only.
+        // A file without sform and qform has no place in the world, and expected.json gives another
+        // program's guess: voxels only.
         let placed = ["sform_code", "qform_code"].iter().any(|code| entry[code].as_i64() != Some(0));
         let place = |volume: &VoxelVolume<f32>| if placed { affine } else { volume.world_from_voxel };
         if !read(&folder.join(name)).is_ok_and(|volume| holds(&volume, place(&volume), &values)) {

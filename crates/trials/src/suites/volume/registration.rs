@@ -11,10 +11,12 @@ use trepan_volume::{Grid, Interpolation, RegistrationConfig, VoxelVolume, regist
 /// A move counts as recovered within these, mm and degrees.
 const RIGHT: (f64, f64) = (1.0, 1.0);
 
-/// An accepted answer further off than this is a wrong one, mm and degrees. The thick pair's voxels are 4 mm high.
+/// An accepted answer further off than this is a wrong one, mm and degrees. The thick pair's voxels
+/// are 4 mm high.
 const BOUND: (f64, f64) = (3.0, 3.0);
 
-/// Random moves of up to 20° and 30 mm, each onto its own turned grid with its own grey values and noise.
+/// Random moves of up to 20° and 30 mm, each onto its own turned grid with its own grey values and
+/// noise.
 pub fn mri(scope: Scope, findings: &mut Findings) {
     let trials = scope.pick(4, 100);
     let still = image(&case_head().mri);
@@ -78,8 +80,9 @@ pub(super) fn scanned_again(still: &VoxelVolume<f32>, known: DAffine3, random: &
     moving
 }
 
-/// Moves of one patient's MRI against the CT, as delivered (with the reference registration as truth) and as resampled onto the
-/// CT, with its padding; and, which must be refused, of another patient's.
+/// Moves of one patient's MRI against the CT, as delivered (with the reference registration as
+/// truth) and as resampled onto the CT, with its padding; and, which must be refused, of another
+/// patient's.
 pub fn ct(scope: Scope, findings: &mut Findings) {
     let Some(data) = data_folder() else { return };
     let pair = data.join("ct-mri-pair-thick");

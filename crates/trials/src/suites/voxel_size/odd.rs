@@ -1,4 +1,5 @@
-//! Scenes that no rule was made for: what each rule says of them, and whether a grid of that size can be built and is near the best.
+//! Scenes that no rule was made for: what each rule says of them, and whether a grid of that size
+//! can be built and is near the best.
 
 use super::{OURS, RULES};
 use crate::conditions;

@@ -1,4 +1,5 @@
-//! One pass of a hashed uniform grid, to be timed: particles sorted into cells, boxes looking through the cells they cover (Teschner et al. 2003).
+//! One pass of a hashed uniform grid, to be timed: particles sorted into cells, boxes looking
+//! through the cells they cover (Teschner et al. 2003).
 
 use glam::DVec3;
 use trepan_geometry::{Aabb, Vec3};
@@ -83,7 +84,8 @@ impl HashedGrid {
     }
 }
 
-/// `floor((p + offset) / cell)`, without the library's floor: a call for each coordinate took longer than the visits.
+/// `floor((p + offset) / cell)`, without the library's floor: a call for each coordinate took
+/// longer than the visits.
 #[inline]
 fn cell_of(p: Vec3, cell_mm: f64, offset: DVec3) -> [i32; 3] {
     ((p.as_dvec3() + offset) / cell_mm).to_array().map(|x| {
@@ -96,8 +98,9 @@ fn key(cell: [i32; 3]) -> u64 {
     cell.iter().fold(0, |key, &n| key << 21 | (n as u64 & 0x1F_FFFF))
 }
 
-/// Bucket of a cell, of a power of two of them, by Knuth's multiplication. Teschner's xor of three products leaves most of such a table empty when
-/// particles lie on a lattice: all that meet in a bucket are then looked at in vain.
+/// Bucket of a cell, of a power of two of them, by Knuth's multiplication. Teschner's xor of three
+/// products leaves most of such a table empty when particles lie on a lattice: all that meet in a
+/// bucket are then looked at in vain.
 fn hash(cell: [i32; 3], buckets: usize) -> usize {
     (key(cell).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (u64::BITS - buckets.trailing_zeros())) as usize
 }

@@ -1,8 +1,10 @@
-//! Times of a grid's passes that a busy machine does not spoil: the least of many, in turn, slice by slice.
+//! Times of a grid's passes that a busy machine does not spoil: the least of many, in turn, slice
+//! by slice.
 //!
 //! # Practice
-//! A pass is timed in slices of some 50 us, each far shorter than the turns in which a busy machine shares its cores out; the least time of every
-//! slice over all rounds counts, and a pass takes their sum.
+//! A pass is timed in slices of some 50 us, each far shorter than the turns in which a busy machine
+//! shares its cores out; the least time of every slice over all rounds counts, and a pass takes
+//! their sum.
 
 use super::pass::HashedGrid;
 use super::scene::Scene;
@@ -43,9 +45,11 @@ impl Least {
     }
 }
 
-/// Rounds over all sizes, so that a slow moment of the machine meets every size, until the halves agree or `most` are done.
+/// Rounds over all sizes, so that a slow moment of the machine meets every size, until the halves
+/// agree or `most` are done.
 ///
-/// `calibration` gets a round in each, so that prices and times are of the same moments of the machine.
+/// `calibration` gets a round in each, so that prices and times are of the same moments of the
+/// machine.
 pub fn least(scene: &Scene, cells: &[f64], calibration: &mut Calibration, most: usize) -> Least {
     let mut random = fastrand::Rng::with_seed(23);
     let places: [DVec3; PLACEMENTS] = std::array::from_fn(|_| DVec3::new(random.f64(), random.f64(), random.f64()));
@@ -73,7 +77,8 @@ pub fn least(scene: &Scene, cells: &[f64], calibration: &mut Calibration, most: 
     }
 }
 
-/// The least times of a pass so far, µs: of sorting the particles, then of every slice of the boxes.
+/// The least times of a pass so far, µs: of sorting the particles, then of every slice of the
+/// boxes.
 #[derive(Clone, Debug, Default)]
 struct Slices(Vec<f64>);
 
@@ -99,7 +104,8 @@ impl Slices {
     }
 }
 
-/// Passes of a sample of the boxes at a few sizes; the least time counts, against the work that was really done.
+/// Passes of a sample of the boxes at a few sizes; the least time counts, against the work that was
+/// really done.
 pub struct Calibration<'a> {
     scene: &'a Scene,
     sample: Vec<Aabb>,
@@ -125,8 +131,9 @@ impl<'a> Calibration<'a> {
         calibration
     }
 
-    /// Times more sizes, and says which of these is the cheapest: what no model knows, such as a lattice that the cells fit, is seen here. The sample says how far
-    /// off the model is at a size, the model what a whole pass does there.
+    /// Times more sizes, and says which of these is the cheapest: what no model knows, such as a
+    /// lattice that the cells fit, is seen here. The sample says how far off the model is at a
+    /// size, the model what a whole pass does there.
     pub fn cheapest_of(&mut self, cells: &[f64], of_all: &Expected) -> Option<f64> {
         let known = self.sizes.len();
         self.time(cells.iter().copied());
@@ -178,7 +185,8 @@ impl<'a> Calibration<'a> {
     }
 }
 
-/// Runs of neighbours, half of them from where the particles are, spread evenly: single boxes would find neither caches nor branches as a whole pass does.
+/// Runs of neighbours, half of them from where the particles are, spread evenly: single boxes would
+/// find neither caches nor branches as a whole pass does.
 fn sample(scene: &Scene) -> Vec<Aabb> {
     let touched = Aabb::of_points(&scene.particles);
     let is_near = |run: &&[Aabb]| run.iter().any(|b| b.overlaps(touched));

@@ -1,7 +1,8 @@
 //! JPEG with losses, 8 bits a pixel, decoded by the crate zune-jpeg.
 //!
 //! # Practice
-//! Size, components and precision are looked at before anything is decoded. A panic of the decoder on a damaged stream becomes an error.
+//! Size, components and precision are looked at before anything is decoded. A panic of the decoder
+//! on a damaged stream becomes an error.
 //!
 //! # When not to use it
 //! For JPEG extended with 12 bits a pixel, which is refused by name: no kept crate decodes it.

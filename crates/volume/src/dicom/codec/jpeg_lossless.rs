@@ -1,9 +1,10 @@
-//! Lossless JPEG: each pixel is predicted from its neighbours, and the differences are Huffman coded.
+//! Lossless JPEG: each pixel is predicted from its neighbours, and the differences are Huffman
+//! coded.
 //!
 //! # Theory
-//! ITU-T T.81 annex H. With a left, b above, c above left, the predictors 1 to 7 are a, b, c, a + b - c, a + (b - c)/2, b + (a - c)/2,
-//! (a + b)/2; the first row takes a, the first column b, the first pixel half the range. A code gives the number of bits of the
-//! difference, which follow it.
+//! ITU-T T.81 annex H. With a left, b above, c above left, the predictors 1 to 7 are a, b, c, a +
+//! b - c, a + (b - c)/2, b + (a - c)/2, (a + b)/2; the first row takes a, the first column b, the
+//! first pixel half the range. A code gives the number of bits of the difference, which follow it.
 
 use super::marker::{Segments, frame};
 use super::{CodecError, Size};
@@ -227,7 +228,8 @@ mod tests {
         }
     }
 
-    /// Encodes with a table in which the number of bits is its own 5-bit code, all predictors, and restarts every row where asked.
+    /// Encodes with a table in which the number of bits is its own 5-bit code, all predictors, and
+    /// restarts every row where asked.
     fn encoded(pixels: &[u16], columns: usize, predictor: u8, restart: bool) -> Vec<u8> {
         let rows = pixels.len() / columns;
         let mut out = vec![0xff, 0xd8, 0xff, 0xc4, 0, 19 + 17, 0];

@@ -1,12 +1,13 @@
 //! JPEG-LS, lossless and near-lossless: prediction with learnt corrections, Golomb codes, runs.
 //!
 //! # Theory
-//! ITU-T T.87. With a left, b above, c above left, d above right: where the three gradients d - b, b - c, c - a are all small, a run of a
-//! follows; else they choose one of 365 contexts, which corrects the median predictor and sets the Golomb parameter k, the
-//! least with `N · 2ᵏ ≥ A`.
+//! ITU-T T.87. With a left, b above, c above left, d above right: where the three gradients d - b,
+//! b - c, c - a are all small, a run of a follows; else they choose one of 365 contexts, which
+//! corrects the median predictor and sets the Golomb parameter k, the least with `N · 2ᵏ ≥ A`.
 //!
 //! # Sources
-//! M. Weinberger, G. Seroussi, G. Sapiro, "The LOCO-I lossless image compression algorithm", IEEE TIP 9, 2000; ITU-T T.87.
+//! M. Weinberger, G. Seroussi, G. Sapiro, "The LOCO-I lossless image compression algorithm", IEEE
+//! TIP 9, 2000; ITU-T T.87.
 
 use super::marker::{Segments, frame};
 use super::{CodecError, Size};
@@ -209,7 +210,8 @@ impl Coder {
         wrapped.clamp(0, self.greatest)
     }
 
-    /// A run of the left neighbour's value and the pixel that breaks it; returns where the row goes on.
+    /// A run of the left neighbour's value and the pixel that breaks it; returns where the row goes
+    /// on.
     fn run(&mut self, bits: &mut Bits, above: &[i32], row: &mut [i32], start: usize) -> Option<usize> {
         let (value, end) = (row[start - 1], row.len() - 1);
         let mut at = start;
@@ -318,7 +320,8 @@ impl<'a> Bits<'a> {
         Some(value as u32)
     }
 
-    /// A Golomb code whose unary part ends at `limit - bits - 1`; after that the number less one stands plainly in `bits`.
+    /// A Golomb code whose unary part ends at `limit - bits - 1`; after that the number less one
+    /// stands plainly in `bits`.
     fn golomb(&mut self, k: u32, limit: u32, bits: u32) -> Option<i32> {
         let longest = limit.checked_sub(bits + 1)?;
         let mut zeros = 0;

@@ -1,4 +1,5 @@
-//! Compressed pictures, one file per compression. Each decoder gives the stored numbers of one frame, row after row.
+//! Compressed pictures, one file per compression. Each decoder gives the stored numbers of one
+//! frame, row after row.
 
 pub(super) mod jpeg;
 pub(super) mod jpeg_2000;
@@ -7,7 +8,8 @@ pub(super) mod jpeg_ls;
 mod marker;
 pub(super) mod rle;
 
-/// Rows and columns that a file announces, and its stream must have: looked at before anything is decoded.
+/// Rows and columns that a file announces, and its stream must have: looked at before anything is
+/// decoded.
 pub(in crate::dicom) type Size = (usize, usize);
 
 /// Most pixels that a compressed frame may claim.

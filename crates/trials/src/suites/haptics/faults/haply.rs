@@ -14,7 +14,8 @@ const TICK: Duration = Duration::from_millis(1);
 /// Longest wait for the answer to a tick.
 const PATIENCE: Duration = Duration::from_millis(2);
 
-/// A device in a loop that runs as fast as the service answers, until the fault begins; then once a millisecond.
+/// A device in a loop that runs as fast as the service answers, until the fault begins; then once a
+/// millisecond.
 struct Inverse {
     service: Service,
     hand: Loop<Haply>,

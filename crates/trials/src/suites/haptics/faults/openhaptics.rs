@@ -8,7 +8,8 @@ use trepan_haptics::{DeviceError, Fault, HapticDevice};
 
 const DRIVER: &str = "openhaptics";
 
-/// The first device in a loop, a second one beside it, and the library whose servo ticks after each tick of the loop.
+/// The first device in a loop, a second one beside it, and the library whose servo ticks after each
+/// tick of the loop.
 struct Touch {
     library: Library,
     hand: Loop<OpenHaptics>,

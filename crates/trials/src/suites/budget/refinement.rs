@@ -1,7 +1,9 @@
-//! What a mesh that is finer at the opening would give: TLED with edges halved there none, one and two times, with and without the cure of locking, in pushes of the judged kind.
+//! What a mesh that is finer at the opening would give: TLED with edges halved there none, one and
+//! two times, with and without the cure of locking, in pushes of the judged kind.
 //!
 //! # Theory
-//! Cost is that of the step that the mesh really allows, on the machine for which choices are priced; the cure's as a ratio in one run.
+//! Cost is that of the step that the mesh really allows, on the machine for which choices are
+//! priced; the cure's as a ratio in one run.
 //!
 //! The truth is held against a mesh with half of its edges under the tool.
 //!

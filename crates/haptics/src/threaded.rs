@@ -5,12 +5,14 @@
 //!   haptic loop: read() <──news── thread: apply, read ── device
 //!                apply() ──wish──>
 //! ```
-//! Both pass through triple buffers: neither side waits. That costs one tick of delay, which the capabilities tell.
+//! Both pass through triple buffers: neither side waits. That costs one tick of delay, which the
+//! capabilities tell.
 //!
 //! # Practice
-//! For the second hand, whose link must not hold up the first one's tick. `apply` wakes the thread. A loop that falls silent leaves the
-//! device without calls, which its driver answers by cutting the force. A device that hangs for 50 ms is lost. Closing waits for the
-//! call that the device is in.
+//! For the second hand, whose link must not hold up the first one's tick. `apply` wakes the thread.
+//! A loop that falls silent leaves the device without calls, which its driver answers by cutting
+//! the force. A device that hangs for 50 ms is lost. Closing waits for the call that the device is
+//! in.
 //!
 //! # When not to use it
 //! For the only device, and for scripts: they do not wait.
@@ -27,10 +29,10 @@ use triple_buffer::{Input, Output, triple_buffer};
 const LOST_MS: f64 = 50.0;
 
 /// A device, seen from the loop.
-pub struct Aside {
+pub struct ThreadedDevice {
     capabilities: Capabilities,
     news: Output<News>,
-    wishes: Input<Wish>,
+    wishes: Input<Command>,
     closing: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     number: u64,
@@ -47,19 +49,19 @@ struct News {
 }
 
 #[derive(Clone, Copy, Default)]
-struct Wish {
+struct Command {
     number: u64,
     time_ms: f64,
     wrench: GuardedWrench,
 }
 
-impl Aside {
+impl ThreadedDevice {
     /// Takes the device to a thread.
     pub fn new(mut device: Box<dyn HapticDevice>) -> Self {
         let capabilities = device.capabilities();
         let last = Reading { status: Status::Stale, ..device.read(0.0) };
         let (news_in, news) = triple_buffer(&News { number: 0, reading: last });
-        let (wishes, wishes_out) = triple_buffer(&Wish::default());
+        let (wishes, wishes_out) = triple_buffer(&Command::default());
         let closing = Arc::new(AtomicBool::new(false));
         let ends = closing.clone();
         let thread = thread::spawn(move || serve(device, news_in, wishes_out, &ends));
@@ -79,7 +81,7 @@ impl Aside {
 }
 
 /// The thread: every wish is applied and answered by a reading; at the end no force is left.
-fn serve(device: Box<dyn HapticDevice>, mut news: Input<News>, mut wishes: Output<Wish>, closing: &AtomicBool) {
+fn serve(device: Box<dyn HapticDevice>, mut news: Input<News>, mut wishes: Output<Command>, closing: &AtomicBool) {
     let mut device = Closing(device);
     let mut last = 0;
     while !closing.load(Ordering::Acquire) {
@@ -104,7 +106,7 @@ impl Drop for Closing {
     }
 }
 
-impl HapticDevice for Aside {
+impl HapticDevice for ThreadedDevice {
     fn read(&mut self, time_ms: f64) -> Reading {
         if self.fresh_ms.is_nan() {
             self.fresh_ms = time_ms;
@@ -125,7 +127,7 @@ impl HapticDevice for Aside {
     fn apply(&mut self, wrench: GuardedWrench) {
         let Some(thread) = &self.thread else { return };
         self.number += 1;
-        self.wishes.write(Wish { number: self.number, time_ms: self.time_ms, wrench });
+        self.wishes.write(Command { number: self.number, time_ms: self.time_ms, wrench });
         thread.thread().unpark();
     }
 
@@ -143,7 +145,7 @@ impl HapticDevice for Aside {
     }
 }
 
-impl Drop for Aside {
+impl Drop for ThreadedDevice {
     fn drop(&mut self) {
         self.close();
     }
@@ -188,9 +190,9 @@ mod tests {
         }
     }
 
-    fn pair() -> (Arc<Mutex<Seen>>, Aside) {
+    fn pair() -> (Arc<Mutex<Seen>>, ThreadedDevice) {
         let seen = Arc::new(Mutex::new(Seen::default()));
-        (seen.clone(), Aside::new(Box::new(Bench(seen))))
+        (seen.clone(), ThreadedDevice::new(Box::new(Bench(seen))))
     }
 
     fn newton() -> GuardedWrench {
@@ -199,7 +201,7 @@ mod tests {
     }
 
     /// Ticks until a reading has a status; waiting in vain fails.
-    fn until(device: &mut Aside, from_ms: f64, status: Status) -> f64 {
+    fn until(device: &mut ThreadedDevice, from_ms: f64, status: Status) -> f64 {
         for tick in 0..5000 {
             let time_ms = from_ms + f64::from(tick);
             let reading = device.read(time_ms);

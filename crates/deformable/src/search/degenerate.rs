@@ -1,25 +1,28 @@
-//! The tetrahedra that lie inside out, are flat, or have a corner that is nowhere: known by number, looked for in turn.
+//! The tetrahedra that lie inside out, are flat, or have a corner that is nowhere: known by number,
+//! looked for in turn.
 //!
 //! # Theory
-//! A sheet of tissue that is folded over itself can hide from a search that begins at the border. But wherever a fold covers a point both upright
-//! and inside out, one of its tetrahedra there has no positive volume; who knows these misses nothing (`walk.rs`).
+//! A sheet of tissue that is folded over itself can hide from a search that begins at the border.
+//! But wherever a fold covers a point both upright and inside out, one of its tetrahedra there has
+//! no positive volume; who knows these misses nothing (`walk.rs`).
 //!
 //! # Practice
-//! Small meshes are looked at whole at every step. In larger ones [`SLICE`] tetrahedra are looked at in each step, and in a step that finds a new unsound one,
-//! or that is told of an alarm, up to [`MOST`]: 400 us. So an unsound tetrahedron that comes alone far from the tool is known after tetrahedra / SLICE steps at the
-//! latest; one that the tool's points meet, at once.
+//! Small meshes are looked at whole at every step. In larger ones [`SLICE`] tetrahedra are looked
+//! at in each step, and in a step that finds a new degenerate one, or that is told of an alarm, up
+//! to [`MOST`]: 400 us. So an degenerate tetrahedron that comes alone far from the tool is known
+//! after tetrahedra / SLICE steps at the latest; one that the tool's points meet, at once.
 
 use super::flood::passage;
 use crate::{extent::Extent, narrow::is_sound, scene::Scene};
 
-/// Known unsound tetrahedra with their boxes.
-pub(crate) struct Unsound {
+/// Known degenerate tetrahedra with their boxes.
+pub(crate) struct Degenerate {
     known: Vec<(u32, Extent)>,
     is_known: Vec<bool>,
     next: u32,
     /// Tetrahedra that are to be looked at before the turn is slow again.
     urgent: u32,
-    /// Unsound tetrahedra that did not fit in this step.
+    /// Degenerate tetrahedra that did not fit in this step.
     pub overflow: u32,
 }
 
@@ -29,10 +32,10 @@ const SLICE: u32 = 64;
 const SMALL: u32 = 2_048;
 /// Tetrahedra looked at in an urgent step.
 const MOST: u32 = 65_536;
-/// Most unsound tetrahedra known.
+/// Most degenerate tetrahedra known.
 const MAX_KNOWN: usize = 16_384;
 
-impl Unsound {
+impl Degenerate {
     pub(crate) fn among(tets: usize) -> Self {
         let known = Vec::with_capacity(MAX_KNOWN.min(tets));
         Self { known, is_known: vec![false; tets], next: 0, urgent: tets as u32, overflow: 0 }
@@ -43,7 +46,7 @@ impl Unsound {
         self.urgent = self.is_known.len() as u32;
     }
 
-    /// Whether this one is known to be unsound.
+    /// Whether this one is known to be degenerate.
     pub(crate) fn knows(&self, tet: u32) -> bool {
         self.is_known[tet as usize]
     }
@@ -71,7 +74,7 @@ impl Unsound {
         self.urgent = self.urgent.saturating_sub(looked);
     }
 
-    /// Says whether this one is newly found to be unsound.
+    /// Says whether this one is newly found to be degenerate.
     fn look(&mut self, scene: &Scene, tet: u32) -> bool {
         if self.is_known[tet as usize] || is_sound(scene.corners(tet)) {
             return false;

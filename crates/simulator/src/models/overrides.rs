@@ -7,7 +7,7 @@ use trepan_budget::{Bone, Picture, Tissue};
 
 /// What is given of each part, and in which words.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Given {
+pub(super) struct Overrides {
     pub spacing_mm: Option<f64>,
     pub rigid: Option<&'static str>,
     pub points: Option<usize>,
@@ -19,7 +19,7 @@ pub(super) struct Given {
     pub words: [Vec<String>; 2],
 }
 
-impl Given {
+impl Overrides {
     /// By flags; refuses names that nobody knows.
     pub fn flags(patient: &Patient, rigid: Option<&str>, solver: Option<&str>) -> Result<Self, SessionError> {
         let tled = |name| if name == FASTEST { FASTEST } else { TLED };
@@ -35,7 +35,7 @@ impl Given {
             rigid: rigid.map(|name| rigid_named(name).map(|method| method.name())).transpose()?,
             points: rigid.map(|_| 0),
             tets: patient.tets,
-            halvings: patient.finer,
+            halvings: patient.opening_refinement,
             solver: solver.map(named).transpose()?,
             still_mm: solver.map(|_| 0.0),
             picture: None,
@@ -46,19 +46,21 @@ impl Given {
                 ]),
                 words(&[
                     ("--tets", patient.tets.map(|n| n.to_string())),
-                    ("--finer", patient.finer.map(|n| n.to_string())),
+                    ("--opening-refinement", patient.opening_refinement.map(|n| n.to_string())),
                     ("--solver", solver.map(String::from)),
                 ]),
             ],
         })
     }
 
-    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is usual, but tetrahedra of a number were alike everywhere.
+    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is
+    /// usual, but tetrahedra of a number were alike everywhere.
     pub fn recorded(config: &BTreeMap<String, String>) -> Self {
         let number = |key: &str| config.get(key)?.parse::<f64>().ok().filter(|value| value.is_finite());
         let count = |key: &str| config.get(key)?.parse::<usize>().ok();
         let flag = |key: &str| config.get(key).is_some_and(|value| value == "true");
-        // What was fastest then need not be fastest now: the processor's is the one that can be had again.
+        // What was fastest then need not be fastest now: the processor's is the one that can be had
+        // again.
         let solver = |name: &String| trepan_soft::Method::named(name).map_or(TLED, |method| method.name());
         let detail = number("picture_detail");
         Self {
@@ -109,7 +111,8 @@ impl Given {
 /// Total Lagrangian explicit dynamics.
 pub const TLED: &str = "tled";
 
-/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not have the recorded forces to the last bit.
+/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not
+/// have the recorded forces to the last bit.
 pub const FASTEST: &str = "fastest";
 
 /// The method on bone of that name.

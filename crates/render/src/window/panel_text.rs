@@ -118,7 +118,8 @@ pub struct Sound {
     pub alarm: bool,
 }
 
-/// A hand without force feedback would not notice a wall: it is kept this close to where the tool is.
+/// A hand without force feedback would not notice a wall: it is kept this close to where the tool
+/// is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leash {
     /// Where contact lets the tool's tip be, world mm.

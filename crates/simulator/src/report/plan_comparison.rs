@@ -9,10 +9,12 @@
 //! ∂: voxels of a set with a neighbour outside it; d between centres, mm.
 //!
 //! # Practice
-//! For the end of a session: one pass over the voxels, then pairs of border voxels: 0.1 s for a flap of 24 mm in voxels of 1 mm.
+//! For the end of a session: one pass over the voxels, then pairs of border voxels: 0.1 s for a
+//! flap of 24 mm in voxels of 1 mm.
 //!
 //! # Sources
-//! L. R. Dice, Ecology 26 (1945); 95 % Hausdorff distance: D. P. Huttenlocher et al., IEEE PAMI 15 (1993), as in A. A. Taha, A. Hanbury, BMC Medical Imaging 15 (2015).
+//! L. R. Dice, Ecology 26 (1945); 95 % Hausdorff distance: D. P. Huttenlocher et al., IEEE PAMI 15
+//! (1993), as in A. A. Taha, A. Hanbury, BMC Medical Imaging 15 (2015).
 
 use crate::case::plan::Plan;
 use serde::Serialize;
@@ -21,20 +23,20 @@ use trepan_volume::{BoneVolume, VoxelVolume};
 
 /// How well the bone that went is the bone that was to go.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Against {
+pub struct PlanComparison {
     /// Bone that was planned to go, mm³.
     pub planned_mm3: f64,
     /// Bone that went, drilled or lifted, mm³.
     pub taken_mm3: f64,
     /// Of it what was not planned, mm³.
-    pub beside_mm3: f64,
+    pub outside_plan_mm3: f64,
     /// Overlap of both, 1 when they are the same.
     pub dice: f64,
     /// Distance of their surfaces that 95 of 100 places keep, mm; `null` where nothing went.
     pub surface_95_mm: Option<f64>,
 }
 
-impl Against {
+impl PlanComparison {
     /// The bone as it was `before` against how it is now; `None` without a plan for any of it.
     pub fn of(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<Self> {
         let now = bone.snapshot();
@@ -49,7 +51,7 @@ impl Against {
         (of_plan > 0.0).then(|| Self {
             planned_mm3: of_plan * mm3,
             taken_mm3: gone * mm3,
-            beside_mm3: (gone - both) * mm3,
+            outside_plan_mm3: (gone - both) * mm3,
             dice: 2.0 * both / (of_plan + gone),
             surface_95_mm: surface_95(&border(before, &planned), &border(before, &taken)),
         })
@@ -94,18 +96,18 @@ mod tests {
         let before = bone.snapshot();
         let site = Site { entry: Vec3::new(14.75, 14.75, 3.75), inward: Vec3::NEG_Z, bone_mm: 3.0, brain_mm: 5.0 };
         let plan = Plan::new(Some(&bone), site, 6.0, 0.0).unwrap();
-        assert_eq!(Against::of(&plan, &before, &bone).unwrap().dice, 0.0);
-        assert_eq!(Against::of(&plan, &before, &bone).unwrap().surface_95_mm, None);
+        assert_eq!(PlanComparison::of(&plan, &before, &bone).unwrap().dice, 0.0);
+        assert_eq!(PlanComparison::of(&plan, &before, &bone).unwrap().surface_95_mm, None);
         let drill = |shift: i32| {
             for at in 0..n * n * 10 {
                 let voxel = IVec3::new((at % n) as i32, (at / n % n) as i32, (at / (n * n)) as i32);
                 let planned = plan.takes(bone.centre_of(voxel - IVec3::X * shift));
                 bone.set_hu(voxel, if planned { AIR_HU } else { before.data[at] });
             }
-            Against::of(&plan, &before, &bone).unwrap()
+            PlanComparison::of(&plan, &before, &bone).unwrap()
         };
         let same = drill(0);
-        assert_eq!((same.dice, same.surface_95_mm, same.beside_mm3), (1.0, Some(0.0), 0.0));
+        assert_eq!((same.dice, same.surface_95_mm, same.outside_plan_mm3), (1.0, Some(0.0), 0.0));
         let mm3 = std::f64::consts::PI * 36.0 * 3.0;
         assert!((same.planned_mm3 / mm3 - 1.0).abs() < 0.02 && same.taken_mm3 == same.planned_mm3, "{same:?}");
         // Overlap of two discs of radius r, d apart: 2 r² acos(d/2r) - d/2 √(4r² - d²).

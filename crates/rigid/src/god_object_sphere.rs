@@ -1,14 +1,16 @@
 //! The recommended method: a ball that slides on the bone's surface without ever entering it.
 //!
 //! # Theory
-//! The centre of a ball of radius r may be where the distance to the bone is at least r. The proxy is the nearest such
-//! place to the device that it can slide to: Zilles and Salisbury's god-object in the space of centres. The surface
-//! is a set of small discs on the crossings of the density with the isovalue; discs yᵢ, at distance dᵢ in direction gᵢ, give half-spaces
+//! The centre of a ball of radius r may be where the distance to the bone is at least r. The proxy
+//! is the nearest such place to the device that it can slide to: Zilles and Salisbury's god-object
+//! in the space of centres. The surface is a set of small discs on the crossings of the density
+//! with the isovalue; discs yᵢ, at distance dᵢ in direction gᵢ, give half-spaces
 //! ```text
 //! gᵢ·c ≥ gᵢ·yᵢ + r        safe: a half-space that leaves the convex disc out keeps the ball out of it
 //! ```
-//! and the proxy moves to the nearest point to the device that satisfies all of them, again and again until it rests. Every step stays
-//! within the region for which all discs are known, so there is no speed at which it tunnels.
+//! and the proxy moves to the nearest point to the device that satisfies all of them, again and
+//! again until it rests. Every step stays within the region for which all discs are known, so there
+//! is no speed at which it tunnels.
 //!
 //! ```text
 //!        ○ proxy, r above every disc
@@ -16,33 +18,39 @@
 //!        ◌ device      depth = |device - proxy|,  n = (proxy - device) / depth
 //! ```
 //!
-//! Projection on a convex set never lengthens a motion, so on flat or convex bone the force changes by no more than k times
-//! the hand's motion. Discs move continuously with the density, also while it is drilled away; where bone gives way or an edge ends at
-//! once the proxy follows at `yield_mm_per_ms` over the hand's own speed.
+//! Projection on a convex set never lengthens a motion, so on flat or convex bone the force changes
+//! by no more than k times the hand's motion. Discs move continuously with the density, also while
+//! it is drilled away; where bone gives way or an edge ends at once the proxy follows at
+//! `yield_mm_per_ms` over the hand's own speed.
 //!
-//! The ball that touches is a little smaller than the tool while a burr cuts (it sits in what it cuts), and where the tool is jammed: where
-//! its walls push more against each other than against the pull of the hand. It grows back into free space at once; where it must push itself off the
-//! bone for that, slowly, and only while growing by g moves it by no more than 2.4 g, which is true on a surface and false in a bore.
+//! The ball that touches is a little smaller than the tool while a burr cuts (it sits in what it
+//! cuts), and where the tool is jammed: where its walls push more against each other than against
+//! the pull of the hand. It grows back into free space at once; where it must push itself off the
+//! bone for that, slowly, and only while growing by g moves it by no more than 2.4 g, which is true
+//! on a surface and false in a bore.
 //!
 //! # Practice
-//! World mm, f32. For a 3 mm ball in 0.5 mm voxels about 4 us a tick of touch, 30 when discs are gathered anew, 20 while drilling: then discs move with
-//! the density, and only a voxel that opens makes them be gathered anew. With `shaft` the contact of the shaft adds its half-spaces (`lean.rs`), a microsecond.
-//! Allocates in `new` only. A ball that starts in bone keeps the clearance that it has and gains more at
-//! `recover_mm_per_ms`. Steps past `max_moves` are left for the next tick; that, and constraints that contradict, count as fallbacks.
+//! World mm, f32. For a 3 mm ball in 0.5 mm voxels about 4 us a tick of touch, 30 when discs are
+//! gathered anew, 20 while drilling: then discs move with the density, and only a voxel that opens
+//! makes them be gathered anew. With `shaft` the contact of the shaft adds its half-spaces
+//! (`lean.rs`), a microsecond. Allocates in `new` only. A ball that starts in bone keeps the
+//! clearance that it has and gains more at `recover_mm_per_ms`. Steps past `max_moves` are left for
+//! the next tick; that, and constraints that contradict, count as fallbacks.
 //!
 //! # Sources
-//! C. B. Zilles, J. K. Salisbury, IROS 1995; D. Ruspini, K. Kolarov, O. Khatib, *The haptic display of complex graphical environments*,
-//! SIGGRAPH 1997 (a ball as proxy); H. Xu, J. Barbič, *6-DoF haptic rendering using continuous collision detection between points and signed
-//! distance fields*, IEEE Trans. Haptics 10 (2017), for continuous motion.
+//! C. B. Zilles, J. K. Salisbury, IROS 1995; D. Ruspini, K. Kolarov, O. Khatib, *The haptic display
+//! of complex graphical environments*, SIGGRAPH 1997 (a ball as proxy); H. Xu, J. Barbič, *6-DoF
+//! haptic rendering using continuous collision detection between points and signed distance
+//! fields*, IEEE Trans. Haptics 10 (2017), for continuous motion.
 //!
 //! # When not to use it
-//! For tools that are not balls. Where edges sharper than a voxel matter: discs stand out over them by up to
-//! `disc_voxels`.
+//! For tools that are not balls. Where edges sharper than a voxel matter: discs stand out over them
+//! by up to `disc_voxels`.
 
 use crate::ball::{Ball, Limits};
 use crate::half_spaces::{HalfSpace, supports};
 use crate::lean::Lean;
-use crate::removal::{Burr, Cut, Law};
+use crate::removal::{Burr, Cut, RemovalLaw};
 use crate::shaft::Shaft;
 use crate::surface::{Disc, Discs};
 use crate::window::Window;
@@ -59,10 +67,12 @@ const MAX_BITES: usize = 16384;
 const TOUCH: f32 = 0.05;
 /// Bone in reach of the burr is this near to a disc, voxels.
 const MARGIN_VOXELS: i32 = 2;
-/// Free space that a ball leaves around it when it grows, voxels: more than the unevenness of a bore.
+/// Free space that a ball leaves around it when it grows, voxels: more than the unevenness of a
+/// bore.
 const MARGIN: f32 = 0.2;
-/// A smaller ball would come on by more than 1/JAM of what it is smaller: jammed. That is how many times the sum of what the walls push exceeds the
-/// pull of the hand. 0.4 is between walls less than 47 degrees apart.
+/// A smaller ball would come on by more than 1/JAM of what it is smaller: jammed. That is how many
+/// times the sum of what the walls push exceeds the pull of the hand. 0.4 is between walls less
+/// than 47 degrees apart.
 const JAM: f32 = 0.4;
 /// Growing may move a ball by so many times its growth.
 const PUSHED: f32 = 2.4;
@@ -74,30 +84,36 @@ const ROUNDING_MM: f32 = 1e-4;
 /// How the method is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// Radius of a disc, voxels. Under 0.71 discs on a plane leave gaps, over which a ball bobs; more fattens sharp edges.
+    /// Radius of a disc, voxels. Under 0.71 discs on a plane leave gaps, over which a ball bobs;
+    /// more fattens sharp edges.
     pub disc_voxels: f32,
-    /// Longest move with one set of discs, voxels. More weighs more discs at each move, less takes more moves at speed.
+    /// Longest move with one set of discs, voxels. More weighs more discs at each move, less takes
+    /// more moves at speed.
     pub move_voxels: f32,
-    /// How far the tool may go before discs are gathered anew, voxels. More gathers less often, and more discs each time.
+    /// How far the tool may go before discs are gathered anew, voxels. More gathers less often, and
+    /// more discs each time.
     pub ahead_voxels: f32,
     /// Most moves in one tick. What is left of the way is gone in the next tick.
     pub max_moves: u32,
-    /// How deep a burr at work sits in the bone that it cuts, voxels. Its bore is then a little wider than what touches, so that it does not
-    /// lock there. Must be less than `slop_voxels`.
+    /// How deep a burr at work sits in the bone that it cuts, voxels. Its bore is then a little
+    /// wider than what touches, so that it does not lock there. Must be less than `slop_voxels`.
     pub bite_voxels: f32,
-    /// Overlap that a jammed ball may have, voxels: in a bore of its own width the unevenness of opposite walls would lock it.
+    /// Overlap that a jammed ball may have, voxels: in a bore of its own width the unevenness of
+    /// opposite walls would lock it.
     pub slop_voxels: f32,
-    /// How fast the ball sinks in when a burr starts to cut, and grows back, mm/ms. Times the stiffness it is a change of force.
+    /// How fast the ball sinks in when a burr starts to cut, and grows back, mm/ms. Times the
+    /// stiffness it is a change of force.
     pub fit_mm_per_ms: f32,
     /// How fast a ball that has its centre in bone is let out, mm/ms.
     pub recover_mm_per_ms: f32,
-    /// Whether the shaft is felt too, with torque. The tool must then be held with its axis out of the bone.
+    /// Whether the shaft is felt too, with torque. The tool must then be held with its axis out of
+    /// the bone.
     pub shaft: bool,
-    /// How much faster than the hand the proxy comes after it where bone gives way, and how fast a jammed ball gives way, mm/ms. Times the stiffness it is
-    /// a change of force.
+    /// How much faster than the hand the proxy comes after it where bone gives way, and how fast a
+    /// jammed ball gives way, mm/ms. Times the stiffness it is a change of force.
     pub yield_mm_per_ms: f32,
     /// What a burr takes away.
-    pub removal: Law,
+    pub removal: RemovalLaw,
 }
 
 impl Config {
@@ -113,7 +129,7 @@ impl Config {
         recover_mm_per_ms: 0.05,
         yield_mm_per_ms: 0.03,
         shaft: false,
-        removal: Law::RATE,
+        removal: RemovalLaw::RATE,
     };
 
     /// With the shaft.
@@ -127,7 +143,7 @@ impl Default for Config {
 }
 
 /// The ball of one tool.
-pub struct DistanceField {
+pub struct GodObjectSphere {
     config: Config,
     tool: Tool,
     proxy: Pose,
@@ -143,7 +159,8 @@ pub struct DistanceField {
     hand: Vec3,
     /// How far the proxy may still go in this tick, mm.
     left_mm: f32,
-    /// Free space around the ball that is sure, from the last selection of discs: centre, grid; radius, voxels.
+    /// Free space around the ball that is sure, from the last selection of discs: centre, grid;
+    /// radius, voxels.
     sure: (Vec3, f32),
     /// Which bone the window shows.
     seen: Option<Seen>,
@@ -178,8 +195,9 @@ struct Known {
     clear: bool,
 }
 
-impl DistanceField {
-    /// A ball of the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts at the first tool pose.
+impl GodObjectSphere {
+    /// A ball of the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts
+    /// at the first tool pose.
     pub fn new(tool: &Tool, config: Config) -> Self {
         let tool = Tool { tip_radius_mm: tool.tip_radius_mm.clamp(1e-3, 100.0), ..*tool };
         Self {
@@ -247,7 +265,8 @@ impl DistanceField {
         }
     }
 
-    /// Lets the ball become smaller where it works or is jammed, at a rate that a hand does not feel as a jump.
+    /// Lets the ball become smaller where it works or is jammed, at a rate that a hand does not
+    /// feel as a jump.
     fn shrink(&mut self, bone: &BoneVolume, dt_ms: f32) {
         let radius = self.tool.tip_radius_mm;
         let (least, rate) = if self.jammed {
@@ -289,7 +308,8 @@ impl DistanceField {
         }
     }
 
-    /// Moves the proxy as near to `device` as the bone lets it. Returns whether it got there within `max_moves`.
+    /// Moves the proxy as near to `device` as the bone lets it. Returns whether it got there within
+    /// `max_moves`.
     fn follow(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) -> bool {
         let margin = self.tool.tip_radius_mm + 2.0 * bone.spacing_mm();
         let end = self.proxy.rotation * Vec3::Z * if self.config.shaft { self.tool.shaft_length_mm } else { 0.0 };
@@ -339,7 +359,8 @@ impl DistanceField {
         slide.rests
     }
 
-    /// The discs near the tool with its ball at `from`. Returns the distance of the nearest from the ball's centre.
+    /// The discs near the tool with its ball at `from`. Returns the distance of the nearest from
+    /// the ball's centre.
     fn select(&mut self, bone: &BoneVolume, ball: &Ball, from: Vec3, out: &mut RigidStep) -> f32 {
         let (base, reach) = (self.discs.base.as_vec3(), self.config.move_voxels);
         let full = self.tool.tip_radius_mm / bone.spacing_mm();
@@ -372,7 +393,8 @@ impl DistanceField {
         }
     }
 
-    /// Makes sure that all discs in reach of the ball at grid point `at` are known; false when the ball is too large for that.
+    /// Makes sure that all discs in reach of the ball at grid point `at` are known; false when the
+    /// ball is too large for that.
     fn know(&mut self, bone: &BoneVolume, at: Vec3, out: &mut RigidStep) -> bool {
         let reach = self.config.move_voxels;
         if self.known.fresh && at.distance(self.known.centre) <= self.known.ahead {
@@ -446,7 +468,7 @@ impl DistanceField {
     }
 }
 
-impl RigidContact for DistanceField {
+impl RigidContact for GodObjectSphere {
     fn step(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool, dt_ms: f32, out: &mut RigidStep) {
         out.clear();
         if !tool.is_finite() {

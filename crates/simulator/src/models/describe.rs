@@ -1,4 +1,5 @@
-//! What is told of the models: in the log, in a recording's header, in `summary.json`, on a terminal.
+//! What is told of the models: in the log, in a recording's header, in `summary.json`, on a
+//! terminal.
 
 use super::Models;
 use serde::Serialize;

@@ -1,11 +1,12 @@
-//! The operating table: patient, plan and methods, and from them the stages that the loops begin with.
+//! The operating table: patient, plan and methods, and from them the stages that the loops begin
+//! with.
 
 use crate::case::Case;
 use crate::case::plan::Plan;
 use crate::case::scene::{RestBrain, Scene};
 use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
-use crate::hand::Feel;
+use crate::hand::DeviceLimits;
 use crate::measure::tissue::MASS_ADDED;
 use crate::models::{BONE_STIFFNESS, FASTEST, Models, rigid_of, solver_named};
 use crate::operation::Operation;
@@ -29,7 +30,7 @@ use trepan_soft::{Body, Loads, SoftSolver};
 use trepan_volume::{BoneVolume, Piece};
 
 /// What the operation is done on, and by which methods.
-pub struct Table {
+pub struct SessionSetup {
     /// The simulator.
     pub program: Program,
     /// The patient.
@@ -47,8 +48,9 @@ pub struct Table {
     fastest: OnceLock<&'static str>,
 }
 
-impl Table {
-    /// Lays a case on the table. `filmed`: the window will go to and fro in the bone that is shown, so a second one is carved.
+impl SessionSetup {
+    /// Lays a case on the table. `filmed`: the window will go to and fro in the bone that is shown,
+    /// so a second one is carved.
     pub fn new(
         program: Program,
         (case, models): (Case, Models),
@@ -101,11 +103,11 @@ impl Table {
         &self,
         start: ToolState,
         tick_ms: f32,
-        (feel, second): (&Feel, Option<&Feel>),
+        (feel, second): (&DeviceLimits, Option<&DeviceLimits>),
         touch: &trepan_deformable::Config,
     ) -> Result<Stages, SessionError> {
         let rigid = rigid_of(&self.models.setup.bone)?;
-        let config = |feel: &Feel| HapticConfig {
+        let config = |feel: &DeviceLimits| HapticConfig {
             program: self.program,
             rigid,
             dt_ms: tick_ms,
@@ -140,7 +142,7 @@ impl Table {
         let wall = self.bone().cloned().map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed));
         let wall = wall.transpose().map_err(|fault| of_brain(&fault))?;
         let collision = CollisionStage::new(self.program, &brain.mesh, touch, wall);
-        let settling = Settling::new(self.operation.fluid_lost, Vec3::NEG_Y, -self.plan.site.inward);
+        let settling = Settling::new(self.operation.csf_loss, Vec3::NEG_Y, -self.plan.site.inward);
         Ok(run::Tissue {
             collision: collision.map_err(|fault| of_brain(&fault))?.settling(settling),
             solver: SolverStage::new(self.solver(&body)?),

@@ -4,8 +4,9 @@
 //! ```text
 //! ln y = w₀ + w₁ f₁ + w₂ f₂ + w₃ f₃ + r        fᵢ logarithms of lengths: a product of powers
 //! ```
-//! The weights are those of least squares, drawn a little towards 0 (ridge), so that features that never varied stay out. What is left, r, is
-//! kept as two numbers: its root mean square, and the bound under which it stays in [`COVERED`] of the scenes.
+//! The weights are those of least squares, drawn a little towards 0 (ridge), so that features that
+//! never varied stay out. What is left, r, is kept as two numbers: its root mean square, and the
+//! bound under which it stays in [`COVERED`] of the scenes.
 //!
 //! # When not to use it
 //! Far outside the features of the scenes that it was fitted to: a power law bends somewhere.
@@ -19,7 +20,7 @@ const RIDGE: f64 = 0.3;
 
 /// A product of powers with its spread.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Law {
+pub struct PowerLaw {
     /// w₀ to w₃.
     pub weights: [f64; FEATURES + 1],
     /// Root mean square of r.
@@ -28,7 +29,7 @@ pub struct Law {
     pub bound: f64,
 }
 
-impl Law {
+impl PowerLaw {
     /// Always this.
     pub fn constant(value: f64) -> Self {
         Self { weights: [value.ln(), 0.0, 0.0, 0.0], spread: 0.0, bound: 0.0 }
@@ -44,7 +45,8 @@ impl Law {
         self.expected(features) * self.bound.exp()
     }
 
-    /// The law of measured values, each with its features, and the bound that covers a share of them; `None` without any, or where one is not above 0 and finite.
+    /// The law of measured values, each with its features, and the bound that covers a share of
+    /// them; `None` without any, or where one is not above 0 and finite.
     pub fn fit(measured: &[([f64; FEATURES], f64)], covered: f64) -> Option<Self> {
         let sound = |(f, y): &([f64; FEATURES], f64)| *y > 0.0 && y.is_finite() && f.iter().all(|f| f.is_finite());
         if measured.is_empty() || !measured.iter().all(sound) {
@@ -63,7 +65,8 @@ impl Law {
         Some(law)
     }
 
-    /// With a bound of 2.5 root mean squares, where care costs little: unlike the worst scenes of a few it puts choices in the order of their errors.
+    /// With a bound of 2.5 root mean squares, where care costs little: unlike the worst scenes of a
+    /// few it puts choices in the order of their errors.
     pub fn careful(self) -> Self {
         Self { bound: WIDE * self.spread, ..self }
     }
@@ -106,7 +109,7 @@ mod tests {
     #[test]
     fn a_product_of_powers_is_found_again() {
         let measured = grid(|[a, b, c]| (0.3 + 1.5 * a - 0.5 * b + 0.25 * c).exp());
-        let law = Law::fit(&measured, 0.98).unwrap();
+        let law = PowerLaw::fit(&measured, 0.98).unwrap();
         for (found, true_one) in law.weights.iter().zip([0.3, 1.5, -0.5, 0.25]) {
             assert!((found - true_one).abs() < 0.01, "{law:?}");
         }
@@ -115,7 +118,7 @@ mod tests {
 
     #[test]
     fn a_feature_that_never_varied_has_no_weight() {
-        let law = Law::fit(&[([1.0, 2.0, 3.0], 0.5), ([1.0, 2.0, 3.0], 0.7)], 0.98).unwrap();
+        let law = PowerLaw::fit(&[([1.0, 2.0, 3.0], 0.5), ([1.0, 2.0, 3.0], 0.7)], 0.98).unwrap();
         assert_eq!(law.weights[1..], [0.0; 3]);
         assert!((law.expected(&[1.0, 2.0, 3.0]) - 0.35f64.sqrt()).abs() < 1e-12);
         assert!((law.at_most(&[1.0, 2.0, 3.0]) - 0.7).abs() < 1e-12);
@@ -123,18 +126,18 @@ mod tests {
 
     #[test]
     fn what_has_no_logarithm_has_no_law() {
-        assert_eq!(Law::fit(&[], 0.98), None);
+        assert_eq!(PowerLaw::fit(&[], 0.98), None);
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert_eq!(Law::fit(&[([0.0; 3], 1.0), ([0.0; 3], bad)], 0.98), None);
+            assert_eq!(PowerLaw::fit(&[([0.0; 3], 1.0), ([0.0; 3], bad)], 0.98), None);
         }
-        assert_eq!(Law::constant(0.0).at_most(&[1.0; 3]), 0.0);
+        assert_eq!(PowerLaw::constant(0.0).at_most(&[1.0; 3]), 0.0);
     }
 
     proptest! {
         #[test]
         fn the_bound_covers_its_share(noise in prop::collection::vec(-1.0f64..1.0, 100)) {
             let measured: Vec<_> = grid(|[a, _, c]| (a - 0.5 * c).exp()).into_iter().zip(&noise).map(|((f, y), n)| (f, y * n.exp())).collect();
-            let law = Law::fit(&measured, 0.98).unwrap();
+            let law = PowerLaw::fit(&measured, 0.98).unwrap();
             let over = measured.iter().filter(|(f, y)| *y > law.at_most(f) * (1.0 + 1e-9)).count();
             prop_assert!(over <= 2, "{over} of 100 over the bound");
         }
