@@ -117,6 +117,7 @@ fn meet(o: vec3f, d: vec3f, furthest: f32) -> f32 {
             leave = max(min(min(exits.x, exits.y), exits.z), t + nudge);
             steps++;
         }
+        leave = min(leave, end);
         // Walk its cells to one with a corner in bone, and solve that; if the ray only passes by,
         // go on behind it.
         var cell = clamp(vec3i(floor(o + safe * (t + nudge))), vec3i(0), last);
@@ -138,7 +139,10 @@ fn meet(o: vec3f, d: vec3f, furthest: f32) -> f32 {
             }
             if open { break; }
             let s = enter(found, o + safe * t - vec3f(cell), o + safe * next - vec3f(cell));
-            if s <= 1.0 { return t + s * (next - t); }
+            if s <= 1.0 {
+                let hit = t + s * (next - t);
+                return select(NOTHING, hit, hit <= end);
+            }
             t = next;
             cell += onward;
             leave = select(leave, t, any(cell < vec3i(0)) || any(cell > last));

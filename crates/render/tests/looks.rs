@@ -261,6 +261,38 @@ fn bone_under_a_cut_is_hit_in_the_plane_and_over_it_there_is_none() {
     assert_eq!(gpu.faults(), Faults::default());
 }
 
+/// Rays that leave the part that is kept are not followed to the end of their brick: fringes of
+/// what is cut away would stand over the edge.
+#[test]
+fn bone_seen_along_a_cut_has_no_hit_over_it() {
+    let Some(gpu) = device() else { return };
+    let ball = bone(48, |p| p.length() - 17.0);
+    let mut device = scene::renderer(&gpu, &scene::alone(&ball), [96, 72]);
+    let mut processor = ProcessorRenderer::new(&scene::alone(&ball), [96, 72]).expect("the scene loads");
+    let (point, normal) = (Vec3::new(0.0, 0.0, 6.3), Vec3::Z);
+    for towards in [Vec3::new(1.0, 0.2, -0.03), Vec3::new(1.0, 0.2, 0.0), Vec3::new(0.5, -1.0, -0.2)] {
+        let camera = Camera { fov_rad: 0.35, ..Camera::viewed_from(Vec3::Z * 4.0, towards, 120.0) };
+        let frame = Frame { cut: Some(Cut { point, normal, bone: true }), camera, ..plain(towards) };
+        device.draw(&frame).expect("drawn");
+        processor.draw(&frame).expect("drawn");
+        let view = processor.view(&frame);
+        for hits in [device.bone_hits().expect("hits"), processor.bone_hits()] {
+            let heights: Vec<f32> = hits
+                .into_iter()
+                .enumerate()
+                .filter_map(|(n, hit)| {
+                    let pixel = glam::Vec2::new((n % 96) as f32 + 0.5, (n / 96) as f32 + 0.5);
+                    let inside = pixel / glam::Vec2::new(48.0, -36.0) - glam::Vec2::new(1.0, -1.0);
+                    Some((view.eye + hit?.distance_mm * view.ray(inside) - point).dot(normal))
+                })
+                .collect();
+            let highest = heights.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+            assert!(heights.len() > 1000 && highest < 0.01, "{highest} mm over the cut, {} hits", heights.len());
+        }
+    }
+    assert_eq!(gpu.faults(), Faults::default());
+}
+
 #[test]
 fn bone_and_brain_cut_by_one_plane_do_not_show_through_each_other() {
     let block = bone(48, |p| p.abs().max_element() - 16.25);

@@ -226,7 +226,7 @@ impl Bricks {
                     Some(step) => self.sample(o, d, t..until, step * self.grid.spacing_mm, &mut steps),
                 };
                 if hit < NOTHING {
-                    return (hit, steps);
+                    return (if hit <= end { hit } else { NOTHING }, steps);
                 }
             }
             t = leave;
