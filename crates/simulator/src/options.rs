@@ -114,6 +114,10 @@ pub struct Options {
 /// A patient's images and what is made of them.
 #[derive(Clone, Debug, Args)]
 pub struct Patient {
+    /// Folder that keeps imported cases [default: TREPAN_CACHE, else trepan/cases in the user's
+    /// cache folder]
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
     /// CT of the patient: a file, or a folder of DICOM slices [default: the built-in case]
     #[arg(long, value_name = "PATH")]
     pub ct: Option<PathBuf>,

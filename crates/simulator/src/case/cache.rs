@@ -3,15 +3,17 @@
 //! # Practice
 //! A folder appears whole or not at all: it is filled beside its place and then renamed. Two
 //! programs that make the same case at once both succeed; the second keeps the first's.
-//! `TREPAN_CACHE` names another place.
+//! `--cache` or `TREPAN_CACHE` names another place. When the folders exceed 8 GB, those that were not
+//! used for the longest time go, but none that was used within the last hour.
 
 use crate::error::SessionError;
+use crate::options::Patient;
 use etcetera::{BaseStrategy, choose_base_strategy};
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 use trepan_volume::open_regular;
 
 /// Goes up when kept cases change their form or the code that makes them changes its results.
@@ -24,7 +26,12 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// The user's: `TREPAN_CACHE`, else `trepan` in the platform's cache folder.
+    /// The folder that the flags name, else the user's.
+    pub fn of(patient: &Patient) -> Result<Self, SessionError> {
+        patient.cache.clone().map_or_else(Self::of_user, |root| Ok(Self::at(root)))
+    }
+
+    /// The user's: `TREPAN_CACHE`, else `trepan/cases` in the platform's cache folder.
     pub fn of_user() -> Result<Self, SessionError> {
         if let Some(root) = std::env::var_os("TREPAN_CACHE").filter(|root| !root.is_empty()) {
             return Ok(Self { root: root.into() });
@@ -54,14 +61,17 @@ impl Cache {
 
     /// The folder of that name, if it is there.
     pub fn find(&self, key: &str) -> Option<PathBuf> {
-        Some(self.root.join(key)).filter(|folder| folder.is_dir())
+        let folder = Some(self.root.join(key)).filter(|folder| folder.is_dir())?;
+        // The time of the last use: the sweep goes by it. A folder of someone else may not be touched.
+        _ = File::open(&folder).and_then(|file| file.set_modified(SystemTime::now()));
+        Some(folder)
     }
 
     /// Fills a folder and puts it in its place; a broken one that is there already gives way.
     pub fn keep(&self, key: &str, fill: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), String> {
         let text = |fault: io::Error| format!("{}: {fault}", self.root.display());
         fs::create_dir_all(&self.root).map_err(text)?;
-        self.sweep();
+        self.sweep(MOST_BYTES);
         let folder = tempfile::Builder::new().prefix(MAKING).tempdir_in(&self.root).map_err(text)?;
         fill(folder.path())?;
         let place = self.root.join(key);
@@ -95,21 +105,46 @@ pub fn digest(file: &Path) -> io::Result<String> {
 
 /// How folders that are being filled begin.
 const MAKING: &str = ".making-";
-/// A folder that was not touched for so long is no longer being filled.
+/// A folder that was not used for so long is not in use, nor being filled.
 const ABANDONED: Duration = Duration::from_secs(3600);
+/// Most that kept cases may take of the disk, bytes: some 80 cases.
+const MOST_BYTES: u64 = 8 << 30;
 
 impl Cache {
-    /// Removes what killed programs left.
-    fn sweep(&self) {
+    /// Removes what killed programs left, and the longest unused cases where all exceed `most`
+    /// bytes.
+    fn sweep(&self, most: u64) {
+        let mut kept = Vec::new();
         for entry in fs::read_dir(&self.root).into_iter().flatten().flatten() {
-            let old = || {
-                entry.metadata().and_then(|m| m.modified()).is_ok_and(|t| t.elapsed().is_ok_and(|age| age > ABANDONED))
-            };
-            if entry.file_name().to_string_lossy().starts_with(MAKING) && old() {
+            let Ok(used) = entry.metadata().and_then(|m| m.modified()) else { continue };
+            let old = used.elapsed().is_ok_and(|age| age > ABANDONED);
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name.starts_with(MAKING) && old {
                 _ = fs::remove_dir_all(entry.path());
+            } else if is_key(&name) {
+                kept.push((used, old, entry.path()));
+            }
+        }
+        kept.sort_by(|a, b| b.0.cmp(&a.0));
+        let mut bytes = 0;
+        for (_, old, folder) in kept {
+            bytes += size(&folder);
+            if bytes > most && old {
+                _ = fs::remove_dir_all(folder);
             }
         }
     }
+}
+
+/// Whether a folder's name is one that [`Cache::key`] gives.
+fn is_key(name: &str) -> bool {
+    name.len() == 64 && name.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+/// Bytes of the files in a folder.
+fn size(folder: &Path) -> u64 {
+    let files = fs::read_dir(folder).into_iter().flatten().flatten();
+    files.filter_map(|file| Some(file.metadata().ok()?.len())).sum()
 }
 
 fn hexadecimal(hash: Sha256) -> String {
@@ -226,10 +261,30 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let (old, new) = (home.path().join(".making-old"), home.path().join(".making-new"));
         [&old, &new].iter().for_each(|folder| fs::create_dir(folder).unwrap());
-        let long_ago = std::time::SystemTime::now() - 2 * ABANDONED;
+        let long_ago = SystemTime::now() - 2 * ABANDONED;
         File::open(&old).unwrap().set_modified(long_ago).unwrap();
         Cache::at(home.path().into()).keep("case", |_| Ok(())).unwrap();
         assert!(!old.exists() && new.exists());
+    }
+
+    #[test]
+    fn cases_over_the_limit_go_the_longest_unused_first_but_none_in_use_and_nothing_else() {
+        let home = tempfile::tempdir().unwrap();
+        let cache = Cache::at(home.path().into());
+        let keys: Vec<String> = (0..4).map(|n| format!("{n:064}")).collect();
+        for (n, key) in keys.iter().enumerate() {
+            cache.keep(key, |folder| fs::write(folder.join("x"), [0; 100]).map_err(|f| f.to_string())).unwrap();
+            let used = SystemTime::now() - (4 - n as u32) * ABANDONED - ABANDONED / 2;
+            File::open(home.path().join(key)).unwrap().set_modified(used).unwrap();
+        }
+        fs::create_dir(home.path().join("mine")).unwrap();
+        assert!(cache.find(&keys[0]).is_some(), "used now");
+        let there = || keys.iter().map(|key| home.path().join(key).is_dir()).collect::<Vec<_>>();
+        cache.sweep(250);
+        assert_eq!(there(), [true, false, false, true]);
+        cache.sweep(0);
+        assert_eq!(there(), [true, false, false, false]);
+        assert!(home.path().join("mine").is_dir());
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub fn open_case(
     let (inputs, mut models) = (inputs(&options.patient, built_in), None);
     guarded(options, |class| class == TissueClass::Brain || inputs.tissues.iter().any(|t| t.class == class))?;
     let wanted = recipe(&options.patient);
-    let case = import::open_by(program, &inputs, &wanted, &Cache::of_user()?, |known| {
+    let case = import::open_by(program, &inputs, &wanted, &Cache::of(&options.patient)?, |known| {
         let facts = known.facts;
         let settled = models.insert(wish.settle(&facts, card, |scene, rows| known.own(scene, rows))?);
         known.say(|| settled.say());
@@ -93,7 +93,7 @@ pub fn plan_case(
             Ok(PlannedCase { models: on_case(wish, &case, card)?, notes: case.notes })
         }
         None => {
-            let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of_user()?);
+            let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of(patient)?);
             let mut known = Known::of(program, &inputs, &recipe, &cache)?;
             let (facts, notes) = (known.facts, known.notes.clone());
             let models = wish.settle(&facts, card, |scene, rows| known.own(scene, rows))?;
@@ -132,7 +132,7 @@ pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inp
         )));
     }
     let recipe = recipe(patient);
-    let case = import::open(program, &inputs(patient, built_in), &recipe, &Cache::of_user()?)?;
+    let case = import::open(program, &inputs(patient, built_in), &recipe, &Cache::of(patient)?)?;
     let parent = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = out.file_name().and_then(|name| name.to_str()).unwrap_or("case");
     let written = Cache::at(parent.into()).keep(name, |place| folder::save(&case, place));

@@ -99,6 +99,7 @@ impl Patient {
     fn flags(&self, found: Option<&Path>) -> Vec<String> {
         let path = |path: &Path| path.display().to_string();
         let mut flags = vec!["--ct".into(), path(&self.files.ct), "--mri".into(), path(&self.files.mri)];
+        flags.extend(["--cache".into(), path(&self.path("cases"))]);
         if let Some(found) = found {
             flags.extend(["--labels".into(), path(found)]);
         }
