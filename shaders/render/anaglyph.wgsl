@@ -1,4 +1,4 @@
-// Both eyes' views in one: the left one's brightness in red, the right one's green and blue.
+// Both eyes' views in one picture: the left one's luminance in red, the right one's green and blue.
 
 @group(0) @binding(1) var left: texture_2d<f32>;
 @group(0) @binding(2) var right: texture_2d<f32>;

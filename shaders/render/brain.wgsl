@@ -1,6 +1,6 @@
-// The brain's surface where the physics has put it, drawn as triangles with smooth normals. Output
-// 0: folded normal (xy), 1 on a cut (z), distance along the ray in mm (w). Output 1: the place at
-// rest, where the MRI was taken.
+// The deformed brain's surface as triangles with smooth normals. Output 0: octahedral normal (xy),
+// 1 on a cut (z), distance along the ray in mm (w). Output 1: the rest position, for sampling the
+// MRI.
 
 @group(0) @binding(1) var<storage, read> places: array<vec4f>;    // now, world mm
 @group(0) @binding(2) var<storage, read> normals: array<vec4f>;   // now, unit

@@ -1,5 +1,5 @@
-// Rays through the padded grid of densities: leap over bricks without bone, walk the cells of the
-// others, solve the cubic in a cell exactly.
+// Traces rays through the padded density grid: skips bricks without bone, visits the cells of the
+// others, and solves the cubic in a cell exactly.
 
 @group(0) @binding(1) var density: texture_3d<f32>;   // HU, padded by one voxel of air on all sides
 @group(0) @binding(2) var linear: sampler;
@@ -10,15 +10,15 @@ const BRICK: f32 = 4.0;   // cells along an edge: `LEAP` in Rust
 const NUDGE: f32 = 1e-3;
 const MOST_STEPS: i32 = 8192;
 
-// Continuous padded grid coordinates of a world point: voxel centres are at whole numbers.
+// Continuous padded grid coordinates of a world point; voxel centres are at integers.
 fn grid_of(point: vec3f) -> vec3f { return (point - scene.origin.xyz) / scene.origin.w; }
 
 // HU at continuous padded grid coordinates.
 fn hu(g: vec3f) -> f32 { return textureSampleLevel(density, linear, (g + 0.5) / scene.dims.xyz, 0.0).x; }
 
-// Smallest part s of the way through a cell at which the density reaches the isovalue, or 2. `v` is
-// the density less the isovalue at s = 0, 1/3, 2/3, 1: a trilinear cell is a cubic along a ray
-// (Marmitt et al. 2004: split at the extrema, then refine).
+// Smallest fraction s of the path through a cell at which the density reaches the isovalue, or 2.
+// `v` is the density less the isovalue at s = 0, 1/3, 2/3, 1: a trilinear cell is a cubic along a
+// ray (Marmitt et al. 2004: split at the extrema, then refine).
 fn first_root(v: vec4f) -> f32 {
     if v.x >= 0.0 { return 0.0; }
     let c1 = 0.5 * (-11.0 * v.x + 18.0 * v.y - 9.0 * v.z + 2.0 * v.w);
@@ -73,7 +73,7 @@ fn promising(c: Corners) -> bool {
     return max(max(most.x, most.y), max(most.z, most.w)) >= 0.0;
 }
 
-// Share of the way between two local points of a cell where bone begins, or 2.
+// Fraction of the segment between two local points of a cell at which bone begins, or 2.
 fn enter(c: Corners, a: vec3f, b: vec3f) -> f32 {
     let third = (b - a) / 3.0;
     let v = vec4f(blend(c.low, c.high, a), blend(c.low, c.high, a + third), blend(c.low, c.high, b - third), blend(c.low, c.high, b));

@@ -1,4 +1,4 @@
-// Where the deformed brain's surface cuts a slice: lines over it.
+// Draws the outline of the deformed brain on a slice, as lines.
 
 struct Ink { colour: vec4f }
 

@@ -1,4 +1,4 @@
-// The brain where it is cut open: triangles in the plane, drawn between those of its surface.
+// The cut surface of the brain: triangles in the plane, drawn together with those of its surface.
 // Outputs as in `brain.wgsl`.
 
 struct Corner { place: vec4f, rest: vec4f }   // now and at rest, world mm

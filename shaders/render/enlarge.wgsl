@@ -1,4 +1,4 @@
-// A coarser 3-D view, enlarged into the picture.
+// Enlarges a coarser 3-D view into the picture.
 
 @group(0) @binding(1) var coarse: texture_2d<f32>;
 @group(0) @binding(2) var linear: sampler;

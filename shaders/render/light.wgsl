@@ -1,4 +1,4 @@
-// The 3-D view: takes the nearest of bone, brain and tool at each pixel and lights it.
+// The 3-D view: shades the nearest of bone, brain and tool at each pixel.
 
 @group(0) @binding(5) var skull_hit: texture_2d<u32>;
 @group(0) @binding(6) var brain_hit: texture_2d<u32>;
@@ -9,11 +9,11 @@
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
 
-// Share of the lamp that passes a body at distance `gap` from the beam, `way` mm on: the lamp is a
-// disc.
+// Fraction of the lamp's light that passes a body at distance `gap` from the beam, `way` mm away:
+// the lamp is a disc.
 fn pass_by(gap: f32, way: f32) -> f32 { return smoothstep(-1.0, 1.0, gap / (0.10 * way + 0.3)); }
 
-// Light that passes the tools on its way to a point: 0 in their shadow, 1 far from them.
+// Fraction of light that the tools let pass to a point: 0 in their shadow, 1 far from them.
 fn past_tools(point: vec3f) -> f32 {
     return past(point, scene.tip, scene.tail) * past(point, scene.second_tip, scene.second_tail);
 }
@@ -23,7 +23,7 @@ fn past(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {
     let to = tip.xyz - point;
     let way = max(dot(to, scene.light.xyz), 0.0);
     let ball = pass_by(length(to - way * scene.light.xyz) - tip.w, way);
-    // Nearest points of the beam and the shaft's axis (Ericson 2005, 5.1.9, with a beam that begins
+    // Nearest points of the beam and the shaft's axis (Ericson 2005, 5.1.9, with a beam that starts
     // at the point).
     let axis = tail.xyz - tip.xyz;
     let b = dot(scene.light.xyz, axis);
@@ -48,14 +48,14 @@ fn brain_colour(rest: vec3f) -> vec3f {
     return tinted(flesh * (0.42 + 0.68 * smoothstep(0.05, 0.60, signal.w)), signal);
 }
 
-// The MRI where the brain is cut, as grey as in the slices.
+// The MRI on the cut brain, as grey as in the slices.
 fn cut_colour(rest: vec3f) -> vec3f {
     let signal = textureSampleLevel(mri, linear, (scene.mri_from_world * vec4f(rest, 1.0)).xyz, 0.0);
     if scene.eye.w == 0.0 { return vec3f(0.62, 0.32, 0.29); }
     return pow(tinted(vec3f(signal.w), signal), vec3f(2.2));
 }
 
-// A colour with paint over it, at a place in the box of the paint, 0 to 1.
+// Blends paint over a colour, at a position in the paint's box, 0 to 1.
 fn painted(colour: vec3f, at: vec3f, paint: vec4f) -> vec3f {
     let inside = all(at >= vec3f(0.0)) && all(at <= vec3f(1.0));
     return select(colour, colour * (1.0 - paint.w) + paint.xyz, inside);
@@ -73,12 +73,12 @@ fn painted_brain(colour: vec3f, rest: vec3f) -> vec3f {
     return painted(colour, at, textureSampleLevel(brain_coat, linear, at, 0.0));
 }
 
-// How wet bone is: while the burr turns, water and blood film what is near it.
+// Wetness of bone: while the burr turns, a film of water and blood covers its surroundings.
 fn wetness(point: vec3f) -> f32 {
     return scene.light.w * (1.0 - smoothstep(1.0, 7.0, distance(point, scene.tip.xyz) - scene.tip.w));
 }
 
-// Whether a grain of bone dust lies at a point: one cell of 0.5 mm in twelve.
+// Whether there is a grain of bone dust at a point: one cell of 0.5 mm in twelve.
 fn dusty(point: vec3f) -> bool {
     let cell = vec3u(vec3i(floor(point * 2.0)));
     let mixed = (cell.x * 73856093u) ^ (cell.y * 19349663u) ^ (cell.z * 83492791u);
@@ -117,7 +117,7 @@ fn burr_colour(point: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
     return mix(vec3f(0.34, 0.36, 0.40), vec3f(0.80, 0.80, 0.78), flute);
 }
 
-// A tool where the ray meets it at `met`; `look` is that of its tip.
+// Shades a tool hit `met`; `look` is the style of its tip.
 fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, look: f32) -> vec3f {
     let on_tip = min(met.y, met.z) > met.x;
     let normal = tool_normal(point, tip, tail, met);
@@ -133,8 +133,8 @@ fn shade_tool(point: vec3f, along: vec3f, tip: vec4f, tail: vec4f, met: vec3f, l
     let skull = unpacked(textureLoad(skull_hit, at, 0));
     var brain = unpacked(textureLoad(brain_hit, at, 0));
     brain.w = select(NOTHING, brain.w, brain.w > 0.0);
-    // Where both are cut by one plane neither is nearer: bone is there, however far the mesh
-    // reaches into it.
+    // Where one plane cuts both, the depths are equal: bone is shown, even if the mesh reaches into
+    // it.
     if brain.z > 0.5 && on_cut(scene.eye.xyz + skull.w * along) { brain.w = NOTHING; }
     let first = reach(along, scene.tip, scene.tail);
     let second = reach(along, scene.second_tip, scene.second_tail);

@@ -1,5 +1,5 @@
-// Shapes over the picture: a rectangle around each, in which rays meet it in closed form. Behind
-// the scene it shows faintly.
+// Draws overlay shapes: rays meet each in closed form inside its rectangle. Parts behind the scene
+// are faint.
 
 struct Item {
     tip: vec4f,      // a tool's ball, or an arrow's begin; w: radius
@@ -20,7 +20,7 @@ struct Place {
     @location(0) @interpolate(flat) item: u32,
 }
 
-// The rectangle around an item's box; the whole view where the box reaches behind the eye.
+// The rectangle around an item's box; the whole view if the box reaches behind the eye.
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> Place {
     let item = items[i / 6u];
     let radius = max(abs(item.tip.w), abs(item.tail.w));
@@ -44,8 +44,8 @@ struct Place {
 
 struct Surface { t: f32, normal: vec3f }
 
-// The nearer of a surface and the front of an arrow's head: a cone around `down` from its point, as
-// deep as `depth`, as wide as `radius` there.
+// The nearer of a given surface and an arrow's head: a cone around `down` from its apex, with
+// height `depth` and base radius `radius`.
 fn head(along: vec3f, apex: vec3f, down: vec3f, depth: f32, radius: f32, other: Surface) -> Surface {
     var nearest = other;
     let away = scene.eye.xyz - apex;

@@ -1,4 +1,5 @@
-// What every pass of the picture knows: camera, bone grid, tool, light. Rust twin: `Scene`.
+// Data shared by all render passes: camera, bone grid, tool, light. Layout of the Rust type
+// `Scene`.
 
 struct Scene {
     clip_from_world: mat4x4f,
@@ -26,8 +27,8 @@ struct Scene {
 
 const NOTHING: f32 = 1e30;
 
-// Hits travel between passes as the bits of floats in integer textures: every driver can draw into
-// those.
+// Hits are passed between passes as the bits of floats in integer textures, which every driver can
+// render to.
 fn packed(v: vec4f) -> vec4u { return bitcast<vec4u>(v); }
 
 fn unpacked(v: vec4u) -> vec4f { return bitcast<vec4f>(v); }
@@ -44,10 +45,10 @@ fn ray_of(pixel: vec2f) -> vec3f {
     return normalize(scene.forward.xyz + x * scene.right.xyz + y * scene.up.xyz);
 }
 
-// Height of a point over a plane, mm; 0 where there is no plane.
+// Signed height of a point over a plane, mm; 0 without a plane.
 fn height(plane: vec4f, point: vec3f) -> f32 { return dot(plane.xyz, point) - plane.w; }
 
-// Unit vectors in two numbers (Cigolle et al. 2014, octahedral).
+// Unit vectors in two numbers (octahedral encoding, Cigolle et al. 2014).
 fn fold(n: vec3f) -> vec2f {
     let p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
     let signs = select(vec2f(-1.0), vec2f(1.0), p >= vec2f(0.0));
@@ -73,7 +74,7 @@ fn distance_to(point: vec3f, tip: vec4f, tail: vec4f) -> f32 {
     return min(shaft, distance(point, tip.xyz) - tip.w);
 }
 
-// A colour where a mark of the MRI lies over it.
+// Blends a mark of the MRI over a colour.
 fn tinted(colour: vec3f, signal: vec4f) -> vec3f {
     let share = max(signal.x, max(signal.y, signal.z));
     return mix(colour, signal.xyz / max(share, 1e-3), 0.45 * share);

@@ -1,5 +1,5 @@
-// The deformed brain cut by a slice: where each point of the cut is at rest, so that the MRI moves
-// with the brain.
+// The deformed brain cut by a slice: the rest position of each point of the cut, so that the MRI
+// moves with the brain.
 
 struct Corner { at: vec4f, rest: vec4f }   // in the slice's picture, -1 to 1; world mm
 

@@ -1,10 +1,10 @@
-// The bone's isosurface at every pixel. Output: folded normal (xy), ambient light that gets there
-// and 1 more if the lamp's does too (z), distance along the ray in mm (w).
+// The bone's isosurface at every pixel. Output: octahedral normal (xy), ambient light fraction,
+// plus 1 if lit by the lamp (z), distance along the ray in mm (w).
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
 
 // Differences between the corners of a cube of 3.2 voxels: smooths the steps of thick slices and of
-// the burr's voxels.
+// drilled voxels.
 fn outward_normal(g: vec3f, along: vec3f) -> vec3f {
     var gradient = vec3f(0.0);
     for (var i = 0u; i < 8u; i++) {

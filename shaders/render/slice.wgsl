@@ -1,5 +1,5 @@
-// One orthogonal slice through the tool's tip: CT as it is drilled now, MRI where there is no bone,
-// tool and crosshair on top.
+// One orthogonal slice through the tool's tip: the present CT, MRI where there is no bone, tool and
+// crosshair on top.
 
 struct Slice {
     centre: vec4f,   // world mm at the middle of the picture; w: mm from there to its right edge

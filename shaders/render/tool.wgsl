@@ -1,4 +1,4 @@
-// Bodies in closed form, and the light on them.
+// Tools in closed form, and their lighting.
 
 // Distance along the ray to a ball, or NOTHING.
 fn ball(eye: vec3f, along: vec3f, centre: vec3f, radius: f32) -> f32 {
@@ -10,7 +10,7 @@ fn ball(eye: vec3f, along: vec3f, centre: vec3f, radius: f32) -> f32 {
     return select(NOTHING, t, room > 0.0 && t > 0.0);
 }
 
-// Distance along the ray to a shaft's mantle, or NOTHING.
+// Distance along the ray to a shaft's lateral surface, or NOTHING.
 fn shaft(eye: vec3f, along: vec3f, tip: vec4f, tail: vec4f) -> f32 {
     let axis = tail.xyz - tip.xyz;
     let away = eye - tip.xyz;
@@ -31,7 +31,7 @@ fn reach(along: vec3f, tip: vec4f, tail: vec4f) -> vec3f {
     return select(vec3f(NOTHING), met, tip.w > 0.0);
 }
 
-// Unit normal of a tool where a ray has met it.
+// Unit normal of a tool at a hit.
 fn tool_normal(point: vec3f, tip: vec4f, tail: vec4f, met: vec3f) -> vec3f {
     let t = min(met.x, min(met.y, met.z));
     let axis = tail.xyz - tip.xyz;
@@ -40,7 +40,7 @@ fn tool_normal(point: vec3f, tip: vec4f, tail: vec4f, met: vec3f) -> vec3f {
     return normalize(select(across, away, t == met.x || t == met.z));
 }
 
-// Diffuse light from above left and from the sky, and a highlight.
+// Diffuse light from the upper left and the sky, and a highlight.
 fn lit(albedo: vec3f, normal: vec3f, along: vec3f, open: f32, key: f32, gloss: f32) -> vec3f {
     let facing = max(dot(normal, scene.light.xyz), 0.0) * key;
     let sky = 0.5 + 0.5 * dot(normal, normalize(scene.up.xyz));

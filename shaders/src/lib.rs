@@ -1,47 +1,47 @@
 //! Trepan's WGSL shaders as strings: one file per pass, named like the Rust file that runs it.
 //!
 //! # Practice
-//! Passes of the picture start with the text of `scene.wgsl`, those of a soft-tissue step with
-//! `step.wgsl`, which declare what all of them know at binding 0. Every entry is checked by naga
-//! when its pipeline is made; there is nothing to build and no path to find at run time.
+//! Render passes start with the text of `scene.wgsl`, those of a soft-tissue step with `step.wgsl`,
+//! which declare their shared data at binding 0. naga checks every entry point when its pipeline is
+//! created; there is nothing to build and no path to find at run time.
 
-/// The text of `scene.wgsl` before some others.
+/// Prepends the text of `scene.wgsl`.
 macro_rules! picture {
     ($($file:literal),+) => {
         concat!(include_str!("../render/scene.wgsl"), $("\n", include_str!(concat!("../render/", $file))),+)
     };
 }
 
-/// The bone's isosurface by ray casting; `bricks.wgsl` takes the rays through the grid.
+/// The bone's isosurface by ray casting; `bricks.wgsl` traces the rays through the grid.
 pub const RENDER_SKULL: &str = picture!("bricks.wgsl", "skull.wgsl");
 /// The brain's deformed surface.
 pub const RENDER_BRAIN: &str = picture!("brain.wgsl");
-/// Bone, brain and tool together, lit, with the shadows that bone throws on the brain.
+/// Lighting of bone, brain and tool, with the shadows of bone on the brain.
 pub const RENDER_LIGHT: &str = picture!("bricks.wgsl", "tool.wgsl", "light.wgsl");
 /// Arrow, ghost and markers over the 3-D view.
 pub const RENDER_OVERLAY: &str = picture!("tool.wgsl", "overlay.wgsl");
-/// The brain where it is cut open.
+/// The cut surface of the brain.
 pub const RENDER_CUT: &str = picture!("cut.wgsl");
 /// One orthogonal slice.
 pub const RENDER_SLICE: &str = picture!("slice.wgsl");
 /// The brain's outline in a slice.
 pub const RENDER_CONTOUR: &str = picture!("contour.wgsl");
-/// A coarser 3-D view, enlarged.
+/// Enlarges a coarser 3-D view.
 pub const RENDER_ENLARGE: &str = picture!("enlarge.wgsl");
 /// Both eyes' views in one picture.
 pub const RENDER_ANAGLYPH: &str = picture!("anaglyph.wgsl");
-/// The brain cut by a slice, as places at rest.
+/// The brain cut by a slice, as rest positions.
 pub const RENDER_SECTION: &str = picture!("section.wgsl");
 
-/// The text of `step.wgsl` before a pass of a soft-tissue step.
+/// Prepends the text of `step.wgsl`.
 macro_rules! tled {
     ($($file:literal),+) => {
         concat!(include_str!("../tled/step.wgsl"), $("\n", include_str!(concat!("../tled/", $file))),+)
     };
 }
 
-/// Forces of tetrahedra on their nodes by law: neo-Hookean, St. Venant-Kirchhoff, Mooney-Rivlin,
-/// Ogden. They want `const RELAXES` and `const CURES` before them.
+/// Nodal forces of tetrahedra by constitutive law: neo-Hookean, St. Venant-Kirchhoff,
+/// Mooney-Rivlin, Ogden. They require `const RELAXES` and `const CURES` before them.
 pub const TLED_FORCES: [&str; 4] = [
     tled!("element.wgsl", "neo_hookean.wgsl", "forces.wgsl"),
     tled!("element.wgsl", "st_venant_kirchhoff.wgsl", "forces.wgsl"),
@@ -50,7 +50,7 @@ pub const TLED_FORCES: [&str; 4] = [
 ];
 /// Volume change of every tetrahedron, and its mean around the nodes.
 pub const TLED_VOLUMES: [&str; 2] = [tled!("element.wgsl", "volumes.wgsl"), tled!("node_groups.wgsl")];
-/// The springs of contact on the tissue.
+/// The contact springs on the tissue surface.
 pub const TLED_PRESS: &str = tled!("press.wgsl");
-/// What nodes gather of the forces, and their motion.
+/// Sums the forces at nodes and integrates their motion.
 pub const TLED_UPDATE: &str = tled!("update.wgsl");

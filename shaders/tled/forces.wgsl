@@ -1,13 +1,14 @@
-// Forces of the elements of one law on their four nodes, each to its own slot. P = F S + (q + κ
-// (J̄-1)) C    f_a = -V P ∇N_a    J̄ = J, or the mean of the corners' node_groups where locking is
-// cured The slot of corner 0 also carries the element's present ω², negative where J ≤ 0.
+// Forces of the elements of one law on their four nodes, each to its own slot.
+//   P = F S + (q + κ (J̄-1)) C    f_a = -V P ∇N_a
+// J̄ = J, or the mean of the corners' node groups with averaged pressure. The slot of corner 0 also
+// carries the element's present ω², negative where J ≤ 0.
 struct Range { first: u32, count: u32 }
 @group(0) @binding(4) var<storage, read_write> forces: array<vec4f>;
 // Further constants of the laws that have more than two.
 @group(0) @binding(5) var<storage, read> more: array<vec4f>;
 // Past stress: two terms of six numbers, all elements each.
 @group(0) @binding(6) var<storage, read_write> memory: array<f32>;
-@group(0) @binding(7) var<storage, read> swelling: array<f32>;
+@group(0) @binding(7) var<storage, read> volume_change: array<f32>;
 @group(0) @binding(8) var<uniform> range: Range;
 
 // An isochoric stress, times rest volume: V P = F s + q C.
@@ -16,7 +17,7 @@ struct Stress {
     q: f32,
 }
 
-// J^n continued linearly below J = 0.3, and its slope, from `at` = max(J, 0.3)^n.
+// J^n continued linearly below J = 0.1, and its slope, from `at` = max(J, 0.1)^n.
 fn continued(d: Deformation, at: f32, n: f32) -> vec2f {
     let slope = n * at * (d.root * d.root * d.root);
     return vec2f(at + slope * (d.j - d.clamped), slope);
@@ -76,9 +77,9 @@ fn pressed(stress: Stress, f: vec3f, c: vec3f) -> vec3f {
     let m = moduli(constants);
     var found = stress(constants, d);
     var swollen = d.j - 1.0;
-    if CURES {
+    if AVERAGES {
         let node_group = corners[2u * now.elements + e];
-        swollen = (swelling[node_group.x] + swelling[node_group.y] + swelling[node_group.z] + swelling[node_group.w]) * 0.25;
+        swollen = (volume_change[node_group.x] + volume_change[node_group.y] + volume_change[node_group.z] + volume_change[node_group.w]) * 0.25;
     }
     let omega2 = d.c.w * stiffness(found, m, d, swollen);
     if RELAXES { found = relaxed(e, found, d); }

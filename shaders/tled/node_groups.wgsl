@@ -5,12 +5,12 @@
 @group(0) @binding(2) var<storage, read> owners: array<u32>;
 @group(0) @binding(3) var<storage, read> swollen: array<f32>;
 @group(0) @binding(4) var<storage, read> inverse_volumes: array<f32>;
-@group(0) @binding(5) var<storage, read_write> swelling: array<f32>;
+@group(0) @binding(5) var<storage, read_write> volume_change: array<f32>;
 
 @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {
     let node_group = id.x;
     if node_group >= now.node_groups { return; }
     var sum = 0.0;
     for (var slot = starts[node_group]; slot < starts[node_group + 1u]; slot++) { sum += swollen[owners[slot]]; }
-    swelling[node_group] = sum * inverse_volumes[node_group];
+    volume_change[node_group] = sum * inverse_volumes[node_group];
 }

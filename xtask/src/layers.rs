@@ -3,6 +3,7 @@
 //! A crate may use only crates on lower floors, and inside floors 1 and 2 the two arrows that the
 //! map names. Some packages and some parts of the standard library belong to a few crates only.
 
+use crate::modules;
 use anyhow::{Context, Result};
 use serde_json::Value;
 use std::fs;
@@ -68,6 +69,7 @@ pub fn check(root: &Path) -> Result<Vec<String>> {
         }
         let manifest = PathBuf::from(package["manifest_path"].as_str().unwrap_or_default());
         faults.extend(words(name, &manifest.with_file_name("src"))?);
+        faults.extend(modules::circles(name, &manifest.with_file_name("src"))?);
     }
     Ok(faults)
 }
@@ -95,14 +97,9 @@ fn arrow(name: &str, floor: usize, dependency: &str, dev: bool) -> Option<String
 fn words(name: &str, folder: &Path) -> Result<Vec<String>> {
     let mut faults = Vec::new();
     for file in rust_files(folder)? {
-        let text = fs::read_to_string(&file)?;
-        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-        for (number, line) in code.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//")) {
-            let stray = WORDS.iter().filter(|(word, users)| line.contains(word) && !users.contains(&name));
-            faults.extend(
-                stray.map(|(word, users)| format!("{}:{}: `{word}` is kept to {users:?}", file.display(), number + 1)),
-            );
-        }
+        let code = modules::without_tests(&fs::read_to_string(&file)?);
+        let stray = WORDS.iter().filter(|(word, users)| code.contains(word) && !users.contains(&name));
+        faults.extend(stray.map(|(word, users)| format!("{}: `{word}` is kept to {users:?}", file.display())));
     }
     Ok(faults)
 }

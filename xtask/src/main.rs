@@ -2,7 +2,9 @@
 
 mod layers;
 mod merge;
+mod modules;
 mod operation;
+mod prose;
 mod tidy;
 mod validation;
 
@@ -147,8 +149,8 @@ fn documentation() -> Result<()> {
     Ok(())
 }
 
-/// Property tests draw the same in every run, so that what fails here is the change's fault and not
-/// the draw's; the environment may name another seed.
+/// Fixes the seed of the property tests, so that a failure comes from the change. The environment
+/// may name another seed.
 const DRAWS: [&str; 2] = ["PROPTEST_RNG_SEED", "2026"];
 
 fn cargo(arguments: &[&str], more: &[String]) -> Result<()> {

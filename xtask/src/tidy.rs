@@ -1,8 +1,8 @@
-//! Checks the house style that a compiler does not: module docs, lengths, READMEs, examples, shader
-//! pairs.
+//! Checks what a compiler does not: module docs, lengths, prose, READMEs, examples, shader pairs.
 
 use crate::layers::{files, rust_files};
-use anyhow::Result;
+use crate::prose;
+use anyhow::{Context, Result};
 use std::fs;
 use std::path::Path;
 
@@ -31,6 +31,7 @@ pub fn check(root: &Path) -> Result<Vec<String>> {
         faults.extend(too_long(root, file, APP_LINES)?);
     }
     faults.extend(shaders(root)?);
+    faults.extend(words(root)?);
     faults.sort();
     Ok(faults)
 }
@@ -47,6 +48,25 @@ fn source(root: &Path, file: &Path) -> Result<Option<String>> {
 fn too_long(root: &Path, file: &Path, limit: usize) -> Result<Option<String>> {
     let lines = fs::read_to_string(file)?.lines().count();
     Ok((lines > limit).then(|| format!("{} has {lines} lines, the limit is {limit}", shown(root, file))))
+}
+
+/// Faults of prose in every source, shader and README.
+fn words(root: &Path) -> Result<Vec<String>> {
+    let folders = ["crates", "apps", "shaders", "fixtures", "xtask"].map(|folder| root.join(folder));
+    let mut found = Vec::new();
+    for folder in &folders {
+        for extension in ["rs", "wgsl", "md"] {
+            found.extend(files(folder, extension)?);
+        }
+    }
+    found.extend(["README.md", "CHANGELOG.md", "CONTRIBUTING.md"].map(|name| root.join(name)));
+    let mut faults = Vec::new();
+    for file in found {
+        let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", file.display()))?;
+        let check = if file.extension().is_some_and(|e| e == "md") { prose::in_markdown } else { prose::in_source };
+        faults.extend(check(&text).into_iter().map(|fault| format!("{}:{fault}", shown(root, &file))));
+    }
+    Ok(faults)
 }
 
 fn crate_folder(root: &Path, folder: &Path) -> Result<Vec<String>> {

@@ -5,8 +5,8 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
 
-/// Runs every suite quickly. Some promises are ratios of times, which other work on the machine can
-/// disturb: what was broken is run once more, by itself, and must then be kept.
+/// Runs every suite quickly. Some acceptance limits are ratios of times, which other work on the
+/// machine can disturb: a suite that missed one runs once more, alone, and must then keep it.
 pub fn check(root: &Path) -> Result<()> {
     let out = root.join("target/xtask-validation");
     if out.is_dir() {
@@ -16,14 +16,14 @@ pub fn check(root: &Path) -> Result<()> {
         return Ok(());
     }
     let broken = broken(&out)?;
-    ensure!(!broken.is_empty(), "the quick validation failed, and not by a promise: see above");
+    ensure!(!broken.is_empty(), "the quick validation failed, and not by a limit: see above");
     println!("xtask: once more, one at a time: {}", broken.join(", "));
     let kept = quick(&out, &[&broken[..], &["--jobs".into(), "1".into()]].concat())?;
-    ensure!(kept, "the quick validation broke a promise");
+    ensure!(kept, "the quick validation missed an acceptance limit");
     Ok(())
 }
 
-/// Whether every promise was kept. A run that failed otherwise is a fault.
+/// Whether every acceptance limit was kept. A run that failed otherwise is a fault.
 fn quick(out: &Path, more: &[String]) -> Result<bool> {
     crate::cargo(&["build", "--workspace", "--bins", crate::FEATURES[0], crate::FEATURES[1]], &[])?;
     let program = std::env::current_exe()?.with_file_name("validate");
@@ -34,7 +34,7 @@ fn quick(out: &Path, more: &[String]) -> Result<bool> {
     Ok(status.success())
 }
 
-/// The suites that broke a promise.
+/// The suites that missed an acceptance limit.
 fn broken(out: &Path) -> Result<Vec<String>> {
     let mut suites = Vec::new();
     for entry in std::fs::read_dir(out).with_context(|| format!("the validation left no {}", out.display()))? {

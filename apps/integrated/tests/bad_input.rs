@@ -1,5 +1,5 @@
-//! What a user can get wrong: each fault names the file, the field and the remedy, exits with 2 and
-//! leaves nothing behind.
+//! Wrong inputs: the error names the file, the field and the remedy, the exit code is 2, and no
+//! file is left.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use glam::{DAffine3, DVec3, Vec3};
@@ -21,7 +21,7 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// A small CT: a hollow ball of bone, 64 mm wide, centred at `centre`.
+    /// Writes a small CT of 64 mm: a hollow ball of bone centred at `centre`.
     fn ct(&self, name: &str, centre: Vec3) -> PathBuf {
         let mut ct = VoxelVolume::isotropic([32, 32, 32], centre - 31.0, 2.0, -1000i16);
         for at in 0..ct.data.len() {
@@ -54,14 +54,14 @@ impl Bench {
             .unwrap()
     }
 
-    /// Exit code 2, every word said, no panic, nothing left.
+    /// Asserts exit code 2, all words in the message, no panic and no files left.
     fn refuses(&self, arguments: &[&str], words: &[&str]) {
         let output = self.run(arguments);
-        let said = String::from_utf8_lossy(&output.stderr).to_string();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
-        assert!(!said.contains("panicked"), "{said}");
+        let log = String::from_utf8_lossy(&output.stderr).to_string();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {log}");
+        assert!(!log.contains("panicked"), "{log}");
         for word in words {
-            assert!(said.contains(word), "{arguments:?} should say {word:?} but says: {said}");
+            assert!(log.contains(word), "{arguments:?} should say {word:?} but says: {log}");
         }
         assert!(!self.path("out").exists(), "an output folder was left");
         let kept = fs::read_dir(self.path("cache")).map_or(0, Iterator::count);
@@ -109,7 +109,7 @@ fn a_picture_of_two_dimensions() {
 }
 
 #[test]
-fn voxels_that_are_no_numbers() {
+fn voxels_that_are_nan() {
     let bench = Bench::new();
     let nan = VoxelVolume::isotropic([16, 16, 16], Vec3::splat(-15.0), 2.0, f32::NAN);
     nifti::write(&bench.path("nan.nii"), &nan).unwrap();
@@ -136,7 +136,7 @@ fn images_that_do_not_overlap() {
 }
 
 #[test]
-fn names_that_nobody_knows() {
+fn unknown_names() {
     let bench = Bench::new();
     bench.refuses(&["--device", "script:sneeze"], &["sneeze", "craniotomy-and-probe"]);
     bench.refuses(&["--device", "telepathy"], &["telepathy", "force-dimension"]);

@@ -1,4 +1,4 @@
-//! `device test`: works without hardware, says what is missing, and ends without force.
+//! `device test` works without hardware, reports what is missing and ends without force.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use serde_json::Value;
@@ -13,7 +13,7 @@ fn test(name: &str, out: &Path, seconds: &str) -> Command {
     command
 }
 
-fn found(out: &Path) -> Value {
+fn report(out: &Path) -> Value {
     serde_json::from_slice(&fs::read(out.join("device.json")).unwrap()).unwrap()
 }
 
@@ -22,17 +22,17 @@ fn a_simulated_device_is_measured_and_pressed() {
     let home = tempfile::tempdir().unwrap();
     let out = home.path().join("new");
     let done = test("simulated:craniotomy", &out, "9").output().unwrap();
-    let said = String::from_utf8_lossy(&done.stdout).to_string();
-    assert!(done.status.success(), "{said}");
+    let log = String::from_utf8_lossy(&done.stdout).to_string();
+    assert!(done.status.success(), "{log}");
     for words in ["move the tool", "light taps", "press down", "report:"] {
-        assert!(said.contains(words), "{words}: {said}");
+        assert!(log.contains(words), "{words}: {log}");
     }
-    let found = found(&out);
-    let (floor, timing) = (&found["floor"], &found["timing"]);
-    assert_eq!(found["ended"], "done");
+    let report = report(&out);
+    let (floor, timing) = (&report["floor"], &report["timing"]);
+    assert_eq!(report["ended"], "done");
     assert!(floor["force_n"].as_f64().unwrap() > 0.3 && floor["force_n"].as_f64().unwrap() <= 1.0, "{floor}");
     assert!(timing["fresh_hz"].as_f64().unwrap() > 0.0 && timing["jitter_us"]["p99"].as_f64().is_some(), "{timing}");
-    assert!(found["explored_mm"][1][1].as_f64().unwrap() > 30.0, "{}", found["explored_mm"]);
+    assert!(report["explored_mm"][1][1].as_f64().unwrap() > 30.0, "{}", report["explored_mm"]);
     let page = fs::read_to_string(out.join("device.html")).unwrap();
     assert!(page.matches("<svg").count() == 6 && !page.contains("NaN"));
 }
@@ -41,13 +41,13 @@ fn a_simulated_device_is_measured_and_pressed() {
 fn a_script_is_tested_without_motors() {
     let out = tempfile::tempdir().unwrap();
     assert!(test("script:probe", out.path(), "8").stdout(Stdio::null()).status().unwrap().success());
-    let found = found(out.path());
-    assert_eq!((&found["delay_ms"], &found["workspace_mm"]), (&Value::Null, &Value::Null));
-    assert!(found["findings"].to_string().contains("no motors"));
+    let report = report(out.path());
+    assert_eq!((&report["delay_ms"], &report["workspace_mm"]), (&Value::Null, &Value::Null));
+    assert!(report["findings"].to_string().contains("no motors"));
 }
 
 #[test]
-fn what_is_missing_is_told_and_nothing_is_left() {
+fn missing_software_is_named_and_no_file_is_left() {
     let home = tempfile::tempdir().unwrap();
     let out = home.path().join("out");
     for (name, words) in [
@@ -58,9 +58,9 @@ fn what_is_missing_is_told_and_nothing_is_left() {
         ("mouse", ["mouse", "--list-devices"]),
     ] {
         let done = test(name, &out, "8").output().unwrap();
-        let said = String::from_utf8_lossy(&done.stderr).to_string();
-        assert_eq!(done.status.code(), Some(2), "{name}: {said}");
-        assert!(words.iter().all(|word| said.contains(word)) && !said.contains("panicked"), "{name}: {said}");
+        let log = String::from_utf8_lossy(&done.stderr).to_string();
+        assert_eq!(done.status.code(), Some(2), "{name}: {log}");
+        assert!(words.iter().all(|word| log.contains(word)) && !log.contains("panicked"), "{name}: {log}");
         assert!(!out.exists(), "{name} left a folder");
     }
     assert_eq!(test("script:probe", &out, "2").output().unwrap().status.code(), Some(2), "too short");
@@ -78,6 +78,6 @@ fn a_signal_ends_it_without_force_and_with_a_report() {
         std::thread::sleep(Duration::from_millis(20));
     }
     assert_eq!(child.wait().unwrap().code(), Some(130));
-    let found = found(out.path());
-    assert_eq!((&found["ended"], &found["end_force_n"]), (&Value::from("stopped"), &Value::from(0.0)));
+    let report = report(out.path());
+    assert_eq!((&report["ended"], &report["end_force_n"]), (&Value::from("stopped"), &Value::from(0.0)));
 }

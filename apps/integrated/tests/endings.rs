@@ -1,5 +1,4 @@
-//! How a session ends: by a signal, by being killed, by itself; and that a replay of it is the
-//! same, bit for bit.
+//! Ends of a session: by a signal, killed, by itself. Replays of it are equal bit for bit.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use serde_json::Value;
@@ -12,7 +11,7 @@ use trepan_link::Recording;
 fn operation(out: &Path, seconds: &str, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_integrated"));
     command.args(["--headless", "--frames-per-second", "0", "--duration", seconds, "--out"]).arg(out);
-    // What a plan takes depends on the machine; a replay goes by its recording.
+    // A plan depends on the machine; a replay uses the models of its recording.
     let again = more.iter().any(|word| word.starts_with("replay:"));
     command.args(["--quality", "usual"].iter().filter(|_| !again)).args(more);
     command
@@ -91,13 +90,13 @@ fn every_session_has_a_folder_of_its_own_and_an_older_one_is_replaced_only_when_
         command.env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"));
         command.current_dir(home.path()).output().unwrap()
     };
-    let told = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     for n in 1..=2 {
         let done = run(&[]);
-        assert!(done.status.success(), "{}", told(&done.stderr));
+        assert!(done.status.success(), "{}", text(&done.stderr));
         let folders: Vec<_> = fs::read_dir(home.path().join("trepan-out/integrated")).unwrap().flatten().collect();
         assert_eq!(folders.len(), n);
-        let last = told(&done.stdout).lines().last().unwrap().to_string();
+        let last = text(&done.stdout).lines().last().unwrap().to_string();
         assert!(folders.iter().any(|f| last.contains(f.file_name().to_str().unwrap())), "{last}");
         assert!(folders.iter().all(|f| f.path().join("summary.json").exists()), "{last}");
     }
@@ -105,15 +104,15 @@ fn every_session_has_a_folder_of_its_own_and_an_older_one_is_replaced_only_when_
     let old = fs::read(home.path().join("out/session.mcap")).unwrap();
     let again = run(&["--out", "out"]);
     assert_eq!(again.status.code(), Some(2));
-    assert!(told(&again.stderr).contains("--overwrite"), "{}", told(&again.stderr));
+    assert!(text(&again.stderr).contains("--overwrite"), "{}", text(&again.stderr));
     assert_eq!(old, fs::read(home.path().join("out/session.mcap")).unwrap());
     fs::write(home.path().join("out/drilled.stl"), "old").unwrap();
     assert!(run(&["--out", "out", "--overwrite"]).status.success());
     assert!(!home.path().join("out/drilled.stl").exists(), "a file of the older session stayed");
     assert!(home.path().join("out/summary.json").exists());
-    // What is run again is never replaced by its replay.
+    // A replay never overwrites its own recording.
     let onto = run(&["--device", "replay:out/session.mcap", "--out", "out", "--overwrite"]);
-    assert_eq!(onto.status.code(), Some(2), "{}", told(&onto.stderr));
+    assert_eq!(onto.status.code(), Some(2), "{}", text(&onto.stderr));
 }
 
 #[test]
@@ -136,7 +135,7 @@ fn a_built_case_runs_and_is_not_overwritten() {
 }
 
 #[test]
-fn a_watcher_follows_and_its_death_changes_nothing() {
+fn a_watcher_follows_and_killing_one_has_no_effect() {
     let name = format!("test-{}", std::process::id());
     let [trainee, watcher, dead] = [(); 3].map(|()| tempfile::tempdir().unwrap());
     let mut session = operation(trainee.path(), "8", &["--share", &name]).spawn().unwrap();
@@ -155,15 +154,15 @@ fn a_watcher_follows_and_its_death_changes_nothing() {
 }
 
 #[test]
-fn a_watcher_of_nobody_is_refused() {
+fn a_watcher_without_a_session_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let mut command = operation(&out, "60", &["--watch", "nobody-shares-this"]);
     let output = command.stderr(Stdio::piped()).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.code() == Some(2) && !out.exists(), "{said}");
+    let log = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && !out.exists(), "{log}");
     for word in ["waiting for the session nobody-shares-this", "no session of this name", "--share"] {
-        assert!(said.contains(word), "{word}: {said}");
+        assert!(log.contains(word), "{word}: {log}");
     }
 }
 
@@ -172,8 +171,8 @@ fn a_session_that_was_interrupted_in_contact_replays_to_its_faded_end() {
     let [live, again] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let record = live.path().join("session.mcap");
     let pressing = |t: &trepan_link::wire::TickRecord| t.wrench.force.length() > 0.1;
-    // This hand rests on the bone for half of its time: a recording that lags behind its session
-    // tells the same.
+    // The script rests on the bone for half of the time, so that a file that lags behind the
+    // session shows contact too.
     let mut child = operation(live.path(), "40", &["--device", "script:aspirate"]).spawn().unwrap();
     let long = |r: &Recording| r.ticks.iter().filter(|t| pressing(t)).count() > 4000;
     while !Recording::open(&record).is_ok_and(|r| r.ticks.last().is_some_and(pressing) && long(&r)) {
@@ -191,8 +190,8 @@ fn a_session_that_was_interrupted_in_contact_replays_to_its_faded_end() {
     assert_eq!(summary["replay"]["ticks"], summary["replay"]["identical"]);
 }
 
-/// Runs the operation with its output in a small disk of its own, and gives its exit code, what it
-/// said, and the recording; `None` where the system lets no one mount.
+/// Runs the operation with its output on a small separate disk. Returns exit code, log and
+/// recording; `None` where mounting is not allowed.
 fn on_disk(options: &str, seconds: &str) -> Option<(Option<i32>, String, Option<Recording>)> {
     let kept = tempfile::tempdir().unwrap();
     let disk = kept.path().join("disk");
@@ -207,42 +206,39 @@ fn on_disk(options: &str, seconds: &str) -> Option<(Option<i32>, String, Option<
     command.args(["--headless", "--quality", "usual", "--frames-per-second", "0", "--duration", seconds]);
     command.env("TREPAN_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases"));
     let done = command.output().ok().filter(|done| !matches!(done.status.code(), Some(1 | 99)))?;
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    Some((done.status.code(), said, Recording::open(&kept.path().join("session.mcap")).ok()))
+    let log = String::from_utf8_lossy(&done.stderr).into_owned();
+    Some((done.status.code(), log, Recording::open(&kept.path().join("session.mcap")).ok()))
 }
 
 #[test]
-fn a_full_disk_ends_the_recording_with_a_word_and_not_the_session() {
-    let Some((code, said, recording)) = on_disk("size=900k", "8") else {
+fn a_full_disk_ends_the_recording_with_an_error_and_not_the_session() {
+    let Some((code, log, recording)) = on_disk("size=900k", "8") else {
         eprintln!("this system lets no test mount a disk: not tried");
         return;
     };
-    assert_eq!(code, Some(2), "{said}");
-    assert!(
-        said.contains("No space left") && said.contains("recording ended early") && said.contains("--out"),
-        "{said}"
-    );
-    // The session went on to its end; what was recorded before is whole.
-    assert!(said.contains("brain begins"), "{said}");
-    let left = said.rsplit_once("/out:\n").unwrap().1;
-    assert_eq!(left.trim(), "session.mcap", "{said}");
+    assert_eq!(code, Some(2), "{log}");
+    assert!(log.contains("No space left") && log.contains("recording ended early") && log.contains("--out"), "{log}");
+    // The session went on to its end; the recording before the fault is intact.
+    assert!(log.contains("brain begins"), "{log}");
+    let left = log.rsplit_once("/out:\n").unwrap().1;
+    assert_eq!(left.trim(), "session.mcap", "{log}");
     let recording = recording.unwrap();
     assert!(recording.damage.is_some() && recording.ticks.len() > 1000, "{} ticks", recording.ticks.len());
     assert!(recording.ticks.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_named_before_anything_is_moved() {
-    let Some((code, said, recording)) = on_disk("size=1500k,ro", "8") else {
+fn a_read_only_folder_is_named_before_the_session_begins() {
+    let Some((code, log, recording)) = on_disk("size=1500k,ro", "8") else {
         eprintln!("this system lets no test mount a disk: not tried");
         return;
     };
-    assert_eq!((code, recording.is_none()), (Some(2), true), "{said}");
-    assert!(said.contains("Read-only file system") && said.contains("--out") && !said.contains("begins"), "{said}");
+    assert_eq!((code, recording.is_none()), (Some(2), true), "{log}");
+    assert!(log.contains("Read-only file system") && log.contains("--out") && !log.contains("begins"), "{log}");
 }
 
 #[test]
-fn a_folder_of_recordings_runs_again_in_shards() {
+fn a_folder_of_recordings_is_replayed_in_shards() {
     let folder = tempfile::tempdir().unwrap();
     let runs = folder.path().join("runs");
     fs::create_dir(&runs).unwrap();

@@ -1,5 +1,5 @@
-//! Nothing that names a patient leaves the input files: not into a case, its cache, a recording, a
-//! report, a log.
+//! No identifier of a patient gets from the input files into a case, its cache, a recording, a
+//! report or a log.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use glam::Vec3;
@@ -9,7 +9,7 @@ use std::process::Command;
 use trepan_link::Recording;
 use trepan_volume::{VoxelVolume, nifti};
 
-/// What identifies a patient in the headers and file names below.
+/// Identifiers of the patient in the headers and file names below.
 const SECRETS: [&str; 14] = [
     "MUSTERMANN",
     "MAIDENNAME",
@@ -27,7 +27,7 @@ const SECRETS: [&str; 14] = [
     "nifti-of-her",
 ];
 
-/// An explicit little-endian DICOM file, element by element.
+/// Writer of an explicit little-endian DICOM file.
 struct Slice(Vec<u8>);
 
 impl Slice {
@@ -66,7 +66,7 @@ impl Slice {
 const SIDE: usize = 32;
 const SPACING_MM: f32 = 2.0;
 
-/// A hollow ball of bone about the origin.
+/// Makes a hollow ball of bone about the origin.
 fn head() -> VoxelVolume<i16> {
     let mut ct = VoxelVolume::isotropic([SIDE; 3], Vec3::splat(-31.0), SPACING_MM, -1000i16);
     for at in 0..ct.data.len() {
@@ -80,7 +80,7 @@ fn head() -> VoxelVolume<i16> {
     ct
 }
 
-/// The head as a DICOM series with everything in it that a hospital writes down.
+/// Writes the head as a DICOM series with all identifiers that a hospital adds.
 fn series(folder: &Path) -> PathBuf {
     let place = folder.join("MUSTERMANN^ERIKA");
     fs::create_dir(&place).unwrap();
@@ -145,7 +145,7 @@ fn series(folder: &Path) -> PathBuf {
     place
 }
 
-/// A ball as NIfTI, with a name in each of the header's free texts.
+/// Writes a ball as NIfTI, with an identifier in each free text of the header.
 fn ball(folder: &Path, name: &str, inside: u8, outside: u8) -> PathBuf {
     let ball = head().map(|hu| if hu == 40 { inside } else { outside });
     let path = folder.join(name);
@@ -158,7 +158,7 @@ fn ball(folder: &Path, name: &str, inside: u8, outside: u8) -> PathBuf {
     path
 }
 
-/// Every file below a folder, unpacked as far as it is packed.
+/// Returns every file below a folder, decompressed.
 fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap().flatten() {
@@ -182,7 +182,7 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     found
 }
 
-/// Asserts that nobody else may look into what a folder holds.
+/// Asserts that other users cannot read the contents of a folder.
 #[cfg(unix)]
 fn private(folder: &Path) {
     use std::os::unix::fs::PermissionsExt;
@@ -195,10 +195,11 @@ fn private(folder: &Path) {
     }
 }
 
-fn told(what: &str, bytes: &[u8]) {
+/// Asserts that bytes contain no identifier.
+fn assert_no_identifier(what: &str, bytes: &[u8]) {
     for secret in SECRETS {
         let found = bytes.windows(secret.len()).any(|window| window == secret.as_bytes());
-        assert!(!found, "{what} tells {secret:?}");
+        assert!(!found, "{what} contains {secret:?}");
     }
 }
 
@@ -216,9 +217,9 @@ fn no_identifier_leaves_the_input_files() {
         let mut command = Command::new(env!("CARGO_BIN_EXE_integrated"));
         command.args(before).args(images).arg("--out").arg(made.join(out)).args(after);
         let output = command.env("TREPAN_CACHE", made.join("cache")).env("RUST_LOG", "info").output().unwrap();
-        let said = [output.stdout, output.stderr].concat();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&said));
-        told("the log", &said);
+        let log = [output.stdout, output.stderr].concat();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&log));
+        assert_no_identifier("the log", &log);
     };
     fs::create_dir(&made).unwrap();
     run(&["case", "build"], "case", &[]);
@@ -232,7 +233,7 @@ fn no_identifier_leaves_the_input_files() {
         assert!(files.iter().any(|(path, _)| path.ends_with(name)), "{name} was not made: the test looks at nothing");
     }
     for (path, bytes) in &files {
-        told(&path.display().to_string(), bytes);
-        told("a file name", path.strip_prefix(&made).unwrap().as_os_str().as_encoded_bytes());
+        assert_no_identifier(&path.display().to_string(), bytes);
+        assert_no_identifier("a file name", path.strip_prefix(&made).unwrap().as_os_str().as_encoded_bytes());
     }
 }

@@ -1,5 +1,5 @@
-//! Which models a session runs: presets reach the loops and the picture, a plan is recorded and
-//! replayed bit for bit without a new one.
+//! Models of a session: presets reach loops and picture; a plan is recorded and replayed bit for
+//! bit without planning again.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use serde_json::Value;
@@ -15,13 +15,13 @@ fn integrated(arguments: &[&str]) -> Output {
     command.output().unwrap()
 }
 
-/// Runs an operation of some seconds; gives its summary and what it said.
+/// Runs an operation of some seconds; returns its summary and its log.
 fn operation(out: &Path, seconds: &str, more: &[&str]) -> (Value, String) {
     let fixed = ["--headless", "--duration", seconds, "--out", out.to_str().unwrap()];
     let done = integrated(&[&fixed, more].concat());
-    let said = String::from_utf8_lossy(&done.stderr).into_owned();
-    assert!(done.status.success(), "{said}");
-    (serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap(), said)
+    let log = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success(), "{log}");
+    (serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap(), log)
 }
 
 fn replay_of(out: &Path) -> String {
@@ -29,15 +29,15 @@ fn replay_of(out: &Path) -> String {
 }
 
 #[test]
-fn a_preset_reaches_loops_and_picture() {
+fn a_preset_applies_to_loops_and_picture() {
     let out = tempfile::tempdir().unwrap();
     let pictures = ["--quality", "draft", "--frames-per-second", "1", "--picture", "160x96"];
-    let (summary, said) = operation(out.path(), "2", &pictures);
+    let (summary, log) = operation(out.path(), "2", &pictures);
     let models = &summary["models"];
     assert_eq!((&models["quality"], &models["planned_cores"]), (&Value::from("draft"), &Value::Null));
     assert_eq!((models["bone"]["spacing_mm"].as_f64(), models["picture"]["detail"].as_f64()), (Some(1.5), Some(0.5)));
-    assert!(said.contains("bone: god-object-sphere on 1.5 mm voxels (preset draft)"), "{said}");
-    // Not what was wished for: what ran.
+    assert!(log.contains("bone: god-object-sphere on 1.5 mm voxels (preset draft)"), "{log}");
+    // The number of tetrahedra that ran, not the requested one.
     let tets = summary["solver"]["tets"].as_f64().unwrap();
     assert!((tets / 3000.0 - 1.0).abs() < 0.1, "{tets} tetrahedra");
     let [skull, ct] =
@@ -63,18 +63,18 @@ fn a_preset_reaches_loops_and_picture() {
 #[test]
 fn a_planned_session_replays_bit_for_bit_without_a_plan() {
     let [live, again, other] = [(); 3].map(|()| tempfile::tempdir().unwrap());
-    let (was, said) =
+    let (was, log) =
         operation(live.path(), "4", &["--force-error-n", "0.5", "--displacement-mm", "4", "--frames-per-second", "0"]);
     assert_eq!(was["models"]["quality"], "auto");
-    assert!(said.contains("planned: ") && said.contains(" N of 0.5 allowed"), "{said}");
-    assert!(said.contains("error in this case "), "the case itself was measured: {said}");
+    assert!(log.contains("planned: ") && log.contains(" N of 0.5 allowed"), "{log}");
+    assert!(log.contains("error in this case "), "the case itself was measured: {log}");
     let header = Recording::open(&live.path().join("session.mcap")).unwrap().header;
     assert_eq!(header.config["quality"], "auto");
     assert_eq!(was["models"]["tissue"]["tets"].to_string(), header.config["tets"]);
 
     let device = replay_of(live.path());
-    let (is, said) = operation(again.path(), "4", &["--device", &device, "--frames-per-second", "0"]);
-    assert!(!said.contains("planned: "), "{said}");
+    let (is, log) = operation(again.path(), "4", &["--device", &device, "--frames-per-second", "0"]);
+    assert!(!log.contains("planned: "), "{log}");
     assert_eq!(
         (&is["models"]["quality"], &is["replay"]["identical"]),
         (&Value::from("replay"), &is["replay"]["ticks"])
@@ -87,27 +87,27 @@ fn a_planned_session_replays_bit_for_bit_without_a_plan() {
         assert_eq!(without_why(is["models"][part].clone()), without_why(was["models"][part].clone()));
     }
 
-    // By another mesh the same time passes, whatever its steps.
+    // With another mesh, whose steps have another length, the simulated time is the same.
     let (is, _) = operation(other.path(), "4", &["--device", &device, "--tets", "4500", "--frames-per-second", "0"]);
     let factor = is["solver"]["real_time_factor"].as_f64().unwrap();
     assert!((factor - 1.0).abs() < 0.1, "{factor}");
 }
 
 #[test]
-fn a_plan_is_told_for_the_case_that_is_given() {
-    let told = integrated(&["plan", "--tets", "6000", "--force-error-n", "0.0001"]);
-    assert!(told.status.success());
-    let told = String::from_utf8_lossy(&told.stdout).into_owned();
+fn a_plan_is_printed_for_the_given_case() {
+    let text = integrated(&["plan", "--tets", "6000", "--force-error-n", "0.0001"]);
+    assert!(text.status.success());
+    let text = String::from_utf8_lossy(&text.stdout).into_owned();
     for words in
         ["this machine: ", "this case: CT voxels of ", "--tets 6000 is given", "next ", "cores", "TOLERANCE NOT MET"]
     {
-        assert!(told.contains(words), "{words:?} is not in: {told}");
+        assert!(text.contains(words), "{words:?} is not in: {text}");
     }
-    assert!(told.contains("errors by measuring bone, tissue, picture in it"), "{told}");
-    // What was found is kept: other tolerances choose among the same errors.
+    assert!(text.contains("errors by measuring bone, tissue, picture in it"), "{text}");
+    // Measured errors are stored: other tolerances choose among the same errors.
     let again = integrated(&["plan", "--tets", "6000", "--force-error-n", "0.5"]);
     let again = String::from_utf8_lossy(&again.stdout).into_owned();
-    let of_tissue = |told: &str| told.lines().skip_while(|l| !l.starts_with("tissue: ")).nth(1).map(String::from);
-    let error = |told: &str| of_tissue(told)?.split("error ").nth(1)?.split(" mm").next().map(String::from);
-    assert!(error(&told).is_some() && error(&told) == error(&again), "{told}\n{again}");
+    let of_tissue = |text: &str| text.lines().skip_while(|l| !l.starts_with("tissue: ")).nth(1).map(String::from);
+    let error = |text: &str| of_tissue(text)?.split("error ").nth(1)?.split(" mm").next().map(String::from);
+    assert!(error(&text).is_some() && error(&text) == error(&again), "{text}\n{again}");
 }

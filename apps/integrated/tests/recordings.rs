@@ -1,5 +1,5 @@
-//! Recordings that are damaged, cut, or of another case: a replay says so, and a repair keeps what
-//! can be read.
+//! Recordings that are damaged, cut or of another case: a replay reports it, and a repair keeps the
+//! readable part.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use serde_json::Value;
@@ -14,11 +14,11 @@ fn integrated(arguments: &[&str]) -> Output {
     command.args(arguments).output().unwrap()
 }
 
-fn said(output: &Output) -> String {
+fn log_of(output: &Output) -> String {
     [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes)).concat()
 }
 
-/// A place for files, with a recorded session of three seconds.
+/// A temporary folder and the bytes of a recorded session of three seconds.
 struct Bench {
     folder: tempfile::TempDir,
     whole: Vec<u8>,
@@ -30,7 +30,7 @@ impl Bench {
         let bench = Self { folder, whole: Vec::new() };
         let live = bench.path("live");
         let run = bench.session(&live, &["--quality", "usual", "--duration", "3"]);
-        assert!(run.status.success(), "{}", said(&run));
+        assert!(run.status.success(), "{}", log_of(&run));
         Self { whole: fs::read(live.join("session.mcap")).unwrap(), ..bench }
     }
 
@@ -58,7 +58,7 @@ impl Bench {
 }
 
 #[test]
-fn a_replay_of_a_damaged_recording_says_so_and_a_repair_keeps_the_rest() {
+fn a_replay_of_a_damaged_recording_reports_it_and_a_repair_keeps_the_rest() {
     let bench = Bench::new();
     let all = Recording::of_bytes(&bench.whole, Path::new("whole")).unwrap().ticks.len();
     let mut bytes = bench.whole.clone();
@@ -67,7 +67,7 @@ fn a_replay_of_a_damaged_recording_says_so_and_a_repair_keeps_the_rest() {
     let damaged = bench.file("damaged.mcap", &bytes);
 
     let (output, summary) = bench.again(&damaged, &[]);
-    let text = said(&output);
+    let text = log_of(&output);
     assert_eq!(output.status.code(), Some(1), "{text}");
     let ran = summary["replay"]["ticks"].as_u64().unwrap() as usize;
     assert!(ran > 100 && ran < all && summary["replay"]["recorded"] == all, "{}", summary["replay"]);
@@ -81,30 +81,30 @@ fn a_replay_of_a_damaged_recording_says_so_and_a_repair_keeps_the_rest() {
     let [from, to] = [&damaged, &repaired].map(|path| path.to_str().unwrap());
     let check = |file| integrated(&["recording", "check", file]);
     assert!(
-        check(from).status.code() == Some(1) && said(&check(from)).contains(&format!("of {all} ticks can be read"))
+        check(from).status.code() == Some(1) && log_of(&check(from)).contains(&format!("of {all} ticks can be read"))
     );
     let mend = integrated(&["recording", "repair", from, to]);
-    assert!(mend.status.success() && said(&mend).contains("are missing"), "{}", said(&mend));
+    assert!(mend.status.success() && log_of(&mend).contains("are missing"), "{}", log_of(&mend));
     let kept = Recording::open(&repaired).unwrap();
     assert!(kept.indexed && kept.damage.is_none() && kept.ticks.len() > all - 250, "{}", kept.ticks.len());
     let again = integrated(&["recording", "repair", from, to]);
-    assert!(again.status.code() == Some(2) && said(&again).contains("exists already"));
+    assert!(again.status.code() == Some(2) && log_of(&again).contains("exists already"));
     let (output, _) = bench.again(&repaired, &[]);
-    assert_eq!(output.status.code(), Some(1), "ticks are missing: {}", said(&output));
+    assert_eq!(output.status.code(), Some(1), "ticks are missing: {}", log_of(&output));
 }
 
 #[test]
-fn a_cut_recording_is_run_as_far_as_it_goes_or_refused() {
+fn a_truncated_recording_is_replayed_as_far_as_it_goes_or_refused() {
     let bench = Bench::new();
     let killed = bench.file("killed.mcap", &bench.whole[..bench.whole.len() * 2 / 3]);
     let (output, summary) = bench.again(&killed, &[]);
-    assert!(output.status.code() == Some(1) && said(&output).contains("a part only"), "{}", said(&output));
+    assert!(output.status.code() == Some(1) && log_of(&output).contains("a part only"), "{}", log_of(&output));
     assert!(summary["replay"]["losses"].as_str().unwrap().contains("cut or damaged"));
 
     fs::remove_dir_all(bench.path("again")).unwrap();
     let stump = bench.file("stump.mcap", &bench.whole[..3000]);
     let (output, _) = bench.again(&stump, &[]);
-    let text = said(&output);
+    let text = log_of(&output);
     assert!(output.status.code() == Some(2) && !bench.path("again").exists(), "{text}");
     assert!(text.contains("nothing to run again") && text.contains("recording repair"), "{text}");
 
@@ -113,20 +113,20 @@ fn a_cut_recording_is_run_as_far_as_it_goes_or_refused() {
     fs::copy(&killed, folder.join("a.mcap")).unwrap();
     fs::write(folder.join("b.mcap"), &bench.whole).unwrap();
     let (output, _) = bench.again(&folder, &[]);
-    assert!(output.status.code() == Some(1) && said(&output).contains("1 of 2 recordings"), "{}", said(&output));
+    assert!(output.status.code() == Some(1) && log_of(&output).contains("1 of 2 recordings"), "{}", log_of(&output));
     assert!(integrated(&["recording", "check", folder.join("b.mcap").to_str().unwrap()]).status.success());
 }
 
 #[test]
-fn a_replay_lasts_no_longer_than_it_was_told() {
+fn a_replay_lasts_no_longer_than_its_duration_flag() {
     let bench = Bench::new();
     let file = bench.file("whole.mcap", &bench.whole);
     let (output, summary) = bench.again(&file, &["--duration", "1"]);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", log_of(&output));
     let replay = &summary["replay"];
     let ticks = replay["ticks"].as_u64().unwrap();
     assert!((800..1010).contains(&ticks) && replay["identical"] == ticks, "{replay}");
-    assert!(replay["recorded"].as_u64().unwrap() > 2000 && said(&output).contains("a part only"), "{replay}");
+    assert!(replay["recorded"].as_u64().unwrap() > 2000 && log_of(&output).contains("a part only"), "{replay}");
     let (output, summary) = bench.again(&file, &["--duration", "3"]);
     assert!(output.status.success() && summary["replay"]["ticks"] == summary["replay"]["recorded"]);
 }
@@ -136,20 +136,20 @@ fn a_recording_of_another_patient_is_refused() {
     let bench = Bench::new();
     let file = bench.file("whole.mcap", &bench.whole);
     let head = trepan_fixtures::case_head();
-    // Another byte behind the voxels: as good as another patient.
+    // An additional byte after the voxels changes the hash, as another patient would.
     let mut bytes = fs::read(&head.ct).unwrap();
     bytes.push(0);
     let ending: String = head.ct.file_name().unwrap().to_string_lossy().into();
     let other = bench.file(&format!("other-{ending}"), &bytes);
     let mri = head.mri.to_str().unwrap();
     let (output, _) = bench.again(&file, &["--ct", other.to_str().unwrap(), "--mri", mri]);
-    let text = said(&output);
+    let text = log_of(&output);
     assert!(output.status.code() == Some(2) && text.contains("another case") && text.contains("--ct"), "{text}");
     assert!(!bench.path("again").exists());
-    // The same images with other voxels, and by their own names: the same patient.
+    // The same images given as files and with other voxels: the same patient.
     let own = ["--ct", head.ct.to_str().unwrap(), "--mri", mri, "--spacing-mm", "2", "--duration", "0.5"];
     let (output, summary) = bench.again(&file, &own);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", log_of(&output));
     assert!(summary["remarks"].to_string().contains("made otherwise"), "{}", summary["remarks"]);
     let out = bench.path("compare");
     let coarse = bench.path("again").join("session.mcap");

@@ -1,5 +1,5 @@
-//! A teacher beside a running session: what she asks reaches the hand and the recording, and ends
-//! with her.
+//! A teacher of a running session: her requests reach the haptic loop and the recording, and end
+//! when she sends nothing more.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -22,7 +22,7 @@ fn paused(tick: &TickRecord) -> bool {
 }
 
 #[test]
-fn a_teacher_pauses_a_session_and_her_silence_ends_it() {
+fn a_teacher_pauses_a_session_and_the_pause_ends_without_records() {
     let folder = tempfile::tempdir().expect("a folder");
     let (live, again) = (folder.path().join("live"), folder.path().join("again"));
     let name = format!("lesson-{}", std::process::id());
@@ -36,11 +36,11 @@ fn a_teacher_pauses_a_session_and_her_silence_ends_it() {
         assert!(began.elapsed() < Duration::from_secs(60), "the session does not press on the bone");
         std::thread::sleep(Duration::from_millis(1));
     }
-    // She says so for a while, then never again.
+    // She requests the pause for a while, then sends nothing more.
     for seq in 1..=20 {
         teacher
             .send(&TeacherRecord { seq, flags: TeacherRecord::PAUSE, ..TeacherRecord::default() })
-            .expect("she tells");
+            .expect("she sends");
         std::thread::sleep(Duration::from_millis(20));
     }
     assert!(trainee.wait().expect("it ends").success());

@@ -1,5 +1,4 @@
-//! Which model does a scene need on which machine? Prints the plan for a fast machine and for a
-//! slow one, at three tolerances.
+//! Prints the plan for a fast and for a slow machine, at three tolerances.
 
 use trepan_budget::{Machine, PlanError, Scene, plan};
 

@@ -1,28 +1,28 @@
-//! One part of a plan: what was taken, and what lies next to it.
+//! One part of a plan: the choice and its neighbours.
 
-/// What was taken of one kind, and its neighbours.
+/// The choice for one part, and its neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice<T> {
-    /// What was taken.
+    /// The chosen model.
     pub what: T,
-    /// Its error in this scene: what it stays under in nearly all scenes like this.
+    /// Bound of its error in this scene.
     pub error: f64,
-    /// Its cost on this machine, cores: CPU seconds a second.
+    /// Its cost on this machine, cores (CPU seconds per second).
     pub cost: f64,
     /// Whether the error is within the scene's tolerance.
     pub meets_tolerance: bool,
     /// Whether it runs in time.
     pub in_time: bool,
-    /// The cheapest one with a smaller error.
+    /// The cheapest alternative with a smaller error.
     pub better: Option<Neighbour<T>>,
-    /// The most accurate one that costs less.
+    /// The most accurate alternative that costs less.
     pub cheaper: Option<Neighbour<T>>,
 }
 
-/// What else there was.
+/// An alternative choice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour<T> {
-    /// What it is.
+    /// The alternative model.
     pub what: T,
     /// Its error.
     pub error: f64,
@@ -32,9 +32,9 @@ pub struct Neighbour<T> {
     pub in_time: bool,
 }
 
-/// Picks from (what, error, cost, whether it runs in time): of those in time the cheapest within
-/// the tolerance; if none is, the most accurate in time; if none runs in time, the cheapest. Of
-/// equals the more accurate or cheaper one.
+/// Picks from (what, error, cost, whether it runs in time).
+/// Of those in time, the cheapest within the tolerance, else the most accurate. If none runs in
+/// time, the cheapest. Ties go to the more accurate or cheaper one.
 pub(crate) fn choose<T: Copy>(judged: impl Iterator<Item = (T, f64, f64, bool)>, tolerance: f64) -> Option<Choice<T>> {
     let all: Vec<Neighbour<T>> =
         judged.map(|(what, error, cost, in_time)| Neighbour { what, error, cost, in_time }).collect();

@@ -1,4 +1,4 @@
-//! What a plan says: what was taken, why, and what its neighbours would cost.
+//! Text of a plan: the choices, the reasons, and the costs of the neighbours.
 
 use crate::{Choice, Plan};
 use core::fmt;

@@ -2,16 +2,16 @@
 //! scene's tolerance and a machine's time.
 //!
 //! # Theory
-//! The cheapest model that meets the tolerance, no more. What each choice costs and how far it is
-//! off was measured in many scenes and stored as laws in a few features of a scene ([`Rows`],
+//! Chooses the cheapest model that meets the tolerance. The cost and error of each choice were
+//! measured in many scenes and stored as power laws in a few scene features ([`Rows`],
 //! [`PowerLaw`]); a machine scales the costs ([`Machine`]), a scene the errors ([`Scene`]). Of the
-//! choices that run in time with headroom the cheapest one whose error stays within the tolerance,
-//! by the law's bound, is taken; if none is, the most accurate one that runs, and the plan says so.
+//! choices that run in time with headroom, the cheapest whose error bound is within the tolerance
+//! is taken. If there is none, the most accurate one that runs is taken, and the plan reports it.
 //!
 //! # Practice
-//! Runs once at start, microseconds. Nothing here measures: the machine's numbers are passed in, so
-//! a plan is the same for the same numbers. Costs are cores, CPU seconds a second, so that they add
-//! up.
+//! Runs once at start, in microseconds. Nothing is measured here: the machine's numbers are passed
+//! in, so that equal numbers give equal plans. Costs are in cores (CPU seconds per second), so that
+//! they add up.
 //!
 //! ```
 //! use trepan_budget::{Machine, Scene, plan};
@@ -24,7 +24,7 @@
 //! ```
 //!
 //! # When not to use it
-//! For a scene outside what the rows were measured on: another tissue geometry, tools thinner than
+//! For a scene outside the range of the measured rows: another tissue geometry, tools thinner than
 //! a voxel.
 
 mod choice;

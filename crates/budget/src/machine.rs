@@ -1,20 +1,20 @@
-//! How fast the machine is, and why there may be no plan.
+//! The speed of the machine, and the errors of planning.
 
 use crate::Scene;
 use trepan_soft::MaterialError;
 
-/// How fast the machine is, measured by the caller; all times are those of one thread.
+/// The speed of the machine, measured by the caller; all times are for one thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Machine {
     /// One tetrahedron, one step of TLED, ns.
     pub ns_per_tet_step: f64,
     /// One rigid tick of `god-object-sphere` with a burr of 3 mm on 0.5 mm voxels, µs.
     pub us_per_rigid_tick: f64,
-    /// One pixel of the 3-D view by the processor with every ray, its light included, ns.
+    /// One pixel of the 3-D view on the processor with every ray and its lighting, ns.
     pub ns_per_ray: f64,
     /// Threads that may run at the same time.
     pub threads: u32,
-    /// Whether a graphics device draws, not the processor.
+    /// Whether a graphics device renders instead of the processor.
     pub device_draws: bool,
 }
 
@@ -28,35 +28,35 @@ impl Default for Machine {
 /// Why there is no plan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlanError {
-    /// A number that makes no sense.
+    /// A number out of range.
     #[error("{field} is {value}; it must be {must}")]
     Value {
         /// Field of [`Machine`] or [`Scene`].
         field: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
-        /// What would be right.
+        /// The valid range.
         must: &'static str,
     },
-    /// A material that does not exist.
+    /// An invalid material.
     #[error("scene.material: {0}")]
     Material(#[from] MaterialError),
-    /// There are no rows to choose from.
+    /// A table of rows is empty.
     #[error("rows.{0} is empty; give at least one measured row")]
     NoRows(&'static str),
-    /// A table of rows that cannot be read.
+    /// A table of rows cannot be parsed.
     #[error("{table}, line {line}: {fault}")]
     Table {
-        /// Which table.
+        /// Name of the table.
         table: &'static str,
         /// Line, from 1.
         line: usize,
-        /// What is wrong and what would be right.
+        /// What is wrong and what is expected.
         fault: String,
     },
 }
 
-/// Refuses numbers that make no sense, naming the field.
+/// Rejects numbers out of range, naming the field.
 pub(crate) fn check(machine: &Machine, scene: &Scene) -> Result<(), PlanError> {
     scene.material.check()?;
     let positive = [

@@ -1,41 +1,42 @@
-//! The choice itself.
+//! The planner: selects bone, tissue and picture models.
 
 use crate::choice::{Choice, choose};
 use crate::machine::check;
 use crate::step::{edge_mm, stable_dt_ms};
 use crate::{Bone, Machine, Picture, PlanError, Quality, Row, Rows, Scene, Setup, Tissue};
 
-/// Share of a tick that the rigid contact may take; the rest is for device, force model and guard.
+/// Fraction of a tick available to the rigid contact; the rest is for device, force model and
+/// guard.
 const TICK_SHARE: f64 = 0.25;
-/// What a second and each further solver thread adds.
+/// Speed-up from each solver thread after the first.
 const THREAD_GAIN: f64 = 0.8;
-/// Longest step of a solver that has a stable bound, ms: one haptic tick at 1 kHz.
+/// Longest step of a solver with a stability bound, ms: one haptic tick at 1 kHz.
 const LONGEST_DT_MS: f64 = 1.0;
 /// Step of the implicit solver, ms: four haptic ticks at 1 kHz.
 pub(crate) const IMPLICIT_DT_MS: f64 = 4.0;
-/// Time of a haptic tick without bone and of what belongs to it in other threads (device, force
-/// model, guard, tissue's collision, recording), µs.
+/// Time of a haptic tick without bone, including its share of other threads (device, force model,
+/// guard, tissue collision, recording), µs.
 const FIXED_US_PER_TICK: f64 = 25.0;
 
-/// What to run.
+/// The chosen models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Bone; `None` in a scene without. Its error is in N.
+    /// Bone; `None` in a scene without bone. Its error is in N.
     pub bone: Option<Choice<Bone>>,
-    /// Tissue; `None` in a scene without. Its error is in mm.
+    /// Tissue; `None` in a scene without tissue. Its error is in mm.
     pub tissue: Option<Choice<Tissue>>,
     /// Picture. Its error is in percent of white.
     pub picture: Choice<Picture>,
-    /// What a session takes whatever is chosen, cores.
+    /// Fixed cost of a session, cores.
     pub fixed_cores: f64,
-    /// What was asked for.
+    /// The requested scene.
     pub scene: Scene,
-    /// For which machine.
+    /// The machine.
     pub machine: Machine,
 }
 
 impl Plan {
-    /// What to run; what the scene lacks is as usual.
+    /// The setup to run; parts that the scene lacks get the usual preset.
     pub fn setup(&self) -> Setup {
         let usual = Quality::Usual.preset().expect("only Auto has none");
         Setup {
@@ -45,7 +46,7 @@ impl Plan {
         }
     }
 
-    /// CPU seconds a second, all parts together.
+    /// Total cost, cores (CPU seconds per second).
     pub fn cores(&self) -> f64 {
         let parts = [self.bone.map(|c| c.cost), self.tissue.map(|c| c.cost), Some(self.picture.cost)];
         self.fixed_cores + parts.into_iter().flatten().sum::<f64>()
@@ -63,8 +64,8 @@ impl Plan {
         self.bone.is_none_or(|c| c.in_time) && self.tissue.is_none_or(|c| c.in_time) && self.picture.in_time
     }
 
-    /// Solver step, ms, and mean edge of the tetrahedra, mm, by their number; the step of TLED is
-    /// what its cost in these rows comes from, light and slender elements included.
+    /// Solver step, ms, and mean edge of the tetrahedra, mm, from their number. TLED's step is the
+    /// one that its cost in these rows is based on, light and slender elements included.
     pub fn step_and_edge(&self) -> Option<(f64, f64)> {
         let Choice { what, cost, .. } = self.tissue?;
         let step_ms = match what.solver {
@@ -75,18 +76,18 @@ impl Plan {
     }
 }
 
-/// The plan by the stored rows.
+/// Makes a plan from the stored rows.
 ///
 /// # Errors
-/// When a number of the machine or the scene makes no sense.
+/// When a number of the machine or the scene is out of range.
 pub fn plan(machine: &Machine, scene: &Scene) -> Result<Plan, PlanError> {
     plan_with(machine, scene, &Rows::stored()?)
 }
 
-/// The plan by rows of the caller's own.
+/// Makes a plan from the caller's rows.
 ///
 /// # Errors
-/// When a number makes no sense or a list of rows that the scene needs is empty.
+/// When a number is out of range or a required list of rows is empty.
 pub fn plan_with(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Plan, PlanError> {
     check(machine, scene)?;
     let fixed_cores = FIXED_US_PER_TICK * 1e-6 * scene.device_rate_hz;
@@ -108,8 +109,8 @@ fn bone(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Choice<Bone>, P
     choose(judged, scene.force_error_n).ok_or(PlanError::NoRows("bone"))
 }
 
-/// Whether a method keeps a proxy on the side of the bone that it came from: one that does not
-/// loses thin walls, whatever its error on thick ones. A plan takes no other.
+/// Whether a method keeps its proxy on the side of the bone that it came from.
+/// Other methods lose thin walls, whatever their error on thick ones; a plan never takes them.
 pub fn holds_walls(bone: &Bone) -> bool {
     trepan_rigid::Method::named(bone.method).is_some_and(|method| method.has_proxy())
 }
@@ -131,23 +132,23 @@ fn picture(machine: &Machine, scene: &Scene, rows: &Rows, free: f64) -> Result<C
     choose(judged, scene.picture_error_percent).ok_or(PlanError::NoRows("picture"))
 }
 
-/// Error of the force that 95 of 100 ticks stay within, N.
+/// Bound of the force error, N, met by 95 of 100 ticks.
 pub fn bone_error_n(scene: &Scene, row: &Row<Bone>) -> f64 {
     scene.stiffness * row.error.at_most(&scene.bone_features())
 }
 
-/// What a way to touch bone costs, cores.
+/// Cost of a bone model, cores.
 pub fn bone_cores(machine: &Machine, scene: &Scene, row: &Row<Bone>) -> f64 {
     machine.us_per_rigid_tick * row.cost.expected(&scene.bone_features()) * 1e-6 * scene.device_rate_hz
 }
 
-/// What a way to move tissue in real time costs, cores.
+/// Cost of a tissue model in real time, cores.
 pub fn tissue_cores(machine: &Machine, scene: &Scene, row: &Row<Tissue>) -> f64 {
     let step_ms = row.what.tets as f64 * machine.ns_per_tet_step * 1e-6 * row.cost.expected(&scene.tissue_features());
     step_ms / dt_ms(scene, &row.what)
 }
 
-/// What a way to draw costs the processor, cores: nothing where a device draws.
+/// Cost of a picture mode on the processor, cores; 0 where a graphics device renders.
 pub fn picture_cores(machine: &Machine, scene: &Scene, row: &Row<Picture>) -> f64 {
     if machine.device_draws {
         return 0.0;
@@ -156,7 +157,7 @@ pub fn picture_cores(machine: &Machine, scene: &Scene, row: &Row<Picture>) -> f6
     machine.ns_per_ray * 1e-9 * pixels * row.cost.expected(&scene.picture_features()) * scene.pictures_per_s
 }
 
-/// Step that a solver takes on a mesh by its number of tetrahedra alone, ms.
+/// Solver step on a mesh, from its number of tetrahedra, ms.
 pub fn dt_ms(scene: &Scene, tissue: &Tissue) -> f64 {
     match tissue.solver {
         "corotational" => IMPLICIT_DT_MS,
@@ -164,7 +165,7 @@ pub fn dt_ms(scene: &Scene, tissue: &Tissue) -> f64 {
     }
 }
 
-/// Work of one core that a solver gets done on so many: further threads add less than the first.
+/// Effective solver cores on `free` cores: further threads add less than the first.
 fn solver_cores(free: f64) -> f64 {
     let free = free.max(0.05);
     if free <= 1.0 { free } else { 1.0 + THREAD_GAIN * (free - 1.0) }
@@ -206,10 +207,13 @@ mod tests {
         }
     }
 
-    /// By hand: 2 N/mm · 0.04 mm = 0.08 N is the first under 0.1 N; 40 us · 1000 Hz is 0.04 core.
-    /// 20 000 tetrahedra: a = 7.985 mm, dt = 0.35 · 6.519/3.373 = 0.6766 ms; a step takes 20 000 ·
-    /// 20 ns = 0.4 ms: 0.591 core. 800 000 pixels · 500 ns · 0.25 · 10/s: 1 core, more than the
-    /// 1.34 that are left allow the full picture.
+    /// The cheapest choice within each tolerance, computed by hand.
+    ///
+    /// - Bone: 2 N/mm · 0.04 mm = 0.08 N is the first under 0.1 N; 40 us · 1000 Hz is 0.04 core.
+    /// - Tissue, 20 000 tetrahedra: a = 7.985 mm, dt = 0.35 · 6.519/3.373 = 0.6766 ms; a step takes
+    ///   20 000 · 20 ns = 0.4 ms: 0.591 core.
+    /// - Picture: 800 000 pixels · 500 ns · 0.25 · 10/s: 1 core; the remaining 1.34 cores do not
+    ///   allow the full picture.
     #[test]
     fn the_cheapest_within_the_tolerance_is_taken() {
         let plan = plan_with(&MACHINE, &scene(), &rows()).unwrap();
@@ -225,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_machine_takes_what_runs_and_says_that_the_tolerance_is_missed() {
+    fn a_slow_machine_takes_what_runs_and_reports_the_missed_tolerance() {
         let slow = Machine { ns_per_tet_step: 60.0, ..MACHINE };
         let plan = plan_with(&slow, &scene(), &rows()).unwrap();
         assert_eq!(plan.tissue.unwrap().what.tets, 10_000);
@@ -236,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_scene_lacks_costs_nothing_and_a_device_draws_for_nothing() {
+    fn missing_parts_and_device_rendering_cost_nothing() {
         let bare = Scene { has_bone: false, has_tissue: false, ..scene() };
         let plan = plan_with(&Machine { device_draws: true, ..MACHINE }, &bare, &rows()).unwrap();
         assert_eq!((plan.bone, plan.tissue), (None, None));
@@ -265,7 +269,7 @@ mod tests {
         assert_eq!(plan_with(&MACHINE, &scene(), &Rows { bone: vec![], ..rows() }), Err(PlanError::NoRows("bone")));
     }
 
-    /// Scenes and machines that a session may have.
+    /// Scenes and machines of possible sessions.
     fn any() -> impl Strategy<Value = (Machine, Scene)> {
         let lengths = (0.5f64..4.0, 0.2f64..2.0, 0.5f64..2.0, 0.3f64..1.0, 2.0f64..5.0, 60.0f64..300.0);
         let asked = (0.02f64..0.5, 0.1f64..3.0, 0.5f64..15.0, 1u32..64, 300u32..1200);
@@ -287,7 +291,7 @@ mod tests {
         })
     }
 
-    /// Whether a plan of enough threads for everything; then accuracy alone decides.
+    /// Whether the machine has threads for everything, so that only accuracy decides.
     fn unhurried(machine: &Machine) -> Machine {
         Machine { threads: 1000, ..*machine }
     }
@@ -331,7 +335,7 @@ mod tests {
         }
 
         #[test]
-        fn what_is_chosen_runs_in_time_or_nothing_does((machine, scene) in any()) {
+        fn the_choice_runs_in_time_if_any_does((machine, scene) in any()) {
             let plan = plan(&machine, &scene).unwrap();
             prop_assert!(!plan.in_time() || plan.cores() <= f64::from(machine.threads) + 1e-9);
             prop_assert!(plan.cores().is_finite() && plan.to_string().contains("picture: "));

@@ -1,36 +1,36 @@
-//! How a number that was measured in many scenes follows a few features of the scene.
+//! A power law for a quantity measured in many scenes, as a function of a few scene features.
 //!
 //! # Theory
 //! ```text
 //! ln y = w₀ + w₁ f₁ + w₂ f₂ + w₃ f₃ + r        fᵢ logarithms of lengths: a product of powers
 //! ```
-//! The weights are those of least squares, drawn a little towards 0 (ridge), so that features that
-//! never varied stay out. What is left, r, is kept as two numbers: its root mean square, and the
-//! bound under which it stays in [`COVERED`] of the scenes.
+//! The weights are fitted by ridge-regularised least squares, so that features that never varied
+//! get no weight. The residual r is stored as two numbers: its root mean square, and the bound that
+//! holds in [`COVERED`] of the scenes.
 //!
 //! # When not to use it
-//! Far outside the features of the scenes that it was fitted to: a power law bends somewhere.
+//! Far outside the features of the fitted scenes: a power law does not extrapolate far.
 
-/// Features of a scene.
+/// Number of features of a scene.
 pub const FEATURES: usize = 3;
-/// Root mean squares of r that a careful bound is wide.
+/// Width of a conservative bound, in root mean squares of r.
 const WIDE: f64 = 2.5;
-/// Weight of the ridge, in scenes.
+/// Weight of the ridge term, in scenes.
 const RIDGE: f64 = 0.3;
 
-/// A product of powers with its spread.
+/// A product of powers with the spread of its residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLaw {
     /// w₀ to w₃.
     pub weights: [f64; FEATURES + 1],
     /// Root mean square of r.
     pub spread: f64,
-    /// What r stays under in nearly all scenes.
+    /// Bound of r in nearly all scenes.
     pub bound: f64,
 }
 
 impl PowerLaw {
-    /// Always this.
+    /// A constant, without spread.
     pub fn constant(value: f64) -> Self {
         Self { weights: [value.ln(), 0.0, 0.0, 0.0], spread: 0.0, bound: 0.0 }
     }
@@ -40,13 +40,13 @@ impl PowerLaw {
         (self.weights[0] + self.weights[1..].iter().zip(features).map(|(w, f)| w * f).sum::<f64>()).exp()
     }
 
-    /// What the value stays under in nearly all scenes.
+    /// Upper bound of the value in nearly all scenes.
     pub fn at_most(&self, features: &[f64; FEATURES]) -> f64 {
         self.expected(features) * self.bound.exp()
     }
 
-    /// The law of measured values, each with its features, and the bound that covers a share of
-    /// them; `None` without any, or where one is not above 0 and finite.
+    /// Fits the law to measured values with their features; the bound covers the share `covered`.
+    /// `None` without values, or if one is not finite and above 0.
     pub fn fit(measured: &[([f64; FEATURES], f64)], covered: f64) -> Option<Self> {
         let sound = |(f, y): &([f64; FEATURES], f64)| *y > 0.0 && y.is_finite() && f.iter().all(|f| f.is_finite());
         if measured.is_empty() || !measured.iter().all(sound) {
@@ -65,14 +65,15 @@ impl PowerLaw {
         Some(law)
     }
 
-    /// With a bound of 2.5 root mean squares, where care costs little: unlike the worst scenes of a
-    /// few it puts choices in the order of their errors.
+    /// Replaces the bound by 2.5 root mean squares, where a conservative bound is cheap. Unlike the
+    /// worst of a few scenes it preserves the order of the choices' errors.
     pub fn careful(self) -> Self {
         Self { bound: WIDE * self.spread, ..self }
     }
 }
 
-/// Slopes of least squares with a ridge, by Gauss's elimination; the matrix is positive definite.
+/// Slopes of ridge-regularised least squares, by Gaussian elimination; the matrix is positive
+/// definite.
 fn slopes(measured: &[([f64; FEATURES], f64)], middle: &[f64; FEATURES], level: f64) -> [f64; FEATURES] {
     let mut rows = [[0.0; FEATURES + 1]; FEATURES];
     for (f, y) in measured {
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_logarithm_has_no_law() {
+    fn values_without_a_logarithm_have_no_power_law() {
         assert_eq!(PowerLaw::fit(&[], 0.98), None);
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert_eq!(PowerLaw::fit(&[([0.0; 3], 1.0), ([0.0; 3], bad)], 0.98), None);

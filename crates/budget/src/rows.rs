@@ -1,29 +1,30 @@
-//! What each choice costs and how far it is off, measured once: tables in `rows/*.csv`.
+//! Measured cost and error of each choice: tables in `rows/*.csv`.
 //!
 //! # Practice
-//! A line is a choice, the law of its error and the law of its cost; the README names the command
-//! that measures them anew. Rows of a caller's own go to [`plan_with`](crate::plan_with).
+//! A line is a choice with the power laws of its error and cost; the README names the command that
+//! measures them again. A caller's own rows go to [`plan_with`](crate::plan_with).
 
 use crate::power_law::FEATURES;
 use crate::{Bone, Picture, PlanError, PowerLaw, Tissue};
 
-/// Numbers of a law in a table.
+/// Numbers of a power law in a table.
 const LAW: usize = FEATURES + 3;
 
-/// One choice.
+/// One choice with its power laws.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row<T> {
-    /// What is chosen.
+    /// The choice.
     pub what: T,
     /// Its error: mm of depth on bone, mm of displacement in tissue, percent of white in the
     /// picture.
     pub error: PowerLaw,
-    /// Its time over that of the number in [`Machine`](crate::Machine): a tick, a tetrahedron and
-    /// step of the expected length (what sleeps included), a pixel of the full picture.
+    /// Its cost relative to the matching time in [`Machine`](crate::Machine).
+    /// The unit is a tick; a tetrahedron and step of the expected length, sleeping ones included;
+    /// or a pixel of the full picture.
     pub cost: PowerLaw,
 }
 
-/// All there is to choose from.
+/// All available choices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rows {
     /// Ways to represent bone.
@@ -35,10 +36,10 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// The rows that were measured and stored.
+    /// The stored rows.
     ///
     /// # Errors
-    /// When a stored table cannot be read, which its test excludes.
+    /// When a stored table cannot be parsed, which a test excludes.
     pub fn stored() -> Result<Self, PlanError> {
         Ok(Self {
             bone: read(include_str!("../rows/bone.csv"))?,
@@ -48,23 +49,23 @@ impl Rows {
     }
 }
 
-/// A kind of choice as a table has it.
+/// A kind of choice in a table.
 pub trait Kind: Copy + Sized {
     /// Name of the table.
     const TABLE: &'static str;
-    /// Its first columns.
+    /// Its key columns.
     const KEYS: &'static [&'static str];
-    /// The features of its laws.
+    /// The features of its power laws.
     const FEATURES: [&'static str; FEATURES];
 
-    /// The choice of the first columns; `None` where they make none.
+    /// Parses the key columns; `None` if they are invalid.
     fn read(keys: &[&'static str]) -> Option<Self>;
 
-    /// The first columns of the choice.
+    /// Formats the key columns.
     fn write(&self) -> Vec<String>;
 }
 
-/// Reads a table.
+/// Parses a table.
 ///
 /// # Errors
 /// Names the table and the line that cannot be read.
@@ -90,7 +91,7 @@ pub fn read<T: Kind>(table: &'static str) -> Result<Vec<Row<T>>, PlanError> {
     lines.map(row).collect()
 }
 
-/// The table of rows.
+/// Formats a table of rows.
 pub fn write<T: Kind>(rows: &[Row<T>]) -> String {
     let mut text = header::<T>() + "\n";
     for row in rows {
@@ -183,9 +184,9 @@ mod tests {
     use super::*;
     use crate::Quality;
 
-    /// Every stored method exists, no choice is there twice, and every preset is one of them.
+    /// Every stored method exists, no choice is repeated, and every preset is stored.
     #[test]
-    fn the_stored_rows_hang_together() {
+    fn the_stored_rows_are_consistent() {
         let rows = Rows::stored().unwrap();
         for row in &rows.bone {
             assert!(trepan_rigid::Method::named(row.what.method).is_some(), "{}", row.what.method);

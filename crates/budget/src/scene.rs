@@ -1,54 +1,54 @@
-//! What a scene asks for, and what of it decides how far each choice is off.
+//! The scene's tolerances and contents, and the features that determine each choice's error.
 
 use trepan_soft::Material;
 
-/// What the scene asks for and what is in it.
+/// The scene's tolerances and contents.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scene {
-    /// Error of the force on bone, as a vector, that 95 of 100 ticks must stay within, N. A hand
-    /// notices about 0.1 N.
+    /// Tolerance of the force error on bone, as a vector, N, met by 95 of 100 ticks. A hand notices
+    /// about 0.1 N.
     pub force_error_n: f64,
-    /// Error of the displacement that 95 of 100 places near the tool must stay within, mm.
+    /// Tolerance of the displacement error, mm, met by 95 of 100 points near the tool.
     pub displacement_mm: f64,
-    /// Error of the picture, root mean square of all colours, percent of white.
+    /// Tolerance of the picture error, root mean square of all colours, percent of white.
     pub picture_error_percent: f64,
-    /// Whether there is bone to touch.
+    /// Whether the scene contains bone.
     pub has_bone: bool,
-    /// Whether there is tissue to move.
+    /// Whether the scene contains soft tissue.
     pub has_tissue: bool,
-    /// Stiffness of the contact with bone, N/mm: an error in depth becomes one in force.
+    /// Stiffness of the bone contact, N/mm; converts a depth error to a force error.
     pub stiffness: f64,
-    /// Radius of the tool on bone, mm.
+    /// Radius of the tool that touches bone, mm.
     pub tool_radius_mm: f64,
-    /// How deep the hand presses that tool into bone, mm: force over stiffness; at most its radius.
-    /// Deeper, its centre is under the surface, and more than one way out is right.
+    /// Penetration depth of that tool in bone, mm: force over stiffness; at most its radius.
+    /// Deeper, its centre is under the surface and the contact normal is ambiguous.
     pub press_mm: f64,
-    /// Edge of the CT's own voxels, the mean of the three, mm: bone is as rough as that.
+    /// Mean voxel edge of the CT, mm: it sets the roughness of the bone.
     pub finest_mm: f64,
-    /// How far a tool pushes the tissue, mm; at most its radius. Deeper, tissue would close around
-    /// the shaft, and finer and finer meshes do not agree on how it moves.
+    /// Displacement of the tissue by a tool, mm; at most its radius. Deeper, tissue would close
+    /// around the shaft, and refined meshes do not converge to one solution.
     pub tissue_motion_mm: f64,
     /// Radius of that tool, mm.
     pub probe_radius_mm: f64,
     /// Volume of the brain, mm³.
     pub brain_mm3: f64,
-    /// What it is made of; the softest of several parts decides least, the stiffest shortens the
-    /// step.
+    /// Material of the tissue. With several parts, the softest sets the error and the stiffest the
+    /// time step.
     pub material: Material,
     /// Rate of the haptic device, Hz.
     pub device_rate_hz: f64,
-    /// Wanted speed of the tissue over real time, at least 1: what is left over absorbs other load.
+    /// Required speed of the tissue over real time, at least 1; the excess absorbs other load.
     pub headroom: f64,
     /// Pixels of the 3-D view, width and height.
     pub picture_pixels: [u32; 2],
-    /// Height of what the 3-D view shows at its target, mm.
+    /// Height of the 3-D view at its target, mm.
     pub view_mm: f64,
-    /// Pictures a second.
+    /// Frame rate, Hz.
     pub pictures_per_s: f64,
 }
 
 impl Default for Scene {
-    /// Tolerances of force and tissue that about the usual setup keeps in an adult's head, and of a
+    /// Tolerances that the usual setup just meets for force and tissue in an adult head, and for a
     /// picture whose edges are still sharp.
     fn default() -> Self {
         Self {
@@ -75,7 +75,7 @@ impl Default for Scene {
 }
 
 impl Scene {
-    /// All that must be above 0, by name.
+    /// All fields that must be above 0, by name.
     pub(crate) fn numbers(&self) -> [(&'static str, f64); 16] {
         [
             ("scene.force_error_n", self.force_error_n),
@@ -97,19 +97,19 @@ impl Scene {
         ]
     }
 
-    /// What the error on bone depends on: the logarithms of radius, depth and the CT's voxels, mm.
+    /// Features of the bone error: the logarithms of radius, depth and CT voxel, mm.
     pub fn bone_features(&self) -> [f64; 3] {
         [self.tool_radius_mm, self.press_mm, self.finest_mm].map(f64::ln)
     }
 
-    /// What the error of tissue depends on: the logarithms of motion and radius, mm, and of the
-    /// volume over 1.2 l.
+    /// Features of the tissue error: the logarithms of motion and radius, mm, and of the volume
+    /// over 1.2 l.
     pub fn tissue_features(&self) -> [f64; 3] {
         [self.tissue_motion_mm, self.probe_radius_mm, self.brain_mm3 / 1.2e6].map(f64::ln)
     }
 
-    /// What the error of the picture depends on: the logarithms of the mm that a pixel shows, of
-    /// the mm that the view shows and of the CT's voxels, mm.
+    /// Features of the picture error, as logarithms: size of a pixel, height of the view and CT
+    /// voxel, mm.
     pub fn picture_features(&self) -> [f64; 3] {
         [self.view_mm / f64::from(self.picture_pixels[1]), self.view_mm, self.finest_mm].map(f64::ln)
     }

@@ -1,4 +1,4 @@
-//! What can be chosen: a way to represent bone, tissue and picture each, and the presets.
+//! The models to choose from for bone, tissue and picture, and the presets.
 
 use core::fmt;
 
@@ -9,7 +9,7 @@ pub struct Bone {
     pub method: &'static str,
     /// Edge of a voxel, mm.
     pub spacing_mm: f64,
-    /// Points on the burr; 0 where the method has none to choose.
+    /// Points of the pointshell on the burr; 0 for methods without one.
     pub points: usize,
 }
 
@@ -20,24 +20,24 @@ pub struct Tissue {
     pub solver: &'static str,
     /// Tetrahedra of the whole brain.
     pub tets: usize,
-    /// How often the edges of the tetrahedra are halved around the opening, of those many; 0 = they
-    /// are alike everywhere.
+    /// How often the tetrahedra's edges are halved around the opening, at the same total count; 0
+    /// for a uniform mesh.
     pub halvings: u32,
-    /// Region of interest: what moves less than this in 50 ms sleeps, mm (`still_mm` of
-    /// `trepan_tled::Config`). 0 = all of it is stepped.
+    /// Region of interest: nodes that move less than this in 50 ms sleep, mm (`still_mm` of
+    /// `trepan_tled::Config`). 0 steps all of them.
     pub still_mm: f64,
 }
 
-/// How the 3-D view is drawn by the processor.
+/// How the processor renders the 3-D view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picture {
-    /// Whether rays are left out where bone is smooth.
+    /// Whether rays are skipped where bone is smooth.
     pub sparse: bool,
-    /// Share of the pixels along an edge, 0 to 1; the picture is enlarged to its full size.
+    /// Fraction of the pixels along an edge, 0 to 1; the picture is enlarged to its full size.
     pub detail: f64,
 }
 
-/// All that a session needs to be told.
+/// The models of a session.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     /// Bone.
@@ -48,15 +48,15 @@ pub struct Setup {
     pub picture: Picture,
 }
 
-/// How a setup is come by.
+/// How a setup is selected.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
-    /// The cheapest that meets the scene's tolerances on this machine: [`plan`](crate::plan).
+    /// The cheapest that meets the scene's tolerances on this machine; see [`plan`](crate::plan).
     #[default]
     Auto,
-    /// For slow machines and first looks.
+    /// For slow machines.
     Draft,
-    /// What most machines run with ease.
+    /// For most machines.
     Usual,
     /// For fast machines.
     Fine,
@@ -81,7 +81,7 @@ impl Quality {
         })
     }
 
-    /// Its name on a command line.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",

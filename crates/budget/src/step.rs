@@ -1,19 +1,19 @@
-//! How long a solver step may be, from the size of the tetrahedra alone.
+//! Estimates the stable solver step from the size of the tetrahedra.
 //!
 //! # Theory
-//! A pressure wave may cross no more than the smallest height in one step: `dt = h_min / c`,
+//! A pressure wave may travel no further than the smallest height in one step: `dt = h_min / c`,
 //! `c = √((λ + 2μ)/ρ)`. N equal regular tetrahedra in a volume V have the edge
-//! `a = (6√2 V/N)^(1/3)` and the height `a √(2/3)`; the smallest height of a real mesh is a share
-//! of that.
+//! `a = (6√2 V/N)^(1/3)` and the height `a √(2/3)`; the smallest height of a real mesh is a
+//! fraction of that.
 //!
 //! # When not to use it
-//! When the mesh is there: `trepan_soft::power_bound_ms` gives its true bound. This estimate serves
-//! before meshing.
+//! When a mesh exists: `trepan_soft::power_bound_ms` gives its true bound. This estimate is for
+//! planning before meshing.
 
 use trepan_soft::Material;
 
-/// Smallest over regular height in meshes from `trepan_mesh::lattice`, and what compression under
-/// the tool takes away.
+/// Ratio of the smallest to the regular height in meshes from `trepan_mesh::lattice`, less the
+/// compression under the tool.
 pub(crate) const SLENDERNESS: f64 = 0.35;
 
 /// Edge of `tets` equal regular tetrahedra that fill `volume_mm3`, mm.
@@ -31,8 +31,10 @@ pub fn stable_dt_ms(volume_mm3: f64, tets: usize, material: &Material) -> f64 {
 mod tests {
     use super::*;
 
-    /// By hand: 1.2e6/22000 = 54.5 mm³, a = (8.485 · 54.5)^(1/3) = 7.73 mm, height 6.31 mm, c =
-    /// 3.37 mm/ms: 0.35 · 1.87 = 0.655 ms.
+    /// Computed by hand.
+    ///
+    /// 1.2e6/22000 = 54.5 mm³, a = (8.485 · 54.5)^(1/3) = 7.73 mm, height 6.31 mm, c = 3.37 mm/ms:
+    /// 0.35 · 1.87 = 0.655 ms.
     #[test]
     fn a_brain_of_22_thousand_tetrahedra() {
         assert!((edge_mm(1.2e6, 22_000) - 7.735).abs() < 0.01);

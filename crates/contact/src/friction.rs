@@ -4,7 +4,7 @@
 //! ```text
 //! F = Fₙ n - kₜ s ,   s = tangential way of the tip from its anchor
 //! |kₜ s| ≤ μₛ Fₙ      sticks: the anchor stays
-//! |kₜ s| > μₛ Fₙ      slips: the anchor follows so that |kₜ s| = μ Fₙ, until the tip turns back or rests
+//! |kₜ s| > μₛ Fₙ      slips: the anchor follows so that |kₜ s| = μ Fₙ until the tip turns or rests
 //! ```
 //! The friction cone of Ruspini's proxy, with the anchor in the part of the proxy. The normal part
 //! is [`Viscoelastic`](crate::Viscoelastic).

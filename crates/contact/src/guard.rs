@@ -2,8 +2,9 @@
 //!
 //! # Theory
 //! ```text
-//! wanted → finite? → input sound? → ramp-in → damping → clamp |F|, |τ| → slew → energy bound → GuardedWrench
-//!                                                          ↑ peak, or less when the motors are warm
+//! wanted → finite? → input valid? → ramp-in → damping → clamp |F|, |τ| → slew → energy bound
+//!        → GuardedWrench
+//!                                               ↑ peak, or less when the motors are warm
 //! ```
 //! Whatever comes in, what goes out is finite, no longer than the limit, and no further from the
 //! last wrench than the slew limit lets it, but for one case: where a held force would give the

@@ -15,12 +15,14 @@
 //! microsecond a tick. Units are mm, ms, g, hence N, N/mm and N ms/mm.
 //!
 //! ```
-//! use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, Viscoelastic};
+//! use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel};
+//! use trepan_contact::{GuardConfig, Viscoelastic};
 //! use trepan_geometry::{Pose, ToolState, Vec3};
 //!
 //! let mut model = Viscoelastic { stiffness: 2.0, damping: 1.0 };
 //! let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, ..GuardConfig::default() });
-//! let manifold = ContactManifold::single(Contact { normal: Vec3::Z, depth_mm: 0.5, point: Vec3::ZERO });
+//! let contact = Contact { normal: Vec3::Z, depth_mm: 0.5, point: Vec3::ZERO };
+//! let manifold = ContactManifold::single(contact);
 //! let tool = ToolState::at(Pose::IDENTITY);
 //! for _ in 0..5 {
 //!     guard.guard(model.wrench(&tool, &manifold, 1.0), &tool, 1.0);

@@ -10,10 +10,13 @@
 //! E < 0 means that the wall has made energy: a sampled spring of stiffness k makes
 //! `k v² T (T/2 + d)` a tick when the force is d late. Three answers, from the gentlest on:
 //! ```text
-//! 1 damp     F ← F (1 - clamp(α v·n/|F|, ±1)),  n = F/|F|       along the force alone; it never pulls and never more than doubles F
+//! 1 damp     F ← F (1 - clamp(α v·n/|F|, ±1)),  n = F/|F|
+//!            along the force alone; it never pulls and never more than doubles F
 //!            α grows by the energy made, stays while in contact, fades in free motion
-//! 2 bound    |F| d ≤ E + ε,   d = (v·n + margin) T              d the way that the hand may go along F in the coming tick
-//! 3 restart  a force held short for a stated time while the scene still wants it: account and force begin anew, counted
+//! 2 bound    |F| d ≤ E + ε,   d = (v·n + margin) T
+//!            d: the way that the hand may go along F in the coming tick
+//! 3 restart  a force limited for a stated time while the scene still asks for it:
+//!            account and force begin anew, counted
 //! ```
 //! A damper cannot undo what a held force is about to give, hence the bound (the energy bounding of
 //! Kim and Ryu). A damper that stops as soon as E ≥ 0 lets the oscillation come back at once, hence
@@ -93,8 +96,8 @@ pub struct PassivityConfig {
     pub min_speed: f32,
     /// Encoder step Δ, mm; 0 for exact positions. 0.055 is the Touch's.
     pub quantum_mm: f32,
-    /// Ticks between a force and the moment when the device applies it: 0 or 1 for a driver, 1 or 2
-    /// across a socket; at most 4.
+    /// Ticks between a force and its application by the device: 0 or 1 for a driver, 1 or 2 across
+    /// a socket; at most 4.
     pub delay_ticks: u8,
 }
 

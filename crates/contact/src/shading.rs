@@ -7,7 +7,8 @@
 //! it has the places where the proxy was, so the normals met there are averaged over the way of the
 //! contact point:
 //! ```text
-//! n* ← n* + (1 - e^(-w/l)) (n - n*) , normalised;   w: way of the contact point since the last tick,  l: length of a facet
+//! n* ← n* + (1 - e^(-w/l)) (n - n*) , normalised
+//! w: way of the contact point since the last tick,  l: length of a facet
 //! ```
 //! At rest nothing changes, so that no force turns in a hand that holds still; over a facet's
 //! length the force has turned.

@@ -10,8 +10,8 @@
 //! normal points from p to q.
 //!
 //! ```text
-//!   moving        at rest            A force f n on the node and -f wᵢ n on the triangle's nodes acts along the line through
-//!   __q__         __q__              p and q: linear and angular momentum are conserved to rounding.
+//!   moving        at rest     A force f n on the node and -f wᵢ n on the triangle's nodes acts
+//!   __q__         __q__       along the line through p and q: momentum is conserved to rounding.
 //!     |p   ─────►    |X
 //! ```
 //!
@@ -160,8 +160,8 @@ impl MeshCollision {
 }
 
 impl NodeContact {
-    /// The spring of a contact of a body with itself, N/mm and N ms/mm, for a solver: between the
-    /// node and the triangle that it leaves through.
+    /// Spring of a contact of a body with itself, N/mm and N ms/mm, for a solver. It acts between
+    /// the node and the triangle that it leaves through.
     pub fn spring(&self, stiffness: f32, damping: f32) -> NodalContact {
         let mut spring = NodalContact::none();
         spring.add(self.node, 1.0);
@@ -173,8 +173,8 @@ impl NodeContact {
     }
 }
 
-/// Adds the springs of contacts to nodal forces, N: `stiffness` (N/mm) times depth on each node,
-/// and the opposite on the triangle that it leaves through.
+/// Adds the springs of contacts to nodal forces, N. Each is `stiffness` (N/mm) times depth on the
+/// node, and the opposite on the triangle that it leaves through.
 pub fn push_apart(contacts: &[NodeContact], stiffness: f32, on_body: &mut [Vec3], on_other: &mut [Vec3]) {
     for contact in contacts {
         let force = contact.normal * (stiffness * contact.depth_mm);

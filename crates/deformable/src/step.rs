@@ -22,7 +22,7 @@ pub struct TissueStep {
     /// The spring that presses on the tissue's nodes, equal and opposite; where there are
     /// `surface_springs`, the one that stands for all of them.
     pub nodal: NodalContact,
-    /// Springs under the ball, one for each node, together as strong as `nodal`: each presses along
+    /// Springs under the ball, one for each node, together as strong as `nodal`. Each presses along
     /// its own normal as deep as the ball is there, so that tissue finer than the ball takes its
     /// shape. Empty where the response has one spring for all.
     pub surface_springs: NodalContacts,

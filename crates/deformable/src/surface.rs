@@ -12,7 +12,8 @@
 //! step and are never stale.
 //!
 //! ```text
-//!   [fit] [loose] [loose] [fit]  ( tool ) -> boxes near it fitted -> their triangles -> exact closest point
+//!   [fit] [loose] [loose] [fit]  ( tool ) -> boxes near it fitted -> their triangles
+//!                                         -> exact closest point
 //! ```
 //!
 //! # Practice

@@ -36,8 +36,8 @@ pub trait Hollow {
     /// Distance to the wall, positive in the hollow, mm, and its unit gradient, away from the wall.
     fn distance(&mut self, place: Vec3) -> (f32, Vec3);
 
-    /// How far the wall has receded from a node that is so deep, mm, at a place of the wall's
-    /// surface with this way out; `None` where it is gone.
+    /// Distance by which the wall has receded from a node, mm; `None` where it is gone. Given are
+    /// the node's depth, mm, a place of the wall and the way out.
     fn recession_mm(&mut self, node: u32, depth_mm: f32, place: Vec3, outward: Vec3) -> Option<f32> {
         let _ = (node, depth_mm, place, outward);
         Some(0.0)
@@ -104,8 +104,8 @@ impl SlidingWall {
         Ok(Self { border: border.collect(), stiffness_per_mm2: 0.05, damping_per_mm2: 0.1, ahead_mm: 0.5 })
     }
 
-    /// Takes this as rest: nodes in the wall, or nearer to it than planes are sent, keep the plane
-    /// of their place here, so that a body at rest is not pushed.
+    /// Takes these positions as the rest shape. Nodes in the wall, or nearer to it than planes are
+    /// sent, keep the plane of their place here, so that a body at rest is not pushed.
     pub fn rest_in(&mut self, rest: &[Vec3], mut wall: impl Hollow) {
         for border in &mut self.border {
             let Some(&at) = rest.get(border.node as usize) else { continue };
@@ -115,7 +115,7 @@ impl SlidingWall {
         }
     }
 
-    /// Adds a plane for each border node in the wall or near it; a node where the distance or its
+    /// Adds a plane for each border node in the wall or near it. A node where the distance or its
     /// gradient is not finite, or the gradient zero, is left out.
     pub fn step(&self, positions: &[Vec3], mut wall: impl Hollow, out: &mut NodalContacts) {
         for &BorderNode { node, area_mm2, normal, fixed_mm } in &self.border {

@@ -21,8 +21,8 @@ fn with(mesh: &TetMesh, config: Config) -> TissueCollision {
     TissueCollision::new(mesh, &Tool::probe(2.0), &config).expect("a sound config")
 }
 
-/// A shaft of radius 1.2 lies flat on the block, its tip far out: pressed in, it reads its own
-/// depth, until its axis is 3 mm under the top.
+/// Presses a shaft of radius 1.2 mm flat on the block, its tip far out. It reads its own depth,
+/// until its axis is 3 mm under the top.
 #[test]
 fn a_shaft_pressed_flat_into_the_top_reads_its_depth() {
     let mesh = block([8, 8, 6], 4.0);

@@ -227,7 +227,7 @@ fn the_springs_under_a_ball_are_together_as_strong_as_one_and_take_its_shape() {
 }
 
 /// A triangle that comes back to the ball between two steps meets its spring, whether the ball
-/// touches elsewhere or only hovers; where nothing moves it feels nothing.
+/// touches elsewhere or only hovers. Where nothing moves it feels nothing.
 #[test]
 fn springs_wait_around_the_ball_and_over_tissue_that_it_does_not_touch() {
     let mesh = block([16, 16, 6], 1.0);
@@ -253,7 +253,7 @@ fn springs_wait_around_the_ball_and_over_tissue_that_it_does_not_touch() {
     assert!(step_at(&mut collision, &mesh, Vec3::new(8.3, 7.9, 6.0 + 1.5 * RADIUS)).surface_springs.is_empty());
 }
 
-/// Two blocks with a gap of 3 mm and a ball of 4 mm between: the walls cancel, a shift to one side
+/// Puts a ball of 4 mm into a gap of 3 mm between two blocks. The walls cancel, a shift to one side
 /// is pushed back.
 #[test]
 fn in_a_groove_opposite_walls_cancel() {

@@ -1,5 +1,5 @@
-//! How evenly do two ways of spreading points cover a burr? Prints count and nearest-neighbour
-//! spacing of each.
+//! Compares two distributions of points over a burr: prints count and nearest-neighbour spacing of
+//! each.
 
 use trepan_geometry::{Pointshell, Spread, Tool};
 

@@ -12,39 +12,39 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box that holds nothing; the neutral element of [`Aabb::grown`].
+    /// The empty box; the neutral element of [`Aabb::grown`].
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The box of a sphere.
+    /// The bounding box of a sphere.
     #[inline]
     pub fn of_sphere(centre: Vec3, radius: f32) -> Self {
         Self { min: centre - radius, max: centre + radius }
     }
 
-    /// The smallest box around some points; [`Aabb::EMPTY`] for none.
+    /// The bounding box of some points; [`Aabb::EMPTY`] for none.
     pub fn of_points<'a>(points: impl IntoIterator<Item = &'a Vec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, |b, &p| b.grown(p))
     }
 
-    /// This box, grown to hold `point`.
+    /// The box, extended to contain `point`.
     #[inline]
     pub fn grown(self, point: Vec3) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
-    /// This box, moved outwards by `margin` mm on all sides.
+    /// The box, extended by `margin` mm on all sides.
     #[inline]
     pub fn inflated(self, margin: f32) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
     }
 
-    /// What two boxes share; empty when they are disjoint.
+    /// The intersection of two boxes; empty if they are disjoint.
     #[inline]
     pub fn intersection(self, other: Self) -> Self {
         Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
 
-    /// Whether the box holds no point. A box with a NaN corner is empty.
+    /// Whether the box contains no point. A box with a NaN corner is empty.
     #[inline]
     pub fn is_empty(self) -> bool {
         !self.min.cmple(self.max).all()
@@ -57,13 +57,13 @@ impl Aabb {
         !self.intersection(other).is_empty()
     }
 
-    /// Whether `point` lies inside or on the border.
+    /// Whether `point` is inside or on the border.
     #[inline]
     pub fn contains(self, point: Vec3) -> bool {
         self.min.cmple(point).all() && point.cmple(self.max).all()
     }
 
-    /// Middle of the box, mm.
+    /// Centre of the box, mm.
     #[inline]
     pub fn centre(self) -> Vec3 {
         (self.min + self.max) * 0.5

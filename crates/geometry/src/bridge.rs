@@ -1,9 +1,9 @@
-//! Exact bridges between the f32 types of the loops and the f64 nalgebra types of references and
+//! Conversion between the f32 types of the loops and the f64 nalgebra types of references and
 //! offline work.
 //!
 //! # Practice
-//! f32 to f64 is exact. f64 to f32 rounds to nearest, once. Rotations are renormalised in f64, so a
-//! round trip moves a point at 300 mm by less than 1e-4 mm.
+//! f32 to f64 is exact. f64 to f32 rounds once, to nearest. Rotations are renormalised in f64, so
+//! that a round trip moves a point at 300 mm by less than 1e-4 mm.
 
 use crate::{Pose, Quat, Vec3};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};

@@ -1,4 +1,4 @@
-//! How a tool moves and what pushes it: twist, wrench, tool state.
+//! Tool motion and loads: twist, wrench, tool state.
 
 use crate::{Pose, ToolKind, Vec3};
 
@@ -45,34 +45,34 @@ pub struct Buttons(pub u32);
 impl Buttons {
     /// The drill's foot pedal.
     pub const PEDAL: Self = Self(1);
-    /// Ask for the next tool.
+    /// Requests the next tool.
     pub const NEXT_TOOL: Self = Self(2);
-    /// Ask for the bone of the last stroke of the burr back.
+    /// Requests an undo of the burr's last stroke.
     pub const UNDO: Self = Self(4);
 
-    /// Ask for the bone flap, once it is free, to be lifted away, or to be put back.
+    /// Requests that the bone flap, once free, be lifted away or put back.
     pub const FLAP: Self = Self(8);
 
-    /// A teacher's pause: no force, and no other button counts.
+    /// A teacher's pause: no force, and other buttons are ignored.
     pub const PAUSE: Self = Self(16);
 
-    /// Ask for a tool of a kind; asked again with one in the hand, for the next of that kind.
+    /// Requests a tool of a kind; with one in the hand, the next of that kind.
     pub fn take(kind: ToolKind) -> Self {
         Self((kind as u32 + 1) << 8)
     }
 
-    /// The kind of tool that is asked for.
+    /// The requested kind of tool.
     pub fn taken(self) -> Option<ToolKind> {
         let wanted = (self.0 >> 8 & 0xf).checked_sub(1)?;
         ToolKind::ALL.into_iter().find(|kind| *kind as u32 == wanted)
     }
 
-    /// Ask for the tool in a slot of the tray, counted from 0; there are at most 15.
+    /// Requests the tool in a slot of the tray, from 0; there are at most 15.
     pub fn slot(slot: usize) -> Self {
         Self((slot.min(14) as u32 + 1) << 12)
     }
 
-    /// The slot of the tray that is asked for.
+    /// The requested slot of the tray.
     pub fn in_slot(self) -> Option<usize> {
         (self.0 >> 12 & 0xf).checked_sub(1).map(|slot| slot as usize)
     }
@@ -95,14 +95,14 @@ impl std::ops::BitOr for Buttons {
 /// The tool at one instant, in world space.
 #[derive(Clone, Copy, Debug)]
 pub struct ToolState {
-    /// Where the tool frame is: origin at the centre of the tip, +z along the shaft, away from the
+    /// Pose of the tool frame: origin at the centre of the tip, +z along the shaft, away from the
     /// patient.
     pub world_from_tool: Pose,
-    /// How it moves.
+    /// Velocity of the tool.
     pub twist: Twist,
-    /// What the user presses.
+    /// Pressed buttons.
     pub buttons: Buttons,
-    /// When this was sensed, ms since the session began.
+    /// Time of measurement, ms since the session began.
     pub time_ms: f64,
 }
 

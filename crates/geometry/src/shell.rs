@@ -1,25 +1,25 @@
-//! Point shells: points on a tool's surface with inward normals.
+//! Pointshells: points on a tool's surface with inward normals.
 //!
 //! # Theory
 //! McNeely et al. 1999 cover the moving object with points that each carry an inward normal; a
-//! voxel that holds a point gives a contact. The thesis (Eq 3.1) places the points of a sphere at
-//! equal steps of latitude and longitude, which crowds the poles: 10 degree steps give 466 points
-//! in principle, with the spacing at the poles many times closer than at the equator. A Fibonacci
-//! lattice (González 2010, Mathematical Geosciences 42, Eq 1) spreads any number evenly.
+//! voxel that contains a point gives a contact. The thesis (Eq 3.1) places the points of a sphere
+//! at equal steps of latitude and longitude, which concentrates them at the poles: steps of 10
+//! degrees give 466 points in principle, many times denser at the poles than at the equator. A
+//! Fibonacci lattice (González 2010, Mathematical Geosciences 42, Eq 1) spreads any number evenly.
 //!
 //! # Practice
 //! 466 points for a burr on bone, 211 for a probe on tissue (thesis, 3.4.1 and 4.4). Built once at
-//! load time; poses are applied point by point in the loop.
+//! load time; the loop transforms the points by the tool's pose.
 
 use crate::Vec3;
 
-/// How the points are spread over the sphere.
+/// Distribution of the points over the sphere.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Spread {
     /// Even spread, any count.
     #[default]
     Fibonacci,
-    /// The thesis's Eq 3.1: equal angles, crowded at the poles. Kept for comparison.
+    /// The thesis's Eq 3.1: equal angles, dense at the poles. For comparison only.
     LatitudeLongitude,
 }
 
@@ -33,13 +33,13 @@ pub struct Pointshell {
 }
 
 impl Pointshell {
-    /// Points of the thesis's rigid shell.
+    /// Number of points of the thesis's rigid shell.
     pub const RIGID_COUNT: usize = 466;
-    /// Points of the thesis's deformable shell.
+    /// Number of points of the thesis's deformable shell.
     pub const DEFORMABLE_COUNT: usize = 211;
 
     /// A sphere around the tool's origin. `LatitudeLongitude` rounds `count` to the nearest full
-    /// grid of rings and the two poles.
+    /// grid of rings plus the two poles.
     pub fn sphere(radius_mm: f32, count: usize, spread: Spread) -> Self {
         let directions = match spread {
             Spread::Fibonacci => fibonacci(count),
@@ -65,7 +65,7 @@ fn fibonacci(count: usize) -> Vec<Vec3> {
         .collect()
 }
 
-/// Rings of equal latitude step and equal count, and the poles, close to `count` directions in all.
+/// Rings of equal latitude step and equal count, and the poles; about `count` directions in total.
 fn latitude_longitude(count: usize) -> Vec<Vec3> {
     let rings = (((count.max(8) - 2) as f64 / 2.0).sqrt()).round().max(2.0) as usize;
     let per_ring = ((count.max(8) - 2) as f64 / rings as f64).round() as usize;

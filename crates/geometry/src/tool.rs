@@ -1,28 +1,28 @@
-//! Surgical tools as the simulators see them: a spherical tip on a straight shaft.
+//! Surgical tools in the simulators: a spherical tip on a straight shaft.
 
-/// What a tool does.
+/// The kind of a tool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ToolKind {
     /// A round cutting burr: removes bone while the pedal is down.
     Burr,
     /// A blunt ball probe: touches, never cuts.
     Probe,
-    /// A wide drill whose clutch lets go where it comes through the bone.
+    /// A wide drill whose clutch disengages where it breaks through the bone.
     Perforator,
     /// A slender mill that cuts with its side, above a blunt foot that runs under the bone.
     Craniotome,
-    /// A blunt rounded blade that holds the brain aside with its shaft.
+    /// A blunt rounded blade that retracts the brain with its shaft.
     Spatula,
     /// A suction tube: touches, never cuts.
     Aspirator,
 }
 
 impl ToolKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 6] =
         [Self::Burr, Self::Probe, Self::Perforator, Self::Craniotome, Self::Spatula, Self::Aspirator];
 
-    /// Whether it takes bone away while the pedal is down.
+    /// Whether it removes bone while the pedal is down.
     pub fn cuts(self) -> bool {
         matches!(self, Self::Burr | Self::Perforator | Self::Craniotome)
     }
@@ -40,8 +40,8 @@ impl ToolKind {
     }
 }
 
-/// A tool's shape. In its own frame the tip is a ball around the origin and the shaft runs from
-/// there along +z.
+/// A tool's shape. In the tool frame the tip is a ball around the origin and the shaft runs along
+/// +z.
 ///
 /// ```text
 ///        +z
@@ -53,7 +53,7 @@ impl ToolKind {
 /// A craniotome cuts with its shaft, from the tip up to `cutting_mm`, and its tip is blunt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tool {
-    /// What it does.
+    /// Kind of the tool.
     pub kind: ToolKind,
     /// Radius of the ball at the tip, mm.
     pub tip_radius_mm: f32,
@@ -61,8 +61,7 @@ pub struct Tool {
     pub shaft_radius_mm: f32,
     /// Length of the shaft from the centre of the tip, mm.
     pub shaft_length_mm: f32,
-    /// Length of the shaft, from the centre of the tip, that cuts instead of the tip, mm; 0 for
-    /// tools that do not cut with it.
+    /// Length of the cutting part of the shaft from the centre of the tip, mm; 0 if the tip cuts.
     pub cutting_mm: f32,
 }
 

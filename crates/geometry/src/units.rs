@@ -1,4 +1,4 @@
-//! The one set of units, mm, ms and g, and the constants in it.
+//! The consistent unit system mm, ms, g, and its constants.
 //!
 //! # Practice
 //! | quantity | unit | of note |
@@ -10,8 +10,8 @@
 //! | spring, damper | N/mm, N ms/mm | |
 //! | density | g/mm³ | water 1e-3 |
 //!
-//! Files and command lines carry other units in their names (`young_modulus_kpa`) and are converted
-//! where they are read.
+//! Files and command lines name other units in their fields (`young_modulus_kpa`); these are
+//! converted when read.
 
 /// Standard gravity, mm/ms².
 pub const GRAVITY_MM_PER_MS2: f32 = 9.81e-3;

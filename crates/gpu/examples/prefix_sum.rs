@@ -1,4 +1,4 @@
-//! Sums a million numbers into running totals on the device and checks them on the processor.
+//! Computes the prefix sums of a million numbers on the device and checks them on the processor.
 
 use trepan_gpu::{Buffer, Gpu, Kernel, Prefer, Slot, Timer};
 

@@ -1,8 +1,8 @@
-//! Slots of a shader and what is bound to them.
+//! Shader binding slots and the resources bound to them.
 
 use crate::{Buffer, Gpu, GpuError, Texture};
 
-/// What a shader expects at one binding of group 0; the place in the list is the binding number.
+/// The resource type of one binding of group 0; its list index is the binding number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
     /// `var<uniform>`.
@@ -23,19 +23,18 @@ pub enum Slot {
     Sampler,
 }
 
-/// Something that can be bound.
+/// A resource that can be bound.
 #[derive(Clone, Copy, Debug)]
 pub enum Resource<'a> {
     /// A whole buffer.
     Buffer(&'a wgpu::Buffer),
     /// A whole texture.
     Texture(&'a Texture),
-    /// Linear filtering, clamped at the edges.
+    /// A linear sampler, clamped at the edges.
     Linear,
 }
 
-/// Resources bound to the slots of one kernel or pipeline. Resources stay alive as long as this
-/// does.
+/// Resources bound to the slots of one kernel or pipeline, kept alive by it.
 #[derive(Clone, Debug)]
 pub struct Bindings {
     pub(crate) group: wgpu::BindGroup,
@@ -100,8 +99,7 @@ pub(crate) fn bind(
         min_filter: wgpu::FilterMode::Linear,
         ..Default::default()
     });
-    // Whether resources fit the slots is checked by wgpu's validation, which names the binding that
-    // does not.
+    // wgpu's validation checks that resources fit the slots, and names the binding that does not.
     let mut entries = Vec::with_capacity(resources.len());
     for (binding, resource) in resources.iter().enumerate() {
         let resource = match resource {

@@ -3,8 +3,8 @@
 use crate::{Gpu, GpuError};
 use core::marker::PhantomData;
 
-/// `len` values of `T` on the device, for storage or uniform slots; written and read whole or from
-/// an offset.
+/// `len` values of `T` on the device, for storage or uniform slots; written and read as a whole or
+/// from an offset.
 #[derive(Clone, Debug)]
 pub struct Buffer<T> {
     raw: wgpu::Buffer,
@@ -13,7 +13,8 @@ pub struct Buffer<T> {
 }
 
 impl<T: bytemuck::Pod> Buffer<T> {
-    /// Zeroes. At least one value is kept, since the device has no empty buffers.
+    /// Creates a buffer of zeroes. At least one value is allocated, since the device has no empty
+    /// buffers.
     pub fn zeroed(gpu: &Gpu, label: &str, len: usize) -> Result<Self, GpuError> {
         let bytes = ((len.max(1) * size_of::<T>()) as u64).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT);
         gpu.within(label, bytes, gpu.limits().max_storage_buffer_binding_size, "bytes")?;
@@ -29,7 +30,7 @@ impl<T: bytemuck::Pod> Buffer<T> {
         Ok(Self { raw, len, of: PhantomData })
     }
 
-    /// A copy of some values.
+    /// Creates a buffer with a copy of `values`.
     pub fn from_slice(gpu: &Gpu, label: &str, values: &[T]) -> Result<Self, GpuError> {
         let buffer = Self::zeroed(gpu, label, values.len())?;
         buffer.write(gpu, 0, values);
@@ -41,13 +42,13 @@ impl<T: bytemuck::Pod> Buffer<T> {
         self.len
     }
 
-    /// Whether there is no value.
+    /// Whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Overwrites values from `first` on, before the next submission. What would not fit is left
-    /// out.
+    /// Overwrites values from `first` on, before the next submission; values that do not fit are
+    /// ignored.
     pub fn write(&self, gpu: &Gpu, first: usize, values: &[T]) {
         let fits = self.len.saturating_sub(first).min(values.len());
         let bytes: &[u8] = bytemuck::cast_slice(&values[..fits]);
@@ -63,7 +64,7 @@ impl<T: bytemuck::Pod> Buffer<T> {
         }
     }
 
-    /// Waits for the device and copies everything back.
+    /// Waits for the device and copies all values to the host.
     pub fn read(&self, gpu: &Gpu) -> Result<Vec<T>, GpuError> {
         let staging = gpu.device().create_buffer(&wgpu::BufferDescriptor {
             label: Some("readback"),
@@ -78,7 +79,7 @@ impl<T: bytemuck::Pod> Buffer<T> {
         gpu.read_back(&staging, self.raw.size(), |data| bytemuck::pod_collect_to_vec(&data[..bytes]))
     }
 
-    /// The bare buffer.
+    /// The wgpu buffer.
     pub fn raw(&self) -> &wgpu::Buffer {
         &self.raw
     }

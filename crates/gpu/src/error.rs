@@ -1,6 +1,6 @@
-//! What can go wrong between a program and its graphics device.
+//! Errors of the graphics device.
 
-/// Why the device could not do something.
+/// Why a device operation failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GpuError {
     /// No driver offers an adapter.
@@ -9,28 +9,28 @@ pub enum GpuError {
          apt-get install mesa-vulkan-drivers libvulkan1"
     )]
     NoAdapter,
-    /// The adapter exists but would not open.
+    /// The adapter could not be opened.
     #[error("{adapter} would not open: {reason}; try another adapter or a newer driver")]
     Open {
         /// The adapter's name.
         adapter: String,
-        /// The driver's words.
+        /// The driver's message.
         reason: String,
     },
-    /// A shader or pipeline did not pass validation.
+    /// A shader or pipeline failed validation.
     #[error("{label} does not compile: {reason}")]
     Shader {
         /// Name of the kernel or pipeline.
         label: String,
-        /// The compiler's words.
+        /// The compiler's message.
         reason: String,
     },
-    /// Resources do not fit the slots of their shader.
+    /// Resources do not match the slots of their shader.
     #[error("{label}: {reason}")]
     Bind {
         /// Name of the kernel or pipeline.
         label: String,
-        /// What does not fit.
+        /// The mismatch.
         reason: String,
     },
     /// A buffer or texture is larger than the device allows.
@@ -38,16 +38,16 @@ pub enum GpuError {
     TooLarge {
         /// Name of the resource.
         label: String,
-        /// What was asked for.
+        /// The requested size.
         wanted: u64,
-        /// What there is.
+        /// The limit.
         limit: u64,
         /// Bytes or texels along an edge.
         unit: &'static str,
         /// The adapter's name.
         adapter: String,
     },
-    /// The device did not answer in time, or is gone.
+    /// The device did not answer in time, or was lost.
     #[error("the graphics device does not answer ({0}); it may have been reset or removed")]
     Lost(String),
 }

@@ -1,20 +1,21 @@
-//! The device: which adapter, its limits, its faults.
+//! The graphics device: adapter, limits, faults.
 
 use crate::{GpuError, Recorder};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// How long a wait for the device may take before it counts as lost.
+/// Longest wait for the device before it counts as lost.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Which kind of adapter to take.
+/// Which kind of adapter to prefer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Prefer {
     /// A graphics card if there is one, else a software driver.
     #[default]
     Hardware,
-    /// A software driver if there is one, else a graphics card: the same pictures on every machine.
+    /// A software driver if there is one, else a graphics card: identical pictures on every
+    /// machine.
     Software,
 }
 
@@ -24,14 +25,14 @@ pub struct Gpu {
     inner: Arc<Inner>,
 }
 
-/// What the device has complained about since it was opened.
+/// Faults of the device since it was opened.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faults {
-    /// Errors that no call returned: a mistake in how the device is used.
+    /// Number of errors that no call returned: misuse of the device.
     pub count: u32,
     /// The first of them.
     pub first: Option<String>,
-    /// Why the device is gone, if it is.
+    /// Why the device was lost, if it was.
     pub lost: Option<String>,
 }
 
@@ -53,7 +54,8 @@ struct FaultLog {
 }
 
 impl Gpu {
-    /// Opens the best adapter: by kind first (see [`Prefer`]), Vulkan, Metal and DX12 before GL.
+    /// Opens the best adapter: by kind first (see [`Prefer`]), then Vulkan, Metal and DX12 before
+    /// GL.
     pub fn open(prefer: Prefer) -> Result<Self, GpuError> {
         match Self::open_on(prefer, wgpu::Backends::PRIMARY) {
             Err(GpuError::NoAdapter) => Self::open_on(prefer, wgpu::Backends::GL),
@@ -61,7 +63,7 @@ impl Gpu {
         }
     }
 
-    /// Opens the best adapter of some backends only.
+    /// Opens the best adapter of the given backends.
     fn open_on(prefer: Prefer, backends: wgpu::Backends) -> Result<Self, GpuError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = backends;
@@ -88,17 +90,17 @@ impl Gpu {
         Ok(Self { inner: Arc::new(Inner { instance, adapter, device, queue, info, faults }) })
     }
 
-    /// Name of the adapter and of the interface that drives it, for people.
+    /// Display name of the adapter and its graphics API.
     pub fn name(&self) -> String {
         format!("{} ({})", self.inner.info.name, self.inner.info.backend)
     }
 
-    /// Whether the adapter is a program on the processor.
+    /// Whether the adapter is a software driver.
     pub fn is_software(&self) -> bool {
         self.inner.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Whether a window can show this device's textures without a copy. One of GL belongs to the
+    /// Whether a window can show this device's textures without a copy. A GL device is bound to the
     /// display it was opened on, and this one to none.
     pub fn can_be_shared(&self) -> bool {
         self.inner.info.backend != wgpu::Backend::Gl
@@ -114,7 +116,7 @@ impl Gpu {
         self.inner.device.limits()
     }
 
-    /// What went wrong so far without being returned by a call.
+    /// Faults so far that no call returned.
     pub fn faults(&self) -> Faults {
         let log = &self.inner.faults;
         let copy = |m: &Mutex<Option<String>>| m.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -126,34 +128,34 @@ impl Gpu {
         Recorder::new(self, label)
     }
 
-    /// Waits until everything submitted is done.
+    /// Waits until all submitted work is done.
     pub fn wait(&self) -> Result<(), GpuError> {
         let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
         self.inner.device.poll(wait).map_err(|e| GpuError::Lost(e.to_string()))?;
         self.faults().lost.map_or(Ok(()), |why| Err(GpuError::Lost(why)))
     }
 
-    /// The bare instance, for sharing with a window.
+    /// The wgpu instance, for sharing with a window.
     pub fn instance(&self) -> &wgpu::Instance {
         &self.inner.instance
     }
 
-    /// The bare adapter, for sharing with a window.
+    /// The wgpu adapter, for sharing with a window.
     pub fn adapter(&self) -> &wgpu::Adapter {
         &self.inner.adapter
     }
 
-    /// The bare device.
+    /// The wgpu device.
     pub fn device(&self) -> &wgpu::Device {
         &self.inner.device
     }
 
-    /// The bare queue.
+    /// The wgpu queue.
     pub fn queue(&self) -> &wgpu::Queue {
         &self.inner.queue
     }
 
-    /// Runs `make`, and turns what validation says about it into an error.
+    /// Runs `make` and converts validation errors.
     pub(crate) fn checked<T>(
         &self,
         make: impl FnOnce() -> T,
@@ -167,13 +169,13 @@ impl Gpu {
         }
     }
 
-    /// Refuses what is over a limit.
+    /// Rejects sizes over a limit.
     pub(crate) fn within(&self, label: &str, wanted: u64, limit: u64, unit: &'static str) -> Result<(), GpuError> {
         let too_large = || GpuError::TooLarge { label: label.into(), wanted, limit, unit, adapter: self.name() };
         (wanted <= limit).then_some(()).ok_or_else(too_large)
     }
 
-    /// Maps the first `bytes` of a readback buffer and hands them to `take`.
+    /// Maps the first `bytes` of a readback buffer and passes them to `take`.
     pub(crate) fn read_back<T>(
         &self,
         staging: &wgpu::Buffer,
@@ -183,7 +185,7 @@ impl Gpu {
         let slice = staging.slice(..bytes);
         let (tell, told) = std::sync::mpsc::channel();
         slice.map_async(wgpu::MapMode::Read, move |mapped| {
-            // The receiver is gone only when this call has already given up.
+            // The receiver is dropped only if this call has timed out.
             tell.send(mapped).ok();
         });
         self.wait()?;
@@ -204,7 +206,7 @@ impl FaultLog {
     }
 }
 
-/// Lower is better.
+/// Rank of an adapter; lower is better.
 fn rank(prefer: Prefer, info: &wgpu::AdapterInfo) -> (u8, u8) {
     let kind = match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,

@@ -11,7 +11,7 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Compiles `entry` of `wgsl`. The label names the kernel in messages and is best the shader
+    /// Compiles `entry` of `wgsl`. The label names the kernel in messages, preferably the shader
     /// file's stem.
     pub fn new(gpu: &Gpu, label: &'static str, wgsl: &str, entry: &str, slots: &[Slot]) -> Result<Self, GpuError> {
         let make = || {

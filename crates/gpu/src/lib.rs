@@ -1,18 +1,18 @@
-//! A thin layer over wgpu: device, typed buffers, textures, kernels, pipelines, a named pass list,
+//! A thin layer over wgpu: device, typed buffers, textures, kernels, pipelines, named passes,
 //! timing, readback.
 //!
 //! # Practice
-//! Open a [`Gpu`] once; it is cheap to clone and may be shared between threads. Make buffers,
-//! textures, [`Kernel`]s and [`Pipeline`]s at load time, bind them to their shader's slots once,
-//! then fill a [`Recorder`] each frame: pass names are timing labels. Nothing here waits for the
-//! device but the `read` calls and [`Gpu::wait`], and these give up after [`PATIENCE`].
+//! Open a [`Gpu`] once; it is cheap to clone and can be shared between threads. Create buffers,
+//! textures, [`Kernel`]s and [`Pipeline`]s at load time and bind them to their shader's slots once;
+//! then fill a [`Recorder`] each frame. Pass names are timing labels. Only the `read` calls and
+//! [`Gpu::wait`] wait for the device, for at most [`PATIENCE`].
 //!
-//! Mistakes found by wgpu's validation do not panic: they are counted in [`Gpu::faults`], and a
-//! test asserts that there are none.
+//! Errors found by wgpu's validation do not panic: [`Gpu::faults`] counts them, and tests assert
+//! that there are none.
 //!
 //! # When not to use it
-//! For one-off experiments with features that only some devices have: [`Gpu::device`] and
-//! [`Gpu::queue`] give the bare wgpu objects.
+//! For experiments with features of particular devices: [`Gpu::device`] and [`Gpu::queue`] return
+//! the wgpu objects.
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

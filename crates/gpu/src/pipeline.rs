@@ -1,9 +1,9 @@
-//! Drawing pipelines. Vertices come from storage buffers by vertex index: there are no vertex
+//! Render pipelines. Vertices are read from storage buffers by vertex index: there are no vertex
 //! layouts.
 
 use crate::{Bindings, Format, Gpu, GpuError, Resource, Slot, bind};
 
-/// How vertices make primitives.
+/// Primitive topology.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Topology {
     /// Three vertices a triangle.
@@ -13,26 +13,26 @@ pub enum Topology {
     Lines,
 }
 
-/// What to compile; entries are `vertex` and `fragment`, bindings are in group 0.
+/// Parameters of a pipeline; entry points are `vertex` and `fragment`, bindings are in group 0.
 #[derive(Clone, Copy, Debug)]
 pub struct PipelineSpec<'a> {
-    /// Name in messages, best the shader file's stem.
+    /// Name in messages, preferably the shader file's stem.
     pub label: &'static str,
-    /// The shader's text.
+    /// The shader's source.
     pub wgsl: &'a str,
-    /// What it binds.
+    /// Its binding slots.
     pub slots: &'a [Slot],
-    /// Formats of the textures that it draws into.
+    /// Formats of the textures that it renders to.
     pub targets: &'a [Format],
-    /// Whether nearer hides farther (depth grows away from the eye).
+    /// Whether depth testing is on (depth grows away from the eye).
     pub depth: bool,
-    /// Whether colours are mixed by alpha over what is there.
+    /// Whether colours are alpha-blended over the target.
     pub blend: bool,
-    /// How vertices make primitives.
+    /// Primitive topology.
     pub topology: Topology,
 }
 
-/// A drawing pipeline with its slots in group 0.
+/// A render pipeline with its slots in group 0.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
     label: &'static str,
@@ -41,7 +41,7 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// Compiles the vertex and fragment entries.
+    /// Compiles the vertex and fragment entry points.
     pub fn new(gpu: &Gpu, spec: &PipelineSpec) -> Result<Self, GpuError> {
         gpu.checked(|| compile(gpu, spec), |reason| GpuError::Shader { label: spec.label.into(), reason })
     }

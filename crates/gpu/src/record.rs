@@ -1,8 +1,8 @@
-//! A list of named passes, submitted at once.
+//! A list of named passes, submitted together.
 
 use crate::{Bindings, Gpu, Kernel, Pipeline, Texture, Timer};
 
-/// Collects passes; [`submit`](Self::submit) hands them to the device. A pass's name labels it in
+/// Collects passes; [`submit`](Self::submit) sends them to the device. A pass's name labels it in
 /// captures and timings.
 #[derive(Debug)]
 pub struct Recorder<'a> {
@@ -11,12 +11,12 @@ pub struct Recorder<'a> {
     timer: Option<&'a mut Timer>,
 }
 
-/// A texture to draw into.
+/// A colour target.
 #[derive(Clone, Copy, Debug)]
 pub struct Target<'a> {
     /// The texture.
     pub texture: &'a Texture,
-    /// What fills it first; `None` keeps what is there.
+    /// Clear colour; `None` keeps the contents.
     pub clear: Option<[f64; 4]>,
 }
 
@@ -25,16 +25,16 @@ pub struct Target<'a> {
 pub struct Depth<'a> {
     /// The texture.
     pub texture: &'a Texture,
-    /// What fills it first; `None` keeps what is there.
+    /// Clear depth; `None` keeps the contents.
     pub clear: Option<f32>,
 }
 
-/// Where a pass draws.
+/// Targets of a pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DrawTarget<'a> {
-    /// Colour textures, all of one size.
+    /// Colour targets, all of one size.
     pub colours: &'a [Target<'a>],
-    /// For hidden surfaces.
+    /// Depth target, if any.
     pub depth: Option<Depth<'a>>,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Recorder<'a> {
         Self { gpu, encoder, timer: None }
     }
 
-    /// Times the passes that follow.
+    /// Times the following passes.
     pub fn timed(mut self, timer: Option<&'a mut Timer>) -> Self {
         self.timer = timer;
         if let Some(timer) = &mut self.timer {
@@ -65,7 +65,7 @@ impl<'a> Recorder<'a> {
         self
     }
 
-    /// A compute pass of several dispatches; each sees what those before it wrote.
+    /// A compute pass of several dispatches; each sees the writes of those before it.
     pub fn compute(&mut self, name: &'static str, steps: impl FnOnce(&mut Dispatches)) {
         let queries = self.timer.as_mut().and_then(|t| t.next(name));
         let timestamp_writes =
@@ -83,7 +83,7 @@ impl<'a> Recorder<'a> {
         self.compute(name, |d| d.dispatch(kernel, bindings, groups));
     }
 
-    /// A drawing pass.
+    /// A render pass.
     pub fn draw(&mut self, name: &'static str, target: &DrawTarget, draws: impl FnOnce(&mut Draws)) {
         let queries = self.timer.as_mut().and_then(|t| t.next(name));
         let timestamp_writes =
@@ -111,7 +111,7 @@ impl<'a> Recorder<'a> {
         draws(&mut Draws { pass: self.encoder.begin_render_pass(&descriptor) });
     }
 
-    /// Hands the passes to the device; does not wait.
+    /// Submits the passes; does not wait.
     pub fn submit(mut self) {
         if let Some(timer) = &self.timer {
             timer.resolve(&mut self.encoder);
@@ -121,7 +121,7 @@ impl<'a> Recorder<'a> {
 }
 
 impl Dispatches<'_> {
-    /// Runs a kernel over some workgroups.
+    /// Runs a kernel over the given workgroups.
     pub fn dispatch(&mut self, kernel: &Kernel, bindings: &Bindings, [x, y, z]: [u32; 3]) {
         self.pass.set_pipeline(&kernel.pipeline);
         self.pass.set_bind_group(0, &bindings.group, &[]);
@@ -130,13 +130,13 @@ impl Dispatches<'_> {
 }
 
 impl Draws<'_> {
-    /// Maps what follows to the rectangle `[x, y, width, height]` in pixels.
+    /// Sets the viewport to the rectangle `[x, y, width, height]` in pixels.
     pub fn viewport(&mut self, [x, y, width, height]: [u32; 4]) {
         self.pass.set_viewport(x as f32, y as f32, width as f32, height as f32, 0.0, 1.0);
         self.pass.set_scissor_rect(x, y, width, height);
     }
 
-    /// Draws only inside the rectangle `[x, y, width, height]` in pixels.
+    /// Restricts drawing to the rectangle `[x, y, width, height]` in pixels.
     pub fn scissor(&mut self, [x, y, width, height]: [u32; 4]) {
         self.pass.set_scissor_rect(x, y, width, height);
     }

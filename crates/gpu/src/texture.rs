@@ -2,36 +2,36 @@
 
 use crate::{Gpu, GpuError};
 
-/// What a texel holds.
+/// Texel format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// One byte, read as 0 to 1.
     R8Unorm,
-    /// One byte, read as an integer.
+    /// One byte, an integer.
     R8Uint,
     /// Colour, one byte each, read as 0 to 1.
     Rgba8Unorm,
-    /// A half-precision number, filterable everywhere.
+    /// Half precision, filterable everywhere.
     R16Float,
-    /// Four integers, or the bits of four single-precision numbers, loaded only; every driver draws
-    /// into it.
+    /// Four integers, or the bits of four single-precision numbers; load only. Every driver can
+    /// render to it.
     Rgba32Uint,
-    /// Depth, for hidden surfaces.
+    /// Depth buffer.
     Depth32Float,
 }
 
-/// What to make.
+/// Parameters of a texture.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureSpec<'a> {
     /// Name in messages.
     pub label: &'a str,
     /// Texels along x, y, z; z is 1 for two dimensions.
     pub size: [u32; 3],
-    /// Whether it is a volume (even one of a single layer).
+    /// Whether it is 3-D (even with a single layer).
     pub volume: bool,
-    /// What a texel holds.
+    /// The texel format.
     pub format: Format,
-    /// Whether passes draw into it.
+    /// Whether passes render to it.
     pub drawn_to: bool,
 }
 
@@ -45,7 +45,7 @@ pub struct Texture {
 }
 
 impl Format {
-    /// The same in wgpu's words.
+    /// The corresponding wgpu format.
     pub fn raw(self) -> wgpu::TextureFormat {
         match self {
             Self::R8Unorm => wgpu::TextureFormat::R8Unorm,
@@ -69,7 +69,7 @@ impl Format {
 }
 
 impl Texture {
-    /// Makes a texture of zeroes.
+    /// Creates a texture of zeroes.
     pub fn new(gpu: &Gpu, spec: &TextureSpec) -> Result<Self, GpuError> {
         let limits = gpu.limits();
         let limit = if spec.volume { limits.max_texture_dimension_3d } else { limits.max_texture_dimension_2d };
@@ -98,13 +98,13 @@ impl Texture {
         self.size
     }
 
-    /// What a texel holds.
+    /// The texel format.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// Overwrites the box of `size` texels at `origin`, before the next submission. The box must
-    /// lie inside and `texels` must fill it.
+    /// Overwrites the box of `size` texels at `origin`, before the next submission. The box must be
+    /// inside and `texels` must fill it.
     pub fn write<T: bytemuck::Pod>(&self, gpu: &Gpu, origin: [u32; 3], size: [u32; 3], texels: &[T]) {
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
@@ -114,7 +114,7 @@ impl Texture {
         gpu.queue().write_texture(self.place(origin), bytemuck::cast_slice(texels), layout, extent(size));
     }
 
-    /// Waits for the device and copies all texels back, row by row.
+    /// Waits for the device and copies all texels to the host, row by row.
     pub fn read<T: bytemuck::Pod>(&self, gpu: &Gpu) -> Result<Vec<T>, GpuError> {
         let [width, height, depth] = self.size;
         let row = width * self.format.bytes();
@@ -139,7 +139,7 @@ impl Texture {
         })
     }
 
-    /// The bare view.
+    /// The wgpu view.
     pub fn view(&self) -> &wgpu::TextureView {
         &self.view
     }

@@ -1,4 +1,4 @@
-//! How long each pass took on the device.
+//! Measures the device time of each pass.
 
 use crate::{Buffer, Gpu, GpuError};
 
@@ -11,8 +11,7 @@ pub struct PassTime {
     pub us: f64,
 }
 
-/// Measures up to a fixed number of passes of one recording; passes over that are counted, not
-/// timed.
+/// Measures up to a fixed number of passes per recording; further passes are counted, not timed.
 #[derive(Debug)]
 pub struct Timer {
     pub(crate) queries: wgpu::QuerySet,
@@ -25,7 +24,7 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// A timer for up to `passes` passes; `None` where the device cannot measure.
+    /// Creates a timer for up to `passes` passes; `None` if the device cannot measure.
     pub fn new(gpu: &Gpu, passes: usize) -> Result<Option<Self>, GpuError> {
         if !gpu.has_timestamps() {
             return Ok(None);
@@ -49,7 +48,7 @@ impl Timer {
         Ok(Some(Self { queries, resolved, ticks, names, capacity, untimed: 0, us_per_tick }))
     }
 
-    /// Waits for the device and gives the times of the newest recording, in order.
+    /// Waits for the device and returns the times of the last recording, in order.
     pub fn read(&self, gpu: &Gpu) -> Result<Vec<PassTime>, GpuError> {
         let ticks = self.ticks.read(gpu)?;
         let time = |(name, pair): (&&'static str, &[u64])| PassTime {
@@ -59,12 +58,12 @@ impl Timer {
         Ok(self.names.iter().zip(ticks.chunks_exact(2)).map(time).collect())
     }
 
-    /// Passes that found no room so far.
+    /// Number of passes over the limit so far.
     pub fn untimed(&self) -> u32 {
         self.untimed
     }
 
-    /// The query numbers for the next pass, if there is room.
+    /// The query indices for the next pass, if there is room.
     pub(crate) fn next(&mut self, name: &'static str) -> Option<[u32; 2]> {
         if self.names.len() == self.capacity {
             self.untimed += 1;

@@ -1,5 +1,5 @@
-//! Kernels, textures, pipelines and timing against the processor. Without an adapter only the error
-//! can be tested, and is.
+//! Tests kernels, textures, pipelines and timing against the processor. Without an adapter only the
+//! error is tested.
 
 use trepan_gpu::*;
 

@@ -1,5 +1,4 @@
-//! Builds the emulated libraries as shared libraries of their own, with the compiler and for the
-//! target of this build.
+//! Builds the emulated libraries as shared libraries for the target of this build.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,5 +1,5 @@
-//! Lists the devices, opens the one named (a scripted craniotomy by default) and prints where its
-//! tool goes.
+//! Lists the devices, opens the one named (default: a scripted craniotomy) and prints its tool's
+//! path.
 //!
 //! `cargo run -p trepan-haptics --example devices [NAME]`
 

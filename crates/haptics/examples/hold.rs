@@ -1,5 +1,5 @@
-//! How stiff a wall may be before a simulated Touch in a light hand begins to buzz, for delays of 0
-//! to 3 ticks.
+//! Finds the wall stiffness at which a simulated Touch in a light hand becomes unstable, for delays
+//! of 0 to 3 ticks.
 //!
 //! `cargo run -p trepan-haptics --example hold`
 
@@ -20,7 +20,8 @@ fn main() {
     }
 }
 
-/// The hand means to be so far inside the wall (x < 0) that its spring presses with 1 N.
+/// Peak-to-peak motion, mm; the hand's intent lies so far inside the wall (x < 0) that it presses
+/// with 1 N.
 fn peak_to_peak(stiffness: f32, delay_ticks: usize) -> f32 {
     let hand = HandModel::LIGHT;
     let inside = Pose::from_translation(Vec3::X * -(1.0 / hand.stiffness + 1.0 / stiffness));

@@ -1,34 +1,35 @@
-//! A clutch over any device: hold its second button and the tool stays while the hand goes back to
-//! the middle of its box.
+//! A clutch for any device: while its second button is held, the tool stays and the hand moves
+//! freely.
 //!
 //! # Theory
 //! ```text
 //!             short press                                   long press
 //!  button  ___╱▔▔╲_______________          button  ___╱▔▔▔▔▔▔▔▔▔▔▔▔▔╲_______
-//!  next tool ____╱▔▔▔╲__________           tool    ~~~~~~~────────────~~~~~~   its tip stays, its shaft turns on
+//!  next tool ____╱▔▔▔╲__________           tool    ~~~~~~~────────────~~~~~~
+//!                                          the tip stays, the shaft still rotates
 //! ```
-//! After a long press the tip is where the hand is, plus what the hand moved meanwhile:
-//! `t = x + Σ (x_before - x_after)`. So nothing jumps.
+//! After a long press the tip is at the hand's position plus the motion during the press:
+//! `t = x + Σ (x_before - x_after)`. So the tip never jumps.
 //!
 //! # Practice
-//! The second button asks for the next tool when it is let go within 250 ms, and is the clutch when
-//! it is held for longer. The force fades within 50 ms of the clutch and comes back over 300 ms
-//! after it: the wall that was felt is elsewhere then.
+//! The second button requests the next tool when released within 250 ms, and acts as the clutch
+//! when held longer. The force fades within 50 ms of the clutch and returns over 300 ms after it:
+//! by then the touched wall is elsewhere relative to the hand.
 //!
 //! # When not to use it
-//! Over scripts and replays: their buttons mean what they say.
+//! With scripts and replays: their buttons already have a fixed meaning.
 
 use crate::{Capabilities, HapticDevice, Reading, Status};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Twist, Vec3};
 
-/// A press up to this long asks for the next tool, ms.
+/// Longest press that requests the next tool, ms.
 const SHORT_MS: f64 = 250.0;
-/// How long the next tool is asked for, ms.
+/// How long the next-tool button is reported, ms.
 const ASK_MS: f64 = 50.0;
-/// Time in which the force fades, ms.
+/// Time in which the force fades out, ms.
 const FADE_MS: f32 = 50.0;
-/// Time in which the force comes back, ms.
+/// Time in which the force returns, ms.
 const RETURN_MS: f32 = 300.0;
 
 /// A device with a clutch.
@@ -36,7 +37,7 @@ pub struct Clutch {
     device: Box<dyn HapticDevice>,
     pressed_ms: Option<f64>,
     asks_until_ms: f64,
-    /// Where the tip stays while the clutch is held.
+    /// Position of the tip while the clutch is held.
     held: Option<Vec3>,
     offset: Vec3,
     share: f32,
@@ -45,7 +46,7 @@ pub struct Clutch {
 }
 
 impl Clutch {
-    /// A clutch over `device`.
+    /// Wraps `device` in a clutch.
     pub fn new(device: Box<dyn HapticDevice>) -> Self {
         Self {
             device,
@@ -59,12 +60,12 @@ impl Clutch {
         }
     }
 
-    /// Whether the tool is held.
+    /// Whether the clutch holds the tool.
     pub fn is_held(&self) -> bool {
         self.held.is_some()
     }
 
-    /// Follows the button; `tip` is where the tool would be without a clutch in this tick.
+    /// Processes the button; `tip` is the tool's position in this tick without a clutch.
     fn follow(&mut self, pressed: bool, tip: Vec3, time_ms: f64) {
         match (pressed, self.pressed_ms) {
             (true, None) => self.pressed_ms = Some(time_ms),
@@ -87,7 +88,7 @@ impl HapticDevice for Clutch {
         self.tick_ms = if self.last_ms.is_nan() { 0.0 } else { (time_ms - self.last_ms).clamp(0.0, 10.0) as f32 };
         self.last_ms = time_ms;
         tool.world_from_tool.translation += self.offset;
-        // A device that is gone keeps its last buttons: they mean nothing.
+        // A lost device keeps reporting its last buttons: ignore them.
         let pressed = tool.buttons.has(Buttons::NEXT_TOOL) && status != Status::Lost;
         let before = self.offset;
         self.follow(pressed, tool.tip(), time_ms);
@@ -123,10 +124,10 @@ mod tests {
     use trepan_contact::{ForceGuard, GuardConfig};
     use trepan_geometry::{Pose, Quat, ToolState, Wrench};
 
-    /// What the hand does, and the force that it gets.
+    /// Position and buttons of the hand, and the force applied to it.
     type Shared = Arc<Mutex<(Vec3, u32, Vec3)>>;
 
-    /// A hand that the test moves.
+    /// A device whose motion the test sets.
     struct Puppet(Shared);
 
     impl HapticDevice for Puppet {
@@ -163,7 +164,7 @@ mod tests {
             Self { clutch, hand, guard: ForceGuard::new(config), time_ms: 0.0 }
         }
 
-        /// Holds hand and buttons for some ticks; gives the last tool and the force on the hand.
+        /// Applies a hand position and buttons for some ticks; returns the last tool and the force.
         fn run(&mut self, tip: Vec3, buttons: Buttons, ticks: u32) -> (ToolState, f32) {
             {
                 let mut hand = self.hand.lock().unwrap();

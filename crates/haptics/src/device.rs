@@ -1,4 +1,4 @@
-//! The seam of the devices.
+//! The trait that all devices implement.
 
 use std::f32::consts::PI;
 use trepan_contact::{GuardConfig, GuardedWrench, PassivityConfig, Viscoelastic};
@@ -7,72 +7,71 @@ use trepan_geometry::{ToolState, Vec3};
 /// Damping of a light grip, N ms/mm.
 const LIGHT_GRIP: f32 = 2.0;
 
-/// A device that a hand holds, or something that behaves as one.
+/// A haptic device, or something that behaves like one.
 pub trait HapticDevice: Send {
-    /// Where the tool is. `time_ms` is the session time of this tick; it never goes back.
+    /// Reads the tool. `time_ms` is the session time of this tick; it never decreases.
     fn read(&mut self, time_ms: f64) -> Reading;
 
-    /// What the hand shall feel until the next call.
+    /// Applies a wrench until the next call.
     fn apply(&mut self, wrench: GuardedWrench);
 
-    /// What the device can do.
+    /// The device's properties and limits.
     fn capabilities(&self) -> Capabilities;
 
-    /// No force, then lets go of the device. May be called more than once; later calls to `apply`
-    /// do nothing.
+    /// Sets zero force and releases the device. May be called more than once; later calls to
+    /// `apply` do nothing.
     fn close(&mut self);
 }
 
-/// What one read gave.
+/// The result of one read.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
     /// The tool in world space.
     pub tool: ToolState,
-    /// What it is worth.
+    /// Whether it is current.
     pub status: Status,
 }
 
-/// What a reading is worth.
+/// Whether a reading is current.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// Sensed for this tick.
+    /// Measured for this tick.
     Fresh,
-    /// The device gave nothing new: the last pose, again.
+    /// The device had no new data: the last pose is repeated.
     Stale,
-    /// A script or a replay is over; the pose stays.
+    /// A script or a replay has ended; the pose stays.
     Finished,
-    /// The device is gone or faulty; the pose is the last one known. Apply no force.
+    /// The device is disconnected or faulty; the pose is the last one known. Apply no force.
     Lost,
 }
 
-/// What a device can do. Numbers of a virtual device say what it pretends to be.
+/// Properties and limits of a device; a virtual device states those that it emulates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capabilities {
-    /// Name for people.
+    /// Display name.
     pub name: String,
-    /// Largest force for a short time, N; 0 for a device without motors.
+    /// Largest short-term force, N; 0 for a device without motors.
     pub peak_force_n: f32,
-    /// Largest force for any time, N; 0 where it is not known.
+    /// Largest continuous force, N; 0 if unknown.
     pub continuous_force_n: f32,
-    /// Highest rate at which it can be read, Hz. Sessions run at 1 kHz unless they are told
-    /// otherwise.
+    /// Highest read rate, Hz. Sessions run at 1 kHz unless configured otherwise.
     pub rate_hz: f32,
-    /// Box that the tip can reach, mm.
+    /// Size of the box that the tip can reach, mm.
     pub workspace_mm: Vec3,
     /// Driven axes: 0, 3 or 6.
     pub axes_driven: u8,
-    /// Smallest step of position that it senses, mm.
+    /// Position resolution, mm.
     pub position_resolution_mm: f32,
-    /// Ticks between `apply` and the moment when the hand feels it.
+    /// Delay from `apply` to the motors, ticks.
     pub delay_ticks: u8,
-    /// Mass that the hand moves with it, g; 0 where it is not known.
+    /// Moving mass at the tip, g; 0 if unknown.
     pub moving_mass_g: f32,
-    /// Its own viscous damping, N ms/mm; 0 where it is not known.
+    /// The device's viscous damping, N ms/mm; 0 if unknown.
     pub damping: f32,
 }
 
 impl Capabilities {
-    /// A device without motors or limits that is read at 1 kHz.
+    /// A device without motors or limits, read at 1 kHz.
     pub fn passive(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -88,12 +87,12 @@ impl Capabilities {
         }
     }
 
-    /// The stiffest coupling to a wall of `wanted` that this device holds stable in a light grip,
-    /// read every `tick_ms`; a device without motors gets what is wanted.
+    /// Limits the wall `wanted` to what stays stable on this device in a light grip, read every
+    /// `tick_ms`. A device without motors returns `wanted` unchanged.
     ///
     /// ```text
-    /// K ≤ (b + b_h + B)/(T/2 + d)              Gil, Hulin: d the delay, b_h = 2 N ms/mm a light grip
-    /// B ≤ 0.8 · 2 sin(π/(4n + 2)) m/T          a sampled damper on the mass m alone, n ticks late
+    /// K ≤ (b + b_h + B)/(T/2 + d)           Gil, Hulin: d the delay, b_h = 2 N ms/mm a light grip
+    /// B ≤ 0.8 · 2 sin(π/(4n + 2)) m/T       a sampled damper on the mass m alone, n ticks late
     /// ```
     pub fn coupled(&self, wanted: Viscoelastic, tick_ms: f32) -> Viscoelastic {
         if self.axes_driven == 0 {
@@ -106,9 +105,9 @@ impl Capabilities {
         Viscoelastic { stiffness: wanted.stiffness.min(passive), damping }
     }
 
-    /// The guard's recommended limits, lowered to this device's peak and continuous force, its
-    /// energy account told of the device's delay and encoder step. A device without motors keeps
-    /// the recommended peak: what it would feel is still shown and recorded.
+    /// The guard's recommended limits, lowered to this device's peak and continuous force, with its
+    /// delay and encoder step for the energy observer. A device without motors keeps the
+    /// recommended peak, since its forces are still shown and recorded.
     pub fn guard_config(&self) -> GuardConfig {
         let recommended = GuardConfig::default();
         let peak_n = if self.peak_force_n > 0.0 { self.peak_force_n } else { recommended.max_force_n };
@@ -131,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_coupling_is_what_delay_mass_and_grip_bear() {
+    fn the_coupling_is_limited_by_delay_mass_and_grip() {
         let touch = |delay_ticks| Capabilities {
             axes_driven: 3,
             moving_mass_g: 45.0,

@@ -1,9 +1,9 @@
-//! Vendor libraries, loaded when a device is opened: nothing proprietary is needed to build or to
-//! run without them.
+//! Loads vendor libraries when a device is opened: building and running without them needs nothing
+//! proprietary.
 //!
 //! # Practice
-//! A library is never unloaded: the vendors' own threads may outlive it, and a second load in one
-//! process is known to fail.
+//! A library is never unloaded: the vendors' own threads may outlive it, and loading it twice in
+//! one process is known to fail.
 #![expect(unsafe_code, reason = "loading a library runs its initialisers, and a symbol's type cannot be checked")]
 
 use crate::DeviceError;
@@ -28,7 +28,7 @@ impl Loaded {
         let mut reasons = Vec::new();
         for name in &wanted {
             // SAFETY: a vendor's library that the user installed or named; its initialisers are
-            // trusted as any program's that the user installs.
+            // trusted like those of any installed program.
             match unsafe { Library::new(name) } {
                 Ok(library) => {
                     let name = name.to_string_lossy().into_owned();
@@ -41,19 +41,19 @@ impl Loaded {
                 }
             }
         }
-        // The loader says the same of every name, or of one what that library in turn lacks.
+        // The loader reports the same for every name, or for a missing dependency.
         reasons.dedup();
         let library = wanted.iter().map(|name| name.to_string_lossy()).collect::<Vec<_>>().join(" or ");
         Err(DeviceError::Library { library, reason: reasons.join("; "), install })
     }
 
-    /// The function `symbol`.
+    /// Looks up the function `symbol`.
     ///
     /// # Safety
     /// `F` must be the function's true type, an `extern "system"` function pointer.
     pub(crate) unsafe fn symbol<F: Copy + 'static>(&self, symbol: &'static str) -> Result<F, DeviceError> {
-        // SAFETY: the caller vouches for the type; the library is never unloaded, so that the
-        // pointer stays good.
+        // SAFETY: the caller guarantees the type; the library is never unloaded, so the pointer
+        // stays valid.
         match unsafe { self.library.get::<F>(symbol.as_bytes()) } {
             Ok(function) => Ok(*function),
             Err(error) => Err(DeviceError::Symbol {
@@ -71,7 +71,7 @@ impl Loaded {
     }
 }
 
-/// A struct of function pointers, each looked up by its name in the library; all are needed.
+/// Declares a struct of function pointers, all required, each looked up by name in the library.
 macro_rules! functions {
     ($(#[$doc:meta])* $table:ident { $($name:ident($($argument:ty),*) $(-> $result:ty)?;)* }) => {
         $(#[$doc])*

@@ -3,12 +3,12 @@
 /// A device could not be opened.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DeviceError {
-    /// The vendor's library is not there or does not load.
+    /// The vendor's library is missing or does not load.
     #[error("cannot load {library}: {reason}; {install}")]
     Library {
         /// Names that were tried.
         library: String,
-        /// The loader's own words.
+        /// The loader's message.
         reason: String,
         /// What to install.
         install: &'static str,
@@ -20,17 +20,17 @@ pub enum DeviceError {
         library: String,
         /// The function.
         symbol: &'static str,
-        /// The loader's own words.
+        /// The loader's message.
         reason: String,
         /// What to install.
         install: &'static str,
     },
-    /// The library is there, the device is not.
+    /// The library is present but the device cannot be opened.
     #[error("cannot open {device}: {reason}; {remedy}")]
     Open {
-        /// The device as it was asked for.
+        /// The requested device.
         device: String,
-        /// The vendor's own words.
+        /// The vendor's message.
         reason: String,
         /// What to do.
         remedy: &'static str,

@@ -1,22 +1,22 @@
-//! What goes wrong with a device while it runs, and what a user can do about it.
+//! Runtime faults of a device, and their remedies.
 //!
 //! # Practice
-//! A driver sets a fault where it happens; the force is zero from that tick on. Whoever shows
-//! messages holds a [`Watch`], made before the device is handed to the haptic loop. Both ends are
+//! A driver sets a fault where it occurs; the force is zero from that tick on. The code that shows
+//! messages owns a [`Watch`], made before the device is moved to the haptic loop. Both ends are
 //! wait-free.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-/// Why a device gives no force.
+/// Why a device applies no force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Fault {
-    /// The link to the device is gone.
+    /// The link to the device is lost.
     Disconnected = 1,
     /// The motors are too warm.
     Overheated = 2,
-    /// The device refused a force.
+    /// The device rejected a force.
     ForceRefused = 3,
     /// The tool moved faster than the device allows.
     TooFast = 4,
@@ -28,11 +28,11 @@ pub enum Fault {
     LoopSilent = 7,
     /// The vendor's service does not answer.
     ServiceSilent = 8,
-    /// What the device or its service sends makes no sense.
+    /// The device or its service sends invalid data.
     Garbled = 9,
-    /// Power is missing.
+    /// The device has no power.
     NoPower = 10,
-    /// The device senses nothing new.
+    /// The device sends no new positions.
     Stale = 11,
     /// The maker's software stopped serving the device.
     Stopped = 12,
@@ -66,7 +66,7 @@ impl std::fmt::Display for Fault {
             Self::Braked => "the brakes are on: release the emergency stop, press the device's force button",
             Self::LoopSilent => "the haptic loop was silent for 10 ms and the force was cut: close other programs",
             Self::ServiceSilent => "the vendor's service does not answer: see whether it runs, then start again",
-            Self::Garbled => "the device sends what makes no sense: update its driver or its service",
+            Self::Garbled => "the device sends invalid data: update its driver or its service",
             Self::NoPower => "the device has no power: plug in its power supply",
             Self::Stale => "the device sends no new positions: close other programs, check its cable",
             Self::Stopped => "the maker's software stopped serving the device: close other programs, then start again",
@@ -74,7 +74,7 @@ impl std::fmt::Display for Fault {
     }
 }
 
-/// The newest fault of a device, seen from outside.
+/// The latest fault of a device, readable from another thread.
 #[derive(Clone, Debug, Default)]
 pub struct Watch(Arc<State>);
 
@@ -85,18 +85,18 @@ struct State {
 }
 
 impl Watch {
-    /// The fault that holds now, if any.
+    /// The current fault, if any.
     pub fn fault(&self) -> Option<Fault> {
         let code = self.0.now.load(Ordering::Relaxed);
         ALL.into_iter().find(|fault| *fault as u32 == code)
     }
 
-    /// How many faults there were.
+    /// Number of faults so far.
     pub fn count(&self) -> u64 {
         self.0.count.load(Ordering::Relaxed)
     }
 
-    /// Sets or lifts the fault; a new one counts.
+    /// Sets or clears the fault; a new one is counted.
     pub(crate) fn set(&self, fault: Option<Fault>) {
         let code = fault.map_or(0, |fault| fault as u32);
         if self.0.now.swap(code, Ordering::Relaxed) != code && code != 0 {

@@ -3,21 +3,21 @@
 //!
 //! # Theory
 //! The library is driven by calls: a read fetches the pose over USB, an apply sends the force. The
-//! firmware has a watchdog; it is set to 9.5 ms, so that a haptic loop that dies leaves no force.
+//! firmware's watchdog is set to 9.5 ms, so that a dead haptic loop leaves no force.
 //!
 //! # Practice
-//! `read` and `apply` each wait for one USB transfer, about 0.1 to 0.25 ms: the device is the clock
-//! of the loop's shortest tick, up to 4 kHz by the maker (the Falcon 1 kHz). The maker's axes (x to
-//! the user, y right, z up; m, N m) become x right, y up, z to the user; mm, N mm; [`Workspace`]
-//! lays them into the patient. Button 1 is the pedal, button 2 asks for the next tool; devices with
-//! one button have a pedal only. The maker's velocity limit stays as it is. After a fault the force
-//! rests, then ramps in; a device whose link failed is lost until it is opened again.
+//! `read` and `apply` each wait for one USB transfer, about 0.1 to 0.25 ms: the device limits the
+//! loop's rate, up to 4 kHz according to the maker (the Falcon 1 kHz). The maker's axes (x to the
+//! user, y right, z up; m, N m) become x right, y up, z to the user; mm, N mm. [`Workspace`] maps
+//! them to world space. Button 1 is the pedal, button 2 requests the next tool; devices with one
+//! button have a pedal only. The maker's velocity limit is not changed. After a fault the force is
+//! zero for a while, then ramps in; a device whose link failed is lost until it is opened again.
 //!
 //! # Sources
 //! Force Dimension SDK 3 reference.
 //!
 //! # When not to use it
-//! With [`Config::auto_init`] while a hand is on the device: it moves by itself.
+//! With [`Config::auto_init`] while a hand touches the device: it moves by itself.
 
 mod library;
 
@@ -28,28 +28,27 @@ use std::path::PathBuf;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Mat3, Pose, Quat, ToolState, Twist, Vec3, Wrench};
 
-/// 9.5 ms in the firmware's steps of 125 µs: within 10 ms there is no force.
+/// Watchdog of 9.5 ms in the firmware's steps of 125 µs, so that force ends within 10 ms.
 const WATCHDOG_STEPS: u8 = 76;
-/// Reads between two looks at the status.
+/// Reads between two checks of the status.
 const STATUS_PERIOD: u32 = 8;
 
-// Places in the status.
+// Indices in the status.
 const POWER: usize = 0;
 const FORCE: usize = 5;
 const BRAKE: usize = 6;
 const FORCE_OFF_CAUSE: usize = 14;
 
-/// Which device, and where it stands.
+/// Which device to open, and its workspace.
 #[derive(Clone, Debug, Default)]
 pub struct Config {
     /// Number of the device, from 0.
     pub index: i8,
-    /// Whether a device that does not know its zero may find it by itself. **It then moves**: hands
-    /// off.
+    /// Whether an uninitialised device may find its zero by itself. **It then moves**: hands off.
     pub auto_init: bool,
-    /// The library's file; `None` lets the system search for it.
+    /// The library's file; `None` uses the system's search path.
     pub library: Option<PathBuf>,
-    /// How device space lies in the patient.
+    /// How device space maps to world space.
     pub workspace: Workspace,
 }
 
@@ -70,7 +69,7 @@ pub struct ForceDimension {
 }
 
 impl ForceDimension {
-    /// Loads the library, opens the device and switches its force on, at zero.
+    /// Loads the library, opens the device and enables its force, at zero.
     pub fn open(config: &Config) -> Result<Self, DeviceError> {
         let drd = Drd::load(config.library.as_deref())?;
         if drd.device_count() <= i32::from(config.index) {
@@ -102,7 +101,7 @@ impl ForceDimension {
         })
     }
 
-    /// Shows what is wrong with the device while another thread uses it.
+    /// Returns a watch on the device's faults, usable from another thread.
     pub fn watch(&self) -> Watch {
         self.watch.clone()
     }
@@ -112,7 +111,7 @@ impl ForceDimension {
         self.ramp.cut(Fault::Disconnected);
     }
 
-    /// Every few reads: is the force still on, and if not, why?
+    /// Checks every few reads whether the force is still on, and if not, why.
     fn look_at_status(&mut self, id: i8) {
         let Some(status) = self.drd.status(id) else { return self.lose() };
         let fault = match status[FORCE_OFF_CAUSE] {
@@ -126,7 +125,7 @@ impl ForceDimension {
         };
         let resting = self.watch.fault();
         match fault {
-            // Only what the maker's own limits cut is switched on again, after the rest.
+            // Only cuts by the device's own limits are re-enabled, after the rest.
             Some(Fault::TooFast | Fault::LoopSilent) if resting.is_some() => {}
             Some(fault) => self.ramp.cut(fault),
             None => {}
@@ -206,7 +205,7 @@ impl Drop for ForceDimension {
     }
 }
 
-/// Every device that the library sees.
+/// Lists every device that the library finds.
 pub(crate) fn probe() -> Result<Vec<Listed>, DeviceError> {
     Drd::load(None).map(|drd| found(&drd))
 }
@@ -244,7 +243,7 @@ fn not_opened(drd: &Drd, remedy: &'static str) -> DeviceError {
     DeviceError::Open { device: "force-dimension".to_owned(), reason: drd.last_error(), remedy }
 }
 
-/// The maker's x to the user, y right, z up as ours: x right, y up, z to the user.
+/// Converts the maker's axes (x to the user, y right, z up) to x right, y up, z to the user.
 fn axes(v: [f64; 3]) -> Vec3 {
     Vec3::new(v[1] as f32, v[2] as f32, v[0] as f32)
 }
@@ -253,14 +252,14 @@ fn makers_axes(v: Vec3) -> [f64; 3] {
     [v.z, v.x, v.y].map(f64::from)
 }
 
-/// The maker's orientation, with axes changed on both sides: at rest the shaft points to the user.
+/// Converts the maker's orientation to these axes: at rest the shaft points to the user.
 fn rotation(rows: [[f64; 3]; 3]) -> Quat {
     let row = |r: [f64; 3]| axes(r);
     let rows = [row(rows[1]), row(rows[2]), row(rows[0])];
     Quat::from_mat3(&Mat3::from_cols(rows[0], rows[1], rows[2]).transpose()).normalize()
 }
 
-/// Data-sheet numbers by the system's type.
+/// Capabilities from the data sheet, by system type.
 fn capabilities(drd: &Drd, id: i8) -> Capabilities {
     let (force_n, workspace_mm, resolution_mm, rate_hz) = match drd.system_type(id) {
         63 => (20.0, Vec3::new(400.0, 400.0, 260.0), 0.02, 4000.0),

@@ -1,27 +1,27 @@
 //! Haply Inverse3 with a VerseGrip, through Haply's own service on the same machine.
 //!
 //! # Theory
-//! The service answers each message with one state: the sender's pace is the loop's. A thread of
-//! the driver sends and receives; the haptic loop exchanges with it through triple buffers and
-//! never waits. That costs one to two ticks of delay.
+//! The service answers each message with one state, so that the sender sets the rate. A thread of
+//! the driver sends and receives; the haptic loop exchanges data with it through triple buffers and
+//! never waits. This costs one to two ticks of delay.
 //!
 //! ```text
-//!   haptic loop: apply() ──wish──> thread ──set_cursor_force──> service
-//!                read() <──news──  thread <──state───────────── service
+//!   haptic loop: apply() ─command─> thread ──set_cursor_force──> service
+//!                read() <──state──  thread <──state───────────── service
 //! ```
 //!
 //! # Practice
 //! The service's x right, y forward, z up (m) become x right, y up, z to the user (mm);
-//! [`Workspace`] lays them into the patient. Button a, or a wired grip's only one, is the pedal; b
-//! asks for the next tool. Force is given only while the service says calibrated, powered and
-//! ready, and no event says braked. Needs service 3.5 or later.
+//! [`Workspace`] maps them to world space. Button a, or the only button of a wired grip, is the
+//! pedal; b requests the next tool. Force is applied only while the service reports calibrated,
+//! powered and ready, and no event reported the brakes on. Needs service 3.5 or later.
 //!
 //! # Sources
-//! Haply Inverse SDK documentation, 3.5. The maker's Rust crate brings an asynchronous runtime;
-//! this is 300 lines.
+//! Haply Inverse SDK documentation, 3.5. The maker's Rust crate needs an asynchronous runtime; this
+//! driver is 300 lines.
 //!
 //! # When not to use it
-//! Over a network: the delay makes stiff walls buzz.
+//! Over a network: the delay makes stiff walls unstable.
 
 mod protocol;
 mod pump;
@@ -41,10 +41,10 @@ use triple_buffer::{Input, Output, triple_buffer};
 use websocket::WebSocket;
 
 const PATIENCE: Duration = Duration::from_secs(1);
-/// A device without news for this long is lost, ms.
+/// Time without a state after which a device is lost, ms.
 const LOST_MS: f64 = 1000.0;
 
-/// Which device, and where it stands.
+/// Which device to open, and its workspace.
 #[derive(Clone, Debug)]
 pub struct Config {
     /// The service's simulation channel, `host:port`.
@@ -53,12 +53,11 @@ pub struct Config {
     pub events: String,
     /// Id of the device, four hexadecimal digits; `None` takes the first.
     pub device: Option<String>,
-    /// Id of the VerseGrip; `None` takes the first that the service lists when the device is
-    /// opened.
+    /// Id of the VerseGrip; `None` takes the first listed when the device is opened.
     pub grip: Option<String>,
-    /// How the tool sits on the grip: tool axes seen from the grip's.
+    /// Rotation of the tool relative to the grip.
     pub grip_from_tool: Quat,
-    /// How device space lies in the patient.
+    /// How device space maps to world space.
     pub workspace: Workspace,
 }
 
@@ -81,7 +80,7 @@ pub struct Haply {
     grip_from_tool: Quat,
     workspace: Workspace,
     news: Output<News>,
-    wishes: Input<Command>,
+    commands: Input<Command>,
     flags: Arc<Flags>,
     threads: Vec<JoinHandle<()>>,
     number: u64,
@@ -93,7 +92,7 @@ pub struct Haply {
 }
 
 impl Haply {
-    /// Connects to the service and takes the device.
+    /// Connects to the service and opens the device.
     pub fn open(config: &Config) -> Result<Self, DeviceError> {
         let mut socket = connect(&config.service)?;
         let (device, grip) = find(&mut socket, config.device.as_deref(), config.grip.as_deref())?;
@@ -102,14 +101,14 @@ impl Haply {
         let watch = Watch::default();
         let flags = Arc::new(Flags::default());
         let (news_in, news) = triple_buffer(&News::default());
-        let (wishes, wish_out) = triple_buffer(&Command::default());
+        let (commands, command_output) = triple_buffer(&Command::default());
         let name = format!("Haply {device}");
         let pump = Pump {
             socket,
             device,
             grip,
             news: news_in,
-            wishes: wish_out,
+            commands: command_output,
             flags: flags.clone(),
             watch: watch.clone(),
             ramp: Ramp::new(watch.clone()),
@@ -128,7 +127,7 @@ impl Haply {
             grip_from_tool: config.grip_from_tool,
             workspace: config.workspace,
             news,
-            wishes,
+            commands,
             flags,
             threads,
             number: 0,
@@ -140,7 +139,7 @@ impl Haply {
         })
     }
 
-    /// Shows what is wrong with the device while another thread uses it.
+    /// Returns a watch on the device's faults, usable from another thread.
     pub fn watch(&self) -> Watch {
         self.watch.clone()
     }
@@ -186,7 +185,7 @@ impl HapticDevice for Haply {
         let Some(pump) = self.threads.first() else { return };
         self.number += 1;
         let force = services_axes(self.workspace.device_wrench(wrench.wrench()).force);
-        self.wishes.write(Command { number: self.number, force, pose_age_ms: self.time_ms - self.fresh_ms });
+        self.commands.write(Command { number: self.number, force, pose_age_ms: self.time_ms - self.fresh_ms });
         pump.thread().unpark();
     }
 
@@ -209,8 +208,7 @@ impl HapticDevice for Haply {
         self.flags.closing.store(true, Ordering::Release);
         for thread in self.threads.drain(..) {
             thread.thread().unpark();
-            // A thread that panicked has no force left to take back: the service drops it with the
-            // connection.
+            // A thread that panicked applies no force: the service drops it with the connection.
             let _ = thread.join();
         }
     }
@@ -222,13 +220,13 @@ impl Drop for Haply {
     }
 }
 
-/// Every device that the service has.
+/// Lists every device of the service.
 pub(crate) fn probe() -> Result<Vec<Listed>, DeviceError> {
     list(&Config::default())
 }
 
-/// Every device that a service has, by the name that opens it; an error says what is missing and
-/// what to do.
+/// Lists every device of a service by the name that opens it; an error says what is missing and how
+/// to fix it.
 pub fn list(config: &Config) -> Result<Vec<Listed>, DeviceError> {
     let mut socket = connect(&config.service)?;
     let listed = |id: String| Listed { name: format!("haply:{id}"), state: "ready".to_owned() };
@@ -242,7 +240,7 @@ fn connect(service: &str) -> Result<WebSocket, DeviceError> {
         .map_err(|error| not_opened(error.to_string(), "install and start Haply's Inverse service"))
 }
 
-/// Introduces us to the wanted device, or the first; gives its id and that of the grip.
+/// Registers with the wanted device, or the first; returns its id and that of the grip.
 fn find(
     socket: &mut WebSocket,
     wanted: Option<&str>,
@@ -259,7 +257,7 @@ fn broken(error: std::io::Error) -> DeviceError {
     not_opened(error.to_string(), "restart Haply's Inverse service")
 }
 
-/// Reads the inventory: ids of the devices that answer to `wanted`, at least one, and its text.
+/// Reads the inventory: its text and the ids of the devices that match `wanted`, at least one.
 fn devices(socket: &mut WebSocket, wanted: Option<&str>) -> Result<(Vec<String>, String), DeviceError> {
     let inventory = socket.receive(PATIENCE).map_err(broken)?;
     let Some(inventory) = inventory else {
@@ -288,7 +286,7 @@ fn not_opened(reason: String, remedy: &'static str) -> DeviceError {
     DeviceError::Open { device: "haply".to_owned(), reason, remedy }
 }
 
-/// The service's x right, y forward, z up as ours: x right, y up, z to the user.
+/// Converts the service's axes (x right, y forward, z up) to x right, y up, z to the user.
 fn axes(v: Vec3) -> Vec3 {
     Vec3::new(v.x, v.z, -v.y)
 }
@@ -297,7 +295,7 @@ fn services_axes(v: Vec3) -> Vec3 {
     Vec3::new(v.x, -v.z, v.y)
 }
 
-/// [`axes`] as a rotation: a quarter turn about x, backwards.
+/// [`axes`] as a rotation: −90° about x.
 fn axes_turn() -> Quat {
     Quat::from_rotation_x(-core::f32::consts::FRAC_PI_2)
 }

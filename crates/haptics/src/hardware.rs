@@ -1,18 +1,18 @@
-//! Opens the devices that are more than software, by the name that a user gave.
+//! Opens hardware devices by the name that a user gave.
 
 use crate::{DeviceError, DeviceName, HapticDevice, Listed, Watch, Workspace};
 use crate::{force_dimension, haply, openhaptics, spacemouse};
 
-/// A device of metal, and the window into its faults.
+/// A hardware device and the watch on its faults.
 pub struct Hardware {
-    /// For the haptic loop.
+    /// The device, for the haptic loop.
     pub device: Box<dyn HapticDevice>,
-    /// For whoever shows messages.
+    /// Its faults, for the code that shows messages.
     pub watch: Watch,
 }
 
-/// Opens the device with the recommended settings; `None` when the name stands for software.
-/// `workspace` lays its space into the patient.
+/// Opens the device with the recommended settings; `None` when the name is a virtual device.
+/// `workspace` maps device space to world space.
 pub fn open(name: &DeviceName, workspace: Workspace) -> Option<Result<Hardware, DeviceError>> {
     match name {
         DeviceName::OpenHaptics(device) => {
@@ -42,8 +42,8 @@ pub fn open(name: &DeviceName, workspace: Workspace) -> Option<Result<Hardware, 
     }
 }
 
-/// The hardware that a user can ask for, each device that is found by its own name, and where there
-/// is none, what is missing. Devices are not opened: that could move them.
+/// Lists the hardware that a user can open: each connected device by name, or what is missing.
+/// Devices are not opened: that could move them.
 pub(crate) fn list() -> Vec<Listed> {
     let one = |name: &str, found: Result<String, DeviceError>| Listed {
         name: name.to_owned(),

@@ -1,14 +1,14 @@
-//! Haptic devices behind one seam: read where the tool is, apply a force that a guard has passed.
+//! Haptic devices behind one trait: read the tool's pose, apply a force checked by the force guard.
 //!
 //! ```text
-//!   device ──read──> tool in world space ──> scene ──> wrench ──guard──> GuardedWrench ──apply──> device
+//! device ──read──> tool in world space ──> scene ──> wrench ──guard──> GuardedWrench ──> device
 //! ```
 //!
 //! # Practice
 //! World space is the patient's RAS+ mm; forces are N, torques N mm. Each driver converts from its
-//! vendor's units and axes. A device takes nothing but a [`GuardedWrench`], which only the force
-//! guard makes: no path goes round it. `read` and `apply` are called once per haptic tick; they
-//! neither allocate, lock nor wait, unless the device itself is the clock (documented at the
+//! vendor's units and axes. A device accepts only a [`GuardedWrench`], which only the force guard
+//! creates, so that no force bypasses it. `read` and `apply` are called once per haptic tick. They
+//! neither allocate, lock nor wait, unless the device itself sets the rate (documented at the
 //! driver).
 //!
 //! # When not to use it
@@ -45,7 +45,7 @@ pub use workspace::Workspace;
 #[doc(no_inline)]
 pub use trepan_contact::GuardedWrench;
 
-/// A driver of metal gives no force that was made for a pose older than this, ms.
+/// Largest age of the pose that a hardware driver accepts a force for, ms.
 const STALE_MS: f64 = 5.0;
 
 #[cfg(doctest)]

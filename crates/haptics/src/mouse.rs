@@ -1,19 +1,20 @@
-//! The window's pointer as a device: poses at the picture's rate in, a smooth tool at the haptic
-//! rate out.
+//! The window's pointer as a device: poses arrive at frame rate and are smoothed to the haptic
+//! rate.
 //!
 //! # Theory
 //! Each axis follows the pointer's pose through a critically damped second-order filter,
-//! `ẍ = ω²(u - x) - 2ω ẋ`, solved exactly over each tick for the pose u held between window events:
-//! with e = x - u and `c = ẋ + ω e`, `e(t) = (e + c t) exp(-ω t)`, `ẋ(t) = (ẋ - ω c t) exp(-ω t)`.
-//! It cannot oscillate or overshoot a step, for any tick length, and its velocity is continuous, as
-//! force models want. Rotation follows by the first-order law `exp(-ω t)` along the shortest arc.
+//! `ẍ = ω²(u - x) - 2ω ẋ`, solved exactly over each tick. The pose u is constant between window
+//! events. With e = x - u and `c = ẋ + ω e`, `e(t) = (e + c t) exp(-ω t)`,
+//! `ẋ(t) = (ẋ - ω c t) exp(-ω t)`. It cannot oscillate or overshoot a step, for any tick length.
+//! Its velocity is continuous, as force models require. Rotation follows first-order, `exp(-ω t)`,
+//! along the shortest arc.
 //!
 //! # Practice
-//! The default ω = 0.08 / ms lags by 25 ms: two pictures. Handle and device exchange values through
+//! The default ω = 0.08 / ms lags by 25 ms: two frames. Handle and device exchange values through
 //! triple buffers: neither side ever waits.
 //!
 //! # When not to use it
-//! To judge forces: the pointer does not feel them. [`MouseHandle::wrench`] is for drawing them.
+//! To judge forces: the pointer does not render them. [`MouseHandle::wrench`] is for display.
 
 use crate::{Capabilities, HapticDevice, Reading, Status};
 use trepan_contact::GuardedWrench;
@@ -25,13 +26,13 @@ const OMEGA_PER_MS: f64 = 0.08;
 /// Longest tick that the smoothing follows, ms.
 const MAX_DT_MS: f64 = 100.0;
 
-/// The window's end.
+/// The window's end of the pair.
 pub struct MouseHandle {
     wanted: Input<(Pose, Buttons)>,
     felt: Output<Wrench>,
 }
 
-/// The haptic loop's end.
+/// The haptic loop's end of the pair.
 pub struct Mouse {
     wanted: Output<(Pose, Buttons)>,
     felt: Input<Wrench>,
@@ -41,7 +42,7 @@ pub struct Mouse {
     closed: bool,
 }
 
-/// A handle for the window and the device that follows it, both at `start`.
+/// Creates a handle for the window and the device that follows it, both at `start`.
 pub fn pair(start: Pose) -> (MouseHandle, Mouse) {
     let (wanted_in, wanted_out) = triple_buffer(&(start, Buttons::default()));
     let (felt_in, felt_out) = triple_buffer(&Wrench::ZERO);
@@ -51,15 +52,14 @@ pub fn pair(start: Pose) -> (MouseHandle, Mouse) {
 }
 
 impl MouseHandle {
-    /// Where the tool shall go, `world_from_tool`, and what is pressed. A pose that is not finite
-    /// is ignored.
+    /// Sets the target pose `world_from_tool` and the pressed buttons; ignores a non-finite pose.
     pub fn set(&mut self, pose: Pose, buttons: Buttons) {
         if pose.translation.is_finite() && pose.rotation.is_finite() {
             self.wanted.write((pose, buttons));
         }
     }
 
-    /// The wrench last applied.
+    /// Returns the wrench last applied.
     pub fn wrench(&mut self) -> Wrench {
         *self.felt.read()
     }
@@ -81,7 +81,7 @@ impl Mouse {
     }
 }
 
-/// Axis times angle of the shorter way round.
+/// Rotation vector (axis times angle, rad) of the shorter rotation.
 pub(crate) fn rotation_vector(q: Quat) -> Vec3 {
     let q = if q.w < 0.0 { -q } else { q };
     q.to_scaled_axis()

@@ -1,10 +1,10 @@
-//! Device names as users write them.
+//! Device names on the command line.
 
 use crate::script;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Which device a user wants.
+/// The device that a user requested.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceName {
     /// `mouse`: the window's pointer.
@@ -13,53 +13,52 @@ pub enum DeviceName {
     Script(String),
     /// `replay:FILE`: the motion of a recorded session.
     Replay(PathBuf),
-    /// `simulated:NAME`: a device with mass, friction and delay, in a springy hand that wants to do
-    /// a scripted operation.
+    /// `simulated:NAME`: a device with mass, friction and delay, in a hand model that follows a
+    /// scripted operation.
     Simulated(String),
-    /// `openhaptics[:NAME]`: 3D Systems Touch and its kin, by the name given in the vendor's set-up
-    /// tool.
+    /// `openhaptics[:NAME]`: 3D Systems Touch and related devices, by the name in the vendor's
+    /// set-up tool.
     OpenHaptics(Option<String>),
-    /// `force-dimension[:N]`: omega, delta, sigma, lambda, Falcon; the first, or by its number
-    /// from 0.
+    /// `force-dimension[:N]`: omega, delta, sigma, lambda, Falcon; the first, or by number from 0.
     ForceDimension(Option<u8>),
     /// `haply[:ID[+GRIP]]`: Inverse3 with VerseGrip, through its service; the first, or by their
     /// four hexadecimal digits.
     Haply(Option<String>),
-    /// `spacemouse`: a six-axis knob, without force.
+    /// `spacemouse`: a six-axis knob without force.
     SpaceMouse,
 }
 
-/// A device name that does not say which device.
+/// Why a device name is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NameError {
     /// No driver has this name.
     #[error("there is no device {name:?}; known are {KNOWN}")]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
     },
-    /// The script or simulated hand is not known.
+    /// The script of a scripted or simulated device is unknown.
     #[error("device {name:?}: the scripts are {}", script::NAMES.join(", "))]
     UnknownScript {
-        /// What was asked for.
+        /// The requested name.
         name: String,
     },
     /// The name needs something after its colon.
     #[error("device {name:?} lacks its {what}; write {name}:{example}")]
     Incomplete {
-        /// What was asked for.
+        /// The requested name.
         name: String,
         /// What is missing.
         what: &'static str,
         /// An example of it.
         example: &'static str,
     },
-    /// The device goes by a number.
+    /// The device needs a number.
     #[error("device {name}:{text} goes by a number; write {name}:N with N from 0 to 127, as --list-devices does")]
     NoNumber {
         /// The device.
         name: String,
-        /// What was after the colon.
+        /// The text after the colon.
         text: String,
     },
     /// The device takes nothing after a colon.
@@ -67,7 +66,7 @@ pub enum NameError {
     Superfluous {
         /// The device.
         name: String,
-        /// What was after the colon.
+        /// The text after the colon.
         extra: String,
     },
 }
@@ -75,13 +74,13 @@ pub enum NameError {
 const KNOWN: &str = "mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics[:NAME], force-dimension[:N], haply[:ID[+GRIP]], spacemouse";
 
 impl DeviceName {
-    /// Whether both names may stand for one device of metal: a name that leaves out which may be
-    /// any of its kind.
+    /// Whether both names may mean the same hardware device; a name without an id may mean any of
+    /// its kind.
     pub fn may_be(&self, other: &Self) -> bool {
         fn meet<T: PartialEq>(one: &Option<T>, other: &Option<T>) -> bool {
             one.is_none() || other.is_none() || one == other
         }
-        /// The device's own id, without its grip's.
+        /// The device's id, without its grip's.
         fn inverse(ids: &Option<String>) -> Option<&str> {
             ids.as_deref().and_then(|ids| ids.split('+').next()).filter(|id| !id.is_empty())
         }
@@ -148,16 +147,16 @@ impl std::fmt::Display for DeviceName {
     }
 }
 
-/// A device that a user can ask for.
+/// A device that a user can request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Listed {
     /// What to write after `--device`.
     pub name: String,
-    /// Whether it is there, and if not, what is missing.
+    /// Whether it is available, and if not, what is missing.
     pub state: String,
 }
 
-/// Every device that a user can ask for, and whether it is there.
+/// Lists every device that a user can request, and whether it is available.
 pub fn list() -> Vec<Listed> {
     let ready = |name: String, state: &str| Listed { name, state: state.to_owned() };
     let mut listed = vec![ready("mouse".to_owned(), "ready where there is a window")];
@@ -194,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn two_names_of_one_device_are_told() {
+    fn names_of_the_same_device_are_recognised() {
         let may = |one: &str, other: &str| one.parse::<DeviceName>().unwrap().may_be(&other.parse().unwrap());
         assert!(may("haply:049D+60BD", "haply:049D+71CE") && !may("haply:049D+60BD", "haply:049E+60BD"));
         assert!(may("haply", "haply:049D") && may("haply:049d", "haply:049D") && !may("haply:049E", "haply:049D"));
@@ -205,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_say_what_would_be_right() {
+    fn errors_name_the_remedy() {
         let error = |name: &str| name.parse::<DeviceName>().unwrap_err().to_string();
         assert!(error("joystick").contains(KNOWN));
         assert!(error("script").contains("write script:craniotomy-and-probe"));
@@ -216,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_is_listed_can_be_asked_for() {
+    fn every_listed_name_parses() {
         for listed in list() {
             assert!(listed.name.parse::<DeviceName>().is_ok(), "{}", listed.name);
             assert!(!listed.state.is_empty());

@@ -2,23 +2,24 @@
 //! when the device is opened.
 //!
 //! # Theory
-//! libHD owns the servo thread. Its callback publishes what it senses and applies what the haptic
-//! loop last asked for; both pass through triple buffers, so that neither thread waits for the
-//! other. That costs up to one tick of delay. All devices share one callback, which finishes the
-//! first device's frame before it begins the second's.
+//! libHD owns the servo thread. Its callback publishes samples and applies the haptic loop's latest
+//! command, both through triple buffers, so that neither thread waits for the other. This costs up
+//! to one tick of delay. All devices share one callback, which finishes the first device's frame
+//! before it begins the second's.
 //!
 //! ```text
-//!   haptic loop: read() <──sample── callback, 1 kHz, each device: begin frame, sense, command, end frame
+//!   haptic loop: read() <──sample── callback, 1 kHz
+//!                                   each device: begin frame, sense, command, end frame
 //!                apply() ──command─>
 //! ```
 //!
 //! # Practice
-//! The device's axes are x right, y up, z towards the user, mm; [`Workspace`] lays them into the
-//! patient. Button 1 is the pedal, button 2 asks for the next tool. Force is off until the device
-//! is calibrated. `read` is [`Status::Lost`] after a fault of the link or 50 ms without a sample.
-//! While a second device is opened or closed the first is without force for a moment, then its
-//! force ramps in. While libHD does not call, its last force stays on the motors; when it calls
-//! again there is none. Nothing of the maker's is part of this crate.
+//! The device's axes are x right, y up, z towards the user, mm; [`Workspace`] maps them to world
+//! space. Button 1 is the pedal, button 2 requests the next tool. Force is off until the device is
+//! calibrated. `read` is [`Status::Lost`] after a link fault or 50 ms without a sample. While a
+//! second device is opened or closed the first has no force for a moment, then its force ramps in.
+//! While libHD does not call, its last force stays on the motors; at its next call the force is
+//! zero. This crate contains no code of the maker.
 //!
 //! # Sources
 //! OpenHaptics API reference and programmer's guide (3D Systems).
@@ -37,20 +38,20 @@ use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Mat3, Pose, Quat, ToolState, Twist, Vec3};
 use triple_buffer::{Input, Output, triple_buffer};
 
-/// A device without a sample for this long is lost, ms.
+/// Time without a sample after which a device is lost, ms.
 const LOST_MS: f64 = 50.0;
 /// Names that the maker's set-up tools give the first device.
 const DEFAULT_NAMES: [Option<&str>; 4] =
     [Some("Default Device"), Some("Default PHANToM"), Some("Default PHANTOM"), None];
 
-/// Which device, and where it stands.
+/// Which device to open, and its workspace.
 #[derive(Clone, Debug, Default)]
 pub struct Config {
     /// Name given in the maker's set-up tool; `None` tries the usual names.
     pub device: Option<String>,
-    /// The library's file; `None` lets the system search for it.
+    /// The library's file; `None` uses the system's search path.
     pub library: Option<PathBuf>,
-    /// How device space lies in the patient.
+    /// How device space maps to world space.
     pub workspace: Workspace,
 }
 
@@ -112,7 +113,7 @@ impl OpenHaptics {
         })
     }
 
-    /// Shows what is wrong with the device while another thread uses it.
+    /// Returns a watch on the device's faults, usable from another thread.
     pub fn watch(&self) -> Watch {
         self.watch.clone()
     }
@@ -166,13 +167,13 @@ impl Drop for OpenHaptics {
     }
 }
 
-/// Whether the library is there.
+/// Checks whether the library is installed.
 pub(crate) fn probe() -> Result<String, DeviceError> {
     Hd::load(None).map(|(_, library)| format!("{library} is installed; the device is looked for when it is opened"))
 }
 
-/// A sample as a tool in device space. The transform's columns drift from orthonormal: they are
-/// made so again.
+/// Converts a sample to a tool in device space. The transform's columns drift from orthonormal and
+/// are re-orthonormalised.
 fn tool(sample: &Sample, time_ms: f64) -> ToolState {
     let m = sample.transform.map(|value| value as f32);
     let z = Vec3::new(m[8], m[9], m[10]).normalize_or(Vec3::Z);
@@ -226,7 +227,7 @@ fn capabilities(hd: &Hd, drives_torque: bool) -> Capabilities {
         axes_driven: if drives_torque { 6 } else { 3 },
         position_resolution_mm: 0.055,
         delay_ticks: 1,
-        // The lightest of the family.
+        // The lightest device of the family.
         moving_mass_g: 45.0,
         damping: 0.1,
     };
@@ -234,7 +235,7 @@ fn capabilities(hd: &Hd, drives_torque: bool) -> Capabilities {
     capabilities
 }
 
-/// The first of the calibration styles that the device has.
+/// The first calibration style in the mask.
 fn lowest_bit(mask: i32) -> u32 {
     let mask = mask.cast_unsigned();
     mask & mask.wrapping_neg()

@@ -1,4 +1,4 @@
-//! How force comes back after a fault: first not at all, then slowly.
+//! Restores the force after a fault: zero for a while, then a linear ramp.
 
 use crate::{Fault, Watch};
 
@@ -6,10 +6,10 @@ use crate::{Fault, Watch};
 const REST_MS: f32 = 200.0;
 /// Time from no force to full force after that, and at the start, ms.
 const RAMP_MS: f32 = 300.0;
-/// Longest tick that counts, ms: a pause is no rest.
+/// Longest tick that counts, ms: a longer pause does not shorten the rest.
 const MAX_DT_MS: f32 = 5.0;
 
-/// The share of the force that a device gives.
+/// The fraction of the force that a device applies.
 #[derive(Clone, Debug)]
 pub(crate) struct Ramp {
     left_ms: f32,
@@ -17,28 +17,28 @@ pub(crate) struct Ramp {
 }
 
 impl Ramp {
-    /// Starts a ramp without a rest. Faults show in `watch`.
+    /// Starts a ramp without a rest; faults are shown in `watch`.
     pub(crate) fn new(watch: Watch) -> Self {
         Self { left_ms: RAMP_MS, watch }
     }
 
-    /// Cuts the force and starts the rest anew.
+    /// Sets the force to zero and restarts the rest.
     pub(crate) fn cut(&mut self, fault: Fault) {
         self.left_ms = REST_MS + RAMP_MS;
         self.watch.set(Some(fault));
     }
 
-    /// Cuts the force for the fault that holds already, or else for a new one.
+    /// Sets the force to zero for the current fault, or else for a new one.
     pub(crate) fn cut_again_or(&mut self, fault: Fault) {
         self.cut(self.watch.fault().unwrap_or(fault));
     }
 
-    /// Ramps in anew without a fault; a rest goes on.
+    /// Restarts the ramp without a fault; a rest continues.
     pub(crate) fn restart(&mut self) {
         self.left_ms = self.left_ms.max(RAMP_MS);
     }
 
-    /// The share for this tick of `dt_ms`, 0 to 1. A fault is over when the ramp begins.
+    /// Returns the fraction for this tick of `dt_ms`, 0 to 1. A fault ends when the ramp begins.
     pub(crate) fn share(&mut self, dt_ms: f32) -> f32 {
         if self.left_ms <= 0.0 {
             return 1.0;
@@ -51,7 +51,7 @@ impl Ramp {
         1.0 - (self.left_ms / RAMP_MS).max(0.0)
     }
 
-    /// Whether a share for a tick of `dt_ms` would begin the ramp after a rest.
+    /// Whether a tick of `dt_ms` would end the rest and begin the ramp.
     pub(crate) fn rest_ends(&self, dt_ms: f32) -> bool {
         self.left_ms >= RAMP_MS && self.left_ms - dt_ms.clamp(0.0, MAX_DT_MS) < RAMP_MS && self.watch.fault().is_some()
     }

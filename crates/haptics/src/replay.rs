@@ -1,14 +1,14 @@
-//! Replays recorded tool states: each read gives the next one, whatever the clock says.
+//! Replays recorded tool states: each read returns the next one, regardless of the clock.
 //!
 //! # Practice
-//! One state per read makes a replay give the same forces as the recording, bit for bit, at any
-//! speed. The states carry their recorded times. After the last one the tool rests there.
+//! One state per read makes a replay produce bit-identical forces at any speed. The states keep
+//! their recorded times. After the last one the tool stays there.
 
 use crate::{Capabilities, HapticDevice, Reading, Status};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Pose, ToolState, Twist, Wrench};
 
-/// A recording in the place of a hand.
+/// A recording used as a device.
 #[derive(Clone, Debug)]
 pub struct Replay {
     states: Vec<ToolState>,
@@ -18,12 +18,12 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Replays `states` in order. Without any, every read is finished, at the origin.
+    /// Replays `states` in order. Without any, every read is [`Status::Finished`] at the origin.
     pub fn new(states: Vec<ToolState>) -> Self {
         Self { states, next: 0, applied: GuardedWrench::ZERO, closed: false }
     }
 
-    /// How many states are still to come.
+    /// Number of remaining states.
     pub fn remaining(&self) -> usize {
         self.states.len() - self.next
     }

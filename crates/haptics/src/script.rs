@@ -1,15 +1,14 @@
-//! Scripted operations: a hand that never tires, for demonstrations, tests and machines without a
-//! device.
+//! Scripted operations for demonstrations, tests and machines without a device.
 //!
 //! # Theory
-//! Between waypoints the tip follows the minimum-jerk law of human reaching (Flash and Hogan 1985,
-//! J. Neurosci. 5): `x(τ) = x₀ + (x₁ - x₀)(10τ³ - 15τ⁴ + 6τ⁵)`, τ = t/T; it starts and ends at
-//! rest, its velocity is continuous and peaks at 15/8 of the mean. Velocities are its exact
+//! Between waypoints the tip follows the minimum-jerk trajectory of human reaching (Flash and Hogan
+//! 1985, J. Neurosci. 5): `x(τ) = x₀ + (x₁ - x₀)(10τ³ - 15τ⁴ + 6τ⁵)`, τ = t/T. It starts and ends
+//! at rest; its velocity is continuous and peaks at 15/8 of the mean. Velocities are its exact
 //! derivative.
 //!
 //! # Practice
-//! A script is a pure function of time: the same times give the same bits, in any order. The tool's
-//! shaft (+z) points out of the patient along the hole.
+//! A script is a pure function of time: equal times give bit-identical states, in any order. The
+//! tool's shaft (+z) points out of the patient along the hole.
 //!
 //! ```text
 //!  approach     drill, pedal down     retreat  change  approach   three presses          leave
@@ -17,7 +16,7 @@
 //! ```
 //!
 //! # When not to use it
-//! To judge what a person would feel or do: it does not yield to force. Use [`crate::simulated`]
+//! To predict what a person would feel or do: it does not yield to force. Use [`crate::simulated`]
 //! for that.
 
 mod operation;
@@ -33,12 +32,12 @@ use trepan_geometry::{ToolState, Wrench};
 
 /// The names of the operations that [`Script::named`] knows.
 ///
-/// `aspirate` is for the second hand: its tool comes beside the burr and rests on the bone there.
-/// `flap` cuts a flap free with burr and craniotome, lifts it and probes the brain; give it a
+/// `aspirate` is for the second hand: its tool approaches beside the burr and rests on the bone.
+/// `flap` cuts a bone flap with burr and craniotome, lifts it and probes the brain; give it a
 /// minute.
 pub const NAMES: [&str; 5] = ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap"];
 
-/// Duration of an operation when none is asked for, ms.
+/// Default duration of an operation, ms.
 pub const DEFAULT_DURATION_MS: f64 = 20_000.0;
 
 /// A script could not be made.
@@ -47,23 +46,23 @@ pub enum ScriptError {
     /// There is no such operation.
     #[error("there is no script {name:?}; the scripts are {}", NAMES.join(", "))]
     UnknownName {
-        /// What was asked for.
+        /// The requested name.
         name: String,
     },
-    /// The duration is not a time.
+    /// The duration is out of range.
     #[error("a script cannot last {duration_ms} ms; give more than 0 and at most 86400000 (a day)")]
     Duration {
-        /// What was asked for.
+        /// The requested duration, ms.
         duration_ms: f64,
     },
-    /// The site is not a place to operate.
+    /// The site is invalid.
     #[error("the site's {field} is {value}; it must be {wanted}")]
     Site {
-        /// Which field.
+        /// The invalid field.
         field: &'static str,
-        /// What it was.
+        /// Its value.
         value: String,
-        /// What would be right.
+        /// The valid range.
         wanted: &'static str,
     },
 }
@@ -83,7 +82,7 @@ impl Script {
         Self::planned(name, site, duration_ms, &Plan::default())
     }
 
-    /// The operation `name` at `site`, with a plan.
+    /// The operation `name` at `site`, with the given plan.
     pub fn planned(name: &str, site: &Site, duration_ms: f64, plan: &Plan) -> Result<Self, ScriptError> {
         let Some(name) = NAMES.into_iter().find(|&known| known == name) else {
             return Err(ScriptError::UnknownName { name: name.to_owned() });
@@ -106,12 +105,12 @@ impl Script {
         self.path.end_ms()
     }
 
-    /// The stations of the way; the first is where the tool waits at time 0.
+    /// The waypoints; the tool waits at the first at time 0.
     pub fn waypoints(&self) -> &[Waypoint] {
         self.path.waypoints()
     }
 
-    /// The tool at a time after the start; it waits before 0 and rests after the end.
+    /// The tool state at a time; before 0 it waits, after the end it rests.
     pub fn at(&self, time_ms: f64) -> ToolState {
         self.path.at(time_ms)
     }

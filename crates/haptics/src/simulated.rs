@@ -1,20 +1,22 @@
-//! A simulated device in a simulated hand: mass, friction, encoder steps and delay, pushed by the
-//! force applied.
+//! A simulated device held by a simulated hand: mass, friction, encoder steps and delay, driven by
+//! the applied force.
 //!
 //! # Theory
 //! ```text
-//!   intent u ──[k_h, b_h]── x: mass m ──[b, f_c]── ground        m ẍ = F(t - d) + k_h(u - x) + b_h(u̇ - ẋ) - b ẋ - f_c ẋ/|ẋ|
+//!   intent u ──[k_h, b_h]── x: mass m ──[b, f_c]── ground
+//!
+//!   m ẍ = F(t - d) + k_h(u - x) + b_h(u̇ - ẋ) - b ẋ - f_c ẋ/|ẋ|
 //! ```
-//! The hand is a spring and a damper between where it means to be and the device's handle; the
-//! handle has the device's apparent mass, viscous and Coulomb friction; the force arrives d ticks
-//! late and what is read is rounded to encoder steps. These are the parts that decide whether a
-//! haptic loop is stable: without a hand, `K < (b + B)/(T/2 + d)` (Gil and others 2004); a passive
-//! wall needs `b > K T/2 + B` (Colgate and Schenkel 1997).
+//! The hand is a spring and a damper between its intended position and the device's handle. The
+//! handle has the device's apparent mass, viscous and Coulomb friction. The force is applied d
+//! ticks late, and readings are rounded to encoder steps. These terms decide whether a haptic loop
+//! is stable: without a hand, `K < (b + B)/(T/2 + d)` (Gil and others 2004); a passive wall needs
+//! `b > K T/2 + B` (Colgate and Schenkel 1997).
 //!
 //! # Practice
-//! Integrated by symplectic Euler with Coulomb friction as a cap on the momentum that it may take,
-//! in steps of at most 20 µs. Motion is free of torque: rotation follows the intent. Deterministic:
-//! the same calls give the same bits.
+//! Integrated by symplectic Euler in steps of at most 20 µs; Coulomb friction is a cap on the
+//! momentum it may remove. Torque has no effect: rotation follows the intent. Deterministic: equal
+//! calls give bit-identical results.
 //!
 //! # Sources
 //! Gil et al. 2004, "Stability analysis of a 1 DOF haptic interface"; Colgate and Schenkel 1997, J.
@@ -30,9 +32,9 @@ use trepan_geometry::{ToolState, Vec3, Wrench};
 
 /// Longest integration step, ms.
 const STEP_MS: f64 = 0.02;
-/// Longest time between two reads that is integrated, ms: what is beyond is a pause.
+/// Longest time between two reads that is integrated, ms; the rest counts as a pause.
 const MAX_DT_MS: f64 = 100.0;
-/// Most ticks that a force can be delayed.
+/// Largest delay of a force, ticks.
 pub const MAX_DELAY_TICKS: usize = 16;
 
 /// The device's mechanics.
@@ -46,19 +48,18 @@ pub struct Config {
     pub friction_n: f32,
     /// Encoder step Δ, mm; 0 for none.
     pub quantum_mm: f32,
-    /// Reads that a force is late; at most [`MAX_DELAY_TICKS`].
+    /// Delay of a force in reads; at most [`MAX_DELAY_TICKS`].
     pub delay_ticks: usize,
-    /// Longest force of the motors, N: more is shortened.
+    /// Largest motor force, N; larger forces are scaled down.
     pub peak_force_n: f32,
-    /// Time constant of the velocity's low-pass filter, ms; 0 for the plain difference of
-    /// positions.
+    /// Time constant of the velocity's low-pass filter, ms; 0 for the raw position difference.
     pub velocity_filter_ms: f32,
-    /// Highest rate at which it may be read, Hz.
+    /// Highest read rate, Hz.
     pub rate_hz: f32,
 }
 
 impl Config {
-    /// A Touch, on a link that bears 4 kHz.
+    /// A Touch, on a link that supports 4 kHz.
     pub const TOUCH: Self = Self {
         mass_g: 45.0,
         damping: 0.1,
@@ -77,7 +78,7 @@ impl Default for Config {
     }
 }
 
-/// The hand on the device.
+/// The hand that holds the device: a spring-damper model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandModel {
     /// Mass that moves with the device, g.
@@ -89,7 +90,7 @@ pub struct HandModel {
 }
 
 impl HandModel {
-    /// No hand: the device floats.
+    /// No hand: the device moves freely.
     pub const FREE: Self = Self { mass_g: 0.0, damping: 0.0, stiffness: 0.0 };
     /// A light grip.
     pub const LIGHT: Self = Self { mass_g: 50.0, damping: 2.0, stiffness: 0.15 };
@@ -97,7 +98,7 @@ impl HandModel {
     pub const FIRM: Self = Self { mass_g: 150.0, damping: 5.0, stiffness: 0.4 };
 }
 
-/// A device whose hand means to go where another device is.
+/// A simulated device whose hand follows the pose of another device.
 pub struct Simulated {
     config: Config,
     hand: HandModel,
@@ -109,7 +110,7 @@ pub struct Simulated {
     closed: bool,
 }
 
-/// What the last read saw.
+/// The state at the last read.
 #[derive(Clone, Copy)]
 struct Sample {
     time_ms: f64,
@@ -119,7 +120,7 @@ struct Sample {
 }
 
 impl Simulated {
-    /// A device in a hand that follows `intent`, usually a [`crate::script::Script`].
+    /// Creates a device in a hand that follows `intent`, usually a [`crate::script::Script`].
     pub fn new(config: Config, hand: HandModel, intent: Box<dyn HapticDevice>) -> Self {
         Self {
             config: Config { delay_ticks: config.delay_ticks.min(MAX_DELAY_TICKS), ..config },
@@ -133,8 +134,7 @@ impl Simulated {
         }
     }
 
-    /// True position of the handle, mm; what [`HapticDevice::read`] gives is rounded to encoder
-    /// steps.
+    /// True position of the handle, mm; [`HapticDevice::read`] returns it rounded to encoder steps.
     pub fn position(&self) -> Vec3 {
         self.position
     }
@@ -144,17 +144,17 @@ impl Simulated {
         self.velocity
     }
 
-    /// Gives the handle a push, mm/ms: a disturbance for stability tests.
+    /// Adds a velocity to the handle, mm/ms: a disturbance for stability tests.
     pub fn push(&mut self, velocity: Vec3) {
         self.velocity += velocity;
     }
 
-    /// The force that the motors make now, N.
+    /// The present motor force, N.
     pub fn motor_force(&self) -> Vec3 {
         self.commanded[self.config.delay_ticks].force.clamp_length_max(self.config.peak_force_n)
     }
 
-    /// Moves the handle on while the intent goes from where it was to `to`.
+    /// Advances the handle while the intent moves from `from` to `to`.
     fn advance(&mut self, from: Vec3, to: Vec3, dt_ms: f64) {
         let steps = (dt_ms / STEP_MS).ceil().max(1.0);
         let h = (dt_ms / steps) as f32;
@@ -172,7 +172,7 @@ impl Simulated {
         }
     }
 
-    /// The tool as encoders show it.
+    /// The tool as the encoders measure it.
     fn sense(&mut self, intent: &ToolState, time_ms: f64) -> ToolState {
         let q = self.config.quantum_mm;
         let sensed = if q > 0.0 { (self.position / q).round() * q } else { self.position };

@@ -1,26 +1,26 @@
-//! SpaceMouse: a knob that is pushed and turned, as a tool that moves while it is pushed. It has no
-//! motors.
+//! SpaceMouse: a six-axis knob that sets the tool's velocity. It has no motors.
 //!
 //! # Theory
-//! The knob says how far it is pushed, −1 to 1 on each axis; that is a velocity, since it springs
-//! back:
+//! The knob reports its deflection, −1 to 1 on each axis. It springs back, so that the deflection
+//! sets a velocity:
 //! ```text
-//! v = s |a| a     ω = r |b| b     position and tilt are their integrals, held within a box and a cone
+//! v = s |a| a     ω = r |b| b
+//! position and tilt are their integrals, limited to a box and a cone
 //! ```
 //! The square makes small pushes fine and large ones fast.
 //!
 //! # Practice
-//! Through the spacenav daemon where it runs, else straight from the system's HID reports
-//! ([`Config::source`]). Both are read without waiting, at most 64 messages a tick. The knob's axes
-//! become x right, y up, z to the user; [`Workspace`] lays them into the patient. The first button
-//! is the pedal, the second asks for the next tool. The knob is silent at rest: after 100 ms
-//! without a word it counts as let go. A lost knob is [`Status::Lost`] until it is opened again.
+//! Reads the spacenav daemon where it runs, else the system's HID reports ([`Config::source`]).
+//! Both are read without waiting, at most 64 messages a tick. The knob's axes become x right, y up,
+//! z to the user; [`Workspace`] maps them to world space. The first button is the pedal, the second
+//! requests the next tool. The knob sends nothing at rest: after 100 ms without a message it counts
+//! as released. A lost knob is [`Status::Lost`] until it is opened again.
 //!
 //! # Sources
 //! spacenavd's protocol (its public documentation), the USB HID reports of 3Dconnexion's devices.
 //!
 //! # When not to use it
-//! To judge forces: it feels none.
+//! To judge forces: it renders none.
 
 mod daemon;
 mod hid;
@@ -32,29 +32,29 @@ use std::path::PathBuf;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
 
-/// What a knob reports when it is pushed to its stop.
+/// Count that a knob reports at full deflection.
 const FULL_SCALE: f32 = 350.0;
-/// A knob that says nothing for this long was let go, ms.
+/// Silence after which the knob counts as released, ms.
 const SILENT_MS: f64 = 100.0;
 /// Longest tick that is integrated, ms.
 const MAX_DT_MS: f64 = 100.0;
-/// Most messages that one read takes in.
+/// Most messages processed by one read.
 const MAX_MESSAGES: usize = 64;
 
-/// Where the knob is heard, and how it moves the tool.
+/// Where the knob is read, and how it moves the tool.
 #[derive(Clone, Debug)]
 pub struct Config {
-    /// Where the knob is heard.
+    /// Where the knob is read.
     pub source: Source,
-    /// Speed of a knob pushed to its stop, mm/ms.
+    /// Speed at full deflection, mm/ms.
     pub speed: f32,
-    /// Turning speed of a knob turned to its stop, rad/ms.
+    /// Rotation speed at full deflection, rad/ms.
     pub turning: f32,
-    /// How far the tool goes from its start on each axis, mm.
+    /// Largest distance of the tool from its start on each axis, mm.
     pub reach_mm: f32,
-    /// How far the tool tilts from its start, rad.
+    /// Largest tilt of the tool from its start, rad.
     pub tilt: f32,
-    /// How device space lies in the patient.
+    /// How device space maps to world space.
     pub workspace: Workspace,
 }
 
@@ -71,11 +71,10 @@ impl Default for Config {
     }
 }
 
-/// Where a knob is heard.
+/// Where a knob is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The daemon at its usual place (or at `SPNAV_SOCKET`), else the first HID device of a known
-    /// kind.
+    /// The daemon at its usual socket (or at `SPNAV_SOCKET`), else the first known HID device.
     Any,
     /// The daemon's socket.
     Daemon(PathBuf),
@@ -83,19 +82,19 @@ pub enum Source {
     Hid(PathBuf),
 }
 
-/// The knob as last heard.
+/// The last reported state of the knob.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Knob {
-    /// Right, up, to the user; counts.
+    /// Translation: right, up, to the user; counts.
     push: Vec3,
-    /// About the same axes, right-handed; counts.
+    /// Rotation about the same axes, right-handed; counts.
     turn: Vec3,
     buttons: u32,
 }
 
-/// Where messages come from.
+/// A source of knob messages.
 trait Link: Send {
-    /// Takes in the next message; `Ok(false)` when there is none yet.
+    /// Processes the next message; `Ok(false)` when none is available.
     fn next(&mut self, knob: &mut Knob) -> io::Result<bool>;
 }
 
@@ -131,12 +130,12 @@ impl SpaceMouse {
         })
     }
 
-    /// Shows what is wrong with the knob while another thread uses it.
+    /// Returns a watch on the device's faults, usable from another thread.
     pub fn watch(&self) -> Watch {
         self.watch.clone()
     }
 
-    /// Takes in what the knob said since the last read.
+    /// Processes the messages received since the last read.
     fn listen(&mut self, time_ms: f64) {
         for _ in 0..MAX_MESSAGES {
             let Some(link) = &mut self.link else { return };
@@ -155,7 +154,7 @@ impl SpaceMouse {
         }
     }
 
-    /// The tool after `dt_ms` of the knob's push, in device space.
+    /// Integrates the knob's velocity over `dt_ms`; returns the tool in device space.
     fn moved(&mut self, dt_ms: f32) -> ToolState {
         let Config { speed, turning, reach_mm, tilt, .. } = self.config;
         let rate = |counts: Vec3| (counts / FULL_SCALE).clamp(-Vec3::ONE, Vec3::ONE);
@@ -201,7 +200,7 @@ impl HapticDevice for SpaceMouse {
     }
 }
 
-/// Whether a knob can be heard.
+/// Checks whether a knob can be read.
 pub(crate) fn probe() -> Result<String, DeviceError> {
     link(&Source::Any).map(|(_, name)| format!("ready: {name}"))
 }

@@ -1,38 +1,37 @@
-//! A driver to copy: an imaginary device that speaks datagrams. It is compiled and tested as the
-//! others are; no such device is sold.
+//! A driver template: an imaginary device that speaks UDP, compiled and tested like the others.
 //!
 //! # The guide
 //! 1. **Copy** this file and `tests/template.rs` under your device's name; put `pub mod` into
 //!    `lib.rs`.
-//! 2. **Write the wire down first**, as the table below, with its units. Two functions know it:
-//!    `command` and `State::parse`. They are pure, so that they are tested with known bytes before
-//!    there is a device.
-//! 3. **Convert at the border**: inside it is mm, ms, N, rad; x right, y up, z to the user. Then
-//!    [`Workspace`] lays that into the patient.
-//! 4. **Never wait in `read`.** A socket or a file is set non-blocking; a library that waits for
-//!    longer than a quarter tick gets a thread (see `haply`), one with its own loop gets triple
-//!    buffers (see `openhaptics`).
-//! 5. **Every fault goes to `Ramp::cut`**, in the tick in which it is seen: the force is zero at
-//!    once, rests, and ramps in again. The message of a [`Fault`] says what the user shall do. A
-//!    loop that dies must leave no force: give the device a watchdog.
-//! 6. **Be honest in [`Capabilities`]**: the guard takes peak and continuous force, delay and
-//!    encoder step from it.
-//! 7. **Emulate the device in a test** with all that can go wrong: silence, garbage, old counters,
+//! 2. **Write down the protocol first**, as the table below, with its units. Only two functions use
+//!    it: `command` and `State::parse`. They are pure, so that they can be tested with known bytes
+//!    before there is a device.
+//! 3. **Convert units and axes in these functions**: elsewhere use mm, ms, N, rad; x right, y up, z
+//!    to the user. [`Workspace`] then maps that to world space.
+//! 4. **Never wait in `read`.** Set a socket or a file non-blocking; a library that waits longer
+//!    than a quarter tick gets a thread (see `haply`), one with its own loop gets triple buffers
+//!    (see `openhaptics`).
+//! 5. **Send every fault to `Ramp::cut`**, in the tick in which it is detected: the force is zero
+//!    at once, stays zero for a while, and ramps in again. The message of a [`Fault`] says what the
+//!    user must do. A dead loop must leave no force: give the device a watchdog.
+//! 6. **State true values in [`Capabilities`]**: the guard takes peak and continuous force, delay
+//!    and encoder step from it.
+//! 7. **Emulate the device in a test** with all faults: silence, invalid data, old counters,
 //!    faults, unplugging, a hundred sessions.
-//! 8. **Name it**: a variant in `name.rs`, a line in `hardware.rs`. `device test NAME` then tries
+//! 8. **Name it**: a variant in `name.rs`, a line in `hardware.rs`. `device test NAME` then tests
 //!    the real one.
 //!
-//! # The imaginary wire
-//! One datagram each way for each tick, numbers little-endian. The device drops its force 10 ms
-//! after the last command.
+//! # The imaginary protocol
+//! One datagram each way per tick, little-endian. The device drops its force 10 ms after the last
+//! command. The axes are x to the user, y right, z up.
 //! ```text
-//! to the device     b"TD"  counter u32  force 3 x f32                       N; x to the user, y right, z up
-//! from the device   b"td"  counter u32  position 3 x f32  velocity 3 x f32  flags u32      m, m/s, same axes
+//! to the device     b"TD"  counter u32  force 3 x f32                                   N
+//! from the device   b"td"  counter u32  position 3 x f32  velocity 3 x f32  flags u32   m, m/s
 //! flags             bits 0..8 buttons, bit 8 motors too warm, bit 9 not calibrated
 //! ```
 //!
 //! # When not to use it
-//! As a device.
+//! To drive hardware: no such device is sold.
 
 use crate::ramp::Ramp;
 use crate::{Capabilities, DeviceError, Fault, HapticDevice, Reading, Status, Watch, Workspace};
@@ -41,23 +40,23 @@ use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, ToolState, Twist, Vec3};
 
-/// The device's own tick, ms.
+/// The device's tick, ms.
 const TICK_MS: f32 = 1.0;
 /// Ticks of silence after which the force is cut.
 const SILENT_TICKS: u32 = 10;
 /// Ticks of silence after which the device is lost.
 const LOST_TICKS: u32 = 500;
-/// Most datagrams that one read takes in.
+/// Most datagrams processed by one read.
 const MAX_DATAGRAMS: usize = 16;
 const TOO_WARM: u32 = 1 << 8;
 const NOT_CALIBRATED: u32 = 1 << 9;
 
-/// Which device, and where it stands.
+/// Which device to open, and its workspace.
 #[derive(Clone, Copy, Debug)]
 pub struct Config {
-    /// Where the device listens.
+    /// The device's network address.
     pub address: SocketAddr,
-    /// How device space lies in the patient.
+    /// How device space maps to world space.
     pub workspace: Workspace,
 }
 
@@ -89,13 +88,13 @@ impl Template {
         })
     }
 
-    /// Shows what is wrong with the device while another thread uses it.
+    /// Returns a watch on the device's faults, usable from another thread.
     pub fn watch(&self) -> Watch {
         self.watch.clone()
     }
 
-    /// The newest state that came since the last read. Datagrams may overtake each other: older
-    /// ones are passed over.
+    /// Returns the newest state received since the last read; datagrams that arrive out of order
+    /// are ignored.
     fn newest(&mut self) -> io::Result<Option<State>> {
         let (Some(socket), mut newest) = (&self.socket, None) else { return Err(ErrorKind::NotConnected.into()) };
         for _ in 0..MAX_DATAGRAMS {
@@ -116,8 +115,8 @@ impl Template {
         Ok(newest)
     }
 
-    /// The last tool again, as stale or as lost.
-    fn held(&mut self, time_ms: f64) -> Reading {
+    /// Repeats the last tool, as stale or lost.
+    fn last_reading(&mut self, time_ms: f64) -> Reading {
         self.silent_ticks = self.silent_ticks.saturating_add(1);
         if self.silent_ticks == SILENT_TICKS {
             self.ramp.cut(Fault::ServiceSilent);
@@ -147,12 +146,12 @@ impl HapticDevice for Template {
     fn read(&mut self, time_ms: f64) -> Reading {
         let state = match self.newest() {
             Ok(Some(state)) => state,
-            Ok(None) => return self.held(time_ms),
+            Ok(None) => return self.last_reading(time_ms),
             Err(_) => {
                 if self.socket.is_some() {
                     self.lose();
                 }
-                return self.held(time_ms);
+                return self.last_reading(time_ms);
             }
         };
         self.silent_ticks = 0;
@@ -197,19 +196,19 @@ impl Drop for Template {
     }
 }
 
-/// What the device says.
+/// One state from the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct State {
     counter: u32,
-    /// Maker's axes, m.
+    /// Position, m, maker's axes.
     position: Vec3,
-    /// Maker's axes, m/s.
+    /// Velocity, m/s, maker's axes.
     velocity: Vec3,
     flags: u32,
 }
 
 impl State {
-    /// From a datagram; `None` when it makes no sense.
+    /// Parses a datagram; `None` when it is invalid.
     fn parse(bytes: &[u8]) -> Option<Self> {
         let (head, body) = bytes.split_at_checked(2)?;
         let words: &[[u8; 4]; 8] = body.as_chunks().0.try_into().ok()?;
@@ -219,7 +218,7 @@ impl State {
         (head == b"td" && body.len() == 32 && state.position.is_finite() && state.velocity.is_finite()).then_some(state)
     }
 
-    /// In device space: mm, mm/ms.
+    /// Converts to a tool in device space: mm, mm/ms.
     fn tool(&self, time_ms: f64) -> ToolState {
         ToolState {
             twist: Twist { linear: axes(self.velocity), angular: Vec3::ZERO },
@@ -230,7 +229,7 @@ impl State {
     }
 }
 
-/// The datagram that asks for a force, N, device space.
+/// The datagram that commands a force, N, device space.
 fn command(counter: u32, force: Vec3) -> [u8; 18] {
     let mut bytes = [0; 18];
     bytes[..2].copy_from_slice(b"TD");
@@ -240,7 +239,7 @@ fn command(counter: u32, force: Vec3) -> [u8; 18] {
     bytes
 }
 
-/// The maker's x to the user, y right, z up as ours: x right, y up, z to the user.
+/// Converts the maker's axes (x to the user, y right, z up) to x right, y up, z to the user.
 fn axes(v: Vec3) -> Vec3 {
     Vec3::new(v.y, v.z, v.x)
 }

@@ -1,21 +1,20 @@
-//! A device on a thread of its own: what it waits for delays no other device of the same loop.
+//! Runs a device on its own thread, so that its delays do not affect other devices.
 //!
 //! # Theory
 //! ```text
-//!   haptic loop: read() <──news── thread: apply, read ── device
-//!                apply() ──wish──>
+//!   haptic loop: read() <──reading── thread: apply, read ── device
+//!                apply() ──command──>
 //! ```
-//! Both pass through triple buffers: neither side waits. That costs one tick of delay, which the
-//! capabilities tell.
+//! Both pass through triple buffers: neither side waits. This costs one tick of delay, which the
+//! capabilities include.
 //!
 //! # Practice
-//! For the second hand, whose link must not hold up the first one's tick. `apply` wakes the thread.
-//! A loop that falls silent leaves the device without calls, which its driver answers by cutting
-//! the force. A device that hangs for 50 ms is lost. Closing waits for the call that the device is
-//! in.
+//! For the second hand's device, whose link must not delay the first one's tick. `apply` wakes the
+//! thread. A silent loop means no calls to the device, and its driver then cuts the force. A device
+//! that hangs for 50 ms is lost. Closing waits for the call in progress.
 //!
 //! # When not to use it
-//! For the only device, and for scripts: they do not wait.
+//! For the only device, and for scripts: their calls do not wait.
 
 use crate::{Capabilities, HapticDevice, Reading, Status};
 use std::sync::Arc;
@@ -25,14 +24,14 @@ use trepan_contact::GuardedWrench;
 use trepan_geometry::ToolState;
 use triple_buffer::{Input, Output, triple_buffer};
 
-/// A device without news for this long is lost, ms.
+/// Time without a reading after which a device is lost, ms.
 const LOST_MS: f64 = 50.0;
 
-/// A device, seen from the loop.
+/// The haptic loop's handle to a device on another thread.
 pub struct ThreadedDevice {
     capabilities: Capabilities,
     news: Output<News>,
-    wishes: Input<Command>,
+    commands: Input<Command>,
     closing: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     number: u64,
@@ -56,19 +55,19 @@ struct Command {
 }
 
 impl ThreadedDevice {
-    /// Takes the device to a thread.
+    /// Moves the device to a new thread.
     pub fn new(mut device: Box<dyn HapticDevice>) -> Self {
         let capabilities = device.capabilities();
         let last = Reading { status: Status::Stale, ..device.read(0.0) };
         let (news_in, news) = triple_buffer(&News { number: 0, reading: last });
-        let (wishes, wishes_out) = triple_buffer(&Command::default());
+        let (commands, command_output) = triple_buffer(&Command::default());
         let closing = Arc::new(AtomicBool::new(false));
         let ends = closing.clone();
-        let thread = thread::spawn(move || serve(device, news_in, wishes_out, &ends));
+        let thread = thread::spawn(move || serve(device, news_in, command_output, &ends));
         Self {
             capabilities: Capabilities { delay_ticks: capabilities.delay_ticks.saturating_add(1), ..capabilities },
             news,
-            wishes,
+            commands,
             closing,
             thread: Some(thread),
             number: 0,
@@ -80,23 +79,23 @@ impl ThreadedDevice {
     }
 }
 
-/// The thread: every wish is applied and answered by a reading; at the end no force is left.
-fn serve(device: Box<dyn HapticDevice>, mut news: Input<News>, mut wishes: Output<Command>, closing: &AtomicBool) {
+/// The thread: applies each command and returns a reading; sets zero force at the end.
+fn serve(device: Box<dyn HapticDevice>, mut news: Input<News>, mut commands: Output<Command>, closing: &AtomicBool) {
     let mut device = Closing(device);
     let mut last = 0;
     while !closing.load(Ordering::Acquire) {
-        let wish = *wishes.read();
-        if wish.number == last {
+        let command = *commands.read();
+        if command.number == last {
             thread::park();
             continue;
         }
-        last = wish.number;
-        device.0.apply(wish.wrench);
-        news.write(News { number: wish.number, reading: device.0.read(wish.time_ms) });
+        last = command.number;
+        device.0.apply(command.wrench);
+        news.write(News { number: command.number, reading: device.0.read(command.time_ms) });
     }
 }
 
-/// Closes the device however the thread ends.
+/// Closes the device however the thread ends, also by a panic.
 struct Closing(Box<dyn HapticDevice>);
 
 impl Drop for Closing {
@@ -127,7 +126,7 @@ impl HapticDevice for ThreadedDevice {
     fn apply(&mut self, wrench: GuardedWrench) {
         let Some(thread) = &self.thread else { return };
         self.number += 1;
-        self.wishes.write(Command { number: self.number, time_ms: self.time_ms, wrench });
+        self.commands.write(Command { number: self.number, time_ms: self.time_ms, wrench });
         thread.thread().unpark();
     }
 
@@ -159,7 +158,7 @@ mod tests {
     use trepan_contact::{ForceGuard, GuardConfig};
     use trepan_geometry::{Pose, Vec3, Wrench};
 
-    /// What the bench's device was told, and how it behaves.
+    /// The calls that the test device received, and its behaviour.
     #[derive(Default)]
     struct Seen {
         force: Vec3,
@@ -200,7 +199,7 @@ mod tests {
         guard.guard(Wrench { force: Vec3::X, torque: Vec3::ZERO }, &ToolState::at(Pose::IDENTITY), 1.0)
     }
 
-    /// Ticks until a reading has a status; waiting in vain fails.
+    /// Reads until a reading has the status; panics on a timeout.
     fn until(device: &mut ThreadedDevice, from_ms: f64, status: Status) -> f64 {
         for tick in 0..5000 {
             let time_ms = from_ms + f64::from(tick);
@@ -232,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_hangs_is_lost_and_holds_nobody_up() {
+    fn a_device_that_hangs_is_lost_without_delaying_the_loop() {
         let (seen, mut device) = pair();
         let at_ms = until(&mut device, 1.0, Status::Fresh);
         seen.lock().unwrap().hangs = true;

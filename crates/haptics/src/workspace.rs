@@ -1,20 +1,21 @@
-//! Where a device's small box lies in the patient, and how much its motion is enlarged.
+//! Maps a device's workspace to the patient: position, orientation and scale.
 //!
 //! # Theory
-//! Positions scale and turn, `x_world = s R x_device + t`; rotations and angular velocities only
-//! turn. Forces only turn as well: a scaled force would change how stiff a surface feels by `s²`
-//! instead of `s`, and its limit belongs to the hand. Torques act at the tip and turn.
+//! Positions are scaled and rotated, `x_world = s R x_device + t`; rotations and angular velocities
+//! are only rotated. Forces are only rotated too: scaling them would change the felt stiffness by
+//! `s²` instead of `s`, and the force limit belongs to the hand. Torques act at the tip and are
+//! rotated.
 //!
 //! # Practice
-//! `s` is world mm per device mm. With s > 1 the loop is `s` times stiffer at the hand: lower the
-//! coupling stiffness.
+//! `s` is world mm per device mm. With s > 1 the loop gain at the hand is `s` times higher: lower
+//! the coupling stiffness.
 
 use trepan_geometry::{Pose, Quat, ToolState, Twist, Vec3, Wrench};
 
 /// Maps device space to world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workspace {
-    /// Where the device's origin is in the world, and how its axes lie there.
+    /// Pose of the device's frame in the world.
     pub world_from_device: Pose,
     /// World mm per device mm; more than 0.
     pub scale: f32,
@@ -28,8 +29,8 @@ impl Default for Workspace {
 }
 
 impl Workspace {
-    /// A device space whose origin is at `centre`, with x to the right of someone who looks along
-    /// `forward` with `up` upwards, y up and z towards them, as force-feedback styluses have it.
+    /// A workspace with its origin at `centre`, oriented as force-feedback styluses are.
+    /// Seen along `forward` with `up` upwards, x is right, y up and z towards the viewer.
     pub fn facing(centre: Vec3, forward: Vec3, up: Vec3, scale: f32) -> Self {
         let z = (-forward).normalize_or(Vec3::Z);
         let x = up.cross(z).normalize_or(z.any_orthonormal_vector());
@@ -37,7 +38,7 @@ impl Workspace {
         Self { world_from_device: Pose::from_parts(centre, rotation), scale }
     }
 
-    /// A tool state in device space, seen in the world.
+    /// Converts a tool state from device to world space.
     pub fn world(&self, device: &ToolState) -> ToolState {
         let turn = self.world_from_device.rotation;
         let pose = device.world_from_tool;
@@ -51,7 +52,7 @@ impl Workspace {
         }
     }
 
-    /// A world wrench on the device's axes.
+    /// Rotates a world wrench to the device's axes.
     pub fn device_wrench(&self, world: Wrench) -> Wrench {
         let turn = self.world_from_device.rotation.inverse();
         Wrench { force: turn * world.force, torque: turn * world.torque }

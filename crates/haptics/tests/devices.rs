@@ -1,4 +1,4 @@
-//! What every device promises, checked on each of them.
+//! Requirements on every device, checked on each of them.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
@@ -30,7 +30,7 @@ fn replay() -> Replay {
     Replay::new((0..200).map(|tick| original.at(f64::from(tick))).collect())
 }
 
-/// Every device, with the force that it holds.
+/// Every device, with its name.
 fn devices() -> Vec<(Box<dyn HapticDevice>, &'static str)> {
     let mut devices: Vec<(Box<dyn HapticDevice>, &'static str)> =
         script::NAMES.map(|name| (Box::new(script(name)) as Box<dyn HapticDevice>, name)).into();

@@ -1,5 +1,4 @@
-//! The Force Dimension driver against an emulator of libdrd: units, axes, and every fault ends
-//! without force.
+//! Tests the Force Dimension driver against an emulator of libdrd: units, axes, and faults.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
@@ -33,7 +32,7 @@ fn guarded(force: Vec3, torque: Vec3) -> GuardedWrench {
     guard.guard(Wrench { force, torque }, &ToolState::at(Pose::IDENTITY), 1.0)
 }
 
-/// Runs the loop, and gives the force on the motors at the end, in the maker's axes.
+/// Runs the loop; returns the force on the motors at the end, in the maker's axes.
 fn run(device: &mut ForceDimension, emulator: &Emulator, from: u32, ticks: u32, force: Vec3) -> Vec3 {
     for tick in from..from + ticks {
         device.read(f64::from(tick));
@@ -136,7 +135,7 @@ fn a_dead_loop_is_cut_by_the_firmware_and_a_living_one_comes_back_slowly() {
 }
 
 #[test]
-fn what_the_device_cut_is_told_and_what_the_user_cut_stays_cut() {
+fn device_cuts_are_reported_and_user_cuts_persist() {
     for (cause, fault, back) in [(2.0, Fault::TooFast, true), (1.0, Fault::Braked, false), (6.0, Fault::Braked, false)]
     {
         let emulator = emulator();

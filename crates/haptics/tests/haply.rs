@@ -1,5 +1,4 @@
-//! The Haply driver against an emulator of its service: units, axes, the protocol, and every fault
-//! ends without force.
+//! Tests the Haply driver against an emulator of its service: units, axes, protocol, and faults.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::time::Duration;
@@ -18,8 +17,7 @@ fn guarded(force: Vec3) -> GuardedWrench {
     guard.guard(Wrench { force, torque: Vec3::ZERO }, &ToolState::at(Pose::IDENTITY), 1.0)
 }
 
-/// Runs the haptic loop until something holds. A test that waits in vain fails, but not for being
-/// slow.
+/// Runs the haptic loop until a condition holds; panics only after a generous timeout.
 fn run_until(
     device: &mut Haply,
     service: &Service,
@@ -51,12 +49,12 @@ fn pose_velocity_buttons_and_force_have_the_right_axes_and_units() {
         Service::start(Behaviour { position: [0.01, 0.02, 0.03], velocity: [0.1, 0.2, 0.3], ..Behaviour::default() });
     let mut device = open(&service).unwrap();
     let force = Vec3::new(0.1, 0.2, 0.3);
-    // Service: x right, y forward, z up. Ours: x right, y up, z to the user.
+    // Service: x right, y forward, z up. Driver: x right, y up, z to the user.
     let reading = run_until(&mut device, &service, force, |_, told| (told - Vec3::new(0.1, -0.3, 0.2)).length() < 1e-6);
     assert!((reading.tool.tip() - Vec3::new(10.0, 30.0, -20.0)).length() < 1e-4, "{}", reading.tool.tip());
     assert!((reading.tool.twist.linear - Vec3::new(0.1, 0.3, -0.2)).length() < 1e-6);
     assert_eq!(reading.tool.buttons, Buttons::PEDAL);
-    // A turn about the service's z (up) is one about our y (up).
+    // A rotation about the service's z (up) is one about the driver's y (up).
     let (axis, angle) = reading.tool.world_from_tool.rotation.to_axis_angle();
     assert!((axis - Vec3::Y).length() < 1e-4 && (angle - 2.0 * 0.6f32.asin()).abs() < 1e-4, "{axis} {angle}");
     device.close();
@@ -107,7 +105,7 @@ fn every_state_that_forbids_force_cuts_it_and_says_why() {
 }
 
 #[test]
-fn garbage_and_late_replies_cut_the_force_until_they_end() {
+fn invalid_and_late_replies_cut_the_force_until_they_end() {
     let service = Service::start(Behaviour::default());
     let mut device = open(&service).unwrap();
     let watch = device.watch();
@@ -138,7 +136,7 @@ fn a_loop_that_stops_gets_no_force() {
 }
 
 #[test]
-fn brakes_tell_through_events_and_release_again() {
+fn brake_events_cut_and_restore_the_force() {
     let service = Service::start(Behaviour::default());
     let mut device = open(&service).unwrap();
     run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
@@ -176,7 +174,7 @@ fn a_device_that_vanishes_or_a_service_that_hangs_up_is_lost() {
 }
 
 #[test]
-fn a_service_that_only_listens_is_told_to_let_go_before_it_is_lost() {
+fn a_silent_service_gets_zero_force_before_it_is_lost() {
     let service = Service::start(Behaviour::default());
     let mut device = open(&service).unwrap();
     run_until(&mut device, &service, Vec3::X, |_, told| told.x > 0.99);
@@ -197,7 +195,7 @@ fn every_device_of_the_service_is_listed_by_the_name_that_opens_it() {
 }
 
 #[test]
-fn many_sessions_end_with_a_goodbye() {
+fn many_sessions_end_with_a_closing_frame() {
     let service = Service::start(Behaviour::default());
     for session in 1..=20 {
         let mut device = open(&service).unwrap();

@@ -1,5 +1,4 @@
-//! The OpenHaptics driver against an emulator of libHD: units, axes, frame rules, and every fault
-//! ends without force.
+//! Tests the OpenHaptics driver against an emulator of libHD: units, axes, frame rules, and faults.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
@@ -29,7 +28,7 @@ fn guarded(force: Vec3, torque: Vec3) -> GuardedWrench {
     guard.guard(Wrench { force, torque }, &ToolState::at(Pose::IDENTITY), 1.0)
 }
 
-/// Runs loop and servo in turn, and gives the force on the motors at the end.
+/// Alternates loop and servo; returns the force on the motors at the end.
 fn run(device: &mut OpenHaptics, emulator: &Emulator, from: u32, ticks: u32, force: Vec3) -> Vec3 {
     for tick in from..from + ticks {
         device.read(f64::from(tick));
@@ -131,14 +130,14 @@ fn the_device_is_found_by_name_and_by_its_usual_names() {
 }
 
 #[test]
-fn a_missing_licence_is_told_in_the_makers_words() {
+fn a_missing_licence_is_reported_with_the_vendors_text() {
     let emulator = emulator();
     emulator.set(keys::UNLICENSED, 1.0);
     let error = OpenHaptics::open(&config(&emulator)).err().unwrap().to_string();
     assert!(error.contains("Invalid license (error 0600)"), "{error}");
 }
 
-/// A library with two devices, and both of them opened.
+/// A library with two devices, both opened.
 fn two() -> (Emulator, OpenHaptics, OpenHaptics) {
     let emulator = emulator();
     emulator.set(keys::NAME, 1.0);
@@ -148,7 +147,7 @@ fn two() -> (Emulator, OpenHaptics, OpenHaptics) {
     (emulator, left, right)
 }
 
-/// Both loops and the servo in turn; gives the forces on both motors along x.
+/// Alternates both loops and the servo; returns the forces on both motors along x.
 fn run_two(emulator: &Emulator, hands: &mut [(&mut OpenHaptics, f32)], from: u32, ticks: u32) -> [f32; 2] {
     for tick in from..from + ticks {
         for (device, newtons) in hands.iter_mut() {
@@ -170,11 +169,11 @@ fn two_devices_have_their_own_poses_forces_and_faults() {
     let tips = [left.read(700.0).tool.tip().x, right.read(700.0).tool.tip().x];
     assert!((tips[0] - 10.0).abs() < 1e-5 && (tips[1] + 20.0).abs() < 1e-5, "{tips:?}");
 
-    // Warm motors of one are not the other's.
+    // Overheating of one device does not affect the other.
     emulator.set(keys::of_second(keys::ERROR), f64::from(0x0200));
     assert_eq!(run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 701, 5), [one, 0.0]);
     assert_eq!((left.watch().fault(), right.watch().fault()), (None, Some(Fault::Overheated)));
-    // Nor is its silence.
+    // Nor does its silence.
     emulator.set(keys::of_second(keys::ERROR), 0.0);
     run_two(&emulator, &mut [(&mut left, 0.5), (&mut right, -1.0)], 706, SETTLED);
     assert_eq!(run_two(&emulator, &mut [(&mut left, 0.5)], 1400, 10), [one, 0.0]);
@@ -238,7 +237,7 @@ fn a_second_device_that_cannot_be_opened_leaves_the_first_alone() {
 }
 
 #[test]
-fn a_scheduler_that_does_not_start_is_told_and_leaves_no_device_open() {
+fn a_scheduler_that_does_not_start_is_reported_and_closes_the_device() {
     let emulator = emulator();
     emulator.set(keys::STUCK, 1.0);
     let error = OpenHaptics::open(&config(&emulator)).err().unwrap().to_string();

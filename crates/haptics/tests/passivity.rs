@@ -1,5 +1,5 @@
-//! The guard before the simulated device: a quiet wall keeps its force, an unstable one is stilled,
-//! a lost one comes back.
+//! Tests the guard on the simulated device: a stable wall keeps its force, an unstable one is
+//! damped, a lost one recovers.
 
 use trepan_contact::{ForceGuard, GuardConfig, GuardCounters, PassivityConfig};
 use trepan_geometry::{Pose, ToolState, Vec3, Wrench};
@@ -9,16 +9,16 @@ use trepan_haptics::simulated::{Config, HandModel, Simulated};
 
 const HANDS: [(&str, HandModel); 2] = [("light", HandModel::LIGHT), ("firm", HandModel::FIRM)];
 
-/// A Touch whose friction is gone.
+/// A Touch without friction.
 const SLIPPERY: Config = Config { friction_n: 0.0, ..TOUCH };
 const TOUCH: Config = Config::TOUCH;
 
-/// A hand that comes from outside and presses a wall with about 1 N, and what the last third of
-/// three seconds was like.
+/// A hand that presses a wall with about 1 N for three seconds, and measurements of the last
+/// second.
 #[derive(Debug)]
 struct Press {
     motion_mm: f32,
-    /// Share of the wanted force that did not come.
+    /// Share of the requested force that was removed.
     lost: f32,
     counters: GuardCounters,
 }
@@ -63,7 +63,7 @@ fn a_steady_press_keeps_its_force() {
 }
 
 #[test]
-fn an_unstable_wall_is_stilled() {
+fn an_unstable_wall_is_damped() {
     for (grip, hand, delay_ticks, stiffness) in [("light", HandModel::LIGHT, 1, 2.0), ("firm", HandModel::FIRM, 2, 2.0)]
     {
         let config = Config { quantum_mm: 0.0, delay_ticks, ..SLIPPERY };
@@ -75,8 +75,7 @@ fn an_unstable_wall_is_stilled() {
     }
 }
 
-/// For a second the scene throws energy at the hand; then it is a wall of 0.8 N/mm that the hand
-/// means to be inside of.
+/// For a second the scene feeds energy into the hand; then a wall of 0.8 N/mm pushes it out.
 #[test]
 fn a_wall_that_lost_its_force_gets_it_back() {
     let exact = Config { quantum_mm: 0.0, ..SLIPPERY };

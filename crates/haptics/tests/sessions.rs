@@ -1,7 +1,6 @@
-//! A hundred sessions of every driver against its emulator: no descriptor, no thread and no memory
-//! is left, and nothing hangs.
+//! Runs a hundred sessions of every driver against its emulator: nothing leaks and nothing hangs.
 //!
-//! One test, since it counts what the whole process holds.
+//! A single test, since it counts the resources of the whole process.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 #![cfg(target_os = "linux")]
 
@@ -14,8 +13,8 @@ use trepan_haptics::{
     HapticDevice, Status, ThreadedDevice, force_dimension, haply, mouse, openhaptics, simulated, spacemouse,
 };
 
-/// Descriptors, threads, and memory in kB that the process holds.
-fn held() -> [usize; 3] {
+/// Descriptors, threads, and memory in kB of the process.
+fn resources() -> [usize; 3] {
     let count = |folder: &str| std::fs::read_dir(folder).unwrap().count();
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let memory = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
@@ -101,14 +100,13 @@ fn a_hundred_sessions_of_every_driver_leave_nothing_behind() {
     }
 }
 
-/// What is held once something is so, or after two seconds: an emulator's own threads end a little
-/// later.
+/// The resources once `so` holds, or after two seconds: an emulator's threads end a little later.
 fn settled(so: impl Fn([usize; 3]) -> bool) -> [usize; 3] {
     for _ in 0..200 {
         std::thread::sleep(std::time::Duration::from_millis(10));
-        if so(held()) {
+        if so(resources()) {
             break;
         }
     }
-    held()
+    resources()
 }

@@ -1,5 +1,5 @@
-//! The SpaceMouse driver against an emulator of its daemon and of its device file: axes, units,
-//! limits, and what happens when it goes.
+//! Tests the SpaceMouse driver against emulators of its daemon and device file: axes, units,
+//! limits, disconnection.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::io::Write;
@@ -8,7 +8,7 @@ use trepan_geometry::{Buttons, Vec3};
 use trepan_haptics::spacemouse::{Config, Source, SpaceMouse};
 use trepan_haptics::{Fault, HapticDevice, Reading, Status, Workspace};
 
-/// The daemon, and the knob connected to it.
+/// The emulated daemon, and the knob connected to it.
 struct Bench {
     daemon: UnixStream,
     knob: SpaceMouse,
@@ -30,16 +30,16 @@ impl Bench {
         Self::with(Config::default())
     }
 
-    fn say(&mut self, message: [i32; 8]) {
+    fn send(&mut self, message: [i32; 8]) {
         let bytes: Vec<u8> = message.iter().flat_map(|number| number.to_ne_bytes()).collect();
         self.daemon.write_all(&bytes).unwrap();
     }
 
-    /// Reads for some ticks; the knob repeats itself all the while, as a pushed one does.
-    fn held(&mut self, message: [i32; 8], ticks: u32) -> Reading {
+    /// Reads for some ticks while the knob repeats its message, as a deflected one does.
+    fn read_while(&mut self, message: [i32; 8], ticks: u32) -> Reading {
         for tick in 0..ticks {
             if tick % 10 == 0 {
-                self.say(message);
+                self.send(message);
             }
             self.read();
         }
@@ -60,7 +60,7 @@ fn pushes_are_speeds_to_the_right_up_and_to_the_user() {
     for (push, axis) in [([350, 0, 0], Vec3::X), ([0, 350, 0], Vec3::Y), ([0, 0, -350], Vec3::Z)] {
         let mut bench = Bench::new();
         bench.read();
-        let reading = bench.held([0, push[0], push[1], push[2], 0, 0, 0, 8], 100);
+        let reading = bench.read_while([0, push[0], push[1], push[2], 0, 0, 0, 8], 100);
         assert_eq!(reading.status, Status::Fresh);
         assert!((reading.tool.twist.linear - axis * 0.05).length() < 1e-5, "{}", reading.tool.twist.linear);
         assert!((reading.tool.tip() - axis * 5.05).length() < 0.06, "{}: 0.05 mm/ms for 101 ms", reading.tool.tip());
@@ -71,7 +71,7 @@ fn pushes_are_speeds_to_the_right_up_and_to_the_user() {
 fn half_a_push_is_a_quarter_of_the_speed_and_more_than_all_is_all() {
     for (counts, speed) in [(175, 0.0125), (-175, -0.0125), (350, 0.05), (100_000, 0.05)] {
         let mut bench = Bench::new();
-        let reading = bench.held([0, counts, 0, 0, 0, 0, 0, 8], 5);
+        let reading = bench.read_while([0, counts, 0, 0, 0, 0, 0, 8], 5);
         assert!((reading.tool.twist.linear.x - speed).abs() < 1e-5, "{counts}: {}", reading.tool.twist.linear);
     }
 }
@@ -81,9 +81,9 @@ fn turns_tilt_the_shaft_and_end_at_the_cone() {
     for (turn, axis) in [([350, 0, 0], Vec3::X), ([0, 350, 0], Vec3::Y), ([0, 0, -350], Vec3::Z)] {
         let mut bench = Bench::new();
         let message = [0, 0, 0, 0, turn[0], turn[1], turn[2], 8];
-        let reading = bench.held(message, 100);
+        let reading = bench.read_while(message, 100);
         assert!((reading.tool.twist.angular - axis * 1e-3).length() < 1e-5, "{}", reading.tool.twist.angular);
-        let far = bench.held(message, 3000).tool;
+        let far = bench.read_while(message, 3000).tool;
         let (about, angle) = far.world_from_tool.rotation.to_axis_angle();
         assert!((about - axis).length() < 1e-3 && (angle - 1.0).abs() < 1e-3, "{about} {angle}");
         assert!(far.twist.angular.length() < 1e-6);
@@ -93,7 +93,7 @@ fn turns_tilt_the_shaft_and_end_at_the_cone() {
 #[test]
 fn the_tool_stays_in_its_box_and_its_velocity_says_so() {
     let mut bench = Bench::new();
-    let tool = bench.held([0, 350, 350, -350, 0, 0, 0, 8], 1500).tool;
+    let tool = bench.read_while([0, 350, 350, -350, 0, 0, 0, 8], 1500).tool;
     assert_eq!((tool.tip(), tool.twist.linear), (Vec3::splat(60.0), Vec3::ZERO));
     assert_eq!(bench.knob.capabilities().workspace_mm, Vec3::splat(120.0));
 }
@@ -101,23 +101,23 @@ fn the_tool_stays_in_its_box_and_its_velocity_says_so() {
 #[test]
 fn buttons_are_the_pedal_and_the_next_tool() {
     let mut bench = Bench::new();
-    bench.say([1, 0, 0, 0, 0, 0, 0, 0]);
+    bench.send([1, 0, 0, 0, 0, 0, 0, 0]);
     assert_eq!(bench.read().tool.buttons, Buttons::PEDAL);
-    bench.say([1, 1, 0, 0, 0, 0, 0, 0]);
-    bench.say([2, 0, 0, 0, 0, 0, 0, 0]);
+    bench.send([1, 1, 0, 0, 0, 0, 0, 0]);
+    bench.send([2, 0, 0, 0, 0, 0, 0, 0]);
     assert_eq!(bench.read().tool.buttons, Buttons::NEXT_TOOL);
-    bench.say([1, 99, 0, 0, 0, 0, 0, 0]);
+    bench.send([1, 99, 0, 0, 0, 0, 0, 0]);
     assert_eq!(bench.read().tool.buttons, Buttons::NEXT_TOOL, "a button that no mask holds");
 }
 
 #[test]
 fn a_knob_let_go_or_silent_stops_and_keeps_its_place() {
     let mut bench = Bench::new();
-    let pushed = bench.held([0, 350, 0, 0, 0, 0, 0, 8], 50).tool;
-    bench.say(REST);
+    let pushed = bench.read_while([0, 350, 0, 0, 0, 0, 0, 8], 50).tool;
+    bench.send(REST);
     let still = bench.read().tool;
     assert_eq!((still.twist.linear, still.tip()), (Vec3::ZERO, pushed.tip()));
-    bench.held([0, 350, 0, 0, 0, 0, 0, 8], 50);
+    bench.read_while([0, 350, 0, 0, 0, 0, 0, 8], 50);
     let silent = (0..300).map(|_| bench.read().tool).last().unwrap();
     assert_eq!(silent.twist.linear, Vec3::ZERO, "300 ms without a word");
 }
@@ -125,8 +125,8 @@ fn a_knob_let_go_or_silent_stops_and_keeps_its_place() {
 #[test]
 fn split_and_unknown_messages_are_no_matter() {
     let mut bench = Bench::new();
-    bench.say([4, 7, 7, 7, 7, 7, 7, 7]);
-    bench.say([-5, i32::MIN, 0, 0, 0, 0, 0, 0]);
+    bench.send([4, 7, 7, 7, 7, 7, 7, 7]);
+    bench.send([-5, i32::MIN, 0, 0, 0, 0, 0, 0]);
     let bytes: Vec<u8> = [0i32, 350, 0, 0, 0, 0, 0, 8].iter().flat_map(|n| n.to_ne_bytes()).collect();
     bench.daemon.write_all(&bytes[..13]).unwrap();
     bench.read();
@@ -136,9 +136,9 @@ fn split_and_unknown_messages_are_no_matter() {
 }
 
 #[test]
-fn a_daemon_that_ends_is_told_and_the_tool_stays() {
+fn a_daemon_that_ends_is_reported_and_the_tool_stays() {
     let mut bench = Bench::new();
-    let place = bench.held([0, 350, 0, 0, 0, 0, 0, 8], 50).tool.tip();
+    let place = bench.read_while([0, 350, 0, 0, 0, 0, 0, 8], 50).tool.tip();
     bench.daemon.shutdown(std::net::Shutdown::Both).unwrap();
     let reading = bench.read();
     assert_eq!((reading.status, reading.tool.twist.linear), (Status::Lost, Vec3::ZERO));
@@ -147,11 +147,11 @@ fn a_daemon_that_ends_is_told_and_the_tool_stays() {
 }
 
 #[test]
-fn the_workspace_lays_it_into_the_patient() {
+fn the_workspace_maps_to_the_patient() {
     let workspace = Workspace::facing(Vec3::new(10.0, 20.0, 30.0), Vec3::NEG_Y, Vec3::Z, 2.0);
     let mut bench = Bench::with(Config { workspace, ..Config::default() });
     assert_eq!(bench.read().tool.tip(), Vec3::new(10.0, 20.0, 30.0));
-    let tool = bench.held([0, 0, 350, 0, 0, 0, 0, 8], 100).tool;
+    let tool = bench.read_while([0, 0, 350, 0, 0, 0, 0, 8], 100).tool;
     assert!((tool.twist.linear - Vec3::Z * 0.1).length() < 1e-5, "up, twice as fast: {}", tool.twist.linear);
 }
 
@@ -161,13 +161,13 @@ fn the_device_file_is_read_where_there_is_no_daemon() {
     let path = folder.path().join("hidraw7");
     std::fs::write(&path, [1, 0x5e, 1, 0, 0, 0, 0]).unwrap();
     let mut knob = SpaceMouse::open(&Config { source: Source::Hid(path), ..Config::default() }).unwrap();
-    // A plain file ends where a device would go on: what was said counts, then the knob is gone.
+    // A plain file ends where a device would continue: its reports are used, then the knob is lost.
     assert_eq!(knob.read(0.0).status, Status::Lost);
     assert_eq!(knob.watch().fault(), Some(Fault::Disconnected));
 }
 
 #[test]
-fn what_is_missing_is_told() {
+fn missing_devices_are_reported() {
     let nowhere = || std::path::PathBuf::from("/nonexistent/knob");
     for source in [Source::Daemon(nowhere()), Source::Hid(nowhere())] {
         let error = SpaceMouse::open(&Config { source, ..Config::default() }).err().unwrap().to_string();
@@ -181,7 +181,7 @@ fn a_hundred_sessions_leave_nothing_behind() {
     let before = open();
     for _ in 0..100 {
         let mut bench = Bench::new();
-        assert_eq!(bench.held([0, 350, 0, 0, 0, 0, 0, 8], 5).status, Status::Fresh);
+        assert_eq!(bench.read_while([0, 350, 0, 0, 0, 0, 0, 8], 5).status, Status::Fresh);
         bench.knob.close();
         bench.knob.close();
         assert_eq!(bench.read().status, Status::Lost);

@@ -1,4 +1,4 @@
-//! The simulated device is as unstable as theory says: where loops fail, not where they work.
+//! Tests that the simulated device becomes unstable where theory predicts.
 
 use trepan_contact::{ForceGuard, GuardConfig};
 use trepan_geometry::{Pose, ToolState, Vec3, Wrench};
@@ -8,7 +8,7 @@ use trepan_haptics::simulated::{Config, HandModel, Simulated};
 
 const TICK_MS: f32 = 1.0;
 
-/// A guard that limits nothing.
+/// A guard without limits.
 fn open_guard() -> ForceGuard {
     ForceGuard::new(GuardConfig {
         max_force_n: 1e6,
@@ -21,8 +21,7 @@ fn open_guard() -> ForceGuard {
     })
 }
 
-/// Mean size of motion in the last fifth over that in the first, for a spring and damper that hold
-/// the handle at the origin.
+/// Mean amplitude in the last fifth over that in the first, with a spring and damper at the origin.
 fn growth(config: Config, hand: HandModel, stiffness: f32, damping: f32) -> f32 {
     let still = Replay::new(vec![ToolState::at(Pose::IDENTITY)]);
     let mut device = Simulated::new(config, hand, Box::new(still));
@@ -47,7 +46,7 @@ fn growth(config: Config, hand: HandModel, stiffness: f32, damping: f32) -> f32 
     last / first
 }
 
-/// Largest stiffness at which motion dies away, N/mm.
+/// Largest stiffness at which motion decays, N/mm.
 fn stable_stiffness(config: Config, hand: HandModel, damping: f32) -> f32 {
     let (mut stable, mut unstable) = (0.001f32, 50.0f32);
     while unstable / stable > 1.01 {
@@ -69,7 +68,7 @@ fn bare(delay_ticks: usize) -> Config {
 }
 
 #[test]
-fn without_a_hand_the_border_is_gils() {
+fn without_a_hand_the_stability_boundary_is_gils() {
     // K < (b + B) / (T/2 + d), N/mm; at B = 1 the mass begins to limit it.
     for (delay_ticks, damping, tolerance) in
         [(0, 0.0, 0.05), (1, 0.0, 0.05), (2, 0.0, 0.05), (0, 1.0, 0.1), (2, 0.5, 0.1)]
@@ -85,22 +84,22 @@ fn without_a_hand_the_border_is_gils() {
 }
 
 #[test]
-fn a_hand_and_less_delay_widen_the_border() {
+fn a_hand_and_less_delay_extend_the_stability_boundary() {
     let light = [0, 1, 2].map(|delay_ticks| stable_stiffness(bare(delay_ticks), HandModel::LIGHT, 0.0));
     assert!(light[0] > light[1] && light[1] > light[2], "{light:?}");
     assert!(light[2] > 5.0 * stable_stiffness(bare(2), HandModel::FREE, 0.0), "{light:?}");
 }
 
 #[test]
-fn friction_stills_what_is_unstable_without_it() {
+fn friction_stabilises_an_unstable_loop() {
     let rubbing = Config { friction_n: 0.26, ..bare(1) };
     assert!(growth(bare(1), HandModel::FREE, 0.2, 0.0) > 100.0);
-    // It sticks where friction stops it: the motion neither grows nor goes on.
+    // Friction stops the motion: it neither grows nor continues.
     assert!(growth(rubbing, HandModel::FREE, 0.2, 0.0) < 1.1);
 }
 
 #[test]
-fn the_hand_gives_way_to_force_as_its_spring_says() {
+fn the_hand_yields_by_its_spring_stiffness() {
     let still = Replay::new(vec![ToolState::at(Pose::IDENTITY)]);
     let mut device = Simulated::new(Config { friction_n: 0.0, ..Config::default() }, HandModel::LIGHT, Box::new(still));
     let mut guard = ForceGuard::new(GuardConfig { passivity: None, ..GuardConfig::default() });
@@ -114,7 +113,7 @@ fn the_hand_gives_way_to_force_as_its_spring_says() {
 }
 
 #[test]
-fn what_is_read_lies_on_encoder_steps() {
+fn readings_are_rounded_to_encoder_steps() {
     let quantum_mm = 0.055;
     let moving =
         Replay::new((0..100).map(|i| ToolState::at(Pose::from_translation(Vec3::X * i as f32 * 0.1))).collect());

@@ -1,5 +1,4 @@
-//! The template driver against an emulator of its imaginary device: units, axes, and every fault
-//! ends without force.
+//! Tests the template driver against an emulator of its imaginary device: units, axes, and faults.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::net::{SocketAddr, UdpSocket};
@@ -8,8 +7,8 @@ use trepan_geometry::{Buttons, Pose, ToolState, Vec3, Wrench};
 use trepan_haptics::template::{Config, Template};
 use trepan_haptics::{Fault, HapticDevice, Reading, Status, Workspace};
 
-/// The device, and the driver that speaks to it. Loopback delivers a datagram before `send`
-/// returns, so nothing waits.
+/// The emulated device and its driver. Loopback delivers a datagram before `send` returns, so
+/// nothing waits.
 struct Bench {
     socket: UdpSocket,
     driver: Template,
@@ -31,7 +30,7 @@ impl Bench {
         bench
     }
 
-    /// One tick of loop and device; the device answers or is silent.
+    /// One tick of loop and device; the device answers or stays silent.
     fn tick(&mut self, answers: bool) -> Reading {
         self.time_ms += 1.0;
         let reading = self.driver.read(self.time_ms);
@@ -40,7 +39,7 @@ impl Bench {
         if answers {
             self.counter += 1;
             let state = self.state(self.counter);
-            self.say(&state);
+            self.send(&state);
         }
         reading
     }
@@ -58,11 +57,11 @@ impl Bench {
         bytes
     }
 
-    fn say(&self, bytes: &[u8]) {
+    fn send(&self, bytes: &[u8]) {
         self.socket.send_to(bytes, self.peer.unwrap()).unwrap();
     }
 
-    /// Takes in the commands, in the maker's axes.
+    /// Receives the commands, in the maker's axes.
     fn listen(&mut self) {
         let mut bytes = [0; 64];
         while let Ok((18, peer)) = self.socket.recv_from(&mut bytes) {
@@ -73,7 +72,7 @@ impl Bench {
     }
 }
 
-/// A guarded newton to the right.
+/// A guarded force of 1 N to the right.
 fn one_newton() -> GuardedWrench {
     let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, slew_n_per_ms: 10.0, ..GuardConfig::default() });
     guard.guard(Wrench { force: Vec3::X, torque: Vec3::ZERO }, &ToolState::at(Pose::IDENTITY), 1.0)
@@ -85,7 +84,7 @@ fn pose_velocity_buttons_and_force_have_the_right_axes_and_units() {
     bench.flags = 2;
     let reading = bench.run(400);
     assert_eq!((reading.status, reading.tool.buttons), (Status::Fresh, Buttons::NEXT_TOOL));
-    // Device: x to the user, y right, z up. Ours: x right, y up, z to the user.
+    // Device: x to the user, y right, z up. Driver: x right, y up, z to the user.
     assert!((reading.tool.tip() - Vec3::new(20.0, 30.0, 10.0)).length() < 1e-4);
     assert!((reading.tool.twist.linear - Vec3::new(0.2, 0.3, 0.1)).length() < 1e-6);
     assert!((bench.told - Vec3::Y).length() < 1e-6, "{}", bench.told);
@@ -120,15 +119,15 @@ fn a_silent_device_is_stale_without_force_then_lost() {
 }
 
 #[test]
-fn garbage_cuts_the_force_and_old_states_are_passed_over() {
+fn invalid_data_cut_the_force_and_old_states_are_skipped() {
     let mut bench = Bench::new();
     bench.run(400);
-    bench.say(b"what?");
+    bench.send(b"what?");
     bench.run(1);
     assert_eq!((bench.told, bench.driver.watch().fault()), (Vec3::ZERO, Some(Fault::Garbled)));
     let old = bench.state(1);
     bench.tick(false);
-    bench.say(&old);
+    bench.send(&old);
     assert_eq!(bench.tick(false).status, Status::Stale);
 }
 

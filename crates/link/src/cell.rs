@@ -1,10 +1,9 @@
-//! Latest-value cells: one thread writes, another reads the newest value; neither ever waits for
-//! the other.
+//! Latest-value cells: one thread writes, another reads the newest value, and neither waits.
 //!
 //! # Theory
-//! A triple buffer: the writer owns one slot, the reader owns one, the third changes hands by one
-//! atomic swap. Both sides finish in a bounded number of steps whatever the other does (wait-free),
-//! and the reader never sees half a value.
+//! A triple buffer: the writer owns one slot, the reader owns one, and the third is exchanged by
+//! one atomic swap. Both sides finish in a bounded number of steps whatever the other does
+//! (wait-free), and the reader never sees a partly written value.
 //!
 //! ```text
 //!   writer ──[slot a]──╮                 ╭──[slot c]── reader
@@ -12,16 +11,16 @@
 //! ```
 //!
 //! # Practice
-//! A write in place costs what the closure costs and one swap, about 20 ns; reading an unchanged
-//! cell is one load, 1 ns. `T` may own memory (a surface patch): slots are reused, so a closure
-//! that overwrites in place never allocates.
+//! A write in place costs the closure and one swap, about 20 ns; reading an unchanged cell is one
+//! load, 1 ns. `T` may own memory (a surface patch): slots are reused, so that a closure that
+//! overwrites in place never allocates.
 //!
 //! # When not to use it
-//! When every value counts, as with carving edits or records: use [`crate::queue`].
+//! When every value matters, as with bone edits or records: use [`crate::queue`].
 
 use triple_buffer::{Input, Output, triple_buffer};
 
-/// A value and how often it had been written.
+/// A value and its sequence number.
 #[derive(Clone, Debug)]
 struct Stamped<T> {
     sequence: u64,
@@ -41,7 +40,7 @@ pub struct Reader<T: Send> {
     output: Output<Stamped<T>>,
 }
 
-/// Makes a cell that holds `initial` under sequence number 0.
+/// Creates a cell with `initial` as sequence number 0.
 ///
 /// ```
 /// let (mut writer, mut reader) = trepan_link::cell::cell(0.0f32);
@@ -56,7 +55,7 @@ pub fn cell<T: Clone + Send>(initial: T) -> (Writer<T>, Reader<T>) {
 impl<T: Send> Writer<T> {
     /// Fills a slot in place and publishes it; returns its sequence number, 1 for the first write.
     ///
-    /// The slot holds *some* earlier value, not always the last one: overwrite all of it.
+    /// The slot contains *some* earlier value, not always the last one: overwrite all of it.
     pub fn write(&mut self, fill: impl FnOnce(&mut T)) -> u64 {
         let slot = self.input.input_buffer_mut();
         fill(&mut slot.value);
@@ -66,14 +65,14 @@ impl<T: Send> Writer<T> {
         self.sequence
     }
 
-    /// Publishes a value whole.
+    /// Publishes a new value.
     pub fn set(&mut self, value: T) -> u64 {
         self.write(|slot| *slot = value)
     }
 }
 
 impl<T: Send> Reader<T> {
-    /// The newest published value and its sequence number (0: nothing was written yet).
+    /// The newest published value and its sequence number (0 before the first write).
     pub fn latest(&mut self) -> (&T, u64) {
         let newest = self.output.read();
         (&newest.value, newest.sequence)

@@ -1,32 +1,32 @@
-//! What can go wrong with a recording, with the file's name and what to do.
+//! Recording errors, with the file's name and the remedy.
 
 use std::path::PathBuf;
 
 /// A recording could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
-    /// The file could not be made.
+    /// The file could not be created.
     #[error("cannot create the recording {}: {source}; choose a folder that exists and that you may write to", path.display())]
     Create {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
-    /// Writing failed part way. Every later call fails too; what was flushed before stays readable.
+    /// Writing failed. Later calls fail too; flushed data stay readable.
     #[error("cannot write to the recording {}: {reason}; free some disk space or record elsewhere; what was flushed before can still be opened", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         reason: String,
     },
-    /// The file could not be read at all.
+    /// The file could not be opened or read.
     #[error("cannot read the recording {}: {source}; check the name and the rights to read it", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
     /// The file is not an MCAP file.
@@ -41,7 +41,7 @@ pub enum LinkError {
         /// The file.
         path: PathBuf,
     },
-    /// A repair would overwrite what it reads.
+    /// A repair would overwrite its input.
     #[error("cannot repair {} onto itself; give the repaired file another name", path.display())]
     SameFile {
         /// The file.

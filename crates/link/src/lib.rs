@@ -1,12 +1,12 @@
-//! What passes between Trepan's threads and into files: latest-value cells, bounded rings, wire
+//! Communication between threads and recording to files: latest-value cells, bounded rings, wire
 //! types, recordings.
 //!
 //! # Practice
-//! Inside a process, loops of different rates exchange state through [`cell`] (only the newest
-//! value counts) and streams through [`queue`] (every value counts, up to a limit). Neither locks,
-//! waits or allocates. A [`Recorder`] on a thread of its own drains the queues into an MCAP file
-//! that Foxglove and Rerun open; a [`Recording`] reads it back bit for bit, whole or cut anywhere.
-//! With the feature `topics`, another process on the machine watches.
+//! Within a process, loops of different rates exchange state through [`cell`] (newest value only)
+//! and streams through [`queue`] (every value, up to a limit). Neither locks, waits or allocates. A
+//! [`Recorder`] on its own thread drains the queues into an MCAP file that Foxglove and Rerun open;
+//! a [`Recording`] reads it bit for bit, complete or cut. With the feature `topics`, another
+//! process on the machine can observe a session.
 //!
 //! # When not to use it
 //! Never call a [`Recorder`] from a haptic tick: closing a chunk takes up to milliseconds.

@@ -1,14 +1,13 @@
-//! Bounded rings: one thread sends, another receives, in order; what does not fit is dropped and
+//! Bounded ring buffers between two threads, in order; values that do not fit are dropped and
 //! counted.
 //!
 //! # Practice
-//! One slot is one value; all memory is taken when the ring is made. Sending and receiving are
-//! wait-free and cost about 10 ns plus the copy (60 ns for a tick record, both ends). Size a ring
-//! for the longest pause of its receiver: 1 kHz of records and a recorder that may stall for 2 s
-//! need 2048 slots.
+//! All memory is allocated at creation. Sending and receiving are wait-free and cost about 10 ns
+//! plus the copy (60 ns for a tick record, both ends). Size a ring for the longest pause of its
+//! receiver: 1 kHz of records and a recorder that may stall for 2 s need 2048 slots.
 //!
 //! # When not to use it
-//! When only the newest value counts: use [`crate::cell`].
+//! When only the newest value matters: use [`crate::cell`].
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -27,7 +26,7 @@ pub struct Receiver<T> {
     dropped: Arc<AtomicU64>,
 }
 
-/// Makes a ring of `capacity` slots.
+/// Creates a ring of `capacity` slots.
 ///
 /// ```
 /// let (mut sender, mut receiver) = trepan_link::queue::bounded(2);
@@ -41,7 +40,7 @@ pub fn bounded<T>(capacity: usize) -> (Sender<T>, Receiver<T>) {
 }
 
 impl<T> Sender<T> {
-    /// Sends a value; false when the ring was full and the value was dropped and counted.
+    /// Sends a value; false if the ring was full and the value was dropped and counted.
     pub fn send(&mut self, value: T) -> bool {
         let sent = self.ring.push(value).is_ok();
         if !sent {
@@ -50,34 +49,34 @@ impl<T> Sender<T> {
         sent
     }
 
-    /// How many values were dropped since the ring was made.
+    /// Number of values dropped since creation.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
     }
 
-    /// Whether the receiver is gone.
+    /// Whether the receiver was dropped.
     pub fn is_abandoned(&self) -> bool {
         self.ring.is_abandoned()
     }
 }
 
 impl<T> Receiver<T> {
-    /// The oldest value not yet received.
+    /// Receives the oldest value.
     pub fn receive(&mut self) -> Option<T> {
         self.ring.pop().ok()
     }
 
-    /// How many values wait.
+    /// Number of waiting values.
     pub fn waiting(&self) -> usize {
         self.ring.slots()
     }
 
-    /// How many values were dropped since the ring was made.
+    /// Number of values dropped since creation.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
     }
 
-    /// Whether the sender is gone; values may still wait.
+    /// Whether the sender was dropped; values may still wait.
     pub fn is_abandoned(&self) -> bool {
         self.ring.is_abandoned()
     }

@@ -1,13 +1,12 @@
-//! Writes a session to an MCAP file, so that a cut at any byte loses at most the last quarter of a
-//! second.
+//! Writes a session to an MCAP file; a cut at any byte loses at most the last quarter of a second.
 //!
 //! # Practice
-//! One topic per record type in Trepan's own protobuf schemas (`/tick`, `/second`, `/collision`,
-//! `/solver`, `/event`), and `/tool` and `/log` in Foxglove's for viewers. Chunks are compressed
-//! with LZ4 and closed after [`MAX_CHUNK_BYTES`] or [`MAX_CHUNK_MS`] of session time, whichever
-//! comes first, then handed to the operating system: a killed process loses the open chunk only. A
-//! tick takes 2 µs and 80 to 250 B, but 5 ms when a chunk closes, or as long as the disk needs: a
-//! recorder lives on a thread of its own, behind [`crate::queue`].
+//! Each record type has a topic in Trepan's protobuf schemas (`/tick`, `/second`, `/collision`,
+//! `/solver`, `/event`); `/tool` and `/log` use Foxglove's for viewers. Chunks are compressed with
+//! LZ4 and closed after [`MAX_CHUNK_BYTES`] or [`MAX_CHUNK_MS`] of session time, whichever comes
+//! first, then handed to the operating system: a killed process loses the open chunk only. A tick
+//! takes 2 µs and 80 to 250 B, but 5 ms or the disk's latency when a chunk closes. So a recorder
+//! runs on its own thread, behind [`crate::queue`].
 //!
 //! # Sources
 //! MCAP: <https://mcap.dev/spec>.
@@ -30,12 +29,12 @@ pub const MAX_CHUNK_MS: f64 = 200.0;
 /// Session time between two poses for viewers, ms.
 const VIEW_PERIOD_MS: f64 = 16.0;
 
-/// Format of the files written, raised when an older reader would misread a newer file.
+/// File format version, raised when an older reader would misread a newer file.
 pub(crate) const FORMAT: u32 = 1;
 /// Name of the metadata record that holds the session header.
 pub(crate) const HEADER_NAME: &str = "trepan.session";
 pub(crate) const HEADER_KEY: &str = "json";
-/// Name of the metadata record that tells what a repaired file had lost.
+/// Name of the metadata record that lists the losses of a repaired file.
 pub(crate) const REPAIR_NAME: &str = "trepan.repair";
 pub(crate) const LOSSES_KEY: &str = "losses";
 pub(crate) const FORMAT_KEY: &str = "format";
@@ -43,9 +42,8 @@ const PROFILE: &str = "trepan";
 
 /// A session file being written.
 ///
-/// After the first error every call fails; what was flushed before stays readable. Dropping a
-/// recorder finishes the file as well as it can; [`Recorder::finish`] also says whether that went
-/// well.
+/// After the first error every call fails; flushed data stay readable. Dropping a recorder finishes
+/// the file as well as possible; [`Recorder::finish`] also returns errors.
 pub struct Recorder<W: Write + Seek = BufWriter<File>> {
     path: PathBuf,
     mcap: mcap::Writer<W>,
@@ -58,7 +56,7 @@ pub struct Recorder<W: Write + Seek = BufWriter<File>> {
     sequences: [u32; CHANNELS],
 }
 
-/// How many channels there are.
+/// Number of channels.
 const CHANNELS: usize = 7;
 
 /// Channel ids.
@@ -73,7 +71,7 @@ struct Channels {
 }
 
 impl Recorder {
-    /// Creates the file, or empties it, and writes the header.
+    /// Creates or truncates the file, and writes the header.
     pub fn create(path: &Path, header: &SessionHeader) -> Result<Self, LinkError> {
         let file = File::create(path).map_err(|source| LinkError::Create { path: path.to_owned(), source })?;
         Self::to(BufWriter::new(file), path, header)
@@ -81,7 +79,7 @@ impl Recorder {
 }
 
 impl<W: Write + Seek> Recorder<W> {
-    /// Records into any stream; `path` only serves error messages.
+    /// Records into any stream; `path` is only used in error messages.
     pub fn to(stream: W, path: &Path, header: &SessionHeader) -> Result<Self, LinkError> {
         let failed = |error: McapError| write_error(path, &error);
         let mut mcap = options().create(stream).map_err(failed)?;
@@ -124,12 +122,12 @@ impl<W: Write + Seek> Recorder<W> {
         self.message(self.channels.second, record)
     }
 
-    /// Records a collision step, at the session time of the newest tick.
+    /// Records a collision step, at the session time of the latest tick.
     pub fn collision(&mut self, record: &CollisionRecord) -> Result<(), LinkError> {
         self.message(self.channels.collision, record)
     }
 
-    /// Records a solver step, at the session time of the newest tick.
+    /// Records a solver step, at the session time of the latest tick.
     pub fn solver(&mut self, record: &SolverRecord) -> Result<(), LinkError> {
         self.message(self.channels.solver, record)
     }
@@ -153,7 +151,7 @@ impl<W: Write + Seek> Recorder<W> {
         self.mcap.into_inner().flush().map_err(|error| write_error(&self.path, &McapError::Io(error)))
     }
 
-    /// Moves the session time on and closes a chunk that spans enough of it.
+    /// Advances the session time and closes a chunk that spans enough of it.
     fn advance(&mut self, time_ms: f64) -> Result<(), LinkError> {
         if time_ms.is_finite() {
             self.newest_ms = self.newest_ms.max(time_ms);
@@ -200,8 +198,8 @@ impl Channels {
     }
 }
 
-/// Chunks are built in memory and written whole: a cut then never leaves a chunk whose length is
-/// not yet known.
+/// Chunks are built in memory and written as a whole, so that a cut never leaves a chunk of unknown
+/// length.
 pub(crate) fn options() -> WriteOptions {
     WriteOptions::new()
         .compression(Some(Compression::Lz4))
@@ -225,13 +223,13 @@ fn foxglove_channel<T: Encode, W: Write + Seek>(mcap: &mut mcap::Writer<W>, topi
 }
 
 fn metadata(header: &SessionHeader) -> Metadata {
-    // A struct of strings and maps of strings always serialises.
+    // Serialising a struct of strings and maps of strings cannot fail.
     let json = serde_json::to_string(header).unwrap_or_default();
     let entries = [(FORMAT_KEY.to_owned(), FORMAT.to_string()), (HEADER_KEY.to_owned(), json)];
     Metadata { name: HEADER_NAME.to_owned(), metadata: BTreeMap::from(entries) }
 }
 
-/// Session time in MCAP's unit; not-a-number and times before the session count as its beginning.
+/// Session time in MCAP's unit; NaN and negative times become 0.
 fn nanoseconds(time_ms: f64) -> u64 {
     (time_ms * 1e6) as u64
 }

@@ -1,11 +1,12 @@
-//! Reads a session file back, whole or cut or damaged at any byte, bit for bit.
+//! Reads a session file, complete, cut or damaged at any byte, bit for bit.
 //!
 //! # Practice
-//! The file is walked record by record from its start; the index at its end is not needed. A chunk
-//! counts when it is complete, its checksum holds and every message in it decodes; reading stops
-//! before the first that is not and [`Recording::damage`] says so. [`Recording::losses`] also tells
-//! ticks that are missing between those read. Everything is held in memory, about 250 B a tick: 15
-//! MB a minute at 1 kHz. Memory stays in proportion to the file whatever the bytes claim.
+//! The file is parsed record by record from its start; the index at its end is not needed. A chunk
+//! is accepted if it is complete, its checksum is valid and every message in it decodes. Reading
+//! stops before the first one that is not, and [`Recording::damage`] reports it.
+//! [`Recording::losses`] also reports ticks missing between those read. Everything is kept in
+//! memory, about 250 B a tick: 15 MB a minute at 1 kHz. Memory stays in proportion to the file's
+//! size whatever its contents.
 
 mod chunk;
 mod losses;
@@ -22,14 +23,14 @@ use scan::{Cursor, Topic};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// A session, read back.
+/// A session read from a file.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
-    /// What the session was.
+    /// Description of the session.
     pub header: SessionHeader,
     /// Haptic ticks in the order in which they were recorded.
     pub ticks: Vec<TickRecord>,
-    /// Ticks of the second hand, where there was one.
+    /// Ticks of the second hand, if any.
     pub second: Vec<SecondRecord>,
     /// Collision steps.
     pub collisions: Vec<CollisionRecord>,
@@ -37,11 +38,11 @@ pub struct Recording {
     pub solver: Vec<SolverRecord>,
     /// Events.
     pub events: Vec<EventRecord>,
-    /// Where the file is cut or damaged: what is here came before. `None` for a whole file.
+    /// Damage of the file; the records are those before it. `None` for a complete file.
     pub damage: Option<Damage>,
-    /// What was lost before the file was repaired; `None` for a file that never was.
+    /// Losses before the file was repaired; `None` if it never was.
     pub repaired: Option<String>,
-    /// Whether the file ends with a sound index, without which other programs refuse it.
+    /// Whether the file ends with a valid index, which other programs require.
     pub indexed: bool,
 }
 
@@ -51,7 +52,7 @@ impl Recording {
         Self::of_bytes(&bytes_of(path)?, path)
     }
 
-    /// Reads a recording in memory; `path` only serves error messages.
+    /// Reads a recording in memory; `path` is only used in error messages.
     pub fn of_bytes(bytes: &[u8], path: &Path) -> Result<Self, LinkError> {
         let Some(body) = bytes.strip_prefix(mcap::MAGIC) else {
             return Err(LinkError::NotARecording { path: path.to_owned() });
@@ -68,7 +69,7 @@ impl Recording {
         Ok(Self { header, damage, indexed: scan::index(bytes).is_some(), ..reading.recording })
     }
 
-    /// How many records of each sort are here: a mark to go back to.
+    /// Number of records of each kind, for a rewind.
     fn mark(&self) -> [usize; 5] {
         [self.ticks.len(), self.collisions.len(), self.solver.len(), self.events.len(), self.second.len()]
     }
@@ -82,7 +83,7 @@ impl Recording {
     }
 }
 
-/// The bytes of a regular file. A pipe or a device has no end, and opening it could wait for ever.
+/// The bytes of a regular file. A pipe or a device has no end, and opening it could block.
 fn bytes_of(path: &Path) -> Result<Vec<u8>, LinkError> {
     let kind = std::fs::metadata(path).map(|kind| kind.is_file());
     let bytes = match kind {
@@ -93,20 +94,20 @@ fn bytes_of(path: &Path) -> Result<Vec<u8>, LinkError> {
     bytes.map_err(|source| LinkError::Read { path: path.to_owned(), source })
 }
 
-/// A file part way read.
+/// A partly read file.
 #[derive(Default)]
 struct Reading {
     header: Option<(u32, SessionHeader)>,
     recording: Recording,
     schemas: HashMap<u16, Topic>,
     channels: HashMap<u16, Topic>,
-    /// Bytes that chunks may still unpack to.
+    /// Remaining limit of unpacked bytes.
     budget: u64,
 }
 
 impl Reading {
-    /// Reads records up to the regular end; `Err` when the bytes end or make no sense before it.
-    /// Either says at which byte of the file.
+    /// Reads records up to the regular end; `Err` if the bytes end or are invalid before it. Both
+    /// contain the byte position.
     fn walk(&mut self, body: &[u8]) -> Result<usize, usize> {
         use mcap::records::op;
         let mut rest = Cursor(body);
@@ -134,7 +135,7 @@ impl Reading {
         Some(())
     }
 
-    /// One record that is not a chunk. Sorts that a session does not need are passed over.
+    /// Processes a record other than a chunk; unused kinds are skipped.
     fn record(&mut self, opcode: u8, body: &[u8]) -> Option<()> {
         use mcap::records::op;
         match opcode {

@@ -1,9 +1,9 @@
-//! Topics between processes on one machine: a teacher who watches a running simulator, and shows
-//! things back.
+//! Topics between processes on one machine, for a teacher who observes a running simulator and
+//! sends markers back.
 //!
 //! # Theory
 //! Publish and subscribe through shared memory (iceoryx2): no daemon, no socket. A publisher never
-//! waits: a subscriber that is slow, stopped or dead loses old messages, and nobody else notices.
+//! waits: a slow, stopped or dead subscriber loses old messages without affecting others.
 //!
 //! ```text
 //!   simulator ──"tick", "event"──> watcher
@@ -13,9 +13,9 @@
 //! # Practice
 //! Messages are the protobuf bytes of the recordings, at most [`MAX_MESSAGE_BYTES`]; publishing one
 //! costs a few µs. Publish from the recorder's thread, not from a haptic tick.
-//! [`Subscriber::newest`] says nothing of age: a publisher that died looks like a quiet one, so
-//! watch the sequence numbers against the clock. What a killed process leaves behind is cleared
-//! when the next one joins. Signals stay the program's own.
+//! [`Subscriber::newest`] has no age: a dead publisher looks like a silent one, so compare the
+//! sequence numbers with the clock. Leftovers of a killed process are removed when the next one
+//! joins. Signal handlers are not changed.
 //!
 //! # Sources
 //! <https://iceoryx.io>.
@@ -34,9 +34,9 @@ use std::marker::PhantomData;
 
 /// Longest message, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 4096;
-/// Messages that a subscriber may be behind before it loses the oldest.
+/// Messages that a subscriber may lag before it loses the oldest.
 const BUFFER: usize = 256;
-/// Simulators and watchers that may share a topic.
+/// Most simulators and watchers that share a topic.
 const MAX_MEMBERS: usize = 16;
 
 type Service = ipc_threadsafe::Service;
@@ -73,7 +73,7 @@ topics!(
 /// A topic could not be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TopicError {
-    /// The session's name is not one.
+    /// The session's name is invalid.
     #[error("{name:?} is no name for a session; give one of 1 to 100 letters, digits and hyphens")]
     Name {
         /// The name.
@@ -82,11 +82,11 @@ pub enum TopicError {
     /// Shared memory could not be set up.
     #[error("cannot {what} in session {session:?}: {reason}; see whether /dev/shm is writable and has room")]
     SharedMemory {
-        /// What was tried.
+        /// The failed operation.
         what: &'static str,
         /// The session.
         session: String,
-        /// The middleware's own words.
+        /// The middleware's message.
         reason: String,
     },
     /// A message is too long.
@@ -99,13 +99,13 @@ pub enum TopicError {
     },
 }
 
-/// A process's seat at a session.
+/// A process's membership in a session.
 pub struct Session {
     node: Node<Service>,
     name: String,
 }
 
-/// Publishes one sort of record.
+/// Publishes one kind of record.
 pub struct Publisher<T> {
     port: Port<Service, [u8], ()>,
     bytes: Vec<u8>,
@@ -113,7 +113,7 @@ pub struct Publisher<T> {
     record: PhantomData<fn(T)>,
 }
 
-/// Receives one sort of record.
+/// Receives one kind of record.
 pub struct Subscriber<T> {
     port: SubscriberPort<Service, [u8], ()>,
     garbled: u64,
@@ -121,7 +121,7 @@ pub struct Subscriber<T> {
 }
 
 impl Session {
-    /// Joins a session by its name, and clears what dead processes left.
+    /// Joins a session by name, and removes leftovers of dead processes.
     pub fn join(name: &str) -> Result<Self, TopicError> {
         let sound = (1..=100).contains(&name.len()) && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-');
         if !sound {
@@ -135,14 +135,14 @@ impl Session {
         Ok(Self { node, name: name.to_owned() })
     }
 
-    /// A publisher of `T`.
+    /// Creates a publisher of `T`.
     pub fn publisher<T: Topic>(&self) -> Result<Publisher<T>, TopicError> {
         let port = self.topic::<T>()?.publisher_builder().initial_max_slice_len(MAX_MESSAGE_BYTES).create();
         let port = port.map_err(|error| failed("publish", &self.name, &error))?;
         Ok(Publisher { port, bytes: Vec::with_capacity(512), session: self.name.clone(), record: PhantomData })
     }
 
-    /// A subscriber to `T`, which begins with the newest message if there is one.
+    /// Creates a subscriber to `T`, starting with the newest message if there is one.
     pub fn subscriber<T: Topic>(&self) -> Result<Subscriber<T>, TopicError> {
         let port = self.topic::<T>()?.subscriber_builder().create();
         let port = port.map_err(|error| failed("subscribe", &self.name, &error))?;
@@ -167,7 +167,7 @@ impl Session {
 }
 
 impl<T: Topic> Publisher<T> {
-    /// Publishes a record, to however many listen. Never waits.
+    /// Publishes a record to all subscribers. Never waits.
     pub fn send(&mut self, record: &T) -> Result<(), TopicError> {
         self.bytes.clear();
         encode(record, &mut self.bytes);
@@ -182,7 +182,7 @@ impl<T: Topic> Publisher<T> {
 }
 
 impl<T: Topic> Subscriber<T> {
-    /// The oldest message not yet received.
+    /// Receives the oldest message.
     pub fn receive(&mut self) -> Result<Option<T>, TopicError> {
         while let Some(sample) = self.port.receive().map_err(|error| failed("receive", T::TOPIC, &error))? {
             match decode(&sample) {
@@ -193,7 +193,7 @@ impl<T: Topic> Subscriber<T> {
         Ok(None)
     }
 
-    /// The newest message, if one came since the last call.
+    /// Receives the newest message, if one arrived since the last call.
     pub fn newest(&mut self) -> Result<Option<T>, TopicError> {
         let mut newest = None;
         for _ in 0..=BUFFER {
@@ -205,7 +205,7 @@ impl<T: Topic> Subscriber<T> {
         Ok(newest)
     }
 
-    /// Messages that made no sense, as from another version.
+    /// Number of invalid messages, for example from another version.
     pub fn garbled(&self) -> u64 {
         self.garbled
     }

@@ -1,7 +1,7 @@
-//! What viewers show without knowing Trepan: the tool's frame and a log, in Foxglove's own schemas.
+//! Data for general viewers: the tool's frame and a log, in Foxglove's schemas.
 //!
 //! # Practice
-//! Drawn from the ticks at 60 Hz at most; a replay never reads them.
+//! Written from the ticks at 60 Hz at most; a replay ignores them.
 //!
 //! # Sources
 //! <https://docs.foxglove.dev/docs/visualization/message-schemas/frame-transform>, `.../log`.
@@ -11,10 +11,10 @@ use foxglove::messages::log::Level;
 use foxglove::messages::{FrameTransform, Log, Quaternion, Timestamp, Vector3};
 use trepan_geometry::Pose;
 
-/// Frame of the patient, RAS+; viewers think in metres, so positions are written in metres.
+/// Frame of the patient, RAS+; positions are written in metres, as viewers expect.
 const WORLD: &str = "patient";
 
-/// `world_from_tool` at a time in the session, as a transform of the frame `child`.
+/// A pose `world_from_tool` at a session time, as a transform of the frame `child`.
 pub(crate) fn frame(world_from_tool: &Pose, child: &str, log_time_ns: u64) -> FrameTransform {
     let metres = world_from_tool.translation.as_dvec3() * 1e-3;
     let q = world_from_tool.rotation.as_dquat();
@@ -27,7 +27,7 @@ pub(crate) fn frame(world_from_tool: &Pose, child: &str, log_time_ns: u64) -> Fr
     }
 }
 
-/// An event as a line of a log.
+/// An event as a log line.
 pub(crate) fn log(event: &EventRecord, log_time_ns: u64) -> Log {
     let level = match event.kind.as_str() {
         "error" => Level::Error,

@@ -1,10 +1,11 @@
-//! The records that loops send to one another and to files: one tick, one collision step, one
-//! solver step, one event.
+//! The records exchanged between loops and written to files: ticks, collision steps, solver steps,
+//! events.
 //!
 //! # Practice
-//! Plain data in mm, ms, N; world space is the patient's RAS+ mm. Everything but [`EventRecord`]
-//! and [`SessionHeader`] is `Copy` and may be sent from a real-time loop. A record holds what a
-//! replay needs to make the same forces again, bit for bit, and nothing that names a patient.
+//! Plain data in mm, ms, N; world space is the patient's RAS+ mm. All records except
+//! [`EventRecord`] and [`SessionHeader`] are `Copy` and may be sent from a real-time loop. A record
+//! contains everything that a replay needs for bit-identical forces, and nothing that identifies a
+//! patient.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,41 +18,41 @@ pub struct TickRecord {
     pub tick: u64,
     /// Session time at which the device was read, ms.
     pub time_ms: f64,
-    /// Where the device held the tool, `world_from_tool`.
+    /// Device pose, `world_from_tool`.
     pub device: Pose,
-    /// How the device moved it.
+    /// Device velocity.
     pub twist: Twist,
     /// Pressed buttons, one bit each.
     pub buttons: u32,
-    /// Where contact let the tool be, `world_from_tool`.
+    /// Proxy pose, `world_from_tool`.
     pub proxy: Pose,
-    /// What went to the hand after the guard.
+    /// Wrench applied to the hand, after the guard.
     pub wrench: Wrench,
-    /// The tissue's part of that force, N; only with [`TickRecord::TISSUE`], read it by
+    /// The tissue's part of that force, N, if [`TickRecord::TISSUE`] is set; read it by
     /// [`tissue_n`](Self::tissue_n).
     pub tissue_force: Vec3,
-    /// Unit normal of the contact out of the obstacle; zero without contact.
+    /// Unit contact normal out of the obstacle; zero without contact.
     pub contact_normal: Vec3,
-    /// Depth in bone, mm.
+    /// Penetration depth in bone, mm.
     pub depth_mm: f32,
-    /// Depth in tissue, mm.
+    /// Penetration depth in tissue, mm.
     pub tissue_depth_mm: f32,
-    /// Bone removed in this tick, mm³; negative where a stroke was undone.
+    /// Bone removed in this tick, mm³; negative if a stroke was undone.
     pub removed_mm3: f32,
-    /// Speed of the drill's spindle, 1/min: 0 when it is off or has stalled.
+    /// Spindle speed, 1/min; 0 when off or stalled.
     pub spindle_rpm: f32,
-    /// Distance from the tip to the brain's surface at rest, mm; negative inside. Of a craniotome,
+    /// Distance from the tip to the brain's rest surface, mm; negative inside. For a craniotome,
     /// from its cutting part above the foot.
     pub brain_distance_mm: f32,
     /// Sequence number of the surface patch that the tick used.
     pub patch_seq: u64,
-    /// Time that the tick's computation took, µs.
+    /// Computation time of the tick, µs.
     pub compute_us: f32,
-    /// See [`TickRecord::LATE`] and its like.
+    /// Flags: [`TickRecord::LATE`] and others.
     pub flags: u32,
     /// Phase of the operation.
     pub phase: u8,
-    /// Which tool of the tray.
+    /// Index of the tool in the tray.
     pub tool: u8,
 }
 
@@ -64,15 +65,15 @@ impl TickRecord {
     pub const CLAMPED: u32 = 1 << 2;
     /// The drill turned.
     pub const DRILLING: u32 = 1 << 3;
-    /// The device gave an old pose.
+    /// The device returned an old pose.
     pub const STALE: u32 = 1 << 4;
-    /// The force was being let go at the end.
+    /// The force was being ramped down at the end.
     pub const RELEASED: u32 = 1 << 5;
-    /// The device was gone; no force was wanted.
+    /// The device was lost; no force was requested.
     pub const LOST: u32 = 1 << 6;
-    /// The burr came through the bone, for the first time in its stroke.
+    /// The burr broke through the bone, for the first time in its stroke.
     pub const THROUGH: u32 = 1 << 7;
-    /// [`tissue_force`](Self::tissue_force) is known; not in recordings of before it was kept.
+    /// [`tissue_force`](Self::tissue_force) is set; not in older recordings.
     pub const TISSUE: u32 = 1 << 8;
 
     /// Whether every flag of `mask` is set.
@@ -80,8 +81,8 @@ impl TickRecord {
         self.flags & mask == mask
     }
 
-    /// Force of the tissue on the hand, N. In recordings of before it was kept it is the whole
-    /// force where no bone was touched, else 0.
+    /// Force of the tissue on the hand, N. In older recordings without it, the whole force if no
+    /// bone was touched, else 0.
     pub fn tissue_n(&self) -> f32 {
         match (self.has(Self::TISSUE), self.tissue_depth_mm > 0.0 && self.depth_mm == 0.0) {
             (true, _) => self.tissue_force.length(),
@@ -90,8 +91,7 @@ impl TickRecord {
         }
     }
 
-    /// Unit normal out of the tissue; that of the contact where the tissue gives no force of its
-    /// own.
+    /// Unit normal out of the tissue; the contact normal if the tissue force is zero.
     pub fn tissue_normal(&self) -> Vec3 {
         self.tissue_force.try_normalize().unwrap_or(self.contact_normal)
     }
@@ -126,25 +126,25 @@ impl Default for TickRecord {
 /// One tick of the second hand.
 #[derive(Clone, Copy, Debug)]
 pub struct SecondRecord {
-    /// Number of the tick, as the first hand's.
+    /// Number of the tick, equal to the first hand's.
     pub tick: u64,
     /// Session time at which the device was read, ms.
     pub time_ms: f64,
-    /// Where the device held the tool, `world_from_tool`.
+    /// Device pose, `world_from_tool`.
     pub device: Pose,
-    /// How the device moved it.
+    /// Device velocity.
     pub twist: Twist,
     /// Pressed buttons, one bit each.
     pub buttons: u32,
-    /// Where contact let the tool be, `world_from_tool`.
+    /// Proxy pose, `world_from_tool`.
     pub proxy: Pose,
-    /// What went to the hand after the guard.
+    /// Wrench applied to the hand, after the guard.
     pub wrench: Wrench,
-    /// Depth in bone, mm.
+    /// Penetration depth in bone, mm.
     pub depth_mm: f32,
-    /// Depth in the brain at rest, mm.
+    /// Penetration depth in the brain at rest, mm.
     pub tissue_depth_mm: f32,
-    /// As in [`TickRecord`]: `STALE`, `LOST`, `RELEASED`, `CLAMPED`.
+    /// Flags as in [`TickRecord`]: `STALE`, `LOST`, `RELEASED`, `CLAMPED`.
     pub flags: u32,
 }
 
@@ -181,11 +181,11 @@ pub struct CollisionRecord {
     pub tick: u64,
     /// Solver step whose positions were used.
     pub solver_step: u64,
-    /// Depth found, mm.
+    /// Penetration depth, mm.
     pub depth_mm: f32,
-    /// Shell points inside the tissue.
+    /// Pointshell points inside the tissue.
     pub points: u32,
-    /// Time that the step took, µs.
+    /// Computation time of the step, µs.
     pub compute_us: f32,
 }
 
@@ -200,50 +200,49 @@ pub struct SolverRecord {
     pub time_ms: f64,
     /// Largest displacement from rest, mm.
     pub max_displacement_mm: f32,
-    /// Elements turned inside out.
+    /// Number of inverted elements.
     pub inverted: u32,
-    /// Time that the step took, µs.
+    /// Computation time of the step, µs.
     pub compute_us: f32,
 }
 
-/// Something that happened once: a warning, a phase change, a device fault.
+/// A single event: a warning, a phase change, a device fault.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EventRecord {
     /// Haptic tick in which it happened.
     pub tick: u64,
     /// Session time, ms.
     pub time_ms: f64,
-    /// What sort: `phase`, `warning`, `device`, `score`...; `warning` and `error` also set the
-    /// level that viewers show.
+    /// Kind: `phase`, `warning`, `device`, `score`...; `warning` and `error` also set the level in
+    /// viewers.
     pub kind: String,
-    /// In words, for a reader.
+    /// Text for a reader.
     pub text: String,
 }
 
-/// What a teacher shows a trainee and asks of the simulator: a second tool, a marker on the
-/// anatomy, a pause, trouble.
+/// A teacher's state: a ghost tool, a marker on the anatomy, a pause, simulated complications.
 #[derive(Clone, Copy, Debug)]
 pub struct TeacherRecord {
     /// Number of the record, from 1.
     pub seq: u64,
-    /// Where the teacher holds a ghost of the tool, `world_from_tool`.
+    /// Pose of the ghost tool, `world_from_tool`.
     pub ghost: Pose,
-    /// Where the marker is, world mm.
+    /// Position of the marker, world mm.
     pub marker: Vec3,
-    /// See [`TeacherRecord::GHOST`] and its like.
+    /// Flags: [`TeacherRecord::GHOST`] and others.
     pub flags: u32,
 }
 
 impl TeacherRecord {
-    /// The ghost is to be seen.
+    /// The ghost is visible.
     pub const GHOST: u32 = 1;
-    /// The marker is to be seen.
+    /// The marker is visible.
     pub const MARKER: u32 = 1 << 1;
-    /// The teacher asks for a pause.
+    /// The teacher requests a pause.
     pub const PAUSE: u32 = 1 << 2;
-    /// The drill shall have no power.
+    /// The drill has no power.
     pub const NO_POWER: u32 = 1 << 3;
-    /// The trainee shall be told that the patient bleeds.
+    /// The trainee sees a bleeding warning.
     pub const BLEEDING: u32 = 1 << 4;
 }
 
@@ -253,17 +252,17 @@ impl Default for TeacherRecord {
     }
 }
 
-/// What a session was: enough to run it again, and no patient's name, number, date or folder.
+/// Description of a session: enough to repeat it, without a patient's name, number, date or folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SessionHeader {
-    /// Program that recorded.
+    /// Recording program.
     pub app: String,
     /// Its version.
     pub version: String,
-    /// Name of the case: the built-in one's, or a pseudonym that the user chose.
+    /// Name of the case: the built-in one's, or a user's pseudonym.
     pub case: String,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Hashes of the inputs, by name, hexadecimal.
     pub hashes: BTreeMap<String, String>,

@@ -1,4 +1,4 @@
-//! Cells and rings never allocate after they are made: real-time loops use them.
+//! Cells and rings never allocate after creation, as real-time loops require.
 #![expect(unsafe_code, reason = "counting allocations means being the allocator")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -12,12 +12,11 @@ thread_local! {
 
 struct Counting;
 
-// SAFETY: passes everything on to the system's allocator; counting touches only a plain
-// thread-local.
+// SAFETY: delegates to the system's allocator; counting uses only a plain thread-local.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller keeps the allocator's contract.
+        // SAFETY: the caller fulfils the allocator's contract.
         unsafe { System.alloc(layout) }
     }
 

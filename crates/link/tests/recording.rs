@@ -1,5 +1,4 @@
-//! A recording survives what happens to files: a whole read, a cut at any byte, damage, a full
-//! disk.
+//! Tests recordings: complete, cut at any byte, damaged, and on a full disk.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
 use std::io::{Cursor, Seek, SeekFrom, Write};
@@ -19,7 +18,7 @@ fn header() -> SessionHeader {
     }
 }
 
-/// Numbers of every bit pattern, from a counter (splitmix64).
+/// Random numbers of every bit pattern, from a counter (splitmix64).
 struct Noise(u64);
 
 impl Noise {
@@ -72,7 +71,7 @@ fn tick(number: u64) -> TickRecord {
     }
 }
 
-/// Every bit of a tick, in words.
+/// All bits of a tick, as words.
 fn bits(t: &TickRecord) -> Vec<u64> {
     let pose = |p: &Pose| [p.translation.to_array().to_vec(), p.rotation.to_array().to_vec()].concat();
     let floats = [
@@ -155,7 +154,7 @@ fn a_cut_at_any_byte_leaves_all_complete_chunks() {
     let whole = file(900);
     let mut last = 0;
     let mut steps = std::collections::BTreeSet::new();
-    // The index holds no records: cuts in it are few.
+    // The index contains no records: few cuts in it are tested.
     for length in (0..whole.len()).filter(|l| l % 331 == 0 || *l < 600 || l + 600 > whole.len()) {
         match open(&whole[..length]) {
             Ok(recording) => {
@@ -214,7 +213,7 @@ fn a_repaired_file_is_whole_and_holds_the_same() {
 }
 
 #[test]
-fn damaged_files_never_panic_and_never_lie() {
+fn damaged_files_never_panic_and_give_no_wrong_ticks() {
     let whole = file(450);
     let folder = tempfile::tempdir().unwrap();
     let (damaged, repaired) = (folder.path().join("damaged.mcap"), folder.path().join("repaired.mcap"));
@@ -243,14 +242,14 @@ fn damaged_files_never_panic_and_never_lie() {
         }
         if let Ok(recording) = open(&bytes) {
             assert!(recording.ticks.len() <= 450);
-            // A checksum stands over every tick: what is given is what was recorded.
+            // A checksum covers every tick: ticks that are read equal those recorded.
             assert!(recording.losses().is_some() || recording.ticks.len() == 450);
             assert!(recording.ticks.iter().enumerate().all(|(n, t)| bits(t) == bits(&tick(n as u64))));
         }
     }
 }
 
-/// Overwrites 16 bytes in the middle of the chunk of this number, and gives where it begins.
+/// Overwrites 16 bytes in the middle of a chunk; returns the chunk's start.
 fn damage_chunk(file: &mut [u8], number: usize) -> usize {
     let mut at = 8;
     for chunk in 0.. {
@@ -282,7 +281,7 @@ fn a_damaged_file_says_where_and_how_many_ticks_are_lost() {
     let cut = open(&whole[..whole.len() * 3 / 4]).unwrap();
     assert!(cut.losses().unwrap().contains("is not known") && cut.promised_ticks() == cut.ticks.len() as u64);
 
-    // A digit of the header changed: JSON still, and every chunk is sound.
+    // A changed digit in the header is still valid JSON, and every chunk is valid.
     let mut changed = whole.clone();
     let seed = whole.windows(8).position(|bytes| bytes == b"\"seed\":7").unwrap();
     changed[seed + 7] = b'8';
@@ -358,7 +357,7 @@ fn older_recordings_are_whole() {
     }
 }
 
-/// Where the record with this opcode begins.
+/// Position of the record with this opcode.
 fn offset_of(opcode: u8, file: &[u8]) -> usize {
     let mut at = 8;
     while file[at] != opcode {
@@ -394,7 +393,7 @@ fn errors_name_the_file_and_the_remedy() {
     assert!(other.contains("session.mcap") && other.contains("--record"), "{other}");
 }
 
-/// A disk with room for so many bytes.
+/// A disk with limited room, bytes.
 struct SmallDisk {
     stream: Cursor<Vec<u8>>,
     room: usize,
@@ -453,7 +452,7 @@ fn times_that_are_no_numbers_are_recorded_as_they_are() {
 }
 
 #[test]
-fn recordings_of_before_the_tissues_force_was_kept_still_tell_it_where_only_tissue_was_touched() {
+fn older_recordings_give_the_tissue_force_without_bone_contact() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/paths");
     for (name, soft) in [("brain-light", true), ("skull-touch", false)] {
         let recording = Recording::open(&folder.join(format!("{name}.mcap"))).unwrap();

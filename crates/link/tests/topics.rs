@@ -1,5 +1,5 @@
-//! Topics between two real processes: what is published arrives, and a death on either side harms
-//! nobody.
+//! Tests topics between two processes: messages arrive, and a dead process does not affect the
+//! other.
 #![cfg(feature = "topics")]
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
@@ -15,7 +15,7 @@ fn session_name(test: &str) -> String {
     format!("test-{test}-{}", std::process::id())
 }
 
-/// This test binary again, as another process that runs only [`other_process`].
+/// Starts this test binary as another process that runs only [`other_process`].
 fn start(role: &str, session: &str) -> Child {
     Command::new(std::env::current_exe().unwrap())
         .args(["--exact", "other_process", "--nocapture"])
@@ -25,7 +25,7 @@ fn start(role: &str, session: &str) -> Child {
         .unwrap()
 }
 
-/// Tries until it is given something: slow machines wait, broken ones fail.
+/// Retries until there is a result, or panics after a timeout.
 fn wait_for<R>(mut attempt: impl FnMut() -> Option<R>) -> R {
     for _ in 0..10_000 {
         if let Some(result) = attempt() {
@@ -36,7 +36,7 @@ fn wait_for<R>(mut attempt: impl FnMut() -> Option<R>) -> R {
     panic!("nothing came");
 }
 
-/// What the other process does; alone, as an ordinary test, it has nothing to do.
+/// The other process's part; does nothing in an ordinary test run.
 #[test]
 fn other_process() {
     let Ok(role) = std::env::var(ROLE) else { return };
@@ -82,7 +82,7 @@ fn a_watcher_sees_the_simulator_and_survives_its_death() {
 }
 
 #[test]
-fn a_simulator_hears_the_teacher_and_does_not_notice_its_death() {
+fn a_simulator_receives_the_teacher_and_survives_its_death() {
     let name = session_name("teach");
     let session = Session::join(&name).unwrap();
     let mut ticks = session.publisher::<TickRecord>().unwrap();

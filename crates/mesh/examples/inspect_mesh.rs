@@ -1,6 +1,6 @@
-//! Reads a mesh file of any known format and prints what it is:
-//! `cargo run -p trepan-mesh --example inspect_mesh FILE [COPY]`; COPY's ending says the format to
-//! write.
+//! Reads a mesh file of any supported format and prints its properties.
+//! `cargo run -p trepan-mesh --example inspect_mesh FILE [COPY]`; the extension of COPY selects its
+//! format.
 
 use std::path::Path;
 use trepan_mesh::{Quality, Surface, Topology};

@@ -1,6 +1,6 @@
-//! Fills a label volume with tetrahedra that conform to its borders: `cargo run -p trepan-mesh
-//! --example labels_to_mesh [LABELS.nii.gz [TETS [OUT.vtk]]]`. Without a volume (or `-`) it takes a
-//! ball of 20 mm in one of 40 mm.
+//! Meshes a label volume with conforming tetrahedra.
+//! `cargo run -p trepan-mesh --example labels_to_mesh [LABELS.nii.gz [TETS
+//! [OUT.vtk]]]`. Without a volume (or with `-`) it uses a ball of 20 mm in one of 40 mm.
 
 use std::path::Path;
 use std::time::Instant;

@@ -1,6 +1,6 @@
-//! Fills a mask with tetrahedra and prints how good they are: `cargo run -p trepan-mesh --example
-//! mask_to_mesh [MASK.nii.gz [TETS [COARSENING [X,Y,Z,RADIUS,HALVINGS
-//! [OUT.vtk]]]]]`. Without a mask (or `-`) it takes a ball of 45 mm.
+//! Meshes a mask with tetrahedra and prints their quality.
+//! `cargo run -p trepan-mesh --example mask_to_mesh [MASK.nii.gz [TETS [COARSENING
+//! [X,Y,Z,RADIUS,HALVINGS [OUT.vtk]]]]]`. Without a mask (or with `-`) it uses a ball of 45 mm.
 
 use std::path::Path;
 use std::time::Instant;
@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// A centre, a radius and a count of halvings; `-` for nothing.
+/// Parses a centre, a radius and a count of halvings; `-` for none.
 fn fine(text: &str) -> Result<Option<Fine>, std::num::ParseFloatError> {
     let numbers = text.split(',').filter(|word| *word != "-").map(str::parse).collect::<Result<Vec<f32>, _>>()?;
     Ok(match numbers[..] {

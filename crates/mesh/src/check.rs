@@ -1,39 +1,39 @@
-//! What a sound tetrahedral mesh is, and the error that says what is wrong with another.
+//! Validity check of tetrahedral meshes, and its errors.
 //!
 //! # Theory
-//! Sound: every index names a node, every node is finite and belongs to a tetrahedron, every volume
-//! (b − a) × (c − a) · (d − a) / 6 is positive, and no face has more than two tetrahedra. The
-//! volume is taken in f64 from f32 corners, so its sign is right unless the element is flat to
-//! rounding.
+//! A valid mesh: every index is in range, every node is finite and belongs to a tetrahedron, every
+//! volume (b − a) × (c − a) · (d − a) / 6 is positive, and no face has more than two tetrahedra.
+//! The volume is computed in f64 from f32 corners, so that its sign is right unless the element is
+//! degenerate to rounding.
 
 use crate::{TetMesh, Topology};
 
-/// Why there is no mesh, or why it cannot be used.
+/// Why a mesh cannot be made or used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// No tetrahedron at all.
+    /// No tetrahedra.
     #[error("the mesh has no tetrahedra; give one with at least one")]
     Empty,
-    /// More than u32 can number.
+    /// Too many nodes for u32 indices.
     #[error("the mesh has {0} nodes, but at most 4294967294 can be numbered; give a smaller one")]
     TooLarge(usize),
-    /// A corner that names no node.
+    /// A corner index out of range.
     #[error("tetrahedron {tet} names node {node}, but there are {nodes} nodes; indices start at 0")]
     Index {
-        /// Which tetrahedron.
+        /// The tetrahedron.
         tet: usize,
-        /// The index it holds.
+        /// The invalid index.
         node: u32,
-        /// How many nodes there are.
+        /// Number of nodes.
         nodes: usize,
     },
     /// A coordinate that is NaN or infinite.
     #[error("node {0} has a coordinate that is not a finite number")]
     NotFinite(usize),
-    /// A flat or inverted tetrahedron.
+    /// A degenerate or inverted tetrahedron.
     #[error("tetrahedron {tet} has volume {mm3} mm³, which must be positive; swap two of its corners or drop it")]
     Volume {
-        /// Which tetrahedron.
+        /// The tetrahedron.
         tet: usize,
         /// Its signed volume, mm³.
         mm3: f64,
@@ -41,38 +41,38 @@ pub enum MeshError {
     /// A node that no tetrahedron uses.
     #[error("node {0} belongs to no tetrahedron; drop it (TetMesh::without_orphans)")]
     Orphan(usize),
-    /// A face with three or more tetrahedra.
+    /// A face shared by three or more tetrahedra.
     #[error("tetrahedron {0} has a face with more than two tetrahedra, so the mesh overlaps itself")]
     Face(usize),
-    /// A mask with nothing in it.
+    /// An empty mask.
     #[error("the mask has no voxel that is not 0, so there is nothing to fill; give a mask of the organ")]
     EmptyMask,
-    /// A mask whose affine has no inverse, or whose samples do not fit its dimensions.
+    /// A mask with a singular affine, or with samples that do not match its dimensions.
     #[error("the mask's {field} is {got}; it must be {wanted}")]
     Mask {
-        /// Which part of the volume.
+        /// The invalid field.
         field: &'static str,
-        /// What it holds.
+        /// Its value.
         got: String,
-        /// What would be right.
+        /// The valid range.
         wanted: &'static str,
     },
-    /// A number in a config that makes no sense.
+    /// A configuration value out of range.
     #[error("config field {field} is {got}; it must be {wanted}")]
     Config {
-        /// Which field.
+        /// The field.
         field: &'static str,
-        /// What it holds.
+        /// Its value.
         got: f64,
-        /// What would be right.
+        /// The valid range.
         wanted: &'static str,
     },
-    /// The count asked for cannot be met.
+    /// The requested count cannot be met.
     #[error(
         "target_tets {wanted} cannot be met within 10 % (nearest: {nearest}); ask for more, at least some hundreds"
     )]
     Target {
-        /// What was asked for.
+        /// The requested count.
         wanted: usize,
         /// The nearest count that the search found.
         nearest: usize,
@@ -80,7 +80,7 @@ pub enum MeshError {
 }
 
 impl TetMesh {
-    /// Whether the mesh is sound, or the first thing that is not. Linear in the size of the mesh.
+    /// Checks that the mesh is valid; returns the first fault. Linear in the size of the mesh.
     pub fn check(&self) -> Result<(), MeshError> {
         self.check_indices()?;
         if let Some(node) = self.positions.iter().position(|p| !p.is_finite()) {
@@ -95,7 +95,7 @@ impl TetMesh {
         Topology::of(self).crowded_face.map_or(Ok(()), |tet| Err(MeshError::Face(tet as usize)))
     }
 
-    /// Only the part of [`check`](Self::check) that later index arithmetic relies on.
+    /// Checks only the indices, as later index arithmetic requires.
     pub fn check_indices(&self) -> Result<(), MeshError> {
         let nodes = self.positions.len();
         if nodes >= u32::MAX as usize {
@@ -118,7 +118,7 @@ impl TetMesh {
         used
     }
 
-    /// The same tetrahedra without the nodes that none of them uses; the order of the others stays.
+    /// Removes nodes that no tetrahedron uses, keeping the order of the others.
     pub fn without_orphans(&self) -> Self {
         let used = self.used_nodes();
         let mut new_index = vec![0u32; used.len()];

@@ -1,12 +1,11 @@
-//! The surface at a density of a voxel volume as closed triangles: how a drilled skull leaves as
-//! STL.
+//! Extracts the isosurface of a voxel volume as closed triangles, such as a drilled skull for STL.
 //!
 //! # Theory
-//! Each cell of eight voxel centres is cut into the six tetrahedra around its diagonal; the
+//! Each cell of eight voxel centres is split into the six tetrahedra around its diagonal. The
 //! density, linear in each, crosses the isovalue in one triangle or two (Doi and Koide 1991).
-//! Neighbouring cells cut their common face alike, so that the triangles close without the
-//! ambiguous cases of marching cubes. Outside the grid there is nothing, so that bone cut by the
-//! grid's border is closed there too.
+//! Neighbouring cells split their common face in the same way, so that the triangles close without
+//! the ambiguous cases of marching cubes. Outside the grid is air, so that bone cut by the grid's
+//! border is closed there too.
 //!
 //! ```text
 //!   •───┄○      • at or over the isovalue
@@ -15,16 +14,16 @@
 //! ```
 //!
 //! # Practice
-//! World mm; vertices are shared, each on its edge of the grid, in the order of the cells: the same
-//! volume gives the same bytes. About a second for 50 million voxels and 100 bytes a triangle.
+//! World mm. Vertices are shared, each on a grid edge, in the order of the cells; equal volumes
+//! give bit-identical results. About a second for 50 million voxels and 100 bytes a triangle.
 //!
 //! # Sources
 //! A. Doi, A. Koide, *An efficient method of triangulating equi-valued surfaces by using
 //! tetrahedral cells*, IEICE Trans. E74, 1991.
 //!
 //! # When not to use it
-//! For printing without a look: slender triangles are left as they are. For finite elements:
-//! [`lattice`](crate::lattice) makes sound tetrahedra.
+//! For printing without inspection: slender triangles remain. For finite elements:
+//! [`lattice`](crate::lattice) makes valid tetrahedra.
 
 use crate::TriMesh;
 use glam::DVec3;
@@ -32,8 +31,8 @@ use std::collections::HashMap;
 use trepan_geometry::Vec3;
 use trepan_volume::VoxelVolume;
 
-/// The six ways from corner 0 to corner 7 along axes, each a tetrahedron, and whether it is a
-/// right-handed one.
+/// The six paths from corner 0 to corner 7 along axes, each a tetrahedron, and whether it is
+/// right-handed.
 const WAYS: [([usize; 3], bool); 6] = [
     ([0, 1, 2], true),
     ([1, 2, 0], true),
@@ -43,14 +42,14 @@ const WAYS: [([usize; 3], bool); 6] = [
     ([1, 0, 2], false),
 ];
 
-/// The closed surface of what is at or over `isovalue`; triangles are counter-clockwise as seen
-/// from outside.
+/// The closed isosurface of voxels at or over `isovalue`; triangles are counterclockwise from
+/// outside.
 pub fn isosurface(volume: &VoxelVolume<i16>, isovalue: i16) -> TriMesh {
     let mut surface = Surface { volume, isovalue, points: HashMap::new(), mesh: TriMesh::default() };
     let [nx, ny, nz] = volume.dims.map(|n| n as i64);
     for k in -1..nz {
         for j in -1..ny {
-            // Bits 0 to 3: the corners at x, bits 4 to 7: those at x + 1.
+            // Bits 0 to 3: the corners at x; bits 4 to 7: those at x + 1.
             let mut solid = 0u8;
             for i in -1..nx {
                 let next = (0..4).map(|n| u8::from(surface.is_solid([i + 1, j + (n & 1), k + (n >> 1)])) << n);
@@ -70,13 +69,13 @@ pub fn isosurface(volume: &VoxelVolume<i16>, isovalue: i16) -> TriMesh {
 struct Surface<'a> {
     volume: &'a VoxelVolume<i16>,
     isovalue: i16,
-    /// Vertices by the ends of their edges.
+    /// Vertex indices by the ends of their edges.
     points: HashMap<[[i64; 3]; 2], u32>,
     mesh: TriMesh,
 }
 
 impl Surface<'_> {
-    /// The density at a voxel, or that of nothing outside the grid.
+    /// The density at a voxel; air outside the grid.
     fn density(&self, [i, j, k]: [i64; 3]) -> i16 {
         let [nx, ny, nz] = self.volume.dims.map(|n| n as i64);
         let inside = (0..nx).contains(&i) && (0..ny).contains(&j) && (0..nz).contains(&k);
@@ -101,7 +100,7 @@ impl Surface<'_> {
 
     fn tetrahedron(&mut self, corners: [[i64; 3]; 4], right_handed: bool) {
         let solid = corners.map(|corner| self.is_solid(corner));
-        // Solid corners first; each exchange turns the tetrahedron's hand.
+        // Solid corners first; each exchange flips the tetrahedron's orientation.
         let mut order = [0, 1, 2, 3];
         order.sort_by_key(|&n| !solid[n]);
         let exchanges = (0..4).flat_map(|n| (0..n).map(move |m| (m, n))).filter(|&(m, n)| order[m] > order[n]).count();
@@ -123,7 +122,7 @@ impl Surface<'_> {
         }
     }
 
-    /// One triangle, with its corners on edges from a solid voxel to one that is not.
+    /// Adds a triangle with its corners on edges from a solid voxel to an empty one.
     fn triangles(&mut self, edges: [[[i64; 3]; 2]; 3]) {
         let triangle = edges.map(|edge| self.point(edge));
         self.mesh.triangles.push(triangle);
@@ -135,7 +134,7 @@ impl Surface<'_> {
         }
         let [solid, bare] = edge.map(|end| DVec3::from_array(end.map(|x| x as f64)));
         let [over, under] = edge.map(|end| f64::from(self.density(end)) - f64::from(self.isovalue));
-        // Strictly between the ends, so that no triangle loses its area: one that does has no side.
+        // Strictly between the ends, so that no triangle degenerates.
         let share = (over / (over - under)).clamp(1e-3, 1.0 - 1e-3);
         let point: Vec3 = self.volume.world_from_voxel.transform_point3(solid.lerp(bare, share)).as_vec3();
         let at = self.mesh.positions.len() as u32;
@@ -161,7 +160,7 @@ mod tests {
         volume
     }
 
-    /// Whether each side of a triangle is that of one other triangle, the other way round.
+    /// Whether each edge of a triangle belongs to one other triangle in the opposite direction.
     fn is_closed(mesh: &TriMesh) -> bool {
         let sides = || mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
         let all: HashSet<_> = sides().collect();

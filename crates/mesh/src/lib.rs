@@ -1,16 +1,16 @@
-//! Tetrahedral and triangle meshes: what is a sound one, how its parts hang together, how good it
-//! is, and how to get one from a mask or a file.
+//! Tetrahedral and triangle meshes: validity, topology, quality, generation from a mask, and file
+//! formats.
 //!
 //! # Theory
 //! A [`TetMesh`] is two arrays: vertices and corner indices. Everything else is derived when
-//! needed: [`Topology`] (face neighbours, tetrahedra of a node), [`Surface`] (border triangles seen
-//! from outside), [`Quality`] (angles, volumes, edges). [`lattice`] fills a binary mask or a label
-//! volume with tetrahedra by isosurface stuffing (Labelle and Shewchuk 2007), whose angles are
-//! bounded where cubes are of one size.
+//! needed: [`Topology`] (face neighbours, tetrahedra of a node), [`Surface`] (boundary triangles),
+//! [`Quality`] (angles, volumes, edges). [`lattice`] fills a binary mask or a label volume with
+//! tetrahedra by isosurface stuffing (Labelle and Shewchuk 2007), with bounded angles for cubes of
+//! one size.
 //!
 //! # Practice
-//! World mm, patient RAS+. Everything here runs when a case is loaded, never inside a tick. The
-//! same input gives the same bytes on any machine.
+//! World mm, patient RAS+. Everything here runs when a case is loaded, never in a tick. Equal input
+//! gives bit-identical results on any machine.
 //!
 //! ```
 //! use trepan_geometry::Vec3;
@@ -22,7 +22,8 @@
 //!     let centre = ball.centre_of([at % 24, at / 24 % 24, at / 576]);
 //!     ball.data[at] = u8::from(centre.length() < 9.0);
 //! }
-//! let mesh = lattice::tetrahedra(&ball, &lattice::Config { target_tets: 2000, ..Default::default() })?;
+//! let config = lattice::Config { target_tets: 2000, ..Default::default() };
+//! let mesh = lattice::tetrahedra(&ball, &config)?;
 //! assert!(mesh.check().is_ok() && Surface::of(&mesh).is_closed());
 //! # Ok::<(), trepan_mesh::MeshError>(())
 //! ```

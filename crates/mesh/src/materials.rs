@@ -1,13 +1,13 @@
-//! Which material each tetrahedron is, from a label volume.
+//! Assigns a material to each tetrahedron from a label volume.
 //!
 //! # Theory
-//! A tetrahedron gets the label that most of its sample points see: 35 points, evenly spread
-//! inside, so that thin structures count by their share. Borders between materials follow the
-//! elements, not the labels.
+//! A tetrahedron gets the most frequent label among 35 evenly spread sample points, so that thin
+//! structures count by their volume fraction. Material boundaries follow the elements, not the
+//! labels.
 //!
 //! # When not to use it
-//! Where the border between two materials must be smooth, or thinner than an element: that takes a
-//! mesh that conforms to it ([`labelled`](crate::lattice::labelled)).
+//! Where the boundary between two materials must be smooth, or thinner than an element: use a
+//! conforming mesh ([`labelled`](crate::lattice::labelled)).
 
 use crate::TetMesh;
 use glam::DVec3;
@@ -17,8 +17,8 @@ use trepan_volume::VoxelVolume;
 /// Samples along an edge.
 const STEPS: usize = 5;
 
-/// The most frequent label of each tetrahedron; 0 outside the volume; of equal ones the smallest.
-/// The same on any number of threads.
+/// The most frequent label of each tetrahedron; 0 outside the volume, the smallest on a tie.
+/// Bit-identical for any number of threads.
 pub fn majority(mesh: &TetMesh, labels: &VoxelVolume<u16>) -> Vec<u16> {
     let voxel_from_world = labels.world_from_voxel.inverse();
     let label_at = |world: DVec3| {
@@ -35,7 +35,7 @@ pub fn majority(mesh: &TetMesh, labels: &VoxelVolume<u16>) -> Vec<u16> {
     (0..mesh.tets.len()).into_par_iter().map(most_frequent).collect()
 }
 
-/// Points evenly inside a tetrahedron.
+/// Evenly spread points inside a tetrahedron.
 fn samples([a, b, c, d]: [DVec3; 4]) -> impl Iterator<Item = DVec3> {
     let last = STEPS - 1;
     let triples =

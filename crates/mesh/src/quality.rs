@@ -1,11 +1,11 @@
-//! How good the elements of a mesh are: angles, radius ratios, volumes, edges, heights.
+//! Element quality of a mesh: angles, radius ratios, volumes, edges, heights.
 //!
 //! # Theory
 //! The dihedral angle at edge e between the other corners k and l is atan2(|u × v|, u · v) with u =
-//! e × (k − i), v = e × (l − i). Angles near 0° or 180° spoil the conditioning of the stiffness
-//! matrix and the accuracy of gradients (Shewchuk 2002); the smallest height bounds the explicit
-//! time step from above. The radius ratio 3 r_in / r_circum is 1 for the regular tetrahedron and 0
-//! for a flat one.
+//! e × (k − i), v = e × (l − i). Angles near 0° or 180° degrade the conditioning of the stiffness
+//! matrix and the accuracy of gradients (Shewchuk 2002). The smallest height limits the explicit
+//! time step. The radius ratio 3 r_in / r_circum is 1 for the regular tetrahedron and 0 for a
+//! degenerate one.
 //!
 //! # Practice
 //! f64 over f32 corners; linear in the size of the mesh.
@@ -13,7 +13,7 @@
 use crate::TetMesh;
 use glam::DVec3;
 
-/// Corners of the six edges of a tetrahedron, and the two corners that are left.
+/// Corners of the six edges of a tetrahedron, and the two remaining corners.
 pub(crate) const EDGES: [[usize; 4]; 6] =
     [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]];
 
@@ -28,11 +28,11 @@ pub struct Quality {
     pub min_radius_ratio: f64,
     /// Mean of 3 r_in / r_circum.
     pub mean_radius_ratio: f64,
-    /// Smallest volume, mm³; negative when an element is inverted.
+    /// Smallest volume, mm³; negative if an element is inverted.
     pub min_mm3: f64,
     /// Largest volume, mm³.
     pub max_mm3: f64,
-    /// Volume of all, mm³.
+    /// Total volume, mm³.
     pub total_mm3: f64,
     /// Shortest edge, mm.
     pub min_edge_mm: f64,
@@ -42,13 +42,13 @@ pub struct Quality {
     pub mean_edge_mm: f64,
     /// Smallest height of a corner over the opposite face, mm.
     pub min_height_mm: f64,
-    /// How many dihedral angles fall into each 10 degrees.
+    /// Number of dihedral angles in each interval of 10 degrees.
     pub dihedral_histogram: [u32; 18],
 }
 
 impl Quality {
-    /// The quality of a mesh whose indices are in range; for an empty mesh the minima are +∞, the
-    /// maxima −∞ and the means NaN.
+    /// Computes the quality of a mesh whose indices are in range. For an empty mesh the minima are
+    /// +∞, the maxima −∞ and the means NaN.
     pub fn of(mesh: &TetMesh) -> Self {
         let mut all = Self::NOTHING;
         for tet in 0..mesh.tets.len() {
@@ -121,8 +121,10 @@ fn min_height(corners: [DVec3; 4]) -> f64 {
     3.0 * volume(corners).abs() / areas(corners).into_iter().fold(0.0, f64::max)
 }
 
-/// 3 r_in / r_circum, with r_in = 3 V / ΣA and 24 V r_circum = √(product of Heron's form over the
-/// products of opposite edges).
+/// The radius ratio 3 r_in / r_circum.
+///
+/// r_in = 3 V / ΣA, and 24 V r_circum = √(product of Heron's form over the products of opposite
+/// edges).
 pub fn radius_ratio(corners: [DVec3; 4]) -> f64 {
     let v = volume(corners).abs();
     let length = |i: usize, j: usize| corners[i].distance(corners[j]);

@@ -1,14 +1,14 @@
-//! The border of a tetrahedral mesh as triangles over the same nodes.
+//! The boundary of a tetrahedral mesh as triangles over the same nodes.
 //!
 //! # Theory
-//! A face with one tetrahedron is on the border. Seen from outside its corners run
-//! counterclockwise. The border is a closed surface without seams when every edge belongs to
-//! exactly two triangles that run through it in opposite directions.
+//! A face with one tetrahedron is on the boundary. Seen from outside its corners run
+//! counterclockwise. The boundary is closed if every edge belongs to exactly two triangles that
+//! traverse it in opposite directions.
 
 use crate::{FACES, NONE, TetMesh, Topology, TriMesh};
 use trepan_geometry::Vec3;
 
-/// Border triangles of a [`TetMesh`], ordered by tetrahedron and face.
+/// Boundary triangles of a [`TetMesh`], ordered by tetrahedron and face.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Surface {
     /// Node indices of the mesh, counterclockwise from outside.
@@ -18,12 +18,12 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The border of a mesh whose indices are in range.
+    /// The boundary of a mesh whose indices are in range.
     pub fn of(mesh: &TetMesh) -> Self {
         Self::with(mesh, &Topology::of(mesh))
     }
 
-    /// The border, when the topology is already there.
+    /// The boundary, from an existing topology.
     pub fn with(mesh: &TetMesh, topology: &Topology) -> Self {
         let mut surface = Self::default();
         for (tet, neighbours) in topology.neighbours.iter().enumerate() {
@@ -35,7 +35,7 @@ impl Surface {
         surface
     }
 
-    /// Whether every edge has exactly two triangles, in opposite directions; not so for an empty
+    /// Whether every edge has exactly two triangles, in opposite directions; false for an empty
     /// surface.
     pub fn is_closed(&self) -> bool {
         crate::triangles::is_closed(&self.triangles)
@@ -58,8 +58,8 @@ impl Surface {
         self.triangles.iter().map(area).sum()
     }
 
-    /// Unit outward normal of every node of the mesh at the given positions: its triangles' normals
-    /// weighted by area; zero off the surface.
+    /// Unit outward normal of every node of the mesh, area-weighted over its triangles; zero for
+    /// interior nodes.
     pub fn node_normals(&self, positions: &[Vec3]) -> Vec<Vec3> {
         let mut normals = vec![Vec3::ZERO; positions.len()];
         for triangle in &self.triangles {
@@ -70,7 +70,7 @@ impl Surface {
         normals.into_iter().map(Vec3::normalize_or_zero).collect()
     }
 
-    /// The surface alone, with its own numbering of the nodes (ascending in the old one).
+    /// The surface as a separate mesh with its own node numbering (in the same order).
     pub fn to_tri_mesh(&self, positions: &[Vec3]) -> TriMesh {
         let nodes = self.nodes();
         let renumber = |n: u32| nodes.partition_point(|&m| m < n) as u32;

@@ -6,7 +6,7 @@ use trepan_geometry::{Aabb, Vec3};
 /// orphan node.
 ///
 /// A tetrahedron `[a, b, c, d]` has positive volume when `(b - a) × (c - a) · (d - a) > 0`; its
-/// faces, seen from outside counterclockwise, are `(a,c,b) (a,b,d) (b,c,d) (a,d,c)`.
+/// faces, counterclockwise from outside, are `(a,c,b) (a,b,d) (b,c,d) (a,d,c)`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TetMesh {
     /// Vertices, world mm.
@@ -15,10 +15,10 @@ pub struct TetMesh {
     pub tets: Vec<[u32; 4]>,
 }
 
-/// The faces of a tetrahedron as corner numbers, counterclockwise from outside; face f lies
-/// opposite corner `OPPOSITE[f]`.
+/// The faces of a tetrahedron as corner numbers, counterclockwise from outside; face f is opposite
+/// corner `OPPOSITE[f]`.
 pub const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
-/// The corner that each of [`FACES`] leaves out.
+/// The corner opposite each of [`FACES`].
 pub const OPPOSITE: [usize; 4] = [3, 2, 0, 1];
 
 impl TetMesh {

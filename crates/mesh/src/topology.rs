@@ -1,30 +1,30 @@
-//! Which tetrahedra touch which: across faces, and around nodes.
+//! Adjacency of tetrahedra: across faces and around nodes.
 //!
 //! # Theory
-//! A face is the set of its three nodes. Faces with the same smallest node are put in one bucket
-//! and sorted there; equal ones are neighbours. No hash map, so the result depends on the mesh
-//! alone.
+//! A face is the set of its three nodes. Faces with the same smallest node are collected in one
+//! bucket and sorted there; equal ones are neighbours. Without a hash map the result depends on the
+//! mesh alone.
 //!
 //! # Practice
-//! 16 bytes a tetrahedron for neighbours, as many for the tetrahedra of nodes. Built once for a
-//! mesh; deformation leaves it valid. Indices must be in range ([`TetMesh::check_indices`]).
+//! 16 bytes per tetrahedron for neighbours, and as many for the tetrahedra of nodes. Built once per
+//! mesh; deformation keeps it valid. Indices must be in range ([`TetMesh::check_indices`]).
 
 use crate::{FACES, TetMesh};
 
-/// No neighbour: the face lies on the border.
+/// No neighbour: the face is on the boundary.
 pub const NONE: u32 = u32::MAX;
 
-/// Lists of u32, one for each row, packed: row r is `items[starts[r]..starts[r + 1]]`.
+/// A compressed list of u32 rows: row r is `items[starts[r]..starts[r + 1]]`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Csr {
-    /// Where each row starts, and one entry more.
+    /// Start of each row, and one extra entry.
     pub starts: Vec<u32>,
-    /// The rows one after another.
+    /// The items of all rows.
     pub items: Vec<u32>,
 }
 
 impl Csr {
-    /// Sorts `(row, item)` pairs into `rows` rows; inside a row the order of the pairs stays.
+    /// Sorts `(row, item)` pairs into `rows` rows, keeping their order within a row.
     pub fn of_pairs(rows: usize, pairs: impl Iterator<Item = (u32, u32)> + Clone) -> Self {
         let mut starts = vec![0u32; rows + 1];
         pairs.clone().for_each(|(row, _)| starts[row as usize + 1] += 1);
@@ -40,30 +40,30 @@ impl Csr {
         Self { starts, items }
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Whether there is no row.
+    /// Whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// One row.
+    /// The items of a row.
     pub fn row(&self, row: usize) -> &[u32] {
         &self.items[self.starts[row] as usize..self.starts[row + 1] as usize]
     }
 }
 
-/// How the tetrahedra of a mesh hang together.
+/// Adjacency of the tetrahedra of a mesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Topology {
-    /// The tetrahedron across each face, in the order of [`FACES`]; [`NONE`] at the border.
+    /// The tetrahedron across each face, in the order of [`FACES`]; [`NONE`] at the boundary.
     pub neighbours: Vec<[u32; 4]>,
     /// The tetrahedra around each node, ascending.
     pub tets_of_node: Csr,
-    /// A tetrahedron with a face that more than two share; such a face links only the first two.
+    /// A tetrahedron with a face shared by more than two; such a face links only the first two.
     pub crowded_face: Option<u32>,
 }
 
@@ -77,8 +77,8 @@ impl Topology {
         Self { neighbours, tets_of_node, crowded_face }
     }
 
-    /// The number of the face-connected part that each tetrahedron belongs to, and how many parts
-    /// there are; part 0 holds tetrahedron 0.
+    /// Index of each tetrahedron's face-connected part, and the number of parts; part 0 contains
+    /// tetrahedron 0.
     pub fn components(&self) -> (Vec<u32>, usize) {
         let mut part = vec![NONE; self.neighbours.len()];
         let mut parts = 0;
@@ -102,8 +102,8 @@ impl Topology {
         (part, parts as usize)
     }
 
-    /// The tetrahedra at most `rings` faces away from `tet`, itself first, then ring by ring, each
-    /// ring ascending.
+    /// The tetrahedra at most `rings` faces away from `tet`: itself first, then ring by ring, each
+    /// ascending.
     pub fn rings(&self, tet: u32, rings: usize) -> Vec<u32> {
         let mut found = vec![tet];
         let mut ring_start = 0;
@@ -120,7 +120,7 @@ impl Topology {
     }
 }
 
-/// A face by its nodes in ascending order, and where it comes from.
+/// A face: its nodes in ascending order, and its tetrahedron and local index.
 type Face = ([u32; 3], u32, u32);
 
 fn link_faces(mesh: &TetMesh) -> (Vec<[u32; 4]>, Option<u32>) {
@@ -162,7 +162,7 @@ mod tests {
     use super::*;
     use trepan_geometry::Vec3;
 
-    /// Two tetrahedra on one face and one apart.
+    /// Two tetrahedra that share a face, and a separate one.
     fn pair_and_one() -> TetMesh {
         let mut positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
         positions.extend([5.0, 6.0].map(|x| Vec3::new(x, 0.0, 0.0)));

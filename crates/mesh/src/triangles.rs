@@ -2,7 +2,7 @@
 
 use trepan_geometry::{Aabb, Vec3};
 
-/// Vertices and triangles; a closed one is counterclockwise seen from outside.
+/// Vertices and triangles; a closed mesh is counterclockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
     /// Vertices, world mm.
@@ -17,8 +17,8 @@ impl TriMesh {
         self.triangles[triangle].map(|n| self.positions[n as usize])
     }
 
-    /// The volume that a closed mesh encloses, mm³ (divergence theorem: Σ a · (b × c) / 6);
-    /// negative when it is inside out.
+    /// The volume enclosed by a closed mesh, mm³ (divergence theorem: Σ a · (b × c) / 6); negative
+    /// if inside out.
     pub fn volume_mm3(&self) -> f64 {
         let origin = self.positions.first().map_or(glam::DVec3::ZERO, |p| p.as_dvec3());
         let six = |t: usize| {
@@ -28,7 +28,7 @@ impl TriMesh {
         (0..self.triangles.len()).map(six).sum::<f64>() / 6.0
     }
 
-    /// Whether every edge has exactly two triangles, in opposite directions; not so for an empty
+    /// Whether every edge has exactly two triangles, in opposite directions; false for an empty
     /// mesh.
     pub fn is_closed(&self) -> bool {
         is_closed(&self.triangles)
@@ -39,8 +39,8 @@ impl TriMesh {
         Aabb::of_points(&self.positions)
     }
 
-    /// Vertices at exactly the same place become one; triangles that this makes degenerate go. For
-    /// formats without shared vertices (STL).
+    /// Merges vertices at exactly the same position and removes triangles that become degenerate.
+    /// For formats without shared vertices (STL).
     pub fn welded(&self) -> Self {
         let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
         let mut order: Vec<u32> = (0..self.positions.len() as u32).collect();

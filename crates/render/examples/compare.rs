@@ -1,5 +1,4 @@
-//! Who draws faster, the device or the processor, and how far are their pictures apart?
-//! `compare [CT [WIDTH HEIGHT]]`.
+//! Compares speed and pictures of device and processor: `compare [CT [WIDTH HEIGHT]]`.
 
 use glam::Vec3;
 use std::path::Path;
@@ -53,7 +52,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// How far two sets of hits are apart.
+/// The difference between two sets of hits, as text.
 fn apart(a: &[Option<Hit>], b: &[Option<Hit>]) -> String {
     let both = a.iter().zip(b).filter_map(|(a, b)| Some((a.as_ref()?.distance_mm - b.as_ref()?.distance_mm).abs()));
     let mut depths: Vec<f32> = both.collect();
@@ -69,7 +68,7 @@ fn from_file(path: &Path) -> Result<VoxelVolume<i16>, Box<dyn std::error::Error>
     Ok(fine.map(|v| v as i16))
 }
 
-/// A shell of bone with waves on it.
+/// A synthetic shell of bone with waves on it.
 fn made_up() -> VoxelVolume<i16> {
     let mut ct = VoxelVolume::isotropic([160; 3], Vec3::splat(-79.5), 1.0, AIR_HU);
     for at in 0..ct.data.len() {

@@ -1,5 +1,5 @@
-//! Draws a skull with a hole in it to a PNG: `picture OUT.png [CT [BRAIN_MASK [MRI]]]`, NIfTI
-//! files; without a CT, a made-up one.
+//! Draws a drilled skull to a PNG: `picture OUT.png [CT [BRAIN_MASK [MRI]]]`, NIfTI files; without
+//! a CT, a synthetic one.
 
 use glam::{DAffine3, Vec3};
 use std::path::Path;
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Takes a ball of bone away where the ray from outside meets the skull; returns its middle.
+/// Removes a ball of bone where the ray from outside hits the skull; returns its centre.
 fn drill(bone: &BoneVolume, outwards: Vec3, radius_mm: f32) -> Vec3 {
     let middle = bone.bounds().centre() + 10.0 * Vec3::Z;
     let way = (0..4000).map(|i| middle + outwards * (200.0 - 0.1 * i as f32));
@@ -66,7 +66,7 @@ fn from_file(path: &Path) -> Result<VoxelVolume<i16>, Box<dyn std::error::Error>
     Ok(fine.map(|v| v as i16))
 }
 
-/// A shell of bone, 7 mm thick.
+/// A synthetic shell of bone, 7 mm thick.
 fn made_up() -> VoxelVolume<i16> {
     let mut ct = VoxelVolume::isotropic([120, 140, 120], Vec3::new(-89.25, -104.25, -89.25), 1.5, AIR_HU);
     let world_from_voxel: DAffine3 = ct.world_from_voxel;

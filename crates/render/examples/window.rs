@@ -1,5 +1,4 @@
-//! A ball of bone to drill with the mouse in a window: `window [SECONDS [processor]]`; without a
-//! display it says so.
+//! A ball of bone to drill with the mouse in a window: `window [SECONDS [processor]]`.
 
 use glam::{DVec3, IVec3, Vec3};
 use std::sync::Arc;
@@ -9,7 +8,7 @@ use trepan_render::window::{self, Capture, Panel, Session, Start, WindowInput};
 use trepan_render::{Camera, Frame, Image, Painter, SceneData};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
-/// Takes away what the burr touches while the pedal is down.
+/// Removes the voxels that the burr touches while the pedal is down.
 struct Drill {
     bone: Arc<BoneVolume>,
     world_from_tool: Pose,

@@ -1,11 +1,11 @@
-//! Brings both eyes' views into one picture for red-cyan glasses.
+//! Combines both eyes' views into one picture for red-cyan glasses.
 
 use crate::RenderError;
 use crate::enlarge::fill;
 use crate::scene::Scene;
 use trepan_gpu::{Bindings, Buffer, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Texture, Topology};
 
-/// The pass.
+/// The render pass.
 #[derive(Debug)]
 pub(crate) struct Anaglyph {
     pipeline: Pipeline,

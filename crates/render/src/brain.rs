@@ -1,9 +1,8 @@
-//! The brain's pass: the border of the tetrahedra where the physics has put it, with smooth
-//! normals.
+//! The brain pass: the boundary of the deformed tetrahedra with smooth normals.
 //!
 //! # Practice
-//! Only border nodes travel to the device, 32 bytes each a frame. Normals are the area-weighted
-//! mean of a node's triangles, made on the processor.
+//! Only boundary nodes are uploaded, 32 bytes each per frame. Normals are the area-weighted mean
+//! over a node's triangles, computed on the processor.
 
 use crate::RenderError;
 use crate::scene::Scene;
@@ -11,7 +10,7 @@ use glam::{Vec3, Vec4};
 use trepan_gpu::{Bindings, Buffer, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
 use trepan_mesh::{Surface, TetMesh};
 
-/// The brain's border on the device.
+/// The brain's boundary on the device.
 #[derive(Debug)]
 pub(crate) struct Brain {
     pub border: Border,
@@ -19,22 +18,22 @@ pub(crate) struct Brain {
     pipeline: Pipeline,
 }
 
-/// The tetrahedra and their border, as they move.
+/// The tetrahedra and their boundary, current and at rest.
 #[derive(Clone, Debug)]
 pub(crate) struct Border {
-    /// Border nodes, as indices of the mesh.
+    /// Boundary nodes, as indices of the mesh.
     nodes: Vec<u32>,
     /// Triangles over `nodes`.
     pub triangles: Vec<[u32; 3]>,
-    /// The tetrahedra behind the border, over all nodes.
+    /// The tetrahedra inside the boundary, over all nodes.
     pub tets: Vec<[u32; 4]>,
     /// All nodes at rest, world mm.
     pub rest: Vec<Vec3>,
-    /// All nodes now, world mm.
+    /// All current nodes, world mm.
     pub now: Vec<Vec3>,
-    /// Border nodes now, world mm.
+    /// Current boundary nodes, world mm.
     pub places: Vec<Vec3>,
-    /// Unit normals of border nodes now.
+    /// Current unit normals of boundary nodes.
     pub normals: Vec<Vec3>,
 }
 
@@ -50,7 +49,7 @@ impl Border {
     pub fn of(mesh: &TetMesh) -> Self {
         let surface = Surface::of(mesh);
         let nodes = surface.nodes();
-        // Every corner is in the sorted list of nodes that was made from the corners.
+        // Every corner is in the sorted node list, which was made from the corners.
         let local = |n: u32| nodes.partition_point(|&m| m < n) as u32;
         let triangles: Vec<[u32; 3]> = surface.triangles.iter().map(|t| t.map(local)).collect();
         let places: Vec<Vec3> = nodes.iter().map(|&n| mesh.positions[n as usize]).collect();
@@ -59,7 +58,7 @@ impl Border {
         Self { nodes, triangles, tets: mesh.tets.clone(), rest, now, places, normals }
     }
 
-    /// Moves the border to where the nodes of the whole mesh are, or back to rest.
+    /// Updates the boundary from the mesh's nodes, or resets it to rest.
     pub fn follow(&mut self, positions: Option<&[Vec3]>) -> Result<(), RenderError> {
         let positions = positions.unwrap_or(&self.rest);
         let (given, wanted) = (positions.len(), self.rest.len());
@@ -72,12 +71,12 @@ impl Border {
         Ok(())
     }
 
-    /// Where a border node is at rest, world mm.
+    /// Rest position of a boundary node, world mm.
     pub fn at_rest(&self, node: u32) -> Vec3 {
         self.rest[self.nodes[node as usize] as usize]
     }
 
-    /// The triangles of the border as they are now.
+    /// The current boundary triangles.
     pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + Clone + '_ {
         self.triangles.iter().map(|t| t.map(|n| self.places[n as usize]))
     }
@@ -109,7 +108,7 @@ impl Brain {
         Ok(Self { border, device, pipeline })
     }
 
-    /// Moves the border to where the nodes of the whole mesh are, or back to rest.
+    /// Updates the boundary from the mesh's nodes, or resets it to rest.
     pub fn follow(&mut self, gpu: &Gpu, positions: Option<&[Vec3]>) -> Result<(), RenderError> {
         self.border.follow(positions)?;
         self.device.places.write(gpu, 0, &wide(&self.border.places));
@@ -124,7 +123,7 @@ impl Brain {
         Ok(self.pipeline.bind(gpu, &all)?)
     }
 
-    /// Draws the border's triangles.
+    /// Draws the boundary triangles.
     pub fn draw(&self, draws: &mut Draws, bindings: &Bindings) {
         draws.draw(&self.pipeline, bindings, 3 * self.border.triangles.len() as u32);
     }
@@ -134,7 +133,7 @@ fn wide(vectors: &[Vec3]) -> Vec<Vec4> {
     vectors.iter().map(|v| v.extend(1.0)).collect()
 }
 
-/// Area-weighted mean of the triangles' normals at every node; zero where all cancel.
+/// Area-weighted mean of the triangle normals at every node; zero where they cancel.
 fn smooth_normals(places: &[Vec3], triangles: &[[u32; 3]], normals: &mut [Vec3]) {
     normals.fill(Vec3::ZERO);
     for corners in triangles {

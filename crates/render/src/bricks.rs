@@ -1,16 +1,16 @@
-//! Where bone may be: the padded grid, its bricks, and how far a ray may leap.
+//! Empty-space skipping: the padded grid, its bricks, and the free distance from each brick.
 //!
 //! # Theory
-//! The grid is padded by one voxel of air, so that bone at the border has a surface too. Cell (i,
-//! j, k) lies between the centres of padded voxels (i, j, k) and (i+1, j+1, k+1). A brick is 4³
+//! The grid is padded by one voxel of air, so that bone at the border has a closed surface. Cell
+//! (i, j, k) lies between the centres of padded voxels (i, j, k) and (i+1, j+1, k+1). A brick is 4³
 //! cells. Where no corner of a brick's cells reaches the isovalue, no ray can enter bone. Free
-//! bricks hold, for each octant of directions, the distance to the nearest other one that lies that
-//! way, in bricks, the largest of the three axes counting (Cohen and Sheffer 1994): one behind a
-//! ray holds it up no more. Where bone may be, each cell has a bit of its own.
+//! bricks store, for each octant of directions, the chessboard distance in bricks to the nearest
+//! non-free brick in that octant (Cohen and Sheffer 1994), so that bricks behind a ray do not limit
+//! it. In other bricks each cell has an occupancy bit.
 //!
 //! # Practice
-//! 17 bytes a brick of 64 cells. Drilling only makes bricks free; bricks that get bone back (an
-//! undo) make the distances anew, which costs about 0.1 µs a brick.
+//! 17 bytes a brick of 64 cells. Drilling only frees bricks; when bricks regain bone (an undo) the
+//! distances are recomputed, at about 0.1 µs a brick.
 
 use glam::{IVec3, Vec3};
 use trepan_geometry::Aabb;
@@ -19,7 +19,7 @@ use trepan_volume::{AIR_HU, BRICK, BoneVolume};
 /// Edge of a brick of cells; `BRICK` in `bricks.wgsl`. Divides the bone's own brick.
 pub(crate) const LEAP: usize = 4;
 
-/// Edge of a block whose share of bone is kept for ambient light, in voxels.
+/// Edge of a block whose bone fraction is stored for ambient light, in voxels.
 pub(crate) const BLOCK: usize = 4;
 
 /// The padded grid of a bone volume.
@@ -31,25 +31,25 @@ pub(crate) struct Grid {
     pub origin: Vec3,
     /// Edge of a voxel, mm.
     pub spacing_mm: f32,
-    /// Bone is at or over this, HU.
+    /// Isovalue of bone, HU.
     pub isovalue: i16,
 }
 
-/// How far a ray may leap from each brick.
+/// Free distances from each brick.
 #[derive(Clone, Debug)]
 pub(crate) struct Leaps {
     /// Bricks of cells along x, y, z.
     pub bricks: [usize; 3],
-    /// By octant (bit n is set where the ray goes up along axis n): 0 where bone may be, else the
-    /// distance to the nearest such brick that way, at most 255.
+    /// Free distance per octant, at most 255; 0 where bone may be.
+    /// Bit n of the octant is set where the ray ascends along axis n.
     pub octants: Vec<[u8; 8]>,
-    /// The cells with a corner in bone, x fastest.
+    /// Occupancy bits of the cells with a corner in bone, x fastest.
     pub cells: Vec<u64>,
     stale: bool,
 }
 
 impl Grid {
-    /// The grid of a bone; without any, eight voxels of air.
+    /// The grid of a bone volume; without bone, eight voxels of air.
     pub fn of(bone: Option<&BoneVolume>) -> Self {
         let Some(bone) = bone else {
             return Self { dims: [2; 3], origin: Vec3::ZERO, spacing_mm: 1.0, isovalue: i16::MAX };
@@ -73,7 +73,7 @@ impl Grid {
         (first, [0, 1, 2].map(|a| BRICK.min(self.dims[a] - 1 - first[a])))
     }
 
-    /// World box that a change of a brick of voxels may change the surface in, mm.
+    /// World box in which a change of a brick of voxels may change the surface, mm.
     pub fn box_of(&self, brick: [usize; 3]) -> Aabb {
         let (first, size) = self.voxels_of(brick);
         let corner = |voxel: [usize; 3]| self.origin + self.spacing_mm * Vec3::from(voxel.map(|v| v as f32));
@@ -88,14 +88,14 @@ impl Grid {
         boxed(low, high, self.blocks())
     }
 
-    /// Shares of bone of all blocks, x fastest.
+    /// Bone fractions of all blocks, x fastest.
     pub fn shares(&self, bone: Option<&BoneVolume>) -> Vec<u8> {
         let [bx, by, bz] = self.blocks();
         let Some(bone) = bone else { return vec![0; bx * by * bz] };
         (0..bx * by * bz).map(|at| self.share(bone, [at % bx, at / bx % by, at / (bx * by)])).collect()
     }
 
-    /// Share of bone in a block, 0 to 255.
+    /// Bone fraction of a block, 0 to 255.
     pub fn share(&self, bone: &BoneVolume, block: [usize; 3]) -> u8 {
         let count = corners(block.map(|b| b * BLOCK), BLOCK).filter(|&v| bone.is_bone(v - 1)).count();
         (count * 255 / BLOCK.pow(3)) as u8
@@ -109,7 +109,7 @@ pub(crate) fn corners(first: [usize; 3], edge: usize) -> impl Iterator<Item = IV
     (0..edge).flat_map(move |k| (0..edge).flat_map(move |j| (0..edge).map(move |i| IVec3::new(x + i, y + j, z + k))))
 }
 
-/// All places from `low` to `high`, both taken, that lie inside `dims`.
+/// All indices from `low` to `high`, inclusive, that lie inside `dims`.
 fn boxed(low: [usize; 3], high: [usize; 3], dims: [usize; 3]) -> Vec<[usize; 3]> {
     let high = [0, 1, 2].map(|a| high[a].min(dims[a] - 1));
     let rows = (low[2]..=high[2]).flat_map(|z| (low[1]..=high[1]).map(move |y| (y, z)));
@@ -133,19 +133,18 @@ impl Leaps {
         [at % self.bricks[0], at / self.bricks[0] % self.bricks[1], at / (self.bricks[0] * self.bricks[1])]
     }
 
-    /// Position of a brick in the lists.
+    /// Index of a brick in the lists.
     pub fn index(&self, [x, y, z]: [usize; 3]) -> usize {
         x + self.bricks[0] * (y + self.bricks[1] * z)
     }
 
-    /// The distance to the nearest brick that may hold bone, whichever way it lies; 0 where bone
-    /// may be.
+    /// Distance to the nearest brick that may hold bone, in any direction; 0 where bone may be.
     pub fn free(&self, at: usize) -> u8 {
         self.octants[at].into_iter().fold(u8::MAX, u8::min)
     }
 
-    /// Looks again at the bricks of cells that touch a brick of voxels, and returns them. Rays wait
-    /// for [`settle`](Self::settle).
+    /// Updates the bricks of cells that touch a brick of voxels, and returns them. Call
+    /// [`settle`](Self::settle) before casting rays.
     pub fn follow(&mut self, bone: &BoneVolume, brick: [usize; 3]) -> Vec<[usize; 3]> {
         let low = brick.map(|b| b * (BRICK / LEAP));
         let touched = boxed(low, low.map(|v| v + BRICK / LEAP), self.bricks);
@@ -162,7 +161,7 @@ impl Leaps {
         touched
     }
 
-    /// Makes the distances anew if bone has come to free bricks. Whether it did.
+    /// Recomputes the distances if free bricks regained bone; returns whether they did.
     pub fn settle(&mut self) -> bool {
         if std::mem::take(&mut self.stale) {
             (0..8).for_each(|octant| self.spread(octant));
@@ -171,8 +170,8 @@ impl Leaps {
         false
     }
 
-    /// The distances of an octant, from its far corner back: one more than the least of the seven
-    /// neighbours that lie that way; exact for this measure.
+    /// Distances of an octant, from its far corner back: one more than the minimum of the seven
+    /// neighbours in that octant. Exact for the chessboard distance.
     fn spread(&mut self, octant: usize) {
         let [nx, ny, nz] = self.bricks;
         let strides = [1, nx, nx * ny];
@@ -195,7 +194,7 @@ impl Leaps {
     }
 }
 
-/// The cells of a brick with a corner that reaches the isovalue, a bit each, x fastest.
+/// Occupancy bits of the cells of a brick with a corner at the isovalue, x fastest.
 fn promising(bone: &BoneVolume, brick: [usize; 3]) -> u64 {
     const EDGE: usize = LEAP + 1;
     let mut corner = [false; EDGE * EDGE * EDGE];
@@ -213,7 +212,7 @@ fn promising(bone: &BoneVolume, brick: [usize; 3]) -> u64 {
     (0..LEAP.pow(3)).fold(0, |bits, cell| bits | u64::from(holds(cell)) << cell)
 }
 
-/// Densities of the padded box of `size` voxels from `first`, x fastest, by the given conversion.
+/// Converts the densities of the padded box of `size` voxels from `first`, x fastest.
 pub(crate) fn densities<T>(
     bone: Option<&BoneVolume>,
     first: [usize; 3],
@@ -279,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn leaps_are_the_distance_to_the_nearest_bone_and_stay_safe_while_it_changes() {
+    fn free_distances_reach_the_nearest_bone_and_stay_valid_while_it_changes() {
         let bone = bone_at([70, 40, 50], &[[3, 3, 2], [60, 20, 46]]);
         let grid = Grid::of(Some(&bone));
         let mut leaps = Leaps::of(Some(&bone), &grid);

@@ -1,24 +1,24 @@
-//! A camera that circles a target.
+//! A camera that orbits a target.
 //!
 //! # Practice
-//! World mm, z up. Elevation stops just short of the poles, so up is always defined. `viewed_from`
-//! puts the eye along a direction: seen from in front, the patient's right is on the left of the
-//! picture.
+//! World mm, z up. Elevation stops just short of the poles, so that up is always defined.
+//! `viewed_from` places the eye along a direction: seen from the front, the patient's right is on
+//! the left of the picture.
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
-/// Where the eye is and what it looks at.
+/// The position of the eye and its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// The point in the middle of the picture, world mm.
+    /// The point at the centre of the picture, world mm.
     pub target: Vec3,
-    /// Turn of the eye around z, from +x towards +y, rad.
+    /// Azimuth of the eye around z, from +x towards +y, rad.
     pub azimuth_rad: f32,
-    /// Height of the eye over the target's horizon, rad.
+    /// Elevation of the eye over the target's horizon, rad.
     pub elevation_rad: f32,
-    /// From the target to the eye, mm.
+    /// Distance from the target to the eye, mm.
     pub distance_mm: f32,
-    /// Opening angle from the lower to the upper edge, rad.
+    /// Vertical field of view, rad.
     pub fov_rad: f32,
 }
 
@@ -35,8 +35,7 @@ pub struct View {
     pub forward: Vec3,
     /// Half the picture's width and height at distance 1.
     pub half: Vec2,
-    /// How far the picture's middle lies to the left of straight ahead at distance 1: 0 but for one
-    /// eye of two.
+    /// Offset of the picture's centre to the left at distance 1; nonzero only for one eye of two.
     pub shear: f32,
 }
 
@@ -44,7 +43,7 @@ const STEEPEST_RAD: f32 = 1.55;
 
 impl Camera {
     /// An eye at `distance_mm` from `target` in the direction `towards_eye` (any length; zero means
-    /// from in front).
+    /// from the front).
     pub fn viewed_from(target: Vec3, towards_eye: Vec3, distance_mm: f32) -> Self {
         let d = towards_eye.try_normalize().unwrap_or(Vec3::Y);
         let azimuth_rad = if d.x.hypot(d.y) < 1e-4 { core::f32::consts::FRAC_PI_2 } else { d.y.atan2(d.x) };
@@ -52,18 +51,18 @@ impl Camera {
         Self { target, azimuth_rad, elevation_rad, distance_mm, fov_rad: 0.6 }
     }
 
-    /// Turns around the target, rad; to the right and upwards.
+    /// Rotates around the target, rad; to the right and upwards.
     pub fn orbit(&mut self, azimuth_rad: f32, elevation_rad: f32) {
         self.azimuth_rad = (self.azimuth_rad + azimuth_rad) % core::f32::consts::TAU;
         self.elevation_rad = (self.elevation_rad + elevation_rad).clamp(-STEEPEST_RAD, STEEPEST_RAD);
     }
 
-    /// Goes nearer (factor under 1) or farther, between 2 mm and 5 m.
+    /// Scales the distance by `factor`, limited to 2 mm and 5 m.
     pub fn zoom(&mut self, factor: f32) {
         self.distance_mm = (self.distance_mm * factor).clamp(2.0, 5000.0);
     }
 
-    /// The camera as vectors, for a picture of some width over height.
+    /// The camera as vectors, for an aspect ratio (width over height).
     pub fn view(&self, aspect: f32) -> View {
         let elevation = self.elevation_rad.clamp(-STEEPEST_RAD, STEEPEST_RAD);
         let ring = elevation.cos();
@@ -82,18 +81,18 @@ impl Camera {
 }
 
 impl View {
-    /// Nearest distance that triangles are drawn at, mm.
+    /// Near clipping distance of triangles, mm.
     pub const NEAR_MM: f32 = 0.5;
-    /// Farthest distance that triangles are drawn at, mm.
+    /// Far clipping distance of triangles, mm.
     pub const FAR_MM: f32 = 6000.0;
 
-    /// The same picture from an eye `offset_mm` to the right: what is `distance_mm` away stays
-    /// where it is (an off-axis frustum, without the keystones of turned eyes).
+    /// The view from an eye `offset_mm` to the right, with zero parallax at `distance_mm`: an
+    /// off-axis frustum without keystone distortion.
     pub fn from_aside(&self, offset_mm: f32, distance_mm: f32) -> Self {
         Self { eye: self.eye + offset_mm * self.right, shear: offset_mm / distance_mm.max(Self::NEAR_MM), ..*self }
     }
 
-    /// Towards the picture's middle; 1 long along `forward`.
+    /// Direction of the picture's centre; length 1 along `forward`.
     pub(crate) fn middle(&self) -> Vec3 {
         self.forward - self.shear * self.right
     }
@@ -104,7 +103,7 @@ impl View {
         (self.middle() + at.x * self.half.x * self.right + at.y * self.half.y * self.up).normalize()
     }
 
-    /// Where a world point is in the picture, from -1 to 1, and its depth along `forward`, mm.
+    /// Picture coordinates of a world point, from -1 to 1, and its depth along `forward`, mm.
     pub fn project(&self, point: Vec3) -> (Vec2, f32) {
         let from = point - self.eye;
         let depth = from.dot(self.forward);
@@ -112,7 +111,7 @@ impl View {
         (Vec2::new(across, from.dot(self.up)) / (self.half * depth), depth)
     }
 
-    /// The same as a matrix for drawing triangles.
+    /// The projection matrix for triangles.
     pub fn clip_from_world(&self) -> Mat4 {
         let aspect = self.half.x / self.half.y;
         let clip_from_eye =

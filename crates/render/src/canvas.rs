@@ -1,4 +1,4 @@
-//! The textures that one size of picture needs, bound to the passes.
+//! The textures for one picture size, bound to the passes.
 
 use crate::RenderError;
 use crate::anaglyph::Anaglyph;
@@ -17,16 +17,16 @@ use crate::slice::Slices;
 use crate::stereo::StereoLook;
 use trepan_gpu::{Bindings, Buffer, Format, Gpu, Texture, TextureSpec};
 
-/// What the passes share.
+/// Resources shared by the passes.
 #[derive(Debug)]
 pub(crate) struct Passes {
-    /// What each eye knows.
+    /// Scene uniform of each eye.
     pub scenes: [Buffer<Scene>; 2],
     pub skull: Skull,
-    /// The border, and where it is cut open.
+    /// The boundary surface and the cut surface.
     pub brain: Option<(Brain, Face)>,
     pub mri: Mri,
-    /// Paint over bone and over the brain.
+    /// Paint on bone and on the brain.
     pub coats: [Coat; 2],
     pub light: Light,
     pub overlay: Shapes,
@@ -35,16 +35,16 @@ pub(crate) struct Passes {
     pub slices: Slices,
 }
 
-/// How the picture is divided.
+/// Division of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Division {
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
-    /// Whether slices are wanted.
+    /// Whether slices are shown.
     pub slices: bool,
-    /// Share of the 3-D view's pixels along an edge that are drawn.
+    /// Fraction of the 3-D view's pixels along an edge that are drawn.
     pub detail: f32,
-    /// How two eyes share the 3-D view, if two look.
+    /// Layout of two eyes in the 3-D view, if stereo.
     pub stereo: Option<StereoLook>,
 }
 
@@ -54,12 +54,12 @@ pub(crate) struct Canvas {
     pub division: Division,
     pub layout: Layout,
     pub picture: Texture,
-    /// One, or the left and the right.
+    /// One eye, or the left and the right.
     pub eyes: Vec<Eye>,
-    /// Of both eyes' views, where they come into one.
+    /// Both eyes' views, for an anaglyph.
     pub anaglyph: Option<Bindings>,
     pub slices: [Bindings; 3],
-    /// Places at rest of the brain's cuts, the slices one below the other.
+    /// Rest positions on the brain's cuts, the slices one below the other.
     pub section: Texture,
 }
 

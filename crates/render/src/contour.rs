@@ -8,10 +8,10 @@ use trepan_gpu::{
     Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
 };
 
-/// Lines that one slice may need; a slice of a brain of 100,000 border triangles needs about 2,000.
+/// Largest number of lines of one slice; a brain of 100,000 boundary triangles needs about 2,000.
 const MOST_LINES: usize = 16_384;
 
-/// The pass for three slices.
+/// The render pass for three slices.
 #[derive(Debug)]
 pub(crate) struct Contour {
     pipeline: Pipeline,
@@ -42,7 +42,7 @@ impl Contour {
         Ok(Self { pipeline, ends, bindings, counts: [0; 3], lines: Vec::with_capacity(2 * MOST_LINES) })
     }
 
-    /// Cuts the triangles by three planes. Returns the lines that found no room.
+    /// Cuts the triangles by three planes; returns the number of lines over the limit.
     pub fn follow(
         &mut self,
         gpu: &Gpu,

@@ -1,13 +1,13 @@
-//! A plane that cuts the brain open and shows the MRI inside, as it has moved.
+//! A plane that cuts the brain and shows the deformed MRI on the cut.
 //!
 //! # Theory
-//! The plane meets the deformed tetrahedra in triangles and quadrilaterals whose corners know their
-//! place at rest, and with it the MRI: within a tetrahedron the deformation is linear, so what lies
-//! between the corners is exact (Tejada and Ertl 2005 do the same along rays).
+//! The plane cuts the deformed tetrahedra in triangles and quadrilaterals with known rest
+//! positions, and so MRI values. Within a tetrahedron the deformation is linear, so that
+//! interpolation between the corners is exact (Tejada and Ertl 2005 do the same along rays).
 //!
 //! # Practice
-//! World mm. All tetrahedra are looked at once a picture; what finds no room is counted in the
-//! picture's report.
+//! World mm. All tetrahedra are tested once per picture; triangles over the limit are counted in
+//! the picture's report.
 
 use crate::RenderError;
 use crate::brain::Border;
@@ -16,35 +16,34 @@ use crate::section;
 use glam::{Vec3, Vec4};
 use trepan_gpu::{Bindings, Buffer, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
 
-/// A plane; what lies on the side that its normal points to is cut away.
+/// A cutting plane; the side that its normal points to is removed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {
     /// A point of the plane, world mm.
     pub point: Vec3,
-    /// Towards what is cut away; of any length, zero cuts nothing.
+    /// Direction of the removed side, of any length; zero cuts nothing.
     pub normal: Vec3,
     /// Whether bone is cut too; tools and overlay never are.
     pub bone: bool,
 }
 
 impl Cut {
-    /// Unit normal n and offset w of the plane n·x = w, in the form in which shaders read it;
-    /// zeroes cut nothing.
+    /// Unit normal n and offset w of the plane n·x = w, as the shaders read it; zeroes cut nothing.
     pub(crate) fn plane(cut: Option<&Self>) -> Vec4 {
         let sound = cut.filter(|c| c.point.is_finite()).and_then(|c| Some((c.point, c.normal.try_normalize()?)));
         sound.map_or(Vec4::ZERO, |(point, normal)| normal.extend(normal.dot(point)))
     }
 }
 
-/// Height of a point over a plane, mm; 0 where there is no plane.
+/// Signed height of a point over a plane, mm; 0 without a plane.
 pub(crate) fn height(plane: Vec4, point: Vec3) -> f32 {
     plane.truncate().dot(point) - plane.w
 }
 
-/// Triangles that a cut may need; one of a brain of 100,000 tetrahedra needs about 8,000.
+/// Largest number of triangles of a cut; a brain of 100,000 tetrahedra needs about 8,000.
 const MOST_TRIANGLES: usize = 16_384;
 
-/// The pass that fills the brain where it is cut.
+/// The pass that draws the cut surface of the brain.
 #[derive(Debug)]
 pub(crate) struct Face {
     pipeline: Pipeline,
@@ -71,7 +70,7 @@ impl Face {
         Ok(self.pipeline.bind(gpu, &[scene.into(), (&self.corners).into()])?)
     }
 
-    /// Cuts the brain. Returns the triangles that found no room.
+    /// Cuts the brain; returns the number of triangles over the limit.
     pub fn follow(&mut self, gpu: &Gpu, plane: Vec4, brain: &Border) -> u32 {
         self.cut.clear();
         if plane == Vec4::ZERO {
@@ -89,7 +88,7 @@ impl Face {
         left
     }
 
-    /// Draws the cut between the border's triangles.
+    /// Draws the cut together with the boundary triangles.
     pub fn draw(&self, draws: &mut Draws, bindings: &Bindings) {
         if !self.cut.is_empty() {
             draws.draw(&self.pipeline, bindings, self.cut.len() as u32);

@@ -1,5 +1,4 @@
-//! Brings a 3-D view that was drawn apart into the picture: with fewer pixels, or for one of two
-//! eyes.
+//! Copies a separately drawn 3-D view into the picture: with fewer pixels, or for one eye of two.
 
 use crate::RenderError;
 use crate::scene::Scene;
@@ -8,7 +7,7 @@ use trepan_gpu::{
     Topology,
 };
 
-/// The pass.
+/// The render pass.
 #[derive(Debug)]
 pub(crate) struct Enlarge {
     pipeline: Pipeline,

@@ -1,4 +1,4 @@
-//! What one eye sees: its hits, kept from picture to picture, bound to the passes.
+//! The view of one eye: hits kept between pictures, bound to the passes.
 
 use crate::RenderError;
 use crate::camera::View;
@@ -14,28 +14,28 @@ use trepan_gpu::{Bindings, Depth, DrawTarget, Format, Gpu, Recorder, Target, Tex
 /// The textures of an eye.
 #[derive(Debug)]
 pub(crate) struct Eye {
-    /// Which of the passes' scenes is its own.
+    /// Index of its scene uniform.
     number: usize,
-    /// Where its view is in the picture.
+    /// Rectangle of its view in the picture.
     pub area: [u32; 4],
-    /// Width and height that it is drawn with, pixels.
+    /// Width and height at which it is drawn, pixels.
     pub drawn: [u32; 2],
     pub skull_hit: Texture,
     pub recast: Recast,
     brain_hit: Texture,
     brain_rest: Texture,
     depth: Texture,
-    /// The view before it comes into the picture, where it is drawn apart.
+    /// The separate view before it is copied into the picture, if any.
     pub apart: Option<(Texture, Bindings)>,
     skull: Bindings,
     light: Bindings,
     overlay: Bindings,
-    /// Of the border and its cut.
+    /// Bindings of the boundary and its cut.
     brain: Option<[Bindings; 2]>,
 }
 
 impl Eye {
-    /// A view drawn with `drawn` pixels, straight into the picture or apart from it.
+    /// A view drawn with `drawn` pixels, directly into the picture or separately.
     pub fn new(
         gpu: &Gpu,
         number: usize,
@@ -80,14 +80,14 @@ impl Eye {
         })
     }
 
-    /// Binds the light anew, after a paint got another texture.
+    /// Rebinds the lighting, after a paint's texture changed.
     pub fn rebind(&mut self, gpu: &Gpu, passes: &Passes) -> Result<(), RenderError> {
         let inputs = inputs(&self.skull_hit, &self.brain_hit, &self.brain_rest, passes);
         self.light = passes.light.bind(gpu, &passes.scenes[self.number], &inputs)?;
         Ok(())
     }
 
-    /// Draws bone, brain, tools and overlay. Returns the pixels whose rays were cast again.
+    /// Draws bone, brain, tools and overlay; returns the number of pixels cast again.
     pub fn draw(
         &mut self,
         recorder: &mut Recorder,

@@ -1,4 +1,4 @@
-//! What a picture is made of: the scene that stays and the frame that changes.
+//! The inputs of a picture: the constant scene and the changing frame.
 
 use crate::{Camera, Cut, Overlay, Paint, Stereo};
 use glam::{IVec3, Vec3};
@@ -7,21 +7,21 @@ use trepan_geometry::{Aabb, Pose, Tool};
 use trepan_mesh::TetMesh;
 use trepan_volume::{BoneVolume, VoxelVolume};
 
-/// What stays for the whole session.
+/// The scene data that stays constant during a session.
 #[derive(Clone, Debug)]
 pub struct SceneData<'a> {
-    /// The skull, if there was a CT; the picture follows its changes.
+    /// The skull, if there was a CT; its changes are rendered.
     pub bone: Option<Arc<BoneVolume>>,
     /// The brain at rest.
     pub brain: Option<&'a TetMesh>,
     /// The MRI in patient space, any range.
     pub mri: Option<&'a VoxelVolume<f32>>,
-    /// A colour laid over each voxel of the MRI; black for none.
+    /// A colour over each voxel of the MRI; black for none.
     pub tint: Option<&'a [[u8; 3]]>,
 }
 
-/// What the slices show, world mm: the box of voxel centres of the CT, else that of the MRI, else
-/// the brain.
+/// Box that the slices show, world mm: the voxel centres of the CT, else of the MRI, else the
+/// brain.
 pub(crate) fn bounds(data: &SceneData) -> Aabb {
     let by_bone = data.bone.as_ref().map(|bone| {
         let last = IVec3::from(bone.dims().map(|n| n as i32 - 1));
@@ -39,55 +39,54 @@ fn corners(volume: &VoxelVolume<f32>) -> [Vec3; 8] {
         .map(|n| volume.centre_of([0, 1, 2].map(|a| if n >> a & 1 == 1 { last[a] } else { 0 })).as_vec3())
 }
 
-/// What one picture shows.
+/// The contents of one picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
-    /// Where the eye is.
+    /// The camera.
     pub camera: Camera,
     /// The tool, if one is shown.
     pub tool: Option<Tool>,
-    /// Where the tool is; slices pass through its tip, or through the camera's target while the tip
-    /// is outside the scanned box.
+    /// The tool's pose. Slices pass through its tip, or through the camera's target if the tip is
+    /// outside the scanned box.
     pub world_from_tool: Pose,
-    /// The tool in the other hand, and where it is.
+    /// The tool in the other hand, and its pose.
     pub second: Option<(Tool, Pose)>,
-    /// Turn of the burr around its shaft, rad.
+    /// Rotation of the burr around its shaft, rad.
     pub turn_rad: f32,
     /// Whether the burr cuts.
     pub drilling: bool,
-    /// Nodes of the brain now, world mm, in the order of the mesh; `None` shows it at rest.
+    /// Current nodes of the brain, world mm, in the order of the mesh; `None` shows it at rest.
     pub brain_positions: Option<&'a [Vec3]>,
     /// Whether the skull is shown in the 3-D view.
     pub show_bone: bool,
     /// Whether the brain is shown in the 3-D view.
     pub show_brain: bool,
-    /// Colours laid over the bone, at the place that is seen.
+    /// Colours over the bone, by world position.
     pub bone_paint: Option<&'a Paint>,
-    /// Colours laid over the brain, at the place at rest of what is seen: they move with the
-    /// tissue.
+    /// Colours over the brain, by rest position: they move with the tissue.
     pub brain_paint: Option<&'a Paint>,
-    /// What is drawn over the scene.
+    /// The overlay.
     pub overlay: Overlay<'a>,
-    /// The plane that cuts the brain open.
+    /// The plane that cuts the brain.
     pub cut: Option<Cut>,
-    /// Both eyes' views instead of one.
+    /// Stereo parameters; `None` for one eye.
     pub stereo: Option<Stereo>,
     /// Grey values of the slices.
     pub slices: SliceLook,
 }
 
-/// How the slices look.
+/// Appearance of the slices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SliceLook {
     /// Whether there are slices beside the 3-D view.
     pub shown: bool,
-    /// Density in the middle of the grey scale, HU.
+    /// Density at the middle of the grey scale, HU.
     pub level_hu: f32,
-    /// Densities from black to white, HU.
+    /// Density range from black to white, HU.
     pub width_hu: f32,
-    /// Share of the MRI where there is no bone: 0 is CT only, 1 is MRI only.
+    /// Weight of the MRI outside bone: 0 is CT only, 1 is MRI only.
     pub mri_share: f32,
-    /// Half the height of what a slice shows, mm; `None` shows the whole volume.
+    /// Half the height of the visible area, mm; `None` shows the whole volume.
     pub half_height_mm: Option<f32>,
 }
 
@@ -99,15 +98,15 @@ impl Default for SliceLook {
 }
 
 impl SliceLook {
-    /// The same where there is no CT: the MRI is all there is.
+    /// The same for a scene without CT: MRI only.
     pub(crate) fn with_bone(self, bone: bool) -> Self {
         if bone { self } else { Self { mri_share: 1.0, ..self } }
     }
 }
 
 impl Frame<'_> {
-    /// Where the slices cross: at the tool's tip, or at what the camera looks at while the tip is
-    /// outside the box of the volumes.
+    /// Intersection of the slices: the tool's tip, or the camera's target if the tip is outside the
+    /// volumes' box.
     pub(crate) fn focus(&self, bounds: Aabb) -> Vec3 {
         let tip = self.world_from_tool.translation;
         if bounds.contains(tip) { tip } else { self.camera.target.clamp(bounds.min, bounds.max) }

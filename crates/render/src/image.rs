@@ -21,8 +21,7 @@ impl Image {
         if inside { [0, 1, 2, 3].map(|c| self.rgba[at + c]) } else { [0; 4] }
     }
 
-    /// The same picture with more pixels, bilinear between the centres of these; itself where it
-    /// has the size.
+    /// Enlarges the picture with bilinear interpolation; unchanged if it has the size.
     pub fn enlarged(&self, [width, height]: [u32; 2]) -> Self {
         if (self.width, self.height) == (width, height) {
             return self.clone();
@@ -45,15 +44,15 @@ impl Image {
         Self { width, height, rgba }
     }
 
-    /// How far it is from another one of its size: root mean square difference of all colours,
-    /// percent of white.
+    /// Root mean square difference of all colours from another picture of the same size, percent of
+    /// white.
     pub fn error_percent(&self, other: &Self) -> f64 {
         let squares = self.rgba.iter().zip(&other.rgba).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2));
-        // The fourth byte never differs.
+        // The alpha byte never differs.
         (squares.sum::<f64>() / (0.75 * self.rgba.len() as f64)).sqrt() / 2.55
     }
 
-    /// The bytes of a PNG file.
+    /// Encodes a PNG file.
     pub fn png(&self) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
@@ -64,7 +63,7 @@ impl Image {
         written.map(|()| bytes).map_err(std::io::Error::other)
     }
 
-    /// Writes a PNG file: first beside it, then renamed, so that no half file is ever seen.
+    /// Writes a PNG file atomically, by renaming a temporary file.
     pub fn write_png(&self, path: &Path) -> std::io::Result<()> {
         let part = path.with_extension("png.part");
         std::fs::write(&part, self.png()?)?;
@@ -72,8 +71,8 @@ impl Image {
     }
 }
 
-/// For each of `to` pixels in a row the pixel of `from` at or before its centre, and how far it
-/// lies towards the next.
+/// For each of `to` pixels in a row, the pixel of `from` at or before its centre, and the weight of
+/// the next.
 fn between(from: u32, to: u32) -> Vec<(u32, f32)> {
     let share = from as f32 / to.max(1) as f32;
     let at = |n: u32| ((n as f32 + 0.5) * share - 0.5).clamp(0.0, from.saturating_sub(1) as f32);

@@ -1,4 +1,4 @@
-//! Which part of the picture is the 3-D view and which are the slices.
+//! Divides the picture into the 3-D view and the slices.
 //!
 //! ```text
 //! ┌──────────────┬─────────┐
@@ -15,11 +15,11 @@
 pub struct Layout {
     /// The 3-D view.
     pub view: [u32; 4],
-    /// Axial, coronal and sagittal slice; none where there is no room.
+    /// Axial, coronal and sagittal slice; `None` if there is no room.
     pub slices: Option<[[u32; 4]; 3]>,
 }
 
-/// Pictures narrower or lower than this show no slices, pixels.
+/// Smallest width and height of a picture with slices, pixels.
 const SMALLEST_WITH_SLICES: u32 = 96;
 
 impl Layout {

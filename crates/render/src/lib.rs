@@ -1,21 +1,21 @@
-//! The picture: ray-cast skull, deforming brain, tools, shadows and slices, headless or in a
+//! The renderer: ray-cast skull, deforming brain, tools, shadows and slices, headless or in a
 //! window.
 //!
 //! # Theory
 //! Bone is the isosurface of a trilinear density: along a ray each voxel cell is a cubic, whose
-//! first root is exact. Empty space is leapt over by the chessboard distance to the nearest brick
-//! with bone. The brain is the border of its tetrahedra. Hits of bone and brain meet in one
-//! lighting pass, where the tool is a ball and a cylinder in closed form.
+//! first root is computed exactly. Empty space is skipped by the chessboard distance to the nearest
+//! brick with bone. The brain is the boundary of its tetrahedra. One lighting pass combines the
+//! hits of bone and brain with the tool, a ball and a cylinder in closed form.
 //!
 //! # Practice
-//! Make a [`Renderer`] once for a scene, then [`draw`](Renderer::draw) a [`Frame`] and take its
-//! texture, or its [`Image`]. Drilling is followed through
+//! Create a [`Renderer`] once per scene, then [`draw`](Renderer::draw) a [`Frame`] and take its
+//! texture or its [`Image`]. Drilling is read through
 //! [`BoneVolume::changed`](trepan_volume::BoneVolume::changed), up to a number of bricks a picture;
-//! the haptic tick is never waited for.
+//! the haptic tick is never delayed.
 //!
 //! # Sources
-//! Marmitt et al. 2004 (roots in a cell), Cohen and Sheffer 1994 (leaping), Cigolle et al. 2014
-//! (folded normals).
+//! Marmitt et al. 2004 (roots in a cell), Cohen and Sheffer 1994 (empty-space skipping), Cigolle et
+//! al. 2014 (octahedral normals).
 //!
 //! # When not to use it
 //! For translucent volumes: there is one isosurface and no transfer function.

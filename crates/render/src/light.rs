@@ -1,4 +1,4 @@
-//! The lighting pass: the nearest of bone, brain and tool at each pixel of the 3-D view, lit.
+//! The lighting pass: shades the nearest of bone, brain and tool at each pixel of the 3-D view.
 
 use crate::RenderError;
 use crate::scene::Scene;
@@ -8,13 +8,13 @@ use trepan_gpu::{
     Topology,
 };
 
-/// The pass.
+/// The render pass.
 #[derive(Debug)]
 pub(crate) struct Light {
     pipeline: Pipeline,
 }
 
-/// What the pass reads.
+/// The inputs of the pass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inputs<'a> {
     pub skull_hit: &'a Texture,

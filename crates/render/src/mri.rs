@@ -1,11 +1,11 @@
-//! The MRI as a texture of grey values, with what is marked in it.
+//! The MRI as a texture of grey values, with its marks.
 
 use crate::RenderError;
 use glam::{DAffine3, DMat4, DVec3, Mat4};
 use trepan_gpu::{Format, Gpu, Texture, TextureSpec};
 use trepan_volume::VoxelVolume;
 
-/// The MRI on the device; one dark texel where there is none.
+/// The MRI on the device; one dark texel if there is none.
 #[derive(Debug)]
 pub(crate) struct Mri {
     pub texture: Texture,
@@ -13,7 +13,7 @@ pub(crate) struct Mri {
     pub texture_from_world: Option<Mat4>,
 }
 
-/// The MRI as texels: a colour that marks the place, black for none, and the grey value.
+/// The MRI as texels: a mark colour, black for none, and the grey value.
 #[derive(Clone, Debug)]
 pub(crate) struct Signals {
     pub dims: [usize; 3],
@@ -58,8 +58,8 @@ impl Signals {
     }
 }
 
-/// The signal that is shown white: the 99.5th percentile of what is over zero, from a sample of at
-/// most 100,000 voxels.
+/// The signal shown as white: the 99.5th percentile of positive values in a sample of at most
+/// 100,000 voxels.
 fn white(data: &[f32]) -> f32 {
     let step = (data.len() / 100_000).max(1);
     let mut signal: Vec<f32> = data.iter().step_by(step).copied().filter(|v| v.is_finite() && *v > 0.0).collect();

@@ -1,11 +1,11 @@
-//! What is drawn over the scene: the force as an arrow, a teacher's tool, markers.
+//! Overlay over the scene: the force as an arrow, a teacher's tool, markers.
 //!
 //! # Theory
-//! Closed forms in boxes: each item is a rectangle of pixels around its box, in which rays meet
-//! ball, cylinder or cone exactly. Far items first, mixed by alpha.
+//! Each item is ray-cast in closed form (ball, cylinder or cone) in the pixel rectangle around its
+//! box. Far items are drawn first and blended by alpha.
 //!
 //! # Practice
-//! World mm. Parts behind bone, brain or tool show faintly, so that an arrow in a hole is not lost.
+//! World mm. Parts behind bone, brain or tool are faint, so that an arrow in a hole stays visible.
 //! Without items there is no pass.
 
 use crate::RenderError;
@@ -16,35 +16,35 @@ use trepan_gpu::{
     Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
 };
 
-/// What is drawn over the scene.
+/// The overlay of a frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overlay<'a> {
-    /// An arrow from one world point to another, mm.
+    /// An arrow between two world points, mm.
     pub force: Option<[Vec3; 2]>,
-    /// A tool that is only shown, and where it is: a teacher's.
+    /// A display-only tool and its pose, such as a teacher's.
     pub ghost: Option<(Tool, Pose)>,
-    /// World points that are marked by small balls, mm; 256 at most.
+    /// World points marked by small balls, mm; 256 at most.
     pub markers: &'a [Vec3],
 }
 
-/// Markers, arrow and ghost that a picture has room for.
+/// Most markers, arrows and ghosts in a picture.
 const MOST_ITEMS: usize = 258;
 
 /// Radius of a marker, mm.
 const MARKER_MM: f32 = 1.0;
 
-// Colours that the colour-blind tell apart (Okabe and Ito 2008), with alpha.
+// Colours distinguishable by the colour-blind (Okabe and Ito 2008), with alpha.
 const FORCE: Vec4 = Vec4::new(0.90, 0.60, 0.0, 1.0);
 const GHOST: Vec4 = Vec4::new(0.10, 0.45, 0.80, 0.45);
 const MARKER: Vec4 = Vec4::new(0.80, 0.20, 0.50, 1.0);
 
-/// A shape of the overlay; twin of the shader's `Item`.
+/// A shape of the overlay; layout of the shader's `Item`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Item {
-    /// A tool's ball, or an arrow's begin; w: the radius there.
+    /// A tool's ball or an arrow's start; w: its radius.
     pub tip: Vec4,
-    /// The far end of a tool's shaft, or an arrow's point; w: the radius of the shaft, or of the
+    /// The far end of a tool's shaft or an arrow's point; w: the radius of the shaft or of the
     /// arrow's head.
     pub tail: Vec4,
     /// Red, green, blue, alpha.
@@ -63,7 +63,7 @@ impl Item {
         Self { tip: from.extend(radius), tail: to.extend(2.5 * radius), colour: FORCE, kind: Vec4::X }
     }
 
-    fn is_sound(&self) -> bool {
+    fn is_valid(&self) -> bool {
         self.tip.is_finite() && self.tail.is_finite() && (self.kind == Vec4::ZERO || self.length() > 1e-3)
     }
 
@@ -72,19 +72,19 @@ impl Item {
     }
 }
 
-/// The shapes of an overlay, far ones first, and how many found no room.
+/// The shapes of an overlay, far ones first, and the number over the limit.
 pub(crate) fn items(overlay: &Overlay, eye: Vec3) -> (Vec<Item>, u32) {
     let marker = |at: &Vec3| Item::tool([at.extend(MARKER_MM); 2], MARKER);
     let ghost = overlay.ghost.map(|(tool, pose)| Item::tool(ends(&tool, &pose), GHOST));
     let all = overlay.force.map(Item::arrow).into_iter().chain(ghost).chain(overlay.markers.iter().map(marker));
-    let mut items: Vec<Item> = all.filter(Item::is_sound).take(MOST_ITEMS).collect();
+    let mut items: Vec<Item> = all.filter(Item::is_valid).take(MOST_ITEMS).collect();
     let distance = |item: &Item| (0.5 * (item.tip + item.tail)).truncate().distance(eye);
     items.sort_by(|a, b| distance(b).total_cmp(&distance(a)));
     let wanted = overlay.markers.len() + usize::from(overlay.force.is_some()) + usize::from(overlay.ghost.is_some());
     (items, wanted.saturating_sub(MOST_ITEMS) as u32)
 }
 
-/// The pass.
+/// The render pass.
 #[derive(Debug)]
 pub(crate) struct Shapes {
     pipeline: Pipeline,
@@ -117,7 +117,7 @@ impl Shapes {
         Ok(self.pipeline.bind(gpu, &[scene.into(), (&self.items).into(), skull_hit.into(), brain_hit.into()])?)
     }
 
-    /// Takes the shapes of a frame over. Returns the number of those that found no room.
+    /// Uploads the shapes of a frame; returns the number over the limit.
     pub fn follow(&mut self, gpu: &Gpu, overlay: &Overlay, eye: Vec3) -> u32 {
         let (items, left) = items(overlay, eye);
         self.items.write(gpu, 0, &items);

@@ -1,41 +1,39 @@
-//! Colours laid over bone or brain: a plan, distances to the dura, a map of forces, forbidden
-//! structures.
+//! Colours on bone or brain: a plan, distances to the dura, a force map, forbidden structures.
 //!
 //! # Theory
-//! A coarse box of colours, sampled trilinearly with the alpha multiplied in first, so that clear
-//! texels lend no colour to their neighbours. Alpha mixes over the surface's own colour before
-//! light falls on it.
+//! A coarse grid of colours, sampled trilinearly with premultiplied alpha, so that transparent
+//! texels do not affect their neighbours. Alpha blends over the surface's colour before lighting.
 //!
 //! # Practice
-//! World mm. The box reaches half a spacing beyond the outer texels and is clear outside. 4 bytes
-//! of device memory a texel; uploaded when the version or the dimensions change.
+//! World mm. The grid reaches half a spacing beyond the outer texels and is transparent outside. 4
+//! bytes of device memory a texel; uploaded when the version or the dimensions change.
 //!
 //! # When not to use it
-//! For what changes at every voxel in every picture: that is the bone itself, whose changes are
-//! followed brick by brick.
+//! For data that changes at every voxel in every picture: that is the bone itself, which is updated
+//! brick by brick.
 
 use crate::RenderError;
 use crate::processor::trilinear;
 use glam::{Vec3, Vec4};
 use trepan_gpu::{Format, Gpu, Texture, TextureSpec};
 
-/// A box of colours in world space.
+/// A grid of colours in world space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Paint {
     /// World centre of the texel (0, 0, 0), mm.
     pub origin: Vec3,
-    /// From texel to texel along x, y, z, mm.
+    /// Texel spacing along x, y, z, mm.
     pub spacing_mm: Vec3,
     /// Texels along x, y, z.
     pub dims: [u32; 3],
     /// Red, green, blue (linear light) and alpha of the texels, x fastest.
     pub rgba: Vec<[u8; 4]>,
-    /// Another number says that the colours are others.
+    /// Changes whenever the colours change.
     pub version: u64,
 }
 
 impl Paint {
-    /// Refuses what is not a box of colours.
+    /// Rejects an invalid grid.
     pub(crate) fn check(&self) -> Result<(), RenderError> {
         let wanted = self.dims.map(|n| n as usize).iter().product::<usize>();
         let sound = self.origin.is_finite() && self.spacing_mm.is_finite() && self.spacing_mm.min_element() > 0.0;
@@ -45,8 +43,8 @@ impl Paint {
         Err(RenderError::Paint { dims: self.dims, spacing_mm: self.spacing_mm, given: self.rgba.len() })
     }
 
-    /// Lower corner of the box (w: 1) and one over its size, in the form in which shaders read it;
-    /// zeroes for none.
+    /// Lower corner of the grid (w: 1) and the inverse of its size, as shaders read it; zeroes for
+    /// none.
     pub(crate) fn placed(paint: Option<&Self>) -> [Vec4; 2] {
         paint.map_or([Vec4::ZERO; 2], |p| {
             let size = p.spacing_mm * Vec3::from(p.dims.map(|n| n as f32));
@@ -54,7 +52,7 @@ impl Paint {
         })
     }
 
-    /// A colour with this paint over it at a world point.
+    /// Blends the paint over a colour at a world point.
     pub(crate) fn over(&self, colour: Vec3, point: Vec3) -> Vec3 {
         let texel = (point - self.origin) / self.spacing_mm;
         let dims = Vec3::from(self.dims.map(|n| n as f32));
@@ -66,12 +64,12 @@ impl Paint {
     }
 }
 
-/// A colour with its alpha multiplied in, 0 to 255.
+/// A colour with premultiplied alpha, 0 to 255.
 fn premultiplied([r, g, b, a]: [u8; 4]) -> Vec4 {
     (Vec3::new(r.into(), g.into(), b.into()) * (f32::from(a) / 255.0)).extend(a.into())
 }
 
-/// A paint on the device; one clear texel where there is none.
+/// A paint on the device; one transparent texel if there is none.
 #[derive(Debug)]
 pub(crate) struct Coat {
     label: &'static str,
@@ -84,8 +82,7 @@ impl Coat {
         Ok(Self { label, texture: texture(gpu, label, [1; 3])?, version: None })
     }
 
-    /// Takes a paint over if it has changed. Whether the texture is another one, so that it has to
-    /// be bound anew.
+    /// Uploads a paint if it has changed; returns whether its texture is new and must be rebound.
     pub fn follow(&mut self, gpu: &Gpu, paint: Option<&Paint>) -> Result<bool, RenderError> {
         let Some(paint) = paint else { return Ok(false) };
         paint.check()?;
@@ -130,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_box_of_colours_is_refused() {
+    fn invalid_paint_is_rejected() {
         assert!(paint().check().is_ok());
         let bad = [
             Paint { dims: [1; 3], ..paint() },

@@ -1,12 +1,11 @@
-//! A picture on every machine: by the graphics device as long as there is one, else by the
-//! processor.
+//! Renders on every machine: on the graphics device if there is one, else on the processor.
 //!
 //! # Practice
-//! One call gives a finished picture. When no device opens, or the device is lost on the way, the
-//! processor goes on with the same scene and the reason is kept for the user to read.
+//! One call returns a finished picture. If no device opens, or the device is lost, the processor
+//! continues with the same scene and the reason is stored for the user.
 //!
 //! # When not to use it
-//! Where the device's texture is to be shown without a copy and a lost device is an error: use
+//! Where the device's texture is shown without a copy and a lost device is an error: use
 //! [`Renderer`].
 
 use crate::brain::Border;
@@ -20,7 +19,7 @@ use trepan_geometry::Aabb;
 use trepan_gpu::{Gpu, GpuError, Prefer};
 use trepan_volume::BoneVolume;
 
-/// Draws finished pictures of one scene, whatever the machine has.
+/// Draws finished pictures of one scene on any machine.
 #[derive(Debug)]
 pub struct Painter {
     by: By,
@@ -29,12 +28,12 @@ pub struct Painter {
     quality: Quality,
 }
 
-/// How much of a picture is drawn.
+/// Resolution and sampling of a picture.
 #[derive(Clone, Copy, Debug)]
 struct Quality {
     sparse: bool,
     detail: f32,
-    /// Size of the pictures that are given, pixels.
+    /// Size of the returned pictures, pixels.
     size: [u32; 2],
 }
 
@@ -43,7 +42,7 @@ impl Quality {
         Self { sparse: false, detail: 1.0, size }
     }
 
-    /// Size of what the processor draws.
+    /// Size that the processor draws.
     fn drawn(&self) -> [u32; 2] {
         self.size.map(|n| ((n as f32 * self.detail).round() as u32).clamp(n.min(1), n))
     }
@@ -55,11 +54,11 @@ enum By {
     Processor(Box<ProcessorRenderer>),
 }
 
-/// What the processor needs if it has to take over.
+/// The data that the processor needs to take over.
 #[derive(Clone, Debug)]
 pub(crate) struct Kept {
     pub bone: Option<Arc<BoneVolume>>,
-    /// What the slices show.
+    /// Box that the slices show.
     pub bounds: Aabb,
     pub brain: Option<Border>,
     pub mri: Option<Signals>,
@@ -73,13 +72,13 @@ impl Kept {
 }
 
 impl Painter {
-    /// Loads a scene for pictures of `size` pixels onto the best device, or onto the processor
-    /// where none opens.
+    /// Loads a scene for pictures of `size` pixels onto the best device, or the processor if none
+    /// opens.
     pub fn open(prefer: Prefer, data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
         Self::on(Gpu::open(prefer), data, size)
     }
 
-    /// Loads a scene onto a device that was opened before, or onto the processor if that failed.
+    /// Loads a scene onto an open device, or onto the processor if opening failed.
     pub fn on(device: Result<Gpu, GpuError>, data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
         let kept = Kept::of(data)?;
         let why = match device.map_err(RenderError::from).and_then(|gpu| Renderer::new(&gpu, data, size)) {
@@ -93,7 +92,7 @@ impl Painter {
         Ok(Self { notice: Some(format!("{why}; the processor draws")), ..Self::processor(kept, size)? })
     }
 
-    /// Loads a scene for pictures by the processor, whatever devices there are.
+    /// Loads a scene for rendering on the processor, ignoring devices.
     pub fn by_processor(data: &SceneData, size: [u32; 2]) -> Result<Self, RenderError> {
         Self::processor(Kept::of(data)?, size)
     }
@@ -103,9 +102,9 @@ impl Painter {
         Ok(Self { by: By::Processor(Box::new(processor)), kept, notice: None, quality: Quality::full(size) })
     }
 
-    /// Draws only a share of the pixels along an edge, from 0.05 to 1, and enlarges them to the
-    /// size that was asked for; `sparse`: the processor casts every second ray where bone is
-    /// smooth. For pictures as they were opened; an area that changes is [`fit`](Self::fit).
+    /// Draws a fraction of the pixels along an edge, from 0.05 to 1, and enlarges the picture to
+    /// full size. With `sparse` the processor casts every second ray where bone is smooth. For a
+    /// fixed picture size; for a changing area use [`fit`](Self::fit).
     pub fn set_quality(&mut self, sparse: bool, detail: f32) -> Result<(), RenderError> {
         let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
         self.quality = Quality { sparse, detail, ..self.quality };
@@ -145,9 +144,9 @@ impl Painter {
         }
     }
 
-    /// Makes the pictures fit an area of `size` pixels, coarser where `detail`, a share of the
-    /// pixels along an edge, is under 1: a device draws the 3-D view with fewer pixels; the
-    /// processor casts every second ray where bone is smooth, and under 1/2 draws smaller pictures.
+    /// Adapts the pictures to an area of `size` pixels, with a fraction `detail` of the pixels
+    /// along an edge. Below 1, a device draws the 3-D view with fewer pixels; the processor casts
+    /// every second ray where bone is smooth, and under 1/2 draws smaller pictures.
     pub fn fit(&mut self, size: [u32; 2], detail: f32) -> Result<(), RenderError> {
         match &mut self.by {
             By::Device(renderer) => renderer.set_detail(detail).and_then(|()| renderer.resize(size)),
@@ -155,7 +154,7 @@ impl Painter {
                 let detail = if detail.is_finite() { detail.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
                 processor.set_casting(Casting { sparse: detail < 1.0, ..processor.casting() });
                 let share = (2.0 * detail).min(1.0);
-                // A window enlarges by itself.
+                // A window enlarges the picture itself.
                 self.quality = Quality::full(Quality { detail: share, ..Quality::full(size) }.drawn());
                 processor.resize(self.quality.size)
             }
@@ -170,7 +169,7 @@ impl Painter {
         }
     }
 
-    /// The renderer on the device, if that draws.
+    /// The renderer on the device, if in use.
     pub fn renderer(&self) -> Option<&Renderer> {
         match &self.by {
             By::Device(renderer) => Some(renderer),
@@ -178,7 +177,7 @@ impl Painter {
         }
     }
 
-    /// The same to draw with.
+    /// The mutable renderer on the device, if in use.
     pub fn renderer_mut(&mut self) -> Option<&mut Renderer> {
         match &mut self.by {
             By::Device(renderer) => Some(renderer),
@@ -186,7 +185,7 @@ impl Painter {
         }
     }
 
-    /// Who draws, for people.
+    /// Display name of the device or processor in use.
     pub fn name(&self) -> String {
         match &self.by {
             By::Device(renderer) => renderer.gpu().name(),
@@ -199,7 +198,7 @@ impl Painter {
         self.notice.as_deref()
     }
 
-    /// The renderer on the device; the painter itself if the processor draws.
+    /// Converts into the renderer on the device; returns itself if the processor draws.
     pub fn into_renderer(self) -> Result<Renderer, Box<Self>> {
         match self.by {
             By::Device(renderer) => Ok(*renderer),
@@ -211,7 +210,7 @@ impl Painter {
 fn on_device(renderer: &mut Renderer, frame: &Frame) -> Result<(Image, DrawReport), RenderError> {
     let report = renderer.draw(frame)?;
     let image = renderer.image()?;
-    // A device that was lost may still hand out memory.
+    // A lost device may still allocate memory.
     renderer.gpu().wait()?;
     Ok((image, report))
 }

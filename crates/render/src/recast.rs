@@ -1,14 +1,14 @@
-//! Which rays have to be cast again: all after a move of the camera, else only those that may see a
+//! Selects the rays to cast again: all after a camera move, otherwise only those that may see a
 //! change.
 
 use crate::camera::View;
 use glam::{Vec2, Vec3, Vec4};
 use trepan_geometry::Aabb;
 
-/// Around changed bone, where the picture is cast again at once, mm.
+/// Margin around changed bone that is cast again at once, mm.
 const MARGIN_MM: f32 = 4.0;
 
-/// What the kept hits are good for.
+/// Tracks which stored hits are still valid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Recast {
     cast_for: Option<(View, Vec4)>,
@@ -23,19 +23,19 @@ impl Default for Recast {
 }
 
 impl Recast {
-    /// Forgets the hits, so that the next picture casts all rays.
+    /// Invalidates the hits, so that the next picture casts all rays.
     pub fn forget(&mut self) {
         self.cast_for = None;
     }
 
-    /// Takes note of a box in which bone changed, world mm.
+    /// Adds a box in which bone changed, world mm.
     pub fn note(&mut self, changed: Aabb) {
         self.changed = Aabb { min: self.changed.min.min(changed.min), max: self.changed.max.max(changed.max) };
     }
 
-    /// The rectangle `[x, y, width, height]` of pixels to cast for this view of bone under this
-    /// plane, if any. Once the drilling rests everything is cast once more, since shadows and
-    /// ambient light reach farther than the changed bricks.
+    /// The pixel rectangle `[x, y, width, height]` to cast for this view and bone cut, if any. Once
+    /// drilling stops everything is cast once more, since shadows and ambient light reach farther
+    /// than the changed bricks.
     pub fn part(&mut self, view: &View, bone_cut: Vec4, [width, height]: [u32; 2]) -> Option<[u32; 4]> {
         let whole = [0, 0, width, height];
         let resting = self.cast_for == Some((*view, bone_cut));
@@ -49,7 +49,7 @@ impl Recast {
     }
 }
 
-/// The smallest rectangle of pixels that shows a box; none if it is out of sight.
+/// The smallest pixel rectangle that shows a box; `None` if it is out of sight.
 fn rectangle(view: &View, of: Aabb, [width, height]: [u32; 2]) -> Option<[u32; 4]> {
     let mut low = Vec2::INFINITY;
     let mut high = Vec2::NEG_INFINITY;

@@ -1,4 +1,4 @@
-//! The picture from its parts: newest poses → changed bricks → brain → rays → light → slices.
+//! Draws the picture from its parts: newest poses → changed bricks → brain → rays → light → slices.
 
 use crate::RenderError;
 use crate::anaglyph::Anaglyph;
@@ -25,13 +25,13 @@ use glam::Vec3;
 use trepan_geometry::Aabb;
 use trepan_gpu::{Buffer, Gpu, PassTime, Recorder, Texture, Timer};
 
-/// Changed bricks that one picture takes over, by default: 1 MiB of densities.
+/// Default for the most changed bricks processed per picture: 1 MiB of densities.
 pub const BRICKS_PER_FRAME: usize = 1024;
 
 /// Colour of the brain's outline in the slices.
 pub(crate) const OUTLINE: Vec3 = Vec3::new(1.0, 0.45, 0.55);
 
-/// Least share of the 3-D view's pixels along an edge.
+/// Smallest fraction of the 3-D view's pixels along an edge.
 pub(crate) const LEAST_DETAIL: f32 = 0.05;
 
 /// Draws pictures of one scene into a texture.
@@ -44,21 +44,21 @@ pub struct Renderer {
     canvas: Canvas,
     bounds: Aabb,
     timer: Option<Timer>,
-    /// Changed bricks that one picture takes over at most; the rest comes with the next pictures.
+    /// Most changed bricks processed per picture; the rest follows in the next pictures.
     pub bricks_per_frame: usize,
 }
 
-/// What drawing a picture came to.
+/// Counters of drawing a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DrawReport {
-    /// Changed bricks taken over.
+    /// Changed bricks processed.
     pub bricks: u32,
     /// Changed bricks left for the next picture.
     pub bricks_left: u32,
     /// Pixels whose rays through the bone were cast again.
     pub pixels_cast: u32,
-    /// Lines of the brain's outline, triangles of its cuts and shapes of the overlay that found no
-    /// room.
+    /// Items over the limit: lines of the brain's outline, triangles of its cuts and shapes of the
+    /// overlay.
     pub lines_left: u32,
 }
 
@@ -112,14 +112,14 @@ impl Renderer {
         Ok(DrawReport { bricks: followed.bricks, bricks_left: followed.left, pixels_cast, lines_left })
     }
 
-    /// Moves the brain, and cuts it. Returns the triangles that found no room.
+    /// Updates the brain and its cut; returns the number of triangles over the limit.
     fn follow_brain(&mut self, frame: &Frame) -> Result<u32, RenderError> {
         let Some((brain, face)) = &mut self.passes.brain else { return Ok(0) };
         brain.follow(&self.gpu, frame.brain_positions)?;
         Ok(face.follow(&self.gpu, Cut::plane(frame.cut.as_ref()), &brain.border))
     }
 
-    /// Takes paints and overlay over. Returns the shapes that found no room.
+    /// Uploads paints and overlay; returns the number of shapes over the limit.
     fn follow_looks(&mut self, frame: &Frame) -> Result<u32, RenderError> {
         let mut other = false;
         for (coat, paint) in self.passes.coats.iter_mut().zip([frame.bone_paint, frame.brain_paint]) {
@@ -131,8 +131,7 @@ impl Renderer {
         Ok(self.passes.overlay.follow(&self.gpu, &frame.overlay, self.view(frame).eye))
     }
 
-    /// The bone, the brain, the tools and what lies over them, as each eye sees them. Returns the
-    /// pixels cast.
+    /// Draws bone, brain, tools and overlay for each eye; returns the number of pixels cast.
     fn draw_views(&mut self, recorder: &mut Recorder, frame: &Frame) -> u32 {
         let Canvas { eyes, picture, anaglyph, layout, .. } = &mut self.canvas;
         let (passes, mri_from_world) = (&self.passes, self.passes.mri.texture_from_world);
@@ -180,15 +179,15 @@ impl Renderer {
         self.divide(Division { size, ..self.canvas.division })
     }
 
-    /// Draws only a share of the 3-D view's pixels along an edge and enlarges them: 1 is all, 0.5 a
-    /// quarter of them. Slices stay fine.
+    /// Draws a fraction of the 3-D view's pixels along an edge and enlarges them: 1 is all, 0.5 a
+    /// quarter of them. Slices keep full resolution.
     pub fn set_detail(&mut self, share: f32) -> Result<(), RenderError> {
         let detail = if share.is_finite() { share.clamp(LEAST_DETAIL, 1.0) } else { 1.0 };
         self.divide(Division { detail, ..self.canvas.division })
     }
 
-    /// Lets rays leap over bricks without bone (the default), or has them walk every cell, to
-    /// measure what leaping is worth.
+    /// Enables empty-space skipping (the default), or makes rays visit every cell, for
+    /// measurements.
     pub fn set_leaping(&mut self, leaping: bool) {
         self.passes.skull.set_leaping(&self.gpu, leaping);
         self.canvas.eyes.iter_mut().for_each(|eye| eye.recast.forget());
@@ -201,7 +200,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// The device that it draws with.
+    /// The device in use.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
@@ -211,35 +210,34 @@ impl Renderer {
         self.canvas.division.size
     }
 
-    /// Pixels that the 3-D view, or the left eye's, is drawn with, width and height.
+    /// Width and height at which the 3-D view, or the left eye's, is drawn, pixels.
     pub fn view_size(&self) -> [u32; 2] {
         self.canvas.eyes[0].drawn
     }
 
-    /// Which part of the picture is what.
+    /// The layout of the picture.
     pub fn layout(&self) -> Layout {
         self.canvas.layout
     }
 
-    /// The camera of a frame as vectors, for the 3-D view of this picture; with two eyes, from
-    /// between them.
+    /// A frame's camera as vectors, for the 3-D view; with stereo, from between the eyes.
     pub fn view(&self, frame: &Frame) -> View {
         let [_, _, width, height] = self.canvas.eyes[0].area;
         frame.camera.view(width as f32 / height as f32)
     }
 
-    /// The newest picture on the device.
+    /// The last picture on the device.
     pub fn texture(&self) -> &Texture {
         &self.canvas.picture
     }
 
-    /// Waits for the newest picture and copies it.
+    /// Waits for the last picture and copies it.
     pub fn image(&self) -> Result<Image, RenderError> {
         let [width, height] = self.size();
         Ok(Image { width, height, rgba: self.canvas.picture.read::<u8>(&self.gpu)? })
     }
 
-    /// Waits for the newest picture and gives the bone at each pixel of its 3-D view
+    /// Waits for the last picture and returns the bone at each pixel of its 3-D view
     /// ([`view_size`](Self::view_size)), row by row.
     pub fn bone_hits(&self) -> Result<Vec<Option<Hit>>, RenderError> {
         let hits = self.canvas.eyes[0].skull_hit.read::<[f32; 4]>(&self.gpu)?;
@@ -247,8 +245,8 @@ impl Renderer {
         Ok(hits.into_iter().map(hit).collect())
     }
 
-    /// Waits for the newest picture and gives the device's time for each pass; empty where it
-    /// cannot measure.
+    /// Waits for the last picture and returns the device's time for each pass; empty if
+    /// unsupported.
     pub fn pass_times(&self) -> Result<Vec<PassTime>, RenderError> {
         Ok(self.timer.as_ref().map(|t| t.read(&self.gpu)).transpose()?.unwrap_or_default())
     }
@@ -260,16 +258,16 @@ pub(crate) fn eye_view(frame: &Frame, [_, _, width, height]: [u32; 4], number: u
     Stereo::views(frame.stereo.as_ref(), view, frame.camera.distance_mm)[number]
 }
 
-/// Where a ray meets bone.
+/// A ray's hit on bone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// From the eye, mm.
+    /// Distance from the eye, mm.
     pub distance_mm: f32,
-    /// Unit, outwards.
+    /// Unit normal, outwards.
     pub normal: Vec3,
 }
 
-/// The unit vector that two octahedral coordinates stand for.
+/// Decodes a unit vector from two octahedral coordinates.
 fn unfold([x, y]: [f32; 2]) -> Vec3 {
     let z = 1.0 - x.abs() - y.abs();
     let folded = if z < 0.0 { [(1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)] } else { [x, y] };

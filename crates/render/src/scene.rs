@@ -1,4 +1,4 @@
-//! What every pass knows, in the form in which shaders read it (`scene.wgsl`).
+//! The uniform shared by all passes, in shader layout (`scene.wgsl`).
 
 use crate::bricks::Grid;
 use crate::camera::View;
@@ -8,7 +8,7 @@ use crate::paint::Paint;
 use glam::{Mat4, Quat, Vec3, Vec4};
 use trepan_geometry::{Pose, Tool, ToolKind};
 
-/// Twin of the shader's `Scene`.
+/// Layout of the shader's `Scene`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Scene {
@@ -34,7 +34,7 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// Gathers what a frame says. `mri_from_world` gives texture coordinates, if there is an MRI.
+    /// Collects a frame's data. `mri_from_world` maps to texture coordinates, if there is an MRI.
     pub fn of(frame: &Frame, view: &View, size: [u32; 2], grid: &Grid, mri_from_world: Option<Mat4>) -> Self {
         let [width, height] = size.map(|n| n as f32);
         let tool = frame.tool.unwrap_or(NO_TOOL);
@@ -66,7 +66,7 @@ impl Scene {
         }
     }
 
-    /// Unit direction of the ray through the middle of a pixel of the 3-D view.
+    /// Unit direction of the ray through the centre of a pixel of the 3-D view.
     pub fn ray_of(&self, x: usize, y: usize) -> Vec3 {
         let x = 2.0 * (x as f32 + 0.5) / self.right.w - 1.0;
         let y = 1.0 - 2.0 * (y as f32 + 0.5) / self.up.w;
@@ -94,7 +94,7 @@ pub(crate) fn ends(tool: &Tool, world_from_tool: &Pose) -> [Vec4; 2] {
     [world_from_tool.translation.extend(tool.tip_radius_mm), tail.extend(tool.shaft_radius_mm)]
 }
 
-/// How a tool's tip looks: fluted, the mouth of a tube, or smooth.
+/// Style of a tool's tip: fluted, the mouth of a tube, or smooth.
 fn look(kind: ToolKind) -> f32 {
     match kind {
         cutting if cutting.cuts() => 1.0,
@@ -110,7 +110,7 @@ fn distance(point: Vec3, tip: Vec4, tail: Vec4) -> f32 {
     shaft.min(point.distance(centre) - tip.w)
 }
 
-/// The lamp stands above the viewer's left shoulder.
+/// Direction of the lamp, above the viewer's left shoulder.
 pub(crate) fn towards_light(view: &View) -> Vec3 {
     (0.75 * view.up - 0.55 * view.right - view.forward).normalize()
 }

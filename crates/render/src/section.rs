@@ -1,9 +1,9 @@
-//! The deformed brain cut by the slices: which place at rest, where the MRI was taken, is seen at
-//! each pixel.
+//! Cuts the deformed brain by the slices and gives each pixel its rest position, for sampling the
+//! MRI.
 //!
 //! # Theory
 //! A plane cuts a tetrahedron in a triangle or a quadrilateral. Deformation is linear in a
-//! tetrahedron, so the place at rest is linear over the cut.
+//! tetrahedron, so that the rest position is linear over the cut.
 
 use crate::RenderError;
 use crate::brain::Border;
@@ -15,17 +15,17 @@ use trepan_gpu::{
     Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Slot, Target, Texture, Topology,
 };
 
-/// Triangles that one slice may need; a slice of a brain of 100,000 tetrahedra needs about 8,000.
+/// Largest number of triangles of one slice; a brain of 100,000 tetrahedra needs about 8,000.
 const MOST_TRIANGLES: usize = 16_384;
 
-/// A corner of a cut, now and at rest, world mm.
+/// A corner of a cut, current and at rest, world mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Corner {
     pub place: Vec3,
     pub rest: Vec3,
 }
 
-/// The pass for three slices.
+/// The render pass for three slices.
 #[derive(Debug)]
 pub(crate) struct Section {
     pipeline: Pipeline,
@@ -54,7 +54,7 @@ impl Section {
         Ok(Self { pipeline, corners, bindings, counts: [0; 3], cut: Vec::with_capacity(3 * MOST_TRIANGLES) })
     }
 
-    /// Cuts the brain by three planes. Returns the triangles that found no room.
+    /// Cuts the brain by three planes; returns the number of triangles over the limit.
     pub fn follow(&mut self, gpu: &Gpu, planes: &[Plane; 3], brain: &Border) -> u32 {
         let mut left = 0;
         for (n, plane) in planes.iter().enumerate() {
@@ -72,7 +72,7 @@ impl Section {
         left
     }
 
-    /// Draws the cuts into `places`, where the slices stand one below the other.
+    /// Draws the cuts into `places`, the slices one below the other.
     pub fn draw(&self, recorder: &mut Recorder, rectangles: &[[u32; 4]; 3], places: &Texture) {
         let colours = [Target { texture: places, clear: Some([0.0; 4]) }];
         recorder.draw("section", &DrawTarget { colours: &colours, depth: None }, |d| {
@@ -102,7 +102,7 @@ fn cut(plane: Vec4, now: [Vec3; 4], rest: [Vec3; 4]) -> Option<[Option<Corner>; 
         let share = height[a] / (height[a] - height[b]);
         Some(Corner { place: now[a].lerp(now[b], share), rest: rest[a].lerp(rest[b], share) })
     };
-    // Which corner, or which pair, is alone on its side.
+    // Finds the single corner, or the pair, on one side of the plane.
     let pair = |a: usize, b: usize, c: usize, d: usize| Some([corner(a, c), corner(a, d), corner(b, d), corner(b, c)]);
     let one = |a: usize, b: usize, c: usize, d: usize| Some([corner(a, b), corner(a, c), corner(a, d), None]);
     let bits = (0..4).fold(0, |bits, n| bits | (over[n] as u32) << n);

@@ -1,15 +1,15 @@
-//! The skull's pass: densities on the device, changed bricks followed, rays cast only where
-//! something changed.
+//! The skull pass: keeps densities on the device, updates changed bricks, and casts only affected
+//! rays.
 //!
 //! # Theory
-//! Within a cell the density is trilinear, so along a ray it is a cubic; its first root is found
-//! exactly (Marmitt et al. 2004), and no wall is too thin to be seen. See `skull.wgsl`.
+//! Within a cell the density is trilinear, so that along a ray it is a cubic. Its first root is
+//! found exactly (Marmitt et al. 2004), and no thin wall is missed. See `skull.wgsl`.
 //!
 //! # Practice
-//! Half-precision densities: exact for whole HU up to 2048, which holds every useful isovalue. The
-//! hits of the last picture are kept: with a resting camera only the part of the picture that shows
-//! changed bricks is cast again, and the whole once the drilling rests (ambient light reaches
-//! farther than a brick).
+//! Half-precision densities are exact for integer HU up to 2048, which covers every useful
+//! isovalue. The hits of the last picture are kept. With a static camera only the part of the
+//! picture that shows changed bricks is cast again, and all of it once drilling stops, since
+//! ambient light reaches farther than a brick.
 
 use crate::RenderError;
 use crate::bricks::{Grid, Leaps, densities};
@@ -22,10 +22,10 @@ use trepan_gpu::{
 };
 use trepan_volume::BoneVolume;
 
-/// Bytes of densities handed to the device at once while loading.
+/// Bytes of densities uploaded at once while loading.
 const LOAD_BYTES: usize = 16 << 20;
 
-/// What a ray that meets nothing stores as its distance.
+/// Distance stored for a ray that hits nothing.
 pub(crate) const NOTHING: f32 = 1e30;
 
 /// The slots of [`Skull::volumes`].
@@ -45,12 +45,12 @@ pub(crate) struct Skull {
     leaping: bool,
 }
 
-/// What following the bone came to.
+/// Result of updating the bone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Followed {
     pub bricks: u32,
     pub left: u32,
-    /// Where bone changed, world mm.
+    /// Box in which bone changed, world mm.
     pub changed: Aabb,
 }
 
@@ -107,19 +107,19 @@ impl Skull {
         self.bone.is_some()
     }
 
-    /// Lets rays leap over bricks without bone, or has them walk every cell.
+    /// Enables or disables empty-space skipping over bricks without bone.
     pub fn set_leaping(&mut self, gpu: &Gpu, leaping: bool) {
         self.leaping = leaping;
         self.write_leaps(gpu);
     }
 
-    /// Hands everything to the device, a few layers at a time.
+    /// Uploads everything, a few layers at a time.
     fn load(&self, gpu: &Gpu) {
         let [nx, ny, nz] = self.grid.dims;
         let layers = (LOAD_BYTES / (2 * nx * ny)).max(1);
         for first in (0..nz).step_by(layers) {
             self.upload(gpu, [0, 0, first], [nx, ny, layers.min(nz - first)]);
-            // Submitting lets the device take the layers over before the next ones come.
+            // Submitting lets the device take these layers before the next ones are written.
             gpu.record("load").submit();
         }
         self.write_leaps(gpu);
@@ -138,7 +138,7 @@ impl Skull {
         self.density.write(gpu, first.map(|v| v as u32), size.map(|v| v as u32), &values);
     }
 
-    /// Brings up to `limit` changed bricks to the device.
+    /// Uploads up to `limit` changed bricks.
     pub fn follow(&mut self, gpu: &Gpu, limit: usize) -> Followed {
         let Some(bone) = self.bone.clone() else { return Followed::default() };
         let mut changed = Vec::new();
@@ -152,8 +152,7 @@ impl Skull {
         Followed::of(&self.grid, &changed, left)
     }
 
-    /// Brings one brick of voxels to the device, with the bricks of cells and the blocks that it
-    /// touches.
+    /// Uploads one brick of voxels and the bricks of cells and blocks that it touches.
     fn refresh(&mut self, gpu: &Gpu, bone: &BoneVolume, brick: [usize; 3]) {
         let (first, size) = self.grid.voxels_of(brick);
         self.upload(gpu, first, size);
@@ -166,7 +165,7 @@ impl Skull {
         }
     }
 
-    /// What `bricks.wgsl` binds, after the uniform.
+    /// The resources that `bricks.wgsl` binds, after the uniform.
     pub fn volumes(&self) -> [Resource<'_>; 4] {
         [(&self.density).into(), Resource::Linear, (&self.leap).into(), (&self.crowd).into()]
     }
@@ -176,7 +175,7 @@ impl Skull {
         Ok(self.pipeline.bind(gpu, &[&[scene.into()], &self.volumes()[..]].concat())?)
     }
 
-    /// Casts a part of the pixels again into `hits`.
+    /// Casts some of the pixels again into `hits`.
     pub fn cast(&self, recorder: &mut Recorder, bindings: &Bindings, part: [u32; 4], hits: &Texture) {
         let colours = [Target { texture: hits, clear: None }];
         recorder.draw("skull", &DrawTarget { colours: &colours, depth: None }, |d| {

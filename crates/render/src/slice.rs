@@ -1,8 +1,8 @@
 //! The three orthogonal slices through the tool's tip.
 //!
 //! # Practice
-//! Radiological convention: the patient is seen from the feet (axial) and from in front (coronal),
-//! so the patient's right, R, is on the left of the picture. The sagittal slice looks from the
+//! Radiological convention: the patient is seen from the feet (axial) and from the front (coronal),
+//! so that the patient's right, R, is on the left of the picture. The sagittal slice looks from the
 //! patient's left: the face, A, is on the left.
 //!
 //! ```text
@@ -22,24 +22,24 @@ use trepan_gpu::{
     Topology,
 };
 
-/// Numbers of the letters R L A P S I in the shader's font.
+/// Indices of the letters R L A P S I in the shader's font.
 pub(crate) const LETTERS: [[f32; 4]; 3] = [[0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 4.0, 5.0], [2.0, 3.0, 4.0, 5.0]];
 
-/// To the right and upwards in the picture: axial, coronal, sagittal; +x is the patient's right, +y
-/// the front, +z the head.
+/// Picture axes (right, up) of axial, coronal and sagittal; +x is the patient's right, +y the
+/// front, +z the head.
 const AXES: [[Vec3; 2]; 3] = [[Vec3::NEG_X, Vec3::Y], [Vec3::NEG_X, Vec3::Z], [Vec3::NEG_Y, Vec3::Z]];
 
-/// A slice: a plane and what of it the picture shows.
+/// A slice plane and its visible area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Plane {
     pub centre: Vec3,
     pub right: Vec3,
     pub up: Vec3,
-    /// From the middle of the picture to its right and upper edge, mm.
+    /// Half width and half height of the visible area, mm.
     pub half: Vec2,
 }
 
-/// Twin of the shader's `Slice`.
+/// Layout of the shader's `Slice`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 struct Slice {
@@ -59,7 +59,7 @@ pub(crate) struct Slices {
 }
 
 impl Plane {
-    /// The three slices through a point. The whole box is shown, centred, or what is around the
+    /// The three slices through a point, showing the whole box, centred, or the surroundings of the
     /// point.
     pub fn three(through: Vec3, bounds: Aabb, half_height_mm: Option<f32>, rectangles: &[[u32; 4]; 3]) -> [Self; 3] {
         [0, 1, 2].map(|n| {
@@ -75,19 +75,19 @@ impl Plane {
         })
     }
 
-    /// Its unit normal and offset.
+    /// Unit normal and offset of the plane.
     pub fn level(&self) -> Vec4 {
         let normal = self.right.cross(self.up);
         normal.extend(normal.dot(self.centre))
     }
 
-    /// Where a point of the plane is in the picture, from -1 to 1.
+    /// Picture coordinates of a point of the plane, from -1 to 1.
     pub fn at(&self, point: Vec3) -> Vec2 {
         let from = point - self.centre;
         Vec2::new(from.dot(self.right), from.dot(self.up)) / self.half
     }
 
-    /// Where the plane cuts a triangle, in the picture's coordinates from -1 to 1.
+    /// Intersection of the plane with a triangle, in picture coordinates from -1 to 1.
     pub fn cut(&self, triangle: [Vec3; 3]) -> Option<[Vec2; 2]> {
         let normal = self.right.cross(self.up);
         let height = triangle.map(|p| (p - self.centre).dot(normal));
@@ -95,7 +95,7 @@ impl Plane {
         if over == [over[0]; 3] {
             return None;
         }
-        // The corner that is alone on its side.
+        // The single corner on one side.
         let alone = (0..3).find(|&n| over[n] != over[(n + 1) % 3] && over[n] != over[(n + 2) % 3])?;
         let end = |other: usize| {
             let share = height[alone] / (height[alone] - height[other]);
@@ -122,7 +122,7 @@ impl Slices {
         Ok(Self { pipeline, uniforms: [uniform()?, uniform()?, uniform()?] })
     }
 
-    /// Binds the three slices; `section` holds the places at rest of the brain's cuts.
+    /// Binds the three slices; `section` holds the rest positions on the brain's cuts.
     pub fn bind(
         &self,
         gpu: &Gpu,
@@ -139,7 +139,7 @@ impl Slices {
         Ok([bind(0)?, bind(1)?, bind(2)?])
     }
 
-    /// Tells the device what the slices show.
+    /// Uploads the slices' parameters.
     pub fn follow(&self, gpu: &Gpu, planes: &[Plane; 3], rectangles: &[[u32; 4]; 3], look: &SliceLook) {
         for n in 0..3 {
             let (plane, [x, y, width, height]) = (&planes[n], rectangles[n].map(|v| v as f32));

@@ -1,25 +1,27 @@
-//! Two eyes: how their views share the picture.
+//! Stereo: layout of two eyes' views in the picture.
 //!
 //! # Theory
 //! Off-axis frusta: both eyes look in parallel, and their pictures are shifted so that the camera's
-//! target has no parallax (Bourke 1999). Turned eyes would give upright parallax in the corners.
+//! target has no parallax (Bourke 1999). Converging eyes would cause vertical parallax in the
+//! corners.
 //!
 //! # When not to use it
-//! Half the frames a second of one eye; anaglyphs lose the red of the tissue.
+//! When frame rate or colour matters: it halves the frame rate, and anaglyphs lose the red of the
+//! tissue.
 
 use crate::camera::View;
 
-/// Both eyes' views in one picture. Slices are seen without depth.
+/// Both eyes' views in one picture; slices have no depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stereo {
-    /// How the views share the picture.
+    /// Layout of the views.
     pub look: StereoLook,
-    /// From eye to eye, mm, at the scale of the scene: 1/30 of the distance to the target is
-    /// comfortable. Negative swaps the eyes.
+    /// Distance between the eyes, mm, at the scale of the scene: 1/30 of the distance to the target
+    /// is comfortable. Negative swaps the eyes.
     pub eye_distance_mm: f32,
 }
 
-/// How two views share a picture.
+/// Layout of two views in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StereoLook {
     /// The left half for the left eye: screens and glasses that split the picture.
@@ -29,8 +31,7 @@ pub enum StereoLook {
 }
 
 impl Stereo {
-    /// The left and the right eye's views for a camera's; the one view where nobody or only one eye
-    /// looks.
+    /// The left and the right eye's views of a camera; the same view twice without stereo.
     pub(crate) fn views(stereo: Option<&Self>, view: View, target_mm: f32) -> [View; 2] {
         let aside = stereo.map(|s| 0.5 * s.eye_distance_mm).filter(|d| d.is_finite()).unwrap_or(0.0);
         [-aside, aside].map(|offset| view.from_aside(offset, target_mm))
@@ -38,8 +39,8 @@ impl Stereo {
 }
 
 impl StereoLook {
-    /// Where the left and the right eye's views are in the picture's area for them; one where there
-    /// is no room for two.
+    /// Rectangles of the left and the right eye's views in the picture's area; one if there is no
+    /// room for two.
     pub(crate) fn areas(look: Option<Self>, [x, y, width, height]: [u32; 4]) -> Vec<[u32; 4]> {
         let half = width / 2;
         match look {

@@ -1,4 +1,4 @@
-//! The ray-cast bone against closed forms and brute force.
+//! Tests ray-cast bone against closed forms and brute force.
 
 mod scene;
 
@@ -9,12 +9,12 @@ use trepan_gpu::Faults;
 use trepan_render::{Camera, Frame, Hit, Renderer, SliceLook, View};
 use trepan_volume::{AIR_HU, BoneVolume};
 
-/// A frame of the 3-D view alone.
+/// A frame with the 3-D view only.
 fn plain(camera: Camera) -> Frame<'static> {
     Frame { slices: SliceLook { shown: false, ..SliceLook::default() }, ..Frame::of(camera) }
 }
 
-/// Rays through the pixels' centres, row by row.
+/// Rays through the pixel centres, row by row.
 fn rays(view: &View, [width, height]: [u32; 2]) -> Vec<Vec3> {
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     let at =

@@ -1,5 +1,5 @@
-//! Where renderers fail: axis-parallel rays, eyes in odd places, volumes of nothing or of noise,
-//! and meshes that are no longer sound.
+//! Tests cases in which renderers fail: axis-parallel rays, odd camera positions, empty or noisy
+//! volumes, degenerate meshes.
 
 mod cube;
 mod scene;
@@ -17,7 +17,7 @@ fn plain(camera: Camera) -> Frame<'static> {
     Frame { slices: SliceLook { shown: false, ..SliceLook::default() }, ..Frame::of(camera) }
 }
 
-/// Hits of leaping rays, of rays that walk every cell, and of the device.
+/// Hits of skipping rays, of rays that visit every cell, and of the device.
 fn hits(gpu: Option<&Gpu>, bone: &Arc<BoneVolume>, frame: &Frame, size: [u32; 2]) -> Vec<Vec<Option<Hit>>> {
     let mut processor = ProcessorRenderer::new(&alone(bone), size).expect("the scene loads");
     let mut all = Vec::new();
@@ -35,7 +35,7 @@ fn hits(gpu: Option<&Gpu>, bone: &Arc<BoneVolume>, frame: &Frame, size: [u32; 2]
     all
 }
 
-/// Rays that disagree by more than some mm, or hit on one side only.
+/// Number of rays that differ by more than `most_mm`, or hit on one side only.
 fn disagree(a: &[Option<Hit>], b: &[Option<Hit>], most_mm: f32) -> usize {
     let far = |(a, b): &(&Option<Hit>, &Option<Hit>)| match (a, b) {
         (Some(a), Some(b)) => (a.distance_mm - b.distance_mm).abs() > most_mm,
@@ -45,7 +45,7 @@ fn disagree(a: &[Option<Hit>], b: &[Option<Hit>], most_mm: f32) -> usize {
 }
 
 #[test]
-fn noise_nothing_everything_and_single_voxels_are_hit_alike_by_all() {
+fn all_renderers_agree_on_noise_empty_full_and_single_voxels() {
     let gpu = device();
     let mut single = VoxelVolume::isotropic([1, 1, 1], Vec3::ZERO, 1.0, AIR_HU);
     single.data[0] = 1000;
@@ -110,8 +110,8 @@ fn sparse_rays_see_a_smooth_surface_where_it_is_and_every_wall() {
     }
 }
 
-/// Pixels of the brain on the processor and, where there is one, on the device, which must not
-/// differ by more than `most` along the rim.
+/// Pixels of the brain on the processor and, if available, on the device. They may differ by at
+/// most `most` along the rim.
 fn brain_pixels(gpu: Option<&Gpu>, mesh: &TetMesh, now: &[Vec3], cut: Option<Cut>, most: usize) -> usize {
     let data = SceneData { bone: None, brain: Some(mesh), mri: None, tint: None };
     let camera = Camera::viewed_from(Vec3::ZERO, Vec3::new(0.31, 1.0, 0.17), 90.0);
@@ -146,17 +146,17 @@ fn block(edge: usize, r: f32) -> TetMesh {
 }
 
 #[test]
-fn no_cracks_at_the_borders_of_tetrahedra_in_surface_and_cut() {
+fn no_cracks_between_tetrahedra_in_surface_and_cut() {
     let (gpu, mesh) = (device(), block(7, 12.0));
     let whole = brain_pixels(gpu.as_ref(), &mesh, &mesh.positions, None, 6);
-    // Moved nodes inside keep the silhouette: a crack would show the background.
+    // Moving interior nodes keeps the silhouette: a crack would show the background.
     let mut random = fastrand::Rng::with_seed(3);
     let mut inner = mesh.positions.clone();
     let shaken = inner.iter_mut().filter(|p| p.abs().max_element() < 11.0);
     shaken.for_each(|p| *p += Vec3::new(random.f32(), random.f32(), random.f32()) - 0.5);
     assert_eq!(brain_pixels(gpu.as_ref(), &mesh, &inner, None, 6), whole);
-    // The face of a cut that faces the eye fills the outline of the half that is left: as many
-    // pixels as a block that ends there.
+    // A cut surface that faces the eye fills the outline of the remaining half: as many pixels as a
+    // block that ends there.
     let cut = Cut { point: Vec3::ZERO, normal: Vec3::Y, bone: false };
     let mut half = mesh.clone();
     half.positions.iter_mut().for_each(|p| p.y = 0.5 * (p.y - 12.0));
@@ -166,7 +166,7 @@ fn no_cracks_at_the_borders_of_tetrahedra_in_surface_and_cut() {
 }
 
 #[test]
-fn folded_flat_and_broken_meshes_are_drawn_as_far_as_they_go() {
+fn valid_parts_of_degenerate_meshes_are_drawn() {
     let (gpu, mesh) = (device(), block(4, 12.0));
     let whole = brain_pixels(gpu.as_ref(), &mesh, &mesh.positions, None, 6);
     let cut = Some(Cut { point: Vec3::new(0.0, 3.0, 0.0), normal: Vec3::new(0.2, 1.0, 0.1), bone: false });

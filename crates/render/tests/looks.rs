@@ -1,4 +1,4 @@
-//! Paint, overlay, cut and two eyes: on the device as by the processor, and each where it belongs.
+//! Tests paint, overlay, cut and stereo on the device and the processor.
 
 mod cube;
 mod scene;
@@ -19,7 +19,7 @@ use trepan_volume::{BoneVolume, VoxelVolume};
 
 const SIZE: [u32; 2] = [320, 240];
 
-/// Blue over everything with a y over `from`.
+/// Blue paint where y is over `from`.
 fn blue(from: f32, version: u64) -> Paint {
     let dims = [16, 16, 16];
     let texel = |at: usize| [0, 0, 255, if at / 16 % 16 * 4 >= (32.0 + from) as usize { 255 } else { 0 }];
@@ -27,10 +27,10 @@ fn blue(from: f32, version: u64) -> Paint {
     Paint { origin: Vec3::splat(-32.0), spacing_mm: Vec3::splat(4.0), dims, rgba, version }
 }
 
-/// Radius of what is bright in the MRI, mm.
+/// Radius of the bright ball in the MRI, mm.
 const BRIGHT_MM: f32 = 11.0;
 
-/// An MRI that is bright in a ball.
+/// An MRI with a bright ball.
 fn ball(centre: DVec3) -> VoxelVolume<f32> {
     let mut mri = VoxelVolume::isotropic([40; 3], Vec3::splat(-39.0), 2.0, 30.0f32);
     for at in 0..mri.data.len() {
@@ -90,7 +90,7 @@ fn frames<'a>(paint: &'a Paint, markers: &'a [Vec3]) -> Vec<(&'static str, Frame
     ]
 }
 
-/// A skull with a hole, a brain in it and its MRI.
+/// A skull with a hole, with a brain and its MRI.
 fn head() -> (Arc<BoneVolume>, TetMesh, VoxelVolume<f32>) {
     let hole = DVec3::new(-6.0, 22.0, 6.0);
     let shell = bone(64, |p| ((p.length() - 24.0).abs() - 3.0).max(9.0 - (p - hole).length()));
@@ -98,7 +98,7 @@ fn head() -> (Arc<BoneVolume>, TetMesh, VoxelVolume<f32>) {
 }
 
 /// A stored picture. With `TREPAN_GOLDEN=write` in the environment the picture is stored first:
-/// look at it before it is kept.
+/// inspect it before committing.
 fn golden(name: &str, image: &Image) -> Image {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{name}.png"));
     if std::env::var_os("TREPAN_GOLDEN").is_some_and(|v| v == "write") {
@@ -207,7 +207,7 @@ fn a_cut_brain_shows_its_mri_in_the_plane_and_moves_it_with_the_tissue() {
     let mut renderer = ProcessorRenderer::new(&data, SIZE).expect("the scene loads");
     let cut = Cut { point: Vec3::ZERO, normal: Vec3::Y, bone: false };
     let frame = Frame { cut: Some(cut), ..plain(Vec3::Y) };
-    // Seen from in front, +x, the patient's right, is on the left.
+    // Seen from the front, +x, the patient's right, is on the left.
     let mut bright = |frame: &Frame| {
         renderer.draw(frame).expect("drawn");
         let image = renderer.image();
@@ -261,8 +261,8 @@ fn bone_under_a_cut_is_hit_in_the_plane_and_over_it_there_is_none() {
     assert_eq!(gpu.faults(), Faults::default());
 }
 
-/// Rays that leave the part that is kept are not followed to the end of their brick: fringes of
-/// what is cut away would stand over the edge.
+/// Rays along a cut end at the plane: following them to the end of their brick would hit removed
+/// bone.
 #[test]
 fn bone_seen_along_a_cut_has_no_hit_over_it() {
     let Some(gpu) = device() else { return };
@@ -335,7 +335,7 @@ fn markers_are_discs_where_they_are_and_faint_behind_bone() {
     };
     let radius = (1.0f32 / 125.0).asin().tan() / 0.3f32.tan() * 120.0;
     let (seen, disc) = (pink(Vec3::new(0.0, 5.0, 0.0)), std::f32::consts::PI * radius * radius);
-    // The far side from the lamp is darker than what is counted.
+    // The side away from the lamp is darker than the threshold.
     assert!((0.6 * disc..disc + 6.0).contains(&(seen as f32)), "{seen} for {disc}");
     assert_eq!(pink(Vec3::new(0.0, -20.0, 0.0)), 0);
     assert_eq!(gpu.faults(), Faults::default());

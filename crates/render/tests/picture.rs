@@ -1,4 +1,4 @@
-//! Brain, tool and slices in the finished picture.
+//! Tests brain, tool and slices in the finished picture.
 
 mod cube;
 mod scene;
@@ -20,8 +20,8 @@ fn picture(renderer: &mut Renderer, frame: &Frame) -> Image {
     renderer.image().expect("the picture is read")
 }
 
-/// How much redder than green a pixel is: the brain and its outline are, bone and steel are less
-/// so.
+/// How much redder than green a pixel is; larger for the brain and its outline than for bone and
+/// steel.
 fn redness(image: &Image, x: u32, y: u32) -> i32 {
     let [r, g, _, _] = image.pixel(x, y);
     i32::from(r) - i32::from(g)
@@ -40,7 +40,7 @@ fn the_brain_is_seen_where_it_is_and_hidden_by_bone() {
     assert!(redness(&at_rest, 32, 32) > 30 && redness(&at_rest, 4, 32) < 10, "{:?}", at_rest.pixel(32, 32));
     let moved: Vec<Vec3> = mesh.positions.iter().map(|&p| p + 25.0 * Vec3::X).collect();
     let aside = picture(&mut renderer, &Frame { brain_positions: Some(&moved), ..front });
-    // Seen from in front, +x, the patient's right, is on the left.
+    // Seen from the front, +x, the patient's right, is on the left.
     assert!(redness(&aside, 32, 32) < 10 && redness(&aside, 11, 32) > 30, "{:?}", aside.pixel(11, 32));
     let above = plain(Camera::viewed_from(Vec3::ZERO, Vec3::Z, 120.0));
     let (hidden, shown) =
@@ -91,7 +91,7 @@ fn the_tool_is_where_its_pose_says_and_throws_a_shadow() {
 #[test]
 fn slices_have_the_patients_right_on_the_left_and_show_density_and_signal() {
     let Some(gpu) = device() else { return };
-    // Bone on the patient's right, in front, at the top.
+    // Bone at the patient's right, front and top.
     let lump = bone(60, |p| (p - DVec3::new(15.0, 15.0, 15.0)).length() - 9.0);
     let affine = DAffine3::from_scale_rotation_translation(
         DVec3::new(-4.0, 4.0, 4.0),

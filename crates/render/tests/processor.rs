@@ -1,4 +1,4 @@
-//! The picture without a device: against closed forms, and against the device's.
+//! Tests the processor's pictures against closed forms and against the device's.
 
 mod cube;
 mod scene;
@@ -95,10 +95,10 @@ fn a_ball_drawn_by_the_processor_is_a_ball() {
     assert!((nearest - 100.0).abs() < 0.05, "{nearest}");
 }
 
-/// A few crumbs of bone far apart, seen from all sides, from far off, from the border and from
-/// among them: leaping, alone or as a beam for a tile, passes none.
+/// Empty-space skipping, per ray or as a beam for a tile, misses none of a few isolated voxels.
+/// They are seen from all sides, from far away, from the border and from among them.
 #[test]
-fn leaping_finds_what_walking_every_cell_finds() {
+fn empty_space_skipping_changes_no_hit() {
     let mut random = fastrand::Rng::with_seed(4);
     let dims = [90, 71, 63];
     let mut ct = VoxelVolume::isotropic(dims, Vec3::new(-40.0, 3.0, 7.0), 1.0, AIR_HU);
@@ -133,7 +133,7 @@ fn leaping_finds_what_walking_every_cell_finds() {
 }
 
 #[test]
-fn threads_change_nothing_and_neither_does_following() {
+fn threads_and_incremental_updates_do_not_change_the_picture() {
     let (shell, mesh, mri, frame) = head();
     let data = SceneData { bone: Some(shell.clone()), brain: Some(&mesh), mri: Some(&mri), tint: None };
     let mut one = ProcessorRenderer::new(&data, [160, 120]).expect("the scene loads");
@@ -205,7 +205,7 @@ fn a_brain_and_its_mri_need_no_ct() {
     let size = [400, 300];
     let mut processor = ProcessorRenderer::new(&data, size).expect("a scene without a CT loads");
     let camera = Camera::viewed_from(Vec3::ZERO, Vec3::new(0.5, 1.0, 0.4), 200.0);
-    // A tool far outside the scanned box leaves the slices where the camera looks.
+    // With the tool far outside the scanned box the slices stay at the camera's target.
     let world_from_tool = Pose::from_translation(Vec3::new(0.0, 90.0, 0.0));
     let slices = SliceLook { half_height_mm: Some(30.0), ..SliceLook::default() };
     let frame = Frame { tool: Some(Tool::probe(3.0)), world_from_tool, slices, ..Frame::of(camera) };

@@ -1,5 +1,5 @@
-//! Strokes over and drills into a synthetic head of 425 x 403 x 283 voxels and prints what a tick
-//! costs, for each method or for the one named: `tick [METHOD [RADIUS_MM]]`.
+//! Strokes over and drills into a synthetic head and prints the cost of a tick. The head has 425 x
+//! 403 x 283 voxels; every method runs, or the one named: `tick [METHOD [RADIUS_MM]]`.
 
 use std::time::Instant;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};

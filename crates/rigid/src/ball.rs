@@ -72,8 +72,8 @@ impl Ball {
         if disc.shaft { self.shaft.radius } else { self.radius }
     }
 
-    /// The place on the shaft's axis that is nearest to a `point` of a disc at the shaft, all as
-    /// seen from the ball's centre; for other discs that centre.
+    /// The place on the shaft's axis nearest to a `point` of a disc, relative to the ball's centre.
+    /// For discs that are not at the shaft it is the centre.
     #[inline]
     pub fn arm(&self, disc: &Disc, point: Vec3) -> Vec3 {
         if disc.shaft { self.shaft.at(self.shaft.along(point)) } else { Vec3::ZERO }

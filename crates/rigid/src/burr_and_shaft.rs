@@ -5,7 +5,8 @@
 //! A voxel of bone touches the burr when its centre is nearer to the burr's centre than the radius,
 //! and the shaft when it is nearer to the shaft's axis than the shaft's radius. For each of the two
 //! ```text
-//! n = Σ dᵢ nᵢ / |Σ dᵢ nᵢ| ,   d = max dᵢ ,   x = Σ dᵢ xᵢ / Σ dᵢ        dᵢ = radius - distance, nᵢ from the voxel to centre or axis
+//! n = Σ dᵢ nᵢ / |Σ dᵢ nᵢ| ,   d = max dᵢ ,   x = Σ dᵢ xᵢ / Σ dᵢ
+//! dᵢ = radius - distance,   nᵢ from the voxel to centre or axis
 //! F = k (d n)₁ + k (d n)₂ ,   τ = (x₂ - tip) × k (d n)₂
 //! ```
 //! Their spring has a damper and friction beside it, which here are the force model's part.

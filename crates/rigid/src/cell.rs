@@ -19,8 +19,8 @@ use glam::DVec3;
 /// Places for edges: `8 axis + lower corner`.
 const EDGES: usize = 24;
 
-/// Calls `triangle` with each triangle, in units of the cell's edge from corner 0; `density[c]` is
-/// that over the isovalue at the corner whose bits are x, y, z.
+/// Calls `triangle` with each triangle of the isosurface, in units of the cell's edge from
+/// corner 0. `density[c]` is that over the isovalue at the corner whose bits are x, y, z.
 pub(crate) fn triangles(density: &[f64; 8], mut triangle: impl FnMut([DVec3; 3])) {
     if density.iter().all(|&d| d >= 0.0) || density.iter().all(|&d| d < 0.0) {
         return;

@@ -6,7 +6,8 @@
 //! bone. From there the proxy follows on the tangent plane of the density, as far as its way is
 //! free; a spring joins the two:
 //! ```text
-//! F = k (proxy₀ - tip) + k (proxyₛ - xₛ) ,   τ = (xₛ - tip) × k (proxyₛ - xₛ)      s: the shaft's vertex that is held furthest off
+//! F = k (proxy₀ - tip) + k (proxyₛ - xₛ) ,   τ = (xₛ - tip) × k (proxyₛ - xₛ)
+//! s: the shaft's vertex whose proxy is furthest off
 //! ```
 //!
 //! # Practice

@@ -6,7 +6,7 @@
 //! in the space of centres. The surface is a set of small discs on the crossings of the density
 //! with the isovalue; discs yᵢ, at distance dᵢ in direction gᵢ, give half-spaces
 //! ```text
-//! gᵢ·c ≥ gᵢ·yᵢ + r        safe: a half-space that leaves the convex disc out keeps the ball out of it
+//! gᵢ·c ≥ gᵢ·yᵢ + r        safe: a half-space without the convex disc keeps the ball out of it
 //! ```
 //! and the proxy moves to the nearest point to the device that satisfies all of them, again and
 //! again until it rests. Every step stays within the region for which all discs are known, so there

@@ -51,8 +51,8 @@ pub(crate) fn nearest(goal: Vec3, spaces: &[HalfSpace]) -> Option<Vec3> {
     Some(solved(goal, spaces)?.0)
 }
 
-/// Which of the half-spaces hold the nearest point off `goal`, and how far each of them: the sum of
-/// their normals so weighted is the way from the goal.
+/// The half-spaces that keep the nearest point off `goal`, each with its weight. The sum of their
+/// normals so weighted is the way from the goal.
 pub(crate) fn supports(goal: Vec3, spaces: &[HalfSpace]) -> Option<impl Iterator<Item = (usize, f32)>> {
     let (x, active) = solved(goal, spaces)?;
     let normals: [DVec3; 3] =

@@ -30,7 +30,8 @@
 //! let mut contact = Method::RECOMMENDED.build(&Tool::burr(2.0));
 //! contact.reset(Pose::from_translation(Vec3::Z * 2.5));
 //! let mut out = RigidStep::default();
-//! contact.step(&bone, &ToolState::at(Pose::from_translation(Vec3::Z * 1.7)), false, 1.0, &mut out);
+//! let tool = ToolState::at(Pose::from_translation(Vec3::Z * 1.7));
+//! contact.step(&bone, &tool, false, 1.0, &mut out);
 //! assert!((out.manifold.depth_mm - 0.3).abs() < 0.01 && out.manifold.normal.z > 0.999);
 //! # Ok::<(), trepan_volume::BoneError>(())
 //! ```

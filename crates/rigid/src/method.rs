@@ -75,12 +75,12 @@ impl Method {
         }
     }
 
-    /// The method of that name in its default configuration. Also takes the names that recordings and
-    /// command lines of version 0.1 have.
+    /// The method of that name in its default configuration. Also takes the names that recordings
+    /// and command lines of version 0.1 have.
     pub fn named(name: &str) -> Option<Self> {
         let name = match name {
-            "distance-field" => "god-object-sphere",
-            "distance-field-shaft" => "god-object-sphere-shaft",
+            "distance-field" => "god-object-sphere",             // version 0.1
+            "distance-field-shaft" => "god-object-sphere-shaft", // version 0.1
             name => name,
         };
         Self::all().into_iter().find(|method| method.name() == name)
@@ -113,8 +113,8 @@ impl Method {
         matches!(self, Self::Thesis(_) | Self::CentreLine(_) | Self::GodObjectSphere(_) | Self::Brute(_))
     }
 
-    /// Whether the method feels the tool's shaft too: then the tool must be held as a hand holds
-    /// it, with its axis out of the bone.
+    /// Whether the method also touches with the tool's shaft. Then the tool must be held as a hand
+    /// holds it, with its axis out of the bone.
     pub fn has_shaft(&self) -> bool {
         match self {
             Self::GodObjectSphere(config) => config.shaft,

@@ -6,7 +6,7 @@
 //! normal:
 //! ```text
 //! dᵢ = (centre - pᵢ)·nᵢ ,  dᵢ > 0 only
-//! sum      d n = Σ dᵢ nᵢ · min(1, 10/N)      McNeely et al. 1999: a sum, reduced when more than ten points touch
+//! sum      d n = Σ dᵢ nᵢ · min(1, 10/N)      McNeely et al. 1999: reduced over ten points
 //! average  d n = Σ dᵢ nᵢ / N                 Renz et al. 2001
 //! ```
 //!

@@ -3,7 +3,7 @@
 //! # Theory
 //! ```text
 //! per tick:  hu ← hu - 1                                           for every voxel in contact
-//! rate:      V̇ = μ F ω(F) r / u                                    mm³/ms of bone at the reference density
+//! rate:      V̇ = μ F ω(F) r / u               mm³/ms of bone at the reference density
 //! ```
 //! Rate is Archard's and Preston's law of abrasive wear, volume in proportion to load F times
 //! sliding speed ω r, written with a cutting ratio μ (tangential over normal force) and the

@@ -6,7 +6,8 @@
 //! the gradient of the density's quadratic B-spline, and is then that of the plane which fits the
 //! densities h of the 27 voxels around best that lie within a voxel of n's plane:
 //! ```text
-//! minimise Σ w (h - iso + g·d)² ,   w = B(d) · max(0, 1 - (n·d)²) ,   d: from x to the voxel,  n = g/|g|
+//! minimise Σ w (h - iso + g·d)² ,   w = B(d) · max(0, 1 - (n·d)²)
+//! d: from x to the voxel,  n = g/|g|
 //! ```
 //! What is further off is flat bone or flat air, and its gradient that of the grid's corners: the
 //! spline alone is up to 2.6 degrees off on planes, the fit 0.3. All of it is continuous, so that
@@ -223,9 +224,9 @@ impl Discs {
         });
     }
 
-    /// Moves the discs to where the crossings are now, and turns one in [`TURNS`] of those with a
-    /// point within `reach` of `centre` to its normal. The edges that cross must be the same as
-    /// when they were gathered.
+    /// Moves the discs to where the crossings are now, and turns some to their normals. It turns
+    /// one in [`TURNS`] of those with a point within `reach` of `centre`. The edges that cross must
+    /// be the same as when they were gathered.
     pub fn refresh(&mut self, window: &Window, centre: Vec3, reach: f32) {
         self.visited = self.list.len() as u32;
         self.wear = self.wear.wrapping_add(1);
@@ -242,8 +243,8 @@ impl Discs {
         }
     }
 
-    /// Gives those discs their normals that have a point within `reach` of the tool, the part of
-    /// which nearest to a place is at `centre`, voxels from [`Self::base`]. The others are of no
+    /// Computes the normals of the discs that have a point within `reach` of the tool. The tool's
+    /// part nearest to a place is at `centre`, voxels from [`Self::base`]. The others are of no
     /// use.
     pub fn shape(&mut self, densities: &impl Densities, centre: impl Fn(Vec3) -> Vec3, reach: f32) {
         for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
@@ -366,9 +367,10 @@ impl Block {
         [taps(-self.off.x), taps(-self.off.y), taps(-self.off.z)]
     }
 
-    /// The normal of the plane through the place that fits the densities within a voxel of the
-    /// plane of `normal` best; `None` when they do not say. A scanner's density rises for a voxel
-    /// or so about a surface and is flat beyond: what is flat would bend the slope.
+    /// The normal of the plane through the place that best fits the densities near it. Those within
+    /// a voxel of the plane of `normal` count; `None` when they do not determine it. A scanner's
+    /// density rises for a voxel or so about a surface and is flat beyond: what is flat would bend
+    /// the slope.
     fn fitted(&self, normal: Vec3) -> Option<Vec3> {
         let [tx, ty, tz] = self.taps();
         let (mut square, mut mixed, mut moment) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);

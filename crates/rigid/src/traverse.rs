@@ -21,9 +21,9 @@ use glam::{DVec3, IVec3};
 use trepan_geometry::{Aabb, Vec3};
 use trepan_volume::BoneVolume;
 
-/// Calls `visit` with each voxel from `from` to `to` (grid coordinates, voxel centres at whole
-/// numbers) and the share of the way at which it is entered, until `visit` returns true or the end
-/// is reached. Returns the share at which it was stopped.
+/// Calls `visit` with each voxel on the line from `from` to `to`, in grid coordinates with voxel
+/// centres at whole numbers. It gets the share of the way at which the voxel is entered, and
+/// returns true to stop. Returns the share at which it was stopped.
 pub(crate) fn traverse(from: Vec3, to: Vec3, mut visit: impl FnMut(IVec3, f32) -> bool) -> Option<f32> {
     let (a, b) = (from.as_dvec3() + 0.5, to.as_dvec3() + 0.5);
     let way = b - a;

@@ -10,8 +10,8 @@ const STIFFNESS: f32 = 2.0;
 const BONE_MM: f32 = 6.0;
 const RADIUS_MM: f32 = 3.0;
 
-/// A skull bone as a CT of 1 mm voxels shows it: hard tables 1.5 mm thick, a light and uneven
-/// middle, all blurred by the scanner.
+/// A skull bone as a CT of 1 mm voxels shows it, blurred by the scanner. It has hard tables 1.5 mm
+/// thick, a light and uneven middle.
 fn skull(inward: Vec3) -> BoneVolume {
     const N: usize = 40;
     let origin = Vec3::splat(-0.5 * (N as f32 - 1.0)) + Vec3::new(0.21, -0.37, 0.13);

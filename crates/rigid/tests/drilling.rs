@@ -1,4 +1,4 @@
-//! What the rate law promises: volume at a rate, whatever the tick, and a burr hole in seconds.
+//! What the rate law must keep: volume at a rate, whatever the tick, and a burr hole in seconds.
 
 mod common;
 use common::{at, bone};

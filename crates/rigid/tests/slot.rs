@@ -7,9 +7,9 @@ use trepan_rigid::{Method, RigidStep};
 
 const RADIUS_MM: f32 = 3.0;
 
-/// Down the middle of the slot, then against one wall and along it, all at 50 mm/s: how far the
-/// proxy is behind the hand across the wall's normal at most, mm, and the largest change of what
-/// lifts it while it goes along the wall, mm.
+/// Moves down the middle of the slot, then against one wall and along it, at 50 mm/s. Gives how far
+/// the proxy is behind the hand across the wall's normal at most, mm, and the largest change of
+/// what lifts it while it goes along the wall, mm.
 fn along_a_slot(axis: Vec3) -> (f32, f32) {
     let across = axis.any_orthonormal_vector();
     let along = axis.cross(across);

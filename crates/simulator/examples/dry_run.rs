@@ -1,5 +1,5 @@
-//! A craniotomy on a synthetic head without threads, clock or window: the haptic stage alone, as
-//! fast as it goes.
+//! A craniotomy on a synthetic head without threads, clock or window: the haptic stage alone, at
+//! full speed.
 //!
 //! `cargo run --release -p trepan-simulator --example dry_run`
 
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Bone from 60 to 66 mm around the origin, brain within 58 mm.
+/// Makes bone from 60 to 66 mm around the origin and brain within 58 mm.
 fn head() -> Result<(BoneVolume, DistanceField), trepan_volume::BoneError> {
     let n = 140;
     let mut ct = VoxelVolume::isotropic([n, n, n], Vec3::splat(-69.5), 1.0, -1000i16);

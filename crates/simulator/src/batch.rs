@@ -1,10 +1,10 @@
-//! Many recordings run again as one job: `--device replay:FOLDER`, of which `--shard I/N` takes
-//! every Nth.
+//! Replays a folder of recordings as one job: `--device replay:FOLDER`; `--shard I/N` takes every
+//! Nth.
 //!
 //! # Practice
-//! Each recording gets a folder of its own under `--out`, named after it; one that fails or is not
-//! whole is told and does not stop the others. Jobs of a cluster take one shard each and need
-//! nothing of one another; `cargo xtask merge` puts their summaries into one table.
+//! Each recording gets its own folder under `--out`, named after it. A recording that fails or is
+//! incomplete is reported and does not stop the others. Cluster jobs take one shard each and are
+//! independent; `cargo xtask merge` merges their summaries into one table.
 
 use crate::command::printable;
 use crate::error::SessionError;
@@ -14,14 +14,14 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use trepan_haptics::DeviceName;
 
-/// The recordings of a folder that are this shard's, in the order of their names; `None` when the
-/// device is not a folder of recordings.
+/// Lists the recordings of this shard in the order of their names. `None` if `--device` is not a
+/// folder of recordings.
 pub fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, SessionError> {
     let named = options.device.as_deref().and_then(|name| name.parse::<DeviceName>().ok());
     let folder = match named {
         Some(DeviceName::Replay(path)) if path.is_dir() => path,
         _ if options.shard.is_some() => {
-            let fault = "--shard takes its part of a folder of recordings: give --device replay:FOLDER";
+            let fault = "--shard needs a folder of recordings: give --device replay:FOLDER";
             return Err(SessionError::Usage(fault.into()));
         }
         _ => return Ok(None),
@@ -38,7 +38,7 @@ pub fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, SessionErro
     Ok(Some(files.into_iter().enumerate().filter(|(at, _)| at % of == shard).map(|(_, file)| file).collect()))
 }
 
-/// Runs recordings again, one after the other. Returns how many failed.
+/// Replays recordings one after the other; returns the number of failures.
 pub fn run(program: Program, options: &Options, built_in: &Inputs, files: &[PathBuf]) -> usize {
     let out = options.out.clone().unwrap_or_else(|| dated(program));
     let failed = |file: &&PathBuf| match one(program, options, built_in, file, &out) {
@@ -70,9 +70,9 @@ fn one(
     };
     let Ended { summary, lack, .. } = Session::open(program, options, built_in.clone())?.run()?;
     let replay = summary.replay.unwrap_or_default();
-    let told = format!("{}, {:.1} mm3 removed", replay.told(), summary.bone_removed_mm3);
+    let text = format!("{}, {:.1} mm3 removed", replay.describe(), summary.bone_removed_mm3);
     match lack {
-        Some(lack) => Err(SessionError::Usage(format!("{told}; {lack}"))),
-        None => Ok(told),
+        Some(lack) => Err(SessionError::Usage(format!("{text}; {lack}"))),
+        None => Ok(text),
     }
 }

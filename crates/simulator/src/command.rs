@@ -1,4 +1,5 @@
-//! What every program does with its command line: flags, session, exit code.
+//! Command line of the three programs: parses flags, runs a session or subcommand, returns the exit
+//! code.
 
 use crate::batch;
 use crate::case::choice::{Built, PlannedCase, plan_case};
@@ -16,15 +17,21 @@ use std::path::Path;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
-/// Runs a program. Exit code 0 for a session that ended, 2 for what the user can put right, 1 for
-/// the rest and for the replay of a recording that is not whole, 128 + n after signal n.
+/// Runs a program and returns its exit code.
 ///
-/// `built_in` is the case that is taken when no image is given.
+/// | code | meaning |
+/// |---|---|
+/// | 0 | the session or subcommand is complete |
+/// | 1 | internal error, or replay of an incomplete recording |
+/// | 2 | error that the user can correct |
+/// | 128 + n | ended by signal n |
+///
+/// `built_in` is the case that is used if no image is given.
 pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     guard_files();
     let options = match Options::try_parse() {
         Ok(options) => options,
-        // On a terminal clap would show them as they are.
+        // clap prints control characters of an argument unescaped.
         Err(fault) if std::env::args_os().any(|word| word.to_string_lossy().contains(char::is_control)) => {
             eprint!("{}", printable(&fault.to_string()));
             return ExitCode::from(2);
@@ -52,23 +59,24 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         Err(fault) => return failed(program, &fault),
     }
     match Session::open(program, options, built_in).and_then(Session::run) {
-        Ok(ended) => told(&ended),
+        Ok(ended) => report(&ended),
         Err(fault) => failed(program, &fault),
     }
 }
 
 fn batched(failures: usize, files: usize) -> ExitCode {
-    println!("{} of {files} recordings run again", files - failures);
+    println!("{} of {files} recordings replayed", files - failures);
     if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Does something else than a session.
+/// Runs a subcommand.
 fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
     let done = match task {
         Task::Plan { case, patient, tolerances, rate_hz, picture } => {
-            let wish = tolerances.check().and_then(|()| rate((*rate_hz).into())).map_err(SessionError::Usage);
-            let wish = wish.and_then(|()| ModelRequest::to_plan(program, patient, *tolerances, *rate_hz, *picture));
-            wish.and_then(|wish| planned(program, case.as_deref(), patient, built_in, wish))
+            let request = tolerances.check().and_then(|()| rate((*rate_hz).into())).map_err(SessionError::Usage);
+            let request =
+                request.and_then(|()| ModelRequest::to_plan(program, patient, *tolerances, *rate_hz, *picture));
+            request.and_then(|request| planned(program, case.as_deref(), patient, built_in, request))
         }
         Task::Case(CaseTask::Series { folder }) => list_series(folder),
         Task::Case(CaseTask::Build { patient, out }) => {
@@ -84,16 +92,16 @@ fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
             ExitCode::SUCCESS
         }),
         Task::Recording(RecordingTask::Check { file }) => recordings::check(program, file),
-        Task::Recording(RecordingTask::Repair { file, out }) => recordings::mend(file, out),
+        Task::Recording(RecordingTask::Repair { file, out }) => recordings::repair_file(file, out),
         Task::Device(DeviceTask::Test { name, out, duration }) => device_test::run(name, out, *duration).map(ended_by),
     };
     done.unwrap_or_else(|fault| failed(program, &fault))
 }
 
-/// One line for each series of a folder.
+/// Prints one line for each DICOM series of a folder.
 fn list_series(folder: &Path) -> Result<ExitCode, SessionError> {
     if !folder.is_dir() {
-        let fault = format!("{} is no folder: give the one that holds the slices", folder.display());
+        let fault = format!("{} is not a folder: give the one that holds the slices", folder.display());
         return Err(SessionError::Usage(fault));
     }
     let found = trepan_volume::dicom::series(folder)?;
@@ -110,22 +118,22 @@ fn list_series(folder: &Path) -> Result<ExitCode, SessionError> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What a case needs on this machine.
+/// Prints the models planned for a case on this machine.
 fn planned(
     program: Program,
     case: Option<&Path>,
     patient: &Patient,
     built_in: Inputs,
-    wish: ModelRequest,
+    request: ModelRequest,
 ) -> Result<ExitCode, SessionError> {
     let card = || driver::open().is_ok_and(|gpu| !gpu.is_software());
-    let PlannedCase { models, notes } = plan_case(program, case, patient, built_in, wish, card)?;
-    println!("{}", models.told());
+    let PlannedCase { models, notes } = plan_case(program, case, patient, built_in, request, card)?;
+    println!("{}", models.describe());
     notes.iter().for_each(|note| println!("note: {note}"));
     Ok(ExitCode::SUCCESS)
 }
 
-fn told(ended: &Ended) -> ExitCode {
+fn report(ended: &Ended) -> ExitCode {
     let summary = &ended.summary;
     println!(
         "{} ticks at {:.1} Hz (compute p50 {:.1}, p99 {:.1} us; {} late), force up to {:.2} N, {:.1} mm3 of bone removed, {} warnings, {} pictures",
@@ -147,7 +155,7 @@ fn told(ended: &Ended) -> ExitCode {
         println!("cut off the skull: {pieces} piece(s) of bone, the largest of {largest_mm3:.0} mm3");
     }
     if let Some(replay) = &summary.replay {
-        println!("replay: {}", replay.told());
+        println!("replay: {}", replay.describe());
     }
     println!("report: {}", printable(&ended.out.join("report.html").display().to_string()));
     if let Some(lack) = &ended.lack {
@@ -166,26 +174,26 @@ fn failed(program: Program, fault: &SessionError) -> ExitCode {
     ExitCode::from(fault.exit_code())
 }
 
-/// Text without what moves or colours a terminal: a file's name may hold such codes.
+/// Escapes control characters, with which a file name could control the terminal.
 pub fn printable(text: &str) -> String {
     let shown = |c: char| match c {
         '\n' | '\t' => c.to_string(),
         c if c.is_control() => c.escape_default().to_string(),
-        // Marks that turn the direction of writing hide a name's end.
+        // Marks of the writing direction can hide the end of a name.
         '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => c.escape_unicode().to_string(),
         c => c.to_string(),
     };
     text.chars().map(shown).collect()
 }
 
-/// Lets only the user read what this process writes, and makes a limit of file size (`ulimit -f`) a
-/// failed write, as a full disk is one, where it would end the process.
+/// Makes new files readable by the user only. It also turns an exceeded file size limit
+/// (`ulimit -f`) into a failed write; by default its signal would end the process.
 #[cfg(unix)]
 fn guard_files() {
     rustix::process::umask(rustix::fs::Mode::from_raw_mode(0o077));
     let passed = std::sync::Arc::default();
     if let Err(fault) = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, passed) {
-        tracing::debug!("a limit of file size will end the process: {fault}");
+        tracing::debug!("cannot handle SIGXFSZ, so a file size limit will end the process: {fault}");
     }
 }
 
@@ -197,7 +205,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_move_no_terminal() {
+    fn names_cannot_control_the_terminal() {
         assert_eq!(printable("a\u{1b}[31mb\u{7}\r\n\u{9b}2J"), "a\\u{1b}[31mb\\u{7}\\r\n\\u{9b}2J");
         assert_eq!(printable("Kopf-Müller \u{202e}gpj.nii"), "Kopf-Müller \\u{202e}gpj.nii");
     }

@@ -1,12 +1,13 @@
-//! Two recorded sessions side by side on one page: scores, what happened, forces over time.
+//! Compares two recorded sessions on one page: scores, events, forces over time.
 //!
 //! # Practice
-//! Scores come from the recorded ticks by the same sums as a session's own, so they need no case
-//! and no second run: a minute is read in a second. Files go by "first" and "second": their names
-//! may hold a patient's.
+//! Scores are computed from the recorded ticks as in a session, so neither case nor replay is
+//! needed: a minute of recording takes a second. The files are called "first" and "second", because
+//! their names may contain a patient's name.
 //!
 //! # When not to use it
-//! To ask whether two builds give the same forces: replay one, the summary says so bit by bit.
+//! To check whether two builds give the same forces: replay one recording; its summary compares the
+//! forces bit by bit.
 
 use crate::case::identity::Identity;
 use crate::error::SessionError;
@@ -20,7 +21,7 @@ use std::path::{Path, PathBuf};
 use trepan_link::Recording;
 use trepan_link::wire::TickRecord;
 
-/// Reads both, and writes `compare.html` into a folder.
+/// Reads two recordings and writes `compare.html` to a folder.
 pub fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionError> {
     let [first, second] = files;
     let sessions = [Recording::open(first)?, Recording::open(second)?];
@@ -30,9 +31,9 @@ pub fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionError> {
     whole(&path, page.as_bytes()).map(|()| path)
 }
 
-/// How the two are called.
+/// Names of the two sessions.
 const NAMES: [&str; 2] = ["first", "second"];
-/// Pages hold two columns.
+/// Style of a page with two columns.
 const WIDE: &str = ".two{display:grid;grid-template-columns:1fr 1fr;gap:1em}body{max-width:1200px}";
 
 fn page(sessions: &[Recording; 2]) -> Result<String, String> {
@@ -49,23 +50,21 @@ fn page(sessions: &[Recording; 2]) -> Result<String, String> {
     Ok(page)
 }
 
-/// What has to be known before numbers are compared.
+/// Adds remarks on differences that limit the comparison.
 fn remarks(page: &mut String, sessions: &[Recording; 2]) {
     let [first, second] = sessions.each_ref().map(|session| &session.header);
     let mut remark = |text: &str| _ = write!(page, "<p class=\"w\">{}</p>", escaped(text));
     if first.app != second.app {
-        remark(&format!("Two programs: {} and {}.", first.app, second.app));
+        remark(&format!("Different programs: {} and {}.", first.app, second.app));
     }
     let [of_first, of_second] = [first, second].map(Identity::of);
     match of_first.is(&of_second) {
         Some(true) if of_first.case != of_second.case => {
-            remark("One patient, but two cases made of the images: by other voxels, tetrahedra, labels or version.");
+            remark("One patient, but two cases: the voxels, tetrahedra, labels or version differ.");
         }
         Some(true) => {}
-        Some(false) => remark("Two patients: scores are of different anatomies."),
-        None => {
-            remark("Whether both are of one patient cannot be told: an older version recorded at least one of them.")
-        }
+        Some(false) => remark("Different patients: scores are of different anatomies."),
+        None => remark("Whether both are of one patient is unknown: an older version recorded at least one of them."),
     }
     for (key, value) in &first.config {
         let other = second.config.get(key).map_or("nothing", String::as_str);
@@ -75,13 +74,13 @@ fn remarks(page: &mut String, sessions: &[Recording; 2]) {
     }
     for (name, session) in NAMES.into_iter().zip(sessions) {
         if let Some(losses) = session.losses() {
-            remark(&format!("The {name} recording is not whole: {losses}."));
+            remark(&format!("The {name} recording is incomplete: {losses}."));
         }
     }
 }
 
-/// All sums over a session's ticks.
-fn kept(session: &Recording) -> ScoreKeeper {
+/// Computes the scores from a session's ticks.
+fn score_keeper(session: &Recording) -> ScoreKeeper {
     let mut scores = ScoreKeeper::default();
     session.ticks.iter().for_each(|tick| scores.add(tick));
     scores
@@ -99,9 +98,9 @@ fn scores(page: &mut String, sessions: &[Recording; 2]) {
     *page += "</table>";
 }
 
-/// Every score by its name; `None` where there is none.
+/// Lists every score by name; `None` if it is undefined.
 fn rows(session: &Recording) -> Vec<(String, Option<f64>)> {
-    let scores = serde_json::to_value(kept(session)).unwrap_or_default();
+    let scores = serde_json::to_value(score_keeper(session)).unwrap_or_default();
     let length = ("length_s".to_string(), session.ticks.last().map(|tick| tick.time_ms * 1e-3));
     let warnings = session.events.iter().filter(|event| event.kind == "warning").count();
     let of_scores = scores.as_object().into_iter().flatten().map(|(name, value)| (name.clone(), value.as_f64()));
@@ -109,7 +108,7 @@ fn rows(session: &Recording) -> Vec<(String, Option<f64>)> {
 }
 
 fn events(page: &mut String, sessions: &[Recording; 2]) {
-    *page += "<h2>What happened</h2><div class=\"two\">";
+    *page += "<h2>Events</h2><div class=\"two\">";
     for (name, session) in NAMES.into_iter().zip(sessions) {
         _ = write!(page, "<div><h3>{name}</h3><ul>");
         for event in session.events.iter().filter(|event| !["cleared", "score"].contains(&event.kind.as_str())) {
@@ -190,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_says_what_differs_and_holds_both() {
+    fn the_page_lists_differences_and_shows_both() {
         let page = page(&[session(1.0, "1"), session(2.5, "0.5")]).unwrap();
         assert!(page.contains("spacing_mm was 1 in the first session, 0.5 in the second"));
         assert!(page.contains("<td class=\"n\">1.000</td><td class=\"n\">2.500</td><td class=\"n\">1.500</td>"));
@@ -199,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_none_is_told_and_leaves_nothing() {
+    fn an_invalid_file_is_an_error_and_writes_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let (file, out) = (folder.path().join("a.mcap"), folder.path().join("out"));
         fs::write(&file, "no recording").unwrap();

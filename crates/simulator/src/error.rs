@@ -1,41 +1,41 @@
-//! What can go wrong before and around a session, and the exit code that says so.
+//! Errors before and after a session, and their exit codes.
 
 use std::path::PathBuf;
 
-/// A session that could not begin or end. Everything that the user can put right exits with 2, the
-/// rest with 1.
+/// Error that keeps a session from starting or from writing its files. Errors that the user can
+/// correct exit with 2, others with 1.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// A flag or a combination of flags.
+    /// Invalid flag or combination of flags.
     #[error("{0}")]
     Usage(String),
-    /// An image that cannot be read.
+    /// Unreadable image.
     #[error(transparent)]
     Read(#[from] trepan_volume::ReadError),
-    /// Images that do not make a case.
+    /// Images from which no case can be built.
     #[error("{0}")]
     Case(String),
-    /// A device that is not known or not there.
+    /// Unknown or missing device.
     #[error("--device: {0}")]
     Device(String),
-    /// A recording that cannot be read or begun.
+    /// Recording that cannot be read or created.
     #[error(transparent)]
     Recording(#[from] trepan_link::LinkError),
-    /// A file or folder of the output.
+    /// Output file or folder that cannot be written.
     #[error("cannot write {}: {fault}; give another folder with --out", path.display())]
     Output {
-        /// Which.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         fault: std::io::Error,
     },
-    /// Anything that is not the user's to mend.
+    /// Internal error, which the user cannot correct.
     #[error("{0}")]
     Internal(String),
 }
 
 impl SessionError {
-    /// 2 for what the user can put right, 1 for the rest.
+    /// Exit code: 2 for errors that the user can correct, else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Internal(_) => 1,

@@ -1,5 +1,5 @@
-//! What holds the tools: the devices that the options name, and what the force guard of each must
-//! know of it.
+//! Opens the devices that the options name, and keeps the properties that their force guards depend
+//! on.
 
 use crate::case::plan::Plan;
 use crate::error::SessionError;
@@ -15,15 +15,15 @@ use trepan_haptics::{
 };
 use trepan_link::Recording;
 
-/// What holds the tool.
+/// An open device of the first hand.
 pub struct OpenDevice {
-    /// For the haptic loop; `None` for a replay, which brings its own hand.
+    /// Device for the haptic loop; `None` for a replay, which has recorded readings.
     pub device: Option<Box<dyn HapticDevice>>,
-    /// The window's end of the mouse.
+    /// Handle with which the window moves the mouse device.
     pub pointer: Option<mouse::MouseHandle>,
-    /// The window into a device's faults.
+    /// Access to the device's faults.
     pub watch: Option<Watch>,
-    /// The session that is watched.
+    /// The session that is watched, if any.
     pub watching: Option<Watching>,
 }
 
@@ -61,7 +61,7 @@ impl OpenDevice {
             hardware => match hardware::open(hardware, workspace(&plan.site, options.device_scale)) {
                 Some(opened) => {
                     let opened = opened.map_err(|f| fault(&f))?;
-                    bears(&opened.device.capabilities(), rate_hz)?;
+                    check_rate(&opened.device.capabilities(), rate_hz)?;
                     hand.watch = Some(opened.watch);
                     Some(Box::new(Clutch::new(opened.device)))
                 }
@@ -72,17 +72,17 @@ impl OpenDevice {
     }
 }
 
-/// What the second hand holds.
-pub struct SecondHold {
-    /// For the haptic loop.
+/// An open device of the second hand.
+pub struct SecondDevice {
+    /// Device for the haptic loop.
     pub device: Box<dyn HapticDevice>,
-    /// The window into a device's faults.
+    /// Access to the device's faults.
     pub watch: Option<Watch>,
 }
 
-impl SecondHold {
-    /// Opens the device. One of metal lives on a thread of its own, so that its link never holds
-    /// the first hand up.
+impl SecondDevice {
+    /// Opens the device. Hardware runs on its own thread, so that its link never delays the first
+    /// hand.
     pub fn open(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
         let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
         let script = |name: &str| scripted(name, options, plan);
@@ -92,12 +92,14 @@ impl SecondHold {
                 let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
                 (Box::new(simulated::Simulated::new(config, grip, Box::new(script(operation)?))), None)
             }
-            metal => {
+            hardware_name => {
                 let mut beside = workspace(&plan.site, options.device_scale);
-                // Both hands rest in the middle of their boxes: there the tools stand side by side.
+                // With both hands in the middle of their workspaces the tools are side by side.
                 beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
-                let opened = hardware::open(metal, beside).ok_or_else(|| unfit(metal))?.map_err(|f| fault(&f))?;
-                bears(&opened.device.capabilities(), rate_hz)?;
+                let opened = hardware::open(hardware_name, beside)
+                    .ok_or_else(|| unfit(hardware_name))?
+                    .map_err(|f| fault(&f))?;
+                check_rate(&opened.device.capabilities(), rate_hz)?;
                 (Box::new(ThreadedDevice::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
             }
         };
@@ -108,7 +110,7 @@ impl SecondHold {
 /// Duration of a scripted operation, and of one that cuts a flap, s.
 const SCRIPT_S: (f64, f64) = (20.0, 75.0);
 
-/// A scripted operation after a plan.
+/// Makes the script of an operation that follows a plan.
 fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, SessionError> {
     let usual_s = if name == "flap" { SCRIPT_S.1 } else { SCRIPT_S.0 };
     let how = script::Plan { outline: plan.outline.clone(), ..script::Plan::default() };
@@ -116,8 +118,8 @@ fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, Sessio
     script.map_err(|fault| SessionError::Device(fault.to_string()))
 }
 
-/// Refuses more ticks a second than a device bears.
-fn bears(device: &Capabilities, rate_hz: f32) -> Result<(), SessionError> {
+/// Refuses a tick rate above that of the device.
+fn check_rate(device: &Capabilities, rate_hz: f32) -> Result<(), SessionError> {
     if rate_hz <= device.rate_hz {
         return Ok(());
     }
@@ -125,10 +127,10 @@ fn bears(device: &Capabilities, rate_hz: f32) -> Result<(), SessionError> {
     Err(SessionError::Usage(fault))
 }
 
-/// How far the second hand's box lies to the left of the first one's, mm.
+/// Offset of the second hand's workspace to the left of the first one's, mm.
 const SIDE_MM: f32 = 30.0;
 
-/// The second hand's device, if one is named and can stand beside the first.
+/// Name of the second hand's device, if given; refuses one that conflicts with the first.
 pub fn second_name(first: &DeviceName, options: &Options) -> Result<Option<DeviceName>, SessionError> {
     let Some(text) = &options.second_device else { return Ok(None) };
     let name: DeviceName = text.parse().map_err(|fault: trepan_haptics::NameError| second(fault.to_string()))?;
@@ -153,20 +155,19 @@ fn second(fault: String) -> SessionError {
     SessionError::Usage(format!("--second-device: {fault}"))
 }
 
-/// The faults that a device had, in a sentence.
+/// Describes the faults of a device; `None` without faults.
 pub fn faults(watch: &Watch) -> Option<String> {
     let last = watch.fault().map_or_else(String::new, |fault| format!("; the last one: {fault}"));
     (watch.count() > 0).then(|| format!("the device had {} faults{last}", watch.count()))
 }
 
-/// A device's small box in front of the site: its middle 20 mm outside the entry, seen as the
-/// picture is.
+/// Maps the device's workspace to the site: centred 20 mm outside the entry, oriented like the
+/// picture.
 fn workspace(site: &Site, scale: f32) -> Workspace {
     Workspace::facing(site.entry - 20.0 * site.inward, site.inward, Vec3::Z, scale)
 }
 
-/// The device that is named; without a name the mouse where there is a window, else the program's
-/// script.
+/// Name of the requested device; by default the mouse with a window, else the program's script.
 pub fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
     let script = || DeviceName::Script(program.script().into());
     let name = match &options.device {
@@ -184,18 +185,18 @@ pub fn device_name(program: Program, options: &Options, windowed: bool) -> Resul
     Ok(name)
 }
 
-/// What the force guard and the walls must know of a device; recorded, so that a replay feels
-/// alike.
+/// Device properties that the force guard and the walls depend on; recorded, so that a replay gives
+/// the same forces.
 pub struct DeviceLimits {
-    /// Seen in the patient: its encoder step is enlarged as its motion is.
+    /// Capabilities, with the encoder step multiplied by the motion scale.
     device: Capabilities,
-    /// World mm per device mm.
+    /// Motion scale, world mm per device mm.
     scale: f32,
 }
 
-/// What the entries of either hand begin with.
+/// Prefix of the first hand's header entries.
 pub const FIRST: &str = "device_";
-/// The second hand's.
+/// Prefix of the second hand's header entries.
 pub const SECOND: &str = "second_device_";
 
 const PEAK: &str = "peak_force_n";
@@ -208,14 +209,14 @@ const DAMPING: &str = "damping_n_ms_per_mm";
 const SCALE: &str = "scale";
 
 impl DeviceLimits {
-    /// Of a device at hand, whose motion is enlarged by `scale`.
+    /// Properties of an open device whose motion is multiplied by `scale`.
     pub fn of(device: &Capabilities, scale: f32) -> Self {
         let position_resolution_mm = scale * device.position_resolution_mm;
         Self { device: Capabilities { position_resolution_mm, ..device.clone() }, scale }
     }
 
-    /// What a recorded session knew of the device of a hand ([`FIRST`], [`SECOND`]); nothing where
-    /// there is no recording.
+    /// Reads the properties of a hand's device ([`FIRST`], [`SECOND`]) from a recording; zeros
+    /// without a recording.
     pub fn recorded(recording: Option<&Recording>, hand: &str) -> Self {
         let config = recording.map(|recording| &recording.header.config);
         let number = |name: &str| config.and_then(|c| c.get(&format!("{hand}{name}"))?.parse().ok()).unwrap_or(0.0f32);
@@ -232,7 +233,7 @@ impl DeviceLimits {
         Self { device, scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0) }
     }
 
-    /// What [`DeviceLimits::recorded`] reads.
+    /// Header entries that [`DeviceLimits::recorded`] reads.
     pub fn entries(&self, hand: &str) -> [(String, String); 8] {
         let device = &self.device;
         [
@@ -248,15 +249,16 @@ impl DeviceLimits {
         .map(|(name, value)| (format!("{hand}{name}"), value.to_string()))
     }
 
-    /// The guard for it.
+    /// Configuration of the force guard.
     pub fn guard(&self) -> GuardConfig {
         self.device.guard_config()
     }
 
-    /// A wall that the device holds stable, and that is no stiffer at the hand for being enlarged.
+    /// Divides a wall's stiffness and damping by a scale over 1, and limits them to what the device
+    /// renders stably.
     pub fn coupled(&self, wall: Viscoelastic, tick_ms: f32) -> Viscoelastic {
-        let enlarged = self.scale.max(1.0);
-        let wall = Viscoelastic { stiffness: wall.stiffness / enlarged, damping: wall.damping / enlarged };
+        let scale = self.scale.max(1.0);
+        let wall = Viscoelastic { stiffness: wall.stiffness / scale, damping: wall.damping / scale };
         self.device.coupled(wall, tick_ms)
     }
 }

@@ -1,25 +1,25 @@
-//! The simulators: threads, clocks, phases, warnings, scores, and a session from its flags to its
-//! files.
+//! Runs a simulation session from its flags to its files: threads, clocks, phases, warnings,
+//! scores, recording.
 //!
 //! # Theory
-//! Three loops turn side by side and exchange newest values without waiting: the haptic tick at 1
-//! kHz or more, the collision step, the solver step; a fourth thread draws. Each loop's body is a
-//! stage without a clock:
+//! Three loops run in parallel and exchange their newest values without waiting: the haptic tick at
+//! 1 kHz or more, the collision step and the solver step. A fourth thread renders. The body of each
+//! loop is a stage without a clock:
 //!
-//! | stage | reads | gives |
+//! | stage | reads | returns |
 //! |---|---|---|
 //! | [`HapticStage::tick`] | device, newest patch | wrench, tool, record |
-//! | [`CollisionStage::step`] | newest tool, newest brain | patch, contacts, record |
-//! | [`SolverStage::step`] | newest contact | moved brain, record |
+//! | [`CollisionStage::step`] | newest tool, newest node positions | patch, contacts, record |
+//! | [`SolverStage::step`] | newest contact | moved nodes, record |
 //!
-//! [`threads`] runs the stages live; [`lockstep`] runs them again from a recording, bit for bit.
+//! [`threads`] runs the stages live; [`lockstep`] replays them from a recording, bit for bit.
 //!
 //! # Practice
-//! [`Session::open`] finds everything that a user can get wrong before anything is written;
-//! [`Session::run`] runs and writes.
+//! [`Session::open`] reports every user error before anything is written; [`Session::run`] runs the
+//! session and writes its files.
 //!
 //! # When not to use it
-//! To use one method in a program of your own: take its crate.
+//! To use a single method in your own program: use the method's crate.
 
 mod batch;
 mod case;

@@ -1,19 +1,18 @@
-//! What the operation is: flap, fluid lost, what must not be touched, how stiff the brain is, how
-//! fast the ticks come. From the options, else from the recording that is run again, else the
-//! usual.
+//! Settings of an operation: flap, loss of cerebrospinal fluid, forbidden tissue, brain stiffness,
+//! tick rate. They come from the options, else from the replayed recording, else from defaults.
 
 use crate::case::tissue::TissueClass;
 use crate::options::{MODULI_KPA, Options, RATES_HZ};
 use trepan_haptics::DeviceName;
 use trepan_link::Recording;
 
-/// Diameter of the flap that the script of that name cuts when none is asked for, mm.
+/// Default diameter of the flap that script `flap` cuts, mm.
 const SCRIPTED_FLAP_MM: f32 = 24.0;
-/// Share of the fluid's lift that is lost when the dura is opened.
+/// Default share of the fluid's buoyancy that is lost when the dura is opened.
 const CSF_LOSS: f32 = 0.05;
-/// Young's modulus of the brain, kPa.
+/// Default Young's modulus of the brain, kPa.
 const YOUNG_KPA: f32 = 3.0;
-/// Haptic ticks a second.
+/// Default haptic tick rate, Hz.
 const RATE_HZ: f32 = 1000.0;
 
 /// Settings of an operation.
@@ -21,24 +20,23 @@ const RATE_HZ: f32 = 1000.0;
 pub struct Operation {
     /// Diameter of the planned flap, mm; 0 for a burr hole alone.
     pub flap_mm: f32,
-    /// Share of the lift of the brain's fluid that is lost when the dura is opened, 0 to 1.
+    /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1.
     pub csf_loss: f32,
-    /// Tissue that no tool may come close to.
+    /// Tissue classes that raise a warning when a tool comes close.
     pub forbidden: Vec<TissueClass>,
     /// Young's modulus of the brain, kPa.
     pub young_kpa: f32,
-    /// Haptic ticks a second.
+    /// Haptic tick rate, Hz.
     pub rate_hz: f32,
-    /// Whether a tool for the brain can be had only once the skull is open; not where another's
-    /// session is watched.
+    /// Whether the brain's tools require an open skull; false for a watcher.
     pub opening_needed: bool,
-    /// Whether force waits for a deliberate act after a fault of the device; not where another's
-    /// session is watched, nor in a recording of before it did.
+    /// Whether force stays off after a device fault until the user acts. False for a watcher, and
+    /// for recordings of versions without this rule.
     pub force_waits: bool,
 }
 
 impl Operation {
-    /// From the options; what they leave open from the recording, if one is run again.
+    /// Takes settings from the options, and missing ones from the replayed recording, if any.
     pub fn of(options: &Options, device: &DeviceName, recording: Option<&Recording>) -> Self {
         let recorded = |key: &str| recording?.header.config.get(key);
         let number = |key: &str| recorded(key)?.parse::<f32>().ok().filter(|value| value.is_finite());
@@ -69,7 +67,7 @@ impl Operation {
         }
     }
 
-    /// As a recording keeps it.
+    /// Entries for a recording's header.
     pub fn entries(&self) -> [(String, String); 7] {
         let forbidden: Vec<&str> = self.forbidden.iter().map(|class| class.name()).collect();
         [
@@ -90,19 +88,19 @@ mod tests {
     use clap::Parser;
 
     #[test]
-    fn options_come_before_the_recording_and_that_before_the_usual() {
+    fn options_override_the_recording_and_the_recording_the_defaults() {
         let parse = |line: &str| Options::try_parse_from(line.split(' ')).unwrap();
         let script = DeviceName::Script("flap".into());
         let usual = Operation::of(&parse("x"), &DeviceName::Mouse, None);
         assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, CSF_LOSS, &[TissueClass::Vessel][..]));
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
         let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --young-modulus-kpa 6 --rate-hz 500 --watch other";
-        let asked = Operation::of(&parse(line), &script, None);
-        assert!(!asked.opening_needed && usual.opening_needed);
+        let given = Operation::of(&parse(line), &script, None);
+        assert!(!given.opening_needed && usual.opening_needed);
         let mut recording = Recording::default();
         assert!(usual.force_waits && !Operation::of(&parse("x"), &script, Some(&recording)).force_waits);
-        recording.header.config.extend(asked.entries());
-        assert_eq!(Operation::of(&parse("x"), &DeviceName::Mouse, Some(&recording)), asked);
+        recording.header.config.extend(given.entries());
+        assert_eq!(Operation::of(&parse("x"), &DeviceName::Mouse, Some(&recording)), given);
         assert_eq!(Operation::of(&parse("x --flap 40"), &script, Some(&recording)).flap_mm, 40.0);
         let older = |line: &str| Operation::of(&parse(line), &script, Some(&recording)).csf_loss;
         assert_eq!((older("x"), older("x --fluid-lost 0.2")), (0.0, 0.2), "the flag of version 0.1");
@@ -113,7 +111,7 @@ mod tests {
         assert_eq!(
             Operation::of(&parse("x"), &script, Some(&recording)).rate_hz,
             RATE_HZ,
-            "no rate that a flag may give"
+            "a rate out of range is ignored"
         );
     }
 }

@@ -5,38 +5,38 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use trepan_budget::Quality;
 
-/// What `--young-modulus-kpa` and `--rate-hz` may be.
+/// Range of `--young-modulus-kpa`.
 pub const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
-/// See [`MODULI_KPA`].
+/// Range of `--rate-hz`.
 pub const RATES_HZ: [f64; 2] = [100.0, 10_000.0];
 
-/// Flags of every program; names say their unit.
+/// Flags of every program; names contain the unit.
 #[derive(Clone, Debug, Parser)]
 #[command(max_term_width = 120, version, args_conflicts_with_subcommands = true)]
 pub struct Options {
-    /// What to do instead of a session
+    /// Task instead of a session
     #[command(subcommand)]
     pub task: Option<Task>,
     /// A folder that `case build` made
     #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "opening_refinement", "isovalue_hu", "register", "opening"])]
     pub case: Option<PathBuf>,
-    /// Images, and what is made of them
+    /// Images and how they are imported
     #[command(flatten)]
     pub patient: Patient,
-    /// mouse | script:NAME | replay:FILE | simulated:NAME | openhaptics or openhaptics:NAME |
-    /// force-dimension or force-dimension:N | haply or haply:ID | spacemouse [default: mouse with a
-    /// window, else a script]
+    /// Haptic device: mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics,
+    /// openhaptics:NAME, force-dimension, force-dimension:N, haply, haply:ID, spacemouse [default:
+    /// mouse with a window, else a script]
     #[arg(long, value_name = "DEVICE")]
     pub device: Option<String>,
-    /// What the second hand holds an aspirator with: script:aspirate | simulated:NAME | a device
-    /// that --list-devices shows
+    /// Device of the second hand, which holds an aspirator: script:aspirate, simulated:NAME, or a
+    /// device that --list-devices shows
     #[arg(long, value_name = "DEVICE", conflicts_with = "watch")]
     pub second_device: Option<String>,
-    /// Millimetres that the tool moves for one of the hand, for devices with a box of their own;
-    /// over 1, walls are softened alike
+    /// Motion of the tool per motion of the hand, for devices with their own workspace; over 1,
+    /// walls are softened by the same factor
     #[arg(long, value_name = "SCALE", default_value_t = 1.0, allow_negative_numbers = true)]
     pub device_scale: f32,
-    /// Let other processes on this machine watch under this name
+    /// Let other processes on this machine watch this session under this name
     #[arg(long, value_name = "NAME")]
     pub share: Option<String>,
     /// Watch the session that runs with --share NAME, with the same case
@@ -45,11 +45,11 @@ pub struct Options {
     /// Run without a window
     #[arg(long)]
     pub headless: bool,
-    /// Length of a scripted operation, and at most of any other, seconds [default: 20 for a script,
-    /// 75 for script:flap]
+    /// Duration of a scripted operation, and the longest of any other, seconds [default: 20 for a
+    /// script, 75 for script:flap]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<f64>,
-    /// Where to record the session [default: session.mcap in the output folder]
+    /// File that records the session [default: session.mcap in the output folder]
     #[arg(long, value_name = "FILE.mcap")]
     pub record: Option<PathBuf>,
     /// Folder for summary, report, recording, pictures [default: trepan-out/PROGRAM/DATE-AND-TIME]
@@ -58,27 +58,27 @@ pub struct Options {
     /// Replace the session that --out holds, or the file that --record names
     #[arg(long)]
     pub overwrite: bool,
-    /// Write the drilled skull's surface too, as drilled.stl; some 50 MB
+    /// Also write the drilled skull's surface as drilled.stl, about 50 MB
     #[arg(long)]
     pub stl: bool,
-    /// How fine bone, brain and picture are: auto measures this machine and takes the cheapest that
-    /// keeps the tolerances below; draft, usual and fine are the same everywhere [default: auto; a
-    /// replay's as recorded]
+    /// Accuracy of bone, brain and picture [default: auto; a replay's as recorded]. Auto measures
+    /// this machine and takes the cheapest models that keep the tolerances below; draft, usual and
+    /// fine are the same on every machine
     #[arg(long, value_name = "auto|draft|usual|fine", value_parser = quality)]
     pub quality: Option<Quality>,
-    /// What --quality auto must keep
+    /// Tolerances of --quality auto
     #[command(flatten)]
     pub tolerances: Tolerances,
-    /// Solver of the brain [default: by --quality]
+    /// Solver of the brain's tissue [default: by --quality]
     #[arg(long, value_name = "NAME")]
     pub solver: Option<String>,
-    /// How bone is touched [default: by --quality]
+    /// Haptic method on bone [default: by --quality]
     #[arg(long, value_name = "NAME")]
     pub rigid: Option<String>,
-    /// Seed of everything random
+    /// Random seed
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// List the haptic devices and what each needs, then end
+    /// List the haptic devices and what each needs, then exit
     #[arg(long)]
     pub list_devices: bool,
     /// Young's modulus of the brain, kPa [default: 3; a replay's as recorded]
@@ -88,22 +88,22 @@ pub struct Options {
     /// 0; 24 with script:flap; a replay's as recorded]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub flap: Option<f32>,
-    /// Share of the lift of the brain's fluid that is lost when the dura is opened, 0 to 1: the
-    /// brain sinks [default: 0.05; uncalibrated]
+    /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1: the brain sinks
+    /// [default: 0.05; uncalibrated]
     #[arg(long, alias = "fluid-lost", value_name = "SHARE", allow_negative_numbers = true)]
     pub csf_loss: Option<f32>,
-    /// Tissue that no tool may come close to: classes of --tissue, separated by commas [default:
-    /// vessel]
+    /// Tissue classes (as for --tissue) that raise a warning when a tool comes close, separated by
+    /// commas [default: vessel]
     #[arg(long, value_name = "CLASS,...", value_delimiter = ',')]
     pub forbid: Option<Vec<TissueClass>>,
-    /// Of a folder of recordings (--device replay:FOLDER) run only every Nth again, from the Ith
-    /// on, as in 2/8
+    /// Replay only every Nth recording of a folder (--device replay:FOLDER), from the Ith on, as in
+    /// 2/8
     #[arg(long, value_name = "I/N", value_parser = shard)]
     pub shard: Option<(usize, usize)>,
-    /// Haptic ticks a second [default: 1000; a replay's as recorded]
+    /// Haptic tick rate, Hz [default: 1000; a replay's as recorded]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate_hz: Option<f32>,
-    /// Pictures a second in a headless run; 0 for none
+    /// Pictures per second of a headless run; 0 for none
     #[arg(long, value_name = "N", default_value_t = 1.0, allow_negative_numbers = true)]
     pub frames_per_second: f64,
     /// Width and height of the picture, pixels
@@ -111,11 +111,11 @@ pub struct Options {
     pub picture: [u32; 2],
 }
 
-/// A patient's images and what is made of them.
+/// A patient's images and how they are imported.
 #[derive(Clone, Debug, Args)]
 pub struct Patient {
-    /// Folder that keeps imported cases [default: TREPAN_CACHE, else trepan/cases in the user's
-    /// cache folder]
+    /// Cache folder of imported cases [default: TREPAN_CACHE, else trepan/cases in the user's cache
+    /// folder]
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
     /// CT of the patient: a file, or a folder of DICOM slices [default: the built-in case]
@@ -124,36 +124,37 @@ pub struct Patient {
     /// MRI of the same patient in the same space
     #[arg(long, value_name = "PATH")]
     pub mri: Option<PathBuf>,
-    /// Which DICOM series of the CT's folder, a number that `case series` lists [default: the one
+    /// DICOM series of the CT's folder, by the number that `case series` lists [default: the one
     /// with the most slices]
     #[arg(long, value_name = "N", requires = "ct")]
     pub ct_series: Option<usize>,
-    /// Which DICOM series of the MRI's folder
+    /// DICOM series of the MRI's folder
     #[arg(long, value_name = "N", requires = "mri")]
     pub mri_series: Option<usize>,
-    /// Label volume: what is not 0 is brain [default: found in the MRI]
+    /// Label volume of the brain: all nonzero voxels [default: segmented from the MRI]
     #[arg(long, value_name = "PATH")]
     pub labels: Option<PathBuf>,
-    /// Tissue inside the brain, from a label volume: white, grey, ventricle, tumour or vessel; all
-    /// that is not 0, or only the codes. Repeatable
+    /// Tissue class from a label volume: white, grey, ventricle, tumour or vessel; all nonzero
+    /// voxels inside the brain, or only the codes. Repeatable
     #[arg(long = "tissue", value_name = "CLASS=PATH[:CODE,...]")]
     pub tissues: Vec<TissueSource>,
     /// Edge of a skull voxel, mm [default: by --quality; 1 for `case build`]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub spacing_mm: Option<f32>,
-    /// Tetrahedra of the brain, met within a tenth [default: by --quality; 8000 for `case build`]
+    /// Number of tetrahedra of the brain, met within 10 % [default: by --quality; 8000 for
+    /// `case build`]
     #[arg(long, value_name = "N")]
     pub tets: Option<usize>,
-    /// How often their edges are halved within 10 mm of the opening, of the same number [default:
-    /// by --quality; 2 for `case build`]
+    /// Halvings of the edge length within 10 mm of the opening, at the same number of tetrahedra
+    /// [default: by --quality; 2 for `case build`]
     #[arg(long, alias = "finer", value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=3))]
     pub opening_refinement: Option<u32>,
-    /// Move the MRI (and labels) to where they fit the CT, by mutual information
+    /// Register the MRI (and labels) to the CT by mutual information
     #[arg(long)]
     pub register: bool,
-    /// A point outside the skull over the place to open, RAS mm [default: bone about 6 mm thick
-    /// close over the brain, on the upper right front where it can be; the same for all voxel
-    /// sizes]
+    /// Point outside the skull over the place to open, RAS mm [default: bone about 6 mm thick]. The
+    /// default place is close to the brain, on the upper right front if possible, and the same for
+    /// all voxel sizes
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub opening: Option<[f32; 3]>,
     /// Threshold of bone, HU [default: from the histogram, 300 to 500]
@@ -161,30 +162,30 @@ pub struct Patient {
     pub isovalue_hu: Option<i16>,
 }
 
-/// What a program can do beside a session.
+/// Tasks of a program besides a session.
 #[derive(Clone, Debug, Subcommand)]
 pub enum Task {
-    /// Make and keep cases
+    /// Build cases, list DICOM series
     #[command(subcommand)]
     Case(CaseTask),
-    /// Look at haptic devices
+    /// Test haptic devices
     #[command(subcommand)]
     Device(DeviceTask),
-    /// Check recordings, and repair what is cut or damaged
+    /// Check recordings, and repair truncated or damaged ones
     #[command(subcommand)]
     Recording(RecordingTask),
-    /// Show two recorded sessions side by side: scores, warnings, forces
+    /// Compare two recorded sessions on one page: scores, warnings, forces
     Compare {
-        /// A session.mcap
+        /// A recording, such as session.mcap
         first: PathBuf,
-        /// Another one
+        /// Another recording
         second: PathBuf,
         /// Folder for compare.html
         #[arg(long, value_name = "DIR", default_value = "trepan-out/compare")]
         out: PathBuf,
     },
-    /// Measure this machine and say what `--quality auto` takes for a case on it, why, and what the
-    /// next better and the next cheaper would cost
+    /// Print which models `--quality auto` takes for a case on this machine, why, and what the next
+    /// better and the next cheaper choice cost
     Plan {
         /// A folder that `case build` made
         #[arg(long, value_name = "CASE", conflicts_with_all = ["ct", "mri", "labels", "tissues", "spacing_mm", "tets", "opening_refinement", "isovalue_hu", "register", "opening"])]
@@ -192,10 +193,10 @@ pub enum Task {
         /// The patient's images
         #[command(flatten)]
         patient: Patient,
-        /// What must be kept
+        /// Tolerances to keep
         #[command(flatten)]
         tolerances: Tolerances,
-        /// Haptic ticks a second
+        /// Haptic tick rate, Hz
         #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
         rate_hz: f32,
         /// Width and height of the picture, pixels
@@ -204,22 +205,22 @@ pub enum Task {
     },
 }
 
-/// Errors that a session bears.
+/// Error tolerances of a session.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub struct Tolerances {
-    /// Error of the force on bone that 95 of 100 ticks stay within, N [default: 0.4]
+    /// Tolerance of the force error on bone, 95th percentile of the ticks, N [default: 0.4]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub force_error_n: Option<f64>,
-    /// Error of the brain's displacement near the tool, mm [default: 0.4]
+    /// Tolerance of the brain's displacement error near the tool, mm [default: 0.4]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub displacement_mm: Option<f64>,
-    /// Error of the picture, percent of white [default: 1]
+    /// Tolerance of the picture error, percent of white [default: 1]
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     pub picture_error_percent: Option<f64>,
 }
 
 impl Tolerances {
-    /// Refuses numbers that make no sense.
+    /// Refuses numbers out of range.
     pub fn check(&self) -> Result<(), String> {
         within("force-error-n", self.force_error_n.unwrap_or(1.0), 1e-4, 100.0)?;
         within("displacement-mm", self.displacement_mm.unwrap_or(1.0), 1e-4, 100.0)?;
@@ -227,48 +228,48 @@ impl Tolerances {
     }
 }
 
-/// What can be done with cases.
+/// Tasks with cases.
 #[derive(Clone, Debug, Subcommand)]
 pub enum CaseTask {
     /// List the DICOM series in a folder, for --ct-series and --mri-series
     Series {
-        /// The folder, and the folders in it
+        /// Folder to search, with its subfolders
         folder: PathBuf,
     },
-    /// Make a case folder from images, for --case
+    /// Build a case folder from images, for --case
     Build {
         /// The patient's images
         #[command(flatten)]
         patient: Patient,
-        /// The folder to make; it must not exist yet
+        /// New case folder; it must not exist yet
         #[arg(long, value_name = "CASE")]
         out: PathBuf,
     },
 }
 
-/// What can be done with recordings.
+/// Tasks with recordings.
 #[derive(Clone, Debug, Subcommand)]
 pub enum RecordingTask {
-    /// Say how long a recording is, of which case, and what it lacks; exit code 1 where it lacks
-    /// something
+    /// Print a recording's length and case, and what it lacks; exit code 1 if it is incomplete
     Check {
-        /// A session.mcap
+        /// A recording, such as session.mcap
         file: PathBuf,
     },
-    /// Make a whole recording of what can be read of a cut or damaged one, also behind the damage;
-    /// other programs open it then
+    /// Write an intact recording from all that can be read of a truncated or damaged one, also
+    /// after the damage; other programs can open it
     Repair {
-        /// The recording that is cut or damaged; it stays as it is
+        /// Truncated or damaged recording; it is not changed
         file: PathBuf,
-        /// The recording to make; it must not exist yet
+        /// New recording; it must not exist yet
         out: PathBuf,
     },
 }
 
-/// What can be done with devices.
+/// Tasks with devices.
 #[derive(Clone, Debug, Subcommand)]
 pub enum DeviceTask {
-    /// Try a device before a session: rate, jitter, delay, range and a gentle wall, with a report
+    /// Test a device before a session: rate, jitter, delay, workspace and a soft wall, with a
+    /// report
     Test {
         /// The device, as for --device
         #[arg(value_name = "NAME")]
@@ -283,7 +284,7 @@ pub enum DeviceTask {
 }
 
 impl Patient {
-    /// Refuses numbers that make no sense.
+    /// Refuses numbers out of range.
     pub fn check(&self) -> Result<(), String> {
         within("spacing-mm", self.spacing_mm.unwrap_or(1.0).into(), 0.2, 4.0)?;
         within("tets", self.tets.unwrap_or(8_000) as f64, 500.0, 1e6)?;
@@ -296,7 +297,7 @@ fn within(flag: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
     good.then_some(()).ok_or(format!("--{flag} {value} is out of range: give {low} to {high}"))
 }
 
-/// Refuses ticks that no loop keeps.
+/// Refuses a tick rate out of range.
 pub fn rate(rate_hz: f64) -> Result<(), String> {
     within("rate-hz", rate_hz, RATES_HZ[0], RATES_HZ[1])
 }
@@ -328,7 +329,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 }
 
 impl Options {
-    /// Refuses numbers that make no sense, naming the flag and what would be right.
+    /// Refuses numbers out of range; the error names flag and range.
     pub fn check(&self) -> Result<(), String> {
         self.patient.check()?;
         self.tolerances.check()?;

@@ -13,13 +13,13 @@ pub enum Program {
     Integrated,
 }
 
-/// What the trainee is doing.
+/// Phase of an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Phase {
-    /// The burr takes bone away; the brain only warns.
+    /// Drilling bone; nearness of the brain only raises warnings.
     #[default]
     Craniotomy,
-    /// The probe meets the brain, which answers.
+    /// Probing the brain, which deforms.
     Brain,
 }
 
@@ -42,7 +42,7 @@ impl Program {
         }
     }
 
-    /// The tools that lie ready, in the order of the phases.
+    /// Tools of the program, in the order of the phases.
     pub fn tray(self) -> &'static [Tool] {
         match self {
             Self::Craniotomy => &TRAY[..BONE_TOOLS],
@@ -51,7 +51,7 @@ impl Program {
         }
     }
 
-    /// The scripted operation that shows the program.
+    /// Name of the program's default script.
     pub fn script(self) -> &'static str {
         match self {
             Self::Craniotomy => "craniotomy",
@@ -92,7 +92,7 @@ const BONE_TOOLS: usize = 4;
 const TRAY: [Tool; 6] =
     [Tool::burr(3.0), Tool::burr(2.0), Tool::perforator(), Tool::craniotome(), Tool::probe(2.0), Tool::spatula()];
 
-/// What a tool is called in the tray: its kind and width.
+/// Name of a tool in the tray: its kind and width.
 pub fn called(tool: &Tool) -> String {
     match tool.kind {
         ToolKind::Burr | ToolKind::Perforator => format!("{} {:.0} mm", tool.kind.name(), 2.0 * tool.tip_radius_mm),

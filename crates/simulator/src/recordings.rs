@@ -1,5 +1,5 @@
-//! `recording check` and `recording repair`: what a recording holds, what it lacks, and a whole one
-//! made of the rest.
+//! `recording check` and `recording repair`: reports what a recording contains and lacks, and
+//! rewrites what can be read.
 
 use crate::case::identity::Identity;
 use crate::command::printable;
@@ -9,35 +9,34 @@ use std::path::Path;
 use std::process::ExitCode;
 use trepan_link::{Recording, repair};
 
-/// What a recording lacks, with the remedy where there is one; `None` when nothing.
+/// Describes what a recording lacks, with the remedy if there is one; `None` if it is complete.
 pub fn not_whole(program: Program, file: &Path, recording: &Recording) -> Option<String> {
     let (losses, program, file) = (recording.losses()?, program.name(), file.display());
     let remedy = format!("; `{program} recording repair {file} NEW.mcap` keeps all that can be read");
     Some(format!("{file} is not whole: {losses}{}", if recording.damage.is_some() { &remedy } else { "" }))
 }
 
-/// Opens a recording to run it again on a case; refuses one of another patient, or with nothing to
-/// run.
+/// Opens a recording for replay on a case; refuses one of another patient or without ticks.
 pub fn open(program: Program, file: &Path, case: &Identity) -> Result<Recording, SessionError> {
     let recording = Recording::open(file)?;
     let losses = not_whole(program, file, &recording);
     if recording.ticks.is_empty() {
-        let none = || format!("{} holds no tick: its session ended before the first", file.display());
+        let none = || format!("{} contains no tick: its session ended before the first", file.display());
         let fault = losses.unwrap_or_else(none);
         return Err(SessionError::Usage(format!("--device: there is nothing to run again: {fault}")));
     }
     let recorded = Identity::of(&recording.header);
     if recorded.is(case) == Some(false) {
-        let fault = format!("{} is of another case: it was recorded on {}", file.display(), recorded.told());
+        let fault = format!("{} is of another case: it was recorded on {}", file.display(), recorded.describe());
         let remedy = "give the --ct and --mri, or the --case, of that one, or none of them for the built-in case";
-        return Err(SessionError::Usage(format!("--device: {fault}, this is {}; {remedy}", case.told())));
+        return Err(SessionError::Usage(format!("--device: {fault}, this is {}; {remedy}", case.describe())));
     }
     losses.iter().for_each(|losses| tracing::warn!("{}", printable(losses)));
     Ok(recording)
 }
 
-/// Says where a recording was made on the case as it was made of the images otherwise, or perhaps
-/// on other images.
+/// Warns if the recording's case was built differently from the same images, or if its patient is
+/// unknown.
 pub fn unlike(recording: &Recording, case: &Identity) -> Option<String> {
     let recorded = Identity::of(&recording.header);
     let made_alike = recorded.case.is_none() || recorded.case == case.case;
@@ -46,22 +45,22 @@ pub fn unlike(recording: &Recording, case: &Identity) -> Option<String> {
                     forces may differ"
             .into(),
         None => format!(
-            "whether the recording is of this patient cannot be told, for an older version made it: \
+            "whether the recording is of this patient is unknown, because an older version made it: \
              it was recorded on {}, this is {}",
-            recorded.told(),
-            case.told()
+            recorded.describe(),
+            case.describe()
         ),
     })
 }
 
-/// Says what a recording holds and lacks.
+/// Prints what a recording contains and lacks.
 pub fn check(program: Program, file: &Path) -> Result<ExitCode, SessionError> {
     let recording = Recording::open(file)?;
-    say(file, &held(&recording));
+    print(file, &describe(&recording));
     let no_index = || {
         let (program, file) = (program.name(), file.display());
         format!(
-            "{file} has no sound index: other programs refuse it; `{program} recording repair {file} NEW.mcap` makes one"
+            "{file} has no valid index: other programs refuse it; `{program} recording repair {file} NEW.mcap` makes one"
         )
     };
     let lack = not_whole(program, file, &recording).or_else(|| (!recording.indexed).then(no_index));
@@ -71,26 +70,26 @@ pub fn check(program: Program, file: &Path) -> Result<ExitCode, SessionError> {
     }))
 }
 
-/// Makes a whole recording of what can be read.
-pub fn mend(file: &Path, out: &Path) -> Result<ExitCode, SessionError> {
+/// Writes a new recording from what can be read.
+pub fn repair_file(file: &Path, out: &Path) -> Result<ExitCode, SessionError> {
     if out.exists() {
         return Err(SessionError::Usage(format!("{} exists already: name a file that does not", out.display())));
     }
     if let Some(losses) = Recording::open(file)?.losses() {
-        say(file, &losses);
+        print(file, &losses);
     }
     let repaired = repair(file, out)?;
     let recording = Recording::open(out)?;
-    say(out, &format!("{}, {} messages", held(&recording), repaired.messages));
-    recording.losses().into_iter().for_each(|losses| say(out, &losses));
+    print(out, &format!("{}, {} messages", describe(&recording), repaired.messages));
+    recording.losses().into_iter().for_each(|losses| print(out, &losses));
     Ok(ExitCode::SUCCESS)
 }
 
-fn say(file: &Path, text: &str) {
+fn print(file: &Path, text: &str) {
     println!("{}", printable(&format!("{}: {text}", file.display())));
 }
 
-fn held(recording: &Recording) -> String {
+fn describe(recording: &Recording) -> String {
     let seconds = recording.ticks.last().map_or(0.0, |tick| tick.time_ms * 1e-3);
     let header = &recording.header;
     format!("{} of {}, {} ticks, {seconds:.1} s", header.app, header.case, recording.ticks.len())

@@ -1,4 +1,4 @@
-//! A session from its flags to its files: open (everything that a user can get wrong), run, write.
+//! Runs a session from its flags to its files: open with all checks, run, write.
 
 use crate::case::choice;
 use crate::case::identity::Identity;
@@ -6,7 +6,7 @@ use crate::case::plan::Plan;
 use crate::case::scene::Scene;
 use crate::case::{Inputs, anatomy};
 use crate::error::SessionError;
-use crate::hand::{self, DeviceLimits, OpenDevice, SecondHold};
+use crate::hand::{self, DeviceLimits, OpenDevice, SecondDevice};
 use crate::models::{ModelRequest, Models};
 use crate::operation::Operation;
 use crate::options::Options;
@@ -47,39 +47,39 @@ pub struct Session {
     second: Option<DeviceName>,
     recording: Option<Recording>,
     case: Identity,
-    table: SessionSetup,
-    /// What the case was made of; nothing for a case folder.
+    setup: SessionSetup,
+    /// Input files of the case; empty for a case folder.
     inputs: Inputs,
     out: PathBuf,
     windowed: bool,
-    /// The device that draws, where it was looked for already.
+    /// Graphics device, if it was looked for already.
     drawing: Option<Result<Gpu, GpuError>>,
 }
 
-/// How a session ended.
+/// Result of a session.
 #[derive(Debug)]
 pub struct Ended {
     /// Its summary.
     pub summary: Summary,
-    /// Where its files are.
+    /// Folder of its files.
     pub out: PathBuf,
     /// The signal that ended it, if one did.
     pub signal: Option<i32>,
-    /// What the recording that was run again lacks, with the remedy.
+    /// What the replayed recording lacks, with the remedy.
     pub lack: Option<String>,
 }
 
 impl Session {
     /// Checks and loads everything; writes nothing but the cache.
     ///
-    /// `built_in` is the case that is taken when no image is given.
+    /// `built_in` is the case that is used if no image is given.
     pub fn open(program: Program, options: Options, built_in: Inputs) -> Result<Self, SessionError> {
         options.check().map_err(SessionError::Usage)?;
         let windowed = !options.headless && window::has_display();
         if !windowed && !options.headless {
             tracing::info!("no display here: running the scripted operation headless");
         }
-        places(&options)?;
+        check_outputs(&options)?;
         let device = hand::device_name(program, &options, windowed)?;
         let second = hand::second_name(&device, &options)?;
         let recording = match &device {
@@ -87,42 +87,42 @@ impl Session {
             _ => None,
         };
         let operation = Operation::of(&options, &device, recording.as_ref());
-        let wish = ModelRequest::of(program, &options, &operation, recording.as_ref())?;
+        let request = ModelRequest::of(program, &options, &operation, recording.as_ref())?;
         let mut drawing = None;
         let inputs = match options.case {
             Some(_) => Inputs::default(),
             None => choice::inputs(&options.patient, built_in.clone()),
         };
         let card = || drawing.insert(driver::open()).as_ref().is_ok_and(|gpu| !gpu.is_software());
-        let (case, models) = choice::open_case(program, &options, built_in, wish, card)?;
-        let opened = Identity { name: case.name.clone(), case: Some(case.hash.clone()), images: case.images.clone() };
-        let table = SessionSetup::new(program, (case, models), operation, windowed && recording.is_some())?;
+        let (case, models) = choice::open_case(program, &options, built_in, request, card)?;
+        let identity = Identity { name: case.name.clone(), case: Some(case.hash.clone()), images: case.images.clone() };
+        let setup = SessionSetup::new(program, (case, models), operation, windowed && recording.is_some())?;
         let out = options.out.clone().unwrap_or_else(|| output::dated(program));
-        Ok(Self { program, options, device, second, recording, case: opened, table, inputs, out, windowed, drawing })
+        Ok(Self { program, options, device, second, recording, case: identity, setup, inputs, out, windowed, drawing })
     }
 
-    /// Runs it and writes its files; where that fails, nothing half-written stays.
+    /// Runs the session and writes its files; on failure no partly written file remains.
     pub fn run(mut self) -> Result<Ended, SessionError> {
         let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-        let (before, whole) = (self.table.pieces(), self.table.bone().map(|bone| bone.snapshot()));
-        let (options, plan, rate_hz) = (&self.options, &self.table.plan, self.table.operation.rate_hz);
+        let (before, whole) = (self.setup.pieces(), self.setup.bone().map(|bone| bone.snapshot()));
+        let (options, plan, rate_hz) = (&self.options, &self.setup.plan, self.setup.operation.rate_hz);
         let hand = OpenDevice::open(&self.device, self.program, options, plan, rate_hz, &stop)?;
         let OpenDevice { device, pointer, watch, watching } = hand;
-        let second = self.second.as_ref().map(|name| SecondHold::open(name, options, plan, rate_hz)).transpose()?;
+        let second = self.second.as_ref().map(|name| SecondDevice::open(name, options, plan, rate_hz)).transpose()?;
         let recorded = || DeviceLimits::recorded(self.recording.as_ref(), hand::FIRST);
         let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
-        let feel = device.as_ref().map_or_else(recorded, |device| DeviceLimits::of(&device.capabilities(), scale));
-        let second_feel = self.second_feel(second.as_ref());
+        let limits = device.as_ref().map_or_else(recorded, |device| DeviceLimits::of(&device.capabilities(), scale));
+        let second_limits = self.second_limits(second.as_ref());
         let start = self.start();
-        let feels = (&feel, second_feel.as_ref());
-        let stages = self.table.stages(start.state, self.tick_ms(), feels, &Default::default())?;
-        let (second_device, second_watch) = second.map_or((None, None), |held| (Some(held.device), held.watch));
+        let limits_of_both = (&limits, second_limits.as_ref());
+        let stages = self.setup.stages(start.state, self.tick_ms(), limits_of_both, &Default::default())?;
+        let (second_device, second_watch) = second.map_or((None, None), |second| (Some(second.device), second.watch));
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
         let place = output::Place::make(&self.out, &record)?;
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         company.watching.clone_from(&watching);
-        let kept = (Recorder::create(&record, &self.header(&feel, second_feel.as_ref()))?, share);
+        let kept = (Recorder::create(&record, &self.header(&limits, second_limits.as_ref()))?, share);
         let drawing = self.drawing.take();
         let mut graphics = self.graphics(drawing);
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
@@ -135,43 +135,43 @@ impl Session {
         ended.iter().for_each(|text| tracing::info!("{text}"));
         let recording = Recording::open(&record)?;
         self.map(&mut album, whole.as_ref(), &recording);
-        let mut remarks = self.table.scene.remarks.clone();
-        remarks.extend(self.table.models.unmet.iter().cloned());
-        let (lack, unlike) = self.against();
+        let mut remarks = self.setup.scene.remarks.clone();
+        remarks.extend(self.setup.models.unmet.iter().cloned());
+        let (lack, unlike) = self.replay_remarks();
         remarks.extend(lack.iter().cloned().chain(unlike).chain(ended));
         remarks.extend(graphics.err());
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
         let drilled =
-            self.table.bone().zip(whole.as_ref()).map(|(bone, whole)| self.drilled(bone, whole, &mut remarks));
+            self.setup.bone().zip(whole.as_ref()).map(|(bone, whole)| self.drilled(bone, whole, &mut remarks));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
         let about = About {
-            cut_off: CutOff::of(&before, &self.table.pieces(), self.table.bone().map_or(0.0, |bone| bone.voxel_mm3())),
+            cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
             plan: self
-                .table
+                .setup
                 .bone()
                 .zip(whole)
-                .and_then(|(bone, whole)| PlanComparison::of(&self.table.plan, &whole, bone)),
-            regions: self.table.regions(&recording),
+                .and_then(|(bone, whole)| PlanComparison::of(&self.setup.plan, &whole, bone)),
+            regions: self.setup.regions(&recording),
             ..self.about(&album, adapter, remarks)
         };
         let summary = Summary::new(about, &outcome);
         output::write(&self.out, &recording, &summary, &outcome, &self.shots(album.shots))?;
-        if let Some((bone, densities)) = self.table.bone().zip(drilled) {
+        if let Some((bone, densities)) = self.setup.bone().zip(drilled) {
             output::drilled(&self.out, &densities, bone, self.options.stl)?;
         }
         place.keep();
         Ok(Ended { summary, out: self.out, signal: stop.signal(), lack })
     }
 
-    /// What the recording that is run again lacks, and whether it is of another making of the case.
-    fn against(&self) -> (Option<String>, Option<String>) {
+    /// Describes what the replayed recording lacks, and whether its case was built differently.
+    fn replay_remarks(&self) -> (Option<String>, Option<String>) {
         let (Some(recording), DeviceName::Replay(path)) = (&self.recording, &self.device) else { return (None, None) };
         (recordings::not_whole(self.program, path, recording), recordings::unlike(recording, &self.case))
     }
 
-    /// The skull as it is now, in the scanner's voxels; in those of the case, with a remark, where
-    /// the CT is not at hand.
+    /// Current skull in the scanner's voxels; in those of the case, with a remark, if the CT is not
+    /// available.
     fn drilled(&self, bone: &BoneVolume, whole: &VoxelVolume<i16>, remarks: &mut Vec<String>) -> VoxelVolume<i16> {
         let ct = anatomy::scanned(&self.inputs, self.options.patient.ct_series).unwrap_or_else(|why| {
             let edge = bone.spacing_mm();
@@ -181,34 +181,38 @@ impl Session {
         drilled::drilled(ct, whole, bone)
     }
 
-    /// The patient as he lies there now.
+    /// The patient's current scene.
     pub fn scene(&self) -> &Scene {
-        &self.table.scene
+        &self.setup.scene
     }
 
-    /// What is planned to be taken away.
+    /// The planned removal of bone.
     pub fn plan(&self) -> &Plan {
-        &self.table.plan
+        &self.setup.plan
     }
 
-    /// Which models run, and why.
+    /// The models that run, with the reasons.
     pub fn models(&self) -> &Models {
-        &self.table.models
+        &self.setup.models
     }
 
-    /// The bodies of the loops for a hand without a device, for who turns them otherwise than
-    /// [`run`](Self::run). The tool is at `start`; `touch` is how it is tested against tissue.
+    /// Creates the stages for a hand without a device, for callers that do not use
+    /// [`run`](Self::run). The tool is at `start`; `touch` configures its contact with tissue.
     pub fn stages(&self, start: ToolState, touch: &trepan_deformable::Config) -> Result<Stages, SessionError> {
-        let feel = DeviceLimits::of(&Capabilities::passive("a script"), 1.0);
-        self.table.stages(start, self.tick_ms(), (&feel, None), touch)
+        let limits = DeviceLimits::of(&Capabilities::passive("a script"), 1.0);
+        self.setup.stages(start, self.tick_ms(), (&limits, None), touch)
     }
 
-    /// Lets a teacher have a say in both hands' buttons, where this session is shared; with a
-    /// window on another's session, this one teaches.
-    fn company(&self, asked: Option<Asked>, mut hands: [Held; 2]) -> Result<(Company, [Held; 2]), SessionError> {
+    /// Connects a teacher. In a shared session the teacher's requests act on both hands' buttons; a
+    /// window that watches another session sends such requests.
+    fn company(
+        &self,
+        asked: Option<Asked>,
+        mut hands: [OptionalDevice; 2],
+    ) -> Result<(Company, [OptionalDevice; 2]), SessionError> {
         let mut company = Company::default();
         if let Some([first, second, window]) = asked {
-            let taught = |hand: Held, asked| hand.map(|device| Box::new(Taught::new(device, asked)) as _);
+            let taught = |hand: OptionalDevice, asked| hand.map(|device| Box::new(Taught::new(device, asked)) as _);
             let [one, other] = hands;
             hands = [taught(one, first), taught(other, second)];
             company.asked = Some(window);
@@ -233,7 +237,7 @@ impl Session {
             (Some(recording), _) => {
                 let end_ms = self.options.duration.map_or(f64::INFINITY, |s| 1e3 * s);
                 let length_ms = lockstep::up_to(recording, end_ms).last().map_or(0.0, |tick| tick.time_ms);
-                let film = self.windowed.then(|| Filming::new(self.table.bone().cloned(), length_ms));
+                let film = self.windowed.then(|| Filming::new(self.setup.bone().cloned(), length_ms));
                 lockstep::run(stages, (recording, end_ms), kept, start, film, stop, picture)
             }
             (None, Some(devices)) => threads::run(stages, devices, kept, start, self.pace(), stop, picture),
@@ -241,28 +245,27 @@ impl Session {
         }
     }
 
-    /// What the second hand's guard must know: of its device, or of the recorded one; `None`
-    /// without a second hand.
-    fn second_feel(&self, held: Option<&SecondHold>) -> Option<DeviceLimits> {
-        let scale = |held: &SecondHold| if held.watch.is_some() { self.options.device_scale } else { 1.0 };
+    /// Limits of the second hand's device, open or recorded; `None` without a second hand.
+    fn second_limits(&self, held: Option<&SecondDevice>) -> Option<DeviceLimits> {
+        let scale = |held: &SecondDevice| if held.watch.is_some() { self.options.device_scale } else { 1.0 };
         let recorded = self.recording.as_ref().filter(|recording| !recording.second.is_empty());
         held.map(|held| DeviceLimits::of(&held.device.capabilities(), scale(held)))
             .or_else(|| recorded.map(|recording| DeviceLimits::recorded(Some(recording), hand::SECOND)))
     }
 
-    /// Where the tool waits for its device: in a replay too, for the first tick's way to the hand
-    /// begins here.
+    /// Tool before the first reading of its device. A replay starts here too, because the first
+    /// tick moves from here to the hand.
     fn start(&self) -> ToolSample {
-        let script = Script::named(self.program.script(), &self.table.scene.site, 1e4);
+        let script = Script::named(self.program.script(), &self.setup.scene.site, 1e4);
         let state = script.map_or_else(|_| ToolState::at(trepan_geometry::Pose::IDENTITY), |script| script.at(0.0));
         ToolSample { tick: 0, state, tool: self.program.tray()[0], slot: 0, drilling: false }
     }
 
     fn graphics(&self, drawing: Option<Result<Gpu, GpuError>>) -> Result<Graphics, String> {
         if !self.windowed && self.options.frames_per_second == 0.0 {
-            return Err("no picture was asked for".into());
+            return Err("no picture was requested".into());
         }
-        Graphics::open(&self.table, self.options.picture, drawing.unwrap_or_else(driver::open), self.windowed)
+        Graphics::open(&self.setup, self.options.picture, drawing.unwrap_or_else(driver::open), self.windowed)
     }
 
     fn picture(
@@ -279,9 +282,9 @@ impl Session {
         };
         if !self.windowed {
             let folder = self.out.join("frames");
-            return picture::draw(eyes, painter, &self.table, self.options.frames_per_second, &folder, stop);
+            return picture::draw(eyes, painter, &self.setup, self.options.frames_per_second, &folder, stop);
         }
-        let (table, case, out, rate_hz) = (&self.table, &*self.case.name, &*self.out, self.table.operation.rate_hz);
+        let (table, case, out, rate_hz) = (&self.setup, &*self.case.name, &*self.out, self.setup.operation.rate_hz);
         let opened = window::Opened { table, case, out, rate_hz };
         match (eyes.film.take(), &self.recording) {
             (Some(film), Some(recording)) => {
@@ -292,20 +295,19 @@ impl Session {
         }
     }
 
-    /// Puts the coloured maps of the end before the session's pictures.
+    /// Inserts the final colour maps before the session's pictures.
     fn map(&self, album: &mut Album, before: Option<&VoxelVolume<i16>>, recording: &Recording) {
         let Some(painter) = &mut album.painter else { return };
-        let maps = self.table.maps(painter, before, recording, &self.out.join("frames"));
+        let maps = self.setup.maps(painter, before, recording, &self.out.join("frames"));
         let of_session = std::mem::take(&mut album.shots);
         maps.into_iter().for_each(|map| album.add(map));
         album.shots.extend(of_session);
     }
 
-    /// The pictures of the report: the session's, then how the images fit.
+    /// Pictures of the report: those of the session, then the overlay of CT and MRI.
     fn shots(&self, session: Vec<Shot>) -> Vec<Shot> {
-        let caption =
-            "how CT and MRI fit: the bone's contour over the MRI (with --register above as read, below as moved)";
-        let fit = self.table.scene.fit_png.clone().map(|png| Shot { caption: caption.into(), png });
+        let caption = "overlay of CT and MRI: the bone's contour over the MRI (with --register: above as read, below as registered)";
+        let fit = self.setup.scene.fit_png.clone().map(|png| Shot { caption: caption.into(), png });
         session.into_iter().chain(fit).collect()
     }
 
@@ -317,11 +319,11 @@ impl Session {
     }
 
     fn tick_ms(&self) -> f32 {
-        1e3 / self.table.operation.rate_hz
+        1e3 / self.setup.operation.rate_hz
     }
 
-    fn header(&self, feel: &DeviceLimits, second: Option<&DeviceLimits>) -> SessionHeader {
-        let hands = feel.entries(hand::FIRST).into_iter();
+    fn header(&self, limits: &DeviceLimits, second: Option<&DeviceLimits>) -> SessionHeader {
+        let hands = limits.entries(hand::FIRST).into_iter();
         let hands = hands.chain(second.into_iter().flat_map(|second| second.entries(hand::SECOND)));
         SessionHeader {
             app: self.program.name().into(),
@@ -329,17 +331,17 @@ impl Session {
             case: self.case.name.clone(),
             seed: self.options.seed,
             hashes: self.case.hashes(),
-            config: [("solver_run".to_string(), self.table.solver_name().into())]
+            config: [("solver_run".to_string(), self.setup.solver_name().into())]
                 .into_iter()
-                .chain(self.table.models.entries())
-                .chain(self.table.operation.entries())
+                .chain(self.setup.models.entries())
+                .chain(self.setup.operation.entries())
                 .chain(hands)
                 .collect(),
         }
     }
 
     fn about(&self, album: &Album, adapter: Option<String>, remarks: Vec<String>) -> About {
-        let brain = self.table.scene.brain.as_ref();
+        let brain = self.setup.scene.brain.as_ref();
         About {
             program: self.program,
             case: self.case.name.clone(),
@@ -349,10 +351,10 @@ impl Session {
                 (other, _) => other.to_string(),
             },
             second_device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),
-            models: self.table.models.summary(),
-            solver: self.table.solver_name().into(),
+            models: self.setup.models.summary(),
+            solver: self.setup.solver_name().into(),
             brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
-            asked_hz: self.table.operation.rate_hz.into(),
+            asked_hz: self.setup.operation.rate_hz.into(),
             frames: album.frames,
             drawn_s: album.seconds,
             cut_off: CutOff::default(),
@@ -364,11 +366,12 @@ impl Session {
     }
 }
 
-/// A device, if a hand holds one.
-type Held = Option<Box<dyn HapticDevice>>;
+/// Device of a hand, if any.
+type OptionalDevice = Option<Box<dyn HapticDevice>>;
 
-/// Refuses places that cannot be written to, or that hold a session, before anything is loaded.
-fn places(options: &Options) -> Result<(), SessionError> {
+/// Refuses output paths that cannot be written or that contain a session, before anything is
+/// loaded.
+fn check_outputs(options: &Options) -> Result<(), SessionError> {
     let usage = |fault: String| Err(SessionError::Usage(fault));
     let remedy = "name another, or give --overwrite to replace it";
     let out = options.out.as_deref();
@@ -392,7 +395,7 @@ fn places(options: &Options) -> Result<(), SessionError> {
     let recording = out.map(|out| out.join(output::RECORDING));
     let mut written = [record, recording.as_deref()].into_iter().flatten();
     match written.any(|written| source.is_some() && written.canonicalize().ok() == source) {
-        true => usage("--device: the recording that is run again would be overwritten; name another --out".into()),
+        true => usage("--device: the replayed recording would be overwritten; name another --out".into()),
         false => Ok(()),
     }
 }

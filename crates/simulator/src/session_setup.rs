@@ -1,5 +1,4 @@
-//! The operating table: patient, plan and methods, and from them the stages that the loops begin
-//! with.
+//! Setup of a session: patient, plan and models, and the stages built from them.
 
 use crate::case::Case;
 use crate::case::plan::Plan;
@@ -29,28 +28,29 @@ use trepan_link::Recording;
 use trepan_soft::{Body, Loads, SoftSolver};
 use trepan_volume::{BoneVolume, Piece};
 
-/// What the operation is done on, and by which methods.
+/// Patient, plan, settings and models of a session.
 pub struct SessionSetup {
-    /// The simulator.
+    /// The program.
     pub program: Program,
     /// The patient.
     pub scene: Scene,
-    /// What is to be taken away.
+    /// Planned removal of bone.
     pub plan: Plan,
     /// Settings of the operation.
     pub operation: Operation,
-    /// By which models.
+    /// Models that run.
     pub models: Models,
-    /// The bone that a replay carves while the window goes back and forth with the scene's.
+    /// Copy of the bone that a replay drills, because the window plays the scene's bone back and
+    /// forth.
     filmed: Option<Arc<BoneVolume>>,
     young_mpa: f32,
-    /// What the solver `fastest` turned out to be.
+    /// Name of the solver chosen for `fastest`, once it is chosen.
     fastest: OnceLock<&'static str>,
 }
 
 impl SessionSetup {
-    /// Lays a case on the table. `filmed`: the window will go to and fro in the bone that is shown,
-    /// so a second one is carved.
+    /// Prepares a case for a session. `filmed`: the window plays the shown bone back and forth, so
+    /// a copy is drilled.
     pub fn new(
         program: Program,
         (case, models): (Case, Models),
@@ -73,7 +73,7 @@ impl SessionSetup {
         })
     }
 
-    /// The bone, if it is operated on.
+    /// The bone, if the program drills it.
     pub fn bone(&self) -> Option<&Arc<BoneVolume>> {
         self.filmed.as_ref().or(self.scene.bone.as_ref()).filter(|_| self.program.has_bone())
     }
@@ -83,39 +83,39 @@ impl SessionSetup {
         self.scene.brain.as_ref().filter(|_| self.program.has_tissue())
     }
 
-    /// The bone's pieces as they hang together now.
+    /// Connected pieces of the bone in its current state.
     pub fn pieces(&self) -> Vec<Piece> {
         self.bone().map_or_else(Vec::new, |bone| Piece::all(bone))
     }
 
-    /// Where the brain was pressed.
+    /// Forces on the brain by region, from a recording.
     pub fn regions(&self, recording: &Recording) -> Vec<Region> {
         self.brain().map_or_else(Vec::new, |brain| regions(brain, self.program.tray(), &recording.ticks))
     }
 
-    /// What steps the tissue: of `fastest` what that turned out to be.
+    /// Name of the tissue solver; for `fastest`, of the chosen one.
     pub fn solver_name(&self) -> &str {
         self.fastest.get().copied().unwrap_or(self.models.setup.tissue.solver)
     }
 
-    /// The bodies of the loops, with the tool at `start`.
+    /// Creates the stages, with the tool at `start`.
     pub fn stages(
         &self,
         start: ToolState,
         tick_ms: f32,
-        (feel, second): (&DeviceLimits, Option<&DeviceLimits>),
+        (limits, second): (&DeviceLimits, Option<&DeviceLimits>),
         touch: &trepan_deformable::Config,
     ) -> Result<Stages, SessionError> {
         let rigid = rigid_of(&self.models.setup.bone)?;
-        let config = |feel: &DeviceLimits| HapticConfig {
+        let config = |limits: &DeviceLimits| HapticConfig {
             program: self.program,
             rigid,
             dt_ms: tick_ms,
             bone_force: Vibration::drill(
-                feel.coupled(Viscoelastic { stiffness: BONE_STIFFNESS, damping: 0.5 }, tick_ms),
+                limits.coupled(Viscoelastic { stiffness: BONE_STIFFNESS, damping: 0.5 }, tick_ms),
             ),
-            tissue_force: feel.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, tick_ms),
-            guard: feel.guard(),
+            tissue_force: limits.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, tick_ms),
+            guard: limits.guard(),
             limits: Limits::default(),
             opening_needed: self.operation.opening_needed,
             force_waits: self.operation.force_waits,
@@ -123,10 +123,10 @@ impl SessionSetup {
         let bone = self.bone().cloned();
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));
         let tissue = self.brain().map(|brain| self.tissue(brain, touch)).transpose()?;
-        let second = second.map(|feel| SecondHand::new(config(feel), bone.clone(), field.clone()));
+        let second = second.map(|limits| SecondHand::new(config(limits), bone.clone(), field.clone()));
         let search = bone.as_ref().and_then(|bone| self.plan.search(bone));
         let forbidden = self.scene.brain.as_ref().and_then(|brain| brain.distance_to(&self.operation.forbidden));
-        let mut haptic = HapticStage::new(config(feel), bone, field, start);
+        let mut haptic = HapticStage::new(config(limits), bone, field, start);
         haptic = search.into_iter().fold(haptic, HapticStage::with_flap);
         haptic = forbidden.map(Arc::new).into_iter().fold(haptic, HapticStage::forbidding);
         Ok(Stages { haptic, second, tissue })
@@ -140,11 +140,11 @@ impl SessionSetup {
             material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
         };
         let wall = self.bone().cloned().map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed));
-        let wall = wall.transpose().map_err(|fault| of_brain(&fault))?;
+        let wall = wall.transpose().map_err(|fault| brain_error(&fault))?;
         let collision = CollisionStage::new(self.program, &brain.mesh, touch, wall);
         let settling = Settling::new(self.operation.csf_loss, Vec3::NEG_Y, -self.plan.site.inward);
         Ok(run::Tissue {
-            collision: collision.map_err(|fault| of_brain(&fault))?.settling(settling),
+            collision: collision.map_err(|fault| brain_error(&fault))?.settling(settling),
             solver: SolverStage::new(self.solver(&body)?),
         })
     }
@@ -152,7 +152,7 @@ impl SessionSetup {
     fn solver(&self, body: &Body) -> Result<Box<dyn SoftSolver>, SessionError> {
         let Tissue { solver, still_mm, .. } = self.models.setup.tissue;
         if let Some(method) = solver_named(solver)? {
-            return method.build(body).map_err(|fault| of_brain(&fault));
+            return method.build(body).map_err(|fault| brain_error(&fault));
         }
         let config = trepan_tled::Config {
             still_mm: still_mm as f32,
@@ -160,29 +160,29 @@ impl SessionSetup {
             ..trepan_tled::Config::default()
         };
         if solver != FASTEST {
-            return Ok(Box::new(trepan_tled::Tled::new(body, &config).map_err(|fault| of_brain(&fault))?));
+            return Ok(Box::new(trepan_tled::Tled::new(body, &config).map_err(|fault| brain_error(&fault))?));
         }
         let clock = Clock::start();
         let all = trepan_tled::choice::candidates(body, &config);
         let chosen = trepan_tled::choice::fastest(&all, &Loads::default(), 100.0, &|| clock.now_ms());
-        let chosen = chosen.map_err(|fault| of_brain(&fault))?;
+        let chosen = chosen.map_err(|fault| brain_error(&fault))?;
         tracing::info!("solver {}: {}", chosen.name, chosen.why);
         let _first = self.fastest.set(chosen.name);
         Ok(chosen.solver)
     }
 }
 
-fn of_brain(fault: &dyn std::fmt::Display) -> SessionError {
+fn brain_error(fault: &dyn std::fmt::Display) -> SessionError {
     SessionError::Internal(format!("the brain: {fault}"))
 }
 
-/// What is to be taken away.
+/// Plans the removal of bone; refuses a flap that the skull does not surround.
 fn planned(scene: &Scene, operation: &Operation) -> Result<Plan, SessionError> {
     let hole_mm = Program::Craniotomy.tray()[0].tip_radius_mm;
     let plan = Plan::new(scene.bone.as_deref(), scene.site, hole_mm, 0.5 * operation.flap_mm);
     plan.ok_or_else(|| {
         let fault = format!(
-            "--flap {}: the skull does not go all around it: give a smaller one, or another --opening",
+            "--flap {}: the skull does not surround the flap: give a smaller one, or another --opening",
             operation.flap_mm
         );
         SessionError::Usage(fault)

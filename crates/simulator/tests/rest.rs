@@ -1,5 +1,4 @@
-//! Tissue that a wall presses comes to rest, however light its nodes and however seldom the wall is
-//! looked at.
+//! Tissue pressed by a wall comes to rest, with light nodes and rare updates of the wall.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use trepan_contact::NodalContacts;
@@ -9,15 +8,16 @@ use trepan_simulator::SolverStage;
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 
-/// A slab of brain, 12 x 12 x 4 mm, hung by its upper side; its nodes weigh 0.0004 to 0.001 g.
+/// Makes a slab of brain, 12 x 12 x 4 mm, fixed at its upper side; nodes weigh 0.0004 to 0.001 g.
 fn slab() -> Body {
     let mesh = boxes::split_box([12, 12, 4], Vec3::new(12.0, 12.0, 4.0));
     let fixed = boxes::nodes_where(&mesh, |p| p.z > 3.99);
     Body::uniform(mesh, fixed, Material::BRAIN)
 }
 
-/// Half a millimetre deep in a gently rounded wall; gives the largest change of a node's velocity
-/// in a step, mm/ms, in the first 20 ms and in the last 20 of 400 ms, and the wall's force then, N.
+/// Presses the slab 0.5 mm deep into a slightly curved wall for 400 ms. Returns the largest change
+/// of a node's velocity in a step, mm/ms, in the first and in the last 20 ms, and the final force
+/// of the wall, N.
 fn pressed(refresh: u64) -> (f32, f32, f32) {
     let body = slab();
     let wall = SlidingWall::around(&body.mesh, &body.fixed).unwrap();
@@ -52,9 +52,9 @@ fn light_nodes_pressed_on_a_wall_come_to_rest() {
     }
 }
 
-/// The law of rest is broken by a node that moves without a touch, and then said.
+/// Motion of a node without a touch is counted and gives a remark.
 #[test]
-fn motion_without_touch_is_counted_and_told() {
+fn motion_without_touch_is_counted_and_gives_a_remark() {
     let body = slab();
     let mut stage = SolverStage::new(Box::new(Tled::new(&body, &Config::default()).unwrap()));
     let mut loads = Loads::default();

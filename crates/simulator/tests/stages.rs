@@ -1,5 +1,5 @@
-//! The stages under faults: nothing that a device, a late thread or an odd script does reaches a
-//! hand as a jump, a NaN or a panic.
+//! The haptic stage under faults: no fault of a device, thread or script causes a force jump, a NaN
+//! or a panic.
 
 use glam::IVec3;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use trepan_simulator::{
 };
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
-/// A flat head: bone from z = -6 to 0 mm, brain under z = -8 mm.
+/// Makes a flat head: bone from z = -6 to 0 mm, brain under z = -8 mm.
 fn head() -> (Arc<BoneVolume>, Arc<DistanceField>) {
     let n = 48;
     let mut ct = VoxelVolume::isotropic([n, n, n], Vec3::new(-23.5, -23.5, -27.5), 1.0, -1000i16);
@@ -42,7 +42,7 @@ fn config(program: Program) -> HapticConfig {
 struct Bench {
     stage: HapticStage,
     tick: u64,
-    told: Vec<Notice>,
+    notices: Vec<Notice>,
     second: Option<Pose>,
 }
 
@@ -53,7 +53,7 @@ impl Bench {
         Self {
             stage: HapticStage::new(config(program), bone, Some(brain), at(20.0, 0.0)),
             tick: 0,
-            told: Vec::new(),
+            notices: Vec::new(),
             second: None,
         }
     }
@@ -63,18 +63,18 @@ impl Bench {
         let tool = ToolState { time_ms: self.tick as f64, ..tool };
         let input =
             TickInput { tick: self.tick, reading: Reading { tool, status }, patch, patch_seq: 1, second: self.second };
-        let done = self.stage.tick(&input, &mut |notice| self.told.push(notice));
+        let done = self.stage.tick(&input, &mut |notice| self.notices.push(notice));
         let force = done.wrench.force();
         assert!(force.is_finite() && force.length() <= 3.3 + 1e-5, "{force} at tick {}", self.tick);
         done.record
     }
 
     fn raised(&self, warning: Warning) -> Option<u64> {
-        self.told.iter().find(|n| matches!(n.what, What::Warning(w, true, _) if w == warning)).map(|n| n.tick)
+        self.notices.iter().find(|n| matches!(n.what, What::Warning(w, true, _) if w == warning)).map(|n| n.tick)
     }
 }
 
-/// The tool with its tip at height z, moving at `speed` mm/ms along z.
+/// Returns a tool with its tip at height z, mm, moving at `speed` mm/ms along z.
 fn at(z: f32, speed: f32) -> ToolState {
     let mut tool = ToolState::at(Pose::from_parts(Vec3::new(0.3, -0.2, z), Quat::IDENTITY));
     tool.twist.linear.z = speed;
@@ -85,11 +85,11 @@ const NO_PATCH: SurfacePatch =
     SurfacePatch { time_ms: 0.0, normal: Vec3::ZERO, tip_mm: Vec3::ZERO, depth_mm: 0.0, normal_velocity: 0.0 };
 
 #[test]
-fn an_undone_stroke_gives_its_bone_back_once_the_tool_is_free() {
+fn undoing_a_stroke_restores_its_bone_once_the_tool_is_free() {
     let (bone, brain) = head();
     let before = bone.snapshot();
     let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(6.0, 0.0));
-    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+    let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let mut removed = 0.0;
     let mut run = |bench: &mut Bench, z: f32, buttons: u32| {
         let record = bench.step(ToolState { buttons: Buttons(buttons), ..at(z, 0.0) }, Status::Fresh, &NO_PATCH);
@@ -107,14 +107,16 @@ fn an_undone_stroke_gives_its_bone_back_once_the_tool_is_free() {
     let left = run(&mut bench, 12.0, undo);
     assert_eq!(bone.snapshot(), before);
     assert!(left.abs() < 1e-3 * drilled, "{left} mm3 are left in the score");
-    assert!(bench.told.iter().any(|n| matches!(n.what, What::Undone(mm3) if (mm3 - drilled).abs() < 1e-3 * drilled)));
+    assert!(
+        bench.notices.iter().any(|n| matches!(n.what, What::Undone(mm3) if (mm3 - drilled).abs() < 1e-3 * drilled))
+    );
     (0..400).for_each(|i| _ = run(&mut bench, 6.0 - 0.01 * i as f32, 0));
     let felt = bench.step(at(2.0, 0.0), Status::Fresh, &NO_PATCH);
     assert!(felt.depth_mm > 0.5, "the bone that came back is not felt: {} mm", felt.depth_mm);
 }
 
-/// A stroke 4 mm down at the pose's place with the pedal, from 6 mm over the bone; then away to 12
-/// mm. Gives what was removed, mm³.
+/// Drills a stroke 4 mm down at `x`, mm, from 6 mm over the bone, then moves away to 12 mm. Returns
+/// the removed bone, mm³.
 fn stroke(bench: &mut Bench, turn: Buttons, x: f32) -> f32 {
     let mut run = |z: f32, buttons: Buttons| {
         let mut tool = ToolState { buttons, ..at(z, 0.0) };
@@ -129,10 +131,10 @@ fn stroke(bench: &mut Bench, turn: Buttons, x: f32) -> f32 {
 }
 
 #[test]
-fn strokes_of_several_tools_come_back_one_by_one() {
+fn strokes_of_several_tools_are_undone_one_by_one() {
     let (bone, brain) = head();
     let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(12.0, 0.0));
-    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+    let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let turns = [Buttons(0), Buttons::take(ToolKind::Perforator), Buttons::take(ToolKind::Burr)];
     let mut states = Vec::new();
     let mut drilled = Vec::new();
@@ -149,18 +151,18 @@ fn strokes_of_several_tools_come_back_one_by_one() {
         assert!(bone.snapshot() == *state);
     }
     bench.step(press(Buttons::UNDO), Status::Fresh, &NO_PATCH);
-    assert_eq!(bench.told.last().unwrap().what, What::NotUndone(Hindrance::NoStroke));
+    assert_eq!(bench.notices.last().unwrap().what, What::NotUndone(Hindrance::NoStroke));
     assert!(bench.stage.scores().bone_removed_mm3.abs() < 1e-2, "{}", bench.stage.scores().bone_removed_mm3);
 }
 
 #[test]
-fn no_bone_comes_back_around_a_tool_of_either_hand() {
+fn no_bone_is_restored_around_a_tool_of_either_hand() {
     let (bone, brain) = head();
     let stage = HapticStage::new(config(Program::Integrated), Some(bone.clone()), Some(brain), at(12.0, 0.0));
-    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+    let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let before = bone.snapshot();
     let mut z = 6.0;
-    while !bench.told.iter().any(|n| n.what == What::Through) {
+    while !bench.notices.iter().any(|n| n.what == What::Through) {
         z -= 0.002;
         assert!(z > -9.0, "it does not come through");
         bench.step(ToolState { buttons: Buttons::PEDAL, ..at(z, 0.0) }, Status::Fresh, &NO_PATCH);
@@ -168,35 +170,35 @@ fn no_bone_comes_back_around_a_tool_of_either_hand() {
     let drilled = bone.snapshot();
     (0..100).for_each(|_| _ = bench.step(at(z + 1.0, 0.0), Status::Fresh, &NO_PATCH));
     let peak = bench.stage.scores().peak_force_n;
-    let asks = |bench: &mut Bench, z: f32| {
+    let undo_at = |bench: &mut Bench, z: f32| {
         (0..300).for_each(|_| _ = bench.step(at(z, 0.0), Status::Fresh, &NO_PATCH));
         let undo = ToolState { buttons: Buttons::UNDO, ..at(z, 0.0) };
         (0..300).for_each(|_| _ = bench.step(undo, Status::Fresh, &NO_PATCH));
         (0..20).for_each(|_| _ = bench.step(at(z, 0.0), Status::Fresh, &NO_PATCH));
         let undo = |n: &&Notice| matches!(n.what, What::Undone(_) | What::NotUndone(_));
-        *bench.told.iter().rev().find(undo).unwrap()
+        *bench.notices.iter().rev().find(undo).unwrap()
     };
-    let refused = asks(&mut bench, z + 1.0);
+    let refused = undo_at(&mut bench, z + 1.0);
     assert_eq!(refused.what, What::NotUndone(Hindrance::Tool), "the burr lies in the hole");
     assert!(bone.snapshot() == drilled && bench.stage.scores().peak_force_n == peak);
     let words = refused.words();
     assert!(words.0 == "refused" && words.1.contains("draw it out"), "{words:?}");
     bench.second = Some(at(-3.0, 0.0).world_from_tool);
-    assert_eq!(asks(&mut bench, 20.0).what, What::NotUndone(Hindrance::SecondTool));
+    assert_eq!(undo_at(&mut bench, 20.0).what, What::NotUndone(Hindrance::SecondTool));
     assert!(bone.snapshot() == drilled);
     bench.second = Some(at(20.0, 0.0).world_from_tool);
-    assert!(matches!(asks(&mut bench, 20.0).what, What::Undone(_)) && bone.snapshot() == before);
+    assert!(matches!(undo_at(&mut bench, 20.0).what, What::Undone(_)) && bone.snapshot() == before);
     let probe = ToolState { buttons: Buttons::take(ToolKind::Probe), ..at(20.0, 0.0) };
     bench.step(probe, Status::Fresh, &NO_PATCH);
-    assert_eq!(bench.told.last().unwrap().what, What::NotOpen, "the hole is bone again");
+    assert_eq!(bench.notices.last().unwrap().what, What::NotOpen, "the hole is bone again");
 }
 
 #[test]
-fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
+fn drilling_warns_before_the_brain_and_removes_bone_only_under_the_burr() {
     let (bone, brain) = head();
     let before = bone.snapshot();
     let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(20.0, 0.0));
-    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+    let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let mut deepest = f32::INFINITY;
     for i in 0..14_000 {
         let mut tool = at((6.0 - 0.001 * i as f32).max(-7.0), -0.001);
@@ -210,7 +212,7 @@ fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
     }
     assert!(deepest > 1.9, "no warning although the brain was {deepest} mm away");
     let order = [Warning::BoneThin, Warning::BreakThrough, Warning::BrainTouched].map(|w| bench.raised(w).unwrap());
-    let through: Vec<u64> = bench.told.iter().filter(|n| n.what == What::Through).map(|n| n.tick).collect();
+    let through: Vec<u64> = bench.notices.iter().filter(|n| n.what == What::Through).map(|n| n.tick).collect();
     assert!(matches!(through[..], [tick] if tick > order[1]), "came through at {through:?}, warned at {order:?}");
     assert!(order.is_sorted() && bench.raised(Warning::BrainNear).unwrap() < order[2], "{order:?}");
     let after = bone.snapshot();
@@ -223,20 +225,20 @@ fn drilling_warns_before_the_brain_and_takes_bone_only_under_the_burr() {
 }
 
 #[test]
-fn a_touch_of_the_brain_is_warned_of_as_it_is_scored_and_a_craniotomes_foot_is_none() {
+fn warning_and_score_agree_on_a_touch_of_the_brain_and_exclude_a_craniotomes_foot() {
     for (kind, foot) in [(ToolKind::Burr, false), (ToolKind::Craniotome, true)] {
         let (bone, brain) = head();
-        // A hole that either tool goes down without touching.
+        // A hole that no tool touches on its way down.
         (0..24).for_each(|at| {
             (0..48 * 48).for_each(|n| bone.set_hu(IVec3::new(n % 48, n / 48, at + 15), trepan_volume::AIR_HU));
         });
         let stage = HapticStage::new(config(Program::Craniotomy), Some(bone), Some(brain), at(20.0, 0.0));
-        let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+        let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
         let take = |z: f32| ToolState { buttons: Buttons::take(kind), ..at(z, 0.0) };
         let lift = |bench: &mut Bench, from: f32, to: f32| {
             (0..=400).for_each(|i| {
                 let z = from + (to - from) * i as f32 / 400.0;
-                // The mesh bulges over the rest surface: that alone is no touch.
+                // Contact with the deformed mesh alone, above the rest surface, is no touch.
                 let patch = SurfacePatch {
                     time_ms: (bench.tick + 1) as f64,
                     normal: Vec3::Z,
@@ -258,13 +260,13 @@ fn a_touch_of_the_brain_is_warned_of_as_it_is_scored_and_a_craniotomes_foot_is_n
         lift(&mut bench, -8.0 + 0.5 * radius, -8.0 - 2.0 * radius);
         assert!(bench.raised(Warning::BrainTouched).is_some(), "what cuts is in the brain");
         assert_eq!(bench.stage.scores().burr_touches_of_brain, 1);
-        let words = bench.told.iter().map(|n| n.words().1).find(|text| text.starts_with("brain-touched")).unwrap();
+        let words = bench.notices.iter().map(|n| n.words().1).find(|text| text.starts_with("brain-touched")).unwrap();
         assert!(words.ends_with(" mm deep)") && !words.contains("(-"), "{words}");
     }
 }
 
 #[test]
-fn a_drill_pressed_too_hard_stalls_and_says_so() {
+fn a_drill_pressed_too_hard_stalls_with_a_warning() {
     let mut bench = Bench::new(Program::Craniotomy);
     for i in 0..1500 {
         let tool = ToolState { buttons: Buttons::PEDAL, ..at(6.0 - 0.1 * i.min(130) as f32, 0.0) };
@@ -278,7 +280,7 @@ fn a_drill_pressed_too_hard_stalls_and_says_so() {
 }
 
 #[test]
-fn a_device_that_gives_nonsense_is_held_and_told() {
+fn invalid_device_poses_are_replaced_by_the_last_valid_one_and_warned_of() {
     let mut bench = Bench::new(Program::Integrated);
     for _ in 0..400 {
         bench.step(at(2.6, 0.0), Status::Fresh, &NO_PATCH);
@@ -299,7 +301,7 @@ fn a_device_that_gives_nonsense_is_held_and_told() {
 }
 
 #[test]
-fn after_a_loss_force_and_drill_wait_for_a_deliberate_act() {
+fn after_a_loss_force_and_drill_are_off_until_a_deliberate_action() {
     let mut bench = Bench::new(Program::Craniotomy);
     let mut run = |ticks: usize, z: f32, buttons: Buttons, status: Status| {
         let step = |_| bench.step(ToolState { buttons, ..at(z, 0.0) }, status, &NO_PATCH);
@@ -322,15 +324,16 @@ fn after_a_loss_force_and_drill_wait_for_a_deliberate_act() {
     assert_eq!(run(50, 2.2, none, Status::Fresh).0, 0.0);
     run(300, 6.0, none, Status::Fresh);
     assert!(run(400, 2.2, none, Status::Fresh).0 > 0.2, "moving clear is an act");
-    let told: Vec<What> = bench.told.iter().map(|n| n.what).filter(|what| matches!(what, What::Force { .. })).collect();
+    let changes: Vec<What> =
+        bench.notices.iter().map(|n| n.what).filter(|what| matches!(what, What::Force { .. })).collect();
     let force = |waits| What::Force { waits, second: false };
-    assert_eq!(told, [true, false, true, false, true, false].map(force));
-    let words = bench.told.iter().map(Notice::words).find(|(kind, _)| *kind == "device").unwrap();
+    assert_eq!(changes, [true, false, true, false, true, false].map(force));
+    let words = bench.notices.iter().map(Notice::words).find(|(kind, _)| *kind == "device").unwrap();
     assert!(words.1.contains("pressed anew"), "{words:?}");
 }
 
 #[test]
-fn a_teleport_through_the_skull_does_not_carry_the_burr_along() {
+fn the_proxy_does_not_follow_a_jump_through_the_skull() {
     let mut bench = Bench::new(Program::Craniotomy);
     bench.step(at(20.0, 0.0), Status::Fresh, &NO_PATCH);
     let record = bench.step(at(-20.0, 0.0), Status::Fresh, &NO_PATCH);
@@ -338,7 +341,7 @@ fn a_teleport_through_the_skull_does_not_carry_the_burr_along() {
 }
 
 #[test]
-fn the_force_of_an_old_patch_fades_and_the_ticks_are_held() {
+fn the_force_of_a_stale_patch_fades_and_its_ticks_are_flagged() {
     let mut bench = Bench::new(Program::Brain);
     let patch = SurfacePatch {
         time_ms: 500.0,
@@ -370,7 +373,7 @@ fn a_probe_that_scrapes_the_rim_does_not_press_the_brain() {
     let (bone, brain) = head();
     let config = HapticConfig { opening_needed: false, ..config(Program::Integrated) };
     let stage = HapticStage::new(config, Some(bone), Some(brain), at(20.0, 0.0));
-    let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+    let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let probe = |z: f32| ToolState { buttons: Buttons::take(ToolKind::Probe), ..at(z, 0.0) };
     (0..50).for_each(|_| _ = bench.step(probe(20.0), Status::Fresh, &NO_PATCH));
     let mut last = TickRecord::default();
@@ -389,13 +392,13 @@ fn a_probe_that_scrapes_the_rim_does_not_press_the_brain() {
 
 #[test]
 fn the_tool_changes_once_for_a_press_and_only_when_free() {
-    let asks = Buttons::take(ToolKind::Probe);
-    let press = |z: f32| ToolState { buttons: asks, ..at(z, 0.0) };
+    let request = Buttons::take(ToolKind::Probe);
+    let press = |z: f32| ToolState { buttons: request, ..at(z, 0.0) };
     for needed in [true, false] {
         let (bone, brain) = head();
         let config = HapticConfig { opening_needed: needed, ..config(Program::Integrated) };
         let stage = HapticStage::new(config, Some(bone), Some(brain), at(20.0, 0.0));
-        let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
+        let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
         for _ in 0..5 {
             bench.step(at(2.5, 0.0), Status::Fresh, &NO_PATCH);
         }
@@ -406,9 +409,9 @@ fn the_tool_changes_once_for_a_press_and_only_when_free() {
             bench.step(press(20.0), Status::Fresh, &NO_PATCH);
         }
         assert_eq!(bench.stage.phase(), if needed { Phase::Craniotomy } else { Phase::Brain });
-        let told = |what: fn(&What) -> bool| bench.told.iter().filter(|n| what(&n.what)).count();
-        assert_eq!(told(|what| matches!(what, What::Phase(_))), if needed { 1 } else { 2 });
-        assert_eq!(told(|what| *what == What::NotOpen), usize::from(needed));
+        let count = |what: fn(&What) -> bool| bench.notices.iter().filter(|n| what(&n.what)).count();
+        assert_eq!(count(|what| matches!(what, What::Phase(_))), if needed { 1 } else { 2 });
+        assert_eq!(count(|what| *what == What::NotOpen), usize::from(needed));
     }
 }
 
@@ -427,7 +430,7 @@ fn a_release_ends_at_zero_and_stays_there() {
 }
 
 #[test]
-fn a_perforator_lets_go_where_it_comes_through_until_the_pedal_is_up() {
+fn a_perforators_clutch_disengages_at_breakthrough_until_the_pedal_is_up() {
     let mut bench = Bench::new(Program::Craniotomy);
     let pedal = Buttons::take(ToolKind::Perforator) | Buttons::PEDAL;
     let press = |z: f32, buttons| ToolState { buttons, ..at(z, 0.0) };
@@ -445,7 +448,7 @@ fn a_perforator_lets_go_where_it_comes_through_until_the_pedal_is_up() {
 }
 
 #[test]
-fn what_must_not_be_touched_is_told_from_a_millimetre_on_for_every_tool() {
+fn a_forbidden_structure_within_a_millimetre_gives_a_warning_for_every_tool() {
     let (bone, brain) = head();
     let mut mask = VoxelVolume::isotropic([36; 3], Vec3::new(-17.5, -17.5, -11.5), 1.0, 0u8);
     for at in 0..mask.data.len() {
@@ -457,20 +460,20 @@ fn what_must_not_be_touched_is_told_from_a_millimetre_on_for_every_tool() {
         let config = HapticConfig { opening_needed: false, ..config(Program::Integrated) };
         let stage = HapticStage::new(config, Some(bone.clone()), Some(brain.clone()), at(30.0, 0.0));
         let stage = stage.forbidding(Arc::new(DistanceField::of_mask(&mask)));
-        let mut bench = Bench { stage, tick: 0, told: Vec::new(), second: None };
-        let mut told_at = None;
+        let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
+        let mut warned_at = None;
         for step in 0..2000 {
             let z = 30.0 - 0.01 * step as f32;
             bench.step(ToolState { buttons: Buttons::slot(slot), ..at(z, 0.0) }, Status::Fresh, &NO_PATCH);
-            told_at = told_at.or(bench.raised(Warning::ForbiddenNear).map(|_| z));
+            warned_at = warned_at.or(bench.raised(Warning::ForbiddenNear).map(|_| z));
         }
-        let told_at = told_at.unwrap();
-        assert!((told_at - (9.0 + radius + 1.0)).abs() < 0.6, "tool {slot} at {told_at}");
+        let warned_at = warned_at.unwrap();
+        assert!((warned_at - (9.0 + radius + 1.0)).abs() < 0.6, "tool {slot} at {warned_at}");
     }
 }
 
 #[test]
-fn a_pause_lets_go_and_comes_back_at_the_guards_pace() {
+fn a_pause_fades_the_force_out_and_in_at_the_guards_rate() {
     let pace = 0.5 + 1e-4;
     let mut bench = Bench::new(Program::Craniotomy);
     let mut press = |buttons| bench.step(ToolState { buttons, ..at(2.2, 0.0) }, Status::Fresh, &NO_PATCH);

@@ -198,7 +198,7 @@ impl Body {
     }
 
     /// Whether the fixed nodes hold the body: three of them span a plane.
-    pub fn is_held(&self) -> bool {
+    pub fn is_supported(&self) -> bool {
         let points = || self.fixed.iter().map(|&n| self.mesh.positions[n as usize].as_dvec3());
         let Some(origin) = points().next() else { return false };
         let furthest = |measure: &dyn Fn(glam::DVec3) -> f64| {
@@ -258,10 +258,10 @@ mod tests {
     #[test]
     fn nodes_on_one_line_do_not_hold_a_body() {
         let mut body = cube();
-        assert!(body.is_held());
+        assert!(body.is_supported());
         body.fixed = boxes::nodes_where(&body.mesh, |p| p.z < 1e-3 && p.y < 1e-3);
-        assert!(!body.is_held());
+        assert!(!body.is_supported());
         body.fixed.clear();
-        assert!(!body.is_held());
+        assert!(!body.is_supported());
     }
 }

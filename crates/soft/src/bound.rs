@@ -73,7 +73,7 @@ pub fn lowest_frequency(body: &Body) -> Option<f64> {
 
 /// The same with the masses of a stiffness.
 pub fn lowest_frequency_of(body: &Body, stiffness: &Stiffness) -> Option<f64> {
-    if !body.is_held() || !stiffness.fixed().contains(&false) {
+    if !body.is_supported() || !stiffness.fixed().contains(&false) {
         return None;
     }
     let masses = stiffness.masses_g();

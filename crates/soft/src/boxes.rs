@@ -12,7 +12,8 @@ use trepan_mesh::TetMesh;
 
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-/// A box from the origin to `size`, mm, of `cells` cells of six tetrahedra each.
+/// A box from the origin to `size`, mm, of `cells` cells with a node in the middle of each. It has
+/// about twelve tetrahedra a cell, as the mesher lays them.
 pub fn split_box(cells: [usize; 3], size: Vec3) -> TetMesh {
     let [nx, ny, nz] = cells;
     let node = |c: [usize; 3]| ((c[2] * (ny + 1) + c[1]) * (nx + 1) + c[0]) as u32;
@@ -35,8 +36,8 @@ pub fn split_box(cells: [usize; 3], size: Vec3) -> TetMesh {
     mesh
 }
 
-/// A box from the origin to `size`, mm, of `cells` cells with a node in the middle of each: about
-/// twelve tetrahedra a cell, as the mesher lays them.
+/// A box from the origin to `size`, mm, of `cells` cells with a node in the middle of each. It has
+/// about twelve tetrahedra a cell, as the mesher lays them.
 pub fn centred_box(cells: [usize; 3], size: Vec3) -> TetMesh {
     let TetMesh { positions, .. } = split_box(cells, size);
     let mut mesh = TetMesh { positions, ..TetMesh::default() };

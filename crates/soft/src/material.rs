@@ -117,11 +117,11 @@ impl Material {
     /// Grey matter, uncalibrated (Budday et al. 2015).
     pub const GREY_MATTER: Self = Self::NeoHookean { young_mpa: 0.002_54, poisson: 0.45, density_g_mm3: 1.0e-3 };
 
-    /// A ventricle filled with CSF, uncalibrated (Wittek et al. 2010): as a solid so soft and
+    /// A ventricle filled with CSF, uncalibrated (Wittek et al. 2010). It is a solid so soft and
     /// compressible that it neither holds the brain up nor keeps it from closing.
     pub const VENTRICLE: Self = Self::NeoHookean { young_mpa: 1.0e-5, poisson: 0.1, density_g_mm3: 1.0e-3 };
 
-    /// Wall of a cerebral artery, uncalibrated (Torii et al. 2006). 300 times as stiff as brain: it
+    /// Wall of a cerebral artery, uncalibrated (Torii et al. 2006): 300 times as stiff as brain. It
     /// shortens the stable step 18 times where elements are as large.
     pub const VESSEL_WALL: Self = Self::NeoHookean { young_mpa: 1.0, poisson: 0.45, density_g_mm3: 1.0e-3 };
 

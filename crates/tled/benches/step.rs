@@ -52,7 +52,7 @@ fn threads(bencher: Bencher<'_, '_>, threads: usize) {
 }
 
 #[divan::bench]
-fn cure(bencher: Bencher<'_, '_>) {
+fn averaged_pressure(bencher: Bencher<'_, '_>) {
     steps(bencher, BRAIN, &Config { averaged_pressure: true, ..Config::default() });
 }
 
@@ -62,11 +62,11 @@ fn prony(bencher: Bencher<'_, '_>) {
 }
 
 #[divan::bench]
-fn cure_and_prony(bencher: Bencher<'_, '_>) {
+fn averaged_pressure_and_prony(bencher: Bencher<'_, '_>) {
     steps(bencher, BRAIN, &Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..Config::default() });
 }
 
-/// One pass alone, of a step with the cure.
+/// One pass alone, of a step with averaged pressure.
 #[divan::bench(args = Pass::ALL.map(Pass::name))]
 fn pass(bencher: Bencher<'_, '_>, name: &str) {
     let pass = Pass::ALL.into_iter().find(|p| p.name() == name).expect("a pass of that name");

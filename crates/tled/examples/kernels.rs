@@ -20,7 +20,10 @@ fn main() -> Result<(), BodyError> {
     runs.push(("two threads", Config { threads: 2, ..plain }));
     runs.push(("locking cure", Config { averaged_pressure: true, ..plain }));
     runs.push(("Prony terms", Config { relaxation: Relaxation::BRAIN, ..plain }));
-    runs.push(("cure and Prony", Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..plain }));
+    runs.push((
+        "averaged pressure and Prony",
+        Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..plain },
+    ));
     let mut solvers = Vec::new();
     for (name, config) in &runs {
         solvers.push((*name, Tled::new(&body, config)?, Vec::new()));

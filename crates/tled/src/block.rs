@@ -1,16 +1,16 @@
-//! Blocks of sixteen tetrahedra, structure of arrays, and the two passes over them.
+//! Blocks of sixteen tetrahedra (structure of arrays) and the two passes over them.
 //!
 //! # Theory
-//! The force pass turns displacements into forces. Where locking is cured a volume pass goes before
-//! it: each group at a node gets the mean `J - 1` of its elements, weighted by volume, and the
-//! force pass takes the mean of its four node_groups in place of its own: the average nodal
-//! pressure of Bonet and Burton 1998, material by material as of Joldes, Wittek and Miller 2009
-//! (see `node_groups.rs`).
+//! The force pass turns displacements into forces. With averaged pressure a volume pass comes
+//! before it: each node group gets the mean `J - 1` of its elements, weighted by volume, and the
+//! force pass uses the mean of its four node groups instead of the element's own `J - 1`. This is
+//! the averaged nodal pressure of Bonet and Burton 1998, material by material as in Joldes, Wittek
+//! and Miller 2009 (see `node_groups.rs`).
 //!
 //! # Practice
-//! 84 bytes of constants a tetrahedron, 48 more for a memory of past stress. Nodes are those of the
-//! part that the block belongs to. Forces are added lane by lane, whatever the register's width, so
-//! that every kernel sums in the same order.
+//! A tetrahedron has 84 bytes of constants, and 48 more for the stress memory. Node numbers refer
+//! to the part that the block belongs to. Forces are added lane by lane for every register width,
+//! so that every kernel sums in the same order.
 
 use crate::element::{deformation, forces};
 use crate::kernel::{Pass, PassReport};
@@ -24,24 +24,24 @@ use trepan_soft::{Material, Shape, element_omega2};
 /// Tetrahedra in a block.
 pub(crate) const WIDTH: usize = 16;
 
-/// Four numbers in one 16-byte row: a displacement and `J - 1` of a node, or a force and nothing.
+/// A 16-byte row of four numbers: a node's displacement and `J - 1`, or a force and padding.
 pub(crate) type Quad = [f32; 4];
 
-/// Sixteen tetrahedra with K material constants each. Lanes without an element have no stiffness
-/// and add nothing to node 0.
+/// Sixteen tetrahedra with K material constants each. Unused lanes have zero stiffness and add zero
+/// to node 0.
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(crate) struct Block<const K: usize> {
     gradients: [[[f32; WIDTH]; 3]; 3],
     constants: [[f32; WIDTH]; K],
-    /// V/4, mm³.
+    /// Quarter of the element's volume, mm³.
     quarter_volume: [f32; WIDTH],
-    /// ω² of the element at rest over its stiffness at rest.
+    /// The element's ω² at rest divided by its stiffness at rest.
     omega2: [f32; WIDTH],
     nodes: [[u32; WIDTH]; 4],
 }
 
-/// Past stress of a block, T terms.
+/// Stress memory of a block, T Prony terms.
 pub(crate) type Memory<const T: usize> = [[[f32; WIDTH]; 6]; T];
 
 /// The force pass.
@@ -59,18 +59,18 @@ pub(crate) struct Forces<'a, M, const K: usize, const T: usize> {
 pub(crate) struct Volumes<'a, const K: usize> {
     pub blocks: &'a [Block<K>],
     pub u: &'a [Quad],
-    /// `Σ V (J - 1) / 4` by node.
+    /// `Σ V (J - 1) / 4` by node, mm³.
     pub shares: &'a mut [f32],
 }
 
-/// Edges of an element as they moved, and the mean of its nodes' fourth numbers.
+/// Displacement differences along an element's edges, and the mean of its nodes' `J - 1`.
 struct Moved<L> {
     edges: [[L; 3]; 3],
     mean: L,
 }
 
 impl<const K: usize> Block<K> {
-    /// A block of no elements.
+    /// Creates a block without elements.
     pub fn empty() -> Self {
         Self {
             gradients: [[[0.0; WIDTH]; 3]; 3],
@@ -81,7 +81,7 @@ impl<const K: usize> Block<K> {
         }
     }
 
-    /// Puts an element into a lane, its density scaled.
+    /// Puts an element into a lane, with a factor on its density.
     pub fn put<M: Constitutive<K>>(
         &mut self,
         lane: usize,
@@ -115,7 +115,7 @@ impl<const K: usize> Block<K> {
         Moved { edges: [minus(&a, &o), minus(&b, &o), minus(&c, &o)], mean }
     }
 
-    /// Nodes of the lanes, corner by corner.
+    /// Node numbers of the lanes, corner by corner.
     #[inline(always)]
     fn corners<L: Lane>(&self, part: usize) -> [&[u32]; 4] {
         let (from, to) = (part * L::LANES, (part + 1) * L::LANES);
@@ -124,8 +124,8 @@ impl<const K: usize> Block<K> {
     }
 }
 
-/// ω² of an element over its stiffness, both at rest; times its stiffness at present it is its ω²
-/// at present.
+/// An element's ω² divided by its stiffness, both at rest. Multiplied by the present stiffness it
+/// gives the present ω².
 pub(crate) fn omega2_over_stiffness<M: Constitutive<K>, const K: usize>(
     shape: &Shape,
     material: &Material,
@@ -146,13 +146,14 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 let (gradients, constants) = (block.gradients::<L>(part), load::<L, K>(&block.constants, part));
                 let d = deformation(&moved.edges, &gradients);
                 let mut stress = M::stress(&constants, &d);
-                let swelling = if self.averaged_pressure { moved.mean } else { d.j - L::splat(1.0) };
-                let omega2 = L::load(&block.omega2, part) * stiffness(&stress, M::moduli(&constants), &d, swelling);
+                let volume_change = if self.averaged_pressure { moved.mean } else { d.j - L::splat(1.0) };
+                let omega2 =
+                    L::load(&block.omega2, part) * stiffness(&stress, M::moduli(&constants), &d, volume_change);
                 stiffest = omega2.larger(stiffest);
                 if T > 0 {
                     relax::<L, T>(&mut stress, &d.inverse_green(), memory, &self.fade, part);
                 }
-                stress.q = stress.q + M::moduli(&constants).1 * swelling;
+                stress.q = stress.q + M::moduli(&constants).1 * volume_change;
                 let [f1, f2, f3] = forces(&stress, M::ROUND && T == 0, &d, &gradients);
                 let zero = L::splat(0.0);
                 let f0 =
@@ -184,7 +185,7 @@ impl<const K: usize> Pass for Volumes<'_, K> {
     }
 }
 
-/// Lets the memory take up the isochoric stress and takes the memory off it.
+/// Updates the stress memory with the isochoric stress, and subtracts the memory from it.
 #[inline(always)]
 fn relax<L: Lane, const T: usize>(
     stress: &mut Stress<L>,

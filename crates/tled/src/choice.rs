@@ -1,32 +1,32 @@
-//! Which solver steps a body fastest on this machine: not by its name, by trying.
+//! Selects the fastest solver for a body on this machine by measurement.
 //!
 //! # Practice
-//! Every candidate is stepped at rest through the seam, as a simulator would, for some ms by the
-//! caller's clock; what counts is wall time for a ms of tissue time, so that a solver with longer
-//! steps is not punished for them. The winner is built anew: trying leaves no trace in it.
+//! Every candidate is stepped at rest through [`SoftSolver`], as in a simulator, for some ms of the
+//! caller's clock. The measure is wall time per ms of simulated time, so that longer steps are no
+//! disadvantage. The winner is built again, so the measurement does not change its state.
 
 use crate::{Config, Tled};
 use trepan_soft::{Body, Loads, SoftSolver};
 
-/// A solver that may be chosen.
+/// A solver to choose from.
 pub struct Candidate<'a> {
-    /// Its name.
+    /// Name of the solver.
     pub name: &'static str,
-    /// Makes it, at rest, or says why not.
+    /// Builds the solver at rest, or returns the reason why not.
     pub build: Box<dyn Fn() -> Result<Box<dyn SoftSolver>, String> + 'a>,
 }
 
-/// What was chosen.
+/// The chosen solver.
 pub struct Chosen {
     /// The solver, at rest.
     pub solver: Box<dyn SoftSolver>,
-    /// Its name.
+    /// Name of the solver.
     pub name: &'static str,
-    /// What each candidate cost, in words.
+    /// Cost of each candidate, or why it was not built, as text.
     pub why: String,
 }
 
-/// TLED on the processor, and on the graphics device where this crate has the feature `gpu`.
+/// TLED on the CPU, and on the GPU where this crate has the feature `gpu`.
 pub fn candidates<'a>(body: &'a Body, config: &'a Config) -> Vec<Candidate<'a>> {
     let processor = move || Ok(Box::new(Tled::new(body, config).map_err(|f| f.to_string())?) as Box<dyn SoftSolver>);
     let mut all = vec![Candidate { name: "tled", build: Box::new(processor) }];
@@ -45,8 +45,8 @@ pub fn candidates<'a>(body: &'a Body, config: &'a Config) -> Vec<Candidate<'a>> 
     all
 }
 
-/// Steps each under `loads` for `each_ms` of `now_ms` and takes the cheapest; an error tells why
-/// none could be built.
+/// Steps each candidate under `loads` for `each_ms` of the clock `now_ms` and returns the cheapest.
+/// The error gives the reasons if none could be built.
 pub fn fastest(
     candidates: &[Candidate<'_>],
     loads: &Loads,
@@ -72,7 +72,7 @@ pub fn fastest(
 }
 
 fn cost_per_ms(solver: &mut dyn SoftSolver, loads: &Loads, each_ms: f64, now_ms: &dyn Fn() -> f64) -> f64 {
-    // A solver without a bound of its own takes the simulators' step.
+    // A solver without a stability limit takes the simulators' step.
     let dt_ms = solver.stable_dt_ms().min(1.0);
     solver.step(loads, dt_ms);
     let (start, mut steps) = (now_ms(), 0u32);
@@ -91,7 +91,7 @@ mod tests {
     use trepan_geometry::Vec3;
     use trepan_soft::{Material, StepReport, boxes};
 
-    /// Moves the clock on instead of a body.
+    /// Solver that only advances the clock.
     struct Costly(Arc<AtomicU64>, u64, f32);
 
     impl SoftSolver for Costly {

@@ -4,51 +4,50 @@ use crate::{Kernel, Relaxation};
 use trepan_geometry::Vec3;
 use trepan_soft::BodyError;
 
-/// Settings of the TLED solver; `Default` is what the simulators use, but for `mass_scaling`: they
-/// add a hundredth.
+/// Settings of the TLED solver. The simulators use the defaults, except for a `mass_scaling` of a
+/// hundredth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// How motion dies away.
+    /// Damping of motion.
     pub damping: Damping,
-    /// Share of the true stable bound that a step may use, over 0 and below 1. The rest is for
-    /// elements that stiffen as they are compressed; springs of contact are implicit and need none
-    /// of it.
+    /// Share of the stable time step that a step may use, over 0 and below 1. The margin is for
+    /// elements that stiffen under compression; contact springs are implicit and need no margin.
     pub safety: f32,
-    /// Most substeps in one call, taken when `dt_ms` is over the stable bound of the body as it is
-    /// deformed now; a `dt_ms` that needs more is shortened, and the rest counted as skipped. 0 =
-    /// obey `dt_ms` even where it is unstable (for experiments on stability).
+    /// Largest number of substeps in one call. Substeps are used when `dt_ms` exceeds the stable
+    /// step of the deformed body; a `dt_ms` that needs more is shortened, and the rest counted as
+    /// skipped. 0 = one step of `dt_ms` even if unstable, for stability experiments.
     pub substeps: u32,
-    /// Gravity under which the given mesh is already in equilibrium, mm/ms². The scan was taken
-    /// lying in CSF, so the case's mesh is not stress-free: forces `-m g` are added that balance
-    /// this gravity exactly. Give the same vector in `Loads::gravity` and nothing sags; turn the
-    /// head there and only the difference acts. Zero = the mesh is free of load.
+    /// Gravity under which the given mesh is already in equilibrium, mm/ms². The patient was
+    /// scanned lying, with the brain in CSF, so the mesh is not stress-free: forces `-m g` are
+    /// added that balance this gravity exactly. With the same vector in `Loads::gravity` nothing
+    /// sags; with a turned head only the difference acts. Zero = the mesh is stress-free.
     pub balanced_gravity: Vec3,
-    /// Share of the body's mass that may be added to the elements with the shortest stable step,
-    /// 0 = none. A hundredth is not felt and lengthens the step where a mesh has slivers; weight
-    /// stays as it was. Infinite = all elements get the same bound: only for
-    /// [`settle`](crate::Tled::settle), whose way to rest does not matter.
+    /// Share of the body's mass that may be added to the elements with the shortest stable step;
+    /// 0 = none. A hundredth is imperceptible and lengthens the step of a mesh with slivers; weight
+    /// does not change. Infinite = all elements get the same stable step; only for
+    /// [`settle`](crate::Tled::settle), where only the equilibrium matters.
     pub mass_scaling: f32,
-    /// Fastest that a node may move, mm/ms (m/s). A surgeon's hand stays under 1; what is over is
-    /// held to it and counted.
+    /// Speed limit of a node, mm/ms (m/s). A surgeon's hand stays under 1. Faster nodes are clamped
+    /// and counted.
     pub max_speed: f32,
-    /// Furthest that a node may get from its rest position, as a share of the body's largest
-    /// extent; held to it and counted.
+    /// Limit of a node's displacement from rest, as a share of the body's largest extent. Nodes
+    /// beyond are clamped and counted.
     pub max_displacement: f32,
-    /// Averages the volume change over the elements of one material around each node, so that
-    /// nearly incompressible tissue (ν over about 0.47) does not lock, and other tissue bends less
-    /// stiffly. Costs about half a step.
+    /// Averages the volume change over the elements of one material around each node (averaged
+    /// nodal pressure). Nearly incompressible tissue (ν over about 0.47) then does not lock, and
+    /// other tissue bends less stiffly. Costs about half a step.
     pub averaged_pressure: bool,
-    /// Stress that fades while the tissue is held.
+    /// Stress relaxation (Prony series).
     pub relaxation: Relaxation,
-    /// Where no node of some thousand neighbouring elements gets further than this in 50 ms, mm,
-    /// they fall asleep until one does; 0 = every element in every step. What sleeps costs a tenth;
-    /// what creeps more slowly is stopped some such lengths from where it would rest. Not with
-    /// `relaxation`, under which everything creeps.
+    /// Motion in 50 ms below which a part of about a thousand elements falls asleep, mm. It wakes
+    /// when a node moves further; 0 = no sleeping. A sleeping part costs a tenth. Slower creep is
+    /// stopped a few times this distance from the equilibrium. Not allowed with `relaxation`, under
+    /// which everything creeps.
     pub still_mm: f32,
-    /// Threads that compute elements, 1 to 64, the caller among them; 1 starts none. The result has
-    /// the same bits for any number. More than the cores that are free gains nothing.
+    /// Number of threads, 1 to 64, including the caller; 1 starts none. The result has the same
+    /// bits for any number. More threads than free cores bring no speed.
     pub threads: usize,
-    /// Which implementation of the element forces; all give the same bytes.
+    /// Implementation of the element forces; all give the same bytes.
     pub kernel: Kernel,
 }
 
@@ -71,23 +70,23 @@ impl Default for Config {
     }
 }
 
-/// How motion dies away. All are proportional to mass, so they cost no stability.
+/// Damping of motion, proportional to mass, so that the stable step does not shrink.
 ///
-/// A body that its fixed nodes do not hold is damped relative to its own best-fitting rigid motion:
-/// it falls and turns unbraked.
+/// A body without enough fixed nodes is damped relative to its best-fitting rigid motion, so that
+/// translation and rotation are not damped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Damping {
-    /// None: energy is kept.
+    /// No damping: energy is conserved.
     None,
-    /// This share of critical damping of the lowest mode, without unit; 1 = back at rest soonest
-    /// (under 1 s for a brain).
+    /// Share of critical damping of the lowest mode, without unit; 1 = fastest return to rest (under
+    /// 1 s for a brain).
     Critical(f32),
-    /// Rate α, 1/ms.
+    /// Damping rate α, 1/ms.
     Rate(f32),
 }
 
 impl Config {
-    /// Refuses settings that make no sense.
+    /// Rejects invalid settings.
     pub fn check(&self) -> Result<(), BodyError> {
         let refuse = |field, value, right| Err(BodyError::Config { field, value, right });
         let damping = match self.damping {

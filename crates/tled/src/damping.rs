@@ -1,4 +1,4 @@
-//! A body's own rigid motion, which damping must not brake.
+//! Rigid motion of a body without supports, which must not be damped.
 //!
 //! # Theory
 //! The rigid motion with the same momentum and angular momentum: `V = Σ m v / Σ m`, `ω = Θ⁻¹ L`
@@ -17,7 +17,7 @@ pub(crate) struct RigidMotion {
 }
 
 impl RigidMotion {
-    /// The rigid motion of nodes with mass (g), position (mm) and velocity (mm/ms).
+    /// Best-fitting rigid motion of nodes with mass (g), position (mm) and velocity (mm/ms).
     pub fn of(nodes: impl Iterator<Item = (f32, Vec3, Vec3)> + Clone) -> Self {
         let (mut mass, mut first, mut momentum) = (0.0, DVec3::ZERO, DVec3::ZERO);
         for (m, x, v) in nodes.clone() {
@@ -37,7 +37,7 @@ impl RigidMotion {
         Self { centre: centre.as_vec3(), velocity: velocity.as_vec3(), spin: spin.as_vec3() }
     }
 
-    /// Its velocity at a point, mm/ms.
+    /// Velocity at a point, mm/ms.
     pub fn at(&self, x: Vec3) -> Vec3 {
         self.velocity + self.spin.cross(x - self.centre)
     }
@@ -52,13 +52,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rigid_motion_is_found_back() {
+    fn a_rigid_motion_is_recovered() {
         let motion =
             RigidMotion { centre: Vec3::ZERO, velocity: Vec3::new(0.1, -0.2, 0.3), spin: Vec3::new(0.01, 0.02, -0.03) };
         let points = [Vec3::X * 20.0, Vec3::Y * 30.0, Vec3::new(-5.0, 3.0, 40.0), Vec3::new(7.0, -9.0, 2.0)];
         let nodes = points.iter().enumerate().map(|(i, &x)| (1.0 + i as f32, x, motion.at(x)));
-        let found = RigidMotion::of(nodes);
-        assert!((found.spin - motion.spin).length() < 1e-6);
-        assert!(points.iter().all(|&x| (found.at(x) - motion.at(x)).length() < 1e-5));
+        let fitted = RigidMotion::of(nodes);
+        assert!((fitted.spin - motion.spin).length() < 1e-6);
+        assert!(points.iter().all(|&x| (fitted.at(x) - motion.at(x)).length() < 1e-5));
     }
 }

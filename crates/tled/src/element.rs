@@ -1,17 +1,17 @@
-//! The force of one tetrahedron, or of several at once.
+//! Nodal forces of one tetrahedron, or of several at once.
 //!
 //! # Theory
 //! ```text
 //! H = Σ_a (u_a - u_0) ⊗ ∇N_a, a = 1..3     F = I + H     C = cof F     J = det F
-//! P = F S + (q + κ (J̄ - 1)) C               f_a = -V P ∇N_a, a = 1..3        f_0 = -(f_1 + f_2 + f_3)
+//! P = F S + (q + κ (J̄ - 1)) C        f_a = -V P ∇N_a, a = 1..3        f_0 = -(f_1 + f_2 + f_3)
 //! ```
-//! S and q come from the material; J̄ is J, or the mean of the nodes' volume ratios where locking
-//! is cured.
+//! S and q come from the material. J̄ is J, or with averaged pressure the mean volume ratio of the
+//! corners' node groups.
 
 use crate::lane::Lane;
 use crate::law::{Deformation, Stress};
 
-/// Deformation from `u_a - u_0` and ∇N_a, a = 1..3.
+/// Computes the deformation from `u_a - u_0` and ∇N_a, a = 1..3.
 #[inline(always)]
 pub(crate) fn deformation<L: Lane>(edges: &[[L; 3]; 3], gradients: &[[L; 3]; 3]) -> Deformation<L> {
     let (f, one) = (displacement_gradient(edges, gradients), L::splat(1.0));
@@ -23,7 +23,7 @@ pub(crate) fn deformation<L: Lane>(edges: &[[L; 3]; 3], gradients: &[[L; 3]; 3])
     Deformation { f, c, j, clamped, root: clamped.inverse_cube_root() }
 }
 
-/// Forces on nodes 1 to 3, N, of a stress times volume; `q` includes the part of the volume.
+/// Forces on nodes 1 to 3, N, from stress times volume; `q` includes the volumetric part.
 #[inline(always)]
 pub(crate) fn forces<L: Lane>(
     stress: &Stress<L>,
@@ -43,7 +43,7 @@ pub(crate) fn forces<L: Lane>(
     [times(&rows, &gradients[0]), times(&rows, &gradients[1]), times(&rows, &gradients[2])]
 }
 
-/// Rows of H.
+/// Rows of the displacement gradient H.
 #[inline(always)]
 fn displacement_gradient<L: Lane>([a, b, c]: &[[L; 3]; 3], [g, h, i]: &[[L; 3]; 3]) -> [[L; 3]; 3] {
     [moved(a[0], b[0], c[0], g, h, i), moved(a[1], b[1], c[1], g, h, i), moved(a[2], b[2], c[2], g, h, i)]

@@ -1,4 +1,4 @@
-//! The elements and nodes of a body, and the rounds of work on them.
+//! The elements and nodes of a body, and their passes.
 
 use crate::block::WIDTH;
 use crate::config::Config;
@@ -14,11 +14,11 @@ use crate::team::{Team, Work};
 use trepan_geometry::Vec3;
 use trepan_soft::Body;
 
-/// Elements of a part: enough that adding up its sums is cheap, few enough that its nodes stay in
-/// the fastest cache.
+/// Elements of a part: enough that gathering is cheap, few enough that its nodes stay in the L1
+/// cache.
 const PART: usize = 64 * WIDTH;
 
-/// The elements of a body and its nodes.
+/// The elements and nodes of a body.
 pub(crate) struct Elements {
     team: Team,
     averaged_pressure: bool,
@@ -32,22 +32,22 @@ impl Elements {
         let inverse_volume =
             if config.averaged_pressure { node_groups.inverse_volumes(body, layout) } else { Vec::new() };
         let of_one_law = layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b));
-        let groups: Vec<&[u32]> = of_one_law.flat_map(|tets| tets.chunks(PART)).collect();
+        let tets_of: Vec<&[u32]> = of_one_law.flat_map(|tets| tets.chunks(PART)).collect();
         let groups_of = |t: u32| node_groups.of_tet(body, layout, t);
-        let owned: Vec<Vec<u32>> = groups.iter().map(|tets| sorted(tets.iter().flat_map(|&t| groups_of(t)))).collect();
+        let owned: Vec<Vec<u32>> = tets_of.iter().map(|tets| sorted(tets.iter().flat_map(|&t| groups_of(t)))).collect();
         let (force_slots, slots) = ForceSlots::of(&owned, &node_groups, layout.node_at.len(), inverse_volume);
-        let part = |((tets, own), slots): ((&&[u32], Vec<u32>), Vec<u32>)| {
-            let places = own.iter().map(|&s| node_groups.place_of[s as usize]).collect();
+        let part = |((tets, groups), slots): ((&&[u32], Vec<u32>), Vec<u32>)| {
+            let places = groups.iter().map(|&s| node_groups.place_of[s as usize]).collect();
             Part::of(
                 body,
                 scaling,
                 tets,
                 &groups_of,
-                PartGroups { node_groups: own, places, slots },
+                PartGroups { node_groups: groups, places, slots },
                 &config.relaxation,
             )
         };
-        let parts = groups.iter().zip(owned).zip(slots).map(part).collect();
+        let parts = tets_of.iter().zip(owned).zip(slots).map(part).collect();
         Self {
             team: Team::of(parts, nodes, force_slots, config.kernel.resolved(), config.threads),
             averaged_pressure: config.averaged_pressure,
@@ -61,7 +61,7 @@ impl Elements {
         self.team.nodes()
     }
 
-    /// Both passes over the elements, `dt_ms` after the last time.
+    /// Runs both passes over the elements, `dt_ms` after the previous run.
     pub fn compute(&mut self, dt_ms: f32) -> PassReport {
         self.average_volumes(dt_ms);
         self.find_forces(dt_ms)
@@ -71,10 +71,10 @@ impl Elements {
     pub fn find_forces(&mut self, dt_ms: f32) -> PassReport {
         let (fade, averaged_pressure) = (self.relaxation.fade(dt_ms), self.averaged_pressure);
         self.team.compute(Work::Forces(Forcing { fade, averaged_pressure, quiet: self.quiet(dt_ms) }));
-        self.team.found()
+        self.team.report()
     }
 
-    /// Averages the volume change by group, where locking is cured.
+    /// Averages the volume change by node group, if averaged pressure is on.
     pub fn average_volumes(&mut self, dt_ms: f32) {
         if self.averaged_pressure {
             self.team.compute(Work::Volumes(self.quiet(dt_ms)));
@@ -109,7 +109,7 @@ impl Elements {
         }
     }
 
-    /// Forgets past stress.
+    /// Clears the stress memory.
     pub fn forget(&mut self) {
         self.team.forget();
     }
@@ -135,8 +135,10 @@ mod tests {
         let mooney = Material::MooneyRivlin { c10_mpa: 3e-4, c01_mpa: 2e-4, poisson: 0.45, density_g_mm3: 1e-3 };
         for material in [Material::BRAIN, stiff, mooney, Material::BRAIN_OGDEN] {
             let body = Body::uniform(mesh.clone(), vec![], material);
-            for (cure, relaxation) in [(false, Relaxation::NONE), (true, Relaxation::NONE), (true, Relaxation::BRAIN)] {
-                compare(&body, cure, relaxation);
+            for (averaged, relaxation) in
+                [(false, Relaxation::NONE), (true, Relaxation::NONE), (true, Relaxation::BRAIN)]
+            {
+                compare(&body, averaged, relaxation);
             }
         }
         let mut mixed = Body::uniform(mesh, vec![], Material::BRAIN);
@@ -146,17 +148,17 @@ mod tests {
         compare(&mixed, true, Relaxation::BRAIN);
     }
 
-    fn compare(body: &Body, cure: bool, relaxation: Relaxation) {
+    fn compare(body: &Body, averaged: bool, relaxation: Relaxation) {
         let layout = Layout::of(body);
         let noise = |i: usize| ((i as f32 * 12.9898).sin() * 43758.547).fract() * 3.0;
         let count = layout.node_at.len();
         let forces = |kernel: Kernel, threads: usize| {
             let nodes = Nodes::of(body, &layout, &body.lumped_masses_g());
             (0..count).for_each(|n| nodes.set(n, Vec3::from([3 * n, 3 * n + 1, 3 * n + 2].map(noise)), Vec3::ZERO));
-            let config = Config { kernel, averaged_pressure: cure, relaxation, threads, ..Config::default() };
+            let config = Config { kernel, averaged_pressure: averaged, relaxation, threads, ..Config::default() };
             let mut elements = Elements::of(body, &layout, &Scaling::of(body, 0.0), nodes, &config);
-            let found = (0..3).map(|_| elements.compute(0.7)).last();
-            (found, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
+            let report = (0..3).map(|_| elements.compute(0.7)).last();
+            (report, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
         };
         let scalar = forces(Kernel::Scalar, 1);
         for kernel in Kernel::all().into_iter().filter(|k| k.runs_here()) {

@@ -1,18 +1,18 @@
-//! Numbers that threads hand to each other between rounds, without a lock.
+//! Arrays that threads share between rounds of work without a lock.
 //!
 //! # Theory
-//! Each number is written by one thread in a round and read by others in later ones; the counters
-//! that begin and end a round order them, so the numbers themselves are loaded and stored without
-//! any order, as plain memory is.
+//! Each number is written by one thread in a round and read by others in later rounds. The counters
+//! that begin and end a round order these accesses, so the numbers themselves use relaxed loads and
+//! stores, as fast as plain memory.
 
 use crate::block::Quad;
 use glam::Vec4;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
-/// Rows of four numbers.
+/// Array of rows of four numbers.
 pub(crate) struct Field(Vec<[AtomicU64; 2]>);
 
-/// Single numbers.
+/// Array of single numbers.
 pub(crate) struct Scalars(Vec<AtomicU32>);
 
 impl Field {

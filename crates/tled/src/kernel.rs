@@ -1,16 +1,16 @@
-//! The kernels of the element forces, and which of them this CPU runs.
+//! The kernels of the element forces, and their selection for this CPU.
 
 use crate::lane::Lane;
 #[cfg(target_arch = "x86_64")]
 use crate::x86;
 use wide::f32x8;
 
-/// Which implementation computes the element forces; all give the same bytes.
+/// Implementation of the element forces; all give the same bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
-    /// The fastest that this CPU has.
+    /// The fastest that this CPU supports.
     Fastest,
-    /// One element after the other.
+    /// One element at a time.
     Scalar,
     /// Eight elements at once with portable SIMD.
     Wide,
@@ -20,18 +20,18 @@ pub enum Kernel {
     Avx512,
 }
 
-/// Work over all blocks, written once for every width. Implementations inline always.
+/// Work over all blocks, generic over the register width. Implementations are always inlined.
 pub(crate) trait Pass {
-    /// Does the work with registers of kind L.
+    /// Does the work with registers of type L.
     fn run<L: Lane>(&mut self) -> PassReport;
 }
 
-/// What a pass noticed on its way.
+/// Result of a pass over the elements.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PassReport {
     /// Elements with J ≤ 0.
     pub inverted: u32,
-    /// Largest ω² of a single element as it is deformed now, 1/ms².
+    /// Largest ω² of a single deformed element, 1/ms².
     pub stiffest: f32,
 }
 
@@ -41,7 +41,7 @@ impl Kernel {
         [Self::Scalar, Self::Wide, Self::Avx2, Self::Avx512, Self::Fastest]
     }
 
-    /// Its name on a command line and in charts.
+    /// Name on the command line and in charts.
     pub fn name(self) -> &'static str {
         match self {
             Self::Fastest => "fastest",
@@ -52,7 +52,7 @@ impl Kernel {
         }
     }
 
-    /// Whether this CPU has its instructions.
+    /// Whether this CPU has the kernel's instructions.
     pub fn runs_here(self) -> bool {
         match self {
             Self::Fastest | Self::Scalar | Self::Wide => true,
@@ -65,7 +65,7 @@ impl Kernel {
         }
     }
 
-    /// What it stands for on this CPU; portable SIMD in place of one that does not run here.
+    /// The kernel that `Fastest` selects on this CPU; any other kernel unchanged.
     pub(crate) fn resolved(self) -> Self {
         match self {
             Self::Fastest => [Self::Avx512, Self::Avx2].into_iter().find(|k| k.runs_here()).unwrap_or(Self::Wide),

@@ -1,9 +1,8 @@
-//! One number per element, for one element or for several at once: the arithmetic of the kernels is
-//! written once.
+//! SIMD abstraction: one number per lane, one lane per element, for kernels generic over the width.
 //!
 //! # Practice
-//! Only operations that IEEE 754 rounds exactly, and no fused ones, so every width gives the same
-//! bits on every machine.
+//! Uses only operations that IEEE 754 rounds exactly, and no fused ones, so every width gives the
+//! same bits on every machine.
 
 use crate::block::{Quad, WIDTH};
 use std::ops::{Add, Div, Mul, Sub};
@@ -11,18 +10,18 @@ use wide::{f32x8, u32x8};
 
 /// A register of f32, one lane per element.
 ///
-/// Implementations inline always: for the registers of [`x86`](crate::x86) the instructions exist
-/// only in their kernel.
+/// Implementations are always inlined: the instructions of [`x86`](crate::x86) registers are
+/// available only inside their kernel.
 pub(crate) trait Lane:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    /// Elements at once; a divisor of [`WIDTH`].
+    /// Number of lanes; a divisor of [`WIDTH`].
     const LANES: usize;
-    /// The same number in every lane.
+    /// Sets every lane to the same number.
     fn splat(x: f32) -> Self;
-    /// Lanes `part * LANES ..` of a block's row.
+    /// Loads lanes `part * LANES ..` of a block's row.
     fn load(row: &[f32; WIDTH], part: usize) -> Self;
-    /// The four numbers of one node for each lane.
+    /// Loads the four numbers of one node for each lane.
     fn gather(from: &[Quad], at: &[u32]) -> [Self; 4];
     /// Adds the vectors of four corners to their rows, lane by lane and corner by corner.
     fn add_rows(corners: [[Self; 3]; 4], to: &mut [Quad], at: [&[u32]; 4]);
@@ -30,15 +29,15 @@ pub(crate) trait Lane:
     fn at_least(self, floor: f32) -> Self;
     /// The larger of two; `other` where this one is NaN.
     fn larger(self, other: Self) -> Self;
-    /// `x^(-1/3)` within 4 % for x over 0, by its bits: the exponent divided by -3.
+    /// `x^(-1/3)` within 4 % for x over 0, from the bits: the exponent divided by -3.
     fn rough_inverse_cube_root(self) -> Self;
-    /// How many lanes are zero or negative.
+    /// Number of lanes that are zero or negative.
     fn not_positive(self) -> u32;
-    /// Writes its lanes to `part * LANES ..` of a block's row.
+    /// Stores to lanes `part * LANES ..` of a block's row.
     fn store(self, row: &mut [f32; WIDTH], part: usize);
     /// Square root.
     fn sqrt(self) -> Self;
-    /// Its magnitude with the sign of `sign`.
+    /// The magnitude of `self` with the sign of `sign`.
     fn with_sign_of(self, sign: Self) -> Self;
     /// e of `m 2^e`, for x over 0.
     fn exponent(self) -> Self;
@@ -67,7 +66,7 @@ pub(crate) trait Lane:
         self.exponent() + (Self::splat(0.5) + artanh * Self::splat(2.0 * std::f32::consts::LOG2_E))
     }
 
-    /// `2^x` within 2e-7 of itself; x is held between -126 and 126.
+    /// `2^x` with a relative error under 2e-7; x is clamped to -126..126.
     #[inline(always)]
     fn exp2(self) -> Self {
         let zero = Self::splat(0.0);
@@ -97,7 +96,7 @@ pub(crate) trait Lane:
     }
 }
 
-/// Adding and taking away this rounds to a whole number.
+/// Adding and subtracting this rounds to a whole number.
 const ROUND: f32 = 12_582_912.0;
 
 /// `ln 2ⁿ / n!` for n = 1..7.
@@ -111,16 +110,16 @@ const EXP2: [f32; 7] = [
     0.000_015_252_734,
 ];
 
-/// `2^23`, whose bits end in a whole number added to it; and the same plus the bias of exponents.
+/// `2^23`: the low bits of `2^23 + n` are n; and the same plus the exponent bias.
 pub(crate) const WHOLE: f32 = 8_388_608.0;
 pub(crate) const BIASED: f32 = WHOLE + 127.0;
-/// Bits of a float's fraction, and of the number 1.
+/// Fraction bits of a float, and the bits of 1.0.
 pub(crate) const FRACTION: u32 = 0x007F_FFFF;
 pub(crate) const ONE: u32 = 0x3F80_0000;
-/// Bit of a float's sign.
+/// Sign bit of a float.
 pub(crate) const SIGN: u32 = 0x8000_0000;
 
-/// Makes the bits of a float its rough inverse cube root, less a third of them.
+/// Subtracting a third of a float's bits from this gives its rough inverse cube root.
 pub(crate) const ROOT_BITS: u32 = 0x54A2_FA8C;
 
 impl Lane for f32 {
@@ -307,9 +306,9 @@ mod tests {
         #[test]
         fn the_inverse_cube_root_is_right_to_f32_and_the_same_in_every_width(x in 0.01f32..1e6) {
             let exact = f64::from(x).powf(-1.0 / 3.0);
-            let found = x.inverse_cube_root();
-            prop_assert!((f64::from(found) / exact - 1.0).abs() < 5e-7);
-            prop_assert_eq!(<f32x8 as Lane>::splat(x).inverse_cube_root().to_array(), [found; 8]);
+            let root = x.inverse_cube_root();
+            prop_assert!((f64::from(root) / exact - 1.0).abs() < 5e-7);
+            prop_assert_eq!(<f32x8 as Lane>::splat(x).inverse_cube_root().to_array(), [root; 8]);
         }
     }
 

@@ -1,21 +1,21 @@
-//! The materials as the kernels compute them, in f32, for one element or several at once.
+//! Constitutive laws of the kernels, in f32, for one element or several at once.
 //!
 //! # Theory
 //! Every law is written as `P = F S + (q_iso + κ (J-1)) cof F`, S a symmetric tensor:
 //! ```text
-//! neo-Hookean          S = μ g I                                        q_iso = μ/2 g' I₁
-//! St. Venant-Kirchhoff S = (λ tr E - μ) I + μ FᵀF                       q_iso = 0, no κ term
-//! Mooney-Rivlin        S = (2 c₁₀ g + 2 c₀₁ h I₁) I - 2 c₀₁ h FᵀF       q_iso = c₁₀ g' I₁ + c₀₁ h' I₂
+//! neo-Hookean          S = μ g I                                     q_iso = μ/2 g' I₁
+//! St. Venant-Kirchhoff S = (λ tr E - μ) I + μ FᵀF                    q_iso = 0, no κ term
+//! Mooney-Rivlin        S = (2 c₁₀ g + 2 c₀₁ h I₁) I - 2 c₀₁ h FᵀF    q_iso = c₁₀ g' I₁ + c₀₁ h' I₂
 //! Ogden                S = Σ_i s_i n_i n_iᵀ, s_i = Σ_p μ_p'/α_p g_p λ_i^(α_p-2)   (μ' = 2 μ)
 //! ```
-//! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3 as in
-//! `trepan_soft::Law`, the f64 twin of this file.
+//! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.1 as in
+//! `trepan_soft::Law`, the f64 version of this file.
 
 use crate::lane::Lane;
 use crate::principal::principal;
 use trepan_soft::{LEAST_STRETCH, Law};
 
-/// What the laws need to know of an element's deformation.
+/// Deformation of an element as the laws need it.
 pub(crate) struct Deformation<L> {
     /// Rows of F.
     pub f: [[L; 3]; 3],
@@ -23,7 +23,7 @@ pub(crate) struct Deformation<L> {
     pub c: [[L; 3]; 3],
     /// det F.
     pub j: L,
-    /// max(J, 0.3) and its power -1/3.
+    /// max(J, 0.1) and its power -1/3.
     pub clamped: L,
     pub root: L,
 }
@@ -37,16 +37,16 @@ pub(crate) struct Stress<L> {
     pub q: L,
 }
 
-/// A law with K constants for each element.
+/// Constitutive law with K constants per element.
 pub(crate) trait Constitutive<const K: usize> {
-    /// The constants of one element, with its rest volume in mm³ in those that are moduli.
+    /// Constants of one element; moduli are multiplied by its rest volume, mm³.
     fn constants(law: &Law, volume_mm3: f64) -> [f32; K];
-    /// Its stress without the part of the volume.
+    /// Stress without the volumetric part.
     fn stress<L: Lane>(constants: &[L; K], d: &Deformation<L>) -> Stress<L>;
-    /// μ V and κ V, N mm. κ multiplies `J - 1` in the part of the volume; it is zero where the law
-    /// is not split.
+    /// Returns μ V and κ V, N mm. κ multiplies `J - 1` in the volumetric part; it is zero if the law
+    /// has no volumetric split.
     fn moduli<L: Lane>(constants: &[L; K]) -> (L, L);
-    /// Whether s is a number times the unit tensor, so that its other entries need no arithmetic.
+    /// Whether s is a multiple of the unit tensor, so that its other entries can be skipped.
     const ROUND: bool = false;
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct MooneyRivlin;
 pub(crate) struct Ogden;
 
 impl<L: Lane> Deformation<L> {
-    /// J^n continued linearly, and its slope, from `at = max(J, 0.3)^n`.
+    /// J^n continued linearly below J = 0.1, and its slope, from `at = max(J, 0.1)^n`.
     #[inline(always)]
     fn continued(&self, at: L, n: L) -> (L, L) {
         let inverse = self.root * self.root * self.root;
@@ -78,7 +78,7 @@ impl<L: Lane> Deformation<L> {
         ]
     }
 
-    /// `(cof F)ᵀ cof F / max(J, 0.3)`, which is J (FᵀF)⁻¹ where J is not clamped.
+    /// `(cof F)ᵀ cof F / max(J, 0.1)`, which is J (FᵀF)⁻¹ where J is not clamped.
     #[inline(always)]
     pub fn inverse_green(&self) -> Symmetric<L> {
         let inverse = self.root * self.root * self.root;
@@ -203,7 +203,7 @@ impl Constitutive<5> for Ogden {
     }
 }
 
-/// One term of Ogden's law: s_i and its part of q_iso.
+/// One term of Ogden's law: s_i and its share of q_iso.
 #[inline(always)]
 fn term<L: Lane>(scale: L, alpha: L, squares: &[L; 3], d: &Deformation<L>) -> ([L; 3], L) {
     let (g, dg) = d.continued((alpha * L::splat(-1.0 / 3.0) * d.clamped.log2()).exp2(), alpha * L::splat(-1.0 / 3.0));
@@ -214,7 +214,7 @@ fn term<L: Lane>(scale: L, alpha: L, squares: &[L; 3], d: &Deformation<L>) -> ([
     ([outer * s0, outer * s1, outer * s2], scale * dg * (v0 + v1 + v2))
 }
 
-/// `λ^α` as a function of λ², and its slope over λ²; a tangent line below the least stretch.
+/// `λ^α` as a function of λ², and its slope over λ²; the tangent line below the least stretch.
 #[inline(always)]
 fn stretch_power<L: Lane>(square: L, alpha: L) -> (L, L) {
     let at = square.at_least((LEAST_STRETCH * LEAST_STRETCH) as f32);

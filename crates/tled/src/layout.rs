@@ -1,19 +1,19 @@
-//! Order of nodes and elements in memory: neighbours in space become neighbours in memory.
+//! Memory order of nodes and elements: neighbours in space are neighbours in memory.
 //!
 //! # Theory
-//! Nodes are sorted along a Morton curve, elements by law and then by their lowest node: those of
-//! one law run through one kernel, and a step reads nodes that are still in the cache.
+//! Nodes are sorted along a Morton curve, elements by law and then by their lowest node. The
+//! elements of one law run through one kernel, and the nodes of consecutive elements are in cache.
 
 use trepan_geometry::Vec3;
 use trepan_soft::{Body, Law};
 
 /// Solver order of nodes and elements.
 pub(crate) struct Layout {
-    /// The mesh's node at each place of the solver's order.
+    /// Mesh node at each place of the solver's order.
     pub node_at: Vec<u32>,
-    /// Where each of the mesh's nodes went.
+    /// Place of each mesh node.
     pub place_of: Vec<u32>,
-    /// The mesh's tetrahedron at each place of the solver's order.
+    /// Mesh tetrahedron at each place of the solver's order.
     pub tet_at: Vec<u32>,
 }
 
@@ -37,7 +37,7 @@ impl Layout {
     }
 }
 
-/// Which law a tetrahedron follows, as a number.
+/// Number of the constitutive law of a tetrahedron.
 pub(crate) fn kind(body: &Body, tet: u32) -> u8 {
     match body.material(tet as usize).law() {
         Law::NeoHookean(_) => 0,
@@ -47,7 +47,7 @@ pub(crate) fn kind(body: &Body, tet: u32) -> u8 {
     }
 }
 
-/// Interleaves ten bits of each coordinate.
+/// Morton code: interleaves ten bits of each coordinate.
 fn morton(p: Vec3) -> u32 {
     let spread = |x: f32| (0..10).fold(0u32, |code, bit| code | ((x as u32 >> bit & 1) << (3 * bit)));
     spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2

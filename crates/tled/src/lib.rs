@@ -1,5 +1,4 @@
-//! Total Lagrangian Explicit Dynamics: large deformations of soft tissue in real time on a plain
-//! CPU.
+//! Total Lagrangian Explicit Dynamics (TLED): large deformations of soft tissue in real time.
 //!
 //! # Theory
 //! ```text
@@ -8,13 +7,13 @@
 //! ```
 //! Everything refers to the rest state, so shape-function gradients are computed once (Miller,
 //! Joldes, Lance and Wittek 2007). A step is four passes: element forces, contact, node update,
-//! bookkeeping; no equation is solved.
+//! bookkeeping; no system of equations is solved.
 //!
 //! # Practice
-//! One step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms); a longer one
-//! is cut into substeps, and so is one that elements do not bear as they are deformed now. Elements
-//! sit in blocks of sixteen with one lane each; their forces are kept and gathered per node in a
-//! fixed order, so the same input gives the same bytes on every machine and with every kernel. A
+//! A step is stable up to [`stable_dt_ms`](trepan_soft::SoftSolver::stable_dt_ms). A longer one is
+//! cut into substeps, and so is one over the stable step of the elements as deformed now. Elements
+//! are stored in blocks of sixteen, one lane each. Their forces are stored and gathered per node in
+//! a fixed order, so the same input gives the same bytes on every machine and with every kernel. A
 //! step neither allocates, locks, waits nor panics.
 //!
 //! ```
@@ -33,8 +32,8 @@
 //!
 //! # When not to use it
 //! For nearly incompressible tissue (ν over about 0.47) without [`Config::averaged_pressure`]:
-//! plain 4-node tetrahedra lock. For slow processes (minutes): the step is bound by sound, use a
-//! static solver.
+//! plain 4-node tetrahedra lock. For slow processes (minutes): the speed of sound limits the step,
+//! so use a static solver.
 
 mod block;
 pub mod choice;

@@ -1,29 +1,29 @@
-//! Where elements sit at a node: those of one material together, so that what is averaged over a
-//! node never mixes two materials.
+//! Node groups: the elements of one material around one node, over which volumes are averaged.
 //!
 //! # Theory
-//! Average nodal pressure has the energy `Σ_s κ V_s/2 (J_s - 1)²` over node_groups s, the elements
-//! of one material around one node, of which a quarter of the volume is theirs:
+//! Averaged nodal pressure has the energy `Σ_s κ V_s/2 (J_s - 1)²` over node groups s. Each element
+//! contributes a quarter of its volume to each of its four node groups:
 //! ```text
-//! V_s = Σ_e V_e/4      J_s = Σ_e V_e/4 J_e / V_s      pressure in e = κ/4 Σ J_s - 1 over its four node_groups
+//! V_s = Σ_e V_e/4    J_s = Σ_e V_e/4 J_e / V_s    pressure in e = κ/4 Σ (J_s - 1), its four groups
 //! ```
-//! With one group a node for all materials no energy stands behind the forces, and the mesh bursts
-//! where neighbours differ by 1:1000. With node_groups a bar of two materials is exact.
+//! With a single group per node for all materials the forces would not derive from an energy, and
+//! the simulation would diverge where neighbours differ in stiffness by 1:1000. With one group per
+//! material a bar of two materials is exact.
 
 use crate::layout::Layout;
 use trepan_soft::Body;
 
-/// The node_groups of a body: one a node, more where materials meet and volume is averaged.
+/// The node groups of a body: one per node, more where materials meet and volumes are averaged.
 pub(crate) struct NodeGroups {
-    /// Place of every group, ascending.
+    /// Place of every group's node, ascending.
     pub place_of: Vec<u32>,
-    /// Material of every group; 0 where they share.
+    /// Material of every group; 0 where materials share one.
     material_of: Vec<u8>,
     apart: bool,
 }
 
 impl NodeGroups {
-    /// One group for each material at a node, or one for all of them.
+    /// Creates one group per material at a node if `apart`, else one per node.
     pub fn of(body: &Body, layout: &Layout, apart: bool) -> Self {
         let key = |t: usize| if apart { body.material_of_tet[t] } else { 0 };
         let of_tet = |(t, tet): (usize, &[u32; 4])| tet.map(|n| (layout.place_of[n as usize], key(t)));
@@ -34,7 +34,7 @@ impl NodeGroups {
         Self { place_of, material_of, apart }
     }
 
-    /// NodeGroups of a tetrahedron's corners.
+    /// Node groups of a tetrahedron's corners.
     pub fn of_tet(&self, body: &Body, layout: &Layout, tet: u32) -> [u32; 4] {
         let material = if self.apart { body.material_of_tet[tet as usize] } else { 0 };
         body.mesh.tets[tet as usize].map(|n| {
@@ -47,7 +47,7 @@ impl NodeGroups {
         })
     }
 
-    /// One over the volume of every group, 1/mm³.
+    /// Inverse volume of every group, 1/mm³.
     pub fn inverse_volumes(&self, body: &Body, layout: &Layout) -> Vec<f32> {
         let mut volumes = vec![0.0; self.place_of.len()];
         for t in 0..body.mesh.tets.len() {

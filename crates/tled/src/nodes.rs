@@ -1,10 +1,10 @@
-//! The nodes' state and its update by central differences, with what keeps it sane.
+//! State of the nodes and its update by central differences, with limits on speed and displacement.
 //!
 //! # Practice
-//! State is kept as displacement from rest, by place in the solver's order: f32 displacements of a
-//! few mm are a thousand times finer than positions of 200 mm. A node beside a sleeping part stays
-//! until something pushes it. Any thread moves any run of nodes: what a node becomes depends on
-//! itself and its slots only.
+//! State is stored as displacement from rest, by place in the solver's order: f32 displacements of
+//! a few mm have a thousand times finer resolution than positions of 200 mm. A node beside a
+//! sleeping part does not move until a force pushes it. Any thread may update any run of nodes,
+//! because a node's update depends only on its state and its slots.
 
 use crate::damping::RigidMotion;
 use crate::field::{Field, Scalars};
@@ -22,23 +22,23 @@ pub(crate) struct Nodes {
     pub u: Field,
     /// Velocities, mm/ms.
     v: Field,
-    /// Forces from outside, N; cleared by the update, and 0 everywhere while nothing pushes.
+    /// External forces, N; cleared by the update, and 0 everywhere while `is_pushed` is false.
     external: Field,
     is_pushed: AtomicBool,
-    /// 1 where a load, or an awake part beside a sleeping one, pushed in the last step: no part
-    /// around it may sleep.
+    /// 1 where a load, or an awake part beside a sleeping one, pushed in the last step, so that the
+    /// parts around stay awake.
     pub pushed: Scalars,
     /// 1/m, 1/g; 0 for fixed nodes.
     pub inverse_mass: Vec<f32>,
-    /// Share of the mass that has weight.
+    /// Share of the mass that has weight (scaled mass has none).
     weight: Vec<f32>,
     rest: Vec<Vec4>,
-    /// Nodes held to a limit, and put back since they were not finite, since this was last asked.
+    /// Nodes clamped to a limit, and nodes reset because they were not finite, since `finish`.
     limited: AtomicU32,
     non_finite: AtomicU32,
 }
 
-/// What the update of one substep needs to know.
+/// Parameters of one substep's node update.
 #[derive(Clone, Copy)]
 pub(crate) struct Update {
     pub dt_ms: f32,
@@ -47,13 +47,13 @@ pub(crate) struct Update {
     pub max_speed: f32,
     pub max_displacement_mm: f32,
     pub rigid: Option<RigidMotion>,
-    /// Nodes beside a sleeping part stay where they are while a step would not move them further
-    /// than this from rest, mm.
+    /// Nodes beside a sleeping part do not move while a step from rest would move them by less than
+    /// this, mm.
     pub calm_mm: f32,
 }
 
 impl Update {
-    /// What multiplies velocity, and acceleration, ms.
+    /// Factors on velocity, without unit, and on acceleration, ms.
     pub fn keep_and_gain(&self) -> [f32; 2] {
         let half = 0.5 * self.damping_per_ms * self.dt_ms;
         [(1.0 - half) / (1.0 + half), self.dt_ms / (1.0 + half)]
@@ -61,8 +61,8 @@ impl Update {
 }
 
 impl Nodes {
-    /// Nodes at rest, of masses by mesh node, g, which may be more than what their weight comes
-    /// from.
+    /// Creates nodes at rest with the given masses by mesh node, g. Added mass (mass scaling) has no
+    /// weight.
     pub fn of(body: &Body, layout: &Layout, masses: &[f64]) -> Self {
         let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
         let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };
@@ -81,19 +81,19 @@ impl Nodes {
         }
     }
 
-    /// Moves some nodes by one substep.
+    /// Moves the nodes at some places by one substep.
     pub fn update(&self, places: Range<usize>, force_slots: &ForceSlots, update: &Update) {
         let [keep, gain] = update.keep_and_gain();
         let (gravity, dt_ms) = (update.gravity.extend(0.0), update.dt_ms);
         let square = |limit: f32| (limit * limit).min(f32::MAX);
         let (fastest, furthest) = (square(update.max_speed), square(update.max_displacement_mm));
-        // What nobody needs is neither read nor written: a step has little more to do for a node
-        // than to move 100 bytes.
+        // Unneeded fields are neither read nor written: the update is limited by memory bandwidth,
+        // about 100 bytes a node.
         let (anything_pushes, may_sleep) = (self.is_pushed.load(Relaxed), update.calm_mm > 0.0);
         for place in places {
             let (u, v, inverse_mass) = (self.u.vector(place), self.v.vector(place), self.inverse_mass[place]);
             if inverse_mass == 0.0 {
-                // A fixed node goes on with the velocity it was given.
+                // A fixed node moves with its prescribed velocity.
                 self.u.set(place, (u + v * dt_ms).to_array());
                 self.take_external(place, anything_pushes);
                 continue;
@@ -123,16 +123,16 @@ impl Nodes {
             };
             let velocity = carried + pull * gain;
             let after = u + velocity * dt_ms;
-            // Not so for what is not a number.
-            let sane = velocity.length_squared() <= fastest && after.length_squared() <= furthest;
-            let (after, velocity) = if sane { (after, velocity) } else { self.held(u, velocity, update) };
+            // False for NaN.
+            let within = velocity.length_squared() <= fastest && after.length_squared() <= furthest;
+            let (after, velocity) = if within { (after, velocity) } else { self.limit(u, velocity, update) };
             self.u.set(place, after.to_array());
             self.v.set(place, velocity.to_array());
         }
     }
 
-    /// Velocity that the node at a place would have after a substep under the force of its elements
-    /// alone, mm/ms; of a fixed node what it has.
+    /// Velocity of a node after a substep under its element force alone, mm/ms. A fixed node keeps
+    /// its velocity.
     pub fn free_velocity(&self, place: usize, force: Vec3, update: &Update) -> Vec3 {
         let (velocity, inverse_mass) = (self.velocity(place), self.inverse_mass[place]);
         if inverse_mass == 0.0 {
@@ -149,7 +149,7 @@ impl Nodes {
         carried + (update.gravity * self.weight[place] + force * inverse_mass) * gain
     }
 
-    /// Force from outside on the node at a place, N, which is thereby used up.
+    /// Takes and clears the external force on the node at a place, N.
     #[inline(always)]
     fn take_external(&self, place: usize, anything_pushes: bool) -> Vec4 {
         if !anything_pushes {
@@ -160,9 +160,9 @@ impl Nodes {
         external
     }
 
-    /// Displacement and velocity of a node that would go too fast, too far or nowhere.
+    /// Clamps speed and displacement of a node over a limit; resets one that is not finite.
     #[cold]
-    fn held(&self, before: Vec4, velocity: Vec4, update: &Update) -> (Vec4, Vec4) {
+    fn limit(&self, before: Vec4, velocity: Vec4, update: &Update) -> (Vec4, Vec4) {
         let velocity = velocity.clamp_length_max(update.max_speed);
         let after = before + velocity * update.dt_ms;
         if !(velocity.is_finite() && after.is_finite()) {
@@ -176,20 +176,20 @@ impl Nodes {
         (after, velocity)
     }
 
-    /// Ends an update: nothing pushes any more. Gives how many nodes were held to a limit and how
-    /// many were not finite.
+    /// Ends an update: clears the external loads and returns the numbers of clamped and of
+    /// non-finite nodes.
     pub fn finish(&self) -> [u32; 2] {
         self.is_pushed.store(false, Relaxed);
         [&self.limited, &self.non_finite].map(|count| count.swap(0, Relaxed))
     }
 
-    /// Adds a force from outside, N.
+    /// Adds an external force, N.
     pub fn push(&self, place: usize, force: Vec3) {
         self.is_pushed.store(true, Relaxed);
         self.external.set(place, (self.external.vector(place) + force.extend(0.0)).to_array());
     }
 
-    /// The body's rigid motion, at present.
+    /// Present rigid motion of the body.
     pub fn rigid_motion(&self) -> RigidMotion {
         let of = |place: usize| {
             (1.0 / self.inverse_mass[place].max(f32::MIN_POSITIVE), self.position(place), self.velocity(place))
@@ -197,7 +197,7 @@ impl Nodes {
         RigidMotion::of((0..self.u.len()).map(of))
     }
 
-    /// Puts a node somewhere from outside.
+    /// Sets a node's displacement, mm, and velocity, mm/ms.
     pub fn set(&self, place: usize, displacement: Vec3, velocity: Vec3) {
         self.u.set(place, displacement.extend(0.0).to_array());
         self.v.set(place, velocity.extend(0.0).to_array());

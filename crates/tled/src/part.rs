@@ -1,24 +1,23 @@
-//! About a thousand neighbouring elements with nodes of their own: what one thread works on at a
-//! time.
+//! Parts: about a thousand neighbouring elements with copies of their nodes, a task of one thread.
 //!
 //! # Theory
-//! A part copies the displacements of the nodes that it touches, lets its elements add to sums of
-//! its own, and puts these into slots of its own: no colouring, nothing added by two. Which
-//! elements make a part does not depend on the number of threads, and slots are gathered in their
-//! own order, so a node's sum has the same bits however many threads there are.
+//! A part copies the displacements of its nodes, adds its element forces to its own sums, and
+//! stores these in its own slots: no colouring, and no number is added to by two threads. Parts do
+//! not depend on the number of threads, and slots are gathered in a fixed order, so a node's sum
+//! has the same bits for any number of threads.
 //!
 //! ```text
-//! places ──copy──▶ part: u ──elements──▶ part: sums ──put──▶ slots ──gather──▶ places
+//! places ──copy──▶ part: u ──elements──▶ part: sums ──store──▶ slots ──gather──▶ places
 //! ```
 //!
 //! A part whose nodes all stay within a tenth of a limit for [`DOZE_MS`] falls asleep: its elements
-//! keep their forces, and its nodes are held. It wakes when something pushes one of them: a load,
-//! or an awake part beside it. So what is awake has a guard ring, the held nodes at its edge, and
-//! what holds still does no work.
+//! keep their forces, and its nodes do not move. It wakes when a load or an awake neighbouring part
+//! pushes one of its nodes. So the awake region is surrounded by a ring of stationary nodes, and
+//! sleeping parts cost no work.
 //!
 //! # Practice
-//! Copies and sums of a part are 10 kB: they stay in the fastest cache while its elements stream
-//! by.
+//! Copies and sums of a part take 10 kB: they stay in the L1 cache while its elements are read in
+//! order.
 
 use crate::block::{Block, Forces, Memory, Quad, Volumes, WIDTH};
 use crate::force_slots::ForceSlots;
@@ -31,11 +30,10 @@ use glam::Vec4;
 use std::marker::PhantomData;
 use trepan_soft::{Body, Law};
 
-/// Some elements and what they last added to their nodes.
+/// Some elements of one law, with copies of their nodes and the last force sums.
 pub(crate) struct Part {
-    group: Box<dyn Group>,
-    /// Seat of every node of the part, ascending, its place, and the slot of what the part hands
-    /// over.
+    elements: Box<dyn LawElements>,
+    /// By node of the part: its node group, ascending; its place; the slot for its force.
     node_groups: Vec<u32>,
     places: Vec<u32>,
     slots: Vec<u32>,
@@ -43,22 +41,22 @@ pub(crate) struct Part {
     sums: Vec<Quad>,
     /// A quarter of the volume change of the elements around each node, mm³.
     shares: Vec<f32>,
-    /// What its last force pass noticed.
-    pub found: PassReport,
+    /// Report of the last force pass.
+    pub report: PassReport,
     tets: usize,
-    /// Where its nodes were when it last stirred, and how long ago that is, ms; asleep over
-    /// [`DOZE_MS`].
+    /// Displacements when the part last moved, and the time since then, ms. It falls asleep over
+    /// [`DOZE_MS`]; infinity means asleep.
     anchor: Vec<Quad>,
     quiet_ms: f32,
 }
 
-/// How long nothing may move before a part falls asleep, ms.
+/// Time without motion after which a part falls asleep, ms.
 const DOZE_MS: f32 = 50.0;
-/// Share of the limit in which it must stay to fall asleep: less than what wakes it, so that one
-/// part's waking does not keep its neighbours up.
+/// Motion under which a part falls asleep, as a share of the limit that wakes it. It is below 1, so
+/// that one waking part does not keep its neighbours awake.
 pub(crate) const CALM: f32 = 0.1;
 
-/// How a round of forces goes.
+/// Parameters of a force pass.
 #[derive(Clone, Copy)]
 pub(crate) struct Forcing {
     pub fade: [Fade; 2],
@@ -66,24 +64,24 @@ pub(crate) struct Forcing {
     pub quiet: Quiet,
 }
 
-/// When a part falls asleep.
+/// Parameters of falling asleep.
 #[derive(Clone, Copy)]
 pub(crate) struct Quiet {
-    /// Since the last round, ms.
+    /// Time since the last pass, ms.
     pub dt_ms: f32,
-    /// How far a node of a part at rest may get, mm; 0 = no part sleeps.
+    /// Motion that wakes a part, mm; 0 = no part sleeps.
     pub still_mm: f32,
 }
 
-/// The nodes of a part, ascending by group.
+/// The nodes of a part, ascending by node group.
 pub(crate) struct PartGroups {
     pub node_groups: Vec<u32>,
     pub places: Vec<u32>,
     pub slots: Vec<u32>,
 }
 
-/// Elements of one law.
-trait Group: Send {
+/// Elements of one constitutive law.
+trait LawElements: Send {
     fn forces(
         &mut self,
         kernel: Kernel,
@@ -96,31 +94,31 @@ trait Group: Send {
     fn forget(&mut self);
 }
 
-struct Of<M, const K: usize, const T: usize> {
+struct Blocks<M, const K: usize, const T: usize> {
     blocks: Vec<Block<K>>,
     memory: Vec<Memory<T>>,
     law: PhantomData<M>,
 }
 
 impl Part {
-    /// The elements at `tets` (mesh numbers), at least one and all of the same law, with the
-    /// node_groups of their corners.
+    /// Creates a part of the elements `tets` (mesh numbers), at least one and all of the same law.
+    /// `groups_of` gives the node groups of an element's corners.
     pub fn of(
         body: &Body,
         scaling: &Scaling,
         tets: &[u32],
         groups_of: &dyn Fn(u32) -> [u32; 4],
-        own: PartGroups,
+        part_groups: PartGroups,
         relaxation: &Relaxation,
     ) -> Self {
-        let PartGroups { node_groups, places, slots } = own;
+        let PartGroups { node_groups, places, slots } = part_groups;
         let nodes = |t: u32| groups_of(t).map(|s| node_groups.partition_point(|&o| o < s) as u32);
         Self {
-            group: group(body, scaling, tets, &nodes, relaxation),
+            elements: elements_of(body, scaling, tets, &nodes, relaxation),
             u: vec![[0.0; 4]; node_groups.len()],
             sums: vec![[0.0; 4]; node_groups.len()],
             shares: vec![0.0; node_groups.len()],
-            found: PassReport::default(),
+            report: PassReport::default(),
             tets: tets.len(),
             anchor: vec![[0.0; 4]; node_groups.len()],
             quiet_ms: 0.0,
@@ -130,35 +128,35 @@ impl Part {
         }
     }
 
-    /// Finds the elements' change of volume, unless they sleep.
+    /// Computes the elements' volume changes, unless the part sleeps.
     pub fn volumes(&mut self, kernel: Kernel, quiet: Quiet, nodes: &Nodes, force_slots: &ForceSlots) {
-        if self.sleeps_on(quiet, nodes) {
+        if self.stays_asleep(quiet, nodes) {
             return;
         }
         self.copy(nodes);
         self.shares.fill(0.0);
-        self.group.volumes(kernel, &self.u, &mut self.shares);
+        self.elements.volumes(kernel, &self.u, &mut self.shares);
         self.slots.iter().zip(&self.shares).for_each(|(&slot, &share)| force_slots.shares.set(slot as usize, share));
     }
 
-    /// Finds the elements' forces, unless they sleep; where locking is cured after their change of
+    /// Finds the elements' forces, unless they sleep; with averaged pressure after their change of
     /// volume was averaged. The fourth number of what a part that falls asleep hands over is 1.
     pub fn forces(&mut self, kernel: Kernel, how: &Forcing, nodes: &Nodes, force_slots: &ForceSlots) {
-        let sleeps_on =
-            if how.averaged_pressure { self.quiet_ms == f32::INFINITY } else { self.sleeps_on(how.quiet, nodes) };
-        if sleeps_on {
+        let stays_asleep =
+            if how.averaged_pressure { self.quiet_ms == f32::INFINITY } else { self.stays_asleep(how.quiet, nodes) };
+        if stays_asleep {
             return;
         }
         if how.averaged_pressure {
             self.u
                 .iter_mut()
                 .zip(&self.node_groups)
-                .for_each(|(u, &group)| u[3] = force_slots.swelling.get(group as usize));
+                .for_each(|(u, &group)| u[3] = force_slots.volume_change.get(group as usize));
         } else {
             self.copy(nodes);
         }
         self.sums.fill([0.0; 4]);
-        self.found = self.group.forces(kernel, how.fade, how.averaged_pressure, &self.u, &mut self.sums);
+        self.report = self.elements.forces(kernel, how.fade, how.averaged_pressure, &self.u, &mut self.sums);
         if self.quiet_ms > DOZE_MS {
             self.quiet_ms = f32::INFINITY;
             self.sums.iter_mut().for_each(|sum| sum[3] = 1.0);
@@ -166,19 +164,18 @@ impl Part {
         self.slots.iter().zip(&self.sums).for_each(|(&slot, &sum)| force_slots.sums.set(slot as usize, sum));
     }
 
-    /// How many elements it has, and how many of them are awake.
+    /// Number of elements, and number of awake elements.
     pub fn awake(&self) -> [usize; 2] {
         [self.tets, if self.quiet_ms == f32::INFINITY { 0 } else { self.tets }]
     }
 
-    /// Wakes it.
+    /// Wakes the part.
     pub fn wake(&mut self) {
         self.quiet_ms = 0.0;
     }
 
-    /// Looks whether the nodes are still quiet; gives whether the part fell asleep before and
-    /// sleeps on.
-    fn sleeps_on(&mut self, quiet: Quiet, nodes: &Nodes) -> bool {
+    /// Updates the time without motion; returns whether the part was asleep and stays asleep.
+    fn stays_asleep(&mut self, quiet: Quiet, nodes: &Nodes) -> bool {
         if quiet.still_mm == 0.0 {
             return false;
         }
@@ -201,34 +198,34 @@ impl Part {
         self.u.iter_mut().zip(&self.places).for_each(|(to, &place)| *to = nodes.u.get(place as usize));
     }
 
-    /// Forgets past stress.
+    /// Clears the stress memory.
     pub fn forget(&mut self) {
-        self.group.forget();
+        self.elements.forget();
         self.wake();
     }
 }
 
-/// The group for the law of these elements. Only the commonest law has a form without memory.
-fn group(
+/// Elements of the law of `tets`. Only the neo-Hookean law has a version without stress memory.
+fn elements_of(
     body: &Body,
     scaling: &Scaling,
     tets: &[u32],
     nodes: &dyn Fn(u32) -> [u32; 4],
     relaxation: &Relaxation,
-) -> Box<dyn Group> {
+) -> Box<dyn LawElements> {
     let of = (body, scaling);
     match body.material(tets[0] as usize).law() {
-        Law::NeoHookean(_) if relaxation.is_none() => Box::new(Of::<NeoHookean, 2, 0>::new(of, tets, nodes)),
-        Law::NeoHookean(_) => Box::new(Of::<NeoHookean, 2, 2>::new(of, tets, nodes)),
-        Law::StVenantKirchhoff { .. } => Box::new(Of::<StVenantKirchhoff, 2, 2>::new(of, tets, nodes)),
-        Law::MooneyRivlin { .. } => Box::new(Of::<MooneyRivlin, 3, 2>::new(of, tets, nodes)),
-        Law::Ogden { .. } => Box::new(Of::<Ogden, 5, 2>::new(of, tets, nodes)),
+        Law::NeoHookean(_) if relaxation.is_none() => Box::new(Blocks::<NeoHookean, 2, 0>::new(of, tets, nodes)),
+        Law::NeoHookean(_) => Box::new(Blocks::<NeoHookean, 2, 2>::new(of, tets, nodes)),
+        Law::StVenantKirchhoff { .. } => Box::new(Blocks::<StVenantKirchhoff, 2, 2>::new(of, tets, nodes)),
+        Law::MooneyRivlin { .. } => Box::new(Blocks::<MooneyRivlin, 3, 2>::new(of, tets, nodes)),
+        Law::Ogden { .. } => Box::new(Blocks::<Ogden, 5, 2>::new(of, tets, nodes)),
     }
 }
 
-impl<M: Constitutive<K>, const K: usize, const T: usize> Of<M, K, T> {
-    /// Neighbours go to the same lane of different blocks, so that the lanes of one block seldom
-    /// add to the same node one after the other.
+impl<M: Constitutive<K>, const K: usize, const T: usize> Blocks<M, K, T> {
+    /// Fills the blocks. Neighbours go to the same lane of different blocks, so that consecutive
+    /// lanes of a block seldom add to the same node.
     fn new((body, scaling): (&Body, &Scaling), tets: &[u32], nodes: &dyn Fn(u32) -> [u32; 4]) -> Self {
         let mut blocks = vec![Block::empty(); tets.len().div_ceil(WIDTH)];
         let count = blocks.len();
@@ -240,7 +237,7 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Of<M, K, T> {
     }
 }
 
-impl<M: Constitutive<K> + Send, const K: usize, const T: usize> Group for Of<M, K, T> {
+impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for Blocks<M, K, T> {
     fn forces(
         &mut self,
         kernel: Kernel,

@@ -1,4 +1,4 @@
-//! Eigenvalues and eigenvectors of symmetric 3×3 matrices, several at once, without a branch.
+//! Eigenvalues and eigenvectors of symmetric 3×3 matrices, several at once, without branches.
 //!
 //! # Theory
 //! Jacobi's method: each rotation makes one off-diagonal entry zero,
@@ -8,7 +8,7 @@
 use crate::lane::Lane;
 use crate::law::Symmetric;
 
-/// Eigenvalues and unit eigenvectors, in no order.
+/// Computes eigenvalues and unit eigenvectors, unsorted.
 #[inline(always)]
 pub(crate) fn principal<L: Lane>(a: &Symmetric<L>) -> ([L; 3], [[L; 3]; 3]) {
     let [mut xx, mut yy, mut zz, mut xy, mut xz, mut yz] = *a;
@@ -28,7 +28,7 @@ pub(crate) fn principal<L: Lane>(a: &Symmetric<L>) -> ([L; 3], [[L; 3]; 3]) {
     ([xx, yy, zz], [u, v, w])
 }
 
-/// Makes `pq` zero; gives cosine and sine.
+/// Rotates so that `pq` becomes zero; returns cosine and sine.
 #[inline(always)]
 fn rotation<L: Lane>(pp: &mut L, qq: &mut L, pq: &mut L) -> (L, L) {
     let (one, two) = (L::splat(1.0), L::splat(2.0));

@@ -1,13 +1,13 @@
-//! Stress that fades while the tissue is held: Prony terms.
+//! Stress relaxation at constant strain: Prony series.
 //!
 //! # Theory
-//! Of the instantaneous isochoric stress S, term i lets the share g_i fade with the time τ_i:
+//! Term i relaxes the share g_i of the instantaneous isochoric stress S with the time constant τ_i:
 //! ```text
 //! S(t) - Σ_i Υ_i(t)      Υ_i' = (g_i S - Υ_i)/τ_i      Υ⁺ = e^(-dt/τ) Υ + g (1 - e^(-dt/τ)) S
 //! ```
-//! exact for a stress that is constant over the step, stable for any dt. The material's moduli are
-//! the instantaneous ones; held for long the isochoric part falls to `1 - Σ g_i`. S is taken in the
-//! rest frame (second Piola-Kirchhoff), so rotation does not mix it.
+//! This is exact for a stress that is constant over the step, and stable for any dt. The material's
+//! moduli are the instantaneous ones; at constant strain the isochoric stress falls to the share
+//! `1 - Σ g_i`. S is in the rest frame (second Piola-Kirchhoff), so it is objective.
 //!
 //! # Sources
 //! Taylor, Comas, Cheng, Passenger, Hawkes, Atkinson, Ourselin, Med. Image Anal. 13 (2009). Brain:
@@ -19,14 +19,14 @@ use trepan_soft::BodyError;
 /// Two Prony terms; a share of 0 = no term.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Relaxation {
-    /// Share g_i of the instantaneous isochoric stress that fades, without unit; at least 0,
+    /// Relaxing share g_i of the instantaneous isochoric stress, without unit; each at least 0,
     /// together below 1.
     pub share: [f32; 2],
-    /// Time τ_i in which it fades to 1/e, ms.
+    /// Time constant τ_i, in which the share falls to 1/e, ms.
     pub time_ms: [f32; 2],
 }
 
-/// One term's factors for a step.
+/// Factors of one term for a step.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Fade {
     pub keep: f32,
@@ -37,16 +37,16 @@ impl Relaxation {
     /// No relaxation: elastic.
     pub const NONE: Self = Self { share: [0.0; 2], time_ms: [1.0; 2] };
 
-    /// Brain as of Miller and Chinzei 2002, uncalibrated: 45 % within half a second, 36.5 % within
-    /// 50 s.
+    /// Brain after Miller and Chinzei 2002, uncalibrated: 45 % with a time constant of 0.5 s, 36.5 %
+    /// with 50 s.
     pub const BRAIN: Self = Self { share: [0.450, 0.365], time_ms: [500.0, 50_000.0] };
 
-    /// Whether anything fades.
+    /// Whether there is no relaxation.
     pub fn is_none(&self) -> bool {
         self.share == [0.0; 2]
     }
 
-    /// Refuses shares and times that make no sense.
+    /// Rejects invalid shares and times.
     pub fn check(&self) -> Result<(), BodyError> {
         let refuse = |field, value, right| Err(BodyError::Config { field, value, right });
         let total = self.share[0] + self.share[1];
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nonsense_is_refused() {
+    fn invalid_terms_are_rejected() {
         let with = |share, time_ms| Relaxation { share, time_ms }.check();
         assert!(
             Relaxation::BRAIN.check().is_ok()
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn a_held_stress_fades_to_what_is_left() {
+    fn a_constant_stress_relaxes_to_the_remaining_share() {
         let relaxation = Relaxation { share: [0.4, 0.2], time_ms: [10.0, 100.0] };
         let (mut memory, dt) = ([0.0f32; 2], 0.5);
         for step in 0..4000 {

@@ -1,23 +1,24 @@
-//! Mass added to the few elements that set the stable step.
+//! Mass scaling: mass added to the few elements that set the stable step.
 //!
 //! # Theory
-//! An element's bound is `2/ω`, `ω² ∝ 1/ρ`. Raising ρ by `max(ω²/ω_t², 1)` brings every element
-//! down to ω_t; ω_t is the lowest for which the mass added stays within what is allowed. On a brain
-//! mesh a hundredth of its mass lifts the slivers that would otherwise set everybody's step. Weight
-//! is not scaled, so that equilibrium stays where it was; motion is slower where mass was added.
+//! An element's stable step is `2/ω`, `ω² ∝ 1/ρ`. Raising ρ by `max(ω²/ω_t², 1)` lowers every
+//! element's frequency to ω_t or less; ω_t is the lowest for which the added mass stays within the
+//! allowed share. On a brain mesh a hundredth of the mass is enough for the slivers that would
+//! otherwise set the step of the whole body. Weight is not scaled, so the equilibrium does not
+//! change; motion is slower where mass was added.
 
 use trepan_soft::{Body, element_omega2};
 
-/// Factors on the density of every tetrahedron, and what they add up to.
+/// Factors on the density of every tetrahedron, and the added mass.
 pub(crate) struct Scaling {
     factors: Vec<f64>,
-    /// Mass added, as a share of the body's.
+    /// Added mass, as a share of the body's mass.
     pub added: f64,
 }
 
 impl Scaling {
     /// Adds at most the share `most` of the body's mass; 0 = none, infinity = until all elements
-    /// have the same bound.
+    /// have the same stable step.
     pub fn of(body: &Body, most: f32) -> Self {
         let count = body.mesh.tets.len();
         if most <= 0.0 {
@@ -28,7 +29,7 @@ impl Scaling {
         let total: f64 = (0..count).map(mass).sum();
         let mut stiffest_first: Vec<usize> = (0..count).collect();
         stiffest_first.sort_by(|&a, &b| omega2[b].total_cmp(&omega2[a]));
-        // With the k stiffest scaled to ω_t² the mass added is Σ m ω²/ω_t² - Σ m.
+        // With the k stiffest scaled to ω_t², the added mass is Σ m ω²/ω_t² - Σ m.
         let (mut weighed, mut plain, mut target) = (0.0, 0.0, f64::MAX);
         for (k, &t) in stiffest_first.iter().enumerate() {
             (weighed, plain) = (weighed + mass(t) * omega2[t], plain + mass(t));
@@ -49,7 +50,7 @@ impl Scaling {
         self.factors[tet as usize]
     }
 
-    /// Mass of every node as motion sees it, g.
+    /// Inertial mass of every node, g.
     pub fn masses_g(&self, body: &Body) -> Vec<f64> {
         let mut masses = vec![0.0; body.mesh.positions.len()];
         for (t, corners) in body.mesh.tets.iter().enumerate() {

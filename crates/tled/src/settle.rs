@@ -1,32 +1,32 @@
-//! Dynamic relaxation: from here to rest under given loads in the fewest steps, as for the sag
-//! under gravity or the shift of a brain.
+//! Dynamic relaxation: reaches equilibrium under given loads in few steps, e.g. sag or brain shift.
 //!
 //! # Theory
-//! Steps of the longest stable length, damped critically for the slowest motion that is still going
-//! on, `α = 2 ω`: what is left falls by `e^(-ω dt)` a step, so about `10/(ω dt)` steps end it. ω
-//! comes from the motion itself, Rayleigh's quotient of what nodes and forces changed by over some
-//! steps, `ω² = -Σ Δu·Δf / Σ m Δu²` (Joldes, Wittek and Miller 2009), held near that of the rest
-//! state. What is left is estimated from velocity and acceleration by `|v|/ω + |a|/ω²`.
+//! Steps have the longest stable length and are damped critically for the slowest remaining motion,
+//! `α = 2 ω`: the remaining distance falls by `e^(-ω dt)` a step, so about `10/(ω dt)` steps
+//! suffice. ω is the Rayleigh quotient of the changes of displacement and force over some steps,
+//! `ω² = -Σ Δu·Δf / Σ m Δu²` (Joldes, Wittek and Miller 2009), clamped to a range around that of
+//! the rest state. The remaining distance is estimated from velocity and acceleration by
+//! `|v|/ω + |a|/ω²`.
 //!
 //! # Practice
-//! With `Config::mass_scaling` infinite all elements have the same bound: fewest steps where rest,
-//! and not the way there, is wanted.
+//! With infinite `Config::mass_scaling` all elements have the same stable step. This takes the
+//! fewest steps if only the equilibrium matters, not the motion towards it.
 
 use crate::tled::Tled;
 use trepan_geometry::Vec3;
 use trepan_soft::{Loads, SoftSolver, StepReport};
 
-/// Steps between two looks at the motion.
-const LOOK: u32 = 20;
-/// How far ω may go from that of the rest state.
+/// Steps between two estimates of the frequency.
+const CHECK_STEPS: u32 = 20;
+/// Range of ω, as a multiple of that of the rest state.
 const NEAR: std::ops::RangeInclusive<f32> = 0.25..=4.0;
 
-/// When to stop.
+/// Stopping criterion of [`Tled::settle`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settling {
-    /// Done when no node has further than this to go, mm.
+    /// Largest remaining distance of a node, mm.
     pub tolerance_mm: f32,
-    /// Most steps.
+    /// Largest number of steps.
     pub steps: u32,
 }
 
@@ -36,41 +36,41 @@ impl Default for Settling {
     }
 }
 
-/// How it went.
+/// Result of [`Tled::settle`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Settled {
-    /// Steps made.
+    /// Number of steps done.
     pub steps: u32,
-    /// Estimate of how far the furthest node has still to go, mm.
+    /// Estimated largest remaining distance of a node, mm.
     pub left_mm: f32,
-    /// Whether that is within the tolerance.
+    /// Whether `left_mm` is within the tolerance.
     pub converged: bool,
-    /// The last step's report.
+    /// Report of the last step.
     pub last: StepReport,
 }
 
 impl Tled {
-    /// Goes to rest under `loads`, then stops all motion; damping is afterwards as before. A body
-    /// that nothing holds does not come to rest, and this says so.
+    /// Moves the body to equilibrium under `loads`, then sets velocities to zero and restores the
+    /// damping. A body without supports is not moved, and `converged` is false.
     pub fn settle(&mut self, loads: &Loads, settling: &Settling) -> Settled {
         let (rate, lowest) = (self.damping_per_ms, self.lowest_per_ms);
         let (mut slow, mut settled) = (lowest, Settled { left_mm: f32::INFINITY, ..Settled::default() });
-        if !self.held {
+        if !self.supported {
             return settled;
         }
         let mut before = self.elements_and_nodes();
         while settled.steps < settling.steps && !settled.converged {
             self.damping_per_ms = 2.0 * slow;
             let dt_ms = self.stable_dt_ms();
-            for _ in 0..LOOK {
+            for _ in 0..CHECK_STEPS {
                 settled.last = self.step(loads, dt_ms);
             }
-            settled.steps += LOOK;
+            settled.steps += CHECK_STEPS;
             let now = self.elements_and_nodes();
             slow = self
                 .frequency_between(&before, &now)
                 .map_or(lowest, |w| w.clamp(NEAR.start() * lowest, NEAR.end() * lowest));
-            settled.left_mm = self.left_mm(slow.min(lowest), LOOK as f32 * dt_ms, &before, &now);
+            settled.left_mm = self.left_mm(slow.min(lowest), CHECK_STEPS as f32 * dt_ms, &before, &now);
             settled.converged = settled.left_mm <= settling.tolerance_mm;
             before = now;
         }
@@ -86,7 +86,7 @@ impl Tled {
         (0..nodes.u.len()).map(of).collect()
     }
 
-    /// Rayleigh's frequency of a change of state; `None` when nothing moved.
+    /// Rayleigh quotient (frequency, rad/ms) of a change of state; `None` when nothing moved.
     fn frequency_between(&self, before: &[[Vec3; 3]], now: &[[Vec3; 3]]) -> Option<f32> {
         let (mut work, mut swung) = (0.0f64, 0.0f64);
         for ((a, b), inverse) in

@@ -1,23 +1,22 @@
-//! How much stiffer an element has become by its deformation: what the stable step is checked
-//! against while it runs.
+//! Bound on the stiffness of a deformed element, from which the stable step is updated.
 //!
 //! # Theory
 //! The tangent `∂P/∂F` of `P = F S + (q + κ (J̄-1)) C` is at most
 //! `A = Σ|S_ij| + (κ + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J̄-1)| √I₁`: the stress itself, the
-//! resistance to a change of volume, and its turning. The largest eigenvalue of a symmetric 3×3
+//! resistance to a change of volume, and its rotation. The largest eigenvalue of a symmetric 3×3
 //! matrix B is at most `m + 2 p`, `m = tr B/3`, `p² = |B - m I|²/6`, and exactly that when two are
 //! equal. The element's ω² at rest grows by `A/A(rest)`.
 //!
 //! # Practice
 //! About 50 operations an element. For Ogden's and Mooney-Rivlin's laws the second term is that of
-//! a neo-Hookean solid with the same moduli; their own stiffening shows in the first.
+//! a neo-Hookean solid with the same moduli; their additional stiffening is in the first term.
 
 use crate::lane::Lane;
 use crate::law::{Deformation, Stress};
 
-/// A, times rest volume, from the isochoric stress and (μ V, κ V).
+/// The bound A times rest volume, from the isochoric stress and (μ V, κ V).
 #[inline(always)]
-pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &Deformation<L>, swelling: L) -> L {
+pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &Deformation<L>, volume_change: L) -> L {
     let [xx, yy, zz, xy, xz, yz] = stress.s;
     let off = magnitude(xy) + magnitude(xz) + magnitude(yz);
     let itself = magnitude(xx) + magnitude(yy) + magnitude(zz) + off + off;
@@ -25,11 +24,11 @@ pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &De
     let power = inverse * inverse * d.root * d.root;
     let i1 = squared(&d.f[0]) + squared(&d.f[1]) + squared(&d.f[2]);
     let volume = kappa + L::splat(5.0 / 9.0) * mu * i1 * power;
-    let turning = magnitude(stress.q + kappa * swelling) * i1.sqrt();
+    let turning = magnitude(stress.q + kappa * volume_change) * i1.sqrt();
     itself + volume * largest_eigenvalue(&d.c) + turning
 }
 
-/// A bound of the largest eigenvalue of `CᵀC`, C given by rows.
+/// Upper bound of the largest eigenvalue of `CᵀC`, C given by rows.
 #[inline(always)]
 fn largest_eigenvalue<L: Lane>([a, b, c]: &[[L; 3]; 3]) -> L {
     let (xx, yy, zz) = (squared(a), squared(b), squared(c));
@@ -79,8 +78,8 @@ mod tests {
             let (a, b) = (DVec3::new(n[0], n[1], n[2]).normalize_or_zero(), DVec3::new(n[3], n[4], n[5]).normalize_or_zero());
             let change = DMat3::from_cols(a * b.x, a * b.y, a * b.z);
             let along = law.stress_change(f, change);
-            let found = along.x_axis.dot(change.x_axis) + along.y_axis.dot(change.y_axis) + along.z_axis.dot(change.z_axis);
-            prop_assert!(found <= f64::from(bound) * 1.0001, "{found} {bound}");
+            let computed = along.x_axis.dot(change.x_axis) + along.y_axis.dot(change.y_axis) + along.z_axis.dot(change.z_axis);
+            prop_assert!(computed <= f64::from(bound) * 1.0001, "{computed} {bound}");
         }
     }
 }

@@ -1,12 +1,12 @@
-//! Work on the elements and the nodes, alone or with more threads.
+//! Distributes the work on elements and nodes over one or more threads.
 //!
 //! # Theory
-//! A round of work falls into tasks, a part of the elements or a run of the nodes each. The caller
-//! and every second worker claim them one after the other from the first on, the rest from the last
-//! on, so that the same thread meets the same elements again and finds them in its cache. A worker
-//! that is not running costs nothing: the caller then claims every task itself, and waits only for
-//! tasks that someone is in the middle of. So a loaded machine falls back to the speed of one
-//! thread and never stalls. Who did a task leaves no trace in the result.
+//! A round of work is divided into tasks: a part of the elements or a run of the nodes each. The
+//! caller and every second worker claim tasks from the first on, the other workers from the last
+//! on, so that a thread tends to get the same elements in every round and has them in its cache. A
+//! worker that is not scheduled costs nothing: the caller then claims every task itself, and waits
+//! only for tasks already claimed. So on a loaded machine the speed falls to that of one thread,
+//! and the step never stalls. The result does not depend on which thread did a task.
 //!
 //! # Practice
 //! Workers spin for a few microseconds after a round, then yield, then sleep.
@@ -22,10 +22,10 @@ use std::thread::JoinHandle;
 
 const SPINS: u32 = 4000;
 const YIELDS: u32 = 64;
-/// Nodes, or node_groups, of a task.
+/// Nodes or node groups per task.
 const RUN: usize = 256;
 
-/// The parts, the nodes, and who works on them.
+/// The parts, the nodes and the worker threads.
 pub(crate) struct Team {
     shared: Arc<Shared>,
     workers: Vec<JoinHandle<()>>,
@@ -34,13 +34,13 @@ pub(crate) struct Team {
 /// A round of work.
 #[derive(Clone, Copy)]
 pub(crate) enum Work {
-    /// The elements' changes of volume.
+    /// Volume changes of the elements.
     Volumes(Quiet),
-    /// Their means around the nodes.
+    /// Mean volume change of the node groups.
     Average,
-    /// The elements' forces.
+    /// Element forces.
     Forces(Forcing),
-    /// The nodes' motion.
+    /// Motion of the nodes.
     Update(Update),
 }
 
@@ -60,20 +60,20 @@ struct Shared {
     quit: AtomicBool,
 }
 
-/// Which tasks of a round are claimed: how many there are, how many from the last on, how many from
-/// the first on, 20 bits each. One number, so that nobody sees half of a new round.
+/// Task counters of a round, 20 bits each: all, claimed from the last on, claimed from the first on.
+/// They share one atomic number, so that a thread never sees half of a new round.
 struct Claims(AtomicU64);
 
-/// Most tasks of a round: a thousand million elements, 270 million nodes.
+/// Largest number of tasks in a round: a thousand million elements, 270 million nodes.
 const MOST: u64 = (1 << 20) - 1;
 
 impl Claims {
-    /// Begins a round.
+    /// Starts a round of `tasks` tasks.
     fn start(&self, tasks: usize) {
         self.0.store((tasks as u64).min(MOST) << 40, Ordering::Release);
     }
 
-    /// The number of a task that nobody else has; `None` when all are claimed.
+    /// Claims a task and returns its number; `None` when all are claimed.
     fn next(&self, from_last: bool) -> Option<usize> {
         let all = self.0.fetch_add(if from_last { 1 << 20 } else { 1 }, Ordering::AcqRel);
         let [count, last, first] = [all >> 40, all >> 20 & MOST, all & MOST];
@@ -91,7 +91,7 @@ impl Drop for Finished<'_> {
 }
 
 impl Team {
-    /// A team of `threads`, the caller among them. A thread that cannot be started is done without.
+    /// Creates a team of `threads`, including the caller. Threads that fail to start are ignored.
     pub fn of(parts: Vec<Part>, nodes: Nodes, force_slots: ForceSlots, kernel: Kernel, threads: usize) -> Self {
         let shared = Arc::new(Shared {
             parts: parts.into_iter().map(Mutex::new).collect(),
@@ -120,7 +120,7 @@ impl Team {
         &self.shared.nodes
     }
 
-    /// What the parts force_slots to them.
+    /// The slots that the parts write their forces to.
     pub fn force_slots(&self) -> &ForceSlots {
         &self.shared.force_slots
     }
@@ -136,16 +136,16 @@ impl Team {
         }
     }
 
-    /// What the elements noticed in the last round of forces.
-    pub fn found(&self) -> PassReport {
+    /// Combined reports of the parts in the last force pass.
+    pub fn report(&self) -> PassReport {
         let add = |all: PassReport, part: &Mutex<Part>| {
-            let found = lock(part).found;
-            PassReport { inverted: all.inverted + found.inverted, stiffest: all.stiffest.max(found.stiffest) }
+            let report = lock(part).report;
+            PassReport { inverted: all.inverted + report.inverted, stiffest: all.stiffest.max(report.stiffest) }
         };
         self.shared.parts.iter().fold(PassReport::default(), add)
     }
 
-    /// How many elements there are, and how many of them are awake.
+    /// Number of elements, and number of awake elements.
     pub fn awake(&self) -> [usize; 2] {
         let add = |[a, b]: [usize; 2], [x, y]: [usize; 2]| [a + x, b + y];
         self.shared.parts.iter().map(|part| lock(part).awake()).fold([0; 2], add)
@@ -156,7 +156,7 @@ impl Team {
         self.shared.parts.iter().for_each(|part| lock(part).wake());
     }
 
-    /// Forgets past stress.
+    /// Clears the stress memory.
     pub fn forget(&mut self) {
         self.shared.parts.iter().for_each(|part| lock(part).forget());
     }
@@ -179,7 +179,7 @@ impl Shared {
         }
     }
 
-    /// Nobody is in the middle of a task when this is called.
+    /// Starts a round; no task may be running.
     fn announce(&self, work: Work, tasks: usize) {
         *self.work.write().unwrap_or_else(PoisonError::into_inner) = work;
         self.done.store(0, Ordering::Release);
@@ -214,7 +214,7 @@ impl Shared {
         }
     }
 
-    /// A worker's life.
+    /// Main loop of a worker.
     fn serve(&self, from_last: bool) {
         let mut seen = 0;
         while !self.quit.load(Ordering::SeqCst) {
@@ -242,12 +242,12 @@ impl Shared {
     }
 }
 
-/// The numbers of a task out of `count`.
+/// Range of items of a task, out of `count`.
 fn run(number: usize, count: usize) -> Range<usize> {
     number * RUN..((number + 1) * RUN).min(count)
 }
 
-/// Spins at first, then lets others run.
+/// Spins at first, then yields to other threads.
 fn pause(waited: &mut u32) {
     if *waited < SPINS {
         std::hint::spin_loop()

@@ -1,4 +1,4 @@
-//! The solver: one step, pass by pass.
+//! The CPU solver and the passes of its step.
 
 use crate::config::{Config, Damping};
 use crate::elements::Elements;
@@ -21,30 +21,30 @@ pub struct Tled {
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
     springs: ImplicitSprings,
-    /// Its triangles by place.
+    /// Surface pressure, its triangles given by place.
     pressure: SurfacePressure,
     layout: Layout,
     bound_ms: f32,
     pub(crate) damping_per_ms: f32,
-    /// Frequency of the slowest motion from rest, rad/ms, or what stands in for it.
+    /// Lowest frequency of the body at rest or its estimate, rad/ms.
     pub(crate) lowest_per_ms: f32,
     mass_added: f32,
     max_displacement_mm: f32,
-    pub(crate) held: bool,
+    pub(crate) supported: bool,
     stiffest_at_rest: f32,
-    /// Since the elements' forces were computed last, ms.
+    /// Time since the element forces were last computed, ms.
     elapsed_ms: f32,
     gravity: Vec3,
 }
 
-/// A pass of a step, by the name that it has on the device too.
+/// A pass of a step; the GPU passes have the same names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pass {
-    /// Mean volume change around each node, where locking is cured.
+    /// Mean volume change of each node group, with averaged pressure.
     Volumes,
-    /// Forces of the elements.
+    /// Element forces.
     Forces,
-    /// The springs of contact and the surface's pressure.
+    /// Contact springs and surface pressure.
     Press,
     /// New velocities and positions.
     Update,
@@ -54,7 +54,7 @@ impl Pass {
     /// Every pass, in the order of a step.
     pub const ALL: [Self; 4] = [Self::Volumes, Self::Forces, Self::Press, Self::Update];
 
-    /// Its name in charts and benches.
+    /// Name in charts and benches.
     pub fn name(self) -> &'static str {
         match self {
             Self::Volumes => "volumes",
@@ -65,17 +65,17 @@ impl Pass {
     }
 }
 
-/// Share of the present bound that a substep may use.
+/// Share of the present stable step that a substep may use.
 pub(crate) const SUBSTEP_SAFETY: f32 = 0.95;
-/// Keeps rounding from adding a substep.
+/// Tolerance that keeps rounding from adding a substep.
 pub(crate) const NEARLY: f32 = 1.0 - 1e-5;
-/// Most that the frequency of the stiffest element is taken to grow by; a state worse than that is
-/// on its way to be healed.
+/// Largest considered growth of the stiffest element's frequency; worse states are recovering from
+/// inversion.
 pub(crate) const MAX_STIFFENING: f32 = 64.0;
 
 impl Tled {
-    /// Takes a body at rest: orders it for the cache, precomputes gradients, finds the stable step
-    /// and the damping.
+    /// Creates a solver for a body at rest: orders it for the cache, precomputes gradients, finds
+    /// the stable step and the damping.
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
         body.check()?;
         config.check()?;
@@ -102,12 +102,12 @@ impl Tled {
             lowest_per_ms,
             mass_added: scaling.added as f32,
             max_displacement_mm: config.max_displacement * extent,
-            held: body.is_held(),
+            supported: body.is_supported(),
             layout,
         })
     }
 
-    /// Length of a step that is just stable, ms, without any margin.
+    /// Stable (critical) time step without safety factor, ms.
     pub fn bound_ms(&self) -> f32 {
         self.bound_ms
     }
@@ -117,7 +117,7 @@ impl Tled {
         self.damping_per_ms
     }
 
-    /// Mass added by [`Config::mass_scaling`], as a share of the body's.
+    /// Mass added by [`Config::mass_scaling`], as a share of the body's mass.
     pub fn mass_added(&self) -> f32 {
         self.mass_added
     }
@@ -127,9 +127,11 @@ impl Tled {
         self.elements.awake()
     }
 
-    /// Puts pressure on some triangles, from the next step on; those that name nodes outside the
-    /// mesh are left out. A contact's spring on the same nodes does not foresee it: at rest the
-    /// spring is off by what the pressure moves its nodes in one step.
+    /// Sets the pressure on surface triangles from the next step on.
+    ///
+    /// Triangles with nodes outside the mesh are ignored. A contact spring on the same nodes does
+    /// not account for the pressure: at rest its depth is off by the distance that the pressure
+    /// moves its nodes in one step.
     pub fn set_pressure(&mut self, mut pressure: SurfacePressure) {
         let place_of = &self.layout.place_of;
         pressure.triangles.retain(|t| t.iter().all(|&n| (n as usize) < place_of.len()));
@@ -137,8 +139,8 @@ impl Tled {
         self.pressure = pressure;
     }
 
-    /// Sets the state of a node: displacement from rest, mm, and velocity, mm/ms. A fixed node goes
-    /// on with its velocity until it is given another.
+    /// Sets a node's displacement from rest, mm, and velocity, mm/ms. A fixed node keeps this
+    /// velocity until the next call.
     pub fn set_node(&mut self, node: u32, displacement: Vec3, velocity: Vec3) {
         if let Some(&place) = self.layout.place_of.get(node as usize) {
             self.elements.nodes().set(place as usize, displacement, velocity);
@@ -148,13 +150,13 @@ impl Tled {
         }
     }
 
-    /// Force that the support of a fixed node exerts on it, N, as of the last step; at a free node
-    /// the force that accelerates it, reversed.
+    /// Support force on a fixed node in the last step, N. For a free node: the accelerating force,
+    /// reversed.
     pub fn support_force(&self, node: u32) -> Vec3 {
         self.layout.place_of.get(node as usize).map_or(Vec3::ZERO, |&place| -self.elements.force(place as usize))
     }
 
-    /// Puts every node back to its rest position, at rest, and forgets past stress.
+    /// Resets every node to its rest position with zero velocity, and clears the stress memory.
     pub fn reset(&mut self) {
         let nodes = self.elements.nodes();
         (0..nodes.u.len()).for_each(|place| nodes.set(place, Vec3::ZERO, Vec3::ZERO));
@@ -163,8 +165,7 @@ impl Tled {
         self.elapsed_ms = 0.0;
     }
 
-    /// Does one pass of a step alone, on the present state: what a bench times. A step is all of
-    /// them in order.
+    /// Does one pass of a step on the present state, for benches. A step is all passes in order.
     pub fn pass(&mut self, pass: Pass, loads: &Loads, dt_ms: f32) {
         let mut report = StepReport::default();
         match pass {
@@ -179,15 +180,15 @@ impl Tled {
         }
     }
 
-    /// One substep of at most `left_ms`; gives its length. As long as the elements bear as they are
-    /// now, and of equal lengths while that stays.
+    /// Does one substep of at most `left_ms` and returns its length, ms. The length is the longest
+    /// that is stable for the deformed elements and divides `left_ms` evenly.
     fn substep(&mut self, loads: &Loads, left_ms: f32, report: &mut StepReport) -> f32 {
         if std::mem::replace(&mut self.gravity, loads.gravity) != loads.gravity {
             self.elements.wake();
         }
-        let found = self.elements.compute(self.elapsed_ms);
-        report.inverted = report.inverted.max(found.inverted);
-        let bound_ms = self.bound_now_ms(found.stiffest);
+        let pass = self.elements.compute(self.elapsed_ms);
+        report.inverted = report.inverted.max(pass.inverted);
+        let bound_ms = self.bound_now_ms(pass.stiffest);
         let longest = self.stable_dt_ms().min(SUBSTEP_SAFETY * bound_ms);
         let dt_ms =
             if self.config.substeps == 0 { left_ms } else { left_ms / (left_ms / longest * NEARLY).ceil().max(1.0) };
@@ -198,9 +199,9 @@ impl Tled {
         dt_ms
     }
 
-    /// What a substep does to a node, beside forces.
+    /// Parameters of the node update in a substep.
     fn update_of(&self, loads: &Loads, dt_ms: f32) -> Update {
-        let rigid = (!self.held && self.damping_per_ms > 0.0).then(|| self.elements.nodes().rigid_motion());
+        let rigid = (!self.supported && self.damping_per_ms > 0.0).then(|| self.elements.nodes().rigid_motion());
         Update {
             dt_ms,
             damping_per_ms: self.damping_per_ms,
@@ -221,20 +222,20 @@ impl Tled {
         self.publish();
     }
 
-    /// Puts the surface's pressure on the nodes.
+    /// Adds the surface pressure to the nodal forces.
     fn push(&mut self) {
         let nodes = self.elements.nodes();
         self.pressure.each(|place| nodes.position(place as usize), |place, force| nodes.push(place as usize, force));
     }
 
-    /// Ends all motion.
+    /// Sets all velocities to zero.
     pub(crate) fn stop(&mut self) {
         let nodes = self.elements.nodes();
         (0..nodes.u.len()).for_each(|place| nodes.set(place, nodes.displacement(place), Vec3::ZERO));
         self.publish();
     }
 
-    /// Writes positions and velocities out in the mesh's order.
+    /// Writes positions and velocities in the mesh's node order.
     fn publish(&mut self) {
         let (nodes, from) = (self.elements.nodes(), self.layout.place_of.iter().zip(&self.rest));
         for ((&place, rest), (x, v)) in from.zip(self.positions.iter_mut().zip(&mut self.velocities)) {
@@ -243,8 +244,8 @@ impl Tled {
         }
     }
 
-    /// The stable bound as the elements are now: that of the rest state, shortened by what the
-    /// stiffest element has gained.
+    /// Stable time step of the deformed body, ms: that of the rest state, shortened by the stiffest
+    /// element's growth in frequency.
     fn bound_now_ms(&self, stiffest: f32) -> f32 {
         let gained = (stiffest / self.stiffest_at_rest).sqrt();
         self.bound_ms / gained.clamp(1.0, MAX_STIFFENING)
@@ -289,12 +290,12 @@ impl SoftSolver for Tled {
     }
 }
 
-/// Frequency of the slowest motion, 1/ms. Where damping does not hang on it, or nothing holds the
-/// body, that of its slowest shear wave stands in.
+/// Lowest natural frequency, rad/ms. If the damping does not depend on it, or the body has no
+/// supports: the frequency of its slowest shear wave.
 pub(crate) fn lowest_per_ms(body: &Body, damping: Damping, stiffness: &Stiffness) -> f32 {
-    let asked = matches!(damping, Damping::Critical(_));
-    let found = asked.then(|| lowest_frequency_of(body, stiffness)).flatten();
-    let standing = || {
+    let requested = matches!(damping, Damping::Critical(_));
+    let lowest = requested.then(|| lowest_frequency_of(body, stiffness)).flatten();
+    let shear_wave = || {
         let total = |of: &dyn Fn(usize) -> f64| -> f64 {
             (0..body.mesh.tets.len()).map(|t| body.mesh.volume_mm3(t) * of(t)).sum()
         };
@@ -302,10 +303,10 @@ pub(crate) fn lowest_per_ms(body: &Body, damping: Damping, stiffness: &Stiffness
         let shear_speed = (shear / total(&|t| body.material(t).density_g_mm3().into())).sqrt();
         std::f64::consts::PI * shear_speed / f64::from(body.mesh.bounds().size().max_element())
     };
-    found.unwrap_or_else(standing) as f32
+    lowest.unwrap_or_else(shear_wave) as f32
 }
 
-/// α = 2 ω₁ is critical.
+/// Damping rate α, 1/ms; α = 2 ω₁ is critical.
 pub(crate) fn damping_rate(damping: Damping, lowest_per_ms: f32) -> f32 {
     match damping {
         Damping::None => 0.0,

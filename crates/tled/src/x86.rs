@@ -1,13 +1,12 @@
-//! Eight and sixteen elements at once with the instructions of newer x86 processors, chosen at run
-//! time.
+//! AVX2 and AVX-512 kernels: eight and sixteen elements at once, chosen at run time.
 //!
 //! # Theory
-//! Nodes are read as whole 16-byte rows and transposed 4×4 in registers, forces are transposed back
-//! and added as rows. The hardware's own gather is slower than that, and the compiler does not find
-//! it by itself.
+//! Nodes are read as whole 16-byte rows and transposed 4×4 in registers; forces are transposed back
+//! and added as rows. The gather instruction is slower than this, and the compiler does not
+//! generate the transposition by itself.
 //!
 //! ```text
-//! rows 4q+i (x y z 0)  ── r_i, one 128-bit part q each ──▶  unpack, shuffle  ──▶  x, y, z of lanes 4q..4q+3
+//! rows 4q+i (x y z 0) ── r_i, a 128-bit part q each ──▶ unpack, shuffle ──▶ x, y, z of 4 lanes
 //! ```
 //!
 //! # Practice
@@ -24,11 +23,11 @@ use std::arch::x86_64::*;
 use std::mem::transmute;
 use std::ops::{Add, Div, Mul, Sub};
 
-/// Eight lanes of AVX2. Made only inside [`avx2`].
+/// Eight AVX2 lanes, created only inside [`avx2`].
 #[derive(Clone, Copy)]
 struct Ymm(__m256);
 
-/// Sixteen lanes of AVX-512F. Made only inside [`avx512`].
+/// Sixteen AVX-512F lanes, created only inside [`avx512`].
 #[derive(Clone, Copy)]
 struct Zmm(__m512);
 
@@ -42,7 +41,7 @@ pub(crate) fn has_avx512() -> bool {
     is_x86_feature_detected!("avx512f")
 }
 
-/// A pass over some blocks, eight elements at once.
+/// Runs a pass over some blocks, eight elements at once.
 pub(crate) fn avx2<P: Pass>(pass: &mut P) -> PassReport {
     assert!(has_avx2());
     #[target_feature(enable = "avx2")]
@@ -53,7 +52,7 @@ pub(crate) fn avx2<P: Pass>(pass: &mut P) -> PassReport {
     unsafe { run(pass) }
 }
 
-/// A pass over some blocks, sixteen elements at once.
+/// Runs a pass over some blocks, sixteen elements at once.
 pub(crate) fn avx512<P: Pass>(pass: &mut P) -> PassReport {
     assert!(has_avx512());
     #[target_feature(enable = "avx512f")]
@@ -236,7 +235,7 @@ fn four_rows(from: &[Quad], at: &[u32], i: usize) -> __m512 {
     }
 }
 
-/// Vectors of eight lanes as rows; row i has those of lanes i and i + 4.
+/// Transposes vectors of eight lanes to rows; row i has those of lanes i and i + 4.
 #[inline(always)]
 fn eight_rows([x, y, z]: [Ymm; 3]) -> [__m256; 4] {
     // SAFETY: called only inside the AVX2 kernel.
@@ -253,7 +252,7 @@ fn eight_rows([x, y, z]: [Ymm; 3]) -> [__m256; 4] {
     }
 }
 
-/// Vectors of sixteen lanes as rows; row i has those of lanes i, i + 4, i + 8 and i + 12.
+/// Transposes vectors of sixteen lanes to rows; row i has those of lanes i, i + 4, i + 8, i + 12.
 #[inline(always)]
 fn sixteen_rows([x, y, z]: [Zmm; 3]) -> [__m512; 4] {
     // SAFETY: called only inside the AVX-512 kernel.

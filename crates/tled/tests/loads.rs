@@ -46,7 +46,7 @@ fn a_tool_that_presses_so_hard_that_steps_are_cut_comes_to_rest() {
         let dt_ms = tled.stable_dt_ms();
         let cut = (0..(1000.0 / dt_ms) as usize).filter(|_| tled.step(&loads, dt_ms).substeps > 1).count();
         let fastest = tled.velocities().iter().map(|v| v.length()).fold(0.0, f32::max);
-        println!("cure {averaged_pressure}: {fastest:e} mm/ms, {cut} steps cut");
+        println!("averaged pressure {averaged_pressure}: {fastest:e} mm/ms, {cut} steps cut");
         assert!(cut > 0 && fastest < 1e-4, "{cut} {fastest}");
     }
 }

@@ -164,8 +164,8 @@ fn a_contact_stiffer_than_the_step_bears_is_stable() {
     }
 }
 
-/// A probe beside a wall on the same light nodes, both damped beyond what an explicit step bears:
-/// at rest the tissue bears all of what a hand on the spring feels.
+/// Presses a probe beside a wall on the same light nodes, both damped beyond what an explicit step
+/// bears. At rest the tissue bears all of what a hand on the spring feels.
 #[test]
 fn what_the_hand_feels_the_tissue_gets() {
     let body = cube();

@@ -39,11 +39,11 @@ fn largest_difference(a: &[Vec3], b: &[Vec3]) -> f32 {
 
 #[test]
 fn a_touch_wakes_its_neighbourhood_and_the_answer_is_that_of_a_body_that_never_sleeps() {
-    for cure in [false, true] {
+    for averaged in [false, true] {
         let (body, free) = (mat(), Loads::default());
         let pressed = tool(&body);
-        let mut sleepy = Tled::new(&body, &config(cure)).unwrap();
-        let mut awake = Tled::new(&body, &Config { averaged_pressure: cure, ..Config::default() }).unwrap();
+        let mut sleepy = Tled::new(&body, &config(averaged)).unwrap();
+        let mut awake = Tled::new(&body, &Config { averaged_pressure: averaged, ..Config::default() }).unwrap();
         run(&mut sleepy, &free, 60.0);
         assert_eq!(sleepy.awake_share(), 0.0);
         run(&mut sleepy, &pressed, 5.0);
@@ -54,7 +54,10 @@ fn a_touch_wakes_its_neighbourhood_and_the_answer_is_that_of_a_body_that_never_s
             run(&mut sleepy, loads, 300.0);
             run(&mut awake, loads, 300.0);
             let apart = largest_difference(sleepy.positions(), awake.positions());
-            println!("cure {cure}: {share} awake, apart by {apart} mm, then {} awake", sleepy.awake_share());
+            println!(
+                "averaged pressure {averaged}: {share} awake, apart by {apart} mm, then {} awake",
+                sleepy.awake_share()
+            );
             assert!(apart < 0.01, "{apart}");
             let (held, share) = (!loads.contacts.is_empty(), sleepy.awake_share());
             assert!(if held { share > 0.0 && share < 0.3 } else { share == 0.0 }, "{share}");

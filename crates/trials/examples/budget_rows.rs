@@ -1,25 +1,24 @@
-//! Makes the rows of the budget: runs every choice in scenes of training and writes the tables of
-//! what was found.
+//! Makes the cost and error tables of the budget: runs every choice in the training scenes.
 //!
-//! What each part found is kept, so that it goes on where it was stopped. The open heads take part
-//! where `TREPAN_DATA` says where they are.
+//! The results of each part are stored, so that a stopped run resumes. The open heads take part
+//! where `TREPAN_DATA` names their folder.
 
 use anyhow::Result;
 use clap::Parser;
 use std::path::PathBuf;
 use trepan_trials::suites::budget::training::{Observed, TABLES, observe, parts, tables};
 
-/// Makes the rows of the budget
+/// Makes the tables of the budget
 #[derive(Parser)]
 struct Arguments {
-    /// Folder for what each part found; of the same tables
+    /// Folder for the results of each part; all from the same tables
     work: PathBuf,
-    /// Folder that gets the tables
+    /// Output folder of the tables
     out: PathBuf,
-    /// Only this part, from 0 on
+    /// Run only this part, from 0 on
     #[arg(long, value_name = "N")]
     part: Option<usize>,
-    /// Only these tables
+    /// Make only these tables
     #[arg(long, value_name = "TABLE", value_parser = TABLES, default_values = TABLES)]
     only: Vec<String>,
 }

@@ -1,7 +1,7 @@
-//! The charts of a validation as SVG files, for a page of one's own.
+//! Writes charts of a validation as SVG files, for a page of your own.
 //!
 //! `cargo run --release -p trepan-trials --example charts -- target/validation OUT [SUITE
-//! TITLE-BEGINS]...`; without names, the three of the top README.
+//! TITLE-BEGINS]...`; without names, the three charts of the top README.
 
 use std::path::Path;
 use trepan_trials::store::{report, whole};

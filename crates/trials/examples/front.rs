@@ -1,5 +1,4 @@
-//! Which way of touching bone is worth its cost: the quick rigid suite's charts as tables, the
-//! front marked.
+//! Prints the quick rigid suite's charts as tables, with the Pareto front marked.
 //!
 //! `cargo run --release -p trepan-trials --example front`
 

@@ -1,8 +1,8 @@
-//! Writes heads of a made population and one picture of all of them.
+//! Writes heads of a synthetic population and one picture of all of them.
 //!
-//! `cargo run -p trepan-trials --example heads -- N FOLDER [SEED]`: the folder gets one folder a
-//! head and `heads.png`. A row is a head: CT from above and from the side, MRI from above, the side
-//! and the front; green the true brain's border, red the tumour's.
+//! `cargo run -p trepan-trials --example heads -- N FOLDER [SEED]`: writes one folder per head and
+//! `heads.png`. Each row of the picture is a head: CT from above and from the side, MRI from above,
+//! the side and the front, with the outlines of the true brain in green and of the tumour in red.
 
 use anyhow::{Context, Result};
 use glam::{DAffine3, DMat3, DVec3};
@@ -12,7 +12,7 @@ use trepan_render::Image;
 use trepan_trials::population::{Head, HeadRecipe, base_heads};
 use trepan_volume::{Grid, Interpolation, Sample, VoxelVolume, resample};
 
-/// Pixels of 1 mm along each side of a look.
+/// Edge of a view, px of 1 mm.
 const SIDE: usize = 280;
 const ABOVE: [DVec3; 2] = [DVec3::X, DVec3::NEG_Y];
 const ASIDE: [DVec3; 2] = [DVec3::Y, DVec3::NEG_Z];

@@ -1,7 +1,7 @@
 //! Records the paths of the rigid and the deformable suite into the fixtures; name a suite to
-//! record only its own.
+//! record only its paths.
 //!
-//! Recordings made anew have other bytes: figures before and after are not comparable.
+//! New recordings have other bytes: figures before and after are not comparable.
 //!
 //! `cargo run -p trepan-trials --example record_paths [rigid|deformable] [FOLDER]`
 

@@ -1,12 +1,14 @@
-//! Borders of stability: where each method worked when they were last kept, and what is worse now.
+//! Kept stability boundaries: compares a run's maps with the stored ones and lists cells that got
+//! worse.
 //!
 //! # Practice
-//! One text file a suite for quick runs and one for full ones, in `borders/` of the sources; a
-//! character a cell, so that a changed border is a changed line in a review.
-//! `validate --keep-borders` writes them from a run; a row, a column or a map that is new is no
-//! regression, one that is gone is not either.
+//! `borders/` in the sources holds one text file per suite for quick runs and one for full runs.
+//! Each
+//! map cell is one character, so a changed boundary is a changed line in a review.
+//! `validate --keep-borders` writes them from a run. A new or a removed row, column or map is not a
+//! regression.
 
-use crate::compare::told;
+use crate::compare::describe_change;
 use crate::part::Scope;
 use crate::picture::{Map, Outcome};
 use crate::store::whole;
@@ -16,20 +18,20 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// The signs of works, degrades, fails, refused.
+/// Characters for works, degrades, fails and refused.
 const SIGNS: [char; 4] = ['.', '~', '#', 'x'];
 const BETWEEN: &str = " | ";
 const COLUMNS: &str = "columns: ";
 
-/// Where a suite's border is kept; a quick run asks less of a cell than a full one, so that each
-/// has its own.
+/// Path of a suite's kept boundary file. Quick and full runs have separate files because a quick
+/// run demands less of each cell.
 fn place(suite: &str, scope: Scope) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("borders").join(scope.pick("quick", "full"));
     folder.join(format!("{suite}.txt"))
 }
 
-/// Counts the cells that are worse than they were kept, and names them; nothing where no border is
-/// kept.
+/// Adds a gate on the number of cells worse than the kept boundary and lists them. Does nothing if
+/// no boundary is kept.
 pub fn judge(suite: &str, scope: Scope, findings: &mut Findings) {
     if let Ok(text) = std::fs::read_to_string(place(suite, scope)) {
         let worse = regressions(&text, &findings.maps);
@@ -42,7 +44,7 @@ pub fn judge(suite: &str, scope: Scope, findings: &mut Findings) {
     }
 }
 
-/// Writes a suite's borders into the sources.
+/// Writes a suite's boundary file into the sources.
 pub fn keep(suite: &str, scope: Scope, maps: &[Map]) -> Result<()> {
     let file = place(suite, scope);
     whole(&file, text(maps).as_bytes())?;
@@ -50,7 +52,7 @@ pub fn keep(suite: &str, scope: Scope, maps: &[Map]) -> Result<()> {
     Ok(())
 }
 
-/// The file of some maps.
+/// Text of a boundary file for some maps.
 pub fn text(maps: &[Map]) -> String {
     let mut text = String::from("Where it works (.), degrades (~), fails (#), is refused (x).\n");
     for map in maps {
@@ -67,7 +69,7 @@ fn line(name: &str) -> String {
     name.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Every cell that is worse than in a kept file, by name.
+/// Names of all cells that are worse than in a kept file.
 fn regressions(kept: &str, maps: &[Map]) -> Vec<String> {
     let kept = cells(kept);
     let mut worse = Vec::new();
@@ -75,14 +77,14 @@ fn regressions(kept: &str, maps: &[Map]) -> Vec<String> {
         for (row, column, cell) in map.named_cells() {
             let key = (line(&map.title), line(row), column.to_string());
             if let Some(was) = kept.get(&key).filter(|was| cell.worse_than(was)) {
-                worse.push(told(map, row, column, was, cell));
+                worse.push(describe_change(map, row, column, was, cell));
             }
         }
     }
     worse
 }
 
-/// Map, row and column, and what was there.
+/// Kept outcomes by map title, row and column.
 fn cells(kept: &str) -> BTreeMap<(String, String, String), Outcome> {
     let mut cells = BTreeMap::new();
     for block in kept.split("\n\n").skip(1) {
@@ -125,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_worse_than_kept_is_named_and_what_is_better_is_not() {
+    fn cells_worse_than_kept_are_named_and_better_ones_are_not() {
         let (fails, refused) = (Outcome::Fails("falls through".into()), Outcome::Refused("too thin".into()));
         let kept = text(&[map([Outcome::Works, fails.clone(), refused.clone()])]);
         assert!(kept.contains("\n.#x thin one\n"), "{kept}");

@@ -1,18 +1,18 @@
-//! Two runs side by side: what got faster, slower, more or less accurate, and how sure that is.
+//! Compares two runs: what got faster, slower, more or less accurate, with confidence intervals.
 //!
 //! # Theory
 //! A metric of a method is compared over all scenes that both runs have, as the ratio r = new / old
-//! in each. The median of the r is what changed; its 95 % interval is the bootstrap's (Efron 1979):
-//! scenes drawn with repeats, a thousand times. A change counts where the interval leaves out 1 and
-//! the median is further from 1 than a time may wander by itself. How far that is, both runs say
-//! together: the spread of the ratios of all times about their median, which a busy or another
-//! machine widens.
+//! in each. The reported change is the median of r with its 95 % bootstrap interval (Efron 1979):
+//! scenes drawn with replacement, 1000 times. A change counts if the interval excludes 1 and
+//! the median is further from 1 than the timing noise of the two runs. That noise is the spread of
+//! all time ratios about their median; a loaded or different machine widens it.
 //!
 //! # Practice
-//! Times end in `_us`, `_ms`, `_s`, `_ns` or are rates `_per_s`; they are set against the median
-//! ratio of all times of the suite, so that a machine that was slower throughout is said once and
-//! not blamed on each method. All else should repeat exactly with the same seed and is compared as
-//! it is.
+//! Times end in `_us`, `_ms`, `_s`, `_ns` or are rates `_per_s`. They are divided by the median
+//! time ratio of the suite, so that a machine that is slower throughout is reported once and
+//! not attributed to each method. All other metrics should repeat exactly with the same seed and
+//! are
+//! compared unscaled.
 
 use crate::picture::{Chart, Map, Outcome};
 use crate::report::Report;
@@ -24,19 +24,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Draws of the bootstrap.
+/// Number of bootstrap draws.
 const DRAWS: usize = 1000;
-/// Deviation that nine in ten of normal values stay within, over that which half of them do: half
-/// the times say it though some methods changed.
+/// 90 % quantile over 50 % quantile of the absolute deviation of a normal distribution. The 50 %
+/// quantile is robust if some methods changed.
 const NINE_IN_TEN: f64 = 2.44;
-/// A time must change by this share at least to be told, however sure it is.
+/// Smallest relative change of a time that is reported, however narrow its interval.
 const LEAST_TIME: f64 = 0.05;
-/// The same for all else.
+/// Smallest relative change of any other metric that is reported.
 const LEAST: f64 = 1e-6;
-/// So many are named of what only one run has.
+/// Number of names listed of what only one run has.
 const NAMED: usize = 3;
 
-/// Which way of a metric is better.
+/// Direction in which a metric improves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Better {
     Less,
@@ -44,18 +44,19 @@ enum Better {
     Neither,
 }
 
-/// What a metric is made of.
+/// How a metric depends on timing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Nature {
     /// A time or a rate: a slower machine changes it.
     Time,
-    /// Made of times, as a ratio of them is: it wanders as they do, and no machine is to blame.
+    /// Derived from times, such as a ratio of them: as noisy as times, but independent of machine
+    /// speed.
     OfTimes,
-    /// The same in every run of one seed.
+    /// Identical in every run with one seed.
     Exact,
 }
 
-/// What a metric's name says of it.
+/// Nature and better direction of a metric, derived from its name.
 fn kind(metric: &str) -> (Nature, Better) {
     let ends = |list: &[&str]| list.iter().any(|end| metric.ends_with(end));
     let has = |list: &[&str]| list.iter().any(|word| metric.contains(word));
@@ -91,7 +92,7 @@ fn kind(metric: &str) -> (Nature, Better) {
     }
 }
 
-/// A metric of a method over all scenes of both runs.
+/// Change of one metric of one method over all scenes of both runs.
 #[derive(Debug)]
 struct Change {
     method: String,
@@ -102,7 +103,7 @@ struct Change {
     high: f64,
 }
 
-/// Everything that differs between the reports of two folders, as text.
+/// Text with all differences between the reports of two folders.
 pub fn folders(old: &Path, new: &Path) -> Result<String> {
     let (mut text, mut both) = (String::new(), 0);
     for suite in ALL.iter().chain(ON_REQUEST) {
@@ -124,14 +125,14 @@ pub fn folders(old: &Path, new: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// Everything that differs between two reports of one suite.
+/// Text with all differences between two reports of one suite.
 pub fn reports(old: &Report, new: &Report) -> String {
     let mut text = format!("{}: {} -> {}\n", new.suite, old.making.commit, new.making.commit);
     if old.making.scope() != new.making.scope() {
         text += "  the runs differ in --quick or --seed: only rows of the same name are compared\n";
     }
     if old.making.machine != new.making.machine {
-        text += "  another machine: times say little\n";
+        text += "  the machines differ: times are hardly comparable\n";
     }
     gates(&mut text, old, new);
     alone(&mut text, old, new);
@@ -145,16 +146,16 @@ fn gates(text: &mut String, old: &Report, new: &Report) {
     let was: BTreeMap<&str, bool> = old.findings.gates.iter().map(|gate| (gate.name.as_str(), gate.pass)).collect();
     let both = || new.findings.gates.iter().filter_map(|gate| Some((gate, *was.get(gate.name.as_str())?)));
     let changed: Vec<_> = both().filter(|(gate, was)| gate.pass != *was).collect();
-    _ = writeln!(text, "  {} promises in both, {} with another verdict", both().count(), changed.len());
+    _ = writeln!(text, "  {} acceptance limits in both, {} with another verdict", both().count(), changed.len());
     for (gate, _) in changed {
         let word = if gate.pass { "now kept" } else { "NOW BROKEN" };
         _ = writeln!(text, "    {word}: {}: {} {} {}", gate.name, gate.value, gate.op, gate.limit);
     }
 }
 
-/// Promises, and methods in scenes, that one of the runs lacks.
+/// Reports gates and method rows that only one of the runs has.
 fn alone(text: &mut String, old: &Report, new: &Report) {
-    let promises = |report: &Report| {
+    let limits = |report: &Report| {
         let names = report.findings.gates.iter().map(|gate| (gate.name.clone(), gate.name.clone()));
         names.collect::<BTreeMap<_, _>>()
     };
@@ -163,7 +164,8 @@ fn alone(text: &mut String, old: &Report, new: &Report) {
             .map(|((key, n), row)| (format!("{key} {n}"), format!("{} in {}", row.method, row.scene)));
         names.collect::<BTreeMap<_, _>>()
     };
-    for (what, was, is) in [("promises", promises(old), promises(new)), ("rows of methods", rows(old), rows(new))] {
+    for (what, was, is) in [("acceptance limits", limits(old), limits(new)), ("rows of methods", rows(old), rows(new))]
+    {
         for (run, of, other) in [("old", &was, &is), ("new", &is, &was)] {
             let lacking = || of.iter().filter(|(key, _)| !other.contains_key(*key)).map(|(_, name)| name.as_str());
             let mut names: Vec<&str> = lacking().collect::<BTreeSet<_>>().into_iter().collect();
@@ -204,7 +206,7 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
     if let (Some(old), Some(new)) = (control(old), control(new)) {
         _ = writeln!(text, "  the machine's own control: new over old {:.3}", new / old);
     }
-    let mut told: BTreeMap<&str, Vec<Change>> = BTreeMap::new();
+    let mut reported: BTreeMap<&str, Vec<Change>> = BTreeMap::new();
     let mut same = 0;
     for ((method, metric), all) in ratios {
         let (nature, better) = kind(&metric);
@@ -216,19 +218,19 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
         let (lost, all): (Vec<f64>, Vec<f64>) = all.into_iter().map(|ratio| ratio * by).partition(|r| r.is_nan());
         if !lost.is_empty() {
             let change = Change::of(method.clone(), metric.clone(), lost);
-            told.entry("NO NUMBER in one of the runs").or_default().push(change);
+            reported.entry("NO NUMBER in one of the runs").or_default().push(change);
             if all.is_empty() {
                 continue;
             }
         }
         let change = Change::of(method, metric, all);
         match change.word(nature, better, spread) {
-            Some(word) => told.entry(word).or_default().push(change),
+            Some(word) => reported.entry(word).or_default().push(change),
             None => same += 1,
         }
     }
     _ = writeln!(text, "  {same} metrics of methods unchanged within their confidence");
-    for (word, mut changes) in told {
+    for (word, mut changes) in reported {
         changes.sort_by(|a, b| b.median.ln().abs().total_cmp(&a.median.ln().abs()));
         _ = writeln!(text, "  {word}:");
         for Change { method, metric, scenes, median, low, high } in changes {
@@ -237,9 +239,9 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
     }
 }
 
-/// New over old of every metric that both have in the same scene, by method and metric. Where both
-/// are 0 the ratio is 1, where one is no number it is none either; where both are none, nothing is
-/// compared.
+/// Ratios new / old of every metric that both runs have in the same scene, by method and metric.
+/// The
+/// ratio is 1 if both are 0 and NaN if one is not finite; metrics not finite in both are skipped.
 fn ratios(old: &[Row], new: &[Row]) -> BTreeMap<(String, String), Vec<f64>> {
     let was: BTreeMap<_, &Row> = keyed(old).collect();
     let mut ratios: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
@@ -256,7 +258,7 @@ fn ratios(old: &[Row], new: &[Row]) -> BTreeMap<(String, String), Vec<f64>> {
     ratios
 }
 
-/// Rows by scene, method, settings, and which of those that share all of these: rows come in the
+/// Rows keyed by scene, method, settings and an index among rows that share these: rows come in the
 /// same order in every run.
 fn keyed(rows: &[Row]) -> impl Iterator<Item = ((String, usize), &Row)> {
     let mut met: BTreeMap<String, usize> = BTreeMap::new();
@@ -268,7 +270,7 @@ fn keyed(rows: &[Row]) -> impl Iterator<Item = ((String, usize), &Row)> {
     })
 }
 
-/// Settings that are not measured themselves: no lists, no fractions.
+/// Settings that are inputs, not measurements: lists and fractions are left out.
 fn stable(row: &Row) -> Vec<(&String, String)> {
     let plain = row.config.iter().filter(|(_, value)| value.is_string() || value.is_u64() || value.is_boolean());
     plain.map(|(name, value)| (name, value.to_string())).collect()
@@ -287,8 +289,9 @@ impl Change {
         Self { median: quantile(&mut all, 0.5).unwrap_or(1.0), method, metric, scenes, low, high }
     }
 
-    /// What to call it, if it is a change beyond the `spread` of all times. A time in a single
-    /// scene is none: nothing says how sure it is.
+    /// Label of the change if it exceeds the `spread` of all times. A time in a single scene has
+    /// none,
+    /// because it has no confidence interval.
     fn word(&self, nature: Nature, better: Better, spread: f64) -> Option<&'static str> {
         let is_time = nature != Nature::Exact;
         let least = if is_time { spread.max(LEAST_TIME) } else { LEAST };
@@ -314,7 +317,7 @@ fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
     values.get(((values.len().max(1) - 1) as f64 * share).round() as usize).copied()
 }
 
-/// Who joined or left a front by more than [`Chart::SPREAD`].
+/// Reports methods that joined or left a Pareto front by more than [`Chart::SPREAD`].
 fn charts(text: &mut String, old: &[Chart], new: &[Chart]) {
     for chart in new {
         let Some(before) = old.iter().find(|other| other.title == chart.title) else { continue };
@@ -335,7 +338,7 @@ fn maps(text: &mut String, old: &[Map], new: &[Map]) {
         let Some(before) = old.iter().find(|other| other.title == map.title) else { continue };
         for (row, column, cell) in map.named_cells() {
             match before.cell(row, column) {
-                Some(was) if was.grade() != cell.grade() => changed.push(told(map, row, column, was, cell)),
+                Some(was) if was.grade() != cell.grade() => changed.push(describe_change(map, row, column, was, cell)),
                 Some(_) => same += 1,
                 None => {}
             }
@@ -347,8 +350,8 @@ fn maps(text: &mut String, old: &[Map], new: &[Map]) {
     changed.iter().for_each(|line| _ = writeln!(text, "    {line}"));
 }
 
-/// A cell that changed, by name.
-pub fn told(map: &Map, row: &str, column: &str, was: &Outcome, is: &Outcome) -> String {
+/// One line that names a changed cell and its old and new outcome.
+pub fn describe_change(map: &Map, row: &str, column: &str, was: &Outcome, is: &Outcome) -> String {
     let word = if is.worse_than(was) { "WORSE" } else { "better" };
     let reason = [is.reason(), was.reason()].into_iter().find(|reason| !reason.is_empty()).unwrap_or_default();
     format!("{word}: {} | {row} | {column}: {} -> {} ({reason})", map.title, was.word(), is.word())
@@ -377,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slower_method_is_told_and_a_slower_machine_is_not_blamed_on_methods() {
+    fn a_slower_method_is_reported_and_a_slower_machine_is_not_attributed_to_methods() {
         let wobble = |n: usize| 1.0 + 0.01 * (n as f64 * 1.7).sin();
         let old = report(wobble, 0.1, 0.2);
         let slower_machine = reports(&old, &report(|n| 1.5 * wobble(n + 3), 0.1, 0.2));
@@ -385,18 +388,18 @@ mod tests {
         let slower_b =
             reports(&old, &report(|n| wobble(n + 3) * if (10..20).contains(&n) { 1.3 } else { 1.0 }, 0.1, 0.2));
         assert!(slower_b.contains("SLOWER") && slower_b.contains("b, tick_p50_us"), "{slower_b}");
-        assert!(slower_b.contains("1 promises in both, 0 with another verdict"));
+        assert!(slower_b.contains("1 acceptance limits in both, 0 with another verdict"));
     }
 
     #[test]
-    fn rows_of_one_name_are_told_apart_by_their_order() {
+    fn rows_of_one_name_are_distinguished_by_their_order() {
         let row = |mm: f64| Row::new("s", "m").with("stiffness", mm + 0.5).metric("depth_error_mm", mm);
         let rows: Vec<Row> = (1..5).map(|n| row(f64::from(n))).collect();
         assert_eq!(ratios(&rows, &rows)[&("m".to_string(), "depth_error_mm".to_string())], [1.0; 4]);
     }
 
     #[test]
-    fn an_error_that_grew_and_a_promise_that_broke_are_told() {
+    fn a_grown_error_and_a_broken_limit_are_reported() {
         let [old, new] = [0.1, 0.3].map(|error| report(|_| 1.0, error, 0.2));
         let text = reports(&old, &new);
         assert!(text.contains("LESS ACCURATE") && text.contains("NOW BROKEN: depth"), "{text}");
@@ -405,20 +408,20 @@ mod tests {
     }
 
     #[test]
-    fn what_one_run_lacks_and_what_is_no_number_is_told() {
+    fn rows_of_one_run_only_and_values_that_are_not_numbers_are_reported() {
         let (old, mut new) = (report(|_| 1.0, 0.1, 0.2), report(|_| 1.0, f64::NAN, 0.2));
         new.findings.gates.push(Gate::at_most("time", 1.0, 2.0));
         new.findings.rows.retain(|row| row.method != "c");
         let text = reports(&old, &new);
         assert!(text.contains("NO NUMBER in one of the runs") && !text.contains("more accurate"), "{text}");
-        assert!(text.contains("  1 promises ONLY IN THE new run: time"), "{text}");
+        assert!(text.contains("  1 acceptance limits ONLY IN THE new run: time"), "{text}");
         let lacking = "  10 rows of methods ONLY IN THE old run: c in scene 20, c in scene 21, c in scene 22, ...";
         assert!(text.contains(lacking), "{text}");
         assert!(!reports(&new, &new).contains("NO NUMBER") && !reports(&new, &new).contains("ONLY"));
     }
 
     #[test]
-    fn a_number_that_one_scene_lost_is_told_and_what_neither_run_has_is_no_change() {
+    fn a_value_lost_in_one_scene_is_reported_and_one_missing_in_both_runs_is_no_change() {
         let (old, mut new) = (report(|_| 1.0, 0.1, 0.2), report(|_| 1.0, 0.1, 0.2));
         new.findings.rows[3].metrics.insert("depth_error_mm".into(), f64::NAN);
         for text in [reports(&old, &new), reports(&new, &old)] {
@@ -440,7 +443,7 @@ mod tests {
     }
 
     #[test]
-    fn rates_of_a_slower_machine_are_not_blamed_on_methods() {
+    fn rates_of_a_slower_machine_are_not_attributed_to_methods() {
         let of = |speed: f64| {
             let mut report = report(|n| (1.0 + 0.01 * (n as f64).sin()) / speed, 0.1, 0.2);
             report.findings.rows.iter_mut().for_each(|row| _ = row.metrics.insert("frames_per_s".into(), 30.0 * speed));
@@ -451,7 +454,7 @@ mod tests {
     }
 
     #[test]
-    fn names_tell_times_from_errors() {
+    fn times_and_errors_are_distinguished_by_name() {
         assert_eq!(kind("error_over_tolerance"), (Nature::Exact, Better::Less));
         assert_eq!(kind("error_over_motion"), (Nature::Exact, Better::Less));
         assert_eq!(kind("cpu_s_per_s"), (Nature::Time, Better::Less));

@@ -1,11 +1,10 @@
-//! The one engine of stability: conditions put to methods, a verdict for each, a map, and a row for
-//! every method.
+//! Runs every method under every condition and returns a stability map and one row per method.
 
 use crate::picture::{Map, Outcome};
 use crate::suite::{Findings, Row};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Puts every condition to every method. A panic is a failure of the cell, not of the run.
+/// Runs every method under every condition. A panic fails only its cell, not the run.
 pub fn judge<M>(
     title: &str,
     conditions: &[&str],
@@ -32,7 +31,7 @@ pub fn judge<M>(
     findings.maps.push(map);
 }
 
-/// For every column of a map the number of its cells of each grade.
+/// One row per map column with the number of cells of each grade.
 pub fn rows(map: &Map) -> Vec<Row> {
     let row = |(column, name): (usize, &String)| {
         let graded = |grade: u8| map.cells.iter().filter(|row| row[column].grade() == grade).count() as f64;
@@ -50,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_panic_fails_its_cell_alone() {
+    fn a_panic_fails_only_its_cell() {
         let mut findings = Findings::default();
         let verdict = |at: usize, limit: &usize| {
             assert!(at < *limit, "on purpose");

@@ -1,9 +1,8 @@
-//! Every method of every family: has it been timed, judged and broken, and does the recommended one
-//! stand on its front?
+//! Checks that every method of every family has rows of speed, accuracy and stability.
 //!
 //! # Practice
-//! The lists are the crates' own; a method that is added there and not measured here is a hole, and
-//! a hole fails a run of all suites.
+//! The method lists come from the crates. A method that is added there and not measured here is
+//! reported as a hole, and a hole fails a run of all suites.
 
 use crate::page::text;
 use crate::part::Suite;
@@ -73,16 +72,16 @@ const FAMILIES: [Family; 6] = [
     },
 ];
 
-/// The columns of a map: what a machine without a graphics device cannot have is not missed.
+/// Column names of a map. Methods that need a missing graphics device are not in it.
 fn mapped(report: &Report, title: &str) -> Vec<String> {
     report.findings.maps.iter().filter(|map| map.title == title).flat_map(|map| map.columns.clone()).collect()
 }
 
-/// What is known of one method.
+/// Measurements of one method.
 struct Known {
     speed: Vec<f64>,
     accuracy: Vec<f64>,
-    /// Cells that work, degrade, fail, are refused.
+    /// Number of cells that work, degrade, fail and are refused.
     cells: [usize; 4],
 }
 
@@ -93,7 +92,7 @@ impl Known {
         let all = |wanted| rows().filter_map(|row| metric(row, wanted)).filter(|v| v.is_finite()).collect();
         let mut cells = [0; 4];
         for map in &report.findings.maps {
-            // A map is one method's, or has methods for columns.
+            // A map belongs to one method, or has methods as columns.
             let whole = map.title.starts_with(&format!("{method}:"));
             let own = map.named_cells().filter(|(_, column, _)| whole || *column == method);
             own.for_each(|(.., cell)| cells[usize::from(Outcome::grade(cell))] += 1);
@@ -111,7 +110,7 @@ impl Known {
     }
 }
 
-/// Methods that a report says nothing of, each with what is lacking.
+/// Methods without a row of speed, accuracy or stability, each with what is missing.
 pub fn holes(reports: &[(&Suite, Report)]) -> Vec<String> {
     let mut holes = Vec::new();
     for family in &FAMILIES {
@@ -125,7 +124,7 @@ pub fn holes(reports: &[(&Suite, Report)]) -> Vec<String> {
     holes
 }
 
-/// A table over all families that the page has.
+/// Appends a table of all methods of the families in the reports.
 pub fn table(page: &mut String, reports: &[(&Suite, Report)]) {
     *page += "<h2>Every method</h2><p>Medians over all scenes in which a method was measured, and cells of the maps. Scenes differ: fronts are in the charts.</p>\
               <table><tr><th>family</th><th>method</th><th>cost</th><th>error</th><th>works</th><th>degrades</th><th>fails</th><th>refused</th></tr>";
@@ -174,7 +173,7 @@ mod tests {
     use crate::suites::ALL;
 
     #[test]
-    fn a_family_that_is_measured_has_no_hole_and_one_that_is_not_has_one_for_each_method() {
+    fn only_families_without_measurements_have_holes_one_for_each_method() {
         let suite = ALL.iter().find(|suite| suite.name == "force").unwrap();
         let scope = Scope { quick: true, seed: 1 };
         let parts = (suite.parts)(scope);

@@ -1,9 +1,9 @@
-//! The Pareto front: what no other row beats in both cost and error.
+//! Pareto front: the rows that no other row beats in both cost and error.
 
 use crate::suite::Row;
 
-/// How many rows of a scene beat a method's in both metrics. Rows with a missing or non-finite
-/// metric beat nobody.
+/// Number of rows of a scene that beat a method's row in both metrics. Rows with a missing or
+/// non-finite metric are ignored.
 pub fn dominated(rows: &[Row], scene: &str, method: &str, cost: &str, error: &str) -> usize {
     let value = |row: &Row, name: &str| row.metrics.get(name).copied().filter(|v| v.is_finite());
     let pair = |row: &Row| Some((value(row, cost)?, value(row, error)?));
@@ -16,8 +16,8 @@ pub fn dominated(rows: &[Row], scene: &str, method: &str, cost: &str, error: &st
         .count()
 }
 
-/// Indices of the points (cost, error) that no other point beats in both, cheapest first. What has
-/// no number is not among them.
+/// Indices of the points (cost, error) that no other point beats in both, cheapest first. Points
+/// with a non-finite value are left out.
 pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     let beaten = |p: &(f64, f64)| points.iter().any(|q| (q.0 < p.0 && q.1 <= p.1) || (q.0 <= p.0 && q.1 < p.1));
     let known = |p: &(f64, f64)| !p.0.is_nan() && !p.1.is_nan();
@@ -31,7 +31,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_front_is_what_nobody_beats() {
+    fn the_front_holds_the_points_that_no_other_beats() {
         let points = [(1.0, 9.0), (2.0, 4.0), (3.0, 5.0), (4.0, 1.0), (4.5, 1.0)];
         assert_eq!(front(&points), [0, 1, 3]);
         assert_eq!(front(&[(0.5, f64::NAN), (1.0, 9.0)]), [1]);

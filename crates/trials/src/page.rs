@@ -1,4 +1,5 @@
-//! `index.html`: every suite's charts, maps, promises and rows on one page that needs nothing else.
+//! Writes `index.html`: charts, maps, acceptance limits and rows of every suite on one
+//! self-contained page.
 
 use crate::families;
 use crate::part::Suite;
@@ -11,12 +12,12 @@ use std::fmt::Write;
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
-/// The whole page.
+/// The whole page as HTML.
 pub fn html(reports: &[(&Suite, Report)]) -> String {
     let mut page = format!(
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Trepan: validation</title><style>{STYLE}</style></head><body>\
-         <h1>Trepan: validation</h1><p class=\"tools\"><label>Show rows and promises with <input id=\"filter\" type=\"search\" placeholder=\"walls god-object-sphere\"></label> \
-         <label><input id=\"broken\" type=\"checkbox\"> broken promises only</label></p>"
+         <h1>Trepan: validation</h1><p class=\"tools\"><label>Show rows and acceptance limits with <input id=\"filter\" type=\"search\" placeholder=\"walls god-object-sphere\"></label> \
+         <label><input id=\"broken\" type=\"checkbox\"> broken acceptance limits only</label></p>"
     );
     overview(&mut page, reports);
     families::table(&mut page, reports);
@@ -33,13 +34,13 @@ pub fn html(reports: &[(&Suite, Report)]) -> String {
     page + "<script>" + SCRIPT + "</script></body></html>\n"
 }
 
-/// Text as HTML.
+/// Escapes text for HTML.
 pub fn text(plain: &str) -> String {
     plain.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 fn overview(page: &mut String, reports: &[(&Suite, Report)]) {
-    *page += "<table><tr><th>suite</th><th>promises</th><th>broken</th><th>rows</th><th>command</th><th>commit</th><th>seed</th></tr>";
+    *page += "<table><tr><th>suite</th><th>acceptance limits</th><th>broken</th><th>rows</th><th>command</th><th>commit</th><th>seed</th></tr>";
     for (suite, report) in reports {
         let (gates, making) = (&report.findings.gates, &report.making);
         let broken = gates.iter().filter(|gate| !gate.pass).count();
@@ -58,7 +59,7 @@ fn overview(page: &mut String, reports: &[(&Suite, Report)]) {
     *page += "</table>";
 }
 
-/// What made the numbers below, and where.
+/// Command, commit, seed and machines of the numbers below.
 fn making(page: &mut String, report: &Report) {
     let named = |machine: &std::collections::BTreeMap<String, String>| {
         text(&machine.iter().map(|(name, value)| format!("{name}: {value}")).collect::<Vec<_>>().join(", "))
@@ -85,7 +86,7 @@ fn regressions(page: &mut String, report: &Report) {
 }
 
 fn gates(page: &mut String, report: &Report) {
-    *page += "<table><tr><th>promise</th><th>found</th><th>limit</th><th></th></tr>";
+    *page += "<table><tr><th>acceptance limit</th><th>measured</th><th>limit</th><th></th></tr>";
     for gate in &report.findings.gates {
         let (class, word) = if gate.pass { ("row", "kept") } else { ("row bad", "broken") };
         _ = write!(
@@ -100,7 +101,7 @@ fn gates(page: &mut String, report: &Report) {
     *page += "</table>";
 }
 
-/// Rows with the same metrics stand in one table, each metric with its unit in a column.
+/// Tables of rows; rows with the same metrics share one table, with a column for each metric.
 fn rows(page: &mut String, report: &Report) {
     *page += "<details><summary>All rows</summary>";
     let alike = |a: &Row, b: &Row| a.metrics.keys().eq(b.metrics.keys());
@@ -140,7 +141,7 @@ fn charts(page: &mut String, suite: &Suite, report: &Report) {
     }
 }
 
-/// The suite's own chart, over all rows.
+/// The suite's default chart over all rows.
 fn chart_of_all(suite: &Suite, report: &Report) -> Chart {
     let (cost, error) = suite.chart;
     let of = |row: &Row| {

@@ -1,10 +1,9 @@
-//! Charts of cost against error with their front, and maps of where a method works, degrades or
-//! fails, as data.
+//! Data of the charts (cost against error with the Pareto front) and of the stability maps.
 //!
 //! # Practice
-//! A suite fills them beside its rows; the page draws them. Both axes of a chart are logarithmic:
-//! what is smaller than a thousandth of a unit of cost or a hundred-thousandth of error is drawn
-//! there.
+//! A suite fills them together with its rows; the page draws them. Both axes of a chart are
+//! logarithmic. Costs below a thousandth of a unit and errors below a hundred-thousandth are drawn
+//! at that limit.
 
 use crate::front::front;
 use crate::page::text;
@@ -15,41 +14,41 @@ use std::fmt::Write;
 /// One point of a chart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
-    /// Whose it is.
+    /// Name of the method.
     pub method: String,
-    /// What it costs.
+    /// Cost.
     #[serde(deserialize_with = "number")]
     pub cost: f64,
-    /// How wrong it is.
+    /// Error.
     #[serde(deserialize_with = "number")]
     pub error: f64,
 }
 
-/// Cost against error.
+/// Chart of cost against error.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Chart {
-    /// What is charted.
+    /// Title.
     pub title: String,
-    /// The metric of cost.
+    /// Metric on the cost axis.
     pub cost: String,
-    /// The metric of error.
+    /// Metric on the error axis.
     pub error: String,
-    /// One for each method, or more.
+    /// One mark or more for each method.
     pub marks: Vec<Mark>,
-    /// A cost that must not be passed, with its name.
+    /// Cost limit with its name.
     pub budget: Option<(f64, String)>,
-    /// The method that must be on the front; gates ask [`beaten`](Self::beaten).
+    /// The method that must be on the Pareto front; gates call [`beaten`](Self::beaten).
     pub chosen: Option<String>,
 }
 
 impl Chart {
-    /// How many other methods' marks are better than this method's first in both; `usize::MAX`
-    /// where it has none that is a number.
+    /// Number of other methods with a mark better than this method's first in both cost and error;
+    /// `usize::MAX` if the method has no finite mark.
     pub fn beaten(&self, method: &str) -> usize {
         self.beaten_beyond(method, 0.0)
     }
 
-    /// The same, counting only marks that are cheaper by more than a share.
+    /// Like [`beaten`](Self::beaten), counting only marks that are cheaper by more than a share.
     pub fn beaten_beyond(&self, method: &str, share: f64) -> usize {
         let is_number = |mark: &&Mark| mark.cost.is_finite() && mark.error.is_finite();
         let Some(own) = self.marks.iter().filter(is_number).find(|mark| mark.method == method) else {
@@ -60,11 +59,11 @@ impl Chart {
         self.marks.iter().filter(is_number).filter(better).count()
     }
 
-    /// How far two runs of one commit may lie apart in cost without changing a front: what shared
-    /// machines need.
+    /// Relative difference in cost between two runs of one commit on a shared machine that does not
+    /// change a Pareto front.
     pub const SPREAD: f64 = 0.15;
 
-    /// Methods with a mark that no other beats.
+    /// Methods with a mark on the Pareto front.
     pub fn on_front(&self) -> Vec<String> {
         let front = self.front();
         let on = |mark: &&Mark| front.contains(&(mark.cost, mark.error));
@@ -74,7 +73,7 @@ impl Chart {
         names
     }
 
-    /// Whether a method has a mark that is on the front or would be, were it cheaper by
+    /// Whether a method has a mark on the Pareto front, or would have if it were cheaper by
     /// [`SPREAD`](Self::SPREAD).
     pub fn near_front(&self, method: &str) -> bool {
         let beats = |other: &Mark, own: &Mark| other.cost < own.cost * (1.0 - Self::SPREAD) && other.error <= own.error;
@@ -83,29 +82,29 @@ impl Chart {
         own.into_iter().any(|own| !self.marks.iter().any(|other| beats(other, own)))
     }
 
-    /// The marks that no other beats, cheapest first.
+    /// Marks on the Pareto front, cheapest first.
     pub fn front(&self) -> Vec<(f64, f64)> {
         let pairs: Vec<(f64, f64)> = self.marks.iter().map(|mark| (mark.cost, mark.error)).collect();
         front(&pairs).into_iter().map(|at| pairs[at]).collect()
     }
 }
 
-/// How a method fared in one cell of a map.
+/// Result of a method in one cell of a map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// As it should.
+    /// Meets all requirements.
     Works,
     /// Usable, with this drawback.
     Degrades(String),
     /// Not usable, for this reason.
     Fails(String),
-    /// Said no before it began, for this reason.
+    /// Rejected before it started, for this reason.
     Refused(String),
 }
 
 impl Outcome {
-    /// 0 works, 1 degrades, 2 fails, 3 refused.
+    /// Grade: 0 works, 1 degrades, 2 fails, 3 refused.
     pub fn grade(&self) -> u8 {
         match self {
             Self::Works => 0,
@@ -115,18 +114,18 @@ impl Outcome {
         }
     }
 
-    /// Its grade in a word.
+    /// The grade as a word.
     pub fn word(&self) -> &'static str {
         ["works", "degrades", "fails", "refused"][usize::from(self.grade())]
     }
 
-    /// Whether another is better: failing is worse than refusing, which is worse than being usable.
+    /// Whether another outcome is better; from best to worst: usable, refused, failed.
     pub fn worse_than(&self, other: &Self) -> bool {
         let rank = |outcome: &Self| [0, 1, 3, 2][usize::from(outcome.grade())];
         rank(self) > rank(other)
     }
 
-    /// Why, where it does not work.
+    /// Reason for not working, else empty.
     pub fn reason(&self) -> &str {
         match self {
             Self::Works => "",
@@ -135,32 +134,32 @@ impl Outcome {
     }
 }
 
-/// A line over a map: its name and its points.
+/// Line over a map: its name and its points.
 pub type Line = (String, Vec<(f64, f64)>);
 
-/// A grid of conditions, coloured by what came of them.
+/// Map of outcomes over a grid of conditions.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Map {
-    /// What is mapped, often the method.
+    /// Title, often the method.
     pub title: String,
-    /// What the columns are.
+    /// Quantity of the columns.
     pub x: String,
-    /// What the rows are.
+    /// Quantity of the rows.
     pub y: String,
     /// Names of the columns, left to right.
     pub columns: Vec<String>,
     /// Names of the rows, top to bottom.
     pub rows: Vec<String>,
-    /// Row by row.
+    /// Outcomes row by row.
     pub cells: Vec<Vec<Outcome>>,
     /// Lines over the cells: name, and points in cells from the upper left corner.
     #[serde(serialize_with = "within_a_file")]
     pub lines: Vec<Line>,
-    /// What else a reader must know, under the map.
+    /// Notes printed under the map.
     pub notes: Vec<String>,
 }
 
-/// JSON has no infinity: what is further than any map is drawn at its end all the same.
+/// Serializes lines with infinite coordinates clamped, because JSON has no infinity.
 fn within_a_file<S: serde::Serializer>(lines: &[Line], to: S) -> Result<S::Ok, S::Error> {
     let kept = |v: f64| if v.is_nan() { 0.0 } else { v.clamp(-1e6, 1e6) };
     let line = |(name, points): &Line| {
@@ -170,12 +169,12 @@ fn within_a_file<S: serde::Serializer>(lines: &[Line], to: S) -> Result<S::Ok, S
 }
 
 const CELL: (usize, usize) = (34, 20);
-/// Apart in lightness too, so that they are told apart without colours.
+/// Fill colours that also differ in lightness, to be distinguishable without colour.
 const FILL: [&str; 4] = ["#d5efe6", "#f2cf74", "#d9744f", "#9aa5b1"];
 const STROKE: [&str; 3] = ["#0072b2", "#000000", "#cc79a7"];
 
 impl Map {
-    /// Every cell with the names of its row and column.
+    /// All cells with the names of their row and column.
     pub fn named_cells(&self) -> impl Iterator<Item = (&str, &str, &Outcome)> {
         let cells = self.rows.iter().zip(&self.cells);
         cells.flat_map(|(row, cells)| {
@@ -188,7 +187,7 @@ impl Map {
         self.named_cells().find(|(r, c, _)| *r == row && *c == column).map(|(.., cell)| cell)
     }
 
-    /// The map as a figure with the reasons, lettered, under it.
+    /// The map as a figure with its reasons, lettered, below.
     pub fn svg(&self) -> String {
         let reasons = self.reasons();
         let left = 8 + 7 * self.rows.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(4);
@@ -250,7 +249,7 @@ impl Map {
         }
     }
 
-    /// Every reason once, in the order in which they come.
+    /// Distinct reasons in order of appearance.
     fn reasons(&self) -> Vec<&str> {
         let mut found = Vec::new();
         for reason in self.cells.iter().flatten().map(Outcome::reason) {
@@ -277,7 +276,7 @@ fn draw_cell(svg: &mut String, (x, y): (usize, usize), cell: &Outcome, reasons: 
     );
 }
 
-/// a, b … z, a1, b1 …
+/// Letter of a reason: a, b … z, a1, b1 …
 fn letter(at: usize) -> String {
     let first = char::from(b'a' + (at % 26) as u8);
     if at < 26 { first.to_string() } else { format!("{first}{}", at / 26) }
@@ -288,7 +287,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_is_better_in_both_beats() {
+    fn a_mark_better_in_both_beats() {
         let mark = |method: &str, cost, error| Mark { method: method.into(), cost, error };
         let marks = vec![mark("a", 1.0, 9.0), mark("b", 2.0, 2.0), mark("c", 3.0, 3.0), mark("d", 1.0, f64::NAN)];
         let chart = Chart { marks, ..Chart::default() };

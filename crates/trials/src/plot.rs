@@ -1,8 +1,8 @@
-//! A chart of cost against error as SVG.
+//! Draws a chart of cost against error as SVG.
 //!
 //! # Practice
-//! Both axes are logarithmic. The front is a line, the budget another one, the recommended method
-//! stands in a ring; methods differ in colour and in shape.
+//! Both axes are logarithmic. The Pareto front and the budget are lines and the recommended method
+//! is circled; methods differ in colour and in shape.
 
 use crate::picture::{Chart, Mark};
 use plotters::coord::CoordTranslate;
@@ -10,9 +10,9 @@ use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 
 const SIZE: (u32, u32) = (960, 420);
-/// Width of the list of methods beside a chart.
+/// Width of the legend, px.
 const KEY_WIDTH: u32 = 210;
-/// Colours told apart by readers with any colour vision (Okabe and Ito 2008).
+/// Colours that are distinguishable with any colour vision (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -23,8 +23,8 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// The chart; `methods` are all of the page's section, so that a method has the same sign in each
-/// of its charts.
+/// Draws the chart. `methods` are all methods of the page's section, so that a method has the same
+/// marker in each of its charts.
 pub fn svg(chart: &Chart, methods: &[&str]) -> Result<String, Box<dyn std::error::Error>> {
     let at_least = |mark: &Mark| (mark.cost.max(1e-3), mark.error.max(1e-5));
     let span = |values: &mut dyn Iterator<Item = f64>| {
@@ -76,14 +76,14 @@ pub fn svg(chart: &Chart, methods: &[&str]) -> Result<String, Box<dyn std::error
     Ok(svg)
 }
 
-/// A number at an axis: three digits, however small.
+/// Axis label with three significant digits.
 fn tick(value: &f64) -> String {
     let digits = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 7.0);
     let text = format!("{value:.*}", digits as usize);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
 }
 
-/// A method's sign: seven colours as discs, then as triangles, then as crosses.
+/// Marker of a method: seven colours as discs, then as triangles, then as crosses.
 fn sign<B: DrawingBackend, C: CoordTranslate>(
     area: &DrawingArea<B, C>,
     at: usize,

@@ -1,27 +1,26 @@
-//! Packages of others as programs of their own: a Python environment that is made for a run and
-//! goes with it.
+//! Runs third-party Python packages in a temporary virtual environment.
 //!
 //! # Practice
-//! Needs Python 3 with `venv`, and its package index once. `TREPAN_PYTHON` names another Python; if
-//! that has the packages already, it is used as it is. Nothing of theirs is linked, kept or
-//! shipped.
+//! Needs Python 3 with `venv`, and access to the package index. `TREPAN_PYTHON` names another
+//! Python; if it has the packages already, it is used as it is. The packages are not linked, kept
+//! or shipped.
 
 use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// The environment variable with another Python.
+/// Environment variable that names another Python.
 const PYTHON: &str = "TREPAN_PYTHON";
 
-/// A folder with a Python that has some packages.
+/// Temporary folder with a script and a Python that has the packages.
 pub struct Workshop {
     folder: tempfile::TempDir,
     python: PathBuf,
 }
 
 impl Workshop {
-    /// With packages, as (name to import, name in the index), and a script to run; says which
-    /// versions they are.
+    /// Sets up packages, as (name to import, name in the index), and a script, and prints the
+    /// packages' versions.
     pub fn with(packages: &[(&str, &str)], script: &str) -> Result<Self, String> {
         let folder = tempfile::tempdir().map_err(|fault| fault.to_string())?;
         std::fs::write(folder.path().join("script.py"), script).map_err(|fault| fault.to_string())?;
@@ -45,18 +44,18 @@ impl Workshop {
         Ok(Self { folder, python })
     }
 
-    /// A file in the folder, in which the script runs too.
+    /// Path of a file in the folder, which is the script's working directory.
     pub fn at(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// What the script prints, or the last line of its complaint.
+    /// Returns the script's output, or the last line of its error text.
     pub fn run(&self, arguments: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Result<String, String> {
         said(Command::new(&self.python).arg(self.at("script.py")).args(arguments).current_dir(self.folder.path()))
     }
 }
 
-/// What a program prints, or why it failed: the last line of its complaint.
+/// Returns a program's output, or the last line of its error text.
 fn said(command: &mut Command) -> Result<String, String> {
     let program = command.get_program().to_string_lossy().into_owned();
     let out = command.output().map_err(|fault| format!("{program}: {fault}"))?;

@@ -1,4 +1,4 @@
-//! One suite's file: its parts with commit and machine, and what they found together.
+//! Report of one suite: its parts with commit and machine, and their joint findings.
 
 use crate::borders;
 use crate::part::{Part, Scope, Suite};
@@ -6,51 +6,51 @@ use crate::suite::Findings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How a part was made.
+/// Provenance of a part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Making {
     /// Commit of the sources, or `unknown`.
     pub commit: String,
-    /// The machine, by name.
+    /// Properties of the machine by name.
     pub machine: BTreeMap<String, String>,
     /// Whether the run was a quick one.
     pub quick: bool,
-    /// The run's seed.
+    /// Seed of the run.
     pub seed: u64,
 }
 
 impl Making {
-    /// Here and now.
+    /// Provenance of a part made now, on this machine.
     pub fn here(scope: Scope) -> Self {
         Self { commit: commit(), machine: machine(), quick: scope.quick, seed: scope.seed }
     }
 
-    /// The scope it was made in.
+    /// Scope of the run.
     pub fn scope(&self) -> Scope {
         Scope { quick: self.quick, seed: self.seed }
     }
 }
 
-/// The whole file of a suite.
+/// Content of a suite's JSON file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Name of the suite.
     pub suite: String,
-    /// What makes it again.
+    /// Command that reproduces it.
     pub command: String,
-    /// How its first part was made.
+    /// Provenance of the first part.
     #[serde(flatten)]
     pub making: Making,
-    /// Parts made on another machine, by name.
+    /// Machines of the parts that were made elsewhere, by part.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub elsewhere: BTreeMap<String, BTreeMap<String, String>>,
-    /// What was found.
+    /// Findings of all parts.
     #[serde(flatten)]
     pub findings: Findings,
 }
 
 impl Report {
-    /// Parts put together in the order of the suite, and judged. `None` without any part.
+    /// Combines parts in the order of the suite and judges them. `None` without any part.
     pub fn of(suite: &Suite, parts: Vec<(String, Making, Findings)>) -> Option<Self> {
         let making = parts.first()?.1.clone();
         let away = parts.iter().filter(|(_, made, _)| made.machine != making.machine);
@@ -65,13 +65,13 @@ impl Report {
         Some(Self { suite: suite.name.into(), command, making, elsewhere, findings })
     }
 
-    /// Whether every promise was kept.
+    /// Whether every acceptance limit is met.
     pub fn passed(&self) -> bool {
         self.findings.gates.iter().all(|gate| gate.pass)
     }
 }
 
-/// Names of a suite's parts, as files are named.
+/// File names of a suite's parts.
 pub fn slugs(suite: &Suite, scope: Scope) -> Vec<String> {
     (suite.parts)(scope).iter().map(Part::slug).collect()
 }
@@ -106,7 +106,7 @@ mod tests {
     use crate::suite::{Gate, Row};
 
     #[test]
-    fn the_file_has_the_stated_fields_and_comes_back() {
+    fn the_file_has_the_documented_fields_and_reads_back() {
         let suite = Suite {
             name: "s",
             question: "q",

@@ -1,11 +1,13 @@
-//! Parts on disk: a run that was stopped goes on where it was, and shards from many machines become
-//! one report.
+//! Stores parts on disk, so that a stopped run resumes and shards from several machines can be
+//! merged.
 //!
 //! # Practice
-//! `OUT/parts/SUITE/PART.json` holds one part; each appears whole or not at all. A run takes up
-//! parts of the very same program, scope and seed, and leaves all others; it deletes its own when
-//! the report is written. Merging takes parts of one program or one commit, of one scope and seed,
-//! whoever made them.
+//! `OUT/parts/SUITE/PART.json` holds one part and is written atomically. A run reuses
+//! parts of the identical program, scope and seed, and ignores all others; it deletes its parts
+//! when
+//! the report is written. Merging takes parts of one program or one commit, with one scope and
+//! seed,
+//! from any machine.
 
 use crate::part::{Scope, Suite};
 use crate::report::{Making, Report, slugs};
@@ -22,33 +24,33 @@ use std::path::{Path, PathBuf};
 
 const PARTS: &str = "parts";
 
-/// One part's file.
+/// Content of one part's file.
 #[derive(Serialize, Deserialize)]
 pub struct Stored {
-    /// Hash of the program that made it.
+    /// Hash of the program that made the part.
     program: String,
-    /// What it took, s.
+    /// Run time, s.
     pub seconds: f64,
-    /// Whether it came to its end; one that did not is made again.
+    /// Whether the part ran to its end; one that did not is made again.
     ended: bool,
-    /// What the machine itself took before and after, the worse of both.
+    /// Timing control before and after the part, the worse of both.
     control: Control,
-    /// How it was made.
+    /// Provenance.
     pub making: Making,
-    /// What it found.
+    /// Findings.
     pub findings: Findings,
 }
 
-/// A folder with parts and reports.
+/// Folder with parts and reports.
 pub struct Store {
     folder: PathBuf,
     program: String,
-    /// As it was when the run began: the sources may change meanwhile.
+    /// Provenance at the start of the run: the sources may change meanwhile.
     making: Making,
 }
 
 impl Store {
-    /// In a folder, which is made if need be.
+    /// Opens a folder, created if missing.
     pub fn open(folder: &Path, scope: Scope) -> Result<Self> {
         fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
         let program = fs::read(std::env::current_exe()?).context("cannot read this program")?;
@@ -63,31 +65,30 @@ impl Store {
         self.folder.join(PARTS).join(suite).join(format!("{part}.json"))
     }
 
-    /// A part that this very program made in this scope, if it is there.
+    /// Finished part that this program made in this scope, if stored.
     pub fn found(&self, suite: &str, part: &str) -> Option<Stored> {
         self.own(suite, part).filter(|stored| stored.ended)
     }
 
-    /// The same, whether it came to its end or not.
+    /// Part that this program made in this scope, finished or not.
     fn own(&self, suite: &str, part: &str) -> Option<Stored> {
         let stored: Stored = serde_json::from_slice(&fs::read(self.place(suite, part)).ok()?).ok()?;
         (stored.program == self.program && stored.making.scope() == self.making.scope()).then_some(stored)
     }
 
-    /// The parts of a suite that this very program made in this scope: name, file and part. Nothing
+    /// Parts of a suite that this program made in this scope: name, file and part. Nothing
     /// else in the folder is read.
     fn all_own(&self, suite: &Suite) -> impl Iterator<Item = (String, PathBuf, Stored)> {
         let names = slugs(suite, self.making.scope()).into_iter();
         names.filter_map(|name| Some((name.clone(), self.place(suite.name, &name), self.own(suite.name, &name)?)))
     }
 
-    /// All of these, judged as one run. `None` where there is none.
+    /// Report over the parts that this program made. `None` if there are none.
     pub fn merged(&self, suite: &Suite) -> Result<Option<Report>> {
         judged(suite, self.all_own(suite))
     }
 
-    /// Keeps a part with what it took, what the machine itself took meanwhile, and whether it came
-    /// to its end.
+    /// Stores a part with its run time, its timing control, and whether it ran to its end.
     pub fn keep(
         &self,
         suite: &str,
@@ -100,20 +101,20 @@ impl Store {
         whole(&self.place(suite, part), &serde_json::to_vec(&stored)?)
     }
 
-    /// Deletes a suite's own parts: they are in its report.
+    /// Deletes this program's parts of a suite, which are in its report.
     pub fn forget(&self, suite: &Suite) {
         self.all_own(suite).for_each(|(_, path, _)| _ = fs::remove_file(path));
         _ = fs::remove_dir(self.folder.join(PARTS).join(suite.name));
         _ = fs::remove_dir(self.folder.join(PARTS));
     }
 
-    /// Seconds that parts took last time, by `SUITE/PART`.
+    /// Last run time of each part, s, by `SUITE/PART`.
     pub fn durations(&self) -> BTreeMap<String, f64> {
         let read = fs::read(self.folder.join(durations(self.making.scope()))).ok();
         read.and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default()
     }
 
-    /// Remembers what parts took.
+    /// Stores the run times of parts.
     pub fn remember(&self, all: &BTreeMap<String, f64>) -> Result<()> {
         whole(&self.folder.join(durations(self.making.scope())), &serde_json::to_vec_pretty(all)?)
     }
@@ -123,14 +124,14 @@ fn durations(scope: Scope) -> &'static str {
     scope.pick("durations-quick.json", "durations.json")
 }
 
-/// All parts of a suite in some folders, in the suite's order, judged as one run. `None` where no
+/// Report over all parts of a suite in some folders, in the suite's order. `None` if no
 /// folder has any.
 pub fn merged(suite: &Suite, folders: &[PathBuf]) -> Result<Option<Report>> {
     judged(suite, stored(suite.name, folders)?)
 }
 
-/// The parts of a suite that lie in some folders: name, file and part. What a stopped write left is
-/// none.
+/// Parts of a suite in some folders: name, file and part. Temporary files of interrupted writes are
+/// skipped.
 fn stored(suite: &str, folders: &[PathBuf]) -> Result<impl Iterator<Item = (String, PathBuf, Stored)>> {
     let mut all = Vec::new();
     for folder in folders {
@@ -148,7 +149,7 @@ fn stored(suite: &str, folders: &[PathBuf]) -> Result<impl Iterator<Item = (Stri
     Ok(all.into_iter())
 }
 
-/// Parts of one suite as one run.
+/// Combines and judges parts of one suite as one run.
 fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, Stored)>) -> Result<Option<Report>> {
     let mut parts: BTreeMap<String, (PathBuf, Stored)> = BTreeMap::new();
     for (name, path, part) in all {
@@ -159,15 +160,14 @@ fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, Stored)>) -
     let Some((first, of_first)) = parts.values().next() else { return Ok(None) };
     let alike = |one: &Stored, two: &Stored| {
         let [one_commit, two_commit] = [one, two].map(|part| &*part.making.commit);
-        // Of changes that no commit holds, and of sources without one, nobody knows whether they
-        // are the same.
+        // Uncommitted changes, and sources without a commit, cannot be checked for equality.
         let is_sure = !one_commit.ends_with("-dirty") && one_commit != "unknown";
         let same_code = one.program == two.program || is_sure && one_commit == two_commit;
         same_code && one.making.scope() == two.making.scope()
     };
     if let Some((path, other)) = parts.values().find(|(_, part)| !alike(part, of_first)) {
-        let told = |m: &Making| format!("commit {}, quick {}, seed {}", m.commit, m.quick, m.seed);
-        let [one, two] = [&of_first.making, &other.making].map(told);
+        let describe = |m: &Making| format!("commit {}, quick {}, seed {}", m.commit, m.quick, m.seed);
+        let [one, two] = [&of_first.making, &other.making].map(describe);
         let remedy = "merge parts of one program, or of one commit without changes";
         bail!("{} is of {one}, {} of {two}: {remedy}", first.display(), path.display());
     }
@@ -184,7 +184,7 @@ fn judged(suite: &Suite, all: impl Iterator<Item = (String, PathBuf, Stored)>) -
     Ok(report)
 }
 
-/// The machine's own times while the parts were made: medians over the parts, and the worst.
+/// Row of the timing control: medians over the parts, and the worst.
 fn control(all: &[Control]) -> Row {
     let sorted = |of: fn(&Control) -> f64| Samples::from(all.iter().map(of).collect::<Vec<f64>>());
     let (middle, slow) = (sorted(|c| c.sum_p50_us), sorted(|c| c.sum_p99_us));
@@ -195,7 +195,7 @@ fn control(all: &[Control]) -> Row {
         .metric("sum_p50_spread_percent", 100.0 * (middle.quantile(0.9) / middle.quantile(0.1) - 1.0))
 }
 
-/// A report that a folder holds.
+/// Report stored in a folder, if any.
 pub fn report(folder: &Path, suite: &str) -> Result<Option<Report>> {
     let path = folder.join(format!("{suite}.json"));
     match fs::read(&path) {
@@ -208,7 +208,7 @@ pub fn report(folder: &Path, suite: &str) -> Result<Option<Report>> {
     }
 }
 
-/// Writes a file whole or not at all, with the folders above it.
+/// Writes a file atomically, creating parent folders.
 pub fn whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn two_shards_merged_are_the_file_of_one_run() {
+    fn two_merged_shards_equal_the_file_of_one_run() {
         let all = tempfile::tempdir().unwrap();
         let [one, even, odd] = ["one", "even", "odd"].map(|name| all.path().join(name));
         run(&one, |_| true);
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stopped_run_is_taken_up_and_another_scope_is_not() {
+    fn a_stopped_run_resumes_and_another_scope_does_not() {
         let all = tempfile::tempdir().unwrap();
         run(all.path(), |n| n < 2);
         let store = Store::open(all.path(), SCOPE).unwrap();
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_report_that_cannot_be_read_is_an_error_and_none_is_not() {
+    fn an_unreadable_report_is_an_error_and_a_missing_one_is_not() {
         let all = tempfile::tempdir().unwrap();
         assert!(report(all.path(), "made-up").unwrap().is_none());
         fs::create_dir(all.path().join("made-up.json")).unwrap();

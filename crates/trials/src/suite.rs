@@ -1,70 +1,70 @@
-//! What a suite finds: rows of metrics, gates, charts and maps.
+//! Findings of a suite: rows of metrics, gates, charts and maps.
 //!
 //! # Practice
-//! A metric's name ends in its unit (`depth_error_voxel`, `step_us`). A gate never hangs on an
-//! absolute time: times belong to charts, as ratios in one run.
+//! A metric's name ends in its unit (`depth_error_voxel`, `step_us`). A gate never depends on an
+//! absolute time: times belong in charts, as ratios within one run.
 
 use crate::picture::{Chart, Map as StabilityMap};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
-/// One method in one scene.
+/// Measurements of one method in one scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// The scene.
+    /// Scene name.
     pub scene: String,
-    /// The method.
+    /// Method name.
     pub method: String,
-    /// The part of the suite that made it.
+    /// Part of the suite that made the row.
     #[serde(default)]
     pub part: String,
-    /// What was set, by name.
+    /// Settings by name.
     pub config: Map<String, Value>,
-    /// What was measured, by name with unit; `null` in a file is not a number.
+    /// Measured values by name with unit; `null` in a file means NaN.
     #[serde(deserialize_with = "numbers")]
     pub metrics: BTreeMap<String, f64>,
 }
 
-/// JSON has no NaN and no infinity: both are `null` there.
+/// Reads metrics; JSON has no NaN and no infinity, so `null` stands for both.
 fn numbers<'de, D: serde::Deserializer<'de>>(from: D) -> Result<BTreeMap<String, f64>, D::Error> {
     let read = BTreeMap::<String, Option<f64>>::deserialize(from)?;
     Ok(read.into_iter().map(|(name, value)| (name, value.unwrap_or(f64::NAN))).collect())
 }
 
 impl Row {
-    /// A row without metrics.
+    /// Creates a row without metrics.
     pub fn new(scene: impl Into<String>, method: impl Into<String>) -> Self {
         let (scene, method) = (scene.into(), method.into());
         Self { scene, method, part: String::new(), config: Map::new(), metrics: BTreeMap::new() }
     }
 
-    /// With one more setting.
+    /// Adds a setting.
     pub fn with(mut self, name: &str, value: impl Into<Value>) -> Self {
         self.config.insert(name.into(), value.into());
         self
     }
 
-    /// With one more metric.
+    /// Adds a metric.
     pub fn metric(mut self, name: &str, value: f64) -> Self {
         self.metrics.insert(name.into(), value);
         self
     }
 
-    /// A setting that is a list of numbers.
+    /// Reads a setting that is a list of numbers.
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         let list = self.config.get(name).and_then(Value::as_array);
         list.into_iter().flatten().map(|value| value.as_f64().unwrap_or(f64::NAN)).collect()
     }
 }
 
-/// Which side of a limit is right.
+/// Allowed side of a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Side {
-    /// Not over it.
+    /// Up to the limit.
     #[serde(rename = "<=")]
     AtMost,
-    /// Not under it.
+    /// From the limit on.
     #[serde(rename = ">=")]
     AtLeast,
 }
@@ -75,40 +75,40 @@ impl std::fmt::Display for Side {
     }
 }
 
-/// A promise, and whether it was kept.
+/// Acceptance limit on a measured value, and whether it is met.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gate {
-    /// What is promised.
+    /// Description of the limited quantity.
     pub name: String,
-    /// What was found; `null` in a file is not a number.
+    /// Measured value; `null` in a file means NaN.
     #[serde(deserialize_with = "number")]
     pub value: f64,
-    /// What is allowed.
+    /// Limit.
     pub limit: f64,
-    /// On which side of the limit.
+    /// Allowed side of the limit.
     pub op: Side,
-    /// Whether it was kept.
+    /// Whether the limit is met.
     pub pass: bool,
 }
 
-/// A number; `null` is none.
+/// Reads a number; `null` means NaN.
 pub(crate) fn number<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
 impl Gate {
-    /// A value that must not be over a limit. A NaN fails.
+    /// Creates a gate on a value that must not exceed a limit. A NaN fails.
     pub fn at_most(name: impl Into<String>, value: f64, limit: f64) -> Self {
         Self { name: name.into(), value, limit, op: Side::AtMost, pass: value <= limit }
     }
 
-    /// A value that must not be under a limit. A NaN fails.
+    /// Creates a gate on a value that must reach a limit. A NaN fails.
     pub fn at_least(name: impl Into<String>, value: f64, limit: f64) -> Self {
         Self { name: name.into(), value, limit, op: Side::AtLeast, pass: value >= limit }
     }
 }
 
-/// A number for people: four digits that say something, however small it is.
+/// Formats a number with four significant digits.
 pub fn shown(value: f64) -> String {
     match value.abs() {
         small if small > 0.0 && small < 0.01 => format!("{value:.3e}"),
@@ -116,24 +116,24 @@ pub fn shown(value: f64) -> String {
     }
 }
 
-/// What a part, or all parts of a suite, found.
+/// Results of a part, or of all parts of a suite.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
-    /// Every method in every scene.
+    /// Rows of every method in every scene.
     pub rows: Vec<Row>,
-    /// Every promise.
+    /// All acceptance limits.
     pub gates: Vec<Gate>,
-    /// Charts for the page; without any it draws the suite's own over all rows.
+    /// Charts for the page; if empty, the page draws the suite's default chart.
     pub charts: Vec<Chart>,
     /// Maps for the page.
     pub maps: Vec<StabilityMap>,
-    /// Cells of maps that are worse than the kept border, by name.
+    /// Names of map cells that are worse than the kept boundary.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regressions: Vec<String>,
 }
 
 impl Findings {
-    /// With another part's findings after these.
+    /// Appends another part's findings.
     pub fn append(&mut self, mut other: Self) {
         self.rows.append(&mut other.rows);
         self.gates.append(&mut other.gates);
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn small_numbers_keep_their_digits() {
+    fn small_numbers_keep_significant_digits() {
         assert_eq!([0.0, 0.5, -3.25e-5, 1234.5].map(shown), ["0.0000", "0.5000", "-3.250e-5", "1234.5000"]);
     }
 

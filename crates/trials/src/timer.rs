@@ -1,20 +1,19 @@
-//! Timing: repeats in turn, quantiles and their spread, ratios with their confidence, and a control
-//! that says what the machine itself took.
+//! Timing: interleaved repeats, quantiles, spread, ratios with confidence intervals, and a machine
+//! control.
 //!
 //! # Practice
-//! Contenders are timed in turn, so that a slow moment of the machine meets all of them. A ratio of
-//! medians comes with the 95 % interval of the bootstrap. The control is made beside every part: an
-//! empty timed call, and a fixed sum; what they wander is what a time of that run cannot tell
-//! apart.
+//! Contenders are timed in turn, so that a slow moment of the machine affects all of them. A ratio
+//! of medians comes with its 95 % bootstrap interval. A control (an empty timed call and a fixed
+//! sum) is timed with every part; its variation is the noise of the times of that run.
 
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Draws of the bootstrap.
+/// Number of bootstrap draws.
 const DRAWS: usize = 400;
-/// Calls of the control.
+/// Number of control calls.
 const CALLS: usize = 300;
-/// Numbers that the control adds up: some 10 µs.
+/// Numbers that the control adds up: about 10 µs.
 const SUM: u32 = 20_000;
 
 /// Sorted times, µs.
@@ -22,7 +21,7 @@ const SUM: u32 = 20_000;
 pub struct Samples(Vec<f64>);
 
 impl Samples {
-    /// Times `count` calls, each on its own.
+    /// Times each of `count` calls.
     pub fn of(count: usize, mut call: impl FnMut(usize)) -> Self {
         let time = |i| {
             let start = Instant::now();
@@ -45,18 +44,18 @@ impl Samples {
         times.into_iter().map(Self::from).collect()
     }
 
-    /// A quantile, 0 to 1, µs; NaN without samples.
+    /// Quantile, 0 to 1, µs; NaN without samples.
     pub fn quantile(&self, share: f64) -> f64 {
         let last = self.0.len().saturating_sub(1);
         self.0.get((share * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
     }
 
-    /// From the first to the third quarter, as a share of the median.
+    /// Interquartile range as a share of the median.
     pub fn spread(&self) -> f64 {
         (self.quantile(0.75) - self.quantile(0.25)) / self.quantile(0.5)
     }
 
-    /// This median over another's: low end, value, high end of the 95 % interval.
+    /// Ratio of this median to another's: low end, value, high end of the 95 % interval.
     pub fn over(&self, other: &Self) -> [f64; 3] {
         let mut random = fastrand::Rng::with_seed(1);
         let mut drawn = |samples: &Self| {
@@ -69,26 +68,26 @@ impl Samples {
 }
 
 impl From<Vec<f64>> for Samples {
-    /// From times in any order, µs.
+    /// Creates samples from unsorted times, µs.
     fn from(mut times: Vec<f64>) -> Self {
         times.sort_by(f64::total_cmp);
         Self(times)
     }
 }
 
-/// What the machine took for nothing and for a fixed sum, µs.
+/// Times of an empty call and of a fixed sum on this machine, µs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Control {
-    /// An empty timed call, in the slowest hundredth.
+    /// 99 % quantile of an empty timed call, µs.
     pub empty_p99_us: f64,
-    /// The fixed sum, in the middle.
+    /// Median of the fixed sum, µs.
     pub sum_p50_us: f64,
-    /// The fixed sum, in the slowest hundredth.
+    /// 99 % quantile of the fixed sum, µs.
     pub sum_p99_us: f64,
 }
 
 impl Control {
-    /// The slower of two in each.
+    /// The slower of two controls in each value.
     pub fn or(self, other: Self) -> Self {
         Self {
             empty_p99_us: self.empty_p99_us.max(other.empty_p99_us),
@@ -97,7 +96,7 @@ impl Control {
         }
     }
 
-    /// Measured now, in some 5 ms.
+    /// Measures the control in about 5 ms.
     pub fn now() -> Self {
         let empty = Samples::of(CALLS, |_| {});
         let sum = Samples::of(CALLS, |call| {
@@ -122,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ratio_lies_in_its_interval_and_contenders_take_turns() {
+    fn a_ratio_lies_in_its_interval_and_contenders_alternate() {
         let mut order = Vec::new();
         let timed = Samples::in_turn(3, &mut ['a', 'b'], |name, round| order.push((*name, round)));
         assert_eq!(order, [('a', 0), ('b', 0), ('a', 1), ('b', 1), ('a', 2), ('b', 2)]);

@@ -1,5 +1,5 @@
-//! Where are the skull and the brain? `brain MRI [CT or -] [LABELS or -] [OUT.nii.gz]` prints
-//! sizes, thresholds, volume and Dice.
+//! Segments skull and brain: `brain MRI [CT or -] [LABELS or -] [OUT.nii.gz]` prints sizes,
+//! thresholds, volume and Dice.
 
 use std::path::Path;
 use std::time::Instant;

@@ -1,11 +1,11 @@
-//! How near are brain masks to those by other hands? Prints a table of the heads that are present;
-//! `TREPAN_DATA` names another folder than `../shared/data`.
+//! Compares brain masks with independent ones: prints a table of the heads present. `TREPAN_DATA`
+//! names another folder than `../shared/data`.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trepan_volume::{BrainConfig, Grid, Interpolation, VoxelVolume, find_brain, hounsfield, import, read, resample};
 
-/// Name, MRI, mask or labels by another hand, CT; empty where there is none.
+/// Name, MRI, independent mask or labels, CT; empty if missing.
 const HEADS: [[&str; 4]; 7] = [
     ["case-head", "case-head/mri_t1.nii.gz", "case-head/brain_mask.nii.gz", ""],
     ["case-head, CT", "case-head/mri_t1.nii.gz", "case-head/brain_mask.nii.gz", "case-head/ct_hu.nii.gz"],
@@ -20,7 +20,7 @@ const HEADS: [[&str; 4]; 7] = [
     ["mri-tumour-labelled", "mri-tumour-labelled/brain1_image.nrrd", "", ""],
     ["dicom-mri-schwannoma", "dicom-mri-schwannoma", "", ""],
 ];
-/// A pair that lies apart, and the MRI moved into the CT's space.
+/// A misaligned pair; the MRI is registered to the CT.
 const PAIR: [[&str; 4]; 2] = [
     ["ct-mri-pair-thick", "ct-mri-pair-thick/mri_t1.nii.gz", "", ""],
     ["ct-mri-pair-thick, CT", "ct-mri-pair-thick/mri_t1_registered_to_ct.nii.gz", "", "ct-mri-pair-thick/ct_hu.nii.gz"],

@@ -1,5 +1,4 @@
-//! What does an image file hold? `inspect FILE|FOLDER...` prints size, spacing, orientation, range
-//! and notes of each.
+//! Prints size, spacing, orientation, range and notes of image files: `inspect FILE|FOLDER...`.
 
 use std::path::Path;
 use trepan_volume::import;

@@ -1,6 +1,5 @@
-//! How much memory does a CT take? `memory make FOLDER` writes a made-up head of 512x512x300 voxels
-//! as DICOM and NIfTI; `memory read PATH` goes from the file to the skull on cubes and prints the
-//! most memory held (Linux).
+//! Measures the memory that importing a CT needs (Linux). `memory make FOLDER` writes a synthetic
+//! head of 512x512x300 voxels, `memory read PATH` converts it and prints the peak memory.
 
 use std::path::Path;
 use trepan_volume::{

@@ -1,5 +1,5 @@
-//! How do CT and MRI lie? `overlap CT MRI OUT.png` registers them and draws the bone's contour over
-//! the MRI, as read above, as moved below.
+//! Registers an MRI to a CT and draws the bone's contour over it: `overlap CT MRI OUT.png`. The
+//! upper row is as read, the lower as registered.
 
 use std::path::Path;
 use trepan_volume::{
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     write(Path::new(out), &[before, after])
 }
 
-/// The pictures side by side, one row for each look.
+/// The pictures side by side, one row before and one after registration.
 fn write(path: &Path, looks: &[[Picture; 3]]) -> Result<(), Box<dyn std::error::Error>> {
     let width: usize = looks[0].iter().map(|p| p.width).sum();
     let height = looks[0].iter().map(|p| p.height).max().unwrap_or(0);

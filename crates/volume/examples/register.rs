@@ -1,7 +1,8 @@
-//! How well are known moves found again? `register FIXED MOVING [TRIALS]` moves the second image at
-//! random, onto a turned grid, and registers it to the first.
+//! Tests registration with known motions.
+//! `register FIXED MOVING [TRIALS]` moves the second image randomly, onto a rotated grid, and
+//! registers it to the first.
 //!
-//! Errors are against the pose that the files' headers give.
+//! Errors are relative to the pose in the files' headers.
 
 use glam::{DAffine3, DQuat, DVec3};
 use std::path::Path;

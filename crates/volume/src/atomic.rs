@@ -1,11 +1,11 @@
-//! Files that appear whole or not at all.
+//! Writes files atomically.
 
 use crate::{Sample, WriteError};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes beside `path` and renames at the end, so that neither a crash nor a full disk leaves half
-/// a file or loses the old one.
+/// Writes next to `path` and renames at the end, so that a crash or a full disk cannot damage the
+/// old file.
 pub(crate) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> io::Result<()>,
@@ -25,7 +25,7 @@ pub(crate) fn write_atomically(
     Ok(())
 }
 
-/// Little-endian voxels, a part at a time.
+/// Writes little-endian voxels in chunks.
 pub(crate) fn write_voxels<T: Sample>(to: &mut impl Write, data: &[T]) -> io::Result<()> {
     let mut bytes = Vec::with_capacity(1 << 16);
     for part in data.chunks(1 << 13) {

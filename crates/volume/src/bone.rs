@@ -1,28 +1,29 @@
-//! The skull while it is being drilled: one writer, any number of readers, no locks.
+//! The skull during drilling: a density grid with one writer, many readers and no locks.
 //!
 //! # Theory
-//! Densities live in a flat grid of atomics, so the haptic tick can take bone away while the
-//! picture and the distance field read. Each brick of 8³ voxels has a version that goes up after a
-//! write. A reader keeps the versions that it has seen and so finds what changed since, however
-//! late it looks: there is no queue that could overflow.
+//! Densities are stored in a flat grid of atomics, so that the haptic tick can remove bone while
+//! renderer and distance field read. Each brick of 8³ voxels has a version that increases after a
+//! write. A reader stores the versions that it has seen and so finds later changes at any time:
+//! there is no queue that could overflow.
 //!
 //! ```text
 //! writer: store density (relaxed) → version += 1 (release)
-//! reader: load version (acquire) → load densities (relaxed)    a newer density than the version is only looked at again
+//! reader: load version (acquire) → load densities (relaxed)
+//! A density newer than the version is only read again later.
 //! ```
 //!
 //! # Practice
-//! World is patient RAS+ mm; the grid is axis-aligned and isotropic (the import resamples), so a
-//! world point costs three multiply-adds. 2 bytes a voxel, 4 bytes a brick. Exactly one thread may
-//! write at a time; that is the caller's to keep.
+//! World is patient RAS+ mm; the grid is axis-aligned and isotropic (the import resamples), so that
+//! converting a world point costs three multiply-adds. 2 bytes a voxel, 4 bytes a brick. The caller
+//! must ensure that only one thread writes at a time.
 //!
-//! Strokes of the burr, each from the pedal's press to its release, can be undone, newest first:
-//! [`begin_stroke`](BoneVolume::begin_stroke) at the press, and bricks are kept before they change.
-//! To all readers undoing is one more change. A tick undoes a few bricks at a time
+//! Strokes of the burr, each from the pedal's press to its release, can be undone, newest first.
+//! [`begin_stroke`](BoneVolume::begin_stroke) marks the press; bricks are then copied before they
+//! change. For readers an undo is one more change. A tick undoes a few bricks at a time
 //! ([`exchange_brick`](BoneVolume::exchange_brick)).
 //!
 //! # When not to use it
-//! For volumes that do not change: [`VoxelVolume`] is plainer.
+//! For volumes that do not change: use [`VoxelVolume`].
 
 mod undo;
 
@@ -35,10 +36,10 @@ use trepan_geometry::{Aabb, Vec3};
 /// Edge of a brick in voxels.
 pub const BRICK: usize = 8;
 
-/// Density of air, HU: what is outside the grid and what is left after drilling.
+/// Density of air, HU: used outside the grid and for removed bone.
 pub const AIR_HU: i16 = -1000;
 
-/// A grid of densities in HU that one thread carves and others read.
+/// A grid of densities in HU that one thread modifies and others read.
 #[derive(Debug)]
 pub struct BoneVolume {
     dims: [usize; 3],
@@ -52,23 +53,23 @@ pub struct BoneVolume {
     /// Whether a brick has ever held bone.
     solid: Vec<AtomicBool>,
     strokes: Strokes,
-    /// Times that bone came back where there was none.
+    /// Number of times that bone was restored.
     undone: AtomicU32,
 }
 
-/// Why a volume cannot be carved.
+/// Why a volume cannot be used as bone.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum BoneError {
     /// The grid is oblique, mirrored or anisotropic.
     #[error("the bone grid must be axis-aligned with cubic voxels, but its affine is {0}; resample it first")]
     Grid(String),
-    /// Nothing reaches the isovalue.
+    /// No voxel reaches the isovalue.
     #[error("no voxel reaches {0} HU, so there is no bone; give a lower isovalue or another CT")]
     Empty(i16),
 }
 
 impl BoneVolume {
-    /// Takes densities over. `isovalue` in HU: a voxel at or over it is bone.
+    /// Copies densities; voxels at or over `isovalue`, HU, are bone.
     pub fn new(volume: &VoxelVolume<i16>, isovalue: i16) -> Result<Self, BoneError> {
         let spacing = volume.spacing_mm().x;
         let scale = volume.world_from_voxel.matrix3;
@@ -93,7 +94,7 @@ impl BoneVolume {
         Ok(bone)
     }
 
-    /// The box of the bone; marks the bricks that hold some.
+    /// Bounding box of the bone; marks the bricks that contain some.
     fn find_bone(&self) -> Option<Aabb> {
         let voxels = self.hu.iter().enumerate().filter(|(_, v)| v.load(Ordering::Relaxed) >= self.isovalue);
         let [nx, ny, _] = self.dims;
@@ -128,24 +129,24 @@ impl BoneVolume {
         self.origin
     }
 
-    /// The threshold in HU; at or over it a voxel is bone.
+    /// The isovalue, HU; a voxel at or over it is bone.
     #[inline]
     pub fn isovalue(&self) -> i16 {
         self.isovalue
     }
 
-    /// World box of what was bone at the start, mm.
+    /// World bounding box of the initial bone, mm.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// The voxel that holds a world point (perhaps outside the grid).
+    /// The voxel that contains a world point (possibly outside the grid).
     #[inline]
     pub fn voxel_of(&self, point: Vec3) -> IVec3 {
         self.grid_of(point).round().as_ivec3()
     }
 
-    /// Continuous grid coordinates of a world point: voxel centres are at whole numbers.
+    /// Continuous grid coordinates of a world point; voxel centres are at integers.
     #[inline]
     pub fn grid_of(&self, point: Vec3) -> Vec3 {
         (point - self.origin) / self.spacing_mm
@@ -176,7 +177,7 @@ impl BoneVolume {
         self.hu(voxel) >= self.isovalue
     }
 
-    /// Sets the density of a voxel, HU; does nothing outside the grid. For the one writer only.
+    /// Sets the density of a voxel, HU; ignored outside the grid. For the writer only.
     pub fn set_hu(&self, voxel: IVec3, hu: i16) {
         if let Some(at) = self.index(voxel) {
             let brick = self.brick_of(voxel);
@@ -192,19 +193,18 @@ impl BoneVolume {
         }
     }
 
-    /// Says that bone was put back by [`set_hu`](Self::set_hu) where there was none. For the one
-    /// writer only.
+    /// Records that [`set_hu`](Self::set_hu) restored bone. For the writer only.
     pub fn came_back(&self) {
         self.undone.fetch_add(1, Ordering::Release);
     }
 
-    /// How often bone has come back where there was none: by an undone stroke, or put back.
+    /// How often bone was restored, by an undone stroke or by a call.
     pub fn undone(&self) -> u32 {
         self.undone.load(Ordering::Acquire)
     }
 
-    /// Version of the brick that starts at 8 times `brick`, voxels: it goes up after each change.
-    /// Always 0 outside the grid.
+    /// Version of a brick, incremented by each change; 0 outside the grid. The brick starts at
+    /// voxel 8 times `brick`.
     #[inline]
     pub fn version(&self, brick: IVec3) -> u32 {
         let [bx, by, bz] = self.bricks;
@@ -219,7 +219,7 @@ impl BoneVolume {
         IVec3::from([brick % bx, brick / bx % by, brick / (bx * by)].map(|b| (b * BRICK) as i32))
     }
 
-    /// The way from the lowest voxel of a brick to its `n`th.
+    /// Offset from the lowest voxel of a brick to its `n`th.
     fn within(n: usize) -> IVec3 {
         IVec3::new((n % BRICK) as i32, (n / BRICK % BRICK) as i32, (n / (BRICK * BRICK)) as i32)
     }
@@ -232,8 +232,8 @@ impl BoneVolume {
         b.x as usize + bx * (b.y as usize + by * b.z as usize)
     }
 
-    /// Whether there may be bone in the box from voxel `low` to voxel `high`, both included:
-    /// whether one of its bricks has ever held some.
+    /// Whether the box from voxel `low` to voxel `high`, inclusive, touches a brick that has ever
+    /// held bone.
     pub fn may_hold_bone(&self, low: IVec3, high: IVec3) -> bool {
         let last = IVec3::new(self.dims[0] as i32, self.dims[1] as i32, self.dims[2] as i32) - 1;
         let (low, high) = (low.max(IVec3::ZERO), high.min(last));
@@ -256,16 +256,16 @@ impl BoneVolume {
         self.bricks
     }
 
-    /// A reader's memory of what it has seen, for [`changed`](Self::changed): everything so far
-    /// counts as seen.
+    /// Creates a reader's record for [`changed`](Self::changed), with everything so far marked as
+    /// seen.
     pub fn seen(&self) -> Vec<u32> {
         self.versions.iter().map(|v| v.load(Ordering::Acquire)).collect()
     }
 
-    /// Calls `visit` with the coordinates of up to `limit` bricks that changed since `seen`, and
-    /// marks them seen. Returns how many were left.
+    /// Calls `visit` with the coordinates of up to `limit` bricks changed since `seen` and marks
+    /// them. Returns how many changed bricks remain for the next call.
     ///
-    /// Cost: one load and compare per brick; no allocation. The rest comes with the next call.
+    /// Cost: one load and compare per brick; no allocation.
     pub fn changed(&self, seen: &mut [u32], limit: usize, mut visit: impl FnMut([usize; 3])) -> usize {
         let [bx, by, _] = self.bricks;
         let mut found = 0;
@@ -282,7 +282,7 @@ impl BoneVolume {
         found.saturating_sub(limit)
     }
 
-    /// A copy of the densities as they are now, HU.
+    /// A copy of the current densities, HU.
     pub fn snapshot(&self) -> VoxelVolume<i16> {
         let mut volume = VoxelVolume::isotropic(self.dims, self.origin, self.spacing_mm, AIR_HU);
         volume.data.iter_mut().zip(&self.hu).for_each(|(to, from)| *to = from.load(Ordering::Relaxed));

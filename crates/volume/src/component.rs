@@ -1,17 +1,16 @@
 //! Connected pieces of a mask.
 //!
 //! # Theory
-//! Two voxels are connected when they share a face (6-neighbourhood). Each row is cut into runs of
-//! set voxels; a run joins the runs that it overlaps in the row before and in the slice before,
-//! kept in a forest with path halving (Tarjan 1975; Rosenfeld and Pfaltz 1966 for the scan).
+//! Two voxels are connected if they share a face (6-neighbourhood). Each row is split into runs of
+//! set voxels; a run is joined with the overlapping runs of the previous row and slice, in a forest
+//! with path halving (Tarjan 1975; Rosenfeld and Pfaltz 1966 for the scan).
 //!
 //! # Practice
-//! One pass over the voxels, memory for the runs alone: about 10 ms for 10 million voxels.
+//! One pass over the voxels, memory only for the runs: about 10 ms for 10 million voxels.
 
 use crate::VoxelVolume;
 
-/// The largest 6-connected piece of what is not 0, as a mask of 0 and 1. Of equals, the one met
-/// first.
+/// The largest 6-connected piece of nonzero voxels, as a mask of 0 and 1; the first met on a tie.
 pub fn largest_component(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
     let pieces = Components::of(mask.dims, |at| mask.data[at] != 0);
     let mut out = VoxelVolume::filled(mask.dims, mask.world_from_voxel, 0u8);
@@ -63,7 +62,7 @@ impl Components {
         Some(best.0 as u32)
     }
 
-    /// Voxels of the largest piece and of the second; 0 for what is not there.
+    /// Voxels of the largest and the second piece; 0 if missing.
     pub fn two_largest(&self) -> [usize; 2] {
         self.sizes.iter().fold([0, 0], |[first, second], &n| [first.max(n), second.max(n.min(first))])
     }
@@ -73,7 +72,7 @@ impl Components {
         self.sizes.iter().filter(|&&n| n > 0).count()
     }
 
-    /// Calls `visit` with the places of each run of a piece.
+    /// Calls `visit` with the index range of each run of a piece.
     pub fn each_run(&self, piece: u32, mut visit: impl FnMut(std::ops::Range<usize>)) {
         for (at, run) in self.runs.iter().enumerate() {
             if self.root(at as u32) == piece {
@@ -112,8 +111,7 @@ fn push_runs(runs: &mut Vec<Run>, start: usize, length: usize, set: &impl Fn(usi
     }
 }
 
-/// Joins the runs from `new` on with those of an earlier row, `before..until`, which lies `apart`
-/// places back.
+/// Joins the runs from `new` on with those of an earlier row, `before..until`, offset by `apart`.
 fn join(runs: &mut [Run], before: usize, until: usize, new: usize, apart: usize) {
     let (mut a, mut b) = (before, new);
     while a < until && b < runs.len() {
@@ -145,7 +143,7 @@ mod tests {
         VoxelVolume { data, ..VoxelVolume::isotropic(dims, Vec3::ZERO, 1.0, 0) }
     }
 
-    /// Every piece by flooding, as sorted sizes.
+    /// Sizes of all pieces by flood fill, sorted.
     fn flooded(dims: [usize; 3], data: &[u8]) -> Vec<usize> {
         let mut left = data.to_vec();
         let mut sizes = Vec::new();

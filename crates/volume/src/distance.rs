@@ -1,36 +1,38 @@
 //! Signed distance to the surface of a mask or of a density level.
 //!
 //! # Theory
-//! The surface is known where grid edges cross it: between an inside voxel a and an outside voxel b
-//! at the fraction `t = (v_a - level) / (v_a - v_b)` of the edge (1/2 for a mask). The field is the
-//! exact Euclidean distance to the nearest such crossing, `D(p) = min_s |p - s|`, negative inside.
-//! Squared distances separate by axis, and each axis is a lower envelope of parabolas (Felzenszwalb
-//! and Huttenlocher 2012), here with vertices at fractional places along the edge's own axis:
+//! The surface points are the crossings of grid edges: between an inside voxel a and an outside
+//! voxel b at the fraction `t = (v_a - level) / (v_a - v_b)` of the edge (1/2 for a mask). The
+//! field is the exact Euclidean distance to the nearest crossing, `D(p) = min_s |p - s|`, negative
+//! inside. Squared distances separate by axis, and each axis is a lower envelope of parabolas
+//! (Felzenszwalb and Huttenlocher 2012), here with vertices at fractional positions along the
+//! edge's own axis:
 //!
 //! ```text
-//! D² = min( Z·Y·X̂, Z·X·Ŷ, Y·X·Ẑ )     X̂: parabolas at the crossings of x-edges; X: envelope over x of what is there
+//! D² = min( Z·Y·X̂, Z·X·Ŷ, Y·X·Ẑ )
+//! X̂: parabolas at the crossings of x-edges; X: envelope over x of the previous result
 //! ```
 //!
-//! Between the crossings the surface is nearer than they are. So each voxel whose own edges cross
-//! it, at distances aᵢ along the axes, adds the foot point on the plane through these crossings,
+//! Between the crossings the surface is nearer than the crossings. So each voxel whose edges cross
+//! it at distances aᵢ along the axes adds the foot point on the plane through these crossings,
 //! `n / |n|²` with `nᵢ = ± 1/aᵢ`, for the voxels within two of it.
 //!
 //! # Practice
-//! Grids of cubes or boxes in any orientation, axes at right angles. Linear in voxels: about 0.2 µs
-//! each and core; 4 bytes each kept, 16 while building. Slices run in parallel with the same bytes
-//! for any number of threads. What lies beyond the grid's border is unknown: a mask that touches it
-//! has no surface there.
+//! Grids of cubes or boxes in any orientation, with orthogonal axes. Cost is linear in voxels:
+//! about 0.2 µs per voxel and core; 4 bytes per voxel kept, 16 while building. Slices run in
+//! parallel with bit-identical results for any number of threads. Beyond the grid's border nothing
+//! is known: a mask that touches it has no surface there.
 //!
-//! Where voxels change, [`update`](DistanceField::update) recomputes a box: a bite of 2 mm in a
-//! skull of 0.5 mm voxels with a reach of 5 mm takes three thousandths of the whole.
+//! Where voxels change, [`update`](DistanceField::update) recomputes a box: a 2 mm cut in a skull
+//! of 0.5 mm voxels with a reach of 5 mm costs three thousandths of the whole.
 //!
 //! # Sources
 //! P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", Theory of
 //! Computing 8, 2012.
 //!
 //! # When not to use it
-//! For single queries near a surface: looking at the voxels around is cheaper. On sheared grids the
-//! distances are only near.
+//! For single queries near a surface: checking the surrounding voxels is cheaper. On sheared grids
+//! the distances are approximate.
 
 use crate::resample::corners;
 use crate::{Sample, VoxelVolume};
@@ -38,47 +40,46 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 use trepan_geometry::{Mat3, Vec3};
 
-/// Signed distances in mm on a grid: negative inside, sampled at any world point.
+/// Signed distances in mm on a grid, negative inside, interpolated at any world point.
 #[derive(Clone, Debug)]
 pub struct DistanceField {
     values: VoxelVolume<f32>,
     voxel_from_world: DAffine3,
     last: Vec3,
-    /// World gradient from the slopes along i, j, k.
+    /// Transform from the slopes along i, j, k to the world gradient.
     world_from_slope: Mat3,
 }
 
 impl DistanceField {
-    /// The distance to a mask (what is not 0), its surface halfway between voxel centres.
+    /// The distance to a mask (nonzero voxels), with its surface halfway between voxel centres.
     ///
-    /// An empty mask is at [`FAR_MM`] everywhere, a full one at minus that.
+    /// An empty mask gives [`FAR_MM`] everywhere, a full one minus that.
     pub fn of_mask(mask: &VoxelVolume<u8>) -> Self {
         Self::of(mask, |at| if mask.data[at] != 0 { 1.0 } else { -1.0 })
     }
 
-    /// The distance to the surface where values reach `level`; inside is at or over it. Finer than
-    /// the voxels.
+    /// The distance to the isosurface at `level`, with sub-voxel accuracy; inside is at or over it.
     pub fn of_level<T: Sample>(volume: &VoxelVolume<T>, level: f32) -> Self {
         Self::of(volume, |at| volume.data[at].to_f32() - level)
     }
 
-    /// `inside` gives how far a voxel is over the surface's level.
+    /// `inside` returns a voxel's value above the level.
     fn of<T: Sample>(grid: &VoxelVolume<T>, inside: impl Fn(usize) -> f32 + Sync) -> Self {
         let data = signed(grid.dims, grid.spacing_mm(), inside);
         Self::from_values(VoxelVolume { dims: grid.dims, data, world_from_voxel: grid.world_from_voxel })
     }
 
-    /// Brings the field up to date after voxels from `changed[0]` to `changed[1]` (both included)
-    /// changed, as when bone is carved.
+    /// Updates the field after voxels from `changed[0]` to `changed[1]`, inclusive, changed, such
+    /// as by drilling.
     ///
-    /// `inside` gives how far a voxel is over the surface's level now. Afterwards signs are those
-    /// of a full computation, and so are all distances up to `reach_mm`; further ones are at least
-    /// that. The cost is that of the box with twice the reach around it.
+    /// `inside` returns a voxel's present value above the level. Afterwards signs equal those of a
+    /// full computation, and so do all distances up to `reach_mm`; larger ones are at least that.
+    /// The cost is that of the box extended by twice the reach.
     pub fn update(&mut self, inside: impl Fn([usize; 3]) -> f32 + Sync, changed: [[usize; 3]; 2], reach_mm: f32) {
         let (dims, spacing) = (self.values.dims, self.values.spacing_mm());
         let reach = |axis: usize| (f64::from(reach_mm.clamp(0.0, FAR_MM)) / spacing[axis]).ceil().min(1e9) as usize;
-        // An edge's crossing moves with either end, and a foot point counts for the voxels within
-        // two of its own.
+        // An edge's crossing moves with either end, and a foot point affects voxels within two of
+        // its own.
         let around = |more: &dyn Fn(usize) -> usize| -> [std::ops::Range<usize>; 3] {
             std::array::from_fn(|a| {
                 let end = changed[1][a].saturating_add(more(a) + 1).min(dims[a]);
@@ -124,11 +125,11 @@ impl DistanceField {
         self.at(self.voxel_of(world))
     }
 
-    /// The field's slope at a world point, over one voxel each way: about 1 long and pointing
-    /// outwards, away from the mask.
+    /// The gradient at a world point by central differences over one voxel: about unit length,
+    /// pointing outwards.
     ///
-    /// Shorter where the nearest surface changes, and towards the outside of the grid, where the
-    /// field is flat.
+    /// It is shorter where the nearest surface changes, and outside the grid, where the field is
+    /// constant.
     pub fn gradient(&self, world: Vec3) -> Vec3 {
         let p = self.voxel_of(world);
         let slope = |step: Vec3| self.at(p + step) - self.at(p - step);
@@ -147,7 +148,7 @@ impl DistanceField {
     }
 }
 
-/// The distance where there is no surface at all, mm.
+/// The distance if there is no surface, mm.
 pub const FAR_MM: f32 = 1e6;
 
 /// Distances at the voxels, negative where `inside` is 0 or more, mm.
@@ -163,7 +164,7 @@ fn signed(dims: [usize; 3], spacing: DVec3, inside: impl Fn(usize) -> f32 + Sync
     data
 }
 
-/// The foot points: for each voxel with an edge that crosses the surface, from its centre, mm.
+/// Foot points of all voxels with an edge that crosses the surface, from the centre, mm.
 fn feet(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) -> f32 + Sync)) -> Vec<(usize, DVec3)> {
     let steps = [1, dims[0], dims[0] * dims[1]];
     let foot = |at: usize| {
@@ -186,8 +187,7 @@ fn feet(dims: [usize; 3], spacing: DVec3, inside: &(impl Fn(usize) -> f32 + Sync
     (0..dims.iter().product()).into_par_iter().filter_map(foot).collect()
 }
 
-/// Lowers the squared distances of the voxels within two of a foot point's to that to the foot
-/// point.
+/// Lowers the squared distances of the voxels within two of a foot point to the distance to it.
 fn splat(dims: [usize; 3], spacing: DVec3, at: usize, foot: DVec3, squared: &mut [f32]) {
     let place = [at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])];
     let range = |axis: usize| place[axis].saturating_sub(2)..(place[axis] + 3).min(dims[axis]);
@@ -252,7 +252,7 @@ impl Line {
     }
 }
 
-/// Computes every line along `axis` by itself and puts the results in the volume's order.
+/// Processes every line along `axis` and stores the results in the volume's order.
 fn along([nx, ny, nz]: [usize; 3], axis: usize, line: impl Fn(Line, &mut Envelope, &mut [f32]) + Sync) -> Vec<f32> {
     let slice = nx * ny;
     let mut all = vec![0.0; slice * nz];
@@ -297,10 +297,10 @@ fn plane(width: usize, height: usize, out: &mut [f32], mut column: impl FnMut(us
     }
 }
 
-/// The least of parabolas `(x - vertex)² + height`, whose vertices are added in rising order.
+/// Lower envelope of parabolas `(x - vertex)² + height`; vertices are added in rising order.
 #[derive(Default)]
 struct Envelope {
-    /// Vertex, height and where the parabola becomes the least.
+    /// Vertex, height and the start of each parabola's interval.
     parabolas: Vec<(f64, f64, f64)>,
 }
 
@@ -330,7 +330,7 @@ impl Envelope {
         self.parabolas.push((vertex, height, from));
     }
 
-    /// The envelope at whole steps from 0.
+    /// Samples the envelope at multiples of `step`, from 0.
     fn read(&self, step: f64, out: &mut [f32]) {
         if self.parabolas.is_empty() {
             return out.fill(f32::INFINITY);
@@ -353,8 +353,8 @@ mod tests {
     use glam::{DMat3, DVec3};
     use proptest::prelude::*;
 
-    /// The nearest crossing of any grid edge, or foot point within two voxels, by looking at all of
-    /// them.
+    /// Brute-force distance to the nearest crossing of any grid edge, or foot point within two
+    /// voxels.
     fn slow(levels: &VoxelVolume<f32>, from: [usize; 3]) -> f64 {
         let mut best = f64::INFINITY;
         let here = levels.centre_of(from);
@@ -387,7 +387,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn distances_are_those_to_the_nearest_crossing(
+        fn distances_equal_brute_force(
             dims in [1usize..7, 1usize..7, 1usize..7],
             values in prop::collection::vec(-9i8..9, 216),
             spacing in [0.5f64..2.0, 0.5f64..2.0, 0.5f64..2.0],

@@ -1,4 +1,4 @@
-//! What can be wrong with a file, said so that its owner can put it right.
+//! Errors in reading and writing files, with their remedies.
 
 use crate::TooLarge;
 use std::io;
@@ -8,13 +8,13 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadError {
-    /// There is no such file.
+    /// The file does not exist.
     #[error("{}: no such file; check the spelling of the path", file.display())]
     Missing {
         /// The file.
         file: PathBuf,
     },
-    /// The system refuses to read.
+    /// The system cannot read the file.
     #[error("{}: cannot be read ({source}); give a file or folder that may be read", file.display())]
     Io {
         /// The file.
@@ -22,27 +22,27 @@ pub enum ReadError {
         /// The system's reason.
         source: io::Error,
     },
-    /// The content is of no format that is read here.
+    /// The format is not supported.
     #[error("{}: {found}; readable are NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr with .img), NRRD, MetaImage and DICOM", file.display())]
     Format {
         /// The file.
         file: PathBuf,
-        /// What it looks like.
+        /// The detected content.
         found: String,
     },
-    /// A header field is wrong.
+    /// A header field is invalid.
     #[error("{}: {field} is {found}; {remedy}", file.display())]
     Field {
         /// The file.
         file: PathBuf,
-        /// The field, as the format's standard calls it.
+        /// The field's name in the format's standard.
         field: &'static str,
-        /// What it holds.
+        /// Its value.
         found: String,
-        /// What would be right.
+        /// The remedy.
         remedy: &'static str,
     },
-    /// Sizes that no image has.
+    /// Invalid volume sizes.
     #[error("{}: {field} is {found}; a volume with at least 2 voxels along each of three axes is needed, not a single picture", file.display())]
     Dimensions {
         /// The file.
@@ -52,7 +52,7 @@ pub enum ReadError {
         /// The sizes.
         found: String,
     },
-    /// Voxel edges that are zero, negative, not a number, or not of this world.
+    /// Voxel edges that are zero, negative, not a number, or implausible.
     #[error("{}: {field} gives voxel edges of {found} mm; edges between 0.0001 and 1000 mm are right", file.display())]
     Spacing {
         /// The file.
@@ -62,7 +62,7 @@ pub enum ReadError {
         /// The edges.
         found: String,
     },
-    /// The axes lie in a plane, or hold something that is not a number.
+    /// The axes are coplanar or not finite.
     #[error("{}: {field} is {found}, which turns the volume into something flat; correct the orientation where the file was made", file.display())]
     Orientation {
         /// The file.
@@ -72,7 +72,7 @@ pub enum ReadError {
         /// The affine.
         found: String,
     },
-    /// Fewer bytes than the header promises.
+    /// Fewer bytes than the header states.
     #[error("{}: ends after {found} bytes of the {expected} that its header announces ({what}); the copy is incomplete, fetch the file again", file.display())]
     Truncated {
         /// The file.
@@ -81,35 +81,35 @@ pub enum ReadError {
         what: &'static str,
         /// Bytes that the part needs.
         expected: u64,
-        /// Bytes that are there (at most).
+        /// Bytes available (at most).
         found: u64,
     },
-    /// Compressed data that cannot be unpacked.
+    /// Compressed data that cannot be decompressed.
     #[error("{}: the compressed data are damaged ({source}); fetch the file again", file.display())]
     Compression {
         /// The file.
         file: PathBuf,
-        /// The unpacker's reason.
+        /// The decompressor's error.
         source: io::Error,
     },
-    /// More than fits into memory.
+    /// The volume does not fit into memory.
     #[error("{}: {field}: {source}; crop or resample the volume, or use a machine with more memory", file.display())]
     TooLarge {
         /// The file.
         file: PathBuf,
         /// The field that gives the size.
         field: &'static str,
-        /// What it would need.
+        /// The size and the limit.
         source: TooLarge,
     },
-    /// Slices that do not make a volume.
+    /// Slices that do not form a volume.
     #[error("{}: {found}; {remedy}", folder.display())]
     Series {
         /// The folder or file.
         folder: PathBuf,
         /// What is wrong with the slices.
         found: String,
-        /// What would be right.
+        /// The remedy.
         remedy: &'static str,
     },
     /// Several volumes in one file.
@@ -127,7 +127,7 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    /// The file that this is about.
+    /// The file concerned.
     pub fn file(&self) -> &std::path::Path {
         match self {
             Self::Missing { file }
@@ -146,16 +146,16 @@ impl ReadError {
     }
 }
 
-/// Why a file was not written. What was there before is still there.
+/// Why a file was not written; an existing file is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// The name does not say the format.
+    /// The file name's extension is not supported.
     #[error("{}: the name must end in {expected}", file.display())]
     Name {
         /// The file.
         file: PathBuf,
-        /// The endings that are right.
+        /// The supported extensions.
         expected: &'static str,
     },
     /// The volume does not fit the format.
@@ -166,7 +166,7 @@ pub enum WriteError {
         /// The sizes.
         found: String,
     },
-    /// The system refuses to write.
+    /// The system cannot write the file.
     #[error("{}: cannot be written ({source}); check that the folder exists, may be written to and has room", file.display())]
     Io {
         /// The file.

@@ -1,9 +1,9 @@
-//! Does the bone flap still hang on the skull, asked a little in every tick.
+//! Searches, a few voxels per tick, whether the bone flap is still connected to the skull.
 //!
 //! # Theory
-//! From a voxel in the middle of the flap the bone is flooded by faces, breadth first. Bone that
-//! reaches the border of a box around the operation hangs on the skull; a flood that ends inside
-//! has found the whole piece.
+//! A breadth-first flood fill through faces starts at a voxel in the middle of the flap. If it
+//! reaches the border of a box around the operation, the flap is connected to the skull. If it ends
+//! inside, the flap is free and all its voxels are known.
 //!
 //! ```text
 //!  ┌───────────────┐ box
@@ -12,9 +12,9 @@
 //! ```
 //!
 //! # Practice
-//! [`FlapSearch::step`] visits a number of voxels and returns, so that a search of a flap of 40 mm
-//! takes some 30 ms of ticks and none of them notices it. It must begin anew after the bone has
-//! changed. A voxel costs about 50 ns. All memory is taken in `new`.
+//! [`FlapSearch::step`] visits a number of voxels and returns, so that a search of a 40 mm flap is
+//! spread over some 30 ms of tick time. It must be restarted after the bone has changed. A voxel
+//! costs about 50 ns. All memory is allocated in `new`.
 //!
 //! # When not to use it
 //! For every piece of a skull at once: [`Piece::all`](crate::Piece::all).
@@ -22,28 +22,28 @@
 use crate::BoneVolume;
 use glam::{IVec3, Vec3};
 
-/// Most voxels of a piece; a larger one counts as hanging on the skull.
+/// Most voxels of a piece; a larger one counts as connected to the skull.
 const MOST: usize = 1 << 20;
 
-/// How far the search is.
+/// State of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlapState {
-    /// It goes on.
+    /// The search is not finished.
     NotYet,
-    /// The bone there hangs on the skull, or there is none.
+    /// The bone there is connected to the skull, or there is none.
     Hanging,
-    /// It is a piece of its own.
+    /// The bone is a separate piece.
     Free,
 }
 
-/// A flood of one piece of bone.
+/// A flood fill of one piece of bone.
 #[derive(Clone, Debug)]
 pub struct FlapSearch {
     low: IVec3,
     dims: IVec3,
     seeds: Vec<IVec3>,
     seen: Vec<u64>,
-    /// Flooded voxels; those from `next` on have neighbours to look at.
+    /// Visited voxels; the neighbours of those from `next` on are still to be visited.
     piece: Vec<u32>,
     next: usize,
     found: FlapState,
@@ -51,8 +51,8 @@ pub struct FlapSearch {
 }
 
 impl FlapSearch {
-    /// Searches the box of `reach_mm` around `centre` for the piece that holds the first bone on
-    /// the way from `from` to `to`, world mm.
+    /// Prepares a search in the box of `reach_mm` around `centre`. The seed is the first bone on
+    /// the line from `from` to `to`, world mm.
     pub fn new(bone: &BoneVolume, centre: Vec3, reach_mm: f32, from: Vec3, to: Vec3) -> Self {
         let last = IVec3::from(bone.dims().map(|n| n as i32 - 1));
         let low = bone.voxel_of(centre - reach_mm).clamp(IVec3::ZERO, last);
@@ -68,12 +68,12 @@ impl FlapSearch {
         Self { low, dims, seeds, seen, piece, next: 0, found: FlapState::NotYet, begun: false }
     }
 
-    /// Begins anew, at a cost in the next steps.
+    /// Restarts the search; the next steps first clear the old one.
     pub fn restart(&mut self) {
         (self.begun, self.found) = (false, FlapState::NotYet);
     }
 
-    /// Goes on for at most `visits` voxels.
+    /// Continues the search for at most `visits` voxels.
     pub fn step(&mut self, bone: &BoneVolume, visits: usize) -> FlapState {
         for _ in 0..visits {
             if self.found != FlapState::NotYet {
@@ -84,7 +84,7 @@ impl FlapSearch {
         self.found
     }
 
-    /// The voxels of the piece, once it is found free.
+    /// Number of voxels of the piece, once it is found free.
     pub fn voxels(&self) -> usize {
         if self.found == FlapState::Free { self.piece.len() } else { 0 }
     }
@@ -99,7 +99,7 @@ impl FlapSearch {
         self.low + IVec3::new(index % nx, index / nx % ny, index / (nx * ny))
     }
 
-    /// Forgets a voxel of the last search; when all are forgotten, begins at the seed.
+    /// Clears a voxel of the last search; when all are cleared, starts at the seed.
     fn begin(&mut self, bone: &BoneVolume) {
         match self.piece.pop() {
             Some(index) => self.seen[index as usize / 64] &= !(1 << (index % 64)),
@@ -113,7 +113,7 @@ impl FlapSearch {
         }
     }
 
-    /// Looks at the neighbours of the next voxel.
+    /// Visits the neighbours of the next voxel.
     fn flood(&mut self, bone: &BoneVolume) {
         let Some(&index) = self.piece.get(self.next) else {
             self.found = FlapState::Free;

@@ -11,9 +11,9 @@ const MOST_LINES: usize = 10_000;
 pub(crate) struct Keys(Vec<(String, String)>);
 
 impl Keys {
-    /// Reads lines until `last` says that a line ended the header, or the file ends.
+    /// Reads lines until `last` is true for one, or the file ends.
     ///
-    /// Lines that start with # or hold ":=" (NRRD's free remarks) are passed over.
+    /// Skips lines that start with # or contain ":=" (NRRD comments).
     pub fn read(source: &mut Source, parting: &str, last: impl Fn(&str) -> bool) -> Result<Self, ReadError> {
         let mut keys = Vec::new();
         for _ in 0..MOST_LINES {
@@ -36,14 +36,14 @@ impl Keys {
         found.map(|(_, value)| value.as_str())
     }
 
-    /// The value of a key that must be there.
+    /// The value of a required key.
     pub fn needed(&self, source: &Source, field: &'static str) -> Result<&str, ReadError> {
         self.text(&[field])
             .ok_or_else(|| source.field(field, "missing", "the header must give it; fetch the file again"))
     }
 }
 
-/// Numbers parted by anything that is no part of a number.
+/// Parses numbers separated by any other characters.
 pub(crate) fn numbers<T: FromStr>(source: &Source, field: &'static str, text: &str) -> Result<Vec<T>, ReadError> {
     let words = text.split(|c: char| c.is_whitespace() || "(),".contains(c)).filter(|w| !w.is_empty());
     let read =

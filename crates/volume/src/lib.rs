@@ -1,17 +1,18 @@
-//! Voxel volumes with patient orientation: files in, resampling, masks, distance fields, carving.
+//! Voxel volumes with patient orientation: file formats, resampling, masks, distance fields,
+//! drilling.
 //!
 //! # Theory
-//! An image is a box of samples and the affine that puts voxel indices into the patient's RAS+ mm
-//! ([`VoxelVolume`]). Everything that a file format says about axes, units and stored numbers is
-//! settled when it is read; after that there is one form.
+//! An image is a grid of samples and the affine from voxel indices to the patient's RAS+ mm
+//! ([`VoxelVolume`]). Readers convert each format's axes, units and stored numbers to this one
+//! form.
 //!
 //! # Practice
-//! [`read`] finds the format by content. A CT becomes [`hounsfield`] values and, with
-//! [`bone_isovalue`] and [`skull_only`], the [`BoneVolume`] that a burr carves; an MRI becomes a
+//! [`read`] detects the format by content. A CT becomes [`hounsfield`] values and, with
+//! [`bone_isovalue`] and [`skull_only`], the [`BoneVolume`] that a burr drills. An MRI becomes a
 //! [`brain_mask`]; a mask becomes a [`DistanceField`].
 //!
 //! # When not to use it
-//! For pictures in time or colour: only real-valued volumes are read.
+//! For time series or colour images: only real-valued volumes are read.
 
 mod atomic;
 mod bone;

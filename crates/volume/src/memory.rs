@@ -1,36 +1,36 @@
-//! Refuses sizes that a file or a flag only claims, before anything is allocated for them.
+//! Rejects sizes from a file or a flag that do not fit into memory, before allocating.
 //!
 //! # Practice
-//! Free memory is the least of what the system, the control group (containers, cluster jobs) and
-//! the process's own limit (`ulimit -v`) leave. It is known on Linux; elsewhere only
-//! [`MOST_VOXELS`] counts.
+//! Free memory is the least of the limits of the system, the control group (containers, cluster
+//! jobs) and the process (`ulimit -v`). It is known on Linux; elsewhere only [`MOST_VOXELS`]
+//! applies.
 
 use std::fs;
 
 /// Most voxels of one image or grid: 1024 x 1024 x 572, over twice the finest CT of a whole head.
 pub const MOST_VOXELS: u64 = 600_000_000;
 
-/// Something that does not fit into memory.
+/// A size that does not fit into memory.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{count} {what} need {:.1} GB of memory, and {limit}", gb(*bytes))]
 pub struct TooLarge {
-    /// How many.
+    /// Number of items.
     pub count: u64,
-    /// Of what.
+    /// Name of the items.
     pub what: &'static str,
-    /// Bytes that they need.
+    /// Bytes needed.
     pub bytes: u64,
-    /// What stands against it.
+    /// The limit exceeded.
     pub limit: Limit,
 }
 
-/// Why something is too large.
+/// Why a size is too large.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Limit {
-    /// More than is ever read.
+    /// Over the fixed limit.
     #[error("the limit is {0}")]
     Count(u64),
-    /// More than this machine has left.
+    /// Over the free memory, bytes.
     #[error("only {:.1} GB are free here", gb(*.0))]
     Free(u64),
 }
@@ -39,7 +39,7 @@ fn gb(bytes: u64) -> f64 {
     bytes as f64 * 1e-9
 }
 
-/// Refuses more voxels than [`MOST_VOXELS`], or than fit into free memory at so many bytes each.
+/// Rejects more voxels than [`MOST_VOXELS`], or than fit into free memory at `bytes_each`.
 pub fn room_for_voxels(count: u64, bytes_each: u64) -> Result<(), TooLarge> {
     let bytes = count.saturating_mul(bytes_each);
     match count <= MOST_VOXELS {
@@ -48,17 +48,17 @@ pub fn room_for_voxels(count: u64, bytes_each: u64) -> Result<(), TooLarge> {
     }
 }
 
-/// Refuses what does not fit into free memory at so many bytes each.
+/// Rejects what does not fit into free memory at `bytes_each`.
 pub fn room_for(what: &'static str, count: u64, bytes_each: u64) -> Result<(), TooLarge> {
     let bytes = count.saturating_mul(bytes_each);
-    // What is small fits, and is not worth asking the system.
+    // Small sizes fit without querying the system.
     match (bytes >> 20 > 0).then(free_bytes).flatten() {
         Some(free) if bytes > free => Err(TooLarge { count, what, bytes, limit: Limit::Free(free) }),
         _ => Ok(()),
     }
 }
 
-/// Bytes that this process may still take; `None` where the system does not say.
+/// Free bytes for this process; `None` where the system does not report them.
 pub(crate) fn free_bytes() -> Option<u64> {
     let system = kilobytes("/proc/meminfo", "MemAvailable:");
     let own = address_space().zip(kilobytes("/proc/self/status", "VmSize:"));
@@ -66,21 +66,21 @@ pub(crate) fn free_bytes() -> Option<u64> {
     [system, own, group()].into_iter().flatten().min()
 }
 
-/// The number behind a key, in bytes, of a file that gives kilobytes.
+/// The value of a key in bytes, from a file in kilobytes.
 fn kilobytes(file: &str, key: &str) -> Option<u64> {
     let text = fs::read_to_string(file).ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     Some(1024 * line.split_whitespace().next()?.parse::<u64>().ok()?)
 }
 
-/// The process's limit of address space; `None` without one.
+/// The process's address-space limit; `None` without one.
 fn address_space() -> Option<u64> {
     let text = fs::read_to_string("/proc/self/limits").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("Max address space"))?;
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// What the control group leaves; files that it only keeps in memory for speed count as free.
+/// Free bytes in the control group; its file cache counts as free.
 fn group() -> Option<u64> {
     let number = |file: &str| fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
     let limit = number("/sys/fs/cgroup/memory.max")?;
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_no_memory_holds_is_refused_with_its_size() {
+    fn sizes_beyond_memory_are_rejected() {
         assert_eq!(room_for_voxels(1000, 8), Ok(()));
         let fault = room_for_voxels(1 << 40, 8).unwrap_err().to_string();
         assert!(fault.contains("1099511627776 voxels need 8796.1 GB"), "{fault}");

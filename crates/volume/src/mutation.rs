@@ -1,9 +1,9 @@
-//! Files that were damaged by chance, for the tests of every reader.
+//! Randomly damaged files for the tests of every reader.
 
 use crate::{Import, ReadError};
 
-/// Feeds mutated copies of valid files to a reader: it must return, and a volume must hold as many
-/// samples as its sizes say.
+/// Feeds mutated copies of valid files to a reader: it must not panic, and a volume must hold as
+/// many samples as its sizes state.
 ///
 /// `TREPAN_MUTATIONS` gives the number of executions; a few thousand by default.
 pub(crate) fn survives_mutations(seeds: &[Vec<u8>], read: impl Fn(Vec<u8>) -> Result<Import, ReadError>) {
@@ -52,7 +52,7 @@ fn mutated(seed: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// Xorshift (Marsaglia 2003): the same numbers every time.
+/// Xorshift (Marsaglia 2003) with a fixed seed.
 struct Random(u64);
 
 impl Random {

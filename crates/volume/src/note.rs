@@ -1,23 +1,23 @@
-//! What a reader found worth saying about a file that it could read.
+//! Notes of a reader about a file that it could read.
 
 use crate::VoxelVolume;
 
-/// A volume with what its reader has to say about it.
+/// A volume with its reader's notes.
 #[derive(Clone, Debug)]
 pub struct Import {
     /// The volume.
     pub volume: VoxelVolume<f32>,
-    /// What the user should know; empty for a plain file.
+    /// Notes for the user; empty for an ordinary file.
     pub notes: Vec<Note>,
     /// CT, MR or another modality's two letters, where the format says it (DICOM).
     pub modality: Option<String>,
 }
 
-/// Something about a file that is no error and yet matters.
+/// A property of a file that is not an error but matters to the user.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Note {
-    /// Voxels that hold no number.
+    /// Voxels that are not finite.
     #[error("{count} voxels hold no number (NaN or infinite)")]
     NotANumber {
         /// How many.
@@ -28,7 +28,7 @@ pub enum Note {
         "the file does not say how the patient lies ({field}); the format's default is taken, so check left and right"
     )]
     NoOrientation {
-        /// The field that would say it.
+        /// The field that would define it.
         field: &'static str,
     },
     /// Two orientations that differ.
@@ -41,23 +41,23 @@ pub enum Note {
         /// Largest distance between where the two put a corner.
         by_mm: f64,
     },
-    /// One of several.
+    /// One of several was read.
     #[error("{count} {what} are in there; number {chosen} (from 0) is read")]
     OneOf {
         /// What there are several of.
         what: &'static str,
         /// How many.
         count: usize,
-        /// Which was read.
+        /// The index read.
         chosen: usize,
     },
-    /// The stack leans.
+    /// The stack is tilted.
     #[error("the gantry was tilted: the stack leans by {degrees:.1} degrees, which is kept as it is")]
     Tilt {
         /// Angle between the stack and the slices' normal.
         degrees: f64,
     },
-    /// Files that were passed over.
+    /// Files that were skipped.
     #[error("{count} files were passed over: {why}")]
     Skipped {
         /// How many.

@@ -1,12 +1,12 @@
-//! Whether two images can be of the same place.
+//! Checks whether two images overlap.
 
 use crate::VoxelVolume;
 use glam::DVec3;
 
-/// Least share of the smaller image's box that the other must cover.
+/// Smallest fraction of the smaller image's box that the other must cover.
 pub const LEAST_SHARE: f64 = 0.25;
 
-/// Two images that lie apart.
+/// Two images that do not overlap.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the CT and the MRI do not overlap: only {:.0} % of the smaller one lies in the other. The CT spans {}, the MRI {} (RAS mm). \
@@ -14,7 +14,7 @@ pub const LEAST_SHARE: f64 = 0.25;
     100.0 * share, span(ct), span(mri)
 )]
 pub struct OverlapError {
-    /// Share of the smaller box that lies in the other, 0 to 1.
+    /// Fraction of the smaller box that lies in the other, 0 to 1.
     pub share: f64,
     /// Lowest and highest corner of the CT, RAS mm.
     pub ct: (DVec3, DVec3),
@@ -22,8 +22,8 @@ pub struct OverlapError {
     pub mri: (DVec3, DVec3),
 }
 
-/// Refuses a CT and an MRI whose world boxes share less than [`LEAST_SHARE`] of the smaller;
-/// returns the share.
+/// Rejects a CT and an MRI whose world boxes share less than [`LEAST_SHARE`] of the smaller;
+/// returns the fraction.
 pub fn overlap<A: Copy, B: Copy>(ct: &VoxelVolume<A>, mri: &VoxelVolume<B>) -> Result<f64, OverlapError> {
     let (ct, mri) = (ct.world_corners(), mri.world_corners());
     let size = |(low, high): (DVec3, DVec3)| (high - low).max(DVec3::ZERO).element_product();
@@ -42,7 +42,7 @@ mod tests {
     use trepan_geometry::Vec3;
 
     #[test]
-    fn images_apart_are_refused_with_both_boxes() {
+    fn non_overlapping_images_are_rejected_with_both_boxes() {
         let ct = VoxelVolume::isotropic([10, 10, 10], Vec3::ZERO, 2.0, 0i16);
         let near = VoxelVolume::isotropic([10, 10, 10], Vec3::splat(3.0), 1.0, 0f32);
         let far = VoxelVolume::isotropic([10, 10, 10], Vec3::splat(300.0), 1.0, 0f32);

@@ -1,11 +1,10 @@
-//! CT and MRI over each other, to look at: the bone's contour drawn on the MRI's grey, in three
-//! planes.
+//! Overlay of CT and MRI for inspection: the bone's contour on the MRI in three planes.
 //!
 //! # Practice
-//! Sagittal, coronal and axial through the middle of the bone, in pixels of 1 mm over the CT's box;
-//! rows from head to foot (axial: from front to back). Radiological convention: the patient's right
-//! is on the left; the sagittal picture has the face on the left. The bone's contour is orange.
-//! Plain RGB bytes: writing a picture file is the caller's.
+//! Sagittal, coronal and axial slices through the middle of the bone, in pixels of 1 mm over the
+//! CT's box; rows from head to foot (axial: from front to back). Radiological convention: the
+//! patient's right is on the left; the sagittal picture has the face on the left. The bone's
+//! contour is orange. Returns raw RGB bytes; the caller writes the file.
 
 use crate::{VoxelVolume, resample::corners};
 use glam::{DVec3, Vec3};
@@ -27,17 +26,17 @@ pub struct Picture {
     pub rgb: Vec<u8>,
 }
 
-/// The contour of what reaches `isovalue` HU in the CT over the MRI as it lies, sagittal, coronal
-/// and axial.
+/// Draws the contour of voxels over `isovalue` HU in the CT on the MRI, sagittal, coronal and
+/// axial.
 ///
-/// For a look before and after registration call it with the MRI's `world_from_voxel` as read and
-/// as moved.
+/// To compare before and after registration, call it with the MRI's original and transformed
+/// `world_from_voxel`.
 pub fn overlap_pictures(ct: &VoxelVolume<i16>, mri: &VoxelVolume<f32>, isovalue: i16) -> [Picture; 3] {
     let (low, high) = ct.world_corners();
     let middle = bone_middle(ct, isovalue).unwrap_or(0.5 * (low + high));
     let (ct, mri) = (Sampler::new(ct), Sampler::new(mri));
     let grey = window(mri.volume);
-    // Across and down of each picture, as axes.
+    // Horizontal and vertical axis of each picture.
     [[1, 2], [0, 2], [0, 1]].map(|[across, down]| {
         let size = (high - low).ceil().clamp(DVec3::ONE, DVec3::splat(LONGEST));
         let (width, height) = (size[across] as usize, size[down] as usize);
@@ -77,7 +76,7 @@ fn bone_middle(ct: &VoxelVolume<i16>, isovalue: i16) -> Option<DVec3> {
     (low.x <= high.x).then(|| ct.world_from_voxel.transform_point3(0.5 * (low + high)))
 }
 
-/// Values that become black and white.
+/// The values shown as black and white.
 struct Window {
     black: f32,
     white: f32,

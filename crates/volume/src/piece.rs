@@ -1,26 +1,26 @@
-//! Pieces of bone: does the flap still hang on the skull?
+//! Finds connected pieces of bone: is the flap still connected to the skull?
 //!
 //! # Practice
-//! Voxels hang together by their faces. One pass over the grid, about 0.1 s for 50 million voxels:
-//! for the end of a session, not for a tick.
+//! Voxels are connected through faces. One pass over the grid takes about 0.1 s for 50 million
+//! voxels: for the end of a session, not for a tick.
 
 use crate::BoneVolume;
 use crate::component::Components;
 use glam::IVec3;
 
-/// Bone that hangs together.
+/// A connected piece of bone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Piece {
-    /// Its voxels.
+    /// Number of voxels.
     pub voxels: usize,
-    /// Least voxel of its box.
+    /// Lowest voxel of its box.
     pub low: [usize; 3],
-    /// Greatest voxel of its box, still in it.
+    /// Highest voxel of its box, inclusive.
     pub high: [usize; 3],
 }
 
 impl Piece {
-    /// All pieces of a bone, the largest first.
+    /// Finds all pieces of bone, the largest first.
     pub fn all(bone: &BoneVolume) -> Vec<Self> {
         let [nx, ny, nz] = bone.dims();
         let place = |at: usize| [at % nx, at / nx % ny, at / (nx * ny)];
@@ -41,7 +41,7 @@ impl Piece {
         pieces
     }
 
-    /// Pieces that were cut off: all but the largest that were not there before.
+    /// Pieces that were cut off: all new ones except the largest.
     pub fn cut_off(before: &[Self], now: &[Self]) -> Vec<Self> {
         now.iter().skip(1).filter(|piece| !before.contains(piece)).copied().collect()
     }
@@ -53,7 +53,7 @@ mod tests {
     use crate::{AIR_HU, VoxelVolume};
     use trepan_geometry::Vec3;
 
-    /// A plate with a speck beside it.
+    /// A plate with an isolated voxel beside it.
     fn plate() -> BoneVolume {
         let mut ct = VoxelVolume::isotropic([20, 16, 9], Vec3::ZERO, 1.0, AIR_HU);
         for at in 0..ct.data.len() {
@@ -71,7 +71,7 @@ mod tests {
         let before = Piece::all(&bone);
         assert_eq!(before.iter().map(|piece| piece.voxels).collect::<Vec<_>>(), [960, 1]);
         let drill = |x: i32, y: i32| (3..6).for_each(|z| bone.set_hu(IVec3::new(x, y, z), AIR_HU));
-        // A ring around 6 x 5 columns, but for one of its corners' neighbours.
+        // A ring around 6 x 5 columns, with one bridge left.
         let ring = (4..12).flat_map(|x| (3..10).map(move |y| (x, y)));
         let ring = ring.filter(|&(x, y)| x == 4 || x == 11 || y == 3 || y == 9).filter(|&at| at != (7, 9));
         ring.for_each(|(x, y)| drill(x, y));

@@ -1,15 +1,15 @@
-//! Any image file, its format found by content.
+//! Reads any image file; the format is detected by content.
 
 use crate::source::Source;
 use crate::{Import, ReadError, VoxelVolume, dicom, metaimage, nifti, nrrd};
 use std::path::Path;
 
-/// Reads a volume in any format that is known here, whatever its name; a folder is a DICOM series.
+/// Reads a volume in any supported format, whatever its name; a folder is a DICOM series.
 pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
     import(path).map(|import| import.volume)
 }
 
-/// Reads a volume in any format, with what there is to say about the file.
+/// Reads a volume in any format, with notes about the file.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
     if path.is_dir() {
         return dicom::import(path);
@@ -24,7 +24,7 @@ pub fn import(path: &Path) -> Result<Import, ReadError> {
     }
 }
 
-/// The formats that are read.
+/// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Format {
     Nifti,
@@ -34,7 +34,7 @@ enum Format {
 }
 
 impl Format {
-    /// Tells the format from a file's first bytes, or says what else it looks like.
+    /// Detects the format from a file's first bytes, or names an unsupported one.
     fn of(start: &[u8]) -> Result<Self, &'static str> {
         let word = |at: usize| start.get(at..at + 4).and_then(|b| <[u8; 4]>::try_from(b).ok()).unwrap_or_default();
         let nifti = [348, 540].iter().any(|&n| word(0) == i32::to_le_bytes(n) || word(0) == i32::to_be_bytes(n));

@@ -1,11 +1,11 @@
-//! Files that can be read to an end: no pipe, device, socket or folder.
+//! Opens regular files only: no pipe, device, socket or folder.
 
 use std::fs::{self, File, FileType};
 use std::io;
 use std::path::Path;
 
-/// Opens a regular file. Anything else is refused before it is opened, since opening a named pipe
-/// waits for who writes into it.
+/// Opens a regular file. Other kinds are rejected before opening, since opening a named pipe waits
+/// for its writer.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     match kind.is_file() {

@@ -1,19 +1,19 @@
-//! The number types that voxels come in, and how their bytes become f32.
+//! Voxel number types and their decoding to f32.
 
 use bytemuck::Pod;
 
-/// A voxel's type: what volumes can be resampled and written in.
+/// A voxel type that volumes can be resampled to and written in.
 pub trait Sample: Pod + PartialEq + PartialOrd + Send + Sync {
     /// The type's name in files.
     const NUMBER: Number;
 
-    /// The nearest value of this type: integers round and saturate, NaN becomes 0.
+    /// Converts to the nearest value: integers round and saturate, NaN becomes 0.
     fn from_f32(value: f32) -> Self;
 
-    /// The value as f32; integers over 2²⁴ round.
+    /// Converts to f32; integers over 2²⁴ are rounded.
     fn to_f32(self) -> f32;
 
-    /// Adds the value's little-endian bytes to `out`.
+    /// Appends the value's little-endian bytes to `out`.
     fn write_le(self, out: &mut Vec<u8>);
 }
 
@@ -46,13 +46,13 @@ sample! {
     f64, F64, f64::from;
 }
 
-/// The nearest whole number, ties away from 0, as long as it is under 2²²; without a call to the
-/// system's `round`.
+/// The nearest integer, ties away from 0, for magnitudes under 2²²; faster than the system's
+/// `round`.
 fn rounded(value: f32) -> f32 {
     value + (0.5 - f32::EPSILON / 4.0).copysign(value)
 }
 
-/// A number type as files name it.
+/// A number type in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Number {
     /// Unsigned, 8 bits.
@@ -77,7 +77,7 @@ pub enum Number {
     F64,
 }
 
-/// Which end of a number comes first.
+/// Byte order of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ByteOrder {
     /// Lowest byte first.
@@ -108,8 +108,8 @@ impl Number {
         }
     }
 
-    /// Decodes whole numbers from `bytes` (a multiple of [`bytes`](Self::bytes) long), scaled in
-    /// f64, to the end of `out`.
+    /// Decodes numbers from `bytes` (a multiple of [`bytes`](Self::bytes) long), scaled in f64, and
+    /// appends them to `out`.
     pub(crate) fn decode(self, bytes: &[u8], order: ByteOrder, scale: Scale, out: &mut Vec<f32>) {
         macro_rules! each {
             ($type:ty) => {{

@@ -1,10 +1,10 @@
-//! Bone out of a CT: HU, the threshold, the skull without the table.
+//! Extracts the skull from a CT: HU values, bone threshold, largest connected piece.
 //!
 //! # Theory
-//! The threshold is Otsu's (1979) on the histogram from 100 to 2000 HU: the t that makes
-//! `w₀(t) · w₁(t) · (μ₀(t) - μ₁(t))²` largest, kept within the 300 to 500 HU that cortical bone is
-//! segmented at. The skull is the largest piece at or over it: table, head rest and teeth that
-//! touch nothing fall away.
+//! The threshold is Otsu's (1979) on the histogram from 100 to 2000 HU: the t that maximises
+//! `w₀(t) · w₁(t) · (μ₀(t) - μ₁(t))²`, clamped to the 300 to 500 HU used to segment cortical bone.
+//! The skull is the largest connected piece at or over it; table, head rest and loose teeth are
+//! removed.
 //!
 //! # Sources
 //! N. Otsu, "A threshold selection method from gray-level histograms", IEEE SMC 9, 1979.
@@ -13,21 +13,21 @@ use crate::component::Components;
 use crate::{ReadError, Sample, VoxelVolume};
 use std::path::Path;
 
-/// Least of the isovalues that [`bone_isovalue`] gives, HU.
+/// Lowest isovalue that [`bone_isovalue`] returns, HU.
 pub const LEAST_ISOVALUE: i16 = 300;
 
-/// Greatest of the isovalues that [`bone_isovalue`] gives, HU.
+/// Highest isovalue that [`bone_isovalue`] returns, HU.
 pub const GREATEST_ISOVALUE: i16 = 500;
 
 /// Why a volume is not a CT in HU.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum HounsfieldError {
-    /// Voxels without a number.
+    /// Voxels that are NaN or infinite.
     #[error(
         "{count} voxels of the CT hold no number (NaN or infinite); write them as air (-1000 HU) or give another file"
     )]
     NotANumber {
-        /// How many.
+        /// Their count.
         count: usize,
     },
     /// Values that are not HU.
@@ -42,7 +42,7 @@ pub enum HounsfieldError {
     },
 }
 
-/// A CT's values as whole HU. Refuses NaN (with the count) and values that cannot be HU.
+/// Converts a CT's values to integer HU. Rejects NaN (with the count) and values that cannot be HU.
 pub fn hounsfield(ct: &VoxelVolume<f32>) -> Result<VoxelVolume<i16>, HounsfieldError> {
     let count = ct.data.iter().filter(|v| !v.is_finite()).count();
     if count > 0 {
@@ -58,10 +58,10 @@ pub fn hounsfield(ct: &VoxelVolume<f32>) -> Result<VoxelVolume<i16>, HounsfieldE
 /// Values at or under this are air in a CT, HU.
 const AIR_AT_MOST_HU: f32 = -900.0;
 
-/// Least share of a CT's voxels that are air.
+/// Smallest fraction of a CT's voxels that is air.
 const LEAST_AIR: f64 = 0.05;
 
-/// Whether an image's values are those of a CT: HU with air around the head, which no MRI has.
+/// Whether an image's values are those of a CT: HU with air around the head, unlike any MRI.
 pub fn is_ct(image: &VoxelVolume<f32>) -> bool {
     let air = image.data.iter().filter(|&&v| v <= AIR_AT_MOST_HU).count();
     hounsfield(image).is_ok() && air as f64 >= LEAST_AIR * image.data.len() as f64
@@ -94,8 +94,8 @@ pub fn bone_isovalue(ct: &VoxelVolume<i16>) -> i16 {
     (best.1 as i16).clamp(LEAST_ISOVALUE, GREATEST_ISOVALUE)
 }
 
-/// Leaves only the skull: what is at or over the isovalue but not in the largest piece becomes one
-/// HU under it.
+/// Keeps only the skull: voxels at or over the isovalue outside the largest piece are set to one HU
+/// under it.
 pub fn skull_only(ct: &mut VoxelVolume<i16>, isovalue: i16) {
     let pieces = Components::of(ct.dims, |at| ct.data[at] >= isovalue);
     let Some(skull) = pieces.largest() else { return };
@@ -108,8 +108,8 @@ pub fn skull_only(ct: &mut VoxelVolume<i16>, isovalue: i16) {
     });
 }
 
-/// A label volume's values as whole numbers. Refuses what is no label: NaN, negative, fractional,
-/// over 65535.
+/// Converts a label volume's values to integers. Rejects NaN, negative and fractional values and
+/// those over 65535.
 pub fn labels(file: &Path, volume: &VoxelVolume<f32>) -> Result<VoxelVolume<u16>, ReadError> {
     let wrong = volume.data.iter().find(|&&v| v.round() != v || !(0.0..=65535.0).contains(&v));
     match wrong {

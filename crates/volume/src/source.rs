@@ -1,9 +1,9 @@
-//! Bytes of a file, plain or compressed, that are never trusted to be as many as a header says.
+//! Reads a plain or compressed file without trusting the sizes in its header.
 //!
 //! # Practice
-//! Compression is found by content. A file can honestly give at most its own length, or,
-//! compressed, that length times deflate's limit of 1032; whatever asks for more is refused before
-//! memory is taken, and memory grows with what has really arrived.
+//! Compression is detected by content. A file can hold at most its own length or, compressed, that
+//! length times deflate's limit of 1032. Larger requests are rejected before allocation, and memory
+//! grows only with the data received.
 
 use crate::sample::{ByteOrder, Number, Scale};
 use crate::{ReadError, VoxelVolume, open_regular, room_for_voxels};
@@ -12,43 +12,42 @@ use glam::{DAffine3, DVec3};
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
-/// What a gzip file starts with.
+/// First bytes of a gzip file.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// No deflate stream unpacks to more than this many times its length.
+/// Largest compression ratio of a deflate stream.
 const DEFLATE_LIMIT: u64 = 1032;
 
 /// Longest line of a header, bytes.
 const LONGEST_LINE: usize = 1 << 16;
 
-/// Memory that an image takes while it is read, bytes a voxel: its values, and what is made of
-/// them.
+/// Memory needed while reading, bytes per voxel: its values and data derived from them.
 pub(crate) const BYTES_PER_VOXEL: u64 = 8;
 
-/// Bytes that are decoded at a time; a multiple of every number's size.
+/// Bytes decoded at a time; a multiple of every number's size.
 const CHUNK: usize = 1 << 16;
 
-/// A file being read from front to back.
+/// A file read from front to back.
 pub(crate) struct Source {
     file: PathBuf,
     stream: Box<dyn Read>,
-    /// Bytes that were looked at and not taken.
+    /// Bytes peeked but not consumed.
     ahead: Vec<u8>,
     compressed: bool,
-    /// Most bytes that can still come.
+    /// Most bytes that can still be read.
     left: u64,
     taken: u64,
 }
 
 impl Source {
-    /// Opens a file and looks whether it is gzip.
+    /// Opens a file and detects gzip.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let mut plain = Self::open_plain(path)?;
         let gzip = plain.peek(2)? == GZIP;
         Ok(if gzip { plain.gunzipped() } else { plain })
     }
 
-    /// Opens a file whose bytes are to be taken as they are.
+    /// Opens a file without decompression.
     pub fn open_plain(path: &Path) -> Result<Self, ReadError> {
         let io = |source| ReadError::Io { file: path.into(), source };
         let file = open_regular(path).map_err(|source| match source.kind() {
@@ -59,7 +58,7 @@ impl Source {
         Ok(Self::of_stream(path, Box::new(io::BufReader::with_capacity(CHUNK, file)), length))
     }
 
-    /// The same from bytes in memory; `name` stands in messages.
+    /// A source from bytes in memory; `name` appears in messages.
     #[cfg(test)]
     pub fn of_bytes(name: &Path, bytes: Vec<u8>) -> Self {
         let (length, gzip) = (bytes.len() as u64, bytes.starts_with(&GZIP));
@@ -71,18 +70,18 @@ impl Source {
         Self { file: file.into(), stream, ahead: Vec::new(), compressed: false, left: length, taken: 0 }
     }
 
-    /// All that is left, as a source of its own.
+    /// Splits off the remaining bytes as a separate source.
     pub fn take_rest(&mut self) -> Self {
         let rest = Self::of_stream(&self.file, Box::new(io::empty()), 0);
         std::mem::replace(self, rest)
     }
 
-    /// What follows, unpacked as gzip.
+    /// The remaining bytes, decompressed as gzip.
     pub fn gunzipped(self) -> Self {
         self.unpacked(|stream| Box::new(MultiGzDecoder::new(stream)))
     }
 
-    /// What follows, unpacked as gzip or zlib, whichever it is.
+    /// The remaining bytes, decompressed as gzip or zlib by content.
     pub fn unpacked_by_content(mut self) -> Result<Self, ReadError> {
         let gzip = self.peek(2)? == GZIP;
         Ok(if gzip { self.gunzipped() } else { self.unpacked(|stream| Box::new(ZlibDecoder::new(stream))) })
@@ -99,17 +98,17 @@ impl Source {
         &self.file
     }
 
-    /// Bytes taken so far.
+    /// Bytes consumed so far.
     pub fn taken(&self) -> u64 {
         self.taken
     }
 
-    /// Most bytes that can still come.
+    /// Most bytes that can still be read.
     pub fn left(&self) -> u64 {
         self.left
     }
 
-    /// Looks at up to `count` of the next bytes without taking them.
+    /// Peeks at up to `count` bytes without consuming them.
     pub fn peek(&mut self, count: usize) -> Result<&[u8], ReadError> {
         let mut more = vec![0; count.saturating_sub(self.ahead.len())];
         let got = self.pull(&mut more)?;
@@ -117,7 +116,7 @@ impl Source {
         Ok(&self.ahead[..count.min(self.ahead.len())])
     }
 
-    /// Takes what is there, up to the whole of `buffer`; returns how much came.
+    /// Reads up to the whole of `buffer`; returns the number of bytes read.
     pub fn some(&mut self, buffer: &mut [u8]) -> Result<usize, ReadError> {
         let known = self.ahead.len().min(buffer.len());
         buffer[..known].copy_from_slice(&self.ahead[..known]);
@@ -139,7 +138,7 @@ impl Source {
         })
     }
 
-    /// Takes a line of text without its end; `None` at the end of the file.
+    /// Reads a line of text without its end; `None` at the end of the file.
     pub fn line(&mut self) -> Result<Option<String>, ReadError> {
         let mut line = Vec::new();
         let mut byte = [0];
@@ -155,7 +154,7 @@ impl Source {
         Ok((!line.is_empty()).then(|| text_of(line)))
     }
 
-    /// Decodes numbers in writing, parted by white space or commas.
+    /// Parses numbers in text, separated by white space or commas.
     pub fn written_samples(&mut self, count: u64) -> Result<Vec<f32>, ReadError> {
         let mut values = Vec::new();
         while (values.len() as u64) < count {
@@ -172,7 +171,7 @@ impl Source {
         }
     }
 
-    /// Passes over all but the last `count` bytes.
+    /// Skips all but the last `count` bytes.
     pub fn skip_to_last(&mut self, count: u64) -> Result<(), ReadError> {
         if !self.compressed {
             return match self.left.checked_sub(count) {
@@ -188,7 +187,7 @@ impl Source {
             if got < buffer.len() {
                 break;
             }
-            // Only the last bytes count; what lies before them is not kept.
+            // Only the last bytes matter; earlier ones are discarded.
             if all.len() as u64 > count.saturating_mul(2) + CHUNK as u64 {
                 all.drain(..all.len() - count as usize);
             }
@@ -200,7 +199,7 @@ impl Source {
         Ok(())
     }
 
-    /// Takes exactly `N` bytes of a header.
+    /// Reads exactly `N` bytes of a header.
     pub fn header<const N: usize>(&mut self) -> Result<[u8; N], ReadError> {
         let mut bytes = [0; N];
         match self.some(&mut bytes)? {
@@ -209,7 +208,7 @@ impl Source {
         }
     }
 
-    /// Passes over bytes.
+    /// Skips bytes.
     pub fn skip(&mut self, count: u64, what: &'static str) -> Result<(), ReadError> {
         let mut buffer = [0; 4096];
         let mut left = count;
@@ -254,7 +253,7 @@ impl Source {
         Ok(values)
     }
 
-    /// Reads compressed data to their end, so that their checksum is compared. At most 16 MiB more.
+    /// Reads compressed data to the end, at most 16 MiB more, so that the checksum is verified.
     pub fn check_end(&mut self) -> Result<(), ReadError> {
         if self.compressed {
             let mut buffer = vec![0; CHUNK];
@@ -277,7 +276,7 @@ impl Source {
         ReadError::Field { file: self.file.clone(), field, found: shown(&found.to_string()), remedy }
     }
 
-    /// Checks sizes that a header gives: the number of voxels, or what is wrong with them.
+    /// Checks the sizes in a header; returns the number of voxels or an error.
     pub fn voxels(&self, field: &'static str, dims: [i64; 3]) -> Result<u64, ReadError> {
         let wrong = || ReadError::Dimensions { file: self.file.clone(), field, found: format!("{dims:?}") };
         if !dims.iter().all(|&n| (2..=1 << 20).contains(&n)) {
@@ -289,7 +288,7 @@ impl Source {
         Ok(count)
     }
 
-    /// Checks an affine and puts the volume together.
+    /// Checks an affine and assembles the volume.
     pub fn volume(
         &self,
         dims: [i64; 3],
@@ -302,13 +301,13 @@ impl Source {
     }
 }
 
-/// As much of a value as a message shows: one short line, since in a damaged header what comes
-/// after may be of a patient.
+/// Truncates a value for a message to one short line, since the rest of a damaged header may hold
+/// patient data.
 fn shown(found: &str) -> String {
     found.chars().take_while(|c| !c.is_control() && *c != '\\').take(64).collect()
 }
 
-/// Makes room for `more` values: twice what is there, never more than the `limit` in all.
+/// Reserves room for `more` values: doubles the capacity, up to `limit` in all.
 fn grow(values: &mut Vec<f32>, more: usize, limit: usize) {
     if values.capacity() - values.len() < more {
         let wanted = (2 * values.len()).max(values.len() + more).min(limit.max(values.len() + more));
@@ -336,8 +335,8 @@ fn read_up_to(stream: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
     Ok(got)
 }
 
-/// Refuses axes that no scanner makes: not finite, flat, with edges outside 0.0001 to 1000 mm, or
-/// further than 10 m away.
+/// Rejects implausible axes: not finite, degenerate, edges outside 0.0001 to 1000 mm, or over 10 m
+/// away.
 pub(crate) fn check_affine(file: &Path, field: &'static str, affine: DAffine3) -> Result<(), ReadError> {
     let m = affine.matrix3;
     let edges = DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length());

@@ -1,67 +1,64 @@
-//! What bricks held before the last strokes: enough to undo them one by one, in memory that is
-//! bounded and taken beforehand.
+//! Copies of bricks before the last strokes, for undo in bounded, preallocated memory.
 //!
 //! # Theory
-//! A brick is copied whole before its first change in a stroke; a stamp per brick says for which
-//! stroke that has been done. Undoing exchanges brick and copy, newest stroke first; the same
-//! exchange again takes it back. The copies of all strokes lie in one ring: where room runs out,
-//! the oldest stroke is forgotten. One stroke that alone needs more room than there is cannot be
-//! undone, nor can any before it.
+//! A brick is copied before its first change in a stroke; a stamp per brick records the stroke of
+//! its last copy. Undoing swaps brick and copy, newest stroke first; a second swap reverts it. The
+//! copies of all strokes are in one ring: when it is full, the oldest stroke is discarded. A stroke
+//! that alone needs more room cannot be undone, nor can any before it.
 //!
 //! ```text
-//! ring of copies   │ forgotten │ stroke 3 │ stroke 4 │ stroke 5, open │ free │
+//! ring of copies   │ discarded │ stroke 3 │ stroke 4 │ stroke 5, open │ free │
 //! ```
 //!
 //! # Practice
-//! Atomics without order: one thread writes, records and undoes. A copy is 1 kB and costs a quarter
-//! of a microsecond.
+//! Relaxed atomics: one thread writes, records and undoes. A copy is 1 kB and costs a quarter of a
+//! microsecond.
 
 use crate::bone::BRICK;
 use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, AtomicUsize, Ordering::Relaxed};
 
 /// Voxels in a brick.
 pub(crate) const BRICK_VOXELS: usize = BRICK * BRICK * BRICK;
-/// Most bricks that are kept of all strokes: 4 MB, at half a millimetre a voxel 256 cm³.
+/// Most bricks stored for all strokes: 4 MB; at half a millimetre a voxel 256 cm³.
 pub const MAX_STROKE_BRICKS: usize = 4096;
-/// Most strokes that are kept.
+/// Most strokes stored.
 pub const MAX_STROKES: usize = 64;
 
-/// What [`BoneVolume::undo_stroke`](crate::BoneVolume::undo_stroke) did.
+/// Result of [`BoneVolume::undo_stroke`](crate::BoneVolume::undo_stroke).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Undone {
-    /// So many bricks are as they were before the stroke.
+    /// This many bricks were restored.
     Bricks(usize),
-    /// There is no stroke, or all have been undone already.
+    /// There is no stroke, or all have been undone.
     Nothing,
-    /// What was done before is kept no longer: over [`MAX_STROKES`] strokes, or over
-    /// [`MAX_STROKE_BRICKS`] bricks.
+    /// The earlier state was discarded: over [`MAX_STROKES`] strokes or [`MAX_STROKE_BRICKS`]
+    /// bricks.
     Forgotten,
 }
 
 /// The bricks before the last strokes.
 #[derive(Debug)]
 pub(crate) struct Strokes {
-    /// Whether a stroke is under way.
+    /// Whether a stroke is in progress.
     open: AtomicBool,
     /// Stamp of the newest stroke; 0 before the first.
     stamp: AtomicU32,
     /// The stroke in which each brick was copied last.
     stamps: Vec<AtomicU32>,
-    /// Strokes from `oldest` up to before `next` are kept; their first copies, by number in the
-    /// ring.
+    /// First copy in the ring of each stored stroke, `oldest` up to before `next`.
     starts: Vec<AtomicUsize>,
     oldest: AtomicUsize,
     next: AtomicUsize,
-    /// Whether an older stroke was forgotten.
+    /// Whether an older stroke was discarded.
     forgot: AtomicBool,
-    /// Copies made so far, less those of strokes that were undone.
+    /// Copies made so far, less those of undone strokes.
     copied: AtomicUsize,
     bricks: Vec<AtomicU32>,
     copies: Vec<AtomicI16>,
 }
 
 impl Strokes {
-    /// For a volume of so many bricks.
+    /// Creates the buffers for a volume of this many bricks.
     pub fn new(bricks: usize) -> Self {
         let room = bricks.clamp(1, MAX_STROKE_BRICKS);
         Self {
@@ -78,7 +75,7 @@ impl Strokes {
         }
     }
 
-    /// A new stroke begins.
+    /// Starts a new stroke.
     pub fn begin(&self) {
         self.end();
         self.stamp.store(self.stamp.load(Relaxed).wrapping_add(1).max(1), Relaxed);
@@ -90,7 +87,7 @@ impl Strokes {
         self.open.store(true, Relaxed);
     }
 
-    /// The stroke is over: later changes belong to none. One that changed nothing is none.
+    /// Ends the stroke: later changes belong to none. A stroke without changes is dropped.
     pub fn end(&self) {
         if self.open.swap(false, Relaxed) && self.length() == 0 {
             self.next.fetch_sub(1, Relaxed);
@@ -102,17 +99,17 @@ impl Strokes {
         self.next.load(Relaxed)
     }
 
-    /// Strokes that are kept.
+    /// Number of stored strokes.
     pub fn count(&self) -> usize {
         self.next.load(Relaxed) - self.oldest.load(Relaxed)
     }
 
-    /// Whether an older stroke was forgotten.
+    /// Whether an older stroke was discarded.
     pub fn forgot(&self) -> bool {
         self.forgot.load(Relaxed)
     }
 
-    /// Bricks of the newest stroke; 0 without one.
+    /// Number of bricks of the newest stroke; 0 without one.
     pub fn length(&self) -> usize {
         if self.count() == 0 { 0 } else { self.copied.load(Relaxed) - self.start(self.next.load(Relaxed) - 1) }
     }
@@ -121,27 +118,27 @@ impl Strokes {
         self.starts[stroke % MAX_STROKES].load(Relaxed)
     }
 
-    /// Forgets the oldest stroke.
+    /// Discards the oldest stroke.
     fn forget(&self) {
         self.forgot.store(true, Relaxed);
         self.oldest.fetch_add(1, Relaxed);
     }
 
-    /// Whether `brick` must be kept before it changes; true once in a stroke.
+    /// Whether `brick` must be copied before it changes; true once per stroke.
     #[inline]
     pub fn is_first(&self, brick: usize) -> bool {
         let stamp = self.stamp.load(Relaxed);
         self.open.load(Relaxed) && self.stamps[brick].swap(stamp, Relaxed) != stamp
     }
 
-    /// Keeps the densities of `brick`, voxel by voxel.
+    /// Copies the densities of `brick`, voxel by voxel.
     pub fn keep(&self, brick: usize, density: impl Fn(usize) -> i16) {
         let (room, copied) = (self.bricks.len(), self.copied.load(Relaxed));
         while self.count() > 0 && copied - self.start(self.oldest.load(Relaxed)) >= room {
             self.forget();
         }
         if self.count() == 0 {
-            // The stroke at hand was the last that could make room.
+            // The current stroke was the last that could make room.
             self.open.store(false, Relaxed);
             return;
         }
@@ -156,15 +153,14 @@ impl Strokes {
         &self.copies[slot * BRICK_VOXELS..][..BRICK_VOXELS]
     }
 
-    /// The `n`th brick of the newest stroke, and what is kept of it, voxel by voxel; `None` from
-    /// [`length`](Self::length) on.
+    /// The `n`th brick of the newest stroke and its copy; `None` from [`length`](Self::length) on.
     pub fn kept(&self, n: usize) -> Option<(usize, &[AtomicI16])> {
         let length = self.length();
         let slot = || (self.copied.load(Relaxed) - length + n) % self.bricks.len();
         (n < length).then(|| (self.bricks[slot()].load(Relaxed) as usize, self.copy(slot())))
     }
 
-    /// Lets the newest stroke go: it has been undone.
+    /// Removes the newest stroke after it was undone.
     pub fn drop_newest(&self) {
         if self.count() > 0 {
             self.copied.fetch_sub(self.length(), Relaxed);

@@ -1,26 +1,25 @@
-//! A box of samples with its place in the patient: the form in which every image travels.
+//! A voxel grid with its pose in the patient: the common form of all images.
 
 use glam::{DAffine3, DVec3};
 use trepan_geometry::{Aabb, Vec3};
 
-/// Samples on a regular grid, x fastest, with the affine that puts voxel indices into patient RAS+
-/// mm.
+/// Samples on a regular grid, x fastest, with the affine from voxel indices to patient RAS+ mm.
 ///
 /// Voxel `(i, j, k)` has its **centre** at `world_from_voxel · (i, j, k)`; the affine may be
-/// oblique, anisotropic or mirrored. Invariant: `data.len() = dims.x · dims.y · dims.z`, the affine
-/// is finite and invertible (readers refuse the rest).
+/// oblique, anisotropic or mirrored. Invariant: `data.len() = dims.x · dims.y · dims.z`, and the
+/// affine is finite and invertible (readers reject others).
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelVolume<T> {
     /// Voxels along i, j, k.
     pub dims: [usize; 3],
     /// Samples, `data[i + dims[0] * (j + dims[1] * k)]`.
     pub data: Vec<T>,
-    /// RAS+ mm from voxel indices.
+    /// Transform from voxel indices to RAS+ mm.
     pub world_from_voxel: DAffine3,
 }
 
 impl<T: Copy> VoxelVolume<T> {
-    /// A volume of one value.
+    /// A volume filled with one value.
     pub fn filled(dims: [usize; 3], world_from_voxel: DAffine3, value: T) -> Self {
         Self { dims, data: vec![value; dims.iter().product()], world_from_voxel }
     }
@@ -32,7 +31,7 @@ impl<T: Copy> VoxelVolume<T> {
         Self::filled(dims, affine, value)
     }
 
-    /// Place of a voxel in `data`.
+    /// Index of a voxel in `data`.
     pub fn index(&self, [i, j, k]: [usize; 3]) -> usize {
         i + self.dims[0] * (j + self.dims[1] * k)
     }
@@ -42,7 +41,7 @@ impl<T: Copy> VoxelVolume<T> {
         voxel.iter().zip(self.dims).all(|(&v, n)| v < n).then(|| self.data[self.index(voxel)])
     }
 
-    /// The same grid with other samples.
+    /// Maps the samples, on the same grid.
     pub fn map<U>(&self, f: impl Fn(T) -> U) -> VoxelVolume<U> {
         VoxelVolume {
             dims: self.dims,

@@ -1,5 +1,5 @@
-//! The brain of a made-up head: nested ellipsoids with a foramen, a neck, orbits of air and a scalp
-//! as bright as fat.
+//! Segments the brain of a synthetic head: ellipsoids with a foramen, a neck, air in the orbits and
+//! a scalp as bright as fat.
 
 use std::path::Path;
 use trepan_geometry::Vec3;
@@ -8,14 +8,14 @@ use trepan_volume::{BrainConfig, MaskError, VoxelVolume, brain_mask, check_brain
 /// Half axes of the brain, mm.
 const BRAIN: Vec3 = Vec3::new(62.0, 80.0, 58.0);
 
-/// Signed distance to an ellipsoid that is `margin` mm larger than the brain, good near it.
+/// Signed distance to an ellipsoid `margin` mm larger than the brain, accurate near it.
 fn beyond(p: Vec3, margin: f32) -> f32 {
     let axes = BRAIN + margin;
     let k = (p / axes).length();
     k * (k - 1.0) / (p / (axes * axes)).length().max(1e-6)
 }
 
-/// The tissue at a point: CT in HU, T1 grey value, whether it is brain or the water around it.
+/// The tissue at a point: CT in HU, T1 grey value, whether it is brain or CSF.
 fn tissue(p: Vec3) -> (i16, f32, bool) {
     let canal = (p.x * p.x + (p.y + 20.0).powi(2)).sqrt();
     let neck = (p.x * p.x / 2500.0 + (p.y + 20.0).powi(2) / 2500.0) < 1.0 && p.z < -50.0;
@@ -79,7 +79,7 @@ fn the_brain_is_found_with_and_without_the_ct() {
 }
 
 #[test]
-fn the_built_in_head_agrees_with_a_mask_by_another_hand() {
+fn the_built_in_head_agrees_with_an_independent_mask() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/case-head");
     let file = |name: &str| read(&folder.join(name)).unwrap();
     let (mri, other) = (file("mri_t1.nii.gz"), file("brain_mask.nii.gz").map(|v| u8::from(v != 0.0)));
@@ -93,7 +93,7 @@ fn the_built_in_head_agrees_with_a_mask_by_another_hand() {
 }
 
 #[test]
-fn a_doubtful_brain_is_given_with_doubt() {
+fn a_doubtful_brain_has_low_confidence() {
     let (ct, mri, _) = head();
     let config = BrainConfig { work_mm: 2.0, ..BrainConfig::default() };
     for skull in [Some(&ct), None] {
@@ -101,7 +101,7 @@ fn a_doubtful_brain_is_given_with_doubt() {
         assert!(found.value > 0.8 && !found.is_doubtful(), "{found}");
         assert_eq!(found.inside.is_some(), skull.is_some());
     }
-    // On the upper right no dark layer lies between brain and scalp: the mask leaks up to the
+    // On the upper right there is no dark layer between brain and scalp: the mask leaks to the
     // scalp.
     let mut leaking = mri.clone();
     for at in 0..mri.data.len() {
@@ -112,7 +112,7 @@ fn a_doubtful_brain_is_given_with_doubt() {
     }
     let found = find_brain(&leaking, None, &config).unwrap();
     assert!(found.confidence.is_doubtful() && found.confidence.border < 0.6, "{}", found.confidence);
-    // Less than an adult's brain is given too, but not what is no brain at all.
+    // A small brain is returned too, but an implausible one is rejected.
     let larger = BrainConfig { least_ml: 1800.0, ..config.clone() };
     let found = find_brain(&mri, None, &larger).unwrap().confidence;
     assert!(found.is_doubtful() && found.volume < 0.6, "{found}");
@@ -122,7 +122,7 @@ fn a_doubtful_brain_is_given_with_doubt() {
 }
 
 #[test]
-fn what_is_no_head_is_refused_with_a_reason() {
+fn images_without_a_head_are_rejected() {
     let (ct, mut mri, brain) = head();
     let config = BrainConfig { work_mm: 4.0, ..BrainConfig::default() };
     let empty = mri.map(|_| 0.0);

@@ -1,4 +1,4 @@
-//! NIfTI files made byte by byte, right and wrong ones.
+//! Tests the NIfTI reader with valid and invalid files built byte by byte.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot make its files should fail")]
 
@@ -181,7 +181,7 @@ fn slope_zero_means_no_scaling_and_others_scale() {
 #[test]
 fn orientation_comes_from_sform_then_qform_then_spacing_with_a_note() {
     let mut file = File1::new([3, 3, 3], false);
-    // A quarter turn about z, mirrored third axis, offset (1, 2, 3).
+    // A rotation of 90° about z, mirrored third axis, offset (1, 2, 3).
     file.i16(252, 1).f32(76, -1.0).f32(264, 0.5f32.sqrt()).f32(268, 1.0).f32(272, 2.0).f32(276, 3.0);
     let folder = tempfile::tempdir().unwrap();
     let import = |file: &File1| nifti::import(&saved(folder.path(), "a.nii", &file.bytes)).unwrap();
@@ -326,7 +326,7 @@ fn voxels_without_a_number_are_counted() {
 }
 
 #[test]
-fn what_is_written_comes_back_exactly() {
+fn written_volumes_round_trip_exactly() {
     let folder = tempfile::tempdir().unwrap();
     let turn =
         DMat3::from_rotation_z(0.3) * DMat3::from_rotation_x(-0.8) * DMat3::from_diagonal(DVec3::new(-0.5, 0.75, 2.0));

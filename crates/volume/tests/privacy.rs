@@ -1,10 +1,10 @@
-//! Nothing of a patient comes through: files full of identifiers, whole, cut and damaged; whatever
-//! the readers give back or say is searched.
+//! Checks that no patient data passes the readers, with valid, truncated and damaged files full of
+//! identifiers.
 
 use std::path::Path;
 use trepan_volume::{dicom, import};
 
-/// What must never be seen again: names, numbers and dates, each unlike anything else.
+/// Identifiers that must never appear in output: names, numbers and dates.
 const SECRETS: [&str; 9] = [
     "SECRET",
     "Secret",
@@ -17,8 +17,8 @@ const SECRETS: [&str; 9] = [
     "1.2.826.0.1.31415926",
 ];
 
-/// Text for every element of the patient, study, institution and staff, in every VR that holds text
-/// or a date.
+/// Text for every element about the patient, study, institution and staff, in every VR with text or
+/// a date.
 const TEXTS: [(u32, &[u8; 2], &str); 38] = [
     (0x0008_0005, b"CS", "ISO_IR 100"),
     (0x0008_0014, b"UI", "1.2.826.0.1.31415926.1"),
@@ -72,7 +72,7 @@ fn element(bytes: &mut Vec<u8>, tag: u32, vr: &[u8; 2], value: &[u8]) {
     bytes.resize(bytes.len() + value.len() % 2, b' ');
 }
 
-/// A slice; its third part is what `wrong` replaces: a picture's element with a secret in it.
+/// A slice; `wrong` replaces one of the picture's elements by a secret.
 fn slice(n: usize, wrong: Option<(u32, &str)>) -> Vec<u8> {
     let mut bytes = [&[0; 128], &b"DICM"[..]].concat();
     element(&mut bytes, 0x0002_0010, b"UI", b"1.2.840.10008.1.2.1\0");
@@ -105,8 +105,8 @@ fn slice(n: usize, wrong: Option<(u32, &str)>) -> Vec<u8> {
     bytes
 }
 
-/// Everything that the readers say about a path.
-fn said(path: &Path) -> String {
+/// All output of the readers for a path.
+fn output(path: &Path) -> String {
     let of = |result: Result<trepan_volume::Import, trepan_volume::ReadError>| match result {
         Ok(import) => format!("{import:?} {}", import.notes.iter().map(ToString::to_string).collect::<String>()),
         Err(error) => format!("{error} {error:?}"),
@@ -127,32 +127,32 @@ fn is_clean(text: &str, what: &str) {
 }
 
 #[test]
-fn a_dicom_series_full_of_identifiers_gives_none_of_them_away() {
+fn no_identifier_of_a_dicom_series_passes() {
     let folder = tempfile::tempdir().unwrap();
     let file = |n: usize| folder.path().join(format!("{n}.dcm"));
     (0..4).for_each(|n| std::fs::write(file(n), slice(n, None)).unwrap());
-    let whole = said(folder.path());
+    let whole = output(folder.path());
     assert!(whole.contains("dims: [4, 3, 4]"), "the series must be read for the test to mean something: {whole}");
     is_clean(&whole, "the whole series");
     let bytes = slice(1, None);
     for length in (132..bytes.len()).step_by(7) {
         std::fs::write(file(1), &bytes[..length]).unwrap();
-        is_clean(&said(folder.path()), "a cut slice in a series");
-        is_clean(&said(&file(1)), "a cut slice");
+        is_clean(&output(folder.path()), "a cut slice in a series");
+        is_clean(&output(&file(1)), "a cut slice");
     }
     let numbers = [0x0020_0011, 0x0020_0032, 0x0020_0037, 0x0028_0030, 0x0028_1052];
     for (tag, secret) in numbers.into_iter().flat_map(|tag| SECRETS.map(|secret| (tag, secret))) {
         std::fs::write(file(1), slice(1, Some((tag, secret)))).unwrap();
-        // A series number, a place or a spacing is a number that is shown: only text is a secret
+        // Numbers such as series number, position or spacing are shown: only text is a secret
         // there.
         if secret.chars().any(char::is_alphabetic) {
-            is_clean(&said(folder.path()), "a secret where a number belongs");
-            is_clean(&said(&file(1)), "a secret where a number belongs");
+            is_clean(&output(folder.path()), "a secret where a number belongs");
+            is_clean(&output(&file(1)), "a secret where a number belongs");
         }
     }
     for secret in SECRETS {
         std::fs::write(file(1), slice(1, Some((0x0008_0060, secret)))).unwrap();
-        is_clean(&said(folder.path()), "a secret as modality");
+        is_clean(&output(folder.path()), "a secret as modality");
     }
 }
 
@@ -161,7 +161,7 @@ fn every_cut_and_flip_is_clean(name: &str, bytes: &[u8]) {
     let path = folder.path().join(name);
     let check = |bytes: &[u8]| {
         std::fs::write(&path, bytes).expect("room");
-        is_clean(&said(&path), name);
+        is_clean(&output(&path), name);
     };
     check(bytes);
     assert!(import(&path).is_ok(), "{:?}", import(&path));

@@ -1,4 +1,4 @@
-//! Two touching spheres: counted work at several cell sizes, and where the rules put the best one.
+//! Two touching spheres: counted work at several cell sizes, and the sizes chosen by each rule.
 
 use trepan_geometry::Vec3;
 use trepan_mesh::lattice;

@@ -1,42 +1,41 @@
-//! How large the bricks of a density volume should be, when a tool looks at them and carves them.
+//! Optimal brick size of a density volume that a tool reads and carves.
 //!
 //! # Theory
-//! A volume of voxels of edge h is stored in bricks of edge δ. A tool whose box is w wide covers
-//! `(w/δ + 1)³` bricks on average over its places; each costs one visit, t_v (look-up, version
-//! check). What it changed, it changed in the same box: whole bricks are copied on (to the picture,
-//! to the next thread), `(w/δ + 1)³ (δ/h)³` voxels at t_p each. So
+//! A volume of voxels of edge h is stored in bricks of edge δ. A tool whose box has width w covers
+//! `(w/δ + 1)³` bricks on average over its positions; each costs one visit, t_v (look-up, version
+//! check). Its changes are in the same box, and whole bricks are copied (to the renderer, to the
+//! next thread): `(w/δ + 1)³ (δ/h)³` voxels at t_p each. So
 //!
 //! ```text
 //! z(δ) = t_v (w/δ + 1)³ + t_p ((w + δ)/h)³        dz/dδ = 0   ⇔   δ⁴ = w h³ t_v / t_p
 //! ```
 //!
-//! z falls before that one root and rises after it. It answers the question that the thesis leaves
-//! open (7.2): chapter 5's sequence of steps for volumes.
+//! z decreases before that single root and increases after it. This extends chapter 5 of the thesis
+//! to volumes, which it leaves open (7.2).
 //!
 //! # Practice
-//! Bricks have whole voxels, often a power of two: [`Bricks::best_of`] compares those that are on
-//! offer.
+//! Bricks have whole voxels, often a power of two: [`Bricks::best_of`] compares given candidates.
 //!
 //! # When not to use it
 //! When nothing is copied (t_p = 0): then larger is always better, up to the memory.
 
 use crate::error::{VoxelSizeError, checked};
 
-/// A volume, a tool, and what each part costs.
+/// A volume, a tool, and the cost of each operation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bricks {
     /// Edge of a voxel, h, mm.
     pub voxel_mm: f64,
     /// Width of the tool's box, w, mm.
     pub tool_mm: f64,
-    /// Cost of visiting a brick, t_v, in any unit. More makes larger bricks better.
+    /// Cost of visiting a brick, t_v, in any unit. Higher values favour larger bricks.
     pub visit: f64,
-    /// Cost of copying a voxel, t_p, in the same unit. More makes smaller bricks better.
+    /// Cost of copying a voxel, t_p, in the same unit. Higher values favour smaller bricks.
     pub copy: f64,
 }
 
 impl Bricks {
-    /// z(δ), in the unit of the prices.
+    /// z(δ), in the unit of the costs.
     pub fn cost(&self, delta_mm: f64) -> f64 {
         let (w, h) = (self.tool_mm, self.voxel_mm);
         self.visit * (w / delta_mm + 1.0).powi(3) + self.copy * ((w + delta_mm) / h).powi(3)
@@ -48,7 +47,7 @@ impl Bricks {
         Ok((self.tool_mm * self.voxel_mm.powi(3) * self.visit / self.copy).powf(0.25))
     }
 
-    /// The cheapest of some edges in voxels, for example powers of two; the first of equals.
+    /// The cheapest of some edges in voxels, for example powers of two; the first on a tie.
     pub fn best_of(&self, voxels: &[u32]) -> Result<u32, VoxelSizeError> {
         self.check()?;
         let smallest = voxels.iter().min().copied().unwrap_or(0);
@@ -86,7 +85,7 @@ mod tests {
         }
     }
 
-    /// Bricks that a box really meets, in the mean over its places along one axis, are w/δ + 1.
+    /// The mean number of bricks that a box covers along one axis, over its positions, is w/δ + 1.
     #[test]
     fn the_count_is_the_mean_over_places() {
         for (w, delta) in [(4.0f64, 1.5f64), (1.0, 8.0)] {

@@ -9,14 +9,15 @@
 //! 4 q c δ³ − s q c δ² − 3 s p_nc = 0
 //! ```
 //!
-//! Its coefficients change sign once, so it has one positive root, and z falls before it and rises
-//! after it. The root is written with Cardano's formula in its stable hyperbolic form and polished
-//! with Newton; [`CostModel::minimised`] finds the same place without the derivative.
+//! Its coefficients change sign once, so that it has one positive root; z decreases before it and
+//! increases after it. The root is computed with Cardano's formula in its stable hyperbolic form
+//! and refined by Newton's method; [`CostModel::minimised`] finds the same minimum without the
+//! derivative.
 //!
 //! # When not to use it
-//! To predict a time: only the place of the minimum means something. The area of facets stands for
-//! the number of particles; where particles do not lie on the mesh's own nodes (a tool's point
-//! shell), use counts ([`crate::counts`]).
+//! To predict a time: only the location of the minimum is meaningful. The area of facets represents
+//! the number of particles; where particles are not the mesh's nodes (a tool's pointshell), use
+//! counts ([`crate::counts`]).
 
 use crate::Measures;
 use crate::error::{VoxelSizeError, checked};
@@ -24,11 +25,11 @@ use crate::error::{VoxelSizeError, checked};
 /// The two constants of the cost function.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CostModel {
-    /// Share of tetrahedra that collide with nothing, 0 to 1 (1 excluded). More makes larger cells
-    /// better. Thesis: 0.98 to 0.99.
+    /// Fraction of tetrahedra without collision, 0 to 1 (1 excluded). Higher values favour larger
+    /// cells. Thesis: 0.98 to 0.99.
     pub p_nc: f64,
-    /// Cost of testing one particle in visits of one cell, t_p / t_v. More makes smaller cells
-    /// better. Thesis: about 5; measure it.
+    /// Cost of testing one particle in visits of one cell, t_p / t_v. Higher values favour smaller
+    /// cells. Thesis: about 5; measure it.
     pub r_t: f64,
 }
 
@@ -40,13 +41,13 @@ impl Default for CostModel {
 }
 
 impl CostModel {
-    /// z(δ), in cell visits for one tetrahedron.
+    /// z(δ), in cell visits per tetrahedron.
     pub fn cost(&self, measures: &Measures, delta_mm: f64) -> f64 {
         self.with_cells(measures, delta_mm, (measures.longest_edge_mm / delta_mm + 2.0).powi(3))
     }
 
-    /// z(δ) with whole cells, as Eq 5.4 is printed: right for a count, but it has steps, so do not
-    /// minimise it.
+    /// z(δ) with whole cells, as Eq 5.4 is printed: correct as a count, but discontinuous, so do
+    /// not minimise it.
     pub fn cost_in_whole_cells(&self, measures: &Measures, delta_mm: f64) -> f64 {
         self.with_cells(measures, delta_mm, (measures.longest_edge_mm / delta_mm + 2.0).ceil().powi(3))
     }
@@ -78,7 +79,7 @@ impl CostModel {
         Ok(golden_section(|log| self.cost(measures, log.exp()), low, high, 80).exp())
     }
 
-    /// The model, if its numbers make sense.
+    /// Checks that the parameters are in range.
     pub fn check(&self) -> Result<(), VoxelSizeError> {
         checked("p_nc", self.p_nc, (0.0..1.0).contains(&self.p_nc), "at least 0 and less than 1")?;
         checked("r_t", self.r_t, self.r_t > 0.0 && self.r_t.is_finite(), "positive and finite")?;
@@ -86,7 +87,7 @@ impl CostModel {
     }
 }
 
-/// c: particles in a cell of edge δ are c δ².
+/// c: a cell of edge δ contains c δ² particles.
 fn particle_density(measures: &Measures) -> f64 {
     3.0 * 3f64.sqrt() / (2.0 * measures.facet_mm2)
 }
@@ -105,7 +106,7 @@ fn root(k: f64) -> f64 {
     x
 }
 
-/// The minimum of a function with one valley.
+/// The minimum of a unimodal function.
 pub(crate) fn golden_section(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64, steps: usize) -> f64 {
     let golden = 0.5 * (5f64.sqrt() - 1.0);
     let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
@@ -124,10 +125,11 @@ pub(crate) fn golden_section(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64
     0.5 * (low + high)
 }
 
-/// The error of Eq 5.9: how far a size lies from the best one, in units of the good zone on its
-/// side: 0 at the best, 1 at the zone's border.
+/// The error of Eq 5.9: distance of a size from the best one, relative to the good zone on its
+/// side.
+/// It is 0 at the best size and 1 at the zone's limit.
 ///
-/// All four in the same measure (the thesis: cells per axis).
+/// All four values in the same unit (the thesis: cells per axis).
 pub fn zone_error(value: f64, low: f64, best: f64, high: f64) -> f64 {
     let side = if value < best { best - low } else { high - best };
     (best - value).abs() / side

@@ -1,13 +1,14 @@
-//! What a uniform grid really does at a cell size: cells visited, particles tested, boxes hit.
-//! Counts, no times.
+//! Counts the work of a uniform grid at a cell size: cells visited, particles tested, boxes hit. It
+//! measures no times.
 //!
 //! # Theory
-//! Algorithm of 5.2 (Teschner et al. 2003): particles are sorted into cells; each box looks through
-//! the cells it covers and tests their particles. The sum of particles over a block of cells comes
-//! from a summed-volume table in eight look-ups, so counting costs far less than doing.
+//! Algorithm of 5.2 (Teschner et al. 2003): particles are sorted into cells; each box visits the
+//! cells that it covers and tests their particles. The sum of particles over a block of cells comes
+//! from a summed-volume table in eight look-ups, so that counting costs far less than the search
+//! itself.
 //!
 //! # Practice
-//! Cells are `floor(x / cell)`, with a world origin of 0, half open. At most [`MAX_CELLS`] cells
+//! Cells are `floor(x / cell)`, half open, with the world origin at 0. At most [`MAX_CELLS`] cells
 //! around the particles; visits outside them count too.
 
 use crate::error::{VoxelSizeError, checked};
@@ -15,13 +16,13 @@ use glam::{DVec3, I64Vec3};
 use trepan_geometry::{Aabb, Vec3};
 use trepan_mesh::TetMesh;
 
-/// Most cells that a table is built for.
+/// Most cells of a table.
 pub const MAX_CELLS: usize = 10_000_000;
 
 /// The work of one pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Boxes that looked.
+    /// Boxes that searched.
     pub boxes: u64,
     /// Particles sorted into cells.
     pub particles: u64,
@@ -29,8 +30,8 @@ pub struct Counts {
     pub visits: u64,
     /// Particles tested against a box: Σ over visited cells of the particles in them.
     pub tests: u64,
-    /// Tests that a particle inside the box passed (the narrow phase's work); the same at any cell
-    /// size.
+    /// Tests in which the particle was inside the box (work of the narrow phase); independent of
+    /// the cell size.
     pub inside: u64,
     /// Boxes with at least one test.
     pub busy_boxes: u64,
@@ -41,7 +42,7 @@ pub fn boxes(mesh: &TetMesh) -> Vec<Aabb> {
     (0..mesh.tets.len()).map(|t| Aabb::of_points(&mesh.corners(t))).collect()
 }
 
-/// Counts what a grid with cells of `cell_mm` does for these boxes and particles.
+/// Counts the work of a grid with cells of `cell_mm` for these boxes and particles.
 pub fn grid(boxes: &[Aabb], particles: &[Vec3], cell_mm: f64) -> Result<Counts, VoxelSizeError> {
     checked("cell_mm", cell_mm, cell_mm > 0.0 && cell_mm.is_finite(), "positive and finite")?;
     check_finite(boxes, particles)?;
@@ -58,7 +59,7 @@ pub fn grid(boxes: &[Aabb], particles: &[Vec3], cell_mm: f64) -> Result<Counts, 
     Ok(counts)
 }
 
-/// The same without a grid: every box tests every particle.
+/// Counts the work without a grid: every box tests every particle.
 pub fn brute_force(boxes: &[Aabb], particles: &[Vec3]) -> Counts {
     let inside = |b: &Aabb| particles.iter().filter(|p| b.contains(**p)).count() as u64;
     let (boxes_count, particles_count) = (boxes.len() as u64, particles.len() as u64);
@@ -79,14 +80,14 @@ pub(crate) fn check_finite(boxes: &[Aabb], particles: &[Vec3]) -> Result<(), Vox
     bad.map_or(Ok(()), |(field, got)| Err(VoxelSizeError::Field { field, got: got.into(), wanted: "finite" }))
 }
 
-/// Particles sorted by cell, and how many lie below and left of each cell.
+/// Particles sorted by cell, with a summed-volume table.
 pub(crate) struct Table {
     cell_mm: f64,
     low: I64Vec3,
     dims: [usize; 3],
     /// `sums[i + (nx + 1) (j + (ny + 1) k)]`: particles in cells below i, j and k.
     sums: Vec<u32>,
-    /// Particles by cell: where each cell starts in `order`.
+    /// Start of each cell's particles in `order`.
     starts: Vec<u32>,
     order: Vec<u32>,
 }
@@ -142,8 +143,7 @@ impl Table {
         }
     }
 
-    /// Cells from `low` to `high` inside the table, as half-open ranges; `None` when there are
-    /// none.
+    /// Cells from `low` to `high` inside the table, as half-open ranges; `None` if there are none.
     fn clipped(&self, low: I64Vec3, high: I64Vec3) -> Option<([usize; 3], [usize; 3])> {
         let dims = I64Vec3::from_array(self.dims.map(|n| n as i64));
         let from = (low - self.low).max(I64Vec3::ZERO);

@@ -1,46 +1,46 @@
-//! What can be wrong with the input.
+//! Input errors.
 
-/// Why there is no voxel size.
+/// Why no voxel size can be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VoxelSizeError {
     /// No tetrahedron, or indices out of range.
     #[error("the mesh cannot be measured: {0}")]
     Mesh(#[from] trepan_mesh::MeshError),
-    /// A number that makes no sense.
+    /// A number out of range.
     #[error("{field} is {got}; it must be {wanted}")]
     Field {
-        /// Which one.
+        /// The field.
         field: &'static str,
-        /// What it is.
+        /// Its value.
         got: f64,
-        /// What would be right.
+        /// The valid range.
         wanted: &'static str,
     },
-    /// A grid that would not fit.
+    /// A grid with too many cells.
     #[error(
         "cells of {cell_mm} mm would make {cells:e} of them; at most {limit:e} are built, so take at least {smallest_mm} mm"
     )]
     TooManyCells {
-        /// The edge asked for, mm.
+        /// The requested edge, mm.
         cell_mm: f64,
         /// Cells that it would need.
         cells: f64,
-        /// How many there may be.
+        /// The limit.
         limit: f64,
-        /// The smallest edge that fits, mm, roughly.
+        /// The smallest edge that fits, mm, approximately.
         smallest_mm: f64,
     },
-    /// Measurements that do not say what each part costs.
+    /// Measurements that do not determine the costs.
     #[error("{got} measurements do not separate {wanted} prices; measure at more and at more different cell sizes")]
     Fit {
-        /// How many there are.
+        /// Number of measurements.
         got: usize,
-        /// How many unknowns.
+        /// Number of unknowns.
         wanted: usize,
     },
 }
 
-/// The number, if `good` says so.
+/// Returns the number if `good`, else an error.
 pub(crate) fn checked(field: &'static str, got: f64, good: bool, wanted: &'static str) -> Result<f64, VoxelSizeError> {
     if good { Ok(got) } else { Err(VoxelSizeError::Field { field, got, wanted }) }
 }

@@ -1,25 +1,24 @@
-//! The work of a grid at any cell size, from the boxes and particles themselves: smooth, without
-//! trying each size.
+//! Expected work of a grid for given boxes and particles, as a smooth function of the cell size.
 //!
 //! # Theory
-//! Let the grid lie anywhere with equal chance. On one axis a box of width w covers w/δ + 1 cells
-//! of edge δ on average, and sees a particle that lies a gap g away with chance max(0, 1 − g/δ) (1
+//! Let the grid's position be uniformly distributed. On one axis a box of width w covers w/δ + 1
+//! cells of edge δ on average, and tests a particle at a gap g with probability max(0, 1 − g/δ) (1
 //! inside). The axes are independent, so
 //!
 //! ```text
 //! visits(δ) = Σ boxes  Π (w_d/δ + 1)          tests(δ) = Σ boxes, particles  Π max(0, 1 − g_d/δ)
 //! ```
 //!
-//! exactly, in the mean over placements. A processor guesses when the loop over a box's cells ends.
-//! On one axis there are ⌊w/δ⌋ + 2 cells with chance f = frac(w/δ) and one less otherwise, so it
-//! guesses wrongly with chance min(f, 1 − f), which costs as much as several visits:
-//! `doubts(δ) = Σ boxes Σ_d min(f_d, 1 − f_d)`. The thesis's formula has one box size, s, one cell
-//! too many on each axis, and guesses particles from facets; this takes what is there: a tool's own
-//! points, graded meshes, any overlap.
+//! exactly, in the mean over placements. A processor predicts when the loop over a box's cells
+//! ends. On one axis there are ⌊w/δ⌋ + 2 cells with probability f = frac(w/δ) and one less
+//! otherwise, so that the misprediction probability is min(f, 1 − f), each costing as much as
+//! several visits: `doubts(δ) = Σ boxes Σ_d min(f_d, 1 − f_d)`. The thesis's formula has a single
+//! box size, s, one cell too many on each axis, and estimates particles from facets. This model
+//! uses the actual data: a tool's points, graded meshes, any overlap.
 //!
 //! # Practice
-//! Gaps up to a reach are kept, so δ may be at most that. At most [`MAX_GAPS`] of them: when there
-//! are more, every second, third … box stands for its neighbours.
+//! Gaps up to a reach are stored, so that δ may be at most that. At most [`MAX_GAPS`] are stored:
+//! with more, every second, third … box represents its neighbours.
 
 use crate::counts::Table;
 use crate::error::{VoxelSizeError, checked};
@@ -27,33 +26,33 @@ use crate::{Prices, Work, cost::golden_section};
 use glam::{DVec3, Vec3};
 use trepan_geometry::Aabb;
 
-/// Most pairs of a box and a particle that are kept.
+/// Most pairs of a box and a particle that are stored.
 pub const MAX_GAPS: usize = 300_000;
-/// Most sizes of boxes that are kept.
+/// Most box sizes that are stored.
 const MAX_SIZES: usize = 4_096;
-/// Candidates on each side of the best size, and the step between them.
+/// Candidates on each side of the best size.
 const CANDIDATES_EACH_WAY: i32 = 8;
 const CANDIDATE_STEP: f64 = 1.07;
-/// A size that is expected to cost at most this much more may be the best one.
+/// Ratio to the lowest expected cost up to which a size is a candidate.
 const WORTH_TIMING: f64 = 1.12;
 
-/// What the expected work needs to know about boxes and particles.
+/// Statistics of boxes and particles for the expected work.
 #[derive(Clone, Debug)]
 pub struct Expected {
     /// Σ of 1, w_x + w_y + w_z, w_x w_y + w_y w_z + w_z w_x and w_x w_y w_z over the boxes.
     moments: [f64; 4],
     /// Gaps between boxes and particles, mm, 0 inside.
     gaps: Vec<Vec3>,
-    /// How many pairs each gap stands for.
+    /// Number of pairs that each gap represents.
     weight: f64,
-    /// Sizes of boxes, mm, and how many boxes each stands for.
+    /// Sizes of boxes, mm, and the number of boxes that each represents.
     sizes: Vec<DVec3>,
     boxes_per_size: f64,
     reach_mm: f64,
 }
 
 impl Expected {
-    /// Measures boxes and particles for cells of up to `reach_mm`.
+    /// Computes the statistics for cells of up to `reach_mm`.
     pub fn of(boxes: &[Aabb], particles: &[Vec3], reach_mm: f64) -> Result<Self, VoxelSizeError> {
         checked("reach_mm", reach_mm, reach_mm > 0.0 && reach_mm.is_finite(), "positive and finite")?;
         crate::counts::check_finite(boxes, particles)?;
@@ -77,20 +76,20 @@ impl Expected {
         Ok(Self { moments: moments(&boxes), gaps, weight: stride as f64, sizes, boxes_per_size, reach_mm })
     }
 
-    /// Expected cells visited with cells of `delta_mm`.
+    /// Expected number of cells visited with cells of `delta_mm`.
     pub fn visits(&self, delta_mm: f64) -> f64 {
         let [n, w, ww, www] = self.moments;
         n + (w + (ww + www / delta_mm) / delta_mm) / delta_mm
     }
 
-    /// Expected particles tested with cells of `delta_mm`, at most the reach.
+    /// Expected number of particles tested with cells of `delta_mm`, at most the reach.
     pub fn tests(&self, delta_mm: f64) -> f64 {
         let per_mm = (1.0 / delta_mm) as f32;
         let chance = |gap: &Vec3| f64::from((Vec3::ONE - *gap * per_mm).max(Vec3::ZERO).element_product());
         self.weight * self.gaps.iter().map(chance).sum::<f64>()
     }
 
-    /// Expected loops whose end is guessed wrongly, with cells of `delta_mm`.
+    /// Expected number of mispredicted loop ends, with cells of `delta_mm`.
     pub fn doubts(&self, delta_mm: f64) -> f64 {
         let even = |size: &DVec3| (*size / delta_mm).fract();
         self.boxes_per_size * self.sizes.iter().map(|s| even(s).min(1.0 - even(s)).element_sum()).sum::<f64>()
@@ -101,7 +100,7 @@ impl Expected {
         Work { visits: self.visits(delta_mm), doubts: self.doubts(delta_mm), tests: self.tests(delta_mm) }
     }
 
-    /// Expected time of a pass, in the unit of the prices.
+    /// Expected time of a pass, in the unit of the costs.
     pub fn time(&self, prices: &Prices, delta_mm: f64) -> f64 {
         prices.time(&self.work(delta_mm))
     }
@@ -122,11 +121,11 @@ impl Expected {
         Ok(best.exp())
     }
 
-    /// Sizes around the best one, mm, that are expected to cost little more, the best one first:
-    /// what is worth timing on a sample of the boxes.
+    /// Sizes around the best one with little higher expected cost, mm, the best one first:
+    /// candidates for timing on a sample of the boxes.
     ///
-    /// No model knows everything, for example that cells fit a mesh's lattice. The sample tells how
-    /// far off it is at a size; so take the size with the least
+    /// No model covers everything, for example cells that match a mesh's lattice. The sample shows
+    /// the model's error at each size; so take the size with the least
     /// `measured(sample) / expected(sample) · expected(all)`.
     pub fn candidates(&self, prices: &Prices, best_mm: f64) -> Vec<f64> {
         let enough = WORTH_TIMING * self.time(prices, best_mm);

@@ -1,41 +1,41 @@
-//! What a visit, a test and the rest cost on a machine, from times that someone else measured.
+//! Fits the costs of a visit and a test on a machine to measured times.
 //!
 //! # Theory
-//! A pass takes t = t_0 + t_v · visits + t_d · doubts + t_p · tests, where t_0 holds what no cell
-//! size changes (sorting particles, boxes, the narrow phase) and t_d is what a wrongly guessed
-//! branch costs. With times at several cell sizes this is linear least squares, solved here with
-//! relative weights (each time divided by itself), so that no size dominates. A negative price,
-//! which noise can give, is set to 0 and the rest solved again.
+//! A pass takes t = t_0 + t_v · visits + t_d · doubts + t_p · tests. t_0 is the part independent of
+//! the cell size (sorting particles, boxes, the narrow phase) and t_d the cost of a mispredicted
+//! branch. With times at several cell sizes this is linear least squares, solved here with relative
+//! weights (each time divided by itself), so that no size dominates. A negative cost, possible with
+//! noise, is set to 0 and the others are solved again.
 //!
 //! # Practice
-//! Times in any unit; prices come in the same unit. Four cell sizes are the minimum; seven to
-//! twelve from 0.5 to 4 mean edges do well.
+//! Times are in any unit; costs are in the same unit. At least four cell sizes are needed; seven to
+//! twelve from 0.5 to 4 mean edges are recommended.
 
 use crate::CostModel;
 use crate::error::{VoxelSizeError, checked};
 
-/// What a pass does besides what no cell size changes: counted, or expected by
+/// The work of a pass that depends on the cell size: counted, or expected by
 /// [`Expected::work`](crate::Expected::work).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Work {
     /// Cells visited.
     pub visits: f64,
-    /// Loops over the cells of a box whose number of turns a processor guesses wrongly.
+    /// Loops over the cells of a box whose length a processor mispredicts.
     pub doubts: f64,
     /// Particles tested.
     pub tests: f64,
 }
 
-/// What each part of a pass costs, in the unit of the measured times.
+/// Cost of each part of a pass, in the unit of the measured times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prices {
-    /// The part that no cell size changes.
+    /// The part independent of the cell size.
     pub fixed: f64,
-    /// One cell visited, t_v.
+    /// One visited cell, t_v.
     pub visit: f64,
-    /// One wrong guess.
+    /// One misprediction.
     pub doubt: f64,
-    /// One particle tested, t_p.
+    /// One tested particle, t_p.
     pub test: f64,
 }
 
@@ -45,7 +45,7 @@ impl Prices {
         self.fixed + self.visit * work.visits + self.doubt * work.doubts + self.test * work.tests
     }
 
-    /// The cost model with these prices, for a measured share of idle tetrahedra.
+    /// The cost model with these costs, for a measured fraction of idle tetrahedra.
     pub fn model(&self, p_nc: f64) -> Result<CostModel, VoxelSizeError> {
         checked("visit", self.visit, self.visit > 0.0, "positive; measure also at small cells")?;
         checked("test", self.test, self.test > 0.0, "positive; measure also at large cells")?;
@@ -54,10 +54,10 @@ impl Prices {
     }
 }
 
-/// How many prices there are.
+/// Number of costs.
 const PRICES: usize = 4;
 
-/// Prices from work and the times that it took.
+/// Fits the costs to measured work and times.
 pub fn fit(measured: &[(Work, f64)]) -> Result<Prices, VoxelSizeError> {
     for (_, time) in measured {
         checked("a measured time", *time, *time > 0.0 && time.is_finite(), "positive and finite")?;
@@ -75,7 +75,7 @@ pub fn fit(measured: &[(Work, f64)]) -> Result<Prices, VoxelSizeError> {
     }
 }
 
-/// Prices of the used columns; 0 for the others.
+/// Least-squares costs of the used columns; 0 for the others.
 fn least_squares(measured: &[(Work, f64)], mut used: [bool; PRICES]) -> Result<[f64; PRICES], VoxelSizeError> {
     let scale = column_scale(measured);
     (0..PRICES).for_each(|n| used[n] &= scale[n] > f64::MIN_POSITIVE);
@@ -99,13 +99,13 @@ fn columns(work: &Work) -> [f64; PRICES] {
     [1.0, work.visits, work.doubts, work.tests]
 }
 
-/// The largest of each column over its time, so that the normal matrix is well scaled.
+/// The largest ratio of each column to its time, used to scale the normal matrix.
 fn column_scale(measured: &[(Work, f64)]) -> [f64; PRICES] {
     let largest = |n: usize| measured.iter().map(|(c, t)| columns(c)[n] / t).fold(f64::MIN_POSITIVE, f64::max);
     std::array::from_fn(largest)
 }
 
-/// Gauss's elimination with row pivots; `None` when the matrix is singular to rounding.
+/// Gaussian elimination with row pivoting; `None` if the matrix is numerically singular.
 fn solve(mut m: [[f64; PRICES + 1]; PRICES]) -> Option<[f64; PRICES]> {
     for col in 0..PRICES {
         let pivot = (col..PRICES).max_by(|&a, &b| m[a][col].abs().total_cmp(&m[b][col].abs()))?;

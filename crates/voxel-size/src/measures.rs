@@ -1,4 +1,4 @@
-//! What the cost function needs to know about a mesh.
+//! Mesh statistics for the cost function.
 
 use crate::error::{VoxelSizeError, checked};
 use trepan_geometry::Vec3;
@@ -7,7 +7,7 @@ use trepan_mesh::{FACES, MeshError, TetMesh};
 /// Means over the tetrahedra or triangles of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measures {
-    /// How many tetrahedra or triangles.
+    /// Number of tetrahedra or triangles.
     pub elements: usize,
     /// s: mean over the elements of their longest edge, mm. In the worst case that is the edge of
     /// their box.
@@ -19,8 +19,8 @@ pub struct Measures {
 }
 
 impl Measures {
-    /// Measures a mesh. Refuses one without tetrahedra, with indices out of range, with a
-    /// coordinate that is not finite, or without extent.
+    /// Measures a mesh. Rejects one without tetrahedra, with indices out of range, with a
+    /// non-finite coordinate, or without extent.
     pub fn of(mesh: &TetMesh) -> Result<Self, VoxelSizeError> {
         mesh.check_indices()?;
         if let Some(node) = mesh.positions.iter().position(|p| !p.is_finite()) {
@@ -42,7 +42,7 @@ impl Measures {
     }
 
     /// Measures a triangle mesh, for the triangle form of Borro et al. 2004: the same cost with the
-    /// triangles' own edges and areas. Refuses what [`of`](Self::of) refuses.
+    /// triangles' edges and areas. Rejects the same meshes as [`of`](Self::of).
     pub fn of_triangles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self, VoxelSizeError> {
         if triangles.is_empty() {
             return Err(MeshError::Empty.into());
@@ -66,7 +66,7 @@ impl Measures {
         Self { elements: triangles.len(), longest_edge_mm, mean_edge_mm, facet_mm2 }.checked()
     }
 
-    /// The same numbers, if they are lengths and areas.
+    /// Checks that the values are valid lengths and areas.
     pub fn checked(self) -> Result<Self, VoxelSizeError> {
         let positive =
             |field, value: f64| checked(field, value, value > 0.0 && value.is_finite(), "positive and finite");

@@ -1,5 +1,5 @@
-//! Chapter 5's spheres: evenly meshed balls give the thesis's ratio of analytic to traditional cell
-//! size.
+//! The spheres of chapter 5: uniformly meshed balls give the thesis's ratio of analytic to
+//! traditional cell size.
 
 use glam::DVec3;
 use trepan_geometry::Vec3;
@@ -42,8 +42,8 @@ fn two_touching_spheres_are_cheaper_at_the_analytic_size() {
     assert!(work(analytic) < work(0.3 * analytic) && work(analytic) < work(6.0 * analytic));
 }
 
-/// Regret: the work at a size over the least work at any size, less 1, in the mean over placements
-/// of the grid.
+/// Regret: the work at a size over the least work at any size, minus 1, in the mean over
+/// placements.
 #[test]
 fn the_expected_best_size_has_less_regret_than_the_formula() {
     let mesh = ball(8_000);

@@ -1,4 +1,4 @@
-//! Files to be refused, and the few sound ones that they are given with.
+//! Invalid files, and the valid ones given with them.
 
 use flate2::{Compression, write::GzEncoder};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
@@ -12,7 +12,7 @@ use trepan_volume::{VoxelVolume, nifti};
 /// Voxels of a small volume along each axis.
 const N: usize = 32;
 
-/// A small head: a ball of bone, 64 mm wide.
+/// Makes a small head: a hollow ball of bone in a volume of 64 mm.
 pub fn ball() -> VoxelVolume<i16> {
     let mut ct = VoxelVolume::isotropic([N; 3], Vec3::splat(-31.0), 2.0, -1000i16);
     for at in 0..ct.data.len() {
@@ -25,16 +25,16 @@ pub fn ball() -> VoxelVolume<i16> {
     ct
 }
 
-/// A head of an adult's size as ellipsoids: CT, T1 MRI and brain, each of 3 mm voxels in one space.
+/// Makes an adult head of ellipsoids: CT, T1 MRI and brain mask, each of 3 mm voxels in one space.
 fn head() -> (VoxelVolume<i16>, VoxelVolume<u8>, VoxelVolume<u8>) {
     let dims = [64, 76, 64];
     let mut ct = VoxelVolume::isotropic(dims, Vec3::new(-94.5, -112.5, -94.5), 3.0, -1000i16);
     let (mut mri, mut brain) = (ct.map(|_| 0u8), ct.map(|_| 0u8));
     for at in 0..ct.data.len() {
         let place = ct.centre_of([at % dims[0], at / dims[0] % dims[1], at / (dims[0] * dims[1])]);
-        // 1 on the brain's surface; a nose and ears break the symmetry.
+        // Length 1 on the brain's surface. The nose makes the head asymmetric.
         let within = |grow: f64| (place / (DVec3::new(64.0, 82.0, 62.0) + grow)).length() < 1.0;
-        // Where the brain's stem leaves the skull.
+        // The opening of the skull for the brain stem.
         let neck = place.truncate().length() < 14.0 && place.z < -40.0;
         let nose = (place - DVec3::new(0.0, 100.0, -35.0)).length() < 14.0;
         (ct.data[at], mri.data[at], brain.data[at]) = match () {
@@ -62,8 +62,7 @@ pub fn gz(bytes: &[u8]) -> Vec<u8> {
     gzip.finish().unwrap()
 }
 
-/// A file of zeros that unpacks to `mib` MiB behind `head`, made of one packed piece again and
-/// again.
+/// Makes a gzip file that unpacks to `head` and `mib` MiB of zeros, by repeating a packed piece.
 fn bomb(head: &[u8], mib: usize) -> Vec<u8> {
     let piece = gz(&vec![0; 16 << 20]);
     let mut bytes = gz(head);
@@ -71,7 +70,7 @@ fn bomb(head: &[u8], mib: usize) -> Vec<u8> {
     bytes
 }
 
-/// An explicit little-endian DICOM file, element by element.
+/// Writer of an explicit little-endian DICOM file.
 pub struct Slice(pub Vec<u8>);
 
 impl Slice {
@@ -91,7 +90,7 @@ impl Slice {
         self
     }
 
-    /// Pixels as one compressed piece behind an empty table.
+    /// Adds pixels as one compressed fragment after an empty offset table.
     fn packed(&mut self, stream: &[u8]) -> &mut Self {
         self.0.extend([0xe0, 0x7f, 0x10, 0, b'O', b'B', 0, 0, 0xff, 0xff, 0xff, 0xff]);
         for piece in [&[], stream] {
@@ -112,10 +111,10 @@ impl Slice {
     }
 }
 
-/// Explicit little-endian, not compressed.
+/// Transfer syntax: explicit little-endian, not compressed.
 const PLAIN: &str = "1.2.840.10008.1.2.1";
 
-/// What is odd about a slice.
+/// Properties of a slice, some of them invalid.
 #[derive(Clone)]
 pub struct Odd {
     pub modality: &'static str,
@@ -131,7 +130,7 @@ pub struct Odd {
     pub pixels: usize,
 }
 
-/// A sound slice at a height.
+/// Returns the properties of the valid slice `k`.
 pub fn sound(k: usize) -> Odd {
     Odd {
         modality: "CT",
@@ -148,7 +147,7 @@ pub fn sound(k: usize) -> Odd {
     }
 }
 
-/// Slice `k` of the ball.
+/// Makes slice `k` of the ball.
 pub fn slice(k: usize, odd: &Odd) -> Vec<u8> {
     let mut slice = Slice([vec![0; 128], b"DICM".to_vec()].concat());
     slice.text(0x0002_0010, b"UI", odd.syntax).text(0x0008_0060, b"CS", odd.modality).text(
@@ -179,7 +178,7 @@ pub fn slice(k: usize, odd: &Odd) -> Vec<u8> {
     slice.0
 }
 
-/// A folder of slices, some of them odd.
+/// Writes a folder of slices; `odd` gives the properties of each.
 pub fn series(folder: &Path, odd: impl Fn(usize) -> Option<Odd>) {
     fs::create_dir_all(folder).unwrap();
     for k in 0..N {
@@ -248,7 +247,7 @@ impl Nifti {
         h
     }
 
-    /// The header and the ball's voxels.
+    /// Returns the header and the ball's voxels.
     pub fn with_ball(&self) -> Vec<u8> {
         let mut bytes = self.header();
         ball().data.iter().for_each(|hu| bytes.extend(hu.to_le_bytes()));
@@ -256,13 +255,13 @@ impl Nifti {
     }
 }
 
-/// The ball as NRRD with lines of its header changed: `from` becomes `to`.
+/// Makes the ball as NRRD with a text of its header changed: `from` becomes `to`.
 pub fn nrrd(from: &str, to: &str) -> Vec<u8> {
     let head = "NRRD0004\ntype: short\ndimension: 3\nspace: RAS\nsizes: 32 32 32\nspace directions: (2,0,0) (0,2,0) (0,0,2)\nendian: little\nencoding: raw\nspace origin: (-31,-31,-31)\n\n";
     text_and_ball(head, from, to)
 }
 
-/// The same as MetaImage.
+/// Makes the ball as MetaImage with a text of its header changed: `from` becomes `to`.
 pub fn meta(from: &str, to: &str) -> Vec<u8> {
     let head = "ObjectType = Image\nNDims = 3\nDimSize = 32 32 32\nElementSpacing = 2 2 2\nOffset = 31 31 -31\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nElementType = MET_SHORT\nElementDataFile = LOCAL\n";
     text_and_ball(head, from, to)
@@ -275,7 +274,7 @@ fn text_and_ball(head: &str, from: &str, to: &str) -> Vec<u8> {
     bytes
 }
 
-/// The sound files, and what is made of them without a header by hand.
+/// Writes the valid files and the invalid ones whose header is not made by hand.
 pub fn make(home: &Path) {
     let place = |name: &str| home.join(name);
     let ct = ball();
@@ -316,7 +315,7 @@ pub fn make(home: &Path) {
     bombs(home);
 }
 
-/// A recording of some ticks, and what is broken of it.
+/// Writes a recording of some ticks, and invalid ones.
 fn recordings(home: &Path) {
     let whole = home.join("whole.mcap");
     let mut recorder = Recorder::create(&whole, &SessionHeader::default()).unwrap();
@@ -330,9 +329,9 @@ fn recordings(home: &Path) {
     fs::create_dir(home.join("no-recordings")).unwrap();
 }
 
-/// Small files that ask for more memory than there is.
+/// Writes small files that need more memory than there is.
 fn bombs(home: &Path) {
-    // 1000 x 1000 x 700 voxels, all there.
+    // 1000 x 1000 x 700 voxels, all of them present.
     let huge = Nifti { dim: [3, 1000, 1000, 700, 1, 1, 1, 1], datatype: 2, bitpix: 8, ..Nifti::default() };
     fs::write(home.join("bomb.nii.gz"), bomb(&huge.header(), 704)).unwrap();
     let head = "NRRD0004\ntype: uchar\ndimension: 3\nspace: RAS\nsizes: 1000 1000 700\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nencoding: gzip\nspace origin: (0,0,0)\n\n";

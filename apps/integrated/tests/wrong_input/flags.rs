@@ -1,4 +1,4 @@
-//! Flags: numbers out of range, names that nobody knows, combinations that mean nothing.
+//! Flags: numbers out of range, unknown names, invalid combinations.
 
 use crate::Wrong;
 

@@ -71,7 +71,7 @@ pub const TABLE: &[Wrong] = &[
     ("no room for a session", "FILES=16 CT=ct.nii --tets 500 --spacing-mm 2", &["too large", "--out"]),
 ];
 
-/// Folders and files of every wrong sort.
+/// Makes invalid folders and files.
 pub fn make(home: &Path) {
     let place = |name: &str| home.join(name);
     let each = |name: &str, odd: &dyn Fn(usize) -> Option<Odd>| files::series(&place(name), odd);
@@ -110,7 +110,7 @@ pub fn make(home: &Path) {
     }
 }
 
-/// Case folders.
+/// Makes invalid case folders.
 fn cases(home: &Path) {
     let card = |form: u32, files: &str| {
         format!(

@@ -1,4 +1,4 @@
-//! Images: missing, cut, changed, of the wrong kind, too large, in another space.
+//! Images: missing, truncated, changed, of the wrong kind, too large, in another space.
 
 use crate::Wrong;
 use crate::files::{Nifti, gz, meta, nrrd};
@@ -45,7 +45,7 @@ pub const TABLE: &[Wrong] = &[
     ("NIfTI with voxels before its head", "CT=offset.nii", &["offset.nii", "vox_offset", "352"]),
     ("NIfTI with voxels behind its end", "CT=beyond.nii", &["beyond.nii", "vox_offset"]),
     ("NIfTI scaled by no number", "CT=slope.nii", &["slope.nii", "scl_slope"]),
-    ("NIfTI that promises more", "CT=promise.nii", &["promise.nii", "limit is 600000000"]),
+    ("NIfTI that declares more", "CT=declares-more.nii", &["declares-more.nii", "limit is 600000000"]),
     ("packed NIfTI that unpacks to all memory", "CT=bomb.nii.gz", &["bomb.nii.gz", "dim", "limit is 600000000"]),
     ("the same as MRI", "MRI=bomb.nii.gz", &["bomb.nii.gz", "GB of memory", "crop"]),
     ("the same as labels", "LABELS=bomb.nii.gz", &["bomb.nii.gz", "GB of memory", "crop"]),
@@ -136,7 +136,7 @@ pub const TABLE: &[Wrong] = &[
     ("registration of a blank", "--ct IN/ct.nii --mri IN/noise.nii --register", &["registration", "contrast", "give"]),
 ];
 
-/// Volumes of every wrong sort.
+/// Writes invalid volumes.
 pub fn make(home: &Path) {
     let put = |name: &str, bytes: Vec<u8>| fs::write(home.join(name), bytes).unwrap();
     put("void.nii", Vec::new());
@@ -234,10 +234,10 @@ fn niftis(put: &dyn Fn(&str, Vec<u8>)) {
         ("offset.nii", Nifti { vox_offset: 100.0, ..Nifti::default() }),
         ("beyond.nii", Nifti { vox_offset: 1e9, ..Nifti::default() }),
         ("slope.nii", Nifti { slope: [f32::NAN, 0.0], ..Nifti::default() }),
-        ("promise.nii", dim([3, 2000, 2000, 2000, 1, 1, 1, 1])),
+        ("declares-more.nii", dim([3, 2000, 2000, 2000, 1, 1, 1, 1])),
     ];
     of.iter().for_each(|(name, nifti)| put(name, nifti.with_ball()));
-    // 900 x 900 x 730 voxels of 8 bytes are under the most that is read, and over 4 GB.
+    // 900 x 900 x 730 voxels of 8 bytes are under the limit for volumes, but over 4 GB.
     let large = Nifti { dim: [3, 900, 900, 730, 1, 1, 1, 1], ..Nifti::default() };
     let piece = gz(&vec![0; 16 << 20]);
     put("large.nii.gz", std::iter::once(gz(&large.header())).chain(std::iter::repeat_n(piece, 71)).flatten().collect());

@@ -1,5 +1,5 @@
-//! What a user can get wrong, as a table: each case exits with 2 within seconds and 4 GB, says
-//! what, where and the remedy, shows no panic, and leaves nothing behind.
+//! Wrong inputs as a table: each case is refused with exit code 2 within 10 s and 4 GB. The message
+//! names fault, place and remedy; there is no panic and no file is left.
 #![cfg(unix)]
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -14,10 +14,11 @@ use std::process::{Command, Output, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// A case: what is wrong, the command line, words that must be said.
+/// A case: its name, the command line, words that the message must contain.
 ///
-/// In the command line `IN` is the folder of files, `OUT` the case's own; `CT=F` gives a file as CT
-/// with a sound MRI and brain, `MRI=F` and `LABELS=F` likewise; `FILES=N` limits the size of files.
+/// In the command line `IN` is the folder of input files and `OUT` the output folder of the case.
+/// `CT=F` gives a file as CT with valid MRI and labels, `MRI=F` and `LABELS=F` likewise. `FILES=N`
+/// limits the size of files.
 pub type Wrong = (&'static str, &'static str, &'static [&'static str]);
 
 /// Longest time of a case.
@@ -25,6 +26,7 @@ const LONGEST: Duration = Duration::from_secs(10);
 /// Address space of a case, KiB.
 const MEMORY_KIB: usize = 4 << 20;
 
+/// Expands a command line of the table into arguments and a limit for the size of files.
 fn expanded(line: &str, home: &Path, own: &Path) -> (Vec<String>, Option<String>) {
     let (mut arguments, mut limit) = (Vec::new(), None);
     let sound = |ct: &str, mri: &str, labels: &str| {
@@ -58,6 +60,7 @@ fn expanded(line: &str, home: &Path, own: &Path) -> (Vec<String>, Option<String>
     (arguments.into_iter().map(place).collect(), limit)
 }
 
+/// Runs a case; returns its output and its wall time.
 fn run(line: &str, home: &Path, own: &Path) -> Result<(Output, Duration), String> {
     let (arguments, limit) = expanded(line, home, own);
     for folder in ["tmp", "here"] {
@@ -69,9 +72,9 @@ fn run(line: &str, home: &Path, own: &Path) -> Result<(Output, Duration), String
     command.args(["-c", &script, "sh", env!("CARGO_BIN_EXE_integrated")]).args(&arguments);
     command.env("TREPAN_CACHE", own.join("cache")).env("TMPDIR", own.join("tmp")).current_dir(own.join("here"));
     command.env("RAYON_NUM_THREADS", "2");
-    let [told, said] = ["stdout", "stderr"].map(|name| fs::File::create(own.join(name)).unwrap());
+    let [stdout, stderr] = ["stdout", "stderr"].map(|name| fs::File::create(own.join(name)).unwrap());
     let began = Instant::now();
-    let mut child = command.stdin(Stdio::null()).stdout(told).stderr(said).spawn().unwrap();
+    let mut child = command.stdin(Stdio::null()).stdout(stdout).stderr(stderr).spawn().unwrap();
     let status = loop {
         match child.try_wait().unwrap() {
             Some(status) => break status,
@@ -91,7 +94,7 @@ fn run(line: &str, home: &Path, own: &Path) -> Result<(Output, Duration), String
     Ok((Output { status, stdout, stderr }, began.elapsed()))
 }
 
-/// Every file and folder below one, but for the folders that the test makes.
+/// Returns every file and folder below one, except the folders that the test makes.
 fn left(own: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(own).unwrap().flatten() {
@@ -107,32 +110,32 @@ fn left(own: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// What is wrong with how a case is refused.
+/// Returns the faults in how a case is refused.
 fn faults((name, line, words): &Wrong, home: &Path, own: &Path) -> Option<String> {
     let (output, took) = match run(line, home, own) {
         Ok(run) => run,
         Err(fault) => return Some(format!("{name}: {fault}")),
     };
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let log = String::from_utf8_lossy(&output.stderr).into_owned();
     let mut faults = Vec::new();
     if output.status.code() != Some(2) {
         faults.push(format!("ends with {:?}", output.status));
     }
-    if ["panicked", "RUST_BACKTRACE", "memory allocation", "overflow"].iter().any(|word| said.contains(word)) {
+    if ["panicked", "RUST_BACKTRACE", "memory allocation", "overflow"].iter().any(|word| log.contains(word)) {
         faults.push("panics".into());
     }
-    if said.chars().any(|c| c.is_control() && c != '\n') {
+    if log.chars().any(|c| c.is_control() && c != '\n') {
         faults.push("moves the terminal".into());
     }
     if took > LONGEST {
         faults.push(format!("takes {took:?}"));
     }
-    faults.extend(words.iter().filter(|word| !said.contains(**word)).map(|word| format!("does not say {word:?}")));
+    faults.extend(words.iter().filter(|word| !log.contains(**word)).map(|word| format!("does not say {word:?}")));
     let left = left(own);
     if !left.is_empty() {
         faults.push(format!("leaves {left:?}"));
     }
-    (!faults.is_empty()).then(|| format!("{name}: {}\n    {line}\n    {said}", faults.join(", ")))
+    (!faults.is_empty()).then(|| format!("{name}: {}\n    {line}\n    {log}", faults.join(", ")))
 }
 
 #[test]
@@ -159,7 +162,7 @@ fn every_wrong_input_is_refused_with_its_remedy() {
 }
 
 #[test]
-fn what_the_wrong_files_are_given_with_is_sound() {
+fn the_valid_files_of_the_table_are_accepted() {
     let home = tempfile::tempdir().unwrap();
     files::make(home.path());
     folders::make(home.path());
@@ -175,8 +178,8 @@ fn what_the_wrong_files_are_given_with_is_sound() {
         let own = tempfile::tempdir().unwrap();
         let line = format!("case build {line} --tets 500 --spacing-mm 2 --out OUT");
         let (output, _) = run(&line, home.path(), own.path()).unwrap();
-        let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
-        assert!(output.status.success(), "{line}: {said}");
-        assert!(!said.contains("may not lie"), "{line}: {said}");
+        let log = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+        assert!(output.status.success(), "{line}: {log}");
+        assert!(!log.contains("may not lie"), "{line}: {log}");
     }
 }

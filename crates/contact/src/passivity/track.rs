@@ -4,7 +4,8 @@
 //! An encoder of step Δ shows x as a staircase: a hand that trembles across one edge seems to jump
 //! by Δ, a slow hand seems to rest and to leap. Two estimates answer that:
 //! ```text
-//! sure way   x̂ ← x̂ while |x - x̂| ≤ Δ/2, else the point at Δ/2 from x towards x̂    a play: at each step it is where the edge is
+//! sure way   x̂ ← x̂ while |x - x̂| ≤ Δ/2, else the point at Δ/2 from x towards x̂
+//!            a play (hysteresis): at each encoder step it is where the edge is
 //! velocity   (x(n) - x(n-L))/L, L the longest window whose chord passes all samples within Δ
 //! ```
 //! The window is short for a fast hand and long for a slow one.

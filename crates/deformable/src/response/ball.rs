@@ -163,9 +163,9 @@ impl Ball {
         Some((sample, depth_mm))
     }
 
-    /// Where triangles matter: as far from the centre as the closest one, as far from the points
-    /// inside as they are deep, and further as normals blend; never beyond a diameter around the
-    /// foot.
+    /// The region in which triangles matter. It reaches as far from the centre as the closest
+    /// triangle, as far from the points inside as they are deep, and further as normals blend,
+    /// never beyond a diameter around the foot.
     fn region(&self, scene: &Scene, hits: &Hits, foot: &Foot, depth_mm: f32) -> Extent {
         let blend_mm = BLEND * scene.radius_mm;
         let mut points = Extent::EMPTY;

@@ -71,9 +71,9 @@ impl Foundation {
         Self { springs: Vec::with_capacity(MAX_SPRINGS), spring_of: vec![NONE; nodes] }
     }
 
-    /// Writes the springs of the ball on the triangles near it: together the force of `spring`
-    /// pressed `depth_mm` deep along `normal`; at depth 0 all wait. Returns how many nodes did not
-    /// fit.
+    /// Writes the springs of the ball on the triangles near it. Together they have the force of
+    /// `spring` pressed `depth_mm` deep along `normal`; at depth 0 all wait. Returns how many nodes
+    /// did not fit.
     pub(crate) fn press(
         &mut self,
         scene: &Scene,

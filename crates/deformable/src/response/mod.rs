@@ -66,9 +66,9 @@ impl Responder {
         }
     }
 
-    /// Writes the springs of the surface under the tool, if the response has any: together the
-    /// force of `spring` pressed `depth_mm` deep along the normal, waiting where that is 0. Returns
-    /// what did not fit.
+    /// Writes the springs of the surface under the tool, if the response has any. Together they
+    /// have the force of `spring` pressed `depth_mm` deep along the normal, and wait where that
+    /// is 0. Returns what did not fit.
     pub(crate) fn press(
         &mut self,
         scene: &Scene,

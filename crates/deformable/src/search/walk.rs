@@ -18,7 +18,7 @@
 //!
 //! ```text
 //!      x   x  ____ →→→→→→→→ ray     o  kept its tetrahedron: walks
-//!   ____o_x__/    surface            x  lost: flood from border and degenerate ones in the box of all x
+//!   ____o_x__/    surface            x  lost: flood from border and degenerate ones near all x
 //! ```
 //!
 //! # Practice

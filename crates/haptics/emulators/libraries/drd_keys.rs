@@ -1,4 +1,4 @@
-//! What a test may set or ask of libdrd's emulator.
+//! Keys that a test may set in or read from libdrd's emulator.
 
 /// Position, m, the maker's axes.
 pub const POSITION_X: u32 = 0;
@@ -28,18 +28,18 @@ pub const CAUSE: u32 = 11;
 pub const POWER: u32 = 12;
 /// 1: auto-initialisation fails.
 pub const STUCK: u32 = 13;
-/// 1: another program has the device.
+/// 1: another program uses the device.
 pub const BUSY: u32 = 14;
 /// 1: forces are refused.
 pub const REFUSES_FORCE: u32 = 15;
-/// 1: the velocity is not known.
+/// 1: the velocity is unknown.
 pub const NO_VELOCITY: u32 = 16;
 /// 1: the firmware has no watchdog.
 pub const NO_WATCHDOG: u32 = 17;
-/// Lets this many ms pass without a call.
+/// Advances time by this many ms without a call.
 pub const SILENCE_MS: u32 = 18;
 
-// To ask only.
+// Read-only.
 /// Force on the motors, N, the maker's axes.
 pub const FORCE_X: u32 = 100;
 /// See [`FORCE_X`].

@@ -1,8 +1,8 @@
-//! An emulator of libdrd: the same symbols and numbers, no device, a firmware watchdog, and time
-//! that the test lets pass.
+//! An emulator of libdrd: the same symbols and numbers, a firmware watchdog, and time that the test
+//! advances.
 //!
-//! Built with `--cfg old` it lacks what old versions lack. A device that is unplugged has no power
-//! and so no force.
+//! Built with `--cfg old` it lacks the functions that old versions lack. An unplugged device has no
+//! power and so no force.
 #![allow(non_snake_case)]
 
 #[path = "drd_keys.rs"]

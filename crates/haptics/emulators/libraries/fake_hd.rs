@@ -1,10 +1,10 @@
 //! An emulator of libHD: the same symbols and numbers, up to two devices, one scheduler, and a
-//! clock that the test turns.
+//! clock that the test advances.
 //!
-//! It keeps the library's rules, so that a driver which breaks them fails its test: see `MISUSE`.
-//! Frames and values belong to the current device, a frame begins once per device and tick, devices
-//! come and go while the scheduler rests, and one callback serves all: of two, one would get no
-//! force.
+//! It enforces the library's rules, so that a driver that breaks them fails its test: see `MISUSE`.
+//! Frames and values belong to the current device. A frame begins once per device and tick. Devices
+//! are added and removed while the scheduler is stopped. One callback serves all: of two, one would
+//! get no force.
 #![allow(non_snake_case)]
 
 #[path = "hd_keys.rs"]
@@ -82,7 +82,7 @@ static FAKE: Mutex<Fake> = Mutex::new(Fake {
     misuse: 0,
 });
 
-/// Held while a callback runs: stopping the scheduler waits for it.
+/// Locked while a callback runs: stopping the scheduler waits for it.
 static TICKING: Mutex<()> = Mutex::new(());
 
 fn with<R>(act: impl FnOnce(&mut Fake) -> R) -> R {
@@ -94,7 +94,7 @@ impl Device {
         self.settings[key as usize]
     }
 
-    /// What keeps the device from giving force, by its own lights.
+    /// The error that prevents force on this device.
     fn trouble(&self) -> u32 {
         match self.get(keys::ERROR) as u32 {
             0 if self.get(keys::VELOCITY_X).abs() > FASTEST_MM_PER_S => 0x0203,
@@ -110,7 +110,7 @@ impl Fake {
         self.errors.push((error, FIRST + self.current as u32));
     }
 
-    /// The place of an open device; anything else is a misuse.
+    /// Index of an open device; any other handle counts as misuse.
     fn place(&mut self, handle: u32) -> Option<usize> {
         let place = handle.wrapping_sub(FIRST) as usize;
         let known = self.devices.get(place).is_some_and(|device| device.open);
@@ -125,7 +125,7 @@ impl Fake {
     }
 }
 
-/// Device and key of a test's key.
+/// Splits a test's key into device and key.
 fn split(key: u32) -> (usize, u32) {
     ((key / 1000) as usize, key % 1000)
 }
@@ -361,7 +361,7 @@ pub extern "C" fn hdUpdateCalibration(style: u32) {
         if style != 0b010 || f.now().applied != [0.0; 6] {
             f.wrong(0x0101);
         }
-        // The device now knows better where it is: its position jumps.
+        // The calibration corrects the position, which jumps.
         f.now().settings[keys::POSITION_X as usize] += 30.0;
         f.now().settings[keys::CALIBRATION as usize] = f64::from(0x5000);
     });

@@ -3,8 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// A copy of an emulated library of its own: a library that the loader has not seen keeps its own
-/// state.
+/// A separate copy of an emulated library: the loader gives each new file its own state.
 pub struct Library {
     library: libloading::Library,
     path: PathBuf,
@@ -22,12 +21,12 @@ impl Library {
         Self::copied(include_bytes!(concat!(env!("OUT_DIR"), "/drd.library")))
     }
 
-    /// libdrd of an older version, without what drivers must do without.
+    /// libdrd of an older version, without its optional functions.
     pub fn old_drd() -> Self {
         Self::copied(include_bytes!(concat!(env!("OUT_DIR"), "/old_drd.library")))
     }
 
-    /// A library without any function of the makers'.
+    /// A library without any of the vendors' functions.
     pub fn nothing() -> Self {
         Self::copied(include_bytes!(concat!(env!("OUT_DIR"), "/nothing.library")))
     }
@@ -46,13 +45,13 @@ impl Library {
         &self.path
     }
 
-    /// Sets what a key stands for.
+    /// Sets the value of a key.
     pub fn set(&self, key: u32, value: f64) {
         // SAFETY: the emulator's own function, of this type.
         unsafe { self.library.get::<extern "C" fn(u32, f64)>(b"fake_set") }.unwrap()(key, value);
     }
 
-    /// Asks what a key stands for.
+    /// Returns the value of a key.
     pub fn get(&self, key: u32) -> f64 {
         // SAFETY: the emulator's own function, of this type.
         unsafe { self.library.get::<extern "C" fn(u32) -> f64>(b"fake_get") }.unwrap()(key)

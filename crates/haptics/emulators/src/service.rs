@@ -1,8 +1,8 @@
-//! An emulator of the Haply Inverse service: a WebSocket server in this process that answers one
-//! for one, and misbehaves on demand.
+//! An emulator of the Haply Inverse service: a WebSocket server in this process, with faults on
+//! demand.
 //!
 //! # Practice
-//! Forces are one-shot, as the service documents them: a connection that ends leaves none.
+//! Forces act once, as the service documents: a connection that ends leaves none.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// What the service says and does.
+/// What the service sends and how it misbehaves.
 #[derive(Clone, Debug)]
 pub struct Behaviour {
     /// Position, m.
@@ -59,24 +59,24 @@ impl Default for Behaviour {
     }
 }
 
-/// What the service was told.
+/// What the service received.
 #[derive(Clone, Debug, Default)]
 pub struct Told {
     /// The force on the motors, N.
     pub force: Option<[f64; 3]>,
-    /// How long after the last change of behaviour there was first no force.
+    /// Time from the last change of behaviour to the first zero force.
     pub no_force_after: Option<Duration>,
     /// Messages on the simulation channel.
     pub messages: u32,
-    /// Demands for a state.
+    /// Requests for a state.
     pub probes: u32,
-    /// Who the client says it is.
+    /// Profile that the client announced.
     pub profile: Option<String>,
-    /// Answers to pings.
+    /// Pongs received.
     pub pongs: u32,
-    /// Closing frames.
+    /// Closing frames received.
     pub goodbyes: u32,
-    /// Unmasked frames, messages that are no JSON, forces that are no numbers.
+    /// Unmasked frames, messages that are not JSON, forces that are not numbers.
     pub misuse: u32,
 }
 
@@ -88,13 +88,13 @@ struct Shared {
 }
 
 impl Shared {
-    /// A fault begins now.
+    /// Starts the clock of a fault.
     fn begin(&self) {
         *self.changed.lock().unwrap() = Instant::now();
         self.told.lock().unwrap().no_force_after = None;
     }
 
-    /// What the motors do now.
+    /// Sets the force on the motors.
     fn drive(&self, force: [f64; 3]) {
         let mut told = self.told.lock().unwrap();
         told.force = Some(force);
@@ -124,18 +124,18 @@ impl Service {
             closing: AtomicBool::new(false),
         });
         let (simulation, one) = listen(shared.clone(), simulate);
-        let (events, two) = listen(shared.clone(), tell_events);
+        let (events, two) = listen(shared.clone(), send_events);
         Self { shared, simulation, events, threads: vec![one, two] }
     }
 
-    /// Changes how it behaves, from now on.
+    /// Changes the behaviour from now on.
     pub fn behave(&self, change: impl FnOnce(&mut Behaviour)) {
         let mut behaviour = self.shared.behaviour.lock().unwrap();
         self.shared.begin();
         change(&mut behaviour);
     }
 
-    /// What it was told so far.
+    /// What it received so far.
     pub fn told(&self) -> Told {
         self.shared.told.lock().unwrap().clone()
     }
@@ -214,7 +214,7 @@ fn simulate(shared: &Shared, mut stream: TcpStream) {
     shared.drive([0.0; 3]);
 }
 
-/// A late reply holds up none that comes after it, and the service goes on listening.
+/// Sends a reply; a late one delays no later ones, and the service keeps listening.
 fn reply(stream: &mut TcpStream, b: &Behaviour) {
     if b.late_ms > 0 {
         let (mut stream, late) = (stream.try_clone().unwrap(), Behaviour { late_ms: 0, ..b.clone() });
@@ -240,7 +240,7 @@ fn reply(stream: &mut TcpStream, b: &Behaviour) {
     }
 }
 
-fn tell_events(shared: &Shared, mut stream: TcpStream) {
+fn send_events(shared: &Shared, mut stream: TcpStream) {
     shake_hands(&mut stream);
     while !shared.closing.load(Ordering::SeqCst) {
         if let Some(event) = shared.behaviour.lock().unwrap().event.take() {
@@ -292,7 +292,7 @@ fn note(shared: &Shared, payload: &[u8]) {
     }
 }
 
-/// Opcode and unmasked payload of the first whole frame.
+/// Opcode and unmasked payload of the first complete frame.
 fn take_frame(shared: &Shared, received: &mut Vec<u8>) -> Option<(u8, Vec<u8>)> {
     let second = *received.get(1)?;
     let (start, length) = match second & 0x7f {

@@ -1,4 +1,4 @@
-//! The functions of libdrd (DHD and DRD) behind safe methods.
+//! Safe wrappers for the functions of libdrd (DHD and DRD).
 //!
 //! # Sources
 //! Force Dimension SDK 3, headers `dhdc.h` and `drdc.h`: names, argument types and numbers only.
@@ -49,7 +49,7 @@ functions! {
 type AngularVelocity = unsafe extern "system" fn(*mut f64, *mut f64, *mut f64, c_char) -> c_int;
 type HasActiveWrist = unsafe extern "system" fn(c_char) -> u8;
 
-/// libdrd, and what older versions of it lack.
+/// libdrd, with the functions that older versions lack as options.
 #[derive(Clone, Copy)]
 pub(super) struct Drd {
     functions: Functions,
@@ -57,17 +57,18 @@ pub(super) struct Drd {
     has_active_wrist: Option<HasActiveWrist>,
 }
 
-/// What a call said.
+/// The result of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
     Done,
-    /// The library found the call too early and did not talk to the device.
+    /// The call came too early, so that the library did not query the device.
     TooSoon,
     Failed,
 }
 
 impl Outcome {
-    /// Negative is a failure; 2 (motors saturated, direction kept) is a success.
+    /// Converts a return code: negative is a failure; 2 (motors saturated, direction kept) is a
+    /// success.
     fn of(code: c_int) -> Self {
         if code < 0 {
             Self::Failed
@@ -98,7 +99,7 @@ impl Drd {
 
     /// Id of the device at `index`.
     pub(super) fn open(&self, index: i8) -> Option<i8> {
-        // SAFETY: numbers; here and below a bad id only returns an error.
+        // SAFETY: numbers; here and below an invalid id only returns an error.
         let id = unsafe { (self.functions.drdOpenID)(index as c_char) };
         i8::try_from(id).ok().filter(|id| *id >= 0)
     }
@@ -128,13 +129,13 @@ impl Drd {
         unsafe { (self.functions.drdIsInitialized)(id as c_char) != 0 }
     }
 
-    /// Lets the device find its zero. It moves by itself.
+    /// Lets the device find its zero; it moves by itself.
     pub(super) fn auto_init(&self, id: i8) -> Outcome {
         // SAFETY: as above.
         Outcome::of(unsafe { (self.functions.drdAutoInit)(id as c_char) })
     }
 
-    /// Ends regulation, so that the caller's force counts.
+    /// Ends regulation, so that the caller's force takes effect.
     pub(super) fn stop_regulation(&self, id: i8) -> Outcome {
         // SAFETY: as above.
         Outcome::of(unsafe { (self.functions.drdStop)(1, id as c_char) })
@@ -150,13 +151,13 @@ impl Drd {
         Outcome::of(unsafe { (self.functions.dhdSetGravityCompensation)(1, id as c_char) })
     }
 
-    /// Motors off, brakes on.
+    /// Turns the motors off and the brakes on.
     pub(super) fn stop(&self, id: i8) {
         // SAFETY: as above.
         unsafe { (self.functions.dhdStop)(id as c_char) };
     }
 
-    /// The firmware drops the force when it hears nothing for `steps` of 125 µs.
+    /// Sets the firmware watchdog: force is dropped after `steps` of 125 µs without a call.
     pub(super) fn set_watchdog(&self, id: i8, steps: u8) -> Outcome {
         // SAFETY: as above.
         unsafe {
@@ -171,12 +172,12 @@ impl Drd {
     pub(super) fn pose(&self, id: i8) -> (Outcome, [f64; 3], [[f64; 3]; 3]) {
         let (mut p, mut rows) = ([0.0; 3], [[0.0; 3]; 3]);
         let [x, y, z] = &mut p;
-        // SAFETY: pointers to what the header asks for, alive during the call.
+        // SAFETY: pointers to the types in the header, valid during the call.
         let code = unsafe { (self.functions.dhdGetPositionAndOrientationFrame)(x, y, z, &raw mut rows, id as c_char) };
         (Outcome::of(code), p, rows)
     }
 
-    /// Linear velocity, m/s; zero while the library has not seen enough positions.
+    /// Linear velocity, m/s; zero until the library has seen enough positions.
     pub(super) fn linear_velocity(&self, id: i8) -> [f64; 3] {
         let mut v = [0.0; 3];
         let [x, y, z] = &mut v;
@@ -185,7 +186,7 @@ impl Drd {
         if Outcome::of(code) == Outcome::Failed { [0.0; 3] } else { v }
     }
 
-    /// Angular velocity, rad/s; zero where the library does not know it.
+    /// Angular velocity, rad/s; zero where the library does not provide it.
     pub(super) fn angular_velocity(&self, id: i8) -> [f64; 3] {
         let mut v = [0.0; 3];
         let [x, y, z] = &mut v;
@@ -199,22 +200,22 @@ impl Drd {
         unsafe { (self.functions.dhdGetButtonMask)(id as c_char) }
     }
 
-    /// Force in N, torque in N m.
+    /// Applies a force in N and a torque in N m.
     pub(super) fn set_wrench(&self, id: i8, f: [f64; 3], t: [f64; 3]) -> Outcome {
         let set = self.functions.dhdSetForceAndTorqueAndGripperForce;
         // SAFETY: as above.
         Outcome::of(unsafe { set(f[0], f[1], f[2], t[0], t[1], t[2], 0.0, id as c_char) })
     }
 
-    /// The status numbers, if the device tells them.
+    /// The status values, if the device reports them.
     pub(super) fn status(&self, id: i8) -> Option<[c_int; 32]> {
         let mut status = [0; 32];
-        // SAFETY: the header asks for 17 numbers; 32 leave room for later versions.
+        // SAFETY: the header specifies 17 numbers; 32 leave room for later versions.
         let code = unsafe { (self.functions.dhdGetStatus)(status.as_mut_ptr(), id as c_char) };
         (Outcome::of(code) != Outcome::Failed).then_some(status)
     }
 
-    /// The vendor's words for the last error.
+    /// The vendor's text for the last error.
     pub(super) fn last_error(&self) -> String {
         // SAFETY: the library returns null or a C string of its own that lives as long as it does.
         unsafe { owned((self.functions.dhdErrorGetLastStr)()) }
@@ -227,6 +228,6 @@ unsafe fn owned(text: *const c_char) -> String {
     if text.is_null() {
         return "no description".to_owned();
     }
-    // SAFETY: not null, and the caller vouches for the rest.
+    // SAFETY: not null; the caller guarantees the rest.
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }

@@ -1,8 +1,8 @@
 //! The messages of the Haply Inverse service, version 3.5.
 //!
 //! # Practice
-//! Entries are read one by one: a bad one does not lose the others. A missing array means "no
-//! news".
+//! Entries are parsed one by one, so that a malformed one does not lose the others. A missing array
+//! means "unchanged".
 //!
 //! # Sources
 //! Haply Inverse SDK documentation: WebSocket protocol, control commands, events.
@@ -12,12 +12,12 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use trepan_geometry::{Buttons, Quat, Vec3};
 
-/// What one frame of the service says about the device.
+/// The contents of one frame of the service about the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Frame {
     /// Position, m, and velocity, m/s, service axes.
     pub cursor: Option<(Vec3, Vec3)>,
-    /// Whether force may be given, and if not, why.
+    /// Whether force may be applied, and if not, why.
     pub status: Option<Result<(), Fault>>,
     /// Orientation of the grip.
     pub orientation: Option<Quat>,
@@ -71,32 +71,32 @@ struct GripButtons {
     b: bool,
 }
 
-/// What is wrong with a message.
+/// Why a message is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Garbled {
-    /// No JSON, or not an object.
+    /// Not JSON, or not an object.
     NotJson,
-    /// Lists of devices are maps: a service before 3.5.
+    /// Device lists are maps: the service is older than 3.5.
     TooOld,
 }
 
-/// Ids of the devices in the service's inventory; of `wanted` only, if it is given.
+/// Ids of the devices in the service's inventory; only `wanted`, if given.
 pub(super) fn devices(message: &str, wanted: Option<&str>) -> Result<Vec<String>, Garbled> {
     let message = object(message)?;
     let ids = entries(&message, "inverse3").filter_map(|entry| entry["device_id"].as_str());
     Ok(ids.filter(|id| wanted.is_none_or(|wanted| wanted.eq_ignore_ascii_case(id))).map(str::to_owned).collect())
 }
 
-/// The grip to listen to: the wanted one, or the first that is listed.
+/// Id of the grip to read: `wanted`, or the first listed.
 pub(super) fn grip(message: &str, wanted: Option<&str>) -> Option<String> {
     let message = object(message).ok()?;
     let listed = grips(&message).find_map(|entry| entry["device_id"].as_str().map(str::to_owned));
     wanted.map(str::to_uppercase).or(listed)
 }
 
-/// What a message says about `device` and `grip`, without which any grip will do. A grip in several
-/// lists is read once. `None` in its place means that the device is not in a list that is there:
-/// gone.
+/// Parses the entries for `device` and `grip` (any grip if `None`) from a message. A grip in
+/// several lists is read once. Returns `None` if the device list exists but lacks the device: it is
+/// disconnected.
 pub(super) fn frame(message: &str, device: &str, grip: Option<&str>) -> Result<Option<Frame>, Garbled> {
     let message = object(message)?;
     let mut frame = Frame::default();
@@ -122,7 +122,7 @@ pub(super) fn frame(message: &str, device: &str, grip: Option<&str>) -> Result<O
     Ok(Some(frame))
 }
 
-/// The first message: who we are.
+/// The first message: announces this client.
 pub(super) fn hello(device: &str) -> String {
     json!({
         "session": {"configure": {"profile": {"name": "trepan"}}},
@@ -131,13 +131,13 @@ pub(super) fn hello(device: &str) -> String {
     .to_string()
 }
 
-/// A force to give, N, service axes.
+/// The command for a force, N, in service axes.
 pub(super) fn force(device: &str, force: Vec3) -> String {
     let vector = json!({"x": force.x, "y": force.y, "z": force.z});
     json!({"inverse3": [{"device_id": device, "commands": {"set_cursor_force": {"vector": vector}}}]}).to_string()
 }
 
-/// An event of the service that bears on force.
+/// An event of the service that affects the force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Event {
     /// The emergency brake is on, until it is released.
@@ -146,11 +146,11 @@ pub(super) enum Event {
     Released,
     /// The motors stalled.
     Stalled,
-    /// A device is gone.
+    /// A device was disconnected.
     Disconnected,
 }
 
-/// What an event tells; `None` for the many that do not bear on force, and for unknown ones.
+/// Parses an event; `None` for unknown events and those that do not affect the force.
 pub(super) fn event(message: &str) -> Option<Event> {
     let event = object(message).ok()?;
     match (event["name"].as_str()?, event["data"]["safety_type"].as_str()) {
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wanted_grip_is_heard_wherever_it_is_listed() {
+    fn the_requested_grip_is_read_from_any_list() {
         let entry = |id: &str, a: bool| format!(r#"{{"device_id":"{id}","state":{{"buttons":{{"a":{a}}}}}}}"#);
         let (left, right) = (entry("60BD", false), entry("71CE", true));
         let message = format!(r#"{{"wireless_verse_grip":[{left}],"custom_verse_grip":[{left},{right}]}}"#);
@@ -240,13 +240,13 @@ mod tests {
     }
 
     #[test]
-    fn absence_of_a_list_is_no_news_and_absence_from_it_is_loss() {
+    fn a_missing_list_is_unchanged_and_a_missing_entry_is_a_loss() {
         assert_eq!(frame("{}", "049D", None), Ok(Some(Frame::default())));
         assert_eq!(frame(r#"{"inverse3":[]}"#, "049D", None), Ok(None));
     }
 
     #[test]
-    fn an_old_service_and_garbage_are_told_apart() {
+    fn an_old_service_and_invalid_messages_are_distinguished() {
         assert_eq!(frame(r#"{"inverse3":{"049D":{}}}"#, "049D", None), Err(Garbled::TooOld));
         assert_eq!(frame("{\"inverse3", "049D", None), Err(Garbled::NotJson));
         assert_eq!(frame("[1]", "049D", None), Err(Garbled::NotJson));
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn events_that_bear_on_force_are_told_from_others() {
+    fn events_that_affect_force_are_recognised() {
         let safety =
             |kind: &str| event(&format!(r#"{{"name":"device-safety-triggered","data":{{"safety_type":"{kind}"}}}}"#));
         assert_eq!(safety("ebrake_triggered"), Some(Event::Braked));

@@ -1,9 +1,9 @@
-//! The thread that talks to the service: one message out, one back, at the haptic loop's pace.
+//! The thread that exchanges messages with the service: one out, one back, at the haptic rate.
 //!
 //! # Practice
-//! The loop's `apply` wakes the thread; a loop that is silent for [`SILENT`] gets no force. A reply
-//! later than [`LATE`] cuts the force, on the wire too, until it comes; without one for [`GONE`]
-//! the device is lost.
+//! The loop's `apply` wakes the thread. A loop silent for [`SILENT`] gets no force. A reply later
+//! than [`LATE`] sets the force to zero, in the service too, until it arrives; without one for
+//! [`GONE`] the device is lost.
 
 use super::protocol::{self, Event, Frame};
 use super::websocket::WebSocket;
@@ -16,44 +16,44 @@ use std::time::Duration;
 use trepan_geometry::Vec3;
 use triple_buffer::{Input, Output};
 
-/// An exchange counts as so long for the ramp, ms: the service's usual pace.
+/// Duration that an exchange counts for in the ramp, ms: the service's usual period.
 const TICK_MS: f32 = 1.0;
-/// Within 10 ms there is no force: the rest is for the message's way.
+/// Silence of the loop that cuts the force: 8 ms, since 10 ms includes the message's transit.
 const SILENT: Duration = Duration::from_millis(8);
-/// Systems wake a waiting socket up to 4 ms late.
+/// Reply time that counts as late: the operating system may wake a waiting socket 4 ms late.
 const LATE: Duration = Duration::from_millis(4);
 const GONE: Duration = Duration::from_millis(1000);
-/// How long the listener waits before it looks whether the driver closes.
+/// How long the event listener waits before it checks for closing.
 const LISTEN: Duration = Duration::from_millis(20);
-/// Messages in a row without sense after which the device is lost.
+/// Consecutive invalid messages after which the device is lost.
 const MAX_GARBLED: u32 = 100;
 
-/// What the service last said.
+/// The latest state from the service.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct News {
     pub number: u64,
     pub frame: Frame,
 }
 
-/// What the loop last asked for, N, service axes.
+/// The latest force requested by the loop, N, service axes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Command {
     pub number: u64,
     pub force: Vec3,
-    /// Age of the pose that it was made for, ms.
+    /// Age of the pose that the force was computed for, ms.
     pub pose_age_ms: f64,
 }
 
-/// Flags that both threads see.
+/// Flags shared by both threads.
 #[derive(Debug, Default)]
 pub(super) struct Flags {
-    /// The driver wants the thread to end.
+    /// The driver asks the thread to end.
     pub closing: AtomicBool,
-    /// The device is gone.
+    /// The device is disconnected.
     pub lost: AtomicBool,
-    /// Brakes as the service's events tell.
+    /// Whether an event reported the brakes on.
     pub braked: AtomicBool,
-    /// The motors stalled, or a device went, since the last look: a rest, once.
+    /// The motors stalled or a device disconnected since the last check: cuts the force once.
     pub cut_once: AtomicBool,
 }
 
@@ -61,21 +61,21 @@ pub(super) struct Flags {
 pub(super) struct Pump {
     pub socket: WebSocket,
     pub device: String,
-    /// Id of the grip; any where there is none.
+    /// Id of the grip; `None` accepts any.
     pub grip: Option<String>,
     pub news: Input<News>,
-    pub wishes: Output<Command>,
+    pub commands: Output<Command>,
     pub flags: Arc<Flags>,
     pub watch: Watch,
     pub ramp: Ramp,
     pub known: Frame,
     pub number: u64,
-    /// Messages without sense in a row.
+    /// Consecutive invalid messages.
     pub garbled: u32,
 }
 
 impl Pump {
-    /// Runs until the driver closes or the device is lost; the last message asks for no force.
+    /// Runs until the driver closes or the device is lost; the last message sets zero force.
     pub(super) fn run(mut self) {
         let mut last = 0;
         while !self.flags.closing.load(Ordering::Acquire) {
@@ -94,31 +94,31 @@ impl Pump {
         self.socket.close();
     }
 
-    /// Waits for the loop, and gives the force to send.
+    /// Waits for the loop, then returns the force to send.
     fn next_force(&mut self, last: &mut u64) -> Vec3 {
-        // Forget wake-ups for wishes that were read already: the one that counts is still to come.
+        // Discard wake-ups for commands already read: the current one is still to come.
         thread::park_timeout(Duration::ZERO);
-        if self.wishes.read().number == *last {
+        if self.commands.read().number == *last {
             thread::park_timeout(SILENT);
         }
-        let wish = *self.wishes.read();
-        let silent = wish.number == *last;
-        *last = wish.number;
+        let command = *self.commands.read();
+        let silent = command.number == *last;
+        *last = command.number;
         if let Err(fault) = self.known.status.unwrap_or(Err(Fault::NotCalibrated)) {
             self.ramp.cut(fault);
         } else if self.flags.braked.load(Ordering::Acquire) || self.flags.cut_once.swap(false, Ordering::AcqRel) {
             self.ramp.cut(Fault::Braked);
-        } else if silent && wish.number > 0 {
+        } else if silent && command.number > 0 {
             self.ramp.cut(Fault::LoopSilent);
-        } else if wish.pose_age_ms > STALE_MS {
+        } else if command.pose_age_ms > STALE_MS {
             self.ramp.cut_again_or(Fault::Stale);
         }
         let share = self.ramp.share(TICK_MS);
-        if wish.force.is_finite() { wish.force * share } else { Vec3::ZERO }
+        if command.force.is_finite() { command.force * share } else { Vec3::ZERO }
     }
 
-    /// One message out, one back. While the answer is late the service is told once more that no
-    /// force is wanted: it may still listen.
+    /// Sends one message and receives one. While the answer is late, zero force is sent once more:
+    /// the service may still receive it.
     fn exchange(&mut self, force: Vec3) -> io::Result<()> {
         self.socket.send(&protocol::force(&self.device, force))?;
         let mut owed = 1;
@@ -153,7 +153,7 @@ impl Pump {
         Ok(())
     }
 
-    /// Lays a frame over what is known: what it does not mention stays.
+    /// Merges a frame into the published state; missing fields keep their values.
     fn publish(&mut self, frame: Frame) {
         let known = &mut self.known;
         known.status = frame.status.or(known.status);
@@ -167,14 +167,14 @@ impl Pump {
     }
 }
 
-/// Listens to the service's events until the driver closes: brakes and losses show there first.
+/// Listens to the service's events until the driver closes: they report brakes and losses first.
 pub(super) fn listen(mut events: WebSocket, flags: &Flags) {
     while !flags.closing.load(Ordering::Acquire) && !flags.lost.load(Ordering::Acquire) {
         match events.receive(LISTEN) {
             Ok(Some(message)) => match protocol::event(&message) {
                 Some(Event::Braked) => flags.braked.store(true, Ordering::Release),
                 Some(Event::Released) => flags.braked.store(false, Ordering::Release),
-                // Whether it was ours, the next state tells: its list lacks the device.
+                // The next state shows whether it was this device: its list then lacks it.
                 Some(Event::Stalled | Event::Disconnected) => flags.cut_once.store(true, Ordering::Release),
                 None => {}
             },

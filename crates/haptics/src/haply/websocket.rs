@@ -2,8 +2,8 @@
 //! bounded.
 //!
 //! # Practice
-//! The handshake's nonce is the standard's own example and masks come from a counter: their
-//! randomness guards caches between machines, and there are none on loopback.
+//! The handshake uses the nonce of the standard's example, and masks come from a counter. Their
+//! randomness only protects caches between machines; a loopback connection has none.
 //!
 //! # Sources
 //! RFC 6455.
@@ -17,7 +17,7 @@ use std::time::Duration;
 
 /// Longest message that is read, bytes.
 const MAX_MESSAGE: usize = 1 << 20;
-/// Longest reply to the handshake, bytes.
+/// Longest handshake reply that is read, bytes.
 const MAX_HANDSHAKE: usize = 8 << 10;
 const NONCE: &str = "dGhlIHNhbXBsZSBub25jZQ==";
 const ANSWER_TO_NONCE: &str = "s3pPLMBiTxaQ9kYGzzhZRbK+xOo=";
@@ -36,14 +36,14 @@ pub(super) struct WebSocket {
     stream: TcpStream,
     /// Bytes received and not yet used.
     received: Vec<u8>,
-    /// The text message in the making.
+    /// The text message that is being assembled.
     message: Vec<u8>,
     frame: Vec<u8>,
     masks: u32,
 }
 
 impl WebSocket {
-    /// Connects to `address` (`host:port`) within `patience`.
+    /// Connects to `address` (`host:port`); fails after `patience`.
     pub(super) fn connect(address: &str, patience: Duration) -> Result<Self> {
         let mut refused = Error::new(ErrorKind::AddrNotAvailable, "no such host");
         for candidate in address.to_socket_addrs()? {
@@ -60,7 +60,7 @@ impl WebSocket {
         self.send_frame(TEXT, text.as_bytes())
     }
 
-    /// The next message; `None` when none came within `patience`.
+    /// Returns the next message; `None` when none arrived within `patience`.
     pub(super) fn receive(&mut self, patience: Duration) -> Result<Option<String>> {
         self.stream.set_read_timeout(Some(patience))?;
         loop {
@@ -75,7 +75,7 @@ impl WebSocket {
         }
     }
 
-    /// Says goodbye; the connection may already be gone.
+    /// Sends a closing frame; the connection may already be closed.
     pub(super) fn close(mut self) {
         let _ = self.send_frame(CLOSE, &1000u16.to_be_bytes());
     }
@@ -107,7 +107,7 @@ impl WebSocket {
         Ok(socket)
     }
 
-    /// Reads what is there; false when nothing came in time.
+    /// Reads the bytes available; false when none arrived in time.
     fn fill(&mut self) -> Result<bool> {
         let mut bytes = [0; 4096];
         match self.stream.read(&mut bytes) {
@@ -122,7 +122,7 @@ impl WebSocket {
         }
     }
 
-    /// First byte and payload of a whole frame, when one has been received.
+    /// Removes the first complete frame from the buffer: its first byte and payload.
     fn take_frame(&mut self) -> Result<Option<(u8, Vec<u8>)>> {
         let Some((start, end)) = frame_bounds(&self.received)? else { return Ok(None) };
         let first = self.received[0];
@@ -131,7 +131,7 @@ impl WebSocket {
         Ok(Some((first, payload)))
     }
 
-    /// Handles a frame; gives the message that it completes.
+    /// Handles a frame; returns the message that it completes.
     fn frame(&mut self, first: u8, payload: Vec<u8>) -> Result<Option<String>> {
         match first & 0x0f {
             CONTINUATION | TEXT | BINARY => {
@@ -145,7 +145,7 @@ impl WebSocket {
                 let complete = first & FINAL != 0;
                 Ok(complete.then(|| String::from_utf8_lossy(&self.message).into_owned()))
             }
-            CLOSE => Err(Error::new(ErrorKind::ConnectionAborted, "the service said goodbye")),
+            CLOSE => Err(Error::new(ErrorKind::ConnectionAborted, "the service closed the connection")),
             PING => self.send_frame(PONG, &payload).map(|()| None),
             _ => Ok(None),
         }
@@ -173,7 +173,7 @@ impl WebSocket {
     }
 }
 
-/// Start and end of the payload of the frame at the start of `bytes`; `None` while it is not whole.
+/// Start and end of the payload of the first frame in `bytes`; `None` while incomplete.
 fn frame_bounds(bytes: &[u8]) -> Result<Option<(usize, usize)>> {
     let Some(&second) = bytes.get(1) else { return Ok(None) };
     if second & MASKED != 0 {

@@ -1,4 +1,4 @@
-//! The functions of libHD behind safe methods.
+//! Safe wrappers for the functions of libHD.
 //!
 //! # Sources
 //! OpenHaptics programmer's guide and API reference (HDAPI 3): names, argument types and numbers
@@ -60,7 +60,7 @@ functions! {
     }
 }
 
-/// Most errors that are taken from the stack at once.
+/// Most errors taken from the stack at once.
 const MAX_ERRORS: usize = 64;
 
 /// libHD.
@@ -70,13 +70,13 @@ pub(super) struct Hd {
 }
 
 impl Hd {
-    /// Loads the library; also its name.
+    /// Loads the library; also returns its name.
     pub(super) fn load(path: Option<&Path>) -> Result<(Self, String), DeviceError> {
         let library = Loaded::open(path, NAMES, INSTALL)?;
         Ok((Self { functions: Functions::load(&library)? }, library.name().to_owned()))
     }
 
-    /// Handle of the device of this name; `None` as name is the first one.
+    /// Initialises the device of this name and returns its handle; `None` opens the first device.
     pub(super) fn init_device(&self, name: Option<&str>) -> Option<u32> {
         let name = name.map(CString::new).transpose().ok()?;
         let pointer = name.as_ref().map_or(std::ptr::null(), |name| name.as_ptr());
@@ -86,7 +86,7 @@ impl Hd {
     }
 
     pub(super) fn disable_device(&self, device: u32) {
-        // SAFETY: a handle; a bad one only raises an error.
+        // SAFETY: a handle; an invalid one only raises an error.
         unsafe { (self.functions.hdDisableDevice)(device) }
     }
 
@@ -106,7 +106,7 @@ impl Hd {
     }
 
     pub(super) fn enable(&self, capability: u32) {
-        // SAFETY: a number; a bad one only raises an error.
+        // SAFETY: a number; an invalid one only raises an error.
         unsafe { (self.functions.hdEnable)(capability) }
     }
 
@@ -122,7 +122,7 @@ impl Hd {
         value[0]
     }
 
-    /// The values of a parameter, as many as it has; the rest is zero.
+    /// The values of a parameter; unused elements are zero.
     pub(super) fn doubles(&self, what: u32) -> [f64; 16] {
         let mut values = [0.0; 16];
         // SAFETY: no parameter has more than 16 doubles.
@@ -140,14 +140,14 @@ impl Hd {
         unsafe { owned((self.functions.hdGetString)(what)) }
     }
 
-    /// Takes the newest error from the stack: its code, and the device that it names.
+    /// Takes the newest error from the stack: its code and its device.
     pub(super) fn next_error(&self) -> Option<(u32, u32)> {
         // SAFETY: no arguments.
         let ErrorInfo { code, device, .. } = unsafe { (self.functions.hdGetError)() };
         (code != codes::SUCCESS).then_some((code, device))
     }
 
-    /// The newest error's code, after which the stack is empty; `SUCCESS` for none.
+    /// Empties the error stack and returns the newest code; `SUCCESS` for none.
     pub(super) fn drain_errors(&self) -> u32 {
         let mut errors = (0..MAX_ERRORS).map_while(|_| self.next_error());
         let newest = errors.next().map_or(codes::SUCCESS, |(code, _)| code);
@@ -155,7 +155,7 @@ impl Hd {
         newest
     }
 
-    /// The vendor's words for an error.
+    /// The vendor's text for an error.
     pub(super) fn describe(&self, code: u32) -> String {
         // SAFETY: the library returns null or a C string of its own that lives as long as it does.
         let words = unsafe { owned((self.functions.hdGetErrorString)(code)) };
@@ -168,7 +168,7 @@ impl Hd {
     }
 
     pub(super) fn update_calibration(&self, style: u32) {
-        // SAFETY: a number; a bad one only raises an error.
+        // SAFETY: a number; an invalid one only raises an error.
         unsafe { (self.functions.hdUpdateCalibration)(style) }
     }
 
@@ -182,16 +182,16 @@ impl Hd {
         unsafe { (self.functions.hdStartScheduler)() }
     }
 
-    /// Runs `rota` on the library's own thread once per tick, from the scheduler's start until
+    /// Runs `group` on the library's thread once per tick, from the scheduler's start until
     /// [`Hd::stop`].
-    pub(super) fn schedule(&self, rota: Box<ServoGroup>) -> Scheduled {
-        let data = Box::into_raw(rota);
+    pub(super) fn schedule(&self, group: Box<ServoGroup>) -> Scheduled {
+        let data = Box::into_raw(group);
         // SAFETY: `data` stays allocated until `stop`, which first stops the scheduler.
         let handle = unsafe { (self.functions.hdScheduleAsynchronous)(tick, data.cast(), codes::MAX_PRIORITY) };
         Scheduled { handle, data }
     }
 
-    /// Stops the scheduler, which waits for a running callback, and takes the rota back.
+    /// Stops the scheduler, which waits for a running callback, and returns the servo group.
     pub(super) fn stop(&self, scheduled: Scheduled) -> Box<ServoGroup> {
         // SAFETY: after these two calls the library does not use `data` any more; it came from a
         // box in `schedule`.
@@ -203,21 +203,20 @@ impl Hd {
     }
 }
 
-/// A rota in the library's hands.
+/// A servo group that the library's scheduler calls.
 pub(super) struct Scheduled {
     handle: c_ulong,
     data: *mut ServoGroup,
 }
 
-// SAFETY: the pointer is only turned back into the box that it came from, and `ServoGroup` is
-// `Send`.
+// SAFETY: the pointer is only converted back to its own box, and `ServoGroup` is `Send`.
 unsafe impl Send for Scheduled {}
 
-/// What the library calls once per tick.
+/// The callback that the library calls once per tick.
 extern "system" fn tick(data: *mut c_void) -> u32 {
-    // SAFETY: `data` is the rota given to `schedule`, which nobody else touches until `stop`.
-    let rota = unsafe { &mut *data.cast::<ServoGroup>() };
-    rota.tick()
+    // SAFETY: `data` is the group given to `schedule`; nothing else accesses it until `stop`.
+    let group = unsafe { &mut *data.cast::<ServoGroup>() };
+    group.tick()
 }
 
 /// # Safety
@@ -226,6 +225,6 @@ unsafe fn owned(text: *const c_char) -> String {
     if text.is_null() {
         return "no description".to_owned();
     }
-    // SAFETY: not null, and the caller vouches for the rest.
+    // SAFETY: not null; the caller guarantees the rest.
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }

@@ -1,9 +1,9 @@
-//! The one scheduler of libHD, which all its devices share.
+//! The single scheduler of libHD, which all its devices share.
 //!
 //! # Practice
-//! Of two callbacks only one gets force, so that one callback serves all devices in turn. Devices
-//! come and go while the scheduler rests, as the maker asks: the others are without force for that
-//! moment, then their force ramps in again.
+//! Of two callbacks only one gets force, so one callback serves all devices in turn. Devices are
+//! added and removed while the scheduler is stopped, as the maker requires. The others have no
+//! force for that moment, then it ramps in again.
 
 use super::codes;
 use super::library::{Hd, Scheduled};
@@ -11,7 +11,7 @@ use super::servo::{Servo, ServoGroup};
 use crate::DeviceError;
 use std::sync::{Mutex, PoisonError};
 
-/// Ticks a second.
+/// Scheduler rate, Hz.
 pub(super) const RATE_HZ: u32 = 1000;
 
 /// The scheduler of each library that has a device open.
@@ -22,8 +22,8 @@ struct Scheduler {
     running: Scheduled,
 }
 
-/// Opens one more device while the scheduler rests, and serves it from then on; gives what `open`
-/// says of it. `refused` words a scheduler that does not start.
+/// Opens one more device while the scheduler is stopped, then serves it; returns the result of
+/// `open`. `refused` converts the error of a scheduler that does not start.
 pub(super) fn add<T>(
     hd: Hd,
     library: &str,
@@ -49,7 +49,7 @@ pub(super) fn add<T>(
     Ok(said)
 }
 
-/// Switches a device off and goes on serving the others.
+/// Removes a device and continues to serve the others.
 pub(super) fn remove(hd: Hd, library: &str, device: u32) {
     let mut schedulers = SCHEDULERS.lock().unwrap_or_else(PoisonError::into_inner);
     without(hd, library, device, &mut schedulers);
@@ -61,18 +61,18 @@ fn without(hd: Hd, library: &str, device: u32, schedulers: &mut Vec<Scheduler>) 
     go_on(hd, library, servos, schedulers);
 }
 
-/// Serves the others again. Should the scheduler not start, their missing samples tell.
+/// Restarts the scheduler for the others. If it fails, their missing samples show it.
 fn go_on(hd: Hd, library: &str, servos: Vec<Servo>, schedulers: &mut Vec<Scheduler>) {
     let _ = start(hd, library, servos, schedulers);
 }
 
-/// Stops the library's scheduler, and gives back whom it served.
+/// Stops the library's scheduler and returns the devices that it served.
 fn rest(hd: Hd, library: &str, schedulers: &mut Vec<Scheduler>) -> Vec<Servo> {
     let place = schedulers.iter().position(|scheduler| scheduler.library == library);
     place.map_or_else(Vec::new, |place| hd.stop(schedulers.swap_remove(place).running).servos)
 }
 
-/// Starts the scheduler where there is somebody to serve; the error is the library's.
+/// Starts the scheduler if there are devices; the error is the library's code.
 fn start(hd: Hd, library: &str, mut servos: Vec<Servo>, schedulers: &mut Vec<Scheduler>) -> Result<(), u32> {
     if servos.is_empty() {
         return Ok(());
@@ -81,7 +81,7 @@ fn start(hd: Hd, library: &str, mut servos: Vec<Servo>, schedulers: &mut Vec<Sch
     let running = hd.schedule(Box::new(ServoGroup { hd, servos }));
     schedulers.push(Scheduler { library: library.to_owned(), running });
     hd.set_scheduler_rate(RATE_HZ);
-    hd.drain_errors(); // A rate that the link cannot have leaves the default, which is 1 kHz.
+    hd.drain_errors(); // An unsupported rate leaves the default, 1 kHz.
     hd.start_scheduler();
     match hd.drain_errors() {
         codes::SUCCESS => Ok(()),

@@ -1,11 +1,10 @@
-//! What runs on libHD's own thread, once per millisecond: sense, publish, command, for one device
-//! after the other.
+//! The servo callback on libHD's thread, once per millisecond and device: sense, publish, command.
 //!
 //! # Practice
-//! The force is what the haptic loop last asked for, as long as that is younger than
-//! [`SILENT_TICKS`] ticks and was thought out for a pose younger than [`STALE_MS`]: neither a loop
-//! that died nor a pause of the library leaves its last force on the motors. After any fault the
-//! force rests, then ramps in. A device that is lost leaves the others alone.
+//! The applied force is the haptic loop's latest command if it is younger than [`SILENT_TICKS`]
+//! ticks and its pose younger than [`STALE_MS`]. So neither a dead loop nor a pause of the library
+//! leaves the last force on the motors. After any fault the force is zero, then ramps in. A lost
+//! device does not affect the others.
 
 use super::codes;
 use super::library::Hd;
@@ -17,10 +16,10 @@ use triple_buffer::{Input, Output};
 const TICK_MS: f32 = 1e3 / super::scheduler::RATE_HZ as f32;
 /// Ticks without a new command after which the force is cut.
 pub(super) const SILENT_TICKS: u32 = 10;
-/// Most errors that are taken from the stack at once.
+/// Most errors taken from the stack at once.
 const MAX_ERRORS: usize = 64;
 
-/// What the device felt, in its own axes: mm, mm/ms, rad/ms.
+/// One sample of the device, in its own axes: mm, mm/ms, rad/ms.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sample {
     pub number: u64,
@@ -31,12 +30,12 @@ pub(super) struct Sample {
     pub buttons: u32,
 }
 
-/// What the motors shall do, device axes, N and N mm.
+/// The commanded wrench, device axes, N and N mm.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Command {
     pub number: u64,
     pub wrench: Wrench,
-    /// Age of the pose that it was made for, ms.
+    /// Age of the pose that the command was computed for, ms.
     pub pose_age_ms: f64,
 }
 
@@ -57,14 +56,14 @@ pub(super) struct Servo {
     number: u64,
     last_command: u64,
     silent_ticks: u32,
-    /// What the motors were last told.
+    /// The wrench last sent to the motors.
     given: Wrench,
-    /// Nothing more can be done for the device.
+    /// The device is lost for good.
     lost: bool,
 }
 
 impl ServoGroup {
-    /// One tick; says whether the library shall call again.
+    /// Runs one tick; returns whether the library should call again.
     pub(super) fn tick(&mut self) -> u32 {
         for place in 0..self.servos.len() {
             if !self.servos[place].lost {
@@ -76,7 +75,7 @@ impl ServoGroup {
         if self.servos.iter().all(|servo| servo.lost) { codes::CALLBACK_DONE } else { codes::CALLBACK_CONTINUE }
     }
 
-    /// Hands every error to the device that it names, or else to the one whose turn it is.
+    /// Passes every error to the device that it names, or else to the one at `place`.
     fn take_errors(&mut self, place: usize) {
         for _ in 0..MAX_ERRORS {
             let Some((error, device)) = self.hd.next_error() else { return };
@@ -125,8 +124,8 @@ impl Servo {
         hd.end_frame(self.device);
     }
 
-    /// Whether the device knows where it is; if not, helps it to, once the force is gone: its
-    /// position jumps.
+    /// Checks the calibration, and updates it if needed once the force is zero, since the position
+    /// then jumps.
     fn calibrate(&mut self, hd: &Hd) -> bool {
         match hd.check_calibration() {
             codes::CALIBRATION_OK => return true,
@@ -151,8 +150,8 @@ impl Servo {
         };
     }
 
-    /// The newest command, or nothing when it is old, when there is a fault, or part of it after
-    /// one.
+    /// The wrench to apply: the newest command, scaled by the ramp, or zero if it is too old or
+    /// there is a fault.
     fn desired_wrench(&mut self, calibrated: bool) -> Wrench {
         let command = *self.commands.read();
         if command.number != self.last_command {
@@ -172,7 +171,7 @@ impl Servo {
         Wrench { force: command.wrench.force * share, torque: command.wrench.torque * share }
     }
 
-    /// Force errors rest and go on; anything else means that the device or the loop is gone.
+    /// Handles an error: force errors cut the force for a while; all others lose the device.
     fn fault(&mut self, hd: &Hd, error: u32) {
         let fault = match error {
             codes::WARM_MOTORS => Fault::Overheated,

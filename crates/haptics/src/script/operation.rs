@@ -1,4 +1,4 @@
-//! The operations: what is done at a site, in shares of the whole time.
+//! The operations at a site, as moves that share the total time.
 
 use super::ScriptError;
 use super::path::Path;
@@ -50,7 +50,7 @@ impl Site {
     }
 }
 
-/// A point of a flap's outline.
+/// A point of a bone flap's outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rim {
     /// On the outer surface of the bone, world mm.
@@ -59,7 +59,7 @@ pub struct Rim {
     pub bone_mm: f32,
 }
 
-/// How an operation is done: sizes of the tools and lengths of the ways.
+/// Tool sizes and path lengths of an operation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Radius of the burr's ball, mm.
@@ -70,21 +70,21 @@ pub struct Plan {
     pub start_mm: f32,
     /// Where a tool is changed, mm outside the bone.
     pub away_mm: f32,
-    /// How far past the inner side of the bone the burr's centre goes where there is room, mm.
+    /// How far past the inner side of the bone the burr's centre goes if there is room, mm.
     pub breakthrough_mm: f32,
-    /// How far the burr's foremost point stays from the brain where there is room, mm.
+    /// Distance of the burr's foremost point from the brain if there is room, mm.
     pub burr_clearance_mm: f32,
-    /// How far the burr's foremost point may go into the brain to make a hole that the probe fits
-    /// through, mm.
+    /// Largest depth of the burr's foremost point in the brain, mm, to make a hole wide enough for
+    /// the probe.
     pub burr_overlap_mm: f32,
     /// Radius of the aspirator's tip, mm.
     pub aspirator_radius_mm: f32,
     /// How deep each press of the probe goes into the brain, mm.
     pub presses_mm: [f32; 3],
-    /// Where the craniotome runs around a flap, closed from the last to the first; empty for a
-    /// circle of 10 mm on flat bone.
+    /// Closed outline of the flap that the craniotome follows; empty for a circle of 10 mm on flat
+    /// bone.
     pub outline: Vec<Rim>,
-    /// How far the centre of the craniotome's foot runs below the bone, mm.
+    /// Depth of the centre of the craniotome's foot below the bone, mm.
     pub foot_mm: f32,
 }
 
@@ -107,11 +107,11 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// Where the burr's centre ends, mm below the entry.
+    /// Final depth of the burr's centre below the entry, mm.
     ///
-    /// It goes `breakthrough_mm` past the bone, unless the brain is nearer; then it stops before
-    /// the brain, unless the hole at the bone's inner side would be too narrow for the probe; then
-    /// it goes on, into the brain by the overlap at most.
+    /// It goes `breakthrough_mm` past the bone. If the brain is nearer, it stops before the brain.
+    /// If the hole at the bone's inner side would then be too narrow for the probe, it continues
+    /// into the brain, at most by the overlap.
     pub fn burr_depth_mm(&self, site: &Site) -> f32 {
         const ROOM_MM: f32 = 0.5;
         let wanted = site.bone_mm + self.breakthrough_mm;
@@ -123,12 +123,12 @@ impl Plan {
     }
 }
 
-/// One move: its share of the whole time, where it ends (mm below the entry), what is pressed.
+/// One move: share of the total time, final depth below the entry in mm, pressed buttons.
 struct Move(&'static str, f64, f32, Buttons);
 
 const HANDS_OFF: Buttons = Buttons(0);
 
-/// The way of an operation that [`super::NAMES`] lists.
+/// The path of an operation listed in [`super::NAMES`].
 pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     match name {
         "aspirate" => return aspirate(site, plan, duration_ms),
@@ -160,8 +160,8 @@ fn craniotomy(site: &Site, plan: &Plan) -> Vec<Move> {
     ]
 }
 
-/// Beside the burr, with the shaft leaning away from it: rests on the bone, follows towards the
-/// hole, lifts off and leaves.
+/// The aspirator beside the burr, its shaft tilted away: rests on the bone, moves to the hole,
+/// lifts off and leaves.
 fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     const LEAN_RAD: f32 = 0.5;
     let outward = -site.inward.normalize();
@@ -186,8 +186,8 @@ fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     path
 }
 
-/// A burr hole at the rim, the craniotome from there around the flap, the flap lifted, the brain
-/// pressed in the middle.
+/// Drills a burr hole at the rim, cuts around the flap with the craniotome, lifts it, and presses
+/// the brain in the middle.
 fn flap(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     let outline = if plan.outline.is_empty() { circle(site) } else { plan.outline.clone() };
     let gap_mm = site.brain_mm - site.bone_mm;
@@ -223,7 +223,7 @@ fn flap(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
     path
 }
 
-/// An outline on flat bone.
+/// A circular outline on flat bone.
 fn circle(site: &Site) -> Vec<Rim> {
     let turn = Quat::from_rotation_arc(Vec3::Z, -site.inward.normalize());
     let rim = |at: u8| {

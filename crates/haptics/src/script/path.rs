@@ -2,20 +2,20 @@
 
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
 
-/// A station of a scripted way.
+/// A waypoint of a scripted path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
-    /// What the hand does until it is here.
+    /// What the tool does on the way to this waypoint.
     pub label: &'static str,
-    /// When the tip is here, ms.
+    /// When the tip arrives here, ms.
     pub time_ms: f64,
     /// Centre of the tip, world mm.
     pub tip: Vec3,
-    /// What is pressed on the way here.
+    /// Buttons pressed on the way here.
     pub buttons: Buttons,
 }
 
-/// A way through waypoints in one orientation. There is at least one waypoint and times never
+/// A path through waypoints in one orientation. It has at least one waypoint, and times never
 /// decrease.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
@@ -24,13 +24,13 @@ pub(super) struct Path {
 }
 
 impl Path {
-    /// Waits at `start`, then goes on with [`Path::to`].
+    /// Starts a path at `start`; continue with [`Path::to`].
     pub(super) fn from(start: Vec3, rotation: Quat) -> Self {
         let first = Waypoint { label: "wait", time_ms: 0.0, tip: start, buttons: Buttons::default() };
         Self { waypoints: vec![first], rotation }
     }
 
-    /// Goes on to `tip` in `duration_ms`.
+    /// Appends a move to `tip` in `duration_ms`.
     pub(super) fn to(&mut self, label: &'static str, duration_ms: f64, tip: Vec3, buttons: Buttons) {
         self.waypoints.push(Waypoint { label, time_ms: self.end_ms() + duration_ms, tip, buttons });
     }
@@ -43,14 +43,14 @@ impl Path {
         self.waypoints[self.waypoints.len() - 1].time_ms
     }
 
-    /// Sets the end exactly, after shares that did not add up to it by rounding.
+    /// Sets the exact end time, which rounding of the shares may have missed.
     pub(super) fn end_at(&mut self, time_ms: f64) {
         if let Some(last) = self.waypoints.last_mut() {
             last.time_ms = time_ms;
         }
     }
 
-    /// The tool at a time. Not a number counts as the start.
+    /// The tool at a time; NaN counts as the start.
     pub(super) fn at(&self, time_ms: f64) -> ToolState {
         let after = self.waypoints.partition_point(|waypoint| waypoint.time_ms < time_ms);
         let (tip, linear, buttons) = match (after.checked_sub(1).map(|i| &self.waypoints[i]), self.waypoints.get(after))

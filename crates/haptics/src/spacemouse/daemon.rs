@@ -1,10 +1,11 @@
-//! The spacenav daemon's socket: eight native 32-bit numbers a message.
+//! The spacenav daemon's socket: messages of eight native 32-bit integers.
 //!
 //! ```text
-//! 0 motion   x y z  rx ry rz  period          z and rz point away from the user: the daemon's axes are left-handed
+//! 0 motion   x y z  rx ry rz  period
+//!            z and rz point away from the user: the daemon's axes are left-handed
 //! 1 press    button
 //! 2 release  button
-//! others     devices, settings: passed over
+//! others     devices, settings: ignored
 //! ```
 
 use super::{Knob, Link};
@@ -25,13 +26,13 @@ pub(super) struct Daemon {
     filled: usize,
 }
 
-/// Where the daemon listens.
+/// Path of the daemon's socket.
 pub(super) fn usual_place() -> PathBuf {
     std::env::var_os("SPNAV_SOCKET").map_or_else(|| "/var/run/spnav.sock".into(), PathBuf::from)
 }
 
 impl Daemon {
-    /// Connects; reads never wait.
+    /// Connects with non-blocking reads.
     pub(super) fn connect(path: &Path) -> io::Result<Self> {
         let socket = UnixStream::connect(path)?;
         socket.set_nonblocking(true)?;
@@ -76,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whatever_the_numbers_are_nothing_breaks() {
+    fn any_message_is_handled() {
         let mut knob = Knob::default();
         for first in [i32::MIN, -1, 0, 1, 2, 3, 7, i32::MAX] {
             for rest in [i32::MIN, -1, 0, 31, 32, i32::MAX] {

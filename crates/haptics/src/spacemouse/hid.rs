@@ -1,9 +1,9 @@
-//! HID reports, read from the system's device file: no library is needed.
+//! HID reports, read from the system's device file without a library.
 //!
 //! ```text
 //! 1  x y z [rx ry rz]   i16 little-endian      raw axes: x right, y to the user, z down
 //! 2  rx ry rz           i16                    older models send the turns apart
-//! 3  buttons            one bit each
+//! 2  rx ry rz           i16                    older models send the rotation separately
 //! ```
 
 use super::{Knob, Link};
@@ -13,13 +13,13 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use trepan_geometry::Vec3;
 
-/// Linux's O_NONBLOCK on the processors that this runs on.
+/// Linux's O_NONBLOCK on the supported processors.
 const NONBLOCK: i32 = 0o4000;
-/// Longest report that is looked at, bytes.
+/// Longest report that is parsed, bytes.
 const LONGEST: usize = 32;
-/// Six-axis devices of Logitech's number.
+/// Product ids of six-axis devices under Logitech's vendor id.
 const LOGITECH: [u16; 11] = [0xc603, 0xc605, 0xc606, 0xc621, 0xc623, 0xc625, 0xc626, 0xc627, 0xc628, 0xc629, 0xc62b];
-/// Six-axis devices of 3Dconnexion's number.
+/// Product ids of six-axis devices under 3Dconnexion's vendor id.
 const CONNEXION: [u16; 9] = [0xc62e, 0xc62f, 0xc631, 0xc632, 0xc633, 0xc635, 0xc636, 0xc638, 0xc63a];
 
 /// An open device file.
@@ -27,7 +27,7 @@ pub(super) struct Hid {
     file: File,
 }
 
-/// The device file of the first knob that the system knows.
+/// The device file of the first known knob of the system.
 pub(super) fn find() -> Option<PathBuf> {
     let known =
         |entry: &fs::DirEntry| fs::read_to_string(entry.path().join("device/uevent")).is_ok_and(|text| is_knob(&text));
@@ -48,7 +48,7 @@ fn is_knob(uevent: &str) -> bool {
 }
 
 impl Hid {
-    /// Opens a device file; reads never wait.
+    /// Opens a device file with non-blocking reads.
     pub(super) fn open(path: &Path) -> io::Result<Self> {
         Ok(Self { file: OpenOptions::new().read(true).custom_flags(NONBLOCK).open(path)? })
     }
@@ -69,7 +69,7 @@ impl Link for Hid {
     }
 }
 
-/// Lays a report over what is known; what is too short says nothing.
+/// Merges a report into the known state; ignores reports that are too short.
 fn apply(report: &[u8], knob: &mut Knob) {
     let Some((&id, rest)) = report.split_first() else { return };
     match id {
@@ -83,7 +83,7 @@ fn apply(report: &[u8], knob: &mut Knob) {
     }
 }
 
-/// Three numbers on the raw axes (x right, y to the user, z down) as right, up, to the user.
+/// Converts three raw values (x right, y to the user, z down) to right, up, to the user.
 fn vector(bytes: &[u8]) -> Option<Vec3> {
     let number = |at: usize| Some(f32::from(i16::from_le_bytes([*bytes.get(at)?, *bytes.get(at + 1)?])));
     Some(Vec3::new(number(0)?, -number(4)?, number(2)?))

@@ -1,14 +1,13 @@
-//! Bytes to a record; any bytes, without a panic or an allocation beyond the strings that they
-//! hold.
+//! Decodes a record from arbitrary bytes, without panics and without allocation except for strings.
 
 use super::{Fields, Nested, Visit, wire_type};
 
-/// Field numbers below this are looked at, others skipped.
+/// Field numbers below this are read, others skipped.
 const MAX_FIELDS: usize = 32;
 
-/// The record in `bytes`; `None` when they are not a whole message or hold a field of another type.
-/// Fields that are missing keep their default, unknown ones are skipped, so files of earlier and
-/// later versions stay readable.
+/// Decodes a record; `None` for an incomplete message or a field of another type. Missing fields
+/// keep their default and unknown ones are skipped, so that files of earlier and later versions
+/// stay readable.
 pub(crate) fn decode<T: Fields>(bytes: &[u8]) -> Option<T> {
     let mut record = T::default();
     let mut decoder = Decoder { values: parse(bytes)?, sound: true };

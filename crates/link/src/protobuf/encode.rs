@@ -1,4 +1,4 @@
-//! A record to bytes.
+//! Encodes a record.
 
 use super::{Fields, Nested, Visit, wire_type};
 
@@ -7,14 +7,14 @@ pub(crate) fn encode<T: Fields>(record: &T, out: &mut Vec<u8>) {
     record.clone().visit(&mut Encoder { out });
 }
 
-/// Appends a field of raw bytes: also what descriptors are made of.
+/// Appends a field of raw bytes; also used for descriptors.
 pub(super) fn put_bytes(out: &mut Vec<u8>, number: u32, bytes: &[u8]) {
     put_varint(out, u64::from(number << 3 | wire_type::BYTES));
     put_varint(out, bytes.len() as u64);
     out.extend_from_slice(bytes);
 }
 
-/// Appends a field of a number.
+/// Appends a numeric field.
 pub(super) fn put_number(out: &mut Vec<u8>, number: u32, value: u64) {
     put_varint(out, u64::from(number << 3 | wire_type::VARINT));
     put_varint(out, value);

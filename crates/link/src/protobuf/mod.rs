@@ -1,11 +1,10 @@
-//! Protobuf messages from one list of fields per record: it makes the bytes, reads them back, and
-//! describes itself.
+//! Protobuf messages from one field list per record: encoding, decoding and schema.
 //!
 //! # Theory
 //! A record lists its fields once, in [`Fields::visit`]. The [`encode`], [`decode`] and [`schema`]
-//! visitors walk that list. Every field is written, zero or not, so that -0.0 keeps its sign, and
-//! floats pass as their bits, so that a NaN keeps its payload: generated proto3 code drops the
-//! first.
+//! visitors use that list. Every field is written, zero or not, so that -0.0 keeps its sign
+//! (generated proto3 code drops it), and floats are stored as bits, so that a NaN keeps its
+//! payload.
 //!
 //! # Practice
 //! Records are flat up to one level of nesting; nested messages are shorter than 128 bytes (one
@@ -28,14 +27,14 @@ pub trait Fields: Default + Clone {
     /// Message name, with its package.
     const NAME: &'static str;
 
-    /// Shows each field to `visit`, which reads it or fills it in.
+    /// Passes each field to `visit`, which reads or sets it.
     fn visit(&mut self, visit: &mut dyn Visit);
 }
 
 /// The body of a nested message.
 pub type Nested<'a> = &'a mut dyn FnMut(&mut dyn Visit);
 
-/// Walks the fields of a record.
+/// Visits the fields of a record.
 pub trait Visit {
     fn uint32(&mut self, number: u32, name: &'static str, value: &mut u32);
     fn uint64(&mut self, number: u32, name: &'static str, value: &mut u64);
@@ -60,8 +59,8 @@ mod tests {
     use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TeacherRecord, TickRecord};
     use proptest::prelude::*;
 
-    /// Bytes of a record that is filled from `seed`, fields of every bit pattern, NaN and -0.0
-    /// included.
+    /// Encoded bytes before and after a round trip, with fields of every bit pattern from `seed`,
+    /// NaN and -0.0 included.
     fn round_trip<T: Fields>(seed: u64) -> (Vec<u8>, Vec<u8>) {
         let mut record = T::default();
         record.visit(&mut Noise(seed));
@@ -71,7 +70,7 @@ mod tests {
         (first, second)
     }
 
-    /// Fills every field with bits of a simple generator (splitmix64).
+    /// Fills every field with random bits (splitmix64).
     struct Noise(u64);
 
     impl Noise {

@@ -1,4 +1,4 @@
-//! The fields of each record, numbered. A number, once given, is never given to another field.
+//! The numbered fields of each record. A number is never reused for another field.
 
 use super::{Fields, Visit};
 use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TeacherRecord, TickRecord};

@@ -1,5 +1,4 @@
-//! A record's description as a protobuf `FileDescriptorSet`, which viewers read from the file
-//! itself.
+//! A record's protobuf `FileDescriptorSet`, which viewers read from the file.
 //!
 //! # Sources
 //! `google/protobuf/descriptor.proto`; MCAP's registry of schema encodings:
@@ -39,7 +38,7 @@ enum Kind {
     Uint32 = 13,
 }
 
-/// A `DescriptorProto` in the making.
+/// A `DescriptorProto` under construction.
 struct Message {
     name: &'static str,
     descriptor: Vec<u8>,

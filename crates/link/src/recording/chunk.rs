@@ -1,19 +1,19 @@
-//! Unpacks one chunk, checks its checksum, and hands out its records.
+//! Unpacks a chunk, verifies its checksum, and returns its records.
 
 use super::scan::{Cursor, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-/// Largest chunk that is read, unpacked; ours have 256 KiB and one record more.
+/// Largest unpacked chunk that is read; the recorder's have 256 KiB plus one record.
 const MAX_CHUNK_BYTES: u64 = 16 << 20;
 
-/// Bytes that all chunks of a file of `length` bytes may unpack to: recordings shrink about
+/// Limit of the unpacked size of all chunks in a file of `length` bytes: recordings shrink about
 /// threefold under LZ4, whose format allows 255-fold.
 pub(super) fn budget(length: usize) -> u64 {
     (length as u64).saturating_mul(32).max(MAX_CHUNK_BYTES)
 }
 
-/// Calls `each` with opcode and body of the records in a chunk. `None` when anything is wrong;
-/// `each` may have been called by then.
+/// Calls `each` with opcode and body of the records in a chunk. Returns `None` on any error; `each`
+/// may have been called by then.
 pub(super) fn unpack(
     chunk: &Record<'_>,
     budget: &mut u64,

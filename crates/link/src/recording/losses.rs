@@ -1,28 +1,27 @@
-//! What a recording lacks of its session: where the file is damaged, which ticks are missing.
+//! Losses of a recording: damaged parts of the file and missing ticks.
 //!
 //! # Theory
-//! A file says in three places how many ticks there were: chunks carry checksums, so that damage is
-//! found where it is; the index at the end counts the messages of each topic; and ticks are
-//! numbered without gaps.
+//! Three sources show the number of ticks: chunks carry checksums, which locate damage; the index
+//! at the end counts the messages of each topic; and ticks are numbered without gaps.
 
 use super::scan::{Cursor, index};
 use super::{Reading, Recording};
 
-/// Where a file is cut or damaged.
+/// Damage of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Damage {
-    /// The byte at which reading ended; `None` where every chunk is sound and yet the checksum of
-    /// the file does not hold: then its header may have been changed.
+    /// The byte at which reading ended.
+    /// `None` if every chunk is valid but the file's checksum fails; then its header may have been
+    /// changed.
     pub at_byte: Option<u64>,
     /// Length of the file, bytes.
     pub of_bytes: u64,
-    /// Haptic ticks that the file's index counts; `None` without a sound index.
+    /// Haptic ticks in the file's index; `None` without a valid index.
     pub indexed_ticks: Option<u64>,
 }
 
 impl Damage {
-    /// Of a file that was read up to its regular `end` (`Ok`) or to where it makes no sense
-    /// (`Err`).
+    /// Damage of a file that was read up to its regular `end` (`Ok`) or to invalid data (`Err`).
     pub(super) fn of(bytes: &[u8], end: Result<usize, usize>, ticks: u64) -> Option<Self> {
         let indexed_ticks = indexed_ticks(bytes);
         let at_byte = match end {
@@ -34,14 +33,14 @@ impl Damage {
     }
 }
 
-/// Whether the checksum at the regular end holds for all that comes before it; files may have none.
+/// Whether the checksum at the regular end is valid or absent.
 fn checksum_holds(bytes: &[u8], end: usize) -> bool {
     let mut rest = Cursor(bytes.get(end..).unwrap_or_default());
     let stated = rest.record().and_then(|record| Cursor(record.body).u32());
     stated.is_some_and(|crc| crc == 0 || bytes.get(..end).is_some_and(|before| crc32fast::hash(before) == crc))
 }
 
-/// Haptic ticks that the index counts.
+/// Haptic ticks in the index.
 fn indexed_ticks(bytes: &[u8]) -> Option<u64> {
     let mut reading = Reading::default();
     let mut counts = Vec::new();
@@ -55,8 +54,7 @@ fn indexed_ticks(bytes: &[u8]) -> Option<u64> {
     Some(counts.iter().filter(|count| is_tick(&count.channel)).map(|count| count.messages).sum())
 }
 
-/// Numbers that are missing in a row that ought to have none missing: the first such, and how many
-/// in all.
+/// A gap in a sequence of numbers: the first missing number, and the total count of missing ones.
 struct Gap {
     from: u64,
     to: u64,
@@ -79,15 +77,15 @@ impl Gap {
 }
 
 impl Recording {
-    /// Ticks that the session had, as far as the file says: read, missing between those, and
-    /// counted in its index.
+    /// Ticks of the session according to the file: the larger of those read and missing, and those
+    /// in its index.
     pub fn promised_ticks(&self) -> u64 {
         let missing = self.missing_ticks().map_or(0, |gap| gap.missing);
         let indexed = self.damage.and_then(|damage| damage.indexed_ticks).unwrap_or(0);
         (self.ticks.len() as u64).saturating_add(missing).max(indexed)
     }
 
-    /// What the recording lacks of its session, in words; `None` when nothing.
+    /// Description of the losses; `None` if there are none.
     pub fn losses(&self) -> Option<String> {
         let missing = |what: &str, gap: Option<Gap>| {
             let Gap { from, to, missing } = gap?;
@@ -124,7 +122,7 @@ impl Recording {
     }
 }
 
-/// What is missing between the numbers that are there.
+/// Numbers missing between the first and the last.
 fn between(numbers: impl Iterator<Item = u64> + Clone) -> Option<Gap> {
     Gap::of(numbers.clone().next()?, numbers)
 }

@@ -1,9 +1,9 @@
-//! Makes a sound file of a cut or damaged one, so that other programs open it too.
+//! Repairs a cut or damaged file, so that other programs open it too.
 //!
 //! # Practice
-//! Every sound chunk is copied message by message, with its times, topics and schemas, also those
-//! behind a damaged one; the index is made anew. [`crate::Recording::losses`] of the repaired file
-//! tells what is missing in between, and what was lost before.
+//! Every valid chunk is copied message by message, with its times, topics and schemas, also after a
+//! damaged one; the index is rebuilt. [`crate::Recording::losses`] of the repaired file reports the
+//! gaps and the earlier losses.
 
 use super::scan::{Cursor, Record, index};
 use super::{Recording, chunk};
@@ -14,17 +14,16 @@ use mcap::records::{MessageHeader, Metadata, op};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// What a repair found.
+/// Result of a repair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Repaired {
     /// Messages copied, of all topics.
     pub messages: u64,
-    /// Whether the file was whole already, but for its index.
+    /// Whether the file was complete except for its index.
     pub was_whole: bool,
 }
 
-/// Copies what is sound of the recording `from` to the new file `to`, which appears whole or not at
-/// all.
+/// Copies the valid parts of the recording `from` to the new file `to`, atomically.
 pub fn repair(from: &Path, to: &Path) -> Result<Repaired, LinkError> {
     let bytes = super::bytes_of(from)?;
     let body = bytes.strip_prefix(mcap::MAGIC).ok_or_else(|| LinkError::NotARecording { path: from.to_owned() })?;
@@ -34,7 +33,7 @@ pub fn repair(from: &Path, to: &Path) -> Result<Repaired, LinkError> {
     let failed = |error: McapError| write_error(to, &error);
     let mcap = options().create(io::Cursor::new(Vec::new())).map_err(failed)?;
     let mut copy = Copy { mcap, messages: 0 };
-    // Where the chunk that holds the topics is damaged, the index knows them too.
+    // If the chunk with the topics is damaged, the index has them too.
     for record in index(&bytes).into_iter().flatten().filter(|r| matches!(r.opcode, op::SCHEMA | op::CHANNEL)) {
         copy.record(record.opcode, record.body).map_err(failed)?;
     }
@@ -48,7 +47,7 @@ pub fn repair(from: &Path, to: &Path) -> Result<Repaired, LinkError> {
     Ok(Repaired { messages: copy.messages, was_whole })
 }
 
-/// Writes a file that appears whole or not at all.
+/// Writes a file atomically.
 fn whole_file(path: &Path, bytes: &[u8]) -> Result<(), LinkError> {
     let failed = |source| LinkError::Create { path: path.to_owned(), source };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -63,8 +62,8 @@ struct Copy {
 }
 
 impl Copy {
-    /// Copies records up to the regular end, passing over what is damaged. Says whether nothing
-    /// was.
+    /// Copies records up to the regular end, skipping damaged ones; returns whether there were
+    /// none.
     fn walk(&mut self, body: &[u8], mut budget: u64) -> Result<bool, McapError> {
         let (mut rest, mut whole) = (Cursor(body), true);
         loop {
@@ -83,7 +82,7 @@ impl Copy {
         }
     }
 
-    /// Copies all of a chunk, or nothing and gives false: its checksum is known at its end.
+    /// Copies all of a chunk, or nothing and returns false: its checksum is known only at its end.
     fn chunk(&mut self, chunk: &Record<'_>, budget: &mut u64) -> Result<bool, McapError> {
         let (mut records, mut left) = (Vec::new(), *budget);
         let sound = chunk::unpack(chunk, &mut left, |opcode, body| {
@@ -101,7 +100,7 @@ impl Copy {
         Ok(true)
     }
 
-    /// Copies one record; passes over what is damaged or of no use without its place.
+    /// Copies one record; skips it if damaged or useless without its position.
     fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), McapError> {
         let body = Cursor(body);
         match opcode {
@@ -134,19 +133,19 @@ impl Copy {
 
 /// Opcodes of MCAP's records.
 const KNOWN: std::ops::RangeInclusive<u8> = op::HEADER..=op::DATA_END;
-/// How our chunks name their compression: length and text.
+/// Compression field of our chunks: length and text.
 const COMPRESSION: &[u8] = b"\x03\0\0\0lz4";
-/// Bytes of a chunk before that: opcode, length, first and last time, unpacked size, checksum.
+/// Bytes of a chunk before it: opcode, length, first and last time, unpacked size, checksum.
 const BEFORE_COMPRESSION: usize = 1 + 8 + 8 + 8 + 8 + 4;
 
-/// The bytes from where the next chunk seems to begin.
+/// The bytes from the next likely start of a chunk.
 fn next_chunk(bytes: &[u8]) -> Option<&[u8]> {
     let windows = bytes.windows(COMPRESSION.len()).enumerate().skip(BEFORE_COMPRESSION);
     let mut places = windows.filter(|(_, window)| *window == COMPRESSION).map(|(at, _)| at - BEFORE_COMPRESSION);
     places.find(|&at| bytes[at] == op::CHUNK).map(|at| &bytes[at..])
 }
 
-/// Only a failure to write ends a repair; a record that contradicts others is left out.
+/// Passes on write errors only; records that contradict others are skipped.
 fn tolerate<T>(result: Result<T, McapError>) -> Result<(), McapError> {
     match result {
         Err(error @ (McapError::Io(_) | McapError::AttemptedWriteAfterFailure)) => Err(error),

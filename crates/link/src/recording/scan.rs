@@ -1,17 +1,17 @@
-//! MCAP's record layouts, read with every length checked.
+//! Parses MCAP records with every length checked.
 //!
 //! # Sources
-//! <https://mcap.dev/spec#records>. The `mcap` crate has these parsers too, but some of them trust lengths.
+//! <https://mcap.dev/spec#records>. The `mcap` crate has these parsers too, but some trust lengths.
 
 use super::Recording;
 use crate::protobuf::{Fields, decode};
 use crate::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
 
-/// Bytes not yet read.
+/// The unread bytes.
 #[derive(Clone, Copy)]
 pub(super) struct Cursor<'a>(pub &'a [u8]);
 
-/// A record as it lies in the file.
+/// A record in the file.
 pub(super) struct Record<'a> {
     pub opcode: u8,
     pub body: &'a [u8],
@@ -19,7 +19,7 @@ pub(super) struct Record<'a> {
     pub whole: &'a [u8],
 }
 
-/// What the messages of a channel are.
+/// The record type of a channel's messages.
 #[derive(Clone, Copy, Default)]
 pub(super) enum Topic {
     Tick,
@@ -27,7 +27,7 @@ pub(super) enum Topic {
     Collision,
     Solver,
     Event,
-    /// Nothing that a session is made of.
+    /// Not used by a session.
     #[default]
     Other,
 }
@@ -61,16 +61,16 @@ impl Topic {
     }
 }
 
-/// How many messages of a channel an index counts.
+/// Message count of a channel in the index.
 pub(super) struct MessageCount {
     pub channel: u16,
     pub messages: u64,
 }
 
-/// Length of the record that ends an MCAP file before its magic.
+/// Length of the footer record before the final magic.
 const FOOTER_BYTES: usize = 29;
 
-/// The records of a file's index; `None` where there is none or its checksum does not hold.
+/// The records of a file's index; `None` if it is missing or its checksum fails.
 pub(super) fn index(bytes: &[u8]) -> Option<impl Iterator<Item = Record<'_>>> {
     let body = bytes.strip_suffix(mcap::MAGIC)?;
     let footer_at = body.len().checked_sub(FOOTER_BYTES)?;
@@ -91,30 +91,30 @@ impl<'a> Cursor<'a> {
         Some(Record { opcode, body, whole: &start[..start.len() - self.0.len()] })
     }
 
-    /// Id and meaning of a schema.
+    /// Parses a schema: id and record type.
     pub(super) fn schema(mut self) -> Option<(u16, Topic)> {
         let id = self.u16()?;
         Some((id, Topic::of_schema(self.text()?)))
     }
 
-    /// Id of a channel and of its schema.
+    /// Parses a channel: its id and its schema's.
     pub(super) fn channel(mut self) -> Option<(u16, u16)> {
         Some((self.u16()?, self.u16()?))
     }
 
-    /// Channel of a message, and its data.
+    /// Parses a message: its channel and data.
     pub(super) fn message(mut self) -> Option<(u16, &'a [u8])> {
         let channel = self.u16()?;
         let (_sequence, _log_time, _publish_time) = (self.u32()?, self.u64()?, self.u64()?);
         Some((channel, self.0))
     }
 
-    /// Name of a metadata record, and its entries.
+    /// Parses a metadata record: its name and entries.
     pub(super) fn metadata(mut self) -> Option<(&'a str, Vec<(&'a str, &'a str)>)> {
         Some((self.text()?, self.map()?))
     }
 
-    /// Pairs of strings, after their length in bytes.
+    /// Parses pairs of strings, preceded by their length in bytes.
     pub(super) fn map(&mut self) -> Option<Vec<(&'a str, &'a str)>> {
         let length = usize::try_from(self.u32()?).ok()?;
         let mut map = Cursor(self.take(length)?);
@@ -125,7 +125,7 @@ impl<'a> Cursor<'a> {
         Some(entries)
     }
 
-    /// How many messages there are of each channel, by the body of a statistics record.
+    /// Parses a statistics record: number of messages of each channel.
     pub(super) fn message_counts(mut self) -> Option<Vec<MessageCount>> {
         // Messages, schemas, channels, attachments, metadata, chunks, first and last time.
         self.take(8 + 2 + 4 * 4 + 2 * 8)?;
@@ -138,7 +138,7 @@ impl<'a> Cursor<'a> {
         Some(counts)
     }
 
-    /// Unpacked size that a chunk claims.
+    /// Unpacked size stated by a chunk.
     pub(super) fn chunk_size(mut self) -> Option<u64> {
         let (_start, _end) = (self.u64()?, self.u64()?);
         self.u64()

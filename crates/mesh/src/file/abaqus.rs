@@ -1,14 +1,14 @@
-//! Abaqus input files (`.inp`): their nodes and tetrahedra.
+//! Abaqus input files (`.inp`): nodes and tetrahedra only.
 //!
 //! # Theory
-//! Keyword lines start with `*`, comments with `**`; data rows follow, with commas. `*NODE` has
+//! Keyword lines start with `*`, comments with `**`; data rows with commas follow. `*NODE` has
 //! "number, x, y, z", `*ELEMENT, TYPE=C3D4` has "number, a, b, c, d"; a row that ends in a comma
-//! goes on in the next.
+//! continues on the next line.
 //!
 //! # Practice
 //! Reads C3D4 and the corners of C3D10 (with their variants: C3D10M, C3D4H …); other elements,
-//! sets, materials and steps are left out, one part is assumed. Writes nodes, elements and nothing
-//! else. Positions are mm; corner order is ours.
+//! sets, materials and steps are skipped, and a single part is assumed. Writes nodes and elements
+//! only. Positions are mm; the corner order is that of [`TetMesh`].
 //!
 //! # Sources
 //! Abaqus Keywords Reference Guide: *NODE, *ELEMENT.
@@ -18,13 +18,13 @@ use crate::file::numbered::Numbered;
 use crate::file::{FileError, Reader, write_atomically};
 use std::path::Path;
 
-/// Reads the tetrahedra of an Abaqus file. Indices are checked; call [`TetMesh::check`] for the
-/// rest.
+/// Reads the tetrahedra of an Abaqus file. Only indices are checked; call [`TetMesh::check`] for
+/// the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
-/// Writes a mesh as an Abaqus file, whole or not at all.
+/// Writes a mesh as an Abaqus file, atomically.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
         writeln!(out, "*HEADING\ntetrahedra, mm\n*NODE")?;
@@ -35,7 +35,7 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     })
 }
 
-/// What the data rows under the last keyword are.
+/// The kind of data rows under the last keyword.
 #[derive(Clone, Copy, PartialEq)]
 enum Rows {
     Nodes,
@@ -102,7 +102,7 @@ fn numbers(reader: &Reader, field: &str, line: &str, count: usize) -> Result<Vec
     }
 }
 
-/// Rows that end in a comma go on; of those only the corners in the first row matter.
+/// Skips continuation rows; the corners are all in the first row.
 fn skip_continuation(reader: &mut Reader, line: &str) {
     let mut open = line.ends_with(',');
     while open {
@@ -119,7 +119,7 @@ mod tests {
                         *Element, type=S3\n1, 10, 20, 30\n*Element, type=C3D10M, elset=brain\n2, 10, 20, 30, 40, 1, 2, 3,\n4, 5, 6\n*Material\n1, 2\n";
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.inp");
         write(&path, &octahedron()).unwrap();

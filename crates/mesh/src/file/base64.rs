@@ -1,9 +1,8 @@
-//! Base64 (RFC 4648) as VTK uses it: several encodings may follow one another, each with its own
-//! padding.
+//! Base64 (RFC 4648) as VTK uses it: several encodings may be concatenated, each with its padding.
 
 const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// The bytes as text.
+/// Encodes bytes as text.
 pub(crate) fn encode(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for three in bytes.chunks(3) {
@@ -17,7 +16,7 @@ pub(crate) fn encode(bytes: &[u8]) -> String {
     text
 }
 
-/// The bytes of a text, blanks left out; `None` where a character is none of ours.
+/// Decodes text, ignoring white space; `None` for an invalid character.
 pub(crate) fn decode(text: &[u8]) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 3);
     let mut letters = text.iter().copied().filter(|b| !b.is_ascii_whitespace());
@@ -63,7 +62,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_encoded_is_decoded(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        fn encoding_round_trips(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             prop_assert_eq!(decode(encode(&bytes).as_bytes()).unwrap(), bytes);
         }
     }

@@ -1,8 +1,8 @@
-//! Any mesh file: which format it is, and the reader or writer for it.
+//! Detects the format of a mesh file and calls its reader or writer.
 //!
 //! # Practice
-//! Reading goes by content first, since `.mesh`, `.msh` and `.vtk` mean different things to
-//! different programs; writing goes by the name's ending.
+//! Reading detects the content first, since programs use `.mesh`, `.msh` and `.vtk` differently;
+//! writing uses the extension.
 
 use crate::file::{FileError, Reader};
 use crate::{TetMesh, TriMesh, abaqus, gmsh, medit, obj, ply, stl, tetgen, vtk, vtu};
@@ -15,8 +15,8 @@ const VOLUME_FORMATS: &str =
 
 const SURFACE_FORMATS: &str = ".stl, .obj or .ply";
 
-/// Reads tetrahedra from a file of any known format. Indices are checked; call [`TetMesh::check`]
-/// for the rest.
+/// Reads tetrahedra from a file of any supported format. Only indices are checked; call
+/// [`TetMesh::check`] for the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     let ending = ending(path);
     if ["node", "ele"].contains(&ending.as_str()) {
@@ -38,7 +38,7 @@ pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     }
 }
 
-/// Reads a triangle surface: STL, OBJ or PLY, by the name's ending.
+/// Reads a triangle surface: STL, OBJ or PLY, by the file's extension.
 pub fn read_surface(path: &Path) -> Result<TriMesh, FileError> {
     match ending(path).as_str() {
         "stl" => stl::read(path),
@@ -48,7 +48,7 @@ pub fn read_surface(path: &Path) -> Result<TriMesh, FileError> {
     }
 }
 
-/// Writes tetrahedra in the format of the name's ending.
+/// Writes tetrahedra in the format of the file's extension.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     match ending(path).as_str() {
         "vtk" => vtk::write(path, mesh),
@@ -61,7 +61,7 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     }
 }
 
-/// Writes a triangle surface in the format of the name's ending: STL, OBJ or PLY.
+/// Writes a triangle surface in the format of the file's extension: STL, OBJ or PLY.
 pub fn write_surface(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     match ending(path).as_str() {
         "stl" => stl::write(path, mesh),
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_format_is_told_what_is_known() {
+    fn an_unknown_format_lists_the_supported_ones() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.xyz");
         assert!(write(&path, &octahedron()).unwrap_err().to_string().contains(".msh"));

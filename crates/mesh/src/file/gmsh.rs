@@ -7,9 +7,9 @@
 //! files hold little-endian i32, u64 and f64 after the counts.
 //!
 //! # Practice
-//! Tetrahedra are kept (of type 11 the corners), other elements and all tags left out. Writes 2.2
-//! as text, with digits that give the same f32 back. Positions are mm; corner order is ours.
-//! Version 4.0 is refused by name.
+//! Tetrahedra are read (of type 11 the corners); other elements and all tags are skipped. Writes
+//! 2.2 as text, with enough digits to restore each f32. Positions are mm; the corner order is that
+//! of [`TetMesh`]. Version 4.0 is rejected.
 //!
 //! # Sources
 //! C. Geuzaine, J.-F. Remacle: Gmsh reference manual, sections MSH file format.
@@ -19,12 +19,13 @@ use crate::file::numbered::Numbered;
 use crate::file::{FileError, Reader, write_atomically};
 use std::path::Path;
 
-/// Reads the tetrahedra of a Gmsh file. Indices are checked; call [`TetMesh::check`] for the rest.
+/// Reads the tetrahedra of a Gmsh file. Only indices are checked; call [`TetMesh::check`] for the
+/// rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
-/// Writes a mesh as Gmsh 2.2 text, whole or not at all.
+/// Writes a mesh as Gmsh 2.2 text, atomically.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
         writeln!(out, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}", mesh.positions.len())?;
@@ -143,13 +144,13 @@ impl Gmsh {
         }
     }
 
-    /// A count of things that take so many bytes in a text and in a binary file.
+    /// Parses a count of items with the given sizes in text and binary.
     fn count(&mut self, field: &str, in_text: usize, in_binary: usize) -> Result<usize, FileError> {
         let count = self.long(field)?;
         self.reader.checked_count(field, count, if self.binary { in_binary } else { in_text })
     }
 
-    /// A count in version 2, always a line of text.
+    /// Parses a count in version 2, always a line of text.
     fn count_line(&mut self, field: &str, in_text: usize, in_binary: usize) -> Result<usize, FileError> {
         let count = self.reader.number(field, "a count")?;
         self.reader.line();
@@ -197,8 +198,8 @@ impl Gmsh {
         let count = self.count_line("the count of $Elements", 8, 12)?;
         let mut read = 0;
         while read < count {
-            // Text has one header for each element: number, type, tags; binary one for several:
-            // type, how many, tags.
+            // Text has one header per element: number, type, tags; binary has one for several:
+            // type, count, tags.
             let [first, second, tags] = self.entity("the header of an element")?;
             let (kind, elements) = if self.binary { (first, second) } else { (second, 1) };
             let elements = self.reader.checked_count("the elements under a header", elements, 4)?;
@@ -227,7 +228,7 @@ impl Gmsh {
         Ok(())
     }
 
-    /// The nodes of an element; kept when it is a tetrahedron.
+    /// Reads the nodes of an element; keeps tetrahedra.
     fn element(&mut self, kind: u64, number: fn(&mut Self, &str) -> Result<u64, FileError>) -> Result<(), FileError> {
         let Some(nodes) = nodes_of(kind) else {
             return Err(self.reader.error("an element's type", kind, "one of 1 to 19 (see the Gmsh manual)"));
@@ -246,7 +247,7 @@ impl Gmsh {
     }
 }
 
-/// How many nodes an element type has.
+/// Number of nodes of an element type.
 fn nodes_of(kind: u64) -> Option<usize> {
     const NODES: [usize; 19] = [2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13];
     let at = usize::try_from(kind).ok()?.checked_sub(1)?;
@@ -281,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.msh");
         write(&path, &octahedron()).unwrap();

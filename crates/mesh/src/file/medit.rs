@@ -2,12 +2,12 @@
 //!
 //! # Theory
 //! A list of sections, each a keyword, a count and that many rows: `Vertices` (x y z reference) and
-//! `Tetrahedra` (four nodes from 1, reference). What else there is (triangles, corners, ridges) is
-//! numbers up to the next keyword.
+//! `Tetrahedra` (four nodes from 1, reference). Other sections (triangles, corners, ridges) are
+//! skipped up to the next keyword.
 //!
 //! # Practice
-//! Reads the text form, dimension 3; references are left out. Writes version 2 with as many digits
-//! as give the same f32 back. Positions are mm; corner order is ours.
+//! Reads the text form, dimension 3; references are skipped. Writes version 2 with enough digits to
+//! restore each f32. Positions are mm; the corner order is that of [`TetMesh`].
 //!
 //! # Sources
 //! P. Frey: MEDIT, an interactive mesh visualization software, INRIA RT-0253, 2001.
@@ -17,12 +17,13 @@ use crate::file::{FileError, Reader, write_atomically};
 use std::path::Path;
 use trepan_geometry::Vec3;
 
-/// Reads the tetrahedra of a Medit file. Indices are checked; call [`TetMesh::check`] for the rest.
+/// Reads the tetrahedra of a Medit file. Only indices are checked; call [`TetMesh::check`] for the
+/// rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
-/// Writes a mesh as Medit text, whole or not at all.
+/// Writes a mesh as Medit text, atomically.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
         writeln!(out, "MeshVersionFormatted 2\nDimension 3\n\nVertices\n{}", mesh.positions.len())?;
@@ -93,7 +94,7 @@ mod tests {
                         Tetrahedra\n1\n1 2 3 4 9\nEnd\n";
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.mesh");
         write(&path, &octahedron()).unwrap();

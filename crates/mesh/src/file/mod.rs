@@ -1,10 +1,9 @@
-//! What all mesh files share: errors that name file, field and remedy, a reader that never trusts a
-//! count, and writing without leaving half a file.
+//! Common parts of the mesh file formats: errors, a bounds-checked reader and atomic writing.
 //!
 //! # Practice
-//! A file is read whole. A count in a header is compared with the bytes that are left before
-//! anything is allocated for it, so a header cannot ask for more than a few times the file's own
-//! size. A new file is written beside its place and then renamed.
+//! A file is read as a whole. A count in a header is compared with the remaining bytes before
+//! allocation, so that a header cannot request more than a few times the file's size. A new file is
+//! written under a temporary name and then renamed.
 
 pub mod abaqus;
 mod base64;
@@ -31,42 +30,42 @@ use trepan_volume::read_regular;
 /// Why a mesh file could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The operating system says no.
+    /// The operating system cannot access the file.
     #[error("{}: {source}; check that the path exists and may be used", path.display())]
     Io {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A part of the file is not what it should be.
+    /// A field of the file is invalid.
     #[error("{}: {field} is {got}; it should be {wanted}", path.display())]
     Field {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Which part.
+        /// The field.
         field: String,
-        /// What is there.
+        /// Its value.
         got: String,
-        /// What would be right.
+        /// The expected value.
         wanted: String,
     },
-    /// The file was read, but its mesh is not usable.
+    /// The file was read, but its mesh is not valid.
     #[error("{}: {source}", path.display())]
     Mesh {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The error.
         source: MeshError,
     },
 }
 
-/// A place in a file's bytes, text or binary.
+/// A read position in a file's bytes, text or binary.
 pub(crate) struct Reader {
     path: PathBuf,
     bytes: Vec<u8>,
     at: usize,
-    /// From here to the end of its line nothing counts as a word.
+    /// Character that starts a comment up to the end of the line.
     pub(crate) comment: Option<u8>,
 }
 
@@ -76,7 +75,7 @@ impl Reader {
         Ok(Self::of(path, bytes))
     }
 
-    /// The content of a file that is already in memory.
+    /// A reader of bytes in memory.
     pub(crate) fn of(path: &Path, bytes: Vec<u8>) -> Self {
         Self { path: path.into(), bytes, at: 0, comment: None }
     }
@@ -90,7 +89,7 @@ impl Reader {
         self.bytes.len() - self.at
     }
 
-    /// The rest of the current line without its end, or `None` at the end of the file.
+    /// The rest of the current line without its end; `None` at the end of the file.
     pub(crate) fn line(&mut self) -> Option<String> {
         if self.left() == 0 {
             return None;
@@ -102,7 +101,7 @@ impl Reader {
         Some(String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)).into_owned())
     }
 
-    /// The next word between blanks.
+    /// The next word, separated by white space.
     pub(crate) fn word(&mut self) -> Option<&str> {
         self.skip_blanks();
         let rest = &self.bytes[self.at..];
@@ -124,7 +123,7 @@ impl Reader {
         }
     }
 
-    /// Leaves out words as long as they are numbers.
+    /// Skips words that are numbers.
     pub(crate) fn skip_numbers(&mut self) {
         loop {
             let at = self.at;
@@ -135,7 +134,7 @@ impl Reader {
         }
     }
 
-    /// Leaves out so many words, or all that there are.
+    /// Skips up to `count` words.
     pub(crate) fn skip_words(&mut self, count: usize) {
         for _ in 0..count {
             if self.word().is_none() {
@@ -144,7 +143,7 @@ impl Reader {
         }
     }
 
-    /// The next words as a position.
+    /// Parses the next words as a position.
     pub(crate) fn xyz(&mut self, node: usize) -> Result<Vec3, FileError> {
         let field = format!("node {node}");
         let mut coordinate = || self.number(&field, "three numbers");
@@ -152,7 +151,7 @@ impl Reader {
         self.position(node, xyz)
     }
 
-    /// Goes on after the next line that starts with `start`; an error at the end of the file.
+    /// Skips past the next line that starts with `start`; an error at the end of the file.
     pub(crate) fn skip_past_line(&mut self, start: &str) -> Result<(), FileError> {
         while let Some(line) = self.line() {
             if line.starts_with(start) {
@@ -162,20 +161,20 @@ impl Reader {
         Err(self.error(start, "missing", "at the end of its section; is the file cut off?"))
     }
 
-    /// The next word, parsed.
+    /// Parses the next word.
     pub(crate) fn number<T: std::str::FromStr>(&mut self, field: &str, wanted: &str) -> Result<T, FileError> {
         let word = self.word().unwrap_or("the end of the file").to_owned();
         word.parse().map_err(|_| self.error(field, &word, wanted))
     }
 
-    /// The next word as a count of things that each take at least `bytes_each` in the rest of the
-    /// file.
+    /// Parses the next word as a count of items that each take at least `bytes_each` of the rest of
+    /// the file.
     pub(crate) fn count(&mut self, field: &str, bytes_each: usize) -> Result<usize, FileError> {
         let count: u64 = self.number(field, "a count")?;
         self.checked_count(field, count, bytes_each)
     }
 
-    /// The same for a count that was read otherwise.
+    /// Checks a count in the same way.
     pub(crate) fn checked_count(&self, field: &str, count: u64, bytes_each: usize) -> Result<usize, FileError> {
         let fits = usize::try_from(count)
             .ok()
@@ -209,7 +208,7 @@ impl Reader {
         Ok(bytes)
     }
 
-    /// Back to the start.
+    /// Returns to the start.
     pub(crate) fn rewind(&mut self) {
         self.at = 0;
     }
@@ -219,12 +218,12 @@ impl Reader {
         self.bytes[self.at..].starts_with(bytes)
     }
 
-    /// Bytes in the whole file.
+    /// Size of the file, bytes.
     pub(crate) fn size(&self) -> usize {
         self.bytes.len()
     }
 
-    /// A position in f32, if it is finite.
+    /// Converts a position to f32, if it is finite.
     pub(crate) fn position(&self, node: usize, xyz: [f64; 3]) -> Result<Vec3, FileError> {
         let position = Vec3::from_array(xyz.map(|c| c as f32));
         if position.is_finite() {
@@ -234,14 +233,14 @@ impl Reader {
         }
     }
 
-    /// The mesh, if it has tetrahedra and their indices are in range.
+    /// Builds the mesh, if it has tetrahedra and their indices are in range.
     pub(crate) fn mesh(&self, positions: Vec<Vec3>, tets: Vec<[u32; 4]>) -> Result<TetMesh, FileError> {
         let mesh = TetMesh { positions, tets };
         mesh.check_indices().map_err(|source| FileError::Mesh { path: self.path.clone(), source })?;
         Ok(mesh)
     }
 
-    /// The surface, if it has triangles and their indices are in range.
+    /// Builds the surface, if it has triangles and their indices are in range.
     pub(crate) fn surface(&self, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<TriMesh, FileError> {
         if triangles.is_empty() {
             return Err(self.error("the file", "without a triangle", "a surface"));
@@ -258,8 +257,7 @@ impl Reader {
     }
 }
 
-/// Writes a file under a temporary name in the same folder, then renames it: the old file, or the
-/// whole new one.
+/// Writes a temporary file in the same folder, then renames it, so that a crash keeps the old file.
 pub(crate) fn write_atomically(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -282,7 +280,7 @@ pub(crate) fn write_atomically(
 pub(crate) mod tests {
     use super::*;
 
-    /// A small sound mesh: an octahedron of four tetrahedra around its axis, off the origin.
+    /// A small valid mesh: an octahedron of four tetrahedra around its axis, off the origin.
     pub(crate) fn octahedron() -> TetMesh {
         let ring = [Vec3::X, Vec3::Y, Vec3::NEG_X, Vec3::NEG_Y];
         let nodes = [Vec3::NEG_Z, Vec3::Z].into_iter().chain(ring);
@@ -292,9 +290,9 @@ pub(crate) mod tests {
         mesh
     }
 
-    /// Feeds a parser thousands of damaged copies of a good file: cut, bytes changed, bytes lost,
-    /// numbers swapped for others. It may refuse or read them, but must not panic, and a refusal
-    /// must name the file.
+    /// Feeds a parser thousands of damaged copies of a valid file: truncated, with bytes changed or
+    /// removed, and with numbers replaced. It may reject or read them, but must not panic, and an
+    /// error must name the file.
     pub(crate) fn survive_mutations<T>(good: &[u8], parse: impl Fn(Reader) -> Result<T, FileError>) {
         let mut random = 0x2545_F491_4F6C_DD1Du64;
         let mut next = |n: usize| {
@@ -321,12 +319,12 @@ pub(crate) mod tests {
         }
     }
 
-    /// What a parser says about a text.
+    /// Parses a text.
     pub(crate) fn of_text<T>(text: &str, parse: impl Fn(Reader) -> Result<T, FileError>) -> Result<T, FileError> {
         parse(Reader::of(Path::new("some.file"), text.as_bytes().to_vec()))
     }
 
-    /// How many damaged copies; more with TREPAN_MUTATIONS=1000000.
+    /// Number of damaged copies; more with TREPAN_MUTATIONS=1000000.
     fn rounds() -> usize {
         std::env::var("TREPAN_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(5_000)
     }

@@ -1,9 +1,9 @@
-//! Nodes that a file numbers in its own way: from 1, with gaps, in any order.
+//! Maps a file's node numbers to indices: from 1, with gaps, in any order.
 
 use crate::file::{FileError, Reader};
 use trepan_geometry::Vec3;
 
-/// Nodes in file order, and the way from a number to the place.
+/// Nodes in file order, with a map from number to index.
 #[derive(Default)]
 pub(crate) struct Numbered {
     pub(crate) positions: Vec<Vec3>,
@@ -23,7 +23,7 @@ impl Numbered {
         twice.map_or(Ok(()), |w| Err(reader.error(format!("node {}", w[0].0), "there twice", "there once")))
     }
 
-    /// The places of four numbers.
+    /// The indices of four node numbers.
     pub(crate) fn corners(&self, reader: &Reader, tet: usize, numbers: [u64; 4]) -> Result<[u32; 4], FileError> {
         let place = |number: u64| self.places.binary_search_by_key(&number, |p| p.0).ok().map(|at| self.places[at].1);
         let missing =

@@ -1,12 +1,12 @@
 //! Wavefront OBJ surfaces (`.obj`).
 //!
 //! # Theory
-//! `v x y z` is a vertex, `f a b c …` a polygon of vertex numbers from 1, or from the last one
-//! backwards when negative; `a/t/n` adds texture and normal.
+//! `v x y z` is a vertex, `f a b c …` a polygon of vertex numbers from 1, negative numbers counting
+//! from the last vertex; `a/t/n` adds texture and normal.
 //!
 //! # Practice
-//! Polygons become fans of triangles; texture, normals, groups and materials are left out. Writes
-//! vertices and triangles with digits that give the same f32 back.
+//! Polygons are split into triangle fans; texture, normals, groups and materials are skipped.
+//! Writes vertices and triangles with enough digits to restore each f32.
 
 use crate::TriMesh;
 use crate::file::{FileError, Reader, write_atomically};
@@ -18,7 +18,7 @@ pub fn read(path: &Path) -> Result<TriMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
-/// Writes a surface as OBJ, whole or not at all.
+/// Writes a surface as OBJ, atomically.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
         mesh.positions.iter().try_for_each(|p| writeln!(out, "v {} {} {}", p.x, p.y, p.z))?;
@@ -51,7 +51,7 @@ fn vertex<'a>(reader: &Reader, node: usize, mut words: impl Iterator<Item = &'a 
     reader.position(node + 1, [coordinate(), coordinate(), coordinate()])
 }
 
-/// A vertex number, made to start at 0.
+/// Converts a vertex number to an index from 0.
 fn corner(reader: &Reader, line: &str, word: &str, vertices: usize) -> Result<u32, FileError> {
     let number: Option<i64> = word.split('/').next().and_then(|n| n.parse().ok());
     let index = match number {
@@ -72,7 +72,7 @@ mod tests {
     const TEXT: &str = "# a square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvn 0 0 1\nv 0 1 0\ng x\nf 1//1 2//1 3//1 -1//1\n";
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("surface.obj");
         let mesh = octahedron();

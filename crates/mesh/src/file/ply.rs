@@ -1,13 +1,13 @@
 //! PLY surfaces (`.ply`).
 //!
 //! # Theory
-//! A text header names elements, their counts and properties, each a number or a list with its
-//! length in front; then come the rows of each element, as text or as binary of either byte order.
+//! A text header lists elements, their counts and properties, each a number or a list preceded by
+//! its length. The rows of each element follow, as text or as binary of either byte order.
 //!
 //! # Practice
-//! Of `vertex` the properties `x`, `y`, `z` are read, of `face` the list `vertex_indices` (or
-//! `vertex_index`); everything else is passed over. Polygons become fans of triangles. Positions
-//! are mm; PLY has no unit. Written: binary, little-endian.
+//! Reads `x`, `y`, `z` of `vertex`, and the list `vertex_indices` (or `vertex_index`) of `face`;
+//! everything else is skipped. Polygons are split into triangle fans. Positions are mm; PLY has no
+//! unit. Writes binary, little-endian.
 //!
 //! # Sources
 //! G. Turk, "The PLY Polygon File Format", 1994.
@@ -21,7 +21,7 @@ pub fn read(path: &Path) -> Result<TriMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
-/// Writes a surface as binary PLY, whole or not at all.
+/// Writes a surface as binary PLY, atomically.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
         writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", mesh.positions.len())?;
@@ -75,17 +75,17 @@ enum Encoding {
     Big,
 }
 
-/// Things of one sort.
+/// A kind of element, its count and properties.
 struct Element {
     name: String,
     count: u64,
     properties: Vec<Property>,
 }
 
-/// What each of them has.
+/// A property of an element.
 struct Property {
     name: String,
-    /// Type of the length, where it is a list.
+    /// Type of the length, for a list.
     length: Option<Kind>,
     kind: Kind,
 }
@@ -153,7 +153,7 @@ impl Ply {
                 _ => {}
             }
         }
-        // Things without a property take no bytes, however many the header claims.
+        // Elements without properties take no bytes, whatever count the header states.
         elements.retain(|element| !element.properties.is_empty());
         Ok(elements)
     }
@@ -183,7 +183,7 @@ impl Ply {
         Ok(Property { name: name.into(), length, kind })
     }
 
-    /// Bytes that a property takes at least.
+    /// Smallest size of a property, bytes.
     fn least_bytes(&self, property: &Property) -> usize {
         match self.encoding {
             Encoding::Text => 2,
@@ -191,7 +191,7 @@ impl Ply {
         }
     }
 
-    /// A property's numbers in the next row.
+    /// Reads a property's numbers in the next row.
     fn values(&mut self, property: &Property) -> Result<Vec<f64>, FileError> {
         let count = match property.length {
             None => 1,
@@ -199,7 +199,7 @@ impl Ply {
                 let length = self.value(&property.name, kind)?;
                 let each = if self.encoding == Encoding::Text { 2 } else { property.kind.bytes() };
                 let field = format!("the length of {}", property.name);
-                // A negative length becomes 0, and a list of none is no polygon.
+                // A negative length becomes 0, and an empty list is not a polygon.
                 self.reader.checked_count(&field, length as u64, each)?
             }
         };
@@ -226,7 +226,7 @@ impl Ply {
         })
     }
 
-    /// A polygon's vertex numbers.
+    /// Converts a polygon's vertex numbers to indices.
     fn corners(&self, row: usize, values: &[f64]) -> Result<Vec<u32>, FileError> {
         let whole = |v: &f64| v.fract() == 0.0 && (0.0..f64::from(u32::MAX)).contains(v);
         match values.len() >= 3 && values.iter().all(whole) {
@@ -248,7 +248,7 @@ mod tests {
 
     const TEXT: &str = "ply\r\nformat ascii 1.0\r\ncomment a square\r\nelement vertex 4\r\nproperty float x\r\nproperty float y\r\nproperty uchar red\r\nproperty float z\r\nelement face 1\r\nproperty list uchar int vertex_indices\r\nproperty uchar red\r\nelement edge 1\r\nproperty int vertex1\r\nend_header\r\n0 0 9 0\r\n1 0 9 0\r\n1 1 9 0\r\n0 1 9 0.5\r\n4 0 1 2 3 7\r\n5\r\n";
 
-    /// [`TEXT`]'s surface as big-endian binary, with lists of another type.
+    /// The surface of [`TEXT`] as big-endian binary, with lists of another type.
     fn big() -> Vec<u8> {
         let mut bytes = b"ply\nformat binary_big_endian 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\nelement face 1\nproperty list ushort short vertex_index\nend_header\n".to_vec();
         for c in [0.0f64, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.5] {
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("surface.ply");
         let mesh = octahedron();
@@ -290,7 +290,7 @@ mod tests {
     fn damage_is_survived() {
         survive_mutations(TEXT.as_bytes(), parse);
         survive_mutations(&big(), parse);
-        // So many things of nothing would be counted for ever.
+        // Iterating over this many empty items would never end.
         let endless = TEXT.replace("element edge 1\r\nproperty int vertex1", "element edge 18446744073709551615");
         assert!(of_text(&endless, parse).is_ok());
     }

@@ -1,13 +1,13 @@
 //! STL surfaces (`.stl`).
 //!
 //! # Theory
-//! Triangles without shared vertices: as text (`solid … facet normal … vertex …`), or 80 bytes of
-//! anything, a little-endian count and 50 bytes for each.
+//! Triangles without shared vertices: as text (`solid … facet normal … vertex …`), or as an
+//! arbitrary 80-byte header, a little-endian count and 50 bytes per triangle.
 //!
 //! # Practice
-//! Both are read, told apart by size and not by the word `solid`, which binary files start with
-//! too. Corners at the same place become one vertex; normals are left out, since the corner order
-//! says them. Writes binary. Positions are mm; STL has no unit.
+//! Reads both, distinguished by size and not by the word `solid`, with which binary files may start
+//! too. Corners at the same position become one vertex; normals are skipped, since the corner order
+//! defines them. Writes binary. Positions are mm; STL has no unit.
 
 use crate::TriMesh;
 use crate::file::{FileError, Reader, write_atomically};
@@ -19,7 +19,7 @@ pub fn read(path: &Path) -> Result<TriMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
-/// Writes a surface as binary STL, whole or not at all.
+/// Writes a surface as binary STL, atomically.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
         out.write_all(&[b' '; 80])?;
@@ -97,7 +97,7 @@ mod tests {
     const TEXT: &str = "solid a b\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1e0 0\n  endloop\n endfacet\nendsolid a b\n";
 
     #[test]
-    fn what_is_written_is_read_and_still_closed() {
+    fn written_surfaces_are_read_back_and_closed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("surface.stl");
         let mesh = octahedron();

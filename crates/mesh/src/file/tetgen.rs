@@ -6,9 +6,10 @@
 //! has. `#` starts a comment.
 //!
 //! # Practice
-//! Give either file; the other lies beside it. Attributes and markers are left out, of 10-node
-//! elements the corners are taken. Corner order is ours; a file whose elements are all negative has
-//! the other order and is turned. Writes numbers from 1 and digits that give the same f32 back.
+//! Give either file; the other must be next to it. Attributes and markers are skipped; of 10-node
+//! elements only the corners are read. The corner order is that of [`TetMesh`]; a file whose
+//! elements are all negative uses the other order and is converted. Writes numbers from 1, with
+//! enough digits to restore each f32.
 //!
 //! # Sources
 //! H. Si: TetGen 1.5 manual, section 5.2.
@@ -18,12 +19,12 @@ use crate::file::numbered::Numbered;
 use crate::file::{FileError, Reader, write_atomically};
 use std::path::Path;
 
-/// Reads a pair of TetGen files. Indices are checked; call [`TetMesh::check`] for the rest.
+/// Reads a pair of TetGen files. Only indices are checked; call [`TetMesh::check`] for the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(&path.with_extension("node"))?, Reader::open(&path.with_extension("ele"))?)
 }
 
-/// Writes a mesh as a pair of TetGen files, each whole or not at all.
+/// Writes a mesh as a pair of TetGen files, each atomically.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     write_atomically(&path.with_extension("node"), |out| {
         writeln!(out, "{} 3 0 0", mesh.positions.len())?;
@@ -57,7 +58,7 @@ fn parse(mut nodes: Reader, mut elements: Reader) -> Result<TetMesh, FileError> 
     elements.mesh(numbered.positions, tets).map(turned)
 }
 
-/// The mesh with positive volumes, if all are negative.
+/// Swaps the corner order if all volumes are negative.
 fn turned(mut mesh: TetMesh) -> TetMesh {
     if (0..mesh.tets.len()).all(|t| mesh.volume_mm3(t) < 0.0) {
         mesh.tets.iter_mut().for_each(|tet| tet.swap(2, 3));
@@ -97,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.ele");
         write(&path, &octahedron()).unwrap();

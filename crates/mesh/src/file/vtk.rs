@@ -6,9 +6,9 @@
 //! splits that into `OFFSETS` and `CONNECTIVITY`. Cell type 10 is the 4-node tetrahedron.
 //!
 //! # Practice
-//! Reads both encodings and both layouts; cells of other types are left out, point and cell data
-//! are not read. Writes version 3.0, binary, f32, which every version of VTK reads. Positions are
-//! mm; VTK has no unit. Corner order is ours.
+//! Reads both encodings and both layouts; skips cells of other types, point and cell data. Writes
+//! version 3.0, binary, f32, which every version of VTK reads. Positions are mm; VTK has no unit.
+//! The corner order is the same as in [`TetMesh`].
 //!
 //! # Sources
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
@@ -22,14 +22,14 @@ use trepan_geometry::Vec3;
 
 const TETRAHEDRON: u8 = 10;
 
-/// Reads the tetrahedra of a legacy VTK file. Indices are checked; call [`TetMesh::check`] for the
-/// rest.
+/// Reads the tetrahedra of a legacy VTK file. Only indices are checked; call [`TetMesh::check`] for
+/// the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
-/// Reads tetrahedra, and nothing else, with the label of each as the first cell data, `label`: what
-/// [`write_labelled`] writes.
+/// Reads a file written by [`write_labelled`]: tetrahedra only, with their labels as the first cell
+/// data, `label`.
 pub fn read_labelled(path: &Path) -> Result<LabelledMesh, FileError> {
     let mut file = Legacy { reader: Reader::open(path)?, binary: false, offsets: false };
     file.header()?;
@@ -44,12 +44,12 @@ pub(crate) fn parse(reader: Reader) -> Result<TetMesh, FileError> {
     file.body()
 }
 
-/// Writes a mesh as binary legacy VTK, whole or not at all.
+/// Writes a mesh as binary legacy VTK, atomically.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     write_atomically(path, |out| write_grid(out, mesh))
 }
 
-/// The same with each tetrahedron's label as the cell data `label`.
+/// Writes a mesh with each tetrahedron's label as the cell data `label`.
 pub fn write_labelled(path: &Path, labelled: &LabelledMesh) -> Result<(), FileError> {
     write_atomically(path, |out| {
         write_grid(out, &labelled.mesh)?;
@@ -77,11 +77,11 @@ fn write_grid(out: &mut dyn Write, mesh: &TetMesh) -> std::io::Result<()> {
 struct Legacy {
     reader: Reader,
     binary: bool,
-    /// Version 5: cells as offsets and connectivity.
+    /// Version 5: cells are stored as offsets and connectivity.
     offsets: bool,
 }
 
-/// All cells one after another: where each starts, and their nodes.
+/// All cells one after another: the start of each, and their nodes.
 #[derive(Default)]
 struct Cells {
     starts: Vec<usize>,
@@ -146,7 +146,7 @@ impl Legacy {
         Ok(self.numbers("label", count, "unsigned_short")?.into_iter().map(|label| label as u16).collect())
     }
 
-    /// Up to the next blank line.
+    /// Skips to the next blank line.
     fn skip_metadata(&mut self) {
         self.reader.line();
         while self.reader.line().is_some_and(|line| !line.trim().is_empty()) {}
@@ -159,7 +159,7 @@ impl Legacy {
         values.as_chunks::<3>().0.iter().enumerate().map(|(n, &xyz)| self.reader.position(n, xyz)).collect()
     }
 
-    /// Numbers of a VTK type, in whichever encoding the file has.
+    /// Reads numbers of a VTK type in the file's encoding.
     fn numbers(&mut self, field: &str, count: usize, kind: &str) -> Result<Vec<f64>, FileError> {
         let (size, of): (usize, fn(&[u8]) -> f64) = match kind {
             "unsigned_short" => (2, |b| u16::from_be_bytes(b.try_into().unwrap_or_default()).into()),
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.vtk");
         write(&path, &octahedron()).unwrap();

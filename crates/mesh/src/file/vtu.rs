@@ -2,15 +2,16 @@
 //!
 //! # Theory
 //! An `UnstructuredGrid` with one `Piece`: `Points`, and `Cells` as `connectivity`, `offsets` and
-//! `types` (10 is the 4-node tetrahedron). A `DataArray` is text, or base64 between its tags, or at
-//! an offset in `AppendedData` (base64 or raw). Binary data start with their length, or, when
-//! compressed, with the number of blocks, the size of a block and of the last one, and each block's
-//! compressed size.
+//! `types` (10 is the 4-node tetrahedron). A `DataArray` is text, base64 between its tags, or at an
+//! offset in `AppendedData` (base64 or raw). Binary data start with their length; compressed data
+//! with the number of blocks, the size of a block and of the last one, and each block's compressed
+//! size.
 //!
 //! # Practice
-//! Reads text, base64 and both kinds of appended data, plain or with zlib, both byte orders; cells
-//! of other types and all data on points and cells are left out. Several pieces, LZ4 and LZMA are
-//! refused by name. Writes base64, plain, f32. Positions are mm; corner order is ours.
+//! Reads text, base64 and both kinds of appended data, uncompressed or zlib, in both byte orders;
+//! skips cells of other types and all point and cell data. Several pieces, LZ4 and LZMA are
+//! rejected. Writes uncompressed base64, f32. Positions are mm; the corner order is that of
+//! [`TetMesh`].
 //!
 //! # Sources
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
@@ -24,13 +25,13 @@ use trepan_geometry::Vec3;
 
 const TETRAHEDRON: f64 = 10.0;
 
-/// Reads the tetrahedra of a VTK XML file. Indices are checked; call [`TetMesh::check`] for the
-/// rest.
+/// Reads the tetrahedra of a VTK XML file. Only indices are checked; call [`TetMesh::check`] for
+/// the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
     parse(Reader::open(path)?)
 }
 
-/// Writes a mesh as VTK XML, whole or not at all.
+/// Writes a mesh as VTK XML, atomically.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     let positions: Vec<u8> = mesh.positions.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect();
     let connectivity: Vec<u8> = mesh.tets.iter().flatten().flat_map(|n| n.to_le_bytes()).collect();
@@ -65,25 +66,25 @@ pub(crate) fn parse(mut reader: Reader) -> Result<TetMesh, FileError> {
     Xml::new(&bytes, &reader)?.mesh()
 }
 
-/// The file, and what its first tags say about the arrays.
+/// The file and the array format in its first tags.
 struct Xml<'a> {
     bytes: &'a [u8],
     reader: &'a Reader,
     big_endian: bool,
     long_headers: bool,
     zlib: bool,
-    /// Where appended data start, and whether they are raw.
+    /// Start of appended data, and whether they are raw.
     appended: Option<(usize, bool)>,
 }
 
-/// A tag: its name and attributes as text, and where it ends.
+/// A tag: its name and attributes as text, and its end.
 struct Tag<'a> {
     text: &'a str,
     end: usize,
 }
 
 impl<'a> Tag<'a> {
-    /// The next tag from `at` on that is no comment.
+    /// The next tag from `at` on, skipping comments.
     fn next(bytes: &'a [u8], mut at: usize) -> Option<Self> {
         loop {
             let start = at + bytes.get(at..)?.iter().position(|b| *b == b'<')? + 1;
@@ -178,7 +179,7 @@ impl<'a> Xml<'a> {
         Ok(tets)
     }
 
-    /// The numbers of an array.
+    /// Reads the numbers of an array.
     fn array(&self, tag: &Tag, name: &str) -> Result<Vec<f64>, FileError> {
         let rest = &self.bytes[tag.end..];
         let inline = &rest[..rest.iter().position(|b| *b == b'<').unwrap_or(rest.len())];
@@ -234,7 +235,7 @@ impl<'a> Xml<'a> {
         Ok(bytes.chunks_exact(size).map(number).collect())
     }
 
-    /// A length in front of data, and how many bytes it takes.
+    /// The length field at the start of data, and its size in bytes.
     fn length(&self, stream: &[u8], at: usize) -> Option<(usize, usize)> {
         let size = if self.long_headers { 8 } else { 4 };
         let mut little = [0; 8];
@@ -269,10 +270,10 @@ impl<'a> Xml<'a> {
     }
 }
 
-/// The number that eight bytes mean.
+/// Conversion of eight bytes to a number.
 type Meaning = fn([u8; 8]) -> f64;
 
-/// Bytes of a number and what they mean, little-endian and filled up with zeros.
+/// Size of a number type and its conversion from little-endian, zero-padded bytes.
 fn number_type(kind: &str) -> Option<(usize, Meaning)> {
     Some(match kind {
         "Float32" => (4, |b| f32::from_bits(u64::from_le_bytes(b) as u32).into()),
@@ -289,7 +290,7 @@ fn number_type(kind: &str) -> Option<(usize, Meaning)> {
     })
 }
 
-/// Where appended data start (after the underscore), and whether they are raw.
+/// Start of appended data (after the underscore), and whether they are raw.
 fn appended(bytes: &[u8]) -> Option<(usize, bool)> {
     let at = bytes.windows(13).position(|w| w == b"<AppendedData")?;
     let tag = Tag::next(bytes, at)?;
@@ -297,7 +298,7 @@ fn appended(bytes: &[u8]) -> Option<(usize, bool)> {
     Some((start, tag.attribute("encoding") == Some("raw")))
 }
 
-/// What decodes as base64 at the start of a stream.
+/// Decodes the base64 prefix of a stream.
 fn decoded_prefix(stream: &[u8]) -> Vec<u8> {
     let end = stream.iter().position(|b| *b == b'<').unwrap_or(stream.len());
     base64::decode(&stream[..end]).unwrap_or_default()
@@ -352,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_files_are_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.vtu");
         write(&path, &octahedron()).unwrap();

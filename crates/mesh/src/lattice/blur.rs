@@ -1,9 +1,9 @@
-//! A Gaussian over a grid, one axis after another.
+//! Gaussian smoothing of a grid, one axis after another.
 
 use rayon::prelude::*;
 
-/// Smooths with a Gaussian of `sigma` voxels along each axis, cut off at 3 σ; the border value goes
-/// on outside.
+/// Smooths with a Gaussian of `sigma` voxels along each axis, truncated at 3 σ; border values are
+/// extended.
 pub(super) fn blur(values: &mut [f32], dims: [usize; 3], sigma: [f64; 3]) {
     for axis in (0..3).filter(|&axis| sigma[axis] > 0.05) {
         let kernel = gaussian(sigma[axis]);
@@ -27,7 +27,7 @@ fn convolve(line: &[f32], kernel: &[f32], smooth: &mut [f32]) {
     }
 }
 
-/// Replaces each line along `axis` by what `f` makes of it; in parallel over slabs.
+/// Applies `f` to each line along `axis`, in parallel over slabs.
 fn for_each_line(values: &mut [f32], [nx, ny, nz]: [usize; 3], axis: usize, f: impl Fn(&[f32], &mut [f32]) + Sync) {
     let layer = nx * ny;
     match axis {
@@ -49,7 +49,7 @@ fn for_each_line(values: &mut [f32], [nx, ny, nz]: [usize; 3], axis: usize, f: i
             },
         ),
         _ => {
-            // Lines along z lie across all slabs: work on a transposed copy.
+            // Lines along z cross all slabs: work on a transposed copy.
             let mut lines = vec![0.0; values.len()];
             let along_z = |line: &mut Vec<f32>, (at, out): (usize, &mut [f32])| {
                 (0..nz).for_each(|z| line[z] = values[at + layer * z]);

@@ -1,24 +1,24 @@
-//! The distance to the border of one label, smoothed: a function of world space.
+//! The smoothed distance to the boundary of one label, as a function of world position.
 //!
 //! # Theory
 //! The exact distance to the label's surface ([`DistanceField`]), positive inside; a Gaussian of
-//! width σ then takes out what a lattice of spacing a ≫ σ could only alias. On a sheared grid the
-//! zero set stays right, the slope does not, and only the zero set matters here.
+//! width σ then removes detail that a lattice of spacing a ≫ σ would alias. On a sheared grid the
+//! zero set remains correct, the gradient does not; only the zero set is used here.
 //!
 //! # Practice
-//! Only the box of the label, padded, is kept: what touches the grid's border is closed there. 4
+//! Only the padded box of the label is stored: labels at the grid's border are closed there. 4
 //! bytes a voxel.
 
 use super::blur::blur;
 use glam::{DAffine3, DVec3};
 use trepan_volume::{DistanceField, VoxelVolume};
 
-/// Where a label lies in its volume.
+/// The box of a label in its volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Block {
     low: [usize; 3],
     high: [usize; 3],
-    /// How many voxels have the label.
+    /// Number of voxels with the label.
     pub(super) voxels: usize,
 }
 
@@ -36,7 +36,7 @@ impl Block {
         blocks.iter().enumerate().filter_map(|(label, block)| Some((label as u16, (*block)?))).collect()
     }
 
-    /// Both together.
+    /// The union of two blocks.
     pub(super) fn with(&self, other: &Self) -> Self {
         Self {
             low: std::array::from_fn(|d| self.low[d].min(other.low[d])),
@@ -56,7 +56,7 @@ impl Block {
     }
 }
 
-/// About millimetres to a border, positive inside.
+/// Approximate distance to a boundary, mm, positive inside.
 pub(super) struct Field {
     dims: [usize; 3],
     spacing_mm: DVec3,
@@ -65,8 +65,8 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// The distance to the border of what `inside` takes, with a margin for smoothing up to
-    /// `most_mm`.
+    /// The distance to the boundary of the labels selected by `inside`, with a margin for smoothing
+    /// up to `most_mm`.
     pub(super) fn of(labels: &VoxelVolume<u16>, block: &Block, most_mm: f64, inside: impl Fn(u16) -> bool) -> Self {
         let spacing_mm = labels.spacing_mm();
         let pad = (most_mm / spacing_mm).to_array().map(|sigma| 2 + (3.0 * sigma).ceil() as usize);
@@ -79,14 +79,14 @@ impl Field {
         blur(&mut self.values, self.dims, (sigma_mm / self.spacing_mm).to_array());
     }
 
-    /// Whether the padded box holds a point.
+    /// Whether the padded box contains a point.
     pub(super) fn contains(&self, world: DVec3) -> bool {
         let at = self.voxel_from_world.transform_point3(world);
         let last = DVec3::from_array(self.dims.map(|n| (n - 1) as f64));
         at.cmpge(DVec3::ZERO).all() && at.cmple(last).all()
     }
 
-    /// Trilinear; constant beyond the border.
+    /// Samples trilinearly; constant beyond the border.
     pub(super) fn sample(&self, world: DVec3) -> f64 {
         let last = DVec3::from_array(self.dims.map(|n| (n - 1) as f64));
         let at = self.voxel_from_world.transform_point3(world).clamp(DVec3::ZERO, last);
@@ -107,7 +107,7 @@ impl Field {
     }
 }
 
-/// The mask of a block and `pad` empty voxels around.
+/// The mask of a block with `pad` empty voxels around it.
 fn padded(labels: &VoxelVolume<u16>, block: &Block, pad: [usize; 3], inside: impl Fn(u16) -> bool) -> VoxelVolume<u8> {
     let size: [usize; 3] = std::array::from_fn(|d| block.high[d] - block.low[d] + 1);
     let dims = std::array::from_fn(|d| size[d] + 2 * pad[d]);

@@ -1,16 +1,16 @@
-//! Takes away what keeps a mesh from having one closed surface without pinches.
+//! Removes tetrahedra until the mesh has one closed manifold surface.
 //!
 //! # Theory
-//! Where the surface passes through lattice nodes, tetrahedra may meet in an edge or a node only.
+//! Where the surface passes through lattice nodes, tetrahedra may touch in an edge or a node only.
 //! Around each edge they should form one fan, around each node one face-connected group with one
-//! rim; of several, all but the largest go. Where the group has two rims, a path of tetrahedra from
-//! rim to rim goes. Each round takes tetrahedra away, so it ends; angles of the others stay as they
-//! are.
+//! rim; of several, all but the largest are removed. If the group has two rims, a path of
+//! tetrahedra between them is removed. Each round removes tetrahedra, so that the process
+//! terminates; the angles of the others do not change.
 
 use super::LabelledMesh;
 use crate::{NONE, TetMesh, Topology};
 
-/// The largest face-connected part of a mesh, with a surface that is a manifold.
+/// The largest face-connected part of a mesh, with a manifold surface.
 pub(super) fn repaired(LabelledMesh { mut mesh, mut label_of_tet }: LabelledMesh) -> LabelledMesh {
     loop {
         let topology = Topology::of(&mesh);
@@ -47,7 +47,7 @@ fn mark_pinches(mesh: &TetMesh, topology: &Topology, doomed: &mut [bool]) {
     }
 }
 
-/// The tetrahedra around a node.
+/// The tetrahedra around a node (its star).
 struct Star<'a> {
     mesh: &'a TetMesh,
     topology: &'a Topology,
@@ -56,7 +56,7 @@ struct Star<'a> {
 }
 
 impl Star<'_> {
-    /// Marks what must go for this node to lie inside, or on one sheet of the surface.
+    /// Marks tetrahedra for removal, so that the node is interior or on one sheet of the surface.
     fn mark(&mut self, doomed: &mut [bool]) {
         let groups = self.groups(|t, f| self.crossable(t, f).is_some());
         if groups.len() > 1 {
@@ -74,7 +74,7 @@ impl Star<'_> {
         }
     }
 
-    /// The star's own tetrahedron across a face that holds the centre.
+    /// The neighbour within the star across a face that contains the centre.
     fn crossable(&self, tet: u32, face: usize) -> Option<u32> {
         let corners = self.mesh.tets[tet as usize];
         let holds_centre = corners[crate::OPPOSITE[face]] != self.centre;
@@ -82,7 +82,7 @@ impl Star<'_> {
         (holds_centre && next != NONE).then_some(next)
     }
 
-    /// The star in groups that hang together through the faces which `open` lets pass.
+    /// Groups of the star that are connected through the faces for which `open` holds.
     fn groups(&self, open: impl Fn(u32, usize) -> bool) -> Vec<Vec<u32>> {
         let mut left = self.tets.to_vec();
         let mut groups = Vec::new();
@@ -105,7 +105,7 @@ impl Star<'_> {
         groups
     }
 
-    /// Nodes at the other end of the border edges of the centre, ascending.
+    /// The other ends of the boundary edges at the centre, ascending.
     fn rim_nodes(&self) -> Vec<u32> {
         let mut nodes: Vec<u32> = self.border_faces().into_iter().flat_map(|(_, ends)| ends).collect();
         nodes.sort_unstable();
@@ -113,7 +113,7 @@ impl Star<'_> {
         nodes
     }
 
-    /// Border faces that hold the centre: the tetrahedron and the two other nodes.
+    /// Boundary faces at the centre: the tetrahedron and the two other nodes.
     fn border_faces(&self) -> Vec<(u32, [u32; 2])> {
         let mut faces = Vec::new();
         for &tet in self.tets {
@@ -129,8 +129,7 @@ impl Star<'_> {
         faces
     }
 
-    /// The tetrahedra around the edge to `other`, in fans that hang together through faces at that
-    /// edge.
+    /// The tetrahedra around the edge to `other`, in fans connected through faces at that edge.
     fn fans(&self, other: u32) -> Vec<Vec<u32>> {
         let at_edge = |t: u32| self.mesh.tets[t as usize].contains(&other);
         let tets: Vec<u32> = self.tets.iter().copied().filter(|&t| at_edge(t)).collect();
@@ -139,7 +138,7 @@ impl Star<'_> {
         fan.groups(|t, f| self.crossable(t, f).is_some() && off_edge(t, f) != other)
     }
 
-    /// Border faces of the centre in closed rings, as their tetrahedra.
+    /// Boundary faces at the centre in closed rings, as their tetrahedra.
     fn rims(&self) -> Vec<Vec<u32>> {
         let mut left = self.border_faces();
         let mut rims = Vec::new();
@@ -155,7 +154,7 @@ impl Star<'_> {
         rims
     }
 
-    /// The shortest way through the star from one set of tetrahedra to another, both ends included.
+    /// The shortest path through the star between two sets of tetrahedra, including both ends.
     fn path(&self, from: &[u32], to: &[u32]) -> Vec<u32> {
         let mut reached: Vec<(u32, usize)> = from.iter().map(|&t| (t, usize::MAX)).collect();
         let mut done = 0;
@@ -196,7 +195,7 @@ mod tests {
 
     /// Two stacks of tetrahedra that share one edge; the first has more volume.
     #[test]
-    fn of_two_that_share_an_edge_the_larger_stays() {
+    fn the_larger_of_two_parts_sharing_an_edge_is_kept() {
         let positions = vec![Vec3::ZERO, Vec3::Z, 2.0 * Vec3::X, Vec3::Y, Vec3::NEG_X, Vec3::NEG_Y];
         let mesh = TetMesh { positions, tets: vec![[0, 4, 5, 1], [0, 2, 3, 1]] };
         let LabelledMesh { mesh, label_of_tet } = repaired(LabelledMesh { mesh, label_of_tet: vec![4, 7] });

@@ -1,16 +1,16 @@
-//! Tetrahedra from a mask or a label volume: a warped and cut body-centred cubic lattice.
+//! Meshes a mask or a label volume with tetrahedra: a warped and cut body-centred cubic lattice.
 //!
 //! # Theory
 //! Isosurface stuffing (Labelle and Shewchuk 2007) on smoothed signed distances, one for each
-//! label: cubes are as fine as [`Config`] says, and where labels meet, the lattice is warped and
-//! cut, so that both sides share the triangles of the border. Two kinds of unknowns are found
-//! together: the lattice spacing a, from the count asked for, and for each label the level of its
-//! distance at which its border is cut, so that it has the volume of its voxels (dV/dlevel = area):
-//! flat triangles cut off what is convex, and smoothing shrinks it, and the level gives both back.
-//! At the end nodes move where that makes the flattest elements higher.
+//! label: cubes are as fine as [`Config`] requests. Where labels meet, the lattice is warped and
+//! cut, so that both sides share the boundary triangles. Two sets of unknowns are solved together:
+//! the lattice spacing a, from the requested count, and for each label the isolevel of its
+//! distance, so that it keeps the volume of its voxels (dV/dlevel = area). Flat triangles cut off
+//! convex parts and smoothing shrinks them; the level compensates both. Finally nodes move to
+//! increase the height of the flattest elements.
 //!
 //! # Practice
-//! World mm; any affine. The same labels give the same bytes, whatever the number of threads.
+//! World mm; any affine. Equal labels give bit-identical results for any number of threads.
 //!
 //! # Sources
 //! F. Labelle, J. R. Shewchuk: Isosurface stuffing, ACM Transactions on Graphics 26(3), 2007. J.
@@ -18,8 +18,8 @@
 //!
 //! # When not to use it
 //! For sharp edges or surfaces that must interpolate given points (they are rounded at the scale of
-//! a), and for layers thinner than about 2 a (they may tear). Where three labels meet, their common
-//! line is true to about half of a only.
+//! a), and for layers thinner than about 2 a (they may break up). Where three labels meet, their
+//! common line is accurate to about half of a only.
 
 mod blur;
 mod field;
@@ -37,19 +37,19 @@ use regions::Regions;
 use trepan_geometry::Vec3;
 use trepan_volume::VoxelVolume;
 
-/// What to build.
+/// Parameters of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// How many tetrahedra to aim at, 100 to 20 million; met within 10 %. More is finer.
+    /// Requested number of tetrahedra, 100 to 20 million; met within 10 %. More is finer.
     pub target_tets: usize,
     /// Width of the Gaussian over the distance field, in lattice spacings, 0 to 2. More rounds off
-    /// what the lattice cannot follow; less keeps it, raggedly.
+    /// detail under the lattice's resolution; less keeps it, with a rough surface.
     pub smoothing: f64,
-    /// How often the edge of the cubes may double from the borders of labels to the depth of a
-    /// label, 0 to 6. More follows the borders better for the same count, with smaller elements
-    /// there: an explicit solver's step shrinks with them.
+    /// How often the edge of the cubes may double from label boundaries to the inside, 0 to 6. More
+    /// follows the boundaries better for the same count, with smaller elements there, which shorten
+    /// an explicit solver's step.
     pub coarsening: u32,
-    /// Where borders are followed more finely than elsewhere.
+    /// Region with a finer boundary.
     pub fine: Option<Fine>,
 }
 
@@ -58,46 +58,44 @@ pub struct Config {
 pub struct Fine {
     /// Its centre, world mm.
     pub centre: Vec3,
-    /// Its radius, mm, over 0. Beyond it, elements grow over about twice their size.
+    /// Its radius, mm, over 0. Beyond it, elements grow to about twice their size.
     pub radius_mm: f32,
-    /// How often the edge of the cubes at a border is halved inside, 1 to 4: 2 makes them four
+    /// How often the edge of the cubes at a boundary is halved inside, 1 to 4: 2 makes them four
     /// times finer.
     pub halvings: u32,
 }
 
-/// A mesh and what each of its tetrahedra is.
+/// A mesh with a label for each tetrahedron.
 ///
-/// Labels meet in triangles that the tetrahedra of both sides share.
+/// Labels meet in triangles shared by the tetrahedra of both sides.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LabelledMesh {
     /// All tetrahedra.
     pub mesh: TetMesh,
-    /// The label of each tetrahedron, as the volume says it; never 0.
+    /// The volume's label of each tetrahedron; never 0.
     pub label_of_tet: Vec<u16>,
 }
 
 impl Default for Config {
-    /// A brain for the whole operation: fine enough to deform smoothly, coarse enough for real time
+    /// A brain for a whole operation: fine enough to deform smoothly, coarse enough for real time
     /// on a CPU.
     fn default() -> Self {
         Self { target_tets: 15_000, smoothing: 0.3, coarsening: 0, fine: None }
     }
 }
 
-/// Fills the largest 6-connected part of a mask (voxels that are not 0) with tetrahedra.
+/// Fills the largest 6-connected part of a mask (nonzero voxels) with tetrahedra.
 ///
-/// The result passes [`TetMesh::check`], is face-connected, and its surface is closed without
-/// seams.
+/// The result passes [`TetMesh::check`], is face-connected, and has a closed surface.
 pub fn tetrahedra(mask: &VoxelVolume<u8>, config: &Config) -> Result<TetMesh, MeshError> {
     labelled(&mask.map(|v| u16::from(v != 0)), config).map(|labelled| labelled.mesh)
 }
 
-/// Fills the largest 6-connected part of what is labelled (voxels that are not 0) with tetrahedra
-/// of one label each.
+/// Fills the largest 6-connected labelled part (nonzero voxels) with tetrahedra of one label each.
 ///
-/// The mesh is as sound as that of [`tetrahedra`]. Borders between labels follow the voxels as the
-/// outer surface does; each label has the volume of its voxels within 0.2 % or one tetrahedron
-/// where the lattice can hold it. A label smaller than some cubes may be lost.
+/// The mesh is as valid as that of [`tetrahedra`]. Label boundaries follow the voxels like the
+/// outer surface. Each label keeps the volume of its voxels within 0.2 % or one tetrahedron where
+/// the lattice can resolve it. A label smaller than a few cubes may be lost.
 pub fn labelled(labels: &VoxelVolume<u16>, config: &Config) -> Result<LabelledMesh, MeshError> {
     check_config(config)?;
     let mut regions = Regions::of(labels, |mm3| config.smoothing * search::uniform_spacing(mm3, config.target_tets))?;
@@ -176,7 +174,7 @@ mod tests {
         tets.map(|t| labelled.mesh.volume_mm3(t)).sum()
     }
 
-    /// The surface of one label's tetrahedra.
+    /// The boundary surface of one label's tetrahedra.
     fn border_of(labelled: &LabelledMesh, label: u16) -> (TetMesh, Surface) {
         let LabelledMesh { mesh, label_of_tet } = labelled;
         let tets = mesh.tets.iter().zip(label_of_tet).filter(|(_, l)| **l == label).map(|(t, _)| *t).collect();
@@ -245,7 +243,7 @@ mod tests {
             let (count, sum) = surface.triangles.iter().filter(here).fold((0, 0.0), |(n, s), t| (n + 1, s + area(t)));
             sum / count as f32
         };
-        // Two halvings: triangles of a sixteenth, but for those across the rim of the ball.
+        // Two halvings: triangles of a sixteenth, except across the rim of the ball.
         assert!(mean(false) > 8.0 * mean(true), "{} {}", mean(false), mean(true));
     }
 
@@ -307,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_that_fills_its_grid_is_closed_at_the_border() {
+    fn a_mask_that_fills_its_grid_is_closed() {
         let mask = VoxelVolume::filled([20, 24, 18], DAffine3::IDENTITY, 7u8);
         let mesh = tetrahedra(&mask, &Config { target_tets: 3000, ..Config::default() }).unwrap();
         assert_sound(&mesh, 3000, 20.0 * 24.0 * 18.0);

@@ -10,20 +10,20 @@
 //!    ╲  c ── c' ╱       one edge of that face: the tetrahedron is q q' c c'
 //! ```
 //!
-//! Cubes of several sizes form an octree in which cubes that touch differ by one doubling at the
-//! most. Where smaller cubes put a node into the middle of the edge c c', the tetrahedron is halved
-//! there. Where a cube meets a smaller one, the square between them is cut along the diagonal to
-//! the middle of the larger face, and each half is joined to both centres. All angles lie between
-//! 45° and 120° (Labelle and Shewchuk 2007, section 4).
+//! Cubes of several sizes form an octree in which touching cubes differ by at most one doubling.
+//! Where smaller cubes put a node on the midpoint of the edge c c', the tetrahedron is split in two
+//! there. Where a cube meets a smaller one, their common square is split along the diagonal to the
+//! centre of the larger face, and each half is joined to both centres. All angles are between 45°
+//! and 120° (Labelle and Shewchuk 2007, section 4).
 //!
 //! # Practice
-//! Places are whole numbers of half the smallest edge, so no two tetrahedra disagree about a node.
-//! 16 bytes a cube, 12 a node, 16 a tetrahedron.
+//! Positions are integers in half the smallest edge, so that all tetrahedra agree about a node. 16
+//! bytes a cube, 12 a node, 16 a tetrahedron.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Cubes along an axis that 21 bits of a key can tell apart, in half edges.
+/// Largest coordinate that fits into 21 bits of a key, in half edges.
 const MOST_HALVES: f64 = 2_000_000.0;
 
 /// Nodes and tetrahedra that cover a body.
@@ -31,29 +31,29 @@ pub(super) struct Lattice {
     /// Edge of the smallest cubes, mm.
     pub(super) spacing: f64,
     origin: DVec3,
-    /// Places of the nodes, in half spacings from the origin.
+    /// Positions of the nodes, in half spacings from the origin.
     halves: Vec<[u32; 3]>,
     /// Positively oriented.
     pub(super) tets: Vec<[u32; 4]>,
 }
 
-/// What is to become of a cube.
+/// Decision about a cube.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cube {
-    /// The body may reach it, and it is small enough.
+    /// The body may reach it, and it is fine enough.
     Keep,
-    /// It is too large for its place.
+    /// It is too large for its position.
     Split,
-    /// The body is far from it.
+    /// It is far from the body.
     Drop,
 }
 
 impl Lattice {
-    /// Covers the box with cubes of edge `spacing · 2^level`, level 0 to `levels`, the middle of
-    /// the box `shift` spacings (0 to 1) off a corner of the largest.
+    /// Covers the box with cubes of edge `spacing · 2^level`, level 0 to `levels`.
+    /// The box's centre is `shift` spacings (0 to 1) off a corner of the largest cube.
     ///
-    /// `judge` is given the centre of a cube and its level. Nothing when that takes more than
-    /// `most` cubes.
+    /// `judge` gets the centre of a cube and its level. Returns nothing if more than `most` cubes
+    /// are needed.
     pub(super) fn over(
         [min, max]: [DVec3; 2],
         spacing: f64,
@@ -86,8 +86,8 @@ impl Lattice {
         self.halves.iter().map(|h| self.origin + 0.5 * self.spacing * DVec3::from_array(h.map(f64::from))).collect()
     }
 
-    /// Square of the distance of two nodes, in quarters of a squared spacing, exactly; and whether
-    /// they lie along an axis.
+    /// Squared distance of two nodes, in quarters of a squared spacing, exactly; and whether they
+    /// are on one axis.
     pub(super) fn edge(&self, a: u32, b: u32) -> (u64, bool) {
         let [a, b] = [a, b].map(|n| self.halves[n as usize]);
         let by: [u64; 3] = std::array::from_fn(|d| u64::from(a[d].abs_diff(b[d])));
@@ -95,7 +95,7 @@ impl Lattice {
     }
 }
 
-/// Places as one number, x fastest.
+/// Packs coordinates into one number, x fastest.
 fn packed([x, y, z]: [u32; 3]) -> u64 {
     u64::from(x) | u64::from(y) << 21 | u64::from(z) << 42
 }
@@ -104,7 +104,7 @@ fn unpacked(key: u64) -> [u32; 3] {
     [0, 21, 42].map(|shift| (key >> shift & 0x1F_FFFF) as u32)
 }
 
-/// The cubes around a cube, itself among them.
+/// The cubes around a cube, including itself.
 fn around(at: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
     (0..27u32).filter_map(move |n| {
         let by = [n % 3, n / 3 % 3, n / 9];
@@ -123,7 +123,7 @@ fn has(set: &[u64], at: [u32; 3]) -> bool {
     set.binary_search(&packed(at)).is_ok()
 }
 
-/// The cubes of each level that are not split, ascending.
+/// The unsplit cubes of each level, ascending.
 fn leaves(
     roots: [u32; 3],
     levels: u32,
@@ -162,7 +162,7 @@ fn children(split: &[u64]) -> Vec<u64> {
     sorted_set(split.iter().flat_map(eight).collect())
 }
 
-/// Splits more cubes, until all cubes around a split one exist.
+/// Splits more cubes, until all neighbours of a split cube exist.
 fn balance(split: &mut [Vec<u64>], roots: [u32; 3]) {
     for level in 2..split.len() {
         let to_root = split.len() - 1 - level;
@@ -226,7 +226,7 @@ fn beside(mut at: [u32; 3], axis: usize, ahead: bool) -> Option<[u32; 3]> {
     Some(at)
 }
 
-/// The corners of a face of a cube in a ring, counterclockwise seen from ahead along its axis.
+/// The corners of a cube's face in a ring, counterclockwise from ahead along its axis.
 fn square(at: [u32; 3], level: usize, axis: usize, ahead: bool) -> [[u32; 3]; 4] {
     [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[s, t]| {
         let mut corner = at;
@@ -237,13 +237,13 @@ fn square(at: [u32; 3], level: usize, axis: usize, ahead: bool) -> [[u32; 3]; 4]
     })
 }
 
-/// The number of a node that is there.
+/// The index of an existing node.
 fn number(nodes: &[u64], halves: [u32; 3]) -> u32 {
     nodes.binary_search(&packed(halves)).unwrap_or_default() as u32
 }
 
-/// The tetrahedra around the line between two centres: one for each edge of the face, two where the
-/// edge has a node in its middle.
+/// The tetrahedra around the line between two centres: one per edge of the face, two if the edge
+/// has a midpoint node.
 fn between_equals(nodes: &[u64], [near, far]: [u32; 2], face: [[u32; 3]; 4]) -> impl Iterator<Item = [u32; 4]> {
     (0..4).flat_map(move |n| {
         let (from, to) = (face[n], face[(n + 1) % 4]);
@@ -274,7 +274,7 @@ pub(super) mod tests {
     use super::*;
     use crate::{Quality, Surface, TetMesh, Topology};
 
-    /// A lattice of one size over a cube.
+    /// A uniform lattice over a cube.
     pub(crate) fn uniform(edge: f64, spacing: f64) -> Lattice {
         Lattice::over([DVec3::ZERO, DVec3::splat(edge)], spacing, DVec3::ZERO, 0, usize::MAX, |_, _| Cube::Keep)
             .unwrap()
@@ -318,7 +318,7 @@ pub(super) mod tests {
         let quality = Quality::of(&mesh);
         assert!((quality.min_dihedral_deg - 45.0).abs() < 1e-4 && (quality.max_dihedral_deg - 120.0).abs() < 1e-4);
         assert!(quality.max_mm3 / quality.min_mm3 > 1000.0);
-        // Without gaps the border encloses what the tetrahedra fill.
+        // Without gaps the boundary encloses exactly the tetrahedra's volume.
         let enclosed = Surface::of(&mesh).to_tri_mesh(&mesh.positions).volume_mm3();
         assert!((enclosed / mesh.total_mm3() - 1.0).abs() < 1e-6);
     }

@@ -1,13 +1,13 @@
-//! Moves nodes so that the flattest elements get higher.
+//! Moves nodes to increase the height of the flattest elements.
 //!
 //! # Theory
-//! The stable step of an explicit solver goes with the smallest height of an element. Where a node
-//! has a flat element, steps along the axes are tried, shorter each round; a node on a border is
-//! brought back to it, p ← p − φ ∇φ / |∇φ|²; where three labels meet it stays. A step stays when
-//! the smallest height around the node grows and no angle there gets worse than the worst before.
-//! Where an angle is sharp, a step also stays when the worst angle gets better and the height no
-//! less. So the worst never gets worse. On a brain the lowest element gets twice as high, and the
-//! stable time step twice as long.
+//! The stable step of an explicit solver is proportional to the smallest height of an element. At a
+//! node with a flat element, steps along the axes are tried, shorter each round; a node on a
+//! boundary is projected back to it, p ← p − φ ∇φ / |∇φ|²; a node where three labels meet is fixed.
+//! A step is accepted if the smallest height around the node grows and no angle there becomes worse
+//! than the worst before. At a sharp angle, a step is also accepted if the worst angle improves and
+//! the height does not decrease. So the worst values never get worse. On a brain the lowest element
+//! becomes twice as high, and the stable time step twice as long.
 
 use super::LabelledMesh;
 use super::regions::Partition;
@@ -17,20 +17,20 @@ use glam::DVec3;
 
 /// Rounds over all nodes.
 const ROUNDS: usize = 8;
-/// Nodes are left alone whose elements are all higher than this share of the spacing (the lattice's
-/// own: 0.71).
+/// Nodes are not moved if all their elements are higher than this fraction of the spacing (0.71 in
+/// the regular lattice).
 const HIGH_ENOUGH: f64 = 0.33;
 /// An angle is sharp when its |cos| is over this (20° and 160°).
 const SHARP: f64 = 0.94;
 
-/// Where a node may go.
+/// Where a node may move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Room {
     /// Inside one label.
     Free,
-    /// On the border between two.
+    /// On the boundary between two labels.
     Border(u16, u16),
-    /// Where three labels meet: nowhere.
+    /// Where three labels meet.
     Fixed,
 }
 
@@ -76,7 +76,7 @@ fn shortest_edge(mesh: &TetMesh, node: usize, around: &[u32]) -> f64 {
     ends.map(length).fold(f64::INFINITY, f64::min)
 }
 
-/// Tries the places that `moved` makes of six directions, and stays at the best.
+/// Tries the positions from `moved` in six directions and keeps the best.
 fn improve(mesh: &mut TetMesh, node: usize, around: &[u32], high_enough: f64, moved: impl Fn(DVec3, DVec3) -> DVec3) {
     let here = mesh.positions[node];
     let mut best = (worth(mesh, around), here);
@@ -95,7 +95,7 @@ fn improve(mesh: &mut TetMesh, node: usize, around: &[u32], high_enough: f64, mo
     mesh.positions[node] = best.1;
 }
 
-/// The point of the surface near `p`: two Newton steps with central differences over `h`.
+/// Projects `p` to the surface: two Newton steps with central differences over `h`.
 fn back_to(surface: impl Fn(DVec3) -> f64, mut p: DVec3, h: f64) -> DVec3 {
     for _ in 0..2 {
         let slope = |axis: DVec3| (surface(p + axis * h) - surface(p - axis * h)) / (2.0 * h);
@@ -105,8 +105,8 @@ fn back_to(surface: impl Fn(DVec3) -> f64, mut p: DVec3, h: f64) -> DVec3 {
     p
 }
 
-/// The smallest height, mm, and minus the largest |cos| of an angle, of some tetrahedra; −∞ when
-/// one is inverted.
+/// The smallest height, mm, and minus the largest |cos| of an angle, of some tetrahedra; −∞ if one
+/// is inverted.
 fn worth(mesh: &TetMesh, tets: &[u32]) -> (f64, f64) {
     let mut worst = (f64::INFINITY, 0.0f64);
     for &tet in tets {

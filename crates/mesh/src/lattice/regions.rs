@@ -1,35 +1,34 @@
-//! The labels of a volume as smooth functions of world space: which one holds a point, and by how
-//! much.
+//! The labels of a volume as smooth functions of world position.
 //!
 //! # Theory
 //! All labels together have a smoothed distance φ₀ (about millimetres, positive inside), and each
-//! label has its own, φ. A point is outside where φ₀ + level₀ is negative, else it belongs to the
-//! label with the largest φ + level: regions neither overlap nor leave gaps, whatever smoothing
-//! does to each, and the outer surface is as smooth where two labels meet as elsewhere. Raising
-//! level₀ moves the outer surface outwards by as much, raising a label's level moves its borders by
+//! label has its own, φ. A point is outside where φ₀ + level₀ is negative; otherwise it belongs to
+//! the label with the largest φ + level. So regions neither overlap nor leave gaps, whatever the
+//! smoothing, and the outer surface is as smooth where two labels meet as elsewhere. Raising level₀
+//! moves the outer surface outwards by as much; raising a label's level moves its boundaries by
 //! half of that.
 //!
 //! # Practice
-//! Labels go by their number in ascending order, 1 up; 0 is the outside. Only the largest
-//! 6-connected part of what is labelled is kept.
+//! Labels are indexed in ascending order from 1; 0 is the outside. Only the largest 6-connected
+//! labelled part is kept.
 
 use super::field::{Block, Field};
 use crate::MeshError;
 use glam::DVec3;
 use trepan_volume::{VoxelVolume, largest_component};
 
-/// Most labels in one mesh: a volume with more is an image.
+/// Most labels in one mesh; a volume with more is taken for an image.
 const MOST_LABELS: usize = 255;
 
-/// Space divided among labels.
+/// A partition of space into labels.
 pub(super) trait Partition: Sync {
-    /// By how much more one label holds a point than another.
+    /// Difference between the values of one label and another at a point.
     fn lead(&self, label: u16, other: u16, p: DVec3) -> f64;
 
-    /// The label that holds a point.
+    /// The label of a point.
     fn label_at(&self, p: DVec3) -> u16;
 
-    /// Of some labels the one that holds a point most; of equals the first.
+    /// Of some labels the one with the largest value at a point; the first on a tie.
     fn strongest(&self, among: &[u16], p: DVec3) -> u16 {
         let stronger = |best: u16, &label: &u16| if self.lead(label, best, p) > 0.0 { label } else { best };
         among.iter().skip(1).fold(among[0], stronger)
@@ -38,22 +37,22 @@ pub(super) trait Partition: Sync {
 
 /// The regions of a label volume.
 pub(super) struct Regions {
-    /// What the volume calls each region; the outside first.
+    /// The volume's label of each region; the outside first.
     pub(super) names: Vec<u16>,
-    /// Volume of each, mm³; of the outside 0.
+    /// Volume of each region, mm³; 0 for the outside.
     pub(super) mm3: Vec<f64>,
-    /// What is added to each φ, mm; the first to that of all together.
+    /// Offset of each φ, mm; the first is that of all labels together.
     pub(super) levels: Vec<f64>,
-    /// World box of all that is labelled.
+    /// World box of all labelled voxels.
     pub(super) bounds: [DVec3; 2],
-    /// Of each label, ascending.
+    /// The distance field of each label, ascending.
     fields: Vec<Field>,
-    /// Of all labels together, when there are several.
+    /// The distance field of all labels together, if there are several.
     union: Option<Field>,
 }
 
 impl Regions {
-    /// The regions with a margin for smoothing up to `most_mm`, not smoothed yet.
+    /// The unsmoothed regions with a margin for smoothing up to `most_mm`.
     pub(super) fn of(labels: &VoxelVolume<u16>, most_mm: impl FnOnce(f64) -> f64) -> Result<Self, MeshError> {
         check_volume(labels)?;
         let mut labels = labels.clone();
@@ -84,7 +83,7 @@ impl Regions {
         self.fields.iter_mut().chain(&mut self.union).for_each(|field| field.smooth(sigma_mm));
     }
 
-    /// About how far a point is from the nearest border, mm, and whether it is outside.
+    /// Approximate distance of a point from the nearest boundary, mm, and whether it is outside.
     pub(super) fn depth(&self, p: DVec3) -> (f64, bool) {
         let inside = self.inside(p);
         let (mut first, mut second) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
@@ -97,12 +96,12 @@ impl Regions {
         (inside.abs().min(to_label), inside <= 0.0)
     }
 
-    /// How far a point is inside of all labels together, mm.
+    /// Depth of a point inside all labels together, mm.
     fn inside(&self, p: DVec3) -> f64 {
         self.union.as_ref().unwrap_or(&self.fields[0]).sample(p) + self.levels[0]
     }
 
-    /// How strongly a label holds a point that is inside.
+    /// Value of a label at a point inside.
     fn hold(&self, label: u16, p: DVec3) -> f64 {
         self.fields[usize::from(label) - 1].sample(p) + self.levels[usize::from(label)]
     }

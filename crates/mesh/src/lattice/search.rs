@@ -1,12 +1,12 @@
-//! Finds the spacing that gives the count asked for, and the levels that give each label its
-//! volume.
+//! Finds the lattice spacing for the requested element count and the isolevels that preserve each
+//! label's volume.
 //!
 //! # Theory
-//! The count goes with a⁻³, where cubes grow inwards with about a^-2.5. Raising the outer level by
-//! x₀ moves the outer surface by x₀, so it takes what all labels lack over that surface's area.
-//! Raising the level of label l by x_l moves its border with k by (x_l − x_k) / 2, so what it still
-//! lacks asks for Σ_k A_lk (x_l − x_k) / 2 = missing_l − A_l0 x₀ with A the areas between labels: a
-//! few sweeps of Gauss and Seidel.
+//! The count is proportional to a⁻³, and to about a^-2.5 if cubes grow inwards. Raising the outer
+//! level by x₀ moves the outer surface by x₀, so that x₀ is the missing volume of all labels over
+//! that surface's area. Raising the level of label l by x_l moves its boundary with k by (x_l −
+//! x_k) / 2, so that the remaining deficit gives Σ_k A_lk (x_l − x_k) / 2 = missing_l − A_l0 x₀,
+//! with A the areas between labels. A few Gauss-Seidel sweeps solve it.
 
 use super::octree::{Cube, Lattice};
 use super::regions::{Partition, Regions};
@@ -15,27 +15,27 @@ use crate::{FACES, MeshError, NONE, TetMesh, Topology};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Spacing and levels are searched at most this often.
+/// Most iterations of the search for spacing and levels.
 const TRIALS: usize = 12;
-/// Largest lattice, in cubes for each tetrahedron asked for (a brain takes a fifth of one): some
-/// 250 bytes a cube.
+/// Largest lattice, in cubes per requested tetrahedron (a brain takes a fifth of one); some 250
+/// bytes a cube.
 const MAX_CUBES: usize = 10;
-/// What the search tries to reach; 10 % is what it promises.
+/// Tolerance that the search aims for; the documented one is 10 %.
 const COUNT_TOLERANCE: f64 = 0.02;
 const VOLUME_TOLERANCE: f64 = 0.002;
 const ALL_TOLERANCE: f64 = 0.01;
-/// How far from a border cubes have its size, in their edges beyond their own corners. Over 0.14
-/// all tetrahedra that a border cuts are of one size.
+/// Distance from a boundary up to which cubes have its size, in their edges beyond their own
+/// corners. Over 0.14, all tetrahedra cut by a boundary are of one size.
 const MARGIN: f64 = 0.15;
-/// Sweeps over the levels.
+/// Gauss-Seidel sweeps over the levels.
 const SWEEPS: usize = 40;
 
-/// The spacing at which 12 tetrahedra a cube, and a fifth more at the surface, fill a volume.
+/// The spacing at which 12 tetrahedra a cube, plus a fifth at the surface, fill a volume.
 pub(super) fn uniform_spacing(mm3: f64, tets: usize) -> f64 {
     (12.0 * 1.2 * mm3 / tets as f64).cbrt()
 }
 
-/// About the spacing of the finest cubes.
+/// Approximate spacing of the finest cubes.
 pub(super) fn first_spacing(regions: &Regions, config: &Config) -> f64 {
     let mut spacing = uniform_spacing(regions.mm3.iter().sum(), config.target_tets);
     if levels(config) == 0 {
@@ -51,7 +51,7 @@ pub(super) fn first_spacing(regions: &Regions, config: &Config) -> f64 {
     spacing
 }
 
-/// The mesh nearest to what is asked for. Leaves the levels of its borders in `regions`.
+/// Searches the mesh nearest to the request; leaves the boundary levels in `regions`.
 pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -> Result<LabelledMesh, MeshError> {
     let wanted = config.target_tets;
     let power = if levels(config) == 0 { 1.0 / 3.0 } else { 0.4 };
@@ -89,8 +89,7 @@ pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -
     Ok(labelled)
 }
 
-/// How much of what is asked for each level goes: less after each overshoot, which thin labels
-/// make.
+/// Step length of each level: reduced after each overshoot, which thin labels cause.
 struct Stride {
     gains: Vec<f64>,
     missing: Vec<f64>,
@@ -124,15 +123,15 @@ fn lattice(regions: &Regions, config: &Config, spacing: f64, trial: usize) -> Op
     Lattice::over(regions.bounds, spacing, shift(trial), levels(config), most, judge)
 }
 
-/// Where the lattice lies against the labels, in spacings: another place when the count does not
-/// settle (small symmetric masks).
+/// Offset of the lattice from the labels, in spacings; varied when the count does not converge
+/// (small symmetric masks).
 fn shift(trial: usize) -> DVec3 {
     let turn = (trial / 4) as f64;
     DVec3::new(0.13 + 0.21 * turn, 0.29 + 0.17 * turn, 0.41 + 0.11 * turn)
 }
 
-/// Cubes at a border are as fine as their place asks for, others up to `coarsening` doublings
-/// larger.
+/// Whether a cube is fine enough: at a boundary as requested there, elsewhere up to `coarsening`
+/// doublings larger.
 fn judge(regions: &Regions, config: &Config, spacing: f64, centre: DVec3, level: u32) -> Cube {
     let edge = spacing * f64::from(1u32 << level);
     let to_corner = 0.75f64.sqrt() * edge;
@@ -148,11 +147,11 @@ fn judge(regions: &Regions, config: &Config, spacing: f64, centre: DVec3, level:
     if level > finest + config.coarsening || (level > finest && at_border) { Cube::Split } else { Cube::Keep }
 }
 
-/// What each label lacks, and what lies between labels.
+/// Missing volume of each label, and areas between labels.
 struct Balance {
-    /// By label, mm³; the first is the sum.
+    /// By label, mm³; the first entry is the sum.
     missing: Vec<f64>,
-    /// Areas between labels, mm²: row by row.
+    /// Areas between labels, mm², row by row.
     areas: Vec<f64>,
 }
 
@@ -177,8 +176,8 @@ impl Balance {
         Self { missing, areas }
     }
 
-    /// The largest lack or excess of a label that is thicker than about a cube, and that of all
-    /// together, in what is tolerated.
+    /// The largest volume error of a label thicker than about a cube, or of the sum, relative to
+    /// the tolerance.
     fn fault(&self, regions: &Regions, spacing: f64) -> f64 {
         let count = self.missing.len();
         let one = spacing.powi(3) / 12.0;
@@ -195,7 +194,7 @@ impl Balance {
         worst.max(each / (ALL_TOLERANCE * all)).max(self.missing[0].abs() / (VOLUME_TOLERANCE * all))
     }
 
-    /// By how much to raise each level, mm.
+    /// Correction of each level, mm.
     fn steps(&self, spacing: f64) -> Vec<f64> {
         let count = self.missing.len();
         let most = 0.3 * spacing;

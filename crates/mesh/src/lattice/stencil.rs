@@ -1,38 +1,39 @@
-//! Isosurface stuffing: a lattice is warped and cut where labels meet.
+//! Isosurface stuffing: warps a lattice and cuts it where labels meet.
 //!
 //! # Theory
 //! (Labelle and Shewchuk 2007; several labels after the idea of Bronson, Levine and Whitaker 2012.)
-//! Each lattice node has a label. An edge between two labels has a cut point where both hold
-//! equally. A cut point nearer to a node than α times the edge *violates* it; the node is moved to
-//! that point, is from then on the border of any label, and its other cut points vanish. No
-//! remaining cut is then close to a node. Each remaining tetrahedron is divided by its cuts, the
-//! same for both sides of a border (∘ is a node on a border):
+//! Each lattice node has a label. An edge between two labels has a cut point where both are equal.
+//! A cut point nearer to a node than α times the edge *violates* it; the node is moved to that
+//! point, counts as on the boundary of every label from then on, and its other cut points are
+//! removed. No remaining cut is then close to a node. Each remaining tetrahedron is divided at its
+//! cuts, identically on both sides of a boundary (∘ is a node on a boundary):
 //!
 //! ```text
 //! A A A A, A ∘ ∘ ∘   whole            A A A B    a prism, three, and a corner
 //! A B ∘ ∘            two corners      A A B B    two wedges, three each, that share four cuts
 //! A A B ∘            a pyramid, two, and a corner
 //! A B C ∘            three corners, and the middle between their cuts
-//! A A B C            two corners, a prism, and a pyramid up to the cut between B and C: the rest is A's
+//! A A B C            two corners, a prism, and a pyramid up to the cut B-C: the rest is A's
 //! A B C D            four corners, and the octahedron between the six cuts in four
 //! ```
 //!
-//! The middle between three or four labels belongs to the one that holds its centre, the rest of A
-//! A B C to A: so where three labels meet, their common line is true to about half a lattice
-//! spacing, while every face still has the same triangles on both sides, and no gap or overlap can
-//! be.
+//! The region between the cuts of three or four labels goes to the label at its centre, the rest of
+//! A A B C to A. Where three labels meet, their common line is therefore accurate to about half a
+//! lattice spacing. Every face still has the same triangles on both sides, so that there is no gap
+//! or overlap.
 //!
-//! A face A A B leaves a quadrilateral that two tetrahedra share, so its diagonal is chosen from
-//! the face alone: at the cut of the longer edge, and of equal ones at the cut of the node with the
-//! higher number. That order of edges is total, so no prism meets three diagonals in a cycle, and
-//! the two wedges of A A B B never need different diagonals on their common quadrilateral.
+//! A face A A B leaves a quadrilateral that two tetrahedra share, so that its diagonal depends on
+//! the face alone: it starts at the cut of the longer edge, and for equal edges at the cut of the
+//! node with the higher number. This order of edges is total, so that no prism has a cyclic choice
+//! of diagonals, and the two wedges of A A B B never need different diagonals on their common
+//! quadrilateral.
 //!
 //! With α = 0.24999 on long edges and 0.41189 on short ones the paper proves dihedral angles
-//! between 10.7° and 164.8° for one label. Here the violating cut is chosen freely (the nearest),
-//! which allows 9.3° to 161.7° for one to four labels, over all extremes of nodes and cuts on cubes
-//! of one size (a test goes through them). Not covered is a tetrahedron with all four nodes on
-//! borders: if one of them was outside it is left out, else it stays; on borders of pure noise such
-//! a one has over 12°.
+//! between 10.7° and 164.8° for one label. Here the nearest violating cut is chosen, which allows
+//! 9.3° to 161.7° for one to four labels, over all extremes of nodes and cuts on cubes of one size
+//! (a test enumerates them). Not covered is a tetrahedron with all four nodes on boundaries: it is
+//! removed if one of them was outside and kept otherwise; on boundaries of pure noise its angles
+//! are over 12°.
 
 use super::LabelledMesh;
 use super::octree::Lattice;
@@ -45,20 +46,20 @@ use rayon::prelude::*;
 /// Violation limits along the axes and across, as fractions of the edge.
 pub(super) const ALPHA_LONG: f64 = 0.24999;
 pub(super) const ALPHA_SHORT: f64 = 0.41189;
-/// A short edge of a lattice of one size, in spacings.
+/// A short edge of a uniform lattice, in spacings.
 const SHORT: f64 = 0.866_025_403_784_438_6;
-/// Halvings of an edge to find its cut point.
+/// Bisection steps to find an edge's cut point.
 const HALVINGS: usize = 24;
-/// The label of a node on a border.
+/// The label of a node on a boundary.
 pub(super) const ON: u16 = u16::MAX;
 
-/// The lattice with labels, while it is warped and cut.
+/// The labelled lattice during warping and cutting.
 pub(super) struct Stuffing<'a, P> {
     pub(super) lattice: &'a Lattice,
     pub(super) regions: &'a P,
     pub(super) positions: Vec<DVec3>,
     pub(super) labels: Vec<u16>,
-    /// Whether a node was outside before nodes moved.
+    /// Whether a node was outside before warping.
     pub(super) outside: Vec<bool>,
     /// Edges with a cut, each `[lower, higher]` node, ascending.
     pub(super) edges: Vec<[u32; 2]>,
@@ -66,7 +67,7 @@ pub(super) struct Stuffing<'a, P> {
     pub(super) tets: Vec<[u32; 4]>,
 }
 
-/// Tetrahedra and the label of each.
+/// Tetrahedra and their labels.
 #[derive(Default)]
 pub(super) struct Pieces {
     pub(super) tets: Vec<[u32; 4]>,
@@ -80,7 +81,7 @@ impl Pieces {
     }
 }
 
-/// The tetrahedra of the lattice inside any label but 0, cut where labels meet.
+/// The tetrahedra of the lattice inside any nonzero label, cut where labels meet.
 pub(super) fn stuff<P: Partition>(lattice: &Lattice, regions: &P) -> LabelledMesh {
     let mut stuffing = Stuffing::new(lattice, regions);
     stuffing.warp();
@@ -118,7 +119,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         }
     }
 
-    /// For each node the spacing of the finest lattice that its edges belong to, mm.
+    /// Spacing of the finest lattice at each node, mm.
     fn reach(&self) -> Vec<f64> {
         let mut quarters = vec![u64::MAX; self.positions.len()];
         for tet in &self.tets {
@@ -134,8 +135,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         quarters.into_iter().map(|n| self.lattice.spacing * (n as f64 / 12.0).sqrt()).collect()
     }
 
-    /// The nearest violating cut of a node among those that still exist: both ends of their edge
-    /// have a label.
+    /// The nearest violating cut of a node whose edge still has labels at both ends.
     fn violation(&self, node: usize, reach: f64, cuts: &[u32]) -> Option<DVec3> {
         if self.labels[node] == ON {
             return None;
@@ -149,13 +149,13 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).map(|(_, c)| self.cuts[c])
     }
 
-    /// How far a cut may be from an end of its edge to violate it, mm.
+    /// Distance from an edge's end within which a cut violates it, mm.
     fn limit(&self, [a, b]: [u32; 2]) -> f64 {
         let (squared, straight) = self.lattice.edge(a, b);
         0.5 * self.lattice.spacing * (squared as f64).sqrt() * if straight { ALPHA_LONG } else { ALPHA_SHORT }
     }
 
-    /// The same for a node whose finest edges are those of a lattice of spacing `reach`.
+    /// The same for a node whose finest lattice has the spacing `reach`.
     fn limit_at(&self, reach: f64, [a, b]: [u32; 2]) -> f64 {
         reach * if self.lattice.edge(a, b).1 { ALPHA_LONG } else { ALPHA_SHORT * SHORT }
     }
@@ -173,7 +173,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         LabelledMesh { mesh, label_of_tet: pieces.labels }
     }
 
-    /// Where a node or a cut is.
+    /// Position of a node or a cut.
     pub(super) fn place(&self, n: u32) -> DVec3 {
         self.positions.get(n as usize).copied().unwrap_or_else(|| self.cuts[n as usize - self.positions.len()])
     }
@@ -182,7 +182,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         nodes.iter().map(|&n| self.place(n)).sum::<DVec3>() / N as f64
     }
 
-    /// The pieces of one tetrahedron that are not outside.
+    /// Adds the pieces of one tetrahedron that are not outside.
     pub(super) fn emit(&self, tet: [u32; 4], out: &mut Pieces) {
         let mut nodes = tet;
         nodes.sort_unstable_by_key(|&n| (self.labels[n as usize], n));
@@ -205,7 +205,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         out.keep_inside(first);
     }
 
-    /// One label's side of a tetrahedron of two.
+    /// One label's part of a tetrahedron with two labels.
     fn side(&self, own: &[u32], other: &[u32], on: &[u32], out: &mut Pieces) {
         let label = self.labels[own[0] as usize];
         match (own, other) {
@@ -232,7 +232,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         out.add(label, &[[on[0], cuts[0], cuts[1], cuts[2]]]);
     }
 
-    /// What two nodes of one label keep beside one node each of two others.
+    /// The part of two nodes of one label in a tetrahedron with two more labels.
     fn fork(&self, [p, q]: [u32; 2], [b, c]: [u32; 2], out: &mut Pieces) {
         let top = [p, self.cut(p, b), self.cut(p, c)];
         let bottom = [q, self.cut(q, b), self.cut(q, c)];
@@ -263,20 +263,20 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         }
     }
 
-    /// The tetrahedron between a node, its cuts with others, and nodes on a border.
+    /// The tetrahedron between a node, its cuts with others, and boundary nodes.
     fn corner(&self, p: u32, others: &[u32], on: &[u32]) -> [u32; 4] {
         let mut far = others.iter().map(|&n| self.cut(p, n)).chain(on.iter().copied());
         [p, far.next().unwrap_or(p), far.next().unwrap_or(p), far.next().unwrap_or(p)]
     }
 
-    /// The node of the cut between two lattice nodes.
+    /// The index of the cut between two lattice nodes.
     fn cut(&self, a: u32, b: u32) -> u32 {
         let at = self.edges.binary_search(&[a.min(b), a.max(b)]).unwrap_or_default();
         (self.positions.len() + at) as u32
     }
 
-    /// Whether the quadrilateral that the face (p, q | n) leaves gets its diagonal at p (to the cut
-    /// of q), else at q.
+    /// Whether the quadrilateral of the face (p, q | n) has its diagonal at p (to the cut of q),
+    /// else at q.
     fn diagonal_at(&self, p: u32, q: u32, n: u32) -> bool {
         (self.lattice.edge(p, n).0, p) < (self.lattice.edge(q, n).0, q)
     }
@@ -290,13 +290,13 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         }
     }
 
-    /// Three nodes over their cuts with one of another label.
+    /// The prism between three nodes and their cuts with one of another label.
     fn prism_under(&self, top: [u32; 3], n: u32) -> [[u32; 4]; 3] {
         let beats = |i: usize, j: usize| self.diagonal_at(top[i], top[j], n);
         prism(top, top.map(|p| self.cut(p, n)), [beats(0, 1), beats(0, 2), beats(1, 2)])
     }
 
-    /// Two nodes against two: a prism between the triangles of the two own ones.
+    /// The wedge of two nodes against two: a prism between the triangles of the first two.
     fn wedge(&self, [p, q]: [u32; 2], [m, n]: [u32; 2]) -> [[u32; 4]; 3] {
         let top = [p, self.cut(p, m), self.cut(p, n)];
         let bottom = [q, self.cut(q, m), self.cut(q, n)];
@@ -304,8 +304,9 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         prism(top, bottom, wins)
     }
 
-    /// Whether the quadrilateral between two nodes and two of another label is cut from p–m to q–n:
-    /// as the prism of either side needs it, else the shorter way.
+    /// Whether the quadrilateral between two nodes and two of another label is split from p–m to
+    /// q–n.
+    /// The prism of either side decides if it needs a diagonal, else the shorter one is taken.
     fn border_diagonal(&self, [p, q]: [u32; 2], [m, n]: [u32; 2]) -> bool {
         let own = [self.diagonal_at(p, q, m), self.diagonal_at(p, q, n)];
         let other = [self.diagonal_at(m, n, p), self.diagonal_at(m, n, q)];
@@ -316,7 +317,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         }
     }
 
-    /// Whether the first of two lines is the shorter one.
+    /// Whether the first of two lines is shorter.
     fn shorter(&self, [a, b]: [u32; 2], [c, d]: [u32; 2]) -> bool {
         let squared = |a: u32, b: u32| self.place(a).distance_squared(self.place(b));
         squared(a, b) < squared(c, d)
@@ -324,7 +325,7 @@ impl<'a, P: Partition> Stuffing<'a, P> {
 }
 
 impl Pieces {
-    /// Drops the outside's pieces among those from `first` on.
+    /// Removes the outside's pieces from `first` on.
     fn keep_inside(&mut self, first: usize) {
         let mut kept = first;
         for at in first..self.tets.len() {
@@ -338,9 +339,9 @@ impl Pieces {
     }
 }
 
-/// Splits a prism into three. `wins` says for the pairs (0,1), (0,2), (1,2) whether the diagonal
-/// between them starts at the top of the first (else of the second). A cycle cannot be split, so
-/// the pairs must give an order.
+/// Splits a prism into three. `wins` gives for the pairs (0,1), (0,2), (1,2) whether the diagonal
+/// starts at the top of the first (else of the second). A cyclic choice cannot be split, so that
+/// the pairs must define an order.
 fn prism(top: [u32; 3], bottom: [u32; 3], wins: [bool; 3]) -> [[u32; 4]; 3] {
     let score = [
         usize::from(wins[0]) + usize::from(wins[1]),
@@ -373,7 +374,7 @@ pub(super) fn cut_edges(tets: &[[u32; 4]], label_of: impl Fn(u32) -> u16) -> Vec
     edges
 }
 
-/// A point on the border between a point that `holds` and one that does not.
+/// Bisects for a boundary point between a point that `holds` and one that does not.
 fn crossing(holds: impl Fn(DVec3) -> bool, mut inner: DVec3, mut outer: DVec3) -> DVec3 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (inner + outer);

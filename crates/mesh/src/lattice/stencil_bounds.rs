@@ -1,4 +1,4 @@
-//! Angles of the cut lattice: over all extremes, and over borders as rough as they can be.
+//! Tests angle bounds of the cut lattice, over all extremes and over noisy boundaries.
 
 use super::octree::tests::uniform;
 use super::octree::{Cube, Lattice};
@@ -8,7 +8,7 @@ use crate::{Quality, Surface, Topology};
 use glam::DVec3;
 use proptest::prelude::*;
 
-/// Space divided by a function.
+/// A partition defined by a function.
 struct By<F>(F);
 
 impl<F: Fn(DVec3) -> f64 + Sync> Partition for By<F> {
@@ -21,7 +21,7 @@ impl<F: Fn(DVec3) -> f64 + Sync> Partition for By<F> {
     }
 }
 
-/// Each label with an arbitrary value at each cell of a fine hash.
+/// Labels with random values at each cell of a fine hash.
 struct Noise {
     seed: u64,
     labels: u16,
@@ -76,7 +76,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
     #[test]
-    fn borders_across_cubes_of_several_sizes_leave_no_gap_and_no_flat_element(seed in any::<u64>(), labels in 2u16..5) {
+    fn boundaries_across_cube_sizes_leave_no_gap_and_no_flat_element(seed in any::<u64>(), labels in 2u16..5) {
         let point = DVec3::new(7.0, 9.0, 8.0);
         let judge = |centre: DVec3, level: u32| {
             let split = level > 0 && centre.distance(point) < 2.5 * f64::from(1 << level);
@@ -87,17 +87,17 @@ proptest! {
         let labelled = stuff(&lattice, &Noise { seed, labels });
         let quality = Quality::of(&labelled.mesh);
         prop_assert!(quality.min_mm3 > 0.0);
-        // The paper proves 1.66° to 174.72° for its way of cutting cubes of several sizes, with one
-        // body in them; here another cut may be the one that a node is moved to. The worst of 1,200
-        // lattices of noise: one body 2.1° to 176.4°, more labels 0.7° to 179.0°.
+        // The paper proves 1.66° to 174.72° for its cutting of cubes of several sizes with one
+        // body; here a node may be moved to another cut. The worst of 1,200 lattices of noise: one
+        // body 2.1° to 176.4°, more labels 0.7° to 179.0°.
         let (least, most) = if labels == 2 { (1.0, 178.0) } else { (0.2, 179.7) };
         prop_assert!(quality.min_dihedral_deg > least && quality.max_dihedral_deg < most, "{quality:?}");
         prop_assert_eq!(Topology::of(&labelled.mesh).crowded_face, None);
     }
 }
 
-/// Where a warped node may be at the most: here, or on one of its 14 edges; with the corner of
-/// `tet` at the other end.
+/// Extreme positions of a warped node: itself, or on one of its 14 edges.
+/// Each comes with the corner of `tet` at the edge's other end, if any.
 fn extremes(at: &[DVec3], tet: [u32; 4], node: u32) -> Vec<(DVec3, Option<usize>)> {
     let here = at[node as usize];
     let long = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| [axis, -axis]).map(|by| (by, ALPHA_LONG));
@@ -108,16 +108,16 @@ fn extremes(at: &[DVec3], tet: [u32; 4], node: u32) -> Vec<(DVec3, Option<usize>
     std::iter::once((here, None)).chain(moved).collect()
 }
 
-/// Whether warped corners can have moved towards these ends: a cut lies between two labels, and
-/// serves one of its ends.
+/// Whether warped corners can have moved towards these ends: a cut is between two labels and
+/// belongs to one of its ends.
 fn possible(labels: [u16; 4], ends: [Option<usize>; 4], most: u16) -> bool {
     let once = (0..4).all(|n| ends[n].is_none_or(|end| ends[end] != Some(n)));
     let before = |all: u16, n: usize| if labels[n] != ON { labels[n] } else { all / most.pow(n as u32) % most };
     once && (0..most.pow(4)).any(|all| (0..4).all(|n| ends[n].is_none_or(|end| before(all, n) != before(all, end))))
 }
 
-/// Every way to give four corners equal or different labels, or none: the first is 0, a new one the
-/// next number.
+/// All assignments of equal or different labels, or none, to four corners: the first is 0, a new
+/// one the next number.
 fn labellings() -> impl Iterator<Item = [u16; 4]> {
     let code = |all: u16| [0, 1, 2, 3].map(|n| if all / 5u16.pow(n) % 5 == 4 { ON } else { all / 5u16.pow(n) % 5 });
     let in_order = |labels: &[u16; 4]| {
@@ -130,7 +130,7 @@ fn labellings() -> impl Iterator<Item = [u16; 4]> {
     (0..625).map(code).filter(in_order)
 }
 
-/// The extremes of all angles of a tetrahedron's pieces with labels that `wanted` takes.
+/// Extreme angles of a tetrahedron's pieces, over the labellings selected by `wanted`.
 fn extremes_of_angles(most: u16, wanted: impl Fn(&[u16; 4]) -> bool) -> (f64, f64) {
     let lattice = uniform(1.0, 1.0);
     let (at, all) = (lattice.positions(), &lattice.tets);
@@ -152,8 +152,8 @@ fn extremes_of_angles(most: u16, wanted: impl Fn(&[u16; 4]) -> bool) -> (f64, f6
     found
 }
 
-/// The smallest and largest dihedral angle of the pieces of one tetrahedron, over cuts as near to
-/// either end as they may be.
+/// Smallest and largest dihedral angle of the pieces of one tetrahedron, over extreme cut
+/// positions.
 fn angles_of_all_cuts(
     lattice: &Lattice,
     at: &[DVec3],
@@ -172,7 +172,7 @@ fn angles_of_all_cuts(
         tets: Vec::new(),
     };
     for n in 0..4 {
-        // One up, so that no side is dropped as the outside.
+        // Plus one, so that no side is dropped as the outside.
         let label = if labels[n] == ON { ON } else { labels[n] + 1 };
         (all.positions[tet[n] as usize], all.labels[tet[n] as usize]) = (corners[n], label);
     }
@@ -221,8 +221,8 @@ fn a_ball_is_sound_and_closed() {
     assert!((mesh.total_mm3() / ball - 1.0).abs() < 0.02, "{}", mesh.total_mm3() / ball);
 }
 
-/// The wedges of two labels share four cuts: whatever the lengths and numbers, neither needs a
-/// diagonal that closes a cycle in the other.
+/// The wedges of two labels share four cuts: for any lengths and numbers, neither needs a cyclic
+/// choice of diagonals.
 #[test]
 fn the_order_of_edges_suits_both_wedges() {
     for lengths in 0..81u32 {
@@ -230,8 +230,8 @@ fn the_order_of_edges_suits_both_wedges() {
             let mut left = vec![0, 1, 2, 3];
             let number = [order / 6, order / 2 % 3, order % 2, 0].map(|n| left.remove(n));
             let length = |a: usize, b: usize| lengths / 3u32.pow((2 * a + b) as u32) % 3;
-            // Nodes p, q are 0, 1; m, n are 2, 3: edge (a, b) lies between a of the former and b of
-            // the latter.
+            // Nodes p, q are 0, 1; m, n are 2, 3: edge (a, b) joins a of the former and b of the
+            // latter.
             let own = [0, 1].map(|b| (length(0, b), number[0]) < (length(1, b), number[1]));
             let other = [0, 1].map(|a| (length(a, 0), number[2]) < (length(a, 1), number[3]));
             assert!(own[0] == own[1] || other[0] == other[1] || own[1] == other[1], "{lengths} {order}");

@@ -1,4 +1,4 @@
-//! Twin of `brain.wgsl`: the brain's border as triangles with smooth normals.
+//! CPU version of `brain.wgsl`: the brain's boundary triangles with smooth normals.
 
 use crate::brain::Border;
 use crate::camera::View;
@@ -23,9 +23,9 @@ pub(crate) struct Fragment {
     /// Distance along the ray, mm, or [`NOTHING`].
     pub t: f32,
     pub normal: Vec3,
-    /// The place at rest, world mm.
+    /// The rest position, world mm.
     pub rest: Vec3,
-    /// Whether the brain is cut open here.
+    /// Whether this is the cut surface.
     pub cut: bool,
 }
 
@@ -40,7 +40,7 @@ impl Fragments {
         &self.nearest[pixel]
     }
 
-    /// Draws the border and its cut anew; none clears.
+    /// Redraws the boundary and its cut; `None` clears.
     pub fn draw(&mut self, border: Option<&Border>, view: &View, brain_cut: Vec4) {
         if std::mem::replace(&mut self.drawn, border.is_some()) {
             self.nearest.fill(NONE);
@@ -64,11 +64,11 @@ impl Fragments {
         }
     }
 
-    /// Draws a triangle of the border, of which only what is under the plane is there, or of a cut.
+    /// Draws a triangle of the boundary, clipped by the plane `under`, or of the cut.
     fn triangle(&mut self, corners: [&Vertex; 3], eye: Vec3, under: Option<Vec4>) {
         let [a, b, c] = corners.map(|v| v.at * Vec2::new(self.width as f32, self.height as f32));
         let double_area = (b - a).perp_dot(c - a);
-        // Neither flat triangles nor those with a place that is not a number have an area.
+        // Skips degenerate triangles and those with a non-finite position.
         if !corners.iter().all(|v| v.depth > View::NEAR_MM) || double_area == 0.0 || !double_area.is_finite() {
             return;
         }
@@ -82,7 +82,7 @@ impl Fragments {
                 if flat.iter().any(|&w| w < 0.0) {
                     continue;
                 }
-                // What is linear in space is linear in the picture after a division by depth.
+                // Perspective-correct interpolation: attributes are divided by depth.
                 let over = [0, 1, 2].map(|n| flat[n] / corners[n].depth);
                 let depth = 1.0 / over.iter().sum::<f32>();
                 let fragment = &mut self.nearest[x + self.width * y];
@@ -105,7 +105,7 @@ impl Fragments {
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug)]
 struct Vertex {
-    /// In the picture, 0 to 1 from the upper left.
+    /// Picture coordinates, 0 to 1 from the upper left.
     at: Vec2,
     depth: f32,
     place: Vec3,
@@ -114,7 +114,7 @@ struct Vertex {
 }
 
 impl Vertex {
-    /// A place as the eye sees it.
+    /// Projects a point into the view.
     fn seen(view: &View, place: Vec3) -> Self {
         let (at, depth) = view.project(place);
         Self { at: Vec2::new(at.x, -at.y) * 0.5 + 0.5, depth, place, normal: Vec3::ZERO, rest: Vec3::ZERO }

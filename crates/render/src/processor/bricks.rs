@@ -1,4 +1,4 @@
-//! Twin of `bricks.wgsl`: rays through the padded grid of densities.
+//! CPU version of `bricks.wgsl`: rays through the padded density grid.
 
 use super::mix::{between, greater, greatest, least, lesser, mixed, trilinear};
 use super::root::enter;
@@ -14,31 +14,30 @@ use trepan_volume::BoneVolume;
 
 const NUDGE: f32 = 1e-3;
 const MOST_STEPS: u32 = 8192;
-/// A beam that leaps less far than this, in voxels, has come near bone.
+/// Step below which a beam counts as near bone, voxels.
 const LEAST_LEAP: f32 = 0.5;
 
-/// How rays go through the bone. The default is what every picture is drawn with; the rest is there
-/// to be measured against it.
+/// How rays are cast through bone. The default is used for every picture; the alternatives are for
+/// comparison measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Casting {
-    /// Whether rays leap over bricks without bone; without, they walk every cell.
+    /// Whether rays skip bricks without bone; otherwise they visit every cell.
     pub leap: bool,
-    /// Samples this far apart, in voxels, instead of the exact root in every cell: thin walls are
-    /// lost.
+    /// Sampling distance in voxels instead of exact roots in every cell; misses thin walls.
     pub step_voxel: Option<f32>,
-    /// Whether only every second ray along both axes is cast, and those between only where bone is
-    /// not smooth: twice as fast, for a camera that moves.
+    /// Whether to cast every second ray along both axes, and the others only where bone is not
+    /// smooth. Twice as fast, for a moving camera.
     pub sparse: bool,
 }
 
 impl Default for Casting {
-    /// Leaps, exact roots, and a ray for every pixel.
+    /// Empty-space skipping, exact roots, and a ray for every pixel.
     fn default() -> Self {
         Self { leap: true, step_voxel: None, sparse: false }
     }
 }
 
-/// The skull as rays see it.
+/// The skull's data for ray casting.
 #[derive(Debug)]
 pub(crate) struct Bricks {
     bone: Option<Arc<BoneVolume>>,
@@ -47,7 +46,7 @@ pub(crate) struct Bricks {
     seen: Vec<u32>,
     /// HU of the padded grid, x fastest.
     density: Vec<i16>,
-    /// Share of bone in blocks, 0 to 255.
+    /// Bone fraction of blocks, 0 to 255.
     crowd: Vec<u8>,
     pub casting: Casting,
 }
@@ -67,7 +66,7 @@ impl Bricks {
         self.bone.is_some()
     }
 
-    /// Takes up to `limit` changed bricks over.
+    /// Copies up to `limit` changed bricks.
     pub fn follow(&mut self, limit: usize) -> Followed {
         let Some(bone) = self.bone.clone() else { return Followed::default() };
         let mut changed = Vec::new();
@@ -112,11 +111,11 @@ impl Bricks {
         trilinear(self.grid.dims, g, |at| f32::from(self.density[at]))
     }
 
-    /// Unit normal out of the bone at a surface point that a ray `along` has met.
+    /// Unit outward normal at a surface point hit by a ray `along`.
     #[inline(always)]
     pub fn outward_normal(&self, g: Vec3, along: Vec3) -> Vec3 {
         let (dims, strides) = (self.grid.dims, self.strides());
-        // Eight points, but only two places along each axis.
+        // Eight points, but only two indices along each axis.
         let pairs: [[(usize, f32); 2]; 3] =
             array::from_fn(|n| [-1.6, 1.6].map(|by| between(g[n] + by, dims[n], strides[n])));
         let mut gradient = Vec3::ZERO;
@@ -128,14 +127,14 @@ impl Bricks {
         if gradient.length_squared() < 1e-6 { -along } else { -gradient.normalize() }
     }
 
-    /// Steps to the next value along each axis.
+    /// Index offsets to the next value along each axis.
     #[inline(always)]
     fn strides(&self) -> [usize; 3] {
         let [x, y, _] = self.grid.dims;
         [1, x, x * y]
     }
 
-    /// Ambient light that reaches a surface point: little where bone crowds in front of it.
+    /// Fraction of ambient light at a surface point: small where bone in front of it is dense.
     #[inline(always)]
     pub fn openness(&self, g: Vec3, normal: Vec3, bone_cut: Vec4) -> f32 {
         let there = (0..4).map(|i| g + normal * (2.5 * f32::exp2(i as f32) / self.grid.spacing_mm));
@@ -147,7 +146,7 @@ impl Bricks {
         (-1.1 * dark).exp()
     }
 
-    /// Whether bone stands between a surface point and the light.
+    /// Whether bone is between a surface point and the light.
     #[inline(always)]
     pub fn shadowed(&self, g: Vec3, normal: Vec3, scene: &Scene) -> bool {
         let (from, light) = (g + 0.8 * normal, scene.light.truncate());
@@ -155,11 +154,11 @@ impl Bricks {
         self.trace(from, light / self.grid.spacing_mm, near, far).0 < NOTHING
     }
 
-    /// Distance up to which no ray o + t·d' meets bone whose d' is nowhere further than `spread`
-    /// from d; [`NOTHING`] where none ever does.
+    /// Distance to which the beam o + t·d' is free of bone, for all d' within `spread` of d;
+    /// [`NOTHING`] if it never hits.
     ///
-    /// From a brick the beam leaps to where its edges, o + t·(d ± spread), leave the free cube
-    /// around it; what is outside the grid is free too.
+    /// From a brick the beam advances to where its edges, o + t·(d ± spread), leave the free cube
+    /// around the brick; the outside of the grid is free too.
     pub fn clear(&self, o: Vec3, d: Vec3, spread: f32) -> f32 {
         if !self.casting.leap {
             return 0.0;
@@ -168,7 +167,7 @@ impl Bricks {
         let count = Vec3A::from(self.leaps.bricks.map(|n| n as f32));
         let last = IVec3::from(self.leaps.bricks.map(|n| n as i32 - 1));
         let (up, down) = (d + spread, d - spread);
-        // Where the edges meet planes; the beam passes no plane that it goes away from.
+        // Intersections of the edges with planes; the beam crosses no plane behind it.
         let reach = |at: Vec3A, edge: Vec3A, passes: BVec3A| {
             Vec3A::select(passes, (LEAP as f32 * at - o) / edge, Vec3A::splat(NOTHING))
         };
@@ -176,7 +175,8 @@ impl Bricks {
         let (end, mut t) = (end.min_element(), 0.0);
         for _ in 0..MOST_STEPS {
             let brick = cell_in((o + d * t) * (1.0 / LEAP as f32), last);
-            // Rays that lag behind the middle are beside its octants, so the cube around it counts.
+            // Edge rays may leave the octant of the centre ray, so the all-direction distance
+            // applies.
             let free = self.leaps.free(self.leaps.index(brick.to_array().map(|v| v as usize)));
             let (low, high) = (brick.as_vec3a() + 1.0 - f32::from(free), brick.as_vec3a() + f32::from(free));
             let over = reach(high, up, up.cmpgt(Vec3A::ZERO) & high.cmplt(count));
@@ -193,9 +193,10 @@ impl Bricks {
         t
     }
 
-    /// Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or
-    /// [`NOTHING`], and the number of bricks, cells and samples looked at. No bone is looked for
-    /// before `from` and after `until`.
+    /// Distance along the ray o + t·d at which bone begins, or [`NOTHING`], and the number of
+    /// bricks, cells and samples visited.
+    /// The ray is in padded grid coordinates, t in mm. Bone is searched between `from` and `until`
+    /// only.
     #[inline(always)]
     pub fn trace(&self, o: Vec3, d: Vec3, from: f32, until: f32) -> (f32, u32) {
         let ray = Line::of(o, d);
@@ -216,7 +217,7 @@ impl Bricks {
                 (0, u64::MAX)
             };
             let reach = f32::from(free.saturating_sub(1));
-            // One wall further on where the ray goes up, `reach` more bricks on in its direction.
+            // The brick's upper wall where the ray ascends, plus `reach` bricks in its direction.
             let wall = brick.as_vec3a() + ray.ahead + reach * ray.side;
             let leave = greater(least((LEAP as f32 * wall - ray.o) * ray.inverse), t + nudge);
             if free == 0 {
@@ -234,8 +235,7 @@ impl Bricks {
         (NOTHING, steps)
     }
 
-    /// Samples a part of a ray every `step` mm, and takes the density as linear between two
-    /// samples.
+    /// Samples part of a ray every `step` mm, with linear density between two samples.
     fn sample(&self, o: Vec3, d: Vec3, part: Range<f32>, step: f32, steps: &mut u32) -> f32 {
         let isovalue = f32::from(self.grid.isovalue);
         let (mut t, mut last) = (part.start, None);
@@ -254,8 +254,8 @@ impl Bricks {
         NOTHING
     }
 
-    /// Walks the cells of a ray from `t` to `leave` (Amanatides and Woo 1987) in the brick from
-    /// `first` on, of which these may hold bone.
+    /// Visits the occupied cells of a ray from `t` to `leave` in one brick (Amanatides and Woo
+    /// 1987). `first` is the brick's first cell, `cells` its occupancy bits.
     #[inline(always)]
     fn walk(&self, ray: &Line, mut t: f32, leave: f32, first: IVec3, cells: u64, steps: &mut u32) -> f32 {
         let last = IVec3::from(self.grid.dims.map(|n| n as i32 - 2));
@@ -266,7 +266,7 @@ impl Bricks {
             *steps += 1;
             let next = greater(least(crossing), t);
             let local = cell - first;
-            // A cell beside the brick, by rounding, is looked at itself.
+            // A cell outside the brick, by rounding, is tested directly.
             let beside = (local.x | local.y | local.z) as u32 >= LEAP as u32;
             let bit = (local.x + LEAP as i32 * (local.y + LEAP as i32 * local.z)) as u32;
             let may = beside || cells >> (bit & 63) & 1 == 1;
@@ -289,7 +289,7 @@ impl Bricks {
         NOTHING
     }
 
-    /// The corners of a cell, x fastest, less the isovalue; `None` where none of them is bone.
+    /// The corners of a cell, x fastest, less the isovalue; `None` if none is bone.
     #[inline(always)]
     fn corners(&self, cell: IVec3) -> Option<[f32; 8]> {
         let [_, row, layer] = self.strides();
@@ -304,17 +304,17 @@ impl Bricks {
     }
 }
 
-/// A ray o + t·d in padded grid coordinates, and what every step needs of it.
+/// A ray o + t·d in padded grid coordinates, with precomputed values.
 struct Line {
     o: Vec3A,
     d: Vec3A,
     inverse: Vec3A,
-    /// 1 along the axes on which it goes up, else 0.
+    /// 1 along the axes on which it ascends, else 0.
     ahead: Vec3A,
     /// 1 along these axes, else -1.
     side: Vec3A,
     step: IVec3,
-    /// Of directions: bit n is set where it goes up along axis n.
+    /// Octant of the direction: bit n is set where it ascends along axis n.
     octant: usize,
 }
 
@@ -335,7 +335,7 @@ impl Line {
     }
 }
 
-/// The part of a ray on the side of a plane that is not cut away, mm: its begin and its end.
+/// The part of a ray on the kept side of a plane, mm: its start and its end.
 #[inline(always)]
 pub(crate) fn under(cut: Vec4, point: Vec3, along: Vec3) -> [f32; 2] {
     let (over, rising) = (height(cut, point), cut.truncate().dot(along));
@@ -347,8 +347,8 @@ pub(crate) fn under(cut: Vec4, point: Vec3, along: Vec3) -> [f32; 2] {
     }
 }
 
-/// Whole parts, clamped to a box from 0: what lies under 0 becomes 0, so that cutting off is as
-/// good as rounding down.
+/// Integer parts, clamped to a box from 0; negative values become 0, so that truncation equals
+/// rounding down.
 #[inline(always)]
 fn cell_in(at: Vec3A, last: IVec3) -> IVec3 {
     at.as_ivec3().clamp(IVec3::ZERO, last)

@@ -1,9 +1,9 @@
-//! Twin of `contour.wgsl`: the outline of the deformed brain over a slice.
+//! CPU version of `contour.wgsl`: the outline of the deformed brain on a slice.
 
 use crate::renderer::OUTLINE;
 use glam::{Vec2, Vec3};
 
-/// Share of the line's colour over what is below it.
+/// Opacity of the line.
 const ALPHA: f32 = 0.9;
 
 /// Draws lines, given from -1 to 1, into a rectangle of the picture.

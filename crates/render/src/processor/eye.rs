@@ -1,4 +1,4 @@
-//! What one eye sees: its hits, kept from picture to picture, and its view.
+//! The view of one eye, with hits kept between pictures.
 
 use super::brain::Fragments;
 use super::skull::{Ray, TILE, cast, clear};
@@ -9,14 +9,14 @@ use crate::image::Image;
 use crate::overlay::Item;
 use crate::recast::Recast;
 
-/// The hits of an eye and what it sees.
+/// The stored hits and the view of an eye.
 #[derive(Debug)]
 pub(crate) struct Eye {
-    /// Where its view is in the picture.
+    /// Rectangle of its view in the picture.
     pub area: [u32; 4],
     pub rays: Vec<Ray>,
     pub recast: Recast,
-    /// Up to where no ray of a tile meets bone, mm.
+    /// Distance that is free of bone for each tile, mm.
     clear: Vec<f32>,
     fragments: Fragments,
     pixels: Vec<[u8; 4]>,
@@ -40,7 +40,7 @@ impl Eye {
         [self.area[2], self.area[3]]
     }
 
-    /// Draws bone, brain, tools and overlay. Returns the pixels whose rays were cast again.
+    /// Draws bone, brain, tools and overlay; returns the number of pixels cast again.
     pub fn draw(
         &mut self,
         inputs: &Inputs,
@@ -90,7 +90,7 @@ impl Eye {
         part[2] * part[3]
     }
 
-    /// Lights what every pixel shows.
+    /// Shades every pixel.
     fn light(&mut self, inputs: &Inputs, view: &View, threads: usize) {
         let [width, height] = self.size().map(|n| n as usize);
         let (rays, fragments, scene) = (&self.rays, &self.fragments, inputs.scene);
@@ -105,7 +105,7 @@ impl Eye {
                 row.iter_mut().enumerate().for_each(|(x, pixel)| *pixel = exact([x, y], &[]));
             });
         }
-        // Colours between those of bone that is smooth and hidden by nothing.
+        // Interpolates between colours of smooth, unoccluded bone.
         let bone = |at: usize| rays[at].t < fragments.at(at).t;
         rows::sparsely(threads, &mut self.pixels, width, exact, |[x, y], around| {
             let at = x + width * y;
@@ -117,8 +117,8 @@ impl Eye {
         });
     }
 
-    /// Copies the view into the picture; in one with the other eye's, only green and blue over that
-    /// one's brightness.
+    /// Copies the view into the picture; for an anaglyph, only green and blue, over the other eye's
+    /// luminance.
     pub fn show(&self, picture: &mut Image, in_one: bool) {
         let [x, y, width, height] = self.area.map(|n| n as usize);
         let wide = picture.width as usize;
@@ -134,7 +134,7 @@ impl Eye {
     }
 }
 
-/// Twin of `anaglyph.wgsl`.
+/// CPU version of `anaglyph.wgsl`.
 fn anaglyph([r, g, b, _]: [u8; 4], right: [u8; 4]) -> [u8; 4] {
     let grey = 0.299 * f32::from(r) + 0.587 * f32::from(g) + 0.114 * f32::from(b);
     [grey.round() as u8, right[1], right[2], 255]

@@ -1,4 +1,4 @@
-//! Twin of `light.wgsl`: takes the nearest of bone, brain and tool at a pixel and lights it.
+//! CPU version of `light.wgsl`: shades the nearest of bone, brain and tool at a pixel.
 
 use super::Inputs;
 use super::brain::Fragment;
@@ -11,14 +11,14 @@ use crate::skull::NOTHING;
 use glam::{Vec3, Vec4};
 use std::sync::LazyLock;
 
-/// The colour of a pixel; `near` says which tools it may show.
+/// The colour of a pixel; `near` selects the tools that may appear there.
 pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bone: &Ray, brain: &Fragment) -> [u8; 4] {
     let scene = inputs.scene;
     let (along, eye) = (scene.ray_of(x, y), scene.eye.truncate());
     let meets = |n: usize| if near[n] { Met::of(scene.tools()[n], eye, along) } else { Met::NONE };
     let [first, second] = [meets(0), meets(1)];
-    // Where both are cut by one plane neither is nearer: bone is there, however far the mesh
-    // reaches into it.
+    // Where one plane cuts both, the depths are equal: bone is shown, even if the mesh reaches into
+    // it.
     let under_bone = brain.cut && on_cut(scene.bone_cut, eye + bone.t * along);
     let brain_t = if under_bone { NOTHING } else { brain.t };
     let t = bone.t.min(brain_t).min(first.t()).min(second.t());
@@ -38,7 +38,7 @@ pub(crate) fn fragment(inputs: &Inputs, [x, y]: [usize; 2], near: [bool; 2], bon
     shown(colour)
 }
 
-/// A linear colour as bytes for a screen of gamma 2.2, from a table over the square root, where the
+/// Converts a linear colour to bytes for gamma 2.2, by a table over the square root, where the
 /// curve is nearly straight.
 pub(crate) fn shown(colour: Vec3) -> [u8; 4] {
     const LAST: usize = 4095;
@@ -66,13 +66,13 @@ fn shade_bone(inputs: &Inputs, point: Vec3, along: Vec3, bone: &Ray) -> Vec3 {
     lit(scene, colour, bone.normal, along, bone.open, key, 0.06 + 0.4 * wet)
 }
 
-/// How wet bone is: while the burr turns, water and blood film what is near it.
+/// Wetness of bone: while the burr turns, a film of water and blood covers its surroundings.
 fn wetness(scene: &Scene, point: Vec3) -> f32 {
     let away = point.distance(scene.tip.truncate()) - scene.tip.w;
     scene.light.w * (1.0 - smoothstep(1.0, 7.0, away))
 }
 
-/// Whether a grain of bone dust lies at a point: one cell of 0.5 mm in twelve.
+/// Whether there is a grain of bone dust at a point: one cell of 0.5 mm in twelve.
 fn dusty(point: Vec3) -> bool {
     let [x, y, z] = (point * 2.0).floor().to_array().map(|v| v as i32 as u32);
     let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663) ^ z.wrapping_mul(83_492_791);
@@ -103,12 +103,12 @@ pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     s * s * (3.0 - 2.0 * s)
 }
 
-/// Share of the lamp that passes a body at distance `gap` from the beam, `way` mm on.
+/// Fraction of the lamp's light that passes a body at distance `gap` from the beam, `way` mm away.
 fn pass_by(gap: f32, way: f32) -> f32 {
     smoothstep(-1.0, 1.0, gap / (0.10 * way + 0.3))
 }
 
-/// Light that passes the tools on its way to a point.
+/// Fraction of light that the tools let pass to a point.
 fn past_tools(scene: &Scene, point: Vec3) -> f32 {
     scene.tools().into_iter().map(|[tip, tail]| past(scene.light.truncate(), point, tip, tail)).product()
 }
@@ -143,7 +143,7 @@ fn brain_colour(mri: Option<&Signals>, rest: Vec3) -> Vec3 {
     })
 }
 
-/// The MRI where the brain is cut, as grey as in the slices.
+/// The MRI on the cut brain, as grey as in the slices.
 fn cut_colour(mri: Option<&Signals>, rest: Vec3) -> Vec3 {
     mri.map_or(Vec3::new(0.62, 0.32, 0.29), |signals| {
         let signal = signal(signals, signals.texture_from_world.transform_point3(rest));
@@ -157,14 +157,14 @@ pub(crate) fn signal(signals: &Signals, at: Vec3) -> Vec4 {
     trilinear(signals.dims, voxel, |n| Vec4::from(signals.texels[n].map(f32::from))) / 255.0
 }
 
-/// Twin of the shader's `tinted`: a colour where a mark lies over it.
+/// CPU version of the shader's `tinted`: a colour with a mark over it.
 pub(crate) fn tinted(colour: Vec3, signal: Vec4) -> Vec3 {
     let mark = signal.truncate();
     let share = mark.max_element();
     colour.lerp(mark / share.max(1e-3), 0.45 * share)
 }
 
-/// A tool where a ray meets it; `look` is that of its tip.
+/// Shades a tool hit; `look` is the style of its tip.
 fn shade_tool(scene: &Scene, point: Vec3, along: Vec3, met: &Met, look: f32) -> Vec3 {
     let on_tip = met.t() == met.at[0];
     let axis = (met.tail - met.tip).truncate().normalize();

@@ -1,34 +1,34 @@
-//! Values between grid points.
+//! Interpolation between grid points.
 
 use glam::{Vec3, Vec3A};
 use std::array;
 use std::ops::{Add, Mul, Sub};
 
-/// The lesser of two numbers that are numbers: one instruction, where `min` also answers for NaN.
+/// The minimum of two non-NaN numbers in one instruction; `min` also handles NaN.
 #[inline(always)]
 pub(crate) fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The greater of two numbers that are numbers.
+/// The maximum of two non-NaN numbers.
 #[inline(always)]
 pub(crate) fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The least of three numbers that are numbers.
+/// The minimum of three non-NaN numbers.
 #[inline(always)]
 pub(crate) fn least(of: Vec3A) -> f32 {
     lesser(lesser(of.x, of.y), of.z)
 }
 
-/// The greatest of three numbers that are numbers.
+/// The maximum of three non-NaN numbers.
 #[inline(always)]
 pub(crate) fn greatest(of: Vec3A) -> f32 {
     greater(greater(of.x, of.y), of.z)
 }
 
-/// Trilinear interpolation between values at whole coordinates, clamped at the border.
+/// Trilinear interpolation between values at integer coordinates, clamped at the border.
 #[inline(always)]
 pub(crate) fn trilinear<V: Mix>(dims: [usize; 3], at: Vec3, value: impl Fn(usize) -> V) -> V {
     let strides = [1, dims[0], dims[0] * dims[1]];
@@ -37,22 +37,22 @@ pub(crate) fn trilinear<V: Mix>(dims: [usize; 3], at: Vec3, value: impl Fn(usize
     mixed(places, array::from_fn(|n| if dims[n] > 1 { strides[n] } else { 0 }), value)
 }
 
-/// What can be interpolated.
+/// Types that can be interpolated.
 pub(crate) trait Mix: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<f32, Output = Self> {}
 impl<V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f32, Output = V>> Mix for V {}
 
-/// Where a coordinate lies along an axis of `count` values `stride` apart, clamped: position of the
-/// value before it, and the share of the next.
+/// Index of the value before a coordinate and the weight of the next; the axis has `count` values
+/// `stride` apart, clamped.
 #[inline(always)]
 pub(crate) fn between(x: f32, count: usize, stride: usize) -> (usize, f32) {
     let last = count - 1;
     let x = lesser(greater(x, 0.0), last as f32);
-    // Cutting off is rounding down for what is not negative; the library's `floor` is a call.
+    // Truncation equals rounding down for non-negative values; the library's `floor` is a call.
     let low = (x as i32 as usize).min(last.saturating_sub(1));
     (low * stride, x - low as f32)
 }
 
-/// The values around places along three axes, mixed by their shares.
+/// Interpolates the values around indices along three axes by their weights.
 #[inline(always)]
 pub(crate) fn mixed<V: Mix>(
     [(x, u), (y, v), (z, w)]: [(usize, f32); 3],

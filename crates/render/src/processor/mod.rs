@@ -1,22 +1,20 @@
-//! The same picture without any graphics device: every pass again in plain Rust.
+//! The renderer on the processor: every pass in plain Rust, without a graphics device.
 //!
 //! # Theory
-//! Each file here is the twin of a shader of the same name and reads the same [`Scene`]: the rays
-//! leap and solve cubics as `bricks.wgsl` does, light falls as in `light.wgsl`. So this is the
-//! oracle for the shaders, and the picture of machines without a driver.
+//! Each file is the CPU version of the shader of the same name and reads the same [`Scene`]: rays
+//! skip empty space and solve cubics as in `bricks.wgsl`, lighting is as in `light.wgsl`. It is the
+//! reference for the shaders, and the renderer for machines without a driver.
 //!
 //! # Practice
-//! Rows are shared between as many threads as there are processors. Three things the device has
-//! not: before the rays of a tile of 8x8 pixels go, the tile leaps as one beam to where bone may
-//! be; rays leap by the octant of their direction, and look at a cell only if its bit says that it
-//! may hold bone (`bricks.rs`); and while the camera moves, sparse rays ([`Casting::sparse`]): a
-//! quarter of the pixels, and those between them where the tangent planes around do not agree
-//! (`skull.rs`). The hits of the last picture are kept, as on the device. Triangles of the brain
-//! that reach behind the eye are left out.
+//! Rows are shared between as many threads as there are processors. Three optimisations are not in
+//! the shaders. Each tile of 8x8 pixels first advances as one beam to where bone may be. Rays skip
+//! by the octant of their direction and test a cell only if its occupancy bit is set (`bricks.rs`).
+//! While the camera moves, rays are sparse ([`Casting::sparse`]): a quarter of the pixels, and the
+//! others where neighbouring tangent planes disagree (`skull.rs`). The hits of the last picture are
+//! kept, as on the device. Triangles of the brain that reach behind the eye are skipped.
 //!
 //! # When not to use it
-//! Where there is any driver, even a software one: that draws the same picture and serves the
-//! window.
+//! Where there is any driver, even a software one: it draws the same picture and serves the window.
 
 mod brain;
 mod bricks;
@@ -55,7 +53,7 @@ use glam::Vec3;
 use skull::Ray;
 use trepan_geometry::Aabb;
 
-/// Draws pictures of one scene on the processor.
+/// Renders pictures of one scene on the processor.
 #[derive(Debug)]
 pub struct ProcessorRenderer {
     bricks: Bricks,
@@ -65,15 +63,15 @@ pub struct ProcessorRenderer {
     layout: Layout,
     picture: Image,
     stereo: Option<StereoLook>,
-    /// One, or the left and the right.
+    /// One eye, or the left and the right.
     eyes: Vec<Eye>,
-    /// Changed bricks that one picture takes over at most; the rest comes with the next pictures.
+    /// Most changed bricks processed per picture; the rest follows in the next pictures.
     pub bricks_per_frame: usize,
-    /// Threads that share the rows of a picture; by default one for each processor.
+    /// Threads that share the rows of a picture; by default one per processor.
     pub threads: usize,
 }
 
-/// What the passes read.
+/// The inputs of the passes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inputs<'a> {
     pub scene: &'a Scene,
@@ -89,7 +87,7 @@ impl ProcessorRenderer {
         Self::with(Kept::of(data)?, size)
     }
 
-    /// Takes over what was kept of a scene.
+    /// Creates a renderer from a stored scene.
     pub(crate) fn with(kept: Kept, size: [u32; 2]) -> Result<Self, RenderError> {
         let mut renderer = Self {
             bounds: kept.bounds,
@@ -195,12 +193,12 @@ impl ProcessorRenderer {
         }
     }
 
-    /// How rays go through the bone.
+    /// How rays are cast through bone.
     pub fn casting(&self) -> Casting {
         self.bricks.casting
     }
 
-    /// Changes how rays go through the bone.
+    /// Changes how rays are cast through bone.
     pub fn set_casting(&mut self, casting: Casting) {
         if self.bricks.casting != casting {
             self.bricks.casting = casting;
@@ -208,8 +206,8 @@ impl ProcessorRenderer {
         }
     }
 
-    /// Bricks, cells and samples that a ray of the newest picture has looked at in the mean,
-    /// without its shadow.
+    /// Mean number of bricks, cells and samples visited per ray in the last picture, without shadow
+    /// rays.
     pub fn steps_per_ray(&self) -> f64 {
         let rays = &self.eyes[0].rays;
         rays.iter().map(|ray| f64::from(ray.steps)).sum::<f64>() / rays.len().max(1) as f64
@@ -220,19 +218,18 @@ impl ProcessorRenderer {
         [self.picture.width, self.picture.height]
     }
 
-    /// Which part of the picture is what.
+    /// The layout of the picture.
     pub fn layout(&self) -> Layout {
         self.layout
     }
 
-    /// The camera of a frame as vectors, for the 3-D view of this picture; with two eyes, from
-    /// between them.
+    /// A frame's camera as vectors, for the 3-D view; with stereo, from between the eyes.
     pub fn view(&self, frame: &Frame) -> View {
         let [_, _, width, height] = self.eyes[0].area;
         frame.camera.view(width as f32 / height as f32)
     }
 
-    /// The newest picture.
+    /// The last picture.
     pub fn image(&self) -> &Image {
         &self.picture
     }
@@ -244,7 +241,7 @@ impl ProcessorRenderer {
     }
 }
 
-/// A colour from 0 to 1 as bytes, rounded as the device does.
+/// Converts a colour from 0 to 1 to bytes, rounded like on the device.
 pub(crate) fn bytes(colour: Vec3) -> [u8; 4] {
     let [r, g, b] = (colour.clamp(Vec3::ZERO, Vec3::ONE) * 255.0).round().to_array();
     [r as u8, g as u8, b as u8, 255]

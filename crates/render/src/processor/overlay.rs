@@ -1,4 +1,4 @@
-//! Twin of `overlay.wgsl`: shapes over the picture, each in the rectangle around it.
+//! CPU version of `overlay.wgsl`: draws each shape in its pixel rectangle.
 
 use super::light::shown;
 use super::tool::{Met, lit, shaft};
@@ -8,10 +8,10 @@ use crate::scene::Scene;
 use crate::skull::NOTHING;
 use glam::{Vec2, Vec3, Vec4};
 
-/// Share of alpha behind the scene.
+/// Fraction of alpha behind the scene.
 const HIDDEN: f32 = 0.25;
 
-/// Draws a shape over pixels of a picture, behind which the scene is as far as `depth` says.
+/// Draws a shape into a picture; `depth` is the scene's distance at a pixel.
 pub(crate) fn draw(item: &Item, scene: &Scene, view: &View, pixels: &mut [[u8; 4]], depth: impl Fn(usize) -> f32) {
     let (width, eye) = (scene.right.w as usize, scene.eye.truncate());
     let [left, top, right, bottom] = rectangle(item.tip, item.tail, view, [width, scene.up.w as usize]);
@@ -31,8 +31,8 @@ pub(crate) fn draw(item: &Item, scene: &Scene, view: &View, pixels: &mut [[u8; 4
     }
 }
 
-/// First pixels, and those behind the last, around a body's box and a pixel more; the whole view
-/// where the box reaches behind the eye, and nothing where there is no body.
+/// Pixel rectangle (first and end) around a body's box with a margin of one pixel.
+/// It is the whole view if the box reaches behind the eye, and empty without a body.
 pub(crate) fn rectangle(tip: Vec4, tail: Vec4, view: &View, [width, height]: [usize; 2]) -> [usize; 4] {
     if tip.w <= 0.0 {
         return [0; 4];
@@ -75,8 +75,8 @@ fn arrow(eye: Vec3, along: Vec3, item: &Item) -> (f32, Vec3) {
     head(eye, along, to, down, depth, item.tail.w, stem)
 }
 
-/// The nearer of a surface and the front of an arrow's head: a cone around `down` from its point,
-/// as deep as `depth`, as wide as `radius` there.
+/// The nearer of a given surface and an arrow's head.
+/// The head is a cone around `down` from its apex, with height `depth` and base radius `radius`.
 fn head(eye: Vec3, along: Vec3, apex: Vec3, down: Vec3, depth: f32, radius: f32, other: (f32, Vec3)) -> (f32, Vec3) {
     let mut nearest = other;
     let away = eye - apex;

@@ -1,13 +1,13 @@
-//! Where a ray enters bone within a cell.
+//! Finds where a ray enters bone within a cell.
 //!
 //! # Theory
-//! The density of a cell is trilinear, so along a ray it is a cubic (Marmitt et al. 2004). Between
-//! its extrema a cubic is monotone: Newton's method, kept between two ends of different sign.
+//! The density of a cell is trilinear, so that along a ray it is a cubic (Marmitt et al. 2004).
+//! Between its extrema a cubic is monotone, and a bracketed Newton's method finds its root.
 
 use super::mix::greater;
 use glam::{Vec3A, Vec4};
 
-/// Trilinear interpolation of a cell's corners at four places, given by their coordinates.
+/// Trilinear interpolation of a cell's corners at four points, given by their coordinates.
 #[inline(always)]
 fn blend(corners: &[f32; 8], [x, y, z]: [Vec4; 3]) -> Vec4 {
     let line = |n: usize| corners[n] + x * (corners[n + 1] - corners[n]);
@@ -19,7 +19,7 @@ fn blend(corners: &[f32; 8], [x, y, z]: [Vec4; 3]) -> Vec4 {
     a + z * (b - a)
 }
 
-/// Share of the way between two local points of a cell where bone begins, or 2.
+/// Fraction of the segment between two local points of a cell at which bone begins, or 2.
 #[inline(always)]
 pub(crate) fn enter(corners: &[f32; 8], a: Vec3A, b: Vec3A) -> f32 {
     let shares = Vec4::new(0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0);
@@ -27,16 +27,15 @@ pub(crate) fn enter(corners: &[f32; 8], a: Vec3A, b: Vec3A) -> f32 {
     first_root(blend(corners, [axis(0), axis(1), axis(2)]).to_array())
 }
 
-/// First root of the cubic with values `v` at 0, 1/3, 2/3, 1 that rises from below zero, or 2.
+/// First rising root of the cubic with values `v` at 0, 1/3, 2/3, 1, or 2.
 ///
-/// Between its extrema the cubic is monotone: Newton's method, kept between two ends of different
-/// sign.
+/// Between its extrema the cubic is monotone: bracketed Newton's method.
 #[inline(always)]
 pub(crate) fn first_root(v: [f32; 4]) -> f32 {
     if v[0] >= 0.0 {
         return 0.0;
     }
-    // The curve lies in the hull of its Bézier points.
+    // The curve lies in the convex hull of its Bézier points.
     let second = -5.0 * v[0] + 18.0 * v[1] - 9.0 * v[2] + 2.0 * v[3];
     let third = 2.0 * v[0] - 9.0 * v[1] + 18.0 * v[2] - 5.0 * v[3];
     if greater(greater(second, third), v[3]) < 0.0 {
@@ -45,7 +44,7 @@ pub(crate) fn first_root(v: [f32; 4]) -> f32 {
     rising_root(v)
 }
 
-/// The same, where there may be a root.
+/// Like [`first_root`], where a root is possible.
 fn rising_root(v: [f32; 4]) -> f32 {
     let c1 = 0.5 * (-11.0 * v[0] + 18.0 * v[1] - 9.0 * v[2] + 2.0 * v[3]);
     let c2 = 4.5 * (2.0 * v[0] - 5.0 * v[1] + 4.0 * v[2] - v[3]);
@@ -87,7 +86,7 @@ fn rising_root(v: [f32; 4]) -> f32 {
     2.0
 }
 
-/// Most steps to a root: halving alone gets to 2⁻¹² in as many.
+/// Most iterations to a root: bisection alone reaches 2⁻¹² in as many.
 const MOST_NEWTON: usize = 12;
 
 #[cfg(test)]
@@ -108,7 +107,7 @@ mod tests {
             let root = f64::from(first_root(v));
             match scan {
                 Some(s) => prop_assert!(root <= s + 3e-4 && (root > s - 6e-4 || lagrange(root) > -0.5), "{root} for {s}"),
-                // A scan may miss a peak between its points, never more than a sliver of one.
+                // A scan may miss a narrow peak between its points.
                 None => prop_assert!(root == 2.0 || lagrange(root).abs() < 0.5, "{root}"),
             }
         }

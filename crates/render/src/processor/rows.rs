@@ -1,9 +1,9 @@
-//! Rows of a picture, shared between threads.
+//! Distributes the rows of a picture over threads.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-/// The columns of some rows of a grid of `width` values a row, each with its number.
+/// The columns of some rows of a grid of `width` values a row, each with its index.
 pub(crate) fn of<T>(
     grid: &mut [T],
     width: usize,
@@ -17,7 +17,7 @@ where
     chosen.map(move |(y, row)| (y, &mut row[columns.clone()]))
 }
 
-/// Does `work` for every row, on some threads; each takes the next row when it has done one.
+/// Runs `work` for every row on several threads; each takes the next row when it is free.
 pub(crate) fn share<'a, T: Send + 'a>(
     threads: usize,
     rows: impl Iterator<Item = (usize, &'a mut [T])> + Send,
@@ -38,9 +38,9 @@ pub(crate) fn share<'a, T: Send + 'a>(
     });
 }
 
-/// Fills a grid sparsely: `exact` values at every second column of every second row, and between
-/// these what `between` makes of the values around, or exact ones, which know these values too,
-/// where it makes nothing of them.
+/// Fills a grid from `exact` values at every second column and row, interpolating the others with
+/// `between`.
+/// Where `between` returns nothing, `exact` is called with the surrounding values.
 pub(crate) fn sparsely<T: Copy + Send + Sync>(
     threads: usize,
     grid: &mut [T],

@@ -1,11 +1,11 @@
-//! Twin of `section.wgsl`: where the brain that is at a pixel of a slice is at rest.
+//! CPU version of `section.wgsl`: rest positions of the brain at the pixels of a slice.
 
 use crate::brain::Border;
 use crate::section::triangles;
 use crate::slice::Plane;
 use glam::{Vec2, Vec3};
 
-/// The place at rest at every pixel of a slice, row by row; none off the brain.
+/// Rest position at every pixel of a slice, row by row; `None` outside the brain.
 pub(crate) fn places([width, height]: [usize; 2], plane: &Plane, brain: &Border) -> Vec<Option<Vec3>> {
     let mut places = vec![None; width * height];
     let size = Vec2::new(width as f32, height as f32);

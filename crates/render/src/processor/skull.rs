@@ -1,4 +1,4 @@
-//! Twin of `skull.wgsl`: the bone's isosurface at a pixel.
+//! CPU version of `skull.wgsl`: the bone's isosurface at a pixel.
 
 use super::bricks::{Bricks, under};
 use crate::cut::height;
@@ -6,20 +6,20 @@ use crate::scene::Scene;
 use crate::skull::NOTHING;
 use glam::{Vec3, Vec4};
 
-/// What a pixel's ray meets of the bone.
+/// The bone hit of a pixel's ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
     /// Distance, mm, or [`NOTHING`].
     pub t: f32,
-    /// Bricks, cells and samples looked at; none where bone was met between other rays.
+    /// Bricks, cells and samples visited; 0 where the hit was interpolated.
     pub steps: u32,
-    /// Unit, outwards.
+    /// Unit normal, outwards.
     pub normal: Vec3,
     /// Height of the surface's tangent plane over the eye along its normal, mm.
     pub plane: f32,
-    /// Ambient light that gets there.
+    /// Fraction of ambient light that reaches the point.
     pub open: f32,
-    /// Whether the lamp's light gets there.
+    /// Whether the lamp's light reaches the point.
     pub lit: bool,
 }
 
@@ -30,7 +30,7 @@ impl Ray {
 /// Pixels along an edge of a tile.
 pub(crate) const TILE: usize = 8;
 
-/// Distance up to which no ray of the tile with this first pixel meets bone.
+/// Distance up to which no ray of the tile with this first pixel hits bone.
 pub(crate) fn clear(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2]) -> f32 {
     let far = TILE - 1;
     let corners = [[x, y], [x + far, y], [x, y + far], [x + far, y + far]].map(|[x, y]| scene.ray_of(x, y));
@@ -40,8 +40,8 @@ pub(crate) fn clear(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2]) -> f32 {
     bricks.clear(bricks.grid_of(scene.eye.truncate()), middle / spacing, 1.01 * spread / spacing)
 }
 
-/// The ray of a pixel, which meets no bone before `from`, mm. Between rays that are all lit it is
-/// taken as lit.
+/// Casts the ray of a pixel, known to be clear up to `from`, mm. It counts as lit if all neighbours
+/// are.
 pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32, around: &[Ray]) -> Ray {
     if from >= NOTHING {
         return Ray::NONE;
@@ -67,20 +67,20 @@ pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32
     Ray { t, steps, normal, plane, open: 0.999 * bricks.openness(g, normal, scene.bone_cut), lit }
 }
 
-/// The least cosine of the angle between neighbours' normals on smooth bone.
+/// Smallest cosine between neighbours' normals on smooth bone.
 const SMOOTH: f32 = 0.95;
 
-/// How far neighbours' tangent planes may be apart on smooth bone, voxels.
+/// Largest distance of neighbours' tangent planes on smooth bone, voxels.
 const FLAT_VOXEL: f32 = 0.15;
 
 impl Ray {
-    /// Whether the ray was not cast, but lies between rays that meet smooth bone.
+    /// Whether the ray was interpolated between rays that hit smooth bone.
     pub fn is_between(&self) -> bool {
         self.steps == 0 && self.t < NOTHING
     }
 
-    /// What the ray of a pixel meets between others that meet nothing, or smooth bone: then their
-    /// tangent planes agree.
+    /// Interpolates a pixel's ray between others that hit nothing, or smooth bone whose tangent
+    /// planes agree.
     pub fn between(scene: &Scene, [x, y]: [usize; 2], around: &[Self]) -> Option<Self> {
         let first = around.first()?;
         if first.t >= NOTHING {
@@ -107,7 +107,7 @@ impl Ray {
     }
 }
 
-/// Whether a point that a ray has met is where bone is cut.
+/// Whether a hit lies on the cutting plane.
 pub(crate) fn on_cut(bone_cut: Vec4, point: Vec3) -> bool {
     bone_cut.truncate() != Vec3::ZERO && height(bone_cut, point).abs() < 0.01
 }

@@ -1,4 +1,4 @@
-//! Twin of `slice.wgsl`: one pixel of an orthogonal slice through the tool's tip.
+//! CPU version of `slice.wgsl`: one pixel of an orthogonal slice through the tool's tip.
 
 use super::light::{signal, smoothstep, tinted};
 use super::{Inputs, bytes};

@@ -1,4 +1,4 @@
-//! Twin of `tool.wgsl`: bodies in closed form, and the light on them.
+//! CPU version of `tool.wgsl`: tools in closed form, and their lighting.
 
 use crate::scene::Scene;
 use crate::skull::NOTHING;
@@ -13,11 +13,11 @@ fn ball(eye: Vec3, along: Vec3, centre: Vec3, radius: f32) -> f32 {
     if room > 0.0 && t > 0.0 { t } else { NOTHING }
 }
 
-/// Where a ray meets a tool.
+/// Intersection of a ray with a tool.
 pub(crate) struct Met {
     pub tip: Vec4,
     pub tail: Vec4,
-    /// Along the ray to ball, shaft and far end, or [`NOTHING`].
+    /// Distances along the ray to ball, shaft and far end, or [`NOTHING`].
     pub at: [f32; 3],
 }
 
@@ -35,7 +35,7 @@ impl Met {
         tip.min(stem).min(end)
     }
 
-    /// Unit normal at the point that is met.
+    /// Unit normal at the hit point.
     pub fn normal(&self, point: Vec3) -> Vec3 {
         let (on_tip, on_end) = (self.t() == self.at[0], self.t() == self.at[2]);
         let axis = (self.tail - self.tip).truncate();
@@ -45,7 +45,7 @@ impl Met {
     }
 }
 
-/// Distance along the ray to a shaft's mantle, or [`NOTHING`].
+/// Distance along the ray to a shaft's lateral surface, or [`NOTHING`].
 pub(crate) fn shaft(eye: Vec3, along: Vec3, tip: Vec4, tail: Vec4) -> f32 {
     let axis = (tail - tip).truncate();
     let away = eye - tip.truncate();
@@ -59,7 +59,7 @@ pub(crate) fn shaft(eye: Vec3, along: Vec3, tip: Vec4, tail: Vec4) -> f32 {
     if room > 0.0 && t > 0.0 && at > 0.0 && at < length2 { t } else { NOTHING }
 }
 
-/// Diffuse light from above left and from the sky, and a highlight.
+/// Diffuse light from the upper left and the sky, and a highlight.
 pub(crate) fn lit(scene: &Scene, albedo: Vec3, normal: Vec3, along: Vec3, open: f32, key: f32, gloss: f32) -> Vec3 {
     let light = scene.light.truncate();
     let facing = normal.dot(light).max(0.0) * key;

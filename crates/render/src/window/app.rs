@@ -22,7 +22,7 @@ enum Screen {
 
 /// Width of the side panel, points.
 const PANEL_WIDTH: f32 = 270.0;
-/// How much larger large type is.
+/// Scale of large type.
 const LARGE: f32 = 1.4;
 
 /// The application behind the window.
@@ -39,7 +39,7 @@ pub(super) struct Window<S, D> {
     large: bool,
     playback: Option<Playback>,
     #[cfg(feature = "sound")]
-    ears: super::loudspeaker::Ears,
+    audio: super::loudspeaker::AudioOutput,
     screen: Screen,
     quality: Quality,
     drawn_at: f64,
@@ -61,14 +61,14 @@ impl<S: Session, D: Draws> Window<S, D> {
             large: false,
             playback: None,
             #[cfg(feature = "sound")]
-            ears: Default::default(),
+            audio: Default::default(),
             screen: if copies { Screen::Copies(None) } else { Screen::Shares(None) },
             quality: Quality::new(!hardware, start.detail),
             drawn_at: 0.0,
         }
     }
 
-    /// One picture of the whole window.
+    /// Draws one picture of the whole window.
     pub fn show(&mut self, ui: &mut egui::Ui, state: Option<&RenderState>) {
         let lent = self.lent.clone();
         let mut lent = lent.borrow_mut();
@@ -93,7 +93,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         ui.request_repaint_after(Duration::from_secs_f32(1.0 / self.start.rate_hz.clamp(1.0, 240.0)));
     }
 
-    /// Does what keys and clicks since the last picture ask of the window itself.
+    /// Handles keys and clicks that concern the window itself.
     fn react(&mut self, ui: &egui::Ui) {
         let mut commands = std::mem::take(&mut self.clicks.commands);
         ui.input(|input| commands.extend(keys::pressed(input)));
@@ -105,7 +105,7 @@ impl<S: Session, D: Draws> Window<S, D> {
                 Command::Help => self.help ^= true,
                 Command::LargeType => self.enlarge(ui),
                 #[cfg(feature = "sound")]
-                Command::Mute => self.ears.muted ^= true,
+                Command::Mute => self.audio.muted ^= true,
                 Command::Quit if std::mem::take(&mut self.help) => (),
                 Command::Quit => ui.send_viewport_cmd(egui::ViewportCommand::Close),
                 of_view => self.look.react(of_view, &mut self.hand.camera),
@@ -119,15 +119,15 @@ impl<S: Session, D: Draws> Window<S, D> {
         ui.set_zoom_factor(if self.large { LARGE } else { 1.0 });
     }
 
-    /// Asks the session what is new.
+    /// Updates the session.
     fn update(&mut self, ui: &egui::Ui, shared: &mut Shared<S, D>) {
-        let asked = |command| self.clicks.commands.contains(&command);
+        let requested = |command| self.clicks.commands.contains(&command);
         let actions = self.panel.actions.iter().enumerate();
         let input = ui.input(|i| WindowInput {
             world_from_tool: self.hand.world_from_tool,
             pedal: i.key_down(egui::Key::Space) || self.clicks.pedal,
-            next_tool: asked(Command::NextTool),
-            undo: asked(Command::Undo),
+            next_tool: requested(Command::NextTool),
+            undo: requested(Command::Undo),
             chosen: self.clicks.chosen,
             actions: actions
                 .filter(|(_, action)| keys::of_action(action).is_some_and(|key| i.key_pressed(key)))
@@ -138,7 +138,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         });
         self.panel = shared.session.update(&input);
         #[cfg(feature = "sound")]
-        self.panel.values.extend(self.ears.hear(self.panel.sound).map(|why| ("sound".into(), why)));
+        self.panel.values.extend(self.audio.play(self.panel.sound).map(|why| ("sound".into(), why)));
         self.panel.leash.into_iter().for_each(|leash| self.hand.hold(leash));
         let now = self.panel.timeline.as_ref().map_or(input.seconds, |timeline| timeline.at_s);
         self.traces.force.push(now, self.panel.force_n.into());
@@ -163,7 +163,7 @@ impl<S: Session, D: Draws> Window<S, D> {
             Ok((view, id)) => {
                 let pointer = Pointer::over(ui, &response);
                 self.hand.follow(&pointer, &view, space.y);
-                // A slider that has the focus takes the arrow keys.
+                // A focused slider takes the arrow keys.
                 if ui.memory(|memory| memory.focused().is_none()) {
                     ui.input(|i| self.hand.keys(i, &view));
                 }
@@ -176,7 +176,7 @@ impl<S: Session, D: Draws> Window<S, D> {
 }
 
 impl Screen {
-    /// Draws a frame and gives the window's texture of it.
+    /// Draws a frame and returns the window's texture of it.
     fn show(
         &mut self,
         ui: &egui::Ui,
@@ -204,13 +204,13 @@ impl Screen {
         if let Some(drawn) = renderer.texture() {
             return Ok((view, registered(texture, state, drawn.view())));
         }
-        // The processor has taken over: from now on its pictures are copied.
+        // The processor has taken over: its pictures are copied from now on.
         *self = Self::Copies(None);
         self.show(ui, Some(state), renderer, frame, pixels, detail)
     }
 }
 
-/// Registers the renderer's texture, anew when it is another one.
+/// Registers the renderer's texture, again when it changed.
 fn registered(
     texture: &mut Option<(egui::TextureId, wgpu::TextureView)>,
     state: &RenderState,

@@ -1,15 +1,15 @@
-//! Warnings that cannot be missed: large black letters on vermilion across the picture, with the
-//! word itself, so that colour is not needed to see them. What is only to be known, such as a
-//! pause, stands on sky blue below.
+//! Warning banners: large black letters on vermilion across the picture.
+//! The word itself is shown too, so that colour is not needed. Information such as a pause is on
+//! sky blue below.
 //!
 //! # Practice
-//! They lie over the picture's upper edge: a picture that made room for them would have to be cast
-//! anew each time.
+//! They overlap the picture's upper edge: making room would change the picture's size and recast it
+//! each time.
 
 use super::palette::{SKY, VERMILION};
 use eframe::egui::{self, Color32, Rect, RichText};
 
-/// Shows warnings and news over an area of the window as long as there are any.
+/// Shows warnings and news over an area of the window while there are any.
 pub(crate) fn show(ui: &egui::Ui, over: Rect, warnings: &[String], news: &[String]) {
     let area = egui::Area::new(egui::Id::unique("banner"))
         .fixed_pos(over.min)

@@ -1,4 +1,4 @@
-//! Pictures of the whole window for the session to keep.
+//! Screenshots of the whole window for the session.
 
 use super::Session;
 use crate::Image;
@@ -6,16 +6,16 @@ use eframe::egui::{self, ColorImage};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-/// What a picture of the window is for.
+/// The purpose of a screenshot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Capture {
-    /// The user asked for this one.
+    /// A single picture that the user requested.
     Picture,
-    /// One of a film's, taken this long after the window opened, ms.
+    /// A film frame, taken this long after the window opened, ms.
     Film(u64),
 }
 
-/// Asks for pictures and hands on what came.
+/// Requests screenshots and passes them on.
 pub(crate) struct Captures {
     filming: bool,
     asked: bool,
@@ -31,23 +31,22 @@ impl Default for Captures {
 }
 
 impl Captures {
-    /// Whether every picture is kept.
+    /// Whether every picture is recorded.
     pub fn filming(&self) -> bool {
         self.filming
     }
 
-    /// Asks for one picture.
+    /// Requests one picture.
     pub fn ask(&mut self) {
         self.asked = true;
     }
 
-    /// Begins or ends a film.
+    /// Starts or stops a film.
     pub fn film(&mut self) {
         self.filming ^= true;
     }
 
-    /// Once a picture: hands on what the windowing system took since the last, and asks for what is
-    /// wanted now.
+    /// Once per picture: passes on the screenshots taken since the last and requests the next.
     pub fn turn(&mut self, context: &egui::Context, session: &mut impl Session) {
         for (what, image) in self.receiver.try_iter() {
             session.capture(what, picture(&image));
@@ -55,7 +54,7 @@ impl Captures {
         let film = self.filming.then(|| Capture::Film((context.input(|i| i.time) * 1e3) as u64));
         for what in std::mem::take(&mut self.asked).then_some(Capture::Picture).into_iter().chain(film) {
             let sender = self.sender.clone();
-            // Nobody listens any more once the window is closed.
+            // The receiver is gone once the window is closed.
             context.request_screenshot(move |image| _ = sender.send((what, image)));
         }
     }

@@ -1,23 +1,24 @@
-//! Who draws the window's picture, and how it gets there.
+//! The renderers that a window can use.
 
 use crate::{Frame, Image, Painter, RenderError, Renderer, View};
 use trepan_gpu::{Gpu, Texture};
 
-/// Draws the pictures of a window: a [`Renderer`], or a [`Painter`], which goes on by the processor
-/// where no device can.
+/// Draws the pictures of a window: a [`Renderer`], or a [`Painter`], which falls back to the
+/// processor.
 pub trait Draws {
-    /// The device that draws now, if one does.
+    /// The device in use, if any.
     fn device(&self) -> Option<&Gpu>;
 
-    /// Draws a frame for an area of `size` pixels into a texture of the device; `detail` is the
-    /// share of the 3-D view's pixels along an edge. Gives the camera as vectors.
+    /// Draws a frame for an area of `size` pixels into a texture of the device; returns the camera
+    /// as vectors.
+    /// `detail` is the fraction of the 3-D view's pixels along an edge.
     fn draw(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<View, RenderError>;
 
-    /// The texture that the last picture was drawn into, if a device draws.
+    /// The texture of the last picture, if a device draws.
     fn texture(&self) -> Option<&Texture>;
 
-    /// The same as [`draw`](Self::draw) as a finished picture, where the window has another device.
-    /// It may have fewer pixels.
+    /// Like [`draw`](Self::draw), but returns a finished picture for a window on another device. It
+    /// may have fewer pixels.
     fn picture(&mut self, frame: &Frame, size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError>;
 }
 

@@ -1,4 +1,4 @@
-//! What the user does with mouse and keys, as a camera and a wanted tool pose.
+//! Mouse and keyboard input, converted to a camera and a target tool pose.
 
 use super::{Leash, Playback};
 use crate::{Camera, View};
@@ -6,54 +6,53 @@ use eframe::egui;
 use glam::{Quat, Vec2};
 use trepan_geometry::Pose;
 
-/// What the user wants, once a picture.
+/// The user's input, once per picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowInput {
-    /// Where the mouse has moved the tool.
+    /// The tool's target pose from the mouse.
     pub world_from_tool: Pose,
     /// Whether the drill's pedal is down.
     pub pedal: bool,
-    /// Whether the next tool was asked for since the last picture.
+    /// Whether the next tool was requested since the last picture.
     pub next_tool: bool,
-    /// Whether the last stroke was to be undone since the last picture.
+    /// Whether an undo of the last stroke was requested since the last picture.
     pub undo: bool,
-    /// An option of one of the panel's choices that was picked: the choice, the option.
+    /// A selected option of a panel choice: index of the choice, index of the option.
     pub chosen: Option<[usize; 2]>,
-    /// The panel's actions that were asked for since the last picture, one bit each.
+    /// The panel's actions requested since the last picture, one bit each.
     pub actions: u32,
-    /// What was done to the timeline.
+    /// The command to the timeline.
     pub playback: Option<Playback>,
     /// The view.
     pub camera: Camera,
-    /// Since the window opened, s.
+    /// Time since the window opened, s.
     pub seconds: f64,
 }
 
-/// Turn of the camera for a drag, rad per point.
+/// Camera rotation for a drag, rad per point.
 const ORBIT_RAD: f32 = 0.008;
 /// Tilt of the shaft for a drag, rad per point.
 const TILT_RAD: f32 = 0.006;
-/// Push for the wheel, mm per point scrolled.
+/// Push by the wheel, mm per point scrolled.
 const PUSH_MM: f32 = 0.02;
 /// Move for a key, mm.
 const KEY_MM: f32 = 0.5;
 
-/// The hand and the eye, as they are moved.
+/// The camera and the target tool pose, as the user moves them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ViewAndTool {
     pub world_from_tool: Pose,
     pub camera: Camera,
 }
 
-/// What the pointer did over the 3-D view since the last picture, in points.
+/// Pointer input over the 3-D view since the last picture, in points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pointer {
     pub left: Vec2,
     pub right: Vec2,
     pub wheel: f32,
     pub tilt: bool,
-    /// How many times larger things are to be seen: egui makes this of the wheel with Ctrl, and of
-    /// two fingers.
+    /// Zoom factor: egui computes it from the wheel with Ctrl and from two-finger gestures.
     pub zoom: f32,
 }
 
@@ -64,7 +63,7 @@ impl Default for Pointer {
 }
 
 impl ViewAndTool {
-    /// Moves hand and eye. `height` is that of the 3-D view in points.
+    /// Moves tool and camera. `height` is that of the 3-D view in points.
     pub fn follow(&mut self, pointer: &Pointer, view: &View, height: f32) {
         let tip = self.world_from_tool.translation;
         let depth = (tip - view.eye).dot(view.forward).max(1.0);
@@ -83,7 +82,7 @@ impl ViewAndTool {
         self.camera.orbit(-ORBIT_RAD * pointer.right.x, ORBIT_RAD * pointer.right.y);
     }
 
-    /// Brings the hand back to the end of its leash.
+    /// Limits the target pose to the leash.
     pub fn hold(&mut self, leash: Leash) {
         let hand = &mut self.world_from_tool.translation;
         if leash.tip.is_finite() {
@@ -105,7 +104,7 @@ impl ViewAndTool {
 }
 
 impl Pointer {
-    /// What happened over a widget.
+    /// Pointer input over a widget.
     pub fn over(ui: &egui::Ui, response: &egui::Response) -> Self {
         let drag = |button| if response.dragged_by(button) { response.drag_delta() } else { egui::Vec2::ZERO };
         let (left, right) = (drag(egui::PointerButton::Primary), drag(egui::PointerButton::Secondary));

@@ -1,10 +1,10 @@
-//! What keys and buttons do, in one table, and the page that shows it.
+//! The table of keys and buttons, and the help page.
 
 use super::Action;
 use super::palette::SKY;
 use eframe::egui::{self, Key, RichText};
 
-/// What the user asks of the window.
+/// A command of the user to the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Command {
     NextTool,
@@ -26,7 +26,7 @@ pub(crate) enum Command {
     Quit,
 }
 
-/// Key, command, words.
+/// Key, command, label.
 pub(crate) const KEYS: &[(Key, Command, &str)] = &[
     (Key::N, Command::NextTool, "Next tool"),
     (Key::U, Command::Undo, "Undo the last stroke"),
@@ -49,7 +49,7 @@ pub(crate) const KEYS: &[(Key, Command, &str)] = &[
     (Key::Escape, Command::Quit, "Close the page of keys, or quit"),
 ];
 
-/// What the mouse does, and the keys that are not in [`KEYS`].
+/// Mouse actions, and keys that are not in [`KEYS`].
 const REST: [(&str, &str); 8] = [
     ("left drag", "Moves the tool; with Shift tilts it"),
     ("wheel", "Pushes the tool in or pulls it out; with Ctrl zooms"),
@@ -66,7 +66,7 @@ pub(crate) fn pressed(input: &egui::InputState) -> impl Iterator<Item = Command>
     KEYS.iter().filter(|(key, ..)| input.key_pressed(*key)).map(|(_, command, _)| *command)
 }
 
-/// Words of a command with its key, for a button.
+/// Button label of a command with its key.
 pub(crate) fn label(command: Command) -> String {
     let found = KEYS.iter().find(|(_, c, _)| *c == command);
     found.map_or_else(String::new, |(key, _, words)| format!("{words} ({})", key.symbol_or_name()))
@@ -77,7 +77,7 @@ pub(crate) fn of_action(action: &Action) -> Option<Key> {
     action.key.and_then(|key| Key::from_name(key.to_uppercase().to_string().as_str()))
 }
 
-/// The page of keys, over the picture.
+/// The help page over the picture.
 pub(crate) fn help(context: &egui::Context, actions: &[Action]) {
     let centre = egui::Align2::CENTER_CENTER;
     let page = egui::Window::new("Keys and mouse").collapsible(false).resizable(false).anchor(centre, [0.0, 0.0]);

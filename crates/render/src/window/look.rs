@@ -1,4 +1,4 @@
-//! What of the scene the user wants to see, and from where.
+//! View settings: the visible parts of the scene and the camera.
 
 use super::keys::{Command, label};
 use crate::{Camera, Cut, Frame, Overlay, SliceLook, Stereo, StereoLook};
@@ -10,15 +10,14 @@ use glam::Vec3;
 pub(crate) struct Look {
     pub bone: bool,
     pub brain: bool,
-    /// Whether the session's colours on bone and brain are shown, and its force arrow, ghost tool
-    /// and markers.
+    /// Whether the session's paint, force arrow, ghost tool and markers are shown.
     pub hints: bool,
     pub section: Option<Section>,
     pub stereo: Option<StereoLook>,
     pub slices: SliceLook,
-    /// Whether the slices show the whole head instead of what is around the tool.
+    /// Whether the slices show the whole head instead of the tool's surroundings.
     pub whole: bool,
-    /// The camera that rests while the other one is used: the microscope's, or the orbiting one.
+    /// The inactive camera: the microscope's or the orbiting one.
     other: Option<Camera>,
     microscope: bool,
 }
@@ -26,18 +25,18 @@ pub(crate) struct Look {
 /// A section plane near the tool's tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Section {
-    /// Which of [`ACROSS`].
+    /// Index into [`ACROSS`].
     across: usize,
-    /// From the tip, mm.
+    /// Distance from the tip, mm.
     offset_mm: f32,
     /// Whether the skull is cut too.
     bone: bool,
 }
 
-/// What a section looks at, and the way to what it cuts away; `None` is the way to the eye.
+/// Section directions: label, and normal towards the removed side; `None` is towards the eye.
 const ACROSS: [(&str, Option<Vec3>); 4] =
     [("to the eye", None), ("axial", Some(Vec3::Z)), ("coronal", Some(Vec3::Y)), ("sagittal", Some(Vec3::NEG_X))];
-/// So many times as far as the eyes are apart is the target, for comfort.
+/// Ratio of the target's distance to the eye distance, for comfort.
 const EYES_AWAY: f32 = 30.0;
 
 impl Section {
@@ -60,8 +59,7 @@ impl Section {
 }
 
 impl Look {
-    /// Everything, seen by the orbiting camera; there is a microscope where there is a camera for
-    /// it.
+    /// Shows everything with the orbiting camera; the microscope needs a camera.
     pub fn with(microscope: Option<Camera>) -> Self {
         Self {
             bone: true,
@@ -76,7 +74,7 @@ impl Look {
         }
     }
 
-    /// Leaves out of a session's frame what is not wanted.
+    /// Removes hidden parts from a session's frame.
     pub fn on<'a>(&self, frame: Frame<'a>) -> Frame<'a> {
         let half_height_mm = frame.slices.half_height_mm.filter(|_| !self.whole);
         let shown = frame.slices.shown && self.slices.shown;
@@ -94,7 +92,7 @@ impl Look {
         }
     }
 
-    /// Does what a command asks of the view.
+    /// Applies a command to the view.
     pub fn react(&mut self, command: Command, camera: &mut Camera) {
         match command {
             Command::Bone => self.bone ^= true,
@@ -114,7 +112,7 @@ impl Look {
         }
     }
 
-    /// Puts the other eye to the scene.
+    /// Switches to the other camera.
     fn change_camera(&mut self, camera: &mut Camera) {
         if let Some(other) = &mut self.other {
             std::mem::swap(other, camera);
@@ -122,7 +120,7 @@ impl Look {
         }
     }
 
-    /// The camera that a reset goes back to.
+    /// The camera that a reset restores.
     pub fn home(&self, orbit: Camera, microscope: Option<Camera>) -> Camera {
         microscope.filter(|_| self.microscope).unwrap_or(orbit)
     }
@@ -211,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn each_eye_stays_where_it_was_left() {
+    fn each_camera_keeps_its_position() {
         let orbit = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0);
         let scope = Camera { fov_rad: 0.2, ..Camera::viewed_from(Vec3::ONE, Vec3::Z, 300.0) };
         let (mut camera, mut look) = (orbit, Look::with(Some(scope)));

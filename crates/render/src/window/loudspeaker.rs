@@ -1,9 +1,8 @@
-//! The loudspeaker: takes samples on a thread of the sound system's own and never waits for the
-//! window.
+//! Audio output on the sound system's thread; it never waits for the window.
 //!
 //! # Practice
-//! What is to be heard travels through one atomic word. A machine without a sound system stays
-//! silent and says why in the panel; nothing else depends on it.
+//! The current sound is passed through one atomic word. A machine without a sound system stays
+//! silent and reports why in the panel; nothing else depends on it.
 //!
 //! # When not to use it
 //! Without ALSA's headers on Linux: leave the feature `sound` off.
@@ -18,7 +17,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// An open sound device.
 pub(crate) struct Loudspeaker {
     wanted: Arc<AtomicU64>,
-    /// Sounds as long as it lives.
+    /// Plays until dropped.
     _stream: Stream,
 }
 
@@ -40,23 +39,23 @@ impl Loudspeaker {
         Ok(Self { wanted, _stream: stream })
     }
 
-    /// Lets this be heard from now on.
+    /// Sets the current sound.
     pub fn sound(&self, sound: Sound) {
         self.wanted.store(packed(sound), Ordering::Relaxed);
     }
 }
 
-/// A loudspeaker that is opened with the first sound, if there is one.
+/// Audio output, opened at the first sound.
 #[derive(Default)]
-pub(crate) struct Ears {
-    /// Whether nothing shall be heard.
+pub(crate) struct AudioOutput {
+    /// Whether sound is muted.
     pub muted: bool,
     loudspeaker: Option<Result<Loudspeaker, String>>,
 }
 
-impl Ears {
-    /// Lets this be heard from now on; says why not, if not.
-    pub fn hear(&mut self, sound: Sound) -> Option<String> {
+impl AudioOutput {
+    /// Sets the current sound; returns an error message, if any.
+    pub fn play(&mut self, sound: Sound) -> Option<String> {
         let sound = if self.muted { Sound::default() } else { sound };
         if self.loudspeaker.is_none() && sound == Sound::default() {
             return None;
@@ -82,11 +81,11 @@ fn stream<T: SizedSample + FromSample<f32>>(
             frame.fill(T::from_sample(synthesis.sample(sound, rate_hz)));
         }
     };
-    // A device that is unplugged falls silent.
+    // An unplugged device falls silent.
     device.build_output_stream(config, fill, |_| (), None)
 }
 
-/// Spindle and load in thousandths, and the alarm, in one word.
+/// Packs spindle and load in thousandths, and the alarm, in one word.
 fn packed(Sound { spindle, load, alarm }: Sound) -> u64 {
     let part = |value: f32| (1e3 * value.clamp(0.0, 1.0)) as u64;
     part(spindle) | part(load) << 16 | u64::from(alarm) << 32

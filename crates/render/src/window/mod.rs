@@ -1,4 +1,4 @@
-//! A window on the scene: the headless renderer's own picture, a side panel, mouse and keys.
+//! A window on the scene: the renderer's picture, a side panel, mouse and keys.
 //!
 //! # Practice
 //! | input | does |
@@ -18,13 +18,13 @@
 //! | Space, \[ and \] | in a replay: run or stand still, to the event before and after |
 //! | Q or Escape | closes |
 //!
-//! The picture stays on the device: egui shows the very texture that the renderer draws into. Where
-//! it cannot (the device is one of GL, cannot show on this display, or the processor draws) the
-//! window opens a device of its own and every picture is copied to it. The picture gets coarser
-//! when pictures take longer than a tenth of a second, and finer again when there is time.
+//! The picture stays on the device: egui shows the renderer's own texture. Where that is impossible
+//! (a GL device, a device that cannot present on this display, or rendering on the processor) the
+//! window opens a second device and every picture is copied to it. Resolution is lowered when
+//! pictures take longer than a tenth of a second, and raised again when there is time.
 //!
 //! # When not to use it
-//! Without a display: [`run`] says so and hands everything back, so that the session can go on
+//! Without a display: [`run`] returns an error and all arguments, so that the session can continue
 //! headless.
 
 mod app;
@@ -58,33 +58,32 @@ use std::rc::Rc;
 use trepan_geometry::Pose;
 use trepan_gpu::Gpu;
 
-/// What the window shows and drives. Called on the window's thread, once a picture; must not wait.
+/// The session behind the window. Called on the window's thread, once per picture; must not wait.
 pub trait Session {
-    /// Takes what the user did and says what the panel shows.
+    /// Processes the user's input and returns the panel.
     fn update(&mut self, input: &WindowInput) -> Panel;
 
-    /// What the picture shows, seen by `camera`.
+    /// The frame to draw, seen by `camera`.
     fn frame(&self, camera: Camera) -> Frame<'_>;
 
-    /// Takes a picture of the whole window that the user asked for.
+    /// Receives a screenshot of the whole window.
     fn capture(&mut self, what: Capture, picture: Image);
 }
 
-/// How the window starts.
+/// Initial state of the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Start {
-    /// The view, to which a reset goes back.
+    /// The initial view, restored by a reset.
     pub camera: Camera,
     /// The microscope's view, if there is one.
     pub microscope: Option<Camera>,
-    /// Where the tool is.
+    /// The tool's initial pose.
     pub world_from_tool: Pose,
     /// Width and height of the window, points.
     pub size: [f32; 2],
-    /// Pictures a second at most.
+    /// Largest frame rate, Hz.
     pub rate_hz: f32,
-    /// Share of the 3-D view's pixels along an edge in the first pictures; then it follows the time
-    /// that they take.
+    /// Initial fraction of the 3-D view's pixels along an edge; later it adapts to the frame time.
     pub detail: f32,
 }
 
@@ -95,10 +94,10 @@ impl Start {
     }
 }
 
-/// Why there is or was no window.
+/// Why the window could not be opened or failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WindowError {
-    /// Nothing to show a window on.
+    /// There is no display.
     #[error("there is no display to open a window on ({0}); run headless, or set DISPLAY or WAYLAND_DISPLAY")]
     NoDisplay(String),
     /// The windowing system failed while opening or showing.
@@ -106,18 +105,18 @@ pub enum WindowError {
     Failed(String),
 }
 
-/// Everything that was given to [`run`], back again.
+/// Everything passed to [`run`], returned.
 #[derive(Debug)]
 pub struct Closed<S, D = Renderer> {
     /// The session.
     pub session: S,
-    /// Who has drawn.
+    /// The renderer.
     pub renderer: D,
-    /// Whether the window was shown and closed as it should.
+    /// Whether the window was shown and closed normally.
     pub result: Result<(), WindowError>,
 }
 
-/// What the window works on while it is open.
+/// The state that the window uses while it is open.
 pub(crate) struct Shared<S, D> {
     pub session: S,
     pub renderer: D,
@@ -126,7 +125,7 @@ pub(crate) struct Shared<S, D> {
     pub fault: Option<String>,
 }
 
-/// Lent to the window, taken back when it is closed.
+/// Lent to the window and taken back when it is closed.
 pub(crate) type Lent<S, D> = Rc<RefCell<Option<Shared<S, D>>>>;
 
 /// Shows the window until it is closed. Must be called on the main thread.
@@ -145,7 +144,7 @@ where
     Closed { session, renderer, result: fault.map_or(result, |why| Err(WindowError::Failed(why))) }
 }
 
-/// Opens the window on the device that draws; where that shows nothing, on a device of its own.
+/// Opens the window on the rendering device, or on a separate device if that cannot present.
 fn open_somehow<S, D>(title: &str, gpu: Option<&Gpu>, lent: &Lent<S, D>, start: Start) -> Result<(), WindowError>
 where
     S: Session + 'static,
@@ -161,7 +160,7 @@ where
     }
 }
 
-/// Opens the window and stays until it is closed.
+/// Opens the window and runs it until it is closed.
 fn open<S, D>(title: &str, gpu: Option<&Gpu>, lent: &Lent<S, D>, start: Start) -> Result<(), WindowError>
 where
     S: Session + 'static,
@@ -175,8 +174,7 @@ where
         });
         eframe::run_native(title, options(gpu, &start), create)
     };
-    // A missing system library makes the windowing crate panic; that must not take the session
-    // along.
+    // A missing system library makes the windowing crate panic; the session must survive that.
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(show)) {
         Ok(Ok(())) => Ok(()),
         Ok(Err(eframe::Error::WinitEventLoop(e))) => Err(WindowError::NoDisplay(e.to_string())),
@@ -185,7 +183,7 @@ where
     }
 }
 
-/// Whether a display is announced at all.
+/// Checks whether a display is configured.
 pub fn display() -> Result<(), WindowError> {
     let named = |name: &str| std::env::var_os(name).is_some_and(|v| !v.is_empty());
     let needed = cfg!(all(unix, not(target_os = "macos")));

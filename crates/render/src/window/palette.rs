@@ -1,5 +1,4 @@
-//! Colours that are told apart by eyes with any colour vision, and bright or dark enough to be
-//! read.
+//! Colours that are legible and distinguishable with any colour vision.
 //!
 //! # Sources
 //! Okabe and Ito 2008, "Color universal design". Contrast: WCAG 2.1, at least 4.5 for text.
@@ -10,9 +9,9 @@ pub(crate) const SKY: Color32 = Color32::from_rgb(86, 180, 233);
 pub(crate) const ORANGE: Color32 = Color32::from_rgb(230, 159, 0);
 pub(crate) const GREEN: Color32 = Color32::from_rgb(0, 158, 115);
 pub(crate) const VERMILION: Color32 = Color32::from_rgb(213, 94, 0);
-/// Behind the plots.
+/// Background of the plots.
 pub(crate) const NIGHT: Color32 = Color32::from_gray(16);
-/// Text that is less important than white text.
+/// Secondary text.
 pub(crate) const PALE: Color32 = Color32::from_gray(205);
 
 #[cfg(test)]
@@ -31,7 +30,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_can_be_read() {
+    fn text_colours_have_enough_contrast() {
         assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 0.01);
         for on_dark in [SKY, ORANGE, GREEN, VERMILION, PALE] {
             assert!(contrast(on_dark, NIGHT) > 4.5, "{on_dark:?}");

@@ -8,19 +8,19 @@ use super::{Choice, Panel};
 use crate::Camera;
 use eframe::egui::{self, Color32, RichText};
 
-/// What was clicked.
+/// The clicks in the panel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Clicks {
     /// Whether the pedal is held down.
     pub pedal: bool,
     pub commands: Vec<Command>,
-    /// Which option of which choice.
+    /// Index of the choice and of its selected option.
     pub chosen: Option<[usize; 2]>,
-    /// The session's own actions, one bit each.
+    /// The session's actions, one bit each.
     pub actions: u32,
 }
 
-/// The seconds in the plots.
+/// Time span of the plots, s.
 pub(crate) const SECONDS_SHOWN: f64 = 8.0;
 
 /// Force and rate over the last seconds.
@@ -35,8 +35,7 @@ impl Default for Traces {
     }
 }
 
-/// Shows the panel and says what was clicked. `filming`: whether the pictures of the window are
-/// kept.
+/// Shows the panel; returns the clicks. `filming` is whether screenshots are being recorded.
 pub(crate) fn show(
     ui: &mut egui::Ui,
     panel: &Panel,
@@ -110,7 +109,7 @@ fn buttons(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
         if panel.drilling {
             pedal = wide(RichText::new(name).strong().color(Color32::BLACK), 32.0).fill(ORANGE);
         }
-        // What can only be clicked counts as let go after 0.8 s.
+        // A widget that only senses clicks counts as released after 0.8 s.
         clicks.pedal = ui.add(pedal.sense(egui::Sense::drag())).is_pointer_button_down_on();
         let next = format!("{}: {}", label(Command::NextTool), panel.tool);
         for (command, name) in [(Command::NextTool, next), (Command::Undo, label(Command::Undo))] {
@@ -132,7 +131,7 @@ fn buttons(ui: &mut egui::Ui, panel: &Panel, clicks: &mut Clicks) {
     }
 }
 
-/// The options of a choice; the one that was clicked.
+/// The options of a choice; returns the one clicked.
 fn options(ui: &mut egui::Ui, choice: &Choice) -> Option<usize> {
     let mut clicked = None;
     ui.horizontal_wrapped(|ui| {

@@ -1,129 +1,129 @@
-//! What a session says to its window: all of it plain data.
+//! The data that a session sends to its window.
 
 use std::sync::Arc;
 use trepan_geometry::Vec3;
 
-/// What the window shows beside the picture.
+/// Contents of the panel beside the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Panel {
-    /// The case, by a name that may be read by anybody.
+    /// The case, by a name that is safe to show.
     pub case: String,
     /// The phase of the operation.
     pub phase: String,
-    /// What to do next.
+    /// The next step.
     pub hint: String,
-    /// The tool in hand.
+    /// The current tool.
     pub tool: String,
-    /// Whether mouse and keys hold the tool: then there are a pedal, a next tool and an undo.
+    /// Whether mouse and keys move the tool; then pedal, next tool and undo are shown.
     pub by_hand: bool,
     /// Whether the drill runs.
     pub drilling: bool,
-    /// What the drill and the alarm sound like now.
+    /// The current sounds of drill and alarm.
     pub sound: Sound,
     /// Largest force since the last picture, N.
     pub force_n: f32,
     /// Where the force guard clamps, N; marked in the plot.
     pub force_limit_n: f32,
-    /// Haptic ticks a second, Hz; no plot where this is 0.
+    /// Haptic rate, Hz; no plot where this is 0.
     pub rate_hz: f32,
-    /// What it should be, Hz; marked in the plot.
+    /// Target rate, Hz; marked in the plot.
     pub wanted_rate_hz: f32,
-    /// What can be chosen: tools, sizes.
+    /// Available choices: tools, sizes.
     pub choices: Vec<Choice>,
-    /// What else can be asked for.
+    /// Further actions.
     pub actions: Vec<Action>,
     /// Named values, in order.
     pub values: Vec<(String, String)>,
-    /// What must not be missed; shown in a vermilion banner as long as it is here.
+    /// Active warnings, shown in a vermilion banner.
     pub warnings: Vec<String>,
-    /// What is to be known, such as a pause; shown in a blue banner.
+    /// Information such as a pause, shown in a blue banner.
     pub news: Vec<String>,
-    /// Where in time the session is, if it can go back and forth.
+    /// Position in time, for a session that can be replayed.
     pub timeline: Option<Timeline>,
-    /// What keeps the hand near the tool; `None` lets it go anywhere.
+    /// Limit of the distance from hand to tool; `None` for no limit.
     pub leash: Option<Leash>,
-    /// Whether the window shall close.
+    /// Whether the window should close.
     pub finished: bool,
 }
 
-/// One of several that is chosen.
+/// A choice between options.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choice {
-    /// What is chosen: `Tool`, `Burr`.
+    /// Name of the choice: `Tool`, `Burr`.
     pub name: String,
-    /// The options, and whether each can be had now.
+    /// The options, and whether each is available.
     pub options: Vec<(String, bool)>,
-    /// Which one it is.
+    /// Index of the selected option.
     pub chosen: usize,
 }
 
-/// A button of the session's own.
+/// A session-specific button.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Action {
-    /// What it does.
+    /// Its label.
     pub name: String,
-    /// A letter that does the same; none that the window has taken: see [`crate::window`].
+    /// A letter key for it that the window does not use: see [`crate::window`].
     pub key: Option<char>,
-    /// Whether it is on, where it is a switch.
+    /// Whether it is on, for a switch.
     pub on: bool,
 }
 
-/// Where in time a session is that can go back and forth.
+/// The position in time of a replayable session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Timeline {
     /// The time shown, s.
     pub at_s: f64,
     /// The whole length, s.
     pub length_s: f64,
-    /// How far it can be shown by now, s.
+    /// Time up to which it can be shown, s.
     pub ready_s: f64,
-    /// Whether time goes on by itself.
+    /// Whether time advances.
     pub running: bool,
-    /// How fast, 1 as it was.
+    /// Speed; 1 is real time.
     pub speed: f32,
-    /// What happened when, in order.
+    /// Events in chronological order.
     pub marks: Arc<[Mark]>,
 }
 
-/// Something that happened.
+/// An event.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mark {
-    /// When, s.
+    /// Time of the event, s.
     pub at_s: f64,
-    /// What.
+    /// Description.
     pub text: String,
     /// Whether it was a warning.
     pub warning: bool,
 }
 
-/// What the user does to a [`Timeline`].
+/// A command to a [`Timeline`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Playback {
-    /// Lets time go on, or stand still.
+    /// Runs or pauses.
     Run(bool),
-    /// Goes at another speed, 1 as it was.
+    /// Sets the speed; 1 is real time.
     Speed(f32),
-    /// Goes to a time, s.
+    /// Jumps to a time, s.
     Seek(f64),
 }
 
-/// What is to be heard.
+/// The current sounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sound {
-    /// Speed of the spindle, 1 at its free speed, 0 at rest.
+    /// Spindle speed, 1 at its free speed, 0 at rest.
     pub spindle: f32,
     /// Force on the tool, 1 at the device's limit.
     pub load: f32,
-    /// Whether the alarm sounds.
+    /// Whether the alarm is on.
     pub alarm: bool,
 }
 
-/// A hand without force feedback would not notice a wall: it is kept this close to where the tool
-/// is.
+/// Limits the distance from the hand to the tool, since a hand without force feedback does not feel
+/// walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leash {
-    /// Where contact lets the tool's tip be, world mm.
+    /// Tip position that contact allows, world mm.
     pub tip: Vec3,
-    /// Longest way from there to the hand, mm.
+    /// Largest distance from there to the hand, mm.
     pub length_mm: f32,
 }

@@ -1,11 +1,11 @@
-//! The last seconds of a value as a line.
+//! Plots the last seconds of a value.
 
 use super::palette::{NIGHT, VERMILION};
 use eframe::egui::{self, Color32};
 use egui_plot::{HLine, Line, Plot, PlotPoint, PlotPoints};
 use std::collections::VecDeque;
 
-/// Samples kept at most; at 30 pictures a second more than the seconds shown.
+/// Most samples kept: more than the seconds shown at 30 pictures a second.
 const MOST_SAMPLES: usize = 1024;
 
 /// A value over the last seconds.
@@ -15,14 +15,14 @@ pub(crate) struct Trace {
     samples: VecDeque<PlotPoint>,
 }
 
-/// How a trace is drawn.
+/// Style of a trace.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drawn<'a> {
     /// Name of the plot.
     pub name: &'a str,
     /// Height, points.
     pub height: f32,
-    /// A value that is marked and always in sight.
+    /// A marked value that is always in range.
     pub mark: f64,
     /// Of the line.
     pub colour: Color32,
@@ -33,7 +33,7 @@ impl Trace {
         Self { seconds_shown, samples: VecDeque::with_capacity(MOST_SAMPLES) }
     }
 
-    /// Adds a value at a time, s. A time before the last one, or far after it, begins anew.
+    /// Adds a value at a time, s. A time before the last one, or far after it, clears the trace.
     pub fn push(&mut self, seconds: f64, value: f64) {
         if self.samples.back().is_some_and(|last| seconds < last.x) {
             self.samples.clear();
@@ -46,7 +46,7 @@ impl Trace {
         self.samples.push_back(PlotPoint::new(seconds, value));
     }
 
-    /// Largest value in sight.
+    /// Largest visible value.
     pub fn most(&self) -> f64 {
         self.samples.iter().map(|s| s.y).fold(0.0, f64::max)
     }

@@ -1,22 +1,22 @@
-//! Picture quality that follows the time a picture takes: coarser when the hand waits for the eye,
-//! finer when there is time.
+//! Adapts the picture's resolution to the frame time: coarser when it is too long, finer when there
+//! is time.
 
-/// Shares of the 3-D view's pixels along an edge.
+/// Selectable fractions of the 3-D view's pixels along an edge.
 const DETAILS: [f32; 5] = [1.0, 0.75, 0.55, 0.4, 0.3];
 
-/// A picture slower than this is too slow, s.
+/// Frame time above which the picture is too slow, s.
 const SLOW_S: f64 = 0.110;
 
-/// A picture faster than this leaves room for a finer one (which costs about twice as much), s.
+/// Frame time below which a finer picture is possible (at about twice the cost), s.
 const FAST_S: f64 = 0.045;
 
-/// Pictures in a row that must be too slow before the picture gets coarser.
+/// Consecutive slow pictures before the picture gets coarser.
 const PATIENCE_SLOW: u32 = 3;
 
-/// Pictures in a row that must be fast before the picture gets finer.
+/// Consecutive fast pictures before the picture gets finer.
 const PATIENCE_FAST: u32 = 25;
 
-/// How fine the picture is.
+/// The current resolution level.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Quality {
     step: usize,
@@ -25,14 +25,14 @@ pub(crate) struct Quality {
 }
 
 impl Quality {
-    /// Starts at the coarser of a detail and the finest on a graphics card, the middle on a
-    /// software driver.
+    /// Starts at the coarser of `detail` and the default: the finest level on a graphics card, the
+    /// middle on a software driver.
     pub fn new(software: bool, detail: f32) -> Self {
         let wanted = DETAILS.iter().position(|&d| d <= detail).unwrap_or(DETAILS.len() - 1);
         Self { step: wanted.max(if software { 2 } else { 0 }), ..Self::default() }
     }
 
-    /// Takes note of the time from picture to picture.
+    /// Processes the time between two pictures.
     pub fn note(&mut self, seconds: f64) {
         self.slow = if seconds > SLOW_S { self.slow + 1 } else { 0 };
         self.fast = if seconds < FAST_S { self.fast + 1 } else { 0 };
@@ -44,7 +44,7 @@ impl Quality {
         *self = Self { step, ..Self::default() };
     }
 
-    /// Share of the 3-D view's pixels along an edge.
+    /// Fraction of the 3-D view's pixels along an edge.
     pub fn detail(&self) -> f32 {
         DETAILS[self.step]
     }
@@ -54,8 +54,8 @@ impl Quality {
 mod tests {
     use super::*;
 
-    /// Detail after some pictures whose time is `full` seconds at the finest and falls with the
-    /// number of pixels.
+    /// Detail after some pictures, with a frame time of `full` seconds at the finest and
+    /// proportional to the pixels.
     fn settled(full: f64, pictures: u32) -> f32 {
         let mut quality = Quality::new(false, 1.0);
         for _ in 0..pictures {
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn quality_settles_where_the_time_fits() {
+    fn quality_converges_to_the_frame_time() {
         assert_eq!(settled(0.02, 500), 1.0);
         assert_eq!(settled(0.15, 500), 0.75);
         assert_eq!(settled(0.5, 500), 0.4);
@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn it_starts_where_it_is_told() {
+    fn it_starts_at_the_given_detail() {
         let starts = [(false, 1.0), (true, 1.0), (false, 0.5), (true, 0.35), (false, 0.1)]
             .map(|(s, d)| Quality::new(s, d).detail());
         assert_eq!(starts, [1.0, 0.55, 0.4, 0.3, 0.3]);

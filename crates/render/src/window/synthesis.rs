@@ -1,48 +1,49 @@
-//! What the drill and the alarm sound like, sample by sample.
+//! Synthesises the sounds of drill and alarm, sample by sample.
 //!
 //! # Theory
-//! A drill hums at its spindle's speed with overtones; load slows the spindle, so the pitch falls,
-//! and pushes the wave into saturation:
+//! A drill hums at its spindle speed with overtones. Load slows the spindle, which lowers the
+//! pitch, and drives the wave into saturation:
 //!
 //! ```text
-//! hum(φ) = tanh(g (sin φ + sin(2φ)/2 + sin(3φ)/3))     φ̇ = 2π · 420 Hz · spindle      g = 0.6 + 2.4 load
+//! hum(φ) = tanh(g (sin φ + sin(2φ)/2 + sin(3φ)/3))
+//!          φ̇ = 2π · 420 Hz · spindle      g = 0.6 + 2.4 load
 //! alarm  = two tones in turn, 880 and 1320 Hz, a quarter second each
 //! ```
 //!
 //! # Practice
-//! Both together stay within ±1. Pitch and loudness follow within some 10 ms, so that nothing
-//! clicks; with the spindle at rest and no alarm there is silence. Nothing is allocated: the
-//! loudspeaker's own thread runs it.
+//! The sum stays within ±1. Pitch and loudness follow within some 10 ms, so that there are no
+//! clicks; with the spindle at rest and no alarm there is silence. Nothing is allocated, since the
+//! audio thread runs it.
 
 use super::Sound;
 use std::f32::consts::TAU;
 
-/// Pitch of a spindle at its free speed, Hz.
+/// Pitch at the spindle's free speed, Hz.
 const HUM_HZ: f32 = 420.0;
 /// The alarm's two tones, Hz.
 const ALARM_HZ: [f32; 2] = [880.0, 1320.0];
 /// Length of each tone, s.
 const TONE_S: f32 = 0.25;
-/// In this time pitch and loudness come nearer by 63 %, s.
+/// Time constant of pitch and loudness, s.
 const FOLLOW_S: f32 = 0.01;
 /// Loudness of the drill.
 const HUM: f32 = 0.45;
 /// Loudness of the alarm.
 const ALARM: f32 = 0.5;
 
-/// What sounds now.
+/// State of the synthesis.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Synthesis {
-    /// Turns of the hum and of the alarm's tone, and time in the alarm, s.
+    /// Phases of the hum and of the alarm's tone, and time in the alarm, s.
     hum: f32,
     tone: f32,
     alarm_s: f32,
-    /// Spindle, load, loudness of the alarm, as they are heard.
+    /// Smoothed spindle speed, load and alarm loudness.
     heard: [f32; 3],
 }
 
 impl Synthesis {
-    /// The next sample, from -1 to 1, on the way to what is wanted.
+    /// The next sample, from -1 to 1, moving towards the target sound.
     pub fn sample(&mut self, wanted: Sound, rate_hz: f32) -> f32 {
         let dt_s = 1.0 / rate_hz.max(1.0);
         let sound = |value: f32| if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 };
@@ -58,8 +59,7 @@ impl Synthesis {
         self.tone = (self.tone + dt_s * tone_hz).fract();
         let wave = |turn: f32| (TAU * turn).sin();
         let hum = wave(self.hum) + wave(2.0 * self.hum) / 2.0 + wave(3.0 * self.hum) / 3.0;
-        // A spindle under a tenth of its speed is not heard, so that no crackle is left of a slow
-        // one.
+        // A spindle fades out under a tenth of its speed, to avoid crackle.
         let loud = HUM * (10.0 * spindle).min(1.0);
         loud * ((0.6 + 2.4 * load) * hum).tanh() + ALARM * alarm * wave(self.tone)
     }
@@ -76,8 +76,8 @@ mod tests {
         (0..(RATE_HZ * seconds) as usize).map(|_| synthesis.sample(wanted, RATE_HZ)).collect()
     }
 
-    /// The strongest frequency between 100 and 2000 Hz of the last half second, by the sums of a
-    /// discrete Fourier transform.
+    /// The strongest frequency between 100 and 2000 Hz of the last half second, by a discrete
+    /// Fourier transform.
     fn pitch_hz(samples: &[f32]) -> f32 {
         let last = &samples[samples.len() - (RATE_HZ / 2.0) as usize..];
         let power = |hz: f32| {
@@ -110,7 +110,7 @@ mod tests {
     fn the_alarm_has_two_tones_and_ends() {
         let alarm = Sound { alarm: true, ..Sound::default() };
         let heard = samples(alarm, 1.2);
-        // The last half second holds both tones; of each, half.
+        // The last half second contains half of each tone.
         assert!([880.0, 1320.0].iter().any(|hz| (pitch_hz(&heard) - hz).abs() < 10.0));
         let mut synthesis = Synthesis::default();
         (0..9600).for_each(|_| _ = synthesis.sample(alarm, RATE_HZ));

@@ -1,5 +1,5 @@
-//! The window as a user meets it: found by its words, worked by mouse and keys, its pictures drawn
-//! by the processor.
+//! Tests of the window through its accessible names, mouse and keys, with pictures drawn by the
+//! processor.
 
 use super::app::Window;
 use super::*;
@@ -12,18 +12,18 @@ use std::sync::Arc;
 use trepan_gpu::{GpuError, Texture};
 use trepan_volume::{BoneVolume, VoxelVolume};
 
-/// Says what it is told to and keeps what it hears.
+/// A session that returns a given panel and stores its inputs.
 #[derive(Default)]
-struct Desk {
-    says: Panel,
-    heard: Vec<WindowInput>,
+struct TestSession {
+    panel: Panel,
+    inputs: Vec<WindowInput>,
     captures: Vec<(Capture, [u32; 2])>,
 }
 
-impl Session for Desk {
+impl Session for TestSession {
     fn update(&mut self, input: &WindowInput) -> Panel {
-        self.heard.push(*input);
-        self.says.clone()
+        self.inputs.push(*input);
+        self.panel.clone()
     }
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
@@ -35,18 +35,18 @@ impl Session for Desk {
     }
 }
 
-/// What a picture was asked to show.
-struct Asked {
+/// The parameters of a requested picture.
+struct Requested {
     bone: bool,
     brain: bool,
     slices: SliceLook,
     camera: Camera,
 }
 
-/// Draws by the processor, and keeps what it was asked for.
-struct Easel(Painter, Option<Asked>);
+/// Draws by the processor and stores the requested parameters.
+struct TestPainter(Painter, Option<Requested>);
 
-impl Draws for Easel {
+impl Draws for TestPainter {
     fn device(&self) -> Option<&Gpu> {
         None
     }
@@ -61,31 +61,31 @@ impl Draws for Easel {
 
     fn picture(&mut self, frame: &Frame, _size: [u32; 2], detail: f32) -> Result<(View, Image), RenderError> {
         let &Frame { show_bone: bone, show_brain: brain, slices, camera, .. } = frame;
-        self.1 = Some(Asked { bone, brain, slices, camera });
+        self.1 = Some(Requested { bone, brain, slices, camera });
         Draws::picture(&mut self.0, frame, [160, 120], detail)
     }
 }
 
 struct Bench {
-    window: Harness<'static, Window<Desk, Easel>>,
-    lent: Lent<Desk, Easel>,
+    window: Harness<'static, Window<TestSession, TestPainter>>,
+    lent: Lent<TestSession, TestPainter>,
 }
 
 impl Bench {
-    fn with(says: Panel) -> Self {
+    fn with(panel: Panel) -> Self {
         let bone = VoxelVolume::isotropic([12; 3], Vec3::splat(-5.5), 1.0, 900i16);
         let bone = Some(Arc::new(BoneVolume::new(&bone, 400).unwrap()));
         let data = SceneData { bone, brain: None, mri: None, tint: None };
-        let easel = Easel(Painter::on(Err(GpuError::NoAdapter), &data, [160, 120]).unwrap(), None);
-        let session = Desk { says, ..Desk::default() };
-        let shared = Shared { session, renderer: easel, shown: false, fault: None };
-        let lent: Lent<Desk, Easel> = Rc::new(RefCell::new(Some(shared)));
+        let painter = TestPainter(Painter::on(Err(GpuError::NoAdapter), &data, [160, 120]).unwrap(), None);
+        let session = TestSession { panel, ..TestSession::default() };
+        let shared = Shared { session, renderer: painter, shown: false, fault: None };
+        let lent: Lent<TestSession, TestPainter> = Rc::new(RefCell::new(Some(shared)));
         let camera = Camera::viewed_from(Vec3::ZERO, Vec3::Y, 60.0);
         let microscope = Some(Camera { fov_rad: 0.2, ..Camera::viewed_from(Vec3::ZERO, Vec3::Z, 300.0) });
         let start = Start { microscope, ..Start::with(camera, Pose::from_translation(Vec3::new(0.0, 8.0, 0.0))) };
         let window = Window::new(lent.clone(), start, true);
         let harness = Harness::builder().with_size(egui::vec2(1280.0, 900.0));
-        let show = |ui: &mut egui::Ui, window: &mut Window<Desk, Easel>| window.show(ui, None);
+        let show = |ui: &mut egui::Ui, window: &mut Window<TestSession, TestPainter>| window.show(ui, None);
         let mut bench = Self { window: harness.build_ui_state(show, window), lent };
         bench.window.run_steps(3);
         bench
@@ -95,42 +95,42 @@ impl Bench {
         Self::with(Panel { by_hand: true, ..Panel::default() })
     }
 
-    /// Presses a key and says what the session heard then.
+    /// Presses a key; returns the session's next input.
     fn press(&mut self, key: Key) -> WindowInput {
         self.window.key_down(key);
         self.window.step();
-        let heard = self.heard();
+        let input = self.last_input();
         self.window.key_up(key);
         self.window.step();
-        heard
+        input
     }
 
-    /// Clicks what is called so and says what the session heard in the picture after.
+    /// Clicks the widget of this name; returns the session's next input.
     fn click(&mut self, name: &str) -> WindowInput {
         self.window.get_by_label(name).click();
         self.window.step();
         self.window.step();
-        self.heard()
+        self.last_input()
     }
 
     fn slider<'a>(&'a self, name: &'a str) -> egui_kittest::Node<'a> {
         self.window.get_by_role_and_label(egui::accesskit::Role::Slider, name)
     }
 
-    fn heard(&self) -> WindowInput {
-        *self.lent.borrow().as_ref().unwrap().session.heard.last().unwrap()
+    fn last_input(&self) -> WindowInput {
+        *self.lent.borrow().as_ref().unwrap().session.inputs.last().unwrap()
     }
 
-    fn asked(&self) -> Asked {
+    fn last_request(&self) -> Requested {
         self.lent.borrow_mut().as_mut().unwrap().renderer.1.take().unwrap()
     }
 
-    fn says(&mut self, change: impl FnOnce(&mut Panel)) {
-        change(&mut self.lent.borrow_mut().as_mut().unwrap().session.says);
+    fn set_panel(&mut self, change: impl FnOnce(&mut Panel)) {
+        change(&mut self.lent.borrow_mut().as_mut().unwrap().session.panel);
         self.window.run_steps(2);
     }
 
-    fn sees(&self, words: &str) -> bool {
+    fn shows(&self, words: &str) -> bool {
         self.window.query_all_by_label_contains(words).next().is_some()
     }
 
@@ -144,7 +144,7 @@ impl Bench {
 }
 
 #[test]
-fn the_panel_says_what_the_session_says() {
+fn the_panel_shows_the_sessions_data() {
     let values = vec![("late / held ticks".into(), "3 / 4".into())];
     let panel = Panel {
         case: "composite".into(),
@@ -160,8 +160,8 @@ fn the_panel_says_what_the_session_says() {
     let bench = Bench::with(panel);
     let words =
         ["case composite", "Craniotomy", "drag the burr", "Force  1.25 N", "limit 3.3 N", "Rate  999 Hz", "3 / 4"];
-    assert!(words.iter().all(|words| bench.sees(words)));
-    assert!(!bench.sees("Hold to drill") && !bench.sees("Next tool"), "nobody's hand is on it");
+    assert!(words.iter().all(|words| bench.shows(words)));
+    assert!(!bench.shows("Hold to drill") && !bench.shows("Next tool"), "nobody's hand is on it");
 }
 
 #[test]
@@ -173,25 +173,25 @@ fn a_warning_is_a_wide_vermilion_banner_and_goes_when_it_is_over() {
         })
     };
     let mut bench = Bench::with(Panel::default());
-    assert!(!bench.sees("WARNING") && !wide(&bench));
-    bench.says(|panel| panel.warnings = vec!["The dura is 1 mm away".into(), "Force is clamped".into()]);
-    assert!(bench.sees("WARNING   The dura is 1 mm away") && bench.sees("Force is clamped") && wide(&bench));
+    assert!(!bench.shows("WARNING") && !wide(&bench));
+    bench.set_panel(|panel| panel.warnings = vec!["The dura is 1 mm away".into(), "Force is clamped".into()]);
+    assert!(bench.shows("WARNING   The dura is 1 mm away") && bench.shows("Force is clamped") && wide(&bench));
     let letters = bench.window.get_by_label_contains("The dura is 1 mm away").rect();
     assert!(letters.height() > 20.0 && letters.top() < 40.0, "{letters}");
-    bench.says(|panel| (panel.warnings, panel.news) = (Vec::new(), vec!["The teacher pauses".into()]));
-    assert!(!bench.sees("WARNING") && bench.sees("The teacher pauses") && !wide(&bench));
+    bench.set_panel(|panel| (panel.warnings, panel.news) = (Vec::new(), vec!["The teacher pauses".into()]));
+    assert!(!bench.shows("WARNING") && bench.shows("The teacher pauses") && !wide(&bench));
 }
 
 #[test]
-fn keys_and_buttons_say_the_same_and_say_it_once() {
+fn keys_and_buttons_give_the_same_input_once() {
     let mut bench = Bench::in_hand();
-    assert!(bench.press(Key::U).undo && !bench.heard().undo);
-    assert!(bench.press(Key::N).next_tool && !bench.heard().next_tool);
+    assert!(bench.press(Key::U).undo && !bench.last_input().undo);
+    assert!(bench.press(Key::N).next_tool && !bench.last_input().next_tool);
     assert!(bench.click("Undo the last stroke (U)").undo);
-    assert!(!bench.heard().next_tool);
+    assert!(!bench.last_input().next_tool);
     bench.window.step();
-    assert!(!bench.heard().undo);
-    bench.says(|panel| panel.tool = "probe".into());
+    assert!(!bench.last_input().undo);
+    bench.set_panel(|panel| panel.tool = "probe".into());
     assert!(bench.click("Next tool (N): probe").next_tool);
 }
 
@@ -200,10 +200,10 @@ fn the_pedal_is_down_as_long_as_it_is_held() {
     let mut bench = Bench::in_hand();
     bench.window.key_down(Key::Space);
     bench.window.run_steps(4);
-    assert!(bench.heard().pedal);
+    assert!(bench.last_input().pedal);
     bench.window.key_up(Key::Space);
     bench.window.run_steps(2);
-    assert!(!bench.heard().pedal);
+    assert!(!bench.last_input().pedal);
     let pos = bench.window.get_by_label("Hold to drill (Space)").rect().center();
     let button =
         |pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Default::default() };
@@ -211,50 +211,50 @@ fn the_pedal_is_down_as_long_as_it_is_held() {
     bench.window.event(button(true));
     bench.window.step();
     bench.window.run_steps(12);
-    assert!(bench.heard().pedal, "held for 3 s");
-    bench.says(|panel| panel.drilling = true);
-    assert!(bench.sees("Drilling (Space)") && bench.heard().pedal);
+    assert!(bench.last_input().pedal, "held for 3 s");
+    bench.set_panel(|panel| panel.drilling = true);
+    assert!(bench.shows("Drilling (Space)") && bench.last_input().pedal);
     bench.window.event(button(false));
     bench.window.step();
     bench.window.run_steps(2);
-    assert!(!bench.heard().pedal);
+    assert!(!bench.last_input().pedal);
 }
 
 #[test]
-fn what_is_not_wanted_leaves_the_picture() {
+fn hidden_parts_are_not_drawn() {
     let mut bench = Bench::with(Panel::default());
-    let all = bench.asked();
+    let all = bench.last_request();
     assert!(all.bone && all.brain && all.slices.shown);
     bench.press(Key::B);
-    assert!(!bench.asked().bone);
+    assert!(!bench.last_request().bone);
     bench.click("Skull (B)");
-    assert!(bench.asked().bone);
+    assert!(bench.last_request().bone);
     bench.press(Key::T);
     bench.press(Key::S);
-    let some = bench.asked();
+    let some = bench.last_request();
     assert!(some.bone && !some.brain && !some.slices.shown);
     bench.press(Key::S);
     bench.slider("level, HU").set_value_accesskit(120.0);
     bench.window.step();
     bench.slider("MRI over CT").set_value_accesskit(0.25);
     bench.window.step();
-    let slices = bench.asked().slices;
+    let slices = bench.last_request().slices;
     assert_eq!((slices.level_hu, slices.mri_share, slices.shown), (120.0, 0.25, true));
 }
 
 #[test]
 fn the_microscope_looks_straight_down_and_back_again() {
     let mut bench = Bench::with(Panel::default());
-    let orbit = bench.asked().camera;
+    let orbit = bench.last_request().camera;
     bench.press(Key::M);
-    let scope = bench.asked().camera;
+    let scope = bench.last_request().camera;
     assert!(scope.fov_rad == 0.2 && scope.elevation_rad > 1.5);
     bench.press(Key::Plus);
-    assert!(bench.asked().camera.distance_mm < scope.distance_mm);
+    assert!(bench.last_request().camera.distance_mm < scope.distance_mm);
     bench.click("Reset the view (R)");
-    assert_eq!(bench.asked().camera, scope);
+    assert_eq!(bench.last_request().camera, scope);
     bench.click("Microscope (M)");
-    assert_eq!(bench.asked().camera, orbit);
+    assert_eq!(bench.last_request().camera, orbit);
 }
 
 #[test]
@@ -264,7 +264,7 @@ fn an_open_option_is_chosen_and_a_closed_one_is_not() {
     let mut bench = Bench::with(Panel { choices: vec![Choice::default(), choice], ..Panel::default() });
     assert_eq!(bench.click("burr 6 mm").chosen, Some([1, 1]));
     bench.window.step();
-    assert_eq!(bench.heard().chosen, None);
+    assert_eq!(bench.last_input().chosen, None);
     assert_eq!(bench.click("perforator").chosen, None);
     assert_eq!(bench.click("burr 4 mm").chosen, None, "it is chosen already");
 }
@@ -275,7 +275,7 @@ fn the_sessions_own_actions_have_buttons_and_keys() {
     let actions = vec![action("Show my tool", 'g'), action("Pause the trainee", 'j')];
     let mut bench = Bench::with(Panel { actions, ..Panel::default() });
     assert_eq!(bench.press(Key::J).actions, 2);
-    assert_eq!(bench.heard().actions, 0);
+    assert_eq!(bench.last_input().actions, 0);
     assert_eq!(bench.click("Show my tool (G)").actions, 1);
     bench.press(Key::F1);
     assert!(bench.window.query_all_by_label("Pause the trainee").count() > 0, "on the page of keys");
@@ -291,7 +291,7 @@ fn large_type_makes_everything_larger_and_nothing_is_lost() {
     bench.click("Large type (L)");
     bench.window.run_steps(2);
     assert!(height(&bench) > 1.3 * before, "{} {before}", height(&bench));
-    assert!(bench.sees("Reset the view (R)") && bench.sees("Keys (F1)"));
+    assert!(bench.shows("Reset the view (R)") && bench.shows("Keys (F1)"));
     bench.press(Key::L);
     bench.window.run_steps(2);
     assert!((height(&bench) - before).abs() < 0.1);
@@ -300,12 +300,12 @@ fn large_type_makes_everything_larger_and_nothing_is_lost() {
 #[test]
 fn the_page_of_keys_opens_and_escape_closes_it_before_the_window() {
     let mut bench = Bench::with(Panel::default());
-    assert!(!bench.sees("Keys and mouse"));
+    assert!(!bench.shows("Keys and mouse"));
     bench.press(Key::Questionmark);
     bench.window.run_steps(2);
-    assert!(bench.sees("Keys and mouse") && bench.sees("Save every picture of the window"));
+    assert!(bench.shows("Keys and mouse") && bench.shows("Save every picture of the window"));
     bench.press(Key::Escape);
-    assert!(!bench.sees("Keys and mouse") && !bench.closes());
+    assert!(!bench.shows("Keys and mouse") && !bench.closes());
     bench.window.key_down(Key::Escape);
     bench.window.step();
     assert!(bench.closes());
@@ -315,20 +315,20 @@ fn the_page_of_keys_opens_and_escape_closes_it_before_the_window() {
 fn a_session_that_is_finished_or_cannot_be_drawn_closes_the_window() {
     let mut bench = Bench::with(Panel::default());
     assert!(!bench.closes());
-    bench.says(|panel| panel.finished = true);
+    bench.set_panel(|panel| panel.finished = true);
     assert!(bench.closes());
 }
 
-/// Does what the windowing system does after a picture: takes what was asked for.
+/// Takes the requested screenshots, as the windowing system does after a picture.
 fn take_pictures(bench: &mut Bench) -> usize {
     let taken = Arc::new(egui::ColorImage::filled([4, 3], Color32::RED));
-    let asked = bench.commands().into_iter().filter_map(|command| match command {
+    let requests = bench.commands().into_iter().filter_map(|command| match command {
         ViewportCommand::Screenshot(callback) => Some(callback),
         _ => None,
     });
-    let asked: Vec<_> = asked.collect();
-    let count = asked.len();
-    asked.into_iter().for_each(|callback| callback.complete(taken.clone()));
+    let requests: Vec<_> = requests.collect();
+    let count = requests.len();
+    requests.into_iter().for_each(|callback| callback.complete(taken.clone()));
     bench.window.step();
     count
 }
@@ -342,7 +342,7 @@ fn pictures_of_the_window_reach_the_session() {
     let captures = |bench: &Bench| bench.lent.borrow().as_ref().unwrap().session.captures.clone();
     assert_eq!(captures(&bench), [(Capture::Picture, [4, 3])]);
     bench.press(Key::V);
-    assert!(bench.sees("every picture of the window is saved"));
+    assert!(bench.shows("every picture of the window is saved"));
     let taken: usize = (0..5).map(|_| take_pictures(&mut bench)).sum();
     bench.press(Key::V);
     take_pictures(&mut bench);
@@ -361,45 +361,45 @@ fn a_timeline_runs_goes_to_events_and_is_dragged() {
     let marks = marks.map(|(at_s, text, warning)| Mark { at_s, text: text.into(), warning }).into();
     let timeline = Timeline { at_s: 3.0123, length_s: 10.0, ready_s: 5.0, running: false, speed: 1.0, marks };
     let mut bench = Bench::with(Panel { timeline: Some(timeline), ..Panel::default() });
-    assert!(bench.lent.borrow().as_ref().unwrap().session.heard.iter().all(|input| input.playback.is_none()));
-    assert!(bench.sees("3.0 / 10.0 s") && bench.sees("50 % made") && bench.sees("burr near the brain"));
+    assert!(bench.lent.borrow().as_ref().unwrap().session.inputs.iter().all(|input| input.playback.is_none()));
+    assert!(bench.shows("3.0 / 10.0 s") && bench.shows("50 % made") && bench.shows("burr near the brain"));
     assert_eq!(bench.click("Run (Space)").playback, Some(Playback::Run(true)));
     bench.window.run_steps(2);
-    assert_eq!(bench.heard().playback, None);
-    let asked = |bench: &Bench| {
+    assert_eq!(bench.last_input().playback, None);
+    let run_requests = |bench: &Bench| {
         let lent = bench.lent.borrow();
-        let heard = &lent.as_ref().unwrap().session.heard;
-        heard.iter().filter(|input| input.playback == Some(Playback::Run(true))).count()
+        let inputs = &lent.as_ref().unwrap().session.inputs;
+        inputs.iter().filter(|input| input.playback == Some(Playback::Run(true))).count()
     };
-    let before = asked(&bench);
+    let before = run_requests(&bench);
     bench.press(Key::Space);
     bench.window.run_steps(2);
-    assert_eq!(asked(&bench), before + 1, "Space says it once");
+    assert_eq!(run_requests(&bench), before + 1, "Space says it once");
     assert_eq!(bench.click("Event before ([)").playback, Some(Playback::Seek(2.0)));
     bench.press(Key::CloseBracket);
-    assert_eq!(bench.heard().playback, Some(Playback::Seek(6.0)));
+    assert_eq!(bench.last_input().playback, Some(Playback::Seek(6.0)));
     assert_eq!(bench.click("0.25x").playback, Some(Playback::Speed(0.25)));
     bench.slider("time, s").set_value_accesskit(7.5);
     bench.window.step();
     bench.window.step();
-    assert_eq!(bench.heard().playback, Some(Playback::Seek(7.5)));
-    bench.says(|panel| panel.timeline.iter_mut().for_each(|timeline| timeline.running = true));
+    assert_eq!(bench.last_input().playback, Some(Playback::Seek(7.5)));
+    bench.set_panel(|panel| panel.timeline.iter_mut().for_each(|timeline| timeline.running = true));
     assert_eq!(bench.click("Pause (Space)").playback, Some(Playback::Run(false)));
 }
 
 #[test]
 fn arrow_keys_move_the_tool_unless_a_slider_has_them() {
     let mut bench = Bench::in_hand();
-    let at = bench.heard().world_from_tool.translation;
+    let at = bench.last_input().world_from_tool.translation;
     bench.press(Key::ArrowUp);
     bench.window.step();
-    let moved = bench.heard().world_from_tool.translation;
+    let moved = bench.last_input().world_from_tool.translation;
     assert!((moved - at - 0.5 * Vec3::Z).length() < 1e-4, "{moved}");
     bench.slider("level, HU").focus();
     bench.window.step();
-    let level = bench.asked().slices.level_hu;
+    let level = bench.last_request().slices.level_hu;
     bench.press(Key::ArrowRight);
     bench.window.step();
-    assert_eq!(bench.heard().world_from_tool.translation, moved);
-    assert!(bench.asked().slices.level_hu > level);
+    assert_eq!(bench.last_input().world_from_tool.translation, moved);
+    assert!(bench.last_request().slices.level_hu > level);
 }

@@ -1,15 +1,15 @@
-//! The bar of a session that can go back and forth: run, speed, events, and where in time it is.
+//! The timeline bar of a replay: run, speed, events and position.
 
 use super::palette::{ORANGE, PALE, SKY, VERMILION};
 use super::{Playback, Timeline};
 use eframe::egui::{self, Key, RichText};
 
-/// Speeds to choose from, 1 as it was.
+/// Selectable speeds; 1 is real time.
 const SPEEDS: [f32; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
-/// An event nearer than this counts as the one that is shown, s.
+/// Distance within which an event counts as the current one, s.
 const HERE_S: f64 = 0.05;
 
-/// Shows the bar and says what was done to it.
+/// Shows the bar; returns the user's command.
 pub(crate) fn show(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let mut asked = keys(ui, timeline);
     egui::Panel::bottom("timeline").show(ui, |ui| {
@@ -32,7 +32,7 @@ fn keys(ui: &egui::Ui, timeline: &Timeline) -> Option<Playback> {
 }
 
 impl Timeline {
-    /// Time of the event before the one that is shown, s.
+    /// Time of the event before the current one, s.
     fn before(&self) -> Option<f64> {
         self.marks.iter().rev().map(|mark| mark.at_s).find(|at| *at < self.at_s - HERE_S)
     }
@@ -68,14 +68,14 @@ fn buttons(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let last = timeline.marks.iter().rev().find(|mark| mark.at_s <= timeline.at_s + HERE_S);
     if let Some(mark) = last {
         let text = RichText::new(&mark.text).color(if mark.warning { ORANGE } else { PALE });
-        // A longer row would make the bar longer too.
+        // A longer row would widen the bar too.
         ui.add(egui::Label::new(text).truncate());
     }
     asked
 }
 
-/// The slider with a mark for each event. It shows no number of its own: one with decimals would
-/// round the time, and so ask to go there.
+/// The slider with a mark for each event. It shows no number: rounding to decimals would move the
+/// time.
 fn bar(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let mut at_s = timeline.at_s;
     ui.spacing_mut().slider_width = (ui.available_width() - 80.0).max(60.0);
@@ -83,7 +83,7 @@ fn bar(ui: &mut egui::Ui, timeline: &Timeline) -> Option<Playback> {
     let response = ui.add(slider);
     let rail =
         egui::Rect::from_min_size(response.rect.min, egui::vec2(ui.spacing().slider_width, response.rect.height()));
-    // The knob's centre stays its own radius away from either end.
+    // The knob's centre stays its own radius from either end.
     let rail = rail.shrink2(egui::vec2(0.5 * rail.height(), 0.0));
     let x = |seconds: f64| rail.left() + rail.width() * (seconds / timeline.length_s.max(1e-9)).clamp(0.0, 1.0) as f32;
     for mark in timeline.marks.iter() {

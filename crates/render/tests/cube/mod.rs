@@ -1,4 +1,4 @@
-//! The smallest brain.
+//! The smallest brain mesh.
 
 use glam::Vec3;
 use trepan_mesh::TetMesh;

@@ -1,4 +1,4 @@
-//! Scenes whose picture is known in closed form.
+//! Scenes with a closed-form picture.
 
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use trepan_volume::{BoneVolume, VoxelVolume};
 
 pub const ISO: i16 = 400;
 
-/// The software device; `None` after checking that the absence of any is reported with the remedy.
+/// The software device; `None` after checking that a missing driver is reported with its remedy.
 pub fn device() -> Option<Gpu> {
     match Gpu::open(Prefer::Software) {
         Ok(gpu) => Some(gpu),
@@ -21,7 +21,7 @@ pub fn device() -> Option<Gpu> {
     }
 }
 
-/// A grid of `edge`³ voxels of 1 mm around the origin, with a density by world point.
+/// A grid of `edge`³ voxels of 1 mm around the origin, with a density by world position.
 pub fn volume(edge: usize, hu: impl Fn(DVec3) -> f64) -> VoxelVolume<i16> {
     let mut volume = VoxelVolume::isotropic([edge; 3], Vec3::splat(0.5 - 0.5 * edge as f32), 1.0, 0i16);
     for at in 0..volume.data.len() {
@@ -31,12 +31,12 @@ pub fn volume(edge: usize, hu: impl Fn(DVec3) -> f64) -> VoxelVolume<i16> {
     volume
 }
 
-/// Bone by a signed distance, mm, negative inside.
+/// Bone from a signed distance, mm, negative inside.
 pub fn bone(edge: usize, distance: impl Fn(DVec3) -> f64) -> Arc<BoneVolume> {
     Arc::new(BoneVolume::new(&volume(edge, |p| f64::from(ISO) - 100.0 * distance(p)), ISO).expect("the scene has bone"))
 }
 
-/// A scene of bone alone.
+/// A scene with bone only.
 pub fn alone(bone: &Arc<BoneVolume>) -> SceneData<'static> {
     SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None }
 }

@@ -1,4 +1,4 @@
-//! How alike two pictures are.
+//! Similarity of two pictures.
 
 use trepan_render::Image;
 

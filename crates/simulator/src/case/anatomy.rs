@@ -1,4 +1,4 @@
-//! What is made of a patient's images: a skull on a grid of cubes, a brain mask, tetrahedra.
+//! Builds a skull on cubic voxels, a brain mask and tetrahedra from a patient's images.
 
 use crate::case::{Brain, Inputs, Recipe};
 use crate::error::SessionError;
@@ -13,20 +13,20 @@ use trepan_volume::{
     room_for_voxels, skull_only,
 };
 
-/// Air around the brain that its grids keep, mm.
+/// Margin of the brain's grids around the brain, mm.
 const MARGIN_MM: f32 = 12.0;
-/// Memory that a skull takes in a session, bytes a voxel: densities, their copies, pieces, picture.
+/// Memory of a skull in a session, bytes per voxel: densities, their copies, pieces, picture.
 const SKULL_BYTES: u64 = 12;
 
-/// Memory that the mesher and a solver take for a tetrahedron, bytes.
+/// Memory of mesher and solver, bytes per tetrahedron.
 const TET_BYTES: u64 = 4096;
 
-/// An image, or one series of a folder of several.
+/// Reads an image, or one DICOM series of a folder.
 fn image(path: &Path, series: Option<usize>) -> Result<Import, ReadError> {
     series.map_or_else(|| trepan_volume::import(path), |number| dicom::import_series(path, number))
 }
 
-/// A CT in HU, and remarks on it.
+/// Reads a CT in HU, and adds remarks on it.
 pub fn read_ct(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<i16>, SessionError> {
     let import = image(path, series)?;
     of_modality(path, &import, "CT")?;
@@ -35,13 +35,13 @@ pub fn read_ct(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> R
     hounsfield(&import.volume).map_err(|fault| SessionError::Case(format!("{}: {fault}", path.display())))
 }
 
-/// The CT of a case's files again, as it was scanned; says why not in a remark.
+/// Reads the original CT of a case again; the error is a text for a remark.
 pub fn scanned(inputs: &Inputs, series: Option<usize>) -> Result<VoxelVolume<i16>, String> {
     let path = inputs.ct.as_deref().ok_or("a case folder does not hold the scanner's images")?;
     read_ct(path, series, &mut Vec::new()).map_err(|fault| format!("the CT cannot be read again: {fault}"))
 }
 
-/// An MRI without holes, and remarks on it.
+/// Reads an MRI, and adds remarks on it; refuses voxels that are not finite, and CTs.
 pub fn read_mri(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<f32>, SessionError> {
     let import = image(path, series)?;
     of_modality(path, &import, "MR")?;
@@ -61,10 +61,10 @@ pub fn read_mri(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> 
     Ok(import.volume)
 }
 
-/// No scanner's image is longer, mm.
+/// Largest accepted extent of an image, mm.
 const LONGEST_MM: f64 = 3000.0;
 
-/// Refuses an image that spans more than a patient: its voxel edges are in another unit.
+/// Refuses an image larger than a patient, whose voxel edges are in a wrong unit.
 fn of_a_patient(path: &Path, image: &VoxelVolume<f32>) -> Result<(), SessionError> {
     let (low, high) = image.world_corners();
     let span = (high - low).max_element();
@@ -78,21 +78,21 @@ fn of_a_patient(path: &Path, image: &VoxelVolume<f32>) -> Result<(), SessionErro
     )))
 }
 
-/// What to do about images that were mixed up.
+/// Remedy for images that were mixed up.
 const GIVE: &str = "give the CT with --ct and a T1 MRI with --mri";
 
-/// Refuses a series that its scanner calls something else.
-fn of_modality(path: &Path, import: &Import, wanted: &str) -> Result<(), SessionError> {
+/// Refuses a series of another DICOM modality.
+fn of_modality(path: &Path, import: &Import, expected: &str) -> Result<(), SessionError> {
     match import.modality.as_deref() {
-        Some(found) if found != wanted && found != "OT" => {
-            let fault = format!("{}: its DICOM modality is {found}, not {wanted}: {GIVE}", path.display());
+        Some(found) if found != expected && found != "OT" => {
+            let fault = format!("{}: its DICOM modality is {found}, not {expected}: {GIVE}", path.display());
             Err(SessionError::Case(fault))
         }
         _ => Ok(()),
     }
 }
 
-/// Moves the MRI to where it fits the CT; returns the move.
+/// Registers the MRI to the CT in place; returns the transform.
 pub fn registered(
     ct: &VoxelVolume<i16>,
     mri: &mut VoxelVolume<f32>,
@@ -105,7 +105,7 @@ pub fn registered(
     let moved_mm = found.fixed_from_moving.transform_point3(middle).distance(middle);
     mri.world_from_voxel = found.fixed_from_moving * mri.world_from_voxel;
     notes.push(format!(
-        "the MRI was moved by {moved_mm:.1} mm and turned by {:.1} degrees to fit the CT: shared information {:.3} to {:.3}, confidence {:.2}; look at the slices, a confident answer can still be wrong",
+        "the MRI was moved by {moved_mm:.1} mm and turned by {:.1} degrees to fit the CT: mutual information {:.3} to {:.3}, confidence {:.2}; check it in the slices, a confident result can still be wrong",
         turn.to_axis_angle().1.to_degrees(),
         found.start_metric,
         found.metric,
@@ -114,16 +114,16 @@ pub fn registered(
     Ok(found.fixed_from_moving)
 }
 
-/// What a user should know of a brain that was found.
+/// Remark on a segmented brain.
 fn brain_note(confidence: &BrainConfidence) -> String {
     let doubt = match confidence.is_doubtful() {
-        true => "; DOUBTFUL: look at its border in the slices, or give a label volume with --labels PATH",
+        true => "; DOUBTFUL: check its border in the slices, or give a label volume with --labels PATH",
         false => "",
     };
     format!("brain found in the MRI: {confidence}{doubt}")
 }
 
-/// The brain: what is not 0 in the labels, else what the MRI shows.
+/// Brain mask: the nonzero labels, else a segmentation of the MRI.
 pub fn find_brain(
     inputs: &Inputs,
     mri: &VoxelVolume<f32>,
@@ -153,7 +153,7 @@ pub fn find_brain(
     Ok(mask)
 }
 
-/// The largest piece of bone on a grid of cubes.
+/// Resamples a CT to cubic voxels and keeps the largest piece of bone.
 pub fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> Result<VoxelVolume<i16>, SessionError> {
     let grid = Grid::isotropic_over(ct, recipe.spacing_mm);
     room_for_voxels(grid.voxels() as u64, SKULL_BYTES).map_err(|fault| {
@@ -171,7 +171,7 @@ pub fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> R
     Ok(skull)
 }
 
-/// Classes on a grid around the brain.
+/// Builds the tissue classes on a grid around the brain.
 pub fn make_classes(
     inputs: &Inputs,
     mask: &VoxelVolume<u8>,
@@ -185,8 +185,7 @@ pub fn make_classes(
     Ok(classes)
 }
 
-/// The brain of some classes: the MRI on their grid, and tetrahedra, which may be finer around
-/// `place`.
+/// Builds the brain: the MRI on the grid of the classes, and tetrahedra, refined around `place`.
 pub fn make_brain(
     mri: &VoxelVolume<f32>,
     classes: VoxelVolume<u8>,
@@ -206,7 +205,7 @@ pub fn make_brain(
     Ok(Brain { classes, mri, mesh, class_of_tet })
 }
 
-/// The mask on a grid of 1 mm cubes, cut to its content and a margin.
+/// Resamples the mask to cubic voxels of 0.8 to 1.5 mm and crops it to its content with a margin.
 pub fn cropped(mask: &VoxelVolume<u8>) -> Result<VoxelVolume<u8>, SessionError> {
     let spacing = mask.spacing_mm().min_element().clamp(0.8, 1.5) as f32;
     let grid = Grid::isotropic_over(mask, spacing);
@@ -233,7 +232,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_doubtful_brain_is_said_to_be_with_the_remedy() {
+    fn a_doubtful_brain_is_reported_with_the_remedy() {
         let sure = BrainConfidence {
             value: 0.9,
             found_ml: 1400.0,

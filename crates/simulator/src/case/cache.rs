@@ -1,10 +1,10 @@
-//! Derived data in the user's cache folder, named by the hash of what it was made from.
+//! Caches derived data in the user's cache folder, named by the hash of its inputs.
 //!
 //! # Practice
-//! A folder appears whole or not at all: it is filled beside its place and then renamed. Two
-//! programs that make the same case at once both succeed; the second keeps the first's.
-//! `--cache` or `TREPAN_CACHE` names another place. When the folders exceed 8 GB, those that were not
-//! used for the longest time go, but none that was used within the last hour.
+//! A folder appears complete or not at all: it is filled under a temporary name and then renamed.
+//! If two programs build the same case at once, the folder of the second replaces the first.
+//! `--cache` or `TREPAN_CACHE` names another folder. Above 8 GB in total the least recently used
+//! folders are removed, but none that was used within the last hour.
 
 use crate::error::SessionError;
 use crate::options::Patient;
@@ -16,22 +16,22 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 use trepan_volume::open_regular;
 
-/// Goes up when kept cases change their form or the code that makes them changes its results.
+/// Version of cached cases; raised when their format or the results of the code change.
 const FORM: u32 = 10;
 
-/// The folder of kept cases.
+/// Folder of cached cases.
 #[derive(Clone, Debug)]
 pub struct Cache {
     root: PathBuf,
 }
 
 impl Cache {
-    /// The folder that the flags name, else the user's.
+    /// Cache in the folder that the flags name, else the user's.
     pub fn of(patient: &Patient) -> Result<Self, SessionError> {
         patient.cache.clone().map_or_else(Self::of_user, |root| Ok(Self::at(root)))
     }
 
-    /// The user's: `TREPAN_CACHE`, else `trepan/cases` in the platform's cache folder.
+    /// The user's cache: `TREPAN_CACHE`, else `trepan/cases` in the platform's cache folder.
     pub fn of_user() -> Result<Self, SessionError> {
         if let Some(root) = std::env::var_os("TREPAN_CACHE").filter(|root| !root.is_empty()) {
             return Ok(Self { root: root.into() });
@@ -41,33 +41,33 @@ impl Cache {
         Ok(Self { root: strategy.cache_dir().join("trepan").join("cases") })
     }
 
-    /// A cache at a given place.
+    /// Cache in a given folder.
     pub fn at(root: PathBuf) -> Self {
         Self { root }
     }
 
-    /// The name of what is made from these files (folders with all that lies in them) by this
-    /// recipe, 64 digits.
+    /// Key of data derived from these files (folders with all their files) by this recipe, 64
+    /// digits.
     pub fn key(&self, inputs: &[&Path], recipe: &str) -> Result<String, SessionError> {
         digest_of_all(&format!("{FORM} {recipe}"), inputs)
     }
 
-    /// The name of what is made by some numbers from what has a name already.
+    /// Key of data derived from cached data by further numbers.
     pub fn under(&self, key: &str, numbers: &str) -> String {
         let mut hash = Sha256::new();
         hash.update(format!("{key} {numbers}"));
         hexadecimal(hash)
     }
 
-    /// The folder of that name, if it is there.
+    /// Folder of a key, if it exists; marks it as used.
     pub fn find(&self, key: &str) -> Option<PathBuf> {
         let folder = Some(self.root.join(key)).filter(|folder| folder.is_dir())?;
-        // The time of the last use: the sweep goes by it. A folder of someone else may not be touched.
+        // Records the time of the last use for the sweep. It fails for a folder of another user.
         _ = File::open(&folder).and_then(|file| file.set_modified(SystemTime::now()));
         Some(folder)
     }
 
-    /// Fills a folder and puts it in its place; a broken one that is there already gives way.
+    /// Fills a temporary folder and moves it to its place; replaces an existing one.
     pub fn keep(&self, key: &str, fill: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), String> {
         let text = |fault: io::Error| format!("{}: {fault}", self.root.display());
         fs::create_dir_all(&self.root).map_err(text)?;
@@ -84,7 +84,7 @@ impl Cache {
     }
 }
 
-/// SHA-256 of a text and of these files (folders with all that lies in them), hexadecimal.
+/// SHA-256 of a text and of these files (folders with all their files), hexadecimal.
 pub fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, SessionError> {
     let mut hash = Sha256::new();
     hash.update(text);
@@ -103,16 +103,16 @@ pub fn digest(file: &Path) -> io::Result<String> {
     Ok(hexadecimal(hash))
 }
 
-/// How folders that are being filled begin.
+/// Name prefix of folders that are being filled.
 const MAKING: &str = ".making-";
-/// A folder that was not used for so long is not in use, nor being filled.
+/// Time without use after which a folder is neither in use nor being filled.
 const ABANDONED: Duration = Duration::from_secs(3600);
-/// Most that kept cases may take of the disk, bytes: some 80 cases.
+/// Largest total size of cached cases, bytes: about 80 cases.
 const MOST_BYTES: u64 = 8 << 30;
 
 impl Cache {
-    /// Removes what killed programs left, and the longest unused cases where all exceed `most`
-    /// bytes.
+    /// Removes temporary folders of killed programs, and the least recently used cases beyond
+    /// `most` bytes in total.
     fn sweep(&self, most: u64) {
         let mut kept = Vec::new();
         for entry in fs::read_dir(&self.root).into_iter().flatten().flatten() {
@@ -161,20 +161,21 @@ fn unreadable(path: &Path, fault: &io::Error) -> SessionError {
     SessionError::Usage(format!("cannot read {}: {fault}; {remedy}", path.display()))
 }
 
-/// Images that lie in one file.
+/// Extensions of images stored in one file.
 const WHOLE: [&str; 5] = ["nii", "gz", "nrrd", "mha", "vtk"];
 
-/// Most files of a folder; more are no series of slices but a whole disk.
+/// Largest number of files of a folder; more is not a series of slices.
 const MOST_FILES: usize = 20_000;
 
-/// Folders inside a folder that are looked into, as for DICOM series.
+/// Depth of subfolders that are read, as for DICOM series.
 const DEEPEST: usize = 4;
 
-/// The file itself, or every file under a folder, in a fixed order. A file of another kind may be
-/// one of several (a slice of a series, half of a pair): all that lies beside it counts too.
+/// Lists the file itself, or every file under a folder, in a fixed order. A file with another
+/// extension may be one of several (a slice of a series, half of a pair), so all files of its
+/// folder are listed.
 fn files_of(input: &Path) -> io::Result<Vec<PathBuf>> {
     if !fs::metadata(input)?.is_dir() {
-        // Said before anything is opened: a pipe would wait for its writer.
+        // Refuses pipes before anything is read: reading one would block.
         open_regular(input)?;
         let whole = input.extension().is_some_and(|e| WHOLE.iter().any(|known| e.eq_ignore_ascii_case(known)));
         return match input.parent().filter(|_| !whole) {
@@ -187,7 +188,7 @@ fn files_of(input: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// The regular files of a folder and of those in it; links to folders are not followed.
+/// Adds the regular files of a folder and its subfolders; links to folders are not followed.
 fn below(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> io::Result<()> {
     let mut entries: Vec<_> = fs::read_dir(folder)?.collect::<io::Result<_>>()?;
     entries.sort_by_key(|entry| entry.file_name());
@@ -207,7 +208,7 @@ fn below(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> io::Result<()
     Ok(())
 }
 
-/// The files of one folder, not of those below it.
+/// Lists the files of a folder, without subfolders.
 fn beside(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let paths: Vec<PathBuf> = fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()?;
     let mut files: Vec<PathBuf> = paths.into_iter().filter(|path| path.is_file()).collect();
@@ -257,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_program_left_is_swept_but_not_what_is_being_made() {
+    fn abandoned_folders_are_removed_but_not_recent_ones() {
         let home = tempfile::tempdir().unwrap();
         let (old, new) = (home.path().join(".making-old"), home.path().join(".making-new"));
         [&old, &new].iter().for_each(|folder| fs::create_dir(folder).unwrap());
@@ -300,7 +301,7 @@ mod tests {
 
     #[test]
     #[cfg(unix)]
-    fn pipes_and_circles_in_a_folder_are_passed_over_and_a_named_pipe_is_refused() {
+    fn pipes_and_link_cycles_in_a_folder_are_skipped_and_a_named_pipe_is_refused() {
         let home = tempfile::tempdir().unwrap();
         let (folder, pipe) = (home.path().join("ct"), home.path().join("ct/pipe"));
         fs::create_dir(&folder).unwrap();

@@ -1,8 +1,8 @@
-//! Which case the options mean, and making one to keep.
+//! Opens the case that the options name, and builds case folders.
 
 use crate::case::cache::Cache;
 use crate::case::identity::{self, Identity, USERS};
-use crate::case::import::{Known, volume_mm3};
+use crate::case::import::{PendingCase, volume_mm3};
 use crate::case::tissue::TissueClass;
 use crate::case::{Case, Inputs, Recipe, folder, import};
 use crate::error::SessionError;
@@ -13,51 +13,51 @@ use crate::program::Program;
 use std::path::Path;
 use trepan_budget::Setup;
 
-/// The case folder that is named, the images that are given, or the built-in case; with the models
-/// that it is opened for. `card`: whether a graphics card draws.
+/// Opens the named case folder, the given images or the built-in case, with the models of the
+/// session. `card`: whether a graphics card draws.
 pub fn open_case(
     program: Program,
     options: &Options,
     built_in: Inputs,
-    wish: ModelRequest,
+    request: ModelRequest,
     card: impl FnOnce() -> bool,
 ) -> Result<(Case, Models), SessionError> {
     if let Some(folder) = &options.case {
         let case = fitting(program, folder::load(folder)?)?;
         let classes = case.brain.as_ref().map(|brain| &brain.classes.data);
-        guarded(options, |class| classes.is_some_and(|classes| classes.contains(&class.code())))?;
-        let models = on_case(wish, &case, card)?;
-        models.say();
+        check_forbidden(options, |class| classes.is_some_and(|classes| classes.contains(&class.code())))?;
+        let models = on_case(request, &case, card)?;
+        models.log();
         return Ok((case, models));
     }
     let (inputs, mut models) = (inputs(&options.patient, built_in), None);
-    guarded(options, |class| class == TissueClass::Brain || inputs.tissues.iter().any(|t| t.class == class))?;
-    let wanted = recipe(&options.patient);
-    let case = import::open_by(program, &inputs, &wanted, &Cache::of(&options.patient)?, |known| {
-        let facts = known.facts;
-        let settled = models.insert(wish.settle(&facts, card, |scene, rows| known.own(scene, rows))?);
-        known.say(|| settled.say());
+    check_forbidden(options, |class| class == TissueClass::Brain || inputs.tissues.iter().any(|t| t.class == class))?;
+    let requested = recipe(&options.patient);
+    let case = import::open_by(program, &inputs, &requested, &Cache::of(&options.patient)?, |pending| {
+        let facts = pending.facts;
+        let settled = models.insert(request.settle(&facts, card, |scene, rows| pending.case_errors(scene, rows))?);
+        pending.suspend_progress(|| settled.log());
         let Setup { bone, tissue, .. } = settled.setup;
-        Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, halvings: tissue.halvings, ..wanted })
+        Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, halvings: tissue.halvings, ..requested })
     })?;
     let unsettled = || SessionError::Internal("a case without models".into());
     Ok((case, models.ok_or_else(unsettled)?))
 }
 
-/// Refuses to guard tissue that is not `there`.
-fn guarded(options: &Options, there: impl Fn(TissueClass) -> bool) -> Result<(), SessionError> {
-    match options.forbid.iter().flatten().find(|class| !there(**class)) {
+/// Refuses a class of `--forbid` that the case does not contain.
+fn check_forbidden(options: &Options, has_class: impl Fn(TissueClass) -> bool) -> Result<(), SessionError> {
+    match options.forbid.iter().flatten().find(|class| !has_class(**class)) {
         None => Ok(()),
         Some(class) => {
             let name = class.name();
             Err(SessionError::Usage(format!(
-                "--forbid {name}: the case holds no {name}: give its labels with --tissue {name}=PATH, or leave it out"
+                "--forbid {name}: the case contains no {name}: give its labels with --tissue {name}=PATH, or leave it out"
             )))
         }
     }
 }
 
-/// Of which patient the case is that the options mean; nothing is made.
+/// Identity of the case that the options name, without building it.
 pub fn identity(options: &Options, built_in: &Inputs) -> Result<Identity, SessionError> {
     match &options.case {
         Some(folder) => folder::identity(folder),
@@ -69,7 +69,7 @@ pub fn identity(options: &Options, built_in: &Inputs) -> Result<Identity, Sessio
     }
 }
 
-/// The models for a case that is not made, and what is remarkable about its images.
+/// Models planned for a case that is not built, with remarks on its images.
 pub struct PlannedCase {
     /// The models.
     pub models: Models,
@@ -77,44 +77,44 @@ pub struct PlannedCase {
     pub notes: Vec<String>,
 }
 
-/// The models for a case, which is not made.
+/// Plans the models for a case without building it.
 pub fn plan_case(
     program: Program,
     case: Option<&Path>,
     patient: &Patient,
     built_in: Inputs,
-    wish: ModelRequest,
+    request: ModelRequest,
     card: impl FnOnce() -> bool,
 ) -> Result<PlannedCase, SessionError> {
     patient.check().map_err(SessionError::Usage)?;
     match case {
         Some(folder) => {
             let case = fitting(program, folder::load(folder)?)?;
-            Ok(PlannedCase { models: on_case(wish, &case, card)?, notes: case.notes })
+            Ok(PlannedCase { models: on_case(request, &case, card)?, notes: case.notes })
         }
         None => {
             let (inputs, recipe, cache) = (inputs(patient, built_in), recipe(patient), Cache::of(patient)?);
-            let mut known = Known::of(program, &inputs, &recipe, &cache)?;
-            let (facts, notes) = (known.facts, known.notes.clone());
-            let models = wish.settle(&facts, card, |scene, rows| known.own(scene, rows))?;
-            known.keep();
+            let mut pending = PendingCase::of(program, &inputs, &recipe, &cache)?;
+            let (facts, notes) = (pending.facts, pending.notes.clone());
+            let models = request.settle(&facts, card, |scene, rows| pending.case_errors(scene, rows))?;
+            pending.store();
             Ok(PlannedCase { models, notes })
         }
     }
 }
 
-/// The models for a case as it was built.
-fn on_case(wish: ModelRequest, case: &Case, card: impl FnOnce() -> bool) -> Result<Models, SessionError> {
-    let wish = case.recipe.iter().fold(wish, ModelRequest::on);
+/// Models for a case folder.
+fn on_case(request: ModelRequest, case: &Case, card: impl FnOnce() -> bool) -> Result<Models, SessionError> {
+    let request = case.recipe.iter().fold(request, ModelRequest::on);
     let facts = Facts {
         ct_voxel_mm: case.skull.as_ref().map(|skull| skull.spacing_mm().element_sum() / 3.0),
         brain_mm3: case.brain.as_ref().map(|brain| volume_mm3(&brain.classes)),
     };
-    // What the scanner saw is no longer there: the laws must do.
-    wish.settle(&facts, card, |_, _| Ok(CaseErrors::default()))
+    // A case folder lacks the original images, so that errors come from the power laws.
+    request.settle(&facts, card, |_, _| Ok(CaseErrors::default()))
 }
 
-/// A case that was made and kept in a folder.
+/// A case that was built in a folder.
 pub struct Built {
     /// Its name.
     pub name: String,
@@ -122,7 +122,7 @@ pub struct Built {
     pub notes: Vec<String>,
 }
 
-/// Makes a case folder.
+/// Builds a case folder.
 pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inputs) -> Result<Built, SessionError> {
     patient.check().map_err(SessionError::Usage)?;
     if out.exists() {
@@ -143,7 +143,7 @@ pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inp
     Ok(Built { name: case.name, notes: case.notes })
 }
 
-/// A case that has what the program needs.
+/// Refuses a case without the skull or brain that the program needs.
 fn fitting(program: Program, case: Case) -> Result<Case, SessionError> {
     let lacks = |what| Err(SessionError::Case(format!("{} needs {what}, which {} lacks", program.name(), case.name)));
     if program.has_bone() && case.skull.is_none() {
@@ -155,8 +155,8 @@ fn fitting(program: Program, case: Case) -> Result<Case, SessionError> {
     Ok(case)
 }
 
-/// As the flags say; what they leave open as usual, so that a folder is the same wherever it is
-/// built.
+/// Recipe from the flags; missing values are those of preset `usual`, so a folder is the same on
+/// every machine.
 fn recipe(patient: &Patient) -> Recipe {
     let usual = models::usual();
     Recipe {
@@ -171,7 +171,7 @@ fn recipe(patient: &Patient) -> Recipe {
     }
 }
 
-/// The files that are given; the built-in case's where none is.
+/// Given input files; those of the built-in case if none is given.
 pub fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
     let Patient { ct, mri, labels, tissues, .. } = patient.clone();
     if ct.is_none() && mri.is_none() && labels.is_none() && tissues.is_empty() {

@@ -1,17 +1,17 @@
-//! A case as a folder: volumes, mesh, numbers, and the hash of each file; self-describing, checked
-//! when it is opened.
+//! Stores a case as a folder: volumes, mesh, numbers and the hash of each file, checked on opening.
 //!
 //! ```text
-//! CASE/case.json   form, name, hash of the images, version, isovalue, planned opening, recipe, remarks, file hashes
-//!      skull.nii   densities in HU, cubes, largest piece of bone only
+//! CASE/case.json   form, name, hash of the images, version, isovalue, planned opening, recipe,
+//!                  remarks, file hashes
+//!      skull.nii   densities in HU, cubic voxels, largest piece of bone only
 //!      mri.nii     the MRI around the brain      mask.nii   1 in the brain
 //!      fit.png     the bone's contour over the MRI
 //!      brain.vtk   tetrahedra, with their classes
 //! ```
 //!
 //! # Practice
-//! Patient RAS+ mm throughout. Nothing in it names a patient: images are written anew from their
-//! voxels, and the name is made from a hash.
+//! All coordinates are patient RAS+ mm. No file contains a patient's name: images are rewritten
+//! from their voxels, and the case is named by a hash.
 
 use crate::case::cache::digest;
 use crate::case::identity::Identity;
@@ -25,7 +25,7 @@ use std::path::Path;
 use trepan_mesh::{lattice::LabelledMesh, vtk};
 use trepan_volume::{hounsfield, nifti, read_regular};
 
-/// Goes up when the folder's form changes.
+/// Version of the folder's format.
 const FORM: u32 = 6;
 const SKULL: &str = "skull.nii";
 const MRI: &str = "mri.nii";
@@ -34,7 +34,7 @@ const MESH: &str = "brain.vtk";
 const FIT: &str = "fit.png";
 const CARD: &str = "case.json";
 
-/// `case.json`.
+/// Contents of `case.json`.
 #[derive(Serialize, Deserialize)]
 struct Card {
     form: u32,
@@ -42,7 +42,7 @@ struct Card {
     hash: String,
     #[serde(default)]
     images: BTreeMap<String, String>,
-    /// The version that made it.
+    /// Program version that built the case.
     version: String,
     isovalue_hu: i16,
     opening: Option<Opening>,
@@ -92,12 +92,12 @@ pub fn save(case: &Case, folder: &Path) -> Result<(), String> {
     fs::write(folder.join(CARD), json).map_err(|f| text(&f))
 }
 
-/// Of which patient the case of a folder is; volumes are not looked at.
+/// Reads the patient's identity from a case folder, without the volumes.
 pub fn identity(folder: &Path) -> Result<Identity, SessionError> {
     card(folder).map(|Card { name, hash, images, .. }| Identity { name, case: Some(hash), images })
 }
 
-/// The numbers of a folder, of the form that this program knows.
+/// Reads `case.json`; refuses an unknown format version.
 fn card(folder: &Path) -> Result<Card, SessionError> {
     let json = read_regular(&folder.join(CARD)).map_err(|fault| broken(folder, CARD, &fault))?;
     let card: Card = serde_json::from_slice(&json).map_err(|fault| broken(folder, CARD, &fault))?;
@@ -112,7 +112,7 @@ fn broken(folder: &Path, file: &str, fault: &dyn std::fmt::Display) -> SessionEr
     SessionError::Case(format!("{}: {fault}; build the case again with `case build`", folder.join(file).display()))
 }
 
-/// Opens a case folder; every file must be there and be what it was when it was written.
+/// Opens a case folder; every file must exist and match its hash.
 pub fn load(folder: &Path) -> Result<Case, SessionError> {
     let card = card(folder)?;
     let broken = |file: &str, fault: &dyn std::fmt::Display| broken(folder, file, fault);
@@ -149,7 +149,7 @@ mod tests {
     use trepan_volume::VoxelVolume;
 
     #[test]
-    fn a_case_comes_back_whole_and_a_changed_file_is_named() {
+    fn a_case_is_read_as_written_and_a_changed_file_is_an_error() {
         let home = tempfile::tempdir().expect("a temporary folder");
         let mut skull = VoxelVolume::isotropic([6, 5, 4], Vec3::new(1.0, -2.0, 3.5), 0.75, -1000i16);
         skull.data[17] = 1234;

@@ -1,8 +1,9 @@
-//! Of which patient a session is: told by the hashes of the images, whatever was made of them.
+//! Identifies the patient of a session by the hashes of the images.
 //!
 //! # Practice
 //! The hash of a case changes with voxel size, tetrahedra and version; those of its images do not.
-//! Recordings of older versions hold the former only: then a name may tell, or nothing.
+//! Recordings of older versions contain the case's hash only: then the name may identify the
+//! patient, or the patient is unknown.
 
 use crate::case::cache::digest_of_all;
 use crate::case::{Inputs, Recipe};
@@ -10,31 +11,31 @@ use crate::error::SessionError;
 use std::collections::BTreeMap;
 use trepan_link::wire::SessionHeader;
 
-/// How the names of users' own cases begin; digits of the hash follow.
+/// Name prefix of users' own cases; digits of the hash follow.
 pub const USERS: &str = "case-";
-/// The entry of a header's hashes that is the case's.
+/// Key of the case's hash in a header.
 const CASE: &str = "case";
 
-/// What tells patients apart.
+/// Identity of a patient.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Identity {
-    /// Name of the case; empty where it is not known.
+    /// Name of the case; empty if unknown.
     pub name: String,
-    /// Hash of what was made of the images, where that is known.
+    /// Hash of the case built from the images, if known.
     pub case: Option<String>,
     /// Hash of each image, by `ct` and `mri`.
     pub images: BTreeMap<String, String>,
 }
 
 impl Identity {
-    /// As a recording's header keeps it.
+    /// Reads the identity from a recording's header.
     pub fn of(header: &SessionHeader) -> Self {
         let mut images = header.hashes.clone();
         let case = images.remove(CASE);
         Self { name: header.case.clone(), case, images }
     }
 
-    /// Whether both are of one patient; `None` where that cannot be told.
+    /// Whether both are of one patient; `None` if unknown.
     pub fn is(&self, other: &Self) -> Option<bool> {
         let mut shared =
             self.images.iter().filter_map(|(image, hash)| Some(other.images.get(image)? == hash)).peekable();
@@ -51,7 +52,7 @@ impl Identity {
         }
     }
 
-    /// As a recording's header keeps it.
+    /// Hashes for a recording's header.
     pub fn hashes(&self) -> BTreeMap<String, String> {
         let case = self.case.iter().map(|hash| (CASE.to_string(), hash.clone()));
         self.images.clone().into_iter().chain(case).collect()
@@ -62,18 +63,18 @@ impl Identity {
         (!self.name.is_empty()).then(|| !digits(&self.name))
     }
 
-    /// In words: the name, and how the hashes of the images begin.
-    pub fn told(&self) -> String {
+    /// Describes the identity: the name and the first digits of the images' hashes.
+    pub fn describe(&self) -> String {
         let short = |hash: &str| hash.chars().take(8).collect::<String>();
         let images = self.images.iter().map(|(image, hash)| format!("{image} {}", short(hash)));
         let case = self.case.iter().map(|hash| format!("hash {}", short(hash)));
         let hashes: Vec<String> = if self.images.is_empty() { case.collect() } else { images.collect() };
-        let name = if self.name == USERS { "the images that are given" } else { &self.name };
+        let name = if self.name == USERS { "the given images" } else { &self.name };
         format!("{name} ({})", hashes.join(", "))
     }
 }
 
-/// The hash of each of the patient's images, by `ct` and `mri`.
+/// Hash of each of the patient's images, by `ct` and `mri`.
 pub fn images(inputs: &Inputs, recipe: &Recipe) -> Result<BTreeMap<String, String>, SessionError> {
     let images = [("ct", &inputs.ct, recipe.ct_series), ("mri", &inputs.mri, recipe.mri_series)];
     let given = images.into_iter().filter_map(|(name, path, series)| Some((name, path.as_deref()?, series)));
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn images_tell_patients_apart_and_older_recordings_only_what_they_can() {
+    fn images_identify_patients_and_older_recordings_may_not() {
         let fine = known("case-1", "1", &[("ct", "a"), ("mri", "b")]);
         assert_eq!(fine.is(&known("case-2", "2", &[("ct", "a"), ("mri", "b")])), Some(true), "another voxel size");
         assert_eq!(fine.is(&known("case-3", "3", &[("ct", "a")])), Some(true), "drilled only");
@@ -100,6 +101,6 @@ mod tests {
         assert_eq!(known("case-head", "7", &[]).is(&known("case-head", "8", &[])), Some(true), "built in");
         assert_eq!(known("case-head", "7", &[]).is(&old), Some(false));
         assert_eq!(known("", "", &[]).is(&old), None);
-        assert!(fine.told().contains("case-1 (ct a, mri b)") && old.told().contains("hash 5"));
+        assert!(fine.describe().contains("case-1 (ct a, mri b)") && old.describe().contains("hash 5"));
     }
 }

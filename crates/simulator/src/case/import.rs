@@ -1,12 +1,12 @@
-//! From the scanner's files to a case: skull grid, brain mask, brain mesh, opening, each made once
-//! and kept by content.
+//! Imports a scanner's files as a case: skull grid, brain mask, brain mesh and opening, cached by
+//! content.
 //!
 //! # Practice
-//! What is made depends only on the bytes of the inputs and the numbers in [`Recipe`]; its hash
-//! names the folder in the user's cache. The folder is made beside its final place and moved there
-//! whole, so an interrupted import leaves nothing. A case goes by the first digits of that hash:
-//! file names may hold a patient's name. What the images are ([`Facts`]) is kept too: who chooses
-//! the numbers by it need not read them again.
+//! A case depends only on the bytes of the inputs and the numbers in [`Recipe`]; their hash names
+//! the folder in the user's cache. The folder is filled under a temporary name and then moved, so
+//! an interrupted import leaves nothing. A case is named by the first digits of that hash, because
+//! file names may contain a patient's name. Properties of the images ([`Facts`]) are cached too, so
+//! that the numbers can be chosen without reading the images again.
 
 use crate::case::anatomy::{cropped, find_brain, make_brain, make_classes, make_skull, read_ct, read_mri, registered};
 use crate::case::cache::Cache;
@@ -32,120 +32,122 @@ use trepan_budget::{Rows, Scene};
 use trepan_haptics::script::Site;
 use trepan_volume::{DistanceField, VoxelVolume, bone_isovalue, overlap, skull_only};
 
-/// Opens a case: from the cache if it was made before, else from the files, with a progress bar.
+/// Opens a case: from the cache if it was built before, else from the files, with a progress bar.
 pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -> Result<Case, SessionError> {
     open_by(program, inputs, recipe, cache, |_| Ok(*recipe))
 }
 
-/// The same, with the voxel size and the tetrahedra of a recipe that is made when the images are
-/// known.
+/// Opens a case whose voxel size and tetrahedra are chosen by `choose` when the images are known.
 pub fn open_by(
     program: Program,
     inputs: &Inputs,
-    wanted: &Recipe,
+    requested: &Recipe,
     cache: &Cache,
-    choose: impl FnOnce(&mut Known) -> Result<Recipe, SessionError>,
+    choose: impl FnOnce(&mut PendingCase) -> Result<Recipe, SessionError>,
 ) -> Result<Case, SessionError> {
-    let mut known = Known::of(program, inputs, wanted, cache)?;
-    let recipe = choose(&mut known)?;
-    let Known { facts, notes, key, images, mut stages, .. } = known;
+    let mut pending = PendingCase::of(program, inputs, requested, cache)?;
+    let recipe = choose(&mut pending)?;
+    let PendingCase { facts, notes, key, images, mut stages, .. } = pending;
     let hash = cache.under(&key, &format!("{} {} {}", recipe.spacing_mm, recipe.tets, recipe.halvings));
     let name = inputs.name.map_or_else(|| format!("case-{}", &hash[..8]), String::from);
-    let hashes = identity::images(inputs, wanted)?;
+    let hashes = identity::images(inputs, requested)?;
     if let Some(Ok(case)) = cache.find(&hash).map(|folder| case_folder::load(&folder)) {
         stages.finish();
         tracing::info!("case {name} from the cache");
         return Ok(Case { images: hashes, ..case });
     }
-    let images = images.map_or_else(|| read(inputs, wanted, &mut stages), Ok)?;
+    let images = images.map_or_else(|| read(inputs, requested, &mut stages), Ok)?;
     let mut case = build(program, inputs, images, &recipe, &mut stages)?;
     (case.name, case.hash, case.images) = (name, hash, hashes);
-    stages.next("keeping the case");
-    // The facts only now: of images that make no case nothing is kept.
+    stages.next("caching the case");
+    // The facts are cached only now: images from which no case can be built leave nothing.
     match cache.keep(&case.hash, |folder| case_folder::save(&case, folder)) {
-        Ok(()) if kept::<Seen>(cache, &key, FACTS).is_none() => keep(&Seen { facts, notes }, cache, &key, FACTS),
+        Ok(()) if cached::<CachedFacts>(cache, &key, FACTS).is_none() => {
+            store(&CachedFacts { facts, notes }, cache, &key, FACTS)
+        }
         Ok(()) => {}
-        Err(fault) => case.notes.push(format!("the case could not be kept for the next start: {fault}")),
+        Err(fault) => case.notes.push(format!("the case could not be cached for the next start: {fault}")),
     }
     tracing::info!("case {} imported in {}", case.name, stages.finish());
     Ok(case)
 }
 
-/// What is kept of images that were read.
+/// Cached properties of images.
 #[derive(Serialize, Deserialize)]
-struct Seen {
+struct CachedFacts {
     facts: Facts,
     notes: Vec<String>,
 }
 
-/// What is known of a case before it is made.
-pub struct Known<'a> {
-    /// What its images are, from the cache if they were read before.
+/// A case before it is built: its inputs and properties.
+pub struct PendingCase<'a> {
+    /// Properties of its images, from the cache if they were read before.
     pub facts: Facts,
     /// Remarks on them.
     pub notes: Vec<String>,
     program: Program,
     inputs: &'a Inputs,
-    wanted: &'a Recipe,
+    requested: &'a Recipe,
     cache: &'a Cache,
     key: String,
     images: Option<Images>,
     stages: ImportStages,
 }
 
-impl<'a> Known<'a> {
-    /// Reads the images where they were not read before.
+impl<'a> PendingCase<'a> {
+    /// Reads the images unless their properties are cached.
     pub fn of(
         program: Program,
         inputs: &'a Inputs,
-        wanted: &'a Recipe,
+        requested: &'a Recipe,
         cache: &'a Cache,
     ) -> Result<Self, SessionError> {
-        let key = key_of_images(program, inputs, wanted, cache)?;
+        let key = key_of_images(program, inputs, requested, cache)?;
         let mut stages = ImportStages::new(7);
-        let (Seen { facts, notes }, images) = match kept(cache, &key, FACTS) {
-            Some(seen) => (seen, None),
+        let (CachedFacts { facts, notes }, images) = match cached(cache, &key, FACTS) {
+            Some(cached) => (cached, None),
             None => {
-                let images = read(inputs, wanted, &mut stages)?;
-                (Seen { facts: facts_of(&images), notes: images.notes.clone() }, Some(images))
+                let images = read(inputs, requested, &mut stages)?;
+                (CachedFacts { facts: facts_of(&images), notes: images.notes.clone() }, Some(images))
             }
         };
-        Ok(Self { facts, notes, program, inputs, wanted, cache, key, images, stages })
+        Ok(Self { facts, notes, program, inputs, requested, cache, key, images, stages })
     }
 
-    /// Keeps the facts where they were not kept before.
-    pub fn keep(&self) {
+    /// Caches the facts unless they are cached already.
+    pub fn store(&self) {
         if self.images.is_some() {
-            keep(&Seen { facts: self.facts, notes: self.notes.clone() }, self.cache, &self.key, FACTS);
+            store(&CachedFacts { facts: self.facts, notes: self.notes.clone() }, self.cache, &self.key, FACTS);
         }
     }
 
-    /// How far these choices are off in this case, from the cache if it was looked at before;
-    /// nothing where there is no place to look at.
-    pub fn own(&mut self, scene: &Scene, rows: &Rows) -> Result<CaseErrors, SessionError> {
+    /// Errors of these choices in this case, from the cache if measured before; empty if no opening
+    /// is found.
+    pub fn case_errors(&mut self, scene: &Scene, rows: &Rows) -> Result<CaseErrors, SessionError> {
         let key = self.cache.under(&self.key, &CaseErrors::about(scene, rows));
-        if let Some(own) = kept(self.cache, &key, OWN) {
-            return Ok(own);
+        if let Some(errors) = cached(self.cache, &key, ERRORS) {
+            return Ok(errors);
         }
         if self.images.is_none() {
-            self.images = Some(read(self.inputs, self.wanted, &mut self.stages)?);
+            self.images = Some(read(self.inputs, self.requested, &mut self.stages)?);
         }
-        self.stages.next("measuring how far models are off in this case");
-        let sight = self.images.as_ref().map(|images| sight(self.program, images, self.wanted, scene)).transpose()?;
+        self.stages.next("measuring model errors in this case");
+        let sight =
+            self.images.as_ref().map(|images| sight(self.program, images, self.requested, scene)).transpose()?;
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-        let own =
+        let errors =
             sight.flatten().map_or_else(CaseErrors::default, |sight| CaseErrors::of(&sight, scene, rows, threads));
-        keep(&own, self.cache, &key, OWN);
-        Ok(own)
+        store(&errors, self.cache, &key, ERRORS);
+        Ok(errors)
     }
 
-    /// Says something that must not meet the progress bar.
-    pub fn say(&self, call: impl FnOnce()) {
+    /// Hides the progress bar during a call that prints.
+    pub fn suspend_progress(&self, call: impl FnOnce()) {
         self.stages.suspend(call);
     }
 }
 
-/// What of the images a session opens and sees first; `None` where no opening is found.
+/// Skull, brain and first view at the opening, to measure errors on; `None` if no opening is found.
 fn sight(program: Program, images: &Images, recipe: &Recipe, scene: &Scene) -> Result<Option<Sight>, SessionError> {
     let classes = images.mask.as_ref().map(cropped).transpose()?;
     let of_bone = |ct: &VoxelVolume<i16>| {
@@ -169,19 +171,19 @@ fn sight(program: Program, images: &Images, recipe: &Recipe, scene: &Scene) -> R
     }))
 }
 
-/// Names the images, and what of a recipe says how they are read.
-fn key_of_images(program: Program, inputs: &Inputs, wanted: &Recipe, cache: &Cache) -> Result<String, SessionError> {
-    needs(program, inputs, wanted)?;
+/// Cache key of the images and of the recipe's numbers for reading them.
+fn key_of_images(program: Program, inputs: &Inputs, requested: &Recipe, cache: &Cache) -> Result<String, SessionError> {
+    needs(program, inputs, requested)?;
     let images = [&inputs.ct, &inputs.mri, &inputs.labels];
     let tissues = inputs.tissues.iter().map(|source| &source.path);
     let files: Vec<&Path> = images.into_iter().flatten().chain(tissues).map(PathBuf::as_path).collect();
     let given = images.map(Option::is_some);
     let meant: Vec<_> = inputs.tissues.iter().map(|source| (source.class, &source.codes)).collect();
-    let of_images = Recipe { spacing_mm: 0.0, tets: 0, halvings: 0, ..*wanted };
+    let of_images = Recipe { spacing_mm: 0.0, tets: 0, halvings: 0, ..*requested };
     cache.key(&files, &format!("{of_images:?} {given:?} {meant:?}"))
 }
 
-fn needs(program: Program, inputs: &Inputs, wanted: &Recipe) -> Result<(), SessionError> {
+fn needs(program: Program, inputs: &Inputs, requested: &Recipe) -> Result<(), SessionError> {
     let lacks = |flag: &str, what: &str| {
         Err(SessionError::Usage(format!(
             "{} needs {what}: give {flag}, or no image at all for the built-in case",
@@ -197,8 +199,8 @@ fn needs(program: Program, inputs: &Inputs, wanted: &Recipe) -> Result<(), Sessi
     let idle = [
         ("--labels", inputs.labels.is_some() && inputs.mri.is_none(), "--mri PATH"),
         ("--tissue", !inputs.tissues.is_empty() && inputs.mri.is_none(), "--mri PATH"),
-        ("--register", wanted.register && (inputs.ct.is_none() || inputs.mri.is_none()), "both --ct and --mri"),
-        ("--opening", wanted.opening.is_some() && inputs.ct.is_none(), "--ct PATH"),
+        ("--register", requested.register && (inputs.ct.is_none() || inputs.mri.is_none()), "both --ct and --mri"),
+        ("--opening", requested.opening.is_some() && inputs.ct.is_none(), "--ct PATH"),
     ];
     match idle.into_iter().find(|(_, idle, _)| *idle) {
         Some((flag, _, needed)) => {
@@ -208,7 +210,7 @@ fn needs(program: Program, inputs: &Inputs, wanted: &Recipe) -> Result<(), Sessi
     }
 }
 
-/// The images as they were read, and the brain found in them.
+/// The images as read, and the brain segmented from them.
 struct Images {
     ct: Option<VoxelVolume<i16>>,
     mri: Option<VoxelVolume<f32>>,
@@ -229,14 +231,14 @@ fn read(inputs: &Inputs, recipe: &Recipe, stages: &mut ImportStages) -> Result<I
     let (mut fit, mut ct_from_mri) = (Fit::new(), DAffine3::IDENTITY);
     if let (Some(ct), Some(mri)) = (&ct, &mut mri) {
         if recipe.register {
-            stages.next("fitting the MRI to the CT");
-            fit.look(ct, mri, isovalue_hu);
+            stages.next("registering the MRI to the CT");
+            fit.add(ct, mri, isovalue_hu);
             ct_from_mri = registered(ct, mri, &mut notes)?;
         }
         overlap(ct, mri).map_err(|fault| SessionError::Case(fault.to_string()))?;
-        fit.look(ct, mri, isovalue_hu);
+        fit.add(ct, mri, isovalue_hu);
     }
-    stages.next("finding the brain");
+    stages.next("segmenting the brain");
     let space = ct.as_ref().map(|ct| Space { ct, isovalue_hu, registered: recipe.register });
     if let Some((space, mri)) = space.as_ref().zip(mri.as_ref()) {
         notes.extend(space.check_mri(mri)?);
@@ -265,7 +267,7 @@ fn build(
     let classes = mask.map(|mask| make_classes(inputs, &mask, ct_from_mri, &mut notes)).transpose()?;
     let on_skull = |(ct, skull)| Opening::planned(ct, skull, isovalue_hu, classes.as_ref(), recipe);
     let opening = match ct.as_ref().zip(skull.as_ref()).map(on_skull).transpose() {
-        // Who drills nothing needs none.
+        // A program that does not drill needs no opening.
         Err(_) if !program.has_bone() && recipe.opening.is_none() => None,
         found => found?,
     };
@@ -275,15 +277,15 @@ fn build(
     Ok(Case { recipe: Some(*recipe), fit_png, skull, isovalue_hu, brain, opening, notes, ..Case::default() })
 }
 
-/// Volume of what is not 0, mm³.
+/// Volume of the nonzero voxels, mm³.
 pub fn volume_mm3(mask: &VoxelVolume<u8>) -> f64 {
     mask.data.iter().filter(|&&v| v != 0).count() as f64 * mask.spacing_mm().element_product()
 }
 
-/// What the facts are kept in.
+/// Cache file of the facts.
 const FACTS: &str = "facts.json";
-/// What was found in this case is kept in.
-const OWN: &str = "own.json";
+/// Cache file of the errors measured in this case.
+const ERRORS: &str = "own.json";
 
 fn facts_of(images: &Images) -> Facts {
     Facts {
@@ -292,15 +294,15 @@ fn facts_of(images: &Images) -> Facts {
     }
 }
 
-fn kept<T: DeserializeOwned>(cache: &Cache, key: &str, file: &str) -> Option<T> {
+fn cached<T: DeserializeOwned>(cache: &Cache, key: &str, file: &str) -> Option<T> {
     serde_json::from_slice(&std::fs::read(cache.find(key)?.join(file)).ok()?).ok()
 }
 
-/// Keeps it where that is possible; where it is not, it is found once more.
-fn keep(what: &impl Serialize, cache: &Cache, key: &str, file: &str) {
+/// Caches a value; if that fails, it is computed again next time.
+fn store(value: &impl Serialize, cache: &Cache, key: &str, file: &str) {
     let write = |folder: &Path| {
-        let json = serde_json::to_vec(what).map_err(|fault| fault.to_string())?;
+        let json = serde_json::to_vec(value).map_err(|fault| fault.to_string())?;
         std::fs::write(folder.join(file), json).map_err(|fault| fault.to_string())
     };
-    cache.keep(key, write).err().into_iter().for_each(|fault| tracing::debug!("{file} not kept: {fault}"));
+    cache.keep(key, write).err().into_iter().for_each(|fault| tracing::debug!("{file} not cached: {fault}"));
 }

@@ -1,4 +1,4 @@
-//! From a patient's files to the operating table.
+//! Builds and opens cases from a patient's files.
 
 pub(crate) mod anatomy;
 pub(crate) mod cache;
@@ -22,29 +22,29 @@ use std::path::PathBuf;
 use trepan_mesh::TetMesh;
 use trepan_volume::VoxelVolume;
 
-/// The files of a case.
+/// Input files of a case.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inputs {
     /// A name that may be shown; `None` for a user's own files.
     pub name: Option<&'static str>,
-    /// CT, where there is one.
+    /// CT, if any.
     pub ct: Option<PathBuf>,
-    /// MRI, where there is one.
+    /// MRI, if any.
     pub mri: Option<PathBuf>,
-    /// Labels, where there are some: what is not 0 is brain.
+    /// Label volume of the brain, if any: all nonzero voxels.
     pub labels: Option<PathBuf>,
-    /// What in the brain is of another kind.
+    /// Label volumes of tissue classes inside the brain.
     pub tissues: Vec<TissueSource>,
 }
 
-/// The numbers that a case depends on.
+/// Parameters of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Recipe {
     /// Edge of a skull voxel, mm.
     pub spacing_mm: f32,
     /// Tetrahedra of the brain.
     pub tets: usize,
-    /// How often their edges are halved around the opening.
+    /// Halvings of the edge length around the opening.
     #[serde(default)]
     pub halvings: u32,
     /// Threshold of bone, HU; `None` for the histogram's.
@@ -54,32 +54,32 @@ pub struct Recipe {
     pub ct_series: Option<usize>,
     /// Which series of the MRI's folder.
     pub mri_series: Option<usize>,
-    /// Whether the MRI, and labels with it, are moved to where they fit the CT.
+    /// Whether the MRI, and the labels with it, are registered to the CT.
     pub register: bool,
-    /// A point outside the skull over the place to open, RAS mm; `None` for one that is found.
+    /// Point outside the skull over the place to open, RAS mm; `None` for an automatic choice.
     pub opening: Option<[f32; 3]>,
 }
 
-/// What a session needs of the patient.
+/// Patient data of a session.
 #[derive(Clone, Debug, Default)]
 pub struct Case {
-    /// A name without a patient in it.
+    /// Name, which does not contain a patient's.
     pub name: String,
     /// Hash of inputs and recipe, hexadecimal.
     pub hash: String,
     /// Hash of each of the patient's images, by `ct` and `mri`; empty in folders of older versions.
     pub images: BTreeMap<String, String>,
-    /// The numbers that it was made by; `None` only for a case that was put together by hand.
+    /// Parameters that it was built with; `None` only for a case assembled in code.
     pub recipe: Option<Recipe>,
-    /// Skull densities in HU on a grid of cubes, largest piece only; `None` without a CT.
+    /// Skull densities in HU on cubic voxels, largest piece only; `None` without a CT.
     pub skull: Option<VoxelVolume<i16>>,
     /// Threshold of bone, HU.
     pub isovalue_hu: i16,
     /// The brain; `None` without an MRI.
     pub brain: Option<Brain>,
-    /// Where the skull is to be opened; `None` without one.
+    /// Planned opening of the skull; `None` without one.
     pub opening: Option<Opening>,
-    /// How CT and MRI fit, as a PNG file's bytes; `None` without both.
+    /// Overlay of CT and MRI, as the bytes of a PNG file; `None` unless both are given.
     pub fit_png: Option<Vec<u8>>,
     /// Remarks of the import.
     pub notes: Vec<String>,
@@ -90,8 +90,7 @@ pub struct Case {
 /// The brain of a case.
 #[derive(Clone, Debug)]
 pub struct Brain {
-    /// 0 outside, a [`TissueClass`](tissue::TissueClass)'s code inside, on a grid of cubes around
-    /// the brain.
+    /// Codes of [`TissueClass`](tissue::TissueClass) on cubic voxels around the brain; 0 outside.
     pub classes: VoxelVolume<u8>,
     /// The MRI on the same grid.
     pub mri: VoxelVolume<f32>,

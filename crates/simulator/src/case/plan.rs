@@ -1,13 +1,13 @@
-//! What is planned to be taken away: a burr hole, or a flap with a burr hole at its rim.
+//! Plans the removal of bone: a burr hole, or a flap with a burr hole at its rim.
 //!
 //! # Theory
-//! The flap is a round piece: rays parallel to the way in, on a circle around it, meet the outer
-//! table and leave the inner one; these points are its outline. The cut runs along it, from the
-//! burr hole at its first point. The planned volume is all bone within half a cut of the outline,
-//! and within the hole, along the way in.
+//! The flap is round: rays parallel to the entry direction, on a circle around it, intersect the
+//! outer and the inner table; these points are its outline. The cut follows the outline from the
+//! burr hole at its first point. The planned volume is all bone inside the outline plus half a
+//! cut's width, and inside the hole, along the entry direction.
 //!
 //! # When not to use it
-//! To plan a real operation: it knows no vessels, sinuses or eloquent cortex.
+//! To plan a real operation: vessels, sinuses and eloquent cortex are ignored.
 
 use trepan_geometry::{Quat, Vec3};
 use trepan_haptics::script::{Rim, Site};
@@ -15,13 +15,13 @@ use trepan_volume::{BoneVolume, FlapSearch, VoxelVolume};
 
 /// Points of an outline.
 const RIMS: usize = 48;
-/// How far around the opening bone is looked for outside of its entry, mm.
+/// Search range for bone outside the entry, mm.
 const OUTSIDE_MM: f32 = 25.0;
-/// How far inside of it.
+/// Search range for bone inside the entry, mm.
 const INSIDE_MM: f32 = 35.0;
-/// Bone farther below the outer table than this is not the skull's vault, mm.
+/// Depth below the outer table beyond which bone is not the vault's, mm.
 const VAULT_MM: f32 = 15.0;
-/// How far around a flap bone counts as the skull, mm beyond its radius.
+/// Margin around a flap in which bone counts as the skull, mm.
 const AROUND_MM: f32 = 15.0;
 /// Half the width of a craniotome's cut, mm.
 const HALF_CUT_MM: f32 = 1.2;
@@ -30,7 +30,7 @@ const STEP_MM: f32 = 0.1;
 /// A planned operation.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Where the skull is opened: the hole, or the middle of the flap.
+    /// Site of the opening: the hole, or the centre of the flap.
     pub site: Site,
     /// Radius of the hole, mm.
     pub hole_mm: f32,
@@ -41,8 +41,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A hole of `hole_mm` radius at the site, or at the rim of a flap of `flap_mm` radius around
-    /// the site. `None` when the skull does not go all around the flap.
+    /// Plans a hole of `hole_mm` radius at the site, or at the rim of a flap of `flap_mm` radius
+    /// around it. `None` if the skull does not surround the flap.
     pub fn new(bone: Option<&BoneVolume>, site: Site, hole_mm: f32, flap_mm: f32) -> Option<Self> {
         let outline = match bone.filter(|_| flap_mm > 0.0) {
             Some(bone) => outline(bone, &site, flap_mm)?,
@@ -51,19 +51,19 @@ impl Plan {
         Some(Self { site, hole_mm, flap_mm: if outline.is_empty() { 0.0 } else { flap_mm }, outline })
     }
 
-    /// Looks for the flap where it may be cut free; `None` without one.
+    /// Search for the free flap during drilling; `None` without a flap.
     pub fn search(&self, bone: &BoneVolume) -> Option<FlapSearch> {
         let Site { entry, inward, .. } = self.site;
         let (from, to) = (entry - OUTSIDE_MM * inward, entry + VAULT_MM * inward);
         (!self.outline.is_empty()).then(|| FlapSearch::new(bone, entry, self.flap_mm + AROUND_MM, from, to))
     }
 
-    /// Middle of the burr hole on the outer table.
+    /// Centre of the burr hole on the outer table.
     pub fn hole(&self) -> Vec3 {
         self.outline.first().map_or(self.site.entry, |rim| rim.outer)
     }
 
-    /// Whether the plan takes a place away, if there is bone.
+    /// Whether the plan removes bone at a place.
     pub fn takes(&self, place: Vec3) -> bool {
         let within = |middle: Vec3, radius_mm: f32| {
             let from = place - middle;
@@ -74,7 +74,7 @@ impl Plan {
         within(self.hole(), self.hole_mm) || self.flap_mm > 0.0 && within(self.site.entry, self.flap_mm + HALF_CUT_MM)
     }
 
-    /// Which of a skull's voxels are planned to go.
+    /// Marks the voxels of a skull that are planned to be removed.
     pub fn of(&self, skull: &VoxelVolume<i16>, isovalue: i16) -> Vec<bool> {
         let [nx, ny, _] = skull.dims;
         let planned = |(at, hu): (usize, &i16)| {
@@ -84,7 +84,7 @@ impl Plan {
     }
 }
 
-/// Where rays on a circle around the site pass the bone.
+/// Outline of the flap: rays on a circle around the site, intersected with the bone.
 fn outline(bone: &BoneVolume, site: &Site, radius_mm: f32) -> Option<Vec<Rim>> {
     let turn = Quat::from_rotation_arc(Vec3::Z, -site.inward.normalize());
     (0..RIMS)
@@ -95,7 +95,7 @@ fn outline(bone: &BoneVolume, site: &Site, radius_mm: f32) -> Option<Vec<Rim>> {
         .collect()
 }
 
-/// Outer table and thickness of the vault on a way in through `place`.
+/// Outer table and thickness of the vault on the line through `place`.
 fn rim(bone: &BoneVolume, place: Vec3, inward: Vec3) -> Option<Rim> {
     let is_bone = |mm: f32| bone.is_bone(bone.voxel_of(place + mm * inward));
     let steps =

@@ -1,4 +1,4 @@
-//! The operating table: a case made ready to be touched, drilled and pressed.
+//! Prepares a case for contact, drilling and deformation.
 
 use crate::case::opening::bare_brain;
 use crate::case::tissue::TissueClass;
@@ -12,26 +12,26 @@ use trepan_haptics::script::Site;
 use trepan_mesh::{Surface, TetMesh};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
-/// Brain nodes nearer to bone than this, in the lower part of the brain, do not move, mm.
-const HELD_BY_BONE_MM: f32 = 6.0;
+/// Distance to bone below which surface nodes of the lower brain are fixed, mm.
+const FIXED_BY_BONE_MM: f32 = 6.0;
 /// The lower part of the brain, as a share of its height.
 const LOWER_PART: f32 = 0.35;
-/// How far around tissue its distance is known, mm: more than the widest tool's radius and what it
-/// is warned at.
+/// Margin of a distance field around tissue, mm: more than the widest tool's radius and its warning
+/// distance.
 const ROOM_MM: f32 = 9.0;
-/// Fewer held nodes than this do not hold a brain.
-const FEWEST_HELD: usize = 12;
+/// Smallest number of fixed nodes that supports a brain.
+const MIN_FIXED: usize = 12;
 
-/// What the stages share.
+/// Patient data that the stages share.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// The skull, while it is drilled.
+    /// The skull in its current state.
     pub bone: Option<Arc<BoneVolume>>,
     /// The brain at rest.
     pub brain: Option<RestBrain>,
     /// Where to operate.
     pub site: Site,
-    /// How CT and MRI fit, as a PNG file's bytes.
+    /// Overlay of CT and MRI, as the bytes of a PNG file.
     pub fit_png: Option<Vec<u8>>,
     /// Remarks for the user.
     pub remarks: Vec<String>,
@@ -52,12 +52,12 @@ pub struct RestBrain {
     pub classes: VoxelVolume<u8>,
     /// The MRI around it.
     pub mri: VoxelVolume<f32>,
-    /// Colours that mark tissue classes in it; `None` where no class is marked.
+    /// Colours of marked tissue classes; `None` if no class is marked.
     pub tint: Option<Vec<[u8; 3]>>,
 }
 
 impl Scene {
-    /// Makes a case ready for a program.
+    /// Prepares a case for a program.
     pub fn new(program: Program, case: Case) -> Result<Self, SessionError> {
         let mut remarks = case.notes;
         let bone = match &case.skull {
@@ -69,7 +69,7 @@ impl Scene {
         };
         let brain = case.brain.map(|brain| rest_brain(brain, bone.as_deref(), &mut remarks));
         if brain.is_none() {
-            remarks.push("without an MRI nothing warns before the burr reaches the brain".into());
+            remarks.push("without an MRI there is no warning before the burr reaches the brain".into());
         }
         let site = match (case.opening, &brain) {
             (Some(opening), _) if program.has_bone() => Some(opening.into()),
@@ -88,11 +88,11 @@ impl Scene {
 }
 
 impl RestBrain {
-    /// Distance to the tissue of some classes, mm, right up to 9 mm and at least that beyond;
-    /// `None` where there is none of it.
-    pub fn distance_to(&self, wanted: &[TissueClass]) -> Option<DistanceField> {
+    /// Distance to the tissue of some classes, mm: exact up to 9 mm, at least 9 mm beyond. `None`
+    /// without such tissue.
+    pub fn distance_to(&self, classes: &[TissueClass]) -> Option<DistanceField> {
         let [nx, ny, _] = self.classes.dims;
-        let is = |at: &usize| wanted.iter().any(|class| class.code() == self.classes.data[*at]);
+        let is = |at: &usize| classes.iter().any(|class| class.code() == self.classes.data[*at]);
         let place = |at: usize| IVec3::from([at % nx, at / nx % ny, at / (nx * ny)].map(|n| n as i32));
         let all: Vec<IVec3> = (0..self.classes.data.len()).filter(is).map(place).collect();
         let low = all.iter().copied().reduce(IVec3::min)?;
@@ -110,9 +110,12 @@ impl RestBrain {
 }
 
 fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>) -> RestBrain {
-    let mut fixed = bone.map(|bone| held_by_bone(&brain.mesh, bone)).unwrap_or_default();
-    if fixed.len() < FEWEST_HELD {
-        remarks.push("too little bone lies under the brain to hold it: its lowest fifth is held instead".into());
+    let mut fixed = bone.map(|bone| fixed_by_bone(&brain.mesh, bone)).unwrap_or_default();
+    if fixed.len() < MIN_FIXED {
+        remarks.push(
+            "too little bone lies under the brain to support it: the nodes of its lowest fifth are fixed instead"
+                .into(),
+        );
         fixed = below(&brain.mesh, 0.2);
     }
     let marked = TissueClass::ALL.map(TissueClass::tint);
@@ -124,8 +127,8 @@ fn rest_brain(brain: Brain, bone: Option<&BoneVolume>, remarks: &mut Vec<String>
     RestBrain { fixed, field, mesh, class_of_tet, classes, mri, tint }
 }
 
-/// Surface nodes near the skull base.
-fn held_by_bone(mesh: &TetMesh, bone: &BoneVolume) -> Vec<u32> {
+/// Surface nodes of the lower brain near bone.
+fn fixed_by_bone(mesh: &TetMesh, bone: &BoneVolume) -> Vec<u32> {
     let mut on_surface = vec![false; mesh.positions.len()];
     Surface::of(mesh).triangles.iter().flatten().for_each(|&node| on_surface[node as usize] = true);
     below(mesh, LOWER_PART)
@@ -141,14 +144,14 @@ fn below(mesh: &TetMesh, share: f32) -> Vec<u32> {
 }
 
 fn near_bone(point: Vec3, bone: &BoneVolume) -> bool {
-    let reach = (HELD_BY_BONE_MM / bone.spacing_mm()).ceil() as i32;
+    let reach = (FIXED_BY_BONE_MM / bone.spacing_mm()).ceil() as i32;
     let centre = bone.voxel_of(point);
     let offsets = || -reach..=reach;
     offsets().any(|k| {
         offsets().any(|j| {
             offsets().any(|i| {
                 let voxel = centre + IVec3::new(i, j, k);
-                bone.is_bone(voxel) && bone.centre_of(voxel).distance(point) <= HELD_BY_BONE_MM
+                bone.is_bone(voxel) && bone.centre_of(voxel).distance(point) <= FIXED_BY_BONE_MM
             })
         })
     })

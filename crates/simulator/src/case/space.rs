@@ -1,10 +1,10 @@
-//! Whether an MRI lies in the CT's space: its brain must lie inside the CT's skull.
+//! Checks that an MRI lies in the CT's space: its brain must lie inside the CT's skull.
 //!
 //! # Theory
-//! The brain is found in the MRI alone and compared with the space inside the skull in the CT
-//! ([`BrainFit`]): the share of the brain that lies outside, the share of the space that it fills,
-//! and the distance between their middles. Boxes of images say little: a scanner's box is as large
-//! for a head that lies elsewhere in it.
+//! The brain is segmented from the MRI alone and compared with the intracranial space of the CT
+//! ([`BrainFit`]): the share of the brain outside, the share of the space filled, and the distance
+//! between the centres. The boxes of the images are no criterion: a scanner's field of view does
+//! not depend on where the head lies in it.
 //!
 //! # When not to use it
 //! To judge a registration: an error of some millimetres passes. Look at the slices for that.
@@ -12,17 +12,17 @@
 use crate::error::SessionError;
 use trepan_volume::{BrainFit, TooLarge, VoxelVolume, brain_by_mri, brain_fit};
 
-/// A CT's space.
+/// CT that an MRI is compared with.
 pub struct Space<'a> {
     /// The CT.
     pub ct: &'a VoxelVolume<i16>,
     /// Its threshold of bone, HU.
     pub isovalue_hu: i16,
-    /// Whether the MRI was moved to where it fits.
+    /// Whether the MRI was registered to the CT.
     pub registered: bool,
 }
 
-/// What a fit is taken for.
+/// Result of the comparison.
 #[derive(Debug, PartialEq)]
 enum Verdict {
     Fits,
@@ -30,13 +30,19 @@ enum Verdict {
     Apart,
 }
 
-/// From here on a user is warned. Two heads whose images fit have 0.00, 0.75 and 2 mm; 10 degrees
-/// and 10 mm off they have 0.01 to 0.05, 0.68 and 9 to 16 mm.
+/// Limits beyond which the user is warned.
+///
+/// | images | share outside | share filled | centres, mm |
+/// |---|---|---|---|
+/// | two heads, aligned | 0.00 | 0.75 | 2 |
+/// | off by 10 degrees and 10 mm | 0.01 to 0.05 | 0.68 | 9 to 16 |
+/// | off by 20 degrees and 30 mm | 0.15 to 0.29 | 0.5 | 26 to 39 |
+/// | of two patients | 0.27 | 0.44 | 37 |
 const DOUBTFUL: BrainFit = BrainFit { outside_share: 0.03, filled_share: 0.5, middles_mm: 8.0 };
 
-/// From here on the images are refused. 20 degrees and 30 mm off the two heads have 0.15 to 0.29,
-/// 0.5 and 26 to 39 mm, two patients' images 0.27, 0.44 and 37 mm. Little is made of the filled
-/// share: an old brain, or a mask without the water around the brain, fills little.
+/// Limits beyond which the images are refused; measured values are at [`DOUBTFUL`]. The limit of
+/// the filled share is low, because an old brain, or a mask without the fluid around the brain,
+/// fills little.
 const APART: BrainFit = BrainFit { outside_share: 0.1, filled_share: 0.3, middles_mm: 20.0 };
 
 impl Verdict {
@@ -55,15 +61,15 @@ impl Verdict {
 }
 
 impl Space<'_> {
-    /// Compares an MRI's brain with the skull; gives a remark where it fits badly.
+    /// Compares an MRI's brain with the skull; returns a remark if it fits badly.
     pub fn check_mri(&self, mri: &VoxelVolume<f32>) -> Result<Option<String>, SessionError> {
         match brain_by_mri(mri).map_err(large)? {
             Some(brain) => self.check("the MRI's brain", &brain),
-            None => Ok(Some("no brain was seen in the MRI alone: whether it lies in the CT's space is not checked; look at the picture of how they fit in the report".into())),
+            None => Ok(Some("no brain was found in the MRI alone: whether it lies in the CT's space is not checked; check the overlay of both in the report".into())),
         }
     }
 
-    /// The same for a brain mask.
+    /// Compares a brain mask with the skull; returns a remark if it fits badly.
     pub fn check(&self, what: &str, brain: &VoxelVolume<u8>) -> Result<Option<String>, SessionError> {
         let Some(fit) = brain_fit(brain, self.ct, self.isovalue_hu).map_err(large)? else {
             return Ok(Some(
@@ -71,7 +77,7 @@ impl Space<'_> {
             ));
         };
         let found = format!(
-            "{:.0} % of {what} lies outside the CT's skull, {:.0} % of the space inside is filled, the middles lie {:.0} mm apart",
+            "{:.0} % of {what} lies outside the CT's skull, {:.0} % of the space inside is filled, the centres lie {:.0} mm apart",
             100.0 * fit.outside_share,
             100.0 * fit.filled_share,
             fit.middles_mm
@@ -80,7 +86,7 @@ impl Space<'_> {
         let remedy = match self.registered {
             false => "give --register to move the MRI to the CT, or images in one space",
             true => {
-                "--register found no good place: give images of one patient, or register them elsewhere and leave --register out"
+                "--register found no good fit: give images of one patient, or register them elsewhere and leave --register out"
             }
         };
         match Verdict::of(&fit) {
@@ -104,8 +110,8 @@ mod tests {
     use std::path::Path;
     use trepan_volume::{bone_isovalue, hounsfield, nifti};
 
-    /// What is said of a head's MRI turned and shifted from where it is: an error for a refusal.
-    fn said(folder: &Path, [ct, mri]: [&str; 2], degrees: f64, shift_mm: f64) -> Result<Option<String>, String> {
+    /// Checks a head's MRI after a rotation and a shift; an error is a refusal.
+    fn checked(folder: &Path, [ct, mri]: [&str; 2], degrees: f64, shift_mm: f64) -> Result<Option<String>, String> {
         let ct = hounsfield(&nifti::read(&folder.join(ct)).unwrap()).unwrap();
         let mut mri = nifti::read(&folder.join(mri)).unwrap();
         let (low, high) = mri.world_corners();
@@ -117,22 +123,22 @@ mod tests {
         space.check_mri(&mri).map_err(|fault| fault.to_string())
     }
 
-    fn judged(folder: &Path, files: [&str; 2]) {
-        assert_eq!(said(folder, files, 0.0, 0.0), Ok(None));
-        assert_eq!(said(folder, files, 2.0, 2.0), Ok(None));
-        let doubt = said(folder, files, 10.0, 10.0).unwrap().unwrap();
+    fn check_head(folder: &Path, files: [&str; 2]) {
+        assert_eq!(checked(folder, files, 0.0, 0.0), Ok(None));
+        assert_eq!(checked(folder, files, 2.0, 2.0), Ok(None));
+        let doubt = checked(folder, files, 10.0, 10.0).unwrap().unwrap();
         assert!(doubt.contains("may not lie") && doubt.contains("--register"), "{doubt}");
-        let fault = said(folder, files, 20.0, 30.0).unwrap_err();
+        let fault = checked(folder, files, 20.0, 30.0).unwrap_err();
         assert!(fault.contains("does not lie") && fault.contains("--register"), "{fault}");
     }
 
     #[test]
     fn a_head_passes_where_it_lies_and_is_refused_turned_and_shifted() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        judged(&root.join("fixtures/case-head"), ["ct_hu.nii.gz", "mri_t1.nii.gz"]);
+        check_head(&root.join("fixtures/case-head"), ["ct_hu.nii.gz", "mri_t1.nii.gz"]);
         let second = root.join("../shared/data/head-second");
         match second.exists() {
-            true => judged(&second, ["ct/ct_head_hu.nii.gz", "mri/mri_t1_in_ct_grid.nii.gz"]),
+            true => check_head(&second, ["ct/ct_head_hu.nii.gz", "mri/mri_t1_in_ct_grid.nii.gz"]),
             false => println!("{} is not there: only one head was tried", second.display()),
         }
     }

@@ -1,20 +1,20 @@
-//! The stages of an import: shown while they run, and the share of each when they are done.
+//! Progress of an import: shows the running stage, and the share of each stage at the end.
 
 use crate::run::clock::Clock;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
 use std::time::Duration;
 
-/// A progress bar that remembers how long each stage took.
+/// Progress bar that records the duration of each stage.
 pub struct ImportStages {
     bar: ProgressBar,
     clock: Clock,
-    /// What began when, ms.
+    /// Name and start time of each stage, ms.
     began: Vec<(&'static str, f64)>,
 }
 
 impl ImportStages {
-    /// Before the first of `count` stages.
+    /// Shows a bar for `count` stages.
     pub fn new(count: u64) -> Self {
         let style = ProgressStyle::with_template("{spinner} [{bar:24}] {pos}/{len} {msg} {elapsed}");
         let bar = ProgressBar::new(count).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -22,19 +22,19 @@ impl ImportStages {
         Self { bar, clock: Clock::start(), began: Vec::new() }
     }
 
-    /// The stage that begins now; the one before it is done.
+    /// Begins a stage, which ends the one before.
     pub fn next(&mut self, what: &'static str) {
         self.began.push((what, self.clock.now_ms()));
         self.bar.inc(1);
         self.bar.set_message(what);
     }
 
-    /// Does something that speaks for itself, without the bar in between.
+    /// Hides the bar during a call that prints.
     pub fn suspend<T>(&self, call: impl FnOnce() -> T) -> T {
         self.bar.suspend(call)
     }
 
-    /// All are done: "4.5 s: reading the CT 0.9 s (20 %), ...".
+    /// Ends the last stage and describes all: "4.5 s: reading the CT 0.9 s (20 %), ...".
     pub fn finish(self) -> String {
         let end_ms = self.clock.now_ms();
         self.bar.finish_and_clear();

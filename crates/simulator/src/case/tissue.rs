@@ -1,9 +1,9 @@
-//! Tissue classes inside the brain, and which label volumes say so.
+//! Tissue classes inside the brain, and the label volumes that define them.
 //!
 //! # Practice
 //! The brain's class volume holds [`TissueClass::code`]s: 0 outside, 1 brain, more where a label
-//! volume names it. Later sources lie over earlier ones. What lies outside the brain is left out
-//! and counted.
+//! volume names it. Later sources override earlier ones. Labels outside the brain are left out and
+//! counted.
 
 use crate::error::SessionError;
 use glam::DAffine3;
@@ -12,10 +12,10 @@ use std::str::FromStr;
 use trepan_soft::Material;
 use trepan_volume::{Grid, Interpolation, VoxelVolume, resample};
 
-/// What a part of the brain is.
+/// Tissue class of a part of the brain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TissueClass {
-    /// Brain of no special kind.
+    /// Brain without a specific class.
     Brain,
     /// White matter.
     White,
@@ -30,26 +30,26 @@ pub enum TissueClass {
 }
 
 impl TissueClass {
-    /// All of them; the place in the list is one less than the code.
+    /// All classes; the index is the code minus one.
     pub const ALL: [Self; 6] = [Self::Brain, Self::White, Self::Grey, Self::Ventricle, Self::Tumour, Self::Vessel];
 
-    /// Its value in a class volume; 0 is outside.
+    /// Value in a class volume; 0 is outside the brain.
     pub fn code(self) -> u8 {
         self as u8 + 1
     }
 
-    /// Its name in flags and remarks.
+    /// Name in flags and remarks.
     pub fn name(self) -> &'static str {
         ["brain", "white", "grey", "ventricle", "tumour", "vessel"][self as usize]
     }
 
-    /// The class of a name.
+    /// Class with a name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|class| class.name() == name)
     }
 
-    /// The colour that marks it in pictures; black for none. Vermilion and sky blue look apart to
-    /// every eye (Okabe and Ito 2008).
+    /// Colour that marks the class in pictures; black for none. Vermilion and sky blue differ also
+    /// with colour blindness (Okabe and Ito 2008).
     pub fn tint(self) -> [u8; 3] {
         match self {
             Self::Tumour => [213, 94, 0],
@@ -58,11 +58,11 @@ impl TissueClass {
         }
     }
 
-    /// What it is made of when brain has this Young's modulus, MPa: the presets of `soft`, scaled
-    /// alike.
+    /// Material of the class for a Young's modulus of brain, MPa: the presets of `soft`, scaled by
+    /// one factor.
     ///
-    /// A vessel is ten times as stiff as brain. Its wall is stiffer still
-    /// ([`Material::VESSEL_WALL`]), but would make every step of the solver many times shorter.
+    /// A vessel is ten times as stiff as brain. Its wall is stiffer ([`Material::VESSEL_WALL`]),
+    /// but would shorten the stable time step many times.
     pub fn material(self, brain_mpa: f32) -> Material {
         let share = |preset: Material| (preset.young_mpa() / Material::BRAIN.young_mpa()) as f32;
         let young_mpa = brain_mpa
@@ -79,15 +79,15 @@ impl TissueClass {
     }
 }
 
-/// A label volume that says where a class is: `CLASS=PATH`, or `CLASS=PATH:CODE,CODE` where only
-/// some codes mean it.
+/// Label volume of a class: `CLASS=PATH`, or `CLASS=PATH:CODE,CODE` if only some codes belong to
+/// it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TissueSource {
     /// The class.
     pub class: TissueClass,
     /// The label volume.
     pub path: PathBuf,
-    /// The codes that mean it; none = all that are not 0.
+    /// Codes of the class; empty = all nonzero codes.
     pub codes: Vec<u16>,
 }
 
@@ -97,15 +97,15 @@ impl TissueSource {
         Self { class: TissueClass::Ventricle, path, codes: vec![4, 5, 14, 15, 43, 44] }
     }
 
-    fn means(&self, code: u16) -> bool {
+    fn contains(&self, code: u16) -> bool {
         if self.codes.is_empty() { code != 0 } else { self.codes.contains(&code) }
     }
 
-    /// Writes the class's code where the labels say so and there is brain; returns a remark with
-    /// its volume.
+    /// Writes the class's code to the brain voxels with its labels; returns a remark with the
+    /// volume.
     pub fn paint(&self, ct_from_mri: DAffine3, classes: &mut VoxelVolume<u8>) -> Result<String, SessionError> {
         let read = trepan_volume::labels(&self.path, &trepan_volume::read(&self.path)?)?;
-        let mut here = read.map(|code| u8::from(self.means(code)));
+        let mut here = read.map(|code| u8::from(self.contains(code)));
         here.world_from_voxel = ct_from_mri * here.world_from_voxel;
         let all = here.data.iter().filter(|&&v| v != 0).count();
         let all_ml = all as f64 * here.spacing_mm().element_product() * 1e-3;
@@ -118,9 +118,10 @@ impl TissueSource {
         let ml = painted as f64 * classes.spacing_mm().element_product() * 1e-3;
         let name = self.class.name();
         if painted == 0 {
-            let codes = if self.codes.is_empty() { "what is not 0".into() } else { format!("codes {:?}", self.codes) };
+            let codes =
+                if self.codes.is_empty() { "the nonzero codes".into() } else { format!("codes {:?}", self.codes) };
             return Err(SessionError::Case(format!(
-                "--tissue {name}: {}: {codes} fills {all_ml:.1} ml, none of it in the brain: give labels in the MRI's space, and codes that are in them",
+                "--tissue {name}: {}: {codes} fill {all_ml:.1} ml, none of it in the brain: give labels in the MRI's space, and codes that are in them",
                 self.path.display()
             )));
         }

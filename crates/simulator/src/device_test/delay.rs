@@ -1,27 +1,27 @@
-//! How late the hand feels a force, from taps.
+//! Measures the delay from an applied force to the first motion of the hand, from taps.
 //!
 //! # Theory
-//! A tap pushes the hand, and the first new position along it tells that the force has come. A hand
-//! of 0.2 kg needs 2 to 3 ms to move by an encoder's step, so that this is an upper bound: the
-//! driver's, the link's, the motors' and the hand's delay together. The median of the taps keeps a
-//! trembling hand from being taken for an answer; a tap on a hand that moves by itself is left out.
+//! A tap pushes the hand; the delay ends at the first new position displaced along the tap. A hand
+//! of 0.2 kg needs 2 to 3 ms to move by one encoder step, so the result is an upper bound: it
+//! includes the delays of driver, link, motors and hand. The median over the taps rejects tremor;
+//! taps during voluntary motion are left out.
 
 use crate::device_test::measured::Sample;
 use crate::device_test::trial::{Part, TAP_MS};
 use trepan_geometry::Vec3;
 
-/// Motion that counts where encoder steps are finer, mm.
-const LEAST_MM: f32 = 0.01;
+/// Smallest displacement that counts as motion, mm, for encoders with finer steps.
+const MIN_MOTION_MM: f32 = 0.01;
 
-/// A hand holds still that moved less than this, mm, in the last time, ms, before a tap.
+/// Motion below which a hand counts as still, mm, and the time before a tap that it covers, ms.
 const STILL: (f32, f64) = (0.15, 20.0);
 
-/// From a tap to the first motion along it, ms: the median of the taps on a hand that held still;
-/// `None` when most of them moved nothing.
+/// Median delay from a tap to the first motion along it, ms, over taps on a still hand. `None` if
+/// most taps caused no motion.
 pub fn median_ms(samples: &[Sample]) -> Option<f64> {
     let begins = |at: &usize| {
         let (before, now) = (&samples[at - 1], &samples[*at]);
-        now.part == Part::Tap && before.force == Vec3::ZERO && now.force != Vec3::ZERO && held_still(&samples[..=*at])
+        now.part == Part::Tap && before.force == Vec3::ZERO && now.force != Vec3::ZERO && is_still(&samples[..=*at])
     };
     let mut delays: Vec<f64> =
         (1..samples.len()).filter(begins).map(|at| first_motion_ms(&samples[at..]).unwrap_or(f64::INFINITY)).collect();
@@ -29,20 +29,21 @@ pub fn median_ms(samples: &[Sample]) -> Option<f64> {
     delays.get(delays.len() / 2).copied().filter(|delay| delay.is_finite())
 }
 
-/// Whether the hand held still before the last sample.
-fn held_still(samples: &[Sample]) -> bool {
+/// Whether the hand was still before the last sample.
+fn is_still(samples: &[Sample]) -> bool {
     let (within_mm, time_ms) = STILL;
     let Some(last) = samples.last() else { return false };
     let recent = samples.iter().rev().take_while(|s| last.time_ms - s.time_ms < time_ms);
     recent.map(|s| (s.tip.y - last.tip.y).abs()).fold(0.0, f32::max) < within_mm
 }
 
-/// When the hand first moved along the tap that begins the samples, half-way between the readings.
+/// Delay of the first motion along the tap that begins the samples, ms; the midpoint of two
+/// readings.
 fn first_motion_ms(samples: &[Sample]) -> Option<f64> {
     let begin = samples[0];
     let mut last_ms = begin.time_ms;
     for now in samples[1..].iter().take_while(|s| s.time_ms - begin.time_ms < 2.0 * TAP_MS).filter(|s| s.fresh) {
-        if (now.tip.y - begin.tip.y) * begin.force.y > LEAST_MM * begin.force.y.abs() {
+        if (now.tip.y - begin.tip.y) * begin.force.y > MIN_MOTION_MM * begin.force.y.abs() {
             return Some(0.5 * (last_ms + now.time_ms) - begin.time_ms);
         }
         last_ms = now.time_ms;
@@ -72,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hand_that_moves_by_itself_tells_no_delay() {
+    fn a_hand_that_moves_by_itself_gives_no_delay() {
         let (samples, ..) = tested(Config::default(), HandModel::FIRM, |t| 0.02 * t as f32 % 40.0);
         assert_eq!(median_ms(&samples), None);
     }

@@ -1,7 +1,7 @@
-//! What a test found: numbers from its samples.
+//! Computes the numbers of a device test from its samples.
 //!
 //! # Practice
-//! mm, N, ms unless the name says otherwise.
+//! Units are mm, N and ms unless a name says otherwise.
 
 use crate::device_test::findings::Finding;
 use crate::device_test::trial::{FLOOR_N, FLOOR_N_PER_MM, Part};
@@ -14,15 +14,15 @@ use trepan_geometry::Vec3;
 /// One tick of the test.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// When the device was read, ms.
+    /// Time of the reading, ms.
     pub time_ms: f64,
-    /// How long reading took, µs.
+    /// Duration of reading the device, µs.
     pub read_us: f32,
-    /// How long applying took, µs.
+    /// Duration of applying the force, µs.
     pub apply_us: f32,
     /// Whether the position was new.
     pub fresh: bool,
-    /// What the hand was asked to do.
+    /// Part of the test.
     pub part: Part,
     /// The tip, device axes, mm.
     pub tip: Vec3,
@@ -34,9 +34,9 @@ pub struct Sample {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Ending {
-    /// It ran to its end.
+    /// The test was completed.
     Done,
-    /// The script was over.
+    /// The device's script ended.
     Finished,
     /// Ctrl-C or a request to terminate.
     Stopped,
@@ -44,113 +44,114 @@ pub enum Ending {
     Lost,
 }
 
-/// The whole of `device.json`.
+/// Contents of `device.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Measured {
-    /// Name as asked for.
+    /// Requested name of the device.
     pub device: String,
-    /// Name as the device says.
+    /// Name that the driver reports.
     pub model: String,
-    /// How it ended.
+    /// How the test ended.
     pub ended: Ending,
-    /// What was wrong with the device at the end, in words.
+    /// Last fault of the device.
     pub fault: Option<String>,
-    /// How many faults there were.
+    /// Number of faults.
     pub faults: u64,
-    /// What it all means.
+    /// Findings, with remedies.
     pub findings: Vec<Finding>,
-    /// The loop.
+    /// Timing of the haptic loop.
     pub timing: Timing,
-    /// From applied force to seen motion at most, ms; `null` where the device has no motors or
-    /// nothing moved.
+    /// Upper bound of the delay from applied force to motion, ms; `null` if the device has no
+    /// motors or did not move.
     pub delay_ms: Option<f64>,
-    /// Ticks of delay that the driver states.
+    /// Delay that the driver states, ticks.
     pub stated_delay_ticks: u8,
-    /// Where the hand was, mm: lowest, highest, device axes (x right, y up, z to the user).
+    /// Bounding box of the tip, mm: lowest and highest corner, device axes (x right, y up, z to the
+    /// user).
     pub explored_mm: [[f32; 3]; 2],
-    /// Where it could be, mm, by the driver; `null` without limits.
+    /// Size of the workspace that the driver states, mm; `null` without limits.
     pub workspace_mm: Option<[f32; 3]>,
-    /// Smallest step of position by the driver, mm.
+    /// Position resolution that the driver states, mm.
     pub resolution_mm: f32,
-    /// Peak and continuous force by the driver, N.
+    /// Peak and continuous force that the driver states, N.
     pub forces_n: [f32; 2],
-    /// The floor.
+    /// Measurements at the virtual floor.
     pub floor: Floor,
-    /// Force at the very end, N.
+    /// Force of the last tick, N.
     pub end_force_n: f32,
-    /// What the system did not allow.
+    /// Remarks, such as a refused real-time priority.
     pub remarks: Vec<String>,
-    /// The machine.
+    /// The computer.
     pub machine: Machine,
 }
 
-/// When ticks and positions came.
+/// Timing of ticks and positions.
 #[derive(Clone, Debug, Serialize)]
 pub struct Timing {
-    /// Length, s.
+    /// Duration of the test, s.
     pub seconds: f64,
-    /// Ticks a second asked for.
+    /// Requested tick rate, Hz.
     pub asked_hz: f64,
-    /// Ticks a second.
+    /// Measured tick rate, Hz.
     pub tick_hz: f64,
-    /// New positions a second.
+    /// Rate of new positions, Hz.
     pub fresh_hz: f64,
-    /// Ticks that missed their time.
+    /// Ticks that missed their deadline.
     pub late_ticks: u64,
-    /// From one tick to the next, µs.
+    /// Tick period, µs.
     pub tick_us: Quantiles,
-    /// From one new position to the next, µs.
+    /// Time between new positions, µs.
     pub gap_us: Quantiles,
-    /// Distance of a tick from its time, µs.
+    /// Jitter: deviation of the tick period from the requested one, µs.
     pub jitter_us: Quantiles,
-    /// A call of read, µs.
+    /// Duration of a read, µs.
     pub read_us: Quantiles,
-    /// A call of apply, µs.
+    /// Duration of an apply, µs.
     pub apply_us: Quantiles,
 }
 
-/// The gentle wall.
+/// Measurements at the virtual floor, a soft wall.
 #[derive(Clone, Debug, Serialize)]
 pub struct Floor {
     /// Stiffness, N/mm.
     pub stiffness_n_per_mm: f32,
-    /// Longest force, N.
+    /// Force limit, N.
     pub limit_n: f32,
-    /// Its height, mm; `null` when the test ended before.
+    /// Height, mm; `null` if the test ended before this part.
     pub height_mm: Option<f32>,
-    /// Time in which it was touched, s.
+    /// Contact time, s.
     pub touched_s: f64,
-    /// Deepest press, mm.
+    /// Largest penetration depth, mm.
     pub depth_mm: f32,
     /// Largest force, N.
     pub force_n: f32,
-    /// Most energy that it gave beyond what it got, mJ.
+    /// Largest net energy output, mJ.
     pub energy_out_mj: f64,
-    /// What the guard did, ticks.
+    /// Interventions of the force guard, ticks.
     pub guard: GuardSummary,
 }
 
-/// What the test's end knows beside its samples.
-pub struct Course<'a> {
+/// Samples of a test, with the state at its end.
+pub struct TestRun<'a> {
     /// Every tick.
     pub samples: &'a [Sample],
-    /// Length of a tick, ms.
+    /// Tick period, ms.
     pub tick_ms: f64,
-    /// Ticks that missed their time.
+    /// Ticks that missed their deadline.
     pub late: u64,
     /// The floor's guard.
     pub guard: &'a ForceGuard,
-    /// The floor's height.
+    /// Height of the floor, mm.
     pub floor_y: Option<f32>,
 }
 
 impl Timing {
-    /// From samples.
-    pub fn of(course: &Course<'_>) -> Self {
-        let samples = course.samples;
+    /// Computes the timing.
+    pub fn of(run: &TestRun<'_>) -> Self {
+        let samples = run.samples;
         let seconds = span_ms(samples) * 1e-3;
         let ticks = gaps(samples.iter());
-        let jitter = ticks.iter().map(|gap| (gap - course.tick_ms).abs()).collect::<Vec<_>>();
+        let jitter = ticks.iter().map(|gap| (gap - run.tick_ms).abs()).collect::<Vec<_>>();
         let times = |values: &mut dyn Iterator<Item = f32>| {
             let mut times = Times::default();
             values.for_each(|us| times.add_us(us));
@@ -160,10 +161,10 @@ impl Timing {
         let rate = |count: usize| count.saturating_sub(1) as f64 / seconds.max(1e-3);
         Self {
             seconds,
-            asked_hz: 1e3 / course.tick_ms,
+            asked_hz: 1e3 / run.tick_ms,
             tick_hz: rate(samples.len()),
             fresh_hz: rate(samples.iter().filter(|s| s.fresh).count()),
-            late_ticks: course.late,
+            late_ticks: run.late,
             tick_us: ms(&ticks),
             gap_us: ms(&gaps(samples.iter().filter(|s| s.fresh))),
             jitter_us: ms(&jitter),
@@ -174,24 +175,24 @@ impl Timing {
 }
 
 impl Floor {
-    /// From samples.
-    pub fn of(course: &Course<'_>) -> Self {
-        let pressed = course.samples.iter().filter(|s| s.part == Part::Floor && s.force.y > 0.0);
-        let depth = |s: &Sample| course.floor_y.map_or(0.0, |y| (y - s.tip.y).max(0.0));
+    /// Evaluates the samples of the floor part.
+    pub fn of(run: &TestRun<'_>) -> Self {
+        let pressed = run.samples.iter().filter(|s| s.part == Part::Floor && s.force.y > 0.0);
+        let depth = |s: &Sample| run.floor_y.map_or(0.0, |y| (y - s.tip.y).max(0.0));
         Self {
             stiffness_n_per_mm: FLOOR_N_PER_MM,
-            limit_n: FLOOR_N.min(course.guard.config().max_force_n),
-            height_mm: course.floor_y,
-            touched_s: pressed.clone().count() as f64 * course.tick_ms * 1e-3,
+            limit_n: FLOOR_N.min(run.guard.config().max_force_n),
+            height_mm: run.floor_y,
+            touched_s: pressed.clone().count() as f64 * run.tick_ms * 1e-3,
             depth_mm: pressed.clone().map(depth).fold(0.0, f32::max),
             force_n: pressed.map(|s| s.force.length()).fold(0.0, f32::max),
-            energy_out_mj: course.guard.passivity_observer().lowest_nmm().min(0.0).abs(),
-            guard: (&course.guard.counters()).into(),
+            energy_out_mj: run.guard.passivity_observer().lowest_nmm().min(0.0).abs(),
+            guard: (&run.guard.counters()).into(),
         }
     }
 }
 
-/// The box in which the hand was; a point at the origin without samples.
+/// Bounding box of the tip, mm; a point at the origin without samples.
 pub fn explored(samples: &[Sample]) -> [Vec3; 2] {
     let tips = || samples.iter().filter(|s| s.fresh).map(|s| s.tip).filter(|tip| tip.is_finite());
     let low = tips().reduce(Vec3::min).unwrap_or(Vec3::ZERO);
@@ -216,8 +217,8 @@ pub(super) mod tests {
     use trepan_haptics::simulated::{Config, HandModel, Simulated};
     use trepan_haptics::{Capabilities, HapticDevice};
 
-    /// A whole test of a simulated device whose hand means to be at heights `intent(ms)`, without a
-    /// clock.
+    /// Runs a whole test on a simulated device, without a clock. The hand aims at the height
+    /// `intent(ms)`, mm.
     pub fn tested(config: Config, hand: HandModel, intent: impl Fn(f64) -> f32) -> (Vec<Sample>, Trial, Capabilities) {
         let at = |t: u32| ToolState::at(Pose::from_translation(Vec3::Y * intent(t.into())));
         let mut device = Simulated::new(config, hand, Box::new(Replay::new((0..10_000).map(at).collect())));
@@ -235,7 +236,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn box_floor_and_timing_are_what_happened() {
+    fn box_floor_and_timing_match_the_motion() {
         // Up and down by 20 mm while exploring, then pressing the floor, then still.
         let hand = |t: f64| match t {
             t if t < 4000.0 => 20.0 * (t * 2e-3).sin() as f32,
@@ -244,12 +245,11 @@ pub(super) mod tests {
         let (samples, trial, able) = tested(Config::default(), HandModel::FIRM, hand);
         let [low, high] = explored(&samples);
         assert!((high.y - 20.0).abs() < 2.0 && (low.y + 20.0).abs() < 2.0, "{low} {high}");
-        let course =
-            Course { samples: &samples, tick_ms: 1.0, late: 0, guard: trial.guard(), floor_y: trial.floor_y() };
-        let floor = Floor::of(&course);
+        let run = TestRun { samples: &samples, tick_ms: 1.0, late: 0, guard: trial.guard(), floor_y: trial.floor_y() };
+        let floor = Floor::of(&run);
         assert!(floor.force_n > 0.9 && floor.touched_s > 1.5 && floor.energy_out_mj < 0.1, "{floor:?}");
         assert!((floor.height_mm.unwrap() + 8.0).abs() < 2.0, "three tenths of the way up from -20");
-        let timing = Timing::of(&course);
+        let timing = Timing::of(&run);
         assert!((timing.tick_hz - 1000.0).abs() < 1.0 && (timing.gap_us.p99 - 1000.0).abs() < 2.0);
         assert!(timing.jitter_us.max < 0.1 && (timing.read_us.p50 - 2.0).abs() < 0.1);
         assert!(able.axes_driven == 3);
@@ -259,8 +259,8 @@ pub(super) mod tests {
     fn gaps_are_between_new_positions() {
         let (mut samples, trial, _) = tested(Config::default(), HandModel::FIRM, |_| 0.0);
         samples.iter_mut().enumerate().for_each(|(at, s)| s.fresh = at % 4 == 0);
-        let course = Course { samples: &samples, tick_ms: 1.0, late: 7, guard: trial.guard(), floor_y: None };
-        let timing = Timing::of(&course);
+        let run = TestRun { samples: &samples, tick_ms: 1.0, late: 7, guard: trial.guard(), floor_y: None };
+        let timing = Timing::of(&run);
         assert!((timing.fresh_hz - 250.0).abs() < 1.0 && (timing.gap_us.p50 - 4000.0).abs() < 8.0);
         assert!((timing.tick_us.p50 - 1000.0).abs() < 2.0 && timing.late_ticks == 7);
     }

@@ -1,10 +1,10 @@
-//! `device test NAME`: is the device fit for a session? Rate, jitter, delay, range and a gentle
-//! wall, for whoever sits before it.
+//! `device test NAME`: measures rate, jitter, delay, workspace and a soft virtual wall of a haptic
+//! device.
 //!
 //! # Practice
-//! The device is opened first: what is missing is told before a file is made. The loop is a
-//! session's: its own thread, real-time priority where allowed, deadlines on an absolute grid.
-//! Whatever happens, the device is closed, and with it the force.
+//! The device is opened first, so a missing device is reported before any file is written. The loop
+//! is that of a session: its own thread, real-time priority where permitted, absolute deadlines.
+//! However the test ends, the device is closed, which sets its force to zero.
 
 mod delay;
 mod findings;
@@ -18,7 +18,7 @@ use crate::report::summary::Machine;
 use crate::run::clock::{Clock, Schedule};
 use crate::run::stop::Stop;
 use crate::run::threads::{HapticDeviceOwner, real_time};
-use measured::{Course, Ending, Floor, Measured, Sample, Timing};
+use measured::{Ending, Floor, Measured, Sample, TestRun, Timing};
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -29,7 +29,7 @@ use trepan_haptics::simulated::{self, Simulated};
 use trepan_haptics::{Capabilities, DeviceName, HapticDevice, NameError, Status, Watch, Workspace, hardware};
 use trial::{Part, Trial};
 
-/// Most ticks for a force to fade at the end.
+/// Largest number of ticks in which the force fades at the end.
 const FADE_TICKS: u32 = 200;
 
 /// A device to test.
@@ -39,8 +39,8 @@ struct Subject {
     watch: Option<Watch>,
 }
 
-/// Tests the device of a name for some seconds; leaves `device.json` and `device.html` in `out`.
-/// Gives the signal that ended it.
+/// Tests a device for some seconds and writes `device.json` and `device.html` to `out`. Returns the
+/// signal that ended the test, if any.
 pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionError> {
     if !(8.0..=600.0).contains(&seconds) {
         return Err(SessionError::Usage(format!("--duration {seconds} is out of range: give 8 to 600")));
@@ -57,7 +57,7 @@ pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionE
     }
     println!("report: {}", out.join("device.html").display());
     if found.ended == Ending::Lost {
-        return Err(SessionError::Usage(format!("{name} was lost during the test; the report says what was seen")));
+        return Err(SessionError::Usage(format!("{name} was lost during the test; see the report")));
     }
     Ok(stop.signal())
 }
@@ -80,13 +80,13 @@ fn open(name: &str, end_ms: f64) -> Result<Subject, String> {
                 let hardware::Hardware { device, watch } = opened.map_err(|fault| fault.to_string())?;
                 Ok(Subject { name, device, watch: Some(watch) })
             }
-            None => Err(format!("{name} is not a device that can be tested by itself; `--list-devices` names those")),
+            None => Err(format!("{name} cannot be tested; `--list-devices` shows the devices that can")),
         },
     }
 }
 
-/// What the loop leaves.
-struct Felt {
+/// Result of the haptic loop.
+struct LoopResult {
     samples: Vec<Sample>,
     late: u64,
     ended: Ending,
@@ -94,7 +94,7 @@ struct Felt {
     remarks: Vec<String>,
 }
 
-/// Runs the loop on a thread of its own while this one says what to do.
+/// Runs the haptic loop on its own thread; this thread prints the instructions.
 fn test(subject: Subject, end_ms: f64, stop: &Stop) -> (Measured, Vec<Sample>) {
     let Subject { name, device, watch } = subject;
     let able = device.capabilities();
@@ -103,44 +103,48 @@ fn test(subject: Subject, end_ms: f64, stop: &Stop) -> (Measured, Vec<Sample>) {
     let hand = HapticDeviceOwner { device, stop: over.clone() };
     let trial = Trial::new(&able, tick_ms as f32, end_ms);
     let part = AtomicU8::new(Part::Over as u8);
-    println!("testing {name} ({}) for {:.0} s; Ctrl-C ends it without force", able.name, 1e-3 * end_ms);
-    let felt = std::thread::scope(|scope| {
-        let feeling = scope.spawn(|| feel(hand, trial, tick_ms, end_ms, stop, &part));
-        tell(&part, &over);
-        feeling.join().ok()
+    println!(
+        "testing {name} ({}) for {:.0} s; Ctrl-C ends the test and sets the force to zero",
+        able.name,
+        1e-3 * end_ms
+    );
+    let result = std::thread::scope(|scope| {
+        let worker = scope.spawn(|| run_loop(hand, trial, tick_ms, end_ms, stop, &part));
+        print_instructions(&part, &over);
+        worker.join().ok()
     });
-    let felt = felt.unwrap_or_else(|| fallen(Trial::new(&able, tick_ms as f32, end_ms)));
-    let found = measured(name.to_string(), &able, &felt, tick_ms, watch.as_ref());
-    (found, felt.samples)
+    let result = result.unwrap_or_else(|| panicked(Trial::new(&able, tick_ms as f32, end_ms)));
+    let found = measured(name.to_string(), &able, &result, tick_ms, watch.as_ref());
+    (found, result.samples)
 }
 
-fn fallen(trial: Trial) -> Felt {
-    let remarks = vec!["the loop fell; the device was closed".to_string()];
-    Felt { samples: Vec::new(), late: 0, ended: Ending::Lost, trial, remarks }
+fn panicked(trial: Trial) -> LoopResult {
+    let remarks = vec!["the haptic thread panicked; the device was closed".to_string()];
+    LoopResult { samples: Vec::new(), late: 0, ended: Ending::Lost, trial, remarks }
 }
 
-/// Says what the hand shall do, when that changes.
-fn tell(part: &AtomicU8, over: &Stop) {
-    let mut told = Part::Over;
+/// Prints the instruction of each part as it begins.
+fn print_instructions(part: &AtomicU8, over: &Stop) {
+    let mut printed = Part::Over;
     while !over.asked() {
         let now = Part::of(part.load(Ordering::Relaxed));
-        if now != told && now != Part::Over {
-            println!("-> {}", now.words());
+        if now != printed && now != Part::Over {
+            println!("-> {}", now.instruction());
         }
-        told = now;
+        printed = now;
         std::thread::sleep(Duration::from_millis(50));
     }
 }
 
-/// The loop: read, step, apply, note, wait.
-fn feel(
+/// The haptic loop: wait, read, step, apply, record.
+fn run_loop(
     mut hand: HapticDeviceOwner,
     mut trial: Trial,
     tick_ms: f64,
     end_ms: f64,
     stop: &Stop,
-    told: &AtomicU8,
-) -> Felt {
+    current: &AtomicU8,
+) -> LoopResult {
     let remarks = real_time(80, "haptic").into_iter().collect();
     let mut samples = Vec::with_capacity((1.1 * end_ms / tick_ms) as usize + FADE_TICKS as usize);
     let (mut late, mut ending, mut fade) = (0, None, FADE_TICKS);
@@ -155,7 +159,7 @@ fn feel(
         let before_ms = clock.now_ms();
         hand.device.apply(wrench);
         let done_ms = clock.now_ms();
-        told.store(part as u8, Ordering::Relaxed);
+        current.store(part as u8, Ordering::Relaxed);
         late += u64::from(schedule.advance(done_ms));
         if samples.len() < samples.capacity() {
             samples.push(Sample {
@@ -173,7 +177,7 @@ fn feel(
             trial.release();
             fade -= 1;
             if wrench.force() == Vec3::ZERO || fade == 0 {
-                return Felt { samples, late, ended, trial, remarks };
+                return LoopResult { samples, late, ended, trial, remarks };
             }
         }
     }
@@ -189,26 +193,26 @@ fn ends(status: Status, over: bool, stop: &Stop) -> Option<Ending> {
     }
 }
 
-fn measured(device: String, able: &Capabilities, felt: &Felt, tick_ms: f64, watch: Option<&Watch>) -> Measured {
-    let Felt { samples, late, trial, .. } = felt;
-    let course = Course { samples, tick_ms, late: *late, guard: trial.guard(), floor_y: trial.floor_y() };
+fn measured(device: String, able: &Capabilities, result: &LoopResult, tick_ms: f64, watch: Option<&Watch>) -> Measured {
+    let LoopResult { samples, late, trial, .. } = result;
+    let run = TestRun { samples, tick_ms, late: *late, guard: trial.guard(), floor_y: trial.floor_y() };
     let mut found = Measured {
         device,
         model: able.name.clone(),
-        ended: felt.ended,
+        ended: result.ended,
         fault: watch.and_then(Watch::fault).map(|fault| fault.to_string()),
         faults: watch.map_or(0, Watch::count),
         findings: Vec::new(),
-        timing: Timing::of(&course),
+        timing: Timing::of(&run),
         delay_ms: delay::median_ms(samples),
         stated_delay_ticks: able.delay_ticks,
         explored_mm: measured::explored(samples).map(|corner| corner.to_array()),
         workspace_mm: able.workspace_mm.is_finite().then(|| able.workspace_mm.to_array()),
         resolution_mm: able.position_resolution_mm,
         forces_n: [able.peak_force_n, able.continuous_force_n],
-        floor: Floor::of(&course),
+        floor: Floor::of(&run),
         end_force_n: samples.last().map_or(0.0, |last| last.force.length()),
-        remarks: felt.remarks.clone(),
+        remarks: result.remarks.clone(),
         machine: Machine::here(None),
     };
     found.findings = findings::of(&found, able);

@@ -1,4 +1,4 @@
-//! `device.html`: a test on one page that needs nothing else.
+//! Writes `device.html`: the results of a device test on one self-contained page.
 
 use crate::device_test::measured::{Measured, Sample};
 use crate::device_test::trial::Part;
@@ -6,7 +6,7 @@ use crate::report::chart::{Curve, histogram, over_time, traces};
 use crate::report::page::{STYLE, escaped, rows, table};
 use crate::run::Times;
 
-/// The page.
+/// Builds the page.
 pub fn html(found: &Measured, samples: &[Sample]) -> Result<String, String> {
     let title = format!("Trepan: test of {}", escaped(&found.device));
     let head = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">";
@@ -44,19 +44,16 @@ fn charts(samples: &[Sample], asked_hz: f64) -> Result<Vec<(&'static str, String
     samples.windows(2).for_each(|pair| gaps.add_us(((pair[1].time_ms - pair[0].time_ms) * 1e3) as f32));
     Ok(vec![
         (
-            "Where the tip was, seen from the user: right and up",
+            "Path of the tip from the front: right and up",
             traces(["to the right, mm", "up, mm"], &[seen("tip", &|s| (s.tip.x, s.tip.y))])?,
         ),
         (
-            "and from the right: towards the user and up",
+            "Path of the tip from the right: towards the user and up",
             traces(["towards you, mm", "up, mm"], &[seen("tip", &|s| (s.tip.z, s.tip.y))])?,
         ),
         ("Height of the tip", over_time("up, mm", &[over("tip", &|s| s.tip.y)], None)?),
-        ("Force: the floor, then taps", over_time("force, N", &[over("up", &|s| s.force.y)], None)?),
-        ("The floor: force by height", traces(["up, mm", "force, N"], &[pressed])?),
-        (
-            "Time from tick to tick (dashed: as asked for)",
-            histogram("from tick to tick, µs", &gaps.bins(), 1e6 / asked_hz)?,
-        ),
+        ("Force: at the floor, then of the taps", over_time("force, N", &[over("up", &|s| s.force.y)], None)?),
+        ("Force at the floor over the height of the tip", traces(["up, mm", "force, N"], &[pressed])?),
+        ("Tick period (dashed: requested)", histogram("tick period, µs", &gaps.bins(), 1e6 / asked_hz)?),
     ])
 }

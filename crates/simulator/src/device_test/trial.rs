@@ -1,17 +1,19 @@
-//! What the hand is asked to do and is given: move freely, press a floor, hold still for taps.
+//! Parts of a device test and their forces: explore freely, press a virtual floor, hold still for
+//! taps.
 //!
 //! # Theory
 //! ```text
 //!  explore ──────> floor: F = k (y₀ - y) up, where y < y₀ ──────> tap ± ± ± ±
 //!  no force        0.3 N/mm, at most 1 N                          0.8 N, 25 ms each
 //! ```
-//! The floor lies at three tenths of the height that the hand explored, but never over the hand:
-//! force begins at zero.
+//! The floor lies at 0.3 of the height range that the hand explored, but at least 1 mm below the
+//! hand, so that the force begins at zero.
 //!
 //! # Practice
-//! No clock and no device: a function of readings and times. Device axes: x right, y up, z to the
-//! user. Every force passes a guard; the taps' is without energy account, since a tap gives energy
-//! by intent: at most 0.8 N over the fraction of a millimetre that a hand yields in 25 ms.
+//! A function of readings and times, without clock and device. Device axes: x right, y up, z to the
+//! user. Every force passes a force guard. That of the taps has no passivity controller, because a
+//! tap adds energy on purpose: at most 0.8 N over the fraction of a millimetre that a hand yields
+//! in 25 ms.
 
 use serde::Serialize;
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
@@ -20,22 +22,22 @@ use trepan_haptics::{Capabilities, Reading, Status};
 
 /// Stiffness of the floor, N/mm.
 pub const FLOOR_N_PER_MM: f32 = 0.3;
-/// Longest force of the floor, N.
+/// Force limit of the floor, N.
 pub const FLOOR_N: f32 = 1.0;
 /// Force of a tap, N.
 const TAP_N: f32 = 0.8;
-/// Length of a tap, ms.
+/// Duration of a tap, ms.
 pub const TAP_MS: f64 = 25.0;
-/// From one tap to the next, ms: a light hand rings for a third of a second.
+/// Period of the taps, ms: a light hand oscillates for a third of a second after a tap.
 const TAP_PERIOD_MS: f64 = 400.0;
-/// Length of all taps, ms: an even number of them.
+/// Duration of all taps, ms: an even number of periods.
 const TAPS_MS: f64 = 8.0 * TAP_PERIOD_MS;
-/// Time in which the floor's force has faded before the taps, ms.
+/// Time in which the floor's force fades before the taps, ms.
 const FADE_MS: f64 = 100.0;
-/// Share of the time for exploring.
+/// Share of the test for exploring.
 const EXPLORE: f64 = 0.4;
 
-/// What the hand is asked to do.
+/// Part of a device test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u8)]
@@ -46,13 +48,13 @@ pub enum Part {
     Floor,
     /// Hold still.
     Tap,
-    /// Nothing more.
+    /// The test is over.
     Over,
 }
 
 impl Part {
-    /// What a user reads.
-    pub fn words(self) -> &'static str {
+    /// Instruction to the user.
+    pub fn instruction(self) -> &'static str {
         match self {
             Self::Explore => "move the tool slowly through its whole range: left, right, up, down, to you, away",
             Self::Tap => "hold the tool still in the middle: you will feel some light taps",
@@ -61,13 +63,13 @@ impl Part {
         }
     }
 
-    /// The part of a number, as `part as u8`.
+    /// Part with a number; the inverse of `part as u8`.
     pub fn of(number: u8) -> Self {
         [Self::Explore, Self::Floor, Self::Tap].get(usize::from(number)).copied().unwrap_or(Self::Over)
     }
 }
 
-/// The course of one test.
+/// State of one test.
 pub struct Trial {
     end_ms: f64,
     tick_ms: f32,
@@ -79,7 +81,7 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// A test of a device that lasts until `end_ms`.
+    /// Prepares a test that lasts until `end_ms`.
     pub fn new(device: &Capabilities, tick_ms: f32, end_ms: f64) -> Self {
         let limits = device.guard_config();
         let upto = |force_n: f32| limits.max_force_n.min(force_n);
@@ -96,22 +98,22 @@ impl Trial {
         }
     }
 
-    /// What the hand does at a time, and what it feels.
+    /// Part of the test at a time, and the guarded force.
     pub fn step(&mut self, reading: &Reading, time_ms: f64) -> (Part, GuardedWrench) {
         let (tool, lost) = (&reading.tool, reading.status == Status::Lost);
         let (part, since_ms) = self.part(time_ms);
         let force = match part {
-            Part::Explore => self.explored(tool),
+            Part::Explore => self.explore(tool),
             _ if lost => Vec3::ZERO,
             Part::Tap => tap(since_ms),
-            Part::Floor => self.pushed(tool),
+            Part::Floor => self.floor_force(tool),
             Part::Over => Vec3::ZERO,
         };
-        let wanted = Wrench { force, torque: Vec3::ZERO };
+        let desired = Wrench { force, torque: Vec3::ZERO };
         // The floor's force fades in the pause before the first tap.
         let tapping = part == Part::Tap && since_ms > FADE_MS;
         let guard = if tapping { &mut self.taps } else { &mut self.floor };
-        (part, guard.guard(wanted, tool, self.tick_ms))
+        (part, guard.guard(desired, tool, self.tick_ms))
     }
 
     /// Fades every force to zero.
@@ -125,7 +127,7 @@ impl Trial {
         &self.floor
     }
 
-    /// Height of the floor, mm, once it lies.
+    /// Height of the floor, mm; `None` before its part begins.
     pub fn floor_y(&self) -> Option<f32> {
         self.floor_y
     }
@@ -141,13 +143,13 @@ impl Trial {
         }
     }
 
-    fn explored(&mut self, tool: &ToolState) -> Vec3 {
+    fn explore(&mut self, tool: &ToolState) -> Vec3 {
         let y = tool.tip().y;
         self.height = [self.height[0].min(y), self.height[1].max(y)];
         Vec3::ZERO
     }
 
-    fn pushed(&mut self, tool: &ToolState) -> Vec3 {
+    fn floor_force(&mut self, tool: &ToolState) -> Vec3 {
         let [low, high] = self.height;
         let y = tool.tip().y;
         let floor_y = *self.floor_y.get_or_insert_with(|| (low + 0.3 * (high - low)).min(y - 1.0));
@@ -155,7 +157,7 @@ impl Trial {
     }
 }
 
-/// Taps up and down in turn; each follows a pause.
+/// Force of the taps, N: up and down alternately, each after a pause.
 fn tap(since_ms: f64) -> Vec3 {
     let (number, within_ms) = ((since_ms / TAP_PERIOD_MS) as u32, since_ms % TAP_PERIOD_MS);
     let sign = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -225,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_device_is_given_nothing() {
+    fn a_lost_device_gets_no_force() {
         let down = |t: f64| if t < 4000.0 { 0.0 } else { -20.0 };
         assert!(run(3, down, Status::Fresh).iter().any(|t| t.1 > 0.0));
         assert!(run(3, down, Status::Lost).iter().all(|t| t.1 == 0.0));

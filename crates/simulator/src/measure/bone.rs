@@ -1,16 +1,17 @@
-//! Bone: a ball slides along the skull and a burr cuts into it, by every method on every grid,
-//! against fine voxels of the same CT.
+//! Measures the force error of each method on each voxel size, against fine voxels of the same CT.
+//! A ball slides along the skull, a burr cuts into it.
 //!
 //! # Theory
-//! The truth is the force by the oracle on voxels of 0.25 mm of the same CT, trilinear between its
-//! samples. The error of a tick is the length of the difference of both forces; of a choice it is
-//! that which 95 of 100 ticks in touch stay within, sliding or cutting, whichever is worse. A tool
-//! whose centre comes under the surface, pressed in or led through a ridge, may leave by more ways
-//! than one, and methods that are both right choose differently: it is led no deeper than its
-//! radius. Nor much deeper than the scene says: at a ridge a hand gives way, which a path cannot.
+//! The ground truth is the force of method `brute` on voxels of 0.25 mm, interpolated trilinearly
+//! from the same CT. The error of a tick is the norm of the difference between the forces. That of
+//! a choice is the 95th percentile over the ticks in contact, sliding or cutting, whichever is
+//! worse. If the tool's centre is below the surface, pressed in or at a ridge, several exits are
+//! valid, and correct methods may choose different ones. Hence the path is no deeper than the
+//! tool's radius, and not much deeper than the scene's depth: at a ridge a hand yields, which a
+//! path cannot.
 //!
 //! # When not to use it
-//! To know how right the CT is: what the scanner has blurred, nobody knows.
+//! To judge the CT itself: what the scanner has blurred is unknown.
 
 use super::quantile;
 use crate::run::clock::Clock;
@@ -20,24 +21,24 @@ use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidStep};
 use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
 
-/// Edges of voxels, mm.
+/// Voxel edges, mm.
 const SPACINGS: [f64; 10] = [0.35, 0.42, 0.5, 0.6, 0.75, 0.85, 1.0, 1.25, 1.5, 2.0];
-/// Points of the thesis's shell.
+/// Numbers of points of method `thesis`.
 const POINTS: [usize; 3] = [211, 466, 932];
-/// Edge of the truth's voxels, mm.
+/// Voxel edge of the ground truth, mm.
 const FINE_MM: f32 = 0.25;
-/// Ticks of going in and of sliding.
+/// Ticks of pressing in and of sliding.
 const TICKS: [usize; 2] = [120, 240];
-/// How deep it may come where the bone rises into its way, over how deep it is pressed.
+/// Largest depth where bone rises into the path, as a multiple of the pressed depth.
 const RIDGE: f64 = 1.5;
-/// How deep the burr is led while it cuts, mm, and how fast, mm/ms: what a scripted hand does.
+/// Depth of the cut, mm, and its feed, mm/ms, as of a scripted hand.
 const DRILL: [f32; 2] = [1.5, 1.4e-3];
-/// Least radius of a burr whose cut the truth's voxels resolve, mm.
+/// Smallest radius of a burr whose cut the ground truth resolves, mm.
 const LEAST_CUT_MM: f64 = 4.0 * FINE_MM as f64;
-/// Half the edge of what is cut out of the skull around the opening, mm.
+/// Half the edge of the block around the opening, mm.
 const ROOM_MM: f32 = 18.0;
 
-/// Every choice: all methods in real time on all grids.
+/// All choices: every real-time method on every voxel size.
 pub fn choices() -> Vec<Bone> {
     let methods = Method::all().into_iter().filter(|m| m.name() != "brute").map(|m| m.name());
     let with = |method: &'static str| match method {
@@ -48,86 +49,86 @@ pub fn choices() -> Vec<Bone> {
     all.flat_map(|(method, points)| SPACINGS.map(|spacing_mm| Bone { method, spacing_mm, points })).collect()
 }
 
-/// The method of a choice; `None` where there is no such.
+/// Method of a choice; `None` for an unknown name.
 fn method(bone: &Bone) -> Option<Method> {
     Method::named(bone.method).map(|method| method.with_points(bone.points))
 }
 
-/// What a choice came to.
+/// Measured error and time of a choice.
 #[derive(Clone, Copy, Debug)]
 pub struct Measurement {
-    /// Error of the force, N.
+    /// Force error, N.
     pub error_n: f64,
-    /// Median tick, µs.
+    /// Median time of a tick, µs.
     pub tick_us: f64,
 }
 
-/// A skull as the scanner saw it.
+/// A skull as scanned.
 #[derive(Clone, Debug)]
 pub struct Skull {
-    /// HU, nothing but the skull, on the scanner's own grid.
+    /// CT in HU on the scanner's grid, skull only.
     pub ct: VoxelVolume<i16>,
-    /// Where bone begins, HU.
+    /// Isovalue of bone, HU.
     pub isovalue: i16,
 }
 
-/// A tool pressed into bone and led along it.
+/// A tool path: pressed in, then slid along the surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Slide {
-    /// Radius, depth and stiffness are taken from here.
+    /// Source of radius, depth and stiffness.
     pub scene: Scene,
-    /// Where it is pressed in.
+    /// Start of the slide, near the surface.
     pub place: Vec3,
-    /// About the way out of the bone there, a unit vector.
+    /// Approximate outward normal there, a unit vector.
     pub outward: Vec3,
-    /// Way along the surface: turn around the normal, rad.
+    /// Direction along the surface: rotation about the normal, rad.
     pub turn_rad: f32,
-    /// How far it is led, mm.
+    /// Length of the slide, mm.
     pub length_mm: f32,
 }
 
 impl Slide {
-    /// A unit vector at right angles to a normal, along which it goes.
+    /// Unit direction of the slide, perpendicular to a normal.
     pub fn along(&self, normal: Vec3) -> Vec3 {
         let (a, b) = normal.any_orthonormal_pair();
         self.turn_rad.cos() * a + self.turn_rad.sin() * b
     }
 }
 
-/// A stretch of skull, ways over and into it, and what is felt there.
+/// A block of skull, with tool paths and their ground-truth forces.
 pub struct Stretch {
     fine: BoneVolume,
     slide: Slide,
-    ways: Vec<Way>,
+    paths: Vec<ToolPath>,
 }
 
-/// Where the tool is at each tick, whether it cuts, and the true forces, N.
-struct Way {
+/// A tool path: the tool at each tick, whether it cuts, and the ground-truth forces, N.
+struct ToolPath {
     path: Vec<ToolState>,
     cuts: bool,
     truth: Vec<Vec3>,
 }
 
 impl Stretch {
-    /// Cuts it out, with a way along it; `None` where there is too little bone under that, or so
-    /// much that the tool comes far deeper than it is pressed, or its centre under the surface.
+    /// Cuts out the block and adds the slide as a path. `None` if the path has too little contact,
+    /// or is much deeper than pressed, or deeper than the tool's radius.
     pub fn of(skull: &Skull, slide: &Slide) -> Option<Self> {
         let fine = cut_out(skull, slide.place, FINE_MM)?;
         let path = path(&Surface::of(&fine, slide)?, slide)?;
-        let stretch = Self { fine, slide: *slide, ways: Vec::new() }.with(path, false);
-        let deep = stretch.ways[0].truth.iter().map(|force| f64::from(force.length()) / slide.scene.stiffness);
+        let stretch = Self { fine, slide: *slide, paths: Vec::new() }.with(path, false);
+        let deep = stretch.paths[0].truth.iter().map(|force| f64::from(force.length()) / slide.scene.stiffness);
         let (touches, deepest) = (deep.clone().filter(|mm| *mm > 0.0).count(), deep.fold(0.0, f64::max));
         let deepest_allowed = slide.scene.tool_radius_mm.min(RIDGE * slide.scene.press_mm);
         (touches > TICKS[1] / 2 && deepest <= deepest_allowed).then_some(stretch)
     }
 
-    /// With a cut straight in from just outside; without one for a burr under 1 mm in radius, which
-    /// the truth's voxels do not resolve.
+    /// Adds a straight cut from just outside; not for a burr under 1 mm in radius, which the ground
+    /// truth does not resolve.
     pub fn cutting(self) -> Self {
         if self.slide.scene.tool_radius_mm < LEAST_CUT_MM {
             return self;
         }
-        let path = &self.ways[0].path;
+        let path = &self.paths[0].path;
         let [outside, inside] = [&path[0], &path[TICKS[0] - 1]];
         let inward = (inside.tip() - outside.tip()).normalize_or_zero();
         let ticks = ((1.0 + DRILL[0]) / DRILL[1]) as usize;
@@ -140,16 +141,16 @@ impl Stretch {
         self.with(path, true)
     }
 
-    /// With one more way.
+    /// Adds a path.
     fn with(mut self, path: Vec<ToolState>, cuts: bool) -> Self {
-        let truth = self.ride(&Method::Brute(Default::default()), &self.fine, &path, cuts).0;
-        self.ways.push(Way { path, cuts, truth });
+        let truth = self.follow(&Method::Brute(Default::default()), &self.fine, &path, cuts).0;
+        self.paths.push(ToolPath { path, cuts, truth });
         self
     }
 
-    /// Forces along a path, N, and the median tick, µs. What is cut on the way is there again
+    /// Forces along a path, N, and the median time of a tick, µs. Removed bone is restored
     /// afterwards.
-    fn ride(&self, method: &Method, bone: &BoneVolume, path: &[ToolState], cuts: bool) -> (Vec<Vec3>, f64) {
+    fn follow(&self, method: &Method, bone: &BoneVolume, path: &[ToolState], cuts: bool) -> (Vec<Vec3>, f64) {
         let mut contact = method.build(&Tool::burr(self.slide.scene.tool_radius_mm as f32));
         contact.reset(path[0].world_from_tool);
         let (mut out, mut us, clock) = (RigidStep::default(), Vec::with_capacity(path.len()), Clock::start());
@@ -170,8 +171,8 @@ impl Stretch {
         (forces, quantile(us, 0.5))
     }
 
-    /// Every choice, in the order given: the worst error of all ways, the tick of the first. The
-    /// grid of each edge is made once.
+    /// Measures each choice, in the order given: the worst error of all paths, the tick time of the
+    /// first. Each voxel size is resampled once.
     pub fn measure(&self, skull: &Skull, choices: &[Bone]) -> Vec<Measurement> {
         let mut grids: Vec<(f64, Option<BoneVolume>)> = Vec::new();
         let mut found = Vec::new();
@@ -181,42 +182,42 @@ impl Stretch {
                 grids.push((choice.spacing_mm, cut));
             }
             let grid = grids.iter().find(|(edge, _)| *edge == choice.spacing_mm);
-            let along = |way: &Way| {
-                // Where a coarse grid holds no voxel of bone, nothing is felt.
+            let along = |tool_path: &ToolPath| {
+                // A coarse grid without any voxel of bone gives no force.
                 let (forces, tick_us) = match (grid.and_then(|(_, bone)| bone.as_ref()), method(choice)) {
-                    (Some(bone), Some(method)) => self.ride(&method, bone, &way.path, way.cuts),
-                    _ => (vec![Vec3::ZERO; way.path.len()], f64::NAN),
+                    (Some(bone), Some(method)) => self.follow(&method, bone, &tool_path.path, tool_path.cuts),
+                    _ => (vec![Vec3::ZERO; tool_path.path.len()], f64::NAN),
                 };
-                Measurement { error_n: error_n(&forces, &way.truth), tick_us }
+                Measurement { error_n: error_n(&forces, &tool_path.truth), tick_us }
             };
             let worse = |a: Measurement, b: Measurement| Measurement { error_n: a.error_n.max(b.error_n), ..a };
-            found.extend(self.ways.iter().map(along).reduce(worse));
+            found.extend(self.paths.iter().map(along).reduce(worse));
         }
         found
     }
 
-    /// The recommended method on the truth's own voxels, sliding: what 95 of 100 ticks stay within,
+    /// Error of the recommended method on the voxels of the ground truth, sliding, 95th percentile,
     /// N.
     pub fn recommended_error_n(&self) -> f64 {
-        let Way { path, cuts, truth } = &self.ways[0];
-        error_n(&self.ride(&Method::RECOMMENDED, &self.fine, path, *cuts).0, truth)
+        let ToolPath { path, cuts, truth } = &self.paths[0];
+        error_n(&self.follow(&Method::RECOMMENDED, &self.fine, path, *cuts).0, truth)
     }
 
-    /// The truth beside forces known otherwise, `of` a place of the tool, sliding: what 95 of 100
-    /// ticks stay within, N.
+    /// Error of the ground truth against known forces `of` the tool's position, sliding, 95th
+    /// percentile, N.
     pub fn known_error_n(&self, of: impl Fn(Vec3) -> Vec3) -> f64 {
-        let Way { path, truth, .. } = &self.ways[0];
+        let ToolPath { path, truth, .. } = &self.paths[0];
         error_n(&path.iter().map(|tool| of(tool.tip())).collect::<Vec<_>>(), truth)
     }
 }
 
-/// What 95 of 100 ticks in touch stay within, N.
+/// Force error over the ticks in contact, 95th percentile, N.
 fn error_n(forces: &[Vec3], truth: &[Vec3]) -> f64 {
     let both = forces.iter().zip(truth).filter(|(a, b)| **a != Vec3::ZERO || **b != Vec3::ZERO);
     quantile(both.map(|(a, b)| f64::from(a.distance(*b))).collect(), 0.95)
 }
 
-/// The voxels of a session's grid around a place.
+/// Resamples the block around a place on the grid of a session.
 fn cut_out(skull: &Skull, place: Vec3, edge_mm: f32) -> Option<BoneVolume> {
     let whole = Grid::isotropic_over(&skull.ct, edge_mm);
     let middle = whole.world_from_voxel.inverse().transform_point3(place.as_dvec3()).round();
@@ -227,7 +228,7 @@ fn cut_out(skull: &Skull, place: Vec3, edge_mm: f32) -> Option<BoneVolume> {
     BoneVolume::new(&cut, skull.isovalue).ok()
 }
 
-/// The surface around an opening as a height over the plane of its normal.
+/// Bone surface around an opening, as a height over its tangent plane.
 struct Surface<'a> {
     bone: &'a BoneVolume,
     place: Vec3,
@@ -238,14 +239,14 @@ impl<'a> Surface<'a> {
     fn of(bone: &'a BoneVolume, slide: &Slide) -> Option<Self> {
         let mut surface = Self { bone, place: slide.place, normal: slide.outward };
         surface.place += surface.height(Vec3::ZERO)? * surface.normal;
-        // The plane through heights 3 mm around.
+        // The tangent plane through heights at 3 mm distance.
         let (a, b) = surface.normal.any_orthonormal_pair();
         let slope = |along: Vec3| Some((surface.height(3.0 * along)? - surface.height(-3.0 * along)?) / 6.0);
         let normal = (surface.normal - slope(a)? * a - slope(b)? * b).normalize();
         (normal.dot(slide.outward) > 0.6).then_some(Self { normal, ..surface })
     }
 
-    /// Height of the outermost bone over a place of the plane, mm.
+    /// Height of the outermost bone over a point of the plane, mm.
     fn height(&self, aside: Vec3) -> Option<f32> {
         let step = 0.5 * self.bone.spacing_mm();
         let over = |height: f32| {
@@ -275,7 +276,7 @@ fn density(bone: &BoneVolume, place: Vec3) -> f32 {
     (0..8).map(corner).sum()
 }
 
-/// In along the normal, then along the surface at the same depth under its smoothed height.
+/// Path in along the normal, then along the surface at constant depth below its smoothed height.
 fn path(surface: &Surface, slide: &Slide) -> Option<Vec<ToolState>> {
     let (radius, press) = (slide.scene.tool_radius_mm as f32, slide.scene.press_mm as f32);
     let along = slide.along(surface.normal);
@@ -303,7 +304,7 @@ fn path(surface: &Surface, slide: &Slide) -> Option<Vec<ToolState>> {
 mod tests {
     use super::*;
 
-    /// Bone under z = 0, and under z = 3 mm where x is over 3 mm.
+    /// Bone below z = 0, and below z = 3 mm where x is over 3 mm.
     fn step() -> Skull {
         let edge = 90;
         let mut ct = VoxelVolume::isotropic([edge; 3], Vec3::splat(-22.25), 0.5, 0i16);
@@ -316,9 +317,9 @@ mod tests {
     }
 
     #[test]
-    fn a_burr_is_not_led_into_a_step_deeper_than_it_is_pressed() {
+    fn a_path_into_a_step_is_refused() {
         let skull = step();
-        let led = |turn_rad: f32, press_mm: f64| {
+        let path_along = |turn_rad: f32, press_mm: f64| {
             let scene = Scene { tool_radius_mm: 2.0, press_mm, ..Scene::default() };
             Stretch::of(&skull, &Slide { scene, place: Vec3::ZERO, outward: Vec3::Z, turn_rad, length_mm: 5.0 })
         };
@@ -329,8 +330,8 @@ mod tests {
         let turns = [0.0, 0.5, 1.0, 1.5].map(|half| half * core::f32::consts::PI);
         let (into, away) =
             (turns.into_iter().find(|t| towards_x(*t) > 0.9), turns.into_iter().find(|t| towards_x(*t) < -0.9));
-        assert!(led(into.unwrap(), 0.5).is_none(), "a wall stands in the way");
-        let flat = led(away.unwrap(), 0.5).expect("flat bone is one");
+        assert!(path_along(into.unwrap(), 0.5).is_none(), "a wall stands in the way");
+        let flat = path_along(away.unwrap(), 0.5).expect("flat bone is one");
         let error_mm = flat.known_error_n(|tip| Vec3::Z * (2.0 - tip.z).max(0.0) * flat.slide.scene.stiffness as f32);
         assert!(error_mm < 0.1, "{error_mm}");
     }

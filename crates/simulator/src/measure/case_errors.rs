@@ -1,23 +1,28 @@
-//! How far the choices are off in this very case: the burr led over the bone where the skull is to
-//! be opened, the probe over the brain below, and the view on it drawn.
+//! Measures the errors of the choices in this case: the burr on the skull, the probe on the brain
+//! below, the drawn view.
 //!
 //! # Theory
-//! A law says what a choice's error is in a case like this; here it is looked at. Each choice for
-//! bone (of the recommended method, unless another is given) is led over three slides from the
-//! opening and cuts in once, against fine voxels of the same CT; the worst counts. TLED on each
-//! mesh is pushed and led along the brain, against a mesh that is sixteen times finer where the
-//! probe goes. Each choice for the picture is drawn from where the eye starts and from three places
-//! around, against every ray. The hand will go other ways and the eye will move, so what is found
-//! is believed with a margin. A mesh that is lucky under one slide need not be under the next, nor
-//! a voxel size: of tissue and bone the case says how far all choices are off, and half of which is
-//! better; the laws say the other half. The margins of tissue and picture are those with which,
-//! over 40 scenes and all tolerances of `cargo xtask validate budget --seed 11`, 99 % of what they
-//! ask is met; more costs more than it mends.
+//! A power law predicts a choice's error in similar cases; here the error is measured.
+//!
+//! - Bone: each choice (of the recommended method, unless another is given) slides along three
+//!   paths from the opening and cuts once, against fine voxels of the same CT. The worst error
+//!   counts.
+//! - Tissue: TLED on each mesh is pushed into the brain and slid along it, against a mesh that is
+//!   sixteen times finer around the probe.
+//! - Picture: each choice is drawn from the first camera and from three others around it,
+//!   against every ray.
+//!
+//! The hand and the camera will move elsewhere, so measured errors get a safety factor. A mesh or
+//! voxel size may be accurate by chance on one path. Hence, for tissue and bone, the case
+//! determines the level of all errors and half of the differences between them (as logarithms); the
+//! power laws determine the other half. The factors of tissue and picture meet 99 % of the
+//! tolerances in `cargo xtask validate budget --seed 11` (40 scenes, all tolerances); larger ones
+//! cost more than they gain.
 //!
 //! # Practice
-//! 46 s of one core, 27 s of two with the reading of the case, tissue beside the rest; what is
-//! found does not depend on the tolerances, so it is kept with the case. What cannot be measured is
-//! left to the laws.
+//! Takes 46 s on one core, and 27 s on two with the reading of the case, with tissue in parallel to
+//! the rest. The errors do not depend on the tolerances, so they are cached with the case. Parts
+//! that cannot be measured use the power laws.
 
 use super::bone::{Skull, Slide, Stretch};
 use super::picture::View;
@@ -31,45 +36,46 @@ use trepan_geometry::Vec3;
 use trepan_rigid::Method;
 use trepan_volume::BoneVolume;
 
-/// Goes up when what is found changes for the same case and choices.
+/// Version of the measurement; raised when the errors change for the same case and choices.
 const FORM: u32 = 8;
-/// Ways along the bone, evenly around the opening.
+/// Slides along the bone, evenly around the opening.
 const SLIDES: usize = 3;
-/// Length of each, mm.
+/// Length of a slide, mm.
 const SLIDE_MM: f32 = 5.0;
-/// RenderInputs around the first, and how far off it, as a share of their distance.
-const EYES: (usize, f32) = (3, 0.2);
-/// How much larger errors may be on other ways: bone costs little, tissue and picture much.
+/// Number of cameras around the first, and their offset as a share of the distance.
+const CAMERAS: (usize, f32) = (3, 0.2);
+/// Safety factors for other paths and views: bone, tissue, picture. A large one is cheap only for
+/// bone.
 const MARGIN: [f64; 3] = [1.5, 1.15, 1.08];
 
-/// What there is to look at.
+/// Geometry on which the errors are measured.
 #[derive(Clone, Debug)]
 pub struct Sight {
-    /// The skull as scanned, and as it is drawn, where there is one.
+    /// The skull as scanned and as drawn, if any.
     pub skull: Option<(Skull, Arc<BoneVolume>)>,
-    /// Where it is to be opened, on its outer surface.
+    /// Entry of the opening on the skull's outer surface.
     pub entry: Vec3,
-    /// The way out there, a unit vector.
+    /// Outward unit vector at the entry.
     pub outward: Vec3,
-    /// Direction from there to the eye.
+    /// Direction from the entry to the camera.
     pub eye: Vec3,
-    /// The brain and the place of its surface that is laid open, where there is one.
+    /// The brain and the exposed point of its surface, if any.
     pub brain: Option<(Shape, Vec3)>,
 }
 
-/// Errors that were found: of a choice, by what it is named in its table.
+/// Measured errors of choices, by their names in the table.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CaseErrors {
-    /// On bone, mm of depth.
+    /// Errors on bone, mm of depth.
     bone: Vec<(Vec<String>, f64)>,
-    /// In tissue, mm.
+    /// Errors in tissue, mm.
     tissue: Vec<(Vec<String>, f64)>,
-    /// In the picture, percent of white.
+    /// Errors in the picture, percent of white.
     picture: Vec<(Vec<String>, f64)>,
 }
 
 impl CaseErrors {
-    /// Looks at the choices that a scene with such tools and such a view has; by so many threads.
+    /// Measures the choices for a scene's tools and view, with so many threads.
     pub fn of(sight: &Sight, scene: &Scene, rows: &Rows, threads: usize) -> Self {
         let others = |threads| (on_bone(sight, scene, rows), in_picture(sight, scene, rows, threads));
         let tissue = || in_tissue(sight, scene, rows);
@@ -84,7 +90,7 @@ impl CaseErrors {
         Self { bone: to_millionths(bone), tissue: to_millionths(tissue), picture: to_millionths(picture) }
     }
 
-    /// Names all that decides what would be found, beside the case.
+    /// Lists all inputs of the measurement except the case, for a cache key.
     pub fn about(scene: &Scene, rows: &Rows) -> String {
         let Scene { tool_radius_mm, press_mm, tissue_motion_mm, probe_radius_mm, view_mm, .. } = *scene;
         let lengths = [tool_radius_mm, press_mm, tissue_motion_mm, probe_radius_mm, view_mm];
@@ -93,21 +99,21 @@ impl CaseErrors {
         format!("own {FORM} {lengths:?} {has:?} {names:?}")
     }
 
-    /// Rows whose laws are what was found, where something was.
+    /// Replaces the power laws of the errors by the measured errors, for measured parts.
     pub fn instead(&self, mut rows: Rows, scene: &Scene) -> Rows {
-        put(&self.bone, MARGIN[0], &mut rows.bone, Some(&scene.bone_features()));
-        put(&self.tissue, MARGIN[1], &mut rows.tissue, Some(&scene.tissue_features()));
-        put(&self.picture, MARGIN[2], &mut rows.picture, None);
+        replace(&self.bone, MARGIN[0], &mut rows.bone, Some(&scene.bone_features()));
+        replace(&self.tissue, MARGIN[1], &mut rows.tissue, Some(&scene.tissue_features()));
+        replace(&self.picture, MARGIN[2], &mut rows.picture, None);
         rows
     }
 
-    /// Whether bone, tissue and picture were looked at.
+    /// Whether bone, tissue and picture were measured.
     pub fn has(&self) -> [bool; 3] {
         [!self.bone.is_empty(), !self.tissue.is_empty(), !self.picture.is_empty()]
     }
 }
 
-/// Digits enough, and few enough that a file gives back the very same numbers.
+/// Rounds to 1e-6, so that a file reproduces the numbers exactly.
 fn to_millionths(mut found: Vec<(Vec<String>, f64)>) -> Vec<(Vec<String>, f64)> {
     found.iter_mut().for_each(|(_, error)| *error = (*error * 1e6).round() / 1e6);
     found
@@ -117,32 +123,37 @@ fn names<T: Kind>(rows: &[Row<T>]) -> Vec<Vec<String>> {
     rows.iter().map(|row| row.what.write()).collect()
 }
 
-/// Of some choices that were looked at, those rows alone, with what was found: a law beside them
-/// would win by luck. With the features of the scene what was found is drawn half-way, as a
-/// logarithm, to the laws raised to its level.
-fn put<T: Kind>(found: &[(Vec<String>, f64)], margin: f64, rows: &mut Vec<Row<T>>, features: Option<&[f64; FEATURES]>) {
+/// Keeps only the measured rows, with the measured errors; a row with a power law could win by
+/// chance. With the scene's features, each error is the geometric mean of the measured one and of
+/// the power law at the measured level.
+fn replace<T: Kind>(
+    found: &[(Vec<String>, f64)],
+    margin: f64,
+    rows: &mut Vec<Row<T>>,
+    features: Option<&[f64; FEATURES]>,
+) {
     let own = |row: &Row<T>| {
         let name = row.what.write();
         found.iter().find(|(of, _)| *of == name).map(|(_, error)| (*row, *error))
     };
-    let seen: Vec<(Row<T>, f64)> = rows.iter().filter_map(own).collect();
-    if seen.is_empty() {
+    let measured: Vec<(Row<T>, f64)> = rows.iter().filter_map(own).collect();
+    if measured.is_empty() {
         return;
     }
     let over = |(row, error): &(Row<T>, f64)| features.map_or(0.0, |f| (error / row.error.expected(f)).ln());
-    let level = (seen.iter().map(over).sum::<f64>() / seen.len() as f64).exp();
-    let drawn = |(row, error): &(Row<T>, f64)| match features {
+    let level = (measured.iter().map(over).sum::<f64>() / measured.len() as f64).exp();
+    let mean_of_both = |(row, error): &(Row<T>, f64)| match features {
         Some(features) => (error * level * row.error.expected(features)).sqrt(),
         None => *error,
     };
-    let believed = |one: &(Row<T>, f64)| Row { error: PowerLaw::constant(margin * drawn(one)), ..one.0 };
-    *rows = seen.iter().map(believed).collect();
+    let with_margin = |one: &(Row<T>, f64)| Row { error: PowerLaw::constant(margin * mean_of_both(one)), ..one.0 };
+    *rows = measured.iter().map(with_margin).collect();
 }
 
 fn on_bone(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64)> {
     let mut choices: Vec<_> = rows.bone.iter().map(|row| row.what).filter(holds_walls).collect();
-    // What others of them find under one path, such as the thesis's points, says little of the
-    // next: where no method is given it is the recommended one.
+    // Errors of other methods, such as `thesis`, differ between paths: unless a method is given,
+    // only the recommended one is measured.
     let recommended = |choice: &Bone| choice.method == Method::RECOMMENDED.name();
     if choices.iter().any(recommended) {
         choices.retain(recommended);
@@ -177,7 +188,7 @@ fn in_tissue(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64
     let found = || {
         let brains = Brains::of(shape, &choices)?;
         let push = Push::of(&slide, &brains, Fineness::QUICK)?;
-        // Where the brain is held, every mesh would be found to be right.
+        // Where the brain is fixed, the error of every mesh would be zero.
         if push.moved_mm() < LEAST_MM { Ok(Vec::new()) } else { push.measure(&brains) }
     };
     let found = found().unwrap_or_else(|fault: SessionError| {
@@ -191,9 +202,9 @@ fn in_picture(sight: &Sight, scene: &Scene, rows: &Rows, threads: usize) -> Vec<
     let choices: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
     let Some((_, bone)) = sight.skull.as_ref().filter(|_| !choices.is_empty()) else { return Vec::new() };
     let (a, b) = sight.eye.any_orthonormal_pair();
-    let around = (0..EYES.0).map(|n| TAU * n as f32 / EYES.0 as f32).map(|turn| turn.cos() * a + turn.sin() * b);
+    let around = (0..CAMERAS.0).map(|n| TAU * n as f32 / CAMERAS.0 as f32).map(|turn| turn.cos() * a + turn.sin() * b);
     let view =
-        |aside| View { bone: Arc::clone(bone), scene: *scene, target: sight.entry, eye: sight.eye + EYES.1 * aside };
+        |aside| View { bone: Arc::clone(bone), scene: *scene, target: sight.entry, eye: sight.eye + CAMERAS.1 * aside };
     let views: Vec<View> = around.chain([Vec3::ZERO]).map(view).collect();
     let found = View::measure_all(&views, &choices, threads).unwrap_or_default();
     choices.iter().zip(found).map(|(choice, error)| (choice.write(), error)).collect()
@@ -204,7 +215,7 @@ mod tests {
     use super::*;
     use trepan_volume::VoxelVolume;
 
-    /// A ball of bone of 30 mm, seen and touched from above.
+    /// A ball of bone with a radius of 30 mm, seen and touched from above.
     fn ball() -> Sight {
         let edge = 70;
         let mut ct = VoxelVolume::isotropic([edge; 3], Vec3::splat(-34.5), 1.0, 0i16);
@@ -223,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn finer_voxels_and_more_pixels_are_found_to_be_nearer() {
+    fn finer_voxels_and_more_pixels_have_smaller_errors() {
         let scene = Scene { picture_pixels: [160, 120], view_mm: 80.0, ..Scene::default() };
         let mut rows = Rows::stored().unwrap();
         rows.bone.retain(|row| row.what.method == "god-object-sphere" && [0.5, 2.0].contains(&row.what.spacing_mm));
@@ -241,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_to_measure_is_there_again_and_finer_voxels_cut_nearer() {
+    fn bone_cut_for_measuring_is_restored_and_finer_voxels_have_smaller_errors() {
         let (sight, scene) = (ball(), Scene::default());
         let skull = &sight.skull.as_ref().unwrap().0;
         let slide = Slide { scene, place: sight.entry, outward: sight.outward, turn_rad: 0.0, length_mm: SLIDE_MM };
@@ -257,12 +268,13 @@ mod tests {
         let cut = errors(&stretch);
         assert!(cut[0] < 0.7 * cut[1] && cut[1] < 3.0, "{cut:?}");
         assert!(cut.iter().zip(&before).all(|(cut, before)| cut >= before), "{cut:?} {before:?}");
-        assert_eq!(errors(&stretch), cut, "what was cut is not there again");
+        assert_eq!(errors(&stretch), cut, "the cut was not restored");
     }
 
-    /// By hand: laws of 1 and 2 mm, found 2 and 2: level √(2·1) = √2, so √(2·√2·1) and √(2·√2·2).
+    /// By hand: laws of 1 and 2 mm, measured 2 and 2 mm: level √(2·1) = √2, so √(2·√2·1) and
+    /// √(2·√2·2).
     #[test]
-    fn a_lucky_mesh_is_drawn_half_way_to_the_laws() {
+    fn a_measured_error_is_averaged_with_the_laws() {
         let scene = Scene::default();
         let mut rows = Rows::stored().unwrap();
         rows.tissue.truncate(2);
@@ -277,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn where_there_is_no_bone_the_laws_stand() {
+    fn without_bone_the_laws_are_kept() {
         let rows = Rows::stored().unwrap();
         let far = Sight { entry: 300.0 * Vec3::Z, ..ball() };
         let scene = Scene { picture_pixels: [64, 48], ..Scene::default() };

@@ -1,9 +1,9 @@
-//! How fast this machine is: the numbers that a plan is made from, measured in under two seconds.
+//! Measures the speed of this machine for a plan, in under two seconds.
 //!
 //! # Practice
-//! The median of many calls, one method at a time, one thread, on small synthetic scenes that stay
-//! in the cache as the real ones do. What is not wanted is not measured and stands as
-//! [`Machine::default`] has it.
+//! Each number is the median of many calls of one method on one thread, on small synthetic scenes
+//! that stay in the CPU cache as real ones do. Parts that are not wanted keep the number of
+//! [`Machine::default`].
 
 use crate::run::clock::Clock;
 use std::f32::consts::TAU;
@@ -16,32 +16,32 @@ use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
-/// Calls that a median is taken over.
+/// Calls per median.
 const CALLS: usize = 400;
-/// Pictures that a median is taken over.
+/// Pictures per median.
 const PICTURES: usize = 9;
 /// Edge of a picture, pixels.
 const PIXELS: u32 = 160;
 
-/// What a plan needs to know.
+/// Parts that a plan chooses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wanted {
-    /// Ticks on bone.
+    /// Haptic ticks on bone.
     pub bone: bool,
-    /// Steps of tissue.
+    /// Solver steps of tissue.
     pub tissue: bool,
     /// Rays of the picture.
     pub picture: bool,
 }
 
 impl Wanted {
-    /// Whether anything is.
+    /// Whether any part is wanted.
     pub fn any(self) -> bool {
         self.bone || self.tissue || self.picture
     }
 }
 
-/// This machine, where a graphics card draws or none.
+/// Measures this machine. `device_draws`: whether a graphics card draws.
 pub fn machine(wanted: Wanted, device_draws: bool) -> Machine {
     let (clock, usual) = (Clock::start(), Machine::default());
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
@@ -54,6 +54,7 @@ pub fn machine(wanted: Wanted, device_draws: bool) -> Machine {
     }
 }
 
+/// Median time of a call, µs.
 fn median_us(clock: &Clock, calls: usize, mut call: impl FnMut(usize)) -> f64 {
     let mut times: Vec<f64> = (0..calls)
         .map(|i| {
@@ -66,12 +67,13 @@ fn median_us(clock: &Clock, calls: usize, mut call: impl FnMut(usize)) -> f64 {
     times[calls / 2]
 }
 
+/// Median time per tetrahedron of a TLED step, ns.
 fn ns_per_tet_step(clock: &Clock) -> f64 {
     let mesh = boxes::split_box([10; 3], Vec3::splat(100.0));
     let tets = mesh.tets.len();
     let fixed = boxes::nodes_where(&mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
     let body = Body::uniform(mesh, fixed, Material::BRAIN);
-    let mut solver = Tled::new(&body, &Config::default()).expect("a split box is sound");
+    let mut solver = Tled::new(&body, &Config::default()).expect("a split box is a valid mesh");
     let loads = Loads { gravity: Vec3::NEG_Z * units::GRAVITY_MM_PER_MS2, ..Loads::default() };
     let dt_ms = solver.stable_dt_ms();
     1e3 * median_us(clock, CALLS, |_| _ = solver.step(&loads, dt_ms)) / tets as f64
@@ -95,8 +97,8 @@ fn us_per_rigid_tick(clock: &Clock) -> f64 {
     })
 }
 
-/// A wavy shell of bone from all sides: each picture from another one, so that nothing of the last
-/// can be used again.
+/// Time per ray on a wavy shell of bone, ns. Each picture has another view direction, so that
+/// nothing is reused.
 fn ns_per_ray(clock: &Clock) -> f64 {
     let n = 96;
     let mut ct = VoxelVolume::isotropic([n; 3], Vec3::splat(-95.0), 2.0, AIR_HU);
@@ -123,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_wanted_is_not_measured() {
+    fn parts_that_are_not_wanted_are_not_measured() {
         let usual = Machine::default();
         let machine = machine(Wanted { bone: true, tissue: false, picture: true }, true);
         assert_eq!((machine.ns_per_tet_step, machine.ns_per_ray), (usual.ns_per_tet_step, usual.ns_per_ray));

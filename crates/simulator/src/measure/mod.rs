@@ -1,5 +1,5 @@
-//! What a plan is made from and no table can say: how fast this machine is, and how far each choice
-//! is off in this very case.
+//! Measures what a plan needs: the speed of this machine, and the error of each choice in this
+//! case.
 
 pub mod bone;
 mod case_errors;
@@ -10,7 +10,7 @@ pub mod tissue;
 pub use case_errors::{CaseErrors, Sight};
 pub use machine::{Wanted, machine};
 
-/// A quantile of values in any order, 0 to 1; NaN without any.
+/// Quantile `share` (0 to 1) of values in any order; NaN without values.
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);

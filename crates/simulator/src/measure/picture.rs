@@ -1,4 +1,4 @@
-//! Picture: the skull from the opening, with fewer rays or fewer pixels, against every ray of the
+//! Measures the error of pictures of the skull with fewer rays or pixels, against every ray of the
 //! full picture.
 
 use crate::run::clock::Clock;
@@ -8,44 +8,44 @@ use trepan_geometry::Vec3;
 use trepan_render::{Camera, Casting, Frame, Image, ProcessorRenderer, RenderError, SceneData, SliceLook};
 use trepan_volume::BoneVolume;
 
-/// Shares of the pixels along an edge.
+/// Resolutions along an edge, as shares of the full picture's.
 const DETAILS: [f64; 9] = [0.25, 0.3, 0.35, 0.42, 0.5, 0.6, 0.7, 0.85, 1.0];
-/// Opening angle of the view, rad.
+/// Field of view, rad.
 const FOV_RAD: f32 = 0.6;
 
-/// Every choice.
+/// All choices for the picture.
 pub fn choices() -> Vec<Picture> {
     [true, false].iter().flat_map(|&sparse| DETAILS.map(|detail| Picture { sparse, detail })).collect()
 }
 
-/// What a choice came to.
+/// Measured error and time of a choice.
 #[derive(Clone, Copy, Debug)]
 pub struct Measurement {
-    /// Root mean square of all colours, percent of white.
+    /// Root-mean-square error of all colours, percent of white.
     pub error_percent: f64,
-    /// Time of a picture on one thread, least of those drawn, µs.
+    /// Time of the picture, µs.
     pub us: f64,
 }
 
 /// A view of a skull.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// What is seen.
+    /// Bone that is drawn.
     pub bone: Arc<BoneVolume>,
-    /// Pixels, and the height of what is shown, are taken from here.
+    /// Source of the number of pixels and the height of the view.
     pub scene: Scene,
-    /// What the eye looks at.
+    /// Point at which the camera looks.
     pub target: Vec3,
-    /// Direction from there to the eye.
+    /// Direction from there to the camera.
     pub eye: Vec3,
 }
 
 impl View {
-    /// Root mean square of all colours over all views, percent of white, of every choice in the
-    /// order given.
+    /// Root-mean-square colour error over all views, percent of white, of each choice in the order
+    /// given.
     ///
     /// # Errors
-    /// When the picture has no pixels or too many.
+    /// If the picture has no pixels or too many.
     pub fn measure_all(views: &[Self], choices: &[Picture], threads: usize) -> Result<Vec<f64>, RenderError> {
         let mut squares = vec![0.0; choices.len()];
         for view in views {
@@ -55,10 +55,10 @@ impl View {
         Ok(squares.into_iter().map(|sum| (sum / views.len().max(1) as f64).sqrt()).collect())
     }
 
-    /// Every choice, in the order given, each drawn once by so many threads.
+    /// Draws each choice once with so many threads, and measures it; in the order given.
     ///
     /// # Errors
-    /// When the picture has no pixels or too many.
+    /// If the picture has no pixels or too many.
     pub fn measure(&self, choices: &[Picture], threads: usize) -> Result<Vec<Measurement>, RenderError> {
         let full = self.scene.picture_pixels;
         let data = SceneData { bone: Some(Arc::clone(&self.bone)), brain: None, mri: None, tint: None };
@@ -76,7 +76,7 @@ impl View {
     }
 }
 
-/// A picture, cast anew, and its time, µs.
+/// Draws a picture from scratch; returns it and its time, µs.
 fn draw(
     renderer: &mut ProcessorRenderer,
     frame: &Frame,

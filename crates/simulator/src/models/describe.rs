@@ -1,5 +1,4 @@
-//! What is told of the models: in the log, in a recording's header, in `summary.json`, on a
-//! terminal.
+//! Describes the models: in the log, in a recording's header, in `summary.json`, on a terminal.
 
 use super::Models;
 use serde::Serialize;
@@ -8,7 +7,7 @@ use trepan_budget::{Plan, Setup};
 /// The models in `summary.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModelSummary {
-    /// How they came about: a quality, or `replay`.
+    /// Source of the choice: a quality, or `replay`.
     pub quality: &'static str,
     /// Bone.
     pub bone: BoneSummary,
@@ -16,52 +15,52 @@ pub struct ModelSummary {
     pub tissue: TissueSummary,
     /// Picture.
     pub picture: PictureSummary,
-    /// CPU seconds a second that the plan counts with; `null` without a plan.
+    /// CPU load that the plan expects, cores; `null` without a plan.
     pub planned_cores: Option<f64>,
 }
 
-/// How bone is represented and touched.
+/// Model and haptic method of bone.
 #[derive(Clone, Debug, Serialize)]
 pub struct BoneSummary {
     /// Name of the method.
     pub method: &'static str,
     /// Edge of a voxel, mm.
     pub spacing_mm: f64,
-    /// Points on the burr; 0 for the method's own.
+    /// Points on the burr; 0 for the method's default.
     pub points: usize,
-    /// Why.
+    /// Reason for the choice.
     pub why: String,
 }
 
-/// How tissue is represented and moved.
+/// Mesh and solver of tissue.
 #[derive(Clone, Debug, Serialize)]
 pub struct TissueSummary {
     /// Name of the solver.
     pub solver: &'static str,
-    /// Tetrahedra that were asked for.
+    /// Requested number of tetrahedra.
     pub tets: usize,
-    /// How often their edges are halved around the opening.
+    /// Halvings of the edge length around the opening.
     pub halvings: u32,
-    /// What moves less in 50 ms sleeps, mm; 0 = nothing does.
+    /// Motion in 50 ms below which tissue sleeps, mm; 0 = nothing sleeps.
     pub still_mm: f64,
-    /// Why.
+    /// Reason for the choice.
     pub why: String,
 }
 
-/// How pictures are drawn.
+/// Rendering of pictures.
 #[derive(Clone, Debug, Serialize)]
 pub struct PictureSummary {
-    /// Whether rays are left out where bone is smooth.
+    /// Whether rays are skipped where bone is smooth.
     pub sparse: bool,
-    /// Share of the pixels along an edge.
+    /// Resolution along an edge, as a share of the full picture's.
     pub detail: f64,
-    /// Why.
+    /// Reason for the choice.
     pub why: String,
 }
 
 impl Models {
-    /// One line for each part, and what is not kept as a warning.
-    pub fn say(&self) {
+    /// Logs one line for each part, and unmet tolerances as warnings.
+    pub fn log(&self) {
         let Setup { bone, tissue, picture } = &self.setup;
         let parts: [(&str, &dyn std::fmt::Display); 3] = [("bone", bone), ("tissue", tissue), ("picture", picture)];
         for ((name, what), why) in parts.into_iter().zip(&self.why) {
@@ -73,10 +72,12 @@ impl Models {
         self.unmet.iter().for_each(|text| tracing::warn!("{text}"));
     }
 
-    /// All of it for people: what was measured, what was chosen, why, and what lies next to it.
-    pub fn told(&self) -> String {
+    /// Describes the measurements, the choices with their reasons, and the neighbouring choices.
+    pub fn describe(&self) -> String {
         let Setup { bone, tissue, .. } = &self.setup;
-        let Some(plan) = &self.plan else { return format!("all is given, nothing was planned: {}", self.setup) };
+        let Some(plan) = &self.plan else {
+            return format!("all values are given, nothing was planned: {}", self.setup);
+        };
         let machine = &plan.machine;
         let drawn = if machine.device_draws {
             "a graphics card draws".into()
@@ -98,21 +99,21 @@ impl Models {
                 text += &format!("{}: {what}\n", given.join(", "));
             }
         }
-        let unmet = self.unmet.iter().map(|text| format!("NOT KEPT: {text}\n"));
+        let unmet = self.unmet.iter().map(|text| format!("NOT MET: {text}\n"));
         text + &unmet.collect::<String>()
     }
 
-    /// Where the plan's errors come from.
+    /// Source of the plan's errors.
     fn errors_by(&self) -> String {
         let all = ["bone", "tissue", "picture"].into_iter().zip(self.measured);
         let measured: Vec<_> = all.filter(|(_, measured)| *measured).map(|(name, _)| name).collect();
         match measured[..] {
-            [] => "the laws of cases like this".into(),
-            _ => format!("measuring {} in it, else by the laws of cases like this", measured.join(", ")),
+            [] => "power laws of similar cases".into(),
+            _ => format!("measuring {} in it, else by power laws of similar cases", measured.join(", ")),
         }
     }
 
-    /// As a recording keeps them; a replay takes the first ones back.
+    /// Entries for a recording's header; a replay reads the parameters among them.
     pub fn entries(&self) -> [(String, String); 13] {
         let Setup { bone, tissue, picture } = &self.setup;
         let [bone_why, tissue_why, picture_why] = self.why.clone();
@@ -134,7 +135,7 @@ impl Models {
         .map(|(key, value)| (key.to_string(), value))
     }
 
-    /// For the summary.
+    /// Entry for `summary.json`.
     pub fn summary(&self) -> ModelSummary {
         let Setup { bone, tissue, picture } = self.setup;
         let [bone_why, tissue_why, picture_why] = self.why.clone();

@@ -1,20 +1,20 @@
-//! Which models a session runs, and why: what the user gave, else what the recording ran, else what
-//! the preset or the plan for this machine says.
+//! Chooses the models of a session, with reasons: from the flags, else the recording, else the
+//! preset or the plan for this machine.
 //!
 //! # Theory
-//! Bone, tissue and picture are chosen each for itself. What is given of a part stands; the rest of
-//! it is
+//! Bone, tissue and picture are chosen independently. Given values of a part are kept; the others
+//! are
 //!
 //! ```text
-//! a replay         the recording's, from its header
-//! --quality NAME   the preset's
-//! auto             the plan's, among the rows that have what is given (trepan_budget)
+//! a replay         those in the recording's header
+//! --quality NAME   those of the preset
+//! auto             those of the plan, among the rows with the given values (trepan_budget)
 //! ```
 //!
 //! # Practice
-//! Settled once at start. The machine is measured only for parts that a plan chooses, in under two
-//! seconds, and the case in some thirty where it was not before; a replay, a preset, or a session
-//! with everything given measures nothing, so that it is the same on every machine.
+//! The choice is made once, at start. The machine is measured only for parts that a plan chooses,
+//! in under two seconds. The case is measured once, in about 30 s. A replay, a preset or a session
+//! with all values given measures nothing, so it is the same on every machine.
 
 mod describe;
 mod overrides;
@@ -36,36 +36,35 @@ use trepan_geometry::{ToolKind, units};
 use trepan_link::Recording;
 use trepan_soft::Material;
 
-/// The models of a session, and why these.
+/// The models of a session, with the reasons for them.
 #[derive(Clone, Debug)]
 pub struct Models {
-    /// What runs.
+    /// Models that run.
     pub setup: Setup,
-    /// How it came about: the name of a quality, or `replay`.
+    /// Source of the choice: the name of a quality, or `replay`.
     pub by: &'static str,
-    /// Why this bone, this tissue, this picture.
+    /// Reasons for the choice of bone, tissue and picture.
     pub why: [String; 3],
-    /// What of bone and tissue is given.
+    /// Given values of bone and tissue, in words.
     pub given: [Vec<String>; 2],
-    /// The tolerances that nothing keeps here in time.
+    /// Tolerances that no choice meets in real time on this machine.
     pub unmet: Vec<String>,
-    /// The plan, where something was planned.
+    /// The plan, if anything was planned.
     pub plan: Option<Plan>,
-    /// Whether it was made from errors of bone, tissue and picture that were found in this very
-    /// case.
+    /// Whether the errors of bone, tissue and picture were measured in this case.
     pub measured: [bool; 3],
 }
 
-/// What a choice of voxel size and mesh needs to know of the images.
+/// Properties of the images that the choice of voxel size and mesh depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Facts {
-    /// Edge of the CT's own voxels, the mean of the three, mm. `None` without a CT.
+    /// Mean edge of the CT's voxels, mm. `None` without a CT.
     pub ct_voxel_mm: Option<f64>,
     /// Volume of the brain, mm³; `None` without an MRI.
     pub brain_mm3: Option<f64>,
 }
 
-/// What is known of a session's models before its case is open.
+/// Request for a session's models, before its case is opened.
 pub struct ModelRequest {
     program: Program,
     /// `None` for a replay.
@@ -80,8 +79,7 @@ pub struct ModelRequest {
 }
 
 impl ModelRequest {
-    /// What the options say, and what the recording ran that is run again; refuses names that
-    /// nobody knows.
+    /// Request from the options and the replayed recording, if any; refuses unknown names.
     pub fn of(
         program: Program,
         options: &Options,
@@ -104,7 +102,7 @@ impl ModelRequest {
         })
     }
 
-    /// What a plan is asked for, without a session.
+    /// Request for a plan without a session.
     pub fn to_plan(
         program: Program,
         patient: &Patient,
@@ -124,7 +122,7 @@ impl ModelRequest {
         })
     }
 
-    /// With what a case folder was built from: that stands.
+    /// Adds the values that a case folder was built with, which override all others.
     pub fn on(mut self, recipe: &Recipe) -> Self {
         let spacing_mm = written(recipe.spacing_mm);
         let (tets, halvings) = (Some(recipe.tets), Some(recipe.halvings));
@@ -136,14 +134,14 @@ impl ModelRequest {
         self
     }
 
-    /// The models for a case with these images. `card` says whether a graphics card draws; it is
-    /// asked only where that matters. `own` finds how far rows are off in this very case; it is
-    /// asked only where a plan is made.
+    /// Chooses the models for a case with these images. `card` returns whether a graphics card
+    /// draws; it is called only if that matters. `case_errors` measures the errors of rows in this
+    /// case; it is called only for a plan.
     pub fn settle(
         &self,
         facts: &Facts,
         card: impl FnOnce() -> bool,
-        own: impl FnOnce(&Scene, &Rows) -> Result<CaseErrors, SessionError>,
+        case_errors: impl FnOnce(&Scene, &Rows) -> Result<CaseErrors, SessionError>,
     ) -> Result<Models, SessionError> {
         let (given, usual) = (&self.given, usual());
         let preset = self.quality.map_or(Some(usual), Quality::preset);
@@ -153,7 +151,7 @@ impl ModelRequest {
             tissue: auto && self.program.has_tissue() && (given.tets.is_none() || given.solver.is_none()),
             picture: auto && self.picture.is_some(),
         };
-        let plan = wanted.any().then(|| self.plan(facts, wanted, wanted.picture && card(), own)).transpose()?;
+        let plan = wanted.any().then(|| self.plan(facts, wanted, wanted.picture && card(), case_errors)).transpose()?;
         let (plan, measured) = plan.unzip();
         let measured = measured.unwrap_or_default();
         let base = preset.unwrap_or_else(|| plan.as_ref().map_or(usual, |plan| of_parts(plan, wanted, usual)));
@@ -174,14 +172,14 @@ impl ModelRequest {
         })
     }
 
-    /// Measures the machine and the case and plans what is wanted, among the rows that have what is
-    /// given; says what was measured of the case.
+    /// Measures machine and case, and plans the `wanted` parts among the rows that match the given
+    /// values. Also returns which errors were measured in the case.
     fn plan(
         &self,
         facts: &Facts,
         wanted: Wanted,
         device_draws: bool,
-        own: impl FnOnce(&Scene, &Rows) -> Result<CaseErrors, SessionError>,
+        case_errors: impl FnOnce(&Scene, &Rows) -> Result<CaseErrors, SessionError>,
     ) -> Result<(Plan, [bool; 3]), SessionError> {
         let internal = |fault: trepan_budget::PlanError| SessionError::Internal(format!("--quality auto: {fault}"));
         let (machine, mut rows) = (measure::machine(wanted, device_draws), Rows::stored().map_err(internal)?);
@@ -207,12 +205,12 @@ impl ModelRequest {
         if !wanted.picture || device_draws {
             asked.picture.clear();
         }
-        let own = own(&scene, &asked)?;
-        let plan = trepan_budget::plan_with(&machine, &scene, &own.instead(rows, &scene)).map_err(internal)?;
-        Ok((plan, own.has()))
+        let case_errors = case_errors(&scene, &asked)?;
+        let plan = trepan_budget::plan_with(&machine, &scene, &case_errors.instead(rows, &scene)).map_err(internal)?;
+        Ok((plan, case_errors.has()))
     }
 
-    /// What the session asks for, with the most demanding of the program's tools.
+    /// Requirements of the session, with the most demanding of the program's tools.
     fn scene(&self, facts: &Facts) -> Scene {
         let usual = Scene::default();
         let thinnest = |kind: ToolKind| {
@@ -240,7 +238,7 @@ impl ModelRequest {
         }
     }
 
-    /// Why each part, and what is not kept.
+    /// Reasons for each part, and the unmet tolerances.
     fn why(&self, plan: Option<&Plan>, wanted: Wanted, measured: [bool; 3]) -> ([String; 3], Vec<String>) {
         let rest = match self.quality {
             None => "as recorded".into(),
@@ -275,24 +273,24 @@ impl ModelRequest {
     }
 }
 
-/// Stiffness of bone in the hand, N/mm.
+/// Stiffness of the contact with bone, N/mm.
 pub const BONE_STIFFNESS: f32 = 2.0;
 
-/// Height of what the 3-D view shows at the opening, mm.
+/// Height of the 3-D view at the opening, mm.
 const VIEW_MM: f64 = 105.0;
 
-/// Pictures a second in a window.
+/// Frame rate of a window, Hz.
 const LIVE_HZ: f64 = 10.0;
 
-/// How hard a hand presses a burr, N.
+/// Force with which a hand presses a burr, N.
 const PRESS_N: f64 = 1.0;
 
-/// What runs where nothing else is said.
+/// Default models: preset `usual`.
 pub fn usual() -> Setup {
     Quality::Usual.preset().expect("only auto has none")
 }
 
-/// A plan's parts where they are wanted.
+/// Setup of a plan; the picture is the default unless it was planned.
 fn of_parts(plan: &Plan, wanted: Wanted, usual: Setup) -> Setup {
     let planned = plan.setup();
     Setup { picture: if wanted.picture { planned.picture } else { usual.picture }, ..planned }
@@ -304,7 +302,7 @@ fn view_pixels(picture: [u32; 2]) -> [u32; 2] {
     [width, height]
 }
 
-/// Why a choice was made, and whether it leaves something to be wished for.
+/// Reason for a choice, and whether it misses the tolerance or real time.
 fn reason<T: std::fmt::Display>(choice: &Choice<T>, (tolerance, unit): (f64, &str), measured: bool) -> (String, bool) {
     let Choice { error, cost, meets_tolerance, in_time, better, cheaper, .. } = choice;
     let why = match (in_time, meets_tolerance) {
@@ -329,11 +327,11 @@ mod tests {
     use clap::Parser;
     use trepan_budget::{Bone, Tissue};
 
-    fn by_law(_: &Scene, _: &Rows) -> Result<CaseErrors, SessionError> {
+    fn unmeasured(_: &Scene, _: &Rows) -> Result<CaseErrors, SessionError> {
         Ok(CaseErrors::default())
     }
 
-    fn wish(line: &str, recording: Option<&Recording>) -> ModelRequest {
+    fn request(line: &str, recording: Option<&Recording>) -> ModelRequest {
         let options = Options::try_parse_from(format!("x --headless {line}").split_whitespace()).unwrap();
         let operation = Operation::of(&options, &trepan_haptics::DeviceName::Mouse, recording);
         ModelRequest::of(Program::Integrated, &options, &operation, recording).unwrap()
@@ -344,39 +342,43 @@ mod tests {
     #[test]
     fn presets_and_flags_are_taken_without_a_measurement() {
         for quality in [Quality::Draft, Quality::Usual, Quality::Fine] {
-            let models = wish(&format!("--quality {}", quality.name()), None).settle(&FACTS, || false, by_law).unwrap();
+            let models =
+                request(&format!("--quality {}", quality.name()), None).settle(&FACTS, || false, unmeasured).unwrap();
             assert_eq!((Some(models.setup), models.plan.is_none()), (quality.preset(), true));
         }
-        let models = wish("--quality draft --tets 3000 --rigid thesis", None).settle(&FACTS, || false, by_law).unwrap();
+        let models =
+            request("--quality draft --tets 3000 --rigid thesis", None).settle(&FACTS, || false, unmeasured).unwrap();
         let draft = Quality::Draft.preset().unwrap();
         assert_eq!(models.setup.bone, Bone { method: "thesis", points: 0, ..draft.bone });
         assert_eq!(models.setup.tissue, Tissue { tets: 3000, ..draft.tissue });
         assert!(models.why[0].contains("--rigid thesis is given; preset draft"), "{}", models.why[0]);
         let all = "--spacing-mm 0.7 --rigid thesis --tets 4000 --solver xpbd --frames-per-second 0";
-        let models = wish(all, None).settle(&FACTS, || false, by_law).unwrap();
+        let models = request(all, None).settle(&FACTS, || false, unmeasured).unwrap();
         assert!(models.plan.is_none() && models.setup.bone.spacing_mm == 0.7 && models.setup.tissue.solver == "xpbd");
     }
 
     #[test]
-    fn auto_plans_what_is_not_given_and_says_why() {
-        let models =
-            wish("--spacing-mm 0.7 --tets 9000 --frames-per-second 0", None).settle(&FACTS, || false, by_law).unwrap();
+    fn auto_plans_missing_values_and_gives_reasons() {
+        let models = request("--spacing-mm 0.7 --tets 9000 --frames-per-second 0", None)
+            .settle(&FACTS, || false, unmeasured)
+            .unwrap();
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.7, 9000));
         let plan = models.plan.as_ref().unwrap();
         assert_eq!(plan.bone.unwrap().what.method, models.setup.bone.method);
         assert!(models.why[0].contains("--spacing-mm 0.7 is given; ") && models.why[0].contains(" N of 0.4 allowed"));
         assert_eq!(models.why[2], "as usual", "no picture is drawn");
         let models =
-            wish("--rigid exposed-faces --frames-per-second 0", None).settle(&FACTS, || false, by_law).unwrap();
+            request("--rigid exposed-faces --frames-per-second 0", None).settle(&FACTS, || false, unmeasured).unwrap();
         let usual = Quality::Usual.preset().unwrap();
         let stands = Bone { method: "exposed-faces", points: 0, ..usual.bone };
-        assert_eq!(models.setup.bone, stands, "a method without a proxy is not planned, but can be had");
+        assert_eq!(models.setup.bone, stands, "a method without a proxy is not planned, but can be requested");
     }
 
     #[test]
-    fn what_cannot_be_kept_is_said_and_the_best_that_runs_is_taken() {
-        let models =
-            wish("--force-error-n 0.0001 --displacement-mm 0.0001", None).settle(&FACTS, || false, by_law).unwrap();
+    fn unmet_tolerances_are_reported_and_the_best_in_time_is_taken() {
+        let models = request("--force-error-n 0.0001 --displacement-mm 0.0001", None)
+            .settle(&FACTS, || false, unmeasured)
+            .unwrap();
         assert!(models.unmet.len() >= 2 && models.unmet[0].contains("TOLERANCE NOT MET"), "{:?}", models.unmet);
         assert!(models.unmet[0].starts_with("bone: ") && models.unmet[1].starts_with("tissue: "));
     }
@@ -384,25 +386,27 @@ mod tests {
     #[test]
     fn a_replay_takes_what_was_recorded_and_measures_nothing() {
         let mut recording = Recording::default();
-        let recorded =
-            wish("--quality fine --spacing-mm 0.85 --rigid thesis", None).settle(&FACTS, || false, by_law).unwrap();
+        let recorded = request("--quality fine --spacing-mm 0.85 --rigid thesis", None)
+            .settle(&FACTS, || false, unmeasured)
+            .unwrap();
         recording.header.config.extend(recorded.entries());
         for line in ["", "--quality auto"] {
-            let again = wish(line, Some(&recording)).settle(&FACTS, || false, by_law).unwrap();
+            let again = request(line, Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
             assert_eq!((again.setup, again.by, again.plan.is_none()), (recorded.setup, "replay", true));
         }
-        let other = wish("--tets 7000 --spacing-mm 2", Some(&recording)).settle(&FACTS, || false, by_law).unwrap();
+        let other =
+            request("--tets 7000 --spacing-mm 2", Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
         assert_eq!((other.setup.tissue.tets, other.setup.bone.spacing_mm), (7000, 2.0));
         assert_eq!(other.setup.bone.method, "thesis");
-        let draft = wish("--quality draft", Some(&recording)).settle(&FACTS, || false, by_law).unwrap();
+        let draft = request("--quality draft", Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
         assert_eq!(Some(draft.setup), Quality::Draft.preset());
         recording.header.config = [("spacing_mm".to_string(), "1".to_string())].into();
-        let older = wish("", Some(&recording)).settle(&FACTS, || false, by_law).unwrap();
-        assert_eq!(Some(older.setup), Quality::Usual.preset(), "an older one ran what was usual");
+        let older = request("", Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
+        assert_eq!(Some(older.setup), Quality::Usual.preset(), "an older one ran the defaults");
     }
 
     #[test]
-    fn a_case_folder_stands() {
+    fn a_case_folder_overrides_other_values() {
         let recipe = Recipe {
             spacing_mm: 0.8,
             tets: 6000,
@@ -413,7 +417,7 @@ mod tests {
             register: false,
             opening: None,
         };
-        let models = wish("--quality fine", None).on(&recipe).settle(&FACTS, || false, by_law).unwrap();
+        let models = request("--quality fine", None).on(&recipe).settle(&FACTS, || false, unmeasured).unwrap();
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.8, 6000));
         assert_eq!(models.setup.tissue.halvings, 1);
         assert!(models.why[0].contains("the case folder has voxels of 0.8 mm; preset fine"), "{}", models.why[0]);

@@ -1,11 +1,11 @@
-//! What of the models is given: by flags, by a recording's header, by a case folder.
+//! Given parameters of the models: by flags, a recording's header or a case folder.
 
 use crate::error::SessionError;
 use crate::options::Patient;
 use std::collections::BTreeMap;
 use trepan_budget::{Bone, Picture, Tissue};
 
-/// What is given of each part, and in which words.
+/// Given parameters of each part; `words` describes those of bone and tissue.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Overrides {
     pub spacing_mm: Option<f64>,
@@ -20,7 +20,7 @@ pub(super) struct Overrides {
 }
 
 impl Overrides {
-    /// By flags; refuses names that nobody knows.
+    /// Reads the flags; refuses unknown names.
     pub fn flags(patient: &Patient, rigid: Option<&str>, solver: Option<&str>) -> Result<Self, SessionError> {
         let tled = |name| if name == FASTEST { FASTEST } else { TLED };
         let named = |name| Ok::<_, SessionError>(solver_named(name)?.map_or(tled(name), |method| method.name()));
@@ -53,14 +53,13 @@ impl Overrides {
         })
     }
 
-    /// As a recording keeps it ([`Models::entries`]); what an older one did not keep was as it is
-    /// usual, but tetrahedra of a number were alike everywhere.
+    /// Reads a recording's header ([`Models::entries`]). Entries missing in older recordings had
+    /// the default value, except that meshes of a given size were uniform.
     pub fn recorded(config: &BTreeMap<String, String>) -> Self {
         let number = |key: &str| config.get(key)?.parse::<f64>().ok().filter(|value| value.is_finite());
         let count = |key: &str| config.get(key)?.parse::<usize>().ok();
         let flag = |key: &str| config.get(key).is_some_and(|value| value == "true");
-        // What was fastest then need not be fastest now: the processor's is the one that can be had
-        // again.
+        // The fastest solver may be another one now; TLED on the CPU is always available.
         let solver = |name: &String| trepan_soft::Method::named(name).map_or(TLED, |method| method.name());
         let detail = number("picture_detail");
         Self {
@@ -76,7 +75,7 @@ impl Overrides {
         }
     }
 
-    /// With what another one leaves open.
+    /// Takes missing values from `other`.
     pub fn or(self, other: Self) -> Self {
         Self {
             spacing_mm: self.spacing_mm.or(other.spacing_mm),
@@ -91,13 +90,14 @@ impl Overrides {
         }
     }
 
-    /// A part of a setup, with what is given instead.
+    /// Replaces the given values of bone.
     pub fn bone(&self, bone: Bone) -> Bone {
         let points = self.points.unwrap_or(if self.rigid.is_some() { 0 } else { bone.points });
         let (method, spacing_mm) = (self.rigid.unwrap_or(bone.method), self.spacing_mm.unwrap_or(bone.spacing_mm));
         Bone { method, spacing_mm, points }
     }
 
+    /// Replaces the given values of tissue.
     pub fn tissue(&self, tissue: Tissue) -> Tissue {
         Tissue {
             solver: self.solver.unwrap_or(tissue.solver),
@@ -111,11 +111,11 @@ impl Overrides {
 /// Total Lagrangian explicit dynamics.
 pub const TLED: &str = "tled";
 
-/// TLED where it steps faster on this machine, processor or graphics device. A replay then need not
-/// have the recorded forces to the last bit.
+/// TLED on the CPU or the GPU, whichever is faster on this machine. A replay may then not reproduce
+/// the recorded forces bit for bit.
 pub const FASTEST: &str = "fastest";
 
-/// The method on bone of that name.
+/// Haptic method on bone with this name.
 fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
     trepan_rigid::Method::named(name).ok_or_else(|| {
         let known: Vec<_> = trepan_rigid::Method::all().iter().map(|method| method.name()).collect();
@@ -123,12 +123,12 @@ fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
     })
 }
 
-/// The method that a part names, with its points.
+/// Haptic method of a choice for bone, with its number of points.
 pub fn rigid_of(bone: &Bone) -> Result<trepan_rigid::Method, SessionError> {
     rigid_named(bone.method).map(|method| method.with_points(bone.points))
 }
 
-/// The rival solver of that name; `None` for TLED.
+/// Solver of `trepan_soft` with this name; `None` for TLED.
 pub fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
     if name == TLED || name == FASTEST {
         return Ok(None);
@@ -139,7 +139,7 @@ pub fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionEr
     })
 }
 
-/// A number of a flag as it was written: 0.7 and not 0.699999988.
+/// Converts a flag's number to the decimal as written: 0.7, not 0.699999988.
 pub(super) fn written(number: f32) -> f64 {
     number.to_string().parse().unwrap_or(f64::from(number))
 }

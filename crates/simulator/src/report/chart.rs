@@ -1,23 +1,24 @@
-//! The curves of a report, as SVG.
+//! Charts of a report, as SVG.
 
 use plotters::prelude::*;
 
 /// One line of a chart.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub name: &'static str,
     /// (x, y) in the chart's units.
     pub points: Vec<(f64, f64)>,
 }
 
-/// Blue, orange, green: told apart by readers with any colour vision (Okabe and Ito 2008).
+/// Blue, orange, green, which readers with any colour vision can distinguish (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 3] = [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115)];
-/// Points a curve keeps; between them the largest stands for all.
+/// Largest number of points drawn of a curve.
 const POINTS: usize = 1200;
+/// Size of a chart, pixels.
 const SIZE: (u32, u32) = (900, 260);
 
-/// Curves over session time in s. `limit`: a dashed line with its meaning.
+/// Draws curves over session time, s. `limit` is a dashed line with its label.
 pub fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Result<String, String> {
     let curves: Vec<Curve> = curves.iter().map(thinned).collect();
     let points = || curves.iter().flat_map(|curve| &curve.points);
@@ -56,7 +57,7 @@ pub fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Re
     Ok(svg)
 }
 
-/// Curves in a plane; `axes` name it with units.
+/// Draws curves in a plane; `axes` are its labels with units.
 pub fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, String> {
     let points = || curves.iter().flat_map(|curve| &curve.points).filter(|p| p.0.is_finite() && p.1.is_finite());
     let span = |of: fn(&(f64, f64)) -> f64| {
@@ -89,8 +90,8 @@ pub fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, String> {
     Ok(svg)
 }
 
-/// How often times fell into bins, both axes logarithmic. `what` names them; `bins`: (upper edge in
-/// µs, count).
+/// Draws a histogram of times with logarithmic axes. `what` is the label of the time axis; `bins`
+/// are (upper edge in µs, count).
 pub fn histogram(what: &str, bins: &[(f64, u64)], limit_us: f64) -> Result<String, String> {
     let used: Vec<(f64, f64)> =
         bins.iter().filter(|b| b.1 > 0).map(|&(edge, count)| (edge.max(0.01), count as f64)).collect();
@@ -120,7 +121,7 @@ pub fn histogram(what: &str, bins: &[(f64, u64)], limit_us: f64) -> Result<Strin
     Ok(svg)
 }
 
-/// A curve of few enough points: of each run of neighbours the one farthest from zero.
+/// Thins a curve to [`POINTS`]: of each run of neighbours it keeps the point farthest from zero.
 fn thinned(curve: &Curve) -> Curve {
     let run = curve.points.len().div_ceil(POINTS).max(1);
     let farthest = |points: &[(f64, f64)]| points.iter().copied().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn charts_hold_their_names_and_survive_emptiness() {
+    fn charts_contain_their_labels_and_work_without_data() {
         let curve = Curve { name: "bone", points: vec![(0.0, 0.0), (1.0, 2.0)] };
         let svg = over_time("force, N", &[curve], Some((3.3, "limit"))).unwrap();
         assert!(svg.contains("force, N") && svg.contains("limit") && svg.contains("bone"));

@@ -1,19 +1,19 @@
-//! The drilled skull in the scanner's own voxels: the CT as it was read, with air where bone went.
+//! The drilled skull in the scanner's voxels: the CT as read, with air where bone was removed.
 //!
 //! # Theory
-//! Of a voxel of the CT the share `r` of its bone went, counted at points spread evenly through it,
-//! each in the voxel of the carved grid that holds it: `V' = V + r (air - V)`. Dense voxels without
-//! bone of the carved grid, such as half-filled ones at the rim of a piece and marrow within it, go
-//! with the nearest bone:
+//! `r` is the removed share of the bone of a CT voxel, `V' = V + r (air - V)`. It is counted at
+//! points spread evenly through the voxel, each looked up in the carved grid. Dense voxels without
+//! bone in the carved grid, such as partly filled voxels at the rim of a piece and marrow within
+//! it, take the share of the nearest bone:
 //!
 //! ```text
 //! r = gone / (gone + left)                   where the carved grid has bone
 //! r = that of the nearest such voxel         where V ≥ 100 HU, along such voxels, within 3 mm
-//! r = 0                                      elsewhere: soft tissue stays as it was scanned
+//! r = 0                                      elsewhere: soft tissue is unchanged
 //! ```
 //!
 //! # Practice
-//! Only what lies around the bone that went is looked at: a second for a large flap.
+//! Only a box around the removed bone is computed: a second for a large flap.
 
 use glam::{DVec3, IVec3, USizeVec3};
 use std::cmp::Reverse;
@@ -21,14 +21,14 @@ use std::collections::BinaryHeap;
 use trepan_geometry::Vec3;
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};
 
-/// From this density on a voxel may hold some bone, HU: more than soft tissue has.
+/// Density from which a voxel may hold some bone, HU: above soft tissue.
 const DENSE_HU: i16 = 100;
-/// How far dense voxels go with the nearest bone, mm.
+/// Largest distance at which a dense voxel takes the share of the nearest bone, mm.
 const REACH_MM: f64 = 3.0;
-/// Most points along an edge of a voxel.
-const MOST_POINTS: f64 = 24.0;
+/// Largest number of points along an edge of a voxel.
+const MAX_POINTS: f64 = 24.0;
 
-/// Takes out of a CT what is gone of the bone since `before`.
+/// Removes from a CT the bone that was removed since `before`.
 pub fn drilled(mut ct: VoxelVolume<i16>, before: &VoxelVolume<i16>, bone: &BoneVolume) -> VoxelVolume<i16> {
     let Some((low, high)) = gone_box(before, bone) else { return ct };
     let part = Part::of(&ct, low, high);
@@ -42,9 +42,8 @@ pub fn drilled(mut ct: VoxelVolume<i16>, before: &VoxelVolume<i16>, bone: &BoneV
     ct
 }
 
-/// What became of a voxel of the carved grid: whether its bone is gone; `None` where it had none
-/// that is known.
-fn fate(was: i16, is: i16, isovalue: i16) -> Option<bool> {
+/// Returns whether the bone of a voxel of the carved grid is gone; `None` where it had no bone.
+fn is_gone(was: i16, is: i16, isovalue: i16) -> Option<bool> {
     match was {
         _ if was >= isovalue => Some(is < isovalue),
         _ if was >= DENSE_HU && is < DENSE_HU => Some(true),
@@ -52,11 +51,11 @@ fn fate(was: i16, is: i16, isovalue: i16) -> Option<bool> {
     }
 }
 
-/// World corners of the voxels whose bone is gone; `None` where none is.
+/// Returns the world corners of a box around the removed voxels, mm; `None` if nothing was removed.
 fn gone_box(before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<(DVec3, DVec3)> {
     let [nx, ny, _] = before.dims;
     let voxel = |at: usize| USizeVec3::new(at % nx, at / nx % ny, at / (nx * ny));
-    let is_gone = |at: &usize| fate(before.data[*at], bone.hu(voxel(*at).as_ivec3()), bone.isovalue()) == Some(true);
+    let is_gone = |at: &usize| is_gone(before.data[*at], bone.hu(voxel(*at).as_ivec3()), bone.isovalue()) == Some(true);
     let gone = (0..before.data.len()).filter(is_gone).map(|at| before.centre_of(voxel(at).to_array()));
     gone.fold(None, |corners: Option<(DVec3, DVec3)>, place| {
         Some(corners.map_or((place, place), |(low, high)| (low.min(place), high.max(place))))
@@ -70,7 +69,7 @@ struct Part {
 }
 
 impl Part {
-    /// What lies within reach of a box in the world.
+    /// Voxels within [`REACH_MM`] of a box in world coordinates.
     fn of(ct: &VoxelVolume<i16>, low: DVec3, high: DVec3) -> Self {
         let voxel_of_world = ct.world_from_voxel.inverse();
         let (low, high) =
@@ -96,8 +95,8 @@ impl Part {
         USizeVec3::new(at % size.x, at / size.x % size.y, at / (size.x * size.y))
     }
 
-    /// The neighbour of the voxel at `at` by a step along an axis.
-    fn beside(&self, at: usize, step: IVec3) -> Option<usize> {
+    /// Returns the neighbour of the voxel at `at` by a step along an axis.
+    fn neighbour(&self, at: usize, step: IVec3) -> Option<usize> {
         let there = Self::place(self.size, at).as_ivec3() + step;
         let inside = there.cmpge(IVec3::ZERO).all() && there.cmplt(self.size.as_ivec3()).all();
         let there = there.as_usizevec3();
@@ -105,20 +104,20 @@ impl Part {
     }
 }
 
-/// The share of a voxel's bone that is gone; `None` where the carved grid had none.
+/// Returns the share of a voxel's bone that is gone; `None` where the carved grid had none.
 fn share(ct: &VoxelVolume<i16>, voxel: USizeVec3, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<f32> {
     if ct.data[ct.index(voxel.to_array())] < DENSE_HU {
         return None;
     }
     let parts =
-        (2.0 * ct.spacing_mm() / f64::from(bone.spacing_mm())).ceil().clamp(DVec3::ONE, DVec3::splat(MOST_POINTS));
+        (2.0 * ct.spacing_mm() / f64::from(bone.spacing_mm())).ceil().clamp(DVec3::ONE, DVec3::splat(MAX_POINTS));
     let [nx, ny, nz] = parts.as_usizevec3().to_array();
     let (mut gone, mut left) = (0u16, 0u16);
     for point in (0..nx * ny * nz).map(|n| DVec3::new((n % nx) as f64, (n / nx % ny) as f64, (n / (nx * ny)) as f64)) {
         let place = ct.world_from_voxel.transform_point3(voxel.as_dvec3() + (point + 0.5) / parts - 0.5);
         let at = bone.voxel_of(Vec3::new(place.x as f32, place.y as f32, place.z as f32));
         let was = before.get(at.as_usizevec3().to_array());
-        match was.and_then(|was| fate(was, bone.hu(at), bone.isovalue())) {
+        match was.and_then(|was| is_gone(was, bone.hu(at), bone.isovalue())) {
             Some(true) => gone += 1,
             Some(false) => left += 1,
             None => {}
@@ -127,12 +126,12 @@ fn share(ct: &VoxelVolume<i16>, voxel: USizeVec3, before: &VoxelVolume<i16>, bon
     (gone + left > 0).then(|| f32::from(gone) / f32::from(gone + left))
 }
 
-/// Gives dense voxels without a share that of the nearest with one, along dense voxels; bone that
-/// is left comes first where both are as near.
+/// Gives dense voxels without a share that of the nearest voxel with one, along dense voxels. At
+/// equal distance, remaining bone has priority over removed bone.
 fn spread(ct: &VoxelVolume<i16>, part: &Part, shares: &mut [Option<f32>]) {
     let edges = ct.spacing_mm();
     let steps = [(IVec3::X, edges.x), (IVec3::Y, edges.y), (IVec3::Z, edges.z)];
-    // µm, so that the order is that of whole numbers; then the share in thousandths.
+    // Distance in µm, so that the order is that of integers; then the share in thousandths.
     let rank = |mm: f64, share: f32| ((1e3 * mm) as u32, (1e3 * share) as u32);
     let mut waiting = BinaryHeap::new();
     for (at, share) in shares.iter().enumerate() {
@@ -148,7 +147,7 @@ fn spread(ct: &VoxelVolume<i16>, part: &Part, shares: &mut [Option<f32>]) {
         }
         for (step, edge) in steps.into_iter().flat_map(|(step, edge)| [(step, edge), (-step, edge)]) {
             let far = f64::from(um) * 1e-3 + edge;
-            let next = part.beside(at, step).filter(|next| !reached[*next] && dense[*next] && far <= REACH_MM);
+            let next = part.neighbour(at, step).filter(|next| !reached[*next] && dense[*next] && far <= REACH_MM);
             next.iter().for_each(|next| waiting.push(Reverse(((rank(far, 0.0).0, share), *next))));
         }
     }
@@ -160,8 +159,8 @@ mod tests {
     use glam::{DAffine3, DMat3};
     use trepan_volume::{Grid, Interpolation, resample};
 
-    /// A plate of bone 6 mm thick with marrow in its middle and soft tissue around it, blurred as a
-    /// scanner does, on an oblique grid.
+    /// Makes a plate of bone 6 mm thick with marrow in its middle, in soft tissue. The image is
+    /// blurred as by a scanner, on an oblique grid.
     fn ct() -> VoxelVolume<i16> {
         let matrix3 = DMat3::from_rotation_x(0.2) * DMat3::from_diagonal(DVec3::new(-0.6, 0.6, 1.1));
         let affine = DAffine3 { matrix3, translation: DVec3::new(24.0, -22.0, -16.0) };
@@ -176,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn removed_bone_does_not_come_back_at_a_low_threshold_and_the_rest_is_as_scanned() {
+    fn removed_bone_is_absent_at_a_low_threshold_and_the_rest_is_as_scanned() {
         let ct = ct();
         for spacing_mm in [0.5, 1.0] {
             let before = resample(&ct, &Grid::isotropic_over(&ct, spacing_mm), Interpolation::Trilinear, AIR_HU);
@@ -185,7 +184,7 @@ mod tests {
             let [nx, ny, nz] = before.dims;
             for (k, j, i) in (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (k, j, i)))) {
                 let voxel = IVec3::new(i as i32, j as i32, k as i32);
-                // As a flap is lifted: what is bone at the isovalue, and no more.
+                // As lifting a flap does: only voxels that are bone at the isovalue.
                 if bone.centre_of(voxel).truncate().abs().max_element() < 8.0 && bone.is_bone(voxel) {
                     bone.set_hu(voxel, AIR_HU);
                 }
@@ -212,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_voxel_loses_as_much_as_of_its_bone_went() {
+    fn a_voxel_loses_the_share_of_its_bone_that_was_removed() {
         let before = VoxelVolume::isotropic([8; 3], Vec3::splat(-3.5), 1.0, 1000i16);
         let bone = BoneVolume::new(&before, 400).unwrap();
         (0..64).for_each(|n| (0..5).for_each(|z| bone.set_hu(IVec3::new(n % 8, n / 8, z), AIR_HU)));

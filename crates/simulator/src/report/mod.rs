@@ -1,4 +1,4 @@
-//! What is left of a session: summary, page, files.
+//! Output files of a session: summary, scores, report page, drilled skull.
 
 pub(crate) mod chart;
 pub(crate) mod drilled;

@@ -1,4 +1,4 @@
-//! The files of a session: each appears whole or not at all.
+//! Writes the output files of a session, each of them atomically.
 
 use crate::error::SessionError;
 use crate::program::Program;
@@ -15,19 +15,19 @@ use trepan_link::Recording;
 use trepan_mesh::{isosurface, stl};
 use trepan_volume::{BoneVolume, VoxelVolume, nifti};
 
-/// Files that a session leaves in its folder, beside pictures.
+/// Files that a session writes into its folder, besides pictures.
 const FILES: [&str; 6] = ["summary.json", "scores.csv", "report.html", "drilled.nii.gz", "drilled.stl", RECORDING];
-/// The recording's name, unless `--record` gives another.
+/// Default name of the recording; `--record` gives another.
 pub const RECORDING: &str = "session.mcap";
-/// Where pictures lie.
+/// Folder of the pictures.
 const FRAMES: &str = "frames";
 
-/// Whether a folder holds a session.
+/// Whether a folder holds files of a session.
 pub fn holds_session(out: &Path) -> bool {
     FILES.iter().any(|name| out.join(name).exists())
 }
 
-/// A folder below `trepan-out/PROGRAM` that is named after the time (UTC) and is not there yet.
+/// Returns a new folder below `trepan-out/PROGRAM`, named after the time (UTC).
 pub fn dated(program: Program) -> PathBuf {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
     let place = Path::new("trepan-out").join(program.name());
@@ -40,7 +40,7 @@ pub fn dated(program: Program) -> PathBuf {
     folder
 }
 
-/// Seconds since 1970 as a date and a time that a file name may hold, UTC; days by Hinnant's
+/// Formats seconds since 1970 as date and time (UTC) for a file name. Days follow Hinnant's
 /// `civil_from_days`.
 fn date_and_time(seconds: u64) -> String {
     let days = seconds / 86_400 + 719_468;
@@ -54,19 +54,19 @@ fn date_and_time(seconds: u64) -> String {
     format!("{year:04}-{month:02}-{day:02}T{h:02}-{m:02}-{s:02}")
 }
 
-/// The folder of a session that is being written. Dropped before [`keep`](Self::keep), it removes
-/// what the session wrote; a recording that can be opened stays, up to its last whole chunk.
+/// Folder of a session that is being written. Dropped before [`keep`](Self::keep), it removes the
+/// session's files; a recording that can be opened is kept, up to its last whole chunk.
 #[derive(Debug)]
 pub struct Place {
     out: PathBuf,
     record: PathBuf,
-    /// Folders that were not there before, the deepest first.
+    /// Folders that this session created, the deepest first.
     made: Vec<PathBuf>,
     kept: bool,
 }
 
 impl Place {
-    /// Makes the folder and its place for pictures, and removes an older session's files.
+    /// Creates the folder and its folder for pictures, and removes the files of an older session.
     pub fn make(out: &Path, record: &Path) -> Result<Self, SessionError> {
         let missing = out.ancestors().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let made = missing.map(PathBuf::from).collect();
@@ -77,12 +77,12 @@ impl Place {
         Ok(place)
     }
 
-    /// The session is whole: its files stay.
+    /// Keeps the files: the session is complete.
     pub fn keep(mut self) {
         self.kept = true;
     }
 
-    /// Removes a session's files and pictures, but for what the user kept of the window.
+    /// Removes a session's files and pictures, except those that the user took in the window.
     fn clear(&self) -> Result<(), SessionError> {
         let frames = self.out.join(FRAMES);
         let pictures = fs::read_dir(&frames).into_iter().flatten().flatten();
@@ -100,13 +100,13 @@ impl Drop for Place {
         if self.kept {
             return;
         }
-        // Under another name while the rest goes.
+        // The recording has another name while the other files are removed.
         let ticks = Recording::open(&self.record).map_or(0, |recording| recording.ticks.len());
-        let aside = self.record.with_extension("kept");
-        let saved = ticks > 0 && fs::rename(&self.record, &aside).is_ok();
+        let kept = self.record.with_extension("kept");
+        let saved = ticks > 0 && fs::rename(&self.record, &kept).is_ok();
         _ = self.clear();
-        if saved && fs::rename(&aside, &self.record).is_ok() {
-            tracing::warn!("of the session only its recording is kept: {ticks} ticks in {}", self.record.display());
+        if saved && fs::rename(&kept, &self.record).is_ok() {
+            tracing::warn!("only the recording of this session is kept: {ticks} ticks in {}", self.record.display());
         }
         _ = fs::remove_dir(self.out.join(FRAMES));
         for folder in &self.made {
@@ -115,8 +115,7 @@ impl Drop for Place {
     }
 }
 
-/// Writes the drilled skull's densities, and with `surface` the triangles of the bone as it was
-/// carved.
+/// Writes the densities of the drilled skull, HU, and with `surface` its isosurface as triangles.
 pub fn drilled(out: &Path, densities: &VoxelVolume<i16>, bone: &BoneVolume, surface: bool) -> Result<(), SessionError> {
     let failed = |fault: &dyn std::fmt::Display| SessionError::Case(format!("{fault}; give another folder with --out"));
     nifti::write(&out.join("drilled.nii.gz"), densities).map_err(|fault| failed(&fault))?;
@@ -143,7 +142,7 @@ pub fn write(
     whole(&out.join("report.html"), page.as_bytes())
 }
 
-/// The scores as lines of name and value; each name ends with its unit.
+/// Formats the scores as CSV lines of name and value; each name ends with its unit.
 fn scores(summary: &Summary) -> String {
     let parts = [
         ("scores", serde_json::to_value(summary.scores)),
@@ -168,7 +167,7 @@ fn scores(summary: &Summary) -> String {
     csv
 }
 
-/// A file that appears whole or not at all.
+/// Writes a file atomically.
 pub fn whole(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
     let failed = |fault| SessionError::Output { path: path.into(), fault };
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -182,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_becomes_a_name_that_sorts() {
+    fn a_time_gives_a_name_that_sorts() {
         assert_eq!(date_and_time(0), "1970-01-01T00-00-00");
         assert_eq!(date_and_time(951_827_696), "2000-02-29T12-34-56");
         assert_eq!(date_and_time(1_795_418_102), "2026-11-23T07-15-02");
@@ -190,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_failed_session_made_goes_and_what_was_there_stays() {
+    fn files_of_a_failed_session_are_removed_and_others_kept() {
         let home = tempfile::tempdir().unwrap();
         let out = home.path().join("a/b");
         let half = || {

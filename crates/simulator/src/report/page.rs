@@ -1,5 +1,5 @@
-//! `report.html`: a session on one page that needs nothing else: pictures, curves from the
-//! recording, scores, the machine.
+//! `report.html`: a self-contained page on a session with pictures, curves from the recording,
+//! scores and the machine.
 
 use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Curve, histogram, over_time};
@@ -14,19 +14,19 @@ use trepan_link::wire::{SecondRecord, TickRecord};
 /// A picture for the report.
 #[derive(Clone, Debug)]
 pub struct Shot {
-    /// What it shows.
+    /// Caption of the picture.
     pub caption: String,
     /// PNG bytes.
     pub png: Vec<u8>,
 }
 
-/// Style of every page.
+/// CSS of every page.
 pub const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#222}\
 h1,h2{line-height:1.2}table{border-collapse:collapse}td,th{padding:.2em .8em;border-bottom:1px solid #ccc;text-align:left}\
 td.n{text-align:right;font-variant-numeric:tabular-nums}figure{margin:1em 0}img,svg{max-width:100%;height:auto}\
 figcaption{color:#555}.w{border-left:.4em solid #d55e00;padding-left:.6em}";
 
-/// The page.
+/// Returns the page as HTML.
 pub fn html(summary: &Summary, outcome: &Outcome, recording: &Recording, shots: &[Shot]) -> Result<String, String> {
     let mut page = String::new();
     let title = format!("Trepan {}: {}", escaped(&summary.app), escaped(&summary.case));
@@ -39,7 +39,7 @@ pub fn html(summary: &Summary, outcome: &Outcome, recording: &Recording, shots: 
         summary.rate_hz
     );
     models(&mut page, summary);
-    happened(&mut page, outcome, recording);
+    add_events(&mut page, outcome, recording);
     pictures(&mut page, shots);
     curves(&mut page, outcome, recording)?;
     numbers(&mut page, summary)?;
@@ -47,7 +47,7 @@ pub fn html(summary: &Summary, outcome: &Outcome, recording: &Recording, shots: 
     Ok(page)
 }
 
-/// What ran, and why.
+/// Adds the models that ran, and why they were chosen.
 fn models(page: &mut String, summary: &Summary) {
     let ModelSummary { quality, bone, tissue, picture, .. } = &summary.models;
     let TissueSummary { solver, tets, halvings, still_mm, .. } = *tissue;
@@ -64,32 +64,31 @@ fn models(page: &mut String, summary: &Summary) {
     *page += "</ul>";
 }
 
-/// Everything that was told, in the order of time; what a teacher asked for stands in the recording
-/// only.
-fn happened(page: &mut String, outcome: &Outcome, recording: &Recording) {
-    let told = outcome.written.notices.iter().map(|notice| (notice.time_ms, notice.words()));
-    let told = told.filter(|(_, (kind, _))| *kind != "cleared").map(|(time_ms, (kind, text))| Told {
+/// Adds all notices in the order of time; the teacher's requests are read from the recording.
+fn add_events(page: &mut String, outcome: &Outcome, recording: &Recording) {
+    let notices = outcome.written.notices.iter().map(|notice| (notice.time_ms, notice.words()));
+    let notices = notices.filter(|(_, (kind, _))| *kind != "cleared").map(|(time_ms, (kind, text))| Line {
         time_ms,
         warns: kind == "warning",
         text: if kind == "warning" { text } else { format!("{kind}: {text}") },
     });
-    let taught = recording.events.iter().filter(|event| event.kind == TEACHER);
-    let taught =
-        taught.map(|event| Told { time_ms: event.time_ms, warns: false, text: format!("{TEACHER}: {}", event.text) });
-    let mut all: Vec<Told> = told.chain(taught).collect();
+    let requests = recording.events.iter().filter(|event| event.kind == TEACHER);
+    let requests =
+        requests.map(|event| Line { time_ms: event.time_ms, warns: false, text: format!("{TEACHER}: {}", event.text) });
+    let mut all: Vec<Line> = notices.chain(requests).collect();
     all.sort_by(|a, b| a.time_ms.total_cmp(&b.time_ms));
     *page += "<h2>What happened</h2><ul>";
-    for Told { time_ms, text, warns } in all {
+    for Line { time_ms, text, warns } in all {
         let class = if warns { " class=\"w\"" } else { "" };
         *page += &format!("<li{class}>{:.2} s: {}</li>", time_ms * 1e-3, escaped(&text));
     }
     *page += "</ul>";
 }
 
-/// Kind of the events that a teacher makes.
+/// Kind of the events of a teacher's requests.
 const TEACHER: &str = "teacher";
 
-struct Told {
+struct Line {
     time_ms: f64,
     text: String,
     warns: bool,
@@ -151,7 +150,7 @@ fn second(recording: &Recording) -> Curve {
     Curve { name: "second hand", points: recording.second.iter().map(point).collect() }
 }
 
-/// What of a summary is timing; scores and the rest have tables of their own.
+/// Paths of the timings in a summary; scores and the rest have their own tables.
 const TIMINGS: [&str; 11] = [
     "asked_hz",
     "rate_hz",
@@ -165,10 +164,10 @@ const TIMINGS: [&str; 11] = [
     "frames",
     "fps",
 ];
-/// What of it is scores.
+/// Paths of the scores in a summary.
 const SCORES: [&str; 5] = ["scores", "bone_removed_mm3", "plan", "cut_off", "force_n"];
 
-/// Every number of the summary, by its path: scores, timings, the rest.
+/// Adds every number of the summary by its path: scores, timings, the rest.
 fn numbers(page: &mut String, summary: &Summary) -> Result<(), String> {
     let value = serde_json::to_value(summary).map_err(|fault| format!("summary: {fault}"))?;
     let mut all = Vec::new();
@@ -187,13 +186,13 @@ fn numbers(page: &mut String, summary: &Summary) -> Result<(), String> {
     Ok(())
 }
 
-/// A number or a word of a file, by its path in it.
+/// A value of a JSON file and its path.
 pub struct Row {
     path: String,
     value: String,
 }
 
-/// A table of values with their units.
+/// Adds a table of values with their units.
 pub fn table(page: &mut String, rows: &[Row]) {
     *page += "<table><tr><th>what</th><th>value</th><th>unit</th></tr>";
     for Row { path, value } in rows {
@@ -203,7 +202,7 @@ pub fn table(page: &mut String, rows: &[Row]) {
     *page += "</table>";
 }
 
-/// How names end that say their unit; the longer before those that they end with.
+/// Endings of names and their units; a longer ending comes before its own endings.
 const UNITS: [(&str, &str); 14] = [
     ("_mm3", "mm³"),
     ("_n_s", "N s"),
@@ -221,13 +220,13 @@ const UNITS: [(&str, &str); 14] = [
     ("guard", "ticks"),
 ];
 
-/// The unit that a path names, in its last part that names one.
+/// Returns the unit of a path, from the last part that has one.
 fn unit(path: &str) -> &'static str {
     let of = |name: &str| UNITS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| *unit);
     path.rsplit('.').find_map(of).unwrap_or_default()
 }
 
-/// A value as rows of a table, by their paths.
+/// Adds a JSON value as rows of a table.
 pub fn rows(path: &str, value: &serde_json::Value, into: &mut Vec<Row>) {
     use serde_json::Value;
     let under = |key: &str| if path.is_empty() { key.to_string() } else { format!("{path}.{key}") };
@@ -241,7 +240,7 @@ pub fn rows(path: &str, value: &serde_json::Value, into: &mut Vec<Row>) {
     into.push(Row { path: path.into(), value: text });
 }
 
-/// Text as HTML.
+/// Escapes a text for HTML.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
@@ -253,7 +252,7 @@ mod tests {
     use trepan_link::wire::EventRecord;
 
     #[test]
-    fn what_happened_is_in_order_and_complete() {
+    fn events_are_in_order_and_complete() {
         let notice = |time_ms, what| Notice { tick: 0, time_ms, what };
         let mut outcome = Outcome::default();
         outcome.written.notices = vec![
@@ -265,7 +264,7 @@ mod tests {
         let event = EventRecord { time_ms: 3500.0, kind: "teacher".into(), text: "begins: rest".into(), tick: 0 };
         let score = EventRecord { time_ms: 3600.0, kind: "score".into(), text: "{}".into(), tick: 0 };
         let mut page = String::new();
-        happened(&mut page, &outcome, &Recording { events: vec![event, score], ..Recording::default() });
+        add_events(&mut page, &outcome, &Recording { events: vec![event, score], ..Recording::default() });
         let lines: Vec<_> = page.split("<li").skip(1).map(|line| line.split('<').next().unwrap()).collect();
         assert_eq!(lines.len(), 4, "{page}");
         assert!(lines[0].contains("0.01 s: phase") && lines[1].contains("3.00 s: through: the burr came through"));

@@ -1,7 +1,7 @@
-//! What was taken away against what was planned.
+//! Comparison of the removed bone with the planned removal.
 //!
 //! # Theory
-//! P: voxels of bone that were planned to go, T: those that went.
+//! P: voxels of bone planned to be removed, T: voxels of bone removed.
 //! ```text
 //! Dice = 2 |P ∩ T| / (|P| + |T|)
 //! s₉₅  = the 95th of 100 of { d(p, ∂T) : p ∈ ∂P } ∪ { d(t, ∂P) : t ∈ ∂T }
@@ -9,8 +9,8 @@
 //! ∂: voxels of a set with a neighbour outside it; d between centres, mm.
 //!
 //! # Practice
-//! For the end of a session: one pass over the voxels, then pairs of border voxels: 0.1 s for a
-//! flap of 24 mm in voxels of 1 mm.
+//! Run at the end of a session: one pass over the voxels, then over all pairs of border voxels.
+//! It takes 0.1 s for a flap of 24 mm in voxels of 1 mm.
 //!
 //! # Sources
 //! L. R. Dice, Ecology 26 (1945); 95 % Hausdorff distance: D. P. Huttenlocher et al., IEEE PAMI 15
@@ -21,23 +21,23 @@ use serde::Serialize;
 use trepan_geometry::Vec3;
 use trepan_volume::{BoneVolume, VoxelVolume};
 
-/// How well the bone that went is the bone that was to go.
+/// Overlap and surface distance of the removed and the planned bone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PlanComparison {
-    /// Bone that was planned to go, mm³.
+    /// Bone planned to be removed, mm³.
     pub planned_mm3: f64,
-    /// Bone that went, drilled or lifted, mm³.
+    /// Bone removed, drilled or lifted, mm³.
     pub taken_mm3: f64,
-    /// Of it what was not planned, mm³.
+    /// Bone removed outside the plan, mm³.
     pub outside_plan_mm3: f64,
-    /// Overlap of both, 1 when they are the same.
+    /// Dice coefficient of both, 1 when they are equal.
     pub dice: f64,
-    /// Distance of their surfaces that 95 of 100 places keep, mm; `null` where nothing went.
+    /// 95 % Hausdorff distance of their surfaces, mm; `null` where nothing was removed.
     pub surface_95_mm: Option<f64>,
 }
 
 impl PlanComparison {
-    /// The bone as it was `before` against how it is now; `None` without a plan for any of it.
+    /// Compares the bone `before` and now with the plan; `None` if the plan contains no bone.
     pub fn of(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Option<Self> {
         let now = bone.snapshot();
         let isovalue = bone.isovalue();
@@ -58,7 +58,7 @@ impl PlanComparison {
     }
 }
 
-/// Centres of the voxels of a set that have a neighbour outside it, world mm.
+/// Returns the centres of the voxels of a set with a neighbour outside it, world mm.
 fn border(of: &VoxelVolume<i16>, set: &[bool]) -> Vec<Vec3> {
     let [nx, ny, nz] = of.dims;
     let inner = |[x, y, z]: [usize; 3]| x > 0 && y > 0 && z > 0 && x + 1 < nx && y + 1 < ny && z + 1 < nz;
@@ -71,6 +71,7 @@ fn border(of: &VoxelVolume<i16>, set: &[bool]) -> Vec<Vec3> {
     at.map(|at| of.centre_of(place(at)).as_vec3()).collect()
 }
 
+/// Returns the 95 % Hausdorff distance of two sets of points, mm.
 fn surface_95(a: &[Vec3], b: &[Vec3]) -> Option<f64> {
     let nearest =
         |p: &Vec3, to: &[Vec3]| to.iter().map(|q| q.distance_squared(*p)).fold(f32::INFINITY, f32::min).sqrt();
@@ -113,10 +114,10 @@ mod tests {
         // Overlap of two discs of radius r, d apart: 2 r² acos(d/2r) - d/2 √(4r² - d²).
         let (r, d) = (6.0f64, 3.0f64);
         let lens = 2.0 * r * r * (d / (2.0 * r)).acos() - 0.5 * d * (4.0 * r * r - d * d).sqrt();
-        let beside = drill(6);
-        assert!((beside.dice - lens / (std::f64::consts::PI * r * r)).abs() < 0.01, "{beside:?}");
+        let shifted = drill(6);
+        assert!((shifted.dice - lens / (std::f64::consts::PI * r * r)).abs() < 0.01, "{shifted:?}");
         // The walls are 3 mm apart where they face the shift, less at the flanks.
-        let apart = beside.surface_95_mm.unwrap();
+        let apart = shifted.surface_95_mm.unwrap();
         assert!((2.5..=3.0).contains(&apart), "{apart}");
     }
 }

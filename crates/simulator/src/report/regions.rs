@@ -1,14 +1,13 @@
-//! Where the brain was pressed, and how hard: by the tissue under the tool and the side of the
-//! head.
+//! Forces on the brain by region: the tissue under the tool and the side of the head.
 //!
 //! # Theory
-//! The place under the tool's ball is carried back along the contact's normal to the brain's
-//! surface at rest, as far as it was pushed in. A tick with force counts to the tissue class a
-//! millimetre below there, or of the nearest brain within 4 mm. Its share is `∫ F dt`. What was
-//! pushed aside counts to its neighbour.
+//! The point under the tool's ball is projected along the contact normal to the brain's surface at
+//! rest. A tick with force counts for the tissue class 1 mm below that point, or of the nearest
+//! brain tissue within 4 mm along the normal. A region's impulse is `∫ F dt`. Tissue displaced
+//! sideways is not followed: its force counts for the neighbouring region.
 //!
 //! # When not to use it
-//! For functional regions: there is no atlas here.
+//! For functional regions: there is no atlas.
 
 use crate::case::scene::RestBrain;
 use crate::case::tissue::TissueClass;
@@ -17,7 +16,7 @@ use trepan_geometry::{Tool, Vec3};
 use trepan_link::wire::TickRecord;
 use trepan_volume::DistanceField;
 
-/// What one region bore.
+/// Force on one region over time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Region {
     /// Side and tissue, as in `right grey`.
@@ -30,26 +29,26 @@ pub struct Region {
     pub peak_n: f32,
 }
 
-/// How far in along the normal brain is looked for, mm.
-const IN_MM: [f32; 5] = [1.0, 0.0, 2.0, 3.0, 4.0];
-/// A longer pause between two ticks does not count, s.
-const LONGEST_S: f64 = 0.1;
+/// Depths below the surface at which brain tissue is searched for, mm, in this order.
+const DEPTHS_MM: [f32; 5] = [1.0, 0.0, 2.0, 3.0, 4.0];
+/// Longest time that counts for one tick, s.
+const MAX_TICK_S: f64 = 0.1;
 
-/// Regions that were pressed, the most first.
+/// Returns the regions that were pressed, largest impulse first.
 pub fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Region> {
     let middle = brain.mesh.bounds().centre().x;
     let mut all: Vec<Region> = Vec::new();
     for pair in ticks.windows(2).filter(|pair| pair[1].tissue_depth_mm > 0.0 && pair[1].phase == 1) {
         let (before, tick) = (&pair[0], &pair[1]);
         let (place, normal) = (touched(&brain.field, tray, tick), tick.tissue_normal());
-        let Some(class) = IN_MM.iter().find_map(|mm| class_at(brain, place - *mm * normal)) else { continue };
+        let Some(class) = DEPTHS_MM.iter().find_map(|mm| class_at(brain, place - *mm * normal)) else { continue };
         let side = if place.x > middle { "right" } else { "left" };
         let name = format!("{side} {}", class.name());
         let at = all.iter().position(|region| region.name == name).unwrap_or_else(|| {
             all.push(Region { name, seconds: 0.0, impulse_n_s: 0.0, peak_n: 0.0 });
             all.len() - 1
         });
-        let seconds = (1e-3 * (tick.time_ms - before.time_ms)).clamp(0.0, LONGEST_S);
+        let seconds = (1e-3 * (tick.time_ms - before.time_ms)).clamp(0.0, MAX_TICK_S);
         let force = tick.tissue_n();
         let region = &mut all[at];
         region.seconds += seconds;
@@ -60,7 +59,7 @@ pub fn regions(brain: &RestBrain, tray: &[Tool], ticks: &[TickRecord]) -> Vec<Re
     all
 }
 
-/// Where at rest the brain was that a tick touches, world mm.
+/// Returns the point of the brain at rest that a tick touches, world mm.
 pub fn touched(brain: &DistanceField, tray: &[Tool], tick: &TickRecord) -> Vec3 {
     let radius_mm = tray.get(usize::from(tick.tool)).map_or(0.0, |tool| tool.tip_radius_mm);
     let normal = tick.tissue_normal();
@@ -83,7 +82,7 @@ mod tests {
     use trepan_volume::VoxelVolume;
 
     #[test]
-    fn a_press_counts_to_the_tissue_below_and_its_side() {
+    fn a_press_counts_for_the_tissue_below_and_its_side() {
         let mut classes = VoxelVolume::isotropic([20; 3], Vec3::splat(-9.5), 1.0, TissueClass::White.code());
         classes.data[20 * 20 * 10..].fill(TissueClass::Grey.code());
         classes.data[20 * 20 * 15..].fill(0);
@@ -109,10 +108,10 @@ mod tests {
             TickRecord { contact_normal: Vec3::NEG_X, ..press(60, -11.0, -5.0, 0.3) },
             TickRecord { tissue_depth_mm: 0.0, ..press(80, 5.0, 6.0, 9.0) },
         ];
-        let found = regions(&brain, &[Tool::probe(2.0)], &ticks);
-        let names: Vec<&str> = found.iter().map(|r| r.name.as_str()).collect();
+        let pressed = regions(&brain, &[Tool::probe(2.0)], &ticks);
+        let names: Vec<&str> = pressed.iter().map(|r| r.name.as_str()).collect();
         assert_eq!(names, ["right grey", "left white"]);
-        assert!((found[0].seconds - 0.04).abs() < 1e-9 && (found[0].impulse_n_s - 0.012).abs() < 1e-6);
-        assert_eq!((found[0].peak_n, found[1].peak_n), (0.4, 0.3));
+        assert!((pressed[0].seconds - 0.04).abs() < 1e-9 && (pressed[0].impulse_n_s - 0.012).abs() < 1e-6);
+        assert_eq!((pressed[0].peak_n, pressed[1].peak_n), (0.4, 0.3));
     }
 }

@@ -1,4 +1,4 @@
-//! `summary.json`: what a session did, in numbers.
+//! `summary.json`: the results of a session as numbers.
 
 use crate::models::ModelSummary;
 use crate::program::Program;
@@ -16,57 +16,57 @@ use trepan_volume::Piece;
 /// The whole file.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// The program.
+    /// Name of the program.
     pub app: String,
-    /// The case, without a patient's name.
+    /// Name of the case, without the patient's name.
     pub case: String,
-    /// The device.
+    /// Name of the device.
     pub device: String,
-    /// Which models ran, and why.
+    /// Models that ran, and why they were chosen.
     pub models: ModelSummary,
-    /// Phases as they began.
+    /// Starts of the phases.
     pub phases: Vec<PhaseStart>,
-    /// When a stroke came through the bone, s of session time; those undone later too.
+    /// Times at which a stroke came through the bone, s of session time, undone strokes included.
     pub through_s: Vec<f64>,
     /// Haptic ticks run.
     pub ticks: u64,
-    /// Ticks a second, as measured.
+    /// Measured rate of the haptic loop, Hz.
     pub rate_hz: f64,
-    /// Ticks a second that were asked for.
+    /// Requested rate of the haptic loop, Hz.
     pub asked_hz: f64,
-    /// Ticks that were not done by the next deadline.
+    /// Ticks that missed their deadline.
     pub late_ticks: u64,
-    /// Ticks that felt an old collision result.
+    /// Ticks that used a stale collision result.
     pub held_ticks: u64,
     /// Compute time of a tick, µs.
     pub tick_us: Quantiles,
-    /// Soft tissue; `null` without.
+    /// The solver of soft tissue; `null` without.
     pub solver: Option<SolverSummary>,
     /// Forces on the hand, N.
     pub force_n: Forces,
     /// Bone removed, mm³.
     pub bone_removed_mm3: f64,
-    /// Bone that was cut off the skull, such as a flap, as it hangs together at the end.
+    /// Pieces of bone cut off the skull, such as a flap, at the end.
     pub cut_off: CutOff,
-    /// Warnings as they were raised.
+    /// Warnings raised.
     pub warnings: Vec<Raised>,
     /// Scores.
     pub scores: ScoreKeeper,
-    /// The bone that went against the plan; `null` without bone.
+    /// Comparison of the removed bone with the plan; `null` without bone.
     pub plan: Option<PlanComparison>,
-    /// Where the brain was pressed, the most first.
+    /// Regions of the brain that were pressed, largest impulse first.
     pub regions: Vec<Region>,
     /// Ticks in which the force guard acted, by cause.
     pub guard: GuardSummary,
     /// The second hand; `null` without.
     pub second: Option<SecondSummary>,
-    /// Pictures drawn.
+    /// Pictures rendered.
     pub frames: u64,
-    /// Pictures a second of the time in which they were drawn.
+    /// Pictures per second while rendering.
     pub fps: f64,
-    /// PlanComparison its recording, in a replay.
+    /// Comparison with the recording, in a replay.
     pub replay: Option<Replayed>,
-    /// Records that the recording lost.
+    /// Records that did not fit into the ring buffers.
     pub dropped_records: u64,
     /// Remarks on the case, the machine and the run.
     pub remarks: Vec<String>,
@@ -77,7 +77,7 @@ pub struct Summary {
 /// A phase and when it began.
 #[derive(Clone, Debug, Serialize)]
 pub struct PhaseStart {
-    /// Its name.
+    /// Name of the phase.
     pub name: String,
     /// Session time, s.
     pub from_s: f64,
@@ -88,23 +88,23 @@ pub struct PhaseStart {
 pub struct Raised {
     /// Session time, s.
     pub time_s: f64,
-    /// Its name.
+    /// Name of the warning.
     pub name: String,
-    /// What the trainee read.
+    /// Text shown to the trainee.
     pub text: String,
 }
 
-/// Pieces of bone that hang on nothing any more.
+/// Pieces of bone that are no longer connected to the skull.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CutOff {
-    /// How many of at least 1 mm³.
+    /// Number of pieces of at least 1 mm³.
     pub pieces: usize,
-    /// The largest, mm³.
+    /// Volume of the largest piece, mm³.
     pub largest_mm3: f64,
 }
 
 impl CutOff {
-    /// From the pieces before and now, with the volume of a voxel, mm³.
+    /// Compares the pieces before and now; `voxel_mm3` is the volume of a voxel.
     pub fn of(before: &[Piece], now: &[Piece], voxel_mm3: f32) -> Self {
         let mm3 = |piece: &Piece| piece.voxels as f64 * f64::from(voxel_mm3);
         let large: Vec<f64> = Piece::cut_off(before, now).iter().map(mm3).filter(|&mm3| mm3 >= 1.0).collect();
@@ -117,11 +117,11 @@ impl CutOff {
 pub struct Quantiles {
     /// Median.
     pub p50: f64,
-    /// 99 of 100.
+    /// 99 % quantile.
     pub p99: f64,
-    /// 999 of 1000.
+    /// 99.9 % quantile.
     pub p999: f64,
-    /// Largest.
+    /// Largest value.
     pub max: f64,
 }
 
@@ -132,18 +132,18 @@ impl From<&Times> for Quantiles {
     }
 }
 
-/// The solver.
+/// Results of the solver.
 #[derive(Clone, Debug, Serialize)]
 pub struct SolverSummary {
-    /// Its name.
+    /// Name of the solver.
     pub name: String,
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub tets: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Nodes that do not move.
+    /// Number of fixed nodes.
     pub fixed_nodes: usize,
-    /// Step, ms.
+    /// Length of a step, ms.
     pub dt_ms: f32,
     /// Compute time of a step, µs.
     pub step_us: Quantiles,
@@ -153,9 +153,9 @@ pub struct SolverSummary {
     pub real_time_factor: f64,
     /// Largest displacement of a node, mm.
     pub max_displacement_mm: f32,
-    /// Largest displacement left at the end, mm.
+    /// Largest displacement of a node at the end, mm.
     pub end_displacement_mm: f32,
-    /// What it had to put right, summed over steps.
+    /// Faults of the solver, summed over steps.
     #[serde(flatten)]
     pub solver_faults: SolverFaults,
 }
@@ -163,34 +163,34 @@ pub struct SolverSummary {
 /// Forces on the hand.
 #[derive(Clone, Debug, Serialize)]
 pub struct Forces {
-    /// Largest, N.
+    /// Largest force, N.
     pub max: f32,
     /// Largest change between two ticks, N.
     pub max_step: f32,
-    /// At the very end, N.
+    /// Force after the last tick, N.
     pub end: f32,
 }
 
-/// What the force guard had to do, ticks.
+/// Ticks in which the force guard acted, by cause.
 #[derive(Clone, Debug, Serialize)]
 pub struct GuardSummary {
-    /// Over the device's limit.
+    /// Force over the device's limit.
     pub clamped: u64,
-    /// Over what its warm motors bear.
+    /// Force over the limit of warm motors.
     pub heated: u64,
-    /// Changed too fast.
+    /// Force changed too fast.
     pub slewed: u64,
-    /// Not a number.
+    /// Force, tool or tick length was not finite.
     pub non_finite: u64,
-    /// Gave out energy: damped.
+    /// The passivity controller damped the force.
     pub passivity: u64,
-    /// Gave out energy that damping could not take: cut.
+    /// The passivity controller shortened the force: damping was not enough.
     pub bounded: u64,
-    /// Let force through again after it was cut.
+    /// Force restarted after the passivity controller had shortened it for long.
     pub restarted: u64,
     /// The tool was too fast, or jumped.
     pub too_fast: u64,
-    /// The device's position was old.
+    /// The device's position was stale.
     pub stale: u64,
     /// The force was still ramping in.
     pub ramped: u64,
@@ -204,20 +204,20 @@ impl From<&GuardCounters> for GuardSummary {
     }
 }
 
-/// The second hand.
+/// Results of the second hand.
 #[derive(Clone, Debug, Serialize)]
 pub struct SecondSummary {
-    /// Its device.
+    /// Name of its device.
     pub device: String,
     /// Largest force, N.
     pub force_max_n: f32,
-    /// Force at the very end, N.
+    /// Force after the last tick, N.
     pub force_end_n: f32,
     /// Ticks in which its force guard acted, by cause.
     pub guard: GuardSummary,
 }
 
-/// Where it ran.
+/// The machine that the session ran on.
 #[derive(Clone, Debug, Serialize)]
 pub struct Machine {
     /// Processor.
@@ -226,14 +226,14 @@ pub struct Machine {
     pub cores: usize,
     /// Operating system and architecture.
     pub system: String,
-    /// Graphics adapter, if pictures were drawn.
+    /// Graphics adapter, if pictures were rendered.
     pub graphics: Option<String>,
-    /// `release` or `dev`.
+    /// Build profile: `release` or `dev`.
     pub profile: String,
 }
 
 impl Machine {
-    /// This one.
+    /// Describes this machine.
     pub fn here(graphics: Option<String>) -> Self {
         let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let cpu = cpuinfo
@@ -250,43 +250,43 @@ impl Machine {
     }
 }
 
-/// What a summary needs beside the outcome.
+/// Contents of a summary that are not in the outcome.
 #[derive(Clone, Debug)]
 pub struct About {
     /// The program.
     pub program: Program,
-    /// The case.
+    /// Name of the case.
     pub case: String,
-    /// The device.
+    /// Name of the device.
     pub device: String,
-    /// The second hand's device.
+    /// Name of the second hand's device.
     pub second_device: String,
-    /// Which models ran, and why.
+    /// Models that ran, and why they were chosen.
     pub models: ModelSummary,
     /// Name of the solver.
     pub solver: String,
-    /// Tetrahedra, nodes, fixed nodes.
+    /// Numbers of tetrahedra, nodes and fixed nodes.
     pub brain: [usize; 3],
-    /// Haptic ticks a second that were asked for.
+    /// Requested rate of the haptic loop, Hz.
     pub asked_hz: f64,
-    /// Pictures drawn.
+    /// Pictures rendered.
     pub frames: u64,
-    /// Time in which they were drawn, s.
+    /// Time in which they were rendered, s.
     pub drawn_s: f64,
-    /// Bone that was cut off.
+    /// Pieces of bone cut off the skull.
     pub cut_off: CutOff,
-    /// PlanComparison the plan.
+    /// Comparison of the removed bone with the plan.
     pub plan: Option<PlanComparison>,
-    /// Where the brain was pressed.
+    /// Regions of the brain that were pressed.
     pub regions: Vec<Region>,
-    /// Remarks of import and pictures.
+    /// Remarks on import and pictures.
     pub remarks: Vec<String>,
     /// The machine.
     pub machine: Machine,
 }
 
 impl Summary {
-    /// From all that is known at the end.
+    /// Makes the summary at the end of a session.
     pub fn new(about: About, outcome: &Outcome) -> Self {
         let seconds = outcome.seconds.max(1e-9);
         let rate_hz = outcome.ticks.count as f64 / seconds;
@@ -351,14 +351,15 @@ impl Summary {
     }
 }
 
-/// Share of the asked rate under which a session is told to be slow.
+/// Share of the requested rate under which a session counts as slow.
 const FULL_RATE: f64 = 0.995;
 
-/// What is to be said of a session whose ticks came slower than they were asked for.
+/// Returns a remark where the haptic rate was lower than requested.
 pub fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
     (rate_hz < FULL_RATE * asked_hz).then(|| {
         format!(
-            "SLOW: {rate_hz:.1} ticks a second instead of {asked_hz:.0}: forces came late, so do not compare this session's              feel and times with others; close other programs, or give a lower --rate-hz"
+            "SLOW: {rate_hz:.1} ticks a second instead of {asked_hz:.0}: forces were late, so do not compare forces \
+             and times of this session with others; close other programs, or give a lower --rate-hz"
         )
     })
 }
@@ -432,16 +433,16 @@ mod tests {
     fn each_stroke_that_came_through_has_its_time() {
         let notice = |time_ms: f64, what| crate::Notice { tick: 1, time_ms, what };
         let mut outcome = Outcome::default();
-        let told =
+        let notices =
             [(10.0, What::Undone(1.0)), (1500.0, What::Through), (1600.0, What::NotOpen), (2500.0, What::Through)];
-        outcome.written.notices = told.map(|(time_ms, what)| notice(time_ms, what)).into();
+        outcome.written.notices = notices.map(|(time_ms, what)| notice(time_ms, what)).into();
         assert_eq!(through_s(&outcome), [1.5, 2.5]);
     }
 
     #[test]
-    fn a_rate_under_199_of_200_is_told() {
-        let told = slow(992.0, 1000.0).expect("992 Hz are too few");
-        assert!(told.contains("992.0") && told.contains("1000") && told.contains("--rate-hz"), "{told}");
+    fn a_rate_under_199_of_200_gives_a_remark() {
+        let notices = slow(992.0, 1000.0).expect("992 Hz are too few");
+        assert!(notices.contains("992.0") && notices.contains("1000") && notices.contains("--rate-hz"), "{notices}");
         assert_eq!((slow(995.1, 1000.0), slow(1000.2, 1000.0), slow(498.0, 500.0)), (None, None, None));
     }
 }

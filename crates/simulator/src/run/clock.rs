@@ -1,14 +1,14 @@
-//! The session's clock, and waiting for the next tick.
+//! The session's clock, and the wait for the next tick.
 //!
 //! # Practice
-//! A sleeping thread wakes late by the kernel's timer slack (about 0.06 ms) and more on a busy
-//! machine, so the wait sleeps to just before the deadline and spins for the rest. Deadlines are
-//! absolute: a late tick does not push later ones back, and lost ticks are counted, never caught
-//! up.
+//! A sleeping thread wakes late by the kernel's timer slack (about 0.06 ms), and by more on a busy
+//! machine. The wait therefore sleeps until shortly before the deadline and spins for the rest.
+//! Deadlines are absolute: a late tick does not delay later ones. Missed ticks are counted, not
+//! made up for.
 
 use std::time::{Duration, Instant};
 
-/// How long before a deadline sleep turns into spinning, ms.
+/// Time before a deadline at which sleeping ends and spinning begins, ms.
 const SPIN_MS: f64 = 0.12;
 
 /// Milliseconds since the session began.
@@ -36,7 +36,7 @@ impl Clock {
         }
     }
 
-    /// Sleeps until `time_ms`, give or take the kernel's slack.
+    /// Sleeps until `time_ms`, to within the kernel's timer slack.
     pub fn sleep_until(&self, time_ms: f64) {
         let left = time_ms - self.now_ms();
         if left > 0.0 {

@@ -1,25 +1,25 @@
-//! A replay as a film: made once at full speed on the replay's thread, shown at any time, forwards
-//! and backwards, by the window.
+//! Film of a replay: made once at full speed on the replay's thread, played forwards and backwards
+//! by the window.
 //!
 //! # Theory
-//! Stages run forwards only; what they change does not. A [`Shot`] is taken thirty times a second
-//! of session time, and where a warning comes or goes or something else is told, and holds what the
-//! picture needs: the tick's view, where the brain is, and each voxel that changed since the shot
-//! before, with its density before and after. Played forwards the new densities are written,
-//! backwards the old ones: at any shot the skull is, voxel by voxel, what it was then.
+//! Stages run forwards only, but their changes can be undone. A [`Shot`] is taken thirty times per
+//! second of session time, and at each new notice or change of warnings. It holds what the picture
+//! needs: the tick's view, the positions of the brain's nodes, and each voxel that changed since
+//! the last shot, with its density before and after. Playing forwards writes the new densities,
+//! backwards the old ones, so that the skull is exact at every shot.
 //!
 //! ```text
-//!  stages ── carve a skull of their own ──┐
-//!      every 1/30 s: view, brain, changes └──> channel ──> window: writes them into the skull that is shown
+//!  stages ── carve a copy of the skull ───┐
+//!      every 1/30 s: view, brain, changes └──> channel ──> window: writes into the visible skull
 //! ```
 //!
 //! # Practice
-//! The stages run on a copy of the skull, so memory is that of three skulls (copy, and what the
-//! last shot saw) and of a brain for each of at most [`BRAINS`] shots: 12 bytes a node. A minute of
-//! craniotomy is made in a second; with the brain, in about the time that the solver needs.
+//! The stages run on a copy of the skull, so memory holds three skulls (the visible one, the copy
+//! and the state at the last shot) and the nodes of at most [`BRAINS`] shots, 12 bytes each. A
+//! minute of craniotomy is made in a second; with the brain, in about the time of the solver.
 //!
 //! # When not to use it
-//! Headless: nobody goes back and forth there.
+//! Headless: there is no time bar.
 
 use crate::run::View;
 use crate::stages::notice::Notice;
@@ -31,58 +31,58 @@ use trepan_volume::BoneVolume;
 
 /// Session time between two shots, ms.
 pub const SHOT_MS: f64 = 1000.0 / 30.0;
-/// Shots with a brain of their own, at most.
+/// Largest number of shots that hold the brain's node positions.
 const BRAINS: f64 = 3600.0;
-/// Edge of a brick of voxels.
+/// Edge of a brick, voxels.
 const BRICK: usize = 8;
 
 /// One moment of a film.
 pub struct Shot {
-    /// The tick.
+    /// View of the tick.
     pub view: View,
-    /// Every voxel that changed since the shot before.
+    /// Voxels that changed since the last shot.
     pub changes: Vec<Change>,
-    /// The brain, where it moved on since the last that was kept.
+    /// Positions of the brain's nodes, mm, in some of the shots.
     pub positions: Option<Vec<Vec3>>,
 }
 
-/// A voxel that changed, HU before and after.
+/// A voxel whose density changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Change {
-    /// Which.
+    /// Index of the voxel.
     pub voxel: IVec3,
-    /// Its density before.
+    /// Density before, HU.
     pub before: i16,
-    /// Its density after.
+    /// Density after, HU.
     pub after: i16,
 }
 
-/// Takes the shots.
+/// Takes the shots of a replay.
 pub struct Filming {
     shots: Sender<Shot>,
     skull: Option<Carved>,
     next_ms: f64,
     brain_every_ms: f64,
     next_brain_ms: f64,
-    /// What the last tick warned of and told.
-    told: (u32, Option<Notice>),
+    /// Warnings and newest notice of the last tick.
+    last_notices: (u32, Option<Notice>),
 }
 
 impl Filming {
-    /// Films a session of `length_ms` that carves `bone`, and what comes of it.
+    /// Makes a film of a session of `length_ms` that carves `bone`, and the receiver of its shots.
     pub fn new(bone: Option<Arc<BoneVolume>>, length_ms: f64) -> (Self, Receiver<Shot>) {
         let (shots, coming) = channel();
         let brain_every_ms = (length_ms / BRAINS).max(SHOT_MS);
-        let (skull, told) = (bone.map(Carved::of), (0, None));
-        (Self { shots, skull, next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, told }, coming)
+        let (skull, last_notices) = (bone.map(Carved::of), (0, None));
+        (Self { shots, skull, next_ms: 0.0, brain_every_ms, next_brain_ms: 0.0, last_notices }, coming)
     }
 
-    /// Takes a shot of a tick if it is time for one, if something happened in it, or if it is the
-    /// last; `brain` copies the positions of the brain's nodes. False when nobody looks any more.
+    /// Takes a shot of a tick if one is due, if there is a new notice, or if it is the last tick.
+    /// `brain` copies the positions of the brain's nodes. Returns false once the receiver is gone.
     pub fn tick(&mut self, view: View, last: bool, brain: impl FnOnce() -> Option<Vec<Vec3>>) -> bool {
         let time_ms = view.time_ms;
-        let told = (view.warnings, view.news);
-        let new = std::mem::replace(&mut self.told, told) != told;
+        let notices = (view.warnings, view.news);
+        let new = std::mem::replace(&mut self.last_notices, notices) != notices;
         if time_ms < self.next_ms && !last && !new {
             return true;
         }
@@ -97,7 +97,7 @@ impl Filming {
     }
 }
 
-/// A skull that is carved, and what of it was seen last.
+/// A skull that is carved, and its state at the last shot.
 struct Carved {
     bone: Arc<BoneVolume>,
     versions: Vec<u32>,
@@ -127,7 +127,7 @@ impl Carved {
     }
 }
 
-/// The places of a brick that lie inside the grid.
+/// Returns the voxels of a brick that lie inside the grid.
 fn places(low: [usize; 3], dims: [usize; 3]) -> impl Iterator<Item = (usize, usize, usize)> {
     let range = move |axis: usize| low[axis]..(low[axis] + BRICK).min(dims[axis]);
     range(0).flat_map(move |a| range(1).flat_map(move |b| range(2).map(move |c| (a, b, c))))
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn long_films_keep_fewer_brains_and_nobody_looking_ends_it() {
+    fn long_films_hold_fewer_brains_and_a_dropped_receiver_ends_them() {
         let (mut filming, receiver) = Filming::new(None, 3.6e6);
         for ms in 0..10_000 {
             filming.tick(view(ms.into()), false, || Some(Vec::new()));

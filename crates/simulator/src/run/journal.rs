@@ -1,11 +1,11 @@
-//! The recording thread: takes what the loops send through rings and writes it, so that no loop
-//! ever touches a file.
+//! The recording thread: writes what the loops send through ring buffers, so that no loop accesses
+//! a file.
 //!
 //! # Practice
-//! Rings hold 4 s of ticks; what does not fit is counted and told. Chunks are flushed five times a
-//! second, so that a killed session loses at most the last fifth of a second. The scores so far are
-//! an event `score` five times a second, for whoever watches and for viewers of the file. A full
-//! disk ends the recording, never the session.
+//! The ring buffers hold 4 s of ticks; records that do not fit are counted and reported. Chunks are
+//! flushed five times a second, so that a killed session loses at most the last 0.2 s. The current
+//! scores are recorded as an event `score` five times a second, for watching sessions and for
+//! viewers of the file. A full disk ends the recording, not the session.
 
 use crate::run::clock::Clock;
 use crate::run::watch::Share;
@@ -16,20 +16,23 @@ use trepan_link::queue::{Receiver, Sender, bounded};
 use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_link::{LinkError, Recorder};
 
-/// Where ticks go: into a file, and to who watches.
+/// Destinations of the records: a file, and watching sessions where the session is shared.
 pub type Kept = (Recorder, Option<Share>);
 
+/// Capacity of a ring buffer, records.
 const RING: usize = 8192;
+/// Time between two flushes of the file, ms.
 const FLUSH_MS: f64 = 200.0;
-/// Time between two records of the scores so far, ms.
+/// Time between two records of the current scores, ms.
 const SCORES_MS: f64 = 200.0;
+/// Time between two reads of the ring buffers.
 const DRAIN: Duration = Duration::from_millis(5);
 
-/// The loops' ends of the rings.
+/// Send ends of the ring buffers, for the loops.
 pub struct JournalSenders {
     /// For the haptic loop.
     pub ticks: Sender<TickRecord>,
-    /// For the haptic loop, where there is a second hand.
+    /// For the haptic loop, with a second hand.
     pub second: Sender<SecondRecord>,
     /// For the haptic loop.
     pub notices: Sender<Notice>,
@@ -39,30 +42,30 @@ pub struct JournalSenders {
     pub solver: Sender<SolverRecord>,
 }
 
-/// The recording thread's ends.
+/// Receive ends of the ring buffers, for the recording thread.
 pub struct Journal {
     ticks: Receiver<TickRecord>,
     second: Receiver<SecondRecord>,
     notices: Receiver<Notice>,
     collisions: Receiver<CollisionRecord>,
     solver: Receiver<SolverRecord>,
-    /// Number and time of the newest tick, ms.
+    /// Number and time, ms, of the newest tick.
     newest: (u64, f64),
 }
 
-/// What the recording thread knows at the end.
+/// Result of the recording thread.
 #[derive(Debug, Default)]
 pub struct Written {
     /// Every notice, in order.
     pub notices: Vec<Notice>,
-    /// Records that did not fit into a ring.
+    /// Records that did not fit into a ring buffer.
     pub dropped: u64,
-    /// Why the recording ended early, if it did.
+    /// Fault that ended the recording early, if any.
     pub fault: Option<LinkError>,
 }
 
 impl Written {
-    /// Ends the recording with a fault and says so at once; only the first one counts.
+    /// Ends the recording with a fault and logs it; later faults are ignored.
     fn end(&mut self, fault: LinkError) {
         if self.fault.is_none() {
             tracing::error!("the recording ended early, the session goes on: {fault}");
@@ -71,7 +74,7 @@ impl Written {
     }
 }
 
-/// Both ends.
+/// Makes the ring buffers and returns both ends.
 pub fn journal() -> (JournalSenders, Journal) {
     let (ticks, ticks_in) = bounded(RING);
     let (second, second_in) = bounded(RING);
@@ -92,8 +95,8 @@ pub fn journal() -> (JournalSenders, Journal) {
 }
 
 impl Journal {
-    /// Writes until every loop has dropped its senders and the rings are empty; then closes the
-    /// recording.
+    /// Writes until every loop has dropped its senders and the ring buffers are empty, then closes
+    /// the recording.
     pub fn write(mut self, mut recorder: Recorder, mut share: Option<Share>, clock: Clock) -> Written {
         let mut written = Written::default();
         let mut flushed_ms = 0.0;
@@ -101,7 +104,7 @@ impl Journal {
         loop {
             let over = self.is_over();
             let drained = self.drain(&mut recorder, &mut share, &mut written, &mut scores);
-            if let Err(fault) = drained.and_then(|()| self.listen(&mut recorder, &mut share, clock.now_ms())) {
+            if let Err(fault) = drained.and_then(|()| self.record_teacher(&mut recorder, &mut share, clock.now_ms())) {
                 written.end(fault);
                 self.discard(&mut written);
             }
@@ -119,7 +122,8 @@ impl Journal {
         written
     }
 
-    /// Asked before draining: what was sent before the last pen fell is still drained.
+    /// Whether every loop has dropped its senders. Call it before draining, so that the last
+    /// records are still written.
     fn is_over(&self) -> bool {
         self.ticks.is_abandoned() && self.collisions.is_abandoned() && self.solver.is_abandoned()
     }
@@ -155,7 +159,7 @@ impl Journal {
         }
         while let Some(notice) = self.notices.receive() {
             written.notices.push(notice);
-            say(&notice);
+            log(&notice);
             let (kind, text) = notice.words();
             let record = EventRecord { tick: notice.tick, time_ms: notice.time_ms, kind: kind.into(), text };
             share.take_if(|share| !share.event(&record));
@@ -164,20 +168,25 @@ impl Journal {
         Ok(())
     }
 
-    /// Records what the teacher asks, at the newest tick.
-    fn listen(&mut self, recorder: &mut Recorder, share: &mut Option<Share>, now_ms: f64) -> Result<(), LinkError> {
+    /// Records the teacher's requests, at the newest tick.
+    fn record_teacher(
+        &mut self,
+        recorder: &mut Recorder,
+        share: &mut Option<Share>,
+        now_ms: f64,
+    ) -> Result<(), LinkError> {
         let Some(sharing) = share else { return Ok(()) };
-        for (begins, text) in sharing.hear(now_ms) {
+        for (begins, text) in sharing.receive(now_ms) {
             let text = format!("{}: {text}", if begins { "begins" } else { "ends" });
             tracing::info!("{:7.3} s  teacher: {text}", self.newest.1 * 1e-3);
             let record = EventRecord { tick: self.newest.0, time_ms: self.newest.1, kind: "teacher".into(), text };
-            // Who watches has asked for it.
+            // Not sent to the watching session: it made the request.
             recorder.event(&record)?;
         }
         Ok(())
     }
 
-    /// Keeps the rings empty after the recording failed.
+    /// Empties the ring buffers after the recording failed.
     fn discard(&mut self, written: &mut Written) {
         while self.ticks.receive().is_some() {}
         while self.second.receive().is_some() {}
@@ -185,7 +194,7 @@ impl Journal {
         while self.solver.receive().is_some() {}
         while let Some(notice) = self.notices.receive() {
             written.notices.push(notice);
-            say(&notice);
+            log(&notice);
         }
     }
 
@@ -198,7 +207,8 @@ impl Journal {
     }
 }
 
-fn say(notice: &Notice) {
+/// Logs a notice.
+fn log(notice: &Notice) {
     let (kind, text) = notice.words();
     let seconds = notice.time_ms * 1e-3;
     match notice.what {

@@ -1,21 +1,21 @@
-//! What a teacher asks of a running session: a ghost of the tool, a marker, a pause, trouble with
-//! the drill or the patient.
+//! A teacher's requests to a running session: a ghost of the tool, a marker, a pause, a drill
+//! without power, bleeding.
 //!
 //! # Theory
-//! A pause is a button that the teacher holds: it comes into the hand's reading before the tick
-//! sees it, and so into the recording. The tick lets the force go at the guard's pace, and no other
-//! button counts. A drill without power is a pedal that does nothing.
+//! A pause is a virtual button pressed by the teacher. It is added to the device's reading before
+//! the tick, and is therefore recorded. During a pause the tick fades the force at the guard's rate
+//! and ignores all other buttons. Without drill power the pedal is ignored.
 //!
 //! ```text
-//!  teacher's window ──shared memory──> recording thread ──cells──┬─> the hand's device: pause, no pedal
-//!                                          │                     └─> the window: ghost, marker, what is told
+//!  teacher's window ──shared memory──> recording thread ──cells──┬─> device: pause, no pedal
+//!                                          │                     └─> window: ghost, marker, texts
 //!                                          └──> recording: event `teacher`
 //! ```
 //!
 //! # Practice
-//! The haptic loop reads one cell a tick, some ns, and waits for nobody. A teacher that is silent
-//! for three seconds has gone: everything that was asked for ends. A replay needs no teacher: the
-//! readings hold what was asked.
+//! The haptic loop reads one cell a tick (some ns) and never blocks. All requests end when the
+//! teacher has sent nothing for three seconds. A replay needs no teacher: the recorded readings
+//! hold the requests.
 
 use crate::run::watch::Watching;
 use trepan_contact::GuardedWrench;
@@ -25,76 +25,77 @@ use trepan_link::cell::{Reader, Writer, cell};
 use trepan_link::topics::{Publisher, Session, Subscriber, TopicError};
 use trepan_link::wire::TeacherRecord;
 
-/// Silence after which a teacher has gone, ms.
+/// Time without a record after which all of the teacher's requests end, ms.
 pub const GONE_MS: f64 = 3000.0;
 
-/// What can be asked for, and what the trainee reads.
-pub const ASKED: [(u32, &str); 3] = [
+/// Bit of each request, and the text that the trainee reads.
+pub const TEACHER_REQUESTS: [(u32, &str); 3] = [
     (TeacherRecord::PAUSE, "the teacher pauses the operation"),
     (TeacherRecord::NO_POWER, "the drill has no power"),
     (TeacherRecord::BLEEDING, "the patient bleeds from the bone's edge"),
 ];
 
-/// The listening end, for the recording thread.
+/// Receive end, for the recording thread.
 pub struct Listener {
     teacher: Subscriber<TeacherRecord>,
     newest: TeacherRecord,
-    heard_ms: f64,
-    tell: Vec<Writer<TeacherRecord>>,
+    received_ms: f64,
+    writers: Vec<Writer<TeacherRecord>>,
 }
 
 impl Listener {
-    /// Listens in a session; tells as many others as there are readers.
+    /// Joins a session; returns also `N` readers that get each received record.
     pub fn join<const N: usize>(session: &Session) -> Result<(Self, [Reader<TeacherRecord>; N]), TopicError> {
         let teacher = session.subscriber()?;
-        let mut tell = Vec::new();
+        let mut writers = Vec::new();
         let readers = std::array::from_fn(|_| {
             let (writer, reader) = cell(TeacherRecord::default());
-            tell.push(writer);
+            writers.push(writer);
             reader
         });
-        Ok((Self { teacher, newest: TeacherRecord::default(), heard_ms: 0.0, tell }, readers))
+        Ok((Self { teacher, newest: TeacherRecord::default(), received_ms: 0.0, writers }, readers))
     }
 
-    /// Listens, and tells what is new; gives what began (`true`) or ended.
-    pub fn hear(&mut self, now_ms: f64) -> impl Iterator<Item = (bool, &'static str)> + use<> {
+    /// Receives the newest record and passes it to the readers. Returns the requests that began
+    /// (`true`) or ended.
+    pub fn receive(&mut self, now_ms: f64) -> impl Iterator<Item = (bool, &'static str)> + use<> {
         let before = self.newest.flags;
         match self.teacher.newest() {
-            Ok(Some(record)) => (self.newest, self.heard_ms) = (record, now_ms),
-            _ if now_ms - self.heard_ms > GONE_MS => self.newest.flags = 0,
+            Ok(Some(record)) => (self.newest, self.received_ms) = (record, now_ms),
+            _ if now_ms - self.received_ms > GONE_MS => self.newest.flags = 0,
             _ => {}
         }
         let now = self.newest.flags;
-        for writer in &mut self.tell {
+        for writer in &mut self.writers {
             writer.set(self.newest);
         }
-        ASKED
+        TEACHER_REQUESTS
             .into_iter()
             .filter(move |(bit, _)| (before ^ now) & bit != 0)
             .map(move |(bit, text)| (now & bit != 0, text))
     }
 }
 
-/// A device whose buttons the teacher has a say in.
+/// A device whose buttons are changed by the teacher's requests.
 pub struct Taught {
     device: Box<dyn HapticDevice>,
     teacher: Reader<TeacherRecord>,
 }
 
 impl Taught {
-    /// The device under the teacher's eyes.
+    /// Wraps a device.
     pub fn new(device: Box<dyn HapticDevice>, teacher: Reader<TeacherRecord>) -> Self {
         Self { device, teacher }
     }
 }
 
-/// The buttons that count while the teacher asks for something.
+/// Returns the buttons that remain under the teacher's requests.
 fn allowed(buttons: Buttons, flags: u32) -> Buttons {
-    let own = Buttons(buttons.0 & !Buttons::PAUSE.0);
+    let pressed = Buttons(buttons.0 & !Buttons::PAUSE.0);
     match () {
         () if flags & TeacherRecord::PAUSE != 0 => Buttons::PAUSE,
-        () if flags & TeacherRecord::NO_POWER != 0 => Buttons(own.0 & !Buttons::PEDAL.0),
-        () => own,
+        () if flags & TeacherRecord::NO_POWER != 0 => Buttons(pressed.0 & !Buttons::PEDAL.0),
+        () => pressed,
     }
 }
 
@@ -118,7 +119,7 @@ impl HapticDevice for Taught {
     }
 }
 
-/// The teacher's end, for the window of a session that watches.
+/// Send end, for the window of a watching session.
 pub struct Teacher {
     trainee: Publisher<TeacherRecord>,
     record: TeacherRecord,
@@ -126,44 +127,44 @@ pub struct Teacher {
 }
 
 impl Teacher {
-    /// Sits down beside the trainee of a session.
+    /// Joins the trainee's session.
     pub fn join(name: &str) -> Result<Self, TopicError> {
         let session = Session::join(name)?;
         Ok(Self { trainee: session.publisher()?, record: TeacherRecord::default(), _session: session })
     }
 
-    /// Asks for something that is not asked for, or no longer for what is.
+    /// Switches a request on or off.
     pub fn switch(&mut self, bit: u32) {
         self.record.flags ^= bit;
     }
 
-    /// Marks a place, or moves the mark there.
+    /// Sets the marker to a place, mm.
     pub fn mark(&mut self, place: Vec3) {
         self.record.flags |= TeacherRecord::MARKER;
         self.record.marker = place;
     }
 
-    /// What is asked for now.
-    pub fn asks(&self) -> &TeacherRecord {
+    /// Returns the present requests.
+    pub fn requests(&self) -> &TeacherRecord {
         &self.record
     }
 
-    /// Tells the trainee, and where the teacher holds the ghost of the tool; often, since silence
-    /// ends everything.
-    pub fn tell(&mut self, ghost: Pose) {
+    /// Sends the requests and the pose of the ghost tool. Call it often: without records all
+    /// requests end after [`GONE_MS`].
+    pub fn send(&mut self, ghost: Pose) {
         self.record.seq += 1;
         self.record.ghost = ghost;
-        // Shared memory that is full or gone is like a trainee who does not listen.
+        // Shared memory that is full or gone is no fault here: the record is lost.
         _ = self.trainee.send(&self.record);
     }
 }
 
-/// Who else looks into the window.
+/// Connections of a session's window to other sessions.
 #[derive(Default)]
 pub struct Company {
-    /// What a teacher asks of this session's trainee.
+    /// Requests of a teacher to this session's trainee.
     pub asked: Option<Reader<TeacherRecord>>,
-    /// The end by which this session teaches another's trainee.
+    /// Send end, where this session teaches the trainee of another.
     pub teacher: Option<Teacher>,
     /// The session that is watched.
     pub watching: Option<Watching>,
@@ -176,10 +177,10 @@ mod tests {
     use trepan_geometry::{Quat, ToolState};
     use trepan_haptics::Status;
 
-    /// A hand that presses everything.
-    struct Greedy;
+    /// A device with all buttons pressed.
+    struct AllPressed;
 
-    impl HapticDevice for Greedy {
+    impl HapticDevice for AllPressed {
         fn read(&mut self, time_ms: f64) -> Reading {
             let buttons = Buttons(u32::MAX);
             let tool = ToolState { buttons, time_ms, ..ToolState::at(Pose::from_translation(Vec3::ONE)) };
@@ -189,7 +190,7 @@ mod tests {
         fn apply(&mut self, _wrench: GuardedWrench) {}
 
         fn capabilities(&self) -> Capabilities {
-            Capabilities { name: "greedy".into(), ..Watched::CAPABILITIES }
+            Capabilities { name: "all pressed".into(), ..Watched::CAPABILITIES }
         }
 
         fn close(&mut self) {}
@@ -200,9 +201,9 @@ mod tests {
     }
 
     #[test]
-    fn a_pause_leaves_no_other_button_and_no_device_can_ask_for_one() {
+    fn a_pause_suppresses_all_other_buttons_and_no_device_can_request_one() {
         let (mut writer, reader) = cell(TeacherRecord::default());
-        let mut hand = Taught::new(Box::new(Greedy), reader);
+        let mut hand = Taught::new(Box::new(AllPressed), reader);
         let mut pressed = |flags| {
             writer.set(TeacherRecord { flags, ..TeacherRecord::default() });
             hand.read(1.0).tool.buttons
@@ -213,38 +214,41 @@ mod tests {
         let weak = pressed(TeacherRecord::NO_POWER);
         assert!(!weak.has(Buttons::PEDAL) && weak.has(Buttons::UNDO));
         assert_eq!(pressed(TeacherRecord::BLEEDING), free);
-        assert_eq!(hand.capabilities().name, "greedy");
+        assert_eq!(hand.capabilities().name, "all pressed");
     }
 
     #[test]
-    fn what_a_teacher_asks_arrives_and_ends_with_her_silence() {
+    fn a_teachers_requests_arrive_and_end_without_records() {
         let name = name("asks");
         let session = Session::join(&name).unwrap();
         let (mut listener, [mut hand, mut window]) = Listener::join::<2>(&session).unwrap();
         let mut teacher = Teacher::join(&name).unwrap();
-        assert_eq!(listener.hear(0.0).count(), 0);
+        assert_eq!(listener.receive(0.0).count(), 0);
         let place = Vec3::new(1.0, 2.0, 3.0);
         teacher.switch(TeacherRecord::PAUSE);
         teacher.mark(place);
-        teacher.tell(Pose::from_parts(place, Quat::from_rotation_x(0.5)));
-        assert_eq!(listener.hear(100.0).collect::<Vec<_>>(), [(true, ASKED[0].1)]);
+        teacher.send(Pose::from_parts(place, Quat::from_rotation_x(0.5)));
+        assert_eq!(listener.receive(100.0).collect::<Vec<_>>(), [(true, TEACHER_REQUESTS[0].1)]);
         assert_eq!((hand.latest().0.marker, window.latest().0.ghost.translation), (place, place));
-        assert_eq!(listener.hear(100.0 + GONE_MS).count(), 0, "not yet");
-        assert_eq!(listener.hear(101.0 + GONE_MS).collect::<Vec<_>>(), [(false, ASKED[0].1)]);
+        assert_eq!(listener.receive(100.0 + GONE_MS).count(), 0, "not yet");
+        assert_eq!(listener.receive(101.0 + GONE_MS).collect::<Vec<_>>(), [(false, TEACHER_REQUESTS[0].1)]);
         assert_eq!((hand.latest().0.flags, window.latest().0.flags), (0, 0));
-        teacher.tell(Pose::IDENTITY);
-        assert_eq!(listener.hear(9000.0).collect::<Vec<_>>(), [(true, ASKED[0].1)], "she is back");
+        teacher.send(Pose::IDENTITY);
+        assert_eq!(listener.receive(9000.0).collect::<Vec<_>>(), [(true, TEACHER_REQUESTS[0].1)], "she is back");
         teacher.switch(TeacherRecord::PAUSE);
         teacher.switch(TeacherRecord::NO_POWER);
-        teacher.tell(Pose::IDENTITY);
-        assert_eq!(listener.hear(9001.0).collect::<Vec<_>>(), [(false, ASKED[0].1), (true, ASKED[1].1)]);
+        teacher.send(Pose::IDENTITY);
+        assert_eq!(
+            listener.receive(9001.0).collect::<Vec<_>>(),
+            [(false, TEACHER_REQUESTS[0].1), (true, TEACHER_REQUESTS[1].1)]
+        );
     }
 
     #[test]
-    fn a_session_that_nobody_teaches_hears_nothing() {
+    fn a_session_without_a_teacher_receives_no_requests() {
         let session = Session::join(&name("quiet")).unwrap();
         let (mut listener, [mut hand]) = Listener::join::<1>(&session).unwrap();
-        assert!((0..10).all(|at| listener.hear(f64::from(at) * 1000.0).next().is_none()));
+        assert!((0..10).all(|at| listener.receive(f64::from(at) * 1000.0).next().is_none()));
         assert_eq!(hand.latest().0.flags, 0);
     }
 }

@@ -1,10 +1,10 @@
-//! A recorded session run again: the same stages in the recorded order, on one thread.
+//! Replays a recorded session: runs the same stages in the recorded order, on one thread.
 //!
 //! # Theory
-//! Live, three loops race; what each of them did depends only on which results of the others it had
-//! seen. The recording names them: a tick its patch, a collision step its tick and its solver step,
-//! a solver step its contact. Run again in any order that respects these names, every stage sees
-//! what it saw, so every number comes out the same, bit for bit:
+//! In a live session three loops run concurrently, and each result depends only on which results of
+//! the other loops were read. The recording holds their numbers: for a tick its patch, for a
+//! collision step its tick and its solver step, for a solver step its contact. Any order that
+//! respects these numbers gives every stage the same inputs, so all results are equal bit for bit:
 //!
 //! ```text
 //! tick t      ← patch p                          collisions up to p first
@@ -13,9 +13,9 @@
 //! ```
 //!
 //! # Practice
-//! With other methods, meshes or a GPU solver the same path gives other forces; the outcome says by
-//! how much. Steps of another length are matched by simulated time. It runs as fast as it can; for
-//! a window that goes back and forth in time it is filmed meanwhile (`run/film.rs`).
+//! With other methods, meshes or a GPU solver the same path gives other forces; the outcome holds
+//! the largest difference. Steps of another length are matched by simulated time. The replay runs
+//! as fast as it can; for a window with a time bar it also makes a film (`run/film.rs`).
 
 use crate::run::clock::Clock;
 use crate::run::film::{Filming, Shot};
@@ -37,10 +37,10 @@ use trepan_link::Recording;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_soft::Loads;
 
-/// Tools and patches of this many past ticks are kept for collision steps that refer to them.
+/// Number of past tools, patches and loads that are kept for steps that refer to them.
 const MEMORY: usize = 16_384;
 
-/// The ticks up to a time, ms, with those in which the force was let go right after it.
+/// Returns the ticks up to a time, ms, and those right after it in which the force faded out.
 pub fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
     let ticks = &recording.ticks;
     let until = ticks.iter().position(|tick| tick.time_ms >= end_ms).map_or(ticks.len(), |at| at + 1);
@@ -48,8 +48,8 @@ pub fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
     &ticks[..until + fading]
 }
 
-/// Runs a recording again, up to a time, ms. Who is filmed goes on being looked at after the end;
-/// else the end asks for a stop.
+/// Replays a recording up to a time, ms. Requests a stop at the end, unless a film is made: its
+/// window stays open.
 pub fn run(
     stages: Stages,
     (recording, end_ms): (&Recording, f64),
@@ -61,46 +61,48 @@ pub fn run(
 ) -> Outcome {
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
-    let (senders, pages) = journal();
+    let (senders, receivers) = journal();
     let (mut film, shots) = film.unzip();
-    let eyes = RenderInputs { view: cells.view.1, soft: stages.tissue.is_some().then_some(cells.shown.1), film: shots };
+    let inputs =
+        RenderInputs { view: cells.view.1, soft: stages.tissue.is_some().then_some(cells.shown.1), film: shots };
     thread::scope(|scope| {
-        let writing = scope.spawn(move || Journal::write(pages, recorder, share, clock));
+        let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
         let (mut view, mut shown) = (cells.view.0, cells.shown.0);
         let replaying = scope.spawn(move || {
-            let mut again = Again::new(stages, recording, senders, start);
+            let mut replay = Replay::new(stages, recording, senders, start);
             let ticks = up_to(recording, end_ms);
             let last = ticks.last().map(|record| record.tick);
             for record in ticks {
                 if stop.asked() {
                     break;
                 }
-                let now = again.tick(record, &clock);
+                let now = replay.tick(record, &clock);
                 view.set(now);
-                let brain = || again.tissue.as_ref().map(|tissue| tissue.solver.positions().to_vec());
+                let brain = || replay.tissue.as_ref().map(|tissue| tissue.solver.positions().to_vec());
                 film.take_if(|film| !film.tick(now, last == Some(record.tick), brain));
-                if let Some(tissue) = again.tissue.as_ref().filter(|_| film.is_none()) {
+                if let Some(tissue) = replay.tissue.as_ref().filter(|_| film.is_none()) {
                     shown.write(|frame| tissue.solver.publish(frame));
                 }
             }
             if film.is_none() {
                 stop.ask();
             }
-            again.outcome()
+            replay.outcome()
         });
-        picture(eyes);
+        picture(inputs);
         let mut outcome = replaying.join().unwrap_or_default();
         outcome.written = writing.join().unwrap_or_default();
         outcome
     })
 }
 
-struct Again<'a> {
+/// State of a replay.
+struct Replay<'a> {
     haptic: HapticStage,
     second: Option<SecondHand>,
     seconds: std::slice::Iter<'a, SecondRecord>,
-    /// Where the second hand's tool was after the last tick.
-    beside: Option<Pose>,
+    /// Pose of the second hand's tool after the last tick.
+    second_pose: Option<Pose>,
     tissue: Option<Tissue>,
     collisions: VecDeque<CollisionRecord>,
     switches: VecDeque<SolverRecord>,
@@ -115,11 +117,11 @@ struct Again<'a> {
     collision_times: Times,
     replayed: Replayed,
     last: Option<TickRecord>,
-    /// Steps here for one that was recorded; `None` where they are equally long.
+    /// Solver steps of this replay per recorded step; `None` where both have the same length.
     pace: Option<f64>,
 }
 
-impl<'a> Again<'a> {
+impl<'a> Replay<'a> {
     fn new(stages: Stages, recording: &'a Recording, senders: JournalSenders, start: ToolSample) -> Self {
         let dt_ms = stages.tissue.as_ref().map(|tissue| tissue.solver.dt_ms());
         Self {
@@ -127,7 +129,7 @@ impl<'a> Again<'a> {
             haptic: stages.haptic,
             second: stages.second,
             seconds: recording.second.iter(),
-            beside: None,
+            second_pose: None,
             tissue: stages.tissue,
             collisions: recording.collisions.iter().copied().collect(),
             switches: recording.solver.iter().copied().collect(),
@@ -149,7 +151,7 @@ impl<'a> Again<'a> {
         }
     }
 
-    /// One tick, and what it looks like.
+    /// Replays one tick and returns its view.
     fn tick(&mut self, record: &TickRecord, clock: &Clock) -> View {
         self.collide_up_to(record.patch_seq, clock);
         let &(patch_seq, patch) =
@@ -159,7 +161,7 @@ impl<'a> Again<'a> {
             reading: reading(record.into()),
             patch: &patch,
             patch_seq,
-            second: self.beside,
+            second: self.second_pose,
         };
         if record.has(TickRecord::RELEASED) {
             self.haptic.release();
@@ -167,11 +169,11 @@ impl<'a> Again<'a> {
         let began_ms = clock.now_ms();
         let (notices, ticks) = (&mut self.senders.notices, &mut self.ticks);
         let mut tick = self.haptic.tick(&input, &mut |notice| {
-            ticks.hear(notice);
+            ticks.record(notice);
             notices.send(notice);
         });
         let second = self.second_tick(record.tick);
-        self.beside = self.second.as_ref().and_then(SecondHand::place);
+        self.second_pose = self.second.as_ref().and_then(SecondHand::place);
         tick.record.compute_us = ((clock.now_ms() - began_ms) * 1e3) as f32;
         self.ticks.add(&tick);
         let same = self.same(record.wrench, tick.record.wrench) & second.is_none_or(|(_, same)| same);
@@ -185,8 +187,8 @@ impl<'a> Again<'a> {
         self.ticks.view(&tick, &self.haptic, second.map(|(view, _)| view), false)
     }
 
-    /// The second hand's tick of a number, if it was recorded, and whether its force is the
-    /// recorded one.
+    /// Replays the second hand's tick of this number, if it was recorded; also returns whether its
+    /// force equals the recorded one.
     fn second_tick(&mut self, number: u64) -> Option<(SecondView, bool)> {
         let record = self.seconds.as_slice().first().filter(|record| record.tick <= number)?;
         self.seconds.next();
@@ -196,7 +198,7 @@ impl<'a> Again<'a> {
         }
         let (notices, ticks) = (&mut self.senders.notices, &mut self.ticks);
         let (wrench, again) = stage.tick(record.tick, &reading(record.into()), &mut |notice| {
-            ticks.hear(notice);
+            ticks.record(notice);
             notices.send(notice);
         });
         while !self.senders.second.send(again) {
@@ -206,7 +208,7 @@ impl<'a> Again<'a> {
         Some((SecondView { world_from_tool: again.proxy, force: wrench.force() }, same))
     }
 
-    /// Every collision step up to a number, each with the tool and the brain that it had.
+    /// Runs every collision step up to a number, each with its recorded tool and brain state.
     fn collide_up_to(&mut self, seq: u64, clock: &Clock) {
         while let Some(next) = self.collisions.front().copied().filter(|c| c.seq <= seq) {
             self.collisions.pop_front();
@@ -224,14 +226,14 @@ impl<'a> Again<'a> {
         }
     }
 
-    /// The step here at the time of a recorded one.
-    fn here(&self, step: u64) -> u64 {
+    /// Returns the number of the step in this replay at the time of a recorded step.
+    fn step_here(&self, step: u64) -> u64 {
         self.pace.map_or(step, |pace| (step as f64 * pace).round() as u64)
     }
 
-    /// Every solver step up to a number, each with the contact that it had.
+    /// Runs every solver step up to a recorded number, each with its recorded contact.
     fn solve_up_to(&mut self, step: u64, clock: &Clock) {
-        let step = self.here(step);
+        let step = self.step_here(step);
         while self.tissue.as_ref().is_some_and(|tissue| tissue.solver.steps() < step) {
             self.solve(clock);
         }
@@ -239,7 +241,7 @@ impl<'a> Again<'a> {
 
     fn solve(&mut self, clock: &Clock) {
         let Some(next) = self.tissue.as_ref().map(|tissue| tissue.solver.steps() + 1) else { return };
-        while let Some(switch) = self.switches.front().copied().filter(|s| self.here(s.step) <= next) {
+        while let Some(switch) = self.switches.front().copied().filter(|s| self.step_here(s.step) <= next) {
             self.switches.pop_front();
             while self.loads.front().is_some_and(|(seq, _)| *seq < switch.contact_seq) {
                 self.loads.pop_front();
@@ -259,7 +261,7 @@ impl<'a> Again<'a> {
         }
     }
 
-    /// Whether a force came out the same, bit for bit; keeps the largest difference.
+    /// Returns whether two forces are equal bit for bit; updates the largest difference.
     fn same(&mut self, was: Wrench, is: Wrench) -> bool {
         let bits = |wrench: Wrench| wrench.force.to_array().map(f32::to_bits);
         self.replayed.max_difference_n = self.replayed.max_difference_n.max((was.force - is.force).length());
@@ -297,34 +299,34 @@ const PATCH: SurfacePatch = SurfacePatch {
     normal_velocity: 0.0,
 };
 
-/// What a device said, as either hand's record keeps it.
-struct Said {
+/// Device state in the record of either hand.
+struct DeviceRecord {
     tool: ToolState,
     flags: u32,
 }
 
-impl From<&TickRecord> for Said {
+impl From<&TickRecord> for DeviceRecord {
     fn from(&TickRecord { device, twist, buttons, time_ms, flags, .. }: &TickRecord) -> Self {
         Self { tool: ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms }, flags }
     }
 }
 
-impl From<&SecondRecord> for Said {
+impl From<&SecondRecord> for DeviceRecord {
     fn from(&SecondRecord { device, twist, buttons, time_ms, flags, .. }: &SecondRecord) -> Self {
         Self { tool: ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms }, flags }
     }
 }
 
-/// How many steps of `dt_ms` are one of a recording's; `None` where they are as long, so that the
-/// same steps are taken.
+/// Returns the number of steps of `dt_ms` per recorded step; `None` where both have the same
+/// length.
 fn pace(recording: &Recording, dt_ms: f32) -> Option<f64> {
     let last = recording.solver.last().filter(|last| last.step > 0)?;
     let recorded_ms = last.time_ms / last.step as f64;
     (recorded_ms as f32 != dt_ms).then(|| recorded_ms / f64::from(dt_ms))
 }
 
-/// What the device said at a recorded tick.
-fn reading(Said { tool, flags }: Said) -> Reading {
+/// Restores the device's reading at a recorded tick.
+fn reading(DeviceRecord { tool, flags }: DeviceRecord) -> Reading {
     let status = match (flags & TickRecord::LOST != 0, flags & TickRecord::STALE != 0) {
         (true, _) => Status::Lost,
         (false, true) => Status::Stale,
@@ -366,7 +368,7 @@ mod tests {
         ToolState { buttons, ..ToolState::at(Pose::from_translation(Vec3::new(0.3, -0.2, z))) }
     }
 
-    /// A slab of bone from z = -6 to 0 mm, and both hands over it.
+    /// Makes a slab of bone from z = -6 to 0 mm and the stages of both hands above it.
     fn both_hands() -> (Arc<BoneVolume>, Stages) {
         let mut ct = VoxelVolume::isotropic([32; 3], Vec3::new(-15.5, -15.5, -18.5), 1.0, -1000i16);
         (32 * 32 * 12..32 * 32 * 19).for_each(|voxel| ct.data[voxel] = 1200);
@@ -387,8 +389,8 @@ mod tests {
         (bone, Stages { haptic, second, tissue: None })
     }
 
-    /// A stroke through the bone; undone, refused, a device lost and there again, pressed once
-    /// more.
+    /// Returns both readings at a tick: a stroke through the bone, undo requests, a lost device,
+    /// renewed pressing.
     fn hands(tick: u32) -> [Reading; 2] {
         let way =
             |from: f32, to: f32, since: u32, ticks: f32| from + (to - from) * ((tick - since) as f32 / ticks).min(1.0);
@@ -399,46 +401,47 @@ mod tests {
             2000..3300 => at(way(-2.0, 12.0, 2000, 300.0), undo),
             _ => at(way(12.0, 2.0, 3300, 200.0), if tick > 3900 { Buttons::FLAP } else { Buttons(0) }),
         };
-        let beside = way(12.0, if (1200..2600).contains(&tick) { -1.0 } else { 12.0 }, tick.min(1200), 300.0);
+        let second_z = way(12.0, if (1200..2600).contains(&tick) { -1.0 } else { 12.0 }, tick.min(1200), 300.0);
         let gone = if (3600..3640).contains(&tick) { Status::Lost } else { Status::Fresh };
         let time_ms = f64::from(tick);
         let reading = |tool: ToolState, status| Reading { tool: ToolState { time_ms, ..tool }, status };
-        [reading(first, gone), reading(at(beside, Buttons(0)), Status::Fresh)]
+        [reading(first, gone), reading(at(second_z, Buttons(0)), Status::Fresh)]
     }
 
     #[test]
-    fn undone_strokes_and_lost_devices_come_out_the_same_bit_for_bit() {
+    fn undone_strokes_and_lost_devices_replay_bit_for_bit() {
         let (bone, Stages { mut haptic, second, .. }) = both_hands();
         let mut second = second.expect("a second hand");
-        let (mut recording, mut told, mut beside) = (Recording::default(), Vec::new(), None);
+        let (mut recording, mut raised, mut second_pose) = (Recording::default(), Vec::new(), None);
         for tick in 1..4400u32 {
             let [first, other] = hands(tick);
-            let input = TickInput { tick: tick.into(), reading: first, patch: &PATCH, patch_seq: 0, second: beside };
-            recording.ticks.push(haptic.tick(&input, &mut |notice| told.push(notice)).record);
-            recording.second.push(second.tick(tick.into(), &other, &mut |notice| told.push(notice)).1);
-            beside = second.place();
+            let input =
+                TickInput { tick: tick.into(), reading: first, patch: &PATCH, patch_seq: 0, second: second_pose };
+            recording.ticks.push(haptic.tick(&input, &mut |notice| raised.push(notice)).record);
+            recording.second.push(second.tick(tick.into(), &other, &mut |notice| raised.push(notice)).1);
+            second_pose = second.place();
         }
         let undo = |what: &What| matches!(what, What::Undone(_) | What::NotUndone(_));
-        let undos: Vec<What> = told.iter().map(|notice| notice.what).filter(undo).collect();
+        let undos: Vec<What> = raised.iter().map(|notice| notice.what).filter(undo).collect();
         let refused = |why| What::NotUndone(why);
         assert!(
             undos.starts_with(&[refused(Hindrance::Tool)]) && undos.contains(&refused(Hindrance::SecondTool)),
             "{undos:?}"
         );
         assert!(undos.iter().any(|what| matches!(what, What::Undone(mm3) if *mm3 > 1.0)), "{undos:?}");
-        assert!(told.iter().any(|notice| matches!(notice.what, What::Force { waits: false, .. })));
+        assert!(raised.iter().any(|notice| matches!(notice.what, What::Force { waits: false, .. })));
         let (again, stages) = both_hands();
         let (senders, _pages) = journal();
         let tool = Program::Craniotomy.tray()[0];
         let start = ToolSample { tick: 0, state: at(20.0, Buttons(0)), tool, slot: 0, drilling: false };
-        let mut replay = Again::new(stages, &recording, senders, start);
+        let mut replay = Replay::new(stages, &recording, senders, start);
         recording.ticks.iter().for_each(|record| _ = replay.tick(record, &Clock::start()));
         assert_eq!((replay.replayed.identical, replay.replayed.ticks), (4399, 4399));
         assert!(again.snapshot() == bone.snapshot());
     }
 
     #[test]
-    fn a_part_ends_with_the_fading_of_the_force_that_was_recorded_there() {
+    fn a_partial_replay_ends_with_the_recorded_fading_of_the_force() {
         let tick = |n: u64| TickRecord {
             tick: n,
             time_ms: n as f64 + 0.5,
@@ -452,12 +455,12 @@ mod tests {
     }
 
     #[test]
-    fn a_part_is_never_called_the_same() {
+    fn a_partial_replay_is_described_as_such() {
         let whole = Replayed { ticks: 9, recorded: 9, identical: 9, ..Replayed::default() };
-        assert!(whole.told().starts_with("9 of 9 ticks gave the same force"));
+        assert!(whole.describe().starts_with("9 of 9 ticks gave the same force"));
         let part = Replayed { recorded: 100, ..whole.clone() };
-        assert!(part.told().starts_with("a part only, 9 of 100 ticks"), "{}", part.told());
+        assert!(part.describe().starts_with("a part only, 9 of 100 ticks"), "{}", part.describe());
         let cut = Replayed { losses: Some("cut".into()), ..whole };
-        assert!(cut.told().starts_with("a part only, 9 of at least 9 ticks"), "{}", cut.told());
+        assert!(cut.describe().starts_with("a part only, 9 of at least 9 ticks"), "{}", cut.describe());
     }
 }

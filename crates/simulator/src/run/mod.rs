@@ -1,7 +1,7 @@
-//! What both ways of running share: the stages, what the picture sees, what is known at the end.
+//! Types that live sessions and replays share: the stages, the inputs of rendering, the outcome.
 //!
-//! A session runs live on threads ([`crate::run::threads`]) or again from a recording, step by step
-//! ([`crate::run::lockstep`]).
+//! A session runs live on threads ([`crate::run::threads`]), or as a replay of a recording on one
+//! thread ([`crate::run::lockstep`]).
 
 pub(crate) mod clock;
 pub(crate) mod film;
@@ -27,25 +27,25 @@ use trepan_geometry::Vec3;
 use trepan_link::cell::{Reader, Writer, cell};
 use trepan_soft::Loads;
 
-/// The three loops' bodies.
+/// Bodies of the three loops.
 pub struct Stages {
-    /// Always there.
+    /// The haptic tick of the first hand.
     pub haptic: HapticStage,
-    /// Where both hands hold something.
+    /// The haptic tick of the second hand, if there is one.
     pub second: Option<SecondHand>,
-    /// Where the brain deforms.
+    /// Collision and solver, where the brain deforms.
     pub tissue: Option<Tissue>,
 }
 
-/// The two loops of soft tissue.
+/// Bodies of the two loops of soft tissue.
 pub struct Tissue {
-    /// Tool against tissue.
+    /// Collision of tool and tissue.
     pub collision: CollisionStage,
-    /// Tissue against itself.
+    /// Deformation of the tissue.
     pub solver: SolverStage,
 }
 
-/// The session as the picture sees it.
+/// State of the session as it is rendered.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     /// Tool and phase.
@@ -54,30 +54,30 @@ pub struct View {
     pub time_ms: f64,
     /// Force on the hand, N.
     pub force: Vec3,
-    /// The longest force that the guard lets through, N.
+    /// Largest force that the guard lets through, N.
     pub force_limit_n: f32,
-    /// The second hand, where there is one.
+    /// The second hand, if there is one.
     pub second: Option<SecondView>,
     /// Depth in bone and tissue, mm.
     pub depth_mm: [f32; 2],
-    /// From the tool's ball to the brain at rest, mm.
+    /// Distance from the tool's ball to the brain at rest, mm.
     pub brain_distance_mm: f32,
-    /// Standing warnings, bits.
+    /// Active warnings, bits.
     pub warnings: u32,
-    /// The newest thing that happened beside the warnings.
+    /// Newest notice that is not a warning.
     pub news: Option<Notice>,
-    /// Speed of the spindle, 1 at its free speed.
+    /// Speed of the spindle over its free speed.
     pub spindle: f32,
     /// Bone removed so far, mm³.
     pub removed_mm3: f64,
-    /// Ticks, late ticks, held ticks so far.
+    /// Numbers of ticks, late ticks and ticks with a stale patch.
     pub counts: [u64; 3],
     /// Whether the operation is over.
     pub finished: bool,
 }
 
 impl View {
-    /// Before the first tick, under a guard that lets this much force through, N.
+    /// View before the first tick; the guard's force limit is in N.
     pub fn at(sample: ToolSample, force_limit_n: f32) -> Self {
         Self {
             sample,
@@ -97,24 +97,24 @@ impl View {
     }
 }
 
-/// Read ends for the picture.
+/// Read ends for rendering.
 pub struct RenderInputs {
     /// Newest tick.
     pub view: Reader<View>,
-    /// Newest brain, where there is one.
+    /// Newest state of the brain, where it deforms.
     pub soft: Option<Reader<SoftFrame>>,
-    /// A recording's film, where it is filmed.
+    /// Film of a replay in a window.
     pub film: Option<Receiver<Shot>>,
 }
 
-/// A collision result under its number.
+/// A collision result with its sequence number.
 pub type Numbered<T> = (u64, T);
 
 /// Write and read ends of every cell between the loops.
 pub struct Cells {
     /// Haptic loop to collision loop.
     pub tool: (Writer<ToolSample>, Reader<ToolSample>),
-    /// Haptic loop to picture.
+    /// Haptic loop to rendering.
     pub view: (Writer<View>, Reader<View>),
     /// Collision loop to haptic loop.
     pub patch: (Writer<Numbered<SurfacePatch>>, Reader<Numbered<SurfacePatch>>),
@@ -122,12 +122,12 @@ pub struct Cells {
     pub loads: (Writer<Numbered<Loads>>, Reader<Numbered<Loads>>),
     /// Solver loop to collision loop.
     pub soft: (Writer<SoftFrame>, Reader<SoftFrame>),
-    /// Solver loop to picture.
+    /// Solver loop to rendering.
     pub shown: (Writer<SoftFrame>, Reader<SoftFrame>),
 }
 
 impl Cells {
-    /// All cells, holding the start of the session.
+    /// Makes all cells with the state at the start of the session.
     pub fn new(stages: &Stages, sample: ToolSample) -> Self {
         let mut frame = SoftFrame::default();
         if let Some(tissue) = &stages.tissue {
@@ -145,7 +145,8 @@ impl Cells {
     }
 }
 
-/// Times of one kind of step, ns. Adding never allocates; what is over 1 s counts as 1 s.
+/// Histogram of the compute times of one kind of step, ns. Adding does not allocate; times over 1 s
+/// count as 1 s.
 #[derive(Clone, Debug)]
 pub struct Times(Histogram<u64>);
 
@@ -161,17 +162,18 @@ impl Times {
         self.0.saturating_record((f64::from(us) * 1e3).max(1.0) as u64);
     }
 
-    /// A quantile in µs; 0 when nothing was added.
+    /// Returns a quantile, µs; 0 without samples.
     pub fn quantile_us(&self, quantile: f64) -> f64 {
         if self.0.is_empty() { 0.0 } else { self.0.value_at_quantile(quantile) as f64 * 1e-3 }
     }
 
-    /// The largest, µs.
+    /// Returns the largest time, µs.
     pub fn max_us(&self) -> f64 {
         self.0.max() as f64 * 1e-3
     }
 
-    /// Counts of times in bins of a tenth of a decade, as (lower edge in µs, count); for a chart.
+    /// Returns the counts in bins of a tenth of a decade, as (upper edge in µs, count), for a
+    /// chart.
     pub fn bins(&self) -> Vec<(f64, u64)> {
         self.0
             .iter_log(10, 10f64.powf(0.1))
@@ -185,19 +187,19 @@ impl Times {
 pub struct Ticks {
     /// Ticks run.
     pub count: u64,
-    /// Ticks that were not done by the next deadline.
+    /// Ticks that missed their deadline.
     pub late: u64,
-    /// Ticks that felt an old collision result.
+    /// Ticks that used a stale collision result.
     pub held: u64,
     /// Compute time.
     pub times: Times,
-    /// The newest thing that happened beside the warnings.
+    /// Newest notice that is not a warning.
     pub news: Option<Notice>,
 }
 
 impl Ticks {
-    /// Takes note of something that happened.
-    pub fn hear(&mut self, notice: Notice) {
+    /// Keeps a notice as the newest, unless it is a warning.
+    pub fn record(&mut self, notice: Notice) {
         if !matches!(notice.what, What::Warning(..)) {
             self.news = Some(notice);
         }
@@ -212,7 +214,7 @@ impl Ticks {
         self.times.add_us(tick.record.compute_us);
     }
 
-    /// The view after a tick.
+    /// Returns the view after a tick.
     pub fn view(&self, tick: &Tick, stage: &HapticStage, second: Option<SecondView>, finished: bool) -> View {
         View {
             sample: tick.sample,
@@ -232,14 +234,14 @@ impl Ticks {
     }
 }
 
-/// How the solver fared.
+/// Outcome of the solver loop.
 #[derive(Clone, Debug, Default)]
 pub struct SolverOutcome {
-    /// Step, ms.
+    /// Length of a step, ms.
     pub dt_ms: f32,
     /// Steps done.
     pub steps: u64,
-    /// Simulated time over the time that was to be simulated.
+    /// Simulated time over wall time.
     pub real_time_factor: f64,
     /// Compute time of a step.
     pub times: Times,
@@ -247,31 +249,31 @@ pub struct SolverOutcome {
     pub collision_times: Times,
     /// Largest displacement of a node, mm.
     pub max_displacement_mm: f32,
-    /// Largest displacement left at the end, mm.
+    /// Largest displacement of a node at the end, mm.
     pub end_displacement_mm: f32,
-    /// What the solver had to put right.
+    /// Faults of the solver, counted.
     pub solver_faults: SolverFaults,
 }
 
-/// How a replay compares with its recording.
+/// Comparison of a replay with its recording.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Replayed {
-    /// Ticks run again.
+    /// Ticks replayed.
     pub ticks: u64,
-    /// Ticks that the session had, as far as its recording says: more where some are lost, or the
-    /// replay was ended.
+    /// Ticks of the session, as far as its recording shows; more than `ticks` where some are lost
+    /// or the replay ended early.
     pub recorded: u64,
-    /// What the recording lacks of its session; `null` when nothing.
+    /// What the recording lacks of its session; `null` if it is whole.
     pub losses: Option<String>,
-    /// Ticks whose forces came out the same, bit for bit, in both hands where there were two.
+    /// Ticks with forces equal bit for bit, in both hands where there are two.
     pub identical: u64,
-    /// Largest difference of force, N.
+    /// Largest difference in force, N.
     pub max_difference_n: f32,
 }
 
 impl Replayed {
-    /// How far the replay is like its recording, in a line.
-    pub fn told(&self) -> String {
+    /// Describes the agreement of replay and recording in a line.
+    pub fn describe(&self) -> String {
         let Self { ticks, recorded, losses, identical, max_difference_n } = self;
         let more = if losses.is_some() { "at least " } else { "" };
         let part = match ticks < recorded || losses.is_some() {
@@ -284,29 +286,29 @@ impl Replayed {
     }
 }
 
-/// All that is known at the end of a run.
+/// Outcome of a live session or a replay.
 #[derive(Debug, Default)]
 pub struct Outcome {
-    /// The haptic loop.
+    /// Counts and times of the haptic loop.
     pub ticks: Ticks,
     /// Length of the run, s of session time.
     pub seconds: f64,
-    /// Soft tissue, where there was some.
+    /// The solver loop, where the brain deforms.
     pub solver: Option<SolverOutcome>,
     /// Scores.
     pub scores: ScoreKeeper,
-    /// What the force guard did.
+    /// Ticks in which the force guard acted, by cause.
     pub guard: GuardCounters,
-    /// The longest force that it let through, N.
+    /// Force limit of the guard, N.
     pub force_limit_n: f32,
-    /// Force at the very end, N: zero.
+    /// Force after the last tick, N; zero after a clean end.
     pub end_force_n: f32,
-    /// The second hand, where there was one.
+    /// The second hand, if there is one.
     pub second: Option<SecondOutcome>,
-    /// The recording.
+    /// Result of the recording thread.
     pub written: Written,
-    /// PlanComparison which recording, in a replay.
+    /// Comparison with the recording, in a replay.
     pub replayed: Option<Replayed>,
-    /// What the operating system did not allow.
+    /// Remarks on the run: missing real-time priority, a loop that panicked.
     pub remarks: Vec<String>,
 }

@@ -1,5 +1,4 @@
-//! A live session: the threads of the thesis (6.2), exchanging newest values, never waiting for one
-//! another.
+//! A live session: the threads of the thesis (6.2), which exchange newest values without blocking.
 //!
 //! ```text
 //!            tool                    contact
@@ -10,9 +9,9 @@
 //!
 //! # Practice
 //! Loops: `haptic_loop` at the device's rate, `collision_loop` at 1 kHz, `solver_loop` at the
-//! solver's own step, bound to wall time. A second hand's tick follows the first one's in the
-//! haptic loop. The operating system's real-time priority is asked for and its refusal remarked.
-//! Whatever happens, the device is closed, and with it the force: also when a loop panics.
+//! solver's step, bound to wall time. The second hand's tick follows the first hand's in the haptic
+//! loop. Real-time priority is requested from the operating system; a refusal becomes a remark. The
+//! force is set to zero and the device closed in every case, also when a loop panics.
 
 use crate::run::clock::{Clock, Schedule};
 use crate::run::journal::Kept;
@@ -31,7 +30,7 @@ use trepan_link::queue::Sender;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_soft::Loads;
 
-/// Pace of the loops.
+/// Periods of the loops and end of the session.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pace {
     /// Length of a haptic tick, ms.
@@ -42,20 +41,20 @@ pub struct Pace {
     pub end_ms: f64,
 }
 
-/// The solver may lag this far behind; more is given up and counted, ms.
+/// Largest lag of simulated behind wall time, ms; more is skipped and lowers the real-time factor.
 const LAG_MS: f64 = 40.0;
-/// Most ticks for the force to fade at the end.
+/// Largest number of ticks for the force to fade at the end.
 const FADE_TICKS: u64 = 200;
 
-/// What the hands hold.
+/// Devices of the hands.
 pub struct Devices {
-    /// The drill's, which also says when the operation is over.
+    /// Device of the drill; the operation ends when it is finished.
     pub first: Box<dyn HapticDevice>,
-    /// The aspirator's, for stages with a second hand.
+    /// Device of the aspirator, for stages with a second hand.
     pub second: Option<Box<dyn HapticDevice>>,
 }
 
-/// Runs until the first device is finished, the time is over or a stop is asked for. `picture` runs
+/// Runs until the first device is finished, the time is over or a stop is requested. `picture` runs
 /// on the calling thread.
 pub fn run(
     stages: Stages,
@@ -68,15 +67,15 @@ pub fn run(
 ) -> Outcome {
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
-    let (senders, pages) = journal();
+    let (senders, receivers) = journal();
     let JournalSenders { ticks, second: seconds, notices, collisions, solver } = senders;
     let Stages { haptic, second, tissue } = stages;
-    let hold = |device| HapticDeviceOwner { device, stop: stop.clone() };
-    let hand = hold(devices.first);
-    let second = second.zip(devices.second.map(hold)).map(|(stage, hand)| Second { stage, hand, records: seconds });
-    let eyes = RenderInputs { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1), film: None };
+    let owned = |device| HapticDeviceOwner { device, stop: stop.clone() };
+    let hand = owned(devices.first);
+    let second = second.zip(devices.second.map(owned)).map(|(stage, hand)| Second { stage, hand, records: seconds });
+    let inputs = RenderInputs { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1), film: None };
     thread::scope(|scope| {
-        let writing = scope.spawn(move || Journal::write(pages, recorder, share, clock));
+        let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
         let ends = HapticEnds { tool: cells.tool.0, view: cells.view.0, patch: cells.patch.1, ticks, notices };
         let feeling = scope.spawn(move || haptic_loop(haptic, hand, second, ends, clock, pace, stop));
         let simulating = tissue.map(|tissue| {
@@ -92,9 +91,9 @@ pub fn run(
             let solving = scope.spawn(move || solver_loop(tissue.solver, ends, clock, stop));
             (colliding, solving)
         });
-        picture(eyes);
+        picture(inputs);
         stop.ask();
-        let mut outcome = feeling.join().unwrap_or_else(|_| fallen("haptic"));
+        let mut outcome = feeling.join().unwrap_or_else(|_| panicked("haptic"));
         if let Some((colliding, solving)) = simulating {
             let mut solver = solving.join().unwrap_or_default();
             solver.collision_times = colliding.join().unwrap_or_default();
@@ -105,15 +104,17 @@ pub fn run(
     })
 }
 
-fn fallen(name: &str) -> Outcome {
-    Outcome { remarks: vec![format!("the {name} loop fell; the device was closed")], ..Outcome::default() }
+/// Outcome after a panic of a loop.
+fn panicked(name: &str) -> Outcome {
+    let remark = format!("the {name} thread panicked; force set to zero, device closed");
+    Outcome { remarks: vec![remark], ..Outcome::default() }
 }
 
-/// Holds the device; however the thread ends, lets go of the force and ends the session.
+/// Owns the device; on drop it sets the force to zero, closes the device and ends the session.
 pub(crate) struct HapticDeviceOwner {
     /// The device.
     pub device: Box<dyn HapticDevice>,
-    /// Asked when the hand lets go.
+    /// Stop flag that is set on drop.
     pub stop: Stop,
 }
 
@@ -125,6 +126,7 @@ impl Drop for HapticDeviceOwner {
     }
 }
 
+/// Ends of cells and ring buffers for the haptic loop.
 struct HapticEnds {
     tool: Writer<ToolSample>,
     view: Writer<View>,
@@ -133,7 +135,7 @@ struct HapticEnds {
     notices: Sender<Notice>,
 }
 
-/// The second hand: what it holds, and its stage.
+/// The second hand: its stage and its device.
 struct Second {
     stage: SecondHand,
     hand: HapticDeviceOwner,
@@ -141,17 +143,18 @@ struct Second {
 }
 
 impl Second {
-    /// Its whole tick, after the first hand's of the same number.
-    fn tick(&mut self, tick: u64, now_ms: f64, tell: &mut dyn FnMut(Notice)) -> SecondView {
+    /// Reads the device, runs the tick and applies the force, after the first hand's tick of the
+    /// same number.
+    fn tick(&mut self, tick: u64, now_ms: f64, notify: &mut dyn FnMut(Notice)) -> SecondView {
         let reading = self.hand.device.read(now_ms);
-        let (wrench, record) = self.stage.tick(tick, &reading, tell);
+        let (wrench, record) = self.stage.tick(tick, &reading, notify);
         self.hand.device.apply(wrench);
         self.records.send(record);
         SecondView { world_from_tool: record.proxy, force: wrench.force() }
     }
 }
 
-/// The haptic loop: read, tick, apply, publish, wait. Late ticks are counted, never caught up.
+/// The haptic loop: read, tick, apply, publish, wait. Late ticks are counted, not made up for.
 fn haptic_loop(
     mut stage: HapticStage,
     mut hand: HapticDeviceOwner,
@@ -165,22 +168,22 @@ fn haptic_loop(
     let mut ticks = Ticks::default();
     let mut schedule = Schedule::new(pace.tick_ms.into(), clock.now_ms());
     let mut ending: Option<u64> = None;
-    let mut beside = None;
+    let mut second_pose = None;
     loop {
         clock.spin_until(schedule.next_ms());
         let now_ms = clock.now_ms();
         let reading = hand.device.read(now_ms);
         let &(patch_seq, patch) = ends.patch.latest().0;
-        let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq, second: beside };
+        let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq, second: second_pose };
         let number = input.tick;
-        let mut tell = |notice| {
-            ticks.hear(notice);
+        let mut notify = |notice| {
+            ticks.record(notice);
             ends.notices.send(notice);
         };
-        let mut tick = stage.tick(&input, &mut tell);
+        let mut tick = stage.tick(&input, &mut notify);
         hand.device.apply(tick.wrench);
-        let aside = second.as_mut().map(|second| second.tick(number, now_ms, &mut tell));
-        beside = second.as_ref().and_then(|second| second.stage.place());
+        let second_view = second.as_mut().map(|second| second.tick(number, now_ms, &mut notify));
+        second_pose = second.as_ref().and_then(|second| second.stage.place());
         let done_ms = clock.now_ms();
         tick.record.compute_us = ((done_ms - now_ms) * 1e3) as f32;
         tick.record.flags |= if schedule.advance(done_ms) { TickRecord::LATE } else { 0 };
@@ -194,7 +197,7 @@ fn haptic_loop(
         let at_rest = stage.is_at_rest() && second.as_ref().is_none_or(|second| second.stage.is_at_rest());
         let finished = ending.is_some_and(|since| at_rest || ticks.count - since > FADE_TICKS);
         ends.tool.set(tick.sample);
-        ends.view.set(ticks.view(&tick, &stage, aside, finished));
+        ends.view.set(ticks.view(&tick, &stage, second_view, finished));
         ends.ticks.send(tick.record);
         if finished {
             let seconds = clock.now_ms() * 1e-3;
@@ -217,6 +220,7 @@ fn haptic_loop(
     }
 }
 
+/// Ends of cells and ring buffers for the collision loop.
 struct CollisionEnds {
     tool: Reader<ToolSample>,
     soft: Reader<SoftFrame>,
@@ -225,7 +229,7 @@ struct CollisionEnds {
     records: Sender<CollisionRecord>,
 }
 
-/// The collision loop: newest tool against newest brain, at its own rate.
+/// The collision loop: collides the newest tool with the newest brain at its own rate.
 fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clock, pace: Pace, stop: &Stop) -> Times {
     let _ = real_time(60, "collision");
     let mut times = Times::default();
@@ -250,6 +254,7 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
     times
 }
 
+/// Ends of cells and ring buffers for the solver loop.
 struct SolverEnds {
     loads: Reader<Numbered<Loads>>,
     soft: Writer<SoftFrame>,
@@ -257,21 +262,21 @@ struct SolverEnds {
     records: Sender<SolverRecord>,
 }
 
-/// The solver loop: simulated time follows wall time; what cannot be followed is given up and told.
+/// The solver loop: simulated time follows wall time; a lag over [`LAG_MS`] is skipped.
 fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop: &Stop) -> SolverOutcome {
     let _ = real_time(40, "simulation");
     let mut times = Times::default();
     let begin_ms = clock.now_ms();
-    let mut given_up_ms = 0.0;
+    let mut skipped_ms = 0.0;
     while !stop.asked() {
         let began_ms = clock.now_ms();
-        let behind_ms = began_ms - begin_ms - given_up_ms - stage.time_ms();
+        let behind_ms = began_ms - begin_ms - skipped_ms - stage.time_ms();
         if behind_ms < f64::from(stage.dt_ms()) {
             clock.sleep_until(began_ms + f64::from(stage.dt_ms()) - behind_ms);
             continue;
         }
         if behind_ms > LAG_MS {
-            given_up_ms += behind_ms - LAG_MS;
+            skipped_ms += behind_ms - LAG_MS;
             thread::yield_now();
         }
         let (seq, loads) = ends.loads.latest().0;
@@ -289,7 +294,7 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
     SolverOutcome { real_time_factor: stage.time_ms() / span_ms, times, ..outcome(&stage) }
 }
 
-/// What a solver stage knows of itself.
+/// Returns the part of the outcome that a solver stage knows itself.
 pub fn outcome(stage: &SolverStage) -> SolverOutcome {
     SolverOutcome {
         dt_ms: stage.dt_ms(),
@@ -301,7 +306,7 @@ pub fn outcome(stage: &SolverStage) -> SolverOutcome {
     }
 }
 
-/// Asks for a first-in-first-out priority; says so when it is refused.
+/// Requests a first-in-first-out priority for this thread; returns a remark when it is refused.
 pub(crate) fn real_time(priority: u8, name: &str) -> Option<String> {
     let value = priority.try_into().ok().map(ThreadPriority::Crossplatform)?;
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);

@@ -1,25 +1,27 @@
-//! A second process that watches: the running session tells its ticks through shared memory, the
-//! watcher follows with its own scene.
+//! Watching from a second process: a session publishes its ticks in shared memory, the watcher
+//! follows them with its own scene.
 //!
 //! # Theory
-//! The watcher is an ordinary session whose device is the other session's hand: it reads where the
-//! trainee's hand is and runs its own bone, brain and picture. So a lost tick costs the watcher
-//! sharpness, nothing else. What a watcher's window sends back is a [lesson](super::lesson).
+//! The watcher is an ordinary session whose device is the other session: it reads the poses of the
+//! trainee's device and simulates its own bone, brain and picture. A lost tick only lowers the
+//! watcher's accuracy. Records from the watcher's window to the trainee are a
+//! [lesson](super::lesson).
 //!
 //! ```text
-//!  trainee: recording thread ──tick, event──> shared memory ──> watcher: pump thread → cell → haptic loop
-//!                            <────teacher────               <── watcher's window
+//!  trainee: recording thread ──tick, event──> shared memory ──> watcher: pump thread ─┐
+//!                            <────teacher────               <── watcher's window      │
+//!                                                               haptic loop <── cell <┘
 //! ```
 //!
 //! # Practice
-//! Telling and listening cost the recording thread a few µs a tick; the haptic loop knows nothing
-//! of it. What was drilled before the watcher came is not seen. Three seconds of silence end the
-//! watching.
+//! Sending and receiving cost the recording thread a few µs a tick; the haptic loop is not
+//! involved. Bone drilled before the watcher joined is not visible to it. Watching ends three
+//! seconds after the last tick.
 //!
 //! # When not to use it
-//! As it is, between machines: shared memory ends at the machine. iceoryx2's own tunnel
-//! (`iox2 tunnel zenoh`, of its command line tools) on both carries the topics `trepan/NAME/...`
-//! from one to the other; nothing changes here.
+//! Alone, between machines: shared memory is local to a machine. Run iceoryx2's tunnel
+//! (`iox2 tunnel zenoh`, of its command line tools) on both machines to forward the topics
+//! `trepan/NAME/...`; nothing changes here.
 
 use crate::error::SessionError;
 use crate::run::clock::Clock;
@@ -35,17 +37,17 @@ use trepan_link::cell::{Reader, cell};
 use trepan_link::topics::{Publisher, Session, Subscriber, TopicError};
 use trepan_link::wire::{EventRecord, TeacherRecord, TickRecord};
 
-/// Silence after which a tick counts as old, ms.
+/// Time without a new tick after which a reading is stale, ms.
 const STALE_MS: f64 = 100.0;
-/// Silence after which the other session counts as over, ms.
-const OVER_MS: f64 = 3000.0;
-/// How long a watcher waits for the first tick, s: the other session may still be reading its
+/// Time without a new tick after which the other session counts as ended, ms.
+const ENDED_MS: f64 = 3000.0;
+/// Longest wait of a watcher for the first tick, s: the other session may still be reading its
 /// images.
-const PATIENCE_S: f64 = 20.0;
-/// Pause of the pump between two looks.
-const LOOK: Duration = Duration::from_millis(1);
+const FIRST_TICK_TIMEOUT_S: f64 = 20.0;
+/// Time between two polls of the shared memory.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
-/// The telling end, for the recording thread.
+/// Send end of a shared session, for the recording thread.
 pub struct Share {
     ticks: Publisher<TickRecord>,
     events: Publisher<EventRecord>,
@@ -53,48 +55,51 @@ pub struct Share {
     _session: Session,
 }
 
-/// Where a session reads what its teacher asks: either hand, and the window.
+/// Readers of the teacher's requests: first hand, second hand, window.
 pub type Asked = [Reader<TeacherRecord>; 3];
 
 impl Share {
-    /// Tells, and listens to a teacher, under a name.
+    /// Shares a session under a name; returns also the readers of the teacher's requests.
     pub fn open(name: &str) -> Result<(Self, Asked), SessionError> {
         let open = || -> Result<(Self, Asked), TopicError> {
             let session = Session::join(name)?;
-            let (teacher, asked) = Listener::join(&session)?;
-            Ok((Self { ticks: session.publisher()?, events: session.publisher()?, teacher, _session: session }, asked))
+            let (teacher, readers) = Listener::join(&session)?;
+            Ok((
+                Self { ticks: session.publisher()?, events: session.publisher()?, teacher, _session: session },
+                readers,
+            ))
         };
         open().map_err(|fault| SessionError::Usage(format!("--share {name}: {fault}")))
     }
 
-    /// Listens to the teacher; gives what began (`true`) or ended.
-    pub fn hear(&mut self, now_ms: f64) -> impl Iterator<Item = (bool, &'static str)> + use<> {
-        self.teacher.hear(now_ms)
+    /// Receives the teacher's requests; returns those that began (`true`) or ended.
+    pub fn receive(&mut self, now_ms: f64) -> impl Iterator<Item = (bool, &'static str)> + use<> {
+        self.teacher.receive(now_ms)
     }
 
-    /// Tells a tick; false when nobody can be told any more.
+    /// Publishes a tick; returns false when publishing failed.
     pub fn tick(&mut self, record: &TickRecord) -> bool {
         self.ticks.send(record).is_ok()
     }
 
-    /// Tells an event; false when nobody can be told any more.
+    /// Publishes an event; returns false when publishing failed.
     pub fn event(&mut self, record: &EventRecord) -> bool {
         self.events.send(record).is_ok()
     }
 }
 
-/// The watching end: another session's hand as a device.
+/// Another session as a device: receive end of a watcher.
 pub struct Watched {
     newest: Reader<TickRecord>,
     seen: u64,
-    heard_ms: Option<f64>,
+    received_ms: Option<f64>,
     tool: ToolState,
     reads: u64,
     open: Arc<AtomicBool>,
     over: Arc<AtomicBool>,
 }
 
-/// Which session is watched, and whether it is over.
+/// Name of the watched session, and whether it has ended.
 #[derive(Clone)]
 pub struct Watching {
     name: String,
@@ -102,31 +107,31 @@ pub struct Watching {
 }
 
 impl Watching {
-    /// What to tell once the session is over.
+    /// Returns a text once the watched session has ended.
     pub fn ended(&self) -> Option<String> {
         self.over.load(Ordering::Relaxed).then(|| format!("the watched session {} has ended", self.name))
     }
 }
 
-/// Waits for a first tick, and says so.
+/// Waits for the first tick and logs the wait.
 fn first_tick(name: &str, ticks: &mut Subscriber<TickRecord>, stop: &Stop) -> Result<TickRecord, SessionError> {
-    let (clock, mut told) = (Clock::start(), false);
-    while clock.now_ms() < 1e3 * PATIENCE_S && !stop.asked() {
+    let (clock, mut logged) = (Clock::start(), false);
+    while clock.now_ms() < 1e3 * FIRST_TICK_TIMEOUT_S && !stop.asked() {
         if let Ok(Some(record)) = ticks.newest() {
             return Ok(record);
         }
-        if !std::mem::replace(&mut told, true) {
-            tracing::info!("waiting for the session {name}, at most {PATIENCE_S} s");
+        if !std::mem::replace(&mut logged, true) {
+            tracing::info!("waiting for the session {name}, at most {FIRST_TICK_TIMEOUT_S} s");
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
     Err(SessionError::Usage(format!(
-        "--watch {name}: no session of this name is heard: start one on this machine with --share {name}, then watch it"
+        "--watch {name}: no session of this name sends ticks: start one on this machine with --share {name}, then watch it"
     )))
 }
 
 impl Watched {
-    /// A device without motors or limits.
+    /// Capabilities of a device without motors or limits.
     pub const CAPABILITIES: Capabilities = Capabilities {
         name: String::new(),
         peak_force_n: 0.0,
@@ -140,7 +145,7 @@ impl Watched {
         damping: 0.0,
     };
 
-    /// Watches the session of a name, once a tick of it is heard; the tool waits at `start`.
+    /// Connects to the session of a name and waits for its first tick; the tool begins at `start`.
     pub fn open(name: &str, start: ToolState, stop: &Stop) -> Result<(Self, Watching), SessionError> {
         let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
         let session = Session::join(name).map_err(fault)?;
@@ -157,10 +162,10 @@ impl Watched {
                 if let Ok(Some(record)) = ticks.newest() {
                     writer.set(record);
                 }
-                std::thread::sleep(LOOK);
+                std::thread::sleep(POLL_INTERVAL);
             }
         });
-        Ok((Self { newest, seen: 0, heard_ms: None, tool: start, reads: 0, open, over }, watching))
+        Ok((Self { newest, seen: 0, received_ms: None, tool: start, reads: 0, open, over }, watching))
     }
 }
 
@@ -169,16 +174,16 @@ impl HapticDevice for Watched {
         let (record, sequence) = self.newest.latest();
         if sequence != self.seen {
             self.seen = sequence;
-            self.heard_ms = Some(time_ms);
-            // A watcher that comes late takes the tool that is already in the hand.
+            self.received_ms = Some(time_ms);
+            // A watcher that joins late takes the tool that the trainee already holds.
             let buttons = Buttons(record.buttons) | Buttons::slot(record.tool.into());
             self.tool = ToolState { world_from_tool: record.device, twist: record.twist, buttons, time_ms };
         }
         self.reads += 1;
         self.tool.time_ms = time_ms;
-        let silent_ms = self.heard_ms.map_or(0.0, |heard| time_ms - heard);
+        let silent_ms = self.received_ms.map_or(0.0, |received| time_ms - received);
         let status = match silent_ms {
-            ms if ms > OVER_MS => {
+            ms if ms > ENDED_MS => {
                 self.over.store(true, Ordering::Relaxed);
                 Status::Finished
             }
@@ -204,39 +209,39 @@ pub(crate) mod tests {
     use super::*;
     use trepan_geometry::Pose;
 
-    /// A watcher of a session that was shared until it was heard.
-    pub(crate) fn heard(name: &str) -> (Watched, Watching) {
+    /// Connects a watcher to a session that sends ticks only until the watcher is connected.
+    pub(crate) fn connected(name: &str) -> (Watched, Watching) {
         let trainee = Session::join(name).unwrap();
         let mut ticks = trainee.publisher::<TickRecord>().unwrap();
-        let heard = AtomicBool::new(false);
+        let connected = AtomicBool::new(false);
         std::thread::scope(|scope| {
             scope.spawn(|| {
-                while !heard.load(Ordering::Relaxed) {
+                while !connected.load(Ordering::Relaxed) {
                     ticks.send(&TickRecord { tick: 1, ..TickRecord::default() }).unwrap();
-                    std::thread::sleep(LOOK);
+                    std::thread::sleep(POLL_INTERVAL);
                 }
             });
             let opened = Watched::open(name, ToolState::at(Pose::IDENTITY), &Stop::default());
-            heard.store(true, Ordering::Relaxed);
+            connected.store(true, Ordering::Relaxed);
             opened.unwrap()
         })
     }
 
     #[test]
-    fn a_watched_session_that_falls_silent_has_ended() {
+    fn a_watched_session_without_new_ticks_has_ended() {
         let name = format!("watched-{}", std::process::id());
-        let (mut watched, watching) = heard(&name);
-        // The pump takes in what was still on its way.
+        let (mut watched, watching) = connected(&name);
+        // Lets the pump thread read the last ticks.
         std::thread::sleep(Duration::from_millis(200));
-        assert_eq!((watched.read(0.0).status, watched.read(OVER_MS).status), (Status::Fresh, Status::Stale));
+        assert_eq!((watched.read(0.0).status, watched.read(ENDED_MS).status), (Status::Fresh, Status::Stale));
         assert_eq!(watching.ended(), None);
-        assert_eq!(watched.read(OVER_MS + 1.0).status, Status::Finished);
+        assert_eq!(watched.read(ENDED_MS + 1.0).status, Status::Finished);
         assert_eq!(watching.ended().unwrap(), format!("the watched session {name} has ended"));
         watched.close();
     }
 
     #[test]
-    fn nobody_is_not_watched() {
+    fn watching_an_unknown_session_is_refused() {
         let stop = Stop::default();
         stop.ask();
         let fault = Watched::open("nobody-at-all", ToolState::at(Pose::IDENTITY), &stop).err().unwrap().to_string();

@@ -1,16 +1,17 @@
-//! Colours over bone and brain: the plan and what lies close below while operating; at the end
-//! where the cut missed the plan, and where the brain bore force.
+//! Colour overlays on bone and brain: plan and remaining thickness during the operation, deviation
+//! from the plan and forces at the end.
 //!
 //! # Practice
-//! | colour | on bone, while operating | on bone, at the end | on the brain |
+//! | colour | on bone, during | on bone, at the end | on the brain |
 //! |---|---|---|---|
 //! | sky blue | planned outline | planned and left | |
 //! | green | | planned and taken | |
-//! | yellow to vermilion | the brain is 3 to 0 mm below | vermilion: taken and not planned | least to most force over time |
+//! | yellow to vermilion | brain 3 to 0 mm below | vermilion: taken outside the plan | `∫ F dt` |
 //! | purple | | | must not be touched |
 //!
-//! Colours of Okabe and Ito (2008), which every kind of colour vision tells apart. A box of some
-//! 10⁵ texels, made once; tens of milliseconds.
+//! On the brain yellow is the least force over time, vermilion the most. The colours are those of
+//! Okabe and Ito (2008), distinct for all kinds of colour vision. An overlay is a box of some
+//! 10⁵ texels, made once in tens of milliseconds.
 
 use crate::case::plan::Plan;
 use crate::report::regions::touched;
@@ -26,22 +27,22 @@ const YELLOW: [f32; 3] = [240.0, 228.0, 66.0];
 const VERMILION: [f32; 3] = [213.0, 94.0, 0.0];
 const PURPLE: [f32; 3] = [204.0, 121.0, 167.0];
 
-/// From texel to texel, mm.
+/// Spacing of texels, mm.
 const TEXEL_MM: f32 = 1.0;
 /// Half the width of an outline, mm.
 const LINE_MM: f32 = 0.8;
-/// Distance to the brain from which the bone is coloured, mm.
+/// Distance to the brain under which the bone is coloured, mm.
 const CLOSE_MM: f32 = 3.0;
-/// How far around the plan is painted, mm.
+/// Margin of the overlay around the plan, mm.
 const AROUND_MM: f32 = 6.0;
-/// How far in is painted, mm.
+/// Depth of the overlay, mm.
 const DEEP_MM: f32 = 20.0;
-/// Spread of a touch on the map of forces, mm.
+/// Standard deviation of a touch on the map of forces, mm.
 const SPREAD_MM: f32 = 2.0;
-/// Most texels of a map of forces along an axis.
-const MOST: u32 = 160;
+/// Largest number of texels of a map along an axis.
+const MAX_TEXELS: u32 = 160;
 
-/// What lies over the patient while the operation goes on.
+/// Colour overlays during the operation.
 #[derive(Clone, Debug, Default)]
 pub struct Colours {
     /// Over the bone.
@@ -50,7 +51,7 @@ pub struct Colours {
     pub brain: Option<Paint>,
 }
 
-/// The plan's outline, and how close the brain lies below what is left of the bone.
+/// Paints the plan's outline and the distance of bone to the brain below it.
 pub fn planned(plan: &Plan, brain: Option<&DistanceField>) -> Paint {
     let (middle, inward) = (plan.site.entry, plan.site.inward);
     let reach = plan.hole_mm.max(plan.flap_mm) + AROUND_MM;
@@ -68,15 +69,15 @@ pub fn planned(plan: &Plan, brain: Option<&DistanceField>) -> Paint {
     })
 }
 
-/// What must not be touched, on the brain.
+/// Paints the structures on the brain that must not be touched.
 pub fn forbidden(field: &DistanceField, around: Aabb) -> Paint {
-    paint(1, around, (around.size().max_element() / MOST as f32).max(TEXEL_MM), |place| {
+    paint(1, around, (around.size().max_element() / MAX_TEXELS as f32).max(TEXEL_MM), |place| {
         let near = 1.0 - field.sample(place).max(0.0) / 2.0;
         if near > 0.0 { coloured(PURPLE, 0.85 * near) } else { CLEAR }
     })
 }
 
-/// The bone that went and the bone that was to go, voxel by voxel around the plan.
+/// Paints removed and planned bone, voxel by voxel around the plan.
 pub fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Paint {
     let reach = plan.hole_mm.max(plan.flap_mm) + 2.0 * AROUND_MM;
     let around = Aabb::of_points(&[plan.site.entry, plan.site.entry + DEEP_MM * plan.site.inward]).inflated(reach);
@@ -93,7 +94,7 @@ pub fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Pai
         }
         let gone = |voxel: IVec3| was_bone(voxel) && !bone.is_bone(voxel);
         let sides = [IVec3::X, IVec3::Y, IVec3::Z].into_iter().flat_map(|side| [voxel + side, voxel - side]);
-        // The rim of what went has its colour, so that the surface there has.
+        // The rim of removed bone has its colour too, so that the remaining surface shows it.
         let at_rim = |planned: bool| sides.clone().any(|at| gone(at) && plan.takes(bone.centre_of(at)) == planned);
         match (plan.takes(place), gone(voxel)) {
             (true, true) => coloured(GREEN, 0.9),
@@ -106,19 +107,18 @@ pub fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Pai
     })
 }
 
-/// Force over time on the brain, by the place at rest where the tool touched; `None` when it never
-/// did.
+/// Paints force over time on the brain at rest, where the tool touched it; `None` without touches.
 pub fn forces(brain: &DistanceField, tray: &[Tool], ticks: &[TickRecord]) -> Option<Paint> {
     let pressed = |tick: &&TickRecord| tick.phase == 1 && tick.tissue_depth_mm > 0.0;
     let touched = |tick: &TickRecord| (touched(brain, tray, tick), tick.tissue_n());
-    // Every 10th tick: a touch spreads over much more than a hand moves in that time.
+    // Every 10th tick is enough: the tool moves less than the spread of a touch in that time.
     let touches: Vec<(Vec3, f32)> = ticks.iter().filter(pressed).step_by(10).map(touched).collect();
     let places: Vec<Vec3> = touches.iter().map(|touch| touch.0).collect();
     if places.is_empty() {
         return None;
     }
     let around = Aabb::of_points(&places).inflated(3.0 * SPREAD_MM);
-    let texel_mm = (around.size().max_element() / MOST as f32).max(TEXEL_MM);
+    let texel_mm = (around.size().max_element() / MAX_TEXELS as f32).max(TEXEL_MM);
     let mut sums = vec![0.0f32; dims(around, texel_mm).iter().map(|n| *n as usize).product()];
     let [nx, ny, _] = dims(around, texel_mm).map(|n| n as usize);
     let reach = (3.0 * SPREAD_MM / texel_mm).ceil() as i32;
@@ -144,14 +144,15 @@ pub fn forces(brain: &DistanceField, tray: &[Tool], ticks: &[TickRecord]) -> Opt
     }))
 }
 
+/// A transparent texel.
 const CLEAR: [u8; 4] = [0; 4];
 
-/// From yellow at 0 to vermilion at 1.
+/// Interpolates from yellow at 0 to vermilion at 1.
 fn warm(share: f32) -> [f32; 3] {
     std::array::from_fn(|n| YELLOW[n] + share.clamp(0.0, 1.0) * (VERMILION[n] - YELLOW[n]))
 }
 
-/// A colour of a screen in linear light.
+/// Converts an sRGB colour to linear light.
 fn coloured(srgb: [f32; 3], alpha: f32) -> [u8; 4] {
     let linear = |value: f32| (255.0 * (value / 255.0).powf(2.2)).round() as u8;
     let [r, g, b] = srgb;
@@ -162,7 +163,7 @@ fn dims(around: Aabb, texel_mm: f32) -> [u32; 3] {
     (around.size() / texel_mm).to_array().map(|n| n.ceil().clamp(1.0, 512.0) as u32 + 1)
 }
 
-/// A box of colours, x fastest; those of the end have another version than those before.
+/// Makes a box of colours, x fastest. `version` 1 is the operation, 2 the maps at the end.
 fn paint(version: u64, around: Aabb, texel_mm: f32, mut colour: impl FnMut(Vec3) -> [u8; 4]) -> Paint {
     let dims = dims(around, texel_mm);
     let [nx, ny, nz] = dims;
@@ -186,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn the_plan_and_the_misses_are_where_they_are() {
+    fn plan_and_deviations_are_painted_at_their_places() {
         let mut ct = VoxelVolume::isotropic([50, 50, 14], Vec3::ZERO, 1.0, AIR_HU);
         ct.data[50 * 50 * 4..50 * 50 * 10].fill(1000);
         let bone = BoneVolume::new(&ct, 400).unwrap();

@@ -1,14 +1,13 @@
-//! Graphics for the picture: opens an adapter, and brings Mesa's software driver where there is
-//! none and that is allowed.
+//! Opens a graphics adapter; as root, installs Mesa's software driver where there is none.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 use trepan_gpu::{Gpu, GpuError, Prefer};
 
-/// The packages that a Debian-like system needs for software Vulkan.
+/// Packages for software Vulkan on a Debian-like system.
 const PACKAGES: [&str; 2] = ["libvulkan1", "mesa-vulkan-drivers"];
 
-/// A graphics device. Where there is none: brings the driver if that is allowed, else says what
+/// Opens a graphics device. Without one, it installs the driver as root, or logs the command that
 /// would.
 pub fn open() -> Result<Gpu, GpuError> {
     let opened = Gpu::open(Prefer::default());
@@ -33,7 +32,7 @@ fn is_root() -> bool {
     std::fs::metadata("/proc/self").is_ok_and(|of_process| of_process.uid() == 0)
 }
 
-/// Installs; asks for fresh package lists only when the known ones do not serve.
+/// Installs the packages; updates the package lists only if the first attempt fails.
 fn install() -> bool {
     let get = |arguments: &[&str]| {
         Command::new("apt-get")

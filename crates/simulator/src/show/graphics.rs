@@ -1,4 +1,4 @@
-//! Who draws a session's pictures, and the coloured maps at its end.
+//! The painter of a session's pictures, and the coloured maps at its end.
 
 use crate::report::page::Shot;
 use crate::session_setup::SessionSetup;
@@ -11,41 +11,42 @@ use trepan_link::Recording;
 use trepan_render::{Camera, Frame, Painter, SceneData, SliceLook};
 use trepan_volume::VoxelVolume;
 
-/// Captions of the maps.
-const OF_BONE: &str = "bone against the plan: green as planned, blue planned and left, red taken beside it";
+/// Caption of the map of bone.
+const OF_BONE: &str = "bone against the plan: green as planned, blue planned and left, red taken outside the plan";
+/// Caption of the map of the brain.
 const OF_BRAIN: &str = "force on the brain over time: yellow little, red most";
-/// From where the bone is seen, mm, and the brain.
-const NEAR_MM: f32 = 75.0;
-const FAR_MM: f32 = 150.0;
+/// Camera distance for the map of bone without a flap, mm.
+const BONE_VIEW_MM: f32 = 75.0;
+/// Camera distance for the map of the brain, mm.
+const BRAIN_VIEW_MM: f32 = 150.0;
 
-/// The drawing device, and what it is called.
+/// The painter and the name of its device.
 pub struct Graphics {
-    /// Its name.
+    /// Name of the graphics adapter.
     pub adapter: String,
-    /// The painter, until somebody takes it.
+    /// The painter; `None` once it is taken.
     pub painter: Option<Painter>,
 }
 
 impl Graphics {
-    /// Opens a painter for pictures of `size` pixels on a device that was opened, or not. A window
-    /// needs the device; without one the processor draws where the models leave out rays or pixels
-    /// that a software driver would draw on the same cores.
+    /// Opens a painter for pictures of `size` pixels. A window needs the graphics device. Headless,
+    /// the CPU painter replaces a software driver where the models leave out rays or pixels.
     pub fn open(
-        table: &SessionSetup,
+        setup: &SessionSetup,
         size: [u32; 2],
         device: Result<Gpu, GpuError>,
         windowed: bool,
     ) -> Result<Self, String> {
-        let Picture { sparse, detail } = table.models.setup.picture;
-        let brain = table.scene.brain.as_ref();
+        let Picture { sparse, detail } = setup.models.setup.picture;
+        let brain = setup.scene.brain.as_ref();
         let data = SceneData {
-            bone: table.scene.bone.clone(),
+            bone: setup.scene.bone.clone(),
             brain: brain.map(|brain| &brain.mesh),
             mri: brain.map(|brain| &brain.mri),
             tint: brain.and_then(|brain| brain.tint.as_deref()),
         };
-        let spared = !windowed && (sparse || detail < 1.0) && device.as_ref().is_ok_and(Gpu::is_software);
-        let painter = if spared { Painter::by_processor(&data, size) } else { Painter::on(device, &data, size) };
+        let by_processor = !windowed && (sparse || detail < 1.0) && device.as_ref().is_ok_and(Gpu::is_software);
+        let painter = if by_processor { Painter::by_processor(&data, size) } else { Painter::on(device, &data, size) };
         let mut painter = painter.map_err(|fault| fault.to_string())?;
         painter.set_quality(sparse, detail as f32).map_err(|fault| fault.to_string())?;
         painter.notice().inspect(|notice| tracing::warn!("{notice}"));
@@ -54,7 +55,7 @@ impl Graphics {
 }
 
 impl SessionSetup {
-    /// Colours over the patient while the operation goes on.
+    /// Makes the colour overlays shown during the operation.
     pub fn colours(&self) -> Colours {
         let brain = self.scene.brain.as_ref();
         let field = brain.map(|brain| &*brain.field);
@@ -64,8 +65,8 @@ impl SessionSetup {
         Colours { bone, brain: forbidden.map(|(field, around)| colours::forbidden(&field, around)) }
     }
 
-    /// The end of a session in colours: bone against the plan, force on the brain. What went wrong
-    /// stands in place of a picture.
+    /// Draws the maps at the end of a session: bone against the plan, force on the brain. A failed
+    /// map gives its fault.
     pub fn maps(
         &self,
         painter: &mut Painter,
@@ -73,7 +74,7 @@ impl SessionSetup {
         recording: &Recording,
         folder: &Path,
     ) -> Vec<Result<Shot, String>> {
-        let against = self.bone().zip(before).map(|(bone, before)| colours::against(&self.plan, before, bone));
+        let removed = self.bone().zip(before).map(|(bone, before)| colours::against(&self.plan, before, bone));
         let field = self.scene.brain.as_ref().map(|brain| &*brain.field);
         let forces = field.and_then(|field| colours::forces(field, self.program.tray(), &recording.ticks));
         let outward = -self.plan.site.inward;
@@ -87,12 +88,12 @@ impl SessionSetup {
             let drawn = painter.picture(&frame).map_err(|fault| fault.to_string());
             drawn.and_then(|(image, _)| snap(&image, folder, caption))
         };
-        let of_bone = against
-            .as_ref()
-            .map(|paint| draw(OF_BONE, Frame { bone_paint: Some(paint), ..frame(NEAR_MM + 3.0 * self.plan.flap_mm) }));
+        let of_bone = removed.as_ref().map(|paint| {
+            draw(OF_BONE, Frame { bone_paint: Some(paint), ..frame(BONE_VIEW_MM + 3.0 * self.plan.flap_mm) })
+        });
         let of_brain = forces
             .as_ref()
-            .map(|paint| draw(OF_BRAIN, Frame { brain_paint: Some(paint), show_bone: false, ..frame(FAR_MM) }));
+            .map(|paint| draw(OF_BRAIN, Frame { brain_paint: Some(paint), show_bone: false, ..frame(BRAIN_VIEW_MM) }));
         of_bone.into_iter().chain(of_brain).collect()
     }
 }

@@ -1,10 +1,9 @@
-//! Keeps pictures of the window: single ones, and films as numbered pictures.
+//! Saves pictures of the window: single pictures, and films as numbered pictures.
 //!
 //! # Practice
-//! A thread of its own turns them into PNG files (some 30 ms each), so that the window never waits.
-//! At most a second of pictures is waiting; what comes on top of that is left out, counted and
-//! told. Beside a film's pictures lies a list with the time of each, for
-//! `ffmpeg -i film.ffconcat film.mp4`.
+//! A separate thread writes the PNG files (some 30 ms each), so that the window never waits. At
+//! most a second of pictures is queued; further ones are dropped, counted and reported. A list with
+//! the time of each picture of a film is written for `ffmpeg -i film.ffconcat film.mp4`.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -13,10 +12,10 @@ use std::thread::JoinHandle;
 use trepan_render::Image;
 use trepan_render::window::Capture;
 
-/// Pictures that wait at most.
-const WAITING: usize = 30;
+/// Capacity of the queue, pictures.
+const QUEUE: usize = 30;
 
-/// Takes pictures of the window.
+/// Saves pictures of the window on a thread.
 pub struct Keeper {
     sender: Option<SyncSender<(Capture, Image)>>,
     thread: Option<JoinHandle<Result<(), String>>>,
@@ -24,30 +23,30 @@ pub struct Keeper {
 }
 
 impl Keeper {
-    /// Keeps them in `folder`, which is made with the first.
+    /// Saves pictures in `folder`, which is created with the first picture.
     pub fn into_folder(folder: &Path) -> Self {
-        let (sender, receiver) = sync_channel::<(Capture, Image)>(WAITING);
-        let mut shelf = Shelf { folder: folder.into(), ..Shelf::default() };
+        let (sender, receiver) = sync_channel::<(Capture, Image)>(QUEUE);
+        let mut files = Files { folder: folder.into(), ..Files::default() };
         let thread = std::thread::spawn(move || {
-            receiver.iter().try_for_each(|(what, image)| shelf.put(what, &image))?;
-            shelf.list()
+            receiver.iter().try_for_each(|(what, image)| files.put(what, &image))?;
+            files.list()
         });
         Self { sender: Some(sender), thread: Some(thread), dropped: 0 }
     }
 
-    /// Keeps a picture, or counts it as left out.
+    /// Queues a picture, or counts it as dropped.
     pub fn keep(&mut self, what: Capture, image: Image) {
         let full = |sender: &SyncSender<_>| matches!(sender.try_send((what, image)), Err(TrySendError::Full(_)));
         self.dropped += u64::from(self.sender.as_ref().is_some_and(full));
     }
 
-    /// Waits for the last file; says what went wrong.
+    /// Waits for the last file; returns what went wrong.
     pub fn finish(mut self) -> Vec<String> {
         self.sender = None;
         let written = self.thread.take().map(JoinHandle::join);
         let fault = match written {
             Some(Ok(Err(fault))) => Some(format!("pictures of the window: {fault}")),
-            Some(Err(_)) => Some("pictures of the window: the thread that writes them fell".into()),
+            Some(Err(_)) => Some("pictures of the window: the thread that writes them panicked".into()),
             _ => None,
         };
         let left_out = (self.dropped > 0)
@@ -56,16 +55,17 @@ impl Keeper {
     }
 }
 
-/// Where the files go.
+/// The files written so far.
 #[derive(Default)]
-struct Shelf {
+struct Files {
     folder: PathBuf,
     pictures: usize,
-    /// When each of the film's pictures was taken, ms.
+    /// Time of each picture of the film, ms.
     film_ms: Vec<u64>,
 }
 
-impl Shelf {
+impl Files {
+    /// Writes a picture under the next number.
     fn put(&mut self, what: Capture, image: &Image) -> Result<(), String> {
         let name = match what {
             Capture::Picture => {
@@ -82,7 +82,7 @@ impl Shelf {
         written.map_err(|fault| format!("{}: {fault}", path.display()))
     }
 
-    /// Writes the film's list, if there is a film.
+    /// Writes the list of the film's pictures, if there is a film.
     fn list(&self) -> Result<(), String> {
         let Some(last) = self.film_ms.last() else { return Ok(()) };
         let mut text = String::from("ffconcat version 1.0\n");
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_kept_leaves_no_folder_and_a_fault_is_told() {
+    fn without_pictures_there_is_no_folder_and_a_fault_is_returned() {
         let folder = tempfile::tempdir().unwrap();
         assert!(Keeper::into_folder(&folder.path().join("window")).finish().is_empty());
         assert!(!folder.path().join("window").exists());

@@ -1,4 +1,4 @@
-//! What the main thread does: pictures into files, or a window.
+//! Rendering on the main thread: into files or a window.
 
 pub(crate) mod colours;
 pub(crate) mod driver;

@@ -1,4 +1,4 @@
-//! What the window says of a session, live or shown again: phase, tool, forces, warnings, in words.
+//! Texts of the window's panel, live and in a replay: phase, tool, forces, warnings.
 
 use crate::program::{Phase, Program, called};
 use crate::run::View;
@@ -6,10 +6,10 @@ use crate::stages::notice::{Notice, Warning};
 use trepan_geometry::Buttons;
 use trepan_render::window::{Choice, Panel, Sound};
 
-/// How long something that happened is shown, ms.
+/// Time for which a notice is shown, ms.
 const NEWS_MS: f64 = 4000.0;
 
-/// Warnings of harm to the patient: the alarm sounds. The others are of device and machine.
+/// Warnings of harm to the patient, which sound the alarm; the others concern device and machine.
 const DANGERS: [Warning; 6] = [
     Warning::BreakThrough,
     Warning::BreachSoon,
@@ -19,7 +19,7 @@ const DANGERS: [Warning; 6] = [
     Warning::ForbiddenNear,
 ];
 
-/// What holds of every session.
+/// Returns the panel's contents that are common to all sessions.
 pub fn panel(case: &str, program: Program, view: &View) -> Panel {
     let value = |name: &str, value: String| (name.to_string(), value);
     let sample = &view.sample;
@@ -41,42 +41,43 @@ pub fn panel(case: &str, program: Program, view: &View) -> Panel {
         sound: Sound {
             spindle: view.spindle,
             load: view.force.length() / view.force_limit_n.max(1e-3),
-            alarm: standing(view.warnings).any(|warning| DANGERS.contains(&warning)),
+            alarm: active(view.warnings).any(|warning| DANGERS.contains(&warning)),
         },
         force_n: view.force.length(),
         force_limit_n: view.force_limit_n,
         choices: vec![tray(program, sample.slot)],
         values: values.into_iter().chain(second).collect(),
-        warnings: standing(view.warnings).map(|warning| warning.text().into()).collect(),
+        warnings: active(view.warnings).map(|warning| warning.text().into()).collect(),
         news: news(view),
         ..Panel::default()
     }
 }
 
-/// A pause, and what happened lately.
+/// Returns a notice of the pause, and the newest notice while it is recent.
 fn news(view: &View) -> Vec<String> {
     let pause =
         view.sample.state.buttons.has(Buttons::PAUSE).then(|| "PAUSED by the teacher: no force, no drill".into());
-    let lately = view.news.filter(|notice| view.time_ms - notice.time_ms < NEWS_MS).map(told);
+    let lately = view.news.filter(|notice| view.time_ms - notice.time_ms < NEWS_MS).map(in_words);
     pause.into_iter().chain(lately).collect()
 }
 
-/// The tools, the one in the hand chosen.
+/// Returns the choice of tools, with the present one selected.
 fn tray(program: Program, slot: usize) -> Choice {
     let options = program.tray().iter().map(|tool| (called(tool), true)).collect();
     Choice { name: "Tool".into(), options, chosen: slot }
 }
 
-fn standing(bits: u32) -> impl Iterator<Item = Warning> {
+/// Returns the active warnings.
+fn active(bits: u32) -> impl Iterator<Item = Warning> {
     Warning::ALL.into_iter().enumerate().filter(move |(at, _)| bits & (1 << at) != 0).map(|(_, warning)| warning)
 }
 
-fn told(notice: Notice) -> String {
+fn in_words(notice: Notice) -> String {
     let (kind, text) = notice.words();
     format!("{kind}: {text}")
 }
 
-/// What to do next.
+/// Returns a hint on what to do next.
 pub fn hint(phase: Phase, by_hand: bool) -> &'static str {
     match (phase, by_hand) {
         (_, false) => "the operation runs by itself",
@@ -101,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn dangers_sound_and_the_rest_is_read() {
+    fn only_warnings_of_harm_sound_the_alarm() {
         let bit = |warning| 1 << Warning::ALL.iter().position(|w| *w == warning).unwrap();
         let panel = |bits| panel("composite", Program::Integrated, &view(bits));
         assert!(panel(bit(Warning::BrainTouched)).sound.alarm);
@@ -112,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn news_grow_old() {
+    fn notices_expire() {
         let mut view = view(0);
         view.news = Some(Notice { tick: 1, time_ms: 4000.0, what: What::NotOpen });
         assert_eq!(panel("c", Program::Brain, &view).news.len(), 1);

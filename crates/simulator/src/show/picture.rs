@@ -1,5 +1,5 @@
-//! The main thread of a headless run: one picture after another, from the newest state, through the
-//! same drawing code as the window.
+//! The main thread of a headless run: renders pictures of the newest state with the same code as
+//! the window.
 
 use crate::case::opening::eye;
 use crate::report::page::Shot;
@@ -15,32 +15,32 @@ use trepan_geometry::Vec3;
 use trepan_haptics::script::Site;
 use trepan_render::{Camera, Frame, Image, Overlay, Painter, SliceLook};
 
-/// Half the height of what a slice shows around the tool, mm.
+/// Half the height of a slice's view around the tool, mm.
 const SLICE_MM: f32 = 60.0;
-/// A force under this has no arrow, N.
+/// Force under which no arrow is drawn, N.
 const FELT_N: f32 = 0.05;
-/// Length of the arrow, mm for 1 N.
+/// Length of the arrow, mm per N.
 const MM_PER_N: f32 = 12.0;
-/// Pictures that go into the report beside the first and the last.
-const SHOWN: usize = 4;
+/// Pictures in the report, besides the first and the last.
+const SHOTS_BETWEEN: usize = 4;
 
-/// What the pictures came to.
+/// Results of rendering.
 #[derive(Debug, Default)]
 pub struct Album {
-    /// Who drew them.
+    /// The painter, for further pictures.
     pub painter: Option<Painter>,
-    /// Pictures written.
+    /// Pictures rendered.
     pub frames: u64,
-    /// Time in which they were drawn, s.
+    /// Time in which they were rendered, s.
     pub seconds: f64,
-    /// Those for the report.
+    /// Pictures for the report.
     pub shots: Vec<Shot>,
-    /// What went wrong.
+    /// Faults of rendering.
     pub faults: Vec<String>,
 }
 
 impl Album {
-    /// Adds one picture, or what went wrong with it.
+    /// Adds a picture or its fault.
     pub fn add(&mut self, shot: Result<Shot, String>) {
         match shot {
             Ok(shot) => {
@@ -52,20 +52,20 @@ impl Album {
     }
 }
 
-/// The eye over the site.
+/// Returns the default camera on the site.
 pub fn camera(site: &Site) -> Camera {
     Camera::viewed_from(site.entry, eye(site), 170.0)
 }
 
-/// The microscope: down on the site from the usual working distance, on a field of some 50 mm;
-/// aslant by 15 degrees, so that a tool along the way in does not hide its tip.
+/// Returns the camera of the microscope: 250 mm from the site, with a field of some 50 mm. It is
+/// inclined by 15 degrees, so that a tool along the approach does not hide its tip.
 pub fn microscope(site: &Site) -> Camera {
     let outward = -site.inward;
     let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
     Camera { fov_rad: 0.2, ..Camera::viewed_from(site.entry, outward + 0.27 * side, 250.0) }
 }
 
-/// A frame of the newest state.
+/// Returns a frame of a state.
 pub fn frame<'a>(
     camera: Camera,
     view: &View,
@@ -89,24 +89,24 @@ pub fn frame<'a>(
     }
 }
 
-/// The force on the hand at the tool's tip; none that is too weak to be felt.
+/// Returns the arrow of the force on the hand at the tool's tip; `None` for a weak force.
 fn arrow(view: &View) -> Option<[Vec3; 2]> {
     let tip = view.sample.state.tip();
     (view.force.length() > FELT_N).then(|| [tip, tip + MM_PER_N * view.force])
 }
 
-/// Waits for the end without a picture.
-pub fn wait(mut eyes: RenderInputs, stop: &Stop) {
-    while !stop.asked() && !eyes.view.latest().0.finished {
+/// Waits for the end without rendering.
+pub fn wait(mut inputs: RenderInputs, stop: &Stop) {
+    while !stop.asked() && !inputs.view.latest().0.finished {
         std::thread::sleep(Duration::from_millis(5));
     }
 }
 
-/// Draws `per_second` pictures a second into `folder` until the end, and one more then.
+/// Renders `per_second` pictures a second into `folder` until the end, and one more at the end.
 pub fn draw(
-    mut eyes: RenderInputs,
+    mut inputs: RenderInputs,
     mut painter: Painter,
-    table: &SessionSetup,
+    setup: &SessionSetup,
     per_second: f64,
     folder: &Path,
     stop: &Stop,
@@ -114,14 +114,14 @@ pub fn draw(
     let mut album = Album::default();
     let mut candidates: Vec<(f64, PathBuf)> = Vec::new();
     let clock = Clock::start();
-    let (camera, colours, bone_shown) = (camera(&table.scene.site), table.colours(), table.program.has_bone());
+    let (camera, colours, bone_shown) = (camera(&setup.scene.site), setup.colours(), setup.program.has_bone());
     let mut next_ms = 0.0;
     loop {
-        let view = *eyes.view.latest().0;
+        let view = *inputs.view.latest().0;
         let over = view.finished || stop.asked();
         if over || clock.now_ms() >= next_ms {
             next_ms = clock.now_ms().max(next_ms) + 1e3 / per_second.max(1e-3);
-            let soft = eyes.soft.as_mut().map(|soft| soft.latest().0.positions.as_slice());
+            let soft = inputs.soft.as_mut().map(|soft| soft.latest().0.positions.as_slice());
             let path = folder.join(format!("frame-{:05}.png", album.frames));
             let drawn = painter.picture(&frame(camera, &view, soft, bone_shown, &colours));
             match drawn.map_err(|f| f.to_string()).and_then(|(image, _)| write(&image, &path)) {
@@ -131,7 +131,7 @@ pub fn draw(
                 }
                 Err(fault) => {
                     album.faults.push(format!("the pictures ended: {fault}"));
-                    wait(eyes, stop);
+                    wait(inputs, stop);
                     break;
                 }
             }
@@ -152,7 +152,7 @@ fn write(image: &Image, path: &Path) -> Result<(), String> {
     image.write_png(path).map_err(|fault| format!("{}: {fault}", path.display()))
 }
 
-/// One picture for the report; its file is named after the caption's first words, up to a colon.
+/// Writes a picture for the report; its file is named after the caption up to a colon.
 pub fn snap(image: &Image, folder: &Path, caption: &str) -> Result<Shot, String> {
     let name = caption.split(':').next().unwrap_or_default().replace(' ', "-");
     let path = folder.join(format!("frame-{name}.png"));
@@ -160,10 +160,10 @@ pub fn snap(image: &Image, folder: &Path, caption: &str) -> Result<Shot, String>
     Ok(Shot { caption: caption.into(), png: std::fs::read(&path).map_err(|fault| fault.to_string())? })
 }
 
-/// The first, the last, and some evenly between.
+/// Returns the first and the last picture, and some evenly spaced between.
 fn chosen(candidates: &[(f64, PathBuf)]) -> Vec<Shot> {
     let last = candidates.len().saturating_sub(1);
-    let mut picks: Vec<usize> = (0..=SHOWN + 1).map(|i| i * last / (SHOWN + 1)).collect();
+    let mut picks: Vec<usize> = (0..=SHOTS_BETWEEN + 1).map(|i| i * last / (SHOTS_BETWEEN + 1)).collect();
     picks.dedup();
     let shot = |&at: &usize| {
         let (seconds, path) = candidates.get(at)?;

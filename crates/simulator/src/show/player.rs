@@ -1,10 +1,10 @@
-//! A recorded session in the window: a film that runs, stands still, and goes to any time.
+//! Player of a recorded session in the window: run, pause, seek.
 //!
 //! # Practice
-//! The film is made at full speed while it is shown ([`crate::run::film`]); how far it is stands
-//! beside the bar. Going somewhere writes the voxels that changed in between, some 20 ns each, at
-//! most [`MOST`] a picture: a jump over more of them takes a few pictures. Between two shots that
-//! keep a brain it is drawn in between.
+//! The film is made at full speed while it is shown ([`crate::run::film`]); the time bar shows how
+//! far it is made. Seeking writes the voxels that changed in between, some 20 ns each, at most
+//! [`MAX_VOXELS`] per picture: a longer jump takes a few pictures. The brain's nodes are
+//! interpolated between the shots that hold them.
 
 use crate::program::Program;
 use crate::run::View;
@@ -24,21 +24,22 @@ use trepan_render::window::{Capture, Mark, Panel, Playback, Session, Timeline, W
 use trepan_render::{Camera, Frame, Image, Painter};
 use trepan_volume::BoneVolume;
 
-/// Voxels written in a picture at most: some 10 ms.
-const MOST: usize = 500_000;
-/// Events of these kinds are no marks: they come many times a second.
+/// Largest number of voxels written per picture: some 10 ms.
+const MAX_VOXELS: usize = 500_000;
+/// Kinds of events without marks on the time bar: they come many times a second.
 const STREAMED: [&str; 1] = ["score"];
 
+/// Hint for a replay.
 const HINT: &str = "a recorded session: Space runs it, the bar goes to any time";
 
-/// The film, and where it is.
+/// The film and its present shot.
 struct Film {
     shots: Vec<Shot>,
     coming: Receiver<Shot>,
     bone: Option<Arc<BoneVolume>>,
-    /// The shot that is shown.
+    /// Index of the present shot.
     at: usize,
-    /// The brain as it is shown.
+    /// Positions of the brain's nodes, mm.
     positions: Vec<Vec3>,
 }
 
@@ -47,32 +48,32 @@ impl Film {
         self.shots.get(shot).map_or(0.0, |shot| shot.view.time_ms)
     }
 
-    /// How far the film is made, ms.
+    /// Returns the time up to which the film is made, ms.
     fn ready_ms(&self) -> f64 {
         self.time_ms(self.shots.len().saturating_sub(1))
     }
 
-    /// Takes in what was made since the last picture.
+    /// Takes the shots made since the last picture.
     fn grow(&mut self) {
         self.shots.extend(self.coming.try_iter());
     }
 
-    /// Goes to the last shot up to a time, or as far towards it as a picture allows.
+    /// Moves to the last shot up to a time, ms, by at most [`MAX_VOXELS`] voxels.
     fn go_to(&mut self, time_ms: f64) {
-        let wanted = self.shots.partition_point(|shot| shot.view.time_ms <= time_ms).saturating_sub(1);
+        let target = self.shots.partition_point(|shot| shot.view.time_ms <= time_ms).saturating_sub(1);
         let mut written = 0;
-        while self.at < wanted && written < MOST {
+        while self.at < target && written < MAX_VOXELS {
             self.at += 1;
             written += self.write(self.at, true);
         }
-        while self.at > wanted && written < MOST {
+        while self.at > target && written < MAX_VOXELS {
             written += self.write(self.at, false);
             self.at -= 1;
         }
         self.place_brain();
     }
 
-    /// Writes the changes of a shot into the skull that is shown; says how many.
+    /// Writes the changes of a shot into the skull; returns their number.
     fn write(&self, shot: usize, forwards: bool) -> usize {
         let (Some(bone), Some(shot)) = (&self.bone, self.shots.get(shot)) else { return 0 };
         for change in &shot.changes {
@@ -81,7 +82,7 @@ impl Film {
         shot.changes.len()
     }
 
-    /// The brain between the shot that kept it last and the next.
+    /// Interpolates the brain's nodes between the nearest shots that hold them.
     fn place_brain(&mut self) {
         let kept = |(at, shot): (usize, &Shot)| shot.positions.is_some().then_some(at);
         let before = self.shots.iter().enumerate().take(self.at + 1).rev().find_map(kept);
@@ -98,7 +99,7 @@ impl Film {
     }
 }
 
-/// What the window shows.
+/// A replay in the window.
 struct Player {
     film: Film,
     timeline: Timeline,
@@ -111,11 +112,11 @@ struct Player {
     keeper: Keeper,
     stop: Stop,
     hint: String,
-    /// Closes by itself then, s.
+    /// Time at which the window closes, s.
     until_s: f64,
 }
 
-/// Shows a recording that is being run again, until the window is closed, or for `until_s`.
+/// Shows a replay until the window is closed, or for `until_s`.
 pub fn show(
     first: View,
     coming: Receiver<Shot>,
@@ -146,9 +147,9 @@ pub fn show(
     album
 }
 
-/// A recording up to a time, s, with its events.
+/// Makes the timeline of a recording up to a time, s, with its events as marks.
 fn timeline(recording: &Recording, until_s: f64) -> Timeline {
-    let told =
+    let marked =
         recording.events.iter().filter(|event| event.kind != "cleared" && !STREAMED.contains(&event.kind.as_str()));
     let mark = |event: &trepan_link::wire::EventRecord| Mark {
         at_s: event.time_ms * 1e-3,
@@ -156,13 +157,13 @@ fn timeline(recording: &Recording, until_s: f64) -> Timeline {
         warning: event.kind == "warning",
     };
     let length_s = up_to(recording, 1e3 * until_s).last().map_or(0.0, |tick| tick.time_ms * 1e-3);
-    let marks = told.map(mark).filter(|mark| mark.at_s <= until_s).collect();
+    let marks = marked.map(mark).filter(|mark| mark.at_s <= until_s).collect();
     Timeline { at_s: 0.0, length_s, ready_s: 0.0, running: true, speed: 1.0, marks }
 }
 
-/// Moves on by the time since the last picture, after what the user asked for.
-fn advance(timeline: &mut Timeline, asked: Option<Playback>, passed_s: f64) {
-    match asked {
+/// Applies the user's input, then advances by the time since the last picture, s.
+fn advance(timeline: &mut Timeline, input: Option<Playback>, passed_s: f64) {
+    match input {
         Some(Playback::Run(running)) => {
             timeline.running = running;
             if running && timeline.at_s >= timeline.length_s {
@@ -174,7 +175,7 @@ fn advance(timeline: &mut Timeline, asked: Option<Playback>, passed_s: f64) {
         None => {}
     }
     if timeline.running {
-        // Time waits for the film.
+        // Playing does not run past the part of the film that is made.
         let next_s = (timeline.at_s + passed_s * f64::from(timeline.speed)).min(timeline.ready_s);
         timeline.at_s = timeline.at_s.max(next_s);
         timeline.running = timeline.at_s < timeline.length_s;
@@ -228,7 +229,8 @@ mod tests {
         View { time_ms, ..View::at(sample, 1.0) }
     }
 
-    /// A film of `count` shots, 10 ms apart; each takes voxel n away, each other one keeps a brain.
+    /// Makes a film of `count` shots, 10 ms apart. Shot n removes voxel n; every other shot holds
+    /// the brain's nodes.
     fn film(count: usize) -> Film {
         let bone = VoxelVolume::isotropic([40, 40, 4], Vec3::ZERO, 1.0, 900i16);
         let bone = Some(Arc::new(BoneVolume::new(&bone, 400).unwrap()));
@@ -246,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn the_skull_is_what_it_was_wherever_one_goes() {
+    fn seeking_restores_skull_and_brain_at_any_time() {
         let mut film = film(200);
         let bone = film.bone.clone().unwrap();
         let gone = || (0..200).filter(|n| !bone.is_bone(IVec3::new(n % 40, n / 40, 1))).count();
@@ -278,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_are_what_happened_and_no_streams() {
+    fn marks_are_events_without_streamed_ones() {
         let event = |kind: &str, text: &str| trepan_link::wire::EventRecord {
             kind: kind.into(),
             text: text.into(),

@@ -1,12 +1,12 @@
-//! The main thread of a session with a window: newest state in, what the user does out.
+//! The main thread of a session with a window: renders the newest state and passes on user input.
 //!
 //! # Practice
-//! The window never waits for a loop and no loop waits for it. With the mouse as a device the pose
-//! goes to the haptic loop, which reads it at its own rate; closing the window ends the session.
+//! Window and loops never wait for each other. With the mouse as device, the haptic loop reads the
+//! mouse pose at its own rate. Closing the window ends the session.
 
 use crate::program::Program;
 use crate::report::page::Shot;
-use crate::run::lesson::{ASKED, Company, Teacher};
+use crate::run::lesson::{Company, TEACHER_REQUESTS, Teacher};
 use crate::run::stop::Stop;
 use crate::run::watch::Watching;
 use crate::run::{RenderInputs, View};
@@ -22,10 +22,10 @@ use trepan_link::wire::TeacherRecord;
 use trepan_render::window::{self, Action, Capture, Leash, Panel, Start, WindowInput};
 use trepan_render::{Camera, Frame, Image, Overlay, Painter};
 
-/// How far a mouse may press past a surface, mm: a little over what the device's largest force
-/// stands for at 2 N/mm.
+/// Largest depth of a mouse-driven pose past a surface, mm: a little over the depth of the device's
+/// largest force at 2 N/mm.
 const LEASH_MM: f32 = 2.0;
-/// A request is held so long that no tick misses it, s.
+/// Duration of a request, s: long enough that no tick misses it.
 const REQUEST_S: f64 = 0.1;
 
 /// Whether a window can be opened here.
@@ -33,21 +33,21 @@ pub fn has_display() -> bool {
     window::display().is_ok()
 }
 
-/// What the window is opened on.
+/// Session data for the window.
 pub struct Opened<'a> {
-    /// The patient, the plan, which simulator.
+    /// Patient, plan and program.
     pub table: &'a SessionSetup,
-    /// A name for the case that anybody may read.
+    /// Name of the case, without the patient's name.
     pub case: &'a str,
-    /// Where pictures go.
+    /// Output folder.
     pub out: &'a Path,
-    /// What the tick's rate should be, Hz.
+    /// Requested rate of the haptic loop, Hz.
     pub rate_hz: f32,
 }
 
-/// What the window shows and drives.
+/// A live session in the window.
 struct Show {
-    eyes: RenderInputs,
+    inputs: RenderInputs,
     view: View,
     positions: Vec<Vec3>,
     case: String,
@@ -57,9 +57,9 @@ struct Show {
     colours: Colours,
     pointer: Option<MouseHandle>,
     company: Company,
-    /// What is marked on the anatomy, mm.
+    /// Markers on the anatomy, mm.
     markers: Vec<Vec3>,
-    /// A tool that is only shown.
+    /// Pose of the teacher's ghost tool.
     ghost: Option<Pose>,
     requests: Requests,
     rate: Rate,
@@ -67,20 +67,20 @@ struct Show {
     stop: Stop,
 }
 
-/// What was asked for lately, and until when it counts, s.
+/// Recent requests, each with the time at which it expires, s.
 #[derive(Default)]
 struct Requests(Vec<(Buttons, f64)>);
 
 impl Requests {
-    /// Everything that is asked for at a time, with what is new.
+    /// Adds new requests and returns all that are active at a time, s.
     fn at(&mut self, seconds: f64, new: impl Iterator<Item = Buttons>) -> Buttons {
         self.0.retain(|(_, until)| seconds < *until);
-        self.0.extend(new.map(|asked| (asked, seconds + REQUEST_S)));
-        self.0.iter().fold(Buttons(0), |all, (asked, _)| all | *asked)
+        self.0.extend(new.map(|button| (button, seconds + REQUEST_S)));
+        self.0.iter().fold(Buttons(0), |all, (button, _)| all | *button)
     }
 }
 
-/// Ticks a second, measured over about a second.
+/// Rate of the haptic loop, Hz, measured over about a second.
 #[derive(Default)]
 struct Rate {
     since: (f64, u64),
@@ -99,16 +99,16 @@ impl Rate {
 
 /// Shows the session until it ends or the window is closed.
 pub fn show(
-    mut eyes: RenderInputs,
+    mut inputs: RenderInputs,
     painter: Painter,
     opened: &Opened<'_>,
     pointer: Option<MouseHandle>,
     company: Company,
     stop: &Stop,
 ) -> Album {
-    let view = *eyes.view.latest().0;
+    let view = *inputs.view.latest().0;
     let show = Show {
-        eyes,
+        inputs,
         view,
         positions: Vec::new(),
         case: opened.case.into(),
@@ -131,7 +131,7 @@ pub fn show(
     album
 }
 
-/// Opens the window on a session, with a picture before and one after.
+/// Runs a session in a window, with a picture before and one after it.
 pub fn run<S: window::Session + 'static>(
     session: S,
     mut painter: Painter,
@@ -157,11 +157,11 @@ pub fn run<S: window::Session + 'static>(
     (session, album)
 }
 
-/// A session whose pictures in the window are counted.
+/// A session in the window that counts its pictures.
 struct Counted<S> {
     session: S,
     pictures: u64,
-    /// When the first and the newest of them were drawn, s.
+    /// Times of the first and the newest picture, s.
     seconds: [f64; 2],
 }
 
@@ -189,18 +189,18 @@ fn shot(painter: &mut Painter, frame: &Frame<'_>, folder: &Path, caption: &str) 
 
 impl window::Session for Show {
     fn update(&mut self, input: &WindowInput) -> Panel {
-        self.view = *self.eyes.view.latest().0;
-        if let Some(soft) = &mut self.eyes.soft {
+        self.view = *self.inputs.view.latest().0;
+        if let Some(soft) = &mut self.inputs.soft {
             self.positions.clone_from(&soft.latest().0.positions);
         }
-        self.pass_on(input);
-        let lesson = self.listen(input);
+        self.send_pose(input);
+        let lesson = self.exchange_requests(input);
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
         let flap = || Action { name: "Lift the flap, or put it back".into(), key: Some('f'), on: false };
         let mut panel = notice_text::panel(&self.case, self.program, view);
         panel.warnings.extend(lesson.warnings);
-        // Who watches reads that the other session is over, and closes the window in her own time.
+        // A watcher reads that the other session has ended, and closes the window herself.
         let over = self.company.watching.as_ref().and_then(Watching::ended);
         let finished = match over {
             Some(_) => self.stop.signal().is_some(),
@@ -238,41 +238,41 @@ impl window::Session for Show {
 }
 
 impl Show {
-    /// The user's hand for the haptic loop.
-    fn pass_on(&mut self, input: &WindowInput) {
+    /// Passes mouse pose, pedal and requests to the haptic loop.
+    fn send_pose(&mut self, input: &WindowInput) {
         let Some(pointer) = &mut self.pointer else { return };
-        let asked = [
+        let buttons = [
             input.next_tool.then_some(Buttons::NEXT_TOOL),
             input.undo.then_some(Buttons::UNDO),
             (input.actions & 1 != 0).then_some(Buttons::FLAP),
             input.chosen.map(|[_, slot]| Buttons::slot(slot)),
         ];
-        let asked = self.requests.at(input.seconds, asked.into_iter().flatten());
+        let active = self.requests.at(input.seconds, buttons.into_iter().flatten());
         let pedal = if input.pedal { Buttons::PEDAL } else { Buttons(0) };
-        pointer.set(input.world_from_tool, asked | pedal);
+        pointer.set(input.world_from_tool, active | pedal);
     }
 }
 
 impl Show {
-    /// What passes between a teacher and a trainee in this picture.
-    fn listen(&mut self, input: &WindowInput) -> Lesson {
-        let (lesson, asks) = match &mut self.company {
-            Company { teacher: Some(teacher), .. } => (taught(teacher, input), *teacher.asks()),
+    /// Exchanges the teacher's requests for this picture; updates ghost and markers.
+    fn exchange_requests(&mut self, input: &WindowInput) -> Lesson {
+        let (lesson, requests) = match &mut self.company {
+            Company { teacher: Some(teacher), .. } => (teach(teacher, input), *teacher.requests()),
             Company { asked: Some(asked), .. } => {
-                let asks = *asked.latest().0;
-                (Lesson::asked(asks.flags), asks)
+                let requests = *asked.latest().0;
+                (Lesson::requested(requests.flags), requests)
             }
             _ => return Lesson::default(),
         };
-        let shows = |bit| asks.flags & bit != 0;
-        self.ghost = shows(TeacherRecord::GHOST).then_some(asks.ghost);
+        let shows = |bit| requests.flags & bit != 0;
+        self.ghost = shows(TeacherRecord::GHOST).then_some(requests.ghost);
         self.markers.clear();
-        self.markers.extend(shows(TeacherRecord::MARKER).then_some(asks.marker));
+        self.markers.extend(shows(TeacherRecord::MARKER).then_some(requests.marker));
         lesson
     }
 }
 
-/// What a lesson adds to the panel.
+/// Additions of a lesson to the panel.
 #[derive(Default)]
 struct Lesson {
     warnings: Vec<String>,
@@ -280,16 +280,17 @@ struct Lesson {
 }
 
 impl Lesson {
-    /// What a trainee is told; of a pause the panel tells by itself.
-    fn asked(flags: u32) -> Self {
-        let trouble = ASKED.into_iter().filter(|(bit, _)| flags & bit & !TeacherRecord::PAUSE != 0);
+    /// Warnings to the trainee; the panel itself reports a pause.
+    fn requested(flags: u32) -> Self {
+        let trouble = TEACHER_REQUESTS.into_iter().filter(|(bit, _)| flags & bit & !TeacherRecord::PAUSE != 0);
         Self { warnings: trouble.map(|(_, text)| text.into()).collect(), ..Self::default() }
     }
 }
 
+/// Hint for a teacher.
 const TEACH: &str = "you watch; your mouse and keys hold a ghost of the tool";
 
-/// A teacher's switches: what they do, their key, and their bit.
+/// A teacher's switches: text, key and bit.
 const SWITCHES: [(&str, char, u32); 5] = [
     ("Show the trainee my tool", 'g', TeacherRecord::GHOST),
     ("Mark the place of my tool", 'k', TeacherRecord::MARKER),
@@ -298,17 +299,17 @@ const SWITCHES: [(&str, char, u32); 5] = [
     ("Let the patient bleed", 'h', TeacherRecord::BLEEDING),
 ];
 
-/// Does what the teacher asks for, tells the trainee, and gives the switches as they are then.
-fn taught(teacher: &mut Teacher, input: &WindowInput) -> Lesson {
+/// Applies the teacher's input, sends the requests to the trainee, and returns the switches.
+fn teach(teacher: &mut Teacher, input: &WindowInput) -> Lesson {
     for (at, (.., bit)) in SWITCHES.into_iter().enumerate().filter(|(at, _)| input.actions >> at & 1 != 0) {
-        if at == 1 && teacher.asks().flags & bit == 0 {
+        if at == 1 && teacher.requests().flags & bit == 0 {
             teacher.mark(input.world_from_tool.translation);
         } else {
             teacher.switch(bit);
         }
     }
-    teacher.tell(input.world_from_tool);
-    let flags = teacher.asks().flags;
+    teacher.send(input.world_from_tool);
+    let flags = teacher.requests().flags;
     let switch =
         |(name, key, bit): (&str, char, u32)| Action { name: name.into(), key: Some(key), on: flags & bit != 0 };
     Lesson { actions: SWITCHES.map(switch).into(), ..Lesson::default() }
@@ -317,28 +318,28 @@ fn taught(teacher: &mut Teacher, input: &WindowInput) -> Lesson {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::watch::tests::heard;
+    use crate::run::watch::tests::connected;
     use crate::stages::haptic_tick::ToolSample;
     use trepan_geometry::ToolState;
     use trepan_haptics::HapticDevice;
     use trepan_link::cell::cell;
 
     #[test]
-    fn a_trainee_reads_what_is_asked() {
-        let lesson = Lesson::asked(TeacherRecord::PAUSE | TeacherRecord::BLEEDING | TeacherRecord::GHOST);
-        assert_eq!(lesson.warnings, [ASKED[2].1]);
+    fn a_trainee_reads_the_requests() {
+        let lesson = Lesson::requested(TeacherRecord::PAUSE | TeacherRecord::BLEEDING | TeacherRecord::GHOST);
+        assert_eq!(lesson.warnings, [TEACHER_REQUESTS[2].1]);
     }
 
     #[test]
-    fn a_window_on_a_session_that_has_ended_says_so_and_stays() {
-        let (mut watched, watching) = heard(&format!("ended-{}", std::process::id()));
+    fn a_window_on_an_ended_session_reports_it_and_stays_open() {
+        let (mut watched, watching) = connected(&format!("ended-{}", std::process::id()));
         std::thread::sleep(std::time::Duration::from_millis(200));
         let start = ToolState::at(Pose::IDENTITY);
         let sample = ToolSample { tick: 0, state: start, tool: Program::Brain.tray()[0], slot: 0, drilling: false };
         let (mut writer, view) = cell(View::at(sample, 1.0));
         let mut show = Show {
             view: View::at(sample, 1.0),
-            eyes: RenderInputs { view, soft: None, film: None },
+            inputs: RenderInputs { view, soft: None, film: None },
             positions: Vec::new(),
             case: "case".into(),
             program: Program::Brain,
@@ -377,11 +378,11 @@ mod tests {
     }
 
     #[test]
-    fn a_request_is_held_for_a_tenth_of_a_second() {
+    fn a_request_is_active_for_a_tenth_of_a_second() {
         let mut requests = Requests::default();
-        let asked = requests.at(1.0, [Buttons::UNDO, Buttons::slot(2)].into_iter());
-        assert!(asked.has(Buttons::UNDO) && asked.in_slot() == Some(2));
-        assert_eq!(requests.at(1.09, std::iter::empty()), asked);
+        let active = requests.at(1.0, [Buttons::UNDO, Buttons::slot(2)].into_iter());
+        assert!(active.has(Buttons::UNDO) && active.in_slot() == Some(2));
+        assert_eq!(requests.at(1.09, std::iter::empty()), active);
         assert_eq!(requests.at(1.11, [Buttons::FLAP].into_iter()), Buttons::FLAP);
     }
 }

@@ -1,24 +1,23 @@
-//! How much bone is left ahead of the burr: the warning before the inner table gives way.
+//! Remaining bone ahead of the burr, for the warning before the inner table is broken through.
 //!
 //! # Theory
-//! A ray from the foremost point of the ball in a direction (the tool's axis, or the push of the
-//! hand), the density between voxel centres trilinear: the bone left is the length from there to
-//! where the density falls under the isovalue for good within the reach.
+//! A ray starts at the foremost point of the ball along a direction (the tool's axis, or the
+//! direction of pressing). The density is trilinear between voxel centres. The remaining bone is
+//! the length up to the last crossing of the isovalue within the reach.
 //!
 //! # Practice
-//! Steps of a quarter voxel with the crossing interpolated: within 0.1 voxel on flat bone. 12
-//! samples a millimetre at 1/3 mm voxels, 8 loads each: under 1 us for the 2 mm that the warnings
-//! ask for.
+//! Steps of a quarter voxel with the crossing interpolated: within 0.1 voxel on flat bone. At
+//! voxels of 1/3 mm a millimetre takes 12 samples of 8 loads: under 1 us for the 2 mm of the
+//! warnings.
 //!
 //! # When not to use it
-//! For a burr that cuts with its side, along its axis alone: what lies ahead is not what is being
-//! cut.
+//! Along the axis alone, for a burr that cuts with its side: that bone is not the bone being cut.
 
 use glam::IVec3;
 use trepan_geometry::Vec3;
 use trepan_volume::BoneVolume;
 
-/// Bone left along `direction` (unit) from `front`, mm, at most `reach_mm`; 0 when there is none.
+/// Returns the remaining bone along `direction` (unit) from `front`, mm, at most `reach_mm`.
 pub fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, reach_mm: f32) -> f32 {
     let step = 0.25 * bone.spacing_mm();
     let over = |mm: f32| density(bone, front + mm * direction) - f32::from(bone.isovalue());
@@ -37,7 +36,7 @@ pub fn bone_ahead_mm(bone: &BoneVolume, front: Vec3, direction: Vec3, reach_mm: 
     left.min(reach_mm)
 }
 
-/// Trilinear density, HU.
+/// Returns the trilinear density, HU.
 fn density(bone: &BoneVolume, point: Vec3) -> f32 {
     let grid = bone.grid_of(point);
     let low = grid.floor();
@@ -54,7 +53,7 @@ mod tests {
     use super::*;
     use trepan_volume::VoxelVolume;
 
-    /// Bone from x = -3 to 3 mm, blurred over one voxel.
+    /// Makes bone from x = -3 to 3 mm, blurred over one voxel.
     fn slab() -> BoneVolume {
         let mut ct = VoxelVolume::isotropic([24, 8, 8], Vec3::new(-6.0, -2.0, -2.0), 0.5, 0i16);
         for at in 0..ct.data.len() {
@@ -65,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_of_a_slab_is_measured_below_the_voxel() {
+    fn remaining_bone_of_a_slab_is_measured_to_less_than_a_voxel() {
         let bone = slab();
         for depth in [0.1f32, 0.77, 1.5, 3.33, 5.0, 5.9] {
             let left = bone_ahead_mm(&bone, Vec3::X * (3.0 - depth), Vec3::NEG_X, 10.0);

@@ -1,9 +1,9 @@
-//! Which causes of warnings a tick finds.
+//! Finds the causes of warnings in a tick.
 //!
 //! # Theory
-//! Of the bone ahead `a` and its change the breach is foreseen: `t = a / v`, v the rate at which a
-//! falls, smoothed over 50 ms. So a fast feed is told as early as a slow one, though less bone is
-//! left.
+//! The time until breakthrough is predicted from the remaining bone `a`: `t = a / v`, where v is
+//! the feed rate (the decrease of a over time), smoothed over 50 ms. The warning therefore precedes
+//! the breakthrough by the same time at any feed rate.
 //!
 //! # Sources
 //! Forces on brain tissue in neurosurgery are mostly under 0.3 N: H. J. Marcus et al., *Forces
@@ -14,26 +14,26 @@ use crate::stages::notice::Warning;
 use crate::stages::score::cuts_into_brain;
 use trepan_link::wire::TickRecord;
 
-/// A breach this near in time is worth a warning, ms.
+/// Time until breakthrough under which a warning is raised, ms.
 const SOON_MS: f32 = 300.0;
-/// Time over which the feed is smoothed, ms.
+/// Time constant of the smoothing of the feed rate, ms.
 const SMOOTH_MS: f32 = 50.0;
 
-/// Share of the smoothing from which the feed is believed.
-const SURE: f32 = 0.4;
+/// Weight of the smoothing from which the feed rate is used.
+const MIN_WEIGHT: f32 = 0.4;
 
-/// How fast the bone ahead becomes less.
+/// Smoothed feed rate: decrease of the remaining bone over time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Feed {
     last_mm: Option<f32>,
     mm_per_ms: f32,
-    /// Share of the smoothing that is there, 0 to 1.
+    /// Weight of the samples in the smoothing so far, 0 to 1.
     weight: f32,
 }
 
 impl Feed {
-    /// Takes note of the bone left ahead, mm, of which `reach_mm` and more count alike; gives the
-    /// time until the breach, ms, infinite while the bone does not give way.
+    /// Updates the feed rate with the remaining bone, mm, and returns the time until breakthrough,
+    /// ms. Bone from `reach_mm` on counts as unknown; without feed the time is infinite.
     pub fn follow(&mut self, ahead_mm: f32, reach_mm: f32, dt_ms: f32) -> f32 {
         let known = Some(ahead_mm).filter(|mm| *mm < reach_mm);
         let (Some(last), Some(now)) = (self.last_mm, known) else {
@@ -45,26 +45,26 @@ impl Feed {
         self.weight += share * (1.0 - self.weight);
         self.last_mm = known;
         let feed = self.mm_per_ms / self.weight.max(1e-6);
-        if self.weight > SURE && feed > 1e-6 { now / feed } else { f32::INFINITY }
+        if self.weight > MIN_WEIGHT && feed > 1e-6 { now / feed } else { f32::INFINITY }
     }
 }
 
-/// What a tick knows beside its record.
+/// Inputs of the warnings that are not in a tick's record.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Signs {
-    /// Whether a tool for bone is in the hand that has no foot to keep the dura off.
+pub(crate) struct WarningInputs {
+    /// Whether the tool cuts bone and has no foot that protects the dura.
     pub bare_cutter: bool,
-    /// Bone left ahead, mm.
+    /// Remaining bone ahead, mm.
     pub ahead_mm: f32,
-    /// Time until it is gone, ms.
+    /// Time until breakthrough, ms.
     pub breach_ms: f32,
     /// Force of the tissue, N.
     pub tissue_n: f32,
     /// Distance from the tool to the nearest forbidden structure, mm.
     pub forbidden_mm: f32,
-    /// The force that is wanted, N.
-    pub wanted_n: f32,
-    /// Whether the drill stands still under its load.
+    /// The desired force, N.
+    pub desired_n: f32,
+    /// Whether the drill has stalled under its load.
     pub stalled: bool,
     /// Age of the last collision result, ms.
     pub age_ms: f32,
@@ -72,7 +72,7 @@ pub(crate) struct Signs {
     pub warm: bool,
 }
 
-/// At what a trainee is warned.
+/// Thresholds of the warnings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Distance from a cutting tool to the brain, mm.
@@ -89,8 +89,8 @@ impl Default for Limits {
     }
 }
 
-impl Signs {
-    /// Every warning, whether its cause is there, and how near, strong or old it is.
+impl WarningInputs {
+    /// Returns every warning, whether its cause is present, and its distance, force, time or age.
     pub fn causes(&self, record: &TickRecord, limits: &Limits) -> [(Warning, bool, f32); Warning::ALL.len()] {
         let brain_mm = record.brain_distance_mm;
         let near = self.bare_cutter && brain_mm <= limits.near_mm;
@@ -103,11 +103,11 @@ impl Signs {
             (Warning::BrainTouched, cuts_into_brain(record), -brain_mm),
             (Warning::BrainPressed, self.tissue_n > limits.brain_force_n, self.tissue_n),
             (Warning::ForbiddenNear, self.forbidden_mm <= limits.forbidden_mm, self.forbidden_mm),
-            (Warning::DrillStalled, drilling && self.stalled, self.wanted_n),
-            (Warning::ForceLimit, record.has(TickRecord::CLAMPED), self.wanted_n),
+            (Warning::DrillStalled, drilling && self.stalled, self.desired_n),
+            (Warning::ForceLimit, record.has(TickRecord::CLAMPED), self.desired_n),
             (Warning::TissueLate, record.has(TickRecord::HELD), self.age_ms),
             (Warning::DeviceStale, record.has(TickRecord::STALE), 0.0),
-            (Warning::MotorsWarm, self.warm, self.wanted_n),
+            (Warning::MotorsWarm, self.warm, self.desired_n),
         ]
     }
 }
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_steady_feed_is_foreseen_and_bone_out_of_reach_is_not() {
+    fn breakthrough_is_predicted_at_a_steady_feed_for_bone_within_reach() {
         let mut feed = Feed::default();
         let mut soon = None;
         for ms in 0..1000u16 {

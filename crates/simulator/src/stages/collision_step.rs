@@ -1,11 +1,11 @@
-//! One collision step: the newest tool and the newest brain in; a surface patch for the hand, loads
-//! for the solver out.
+//! One collision step: from the newest tool and brain it computes a surface patch for the hand and
+//! loads for the solver.
 //!
 //! # Practice
-//! While the burr is in the hand the result only warns: the patch goes to the haptic thread, the
-//! solver gets no contact of it (thesis 6.4). The probe touches with tip and shaft. From then on
-//! the skull holds back what the probe and the brain's weight push away. The stage has no clock;
-//! the same tools and positions give the same results.
+//! With a tool for bone the result only causes warnings: the patch goes to the haptic thread, the
+//! solver gets no contact of it (thesis 6.4). A tool for the brain collides with tip and shaft.
+//! From its first use on, the skull supports the brain against the probe and its own weight. The
+//! stage has no clock; the same tools and positions give the same results.
 
 use crate::program::{Phase, Program};
 use crate::stages::haptic_tick::ToolSample;
@@ -18,7 +18,7 @@ use trepan_link::wire::CollisionRecord;
 use trepan_mesh::TetMesh;
 use trepan_soft::Loads;
 
-/// The brain as the solver last published it.
+/// State of the brain as last published by the solver.
 #[derive(Clone, Debug, Default)]
 pub struct SoftFrame {
     /// Solver steps done.
@@ -29,7 +29,7 @@ pub struct SoftFrame {
     pub velocities: Vec<Vec3>,
 }
 
-/// The state that lives from step to step.
+/// State of the collision loop.
 pub struct CollisionStage {
     tools: Vec<TissueCollision>,
     wall: Option<SkullWall>,
@@ -41,8 +41,8 @@ pub struct CollisionStage {
 }
 
 impl CollisionStage {
-    /// One collision pipeline for each tool of the program, and the skull around the brain where it
-    /// is there.
+    /// Makes a collision pipeline for each tool of the program, and takes the skull around the
+    /// brain if there is one.
     pub fn new(
         program: Program,
         mesh: &TetMesh,
@@ -64,13 +64,12 @@ impl CollisionStage {
         })
     }
 
-    /// With a brain that sinks and sways once the dura is open.
+    /// Adds the body force on the brain once the dura is open.
     pub fn settling(self, settling: Settling) -> Self {
         Self { settling, ..self }
     }
 
-    /// The step. Its results stand in [`patch`](Self::patch) and [`loads`](Self::loads) until the
-    /// next.
+    /// Runs a step; its results are in [`patch`](Self::patch) and [`loads`](Self::loads).
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
         self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
         self.patch = self.step.patch.with(self.step.shaft.normal, self.step.shaft.depth_mm);
@@ -87,12 +86,12 @@ impl CollisionStage {
         }
     }
 
-    /// For the haptic thread.
+    /// Returns the surface patch for the haptic thread.
     pub fn patch(&self) -> &SurfacePatch {
         &self.patch
     }
 
-    /// For the solver: no contact of a tool for bone.
+    /// Returns the loads for the solver, without contacts of a tool for bone.
     pub fn loads(&self) -> &Loads {
         &self.loads
     }

@@ -1,9 +1,9 @@
-//! What the burr does to the bone from stroke to stroke: what is left ahead, when it comes through.
+//! Strokes of the burr: their beginning and end, the remaining bone, and breakthrough.
 //!
 //! # Practice
-//! A stroke begins when the pedal goes down. The burr comes through once in a stroke, where it
-//! opens the bone and nothing is left ahead: a hole beside bone that is still ahead is a pore. What
-//! undoing gives back is `undo.rs`'s.
+//! A stroke begins when the pedal is pressed. Breakthrough is counted once per stroke, where the
+//! burr opens the bone and no bone is left ahead: with bone ahead the hole is a pore. Undoing is in
+//! `undo.rs`.
 
 use crate::stages::ahead::bone_ahead_mm;
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3};
@@ -11,12 +11,12 @@ use trepan_rigid::RigidStep;
 use trepan_rigid::spindle::Spindle;
 use trepan_volume::BoneVolume;
 
-/// Bone this thin ahead of the burr is worth a warning, mm.
+/// Remaining bone under which a warning is raised, mm.
 pub(crate) const THIN_MM: f32 = 1.0;
-/// Bone this thin is about to give way, mm.
+/// Remaining bone at which the burr is about to break through, mm.
 pub(crate) const BREAK_MM: f32 = 0.3;
 
-/// The stroke at hand.
+/// The present stroke.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Drill {
     drilled: bool,
@@ -25,8 +25,7 @@ pub(crate) struct Drill {
 }
 
 impl Drill {
-    /// Begins a stroke when the pedal goes down, and ends it when it comes up. Returns whether one
-    /// began.
+    /// Begins and ends strokes as drilling starts and stops; returns whether one began.
     pub fn stroke(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool) -> bool {
         let begins = drilling && !self.drilled;
         if begins {
@@ -40,12 +39,12 @@ impl Drill {
         begins
     }
 
-    /// Whether the clutch of a perforator lets go: once it is through, until the pedal is up.
+    /// Whether a perforator's clutch is disengaged: after breakthrough until the pedal is released.
     pub fn lets_go(&self) -> bool {
         self.through
     }
 
-    /// Whether the burr has come through the bone for the first time in its stroke.
+    /// Whether the burr comes through the bone in this step, for the first time in its stroke.
     pub fn came_through(&mut self, step: &RigidStep, ahead_mm: f32) -> bool {
         let first = step.broke_through && ahead_mm <= BREAK_MM && !self.through;
         self.through |= first;
@@ -53,11 +52,11 @@ impl Drill {
     }
 }
 
-/// Farthest that is looked ahead, mm.
+/// Largest remaining bone that is measured, mm.
 pub(crate) const REACH_MM: f32 = 2.0;
 
-/// Bone left ahead of a burr that cuts, along its axis or where it is pressed to, mm, at most
-/// [`REACH_MM`].
+/// Returns the remaining bone ahead of a cutting burr, mm, at most [`REACH_MM`]: the smaller value
+/// along its axis and along the direction of pressing.
 pub(crate) fn remaining_thickness_mm(bone: &BoneVolume, world_from_tool: Pose, tool: &Tool, normal: Vec3) -> f32 {
     let ahead = |way: Vec3| {
         let front = world_from_tool.translation + tool.tip_radius_mm * way;
@@ -66,8 +65,8 @@ pub(crate) fn remaining_thickness_mm(bone: &BoneVolume, world_from_tool: Pose, t
     ahead(world_from_tool.rotation * Vec3::NEG_Z).min(ahead(-normal))
 }
 
-/// Speed of the spindle, 1/min: free in air, as the load lets it in bone; 0 without one or when it
-/// rests.
+/// Returns the speed of the spindle, 1/min: the free speed in air, reduced by the load in bone, 0
+/// while not drilling.
 pub(crate) fn spindle_rpm(spindle: Option<Spindle>, step: &RigidStep, drilling: bool) -> f32 {
     match spindle {
         Some(_) if drilling && step.manifold.touches() => step.spindle_rpm,
@@ -105,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn it_comes_through_once_in_a_stroke_and_not_into_a_pore() {
+    fn breakthrough_counts_once_per_stroke_and_not_into_a_pore() {
         let (bone, mut drill) = (slab(), Drill::default());
         let open = RigidStep { broke_through: true, ..RigidStep::default() };
         drill.stroke(&bone, &pressed(&[Buttons::PEDAL]), true);

@@ -1,42 +1,42 @@
-//! After a device's fault its force waits for a deliberate act of the hand.
+//! Keeps the force off after a fault of the device until a deliberate action of the user.
 //!
 //! # Theory
 //! ```text
-//! lost, or stale for 100 ms ─→ waits ─→ a button pressed anew, or nothing touched for 200 ms ─→ force again
+//! lost, or stale for 100 ms ─→ off ─→ button pressed anew, or no contact for 200 ms ─→ on
 //! ```
-//! The hand may have let the device go meanwhile, or rest somewhere else: a force that comes back
-//! by itself would push what it does not expect. A button that was down before, or went down while
-//! nothing could be read, is no act.
+//! The user may have released or moved the device meanwhile: a force that returned by itself would
+//! be unexpected. A button that was down before, or was pressed while the device could not be read,
+//! does not count.
 //!
 //! # Practice
-//! While it waits nothing drills either. The guard lets go and ramps in anew. A device that has
-//! never been there waits for nothing.
+//! While the force is off nothing drills either. The guard fades the force out and ramps it in
+//! again. A device that has never given a pose has no fault.
 
 use trepan_geometry::{Buttons, ToolState};
 
-/// Stale for longer than this, a device counts as gone, ms.
+/// Time of stale readings after which the device has a fault, ms.
 const LONG_MS: f32 = 100.0;
-/// So long the tool must touch nothing, ms.
+/// Time without contact after which the force returns, ms.
 const CLEAR_MS: f32 = 200.0;
 
-/// What a tick of a device was like.
+/// Status of the device and its tool in a tick.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
-    /// The device is gone.
+pub(crate) struct DeviceStatus {
+    /// The device is lost.
     pub lost: bool,
-    /// It gave no fresh pose.
+    /// The device gave no fresh pose.
     pub stale: bool,
     /// The tool touches something.
     pub touches: bool,
 }
 
-/// Whether the force waits.
+/// State of the force after faults of a device.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct AfterFault {
     waits: bool,
     /// Whether the device has ever given a pose.
     known: bool,
-    /// Whether it gave one in the last tick.
+    /// Whether it gave a pose in the last tick.
     fresh: bool,
     stale_ms: f32,
     clear_ms: f32,
@@ -44,22 +44,22 @@ pub(crate) struct AfterFault {
 }
 
 impl AfterFault {
-    /// Whether the force waits.
+    /// Whether the force is off and waits for an action of the user.
     pub fn waits(&self) -> bool {
         self.waits
     }
 
-    /// One tick of `dt_ms`; says when it begins to wait (`true`) and when it ends.
-    pub fn tick(&mut self, tool: &ToolState, seen: Seen, dt_ms: f32) -> Option<bool> {
+    /// Runs a tick of `dt_ms`; returns a change: `true` when the force is switched off.
+    pub fn tick(&mut self, tool: &ToolState, status: DeviceStatus, dt_ms: f32) -> Option<bool> {
         let before = self.waits;
-        if seen.stale || seen.lost {
+        if status.stale || status.lost {
             (self.fresh, self.clear_ms) = (false, 0.0);
             self.stale_ms += dt_ms;
-            self.waits |= self.known && (seen.lost || self.stale_ms > LONG_MS);
+            self.waits |= self.known && (status.lost || self.stale_ms > LONG_MS);
         } else {
             let buttons = tool.buttons.0 & !Buttons::PAUSE.0;
             let pressed = self.fresh && buttons & !self.buttons != 0;
-            self.clear_ms = if seen.touches { 0.0 } else { self.clear_ms + dt_ms };
+            self.clear_ms = if status.touches { 0.0 } else { self.clear_ms + dt_ms };
             self.waits &= !pressed && self.clear_ms < CLEAR_MS;
             (self.known, self.fresh, self.stale_ms, self.buttons) = (true, true, 0.0, buttons);
         }
@@ -79,12 +79,12 @@ mod tests {
     impl Hand {
         fn run(&mut self, ticks: usize, buttons: Buttons, lost: bool, stale: bool, touches: bool) -> Vec<bool> {
             let tool = ToolState { buttons, ..ToolState::at(Pose::IDENTITY) };
-            (0..ticks).filter_map(|_| self.0.tick(&tool, Seen { lost, stale, touches }, 1.0)).collect()
+            (0..ticks).filter_map(|_| self.0.tick(&tool, DeviceStatus { lost, stale, touches }, 1.0)).collect()
         }
     }
 
     #[test]
-    fn it_waits_after_a_loss_until_a_button_is_pressed_anew_or_the_tool_is_clear() {
+    fn after_a_loss_the_force_is_off_until_a_button_is_pressed_anew_or_the_tool_is_clear() {
         let (none, pedal) = (Buttons(0), Buttons::PEDAL);
         let mut hand = Hand(AfterFault::default());
         assert_eq!(hand.run(500, none, true, true, false), NOTHING, "it was never there");

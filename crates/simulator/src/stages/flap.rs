@@ -1,104 +1,111 @@
-//! The planned bone flap: found free after the stroke that frees it, lifted away and put back.
+//! The planned bone flap: detects when it is cut free, lifts it and puts it back.
 //!
 //! # Practice
-//! After each stroke of a cutting tool the bone in the middle of the flap is flooded, a few hundred
-//! voxels a tick, while nothing cuts ([`FlapSearch`]). Lifting and putting back write as many
-//! voxels a tick as fit beside the rest of it. All of it is a function of the ticks: a replay lifts
-//! the same voxels. Bone of less than the isovalue at the flap's rim stays where it is.
+//! After each stroke of a cutting tool a flood fill starts in the middle of the flap. It visits a
+//! few hundred voxels per tick while nothing cuts ([`FlapSearch`]). Lifting and putting back write
+//! a fixed number of voxels per tick. Everything depends on the ticks alone, so a replay lifts the
+//! same voxels. Bone under the isovalue at the flap's rim is not lifted.
 
 use crate::stages::notice::What;
 use trepan_geometry::Buttons;
 use trepan_volume::{AIR_HU, BoneVolume, FlapSearch, FlapState};
 
-/// Voxels flooded in a tick: some 15 us.
+/// Voxels visited by the flood fill in a tick: some 15 us.
 const FLOODED: usize = 300;
 /// Voxels written in a tick.
 const WRITTEN: usize = 256;
 
-/// Where the flap is.
+/// State of the flap.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum At {
-    /// On the skull.
+enum State {
+    /// Attached to the skull.
     Skull,
-    /// Being looked at.
+    /// The flood fill runs.
     Searched,
     /// Cut free, in its place.
     Cut,
-    /// On its way out; so many voxels are gone.
+    /// Being lifted; the number of removed voxels.
     Lifting(usize),
-    /// Away.
+    /// Lifted.
     Away,
-    /// On its way back; so many voxels are back.
+    /// Being put back; the number of restored voxels.
     Returning(usize),
 }
 
-/// The flap of one operation.
+/// The flap of an operation.
 #[derive(Clone, Debug)]
 pub(crate) struct Flap {
     search: FlapSearch,
-    at: At,
+    at: State,
     densities: Vec<i16>,
     stroke: bool,
-    asked: bool,
-    told: bool,
+    was_requested: bool,
+    reported: bool,
 }
 
 impl Flap {
-    /// A flap that hangs on the skull. Takes all memory.
+    /// Makes a flap attached to the skull; allocates all memory.
     pub fn new(search: FlapSearch) -> Self {
-        Self { search, at: At::Skull, densities: Vec::with_capacity(1 << 20), stroke: false, asked: false, told: false }
-    }
-
-    /// Whether it is away.
-    pub fn is_away(&self) -> bool {
-        self.at == At::Away
-    }
-
-    /// Whether it is on its way: no stroke may come back then.
-    pub fn moves(&self) -> bool {
-        matches!(self.at, At::Lifting(_) | At::Returning(_))
-    }
-
-    /// Takes note of bone that came back: the flap may hang on the skull again.
-    pub fn bone_came_back(&mut self) {
-        self.stroke = true;
-        if matches!(self.at, At::Searched | At::Cut) {
-            self.at = At::Skull;
+        Self {
+            search,
+            at: State::Skull,
+            densities: Vec::with_capacity(1 << 20),
+            stroke: false,
+            was_requested: false,
+            reported: false,
         }
     }
 
-    /// One tick, after the bone was touched; `cut`: whether bone was removed in it, `free`: whether
-    /// the tool touches nothing. Says what happened.
+    /// Whether it is lifted.
+    pub fn is_away(&self) -> bool {
+        self.at == State::Away
+    }
+
+    /// Whether it is being lifted or put back: no stroke can be undone meanwhile.
+    pub fn moves(&self) -> bool {
+        matches!(self.at, State::Lifting(_) | State::Returning(_))
+    }
+
+    /// Starts a new search after bone was restored: the flap may be attached again.
+    pub fn bone_came_back(&mut self) {
+        self.stroke = true;
+        if matches!(self.at, State::Searched | State::Cut) {
+            self.at = State::Skull;
+        }
+    }
+
+    /// Runs a tick, after the contact with bone; returns a notice. `cut`: bone was removed in this
+    /// tick, `free`: the tool touches nothing.
     pub fn tick(&mut self, bone: &BoneVolume, buttons: Buttons, drilling: bool, cut: bool, free: bool) -> Option<What> {
-        let asks = buttons.has(Buttons::FLAP);
-        let before = std::mem::replace(&mut self.asked, asks);
-        let asked = asks && !before && free && !drilling;
+        let pressed = buttons.has(Buttons::FLAP);
+        let before = std::mem::replace(&mut self.was_requested, pressed);
+        let requested = pressed && !before && free && !drilling;
         self.stroke |= cut;
         match self.at {
-            At::Skull | At::Searched | At::Cut if drilling => {
-                self.at = if self.at == At::Cut && !cut { At::Cut } else { At::Skull };
+            State::Skull | State::Searched | State::Cut if drilling => {
+                self.at = if self.at == State::Cut && !cut { State::Cut } else { State::Skull };
                 None
             }
-            At::Skull if self.stroke => {
+            State::Skull if self.stroke => {
                 self.stroke = false;
                 self.search.restart();
-                self.at = At::Searched;
+                self.at = State::Searched;
                 None
             }
-            At::Skull => asked.then_some(What::FlapHangs),
-            At::Searched => self.look(bone, asked),
-            At::Cut if asked => {
+            State::Skull => requested.then_some(What::FlapHangs),
+            State::Searched => self.look(bone, requested),
+            State::Cut if requested => {
                 self.densities.clear();
-                self.at = At::Lifting(0);
+                self.at = State::Lifting(0);
                 None
             }
-            At::Cut => None,
-            At::Lifting(done) => self.lift(bone, done),
-            At::Away => {
-                self.at = if asked { At::Returning(0) } else { At::Away };
+            State::Cut => None,
+            State::Lifting(done) => self.lift(bone, done),
+            State::Away => {
+                self.at = if requested { State::Returning(0) } else { State::Away };
                 None
             }
-            At::Returning(done) => self.put_back(bone, done),
+            State::Returning(done) => self.put_back(bone, done),
         }
     }
 
@@ -106,16 +113,16 @@ impl Flap {
         self.search.voxels() as f32 * bone.voxel_mm3()
     }
 
-    fn look(&mut self, bone: &BoneVolume, asked: bool) -> Option<What> {
+    fn look(&mut self, bone: &BoneVolume, requested: bool) -> Option<What> {
         match self.search.step(bone, FLOODED) {
             FlapState::NotYet => None,
             FlapState::Hanging => {
-                (self.at, self.told) = (At::Skull, false);
-                asked.then_some(What::FlapHangs)
+                (self.at, self.reported) = (State::Skull, false);
+                requested.then_some(What::FlapHangs)
             }
             FlapState::Free => {
-                self.at = At::Cut;
-                (!std::mem::replace(&mut self.told, true)).then(|| What::FlapFree(self.mm3(bone)))
+                self.at = State::Cut;
+                (!std::mem::replace(&mut self.reported, true)).then(|| What::FlapFree(self.mm3(bone)))
             }
         }
     }
@@ -128,7 +135,7 @@ impl Flap {
             bone.set_hu(voxel, AIR_HU);
         }
         let whole = end == self.search.voxels().min(self.densities.capacity());
-        self.at = if whole { At::Away } else { At::Lifting(end) };
+        self.at = if whole { State::Away } else { State::Lifting(end) };
         whole.then(|| What::FlapLifted(self.mm3(bone)))
     }
 
@@ -137,7 +144,7 @@ impl Flap {
         (done..end).for_each(|at| bone.set_hu(self.search.voxel(at), self.densities[at]));
         bone.came_back();
         let whole = end == self.densities.len();
-        self.at = if whole { At::Cut } else { At::Returning(end) };
+        self.at = if whole { State::Cut } else { State::Returning(end) };
         whole.then_some(What::FlapReturned)
     }
 }
@@ -180,7 +187,7 @@ mod tests {
         assert_eq!(bone.undo_stroke(), trepan_volume::Undone::Nothing);
         assert_eq!(bone.snapshot(), cut);
         assert!(bone.undone() > 0, "who feels the bone must look anew");
-        assert_eq!(run(&mut flap, 50, Buttons::PEDAL, true, true), [], "told once");
+        assert_eq!(run(&mut flap, 50, Buttons::PEDAL, true, true), [], "reported once");
         assert_eq!(run(&mut flap, 50, none, false, false), []);
     }
 }

@@ -1,25 +1,25 @@
-//! One haptic tick: a device's pose in, a guarded wrench and a record out.
+//! One haptic tick: takes a device's pose, returns a guarded wrench and a record.
 //!
 //! # Theory
 //! ```text
 //! device pose → bone contact (proxy, drilling) ─╮
 //! newest surface patch → tissue depth ──────────┴→ force models → force guard → wrench
 //! ```
-//! The seven steps of rigid handling (thesis, 3.2 to 3.4) run inside [`RigidContact`]; tissue is
-//! felt through the tangent plane of the last collision result at the tick's own pose, so that a
-//! slow collision thread costs sharpness, not stability. A patch that grows old fades: full force
-//! up to [`FRESH_MS`], none after [`GONE_MS`].
+//! The seven steps of rigid handling (thesis, 3.2 to 3.4) run inside [`RigidContact`]. The force of
+//! tissue comes from the tangent plane of the last collision result, evaluated at the tick's pose:
+//! a slow collision thread reduces accuracy, not stability. The force of an old patch fades: full
+//! force up to [`FRESH_MS`], none after [`GONE_MS`].
 //!
 //! # Practice
-//! The stage has no clock and no device: the same readings and patches give the same wrenches, bit
-//! for bit, live or in a replay. A tick does not allocate, lock, log or panic.
+//! The stage has no clock and no device: the same readings and patches give wrenches equal bit for
+//! bit, live or in a replay. A tick does not allocate, lock, log or panic.
 
-mod asked;
+mod requests;
 
 use crate::program::{Phase, Program};
-use crate::stages::alarms::{Feed, Limits, Signs};
+use crate::stages::alarms::{Feed, Limits, WarningInputs};
 use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm, spindle_rpm};
-use crate::stages::fault::{AfterFault, Seen};
+use crate::stages::fault::{AfterFault, DeviceStatus};
 use crate::stages::flap::Flap;
 use crate::stages::notice::{Notice, Watch, What};
 use crate::stages::score::ScoreKeeper;
@@ -34,89 +34,89 @@ use trepan_link::wire::TickRecord;
 use trepan_rigid::{Method, RigidContact, RigidStep};
 use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
 
-/// Up to this age a patch gives its full force, ms.
+/// Age up to which a patch gives its full force, ms.
 pub const FRESH_MS: f32 = 10.0;
-/// From this age on a patch gives no force, ms.
+/// Age from which a patch gives no force, ms.
 pub const GONE_MS: f32 = 60.0;
 
-/// What a haptic stage is built from.
+/// Configuration of a haptic stage.
 #[derive(Clone, Debug)]
 pub struct HapticConfig {
-    /// Phases and their order.
+    /// Program: its phases and tools.
     pub program: Program,
-    /// How bone is touched.
+    /// Method of contact with bone.
     pub rigid: Method,
     /// Length of a tick, ms.
     pub dt_ms: f32,
-    /// Force of bone: k in N/mm, b in N ms/mm, with the buzz of the drill.
+    /// Force of bone: k in N/mm, b in N ms/mm, with the vibration of the drill.
     pub bone_force: Vibration<Viscoelastic>,
     /// Force of tissue: k in N/mm, b in N ms/mm.
     pub tissue_force: Viscoelastic,
-    /// Limits of the hand.
+    /// Configuration of the force guard.
     pub guard: GuardConfig,
-    /// At what the trainee is warned.
+    /// Thresholds of the warnings.
     pub limits: Limits,
-    /// Whether tools for the brain wait until the bone is open.
+    /// Whether tools for the brain require an open bone.
     pub opening_needed: bool,
-    /// Whether the force waits for a deliberate act after a fault of the device.
+    /// Whether the force stays off after a fault of the device until a deliberate action.
     pub force_waits: bool,
 }
 
-/// What one tick is given.
+/// Inputs of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct TickInput<'a> {
     /// Number of the tick, from 1.
     pub tick: u64,
-    /// What the device said.
+    /// Reading of the device.
     pub reading: Reading,
     /// The newest collision result.
     pub patch: &'a SurfacePatch,
     /// Its sequence number; 0 before the first.
     pub patch_seq: u64,
-    /// Where the second hand's tool was after the last tick; `None` without one.
+    /// Pose of the second hand's tool after the last tick; `None` without one.
     pub second: Option<Pose>,
 }
 
-/// The tool as the other threads see it.
+/// The tool as sent to the other threads.
 #[derive(Clone, Copy, Debug)]
 pub struct ToolSample {
-    /// Tick that made it.
+    /// Number of the tick.
     pub tick: u64,
-    /// The tool where contact lets it be, moving as it really moved.
+    /// State with the pose of the proxy; at rest while it touches bone.
     pub state: ToolState,
-    /// The tool in the hand.
+    /// The present tool.
     pub tool: Tool,
-    /// Its place in the tray.
+    /// Its slot in the tray.
     pub slot: usize,
-    /// Whether the burr turns.
+    /// Whether the tool cuts.
     pub drilling: bool,
 }
 
 impl ToolSample {
-    /// The phase, which is that of the tool in the hand.
+    /// Returns the phase of the present tool.
     pub fn phase(&self) -> Phase {
         Phase::of(&self.tool)
     }
 }
 
-/// What one tick gives.
+/// Results of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Tick {
     /// For the device.
     pub wrench: GuardedWrench,
     /// For the other threads.
     pub sample: ToolSample,
-    /// For the recording; the time it took is the caller's to fill in.
+    /// For the recording; the caller sets the compute time.
     pub record: TickRecord,
-    /// The standing warnings, bits as in [`Warning::ALL`](crate::Warning::ALL).
+    /// Active warnings, bits as in [`Warning::ALL`](crate::Warning::ALL).
     pub warnings: u32,
 }
 
-/// What bone and tissue want the hand to feel.
+/// Desired wrenches of bone and tissue, before the guard.
 #[derive(Clone, Copy, Debug, Default)]
 struct DesiredWrench {
     bone: Wrench,
-    /// `None` where tissue only warns.
+    /// `None` where tissue only causes warnings.
     tissue: Option<Wrench>,
 }
 
@@ -125,15 +125,15 @@ impl DesiredWrench {
         self.tissue.map_or(self.bone, |tissue| self.bone + tissue)
     }
 
-    /// The tissue's part of the force that the guard let through, N: shortened as the sum was.
+    /// Returns the tissue's part of the guarded force, N, scaled as the sum was.
     fn tissue_within(&self, given: Vec3) -> Vec3 {
-        let wanted_n = self.sum().force.length();
-        let share = if wanted_n > 0.0 { (given.length() / wanted_n).min(1.0) } else { 1.0 };
+        let desired_n = self.sum().force.length();
+        let share = if desired_n > 0.0 { (given.length() / desired_n).min(1.0) } else { 1.0 };
         share * self.tissue.unwrap_or_default().force
     }
 }
 
-/// The state that lives from tick to tick.
+/// State of the first hand.
 pub struct HapticStage {
     config: HapticConfig,
     bone: Option<Arc<BoneVolume>>,
@@ -146,11 +146,11 @@ pub struct HapticStage {
     guard: ForceGuard,
     watch: Watch,
     scores: ScoreKeeper,
-    held: ToolState,
+    last_valid: ToolState,
     proxy: Pose,
     drill: Drill,
     undo: Undo,
-    /// Times that the burr came through, less those that were undone.
+    /// Number of strokes that came through, without those undone.
     holes: u32,
     feed: Feed,
     flap: Option<Flap>,
@@ -159,8 +159,8 @@ pub struct HapticStage {
 }
 
 impl HapticStage {
-    /// A stage with the tool at `start`. Without bone nothing rigid is felt; without a brain
-    /// nothing warns of it.
+    /// Makes a stage with the tool at `start`. Without bone there is no rigid contact; without a
+    /// brain there are no warnings of it.
     pub fn new(
         config: HapticConfig,
         bone: Option<Arc<BoneVolume>>,
@@ -189,7 +189,7 @@ impl HapticStage {
             tissue: ContactManifold::default(),
             watch: Watch::default(),
             scores: ScoreKeeper::default(),
-            held: start,
+            last_valid: start,
             proxy,
             drill: Drill::default(),
             undo: Undo::default(),
@@ -201,46 +201,46 @@ impl HapticStage {
         }
     }
 
-    /// With a flap that can be lifted once it is cut free.
+    /// Adds a flap that can be lifted once it is cut free.
     pub fn with_flap(self, search: FlapSearch) -> Self {
         Self { flap: Some(Flap::new(search)), ..self }
     }
 
-    /// With structures that no tool may come close to, as the distance to them.
+    /// Adds the distance field of structures that no tool may come close to.
     pub fn forbidding(self, forbidden: Arc<DistanceField>) -> Self {
         Self { forbidden: Some(forbidden), ..self }
     }
 
-    /// The tick, in the order of its parts.
-    pub fn tick(&mut self, input: &TickInput<'_>, tell: &mut dyn FnMut(Notice)) -> Tick {
+    /// Runs a tick; notices go to `notify`.
+    pub fn tick(&mut self, input: &TickInput<'_>, notify: &mut dyn FnMut(Notice)) -> Tick {
         let (tool, stale) = self.last_valid_state(&input.reading);
-        self.change_tool(&tool, input.tick, tell);
+        self.change_tool(&tool, input.tick, notify);
         let drilling = self.drills(&tool);
-        let back_mm3 = self.undo(&tool, drilling, input.second, input.tick, tell);
+        let back_mm3 = self.undo(&tool, drilling, input.second, input.tick, notify);
         self.touch_bone(&tool, drilling);
-        self.follow_flap(&tool, drilling, input.tick, tell);
+        self.follow_flap(&tool, drilling, input.tick, notify);
         let ahead_mm = self.bone_ahead(drilling);
         let sample = self.sample(&tool, input.tick, drilling);
-        let held = self.touch_tissue(input.patch, &sample);
+        let stale_patch = self.touch_tissue(input.patch, &sample);
         let lost = input.reading.status == Status::Lost;
-        self.follow_fault(&tool, (lost, stale), input.tick, tell);
+        self.follow_fault(&tool, (lost, stale), input.tick, notify);
         let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
-        let wanted = if let_go { DesiredWrench::default() } else { self.desired_wrench(&tool, drilling) };
+        let desired = if let_go { DesiredWrench::default() } else { self.desired_wrench(&tool, drilling) };
         let heated = self.guard.counters().heated;
-        let wrench = self.guard.guard(wanted.sum(), &tool, self.config.dt_ms);
+        let wrench = self.guard.guard(desired.sum(), &tool, self.config.dt_ms);
         let warm = self.guard.counters().heated > heated;
-        let mut record = self.record(input, &tool, &sample, wrench, held, stale, wanted);
+        let mut record = self.record(input, &tool, &sample, wrench, stale_patch, stale, desired);
         record.removed_mm3 -= back_mm3;
-        let signs = self.signs(&record, &sample, ahead_mm, input.patch, (wanted, warm));
-        for (warning, present, value) in signs.causes(&record, &self.config.limits) {
-            if let Some(what) = self.watch.tell(warning, present, value, record.time_ms) {
-                tell(Notice { tick: record.tick, time_ms: record.time_ms, what });
+        let inputs = self.warning_inputs(&record, &sample, ahead_mm, input.patch, (desired, warm));
+        for (warning, present, value) in inputs.causes(&record, &self.config.limits) {
+            if let Some(what) = self.watch.update(warning, present, value, record.time_ms) {
+                notify(Notice { tick: record.tick, time_ms: record.time_ms, what });
             }
         }
         if self.drill.came_through(&self.bone_step, ahead_mm) {
             record.flags |= TickRecord::THROUGH;
             self.count_hole();
-            tell(Notice { tick: input.tick, time_ms: tool.time_ms, what: What::Through });
+            notify(Notice { tick: input.tick, time_ms: tool.time_ms, what: What::Through });
         }
         self.scores.add(&record);
         Tick { wrench, sample, record, warnings: self.watch.standing() }
@@ -257,51 +257,57 @@ impl HapticStage {
         self.guard.is_at_rest()
     }
 
-    /// The phase, which is that of the tool in the hand.
+    /// Returns the phase of the present tool.
     pub fn phase(&self) -> Phase {
         self.tray.phase()
     }
 
-    /// The scores so far.
+    /// Returns the scores so far.
     pub fn scores(&self) -> &ScoreKeeper {
         &self.scores
     }
 
-    /// What the force guard had to do.
+    /// Returns the force guard.
     pub fn guard(&self) -> &ForceGuard {
         &self.guard
     }
 
-    /// Speed of the spindle in a tick, 1 at its free speed.
+    /// Returns the speed of the spindle in a tick over its free speed.
     pub fn spindle_share(&self, record: &TickRecord) -> f32 {
         self.config.rigid.removal().spindle().map_or(0.0, |spindle| record.spindle_rpm / spindle.free_rpm)
     }
 
-    /// The reading, or the last sound one when the device gave nothing usable.
+    /// Returns the reading, or the last valid one and `true` if the device gave no usable pose.
     fn last_valid_state(&mut self, reading: &Reading) -> (ToolState, bool) {
         let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
         if fresh {
-            self.held = reading.tool;
+            self.last_valid = reading.tool;
         } else {
-            self.held.time_ms = reading.tool.time_ms;
-            self.held.twist = Default::default();
+            self.last_valid.time_ms = reading.tool.time_ms;
+            self.last_valid.twist = Default::default();
         }
-        (self.held, !fresh)
+        (self.last_valid, !fresh)
     }
 
-    /// Lets the force go where the device is gone, and come back by a deliberate act only.
-    fn follow_fault(&mut self, tool: &ToolState, (lost, stale): (bool, bool), tick: u64, tell: &mut dyn FnMut(Notice)) {
+    /// Switches the force off after a fault of the device until a deliberate action of the user.
+    fn follow_fault(
+        &mut self,
+        tool: &ToolState,
+        (lost, stale): (bool, bool),
+        tick: u64,
+        notify: &mut dyn FnMut(Notice),
+    ) {
         if !self.config.force_waits {
             return;
         }
-        let seen = Seen { lost, stale, touches: !self.is_free() };
-        let Some(waits) = self.fault.tick(tool, seen, self.config.dt_ms) else { return };
+        let status = DeviceStatus { lost, stale, touches: !self.is_free() };
+        let Some(waits) = self.fault.tick(tool, status, self.config.dt_ms) else { return };
         match waits {
             true => self.guard.release(),
             false if !self.released => self.guard.resume(),
             false => {}
         }
-        tell(Notice { tick, time_ms: tool.time_ms, what: What::Force { waits, second: false } });
+        notify(Notice { tick, time_ms: tool.time_ms, what: What::Force { waits, second: false } });
     }
 
     fn tool(&self) -> Tool {
@@ -321,13 +327,13 @@ impl HapticStage {
         }
     }
 
-    /// Takes note of a hole through the bone.
+    /// Counts a hole through the bone.
     fn count_hole(&mut self) {
         self.holes += 1;
         self.bone.iter().for_each(|bone| self.undo.newest(bone).through += 1);
     }
 
-    /// Speed of the spindle, 1/min.
+    /// Returns the speed of the spindle, 1/min.
     fn spindle_rpm(&self, drilling: bool) -> f32 {
         spindle_rpm(self.config.rigid.removal().spindle(), &self.bone_step, drilling)
     }
@@ -340,7 +346,8 @@ impl HapticStage {
         ToolSample { tick, state, tool: self.tool(), slot: self.tray.slot(), drilling }
     }
 
-    /// Tissue at the present pose; true when the patch is older than fresh.
+    /// Sets the contact with tissue at the present pose; returns whether the patch in contact is
+    /// stale.
     fn touch_tissue(&mut self, patch: &SurfacePatch, sample: &ToolSample) -> bool {
         self.tissue.clear();
         let age_ms = (sample.state.time_ms - patch.time_ms) as f32;
@@ -355,8 +362,8 @@ impl HapticStage {
         age_ms > FRESH_MS
     }
 
-    /// Bone always pushes; tissue pushes in its own phase only (thesis 6.4: while drilling it only
-    /// warns).
+    /// Returns the desired wrenches of bone, and of tissue in the brain phase only (thesis 6.4:
+    /// while drilling, tissue only causes warnings).
     fn desired_wrench(&mut self, tool: &ToolState, drilling: bool) -> DesiredWrench {
         let free = self.config.rigid.removal().spindle().map_or(f32::INFINITY, |spindle| spindle.free_rpm);
         self.config.bone_force.turn(self.spindle_rpm(drilling) / free);
@@ -373,13 +380,13 @@ impl HapticStage {
         tool: &ToolState,
         sample: &ToolSample,
         wrench: GuardedWrench,
-        held: bool,
+        stale_patch: bool,
         stale: bool,
-        wanted: DesiredWrench,
+        desired: DesiredWrench,
     ) -> TickRecord {
-        let clamped = wanted.sum().force.length() > self.config.guard.max_force_n;
+        let clamped = desired.sum().force.length() > self.config.guard.max_force_n;
         let bits = [
-            (held, TickRecord::HELD),
+            (stale_patch, TickRecord::HELD),
             (clamped, TickRecord::CLAMPED),
             (sample.drilling, TickRecord::DRILLING),
             (stale, TickRecord::STALE),
@@ -396,7 +403,7 @@ impl HapticStage {
             buttons: input.reading.tool.buttons.0,
             proxy: self.proxy,
             wrench: wrench.wrench(),
-            tissue_force: wanted.tissue_within(wrench.force()),
+            tissue_force: desired.tissue_within(wrench.force()),
             contact_normal: if bone.touches() { bone.normal } else { self.tissue.normal },
             depth_mm: bone.depth_mm,
             tissue_depth_mm: self.tissue.depth_mm,
@@ -411,10 +418,10 @@ impl HapticStage {
         }
     }
 
-    /// Bone left ahead of a burr that cuts, mm; infinite when it does not.
+    /// Returns the remaining bone ahead of a cutting burr, mm; infinite if it does not cut.
     fn bone_ahead(&self, drilling: bool) -> f32 {
         match &self.bone {
-            // A craniotome's foot runs under the bone and keeps what lies there.
+            // A craniotome's foot runs under the bone and protects the dura.
             Some(bone) if drilling && self.tool().cutting_mm == 0.0 && self.bone_step.manifold.touches() => {
                 remaining_thickness_mm(bone, self.proxy, &self.tool(), self.bone_step.manifold.normal)
             }
@@ -422,9 +429,9 @@ impl HapticStage {
         }
     }
 
-    /// From the tool's ball to the brain's rest surface, mm; negative inside, infinite without a
-    /// brain. Of a craniotome, whose ball is a blunt foot made to run on the dura, from where its
-    /// cutting part begins above the foot.
+    /// Returns the distance from the tool's ball to the brain's rest surface, mm; negative inside,
+    /// infinite without a brain. A craniotome's ball is a blunt foot made to run on the dura: its
+    /// distance is measured from the lower end of the cutting part.
     fn brain_distance(&self, world_from_tool: Pose) -> f32 {
         let Some(field) = &self.brain else { return f32::INFINITY };
         let Tool { tip_radius_mm, cutting_mm, .. } = self.tool();
@@ -435,29 +442,29 @@ impl HapticStage {
         }
     }
 
-    /// Whether the drill stands still under its load.
+    /// Whether the drill has stalled under its load.
     fn stalls(&self, record: &TickRecord) -> bool {
         record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some()
     }
 
-    /// What this tick knows that may be worth a warning.
-    fn signs(
+    /// Returns the inputs of the warnings.
+    fn warning_inputs(
         &mut self,
         record: &TickRecord,
         sample: &ToolSample,
         ahead_mm: f32,
         patch: &SurfacePatch,
-        (wanted, warm): (DesiredWrench, bool),
-    ) -> Signs {
+        (desired, warm): (DesiredWrench, bool),
+    ) -> WarningInputs {
         let radius_mm = sample.tool.tip_radius_mm;
         let forbidden = self.forbidden.as_ref().map(|field| field.sample(sample.state.tip()) - radius_mm);
-        Signs {
+        WarningInputs {
             bare_cutter: self.phase() == Phase::Craniotomy && sample.tool.cutting_mm == 0.0,
             ahead_mm,
             breach_ms: self.feed.follow(ahead_mm, REACH_MM, self.config.dt_ms),
             tissue_n: record.tissue_n(),
             forbidden_mm: forbidden.unwrap_or(f32::INFINITY),
-            wanted_n: wanted.sum().force.length(),
+            desired_n: desired.sum().force.length(),
             stalled: self.stalls(record),
             age_ms: (record.time_ms - patch.time_ms) as f32,
             warm,

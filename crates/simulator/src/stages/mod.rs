@@ -1,4 +1,4 @@
-//! The bodies of the three loops, without clocks or threads.
+//! Bodies of the three loops, without clocks or threads.
 
 pub(crate) mod ahead;
 pub(crate) mod alarms;

@@ -1,8 +1,8 @@
-//! How the tip moved: path, idle time and smoothness, alike at any rate of ticks.
+//! Motion of the tip: path, idle time and smoothness, independent of the tick rate.
 //!
 //! # Theory
-//! The mean place of the tip is taken over even windows of time, linear between two ticks, so that
-//! neither the rate nor an encoder's noise counts. Over windows of 20 ms:
+//! The position of the tip is averaged over equal windows of time, linear between two ticks, so
+//! that neither tick rate nor encoder noise affects it. Over windows of 20 ms:
 //!
 //! ```text
 //! path = Σ |xₖ₊₁ - xₖ|          idle = time with |xₖ₊₁ - xₖ| / h < 5 mm/s
@@ -15,23 +15,24 @@
 //! log dimensionless jerk = -ln( T³ / v_peak² · Σ |j|² h )
 //! ```
 //!
-//! More is smoother: -5.32 = -ln(720/1.875²) for one movement of least jerk, however long and far;
-//! every halt and turn lowers it. What moves faster than 5 Hz, as tremor does, is not in it.
+//! A larger value is smoother. One minimum-jerk movement of any length and duration has
+//! -5.32 = -ln(720/1.875²); every stop and turn lowers it. Motion above 5 Hz, such as tremor, is
+//! filtered out.
 //!
 //! # Sources
-//! Log dimensionless jerk: Balasubramanian, Melendez-Calderon and Burdet 2012. Least jerk: Flash
-//! and Hogan 1985. The limit of idleness is ours.
+//! Log dimensionless jerk: Balasubramanian, Melendez-Calderon and Burdet 2012. Minimum jerk: Flash
+//! and Hogan 1985. The speed limit of idle time was chosen here.
 
 use glam::DVec3;
 use trepan_geometry::Vec3;
 
-/// Step for path and idle time, ms.
+/// Window for path and idle time, ms.
 const FINE_MS: f64 = 20.0;
-/// Step for smoothness, ms.
+/// Window for smoothness, ms.
 const COARSE_MS: f64 = 100.0;
-/// Slower than this the tip is idle, mm/s.
+/// Speed under which the tip is idle, mm/s.
 const IDLE_MM_S: f64 = 5.0;
-/// After a pause in the ticks of more than this the movement begins anew, ms.
+/// Pause between two ticks from which a new movement begins, ms.
 const PAUSE_MS: f64 = 1000.0;
 
 /// Sums over a movement.
@@ -44,7 +45,7 @@ pub(crate) struct Motion {
     fine: Grid,
     last: Option<DVec3>,
     coarse: Grid,
-    /// The newest places on the coarse grid, the oldest first, and how many there are.
+    /// Newest mean positions on the coarse grid, the oldest first; `known` is their number.
     places: [DVec3; 4],
     known: usize,
     /// Steps of the coarse grid.
@@ -54,17 +55,17 @@ pub(crate) struct Motion {
     jerk2: f64,
 }
 
-/// Windows of time, one after the other, with the mean place in each.
+/// Consecutive windows of time, with the mean position in each.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Grid {
     before: Option<(f64, DVec3)>,
-    /// End of this window, ms, and the place summed over its time so far, mm ms.
+    /// End of the present window, ms; `sum` is the position integrated over it so far, mm ms.
     end_ms: f64,
     sum: DVec3,
 }
 
 impl Motion {
-    /// Adds where the tip was at a time, ms.
+    /// Adds the position of the tip, mm, at a time, ms.
     pub fn add(&mut self, time_ms: f64, tip: Vec3) {
         let tip = tip.as_dvec3();
         let (mut fine, mut coarse) = (self.fine, self.coarse);
@@ -76,7 +77,7 @@ impl Motion {
         (self.fine, self.coarse) = (fine, coarse);
     }
 
-    /// Smoothness so far; `None` before there was any movement to speak of.
+    /// Returns the smoothness so far; `None` if it is not defined yet.
     pub fn log_dimensionless_jerk(&self) -> Option<f64> {
         let seconds = self.steps as f64 * COARSE_MS * 1e-3;
         let value = -(seconds.powi(3) / self.peak_mm_s.powi(2) * self.jerk2).ln();
@@ -110,13 +111,13 @@ impl Motion {
 }
 
 impl Grid {
-    /// Whether a place at this time comes after a pause: then all begins anew.
+    /// Whether there is a pause before this time, so that a new movement begins.
     fn breaks_off(&self, time_ms: f64) -> bool {
         self.before.is_some_and(|(before_ms, _)| time_ms - before_ms >= PAUSE_MS)
     }
 
-    /// Gives the mean places of the windows that end up to this time. A place that is not finite
-    /// and a time that does not go on are left out.
+    /// Calls `each` with the mean positions of the windows that end up to this time. Samples that
+    /// are not finite or not later than the last are ignored.
     fn add(&mut self, step_ms: f64, time_ms: f64, tip: DVec3, mut each: impl FnMut(DVec3)) {
         if !tip.is_finite() || !time_ms.is_finite() {
             return;
@@ -144,7 +145,7 @@ impl Grid {
 mod tests {
     use super::*;
 
-    /// A movement of least jerk over `mm` in `seconds`, at `hz`.
+    /// Makes a minimum-jerk movement over `mm` in `seconds`, at `hz`.
     fn least_jerk(mm: f64, seconds: f64, hz: f64) -> Motion {
         let mut motion = Motion::default();
         for n in 0..=(seconds * hz) as usize {
@@ -156,9 +157,8 @@ mod tests {
     }
 
     #[test]
-    fn least_jerk_has_its_closed_form() {
-        // The grid leaves the ends out, where the jerk is largest: 0.2 s, little of a long
-        // movement.
+    fn a_minimum_jerk_movement_has_its_closed_form() {
+        // The grid omits 0.2 s at the ends, where the jerk is largest: little of a long movement.
         for (mm, seconds) in [(100.0, 40.0), (300.0, 60.0)] {
             let motion = least_jerk(mm, seconds, 1000.0);
             assert!((motion.path_mm / mm - 1.0).abs() < 0.01, "{}", motion.path_mm);
@@ -177,7 +177,7 @@ mod tests {
         assert_eq!(Motion::default().log_dimensionless_jerk(), None);
     }
 
-    /// Twelve seconds of a curve that never repeats itself, at `hz`.
+    /// Makes twelve seconds of a curve that does not repeat, at `hz`.
     fn curve(hz: f64, mm: f64, turns_s: f64) -> Motion {
         let mut motion = Motion::default();
         for n in 0..(12.0 * hz) as usize {
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rate_of_ticks_changes_nothing() {
+    fn the_tick_rate_does_not_affect_the_scores() {
         for (mm, turns_s) in [(5.0, 0.3), (12.0, 0.55), (30.0, 0.8)] {
             let exact = curve(1000.0, mm, turns_s);
             for hz in [60.0, 87.3, 240.0, 500.0] {
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_and_nonsense_are_left_out() {
+    fn pauses_and_invalid_samples_are_ignored() {
         let mut motion = Motion::default();
         motion.add(0.0, Vec3::ZERO);
         motion.add(1.0, Vec3::NAN);

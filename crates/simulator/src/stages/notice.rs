@@ -1,45 +1,44 @@
-//! What the session says while it runs: phase and tool changes, warnings raised and cleared.
+//! Notices of a running session: changes of phase and tool, warnings raised and cleared.
 //!
 //! # Practice
-//! A notice is plain data, made inside a tick without allocation; its words are made by whoever
-//! shows it.
+//! A notice is plain data, made in a tick without allocation. Its text is made where it is shown.
 
 use crate::program::{Phase, called};
 use trepan_geometry::Tool;
 use trepan_volume::{MAX_STROKE_BRICKS, MAX_STROKES};
 
-/// A warning that can stand for a while.
+/// A warning, active while its cause is present.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Warning {
-    /// Less than a millimetre of bone is left ahead of the burr.
+    /// Less than 1 mm of bone is left ahead of the burr.
     BoneThin,
-    /// The bone is about to give way.
+    /// At most 0.3 mm of bone is left ahead of the burr.
     BreakThrough,
-    /// At the feed of now the bone gives way in a moment.
+    /// At the present feed rate the burr comes through within 300 ms.
     BreachSoon,
     /// The burr is close to the brain.
     BrainNear,
-    /// What cuts is past the brain's rest surface, where the dura lies; a craniotome's foot may be
-    /// there.
+    /// The cutting part is past the brain's rest surface, where the dura lies. A craniotome's foot
+    /// does not count.
     BrainTouched,
     /// A tool presses hard on the brain.
     BrainPressed,
-    /// A tool is close to what must not be touched.
+    /// A tool is close to a structure that must not be touched.
     ForbiddenNear,
-    /// The drill is pressed so hard that it stands still.
+    /// The drill has stalled under its load.
     DrillStalled,
-    /// The wanted force is over the device's limit.
+    /// The desired force is over the device's limit.
     ForceLimit,
-    /// The last collision result is old; its force fades.
+    /// The last collision result is stale; its force fades.
     TissueLate,
     /// The device gave no fresh or no finite pose.
     DeviceStale,
-    /// The device's motors are warm; less force than wanted is given.
+    /// The device's motors are warm; the force is less than desired.
     MotorsWarm,
 }
 
 impl Warning {
-    /// Every warning, in the order of their bits.
+    /// All warnings, in the order of their bits.
     pub const ALL: [Self; 12] = [
         Self::BoneThin,
         Self::BreakThrough,
@@ -55,7 +54,7 @@ impl Warning {
         Self::ForbiddenNear,
     ];
 
-    /// A short name for files.
+    /// Returns the name for files.
     pub fn name(self) -> &'static str {
         match self {
             Self::BoneThin => "bone-thin",
@@ -73,7 +72,7 @@ impl Warning {
         }
     }
 
-    /// What the trainee reads.
+    /// Returns the text shown to the trainee.
     pub fn text(self) -> &'static str {
         match self {
             Self::BoneThin => "less than a millimetre of bone is left",
@@ -81,8 +80,8 @@ impl Warning {
             Self::BrainNear => "the drill is about to reach the brain",
             Self::BrainTouched => "the drill touches the brain",
             Self::ForceLimit => "the force is at the device's limit",
-            Self::TissueLate => "the tissue's answer is late, its force fades",
-            Self::DeviceStale => "the device gave no fresh position, the last one is held",
+            Self::TissueLate => "the collision result of the tissue is late, its force fades",
+            Self::DeviceStale => "the device gave no fresh position, the last one is used",
             Self::MotorsWarm => "the device's motors are warm, its force is reduced: press less",
             Self::DrillStalled => "the drill has stalled: press less",
             Self::BreachSoon => "at this feed the drill is through in a moment",
@@ -92,98 +91,97 @@ impl Warning {
     }
 }
 
-/// What happened.
+/// Kind of a notice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum What {
     /// A phase began.
     Phase(Phase),
-    /// A warning was raised (`true`) or cleared; the number says how near, how strong or how old
-    /// (mm, N or ms).
+    /// A warning was raised (`true`) or cleared, with its distance, force, time or age (mm, N, ms).
     Warning(Warning, bool, f32),
     /// The burr came through the bone.
     Through,
-    /// The last stroke of the burr was undone; the number is the bone that came back, mm³.
+    /// The last stroke of the burr was undone; the volume of restored bone, mm³.
     Undone(f32),
-    /// A stroke was to be undone, and was not.
+    /// Undoing a stroke was requested and refused.
     NotUndone(Hindrance),
-    /// A tool was taken into the hand.
+    /// A tool was taken.
     Taken(Tool),
-    /// A tool for the brain was asked for before the bone was open.
+    /// A tool for the brain was requested before the bone was open.
     NotOpen,
-    /// The planned flap hangs on nothing any more; its bone, mm³.
+    /// The planned flap is cut free; its volume, mm³.
     FlapFree(f32),
-    /// The flap was to be lifted, but hangs on the skull.
+    /// Lifting the flap was requested while it is still attached to the skull.
     FlapHangs,
-    /// The flap was lifted away; its bone, mm³.
+    /// The flap was lifted; its volume, mm³.
     FlapLifted(f32),
     /// The flap was put back.
     FlapReturned,
-    /// After a fault of the device its force waits, or is there again.
+    /// The force was switched off after a fault of the device, or is back.
     Force {
-        /// Whether it waits.
+        /// Whether the force is off and waits for an action of the user.
         waits: bool,
-        /// Whether it is the second hand's.
+        /// Whether it is the second hand's force.
         second: bool,
     },
 }
 
-/// Why a stroke is not undone.
+/// Reason why a stroke is not undone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hindrance {
-    /// The tool in the hand lies in bone that would come back.
+    /// The tool lies in bone that would be restored.
     Tool,
-    /// The second hand's tool does.
+    /// The second hand's tool lies in bone that would be restored.
     SecondTool,
     /// The pedal is down.
     Pedal,
-    /// A tool for the brain is in the hand.
+    /// The present tool is a tool for the brain.
     BrainTool,
     /// The flap is being lifted or put back.
     FlapMoves,
-    /// The flap is away and was not when the stroke was made.
+    /// The flap is lifted and was in its place during the stroke.
     FlapAway,
-    /// The flap is in its place and was not when the stroke was made.
+    /// The flap is in its place and was lifted during the stroke.
     FlapThere,
-    /// Nothing was drilled that is not undone.
+    /// No stroke is left to undo.
     NoStroke,
-    /// What was drilled before is kept no longer.
+    /// Earlier strokes are no longer stored.
     Forgotten,
 }
 
 impl Hindrance {
-    /// What the trainee reads.
+    /// Returns the text shown to the trainee.
     fn text(self) -> String {
         let text = match self {
-            Self::Tool => "the tool lies in the bone that would come back: draw it out first",
-            Self::SecondTool => "the second hand's tool lies in the bone that would come back: draw it out first",
+            Self::Tool => "the tool lies in the bone that would be restored: draw it out first",
+            Self::SecondTool => "the second hand's tool lies in the bone that would be restored: draw it out first",
             Self::Pedal => "the pedal is down: let it go first",
             Self::BrainTool => "a tool for the brain is in the hand: take one for bone first",
-            Self::FlapMoves => "the flap is on its way: wait until it rests",
+            Self::FlapMoves => "the flap is moving: wait until it rests",
             Self::FlapAway => "the flap was in its place at that stroke: put it back first",
             Self::FlapThere => "the flap was away at that stroke: lift it first",
             Self::NoStroke => "there is no stroke left",
             Self::Forgotten => {
                 let room = format!("{MAX_STROKES} strokes, or {MAX_STROKE_BRICKS} blocks of bone that they changed");
-                return format!("earlier strokes are kept no longer: there is room for {room}");
+                return format!("earlier strokes are no longer stored: there is room for {room}");
             }
         };
         text.into()
     }
 }
 
-/// Something that happened at a tick.
+/// An event of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Notice {
     /// Tick number.
     pub tick: u64,
     /// Session time, ms.
     pub time_ms: f64,
-    /// What.
+    /// Kind of the notice.
     pub what: What,
 }
 
 impl Notice {
-    /// Kind and sentence, as recorded.
+    /// Returns kind and text, as recorded.
     pub fn words(&self) -> (&'static str, String) {
         match self.what {
             What::Phase(phase) => ("phase", format!("{} begins", phase.name())),
@@ -198,7 +196,7 @@ impl Notice {
                     Warning::BreachSoon => "ms left",
                     Warning::TissueLate | Warning::DeviceStale => "ms old",
                 };
-                // Nothing is -0.00 mm deep.
+                // Avoids -0.00.
                 let value = (100.0 * value).round() / 100.0 + 0.0;
                 ("warning", format!("{}: {} ({value:.2} {unit})", warning.name(), warning.text()))
             }
@@ -208,7 +206,7 @@ impl Notice {
             What::NotUndone(why) => ("refused", format!("no stroke is undone: {}", why.text())),
             What::NotOpen => ("refused", "the bone is not open: drill through it or lift the flap first".into()),
             What::FlapFree(mm3) => ("flap", format!("the flap is free: {mm3:.0} mm3 of bone")),
-            What::FlapHangs => ("refused", "the flap still hangs on the skull".into()),
+            What::FlapHangs => ("refused", "the flap is still attached to the skull: cut it free first".into()),
             What::FlapLifted(mm3) => ("flap", format!("the flap is lifted: {mm3:.0} mm3 of bone")),
             What::FlapReturned => ("flap", "the flap is back in its place".into()),
             What::Force { waits, second } => {
@@ -222,19 +220,19 @@ impl Notice {
     }
 }
 
-/// Which warnings stand, with hysteresis, so that noise at a threshold does not repeat them.
+/// The active warnings, with hysteresis, so that noise at a threshold does not repeat them.
 #[derive(Clone, Debug, Default)]
 pub struct Watch {
     standing: u32,
     quiet_since_ms: [f64; Warning::ALL.len()],
 }
 
-/// How long a cause must be gone before its warning is cleared, ms.
+/// Time that a cause must be absent before its warning is cleared, ms.
 const CLEAR_MS: f64 = 100.0;
 
 impl Watch {
-    /// Tells whether a cause is present at `time_ms`; returns the change, if it is one.
-    pub fn tell(&mut self, warning: Warning, present: bool, value: f32, time_ms: f64) -> Option<What> {
+    /// Updates a warning with the presence of its cause at `time_ms`; returns a change.
+    pub fn update(&mut self, warning: Warning, present: bool, value: f32, time_ms: f64) -> Option<What> {
         let at = Warning::ALL.iter().position(|&w| w == warning)?;
         let bit = 1 << at;
         let stands = self.standing & bit != 0;
@@ -250,7 +248,7 @@ impl Watch {
         }
     }
 
-    /// The bits of the standing warnings, as in [`Warning::ALL`].
+    /// Returns the bits of the active warnings, as in [`Warning::ALL`].
     pub fn standing(&self) -> u32 {
         self.standing
     }
@@ -263,19 +261,19 @@ mod tests {
     #[test]
     fn a_warning_is_raised_once_and_cleared_after_quiet() {
         let mut watch = Watch::default();
-        let mut told = Vec::new();
+        let mut changes = Vec::new();
         for ms in 0..400 {
             let present = ms < 50 || (ms < 150 && ms % 20 == 0);
-            told.extend(watch.tell(Warning::BrainNear, present, 1.5, f64::from(ms)).map(|what| (ms, what)));
+            changes.extend(watch.update(Warning::BrainNear, present, 1.5, f64::from(ms)).map(|what| (ms, what)));
         }
-        assert_eq!(told.len(), 2);
-        assert_eq!(told[0], (0, What::Warning(Warning::BrainNear, true, 1.5)));
-        assert!(matches!(told[1], (240, What::Warning(Warning::BrainNear, false, _))), "{told:?}");
+        assert_eq!(changes.len(), 2);
+        assert_eq!(changes[0], (0, What::Warning(Warning::BrainNear, true, 1.5)));
+        assert!(matches!(changes[1], (240, What::Warning(Warning::BrainNear, false, _))), "{changes:?}");
         assert_eq!(watch.standing(), 0);
     }
 
     #[test]
-    fn nothing_is_minus_nothing_deep() {
+    fn a_depth_is_never_printed_as_minus_zero() {
         let words =
             |value| Notice { tick: 0, time_ms: 0.0, what: What::Warning(Warning::BrainTouched, true, value) }.words().1;
         assert!(words(-0.001).ends_with("(0.00 mm deep)"), "{}", words(-0.001));

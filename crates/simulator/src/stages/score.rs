@@ -1,39 +1,40 @@
-//! The scores so far: what the hand did to bone and brain, summed tick by tick.
+//! Scores of a session, accumulated tick by tick.
 //!
 //! # Theory
-//! Path, idle time and smoothness of the tool's tip (`motion.rs`), drilling time, volume of bone
-//! removed, plunge (how far the burr's ball went past the brain's rest surface), separate touches
-//! of the brain with the burr, time, impulse `∫ F dt` and largest force of the probe on the brain,
-//! changes of the tool. They are plain physical quantities; none is validated against clinical
-//! skill.
+//! - Tip of the tool: path, idle time and smoothness (`motion.rs`).
+//! - Burr: drilling time, volume of bone removed, plunge (depth of its ball past the brain's rest
+//!   surface), separate touches of the brain.
+//! - Probe on the brain: time, impulse `∫ F dt` and largest force.
+//! - Changes of the tool.
+//!
+//! They are physical quantities; none is validated against clinical skill.
 
 use crate::stages::motion::Motion;
 use serde::Serialize;
 use trepan_geometry::Vec3;
 use trepan_link::wire::TickRecord;
 
-/// Running sums; a copy of it is the score.
+/// Running sums of the scores.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ScoreKeeper {
     /// Path of the tip, mm.
     pub path_mm: f64,
     /// Time in which the tip was slower than 5 mm/s, s.
     pub idle_s: f64,
-    /// Smoothness of the tip's movement below 5 Hz, more is smoother; `null` before there was any.
+    /// Smoothness of the tip's motion below 5 Hz, larger is smoother; `null` without motion.
     pub log_dimensionless_jerk: Option<f64>,
     /// Tools taken after the first.
     pub tool_changes: u32,
-    /// Time with the burr turning, s.
+    /// Time of drilling, s.
     pub drilling_s: f64,
     /// Bone removed, mm³.
     pub bone_removed_mm3: f64,
     /// Strokes of the burr that came through the bone.
     pub times_through: u32,
-    /// Deepest place of what cuts past the brain's rest surface, mm; 0 when it never got there. A
-    /// craniotome's foot does not cut.
+    /// Largest depth of the cutting part past the brain's rest surface, mm. A craniotome's foot
+    /// does not cut.
     pub plunge_mm: f32,
-    /// Separate touches of the brain's rest surface, and so of the dura over it, with a tool for
-    /// bone.
+    /// Separate touches of the brain's rest surface, where the dura lies, with a tool for bone.
     pub burr_touches_of_brain: u32,
     /// Time of these touches, s.
     pub burr_on_brain_s: f64,
@@ -41,14 +42,13 @@ pub struct ScoreKeeper {
     pub peak_burr_on_brain_n: f32,
     /// Time in which the tool pressed on tissue, s.
     pub tissue_s: f64,
-    /// Force of the tissue on the hand, summed over that time, N s; that of bone touched at once is
-    /// not in it.
+    /// Force of the tissue on the hand, integrated over that time, N s, without the force of bone.
     pub tissue_impulse_n_s: f64,
     /// Largest force of the tissue on the hand, N.
     pub peak_tissue_force_n: f32,
     /// Largest depth of the probe in tissue, mm.
     pub peak_tissue_depth_mm: f32,
-    /// Largest force of all, N.
+    /// Largest force on the hand, N.
     pub peak_force_n: f32,
     /// Largest change of force between two ticks, N.
     pub peak_force_step_n: f32,
@@ -64,25 +64,25 @@ pub struct ScoreKeeper {
     last_ms: Option<f64>,
 }
 
-/// A longer pause between two ticks does not count, s.
-const LONGEST_S: f64 = 0.1;
+/// Longest time that counts for one tick, s.
+const MAX_TICK_S: f64 = 0.1;
 
-/// Whether a tool for bone is past the brain's rest surface: what is warned of, counted and timed
-/// as a touch of the brain.
+/// Whether a tool for bone is past the brain's rest surface. This is a touch of the brain in
+/// warnings and scores.
 pub(crate) fn cuts_into_brain(record: &TickRecord) -> bool {
     record.phase == 0 && record.brain_distance_mm <= 0.0
 }
 
 impl ScoreKeeper {
-    /// Time of the newest tick, ms; 0 before the first.
+    /// Returns the time of the newest tick, ms; 0 before the first.
     pub fn time_ms(&self) -> f64 {
         self.last_ms.unwrap_or(0.0)
     }
 
-    /// Adds one tick, which stands for the time since the last.
+    /// Adds a tick, weighted with the time since the last.
     pub fn add(&mut self, record: &TickRecord) {
         let since_s = self.last_ms.map_or(0.0, |last| 1e-3 * (record.time_ms - last));
-        let (force, seconds) = (record.wrench.force, since_s.clamp(0.0, LONGEST_S));
+        let (force, seconds) = (record.wrench.force, since_s.clamp(0.0, MAX_TICK_S));
         self.last_ms = Some(record.time_ms);
         self.motion.add(record.time_ms, record.proxy.translation);
         (self.path_mm, self.idle_s) = (self.motion.path_mm, self.motion.idle_s);

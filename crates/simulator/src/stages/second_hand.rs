@@ -1,21 +1,21 @@
-//! One tick of the second hand: an aspirator that touches bone and brain and cuts nothing.
+//! One tick of the second hand: an aspirator that touches bone and brain and does not cut.
 //!
 //! # Theory
 //! ```text
 //! device pose → bone contact (proxy) ──────────╮
-//! brain at rest → d = r - φ(tip), n = ∇φ ──────┴→ force models → the hand's own guard → wrench
+//! brain at rest → d = r - φ(tip), n = ∇φ ──────┴→ force models → force guard → wrench
 //! ```
 //!
 //! # Practice
-//! Its tick follows the first hand's in the same loop, so that it meets the bone that the burr has
-//! left in that very tick: a replay meets the same. A tick does not allocate, lock, log or panic.
-//! The brain is met where it lies at rest: this hand neither moves it nor feels it move. The hands
-//! do not feel each other.
+//! Its tick follows the first hand's in the same loop, so that it collides with the bone as the
+//! burr left it in that tick, also in a replay. A tick does not allocate, lock, log or panic.
+//! Contact with the brain uses the rest shape: this hand neither deforms the brain nor feels it
+//! move. The tools of the two hands do not collide.
 //!
 //! # When not to use it
-//! To retract the brain: press it with the first hand.
+//! To retract the brain: use the first hand.
 
-use crate::stages::fault::{AfterFault, Seen};
+use crate::stages::fault::{AfterFault, DeviceStatus};
 use crate::stages::haptic_tick::HapticConfig;
 use crate::stages::notice::{Notice, What};
 use std::sync::Arc;
@@ -26,27 +26,27 @@ use trepan_link::wire::{SecondRecord, TickRecord};
 use trepan_rigid::{RigidContact, RigidStep};
 use trepan_volume::{BoneVolume, DistanceField};
 
-/// The second hand as the picture sees it.
+/// State of the second hand as it is rendered.
 #[derive(Clone, Copy, Debug)]
 pub struct SecondView {
-    /// Where contact lets the tool be.
+    /// Pose of the proxy.
     pub world_from_tool: Pose,
     /// Force on the hand, N.
     pub force: Vec3,
 }
 
-/// How the second hand fared.
+/// Outcome of the second hand.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SecondOutcome {
-    /// The largest force, N.
+    /// Largest force, N.
     pub peak_force_n: f32,
-    /// What its force guard did.
+    /// Ticks in which its force guard acted, by cause.
     pub guard: GuardCounters,
-    /// Force at the very end, N: zero.
+    /// Force after the last tick, N; zero after a clean end.
     pub end_force_n: f32,
 }
 
-/// The state that lives from tick to tick.
+/// State of the second hand.
 pub struct SecondHand {
     config: HapticConfig,
     bone: Option<Arc<BoneVolume>>,
@@ -55,7 +55,7 @@ pub struct SecondHand {
     step: RigidStep,
     tissue: ContactManifold,
     guard: ForceGuard,
-    held: Option<ToolState>,
+    last_valid: Option<ToolState>,
     fault: AfterFault,
     released: bool,
     peak_force_n: f32,
@@ -63,8 +63,8 @@ pub struct SecondHand {
 }
 
 impl SecondHand {
-    /// A hand whose tool is wherever its device first says. Of the configuration it takes method,
-    /// forces, guard and tick.
+    /// Makes a second hand; its tool begins at the first pose of its device. Used of the
+    /// configuration are method, forces, guard, tick and `force_waits`.
     pub fn new(config: HapticConfig, bone: Option<Arc<BoneVolume>>, brain: Option<Arc<DistanceField>>) -> Self {
         Self {
             rigid: config.rigid.build(&Self::tool()),
@@ -74,7 +74,7 @@ impl SecondHand {
             brain,
             step: RigidStep::default(),
             tissue: ContactManifold::default(),
-            held: None,
+            last_valid: None,
             fault: AfterFault::default(),
             released: false,
             peak_force_n: 0.0,
@@ -82,36 +82,36 @@ impl SecondHand {
         }
     }
 
-    /// What it holds.
+    /// Returns the tool: an aspirator.
     pub fn tool() -> Tool {
         Tool::aspirator()
     }
 
-    /// Where its tool is; `None` before its device has said where.
+    /// Returns the pose of the proxy; `None` before the device's first pose.
     pub fn place(&self) -> Option<Pose> {
-        self.held.map(|_| self.rigid.proxy())
+        self.last_valid.map(|_| self.rigid.proxy())
     }
 
-    /// The tick, after the first hand's of the same number.
+    /// Runs a tick, after the first hand's tick of the same number.
     pub fn tick(
         &mut self,
         tick: u64,
         reading: &Reading,
-        tell: &mut dyn FnMut(Notice),
+        notify: &mut dyn FnMut(Notice),
     ) -> (GuardedWrench, SecondRecord) {
         let (tool, stale) = self.last_valid_state(reading);
         let proxy = self.touch_bone(&tool);
         self.touch_brain(proxy.translation);
         let lost = reading.status == Status::Lost;
         if let Some(waits) = self.follow_fault(&tool, lost, stale) {
-            tell(Notice { tick, time_ms: tool.time_ms, what: What::Force { waits, second: true } });
+            notify(Notice { tick, time_ms: tool.time_ms, what: What::Force { waits, second: true } });
         }
         let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
-        let wanted = if let_go { Wrench::ZERO } else { self.desired_wrench(&tool) };
-        let wrench = self.guard.guard(wanted, &tool, self.config.dt_ms);
+        let desired = if let_go { Wrench::ZERO } else { self.desired_wrench(&tool) };
+        let wrench = self.guard.guard(desired, &tool, self.config.dt_ms);
         self.force_n = wrench.force().length();
         self.peak_force_n = self.peak_force_n.max(self.force_n);
-        let clamped = wanted.force.length() > self.config.guard.max_force_n;
+        let clamped = desired.force.length() > self.config.guard.max_force_n;
         let bits = [
             (clamped, TickRecord::CLAMPED),
             (stale, TickRecord::STALE),
@@ -144,38 +144,38 @@ impl SecondHand {
         self.guard.is_at_rest()
     }
 
-    /// How it fared so far.
+    /// Returns the outcome so far.
     pub fn outcome(&self) -> SecondOutcome {
         let guard = self.guard.counters();
         SecondOutcome { peak_force_n: self.peak_force_n, guard, end_force_n: self.force_n }
     }
 
-    /// The reading, or the last sound one when the device gave nothing usable. The first one says
-    /// where the tool begins.
+    /// Returns the reading, or the last valid one and `true` if the device gave no usable pose. The
+    /// first valid pose sets the proxy.
     fn last_valid_state(&mut self, reading: &Reading) -> (ToolState, bool) {
         let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
-        let begins = self.held.is_none();
-        let last = self.held.unwrap_or(ToolState::at(Pose::IDENTITY));
-        let held = if fresh {
+        let begins = self.last_valid.is_none();
+        let last = self.last_valid.unwrap_or(ToolState::at(Pose::IDENTITY));
+        let last_valid = if fresh {
             reading.tool
         } else {
             ToolState { twist: Default::default(), time_ms: reading.tool.time_ms, ..last }
         };
         if begins && fresh {
-            self.rigid.reset(held.world_from_tool);
+            self.rigid.reset(last_valid.world_from_tool);
         }
         if fresh {
-            self.held = Some(held);
+            self.last_valid = Some(last_valid);
         }
-        (held, !fresh)
+        (last_valid, !fresh)
     }
 
-    /// Lets the force go where the device is gone, and come back by a deliberate act only; says
-    /// when it does.
+    /// Switches the force off after a fault of the device until a deliberate action of the user.
+    /// Returns a change: `true` when it is switched off.
     fn follow_fault(&mut self, tool: &ToolState, lost: bool, stale: bool) -> Option<bool> {
         let touches = self.step.manifold.touches() || self.tissue.depth_mm > 0.0;
-        let seen = self.config.force_waits.then_some(Seen { lost, stale, touches })?;
-        let waits = self.fault.tick(tool, seen, self.config.dt_ms)?;
+        let status = self.config.force_waits.then_some(DeviceStatus { lost, stale, touches })?;
+        let waits = self.fault.tick(tool, status, self.config.dt_ms)?;
         match waits {
             true => self.guard.release(),
             false if !self.released => self.guard.resume(),
@@ -184,16 +184,16 @@ impl SecondHand {
         Some(waits)
     }
 
-    /// The bone, once the tool is somewhere; gives the proxy.
+    /// Runs the contact with bone, once a pose is known; returns the proxy.
     fn touch_bone(&mut self, tool: &ToolState) -> Pose {
-        let (Some(bone), Some(_)) = (&self.bone, self.held) else { return tool.world_from_tool };
+        let (Some(bone), Some(_)) = (&self.bone, self.last_valid) else { return tool.world_from_tool };
         self.rigid.step(bone, tool, false, self.config.dt_ms, &mut self.step);
         self.rigid.proxy()
     }
 
     fn touch_brain(&mut self, tip: Vec3) {
         self.tissue.clear();
-        let (Some(brain), Some(_)) = (&self.brain, self.held) else { return };
+        let (Some(brain), Some(_)) = (&self.brain, self.last_valid) else { return };
         let radius_mm = Self::tool().tip_radius_mm;
         let depth_mm = radius_mm - brain.sample(tip);
         let normal = brain.gradient(tip).normalize_or_zero();
@@ -217,7 +217,7 @@ mod tests {
     use trepan_contact::{GuardConfig, Vibration};
     use trepan_volume::VoxelVolume;
 
-    /// Bone under z = 0; brain under z = -8 mm.
+    /// Makes a hand above bone under z = 0 and brain under z = -8 mm.
     fn hand(with_bone: bool) -> SecondHand {
         let n = 40;
         let mut ct = VoxelVolume::isotropic([n; 3], Vec3::splat(-19.5), 1.0, -1000i16);
@@ -242,7 +242,7 @@ mod tests {
         SecondHand::new(config, bone, Some(Arc::new(DistanceField::of_mask(&mask))))
     }
 
-    /// Lowers the tip from 5 mm to `z` in 200 ticks, then rests for 200; gives the last record.
+    /// Lowers the tip from 5 mm to `z` in 200 ticks, then rests for 200; returns the last record.
     fn lowered(hand: &mut SecondHand, z: f32, status: Status) -> SecondRecord {
         let mut last = SecondRecord::default();
         for tick in 1..=400u32 {
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn it_rests_on_bone_and_on_the_brain_with_the_force_of_each() {
+    fn the_second_hand_feels_bone_and_brain_with_their_stiffness() {
         let on_bone = lowered(&mut hand(true), 0.5, Status::Fresh);
         assert!((on_bone.wrench.force - Vec3::Z * 2.0).length() < 0.3, "{:?}", on_bone.wrench);
         assert!((on_bone.proxy.translation.z - 1.5).abs() < 0.15 && on_bone.tissue_depth_mm == 0.0, "{on_bone:?}");
@@ -275,16 +275,17 @@ mod tests {
     }
 
     #[test]
-    fn after_a_loss_force_waits_for_a_deliberate_act() {
+    fn after_a_loss_the_force_is_off_until_a_deliberate_action() {
         let mut hand = hand(true);
-        let mut told = Vec::new();
+        let mut notices = Vec::new();
         let mut time_ms = 0.0;
         let mut run = |ticks: u32, z: f32, buttons: Buttons, status: Status| {
             let mut peak_n = 0f32;
             for _ in 0..ticks {
                 time_ms += 1.0;
                 let tool = ToolState { buttons, time_ms, ..ToolState::at(Pose::from_translation(Vec3::Z * z)) };
-                let done = hand.tick(time_ms as u64, &Reading { tool, status }, &mut |notice| told.push(notice.what));
+                let done =
+                    hand.tick(time_ms as u64, &Reading { tool, status }, &mut |notice| notices.push(notice.what));
                 peak_n = peak_n.max(done.0.force().length());
             }
             peak_n
@@ -299,11 +300,11 @@ mod tests {
         run(300, 5.0, Buttons(0), Status::Fresh);
         assert!(run(300, 0.8, Buttons(0), Status::Fresh) > 0.5);
         let waits: Vec<What> = [true, false, true, false].map(|waits| What::Force { waits, second: true }).into();
-        assert_eq!(told, waits);
+        assert_eq!(notices, waits);
     }
 
     #[test]
-    fn nothing_is_felt_before_the_device_says_where_it_is() {
+    fn there_is_no_force_before_the_devices_first_pose() {
         let mut hand = hand(true);
         let tool = ToolState::at(Pose::from_translation(Vec3::Z * -5.0));
         for tick in 1..50 {

@@ -1,19 +1,21 @@
-//! The brain's weight once the dura is open: it sinks, and moves with pulse and breath.
+//! Body force on the brain once the dura is open: brain shift under gravity, pulsation and
+//! breathing.
 //!
 //! # Theory
-//! In the scanner the brain floats in its fluid: its shape at rest is in balance. With the dura
-//! open, fluid runs off and the part `c` of its weight that the fluid no longer carries acts on it,
-//! as a body force; pulse and breath act as two more along the way out of the opening:
+//! In the scanner the brain floats in cerebrospinal fluid, and its rest shape is in equilibrium.
+//! With the dura open, fluid is lost: the share `c` of the weight that it no longer carries acts as
+//! a body force. Breathing and pulsation are two more body forces along the outward direction of
+//! the opening:
 //! ```text
-//! a(t) = r(t) (c g  +  o (0.008 sin 2π 0.25 t + 0.003 sin 2π 1.2 t) 9.81e-3)        r: from 0 to 1 in 2 s
+//! a(t) = r(t) (c g  +  o (0.008 sin 2π 0.25 t + 0.003 sin 2π 1.2 t) 9.81e-3)
 //! ```
-//! mm/ms², t in s, o the outward unit vector.
+//! a in mm/ms², t in s, o the outward unit vector, r a ramp from 0 to 1 in 2 s.
 //!
 //! # Practice
-//! The dura counts as open from the first tool for the brain on. A function of the ticks' times
-//! alone, so that a replay has the same loads. **Uncalibrated**: shares of the weight are chosen
-//! for motions of the order of those seen at craniotomies: some 0.3 mm of breath, 0.1 mm of pulse,
-//! millimetres of shift.
+//! The dura counts as open from the first use of a tool for the brain. The force depends on the
+//! ticks' times alone, so that a replay has the same loads. **Uncalibrated**: the shares of the
+//! weight are chosen for motions of the order of those seen at craniotomies: breathing some 0.3 mm,
+//! pulsation 0.1 mm, shift some millimetres.
 //!
 //! # Sources
 //! Brain shift under gravity after loss of fluid: M. I. Miga et al., *In vivo quantification of a
@@ -22,12 +24,12 @@
 use crate::program::Phase;
 use trepan_geometry::{Vec3, units};
 
-/// Time in which the weight comes to bear, ms.
+/// Length of the ramp, ms.
 const RAMP_MS: f64 = 2000.0;
-/// Share of the weight, and frequency in 1/ms, of breath and pulse.
+/// Share of the weight and frequency, 1/ms, of breathing and pulsation.
 const SWAY: [(f64, f64); 2] = [(0.008, 0.25e-3), (0.003, 1.2e-3)];
 
-/// What acts on the whole brain.
+/// Body force on the whole brain.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Settling {
     sinks: Vec3,
@@ -36,8 +38,8 @@ pub struct Settling {
 }
 
 impl Settling {
-    /// With the share `lost` of the fluid's lift gone once the dura is open, gravity along `down`
-    /// and the opening towards `outward`, unit vectors.
+    /// Makes the body force with the share `lost` of the fluid's buoyancy. `down` and `outward` are
+    /// the unit vectors of gravity and of the opening.
     pub fn new(lost: f32, down: Vec3, outward: Vec3) -> Self {
         let weight = units::GRAVITY_MM_PER_MS2;
         Self { sinks: lost * weight * down, outward: weight * outward, opened_ms: None }
@@ -48,7 +50,7 @@ impl Settling {
         self.opened_ms.is_some()
     }
 
-    /// Acceleration at a time of the session, mm/ms².
+    /// Returns the acceleration at a time of the session, mm/ms².
     pub fn at(&mut self, phase: Phase, time_ms: f64) -> Vec3 {
         if phase == Phase::Brain {
             self.opened_ms.get_or_insert(time_ms);
@@ -66,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_acts_before_the_dura_is_open_and_then_the_weight_comes_slowly() {
+    fn no_force_acts_before_the_dura_is_open_and_then_the_weight_ramps_up() {
         let mut settling = Settling::new(0.1, Vec3::NEG_Y, Vec3::Z);
         assert_eq!(settling.at(Phase::Craniotomy, 5000.0), Vec3::ZERO);
         assert_eq!(settling.at(Phase::Brain, 6000.0), Vec3::ZERO);

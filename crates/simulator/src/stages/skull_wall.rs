@@ -1,22 +1,23 @@
-//! The inside of the skull as a wall that the brain slides along.
+//! The inside of the skull as a wall along which the brain slides.
 //!
 //! # Theory
-//! Signed distance to the bone as it was before the operation, on a grid around the brain. Where
-//! the burr has opened the skull there is no wall: a node is held back unless bone was behind the
-//! nearest place of the wall and is gone. Where the skull never had bone to speak of (thin bone,
-//! foramina) the wall stands: asking whether there is bone now would answer otherwise at every
-//! breath of the brain. A node that the wall holds when its bone goes, or that slides past the rim
-//! of the opening, is let go gradually: its plane recedes, at last by 0.005 mm in a collision step.
+//! The wall is the zero level of the signed distance to the bone before the operation, on a grid
+//! around the brain. It is absent where the burr has opened the skull: where there was bone behind
+//! the nearest point of the wall and it is now gone. Where the skull never had dense bone (thin
+//! bone, foramina) the wall remains. Testing only the present bone there would change its answer
+//! with every breathing motion of the brain. A node that the wall supports when its bone is
+//! removed, or that slides past the rim of the opening, is released gradually: its contact plane
+//! recedes, at most by 0.005 mm per collision step.
 //!
 //! ```text
-//! hollow  φ > 0      x  node      s  place of the wall      0.5, 1, 2 mm behind s: bone that is gone?
+//! hollow  φ > 0     x  node     s  point of the wall     0.5, 1, 2 mm behind s: is bone gone?
 //! ```
 //!
 //! # Practice
-//! The bone is read only while the probe is in the hand, when nobody carves, so that what a step
-//! finds depends on its inputs alone. While a tool for bone is back in the hand, the wall stands as
-//! it was last read: a brain that lies on it must not fall through and be thrown out later. About
-//! 30 ns for each border node of the brain.
+//! The bone is read only while a tool for the brain is used, when nothing is carved, so that a step
+//! depends on its inputs alone. While a tool for bone is used again, the wall stays as last read:
+//! the brain that lies on it must not sink in and be pushed out later. About 30 ns per border
+//! node of the brain.
 
 use glam::IVec3;
 use std::sync::Arc;
@@ -28,34 +29,33 @@ use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// Spacing of the grid, mm.
 const SPACING_MM: f32 = 1.5;
-/// The grid reaches this far beyond the brain, mm.
+/// Margin of the grid around the brain, mm.
 const MARGIN_MM: f32 = 8.0;
-/// Beyond this distance from the wall a node cannot reach it before the next collision result, mm.
+/// Distance from the wall beyond which a node cannot reach it before the next collision result, mm.
 const NEAR_MM: f32 = 0.5;
-/// Bone so far behind the wall's surface is what holds, mm; the likeliest first.
+/// Depths behind the wall at which bone is looked up, mm, the likeliest first.
 const BEHIND_MM: [f32; 3] = [1.0, 2.0, 0.5];
 
-/// How far the wall recedes in a collision step from a node that it held where bone is gone, mm: in
-/// the first step, by how much of its way faster in each, and at most.
+/// Recession of the wall from a released node in the first collision step, mm.
 const FIRST_MM: f32 = 1e-4;
-/// See above.
+/// Increase of the recession per collision step, as a share of the recession so far.
 const GROWTH: f32 = 0.02;
-/// See above.
+/// Largest recession in a collision step, mm.
 const FASTEST_MM: f32 = 5e-3;
 
-/// The wall and the bone that it stands on.
+/// The wall and the bone behind it.
 pub struct SkullWall {
     wall: SlidingWall,
     field: DistanceField,
     bone: Arc<BoneVolume>,
-    /// Where there was bone before the operation.
+    /// The bone before the operation.
     before: BoneMask,
-    /// How far the wall had receded from each node when the bone was last read, mm; infinite where
-    /// it is gone.
+    /// Recession of the wall from each node when the bone was last read, mm; infinite where there
+    /// is no wall.
     receded_mm: Vec<f32>,
 }
 
-/// Which voxels of a volume were bone at one time, a bit each.
+/// Bone voxels of a volume at one time, a bit each.
 struct BoneMask {
     dims: [usize; 3],
     bits: Vec<u64>,
@@ -83,8 +83,8 @@ impl BoneMask {
 }
 
 impl SkullWall {
-    /// For a brain at rest in a skull that is still whole; `held` nodes do not move.
-    pub fn new(bone: Arc<BoneVolume>, brain: &TetMesh, held: &[u32]) -> Result<Self, ConfigError> {
+    /// Makes the wall around a brain at rest in an intact skull; `fixed` nodes do not move.
+    pub fn new(bone: Arc<BoneVolume>, brain: &TetMesh, fixed: &[u32]) -> Result<Self, ConfigError> {
         let bounds = brain.bounds();
         let low = bounds.min - MARGIN_MM;
         let dims = (bounds.size() + 2.0 * MARGIN_MM).to_array().map(|mm| (mm / SPACING_MM) as usize + 1);
@@ -95,21 +95,21 @@ impl SkullWall {
             *value = u8::from(bone.is_bone(bone.voxel_of(world)));
         }
         let field = DistanceField::of_mask(&mask);
-        let mut wall = SlidingWall::around(brain, held)?;
+        let mut wall = SlidingWall::around(brain, fixed)?;
         wall.ahead_mm = NEAR_MM;
         wall.rest_in(&brain.positions, |p| (field.sample(p), Vec3::ZERO));
         Ok(Self { wall, field, before: BoneMask::of(&bone), bone, receded_mm: vec![0.0; brain.positions.len()] })
     }
 
-    /// Adds the planes of what is near the wall. `reads_bone`: nobody carves now, so openings may
-    /// be looked for.
+    /// Adds the contact planes of nodes near the wall. `reads_bone`: nothing is carved, so openings
+    /// may be searched.
     pub fn press(&mut self, positions: &[Vec3], reads_bone: bool, out: &mut NodalContacts) {
         let Self { wall, field, bone, before, receded_mm } = self;
         wall.step(positions, Carved { field, bone, before, receded_mm, reads_bone }, out);
     }
 }
 
-/// The skull's inside as it is now.
+/// The inside of the skull with its openings.
 struct Carved<'a> {
     field: &'a DistanceField,
     bone: &'a BoneVolume,
@@ -130,7 +130,7 @@ impl Hollow for Carved<'_> {
             let behind = BEHIND_MM.map(|mm| self.bone.voxel_of(place + mm * outward));
             let is_bone = behind.iter().any(|voxel| self.bone.is_bone(*voxel));
             let there = is_bone || !behind.iter().any(|voxel| self.before.has(*voxel));
-            // Who went out through the opening is not caught by its rim.
+            // A node that left through the opening is not caught by its rim.
             *back_mm = match there && (*back_mm == 0.0 || depth_mm <= 0.0) {
                 true => 0.0,
                 false if depth_mm > *back_mm => *back_mm + (FIRST_MM + GROWTH * *back_mm).min(FASTEST_MM),
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
     use trepan_soft::boxes;
 
-    /// A cube of 20 mm, a millimetre from walls 6 mm thick all around.
+    /// Makes a cube of brain of 20 mm, 1 mm from walls of bone 6 mm thick.
     fn boxed() -> (Arc<BoneVolume>, TetMesh) {
         let mut volume = VoxelVolume::isotropic([68; 3], Vec3::splat(-16.75), 0.5, 0i16);
         for at in 0..volume.data.len() {
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_brain_is_held_back_by_bone_and_not_by_the_opening() {
+    fn the_brain_is_supported_by_bone_and_not_by_the_opening() {
         let (bone, brain) = boxed();
         let mut wall = SkullWall::new(Arc::clone(&bone), &brain, &[]).unwrap();
         let mut pushed = |by: Vec3, reads_bone: bool| -> Vec3 {

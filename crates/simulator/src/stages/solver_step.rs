@@ -1,9 +1,9 @@
-//! One solver step: the newest loads in, moved nodes out.
+//! One solver step: takes the newest loads and moves the nodes.
 //!
 //! # Practice
-//! Contacts are springs on the nodes that the solver evaluates with its own positions, so steps
-//! between two collision results stay stable. A record is made whenever another contact took
-//! effect, and every [`EACH`] steps: what a replay needs, no more.
+//! Contacts are springs on the nodes. The solver evaluates them at its own positions, so steps
+//! between two collision results remain stable. A record is made when a new contact takes effect,
+//! and every [`EACH`] steps: as much as a replay needs.
 
 use crate::stages::collision_step::SoftFrame;
 use serde::Serialize;
@@ -12,14 +12,14 @@ use trepan_geometry::Vec3;
 use trepan_link::wire::SolverRecord;
 use trepan_soft::{Loads, SoftSolver, StepReport};
 
-/// Steps between two records when the contact stays.
+/// Steps between two records while the contact is unchanged.
 pub const EACH: u64 = 32;
-/// Longest way that a node may go in a step while no tool touches the brain, mm.
+/// Limit for the motion of a node in a step while no tool touches the brain, mm.
 pub const REST_MOTION_MM: f32 = 0.02;
 /// Time after the last touch in which the brain may still move back, ms.
 const MOVES_BACK_MS: f64 = 500.0;
 
-/// The state that lives from step to step.
+/// State of the solver loop.
 pub struct SolverStage {
     solver: Box<dyn SoftSolver>,
     rest: Vec<Vec3>,
@@ -29,28 +29,26 @@ pub struct SolverStage {
     contact_seq: u64,
     solver_faults: SolverFaults,
     max_displacement_mm: f32,
-    /// Simulated time at which a tool touched the brain last, ms.
+    /// Simulated time of the last touch of the brain, ms.
     touched_ms: f64,
 }
 
-/// What a solver had to put right, summed over steps; all 0 where nothing was.
+/// Faults of a solver, summed over steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SolverFaults {
-    /// Inverted elements, which their energy turns back.
+    /// Inverted elements, which their strain energy restores.
     pub inverted: u64,
-    /// Nodes that hit the limit of speed or displacement and were held to it.
+    /// Nodes clamped to the limit of speed or displacement.
     pub limited: u64,
-    /// Nodes whose new state was not finite, put back to where they were.
+    /// Nodes with a non-finite new state, reset to their previous state.
     pub non_finite: u64,
-    /// Time that was not simulated because it would have taken too many substeps, ms.
+    /// Time not simulated because it would have taken too many substeps, ms.
     pub skipped_ms: f64,
-    /// Contacts and springs for which there was no room, summed over the collision steps that took
-    /// effect.
+    /// Contacts and springs dropped for lack of room, summed over the collision steps used.
     pub contacts_left_out: u64,
-    /// Longest way of a node in one step while no tool touched the brain, nor in the half second
-    /// before, mm.
+    /// Largest motion of a node in a step, mm, while no tool has touched the brain for 0.5 s.
     pub rest_motion_mm: f32,
-    /// Steps in which that was more than 0.02 mm.
+    /// Steps in which that motion exceeded 0.02 mm.
     pub restless_steps: u64,
 }
 
@@ -67,35 +65,33 @@ impl SolverFaults {
         self.restless_steps += u64::from(motion_mm > REST_MOTION_MM);
     }
 
-    /// What a report should say of them, where the brain did not move as its solver says.
+    /// Returns the remarks for a report where faults make the brain's motion unreliable.
     pub fn remarks(&self) -> impl Iterator<Item = String> + use<> {
         let Self { inverted, limited, non_finite, skipped_ms, contacts_left_out, rest_motion_mm, restless_steps } =
             *self;
-        let sound = limited + non_finite + contacts_left_out == 0 && skipped_ms == 0.0;
-        let held = (!sound).then(|| {
+        let valid = limited + non_finite + contacts_left_out == 0 && skipped_ms == 0.0;
+        let invalid = (!valid).then(|| {
             format!(
-                "the brain's solver held {limited} nodes to a limit, put {non_finite} back that were not finite, \
-                 left {skipped_ms:.1} ms out and {contacts_left_out} contacts for which there was no room: do not \
-                 trust how it moved"
+                "the brain's solver clamped {limited} nodes to a limit, reset {non_finite} non-finite nodes, skipped \
+                 {skipped_ms:.1} ms and dropped {contacts_left_out} contacts for lack of room: do not rely on the \
+                 brain's motion"
             )
         });
         let inverted = (inverted > 0).then(|| {
-            format!(
-                "elements of the brain were inverted {inverted} times: its forces were wrong there; take --quality fine"
-            )
+            format!("elements of the brain were inverted {inverted} times: forces there were wrong; use --quality fine")
         });
         let restless = (restless_steps > 0).then(|| {
             format!(
                 "the brain moved by itself: up to {rest_motion_mm:.2} mm in a step while nothing touched it, over \
-                 {REST_MOTION_MM} mm in {restless_steps} steps: do not trust its motion; report the case"
+                 {REST_MOTION_MM} mm in {restless_steps} steps: do not rely on its motion; report the case"
             )
         });
-        [held, inverted, restless].into_iter().flatten()
+        [invalid, inverted, restless].into_iter().flatten()
     }
 }
 
 impl SolverStage {
-    /// A stage over a solver at rest, whose shape at rest is in balance.
+    /// Makes a stage with a solver at rest, whose rest shape is in equilibrium.
     pub fn new(solver: Box<dyn SoftSolver>) -> Self {
         Self {
             rest: solver.positions().to_vec(),
@@ -110,7 +106,7 @@ impl SolverStage {
         }
     }
 
-    /// The step; a record when it is worth one.
+    /// Runs a step; returns a record if one is due.
     pub fn step(&mut self, loads: &Loads, contact_seq: u64) -> Option<SolverRecord> {
         let switched = contact_seq != self.contact_seq;
         if switched {
@@ -130,7 +126,7 @@ impl SolverStage {
         (switched || self.steps.is_multiple_of(EACH)).then(|| self.record(report.inverted))
     }
 
-    /// Speed of the fastest node, mm/ms.
+    /// Returns the speed of the fastest node, mm/ms.
     fn fastest(&self) -> f32 {
         self.solver.velocities().iter().map(|v| v.length_squared()).fold(0.0, f32::max).sqrt()
     }
@@ -148,12 +144,13 @@ impl SolverStage {
         }
     }
 
-    /// Where the nodes are, mm.
+    /// Returns the node positions, mm.
     pub fn positions(&self) -> &[Vec3] {
         self.solver.positions()
     }
 
-    /// Copies the brain as it is now into a frame, without allocating when the frame has the size.
+    /// Copies step, positions and velocities into a frame; does not allocate if the frame is large
+    /// enough.
     pub fn publish(&self, frame: &mut SoftFrame) {
         frame.step = self.steps;
         frame.positions.clear();
@@ -162,7 +159,7 @@ impl SolverStage {
         frame.velocities.extend_from_slice(self.solver.velocities());
     }
 
-    /// Largest distance of a node from where it began, mm.
+    /// Returns the largest displacement of a node from its rest position, mm.
     pub fn displacement_mm(&self) -> f32 {
         let squared = self.solver.positions().iter().zip(&self.rest).map(|(x, x0)| x.distance_squared(*x0));
         squared.fold(0.0, f32::max).sqrt()
@@ -188,7 +185,7 @@ impl SolverStage {
         self.steps as f64 * f64::from(self.dt_ms)
     }
 
-    /// What had to be put right so far.
+    /// Returns the faults so far.
     pub fn solver_faults(&self) -> &SolverFaults {
         &self.solver_faults
     }

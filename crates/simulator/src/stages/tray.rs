@@ -1,73 +1,72 @@
-//! Which tool is in the hand, and when another may be taken.
+//! The present tool, and the conditions for changing it.
 //!
 //! # Practice
-//! A tool is laid down only while it touches nothing. From bone to brain there is a guard: the bone
-//! must be open, by a stroke that came through or a flap that was lifted. Back to the bone there is
-//! none. A request counts once, however long it is held; a slot that is asked for is tried until
-//! the tool is free.
+//! A tool can be changed only while it touches nothing. A tool for the brain requires an open bone:
+//! a stroke that came through or a lifted flap. A tool for bone has no such condition. A request
+//! counts once, however long its button is pressed; a requested slot is retried until the tool is
+//! free.
 
 use crate::program::{Phase, Program};
 use trepan_geometry::{Buttons, Tool, ToolKind};
 
-/// The tray and what is missing from it.
+/// The program's tools and the present one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tray {
     program: Program,
     slot: usize,
-    asked: (bool, Option<ToolKind>, Option<usize>),
+    last_request: (bool, Option<ToolKind>, Option<usize>),
 }
 
-/// What came of a request.
+/// Result of a request for a tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Change {
-    /// Another tool is in the hand.
+    /// The tool was changed.
     Taken,
-    /// The bone is not open.
+    /// The request was refused: the bone is not open.
     Refused,
 }
 
 impl Tray {
-    /// The first tool is in the hand.
+    /// Makes a tray with the first tool taken.
     pub fn new(program: Program) -> Self {
-        Self { program, slot: 0, asked: (false, None, None) }
+        Self { program, slot: 0, last_request: (false, None, None) }
     }
 
-    /// Place of the tool in the tray.
+    /// Returns the slot of the present tool.
     pub fn slot(&self) -> usize {
         self.slot
     }
 
-    /// The tool in the hand.
+    /// Returns the present tool.
     pub fn tool(&self) -> Tool {
         self.program.tray()[self.slot]
     }
 
-    /// The phase of the tool in the hand.
+    /// Returns the phase of the present tool.
     pub fn phase(&self) -> Phase {
         Phase::of(&self.tool())
     }
 
-    /// Changes the tool if that is asked for, the tool is `free`, and the bone `open` where it must
-    /// be.
+    /// Changes the tool on request, if the tool is `free` and the bone is `open` where required.
     pub fn change(&mut self, buttons: Buttons, free: bool, open: bool) -> Option<Change> {
-        let asks = (buttons.has(Buttons::NEXT_TOOL), buttons.taken(), buttons.in_slot());
-        let before = std::mem::replace(&mut self.asked, asks);
+        let request = (buttons.has(Buttons::NEXT_TOOL), buttons.taken(), buttons.in_slot());
+        let before = std::mem::replace(&mut self.last_request, request);
         let slots = self.program.tray().len();
-        let next = || asks.0.then(|| (self.slot + 1) % slots).filter(|_| !before.0);
-        let kind = || asks.1.filter(|_| before.1 != asks.1).and_then(|kind| self.of_kind(kind));
-        let wanted = next().or_else(kind).or(asks.2.filter(|slot| *slot < slots))?;
-        if wanted == self.slot || !free {
+        let next = || request.0.then(|| (self.slot + 1) % slots).filter(|_| !before.0);
+        let kind = || request.1.filter(|_| before.1 != request.1).and_then(|kind| self.of_kind(kind));
+        let target = next().or_else(kind).or(request.2.filter(|slot| *slot < slots))?;
+        if target == self.slot || !free {
             return None;
         }
-        let phase = Phase::of(&self.program.tray()[wanted]);
+        let phase = Phase::of(&self.program.tray()[target]);
         if phase == Phase::Brain && self.phase() == Phase::Craniotomy && !open {
-            return (before != asks).then_some(Change::Refused);
+            return (before != request).then_some(Change::Refused);
         }
-        self.slot = wanted;
+        self.slot = target;
         Some(Change::Taken)
     }
 
-    /// The next tool of a kind after the one in the hand, around the tray.
+    /// Returns the slot of the next tool of a kind, cyclically after the present one.
     fn of_kind(&self, kind: ToolKind) -> Option<usize> {
         let tray = self.program.tray();
         (1..=tray.len()).map(|step| (self.slot + step) % tray.len()).find(|slot| tray[*slot].kind == kind)
@@ -100,13 +99,13 @@ mod tests {
     }
 
     #[test]
-    fn the_brain_waits_for_an_opening() {
+    fn a_tool_for_the_brain_requires_an_opening() {
         let mut tray = Tray::new(Program::Integrated);
-        let asks = Buttons::take(ToolKind::Probe);
-        assert_eq!(tray.change(asks, true, false), Some(Change::Refused));
-        assert_eq!(tray.change(asks, true, false), None, "told once");
+        let request = Buttons::take(ToolKind::Probe);
+        assert_eq!(tray.change(request, true, false), Some(Change::Refused));
+        assert_eq!(tray.change(request, true, false), None, "reported once");
         tray.change(NONE, true, false);
-        assert_eq!((tray.change(asks, true, true), tray.phase()), (Some(Change::Taken), Phase::Brain));
+        assert_eq!((tray.change(request, true, true), tray.phase()), (Some(Change::Taken), Phase::Brain));
         let mut alone = Tray::new(Program::Brain);
         assert_eq!(alone.change(Buttons::NEXT_TOOL, true, false), Some(Change::Taken));
     }

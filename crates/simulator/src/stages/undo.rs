@@ -1,120 +1,118 @@
-//! Taking strokes of the burr back, the newest first: when it may be, a few bricks in a tick, and
-//! why not.
+//! Undoing strokes of the burr, the newest first, a few bricks per tick.
 //!
 //! # Theory
-//! The bricks of a stroke are exchanged with what was kept of them. Where a tool of either hand
-//! lies in bone that would come back, what has come back goes again, and the trainee is told which
-//! tool is in the way:
+//! The bricks of a stroke are exchanged with their stored copies. Where a tool of either hand lies
+//! in bone that would be restored, the bricks restored so far are removed again, and a notice names
+//! the tool in the way:
 //!
 //! ```text
-//! asked ─→ returning ──(all bricks)──→ back
-//!              └──(tool in the way)──→ leaving ─→ refused
+//! request ─→ returning ──(all bricks)──→ undone
+//!                └──(tool in the way)──→ leaving ─→ refused
 //! ```
 //!
 //! # Practice
-//! A tool counts with its tip and its shaft and a voxel of room around them, where contact lets it
-//! be. Nothing cuts, no tool changes and no flap moves meanwhile. The largest stroke takes half a
-//! second at 1 kHz, a burr hole a few ticks. All of it is a function of the ticks; nothing
-//! allocates.
+//! A tool is tested at its proxy with its tip and shaft, and a margin of one voxel. Meanwhile
+//! nothing cuts, no tool is changed and no flap moves. The largest stroke takes half a second at 1
+//! kHz, a burr hole a few ticks. The result depends on the ticks alone; nothing allocates.
 
 use crate::stages::notice::Hindrance;
 use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_volume::{BoneVolume, MAX_STROKES};
 
-/// Bricks put back in a tick: some 20 us.
+/// Bricks exchanged in a tick: some 20 us.
 const BRICKS: usize = 8;
 
-/// What is known of a stroke beside its bone.
+/// Data of a stroke besides its bone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Stroke {
-    /// Bone that it removed, mm³.
+    /// Bone removed, mm³.
     pub mm3: f32,
-    /// How often the burr came through in it.
+    /// Number of times that the burr came through.
     pub through: u32,
-    /// Whether the flap was away.
+    /// Whether the flap was lifted.
     pub flap_away: bool,
 }
 
-/// What came of asking.
+/// Result of a request to undo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Answer {
-    /// The bone of this stroke is back.
+    /// The stroke is undone.
     Back(Stroke),
-    /// It is not.
+    /// The request is refused.
     Not(Hindrance),
 }
 
-/// How far it is; the numbers count bricks.
+/// Progress of undoing; the numbers count bricks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum At {
+enum State {
     Rest,
-    /// So many are back.
+    /// Bricks restored so far.
     Returning(usize),
-    /// So many are still to go again.
+    /// Bricks still to be removed again, and the reason.
     Leaving(usize, Hindrance),
 }
 
-/// Where a tool is.
+/// A tool and its pose.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     /// The tool.
     pub tool: Tool,
-    /// Where contact lets it be.
+    /// Pose of the proxy.
     pub world_from_tool: Pose,
-    /// What to say when it is in the way.
-    pub said: Hindrance,
+    /// Reason to report when it is in the way.
+    pub hindrance: Hindrance,
 }
 
-/// The strokes that can come back.
+/// Strokes that can be undone.
 #[derive(Clone, Debug)]
 pub(crate) struct Undo {
-    at: At,
-    asked: bool,
-    /// By number, around.
+    at: State,
+    was_requested: bool,
+    /// Ring buffer, indexed by the number of the stroke.
     strokes: Vec<Stroke>,
 }
 
 impl Default for Undo {
-    /// Takes all memory.
+    /// Allocates all memory.
     fn default() -> Self {
-        Self { at: At::Rest, asked: false, strokes: vec![Stroke::default(); MAX_STROKES] }
+        Self { at: State::Rest, was_requested: false, strokes: vec![Stroke::default(); MAX_STROKES] }
     }
 }
 
 impl Undo {
-    /// Whether bone is on its way.
+    /// Whether a stroke is being undone.
     pub fn runs(&self) -> bool {
-        self.at != At::Rest
+        self.at != State::Rest
     }
 
-    /// The newest stroke.
+    /// Returns the newest stroke.
     pub fn newest(&mut self, bone: &BoneVolume) -> &mut Stroke {
         &mut self.strokes[bone.stroke_number() % MAX_STROKES]
     }
 
-    /// One tick. `hinders`: why no stroke may come back now; `flap_away`: whether the flap is;
-    /// `tools`: those in the hands.
+    /// Runs a tick. `hinders`: reason why no stroke can be undone now; `flap_away`: the flap is
+    /// lifted; `tools`: tools of both hands.
     pub fn tick(
         &mut self,
         bone: &BoneVolume,
-        asks: bool,
+        pressed: bool,
         hinders: Option<Hindrance>,
         flap_away: bool,
         tools: &[Option<Place>],
     ) -> Option<Answer> {
-        let before = std::mem::replace(&mut self.asked, asks);
+        let before = std::mem::replace(&mut self.was_requested, pressed);
         match self.at {
-            At::Rest if asks && !before => {
+            State::Rest if pressed && !before => {
                 let hinders = hinders.or_else(|| self.lacks(bone, flap_away));
                 hinders.map(Answer::Not).or_else(|| self.put_back(bone, tools, 0))
             }
-            At::Rest => None,
-            At::Returning(done) => self.put_back(bone, tools, done),
-            At::Leaving(left, why) => self.take_away(bone, left, why),
+            State::Rest => None,
+            State::Returning(done) => self.put_back(bone, tools, done),
+            State::Leaving(left, why) => self.take_away(bone, left, why),
         }
     }
 
-    /// Why there is no stroke that fits the bone as it is.
+    /// Returns why no stroke fits the present state of the bone.
     fn lacks(&mut self, bone: &BoneVolume, flap_away: bool) -> Option<Hindrance> {
         match (bone.strokes(), bone.forgot_strokes(), self.newest(bone).flap_away) {
             (0, true, _) => Some(Hindrance::Forgotten),
@@ -130,11 +128,11 @@ impl Undo {
         let end = (done + BRICKS).min(all);
         for n in done..end {
             if let Some(place) = tools.iter().flatten().find(|place| place.is_in_the_way(bone, n)) {
-                return self.take_away(bone, n, place.said);
+                return self.take_away(bone, n, place.hindrance);
             }
             bone.exchange_brick(n);
         }
-        self.at = if end == all { At::Rest } else { At::Returning(end) };
+        self.at = if end == all { State::Rest } else { State::Returning(end) };
         (end == all).then(|| {
             let stroke = *self.newest(bone);
             bone.drop_stroke();
@@ -145,13 +143,13 @@ impl Undo {
     fn take_away(&mut self, bone: &BoneVolume, left: usize, why: Hindrance) -> Option<Answer> {
         let end = left.saturating_sub(BRICKS);
         (end..left).for_each(|n| bone.exchange_brick(n));
-        self.at = if end == 0 { At::Rest } else { At::Leaving(end, why) };
+        self.at = if end == 0 { State::Rest } else { State::Leaving(end, why) };
         (end == 0).then_some(Answer::Not(why))
     }
 }
 
 impl Place {
-    /// Whether the tool lies where the `n`th brick of the newest stroke would bring bone back.
+    /// Whether the tool lies where the `n`th brick of the newest stroke would restore bone.
     fn is_in_the_way(&self, bone: &BoneVolume, n: usize) -> bool {
         let Tool { tip_radius_mm, shaft_radius_mm, shaft_length_mm, .. } = self.tool;
         let (tip, axis) = (self.world_from_tool.translation, self.world_from_tool.rotation * Vec3::Z);
@@ -171,7 +169,7 @@ mod tests {
     use glam::IVec3;
     use trepan_volume::{AIR_HU, VoxelVolume};
 
-    /// A block with a trench of 40 bricks.
+    /// Makes a block with a trench of 40 bricks.
     fn trench() -> (BoneVolume, VoxelVolume<i16>) {
         let whole = VoxelVolume::isotropic([320, 16, 16], Vec3::ZERO, 1.0, 900i16);
         let bone = BoneVolume::new(&whole, 400).expect("all bone");
@@ -183,11 +181,11 @@ mod tests {
 
     fn probe(x: f32, y: f32) -> Option<Place> {
         let world_from_tool = Pose::from_translation(Vec3::new(x, y, -1.0));
-        Some(Place { tool: Tool::probe(1.0), world_from_tool, said: Hindrance::Tool })
+        Some(Place { tool: Tool::probe(1.0), world_from_tool, hindrance: Hindrance::Tool })
     }
 
     #[test]
-    fn a_long_stroke_comes_back_over_several_ticks_each_of_bounded_work() {
+    fn a_long_stroke_is_undone_over_several_ticks_each_of_bounded_work() {
         let (bone, whole) = trench();
         let mut undo = Undo::default();
         undo.newest(&bone).mm3 = 5.0;
@@ -209,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tool_that_comes_into_the_way_gets_its_room_back() {
+    fn a_tool_that_moves_into_restored_bone_has_it_removed_again() {
         let (bone, whole) = trench();
         let cut = bone.snapshot();
         let mut undo = Undo::default();
@@ -219,15 +217,15 @@ mod tests {
         let answer = (0..9).find_map(|_| into(&mut undo));
         assert_eq!(answer, Some(Answer::Not(Hindrance::Tool)));
         assert!(bone.snapshot() == cut && !undo.runs() && bone.strokes() == 1);
-        assert_eq!(undo.tick(&bone, true, None, false, &[]), None, "held down it asks once");
+        assert_eq!(undo.tick(&bone, true, None, false, &[]), None, "pressed once, it requests once");
         undo.tick(&bone, false, None, false, &[]);
         assert!((0..9).any(|_| undo.tick(&bone, true, None, false, &[]).is_some()) && bone.snapshot() == whole);
     }
 
     #[test]
-    fn a_shaft_in_the_hole_is_in_the_way_and_a_tool_beside_it_is_not() {
+    fn a_tool_in_the_hole_prevents_undoing_with_its_shaft_and_its_ball() {
         let (bone, _) = trench();
-        let asks = |place| {
+        let answer_at = |place| {
             let mut undo = Undo::default();
             undo.tick(
                 &bone,
@@ -237,12 +235,12 @@ mod tests {
                 &[Some(Place {
                     tool: Tool::burr(3.0),
                     world_from_tool: Pose::from_translation(place),
-                    said: Hindrance::Tool,
+                    hindrance: Hindrance::Tool,
                 })],
             )
         };
-        assert_eq!(asks(Vec3::ZERO), Some(Answer::Not(Hindrance::FlapMoves)));
-        assert_eq!(asks(Vec3::new(60.0, 4.0, -20.0)), Some(Answer::Not(Hindrance::Tool)), "the shaft");
-        assert_eq!(asks(Vec3::new(60.0, 4.0, 6.5)), Some(Answer::Not(Hindrance::Tool)), "the ball");
+        assert_eq!(answer_at(Vec3::ZERO), Some(Answer::Not(Hindrance::FlapMoves)));
+        assert_eq!(answer_at(Vec3::new(60.0, 4.0, -20.0)), Some(Answer::Not(Hindrance::Tool)), "the shaft");
+        assert_eq!(answer_at(Vec3::new(60.0, 4.0, 6.5)), Some(Answer::Not(Hindrance::Tool)), "the ball");
     }
 }

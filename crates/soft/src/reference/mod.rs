@@ -97,7 +97,8 @@ impl Reference {
         body.check()?;
         let cells = Cells::of(body, config.order);
         let factor = Factor::of(&cells.fixed, cells.cells.iter().map(|cell| &cell.nodes[..]));
-        let factor = factor.filter(|_| config.motion || body.is_held()).ok_or(BodyError::Floating(body.fixed.len()))?;
+        let factor =
+            factor.filter(|_| config.motion || body.is_supported()).ok_or(BodyError::Floating(body.fixed.len()))?;
         let zero = || vec![DVec3::ZERO; cells.rest.len()];
         Ok(Self {
             config: *config,

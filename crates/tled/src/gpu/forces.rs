@@ -7,8 +7,8 @@
 //!
 //! # Practice
 //! 80 bytes read in a row and 64 bytes scattered a tetrahedron and step, besides the displacements
-//! of four nodes; 96 more read and written for a memory of past stress, 16 more for the cure of
-//! locking. What a body does not need is compiled out of its kernels.
+//! of four nodes; 96 more read and written for a memory of past stress, 16 more for averaged nodal
+//! pressure. What a body does not need is compiled out of its kernels.
 
 use crate::block::omega2_over_stiffness;
 use crate::config::Config;
@@ -74,7 +74,7 @@ impl Forces {
                     (&slots).into(),
                     (&more).into(),
                     (&memory).into(),
-                    (&topology.swelling).into(),
+                    (&topology.volume_change).into(),
                     (&range).into(),
                 ],
             )?;
@@ -93,9 +93,9 @@ impl Forces {
 }
 
 /// The kernel of a tetrahedron's law, with what the body needs.
-fn text(body: &Body, tet: u32, relaxes: bool, cures: bool) -> String {
+fn text(body: &Body, tet: u32, relaxes: bool, averages: bool) -> String {
     let law = TLED_FORCES[usize::from(kind(body, tet))];
-    format!("const RELAXES = {relaxes};\nconst CURES = {cures};\n{law}")
+    format!("const RELAXES = {relaxes};\nconst AVERAGES = {averages};\n{law}")
 }
 
 /// A tetrahedron's constants, and its ω² over stiffness at rest.

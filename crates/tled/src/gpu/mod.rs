@@ -2,13 +2,13 @@
 //!
 //! # Theory
 //! ```text
-//! volumes  elements ──▶ change of volume                          (only where locking is cured)
-//! node_groups    change of volume ──▶ its mean around each node         (only where locking is cured)
+//! volumes  elements ──▶ change of volume                          (only with averaged pressure)
+//! node_groups    change of volume ──▶ its mean around each node  (only with averaged pressure)
 //! forces   elements ──▶ slots, one a corner, sorted by node
 //! press    touched nodes ──▶ forces of the contact springs       (only where something touches)
 //! update   slots ──▶ node, in their order; v⁺, u⁺
 //! ```
-//! Every law, the cure of locking, Prony's relaxation and mass scaling are there, with the
+//! Every law, averaged nodal pressure, Prony's relaxation and mass scaling are there, with the
 //! processor's arithmetic. No atomics and no order that depends on timing: the same input gives the
 //! same bytes on the same device. Against the processor's solver the difference is that of
 //! rounding, since drivers may fuse a multiplication and an addition.
@@ -28,7 +28,8 @@
 //! let mesh = boxes::split_box([8, 8, 8], trepan_geometry::Vec3::splat(80.0));
 //! let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
 //! let gpu = Gpu::open(Prefer::Hardware)?;
-//! let mut tled = GpuTled::new(&gpu, &Body::uniform(mesh, fixed, Material::BRAIN), &Config::default())?;
+//! let body = Body::uniform(mesh, fixed, Material::BRAIN);
+//! let mut tled = GpuTled::new(&gpu, &body, &Config::default())?;
 //! tled.steps(&Loads { gravity: trepan_geometry::Vec3::NEG_Z * 9.81e-3, ..Loads::default() }, 30);
 //! tled.read()?;
 //! println!("{}", tled.positions()[0]);
@@ -123,16 +124,16 @@ impl GpuTled {
         let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
         let damping_per_ms = damping_rate(config.damping, lowest_per_ms(body, config.damping, &stiffness));
         refuse(body, config, damping_per_ms)?;
-        let (layout, cures) = (Layout::of(body), config.averaged_pressure);
-        let node_groups = NodeGroups::of(body, &layout, cures);
+        let (layout, averages) = (Layout::of(body), config.averaged_pressure);
+        let node_groups = NodeGroups::of(body, &layout, averages);
         let state = DeviceState::new(gpu, body, &layout, stiffness.masses_g())?;
-        let topology = Topology::new(gpu, body, &layout, &node_groups, cures)?;
+        let topology = Topology::new(gpu, body, &layout, &node_groups, averages)?;
         let forces = Forces::new(gpu, (body, &layout, &scaling), config, &state, &topology)?;
         let volumes = || Volumes::new(gpu, (body, &layout, &node_groups), &state, &topology, &forces);
         let press = Press::new(gpu, &state, &topology, &forces)?;
         let stiffest = stiffest(body, &scaling);
         Ok(Self {
-            volumes: cures.then(volumes).transpose()?,
+            volumes: averages.then(volumes).transpose()?,
             update: Update::new(gpu, &state, &topology, &forces, &press)?,
             gpu: gpu.clone(),
             config: *config,
@@ -332,7 +333,7 @@ fn refuse(body: &Body, config: &Config, damping_per_ms: f32) -> Result<(), GpuTl
     if config.still_mm > 0.0 {
         return Err(GpuTledError::Unsupported { field: "still_mm", right: "every element in every step (0)" });
     }
-    if damping_per_ms > 0.0 && !body.is_held() {
+    if damping_per_ms > 0.0 && !body.is_supported() {
         let right = "undamped bodies where no fixed nodes hold them";
         return Err(GpuTledError::Unsupported { field: "damping", right });
     }

@@ -46,8 +46,8 @@ pub(crate) struct Spring {
     padding: [u32; 2],
 }
 
-/// Springs, and of every node that they touch its place and the bits of its weight, of 1/m and of
-/// the share of m that has weight.
+/// Springs, and the place of every node that they touch. With it go the bits of its weight, of 1/m
+/// and of the share of m that has weight.
 pub(crate) struct List {
     springs: Vec<Spring>,
     touched: Vec<[u32; 4]>,

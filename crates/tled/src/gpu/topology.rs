@@ -5,7 +5,7 @@
 //! node_groups by place, so that one run of slots belongs to a group and a longer one to a node.
 //!
 //! ```text
-//! slots   │ group 0 │ group 1 │ group 2 │ …         a group: the elements of one material around a node, where locking is cured
+//! slots   │ group 0 │ group 1 │ …    a group: the elements of one material around a node
 //!         │ place 0│     place 1     │ …         a place: a node
 //! ```
 
@@ -20,9 +20,9 @@ pub(crate) struct Topology {
     pub corners: Buffer<[u32; 4]>,
     /// Where a place's run of slots begins, one more than places.
     pub starts: Buffer<u32>,
-    /// By group: mean `J - 1` around it; one number where locking is not cured.
-    pub swelling: Buffer<f32>,
-    /// The same on this side, for the cure of locking.
+    /// By group: mean `J - 1` around it; one number without averaged pressure.
+    pub volume_change: Buffer<f32>,
+    /// The same on this side, for averaged nodal pressure.
     pub runs: Runs,
 }
 
@@ -42,20 +42,20 @@ impl Topology {
         body: &Body,
         layout: &Layout,
         node_groups: &NodeGroups,
-        cures: bool,
+        averages: bool,
     ) -> Result<Self, GpuError> {
         let groups_of: Vec<[u32; 4]> = layout.tet_at.iter().map(|&t| node_groups.of_tet(body, layout, t)).collect();
         let runs = Runs::of(&groups_of, node_groups, layout.node_at.len());
         let place = |group: u32| node_groups.place_of[group as usize];
         let mut corners: Vec<[u32; 4]> = groups_of.iter().map(|tet| tet.map(place)).collect();
         corners.extend_from_slice(&runs.slots);
-        if cures {
+        if averages {
             corners.extend_from_slice(&groups_of);
         }
         Ok(Self {
             corners: Buffer::from_slice(gpu, "corners", &corners)?,
             starts: Buffer::from_slice(gpu, "starts", &runs.of_places)?,
-            swelling: Buffer::zeroed(gpu, "swelling", if cures { node_groups.place_of.len() } else { 1 })?,
+            volume_change: Buffer::zeroed(gpu, "volume_change", if averages { node_groups.place_of.len() } else { 1 })?,
             runs,
         })
     }

@@ -1,4 +1,5 @@
-//! The passes that cure locking: every element's change of volume, and its mean around the nodes.
+//! The passes of averaged nodal pressure: every element's change of volume, and its mean around the
+//! nodes.
 //!
 //! # Practice
 //! 80 bytes read in a row a tetrahedron and step besides its nodes, 4 written, and 8 read for each
@@ -14,7 +15,7 @@ use trepan_gpu::{Bindings, Buffer, Dispatches, Gpu, GpuError, Kernel, Slot};
 use trepan_shaders::TLED_VOLUMES;
 use trepan_soft::Body;
 
-/// The kernels of the cure.
+/// The kernels of averaged pressure.
 pub(crate) struct Volumes {
     passes: [(Kernel, Bindings, u32); 2],
 }
@@ -56,7 +57,7 @@ impl Volumes {
             (&owners).into(),
             (&swollen).into(),
             (&inverse).into(),
-            (&topology.swelling).into(),
+            (&topology.volume_change).into(),
         ];
         let of_means = means.bind(gpu, &of_means)?;
         Ok(Self { passes: [(volumes, of_volumes, elements as u32), (means, of_means, count as u32)] })

@@ -1,5 +1,4 @@
-//! `cargo xtask validate`, `merge` and `compare`: runs suites, puts shards together, sets two runs
-//! side by side.
+//! `cargo xtask validate`, `merge` and `compare`: runs suites, merges shards, compares two runs.
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
@@ -31,55 +30,57 @@ struct Arguments {
 
 #[derive(Args)]
 struct Run {
-    /// The suites to run, or one's parts that begin so, as in rigid/walls [default: all but those
-    /// that run when named only]
+    /// Suites to run, or parts of a suite, as in rigid/walls [default: all suites except those that
+    /// run only when named]. A part's name may be given by its beginning
     suites: Vec<String>,
     /// Fewer and smaller scenes
     #[arg(long)]
     quick: bool,
-    /// Seed of everything random
+    /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     seed: u64,
-    /// Only every Nth part, from the Ith on, as in 2/8; `cargo xtask merge` puts the shards'
-    /// folders together
+    /// Run only every Nth part, from the Ith on, as in 2/8; `cargo xtask merge` combines the
+    /// folders
+    /// of the shards
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<(usize, usize)>,
-    /// Processes beside each other, one for each core at most: sooner done, and times that disturb
+    /// Number of parallel processes, at most one per core: finishes sooner, but the timings disturb
     /// each other [default: 2 with --quick, else 1]
     #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u8).range(1..))]
     jobs: Option<u8>,
-    /// Keep the borders of this run's maps as those that later runs are held against (in the
-    /// sources)
+    /// Store the stability boundaries of this run's maps in the sources, as the reference for later
+    /// runs
     #[arg(long, conflicts_with = "shard")]
     keep_borders: bool,
-    /// Name the parts instead of running them
+    /// List the parts instead of running them
     #[arg(long)]
     list: bool,
-    /// Where SUITE.json and index.html go
+    /// Output folder for SUITE.json and index.html
     #[arg(long, value_name = "DIR", default_value = "target/validation")]
     out: PathBuf,
 }
 
 #[derive(Subcommand)]
 enum Task {
-    /// Put the parts of several shards together
+    /// Merge the parts of several shards
     Merge {
         /// Folders that shards wrote with --out
         #[arg(required = true)]
         folders: Vec<PathBuf>,
-        /// Where SUITE.json and index.html go
+        /// Output folder for SUITE.json and index.html
         #[arg(long, value_name = "DIR", default_value = "target/validation")]
         out: PathBuf,
-        /// Keep the borders of the merged maps as those that later runs are held against (in the
-        /// sources)
+        /// Store the stability boundaries of the merged maps in the sources, as the reference for
+        /// later
+        /// runs
         #[arg(long)]
         keep_borders: bool,
     },
-    /// What got faster, slower, more or less accurate from one run to another
+    /// Report what got faster, slower, more or less accurate from one run to another
     Compare {
-        /// A folder with SUITE.json files
+        /// Folder with the SUITE.json files of the old run
         old: PathBuf,
-        /// Another one
+        /// Folder with the SUITE.json files of the new run
         new: PathBuf,
     },
 }
@@ -115,7 +116,7 @@ fn main() -> ExitCode {
 struct Job {
     suite: &'static Suite,
     part: Part,
-    /// Its name in files and durations.
+    /// Name in files and durations.
     key: String,
 }
 
@@ -137,8 +138,8 @@ fn run(asked: &Run) -> Result<bool> {
             thread::available_parallelism()?.get().min(jobs.len()).min(asked.jobs.unwrap_or(scope.pick(2, 1)).into())
         }
     };
-    let told = if at_once > 1 { beside(at_once, asked, &jobs, &store)? } else { BTreeSet::new() };
-    let kept = perform(jobs, &store, scope, &told)?;
+    let reported = if at_once > 1 { beside(at_once, asked, &jobs, &store)? } else { BTreeSet::new() };
+    let kept = perform(jobs, &store, scope, &reported)?;
     if asked.shard.is_some() || whole_suites.is_empty() {
         println!("parts: {}", asked.out.join("parts").display());
         return Ok(kept);
@@ -153,7 +154,7 @@ fn run(asked: &Run) -> Result<bool> {
     Ok(paged(&asked.out)? && passed)
 }
 
-/// The parts that are asked for, and the suites that are asked for as a whole.
+/// The requested parts, and the suites that are requested as a whole.
 fn jobs(names: &[String], scope: Scope) -> Result<(Vec<Job>, Vec<&'static Suite>)> {
     let job = |suite: &'static Suite, part: Part| Job { suite, key: format!("{}/{}", suite.name, part.slug()), part };
     let of = |suite: &'static Suite| (suite.parts)(scope).into_iter().map(move |part| job(suite, part));
@@ -183,7 +184,7 @@ fn jobs(names: &[String], scope: Scope) -> Result<(Vec<Job>, Vec<&'static Suite>
     Ok((jobs, suites))
 }
 
-/// How far a run is: parts that are done, and the time that is left by what they took last time.
+/// Progress of a run: finished parts, and the remaining time estimated from the last run.
 struct Progress {
     bar: ProgressBar,
     durations: BTreeMap<String, f64>,
@@ -197,7 +198,7 @@ impl Progress {
         let usual_s = durations.values().sum::<f64>() / durations.len().max(1) as f64;
         let bar = ProgressBar::new(jobs.len() as u64);
         bar.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} parts, {msg}")?);
-        // Lines that go to a file or another process are not to be missed from it.
+        // A bar would hide lines that go to a file or another process.
         if !std::io::stdout().is_terminal() {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
@@ -211,7 +212,7 @@ impl Progress {
         self.durations.get(key).copied().unwrap_or(self.usual_s)
     }
 
-    /// Shows a part beside the time that is left.
+    /// Shows the current part and the remaining time.
     fn show(&self, key: &str) {
         let left = match self.left_s > 0.0 {
             true => format!(" about {} left", HumanDuration(Duration::from_secs_f64(self.left_s))),
@@ -221,8 +222,9 @@ impl Progress {
     }
 }
 
-/// Runs the parts as shards in processes beside each other, into one folder, and passes on what
-/// they tell of parts; gives the parts of which they told.
+/// Runs the parts as shards in parallel processes, into one folder, and forwards their output
+/// lines;
+/// returns the parts that were reported.
 fn beside(at_once: usize, asked: &Run, jobs: &[Job], store: &Store) -> Result<BTreeSet<String>> {
     let program = std::env::current_exe()?;
     let start = |number: usize| {
@@ -232,37 +234,37 @@ fn beside(at_once: usize, asked: &Run, jobs: &[Job], store: &Store) -> Result<BT
         shard.stdout(Stdio::piped()).spawn().context("cannot start a process for a shard")
     };
     let mut shards = (0..at_once).map(start).collect::<Result<Vec<Child>>>()?;
-    let (mut progress, mut told) = (Progress::of(jobs, store, at_once)?, BTreeSet::new());
+    let (mut progress, mut reported) = (Progress::of(jobs, store, at_once)?, BTreeSet::new());
     thread::scope(|scope| {
-        let (say_on, lines) = mpsc::channel();
+        let (forward, lines) = mpsc::channel();
         for out in shards.iter_mut().filter_map(|shard| shard.stdout.take()) {
-            let say_on = say_on.clone();
+            let forward = forward.clone();
             scope.spawn(move || {
-                BufReader::new(out).lines().map_while(Result::ok).try_for_each(|line| say_on.send(line))
+                BufReader::new(out).lines().map_while(Result::ok).try_for_each(|line| forward.send(line))
             });
         }
-        drop(say_on);
+        drop(forward);
         for line in lines {
             let Some(key) = line.split(": ").next().filter(|key| jobs.iter().any(|job| job.key == *key)) else {
                 continue;
             };
-            say(&progress.bar, &line);
+            print(&progress.bar, &line);
             progress.left_s -= progress.expected_s(key) / at_once as f64;
             progress.bar.inc(1);
             progress.show(key);
-            told.insert(key.to_string());
+            reported.insert(key.to_string());
         }
     });
     progress.bar.finish_and_clear();
     for mut shard in shards {
         shard.wait()?;
     }
-    Ok(told)
+    Ok(reported)
 }
 
-/// Runs what is not there yet; gives whether every promise of every part was kept. Of parts that
-/// were `told` of before, nothing is said.
-fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, told: &BTreeSet<String>) -> Result<bool> {
+/// Runs the parts that are not stored yet; returns whether every acceptance limit of every part is
+/// met. Parts in `reported` are not printed again.
+fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, reported: &BTreeSet<String>) -> Result<bool> {
     let mut progress = Progress::of(&jobs, store, 1)?;
     let mut passed = true;
     for Job { suite, part, key } in jobs {
@@ -270,8 +272,8 @@ fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, told: &BTreeSet<String>)
         progress.left_s -= progress.expected_s(&key);
         let slug = part.slug();
         if let Some(stored) = store.found(suite.name, &slug) {
-            if !told.contains(&key) {
-                say(&progress.bar, &format!("{key}: there already"));
+            if !reported.contains(&key) {
+                print(&progress.bar, &format!("{key}: already done"));
             }
             passed &= stored.findings.gates.iter().all(|gate| gate.pass);
             progress.durations.insert(key, stored.seconds);
@@ -280,8 +282,8 @@ fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, told: &BTreeSet<String>)
             let (findings, ended) = part.run(scope);
             let seconds = began.elapsed().as_secs_f64();
             let broken = findings.gates.iter().filter(|gate| !gate.pass).count();
-            let word = if broken == 0 { String::new() } else { format!(", {broken} promise(s) BROKEN") };
-            say(&progress.bar, &format!("{key}: {seconds:.1} s{word}"));
+            let word = if broken == 0 { String::new() } else { format!(", {broken} acceptance limit(s) BROKEN") };
+            print(&progress.bar, &format!("{key}: {seconds:.1} s{word}"));
             passed &= broken == 0;
             store.keep(suite.name, &slug, (seconds, before.or(Control::now())), (findings, ended))?;
             if ended {
@@ -296,8 +298,8 @@ fn perform(jobs: Vec<Job>, store: &Store, scope: Scope, told: &BTreeSet<String>)
     Ok(passed)
 }
 
-/// Above the bar, or plainly where there is none.
-fn say(bar: &ProgressBar, line: &str) {
+/// Prints above the progress bar, or plainly if the bar is hidden.
+fn print(bar: &ProgressBar, line: &str) {
     if bar.is_hidden() {
         println!("{line}");
     } else {
@@ -320,7 +322,7 @@ fn merge(folders: &[PathBuf], out: &Path, keep_borders: bool) -> Result<bool> {
     Ok(paged(out)? && passed)
 }
 
-/// Keeps the borders of a suite that has maps, where that is asked for.
+/// Stores the boundaries of a suite that has maps, if requested.
 fn keep(asked: bool, suite: &Suite, report: &Report) -> Result<()> {
     if asked && !report.findings.maps.is_empty() {
         borders::keep(suite.name, report.making.scope(), &report.findings.maps)?;
@@ -328,7 +330,7 @@ fn keep(asked: bool, suite: &Suite, report: &Report) -> Result<()> {
     Ok(())
 }
 
-/// A suite's file, and its gates for the eye.
+/// Writes a suite's file and prints its gates.
 fn write(suite: &Suite, report: &Report, out: &Path) -> Result<bool> {
     println!("{}: {}?", suite.name, suite.question);
     for gate in &report.findings.gates {
@@ -340,7 +342,8 @@ fn write(suite: &Suite, report: &Report, out: &Path) -> Result<bool> {
     Ok(report.passed())
 }
 
-/// The page of every report that lies in the folder; whether every method of every family is in it.
+/// Writes the page of every report in the folder; returns whether every method of every family is
+/// in it.
 fn paged(out: &Path) -> Result<bool> {
     let mut reports = Vec::new();
     for suite in ALL.iter().chain(ON_REQUEST) {
@@ -359,7 +362,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_named_twice_is_run_once() {
+    fn parts_named_twice_run_once() {
         let count = |names: &[&str]| {
             let names: Vec<String> = names.iter().map(ToString::to_string).collect();
             let (jobs, suites) = jobs(&names, Scope { quick: true, seed: 1 }).unwrap();

@@ -1,4 +1,4 @@
-//! The real heads that others are made from, and what is measured of them once.
+//! Real heads that synthetic heads are made from, and their anatomy, measured once.
 
 use anyhow::{Context, Result};
 use glam::DVec3;
@@ -7,37 +7,37 @@ use std::path::{Path, PathBuf};
 use trepan_fixtures::case_head;
 use trepan_volume::{AIR_HU, DistanceField, Grid, Interpolation, VoxelVolume, hounsfield, read, resample};
 
-/// FreeSurfer's codes of the two lateral ventricles.
+/// FreeSurfer labels of the two lateral ventricles.
 const VENTRICLES: [f32; 2] = [4.0, 43.0];
-/// Edge of the voxels that distances are measured on, mm.
+/// Voxel edge of the distance fields, mm.
 const WORK_MM: f64 = 2.0;
-/// What is at or over it is bone, HU.
+/// Lowest CT value of bone, HU.
 const BONE_HU: i16 = 250;
-/// The cavity is wider than this around its middle, mm: more than half the foramen magnum.
+/// Minimum radius of the cavity's wide part, mm: larger than the foramen magnum's.
 const WIDE_MM: f32 = 15.0;
-/// Enamel is over it, HU.
+/// Lowest CT value of enamel, HU.
 const TEETH_HU: i16 = 1400;
-/// Teeth lie further than this before and under the brain's middle, mm.
+/// Minimum distance of teeth in front of and below the brain's centre, mm.
 const TEETH_OFF_MM: [f64; 2] = [40.0, 50.0];
 
-/// A real head: CT, MRI and masks in one space.
+/// Real head: CT, MRI and masks in one space.
 pub struct BaseHead {
-    /// A short name without spaces.
+    /// Short name without spaces.
     pub name: &'static str,
-    /// CT, HU.
+    /// CT image, HU.
     pub ct: VoxelVolume<i16>,
-    /// T1-weighted MRI.
+    /// T1-weighted MRI image.
     pub mri: VoxelVolume<f32>,
-    /// Brain, 0 or 1.
+    /// Brain mask, 0 or 1.
     pub brain: VoxelVolume<u8>,
-    /// Lateral ventricles, 0 or 1.
+    /// Mask of the lateral ventricles, 0 or 1.
     pub ventricles: VoxelVolume<u8>,
     pub(super) anatomy: Anatomy,
 }
 
-/// Distances and values that every head of a base needs.
+/// Distance fields and values that every head of a base needs.
 pub struct Anatomy {
-    /// Distance to the brain mask as it is, mm.
+    /// Distance to the unsmoothed brain mask, mm.
     pub truth: DistanceField,
     /// Distance to the brain's smoothed surface, mm.
     pub brain: DistanceField,
@@ -45,23 +45,23 @@ pub struct Anatomy {
     pub cavity: DistanceField,
     /// Distance to the ventricles' smoothed surface, mm.
     pub ventricles: DistanceField,
-    /// Middle of the brain's box.
+    /// Centre of the brain's bounding box.
     pub middle: DVec3,
     /// Half the brain's height, mm.
     half_height_mm: f64,
     /// Points of the head, about 4 mm apart.
     pub head: Vec<DVec3>,
-    /// Where there are teeth, or else the lowest front bone.
+    /// Points on teeth, or else on the lowest bone in front.
     pub teeth: Vec<DVec3>,
-    /// The MRI's grey value of ventricles.
+    /// MRI grey value of the ventricles.
     pub fluid: f32,
-    /// The MRI's median grey value in the brain.
+    /// Median MRI grey value of the brain.
     pub tissue: f32,
 }
 
-/// The built-in head, and the second one where the folder of shared data holds it.
+/// Reads the built-in head, and the second one if the folder of shared data holds it.
 ///
-/// That folder is `data` under what the environment variable `TREPAN_SHARED` names, else under
+/// That folder is `data` in the folder named by the environment variable `TREPAN_SHARED`, else in
 /// `../shared` beside the workspace.
 pub fn base_heads() -> Result<Vec<BaseHead>> {
     let mut heads = vec![BaseHead::built_in()?];
@@ -83,7 +83,7 @@ pub fn base_heads() -> Result<Vec<BaseHead>> {
 }
 
 impl BaseHead {
-    /// The built-in head.
+    /// Reads the built-in head.
     pub fn built_in() -> Result<Self> {
         let case = case_head();
         Self::read(case.name, &case.ct, &case.mri, &case.labels, &case.aseg)
@@ -97,7 +97,7 @@ impl BaseHead {
         Ok(Self::new(name, ct, image(mri)?, brain, ventricles))
     }
 
-    /// A head of images in one space; brain and ventricles lie on the MRI's grid and are not empty.
+    /// Creates a head from images in one space; the masks lie on the MRI's grid and are not empty.
     pub fn new(
         name: &'static str,
         ct: VoxelVolume<i16>,
@@ -135,7 +135,8 @@ impl Anatomy {
         }
     }
 
-    /// How far a point belongs to the vault, 0 to 1: over the ears, where the skull is one shell.
+    /// Membership of a point in the vault, 0 to 1: above the ears, where the skull is a single
+    /// shell.
     pub fn vault(&self, point: DVec3) -> f64 {
         let height = (point.z - self.middle.z) / self.half_height_mm;
         let share = ((height + 0.4) / 0.5).clamp(0.0, 1.0);
@@ -143,8 +144,8 @@ impl Anatomy {
     }
 }
 
-/// The space inside the skull: the brain, and what a ball that fits through no hole of the skull
-/// reaches from it.
+/// Distance to the cavity of the skull: the brain, and the space that a ball too large for the
+/// skull's holes reaches from it.
 fn cavity(ct: &VoxelVolume<i16>, brain: &VoxelVolume<f32>) -> DistanceField {
     let bone = resample(ct, &Grid::of(brain), Interpolation::Trilinear, AIR_HU).map(|hu| u8::from(hu >= BONE_HU));
     let wide = DistanceField::of_mask(&bone);
@@ -161,14 +162,14 @@ fn cavity(ct: &VoxelVolume<i16>, brain: &VoxelVolume<f32>) -> DistanceField {
     DistanceField::of_level(&space, 0.5)
 }
 
-/// A mask on another grid as shares of 1, smoothed so many times.
+/// Mask resampled to another grid as shares of 1, smoothed `times` times.
 fn smoothed(grid: &Grid, mask: &VoxelVolume<u8>, times: usize) -> VoxelVolume<f32> {
     let mut soft = resample(&mask.map(f32::from), grid, Interpolation::Trilinear, 0.0);
     (0..times).for_each(|_| smooth(&mut soft));
     soft
 }
 
-/// Weighs each voxel with its neighbours by 1 2 1 along each axis.
+/// Smooths with weights 1 2 1 along each axis.
 pub fn smooth<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(volume: &mut VoxelVolume<T>) {
     let [nx, ny, nz] = volume.dims;
     for (stride, count) in [(1, nx), (nx, ny), (nx * ny, nz)] {
@@ -182,13 +183,13 @@ pub fn smooth<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(volume: &mut Vox
     }
 }
 
-/// Lowest and highest voxel centre of what is at or over a half, along right, front and head.
+/// Lowest and highest centre of voxels of at least 0.5, along right, front and head.
 fn span(volume: &VoxelVolume<f32>) -> (DVec3, DVec3) {
     let inside = points(volume, |v| v >= 0.5, 0.0);
     inside.iter().fold((DVec3::MAX, DVec3::MIN), |(low, high), p| (low.min(*p), high.max(*p)))
 }
 
-/// Centres of the voxels of a kind, thinned to about one in so many mm along each axis.
+/// Voxel centres of a kind, thinned to about one per `apart_mm` along each axis.
 fn points<T: Copy>(volume: &VoxelVolume<T>, kind: impl Fn(T) -> bool, apart_mm: f64) -> Vec<DVec3> {
     let skip = (apart_mm / volume.spacing_mm()).floor().max(DVec3::ONE).as_uvec3().to_array().map(|n| n as usize);
     let [nx, ny, nz] = volume.dims;

@@ -1,25 +1,25 @@
-//! A head as files, as a user gives them.
+//! Writes a head as image files, as a user provides them.
 
 use super::head::Head;
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use trepan_volume::nifti;
 
-/// Where a head was written to.
+/// Paths of a written head.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Files {
-    /// CT, HU.
+    /// CT image, HU.
     pub ct: PathBuf,
-    /// MRI.
+    /// MRI image.
     pub mri: PathBuf,
-    /// The true brain on the MRI's grid.
+    /// True brain mask on the MRI's grid.
     pub brain: PathBuf,
-    /// The tumour on the MRI's grid, if there is one.
+    /// Tumour mask on the MRI's grid, if there is a tumour.
     pub tumour: Option<PathBuf>,
 }
 
 impl Head {
-    /// Writes the images as uncompressed NIfTI into a folder, which is made where it is missing.
+    /// Writes the images as uncompressed NIfTI into a folder, created if missing.
     pub fn write(&self, folder: &Path) -> Result<Files> {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
         let files = Files {

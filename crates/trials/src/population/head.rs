@@ -1,4 +1,4 @@
-//! One head with its truth.
+//! Synthetic head with its ground truth.
 
 use super::base::BaseHead;
 use super::lesion::Tumour;
@@ -7,24 +7,24 @@ use super::scan::{Patient, ct_grid, mri_grid};
 use super::warp::Warp;
 use trepan_volume::VoxelVolume;
 
-/// A head made from a real one, with what is known of it.
+/// Head made from a real one, with its ground truth.
 pub struct Head {
-    /// CT, HU.
+    /// CT image, HU.
     pub ct: VoxelVolume<i16>,
-    /// T1-weighted MRI, in the CT's space.
+    /// T1-weighted MRI image, in the CT's space.
     pub mri: VoxelVolume<f32>,
-    /// The true brain on the MRI's grid, 0 or 1.
+    /// True brain mask on the MRI's grid, 0 or 1.
     pub brain: VoxelVolume<u8>,
-    /// The tumour on the MRI's grid, 0 or 1, if there is one.
+    /// Tumour mask on the MRI's grid, 0 or 1, if there is a tumour.
     pub tumour: Option<VoxelVolume<u8>>,
-    /// What it was made by.
+    /// Recipe of the head.
     pub recipe: HeadRecipe,
-    /// Share of the recipe's displacements that was kept so that the map folds nowhere, 0 to 1.
+    /// Share of the recipe's displacements that was kept to prevent folding, 0 to 1.
     pub share: f64,
 }
 
 impl Head {
-    /// Makes a head; the same recipe and base give the same bits.
+    /// Makes a head; the same recipe and base give identical bits.
     pub fn make(recipe: &HeadRecipe, base: &BaseHead) -> Self {
         let warp = Warp::new(recipe, base);
         let tumour = recipe.tumour.map(|tumour| Tumour::placed(&tumour, recipe.seed, &warp, base));

@@ -1,29 +1,29 @@
-//! A tumour in the brain: where it lies and how it looks.
+//! Tumour in the brain: its place and its image contrast.
 
 use super::base::BaseHead;
 use super::recipe::{TumourRecipe, random_of};
 use super::warp::Warp;
 use glam::DVec3;
 
-/// Places that are tried.
+/// Number of places tried.
 const TRIES: usize = 4000;
-/// The depth of its middle over its greatest radius.
+/// Required depth of the centre over the largest radius.
 const DEPTH: f64 = 0.85;
-/// Tumours lie above this depth under the brain's middle, mm: in the cerebrum.
+/// Largest depth of a tumour's centre below the brain's centre, mm: keeps it in the cerebrum.
 const BELOW_MM: f64 = 15.0;
-/// Width of its border in the image, mm.
+/// Width of the border in the image, mm.
 const BORDER_MM: f64 = 1.5;
 
-/// An ellipsoid in the new head.
+/// Ellipsoidal tumour in the new head.
 pub struct Tumour {
     middle: DVec3,
     radii: DVec3,
-    /// Its grey value in the MRI over the brain's median.
+    /// MRI grey value over the brain's median.
     pub brightness: f64,
 }
 
 impl Tumour {
-    /// A tumour deep enough in the brain; smaller where no place is deep enough.
+    /// Places a tumour deep enough in the brain, shrunk if no place is deep enough.
     pub fn placed(recipe: &TumourRecipe, seed: u64, warp: &Warp, base: &BaseHead) -> Self {
         let mut random = random_of(seed, 3);
         let (low, high) = warp.corners();
@@ -48,7 +48,7 @@ impl Tumour {
         Self { middle, radii, brightness: recipe.brightness }
     }
 
-    /// Share of a voxel that is tumour, 0 to 1, over half inside.
+    /// Share of a voxel that is tumour, 0 to 1; above 0.5 inside.
     pub fn share(&self, point: DVec3) -> f64 {
         let level = ((point - self.middle) / self.radii).length();
         ((1.0 - level) * self.radii.min_element() / BORDER_MM + 0.5).clamp(0.0, 1.0)

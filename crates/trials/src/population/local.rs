@@ -1,16 +1,16 @@
 //! Local changes of shape: thickness of the vault, atrophy, size of the ventricles.
 //!
 //! # Theory
-//! Each is a velocity along the gradient of a distance d, and the map is where a point flows to in
+//! Each is a velocity along the gradient of a distance d. The map takes a point along the flow for
 //! unit time:
 //!
 //! ```text
-//! surface moved by m    speed -m · trapezoid(d), 1 between 0 and m, 0 from both ends on
+//! surface moved by m    speed -m · trapezoid(d), 1 between 0 and m, 0 beyond both ends
 //! thickness times f     speed -ln(f) · min(d, S), S = 8 mm · (f - 1) / ln(f):   d to d / f
 //! ```
 //!
-//! Points that flow in one continuous field never meet, so the map cannot fold, however thin a horn
-//! of a ventricle is.
+//! Trajectories of a continuous velocity field never meet, so the map cannot fold, even at a thin
+//! ventricular horn.
 
 use super::base::{Anatomy, smooth};
 use super::recipe::HeadRecipe;
@@ -18,27 +18,27 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use trepan_volume::{DistanceField, VoxelVolume};
 
-/// Bone within this distance of the cavity changes its thickness, mm: an adult vault and some more.
+/// Distance from the cavity within which bone changes its thickness, mm: adult vault plus a margin.
 const VAULT_MM: f32 = 8.0;
-/// Atrophy fades out at this depth in the brain, mm.
+/// Depth in the brain at which atrophy fades out, mm.
 const ATROPHY_MM: f32 = 16.0;
-/// Atrophy fades out this far outside the brain, mm.
+/// Distance outside the brain at which atrophy fades out, mm.
 const SPACE_MM: f32 = 1.0;
-/// Growth of the ventricles fades out at this distance, mm.
+/// Distance outside the ventricles at which their growth fades out, mm.
 const AROUND_MM: f32 = 20.0;
-/// Growth of the ventricles fades out this deep inside, mm.
+/// Depth inside the ventricles at which their growth fades out, mm.
 const INSIDE_MM: f32 = 3.0;
-/// Steps of the flow.
+/// Number of integration steps of the flow.
 const STEPS: usize = 6;
 
-/// The local changes of one head.
+/// Local changes of one head.
 pub struct Local {
     intact: Flow,
     with_atrophy: Option<Flow>,
 }
 
 impl Local {
-    /// The changes of a recipe, weakened to a share of what it asks for.
+    /// Creates the changes of a recipe, scaled by `share`.
     pub fn new(anatomy: &Anatomy, recipe: &HeadRecipe, share: f64) -> Self {
         let share = share as f32;
         let (thickness, ventricles) = (recipe.skull_thickness as f32, share * recipe.ventricles_mm as f32);
@@ -68,7 +68,7 @@ impl Local {
         Self { intact: smoothed(intact), with_atrophy: with_atrophy.map(smoothed) }
     }
 
-    /// Where a point of the head lies in the base.
+    /// Maps a point of the head to the base.
     pub fn place(&self, point: DVec3) -> Flown {
         let intact = self.intact.end(point.as_vec3());
         match &self.with_atrophy {
@@ -78,15 +78,15 @@ impl Local {
     }
 }
 
-/// Where the flow takes a point.
+/// Position of a point after the flow.
 pub struct Flown {
-    /// The base's point.
+    /// Point in the base.
     pub base: Vec3,
-    /// The base's point without the atrophy, where there is any.
+    /// Point in the base without atrophy, if the recipe has any.
     pub intact: Option<Vec3>,
 }
 
-/// A steady field of velocities, mm in unit time; nothing moves where it is empty.
+/// Steady velocity field, mm per unit time; zero where empty.
 #[derive(Clone)]
 struct Flow {
     velocities: VoxelVolume<Vec3>,
@@ -121,7 +121,7 @@ impl Flow {
         }
     }
 
-    /// Where a point is after unit time, by midpoint steps.
+    /// Position of a point after unit time, by midpoint steps.
     fn end(&self, point: Vec3) -> Vec3 {
         if !self.moves {
             return point;
@@ -137,7 +137,7 @@ impl Flow {
     }
 }
 
-/// A speed that moves a surface from 0 by a way, mm, and fades out towards two distances.
+/// Speed that moves the surface at distance 0 by a given length, mm, and fades out on both sides.
 #[derive(Clone, Copy)]
 struct Trapezoid {
     by: f32,
@@ -154,7 +154,7 @@ impl Trapezoid {
     }
 }
 
-/// A speed that takes a distance to a part of itself, within the vault.
+/// Speed that scales a distance by a factor within the vault.
 #[derive(Clone, Copy)]
 struct Thickening {
     log: f32,
@@ -176,13 +176,13 @@ impl Thickening {
 mod tests {
     use super::*;
 
-    /// Where a distance flows to in unit time.
+    /// Distance after flowing for unit time.
     fn flown(speed: impl Fn(f32) -> f32, from: f32) -> f32 {
         (0..1000).fold(from, |d, _| d + 1e-3 * speed(d))
     }
 
     #[test]
-    fn surfaces_go_where_they_should_and_far_points_stay() {
+    fn surfaces_move_as_requested_and_far_points_stay() {
         let near = |a: f32, b: f32| assert!((a - b).abs() < 0.05, "{a} instead of {b}");
         for by in [-4.0, -2.0, 1.0, 6.0] {
             let speed = Trapezoid { by, low: -16.0, high: 18.0 };

@@ -1,29 +1,29 @@
-//! Metal in a CT: fillings, clips, and the streaks that they cast in their slices.
+//! Metal in a CT: fillings, clips and the streaks they cast in their slices.
 
 use super::base::BaseHead;
 use super::recipe::{HeadRecipe, random_of};
 use super::warp::Warp;
 use glam::{DAffine3, DVec3};
 
-/// Streaks fade over this distance, mm.
+/// Decay length of streaks, mm.
 const FADE_MM: f64 = 60.0;
-/// Streaks reach this far out of the metal's slices, mm.
+/// Reach of streaks beyond the metal's slices, mm.
 const BEYOND_MM: f64 = 1.0;
-/// Greatest value of a scanner's usual range, HU.
+/// Highest value of a scanner's usual range, HU.
 pub const USUAL_HU: f32 = 3071.0;
 
-/// A capsule of metal.
+/// Capsule of metal.
 pub struct Metal {
     ends: [DVec3; 2],
     radius_mm: f64,
     hu: f32,
     streak_hu: f64,
-    /// Rays on a turn and their phase, for each wave.
+    /// Streaks per turn and phase of each wave.
     waves: [(f64, f64); 4],
 }
 
 impl Metal {
-    /// The pieces of a recipe: fillings at teeth, clips near the base of the brain.
+    /// Metal of a recipe: fillings at teeth, clips near the base of the brain.
     pub fn of(recipe: &HeadRecipe, warp: &Warp, base: &BaseHead) -> Vec<Self> {
         let mut random = random_of(recipe.seed, 4);
         let mut pieces = Vec::new();
@@ -49,7 +49,7 @@ impl Metal {
         Self { ends, radius_mm, hu, streak_hu, waves }
     }
 
-    /// Puts metal and streaks into a row of a slice whose first voxel's index is `[0, j, k]`.
+    /// Adds metal and streaks to a row of a slice whose first voxel has the index `[0, j, k]`.
     pub fn cast(&self, world: &DAffine3, [j, k]: [usize; 2], row: &mut [f32]) {
         let middle = 0.5 * (self.ends[0] + self.ends[1]);
         let reach = 0.5 * self.ends[0].distance(self.ends[1]) + self.radius_mm + BEYOND_MM;

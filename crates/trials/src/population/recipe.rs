@@ -1,77 +1,77 @@
-//! The numbers that a head is made by.
+//! Parameters of a synthetic head.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
-/// Least volume of a CT voxel, mm³: keeps a head under the limit of voxels.
+/// Smallest volume of a CT voxel, mm³: keeps a head under the voxel limit.
 const LEAST_CT_VOXEL_MM3: f64 = 0.45;
-/// Least volume of an MRI voxel, mm³.
+/// Smallest volume of an MRI voxel, mm³.
 const LEAST_MRI_VOXEL_MM3: f64 = 0.9;
 
-/// Edges of a voxel, mm.
+/// Voxel edges, mm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spacing {
-    /// Along both axes of a slice.
+    /// In-plane pixel size, mm.
     pub pixel_mm: f64,
-    /// From slice to slice.
+    /// Slice spacing, mm.
     pub slice_mm: f64,
 }
 
-/// A tumour: an ellipsoid in the brain.
+/// Ellipsoidal tumour in the brain.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TumourRecipe {
     /// Semi-axes, mm.
     pub radii_mm: [f64; 3],
-    /// Its grey value in the MRI over the brain's median.
+    /// MRI grey value over the brain's median.
     pub brightness: f64,
 }
 
-/// How a head differs from the real one that it is made from.
+/// Differences of a head from the real head it is made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeadRecipe {
-    /// What it was drawn from; also where noise, metal and tumour are drawn from.
+    /// Seed of the recipe and of noise, metal and tumour.
     pub seed: u64,
-    /// Number of the base head.
+    /// Index of the base head.
     pub base: usize,
-    /// Size along right, front and head over the base's.
+    /// Size along right, front and head, relative to the base.
     pub scale: [f64; 3],
     /// Shears xy, xz and yz.
     pub shear: [f64; 3],
-    /// Turn as axis times angle, degrees.
+    /// Rotation as axis times angle, degrees.
     pub turn_degrees: [f64; 3],
-    /// Shift, mm.
+    /// Translation, mm.
     pub shift_mm: [f64; 3],
-    /// Greatest displacement of the spline along an axis, mm.
+    /// Largest displacement of the spline along an axis, mm.
     pub warp_mm: f64,
-    /// Thickness of the vault over the base's.
+    /// Thickness of the vault relative to the base.
     pub skull_thickness: f64,
-    /// Growth of the ventricles outwards, mm; negative where they shrink.
+    /// Outward growth of the ventricles, mm; negative for shrinking.
     pub ventricles_mm: f64,
-    /// How far the brain's surface retreats, mm.
+    /// Retreat of the brain's surface, mm.
     pub atrophy_mm: f64,
     /// A tumour, if there is one.
     pub tumour: Option<TumourRecipe>,
-    /// The CT's voxels.
+    /// Voxel size of the CT.
     pub ct_spacing: Spacing,
-    /// Tilt of the gantry, degrees.
+    /// Gantry tilt, degrees.
     pub tilt_degrees: f64,
     /// Standard deviation of the CT's noise, HU.
     pub ct_noise_hu: f64,
-    /// Fillings among the teeth.
+    /// Number of dental fillings.
     pub fillings: usize,
-    /// Clips in the brain.
+    /// Number of clips in the brain.
     pub clips: usize,
-    /// The MRI's voxels.
+    /// Voxel size of the MRI.
     pub mri_spacing: Spacing,
-    /// Axis that the MRI's slices follow each other along: 0 right, 1 front, 2 head.
+    /// Slice axis of the MRI: 0 right, 1 front, 2 head.
     pub mri_slice_axis: usize,
-    /// Greatest relative deviation of the MRI's bias field.
+    /// Largest relative deviation of the MRI's bias field.
     pub mri_bias: f64,
 }
 
 impl HeadRecipe {
-    /// A head close to the base: voxels of 1 mm, little noise, nothing ill.
+    /// A recipe close to the base: voxels of 1 mm, little noise, no pathology.
     pub fn mild(seed: u64, bases: usize) -> Self {
         Self {
             seed,
@@ -96,7 +96,7 @@ impl HeadRecipe {
         }
     }
 
-    /// A head from a seed: each factor is on in about half of the heads, a tumour in a third.
+    /// A random recipe: each factor is active in about half of the heads, a tumour in a third.
     pub fn drawn(seed: u64, bases: usize) -> Self {
         let mut random = Draws(random_of(seed, 1));
         let three = |random: &mut Draws, low: f64, high: f64| [0; 3].map(|_| random.between(low, high));
@@ -129,7 +129,7 @@ impl HeadRecipe {
         recipe
     }
 
-    /// The recipes of a run: the first is mild, the others are drawn from the seeds after it.
+    /// Recipes of a run: the first is mild, the others are drawn from consecutive seeds.
     pub fn of_run(seed: u64, heads: usize, bases: usize) -> Vec<Self> {
         let of = |number: u64| match number {
             0 => Self::mild(seed, bases),
@@ -138,7 +138,7 @@ impl HeadRecipe {
         (0..heads as u64).map(of).collect()
     }
 
-    /// The recipe in one line: what differs from the base.
+    /// Describes the differences from the base in one line.
     pub fn describe(&self) -> String {
         let [x, y, z] = self.scale;
         let turn = DVec3::from_array(self.turn_degrees).length();
@@ -169,19 +169,19 @@ impl HeadRecipe {
     }
 }
 
-/// A generator for one purpose: draws for one never shift those for another.
+/// Generator for one purpose, so that draws for one never shift those for another.
 pub(super) fn random_of(seed: u64, purpose: u64) -> fastrand::Rng {
     let mut random = fastrand::Rng::with_seed(seed ^ purpose.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    // Seeds that differ by one bit begin alike.
+    // Seeds that differ by one bit start with similar values.
     fastrand::Rng::with_seed(random.u64(..))
 }
 
-/// To four digits after the point, so that a recipe comes back from JSON bit for bit.
+/// Rounds to four decimals, so that a recipe survives JSON bit for bit.
 fn rounded(value: f64) -> f64 {
     (1e4 * value).round() / 1e4
 }
 
-/// Draws of a recipe.
+/// Random draws of a recipe.
 struct Draws(fastrand::Rng);
 
 impl Draws {
@@ -193,7 +193,7 @@ impl Draws {
         self.0.f64() < share
     }
 
-    /// A value of the range in a share of the draws, else what is off.
+    /// A value of the range in a given share of the draws, else `off`.
     fn maybe(&mut self, share: f64, off: f64, low: f64, high: f64) -> f64 {
         let value = self.between(low, high);
         if self.chance(share) { value } else { off }
@@ -205,7 +205,7 @@ impl Draws {
         DVec3::new(ring * turn.cos(), ring * turn.sin(), z)
     }
 
-    /// Slices first, alike in each octave; pixels that keep the voxel over its least volume.
+    /// Spacing with log-uniform slices and pixels that keep the voxel above its smallest volume.
     fn spacing(&mut self, pixel: [f64; 2], slice: [f64; 2], least_mm3: f64) -> Spacing {
         let slice_mm = rounded(slice[0] * (slice[1] / slice[0]).powf(self.0.f64()));
         let least = (least_mm3 / slice_mm).sqrt().clamp(pixel[0], pixel[1]);

@@ -1,4 +1,4 @@
-//! The scanners: which voxels a head gets, and what CT and MRI show in them.
+//! Simulated scanners: the voxel grids and the contents of CT and MRI.
 
 use super::base::BaseHead;
 use super::lesion::Tumour;
@@ -10,33 +10,33 @@ use glam::{Affine3A, DAffine3, DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use trepan_volume::{AIR_HU, Grid, Sample, VoxelVolume};
 
-/// Most voxels of an image: pixels become larger where there were more.
+/// Largest number of voxels of an image; pixels are enlarged to stay below it.
 pub const MOST_VOXELS: usize = 40_000_000;
-/// Air around the head, mm.
+/// Air margin around the head, mm.
 const MARGIN_MM: f64 = 6.0;
-/// A slice is the mean over parts of at most this thickness, mm.
+/// Largest thickness of the sublayers that a slice averages, mm.
 const PART_MM: f64 = 1.3;
-/// Water around the brain, HU.
+/// CT value of cerebrospinal fluid, HU.
 const FLUID_HU: f32 = 8.0;
-/// A tumour over the brain, HU.
+/// CT value of a tumour above the brain's, HU.
 const TUMOUR_HU: f64 = 20.0;
-/// Distance between the control points of a bias field, mm.
+/// Spacing of the bias field's control points, mm.
 const BIAS_MM: f64 = 90.0;
 
-/// The CT's voxels: slices that lean towards the front, one above the other along the table.
+/// CT grid: slices tilted towards the front, stacked along the table.
 pub fn ct_grid(recipe: &HeadRecipe, warp: &Warp, base: &BaseHead) -> Grid {
     let (sin, cos) = recipe.tilt_degrees.to_radians().sin_cos();
     let axes = DMat3::from_cols(DVec3::X, DVec3::new(0.0, cos, sin), DVec3::Z);
     stack(axes, recipe.ct_spacing, warp, base)
 }
 
-/// The MRI's voxels.
+/// MRI grid.
 pub fn mri_grid(recipe: &HeadRecipe, warp: &Warp, base: &BaseHead) -> Grid {
     let axes = [1, 2, 3].map(|n| DVec3::AXES[(recipe.mri_slice_axis + n) % 3]);
     stack(DMat3::from_cols(axes[0], axes[1], axes[2]), recipe.mri_spacing, warp, base)
 }
 
-/// A stack of slices around the head, with larger pixels where it had too many voxels.
+/// Stack of slices around the head, with enlarged pixels if it has too many voxels.
 fn stack(axes: DMat3, spacing: Spacing, warp: &Warp, base: &BaseHead) -> Grid {
     let along = DAffine3::from_mat3(axes.inverse()) * warp.head_from_base();
     let points = base.anatomy.head.iter().map(|p| along.transform_point3(*p));
@@ -57,7 +57,7 @@ fn stack(axes: DMat3, spacing: Spacing, warp: &Warp, base: &BaseHead) -> Grid {
     }
 }
 
-/// One head before the scanners.
+/// Head before scanning.
 pub struct Patient<'a> {
     pub recipe: &'a HeadRecipe,
     pub base: &'a BaseHead,
@@ -66,7 +66,7 @@ pub struct Patient<'a> {
 }
 
 impl Patient<'_> {
-    /// The CT, HU.
+    /// Scans the CT, HU.
     pub fn ct(&self, grid: &Grid) -> VoxelVolume<i16> {
         let metal = Metal::of(self.recipe, self.warp, self.base);
         let from = Source::new(&self.base.ct, AIR_HU.into());
@@ -84,7 +84,7 @@ impl Patient<'_> {
         })
     }
 
-    /// The MRI.
+    /// Scans the MRI.
     pub fn mri(&self, grid: &Grid) -> VoxelVolume<f32> {
         let anatomy = &self.base.anatomy;
         let from = Source::new(&self.base.mri, 0.0);
@@ -95,7 +95,7 @@ impl Patient<'_> {
         let step = grid.world_from_voxel.x_axis;
         self.scanned(grid, look, |[j, k], sums, row| {
             let start = grid.world_from_voxel.transform_point3(DVec3::new(0.0, j as f64, k as f64));
-            // The field is smooth over centimetres.
+            // The field varies over centimetres.
             let field: Vec<f64> =
                 (0..=row.len() / 8 + 1).map(|n| 1.0 + bias.at(start + (8 * n) as f64 * step).x).collect();
             for (i, (to, sum)) in row.iter_mut().zip(sums).enumerate() {
@@ -107,7 +107,7 @@ impl Patient<'_> {
         })
     }
 
-    /// The brain, 0 or 1, where the voxels' centres are in it.
+    /// Brain mask, 0 or 1, by voxel centres.
     pub fn brain(&self, grid: &Grid) -> VoxelVolume<u8> {
         let truth = &self.base.anatomy.truth;
         let mut mask = VoxelVolume::filled(grid.dims, grid.world_from_voxel, 0);
@@ -122,7 +122,7 @@ impl Patient<'_> {
         mask
     }
 
-    /// The tumour on the brain's grid: 1 where over half of a voxel of the brain is tumour.
+    /// Tumour mask on the brain's grid: 1 where a brain voxel is more than half tumour.
     pub fn tumour_labels(&self, brain: &VoxelVolume<u8>) -> Option<VoxelVolume<u8>> {
         let tumour = self.tumour.as_ref()?;
         let [nx, ny, _] = brain.dims;
@@ -139,12 +139,12 @@ impl Patient<'_> {
         self.tumour.as_ref().map_or(0.0, |tumour| tumour.share(point))
     }
 
-    /// Whether atrophy took the brain away from here.
+    /// Whether atrophy replaced the brain by fluid here.
     fn is_fluid(&self, place: Place) -> bool {
         self.recipe.atrophy_mm > 0.0 && place.intact < 0.0 && self.base.anatomy.truth.sample(place.base) >= 0.0
     }
 
-    /// Each row's means over the slice's thickness, made voxels by `finish`.
+    /// Scans an image: averages each row over the slice thickness and converts it with `finish`.
     fn scanned<T: Sample>(
         &self,
         grid: &Grid,
@@ -173,9 +173,9 @@ impl Patient<'_> {
     }
 }
 
-/// An image that is looked up at world points.
+/// Image sampled at world points.
 ///
-/// Under it the neck goes on as it was cut off; elsewhere outside there is air.
+/// Below it, the neck continues its lowest slice; elsewhere outside there is air.
 struct Source<'a, T> {
     volume: &'a VoxelVolume<T>,
     voxel_from_world: Affine3A,
@@ -210,7 +210,7 @@ impl<'a, T: Sample> Source<'a, T> {
     }
 }
 
-/// About a normal deviate: the sum of four even ones, with a standard deviation of 1.
+/// Approximately normal deviate: sum of four uniform ones, with a standard deviation of 1.
 fn normal(random: &mut fastrand::Rng) -> f32 {
     let bits = random.u64(..);
     let sum: f32 = [0, 16, 32, 48].map(|shift| (bits >> shift & 0xffff) as f32).iter().sum();

@@ -1,10 +1,10 @@
-//! A smooth random field of vectors: uniform cubic B-splines.
+//! Smooth random vector field of uniform cubic B-splines.
 
 use glam::DVec3;
 
-/// Cubic B-spline on a grid of control points; beyond the grid the border holds on.
+/// Cubic B-spline on a grid of control points, extended by its border values.
 ///
-/// The basis is a partition of one with weights over 0, so no value leaves the range of the
+/// The basis is a partition of unity with positive weights, so no value leaves the range of the
 /// coefficients.
 pub struct Spline {
     low: DVec3,
@@ -14,7 +14,7 @@ pub struct Spline {
 }
 
 impl Spline {
-    /// A field over a box whose components are drawn from -amplitude to amplitude.
+    /// Creates a field over a box with components drawn from -amplitude to amplitude.
     pub fn random((low, high): (DVec3, DVec3), spacing_mm: f64, amplitude: f64, random: &mut fastrand::Rng) -> Self {
         let cells = ((high - low) / spacing_mm).ceil().max(DVec3::ONE).as_uvec3();
         let dims = [cells.x, cells.y, cells.z].map(|n| n as usize + 3);
@@ -23,7 +23,7 @@ impl Spline {
         Self { low, spacing_mm, dims, coefficients }
     }
 
-    /// The field at a point.
+    /// Field value at a point.
     pub fn at(&self, point: DVec3) -> DVec3 {
         let place = ((point - self.low) / self.spacing_mm).to_array();
         let [x, y, z]: [(usize, [f64; 4]); 3] = std::array::from_fn(|axis| {
@@ -45,7 +45,7 @@ impl Spline {
     }
 }
 
-/// Weights of the four control points around a place between the two in the middle.
+/// Weights of the four control points around a position between the middle two.
 fn basis(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [
@@ -69,7 +69,7 @@ mod tests {
             let p = DVec3::new(0.025 * f64::from(n), 0.02 * f64::from(n), 0.021 * f64::from(n));
             let (here, next) = (spline.at(p), spline.at(p + DVec3::splat(1e-3)));
             assert!(here.abs().max_element() <= 6.0);
-            // No slope of a component can exceed 2 amplitudes in one spacing along each axis.
+            // No component's slope along an axis exceeds 2 amplitudes per spacing.
             assert!((next - here).abs().max_element() <= 3.0 * 12.0 / 30.0 * 1e-3 + 1e-12, "a step at {p}");
             greatest = greatest.max(here.length());
         }

@@ -1,4 +1,4 @@
-//! Heads of the built-in base: the map, the truth, the scan.
+//! Tests of heads made from the built-in base: map, ground truth and scan.
 
 use super::base::BaseHead;
 use super::head::Head;
@@ -8,12 +8,12 @@ use glam::DVec3;
 use std::sync::LazyLock;
 use trepan_volume::{Grid, Interpolation, VoxelVolume, nifti, resample};
 
-/// Least value of bone in the tests, HU: far over the noise.
+/// Lowest bone value in the tests, HU: far above the noise.
 const BONE_HU: i16 = 300;
 
 static BASE: LazyLock<BaseHead> = LazyLock::new(|| BaseHead::built_in().expect("the built-in head is whole"));
 
-/// A head on coarse voxels, without noise that could pass for bone.
+/// Head on coarse voxels, without noise that could be taken for bone.
 fn coarse(recipe: HeadRecipe) -> Head {
     let spacing = Spacing { pixel_mm: 1.5, slice_mm: 2.0 };
     Head::make(&HeadRecipe { ct_spacing: spacing, mri_spacing: spacing, ct_noise_hu: 5.0, ..recipe }, &BASE)
@@ -27,7 +27,7 @@ fn ml<T: Copy>(volume: &VoxelVolume<T>, kind: impl Fn(T) -> bool) -> f64 {
     1e-3 * volume.voxel_mm3() * volume.data.iter().filter(|v| kind(**v)).count() as f64
 }
 
-/// The CT on the MRI's grid.
+/// CT on the MRI's grid.
 fn ct_there(head: &Head) -> VoxelVolume<i16> {
     resample(&head.ct, &Grid::of(&head.mri), Interpolation::Trilinear, -1000)
 }
@@ -38,26 +38,26 @@ fn share_of_brain_in_bone(head: &Head) -> f64 {
     both as f64 / head.brain.data.iter().filter(|v| **v != 0).count() as f64
 }
 
-/// The mean of the MRI where a mask is set.
+/// Mean of the MRI where a mask is set.
 fn mean(mri: &VoxelVolume<f32>, mask: impl Fn(usize) -> bool) -> f64 {
     let inside: Vec<f64> = (0..mri.data.len()).filter(|at| mask(*at)).map(|at| f64::from(mri.data[at])).collect();
     inside.iter().sum::<f64>() / inside.len() as f64
 }
 
 #[test]
-fn the_map_folds_nowhere_and_keeps_what_was_asked() {
+fn the_map_does_not_fold_and_keeps_the_requested_share() {
     let mut kept = 0.0;
     for seed in 0..5 {
         let warp = Warp::new(&HeadRecipe::drawn(seed, 1), &BASE);
         assert!(warp.least_jacobian() > 0.0, "head {seed}");
         kept += warp.share / 5.0;
-        // There and back: no two places of the base are one of the head.
+        // Inverse and forward map: no two places of the base are one of the head.
         let place = BASE.anatomy.middle + DVec3::new(20.0, -30.0, 25.0);
         let back = warp.place(warp.nearest_to(place)).base.as_dvec3();
         assert!(back.distance(place) < 0.1, "head {seed}: {:.3} mm", back.distance(place));
     }
     assert!(kept > 0.9, "only {kept:.2} of the displacements are kept on average");
-    // A map that folds is noticed, and weakened.
+    // A map that folds is detected and weakened.
     let wild = Warp::new(&HeadRecipe { warp_mm: 60.0, ..mild() }, &BASE);
     assert!(wild.share < 0.9 && wild.least_jacobian() > 0.0);
 }
@@ -90,14 +90,14 @@ fn the_brain_stays_inside_the_skull() {
 }
 
 #[test]
-fn size_and_thickness_are_as_asked() {
+fn size_and_thickness_are_as_requested() {
     let (plain, brain) = (coarse(mild()), |head: &Head| ml(&head.brain, |v| v != 0));
     let large = coarse(HeadRecipe { scale: [1.1, 1.1, 1.1], ..mild() });
     let grown = 1.1f64.powi(3) / mild().scale.iter().product::<f64>();
     assert!((brain(&large) / brain(&plain) / grown - 1.0).abs() < 0.02);
     let bone = |thickness| ml(&coarse(HeadRecipe { skull_thickness: thickness, ..mild() }).ct, |hu| hu >= BONE_HU);
     let (thin, usual, thick) = (bone(0.6), bone(1.0), bone(1.6));
-    // Jaw and base, about half of all bone, stay.
+    // Jaw and skull base, about half of all bone, do not change.
     assert!(thin < 0.9 * usual && thick > 1.15 * usual, "{thin:.0}, {usual:.0}, {thick:.0} ml");
 }
 
@@ -127,7 +127,7 @@ fn ventricles_grow_and_shrink() {
 }
 
 #[test]
-fn voxels_and_tilt_are_as_asked() {
+fn voxels_and_tilt_are_as_requested() {
     let recipe = HeadRecipe {
         ct_spacing: Spacing { pixel_mm: 1.1, slice_mm: 2.5 },
         tilt_degrees: 15.0,
@@ -153,11 +153,11 @@ fn voxels_and_tilt_are_as_asked() {
 }
 
 #[test]
-fn noise_metal_and_bias_are_seen() {
+fn noise_metal_and_bias_are_visible() {
     let noisy = Head::make(&HeadRecipe { ct_noise_hu: 40.0, ..coarse(mild()).recipe }, &BASE);
     let plain = coarse(mild());
     let off: Vec<f64> = noisy.ct.data.iter().zip(&plain.ct.data).map(|(a, b)| f64::from(a - b)).collect();
-    // Air at the lower end of the range hides some.
+    // Air at the lower end of the range clips some of the noise.
     let deviation = (off.iter().map(|v| v * v).sum::<f64>() / off.len() as f64).sqrt();
     assert!((25.0..45.0).contains(&deviation), "{deviation:.1} HU");
     let metal = coarse(HeadRecipe { fillings: 3, clips: 1, ..mild() });
@@ -173,7 +173,7 @@ fn noise_metal_and_bias_are_seen() {
 const TUMOUR: TumourRecipe = TumourRecipe { radii_mm: [12.0, 15.0, 10.0], brightness: 1.6 };
 
 #[test]
-fn a_tumour_lies_in_the_brain_and_is_seen() {
+fn a_tumour_lies_in_the_brain_and_is_visible() {
     for (seed, brightness) in [(1, 1.6), (2, 0.4)] {
         let recipe = HeadRecipe { seed, tumour: Some(TumourRecipe { brightness, ..TUMOUR }), ..mild() };
         let head = coarse(recipe);
@@ -188,7 +188,7 @@ fn a_tumour_lies_in_the_brain_and_is_seen() {
 }
 
 #[test]
-fn recipes_vary_fit_a_line_and_come_back_from_json() {
+fn recipes_vary_fit_a_line_and_round_trip_through_json() {
     let run = HeadRecipe::of_run(1, 1000, 2);
     assert_eq!(run[0], HeadRecipe::mild(1, 2));
     let share = |on: &dyn Fn(&HeadRecipe) -> bool| run.iter().filter(|r| on(r)).count() as f64 / 1000.0;
@@ -214,7 +214,7 @@ fn recipes_vary_fit_a_line_and_come_back_from_json() {
 }
 
 #[test]
-fn a_written_head_is_read_again() {
+fn a_written_head_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let head = coarse(HeadRecipe { tilt_degrees: 12.0, tumour: Some(TUMOUR), ..mild() });
     let files = head.write(&folder.path().join("head")).unwrap();

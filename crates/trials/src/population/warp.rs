@@ -1,4 +1,4 @@
-//! The map from a new head to its base, kept on a grid of nodes.
+//! Map from a new head to its base, tabulated on a grid of nodes.
 
 use super::base::BaseHead;
 use super::local::Local;
@@ -9,38 +9,38 @@ use rayon::prelude::*;
 use std::ops::{Add, Mul};
 use trepan_volume::VoxelVolume;
 
-/// Distance between nodes, mm.
+/// Spacing of the nodes, mm.
 const NODE_MM: f64 = 2.0;
-/// Distance between the spline's control points, mm.
+/// Spacing of the spline's control points, mm.
 const CONTROL_MM: f64 = 30.0;
-/// Room around the head, mm: more than any displacement.
+/// Margin around the head, mm: larger than any displacement.
 const MARGIN_MM: f64 = 10.0;
-/// The map may not shrink a volume below this share.
+/// Smallest relative volume to which the map may shrink a cell.
 const LEAST_JACOBIAN: f64 = 0.02;
-/// What is left of the displacements when the map folds, for each try.
+/// Factor on the displacements for each retry after folding.
 const WEAKER: f64 = 0.9;
 
-/// Where a point of the new head lies in the base.
+/// Position of a head's point in the base.
 #[derive(Clone, Copy)]
 pub struct Place {
-    /// The base's point, mm.
+    /// Point in the base, mm.
     pub base: Vec3,
-    /// Distance to the brain as it was before atrophy, mm; 0 without atrophy.
+    /// Distance to the brain before atrophy, mm; 0 without atrophy.
     pub intact: f32,
 }
 
-/// The map from a new head to its base.
+/// Map from a new head to its base.
 pub struct Warp {
     base_from_head: DAffine3,
     head_from_base: DAffine3,
-    /// For each node the displacement after the affine, mm, and the intact brain's distance.
+    /// For each node, the displacement after the affine part, mm, and the intact brain's distance.
     nodes: VoxelVolume<Vec4>,
-    /// Share of the displacements that was kept so that the map does not fold.
+    /// Share of the displacements that was kept to prevent folding.
     pub share: f64,
 }
 
 impl Warp {
-    /// The map of a recipe, with displacements weakened until it folds nowhere.
+    /// Creates the map of a recipe, with displacements weakened until it does not fold.
     pub fn new(recipe: &HeadRecipe, base: &BaseHead) -> Self {
         let head_from_base = affine(recipe, base.anatomy.middle);
         let box_of = |points: &mut dyn Iterator<Item = DVec3>| {
@@ -78,17 +78,17 @@ impl Warp {
         });
     }
 
-    /// The affine part: the new head's point for one of the base.
+    /// Affine part: maps a point of the base to the new head.
     pub fn head_from_base(&self) -> DAffine3 {
         self.head_from_base
     }
 
-    /// Lowest and highest corner of the nodes, mm.
+    /// Lowest and highest corner of the node grid, mm.
     pub fn corners(&self) -> (DVec3, DVec3) {
         (self.nodes.centre_of([0; 3]), self.nodes.centre_of(self.nodes.dims.map(|n| n - 1)))
     }
 
-    /// Where a point lies in the base.
+    /// Maps a point of the head to the base.
     pub fn place(&self, point: DVec3) -> Place {
         let node = self.node(point);
         Place {
@@ -97,7 +97,7 @@ impl Warp {
         }
     }
 
-    /// Visits points on a line, `step` apart; exact every 2 mm or less, straight between.
+    /// Visits points on a line, `step` apart; exact every 2 mm or less, interpolated between.
     pub fn along(&self, start: DVec3, step: DVec3, count: usize, mut visit: impl FnMut(usize, Place)) {
         let stride = ((NODE_MM / step.length()) as usize).clamp(1, 8);
         let at = |i: usize| {
@@ -116,18 +116,18 @@ impl Warp {
         }
     }
 
-    /// The new head's point that lies nearest to a point of the base, to 2 mm.
+    /// Point of the new head that maps closest to a point of the base, to 2 mm.
     pub fn nearest_to(&self, base: DVec3) -> DVec3 {
         let guess = self.head_from_base.transform_point3(base);
-        // The map is near to its affine: what is left goes down by more than half each time.
+        // The map is close to its affine part: the residual more than halves each time.
         (0..12).fold(guess, |point, _| {
             let left = base - self.place(point).base.as_dvec3();
             point + self.head_from_base.transform_vector3(left)
         })
     }
 
-    /// The smallest determinant of the map's Jacobian over the affine's: over 0, the map folds
-    /// nowhere.
+    /// Smallest determinant of the map's Jacobian relative to the affine part; if positive, the map
+    /// does not fold.
     pub fn least_jacobian(&self) -> f64 {
         let [nx, ny, nz] = self.nodes.dims;
         let whole = self.base_from_head.matrix3.determinant();
@@ -144,7 +144,7 @@ impl Warp {
         slices.reduce(|| f64::MAX, f64::min) / (whole * NODE_MM.powi(3))
     }
 
-    /// The least determinant at the corners of a cell, which bounds it within.
+    /// Smallest determinant at the corners of a cell, a bound for its inside.
     fn corners_of_cell(&self, cell: [usize; 3], edges: &DMat3) -> f64 {
         let at = |bits: usize| {
             let node = [0, 1, 2].map(|axis| cell[axis] + (bits >> axis & 1));
@@ -164,7 +164,7 @@ impl Warp {
     }
 }
 
-/// The trilinear value at continuous indices; the border holds on outside.
+/// Trilinear interpolation at continuous indices, clamped to the border.
 pub fn between<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(volume: &VoxelVolume<T>, place: Vec3) -> T {
     let last = Vec3::from_array(volume.dims.map(|n| (n - 1) as f32));
     let p = place.clamp(Vec3::ZERO, last);
@@ -178,7 +178,7 @@ pub fn between<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(volume: &VoxelV
     plane(first) * (1.0 - f.z) + plane(first + nx * ny) * f.z
 }
 
-/// From the base to the new head, around the brain's middle.
+/// Affine map from the base to the new head, about the brain's centre.
 fn affine(recipe: &HeadRecipe, middle: DVec3) -> DAffine3 {
     let [xy, xz, yz] = recipe.shear;
     let shear = DMat3::from_cols(DVec3::X, DVec3::new(xy, 1.0, 0.0), DVec3::new(xz, yz, 1.0));

@@ -1,5 +1,5 @@
-//! A ball-tipped tool against moving tetrahedra: the thesis's cubes and a brain, its three paths,
-//! jumps and broken meshes, against an f64 oracle.
+//! Measures collision of a ball-tipped tool with moving tetrahedra against an f64 oracle. Scenes
+//! are cubes and a brain on the thesis's three paths, jumps and broken meshes.
 
 mod poses;
 mod published;
@@ -19,17 +19,17 @@ use trepan_deformable::Method;
 use trepan_geometry::Vec3;
 use truth::Truth;
 
-/// What the recommended method must gain over looking at every tetrahedron, from 48 thousand of
-/// them on: two thirds of the least that a machine busy with other work has shown there.
+/// Required speed-up of the recommended method over scanning all tetrahedra, from 48,000 of them
+/// on. It is two thirds of the smallest measured on a loaded machine.
 const LEAST_RATIO: f64 = 7.0;
-/// How many steps methods that look at every tetrahedron are given.
+/// Number of steps times tetrahedra for methods that scan all tetrahedra.
 const STEPS_TIMES_TETS: usize = 20_000_000;
-/// Steps by the oracle, which is slow.
+/// Number of steps of the oracle, which is slow.
 const ORACLE_STEPS: usize = 20;
-/// How far the depth may jump when a point goes from one tetrahedron into the next, edges.
+/// Largest allowed jump of the depth between neighbouring tetrahedra, edges.
 const MOST_JUMP: f64 = 1e-4;
 
-/// Every method on every mesh and path, then what breaks them.
+/// Lists the parts: every method on every mesh and path, then stability.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let cubes = scope.pick(&[7usize, 22][..], &[7, 13, 22, 30, 40, 50, 60][..]);
     let brains = scope.pick(&[][..], &[12_511usize, 22_076, 50_041][..]);
@@ -49,22 +49,22 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// The promise over all random poses.
+/// Adds the gate over all random poses.
 pub fn judge(_: Scope, findings: &mut Findings) {
     poses::judge(findings);
 }
 
-/// All but the oracle, which judges and is too slow to be judged.
+/// All methods but the oracle, which is the reference and too slow to be rated.
 fn methods() -> impl Iterator<Item = Method> {
     Method::all().into_iter().filter(|&method| method != Method::Brute)
 }
 
-/// Whether the method promises to find every point.
+/// Whether the method must find every point.
 fn is_complete(method: Method) -> bool {
     method != Method::Thesis
 }
 
-/// One mesh: every path by every method.
+/// Runs every method on every path over one mesh.
 fn measure(scene: &Scene, scope: Scope, findings: &mut Findings) {
     for path in PATHS {
         let steps = if path.jumps { scope.pick(30, 200) } else { scope.pick(80, 1000) };
@@ -73,7 +73,7 @@ fn measure(scene: &Scene, scope: Scope, findings: &mut Findings) {
     }
 }
 
-/// The three recorded paths over the brain that they were recorded on.
+/// Runs the three recorded paths over the brain on which they were recorded.
 fn recorded(scope: Scope, findings: &mut Findings) {
     let scene = Scene::brain_at_rest(recording::TETS);
     for name in recording::NAMES {
@@ -83,12 +83,12 @@ fn recorded(scope: Scope, findings: &mut Findings) {
     }
 }
 
-/// One path by every method; `in_time` where nothing may beat the recommended one.
+/// Runs every method on one path; `in_time` adds gates on the recommended method's speed.
 fn follow(scene: &Scene, place: &str, tips: &[Vec3], in_time: bool, findings: &mut Findings) {
     let steps = tips.len();
     let truth = Truth::along(scene, tips);
-    // Methods that look at every tetrahedron repeat themselves: on large meshes some warm steps say
-    // all.
+    // The cost of methods that scan all tetrahedra varies little: on large meshes a few warm steps
+    // suffice.
     let enough = (STEPS_TIMES_TETS / scene.mesh.tets.len()).max(3 * START).min(steps);
     let steps_of = |method| if method == Method::RECOMMENDED { steps } else { enough };
     let take = |method| ride(scene, method, &tips[..steps_of(method)], &truth);
@@ -103,8 +103,8 @@ fn follow(scene: &Scene, place: &str, tips: &[Vec3], in_time: bool, findings: &m
     }
 }
 
-/// Nothing beats the recommended method in both time and depth, and it gains on the scan what it
-/// promises.
+/// Adds gates: no method beats the recommended one in both time and depth, and its speed-up over
+/// the scan is as required.
 fn speed_gates(place: &str, scene: &Scene, rides: &[Ride], findings: &mut Findings) {
     let best = Method::RECOMMENDED.name();
     let beaten = crate::front::dominated(&findings.rows, place, best, "step_p50_us", "depth_error_p95_mm");
@@ -117,8 +117,8 @@ fn speed_gates(place: &str, scene: &Scene, rides: &[Ride], findings: &mut Findin
     }
 }
 
-/// A stroke 0.5 mm deep over a flat side at rest: the true depth never changes, though points go
-/// from tetrahedron to tetrahedron.
+/// A stroke 0.5 mm deep over a flat side at rest: the true depth is constant while points pass from
+/// tetrahedron to tetrahedron.
 fn slide(scope: Scope, findings: &mut Findings) {
     let scene = Scene::cube_at_rest(13);
     let (tips, depth_mm) = scene.stroke(scope.pick(800, 4000));
@@ -138,8 +138,8 @@ fn slide(scope: Scope, findings: &mut Findings) {
     ));
 }
 
-/// Straight down into a slab to 0.9 of its thickness: the depth, and with it the force, must never
-/// fall.
+/// Pushes straight into a slab to 0.9 of its thickness: depth, and with it force, must never
+/// decrease.
 fn press(findings: &mut Findings) {
     let scene = Scene::cube_at_rest(7);
     let (tips, deepest_mm) = scene.push(0.9);
@@ -155,7 +155,7 @@ fn press(findings: &mut Findings) {
     }
 }
 
-/// A row without what could not be measured.
+/// Adds the finite metrics to a row.
 fn finite(row: Row, metrics: &[(&str, f64)]) -> Row {
     metrics.iter().filter(|(_, value)| value.is_finite()).fold(row, |row, (name, value)| row.metric(name, *value))
 }

@@ -1,18 +1,18 @@
-//! Force models: what a call costs, how near a pressed hand comes to the force that it should feel,
-//! and where each model gives way.
+//! Force models: cost of a call, force error of a pressing hand, and conditions under which each
+//! fails.
 //!
 //! # Theory
-//! A hand of stiffness K_h that means to be d deep in a wall of stiffness K must come to rest under
+//! A hand of stiffness K_h whose target is d deep in a wall of stiffness K comes to rest under
 //! ```text
 //! F = K K_h / (K + K_h) · d
 //! ```
-//! The error is the root mean square from F over the second after the press: a model that swings
-//! never comes there. The device has no friction and exact positions, so that nothing but the model
-//! damps; it answers a tick late.
+//! The error is the root mean square deviation from F over the second after the press; it stays
+//! large for a model that oscillates. The device has no friction and exact positions, so that only
+//! the model damps, and it responds one tick late.
 //!
 //! # Practice
-//! No guard: it would hide what is asked. `god-object` is the damped spring on a contact found by
-//! the proxy under planes; all others take the nearest face.
+//! No guard is used, because it would hide the failures. `god-object` is the damped spring on a
+//! contact found by the god-object constrained to planes; all others use the nearest face.
 
 use super::{Part, Scope};
 use crate::conditions;
@@ -30,19 +30,19 @@ use trepan_haptics::simulated::{Config, HandModel, Simulated};
 
 /// Damping of all damped walls, N ms/mm.
 const DAMPING: f32 = 0.5;
-/// Depth at which hands mean to be, mm: under the force that the device can give.
+/// Target depth of the hands, mm: below the force that the device can give.
 const MEANT_MM: f32 = 4.0;
-/// Stiffness between what a bare spring bears on this device and what a damped one does, N/mm.
+/// Stiffness above the limit of a bare spring and below that of a damped one on this device, N/mm.
 const STIFF: f32 = 1.5;
 const TICKS: usize = 3000;
 const JUDGED: usize = 1000;
-/// What may be left of swinging, mm, and what a tick may change, N.
+/// Largest allowed oscillation, mm, and change of force per tick, N.
 const QUIET_MM: f32 = 0.1;
 const SMOOTH_N: f32 = 0.1;
-/// The model of a session's tissue, and under the drill's buzz of its bone.
+/// Model that a session uses for tissue, and below the drill's vibration for bone.
 const CHOSEN: &str = "viscoelastic";
 
-/// A model of a given stiffness, and whether a proxy finds the contact.
+/// Force model of a given stiffness, and whether a god-object finds the contact.
 #[derive(Clone, Copy)]
 struct Model {
     make: fn(f32) -> Box<dyn ForceModel>,
@@ -65,7 +65,7 @@ fn models() -> Vec<(&'static str, Model)> {
     ]
 }
 
-/// Cost and error, then the conditions.
+/// Lists the parts: cost and error, then the conditions.
 pub fn parts(_: Scope) -> Vec<Part> {
     vec![Part::new("press", press), Part::new("conditions", |_, findings| endure(findings))]
 }
@@ -110,7 +110,7 @@ fn press(scope: Scope, findings: &mut Findings) {
     findings.charts.push(chart);
 }
 
-/// Calls that are timed together: a time of theirs in µs is one call's in ns.
+/// Calls that are timed together: their time in µs is that of one call in ns.
 const CALLS: usize = 1000;
 
 /// Times of a call, ns, of all models in turn.
@@ -125,7 +125,7 @@ fn calls(rounds: usize) -> Vec<Samples> {
     })
 }
 
-/// What a hand found that pressed.
+/// Measurements of a pressing hand.
 #[derive(Clone, Copy, Default)]
 struct Held {
     error_n: f64,
@@ -135,7 +135,7 @@ struct Held {
     finite: bool,
 }
 
-/// A hand goes into a wall of x ≤ 0, `thick` mm thick or without end, and stays.
+/// Presses a hand into a wall at x ≤ 0, `thick` mm thick or infinite, and holds it there.
 fn hold(model: &Model, stiffness: f32, delay_ticks: usize, thick_mm: Option<f32>) -> Held {
     let hand = HandModel::LIGHT;
     let goal = thick_mm.map_or(MEANT_MM, |thick| thick + 2.0);
@@ -162,7 +162,7 @@ fn hold(model: &Model, stiffness: f32, delay_ticks: usize, thick_mm: Option<f32>
     held
 }
 
-/// The nearest face of the wall, whichever that is.
+/// Contact with the nearest face of the wall, whichever it is.
 fn nearest(x: f32, thick_mm: Option<f32>) -> ContactManifold {
     let (front, back) = (-x, thick_mm.map_or(f32::MAX, |thick| x + thick));
     match () {
@@ -172,7 +172,7 @@ fn nearest(x: f32, thick_mm: Option<f32>) -> ContactManifold {
     }
 }
 
-/// The face that the proxy has not crossed.
+/// Contact with the face that the god-object has not crossed.
 fn by_proxy(proxy: &mut GodObject, tip: Vec3) -> ContactManifold {
     let place = proxy.follow(tip, &[Plane { point: Vec3::ZERO, normal: Vec3::X }]);
     let depth_mm = place.distance(tip);
@@ -219,7 +219,7 @@ fn held_back(held: &Held) -> Outcome {
     if held.inward_n > 1e-3 { Outcome::Fails("pushes on through the wall".into()) } else { quiet(held) }
 }
 
-/// Ten times a millimetre's way over an edge at 50 mm/s under 0.5 mm of depth.
+/// Moves over an edge at 50 mm/s, 0.5 mm deep, 5 mm to each side.
 fn over_an_edge(model: &Model) -> Outcome {
     let (mut force, mut last, mut most) = ((model.make)(1.0), None::<Vec3>, 0.0f32);
     for tick in 0..200 {
@@ -242,8 +242,7 @@ fn finite(model: &Model, dt_ms: f32, depth_mm: f32) -> Outcome {
     let mut force = (model.make)(1.0);
     let touch = ContactManifold::single(Contact { point: Vec3::ZERO, normal: Vec3::X, depth_mm });
     let given: Vec<Vec3> = (0..10).map(|_| force.wrench(&at(-0.5), &touch, dt_ms).force).collect();
-    // The guard takes what is not finite for no force; a model that leaves it to the guard is
-    // usable.
+    // The guard replaces non-finite forces by zero; a model that relies on it is usable.
     if given.iter().all(|force| force.is_finite()) {
         Outcome::Works
     } else {
@@ -268,7 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bare_spring_swings_where_a_damped_one_rests_and_a_proxy_holds_a_thin_wall() {
+    fn a_bare_spring_oscillates_where_a_damped_one_rests_and_a_god_object_holds_a_thin_wall() {
         let verdict = |condition: usize, name: &str| {
             let (_, model) = models().into_iter().find(|(known, _)| *known == name).unwrap();
             CONDITIONS[condition].1(&model).word()

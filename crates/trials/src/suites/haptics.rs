@@ -1,25 +1,31 @@
-//! The guarded loop on the simulated device: where it is quiet, where it leaks energy, and what
-//! force the guard takes for it.
+//! The guarded haptic loop on the simulated device: where it is stable, how much energy it
+//! generates,
+//! and how much force the guard removes.
 //!
 //! # Theory
 //! ```text
-//! Gil, Hulin          stable   K < (b + b_h + B)/(T/2 + d)     hand's damping b_h added
-//! Colgate, Schenkel   passive  K ≤ (b - B)/(T/2 + d)           their bound at d = 0, delay added as to T/2
-//! Abbott, Okamura     K Δ/2 ≤ f_c                              else encoder steps alone keep a small cycle going
+//! Gil, Hulin          stable   K < (b + b_h + B)/(T/2 + d)   hand's damping b_h added
+//! Colgate, Schenkel   passive  K ≤ (b - B)/(T/2 + d)         their bound at d = 0, delay added to
+//! T/2
+//! Abbott, Okamura     K Δ/2 ≤ f_c                            else encoder steps sustain a small
+//! cycle
 //! ```
-//! A device is passive if the hand cannot get more out of it than it put in, so that its own losses
-//! count (Colgate and Schenkel; Abbott and Okamura). Energy out is therefore what the motors give
-//! less what the device's friction takes, `b Δx²/T + f_c |Δx|` a tick, which is a lower bound of
-//! that. Friction that a long free motion took must not pay for a wall: each contact is an account
-//! of its own, and the whole run is one more; the worst counts. What the motors alone give is shown
-//! beside: encoder steps hide up to `|F| Δ` from every controller, on a Touch 0.18 mJ, and a stuck
-//! handle its next start.
+//! A device is passive if the hand cannot extract more energy than it put in; the device's own
+//! losses count (Colgate and Schenkel; Abbott and Okamura). Energy out is therefore the motors'
+//! work
+//! less the device's friction losses, `b Δx²/T + f_c |Δx|` per tick, which is a lower bound of
+//! them.
+//! Friction losses of a long free motion must not offset a wall's energy: each contact has a
+//! separate energy balance, and the whole run is one more; the worst counts. The work of the motors
+//! alone is reported too: encoder steps hide up to `|F| Δ` from every controller (0.18 mJ on a
+//! Touch), and a handle held by static friction hides its next start.
 //!
 //! # Practice
-//! `limited`: guarded, and the wall no stiffer than the device's own coupling limit
-//! (`Capabilities::coupled`), as sessions have it; it is declared where the limited wall is. The
-//! declared range, to which gates apply: a hand with a grip, walls to 2 N/mm, delays to 2 ticks,
-//! `K Δ/2 ≤ f_c`. All other rows are shown beside; there the guard must act and count it.
+//! `limited`: guarded, with the wall no stiffer than the device's coupling limit
+//! (`Capabilities::coupled`), as in sessions. Gates apply to the declared range: a hand with a
+//! grip,
+//! walls to 2 N/mm, delays to 2 ticks, `K Δ/2 ≤ f_c`; for `limited`, of the limited wall. All other
+//! rows are reported without gates; there the guard must act and count its actions.
 
 mod coupling;
 mod faults;
@@ -35,21 +41,21 @@ use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
 use trepan_haptics::simulated::Simulated;
 
-/// A hand comes this fast, mm/ms.
+/// Approach speed of the hand, mm/ms.
 const APPROACH: f32 = 0.1;
 const PRESS_MS: f32 = 3000.0;
-/// The time at the end over which a press is judged, ms.
+/// Time at the end over which a press is judged, ms.
 const JUDGED_MS: f32 = 1000.0;
-/// How long a wandering hand keeps an aim on average, and how fast it goes there, ms.
+/// Mean time that a wandering hand keeps a target, and time constant of its motion, ms.
 const AIM_MS: f32 = 125.0;
 const FOLLOW_MS: f32 = 25.0;
 const NMM_PER_J: f64 = 1000.0;
 
-/// Couplings in one part.
+/// Number of couplings in one part.
 const TOGETHER: usize = 60;
 
-/// Presses for every coupling with and without the controller, then hands that wander; last the
-/// pace of the loop.
+/// Lists the parts: presses for every coupling with and without the controller, wandering hands,
+/// and the timing of the loop.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let all = coupling::all(scope).len();
     let some = |first: usize| {
@@ -72,7 +78,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// Every way of guarding one coupling.
+/// Runs every way of guarding one coupling.
 fn couple(scene: &str, coupling: &Coupling, number: usize, scope: Scope, findings: &mut Findings) {
     findings.rows.push(press_row(scene, coupling, "guarded", scope));
     findings.rows.push(press_row(scene, coupling, "unguarded", scope));
@@ -85,19 +91,20 @@ fn couple(scene: &str, coupling: &Coupling, number: usize, scope: Scope, finding
     }
 }
 
-/// Promises over all couplings, and their maps.
+/// Adds the gates over all couplings, and their maps.
 pub fn judge(_: Scope, findings: &mut Findings) {
     let coupled: Vec<Row> = findings.rows.iter().filter(|row| row.config.contains_key("declared")).cloned().collect();
     findings.gates.extend(gates(&coupled));
     findings.maps.extend(maps::of(&coupled));
 }
 
-/// What a run was like.
+/// Measurements of a run.
 #[derive(Clone, Copy, Default)]
 struct Run {
     cycle_mm: f64,
-    /// The cycle in the second half of the judged time over that in the first: under 1 it dies
-    /// away.
+    /// Amplitude of the cycle in the second half of the judged time over that in the first; under 1
+    /// it
+    /// decays.
     growth: f64,
     lost_percent: f64,
     to_hand_j: f64,
@@ -107,7 +114,7 @@ struct Run {
 }
 
 impl Run {
-    /// The worse of both in each.
+    /// The worse of both in each value.
     fn or(self, other: Self) -> Self {
         let (mut counters, more) = (self.counters, other.counters);
         counters.passivity += more.passivity;
@@ -128,7 +135,7 @@ impl Run {
 /// Ticks without force after which a contact is over.
 const FREE_TICKS: u32 = 5;
 
-/// The most energy given out above what was taken in, over the run and over any contact.
+/// Largest net energy given out, over the run and over any single contact.
 #[derive(Default)]
 struct Account {
     run_nmm: f64,
@@ -150,7 +157,7 @@ impl Account {
     }
 }
 
-/// The hand's intent tick by tick, against a wall at x ≤ 0.
+/// Runs the loop with the hand's target given per tick, against a wall at x ≤ 0.
 fn run_loop(coupling: &Coupling, intent: Vec<ToolState>, ticks: usize, guarded: bool) -> Run {
     let Coupling { device: config, hand, mut wall, tick_ms, .. } = *coupling;
     let judged_ticks = coupling.ticks(JUDGED_MS);
@@ -202,8 +209,8 @@ fn at(x: f32) -> ToolState {
     ToolState::at(Pose::from_translation(Vec3::X * x))
 }
 
-/// The worst of several presses: the hand comes from 2 mm outside and presses until the wall
-/// answers with the press's force.
+/// Worst of several presses: the hand comes from 2 mm outside and presses until the wall
+/// responds with the press's force.
 fn press_row(scene: &str, wanted: &Coupling, method: &str, scope: Scope) -> Row {
     let limited = wanted.limited();
     let coupling = if method == "limited" { &limited } else { wanted };
@@ -223,7 +230,7 @@ fn press_row(scene: &str, wanted: &Coupling, method: &str, scope: Scope) -> Row 
         .metric("steady_force_lost_percent", worst.lost_percent)
 }
 
-/// A hand that means to be now here, now there, each for up to a quarter of a second.
+/// A hand with random targets, each kept for up to a quarter of a second.
 fn wander_row(scene: &str, coupling: &Coupling, own: usize, ticks: usize, scope: Scope) -> Row {
     let mut random = scope.random(own as u64);
     let mut intent = Vec::with_capacity(ticks);
@@ -299,7 +306,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_free_motion_lost_pays_for_no_wall() {
+    fn losses_in_free_motion_do_not_offset_a_walls_energy() {
         let mut account = Account::default();
         (0..100).for_each(|_| account.book(1.0, Vec3::ZERO));
         account.book(-0.2, Vec3::X);
@@ -309,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_gils_bound_the_bare_loop_swings_and_gives_energy() {
+    fn beyond_gils_bound_the_bare_loop_oscillates_and_generates_energy() {
         let press =
             |stiffness: f32| run_loop(&coupling(stiffness, 1), vec![at(-1.0 / stiffness - 1.0 / 0.15)], 3000, false);
         let (quiet, wild) = (press(0.8), press(2.0));

@@ -1,5 +1,5 @@
-//! Tetrahedra from masks and labels: a brain at several voxel sizes, a ball, a torus and a ball in
-//! a ball, against the voxels' own faces or a closed form.
+//! Tetrahedral meshes from masks and labels, measured against the voxels' faces or a closed form.
+//! Scenes: a brain at several voxel sizes, a ball, a torus and a ball in a ball.
 
 mod odd;
 pub(super) mod rivals;
@@ -16,13 +16,13 @@ use trepan_mesh::lattice::{self, LabelledMesh};
 use trepan_mesh::{Quality, Surface, TetMesh, Topology};
 use trepan_volume::VoxelVolume;
 
-/// A distance counts as small up to this many voxels.
+/// Largest distance that counts as small, voxels.
 const SMALL_VOXEL: f64 = 0.5;
-/// Dihedral angles that Labelle and Shewchuk prove for their way of cutting, degrees: where a
-/// border cuts cubes of one size only, and of several.
+/// Bounds of the dihedral angles proven by Labelle and Shewchuk for isosurface stuffing, degrees:
+/// with cubes of one size, and of several sizes.
 const PROVEN_DEG: [[f64; 2]; 2] = [[10.7, 164.8], [1.66, 174.72]];
 
-/// Every scene.
+/// Lists a part for every scene.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let measured = scenes::all(scope)
         .into_iter()
@@ -34,8 +34,8 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     measured.chain(searched).chain((!scope.quick).then(odd)).collect()
 }
 
-/// The least count between two, to about a fifteenth, with which a mesh's border follows the
-/// voxels; nothing when not even the larger does.
+/// Smallest element count between two, to about a fifteenth, with which a mesh's boundary follows
+/// the voxels; `None` if not even the larger does.
 fn least_count(scene: &Scene, [mut low, mut high]: [usize; 2]) -> Option<Row> {
     let at = |target_tets: usize| {
         let labelled = lattice::labelled(&scene.labels, &lattice::Config { target_tets, ..scene.config }).ok()?;
@@ -60,7 +60,7 @@ fn least_count(scene: &Scene, [mut low, mut high]: [usize; 2]) -> Option<Row> {
     Some(best)
 }
 
-/// One scene: its row and its gates.
+/// Meshes one scene and adds its row and gates.
 fn measure(scene: &Scene, findings: &mut Findings) {
     forget_peak();
     let start = Instant::now();
@@ -106,7 +106,7 @@ fn measure(scene: &Scene, findings: &mut Findings) {
     findings.rows.push(peak.into_iter().fold(row, |row, mb| row.metric("process_peak_mb", mb)));
 }
 
-/// The largest error of a volume that is known.
+/// Largest error of a known volume, %.
 fn volume_error_percent(scene: &Scene, labelled: &LabelledMesh) -> f64 {
     let off = |&(label, truth): &(u16, f64)| 100.0 * (mm3(labelled, label) / truth - 1.0).abs();
     scene.mm3.iter().map(off).fold(0.0, f64::max)
@@ -117,8 +117,8 @@ fn mm3(labelled: &LabelledMesh, label: u16) -> f64 {
     tets.map(|t| labelled.mesh.volume_mm3(t)).sum()
 }
 
-/// How many of soundness (no gap, no overlap), closedness, connectedness and the sum of all labels
-/// fail.
+/// Number of failed checks: soundness (no gap, no overlap), closedness, connectedness, sum of all
+/// labels.
 fn faults(labelled: &LabelledMesh, surface: &Surface) -> f64 {
     let mesh = &labelled.mesh;
     let parts = Topology::of(mesh).components().1;
@@ -129,8 +129,9 @@ fn faults(labelled: &LabelledMesh, surface: &Surface) -> f64 {
     all.into_iter().filter(|bad| *bad).count() as f64
 }
 
-/// From the mesh's borders to the truth, and from the borders of the voxels to the mesh's: 95 % are
-/// nearer, in voxels; of several borders the worst.
+/// 95 % quantiles of the distance from the mesh's boundaries to the truth and back from the
+/// voxels'.
+/// In voxels; of several boundaries the worst.
 fn distances(scene: &Scene, labelled: &LabelledMesh) -> [f64; 2] {
     let of_border = |border: &Border| {
         let holds = |label: u16| if border.label == 0 { label != 0 } else { label == border.label };
@@ -151,7 +152,7 @@ fn distances(scene: &Scene, labelled: &LabelledMesh) -> [f64; 2] {
     scene.borders.iter().map(of_border).fold([0.0; 2], |[a, b], [c, d]| [a.max(c), b.max(d)])
 }
 
-/// The tetrahedra of some labels.
+/// Submesh of some labels.
 fn part(labelled: &LabelledMesh, holds: impl Fn(u16) -> bool) -> TetMesh {
     let LabelledMesh { mesh, label_of_tet } = labelled;
     let tets = mesh.tets.iter().zip(label_of_tet).filter(|(_, label)| holds(**label)).map(|(tet, _)| *tet);
@@ -162,12 +163,12 @@ fn world<T>(grid: &VoxelVolume<T>, voxel: Vec3) -> Vec3 {
     grid.world_from_voxel.transform_point3(voxel.as_dvec3()).as_vec3()
 }
 
-/// Lets the system count this process's peak memory anew, where it can.
+/// Resets the system's record of this process's peak memory, where supported.
 fn forget_peak() {
     _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Most memory of this process since then, MB; nothing where the system does not tell.
+/// Peak memory of this process since the reset, MB; `None` where the system does not report it.
 fn peak_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let kb = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.trim().strip_suffix("kB")?.trim();

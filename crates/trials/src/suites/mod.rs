@@ -1,4 +1,4 @@
-//! The suites, one file each; one list feeds the command line and the page.
+//! All validation suites, one file each; one list feeds the command line and the page.
 
 pub mod budget;
 pub mod deformable;
@@ -18,7 +18,7 @@ use crate::part::nothing_more;
 pub use crate::part::{Part, Scope, Suite};
 pub(crate) use voxel_size::RULES;
 
-/// Suites that run when they are named only: they fetch programs of others, or take an hour.
+/// Suites that run only when named: they download other programs, or take an hour.
 pub const ON_REQUEST: &[Suite] = &[
     Suite {
         name: "population",
@@ -50,7 +50,7 @@ pub const ON_REQUEST: &[Suite] = &[
     },
 ];
 
-/// Every suite.
+/// Suites that run by default.
 pub const ALL: &[Suite] = &[
     Suite {
         name: "mesh",
@@ -144,7 +144,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_part_has_a_file_name_of_its_own() {
+    fn every_part_has_a_unique_file_name() {
         for suite in ALL.iter().chain(ON_REQUEST) {
             for quick in [true, false] {
                 let names = crate::report::slugs(suite, Scope { quick, seed: 1 });

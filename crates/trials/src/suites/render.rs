@@ -1,5 +1,5 @@
-//! The picture: rays against a brute-force f64 march, device against processor, what leaping,
-//! sparse rays, steps and resolution are worth, and where it fails.
+//! Rendering: accuracy of rays against a brute-force f64 march, GPU against CPU, effect of
+//! empty-space skipping, sparse rays, step and resolution, and failure cases.
 
 mod accuracy;
 mod faults;
@@ -21,29 +21,29 @@ const FINE_VOXEL: f64 = 1.0 / 16.0;
 
 type Hits = Vec<Option<Hit>>;
 
-/// Who draws.
+/// Renderer: GPU or CPU.
 enum By {
     Processor(Box<ProcessorRenderer>),
     Device(Box<Renderer>),
 }
 
-/// What of the 3-D view is drawn, and how.
+/// Settings of the 3-D view.
 #[derive(Clone, Copy)]
 struct Setting {
     name: &'static str,
     casting: Casting,
-    /// Share of the pixels along an edge.
+    /// Fraction of the pixels along an edge.
     detail: f32,
 }
 
-/// What still pictures are drawn with.
+/// Setting of still pictures.
 const EXACT: Setting =
     Setting { name: "exact", casting: Casting { leap: true, step_voxel: None, sparse: false }, detail: 1.0 };
 
-/// What the processor draws with while the camera moves.
+/// Setting of the CPU while the camera moves.
 const SPARSE: Setting = Setting { name: "sparse rays", casting: Casting { sparse: true, ..EXACT.casting }, ..EXACT };
 
-/// Accuracy on small pictures, speed against image error on large ones, models and failures.
+/// Lists the parts: accuracy on small pictures, speed on large ones, models and failures.
 pub fn parts(_: Scope) -> Vec<Part> {
     type Subject = fn(Scope, Option<&Gpu>, &mut Findings);
     let all: [(&str, Subject); 6] = [
@@ -54,7 +54,7 @@ pub fn parts(_: Scope) -> Vec<Part> {
         ("speed", speed::run),
         ("models", models::run),
     ];
-    // Without a driver the processor's rows are all there are.
+    // Without a driver only the processor's rows are made.
     let drawn = |(name, subject): (&str, Subject)| {
         Part::new(name, move |scope, found| subject(scope, Gpu::open(Prefer::Hardware).ok().as_ref(), found))
     };
@@ -62,7 +62,7 @@ pub fn parts(_: Scope) -> Vec<Part> {
 }
 
 impl By {
-    /// The processor, and the device if there is one.
+    /// The CPU renderer, and the GPU one if there is a device.
     fn all(bone: &Arc<BoneVolume>, gpu: Option<&Gpu>, size: [u32; 2]) -> Vec<Self> {
         Self::of(&SceneData { bone: Some(bone.clone()), brain: None, mri: None, tint: None }, gpu, size)
     }
@@ -87,7 +87,7 @@ impl By {
         }
     }
 
-    /// Casts the next picture anew, in this way.
+    /// Applies a setting and invalidates the last picture.
     fn set(&mut self, setting: &Setting, size: [u32; 2]) {
         match self {
             Self::Processor(p) => {
@@ -101,7 +101,7 @@ impl By {
         }
     }
 
-    /// Draws and waits.
+    /// Draws a frame and waits for it.
     fn draw(&mut self, frame: &Frame) {
         match self {
             Self::Processor(p) => drop(p.draw(frame).expect("drawn")),

@@ -1,9 +1,9 @@
-//! Ways of touching voxel bone: bone with a closed form, the thesis's cubes and skulls, what a burr
-//! takes, and where each method fails.
+//! Collision and force methods on voxel bone: accuracy, cost, removal by a burr, and failure cases.
 //!
 //! # Practice
-//! One file a subject. Each adds its rows, charts, maps and gates; every method of `Method::all` is
-//! in all of them but where its cost forbids (the oracle), which the rows show by their absence.
+//! Scenes are bone with a closed form and the thesis's cubes and skulls. Each subject has one file
+//! that adds its rows, charts, maps and gates. Every method of `Method::all` is in all of them,
+//! unless its cost forbids it (the oracle); then its rows are missing.
 
 mod accuracy;
 mod clearance;
@@ -25,12 +25,12 @@ use crate::picture::{Chart, Map, Mark};
 use crate::suite::{Findings, Gate, Row};
 use trepan_rigid::Method;
 
-/// Stiffness at which depths are felt, N/mm: the thesis's.
+/// Stiffness that converts depths to forces, N/mm: the thesis's.
 const STIFFNESS: f32 = 2.0;
-/// What a tick may cost at 1 kHz, µs.
+/// Time limit of a tick at 1 kHz, µs.
 const BUDGET_US: f64 = 1000.0;
 
-/// Every subject.
+/// Lists the parts of every subject.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let mut parts = accuracy::parts();
     parts.extend(models::parts(scope));
@@ -42,20 +42,20 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// Charts and promises over all methods.
+/// Adds charts and gates over all methods.
 pub fn judge(_: Scope, findings: &mut Findings) {
     accuracy::judge(findings);
     models::judge(findings);
     removal::judge(findings);
 }
 
-/// A group's chart, each method at its worst cost and worst error over the group's scenes; where it
-/// is `gated`, with the gate that the recommended one is on its front.
+/// A group's chart with each method's worst cost and worst error over the group's scenes. `gated`
+/// adds a gate that the recommended method is on its Pareto front.
 fn worst_chart(findings: &mut Findings, group: &str, title: &str, metrics: (&str, &str), gated: bool) -> Option<Chart> {
     let mut marks: Vec<Mark> = Vec::new();
     for row in findings.rows.iter().filter(|row| row.config.get("group").is_some_and(|g| g == group)) {
         let (Some(&cost), Some(&error)) = (row.metrics.get(metrics.0), row.metrics.get(metrics.1)) else { continue };
-        // A method that never touched has no cost there.
+        // A method that never touched has no finite cost or error.
         if !cost.is_finite() || !error.is_finite() {
             continue;
         }
@@ -81,13 +81,13 @@ fn worst_chart(findings: &mut Findings, group: &str, title: &str, metrics: (&str
     drawn.then_some(chart)
 }
 
-/// The row with the number of a map's cells of each grade.
+/// Adds the number of a map's cells of each grade to a row.
 fn passes(row: Row, map: &Map) -> Row {
     let count = |grade: u8| map.cells.iter().flatten().filter(|cell| cell.grade() == grade).count() as f64;
     row.metric("works_count", count(0)).metric("degrades_count", count(1)).metric("fails_count", count(2))
 }
 
-/// The map, its title marked where it is the recommended method's.
+/// The map, its title marked if it is the recommended method's.
 fn map_of(method: &Method, map: Map) -> Map {
     let recommended = *method == Method::RECOMMENDED && map.title.starts_with(method.name());
     let title = if recommended { format!("{} (recommended)", map.title) } else { map.title };

@@ -1,4 +1,5 @@
-//! Volumes: known moves of a real MRI found again, files round trips, a ball's distances, the brain
+//! Volumes: registration of known MRI motions, file round trips, distance fields, and the brain
+//! mask
 //! of the built-in head.
 
 mod files;
@@ -14,7 +15,7 @@ use trepan_volume::{
     BrainConfig, DistanceField, Grid, Interpolation, VoxelVolume, brain_mask, hounsfield, nifti, nrrd, read, resample,
 };
 
-/// Every question.
+/// Lists a part for every subject.
 pub fn parts(scope: Scope) -> Vec<Part> {
     type Question = fn(Scope, &mut Findings);
     let all: [(&str, Question); 7] = [
@@ -33,8 +34,8 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// The folder of real images that the environment variable `TREPAN_DATA` names; says so where there
-/// is none.
+/// Folder of real images named by the environment variable `TREPAN_DATA`; prints a note if there is
+/// none.
 fn data_folder() -> Option<std::path::PathBuf> {
     let folder = std::env::var_os("TREPAN_DATA").map(std::path::PathBuf::from).filter(|folder| folder.is_dir());
     if folder.is_none() {
@@ -100,8 +101,8 @@ fn distances(scope: Scope, findings: &mut Findings) {
     }
 }
 
-/// Bites out of a skull, the distance to what is left brought up to date around them and computed
-/// anew.
+/// Bites out of a skull: compares the distance updated around each bite with one computed from
+/// scratch.
 fn carving(scope: Scope, findings: &mut Findings) {
     const REACH_MM: f32 = 5.0;
     let edge = scope.pick(96, 192);
@@ -122,7 +123,7 @@ fn carving(scope: Scope, findings: &mut Findings) {
         }
         let voxel =
             |p: Vec3| [p.x, p.y, p.z].map(|x| ((x + 0.25 * edge as f32) / 0.5).clamp(0.0, edge as f32 - 1.0) as usize);
-        // What lies further than 3 mm from the bite's surface keeps its value.
+        // Voxels further than 3 mm from the bite's surface keep their values.
         let changed = [voxel(place - 6.0), voxel(place + 6.0)];
         let start = Instant::now();
         field.update(|p| skull.data[skull.index(p)], changed, REACH_MM);

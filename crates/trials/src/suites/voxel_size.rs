@@ -1,9 +1,10 @@
-//! The best cell edge of a uniform grid: the thesis's formula, the usual rule and our model against
-//! a ladder of measured sizes.
+//! The best cell edge of a uniform grid: compares the thesis's formula, the usual rule and our
+//! model
+//! with a ladder of measured sizes.
 //!
 //! # Practice
-//! Times are the least of many short passes, in rounds over all sizes, until two halves of the
-//! rounds agree: what the machine takes when nothing disturbs it. So the verdict bears a busy
+//! Times are the minimum of many short passes, in rounds over all sizes, until two halves of the
+//! rounds agree: the time on an undisturbed machine. The verdict is therefore robust on a loaded
 //! machine; only the number of rounds grows. `TREPAN_DATA` may name a folder with triangle meshes
 //! in `meshes-collision` (`stanford-bunny.obj`, `spot.obj`, ...).
 
@@ -30,18 +31,18 @@ const TABLE: [[f64; 8]; 5] = [
 ];
 /// Triangle models: bunny, cow, armadillo.
 const MODELS: [&str; 3] = ["stanford-bunny.obj", "spot.obj", "Armadillo_simplified.obj"];
-/// The rules in the rows, ours first.
+/// The rules in the rows, this crate's first.
 pub const RULES: [&str; 6] =
     [OURS, "expected work alone", "thesis analytic", "thesis, measured prices", "mean edge", "1.45 x mean edge"];
 const OURS: &str = "expected work, then timed";
-/// Sizes of the ladder, the first in mean edges, and the step between them.
+/// Ladder: number of sizes, the first in mean edges, and the factor between them.
 const LADDER: (usize, f64, f64) = (26, 0.3, 1.11);
-/// A size belongs to the good zone up to this much over the best time.
+/// Largest time of the good zone relative to the best.
 const ZONE: f64 = 1.10;
-/// The method of the row that holds a scene's curves.
+/// Method name of the row that holds a scene's curves.
 const CURVES: &str = "every size of the ladder";
 
-/// Every rule in every scene.
+/// Lists a part for every scene.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let part = |(body, table_row): (Body, Option<usize>)| {
         Part::new(format!("{body:?}"), move |scope, findings: &mut Findings| {
@@ -87,11 +88,12 @@ fn rules(scene: &Scene, scope: Scope, findings: &mut Findings) {
     let rules: [(&str, f64); 6] = std::array::from_fn(|at| (RULES[at], sizes[at]));
     let cells: Vec<f64> = ladder.iter().copied().chain(rules.map(|rule| rule.1)).collect();
     let measured = timing::least(scene, &cells, &mut calibration, scope.pick(8, 64));
-    // The size was chosen with the first prices; the times are predicted with those of the moments
-    // in which they were measured.
+    // The size was chosen with the first prices; the times are predicted with the prices calibrated
+    // during the measurement.
     let prices = calibration.prices();
-    // The best size is chosen on one half of the rounds and every size judged on the other, so that
-    // luck does not make it better.
+    // The best size is chosen on one half of the rounds and every size judged on the other, to
+    // avoid
+    // selection bias.
     let timing::Least { choose, judge, .. } = &measured;
     let best = (0..steps).min_by(|&a, &b| choose[a].total_cmp(&choose[b])).unwrap_or(0);
     let axis_mm = f64::from(2.0 * scene.size_mm.max_element());
@@ -135,7 +137,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// Largest, best and smallest cell of the good zone, mm: so lowest, best and highest count of
+/// Largest, best and smallest cell of the good zone, mm, hence lowest, best and highest count of
 /// cells.
 fn zone(ladder: &[f64], times: &[f64], best: usize) -> [f64; 3] {
     let good = |n: &usize| times[*n] <= ZONE * times[best];
@@ -144,7 +146,7 @@ fn zone(ladder: &[f64], times: &[f64], best: usize) -> [f64; 3] {
     [ladder[(high + 1).min(ladder.len() - 1)], ladder[best], ladder[low]]
 }
 
-/// The thesis's numbers for a pair of spheres as rows, and the ratio that its formula must give.
+/// Rows of the thesis's numbers for a pair of spheres, and the ratio that its formula must give.
 fn beside_the_table(scene: &str, row: usize, ratio: f64, findings: &mut Findings) {
     let [tets, low, best, high, analytic, edge, error_analytic, error_edge] = TABLE[row];
     for (rule, cells, error) in [("analytic", analytic, error_analytic), ("mean edge", edge, error_edge)] {
@@ -161,11 +163,11 @@ fn beside_the_table(scene: &str, row: usize, ratio: f64, findings: &mut Findings
     findings.gates.push(Gate::at_most(format!("{scene}: analytic over mean edge"), ratio, 1.60));
 }
 
-/// Settings of the row of curves.
+/// Setting of the row of curves.
 const MEASURED: &str = "measured_us";
 const PREDICTED: &str = "predicted_us";
 
-/// Promises over all scenes of a run; wider in a quick one, which has few scenes and few rounds.
+/// Gates over all scenes of a run; wider in a quick run, which has few scenes and rounds.
 pub fn judge(scope: Scope, findings: &mut Findings) {
     let ours = |metric: &str| {
         let rows = findings.rows.iter().filter(|row| row.method == OURS);
@@ -210,7 +212,7 @@ pub fn judge(scope: Scope, findings: &mut Findings) {
     );
 }
 
-/// The share of the measured times' spread that the predictions explain.
+/// Coefficient of determination of the predicted times.
 fn r_squared<'a>(times: impl Iterator<Item = &'a (usize, f64, f64)> + Clone) -> f64 {
     let count = times.clone().count() as f64;
     let mean = times.clone().map(|t| t.1).sum::<f64>() / count;

@@ -1,4 +1,4 @@
-//! Strokes of the burr, and undoing them brick by brick.
+//! Records strokes of the burr and undoes them brick by brick.
 
 use super::{BRICK, BoneVolume};
 use crate::stroke::Undone;
@@ -6,45 +6,45 @@ use std::sync::atomic::{AtomicI16, Ordering};
 use trepan_geometry::Vec3;
 
 impl BoneVolume {
-    /// From now on changes belong to a new stroke, and [`undo_stroke`](Self::undo_stroke) leads
-    /// back to here. For the one writer only.
+    /// Starts a new stroke, to which [`undo_stroke`](Self::undo_stroke) returns. For the writer
+    /// only.
     pub fn begin_stroke(&self) {
         self.strokes.begin();
     }
 
-    /// The stroke is over: changes from now on belong to none and stay. For the one writer only.
+    /// Ends the stroke: later changes belong to none and are kept. For the writer only.
     pub fn end_stroke(&self) {
         self.strokes.end();
     }
 
-    /// Number of the newest stroke, counted from 1; one that is undone gives its number back.
+    /// Number of the newest stroke, from 1; undoing one frees its number.
     pub fn stroke_number(&self) -> usize {
         self.strokes.number()
     }
 
-    /// Strokes that can be undone.
+    /// Number of strokes that can be undone.
     pub fn strokes(&self) -> usize {
         self.strokes.count()
     }
 
-    /// Whether older strokes than these were forgotten, since there is room for so many only.
+    /// Whether older strokes were discarded for lack of room.
     pub fn forgot_strokes(&self) -> bool {
         self.strokes.forgot()
     }
 
-    /// Bricks that the newest stroke changed; 0 without one.
+    /// Number of bricks that the newest stroke changed; 0 without one.
     pub fn stroke_bricks(&self) -> usize {
         self.strokes.length()
     }
 
-    /// Exchanges the `n`th brick of the newest stroke with how it was before; the same again takes
-    /// that back. For the one writer only; half a microsecond.
+    /// Swaps the `n`th brick of the newest stroke with its earlier state; a second call swaps back.
+    /// For the writer only; half a microsecond.
     pub fn exchange_brick(&self, n: usize) {
         let Some((brick, copy)) = self.strokes.kept(n) else { return };
         let low = self.low_of(brick);
         for (n, copy) in copy.iter().enumerate() {
             if let Some(at) = self.index(low + Self::within(n)) {
-                // Not a swap, which would lock the bus: there is one writer.
+                // Not an atomic swap, which would lock the bus: there is one writer.
                 let before = copy.load(Ordering::Relaxed);
                 copy.store(self.hu[at].load(Ordering::Relaxed), Ordering::Relaxed);
                 self.hu[at].store(before, Ordering::Relaxed);
@@ -54,9 +54,8 @@ impl BoneVolume {
         self.came_back();
     }
 
-    /// Whether undoing the `n`th brick of the newest stroke would bring bone back at a place for
-    /// which `taken` is true. `near` is asked first, with the centre of the brick and its half
-    /// diagonal, mm.
+    /// Whether undoing the `n`th brick of the newest stroke would restore bone at a point for which
+    /// `taken` is true. `near` is called first, with the brick's centre and half diagonal, mm.
     pub fn brings_back(&self, n: usize, near: impl Fn(Vec3, f32) -> bool, taken: impl Fn(Vec3) -> bool) -> bool {
         let Some((brick, copy)) = self.strokes.kept(n) else { return false };
         let low = self.low_of(brick);
@@ -70,14 +69,14 @@ impl BoneVolume {
         near(middle, half) && copy.iter().enumerate().any(|(n, copy)| comes(n, copy))
     }
 
-    /// The newest stroke is undone, brick by brick: the one before it is the newest now. For the
-    /// one writer only.
+    /// Removes the newest stroke after its bricks were undone; the one before it becomes the
+    /// newest. For the writer only.
     pub fn drop_stroke(&self) {
         self.strokes.drop_newest();
     }
 
-    /// Puts all bricks of the newest stroke back to how they were before it. For the one writer
-    /// only; up to some milliseconds for the largest stroke.
+    /// Restores all bricks of the newest stroke. For the writer only; up to a few milliseconds for
+    /// the largest stroke.
     pub fn undo_stroke(&self) -> Undone {
         match self.stroke_bricks() {
             0 if self.forgot_strokes() => Undone::Forgotten,
@@ -161,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn only_bone_that_comes_back_is_in_the_way() {
+    fn only_restored_bone_counts_as_collision() {
         let bone = BoneVolume::new(&block(), 400).unwrap();
         let (gone, there, thin) = (IVec3::new(6, 4, 5), IVec3::new(5, 4, 5), IVec3::new(0, 4, 5));
         bone.begin_stroke();

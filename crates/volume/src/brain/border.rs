@@ -1,11 +1,11 @@
-//! The border of a brain: the darkest layer around its tissue.
+//! Finds the border of a brain: the darkest layer around its tissue.
 //!
 //! # Theory
-//! Between brain and scalp a T1 MRI has a dark layer of water, dura and the skull's inner table. A
-//! flood of the smoothed grey values, brightest first, from the tissue on one side and from what is
-//! surely outside on the other meets there: a watershed, as in the skull stripping of Hahn and
-//! Peitgen (2000). What is farther than a reach from the tissue, brighter than brain, under the
-//! skin or outside a CT's skull is outside.
+//! Between brain and scalp a T1 MRI has a dark layer of CSF, dura and the skull's inner table. A
+//! watershed of the smoothed grey values, brightest first, starts from the tissue on one side and
+//! from the known outside on the other; the two meet in this layer, as in the skull stripping of
+//! Hahn and Peitgen (2000). The known outside is farther than a reach from the tissue, brighter
+//! than brain, just under the skin, or outside a CT's skull.
 //!
 //! # Sources
 //! H. K. Hahn, H.-O. Peitgen, "The skull stripping problem in MRI solved by a single 3D watershed
@@ -14,13 +14,13 @@
 use super::flood::{INSIDE, OUTSIDE, UNKNOWN, flood};
 use crate::VoxelVolume;
 
-/// Nearer to the tissue than this, bright voxels may be its own vessels, mm.
+/// Distance to the tissue within which bright voxels may be its vessels, mm.
 const BRIGHT_MM: f32 = 2.0;
-/// The smallest grey value, as a share of the brightest brain: a flood stops at 0.
+/// The smallest grey value, as a fraction of the brightest brain, since a flood stops at 0.
 const DARKEST: f32 = 1e-3;
 
-/// The tissue with what lies between it and the darkest layer around it. `distance` is that to the
-/// tissue, mm, negative in it.
+/// Extends the tissue up to the darkest layer around it. `distance` is that to the tissue, mm,
+/// negative inside.
 pub(super) fn grown(
     mri: &VoxelVolume<f32>,
     distance: &[f32],
@@ -41,7 +41,7 @@ pub(super) fn grown(
     VoxelVolume { dims: mri.dims, data, world_from_voxel: mri.world_from_voxel }
 }
 
-/// Grey values weighted 1, 2, 1 along each axis: noise does not lead the flood.
+/// Grey values smoothed by 1, 2, 1 along each axis, so that noise does not lead the flood.
 fn smoothed(mri: &VoxelVolume<f32>) -> Vec<f32> {
     let [nx, ny, _] = mri.dims;
     let mut values = mri.data.clone();

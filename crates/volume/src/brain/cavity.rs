@@ -1,17 +1,17 @@
-//! The inside of the skull in a CT.
+//! Segments the inside of the skull in a CT.
 //!
 //! # Theory
-//! The skull has holes, up to the 3 cm of the foramen magnum, so no flood stops at bone alone.
-//! Instead, with d the distance to bone, the space around it is divided at its necks by a watershed
-//! of -d (Vincent and Soille 1991) from two markers:
+//! The skull has holes, up to the 3 cm of the foramen magnum, so that a flood fill bounded by bone
+//! leaks. Instead, with d the distance to bone, the space around it is divided at its necks by a
+//! watershed of -d (Vincent and Soille 1991) from two markers:
 //!
 //! ```text
 //! inside   the largest piece with d > 12 mm that sees bone in at least 4 of the 6 grid directions
-//! outside  what sees bone in at most 2 of them: air, face, neck
+//! outside  voxels that see bone in at most 2 of them: air, face, neck
 //! ```
 //!
-//! What hangs on the cavity by less than a ball of 11 mm (the spinal canal, the optic canals) is
-//! cut off in the end.
+//! Finally, parts connected to the cavity by less than a ball of 11 mm (the spinal canal, the optic
+//! canals) are cut off.
 //!
 //! # Sources
 //! L. Vincent, P. Soille, "Watersheds in digital spaces", IEEE PAMI 13, 1991.
@@ -21,16 +21,16 @@ use super::morphology::{core, within};
 use crate::component::Components;
 use crate::{AIR_HU, DistanceField, Grid, Interpolation, VoxelVolume, resample};
 
-/// Depth that a ball must have to mark the inside, mm.
+/// Distance to bone that marks the inside, mm.
 const DEEP_MM: f32 = 12.0;
 
-/// Ball that must fit into the cavity, mm: wider than the spinal canal.
+/// Radius of the ball that must fit into the cavity, mm: wider than the spinal canal.
 const BALL_MM: f32 = 11.0;
 
-/// Distances over this count as it in the flood, mm.
+/// Larger distances are clamped to this in the flood, mm.
 const DEEPEST_MM: f32 = 64.0;
 
-/// The space inside the skull on a RAS grid of cubes; `None` where nothing is enclosed.
+/// The space inside the skull on a RAS grid of cubes; `None` if nothing is enclosed.
 pub(super) fn cavity(ct: &VoxelVolume<i16>, isovalue: i16, grid: &Grid) -> Option<VoxelVolume<u8>> {
     let hu = resample(ct, grid, Interpolation::Trilinear, AIR_HU);
     let bone = hu.map(|v| u8::from(v >= isovalue));
@@ -58,7 +58,7 @@ pub(super) fn cavity(ct: &VoxelVolume<i16>, isovalue: i16, grid: &Grid) -> Optio
     Some(within(&core, BALL_MM + 4.0, |at| space.data[at] != 0))
 }
 
-/// In how many of the 6 grid directions each voxel sees bone.
+/// Number of the 6 grid directions in which each voxel sees bone.
 fn walls(bone: &VoxelVolume<u8>) -> Vec<u8> {
     let [nx, ny, nz] = bone.dims;
     let mut seen = vec![0; bone.data.len()];

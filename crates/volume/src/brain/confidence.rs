@@ -1,4 +1,4 @@
-//! How sure a brain mask is.
+//! Confidence of a brain mask.
 //!
 //! # Theory
 //! Each part is a score from 0 to 1; the confidence is their product.
@@ -8,45 +8,45 @@
 //! border   share of the surface that has a dark layer outside; 1 from 95 %, 0 at 50 %
 //! shape    sphericity, surface of a ball of that volume over the mask's; 1 from 0.55, 0 at 0.3
 //! slices   1 up to slices of 3 mm, half at 9 mm
-//! inside   with a CT: share of the mask in the skull (1 from 98 %, 0 at 80 %), and of the skull's
-//!          inside in the mask (1 from 75 %, 0 at 50 %), the lesser
+//! inside   with a CT, the lesser of the share of the mask in the skull (1 from 98 %, 0 at 80 %)
+//!          and of the skull's inside in the mask (1 from 75 %, 0 at 50 %)
 //! ```
 //!
-//! A mask that leaks along muscle or into an orbit has no dark layer there.
+//! A mask that leaks along muscle or into an orbit lacks the dark layer there.
 //!
 //! # When not to use it
-//! As a probability: the scores order masks, they were not fitted to how often one is wrong.
+//! As a probability: the scores rank masks and were not calibrated to error rates.
 
 use super::{BrainConfig, Levels, millilitres};
 use crate::VoxelVolume;
 use std::fmt;
 
-/// Under this a mask should be looked at, or replaced by labels.
+/// Below this confidence a mask should be inspected or replaced by labels.
 const DOUBT: f64 = 0.6;
 
-/// A score for a brain mask, and what it is made of; each from 0 to 1.
+/// The confidence of a brain mask and its components, each from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrainConfidence {
-    /// The product of the others.
+    /// The product of the components.
     pub value: f64,
     /// Volume of the mask, ml.
     pub found_ml: f64,
     /// Thickness of the MRI's slices, mm.
     pub slice_mm: f64,
-    /// Whether an adult brain has this volume.
+    /// Score for the volume of an adult brain.
     pub volume: f64,
-    /// Whether a dark layer lies around it.
+    /// Score for a dark layer around it.
     pub border: f64,
-    /// Whether it is compact.
+    /// Score for compactness.
     pub shape: f64,
-    /// Whether the slices are thin enough to see a surface between them.
+    /// Score for slices thin enough to resolve a surface between them.
     pub slices: f64,
-    /// Whether it fills the inside of the skull and no more; `None` without a CT.
+    /// Score for filling the inside of the skull and no more; `None` without a CT.
     pub inside: Option<f64>,
 }
 
 impl BrainConfidence {
-    /// Of a mask on a grid of cubes with the MRI on the same grid.
+    /// Computes the confidence of a mask on a grid of cubes, with the MRI on the same grid.
     pub(super) fn of(
         brain: &VoxelVolume<u8>,
         mri: &VoxelVolume<f32>,
@@ -73,7 +73,7 @@ impl BrainConfidence {
         Self { value, found_ml, slice_mm, volume, border, shape, slices, inside }
     }
 
-    /// Whether the mask should be looked at, or replaced by labels.
+    /// Whether the mask should be inspected or replaced by labels.
     pub fn is_doubtful(&self) -> bool {
         self.value.is_nan() || self.value < DOUBT
     }
@@ -93,7 +93,7 @@ impl fmt::Display for BrainConfidence {
     }
 }
 
-/// 0 up to `low`, 1 from `high` on.
+/// Linear from 0 at `low` to 1 at `high`, clamped.
 fn rising(value: f64, low: f64, high: f64) -> f64 {
     ((value - low) / (high - low)).clamp(0.0, 1.0)
 }
@@ -101,7 +101,7 @@ fn rising(value: f64, low: f64, high: f64) -> f64 {
 /// The surface of a mask.
 struct Surface {
     mm2: f64,
-    /// Share of it that has a value under brain's within two voxels.
+    /// Fraction of it with a value under brain's within two voxels.
     dark: f64,
 }
 
@@ -131,7 +131,8 @@ impl Surface {
                 dark += usize::from(low < least);
             }
         }
-        // Faces of cubes overrate a smooth surface by half (the mean of |cos| over its directions).
+        // The faces of cubes overestimate a smooth surface by half (the mean of |cos| over its
+        // directions).
         let edge = mask.spacing_mm().element_product().cbrt();
         let mm2 = faces.iter().sum::<usize>() as f64 * edge * edge / 1.5;
         Self { mm2, dark: dark as f64 / (places as f64).max(1.0) }

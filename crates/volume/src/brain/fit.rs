@@ -1,38 +1,38 @@
-//! Whether a brain lies inside a skull: are the MRI and the CT in one space?
+//! Checks whether a brain lies inside a skull, that is, whether MRI and CT share one space.
 
 use super::cavity::cavity;
 use super::{BrainConfig, in_head, millilitres};
 use crate::{DistanceField, Grid, Interpolation, TooLarge, VoxelVolume, resample, room_for_voxels};
 use glam::DVec3;
 
-/// Edge of the voxels that are compared, mm: at 2 mm the shares are the same within 0.06, in four
-/// times the time.
+/// Edge of the compared voxels, mm; at 2 mm the fractions change by at most 0.06, at four times the
+/// cost.
 const WORK_MM: f32 = 3.0;
 
-/// A brain this far beyond the inner table counts as outside, mm: over a voxel and the mask's rim.
+/// Distance beyond the inner table that counts as outside, mm: over a voxel and the mask's rim.
 const SLACK_MM: f32 = 4.0;
 
-/// What may be an adult's brain by a coarse mask, ml.
+/// Plausible volume of an adult brain in a coarse mask, ml.
 const CREDIBLE_ML: std::ops::RangeInclusive<f64> = 600.0..=2200.0;
 
-/// How a brain lies in the space inside a skull.
+/// The fit of a brain in the space inside a skull.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrainFit {
-    /// Share of the brain in the CT's view that lies outside the inner table by more than 4 mm.
+    /// Fraction of the brain in the CT's view that lies over 4 mm outside the inner table.
     pub outside_share: f64,
-    /// Share of the space inside the skull that the brain fills.
+    /// Fraction of the space inside the skull that the brain fills.
     pub filled_share: f64,
-    /// Distance between the middle of the brain and the middle of the space, mm.
+    /// Distance between the centres of the brain and of the space, mm.
     pub middles_mm: f64,
 }
 
-/// Compares a brain mask with the space inside the skull, where both images see it; `None` where
-/// the CT's bone encloses nothing.
+/// Compares a brain mask with the space inside the skull where both images overlap; `None` if the
+/// CT's bone encloses nothing.
 pub fn brain_fit(brain: &VoxelVolume<u8>, ct: &VoxelVolume<i16>, isovalue: i16) -> Result<Option<BrainFit>, TooLarge> {
     let grid = Grid::isotropic_over(ct, WORK_MM);
     room_for_voxels(grid.voxels() as u64, 32)?;
     let Some(room) = cavity(ct, isovalue, &grid) else { return Ok(None) };
-    // 2 where the MRI does not see.
+    // 2 outside the MRI.
     let brain = resample(brain, &grid, Interpolation::Nearest, 2);
     let to_room = DistanceField::of_mask(&room);
     let (mut inside, mut outside, mut space) = (0, 0, 0);
@@ -63,8 +63,8 @@ pub fn brain_fit(brain: &VoxelVolume<u8>, ct: &VoxelVolume<i16>, isovalue: i16) 
     }))
 }
 
-/// The brain by the MRI alone, coarsely and unchecked: what a CT in another space cannot spoil.
-/// `None` where nothing of a brain's size is seen.
+/// A coarse, unchecked brain mask from the MRI alone, independent of a misaligned CT. `None` if
+/// nothing of a brain's size is found.
 pub fn brain_by_mri(mri: &VoxelVolume<f32>) -> Result<Option<VoxelVolume<u8>>, TooLarge> {
     let grid = Grid::isotropic_over(mri, WORK_MM);
     room_for_voxels(grid.voxels() as u64, 32)?;
@@ -77,7 +77,7 @@ fn voxel(at: usize, nx: usize, ny: usize) -> DVec3 {
     DVec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64)
 }
 
-/// The middle of some places.
+/// Mean of a set of points.
 #[derive(Clone, Copy, Default)]
 struct Middle {
     sum: DVec3,

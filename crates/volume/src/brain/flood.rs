@@ -1,20 +1,20 @@
-//! A flood from markers, highest values first: a watershed.
+//! Watershed: floods from markers, highest values first.
 //!
 //! # Sources
 //! L. Vincent, P. Soille, "Watersheds in digital spaces", IEEE PAMI 13, 1991.
 
 use std::collections::VecDeque;
 
-/// A place that the flood may reach.
+/// A voxel that the flood may reach.
 pub(super) const UNKNOWN: u8 = 0;
 pub(super) const INSIDE: u8 = 1;
 pub(super) const OUTSIDE: u8 = 2;
 
-/// Levels of the flood.
+/// Number of levels of the flood.
 const LEVELS: usize = 256;
 
-/// Spreads the labels into what is unknown and over 0, highest values first, nearest first on a
-/// level; values over `highest` count as that.
+/// Spreads the labels into unknown voxels with values over 0, highest first and nearest first on a
+/// level. Values over `highest` are clamped.
 pub(super) fn flood([nx, ny, nz]: [usize; 3], values: &[f32], highest: f32, labels: &mut [u8]) {
     let scale = LEVELS as f32 / highest;
     let level_of = |at: usize| ((values[at] * scale) as usize).min(LEVELS - 1);

@@ -1,18 +1,18 @@
-//! Which grey values are brain in a T1 MRI.
+//! Grey-value range of brain in a T1 MRI.
 //!
 //! # Theory
 //! Deep in the head there is white matter, grey matter and little CSF. With m the median and w the
-//! 90th percentile of what has signal there, brain is from 0.62 m (halfway between CSF and grey
-//! matter) to 1.3 w (under fat and contrast agent). The head is what is over half of Otsu's
-//! threshold (1979), closed and filled.
+//! 90th percentile of the signal there, brain is from 0.62 m (halfway between CSF and grey matter)
+//! to 1.3 w (under fat and contrast agent). The head is everything over half of Otsu's threshold
+//! (1979), closed and filled.
 
 use super::morphology::{closed, filled};
 use crate::{DistanceField, VoxelVolume, largest_component};
 
-/// How deep under the skin only brain and its water are, mm.
+/// Depth under the skin from which there is only brain and CSF, mm.
 const CORE_MM: f32 = 35.0;
 
-/// Grey values of brain signal.
+/// Grey-value range of brain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Levels {
     pub least: f32,
@@ -20,7 +20,7 @@ pub(super) struct Levels {
 }
 
 impl Levels {
-    /// From the voxels for which `deep` holds; `None` when they are too few or all alike.
+    /// Computes it from the voxels for which `deep` holds; `None` if they are too few or uniform.
     pub fn of(mri: &VoxelVolume<f32>, deep: impl Fn(usize) -> bool) -> Option<Self> {
         let mut values: Vec<f32> = (0..mri.data.len()).filter(|&at| deep(at)).map(|at| mri.data[at]).collect();
         values.sort_unstable_by(f32::total_cmp);
@@ -38,7 +38,7 @@ impl Levels {
     }
 }
 
-/// How deep each voxel lies under the skin, mm; negative outside the head.
+/// Depth of each voxel under the skin, mm; negative outside the head.
 pub(super) fn depth_in_head(mri: &VoxelVolume<f32>) -> VoxelVolume<f32> {
     let mut values: Vec<f32> = mri.data.iter().copied().filter(|&v| v > 0.0).collect();
     values.sort_unstable_by(f32::total_cmp);
@@ -47,7 +47,7 @@ pub(super) fn depth_in_head(mri: &VoxelVolume<f32>) -> VoxelVolume<f32> {
     DistanceField::of_mask(&head).values().map(|d| -d)
 }
 
-/// Whether a depth is one of the middle of the head.
+/// Whether a depth belongs to the middle of the head.
 pub(super) fn is_core(depth_mm: f32) -> bool {
     depth_mm > CORE_MM
 }

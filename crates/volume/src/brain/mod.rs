@@ -1,33 +1,35 @@
-//! The brain in a T1 MRI, by threshold, morphology and the largest piece; inside the skull where a
+//! Segments the brain in a T1 MRI by threshold, morphology and largest piece; inside the skull if a
 //! CT is given.
 //!
 //! # Theory
 //! All on a grid of cubes (1.5 mm by default), with balls of any radius from distance fields:
 //!
 //! ```text
-//! room    with a CT: the inside of the skull; without: what lies under the skin
+//! room    with a CT: the inside of the skull; without: the region under the skin
 //! tissue  room ∩ brain's grey values, from the median deep in the room
-//! core    largest piece of tissue that a ball of radius r can move in          cuts meninges, vessels, nerves
-//! brain   tissue within r + 1 mm of the core, closed by a ball of 8 mm         fills sulci and ventricles
-//! border  the darkest layer within 6 mm around it, by a flood of grey values   takes the water in
-//! mask    what lies within, brought to the MRI's grid between voxels, less bone
+//! core    largest piece of tissue that a ball of radius r can move in
+//!         (cuts meninges, vessels, nerves)
+//! brain   tissue within r + 1 mm of the core, closed by a ball of 8 mm
+//!         (fills sulci and ventricles)
+//! border  the darkest layer within 6 mm around it, by a watershed of grey values (adds CSF)
+//! mask    everything inside, interpolated on the MRI's grid, less bone
 //! ```
 //!
-//! The mask is the brain with the water in and around it up to about the dura, as other hands draw
-//! it.
+//! The mask is the brain with the CSF in and around it up to about the dura, as in manual
+//! segmentations.
 //!
-//! Without a CT, r starts at 1 mm and grows by 0.5 mm until less than 0.5 % of the brain lies
-//! within 6 mm of the skin, where none can be, and the mask is not larger than a brain: the
-//! smallest ball at which muscle and scalp let go.
+//! Without a CT, r starts at 1 mm and grows by 0.5 mm until less than 0.5 % of the mask lies within
+//! 6 mm of the skin and the mask is not larger than a brain. This is the smallest ball that
+//! separates muscle and scalp.
 //!
 //! # Practice
-//! Seconds per head on two cores, linear in the voxels of the working grid. Against masks by other
-//! hands: Dice 0.96 to 0.97 (README). [`find_brain`] says how sure it is ([`BrainConfidence`]):
-//! look at that.
+//! Takes seconds per head on two cores, linear in the voxels of the working grid. Against
+//! independent masks: Dice 0.96 to 0.97 (README). [`find_brain`] also returns the confidence
+//! ([`BrainConfidence`]): check it.
 //!
 //! # When not to use it
-//! For T2, for infants, for brains open to the outside, or when a label volume is at hand: give
-//! that and check it with [`check_brain_mask`].
+//! For T2, infants, open brains, or when a label volume exists: use that and check it with
+//! [`check_brain_mask`].
 
 mod border;
 mod cavity;
@@ -47,40 +49,39 @@ pub use confidence::BrainConfidence;
 use levels::{Levels, depth_in_head, is_core};
 use morphology::{closed, core, within};
 
-/// Nearer than this to the skin there is no brain, mm.
+/// Depth under the skin within which there is no brain, mm.
 const SHALLOW_MM: f32 = 6.0;
 
-/// Share of a mask that may lie nearer to the skin than [`SHALLOW_MM`].
+/// Largest fraction of a mask that may lie nearer to the skin than [`SHALLOW_MM`].
 const LEAK: f64 = 0.005;
 
-/// The border voxels of tissue, which are half water, mm.
+/// Thickness of the tissue's border voxels, which are half CSF, mm.
 const RIM_MM: f32 = 1.0;
 
-/// How many times smaller or larger than an adult brain a mask may be that is given, with doubt.
+/// Factor beyond adult brain volumes up to which a mask is still returned as doubtful.
 const DOUBTFUL: f64 = 1.5;
 
-/// A second piece up to this volume is a speck, ml.
+/// Largest volume of a second piece that is ignored, ml.
 const SPECK_ML: f64 = 5.0;
 
-/// How the brain is found.
+/// How to segment the brain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrainConfig {
-    /// Bone threshold in the CT, HU; `None` takes the lowest, [`LEAST_ISOVALUE`], which leaves the
-    /// fewest holes in thin bone.
+    /// Bone threshold in the CT, HU; `None` uses [`LEAST_ISOVALUE`], which leaves the fewest holes
+    /// in thin bone.
     pub isovalue: Option<i16>,
-    /// Edge of the voxels that the search runs on, mm: smaller is slower and follows the surface
-    /// closer.
+    /// Voxel edge of the working grid, mm: smaller is slower and follows the surface closer.
     pub work_mm: f32,
-    /// Radius of the ball that must fit into brain, mm: parts that hang on something thinner are
-    /// cut off. Grows by itself without a CT.
+    /// Radius of the ball that must fit into brain, mm: parts with a thinner connection are cut
+    /// off. Grows automatically without a CT.
     pub opening_mm: f32,
     /// Radius of the ball that closes gaps, mm: sulci narrower than twice this are filled.
     pub closing_mm: f32,
-    /// How far from the tissue the dark layer around a brain is looked for, mm.
+    /// Search distance from the tissue for the dark layer around a brain, mm.
     pub border_mm: f32,
-    /// Least volume that passes for an adult brain, ml.
+    /// Smallest plausible volume of an adult brain, ml.
     pub least_ml: f64,
-    /// Greatest volume that passes for an adult brain, ml.
+    /// Largest plausible volume of an adult brain, ml.
     pub greatest_ml: f64,
 }
 
@@ -102,7 +103,7 @@ impl Default for BrainConfig {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MaskError {
-    /// Nothing was found.
+    /// No brain was found.
     #[error("no brain was found: {0}; is this a T1 MRI of a head? Give a label volume instead")]
     Empty(&'static str),
     /// An implausible volume.
@@ -125,34 +126,34 @@ pub enum MaskError {
         /// Volume of the second largest, ml.
         second_ml: f64,
     },
-    /// Voxels without a number.
+    /// Voxels that are not finite.
     #[error("{count} voxels of the MRI hold no number (NaN or infinite); write them as 0 or give another file")]
     NotANumber {
         /// How many.
         count: usize,
     },
-    /// A setting out of bounds.
+    /// A setting out of range.
     #[error("work_mm is {0} mm; 0.3 to 6 mm is right")]
     Work(f32),
     /// More than fits into memory.
     #[error("{0}; crop the MRI, or correct its voxel edges")]
     TooLarge(#[from] TooLarge),
-    /// CT and MRI lie apart.
+    /// CT and MRI do not overlap.
     #[error(transparent)]
     Apart(#[from] OverlapError),
 }
 
-/// A brain that was found.
+/// A segmented brain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundBrain {
     /// 1 in the brain, 0 elsewhere, on the MRI's grid.
     pub mask: VoxelVolume<u8>,
-    /// How sure it is.
+    /// Its confidence.
     pub confidence: BrainConfidence,
 }
 
-/// Finds the brain in a T1 MRI: 1 in the brain, 0 elsewhere, on the MRI's grid. `skull` is a CT in
-/// HU on any grid.
+/// Segments the brain in a T1 MRI: 1 in the brain, 0 elsewhere, on the MRI's grid. `skull` is a CT
+/// in HU on any grid.
 pub fn brain_mask(
     mri: &VoxelVolume<f32>,
     skull: Option<&VoxelVolume<i16>>,
@@ -161,8 +162,8 @@ pub fn brain_mask(
     find_brain(mri, skull, config).map(|found| found.mask)
 }
 
-/// The same, with how sure it is. A mask of a doubtful volume is given with low confidence; one
-/// that no brain has is refused.
+/// Like [`brain_mask`], with the confidence. A mask of a doubtful volume is returned with low
+/// confidence; an implausible one is rejected.
 pub fn find_brain(
     mri: &VoxelVolume<f32>,
     skull: Option<&VoxelVolume<i16>>,
@@ -214,7 +215,7 @@ fn millilitres(mask: &VoxelVolume<u8>) -> f64 {
     mask.data.iter().filter(|&&v| v != 0).count() as f64 * mask.voxel_mm3() * 1e-3
 }
 
-/// Brain inside the skull: what has brain's grey values, opened, closed, within the room.
+/// Brain inside the skull: voxels of brain's grey values in the room, opened and closed.
 fn in_room(mri: &VoxelVolume<f32>, room: &VoxelVolume<u8>, config: &BrainConfig) -> Option<(VoxelVolume<u8>, Levels)> {
     let to_wall = DistanceField::of_mask(room);
     let depth = &to_wall.values().data;
@@ -227,8 +228,9 @@ fn in_room(mri: &VoxelVolume<f32>, room: &VoxelVolume<u8>, config: &BrainConfig)
     Some((mask, levels))
 }
 
-/// Brain by the MRI alone: the ball of the opening grows until nothing but a trace of the mask lies
-/// right under the skin and the volume is no longer too large.
+/// Brain from the MRI alone.
+/// The opening's ball grows until almost no mask lies right under the skin and the volume is
+/// plausible.
 fn in_head(mri: &VoxelVolume<f32>, config: &BrainConfig) -> Option<(VoxelVolume<u8>, Levels)> {
     let depth = depth_in_head(mri);
     let levels = Levels::of(mri, |at| is_core(depth.data[at]))?;
@@ -251,8 +253,8 @@ fn in_head(mri: &VoxelVolume<f32>, config: &BrainConfig) -> Option<(VoxelVolume<
     None
 }
 
-/// The largest piece that a ball of the radius can move in, and what is within 1 mm of the ball's
-/// places.
+/// The largest piece that a ball of the radius can move in, plus everything within 1 mm of the
+/// ball.
 fn opened(mri: &VoxelVolume<f32>, tissue: impl Fn(usize) -> bool, radius_mm: f32) -> Option<VoxelVolume<u8>> {
     let mask = VoxelVolume {
         dims: mri.dims,
@@ -262,8 +264,7 @@ fn opened(mri: &VoxelVolume<f32>, tissue: impl Fn(usize) -> bool, radius_mm: f32
     Some(within(&core(&mask, radius_mm)?, radius_mm + 1.0, |at| mask.data[at] != 0))
 }
 
-/// The mask on the MRI's grid, its surface between the coarse voxels, without bone; the largest
-/// piece.
+/// The mask on the MRI's grid, with an interpolated surface and without bone; the largest piece.
 fn refined(brain: &VoxelVolume<u8>, mri: &VoxelVolume<f32>, bone: Option<(&VoxelVolume<i16>, i16)>) -> VoxelVolume<u8> {
     let field = DistanceField::of_mask(brain);
     let fine = resample(field.values(), &Grid::of(mri), Interpolation::Trilinear, FAR_MM);
@@ -275,8 +276,8 @@ fn refined(brain: &VoxelVolume<u8>, mri: &VoxelVolume<f32>, bone: Option<(&Voxel
     largest_component(&mask)
 }
 
-/// Checks a brain mask, also one that was given as a label volume: not empty, one piece but for
-/// specks, an adult's volume.
+/// Checks a brain mask, also a given label volume: not empty, one piece except specks, an adult's
+/// volume.
 pub fn check_brain_mask(mask: &VoxelVolume<u8>, config: &BrainConfig) -> Result<(), MaskError> {
     let pieces = Components::of(mask.dims, |at| mask.data[at] != 0);
     let ml = |voxels: usize| voxels as f64 * mask.voxel_mm3() * 1e-3;

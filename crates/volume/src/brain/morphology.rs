@@ -8,14 +8,14 @@
 use crate::component::Components;
 use crate::{DistanceField, VoxelVolume, largest_component};
 
-/// The largest piece of what is left after erosion; `None` when nothing is.
+/// The largest piece after erosion; `None` if nothing is left.
 pub(super) fn core(mask: &VoxelVolume<u8>, radius_mm: f32) -> Option<VoxelVolume<u8>> {
     let eroded = DistanceField::of_mask(mask).values().map(|d| u8::from(d < -radius_mm));
     let core = largest_component(&eroded);
     core.data.contains(&1).then_some(core)
 }
 
-/// What lies within `radius_mm` of a mask and is `allowed`.
+/// The voxels within `radius_mm` of a mask that are `allowed`.
 pub(super) fn within(mask: &VoxelVolume<u8>, radius_mm: f32, allowed: impl Fn(usize) -> bool) -> VoxelVolume<u8> {
     let field = DistanceField::of_mask(mask);
     let data = field.values().data.iter().enumerate().map(|(at, &d)| u8::from(d < radius_mm && allowed(at))).collect();
@@ -28,7 +28,7 @@ pub(super) fn closed(mask: &VoxelVolume<u8>, radius_mm: f32) -> VoxelVolume<u8> 
     filled(&DistanceField::of_mask(&wide).values().map(|d| u8::from(d < -radius_mm)))
 }
 
-/// Fills what is enclosed: everything but the largest piece of the background.
+/// Fills enclosed holes: everything but the largest piece of the background.
 pub(super) fn filled(mask: &VoxelVolume<u8>) -> VoxelVolume<u8> {
     let gaps = Components::of(mask.dims, |at| mask.data[at] == 0);
     let mut out = VoxelVolume::filled(mask.dims, mask.world_from_voxel, 1);

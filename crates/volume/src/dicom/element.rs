@@ -1,9 +1,9 @@
-//! Walking through the data elements of a DICOM file.
+//! Traverses the data elements of a DICOM file.
 //!
 //! # Theory
 //! PS3.5 of the standard: an element is a tag (group, element), in explicit syntaxes a value
-//! representation (VR) of two letters, a length, and the value. Sequences hold items that hold
-//! elements again; a length of 0xFFFFFFFF means "until the delimiter".
+//! representation (VR) of two letters, a length, and the value. Sequences contain items that
+//! contain elements; a length of 0xFFFFFFFF means "until the delimiter".
 
 use crate::sample::ByteOrder;
 
@@ -18,48 +18,47 @@ const ITEM_END: Tag = 0xfffe_e00d;
 const SEQUENCE_END: Tag = 0xfffe_e0dd;
 const UNDEFINED: u32 = u32::MAX;
 
-/// Sequences inside sequences that are looked into at most.
+/// Deepest nesting of sequences that is read.
 const DEEPEST: usize = 12;
 
-/// VRs whose length takes four bytes, after two that are reserved.
+/// VRs with a four-byte length after two reserved bytes.
 const LONG: [&[u8; 2]; 12] = [b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT"];
 
-/// Sequences that are looked into also where the syntax is implicit and their length is given:
-/// functional groups and their parts.
+/// Sequences also parsed in implicit syntax with a given length: functional groups and their parts.
 const SEQUENCES: [Tag; 6] = [0x5200_9229, 0x5200_9230, 0x0020_9113, 0x0020_9116, 0x0028_9110, 0x0028_9145];
 
-/// How elements are written.
+/// Encoding of the elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Syntax {
     pub explicit: bool,
     pub order: ByteOrder,
 }
 
-/// A value, seen while walking.
+/// A value found during traversal.
 pub(super) struct Element<'a> {
     pub tag: Tag,
     pub value: &'a [u8],
     pub order: ByteOrder,
-    /// The outermost sequence that it lies in and the number of its item there.
+    /// Its outermost sequence and item number there.
     pub within: Option<(Tag, usize)>,
 }
 
 /// The voxels as they are stored.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Pixels {
-    /// From byte to byte.
+    /// A byte range.
     Plain(std::ops::Range<usize>),
-    /// Pieces of a compressed stream; the first is a table of offsets.
+    /// Fragments of a compressed stream; the first is the offset table.
     Fragments(Vec<std::ops::Range<usize>>),
 }
 
-/// Why a walk ended early.
+/// Why a traversal ended early.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Broken {
     pub at: usize,
 }
 
-/// A walk through the bytes of a file.
+/// A traversal of a file's bytes.
 pub(super) struct Walk<'a> {
     pub bytes: &'a [u8],
     pub at: usize,
@@ -73,7 +72,7 @@ impl<'a> Walk<'a> {
         self.elements(self.bytes.len(), 0, None, visit)
     }
 
-    /// The next element, which is no sequence.
+    /// The next element, which must not be a sequence.
     pub fn plain_element(&mut self) -> Result<Element<'a>, Broken> {
         let (tag, _, length) = self.head()?;
         Ok(Element { tag, value: self.take(length)?, order: self.syntax.order, within: None })

@@ -1,24 +1,23 @@
-//! DICOM series: what the scanner sends, a file per slice or all slices in one.
+//! Reads DICOM series, with a file per slice or all slices in one.
 //!
 //! # Theory
-//! Files are grouped by series, orientation and size; see the stack for how slices find their order
-//! and place. Stored numbers become values by `RescaleSlope · stored + RescaleIntercept`, which for
-//! CT gives HU.
+//! Files are grouped by series, orientation and size; the stack module sorts and places the slices.
+//! Values are `RescaleSlope · stored + RescaleIntercept`, which for CT gives HU.
 //!
 //! # Practice
-//! Give a folder, or one file of the series in it. Read: explicit and implicit, little- and
-//! big-endian, deflated, RLE, JPEG (8 bits with losses, or lossless), JPEG-LS, JPEG 2000; 8, 16 and
-//! 32 bits; enhanced multi-frame files; oblique and tilted stacks. Of several series in a folder
-//! the one with the most slices is taken and a note says so; [`series`] lists them. Doubled,
-//! missing and uneven slices are refused. Only the elements that place and scale voxels are looked
-//! at: no name, date, identifier or free text of a patient is kept or shown.
+//! Give a folder, or one file of the series in it. Reads explicit and implicit, little- and
+//! big-endian, deflated, RLE, JPEG (8 bits lossy, or lossless), JPEG-LS, JPEG 2000; 8, 16 and 32
+//! bits; enhanced multi-frame files; oblique and tilted stacks. Of several series in a folder the
+//! one with the most slices is read and a note reports it; [`series`] lists them. Doubled, missing
+//! and uneven slices are rejected. Only the elements that place and scale voxels are read: no name,
+//! date, identifier or free text of a patient is stored or shown.
 //!
 //! # Sources
 //! NEMA, "DICOM PS3.3 C.7.6.2, C.7.6.16; PS3.5; PS3.10", dicom.nema.org.
 //!
 //! # When not to use it
-//! For colour, ultrasound, 12-bit JPEG with losses, and other compressed syntaxes: the error names
-//! the syntax.
+//! For colour, ultrasound, lossy 12-bit JPEG, and other compressed syntaxes: the error names the
+//! syntax.
 
 mod codec;
 mod element;
@@ -32,17 +31,16 @@ use rayon::prelude::*;
 use slice::Slice;
 use std::path::{Path, PathBuf};
 
-/// Most files that are looked at in a folder.
+/// Most files examined in a folder.
 const MOST_FILES: usize = 20_000;
 
-/// Folders inside the folder that are looked into.
+/// Depth of subfolders searched.
 const DEEPEST: usize = 4;
 
-/// How to choose a series.
+/// Hint on choosing a series.
 const LIST: &str = "`case series FOLDER` lists them with the numbers that --ct-series and --mri-series take";
 
-/// Pictures that are decoded at a time, so that files and numbers of a few only are in memory
-/// beside the volume.
+/// Pictures decoded at a time, so that few files are in memory beside the volume.
 const BATCH: usize = 16;
 
 /// A stack of pictures of one size and orientation.
@@ -63,8 +61,7 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
     import(path).map(|import| import.volume)
 }
 
-/// Reads the largest series of a folder, or the one that a file belongs to, with what there is to
-/// say about it.
+/// Reads the largest series of a folder, or the one of a file, with notes.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
     let groups = Groups::of(path)?;
     let wanted = match path.is_dir() {
@@ -77,7 +74,7 @@ pub fn import(path: &Path) -> Result<Import, ReadError> {
     }
 }
 
-/// Reads the series with a number of [`series`]'s list, which counts from 0.
+/// Reads the series at an index of [`series`]'s list, from 0.
 pub fn import_series(folder: &Path, index: usize) -> Result<Import, ReadError> {
     if folder.is_file() {
         let found = format!("it is a file, and series {index} is asked for");
@@ -87,7 +84,7 @@ pub fn import_series(folder: &Path, index: usize) -> Result<Import, ReadError> {
     Groups::of(folder)?.read(folder, index)
 }
 
-/// The series in a folder (and the folders in it), in the order of their first files' names.
+/// Lists the series in a folder and its subfolders, ordered by the names of their first files.
 pub fn series(folder: &Path) -> Result<Vec<Series>, ReadError> {
     Ok(Groups::of(folder)?.groups.iter().map(|group| summary(group)).collect())
 }
@@ -125,7 +122,7 @@ impl Groups {
         Ok(found)
     }
 
-    /// A picture that lies there twice is taken once.
+    /// Adds a picture; duplicates are ignored.
     fn add(&mut self, slice: Slice) {
         let same = |known: &Slice| !slice.instance.is_empty() && known.instance == slice.instance;
         if self.groups.iter().flatten().any(same) {
@@ -222,7 +219,7 @@ fn bytes_of(file: &Path) -> Result<Vec<u8>, ReadError> {
     slice::inflated(file, bytes)
 }
 
-/// The same series, orientation, size and spacing.
+/// Whether two slices have the same series, orientation, size and spacing.
 fn belongs(a: &Slice, b: &Slice) -> bool {
     let turned = match (a.orientation, b.orientation) {
         (Some(a), Some(b)) => (0..2).any(|n| !a[n].abs_diff_eq(b[n], 1e-3)),
@@ -241,7 +238,7 @@ fn summary(group: &[Slice]) -> Series {
     }
 }
 
-/// Files of a folder by name, then those of the folders in it.
+/// Collects the files of a folder by name, then those of its subfolders.
 fn collect(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), ReadError> {
     let io = |source| ReadError::Io { file: folder.into(), source };
     let mut entries = Vec::new();

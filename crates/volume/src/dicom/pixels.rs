@@ -1,4 +1,4 @@
-//! Stored pixels into values.
+//! Converts stored pixels to values.
 
 use super::codec::{CodecError, MOST_PIXELS, jpeg, jpeg_2000, jpeg_lossless, jpeg_ls, rle};
 use super::element::Pixels;
@@ -8,7 +8,7 @@ use crate::sample::ByteOrder;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Adds the values of one frame of a picture to `out`.
+/// Appends the values of one frame to `out`.
 pub(super) fn frame(slice: &Slice, bytes: &[u8], frame: usize, out: &mut Vec<f32>) -> Result<(), ReadError> {
     let layout = Layout::of(slice)?;
     let field =
@@ -157,7 +157,7 @@ impl Layout {
         }
     }
 
-    /// The stored bits out of the allocated ones, with their sign.
+    /// Extracts the stored bits from the allocated ones, with sign.
     fn value(&self, allocated: u64) -> i64 {
         let up = 64 - self.stored;
         let top = allocated >> self.shift << up;
@@ -165,7 +165,7 @@ impl Layout {
     }
 }
 
-/// What a transfer syntax is called.
+/// Name of a transfer syntax.
 fn name(syntax: &str) -> &'static str {
     match syntax {
         "1.2.840.10008.1.2.4.53" => "JPEG spectral selection, retired",

@@ -1,5 +1,4 @@
-//! What one DICOM file says about its picture: only the few elements that place and scale voxels
-//! are ever kept.
+//! Parses one DICOM file; only the few elements that place and scale voxels are stored.
 
 use super::element::{Element, Pixels, Syntax, Walk};
 use crate::ReadError;
@@ -39,7 +38,7 @@ pub(super) struct Slice {
 }
 
 impl Slice {
-    /// Looks into a whole file; `None` where it is no DICOM file or holds no picture.
+    /// Parses a whole file; `None` if it is not DICOM or has no picture.
     pub fn parse(file: &Path, bytes: &[u8]) -> Result<Option<Self>, ReadError> {
         let Some(start) = Start::of(bytes) else { return Ok(None) };
         let mut walk = Walk { bytes, at: start.at, syntax: start.syntax, pixels: None };
@@ -98,7 +97,7 @@ impl Slice {
     }
 }
 
-/// Where and how the elements start.
+/// Offset and encoding of the first element.
 struct Start {
     at: usize,
     syntax: Syntax,
@@ -108,8 +107,8 @@ struct Start {
 const EXPLICIT: Syntax = Syntax { explicit: true, order: ByteOrder::Little };
 
 impl Start {
-    /// With the preamble, the meta group says the syntax; without, the first element must look like
-    /// one.
+    /// With a preamble, the meta group gives the syntax; without, the first element must be
+    /// plausible.
     fn of(bytes: &[u8]) -> Option<Self> {
         let meta = if bytes.get(128..132) == Some(b"DICM") { 132 } else { 0 };
         let mut name = String::new();
@@ -133,18 +132,18 @@ impl Start {
     }
 }
 
-/// Explicit where two capital letters follow the first tag; big-endian where the group's zero comes
-/// first.
+/// Guesses explicit VR if two capital letters follow the first tag, big-endian if the group's zero
+/// byte comes first.
 fn guessed(bytes: &[u8]) -> Syntax {
     let letters = bytes.get(4..6).is_some_and(|vr| vr.iter().all(u8::is_ascii_uppercase));
     let order = if bytes.first() == Some(&0) { ByteOrder::Big } else { ByteOrder::Little };
     Syntax { explicit: letters, order }
 }
 
-/// Most bytes that a deflated file is unpacked to: over 1000 frames of 512 x 512.
+/// Largest unpacked size of a deflated file: over 1000 frames of 512 x 512.
 const MOST_INFLATED: u64 = 1 << 30;
 
-/// The deflated syntax's elements, unpacked behind the meta group; other files are left alone.
+/// Unpacks the deflated syntax's elements after the meta group; other files are unchanged.
 pub(super) fn inflated(file: &Path, bytes: Vec<u8>) -> Result<Vec<u8>, ReadError> {
     let deflated = Start::of(&bytes).filter(|start| start.name == "1.2.840.10008.1.2.1.99");
     let Some(start) = deflated else { return Ok(bytes) };
@@ -175,12 +174,12 @@ fn directions(numbers: &[f64]) -> Option<[DVec3; 2]> {
     upright.then_some([a, b])
 }
 
-/// Capital letters only, so that nothing else can come through.
+/// Keeps capital letters only, so that no patient data can pass.
 fn code(text: &str, most: usize) -> String {
     text.chars().filter(char::is_ascii_uppercase).take(most).collect()
 }
 
-/// Digits and points only, so that nothing else can come through.
+/// Keeps digits and points only, so that no patient data can pass.
 fn uid(text: &str) -> String {
     text.chars().filter(|c| c.is_ascii_digit() || *c == '.').take(64).collect()
 }

@@ -1,12 +1,13 @@
-//! Slices into a stack: by where they lie, never by what they are called.
+//! Sorts slices into a stack by position, never by file name.
 //!
 //! # Theory
 //! With the row direction r and the column direction c, n = r × c is the slices' normal and
-//! `n · position` their order. The step s = (last - first) / (count - 1) is the third axis; where
-//! the gantry was tilted it leans against n, and the affine is sheared:
+//! `n · position` sorts them. The step s = (last - first) / (count - 1) is the third axis. With a
+//! tilted gantry it is not parallel to n, and the affine is sheared:
 //!
 //! ```text
-//! world = diag(-1, -1, 1) · ( i · column spacing · r + j · row spacing · c + k · s + first )       DICOM is LPS, the world RAS
+//! world = diag(-1, -1, 1) · ( i · column spacing · r + j · row spacing · c + k · s + first )
+//! DICOM is LPS, the world RAS
 //! ```
 
 use super::slice::Slice;
@@ -22,17 +23,17 @@ pub(super) struct Picture<'a> {
     pub position: DVec3,
 }
 
-/// A stack in order, with its place in the patient.
+/// A sorted stack with its affine.
 pub(super) struct Stack<'a> {
     pub pictures: Vec<Picture<'a>>,
     pub world_from_voxel: DAffine3,
     pub tilt: Option<Note>,
 }
 
-/// Leaning by less than this is rounding, degrees.
+/// Tilts under this are rounding, degrees.
 const LEAST_TILT: f64 = 0.1;
 
-/// Puts the pictures of some files in order and checks that they fill a box evenly.
+/// Sorts the pictures of some files and checks that they are evenly spaced.
 pub(super) fn stack<'a>(place: &Path, slices: &[&'a Slice]) -> Result<Stack<'a>, ReadError> {
     let first = slices.first().ok_or_else(|| series(place, "no pictures are there".into(), "choose another folder"))?;
     let [row, column] = first.orientation.ok_or_else(|| missing(first, "ImageOrientationPatient"))?;
@@ -64,7 +65,7 @@ pub(super) fn stack<'a>(place: &Path, slices: &[&'a Slice]) -> Result<Stack<'a>,
     Ok(Stack { world_from_voxel, tilt: (degrees > LEAST_TILT).then_some(Note::Tilt { degrees }), pictures })
 }
 
-/// Refuses doubled, missing and uneven slices.
+/// Rejects doubled, missing and uneven slices.
 fn check_gaps(place: &Path, heights: &[f64]) -> Result<(), ReadError> {
     let mut gaps: Vec<f64> = heights.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let doubled = gaps.iter().filter(|&&gap| gap < 1e-3).count();
@@ -100,7 +101,7 @@ fn check_gaps(place: &Path, heights: &[f64]) -> Result<(), ReadError> {
     }
 }
 
-/// Refuses positions off the line from the first to the last.
+/// Rejects positions off the line from the first to the last.
 fn check_line(place: &Path, pictures: &[Picture], step: DVec3) -> Result<(), ReadError> {
     let off = |(n, picture): (usize, &Picture)| (pictures[0].position + n as f64 * step).distance(picture.position);
     let worst = pictures.iter().enumerate().map(off).fold(0.0, f64::max);

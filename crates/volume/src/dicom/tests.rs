@@ -5,7 +5,7 @@ use crate::mutation::survives_mutations;
 use glam::{DMat3, DVec3};
 use std::io::Write;
 
-/// A DICOM file made element by element.
+/// Builds a DICOM file element by element.
 struct Maker {
     bytes: Vec<u8>,
     explicit: bool,
@@ -81,7 +81,7 @@ fn stored(slice: usize, pixel: usize) -> u16 {
     (100 * slice + pixel) as u16
 }
 
-/// Everything but the pixels, patients' secrets included.
+/// Adds everything but the pixels, including patient identifiers.
 fn described(maker: &mut Maker, series: &str, instance: usize, position: DVec3) {
     maker.text(0x0008_0018, b"UI", &format!("1.2.3.{series}.{instance}")).text(0x0008_0020, b"DA", "19991231");
     maker.text(0x0008_0060, b"CS", "CT").text(0x0008_103e, b"LO", "SECRET-DESCRIPTION").text(
@@ -129,7 +129,7 @@ fn position(n: usize) -> DVec3 {
     DVec3::new(10.0, -20.0, 30.0) + 1.25 * n as f64 * oblique().z_axis
 }
 
-/// A series of some slices in a new folder, under names that say nothing of their order.
+/// A series of some slices in a new folder, with names in no order.
 fn folder(slices: impl IntoIterator<Item = usize>) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for n in slices {
@@ -179,7 +179,7 @@ fn every_plain_syntax_deflate_and_rle_give_the_same_volume() {
     is_the_stack(&read(folder.path()).unwrap(), 3);
 }
 
-/// Explicit little-endian and implicit files are also read without preamble and meta group.
+/// Strips preamble and meta group, which explicit little-endian and implicit files may lack.
 fn without_meta(bytes: Vec<u8>, syntax: (&str, bool, bool)) -> Vec<u8> {
     let meta = Maker::new(syntax.0, true, false).bytes.len();
     if syntax.2 { bytes } else { bytes[meta..].to_vec() }
@@ -199,7 +199,7 @@ fn run_length_encoded(n: usize) -> Vec<u8> {
     described(&mut maker, "1", n, position(n));
     let mut packed: Vec<u8> = [2u32, 64, 67].iter().flat_map(|v| v.to_le_bytes()).collect();
     packed.resize(64, 0);
-    // A slice's high bytes are all alike: one run of 12. Then the low bytes as they are.
+    // A slice's high bytes are all equal: one run of 12. Then the low bytes uncompressed.
     packed.extend([(257 - 12) as u8, (stored(n, 0) >> 8) as u8, 128, 11]);
     packed.extend((0..12).map(|pixel| stored(n, pixel) as u8));
     maker.head(0x7fe0_0010, b"OB", u32::MAX).head(0xfffe_e000, b"--", 0).head(0xfffe_e000, b"--", packed.len() as u32);
@@ -373,20 +373,20 @@ fn each_wrong_field_has_its_own_error() {
 }
 
 #[test]
-fn nothing_of_the_patient_comes_through() {
+fn no_patient_data_passes() {
     let folder = folder(0..3);
     let path = folder.path().join("3.dcm");
     let whole = std::fs::read(&path).unwrap();
-    let mut said = format!("{:?} {:?}", import(folder.path()).unwrap().notes, series(folder.path()).unwrap());
-    said += &format!("{:?}", Slice::parse(&path, &whole).unwrap());
+    let mut output = format!("{:?} {:?}", import(folder.path()).unwrap().notes, series(folder.path()).unwrap());
+    output += &format!("{:?}", Slice::parse(&path, &whole).unwrap());
     for length in (132..whole.len()).step_by(3) {
         std::fs::write(&path, &whole[..length]).unwrap();
         for result in [import(folder.path()), import(&path)] {
-            said += &result.map_or_else(|e| format!("{e} {e:?}"), |i| format!("{:?}", i.notes));
+            output += &result.map_or_else(|e| format!("{e} {e:?}"), |i| format!("{:?}", i.notes));
         }
     }
     assert!(
-        !said.contains("SECRET") && !said.contains("1950") && !said.contains("1999"),
+        !output.contains("SECRET") && !output.contains("1950") && !output.contains("1999"),
         "a patient's data came through"
     );
 }
@@ -420,7 +420,7 @@ fn run_lengths_unpack_to_exactly_the_pixels() {
     assert!(matches!(rle::decode(&packed, 7, 2), Err(CodecError::Wrong(_))));
 }
 
-/// One slice in plain numbers, run lengths, JPEG-LS and JPEG 2000 without loss, and in 8-bit JPEG.
+/// One slice uncompressed, as RLE, JPEG-LS and lossless JPEG 2000, and as 8-bit JPEG.
 fn compressed() -> [Vec<u8>; 5] {
     [
         include_bytes!("../../tests/data/MR_small.dcm").to_vec(),
@@ -431,7 +431,7 @@ fn compressed() -> [Vec<u8>; 5] {
     ]
 }
 
-/// A single picture, whatever its place.
+/// Reads a single picture, ignoring its position.
 fn one_picture(bytes: Vec<u8>) -> Result<Import, ReadError> {
     let file = Path::new("a");
     let nothing = || ReadError::Format { file: file.into(), found: "no picture".into() };
@@ -460,7 +460,7 @@ fn a_jpeg_has_the_values_that_another_decoder_gives() {
     let off = |(a, &b): (&f32, &u8)| (a - f32::from(b)).abs();
     let worst = found.data.iter().zip(truth).map(off).fold(0.0, f32::max);
     assert!(found.data.len() == truth.len() && worst <= 2.0, "off by up to {worst}");
-    // The frame header (SOF0) with 12 bits instead of 8: refused by name.
+    // The frame header (SOF0) with 12 bits instead of 8 is rejected.
     let mut extended = jpeg;
     let at = extended.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
     (extended[at + 1], extended[at + 4]) = (0xc1, 12);

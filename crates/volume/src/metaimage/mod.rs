@@ -7,15 +7,15 @@
 //! `world = diag(-1, -1, 1) · (direction · spacing | offset)`.
 //!
 //! # Practice
-//! Read: raw, zlib and text voxels; both byte orders; headers in the voxels' file to skip
-//! (`HeaderSize`, also -1); the intensity function. `AnatomicalOrientation` is not looked at:
-//! writers disagree about it and the matrix says the same.
+//! Reads raw, zlib and text voxels, both byte orders, `HeaderSize` (also -1) and the intensity
+//! function. `AnatomicalOrientation` is ignored: writers disagree about it, and the matrix holds
+//! the same information.
 //!
 //! # Sources
 //! Kitware, "MetaIO/Documentation", itk.org/Wiki/ITK/MetaIO/Documentation.
 //!
 //! # When not to use it
-//! For new files: NIfTI and NRRD say more about the space.
+//! For new files: NIfTI and NRRD describe the space more fully.
 
 use crate::keys::{Keys, numbers};
 use crate::sample::{ByteOrder, Number, Scale};
@@ -29,7 +29,7 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
     import(path).map(|import| import.volume)
 }
 
-/// Reads the volume of a file, with what there is to say about it.
+/// Reads the volume of a file, with notes.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
     import_source(Source::open_plain(path)?)
 }

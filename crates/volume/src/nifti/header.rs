@@ -1,11 +1,11 @@
-//! The fields of a NIfTI header that say what and where the voxels are.
+//! The fields of a NIfTI header that describe the voxels and their position.
 
 use crate::sample::{ByteOrder, Number, Scale};
 use crate::source::Source;
 use crate::{Note, ReadError};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// A header, whichever version and byte order it was written in.
+/// A parsed header of either version and byte order.
 pub(super) struct Header {
     pub order: ByteOrder,
     pub dims: [i64; 3],
@@ -13,7 +13,7 @@ pub(super) struct Header {
     pub volumes: u64,
     pub number: Number,
     pub vox_offset: u64,
-    /// None for a slope of 0, which means that values are as stored.
+    /// `None` for a slope of 0, which means unscaled values.
     pub scale: Option<Scale>,
     pub voxels_elsewhere: bool,
     pixdim: [f64; 4],
@@ -25,7 +25,7 @@ pub(super) struct Header {
     mm_per_unit: f64,
 }
 
-/// Where the patient lies, and which field says so.
+/// The affine and the field that it comes from.
 pub(super) struct Orientation {
     pub world_from_voxel: DAffine3,
     pub field: &'static str,
@@ -149,8 +149,8 @@ impl Header {
         DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) }
     }
 
-    /// R(a, b, c, d) · diag(spacing with the third mirrored where pixdim\[0\] < 0), a = √(1 - b² -
-    /// c² - d²).
+    /// R(a, b, c, d) · diag(spacing with the third mirrored where pixdim\[0\] < 0),
+    /// a = √(1 - b² - c² - d²).
     fn qform(&self, spacing: DVec3) -> DAffine3 {
         let v = self.quaternion;
         let rest = 1.0 - v.length_squared();
@@ -161,8 +161,7 @@ impl Header {
         DAffine3 { matrix3: DMat3::from_quat(q) * scale, translation: self.qoffset * self.mm_per_unit }
     }
 
-    /// A note where sform and qform put a corner of the volume more than a tenth of a millimetre
-    /// apart.
+    /// Returns a note if sform and qform place a corner of the volume over 0.1 mm apart.
     fn difference(&self, sform: DAffine3, qform: DAffine3) -> Option<Note> {
         let by_mm = (0..8)
             .map(|corner| {
@@ -175,7 +174,7 @@ impl Header {
     }
 }
 
-/// Numbers at the standard's offsets; `bytes` starts `start` bytes into the header.
+/// Accesses fields by the standard's offsets; `bytes` starts `start` bytes into the header.
 struct Fields<'a> {
     bytes: &'a [u8],
     start: usize,

@@ -1,4 +1,4 @@
-//! NIfTI-1 and NIfTI-2: the format of brain imaging.
+//! NIfTI-1 and NIfTI-2, the usual format of brain imaging.
 //!
 //! # Theory
 //! A header of 348 (version 1) or 540 bytes (version 2), then voxels with i fastest. The header's
@@ -6,19 +6,19 @@
 //! offset. Stored numbers become values by `scl_slope · stored + scl_inter`, unless the slope is 0.
 //!
 //! # Practice
-//! Read: both versions, both byte orders, gzip found by content, `.nii` or `.hdr` with `.img`,
-//! every real number type. `sform` goes before `qform`; with neither, i, j, k are taken as right,
-//! front, head, and a note says so. World units other than mm are converted. NaN voxels stay NaN:
-//! [`import`] counts them and [`hounsfield`](crate::hounsfield) refuses them. Written: version 1,
-//! single file, little-endian, both forms; a file appears whole or not at all.
+//! Reads both versions, both byte orders, gzip detected by content, `.nii` or `.hdr` with `.img`,
+//! and every real number type. `sform` takes precedence over `qform`; with neither, i, j, k are
+//! taken as right, front, head, and a note reports it. World units other than mm are converted. NaN
+//! voxels stay NaN: [`import`] counts them and [`hounsfield`](crate::hounsfield) rejects them.
+//! Writes version 1, single file, little-endian, both forms, atomically.
 //!
 //! # Sources
 //! R. W. Cox et al., "A (sort of) new image data format standard: NIfTI-1", 2004; the NIfTI-1 and
 //! NIfTI-2 C headers, nifti.nimh.nih.gov.
 //!
 //! # When not to use it
-//! Version 1 keeps the affine in f32: where an orientation must survive to the last bit of an f64,
-//! write [`nrrd`](crate::nrrd).
+//! Version 1 stores the affine in f32: to preserve an f64 affine exactly, write
+//! [`nrrd`](crate::nrrd).
 
 mod header;
 mod write;
@@ -36,7 +36,7 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
     import(path).map(|import| import.volume)
 }
 
-/// Reads the one volume of a file, with what there is to say about it.
+/// Reads the one volume of a file, with notes.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
     read_one(path, None)
 }
@@ -97,7 +97,7 @@ fn several(source: &Source, header: &Header, remedy: &'static str) -> ReadError 
     ReadError::Volumes { file: source.file().into(), field: "dim", found: header.volumes, remedy }
 }
 
-/// The header's path where the user named the voxels' half of a pair.
+/// The header's path if the user named the voxel file of a pair.
 pub(crate) fn header_of_pair(path: &Path) -> PathBuf {
     let plain = if ends(path, "gz") { path.with_extension("") } else { path.into() };
     let other = [plain.with_extension("hdr"), plain.with_extension("HDR"), plain.with_extension("hdr.gz")];
@@ -107,7 +107,7 @@ pub(crate) fn header_of_pair(path: &Path) -> PathBuf {
     }
 }
 
-/// The voxels' path beside a header.
+/// The path of the voxel file next to a header.
 fn voxels_of_pair(header: &Path) -> Result<PathBuf, ReadError> {
     let plain = if ends(header, "gz") { header.with_extension("") } else { header.into() };
     let places = ["img", "IMG", "img.gz"].map(|end| plain.with_extension(end));

@@ -9,7 +9,7 @@ use std::path::Path;
 
 const HEADER: usize = 352;
 
-/// Writes a volume: `.nii` plain, `.nii.gz` compressed. The file appears whole or not at all.
+/// Writes a volume atomically: `.nii` uncompressed, `.nii.gz` compressed.
 pub fn write<T: Sample>(path: &Path, volume: &VoxelVolume<T>) -> Result<(), WriteError> {
     let name = path.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let header = header(path, volume)?;
@@ -50,7 +50,7 @@ fn header<T: Sample>(path: &Path, volume: &VoxelVolume<T>) -> Result<[u8; HEADER
     Ok(h)
 }
 
-/// The sform always; the qform too where it can say the same, for readers that prefer it.
+/// Writes the sform; also the qform where it can represent the same affine.
 fn put_orientation(h: &mut [u8; HEADER], affine: DAffine3) {
     let m = affine.matrix3;
     let spacing = [m.x_axis.length(), m.y_axis.length(), m.z_axis.length()];

@@ -2,14 +2,14 @@
 //!
 //! # Theory
 //! Each axis has a direction vector (its length is the spacing) in a named space; the affine's
-//! columns are these vectors and the origin, turned into RAS+:
+//! columns are these vectors and the origin, converted to RAS+:
 //! `world = diag(±1) · (space directions | space origin)`.
 //!
 //! # Practice
-//! Read: attached and detached, raw, text, gzip; both byte orders; line skip and byte skip (also
-//! -1, voxels at the end); further axes of size 1. Without a space, i, j, k are taken as right,
-//! front, head and a note says so. Written: attached, gzip, with numbers in full length, so that an
-//! f64 affine comes back to the last bit.
+//! Reads attached and detached files; raw, text and gzip; both byte orders; line skip and byte skip
+//! (also -1, voxels at the end); further axes of size 1. Without a space, i, j, k are taken as
+//! right, front, head and a note reports it. Writes attached files with gzip and numbers in full
+//! length, so that an f64 affine is preserved exactly.
 //!
 //! # Sources
 //! G. Kindlmann, "Definition of NRRD file format", teem.sourceforge.net/nrrd/format.html.
@@ -33,7 +33,7 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
     import(path).map(|import| import.volume)
 }
 
-/// Reads the volume of a file, with what there is to say about it.
+/// Reads the volume of a file, with notes.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
     import_source(Source::open(path)?)
 }
@@ -53,10 +53,10 @@ pub(crate) fn import_source(mut source: Source) -> Result<Import, ReadError> {
     Ok(Import::new(volume, note.into_iter().collect()))
 }
 
-/// Which of the axes are those of the volume.
+/// The sizes and which axes are those of the volume.
 struct Sizes {
     dims: [i64; 3],
-    /// Their places among all axes.
+    /// Their indices among all axes.
     axes: [usize; 3],
     count: usize,
 }
@@ -127,7 +127,7 @@ fn orientation(source: &Source, keys: &Keys, sizes: &Sizes) -> Result<(DAffine3,
     Ok((turn * DAffine3 { matrix3, translation }, note))
 }
 
-/// Signs that turn the file's space into RAS+.
+/// Signs that convert the file's space to RAS+.
 fn signs(source: &Source, keys: &Keys) -> Result<(DVec3, Option<Note>), ReadError> {
     let Some(space) = keys.text(&["space"]) else {
         return Ok((DVec3::ONE, Some(Note::NoOrientation { field: "no space" })));
@@ -143,7 +143,7 @@ fn signs(source: &Source, keys: &Keys) -> Result<(DVec3, Option<Note>), ReadErro
     }
 }
 
-/// The parts of "(1,0,0) none (0,1,0)".
+/// Splits a list such as "(1,0,0) none (0,1,0)".
 fn vectors(text: &str) -> impl Iterator<Item = &str> {
     let ends = |c: char| c == ')' || c.is_whitespace();
     let mut rest = text.trim();
@@ -206,7 +206,7 @@ fn voxels(source: &mut Source, keys: &Keys, count: u64) -> Result<Vec<f32>, Read
     Ok(data)
 }
 
-/// The voxels' file beside a header.
+/// Opens the voxels' file next to a header.
 fn beside(header: &Source, name: &str) -> Result<Source, ReadError> {
     if name.starts_with("LIST") || name.contains('%') {
         return Err(header.field(

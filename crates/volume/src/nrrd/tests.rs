@@ -67,7 +67,7 @@ fn a_detached_header_finds_its_voxels_beside_it() {
 }
 
 #[test]
-fn what_is_written_comes_back_to_the_last_bit() {
+fn written_volumes_round_trip_exactly() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.nrrd");
     let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(0.3, -1.0, 0.7)));

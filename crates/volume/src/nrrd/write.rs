@@ -6,7 +6,7 @@ use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
 use std::path::Path;
 
-/// Writes a volume to a `.nrrd` file, compressed. The file appears whole or not at all.
+/// Writes a volume to a compressed `.nrrd` file, atomically.
 pub fn write<T: Sample>(path: &Path, volume: &VoxelVolume<T>) -> Result<(), WriteError> {
     let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("nrrd"));
     if !named {

@@ -1,12 +1,11 @@
-//! How much one image says about the other at a pose: normalised mutual information of their joint
-//! histogram.
+//! Normalised mutual information of the joint histogram of two images at a pose.
 
 use super::pyramid::{Level, Point};
 use glam::DAffine3;
 use rayon::prelude::*;
 
-/// Points that one thread takes at a time; the sums' order, and with it their bytes, depends on
-/// this alone.
+/// Points that one thread processes at a time; it alone determines the order of summation, so
+/// results are bit-identical.
 const CHUNK: usize = 16_384;
 
 /// Two images at one level of the pyramid.
@@ -17,7 +16,7 @@ pub(super) struct Pair<'a> {
     pub least_overlap: f64,
 }
 
-/// What a pose shows.
+/// The similarity of two images at a pose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shared {
     /// (H(F) + H(M)) / H(F, M), 1 to 2; under 1 where too few points overlap.
@@ -27,7 +26,7 @@ pub(super) struct Shared {
 }
 
 impl Pair<'_> {
-    /// The images' shared information at a pose.
+    /// Computes the similarity at a pose.
     pub fn at(&self, moving_from_fixed: DAffine3) -> Shared {
         let voxel_from_fixed = self.moving.voxel_from_world * moving_from_fixed;
         let part = |points: &[Point]| self.histogram(voxel_from_fixed, points);
@@ -47,7 +46,7 @@ impl Pair<'_> {
         Shared { normalised: normalised(&joint, self.bins, total), overlap }
     }
 
-    /// Pairs of bins; a moving value counts in the two bins around it by nearness.
+    /// Joint histogram; a moving value is shared linearly between its two nearest bins.
     fn histogram(&self, voxel_from_fixed: DAffine3, points: &[Point]) -> Vec<f32> {
         let mut joint = vec![0f32; self.bins * self.bins];
         for point in points {
@@ -77,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn information_has_its_closed_forms() {
+    fn mutual_information_matches_closed_forms() {
         assert!((normalised(&[5.0, 0.0, 0.0, 5.0], 2, 10.0) - 2.0).abs() < 1e-12);
         assert!((normalised(&[1.0, 3.0, 2.0, 6.0], 2, 12.0) - 1.0).abs() < 1e-12);
         assert_eq!(normalised(&[7.0, 0.0, 0.0, 0.0], 2, 7.0), 1.0);

@@ -1,37 +1,36 @@
-//! Where one image of a patient lies in another: rigid registration by mutual information.
+//! Rigid registration of two images of a patient by mutual information.
 //!
 //! # Theory
-//! Two scanners map tissue to grey values in unrelated ways, but at the right pose one value says
-//! most about the other. With the joint histogram of values at common points, H its entropy and
-//! H(F), H(M) those of its margins, the pose that makes (H(F) + H(M)) / H(F, M) largest is sought;
-//! this quotient, unlike H(F) + H(M) - H(F, M), does not grow by mere overlap. Powell's method
-//! climbs it on a pyramid of coarser images, from several rotations, so that its many side peaks do
-//! no harm.
+//! Two scanners map tissue to grey values in unrelated ways, but at the right pose one image's
+//! value predicts the other's. With H(F, M) the entropy of the joint histogram at common points and
+//! H(F), H(M) its marginal entropies, the pose that maximises (H(F) + H(M)) / H(F, M) is sought.
+//! Unlike H(F) + H(M) - H(F, M), this quotient does not grow with the overlap alone. Powell's
+//! method maximises it on an image pyramid from several initial rotations, to avoid local maxima.
 //!
 //! # Practice
-//! Moves up to about 20° and 30 mm are caught; further ones when the heads' middles and tilt tell.
-//! What fills an image from its border with one value is padding or cleared air; both are tried.
-//! The confidence is
+//! Captures motions of up to about 20° and 30 mm; larger ones where the heads' centres and tilt
+//! give a good start. A constant region at the image border is padding or cleared air; both are
+//! tried. The confidence is
 //!
 //! ```text
 //! l / (l + 0.003) · 1 / (1 + (h / 10 mm)²)
 //! ```
 //!
-//! l: normalised information lost 10 mm beside the result (turns at 80 mm from the middle), in the
-//! least certain of the six directions; a ball, whose turn nothing shows, has none. h: by how much
-//! the left, right, back, front, lower and upper half of the fixed image, each registered alone,
-//! contradict the whole; a false edge such as padding pulls one half only. In the moves of a real
-//! CT and MRI that the README lists no answer at or over 0.6, the default, was off by 3 mm or 3°;
-//! under it the answer is refused and comes with the error. Shares of the work are fixed, so the
-//! bytes do not depend on the number of threads. About 3 s a head on one core, twice that with
-//! padding.
+//! l is the normalised information lost 10 mm beside the result (rotations at 80 mm from the
+//! centre) in the least certain of the six directions; a ball, whose rotation is undetermined, has
+//! confidence 0. h is the disagreement of the left, right, back, front, lower and upper half of the
+//! fixed image, each registered alone; a false edge such as padding affects one half only. For the
+//! motions of a real CT and MRI listed in the README, no result at or over 0.6 (the default) had an
+//! error of 3 mm or 3°. Results under it are rejected and returned with the error. Work is split in
+//! fixed parts, so that results are bit-identical for any number of threads. It takes about 3 s a
+//! head on one core, twice that with padding.
 //!
 //! # Sources
 //! Viola and Wells 1997 and Collignon 1995 (mutual information), Studholme, Hill and Hawkes 1999
 //! (the quotient), Powell 1964.
 //!
 //! # When not to use it
-//! For two patients, for a brain that has shifted, or where the images share only a thin slab.
+//! For two patients, after brain shift, or where the images share only a thin slab.
 
 mod information;
 mod padding;
@@ -47,25 +46,24 @@ use powell::{Climb, Pose, climb};
 use pyramid::{Level, middle, range, reduced};
 use rayon::prelude::*;
 
-/// A turn of one radian counts as this many mm.
+/// Length that a rotation of one radian counts as, mm.
 const RADIUS_MM: f64 = 80.0;
 
-/// Halves that disagree by this are as likely wrong as right, mm.
+/// Disagreement of the halves at which the confidence is halved, mm.
 const CHANCE_MM: f64 = 10.0;
 
 /// How to register.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegistrationConfig {
-    /// Spacing of the finest level, mm, 0.5 to 8: finer is slower and hardly more exact.
+    /// Spacing of the finest level, mm, 0.5 to 8: finer is slower and hardly more accurate.
     pub work_mm: f64,
-    /// Grey values told apart in each image, 8 to 128: fewer is smoother, more tells thin contrasts
-    /// apart.
+    /// Grey-value bins of each image, 8 to 128: fewer are smoother, more resolve thin contrasts.
     pub bins: usize,
-    /// Points compared at the finest level, from 1000: more is slower and steadier.
+    /// Sample points at the finest level, from 1000: more are slower and more stable.
     pub points: usize,
-    /// Least share of the fixed image's points that must lie in the moving image, 0 to 1.
+    /// Smallest fraction of the fixed image's points that must lie in the moving image, 0 to 1.
     pub least_overlap: f64,
-    /// Under this confidence the result is refused, 0 to 1.
+    /// Results under this confidence are rejected, 0 to 1.
     pub least_confidence: f64,
 }
 
@@ -75,25 +73,26 @@ impl Default for RegistrationConfig {
     }
 }
 
-/// Where the moving image lies.
+/// The pose of the moving image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Registration {
-    /// Rigid: put before the moving image's `world_from_voxel`, it lies in the fixed image's space.
+    /// Rigid transform; multiplied with the moving image's `world_from_voxel` it maps to fixed
+    /// space.
     pub fixed_from_moving: DAffine3,
-    /// Normalised mutual information at the result, 1 (none) to 2 (one image gives the other).
+    /// Normalised mutual information at the result, 1 (independent) to 2 (fully dependent).
     pub metric: f64,
-    /// The same with the headers' poses; under 1 where they overlap too little.
+    /// The same at the headers' poses; under 1 where they overlap too little.
     pub start_metric: f64,
-    /// How far to trust it, 0 (not at all) to 1; see the module.
+    /// Confidence, 0 (none) to 1; see the module.
     pub confidence: f64,
     /// Share of the fixed image that lies in the moving image.
     pub overlap_share: f64,
-    /// How far the answers of the fixed image's left, right, back, front, lower and upper half
-    /// alone lie from this one: root mean square of shift and of turn at 80 mm, mm.
+    /// Disagreement of the results for the fixed image's six halves, root mean square over shift
+    /// and rotation at 80 mm, mm.
     pub halves_mm: f64,
 }
 
-/// Why there is no registration.
+/// Why registration failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RegistrationError {
     /// A number of the configuration is out of its range.
@@ -106,7 +105,7 @@ pub enum RegistrationError {
         /// The range.
         right: &'static str,
     },
-    /// An image shows nothing.
+    /// An image has no contrast.
     #[error(
         "registration: the {image} image has no contrast to register by; give the image itself, not a mask or a blank one"
     )]
@@ -114,7 +113,7 @@ pub enum RegistrationError {
         /// Fixed or moving.
         image: &'static str,
     },
-    /// The images do not cover one place.
+    /// The images overlap too little.
     #[error(
         "registration: only {:.0} % of the fixed image lies in the moving one, under the least of {:.0} %; give images that \
          show the same part of one patient, or crop the larger one", 100.0 * share, 100.0 * least
@@ -122,26 +121,26 @@ pub enum RegistrationError {
     Overlap {
         /// The share found.
         share: f64,
-        /// The least.
+        /// The smallest allowed.
         least: f64,
     },
-    /// The result could as well lie elsewhere.
+    /// The result is ambiguous.
     #[error(
         "registration: the confidence of {:.2} is under the least of {:.2} (shared information {:.3}); are both images of one \
          patient? Crop what only one of them shows, or register them by hand elsewhere and give files that agree", found.confidence, least, found.metric
     )]
     Doubtful {
-        /// What was found, to look at.
+        /// The rejected result.
         found: Box<Registration>,
-        /// The least confidence.
+        /// The smallest allowed confidence.
         least: f64,
     },
 }
 
-/// Finds the rigid move that puts `moving` into the space of `fixed`.
+/// Finds the rigid transform that maps `moving` to the space of `fixed`.
 ///
-/// A constant around an image counts as unseen (padding) and, in a second try, as air; the surer
-/// answer is given.
+/// A constant region around an image is ignored (padding) and, in a second try, used as air; the
+/// result with the higher confidence is returned.
 pub fn register<F: Sample, M: Sample>(
     fixed: &VoxelVolume<F>,
     moving: &VoxelVolume<M>,
@@ -181,7 +180,7 @@ fn check(config: &RegistrationConfig) -> Result<(), RegistrationError> {
     }
 }
 
-/// A pose to climb from: the six numbers are added to a turn and a shift.
+/// A start pose: the six numbers add a rotation and a shift to it.
 #[derive(Clone, Copy)]
 struct Start {
     turn: DQuat,
@@ -192,9 +191,9 @@ struct Search<'a> {
     config: &'a RegistrationConfig,
     /// Coarsest first.
     levels: Vec<(Level, Level)>,
-    /// Turns go about this point of the fixed image.
+    /// Rotation centre in the fixed image.
     centre: DVec3,
-    /// From the fixed image's middle to the moving one's.
+    /// From the fixed image's centre to the moving one's.
     between: DVec3,
 }
 
@@ -215,7 +214,7 @@ impl<'a> Search<'a> {
         Ok(Self { config, levels, centre, between: other - centre })
     }
 
-    /// The best pose, if it can be trusted.
+    /// The best pose, if its confidence suffices.
     fn run(&self) -> Result<Registration, RegistrationError> {
         let best = self.best();
         let found = self.judged(best);
@@ -254,7 +253,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// The headers' pose, the middles put together, and turns of both about the axes and the
+    /// Start poses: the headers', aligned centres, and rotations of both about the axes and the
     /// diagonals.
     fn starts(&self) -> Vec<Start> {
         let axes = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z].map(|a| a * 14f64.to_radians());
@@ -267,7 +266,7 @@ impl<'a> Search<'a> {
         turns.flat_map(|t| shifts.map(|shift| Start { turn: DQuat::from_scaled_axis(t), shift })).collect()
     }
 
-    /// Climbs from every start on one level; the best few, best first.
+    /// Optimises from every start on one level; returns the best few, best first.
     fn climb_all(&self, level: usize, points: usize, starts: &[Start], how: Climb, keep: usize) -> Vec<Start> {
         let mut ends: Vec<(Start, f64)> = self.with(level, points, |pair| {
             let from = |&start: &Start| {

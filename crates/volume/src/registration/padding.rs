@@ -1,23 +1,23 @@
-//! Voxels that no scanner saw: the one value that fills an image from its border inwards.
+//! Detects padding: the single value that fills an image from its border inwards.
 //!
 //! # Theory
-//! Resampling, cropping and round fields of view leave a constant around the picture. Taken for air
-//! it is a false edge that mutual information follows. Padding is what hangs on the border through
-//! faces and holds exactly the border's commonest value, where that value makes up a twentieth of
-//! the border.
+//! Resampling, cropping and round fields of view leave a constant around the image. If taken for
+//! air it is a false edge for mutual information. Padding is the region connected to the border
+//! through faces whose voxels equal the border's most common value, if that value makes up a
+//! twentieth of the border.
 
 use crate::component::Components;
 use crate::{Sample, VoxelVolume};
 use std::collections::HashMap;
 
-/// Least share of the border that is padding's.
+/// Smallest fraction of the border that counts as padding.
 const LEAST_SHARE: f64 = 0.05;
 
-/// Which voxels are padding, a bit each.
+/// Padding flag of each voxel, one bit each.
 pub(super) struct Padding(Vec<u64>);
 
 impl Padding {
-    /// Looks for padding.
+    /// Detects padding.
     pub fn of<T: Sample>(image: &VoxelVolume<T>) -> Self {
         let Some(value) = border_value(image) else { return Self::none() };
         let pieces = Components::of(image.dims, |at| image.data[at].to_f32() == value);
@@ -37,7 +37,7 @@ impl Padding {
         Self(bits)
     }
 
-    /// Takes every voxel for seen.
+    /// No padding: all voxels count.
     pub fn none() -> Self {
         Self(Vec::new())
     }
@@ -53,7 +53,7 @@ impl Padding {
     }
 }
 
-/// The commonest value on the faces of the image, where it is common enough.
+/// The most common value on the faces of the image, if common enough.
 fn border_value<T: Sample>(image: &VoxelVolume<T>) -> Option<f32> {
     let [nx, ny, nz] = image.dims;
     let mut counts: HashMap<u32, usize> = HashMap::new();
@@ -82,7 +82,7 @@ mod tests {
     use trepan_geometry::Vec3;
 
     #[test]
-    fn only_the_constant_that_hangs_on_the_border_is_padding() {
+    fn only_the_constant_connected_to_the_border_is_padding() {
         let mut image = VoxelVolume::isotropic([9, 9, 9], Vec3::ZERO, 1.0, 0i16);
         for at in 0..729 {
             let p = [at % 9, at / 9 % 9, at / 81];

@@ -1,21 +1,20 @@
-//! Climbing to a peak without derivatives: Powell's conjugate directions (1964) with parabolic line
-//! searches.
+//! Derivative-free maximisation: Powell's conjugate directions (1964) with parabolic line searches.
 
-/// A pose's six numbers: three of translation, three of rotation, all in mm.
+/// A pose: three translations, three rotations, all in mm.
 pub(super) type Pose = [f64; 6];
 
-/// How far and how finely to climb.
+/// Step size and stopping criteria.
 #[derive(Clone, Copy)]
 pub(super) struct Climb {
     /// First step along a direction, mm.
     pub step: f64,
-    /// A sweep that moves less ends the climb, mm.
+    /// A sweep with less motion ends the search, mm.
     pub tolerance: f64,
-    /// Most sweeps over the directions.
+    /// Largest number of sweeps over the directions.
     pub sweeps: usize,
 }
 
-/// The highest place reached from `start`, with its height.
+/// Maximises `height` from `start`; returns the pose and its height.
 pub(super) fn climb(height: &impl Fn(&Pose) -> f64, start: Pose, how: Climb) -> (Pose, f64) {
     let mut directions: [Pose; 6] = std::array::from_fn(|a| std::array::from_fn(|b| f64::from(u8::from(a == b))));
     let (mut pose, mut top) = (start, height(&start));
@@ -45,8 +44,7 @@ pub(super) fn climb(height: &impl Fn(&Pose) -> f64, start: Pose, how: Climb) -> 
     (pose, top)
 }
 
-/// The highest place found along a direction: a bracket by doubled steps, then parabolas through
-/// its three places.
+/// Maximises along a direction: brackets by doubled steps, then fits parabolas to three points.
 fn line(height: &impl Fn(&Pose) -> f64, pose: Pose, top: f64, direction: &Pose, step: f64) -> (Pose, f64) {
     let place = |t: f64| -> Pose { std::array::from_fn(|a| pose[a] + t * direction[a]) };
     let at = |t: f64| (t, height(&place(t)));

@@ -1,4 +1,4 @@
-//! An image at a coarser spacing, in bins of grey, and the points at which two images are compared.
+//! One level of an image pyramid in grey-value bins, and the sample points for the comparison.
 
 use super::padding::Padding;
 use crate::component::Components;
@@ -7,22 +7,21 @@ use crate::{Sample, VoxelVolume};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-/// An image whose values are places between bins, 0 to bins - 1; NaN where the image has none.
+/// An image in bin units, 0 to bins - 1; NaN where the image is undefined.
 pub(super) struct Level {
     pub binned: VoxelVolume<f32>,
     pub voxel_from_world: DAffine3,
     last: Vec3,
 }
 
-/// A place in the fixed image and its bin.
+/// A point in the fixed image and its bin.
 #[derive(Clone, Copy)]
 pub(super) struct Point {
     pub world: DVec3,
     pub bin: u8,
 }
 
-/// The image with voxels merged until they are about `mm` long; NaN for padding and for what is
-/// merged with it.
+/// Averages voxels until they are about `mm` long; padding and its averages become NaN.
 pub(super) fn reduced<T: Sample>(image: &VoxelVolume<T>, padding: &Padding, mm: f64) -> VoxelVolume<f32> {
     let value = |at: usize| if padding.holds(at) { f32::NAN } else { image.data[at].to_f32() };
     let grid = VoxelVolume { dims: image.dims, data: Vec::<T>::new(), world_from_voxel: image.world_from_voxel };
@@ -38,7 +37,7 @@ pub(super) fn reduced<T: Sample>(image: &VoxelVolume<T>, padding: &Padding, mm: 
 }
 
 impl Level {
-    /// A reduced image, reduced further until its voxels are about `mm` long.
+    /// Reduces an image further until its voxels are about `mm` long.
     pub fn new(image: &VoxelVolume<f32>, mm: f64, range: (f32, f32), bins: usize) -> Self {
         let mut merged = image.clone();
         while let Some(smaller) = halved(&merged, mm, |at| merged.data[at]) {
@@ -53,7 +52,7 @@ impl Level {
         }
     }
 
-    /// The value at a point in voxel indices; `None` outside the voxel centres and beside a NaN.
+    /// Value at voxel coordinates; `None` outside the voxel centres and next to a NaN.
     pub fn at(&self, voxel: Vec3) -> Option<f32> {
         if !(voxel.cmpge(Vec3::ZERO).all() && voxel.cmple(self.last).all()) {
             return None;
@@ -63,8 +62,8 @@ impl Level {
         (!value.is_nan()).then_some(value)
     }
 
-    /// At most `most` points spread over the image, each a little off its voxel's centre: grids of
-    /// a like spacing then show no false peaks where their voxels coincide.
+    /// At most `most` points spread over the image, each jittered within its voxel.
+    /// The jitter avoids false peaks where the voxels of two grids of similar spacing coincide.
     pub fn points(&self, most: usize) -> Vec<Point> {
         let [nx, ny, _] = self.binned.dims;
         let known: Vec<u32> =
@@ -83,7 +82,7 @@ impl Level {
     }
 }
 
-/// Numbers in 0..1 that depend on the seed alone (splitmix64, Steele 2014).
+/// Pseudo-random numbers in 0..1 from a seed (splitmix64, Steele 2014).
 fn fraction(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0xD134_2543_DE82_EF95);
     move || {
@@ -95,8 +94,7 @@ fn fraction(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// The image with pairs of voxels merged along each axis that is finer than `mm`; `None` when there
-/// is none.
+/// Averages pairs of voxels along each axis that is finer than `mm`; `None` when there is none.
 fn halved<T: Copy + Sync>(
     image: &VoxelVolume<T>,
     mm: f64,
@@ -125,8 +123,7 @@ fn halved<T: Copy + Sync>(
     Some(out)
 }
 
-/// The values under which half a per cent of the image lies and over which half a per cent does;
-/// `None` without contrast.
+/// The 0.5th and 99.5th percentile of the image; `None` without contrast.
 pub(super) fn range(image: &VoxelVolume<f32>) -> Option<(f32, f32)> {
     let stride = image.data.len().div_ceil(400_000).max(1);
     let mut values: Vec<f32> = image.data.iter().step_by(stride).copied().filter(|v| v.is_finite()).collect();
@@ -136,8 +133,7 @@ pub(super) fn range(image: &VoxelVolume<f32>) -> Option<(f32, f32)> {
     (high > low && (high - low).is_finite()).then_some((low, high))
 }
 
-/// The middle of the largest piece that is brighter than the mean, world mm: a head without table
-/// and frame.
+/// Centre of the largest piece brighter than the mean, world mm: the head without table and frame.
 pub(super) fn middle(level: &Level) -> DVec3 {
     let image = &level.binned;
     let known = || image.data.iter().copied().filter(|v| !v.is_nan());

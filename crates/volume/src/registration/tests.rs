@@ -1,7 +1,7 @@
 use super::*;
 use trepan_geometry::Vec3;
 
-/// A lopsided head: skull, brain, two ventricles and a jaw, in one of two modalities.
+/// An asymmetric head phantom: skull, brain, two ventricles and a jaw, in one of two modalities.
 fn tissue(p: DVec3, ct: bool) -> f32 {
     let ball = |centre: DVec3, axes: DVec3| ((p - centre) / axes).length();
     let (skin, skull, brain) = ([0.0, 180.0], [900.0, 10.0], [35.0, 100.0]);
@@ -46,14 +46,14 @@ fn a_moved_head_in_another_modality_is_found_with_the_same_bytes_on_any_threads(
     let found = with(2);
     assert_eq!(found, with(1));
     let error = found.fixed_from_moving * truth.inverse();
-    // Half a voxel of 4 mm, at the middle and at the skin.
+    // Half a voxel of 4 mm, at the centre and at the skin.
     let turn = DQuat::from_mat3(&error.matrix3).to_scaled_axis().length().to_degrees();
     assert!(turn < 2.0 && error.translation.length() < 1.0, "{turn}° {}: {found:?}", error.translation);
     assert!(found.metric > found.start_metric && found.overlap_share > 0.6, "{found:?}");
 }
 
 #[test]
-fn what_cannot_be_told_is_refused() {
+fn undetermined_poses_are_rejected() {
     let ct = image(true, 8.0, DAffine3::IDENTITY);
     let mut noise = ct.clone();
     noise.data.iter_mut().enumerate().for_each(|(at, v)| *v = ((at as f32) * 78.233).sin().fract() * 100.0);

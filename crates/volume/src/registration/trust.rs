@@ -1,20 +1,18 @@
-//! How far a pose can be trusted: how clear its peak is, and whether each half of the image says
-//! the same.
+//! Confidence of a pose: sharpness of its peak, and agreement of the results for image halves.
 
 use super::information::Pair;
 use super::powell::{Climb, Pose, climb};
 use super::{Search, Start};
 
-/// How far beside the peak its sharpness is looked for, mm.
+/// Distance from the peak at which its sharpness is measured, mm.
 const BESIDE_MM: f64 = 10.0;
 
-/// A loss of normalised information that is as likely right as wrong: one noise image lost a third
+/// Loss of normalised information at which the confidence is halved; one noise image lost a third
 /// of it.
 const CHANCE: f64 = 0.003;
 
 impl Search<'_> {
-    /// How much is lost beside the peak along the least certain direction, against what chance
-    /// loses: 0 to 1.
+    /// Loss beside the peak in the least certain direction, relative to the loss by chance: 0 to 1.
     pub(super) fn sharpness(&self, pair: &Pair, best: Start, top: f64) -> f64 {
         let lost = |axis: usize| {
             let beside = |side: f64| {
@@ -27,8 +25,7 @@ impl Search<'_> {
         least / (least + CHANCE)
     }
 
-    /// Root mean square of how far the answers of the fixed image's six halves, each climbed from
-    /// `best`, lie from it, mm.
+    /// Root mean square distance from `best` of the results for the fixed image's six halves, mm.
     pub(super) fn halves_mm(&self, best: Start) -> f64 {
         let (fixed, moving) = &self.levels[1];
         let there = moving.voxel_from_world * self.moving_from_fixed(best, &[0.0; 6]);

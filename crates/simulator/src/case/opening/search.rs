@@ -1,48 +1,49 @@
-//! The search for an opening: lines through bone to the brain, and which of them suit a hole.
+//! Searches for an opening: intersects lines with bone and brain, and rates the places for a hole.
 //!
 //! # Theory
-//! Bone begins and ends where the density, trilinear between voxels, passes the isovalue. A place
-//! suits where the bone is 3 to 12 mm thick, the brain begins at most 8 mm below it and no air lies
-//! between (a sinus, mastoid cells), on each line within [`HOLE_MM`]. Of those places that one is
-//! taken which minimises a sum of squares: thickness from 6 mm and its spread, gap from 2 mm, slope
-//! of the outer table, and thickness at a flap's rim. Of equals, the first ray's.
+//! Bone begins and ends where the trilinear density crosses the isovalue. On each line within
+//! [`HOLE_MM`] of a suitable place, the bone is 3 to 12 mm thick, the brain begins at most 8 mm
+//! below it, and no air (a sinus, mastoid cells) lies between. The suitable place with the smallest
+//! sum of squares is taken: deviation of the thickness from 6 mm and its spread, deviation of the
+//! gap from 2 mm, slope of the outer table, and thickness at a flap's rim. Ties go to the first
+//! ray.
 
 use super::{BELOW_BONE_MM, Vec3};
 use trepan_haptics::script::Site;
 use trepan_volume::{BoneVolume, DistanceField};
 
-/// Where rays start, mm from the middle of the head.
+/// Start of the rays, mm from the centre of the head.
 pub const FAR_MM: f32 = 160.0;
 /// Rays over the whole sphere.
 const RAYS: usize = 3200;
-/// Step along a line, mm; surfaces are found between steps.
+/// Step along a line, mm; surfaces are interpolated between steps.
 const STEP_MM: f32 = 0.25;
-/// Radius around an entry that must suit, mm: a burr hole and some room.
+/// Radius around an entry that must be suitable, mm: a burr hole and a margin.
 const HOLE_MM: f32 = 5.0;
-/// Radius of a flap that should find bone all around, mm.
+/// Radius of a flap whose whole rim should lie on bone, mm.
 const FLAP_MM: f32 = 14.0;
 /// Lines on a circle.
 const LINES: usize = 8;
-/// Bone that suits, mm.
+/// Suitable thickness of bone, mm.
 const BONE_MM: [f32; 2] = [3.0, 12.0];
-/// Gap between bone and brain that suits, mm.
+/// Suitable gap between bone and brain, mm.
 const GAP_MM: [f32; 2] = [0.0, 8.0];
-/// The best thickness and gap, mm.
+/// Ideal thickness and gap, mm.
 const BEST_MM: [f32; 2] = [6.0, 2.0];
-/// Thickest wall that counts as the vault where there is no brain to end at, mm.
+/// Largest thickness of the vault if there is no brain to limit the search, mm.
 const WALL_MM: f32 = 30.0;
-/// Under this there is air, HU.
+/// Density below which there is air, HU.
 const AIR_BELOW_HU: f32 = -300.0;
-/// How far a line may begin before and after its neighbour's entry, mm.
+/// Search range of a line before and after its neighbour's entry, mm.
 const AROUND_MM: f32 = 10.0;
-/// What a line that meets no bone or brain, or air, counts as, mm beyond what suits.
+/// Penalty of a line that misses bone or brain, or meets air, mm.
 const LOST_MM: f32 = 10.0;
 
-/// What a line may pass.
+/// Geometry that lines are intersected with.
 pub struct Surroundings<'a> {
     pub bone: &'a BoneVolume,
     pub brain: Option<&'a DistanceField>,
-    /// The middle of the head.
+    /// Centre of the head.
     pub centre: Vec3,
 }
 
@@ -64,7 +65,7 @@ impl Passage {
         self.brain - self.inner
     }
 
-    /// How far it is from what suits, mm; 0 where it suits.
+    /// Deviation from the suitable ranges, mm; 0 if suitable.
     fn beyond(&self) -> f32 {
         let over = |value: f32, [low, high]: [f32; 2]| (low - value).max(value - high).max(0.0);
         let air = if self.air { LOST_MM } else { 0.0 };
@@ -72,16 +73,17 @@ impl Passage {
     }
 }
 
-/// A place with what is around it.
+/// A rated place.
 struct Candidate {
     site: Site,
-    /// Sum over its lines of how far they are from what suits, mm.
+    /// Sum of its lines' deviations from the suitable ranges, mm.
     beyond_mm: f32,
     cost: f32,
 }
 
 impl Surroundings<'_> {
-    /// The site on the way in from one direction; `None` when it meets no bone, or no brain below.
+    /// Site on the line from a direction to the centre; `None` if the line misses bone, or brain
+    /// below.
     pub fn towards(&self, outward: Vec3) -> Option<Site> {
         let from = self.centre + FAR_MM * outward;
         let way = self.passage(from, -outward, [0.0, FAR_MM])?;
@@ -89,8 +91,8 @@ impl Surroundings<'_> {
         Some(Site { entry: from - way.outer * outward, inward: -outward, bone_mm, brain_mm })
     }
 
-    /// The place that suits best, on the upper right front if one does, else anywhere on the vault;
-    /// else why none does.
+    /// Best place on the upper right front if one is suitable there, else on the vault; the error
+    /// says why none is.
     pub fn best(&self) -> Result<Site, String> {
         let right_front = |d: &Vec3| d.x > 0.25 && d.y > -0.2 && d.z > 0.45;
         let vault = |d: &Vec3| d.z > 0.2;
@@ -115,7 +117,7 @@ impl Surroundings<'_> {
                 )),
                 best.site.entry,
             )),
-            None => Err(format!("no way in from above meets bone{below}: {remedy}")),
+            None => Err(format!("no line from above meets bone{below}: {remedy}")),
         }
     }
 
@@ -151,8 +153,8 @@ impl Surroundings<'_> {
         Some(Candidate { site, beyond_mm, cost: cost(&hole) + 4.0 * rim })
     }
 
-    /// What a line from `from` along `inward` passes between two depths; `None` when it meets no
-    /// bone, no brain below it, or brain first.
+    /// Intersects a line from `from` along `inward` with bone and brain between two depths. `None`
+    /// if it misses either or meets brain first.
     fn passage(&self, from: Vec3, inward: Vec3, [start, end]: [f32; 2]) -> Option<Passage> {
         let over = |t: f32| over_isovalue(self.bone, from + t * inward);
         let begin = first(start, end, over)?;
@@ -173,20 +175,20 @@ impl Surroundings<'_> {
     }
 }
 
-/// 1 where no bone follows within 5 mm, else -1.
+/// 1 if no bone follows within 5 mm, else -1.
 fn open_below(t: f32, over: &impl Fn(f32) -> f32) -> f32 {
     let bone = (0..(BELOW_BONE_MM / STEP_MM) as usize).any(|n| over(t + n as f32 * STEP_MM) >= 0.0);
     if bone { -1.0 } else { 1.0 }
 }
 
-/// Sum of squares, each about 1 where a place is noticeably worse.
+/// Cost of a place: a sum of squares, each about 1 at a noticeable deviation.
 fn cost(hole: &[(Vec3, Passage)]) -> f32 {
     let n = hole.len().max(1) as f32;
     let mean = |of: &dyn Fn(&Passage) -> f32| hole.iter().map(|(_, way)| of(way)).sum::<f32>() / n;
     let (bone, gap, outer) = (mean(&Passage::bone_mm), mean(&Passage::gap_mm), mean(&|way| way.outer));
     let spread = mean(&|way| (way.bone_mm() - bone).powi(2));
     let uneven = mean(&|way| (way.gap_mm() - gap).powi(2));
-    // The least-squares slope of the outer table: offsets are even around the middle.
+    // The least-squares slope of the outer table: offsets are symmetric about the centre.
     let moment: Vec3 = hole.iter().map(|(offset, way)| (way.outer - outer) * *offset).sum();
     let reach: f32 = 0.5 * hole.iter().map(|(offset, _)| offset.length_squared()).sum::<f32>();
     let slope = moment / reach.max(1e-6);
@@ -194,7 +196,7 @@ fn cost(hole: &[(Vec3, Passage)]) -> f32 {
     square(bone - BEST_MM[0], 1.5) + square(gap - BEST_MM[1], 1.5) + spread + 0.5 * uneven + square(slope.length(), 0.2)
 }
 
-/// Where bone begins and where it last ends between two depths of a line, mm.
+/// First entry into bone and last exit from it between two depths of a line, mm.
 pub fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f32; 2]) -> Option<[f32; 2]> {
     let over = |t: f32| over_isovalue(bone, from + t * inward);
     let outer = first(start, end, over)?;
@@ -202,8 +204,8 @@ pub fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f3
     Some([outer, end - back])
 }
 
-/// The first depth from `start` to `end` where a value gets over 0, between steps where it passes
-/// it there, mm.
+/// First depth between `start` and `end` at which a value reaches 0, interpolated between steps,
+/// mm.
 pub fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
     let steps = ((end - start) / STEP_MM).max(0.0) as usize;
     let mut before = None;
@@ -218,7 +220,7 @@ pub fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
     None
 }
 
-/// Density over the isovalue at a point, HU, trilinear between voxels.
+/// Trilinear density minus the isovalue at a point, HU.
 fn over_isovalue(bone: &BoneVolume, point: Vec3) -> f32 {
     let at = bone.grid_of(point);
     let (low, part) = (at.floor().as_ivec3(), at - at.floor());
@@ -230,7 +232,7 @@ fn over_isovalue(bone: &BoneVolume, point: Vec3) -> f32 {
     (0..8).map(corner).sum::<f32>() - f32::from(bone.isovalue())
 }
 
-/// Even directions over the sphere.
+/// Evenly distributed directions over the sphere.
 fn rays() -> impl Iterator<Item = Vec3> {
     let golden = std::f32::consts::PI * (3.0 - 5.0f32.sqrt());
     let of = move |i: usize| {

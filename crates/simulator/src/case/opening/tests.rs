@@ -16,7 +16,7 @@ const RECIPE: Recipe = Recipe {
     opening: None,
 };
 
-/// A round head with its bone by radius and direction; brain within 78 mm.
+/// Spherical head whose density depends on radius and direction; brain within 78 mm.
 fn head(hu: impl Fn(f32, Vec3) -> f32) -> (VoxelVolume<i16>, VoxelVolume<u8>) {
     let mut ct = VoxelVolume::isotropic([N; 3], Vec3::splat(-95.0), 2.0, -1000i16);
     let mut mask = ct.map(|_| 0u8);
@@ -29,7 +29,7 @@ fn head(hu: impl Fn(f32, Vec3) -> f32) -> (VoxelVolume<i16>, VoxelVolume<u8>) {
     (ct, mask)
 }
 
-/// Bone from `80` mm on, so thick.
+/// Density of a spherical wall of bone that begins at 80 mm and has this thickness.
 fn wall(r: f32, thick_mm: f32) -> f32 {
     400.0 + 300.0 * (0.5 * thick_mm - (r - 80.0 - 0.5 * thick_mm).abs())
 }
@@ -37,9 +37,9 @@ fn wall(r: f32, thick_mm: f32) -> f32 {
 fn opened(
     ct: &VoxelVolume<i16>,
     mask: Option<&VoxelVolume<u8>>,
-    wanted: Option<[f32; 3]>,
+    requested: Option<[f32; 3]>,
 ) -> Result<Opening, SessionError> {
-    Opening::of_patient(&BoneVolume::new(ct, 400).unwrap(), mask, wanted)
+    Opening::of_patient(&BoneVolume::new(ct, 400).unwrap(), mask, requested)
 }
 
 #[test]
@@ -53,13 +53,16 @@ fn a_round_head_is_entered_along_its_radius() {
 }
 
 #[test]
-fn an_opening_is_found_or_made_where_it_is_wanted_or_refused() {
+fn an_opening_is_found_or_placed_on_request_or_refused() {
     let (ct, _) = head(|r, _| wall(r, 6.0));
     let found = opened(&ct, None, None).unwrap();
     assert!((found.bone_mm - 6.0).abs() < 0.8, "{found:?}");
-    let wanted = opened(&ct, None, Some([-120.0, 0.0, 0.0])).unwrap();
-    assert!(Vec3::from(wanted.inward).dot(Vec3::X) > 0.999 && (wanted.entry_mm[0] + 86.0).abs() < 1.0, "{wanted:?}");
-    let refused = |wanted| opened(&ct, None, Some(wanted)).unwrap_err().to_string();
+    let requested = opened(&ct, None, Some([-120.0, 0.0, 0.0])).unwrap();
+    assert!(
+        Vec3::from(requested.inward).dot(Vec3::X) > 0.999 && (requested.entry_mm[0] + 86.0).abs() < 1.0,
+        "{requested:?}"
+    );
+    let refused = |requested| opened(&ct, None, Some(requested)).unwrap_err().to_string();
     let inside = refused([-40.0, 0.0, 0.0]);
     assert!(inside.contains("46 mm inside") && inside.contains("-86,0,0"), "{inside}");
     let far = refused([0.0, 0.0, 1000.0]);
@@ -71,9 +74,8 @@ fn an_opening_is_found_or_made_where_it_is_wanted_or_refused() {
 }
 
 #[test]
-fn thin_bone_air_and_deep_brain_are_passed_by() {
-    // Right front: bone of 2 mm but for a small spot. Left front: a sinus. Right back is what
-    // remains.
+fn thin_bone_air_and_deep_brain_are_avoided() {
+    // Right front: thin bone except for a small spot. Left front: a sinus. Right back remains.
     let bone = |r: f32, d: Vec3| match (d.x > 0.0, d.y > -0.1) {
         (true, true) => wall(r, if d.distance(Vec3::new(0.7, 0.3, 0.65)) < 0.03 { 6.0 } else { 1.5 }),
         (false, true) if (82.0..84.5).contains(&r) => -900.0,
@@ -99,7 +101,7 @@ fn thin_bone_air_and_deep_brain_are_passed_by() {
 }
 
 #[test]
-fn bone_that_a_grid_has_lost_is_said() {
+fn bone_lost_on_a_coarse_grid_is_an_error() {
     let (ct, mask) = head(|r, _| wall(r, 6.0));
     let opening = opened(&ct, Some(&mask), None).unwrap();
     let mut gone = ct;
@@ -116,13 +118,13 @@ fn a_brain_without_skull_is_touched_at_its_surface() {
     assert!((site.entry.length() - 78.0).abs() < 1.5, "{site:?}");
 }
 
-/// A patient's opening on the skull of each preset, and between.
-fn on_every_preset(ct: &Path, brain: &Path, wanted: Option<[f32; 3]>) -> Vec<Opening> {
+/// Openings of a patient on the skull of each preset, and of a voxel size between them.
+fn on_every_preset(ct: &Path, brain: &Path, requested: Option<[f32; 3]>) -> Vec<Opening> {
     let ct = hounsfield(&read(ct).unwrap()).unwrap();
     let classes = cropped(&largest_component(&read(brain).unwrap().map(|v| u8::from(v != 0.0)))).unwrap();
     let isovalue = bone_isovalue(&ct);
     let on = |spacing_mm| {
-        let recipe = Recipe { spacing_mm, opening: wanted, ..RECIPE };
+        let recipe = Recipe { spacing_mm, opening: requested, ..RECIPE };
         let skull = make_skull(&ct, &recipe, isovalue).unwrap();
         Opening::planned(&ct, &skull, isovalue, Some(&classes), &recipe).unwrap()
     };
@@ -130,7 +132,7 @@ fn on_every_preset(ct: &Path, brain: &Path, wanted: Option<[f32; 3]>) -> Vec<Ope
 }
 
 #[test]
-fn the_opening_is_the_patients_whatever_the_voxels_are() {
+fn the_opening_does_not_depend_on_the_voxel_size() {
     let built_in = trepan_case_head();
     let second = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/head-second");
     let mut heads = vec![(built_in[0].clone(), built_in[1].clone())];
@@ -140,8 +142,8 @@ fn the_opening_is_the_patients_whatever_the_voxels_are() {
         println!("{} is not there: the built-in head alone", second.display());
     }
     for (ct, brain) in heads {
-        for wanted in [None, Some([60.0, 30.0, 110.0])] {
-            let all = on_every_preset(&ct, &brain, wanted);
+        for requested in [None, Some([60.0, 30.0, 110.0])] {
+            let all = on_every_preset(&ct, &brain, requested);
             println!("{}: {all:#?}", ct.display());
             for one in &all {
                 let apart = Vec3::from(one.entry_mm).distance(Vec3::from(all[0].entry_mm));
@@ -150,7 +152,7 @@ fn the_opening_is_the_patients_whatever_the_voxels_are() {
                 assert!(one.brain_mm > one.bone_mm, "{one:?}");
             }
             let plausible = (3.0..=12.0).contains(&all[0].bone_mm) && all[0].brain_mm - all[0].bone_mm <= 8.0;
-            assert!(wanted.is_some() || plausible, "{all:?}");
+            assert!(requested.is_some() || plausible, "{all:?}");
         }
     }
 }

@@ -1,5 +1,5 @@
-//! No more model than a scene needs: what a plan chooses in random scenes, whether that meets the
-//! tolerance, and what the cheapest choice that does would cost.
+//! Judges the plan: what it chooses in random scenes, whether that meets the tolerance, and what
+//! the cheapest choice that does would cost.
 //!
 //! # Theory
 //! In each scene every stored choice for bone, tissue and picture that a session may take (bone:
@@ -65,9 +65,9 @@ fn stretch(case: &Case, random: &mut fastrand::Rng) -> (Situation, Stretch) {
     (0..TRIES).find_map(|_| draw()).expect("a skull has places with bone")
 }
 
-/// The truth of bone, by the oracle on fine voxels, on made-up heads beside what a ball pushes back
-/// with in closed form; how far the recommended method is off on the same voxels, and the oracle on
-/// half as large ones.
+/// Compares the truth of bone with closed forms. The truth is the oracle on fine voxels, on made-up
+/// heads; rows beside it are the recommended method on the same voxels, and the oracle on half as
+/// large ones.
 fn truth(scope: Scope, findings: &mut Findings) {
     let mut random = scope.random(SEED + 9000);
     let mut worst = 0.0f64;

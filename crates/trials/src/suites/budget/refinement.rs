@@ -1,5 +1,5 @@
-//! What a mesh that is finer at the opening would give: TLED with edges halved there none, one and
-//! two times, with and without the cure of locking, in pushes of the judged kind.
+//! Measures meshes that are finer at the opening. TLED runs with edges halved there none, one and
+//! two times, with and without averaged nodal pressure, in pushes of the judged kind.
 //!
 //! # Theory
 //! Cost is that of the step that the mesh really allows, on the machine for which choices are
@@ -8,7 +8,7 @@
 //! The truth is held against a mesh with half of its edges under the tool.
 //!
 //! # Practice
-//! Plans and presets take such meshes, without the cure.
+//! Plans and presets take such meshes, without averaged pressure.
 
 use super::super::Scope;
 use super::case::{Case, Source};

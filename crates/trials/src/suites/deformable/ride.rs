@@ -82,8 +82,8 @@ impl Ride {
         quantile(self.warm(), 0.5)
     }
 
-    /// How often it would have gone the way of another ride in that one's time: over the steps that
-    /// both went, touching or not, by the mean of the middle nine in ten.
+    /// How many times faster it is than another run along the same path. Counted are the steps of
+    /// both, touching or not, by the mean of the middle nine in ten.
     pub fn times_faster_than(&self, other: &Self) -> f64 {
         let both = self.times_us.len().min(other.times_us.len());
         let mean = |times: &[f64]| {

@@ -1,4 +1,4 @@
-//! What is coupled: a device, a hand, a wall, and the bounds of theory for them.
+//! Couplings of a device, a hand and a wall, and their theoretical stability bounds.
 
 use super::{Scope, at};
 use trepan_contact::Viscoelastic;
@@ -6,7 +6,7 @@ use trepan_haptics::HapticDevice;
 use trepan_haptics::replay::Replay;
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
 
-/// A device at hand: name, friction, encoder step, length of a tick.
+/// Devices: name, friction, encoder step, length of a tick.
 const DEVICES: [(&str, f32, f32, f32); 6] = [
     ("Touch", 0.26, 0.055, 1.0),
     ("exact positions, no friction", 0.0, 0.0, 1.0),
@@ -16,17 +16,17 @@ const DEVICES: [(&str, f32, f32, f32); 6] = [
     ("exact positions, no friction, 4 kHz", 0.0, 0.0, 0.25),
 ];
 
-/// Light, firm, and a finger that hardly damps.
+/// Hands: light, firm, and a finger with little damping.
 const HANDS: [(&str, HandModel); 3] = [
     ("light grip", HandModel::LIGHT),
     ("firm grip", HandModel::FIRM),
     ("loose finger", HandModel { mass_g: 10.0, damping: 0.1, stiffness: 0.1 }),
 ];
 
-/// One coupling.
+/// Device, hand and wall in one loop.
 #[derive(Clone, Copy)]
 pub struct Coupling {
-    /// Device and hand.
+    /// Names of device and hand.
     pub names: [&'static str; 2],
     pub device: Config,
     pub hand: HandModel,
@@ -35,7 +35,7 @@ pub struct Coupling {
 }
 
 impl Coupling {
-    /// Whether the promises hold for it.
+    /// Whether the acceptance limits apply to it.
     pub fn declared(&self) -> bool {
         let device = &self.device;
         let grip = self.hand.damping >= HandModel::LIGHT.damping;
@@ -43,7 +43,7 @@ impl Coupling {
         grip && seen && self.wall.stiffness <= 2.0 && device.delay_ticks <= 2
     }
 
-    /// With the wall as a session would give it to this device.
+    /// The coupling with the wall stiffness that a session would use on this device.
     pub fn limited(&self) -> Self {
         let device = Simulated::new(self.device, self.hand, Box::new(Replay::new(vec![at(0.0)])));
         Self { wall: device.capabilities().coupled(self.wall, self.tick_ms), ..*self }
@@ -75,13 +75,13 @@ pub const MILLION: Coupling = Coupling {
     tick_ms: 1.0,
 };
 
-/// Every coupling that is tried, and its scene.
+/// All couplings, each with its scene name.
 pub fn all(scope: Scope) -> Vec<(String, Coupling)> {
     let stiffnesses = scope.pick(&[0.3f32, 0.8, 2.0, 5.0][..], &[0.1, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0][..]);
     let dampings = scope.pick(&[0.0f32, 0.5][..], &[0.0, 0.5, 1.0, 2.0][..]);
     let mut found = Vec::new();
     for (name, friction_n, quantum_mm, tick_ms) in DEVICES {
-        // Four times the ticks: the other rate is tried where it matters.
+        // 4 kHz has four times the ticks: it is run only where it matters.
         let (hands, delays, dampings) = if tick_ms < 1.0 {
             (&HANDS[..1], &[1, 2][..], &[0.5f32][..])
         } else {

@@ -1,12 +1,16 @@
-//! Every fault of the emulators, driver by driver: how long the force stays, and what the user is
-//! told.
+//! Every fault of the device emulators, by driver: how long force remains, and which message the
+//! user gets.
 //!
 //! # Practice
-//! A loop as a session's wants 1 N; then the fault begins. libHD and libdrd are given time tick by
-//! tick, so that 1 ms is one tick and every run is the same. Haply's service runs beside in real
-//! time: of some runs the gates take the one that the machine disturbed least; the slowest is
-//! shown. Where the library itself pauses nobody can reach the motors: the time counts from its
-//! return. `Kept` are faults that must not cost the force.
+//! A loop like a session's requests 1 N; then the fault begins. libHD and libdrd are given time
+//! tick
+//! by tick, so that 1 ms is one tick and every run is identical. Haply's service runs in parallel
+//! in
+//! real time: of several runs the gates use the one that the machine disturbed least; the slowest
+//! is
+//! reported too. While the library itself pauses, no code can reach the motors: the time counts
+//! from
+//! its return. `Kept` are faults that must not remove the force.
 
 mod force_dimension;
 mod haply;
@@ -19,53 +23,53 @@ use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
 use trepan_geometry::{ToolState, Vec3, Wrench};
 use trepan_haptics::{DeviceError, Fault, HapticDevice, Status};
 
-/// What the loop wants, N.
+/// Requested force, N.
 const WANTED_N: f32 = 1.0;
-/// Ticks after which the force is there: rests and ramps of driver and guard.
+/// Largest number of ticks until the force is reached: rests and ramps of driver and guard.
 const SETTLE_TICKS: u32 = 20_000;
-/// Ticks for which a fault is watched.
+/// Ticks for which a fault is observed.
 const WATCHED_TICKS: u32 = 300;
 const LIMIT_MS: f64 = 10.0;
 
-/// What a fault must lead to.
+/// Required response to a fault.
 #[derive(Clone, Copy)]
 enum Then {
-    /// No force, and this message.
+    /// Force off, with this message.
     Cut(Fault),
-    /// Nothing.
+    /// No response.
     Kept,
 }
 
-/// What the motors do.
+/// Motor force at a time.
 #[derive(Clone, Copy)]
 struct Felt {
-    /// When, ms.
+    /// Time, ms.
     at_ms: f64,
-    /// Size of the force, N.
+    /// Force magnitude, N.
     force_n: f64,
 }
 
-/// A driver on its emulator.
+/// Driver on its emulator.
 trait Bench {
-    /// One tick of the loop.
+    /// Runs one tick of the loop.
     fn tick(&mut self) -> Felt;
-    /// What is wrong with the device.
+    /// Fault reported by the driver.
     fn fault(&self) -> Option<Fault>;
 }
 
-/// A fault, and how it begins.
+/// Fault case with the function that starts the fault.
 struct Case<B> {
     name: &'static str,
     begin: fn(&mut B),
     then: Then,
 }
 
-/// All rows.
+/// Rows of all drivers.
 pub fn rows(scope: Scope) -> Vec<Row> {
     [openhaptics::rows(), force_dimension::rows(), haply::rows(scope)].concat()
 }
 
-/// What all rows together promise.
+/// Gates over all rows.
 pub fn gates(rows: &[Row]) -> Vec<Gate> {
     let of = |kind: &str, name: &str| -> Vec<f64> {
         rows.iter().filter(|row| row.config["kind"] == kind).map(|row| row.metrics[name]).collect()
@@ -87,7 +91,7 @@ pub fn gates(rows: &[Row]) -> Vec<Gate> {
     ]
 }
 
-/// The guarded loop over a device, as a session has it.
+/// Guarded loop over a device, as in a session.
 struct Loop<D> {
     device: D,
     guard: ForceGuard,
@@ -99,7 +103,7 @@ impl<D: HapticDevice> Loop<D> {
         Self { device, guard }
     }
 
-    /// Reads, and applies what the guard lets through; a lost device gets nothing.
+    /// Reads, and applies the guarded force; a lost device gets zero force.
     fn tick(&mut self, time_ms: f64) {
         let reading = self.device.read(time_ms);
         let tool = ToolState { time_ms, ..reading.tool };
@@ -109,7 +113,7 @@ impl<D: HapticDevice> Loop<D> {
     }
 }
 
-/// What one run of a case was like.
+/// Measurements of one run of a case.
 #[derive(Clone, Copy)]
 struct Course {
     before_n: f64,
@@ -121,7 +125,7 @@ struct Course {
     told: Option<Fault>,
 }
 
-/// Waits until the force is there, lets the fault begin, and watches.
+/// Waits until the force is reached, starts the fault, and observes.
 fn run<B: Bench>(bench: &mut B, case: &Case<B>) -> Course {
     let mut before = bench.tick();
     let (mut largest_n, mut rise_n) = (0.0f64, 0.0f64);
@@ -159,7 +163,7 @@ fn run<B: Bench>(bench: &mut B, case: &Case<B>) -> Course {
     course
 }
 
-/// The row of one case, by the run that the machine disturbed least: the quickest cut, or the one
+/// Row of one case, from the run that the machine disturbed least: the quickest cut, or the one
 /// that kept most force.
 fn row<B>(driver: &str, case: &Case<B>, courses: &[Course]) -> Row {
     let worst = |what: fn(&Course) -> f64| courses.iter().map(what).fold(0.0, f64::max);
@@ -187,8 +191,8 @@ fn row<B>(driver: &str, case: &Case<B>, courses: &[Course]) -> Row {
     }
 }
 
-/// The row of a device that must not open, and say so with certain words; `force_n` is what is on
-/// its motors then.
+/// Row of a device that must refuse to open with a message containing `words`; `force_n` is the
+/// motor force then.
 fn refused<D>(driver: &str, name: &str, opened: Result<D, DeviceError>, words: &str, force_n: f64) -> Row {
     let told = opened.err().map_or_else(|| "it opened".to_owned(), |error| error.to_string());
     Row::new(name, driver)
@@ -198,7 +202,7 @@ fn refused<D>(driver: &str, name: &str, opened: Result<D, DeviceError>, words: &
         .metric("force_after_n", force_n)
 }
 
-/// What was said, with files for paths: a folder of this run is in no other.
+/// The message without folders in its paths, so that it is the same in every run.
 fn without_folders(told: &str) -> String {
     let file = |word: &str| {
         let path = Path::new(word);
@@ -214,12 +218,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_said_names_no_folder_of_this_run() {
+    fn messages_contain_no_folder_of_this_run() {
         let told = format!("{} lacks a/b", std::env::temp_dir().join("run-1").join("lib.so:").display());
         assert_eq!(without_folders(&told), "lib.so: lacks a/b");
     }
 
-    /// A device whose force ends some ticks after the fault.
+    /// Device whose force ends some ticks after the fault.
     struct Slow {
         ticks: u32,
         left: Option<u32>,
@@ -237,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_that_comes_late_or_says_the_wrong_thing_fails_its_gate() {
+    fn a_late_cut_or_a_wrong_message_fails_its_gate() {
         let begin = |bench: &mut Slow| bench.left = Some(12);
         let failed = |then: Then| {
             let case = Case { name: "slow", begin, then };

@@ -1,13 +1,13 @@
-//! Where a wall is quiet: stiffness by delay and damping, one map for each device, hand and way of
-//! guarding, with the bounds of theory.
+//! Maps of wall stability: stiffness by delay and damping, one map for each device, hand and way of
+//! guarding, with theoretical bounds.
 
 use crate::picture::{Map, Outcome};
 use crate::suite::Row;
 
-/// How a wall was given, and what that is called.
+/// Ways of guarding: key in the row and name in the title.
 const WAYS: [(&str, &str); 3] = [("unguarded", "bare"), ("guarded", "guarded"), ("limited", "guarded and limited")];
 
-/// A map for each device, hand and way; bare walls first.
+/// One map for each device, hand and way; bare walls first.
 pub fn of(rows: &[Row]) -> Vec<Map> {
     let presses: Vec<&Row> = rows.iter().filter(|row| row.metrics.contains_key("limit_cycle_mm")).collect();
     let mut pairs: Vec<(&str, &str)> = Vec::new();
@@ -34,7 +34,7 @@ fn map(title: String, method: &str, rows: &[&Row]) -> Map {
                 && 100.0 * number(row, "delay_ticks") + number(row, "damping_n_ms_per_mm") == line
         })
     };
-    // A wall that the device bears anyway is not limited: its row is the guarded one.
+    // A wall within the device's limit is not limited: its row is the guarded one.
     let cell = |line, stiffness| at(line, stiffness, method).or_else(|| at(line, stiffness, "guarded"));
     let bound = |name: &str| {
         let of_line = |(place, &line): (usize, &f64)| {
@@ -75,7 +75,7 @@ fn notes(method: &str) -> Vec<String> {
     }
 }
 
-/// What a press was like.
+/// Outcome of a press.
 fn outcome(row: &Row) -> Outcome {
     let metric = |name: &str| row.metrics[name];
     match () {
@@ -95,8 +95,8 @@ fn outcome(row: &Row) -> Outcome {
     }
 }
 
-/// Place of a stiffness among the columns, whose middles are theirs; between two of them by its
-/// logarithm.
+/// Position of a stiffness on the column axis, where column centres are the given stiffnesses;
+/// logarithmic in between.
 fn column(stiffnesses: &[f64], bound: f64) -> f64 {
     let after = stiffnesses.partition_point(|k| *k < bound);
     match (after.checked_sub(1).map(|at| stiffnesses[at]), stiffnesses.get(after)) {
@@ -113,7 +113,7 @@ fn values(rows: &[&Row], of: impl Fn(&Row) -> f64) -> Vec<f64> {
     found
 }
 
-/// A setting as it reads: single precision would else show all its digits.
+/// Setting rounded to four decimals, to hide single-precision digits.
 fn number(row: &Row, name: &str) -> f64 {
     (row.config[name].as_f64().unwrap_or(f64::NAN) * 1e4).round() / 1e4
 }

@@ -1,12 +1,12 @@
-//! The haptic loop at 1 and 4 kHz beside a solver and a picture: how late, beside a loop that does
-//! nothing, in the same run.
+//! Timing of the haptic loop at 1 and 4 kHz while a solver and a renderer run. An idle loop in the
+//! same run is the comparison.
 //!
 //! # Practice
-//! Slices of half a second alternate between both loops, so that whatever else the machine does
-//! falls on both. The tick is a session's: simulated device, burr on a plane of bone, force model,
-//! guard. The solver is TLED with 10 368 tetrahedra in real time; the picture shows the same bone
-//! and the solver's newest nodes, 640 x 400, at most sixty times a second, on what device there is,
-//! else on the processor. Counts and times are shown, none is a gate.
+//! Slices of half a second alternate between both loops, so that other load on the machine
+//! affects both. The tick is a session's: simulated device, burr on a plane of bone, force model,
+//! guard. The solver is TLED with 10 368 tetrahedra in real time. The picture shows the same bone
+//! and the solver's newest nodes, 640 x 400, at most 60 times per second, on the GPU if there is
+//! one, else on the CPU. Counts and times are reported without gates.
 
 use super::Scope;
 use crate::suite::Row;
@@ -30,18 +30,18 @@ use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::Tled;
 use trepan_volume::{BoneVolume, VoxelVolume};
 
-/// Ticks a second.
+/// Ticks per second.
 const RATES_HZ: [u32; 2] = [1000, 4000];
-/// How long before a deadline sleep turns into spinning.
+/// Time before a deadline at which sleeping turns into spinning.
 const SPIN: Duration = Duration::from_micros(120);
-/// Slices a second.
+/// Slices per second.
 const SLICES_HZ: u32 = 2;
-/// Shortest time from picture to picture.
+/// Shortest interval between pictures.
 const PICTURE: Duration = Duration::from_micros(16_667);
-/// Pixels of a picture.
+/// Picture size, px.
 const SIZE: [u32; 2] = [640, 400];
 
-/// What a loop's ticks were like.
+/// Timing of a loop's ticks.
 #[derive(Default)]
 struct Pace {
     ticks: u32,
@@ -50,7 +50,7 @@ struct Pace {
     wake_us: Vec<f64>,
 }
 
-/// What ran beside the loops.
+/// Work done in parallel to the loops.
 struct Beside {
     solver_factor: f64,
     pictures: f64,
@@ -104,8 +104,8 @@ fn row(rate_hz: u32, method: &str, pace: Pace, real_time: bool, beside: &Beside)
         .metric("pictures_count", beside.pictures)
 }
 
-/// Half a second of ticks on an absolute grid; a tick that misses its end is late, and what it
-/// missed is given up.
+/// Runs ticks for half a second on an absolute grid; a tick that misses its deadline is late, and
+/// missed ticks are skipped.
 fn slice(pace: &mut Pace, rate_hz: u32, mut tick: impl FnMut()) {
     let length = Duration::from_secs(1) / rate_hz;
     let mut next = Instant::now() + length;
@@ -136,7 +136,7 @@ fn ask_for_real_time() -> bool {
     thread_priority::set_thread_priority_and_policy(thread, value, policy).is_ok()
 }
 
-/// A burr that goes in and out of a plane of bone.
+/// Burr that moves in and out of a plane of bone.
 struct Bench {
     device: Simulated,
     bone: Arc<BoneVolume>,
@@ -156,7 +156,7 @@ impl Bench {
             let z = -31.5 + (at / (n * n)) as f32;
             ct.data[at] = (400.0 - 800.0 * z).clamp(-1000.0, 1500.0) as i16;
         }
-        // One recorded state per read: the hand is as fast at every rate.
+        // One recorded state per read: the hand is equally fast at every rate.
         let dt_ms = 1e3 / rate_hz as f32;
         let turn = 0.01 * f64::from(dt_ms);
         let hand = |t: u32| ToolState::at(Pose::from_translation(Vec3::Z * (3.0 + (f64::from(t) * turn).sin() as f32)));
@@ -186,8 +186,8 @@ impl Bench {
     }
 }
 
-/// Steps a brain in real time and tells its nodes sixty times a second; gives simulated over wall
-/// time.
+/// Steps a brain in real time and publishes its nodes 60 times per second; returns simulated over
+/// wall time.
 fn solve(mesh: &TetMesh, mut nodes: Writer<Vec<Vec3>>, over: &AtomicBool) -> f64 {
     let fixed = boxes::nodes_where(mesh, |p| p.z < mesh.bounds().min.z + 1e-3);
     let body = Body::uniform(mesh.clone(), fixed, Material::BRAIN);
@@ -210,7 +210,7 @@ fn solve(mesh: &TetMesh, mut nodes: Writer<Vec<Vec3>>, over: &AtomicBool) -> f64
     simulated_ms / (start.elapsed().as_secs_f64() * 1e3)
 }
 
-/// Draws the bone and the newest nodes; gives how many pictures, and by what.
+/// Draws the bone and the newest nodes; returns the number of pictures and the renderer.
 fn paint(
     bone: Arc<BoneVolume>,
     mesh: &TetMesh,
@@ -239,7 +239,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn late_ticks_are_counted_and_the_bench_feels_bone() {
+    fn late_ticks_are_counted_and_the_bench_touches_bone() {
         let mut pace = Pace::default();
         slice(&mut pace, 1000, || thread::sleep(Duration::from_micros(1200)));
         assert_eq!((pace.ticks, pace.late), (500, 500));

@@ -8,8 +8,9 @@ const FELT_N: f32 = 0.02;
 
 /// What differs.
 pub struct Errors {
-    /// Force while the burr is in the hand, or the probe touches bone in one of the two, and one
-    /// feels something, N: root mean square, and what 95 of 100 ticks stay under.
+    /// Error of the force, N: root mean square, and what 95 of 100 ticks stay under. It counts
+    /// while the burr is in the hand, or the probe touches bone in one of the two, and one feels
+    /// something.
     pub bone_rms_n: f64,
     /// See above.
     pub bone_p95_n: f64,
@@ -17,8 +18,8 @@ pub struct Errors {
     pub tissue_rms_n: f64,
     /// See above.
     pub tissue_p95_n: f64,
-    /// From where the finest run shows the brain at the opening to the nearest place of this run's
-    /// brain, while the probe is in the hand, mm.
+    /// Error of the brain's surface at the opening, mm, while the probe is in the hand. It is the
+    /// distance from where the finest run shows it to the nearest place of this run's brain.
     pub shown_mean_mm: f64,
     /// See above: what 95 of 100 places and looks stay under.
     pub shown_p95_mm: f64,

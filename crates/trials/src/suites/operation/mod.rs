@@ -1,5 +1,5 @@
-//! The whole operation by every setup: what a choice of voxels, tetrahedra and methods costs the
-//! processor, and how wrong force, bone and brain then are.
+//! Runs the whole operation by every setup: what voxels, tetrahedra and methods cost the processor,
+//! and the errors of force, bone and brain.
 //!
 //! # Theory
 //! The hand goes the same way in every run: poses and buttons of the scripted operation (drill,
@@ -114,8 +114,8 @@ pub fn judge(_: Scope, findings: &mut Findings) {
     gates(&of_scene, &mut findings.gates);
 }
 
-/// What is promised: every choice opens the skull, and no fixed preset is both cheaper and more
-/// accurate than what is chosen for this machine.
+/// The acceptance limits: every choice opens the skull, and no fixed preset is both cheaper and
+/// more accurate than what is chosen for this machine.
 fn gates(rows: &[Row], gates: &mut Vec<Gate>) {
     let number = |row: &Row, name: &str| row.metrics.get(name).copied().unwrap_or(f64::NAN);
     let presets = || rows.iter().filter(|row| ["draft", "usual", "fine"].contains(&row.method.as_str()));
@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_error_that_is_no_number_breaks_its_promise() {
+    fn an_error_that_is_no_number_misses_its_limit() {
         assert!(worst([f64::NAN, 1.0, 2.0]).is_nan() && worst([1.0, 2.0, f64::NAN]).is_nan());
         assert_eq!(worst([1.0, 3.0, 2.0]), 3.0);
         let row = |name: &str, tissue: f64| {
@@ -150,9 +150,9 @@ mod tests {
             row.metric("tissue_force_error_rms_n", tissue)
         };
         let broken = |auto: f64, draft: f64| {
-            let mut promises = Vec::new();
-            gates(&[row("auto", auto), row("draft", draft)], &mut promises);
-            promises.iter().filter(|gate| !gate.pass).count()
+            let mut limits = Vec::new();
+            gates(&[row("auto", auto), row("draft", draft)], &mut limits);
+            limits.iter().filter(|gate| !gate.pass).count()
         };
         assert_eq!([broken(0.1, 0.1), broken(f64::NAN, 0.1), broken(0.1, f64::NAN)], [0, 1, 1]);
     }

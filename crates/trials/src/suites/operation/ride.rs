@@ -1,5 +1,5 @@
-//! The operation along one path by one setup: what the hand felt, what is gone of the bone, where
-//! the brain was shown, and what it cost.
+//! Runs the operation along one path by one setup. It gives what the hand felt, what is gone of the
+//! bone, where the brain was shown, and what it cost.
 
 use super::Scope;
 use super::setups::{self, Candidate};

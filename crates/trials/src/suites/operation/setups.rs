@@ -1,5 +1,5 @@
-//! Which setups the operation is done by: the presets, what is chosen for this machine, the
-//! thesis's own methods, and single steps away from the usual.
+//! Setups of the operation: the presets, what is chosen for this machine, the thesis's own methods,
+//! and single steps away from the usual.
 
 use super::Scope;
 use trepan_deformable::{Config, Method};

@@ -1,5 +1,5 @@
-//! Frames a second for the skulls of the thesis (Table 3.2) and for a brain of 22,000 tetrahedra,
-//! each by processor and device; the camera moves.
+//! Measures frames a second for the thesis's skulls (Table 3.2) and a brain of 22,000 tetrahedra,
+//! by processor and device; the camera moves.
 //!
 //! # Practice
 //! The thesis draws 15 to 20 frames a second at 1680x1050 on the graphics card of its day. Times

@@ -41,7 +41,7 @@ fn measure(kind: &Kind, scope: Scope, findings: &mut Findings) {
     findings.rows.extend(methods.iter().zip(errors).map(|(method, errors)| errors.row(kind, method)));
 }
 
-/// The charts and what is promised of the recommended method.
+/// The charts and the limits of the recommended method.
 pub fn judge(findings: &mut Findings) {
     for (group, title) in [
         ("planes", "Planes in every orientation, 0.5 and 1 mm voxels"),
@@ -147,7 +147,7 @@ impl Errors {
     }
 }
 
-/// The recommended method keeps its promises on planes in every orientation and on curved bone.
+/// The recommended method keeps its limits on planes in every orientation and on curved bone.
 fn gates(rows: &[Row]) -> Vec<Gate> {
     let name = Method::RECOMMENDED.name();
     let own = || rows.iter().filter(move |row| row.method == name);
@@ -163,7 +163,7 @@ fn gates(rows: &[Row]) -> Vec<Gate> {
     }
     for row in own().filter(|row| row.config.get("group").is_some_and(|group| group == "solids")) {
         // A box's edge is sharper than a voxel: on its grid no method knows where it is, so its
-        // normal is shown and not promised.
+        // normal is shown without a limit.
         if !row.scene.starts_with("box") {
             gate(row, "normal, p95 degrees", "normal_error_p95_deg", 5.0);
         }

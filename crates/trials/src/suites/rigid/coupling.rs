@@ -131,8 +131,8 @@ fn chart(method: Option<&Method>, bone: &BoneVolume, normal: Vec3, scope: Scope,
     let row = passes(Row::new("stiffness x damping x delay x encoder steps", name), &map);
     findings.rows.push(row.metric("not_quiet_within_80_percent_of_bound_count", unsure as f64));
     if method == Some(&Method::RECOMMENDED) || method.is_none() {
-        let promise = format!("{name}: couplings within 80 % of the bound that are not quiet by themselves");
-        findings.gates.push(Gate::at_most(promise, unsure as f64, 0.0));
+        let limit = format!("{name}: couplings within 80 % of the bound that are not quiet by themselves");
+        findings.gates.push(Gate::at_most(limit, unsure as f64, 0.0));
     }
     findings.maps.push(match method {
         Some(method) => map_of(method, map),

@@ -123,8 +123,8 @@ fn repeats(scope: Scope, findings: &mut Findings) {
         let row = Row::new("same path again", method.name()).with("ticks", part.len());
         findings.rows.push(row.metric("differing_runs_count", f64::from(u8::from(!same))));
     }
-    let promise = "same path again: methods whose results or bone differ";
-    findings.gates.push(Gate::at_most(promise, f64::from(differing), 0.0));
+    let limit = "same path again: methods whose results or bone differ";
+    findings.gates.push(Gate::at_most(limit, f64::from(differing), 0.0));
 }
 
 /// FNV-1a over everything that a run answers and leaves.

@@ -162,8 +162,8 @@ struct Felt {
 }
 
 impl Felt {
-    /// Error of the depth on a cube, voxels, where the truth is a touch of 0.2 mm or more and the
-    /// centre is out of the cube.
+    /// Error of the depth on a cube, voxels. It counts where the truth is a touch of 0.2 mm or more
+    /// and the centre is out of the cube.
     fn error_voxel(&self, voxel_mm: f32) -> Option<f64> {
         let out = self.tip.as_dvec3().abs() - HALF_MM;
         let depth = f64::from(RADIUS_MM) - out.max(DVec3::ZERO).length();

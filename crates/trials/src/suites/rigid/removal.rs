@@ -77,7 +77,7 @@ fn strokes(method: &Method, scope: Scope) -> Row {
         .metric("hole_beyond_perfect_percent", 100.0 * own.abs())
 }
 
-/// The chart and what is promised of the recommended method.
+/// The chart and the limits of the recommended method.
 pub fn judge(findings: &mut Findings) {
     let title = "Drilling: tick against error of the removed volume";
     let chart = worst_chart(findings, "swept volume", title, ("tick_p50_us", "hole_beyond_perfect_percent"), false);

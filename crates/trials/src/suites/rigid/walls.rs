@@ -6,7 +6,7 @@
 //! questions a cell:
 //! ```text
 //! pressed   the hand stops 1.65 mm past the wall's face: what 3.3 N, a Touch's peak, are at 2 N/mm
-//! pierced   the hand goes on to 6 mm past it: no device could stop it, but a picture of the tool must stay outside
+//! pierced   the hand goes on to 6 mm past it: no device could stop it, but the tool stays outside
 //! ```
 //! held in both: works; held only when pressed: degrades; else fails.
 //!

@@ -132,8 +132,8 @@ impl Operated {
 /// What in a tick calls for a warning.
 type Cause<'a> = &'a dyn Fn(&TickRecord) -> bool;
 
-/// Whether the warnings that a record alone can justify came with their causes: most ticks late,
-/// and how many came without one, twice or not at all.
+/// Checks the warnings that a record alone can justify: most ticks late, and how many came without
+/// a cause, twice or not at all.
 fn checked(bench: &Bench) -> (u64, u64) {
     let near_mm = Limits::default().near_mm;
     let causes: [(Warning, Cause); 4] = [

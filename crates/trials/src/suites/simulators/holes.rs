@@ -6,7 +6,8 @@
 //! sphere. Half of the hands mean to come through, half stop 0.8 to 3 mm before.
 //!
 //! ```text
-//!  C ·············· R - t - g  brain ·· R - t  inner table ▒▒▒▒ R  outer table      reach = |c - C| - r of the ball
+//!  C ·············· R - t - g  brain ·· R - t  inner table ▒▒▒▒ R  outer table
+//!  reach = |c - C| - r of the ball
 //! ```
 
 use super::bench::Bench;
@@ -27,8 +28,8 @@ const EDGE_MM: f32 = 30.0;
 const WAIT_MS: (f64, f64) = (3000.0, 40_000.0);
 /// How long a hand stays that has come through, ms.
 const AFTER_MS: f64 = 1500.0;
-/// A breach that was announced and did not come is no false alarm where less bone than this was
-/// left when the hand gave up, mm.
+/// Bone left, mm, under which an announced breach that did not come is no false alarm, when the
+/// hand gave up.
 const ABOUT_MM: f32 = 0.5;
 /// What counts as an announcement of a breach.
 const ANNOUNCE: [Warning; 2] = [Warning::BreachSoon, Warning::BreakThrough];

@@ -18,7 +18,7 @@ use anyhow::Result;
 /// Length of the long session, minutes.
 const LONG_MIN: f64 = 30.0;
 
-/// Every part; one that could not be run is a broken promise.
+/// Every part; one that could not be run misses its limit.
 pub fn parts(scope: Scope) -> Vec<Part> {
     let mut parts = holes::parts(scope);
     type OnTheCase = fn(&case::CaseFixture) -> Findings;
@@ -35,7 +35,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
     parts
 }
 
-/// The promises over all holes.
+/// The acceptance limits over all holes.
 pub fn judge(_: Scope, findings: &mut Findings) {
     holes::judge(findings);
 }

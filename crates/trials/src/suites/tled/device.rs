@@ -14,8 +14,8 @@ use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::gpu::GpuTled;
 use trepan_tled::{Config, Relaxation, Tled};
 
-/// Bytes that a step reads and writes a tetrahedron: corners and slots 32, rows 48, displacements
-/// 64, forces written and read 128; nodes are a fifth as many, 128 each.
+/// Bytes that a step reads and writes for a tetrahedron. Corners and slots take 32, rows 48,
+/// displacements 64, forces written and read 128; nodes are a fifth as many, 128 each.
 const BYTES: f64 = 32.0 + 48.0 + 64.0 + 128.0 + 26.0;
 
 /// Every size, and agreement on the smallest.
@@ -47,7 +47,7 @@ fn agreement(gpu: &Gpu, findings: &mut Findings) {
     let plain = Config { safety: 0.5, ..Config::default() };
     let options = [
         ("plain", plain),
-        ("cure and Prony", Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..plain }),
+        ("averaged pressure and Prony", Config { averaged_pressure: true, relaxation: Relaxation::BRAIN, ..plain }),
     ];
     for (name, config) in options {
         for (law, material) in [("neo-Hookean", Material::BRAIN), ("Ogden", Material::BRAIN_OGDEN)] {

@@ -1,5 +1,5 @@
-//! Error against time: a block hangs from one side under gravity, by every solver on meshes of
-//! several sizes; what the fastest needs to be right within 5 % and within 1 %.
+//! Charts error against time: a block hangs from one side under gravity, by every solver on meshes
+//! of several sizes. The fastest is judged by its time within 5 % and within 1 %.
 //!
 //! # Theory
 //! The truth is the continuum's: quadratic tetrahedra ([`Order::Quadratic`]), where the middle of

@@ -168,8 +168,8 @@ fn chart(title: &str, error: &str, findings: &mut Findings) {
     });
 }
 
-/// What hangs and is less compressible than this starts from where tissue of this ν comes to rest:
-/// most of the way in a fifth of the steps.
+/// Poisson's ratio over which a hanging body starts from where tissue of this ν comes to rest. That
+/// is most of the way in a fifth of the steps.
 const EASY: f32 = 0.49;
 
 /// The metric of cost.

@@ -24,8 +24,8 @@ pub fn parts() -> Vec<Part> {
     ]
 }
 
-/// Linear tetrahedra are too stiff by the square of their size: plain ones on two meshes tell the
-/// limit, cured ones on the finer one are near it.
+/// Linear tetrahedra are too stiff by the square of their size. Plain ones on two meshes tell the
+/// limit; those with averaged pressure on the finer one are near it.
 fn frequency(scope: Scope, findings: &mut Findings) {
     let (coarse, fine) = scope.pick((4, 6), (6, 12));
     let split = |across: usize| boxes::split_box([5 * across, across, across], BEAM_MM);

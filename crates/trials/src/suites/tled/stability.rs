@@ -70,7 +70,7 @@ pub(super) fn offset(solver: &dyn SoftSolver, body: &Body) -> f64 {
     all.fold(0.0, |most, d| if d.is_nan() || most.is_nan() { f64::NAN } else { most.max(d) })
 }
 
-/// Records whether a method held, and promises what should be.
+/// Records whether a method held, and sets the acceptance limits.
 fn verdict(scene: String, method: &str, held: bool, wanted: bool, measured: (&str, f64), findings: &mut Findings) {
     let row = Row::new(&scene, method).metric(HELD, f64::from(held)).metric(measured.0, measured.1);
     findings.rows.push(row);
@@ -122,8 +122,8 @@ fn incompressible(findings: &mut Findings) {
     }
 }
 
-/// A block squeezed or drawn to a multiple of its height, then let go: back at rest after a second,
-/// or said to have been turned over or held on the way.
+/// Squeezes or draws a block to a multiple of its height, then lets it go. It must be back at rest
+/// after a second, or be reported as turned over or limited on the way.
 fn stretched(findings: &mut Findings) {
     for stretch in [0.05f32, 0.1, 0.5, 2.0, 5.0] {
         let kirchhoff = Material::StVenantKirchhoff { young_mpa: 0.003, poisson: 0.45, density_g_mm3: 1e-3 };

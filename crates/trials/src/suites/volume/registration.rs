@@ -80,9 +80,9 @@ pub(super) fn scanned_again(still: &VoxelVolume<f32>, known: DAffine3, random: &
     moving
 }
 
-/// Moves of one patient's MRI against the CT, as delivered (with the reference registration as
-/// truth) and as resampled onto the CT, with its padding; and, which must be refused, of another
-/// patient's.
+/// Registers an MRI that was moved against the CT. One patient's is as delivered (with the
+/// reference registration as truth) and as resampled onto the CT, with its padding; another
+/// patient's must be refused.
 pub fn ct(scope: Scope, findings: &mut Findings) {
     let Some(data) = data_folder() else { return };
     let pair = data.join("ct-mri-pair-thick");

@@ -1,5 +1,5 @@
-//! Scenes that no rule was made for: what each rule says of them, and whether a grid of that size
-//! can be built and is near the best.
+//! Runs scenes that no rule was made for. Rows give each rule's size, whether a grid of that size
+//! can be built, and whether it is near the best.
 
 use super::{OURS, RULES};
 use crate::conditions;

@@ -131,9 +131,9 @@ impl<'a> Calibration<'a> {
         calibration
     }
 
-    /// Times more sizes, and says which of these is the cheapest: what no model knows, such as a
-    /// lattice that the cells fit, is seen here. The sample says how far off the model is at a
-    /// size, the model what a whole pass does there.
+    /// Times more sizes and gives the cheapest: what no model knows, such as a lattice that the
+    /// cells fit, is seen here. The sample says how far off the model is at a size, the model what
+    /// a whole pass does there.
     pub fn cheapest_of(&mut self, cells: &[f64], of_all: &Expected) -> Option<f64> {
         let known = self.sizes.len();
         self.time(cells.iter().copied());
@@ -185,8 +185,8 @@ impl<'a> Calibration<'a> {
     }
 }
 
-/// Runs of neighbours, half of them from where the particles are, spread evenly: single boxes would
-/// find neither caches nor branches as a whole pass does.
+/// Runs of neighbouring boxes, half of them from where the particles are, spread evenly. Single
+/// boxes would find neither caches nor branches as a whole pass does.
 fn sample(scene: &Scene) -> Vec<Aabb> {
     let touched = Aabb::of_points(&scene.particles);
     let is_near = |run: &&[Aabb]| run.iter().any(|b| b.overlaps(touched));

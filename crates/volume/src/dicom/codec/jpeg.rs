@@ -1,11 +1,11 @@
-//! JPEG with losses, 8 bits a pixel, decoded by the crate zune-jpeg.
+//! Lossy JPEG, 8 bits a pixel, decoded by the crate zune-jpeg.
 //!
 //! # Practice
-//! Size, components and precision are looked at before anything is decoded. A panic of the decoder
-//! on a damaged stream becomes an error.
+//! Size, components and precision are checked before decoding. A panic of the decoder on a damaged
+//! stream becomes an error.
 //!
 //! # When not to use it
-//! For JPEG extended with 12 bits a pixel, which is refused by name: no kept crate decodes it.
+//! For extended JPEG with 12 bits a pixel, which is rejected: no maintained crate decodes it.
 
 use super::marker::{Segments, frame};
 use super::{CodecError, Size};
@@ -15,7 +15,7 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-/// Decodes a frame of one component and that size; returns the stored numbers.
+/// Decodes a frame of one component and the given size; returns the stored values.
 pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     check(bytes, size)?;
     let (rows, columns) = size;
@@ -33,7 +33,7 @@ pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, Cod
     }
 }
 
-/// Refuses a first frame header of another size, or of a kind that is not decoded.
+/// Rejects a frame header of another size or an unsupported kind.
 fn check(bytes: &[u8], size: Size) -> Result<(), CodecError> {
     let mut segments = Segments::of(bytes)?;
     loop {

@@ -1,15 +1,15 @@
 //! JPEG 2000, decoded by the crate hayro-jpeg2000.
 //!
 //! # Practice
-//! The size is looked at before anything is decoded. A panic of the decoder on a damaged stream
-//! becomes an error.
+//! The size is checked before decoding. A panic of the decoder on a damaged stream becomes an
+//! error.
 
 use super::{CodecError, Size};
 use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Decodes a frame of one component and that size; returns the stored numbers (negative ones in
-/// two's complement).
+/// Decodes a frame of one component and the given size; returns the stored values (two's
+/// complement).
 pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     let unsafe_to_go_on = |_| CodecError::Wrong("its JPEG 2000 stream is damaged");
     catch_unwind(AssertUnwindSafe(|| decode_trusting(bytes, size))).map_err(unsafe_to_go_on)?
@@ -34,8 +34,8 @@ fn decode_trusting(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     }
 }
 
-/// What the decoder adds to signed numbers: half the range, which the stream's size segment (SIZ)
-/// tells; 0 for unsigned ones.
+/// Offset that the decoder adds to signed values: half the range from the stream's size segment
+/// (SIZ); 0 for unsigned ones.
 fn sign_shift(bytes: &[u8]) -> i32 {
     const START: [u8; 4] = [0xff, 0x4f, 0xff, 0x51];
     let start = bytes.windows(4).position(|window| window == START);

@@ -1,5 +1,4 @@
-//! Lossless JPEG: each pixel is predicted from its neighbours, and the differences are Huffman
-//! coded.
+//! Lossless JPEG: pixels predicted from their neighbours, with Huffman-coded differences.
 //!
 //! # Theory
 //! ITU-T T.81 annex H. With a left, b above, c above left, the predictors 1 to 7 are a, b, c, a +
@@ -9,7 +8,7 @@
 use super::marker::{Segments, frame};
 use super::{CodecError, Size};
 
-/// Decodes a frame of one component and that size; returns the stored numbers.
+/// Decodes a frame of one component and the given size; returns the stored values.
 pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     let mut segments = Segments::of(bytes)?;
     let mut tables: [Option<Table>; 4] = [const { None }; 4];
@@ -47,7 +46,7 @@ pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, Cod
 struct Scan<'a> {
     columns: usize,
     predictor: u8,
-    /// Half the range: what the first pixel is predicted as.
+    /// Prediction of the first pixel: half the range.
     half: u16,
     /// Pixels between restarts; 0 for none.
     restart: usize,
@@ -69,7 +68,7 @@ impl Scan<'_> {
         Ok(pixels)
     }
 
-    /// `first` is where the scan started or restarted: the row from there on has no row above.
+    /// `first` is where the scan started or restarted: the row from there has no row above.
     fn predicted(&self, pixels: &[u16], at: usize, first: usize) -> u16 {
         if at == first {
             return self.half;
@@ -132,7 +131,7 @@ impl Table {
         table
     }
 
-    /// The next difference: a code for its number of bits, then these.
+    /// Decodes the next difference: a code for its number of bits, then the bits.
     fn difference(&self, bits: &mut Bits) -> Option<u16> {
         let mut code = 0;
         for length in 1..=16 {
@@ -155,7 +154,7 @@ impl Table {
     }
 }
 
-/// Bits of a scan, highest first; a 0 after 255 is stuffing, anything else there a marker.
+/// Bits of a scan, highest first; after a byte of 255, a 0 is stuffing and anything else a marker.
 struct Bits<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -188,7 +187,7 @@ impl<'a> Bits<'a> {
         (0..count).try_fold(0, |value, _| Some(value << 1 | self.bit()?))
     }
 
-    /// Passes over the rest of a byte and the restart marker.
+    /// Skips the rest of a byte and the restart marker.
     fn next_restart(&mut self) -> Option<()> {
         self.count = 0;
         let marker = self.bytes.get(self.at..self.at + 2)?;
@@ -220,7 +219,7 @@ mod tests {
             }
         }
 
-        /// Fills a started byte with ones.
+        /// Pads a started byte with ones.
         fn fill(&mut self, out: &mut Vec<u8>) {
             while self.count > 0 {
                 self.push(out, 1, 1);
@@ -228,8 +227,8 @@ mod tests {
         }
     }
 
-    /// Encodes with a table in which the number of bits is its own 5-bit code, all predictors, and
-    /// restarts every row where asked.
+    /// Encodes with a table whose codes are the 5-bit lengths, any predictor, and optional restarts
+    /// every row.
     fn encoded(pixels: &[u16], columns: usize, predictor: u8, restart: bool) -> Vec<u8> {
         let rows = pixels.len() / columns;
         let mut out = vec![0xff, 0xd8, 0xff, 0xc4, 0, 19 + 17, 0];
@@ -265,7 +264,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_encoded_comes_back(pixels in prop::collection::vec(any::<u16>(), 42), predictor in 1u8..8, restart in any::<bool>()) {
+        fn encoding_round_trips(pixels in prop::collection::vec(any::<u16>(), 42), predictor in 1u8..8, restart in any::<bool>()) {
             let bytes = encoded(&pixels, 7, predictor, restart);
             prop_assert_eq!(decode(&bytes, (6, 7)), Ok(pixels));
             for length in 0..bytes.len() - 3 {

@@ -1,8 +1,8 @@
-//! JPEG-LS, lossless and near-lossless: prediction with learnt corrections, Golomb codes, runs.
+//! JPEG-LS, lossless and near-lossless: context-corrected prediction, Golomb codes, runs.
 //!
 //! # Theory
-//! ITU-T T.87. With a left, b above, c above left, d above right: where the three gradients d - b,
-//! b - c, c - a are all small, a run of a follows; else they choose one of 365 contexts, which
+//! ITU-T T.87. With a left, b above, c above left, d above right: where the gradients d - b, b - c,
+//! c - a are all small, a run of a follows. Otherwise they select one of 365 contexts, which
 //! corrects the median predictor and sets the Golomb parameter k, the least with `N · 2ᵏ ≥ A`.
 //!
 //! # Sources
@@ -12,11 +12,11 @@
 use super::marker::{Segments, frame};
 use super::{CodecError, Size};
 
-/// Lengths of the runs that one bit stands for, as powers of two.
+/// Run lengths that one bit stands for, as powers of two.
 const RUNS: [u32; 32] =
     [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// Decodes a frame of one component and that size; returns the stored numbers.
+/// Decodes a frame of one component and the given size; returns the stored values.
 pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, CodecError> {
     let mut segments = Segments::of(bytes)?;
     let mut known = None;
@@ -52,10 +52,10 @@ pub(in crate::dicom) fn decode(bytes: &[u8], size: Size) -> Result<Vec<u16>, Cod
     }
 }
 
-/// What a context has learnt.
+/// The adaptive state of a context.
 #[derive(Clone, Copy)]
 struct Context {
-    /// Sum of the errors' sizes.
+    /// Sum of the absolute errors.
     a: i32,
     /// Sum of the errors; for the two run contexts the number of negative ones.
     b: i32,
@@ -78,7 +78,7 @@ struct Coder {
     thresholds: [i32; 3],
     reset: i32,
     range: i32,
-    /// Bits of an error that is written plainly.
+    /// Bits of an error in escape code.
     error_bits: u32,
     /// Longest code.
     limit: u32,
@@ -112,7 +112,7 @@ impl Coder {
     }
 
     fn picture(&mut self, bits: &mut Bits, rows: usize, columns: usize) -> Result<Vec<u16>, CodecError> {
-        // Rows with a border voxel on both sides.
+        // Rows are padded by a voxel on both sides.
         let (mut above, mut row) = (vec![0; columns + 2], vec![0; columns + 2]);
         let mut pixels = Vec::new();
         for n in 0..rows {
@@ -195,7 +195,7 @@ impl Coder {
         }
     }
 
-    /// The value from prediction and error, wrapped into the range.
+    /// Reconstructs the value from prediction and error, modulo the range.
     fn rebuilt(&self, predicted: i32, error: i32) -> i32 {
         let step = 2 * self.near + 1;
         let value = predicted.wrapping_add(error.wrapping_mul(step));
@@ -210,8 +210,7 @@ impl Coder {
         wrapped.clamp(0, self.greatest)
     }
 
-    /// A run of the left neighbour's value and the pixel that breaks it; returns where the row goes
-    /// on.
+    /// Decodes a run of the left neighbour's value and the pixel after it; returns the next column.
     fn run(&mut self, bits: &mut Bits, above: &[i32], row: &mut [i32], start: usize) -> Option<usize> {
         let (value, end) = (row[start - 1], row.len() - 1);
         let mut at = start;
@@ -282,7 +281,7 @@ fn default_thresholds(greatest: i32, near: i32) -> [i32; 3] {
 struct Bits<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Bits at hand, the next one on top; below the last one zeros.
+    /// Buffered bits, the next one on top, zeros below the last.
     held: u64,
     count: u32,
 }
@@ -292,7 +291,7 @@ impl<'a> Bits<'a> {
         Self { bytes, at: 0, held: 0, count: 0 }
     }
 
-    /// Takes bytes until 57 bits are at hand or a marker comes.
+    /// Reads bytes until 57 bits are buffered or a marker comes.
     fn fill(&mut self) {
         while self.count <= 56 {
             let stuffed = self.at > 0 && self.bytes[self.at - 1] == 0xff;
@@ -308,7 +307,7 @@ impl<'a> Bits<'a> {
         self.take(1)
     }
 
-    /// Up to 32 bits as a number.
+    /// Reads up to 32 bits as a number.
     fn take(&mut self, count: u32) -> Option<u32> {
         if count > self.count {
             self.fill();
@@ -320,8 +319,8 @@ impl<'a> Bits<'a> {
         Some(value as u32)
     }
 
-    /// A Golomb code whose unary part ends at `limit - bits - 1`; after that the number less one
-    /// stands plainly in `bits`.
+    /// Decodes a Golomb code; a unary part of `limit - bits - 1` is followed by the value less one
+    /// in `bits`.
     fn golomb(&mut self, k: u32, limit: u32, bits: u32) -> Option<i32> {
         let longest = limit.checked_sub(bits + 1)?;
         let mut zeros = 0;
@@ -350,7 +349,7 @@ impl<'a> Bits<'a> {
 mod tests {
     use super::*;
 
-    /// A flat row of four and the markers around it: runs of 1, 1, 1, 1.
+    /// A constant row of four with its markers: runs of 1, 1, 1, 1.
     #[test]
     fn a_flat_picture_is_a_row_of_ones() {
         let head = [0xff, 0xd8, 0xff, 0xf7, 0, 11, 8, 0, 2, 0, 4, 1, 1, 0x11, 0, 0xff, 0xda, 0, 8, 1, 1, 0, 0, 0, 0];

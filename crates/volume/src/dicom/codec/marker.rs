@@ -1,21 +1,21 @@
-//! The marker segments that JPEG and JPEG-LS streams are made of (ITU-T T.81 annex B).
+//! Parses the marker segments of JPEG and JPEG-LS streams (ITU-T T.81 annex B).
 
 use super::{CodecError, Size};
 
-/// A segment: its marker's second byte and what it holds.
+/// A segment: its marker's second byte and its body.
 pub(super) struct Segment<'a> {
     pub marker: u8,
     pub body: &'a [u8],
 }
 
-/// Reads segments until the scan's data start.
+/// Iterates over segments up to the scan data.
 pub(super) struct Segments<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
 impl<'a> Segments<'a> {
-    /// Expects the start-of-image marker.
+    /// Starts at the start-of-image marker.
     pub fn of(bytes: &'a [u8]) -> Result<Self, CodecError> {
         match bytes.starts_with(&[0xff, 0xd8]) {
             true => Ok(Self { bytes, at: 2 }),
@@ -38,13 +38,13 @@ impl<'a> Segments<'a> {
         Ok(Segment { marker, body })
     }
 
-    /// What follows the segments read so far.
+    /// The bytes after the segments read so far.
     pub fn rest(&self) -> &'a [u8] {
         &self.bytes[self.at.min(self.bytes.len())..]
     }
 }
 
-/// Precision of a frame header with one component and the size that is announced.
+/// Precision in a frame header with one component and the expected size.
 pub(super) fn frame(body: &[u8], size: Size) -> Result<u32, CodecError> {
     let &[precision, y1, y0, x1, x0, components, ..] = body else { return Err(CodecError::Short(0)) };
     if components != 1 || !(2..=16).contains(&precision) {

@@ -1,5 +1,5 @@
-//! Compressed pictures, one file per compression. Each decoder gives the stored numbers of one
-//! frame, row after row.
+//! Decoders of compressed frames, one file per compression; each returns the stored values row by
+//! row.
 
 pub(super) mod jpeg;
 pub(super) mod jpeg_2000;
@@ -8,20 +8,19 @@ pub(super) mod jpeg_ls;
 mod marker;
 pub(super) mod rle;
 
-/// Rows and columns that a file announces, and its stream must have: looked at before anything is
-/// decoded.
+/// Rows and columns in the DICOM header, compared with the stream before decoding.
 pub(in crate::dicom) type Size = (usize, usize);
 
 /// Most pixels that a compressed frame may claim.
 pub(in crate::dicom) const MOST_PIXELS: usize = 1 << 26;
 
-/// Why a frame was not decoded.
+/// Why a frame cannot be decoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::dicom) enum CodecError {
-    /// The stream ends after so many pixels.
+    /// The stream ends after this many pixels.
     Short(usize),
-    /// The stream's rows and columns are others than the file announces.
+    /// The stream's rows and columns differ from the DICOM header's.
     Size(usize, usize),
-    /// Something in the stream is wrong or not supported.
+    /// The stream is invalid or unsupported.
     Wrong(&'static str),
 }

@@ -25,8 +25,8 @@ pub(in crate::dicom) fn decode(packed: &[u8], pixels: usize, bytes: usize) -> Re
     Ok(out)
 }
 
-/// PackBits: n < 128 copies n + 1 bytes, n > 128 repeats the next one 257 - n times. Returns how
-/// many came.
+/// PackBits: n < 128 copies n + 1 bytes, n > 128 repeats the next one 257 - n times. Returns the
+/// output length.
 fn unpack(segment: &[u8], limit: usize, mut put: impl FnMut(usize, u8)) -> usize {
     let (mut at, mut written) = (0, 0);
     while written < limit {

@@ -1,4 +1,4 @@
-//! The driver of libdrd.
+//! Fault cases of the libdrd driver.
 
 use super::{Bench, Case, Felt, Loop, Then, refused, row, run};
 use crate::suite::Row;
@@ -8,18 +8,18 @@ use trepan_haptics::{DeviceError, Fault};
 
 const DRIVER: &str = "force-dimension";
 
-/// A device in a loop.
+/// Device in a loop.
 struct Omega {
     library: Library,
     hand: Loop<ForceDimension>,
     tick: u32,
-    /// The loop does not run, for so many ms.
+    /// Time for which the loop does not run, ms.
     silent_ms: Option<f64>,
-    /// Reads come too soon in every other tick.
+    /// Whether reads come too soon in every other tick.
     hasty: bool,
 }
 
-/// Every fault.
+/// Rows of all fault cases.
 pub fn rows() -> Vec<Row> {
     let in_use = cases().into_iter().filter_map(|case| {
         let mut bench = Omega::new(Library::drd()).ok()?;
@@ -49,7 +49,7 @@ impl Bench for Omega {
                 *silent_ms += 1.0;
                 self.library.set(drd::SILENCE_MS, *silent_ms);
             }
-            // The loop is back: it is told why there is no force.
+            // The loop resumes: it learns why there is no force.
             _ => self.hand.tick(self.tick.into()),
         }
         let force = [drd::FORCE_X, drd::FORCE_Y, drd::FORCE_Z].map(|key| self.library.get(key));

@@ -1,4 +1,4 @@
-//! The driver of Haply's service, in real time.
+//! Fault cases of the driver of Haply's service, in real time.
 
 use super::{Bench, Case, Felt, Loop, Scope, Then, refused, row, run};
 use crate::suite::Row;
@@ -9,13 +9,13 @@ use trepan_haptics::haply::{Config, Haply};
 use trepan_haptics::{DeviceError, Fault};
 
 const DRIVER: &str = "haply";
-/// A tick of the loop.
+/// Length of a loop tick.
 const TICK: Duration = Duration::from_millis(1);
-/// Longest wait for the answer to a tick.
+/// Longest wait for the response to a tick.
 const PATIENCE: Duration = Duration::from_millis(2);
 
-/// A device in a loop that runs as fast as the service answers, until the fault begins; then once a
-/// millisecond.
+/// Device in a loop that runs as fast as the service responds until the fault begins, then at 1
+/// kHz.
 struct Inverse {
     service: Service,
     hand: Loop<Haply>,
@@ -24,7 +24,7 @@ struct Inverse {
     silent: bool,
 }
 
-/// Every fault.
+/// Rows of all fault cases.
 pub fn rows(scope: Scope) -> Vec<Row> {
     let in_use = cases().into_iter().filter_map(|case| {
         let courses: Result<Vec<_>, DeviceError> =
@@ -55,7 +55,7 @@ impl Inverse {
         self.start.elapsed().as_secs_f64() * 1e3
     }
 
-    /// Waits as a loop does: after the fault for the next tick, before it for the answer.
+    /// Waits for the next tick: for the response before the fault, for 1 ms after it.
     fn wait(&self, messages: u32) {
         let asked = Instant::now();
         if self.began.is_some() {
@@ -77,7 +77,7 @@ impl Bench for Inverse {
         self.wait(messages);
         let told = self.service.told();
         let force_n = told.force.unwrap_or_default().iter().map(|n| n * n).sum::<f64>().sqrt();
-        // The service knows best when the force went.
+        // The service records most precisely when the force ended.
         let at_ms = match (self.began, told.no_force_after) {
             (Some(began), Some(after)) if force_n == 0.0 => ((began - self.start) + after).as_secs_f64() * 1e3,
             _ => self.now_ms(),
@@ -99,7 +99,7 @@ const UNPOWERED: &str = r#"{"calibrated":true,"power_supply":false,"ready":true}
 const UNREADY: &str = r#"{"calibrated":true,"power_supply":true,"ready":false}"#;
 const WITHOUT_POSE: &str = r#"{"inverse3":[{"device_id":"049D","state":{"mode":"idle"}}]}"#;
 const OLD: &str = r#"{"inverse3":{"049D":{}}}"#;
-/// A malformed device and grip beside good ones, and a grip in two lists.
+/// Malformed device and grip beside valid ones, and a grip in two lists.
 const NEIGHBOURS: &str = r#"{"inverse3":[{"device_id":7,"state":"?"},{"device_id":"049D","state":
     {"cursor_position":{"x":0,"y":0,"z":0},"cursor_velocity":{"x":0,"y":0,"z":0}}}],"verse_grip":[{"state":[]}],
     "wireless_verse_grip":[{"device_id":"60BD","state":{"buttons":{"a":true}}}],
@@ -161,7 +161,7 @@ mod tests {
     use trepan_emulators::service::READY;
 
     #[test]
-    fn the_texts_are_what_they_are_called() {
+    fn the_json_texts_match_their_names() {
         let json = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
         assert!(json(NEIGHBOURS)["inverse3"].is_array() && json(OLD)["inverse3"].is_object());
         assert!([UNCALIBRATED, UNPOWERED, UNREADY, READY].iter().all(|text| json(text)["ready"].is_boolean()));

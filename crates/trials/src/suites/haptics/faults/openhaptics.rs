@@ -1,4 +1,4 @@
-//! The driver of libHD.
+//! Fault cases of the libHD driver.
 
 use super::{Bench, Case, Felt, Loop, Then, refused, row, run};
 use crate::suite::Row;
@@ -8,24 +8,24 @@ use trepan_haptics::{DeviceError, Fault, HapticDevice};
 
 const DRIVER: &str = "openhaptics";
 
-/// The first device in a loop, a second one beside it, and the library whose servo ticks after each
-/// tick of the loop.
+/// First device in a loop, a second one beside it, and the library, whose servo ticks after each
+/// loop tick.
 struct Touch {
     library: Library,
     hand: Loop<OpenHaptics>,
     other: OpenHaptics,
     tick: u32,
-    /// The loop does not run.
+    /// Whether the loop does not run.
     silent: bool,
-    /// The servo ticks once in so many ticks of the loop.
+    /// Loop ticks per servo tick.
     servo_period: u32,
-    /// Ticks of the loop since the servo's last.
+    /// Loop ticks since the last servo tick.
     servo_waits: u32,
-    /// Ticks of the loop that nobody could do anything about.
+    /// Loop ticks during which no code can act.
     paused: u32,
 }
 
-/// Every fault.
+/// Rows of all fault cases.
 pub fn rows() -> Vec<Row> {
     let in_use = cases().into_iter().filter_map(|case| {
         let mut bench = Touch::new().ok()?;
@@ -109,7 +109,7 @@ fn cases() -> Vec<Case<Touch>> {
     cut.chain(kept.into_iter().map(|(name, begin)| case(name, begin, Then::Kept))).collect()
 }
 
-/// The loop goes on for 200 ms without the library.
+/// Runs the loop for 200 ms without the library.
 fn pause(bench: &mut Touch) {
     bench.servo_period = 201;
     (0..200).for_each(|_| _ = bench.tick());

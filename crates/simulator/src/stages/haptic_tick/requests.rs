@@ -1,4 +1,4 @@
-//! What the hand asks for beside moving: cutting, another tool, the last stroke back, the flap.
+//! Requests by buttons: cutting, changing the tool, undoing a stroke, moving the flap.
 
 use super::HapticStage;
 use crate::program::Phase;
@@ -11,8 +11,8 @@ use crate::stages::undo::{Answer, Place, Stroke};
 use trepan_geometry::{Buttons, Pose, ToolKind, ToolState};
 
 impl HapticStage {
-    /// Whether the tool cuts: a perforator's clutch lets go once it is through, and nothing cuts
-    /// while bone is on its way or the force waits.
+    /// Whether the tool cuts. A perforator's clutch disengages once it is through; nothing cuts
+    /// while bone is restored or lifted, or while the force is off after a fault.
     pub(super) fn drills(&self, tool: &ToolState) -> bool {
         let kind = self.tool().kind;
         let slips = kind == ToolKind::Perforator && self.drill.lets_go();
@@ -20,7 +20,7 @@ impl HapticStage {
         tool.buttons.has(Buttons::PEDAL) && kind.cuts() && may
     }
 
-    /// Whether bone is on its way: a stroke that comes back, or the flap.
+    /// Whether a stroke is being undone or the flap is moving.
     fn bone_moves(&self) -> bool {
         self.undo.runs() || self.flap.as_ref().is_some_and(Flap::moves)
     }
@@ -30,19 +30,19 @@ impl HapticStage {
         !self.bone_step.manifold.touches() && self.tissue.depth_mm <= 0.0
     }
 
-    /// Whether there is a way to the brain.
+    /// Whether the bone is open, or need not be.
     fn is_open(&self) -> bool {
         let lifted = self.flap.as_ref().is_some_and(Flap::is_away);
         lifted || self.bone.is_none() || self.holes > 0 || !self.config.opening_needed
     }
 
-    /// Another tool comes when it is asked for and the last one touches nothing.
-    pub(super) fn change_tool(&mut self, tool: &ToolState, tick: u64, tell: &mut dyn FnMut(Notice)) {
-        let mut say = |what| tell(Notice { tick, time_ms: tool.time_ms, what });
+    /// Changes the tool on request, if the present one touches nothing.
+    pub(super) fn change_tool(&mut self, tool: &ToolState, tick: u64, notify: &mut dyn FnMut(Notice)) {
+        let mut report = |what| notify(Notice { tick, time_ms: tool.time_ms, what });
         let before = self.phase();
         let change = self.tray.change(tool.buttons, self.is_free() && !self.undo.runs(), self.is_open());
         match change {
-            Some(Change::Refused) => say(What::NotOpen),
+            Some(Change::Refused) => report(What::NotOpen),
             Some(Change::Taken) => {
                 if let Some(rigid) = &mut self.rigid[self.tray.slot()] {
                     rigid.reset(self.proxy);
@@ -53,32 +53,32 @@ impl HapticStage {
             None => {}
         }
         if tick <= 1 || before != self.phase() {
-            say(What::Phase(self.phase()));
+            report(What::Phase(self.phase()));
         }
         if tick <= 1 || change == Some(Change::Taken) {
-            say(What::Taken(self.tool()));
+            report(What::Taken(self.tool()));
         }
     }
 
-    /// Looks after the flap.
-    pub(super) fn follow_flap(&mut self, tool: &ToolState, drilling: bool, tick: u64, tell: &mut dyn FnMut(Notice)) {
+    /// Runs the tick of the flap.
+    pub(super) fn follow_flap(&mut self, tool: &ToolState, drilling: bool, tick: u64, notify: &mut dyn FnMut(Notice)) {
         let free = self.is_free() && self.phase() == Phase::Craniotomy && !self.undo.runs();
         let cut = self.bone_step.removed_mm3 > 0.0;
         if let (Some(bone), Some(flap)) = (&self.bone, &mut self.flap) {
             let what = flap.tick(bone, tool.buttons, drilling, cut, free);
-            what.into_iter().for_each(|what| tell(Notice { tick, time_ms: tool.time_ms, what }));
+            what.into_iter().for_each(|what| notify(Notice { tick, time_ms: tool.time_ms, what }));
         }
     }
 
-    /// Lets strokes begin, end and come back; `second` is where the second hand's tool is. Returns
-    /// what came back, mm³.
+    /// Begins, ends and undoes strokes; `second` is the pose of the second hand's tool. Returns the
+    /// restored bone, mm³.
     pub(super) fn undo(
         &mut self,
         tool: &ToolState,
         drilling: bool,
         second: Option<Pose>,
         tick: u64,
-        tell: &mut dyn FnMut(Notice),
+        notify: &mut dyn FnMut(Notice),
     ) -> f32 {
         let hinders = self.hinders_undo(tool);
         let Some(bone) = &self.bone else { return 0.0 };
@@ -86,7 +86,7 @@ impl HapticStage {
         if self.drill.stroke(bone, tool, drilling) {
             *self.undo.newest(bone) = Stroke { flap_away, ..Stroke::default() };
         }
-        let place = |tool, world_from_tool, said| Place { tool, world_from_tool, said };
+        let place = |tool, world_from_tool, hindrance| Place { tool, world_from_tool, hindrance };
         let tools = [
             Some(place(self.tray.tool(), self.proxy, Hindrance::Tool)),
             second.map(|pose| place(SecondHand::tool(), pose, Hindrance::SecondTool)),
@@ -104,11 +104,11 @@ impl HapticStage {
             }
             Answer::Not(why) => (What::NotUndone(why), 0.0),
         };
-        tell(Notice { tick, time_ms: tool.time_ms, what });
+        notify(Notice { tick, time_ms: tool.time_ms, what });
         back_mm3
     }
 
-    /// Why no stroke may come back now.
+    /// Returns why no stroke can be undone now.
     fn hinders_undo(&self, tool: &ToolState) -> Option<Hindrance> {
         if self.phase() == Phase::Brain {
             return Some(Hindrance::BrainTool);
