@@ -78,8 +78,8 @@ impl Default for Config {
 pub enum Damping {
     /// No damping: energy is conserved.
     None,
-    /// Share of critical damping of the lowest mode, without unit; 1 = fastest return to rest (under
-    /// 1 s for a brain).
+    /// Share of critical damping of the lowest mode, without unit; 1 = fastest return to rest
+    /// (under 1 s for a brain).
     Critical(f32),
     /// Damping rate α, 1/ms.
     Rate(f32),

@@ -61,8 +61,8 @@ impl Update {
 }
 
 impl Nodes {
-    /// Creates nodes at rest with the given masses by mesh node, g. Added mass (mass scaling) has no
-    /// weight.
+    /// Creates nodes at rest with the given masses by mesh node, g. Added mass (mass scaling) has
+    /// no weight.
     pub fn of(body: &Body, layout: &Layout, masses: &[f64]) -> Self {
         let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
         let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };

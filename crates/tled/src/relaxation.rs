@@ -37,8 +37,8 @@ impl Relaxation {
     /// No relaxation: elastic.
     pub const NONE: Self = Self { share: [0.0; 2], time_ms: [1.0; 2] };
 
-    /// Brain after Miller and Chinzei 2002, uncalibrated: 45 % with a time constant of 0.5 s, 36.5 %
-    /// with 50 s.
+    /// Brain after Miller and Chinzei 2002, uncalibrated: 45 % with a time constant of 0.5 s, 36.5
+    /// % with 50 s.
     pub const BRAIN: Self = Self { share: [0.450, 0.365], time_ms: [500.0, 50_000.0] };
 
     /// Whether there is no relaxation.

@@ -60,8 +60,8 @@ struct Shared {
     quit: AtomicBool,
 }
 
-/// Task counters of a round, 20 bits each: all, claimed from the last on, claimed from the first on.
-/// They share one atomic number, so that a thread never sees half of a new round.
+/// Task counters of a round, 20 bits each: all, claimed from the last on, claimed from the first
+/// on. They share one atomic number, so that a thread never sees half of a new round.
 struct Claims(AtomicU64);
 
 /// Largest number of tasks in a round: a thousand million elements, 270 million nodes.
