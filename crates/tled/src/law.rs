@@ -43,8 +43,8 @@ pub(crate) trait Constitutive<const K: usize> {
     fn constants(law: &Law, volume_mm3: f64) -> [f32; K];
     /// Stress without the volumetric part.
     fn stress<L: Lane>(constants: &[L; K], d: &Deformation<L>) -> Stress<L>;
-    /// Returns μ V and κ V, N mm. κ multiplies `J - 1` in the volumetric part; it is zero if the
-    /// law has no volumetric split.
+    /// Returns μ V and κ V, N mm. The latter multiplies `J - 1` in the volumetric part; it is zero
+    /// if the law has no volumetric split.
     fn moduli<L: Lane>(constants: &[L; K]) -> (L, L);
     /// Whether s is a multiple of the unit tensor, so that its other entries can be skipped.
     const ROUND: bool = false;

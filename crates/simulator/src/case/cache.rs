@@ -125,7 +125,7 @@ impl Cache {
                 kept.push((used, old, entry.path()));
             }
         }
-        kept.sort_by(|a, b| b.0.cmp(&a.0));
+        kept.sort_by_key(|kept| std::cmp::Reverse(kept.0));
         let mut bytes = 0;
         for (_, old, folder) in kept {
             bytes += size(&folder);
