@@ -192,7 +192,7 @@ pub enum Task {
         case: Option<PathBuf>,
         /// The patient's images
         #[command(flatten)]
-        patient: Patient,
+        patient: Box<Patient>,
         /// Tolerances to keep
         #[command(flatten)]
         tolerances: Tolerances,
@@ -240,7 +240,7 @@ pub enum CaseTask {
     Build {
         /// The patient's images
         #[command(flatten)]
-        patient: Patient,
+        patient: Box<Patient>,
         /// New case folder; it must not exist yet
         #[arg(long, value_name = "CASE")]
         out: PathBuf,
