@@ -12,7 +12,7 @@ struct Deformation {
     f: mat3x3f,
     cof: mat3x3f,
     j: f32,
-    // max(J, 0.1) and its power -1/3.
+    // max(J, 0.3) and its power -1/3.
     clamped: f32,
     root: f32,
     // Gradients and what stands beside them.
@@ -50,7 +50,7 @@ fn deformation(e: u32) -> Deformation {
     d.f = mat3x3f(f0, f1, f2);
     d.cof = mat3x3f(cross(f1, f2), cross(f2, f0), cross(f0, f1));
     d.j = dot(f0, d.cof[0]);
-    d.clamped = max(d.j, 0.1);
+    d.clamped = max(d.j, 0.3);
     d.root = inverse_cube_root(d.clamped);
     return d;
 }

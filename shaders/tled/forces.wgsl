@@ -17,7 +17,7 @@ struct Stress {
     q: f32,
 }
 
-// J^n continued linearly below J = 0.1, and its slope, from `at` = max(J, 0.1)^n.
+// J^n continued linearly below J = 0.3, and its slope, from `at` = max(J, 0.3)^n.
 fn continued(d: Deformation, at: f32, n: f32) -> vec2f {
     let slope = n * at * (d.root * d.root * d.root);
     return vec2f(at + slope * (d.j - d.clamped), slope);

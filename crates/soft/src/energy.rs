@@ -6,7 +6,7 @@
 //! P    = ∂W/∂F = μ g F + q C                   q = μ/2 g' I₁ + κ (J-1),   C = cof F = ∂J/∂F
 //! ```
 //! With `g = J^(-2/3)` throughout, W is infinite at J = 0 and undefined beyond. Continued linearly
-//! below `J₀ = 0.1` it stays once differentiable, and its force always pushes J back towards 1: an
+//! below `J₀ = 0.3` it stays once differentiable, and its force always pushes J back towards 1: an
 //! inverted element heals by itself.
 //!
 //! # Sources
@@ -15,10 +15,9 @@
 
 use glam::{DMat3, DVec3};
 
-/// Below this volume ratio the isochoric factor continues along its tangent line. With 0.3 single
-/// elements of averaged pressure turned inside out under a probe pressed by 8 mm; with 0.1 the law
-/// itself resists longer.
-pub const FADE_BELOW: f64 = 0.1;
+/// Below this volume ratio the isochoric factor continues along its tangent line. With 0.1 fewer
+/// elements invert under a probe, but a block turned inside out as a whole no longer heals.
+pub const FADE_BELOW: f64 = 0.3;
 
 /// The compressible neo-Hookean law.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,7 @@
 //! Mooney-Rivlin           W = c₁₀ (J^(-2/3) I₁ - 3) + c₀₁ (J^(-4/3) I₂ - 3) + κ/2 (J-1)²
 //! Ogden                   W = Σ_p 2 μ_p/α_p² (Σ_i (J^(-1/3) λ_i)^α_p - 3) + κ/2 (J-1)²
 //! ```
-//! λ_i² are the eigenvalues of FᵀF. Powers of J continue linearly below 0.1
+//! λ_i² are the eigenvalues of FᵀF. Powers of J continue linearly below 0.3
 //! ([`crate::FADE_BELOW`]), principal stretches stop at 0.1, so that every energy is finite for
 //! every F.
 

@@ -8,7 +8,7 @@
 //! Mooney-Rivlin        S = (2 c₁₀ g + 2 c₀₁ h I₁) I - 2 c₀₁ h FᵀF    q_iso = c₁₀ g' I₁ + c₀₁ h' I₂
 //! Ogden                S = Σ_i s_i n_i n_iᵀ, s_i = Σ_p μ_p'/α_p g_p λ_i^(α_p-2)   (μ' = 2 μ)
 //! ```
-//! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.1 as in
+//! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3 as in
 //! `trepan_soft::Law`, the f64 version of this file.
 
 use crate::lane::Lane;
@@ -23,7 +23,7 @@ pub(crate) struct Deformation<L> {
     pub c: [[L; 3]; 3],
     /// det F.
     pub j: L,
-    /// max(J, 0.1) and its power -1/3.
+    /// max(J, 0.3) and its power -1/3.
     pub clamped: L,
     pub root: L,
 }
@@ -56,7 +56,7 @@ pub(crate) struct MooneyRivlin;
 pub(crate) struct Ogden;
 
 impl<L: Lane> Deformation<L> {
-    /// J^n continued linearly below J = 0.1, and its slope, from `at = max(J, 0.1)^n`.
+    /// J^n continued linearly below J = 0.3, and its slope, from `at = max(J, 0.3)^n`.
     #[inline(always)]
     fn continued(&self, at: L, n: L) -> (L, L) {
         let inverse = self.root * self.root * self.root;
@@ -78,7 +78,7 @@ impl<L: Lane> Deformation<L> {
         ]
     }
 
-    /// `(cof F)ᵀ cof F / max(J, 0.1)`, which is J (FᵀF)⁻¹ where J is not clamped.
+    /// `(cof F)ᵀ cof F / max(J, 0.3)`, which is J (FᵀF)⁻¹ where J is not clamped.
     #[inline(always)]
     pub fn inverse_green(&self) -> Symmetric<L> {
         let inverse = self.root * self.root * self.root;
