@@ -1,7 +1,7 @@
 // Forces of the elements of one law on their four nodes, each to its own slot.
 //   P = F S + (q + κ (J̄-1)) C    f_a = -V P ∇N_a
 // J̄ = J, or the mean of the corners' node groups with averaged pressure. The slot of corner 0 also
-// carries the element's present ω², negative where J ≤ 0.
+// carries the growth of the element's ω² since rest, negative where J ≤ 0.
 struct Range { first: u32, count: u32 }
 @group(0) @binding(4) var<storage, read_write> forces: array<vec4f>;
 // Further constants of the laws that have more than two.
@@ -81,7 +81,8 @@ fn pressed(stress: Stress, f: vec3f, c: vec3f) -> vec3f {
         let node_group = corners[2u * now.elements + e];
         swollen = (volume_change[node_group.x] + volume_change[node_group.y] + volume_change[node_group.z] + volume_change[node_group.w]) * 0.25;
     }
-    let omega2 = d.c.w * stiffness(found, m, d, swollen);
+    let at_rest = (3.0 + sqrt(3.0)) * abs(stress_at_rest(constants)) + m.y + 5.0 / 3.0 * m.x;
+    let growth = max(d.c.w * (stiffness(found, m, d, swollen) - at_rest), 1e-30);
     if RELAXES { found = relaxed(e, found, d); }
     found.q += m.y * swollen;
     let p0 = pressed(found, d.f[0], d.cof[0]);
@@ -91,7 +92,7 @@ fn pressed(stress: Stress, f: vec3f, c: vec3f) -> vec3f {
     let fb = vec3f(dot(p0, d.b.xyz), dot(p1, d.b.xyz), dot(p2, d.b.xyz));
     let fc = vec3f(dot(p0, d.c.xyz), dot(p1, d.c.xyz), dot(p2, d.c.xyz));
     let to = corners[now.elements + e];
-    forces[to.x] = vec4f(-(fa + fb + fc), select(omega2, -omega2, d.j <= 0.0));
+    forces[to.x] = vec4f(-(fa + fb + fc), select(growth, -growth, d.j <= 0.0));
     forces[to.y] = vec4f(fa, 0.0);
     forces[to.z] = vec4f(fb, 0.0);
     forces[to.w] = vec4f(fc, 0.0);

@@ -3,6 +3,7 @@
 const ROUND = false;
 fn more_of(e: u32) -> vec4f { return more[e]; }
 fn moduli(c: array<f32, 5>) -> vec2f { return vec2f(2.0 * (c[0] + c[1]), c[2]); }
+fn stress_at_rest(c: array<f32, 5>) -> f32 { return 2.0 * (c[0] + 2.0 * c[1]); }
 fn stress(c: array<f32, 5>, d: Deformation) -> Stress {
     let power = d.root * d.root;
     let g = continued(d, power, -2.0 / 3.0);

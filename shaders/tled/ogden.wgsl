@@ -6,6 +6,7 @@ fn more_of(e: u32) -> vec4f { return more[e]; }
 fn moduli(c: array<f32, 5>) -> vec2f {
     return vec2f(0.5 * (c[0] * c[1] * c[1] + c[2] * c[3] * c[3]), c[4]);
 }
+fn stress_at_rest(c: array<f32, 5>) -> f32 { return c[0] * c[1] + c[2] * c[3]; }
 
 // log₂ x for x over 0.
 fn logarithm(x: f32) -> f32 {

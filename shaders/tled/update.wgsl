@@ -8,7 +8,7 @@
 @group(0) @binding(5) var<storage, read_write> u: array<vec4f>;
 @group(0) @binding(6) var<storage, read_write> v: array<vec4f>;
 // Since they were last cleared: most inverted elements at once, times limited, times not finite,
-// bits of the largest ω².
+// bits of the largest growth of ω².
 @group(0) @binding(7) var<storage, read_write> noticed: array<vec4u>;
 
 fn finite(x: vec3f) -> bool {
@@ -20,17 +20,17 @@ fn finite(x: vec3f) -> bool {
     let n = id.x;
     if n >= now.nodes { return; }
     var force = vec3f(0.0);
-    var stiffest = 0.0;
+    var growth = 0.0;
     var inverted = 0u;
     for (var slot = starts[n]; slot < starts[n + 1u]; slot++) {
         let f = forces[slot];
         force += f.xyz;
-        stiffest = max(stiffest, abs(f.w));
+        growth = max(growth, abs(f.w));
         inverted += select(0u, 1u, f.w < 0.0);
     }
     var seen = noticed[n];
     seen.x = max(seen.x, inverted);
-    seen.w = max(seen.w, bitcast<u32>(stiffest));
+    seen.w = max(seen.w, bitcast<u32>(growth));
     let node = nodes[n];
     if node.x > 0.0 {
         if node.z != 0.0 { force += pushed[n].xyz; }

@@ -17,7 +17,7 @@ use crate::kernel::{Pass, PassReport};
 use crate::lane::Lane;
 use crate::law::{Constitutive, Stress};
 use crate::relaxation::Fade;
-use crate::stiffness::stiffness;
+use crate::stiffness::{stiffness, stiffness_at_rest};
 use std::marker::PhantomData;
 use trepan_soft::{Material, Shape, element_omega2};
 
@@ -131,15 +131,14 @@ pub(crate) fn omega2_over_stiffness<M: Constitutive<K>, const K: usize>(
     material: &Material,
     constants: &[f32; K],
 ) -> f32 {
-    let rest = deformation(&[[0.0; 3]; 3], &[[0.0; 3]; 3]);
-    let at_rest = stiffness(&M::stress(constants, &rest), M::moduli(constants), &rest, 0.0);
+    let at_rest = stiffness_at_rest(M::stress_at_rest(constants), M::moduli(constants));
     (element_omega2(shape, material) / f64::from(at_rest)) as f32
 }
 
 impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, K, T> {
     #[inline(always)]
     fn run<L: Lane>(&mut self) -> PassReport {
-        let (mut inverted, mut stiffest) = (0, L::splat(0.0));
+        let (mut inverted, mut growth) = (0, L::splat(0.0));
         for (block, memory) in self.blocks.iter().zip(self.memory.iter_mut()) {
             for part in 0..WIDTH / L::LANES {
                 let moved = block.moved::<L>(part, self.u);
@@ -147,13 +146,14 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 let d = deformation(&moved.edges, &gradients);
                 let mut stress = M::stress(&constants, &d);
                 let volume_change = if self.averaged_pressure { moved.mean } else { d.j - L::splat(1.0) };
-                let omega2 =
-                    L::load(&block.omega2, part) * stiffness(&stress, M::moduli(&constants), &d, volume_change);
-                stiffest = omega2.larger(stiffest);
+                let moduli = M::moduli(&constants);
+                let gained = stiffness(&stress, moduli, &d, volume_change)
+                    - stiffness_at_rest(M::stress_at_rest(&constants), moduli);
+                growth = (L::load(&block.omega2, part) * gained).larger(growth);
                 if T > 0 {
                     relax::<L, T>(&mut stress, &d.inverse_green(), memory, &self.fade, part);
                 }
-                stress.q = stress.q + M::moduli(&constants).1 * volume_change;
+                stress.q = stress.q + moduli.1 * volume_change;
                 let [f1, f2, f3] = forces(&stress, M::ROUND && T == 0, &d, &gradients);
                 let zero = L::splat(0.0);
                 let f0 =
@@ -162,7 +162,7 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 inverted += d.j.not_positive();
             }
         }
-        PassReport { inverted, stiffest: stiffest.largest() }
+        PassReport { inverted, growth: growth.largest() }
     }
 }
 

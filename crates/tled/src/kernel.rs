@@ -31,8 +31,8 @@ pub(crate) trait Pass {
 pub(crate) struct PassReport {
     /// Elements with J ≤ 0.
     pub inverted: u32,
-    /// Largest ω² of a single deformed element, 1/ms².
-    pub stiffest: f32,
+    /// Largest growth of a single element's ω² since rest, 1/ms²; 0 where none has grown.
+    pub growth: f32,
 }
 
 impl Kernel {

@@ -46,6 +46,8 @@ pub(crate) trait Constitutive<const K: usize> {
     /// Returns μ V and κ V, N mm. The latter multiplies `J - 1` in the volumetric part; it is zero
     /// if the law has no volumetric split.
     fn moduli<L: Lane>(constants: &[L; K]) -> (L, L);
+    /// Returns the multiple of the unit tensor that s is at rest, N mm; q is its negative.
+    fn stress_at_rest<L: Lane>(constants: &[L; K]) -> L;
     /// Whether s is a multiple of the unit tensor, so that its other entries can be skipped.
     const ROUND: bool = false;
 }
@@ -123,6 +125,11 @@ impl Constitutive<2> for NeoHookean {
     fn moduli<L: Lane>(constants: &[L; 2]) -> (L, L) {
         (constants[0], constants[1])
     }
+
+    #[inline(always)]
+    fn stress_at_rest<L: Lane>(constants: &[L; 2]) -> L {
+        constants[0]
+    }
 }
 
 impl Constitutive<2> for StVenantKirchhoff {
@@ -143,6 +150,11 @@ impl Constitutive<2> for StVenantKirchhoff {
     #[inline(always)]
     fn moduli<L: Lane>(constants: &[L; 2]) -> (L, L) {
         (constants[0] + constants[1], L::splat(0.0))
+    }
+
+    #[inline(always)]
+    fn stress_at_rest<L: Lane>(_: &[L; 2]) -> L {
+        L::splat(0.0)
     }
 }
 
@@ -177,6 +189,11 @@ impl Constitutive<3> for MooneyRivlin {
     fn moduli<L: Lane>(constants: &[L; 3]) -> (L, L) {
         ((constants[0] + constants[1]) * L::splat(2.0), constants[2])
     }
+
+    #[inline(always)]
+    fn stress_at_rest<L: Lane>(constants: &[L; 3]) -> L {
+        (constants[0] + constants[1] + constants[1]) * L::splat(2.0)
+    }
 }
 
 impl Constitutive<5> for Ogden {
@@ -200,6 +217,11 @@ impl Constitutive<5> for Ogden {
         let half = L::splat(0.5);
         let term = |scale: L, alpha: L| scale * alpha * alpha * half;
         (term(constants[0], constants[1]) + term(constants[2], constants[3]), constants[4])
+    }
+
+    #[inline(always)]
+    fn stress_at_rest<L: Lane>(constants: &[L; 5]) -> L {
+        constants[0] * constants[1] + constants[2] * constants[3]
     }
 }
 

@@ -36,6 +36,7 @@
 //! so use a static solver.
 
 mod block;
+mod bound;
 pub mod choice;
 mod config;
 mod damping;

@@ -42,6 +42,9 @@ pub(crate) struct Nodes {
 #[derive(Clone, Copy)]
 pub(crate) struct Update {
     pub dt_ms: f32,
+    /// Time from the middle of the last substep to that of this one, over which forces change
+    /// velocities.
+    pub kick_ms: f32,
     pub damping_per_ms: f32,
     pub gravity: Vec3,
     pub max_speed: f32,
@@ -55,9 +58,24 @@ pub(crate) struct Update {
 impl Update {
     /// Factors on velocity, without unit, and on acceleration, ms.
     pub fn keep_and_gain(&self) -> [f32; 2] {
-        let half = 0.5 * self.damping_per_ms * self.dt_ms;
-        [(1.0 - half) / (1.0 + half), self.dt_ms / (1.0 + half)]
+        keep_and_gain(self.damping_per_ms, self.kick_ms)
     }
+}
+
+/// Time from the middle of the last substep to that of this one, ms; `last_ms` is 0 before the
+/// first one.
+///
+/// Central differences with a changing step need it (Belytschko, Liu and Moran 2000, chapter 6):
+/// if a step that is shortened while elements stiffen gave velocities its own length, every swing
+/// would gain energy.
+pub(crate) fn kick_ms(last_ms: f32, dt_ms: f32) -> f32 {
+    if last_ms > 0.0 { 0.5 * (last_ms + dt_ms) } else { dt_ms }
+}
+
+/// Factors on velocity, without unit, and on acceleration, ms, from the damping rate, 1/ms.
+pub(crate) fn keep_and_gain(damping_per_ms: f32, kick_ms: f32) -> [f32; 2] {
+    let half = 0.5 * damping_per_ms * kick_ms;
+    [(1.0 - half) / (1.0 + half), kick_ms / (1.0 + half)]
 }
 
 impl Nodes {

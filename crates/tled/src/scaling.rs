@@ -12,6 +12,8 @@ use trepan_soft::{Body, element_omega2};
 /// Factors on the density of every tetrahedron, and the added mass.
 pub(crate) struct Scaling {
     factors: Vec<f64>,
+    /// Largest ω² of an element after scaling, 1/ms².
+    pub stiffest: f64,
     /// Added mass, as a share of the body's mass.
     pub added: f64,
 }
@@ -21,10 +23,11 @@ impl Scaling {
     /// have the same stable step.
     pub fn of(body: &Body, most: f32) -> Self {
         let count = body.mesh.tets.len();
-        if most <= 0.0 {
-            return Self { factors: vec![1.0; count], added: 0.0 };
-        }
         let omega2: Vec<f64> = (0..count).map(|t| element_omega2(&body.shape(t), body.material(t))).collect();
+        let stiffest = omega2.iter().copied().fold(0.0, f64::max);
+        if most <= 0.0 {
+            return Self { factors: vec![1.0; count], stiffest, added: 0.0 };
+        }
         let mass = |t: usize| f64::from(body.material(t).density_g_mm3()) * body.mesh.volume_mm3(t);
         let total: f64 = (0..count).map(mass).sum();
         let mut stiffest_first: Vec<usize> = (0..count).collect();
@@ -42,7 +45,7 @@ impl Scaling {
         }
         let factors: Vec<f64> = omega2.iter().map(|w| (w / target).max(1.0)).collect();
         let added = (0..count).map(|t| mass(t) * (factors[t] - 1.0)).sum::<f64>() / total;
-        Self { factors, added }
+        Self { factors, stiffest: stiffest.min(target), added }
     }
 
     /// Factor on the density of a tetrahedron.

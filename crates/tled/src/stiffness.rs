@@ -5,7 +5,8 @@
 //! `A = Σ|S_ij| + (κ + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J̄-1)| √I₁`: the stress itself, the
 //! resistance to a change of volume, and its rotation. The largest eigenvalue of a symmetric 3×3
 //! matrix B is at most `m + 2 p`, `m = tr B/3`, `p² = |B - m I|²/6`, and exactly that when two are
-//! equal. The element's ω² at rest grows by `A/A(rest)`.
+//! equal. At rest S is `s I` and q is `-s`, so that `A(rest) = (3 + √3) |s| + κ + 5/3 μ`. The
+//! element's ω² at rest grows by `A/A(rest)`.
 //!
 //! # Practice
 //! About 50 operations an element. For Ogden's and Mooney-Rivlin's laws the second term is that of
@@ -26,6 +27,13 @@ pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &De
     let volume = kappa + L::splat(5.0 / 9.0) * mu * i1 * power;
     let turning = magnitude(stress.q + kappa * volume_change) * i1.sqrt();
     itself + volume * largest_eigenvalue(&d.c) + turning
+}
+
+/// The bound at rest times rest volume, from the multiple of the unit tensor that the isochoric
+/// stress is at rest.
+#[inline(always)]
+pub(crate) fn stiffness_at_rest<L: Lane>(stress: L, (mu, kappa): (L, L)) -> L {
+    L::splat(3.0 + 3f32.sqrt()) * magnitude(stress) + kappa + L::splat(5.0 / 3.0) * mu
 }
 
 /// Upper bound of the largest eigenvalue of `CᵀC`, C given by rows.
@@ -59,10 +67,31 @@ fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
 mod tests {
     use super::*;
     use crate::element::deformation;
-    use crate::law::{Constitutive, NeoHookean};
+    use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
     use glam::{DMat3, DVec3};
     use proptest::prelude::*;
     use trepan_soft::Law;
+
+    fn at_rest<M: Constitutive<K>, const K: usize>(law: Law) -> [f32; 2] {
+        let constants = M::constants(&law, 1.0);
+        let rest = deformation(&[[0.0; 3]; 3], &[[0.0; 3]; 3]);
+        let moduli = M::moduli(&constants);
+        let general = stiffness(&M::stress(&constants, &rest), moduli, &rest, 0.0);
+        [general, stiffness_at_rest(M::stress_at_rest(&constants), moduli)]
+    }
+
+    #[test]
+    fn the_bound_at_rest_is_the_general_one_without_displacement() {
+        let cases = [
+            at_rest::<NeoHookean, 2>(Law::NeoHookean(trepan_soft::NeoHookean { mu: 1.0, kappa: 9.0 })),
+            at_rest::<StVenantKirchhoff, 2>(Law::StVenantKirchhoff { lambda: 7.0, mu: 2.0 }),
+            at_rest::<MooneyRivlin, 3>(Law::MooneyRivlin { c10: 0.3, c01: 0.2, kappa: 9.0 }),
+            at_rest::<Ogden, 5>(Law::Ogden { mu: [0.8, 0.2], alpha: [-4.7, 2.0], kappa: 9.0 }),
+        ];
+        for [general, closed] in cases {
+            assert!((general / closed - 1.0).abs() < 1e-5, "{general} {closed}");
+        }
+    }
 
     proptest! {
         #[test]

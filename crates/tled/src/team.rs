@@ -140,7 +140,7 @@ impl Team {
     pub fn report(&self) -> PassReport {
         let add = |all: PassReport, part: &Mutex<Part>| {
             let report = lock(part).report;
-            PassReport { inverted: all.inverted + report.inverted, stiffest: all.stiffest.max(report.stiffest) }
+            PassReport { inverted: all.inverted + report.inverted, growth: all.growth.max(report.growth) }
         };
         self.shared.parts.iter().fold(PassReport::default(), add)
     }

@@ -1,15 +1,16 @@
 //! The CPU solver and the passes of its step.
 
+use crate::bound::Bound;
 use crate::config::{Config, Damping};
 use crate::elements::Elements;
 use crate::layout::Layout;
-use crate::nodes::{Nodes, Update};
+use crate::nodes::{Nodes, Update, kick_ms};
 use crate::part::CALM;
 use crate::scaling::Scaling;
 use trepan_geometry::Vec3;
 use trepan_soft::{
     Body, BodyError, FreeNode, Gain, ImplicitSprings, Loads, SoftSolver, StepReport, Stiffness, SurfacePressure,
-    lowest_frequency_of, power_bound_of_ms,
+    lowest_frequency_of,
 };
 
 /// Total Lagrangian explicit solver of one body.
@@ -24,15 +25,14 @@ pub struct Tled {
     /// Surface pressure, its triangles given by place.
     pressure: SurfacePressure,
     layout: Layout,
-    bound_ms: f32,
+    bound: Bound,
     pub(crate) damping_per_ms: f32,
     /// Lowest frequency of the body at rest or its estimate, rad/ms.
     pub(crate) lowest_per_ms: f32,
     mass_added: f32,
     max_displacement_mm: f32,
     pub(crate) supported: bool,
-    stiffest_at_rest: f32,
-    /// Time since the element forces were last computed, ms.
+    /// Length of the last substep, ms; 0 before the first one.
     elapsed_ms: f32,
     gravity: Vec3,
 }
@@ -69,9 +69,6 @@ impl Pass {
 pub(crate) const SUBSTEP_SAFETY: f32 = 0.95;
 /// Tolerance that keeps rounding from adding a substep.
 pub(crate) const NEARLY: f32 = 1.0 - 1e-5;
-/// Largest considered growth of the stiffest element's frequency; worse states are recovering from
-/// inversion.
-pub(crate) const MAX_STIFFENING: f32 = 64.0;
 
 impl Tled {
     /// Creates a solver for a body at rest: orders it for the cache, precomputes gradients, finds
@@ -85,10 +82,9 @@ impl Tled {
         let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
         let lowest_per_ms = lowest_per_ms(body, config.damping, &stiffness);
         let nodes = Nodes::of(body, &layout, stiffness.masses_g());
-        let mut elements = Elements::of(body, &layout, &scaling, nodes, config);
+        let elements = Elements::of(body, &layout, &scaling, nodes, config);
         Ok(Self {
             config: *config,
-            stiffest_at_rest: elements.compute(0.0).stiffest,
             elapsed_ms: 0.0,
             gravity: Vec3::ZERO,
             elements,
@@ -97,7 +93,7 @@ impl Tled {
             velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
             springs: ImplicitSprings::on_nodes(body.mesh.positions.len()),
             pressure: SurfacePressure::default(),
-            bound_ms: power_bound_of_ms(body, &stiffness) as f32,
+            bound: Bound::of(body, &stiffness, &scaling),
             damping_per_ms: damping_rate(config.damping, lowest_per_ms),
             lowest_per_ms,
             mass_added: scaling.added as f32,
@@ -109,7 +105,7 @@ impl Tled {
 
     /// Stable (critical) time step without safety factor, ms.
     pub fn bound_ms(&self) -> f32 {
-        self.bound_ms
+        self.bound.at_rest_ms
     }
 
     /// Mass-proportional damping α in use, 1/ms.
@@ -188,7 +184,7 @@ impl Tled {
         }
         let pass = self.elements.compute(self.elapsed_ms);
         report.inverted = report.inverted.max(pass.inverted);
-        let bound_ms = self.bound_now_ms(pass.stiffest);
+        let bound_ms = self.bound.deformed_ms(pass.growth);
         let longest = self.stable_dt_ms().min(SUBSTEP_SAFETY * bound_ms);
         let dt_ms =
             if self.config.substeps == 0 { left_ms } else { left_ms / (left_ms / longest * NEARLY).ceil().max(1.0) };
@@ -204,6 +200,7 @@ impl Tled {
         let rigid = (!self.supported && self.damping_per_ms > 0.0).then(|| self.elements.nodes().rigid_motion());
         Update {
             dt_ms,
+            kick_ms: kick_ms(self.elapsed_ms, dt_ms),
             damping_per_ms: self.damping_per_ms,
             gravity: loads.gravity - self.config.balanced_gravity,
             max_speed: self.config.max_speed,
@@ -244,13 +241,6 @@ impl Tled {
         }
     }
 
-    /// Stable time step of the deformed body, ms: that of the rest state, shortened by the stiffest
-    /// element's growth in frequency.
-    fn bound_now_ms(&self, stiffest: f32) -> f32 {
-        let gained = (stiffest / self.stiffest_at_rest).sqrt();
-        self.bound_ms / gained.clamp(1.0, MAX_STIFFENING)
-    }
-
     fn press(&mut self, loads: &Loads, update: &Update, report: &mut StepReport) {
         let (elements, place_of) = (&self.elements, &self.layout.place_of);
         let nodes = elements.nodes();
@@ -286,7 +276,7 @@ impl SoftSolver for Tled {
     }
 
     fn stable_dt_ms(&self) -> f32 {
-        self.config.safety * self.bound_ms
+        self.config.safety * self.bound.at_rest_ms
     }
 }
 

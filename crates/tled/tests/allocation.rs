@@ -59,6 +59,6 @@ fn a_step_never_allocates() {
         // Other threads: the worker's start, whenever that is, and the test harness; not 900
         // substeps.
         assert!(ALLOCATIONS.load(Ordering::Relaxed) - before < 100, "a worker allocated");
-        assert_eq!(report.substeps, 3);
+        assert!(report.substeps >= 3, "{}", report.substeps);
     }
 }

@@ -209,6 +209,25 @@ fn without_damping_energy_is_kept() {
 }
 
 #[test]
+fn steps_that_change_in_time_with_a_swing_do_not_drive_it() {
+    let body = block([2, 2, 2], Vec3::splat(20.0), |p| p.z < 1.0);
+    let mut tled = Tled::new(&body, &Config { damping: Damping::None, substeps: 0, ..Config::default() }).unwrap();
+    let top = boxes::nodes_where(&body.mesh, |p| p.z > 19.0)[0] as usize;
+    let frequency = trepan_soft::lowest_frequency(&body).unwrap() as f32;
+    for (n, at) in body.mesh.positions.iter().enumerate().filter(|(_, at)| at.z > 1.0) {
+        tled.set_node(n as u32, Vec3::ZERO, Vec3::X * (2e-3 * at.z / 20.0));
+    }
+    let (start, mut most) = (kinetic_energy(&body, tled.velocities()), 0.0f64);
+    for _ in 0..20_000 {
+        let (u, v) = ((tled.positions()[top] - body.mesh.positions[top]).x, tled.velocities()[top].x);
+        let share = if u.abs() * frequency < v.abs() { 0.1 } else { 0.5 };
+        tled.step(&Loads::default(), share * tled.bound_ms());
+        most = most.max(kinetic_energy(&body, tled.velocities()));
+    }
+    assert!(most < 1.1 * start, "{start} {most}");
+}
+
+#[test]
 fn damping_stops_the_wobble_of_a_free_body_and_not_its_flight() {
     let body = block([3, 4, 5], Vec3::new(30.0, 40.0, 50.0), |_| false);
     let mut tled = Tled::new(&body, &Config::default()).unwrap();

@@ -35,7 +35,7 @@ pub(crate) struct DeviceState {
     /// By place: 1/m, 1/g; the share of m that has weight; 1 where a spring pushes.
     pub nodes: Buffer<[f32; 4]>,
     /// By place, since it was cleared: inverted elements, times limited, times not finite, bits of
-    /// the largest ω².
+    /// the largest growth of ω².
     pub noticed: Buffer<[u32; 4]>,
     /// 1/m by place on this side.
     pub inverse_mass: Vec<f32>,

@@ -48,11 +48,13 @@ mod topology;
 mod update;
 mod volumes;
 
+use crate::bound::Bound;
 use crate::config::Config;
 use crate::layout::Layout;
 use crate::node_groups::NodeGroups;
+use crate::nodes::{keep_and_gain, kick_ms};
 use crate::scaling::Scaling;
-use crate::tled::{MAX_STIFFENING, NEARLY, SUBSTEP_SAFETY, damping_rate, lowest_per_ms};
+use crate::tled::{NEARLY, SUBSTEP_SAFETY, damping_rate, lowest_per_ms};
 use device_state::{DeviceState, Step};
 use forces::Forces;
 use press::Press;
@@ -60,7 +62,7 @@ use topology::Topology;
 use trepan_contact::PlaneContact;
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError};
-use trepan_soft::{Body, BodyError, Loads, SoftSolver, StepReport, Stiffness, power_bound_of_ms};
+use trepan_soft::{Body, BodyError, Loads, SoftSolver, StepReport, Stiffness};
 use update::Update;
 use volumes::Volumes;
 
@@ -101,15 +103,15 @@ pub struct GpuTled {
     rest: Vec<Vec3>,
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
-    bound_ms: f32,
+    bound: Bound,
     damping_per_ms: f32,
     max_displacement_mm: f32,
     elements: u32,
     node_groups: u32,
-    /// Since forces were computed last, ms.
+    /// Length of the last step, ms; 0 before the first one.
     elapsed_ms: f32,
-    stiffest_at_rest: f32,
-    stiffest: f32,
+    /// Largest growth of an element's ω² between the last two reads, 1/ms².
+    growth: f32,
     submitted: u32,
     fault: Option<GpuError>,
 }
@@ -131,7 +133,6 @@ impl GpuTled {
         let forces = Forces::new(gpu, (body, &layout, &scaling), config, &state, &topology)?;
         let volumes = || Volumes::new(gpu, (body, &layout, &node_groups), &state, &topology, &forces);
         let press = Press::new(gpu, &state, &topology, &forces)?;
-        let stiffest = stiffest(body, &scaling);
         Ok(Self {
             volumes: averages.then(volumes).transpose()?,
             update: Update::new(gpu, &state, &topology, &forces, &press)?,
@@ -140,13 +141,12 @@ impl GpuTled {
             rest: body.mesh.positions.clone(),
             positions: body.mesh.positions.clone(),
             velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
-            bound_ms: power_bound_of_ms(body, &stiffness) as f32,
+            bound: Bound::of(body, &stiffness, &scaling),
             max_displacement_mm: config.max_displacement * extent,
             elements: body.mesh.tets.len() as u32,
             node_groups: node_groups.place_of.len() as u32,
             elapsed_ms: 0.0,
-            stiffest_at_rest: stiffest,
-            stiffest,
+            growth: 0.0,
             submitted: 0,
             fault: None,
             damping_per_ms,
@@ -176,7 +176,7 @@ impl GpuTled {
             self.velocities[node as usize] = Vec3::from_slice(&v[place]);
         }
         if self.submitted > 0 {
-            self.stiffest = noticed.iter().map(|n| f32::from_bits(n[3])).fold(0.0, f32::max);
+            self.growth = noticed.iter().map(|n| f32::from_bits(n[3])).fold(0.0, f32::max);
             self.state.noticed.write(&self.gpu, 0, &vec![[0; 4]; noticed.len()]);
         }
         let sum = |k: usize| noticed.iter().map(|n| n[k]).sum();
@@ -199,29 +199,30 @@ impl GpuTled {
 
     /// Length of a step that is just stable at rest, ms, without any margin.
     pub fn bound_ms(&self) -> f32 {
-        self.bound_ms
+        self.bound.at_rest_ms
     }
 
     /// The stable bound as the elements were at the last read.
     fn bound_now_ms(&self) -> f32 {
-        self.bound_ms / (self.stiffest / self.stiffest_at_rest).sqrt().clamp(1.0, MAX_STIFFENING)
+        self.bound.deformed_ms(self.growth)
     }
 
     fn longest_ms(&self) -> f32 {
         self.stable_dt_ms().min(SUBSTEP_SAFETY * self.bound_now_ms())
     }
 
-    /// The first of the steps lets past stress fade for as long as the last step took, where that
-    /// was another length.
+    /// Where the last step had another length, the first of these lets past stress fade for as long
+    /// as that, and changes velocities from the middle of that step on.
     fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
         let mut step = self.numbers(loads, dt_ms);
         let presses = step.springs + step.planes > 0;
         if !presses {
             self.press.pressure.write(&self.gpu, 0, &[0.0]);
         }
-        let first = u32::from(self.elapsed_ms != dt_ms && !self.config.relaxation.is_none()).min(count);
+        let first = u32::from(self.elapsed_ms != dt_ms).min(count);
         for (elapsed_ms, count) in [(self.elapsed_ms, first), (dt_ms, count - first)] {
             let [one, two] = self.config.relaxation.fade(elapsed_ms);
+            [step.keep, step.gain] = keep_and_gain(self.damping_per_ms, kick_ms(elapsed_ms, dt_ms));
             (step.fade_keep, step.fade_gain) = ([one.keep, two.keep], [one.gain, two.gain]);
             self.state.step.write(&self.gpu, 0, &[step]);
             self.run(count, presses);
@@ -257,13 +258,10 @@ impl GpuTled {
 
     /// The uniform of a step; hands the springs over.
     fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> Step {
-        let half = 0.5 * self.damping_per_ms * dt_ms;
         let (springs, planes) = self.hand_over(loads);
         Step {
             gravity: (loads.gravity - self.config.balanced_gravity).to_array(),
             dt: dt_ms,
-            keep: (1.0 - half) / (1.0 + half),
-            gain: dt_ms / (1.0 + half),
             max_speed: self.config.max_speed,
             max_displacement: self.max_displacement_mm,
             springs,
@@ -324,7 +322,7 @@ impl SoftSolver for GpuTled {
     }
 
     fn stable_dt_ms(&self) -> f32 {
-        self.config.safety * self.bound_ms
+        self.config.safety * self.bound.at_rest_ms
     }
 }
 
@@ -338,12 +336,6 @@ fn refuse(body: &Body, config: &Config, damping_per_ms: f32) -> Result<(), GpuTl
         return Err(GpuTledError::Unsupported { field: "damping", right });
     }
     Ok(())
-}
-
-/// Largest ω² of an element at rest, 1/ms².
-fn stiffest(body: &Body, scaling: &Scaling) -> f32 {
-    let of = |t: usize| trepan_soft::element_omega2(&body.shape(t), body.material(t)) / scaling.factor(t as u32);
-    (0..body.mesh.tets.len()).map(of).fold(0.0, f64::max) as f32
 }
 
 /// Refuses more workgroups than the device runs at once.
