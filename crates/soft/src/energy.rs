@@ -2,12 +2,16 @@
 //!
 //! # Theory
 //! ```text
-//! W(F) = μ/2 (g(J) I₁ - 3) + κ/2 (J-1)²      g(J) = J^(-2/3) for J ≥ J₀, its tangent line below
-//! P    = ∂W/∂F = μ g F + q C                   q = μ/2 g' I₁ + κ (J-1),   C = cof F = ∂J/∂F
+//! W(F) = μ/2 (g(J) I₁ - 3) + κ U(J)      g(J) = J^(-2/3) for J ≥ J₀, its tangent line below
+//! P    = ∂W/∂F = μ g F + q C             q = μ/2 g' I₁ + κ U',   C = cof F = ∂J/∂F
+//! U'   = J - 1 - s²                      s = (J₀ - J)/J₀ between 0 and 1
 //! ```
 //! With `g = J^(-2/3)` throughout, W is infinite at J = 0 and undefined beyond. Continued linearly
 //! below `J₀ = 0.3` it stays once differentiable, and its force always pushes J back towards 1: an
-//! inverted element heals by itself.
+//! inverted element heals by itself. That line has no wall at J = 0, which the law itself has, so
+//! `s²` stands in for it: a pressure up to κ, from J₀ down to 0 and constant beyond. It acts along
+//! C alone. A steeper g would pull an inverted element towards F = 0, and a body turned inside out
+//! would not come back.
 //!
 //! # Sources
 //! The split energy is the one of Miller, Joldes, Lance and Wittek 2007 (TLED); continuing an
@@ -15,8 +19,8 @@
 
 use glam::{DMat3, DVec3};
 
-/// Below this volume ratio the isochoric factor continues along its tangent line. With 0.1 fewer
-/// elements invert under a probe, but a block turned inside out as a whole no longer heals.
+/// Volume ratio below which the isochoric factor continues along its tangent line, and pressure
+/// beyond the law's resists.
 pub const FADE_BELOW: f64 = 0.3;
 
 /// The compressible neo-Hookean law.
@@ -33,7 +37,7 @@ impl NeoHookean {
     pub fn energy(&self, f: DMat3) -> f64 {
         let j = f.determinant();
         let [g, ..] = isochoric(j);
-        0.5 * self.mu * (g * squared(f) - 3.0) + 0.5 * self.kappa * (j - 1.0).powi(2)
+        0.5 * self.mu * (g * squared(f) - 3.0) + self.kappa * volumetric(j)[0]
     }
 
     /// First Piola-Kirchhoff stress P, MPa.
@@ -49,12 +53,12 @@ impl NeoHookean {
         let [g, dg, ddg] = isochoric(j);
         let c = cofactor(f);
         let (fd, cd) = (dot(f, df), dot(c, df));
-        let along_c = self.mu * dg * fd + (0.5 * self.mu * ddg * squared(f) + self.kappa) * cd;
+        let along_c = self.mu * dg * fd + (0.5 * self.mu * ddg * squared(f) + self.kappa * volumetric(j)[2]) * cd;
         df * (self.mu * g) + f * (self.mu * dg * cd) + c * along_c + cofactor_change(f, df) * self.volumetric(f, j, dg)
     }
 
     fn volumetric(&self, f: DMat3, j: f64, dg: f64) -> f64 {
-        0.5 * self.mu * dg * squared(f) + self.kappa * (j - 1.0)
+        0.5 * self.mu * dg * squared(f) + self.kappa * volumetric(j)[1]
     }
 }
 
@@ -69,6 +73,14 @@ pub(crate) fn power(j: f64, n: f64) -> [f64; 3] {
     let g = at.powf(n);
     let dg = n * g / at;
     if j < FADE_BELOW { [g + dg * (j - at), dg, 0.0] } else { [g, dg, n * (n - 1.0) * g / (at * at)] }
+}
+
+/// Energy U of a change of volume for κ = 1, with its first two derivatives.
+pub(crate) fn volumetric(j: f64) -> [f64; 3] {
+    let short = ((FADE_BELOW - j) / FADE_BELOW).clamp(0.0, 1.0);
+    let wall = FADE_BELOW / 3.0 * short.powi(3) - j.min(0.0);
+    let change = if j > 0.0 { 2.0 * short / FADE_BELOW } else { 0.0 };
+    [0.5 * (j - 1.0).powi(2) + wall, j - 1.0 - short * short, 1.0 + change]
 }
 
 /// Cofactor matrix, the gradient of the determinant: `cof F = J F⁻ᵀ`, defined for singular F too.
@@ -106,7 +118,7 @@ mod tests {
             entries in proptest::array::uniform9(-1.5f64..1.5), change in proptest::array::uniform9(-1.0f64..1.0),
         ) {
             let (f, df) = (DMat3::from_cols_array(&entries), DMat3::from_cols_array(&change));
-            prop_assume!((f.determinant() - FADE_BELOW).abs() > 1e-3);
+            prop_assume!([FADE_BELOW, 0.0].iter().all(|at| (f.determinant() - at).abs() > 1e-3));
             let h = 1e-6;
             let slope = (LAW.energy(f + df * h) - LAW.energy(f - df * h)) / (2.0 * h);
             prop_assert!((slope - dot(LAW.stress(f), df)).abs() < 1e-4 * (1.0 + slope.abs()));

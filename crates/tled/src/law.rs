@@ -1,7 +1,7 @@
 //! Constitutive laws of the kernels, in f32, for one element or several at once.
 //!
 //! # Theory
-//! Every law is written as `P = F S + (q_iso + κ (J-1)) cof F`, S a symmetric tensor:
+//! Every law is written as `P = F S + (q_iso + κ (J - 1 - s²)) cof F`, S a symmetric tensor:
 //! ```text
 //! neo-Hookean          S = μ g I                                     q_iso = μ/2 g' I₁
 //! St. Venant-Kirchhoff S = (λ tr E - μ) I + μ FᵀF                    q_iso = 0, no κ term
@@ -9,11 +9,12 @@
 //! Ogden                S = Σ_i s_i n_i n_iᵀ, s_i = Σ_p μ_p'/α_p g_p λ_i^(α_p-2)   (μ' = 2 μ)
 //! ```
 //! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3 as in
-//! `trepan_soft::Law`, the f64 version of this file.
+//! `trepan_soft::Law`, the f64 version of this file. There `s` has its reasons: it is `(0.3 - J)/0.3`
+//! between 0 and 1.
 
 use crate::lane::Lane;
 use crate::principal::principal;
-use trepan_soft::{LEAST_STRETCH, Law};
+use trepan_soft::{FADE_BELOW, LEAST_STRETCH, Law};
 
 /// Deformation of an element as the laws need it.
 pub(crate) struct Deformation<L> {
@@ -64,6 +65,13 @@ impl<L: Lane> Deformation<L> {
         let inverse = self.root * self.root * self.root;
         let slope = n * at * inverse;
         (at + slope * (self.j - self.clamped), slope)
+    }
+
+    /// How short of the volume ratio 0.3 the element is, as a share of it, up to 1.
+    #[inline(always)]
+    pub fn short(&self) -> L {
+        let share = (self.clamped - self.j) * L::splat((1.0 / FADE_BELOW) as f32);
+        share - (share - L::splat(1.0)).at_least(0.0)
     }
 
     /// FᵀF.
