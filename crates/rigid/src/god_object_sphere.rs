@@ -74,6 +74,9 @@ const MARGIN: f32 = 0.2;
 /// times the sum of what the walls push exceeds the pull of the hand. 0.4 is between walls less
 /// than 47 degrees apart.
 const JAM: f32 = 0.4;
+/// Overlap of a jammed burr at rest relative to one at work, so that it leaves the bore that it came
+/// in by.
+const RESTING_SLOP: f32 = 1.5;
 /// Growing may move a ball by so many times its growth.
 const PUSHED: f32 = 2.4;
 /// A shaft this far in bone gives way, voxels.
@@ -270,7 +273,8 @@ impl GodObjectSphere {
     fn shrink(&mut self, bone: &BoneVolume, dt_ms: f32) {
         let radius = self.tool.tip_radius_mm;
         let (least, rate) = if self.jammed {
-            let slop = self.config.slop_voxels * bone.spacing_mm();
+            let share = if self.works { 1.0 } else { RESTING_SLOP };
+            let slop = share * self.config.slop_voxels * bone.spacing_mm();
             ((radius - slop).max(0.5 * radius), self.config.yield_mm_per_ms)
         } else {
             (radius - self.bite_mm(bone), self.config.fit_mm_per_ms)

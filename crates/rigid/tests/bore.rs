@@ -105,3 +105,44 @@ fn letting_the_pedal_go_and_drawing_the_burr_out_of_its_bore_is_smooth() {
         }
     }
 }
+
+/// Drills with a hand that leans on its drill by 1.5 N/mm and falls through; gives the force, N,
+/// that holds the burr back on its way out, the pedal up.
+fn fall_through(inward: Vec3, drill_ms: usize) -> f32 {
+    const DEEPEST: f32 = 6.5;
+    let bone = skull(inward);
+    let mut contact = Method::RECOMMENDED.build(&Tool::burr(RADIUS_MM));
+    let mut out = RigidStep::default();
+    // Depth, mm, and speed, mm/ms, of a hand of 250 g, with 8 N s/m of damping.
+    let (mut depth, mut speed, mut drag) = (-4.0f32, 0.0f32, 0.0f32);
+    contact.reset(Pose::from_translation(depth * inward));
+    for tick in 0..drill_ms + 3000 {
+        let pedal = tick < drill_ms + 300;
+        let meant = match pedal {
+            true => -4.0 + (DEEPEST + 4.0) * reach((tick as f32 / drill_ms as f32).min(1.0)),
+            false => DEEPEST - 0.01 * (tick - drill_ms - 300) as f32,
+        };
+        contact.step(&bone, &ToolState::at(Pose::from_translation(depth * inward)), pedal, 1.0, &mut out);
+        let force_n = (STIFFNESS * out.manifold.depth_mm).min(3.3) * out.manifold.normal.dot(inward);
+        let push_n = 1.5 * (meant - depth) - 8.0 * speed + force_n;
+        speed += push_n / 250.0;
+        depth += speed;
+        if !pedal {
+            drag = drag.max(force_n);
+        }
+    }
+    drag
+}
+
+#[test]
+fn a_burr_that_fell_through_comes_out_again() {
+    let mut axes = directions(5);
+    axes.extend([Vec3::NEG_Z, Vec3::new(-0.36, -0.48, -0.8)]);
+    for inward in axes {
+        for drill_ms in [1500, 3000, 4500] {
+            let drag = fall_through(inward, drill_ms);
+            println!("inward {inward} in {drill_ms} ms: {drag}");
+            assert!(drag < 1.0, "inward {inward} in {drill_ms} ms: {drag} N");
+        }
+    }
+}
