@@ -150,11 +150,21 @@ pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Pa
     path
 }
 
+/// Bone that the usual share of the time is enough for, mm; thicker bone gets more.
+const USUAL_BONE_MM: f32 = 7.0;
+
+impl Site {
+    /// Time for drilling here relative to bone of up to 7 mm.
+    pub fn drilling_share(&self) -> f64 {
+        f64::from((self.bone_mm / USUAL_BONE_MM).max(1.0))
+    }
+}
+
 fn craniotomy(site: &Site, plan: &Plan) -> Vec<Move> {
     let depth_mm = plan.burr_depth_mm(site);
     vec![
         Move("approach with the burr", 8.0, -plan.burr_radius_mm - 1.0, HANDS_OFF),
-        Move("drill", 43.0, depth_mm, Buttons::PEDAL),
+        Move("drill", 43.0 * site.drilling_share(), depth_mm, Buttons::PEDAL),
         Move("clean the hole", 2.0, depth_mm, Buttons::PEDAL),
         Move("retreat", 7.0, -plan.away_mm, HANDS_OFF),
     ]

@@ -35,7 +35,7 @@ const PRESSED_N: f32 = 0.5;
 pub struct Task {
     /// Name of the script.
     pub script: &'static str,
-    /// Its length, ms.
+    /// Its length in bone of up to 7 mm, ms.
     pub milliseconds: u64,
 }
 
@@ -82,7 +82,9 @@ pub struct Ride {
 pub fn ride(session: &Session, task: Task) -> Result<Ride> {
     let site = session.scene().site;
     let plan = Plan { presses_mm: PRESSES_MM, outline: session.plan().outline.clone(), ..Plan::default() };
-    let path = Script::planned(task.script, &site, task.milliseconds as f64, &plan)?;
+    // Drilling takes 43 % of it; thicker bone takes longer.
+    let milliseconds = (task.milliseconds as f64 * (0.57 + 0.43 * site.drilling_share())) as u64;
+    let path = Script::planned(task.script, &site, milliseconds as f64, &plan)?;
     let stages = session.stages(path.at(0.0), &trepan_deformable::Config::default())?;
     let device = Simulated::new(Config::TOUCH, SURGEON, Box::new(path));
     let mut ride = Ride {
@@ -91,7 +93,7 @@ pub fn ride(session: &Session, task: Task) -> Result<Ride> {
         brain_mm: site.brain_mm,
         ..Ride::default()
     };
-    operate(stages, Box::new(device), task.milliseconds, &mut ride).context("the program has tissue")?;
+    operate(stages, Box::new(device), milliseconds, &mut ride).context("the program has tissue")?;
     Ok(ride)
 }
 
