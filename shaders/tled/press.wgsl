@@ -2,7 +2,7 @@
 // velocities v that nodes would have without the springs to come: d = d_rest + Σ w u·n    p =
 // max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + gain (k dt + b) Σ w²/m)) What slides across the
 // normal of a pressing spring is damped, node by node. Planes, springs of one node each and no two
-// of the same, follow side by side.
+// of the same, follow side by side; they damp sliding as they damp the normal velocity.
 struct Spring {
     // Unit vector out of the tissue.
     normal: vec3f,
@@ -98,10 +98,12 @@ fn free_velocity(at: vec4u) -> vec3f {
         let plane = springs[s];
         let at = touched[plane.first];
         let depth = plane.rest_depth + dot(u[at.x].xyz, plane.normal);
-        let coming = dot(free_velocity(at), plane.normal);
+        let velocity = free_velocity(at);
+        let coming = dot(velocity, plane.normal);
         let force = pressed(plane, depth, coming);
         of_planes += force;
-        pushed[at.x] -= vec4f(plane.normal * force, 0.0);
+        let brake = select(0.0, plane.damping / (1.0 + now.gain * bitcast<f32>(at.z) * plane.damping), depth > 0.0);
+        pushed[at.x] -= vec4f(plane.normal * force + (velocity - plane.normal * coming) * brake, 0.0);
     }
     sums[lane] = vec2f(of_planes, 0.0);
     workgroupBarrier();

@@ -25,7 +25,7 @@ pub struct PlaneContact {
     pub offset_mm: f32,
     /// Spring stiffness k, N/mm.
     pub stiffness: f32,
-    /// Damping b against the normal velocity, N ms/mm.
+    /// Damping b, N ms/mm, of the normal velocity while the node presses, and of sliding.
     pub damping: f32,
 }
 
@@ -42,7 +42,7 @@ impl From<PlaneContact> for NodalContact {
         let PlaneContact { node, normal, offset_mm, stiffness, damping } = plane;
         let mut spring = Self::none();
         (spring.normal, spring.offset_mm) = (normal, offset_mm);
-        (spring.stiffness, spring.damping) = (stiffness, damping);
+        (spring.stiffness, spring.damping, spring.lateral_damping) = (stiffness, damping, damping);
         spring.add(node, 1.0);
         spring
     }
