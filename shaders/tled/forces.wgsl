@@ -1,5 +1,5 @@
 // Forces of the elements of one law on their four nodes, each to its own slot.
-//   P = F S + (q + κ (J̄ - 1 - s²)) C    f_a = -V P ∇N_a    s = (0.3 - J)/0.3 between 0 and 1
+//   P = F S + (q + κ (J̄ - 1 - w²)) C    f_a = -V P ∇N_a    w = (0.3 - J)/0.3 between 0 and 1
 // J̄ = J, or the mean of the corners' node groups with averaged pressure. The slot of corner 0 also
 // carries the growth of the element's ω² since rest, negative where J ≤ 0.
 struct Range { first: u32, count: u32 }
@@ -23,7 +23,7 @@ fn continued(d: Deformation, at: f32, n: f32) -> vec2f {
     return vec2f(at + slope * (d.j - d.clamped), slope);
 }
 
-// s: how short of the volume ratio 0.3 the element is.
+// w: how short of the volume ratio 0.3 the element is.
 fn short_of(d: Deformation) -> f32 {
     return min((d.clamped - d.j) * (1.0 / 0.3), 1.0);
 }

@@ -74,8 +74,7 @@ const MARGIN: f32 = 0.2;
 /// times the sum of what the walls push exceeds the pull of the hand. 0.4 is between walls less
 /// than 47 degrees apart.
 const JAM: f32 = 0.4;
-/// Overlap of a jammed burr at rest relative to one at work, so that it leaves the bore that it came
-/// in by.
+/// Overlap of a jammed burr at rest relative to one at work: it leaves the bore that it came in by.
 const RESTING_SLOP: f32 = 1.5;
 /// Growing may move a ball by so many times its growth.
 const PUSHED: f32 = 2.4;

@@ -106,8 +106,8 @@ fn letting_the_pedal_go_and_drawing_the_burr_out_of_its_bore_is_smooth() {
     }
 }
 
-/// Drills with a hand that leans on its drill by 1.5 N/mm and falls through; gives the force, N,
-/// that holds the burr back on its way out, the pedal up.
+/// Drills with a hand that leans on its drill by 1.5 N/mm and falls through. Gives the force that
+/// holds the burr back on its way out, the pedal up, N.
 fn fall_through(inward: Vec3, drill_ms: usize) -> f32 {
     const DEEPEST: f32 = 6.5;
     let bone = skull(inward);

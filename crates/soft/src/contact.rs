@@ -20,8 +20,9 @@
 //! A spring's damping across its normal is taken implicitly too, node by node, because a contact
 //! that is found anew every millisecond follows a node's sliding late, and what is late drives
 //! light nodes: on a curved wall the normal of a pressed node turns a millisecond after it slid.
-//! Planes damp across their normal as they do along it. It changes no rest. Springs with it are stable by themselves; beside springs of
-//! thousands of N/mm with other normals on the same nodes they are not, near the stable step.
+//! Planes damp across their normal as they do along it. It changes no rest. Springs with it are
+//! stable by themselves; beside springs of thousands of N/mm with other normals on the same nodes
+//! they are not, near the stable step.
 //!
 //! # Practice
 //! 10 ns for each node of each spring. Nodes outside the mesh are left out.

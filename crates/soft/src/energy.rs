@@ -4,12 +4,12 @@
 //! ```text
 //! W(F) = μ/2 (g(J) I₁ - 3) + κ U(J)      g(J) = J^(-2/3) for J ≥ J₀, its tangent line below
 //! P    = ∂W/∂F = μ g F + q C             q = μ/2 g' I₁ + κ U',   C = cof F = ∂J/∂F
-//! U'   = J - 1 - s²                      s = (J₀ - J)/J₀ between 0 and 1
+//! U'   = J - 1 - w²                      w = (J₀ - J)/J₀ between 0 and 1
 //! ```
 //! With `g = J^(-2/3)` throughout, W is infinite at J = 0 and undefined beyond. Continued linearly
 //! below `J₀ = 0.3` it stays once differentiable, and its force always pushes J back towards 1: an
 //! inverted element heals by itself. That line has no wall at J = 0, which the law itself has, so
-//! `s²` stands in for it: a pressure up to κ, from J₀ down to 0 and constant beyond. It acts along
+//! `w²` stands in for it: a pressure up to κ, from J₀ down to 0 and constant beyond. It acts along
 //! C alone. A steeper g would pull an inverted element towards F = 0, and a body turned inside out
 //! would not come back.
 //!

@@ -9,8 +9,8 @@
 //! Ogden                   W = Σ_p 2 μ_p/α_p² (Σ_i (J^(-1/3) λ_i)^α_p - 3) + κ U(J)
 //! ```
 //! λ_i² are the eigenvalues of FᵀF, U is `(J-1)²/2` with a wall below 0.3 (see `energy.rs`). Powers
-//! of J continue linearly below 0.3 ([`crate::FADE_BELOW`]), principal stretches stop at 0.1, so that every energy is finite for
-//! every F.
+//! of J continue linearly below 0.3 ([`crate::FADE_BELOW`]), principal stretches stop at 0.1, so
+//! that every energy is finite for every F.
 
 use crate::energy::{NeoHookean, cofactor, cofactor_change, dot, power, squared, volumetric};
 use glam::{DMat3, DVec3};

@@ -3,7 +3,7 @@
 //! # Theory
 //! ```text
 //! H = Σ_a (u_a - u_0) ⊗ ∇N_a, a = 1..3     F = I + H     C = cof F     J = det F
-//! P = F S + (q + κ (J̄ - 1 - s²)) C        f_a = -V P ∇N_a, a = 1..3        f_0 = -(f_1 + f_2 + f_3)
+//! P = F S + (q + κ (J̄ - 1 - w²)) C     f_a = -V P ∇N_a, a = 1..3     f_0 = -(f_1 + f_2 + f_3)
 //! ```
 //! S and q come from the material. J̄ is J, or with averaged pressure the mean volume ratio of the
 //! corners' node groups.

@@ -1,16 +1,15 @@
 //! Constitutive laws of the kernels, in f32, for one element or several at once.
 //!
 //! # Theory
-//! Every law is written as `P = F S + (q_iso + κ (J - 1 - s²)) cof F`, S a symmetric tensor:
+//! Every law is written as `P = F S + (q_iso + κ (J - 1 - w²)) cof F`, S a symmetric tensor:
 //! ```text
 //! neo-Hookean          S = μ g I                                     q_iso = μ/2 g' I₁
 //! St. Venant-Kirchhoff S = (λ tr E - μ) I + μ FᵀF                    q_iso = 0, no κ term
 //! Mooney-Rivlin        S = (2 c₁₀ g + 2 c₀₁ h I₁) I - 2 c₀₁ h FᵀF    q_iso = c₁₀ g' I₁ + c₀₁ h' I₂
 //! Ogden                S = Σ_i s_i n_i n_iᵀ, s_i = Σ_p μ_p'/α_p g_p λ_i^(α_p-2)   (μ' = 2 μ)
 //! ```
-//! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3 as in
-//! `trepan_soft::Law`, the f64 version of this file. There `s` has its reasons: it is `(0.3 - J)/0.3`
-//! between 0 and 1.
+//! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3;
+//! `w = (0.3 - J)/0.3` between 0 and 1. Why, says `trepan_soft::Law`, the f64 version of this file.
 
 use crate::lane::Lane;
 use crate::principal::principal;

@@ -1,12 +1,12 @@
 //! Bound on the stiffness of a deformed element, from which the stable step is updated.
 //!
 //! # Theory
-//! The tangent `∂P/∂F` of `P = F S + (q + κ (J̄-1)) C` is at most
-//! `A = Σ|S_ij| + (κ (1 + 2 s/0.3) + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J̄-1-s²)| √I₁`: the
-//! stress itself, the resistance to a change of volume, and its rotation. The largest eigenvalue of a symmetric 3×3
-//! matrix B is at most `m + 2 p`, `m = tr B/3`, `p² = |B - m I|²/6`, and exactly that when two are
-//! equal. At rest S is `s I` and q is `-s`, so that `A(rest) = (3 + √3) |s| + κ + 5/3 μ`. The
-//! element's ω² at rest grows by `A/A(rest)`.
+//! The tangent `∂P/∂F` of `P = F S + (q + κ (J̄-1-w²)) C` is at most
+//! `A = Σ|S_ij| + (κ (1 + 2 w/0.3) + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J̄-1-w²)| √I₁`: the
+//! stress itself, the resistance to a change of volume, and its rotation. The largest eigenvalue of
+//! a symmetric 3×3 matrix B is at most `m + 2 p`, `m = tr B/3`, `p² = |B - m I|²/6`, and exactly
+//! that when two are equal. At rest S is `s I` and q is `-s`, so that
+//! `A(rest) = (3 + √3) |s| + κ + 5/3 μ`. The element's ω² at rest grows by `A/A(rest)`.
 //!
 //! # Practice
 //! About 50 operations an element. For Ogden's and Mooney-Rivlin's laws the second term is that of

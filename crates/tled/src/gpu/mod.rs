@@ -211,8 +211,8 @@ impl GpuTled {
         self.stable_dt_ms().min(SUBSTEP_SAFETY * self.bound_now_ms())
     }
 
-    /// Where the last step had another length, the first of these lets past stress fade for as long
-    /// as that, and changes velocities from the middle of that step on.
+    /// Submits `count` steps of one length. Where the last step had another length, the first of
+    /// these lets past stress fade for as long as that, and changes velocities from its middle on.
     fn submit(&mut self, loads: &Loads, dt_ms: f32, count: u32) {
         let mut step = self.numbers(loads, dt_ms);
         let presses = step.springs + step.planes > 0;
