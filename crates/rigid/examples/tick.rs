@@ -17,7 +17,7 @@ fn main() -> Result<(), trepan_volume::BoneError> {
     for method in Method::all().into_iter().filter(|m| only.as_ref().is_none_or(|name| m.name() == name)) {
         for drilling in [false, true] {
             let bone = BoneVolume::new(&head, 400)?;
-            stroke(&method, &bone, drilling, radius_mm, if method.name() == "brute" { 50 } else { 2500 });
+            stroke(&method, &bone, drilling, radius_mm, if method.descriptor().is_oracle { 50 } else { 2500 });
         }
     }
     Ok(())

@@ -24,7 +24,7 @@
 //! # When not to use it
 //! For torque: a chain turns freely.
 
-use crate::{Method, RigidContact, RigidStep};
+use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
 use trepan_volume::BoneVolume;
@@ -43,12 +43,12 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
-    /// The stations of a tool that cuts along its shaft, each by `method`.
-    pub fn new(tool: &Tool, method: &Method) -> Self {
+    /// The stations of a tool that cuts along its shaft, each made for its ball by `build`.
+    pub fn new(tool: &Tool, build: impl Fn(&Tool) -> Box<dyn RigidContact>) -> Self {
         let count = ((tool.cutting_mm / (APART * tool.tip_radius_mm.max(1e-3))) as usize + 1).clamp(2, MOST);
         let height = |at: usize| tool.cutting_mm * at as f32 / (count - 1) as f32;
         let ball = Tool { cutting_mm: 0.0, ..*tool };
-        let stations = (0..count).map(|at| (height(at), method.build(&ball))).collect();
+        let stations = (0..count).map(|at| (height(at), build(&ball))).collect();
         Self { stations, proxy: Pose::IDENTITY, each: RigidStep::default() }
     }
 }
@@ -107,6 +107,7 @@ impl RigidContact for Chain {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Method;
     use glam::IVec3;
     use trepan_volume::VoxelVolume;
 

@@ -50,6 +50,7 @@
 use crate::ball::{Ball, Limits};
 use crate::half_spaces::{HalfSpace, supports};
 use crate::lean::Lean;
+use crate::method::{Descriptor, Extent, Method};
 use crate::removal::{Burr, Cut, RemovalLaw};
 use crate::shaft::Shaft;
 use crate::surface::{Disc, Discs};
@@ -535,5 +536,42 @@ impl RigidContact for GodObjectSphere {
         self.lean.renew();
         self.near.clear();
         self.burr.reset();
+    }
+}
+
+/// The ball alone.
+pub const METHOD: Descriptor = Descriptor {
+    name: "god-object-sphere",
+    former_names: &["distance-field"], // version 0.1
+    source: "Ruspini et al. 1997, Xu and Barbič 2017",
+    extent: Extent::Ball,
+    has_proxy: true,
+    is_oracle: false,
+    points: 0,
+    removal: RemovalLaw::RATE,
+    build: |tool, _| Box::new(GodObjectSphere::new(tool, Config::RECOMMENDED)),
+};
+
+/// The ball and the shaft.
+pub const WITH_SHAFT: Descriptor = Descriptor {
+    name: "god-object-sphere-shaft",
+    former_names: &["distance-field-shaft"], // version 0.1
+    source: "Ruspini et al. 1997, Xu and Barbič 2017",
+    extent: Extent::BallAndShaft,
+    has_proxy: true,
+    is_oracle: false,
+    points: 0,
+    removal: RemovalLaw::RATE,
+    build: |tool, _| Box::new(GodObjectSphere::new(tool, Config::WITH_SHAFT)),
+};
+
+impl Method {
+    /// What the simulators use.
+    pub const RECOMMENDED: Self = Self::of(&METHOD);
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Self::RECOMMENDED
     }
 }

@@ -11,8 +11,8 @@
 //! ```
 //!
 //! # Practice
-//! [`Method`] lists the methods with their configuration; [`Method::RECOMMENDED`] is
-//! `god-object-sphere`. A step does not allocate, lock or wait; the same bone and path give the
+//! [`Method::RECOMMENDED`] is [`god_object_sphere`]; [`rivals`] has the others, and [`Method::all`]
+//! lists all. A step does not allocate, lock or wait; the same bone and path give the
 //! same bytes. The step is the one writer of the [`BoneVolume`](trepan_volume::BoneVolume).
 //!
 //! ```
@@ -45,33 +45,25 @@
 mod readme {}
 
 mod ball;
-pub mod brute;
-pub mod burr_and_shaft;
 mod cell;
-pub mod centre_line;
 mod chain;
-pub mod exposed_faces;
 pub mod god_object_sphere;
 mod half_spaces;
 mod lean;
+mod list;
 pub mod mesh_shell;
 mod method;
-mod penalty;
-pub mod pointshell;
-pub mod ray_trace;
 pub mod removal;
+pub mod rivals;
 mod rows;
 mod seam;
 mod shaft;
 pub mod spindle;
 mod surface;
-pub mod surface_vertices;
 mod sweep;
-pub mod thesis;
 mod traverse;
-pub mod voxel_sum;
 mod window;
 
-pub use method::Method;
+pub use method::{Descriptor, Extent, Method};
 pub use seam::{RigidContact, RigidStep};
 pub use sweep::Sweep;

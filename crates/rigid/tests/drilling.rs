@@ -3,7 +3,8 @@
 mod common;
 use common::{at, bone};
 use trepan_geometry::{Pose, Tool, Vec3};
-use trepan_rigid::{Method, RigidStep, removal::RemovalLaw};
+use trepan_rigid::god_object_sphere::{Config, GodObjectSphere};
+use trepan_rigid::{Method, RigidContact, RigidStep, removal::RemovalLaw};
 
 /// Drills for `total_ms` with a spring of 2 N/mm pressing with about `newtons`, and returns the
 /// volume, mm³.
@@ -96,8 +97,8 @@ fn the_hole_has_the_shape_of_the_burr() {
 /// speed.
 fn half_a_second(hu: f32, newtons: f32, law: RemovalLaw) -> (f32, f32) {
     let bone = common::dense([28, 28, 28], 0.5, hu, |p| p.z);
-    let config = trepan_rigid::god_object_sphere::Config { removal: law, ..Default::default() };
-    let mut contact = Method::GodObjectSphere(config).build(&Tool::burr(2.0));
+    let config = Config { removal: law, ..Default::default() };
+    let mut contact = GodObjectSphere::new(&Tool::burr(2.0), config);
     contact.reset(Pose::from_translation(Vec3::Z * 2.0));
     let (mut out, mut removed, mut rpm) = (RigidStep::default(), 0.0, 0.0);
     for _ in 0..500 {

@@ -3,6 +3,7 @@
 mod common;
 use common::{at, bone, directions};
 use trepan_geometry::{Pose, Tool, Vec3};
+use trepan_rigid::rivals::brute;
 use trepan_rigid::{Method, RigidStep};
 
 const RADIUS_MM: f32 = 3.0;
@@ -47,7 +48,7 @@ fn a_ball_slides_along_a_slot_of_its_own_width() {
 fn the_oracle_stays_on_a_sphere() {
     const SPHERE_MM: f32 = 6.0;
     let bone = bone([48; 3], 0.5, |p| p.length() - SPHERE_MM);
-    let mut contact = Method::named("brute").unwrap().build(&Tool::burr(RADIUS_MM));
+    let mut contact = Method::of(&brute::METHOD).build(&Tool::burr(RADIUS_MM));
     let mut out = RigidStep::default();
     for tick in 0..60 {
         let turn = 0.01 * tick as f32;

@@ -3,6 +3,7 @@
 mod common;
 use common::{at, bone, scanned};
 use trepan_geometry::{Pose, Tool, Vec3};
+use trepan_rigid::rivals::brute;
 use trepan_rigid::{Method, RigidStep};
 
 /// Whether a ball driven through a wall of `voxels` thickness at `mm_per_tick`, `degrees` off its
@@ -47,7 +48,7 @@ fn on_rough_bone_it_agrees_with_the_oracle() {
     let rough = |p: Vec3| p.z + 0.4 * noise(0.6 * p);
     // Triangles cut the ridges off, in voxels of half the size by a quarter of it.
     let (bone, finer) = (bone([40; 3], 0.5, rough), bone([80; 3], 0.25, rough));
-    let oracle = Method::named("brute").unwrap();
+    let oracle = Method::of(&brute::METHOD);
     let (mut ours, mut truth) = (Method::RECOMMENDED.build(&Tool::burr(2.0)), oracle.build(&Tool::burr(2.0)));
     let (mut a, mut b) = (RigidStep::default(), RigidStep::default());
     let mut errors = Vec::new();

@@ -1,58 +1,57 @@
-//! The closed list of the solvers in this crate, by name, for tests, charts and command lines.
+//! A soft-tissue solver as a value: what it says of itself.
+//!
+//! # Practice
+//! A solver is one file with a [`SoftSolver`] and a [`Descriptor`]. `Method::of` makes it usable
+//! from any crate (`tests/toy_solver.rs`); a `mod` line and its name in `list.rs` bring it to the
+//! command lines, suites and charts.
 
-use crate::{Body, BodyError, SoftSolver, corotational, linear, mass_spring, reference, xpbd};
+use crate::body::{Body, BodyError};
+use crate::solver::SoftSolver;
 
-/// A soft-tissue solver with its settings.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Method {
-    /// Small strain, explicit.
-    Linear(linear::Config),
-    /// Masses and springs, explicit.
-    MassSpring(mass_spring::Config),
-    /// Large rotations, implicit.
-    Corotational(corotational::Config),
-    /// Position based, neo-Hookean.
-    Xpbd(xpbd::Config),
-    /// Static hyperelastic oracle, f64.
-    Reference(reference::Config),
+/// A solver: what it is called, what it can, how it is made.
+#[derive(Debug)]
+pub struct Descriptor {
+    /// Name on command lines, in charts and recordings.
+    pub name: &'static str,
+    /// Paper that it follows.
+    pub source: &'static str,
+    /// Whether a step goes to equilibrium, without inertia.
+    pub is_static: bool,
+    /// Makes it for a body at rest, with its default settings.
+    pub build: fn(&Body) -> Result<Box<dyn SoftSolver>, BodyError>,
+}
+
+/// A described soft-tissue solver.
+#[derive(Clone, Copy, Debug)]
+pub struct Method {
+    descriptor: &'static Descriptor,
 }
 
 impl Method {
-    /// Every method with its default settings.
-    pub fn all() -> Vec<Self> {
-        vec![
-            Self::Linear(linear::Config::default()),
-            Self::MassSpring(mass_spring::Config::default()),
-            Self::Corotational(corotational::Config::default()),
-            Self::Xpbd(xpbd::Config::default()),
-            Self::Reference(reference::Config::default()),
-        ]
+    /// The method of a descriptor.
+    pub const fn of(descriptor: &'static Descriptor) -> Self {
+        Self { descriptor }
     }
 
-    /// The method of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::all().into_iter().find(|method| method.name() == name)
+    /// What the method says of itself.
+    pub fn descriptor(&self) -> &'static Descriptor {
+        self.descriptor
     }
 
     /// Its name on a command line and in charts.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Linear(_) => "linear",
-            Self::MassSpring(_) => "mass-spring",
-            Self::Corotational(_) => "corotational",
-            Self::Xpbd(_) => "xpbd",
-            Self::Reference(_) => "reference",
-        }
+        self.descriptor.name
     }
 
     /// Makes the solver for a body at rest.
     pub fn build(&self, body: &Body) -> Result<Box<dyn SoftSolver>, BodyError> {
-        Ok(match self {
-            Self::Linear(config) => Box::new(linear::Linear::new(body, config)?),
-            Self::MassSpring(config) => Box::new(mass_spring::MassSpring::new(body, config)?),
-            Self::Corotational(config) => Box::new(corotational::Corotational::new(body, config)?),
-            Self::Xpbd(config) => Box::new(xpbd::Xpbd::new(body, config)?),
-            Self::Reference(config) => Box::new(reference::Reference::new(body, config)?),
-        })
+        (self.descriptor.build)(body)
+    }
+}
+
+/// Two are the same if they have the same name.
+impl PartialEq for Method {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
     }
 }

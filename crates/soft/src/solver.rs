@@ -6,9 +6,10 @@ use trepan_geometry::Vec3;
 /// Advances a body under loads. One implementation owns all of a body's nodal state.
 ///
 /// # Practice
-/// The real-time solvers neither allocate, lock, wait nor panic in [`step`](Self::step); a solver
-/// that does (the reference) says so. Nodes are numbered as in the mesh that the solver was made
-/// from.
+/// The real-time solvers neither allocate nor panic in [`step`](Self::step); a solver that does
+/// (the reference) says so. They wait for nothing outside the solver. One with threads of its own
+/// takes locks that nobody else holds, and waits at the end of a pass for the parts that its other
+/// threads have begun. Nodes are numbered as in the mesh that the solver was made from.
 pub trait SoftSolver: Send {
     /// Advances by `dt_ms`. Whatever goes wrong is healed and counted in the report; positions stay
     /// finite.

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;
-use trepan_soft::reference::{self, Reference};
+use trepan_soft::rivals::reference::{self, Reference};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 
 fn elastic(young_mpa: f32, density_g_mm3: f32) -> Material {

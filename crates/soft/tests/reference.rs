@@ -4,8 +4,8 @@
 use glam::{DMat3, DVec3};
 use trepan_geometry::Vec3;
 use trepan_mesh::Surface;
-use trepan_soft::reference::{Config, Order, Reference};
-use trepan_soft::{Body, Loads, Material, SoftSolver, SurfacePressure, boxes, linear};
+use trepan_soft::rivals::reference::{Config, Order, Reference};
+use trepan_soft::{Body, Loads, Material, SoftSolver, SurfacePressure, boxes, rivals::linear};
 
 const GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.81e-3);
 const QUADRATIC: Config = Config { iterations: 200, tolerance: 1e-9, order: Order::Quadratic, motion: false };

@@ -18,6 +18,7 @@ use crate::run::clock::Clock;
 use glam::DAffine3;
 use trepan_budget::{Bone, Scene};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
+use trepan_rigid::rivals::brute;
 use trepan_rigid::{Method, RigidStep};
 use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
 
@@ -40,7 +41,7 @@ const ROOM_MM: f32 = 18.0;
 
 /// All choices: every real-time method on every voxel size.
 pub fn choices() -> Vec<Bone> {
-    let methods = Method::all().into_iter().filter(|m| m.name() != "brute").map(|m| m.name());
+    let methods = Method::all().into_iter().filter(|m| !m.descriptor().is_oracle).map(|m| m.name());
     let with = |method: &'static str| match method {
         "thesis" => POINTS.to_vec(),
         _ => vec![0],
@@ -143,7 +144,7 @@ impl Stretch {
 
     /// Adds a path.
     fn with(mut self, path: Vec<ToolState>, cuts: bool) -> Self {
-        let truth = self.follow(&Method::Brute(Default::default()), &self.fine, &path, cuts).0;
+        let truth = self.follow(&Method::of(&brute::METHOD), &self.fine, &path, cuts).0;
         self.paths.push(ToolPath { path, cuts, truth });
         self
     }

@@ -6,6 +6,7 @@
 //! unless its cost forbids it (the oracle); then its rows are missing.
 
 mod accuracy;
+mod bones;
 mod clearance;
 mod coupling;
 mod energy;

@@ -33,7 +33,7 @@ fn measure(kind: &Kind, scope: Scope, findings: &mut Findings) {
     for (at, direction) in all.iter().enumerate() {
         let scene = kind.scene(*direction);
         for (method, errors) in methods.iter().zip(&mut errors) {
-            if method.name() != "brute" || at < scope.pick(1, ORACLE_ORIENTATIONS) {
+            if !method.descriptor().is_oracle || at < scope.pick(1, ORACLE_ORIENTATIONS) {
                 stroke(method, &scene, errors);
             }
         }

@@ -77,7 +77,7 @@ pub fn parts() -> Vec<Part> {
         let name = format!("coupling {}", method.as_ref().map_or("exact wall", Method::name));
         Part::new(name, move |scope, found| chart(method.as_ref(), &bone(normal()), normal(), scope, found))
     };
-    let slow = |method: &Method| method.name() == "brute";
+    let slow = |method: &Method| method.descriptor().is_oracle;
     std::iter::once(None).chain(Method::all().into_iter().filter(|m| !slow(m)).map(Some)).map(part).collect()
 }
 

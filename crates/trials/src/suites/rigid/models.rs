@@ -9,6 +9,7 @@
 //! recorded, the same for every model and method: where a burr is slower than the recorded one, it
 //! lags.
 
+use super::bones::{HALF_MM, SKULLS, cube, head, skull};
 use super::recording::{self, Task};
 use super::solid::{ISO, RADIUS_MM};
 use super::{STIFFNESS, clearance, published, worst_chart};
@@ -20,24 +21,10 @@ use std::time::Instant;
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Buttons, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidStep};
-use trepan_volume::{
-    AIR_HU, BRICK, BoneVolume, Grid, Interpolation, VoxelVolume, bone_isovalue, hounsfield, read, resample, skull_only,
-};
+use trepan_volume::{BRICK, BoneVolume, VoxelVolume};
 
 /// Table 3.1: voxels along an edge of 200 mm.
 const CUBES: [usize; 6] = [100, 200, 300, 400, 450, 500];
-/// Table 3.2: dimensions and voxel edge, mm.
-pub(super) const SKULLS: [([usize; 3], f32); 5] = [
-    ([143, 135, 95], 1.5),
-    ([171, 162, 114], 1.25),
-    ([213, 202, 142], 1.0),
-    ([284, 269, 189], 0.75),
-    ([425, 403, 283], 0.5),
-];
-/// Half of a cube's edge, mm.
-pub(super) const HALF_MM: f64 = 100.0;
-/// Density of the cubes: halfway between a voxel of it and one of air lies the isovalue.
-const CUBE_HU: i16 = 1800;
 /// Edge of the largest grid, voxels.
 const HUGE: usize = 1024;
 /// How much slower the largest grid may be.
@@ -46,31 +33,6 @@ const MOST_RATIO: f64 = 1.5;
 const ORACLE_TICKS: usize = 800;
 /// Ticks between two looks at the held ball.
 const LOOK: usize = 20;
-
-/// A cube of Table 3.1 with so many voxels along an edge.
-pub fn cube(voxels: usize) -> VoxelVolume<i16> {
-    let spacing = (2.0 * HALF_MM / voxels as f64) as f32;
-    VoxelVolume::isotropic([voxels; 3], Vec3::splat(0.5 * spacing - HALF_MM as f32), spacing, CUBE_HU)
-}
-
-/// The skull of the built-in case and its isovalue, HU, on the CT's own grid.
-pub fn head() -> (VoxelVolume<i16>, i16) {
-    let ct = read(&trepan_fixtures::case_head().ct).expect("the built-in CT is there");
-    let mut ct = hounsfield(&ct).expect("the built-in CT is in HU");
-    let isovalue = bone_isovalue(&ct);
-    skull_only(&mut ct, isovalue);
-    (ct, isovalue)
-}
-
-/// The top of a head on a grid of such dimensions and voxel edge; what is beyond the CT is air.
-pub fn skull(head: &VoxelVolume<i16>, dims: [usize; 3], voxel_mm: f32) -> VoxelVolume<i16> {
-    let (low, high) = head.world_corners();
-    let size = f64::from(voxel_mm) * DVec3::from(dims.map(|n| n as f64));
-    let corner = (0.5 * (low + high) - 0.5 * size).with_z(high.z - size.z);
-    let origin = (corner + 0.5 * f64::from(voxel_mm)).as_vec3();
-    let grid = Grid::of(&VoxelVolume::isotropic([0; 3], origin, voxel_mm, 0u8));
-    resample(head, &Grid { dims, ..grid }, Interpolation::Trilinear, AIR_HU)
-}
 
 /// Every model, then the grid of 1024³.
 pub fn parts(scope: Scope) -> Vec<Part> {
@@ -127,7 +89,7 @@ impl Model {
         for task in [Task::Touch, Task::Drill] {
             let path = recording::path(of, task);
             for method in methods {
-                let slow = method.name() == "brute";
+                let slow = method.descriptor().is_oracle;
                 if slow && (scope.quick || task == Task::Drill) {
                     continue;
                 }

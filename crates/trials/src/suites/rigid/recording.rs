@@ -7,7 +7,7 @@
 //! tenths of a millimetre deep. `cargo run -p trepan-trials --example record_paths` makes them
 //! anew.
 
-use super::models::{self, HALF_MM, SKULLS};
+use super::bones::{self, HALF_MM, SKULLS};
 use super::solid::{RADIUS_MM, held};
 use std::path::{Path, PathBuf};
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
@@ -85,10 +85,10 @@ fn name(place: Place, task: Task) -> String {
 
 /// Records all four paths into a folder.
 pub fn record_all(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let (head, isovalue) = models::head();
+    let (head, isovalue) = bones::head();
     let (dims, voxel_mm) = SKULLS[4];
-    let skull = models::skull(&head, dims, voxel_mm);
-    let cube = models::cube(400);
+    let skull = bones::skull(&head, dims, voxel_mm);
+    let cube = bones::cube(400);
     let mut files = Vec::new();
     for place in [Place::Cube, Place::Skull] {
         for task in [Task::Touch, Task::Drill] {

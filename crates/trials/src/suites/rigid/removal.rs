@@ -50,12 +50,12 @@ pub fn parts(scope: Scope) -> Vec<Part> {
             findings.rows.extend([strokes(&method, scope), rates(&method, scope)]);
         })
     };
-    Method::all().into_iter().filter(|method| method.name() != "brute" || !scope.quick).map(part).collect()
+    Method::all().into_iter().filter(|method| !method.descriptor().is_oracle || !scope.quick).map(part).collect()
 }
 
 fn strokes(method: &Method, scope: Scope) -> Row {
     let normals = directions(scope.pick(6, 12));
-    let few = method.name() == "brute";
+    let few = method.descriptor().is_oracle;
     let orientations = if few { 1 } else { normals.len() };
     let (mut said, mut left, mut own, mut times) = (0.0f64, 0.0f64, 0.0f64, Vec::new());
     for normal in &normals[..orientations] {
@@ -160,7 +160,7 @@ fn trilinear(hu: &[f64; 8], p: DVec3) -> f64 {
 
 /// Volume under a constant load at each rate, against that at 1 kHz; all of it where nothing goes.
 fn rates(method: &Method, scope: Scope) -> Row {
-    let slow = method.name() == "brute";
+    let slow = method.descriptor().is_oracle;
     let total_ms = if slow { 60.0 } else { scope.pick(400.0, 1500.0) };
     let found = RATES.map(|khz| pressed(method, 1.0 / khz, total_ms));
     let volumes = found.map(|(removed, _)| removed);

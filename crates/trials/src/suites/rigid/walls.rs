@@ -50,13 +50,13 @@ pub struct Cell {
 pub fn parts(scope: Scope) -> Vec<Part> {
     let part =
         |method: Method| Part::new(format!("walls {}", method.name()), move |scope, found| by(&method, scope, found));
-    Method::all().into_iter().filter(|method| method.name() != "brute" || !scope.quick).map(part).collect()
+    Method::all().into_iter().filter(|method| !method.descriptor().is_oracle || !scope.quick).map(part).collect()
 }
 
 fn by(method: &Method, scope: Scope, findings: &mut Findings) {
     let normals = normals(scope.pick(1, 6));
     let speeds = scope.pick(&SPEEDS[1..], &SPEEDS[..]);
-    let slow = method.name() == "brute";
+    let slow = method.descriptor().is_oracle;
     let used = if slow { &normals[..1] } else { &normals[..] };
     // The smallest ball is the hardest; the recommended method must hold walls with all.
     let sizes = if *method == Method::RECOMMENDED { &RADII_MM[..] } else { &RADII_MM[..1] };

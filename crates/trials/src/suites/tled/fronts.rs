@@ -12,7 +12,7 @@ use crate::picture::{Chart, Mark};
 use crate::suite::{Findings, Gate, Row};
 use std::time::Instant;
 use trepan_geometry::{Vec3, units};
-use trepan_soft::reference::{self, Order, Reference};
+use trepan_soft::rivals::reference::{self, Order, Reference};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};
 use trepan_tled::{Config, Tled};
 

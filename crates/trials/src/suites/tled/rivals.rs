@@ -43,7 +43,7 @@ impl Solver {
     }
 
     fn is_static(&self) -> bool {
-        matches!(self, Self::Rival(Method::Reference(_)))
+        matches!(self, Self::Rival(method) if method.descriptor().is_static)
     }
 }
 

@@ -20,36 +20,22 @@
 //! # When not to use it
 //! For a tool that is wholly in bone: the rays end at its centre, and there is no way out.
 
+use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
 use crate::RigidStep;
-use crate::penalty::{Felt, PenaltyProbe, answer};
+use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
 use trepan_contact::Contact;
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
-/// How the method is set up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Config {
-    /// Points of the shell.
-    pub points: usize,
-    /// What a burr takes away.
-    pub removal: RemovalLaw,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { points: Pointshell::RIGID_COUNT, removal: RemovalLaw::RATE }
-    }
-}
-
-pub(crate) struct Rays {
+struct Rays {
     shell: Pointshell,
     radius_mm: f32,
 }
 
 impl Rays {
-    pub fn new(tool: &Tool, config: &Config) -> Self {
-        let shell = Pointshell::sphere(tool.tip_radius_mm, config.points.clamp(8, 20_000), Spread::Fibonacci);
+    pub fn new(tool: &Tool, points: usize) -> Self {
+        let shell = Pointshell::sphere(tool.tip_radius_mm, points.clamp(8, 20_000), Spread::Fibonacci);
         Self { shell, radius_mm: tool.tip_radius_mm }
     }
 }
@@ -102,3 +88,16 @@ pub(crate) fn over_iso(bone: &BoneVolume, point: Vec3) -> f32 {
     g.z * (g.y * along(0, 0) + f.y * along(1, 0)) + f.z * (g.y * along(0, 1) + f.y * along(1, 1))
         - f32::from(bone.isovalue())
 }
+
+/// What the method says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "ray-trace",
+    former_names: &[],
+    source: "Petersik et al. 2002, Morris et al. 2006",
+    extent: Extent::Ball,
+    has_proxy: false,
+    is_oracle: false,
+    points: Pointshell::RIGID_COUNT,
+    removal: RemovalLaw::RATE,
+    build: |tool, points| Box::new(Penalty::new(tool, Rays::new(tool, points), RemovalLaw::RATE)),
+};

@@ -23,8 +23,9 @@
 //! On oblique bone: a voxel knows 26 normals, so that force turns and jumps at voxel borders.
 //! Against thin walls: it has no proxy.
 
+use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
 use crate::RigidStep;
-use crate::penalty::{Felt, PenaltyProbe, answer};
+use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
 use glam::IVec3;
 use trepan_contact::Contact;
@@ -33,29 +34,14 @@ use trepan_volume::BoneVolume;
 
 const NEIGHBOURS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
 
-/// How the method is set up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Config {
-    /// Points of the shell.
-    pub points: usize,
-    /// What a burr takes away.
-    pub removal: RemovalLaw,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self { points: Pointshell::RIGID_COUNT, removal: RemovalLaw::RATE }
-    }
-}
-
-pub(crate) struct Faces {
+struct Faces {
     shell: Pointshell,
     radius_mm: f32,
 }
 
 impl Faces {
-    pub fn new(tool: &Tool, config: &Config) -> Self {
-        let shell = Pointshell::sphere(tool.tip_radius_mm, config.points.clamp(8, 20_000), Spread::Fibonacci);
+    pub fn new(tool: &Tool, points: usize) -> Self {
+        let shell = Pointshell::sphere(tool.tip_radius_mm, points.clamp(8, 20_000), Spread::Fibonacci);
         Self { shell, radius_mm: tool.tip_radius_mm }
     }
 
@@ -102,3 +88,16 @@ impl PenaltyProbe for Faces {
         answer(push, depth, out)
     }
 }
+
+/// What the method says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "exposed-faces",
+    former_names: &[],
+    source: "Acosta and Liu 2007",
+    extent: Extent::Ball,
+    has_proxy: false,
+    is_oracle: false,
+    points: Pointshell::RIGID_COUNT,
+    removal: RemovalLaw::RATE,
+    build: |tool, points| Box::new(Penalty::new(tool, Faces::new(tool, points), RemovalLaw::RATE)),
+};

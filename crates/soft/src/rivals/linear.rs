@@ -14,6 +14,7 @@
 //! turned part swells, because small strain takes rotation for strain.
 
 use crate::contact::press;
+use crate::method::Descriptor;
 use crate::{Body, BodyError, Loads, SoftSolver, StepReport, Stiffness, lowest_frequency, power_bound_ms};
 use glam::DVec3;
 use trepan_geometry::Vec3;
@@ -126,3 +127,11 @@ impl SoftSolver for Linear {
         (self.safety * self.bound_ms) as f32
     }
 }
+
+/// What the solver says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "linear",
+    source: "Zienkiewicz, small strain, central differences",
+    is_static: false,
+    build: |body| Ok(Box::new(Linear::new(body, &Config::default())?)),
+};

@@ -26,6 +26,7 @@ mod cells;
 mod rank_one;
 
 use crate::factor::Factor;
+use crate::method::Descriptor;
 use crate::{Body, BodyError, Law, Loads, Material, SoftSolver, StepReport, SurfacePressure};
 use cells::{Cell, Cells};
 use glam::{DMat3, DVec3};
@@ -402,3 +403,11 @@ fn add_tangent(factor: &mut Factor, law: &Law, cell: &Cell, u: &[DVec3]) {
         factor.add(cell.nodes[at / count], cell.nodes[at % count], *block);
     }
 }
+
+/// What the solver says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "reference",
+    source: "Newton iteration on the hyperelastic energy, f64",
+    is_static: true,
+    build: |body| Ok(Box::new(Reference::new(body, &Config::default())?)),
+};

@@ -32,6 +32,7 @@
 //! For force feedback on a hand: [`god_object_sphere`](crate::god_object_sphere) is smoother and
 //! nearer to the surface. It is here for comparison.
 
+use crate::method::{Descriptor, Extent};
 use crate::removal::{Burr, Cut, RemovalLaw};
 use crate::rows::EVERYWHERE;
 use crate::sweep::{Ball, Stop, Sweep};
@@ -282,3 +283,29 @@ fn slot<'a>(touched: &'a mut Vec<Touched>, table: &mut [u16], voxel: IVec3) -> &
     }
     &mut touched[table[at] as usize - 1]
 }
+
+/// The thesis's method with its errors put right.
+pub const METHOD: Descriptor = Descriptor {
+    name: "thesis",
+    former_names: &[],
+    source: "the thesis, chapter 3, its errors put right",
+    extent: Extent::Ball,
+    has_proxy: true,
+    is_oracle: false,
+    points: Pointshell::RIGID_COUNT,
+    removal: RemovalLaw::RATE,
+    build: |tool, points| Box::new(Thesis::new(tool, Config { points, ..Config::default() })),
+};
+
+/// The thesis's method as printed.
+pub const AS_PRINTED: Descriptor = Descriptor {
+    name: "thesis-printed",
+    former_names: &[],
+    source: "the thesis, chapter 3",
+    extent: Extent::Ball,
+    has_proxy: true,
+    is_oracle: false,
+    points: Pointshell::RIGID_COUNT,
+    removal: RemovalLaw::PER_TICK,
+    build: |tool, points| Box::new(Thesis::new(tool, Config { points, ..Config::PRINTED })),
+};

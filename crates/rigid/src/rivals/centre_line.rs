@@ -21,7 +21,8 @@
 //! For burrs that are seen: the line has no thickness, so that a burr sinks in to its centre before
 //! it touches.
 
-use crate::ray_trace::over_iso;
+use super::ray_trace::over_iso;
+use crate::method::{Descriptor, Extent};
 use crate::removal::{Burr, Cut, RemovalLaw};
 use crate::rows::EVERYWHERE;
 use crate::traverse::first_bone;
@@ -187,3 +188,16 @@ fn normal(bone: &BoneVolume, point: Vec3) -> Vec3 {
     let along = |axis: Vec3| over_iso(bone, point - step * axis) - over_iso(bone, point + step * axis);
     Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)).normalize_or_zero()
 }
+
+/// What the method says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "centre-line",
+    former_names: &[],
+    source: "Asenjo 2008, line approximation",
+    extent: Extent::Axis,
+    has_proxy: true,
+    is_oracle: false,
+    points: 0,
+    removal: RemovalLaw::RATE,
+    build: |tool, _| Box::new(CentreLine::new(tool, Config::default())),
+};

@@ -6,7 +6,7 @@
 //! `k = 2.5 μ V/l²`. Such a solid has ν = 1/4 whatever is asked for (Cauchy's relation): the
 //! tetrahedron adds the pressure `κ' (J - 1)`, `κ' = κ - 5/3 μ`, that makes up its bulk modulus;
 //! none under ν = 1/4, where κ' would be a pressure that collapses single tetrahedra. Central
-//! differences as in [`crate::linear`].
+//! differences as in [`super::linear`].
 //!
 //! # Practice
 //! About 20 ns a tetrahedron and step, f64, no allocation.
@@ -18,6 +18,7 @@
 use crate::body::Element;
 use crate::contact::press;
 use crate::energy::cofactor;
+use crate::method::Descriptor;
 use crate::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
@@ -195,6 +196,14 @@ fn springs(body: &Body) -> Vec<Spring> {
     };
     edges.into_iter().map(spring).collect()
 }
+
+/// What the solver says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "mass-spring",
+    source: "Provot 1995, with a pressure that makes up the bulk modulus",
+    is_static: false,
+    build: |body| Ok(Box::new(MassSpring::new(body, &Config::default())?)),
+};
 
 #[cfg(test)]
 mod tests {

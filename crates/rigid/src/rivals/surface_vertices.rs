@@ -22,9 +22,10 @@
 //! Where depth is wanted: a mean over a cap is half of what its deepest vertex has. Against thin
 //! walls: it has no proxy.
 
+use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
+use super::ray_trace::{over_iso, way_out};
 use crate::RigidStep;
-use crate::penalty::{Felt, PenaltyProbe, answer};
-use crate::ray_trace::{over_iso, way_out};
+use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
 use core::f32::consts::TAU;
 use trepan_contact::Contact;
@@ -36,24 +37,10 @@ const MAX_RINGS: usize = 512;
 /// Vertices of a ring.
 const RING: usize = 8;
 
-/// How the method is set up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Config {
-    /// Vertices on the ball.
-    pub points: usize,
-    /// Way between two rings of vertices on the shaft, mm.
-    pub ring_mm: f32,
-    /// What a burr takes away.
-    pub removal: RemovalLaw,
-}
+/// Way between two rings of vertices on the shaft, mm.
+const RING_MM: f32 = 1.0;
 
-impl Default for Config {
-    fn default() -> Self {
-        Self { points: Pointshell::RIGID_COUNT, ring_mm: 1.0, removal: RemovalLaw::RATE }
-    }
-}
-
-pub(crate) struct Vertices {
+struct Vertices {
     shell: Pointshell,
     /// Vertices before this one are on the ball, the others on the shaft.
     on_ball: usize,
@@ -62,15 +49,14 @@ pub(crate) struct Vertices {
 }
 
 impl Vertices {
-    pub fn new(tool: &Tool, config: &Config) -> Self {
-        let mut shell = Pointshell::sphere(tool.tip_radius_mm, config.points.clamp(8, 20_000), Spread::Fibonacci);
+    pub fn new(tool: &Tool, points: usize) -> Self {
+        let mut shell = Pointshell::sphere(tool.tip_radius_mm, points.clamp(8, 20_000), Spread::Fibonacci);
         let on_ball = shell.points.len();
-        let ring_mm = config.ring_mm.max(1e-2);
-        let rings = ((tool.shaft_length_mm - tool.tip_radius_mm) / ring_mm).clamp(0.0, MAX_RINGS as f32) as usize;
+        let rings = ((tool.shaft_length_mm - tool.tip_radius_mm) / RING_MM).clamp(0.0, MAX_RINGS as f32) as usize;
         for at in 0..rings * RING {
             let (ring, angle) = (at / RING, TAU * (at % RING) as f32 / RING as f32);
             let out = Vec3::new(angle.cos(), angle.sin(), 0.0);
-            let height = tool.tip_radius_mm + ring as f32 * ring_mm;
+            let height = tool.tip_radius_mm + ring as f32 * RING_MM;
             shell.points.push(tool.shaft_radius_mm * out + Vec3::Z * height);
             shell.inward_normals.push(-out);
         }
@@ -106,3 +92,16 @@ impl PenaltyProbe for Vertices {
         Some(Felt { burr: share * burr, ..felt })
     }
 }
+
+/// What the method says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "surface-vertices",
+    former_names: &[],
+    source: "Asenjo 2008, surface approximation",
+    extent: Extent::BallAndShaft,
+    has_proxy: false,
+    is_oracle: false,
+    points: Pointshell::RIGID_COUNT,
+    removal: RemovalLaw::RATE,
+    build: |tool, points| Box::new(Penalty::new(tool, Vertices::new(tool, points), RemovalLaw::RATE)),
+};

@@ -22,7 +22,8 @@
 //! Deeper than a voxel: the depth of a point starts anew in each voxel, so that the force stays as
 //! small as at the surface.
 
-use crate::penalty::{Felt, Penalty, PenaltyProbe, answer};
+use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
+use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
@@ -70,7 +71,7 @@ pub fn with_shell(tool: &Tool, shell: Pointshell, config: &Config) -> Box<dyn Ri
     Box::new(Penalty::new(tool, Shell { shell, combine: config.combine }, config.removal))
 }
 
-pub(crate) struct Shell {
+struct Shell {
     shell: Pointshell,
     combine: Combine,
 }
@@ -108,4 +109,34 @@ impl PenaltyProbe for Shell {
         out.manifold.couple_mm = moment / push.length();
         Some(felt)
     }
+}
+
+/// The mean of the points' pushes.
+pub const AVERAGE: Descriptor = Descriptor {
+    name: "pointshell-average",
+    former_names: &[],
+    source: "Renz et al. 2001",
+    extent: Extent::Ball,
+    has_proxy: false,
+    is_oracle: false,
+    points: Pointshell::RIGID_COUNT,
+    removal: RemovalLaw::RATE,
+    build: |tool, points| penalty(tool, &Config { points, ..Config::default() }),
+};
+
+/// The sum of the points' pushes.
+pub const SUM: Descriptor = Descriptor {
+    name: "pointshell-sum",
+    former_names: &[],
+    source: "McNeely et al. 1999",
+    extent: Extent::Ball,
+    has_proxy: false,
+    is_oracle: false,
+    points: Pointshell::RIGID_COUNT,
+    removal: RemovalLaw::RATE,
+    build: |tool, points| penalty(tool, &Config { points, ..Config::SUM }),
+};
+
+fn penalty(tool: &Tool, config: &Config) -> Box<dyn RigidContact> {
+    Box::new(Penalty::new(tool, Shell::new(tool, config), config.removal))
 }

@@ -17,6 +17,7 @@
 //! In a haptic tick.
 
 use crate::cell;
+use crate::method::{Descriptor, Extent};
 use crate::removal::{Burr, Cut, RemovalLaw};
 use crate::rows::EVERYWHERE;
 use crate::{RigidContact, RigidStep};
@@ -249,3 +250,16 @@ fn nearest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
     let sum = va + vb + vc;
     if sum > 0.0 { a + ab * (vb / sum) + ac * (vc / sum) } else { a }
 }
+
+/// What the method says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "brute",
+    former_names: &[],
+    source: "Zilles and Salisbury 1995, by small steps in f64",
+    extent: Extent::Ball,
+    has_proxy: true,
+    is_oracle: true,
+    points: 0,
+    removal: RemovalLaw::RATE,
+    build: |tool, _| Box::new(Brute::new(tool, Config::default())),
+};

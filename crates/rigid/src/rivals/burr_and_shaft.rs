@@ -23,8 +23,9 @@
 //! For a steady force: depth is counted from voxel centres, so that it steps by fractions of a
 //! voxel. Against thin walls: it has no proxy.
 
+use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
 use crate::RigidStep;
-use crate::penalty::{Felt, PenaltyProbe, answer};
+use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
 use crate::shaft::Shaft;
@@ -32,14 +33,7 @@ use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
-/// How the method is set up.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Config {
-    /// What a burr takes away.
-    pub removal: RemovalLaw,
-}
-
-pub(crate) struct BurrAndShaft {
+struct BurrAndShaft {
     tool: Tool,
 }
 
@@ -129,3 +123,16 @@ impl PenaltyProbe for BurrAndShaft {
         Some(Felt { burr: burr.depth_mm * burr.normal, ..felt })
     }
 }
+
+/// What the method says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "burr-and-shaft",
+    former_names: &[],
+    source: "He and Chen 2006",
+    extent: Extent::BallAndShaft,
+    has_proxy: false,
+    is_oracle: false,
+    points: 0,
+    removal: RemovalLaw::RATE,
+    build: |tool, _| Box::new(Penalty::new(tool, BurrAndShaft::new(tool), RemovalLaw::RATE)),
+};

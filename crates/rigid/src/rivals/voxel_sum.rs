@@ -21,8 +21,9 @@
 //! Against edges and thin walls, where there is less bone than a cap has: the depth reads too
 //! small.
 
+use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
 use crate::RigidStep;
-use crate::penalty::{Felt, PenaltyProbe, answer};
+use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
 use core::f32::consts::PI;
@@ -30,14 +31,7 @@ use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
-/// How the method is set up.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Config {
-    /// What a burr takes away.
-    pub removal: RemovalLaw,
-}
-
-pub(crate) struct Sum {
+struct Sum {
     radius_mm: f32,
 }
 
@@ -88,6 +82,19 @@ fn cap_height(volume: f32, radius: f32) -> f32 {
     }
     low
 }
+
+/// What the method says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "voxel-sum",
+    former_names: &[],
+    source: "Agus et al. 2003",
+    extent: Extent::Ball,
+    has_proxy: false,
+    is_oracle: false,
+    points: 0,
+    removal: RemovalLaw::RATE,
+    build: |tool, _| Box::new(Penalty::new(tool, Sum::new(tool), RemovalLaw::RATE)),
+};
 
 #[cfg(test)]
 mod tests {

@@ -20,6 +20,7 @@
 //! collapse. For vibration: it is damped by the step.
 
 use crate::body::Element;
+use crate::method::Descriptor;
 use crate::operator::Hooke;
 use crate::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DQuat, DVec3};
@@ -308,6 +309,14 @@ fn rotation_of(f: DMat3, mut turn: DQuat) -> DQuat {
 fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }
+
+/// What the solver says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "corotational",
+    source: "Müller and Gross 2004",
+    is_static: false,
+    build: |body| Ok(Box::new(Corotational::new(body, &Config::default())?)),
+};
 
 #[cfg(test)]
 mod tests {

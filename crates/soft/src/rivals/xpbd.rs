@@ -19,6 +19,7 @@
 //! further on it folds into itself.
 
 use crate::body::Element;
+use crate::method::Descriptor;
 use crate::{Body, BodyError, Loads, Material, SoftSolver, StepReport, lowest_frequency};
 use glam::{DMat3, DVec3};
 use trepan_contact::NodalContact;
@@ -201,3 +202,11 @@ impl SoftSolver for Xpbd {
         self.config.substep_ms * self.config.substeps.max(1) as f32
     }
 }
+
+/// What the solver says of itself.
+pub const METHOD: Descriptor = Descriptor {
+    name: "xpbd",
+    source: "Macklin, Müller and Chentanez 2016; Macklin and Müller 2021",
+    is_static: false,
+    build: |body| Ok(Box::new(Xpbd::new(body, &Config::default())?)),
+};

@@ -1,0 +1,16 @@
+//! The methods beside the recommended one: the thesis's, those of other simulators, the oracle.
+//!
+//! # Practice
+//! They are compared with [`god_object_sphere`](crate::god_object_sphere) under the same tools,
+//! bones and limits. Each file ends with what the method says of itself.
+
+pub mod brute;
+pub mod burr_and_shaft;
+pub mod centre_line;
+pub mod exposed_faces;
+mod penalty;
+pub mod pointshell;
+pub mod ray_trace;
+pub mod surface_vertices;
+pub mod thesis;
+pub mod voxel_sum;
