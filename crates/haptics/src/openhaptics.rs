@@ -222,7 +222,7 @@ fn capabilities(hd: &Hd, drives_torque: bool) -> Capabilities {
         name: hd.string(codes::DEVICE_MODEL_TYPE),
         peak_force_n: hd.doubles(codes::NOMINAL_MAX_FORCE)[0] as f32,
         continuous_force_n: hd.doubles(codes::NOMINAL_MAX_CONTINUOUS_FORCE)[0] as f32,
-        rate_hz: scheduler::RATE_HZ as f32,
+        rate_hz: library::RATE_HZ as f32,
         workspace_mm: Vec3::new(box_mm[3] - box_mm[0], box_mm[4] - box_mm[1], box_mm[5] - box_mm[2]),
         axes_driven: if drives_torque { 6 } else { 3 },
         position_resolution_mm: 0.055,

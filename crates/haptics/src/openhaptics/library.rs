@@ -6,11 +6,13 @@
 #![expect(unsafe_code, reason = "calls into the vendor's C library")]
 
 use super::codes;
-use super::servo::ServoGroup;
 use crate::DeviceError;
 use crate::dynamic::{Loaded, functions};
 use std::ffi::{CStr, CString, c_char, c_ulong, c_void};
 use std::path::Path;
+
+/// Scheduler rate, Hz.
+pub(super) const RATE_HZ: u32 = 1000;
 
 const NAMES: &[&str] = if cfg!(windows) {
     &["HD.dll"]
@@ -182,17 +184,17 @@ impl Hd {
         unsafe { (self.functions.hdStartScheduler)() }
     }
 
-    /// Runs `group` on the library's thread once per tick, from the scheduler's start until
+    /// Runs `ticked` on the library's thread once per tick, from the scheduler's start until
     /// [`Hd::stop`].
-    pub(super) fn schedule(&self, group: Box<ServoGroup>) -> Scheduled {
-        let data = Box::into_raw(group);
+    pub(super) fn schedule<T: Ticked>(&self, ticked: Box<T>) -> Scheduled<T> {
+        let data = Box::into_raw(ticked);
         // SAFETY: `data` stays allocated until `stop`, which first stops the scheduler.
-        let handle = unsafe { (self.functions.hdScheduleAsynchronous)(tick, data.cast(), codes::MAX_PRIORITY) };
+        let handle = unsafe { (self.functions.hdScheduleAsynchronous)(tick::<T>, data.cast(), codes::MAX_PRIORITY) };
         Scheduled { handle, data }
     }
 
-    /// Stops the scheduler, which waits for a running callback, and returns the servo group.
-    pub(super) fn stop(&self, scheduled: Scheduled) -> Box<ServoGroup> {
+    /// Stops the scheduler, which waits for a running callback, and returns what it ran.
+    pub(super) fn stop<T>(&self, scheduled: Scheduled<T>) -> Box<T> {
         // SAFETY: after these two calls the library does not use `data` any more; it came from a
         // box in `schedule`.
         unsafe {
@@ -203,20 +205,26 @@ impl Hd {
     }
 }
 
-/// A servo group that the library's scheduler calls.
-pub(super) struct Scheduled {
-    handle: c_ulong,
-    data: *mut ServoGroup,
+/// What the library's scheduler calls.
+pub(super) trait Ticked: Send {
+    /// Runs one tick; returns whether the library should call again.
+    fn tick(&mut self) -> u32;
 }
 
-// SAFETY: the pointer is only converted back to its own box, and `ServoGroup` is `Send`.
-unsafe impl Send for Scheduled {}
+/// What the scheduler runs at present.
+pub(super) struct Scheduled<T> {
+    handle: c_ulong,
+    data: *mut T,
+}
+
+// SAFETY: the pointer is only converted back to its own box, whose content may be sent.
+unsafe impl<T: Send> Send for Scheduled<T> {}
 
 /// The callback that the library calls once per tick.
-extern "system" fn tick(data: *mut c_void) -> u32 {
-    // SAFETY: `data` is the group given to `schedule`; nothing else accesses it until `stop`.
-    let group = unsafe { &mut *data.cast::<ServoGroup>() };
-    group.tick()
+extern "system" fn tick<T: Ticked>(data: *mut c_void) -> u32 {
+    // SAFETY: `data` is what was given to `schedule`; nothing else accesses it until `stop`.
+    let ticked = unsafe { &mut *data.cast::<T>() };
+    ticked.tick()
 }
 
 /// # Safety

@@ -6,20 +6,17 @@
 //! force for that moment, then it ramps in again.
 
 use super::codes;
-use super::library::{Hd, Scheduled};
+use super::library::{Hd, RATE_HZ, Scheduled};
 use super::servo::{Servo, ServoGroup};
 use crate::DeviceError;
 use std::sync::{Mutex, PoisonError};
-
-/// Scheduler rate, Hz.
-pub(super) const RATE_HZ: u32 = 1000;
 
 /// The scheduler of each library that has a device open.
 static SCHEDULERS: Mutex<Vec<Scheduler>> = Mutex::new(Vec::new());
 
 struct Scheduler {
     library: String,
-    running: Scheduled,
+    running: Scheduled<ServoGroup>,
 }
 
 /// Opens one more device while the scheduler is stopped, then serves it; returns the result of

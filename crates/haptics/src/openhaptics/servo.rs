@@ -7,13 +7,13 @@
 //! device does not affect the others.
 
 use super::codes;
-use super::library::Hd;
+use super::library::{Hd, RATE_HZ, Ticked};
 use crate::{Fault, STALE_MS, ramp::Ramp};
 use trepan_geometry::Wrench;
 use triple_buffer::{Input, Output};
 
 /// The servo's tick, ms.
-const TICK_MS: f32 = 1e3 / super::scheduler::RATE_HZ as f32;
+const TICK_MS: f32 = 1e3 / RATE_HZ as f32;
 /// Ticks without a new command after which the force is cut.
 pub(super) const SILENT_TICKS: u32 = 10;
 /// Most errors taken from the stack at once.
@@ -62,9 +62,8 @@ pub(super) struct Servo {
     lost: bool,
 }
 
-impl ServoGroup {
-    /// Runs one tick; returns whether the library should call again.
-    pub(super) fn tick(&mut self) -> u32 {
+impl Ticked for ServoGroup {
+    fn tick(&mut self) -> u32 {
         for place in 0..self.servos.len() {
             if !self.servos[place].lost {
                 self.servos[place].frame(&self.hd);
@@ -74,7 +73,9 @@ impl ServoGroup {
         }
         if self.servos.iter().all(|servo| servo.lost) { codes::CALLBACK_DONE } else { codes::CALLBACK_CONTINUE }
     }
+}
 
+impl ServoGroup {
     /// Passes every error to the device that it names, or else to the one at `place`.
     fn take_errors(&mut self, place: usize) {
         for _ in 0..MAX_ERRORS {

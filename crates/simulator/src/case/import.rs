@@ -68,7 +68,8 @@ pub fn open_by(
         Ok(()) => {}
         Err(fault) => case.notes.push(format!("the case could not be cached for the next start: {fault}")),
     }
-    tracing::info!("case {} imported in {}", case.name, stages.finish());
+    let took = stages.finish();
+    tracing::info!("case {} imported in {took}", case.name);
     Ok(case)
 }
 

@@ -1,18 +1,8 @@
 //! Turns the numbers of a device test into findings, each with a remedy if it is bad.
 
-use crate::device_test::measured::{Floor, Measured, Timing};
-use serde::Serialize;
+use crate::device_test::measured::{Finding, Floor, Measured, Timing};
 use trepan_geometry::Vec3;
 use trepan_haptics::Capabilities;
-
-/// One finding of a device test.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
-    /// Whether the device passes.
-    pub good: bool,
-    /// Description; with a remedy if the device fails.
-    pub text: String,
-}
 
 /// Derives the findings from the measurements.
 pub fn of(measured: &Measured, device: &Capabilities) -> Vec<Finding> {

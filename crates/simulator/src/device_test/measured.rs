@@ -3,7 +3,6 @@
 //! # Practice
 //! Units are mm, N and ms unless a name says otherwise.
 
-use crate::device_test::findings::Finding;
 use crate::device_test::trial::{FLOOR_N, FLOOR_N_PER_MM, Part};
 use crate::report::summary::{GuardSummary, Machine, Quantiles};
 use crate::run::Times;
@@ -206,6 +205,15 @@ fn span_ms(samples: &[Sample]) -> f64 {
 fn gaps<'a>(samples: impl Iterator<Item = &'a Sample>) -> Vec<f64> {
     let times: Vec<f64> = samples.map(|s| s.time_ms).collect();
     times.windows(2).map(|pair| pair[1] - pair[0]).collect()
+}
+
+/// One finding of a device test.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// Whether the device passes.
+    pub good: bool,
+    /// Description; with a remedy if the device fails.
+    pub text: String,
 }
 
 #[cfg(test)]

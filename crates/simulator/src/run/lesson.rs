@@ -17,7 +17,6 @@
 //! teacher has sent nothing for three seconds. A replay needs no teacher: the recorded readings
 //! hold the requests.
 
-use crate::run::watch::Watching;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, Vec3};
 use trepan_haptics::{Capabilities, HapticDevice, Reading};
@@ -157,17 +156,6 @@ impl Teacher {
         // Shared memory that is full or gone is no fault here: the record is lost.
         _ = self.trainee.send(&self.record);
     }
-}
-
-/// Connections of a session's window to other sessions.
-#[derive(Default)]
-pub struct Company {
-    /// Requests of a teacher to this session's trainee.
-    pub asked: Option<Reader<TeacherRecord>>,
-    /// Send end, where this session teaches the trainee of another.
-    pub teacher: Option<Teacher>,
-    /// The session that is watched.
-    pub watching: Option<Watching>,
 }
 
 #[cfg(test)]

@@ -347,7 +347,7 @@ mod tests {
     use super::*;
     use crate::program::Program;
     use crate::stages::alarms::Limits;
-    use crate::stages::haptic_tick::HapticConfig;
+    use crate::stages::haptic_config::HapticConfig;
     use crate::stages::notice::{Hindrance, What};
     use std::sync::Arc;
     use trepan_contact::{GuardConfig, Vibration, Viscoelastic};

@@ -25,7 +25,7 @@
 
 use crate::error::SessionError;
 use crate::run::clock::Clock;
-use crate::run::lesson::Listener;
+use crate::run::lesson::{Listener, Teacher};
 use crate::run::stop::Stop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -202,6 +202,17 @@ impl HapticDevice for Watched {
     fn close(&mut self) {
         self.open.store(false, Ordering::Relaxed);
     }
+}
+
+/// Connections of a session's window to other sessions.
+#[derive(Default)]
+pub struct Company {
+    /// Requests of a teacher to this session's trainee.
+    pub asked: Option<Reader<TeacherRecord>>,
+    /// Send end, where this session teaches the trainee of another.
+    pub teacher: Option<Teacher>,
+    /// The session that is watched.
+    pub watching: Option<Watching>,
 }
 
 #[cfg(test)]

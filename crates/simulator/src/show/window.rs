@@ -6,9 +6,9 @@
 
 use crate::program::Program;
 use crate::report::page::Shot;
-use crate::run::lesson::{Company, TEACHER_REQUESTS, Teacher};
+use crate::run::lesson::{TEACHER_REQUESTS, Teacher};
 use crate::run::stop::Stop;
-use crate::run::watch::Watching;
+use crate::run::watch::{Company, Watching};
 use crate::run::{RenderInputs, View};
 use crate::session_setup::SessionSetup;
 use crate::show::colours::Colours;

@@ -16,51 +16,28 @@
 
 mod requests;
 
-use crate::program::{Phase, Program};
-use crate::stages::alarms::{Feed, Limits, WarningInputs};
+use crate::program::Phase;
+use crate::stages::alarms::{Feed, WarningInputs};
 use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm, spindle_rpm};
 use crate::stages::fault::{AfterFault, DeviceStatus};
 use crate::stages::flap::Flap;
+use crate::stages::haptic_config::HapticConfig;
 use crate::stages::notice::{Notice, Watch, What};
 use crate::stages::score::ScoreKeeper;
 use crate::stages::tray::Tray;
 use crate::stages::undo::Undo;
 use std::sync::Arc;
-use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardedWrench, SurfacePatch};
-use trepan_contact::{Vibration, Viscoelastic};
+use trepan_contact::{ContactManifold, ForceGuard, ForceModel, GuardedWrench, SurfacePatch};
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
-use trepan_rigid::{Method, RigidContact, RigidStep};
+use trepan_rigid::{RigidContact, RigidStep};
 use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
 
 /// Age up to which a patch gives its full force, ms.
 pub const FRESH_MS: f32 = 10.0;
 /// Age from which a patch gives no force, ms.
 pub const GONE_MS: f32 = 60.0;
-
-/// Configuration of a haptic stage.
-#[derive(Clone, Debug)]
-pub struct HapticConfig {
-    /// Program: its phases and tools.
-    pub program: Program,
-    /// Method of contact with bone.
-    pub rigid: Method,
-    /// Length of a tick, ms.
-    pub dt_ms: f32,
-    /// Force of bone: k in N/mm, b in N ms/mm, with the vibration of the drill.
-    pub bone_force: Vibration<Viscoelastic>,
-    /// Force of tissue: k in N/mm, b in N ms/mm.
-    pub tissue_force: Viscoelastic,
-    /// Configuration of the force guard.
-    pub guard: GuardConfig,
-    /// Thresholds of the warnings.
-    pub limits: Limits,
-    /// Whether tools for the brain require an open bone.
-    pub opening_needed: bool,
-    /// Whether the force stays off after a fault of the device until a deliberate action.
-    pub force_waits: bool,
-}
 
 /// Inputs of a tick.
 #[derive(Clone, Copy, Debug)]

@@ -6,6 +6,7 @@ pub(crate) mod collision_step;
 pub(crate) mod drill;
 pub(crate) mod fault;
 pub(crate) mod flap;
+pub(crate) mod haptic_config;
 pub(crate) mod haptic_tick;
 pub(crate) mod motion;
 pub(crate) mod notice;

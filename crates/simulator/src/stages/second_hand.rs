@@ -16,7 +16,7 @@
 //! To retract the brain: use the first hand.
 
 use crate::stages::fault::{AfterFault, DeviceStatus};
-use crate::stages::haptic_tick::HapticConfig;
+use crate::stages::haptic_config::HapticConfig;
 use crate::stages::notice::{Notice, What};
 use std::sync::Arc;
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardCounters, GuardedWrench, Viscoelastic};

@@ -16,6 +16,7 @@ use super::base::{Anatomy, smooth};
 use super::recipe::HeadRecipe;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::ops::{Add, Mul};
 use trepan_volume::{DistanceField, VoxelVolume};
 
 /// Distance from the cavity within which bone changes its thickness, mm: adult vault plus a margin.
@@ -133,7 +134,7 @@ impl Flow {
     fn at(&self, point: Vec3) -> Vec3 {
         let volume = &self.velocities;
         let (origin, edge) = (volume.world_from_voxel.translation.as_vec3(), volume.spacing_mm().x as f32);
-        super::warp::between(volume, (point - origin) / edge)
+        between(volume, (point - origin) / edge)
     }
 }
 
@@ -170,6 +171,20 @@ impl Thickening {
     fn of(self, distance: f32) -> f32 {
         -self.log * distance.clamp(0.0, self.limit_mm)
     }
+}
+
+/// Trilinear interpolation at continuous indices, clamped to the border.
+pub fn between<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(volume: &VoxelVolume<T>, place: Vec3) -> T {
+    let last = Vec3::from_array(volume.dims.map(|n| (n - 1) as f32));
+    let p = place.clamp(Vec3::ZERO, last);
+    let at = p.min(last - 1.0).as_uvec3();
+    let f = p - at.as_vec3();
+    let [nx, ny, _] = volume.dims;
+    let first = at.x as usize + nx * (at.y as usize + ny * at.z as usize);
+    let data = &volume.data;
+    let line = |from: usize| data[from] * (1.0 - f.x) + data[from + 1] * f.x;
+    let plane = |from: usize| line(from) * (1.0 - f.y) + line(from + nx) * f.y;
+    plane(first) * (1.0 - f.z) + plane(first + nx * ny) * f.z
 }
 
 #[cfg(test)]

@@ -1,12 +1,11 @@
 //! Map from a new head to its base, tabulated on a grid of nodes.
 
 use super::base::BaseHead;
-use super::local::Local;
+use super::local::{Local, between};
 use super::recipe::{HeadRecipe, random_of};
 use super::spline::Spline;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
-use std::ops::{Add, Mul};
 use trepan_volume::VoxelVolume;
 
 /// Spacing of the nodes, mm.
@@ -162,20 +161,6 @@ impl Warp {
     fn node(&self, point: DVec3) -> Vec4 {
         between(&self.nodes, ((point - self.nodes.world_from_voxel.translation) / NODE_MM).as_vec3())
     }
-}
-
-/// Trilinear interpolation at continuous indices, clamped to the border.
-pub fn between<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(volume: &VoxelVolume<T>, place: Vec3) -> T {
-    let last = Vec3::from_array(volume.dims.map(|n| (n - 1) as f32));
-    let p = place.clamp(Vec3::ZERO, last);
-    let at = p.min(last - 1.0).as_uvec3();
-    let f = p - at.as_vec3();
-    let [nx, ny, _] = volume.dims;
-    let first = at.x as usize + nx * (at.y as usize + ny * at.z as usize);
-    let data = &volume.data;
-    let line = |from: usize| data[from] * (1.0 - f.x) + data[from + 1] * f.x;
-    let plane = |from: usize| line(from) * (1.0 - f.y) + line(from + nx) * f.y;
-    plane(first) * (1.0 - f.z) + plane(first + nx * ny) * f.z
 }
 
 /// Affine map from the base to the new head, about the brain's centre.
