@@ -55,7 +55,9 @@ pub(super) fn first_spacing(regions: &Regions, config: &Config) -> f64 {
 pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -> Result<LabelledMesh, MeshError> {
     let wanted = config.target_tets;
     let power = if levels(config) == 0 { 1.0 / 3.0 } else { 0.4 };
-    let mut best = (f64::INFINITY, LabelledMesh::default(), regions.levels.clone(), spacing);
+    let meets = |tets: usize| tets.abs_diff(wanted) * 10 <= wanted;
+    // A mesh that meets the count is better than any that does not.
+    let mut best = ((true, f64::INFINITY), LabelledMesh::default(), regions.levels.clone(), spacing);
     let mut stride = Stride::of(regions.names.len());
     for trial in 0..TRIALS {
         let Some(lattice) = lattice(regions, config, spacing, trial) else { break };
@@ -68,8 +70,9 @@ pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -
         let balance = Balance::of(&labelled, regions);
         let volume_fault = balance.fault(regions, spacing);
         let fault = ((share - 1.0).abs() / COUNT_TOLERANCE).max(volume_fault);
-        if fault < best.0 {
-            best = (fault, labelled, regions.levels.clone(), spacing);
+        let rank = (!meets(labelled.mesh.tets.len()), fault);
+        if rank < best.0 {
+            best = (rank, labelled, regions.levels.clone(), spacing);
         }
         if fault < 1.0 {
             break;
@@ -82,7 +85,7 @@ pub(super) fn search(regions: &mut Regions, config: &Config, mut spacing: f64) -
     let (_, mut labelled, levels, spacing) = best;
     regions.levels = levels;
     let nearest = labelled.mesh.tets.len();
-    if nearest.abs_diff(wanted) * 10 > wanted {
+    if !meets(nearest) {
         return Err(MeshError::Target { wanted, nearest });
     }
     polish::polish(&mut labelled, spacing, regions);
