@@ -2,7 +2,10 @@
 // velocities v that nodes would have without the springs to come: d = d_rest + Σ w u·n    p =
 // max(0, (k (d + dt v̄) + b (v̄ - v_tool)) / (1 + gain (k dt + b) Σ w²/m)) What slides across the
 // normal of a pressing spring is damped, node by node. Planes, springs of one node each and no two
-// of the same, follow side by side; they damp sliding as they damp the normal velocity.
+// of the same, follow side by side; they damp sliding by how deep their node is.
+// Depth from which sliding along a plane is damped as strongly as the normal velocity.
+const SLIDING_FULL_MM = 0.2;
+
 struct Spring {
     // Unit vector out of the tissue.
     normal: vec3f,
@@ -102,7 +105,8 @@ fn free_velocity(at: vec4u) -> vec3f {
         let coming = dot(velocity, plane.normal);
         let force = pressed(plane, depth, coming);
         of_planes += force;
-        let brake = select(0.0, plane.damping / (1.0 + now.gain * bitcast<f32>(at.z) * plane.damping), depth > 0.0);
+        let braking = plane.damping * clamp(depth / SLIDING_FULL_MM, 0.0, 1.0);
+        let brake = braking / (1.0 + now.gain * bitcast<f32>(at.z) * braking);
         pushed[at.x] -= vec4f(plane.normal * force + (velocity - plane.normal * coming) * brake, 0.0);
     }
     sums[lane] = vec2f(of_planes, 0.0);

@@ -7,12 +7,19 @@
 //! changes: a spring that several nodes share, with weights found anew in each collision step,
 //! passes force from node to node as the weights move, and light nodes ring.
 //!
+//! Sliding is damped by `-b min(d / 0.2 mm, 1)`, as in a film of fluid that is pressed out. A brake
+//! that is whole from the first contact holds back nodes that barely touch; where they lift off,
+//! the tissue that lagged behind jumps.
+//!
 //! # Practice
 //! A plane may be sent before its node touches: a negative depth exerts nothing, and the solver
 //! finds the moment of contact with its own positions, however late the next collision result is.
 
 use crate::NodalContact;
 use trepan_geometry::Vec3;
+
+/// Depth from which sliding is damped as strongly as the normal velocity, mm.
+pub const SLIDING_FULL_MM: f32 = 0.2;
 
 /// A unilateral spring between one node and a plane. Plain data, 28 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,7 +32,7 @@ pub struct PlaneContact {
     pub offset_mm: f32,
     /// Spring stiffness k, N/mm.
     pub stiffness: f32,
-    /// Damping b, N ms/mm, of the normal velocity while the node presses, and of sliding.
+    /// Damping b, N ms/mm, of the normal velocity while the node presses.
     pub damping: f32,
 }
 
@@ -34,15 +41,20 @@ impl PlaneContact {
     pub fn depth_mm(&self, position: Vec3) -> f32 {
         self.offset_mm + position.dot(self.normal)
     }
+
+    /// Damping of sliding at a depth in mm, N ms/mm: 0 without contact, continuous.
+    pub fn sliding_damping(&self, depth_mm: f32) -> f32 {
+        self.damping * (depth_mm / SLIDING_FULL_MM).clamp(0.0, 1.0)
+    }
 }
 
-/// The same contact in the form of a spring on several nodes.
+/// The same contact in the form of a spring on several nodes, without its damping of sliding.
 impl From<PlaneContact> for NodalContact {
     fn from(plane: PlaneContact) -> Self {
         let PlaneContact { node, normal, offset_mm, stiffness, damping } = plane;
         let mut spring = Self::none();
         (spring.normal, spring.offset_mm) = (normal, offset_mm);
-        (spring.stiffness, spring.damping, spring.lateral_damping) = (stiffness, damping, damping);
+        (spring.stiffness, spring.damping) = (stiffness, damping);
         spring.add(node, 1.0);
         spring
     }
@@ -63,5 +75,12 @@ mod tests {
             assert!((plane.depth_mm(at) - (z - 1.0)).abs() < 1e-6);
         }
         assert_eq!(spring.nodes().collect::<Vec<_>>(), [(3, 1.0)]);
+    }
+
+    #[test]
+    fn it_damps_sliding_by_how_deep_the_node_is() {
+        let plane = PlaneContact { damping: 0.5, ..PlaneContact::default() };
+        let damping = [-1.0, 0.0, 0.05, 0.1, 0.2, 3.0].map(|depth_mm| plane.sliding_damping(depth_mm));
+        assert_eq!(damping, [0.0, 0.0, 0.125, 0.25, 0.5, 0.5]);
     }
 }

@@ -9,7 +9,9 @@
 //! n = -g     d = -φ     offset = d - x·n     force on the node: -(k d + b ẋ·n) n, d > 0
 //! ```
 //! k and b are those of the node's share of the border, a third of the triangles around it, so that
-//! a finer mesh meets the same wall. The force is along the normal only, so the tissue slides.
+//! a finer mesh meets the same wall. The spring is along the normal only, so the tissue slides; its
+//! damping ([`PlaneContact::sliding_damping`]) keeps nodes from chattering on curved walls, where
+//! the normal turns a step after the node slid.
 //! Springs that nodes share are no substitute: their weights change with every collision step, and
 //! a node's own force is then explicit whatever the solver does; nodes of under 0.1 g ring without
 //! end.

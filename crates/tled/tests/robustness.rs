@@ -77,7 +77,9 @@ fn a_step_over_the_bound_explodes_when_obeyed_and_is_cut_by_default() {
     let mut cut = shaken(&Config::default(), 0.01);
     for _ in 0..400 {
         let report = cut.step(&Loads::default(), dt);
-        assert_eq!((report.substeps, report.limited, report.non_finite, report.skipped_ms), (3, 0, 0, 0.0));
+        // Three by the step at rest, four by the elements' of the shaken body.
+        assert!((3..=4).contains(&report.substeps), "{}", report.substeps);
+        assert_eq!((report.limited, report.non_finite, report.skipped_ms), (0, 0, 0.0));
     }
     assert!(offset(&cut) < 0.02);
     let report = cut.step(&Loads::default(), 100.0);
