@@ -1,7 +1,11 @@
 // Forces of the elements of one law on their four nodes, each to its own slot.
-//   P = F S + (q + κ (J̄ - 1 - w²)) C    f_a = -V P ∇N_a    w = (0.3 - J)/0.3 between 0 and 1
+//   P = F S + (q + κ (J̄ - 1 - p)) C    f_a = -V P ∇N_a
+//   p = w² (1 + 4 w²)                  w = (0.3 - J)/0.3 between 0 and 1
 // J̄ = J, or the mean of the corners' node groups with averaged pressure. The slot of corner 0 also
 // carries the growth of the element's ω² since rest, negative where J ≤ 0.
+// Part b of p = w² (1 + b w²), as in the processor's law.
+const STEEPENING = 4.0;
+
 struct Range { first: u32, count: u32 }
 @group(0) @binding(4) var<storage, read_write> forces: array<vec4f>;
 // Further constants of the laws that have more than two.
@@ -23,9 +27,11 @@ fn continued(d: Deformation, at: f32, n: f32) -> vec2f {
     return vec2f(at + slope * (d.j - d.clamped), slope);
 }
 
-// w: how short of the volume ratio 0.3 the element is.
-fn short_of(d: Deformation) -> f32 {
-    return min((d.clamped - d.j) * (1.0 / 0.3), 1.0);
+// Pressure p that resists inversion, and its slope against -J.
+fn resistance(d: Deformation) -> vec2f {
+    let w = min((d.clamped - d.j) * (1.0 / 0.3), 1.0);
+    let steep = STEEPENING * w * w;
+    return vec2f(w * w * (1.0 + steep), w * (2.0 + 4.0 * steep) * (1.0 / 0.3));
 }
 
 // A bound of the largest eigenvalue of CᵀC.
@@ -43,7 +49,7 @@ fn stiffness(stress: Stress, m: vec2f, d: Deformation, swollen: f32) -> f32 {
     let off = abs(s[3]) + abs(s[4]) + abs(s[5]);
     let inverse = d.root * d.root * d.root;
     let i1 = dot(d.f[0], d.f[0]) + dot(d.f[1], d.f[1]) + dot(d.f[2], d.f[2]);
-    let volume = m.y * (1.0 + short_of(d) * (2.0 / 0.3)) + 5.0 / 9.0 * m.x * i1 * (inverse * inverse * d.root * d.root);
+    let volume = m.y * (1.0 + resistance(d).y) + 5.0 / 9.0 * m.x * i1 * (inverse * inverse * d.root * d.root);
     let turning = abs(stress.q + m.y * swollen) * sqrt(i1);
     return abs(s[0]) + abs(s[1]) + abs(s[2]) + off + off + volume * largest_eigenvalue(d.cof) + turning;
 }
@@ -86,7 +92,7 @@ fn pressed(stress: Stress, f: vec3f, c: vec3f) -> vec3f {
         let node_group = corners[2u * now.elements + e];
         swollen = (volume_change[node_group.x] + volume_change[node_group.y] + volume_change[node_group.z] + volume_change[node_group.w]) * 0.25;
     }
-    swollen -= short_of(d) * short_of(d);
+    swollen -= resistance(d).x;
     let at_rest = (3.0 + sqrt(3.0)) * abs(stress_at_rest(constants)) + m.y + 5.0 / 3.0 * m.x;
     let growth = max(d.c.w * (stiffness(found, m, d, swollen) - at_rest), 1e-30);
     if RELAXES { found = relaxed(e, found, d); }

@@ -46,7 +46,7 @@ pub use bound::{
     power_bound_of_ms,
 };
 pub use contact::{FreeNode, Gain, ImplicitSprings};
-pub use energy::{FADE_BELOW, NeoHookean};
+pub use energy::{FADE_BELOW, NeoHookean, STEEPENING};
 pub use law::{LEAST_STRETCH, Law};
 pub use material::{Material, MaterialError};
 pub use method::{Descriptor, Method};

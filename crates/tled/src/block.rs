@@ -145,8 +145,8 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Pass for Forces<'_, M, 
                 let (gradients, constants) = (block.gradients::<L>(part), load::<L, K>(&block.constants, part));
                 let d = deformation(&moved.edges, &gradients);
                 let mut stress = M::stress(&constants, &d);
-                let (short, own) = (d.short(), d.j - L::splat(1.0));
-                let volume_change = if self.averaged_pressure { moved.mean } else { own } - short * short;
+                let (own, (resistance, _)) = (d.j - L::splat(1.0), d.resistance());
+                let volume_change = if self.averaged_pressure { moved.mean } else { own } - resistance;
                 let moduli = M::moduli(&constants);
                 let gained = stiffness(&stress, moduli, &d, volume_change)
                     - stiffness_at_rest(M::stress_at_rest(&constants), moduli);

@@ -3,10 +3,10 @@
 //! # Theory
 //! ```text
 //! H = Σ_a (u_a - u_0) ⊗ ∇N_a, a = 1..3     F = I + H     C = cof F     J = det F
-//! P = F S + (q + κ (J̄ - 1 - w²)) C     f_a = -V P ∇N_a, a = 1..3     f_0 = -(f_1 + f_2 + f_3)
+//! P = F S + (q + κ (J̄ - 1 - p)) C      f_a = -V P ∇N_a, a = 1..3     f_0 = -(f_1 + f_2 + f_3)
 //! ```
 //! S and q come from the material. J̄ is J, or with averaged pressure the mean volume ratio of the
-//! corners' node groups.
+//! corners' node groups; p resists inversion (`law.rs`).
 
 use crate::lane::Lane;
 use crate::law::{Deformation, Stress};
@@ -106,7 +106,7 @@ mod tests {
         let constants = M::constants(law, shape.volume_mm3).map(L::splat);
         let d = deformation(&edges.map(|e| e.map(L::splat)), &gradients);
         let mut stress = M::stress(&constants, &d);
-        stress.q = stress.q + M::moduli(&constants).1 * (d.j - L::splat(1.0) - d.short() * d.short());
+        stress.q = stress.q + M::moduli(&constants).1 * (d.j - L::splat(1.0) - d.resistance().0);
         forces(&stress, M::ROUND, &d, &gradients)
     }
 

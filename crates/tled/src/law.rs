@@ -1,7 +1,7 @@
 //! Constitutive laws of the kernels, in f32, for one element or several at once.
 //!
 //! # Theory
-//! Every law is written as `P = F S + (q_iso + κ (J - 1 - w²)) cof F`, S a symmetric tensor:
+//! Every law is written as `P = F S + (q_iso + κ (J - 1 - p)) cof F`, S a symmetric tensor:
 //! ```text
 //! neo-Hookean          S = μ g I                                     q_iso = μ/2 g' I₁
 //! St. Venant-Kirchhoff S = (λ tr E - μ) I + μ FᵀF                    q_iso = 0, no κ term
@@ -9,11 +9,12 @@
 //! Ogden                S = Σ_i s_i n_i n_iᵀ, s_i = Σ_p μ_p'/α_p g_p λ_i^(α_p-2)   (μ' = 2 μ)
 //! ```
 //! `g = J^(-2/3)`, `h = J^(-4/3)`, `g_p = J^(-α_p/3)`, continued linearly below J = 0.3;
-//! `w = (0.3 - J)/0.3` between 0 and 1. Why, says `trepan_soft::Law`, the f64 version of this file.
+//! `p = w² (1 + 4 w²)` resists inversion, `w = (0.3 - J)/0.3` between 0 and 1. Its reasons stand in
+//! `trepan_soft::Law`, the f64 version of this file.
 
 use crate::lane::Lane;
 use crate::principal::principal;
-use trepan_soft::{FADE_BELOW, LEAST_STRETCH, Law};
+use trepan_soft::{FADE_BELOW, LEAST_STRETCH, Law, STEEPENING};
 
 /// Deformation of an element as the laws need it.
 pub(crate) struct Deformation<L> {
@@ -68,9 +69,19 @@ impl<L: Lane> Deformation<L> {
 
     /// How short of the volume ratio 0.3 the element is, as a share of it, up to 1.
     #[inline(always)]
-    pub fn short(&self) -> L {
+    fn short(&self) -> L {
         let share = (self.clamped - self.j) * L::splat((1.0 / FADE_BELOW) as f32);
         share - (share - L::splat(1.0)).at_least(0.0)
+    }
+
+    /// Pressure that resists inversion, as a multiple of κ, and its slope against -J.
+    #[inline(always)]
+    pub fn resistance(&self) -> (L, L) {
+        let short = self.short();
+        let squared = short * short;
+        let steep = L::splat(STEEPENING as f32) * squared;
+        let slope = short * (L::splat(2.0) + L::splat(4.0) * steep) * L::splat((1.0 / FADE_BELOW) as f32);
+        (squared * (L::splat(1.0) + steep), slope)
     }
 
     /// FᵀF.

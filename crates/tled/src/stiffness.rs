@@ -1,8 +1,8 @@
 //! Bound on the stiffness of a deformed element, from which the stable step is updated.
 //!
 //! # Theory
-//! The tangent `∂P/∂F` of `P = F S + (q + κ (J̄-1-w²)) C` is at most
-//! `A = Σ|S_ij| + (κ (1 + 2 w/0.3) + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J̄-1-w²)| √I₁`: the
+//! The tangent `∂P/∂F` of `P = F S + (q + κ (J̄-1-p)) C` is at most
+//! `A = Σ|S_ij| + (κ (1 - p') + 5/9 μ I₁ J₀^(-8/3)) λ_max(CᵀC) + |q + κ (J̄-1-p)| √I₁`: the
 //! stress itself, the resistance to a change of volume, and its rotation. The largest eigenvalue of
 //! a symmetric 3×3 matrix B is at most `m + 2 p`, `m = tr B/3`, `p² = |B - m I|²/6`, and exactly
 //! that when two are equal. At rest S is `s I` and q is `-s`, so that
@@ -14,7 +14,6 @@
 
 use crate::lane::Lane;
 use crate::law::{Deformation, Stress};
-use trepan_soft::FADE_BELOW;
 
 /// The bound A times rest volume, from the isochoric stress and (μ V, κ V).
 #[inline(always)]
@@ -25,8 +24,8 @@ pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &De
     let inverse = d.root * d.root * d.root;
     let power = inverse * inverse * d.root * d.root;
     let i1 = squared(&d.f[0]) + squared(&d.f[1]) + squared(&d.f[2]);
-    let wall = kappa * d.short() * L::splat((2.0 / FADE_BELOW) as f32);
-    let volume = kappa + wall + L::splat(5.0 / 9.0) * mu * i1 * power;
+    let resistance = kappa * d.resistance().1;
+    let volume = kappa + resistance + L::splat(5.0 / 9.0) * mu * i1 * power;
     let turning = magnitude(stress.q + kappa * volume_change) * i1.sqrt();
     itself + volume * largest_eigenvalue(&d.c) + turning
 }
@@ -102,7 +101,7 @@ mod tests {
             let d = deformation(&[[x[0], x[1], x[2]], [x[3], x[4], x[5]], [x[6], x[7], x[8]]], &unit);
             let law = Law::NeoHookean(trepan_soft::NeoHookean { mu: 1.0, kappa: 9.0 });
             let constants = NeoHookean::constants(&law, 1.0);
-            let bound = stiffness(&NeoHookean::stress(&constants, &d), NeoHookean::moduli(&constants), &d, d.j - 1.0 - d.short() * d.short());
+            let bound = stiffness(&NeoHookean::stress(&constants, &d), NeoHookean::moduli(&constants), &d, d.j - 1.0 - d.resistance().0);
             let f = DMat3::from_cols_array(&[
                 d.f[0][0], d.f[1][0], d.f[2][0], d.f[0][1], d.f[1][1], d.f[2][1], d.f[0][2], d.f[1][2], d.f[2][2],
             ].map(f64::from));
