@@ -233,6 +233,8 @@ fn row_of_ride(head: &str, place: &str, quality: &str, session: Result<Session>,
         .metric("rest_motion_mm", ride.solver_faults.rest_motion_mm.into())
         .metric("inverted", ride.solver_faults.inverted as f64)
         .metric("non_finite", ride.solver_faults.non_finite as f64)
+        .metric("limited", ride.solver_faults.limited as f64)
+        .metric("skipped_ms", ride.solver_faults.skipped_ms)
         .metric("contacts_left_out", ride.solver_faults.contacts_left_out as f64)
         .metric("falsely_pressed", ride.falsely_pressed.into())
         .metric("pressed", ride.pressed.into())
@@ -265,6 +267,7 @@ pub fn judge(_: Scope, findings: &mut Findings) {
         ("operations with motion over 0.02 mm in a step at rest", all("rest_motion_mm", &over(0.02))),
         ("operations with inverted elements", all("inverted", &over(0.0))),
         ("operations with nodes that were not finite", all("non_finite", &over(0.0))),
+        ("operations with nodes clamped to a limit", all("limited", &over(0.0))),
         ("operations with contacts left out", all("contacts_left_out", &over(0.0))),
         ("operations with a false \"brain is pressed hard\"", all("falsely_pressed", &over(0.0))),
         (
@@ -297,6 +300,7 @@ mod tests {
             ("rest_motion_mm", 0.01),
             ("inverted", 0.0),
             ("non_finite", 0.0),
+            ("limited", 0.0),
             ("contacts_left_out", 0.0),
             ("falsely_pressed", 0.0),
             ("drill_on_brain_warned", 1.0),
@@ -324,6 +328,7 @@ mod tests {
             ("rest_motion_mm", 0.03),
             ("inverted", 1.0),
             ("non_finite", 1.0),
+            ("limited", 1.0),
             ("contacts_left_out", 1.0),
             ("falsely_pressed", 1.0),
             ("drill_on_brain_warned", 0.0),
