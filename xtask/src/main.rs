@@ -88,10 +88,12 @@ fn run() -> Result<()> {
     }
 }
 
-/// The program of all suites, in release mode. Not quietly: cargo says when it builds or waits for
-/// another build.
+/// Starts the program of all suites, in release mode. Not quietly: cargo reports that it builds or
+/// waits for another build.
+const VALIDATE: [&str; 7] = ["run", "--release", "--package", "trepan-trials", "--bin", "validate", "--"];
+
 fn validate(arguments: &[String]) -> Result<()> {
-    cargo(&["run", "--release", "--package", "trepan-trials", "--bin", "validate", "--"], arguments)
+    cargo(&VALIDATE, arguments)
 }
 
 /// The steps of CI in the order in which they fail fastest.
@@ -179,4 +181,12 @@ fn report(name: &str, faults: Vec<String>) -> Result<()> {
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies in the workspace").to_path_buf()
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_validation_that_waits_for_another_build_reports_it() {
+        assert!(super::VALIDATE.iter().all(|argument| !["--quiet", "-q"].contains(argument)));
+    }
 }

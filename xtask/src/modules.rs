@@ -23,6 +23,7 @@ struct Modules {
 /// Circles of sibling modules under a crate's `src`, each one line.
 pub fn circles(name: &str, src: &Path) -> Result<Vec<String>> {
     let mut modules = Modules::default();
+    let mut tests = Vec::new();
     for file in rust_files(src)? {
         let inside = file.strip_prefix(src)?.with_extension("");
         let mut path: ModulePath = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
@@ -33,8 +34,10 @@ pub fn circles(name: &str, src: &Path) -> Result<Vec<String>> {
             path.pop();
         }
         let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", file.display()))?;
+        tests.extend(test_modules(&text).map(|name| [&path[..], &[name.to_owned()]].concat()));
         modules.code.insert(path, without_tests(&text));
     }
+    modules.code.retain(|path, _| !tests.iter().any(|test| path.starts_with(test)));
     Ok(modules.circles().into_iter().map(|circle| format!("{name}: {circle}")).collect())
 }
 
@@ -188,6 +191,13 @@ fn expand(tree: &str, before: &[String], paths: &mut Vec<ModulePath>) {
     }
 }
 
+/// Names of the modules that a file declares for its tests, each in a file of its own.
+fn test_modules(text: &str) -> impl Iterator<Item = &str> {
+    let lines = text.lines().map(str::trim);
+    let pairs = lines.clone().zip(lines.skip(1)).filter(|(above, _)| *above == "#[cfg(test)]");
+    pairs.filter_map(|(_, line)| line.strip_suffix(';')?.rsplit_once("mod ").map(|(_, name)| name))
+}
+
 /// The code of a file without comments and without what `#[cfg(test)]` stands before.
 pub fn without_tests(text: &str) -> String {
     let mut code = String::new();
@@ -237,6 +247,8 @@ mod tests {
         assert!(without_tests(test).ends_with("fn f() {}\n") && !without_tests(test).contains("super"));
         let b = "// crate::a::A\npub struct B;\n#[cfg(test)]\nmod tests {\n    use crate::a::A;\n}\n";
         assert!(found(&[("a", test), ("b", b), ("", "mod a;\nmod b;\n")]).is_empty());
+        assert_eq!(test_modules("mod a;\n#[cfg(test)]\nmod tests;\nmod b;\n").collect::<Vec<_>>(), ["tests"]);
+        assert_eq!(test_modules("#[cfg(test)]\npub(super) mod tests {\n").count(), 0);
         assert!(found(&[("a", "mod c;\nuse c::C;\n"), ("a::c", "use super::D;\n")]).is_empty(), "child and parent");
     }
 }

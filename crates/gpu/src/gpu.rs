@@ -1,6 +1,6 @@
 //! The graphics device: adapter, limits, faults.
 
-use crate::{GpuError, Recorder};
+use crate::GpuError;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -121,11 +121,6 @@ impl Gpu {
         let log = &self.inner.faults;
         let copy = |m: &Mutex<Option<String>>| m.lock().unwrap_or_else(PoisonError::into_inner).clone();
         Faults { count: log.count.load(Ordering::Relaxed), first: copy(&log.first), lost: copy(&log.lost) }
-    }
-
-    /// Starts a list of passes.
-    pub fn record(&self, label: &str) -> Recorder<'_> {
-        Recorder::new(self, label)
     }
 
     /// Waits until all submitted work is done.

@@ -50,6 +50,13 @@ pub struct Draws<'p> {
     pass: wgpu::RenderPass<'p>,
 }
 
+impl Gpu {
+    /// Starts a list of passes.
+    pub fn record(&self, label: &str) -> Recorder<'_> {
+        Recorder::new(self, label)
+    }
+}
+
 impl<'a> Recorder<'a> {
     pub(crate) fn new(gpu: &'a Gpu, label: &str) -> Self {
         let encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) });

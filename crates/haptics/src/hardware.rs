@@ -1,7 +1,7 @@
 //! Opens hardware devices by the name that a user gave.
 
 use crate::{DeviceError, DeviceName, HapticDevice, Listed, Watch, Workspace};
-use crate::{force_dimension, haply, openhaptics, spacemouse};
+use crate::{force_dimension, haply, openhaptics, script, spacemouse};
 
 /// A hardware device and the watch on its faults.
 pub struct Hardware {
@@ -42,9 +42,20 @@ pub fn open(name: &DeviceName, workspace: Workspace) -> Option<Result<Hardware, 
     }
 }
 
+/// Lists every device that a user can request, and whether it is available.
+pub fn list() -> Vec<Listed> {
+    let ready = |name: String, state: &str| Listed { name, state: state.to_owned() };
+    let mut listed = vec![ready("mouse".to_owned(), "ready where there is a window")];
+    listed.extend(script::NAMES.map(|name| ready(format!("script:{name}"), "ready")));
+    listed.extend(script::NAMES.map(|name| ready(format!("simulated:{name}"), "ready")));
+    listed.push(ready("replay:FILE".to_owned(), "ready"));
+    listed.extend(connected());
+    listed
+}
+
 /// Lists the hardware that a user can open: each connected device by name, or what is missing.
 /// Devices are not opened: that could move them.
-pub(crate) fn list() -> Vec<Listed> {
+fn connected() -> Vec<Listed> {
     let one = |name: &str, found: Result<String, DeviceError>| Listed {
         name: name.to_owned(),
         state: found.unwrap_or_else(|error| error.to_string()),
@@ -73,11 +84,19 @@ mod tests {
 
     #[test]
     fn the_list_says_what_is_missing_and_what_to_do() {
-        for listed in list() {
+        for listed in connected() {
             let absent = listed.state.contains(';') && listed.state.starts_with("cannot ");
             let present = listed.state.contains("ready") || listed.state.contains("installed");
             assert!(absent || present, "{}: {}", listed.name, listed.state);
             assert!(listed.name.parse::<DeviceName>().is_ok());
+        }
+    }
+
+    #[test]
+    fn every_listed_name_parses() {
+        for listed in list() {
+            assert!(listed.name.parse::<DeviceName>().is_ok(), "{}", listed.name);
+            assert!(!listed.state.is_empty());
         }
     }
 }

@@ -38,7 +38,8 @@ pub use clutch::Clutch;
 pub use device::{Capabilities, HapticDevice, Reading, Status};
 pub use error::DeviceError;
 pub use fault::{Fault, Watch};
-pub use name::{DeviceName, Listed, NameError, list};
+pub use hardware::list;
+pub use name::{DeviceName, Listed, NameError};
 pub use threaded::ThreadedDevice;
 pub use workspace::Workspace;
 

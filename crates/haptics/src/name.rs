@@ -156,17 +156,6 @@ pub struct Listed {
     pub state: String,
 }
 
-/// Lists every device that a user can request, and whether it is available.
-pub fn list() -> Vec<Listed> {
-    let ready = |name: String, state: &str| Listed { name, state: state.to_owned() };
-    let mut listed = vec![ready("mouse".to_owned(), "ready where there is a window")];
-    listed.extend(script::NAMES.map(|name| ready(format!("script:{name}"), "ready")));
-    listed.extend(script::NAMES.map(|name| ready(format!("simulated:{name}"), "ready")));
-    listed.push(ready("replay:FILE".to_owned(), "ready"));
-    listed.extend(crate::hardware::list());
-    listed
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -212,13 +201,5 @@ mod tests {
         assert!(error("replay:").contains("file"));
         assert!(error("mouse:2").contains("takes no \"2\""));
         assert!(error("force-dimension:left").contains("0 to 127"));
-    }
-
-    #[test]
-    fn every_listed_name_parses() {
-        for listed in list() {
-            assert!(listed.name.parse::<DeviceName>().is_ok(), "{}", listed.name);
-            assert!(!listed.state.is_empty());
-        }
     }
 }

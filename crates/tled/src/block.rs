@@ -13,19 +13,13 @@
 //! so that every kernel sums in the same order.
 
 use crate::element::{deformation, forces};
-use crate::kernel::{Pass, PassReport};
-use crate::lane::Lane;
+use crate::lane::{Lane, Quad, WIDTH};
 use crate::law::{Constitutive, Stress};
+use crate::pass::{Pass, PassReport};
 use crate::relaxation::Fade;
 use crate::stiffness::{stiffness, stiffness_at_rest};
 use std::marker::PhantomData;
 use trepan_soft::{Material, Shape, element_omega2};
-
-/// Tetrahedra in a block.
-pub(crate) const WIDTH: usize = 16;
-
-/// A 16-byte row of four numbers: a node's displacement and `J - 1`, or a force and padding.
-pub(crate) type Quad = [f32; 4];
 
 /// Sixteen tetrahedra with K material constants each. Unused lanes have zero stiffness and add zero
 /// to node 0.

@@ -1,13 +1,13 @@
 //! The elements and nodes of a body, and their passes.
 
-use crate::block::WIDTH;
 use crate::config::Config;
 use crate::force_slots::ForceSlots;
-use crate::kernel::PassReport;
+use crate::lane::WIDTH;
 use crate::layout::{Layout, kind};
 use crate::node_groups::NodeGroups;
 use crate::nodes::{Nodes, Update};
 use crate::part::{Forcing, Part, PartGroups, Quiet};
+use crate::pass::PassReport;
 use crate::relaxation::Relaxation;
 use crate::scaling::Scaling;
 use crate::team::{Team, Work};

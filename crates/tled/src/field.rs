@@ -5,7 +5,7 @@
 //! that begin and end a round order these accesses, so the numbers themselves use relaxed loads and
 //! stores, as fast as plain memory.
 
-use crate::block::Quad;
+use crate::lane::Quad;
 use glam::Vec4;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 

@@ -1,6 +1,6 @@
 //! The kernels of the element forces, and their selection for this CPU.
 
-use crate::lane::Lane;
+use crate::pass::{Pass, PassReport};
 #[cfg(target_arch = "x86_64")]
 use crate::x86;
 use wide::f32x8;
@@ -18,21 +18,6 @@ pub enum Kernel {
     Avx2,
     /// Sixteen elements at once with AVX-512 (servers, some PCs).
     Avx512,
-}
-
-/// Work over all blocks, generic over the register width. Implementations are always inlined.
-pub(crate) trait Pass {
-    /// Does the work with registers of type L.
-    fn run<L: Lane>(&mut self) -> PassReport;
-}
-
-/// Result of a pass over the elements.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct PassReport {
-    /// Elements with J ≤ 0.
-    pub inverted: u32,
-    /// Largest growth of a single element's ω² since rest, 1/ms²; 0 where none has grown.
-    pub growth: f32,
 }
 
 impl Kernel {

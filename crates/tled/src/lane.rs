@@ -4,9 +4,14 @@
 //! Uses only operations that IEEE 754 rounds exactly, and no fused ones, so every width gives the
 //! same bits on every machine.
 
-use crate::block::{Quad, WIDTH};
 use std::ops::{Add, Div, Mul, Sub};
 use wide::{f32x8, u32x8};
+
+/// Tetrahedra in a block.
+pub(crate) const WIDTH: usize = 16;
+
+/// A 16-byte row of four numbers: a node's displacement and `J - 1`, or a force and padding.
+pub(crate) type Quad = [f32; 4];
 
 /// A register of f32, one lane per element.
 ///

@@ -13,7 +13,7 @@
 //! `trepan_soft::Law`, the f64 version of this file.
 
 use crate::lane::Lane;
-use crate::principal::principal;
+use crate::principal::{Symmetric, principal};
 use trepan_soft::{FADE_BELOW, LEAST_STRETCH, Law, STEEPENING};
 
 /// Deformation of an element as the laws need it.
@@ -28,9 +28,6 @@ pub(crate) struct Deformation<L> {
     pub clamped: L,
     pub root: L,
 }
-
-/// A symmetric tensor as xx, yy, zz, xy, xz, yz.
-pub(crate) type Symmetric<L> = [L; 6];
 
 /// An isochoric stress, times rest volume: `P V = F s + q cof F`.
 pub(crate) struct Stress<L> {

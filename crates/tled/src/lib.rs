@@ -53,6 +53,7 @@ mod layout;
 mod node_groups;
 mod nodes;
 mod part;
+mod pass;
 mod principal;
 mod relaxation;
 mod scaling;

@@ -19,11 +19,13 @@
 //! Copies and sums of a part take 10 kB: they stay in the L1 cache while its elements are read in
 //! order.
 
-use crate::block::{Block, Forces, Memory, Quad, Volumes, WIDTH};
+use crate::block::{Block, Forces, Memory, Volumes};
 use crate::force_slots::ForceSlots;
-use crate::kernel::{Kernel, PassReport};
+use crate::kernel::Kernel;
+use crate::lane::{Quad, WIDTH};
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
 use crate::nodes::Nodes;
+use crate::pass::PassReport;
 use crate::relaxation::{Fade, Relaxation};
 use crate::scaling::Scaling;
 use glam::Vec4;

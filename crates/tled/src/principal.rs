@@ -6,7 +6,9 @@
 //! f32 precision. Equal eigenvalues need no special case.
 
 use crate::lane::Lane;
-use crate::law::Symmetric;
+
+/// A symmetric tensor as xx, yy, zz, xy, xz, yz.
+pub(crate) type Symmetric<L> = [L; 6];
 
 /// Computes eigenvalues and unit eigenvectors, unsorted.
 #[inline(always)]

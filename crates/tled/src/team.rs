@@ -12,9 +12,10 @@
 //! Workers spin for a few microseconds after a round, then yield, then sleep.
 
 use crate::force_slots::ForceSlots;
-use crate::kernel::{Kernel, PassReport};
+use crate::kernel::Kernel;
 use crate::nodes::{Nodes, Update};
 use crate::part::{Forcing, Part, Quiet};
+use crate::pass::PassReport;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};

@@ -16,9 +16,8 @@
     reason = "the instructions are unsafe to call where the compiler cannot see that the CPU has them"
 )]
 
-use crate::block::{Quad, WIDTH};
-use crate::kernel::{Pass, PassReport};
-use crate::lane::{BIASED, FRACTION, Lane, ONE, ROOT_BITS, SIGN, WHOLE};
+use crate::lane::{BIASED, FRACTION, Lane, ONE, Quad, ROOT_BITS, SIGN, WHOLE, WIDTH};
+use crate::pass::{Pass, PassReport};
 use std::arch::x86_64::*;
 use std::mem::transmute;
 use std::ops::{Add, Div, Mul, Sub};

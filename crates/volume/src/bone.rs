@@ -28,13 +28,10 @@
 mod undo;
 
 use crate::VoxelVolume;
-use crate::stroke::Strokes;
+use crate::stroke::{BRICK, Strokes};
 use glam::{DVec3, IVec3};
 use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, Ordering};
 use trepan_geometry::{Aabb, Vec3};
-
-/// Edge of a brick in voxels.
-pub const BRICK: usize = 8;
 
 /// Density of air, HU: used outside the grid and for removed bone.
 pub const AIR_HU: i16 = -1000;

@@ -43,7 +43,7 @@ mod source;
 mod stroke;
 mod volume;
 
-pub use bone::{AIR_HU, BRICK, BoneError, BoneVolume};
+pub use bone::{AIR_HU, BoneError, BoneVolume};
 pub use brain::{
     BrainConfidence, BrainConfig, BrainFit, FoundBrain, MaskError, brain_by_mri, brain_fit, brain_mask,
     check_brain_mask, find_brain,
@@ -65,7 +65,7 @@ pub use sample::{ByteOrder, Number, Sample};
 pub use skull::{
     GREATEST_ISOVALUE, HounsfieldError, LEAST_ISOVALUE, bone_isovalue, hounsfield, is_ct, labels, skull_only,
 };
-pub use stroke::{MAX_STROKE_BRICKS, MAX_STROKES, Undone};
+pub use stroke::{BRICK, MAX_STROKE_BRICKS, MAX_STROKES, Undone};
 pub use volume::VoxelVolume;
 
 /// The README's example, compiled.

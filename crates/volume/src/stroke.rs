@@ -14,9 +14,10 @@
 //! Relaxed atomics: one thread writes, records and undoes. A copy is 1 kB and costs a quarter of a
 //! microsecond.
 
-use crate::bone::BRICK;
 use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, AtomicUsize, Ordering::Relaxed};
 
+/// Edge of a brick in voxels.
+pub const BRICK: usize = 8;
 /// Voxels in a brick.
 pub(crate) const BRICK_VOXELS: usize = BRICK * BRICK * BRICK;
 /// Most bricks stored for all strokes: 4 MB; at half a millimetre a voxel 256 cm³.

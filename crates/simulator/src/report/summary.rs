@@ -430,6 +430,13 @@ mod tests {
     }
 
     #[test]
+    fn pictures_are_told_by_the_second_of_drawing_not_of_the_session() {
+        let outcome = Outcome { seconds: 60.0, ..Outcome::default() };
+        let fps = |frames, drawn_s| Summary::new(About { frames, drawn_s, ..about() }, &outcome).fps;
+        assert_eq!([fps(300, 10.0), fps(0, 0.0)], [30.0, 0.0]);
+    }
+
+    #[test]
     fn each_stroke_that_came_through_has_its_time() {
         let notice = |time_ms: f64, what| crate::Notice { tick: 1, time_ms, what };
         let mut outcome = Outcome::default();

@@ -355,17 +355,7 @@ mod tests {
             keeper: Keeper::into_folder(Path::new("nowhere")),
             stop: Stop::default(),
         };
-        let input = WindowInput {
-            world_from_tool: Pose::IDENTITY,
-            pedal: false,
-            next_tool: false,
-            undo: false,
-            chosen: None,
-            actions: 0,
-            playback: None,
-            camera: Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0),
-            seconds: 0.0,
-        };
+        let input = input();
         assert!(window::Session::update(&mut show, &input).news.is_empty());
         watched.read(0.0);
         watched.read(1e4);
@@ -375,6 +365,45 @@ mod tests {
         assert!(!panel.finished && panel.news[0].contains("has ended"), "{:?}", panel.news);
         show.company.watching = None;
         assert!(window::Session::update(&mut show, &input).finished, "a session of one's own closes");
+    }
+
+    fn input() -> WindowInput {
+        WindowInput {
+            world_from_tool: Pose::IDENTITY,
+            pedal: false,
+            next_tool: false,
+            undo: false,
+            chosen: None,
+            actions: 0,
+            playback: None,
+            camera: Camera::viewed_from(Vec3::ZERO, Vec3::Y, 200.0),
+            seconds: 0.0,
+        }
+    }
+
+    /// A session that shows nothing.
+    struct Blank;
+
+    impl window::Session for Blank {
+        fn update(&mut self, _: &WindowInput) -> Panel {
+            Panel::default()
+        }
+
+        fn frame(&self, _: Camera) -> Frame<'_> {
+            unreachable!("nothing is drawn here")
+        }
+
+        fn capture(&mut self, _: Capture, _: Image) {}
+    }
+
+    #[test]
+    fn pictures_are_counted_with_the_time_from_the_first_to_the_newest() {
+        let mut counted = Counted { session: Blank, pictures: 0, seconds: [0.0; 2] };
+        for picture in 0..=20 {
+            let input = WindowInput { seconds: 5.0 + 0.1 * f64::from(picture), ..input() };
+            window::Session::update(&mut counted, &input);
+        }
+        assert_eq!((counted.pictures, counted.seconds), (21, [5.0, 7.0]));
     }
 
     #[test]
