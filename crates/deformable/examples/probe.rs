@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for method in Method::all().into_iter().filter(|m| only.as_deref().is_none_or(|name| m.name() == name)) {
         let config = Config { method, ..Config::default() };
         let mut collision = TissueCollision::new(&mesh, &Tool::probe(2.0), &config)?;
-        let steps = if method == Method::Brute { 5 } else { 400 };
+        let steps = if method.descriptor().is_oracle { 5 } else { 400 };
         let mut out = TissueStep::default();
         let mut us = Vec::new();
         let still = vec![Vec3::ZERO; mesh.positions.len()];

@@ -25,9 +25,10 @@
 //! a step's motion.
 
 use crate::{
-    BroadPhase, ConfigError,
-    broad::HashedGrid,
+    config::ConfigError,
     narrow::{Hits, NONE},
+    phase::BroadPhase,
+    rivals::HashedGrid,
     scene::Scene,
     step::{check_mesh, usual_cell_mm},
     surface::MovingSurface,

@@ -1,6 +1,6 @@
 //! What a user chooses, and what is refused.
 
-use crate::{Method, Response};
+use crate::method::{Method, Response};
 
 /// How the tool is tested against the tissue and how the tissue answers.
 #[derive(Clone, Debug, PartialEq)]

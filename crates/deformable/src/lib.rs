@@ -11,31 +11,37 @@
 //! [`MeshCollision`] is for two meshes or one against itself, [`SlidingWall`] for tissue in a
 //! hollow. [`TissueCollision::step`] runs in the collision thread, once for each new state of the
 //! tissue; it allocates nothing, and what it found is one plain struct, [`TissueStep`]. Searches
-//! are a closed list, [`Method`], with an f64 oracle among them.
+//! are described values, [`Method`]: [`search::walk`] is recommended, [`rivals`] has the others, an
+//! f64 oracle among them.
 //!
 //! # When not to use it
 //! For cutting: connections of the mesh are fixed.
 
 mod bodies;
-pub mod broad;
 mod config;
 mod extent;
+mod list;
 mod method;
 mod narrow;
+mod outcome;
+mod phase;
 mod response;
+pub mod rivals;
 mod scene;
-mod search;
+mod seam;
+pub mod search;
 mod step;
 mod surface;
 mod triangle;
 mod wall;
 
 pub use bodies::{MeshCollision, NodeContact, push_apart, push_itself_apart};
-pub use broad::BroadPhase;
 pub use config::{Config, ConfigError};
-pub use method::Method;
-pub use response::Response;
-pub use step::{TissueCollision, TissueStep};
+pub use method::{Descriptor, Method, Response};
+pub use outcome::TissueStep;
+pub use phase::{BroadPhase, Phased};
+pub use seam::{Search, SearchInputs};
+pub use step::TissueCollision;
 pub use wall::{Hollow, SlidingWall};
 
 #[doc = include_str!("../README.md")]

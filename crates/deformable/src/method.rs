@@ -1,118 +1,88 @@
-//! The ways to find which tool points lie in which tetrahedra, as one closed list.
+//! A method as a value: what it says of itself.
+//!
+//! # Practice
+//! A method is one file with a [`BroadPhase`](crate::BroadPhase) and a [`Descriptor`]. `Method::of`
+//! makes it usable from any crate (`tests/toy_method.rs`); a `mod` line and its name in `list.rs`
+//! bring it to the command lines, suites and charts.
 
-use crate::Response;
+use crate::seam::{Search, SearchInputs};
 
-/// How the points inside the tissue are found. The list feeds tests, charts and command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Method {
-    /// Every point against every tetrahedron in f64: the oracle, slow and obvious.
-    Brute,
-    /// Every tetrahedron's box against the tool's box, then the exact test: the plain baseline.
-    Scan,
-    /// Points in a uniform grid, every tetrahedron's box against its cells (Teschner et al. 2003,
-    /// as an array).
-    UniformGrid,
-    /// The same with a hash table and time stamps (Teschner et al. 2003).
-    HashedGrid,
-    /// Points in an octree, made anew at every step (Meagher 1982).
-    Octree,
-    /// Points in a k-d tree, made anew at every step (Bentley 1975).
-    KdTree,
-    /// A tree of boxes, refitted bottom-up (van den Bergen 1997).
-    AabbTree,
-    /// The same of balls (Hubbard 1996).
-    SphereTree,
-    /// The same of polytopes with 18 sides (Klosowski et al. 1998).
-    KDopTree,
-    /// The same of boxes turned as at rest (Gottschalk et al. 1996).
-    ObbTree,
-    /// A tree of boxes, refitted bottom-up above and only where it is looked at below (Larsson and
-    /// Akenine-Möller 2001).
-    HybridTree,
-    /// The ready-made tree: parry's.
-    #[cfg(feature = "parry")]
-    ParryTree,
-    /// The thesis's chapter 4: grid, first tetrahedron from the last one found, two rings of
-    /// neighbours.
-    Thesis,
-    /// Each point keeps its tetrahedron and walks on through neighbours; only what lies near the
-    /// tool is looked at.
-    Walk,
+/// A method: what it is called, what it can, how it is made.
+#[derive(Debug)]
+pub struct Descriptor {
+    /// Name on command lines, in charts and recordings.
+    pub name: &'static str,
+    /// Paper or chapter that it follows.
+    pub source: &'static str,
+    /// The response that belongs to it.
+    pub response: Response,
+    /// Whether it answers slowly and exactly: a truth for the others, not for a collision step.
+    pub is_oracle: bool,
+    /// Whether it finds every point that is inside.
+    pub is_complete: bool,
+    /// Whether it reads the moving surface.
+    pub uses_surface: bool,
+    /// Makes it. All memory is taken here.
+    pub build: fn(&SearchInputs) -> Box<dyn Search>,
 }
 
-const METHODS: usize = if cfg!(feature = "parry") { 14 } else { 13 };
+impl Descriptor {
+    /// A broad phase with the recommended response: [`Phased`](crate::Phased) makes its search.
+    pub const fn of_phase(
+        name: &'static str,
+        source: &'static str,
+        build: fn(&SearchInputs) -> Box<dyn Search>,
+    ) -> Self {
+        let response = Response::RECOMMENDED;
+        Self { name, source, response, is_oracle: false, is_complete: true, uses_surface: false, build }
+    }
+}
+
+/// How normal and depth come out of the points inside the tissue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Response {
+    /// The ball against the moving surface: continuous, and deeper is more.
+    Ball,
+    /// The thesis's Algorithm 2 as printed: the greatest distance to any surface face of the
+    /// tetrahedra hit.
+    Printed,
+    /// Algorithm 2 with each point measured against the nearest surface face of its tetrahedron.
+    NearestFace,
+}
+
+impl Response {
+    /// The charted choice.
+    pub const RECOMMENDED: Self = Self::Ball;
+}
+
+/// A described way to find which tool points lie in which tetrahedra.
+#[derive(Clone, Copy, Debug)]
+pub struct Method {
+    descriptor: &'static Descriptor,
+}
 
 impl Method {
-    /// The charted choice.
-    pub const RECOMMENDED: Self = Self::Walk;
+    /// The method of a descriptor.
+    pub const fn of(descriptor: &'static Descriptor) -> Self {
+        Self { descriptor }
+    }
 
-    /// All methods, the oracle first.
-    pub fn all() -> [Self; METHODS] {
-        use Method::*;
-        [
-            Brute,
-            Scan,
-            UniformGrid,
-            HashedGrid,
-            Octree,
-            KdTree,
-            AabbTree,
-            SphereTree,
-            KDopTree,
-            ObbTree,
-            HybridTree,
-            #[cfg(feature = "parry")]
-            ParryTree,
-            Thesis,
-            Walk,
-        ]
+    /// What the method says of itself.
+    pub fn descriptor(&self) -> &'static Descriptor {
+        self.descriptor
     }
 
     /// The name used in files and on command lines.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Brute => "brute",
-            Self::Scan => "scan",
-            Self::UniformGrid => "uniform-grid",
-            Self::HashedGrid => "hashed-grid",
-            Self::Octree => "octree",
-            Self::KdTree => "kd-tree",
-            Self::AabbTree => "aabb-tree",
-            Self::SphereTree => "sphere-tree",
-            Self::KDopTree => "k-dop-tree",
-            Self::ObbTree => "obb-tree",
-            Self::HybridTree => "hybrid-tree",
-            #[cfg(feature = "parry")]
-            Self::ParryTree => "parry-tree",
-            Self::Thesis => "thesis",
-            Self::Walk => "walk",
-        }
-    }
-
-    /// The method of that name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::all().into_iter().find(|method| method.name() == name)
-    }
-
-    /// The response that belongs to the method: the thesis's own to the thesis, the recommended one
-    /// to all others.
-    pub fn response(&self) -> Response {
-        match self {
-            Self::Thesis => Response::Printed,
-            _ => Response::RECOMMENDED,
-        }
+        self.descriptor.name
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_name_leads_back_to_its_method() {
-        for method in Method::all() {
-            assert_eq!(Method::named(method.name()), Some(method));
-        }
-        assert_eq!(Method::named("octree of dreams"), None);
+/// Two are the same if they have the same name.
+impl PartialEq for Method {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
     }
 }
+
+impl Eq for Method {}

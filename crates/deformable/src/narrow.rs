@@ -22,7 +22,7 @@ const BORDER: f64 = 1e-9;
 
 /// Which tetrahedron holds each point.
 #[derive(Clone, Debug)]
-pub(crate) struct Hits {
+pub struct Hits {
     /// Tetrahedron of each point, or [`NONE`].
     pub tet: Vec<u32>,
     /// Barycentric coordinates of each point that has one.

@@ -4,7 +4,7 @@ use trepan_geometry::{Aabb, ToolState, Vec3};
 
 /// Tissue and tool at one instant.
 #[derive(Clone, Copy)]
-pub(crate) struct Scene<'a> {
+pub struct Scene<'a> {
     /// Moved nodes, world mm.
     pub positions: &'a [Vec3],
     /// Node velocities, mm/ms.

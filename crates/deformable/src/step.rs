@@ -1,109 +1,15 @@
 //! One collision step, readable as a list: place the points, fit the surface, find, respond.
 
-use crate::{
-    Config, ConfigError,
-    narrow::Hits,
-    response::{Friction, Responder, Shaft, Spring, finish},
-    scene::Scene,
-    search::Search,
-    surface::MovingSurface,
-};
-use trepan_contact::{Contact, ContactManifold, NodalContact, NodalContacts, SurfacePatch};
+use crate::config::{Config, ConfigError};
+use crate::narrow::{Hits, NONE};
+use crate::outcome::TissueStep;
+use crate::response::{Friction, Responder, Shaft, Spring, finish};
+use crate::scene::Scene;
+use crate::seam::{Search, SearchInputs};
+use crate::surface::MovingSurface;
+use trepan_contact::{Contact, NodalContact, SurfacePatch};
 use trepan_geometry::{Aabb, Pointshell, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::{TetMesh, Topology};
-
-/// What one step found.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TissueStep {
-    /// The contact, as force models read it.
-    pub manifold: ContactManifold,
-    /// The tangent plane that the haptic tick holds on to until the next result.
-    pub patch: SurfacePatch,
-    /// The spring that presses on the tissue's nodes, equal and opposite; where there are
-    /// `surface_springs`, the one that stands for all of them.
-    pub nodal: NodalContact,
-    /// Springs under the ball, one for each node, together as strong as `nodal`. Each presses along
-    /// its own normal as deep as the ball is there, so that tissue finer than the ball takes its
-    /// shape. Empty where the response has one spring for all.
-    pub surface_springs: NodalContacts,
-    /// Dry friction of the tissue on the tool's tip, N; the nodes take the opposite by the weights
-    /// of `nodal`.
-    pub friction_n: Vec3,
-    /// The contact of the tool's shaft; depth 0 when it is free or not asked for.
-    pub shaft: Contact,
-    /// The spring with which the shaft presses on the tissue's nodes.
-    pub shaft_nodal: NodalContact,
-    /// Tool points inside the tissue.
-    pub points_in_contact: u32,
-    /// Exact tests of a point in a tetrahedron.
-    pub tests: u32,
-    /// Candidates, triangles or nodes that did not fit their limits.
-    pub overflow: u32,
-    /// Inverted, flat or non-finite tetrahedra met and skipped; all of them, when the step was
-    /// refused for lack of sound input.
-    pub skipped: u32,
-    /// Boxes of far surface that moved further than was allowed for; a contact there could be some
-    /// steps late. 0 unless the tissue leaps.
-    pub stale: u32,
-}
-
-impl Default for TissueStep {
-    /// No contact, and room for every spring.
-    fn default() -> Self {
-        Self {
-            manifold: ContactManifold::default(),
-            patch: SurfacePatch::default(),
-            nodal: NodalContact::none(),
-            surface_springs: NodalContacts::with_room(),
-            friction_n: Vec3::ZERO,
-            shaft: Contact::default(),
-            shaft_nodal: NodalContact::none(),
-            points_in_contact: 0,
-            tests: 0,
-            overflow: 0,
-            skipped: 0,
-            stale: 0,
-        }
-    }
-}
-
-impl TissueStep {
-    /// Back to no contact; counters and springs that wait are kept.
-    pub(crate) fn forget_contact(&mut self) {
-        self.manifold.clear();
-        self.patch = SurfacePatch { time_ms: self.patch.time_ms, tip_mm: self.patch.tip_mm, ..SurfacePatch::default() };
-        self.nodal = NodalContact::none();
-        self.friction_n = Vec3::ZERO;
-    }
-
-    /// The springs of tip and shaft.
-    fn all(&self) -> impl Iterator<Item = &NodalContact> {
-        let tip =
-            if self.surface_springs.is_empty() { core::slice::from_ref(&self.nodal) } else { &self.surface_springs };
-        tip.iter().chain([&self.shaft_nodal])
-    }
-
-    /// Adds the springs of tip and shaft to a solver's list. Friction is not among them.
-    pub fn springs(&self, out: &mut NodalContacts) {
-        self.all().for_each(|spring| out.push(*spring));
-    }
-
-    /// Adds all forces on the nodes, N: springs of tip and shaft, and friction. Returns the force
-    /// on the tool, equal and opposite.
-    pub fn push(&self, positions: &[Vec3], velocities: &[Vec3], forces: &mut [Vec3]) -> Vec3 {
-        let mut on_tool = Vec3::ZERO;
-        let mut press = |nodal: &NodalContact, force: Vec3| {
-            nodal.nodes().for_each(|(node, weight)| forces[node as usize] -= weight * force);
-            on_tool += force;
-        };
-        for spring in self.all() {
-            let (place, velocity) = (spring.mean(|n| positions[n as usize]), spring.mean(|n| velocities[n as usize]));
-            press(spring, spring.pressure_n(place, velocity) * spring.normal);
-        }
-        press(&self.nodal, self.friction_n);
-        on_tool
-    }
-}
 
 /// Tests one ball-tipped tool against one moving tetrahedral mesh.
 ///
@@ -116,7 +22,7 @@ pub struct TissueCollision {
     radius_mm: f32,
     points: Vec<Vec3>,
     surface: MovingSurface,
-    search: Search,
+    search: Box<dyn Search>,
     responder: Responder,
     uses_surface: bool,
     hits: Hits,
@@ -138,7 +44,8 @@ impl TissueCollision {
         let count = shell.points.len() + 1;
         let cell_mm = config.cell_mm.unwrap_or_else(|| usual_cell_mm(mesh));
         let shaft = if config.shaft { Shaft::new(tool, mesh.tets.len()) } else { None };
-        let responder = Responder::new(config.response.unwrap_or(config.method.response()), mesh.positions.len());
+        let method = config.method.descriptor();
+        let responder = Responder::new(config.response.unwrap_or(method.response), mesh.positions.len());
         Ok(Self {
             neighbours: Topology::of(mesh).neighbours,
             tets: mesh.tets.clone(),
@@ -146,8 +53,8 @@ impl TissueCollision {
             radius_mm: tool.tip_radius_mm,
             points: vec![Vec3::ZERO; count],
             surface: MovingSurface::of(mesh),
-            search: Search::new(config.method, mesh, count, cell_mm),
-            uses_surface: responder.needs_surface() || config.method == crate::Method::Walk || config.shaft,
+            search: (method.build)(&SearchInputs { mesh, points: count, cell_mm }),
+            uses_surface: responder.needs_surface() || method.uses_surface || config.shaft,
             responder,
             hits: Hits::with_points(count),
             shell,
@@ -238,7 +145,7 @@ const CELL_PER_EDGE: f32 = 1.45;
 
 fn count(hits: &Hits, out: &mut TissueStep) {
     let shell = &hits.tet[..hits.tet.len() - 1];
-    out.points_in_contact = shell.iter().filter(|&&t| t != crate::narrow::NONE).count() as u32;
+    out.points_in_contact = shell.iter().filter(|&&t| t != NONE).count() as u32;
     (out.tests, out.skipped) = (hits.tests, hits.skipped);
     out.overflow += hits.overflow;
 }

@@ -48,7 +48,7 @@ pub(crate) struct Foot {
 }
 
 /// Border triangles of a moving mesh, in clusters with boxes.
-pub(crate) struct MovingSurface {
+pub struct MovingSurface {
     /// Node indices, counterclockwise from outside.
     pub triangles: Vec<[u32; 3]>,
     /// The tetrahedron behind each triangle.
@@ -67,7 +67,7 @@ pub(crate) struct MovingSurface {
     region: Extent,
     here: Vec<(u32, Extent)>,
     /// Box around the whole surface.
-    pub bounds: Extent,
+    pub(crate) bounds: Extent,
     /// Boxes that were found outside their margin in this step.
     pub stale: u32,
 }

@@ -5,6 +5,7 @@ mod common;
 
 use common::{Random, block, deformed, tool_at};
 use glam::Vec3;
+use trepan_deformable::rivals::{brute, thesis, uniform_grid};
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
 use trepan_geometry::Tool;
 use trepan_mesh::TetMesh;
@@ -16,7 +17,7 @@ fn same_points_as_oracle(mesh: &TetMesh, radius: f32, poses: usize, jump: f32, s
     let new = |method| {
         TissueCollision::new(mesh, &tool, &Config { method, points: 60, ..Config::default() }).expect("a sound config")
     };
-    let mut oracle = new(Method::Brute);
+    let mut oracle = new(Method::of(&brute::METHOD));
     let mut tested: Vec<_> = complete().map(|method| (method, new(method))).collect();
     let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
     let mut random = Random::new(seed);
@@ -44,7 +45,7 @@ fn same_points_as_oracle(mesh: &TetMesh, radius: f32, poses: usize, jump: f32, s
 }
 
 fn complete() -> impl Iterator<Item = Method> {
-    Method::all().into_iter().filter(|&method| method != Method::Brute && method != Method::Thesis)
+    Method::all().into_iter().filter(|&method| !method.descriptor().is_oracle && method.descriptor().is_complete)
 }
 
 #[test]
@@ -93,7 +94,7 @@ fn degenerate_meshes_lose_nothing_and_give_no_nan() {
             TissueCollision::new(&mesh, &tool, &Config { method: m, points: 60, ..Config::default() })
                 .expect("a sound config")
         };
-        let (mut tested, mut oracle) = (new(method), new(Method::Brute));
+        let (mut tested, mut oracle) = (new(method), new(Method::of(&brute::METHOD)));
         let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
         let mut random = Random::new(23);
         let mut skipped = 0;
@@ -128,7 +129,7 @@ fn a_mesh_torn_anew_at_every_step_hides_nothing_from_the_walk() {
     let new = |method| {
         TissueCollision::new(&mesh, &tool, &Config { method, points: 60, ..Config::default() }).expect("a sound config")
     };
-    let (mut walk, mut scan) = (new(Method::Walk), new(Method::Scan));
+    let (mut walk, mut scan) = (new(Method::RECOMMENDED), new(Method::of(&uniform_grid::SCAN)));
     let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
     let still = vec![Vec3::ZERO; mesh.positions.len()];
     let (mut random, mut tip, mut touching) = (Random::new(31), Vec3::splat(12.5), 0);
@@ -160,7 +161,7 @@ fn the_thesis_never_sees_a_point_that_is_not_there() {
     let still = vec![Vec3::ZERO; mesh.positions.len()];
     let new =
         |method| TissueCollision::new(&mesh, &tool, &Config { method, ..Config::default() }).expect("a sound config");
-    let (mut thesis, mut oracle) = (new(Method::Thesis), new(Method::Brute));
+    let (mut thesis, mut oracle) = (new(Method::of(&thesis::METHOD)), new(Method::of(&brute::METHOD)));
     let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
     let mut random = Random::new(29);
     for _ in 0..200 {
@@ -187,7 +188,7 @@ fn a_surface_too_large_to_fit_whole_at_every_step() {
     let new = |method| {
         TissueCollision::new(&mesh, &tool, &Config { method, points: 60, ..Config::default() }).expect("a sound config")
     };
-    let (mut walk, mut scan) = (new(Method::Walk), new(Method::Scan));
+    let (mut walk, mut scan) = (new(Method::RECOMMENDED), new(Method::of(&uniform_grid::SCAN)));
     let (mut found, mut truth) = (TissueStep::default(), TissueStep::default());
     let mut random = Random::new(31);
     let mut tip = Vec3::new(80.0, 80.0, 9.0);

@@ -5,7 +5,8 @@ mod common;
 
 use common::{Random, block, deformed};
 use glam::{DVec3, Vec3};
-use trepan_deformable::broad::*;
+use trepan_deformable::BroadPhase;
+use trepan_deformable::rivals::*;
 use trepan_geometry::Aabb;
 use trepan_mesh::TetMesh;
 

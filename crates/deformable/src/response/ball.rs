@@ -37,8 +37,8 @@ use super::{
 use crate::{
     extent::Extent,
     narrow::{Hits, NONE},
+    outcome::TissueStep,
     scene::Scene,
-    step::TissueStep,
     surface::{Foot, MovingSurface},
 };
 use trepan_contact::{Contact, MAX_CONTACTS, NodalContacts};

@@ -18,7 +18,7 @@
 //! # Sources
 //! Ruspini, Kolarov and Khatib 1997 (the cone); stick and slip as Hayward and Armstrong 1999.
 
-use crate::{scene::Scene, step::TissueStep};
+use crate::{outcome::TissueStep, scene::Scene};
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;
 

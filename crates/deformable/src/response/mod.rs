@@ -10,26 +10,9 @@ mod shaft;
 pub(crate) use friction::Friction;
 pub(crate) use shaft::Shaft;
 
-use crate::{narrow::Hits, scene::Scene, step::TissueStep, surface::MovingSurface};
+use crate::{method::Response, narrow::Hits, outcome::TissueStep, scene::Scene, surface::MovingSurface};
 use trepan_contact::{NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
-
-/// How normal and depth come out of the points inside the tissue.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Response {
-    /// The ball against the moving surface: continuous, and deeper is more.
-    Ball,
-    /// The thesis's Algorithm 2 as printed: the greatest distance to any surface face of the
-    /// tetrahedra hit.
-    Printed,
-    /// Algorithm 2 with each point measured against the nearest surface face of its tetrahedron.
-    NearestFace,
-}
-
-impl Response {
-    /// The charted choice.
-    pub const RECOMMENDED: Self = Self::Ball;
-}
 
 /// A response with its memory.
 pub(crate) enum Responder {

@@ -14,8 +14,8 @@
 use super::Answer;
 use crate::{
     narrow::{Hits, NONE},
+    outcome::TissueStep,
     scene::Scene,
-    step::TissueStep,
 };
 use trepan_contact::Contact;
 use trepan_geometry::Vec3;

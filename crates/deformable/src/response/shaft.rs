@@ -19,6 +19,7 @@ use crate::{
     narrow::{Hits, NONE},
     response::Spring,
     scene::Scene,
+    seam::Search,
     search::Walk,
     surface::{Foot, MovingSurface},
 };

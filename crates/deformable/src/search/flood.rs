@@ -2,9 +2,9 @@
 
 use super::lost::Lost;
 use crate::{
-    broad::box_of,
     extent::Extent,
     narrow::{Hits, NONE},
+    phase::box_of,
     scene::Scene,
 };
 

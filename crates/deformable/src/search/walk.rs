@@ -31,12 +31,12 @@
 //! On a large mesh that is torn anew at every step: take a method that looks at all boxes.
 
 use super::{degenerate::Degenerate, flood::Flood, lost::Lost};
-use crate::{
-    extent::Extent,
-    narrow::{Hits, NONE, is_inside},
-    scene::Scene,
-    surface::MovingSurface,
-};
+use crate::extent::Extent;
+use crate::method::{Descriptor, Method, Response};
+use crate::narrow::{Hits, NONE, is_inside};
+use crate::scene::Scene;
+use crate::seam::Search;
+use crate::surface::MovingSurface;
 use trepan_mesh::OPPOSITE;
 
 /// The tetrahedron of each point, and room for floods.
@@ -54,24 +54,29 @@ const MAX_STEPS: usize = 32;
 /// Most border triangles taken as seeds.
 const MAX_SEEDS: usize = 4_096;
 
-impl Walk {
-    pub(crate) fn new(points: usize, tets: usize) -> Self {
-        Self {
-            last: vec![NONE; points],
-            lost: Lost::with_capacity(points),
-            alone: Lost::with_capacity(1),
-            near: Vec::with_capacity(MAX_SEEDS),
-            flood: Flood::over(tets),
-            degenerate: Degenerate::among(tets),
-        }
-    }
+/// The walk.
+pub const METHOD: Descriptor = Descriptor {
+    name: "walk",
+    source: "Guibas and Stolfi 1985, with floods (this crate)",
+    response: Response::RECOMMENDED,
+    is_oracle: false,
+    is_complete: true,
+    uses_surface: true,
+    build: |inputs| Box::new(Walk::new(inputs.points, inputs.mesh.tets.len())),
+};
 
-    pub(crate) fn reset(&mut self) {
+impl Method {
+    /// What the simulators use.
+    pub const RECOMMENDED: Self = Self::of(&METHOD);
+}
+
+impl Search for Walk {
+    fn reset(&mut self) {
         self.last.fill(NONE);
         self.degenerate.alarm();
     }
 
-    pub(crate) fn find(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
+    fn find(&mut self, scene: &Scene, surface: &mut MovingSurface, hits: &mut Hits) {
         if surface.stale > 0 {
             self.degenerate.alarm();
         }
@@ -92,6 +97,19 @@ impl Walk {
             self.search_lost(scene, surface, hits);
         }
         self.last.copy_from_slice(&hits.tet);
+    }
+}
+
+impl Walk {
+    pub(crate) fn new(points: usize, tets: usize) -> Self {
+        Self {
+            last: vec![NONE; points],
+            lost: Lost::with_capacity(points),
+            alone: Lost::with_capacity(1),
+            near: Vec::with_capacity(MAX_SEEDS),
+            flood: Flood::over(tets),
+            degenerate: Degenerate::among(tets),
+        }
     }
 
     /// Every point from where it was; those that do not arrive are lost.

@@ -92,7 +92,7 @@ const FIXED_SHARE: f32 = 0.35;
 pub fn choices() -> Vec<Tissue> {
     let choice = |solver, tets, still_mm| Tissue { solver, tets, halvings: 0, still_mm };
     let refined = |halvings| FINER.0.map(|tets| Tissue { halvings, ..choice("tled", tets, 0.0) });
-    let names = Method::all().into_iter().filter(|m| m.name() != "reference").map(|m| m.name());
+    let names = Method::all().into_iter().filter(|m| !m.descriptor().is_static).map(|m| m.name());
     let rivals = names.flat_map(|solver| RIVALS_TETS.map(|tets| choice(solver, tets, 0.0)));
     let tled = TETS.map(|tets| choice("tled", tets, 0.0)).into_iter();
     tled.chain(FINER.1.into_iter().flat_map(refined))

@@ -16,6 +16,7 @@ use crate::suite::{Findings, Gate, Row};
 use ride::{Ride, START, ride};
 use scene::{PATHS, Scene};
 use trepan_deformable::Method;
+use trepan_deformable::rivals::uniform_grid;
 use trepan_geometry::Vec3;
 use truth::Truth;
 
@@ -56,12 +57,12 @@ pub fn judge(_: Scope, findings: &mut Findings) {
 
 /// All methods but the oracle, which is the reference and too slow to be rated.
 fn methods() -> impl Iterator<Item = Method> {
-    Method::all().into_iter().filter(|&method| method != Method::Brute)
+    Method::all().into_iter().filter(|method| !method.descriptor().is_oracle)
 }
 
 /// Whether the method must find every point.
 fn is_complete(method: Method) -> bool {
-    method != Method::Thesis
+    method.descriptor().is_complete
 }
 
 /// Runs every method on every path over one mesh.
@@ -93,7 +94,7 @@ fn follow(scene: &Scene, place: &str, tips: &[Vec3], in_time: bool, findings: &m
     let steps_of = |method| if method == Method::RECOMMENDED { steps } else { enough };
     let take = |method| ride(scene, method, &tips[..steps_of(method)], &truth);
     let rides: Vec<Ride> = methods().map(take).collect();
-    let scan = rides.iter().find(|ride| ride.method == Method::Scan);
+    let scan = rides.iter().find(|ride| ride.method == Method::of(&uniform_grid::SCAN));
     findings.rows.extend(rides.iter().map(|ride| ride.row(place, scene, scan)));
     let complete = rides.iter().filter(|ride| is_complete(ride.method));
     let wrong = complete.map(|ride| (ride.missed + ride.invented) as f64).sum();
@@ -111,7 +112,9 @@ fn speed_gates(place: &str, scene: &Scene, rides: &[Ride], findings: &mut Findin
     findings.gates.push(Gate::at_most(format!("{place}: methods that beat {best} in both"), beaten as f64, 0.0));
     if scene.mesh.tets.len() > 48_000 {
         let of = |method| rides.iter().find(|ride| ride.method == method);
-        let faster = of(Method::RECOMMENDED).zip(of(Method::Scan)).map(|(own, scan)| own.times_faster_than(scan));
+        let faster = of(Method::RECOMMENDED)
+            .zip(of(Method::of(&uniform_grid::SCAN)))
+            .map(|(own, scan)| own.times_faster_than(scan));
         let name = format!("{place}: {best}, times faster than the scan");
         findings.gates.push(Gate::at_least(name, faster.unwrap_or(f64::NAN), LEAST_RATIO));
     }
@@ -125,7 +128,7 @@ fn slide(scope: Scope, findings: &mut Findings) {
     let truth = vec![Truth { depth_mm, ..Truth::UNKNOWN }; tips.len()];
     let (place, mut most_edges) = (format!("{}, flat stroke", scene.name), 0.0f64);
     for method in Method::all() {
-        let steps = if method == Method::Brute { ORACLE_STEPS } else { tips.len() };
+        let steps = if method.descriptor().is_oracle { ORACLE_STEPS } else { tips.len() };
         let ride = ride(&scene, method, &tips[..steps], &truth);
         let jump_edges = ride.depth_jump_mm / f64::from(scene.edge_mm);
         findings.rows.push(ride.row(&place, &scene, None).metric("depth_jump_edges", jump_edges));

@@ -113,7 +113,7 @@ struct Record {
 
 /// Every condition, every method, the oracle for fewer steps.
 pub fn run(scope: Scope, findings: &mut Findings) {
-    let steps = |method: Method| if method == Method::Brute { 50 } else { scope.pick(150, 2000) };
+    let steps = |method: Method| if method.descriptor().is_oracle { 50 } else { scope.pick(150, 2000) };
     let methods: Vec<(&str, Method)> = Method::all().into_iter().map(|method| (method.name(), method)).collect();
     let mut all: Vec<(usize, Method, Record)> = Vec::new();
     let verdict = |at: usize, method: &Method| {

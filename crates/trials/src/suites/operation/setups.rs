@@ -2,6 +2,7 @@
 //! and single steps away from the usual.
 
 use super::Scope;
+use trepan_deformable::rivals::thesis;
 use trepan_deformable::{Config, Method};
 
 /// One setup.
@@ -25,7 +26,7 @@ pub fn truth(scope: Scope) -> Candidate {
 
 /// Every setup, auto and the presets first.
 pub fn all(scope: Scope) -> Vec<Candidate> {
-    let thesis = || Config { method: Method::Thesis, ..Config::default() };
+    let thesis = || Config { method: Method::of(&thesis::METHOD), ..Config::default() };
     let mut setups = vec![
         ("auto", "--quality auto", Config::default()),
         ("draft", "--quality draft", Config::default()),

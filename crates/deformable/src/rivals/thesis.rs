@@ -19,16 +19,18 @@
 //! 22 thousand tetrahedra: all boxes are updated at every step, and a lost contact costs a search
 //! over all of them.
 
-use crate::{
-    broad::{PointCells, box_of},
-    extent::Extent,
-    narrow::{Hits, NONE},
-    scene::Scene,
-};
+use super::uniform_grid::PointCells;
+use crate::extent::Extent;
+use crate::method::{Descriptor, Response};
+use crate::narrow::{Hits, NONE};
+use crate::phase::box_of;
+use crate::scene::Scene;
+use crate::seam::Search;
+use crate::surface::MovingSurface;
 use trepan_geometry::Aabb;
 
 /// Grid, boxes, and the tetrahedron found last.
-pub(crate) struct Thesis {
+struct Thesis {
     cell_mm: f32,
     cells: PointCells,
     boxes: Vec<Extent>,
@@ -39,22 +41,23 @@ pub(crate) struct Thesis {
 /// A tetrahedron has at most 4 neighbours, and those 3 more each.
 const TWO_RINGS: usize = 1 + 4 + 12;
 
-impl Thesis {
-    pub(crate) fn new(cell_mm: f32, points: usize, tets: usize) -> Self {
-        Self {
-            cell_mm,
-            cells: PointCells::new(points),
-            boxes: Vec::with_capacity(tets),
-            last: 0,
-            rings: Vec::with_capacity(TWO_RINGS),
-        }
-    }
+/// The thesis's search with its response.
+pub const METHOD: Descriptor = Descriptor {
+    name: "thesis",
+    source: "thesis, chapter 4",
+    response: Response::Printed,
+    is_oracle: false,
+    is_complete: false,
+    uses_surface: false,
+    build: |inputs| Box::new(Thesis::new(inputs.cell_mm, inputs.points, inputs.mesh.tets.len())),
+};
 
-    pub(crate) fn reset(&mut self) {
+impl Search for Thesis {
+    fn reset(&mut self) {
         self.last = 0;
     }
 
-    pub(crate) fn find(&mut self, scene: &Scene, hits: &mut Hits) {
+    fn find(&mut self, scene: &Scene, _: &mut MovingSurface, hits: &mut Hits) {
         self.cells.place(scene.points, self.cell_mm);
         let tissue = self.update_boxes(scene);
         let colliding = Aabb::from(tissue).intersection(scene.ball_box());
@@ -67,6 +70,18 @@ impl Thesis {
             for k in 1..self.rings.len() {
                 self.test(scene, self.rings[k], hits);
             }
+        }
+    }
+}
+
+impl Thesis {
+    fn new(cell_mm: f32, points: usize, tets: usize) -> Self {
+        Self {
+            cell_mm,
+            cells: PointCells::new(points),
+            boxes: Vec::with_capacity(tets),
+            last: 0,
+            rings: Vec::with_capacity(TWO_RINGS),
         }
     }
 

@@ -1,33 +1,11 @@
-//! Broad phases: from moving boxes to few pairs of point and tetrahedron.
-
-mod aabb;
-mod hashed_grid;
-mod hybrid_tree;
-mod k_dop;
-mod kd_tree;
-mod obb;
-mod octree;
-#[cfg(feature = "parry")]
-mod parry_tree;
-mod sphere;
-mod uniform_grid;
-mod volume_tree;
-
-pub use aabb::Aabox;
-pub use hashed_grid::HashedGrid;
-pub use hybrid_tree::HybridTree;
-pub use k_dop::KDop;
-pub use kd_tree::KdTree;
-pub use obb::Obb;
-pub use octree::Octree;
-#[cfg(feature = "parry")]
-pub use parry_tree::ParryTree;
-pub use sphere::Sphere;
-pub(crate) use uniform_grid::PointCells;
-pub use uniform_grid::UniformGrid;
-pub use volume_tree::{Volume, VolumeTree};
+//! Broad phases: from moving boxes to few pairs of point and tetrahedron, each of which gets the
+//! exact test.
 
 use crate::extent::Extent;
+use crate::narrow::{Hits, NONE};
+use crate::scene::Scene;
+use crate::seam::Search;
+use crate::surface::MovingSurface;
 use glam::Vec3A;
 use trepan_geometry::{Aabb, Vec3};
 
@@ -81,5 +59,34 @@ pub(crate) fn push_bounded(out: &mut Vec<[u32; 2]>, pair: [u32; 2]) -> u32 {
             0
         }
         false => 1,
+    }
+}
+
+/// The search by any [`BroadPhase`] and the exact test on each of its pairs.
+pub struct Phased {
+    phase: Box<dyn BroadPhase>,
+    pairs: Vec<[u32; 2]>,
+}
+
+/// Room for this many candidate tetrahedra at each point.
+const CANDIDATES: usize = 64;
+
+impl Phased {
+    /// The search by a broad phase for so many points.
+    pub fn new(phase: impl BroadPhase + 'static, points: usize) -> Self {
+        Self { phase: Box::new(phase), pairs: Vec::with_capacity(points * CANDIDATES) }
+    }
+}
+
+impl Search for Phased {
+    fn find(&mut self, scene: &Scene, _: &mut MovingSurface, hits: &mut Hits) {
+        self.phase.update(scene.positions, scene.tets, &scene.ball_box());
+        hits.overflow += self.phase.pairs(scene.points, &mut self.pairs);
+        for &[point, tet] in &self.pairs {
+            let i = point as usize;
+            if hits.tet[i] == NONE {
+                hits.test(scene, i, tet);
+            }
+        }
     }
 }

@@ -13,6 +13,9 @@
 //! Where the mesh turns: directions from rest then fit no better than those of the axes.
 
 use super::volume_tree::Volume;
+use super::volume_tree::VolumeTree;
+use crate::method::Descriptor;
+use crate::phase::Phased;
 use glam::Mat3;
 use trepan_geometry::Vec3;
 
@@ -101,6 +104,11 @@ fn rotation(m: &[[f32; 3]; 3], i: usize, j: usize) -> (f32, f32) {
     let angle = 0.5 * (2.0 * m[i][j]).atan2(m[j][j] - m[i][i]);
     (angle.cos(), angle.sin())
 }
+
+/// A tree of turned boxes.
+pub const METHOD: Descriptor = Descriptor::of_phase("obb-tree", "Gottschalk et al. 1996", |inputs| {
+    Box::new(Phased::new(VolumeTree::<Obb>::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
+});
 
 #[cfg(test)]
 mod tests {

@@ -9,8 +9,9 @@
 //! # When not to use it
 //! For points that lie evenly, as on a ball: a grid finds their cell without going down.
 
-use super::{BroadPhase, TetBoxes, push_bounded};
 use crate::extent::Extent;
+use crate::method::Descriptor;
+use crate::phase::{BroadPhase, Phased, TetBoxes, push_bounded};
 use trepan_geometry::{Aabb, Vec3};
 
 /// An octree of points.
@@ -123,3 +124,8 @@ impl BroadPhase for Octree {
         overflow
     }
 }
+
+/// Points in the octree.
+pub const METHOD: Descriptor = Descriptor::of_phase("octree", "Meagher 1982", |inputs| {
+    Box::new(Phased::new(Octree::new(inputs.points, inputs.mesh.tets.len()), inputs.points))
+});

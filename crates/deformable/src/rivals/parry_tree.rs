@@ -8,8 +8,9 @@
 //! # When not to use it
 //! For one small tool, as all trees that follow every tetrahedron.
 
-use super::{BroadPhase, box_of, push_bounded};
 use crate::extent::Extent;
+use crate::method::Descriptor;
+use crate::phase::{BroadPhase, Phased, box_of, push_bounded};
 use parry3d::bounding_volume::Aabb as Box3;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use trepan_geometry::{Aabb, Vec3};
@@ -58,3 +59,8 @@ impl BroadPhase for ParryTree {
         overflow
     }
 }
+
+/// The tree of the crate parry.
+pub const METHOD: Descriptor = Descriptor::of_phase("parry-tree", "parry3d", |inputs| {
+    Box::new(Phased::new(ParryTree::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
+});

@@ -10,6 +10,9 @@
 //! more tightly.
 
 use super::volume_tree::Volume;
+use super::volume_tree::VolumeTree;
+use crate::method::Descriptor;
+use crate::phase::Phased;
 use trepan_geometry::Vec3;
 
 /// An 18-DOP; empty when a `low` exceeds its `high`.
@@ -67,3 +70,8 @@ impl Volume for KDop {
 
 /// A point inside a tetrahedron may be rounded to outside a slanted slab by this share.
 const ROUNDING: f32 = 4e-7;
+
+/// A tree of polytopes with 18 sides.
+pub const METHOD: Descriptor = Descriptor::of_phase("k-dop-tree", "Klosowski et al. 1998", |inputs| {
+    Box::new(Phased::new(VolumeTree::<KDop>::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
+});

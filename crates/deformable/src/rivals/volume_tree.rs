@@ -23,8 +23,8 @@
 //! For one small tool: the refit costs more than a scan over all boxes. It pays with many points
 //! that lie far apart.
 
-use super::{BroadPhase, box_of, push_bounded};
 use crate::extent::Extent;
+use crate::phase::{BroadPhase, box_of, push_bounded};
 use trepan_geometry::{Aabb, Vec3};
 
 /// Something that holds points, and can be made to hold more.

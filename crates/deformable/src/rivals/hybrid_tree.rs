@@ -15,11 +15,10 @@
 //! When the points are all over the mesh: then every lower node is fitted to all mesh nodes below
 //! it, level by level.
 
-use super::{
-    BroadPhase, box_of, push_bounded,
-    volume_tree::{LEAF, Node, halved},
-};
+use super::volume_tree::{LEAF, Node, halved};
 use crate::extent::Extent;
+use crate::method::Descriptor;
+use crate::phase::{BroadPhase, Phased, box_of, push_bounded};
 use trepan_geometry::{Aabb, Vec3};
 use trepan_mesh::Csr;
 
@@ -144,3 +143,8 @@ impl BroadPhase for HybridTree {
         overflow
     }
 }
+
+/// The tree of boxes, refitted where it is looked at.
+pub const METHOD: Descriptor = Descriptor::of_phase("hybrid-tree", "Larsson and Akenine-Möller 2001", |inputs| {
+    Box::new(Phased::new(HybridTree::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
+});

@@ -4,7 +4,10 @@
 //! The cheapest to refit, 24 bytes and six comparisons; the loosest round slanted parts.
 
 use super::volume_tree::Volume;
+use super::volume_tree::VolumeTree;
 use crate::extent::Extent;
+use crate::method::Descriptor;
+use crate::phase::Phased;
 use trepan_geometry::Vec3;
 
 /// An axis-aligned box.
@@ -35,3 +38,8 @@ impl Volume for Aabox {
         self.0.contains(p)
     }
 }
+
+/// A tree of boxes.
+pub const METHOD: Descriptor = Descriptor::of_phase("aabb-tree", "van den Bergen 1997", |inputs| {
+    Box::new(Phased::new(VolumeTree::<Aabox>::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
+});

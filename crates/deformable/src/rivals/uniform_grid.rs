@@ -15,8 +15,9 @@
 //! # When not to use it
 //! For a small tool in a large mesh: it still looks at every tetrahedron's box.
 
-use super::{BroadPhase, TetBoxes, push_bounded};
 use crate::extent::Extent;
+use crate::method::Descriptor;
+use crate::phase::{BroadPhase, Phased, TetBoxes, push_bounded};
 use trepan_geometry::{Aabb, Vec3};
 
 /// A uniform grid over the points, as an array.
@@ -156,3 +157,13 @@ pub(crate) fn fitting_cell(wanted_mm: f32, bounds: &Extent) -> f32 {
     }
     cell_mm
 }
+
+/// Points in the uniform grid.
+pub const METHOD: Descriptor = Descriptor::of_phase("uniform-grid", "Teschner et al. 2003", |inputs| {
+    Box::new(Phased::new(UniformGrid::new(inputs.cell_mm, inputs.points, inputs.mesh.tets.len()), inputs.points))
+});
+
+/// One cell for all: the box of every tetrahedron against the tool's box, the plain baseline.
+pub const SCAN: Descriptor = Descriptor::of_phase("scan", "none", |inputs| {
+    Box::new(Phased::new(UniformGrid::new(f32::MAX, inputs.points, inputs.mesh.tets.len()), inputs.points))
+});

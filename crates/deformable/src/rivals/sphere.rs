@@ -11,6 +11,9 @@
 //! ball, so the upper levels are much larger than what they hold.
 
 use super::volume_tree::Volume;
+use super::volume_tree::VolumeTree;
+use crate::method::Descriptor;
+use crate::phase::Phased;
 use trepan_geometry::Vec3;
 
 /// A ball; empty when its radius is negative.
@@ -55,3 +58,8 @@ impl Volume for Sphere {
         self.radius >= 0.0 && self.centre.distance_squared(p) <= self.radius * self.radius * (1.0 + ROUNDING)
     }
 }
+
+/// A tree of balls.
+pub const METHOD: Descriptor = Descriptor::of_phase("sphere-tree", "Hubbard 1996", |inputs| {
+    Box::new(Phased::new(VolumeTree::<Sphere>::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
+});

@@ -16,9 +16,11 @@
 //! When the points lie close together, as on a tool: the array of
 //! [`UniformGrid`](super::UniformGrid) is as small and needs no hash.
 
-use super::{BroadPhase, TetBoxes, push_bounded, uniform_grid::fitting_cell};
+use super::uniform_grid::fitting_cell;
 use crate::extent::Extent;
+use crate::method::Descriptor;
 use crate::narrow::NONE;
+use crate::phase::{BroadPhase, Phased, TetBoxes, push_bounded};
 use trepan_geometry::{Aabb, Vec3};
 
 /// A hash table of points by cell.
@@ -123,3 +125,8 @@ impl BroadPhase for HashedGrid {
         overflow
     }
 }
+
+/// Points in the hashed grid.
+pub const METHOD: Descriptor = Descriptor::of_phase("hashed-grid", "Teschner et al. 2003", |inputs| {
+    Box::new(Phased::new(HashedGrid::new(inputs.cell_mm, inputs.points, inputs.mesh.tets.len()), inputs.points))
+});

@@ -12,7 +12,8 @@
 //! # When not to use it
 //! For few points in a small box: nearly every tetrahedron there meets nearly every split.
 
-use super::{BroadPhase, TetBoxes, push_bounded};
+use crate::method::Descriptor;
+use crate::phase::{BroadPhase, Phased, TetBoxes, push_bounded};
 use trepan_geometry::{Aabb, Vec3};
 
 /// A k-d tree of points.
@@ -90,3 +91,8 @@ impl BroadPhase for KdTree {
         overflow
     }
 }
+
+/// Points in the k-d tree.
+pub const METHOD: Descriptor = Descriptor::of_phase("kd-tree", "Bentley 1975", |inputs| {
+    Box::new(Phased::new(KdTree::new(inputs.points, inputs.mesh.tets.len()), inputs.points))
+});

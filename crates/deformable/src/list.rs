@@ -1,0 +1,52 @@
+//! The methods of this crate.
+
+use crate::method::{Descriptor, Method};
+#[cfg(feature = "parry")]
+use crate::rivals::parry_tree;
+use crate::rivals::{aabb, brute, hashed_grid, hybrid_tree, k_dop, kd_tree};
+use crate::rivals::{obb, octree, sphere, thesis, uniform_grid};
+use crate::search::walk;
+
+/// All of them, the oracle first.
+const METHODS: &[Descriptor] = &[
+    brute::METHOD,
+    uniform_grid::SCAN,
+    uniform_grid::METHOD,
+    hashed_grid::METHOD,
+    octree::METHOD,
+    kd_tree::METHOD,
+    aabb::METHOD,
+    sphere::METHOD,
+    k_dop::METHOD,
+    obb::METHOD,
+    hybrid_tree::METHOD,
+    #[cfg(feature = "parry")]
+    parry_tree::METHOD,
+    thesis::METHOD,
+    walk::METHOD,
+];
+
+impl Method {
+    /// Every method.
+    pub fn all() -> Vec<Self> {
+        METHODS.iter().map(Self::of).collect()
+    }
+
+    /// The method of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        METHODS.iter().find(|descriptor| descriptor.name == name).map(Self::of)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_leads_back_to_its_method() {
+        for method in Method::all() {
+            assert_eq!(Method::named(method.name()), Some(method));
+        }
+        assert_eq!(Method::named("octree of dreams"), None);
+    }
+}

@@ -1,0 +1,33 @@
+//! The searches beside the recommended one: broad phases, the thesis's, the oracle.
+//!
+//! # Practice
+//! Each file ends with what the method says of itself. [`HashedGrid`] also serves
+//! [`MeshCollision`](crate::MeshCollision).
+
+pub mod aabb;
+pub mod brute;
+pub mod hashed_grid;
+pub mod hybrid_tree;
+pub mod k_dop;
+pub mod kd_tree;
+pub mod obb;
+pub mod octree;
+#[cfg(feature = "parry")]
+pub mod parry_tree;
+pub mod sphere;
+pub mod thesis;
+pub mod uniform_grid;
+pub mod volume_tree;
+
+pub use aabb::Aabox;
+pub use hashed_grid::HashedGrid;
+pub use hybrid_tree::HybridTree;
+pub use k_dop::KDop;
+pub use kd_tree::KdTree;
+pub use obb::Obb;
+pub use octree::Octree;
+#[cfg(feature = "parry")]
+pub use parry_tree::ParryTree;
+pub use sphere::Sphere;
+pub use uniform_grid::UniformGrid;
+pub use volume_tree::{Volume, VolumeTree};
