@@ -6,8 +6,8 @@
 //! incomplete is reported and does not stop the others. Cluster jobs take one shard each and are
 //! independent; `cargo xtask merge` merges their summaries into one table.
 
-use crate::command::printable;
 use crate::error::SessionError;
+use crate::printable::printable;
 use crate::report::output::dated;
 use crate::{Ended, Inputs, Options, Program, Session};
 use std::ffi::OsStr;

@@ -7,6 +7,7 @@ use crate::compare::compare;
 use crate::device_test;
 use crate::models::ModelRequest;
 use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, Task, rate};
+use crate::printable::printable;
 use crate::recordings;
 use crate::report::summary::{CutOff, slow};
 use crate::show::driver;
@@ -174,18 +175,6 @@ fn failed(program: Program, fault: &SessionError) -> ExitCode {
     ExitCode::from(fault.exit_code())
 }
 
-/// Escapes control characters, with which a file name could control the terminal.
-pub fn printable(text: &str) -> String {
-    let shown = |c: char| match c {
-        '\n' | '\t' => c.to_string(),
-        c if c.is_control() => c.escape_default().to_string(),
-        // Marks of the writing direction can hide the end of a name.
-        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => c.escape_unicode().to_string(),
-        c => c.to_string(),
-    };
-    text.chars().map(shown).collect()
-}
-
 /// Makes new files readable by the user only. It also turns an exceeded file size limit
 /// (`ulimit -f`) into a failed write; by default its signal would end the process.
 #[cfg(unix)]
@@ -199,14 +188,3 @@ fn guard_files() {
 
 #[cfg(not(unix))]
 fn guard_files() {}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_cannot_control_the_terminal() {
-        assert_eq!(printable("a\u{1b}[31mb\u{7}\r\n\u{9b}2J"), "a\\u{1b}[31mb\\u{7}\\r\n\\u{9b}2J");
-        assert_eq!(printable("Kopf-Müller \u{202e}gpj.nii"), "Kopf-Müller \\u{202e}gpj.nii");
-    }
-}

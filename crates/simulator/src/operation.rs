@@ -1,8 +1,8 @@
 //! Settings of an operation: flap, loss of cerebrospinal fluid, forbidden tissue, brain stiffness,
 //! tick rate. They come from the options, else from the replayed recording, else from defaults.
 
-use crate::case::tissue::TissueClass;
 use crate::options::{MODULI_KPA, Options, RATES_HZ};
+use crate::tissue_class::TissueClass;
 use trepan_haptics::DeviceName;
 use trepan_link::Recording;
 

@@ -1,6 +1,6 @@
 //! The command line that the three programs share.
 
-use crate::case::tissue::{TissueClass, TissueSource};
+use crate::tissue_class::{TissueClass, TissueSource};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use trepan_budget::Quality;

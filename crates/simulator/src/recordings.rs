@@ -2,8 +2,8 @@
 //! rewrites what can be read.
 
 use crate::case::identity::Identity;
-use crate::command::printable;
 use crate::error::SessionError;
+use crate::printable::printable;
 use crate::program::Program;
 use std::path::Path;
 use std::process::ExitCode;

@@ -3,7 +3,6 @@
 use crate::case::Case;
 use crate::case::plan::Plan;
 use crate::case::scene::{RestBrain, Scene};
-use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
 use crate::hand::DeviceLimits;
 use crate::measure::tissue::MASS_ADDED;
@@ -21,6 +20,7 @@ use crate::stages::second_hand::SecondHand;
 use crate::stages::settling::Settling;
 use crate::stages::skull_wall::SkullWall;
 use crate::stages::solver_step::SolverStage;
+use crate::tissue_class::TissueClass;
 use std::sync::{Arc, OnceLock};
 use trepan_budget::Tissue;
 use trepan_contact::{Vibration, Viscoelastic};

@@ -1,8 +1,9 @@
 //! Builds a skull on cubic voxels, a brain mask and tetrahedra from a patient's images.
 
-use crate::case::{Brain, Inputs, Recipe};
+use crate::case::{Brain, Inputs};
 use crate::error::SessionError;
 use crate::measure::tissue::OPENING_MM;
+use crate::recipe::Recipe;
 use glam::DAffine3;
 use std::path::Path;
 use trepan_geometry::Vec3;

@@ -3,13 +3,14 @@
 use crate::case::cache::Cache;
 use crate::case::identity::{self, Identity, USERS};
 use crate::case::import::{PendingCase, volume_mm3};
-use crate::case::tissue::TissueClass;
-use crate::case::{Case, Inputs, Recipe, folder, import};
+use crate::case::{Case, Inputs, folder, import};
 use crate::error::SessionError;
 use crate::measure::CaseErrors;
 use crate::models::{self, Facts, ModelRequest, Models};
 use crate::options::{Options, Patient};
 use crate::program::Program;
+use crate::recipe::Recipe;
+use crate::tissue_class::TissueClass;
 use std::path::Path;
 use trepan_budget::Setup;
 

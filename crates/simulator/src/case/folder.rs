@@ -16,8 +16,9 @@
 use crate::case::cache::digest;
 use crate::case::identity::Identity;
 use crate::case::opening::Opening;
-use crate::case::{Brain, Case, Recipe};
+use crate::case::{Brain, Case};
 use crate::error::SessionError;
+use crate::recipe::Recipe;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;

@@ -5,9 +5,10 @@
 //! Recordings of older versions contain the case's hash only: then the name may identify the
 //! patient, or the patient is unknown.
 
+use crate::case::Inputs;
 use crate::case::cache::digest_of_all;
-use crate::case::{Inputs, Recipe};
 use crate::error::SessionError;
+use crate::recipe::Recipe;
 use std::collections::BTreeMap;
 use trepan_link::wire::SessionHeader;
 

@@ -12,11 +12,10 @@ pub(crate) mod plan;
 pub(crate) mod scene;
 mod space;
 mod stages;
-pub(crate) mod tissue;
 
 use crate::case::opening::Opening;
-use crate::case::tissue::TissueSource;
-use serde::{Deserialize, Serialize};
+use crate::recipe::Recipe;
+use crate::tissue_class::TissueSource;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use trepan_mesh::TetMesh;
@@ -35,29 +34,6 @@ pub struct Inputs {
     pub labels: Option<PathBuf>,
     /// Label volumes of tissue classes inside the brain.
     pub tissues: Vec<TissueSource>,
-}
-
-/// Parameters of a case.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Recipe {
-    /// Edge of a skull voxel, mm.
-    pub spacing_mm: f32,
-    /// Tetrahedra of the brain.
-    pub tets: usize,
-    /// Halvings of the edge length around the opening.
-    #[serde(default)]
-    pub halvings: u32,
-    /// Threshold of bone, HU; `None` for the histogram's.
-    pub isovalue_hu: Option<i16>,
-    /// Which series of the CT's folder, as [`trepan_volume::dicom::series`] lists them; `None` for
-    /// the largest.
-    pub ct_series: Option<usize>,
-    /// Which series of the MRI's folder.
-    pub mri_series: Option<usize>,
-    /// Whether the MRI, and the labels with it, are registered to the CT.
-    pub register: bool,
-    /// Point outside the skull over the place to open, RAS mm; `None` for an automatic choice.
-    pub opening: Option<[f32; 3]>,
 }
 
 /// Patient data of a session.
@@ -90,7 +66,7 @@ pub struct Case {
 /// The brain of a case.
 #[derive(Clone, Debug)]
 pub struct Brain {
-    /// Codes of [`TissueClass`](tissue::TissueClass) on cubic voxels around the brain; 0 outside.
+    /// Codes of [`TissueClass`](crate::TissueClass) on cubic voxels around the brain; 0 outside.
     pub classes: VoxelVolume<u8>,
     /// The MRI on the same grid.
     pub mri: VoxelVolume<f32>,

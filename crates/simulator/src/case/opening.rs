@@ -14,9 +14,9 @@
 
 mod search;
 
-use crate::case::Recipe;
 use crate::case::anatomy::make_skull;
 use crate::error::SessionError;
+use crate::recipe::Recipe;
 use search::Surroundings;
 use serde::{Deserialize, Serialize};
 use trepan_geometry::Vec3;

@@ -1,10 +1,10 @@
 //! Prepares a case for contact, drilling and deformation.
 
 use crate::case::opening::bare_brain;
-use crate::case::tissue::TissueClass;
 use crate::case::{Brain, Case};
 use crate::error::SessionError;
 use crate::program::Program;
+use crate::tissue_class::TissueClass;
 use glam::{DAffine3, IVec3};
 use std::sync::Arc;
 use trepan_geometry::Vec3;

@@ -22,13 +22,13 @@ mod overrides;
 pub use describe::{BoneSummary, ModelSummary, PictureSummary, TissueSummary};
 pub use overrides::{FASTEST, rigid_of, solver_named};
 
-use crate::case::Recipe;
-use crate::case::tissue::TissueClass;
 use crate::error::SessionError;
 use crate::measure::{self, CaseErrors, Wanted};
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
 use crate::program::Program;
+use crate::recipe::Recipe;
+use crate::tissue_class::TissueClass;
 use overrides::{Overrides, written};
 use serde::{Deserialize, Serialize};
 use trepan_budget::{Choice, Plan, Quality, Rows, Scene, Setup};

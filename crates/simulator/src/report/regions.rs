@@ -10,7 +10,7 @@
 //! For functional regions: there is no atlas.
 
 use crate::case::scene::RestBrain;
-use crate::case::tissue::TissueClass;
+use crate::tissue_class::TissueClass;
 use serde::Serialize;
 use trepan_geometry::{Tool, Vec3};
 use trepan_link::wire::TickRecord;

@@ -1,6 +1,6 @@
 use super::*;
-use crate::case::Recipe;
 use crate::case::anatomy::{cropped, make_skull};
+use crate::recipe::Recipe;
 use std::path::Path;
 use trepan_volume::{bone_isovalue, hounsfield, largest_component, read};
 

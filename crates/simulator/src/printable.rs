@@ -1,0 +1,24 @@
+//! Text that is safe to print on a terminal.
+
+/// Escapes control characters, with which a file name could control the terminal.
+pub fn printable(text: &str) -> String {
+    let shown = |c: char| match c {
+        '\n' | '\t' => c.to_string(),
+        c if c.is_control() => c.escape_default().to_string(),
+        // Marks of the writing direction can hide the end of a name.
+        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => c.escape_unicode().to_string(),
+        c => c.to_string(),
+    };
+    text.chars().map(shown).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_control_the_terminal() {
+        assert_eq!(printable("a\u{1b}[31mb\u{7}\r\n\u{9b}2J"), "a\\u{1b}[31mb\\u{7}\\r\n\\u{9b}2J");
+        assert_eq!(printable("Kopf-Müller \u{202e}gpj.nii"), "Kopf-Müller \\u{202e}gpj.nii");
+    }
+}
