@@ -42,6 +42,12 @@ fn source(root: &Path, file: &Path) -> Result<Option<String>> {
     if !is_test && !text.starts_with("//!") {
         return Ok(Some(format!("{} does not begin with a module doc", shown(root, file))));
     }
+    if file.with_extension("").is_dir() {
+        return Ok(Some(format!(
+            "{0}.rs lies beside {0}: move it to {0}/mod.rs",
+            shown(root, &file.with_extension(""))
+        )));
+    }
     too_long(root, file, FILE_LINES)
 }
 
@@ -112,4 +118,19 @@ fn shaders(root: &Path) -> Result<Vec<String>> {
 
 fn shown(root: &Path, path: &Path) -> String {
     path.strip_prefix(root).unwrap_or(path).display().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_module_has_one_place() {
+        let root = tempfile::tempdir().unwrap();
+        let (file, folder) = (root.path().join("a.rs"), root.path().join("a"));
+        fs::write(&file, "//! A module.\n").unwrap();
+        assert_eq!(source(root.path(), &file).unwrap(), None);
+        fs::create_dir(&folder).unwrap();
+        assert_eq!(source(root.path(), &file).unwrap().unwrap(), "a.rs lies beside a: move it to a/mod.rs");
+    }
 }
