@@ -16,6 +16,9 @@ use glam::{IVec3, Vec3};
 use trepan_geometry::Aabb;
 use trepan_volume::{AIR_HU, BRICK, BoneVolume};
 
+/// Distance stored for a ray that hits nothing.
+pub(crate) const NOTHING: f32 = 1e30;
+
 /// Edge of a brick of cells; `BRICK` in `bricks.wgsl`. Divides the bone's own brick.
 pub(crate) const LEAP: usize = 4;
 
@@ -229,6 +232,31 @@ pub(crate) fn densities<T>(
     }
     debug_assert_eq!(AIR_HU, bone.hu(IVec3::NEG_ONE));
     values
+}
+
+/// Result of updating the bone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Followed {
+    pub bricks: u32,
+    pub left: u32,
+    /// Box in which bone changed, world mm.
+    pub changed: Aabb,
+}
+
+impl Default for Followed {
+    fn default() -> Self {
+        Self { bricks: 0, left: 0, changed: Aabb::EMPTY }
+    }
+}
+
+impl Followed {
+    pub fn of(grid: &Grid, bricks: &[[usize; 3]], left: usize) -> Self {
+        let grow = |all: Aabb, &brick: &[usize; 3]| {
+            let changed = grid.box_of(brick);
+            all.grown(changed.min).grown(changed.max)
+        };
+        Self { bricks: bricks.len() as u32, left: left as u32, changed: bricks.iter().fold(Aabb::EMPTY, grow) }
+    }
 }
 
 #[cfg(test)]

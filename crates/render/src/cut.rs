@@ -9,12 +9,7 @@
 //! World mm. All tetrahedra are tested once per picture; triangles over the limit are counted in
 //! the picture's report.
 
-use crate::RenderError;
-use crate::brain::Border;
-use crate::scene::Scene;
-use crate::section;
 use glam::{Vec3, Vec4};
-use trepan_gpu::{Bindings, Buffer, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
 
 /// A cutting plane; the side that its normal points to is removed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,62 +33,6 @@ impl Cut {
 /// Signed height of a point over a plane, mm; 0 without a plane.
 pub(crate) fn height(plane: Vec4, point: Vec3) -> f32 {
     plane.truncate().dot(point) - plane.w
-}
-
-/// Largest number of triangles of a cut; a brain of 100,000 tetrahedra needs about 8,000.
-const MOST_TRIANGLES: usize = 16_384;
-
-/// The pass that draws the cut surface of the brain.
-#[derive(Debug)]
-pub(crate) struct Face {
-    pipeline: Pipeline,
-    corners: Buffer<[Vec4; 2]>,
-    cut: Vec<[Vec4; 2]>,
-}
-
-impl Face {
-    pub fn new(gpu: &Gpu) -> Result<Self, RenderError> {
-        let spec = PipelineSpec {
-            label: "cut",
-            wgsl: trepan_shaders::RENDER_CUT,
-            slots: &[Slot::Uniform, Slot::Storage],
-            targets: &[Format::Rgba32Uint, Format::Rgba32Uint],
-            depth: true,
-            blend: false,
-            topology: Topology::Triangles,
-        };
-        let corners = Buffer::zeroed(gpu, "cut", 3 * MOST_TRIANGLES)?;
-        Ok(Self { pipeline: Pipeline::new(gpu, &spec)?, corners, cut: Vec::new() })
-    }
-
-    pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Bindings, RenderError> {
-        Ok(self.pipeline.bind(gpu, &[scene.into(), (&self.corners).into()])?)
-    }
-
-    /// Cuts the brain; returns the number of triangles over the limit.
-    pub fn follow(&mut self, gpu: &Gpu, plane: Vec4, brain: &Border) -> u32 {
-        self.cut.clear();
-        if plane == Vec4::ZERO {
-            return 0;
-        }
-        let mut left = 0;
-        for triangle in section::triangles(plane, brain) {
-            if self.cut.len() < 3 * MOST_TRIANGLES {
-                self.cut.extend(triangle.map(|corner| [corner.place.extend(1.0), corner.rest.extend(1.0)]));
-            } else {
-                left += 1;
-            }
-        }
-        self.corners.write(gpu, 0, &self.cut);
-        left
-    }
-
-    /// Draws the cut together with the boundary triangles.
-    pub fn draw(&self, draws: &mut Draws, bindings: &Bindings) {
-        if !self.cut.is_empty() {
-            draws.draw(&self.pipeline, bindings, self.cut.len() as u32);
-        }
-    }
 }
 
 #[cfg(test)]

@@ -24,37 +24,35 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-mod anaglyph;
-mod brain;
+mod border;
 mod bricks;
 mod camera;
-mod canvas;
-mod contour;
 mod cut;
-mod enlarge;
+mod device;
 mod error;
-mod eye;
 mod frame;
 mod image;
+mod kept;
 mod layout;
-mod light;
+mod mix;
 mod mri;
 mod overlay;
 mod paint;
 mod painter;
 mod processor;
 mod recast;
-mod renderer;
+mod report;
 mod scene;
 mod section;
-mod skull;
 mod slice;
 mod stereo;
+mod tool;
 #[cfg(feature = "window")]
 pub mod window;
 
 pub use camera::{Camera, View};
 pub use cut::Cut;
+pub use device::Renderer;
 pub use error::RenderError;
 pub use frame::{Frame, SceneData, SliceLook};
 pub use image::Image;
@@ -63,5 +61,5 @@ pub use overlay::Overlay;
 pub use paint::Paint;
 pub use painter::Painter;
 pub use processor::{Casting, ProcessorRenderer};
-pub use renderer::{BRICKS_PER_FRAME, DrawReport, Hit, Renderer};
+pub use report::{BRICKS_PER_FRAME, DrawReport, Hit};
 pub use stereo::{Stereo, StereoLook};

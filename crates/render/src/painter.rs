@@ -8,16 +8,12 @@
 //! Where the device's texture is shown without a copy and a lost device is an error: use
 //! [`Renderer`].
 
-use crate::brain::Border;
-use crate::frame::{Frame, SceneData, bounds};
+use crate::frame::{Frame, SceneData};
 use crate::image::Image;
-use crate::mri::Signals;
-use crate::renderer::{DrawReport, LEAST_DETAIL};
+use crate::kept::Kept;
+use crate::report::{DrawReport, LEAST_DETAIL};
 use crate::{Casting, ProcessorRenderer, RenderError, Renderer, View};
-use std::sync::Arc;
-use trepan_geometry::Aabb;
 use trepan_gpu::{Gpu, GpuError, Prefer};
-use trepan_volume::BoneVolume;
 
 /// Draws finished pictures of one scene on any machine.
 #[derive(Debug)]
@@ -52,23 +48,6 @@ impl Quality {
 enum By {
     Device(Box<Renderer>),
     Processor(Box<ProcessorRenderer>),
-}
-
-/// The data that the processor needs to take over.
-#[derive(Clone, Debug)]
-pub(crate) struct Kept {
-    pub bone: Option<Arc<BoneVolume>>,
-    /// Box that the slices show.
-    pub bounds: Aabb,
-    pub brain: Option<Border>,
-    pub mri: Option<Signals>,
-}
-
-impl Kept {
-    pub fn of(data: &SceneData) -> Result<Self, RenderError> {
-        let mri = data.mri.map(|mri| Signals::of(mri, data.tint)).transpose()?;
-        Ok(Self { bone: data.bone.clone(), bounds: bounds(data), brain: data.brain.map(Border::of), mri })
-    }
 }
 
 impl Painter {

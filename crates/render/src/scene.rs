@@ -5,6 +5,7 @@ use crate::camera::View;
 use crate::cut::Cut;
 use crate::frame::Frame;
 use crate::paint::Paint;
+use crate::tool::ends;
 use glam::{Mat4, Quat, Vec3, Vec4};
 use trepan_geometry::{Pose, Tool, ToolKind};
 
@@ -87,12 +88,6 @@ impl Scene {
 
 const NO_TOOL: Tool =
     Tool { kind: ToolKind::Probe, tip_radius_mm: -1.0, shaft_radius_mm: 1.0, shaft_length_mm: 1.0, cutting_mm: 0.0 };
-
-/// Centre of the ball and far end of the shaft, with their radii.
-pub(crate) fn ends(tool: &Tool, world_from_tool: &Pose) -> [Vec4; 2] {
-    let tail = *world_from_tool * Vec3::new(0.0, 0.0, tool.shaft_length_mm);
-    [world_from_tool.translation.extend(tool.tip_radius_mm), tail.extend(tool.shaft_radius_mm)]
-}
 
 /// Style of a tool's tip: fluted, the mouth of a tube, or smooth.
 fn look(kind: ToolKind) -> f32 {

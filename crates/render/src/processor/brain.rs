@@ -1,10 +1,10 @@
 //! CPU version of `brain.wgsl`: the brain's boundary triangles with smooth normals.
 
-use crate::brain::Border;
+use crate::border::Border;
+use crate::bricks::NOTHING;
 use crate::camera::View;
 use crate::cut::height;
 use crate::section::{self, Corner};
-use crate::skull::NOTHING;
 use glam::{Vec2, Vec3, Vec4};
 
 /// The nearest triangle at every pixel.

@@ -1,11 +1,11 @@
 //! CPU version of `bricks.wgsl`: rays through the padded density grid.
 
-use super::mix::{between, greater, greatest, least, lesser, mixed, trilinear};
 use super::root::enter;
-use crate::bricks::{BLOCK, Grid, LEAP, Leaps, densities};
+use crate::bricks::{BLOCK, Followed, Grid, LEAP, Leaps, NOTHING, densities};
 use crate::cut::height;
+use crate::mix::{between, greater, greatest, least, lesser, mixed, trilinear};
 use crate::scene::Scene;
-use crate::skull::{Followed, NOTHING};
+
 use glam::{BVec3A, IVec3, Vec3, Vec3A, Vec4};
 use std::array;
 use std::ops::Range;

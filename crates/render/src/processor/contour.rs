@@ -1,6 +1,6 @@
 //! CPU version of `contour.wgsl`: the outline of the deformed brain on a slice.
 
-use crate::renderer::OUTLINE;
+use crate::report::OUTLINE;
 use glam::{Vec2, Vec3};
 
 /// Opacity of the line.

@@ -3,7 +3,7 @@
 use super::brain::Fragments;
 use super::skull::{Ray, TILE, cast, clear};
 use super::{Inputs, light, overlay, rows};
-use crate::brain::Border;
+use crate::border::Border;
 use crate::camera::View;
 use crate::image::Image;
 use crate::overlay::Item;

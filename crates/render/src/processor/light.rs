@@ -2,12 +2,12 @@
 
 use super::Inputs;
 use super::brain::Fragment;
-use super::mix::trilinear;
 use super::skull::{Ray, on_cut};
 use super::tool::{Met, lit};
+use crate::bricks::NOTHING;
+use crate::mix::trilinear;
 use crate::mri::Signals;
 use crate::scene::Scene;
-use crate::skull::NOTHING;
 use glam::{Vec3, Vec4};
 use std::sync::LazyLock;
 

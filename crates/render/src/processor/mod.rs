@@ -21,7 +21,6 @@ mod bricks;
 mod contour;
 mod eye;
 mod light;
-mod mix;
 mod overlay;
 mod root;
 mod rows;
@@ -31,21 +30,20 @@ mod slice;
 mod tool;
 
 use crate::RenderError;
-use crate::brain::Border;
+use crate::border::Border;
 use crate::camera::View;
 use crate::frame::{Frame, SceneData};
 use crate::image::Image;
+use crate::kept::Kept;
 use crate::layout::Layout;
 use crate::mri::Signals;
 use crate::overlay::items;
 use crate::paint::Paint;
-use crate::painter::Kept;
-use crate::renderer::{BRICKS_PER_FRAME, DrawReport, Hit, eye_view};
+use crate::report::{BRICKS_PER_FRAME, DrawReport, Hit, eye_view};
 use crate::scene::Scene;
 use crate::slice::Plane;
 use crate::stereo::StereoLook;
 pub use bricks::Casting;
-pub(crate) use mix::trilinear;
 
 use bricks::Bricks;
 use eye::Eye;
@@ -236,7 +234,7 @@ impl ProcessorRenderer {
 
     /// The bone at each pixel of the 3-D view, row by row.
     pub fn bone_hits(&self) -> Vec<Option<Hit>> {
-        let hit = |r: &Ray| (r.t < crate::skull::NOTHING).then_some(Hit { distance_mm: r.t, normal: r.normal });
+        let hit = |r: &Ray| (r.t < crate::bricks::NOTHING).then_some(Hit { distance_mm: r.t, normal: r.normal });
         self.eyes[0].rays.iter().map(hit).collect()
     }
 }

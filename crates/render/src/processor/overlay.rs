@@ -2,10 +2,10 @@
 
 use super::light::shown;
 use super::tool::{Met, lit, shaft};
+use crate::bricks::NOTHING;
 use crate::camera::View;
 use crate::overlay::Item;
 use crate::scene::Scene;
-use crate::skull::NOTHING;
 use glam::{Vec2, Vec3, Vec4};
 
 /// Fraction of alpha behind the scene.

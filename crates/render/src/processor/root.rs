@@ -4,7 +4,7 @@
 //! The density of a cell is trilinear, so that along a ray it is a cubic (Marmitt et al. 2004).
 //! Between its extrema a cubic is monotone, and a bracketed Newton's method finds its root.
 
-use super::mix::greater;
+use crate::mix::greater;
 use glam::{Vec3A, Vec4};
 
 /// Trilinear interpolation of a cell's corners at four points, given by their coordinates.

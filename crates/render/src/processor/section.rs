@@ -1,6 +1,6 @@
 //! CPU version of `section.wgsl`: rest positions of the brain at the pixels of a slice.
 
-use crate::brain::Border;
+use crate::border::Border;
 use crate::section::triangles;
 use crate::slice::Plane;
 use glam::{Vec2, Vec3};

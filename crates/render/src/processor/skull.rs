@@ -1,9 +1,9 @@
 //! CPU version of `skull.wgsl`: the bone's isosurface at a pixel.
 
 use super::bricks::{Bricks, under};
+use crate::bricks::NOTHING;
 use crate::cut::height;
 use crate::scene::Scene;
-use crate::skull::NOTHING;
 use glam::{Vec3, Vec4};
 
 /// The bone hit of a pixel's ray.

@@ -1,7 +1,7 @@
 //! CPU version of `tool.wgsl`: tools in closed form, and their lighting.
 
+use crate::bricks::NOTHING;
 use crate::scene::Scene;
-use crate::skull::NOTHING;
 use glam::{Vec3, Vec4};
 
 /// Distance along the ray to a ball, or [`NOTHING`].

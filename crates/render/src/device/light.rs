@@ -1,8 +1,8 @@
 //! The lighting pass: shades the nearest of bone, brain and tool at each pixel of the 3-D view.
 
+use super::skull::{Skull, VOLUMES};
 use crate::RenderError;
 use crate::scene::Scene;
-use crate::skull::{Skull, VOLUMES};
 use trepan_gpu::{
     Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
     Topology,

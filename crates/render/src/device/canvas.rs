@@ -1,52 +1,11 @@
 //! The textures for one picture size, bound to the passes.
 
+use super::eye::Eye;
+use super::passes::{Division, Passes};
 use crate::RenderError;
-use crate::anaglyph::Anaglyph;
-use crate::brain::Brain;
-use crate::cut::Face;
-use crate::enlarge::Enlarge;
-use crate::eye::Eye;
 use crate::layout::Layout;
-use crate::light::Light;
-use crate::mri::Mri;
-use crate::overlay::Shapes;
-use crate::paint::Coat;
-use crate::scene::Scene;
-use crate::skull::Skull;
-use crate::slice::Slices;
 use crate::stereo::StereoLook;
-use trepan_gpu::{Bindings, Buffer, Format, Gpu, Texture, TextureSpec};
-
-/// Resources shared by the passes.
-#[derive(Debug)]
-pub(crate) struct Passes {
-    /// Scene uniform of each eye.
-    pub scenes: [Buffer<Scene>; 2],
-    pub skull: Skull,
-    /// The boundary surface and the cut surface.
-    pub brain: Option<(Brain, Face)>,
-    pub mri: Mri,
-    /// Paint on bone and on the brain.
-    pub coats: [Coat; 2],
-    pub light: Light,
-    pub overlay: Shapes,
-    pub enlarge: Enlarge,
-    pub anaglyph: Anaglyph,
-    pub slices: Slices,
-}
-
-/// Division of the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Division {
-    /// Width and height of the picture, pixels.
-    pub size: [u32; 2],
-    /// Whether slices are shown.
-    pub slices: bool,
-    /// Fraction of the 3-D view's pixels along an edge that are drawn.
-    pub detail: f32,
-    /// Layout of two eyes in the 3-D view, if stereo.
-    pub stereo: Option<StereoLook>,
-}
+use trepan_gpu::{Bindings, Format, Gpu, Texture, TextureSpec};
 
 /// The textures.
 #[derive(Debug)]

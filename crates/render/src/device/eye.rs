@@ -1,13 +1,13 @@
 //! The view of one eye: hits kept between pictures, bound to the passes.
 
+use super::light::Inputs;
+use super::passes::{Division, Passes};
 use crate::RenderError;
+use crate::bricks::NOTHING;
 use crate::camera::View;
-use crate::canvas::{Division, Passes};
 use crate::frame::Frame;
-use crate::light::Inputs;
 use crate::recast::Recast;
 use crate::scene::Scene;
-use crate::skull::NOTHING;
 use crate::stereo::StereoLook;
 use trepan_gpu::{Bindings, Depth, DrawTarget, Format, Gpu, Recorder, Target, Texture, TextureSpec};
 

@@ -12,10 +12,9 @@
 //! ambient light reaches farther than a brick.
 
 use crate::RenderError;
-use crate::bricks::{Grid, Leaps, densities};
+use crate::bricks::{Followed, Grid, Leaps, densities};
 use crate::scene::Scene;
 use std::sync::Arc;
-use trepan_geometry::Aabb;
 use trepan_gpu::{
     Bindings, Buffer, DrawTarget, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Target, Texture,
     TextureSpec, Topology,
@@ -24,9 +23,6 @@ use trepan_volume::BoneVolume;
 
 /// Bytes of densities uploaded at once while loading.
 const LOAD_BYTES: usize = 16 << 20;
-
-/// Distance stored for a ray that hits nothing.
-pub(crate) const NOTHING: f32 = 1e30;
 
 /// The slots of [`Skull::volumes`].
 pub(crate) const VOLUMES: [Slot; 4] = [Slot::Texture3, Slot::Sampler, Slot::Integer3, Slot::Texture3];
@@ -43,31 +39,6 @@ pub(crate) struct Skull {
     crowd: Texture,
     pipeline: Pipeline,
     leaping: bool,
-}
-
-/// Result of updating the bone.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Followed {
-    pub bricks: u32,
-    pub left: u32,
-    /// Box in which bone changed, world mm.
-    pub changed: Aabb,
-}
-
-impl Default for Followed {
-    fn default() -> Self {
-        Self { bricks: 0, left: 0, changed: Aabb::EMPTY }
-    }
-}
-
-impl Followed {
-    pub fn of(grid: &Grid, bricks: &[[usize; 3]], left: usize) -> Self {
-        let grow = |all: Aabb, &brick: &[usize; 3]| {
-            let changed = grid.box_of(brick);
-            all.grown(changed.min).grown(changed.max)
-        };
-        Self { bricks: bricks.len() as u32, left: left as u32, changed: bricks.iter().fold(Aabb::EMPTY, grow) }
-    }
 }
 
 impl Skull {

@@ -1,7 +1,7 @@
 //! Combines both eyes' views into one picture for red-cyan glasses.
 
+use super::enlarge::fill;
 use crate::RenderError;
-use crate::enlarge::fill;
 use crate::scene::Scene;
 use trepan_gpu::{Bindings, Buffer, Format, Gpu, Pipeline, PipelineSpec, Recorder, Resource, Slot, Texture, Topology};
 

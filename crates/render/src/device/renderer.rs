@@ -1,38 +1,33 @@
 //! Draws the picture from its parts: newest poses → changed bricks → brain → rays → light → slices.
 
+use super::anaglyph::Anaglyph;
+use super::brain::Brain;
+use super::canvas::Canvas;
+use super::contour::Contour;
+use super::cut::Face;
+use super::enlarge::Enlarge;
+use super::eye::clear;
+use super::light::Light;
+use super::overlay::Shapes;
+use super::paint::Coat;
+use super::passes::{Division, Passes};
+use super::section::Section;
+use super::skull::Skull;
+use super::slice::Slices;
 use crate::RenderError;
-use crate::anaglyph::Anaglyph;
-use crate::brain::Brain;
+use crate::bricks::NOTHING;
 use crate::camera::View;
-use crate::canvas::{Canvas, Division, Passes};
-use crate::contour::Contour;
-use crate::cut::{Cut, Face};
-use crate::enlarge::Enlarge;
-use crate::eye::clear;
+use crate::cut::Cut;
 use crate::frame::{Frame, SceneData, bounds};
 use crate::image::Image;
 use crate::layout::Layout;
-use crate::light::Light;
 use crate::mri::Mri;
-use crate::overlay::Shapes;
-use crate::paint::Coat;
+use crate::report::{BRICKS_PER_FRAME, DrawReport, Hit, LEAST_DETAIL, OUTLINE, eye_view};
 use crate::scene::Scene;
-use crate::section::Section;
-use crate::skull::{NOTHING, Skull};
-use crate::slice::{Plane, Slices};
-use crate::stereo::Stereo;
+use crate::slice::Plane;
 use glam::Vec3;
 use trepan_geometry::Aabb;
 use trepan_gpu::{Buffer, Gpu, PassTime, Recorder, Texture, Timer};
-
-/// Default for the most changed bricks processed per picture: 1 MiB of densities.
-pub const BRICKS_PER_FRAME: usize = 1024;
-
-/// Colour of the brain's outline in the slices.
-pub(crate) const OUTLINE: Vec3 = Vec3::new(1.0, 0.45, 0.55);
-
-/// Smallest fraction of the 3-D view's pixels along an edge.
-pub(crate) const LEAST_DETAIL: f32 = 0.05;
 
 /// Draws pictures of one scene into a texture.
 #[derive(Debug)]
@@ -46,20 +41,6 @@ pub struct Renderer {
     timer: Option<Timer>,
     /// Most changed bricks processed per picture; the rest follows in the next pictures.
     pub bricks_per_frame: usize,
-}
-
-/// Counters of drawing a picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct DrawReport {
-    /// Changed bricks processed.
-    pub bricks: u32,
-    /// Changed bricks left for the next picture.
-    pub bricks_left: u32,
-    /// Pixels whose rays through the bone were cast again.
-    pub pixels_cast: u32,
-    /// Items over the limit: lines of the brain's outline, triangles of its cuts and shapes of the
-    /// overlay.
-    pub lines_left: u32,
 }
 
 impl Renderer {
@@ -250,21 +231,6 @@ impl Renderer {
     pub fn pass_times(&self) -> Result<Vec<PassTime>, RenderError> {
         Ok(self.timer.as_ref().map(|t| t.read(&self.gpu)).transpose()?.unwrap_or_default())
     }
-}
-
-/// The view of the left (0) or the right eye (1) in an area of the picture.
-pub(crate) fn eye_view(frame: &Frame, [_, _, width, height]: [u32; 4], number: usize) -> View {
-    let view = frame.camera.view(width as f32 / height as f32);
-    Stereo::views(frame.stereo.as_ref(), view, frame.camera.distance_mm)[number]
-}
-
-/// A ray's hit on bone.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// Distance from the eye, mm.
-    pub distance_mm: f32,
-    /// Unit normal, outwards.
-    pub normal: Vec3,
 }
 
 /// Decodes a unit vector from two octahedral coordinates.

@@ -1,0 +1,79 @@
+//! The brain pass: the boundary of the deformed tetrahedra with smooth normals.
+//!
+//! # Practice
+//! Only boundary nodes are uploaded, 32 bytes each per frame. Normals are the area-weighted mean
+//! over a node's triangles, computed on the processor.
+
+use crate::RenderError;
+use crate::border::Border;
+use crate::scene::Scene;
+use glam::{Vec3, Vec4};
+use trepan_gpu::{Bindings, Buffer, Draws, Format, Gpu, Pipeline, PipelineSpec, Slot, Topology};
+use trepan_mesh::TetMesh;
+
+/// The brain's boundary on the device.
+#[derive(Debug)]
+pub(crate) struct Brain {
+    pub border: Border,
+    device: Device,
+    pipeline: Pipeline,
+}
+
+#[derive(Debug)]
+struct Device {
+    places: Buffer<Vec4>,
+    normals: Buffer<Vec4>,
+    rest: Buffer<Vec4>,
+    corners: Buffer<[u32; 3]>,
+}
+
+impl Brain {
+    pub fn new(gpu: &Gpu, mesh: &TetMesh) -> Result<Self, RenderError> {
+        let border = Border::of(mesh);
+        let nodes = border.places.len();
+        let device = Device {
+            places: Buffer::zeroed(gpu, "brain places", nodes)?,
+            normals: Buffer::zeroed(gpu, "brain normals", nodes)?,
+            rest: Buffer::from_slice(gpu, "brain at rest", &wide(&border.places))?,
+            corners: Buffer::from_slice(gpu, "brain corners", &border.triangles)?,
+        };
+        let slots = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::Storage, Slot::Storage];
+        let pipeline = Pipeline::new(
+            gpu,
+            &PipelineSpec {
+                label: "brain",
+                wgsl: trepan_shaders::RENDER_BRAIN,
+                slots: &slots,
+                targets: &[Format::Rgba32Uint, Format::Rgba32Uint],
+                depth: true,
+                blend: false,
+                topology: Topology::Triangles,
+            },
+        )?;
+        Ok(Self { border, device, pipeline })
+    }
+
+    /// Updates the boundary from the mesh's nodes, or resets it to rest.
+    pub fn follow(&mut self, gpu: &Gpu, positions: Option<&[Vec3]>) -> Result<(), RenderError> {
+        self.border.follow(positions)?;
+        self.device.places.write(gpu, 0, &wide(&self.border.places));
+        self.device.normals.write(gpu, 0, &wide(&self.border.normals));
+        Ok(())
+    }
+
+    /// Binds the pass to the frame's uniform.
+    pub fn bind(&self, gpu: &Gpu, scene: &Buffer<Scene>) -> Result<Bindings, RenderError> {
+        let d = &self.device;
+        let all = [scene.into(), (&d.places).into(), (&d.normals).into(), (&d.rest).into(), (&d.corners).into()];
+        Ok(self.pipeline.bind(gpu, &all)?)
+    }
+
+    /// Draws the boundary triangles.
+    pub fn draw(&self, draws: &mut Draws, bindings: &Bindings) {
+        draws.draw(&self.pipeline, bindings, 3 * self.border.triangles.len() as u32);
+    }
+}
+
+fn wide(vectors: &[Vec3]) -> Vec<Vec4> {
+    vectors.iter().map(|v| v.extend(1.0)).collect()
+}
