@@ -45,10 +45,6 @@ const WORDS: [(&str, &[&str]); 6] = [
     ("unsafe {", &["haptics", "tled", "simulator", "emulators"]),
 ];
 
-/// Circles of sibling modules that are left in each crate: known gaps, printed in each run. The
-/// numbers may only fall.
-const CIRCLES: [(&str, usize); 1] = [("trials", 1)];
-
 /// All faults found, each one line.
 pub fn check(root: &Path) -> Result<Vec<String>> {
     let out = Command::new("cargo")
@@ -73,13 +69,7 @@ pub fn check(root: &Path) -> Result<Vec<String>> {
         }
         let manifest = PathBuf::from(package["manifest_path"].as_str().unwrap_or_default());
         faults.extend(words(name, &manifest.with_file_name("src"))?);
-        let circles = modules::circles(name, &manifest.with_file_name("src"))?;
-        let known = CIRCLES.iter().find(|(known, _)| *known == name).map_or(0, |(_, count)| *count);
-        if circles.len() > known {
-            faults.extend(circles);
-        } else {
-            circles.iter().for_each(|circle| println!("xtask layers: known gap: {circle}"));
-        }
+        faults.extend(modules::circles(name, &manifest.with_file_name("src"))?);
     }
     Ok(faults)
 }

@@ -4,7 +4,8 @@
 //! TITLE-BEGINS]...`; without names, the three charts of the top README.
 
 use std::path::Path;
-use trepan_trials::store::{report, whole};
+use trepan_trials::files::whole;
+use trepan_trials::store::report;
 use trepan_trials::{plot, suites::ALL};
 
 const OF_README: [(&str, &str); 3] = [

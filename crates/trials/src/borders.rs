@@ -8,10 +8,9 @@
 //! `validate --keep-borders` writes them from a run. A new or a removed row, column or map is not a
 //! regression.
 
-use crate::compare::describe_change;
+use crate::files::whole;
 use crate::part::Scope;
-use crate::picture::{Map, Outcome};
-use crate::store::whole;
+use crate::picture::{Map, Outcome, describe_change};
 use crate::suite::{Findings, Gate};
 use anyhow::Result;
 use std::collections::BTreeMap;

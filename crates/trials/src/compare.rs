@@ -14,7 +14,7 @@
 //! are
 //! compared unscaled.
 
-use crate::picture::{Chart, Map, Outcome};
+use crate::picture::{Chart, Map, describe_change};
 use crate::report::Report;
 use crate::store;
 use crate::suite::Row;
@@ -348,13 +348,6 @@ fn maps(text: &mut String, old: &[Map], new: &[Map]) {
         _ = writeln!(text, "  {same} cells of maps with the same verdict, {} with another", changed.len());
     }
     changed.iter().for_each(|line| _ = writeln!(text, "    {line}"));
-}
-
-/// One line that names a changed cell and its old and new outcome.
-pub fn describe_change(map: &Map, row: &str, column: &str, was: &Outcome, is: &Outcome) -> String {
-    let word = if is.worse_than(was) { "WORSE" } else { "better" };
-    let reason = [is.reason(), was.reason()].into_iter().find(|reason| !reason.is_empty()).unwrap_or_default();
-    format!("{word}: {} | {row} | {column}: {} -> {} ({reason})", map.title, was.word(), is.word())
 }
 
 #[cfg(test)]

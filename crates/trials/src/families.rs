@@ -4,7 +4,7 @@
 //! The method lists come from the crates. A method that is added there and not measured here is
 //! reported as a hole, and a hole fails a run of all suites.
 
-use crate::page::text;
+use crate::html::text;
 use crate::part::Suite;
 use crate::picture::Outcome;
 use crate::report::Report;

@@ -2,6 +2,7 @@
 //! self-contained page.
 
 use crate::families;
+use crate::html::text;
 use crate::part::Suite;
 use crate::picture::{Chart, Mark, Outcome};
 use crate::plot;
@@ -32,11 +33,6 @@ pub fn html(reports: &[(&Suite, Report)]) -> String {
         page += "</section>";
     }
     page + "<script>" + SCRIPT + "</script></body></html>\n"
-}
-
-/// Escapes text for HTML.
-pub fn text(plain: &str) -> String {
-    plain.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 fn overview(page: &mut String, reports: &[(&Suite, Report)]) {

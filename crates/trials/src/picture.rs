@@ -6,8 +6,8 @@
 //! at that limit.
 
 use crate::front::front;
-use crate::page::text;
-use crate::suite::number;
+use crate::html::text;
+use crate::row::number;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 
@@ -280,6 +280,13 @@ fn draw_cell(svg: &mut String, (x, y): (usize, usize), cell: &Outcome, reasons: 
 fn letter(at: usize) -> String {
     let first = char::from(b'a' + (at % 26) as u8);
     if at < 26 { first.to_string() } else { format!("{first}{}", at / 26) }
+}
+
+/// One line that names a changed cell and its old and new outcome.
+pub fn describe_change(map: &Map, row: &str, column: &str, was: &Outcome, is: &Outcome) -> String {
+    let word = if is.worse_than(was) { "WORSE" } else { "better" };
+    let reason = [is.reason(), was.reason()].into_iter().find(|reason| !reason.is_empty()).unwrap_or_default();
+    format!("{word}: {} | {row} | {column}: {} -> {} ({reason})", map.title, was.word(), is.word())
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 //! seed,
 //! from any machine.
 
+use crate::files::whole;
 use crate::part::{Scope, Suite};
 use crate::report::{Making, Report, slugs};
 use crate::suite::{Findings, Row};
@@ -19,7 +20,6 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 const PARTS: &str = "parts";
@@ -206,16 +206,6 @@ pub fn report(folder: &Path, suite: &str) -> Result<Option<Report>> {
         Err(fault) if fault.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(fault) => Err(fault).with_context(|| format!("cannot read {}", path.display())),
     }
-}
-
-/// Writes a file atomically, creating parent folders.
-pub fn whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    let mut file = tempfile::NamedTempFile::new_in(folder)?;
-    file.write_all(bytes)?;
-    file.persist(path).with_context(|| format!("cannot write {}", path.display()))?;
-    Ok(())
 }
 
 #[cfg(test)]
