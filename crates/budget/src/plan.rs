@@ -4,6 +4,7 @@ use crate::choice::{Choice, choose};
 use crate::machine::check;
 use crate::step::{edge_mm, stable_dt_ms};
 use crate::{Bone, Machine, Picture, PlanError, Quality, Row, Rows, Scene, Setup, Tissue};
+use core::f64::consts::PI;
 
 /// Fraction of a tick available to the rigid contact; the rest is for device, force model and
 /// guard.
@@ -102,17 +103,23 @@ pub fn plan_with(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Plan, 
 
 fn bone(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Choice<Bone>, PlanError> {
     let longest = TICK_SHARE;
-    let judged = rows.bone.iter().filter(|row| holds_walls(&row.what)).map(|row| {
+    let judged = rows.bone.iter().filter(|row| holds_walls(&row.what, scene.tool_radius_mm)).map(|row| {
         let cost = bone_cores(machine, scene, row);
         (row.what, bone_error_n(scene, row), cost, cost <= longest)
     });
     choose(judged, scene.force_error_n).ok_or(PlanError::NoRows("bone"))
 }
 
-/// Whether a method keeps its proxy on the side of the bone that it came from.
-/// Other methods lose thin walls, whatever their error on thick ones; a plan never takes them.
-pub fn holds_walls(bone: &Bone) -> bool {
-    trepan_rigid::Method::named(bone.method).is_some_and(|method| method.has_proxy())
+/// Whether a bone model keeps a burr of a radius, mm, on the side of the bone that it came from.
+///
+/// It needs a proxy, and points no further apart than a voxel: through `4πr²/N > h²` a burr passes
+/// a hole that is narrower than itself, and jams in it. Other models lose thin walls, whatever
+/// their error on thick ones; a plan never takes them.
+pub fn holds_walls(bone: &Bone, tool_radius_mm: f64) -> bool {
+    let Some(method) = trepan_rigid::Method::named(bone.method) else { return false };
+    let points = method.with_points(bone.points).points() as f64;
+    let is_dense = 4.0 * PI * tool_radius_mm.powi(2) <= points * bone.spacing_mm.powi(2);
+    method.has_proxy() && (points == 0.0 || is_dense)
 }
 
 fn tissue(machine: &Machine, scene: &Scene, rows: &Rows, free: f64) -> Result<Choice<Tissue>, PlanError> {
@@ -214,6 +221,16 @@ mod tests {
     ///   20 000 · 20 ns = 0.4 ms: 0.591 core.
     /// - Picture: 800 000 pixels · 500 ns · 0.25 · 10/s: 1 core; the remaining 1.34 cores do not
     ///   allow the full picture.
+    /// A burr of 3 mm has 113 mm² for 211 points: 0.73 mm apart.
+    #[test]
+    fn points_further_apart_than_a_voxel_hold_no_wall() {
+        let model = |method, spacing_mm, points| Bone { method, spacing_mm, points };
+        assert!(holds_walls(&model("thesis", 0.75, 211), 3.0) && !holds_walls(&model("thesis", 0.6, 211), 3.0));
+        assert!(holds_walls(&model("thesis", 0.6, 466), 3.0) && holds_walls(&model("thesis", 0.35, 211), 1.0));
+        assert!(holds_walls(&model("god-object-sphere", 0.35, 0), 3.0));
+        assert!(!holds_walls(&model("voxel-sum", 2.0, 0), 3.0) && !holds_walls(&model("none", 2.0, 0), 3.0));
+    }
+
     #[test]
     fn the_cheapest_within_the_tolerance_is_taken() {
         let plan = plan_with(&MACHINE, &scene(), &rows()).unwrap();

@@ -75,6 +75,11 @@ impl Method {
         if points == 0 || self.points == 0 { self } else { Self { points, ..self } }
     }
 
+    /// Points on the burr; 0 for a method without points.
+    pub fn points(&self) -> usize {
+        self.points
+    }
+
     /// Whether the method keeps a proxy on the side of the bone that it came from.
     pub fn has_proxy(&self) -> bool {
         self.descriptor.has_proxy

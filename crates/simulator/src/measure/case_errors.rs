@@ -151,7 +151,8 @@ fn replace<T: Kind>(
 }
 
 fn on_bone(sight: &Sight, scene: &Scene, rows: &Rows) -> Vec<(Vec<String>, f64)> {
-    let mut choices: Vec<_> = rows.bone.iter().map(|row| row.what).filter(holds_walls).collect();
+    let mut choices: Vec<_> =
+        rows.bone.iter().map(|row| row.what).filter(|what| holds_walls(what, scene.tool_radius_mm)).collect();
     // Errors of other methods, such as `thesis`, differ between paths: unless a method is given,
     // only the recommended one is measured.
     let recommended = |choice: &Bone| choice.method == Method::RECOMMENDED.name();

@@ -31,7 +31,7 @@ use crate::recipe::Recipe;
 use crate::tissue_class::TissueClass;
 use overrides::{Overrides, written};
 use serde::{Deserialize, Serialize};
-use trepan_budget::{Choice, Plan, Quality, Rows, Scene, Setup};
+use trepan_budget::{Bone, Choice, Plan, Quality, Row, Rows, Scene, Setup};
 use trepan_geometry::{ToolKind, units};
 use trepan_link::Recording;
 use trepan_soft::Material;
@@ -196,10 +196,12 @@ impl ModelRequest {
         rows.tissue.retain(|row| tets.is_none_or(|n| row.what.tets as f64 == n));
         let finest = rows.tissue.iter().map(|row| row.what.halvings).max();
         rows.tissue.retain(|row| halvings.is_none_or(|n| Some(row.what.halvings) == finest.map(|most| n.min(most))));
+        let scene = self.scene(facts);
+        let holds_walls = |row: &Row<Bone>| trepan_budget::holds_walls(&row.what, scene.tool_radius_mm);
         let scene = Scene {
-            has_bone: wanted.bone && rows.bone.iter().any(|row| trepan_budget::holds_walls(&row.what)),
+            has_bone: wanted.bone && rows.bone.iter().any(holds_walls),
             has_tissue: wanted.tissue && !rows.tissue.is_empty(),
-            ..self.scene(facts)
+            ..scene
         };
         let mut asked = rows.clone();
         if !wanted.picture || device_draws {

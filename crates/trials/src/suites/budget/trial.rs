@@ -5,7 +5,7 @@ use super::scene::{MACHINE, Situation};
 use crate::suite::{Findings, Row};
 use std::fmt::Display;
 use trepan_budget::{
-    Choice, FEATURES, Kind, Neighbour, Quality, Row as Laws, Rows, Setup, bone_cores, bone_error_n, holds_walls,
+    Bone, Choice, FEATURES, Kind, Neighbour, Quality, Row as Laws, Rows, Setup, bone_cores, bone_error_n, holds_walls,
     picture_cores, plan_with, tissue_cores,
 };
 use trepan_simulator::measure::CaseErrors;
@@ -50,7 +50,7 @@ fn scene(case: &Case, brains: &Brains, truth: Fineness, random: &mut fastrand::R
 /// The stored rows that a session may take; in a quick run without those that take long.
 fn stored(quick: bool) -> Rows {
     let mut rows = Rows::stored().expect("the stored tables are sound");
-    rows.bone.retain(|row| holds_walls(&row.what));
+    rows.bone.retain(|row| holds_walls(&row.what, 0.0));
     rows.tissue.retain(|row| !quick || row.what.tets <= QUICK_TETS);
     rows
 }
@@ -66,11 +66,14 @@ fn note(
     findings: &mut Findings,
 ) {
     let scene = &situation.scene;
+    let [on_bone, in_tissue, seen] = errors;
+    let holds_walls = |(row, _): &(Laws<Bone>, f64)| holds_walls(&row.what, scene.tool_radius_mm);
+    let (holding, on_bone): (Vec<_>, Vec<_>) = rows.bone.iter().copied().zip(on_bone).filter(holds_walls).unzip();
+    let rows = &Rows { bone: holding, ..rows.clone() };
     let looked_at = own.instead(rows.clone(), scene);
     let plan = plan_with(&MACHINE, scene, &looked_at).expect("the scene is sound");
     let (bone, tissue, picture) =
         (plan.bone.expect("there is bone"), plan.tissue.expect("there is tissue"), plan.picture);
-    let [on_bone, in_tissue, seen] = errors;
     let of = |kind, tolerance, features| Of { scene: format!("{name}, {kind}"), kind, tolerance, features };
     let judged = rows.bone.iter().zip(on_bone).map(|(row, e)| (row.what, e, bone_cores(&MACHINE, scene, row)));
     let said = Said::of(&bone, &rows.bone, &looked_at.bone, |row| bone_error_n(scene, row));
