@@ -214,13 +214,6 @@ mod tests {
         }
     }
 
-    /// The cheapest choice within each tolerance, computed by hand.
-    ///
-    /// - Bone: 2 N/mm · 0.04 mm = 0.08 N is the first under 0.1 N; 40 us · 1000 Hz is 0.04 core.
-    /// - Tissue, 20 000 tetrahedra: a = 7.985 mm, dt = 0.35 · 6.519/3.373 = 0.6766 ms; a step takes
-    ///   20 000 · 20 ns = 0.4 ms: 0.591 core.
-    /// - Picture: 800 000 pixels · 500 ns · 0.25 · 10/s: 1 core; the remaining 1.34 cores do not
-    ///   allow the full picture.
     /// A burr of 3 mm has 113 mm² for 211 points: 0.73 mm apart.
     #[test]
     fn points_further_apart_than_a_voxel_hold_no_wall() {
@@ -231,6 +224,13 @@ mod tests {
         assert!(!holds_walls(&model("voxel-sum", 2.0, 0), 3.0) && !holds_walls(&model("none", 2.0, 0), 3.0));
     }
 
+    /// The cheapest choice within each tolerance, computed by hand.
+    ///
+    /// - Bone: 2 N/mm · 0.04 mm = 0.08 N is the first under 0.1 N; 40 us · 1000 Hz is 0.04 core.
+    /// - Tissue, 20 000 tetrahedra: a = 7.985 mm, dt = 0.35 · 6.519/3.373 = 0.6766 ms; a step takes
+    ///   20 000 · 20 ns = 0.4 ms: 0.591 core.
+    /// - Picture: 800 000 pixels · 500 ns · 0.25 · 10/s: 1 core; the remaining 1.34 cores do not
+    ///   allow the full picture.
     #[test]
     fn the_cheapest_within_the_tolerance_is_taken() {
         let plan = plan_with(&MACHINE, &scene(), &rows()).unwrap();

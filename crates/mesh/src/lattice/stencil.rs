@@ -50,6 +50,9 @@ pub(super) const ALPHA_SHORT: f64 = 0.41189;
 const SHORT: f64 = 0.866_025_403_784_438_6;
 /// Bisection steps to find an edge's cut point.
 const HALVINGS: usize = 24;
+/// Smallest volume that warping may leave a lattice tetrahedron, in cubes of the finest spacing; at
+/// rest the smallest has 1/12.
+const LEAST_VOLUME: f64 = 1e-4;
 /// The label of a node on a boundary.
 pub(super) const ON: u16 = u16::MAX;
 
@@ -110,13 +113,30 @@ impl<'a, P: Partition> Stuffing<'a, P> {
     fn warp(&mut self) {
         let ends = (0..2 * self.edges.len()).map(|n| (self.edges[n / 2][n % 2], (n / 2) as u32));
         let cuts_of_node = crate::Csr::of_pairs(self.positions.len(), ends);
+        let corners = self.tets.iter().enumerate().flat_map(|(t, tet)| tet.iter().map(move |&n| (n, t as u32)));
+        let tets_of_node = crate::Csr::of_pairs(self.positions.len(), corners);
         let reach = self.reach();
         for node in 0..self.positions.len() {
-            if let Some(cut) = self.violation(node, reach[node], cuts_of_node.row(node)) {
+            if let Some(cut) = self.violation(node, reach[node], cuts_of_node.row(node))
+                && !self.flattens(node, cut, tets_of_node.row(node))
+            {
                 self.positions[node] = cut;
                 self.labels[node] = ON;
             }
         }
+    }
+
+    /// Whether moving a node would leave a tetrahedron at it almost without volume. Only where cubes
+    /// of several sizes and several labels meet; the node then stays, and its cut makes a short edge.
+    fn flattens(&self, node: usize, to: DVec3, tets: &[u32]) -> bool {
+        let left = |&t: &u32| {
+            let tet = self.tets[t as usize];
+            let now = volume(tet.map(|n| self.positions[n as usize]));
+            let then = volume(tet.map(|n| if n as usize == node { to } else { self.positions[n as usize] }));
+            then / now.signum()
+        };
+        let least = LEAST_VOLUME * self.lattice.spacing.powi(3);
+        tets.iter().map(left).any(|volume| volume.is_nan() || volume < least)
     }
 
     /// Spacing of the finest lattice at each node, mm.

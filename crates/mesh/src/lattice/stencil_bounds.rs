@@ -77,14 +77,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
     #[test]
     fn boundaries_across_cube_sizes_leave_no_gap_and_no_flat_element(seed in any::<u64>(), labels in 2u16..5) {
-        let point = DVec3::new(7.0, 9.0, 8.0);
-        let judge = |centre: DVec3, level: u32| {
-            let split = level > 0 && centre.distance(point) < 2.5 * f64::from(1 << level);
-            if split { Cube::Split } else { Cube::Keep }
-        };
-        let bounds = [DVec3::ZERO, DVec3::splat(20.0)];
-        let lattice = Lattice::over(bounds, 0.5, DVec3::ZERO, 3, usize::MAX, judge).unwrap();
-        let labelled = stuff(&lattice, &Noise { seed, labels });
+        let labelled = stuff(&graded(), &Noise { seed, labels });
         let quality = Quality::of(&labelled.mesh);
         prop_assert!(quality.min_mm3 > 0.0);
         // The paper proves 1.66° to 174.72° for its cutting of cubes of several sizes with one
@@ -94,6 +87,25 @@ proptest! {
         prop_assert!(quality.min_dihedral_deg > least && quality.max_dihedral_deg < most, "{quality:?}");
         prop_assert_eq!(Topology::of(&labelled.mesh).crowded_face, None);
     }
+}
+
+/// A lattice of noise whose warp had left a tetrahedron without volume.
+#[test]
+fn a_node_stays_where_its_warp_would_flatten_a_tetrahedron() {
+    let labelled = stuff(&graded(), &Noise { seed: 8_760_264_896_629_956_405, labels: 4 });
+    assert!(Quality::of(&labelled.mesh).min_mm3 > 0.0);
+    assert_eq!(Topology::of(&labelled.mesh).crowded_face, None);
+}
+
+/// A lattice of four cube sizes, finest around one point.
+fn graded() -> Lattice {
+    let point = DVec3::new(7.0, 9.0, 8.0);
+    let judge = |centre: DVec3, level: u32| {
+        let split = level > 0 && centre.distance(point) < 2.5 * f64::from(1 << level);
+        if split { Cube::Split } else { Cube::Keep }
+    };
+    let bounds = [DVec3::ZERO, DVec3::splat(20.0)];
+    Lattice::over(bounds, 0.5, DVec3::ZERO, 3, usize::MAX, judge).unwrap()
 }
 
 /// Extreme positions of a warped node: itself, or on one of its 14 edges.
