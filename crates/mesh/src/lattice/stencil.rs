@@ -126,8 +126,9 @@ impl<'a, P: Partition> Stuffing<'a, P> {
         }
     }
 
-    /// Whether moving a node would leave a tetrahedron at it almost without volume. Only where cubes
-    /// of several sizes and several labels meet; the node then stays, and its cut makes a short edge.
+    /// Whether moving a node would leave a tetrahedron at it almost without volume. Only where
+    /// cubes of several sizes and several labels meet; the node then stays, and its cut makes a
+    /// short edge.
     fn flattens(&self, node: usize, to: DVec3, tets: &[u32]) -> bool {
         let left = |&t: &u32| {
             let tet = self.tets[t as usize];
