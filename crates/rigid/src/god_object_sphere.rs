@@ -180,8 +180,14 @@ pub struct GodObjectSphere {
     burr: Burr,
 }
 
-/// What tells one bone from another: its address, its grid, and how often a stroke was undone.
-type Seen = (usize, [usize; 3], Vec3, u32);
+/// The bone of the last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Seen {
+    /// [`BoneVolume::id`].
+    bone: u64,
+    /// How often bone had been restored.
+    undone: u32,
+}
 
 /// What the discs at hand are good for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -229,7 +235,7 @@ impl GodObjectSphere {
 
     /// Forgets what is not of this bone as it is now.
     fn look_at(&mut self, bone: &BoneVolume) {
-        let this = Some((std::ptr::from_ref(bone) as usize, bone.dims(), bone.origin(), bone.undone()));
+        let this = Some(Seen { bone: bone.id(), undone: bone.undone() });
         if self.seen != this {
             self.seen = this;
             self.known = Known::default();

@@ -36,6 +36,11 @@ impl Bound {
         Self { at_rest_ms, stiffest: (scaling.stiffest as f32).max(4.0 / (at_rest_ms * at_rest_ms)) }
     }
 
+    /// Stable step by the elements at rest, ms: the one that a slightly deformed body keeps.
+    pub fn elements_ms(&self) -> f32 {
+        2.0 / self.stiffest.sqrt()
+    }
+
     /// Stable step of the deformed body, ms, from the largest growth of an element's ω², 1/ms².
     pub fn deformed_ms(&self, growth: f32) -> f32 {
         let relative = (growth / self.stiffest).min(MAX_STIFFENING * MAX_STIFFENING);
@@ -57,6 +62,7 @@ mod tests {
         let by_element = trepan_soft::element_bound_ms(&body) as f32;
         assert!(bound.at_rest_ms > 1.1 * by_element);
         assert_eq!(bound.deformed_ms(0.0), bound.at_rest_ms);
+        assert!((bound.elements_ms() / by_element - 1.0).abs() < 1e-4);
         let deformed = |relative: f32| bound.deformed_ms(relative * 4.0 / (by_element * by_element)) / by_element;
         assert!((deformed(0.01) - 1.01f32.sqrt().recip()).abs() < 1e-4);
         assert!((deformed(3.0) - 0.5).abs() < 1e-4);

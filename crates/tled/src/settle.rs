@@ -61,7 +61,7 @@ impl Tled {
         let mut before = self.elements_and_nodes();
         while settled.steps < settling.steps && !settled.converged {
             self.damping_per_ms = 2.0 * slow;
-            let dt_ms = self.stable_dt_ms();
+            let dt_ms = self.longest_dt_ms();
             for _ in 0..CHECK_STEPS {
                 settled.last = self.step(loads, dt_ms);
             }
@@ -77,6 +77,11 @@ impl Tled {
         self.damping_per_ms = rate;
         self.stop();
         settled
+    }
+
+    /// Longest step that is stable near rest, ms; cut into substeps where the body is not.
+    fn longest_dt_ms(&self) -> f32 {
+        self.config.safety * self.bound.at_rest_ms
     }
 
     /// Displacement, velocity and force of every node, by place.

@@ -15,7 +15,7 @@ use trepan_soft::{
 
 /// Total Lagrangian explicit solver of one body.
 pub struct Tled {
-    config: Config,
+    pub(crate) config: Config,
     pub(crate) elements: Elements,
     /// Positions at rest and now, mm, and velocities, mm/ms, by mesh node.
     rest: Vec<Vec3>,
@@ -25,7 +25,7 @@ pub struct Tled {
     /// Surface pressure, its triangles given by place.
     pressure: SurfacePressure,
     layout: Layout,
-    bound: Bound,
+    pub(crate) bound: Bound,
     pub(crate) damping_per_ms: f32,
     /// Lowest frequency of the body at rest or its estimate, rad/ms.
     pub(crate) lowest_per_ms: f32,
@@ -276,7 +276,7 @@ impl SoftSolver for Tled {
     }
 
     fn stable_dt_ms(&self) -> f32 {
-        self.config.safety * self.bound.at_rest_ms
+        self.config.safety * self.bound.elements_ms()
     }
 }
 

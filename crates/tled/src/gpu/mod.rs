@@ -322,7 +322,7 @@ impl SoftSolver for GpuTled {
     }
 
     fn stable_dt_ms(&self) -> f32 {
-        self.config.safety * self.bound.at_rest_ms
+        self.config.safety * self.bound.elements_ms()
     }
 }
 

@@ -30,15 +30,19 @@ mod undo;
 use crate::VoxelVolume;
 use crate::stroke::{BRICK, Strokes};
 use glam::{DVec3, IVec3};
-use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI16, AtomicU32, AtomicU64, Ordering};
 use trepan_geometry::{Aabb, Vec3};
 
 /// Density of air, HU: used outside the grid and for removed bone.
 pub const AIR_HU: i16 = -1000;
 
+/// The number of the next volume.
+static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
 /// A grid of densities in HU that one thread modifies and others read.
 #[derive(Debug)]
 pub struct BoneVolume {
+    id: u64,
     dims: [usize; 3],
     origin: Vec3,
     spacing_mm: f32,
@@ -75,6 +79,7 @@ impl BoneVolume {
         }
         let bricks = volume.dims.map(|n| n.div_ceil(BRICK));
         let mut bone = Self {
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
             dims: volume.dims,
             origin: volume.world_from_voxel.translation.as_vec3(),
             spacing_mm: spacing as f32,
@@ -103,6 +108,11 @@ impl BoneVolume {
         }
         let half = Vec3::splat(0.5 * self.spacing_mm);
         (low.x <= high.x).then(|| Aabb { min: self.centre_of(low) - half, max: self.centre_of(high) + half })
+    }
+
+    /// Number of this volume, unique in the process. Readers that keep state recognise it by this.
+    pub fn id(&self) -> u64 {
+        self.id
     }
 
     /// Voxels along x, y, z.
