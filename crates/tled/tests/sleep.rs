@@ -28,6 +28,10 @@ fn config(averaged_pressure: bool) -> Config {
     Config { still_mm: 0.003, averaged_pressure, ..Config::default() }
 }
 
+/// Steps by 0.8 of the bound at rest.
+///
+/// Known gap: with steps of `stable_dt_ms()` the averaged-pressure case ends 0.0105 mm apart, over
+/// the limit of 0.01 mm, with any wake threshold tried.
 fn run(solver: &mut Tled, loads: &Loads, ms: f32) {
     let dt_ms = 0.8 * solver.bound_ms();
     (0..(ms / dt_ms) as usize).for_each(|_| _ = solver.step(loads, dt_ms));
