@@ -14,7 +14,8 @@
 //! cut into substeps, and so is one over the stable step of the elements as deformed now. Elements
 //! are stored in blocks of sixteen, one lane each. Their forces are stored and gathered per node in
 //! a fixed order, so the same input gives the same bytes on every machine and with every kernel. A
-//! step neither allocates, locks, waits nor panics.
+//! step neither allocates nor panics. With several threads it takes locks that nobody else holds,
+//! and waits for the parts that its own threads have begun.
 //!
 //! ```
 //! use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
