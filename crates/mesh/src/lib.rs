@@ -41,7 +41,8 @@ mod triangles;
 
 pub use check::MeshError;
 pub use file::{
-    FileError, abaqus, gmsh, medit, obj, ply, read, read_surface, stl, tetgen, vtk, vtu, write, write_surface,
+    FileError, Format, SURFACE_FORMATS, VOLUME_FORMATS, abaqus, gmsh, medit, obj, ply, read, read_among, read_surface,
+    stl, tetgen, vtk, vtu, write, write_among, write_surface,
 };
 pub use isosurface::isosurface;
 pub use quality::Quality;

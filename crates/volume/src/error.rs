@@ -23,7 +23,7 @@ pub enum ReadError {
         source: io::Error,
     },
     /// The format is not supported.
-    #[error("{}: {found}; readable are NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr with .img), NRRD, MetaImage and DICOM", file.display())]
+    #[error("{}: {found}; readable are {}", file.display(), crate::format::names())]
     Format {
         /// The file.
         file: PathBuf,

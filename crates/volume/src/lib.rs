@@ -22,6 +22,7 @@ pub mod dicom;
 mod distance;
 mod error;
 mod flap;
+mod format;
 mod keys;
 mod memory;
 pub mod metaimage;
@@ -33,7 +34,6 @@ pub mod nrrd;
 mod overlap;
 mod pictures;
 mod piece;
-mod read;
 mod registration;
 mod regular;
 mod resample;
@@ -43,6 +43,7 @@ mod source;
 mod stroke;
 mod volume;
 
+pub use atomic::write_atomically;
 pub use bone::{AIR_HU, BoneError, BoneVolume};
 pub use brain::{
     BrainConfidence, BrainConfig, BrainFit, FoundBrain, MaskError, brain_by_mri, brain_fit, brain_mask,
@@ -52,12 +53,12 @@ pub use component::largest_component;
 pub use distance::{DistanceField, FAR_MM};
 pub use error::{ReadError, WriteError};
 pub use flap::{FlapSearch, FlapState};
+pub use format::{FORMATS, Format, import, import_among, read};
 pub use memory::{Limit, MOST_VOXELS, TooLarge, room_for, room_for_voxels};
 pub use note::{Import, Note};
 pub use overlap::{LEAST_SHARE, OverlapError, overlap};
 pub use pictures::{Picture, overlap_pictures};
 pub use piece::Piece;
-pub use read::{import, read};
 pub use registration::{Registration, RegistrationConfig, RegistrationError, register};
 pub use regular::{open_regular, read_regular};
 pub use resample::{Grid, Interpolation, resample};

@@ -15,8 +15,11 @@
 
 use crate::TetMesh;
 use crate::file::numbered::Numbered;
-use crate::file::{FileError, Reader, write_atomically};
+use crate::file::{FileError, Format, Reader, write_atomically};
 use std::path::Path;
+
+/// The format.
+pub const FORMAT: Format<TetMesh> = Format { name: "Abaqus (.inp)", endings: &["inp"], starts: &["*"], read, write };
 
 /// Reads the tetrahedra of an Abaqus file. Only indices are checked; call [`TetMesh::check`] for
 /// the rest.

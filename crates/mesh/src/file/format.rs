@@ -1,73 +1,83 @@
 //! Detects the format of a mesh file and calls its reader or writer.
 //!
 //! # Practice
+//! A format is one file with a [`Format`]; its name in one of the two lists brings it to the
+//! programs. [`read_among`] and [`write_among`] use it from any crate (`tests/toy_format.rs`).
 //! Reading detects the content first, since programs use `.mesh`, `.msh` and `.vtk` differently;
-//! writing uses the extension.
+//! writing uses the ending.
 
-use crate::file::{FileError, Reader};
+use crate::file::FileError;
 use crate::{TetMesh, TriMesh, abaqus, gmsh, medit, obj, ply, stl, tetgen, vtk, vtu};
+use std::io::Read;
 use std::path::Path;
+use trepan_volume::open_regular;
 
-type Parse = fn(Reader) -> Result<TetMesh, FileError>;
+/// A file format of tetrahedra or of a surface.
+#[derive(Debug)]
+pub struct Format<M> {
+    /// Its name with the endings, as an error lists it.
+    pub name: &'static str,
+    /// Endings of its files' names: lower case, without the dot.
+    pub endings: &'static [&'static str],
+    /// The texts that its files may begin with. Without any, the ending decides.
+    pub starts: &'static [&'static str],
+    /// Reads a file. Only indices need to be checked.
+    pub read: fn(&Path) -> Result<M, FileError>,
+    /// Writes a file, atomically.
+    pub write: fn(&Path, &M) -> Result<(), FileError>,
+}
 
-const VOLUME_FORMATS: &str =
-    "legacy VTK (.vtk), VTK XML (.vtu), Gmsh (.msh), Medit (.mesh), TetGen (.node, .ele) or Abaqus (.inp)";
+/// The formats of tetrahedra.
+pub const VOLUME_FORMATS: &[Format<TetMesh>] =
+    &[vtk::FORMAT, vtu::FORMAT, gmsh::FORMAT, medit::FORMAT, tetgen::FORMAT, abaqus::FORMAT];
 
-const SURFACE_FORMATS: &str = ".stl, .obj or .ply";
+/// The formats of triangle surfaces.
+pub const SURFACE_FORMATS: &[Format<TriMesh>] = &[stl::FORMAT, obj::FORMAT, ply::FORMAT];
 
-/// Reads tetrahedra from a file of any supported format. Only indices are checked; call
+/// Bytes of a file in which its format is recognised.
+const START: u64 = 32;
+
+/// Reads tetrahedra from a file of any of the [`VOLUME_FORMATS`]. Only indices are checked; call
 /// [`TetMesh::check`] for the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {
-    let ending = ending(path);
-    if ["node", "ele"].contains(&ending.as_str()) {
-        return tetgen::read(path);
-    }
-    let reader = Reader::open(path)?;
-    let starts: [(&str, Parse); 6] = [
-        ("# vtk DataFile", vtk::parse),
-        ("<?xml", vtu::parse),
-        ("<VTKFile", vtu::parse),
-        ("$", gmsh::parse),
-        ("MeshVersionFormatted", medit::parse),
-        ("*", abaqus::parse),
-    ];
-    match starts.iter().find(|(start, _)| reader.starts_with(start.as_bytes())) {
-        Some((_, parse)) => parse(reader),
-        None if ending == "mesh" => medit::parse(reader),
-        None => Err(reader.error("the format", "unknown", VOLUME_FORMATS)),
-    }
+    read_among(VOLUME_FORMATS, path)
 }
 
-/// Reads a triangle surface: STL, OBJ or PLY, by the file's extension.
+/// Reads a triangle surface from a file of any of the [`SURFACE_FORMATS`].
 pub fn read_surface(path: &Path) -> Result<TriMesh, FileError> {
-    match ending(path).as_str() {
-        "stl" => stl::read(path),
-        "obj" => obj::read(path),
-        "ply" => ply::read(path),
-        other => Err(unknown(path, other, SURFACE_FORMATS)),
-    }
+    read_among(SURFACE_FORMATS, path)
 }
 
-/// Writes tetrahedra in the format of the file's extension.
+/// Writes tetrahedra in the format of the file's ending.
 pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
-    match ending(path).as_str() {
-        "vtk" => vtk::write(path, mesh),
-        "vtu" => vtu::write(path, mesh),
-        "msh" => gmsh::write(path, mesh),
-        "mesh" => medit::write(path, mesh),
-        "node" | "ele" => tetgen::write(path, mesh),
-        "inp" => abaqus::write(path, mesh),
-        other => Err(unknown(path, other, VOLUME_FORMATS)),
+    write_among(VOLUME_FORMATS, path, mesh)
+}
+
+/// Writes a triangle surface in the format of the file's ending.
+pub fn write_surface(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
+    write_among(SURFACE_FORMATS, path, mesh)
+}
+
+/// Reads a file in the one of `formats` that its first bytes belong to, else in that of its ending.
+pub fn read_among<M>(formats: &[Format<M>], path: &Path) -> Result<M, FileError> {
+    let named = formats.iter().find(|format| format.endings.contains(&ending(path).as_str()));
+    if let Some(format) = named.filter(|format| format.starts.is_empty()) {
+        return (format.read)(path);
+    }
+    let start = start(path).map_err(|source| FileError::Io { path: path.into(), source })?;
+    let begins = |format: &&Format<M>| format.starts.iter().any(|text| start.starts_with(text.as_bytes()));
+    match formats.iter().find(begins).or(named) {
+        Some(format) => (format.read)(path),
+        None => Err(unknown(path, "the format", "unknown".into(), formats)),
     }
 }
 
-/// Writes a triangle surface in the format of the file's extension: STL, OBJ or PLY.
-pub fn write_surface(path: &Path, mesh: &TriMesh) -> Result<(), FileError> {
-    match ending(path).as_str() {
-        "stl" => stl::write(path, mesh),
-        "obj" => obj::write(path, mesh),
-        "ply" => ply::write(path, mesh),
-        other => Err(unknown(path, other, SURFACE_FORMATS)),
+/// Writes a file in the one of `formats` that its ending belongs to.
+pub fn write_among<M>(formats: &[Format<M>], path: &Path, mesh: &M) -> Result<(), FileError> {
+    let ending = ending(path);
+    match formats.iter().find(|format| format.endings.contains(&ending.as_str())) {
+        Some(format) => (format.write)(path, mesh),
+        None => Err(unknown(path, "the name's ending", format!("{ending:?}"), formats)),
     }
 }
 
@@ -75,13 +85,15 @@ fn ending(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
 
-fn unknown(path: &Path, ending: &str, wanted: &str) -> FileError {
-    FileError::Field {
-        path: path.into(),
-        field: "the name's ending".into(),
-        got: format!("{ending:?}"),
-        wanted: wanted.into(),
-    }
+fn start(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open_regular(path)?.take(START).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+fn unknown<M>(path: &Path, field: &str, got: String, formats: &[Format<M>]) -> FileError {
+    let names: Vec<&str> = formats.iter().map(|format| format.name).collect();
+    FileError::Field { path: path.into(), field: field.into(), got, wanted: names.join(" or ") }
 }
 
 #[cfg(test)]
@@ -93,18 +105,28 @@ mod tests {
     #[test]
     fn every_format_gives_the_same_mesh_back() {
         let folder = tempfile::tempdir().unwrap();
-        for ending in ["vtk", "vtu", "msh", "mesh", "node", "inp"] {
+        for ending in VOLUME_FORMATS.iter().map(|format| format.endings[0]) {
             let path = folder.path().join(format!("mesh.{ending}"));
             write(&path, &octahedron()).unwrap();
             assert_eq!(read(&path).unwrap(), octahedron(), "{ending}");
         }
         let mesh = octahedron();
         let surface = Surface::of(&mesh).to_tri_mesh(&mesh.positions);
-        for ending in ["stl", "obj", "ply"] {
+        for ending in SURFACE_FORMATS.iter().map(|format| format.endings[0]) {
             let path = folder.path().join(format!("surface.{ending}"));
             write_surface(&path, &surface).unwrap();
             assert!((read_surface(&path).unwrap().volume_mm3() - mesh.total_mm3()).abs() < 1e-6, "{ending}");
         }
+    }
+
+    #[test]
+    fn the_content_decides_before_the_ending() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.msh");
+        write(&path, &octahedron()).unwrap();
+        let renamed = folder.path().join("mesh.mesh");
+        std::fs::rename(&path, &renamed).unwrap();
+        assert_eq!(read(&renamed).unwrap(), octahedron());
     }
 
     #[test]

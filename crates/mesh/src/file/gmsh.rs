@@ -16,8 +16,11 @@
 
 use crate::TetMesh;
 use crate::file::numbered::Numbered;
-use crate::file::{FileError, Reader, write_atomically};
+use crate::file::{FileError, Format, Reader, write_atomically};
 use std::path::Path;
+
+/// The format.
+pub const FORMAT: Format<TetMesh> = Format { name: "Gmsh (.msh)", endings: &["msh"], starts: &["$"], read, write };
 
 /// Reads the tetrahedra of a Gmsh file. Only indices are checked; call [`TetMesh::check`] for the
 /// rest.

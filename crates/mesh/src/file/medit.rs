@@ -13,9 +13,13 @@
 //! P. Frey: MEDIT, an interactive mesh visualization software, INRIA RT-0253, 2001.
 
 use crate::TetMesh;
-use crate::file::{FileError, Reader, write_atomically};
+use crate::file::{FileError, Format, Reader, write_atomically};
 use std::path::Path;
 use trepan_geometry::Vec3;
+
+/// The format.
+pub const FORMAT: Format<TetMesh> =
+    Format { name: "Medit (.mesh)", endings: &["mesh"], starts: &["MeshVersionFormatted"], read, write };
 
 /// Reads the tetrahedra of a Medit file. Only indices are checked; call [`TetMesh::check`] for the
 /// rest.

@@ -6,7 +6,6 @@
 //! written under a temporary name and then renamed.
 
 pub mod abaqus;
-mod base64;
 mod format;
 pub mod gmsh;
 pub mod medit;
@@ -18,7 +17,9 @@ pub mod tetgen;
 pub mod vtk;
 pub mod vtu;
 
-pub use format::{read, read_surface, write, write_surface};
+pub use format::{
+    Format, SURFACE_FORMATS, VOLUME_FORMATS, read, read_among, read_surface, write, write_among, write_surface,
+};
 
 use crate::{MeshError, TetMesh, TriMesh};
 use std::fmt::Display;
@@ -213,11 +214,6 @@ impl Reader {
         self.at = 0;
     }
 
-    /// Whether the rest starts with these bytes.
-    pub(crate) fn starts_with(&self, bytes: &[u8]) -> bool {
-        self.bytes[self.at..].starts_with(bytes)
-    }
-
     /// Size of the file, bytes.
     pub(crate) fn size(&self) -> usize {
         self.bytes.len()
@@ -262,18 +258,7 @@ pub(crate) fn write_atomically(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<(), FileError> {
-    let io = |source| FileError::Io { path: path.into(), source };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".trepan-");
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(io)?;
-    let mut buffered = std::io::BufWriter::new(file.as_file_mut());
-    fill(&mut buffered).and_then(|()| buffered.flush()).map_err(io)?;
-    drop(buffered);
-    file.persist(path).map_err(|e| io(e.error))?;
-    Ok(())
+    trepan_volume::write_atomically(path, |out| fill(out)).map_err(|source| FileError::Io { path: path.into(), source })
 }
 
 #[cfg(test)]

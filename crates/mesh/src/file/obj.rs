@@ -9,9 +9,12 @@
 //! Writes vertices and triangles with enough digits to restore each f32.
 
 use crate::TriMesh;
-use crate::file::{FileError, Reader, write_atomically};
+use crate::file::{FileError, Format, Reader, write_atomically};
 use std::path::Path;
 use trepan_geometry::Vec3;
+
+/// The format.
+pub const FORMAT: Format<TriMesh> = Format { name: "OBJ (.obj)", endings: &["obj"], starts: &[], read, write };
 
 /// Reads a surface.
 pub fn read(path: &Path) -> Result<TriMesh, FileError> {

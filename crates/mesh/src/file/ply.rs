@@ -13,8 +13,11 @@
 //! G. Turk, "The PLY Polygon File Format", 1994.
 
 use crate::TriMesh;
-use crate::file::{FileError, Reader, write_atomically};
+use crate::file::{FileError, Format, Reader, write_atomically};
 use std::path::Path;
+
+/// The format.
+pub const FORMAT: Format<TriMesh> = Format { name: "PLY (.ply)", endings: &["ply"], starts: &[], read, write };
 
 /// Reads a surface.
 pub fn read(path: &Path) -> Result<TriMesh, FileError> {

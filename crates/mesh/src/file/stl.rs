@@ -10,9 +10,12 @@
 //! defines them. Writes binary. Positions are mm; STL has no unit.
 
 use crate::TriMesh;
-use crate::file::{FileError, Reader, write_atomically};
+use crate::file::{FileError, Format, Reader, write_atomically};
 use std::path::Path;
 use trepan_geometry::Vec3;
+
+/// The format.
+pub const FORMAT: Format<TriMesh> = Format { name: "STL (.stl)", endings: &["stl"], starts: &[], read, write };
 
 /// Reads a surface.
 pub fn read(path: &Path) -> Result<TriMesh, FileError> {

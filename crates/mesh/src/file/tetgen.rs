@@ -16,8 +16,12 @@
 
 use crate::TetMesh;
 use crate::file::numbered::Numbered;
-use crate::file::{FileError, Reader, write_atomically};
+use crate::file::{FileError, Format, Reader, write_atomically};
 use std::path::Path;
+
+/// The format.
+pub const FORMAT: Format<TetMesh> =
+    Format { name: "TetGen (.node, .ele)", endings: &["node", "ele"], starts: &[], read, write };
 
 /// Reads a pair of TetGen files. Only indices are checked; call [`TetMesh::check`] for the rest.
 pub fn read(path: &Path) -> Result<TetMesh, FileError> {

@@ -14,13 +14,17 @@
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
 
 use crate::TetMesh;
-use crate::file::{FileError, Reader, write_atomically};
+use crate::file::{FileError, Format, Reader, write_atomically};
 use crate::lattice::LabelledMesh;
 use std::io::Write;
 use std::path::Path;
 use trepan_geometry::Vec3;
 
 const TETRAHEDRON: u8 = 10;
+
+/// The format.
+pub const FORMAT: Format<TetMesh> =
+    Format { name: "legacy VTK (.vtk)", endings: &["vtk"], starts: &["# vtk DataFile"], read, write };
 
 /// Reads the tetrahedra of a legacy VTK file. Only indices are checked; call [`TetMesh::check`] for
 /// the rest.

@@ -17,13 +17,18 @@
 //! VTK File Formats, in The VTK User's Guide, 11th edition.
 
 use crate::TetMesh;
-use crate::file::base64;
-use crate::file::{FileError, Reader, write_atomically};
+use crate::file::{FileError, Format, Reader, write_atomically};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
 use std::io::Read;
 use std::path::Path;
 use trepan_geometry::Vec3;
 
 const TETRAHEDRON: f64 = 10.0;
+
+/// The format.
+pub const FORMAT: Format<TetMesh> =
+    Format { name: "VTK XML (.vtu)", endings: &["vtu"], starts: &["<?xml", "<VTKFile"], read, write };
 
 /// Reads the tetrahedra of a VTK XML file. Only indices are checked; call [`TetMesh::check`] for
 /// the rest.
@@ -37,7 +42,7 @@ pub fn write(path: &Path, mesh: &TetMesh) -> Result<(), FileError> {
     let connectivity: Vec<u8> = mesh.tets.iter().flatten().flat_map(|n| n.to_le_bytes()).collect();
     let offsets: Vec<u8> = (1..=mesh.tets.len() as u64).flat_map(|n| (4 * n).to_le_bytes()).collect();
     let types = vec![TETRAHEDRON as u8; mesh.tets.len()];
-    let inline = |bytes: &[u8]| base64::encode(&[&(bytes.len() as u64).to_le_bytes(), bytes].concat());
+    let inline = |bytes: &[u8]| BASE64.encode([&(bytes.len() as u64).to_le_bytes(), bytes].concat());
     write_atomically(path, |out| {
         let (nodes, cells) = (mesh.positions.len(), mesh.tets.len());
         writeln!(out, "<?xml version=\"1.0\"?>")?;
@@ -186,7 +191,7 @@ impl<'a> Xml<'a> {
         match tag.attribute("format").unwrap_or("ascii") {
             "ascii" => self.text_array(inline, name),
             "binary" => {
-                let stream = base64::decode(inline).ok_or_else(|| self.damaged(name, "not base64"))?;
+                let stream = decoded(inline).ok_or_else(|| self.damaged(name, "not base64"))?;
                 self.binary_array(tag, name, &stream)
             }
             "appended" => {
@@ -298,10 +303,20 @@ fn appended(bytes: &[u8]) -> Option<(usize, bool)> {
     Some((start, tag.attribute("encoding") == Some("raw")))
 }
 
-/// Decodes the base64 prefix of a stream.
+/// Decodes base64 up to the next tag.
 fn decoded_prefix(stream: &[u8]) -> Vec<u8> {
     let end = stream.iter().position(|b| *b == b'<').unwrap_or(stream.len());
-    base64::decode(&stream[..end]).unwrap_or_default()
+    decoded(&stream[..end]).unwrap_or_default()
+}
+
+/// Decodes several base64 texts in a row, each with its padding, and white space between letters.
+fn decoded(text: &[u8]) -> Option<Vec<u8>> {
+    let letters: Vec<u8> = text.iter().copied().filter(|b| !b.is_ascii_whitespace()).collect();
+    let ends = |pair: [u8; 2]| pair[0] == b'=' && pair[1] != b'=';
+    let parts = letters.chunk_by(|&a, &b| !ends([a, b]));
+    let mut bytes = Vec::with_capacity(letters.len() / 4 * 3);
+    parts.map(|part| BASE64.decode_vec(part, &mut bytes).ok()).collect::<Option<()>>()?;
+    Some(bytes)
 }
 
 #[cfg(test)]
@@ -309,6 +324,13 @@ mod tests {
     use super::*;
     use crate::file::tests::{octahedron, of_text, survive_mutations};
     use std::io::Write;
+
+    #[test]
+    fn base64_in_several_parts_is_decoded_and_anything_else_refused() {
+        assert_eq!(decoded(b"Zm9vYg==Zm9v\nYmE=").unwrap(), b"foobfooba");
+        assert_eq!(decoded(b"").unwrap(), b"");
+        assert_eq!((decoded(b"Zg"), decoded(b"Zg*=")), (None, None));
+    }
 
     const TEXT: &str = "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"BigEndian\">\n<!-- note -->\n<UnstructuredGrid>\n\
         <Piece NumberOfPoints=\"4\" NumberOfCells=\"2\">\n<PointData><DataArray type=\"Int8\" Name=\"x\">1 2 3 4</DataArray></PointData>\n\

@@ -26,7 +26,7 @@ mod slice;
 mod stack;
 
 use crate::source::BYTES_PER_VOXEL;
-use crate::{Import, Note, ReadError, VoxelVolume, open_regular, room_for, room_for_voxels};
+use crate::{Format, Import, Note, ReadError, VoxelVolume, open_regular, room_for, room_for_voxels};
 use rayon::prelude::*;
 use slice::Slice;
 use std::path::{Path, PathBuf};
@@ -54,6 +54,13 @@ pub struct Series {
     pub slices: usize,
     /// Columns and rows of a picture.
     pub size: [usize; 2],
+}
+
+/// The format.
+pub const FORMAT: Format = Format { name: "DICOM", file: Path::to_path_buf, starts, import };
+
+fn starts(bytes: &[u8]) -> bool {
+    bytes.get(128..132) == Some(b"DICM") || matches!(bytes, [2 | 8, 0, _, 0, ..])
 }
 
 /// Reads the largest series of a folder, or the one that a file belongs to.
@@ -87,11 +94,6 @@ pub fn import_series(folder: &Path, index: usize) -> Result<Import, ReadError> {
 /// Lists the series in a folder and its subfolders, ordered by the names of their first files.
 pub fn series(folder: &Path) -> Result<Vec<Series>, ReadError> {
     Ok(Groups::of(folder)?.groups.iter().map(|group| summary(group)).collect())
-}
-
-/// Whether a file's first bytes are those of DICOM.
-pub(crate) fn starts(bytes: &[u8]) -> bool {
-    bytes.get(128..132) == Some(b"DICM") || matches!(bytes, [2 | 8, 0, _, 0, ..])
 }
 
 fn no_picture(path: &Path) -> ReadError {

@@ -20,9 +20,17 @@
 use crate::keys::{Keys, numbers};
 use crate::sample::{ByteOrder, Number, Scale};
 use crate::source::Source;
-use crate::{Import, Note, ReadError, VoxelVolume};
+use crate::{Format, Import, Note, ReadError, VoxelVolume};
 use glam::{DAffine3, DMat3, DVec3};
 use std::path::Path;
+
+/// The format.
+pub const FORMAT: Format = Format { name: "MetaImage", file: Path::to_path_buf, starts, import };
+
+fn starts(bytes: &[u8]) -> bool {
+    let key: Vec<u8> = bytes.iter().take_while(|&&b| b != b'=').map(u8::to_ascii_lowercase).collect();
+    [&b"objecttype"[..], b"ndims", b"comment", b"objectsubtype"].contains(&key.trim_ascii())
+}
 
 /// Reads the volume of a file.
 pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
@@ -31,11 +39,11 @@ pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
 
 /// Reads the volume of a file, with notes.
 pub fn import(path: &Path) -> Result<Import, ReadError> {
-    import_source(Source::open_plain(path)?)
+    import_source(Source::open(path)?)
 }
 
 /// Reads from a source that starts with the header.
-pub(crate) fn import_source(mut source: Source) -> Result<Import, ReadError> {
+fn import_source(mut source: Source) -> Result<Import, ReadError> {
     let keys = Keys::read(&mut source, "=", |line| line.trim_start().starts_with("ElementDataFile"))?;
     let file = keys.needed(&source, "ElementDataFile")?;
     let dims = dims(&source, &keys)?;

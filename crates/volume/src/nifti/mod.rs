@@ -27,9 +27,18 @@ pub use write::write;
 
 use crate::sample::Scale;
 use crate::source::Source;
-use crate::{Import, Note, ReadError, VoxelVolume};
+use crate::{Format, Import, Note, ReadError, VoxelVolume};
 use header::Header;
 use std::path::{Path, PathBuf};
+
+/// The format.
+pub const FORMAT: Format =
+    Format { name: "NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr with .img)", file: header_of_pair, starts, import };
+
+fn starts(bytes: &[u8]) -> bool {
+    let size = bytes.first_chunk::<4>().copied().unwrap_or_default();
+    [348, 540].iter().any(|&header| size == i32::to_le_bytes(header) || size == i32::to_be_bytes(header))
+}
 
 /// Reads the one volume of a file.
 pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
@@ -52,7 +61,7 @@ fn read_one(path: &Path, index: Option<u64>) -> Result<Import, ReadError> {
 }
 
 /// Reads from a source that starts with the header.
-pub(crate) fn import_source(mut source: Source, index: Option<u64>) -> Result<Import, ReadError> {
+fn import_source(mut source: Source, index: Option<u64>) -> Result<Import, ReadError> {
     let header = Header::read(&mut source)?;
     match header.voxels_elsewhere {
         false => voxels(source, &header, index),
@@ -98,7 +107,7 @@ fn several(source: &Source, header: &Header, remedy: &'static str) -> ReadError 
 }
 
 /// The header's path if the user named the voxel file of a pair.
-pub(crate) fn header_of_pair(path: &Path) -> PathBuf {
+fn header_of_pair(path: &Path) -> PathBuf {
     let plain = if ends(path, "gz") { path.with_extension("") } else { path.into() };
     let other = [plain.with_extension("hdr"), plain.with_extension("HDR"), plain.with_extension("hdr.gz")];
     match ends(&plain, "img") {

@@ -13,15 +13,16 @@ const HEADER: usize = 352;
 pub fn write<T: Sample>(path: &Path, volume: &VoxelVolume<T>) -> Result<(), WriteError> {
     let name = path.file_name().map(|n| n.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let header = header(path, volume)?;
-    match (name.ends_with(".nii"), name.ends_with(".nii.gz")) {
+    let written = match (name.ends_with(".nii"), name.ends_with(".nii.gz")) {
         (true, _) => write_atomically(path, |file| body(file, &header, &volume.data)),
         (_, true) => write_atomically(path, |file| {
             let mut gzip = GzEncoder::new(file, Compression::new(4));
             body(&mut gzip, &header, &volume.data)?;
             gzip.finish().map(drop)
         }),
-        _ => Err(WriteError::Name { file: path.into(), expected: ".nii or .nii.gz" }),
-    }
+        _ => return Err(WriteError::Name { file: path.into(), expected: ".nii or .nii.gz" }),
+    };
+    written.map_err(|source| WriteError::Io { file: path.into(), source })
 }
 
 fn body<T: Sample>(to: &mut impl Write, header: &[u8], data: &[T]) -> io::Result<()> {

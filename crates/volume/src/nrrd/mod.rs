@@ -24,9 +24,13 @@ pub use write::write;
 use crate::keys::{Keys, numbers};
 use crate::sample::{ByteOrder, Number, Scale};
 use crate::source::Source;
-use crate::{Import, Note, ReadError, VoxelVolume};
+use crate::{Format, Import, Note, ReadError, VoxelVolume};
 use glam::{DAffine3, DMat3, DVec3};
 use std::path::Path;
+
+/// The format.
+pub const FORMAT: Format =
+    Format { name: "NRRD", file: Path::to_path_buf, starts: |bytes| bytes.starts_with(b"NRRD"), import };
 
 /// Reads the volume of a file.
 pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
@@ -39,7 +43,7 @@ pub fn import(path: &Path) -> Result<Import, ReadError> {
 }
 
 /// Reads from a source that starts with the header.
-pub(crate) fn import_source(mut source: Source) -> Result<Import, ReadError> {
+fn import_source(mut source: Source) -> Result<Import, ReadError> {
     let magic = source.line()?.unwrap_or_default();
     if !magic.starts_with("NRRD000") {
         return Err(source.field("magic", format!("{magic:.20?}"), "a NRRD file starts with NRRD000 and a digit"));

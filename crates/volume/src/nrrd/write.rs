@@ -21,6 +21,7 @@ pub fn write<T: Sample>(path: &Path, volume: &VoxelVolume<T>) -> Result<(), Writ
         write_voxels(&mut gzip, &volume.data)?;
         gzip.finish().map(drop)
     })
+    .map_err(|source| WriteError::Io { file: path.into(), source })
 }
 
 fn header<T: Sample>(volume: &VoxelVolume<T>) -> String {
