@@ -4,9 +4,10 @@
 //! TITLE-BEGINS]...`; without names, the three charts of the top README.
 
 use std::path::Path;
-use trepan_trials::files::whole;
-use trepan_trials::store::report;
-use trepan_trials::{plot, suites::ALL};
+use trepan_trials::engine::files::whole;
+use trepan_trials::engine::plot;
+use trepan_trials::engine::store::report;
+use trepan_trials::suites::ALL;
 
 const OF_README: [(&str, &str); 3] = [
     ("rigid", "The thesis's skulls, touch: whole tick against gap"),

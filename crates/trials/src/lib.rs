@@ -16,22 +16,6 @@
 //! # When not to use it
 //! In an app or a simulator: nothing there may depend on this crate.
 
-pub mod borders;
-pub mod compare;
-mod conditions;
-pub mod families;
-pub mod files;
-pub mod front;
-mod html;
-pub mod page;
-pub mod part;
-pub mod picture;
-pub mod plot;
+pub mod engine;
 pub mod population;
-mod python;
-pub mod report;
-pub mod row;
-pub mod store;
-pub mod suite;
 pub mod suites;
-pub mod timer;

@@ -10,14 +10,15 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
-use trepan_trials::files::whole;
-use trepan_trials::part::{Part, Scope, Suite};
-use trepan_trials::report::Report;
-use trepan_trials::store::{self, Store};
-use trepan_trials::suite::shown;
+use trepan_trials::engine::files::whole;
+use trepan_trials::engine::part::{Part, Scope, Suite};
+use trepan_trials::engine::report::Report;
+use trepan_trials::engine::store::{self, Store};
+use trepan_trials::engine::suite::shown;
+use trepan_trials::engine::timer::Control;
+use trepan_trials::engine::{borders, compare, page};
+use trepan_trials::suites::families;
 use trepan_trials::suites::{ALL, ON_REQUEST};
-use trepan_trials::timer::Control;
-use trepan_trials::{borders, compare, families, page};
 
 #[derive(Parser)]
 #[command(name = "cargo xtask validate", about = "Run validation suites", max_term_width = 120)]
@@ -98,7 +99,7 @@ fn main() -> ExitCode {
     let passed = match arguments.task {
         None => run(&arguments.run),
         Some(Task::Merge { folders, out, keep_borders }) => merge(&folders, &out, keep_borders),
-        Some(Task::Compare { old, new }) => compare::folders(&old, &new).map(|text| {
+        Some(Task::Compare { old, new }) => compare::folders(ALL.iter().chain(ON_REQUEST), &old, &new).map(|text| {
             println!("{text}");
             true
         }),
@@ -351,7 +352,7 @@ fn paged(out: &Path) -> Result<bool> {
         reports.extend(store::report(out, suite.name)?.map(|report| (suite, report)));
     }
     let page = out.join("index.html");
-    whole(&page, page::html(&reports).as_bytes())?;
+    whole(&page, page::html(&reports, &families::measured(&reports))?.as_bytes())?;
     println!("page: {}", page.display());
     let holes = families::holes(&reports);
     holes.iter().for_each(|hole| println!("  HOLE {hole}"));

@@ -15,10 +15,10 @@
 //! contact found by the god-object constrained to planes; all others use the nearest face.
 
 use super::{Part, Scope};
-use crate::conditions;
-use crate::picture::{Chart, Mark, Outcome};
-use crate::suite::{Findings, Gate, Row};
-use crate::timer::Samples;
+use crate::engine::picture::{Chart, Mark, Outcome};
+use crate::engine::suite::{Findings, Gate, Row};
+use crate::engine::timer::Samples;
+use crate::suites::conditions;
 use trepan_contact::{
     Contact, ContactManifold, ForceGuard, ForceModel, ForceShading, Friction, GodObject, GuardConfig, Hooke, Plane,
     Vibration, Viscoelastic,

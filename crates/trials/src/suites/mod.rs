@@ -1,12 +1,15 @@
 //! All validation suites, one file each; one list feeds the command line and the page.
 
 pub mod budget;
+mod conditions;
 pub mod deformable;
+pub mod families;
 mod force;
 mod haptics;
 mod mesh;
 mod operation;
 mod population;
+mod python;
 mod render;
 pub mod rigid;
 mod simulators;
@@ -14,9 +17,8 @@ mod tled;
 mod volume;
 mod voxel_size;
 
-use crate::part::nothing_more;
-pub use crate::part::{Part, Scope, Suite};
-pub(crate) use voxel_size::RULES;
+use crate::engine::part::nothing_more;
+pub use crate::engine::part::{Part, Scope, Suite};
 
 /// Suites that run only when named: they download other programs, or take an hour.
 pub const ON_REQUEST: &[Suite] = &[
@@ -147,7 +149,7 @@ mod tests {
     fn every_part_has_a_unique_file_name() {
         for suite in ALL.iter().chain(ON_REQUEST) {
             for quick in [true, false] {
-                let names = crate::report::slugs(suite, Scope { quick, seed: 1 });
+                let names = crate::engine::report::slugs(suite, Scope { quick, seed: 1 });
                 assert!(!names.is_empty() && names.iter().all(|name| !name.is_empty()));
                 assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len(), "{}: {names:?}", suite.name);
             }

@@ -8,9 +8,9 @@
 //! miss but no broken word.
 
 use super::super::Scope;
-use crate::picture::{Chart, Mark};
-use crate::suite::{Findings, Gate, Row};
-use crate::timer::Samples;
+use crate::engine::picture::{Chart, Mark};
+use crate::engine::suite::{Findings, Gate, Row};
+use crate::engine::timer::Samples;
 use std::collections::BTreeMap;
 
 const KINDS: [&str; 3] = ["bone", "tissue", "picture"];

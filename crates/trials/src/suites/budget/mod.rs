@@ -19,7 +19,7 @@ pub mod training;
 mod trial;
 
 use super::{Part, Scope};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use case::{Case, Source};
 pub use judge::judge;
 use scene::Situation;

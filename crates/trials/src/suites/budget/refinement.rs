@@ -13,8 +13,8 @@
 use super::super::Scope;
 use super::case::{Case, Source};
 use super::scene::MACHINE;
-use crate::picture::{Chart, Mark};
-use crate::suite::{Findings, Row};
+use crate::engine::picture::{Chart, Mark};
+use crate::engine::suite::{Findings, Row};
 use trepan_budget::Tissue;
 use trepan_simulator::measure::tissue::{Brains, Fineness, Push};
 

@@ -2,7 +2,7 @@
 
 use super::case::{Case, Source};
 use super::scene::{MACHINE, Situation};
-use crate::suite::{Findings, Row};
+use crate::engine::suite::{Findings, Row};
 use std::fmt::Display;
 use trepan_budget::{
     Bone, Choice, FEATURES, Kind, Neighbour, Quality, Row as Laws, Rows, Setup, bone_cores, bone_error_n, holds_walls,

@@ -2,7 +2,7 @@
 //! may be missed.
 
 use super::{Part, Scope, scene::five_split, truth::inside};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
 

@@ -1,7 +1,7 @@
 //! What the thesis reports for its own method on its own machine of 2012, as far as its text gives
 //! numbers.
 
-use crate::suite::Row;
+use crate::engine::suite::Row;
 
 /// Models of Tables 4.1 and 4.2: name, tetrahedra, cell, mm, and whether every step kept within 1
 /// ms (Figures 4.8 and 4.12).

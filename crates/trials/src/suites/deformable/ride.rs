@@ -1,11 +1,11 @@
 //! A tool taken along a path by one method, and what the truth says about every step.
 
 use super::{finite, scene::RADIUS_MM, scene::Scene, truth::Truth};
-use crate::suite::Row;
-use crate::timer::Samples;
+use crate::engine::suite::Row;
+use crate::engine::timer::Samples;
 use trepan_contact::Viscoelastic;
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
-use trepan_geometry::{Pointshell, Pose, Tool, ToolState, Vec3};
+use trepan_geometry::{Pointshell, Pose, Tool, ToolState, Vec3, quantile};
 
 /// Steps in which a method may still get to know the mesh; their time is reported by itself.
 pub const START: usize = 32;
@@ -79,7 +79,7 @@ impl Ride {
 
     /// Median time of a warm step, µs.
     pub fn p50_us(&self) -> f64 {
-        quantile(self.warm(), 0.5)
+        quantile(&mut self.warm().to_vec(), 0.5)
     }
 
     /// How many times faster it is than another run along the same path. Counted are the steps of
@@ -122,8 +122,11 @@ impl Ride {
             .with("points", Pointshell::DEFORMABLE_COUNT)
             .with("steps", self.times_us.len())
             .metric("step_p50_us", self.p50_us())
-            .metric("step_p99_us", quantile(self.warm(), 0.99))
-            .metric("step_max_at_start_us", quantile(&self.times_us[..START.min(self.times_us.len())], 1.0))
+            .metric("step_p99_us", quantile(&mut self.warm().to_vec(), 0.99))
+            .metric(
+                "step_max_at_start_us",
+                quantile(&mut self.times_us[..START.min(self.times_us.len())].to_vec(), 1.0),
+            )
             .metric("tests_per_point", self.tests as f64 / steps / Pointshell::DEFORMABLE_COUNT as f64)
             .metric("missed_points_count", self.missed as f64)
             .metric("invented_points_count", self.invented as f64)
@@ -135,18 +138,10 @@ impl Ride {
             row,
             &[
                 ("missed_percent", missed_percent),
-                ("depth_error_p95_mm", quantile(&self.depth_errors_mm, 0.95)),
-                ("depth_error_max_mm", quantile(&self.depth_errors_mm, 1.0)),
+                ("depth_error_p95_mm", quantile(&mut self.depth_errors_mm.clone(), 0.95)),
+                ("depth_error_max_mm", quantile(&mut self.depth_errors_mm.clone(), 1.0)),
                 ("times_faster_than_scan", scan.map_or(f64::NAN, |scan| self.times_faster_than(scan))),
             ],
         )
     }
-}
-
-/// A quantile of values in any order; NaN without values.
-fn quantile(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().saturating_sub(1);
-    sorted.get((share * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
 }

@@ -2,9 +2,9 @@
 //! stand still, leap or run away.
 
 use super::{Scope, is_complete, truth::inside};
-use crate::conditions;
-use crate::picture::Outcome;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::picture::Outcome;
+use crate::engine::suite::{Findings, Gate, Row};
+use crate::suites::conditions;
 use trepan_deformable::{Config, Method, TissueCollision, TissueStep};
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
 use trepan_mesh::TetMesh;

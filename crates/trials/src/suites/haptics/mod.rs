@@ -33,7 +33,7 @@ mod maps;
 mod pace;
 
 use super::{Part, Scope};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use coupling::{Coupling, MILLION};
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardConfig, GuardCounters};
 use trepan_geometry::{Pose, ToolState, Vec3};

@@ -9,8 +9,8 @@
 //! one, else on the CPU. Counts and times are reported without gates.
 
 use super::Scope;
-use crate::suite::Row;
-use crate::timer::Samples;
+use crate::engine::suite::Row;
+use crate::engine::timer::Samples;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;

@@ -7,11 +7,11 @@ mod scenes;
 mod spots;
 
 use super::{Part, Scope};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use scenes::{Border, Scene};
-use spots::{Spots, faces, quantile, samples};
+use spots::{Spots, faces, samples};
 use std::time::Instant;
-use trepan_geometry::Vec3;
+use trepan_geometry::{Vec3, quantile};
 use trepan_mesh::lattice::{self, LabelledMesh};
 use trepan_mesh::{Quality, Surface, TetMesh, Topology};
 use trepan_volume::VoxelVolume;
@@ -147,7 +147,8 @@ fn distances(scene: &Scene, labelled: &LabelledMesh) -> [f64; 2] {
             |p: Vec3| border.distance.map_or_else(|| faces.nearest(p), |to| to(world(grid, p)).abs() / voxel_mm);
         let there = samples.spots.iter().filter(|(p, _)| counts(*p)).map(|&(p, _)| to_truth(p));
         let back = faces.spots.iter().filter(|(p, _)| counts(*p)).map(|&(p, _)| samples.nearest(p));
-        [there.collect(), back.collect()].map(|all| quantile(all, 0.95))
+        [there.map(f64::from).collect(), back.map(f64::from).collect()]
+            .map(|mut all: Vec<f64>| quantile(&mut all, 0.95))
     };
     scene.borders.iter().map(of_border).fold([0.0; 2], |[a, b], [c, d]| [a.max(c), b.max(d)])
 }

@@ -1,9 +1,9 @@
 //! Masks that no brain looks like: does the mesher fill them soundly, lose volume, or say no?
 
 use super::scenes::voxels;
-use crate::conditions;
-use crate::picture::Outcome;
-use crate::suite::{Findings, Gate};
+use crate::engine::picture::Outcome;
+use crate::engine::suite::{Findings, Gate};
+use crate::suites::conditions;
 use trepan_geometry::Vec3;
 use trepan_mesh::Surface;
 use trepan_mesh::lattice::{self, Config, Fine};

@@ -9,12 +9,13 @@
 
 use super::super::{Part, Scope};
 use super::scenes::{self, Scene};
-use super::spots::{Spots, faces, quantile, samples};
-use crate::python::Workshop;
-use crate::suite::{Findings, Row};
+use super::spots::{Spots, faces, samples};
+use crate::engine::suite::{Findings, Row};
+use crate::suites::python::Workshop;
 use std::ffi::OsStr;
 use std::path::Path;
 use std::time::Instant;
+use trepan_geometry::quantile;
 use trepan_mesh::{Quality, Surface, TetMesh, lattice, obj};
 
 /// The rivals: name, Python package, ending of what the script writes.
@@ -65,7 +66,7 @@ fn row(scene: &Scene, method: &str, mesh: &TetMesh, seconds: f64) -> Row {
     let (quality, surface) = (Quality::of(mesh), Surface::of(mesh));
     let there = Spots::new(&scene.labels, samples(&scene.labels, &surface.triangles, &mesh.positions));
     let border = Spots::new(&scene.labels, faces(&scene.labels, |a, b| (a != 0) != (b != 0)));
-    let distances = there.spots.iter().map(|&(p, _)| border.nearest(p)).collect();
+    let mut distances: Vec<f64> = there.spots.iter().map(|&(p, _)| border.nearest(p).into()).collect();
     let truth: f64 = scene.mm3.iter().map(|(_, mm3)| mm3).sum();
     Row::new(&scene.name, method)
         .with("target_tets", scene.config.target_tets)
@@ -76,7 +77,7 @@ fn row(scene: &Scene, method: &str, mesh: &TetMesh, seconds: f64) -> Row {
         .metric("mean_radius_ratio", quality.mean_radius_ratio)
         .metric("min_height_mm", quality.min_height_mm)
         .metric("volume_error_percent", 100.0 * (mesh.total_mm3() / truth - 1.0).abs())
-        .metric("surface_p95_voxel", quantile(distances, 0.95))
+        .metric("surface_p95_voxel", quantile(&mut distances, 0.95))
 }
 
 fn print_table(rows: &[Row]) {

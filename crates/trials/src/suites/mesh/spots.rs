@@ -107,12 +107,6 @@ fn apart(by: Vec3, axis: usize) -> f32 {
     (by.abs() - half).max(Vec3::ZERO).length()
 }
 
-pub(super) fn quantile(mut values: Vec<f32>, share: f64) -> f64 {
-    values.sort_by(f32::total_cmp);
-    let last = values.len().saturating_sub(1);
-    values.get((share * last as f64).round() as usize).map_or(f64::NAN, |v| f64::from(*v))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,7 @@
 //! How far one run of the operation is from the finest one.
 
 use super::ride::{LOOK_MS, PLACE_MM, Ride};
-use trepan_geometry::Vec3;
+use trepan_geometry::{Vec3, quantile};
 
 /// A force under this is no contact, N.
 const FELT_N: f32 = 0.02;
@@ -43,20 +43,21 @@ impl Errors {
             (a.length() > FELT_N || b.length() > FELT_N).then(|| f64::from(a.distance(b)))
         };
         let (tissue, bone): (Vec<usize>, Vec<usize>) = (0..truth.forces.len()).partition(on_tissue);
-        let [bone, tissue] = [bone, tissue].map(|ticks| ticks.into_iter().filter_map(apart_n).collect::<Vec<_>>());
-        let (rest, shown) = surfaces(ride, truth);
+        let [mut bone, mut tissue] =
+            [bone, tissue].map(|ticks| ticks.into_iter().filter_map(apart_n).collect::<Vec<_>>());
+        let (mut rest, mut shown) = surfaces(ride, truth);
         let both = ride.removed.iter().zip(&truth.removed);
         let count = |wanted: fn(bool, bool) -> bool| both.clone().filter(|(a, b)| wanted(**a, **b)).count() as f64;
         let (common, apart) = (count(|a, b| a && b), count(|a, b| a != b));
         Self {
             bone_rms_n: rms(&bone),
-            bone_p95_n: p95(&bone),
+            bone_p95_n: quantile(&mut bone, 0.95),
             tissue_rms_n: rms(&tissue),
-            tissue_p95_n: p95(&tissue),
+            tissue_p95_n: quantile(&mut tissue, 0.95),
             shown_mean_mm: shown.iter().sum::<f64>() / shown.len() as f64,
-            shown_p95_mm: p95(&shown),
-            rest_p95_mm: p95(&rest),
-            mask_p95_mm: p95(&ride.from_mask_mm.iter().copied().map(f64::from).collect::<Vec<_>>()),
+            shown_p95_mm: quantile(&mut shown, 0.95),
+            rest_p95_mm: quantile(&mut rest, 0.95),
+            mask_p95_mm: quantile(&mut ride.from_mask_mm.iter().copied().map(f64::from).collect::<Vec<_>>(), 0.95),
             bone_mm3: apart * f64::from(PLACE_MM.powi(3)),
             bone_dice: 2.0 * common / (2.0 * common + apart),
         }
@@ -108,13 +109,6 @@ fn distance_mm(point: Vec3, &[a, b, c]: &[Vec3; 3]) -> f64 {
 
 fn rms(errors: &[f64]) -> f64 {
     (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
-}
-
-/// What 95 of 100 stay under; NaN without any.
-fn p95(errors: &[f64]) -> f64 {
-    let mut sorted = errors.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get((sorted.len() * 95 / 100).min(sorted.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]

@@ -23,8 +23,8 @@ mod ride;
 mod setups;
 
 use super::{Part, Scope};
-use crate::picture::{Chart, Mark};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::picture::{Chart, Mark};
+use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::{Result, ensure};
 use error::Errors;
 use ride::Ride;

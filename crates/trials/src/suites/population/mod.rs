@@ -18,8 +18,8 @@
 mod ride;
 
 use super::{Part, Scope};
+use crate::engine::suite::{Findings, Gate, Row};
 use crate::population::{BaseHead, Files, Head, HeadRecipe, base_heads};
-use crate::suite::{Findings, Gate, Row};
 use anyhow::{Context, Result};
 use clap::Parser;
 use ride::{FLAP, HOLE, Ride, Task};

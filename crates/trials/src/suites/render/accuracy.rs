@@ -3,7 +3,7 @@
 
 use super::scenes::{ISO, frame, head};
 use super::{By, EXACT, FINE_VOXEL, Hits, SPARSE, Setting};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
 use glam::{DVec3, IVec3, Vec2, Vec3};
 use std::sync::Arc;

@@ -10,7 +10,7 @@ mod scenes;
 mod speed;
 
 use super::{Part, Scope};
-use crate::suite::Findings;
+use crate::engine::suite::Findings;
 use std::sync::Arc;
 use trepan_gpu::{Gpu, Prefer};
 use trepan_render::{Casting, Frame, Hit, Image, ProcessorRenderer, Renderer, SceneData, View};

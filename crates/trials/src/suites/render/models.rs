@@ -7,9 +7,9 @@
 
 use super::scenes::{SKULLS, brain, frame, skull, swaying};
 use super::{By, EXACT, SPARSE, Setting};
-use crate::suite::{Findings, Row};
+use crate::engine::suite::{Findings, Row};
+use crate::engine::timer::Samples;
 use crate::suites::Scope;
-use crate::timer::Samples;
 use glam::Vec3;
 use std::sync::Arc;
 use trepan_gpu::Gpu;

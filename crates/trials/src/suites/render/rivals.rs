@@ -11,10 +11,10 @@
 
 use super::scenes::{ISO, frame, head};
 use super::{By, EXACT, SPARSE, Setting};
-use crate::python::Workshop;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
+use crate::engine::timer::Samples;
+use crate::suites::python::Workshop;
 use crate::suites::{Part, Scope};
-use crate::timer::Samples;
 use glam::Vec3;
 use std::path::Path;
 use trepan_render::{Casting, Image};

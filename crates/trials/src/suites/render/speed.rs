@@ -3,10 +3,10 @@
 use super::likeness::similarity;
 use super::scenes::{frame, head};
 use super::{By, EXACT, FINE_VOXEL, SPARSE, Setting};
-use crate::picture::{Chart, Mark};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::picture::{Chart, Mark};
+use crate::engine::suite::{Findings, Gate, Row};
+use crate::engine::timer::Samples;
 use crate::suites::Scope;
-use crate::timer::Samples;
 use glam::Vec3;
 use trepan_gpu::Gpu;
 use trepan_render::Casting;

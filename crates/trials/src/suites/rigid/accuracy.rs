@@ -2,9 +2,9 @@
 
 use super::solid::{ISO, KINDS, Kind, Moment, RADIUS_MM, Scene, directions};
 use super::{STIFFNESS, worst_chart};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
+use crate::engine::timer::Samples;
 use crate::suites::{Part, Scope};
-use crate::timer::Samples;
 use std::time::Instant;
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::{Method, RigidStep};

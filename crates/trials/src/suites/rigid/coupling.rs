@@ -18,8 +18,8 @@
 
 use super::solid::{RADIUS_MM, held, voxels};
 use super::{map_of, passes};
-use crate::picture::{Map, Outcome};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::picture::{Map, Outcome};
+use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use trepan_contact::{Contact, ForceGuard, ForceModel, GuardConfig, Hooke};
 use trepan_geometry::{Tool, ToolState, Vec3};

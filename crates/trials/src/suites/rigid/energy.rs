@@ -14,7 +14,7 @@
 use super::coupling;
 use super::recording::{self, Place, Task};
 use super::solid::{ISO, RADIUS_MM, held};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Buttons, Tool, ToolState, Vec3};

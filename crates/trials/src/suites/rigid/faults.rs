@@ -7,9 +7,9 @@
 //! before.
 
 use super::solid::{ISO, RADIUS_MM, held, voxels};
-use crate::conditions;
-use crate::picture::Outcome;
-use crate::suite::{Findings, Gate};
+use crate::engine::picture::Outcome;
+use crate::engine::suite::{Findings, Gate};
+use crate::suites::conditions;
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
 use trepan_rigid::{Method, RigidContact, RigidStep};
 use trepan_volume::{AIR_HU, BoneVolume, VoxelVolume};

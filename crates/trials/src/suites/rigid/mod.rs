@@ -22,8 +22,8 @@ mod walls;
 pub use recording::record_all;
 
 use super::{Part, Scope};
-use crate::picture::{Chart, Map, Mark};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::picture::{Chart, Map, Mark};
+use crate::engine::suite::{Findings, Gate, Row};
 use trepan_rigid::Method;
 
 /// Stiffness that converts depths to forces, N/mm: the thesis's.

@@ -19,9 +19,9 @@
 
 use super::solid::{ISO, directions, held, voxels};
 use super::worst_chart;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
+use crate::engine::timer::Samples;
 use crate::suites::{Part, Scope};
-use crate::timer::Samples;
 use glam::{DVec3, IVec3};
 use std::f64::consts::PI;
 use std::time::Instant;

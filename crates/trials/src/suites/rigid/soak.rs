@@ -2,7 +2,7 @@
 //! loop misses on the same machine.
 
 use super::solid::RADIUS_MM;
-use crate::suite::Row;
+use crate::engine::suite::Row;
 use std::time::{Duration, Instant};
 use trepan_contact::{ForceGuard, ForceModel, GuardConfig, Viscoelastic};
 use trepan_geometry::{Buttons, Tool, ToolState};

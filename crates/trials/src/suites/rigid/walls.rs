@@ -15,8 +15,8 @@
 
 use super::solid::{directions, held, voxels};
 use super::{map_of, passes};
-use crate::picture::{Map, Outcome};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::picture::{Map, Outcome};
+use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use trepan_geometry::{Tool, Vec3};
 use trepan_rigid::{Method, RigidStep};

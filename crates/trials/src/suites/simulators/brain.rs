@@ -11,7 +11,7 @@
 
 use super::bench::config;
 use super::case;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::Result;
 use std::sync::Arc;
 use trepan_geometry::{Pose, Quat, ToolState, Vec3};

@@ -8,7 +8,7 @@
 
 use super::bench::Bench;
 use super::case::CaseFixture;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Plan, Script};

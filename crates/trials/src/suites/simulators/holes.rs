@@ -11,7 +11,7 @@
 //! ```
 
 use super::bench::Bench;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::{Part, Scope};
 use std::sync::Arc;
 use trepan_contact::GuardedWrench;

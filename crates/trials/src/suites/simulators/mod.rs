@@ -12,7 +12,7 @@ pub mod readers;
 mod sessions;
 
 use super::{Part, Scope};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::Result;
 
 /// Length of the long session, minutes.

@@ -2,8 +2,8 @@
 //! Python environment.
 
 use super::sessions;
-use crate::python::Workshop;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
+use crate::suites::python::Workshop;
 use crate::suites::{Part, Scope};
 use std::time::{Duration, Instant};
 use trepan_link::Recording;

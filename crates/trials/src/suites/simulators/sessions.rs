@@ -2,7 +2,7 @@
 //! half an hour of it.
 
 use super::case;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use crate::suites::Scope;
 use anyhow::Result;
 use clap::Parser;

@@ -6,7 +6,7 @@
 //! sizes only, since its times say nothing of a graphics card.
 
 use super::Scope;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use std::time::Instant;
 use trepan_geometry::{Vec3, units};
 use trepan_gpu::{Gpu, Prefer};

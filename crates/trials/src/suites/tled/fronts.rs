@@ -8,8 +8,8 @@
 //! time.
 
 use super::{Part, Scope};
-use crate::picture::{Chart, Mark};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::picture::{Chart, Mark};
+use crate::engine::suite::{Findings, Gate, Row};
 use std::time::Instant;
 use trepan_geometry::{Vec3, units};
 use trepan_soft::rivals::reference::{self, Order, Reference};

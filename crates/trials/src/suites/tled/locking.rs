@@ -17,9 +17,9 @@
 //! beside it.
 
 use super::{Part, Scope};
-use crate::picture::{Chart, Mark};
-use crate::suite::{Findings, Gate, Row};
-use crate::timer::Samples;
+use crate::engine::picture::{Chart, Mark};
+use crate::engine::suite::{Findings, Gate, Row};
+use crate::engine::timer::Samples;
 use glam::DVec3;
 use std::f32::consts::TAU;
 use std::time::Instant;

@@ -12,7 +12,7 @@ mod speed;
 mod stability;
 
 use super::{Part, Scope};
-use crate::suite::Findings;
+use crate::engine::suite::Findings;
 
 /// Every scene.
 pub fn parts(scope: Scope) -> Vec<Part> {

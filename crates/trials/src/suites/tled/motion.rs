@@ -2,7 +2,7 @@
 //! relaxation finds.
 
 use super::{Part, Scope};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use glam::DMat3;
 use trepan_geometry::{Vec3, units};
 use trepan_mesh::TetMesh;

@@ -8,8 +8,8 @@
 //! changes.
 
 use super::Scope;
-use crate::picture::{Chart, Mark};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::picture::{Chart, Mark};
+use crate::engine::suite::{Findings, Gate, Row};
 use std::time::Instant;
 use trepan_contact::NodalContact;
 use trepan_geometry::Vec3;

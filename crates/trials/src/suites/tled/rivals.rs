@@ -7,9 +7,9 @@
 //! shakes or leaves numbers that are none.
 
 use super::stability::{cube, offset};
-use crate::conditions;
-use crate::picture::Outcome;
-use crate::suite::{Findings, Gate};
+use crate::engine::picture::Outcome;
+use crate::engine::suite::{Findings, Gate};
+use crate::suites::conditions;
 use trepan_contact::NodalContact;
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};

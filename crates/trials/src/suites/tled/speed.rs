@@ -2,7 +2,7 @@
 //! threads than free cores.
 
 use super::{Part, Scope};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use trepan_geometry::{Vec3, units};

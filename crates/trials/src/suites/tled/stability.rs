@@ -2,8 +2,8 @@
 //! there.
 
 use super::{Part, Scope};
-use crate::picture::{Map, Outcome};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::picture::{Map, Outcome};
+use crate::engine::suite::{Findings, Gate, Row};
 use trepan_contact::NodalContact;
 use trepan_geometry::{Vec3, units};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver, boxes};

@@ -3,7 +3,7 @@
 
 use super::super::Scope;
 use super::data_folder;
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use glam::{DAffine3, DMat3, DVec3};
 use serde_json::Value;
 use std::path::Path;

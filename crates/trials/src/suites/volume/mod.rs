@@ -7,10 +7,10 @@ mod moves;
 mod registration;
 
 use super::{Part, Scope};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use std::time::Instant;
 use trepan_fixtures::case_head;
-use trepan_geometry::Vec3;
+use trepan_geometry::{Vec3, quantile};
 use trepan_volume::{
     BrainConfig, DistanceField, Grid, Interpolation, VoxelVolume, brain_mask, hounsfield, nifti, nrrd, read, resample,
 };
@@ -160,9 +160,4 @@ fn brain(_: Scope, findings: &mut Findings) {
     findings
         .rows
         .push(Row::new("brain of the built-in head", "brain_mask").metric("cost_s", seconds).metric("dice", dice));
-}
-
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[((values.len() - 1) as f64 * share).round() as usize]
 }

@@ -2,7 +2,7 @@
 
 use super::super::Scope;
 use super::{data_folder, image, quantile};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use std::time::Instant;
 use trepan_fixtures::case_head;

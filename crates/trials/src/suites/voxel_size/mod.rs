@@ -14,10 +14,11 @@ mod scene;
 mod timing;
 
 use super::{Part, Scope};
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use scene::{Body, Elements, Scene, Touch};
 use std::time::Instant;
 use timing::Calibration;
+use trepan_geometry::quantile;
 use trepan_voxel_size::{CostModel, Expected, counts, zone_error};
 
 /// Tables 5.2 and 5.3 of the thesis, in cells per axis: tetrahedra, low, best, high, analytic, mean
@@ -132,11 +133,6 @@ fn share_without_contact(scene: &Scene, usual: f64) -> f64 {
     1.0 - (busy as f64 / scene.boxes.len() as f64).clamp(1e-4, 1.0)
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
 /// Largest, best and smallest cell of the good zone, mm, hence lowest, best and highest count of
 /// cells.
 fn zone(ladder: &[f64], times: &[f64], best: usize) -> [f64; 3] {
@@ -173,7 +169,7 @@ pub fn judge(scope: Scope, findings: &mut Findings) {
         let rows = findings.rows.iter().filter(|row| row.method == OURS);
         rows.filter_map(|row| row.metrics.get(metric).copied()).collect::<Vec<f64>>()
     };
-    let (regrets, calibration) = (ours("regret_percent"), ours("calibration_ms"));
+    let (mut regrets, mut calibration) = (ours("regret_percent"), ours("calibration_ms"));
     let curves = findings.rows.iter().filter(|row| row.method == CURVES).enumerate();
     let of_row = |(number, row): (usize, &Row)| {
         row.numbers(MEASURED)
@@ -189,8 +185,9 @@ pub fn judge(scope: Scope, findings: &mut Findings) {
     let worst = regrets.iter().copied().fold(f64::MIN, f64::max);
     let scenes = regrets.len();
     let of_scene = |n: usize| r_squared(times.iter().filter(|t| t.0 == n));
-    let (middle, slowest) = (median(regrets), calibration.iter().copied().fold(0.0, f64::max));
-    let calibration_ms = median(calibration);
+    let middle = quantile(&mut regrets, 0.5);
+    let slowest = calibration.iter().copied().fold(0.0, f64::max);
+    let calibration_ms = quantile(&mut calibration, 0.5);
     findings.gates.extend([
         Gate::at_most(format!("{OURS}: median regret over {scenes} scenes, percent"), middle, scope.pick(15.0, 3.0)),
         Gate::at_most(format!("{OURS}: worst regret over {scenes} scenes, percent"), worst, scope.pick(40.0, 10.0)),
@@ -205,7 +202,7 @@ pub fn judge(scope: Scope, findings: &mut Findings) {
             .with("scenes", scenes)
             .metric("median_regret_percent", middle)
             .metric("worst_regret_percent", worst)
-            .metric("median_r_squared", median((0..scenes).map(of_scene).collect()))
+            .metric("median_r_squared", quantile(&mut (0..scenes).map(of_scene).collect::<Vec<_>>(), 0.5))
             .metric("worst_r_squared", (0..scenes).map(of_scene).fold(f64::MAX, f64::min))
             .metric("median_calibration_ms", calibration_ms)
             .metric("worst_calibration_ms", slowest),

@@ -2,9 +2,9 @@
 //! can be built, and whether it is near the best.
 
 use super::{OURS, RULES};
-use crate::conditions;
-use crate::picture::Outcome;
-use crate::suite::{Findings, Gate};
+use crate::engine::picture::Outcome;
+use crate::engine::suite::{Findings, Gate};
+use crate::suites::conditions;
 use trepan_geometry::{Aabb, Vec3};
 use trepan_voxel_size::{CostModel, Expected, Measures, Prices, counts};
 

@@ -1,7 +1,7 @@
 //! Fault cases of the driver of Haply's service, in real time.
 
 use super::{Bench, Case, Felt, Loop, Scope, Then, refused, row, run};
-use crate::suite::Row;
+use crate::engine::suite::Row;
 use std::thread;
 use std::time::{Duration, Instant};
 use trepan_emulators::service::{Behaviour, Service};

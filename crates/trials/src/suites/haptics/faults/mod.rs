@@ -17,7 +17,7 @@ mod haply;
 mod openhaptics;
 
 use super::Scope;
-use crate::suite::{Gate, Row};
+use crate::engine::suite::{Gate, Row};
 use std::path::Path;
 use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
 use trepan_geometry::{ToolState, Vec3, Wrench};

@@ -5,7 +5,7 @@
 //! judgement reads rows only. So parts may run in any order, in any number of processes, and again
 //! after a crash, and the judgement over all of them equals that of one run.
 
-use crate::suite::{Findings, Gate, Row};
+use crate::engine::suite::{Findings, Gate, Row};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// How much of a suite to run, and with which random numbers.

@@ -5,11 +5,9 @@
 //! logarithmic. Costs below a thousandth of a unit and errors below a hundred-thousandth are drawn
 //! at that limit.
 
-use crate::front::front;
-use crate::html::text;
-use crate::row::number;
+use crate::engine::front::front;
+use crate::engine::row::number;
 use serde::{Deserialize, Serialize};
-use std::fmt::Write;
 
 /// One point of a chart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -168,11 +166,6 @@ fn within_a_file<S: serde::Serializer>(lines: &[Line], to: S) -> Result<S::Ok, S
     lines.iter().map(line).collect::<Vec<Line>>().serialize(to)
 }
 
-const CELL: (usize, usize) = (34, 20);
-/// Fill colours that also differ in lightness, to be distinguishable without colour.
-const FILL: [&str; 4] = ["#d5efe6", "#f2cf74", "#d9744f", "#9aa5b1"];
-const STROKE: [&str; 3] = ["#0072b2", "#000000", "#cc79a7"];
-
 impl Map {
     /// All cells with the names of their row and column.
     pub fn named_cells(&self) -> impl Iterator<Item = (&str, &str, &Outcome)> {
@@ -186,100 +179,6 @@ impl Map {
     pub fn cell(&self, row: &str, column: &str) -> Option<&Outcome> {
         self.named_cells().find(|(r, c, _)| *r == row && *c == column).map(|(.., cell)| cell)
     }
-
-    /// The map as a figure with its reasons, lettered, below.
-    pub fn svg(&self) -> String {
-        let reasons = self.reasons();
-        let left = 8 + 7 * self.rows.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(4);
-        let widest = self.columns.iter().map(|name| name.chars().count()).max().unwrap_or(0);
-        let slanted = widest > 6;
-        let top = if slanted { 30 + 6 * widest } else { 36 };
-        let (width, height) = (left + CELL.0 * self.columns.len() + 8, top + CELL.1 * self.rows.len() + 20);
-        let width = (width + if slanted { 4 * widest } else { 0 })
-            .max(8 * self.title.len().max(self.x.len() + self.y.len() + 8));
-        let mut svg = format!(
-            "<figure><svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
-             font-family=\"sans-serif\" font-size=\"11\"><text x=\"2\" y=\"13\" font-weight=\"bold\">{}</text>\
-             <text x=\"2\" y=\"{}\" fill=\"#555\">{} ↓, {} →</text>",
-            text(&self.title),
-            height - 4,
-            text(&self.y),
-            text(&self.x)
-        );
-        for (at, name) in self.columns.iter().enumerate() {
-            let (x, y, name) = (left + CELL.0 * at + CELL.0 / 2, top - 6, text(name));
-            if slanted {
-                _ = write!(svg, "<text transform=\"translate({x},{y}) rotate(-60)\">{name}</text>");
-            } else {
-                _ = write!(svg, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"middle\">{name}</text>");
-            }
-        }
-        for (at, (name, cells)) in self.rows.iter().zip(&self.cells).enumerate() {
-            let y = top + CELL.1 * at;
-            _ = write!(svg, "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>", left - 5, y + 14, text(name));
-            for (column, cell) in cells.iter().enumerate() {
-                draw_cell(&mut svg, (left + CELL.0 * column, y), cell, &reasons);
-            }
-        }
-        self.draw_lines(&mut svg, (left, top));
-        svg += "</svg><figcaption>";
-        self.notes.iter().for_each(|note| _ = write!(svg, "{}<br>", text(note)));
-        for (at, reason) in reasons.iter().enumerate() {
-            _ = write!(svg, "<b>{}</b> {}<br>", letter(at), text(reason));
-        }
-        for (at, (name, _)) in self.lines.iter().enumerate() {
-            _ = write!(svg, "<span style=\"color:{}\">━</span> {} ", STROKE[at % STROKE.len()], text(name));
-        }
-        svg + "</figcaption></figure>"
-    }
-
-    fn draw_lines(&self, svg: &mut String, (left, top): (usize, usize)) {
-        for (at, (_, points)) in self.lines.iter().enumerate() {
-            let place = |&(x, y): &(f64, f64)| {
-                let (x, y) = (x.clamp(0.0, self.columns.len() as f64), y.clamp(0.0, self.rows.len() as f64));
-                format!("{:.1},{:.1}", left as f64 + x * CELL.0 as f64, top as f64 + y * CELL.1 as f64)
-            };
-            let points: Vec<String> = points.iter().map(place).collect();
-            _ = write!(
-                svg,
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"/>",
-                points.join(" "),
-                STROKE[at % STROKE.len()]
-            );
-        }
-    }
-
-    /// Distinct reasons in order of appearance.
-    fn reasons(&self) -> Vec<&str> {
-        let mut found = Vec::new();
-        for reason in self.cells.iter().flatten().map(Outcome::reason) {
-            if !reason.is_empty() && !found.contains(&reason) {
-                found.push(reason);
-            }
-        }
-        found
-    }
-}
-
-fn draw_cell(svg: &mut String, (x, y): (usize, usize), cell: &Outcome, reasons: &[&str]) {
-    let mark = reasons.iter().position(|reason| *reason == cell.reason()).map(letter).unwrap_or_default();
-    _ = write!(
-        svg,
-        "<rect x=\"{x}\" y=\"{y}\" width=\"{}\" height=\"{}\" fill=\"{}\" stroke=\"white\"><title>{}</title></rect>\
-         <text x=\"{}\" y=\"{}\" text-anchor=\"middle\" pointer-events=\"none\">{mark}</text>",
-        CELL.0,
-        CELL.1,
-        FILL[usize::from(cell.grade())],
-        text(cell.reason()),
-        x + CELL.0 / 2,
-        y + 14
-    );
-}
-
-/// Letter of a reason: a, b … z, a1, b1 …
-fn letter(at: usize) -> String {
-    let first = char::from(b'a' + (at % 26) as u8);
-    if at < 26 { first.to_string() } else { format!("{first}{}", at / 26) }
 }
 
 /// One line that names a changed cell and its old and new outcome.
@@ -300,22 +199,5 @@ mod tests {
         let chart = Chart { marks, ..Chart::default() };
         assert_eq!(["a", "b", "c"].map(|name| chart.beaten(name)), [0, 0, 1]);
         assert_eq!((chart.beaten("d"), chart.beaten("none")), (usize::MAX, usize::MAX));
-    }
-
-    #[test]
-    fn a_map_letters_each_reason_once() {
-        let fails = |why: &str| Outcome::Fails(why.into());
-        let map = Map {
-            title: "t".into(),
-            columns: vec!["1".into(), "2".into()],
-            rows: vec!["r".into(), "s".into()],
-            cells: vec![vec![Outcome::Works, fails("falls through")], vec![fails("falls through"), fails("shakes")]],
-            lines: vec![("bound".into(), vec![(0.0, 1.0), (9.0, 0.5)])],
-            ..Map::default()
-        };
-        let svg = map.svg();
-        assert_eq!(svg.matches(">a</text>").count(), 2, "{svg}");
-        assert!(svg.contains("<b>b</b> shakes") && svg.contains("polyline"));
-        assert_eq!((Outcome::Works.grade(), letter(27)), (0, "b1".to_string()));
     }
 }

@@ -14,15 +14,16 @@
 //! are
 //! compared unscaled.
 
-use crate::picture::{Chart, Map, describe_change};
-use crate::report::Report;
-use crate::store;
-use crate::suite::Row;
-use crate::suites::{ALL, ON_REQUEST};
+use crate::engine::part::Suite;
+use crate::engine::picture::{Chart, Map, describe_change};
+use crate::engine::report::Report;
+use crate::engine::store;
+use crate::engine::suite::Row;
 use anyhow::{Result, bail};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
+use trepan_geometry::quantile;
 
 /// Number of bootstrap draws.
 const DRAWS: usize = 1000;
@@ -103,10 +104,10 @@ struct Change {
     high: f64,
 }
 
-/// Text with all differences between the reports of two folders.
-pub fn folders(old: &Path, new: &Path) -> Result<String> {
+/// Text with all differences between the reports of some suites in two folders.
+pub fn folders<'a>(suites: impl IntoIterator<Item = &'a Suite>, old: &Path, new: &Path) -> Result<String> {
     let (mut text, mut both) = (String::new(), 0);
-    for suite in ALL.iter().chain(ON_REQUEST) {
+    for suite in suites {
         match (store::report(old, suite.name)?, store::report(new, suite.name)?) {
             (Some(old), Some(new)) => {
                 both += 1;
@@ -191,9 +192,9 @@ fn metrics(text: &mut String, old: &[Row], new: &[Row]) {
         }
     }
     of_times.retain(|ratio| ratio.is_finite());
-    let machine = quantile(&mut of_times, 0.5).unwrap_or(1.0);
+    let machine = quantile(&mut of_times, 0.5);
     let mut wander: Vec<f64> = of_times.iter().map(|ratio| (ratio / machine).ln().abs()).collect();
-    let spread = (NINE_IN_TEN * quantile(&mut wander, 0.5).unwrap_or(0.0)).exp() - 1.0;
+    let spread = (NINE_IN_TEN * quantile(&mut wander, 0.5)).exp() - 1.0;
     if !of_times.is_empty() {
         _ = writeln!(
             text,
@@ -282,11 +283,11 @@ impl Change {
         let mut random = fastrand::Rng::with_seed(1);
         let mut draw = || {
             let mut drawn: Vec<f64> = (0..scenes).map(|_| all[random.usize(..scenes)]).collect();
-            quantile(&mut drawn, 0.5).unwrap_or(1.0)
+            quantile(&mut drawn, 0.5)
         };
         let mut medians: Vec<f64> = (0..DRAWS).map(|_| draw()).collect();
-        let [low, high] = [0.025, 0.975].map(|share| quantile(&mut medians, share).unwrap_or(1.0));
-        Self { median: quantile(&mut all, 0.5).unwrap_or(1.0), method, metric, scenes, low, high }
+        let [low, high] = [0.025, 0.975].map(|share| quantile(&mut medians, share));
+        Self { median: quantile(&mut all, 0.5), method, metric, scenes, low, high }
     }
 
     /// Label of the change if it exceeds the `spread` of all times. A time in a single scene has
@@ -310,11 +311,6 @@ impl Change {
             (false, _) => "more accurate",
         })
     }
-}
-
-fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(((values.len().max(1) - 1) as f64 * share).round() as usize).copied()
 }
 
 /// Reports methods that joined or left a Pareto front by more than [`Chart::SPREAD`].
@@ -353,9 +349,9 @@ fn maps(text: &mut String, old: &[Map], new: &[Map]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::part::Scope;
-    use crate::report::Making;
-    use crate::suite::{Findings, Gate};
+    use crate::engine::part::Scope;
+    use crate::engine::report::Making;
+    use crate::engine::suite::{Findings, Gate};
 
     fn report(us: impl Fn(usize) -> f64, error: f64, limit: f64) -> Report {
         let row = |n| {

@@ -8,10 +8,10 @@
 //! `validate --keep-borders` writes them from a run. A new or a removed row, column or map is not a
 //! regression.
 
-use crate::files::whole;
-use crate::part::Scope;
-use crate::picture::{Map, Outcome, describe_change};
-use crate::suite::{Findings, Gate};
+use crate::engine::files::whole;
+use crate::engine::part::Scope;
+use crate::engine::picture::{Map, Outcome, describe_change};
+use crate::engine::suite::{Findings, Gate};
 use anyhow::Result;
 use std::collections::BTreeMap;
 use std::fmt::Write;

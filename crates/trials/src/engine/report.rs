@@ -1,8 +1,8 @@
 //! Report of one suite: its parts with commit and machine, and their joint findings.
 
-use crate::borders;
-use crate::part::{Part, Scope, Suite};
-use crate::suite::Findings;
+use crate::engine::borders;
+use crate::engine::part::{Part, Scope, Suite};
+use crate::engine::suite::Findings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -102,8 +102,8 @@ fn machine() -> BTreeMap<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::part::nothing_more;
-    use crate::suite::{Gate, Row};
+    use crate::engine::part::nothing_more;
+    use crate::engine::suite::{Gate, Row};
 
     #[test]
     fn the_file_has_the_documented_fields_and_reads_back() {

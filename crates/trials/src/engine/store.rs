@@ -9,11 +9,11 @@
 //! seed,
 //! from any machine.
 
-use crate::files::whole;
-use crate::part::{Scope, Suite};
-use crate::report::{Making, Report, slugs};
-use crate::suite::{Findings, Row};
-use crate::timer::{Control, Samples};
+use crate::engine::files::whole;
+use crate::engine::part::{Scope, Suite};
+use crate::engine::report::{Making, Report, slugs};
+use crate::engine::suite::{Findings, Row};
+use crate::engine::timer::{Control, Samples};
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -211,8 +211,8 @@ pub fn report(folder: &Path, suite: &str) -> Result<Option<Report>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::part::Part;
-    use crate::suite::{Gate, Row};
+    use crate::engine::part::Part;
+    use crate::engine::suite::{Gate, Row};
 
     fn judge(_: Scope, findings: &mut Findings) {
         let sum = findings.rows.iter().map(|row| row.metrics["value_mm"]).sum();

@@ -1,6 +1,6 @@
 //! Pareto front: the rows that no other row beats in both cost and error.
 
-use crate::row::Row;
+use crate::engine::row::Row;
 
 /// Number of rows of a scene that beat a method's row in both metrics. Rows with a missing or
 /// non-finite metric are ignored.

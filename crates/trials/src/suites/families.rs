@@ -4,12 +4,12 @@
 //! The method lists come from the crates. A method that is added there and not measured here is
 //! reported as a hole, and a hole fails a run of all suites.
 
-use crate::html::text;
-use crate::part::Suite;
-use crate::picture::Outcome;
-use crate::report::Report;
-use crate::suite::Row;
-use std::fmt::Write;
+use crate::engine::part::Suite;
+use crate::engine::picture::Outcome;
+use crate::engine::report::Report;
+use crate::engine::suite::{Row, shown};
+use crate::engine::timer::Samples;
+use serde::Serialize;
 
 /// A family of methods that answer the same question.
 struct Family {
@@ -59,7 +59,7 @@ const FAMILIES: [Family; 6] = [
     Family {
         name: "voxel size",
         suite: "voxel-size",
-        methods: |_| names(crate::suites::RULES),
+        methods: |_| names(super::voxel_size::RULES),
         speed: &["cost_us"],
         accuracy: &["regret_percent"],
     },
@@ -124,32 +124,41 @@ pub fn holes(reports: &[(&Suite, Report)]) -> Vec<String> {
     holes
 }
 
-/// Appends a table of all methods of the families in the reports.
-pub fn table(page: &mut String, reports: &[(&Suite, Report)]) {
-    *page += "<h2>Every method</h2><p>Medians over all scenes in which a method was measured, and cells of the maps. Scenes differ: fronts are in the charts.</p>\
-              <table><tr><th>family</th><th>method</th><th>cost</th><th>error</th><th>works</th><th>degrades</th><th>fails</th><th>refused</th></tr>";
+/// A method's line in the table of all methods.
+#[derive(Serialize)]
+pub struct Measured {
+    family: &'static str,
+    method: String,
+    cost: String,
+    error: String,
+    /// Number of map cells that work, degrade, fail and are refused.
+    cells: [usize; 4],
+    /// Whether nothing is missing.
+    is_whole: bool,
+}
+
+/// All methods of the families in the reports, with medians over all of their scenes.
+pub fn measured(reports: &[(&Suite, Report)]) -> Vec<Measured> {
+    let mut measured = Vec::new();
     for family in &FAMILIES {
         let Some((_, report)) = reports.iter().find(|(suite, _)| suite.name == family.suite) else { continue };
         for method in (family.methods)(report) {
             let known = Known::of(report, family, &method);
-            let class = if known.lacks().is_empty() { "row" } else { "row bad" };
-            let shown = |values: &[f64], name: &str| match median(values) {
-                Some(value) => format!("{} {}", crate::suite::shown(value), unit(name)),
-                None => "none".into(),
+            let shown = |values: &[f64], name: &str| match values.is_empty() {
+                true => "none".into(),
+                false => format!("{} {}", shown(Samples::from(values.to_vec()).quantile(0.5)), unit(name)),
             };
-            _ = write!(
-                page,
-                "<tr class=\"{class}\"><td>{}</td><td>{}</td><td>{}</td><td>{}</td>",
-                text(family.name),
-                text(&method),
-                shown(&known.speed, family.speed[0]),
-                shown(&known.accuracy, family.accuracy[0])
-            );
-            known.cells.iter().for_each(|count| _ = write!(page, "<td>{count}</td>"));
-            *page += "</tr>";
+            measured.push(Measured {
+                family: family.name,
+                cost: shown(&known.speed, family.speed[0]),
+                error: shown(&known.accuracy, family.accuracy[0]),
+                is_whole: known.lacks().is_empty(),
+                cells: known.cells,
+                method,
+            });
         }
     }
-    *page += "</table>";
+    measured
 }
 
 fn unit(metric: &str) -> &str {
@@ -160,16 +169,10 @@ fn unit(metric: &str) -> &str {
     }
 }
 
-fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::part::Scope;
+    use crate::engine::part::Scope;
     use crate::suites::ALL;
 
     #[test]
@@ -177,7 +180,9 @@ mod tests {
         let suite = ALL.iter().find(|suite| suite.name == "force").unwrap();
         let scope = Scope { quick: true, seed: 1 };
         let parts = (suite.parts)(scope);
-        let made = |part: crate::part::Part| (part.slug(), crate::report::Making::here(scope), part.run(scope).0);
+        let made = |part: crate::engine::part::Part| {
+            (part.slug(), crate::engine::report::Making::here(scope), part.run(scope).0)
+        };
         let mut report = Report::of(suite, parts.into_iter().map(made).collect()).unwrap();
         assert_eq!(holes(&[(suite, report.clone())]), Vec::<String>::new());
         report.findings.rows.retain(|row| row.method != "friction");

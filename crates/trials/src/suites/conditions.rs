@@ -1,7 +1,7 @@
 //! Runs every method under every condition and returns a stability map and one row per method.
 
-use crate::picture::{Map, Outcome};
-use crate::suite::{Findings, Row};
+use crate::engine::picture::{Map, Outcome};
+use crate::engine::suite::{Findings, Row};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Runs every method under every condition. A panic fails only its cell, not the run.

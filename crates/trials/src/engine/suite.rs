@@ -4,9 +4,9 @@
 //! A metric's name ends in its unit (`depth_error_voxel`, `step_us`). A gate never depends on an
 //! absolute time: times belong in charts, as ratios within one run.
 
-use crate::picture::{Chart, Map as StabilityMap};
-use crate::row::number;
-pub use crate::row::{Row, shown};
+use crate::engine::picture::{Chart, Map as StabilityMap};
+use crate::engine::row::number;
+pub use crate::engine::row::{Row, shown};
 use serde::{Deserialize, Serialize};
 
 /// Allowed side of a limit.

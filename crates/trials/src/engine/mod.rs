@@ -1,0 +1,16 @@
+//! What runs any suite: parts, rows, limits, charts, maps, kept boundaries, comparison, page.
+
+pub mod borders;
+pub mod compare;
+mod figure;
+pub mod files;
+pub mod front;
+pub mod page;
+pub mod part;
+pub mod picture;
+pub mod plot;
+pub mod report;
+pub mod row;
+pub mod store;
+pub mod suite;
+pub mod timer;

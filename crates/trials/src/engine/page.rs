@@ -1,0 +1,164 @@
+//! Writes `index.html`: charts, maps, acceptance limits and rows of every suite on one
+//! self-contained page.
+
+use crate::engine::figure::Figure;
+use crate::engine::part::Suite;
+use crate::engine::picture::{Chart, Mark, Outcome};
+use crate::engine::plot;
+use crate::engine::report::Report;
+use crate::engine::suite::{Row, shown};
+use minijinja::value::Serde;
+use minijinja::{Environment, Value, context};
+use serde::Serialize;
+
+/// What the page shows of one suite.
+#[derive(Serialize)]
+struct Section<'a> {
+    name: &'static str,
+    question: &'static str,
+    report: &'a Report,
+    broken: usize,
+    /// Command that runs one part alone.
+    command_of_part: String,
+    charts: Vec<Drawn>,
+    maps: Vec<Figure<'a>>,
+    /// Number of map cells that work, degrade, fail and are refused.
+    grades: [usize; 4],
+    /// Rows with the same metrics share a table.
+    tables: Vec<&'a [Row]>,
+}
+
+/// A chart, or why there is none.
+#[derive(Serialize)]
+struct Drawn {
+    svg: Option<String>,
+    fault: Option<String>,
+}
+
+/// The whole page as HTML. `methods`: the lines of the table of all methods.
+pub fn html(reports: &[(&Suite, Report)], methods: &impl Serialize) -> Result<String, minijinja::Error> {
+    let sections: Vec<Section> = reports.iter().map(|(suite, report)| Section::of(suite, report)).collect();
+    let mut pages = Environment::new();
+    pages.add_filter("number", shown);
+    pages.add_template("page.html", include_str!("../../templates/page.html"))?;
+    pages.add_template("map.html", include_str!("../../templates/map.html"))?;
+    pages.get_template("page.html")?.render(context! {
+        style => include_str!("../../templates/page.css"),
+        script => include_str!("../../templates/page.js"),
+        methods => Value::from(Serde(methods)),
+        suites => Value::from(Serde(sections)),
+    })
+}
+
+impl<'a> Section<'a> {
+    fn of(suite: &Suite, report: &'a Report) -> Self {
+        let found = &report.findings;
+        let mut grades = [0; 4];
+        let cells = found.maps.iter().flat_map(|map| map.cells.iter().flatten());
+        cells.for_each(|cell| grades[usize::from(Outcome::grade(cell))] += 1);
+        Self {
+            name: suite.name,
+            question: suite.question,
+            broken: found.gates.iter().filter(|gate| !gate.pass).count(),
+            command_of_part: report.command.replacen(&report.suite, &format!("{}/PART", report.suite), 1),
+            charts: charts(suite, report),
+            maps: found.maps.iter().map(Figure::of).collect(),
+            grades,
+            tables: found.rows.chunk_by(|a, b| a.metrics.keys().eq(b.metrics.keys())).collect(),
+            report,
+        }
+    }
+}
+
+fn charts(suite: &Suite, report: &Report) -> Vec<Drawn> {
+    let own = &report.findings.charts;
+    let drawn = if own.is_empty() { vec![chart_of_all(suite, report)] } else { own.clone() };
+    let mut methods: Vec<&str> = Vec::new();
+    for mark in drawn.iter().flat_map(|chart| &chart.marks) {
+        if !methods.contains(&mark.method.as_str()) {
+            methods.push(&mark.method);
+        }
+    }
+    let draw = |chart: &Chart| {
+        let svg = match chart.marks.is_empty() {
+            true => Err(format!("no row has {} and {}", chart.cost, chart.error)),
+            false => plot::svg(chart, &methods).map_err(|fault| fault.to_string()),
+        };
+        Drawn { fault: svg.as_ref().err().cloned(), svg: svg.ok() }
+    };
+    drawn.iter().map(draw).collect()
+}
+
+/// The suite's default chart over all rows.
+fn chart_of_all(suite: &Suite, report: &Report) -> Chart {
+    let (cost, error) = suite.chart;
+    let of = |row: &Row| {
+        let value = |name: &str| row.metrics.get(name).copied().filter(|v| v.is_finite() && *v >= 0.0);
+        Some(Mark { method: row.method.clone(), cost: value(cost)?, error: value(error)? })
+    };
+    let marks = report.findings.rows.iter().filter_map(of).collect();
+    Chart { title: format!("{}?", suite.question), cost: cost.into(), error: error.into(), marks, ..Chart::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::part::{Scope, nothing_more};
+    use crate::engine::picture::Map;
+    use crate::engine::report::Making;
+    use crate::engine::suite::{Findings, Gate};
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn the_page_shows_rows_limits_maps_and_charts_and_escapes_text() {
+        let suite = Suite {
+            name: "toy",
+            question: "is a < b",
+            chart: ("tick_p50_us", "depth_error_mm"),
+            parts: |_| vec![],
+            judge: nothing_more,
+        };
+        let row = |n| {
+            let row = Row::new(format!("scene <{n}>"), "a & b").with("points", n);
+            row.metric("tick_p50_us", f64::from(n)).metric("depth_error_mm", 0.5 / f64::from(n))
+        };
+        let findings = Findings {
+            rows: vec![row(1), row(2), Row::new("other", "c").metric("cost_s", f64::NAN)],
+            gates: vec![Gate::at_most("depth", 0.3, 0.2), Gate::at_most("cost", f64::NAN, 1.0)],
+            maps: vec![Map {
+                title: "a map".into(),
+                columns: vec!["1".into()],
+                rows: vec!["r".into()],
+                cells: vec![vec![Outcome::Fails("falls <through>".into())]],
+                ..Map::default()
+            }],
+            regressions: vec!["WORSE: a map".into()],
+            ..Findings::default()
+        };
+        let making = Making::here(Scope { quick: true, seed: 1 });
+        let report = Report {
+            suite: "toy".into(),
+            command: "validate toy".into(),
+            making,
+            elsewhere: BTreeMap::new(),
+            findings,
+        };
+        let page = html(&[(&suite, report)], &[(); 0]).unwrap();
+        for part in [
+            "is a &lt; b?",
+            "scene &lt;2&gt;",
+            "a &amp; b",
+            "points 2",
+            "<td>NaN</td>",
+            "<code>validate toy&#x2f;PART</code>",
+            "<b>a</b> falls &lt;through&gt;",
+            "fails (1)",
+            "WORSE: a map",
+            "<circle",
+        ] {
+            assert!(page.contains(part), "{part} is missing in {page}");
+        }
+        assert_eq!(page.matches("class=\"row bad\"").count(), 2, "{page}");
+        assert_eq!(page.matches("<summary>").count(), 1);
+    }
+}
