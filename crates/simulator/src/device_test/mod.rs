@@ -222,7 +222,7 @@ fn measured(device: String, able: &Capabilities, result: &LoopResult, tick_ms: f
 fn write(found: &Measured, samples: &[Sample], out: &Path) -> Result<(), SessionError> {
     let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(format!("device.json: {fault}"));
     let json = serde_json::to_vec_pretty(found).map_err(|fault| internal(&fault))?;
-    let page = page::html(found, samples).map_err(SessionError::Internal)?;
+    let page = page::html(found, samples)?;
     fs::create_dir_all(out).map_err(|fault| SessionError::Output { path: out.into(), fault })?;
     whole(&out.join("device.json"), &json)?;
     whole(&out.join("device.html"), page.as_bytes())

@@ -116,7 +116,12 @@ impl Drop for Place {
 }
 
 /// Writes the densities of the drilled skull, HU, and with `surface` its isosurface as triangles.
-pub fn drilled(out: &Path, densities: &VoxelVolume<i16>, bone: &BoneVolume, surface: bool) -> Result<(), SessionError> {
+pub fn drilled(
+    out: &Path,
+    densities: &VoxelVolume<i16>,
+    bone: &BoneVolume,
+    surface: bool,
+) -> Result<(), SessionError> {
     let failed = |fault: &dyn std::fmt::Display| SessionError::Case(format!("{fault}; give another folder with --out"));
     nifti::write(&out.join("drilled.nii.gz"), densities).map_err(|fault| failed(&fault))?;
     if surface {
@@ -138,7 +143,7 @@ pub fn write(
         serde_json::to_vec_pretty(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
     whole(&out.join("summary.json"), &json)?;
     whole(&out.join("scores.csv"), scores(summary).as_bytes())?;
-    let page = page::html(summary, outcome, recording, shots).map_err(SessionError::Internal)?;
+    let page = page::html(summary, outcome, recording, shots)?;
     whole(&out.join("report.html"), page.as_bytes())
 }
 
