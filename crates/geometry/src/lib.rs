@@ -20,6 +20,7 @@ mod aabb;
 pub mod bridge;
 mod motion;
 mod shell;
+mod statistics;
 mod tool;
 pub mod units;
 
@@ -28,4 +29,5 @@ pub use glam::{Mat3, Quat, Vec3, Vec4};
 pub use glamx::Pose3 as Pose;
 pub use motion::{Buttons, ToolState, Twist, Wrench};
 pub use shell::{Pointshell, Spread};
+pub use statistics::quantile;
 pub use tool::{Tool, ToolKind};

@@ -1,11 +1,12 @@
 //! Given parameters of the models: by flags, a recording's header or a case folder.
 
 use crate::error::SessionError;
+use crate::measure::Parts;
 use crate::options::Patient;
 use std::collections::BTreeMap;
 use trepan_budget::{Bone, Picture, Tissue};
 
-/// Given parameters of each part; `words` describes those of bone and tissue.
+/// Given parameters of each part, and `words` that describe them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Overrides {
     pub spacing_mm: Option<f64>,
@@ -16,7 +17,7 @@ pub(super) struct Overrides {
     pub solver: Option<&'static str>,
     pub still_mm: Option<f64>,
     pub picture: Option<Picture>,
-    pub words: [Vec<String>; 2],
+    pub words: Parts<Vec<String>>,
 }
 
 impl Overrides {
@@ -25,10 +26,7 @@ impl Overrides {
         let tled = |name| if name == FASTEST { FASTEST } else { TLED };
         let named = |name| Ok::<_, SessionError>(solver_named(name)?.map_or(tled(name), |method| method.name()));
         let words = |flags: &[(&str, Option<String>)]| -> Vec<String> {
-            flags
-                .iter()
-                .filter_map(|(flag, value)| value.as_ref().map(|value| format!("{flag} {value} is given")))
-                .collect()
+            flags.iter().filter_map(|(flag, value)| Some(format!("{flag} {} is given", value.as_ref()?))).collect()
         };
         Ok(Self {
             spacing_mm: patient.spacing_mm.map(written),
@@ -39,17 +37,18 @@ impl Overrides {
             solver: solver.map(named).transpose()?,
             still_mm: solver.map(|_| 0.0),
             picture: None,
-            words: [
-                words(&[
+            words: Parts {
+                bone: words(&[
                     ("--spacing-mm", patient.spacing_mm.map(|mm| mm.to_string())),
                     ("--rigid", rigid.map(String::from)),
                 ]),
-                words(&[
+                tissue: words(&[
                     ("--tets", patient.tets.map(|n| n.to_string())),
                     ("--opening-refinement", patient.opening_refinement.map(|n| n.to_string())),
                     ("--solver", solver.map(String::from)),
                 ]),
-            ],
+                picture: Vec::new(),
+            },
         })
     }
 
@@ -71,7 +70,7 @@ impl Overrides {
             solver: config.get("solver").map(solver),
             still_mm: number("still_mm"),
             picture: detail.map(|detail| Picture { sparse: flag("picture_sparse"), detail }),
-            words: Default::default(),
+            words: Parts::default(),
         }
     }
 

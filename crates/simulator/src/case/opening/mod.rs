@@ -12,7 +12,7 @@
 //! # When not to use it
 //! To plan a real operation: vessels, venous sinuses and eloquent cortex are ignored.
 
-mod search;
+pub(crate) mod search;
 
 use crate::case::anatomy::make_skull;
 use crate::error::SessionError;
@@ -56,7 +56,7 @@ const ON_BONE_MM: f32 = 3.0;
 const FARTHEST_MM: f32 = 150.0;
 
 /// Refuses a point that lies inside the skull or far from it; the bone's surface is at `entry`.
-fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), String> {
+fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), SessionError> {
     let away_mm = Vec3::from(requested).distance(centre) - entry.distance(centre);
     let what = if away_mm < -ON_BONE_MM {
         format!("lies {:.0} mm inside the skull", -away_mm)
@@ -66,9 +66,9 @@ fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), Str
         return Ok(());
     };
     let [x, y, z] = entry.to_array();
-    Err(format!(
+    Err(SessionError::Case(format!(
         "--opening: {requested:?} {what}: give a point outside the skull, over the place to open; on the same line the bone begins at {x:.0},{y:.0},{z:.0} (RAS mm)"
-    ))
+    )))
 }
 
 impl Opening {
@@ -100,15 +100,14 @@ impl Opening {
         let site = match requested {
             Some(requested) => head.towards((Vec3::from(requested) - centre).normalize_or_zero()).ok_or_else(|| {
                 let what = if brain.is_some() { "bone and then brain" } else { "a wall of bone up to 30 mm thick" };
-                format!(
+                SessionError::Case(format!(
                     "--opening: the line from {requested:?} to the centre of the head at {centre:.0} (RAS mm) does not meet {what}: give a point outside the skull, over the place to open"
-                )
-            }),
-            None => head.best(),
+                ))
+            })?,
+            None => head.best()?,
         };
-        let site = site.map_err(SessionError::Case)?;
         if let Some(requested) = requested {
-            check_point(requested, centre, site.entry).map_err(SessionError::Case)?;
+            check_point(requested, centre, site.entry)?;
         }
         Ok(site.into())
     }

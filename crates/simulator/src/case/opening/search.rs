@@ -9,6 +9,7 @@
 //! ray.
 
 use super::{BELOW_BONE_MM, Vec3};
+use crate::error::SessionError;
 use trepan_haptics::script::Site;
 use trepan_volume::{BoneVolume, DistanceField};
 
@@ -93,32 +94,26 @@ impl Surroundings<'_> {
 
     /// Best place on the upper right front if one is suitable there, else on the vault; the error
     /// says why none is.
-    pub fn best(&self) -> Result<Site, String> {
+    pub fn best(&self) -> Result<Site, SessionError> {
         let right_front = |d: &Vec3| d.x > 0.25 && d.y > -0.2 && d.z > 0.45;
         let vault = |d: &Vec3| d.z > 0.2;
         let suits = |found: &Option<Candidate>| found.as_ref().is_some_and(|best| best.beyond_mm == 0.0);
         let found = Some(self.best_of(right_front)).filter(suits).unwrap_or_else(|| self.best_of(vault));
-        let below = if self.brain.is_some() { " and then brain" } else { "" };
         let remedy = "are CT and MRI of one head, upright, in one space (--register), and does the bone threshold fit (--isovalue-hu)? Or name a place with --opening X,Y,Z";
-        match found {
-            Some(best) if best.beyond_mm == 0.0 => Ok(best.site),
-            Some(best) => Err(format!(
-                "no place on the vault has bone {} to {} mm thick{} within {HOLE_MM} mm around; the nearest to it has bone of {:.1} mm{} at {:.0} (RAS mm): {remedy}",
-                BONE_MM[0],
-                BONE_MM[1],
-                self.brain.map_or(String::new(), |_| format!(
-                    " with brain at most {} mm below and no air between",
-                    GAP_MM[1]
-                )),
-                best.site.bone_mm,
-                self.brain.map_or(String::new(), |_| format!(
-                    " and brain {:.1} mm below",
-                    best.site.brain_mm - best.site.bone_mm
-                )),
-                best.site.entry,
-            )),
-            None => Err(format!("no line from above meets bone{below}: {remedy}")),
-        }
+        let with_brain = |text: String| if self.brain.is_some() { text } else { String::new() };
+        let fault = match found {
+            Some(best) if best.beyond_mm == 0.0 => return Ok(best.site),
+            Some(Candidate { site: Site { entry, bone_mm, brain_mm, .. }, .. }) => {
+                let [thinnest, thickest] = BONE_MM;
+                let wanted = with_brain(format!(" with brain at most {} mm below and no air between", GAP_MM[1]));
+                let nearest = with_brain(format!(" and brain {:.1} mm below", brain_mm - bone_mm));
+                format!(
+                    "no place on the vault has bone {thinnest} to {thickest} mm thick{wanted} within {HOLE_MM} mm around; the nearest to it has bone of {bone_mm:.1} mm{nearest} at {entry:.0} (RAS mm)"
+                )
+            }
+            None => format!("no line from above meets bone{}", with_brain(" and then brain".into())),
+        };
+        Err(SessionError::Case(format!("{fault}: {remedy}")))
     }
 
     fn best_of(&self, region: impl Fn(&Vec3) -> bool) -> Option<Candidate> {
@@ -221,7 +216,7 @@ pub fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
 }
 
 /// Trilinear density minus the isovalue at a point, HU.
-fn over_isovalue(bone: &BoneVolume, point: Vec3) -> f32 {
+pub(crate) fn over_isovalue(bone: &BoneVolume, point: Vec3) -> f32 {
     let at = bone.grid_of(point);
     let (low, part) = (at.floor().as_ivec3(), at - at.floor());
     let corner = |n: i32| {
