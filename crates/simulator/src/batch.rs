@@ -9,7 +9,8 @@
 use crate::error::SessionError;
 use crate::printable::printable;
 use crate::report::output::dated;
-use crate::{Ended, Inputs, Options, Program, Session};
+use crate::session::{Ended, Session};
+use crate::{Inputs, Options, Program};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use trepan_haptics::DeviceName;

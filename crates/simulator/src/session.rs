@@ -74,7 +74,7 @@ impl Session {
     ///
     /// `built_in` is the case that is used if no image is given.
     pub fn open(program: Program, options: Options, built_in: Inputs) -> Result<Self, SessionError> {
-        options.check().map_err(SessionError::Usage)?;
+        options.check()?;
         let windowed = !options.headless && window::has_display();
         if !windowed && !options.headless {
             tracing::info!("no display here: running the scripted operation headless");

@@ -28,7 +28,11 @@ fn image(path: &Path, series: Option<usize>) -> Result<Import, ReadError> {
 }
 
 /// Reads a CT in HU, and adds remarks on it.
-pub fn read_ct(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<i16>, SessionError> {
+pub fn read_ct(
+    path: &Path,
+    series: Option<usize>,
+    notes: &mut Vec<String>,
+) -> Result<VoxelVolume<i16>, SessionError> {
     let import = image(path, series)?;
     of_modality(path, &import, "CT")?;
     of_a_patient(path, &import.volume)?;
@@ -43,7 +47,11 @@ pub fn scanned(inputs: &Inputs, series: Option<usize>) -> Result<VoxelVolume<i16
 }
 
 /// Reads an MRI, and adds remarks on it; refuses voxels that are not finite, and CTs.
-pub fn read_mri(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<f32>, SessionError> {
+pub fn read_mri(
+    path: &Path,
+    series: Option<usize>,
+    notes: &mut Vec<String>,
+) -> Result<VoxelVolume<f32>, SessionError> {
     let import = image(path, series)?;
     of_modality(path, &import, "MR")?;
     of_a_patient(path, &import.volume)?;
@@ -155,7 +163,11 @@ pub fn find_brain(
 }
 
 /// Resamples a CT to cubic voxels and keeps the largest piece of bone.
-pub fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> Result<VoxelVolume<i16>, SessionError> {
+pub fn make_skull(
+    ct: &VoxelVolume<i16>,
+    recipe: &Recipe,
+    isovalue_hu: i16,
+) -> Result<VoxelVolume<i16>, SessionError> {
     let grid = Grid::isotropic_over(ct, recipe.spacing_mm);
     room_for_voxels(grid.voxels() as u64, SKULL_BYTES).map_err(|fault| {
         let text =

@@ -87,7 +87,7 @@ pub fn plan_case(
     request: ModelRequest,
     card: impl FnOnce() -> bool,
 ) -> Result<PlannedCase, SessionError> {
-    patient.check().map_err(SessionError::Usage)?;
+    patient.check()?;
     match case {
         Some(folder) => {
             let case = fitting(program, folder::load(folder)?)?;
@@ -124,8 +124,13 @@ pub struct Built {
 }
 
 /// Builds a case folder.
-pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inputs) -> Result<Built, SessionError> {
-    patient.check().map_err(SessionError::Usage)?;
+pub fn build_case(
+    program: Program,
+    patient: &Patient,
+    out: &Path,
+    built_in: Inputs,
+) -> Result<Built, SessionError> {
+    patient.check()?;
     if out.exists() {
         return Err(SessionError::Usage(format!(
             "--out {} exists already: name a folder that does not",

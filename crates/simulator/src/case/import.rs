@@ -302,9 +302,6 @@ fn cached<T: DeserializeOwned>(cache: &Cache, key: &str, file: &str) -> Option<T
 
 /// Caches a value; if that fails, it is computed again next time.
 fn store(value: &impl Serialize, cache: &Cache, key: &str, file: &str) {
-    let write = |folder: &Path| {
-        let json = serde_json::to_vec(value).map_err(|fault| fault.to_string())?;
-        std::fs::write(folder.join(file), json).map_err(|fault| fault.to_string())
-    };
+    let write = |folder: &Path| Ok(std::fs::write(folder.join(file), serde_json::to_vec(value)?)?);
     cache.keep(key, write).err().into_iter().for_each(|fault| tracing::debug!("{file} not cached: {fault}"));
 }

@@ -59,8 +59,6 @@ pub struct Case {
     pub fit_png: Option<Vec<u8>>,
     /// Remarks of the import.
     pub notes: Vec<String>,
-    /// Whether it came from the cache.
-    pub cached: bool,
 }
 
 /// The brain of a case.
