@@ -37,38 +37,26 @@ impl OpenDevice {
         rate_hz: f32,
         stop: &Stop,
     ) -> Result<Self, SessionError> {
-        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| scripted(name, options, plan);
-        let mut hand = Self { device: None, pointer: None, watch: None, watching: None };
+        let none = Self { device: None, pointer: None, watch: None, watching: None };
+        let start = || scripted(program.script(), options, plan).map(|script| script.at(0.0));
         if let Some(name) = &options.watch {
-            let (watched, watching) = Watched::open(name, script(program.script())?.at(0.0), stop)?;
-            hand.watching = Some(watching);
-            hand.device = Some(Box::new(watched));
-            return Ok(hand);
+            let (watched, watching) = Watched::open(name, start()?, stop)?;
+            return Ok(Self { device: Some(Box::new(watched)), watching: Some(watching), ..none });
         }
-        hand.device = match name {
-            DeviceName::Script(name) => Some(Box::new(script(name)?)),
-            DeviceName::Simulated(name) => {
-                let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-                Some(Box::new(simulated::Simulated::new(config, grip, Box::new(script(name)?))))
-            }
+        if let Some(device) = software(name, options, plan)? {
+            return Ok(Self { device: Some(device), ..none });
+        }
+        Ok(match name {
             DeviceName::Mouse => {
-                let (pointer, mouse) = mouse::pair(script(program.script())?.at(0.0).world_from_tool);
-                hand.pointer = Some(pointer);
-                Some(Box::new(mouse))
+                let (pointer, mouse) = mouse::pair(start()?.world_from_tool);
+                Self { device: Some(Box::new(mouse)), pointer: Some(pointer), ..none }
             }
-            DeviceName::Replay(_) => None,
-            hardware => match hardware::open(hardware, workspace(&plan.site, options.device_scale)) {
-                Some(opened) => {
-                    let opened = opened.map_err(|f| fault(&f))?;
-                    check_rate(&opened.device.capabilities(), rate_hz)?;
-                    hand.watch = Some(opened.watch);
-                    Some(Box::new(Clutch::new(opened.device)))
-                }
-                None => None,
+            DeviceName::Replay(_) => none,
+            hardware => match opened(hardware, workspace(&plan.site, options.device_scale), rate_hz)? {
+                Some((device, watch)) => Self { device: Some(Box::new(device)), watch: Some(watch), ..none },
+                None => none,
             },
-        };
-        Ok(hand)
+        })
     }
 }
 
@@ -84,27 +72,38 @@ impl SecondDevice {
     /// Opens the device. Hardware runs on its own thread, so that its link never delays the first
     /// hand.
     pub fn open(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
-        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| scripted(name, options, plan);
-        let (device, watch): (Box<dyn HapticDevice>, _) = match name {
-            DeviceName::Script(operation) => (Box::new(script(operation)?), None),
-            DeviceName::Simulated(operation) => {
-                let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-                (Box::new(simulated::Simulated::new(config, grip, Box::new(script(operation)?))), None)
-            }
-            hardware_name => {
-                let mut beside = workspace(&plan.site, options.device_scale);
-                // With both hands in the middle of their workspaces the tools are side by side.
-                beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
-                let opened = hardware::open(hardware_name, beside)
-                    .ok_or_else(|| unfit(hardware_name))?
-                    .map_err(|f| fault(&f))?;
-                check_rate(&opened.device.capabilities(), rate_hz)?;
-                (Box::new(ThreadedDevice::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
-            }
-        };
-        Ok(Self { device, watch })
+        if let Some(device) = software(name, options, plan)? {
+            return Ok(Self { device, watch: None });
+        }
+        let mut beside = workspace(&plan.site, options.device_scale);
+        // With both hands in the middle of their workspaces the tools are side by side.
+        beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
+        let (device, watch) = opened(name, beside, rate_hz)?.ok_or_else(|| unfit(name))?;
+        Ok(Self { device: Box::new(ThreadedDevice::new(Box::new(device))), watch: Some(watch) })
     }
+}
+
+/// Makes a device of software: a script, or a simulated hand that follows one.
+fn software(name: &DeviceName, options: &Options, plan: &Plan) -> Result<Option<Box<dyn HapticDevice>>, SessionError> {
+    Ok(match name {
+        DeviceName::Script(operation) => Some(Box::new(scripted(operation, options, plan)?)),
+        DeviceName::Simulated(operation) => Some(simulated_hand(scripted(operation, options, plan)?)),
+        _ => None,
+    })
+}
+
+/// Makes a simulated device in a firm hand that follows a script.
+pub(crate) fn simulated_hand(script: Script) -> Box<dyn HapticDevice> {
+    let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
+    Box::new(simulated::Simulated::new(config, grip, Box::new(script)))
+}
+
+/// Opens hardware that is read at `rate_hz`; `None` if the name is not one of hardware.
+fn opened(name: &DeviceName, workspace: Workspace, rate_hz: f32) -> Result<Option<(Clutch, Watch)>, SessionError> {
+    let Some(opened) = hardware::open(name, workspace) else { return Ok(None) };
+    let opened = opened.map_err(|fault| SessionError::Device(fault.to_string()))?;
+    check_rate(&opened.device.capabilities(), rate_hz)?;
+    Ok(Some((Clutch::new(opened.device), opened.watch)))
 }
 
 /// Duration of a scripted operation, and of one that cuts a flap, s.
@@ -228,7 +227,7 @@ impl DeviceLimits {
             axes_driven: number(AXES) as u8,
             moving_mass_g: number(MASS),
             damping: number(DAMPING),
-            ..Watched::CAPABILITIES
+            ..Capabilities::passive("")
         };
         Self { device, scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0) }
     }

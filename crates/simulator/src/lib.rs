@@ -12,7 +12,8 @@
 //! | [`CollisionStage::step`] | newest tool, newest node positions | patch, contacts, record |
 //! | [`SolverStage::step`] | newest contact | moved nodes, record |
 //!
-//! [`threads`] runs the stages live; [`lockstep`] replays them from a recording, bit for bit.
+//! `run/threads.rs` runs the stages live; `run/lockstep.rs` replays them from a recording, bit for
+//! bit.
 //!
 //! # Practice
 //! [`Session::open`] reports every user error before anything is written; [`Session::run`] runs the
@@ -64,7 +65,6 @@ pub use report::summary::Summary;
 pub use run::clock::{Clock, Schedule};
 pub use run::stop::Stop;
 pub use run::{Cells, Outcome, RenderInputs, Replayed, SolverOutcome, Stages, Ticks, Times, Tissue, View};
-pub use run::{lockstep, threads};
 pub use session::{Ended, Session};
 pub use stages::alarms::Limits;
 pub use stages::collision_step::{CollisionStage, SoftFrame};

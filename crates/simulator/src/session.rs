@@ -14,16 +14,15 @@ use crate::program::Program;
 use crate::recordings;
 use crate::report::page::Shot;
 use crate::report::plan_comparison::PlanComparison;
-use crate::report::summary::{About, CutOff, Machine, Summary};
+use crate::report::summary::{CutOff, Machine, SecondSummary, SolverSummary, Summary, fps};
 use crate::report::{drilled, output};
 use crate::run::film::Filming;
-use crate::run::journal::Kept;
 use crate::run::lesson::{Taught, Teacher};
 use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Devices, Pace};
 use crate::run::watch::{Asked, Company, Share};
-use crate::run::{Outcome, RenderInputs, Stages};
+use crate::run::{Outcome, RenderInputs, Run, Stages};
 use crate::session_setup::SessionSetup;
 use crate::show::driver;
 use crate::show::graphics::Graphics;
@@ -122,13 +121,14 @@ impl Session {
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         company.watching.clone_from(&watching);
-        let kept = (Recorder::create(&record, &self.header(&limits, second_limits.as_ref()))?, share);
+        let recorder = Recorder::create(&record, &self.header(&limits, second_limits.as_ref()))?;
         let drawing = self.drawing.take();
         let mut graphics = self.graphics(drawing);
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
         let devices = device.map(|first| Devices { first, second: second_device });
-        let outcome = self.loops(stages, devices, kept, start, &stop, |eyes| {
+        let run = Run { stages, start, recorder, share, stop: &stop };
+        let outcome = self.loops(run, devices, |eyes| {
             album = self.picture(eyes, &mut graphics, pointer, std::mem::take(&mut company), &stop);
         });
         let ended = watching.and_then(|watching| watching.ended());
@@ -145,17 +145,16 @@ impl Session {
         let drilled =
             self.setup.bone().zip(whole.as_ref()).map(|(bone, whole)| self.drilled(bone, whole, &mut remarks));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
-        let about = About {
+        let bone_before = self.setup.bone().zip(whole);
+        let summary = Summary {
             cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
-            plan: self
-                .setup
-                .bone()
-                .zip(whole)
-                .and_then(|(bone, whole)| PlanComparison::of(&self.setup.plan, &whole, bone)),
+            plan: bone_before.and_then(|(bone, whole)| PlanComparison::of(&self.setup.plan, &whole, bone)),
             regions: self.setup.regions(&recording),
-            ..self.about(&album, adapter, remarks)
+            remarks,
+            machine: Machine::here(adapter),
+            ..self.about(&album)
         };
-        let summary = Summary::new(about, &outcome);
+        let summary = summary.with(&outcome);
         output::write(&self.out, &recording, &summary, &outcome, &self.shots(album.shots))?;
         if let Some((bone, densities)) = self.setup.bone().zip(drilled) {
             output::drilled(&self.out, &densities, bone, self.options.stl)?;
@@ -224,23 +223,15 @@ impl Session {
         Ok((company, hands))
     }
 
-    fn loops(
-        &self,
-        stages: Stages,
-        devices: Option<Devices>,
-        kept: Kept,
-        start: ToolSample,
-        stop: &Stop,
-        picture: impl FnOnce(RenderInputs),
-    ) -> Outcome {
+    fn loops(&self, run: Run<'_>, devices: Option<Devices>, picture: impl FnOnce(RenderInputs)) -> Outcome {
         match (&self.recording, devices) {
             (Some(recording), _) => {
                 let end_ms = self.options.duration.map_or(f64::INFINITY, |s| 1e3 * s);
                 let length_ms = lockstep::up_to(recording, end_ms).last().map_or(0.0, |tick| tick.time_ms);
                 let film = self.windowed.then(|| Filming::new(self.setup.bone().cloned(), length_ms));
-                lockstep::run(stages, (recording, end_ms), kept, start, film, stop, picture)
+                lockstep::run(run, (recording, end_ms), film, picture)
             }
-            (None, Some(devices)) => threads::run(stages, devices, kept, start, self.pace(), stop, picture),
+            (None, Some(devices)) => threads::run(run, devices, self.pace(), picture),
             (None, None) => Outcome::default(),
         }
     }
@@ -340,28 +331,33 @@ impl Session {
         }
     }
 
-    fn about(&self, album: &Album, adapter: Option<String>, remarks: Vec<String>) -> About {
+    /// The part of the summary that is known without the outcome.
+    fn about(&self, album: &Album) -> Summary {
         let brain = self.setup.scene.brain.as_ref();
-        About {
-            program: self.program,
+        Summary {
+            app: self.program.name().into(),
             case: self.case.name.clone(),
             device: match (&self.device, &self.options.watch) {
                 (_, Some(_)) => "watch".into(),
                 (DeviceName::Replay(_), _) => "replay".into(),
                 (other, _) => other.to_string(),
             },
-            second_device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),
+            second: Some(SecondSummary {
+                device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),
+                ..SecondSummary::default()
+            }),
             models: self.setup.models.summary(),
-            solver: self.setup.solver_name().into(),
-            brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
+            solver: Some(SolverSummary {
+                name: self.setup.solver_name().into(),
+                tets: brain.map_or(0, |brain| brain.mesh.tets.len()),
+                nodes: brain.map_or(0, |brain| brain.mesh.positions.len()),
+                fixed_nodes: brain.map_or(0, |brain| brain.fixed.len()),
+                ..SolverSummary::default()
+            }),
             asked_hz: self.setup.operation.rate_hz.into(),
             frames: album.frames,
-            drawn_s: album.seconds,
-            cut_off: CutOff::default(),
-            plan: None,
-            regions: Vec::new(),
-            remarks,
-            machine: Machine::here(adapter),
+            fps: fps(album.frames, album.seconds),
+            ..Summary::default()
         }
     }
 }

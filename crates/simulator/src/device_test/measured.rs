@@ -4,10 +4,10 @@
 //! Units are mm, N and ms unless a name says otherwise.
 
 use crate::device_test::trial::{FLOOR_N, FLOOR_N_PER_MM, Part};
-use crate::report::summary::{GuardSummary, Machine, Quantiles};
+use crate::report::summary::{Machine, Quantiles, by_cause};
 use crate::run::Times;
 use serde::Serialize;
-use trepan_contact::ForceGuard;
+use trepan_contact::{ForceGuard, GuardCounters};
 use trepan_geometry::Vec3;
 
 /// One tick of the test.
@@ -127,7 +127,8 @@ pub struct Floor {
     /// Largest net energy output, mJ.
     pub energy_out_mj: f64,
     /// Interventions of the force guard, ticks.
-    pub guard: GuardSummary,
+    #[serde(serialize_with = "by_cause")]
+    pub guard: GuardCounters,
 }
 
 /// Samples of a test, with the state at its end.
@@ -186,7 +187,7 @@ impl Floor {
             depth_mm: pressed.clone().map(depth).fold(0.0, f32::max),
             force_n: pressed.map(|s| s.force.length()).fold(0.0, f32::max),
             energy_out_mj: run.guard.passivity_observer().lowest_nmm().min(0.0).abs(),
-            guard: (&run.guard.counters()).into(),
+            guard: run.guard.counters(),
         }
     }
 }
@@ -253,7 +254,7 @@ pub(super) mod tests {
         let (samples, trial, able) = tested(Config::default(), HandModel::FIRM, hand);
         let [low, high] = explored(&samples);
         assert!((high.y - 20.0).abs() < 2.0 && (low.y + 20.0).abs() < 2.0, "{low} {high}");
-        let run = TestRun { samples: &samples, tick_ms: 1.0, late: 0, guard: trial.guard(), floor_y: trial.floor_y() };
+        let run = TestRun { samples: &samples, tick_ms: 1.0, late: 0, guard: &trial.floor, floor_y: trial.floor_y };
         let floor = Floor::of(&run);
         assert!(floor.force_n > 0.9 && floor.touched_s > 1.5 && floor.energy_out_mj < 0.1, "{floor:?}");
         assert!((floor.height_mm.unwrap() + 8.0).abs() < 2.0, "three tenths of the way up from -20");
@@ -267,7 +268,7 @@ pub(super) mod tests {
     fn gaps_are_between_new_positions() {
         let (mut samples, trial, _) = tested(Config::default(), HandModel::FIRM, |_| 0.0);
         samples.iter_mut().enumerate().for_each(|(at, s)| s.fresh = at % 4 == 0);
-        let run = TestRun { samples: &samples, tick_ms: 1.0, late: 7, guard: trial.guard(), floor_y: None };
+        let run = TestRun { samples: &samples, tick_ms: 1.0, late: 7, guard: &trial.floor, floor_y: None };
         let timing = Timing::of(&run);
         assert!((timing.fresh_hz - 250.0).abs() < 1.0 && (timing.gap_us.p50 - 4000.0).abs() < 8.0);
         assert!((timing.tick_us.p50 - 1000.0).abs() < 2.0 && timing.late_ticks == 7);

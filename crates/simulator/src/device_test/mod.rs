@@ -13,19 +13,20 @@ mod page;
 mod trial;
 
 use crate::error::SessionError;
+use crate::hand::simulated_hand;
 use crate::report::output::whole;
 use crate::report::summary::Machine;
 use crate::run::clock::{Clock, Schedule};
 use crate::run::stop::Stop;
 use crate::run::threads::{HapticDeviceOwner, real_time};
 use measured::{Ending, Floor, Measured, Sample, TestRun, Timing};
+use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::simulated::{self, Simulated};
 use trepan_haptics::{Capabilities, DeviceName, HapticDevice, NameError, Status, Watch, Workspace, hardware};
 use trial::{Part, Trial};
 
@@ -49,7 +50,7 @@ pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionE
         return Err(SessionError::Usage(format!("--out {} is a file: name a folder, new or old", out.display())));
     }
     let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-    let subject = open(name, 1e3 * seconds).map_err(SessionError::Usage)?;
+    let subject = open(name, 1e3 * seconds)?;
     let (found, samples) = test(subject, 1e3 * seconds, &stop);
     write(&found, &samples, out)?;
     for finding in &found.findings {
@@ -62,27 +63,24 @@ pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionE
     Ok(stop.signal())
 }
 
-fn open(name: &str, end_ms: f64) -> Result<Subject, String> {
-    let name: DeviceName = name.parse().map_err(|fault: NameError| fault.to_string())?;
+fn open(name: &str, end_ms: f64) -> Result<Subject, SessionError> {
+    let usage = |fault: &dyn Display| SessionError::Usage(fault.to_string());
+    let name: DeviceName = name.parse().map_err(|fault: NameError| usage(&fault))?;
     let script = |script: &str| {
         let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Y, bone_mm: 6.0, brain_mm: 8.0 };
-        Script::named(script, &site, end_ms).map_err(|fault| fault.to_string())
+        Script::named(script, &site, end_ms).map_err(|fault| usage(&fault))
     };
-    let software = |device: Box<dyn HapticDevice>| Ok(Subject { name: name.clone(), device, watch: None });
-    match &name {
-        DeviceName::Script(operation) => software(Box::new(script(operation)?)),
-        DeviceName::Simulated(operation) => {
-            let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-            software(Box::new(Simulated::new(config, grip, Box::new(script(operation)?))))
+    let (device, watch): (Box<dyn HapticDevice>, _) = match &name {
+        DeviceName::Script(operation) => (Box::new(script(operation)?), None),
+        DeviceName::Simulated(operation) => (simulated_hand(script(operation)?), None),
+        _ => {
+            let unfit = || usage(&format!("{name} cannot be tested; `--list-devices` shows the devices that can"));
+            let opened = hardware::open(&name, Workspace::default()).ok_or_else(unfit)?;
+            let hardware::Hardware { device, watch } = opened.map_err(|fault| usage(&fault))?;
+            (device, Some(watch))
         }
-        _ => match hardware::open(&name, Workspace::default()) {
-            Some(opened) => {
-                let hardware::Hardware { device, watch } = opened.map_err(|fault| fault.to_string())?;
-                Ok(Subject { name, device, watch: Some(watch) })
-            }
-            None => Err(format!("{name} cannot be tested; `--list-devices` shows the devices that can")),
-        },
-    }
+    };
+    Ok(Subject { name, device, watch })
 }
 
 /// Result of the haptic loop.
@@ -195,7 +193,7 @@ fn ends(status: Status, over: bool, stop: &Stop) -> Option<Ending> {
 
 fn measured(device: String, able: &Capabilities, result: &LoopResult, tick_ms: f64, watch: Option<&Watch>) -> Measured {
     let LoopResult { samples, late, trial, .. } = result;
-    let run = TestRun { samples, tick_ms, late: *late, guard: trial.guard(), floor_y: trial.floor_y() };
+    let run = TestRun { samples, tick_ms, late: *late, guard: &trial.floor, floor_y: trial.floor_y };
     let mut found = Measured {
         device,
         model: able.name.clone(),
@@ -220,8 +218,8 @@ fn measured(device: String, able: &Capabilities, result: &LoopResult, tick_ms: f
 }
 
 fn write(found: &Measured, samples: &[Sample], out: &Path) -> Result<(), SessionError> {
-    let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(format!("device.json: {fault}"));
-    let json = serde_json::to_vec_pretty(found).map_err(|fault| internal(&fault))?;
+    let json = serde_json::to_vec_pretty(found);
+    let json = json.map_err(|fault| SessionError::Internal(format!("device.json: {fault}")))?;
     let page = page::html(found, samples)?;
     fs::create_dir_all(out).map_err(|fault| SessionError::Output { path: out.into(), fault })?;
     whole(&out.join("device.json"), &json)?;

@@ -75,9 +75,11 @@ pub struct Trial {
     tick_ms: f32,
     driven: bool,
     height: [f32; 2],
-    floor_y: Option<f32>,
+    /// Height of the floor, mm; `None` before its part begins.
+    pub floor_y: Option<f32>,
     taps: ForceGuard,
-    floor: ForceGuard,
+    /// The guard of the floor.
+    pub floor: ForceGuard,
 }
 
 impl Trial {
@@ -120,16 +122,6 @@ impl Trial {
     pub fn release(&mut self) {
         self.taps.release();
         self.floor.release();
-    }
-
-    /// The guard of the floor.
-    pub fn guard(&self) -> &ForceGuard {
-        &self.floor
-    }
-
-    /// Height of the floor, mm; `None` before its part begins.
-    pub fn floor_y(&self) -> Option<f32> {
-        self.floor_y
     }
 
     fn part(&self, time_ms: f64) -> (Part, f64) {
@@ -223,7 +215,7 @@ mod tests {
         trial.step(&reading(50.0, 1.0, Status::Fresh), 1.0);
         trial.step(&reading(-50.0, 2.0, Status::Fresh), 2.0);
         trial.step(&reading(-30.0, 5000.0, Status::Fresh), 5000.0);
-        assert_eq!(trial.floor_y(), Some(-31.0));
+        assert_eq!(trial.floor_y, Some(-31.0));
     }
 
     #[test]

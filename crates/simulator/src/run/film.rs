@@ -134,14 +134,15 @@ fn places(low: [usize; 3], dims: [usize; 3]) -> impl Iterator<Item = (usize, usi
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::program::Program;
     use crate::stages::haptic_tick::ToolSample;
     use trepan_geometry::{Pose, ToolState};
     use trepan_volume::{AIR_HU, VoxelVolume};
 
-    fn view(time_ms: f64) -> View {
+    /// Returns the view of a tool at the origin.
+    pub(crate) fn view(time_ms: f64) -> View {
         let tool = Program::Craniotomy.tray()[0];
         let sample = ToolSample { tick: 0, state: ToolState::at(Pose::IDENTITY), tool, slot: 0, drilling: false };
         View { time_ms, ..View::at(sample, 1.0) }

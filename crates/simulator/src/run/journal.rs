@@ -16,9 +16,6 @@ use trepan_link::queue::{Receiver, Sender, bounded};
 use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_link::{LinkError, Recorder};
 
-/// Destinations of the records: a file, and watching sessions where the session is shared.
-pub type Kept = (Recorder, Option<Share>);
-
 /// Capacity of a ring buffer, records.
 const RING: usize = 8192;
 /// Time between two flushes of the file, ms.

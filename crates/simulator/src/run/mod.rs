@@ -7,13 +7,16 @@ pub(crate) mod clock;
 pub(crate) mod film;
 pub(crate) mod journal;
 pub(crate) mod lesson;
-pub mod lockstep;
+pub(crate) mod lockstep;
 pub(crate) mod stop;
-pub mod threads;
+pub(crate) mod threads;
 pub(crate) mod watch;
 
+use crate::report::summary::Quantiles;
 use crate::run::film::Shot;
 use crate::run::journal::Written;
+use crate::run::stop::Stop;
+use crate::run::watch::Share;
 use crate::stages::collision_step::{CollisionStage, SoftFrame};
 use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
 use crate::stages::notice::{Notice, What};
@@ -21,11 +24,27 @@ use crate::stages::score::ScoreKeeper;
 use crate::stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 use crate::stages::solver_step::{SolverFaults, SolverStage};
 use hdrhistogram::Histogram;
+use serde::{Serialize, Serializer};
 use std::sync::mpsc::Receiver;
 use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
+use trepan_link::Recorder;
 use trepan_link::cell::{Reader, Writer, cell};
 use trepan_soft::Loads;
+
+/// What a live session and a replay need.
+pub(crate) struct Run<'a> {
+    /// Bodies of the loops.
+    pub stages: Stages,
+    /// The tool before the first tick.
+    pub start: ToolSample,
+    /// Destination of the records.
+    pub recorder: Recorder,
+    /// Publishes the records, where the session is shared.
+    pub share: Option<Share>,
+    /// Ends the session.
+    pub stop: &'a Stop,
+}
 
 /// Bodies of the three loops.
 pub struct Stages {
@@ -156,6 +175,12 @@ impl Default for Times {
     }
 }
 
+impl Serialize for Times {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        Quantiles::from(self).serialize(to)
+    }
+}
+
 impl Times {
     /// Adds a duration in µs.
     pub fn add_us(&mut self, us: f32) {
@@ -234,29 +259,43 @@ impl Ticks {
     }
 }
 
-/// Outcome of the solver loop.
-#[derive(Clone, Debug, Default)]
+/// Outcome of the solver loop, as in `summary.json`.
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct SolverOutcome {
     /// Length of a step, ms.
     pub dt_ms: f32,
-    /// Steps done.
-    pub steps: u64,
-    /// Simulated time over wall time.
-    pub real_time_factor: f64,
     /// Compute time of a step.
+    #[serde(rename = "step_us")]
     pub times: Times,
     /// Compute time of a collision step.
+    #[serde(rename = "collision_us")]
     pub collision_times: Times,
+    /// Simulated time over wall time.
+    pub real_time_factor: f64,
     /// Largest displacement of a node, mm.
     pub max_displacement_mm: f32,
     /// Largest displacement of a node at the end, mm.
     pub end_displacement_mm: f32,
-    /// Faults of the solver, counted.
+    /// Faults of the solver, summed over steps.
+    #[serde(flatten)]
     pub solver_faults: SolverFaults,
 }
 
+impl SolverOutcome {
+    /// Returns the part of the outcome that a solver stage knows itself.
+    pub(crate) fn of(stage: &SolverStage) -> Self {
+        Self {
+            dt_ms: stage.dt_ms(),
+            max_displacement_mm: stage.max_displacement_mm(),
+            end_displacement_mm: stage.displacement_mm(),
+            solver_faults: *stage.solver_faults(),
+            ..Self::default()
+        }
+    }
+}
+
 /// Comparison of a replay with its recording.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Replayed {
     /// Ticks replayed.
     pub ticks: u64,
@@ -311,4 +350,17 @@ pub struct Outcome {
     pub replayed: Option<Replayed>,
     /// Remarks on the run: missing real-time priority, a loop that panicked.
     pub remarks: Vec<String>,
+}
+
+impl Outcome {
+    /// Returns the part of the outcome that the stages know themselves.
+    pub(crate) fn of(stage: &HapticStage, second: Option<&SecondHand>) -> Self {
+        Self {
+            scores: *stage.scores(),
+            guard: stage.guard().counters(),
+            force_limit_n: stage.guard().config().max_force_n,
+            second: second.map(SecondHand::outcome),
+            ..Self::default()
+        }
+    }
 }

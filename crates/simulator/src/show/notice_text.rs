@@ -69,7 +69,7 @@ fn tray(program: Program, slot: usize) -> Choice {
 
 /// Returns the active warnings.
 fn active(bits: u32) -> impl Iterator<Item = Warning> {
-    Warning::ALL.into_iter().enumerate().filter(move |(at, _)| bits & (1 << at) != 0).map(|(_, warning)| warning)
+    Warning::ALL.into_iter().filter(move |warning| bits & (1 << *warning as u32) != 0)
 }
 
 fn in_words(notice: Notice) -> String {

@@ -12,6 +12,7 @@
 //! While the force is off nothing drills either. The guard fades the force out and ramps it in
 //! again. A device that has never given a pose has no fault.
 
+use trepan_contact::ForceGuard;
 use trepan_geometry::{Buttons, ToolState};
 
 /// Time of stale readings after which the device has a fault, ms.
@@ -49,8 +50,27 @@ impl AfterFault {
         self.waits
     }
 
+    /// Runs a tick, and switches the force off or on again; a `released` hand stays off. Returns a
+    /// change: `true` when the force is switched off.
+    pub fn follow(
+        &mut self,
+        tool: &ToolState,
+        status: DeviceStatus,
+        dt_ms: f32,
+        guard: &mut ForceGuard,
+        released: bool,
+    ) -> Option<bool> {
+        let waits = self.tick(tool, status, dt_ms)?;
+        match waits {
+            true => guard.release(),
+            false if !released => guard.resume(),
+            false => {}
+        }
+        Some(waits)
+    }
+
     /// Runs a tick of `dt_ms`; returns a change: `true` when the force is switched off.
-    pub fn tick(&mut self, tool: &ToolState, status: DeviceStatus, dt_ms: f32) -> Option<bool> {
+    fn tick(&mut self, tool: &ToolState, status: DeviceStatus, dt_ms: f32) -> Option<bool> {
         let before = self.waits;
         if status.stale || status.lost {
             (self.fresh, self.clear_ms) = (false, 0.0);
