@@ -22,7 +22,7 @@ use trepan_link::Recording;
 use trepan_link::wire::{EventRecord, TickRecord};
 
 /// Reads two recordings and writes `compare.html` to a folder.
-pub fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionError> {
+pub(crate) fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionError> {
     let [first, second] = files;
     let page = page(&[Recording::open(first)?, Recording::open(second)?])?;
     fs::create_dir_all(out).map_err(|fault| SessionError::Output { path: out.into(), fault })?;

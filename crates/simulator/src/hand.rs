@@ -16,7 +16,7 @@ use trepan_haptics::{
 use trepan_link::Recording;
 
 /// An open device of the first hand.
-pub struct OpenDevice {
+pub(crate) struct OpenDevice {
     /// Device for the haptic loop; `None` for a replay, which has recorded readings.
     pub device: Option<Box<dyn HapticDevice>>,
     /// Handle with which the window moves the mouse device.
@@ -61,7 +61,7 @@ impl OpenDevice {
 }
 
 /// An open device of the second hand.
-pub struct SecondDevice {
+pub(crate) struct SecondDevice {
     /// Device for the haptic loop.
     pub device: Box<dyn HapticDevice>,
     /// Access to the device's faults.
@@ -130,7 +130,7 @@ fn check_rate(device: &Capabilities, rate_hz: f32) -> Result<(), SessionError> {
 const SIDE_MM: f32 = 30.0;
 
 /// Name of the second hand's device, if given; refuses one that conflicts with the first.
-pub fn second_name(first: &DeviceName, options: &Options) -> Result<Option<DeviceName>, SessionError> {
+pub(crate) fn second_name(first: &DeviceName, options: &Options) -> Result<Option<DeviceName>, SessionError> {
     let Some(text) = &options.second_device else { return Ok(None) };
     let name: DeviceName = text.parse().map_err(|fault: trepan_haptics::NameError| second(fault.to_string()))?;
     if matches!(first, DeviceName::Replay(_)) {
@@ -155,7 +155,7 @@ fn second(fault: String) -> SessionError {
 }
 
 /// Describes the faults of a device; `None` without faults.
-pub fn faults(watch: &Watch) -> Option<String> {
+pub(crate) fn faults(watch: &Watch) -> Option<String> {
     let last = watch.fault().map_or_else(String::new, |fault| format!("; the last one: {fault}"));
     (watch.count() > 0).then(|| format!("the device had {} faults{last}", watch.count()))
 }
@@ -167,7 +167,7 @@ fn workspace(site: &Site, scale: f32) -> Workspace {
 }
 
 /// Name of the requested device; by default the mouse with a window, else the program's script.
-pub fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
+pub(crate) fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
     let script = || DeviceName::Script(program.script().into());
     let name = match &options.device {
         Some(text) => {
@@ -186,7 +186,7 @@ pub fn device_name(program: Program, options: &Options, windowed: bool) -> Resul
 
 /// Device properties that the force guard and the walls depend on; recorded, so that a replay gives
 /// the same forces.
-pub struct DeviceLimits {
+pub(crate) struct DeviceLimits {
     /// Capabilities, with the encoder step multiplied by the motion scale.
     device: Capabilities,
     /// Motion scale, world mm per device mm.
@@ -194,9 +194,9 @@ pub struct DeviceLimits {
 }
 
 /// Prefix of the first hand's header entries.
-pub const FIRST: &str = "device_";
+pub(crate) const FIRST: &str = "device_";
 /// Prefix of the second hand's header entries.
-pub const SECOND: &str = "second_device_";
+pub(crate) const SECOND: &str = "second_device_";
 
 const PEAK: &str = "peak_force_n";
 const CONTINUOUS: &str = "continuous_force_n";

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 use trepan_budget::Quality;
 
 /// Range of `--young-modulus-kpa`.
-pub const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
+pub(crate) const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
 /// Range of `--rate-hz`.
-pub const RATES_HZ: [f64; 2] = [100.0, 10_000.0];
+pub(crate) const RATES_HZ: [f64; 2] = [100.0, 10_000.0];
 
 /// Flags of every program; names contain the unit.
 #[derive(Clone, Debug, Parser)]
@@ -299,7 +299,7 @@ fn within(flag: &str, value: f64, low: f64, high: f64) -> Result<(), SessionErro
 }
 
 /// Refuses a tick rate out of range.
-pub fn rate(rate_hz: f64) -> Result<(), SessionError> {
+pub(crate) fn rate(rate_hz: f64) -> Result<(), SessionError> {
     within("rate-hz", rate_hz, RATES_HZ[0], RATES_HZ[1])
 }
 

@@ -29,7 +29,7 @@ use trepan_soft::{Body, Loads, SoftSolver};
 use trepan_volume::{BoneVolume, Piece};
 
 /// Patient, plan, settings and models of a session.
-pub struct SessionSetup {
+pub(crate) struct SessionSetup {
     /// The program.
     pub program: Program,
     /// The patient.

@@ -90,7 +90,7 @@ impl Cache {
 }
 
 /// SHA-256 of a text and of these files (folders with all their files), hexadecimal.
-pub fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, SessionError> {
+pub(super) fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, SessionError> {
     let mut hash = Sha256::new();
     hash.update(text);
     for input in inputs {
@@ -102,7 +102,7 @@ pub fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, SessionErro
 }
 
 /// SHA-256 of a file's bytes, hexadecimal.
-pub fn digest(file: &Path) -> io::Result<String> {
+pub(super) fn digest(file: &Path) -> io::Result<String> {
     let mut hash = Sha256::new();
     feed(&mut hash, &mut open_regular(file)?)?;
     Ok(hexadecimal(hash))

@@ -55,7 +55,7 @@ struct Card {
 }
 
 /// Writes a case into an empty folder.
-pub fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
+pub(crate) fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut names = Vec::new();
     if let Some(skull) = &case.skull {
         nifti::write(&folder.join(SKULL), skull)?;
@@ -90,7 +90,7 @@ pub fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
 }
 
 /// Reads the patient's identity from a case folder, without the volumes.
-pub fn identity(folder: &Path) -> Result<Identity, SessionError> {
+pub(crate) fn identity(folder: &Path) -> Result<Identity, SessionError> {
     card(folder).map(|Card { name, hash, images, .. }| Identity { name, case: Some(hash), images })
 }
 
@@ -110,7 +110,7 @@ fn broken(folder: &Path, file: &str, fault: &dyn std::fmt::Display) -> SessionEr
 }
 
 /// Opens a case folder; every file must exist and match its hash.
-pub fn load(folder: &Path) -> Result<Case, SessionError> {
+pub(crate) fn load(folder: &Path) -> Result<Case, SessionError> {
     let card = card(folder)?;
     let broken = |file: &str, fault: &dyn std::fmt::Display| broken(folder, file, fault);
     for (name, hash) in &card.files {

@@ -39,7 +39,7 @@ pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -
 }
 
 /// Opens a case whose voxel size and tetrahedra are chosen by `choose` when the images are known.
-pub fn open_by(
+pub(super) fn open_by(
     program: Program,
     inputs: &Inputs,
     requested: &Recipe,
@@ -82,7 +82,7 @@ struct CachedFacts {
 }
 
 /// A case before it is built: its inputs and properties.
-pub struct PendingCase<'a> {
+pub(super) struct PendingCase<'a> {
     /// Properties of its images, from the cache if they were read before.
     pub facts: Facts,
     /// Remarks on them.
@@ -280,7 +280,7 @@ fn build(
 }
 
 /// Volume of the nonzero voxels, mm³.
-pub fn volume_mm3(mask: &VoxelVolume<u8>) -> f64 {
+pub(super) fn volume_mm3(mask: &VoxelVolume<u8>) -> f64 {
     mask.data.iter().filter(|&&v| v != 0).count() as f64 * mask.spacing_mm().element_product()
 }
 

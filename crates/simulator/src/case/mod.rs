@@ -4,7 +4,7 @@ pub(crate) mod anatomy;
 pub(crate) mod cache;
 pub(crate) mod choice;
 mod fit;
-pub(crate) mod folder;
+mod folder;
 pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod opening;

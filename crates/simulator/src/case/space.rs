@@ -13,7 +13,7 @@ use crate::error::SessionError;
 use trepan_volume::{BrainFit, TooLarge, VoxelVolume, brain_by_mri, brain_fit};
 
 /// CT that an MRI is compared with.
-pub struct Space<'a> {
+pub(crate) struct Space<'a> {
     /// The CT.
     pub ct: &'a VoxelVolume<i16>,
     /// Its threshold of bone, HU.

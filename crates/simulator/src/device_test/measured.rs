@@ -12,7 +12,7 @@ use trepan_geometry::Vec3;
 
 /// One tick of the test.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// Time of the reading, ms.
     pub time_ms: f64,
     /// Duration of reading the device, µs.
@@ -32,7 +32,7 @@ pub struct Sample {
 /// How a test ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Ending {
+pub(crate) enum Ending {
     /// The test was completed.
     Done,
     /// The device's script ended.
@@ -45,7 +45,7 @@ pub enum Ending {
 
 /// Contents of `device.json`.
 #[derive(Clone, Debug, Serialize)]
-pub struct Measured {
+pub(crate) struct Measured {
     /// Requested name of the device.
     pub device: String,
     /// Name that the driver reports.
@@ -86,7 +86,7 @@ pub struct Measured {
 
 /// Timing of ticks and positions.
 #[derive(Clone, Debug, Serialize)]
-pub struct Timing {
+pub(crate) struct Timing {
     /// Duration of the test, s.
     pub seconds: f64,
     /// Requested tick rate, Hz.
@@ -111,7 +111,7 @@ pub struct Timing {
 
 /// Measurements at the virtual floor, a soft wall.
 #[derive(Clone, Debug, Serialize)]
-pub struct Floor {
+pub(crate) struct Floor {
     /// Stiffness, N/mm.
     pub stiffness_n_per_mm: f32,
     /// Force limit, N.
@@ -132,7 +132,7 @@ pub struct Floor {
 }
 
 /// Samples of a test, with the state at its end.
-pub struct TestRun<'a> {
+pub(crate) struct TestRun<'a> {
     /// Every tick.
     pub samples: &'a [Sample],
     /// Tick period, ms.
@@ -193,7 +193,7 @@ impl Floor {
 }
 
 /// Bounding box of the tip, mm; a point at the origin without samples.
-pub fn explored(samples: &[Sample]) -> [Vec3; 2] {
+pub(crate) fn explored(samples: &[Sample]) -> [Vec3; 2] {
     let tips = || samples.iter().filter(|s| s.fresh).map(|s| s.tip).filter(|tip| tip.is_finite());
     let low = tips().reduce(Vec3::min).unwrap_or(Vec3::ZERO);
     [low, tips().reduce(Vec3::max).unwrap_or(Vec3::ZERO)]
@@ -210,7 +210,7 @@ fn gaps<'a>(samples: impl Iterator<Item = &'a Sample>) -> Vec<f64> {
 
 /// One finding of a device test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
+pub(crate) struct Finding {
     /// Whether the device passes.
     pub good: bool,
     /// Description; with a remedy if the device fails.

@@ -42,7 +42,7 @@ struct Subject {
 
 /// Tests a device for some seconds and writes `device.json` and `device.html` to `out`. Returns the
 /// signal that ended the test, if any.
-pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionError> {
+pub(crate) fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionError> {
     if !(8.0..=600.0).contains(&seconds) {
         return Err(SessionError::Usage(format!("--duration {seconds} is out of range: give 8 to 600")));
     }

@@ -9,7 +9,7 @@ use crate::run::Times;
 use serde_json::json;
 
 /// Builds the page.
-pub fn html(found: &Measured, samples: &[Sample]) -> Result<String, SessionError> {
+pub(super) fn html(found: &Measured, samples: &[Sample]) -> Result<String, SessionError> {
     let context = json!({
         "title": format!("Trepan: test of {}", found.device),
         "found": found,

@@ -19,8 +19,8 @@
 mod describe;
 mod overrides;
 
-pub use describe::{BoneSummary, ModelSummary, PictureSummary, TissueSummary};
-pub use overrides::{FASTEST, rigid_of, solver_named};
+pub use describe::{ModelSummary, TissueSummary};
+pub(crate) use overrides::{FASTEST, rigid_of, solver_named};
 
 use crate::error::SessionError;
 use crate::measure::{self, CaseErrors, Parts, Wanted};
@@ -57,7 +57,7 @@ pub struct Models {
 
 /// Properties of the images that the choice of voxel size and mesh depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Facts {
+pub(crate) struct Facts {
     /// Mean edge of the CT's voxels, mm. `None` without a CT.
     pub ct_voxel_mm: Option<f64>,
     /// Volume of the brain, mm³; `None` without an MRI.
@@ -65,7 +65,7 @@ pub struct Facts {
 }
 
 /// Request for a session's models, before its case is opened.
-pub struct ModelRequest {
+pub(crate) struct ModelRequest {
     program: Program,
     /// `None` for a replay.
     quality: Option<Quality>,
@@ -271,7 +271,7 @@ impl ModelRequest {
 }
 
 /// Stiffness of the contact with bone, N/mm.
-pub const BONE_STIFFNESS: f32 = 2.0;
+pub(crate) const BONE_STIFFNESS: f32 = 2.0;
 
 /// Height of the 3-D view at the opening, mm.
 const VIEW_MM: f64 = 105.0;
@@ -283,7 +283,7 @@ const LIVE_HZ: f64 = 10.0;
 const PRESS_N: f64 = 1.0;
 
 /// Default models: preset `usual`.
-pub fn usual() -> Setup {
+pub(crate) fn usual() -> Setup {
     Quality::Usual.preset().expect("only auto has none")
 }
 

@@ -108,11 +108,11 @@ impl Overrides {
 }
 
 /// Total Lagrangian explicit dynamics.
-pub const TLED: &str = "tled";
+pub(crate) const TLED: &str = "tled";
 
 /// TLED on the CPU or the GPU, whichever is faster on this machine. A replay may then not reproduce
 /// the recorded forces bit for bit.
-pub const FASTEST: &str = "fastest";
+pub(crate) const FASTEST: &str = "fastest";
 
 /// Haptic method on bone with this name.
 fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
@@ -123,12 +123,12 @@ fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
 }
 
 /// Haptic method of a choice for bone, with its number of points.
-pub fn rigid_of(bone: &Bone) -> Result<trepan_rigid::Method, SessionError> {
+pub(crate) fn rigid_of(bone: &Bone) -> Result<trepan_rigid::Method, SessionError> {
     rigid_named(bone.method).map(|method| method.with_points(bone.points))
 }
 
 /// Solver of `trepan_soft` with this name; `None` for TLED.
-pub fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
+pub(crate) fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
     if name == TLED || name == FASTEST {
         return Ok(None);
     }

@@ -22,7 +22,7 @@ impl Chart {
 
 /// One line of a chart.
 #[derive(Clone, Debug)]
-pub struct Curve {
+pub(crate) struct Curve {
     /// Name in the legend.
     pub name: &'static str,
     /// (x, y) in the chart's units.
@@ -82,7 +82,7 @@ where
 }
 
 /// Draws curves over session time, s. `limit` is a dashed line with its label.
-pub fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Result<String, SessionError> {
+pub(crate) fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Result<String, SessionError> {
     let curves: Vec<Curve> = curves.iter().map(thinned).collect();
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let end = points().map(|p| p.0).fold(1e-3, f64::max);
@@ -105,7 +105,7 @@ pub fn over_time(unit: &str, curves: &[Curve], limit: Option<(f64, &str)>) -> Re
 }
 
 /// Draws curves in a plane; `axes` are its labels with units.
-pub fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, SessionError> {
+pub(crate) fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, SessionError> {
     let is_finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
     let points = || curves.iter().flat_map(|curve| &curve.points).filter(|p| is_finite(p));
     let span = |of: fn(&(f64, f64)) -> f64| {
@@ -127,7 +127,7 @@ pub fn traces(axes: [&str; 2], curves: &[Curve]) -> Result<String, SessionError>
 
 /// Draws a histogram of times with logarithmic axes. `what` is the label of the time axis; `bins`
 /// are (upper edge in µs, count).
-pub fn histogram(what: &str, bins: &[(f64, u64)], limit_us: f64) -> Result<String, SessionError> {
+pub(crate) fn histogram(what: &str, bins: &[(f64, u64)], limit_us: f64) -> Result<String, SessionError> {
     let used: Vec<(f64, f64)> =
         bins.iter().filter(|b| b.1 > 0).map(|&(edge, count)| (edge.max(0.01), count as f64)).collect();
     let low = used.first().map_or(0.1, |b| 0.7 * b.0);

@@ -18,7 +18,7 @@ use trepan_link::wire::TickRecord;
 
 /// A picture for the report.
 #[derive(Clone, Debug)]
-pub struct Shot {
+pub(crate) struct Shot {
     /// Caption of the picture.
     pub caption: String,
     /// PNG bytes.
@@ -46,7 +46,7 @@ pub(crate) fn render(template: &str, context: &impl Serialize) -> Result<String,
 }
 
 /// Returns the page as HTML.
-pub fn html(
+pub(crate) fn html(
     summary: &Summary,
     outcome: &Outcome,
     recording: &Recording,
@@ -162,7 +162,7 @@ pub(crate) struct Table {
 
 /// A value of a JSON file, its path and its unit.
 #[derive(Serialize)]
-pub struct Row {
+pub(crate) struct Row {
     path: String,
     value: String,
     unit: &'static str,
@@ -181,7 +181,7 @@ fn tables(summary: &Summary) -> Result<[Table; 3], SessionError> {
 }
 
 /// Lists the values of a JSON file; `name` names it in an error.
-pub fn rows(name: &str, file: &impl Serialize) -> Result<Vec<Row>, SessionError> {
+pub(crate) fn rows(name: &str, file: &impl Serialize) -> Result<Vec<Row>, SessionError> {
     let value = serde_json::to_value(file).map_err(|fault| SessionError::Internal(format!("{name}: {fault}")))?;
     let mut rows = Vec::new();
     add_rows("", &value, &mut rows);

@@ -264,7 +264,7 @@ pub(crate) fn fps(frames: u64, drawn_s: f64) -> f64 {
 const FULL_RATE: f64 = 0.995;
 
 /// Returns a remark where the haptic rate was lower than requested.
-pub fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
+pub(crate) fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
     (rate_hz < FULL_RATE * asked_hz).then(|| {
         format!(
             "SLOW: {rate_hz:.1} ticks a second instead of {asked_hz:.0}: forces were late, so do not compare forces \

@@ -26,7 +26,7 @@ const SCORES_MS: f64 = 200.0;
 const DRAIN: Duration = Duration::from_millis(5);
 
 /// Send ends of the ring buffers, for the loops.
-pub struct JournalSenders {
+pub(crate) struct JournalSenders {
     /// For the haptic loop.
     pub ticks: Sender<TickRecord>,
     /// For the haptic loop, with a second hand.
@@ -40,7 +40,7 @@ pub struct JournalSenders {
 }
 
 /// Receive ends of the ring buffers, for the recording thread.
-pub struct Journal {
+pub(crate) struct Journal {
     ticks: Receiver<TickRecord>,
     second: Receiver<SecondRecord>,
     notices: Receiver<Notice>,
@@ -52,7 +52,7 @@ pub struct Journal {
 
 /// Result of the recording thread.
 #[derive(Debug, Default)]
-pub struct Written {
+pub(crate) struct Written {
     /// Every notice, in order.
     pub notices: Vec<Notice>,
     /// Records that did not fit into a ring buffer.
@@ -72,7 +72,7 @@ impl Written {
 }
 
 /// Makes the ring buffers and returns both ends.
-pub fn journal() -> (JournalSenders, Journal) {
+pub(crate) fn journal() -> (JournalSenders, Journal) {
     let (ticks, ticks_in) = bounded(RING);
     let (second, second_in) = bounded(RING);
     let (notices, notices_in) = bounded(RING / 8);

@@ -40,7 +40,7 @@ use trepan_soft::Loads;
 const MEMORY: usize = 16_384;
 
 /// Returns the ticks up to a time, ms, and those right after it in which the force faded out.
-pub fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
+pub(crate) fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
     let ticks = &recording.ticks;
     let until = ticks.iter().position(|tick| tick.time_ms >= end_ms).map_or(ticks.len(), |at| at + 1);
     let fading = ticks[until..].iter().take_while(|tick| tick.has(TickRecord::RELEASED)).count();
@@ -49,7 +49,7 @@ pub fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
 
 /// Replays a recording up to a time, ms. Requests a stop at the end, unless a film is made: its
 /// window stays open.
-pub fn run(
+pub(crate) fn run(
     run: Run<'_>,
     (recording, end_ms): (&Recording, f64),
     film: Option<(Filming, Receiver<Shot>)>,

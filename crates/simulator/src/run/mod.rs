@@ -5,7 +5,7 @@
 
 pub(crate) mod clock;
 pub(crate) mod film;
-pub(crate) mod journal;
+mod journal;
 pub(crate) mod lesson;
 pub(crate) mod lockstep;
 pub(crate) mod stop;
@@ -66,7 +66,7 @@ pub struct Tissue {
 
 /// State of the session as it is rendered.
 #[derive(Clone, Copy, Debug)]
-pub struct View {
+pub(crate) struct View {
     /// Tool and phase.
     pub sample: ToolSample,
     /// Session time, ms.
@@ -117,7 +117,7 @@ impl View {
 }
 
 /// Read ends for rendering.
-pub struct RenderInputs {
+pub(crate) struct RenderInputs {
     /// Newest tick.
     pub view: Reader<View>,
     /// Newest state of the brain, where it deforms.
@@ -127,10 +127,10 @@ pub struct RenderInputs {
 }
 
 /// A collision result with its sequence number.
-pub type Numbered<T> = (u64, T);
+pub(crate) type Numbered<T> = (u64, T);
 
 /// Write and read ends of every cell between the loops.
-pub struct Cells {
+pub(crate) struct Cells {
     /// Haptic loop to collision loop.
     pub tool: (Writer<ToolSample>, Reader<ToolSample>),
     /// Haptic loop to rendering.
@@ -209,7 +209,7 @@ impl Times {
 
 /// Counts and times of the haptic loop.
 #[derive(Clone, Debug, Default)]
-pub struct Ticks {
+pub(crate) struct Ticks {
     /// Ticks run.
     pub count: u64,
     /// Ticks that missed their deadline.
@@ -327,7 +327,7 @@ impl Replayed {
 
 /// Outcome of a live session or a replay.
 #[derive(Debug, Default)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// Counts and times of the haptic loop.
     pub ticks: Ticks,
     /// Length of the run, s of session time.

@@ -131,7 +131,7 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
 
 /// Runs until the first device is finished, the time is over or a stop is requested. `picture` runs
 /// on the calling thread.
-pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(RenderInputs)) -> Outcome {
+pub(crate) fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(RenderInputs)) -> Outcome {
     let Run { stages, start, recorder, share, stop } = run;
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
@@ -168,7 +168,7 @@ pub fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(Rend
 
 /// Periods of the loops and end of the session.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
+pub(crate) struct Pace {
     /// Length of a haptic tick, ms.
     pub tick_ms: f32,
     /// Length of a collision step, ms.
@@ -178,7 +178,7 @@ pub struct Pace {
 }
 
 /// Devices of the hands.
-pub struct Devices {
+pub(crate) struct Devices {
     /// Device of the drill; the operation ends when it is finished.
     pub first: Box<dyn HapticDevice>,
     /// Device of the aspirator, for stages with a second hand.

@@ -48,7 +48,7 @@ const FIRST_TICK_TIMEOUT_S: f64 = 20.0;
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 /// Send end of a shared session, for the recording thread.
-pub struct Share {
+pub(crate) struct Share {
     ticks: Publisher<TickRecord>,
     events: Publisher<EventRecord>,
     teacher: Listener,
@@ -56,7 +56,7 @@ pub struct Share {
 }
 
 /// Readers of the teacher's requests: first hand, second hand, window.
-pub type Asked = [Reader<TeacherRecord>; 3];
+pub(crate) type Asked = [Reader<TeacherRecord>; 3];
 
 impl Share {
     /// Shares a session under a name; returns also the readers of the teacher's requests.
@@ -89,7 +89,7 @@ impl Share {
 }
 
 /// Another session as a device: receive end of a watcher.
-pub struct Watched {
+pub(crate) struct Watched {
     newest: Reader<TickRecord>,
     seen: u64,
     received_ms: Option<f64>,
@@ -101,7 +101,7 @@ pub struct Watched {
 
 /// Name of the watched session, and whether it has ended.
 #[derive(Clone)]
-pub struct Watching {
+pub(crate) struct Watching {
     name: String,
     over: Arc<AtomicBool>,
 }
@@ -192,7 +192,7 @@ impl HapticDevice for Watched {
 
 /// Connections of a session's window to other sessions.
 #[derive(Default)]
-pub struct Company {
+pub(crate) struct Company {
     /// Requests of a teacher to this session's trainee.
     pub asked: Option<Reader<TeacherRecord>>,
     /// Send end, where this session teaches the trainee of another.

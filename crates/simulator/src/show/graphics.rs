@@ -21,7 +21,7 @@ const BONE_VIEW_MM: f32 = 75.0;
 const BRAIN_VIEW_MM: f32 = 150.0;
 
 /// The painter and the name of its device.
-pub struct Graphics {
+pub(crate) struct Graphics {
     /// Name of the graphics adapter.
     pub adapter: String,
     /// The painter; `None` once it is taken.

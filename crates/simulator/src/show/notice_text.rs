@@ -20,7 +20,7 @@ const DANGERS: [Warning; 6] = [
 ];
 
 /// Returns the panel's contents that are common to all sessions.
-pub fn panel(case: &str, program: Program, view: &View) -> Panel {
+pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let value = |name: &str, value: String| (name.to_string(), value);
     let sample = &view.sample;
     let [_, late, held] = view.counts;
@@ -78,7 +78,7 @@ fn in_words(notice: Notice) -> String {
 }
 
 /// Returns a hint on what to do next.
-pub fn hint(phase: Phase, by_hand: bool) -> &'static str {
+pub(crate) fn hint(phase: Phase, by_hand: bool) -> &'static str {
     match (phase, by_hand) {
         (_, false) => "the operation runs by itself",
         (Phase::Craniotomy, true) => {

@@ -108,7 +108,7 @@ struct Player {
 }
 
 /// Shows a replay until the window is closed, or for `until_s`.
-pub fn show(
+pub(crate) fn show(
     first: View,
     coming: Receiver<Shot>,
     painter: Painter,

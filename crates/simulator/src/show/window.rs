@@ -29,12 +29,12 @@ const LEASH_MM: f32 = 2.0;
 const REQUEST_S: f64 = 0.1;
 
 /// Whether a window can be opened here.
-pub fn has_display() -> bool {
+pub(crate) fn has_display() -> bool {
     window::display().is_ok()
 }
 
 /// Session data for the window.
-pub struct Opened<'a> {
+pub(crate) struct Opened<'a> {
     /// Patient, plan and program.
     pub table: &'a SessionSetup,
     /// Name of the case, without the patient's name.
@@ -145,7 +145,7 @@ impl Rate {
 }
 
 /// Shows the session until it ends or the window is closed.
-pub fn show(
+pub(crate) fn show(
     mut inputs: RenderInputs,
     painter: Painter,
     opened: &Opened<'_>,
@@ -172,7 +172,7 @@ pub fn show(
 }
 
 /// Runs a session in a window, with a picture before and one after it.
-pub fn run<S: window::Session + 'static>(
+pub(crate) fn run<S: window::Session + 'static>(
     session: S,
     mut painter: Painter,
     opened: &Opened<'_>,

@@ -220,7 +220,7 @@ impl Notice {
 
 /// The active warnings, with hysteresis, so that noise at a threshold does not repeat them.
 #[derive(Clone, Debug, Default)]
-pub struct Watch {
+pub(crate) struct Watch {
     standing: u32,
     quiet_since_ms: [f64; Warning::ALL.len()],
 }

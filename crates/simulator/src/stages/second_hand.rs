@@ -30,7 +30,7 @@ use trepan_volume::{BoneVolume, DistanceField};
 
 /// State of the second hand as it is rendered.
 #[derive(Clone, Copy, Debug)]
-pub struct SecondView {
+pub(crate) struct SecondView {
     /// Pose of the proxy.
     pub world_from_tool: Pose,
     /// Force on the hand, N.

@@ -13,9 +13,9 @@ use trepan_link::wire::SolverRecord;
 use trepan_soft::{Loads, SoftSolver, StepReport};
 
 /// Steps between two records while the contact is unchanged.
-pub const EACH: u64 = 32;
+pub(crate) const EACH: u64 = 32;
 /// Limit for the motion of a node in a step while no tool touches the brain, mm.
-pub const REST_MOTION_MM: f32 = 0.02;
+pub(crate) const REST_MOTION_MM: f32 = 0.02;
 /// Time after the last touch in which the brain may still move back, ms.
 const MOVES_BACK_MS: f64 = 500.0;
 

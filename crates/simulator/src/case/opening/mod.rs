@@ -24,7 +24,7 @@ use trepan_haptics::script::Site;
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// Voxel edge of the skull in which an opening is searched, mm.
-pub const REFERENCE_MM: f32 = 1.0;
+pub(crate) const REFERENCE_MM: f32 = 1.0;
 
 /// Assumed depth of the brain below bone without an MRI, mm.
 const BELOW_BONE_MM: f32 = 5.0;
@@ -46,7 +46,7 @@ pub struct Opening {
 }
 
 /// Bone volume of a skull, for drilling.
-pub fn bone_of(skull: &VoxelVolume<i16>, isovalue_hu: i16) -> Result<BoneVolume, SessionError> {
+pub(crate) fn bone_of(skull: &VoxelVolume<i16>, isovalue_hu: i16) -> Result<BoneVolume, SessionError> {
     BoneVolume::new(skull, isovalue_hu).map_err(|fault| SessionError::Case(format!("the CT: {fault}")))
 }
 
@@ -164,7 +164,7 @@ fn middle(classes: &VoxelVolume<u8>) -> Vec3 {
 
 /// Finds a place to probe a brain without a skull, on a ray to its centre from above, right and
 /// front.
-pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
+pub(crate) fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
     let outward = Vec3::new(0.45, 0.35, 0.82).normalize();
     let from = centre + search::FAR_MM * outward;
     let depth = search::first(0.0, search::FAR_MM, |t| -brain.sample(from - t * outward))?;
@@ -173,7 +173,7 @@ pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
 
 /// Direction from the site to the camera: slightly from behind and the side, so that hole and tool
 /// are visible.
-pub fn eye(site: &Site) -> Vec3 {
+pub(crate) fn eye(site: &Site) -> Vec3 {
     let outward = -site.inward;
     let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
     outward + 0.45 * side + 0.25 * Vec3::Z

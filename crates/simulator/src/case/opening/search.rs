@@ -14,7 +14,7 @@ use trepan_haptics::script::Site;
 use trepan_volume::{BoneVolume, DistanceField};
 
 /// Start of the rays, mm from the centre of the head.
-pub const FAR_MM: f32 = 160.0;
+pub(super) const FAR_MM: f32 = 160.0;
 /// Rays over the whole sphere.
 const RAYS: usize = 3200;
 /// Step along a line, mm; surfaces are interpolated between steps.
@@ -41,7 +41,7 @@ const AROUND_MM: f32 = 10.0;
 const LOST_MM: f32 = 10.0;
 
 /// Geometry that lines are intersected with.
-pub struct Surroundings<'a> {
+pub(super) struct Surroundings<'a> {
     pub bone: &'a BoneVolume,
     pub brain: Option<&'a DistanceField>,
     /// Centre of the head.
@@ -192,7 +192,7 @@ fn cost(hole: &[(Vec3, Passage)]) -> f32 {
 }
 
 /// First entry into bone and last exit from it between two depths of a line, mm.
-pub fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f32; 2]) -> Option<[f32; 2]> {
+pub(super) fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f32; 2]) -> Option<[f32; 2]> {
     let over = |t: f32| over_isovalue(bone, from + t * inward);
     let outer = first(start, end, over)?;
     let back = first(0.0, end - outer, |t| over(end - t))?;
@@ -201,7 +201,7 @@ pub fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f3
 
 /// First depth between `start` and `end` at which a value reaches 0, interpolated between steps,
 /// mm.
-pub fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
+pub(super) fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
     let steps = ((end - start) / STEP_MM).max(0.0) as usize;
     let mut before = None;
     for n in 0..=steps {

@@ -84,9 +84,9 @@ impl HapticStage {
 }
 
 /// Age up to which a patch gives its full force, ms.
-pub const FRESH_MS: f32 = 10.0;
+pub(crate) const FRESH_MS: f32 = 10.0;
 /// Age from which a patch gives no force, ms.
-pub const GONE_MS: f32 = 60.0;
+pub(crate) const GONE_MS: f32 = 60.0;
 
 /// Inputs of a tick.
 #[derive(Clone, Copy, Debug)]
