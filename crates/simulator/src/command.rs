@@ -56,7 +56,11 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         return perform(program, task, built_in);
     }
     match batch::recordings(&options) {
-        Ok(Some(files)) => return batched(batch::run(program, &options, &built_in, &files), files.len()),
+        Ok(Some(files)) => {
+            let failures = batch::run(program, &options, &built_in, &files);
+            println!("{} of {} recordings replayed", files.len() - failures, files.len());
+            return if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+        }
         Ok(None) => {}
         Err(fault) => return failed(program, &fault),
     }
@@ -64,11 +68,6 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         Ok(ended) => report(&ended),
         Err(fault) => failed(program, &fault),
     }
-}
-
-fn batched(failures: usize, files: usize) -> ExitCode {
-    println!("{} of {files} recordings replayed", files - failures);
-    if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// Runs a subcommand.

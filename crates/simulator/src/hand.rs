@@ -15,7 +15,8 @@ use trepan_haptics::{
 };
 use trepan_link::Recording;
 
-/// An open device of the first hand.
+/// An open device of a hand.
+#[derive(Default)]
 pub(crate) struct OpenDevice {
     /// Device for the haptic loop; `None` for a replay, which has recorded readings.
     pub device: Option<Box<dyn HapticDevice>>,
@@ -37,7 +38,7 @@ impl OpenDevice {
         rate_hz: f32,
         stop: &Stop,
     ) -> Result<Self, SessionError> {
-        let none = Self { device: None, pointer: None, watch: None, watching: None };
+        let none = Self::default();
         let start = || scripted(program.script(), options, plan).map(|script| script.at(0.0));
         if let Some(name) = &options.watch {
             let (watched, watching) = Watched::open(name, start()?, stop)?;
@@ -58,28 +59,19 @@ impl OpenDevice {
             },
         })
     }
-}
 
-/// An open device of the second hand.
-pub(crate) struct SecondDevice {
-    /// Device for the haptic loop.
-    pub device: Box<dyn HapticDevice>,
-    /// Access to the device's faults.
-    pub watch: Option<Watch>,
-}
-
-impl SecondDevice {
-    /// Opens the device. Hardware runs on its own thread, so that its link never delays the first
-    /// hand.
-    pub fn open(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
+    /// Opens the device of the second hand. Hardware runs on its own thread, so that its link never
+    /// delays the first hand.
+    pub fn second(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
         if let Some(device) = software(name, options, plan)? {
-            return Ok(Self { device, watch: None });
+            return Ok(Self { device: Some(device), ..Self::default() });
         }
         let mut beside = workspace(&plan.site, options.device_scale);
         // With both hands in the middle of their workspaces the tools are side by side.
         beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
         let (device, watch) = opened(name, beside, rate_hz)?.ok_or_else(|| unfit(name))?;
-        Ok(Self { device: Box::new(ThreadedDevice::new(Box::new(device))), watch: Some(watch) })
+        let device: Box<dyn HapticDevice> = Box::new(ThreadedDevice::new(Box::new(device)));
+        Ok(Self { device: Some(device), watch: Some(watch), ..Self::default() })
     }
 }
 
@@ -98,11 +90,16 @@ pub(crate) fn simulated_hand(script: Script) -> Box<dyn HapticDevice> {
     Box::new(simulated::Simulated::new(config, grip, Box::new(script)))
 }
 
-/// Opens hardware that is read at `rate_hz`; `None` if the name is not one of hardware.
+/// Opens hardware; `None` if the name is not one of hardware. Refuses a tick rate above that of the
+/// device.
 fn opened(name: &DeviceName, workspace: Workspace, rate_hz: f32) -> Result<Option<(Clutch, Watch)>, SessionError> {
     let Some(opened) = hardware::open(name, workspace) else { return Ok(None) };
     let opened = opened.map_err(|fault| SessionError::Device(fault.to_string()))?;
-    check_rate(&opened.device.capabilities(), rate_hz)?;
+    let Capabilities { name, rate_hz: most_hz, .. } = opened.device.capabilities();
+    if rate_hz > most_hz {
+        let fault = format!("--rate-hz {rate_hz} is too fast for {name}: give at most {most_hz}");
+        return Err(SessionError::Usage(fault));
+    }
     Ok(Some((Clutch::new(opened.device), opened.watch)))
 }
 
@@ -115,15 +112,6 @@ fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, Sessio
     let how = script::Plan { outline: plan.outline.clone(), ..script::Plan::default() };
     let script = Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(usual_s), &how);
     script.map_err(|fault| SessionError::Device(fault.to_string()))
-}
-
-/// Refuses a tick rate above that of the device.
-fn check_rate(device: &Capabilities, rate_hz: f32) -> Result<(), SessionError> {
-    if rate_hz <= device.rate_hz {
-        return Ok(());
-    }
-    let fault = format!("--rate-hz {rate_hz} is too fast for {}: give at most {}", device.name, device.rate_hz);
-    Err(SessionError::Usage(fault))
 }
 
 /// Offset of the second hand's workspace to the left of the first one's, mm.

@@ -6,7 +6,7 @@ use crate::case::plan::Plan;
 use crate::case::scene::Scene;
 use crate::case::{Inputs, anatomy};
 use crate::error::SessionError;
-use crate::hand::{self, DeviceLimits, OpenDevice, SecondDevice};
+use crate::hand::{self, DeviceLimits, OpenDevice};
 use crate::models::{ModelRequest, Models};
 use crate::operation::Operation;
 use crate::options::Options;
@@ -74,7 +74,7 @@ impl Session {
     /// `built_in` is the case that is used if no image is given.
     pub fn open(program: Program, options: Options, built_in: Inputs) -> Result<Self, SessionError> {
         options.check()?;
-        let windowed = !options.headless && window::has_display();
+        let windowed = !options.headless && trepan_render::window::display().is_ok();
         if !windowed && !options.headless {
             tracing::info!("no display here: running the scripted operation headless");
         }
@@ -106,16 +106,17 @@ impl Session {
         let (before, whole) = (self.setup.pieces(), self.setup.bone().map(|bone| bone.snapshot()));
         let (options, plan, rate_hz) = (&self.options, &self.setup.plan, self.setup.operation.rate_hz);
         let hand = OpenDevice::open(&self.device, self.program, options, plan, rate_hz, &stop)?;
-        let OpenDevice { device, pointer, watch, watching } = hand;
-        let second = self.second.as_ref().map(|name| SecondDevice::open(name, options, plan, rate_hz)).transpose()?;
-        let recorded = || DeviceLimits::recorded(self.recording.as_ref(), hand::FIRST);
-        let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
-        let limits = device.as_ref().map_or_else(recorded, |device| DeviceLimits::of(&device.capabilities(), scale));
-        let second_limits = self.second_limits(second.as_ref());
+        let second = match &self.second {
+            Some(name) => Some(OpenDevice::second(name, options, plan, rate_hz)?),
+            None => self.recording.as_ref().filter(|r| !r.second.is_empty()).map(|_| OpenDevice::default()),
+        };
+        let limits = self.limits(&hand, hand::FIRST);
+        let second_limits = second.as_ref().map(|second| self.limits(second, hand::SECOND));
         let start = self.start();
         let limits_of_both = (&limits, second_limits.as_ref());
         let stages = self.setup.stages(start.state, self.tick_ms(), limits_of_both, &Default::default())?;
-        let (second_device, second_watch) = second.map_or((None, None), |second| (Some(second.device), second.watch));
+        let OpenDevice { device, pointer, watch, watching } = hand;
+        let OpenDevice { device: second_device, watch: second_watch, .. } = second.unwrap_or_default();
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
         let place = output::Place::make(&self.out, &record)?;
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
@@ -236,12 +237,11 @@ impl Session {
         }
     }
 
-    /// Limits of the second hand's device, open or recorded; `None` without a second hand.
-    fn second_limits(&self, held: Option<&SecondDevice>) -> Option<DeviceLimits> {
-        let scale = |held: &SecondDevice| if held.watch.is_some() { self.options.device_scale } else { 1.0 };
-        let recorded = self.recording.as_ref().filter(|recording| !recording.second.is_empty());
-        held.map(|held| DeviceLimits::of(&held.device.capabilities(), scale(held)))
-            .or_else(|| recorded.map(|recording| DeviceLimits::recorded(Some(recording), hand::SECOND)))
+    /// Limits of a hand's device; the recorded ones, if none is open.
+    fn limits(&self, hand: &OpenDevice, name: &str) -> DeviceLimits {
+        let scale = if hand.watch.is_some() { self.options.device_scale } else { 1.0 };
+        let recorded = || DeviceLimits::recorded(self.recording.as_ref(), name);
+        hand.device.as_ref().map_or_else(recorded, |device| DeviceLimits::of(&device.capabilities(), scale))
     }
 
     /// Tool before the first reading of its device. A replay starts here too, because the first
@@ -256,7 +256,8 @@ impl Session {
         if !self.windowed && self.options.frames_per_second == 0.0 {
             return Err("no picture was requested".into());
         }
-        Graphics::open(&self.setup, self.options.picture, drawing.unwrap_or_else(driver::open), self.windowed)
+        let gpu = drawing.unwrap_or_else(driver::open);
+        Graphics::open(&self.setup, self.options.picture, gpu, self.windowed).map_err(|fault| fault.to_string())
     }
 
     fn picture(

@@ -37,7 +37,7 @@ pub(crate) fn open_case(
     let case = import::open_by(program, &inputs, &requested, &Cache::of(&options.patient)?, |pending| {
         let facts = pending.facts;
         let settled = models.insert(request.settle(&facts, card, |scene, rows| pending.case_errors(scene, rows))?);
-        pending.suspend_progress(|| settled.log());
+        pending.stages.suspend(|| settled.log());
         let Setup { bone, tissue, .. } = settled.setup;
         Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, halvings: tissue.halvings, ..requested })
     })?;

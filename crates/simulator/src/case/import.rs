@@ -93,7 +93,8 @@ pub(super) struct PendingCase<'a> {
     cache: &'a Cache,
     key: String,
     images: Option<Images>,
-    stages: ImportStages,
+    /// Progress of the import.
+    pub stages: ImportStages,
 }
 
 impl<'a> PendingCase<'a> {
@@ -141,11 +142,6 @@ impl<'a> PendingCase<'a> {
             sight.flatten().map_or_else(CaseErrors::default, |sight| CaseErrors::of(&sight, scene, rows, threads));
         store(&errors, self.cache, &key, ERRORS);
         Ok(errors)
-    }
-
-    /// Hides the progress bar during a call that prints.
-    pub fn suspend_progress(&self, call: impl FnOnce()) {
-        self.stages.suspend(call);
     }
 }
 

@@ -83,15 +83,6 @@ fn open(name: &str, end_ms: f64) -> Result<Subject, SessionError> {
     Ok(Subject { name, device, watch })
 }
 
-/// Result of the haptic loop.
-struct LoopResult {
-    samples: Vec<Sample>,
-    late: u64,
-    ended: Ending,
-    trial: Trial,
-    remarks: Vec<String>,
-}
-
 /// Runs the haptic loop on its own thread; this thread prints the instructions.
 fn test(subject: Subject, end_ms: f64, stop: &Stop) -> (Measured, Vec<Sample>) {
     let Subject { name, device, watch } = subject;
@@ -111,14 +102,16 @@ fn test(subject: Subject, end_ms: f64, stop: &Stop) -> (Measured, Vec<Sample>) {
         print_instructions(&part, &over);
         worker.join().ok()
     });
-    let result = result.unwrap_or_else(|| panicked(Trial::new(&able, tick_ms as f32, end_ms)));
-    let found = measured(name.to_string(), &able, &result, tick_ms, watch.as_ref());
+    let result = result.unwrap_or_else(|| TestRun {
+        samples: Vec::new(),
+        tick_ms,
+        late: 0,
+        ended: Ending::Lost,
+        trial: Trial::new(&able, tick_ms as f32, end_ms),
+        remarks: vec!["the haptic thread panicked; the device was closed".to_string()],
+    });
+    let found = measured(name.to_string(), &able, &result, watch.as_ref());
     (found, result.samples)
-}
-
-fn panicked(trial: Trial) -> LoopResult {
-    let remarks = vec!["the haptic thread panicked; the device was closed".to_string()];
-    LoopResult { samples: Vec::new(), late: 0, ended: Ending::Lost, trial, remarks }
 }
 
 /// Prints the instruction of each part as it begins.
@@ -142,7 +135,7 @@ fn run_loop(
     end_ms: f64,
     stop: &Stop,
     current: &AtomicU8,
-) -> LoopResult {
+) -> TestRun {
     let remarks = real_time(80, "haptic").into_iter().collect();
     let mut samples = Vec::with_capacity((1.1 * end_ms / tick_ms) as usize + FADE_TICKS as usize);
     let (mut late, mut ending, mut fade) = (0, None, FADE_TICKS);
@@ -175,7 +168,7 @@ fn run_loop(
             trial.release();
             fade -= 1;
             if wrench.force() == Vec3::ZERO || fade == 0 {
-                return LoopResult { samples, late, ended, trial, remarks };
+                return TestRun { samples, tick_ms, late, ended, trial, remarks };
             }
         }
     }
@@ -191,26 +184,25 @@ fn ends(status: Status, over: bool, stop: &Stop) -> Option<Ending> {
     }
 }
 
-fn measured(device: String, able: &Capabilities, result: &LoopResult, tick_ms: f64, watch: Option<&Watch>) -> Measured {
-    let LoopResult { samples, late, trial, .. } = result;
-    let run = TestRun { samples, tick_ms, late: *late, guard: &trial.floor, floor_y: trial.floor_y };
+fn measured(device: String, able: &Capabilities, run: &TestRun, watch: Option<&Watch>) -> Measured {
+    let samples = &run.samples;
     let mut found = Measured {
         device,
         model: able.name.clone(),
-        ended: result.ended,
+        ended: run.ended,
         fault: watch.and_then(Watch::fault).map(|fault| fault.to_string()),
         faults: watch.map_or(0, Watch::count),
         findings: Vec::new(),
-        timing: Timing::of(&run),
+        timing: Timing::of(run),
         delay_ms: delay::median_ms(samples),
         stated_delay_ticks: able.delay_ticks,
         explored_mm: measured::explored(samples).map(|corner| corner.to_array()),
         workspace_mm: able.workspace_mm.is_finite().then(|| able.workspace_mm.to_array()),
         resolution_mm: able.position_resolution_mm,
         forces_n: [able.peak_force_n, able.continuous_force_n],
-        floor: Floor::of(&run),
+        floor: Floor::of(run),
         end_force_n: samples.last().map_or(0.0, |last| last.force.length()),
-        remarks: result.remarks.clone(),
+        remarks: run.remarks.clone(),
         machine: Machine::here(None),
     };
     found.findings = findings::of(&found, able);

@@ -13,7 +13,6 @@
 //! # When not to use it
 //! To judge the CT itself: what the scanner has blurred is unknown.
 
-use crate::case::opening::search::over_isovalue;
 use crate::run::clock::Clock;
 use glam::DAffine3;
 use trepan_budget::{Bone, Scene};
@@ -261,6 +260,18 @@ impl<'a> Surface<'a> {
         }
         None
     }
+}
+
+/// Trilinear density minus the isovalue at a point, HU.
+pub(crate) fn over_isovalue(bone: &BoneVolume, point: Vec3) -> f32 {
+    let at = bone.grid_of(point);
+    let (low, part) = (at.floor().as_ivec3(), at - at.floor());
+    let corner = |n: i32| {
+        let step = glam::IVec3::new(n & 1, n >> 1 & 1, n >> 2);
+        let weight = Vec3::select(step.cmpeq(glam::IVec3::ONE), part, 1.0 - part);
+        weight.element_product() * f32::from(bone.hu(low + step))
+    };
+    (0..8).map(corner).sum::<f32>() - f32::from(bone.isovalue())
 }
 
 /// Path in along the normal, then along the surface at constant depth below its smoothed height.

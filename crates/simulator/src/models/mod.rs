@@ -28,6 +28,7 @@ use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
 use crate::program::Program;
 use crate::recipe::Recipe;
+use crate::stages::haptic_config::BONE_STIFFNESS;
 use crate::tissue_class::TissueClass;
 use overrides::{Overrides, written};
 use serde::{Deserialize, Serialize};
@@ -269,9 +270,6 @@ impl ModelRequest {
         (why, unmet)
     }
 }
-
-/// Stiffness of the contact with bone, N/mm.
-pub(crate) const BONE_STIFFNESS: f32 = 2.0;
 
 /// Height of the 3-D view at the opening, mm.
 const VIEW_MM: f64 = 105.0;

@@ -3,11 +3,12 @@
 use crate::models::ModelSummary;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::regions::Region;
-use crate::run::{Outcome, Replayed, SolverOutcome, Times};
+use crate::run::{Outcome, Quantiles, Replayed, SolverOutcome};
+use crate::stages::by_cause;
 use crate::stages::notice::{Notice, What};
 use crate::stages::score::ScoreKeeper;
 use crate::stages::second_hand::SecondOutcome;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use std::fs;
 use trepan_contact::GuardCounters;
 use trepan_volume::Piece;
@@ -112,26 +113,6 @@ impl CutOff {
     }
 }
 
-/// Quantiles of a time, µs.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Quantiles {
-    /// Median.
-    pub p50: f64,
-    /// 99 % quantile.
-    pub p99: f64,
-    /// 99.9 % quantile.
-    pub p999: f64,
-    /// Largest value.
-    pub max: f64,
-}
-
-impl From<&Times> for Quantiles {
-    fn from(times: &Times) -> Self {
-        let [p50, p99, p999] = [0.5, 0.99, 0.999].map(|q| times.quantile_us(q));
-        Self { p50, p99, p999, max: times.max_us() }
-    }
-}
-
 /// Results of the solver.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SolverSummary {
@@ -157,24 +138,6 @@ pub struct Forces {
     pub max_step: f32,
     /// Force after the last tick, N.
     pub end: f32,
-}
-
-/// Writes the ticks in which the force guard acted, by cause.
-pub(crate) fn by_cause<S: Serializer>(guard: &GuardCounters, to: S) -> Result<S::Ok, S::Error> {
-    let &GuardCounters { clamped, heated, slewed, non_finite, passivity, .. } = guard;
-    let &GuardCounters { bounded, restarted, too_fast, stale, ramped, .. } = guard;
-    to.collect_map([
-        ("clamped", clamped),
-        ("heated", heated),
-        ("slewed", slewed),
-        ("non_finite", non_finite),
-        ("passivity", passivity),
-        ("bounded", bounded),
-        ("restarted", restarted),
-        ("too_fast", too_fast),
-        ("stale", stale),
-        ("ramped", ramped),
-    ])
 }
 
 /// Results of the second hand.

@@ -12,7 +12,6 @@ pub(crate) mod stop;
 pub(crate) mod threads;
 pub(crate) mod watch;
 
-use crate::report::summary::Quantiles;
 use crate::run::film::Shot;
 use crate::run::journal::Written;
 use crate::run::stop::Stop;
@@ -204,6 +203,26 @@ impl Times {
             .iter_log(10, 10f64.powf(0.1))
             .map(|v| (v.value_iterated_to() as f64 * 1e-3, v.count_since_last_iteration()))
             .collect()
+    }
+}
+
+/// Quantiles of a time, µs.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Quantiles {
+    /// Median.
+    pub p50: f64,
+    /// 99 % quantile.
+    pub p99: f64,
+    /// 99.9 % quantile.
+    pub p999: f64,
+    /// Largest value.
+    pub max: f64,
+}
+
+impl From<&Times> for Quantiles {
+    fn from(times: &Times) -> Self {
+        let [p50, p99, p999] = [0.5, 0.99, 0.999].map(|q| times.quantile_us(q));
+        Self { p50, p99, p999, max: times.max_us() }
     }
 }
 

@@ -157,7 +157,8 @@ pub(crate) fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOn
         });
         picture(inputs);
         stop.ask();
-        let outcome = feeling.join().unwrap_or_else(|_| panicked("haptic"));
+        let panicked = || vec!["the haptic thread panicked; force set to zero, device closed".to_string()];
+        let outcome = feeling.join().unwrap_or_else(|_| Outcome { remarks: panicked(), ..Outcome::default() });
         let solver = simulating.map(|(colliding, solving)| {
             let solver = solving.join().unwrap_or_default();
             SolverOutcome { collision_times: colliding.join().unwrap_or_default(), ..solver }
@@ -183,12 +184,6 @@ pub(crate) struct Devices {
     pub first: Box<dyn HapticDevice>,
     /// Device of the aspirator, for stages with a second hand.
     pub second: Option<Box<dyn HapticDevice>>,
-}
-
-/// Outcome after a panic of a loop.
-fn panicked(name: &str) -> Outcome {
-    let remark = format!("the {name} thread panicked; force set to zero, device closed");
-    Outcome { remarks: vec![remark], ..Outcome::default() }
 }
 
 /// Owns the device; on drop it sets the force to zero, closes the device and ends the session.

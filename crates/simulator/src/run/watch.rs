@@ -49,9 +49,12 @@ const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 /// Send end of a shared session, for the recording thread.
 pub(crate) struct Share {
-    ticks: Publisher<TickRecord>,
-    events: Publisher<EventRecord>,
-    teacher: Listener,
+    /// Publishes ticks.
+    pub(super) ticks: Publisher<TickRecord>,
+    /// Publishes events.
+    pub(super) events: Publisher<EventRecord>,
+    /// Receives the teacher's requests.
+    pub(super) teacher: Listener,
     _session: Session,
 }
 
@@ -70,21 +73,6 @@ impl Share {
             ))
         };
         open().map_err(|fault| SessionError::Usage(format!("--share {name}: {fault}")))
-    }
-
-    /// Receives the teacher's requests; returns those that began (`true`) or ended.
-    pub fn receive(&mut self, now_ms: f64) -> impl Iterator<Item = (bool, &'static str)> + use<> {
-        self.teacher.receive(now_ms)
-    }
-
-    /// Publishes a tick; returns false when publishing failed.
-    pub fn tick(&mut self, record: &TickRecord) -> bool {
-        self.ticks.send(record).is_ok()
-    }
-
-    /// Publishes an event; returns false when publishing failed.
-    pub fn event(&mut self, record: &EventRecord) -> bool {
-        self.events.send(record).is_ok()
     }
 }
 

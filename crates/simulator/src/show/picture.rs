@@ -167,12 +167,10 @@ fn chosen(candidates: &[(f64, PathBuf)]) -> Vec<Shot> {
     picks.dedup();
     let shot = |&at: &usize| {
         let (seconds, path) = candidates.get(at)?;
-        let when = if at == 0 {
-            "before"
-        } else if at == last {
-            "after"
-        } else {
-            "during"
+        let when = match at {
+            0 => "before",
+            _ if at == last => "after",
+            _ => "during",
         };
         Some(Shot { caption: format!("{when}, at {seconds:.1} s"), png: std::fs::read(path).ok()? })
     };

@@ -28,11 +28,6 @@ const LEASH_MM: f32 = 2.0;
 /// Duration of a request, s: long enough that no tick misses it.
 const REQUEST_S: f64 = 0.1;
 
-/// Whether a window can be opened here.
-pub(crate) fn has_display() -> bool {
-    window::display().is_ok()
-}
-
 /// Session data for the window.
 pub(crate) struct Opened<'a> {
     /// Patient, plan and program.

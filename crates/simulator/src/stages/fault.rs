@@ -13,12 +13,21 @@
 //! again. A device that has never given a pose has no fault.
 
 use trepan_contact::ForceGuard;
-use trepan_geometry::{Buttons, ToolState};
+use trepan_geometry::{Buttons, ToolState, Twist};
+use trepan_haptics::{Reading, Status};
 
 /// Time of stale readings after which the device has a fault, ms.
 const LONG_MS: f32 = 100.0;
 /// Time without contact after which the force returns, ms.
 const CLEAR_MS: f32 = 200.0;
+
+/// Returns the reading of a device, or its last valid one at rest and `true` if it gave no usable
+/// pose.
+pub(crate) fn last_valid_state(reading: &Reading, last: ToolState) -> (ToolState, bool) {
+    let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
+    let at_rest = ToolState { twist: Twist::default(), time_ms: reading.tool.time_ms, ..last };
+    (if fresh { reading.tool } else { at_rest }, !fresh)
+}
 
 /// Status of the device and its tool in a tick.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,12 @@
 //! Configuration of the haptic tick of either hand.
 
-use crate::models::BONE_STIFFNESS;
 use crate::program::Program;
 use crate::stages::alarms::Limits;
 use trepan_contact::{GuardConfig, Vibration, Viscoelastic};
 use trepan_rigid::Method;
+
+/// Stiffness of the contact with bone, N/mm.
+pub(crate) const BONE_STIFFNESS: f32 = 2.0;
 
 /// Configuration of a haptic stage.
 #[derive(Clone, Debug)]

@@ -15,8 +15,8 @@
 //! # When not to use it
 //! To retract the brain: use the first hand.
 
-use crate::report::summary::by_cause;
-use crate::stages::fault::{AfterFault, DeviceStatus};
+use crate::stages::by_cause;
+use crate::stages::fault::{AfterFault, DeviceStatus, last_valid_state};
 use crate::stages::haptic_config::HapticConfig;
 use crate::stages::notice::{Notice, What};
 use serde::Serialize;
@@ -104,7 +104,11 @@ impl SecondHand {
         reading: &Reading,
         notify: &mut dyn FnMut(Notice),
     ) -> (GuardedWrench, SecondRecord) {
-        let (tool, stale) = self.last_valid_state(reading);
+        let (tool, stale) = last_valid_state(reading, self.last_valid.unwrap_or(ToolState::at(Pose::IDENTITY)));
+        if !stale && self.last_valid.replace(tool).is_none() {
+            // The first valid pose sets the proxy.
+            self.rigid.reset(tool.world_from_tool);
+        }
         let proxy = self.touch_bone(&tool);
         self.touch_brain(proxy.translation);
         let lost = reading.status == Status::Lost;
@@ -157,26 +161,6 @@ impl SecondHand {
     pub fn outcome(&self) -> SecondOutcome {
         let guard = self.guard.counters();
         SecondOutcome { peak_force_n: self.peak_force_n, guard, end_force_n: self.force_n }
-    }
-
-    /// Returns the reading, or the last valid one and `true` if the device gave no usable pose. The
-    /// first valid pose sets the proxy.
-    fn last_valid_state(&mut self, reading: &Reading) -> (ToolState, bool) {
-        let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
-        let begins = self.last_valid.is_none();
-        let last = self.last_valid.unwrap_or(ToolState::at(Pose::IDENTITY));
-        let last_valid = if fresh {
-            reading.tool
-        } else {
-            ToolState { twist: Default::default(), time_ms: reading.tool.time_ms, ..last }
-        };
-        if begins && fresh {
-            self.rigid.reset(last_valid.world_from_tool);
-        }
-        if fresh {
-            self.last_valid = Some(last_valid);
-        }
-        (last_valid, !fresh)
     }
 
     /// Runs the contact with bone, once a pose is known; returns the proxy.

@@ -12,7 +12,7 @@
 //! # When not to use it
 //! To plan a real operation: vessels, venous sinuses and eloquent cortex are ignored.
 
-pub(crate) mod search;
+mod search;
 
 use crate::case::anatomy::make_skull;
 use crate::error::SessionError;

@@ -10,6 +10,7 @@
 
 use super::{BELOW_BONE_MM, Vec3};
 use crate::error::SessionError;
+use crate::measure::bone::over_isovalue;
 use trepan_haptics::script::Site;
 use trepan_volume::{BoneVolume, DistanceField};
 
@@ -213,18 +214,6 @@ pub(super) fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<
         before = Some(now);
     }
     None
-}
-
-/// Trilinear density minus the isovalue at a point, HU.
-pub(crate) fn over_isovalue(bone: &BoneVolume, point: Vec3) -> f32 {
-    let at = bone.grid_of(point);
-    let (low, part) = (at.floor().as_ivec3(), at - at.floor());
-    let corner = |n: i32| {
-        let step = glam::IVec3::new(n & 1, n >> 1 & 1, n >> 2);
-        let weight = Vec3::select(step.cmpeq(glam::IVec3::ONE), part, 1.0 - part);
-        weight.element_product() * f32::from(bone.hu(low + step))
-    };
-    (0..8).map(corner).sum::<f32>() - f32::from(bone.isovalue())
 }
 
 /// Evenly distributed directions over the sphere.

@@ -27,8 +27,8 @@ mod requests;
 
 use crate::program::Phase;
 use crate::stages::alarms::{Feed, WarningInputs};
-use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm, spindle_rpm};
-use crate::stages::fault::{AfterFault, DeviceStatus};
+use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm};
+use crate::stages::fault::{AfterFault, DeviceStatus, last_valid_state};
 use crate::stages::flap::Flap;
 use crate::stages::haptic_config::HapticConfig;
 use crate::stages::notice::{Notice, Watch, What};
@@ -46,7 +46,8 @@ use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
 impl HapticStage {
     /// Runs a tick; notices go to `notify`. The caller applies the wrench.
     pub fn tick(&mut self, input: &TickInput<'_>, notify: &mut dyn FnMut(Notice)) -> Tick {
-        let (tool, stale) = self.last_valid_state(&input.reading);
+        let (tool, stale) = last_valid_state(&input.reading, self.last_valid);
+        self.last_valid = tool;
         let lost = input.reading.status == Status::Lost;
         let report = &mut |what| notify(Notice { tick: input.tick, time_ms: tool.time_ms, what });
         self.change_tool(&tool, input.tick <= 1, report);
@@ -268,18 +269,6 @@ impl HapticStage {
         self.config.rigid.removal().spindle().map_or(0.0, |spindle| record.spindle_rpm / spindle.free_rpm)
     }
 
-    /// Returns the reading, or the last valid one and `true` if the device gave no usable pose.
-    fn last_valid_state(&mut self, reading: &Reading) -> (ToolState, bool) {
-        let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
-        if fresh {
-            self.last_valid = reading.tool;
-        } else {
-            self.last_valid.time_ms = reading.tool.time_ms;
-            self.last_valid.twist = Default::default();
-        }
-        (self.last_valid, !fresh)
-    }
-
     /// Switches the force off after a fault of the device until a deliberate action of the user.
     fn follow_fault(&mut self, tool: &ToolState, (lost, stale): (bool, bool), report: &mut dyn FnMut(What)) {
         if self.config.force_waits {
@@ -312,9 +301,14 @@ impl HapticStage {
         self.bone.iter().for_each(|bone| self.undo.newest(bone).through += 1);
     }
 
-    /// Returns the speed of the spindle, 1/min.
+    /// Returns the speed of the spindle, 1/min: the free speed in air, reduced by the load in bone,
+    /// 0 while not drilling.
     fn spindle_rpm(&self, drilling: bool) -> f32 {
-        spindle_rpm(self.config.rigid.removal().spindle(), &self.bone_step, drilling)
+        match self.config.rigid.removal().spindle() {
+            Some(_) if drilling && self.bone_step.manifold.touches() => self.bone_step.spindle_rpm,
+            Some(spindle) if drilling => spindle.free_rpm,
+            _ => 0.0,
+        }
     }
 
     fn sample(&mut self, tool: &ToolState, tick: u64, drilling: bool) -> ToolSample {
@@ -413,11 +407,6 @@ impl HapticStage {
         }
     }
 
-    /// Whether the drill has stalled under its load.
-    fn stalls(&self, record: &TickRecord) -> bool {
-        record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some()
-    }
-
     /// Raises and clears the warnings.
     fn warn(&mut self, record: &TickRecord, inputs: WarningInputs, report: &mut dyn FnMut(What)) {
         for (warning, present, value) in inputs.causes(record, &self.config.limits) {
@@ -443,7 +432,7 @@ impl HapticStage {
             tissue_n: record.tissue_n(),
             forbidden_mm: forbidden.unwrap_or(f32::INFINITY),
             desired_n: desired.sum().force.length(),
-            stalled: self.stalls(record),
+            stalled: record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some(),
             age_ms: (record.time_ms - patch.time_ms) as f32,
             warm,
         }

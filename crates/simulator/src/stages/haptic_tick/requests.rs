@@ -36,8 +36,8 @@ impl HapticStage {
         lifted || self.bone.is_none() || self.holes > 0 || !self.config.opening_needed
     }
 
-    /// Changes the tool on request, if the present one touches nothing. The first tick reports phase
-    /// and tool.
+    /// Changes the tool on request, if the present one touches nothing. The first tick reports
+    /// phase and tool.
     pub(super) fn change_tool(&mut self, tool: &ToolState, is_first: bool, report: &mut dyn FnMut(What)) {
         let before = self.phase();
         let change = self.tray.change(tool.buttons, self.is_free() && !self.undo.runs(), self.is_open());
