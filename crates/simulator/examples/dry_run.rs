@@ -4,28 +4,18 @@
 //! `cargo run --release -p trepan-simulator --example dry_run`
 
 use std::sync::Arc;
-use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
+use trepan_contact::SurfacePatch;
 use trepan_geometry::Vec3;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::script::{Script, Site};
-use trepan_simulator::{HapticConfig, HapticStage, Limits, Program, TickInput};
+use trepan_simulator::{HapticConfig, HapticStage, Program, TickInput};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (bone, brain) = head()?;
     let site = Site { entry: Vec3::Z * 66.0, inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 };
     let mut device = Script::named("craniotomy", &site, 10_000.0)?;
-    let config = HapticConfig {
-        program: Program::Craniotomy,
-        rigid: trepan_rigid::Method::RECOMMENDED,
-        dt_ms: 1.0,
-        bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
-        tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
-        guard: GuardConfig::default(),
-        limits: Limits::default(),
-        opening_needed: true,
-        force_waits: true,
-    };
+    let config = HapticConfig::usual(Program::Craniotomy);
     let mut stage = HapticStage::new(config, Some(Arc::new(bone)), Some(Arc::new(brain)), device.at(0.0));
     for tick in 1..=10_000u64 {
         let reading = device.read(tick as f64);

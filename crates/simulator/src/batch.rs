@@ -9,14 +9,15 @@
 use crate::error::SessionError;
 use crate::printable::printable;
 use crate::report::output::dated;
-use crate::{Ended, Inputs, Options, Program, Session};
+use crate::session::{Ended, Session};
+use crate::{Inputs, Options, Program};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use trepan_haptics::DeviceName;
 
 /// Lists the recordings of this shard in the order of their names. `None` if `--device` is not a
 /// folder of recordings.
-pub fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, SessionError> {
+pub(crate) fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, SessionError> {
     let named = options.device.as_deref().and_then(|name| name.parse::<DeviceName>().ok());
     let folder = match named {
         Some(DeviceName::Replay(path)) if path.is_dir() => path,
@@ -39,7 +40,7 @@ pub fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, SessionErro
 }
 
 /// Replays recordings one after the other; returns the number of failures.
-pub fn run(program: Program, options: &Options, built_in: &Inputs, files: &[PathBuf]) -> usize {
+pub(crate) fn run(program: Program, options: &Options, built_in: &Inputs, files: &[PathBuf]) -> usize {
     let out = options.out.clone().unwrap_or_else(|| dated(program));
     let failed = |file: &&PathBuf| match one(program, options, built_in, file, &out) {
         Ok(line) => {

@@ -2,7 +2,7 @@
 //! code.
 
 use crate::batch;
-use crate::case::choice::{Built, PlannedCase, plan_case};
+use crate::case::choice::{Built, PlannedCase, build_case, plan_case};
 use crate::compare::compare;
 use crate::device_test;
 use crate::models::ModelRequest;
@@ -10,8 +10,9 @@ use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, Task, rate};
 use crate::printable::printable;
 use crate::recordings;
 use crate::report::summary::{CutOff, slow};
+use crate::session::{Ended, Session};
 use crate::show::driver;
-use crate::{Ended, Inputs, Options, Program, Session, SessionError, build_case};
+use crate::{Inputs, Options, Program, SessionError};
 use clap::Parser;
 use std::io::IsTerminal;
 use std::path::Path;
@@ -55,7 +56,11 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         return perform(program, task, built_in);
     }
     match batch::recordings(&options) {
-        Ok(Some(files)) => return batched(batch::run(program, &options, &built_in, &files), files.len()),
+        Ok(Some(files)) => {
+            let failures = batch::run(program, &options, &built_in, &files);
+            println!("{} of {} recordings replayed", files.len() - failures, files.len());
+            return if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+        }
         Ok(None) => {}
         Err(fault) => return failed(program, &fault),
     }
@@ -65,19 +70,14 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
     }
 }
 
-fn batched(failures: usize, files: usize) -> ExitCode {
-    println!("{} of {files} recordings replayed", files - failures);
-    if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
-}
-
 /// Runs a subcommand.
 fn perform(program: Program, task: &Task, built_in: Inputs) -> ExitCode {
     let done = match task {
         Task::Plan { case, patient, tolerances, rate_hz, picture } => {
-            let request = tolerances.check().and_then(|()| rate((*rate_hz).into())).map_err(SessionError::Usage);
-            let request =
-                request.and_then(|()| ModelRequest::to_plan(program, patient, *tolerances, *rate_hz, *picture));
-            request.and_then(|request| planned(program, case.as_deref(), patient, built_in, request))
+            let checked = tolerances.check().and_then(|()| rate((*rate_hz).into()));
+            checked
+                .and_then(|()| ModelRequest::to_plan(program, patient, *tolerances, *rate_hz, *picture))
+                .and_then(|request| planned(program, case.as_deref(), patient, built_in, request))
         }
         Task::Case(CaseTask::Series { folder }) => list_series(folder),
         Task::Case(CaseTask::Build { patient, out }) => {

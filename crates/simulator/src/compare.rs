@@ -11,21 +11,20 @@
 
 use crate::case::identity::Identity;
 use crate::error::SessionError;
-use crate::report::chart::{Curve, over_time};
+use crate::report::chart::{Chart, Curve, over_time};
 use crate::report::output::whole;
-use crate::report::page::{STYLE, escaped};
+use crate::report::page::{Event, render};
 use crate::stages::score::ScoreKeeper;
-use std::fmt::Write;
+use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 use trepan_link::Recording;
-use trepan_link::wire::TickRecord;
+use trepan_link::wire::{EventRecord, TickRecord};
 
 /// Reads two recordings and writes `compare.html` to a folder.
-pub fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionError> {
+pub(crate) fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionError> {
     let [first, second] = files;
-    let sessions = [Recording::open(first)?, Recording::open(second)?];
-    let page = page(&sessions).map_err(SessionError::Internal)?;
+    let page = page(&[Recording::open(first)?, Recording::open(second)?])?;
     fs::create_dir_all(out).map_err(|fault| SessionError::Output { path: out.into(), fault })?;
     let path = out.join("compare.html");
     whole(&path, page.as_bytes()).map(|()| path)
@@ -33,50 +32,42 @@ pub fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionError> {
 
 /// Names of the two sessions.
 const NAMES: [&str; 2] = ["first", "second"];
-/// Style of a page with two columns.
-const WIDE: &str = ".two{display:grid;grid-template-columns:1fr 1fr;gap:1em}body{max-width:1200px}";
 
-fn page(sessions: &[Recording; 2]) -> Result<String, String> {
-    let title = "Trepan: two sessions";
-    let mut page = format!(
-        "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}{WIDE}</style></head><body><h1>{title}</h1>"
-    );
-    page += "<p>Scores are physical sums, not clinical ones.</p>";
-    remarks(&mut page, sessions);
-    scores(&mut page, sessions);
-    events(&mut page, sessions);
-    curves(&mut page, sessions)?;
-    page += "</body></html>\n";
-    Ok(page)
+fn page(sessions: &[Recording; 2]) -> Result<String, SessionError> {
+    let context = json!({
+        "title": "Trepan: two sessions",
+        "remarks": remarks(sessions),
+        "scores": scores(sessions),
+        "sessions": ([0, 1].map(|at| json!({ "name": NAMES[at], "events": events(&sessions[at]) }))),
+        "curves": curves(sessions)?,
+    });
+    render("compare.html", &context)
 }
 
-/// Adds remarks on differences that limit the comparison.
-fn remarks(page: &mut String, sessions: &[Recording; 2]) {
+/// Remarks on differences that limit the comparison.
+fn remarks(sessions: &[Recording; 2]) -> Vec<String> {
     let [first, second] = sessions.each_ref().map(|session| &session.header);
-    let mut remark = |text: &str| _ = write!(page, "<p class=\"w\">{}</p>", escaped(text));
+    let mut remarks = Vec::new();
     if first.app != second.app {
-        remark(&format!("Different programs: {} and {}.", first.app, second.app));
+        remarks.push(format!("Different programs: {} and {}.", first.app, second.app));
     }
     let [of_first, of_second] = [first, second].map(Identity::of);
-    match of_first.is(&of_second) {
-        Some(true) if of_first.case != of_second.case => {
-            remark("One patient, but two cases: the voxels, tetrahedra, labels or version differ.");
-        }
-        Some(true) => {}
-        Some(false) => remark("Different patients: scores are of different anatomies."),
-        None => remark("Whether both are of one patient is unknown: an older version recorded at least one of them."),
-    }
+    let patients = match of_first.is(&of_second) {
+        Some(true) if of_first.case == of_second.case => None,
+        Some(true) => Some("One patient, but two cases: the voxels, tetrahedra, labels or version differ."),
+        Some(false) => Some("Different patients: scores are of different anatomies."),
+        None => Some("Whether both are of one patient is unknown: an older version recorded at least one of them."),
+    };
+    remarks.extend(patients.map(String::from));
     for (key, value) in &first.config {
         let other = second.config.get(key).map_or("nothing", String::as_str);
         if other != value {
-            remark(&format!("{key} was {value} in the first session, {other} in the second."));
+            remarks.push(format!("{key} was {value} in the first session, {other} in the second."));
         }
     }
-    for (name, session) in NAMES.into_iter().zip(sessions) {
-        if let Some(losses) = session.losses() {
-            remark(&format!("The {name} recording is incomplete: {losses}."));
-        }
-    }
+    let losses = NAMES.into_iter().zip(sessions).filter_map(|(name, session)| Some((name, session.losses()?)));
+    remarks.extend(losses.map(|(name, losses)| format!("The {name} recording is incomplete: {losses}.")));
+    remarks
 }
 
 /// Computes the scores from a session's ticks.
@@ -86,16 +77,11 @@ fn score_keeper(session: &Recording) -> ScoreKeeper {
     scores
 }
 
-fn scores(page: &mut String, sessions: &[Recording; 2]) {
-    *page += "<h2>Scores</h2><table><tr><th>score</th><th>first</th><th>second</th><th>second - first</th></tr>";
+/// Lists each score of both sessions, with the difference.
+fn scores(sessions: &[Recording; 2]) -> Vec<Value> {
     let [first, second] = sessions.each_ref().map(rows);
-    for ((name, first), (_, second)) in first.iter().zip(&second) {
-        let cell = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
-        let difference = first.zip(*second).map(|(a, b)| b - a);
-        let cells = [*first, *second, difference].map(|value| format!("<td class=\"n\">{}</td>", cell(value))).concat();
-        _ = write!(page, "<tr><td>{}</td>{cells}</tr>", escaped(name));
-    }
-    *page += "</table>";
+    let row = |((name, first), (_, second)): ((String, Option<f64>), (String, Option<f64>))| json!({ "name": name, "values": [first, second, first.zip(second).map(|(a, b)| b - a)] });
+    first.into_iter().zip(second).map(row).collect()
 }
 
 /// Lists every score by name; `None` if it is undefined.
@@ -107,59 +93,41 @@ fn rows(session: &Recording) -> Vec<(String, Option<f64>)> {
     [length, ("warnings".into(), Some(warnings as f64))].into_iter().chain(of_scores).collect()
 }
 
-fn events(page: &mut String, sessions: &[Recording; 2]) {
-    *page += "<h2>Events</h2><div class=\"two\">";
-    for (name, session) in NAMES.into_iter().zip(sessions) {
-        _ = write!(page, "<div><h3>{name}</h3><ul>");
-        for event in session.events.iter().filter(|event| !["cleared", "score"].contains(&event.kind.as_str())) {
-            let class = if event.kind == "warning" { " class=\"w\"" } else { "" };
-            _ = write!(page, "<li{class}>{:.2} s: {}</li>", event.time_ms * 1e-3, escaped(&event.text));
-        }
-        *page += "</ul></div>";
-    }
-    *page += "</div>";
+fn events(session: &Recording) -> Vec<Event> {
+    let shown = session.events.iter().filter(|event| !["cleared", "score"].contains(&event.kind.as_str()));
+    let event = |event: &EventRecord| Event {
+        seconds: event.time_ms * 1e-3,
+        text: event.text.clone(),
+        warns: event.kind == "warning",
+    };
+    shown.map(event).collect()
 }
 
-fn curves(page: &mut String, sessions: &[Recording; 2]) -> Result<(), String> {
-    let both = |value: &dyn Fn(&TickRecord) -> f32| {
-        NAMES
-            .iter()
-            .zip(sessions)
-            .map(|(name, session)| Curve {
-                name,
-                points: session.ticks.iter().map(|tick| (tick.time_ms * 1e-3, f64::from(value(tick)))).collect(),
-            })
-            .collect::<Vec<_>>()
+/// Draws each quantity of both sessions in one chart, then each alone.
+fn curves(sessions: &[Recording; 2]) -> Result<[Value; 4], SessionError> {
+    let pair = |caption: &str, unit: &str, value: fn(&TickRecord) -> f32| {
+        let curve = |at: usize| Curve::over_time(NAMES[at], &sessions[at].ticks, |tick| (tick.time_ms, value(tick)));
+        let both = [curve(0), curve(1)];
+        let chart = |name: &str, curves: &[Curve]| {
+            Ok::<_, SessionError>(Chart::new(format!("{caption}, {name}"), over_time(unit, curves, None)?))
+        };
+        let alone = [chart(NAMES[0], &both[..1])?, chart(NAMES[1], &both[1..])?];
+        Ok::<_, SessionError>(json!({ "together": [chart("both", &both)?], "alone": alone }))
     };
-    let charts = [
-        ("Force on the hand", "force, N", both(&|tick| tick.wrench.force.length())),
-        ("Depth in bone", "depth, mm", both(&|tick| tick.depth_mm)),
-        (
-            "Distance to the brain at rest (cut at 20 mm)",
-            "distance, mm",
-            both(&|tick| tick.brain_distance_mm.clamp(-10.0, 20.0)),
-        ),
-        ("Depth in tissue", "depth, mm", both(&|tick| tick.tissue_depth_mm)),
-    ];
-    *page += "<h2>Curves</h2>";
-    for (caption, unit, curves) in charts {
-        let together = over_time(unit, &curves, None)?;
-        _ = write!(page, "<figure>{together}<figcaption>{caption}, both</figcaption></figure><div class=\"two\">");
-        for curve in curves {
-            let name = curve.name;
-            let alone = over_time(unit, &[curve], None)?;
-            _ = write!(page, "<figure>{alone}<figcaption>{caption}, {name}</figcaption></figure>");
-        }
-        *page += "</div>";
-    }
-    Ok(())
+    let distance = "Distance to the brain at rest (cut at 20 mm)";
+    Ok([
+        pair("Force on the hand", "force, N", |tick| tick.wrench.force.length())?,
+        pair("Depth in bone", "depth, mm", |tick| tick.depth_mm)?,
+        pair(distance, "distance, mm", |tick| tick.brain_distance_mm.clamp(-10.0, 20.0))?,
+        pair("Depth in tissue", "depth, mm", |tick| tick.tissue_depth_mm)?,
+    ])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use trepan_geometry::{Pose, Vec3, Wrench};
-    use trepan_link::wire::{EventRecord, SessionHeader};
+    use trepan_link::wire::SessionHeader;
 
     fn session(newtons: f32, spacing: &str) -> Recording {
         let tick = |n: u32| TickRecord {

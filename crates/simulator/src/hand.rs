@@ -15,8 +15,9 @@ use trepan_haptics::{
 };
 use trepan_link::Recording;
 
-/// An open device of the first hand.
-pub struct OpenDevice {
+/// An open device of a hand.
+#[derive(Default)]
+pub(crate) struct OpenDevice {
     /// Device for the haptic loop; `None` for a replay, which has recorded readings.
     pub device: Option<Box<dyn HapticDevice>>,
     /// Handle with which the window moves the mouse device.
@@ -37,74 +38,69 @@ impl OpenDevice {
         rate_hz: f32,
         stop: &Stop,
     ) -> Result<Self, SessionError> {
-        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| scripted(name, options, plan);
-        let mut hand = Self { device: None, pointer: None, watch: None, watching: None };
+        let none = Self::default();
+        let start = || scripted(program.script(), options, plan).map(|script| script.at(0.0));
         if let Some(name) = &options.watch {
-            let (watched, watching) = Watched::open(name, script(program.script())?.at(0.0), stop)?;
-            hand.watching = Some(watching);
-            hand.device = Some(Box::new(watched));
-            return Ok(hand);
+            let (watched, watching) = Watched::open(name, start()?, stop)?;
+            return Ok(Self { device: Some(Box::new(watched)), watching: Some(watching), ..none });
         }
-        hand.device = match name {
-            DeviceName::Script(name) => Some(Box::new(script(name)?)),
-            DeviceName::Simulated(name) => {
-                let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-                Some(Box::new(simulated::Simulated::new(config, grip, Box::new(script(name)?))))
-            }
+        if let Some(device) = software(name, options, plan)? {
+            return Ok(Self { device: Some(device), ..none });
+        }
+        Ok(match name {
             DeviceName::Mouse => {
-                let (pointer, mouse) = mouse::pair(script(program.script())?.at(0.0).world_from_tool);
-                hand.pointer = Some(pointer);
-                Some(Box::new(mouse))
+                let (pointer, mouse) = mouse::pair(start()?.world_from_tool);
+                Self { device: Some(Box::new(mouse)), pointer: Some(pointer), ..none }
             }
-            DeviceName::Replay(_) => None,
-            hardware => match hardware::open(hardware, workspace(&plan.site, options.device_scale)) {
-                Some(opened) => {
-                    let opened = opened.map_err(|f| fault(&f))?;
-                    check_rate(&opened.device.capabilities(), rate_hz)?;
-                    hand.watch = Some(opened.watch);
-                    Some(Box::new(Clutch::new(opened.device)))
-                }
-                None => None,
+            DeviceName::Replay(_) => none,
+            hardware => match opened(hardware, workspace(&plan.site, options.device_scale), rate_hz)? {
+                Some((device, watch)) => Self { device: Some(Box::new(device)), watch: Some(watch), ..none },
+                None => none,
             },
-        };
-        Ok(hand)
+        })
+    }
+
+    /// Opens the device of the second hand. Hardware runs on its own thread, so that its link never
+    /// delays the first hand.
+    pub fn second(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
+        if let Some(device) = software(name, options, plan)? {
+            return Ok(Self { device: Some(device), ..Self::default() });
+        }
+        let mut beside = workspace(&plan.site, options.device_scale);
+        // With both hands in the middle of their workspaces the tools are side by side.
+        beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
+        let (device, watch) = opened(name, beside, rate_hz)?.ok_or_else(|| unfit(name))?;
+        let device: Box<dyn HapticDevice> = Box::new(ThreadedDevice::new(Box::new(device)));
+        Ok(Self { device: Some(device), watch: Some(watch), ..Self::default() })
     }
 }
 
-/// An open device of the second hand.
-pub struct SecondDevice {
-    /// Device for the haptic loop.
-    pub device: Box<dyn HapticDevice>,
-    /// Access to the device's faults.
-    pub watch: Option<Watch>,
+/// Makes a device of software: a script, or a simulated hand that follows one.
+fn software(name: &DeviceName, options: &Options, plan: &Plan) -> Result<Option<Box<dyn HapticDevice>>, SessionError> {
+    Ok(match name {
+        DeviceName::Script(operation) => Some(Box::new(scripted(operation, options, plan)?)),
+        DeviceName::Simulated(operation) => Some(simulated_hand(scripted(operation, options, plan)?)),
+        _ => None,
+    })
 }
 
-impl SecondDevice {
-    /// Opens the device. Hardware runs on its own thread, so that its link never delays the first
-    /// hand.
-    pub fn open(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
-        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| scripted(name, options, plan);
-        let (device, watch): (Box<dyn HapticDevice>, _) = match name {
-            DeviceName::Script(operation) => (Box::new(script(operation)?), None),
-            DeviceName::Simulated(operation) => {
-                let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-                (Box::new(simulated::Simulated::new(config, grip, Box::new(script(operation)?))), None)
-            }
-            hardware_name => {
-                let mut beside = workspace(&plan.site, options.device_scale);
-                // With both hands in the middle of their workspaces the tools are side by side.
-                beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
-                let opened = hardware::open(hardware_name, beside)
-                    .ok_or_else(|| unfit(hardware_name))?
-                    .map_err(|f| fault(&f))?;
-                check_rate(&opened.device.capabilities(), rate_hz)?;
-                (Box::new(ThreadedDevice::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
-            }
-        };
-        Ok(Self { device, watch })
+/// Makes a simulated device in a firm hand that follows a script.
+pub(crate) fn simulated_hand(script: Script) -> Box<dyn HapticDevice> {
+    let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
+    Box::new(simulated::Simulated::new(config, grip, Box::new(script)))
+}
+
+/// Opens hardware; `None` if the name is not one of hardware. Refuses a tick rate above that of the
+/// device.
+fn opened(name: &DeviceName, workspace: Workspace, rate_hz: f32) -> Result<Option<(Clutch, Watch)>, SessionError> {
+    let Some(opened) = hardware::open(name, workspace) else { return Ok(None) };
+    let opened = opened.map_err(|fault| SessionError::Device(fault.to_string()))?;
+    let Capabilities { name, rate_hz: most_hz, .. } = opened.device.capabilities();
+    if rate_hz > most_hz {
+        let fault = format!("--rate-hz {rate_hz} is too fast for {name}: give at most {most_hz}");
+        return Err(SessionError::Usage(fault));
     }
+    Ok(Some((Clutch::new(opened.device), opened.watch)))
 }
 
 /// Duration of a scripted operation, and of one that cuts a flap, s.
@@ -118,20 +114,11 @@ fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, Sessio
     script.map_err(|fault| SessionError::Device(fault.to_string()))
 }
 
-/// Refuses a tick rate above that of the device.
-fn check_rate(device: &Capabilities, rate_hz: f32) -> Result<(), SessionError> {
-    if rate_hz <= device.rate_hz {
-        return Ok(());
-    }
-    let fault = format!("--rate-hz {rate_hz} is too fast for {}: give at most {}", device.name, device.rate_hz);
-    Err(SessionError::Usage(fault))
-}
-
 /// Offset of the second hand's workspace to the left of the first one's, mm.
 const SIDE_MM: f32 = 30.0;
 
 /// Name of the second hand's device, if given; refuses one that conflicts with the first.
-pub fn second_name(first: &DeviceName, options: &Options) -> Result<Option<DeviceName>, SessionError> {
+pub(crate) fn second_name(first: &DeviceName, options: &Options) -> Result<Option<DeviceName>, SessionError> {
     let Some(text) = &options.second_device else { return Ok(None) };
     let name: DeviceName = text.parse().map_err(|fault: trepan_haptics::NameError| second(fault.to_string()))?;
     if matches!(first, DeviceName::Replay(_)) {
@@ -156,7 +143,7 @@ fn second(fault: String) -> SessionError {
 }
 
 /// Describes the faults of a device; `None` without faults.
-pub fn faults(watch: &Watch) -> Option<String> {
+pub(crate) fn faults(watch: &Watch) -> Option<String> {
     let last = watch.fault().map_or_else(String::new, |fault| format!("; the last one: {fault}"));
     (watch.count() > 0).then(|| format!("the device had {} faults{last}", watch.count()))
 }
@@ -168,7 +155,7 @@ fn workspace(site: &Site, scale: f32) -> Workspace {
 }
 
 /// Name of the requested device; by default the mouse with a window, else the program's script.
-pub fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
+pub(crate) fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
     let script = || DeviceName::Script(program.script().into());
     let name = match &options.device {
         Some(text) => {
@@ -187,7 +174,7 @@ pub fn device_name(program: Program, options: &Options, windowed: bool) -> Resul
 
 /// Device properties that the force guard and the walls depend on; recorded, so that a replay gives
 /// the same forces.
-pub struct DeviceLimits {
+pub(crate) struct DeviceLimits {
     /// Capabilities, with the encoder step multiplied by the motion scale.
     device: Capabilities,
     /// Motion scale, world mm per device mm.
@@ -195,9 +182,9 @@ pub struct DeviceLimits {
 }
 
 /// Prefix of the first hand's header entries.
-pub const FIRST: &str = "device_";
+pub(crate) const FIRST: &str = "device_";
 /// Prefix of the second hand's header entries.
-pub const SECOND: &str = "second_device_";
+pub(crate) const SECOND: &str = "second_device_";
 
 const PEAK: &str = "peak_force_n";
 const CONTINUOUS: &str = "continuous_force_n";
@@ -228,7 +215,7 @@ impl DeviceLimits {
             axes_driven: number(AXES) as u8,
             moving_mass_g: number(MASS),
             damping: number(DAMPING),
-            ..Watched::CAPABILITIES
+            ..Capabilities::passive("")
         };
         Self { device, scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0) }
     }

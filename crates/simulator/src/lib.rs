@@ -12,7 +12,8 @@
 //! | [`CollisionStage::step`] | newest tool, newest node positions | patch, contacts, record |
 //! | [`SolverStage::step`] | newest contact | moved nodes, record |
 //!
-//! [`threads`] runs the stages live; [`lockstep`] replays them from a recording, bit for bit.
+//! `run/threads.rs` runs the stages live; `run/lockstep.rs` replays them from a recording, bit for
+//! bit.
 //!
 //! # Practice
 //! [`Session::open`] reports every user error before anything is written; [`Session::run`] runs the
@@ -44,36 +45,26 @@ mod show;
 mod stages;
 mod tissue_class;
 
+pub use case::Inputs;
 pub use case::cache::Cache;
-pub use case::choice::{Built, build_case};
 pub use case::import::open as open_case;
-pub use case::opening::Opening;
 pub use case::plan::Plan;
 pub use case::scene::{RestBrain, Scene};
-pub use case::{Brain, Case, Inputs};
 pub use command::command;
 pub use error::SessionError;
-pub use models::{BoneSummary, Facts, ModelSummary, Models, PictureSummary, TissueSummary};
-pub use operation::Operation;
-pub use options::{Options, Patient, Tolerances};
-pub use program::{Phase, Program, called};
+pub use options::Options;
+pub use program::{Phase, Program};
 pub use recipe::Recipe;
 pub use report::plan_comparison::PlanComparison;
-pub use report::regions::{Region, regions};
 pub use report::summary::Summary;
-pub use run::clock::{Clock, Schedule};
-pub use run::stop::Stop;
-pub use run::{Cells, Outcome, RenderInputs, Replayed, SolverOutcome, Stages, Ticks, Times, Tissue, View};
-pub use run::{lockstep, threads};
-pub use session::{Ended, Session};
+pub use run::Stages;
+pub use session::Session;
 pub use stages::alarms::Limits;
 pub use stages::collision_step::{CollisionStage, SoftFrame};
 pub use stages::haptic_config::HapticConfig;
-pub use stages::haptic_tick::{FRESH_MS, GONE_MS, HapticStage, Tick, TickInput, ToolSample};
-pub use stages::notice::{Hindrance, Notice, Warning, Watch, What};
+pub use stages::haptic_tick::{HapticStage, TickInput, ToolSample};
+pub use stages::notice::{Hindrance, Notice, Warning, What};
 pub use stages::score::ScoreKeeper;
-pub use stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 pub use stages::settling::Settling;
-pub use stages::skull_wall::SkullWall;
-pub use stages::solver_step::{EACH, REST_MOTION_MM, SolverFaults, SolverStage};
+pub use stages::solver_step::{SolverFaults, SolverStage};
 pub use tissue_class::{TissueClass, TissueSource};

@@ -17,7 +17,7 @@ const RATE_HZ: f32 = 1000.0;
 
 /// Settings of an operation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Operation {
+pub(crate) struct Operation {
     /// Diameter of the planned flap, mm; 0 for a burr hole alone.
     pub flap_mm: f32,
     /// Share of the fluid's buoyancy that is lost when the dura is opened, 0 to 1.

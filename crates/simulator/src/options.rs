@@ -1,14 +1,15 @@
 //! The command line that the three programs share.
 
+use crate::error::SessionError;
 use crate::tissue_class::{TissueClass, TissueSource};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use trepan_budget::Quality;
 
 /// Range of `--young-modulus-kpa`.
-pub const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
+pub(crate) const MODULI_KPA: [f64; 2] = [0.05, 1000.0];
 /// Range of `--rate-hz`.
-pub const RATES_HZ: [f64; 2] = [100.0, 10_000.0];
+pub(crate) const RATES_HZ: [f64; 2] = [100.0, 10_000.0];
 
 /// Flags of every program; names contain the unit.
 #[derive(Clone, Debug, Parser)]
@@ -221,7 +222,7 @@ pub struct Tolerances {
 
 impl Tolerances {
     /// Refuses numbers out of range.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), SessionError> {
         within("force-error-n", self.force_error_n.unwrap_or(1.0), 1e-4, 100.0)?;
         within("displacement-mm", self.displacement_mm.unwrap_or(1.0), 1e-4, 100.0)?;
         within("picture-error-percent", self.picture_error_percent.unwrap_or(1.0), 1e-3, 100.0)
@@ -285,20 +286,20 @@ pub enum DeviceTask {
 
 impl Patient {
     /// Refuses numbers out of range.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), SessionError> {
         within("spacing-mm", self.spacing_mm.unwrap_or(1.0).into(), 0.2, 4.0)?;
         within("tets", self.tets.unwrap_or(8_000) as f64, 500.0, 1e6)?;
         within("isovalue-hu", self.isovalue_hu.unwrap_or(0).into(), -900.0, 3000.0)
     }
 }
 
-fn within(flag: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
-    let good = value.is_finite() && value >= low && value <= high;
-    good.then_some(()).ok_or(format!("--{flag} {value} is out of range: give {low} to {high}"))
+fn within(flag: &str, value: f64, low: f64, high: f64) -> Result<(), SessionError> {
+    let fault = || SessionError::Usage(format!("--{flag} {value} is out of range: give {low} to {high}"));
+    (low..=high).contains(&value).then_some(()).ok_or_else(fault)
 }
 
 /// Refuses a tick rate out of range.
-pub fn rate(rate_hz: f64) -> Result<(), String> {
+pub(crate) fn rate(rate_hz: f64) -> Result<(), SessionError> {
     within("rate-hz", rate_hz, RATES_HZ[0], RATES_HZ[1])
 }
 
@@ -330,16 +331,12 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 
 impl Options {
     /// Refuses numbers out of range; the error names flag and range.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), SessionError> {
         self.patient.check()?;
         self.tolerances.check()?;
         within("duration", self.duration.unwrap_or(1.0), 0.1, 86_400.0)?;
-        within(
-            "young-modulus-kpa",
-            self.young_modulus_kpa.map_or(MODULI_KPA[0], f64::from),
-            MODULI_KPA[0],
-            MODULI_KPA[1],
-        )?;
+        let [softest, stiffest] = MODULI_KPA;
+        within("young-modulus-kpa", self.young_modulus_kpa.map_or(softest, f64::from), softest, stiffest)?;
         within("device-scale", self.device_scale.into(), 0.2, 5.0)?;
         within("flap", self.flap.unwrap_or(0.0).into(), 0.0, 90.0)?;
         within("csf-loss", self.csf_loss.unwrap_or(0.0).into(), 0.0, 1.0)?;
@@ -356,7 +353,7 @@ mod tests {
     fn bad_numbers_are_refused_with_a_range() {
         let parse = |line: &str| Options::try_parse_from(line.split(' '));
         assert!(parse("x --headless --duration 20 --out demo").unwrap().check().is_ok());
-        let fault = parse("x --duration nan").unwrap().check().unwrap_err();
+        let fault = parse("x --duration nan").unwrap().check().unwrap_err().to_string();
         assert!(fault.contains("--duration") && fault.contains("0.1 to 86400"), "{fault}");
         assert!(parse("x --flap 91").unwrap().check().is_err() && parse("x --csf-loss -0.1").unwrap().check().is_err());
         assert!(parse("x --forbid bone").unwrap_err().to_string().contains("vessel"));
@@ -366,7 +363,7 @@ mod tests {
         assert!(parse("x --opening 1,2").is_err() && parse("x --opening 1,2,nan").is_err());
         assert!(parse("x --quality best").unwrap_err().to_string().contains("auto, draft, usual, fine"));
         assert_eq!(parse("x --quality fine").unwrap().quality, Some(Quality::Fine));
-        assert!(parse("x --force-error-n 0").unwrap().check().unwrap_err().contains("--force-error-n"));
+        assert!(parse("x --force-error-n 0").unwrap().check().unwrap_err().to_string().contains("--force-error-n"));
         assert!(parse("x plan --tets 5000 --displacement-mm 0.5 --spacing-mm 0.7").is_ok());
         assert!(parse("x --picture 960").is_err() && parse("x --picture 0x7").is_err());
     }

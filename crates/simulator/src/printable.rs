@@ -1,7 +1,7 @@
 //! Text that is safe to print on a terminal.
 
 /// Escapes control characters, with which a file name could control the terminal.
-pub fn printable(text: &str) -> String {
+pub(crate) fn printable(text: &str) -> String {
     let shown = |c: char| match c {
         '\n' | '\t' => c.to_string(),
         c if c.is_control() => c.escape_default().to_string(),

@@ -10,14 +10,14 @@ use std::process::ExitCode;
 use trepan_link::{Recording, repair};
 
 /// Describes what a recording lacks, with the remedy if there is one; `None` if it is complete.
-pub fn not_whole(program: Program, file: &Path, recording: &Recording) -> Option<String> {
+pub(crate) fn not_whole(program: Program, file: &Path, recording: &Recording) -> Option<String> {
     let (losses, program, file) = (recording.losses()?, program.name(), file.display());
     let remedy = format!("; `{program} recording repair {file} NEW.mcap` keeps all that can be read");
     Some(format!("{file} is not whole: {losses}{}", if recording.damage.is_some() { &remedy } else { "" }))
 }
 
 /// Opens a recording for replay on a case; refuses one of another patient or without ticks.
-pub fn open(program: Program, file: &Path, case: &Identity) -> Result<Recording, SessionError> {
+pub(crate) fn open(program: Program, file: &Path, case: &Identity) -> Result<Recording, SessionError> {
     let recording = Recording::open(file)?;
     let losses = not_whole(program, file, &recording);
     if recording.ticks.is_empty() {
@@ -37,7 +37,7 @@ pub fn open(program: Program, file: &Path, case: &Identity) -> Result<Recording,
 
 /// Warns if the recording's case was built differently from the same images, or if its patient is
 /// unknown.
-pub fn unlike(recording: &Recording, case: &Identity) -> Option<String> {
+pub(crate) fn unlike(recording: &Recording, case: &Identity) -> Option<String> {
     let recorded = Identity::of(&recording.header);
     let made_alike = recorded.case.is_none() || recorded.case == case.case;
     (!made_alike).then(|| match recorded.is(case) {
@@ -54,7 +54,7 @@ pub fn unlike(recording: &Recording, case: &Identity) -> Option<String> {
 }
 
 /// Prints what a recording contains and lacks.
-pub fn check(program: Program, file: &Path) -> Result<ExitCode, SessionError> {
+pub(crate) fn check(program: Program, file: &Path) -> Result<ExitCode, SessionError> {
     let recording = Recording::open(file)?;
     print(file, &describe(&recording));
     let no_index = || {
@@ -71,7 +71,7 @@ pub fn check(program: Program, file: &Path) -> Result<ExitCode, SessionError> {
 }
 
 /// Writes a new recording from what can be read.
-pub fn repair_file(file: &Path, out: &Path) -> Result<ExitCode, SessionError> {
+pub(crate) fn repair_file(file: &Path, out: &Path) -> Result<ExitCode, SessionError> {
     if out.exists() {
         return Err(SessionError::Usage(format!("{} exists already: name a file that does not", out.display())));
     }

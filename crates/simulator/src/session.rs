@@ -6,7 +6,7 @@ use crate::case::plan::Plan;
 use crate::case::scene::Scene;
 use crate::case::{Inputs, anatomy};
 use crate::error::SessionError;
-use crate::hand::{self, DeviceLimits, OpenDevice, SecondDevice};
+use crate::hand::{self, DeviceLimits, OpenDevice};
 use crate::models::{ModelRequest, Models};
 use crate::operation::Operation;
 use crate::options::Options;
@@ -14,16 +14,15 @@ use crate::program::Program;
 use crate::recordings;
 use crate::report::page::Shot;
 use crate::report::plan_comparison::PlanComparison;
-use crate::report::summary::{About, CutOff, Machine, Summary};
+use crate::report::summary::{CutOff, Machine, SecondSummary, SolverSummary, Summary, fps};
 use crate::report::{drilled, output};
 use crate::run::film::Filming;
-use crate::run::journal::Kept;
 use crate::run::lesson::{Taught, Teacher};
 use crate::run::lockstep;
 use crate::run::stop::Stop;
 use crate::run::threads::{self, Devices, Pace};
 use crate::run::watch::{Asked, Company, Share};
-use crate::run::{Outcome, RenderInputs, Stages};
+use crate::run::{Outcome, RenderInputs, Run, Stages};
 use crate::session_setup::SessionSetup;
 use crate::show::driver;
 use crate::show::graphics::Graphics;
@@ -74,8 +73,8 @@ impl Session {
     ///
     /// `built_in` is the case that is used if no image is given.
     pub fn open(program: Program, options: Options, built_in: Inputs) -> Result<Self, SessionError> {
-        options.check().map_err(SessionError::Usage)?;
-        let windowed = !options.headless && window::has_display();
+        options.check()?;
+        let windowed = !options.headless && trepan_render::window::display().is_ok();
         if !windowed && !options.headless {
             tracing::info!("no display here: running the scripted operation headless");
         }
@@ -107,28 +106,30 @@ impl Session {
         let (before, whole) = (self.setup.pieces(), self.setup.bone().map(|bone| bone.snapshot()));
         let (options, plan, rate_hz) = (&self.options, &self.setup.plan, self.setup.operation.rate_hz);
         let hand = OpenDevice::open(&self.device, self.program, options, plan, rate_hz, &stop)?;
-        let OpenDevice { device, pointer, watch, watching } = hand;
-        let second = self.second.as_ref().map(|name| SecondDevice::open(name, options, plan, rate_hz)).transpose()?;
-        let recorded = || DeviceLimits::recorded(self.recording.as_ref(), hand::FIRST);
-        let scale = if watch.is_some() { self.options.device_scale } else { 1.0 };
-        let limits = device.as_ref().map_or_else(recorded, |device| DeviceLimits::of(&device.capabilities(), scale));
-        let second_limits = self.second_limits(second.as_ref());
+        let second = match &self.second {
+            Some(name) => Some(OpenDevice::second(name, options, plan, rate_hz)?),
+            None => self.recording.as_ref().filter(|r| !r.second.is_empty()).map(|_| OpenDevice::default()),
+        };
+        let limits = self.limits(&hand, hand::FIRST);
+        let second_limits = second.as_ref().map(|second| self.limits(second, hand::SECOND));
         let start = self.start();
         let limits_of_both = (&limits, second_limits.as_ref());
         let stages = self.setup.stages(start.state, self.tick_ms(), limits_of_both, &Default::default())?;
-        let (second_device, second_watch) = second.map_or((None, None), |second| (Some(second.device), second.watch));
+        let OpenDevice { device, pointer, watch, watching } = hand;
+        let OpenDevice { device: second_device, watch: second_watch, .. } = second.unwrap_or_default();
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
         let place = output::Place::make(&self.out, &record)?;
         let (share, asked) = self.options.share.as_deref().map(Share::open).transpose()?.unzip();
         let (mut company, [device, second_device]) = self.company(asked, [device, second_device])?;
         company.watching.clone_from(&watching);
-        let kept = (Recorder::create(&record, &self.header(&limits, second_limits.as_ref()))?, share);
+        let recorder = Recorder::create(&record, &self.header(&limits, second_limits.as_ref()))?;
         let drawing = self.drawing.take();
         let mut graphics = self.graphics(drawing);
         let adapter = graphics.as_ref().ok().map(|g| g.adapter.clone());
         let mut album = Album::default();
         let devices = device.map(|first| Devices { first, second: second_device });
-        let outcome = self.loops(stages, devices, kept, start, &stop, |eyes| {
+        let run = Run { stages, start, recorder, share, stop: &stop };
+        let outcome = self.loops(run, devices, |eyes| {
             album = self.picture(eyes, &mut graphics, pointer, std::mem::take(&mut company), &stop);
         });
         let ended = watching.and_then(|watching| watching.ended());
@@ -145,17 +146,16 @@ impl Session {
         let drilled =
             self.setup.bone().zip(whole.as_ref()).map(|(bone, whole)| self.drilled(bone, whole, &mut remarks));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
-        let about = About {
+        let bone_before = self.setup.bone().zip(whole);
+        let summary = Summary {
             cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
-            plan: self
-                .setup
-                .bone()
-                .zip(whole)
-                .and_then(|(bone, whole)| PlanComparison::of(&self.setup.plan, &whole, bone)),
+            plan: bone_before.and_then(|(bone, whole)| PlanComparison::of(&self.setup.plan, &whole, bone)),
             regions: self.setup.regions(&recording),
-            ..self.about(&album, adapter, remarks)
+            remarks,
+            machine: Machine::here(adapter),
+            ..self.about(&album)
         };
-        let summary = Summary::new(about, &outcome);
+        let summary = summary.with(&outcome);
         output::write(&self.out, &recording, &summary, &outcome, &self.shots(album.shots))?;
         if let Some((bone, densities)) = self.setup.bone().zip(drilled) {
             output::drilled(&self.out, &densities, bone, self.options.stl)?;
@@ -224,33 +224,24 @@ impl Session {
         Ok((company, hands))
     }
 
-    fn loops(
-        &self,
-        stages: Stages,
-        devices: Option<Devices>,
-        kept: Kept,
-        start: ToolSample,
-        stop: &Stop,
-        picture: impl FnOnce(RenderInputs),
-    ) -> Outcome {
+    fn loops(&self, run: Run<'_>, devices: Option<Devices>, picture: impl FnOnce(RenderInputs)) -> Outcome {
         match (&self.recording, devices) {
             (Some(recording), _) => {
                 let end_ms = self.options.duration.map_or(f64::INFINITY, |s| 1e3 * s);
                 let length_ms = lockstep::up_to(recording, end_ms).last().map_or(0.0, |tick| tick.time_ms);
                 let film = self.windowed.then(|| Filming::new(self.setup.bone().cloned(), length_ms));
-                lockstep::run(stages, (recording, end_ms), kept, start, film, stop, picture)
+                lockstep::run(run, (recording, end_ms), film, picture)
             }
-            (None, Some(devices)) => threads::run(stages, devices, kept, start, self.pace(), stop, picture),
+            (None, Some(devices)) => threads::run(run, devices, self.pace(), picture),
             (None, None) => Outcome::default(),
         }
     }
 
-    /// Limits of the second hand's device, open or recorded; `None` without a second hand.
-    fn second_limits(&self, held: Option<&SecondDevice>) -> Option<DeviceLimits> {
-        let scale = |held: &SecondDevice| if held.watch.is_some() { self.options.device_scale } else { 1.0 };
-        let recorded = self.recording.as_ref().filter(|recording| !recording.second.is_empty());
-        held.map(|held| DeviceLimits::of(&held.device.capabilities(), scale(held)))
-            .or_else(|| recorded.map(|recording| DeviceLimits::recorded(Some(recording), hand::SECOND)))
+    /// Limits of a hand's device; the recorded ones, if none is open.
+    fn limits(&self, hand: &OpenDevice, name: &str) -> DeviceLimits {
+        let scale = if hand.watch.is_some() { self.options.device_scale } else { 1.0 };
+        let recorded = || DeviceLimits::recorded(self.recording.as_ref(), name);
+        hand.device.as_ref().map_or_else(recorded, |device| DeviceLimits::of(&device.capabilities(), scale))
     }
 
     /// Tool before the first reading of its device. A replay starts here too, because the first
@@ -265,7 +256,8 @@ impl Session {
         if !self.windowed && self.options.frames_per_second == 0.0 {
             return Err("no picture was requested".into());
         }
-        Graphics::open(&self.setup, self.options.picture, drawing.unwrap_or_else(driver::open), self.windowed)
+        let gpu = drawing.unwrap_or_else(driver::open);
+        Graphics::open(&self.setup, self.options.picture, gpu, self.windowed).map_err(|fault| fault.to_string())
     }
 
     fn picture(
@@ -340,28 +332,33 @@ impl Session {
         }
     }
 
-    fn about(&self, album: &Album, adapter: Option<String>, remarks: Vec<String>) -> About {
+    /// The part of the summary that is known without the outcome.
+    fn about(&self, album: &Album) -> Summary {
         let brain = self.setup.scene.brain.as_ref();
-        About {
-            program: self.program,
+        Summary {
+            app: self.program.name().into(),
             case: self.case.name.clone(),
             device: match (&self.device, &self.options.watch) {
                 (_, Some(_)) => "watch".into(),
                 (DeviceName::Replay(_), _) => "replay".into(),
                 (other, _) => other.to_string(),
             },
-            second_device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),
+            second: Some(SecondSummary {
+                device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),
+                ..SecondSummary::default()
+            }),
             models: self.setup.models.summary(),
-            solver: self.setup.solver_name().into(),
-            brain: brain.map_or([0; 3], |b| [b.mesh.tets.len(), b.mesh.positions.len(), b.fixed.len()]),
+            solver: Some(SolverSummary {
+                name: self.setup.solver_name().into(),
+                tets: brain.map_or(0, |brain| brain.mesh.tets.len()),
+                nodes: brain.map_or(0, |brain| brain.mesh.positions.len()),
+                fixed_nodes: brain.map_or(0, |brain| brain.fixed.len()),
+                ..SolverSummary::default()
+            }),
             asked_hz: self.setup.operation.rate_hz.into(),
             frames: album.frames,
-            drawn_s: album.seconds,
-            cut_off: CutOff::default(),
-            plan: None,
-            regions: Vec::new(),
-            remarks,
-            machine: Machine::here(adapter),
+            fps: fps(album.frames, album.seconds),
+            ..Summary::default()
         }
     }
 }

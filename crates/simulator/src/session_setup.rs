@@ -6,13 +6,12 @@ use crate::case::scene::{RestBrain, Scene};
 use crate::error::SessionError;
 use crate::hand::DeviceLimits;
 use crate::measure::tissue::MASS_ADDED;
-use crate::models::{BONE_STIFFNESS, FASTEST, Models, rigid_of, solver_named};
+use crate::models::{FASTEST, Models, rigid_of, solver_named};
 use crate::operation::Operation;
 use crate::program::Program;
 use crate::report::regions::{Region, regions};
 use crate::run::clock::Clock;
 use crate::run::{self, Stages};
-use crate::stages::alarms::Limits;
 use crate::stages::collision_step::CollisionStage;
 use crate::stages::haptic_config::HapticConfig;
 use crate::stages::haptic_tick::HapticStage;
@@ -23,14 +22,14 @@ use crate::stages::solver_step::SolverStage;
 use crate::tissue_class::TissueClass;
 use std::sync::{Arc, OnceLock};
 use trepan_budget::Tissue;
-use trepan_contact::{Vibration, Viscoelastic};
+use trepan_contact::Vibration;
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_link::Recording;
 use trepan_soft::{Body, Loads, SoftSolver};
 use trepan_volume::{BoneVolume, Piece};
 
 /// Patient, plan, settings and models of a session.
-pub struct SessionSetup {
+pub(crate) struct SessionSetup {
     /// The program.
     pub program: Program,
     /// The patient.
@@ -108,18 +107,16 @@ impl SessionSetup {
         touch: &trepan_deformable::Config,
     ) -> Result<Stages, SessionError> {
         let rigid = rigid_of(&self.models.setup.bone)?;
+        let usual = HapticConfig::usual(self.program);
         let config = |limits: &DeviceLimits| HapticConfig {
-            program: self.program,
             rigid,
             dt_ms: tick_ms,
-            bone_force: Vibration::drill(
-                limits.coupled(Viscoelastic { stiffness: BONE_STIFFNESS, damping: 0.5 }, tick_ms),
-            ),
-            tissue_force: limits.coupled(Viscoelastic { stiffness: 0.3, damping: 0.3 }, tick_ms),
+            bone_force: Vibration::drill(limits.coupled(usual.bone_force.mean, tick_ms)),
+            tissue_force: limits.coupled(usual.tissue_force, tick_ms),
             guard: limits.guard(),
-            limits: Limits::default(),
             opening_needed: self.operation.opening_needed,
             force_waits: self.operation.force_waits,
+            ..usual.clone()
         };
         let bone = self.bone().cloned();
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));

@@ -3,13 +3,11 @@
 
 use glam::IVec3;
 use std::sync::Arc;
-use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
+use trepan_contact::SurfacePatch;
 use trepan_geometry::{Buttons, Pose, Quat, ToolKind, ToolState, Vec3};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{
-    HapticConfig, HapticStage, Hindrance, Limits, Notice, Phase, Program, TickInput, Warning, What,
-};
+use trepan_simulator::{HapticConfig, HapticStage, Hindrance, Notice, Phase, Program, TickInput, Warning, What};
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// Makes a flat head: bone from z = -6 to 0 mm, brain under z = -8 mm.
@@ -25,20 +23,6 @@ fn head() -> (Arc<BoneVolume>, Arc<DistanceField>) {
     (Arc::new(BoneVolume::new(&ct, 400).expect("there is bone")), Arc::new(DistanceField::of_mask(&mask)))
 }
 
-fn config(program: Program) -> HapticConfig {
-    HapticConfig {
-        program,
-        rigid: trepan_rigid::Method::RECOMMENDED,
-        dt_ms: 1.0,
-        bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
-        tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
-        guard: GuardConfig::default(),
-        limits: Limits::default(),
-        opening_needed: true,
-        force_waits: true,
-    }
-}
-
 struct Bench {
     stage: HapticStage,
     tick: u64,
@@ -51,7 +35,7 @@ impl Bench {
         let (bone, brain) = head();
         let bone = Some(bone).filter(|_| program.has_bone());
         Self {
-            stage: HapticStage::new(config(program), bone, Some(brain), at(20.0, 0.0)),
+            stage: HapticStage::new(HapticConfig::usual(program), bone, Some(brain), at(20.0, 0.0)),
             tick: 0,
             notices: Vec::new(),
             second: None,
@@ -88,7 +72,8 @@ const NO_PATCH: SurfacePatch =
 fn undoing_a_stroke_restores_its_bone_once_the_tool_is_free() {
     let (bone, brain) = head();
     let before = bone.snapshot();
-    let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(6.0, 0.0));
+    let stage =
+        HapticStage::new(HapticConfig::usual(Program::Craniotomy), Some(bone.clone()), Some(brain), at(6.0, 0.0));
     let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let mut removed = 0.0;
     let mut run = |bench: &mut Bench, z: f32, buttons: u32| {
@@ -133,7 +118,8 @@ fn stroke(bench: &mut Bench, turn: Buttons, x: f32) -> f32 {
 #[test]
 fn strokes_of_several_tools_are_undone_one_by_one() {
     let (bone, brain) = head();
-    let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(12.0, 0.0));
+    let stage =
+        HapticStage::new(HapticConfig::usual(Program::Craniotomy), Some(bone.clone()), Some(brain), at(12.0, 0.0));
     let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let turns = [Buttons(0), Buttons::take(ToolKind::Perforator), Buttons::take(ToolKind::Burr)];
     let mut states = Vec::new();
@@ -158,7 +144,8 @@ fn strokes_of_several_tools_are_undone_one_by_one() {
 #[test]
 fn no_bone_is_restored_around_a_tool_of_either_hand() {
     let (bone, brain) = head();
-    let stage = HapticStage::new(config(Program::Integrated), Some(bone.clone()), Some(brain), at(12.0, 0.0));
+    let stage =
+        HapticStage::new(HapticConfig::usual(Program::Integrated), Some(bone.clone()), Some(brain), at(12.0, 0.0));
     let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let before = bone.snapshot();
     let mut z = 6.0;
@@ -197,7 +184,8 @@ fn no_bone_is_restored_around_a_tool_of_either_hand() {
 fn drilling_warns_before_the_brain_and_removes_bone_only_under_the_burr() {
     let (bone, brain) = head();
     let before = bone.snapshot();
-    let stage = HapticStage::new(config(Program::Craniotomy), Some(bone.clone()), Some(brain), at(20.0, 0.0));
+    let stage =
+        HapticStage::new(HapticConfig::usual(Program::Craniotomy), Some(bone.clone()), Some(brain), at(20.0, 0.0));
     let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let mut deepest = f32::INFINITY;
     for i in 0..14_000 {
@@ -232,7 +220,7 @@ fn warning_and_score_agree_on_a_touch_of_the_brain_and_exclude_a_craniotomes_foo
         (0..24).for_each(|at| {
             (0..48 * 48).for_each(|n| bone.set_hu(IVec3::new(n % 48, n / 48, at + 15), trepan_volume::AIR_HU));
         });
-        let stage = HapticStage::new(config(Program::Craniotomy), Some(bone), Some(brain), at(20.0, 0.0));
+        let stage = HapticStage::new(HapticConfig::usual(Program::Craniotomy), Some(bone), Some(brain), at(20.0, 0.0));
         let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
         let take = |z: f32| ToolState { buttons: Buttons::take(kind), ..at(z, 0.0) };
         let lift = |bench: &mut Bench, from: f32, to: f32| {
@@ -371,7 +359,7 @@ fn a_probe_that_scrapes_the_rim_does_not_press_the_brain() {
         normal_velocity: 0.0,
     };
     let (bone, brain) = head();
-    let config = HapticConfig { opening_needed: false, ..config(Program::Integrated) };
+    let config = HapticConfig { opening_needed: false, ..HapticConfig::usual(Program::Integrated) };
     let stage = HapticStage::new(config, Some(bone), Some(brain), at(20.0, 0.0));
     let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
     let probe = |z: f32| ToolState { buttons: Buttons::take(ToolKind::Probe), ..at(z, 0.0) };
@@ -396,7 +384,7 @@ fn the_tool_changes_once_for_a_press_and_only_when_free() {
     let press = |z: f32| ToolState { buttons: request, ..at(z, 0.0) };
     for needed in [true, false] {
         let (bone, brain) = head();
-        let config = HapticConfig { opening_needed: needed, ..config(Program::Integrated) };
+        let config = HapticConfig { opening_needed: needed, ..HapticConfig::usual(Program::Integrated) };
         let stage = HapticStage::new(config, Some(bone), Some(brain), at(20.0, 0.0));
         let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };
         for _ in 0..5 {
@@ -457,7 +445,7 @@ fn a_forbidden_structure_within_a_millimetre_gives_a_warning_for_every_tool() {
     }
     for slot in [0, 1, 4] {
         let radius = Program::Integrated.tray()[slot].tip_radius_mm;
-        let config = HapticConfig { opening_needed: false, ..config(Program::Integrated) };
+        let config = HapticConfig { opening_needed: false, ..HapticConfig::usual(Program::Integrated) };
         let stage = HapticStage::new(config, Some(bone.clone()), Some(brain.clone()), at(30.0, 0.0));
         let stage = stage.forbidding(Arc::new(DistanceField::of_mask(&mask)));
         let mut bench = Bench { stage, tick: 0, notices: Vec::new(), second: None };

@@ -28,7 +28,11 @@ fn image(path: &Path, series: Option<usize>) -> Result<Import, ReadError> {
 }
 
 /// Reads a CT in HU, and adds remarks on it.
-pub fn read_ct(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<i16>, SessionError> {
+pub(super) fn read_ct(
+    path: &Path,
+    series: Option<usize>,
+    notes: &mut Vec<String>,
+) -> Result<VoxelVolume<i16>, SessionError> {
     let import = image(path, series)?;
     of_modality(path, &import, "CT")?;
     of_a_patient(path, &import.volume)?;
@@ -37,13 +41,17 @@ pub fn read_ct(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> R
 }
 
 /// Reads the original CT of a case again; the error is a text for a remark.
-pub fn scanned(inputs: &Inputs, series: Option<usize>) -> Result<VoxelVolume<i16>, String> {
+pub(crate) fn scanned(inputs: &Inputs, series: Option<usize>) -> Result<VoxelVolume<i16>, String> {
     let path = inputs.ct.as_deref().ok_or("a case folder does not hold the scanner's images")?;
     read_ct(path, series, &mut Vec::new()).map_err(|fault| format!("the CT cannot be read again: {fault}"))
 }
 
 /// Reads an MRI, and adds remarks on it; refuses voxels that are not finite, and CTs.
-pub fn read_mri(path: &Path, series: Option<usize>, notes: &mut Vec<String>) -> Result<VoxelVolume<f32>, SessionError> {
+pub(super) fn read_mri(
+    path: &Path,
+    series: Option<usize>,
+    notes: &mut Vec<String>,
+) -> Result<VoxelVolume<f32>, SessionError> {
     let import = image(path, series)?;
     of_modality(path, &import, "MR")?;
     of_a_patient(path, &import.volume)?;
@@ -94,7 +102,7 @@ fn of_modality(path: &Path, import: &Import, expected: &str) -> Result<(), Sessi
 }
 
 /// Registers the MRI to the CT in place; returns the transform.
-pub fn registered(
+pub(super) fn registered(
     ct: &VoxelVolume<i16>,
     mri: &mut VoxelVolume<f32>,
     notes: &mut Vec<String>,
@@ -125,7 +133,7 @@ fn brain_note(confidence: &BrainConfidence) -> String {
 }
 
 /// Brain mask: the nonzero labels, else a segmentation of the MRI.
-pub fn find_brain(
+pub(super) fn find_brain(
     inputs: &Inputs,
     mri: &VoxelVolume<f32>,
     ct_from_mri: DAffine3,
@@ -155,7 +163,11 @@ pub fn find_brain(
 }
 
 /// Resamples a CT to cubic voxels and keeps the largest piece of bone.
-pub fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> Result<VoxelVolume<i16>, SessionError> {
+pub(super) fn make_skull(
+    ct: &VoxelVolume<i16>,
+    recipe: &Recipe,
+    isovalue_hu: i16,
+) -> Result<VoxelVolume<i16>, SessionError> {
     let grid = Grid::isotropic_over(ct, recipe.spacing_mm);
     room_for_voxels(grid.voxels() as u64, SKULL_BYTES).map_err(|fault| {
         let text =
@@ -173,7 +185,7 @@ pub fn make_skull(ct: &VoxelVolume<i16>, recipe: &Recipe, isovalue_hu: i16) -> R
 }
 
 /// Builds the tissue classes on a grid around the brain.
-pub fn make_classes(
+pub(super) fn make_classes(
     inputs: &Inputs,
     mask: &VoxelVolume<u8>,
     ct_from_mri: DAffine3,
@@ -187,7 +199,7 @@ pub fn make_classes(
 }
 
 /// Builds the brain: the MRI on the grid of the classes, and tetrahedra, refined around `place`.
-pub fn make_brain(
+pub(super) fn make_brain(
     mri: &VoxelVolume<f32>,
     classes: VoxelVolume<u8>,
     place: Option<Vec3>,
@@ -207,7 +219,7 @@ pub fn make_brain(
 }
 
 /// Resamples the mask to cubic voxels of 0.8 to 1.5 mm and crops it to its content with a margin.
-pub fn cropped(mask: &VoxelVolume<u8>) -> Result<VoxelVolume<u8>, SessionError> {
+pub(super) fn cropped(mask: &VoxelVolume<u8>) -> Result<VoxelVolume<u8>, SessionError> {
     let spacing = mask.spacing_mm().min_element().clamp(0.8, 1.5) as f32;
     let grid = Grid::isotropic_over(mask, spacing);
     room_for_voxels(grid.voxels() as u64, 16).map_err(|fault| {

@@ -10,6 +10,7 @@ use crate::error::SessionError;
 use crate::options::Patient;
 use etcetera::{BaseStrategy, choose_base_strategy};
 use sha2::{Digest, Sha256};
+use std::error::Error;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -68,7 +69,11 @@ impl Cache {
     }
 
     /// Fills a temporary folder and moves it to its place; replaces an existing one.
-    pub fn keep(&self, key: &str, fill: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), String> {
+    pub fn keep(
+        &self,
+        key: &str,
+        fill: impl FnOnce(&Path) -> Result<(), Box<dyn Error>>,
+    ) -> Result<(), Box<dyn Error>> {
         let text = |fault: io::Error| format!("{}: {fault}", self.root.display());
         fs::create_dir_all(&self.root).map_err(text)?;
         self.sweep(MOST_BYTES);
@@ -85,7 +90,7 @@ impl Cache {
 }
 
 /// SHA-256 of a text and of these files (folders with all their files), hexadecimal.
-pub fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, SessionError> {
+pub(super) fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, SessionError> {
     let mut hash = Sha256::new();
     hash.update(text);
     for input in inputs {
@@ -97,7 +102,7 @@ pub fn digest_of_all(text: &str, inputs: &[&Path]) -> Result<String, SessionErro
 }
 
 /// SHA-256 of a file's bytes, hexadecimal.
-pub fn digest(file: &Path) -> io::Result<String> {
+pub(super) fn digest(file: &Path) -> io::Result<String> {
     let mut hash = Sha256::new();
     feed(&mut hash, &mut open_regular(file)?)?;
     Ok(hexadecimal(hash))
@@ -250,10 +255,10 @@ mod tests {
             fs::write(folder.join("half"), b"x").unwrap();
             Err("disk full".into())
         });
-        assert_eq!(failed, Err("disk full".into()));
+        assert_eq!(failed.unwrap_err().to_string(), "disk full");
         assert!(cache.find(&key).is_none());
         assert_eq!(fs::read_dir(home.path().join("cases")).unwrap().count(), 0);
-        cache.keep(&key, |folder| fs::write(folder.join("whole"), b"x").map_err(|f| f.to_string())).unwrap();
+        cache.keep(&key, |folder| Ok(fs::write(folder.join("whole"), b"x")?)).unwrap();
         assert!(cache.find(&key).unwrap().join("whole").is_file());
     }
 
@@ -274,7 +279,7 @@ mod tests {
         let cache = Cache::at(home.path().into());
         let keys: Vec<String> = (0..4).map(|n| format!("{n:064}")).collect();
         for (n, key) in keys.iter().enumerate() {
-            cache.keep(key, |folder| fs::write(folder.join("x"), [0; 100]).map_err(|f| f.to_string())).unwrap();
+            cache.keep(key, |folder| Ok(fs::write(folder.join("x"), [0; 100])?)).unwrap();
             let used = SystemTime::now() - (4 - n as u32) * ABANDONED - ABANDONED / 2;
             File::open(home.path().join(key)).unwrap().set_modified(used).unwrap();
         }

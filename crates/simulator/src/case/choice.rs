@@ -16,7 +16,7 @@ use trepan_budget::Setup;
 
 /// Opens the named case folder, the given images or the built-in case, with the models of the
 /// session. `card`: whether a graphics card draws.
-pub fn open_case(
+pub(crate) fn open_case(
     program: Program,
     options: &Options,
     built_in: Inputs,
@@ -37,7 +37,7 @@ pub fn open_case(
     let case = import::open_by(program, &inputs, &requested, &Cache::of(&options.patient)?, |pending| {
         let facts = pending.facts;
         let settled = models.insert(request.settle(&facts, card, |scene, rows| pending.case_errors(scene, rows))?);
-        pending.suspend_progress(|| settled.log());
+        pending.stages.suspend(|| settled.log());
         let Setup { bone, tissue, .. } = settled.setup;
         Ok(Recipe { spacing_mm: bone.spacing_mm as f32, tets: tissue.tets, halvings: tissue.halvings, ..requested })
     })?;
@@ -59,7 +59,7 @@ fn check_forbidden(options: &Options, has_class: impl Fn(TissueClass) -> bool) -
 }
 
 /// Identity of the case that the options name, without building it.
-pub fn identity(options: &Options, built_in: &Inputs) -> Result<Identity, SessionError> {
+pub(crate) fn identity(options: &Options, built_in: &Inputs) -> Result<Identity, SessionError> {
     match &options.case {
         Some(folder) => folder::identity(folder),
         None => {
@@ -71,7 +71,7 @@ pub fn identity(options: &Options, built_in: &Inputs) -> Result<Identity, Sessio
 }
 
 /// Models planned for a case that is not built, with remarks on its images.
-pub struct PlannedCase {
+pub(crate) struct PlannedCase {
     /// The models.
     pub models: Models,
     /// Remarks of the import.
@@ -79,7 +79,7 @@ pub struct PlannedCase {
 }
 
 /// Plans the models for a case without building it.
-pub fn plan_case(
+pub(crate) fn plan_case(
     program: Program,
     case: Option<&Path>,
     patient: &Patient,
@@ -87,7 +87,7 @@ pub fn plan_case(
     request: ModelRequest,
     card: impl FnOnce() -> bool,
 ) -> Result<PlannedCase, SessionError> {
-    patient.check().map_err(SessionError::Usage)?;
+    patient.check()?;
     match case {
         Some(folder) => {
             let case = fitting(program, folder::load(folder)?)?;
@@ -116,7 +116,7 @@ fn on_case(request: ModelRequest, case: &Case, card: impl FnOnce() -> bool) -> R
 }
 
 /// A case that was built in a folder.
-pub struct Built {
+pub(crate) struct Built {
     /// Its name.
     pub name: String,
     /// Remarks of the import.
@@ -124,8 +124,13 @@ pub struct Built {
 }
 
 /// Builds a case folder.
-pub fn build_case(program: Program, patient: &Patient, out: &Path, built_in: Inputs) -> Result<Built, SessionError> {
-    patient.check().map_err(SessionError::Usage)?;
+pub(crate) fn build_case(
+    program: Program,
+    patient: &Patient,
+    out: &Path,
+    built_in: Inputs,
+) -> Result<Built, SessionError> {
+    patient.check()?;
     if out.exists() {
         return Err(SessionError::Usage(format!(
             "--out {} exists already: name a folder that does not",
@@ -173,7 +178,7 @@ fn recipe(patient: &Patient) -> Recipe {
 }
 
 /// Given input files; those of the built-in case if none is given.
-pub fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
+pub(crate) fn inputs(patient: &Patient, built_in: Inputs) -> Inputs {
     let Patient { ct, mri, labels, tissues, .. } = patient.clone();
     if ct.is_none() && mri.is_none() && labels.is_none() && tissues.is_empty() {
         return built_in;

@@ -5,7 +5,7 @@ use trepan_render::Image;
 use trepan_volume::{Picture, VoxelVolume, overlap_pictures};
 
 /// Overlay pictures: a row of three planes for each pose of the MRI.
-pub struct Fit {
+pub(crate) struct Fit {
     rows: Vec<[Picture; 3]>,
 }
 

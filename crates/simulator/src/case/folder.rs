@@ -21,8 +21,9 @@ use crate::error::SessionError;
 use crate::recipe::Recipe;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs;
+use std::error::Error;
 use std::path::Path;
+use std::{fs, io};
 use trepan_mesh::{lattice::LabelledMesh, vtk};
 use trepan_volume::{hounsfield, nifti, read_regular};
 
@@ -54,29 +55,25 @@ struct Card {
 }
 
 /// Writes a case into an empty folder.
-pub fn save(case: &Case, folder: &Path) -> Result<(), String> {
-    let text = |fault: &dyn std::fmt::Display| fault.to_string();
+pub(crate) fn save(case: &Case, folder: &Path) -> Result<(), Box<dyn Error>> {
     let mut names = Vec::new();
     if let Some(skull) = &case.skull {
-        nifti::write(&folder.join(SKULL), skull).map_err(|f| text(&f))?;
+        nifti::write(&folder.join(SKULL), skull)?;
         names.push(SKULL);
     }
     if let Some(brain) = &case.brain {
-        nifti::write(&folder.join(MASK), &brain.classes).map_err(|f| text(&f))?;
-        nifti::write(&folder.join(MRI), &brain.mri).map_err(|f| text(&f))?;
+        nifti::write(&folder.join(MASK), &brain.classes)?;
+        nifti::write(&folder.join(MRI), &brain.mri)?;
         let label_of_tet = brain.class_of_tet.iter().map(|&class| class.into()).collect();
         let labelled = LabelledMesh { mesh: brain.mesh.clone(), label_of_tet };
-        vtk::write_labelled(&folder.join(MESH), &labelled).map_err(|f| text(&f))?;
+        vtk::write_labelled(&folder.join(MESH), &labelled)?;
         names.extend([MASK, MRI, MESH]);
     }
     if let Some(png) = &case.fit_png {
-        fs::write(folder.join(FIT), png).map_err(|f| text(&f))?;
+        fs::write(folder.join(FIT), png)?;
         names.push(FIT);
     }
-    let mut files = BTreeMap::new();
-    for name in names {
-        files.insert(name.to_string(), digest(&folder.join(name)).map_err(|f| text(&f))?);
-    }
+    let hashed = |name: &str| Ok((name.to_string(), digest(&folder.join(name))?));
     let card = Card {
         form: FORM,
         name: case.name.clone(),
@@ -87,14 +84,13 @@ pub fn save(case: &Case, folder: &Path) -> Result<(), String> {
         opening: case.opening,
         recipe: case.recipe,
         notes: case.notes.clone(),
-        files,
+        files: names.into_iter().map(hashed).collect::<io::Result<_>>()?,
     };
-    let json = serde_json::to_vec_pretty(&card).map_err(|f| text(&f))?;
-    fs::write(folder.join(CARD), json).map_err(|f| text(&f))
+    Ok(fs::write(folder.join(CARD), serde_json::to_vec_pretty(&card)?)?)
 }
 
 /// Reads the patient's identity from a case folder, without the volumes.
-pub fn identity(folder: &Path) -> Result<Identity, SessionError> {
+pub(crate) fn identity(folder: &Path) -> Result<Identity, SessionError> {
     card(folder).map(|Card { name, hash, images, .. }| Identity { name, case: Some(hash), images })
 }
 
@@ -114,7 +110,7 @@ fn broken(folder: &Path, file: &str, fault: &dyn std::fmt::Display) -> SessionEr
 }
 
 /// Opens a case folder; every file must exist and match its hash.
-pub fn load(folder: &Path) -> Result<Case, SessionError> {
+pub(crate) fn load(folder: &Path) -> Result<Case, SessionError> {
     let card = card(folder)?;
     let broken = |file: &str, fault: &dyn std::fmt::Display| broken(folder, file, fault);
     for (name, hash) in &card.files {
@@ -140,7 +136,7 @@ pub fn load(folder: &Path) -> Result<Case, SessionError> {
     let fit_png = card.files.contains_key(FIT).then(|| fs::read(folder.join(FIT))).transpose();
     let fit_png = fit_png.map_err(|fault| broken(FIT, &fault))?;
     let Card { name, hash, images, isovalue_hu, opening, recipe, notes, .. } = card;
-    Ok(Case { name, hash, images, recipe, skull, isovalue_hu, brain, opening, fit_png, notes, cached: true })
+    Ok(Case { name, hash, images, recipe, skull, isovalue_hu, brain, opening, fit_png, notes })
 }
 
 #[cfg(test)]
@@ -154,16 +150,7 @@ mod tests {
         let home = tempfile::tempdir().expect("a temporary folder");
         let mut skull = VoxelVolume::isotropic([6, 5, 4], Vec3::new(1.0, -2.0, 3.5), 0.75, -1000i16);
         skull.data[17] = 1234;
-        let recipe = Recipe {
-            spacing_mm: 0.75,
-            tets: 500,
-            halvings: 1,
-            isovalue_hu: None,
-            ct_series: None,
-            mri_series: None,
-            register: false,
-            opening: None,
-        };
+        let recipe = Recipe { spacing_mm: 0.75, tets: 500, halvings: 1, ..Recipe::default() };
         let case = Case {
             name: "case-1".into(),
             hash: "ab".into(),

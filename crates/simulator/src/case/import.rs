@@ -39,7 +39,7 @@ pub fn open(program: Program, inputs: &Inputs, recipe: &Recipe, cache: &Cache) -
 }
 
 /// Opens a case whose voxel size and tetrahedra are chosen by `choose` when the images are known.
-pub fn open_by(
+pub(super) fn open_by(
     program: Program,
     inputs: &Inputs,
     requested: &Recipe,
@@ -82,7 +82,7 @@ struct CachedFacts {
 }
 
 /// A case before it is built: its inputs and properties.
-pub struct PendingCase<'a> {
+pub(super) struct PendingCase<'a> {
     /// Properties of its images, from the cache if they were read before.
     pub facts: Facts,
     /// Remarks on them.
@@ -93,7 +93,8 @@ pub struct PendingCase<'a> {
     cache: &'a Cache,
     key: String,
     images: Option<Images>,
-    stages: ImportStages,
+    /// Progress of the import.
+    pub stages: ImportStages,
 }
 
 impl<'a> PendingCase<'a> {
@@ -141,11 +142,6 @@ impl<'a> PendingCase<'a> {
             sight.flatten().map_or_else(CaseErrors::default, |sight| CaseErrors::of(&sight, scene, rows, threads));
         store(&errors, self.cache, &key, ERRORS);
         Ok(errors)
-    }
-
-    /// Hides the progress bar during a call that prints.
-    pub fn suspend_progress(&self, call: impl FnOnce()) {
-        self.stages.suspend(call);
     }
 }
 
@@ -280,7 +276,7 @@ fn build(
 }
 
 /// Volume of the nonzero voxels, mm³.
-pub fn volume_mm3(mask: &VoxelVolume<u8>) -> f64 {
+pub(super) fn volume_mm3(mask: &VoxelVolume<u8>) -> f64 {
     mask.data.iter().filter(|&&v| v != 0).count() as f64 * mask.spacing_mm().element_product()
 }
 
@@ -302,9 +298,6 @@ fn cached<T: DeserializeOwned>(cache: &Cache, key: &str, file: &str) -> Option<T
 
 /// Caches a value; if that fails, it is computed again next time.
 fn store(value: &impl Serialize, cache: &Cache, key: &str, file: &str) {
-    let write = |folder: &Path| {
-        let json = serde_json::to_vec(value).map_err(|fault| fault.to_string())?;
-        std::fs::write(folder.join(file), json).map_err(|fault| fault.to_string())
-    };
+    let write = |folder: &Path| Ok(std::fs::write(folder.join(file), serde_json::to_vec(value)?)?);
     cache.keep(key, write).err().into_iter().for_each(|fault| tracing::debug!("{file} not cached: {fault}"));
 }

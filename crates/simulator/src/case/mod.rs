@@ -4,7 +4,7 @@ pub(crate) mod anatomy;
 pub(crate) mod cache;
 pub(crate) mod choice;
 mod fit;
-pub(crate) mod folder;
+mod folder;
 pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod opening;
@@ -59,8 +59,6 @@ pub struct Case {
     pub fit_png: Option<Vec<u8>>,
     /// Remarks of the import.
     pub notes: Vec<String>,
-    /// Whether it came from the cache.
-    pub cached: bool,
 }
 
 /// The brain of a case.

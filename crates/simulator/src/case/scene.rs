@@ -147,12 +147,7 @@ fn near_bone(point: Vec3, bone: &BoneVolume) -> bool {
     let reach = (FIXED_BY_BONE_MM / bone.spacing_mm()).ceil() as i32;
     let centre = bone.voxel_of(point);
     let offsets = || -reach..=reach;
-    offsets().any(|k| {
-        offsets().any(|j| {
-            offsets().any(|i| {
-                let voxel = centre + IVec3::new(i, j, k);
-                bone.is_bone(voxel) && bone.centre_of(voxel).distance(point) <= FIXED_BY_BONE_MM
-            })
-        })
-    })
+    let mut all = offsets().flat_map(|k| offsets().flat_map(move |j| offsets().map(move |i| IVec3::new(i, j, k))));
+    let is_near = |voxel: IVec3| bone.is_bone(voxel) && bone.centre_of(voxel).distance(point) <= FIXED_BY_BONE_MM;
+    all.any(|offset| is_near(centre + offset))
 }

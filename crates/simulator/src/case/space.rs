@@ -13,21 +13,13 @@ use crate::error::SessionError;
 use trepan_volume::{BrainFit, TooLarge, VoxelVolume, brain_by_mri, brain_fit};
 
 /// CT that an MRI is compared with.
-pub struct Space<'a> {
+pub(crate) struct Space<'a> {
     /// The CT.
     pub ct: &'a VoxelVolume<i16>,
     /// Its threshold of bone, HU.
     pub isovalue_hu: i16,
     /// Whether the MRI was registered to the CT.
     pub registered: bool,
-}
-
-/// Result of the comparison.
-#[derive(Debug, PartialEq)]
-enum Verdict {
-    Fits,
-    Doubtful,
-    Apart,
 }
 
 /// Limits beyond which the user is warned.
@@ -45,19 +37,11 @@ const DOUBTFUL: BrainFit = BrainFit { outside_share: 0.03, filled_share: 0.5, mi
 /// fills little.
 const APART: BrainFit = BrainFit { outside_share: 0.1, filled_share: 0.3, middles_mm: 20.0 };
 
-impl Verdict {
-    fn of(fit: &BrainFit) -> Self {
-        let beyond = |bounds: &BrainFit| {
-            fit.outside_share > bounds.outside_share
-                || fit.filled_share < bounds.filled_share
-                || fit.middles_mm > bounds.middles_mm
-        };
-        match (beyond(&DOUBTFUL), beyond(&APART)) {
-            (_, true) => Self::Apart,
-            (true, _) => Self::Doubtful,
-            _ => Self::Fits,
-        }
-    }
+/// Whether a fit lies beyond a limit.
+fn is_beyond(fit: &BrainFit, limits: &BrainFit) -> bool {
+    fit.outside_share > limits.outside_share
+        || fit.filled_share < limits.filled_share
+        || fit.middles_mm > limits.middles_mm
 }
 
 impl Space<'_> {
@@ -89,13 +73,11 @@ impl Space<'_> {
                 "--register found no good fit: give images of one patient, or register them elsewhere and leave --register out"
             }
         };
-        match Verdict::of(&fit) {
-            Verdict::Fits => Ok(None),
-            Verdict::Doubtful => Ok(Some(format!("the MRI may not lie in the CT's space: {found}; {remedy}"))),
-            Verdict::Apart => {
-                Err(SessionError::Case(format!("the MRI does not lie in the CT's space: {found}; {remedy}")))
-            }
+        if is_beyond(&fit, &APART) {
+            return Err(SessionError::Case(format!("the MRI does not lie in the CT's space: {found}; {remedy}")));
         }
+        let doubt = || format!("the MRI may not lie in the CT's space: {found}; {remedy}");
+        Ok(is_beyond(&fit, &DOUBTFUL).then(doubt))
     }
 }
 

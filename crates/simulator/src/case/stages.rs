@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::time::Duration;
 
 /// Progress bar that records the duration of each stage.
-pub struct ImportStages {
+pub(crate) struct ImportStages {
     bar: ProgressBar,
     clock: Clock,
     /// Name and start time of each stage, ms.

@@ -8,7 +8,7 @@
 
 use crate::device_test::measured::Sample;
 use crate::device_test::trial::{Part, TAP_MS};
-use trepan_geometry::Vec3;
+use trepan_geometry::{Vec3, quantile};
 
 /// Smallest displacement that counts as motion, mm, for encoders with finer steps.
 const MIN_MOTION_MM: f32 = 0.01;
@@ -18,15 +18,14 @@ const STILL: (f32, f64) = (0.15, 20.0);
 
 /// Median delay from a tap to the first motion along it, ms, over taps on a still hand. `None` if
 /// most taps caused no motion.
-pub fn median_ms(samples: &[Sample]) -> Option<f64> {
+pub(crate) fn median_ms(samples: &[Sample]) -> Option<f64> {
     let begins = |at: &usize| {
         let (before, now) = (&samples[at - 1], &samples[*at]);
         now.part == Part::Tap && before.force == Vec3::ZERO && now.force != Vec3::ZERO && is_still(&samples[..=*at])
     };
-    let mut delays: Vec<f64> =
-        (1..samples.len()).filter(begins).map(|at| first_motion_ms(&samples[at..]).unwrap_or(f64::INFINITY)).collect();
-    delays.sort_by(f64::total_cmp);
-    delays.get(delays.len() / 2).copied().filter(|delay| delay.is_finite())
+    let delay = |at: usize| first_motion_ms(&samples[at..]).unwrap_or(f64::INFINITY);
+    let mut delays: Vec<f64> = (1..samples.len()).filter(begins).map(delay).collect();
+    Some(quantile(&mut delays, 0.5)).filter(|delay| delay.is_finite())
 }
 
 /// Whether the hand was still before the last sample.

@@ -5,7 +5,7 @@ use trepan_geometry::Vec3;
 use trepan_haptics::Capabilities;
 
 /// Derives the findings from the measurements.
-pub fn of(measured: &Measured, device: &Capabilities) -> Vec<Finding> {
+pub(crate) fn of(measured: &Measured, device: &Capabilities) -> Vec<Finding> {
     let [rate, pauses] = timing(&measured.timing);
     let mut found = vec![rate, pauses, range(measured, device), delay(measured, device), floor(&measured.floor)];
     found.extend(measured.fault.iter().map(|fault| Finding { good: false, text: fault.clone() }));
@@ -78,7 +78,7 @@ fn floor(floor: &Floor) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::summary::Quantiles;
+    use crate::run::Quantiles;
 
     #[test]
     fn a_fast_rate_is_good_and_a_slow_or_uneven_one_is_not() {

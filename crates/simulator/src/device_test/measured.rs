@@ -3,16 +3,17 @@
 //! # Practice
 //! Units are mm, N and ms unless a name says otherwise.
 
-use crate::device_test::trial::{FLOOR_N, FLOOR_N_PER_MM, Part};
-use crate::report::summary::{GuardSummary, Machine, Quantiles};
-use crate::run::Times;
+use crate::device_test::trial::{FLOOR_N, FLOOR_N_PER_MM, Part, Trial};
+use crate::report::summary::Machine;
+use crate::run::{Quantiles, Times};
+use crate::stages::by_cause;
 use serde::Serialize;
-use trepan_contact::ForceGuard;
+use trepan_contact::GuardCounters;
 use trepan_geometry::Vec3;
 
 /// One tick of the test.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// Time of the reading, ms.
     pub time_ms: f64,
     /// Duration of reading the device, µs.
@@ -32,7 +33,7 @@ pub struct Sample {
 /// How a test ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Ending {
+pub(crate) enum Ending {
     /// The test was completed.
     Done,
     /// The device's script ended.
@@ -45,7 +46,7 @@ pub enum Ending {
 
 /// Contents of `device.json`.
 #[derive(Clone, Debug, Serialize)]
-pub struct Measured {
+pub(crate) struct Measured {
     /// Requested name of the device.
     pub device: String,
     /// Name that the driver reports.
@@ -86,7 +87,7 @@ pub struct Measured {
 
 /// Timing of ticks and positions.
 #[derive(Clone, Debug, Serialize)]
-pub struct Timing {
+pub(crate) struct Timing {
     /// Duration of the test, s.
     pub seconds: f64,
     /// Requested tick rate, Hz.
@@ -111,7 +112,7 @@ pub struct Timing {
 
 /// Measurements at the virtual floor, a soft wall.
 #[derive(Clone, Debug, Serialize)]
-pub struct Floor {
+pub(crate) struct Floor {
     /// Stiffness, N/mm.
     pub stiffness_n_per_mm: f32,
     /// Force limit, N.
@@ -127,27 +128,30 @@ pub struct Floor {
     /// Largest net energy output, mJ.
     pub energy_out_mj: f64,
     /// Interventions of the force guard, ticks.
-    pub guard: GuardSummary,
+    #[serde(serialize_with = "by_cause")]
+    pub guard: GuardCounters,
 }
 
 /// Samples of a test, with the state at its end.
-pub struct TestRun<'a> {
+pub(super) struct TestRun {
     /// Every tick.
-    pub samples: &'a [Sample],
+    pub samples: Vec<Sample>,
     /// Tick period, ms.
     pub tick_ms: f64,
     /// Ticks that missed their deadline.
     pub late: u64,
-    /// The floor's guard.
-    pub guard: &'a ForceGuard,
-    /// Height of the floor, mm.
-    pub floor_y: Option<f32>,
+    /// How the test ended.
+    pub ended: Ending,
+    /// The floor and its guard.
+    pub trial: Trial,
+    /// Remarks, such as a refused real-time priority.
+    pub remarks: Vec<String>,
 }
 
 impl Timing {
     /// Computes the timing.
-    pub fn of(run: &TestRun<'_>) -> Self {
-        let samples = run.samples;
+    pub fn of(run: &TestRun) -> Self {
+        let samples = &run.samples;
         let seconds = span_ms(samples) * 1e-3;
         let ticks = gaps(samples.iter());
         let jitter = ticks.iter().map(|gap| (gap - run.tick_ms).abs()).collect::<Vec<_>>();
@@ -175,24 +179,25 @@ impl Timing {
 
 impl Floor {
     /// Evaluates the samples of the floor part.
-    pub fn of(run: &TestRun<'_>) -> Self {
+    pub fn of(run: &TestRun) -> Self {
         let pressed = run.samples.iter().filter(|s| s.part == Part::Floor && s.force.y > 0.0);
-        let depth = |s: &Sample| run.floor_y.map_or(0.0, |y| (y - s.tip.y).max(0.0));
+        let (guard, floor_y) = (&run.trial.floor, run.trial.floor_y);
+        let depth = |s: &Sample| floor_y.map_or(0.0, |y| (y - s.tip.y).max(0.0));
         Self {
             stiffness_n_per_mm: FLOOR_N_PER_MM,
-            limit_n: FLOOR_N.min(run.guard.config().max_force_n),
-            height_mm: run.floor_y,
+            limit_n: FLOOR_N.min(guard.config().max_force_n),
+            height_mm: floor_y,
             touched_s: pressed.clone().count() as f64 * run.tick_ms * 1e-3,
             depth_mm: pressed.clone().map(depth).fold(0.0, f32::max),
             force_n: pressed.map(|s| s.force.length()).fold(0.0, f32::max),
-            energy_out_mj: run.guard.passivity_observer().lowest_nmm().min(0.0).abs(),
-            guard: (&run.guard.counters()).into(),
+            energy_out_mj: guard.passivity_observer().lowest_nmm().min(0.0).abs(),
+            guard: guard.counters(),
         }
     }
 }
 
 /// Bounding box of the tip, mm; a point at the origin without samples.
-pub fn explored(samples: &[Sample]) -> [Vec3; 2] {
+pub(crate) fn explored(samples: &[Sample]) -> [Vec3; 2] {
     let tips = || samples.iter().filter(|s| s.fresh).map(|s| s.tip).filter(|tip| tip.is_finite());
     let low = tips().reduce(Vec3::min).unwrap_or(Vec3::ZERO);
     [low, tips().reduce(Vec3::max).unwrap_or(Vec3::ZERO)]
@@ -209,7 +214,7 @@ fn gaps<'a>(samples: impl Iterator<Item = &'a Sample>) -> Vec<f64> {
 
 /// One finding of a device test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
+pub(crate) struct Finding {
     /// Whether the device passes.
     pub good: bool,
     /// Description; with a remedy if the device fails.
@@ -219,7 +224,6 @@ pub struct Finding {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::device_test::trial::Trial;
     use trepan_geometry::{Pose, ToolState};
     use trepan_haptics::replay::Replay;
     use trepan_haptics::simulated::{Config, HandModel, Simulated};
@@ -243,6 +247,10 @@ pub(super) mod tests {
         ((0..10_000).map(sample).collect(), trial, able)
     }
 
+    fn run(samples: Vec<Sample>, trial: Trial, late: u64) -> TestRun {
+        TestRun { samples, tick_ms: 1.0, late, ended: Ending::Done, trial, remarks: Vec::new() }
+    }
+
     #[test]
     fn box_floor_and_timing_match_the_motion() {
         // Up and down by 20 mm while exploring, then pressing the floor, then still.
@@ -253,7 +261,7 @@ pub(super) mod tests {
         let (samples, trial, able) = tested(Config::default(), HandModel::FIRM, hand);
         let [low, high] = explored(&samples);
         assert!((high.y - 20.0).abs() < 2.0 && (low.y + 20.0).abs() < 2.0, "{low} {high}");
-        let run = TestRun { samples: &samples, tick_ms: 1.0, late: 0, guard: trial.guard(), floor_y: trial.floor_y() };
+        let run = run(samples, trial, 0);
         let floor = Floor::of(&run);
         assert!(floor.force_n > 0.9 && floor.touched_s > 1.5 && floor.energy_out_mj < 0.1, "{floor:?}");
         assert!((floor.height_mm.unwrap() + 8.0).abs() < 2.0, "three tenths of the way up from -20");
@@ -267,7 +275,7 @@ pub(super) mod tests {
     fn gaps_are_between_new_positions() {
         let (mut samples, trial, _) = tested(Config::default(), HandModel::FIRM, |_| 0.0);
         samples.iter_mut().enumerate().for_each(|(at, s)| s.fresh = at % 4 == 0);
-        let run = TestRun { samples: &samples, tick_ms: 1.0, late: 7, guard: trial.guard(), floor_y: None };
+        let run = run(samples, trial, 7);
         let timing = Timing::of(&run);
         assert!((timing.fresh_hz - 250.0).abs() < 1.0 && (timing.gap_us.p50 - 4000.0).abs() < 8.0);
         assert!((timing.tick_us.p50 - 1000.0).abs() < 2.0 && timing.late_ticks == 7);

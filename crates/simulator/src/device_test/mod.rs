@@ -13,19 +13,20 @@ mod page;
 mod trial;
 
 use crate::error::SessionError;
+use crate::hand::simulated_hand;
 use crate::report::output::whole;
 use crate::report::summary::Machine;
 use crate::run::clock::{Clock, Schedule};
 use crate::run::stop::Stop;
 use crate::run::threads::{HapticDeviceOwner, real_time};
 use measured::{Ending, Floor, Measured, Sample, TestRun, Timing};
+use std::fmt::Display;
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::simulated::{self, Simulated};
 use trepan_haptics::{Capabilities, DeviceName, HapticDevice, NameError, Status, Watch, Workspace, hardware};
 use trial::{Part, Trial};
 
@@ -41,7 +42,7 @@ struct Subject {
 
 /// Tests a device for some seconds and writes `device.json` and `device.html` to `out`. Returns the
 /// signal that ended the test, if any.
-pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionError> {
+pub(crate) fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionError> {
     if !(8.0..=600.0).contains(&seconds) {
         return Err(SessionError::Usage(format!("--duration {seconds} is out of range: give 8 to 600")));
     }
@@ -49,7 +50,7 @@ pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionE
         return Err(SessionError::Usage(format!("--out {} is a file: name a folder, new or old", out.display())));
     }
     let stop = Stop::on_signals().map_err(|fault| SessionError::Internal(format!("signals: {fault}")))?;
-    let subject = open(name, 1e3 * seconds).map_err(SessionError::Usage)?;
+    let subject = open(name, 1e3 * seconds)?;
     let (found, samples) = test(subject, 1e3 * seconds, &stop);
     write(&found, &samples, out)?;
     for finding in &found.findings {
@@ -62,36 +63,24 @@ pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionE
     Ok(stop.signal())
 }
 
-fn open(name: &str, end_ms: f64) -> Result<Subject, String> {
-    let name: DeviceName = name.parse().map_err(|fault: NameError| fault.to_string())?;
+fn open(name: &str, end_ms: f64) -> Result<Subject, SessionError> {
+    let usage = |fault: &dyn Display| SessionError::Usage(fault.to_string());
+    let name: DeviceName = name.parse().map_err(|fault: NameError| usage(&fault))?;
     let script = |script: &str| {
         let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Y, bone_mm: 6.0, brain_mm: 8.0 };
-        Script::named(script, &site, end_ms).map_err(|fault| fault.to_string())
+        Script::named(script, &site, end_ms).map_err(|fault| usage(&fault))
     };
-    let software = |device: Box<dyn HapticDevice>| Ok(Subject { name: name.clone(), device, watch: None });
-    match &name {
-        DeviceName::Script(operation) => software(Box::new(script(operation)?)),
-        DeviceName::Simulated(operation) => {
-            let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-            software(Box::new(Simulated::new(config, grip, Box::new(script(operation)?))))
+    let (device, watch): (Box<dyn HapticDevice>, _) = match &name {
+        DeviceName::Script(operation) => (Box::new(script(operation)?), None),
+        DeviceName::Simulated(operation) => (simulated_hand(script(operation)?), None),
+        _ => {
+            let unfit = || usage(&format!("{name} cannot be tested; `--list-devices` shows the devices that can"));
+            let opened = hardware::open(&name, Workspace::default()).ok_or_else(unfit)?;
+            let hardware::Hardware { device, watch } = opened.map_err(|fault| usage(&fault))?;
+            (device, Some(watch))
         }
-        _ => match hardware::open(&name, Workspace::default()) {
-            Some(opened) => {
-                let hardware::Hardware { device, watch } = opened.map_err(|fault| fault.to_string())?;
-                Ok(Subject { name, device, watch: Some(watch) })
-            }
-            None => Err(format!("{name} cannot be tested; `--list-devices` shows the devices that can")),
-        },
-    }
-}
-
-/// Result of the haptic loop.
-struct LoopResult {
-    samples: Vec<Sample>,
-    late: u64,
-    ended: Ending,
-    trial: Trial,
-    remarks: Vec<String>,
+    };
+    Ok(Subject { name, device, watch })
 }
 
 /// Runs the haptic loop on its own thread; this thread prints the instructions.
@@ -113,14 +102,16 @@ fn test(subject: Subject, end_ms: f64, stop: &Stop) -> (Measured, Vec<Sample>) {
         print_instructions(&part, &over);
         worker.join().ok()
     });
-    let result = result.unwrap_or_else(|| panicked(Trial::new(&able, tick_ms as f32, end_ms)));
-    let found = measured(name.to_string(), &able, &result, tick_ms, watch.as_ref());
+    let result = result.unwrap_or_else(|| TestRun {
+        samples: Vec::new(),
+        tick_ms,
+        late: 0,
+        ended: Ending::Lost,
+        trial: Trial::new(&able, tick_ms as f32, end_ms),
+        remarks: vec!["the haptic thread panicked; the device was closed".to_string()],
+    });
+    let found = measured(name.to_string(), &able, &result, watch.as_ref());
     (found, result.samples)
-}
-
-fn panicked(trial: Trial) -> LoopResult {
-    let remarks = vec!["the haptic thread panicked; the device was closed".to_string()];
-    LoopResult { samples: Vec::new(), late: 0, ended: Ending::Lost, trial, remarks }
 }
 
 /// Prints the instruction of each part as it begins.
@@ -144,7 +135,7 @@ fn run_loop(
     end_ms: f64,
     stop: &Stop,
     current: &AtomicU8,
-) -> LoopResult {
+) -> TestRun {
     let remarks = real_time(80, "haptic").into_iter().collect();
     let mut samples = Vec::with_capacity((1.1 * end_ms / tick_ms) as usize + FADE_TICKS as usize);
     let (mut late, mut ending, mut fade) = (0, None, FADE_TICKS);
@@ -177,7 +168,7 @@ fn run_loop(
             trial.release();
             fade -= 1;
             if wrench.force() == Vec3::ZERO || fade == 0 {
-                return LoopResult { samples, late, ended, trial, remarks };
+                return TestRun { samples, tick_ms, late, ended, trial, remarks };
             }
         }
     }
@@ -193,26 +184,25 @@ fn ends(status: Status, over: bool, stop: &Stop) -> Option<Ending> {
     }
 }
 
-fn measured(device: String, able: &Capabilities, result: &LoopResult, tick_ms: f64, watch: Option<&Watch>) -> Measured {
-    let LoopResult { samples, late, trial, .. } = result;
-    let run = TestRun { samples, tick_ms, late: *late, guard: trial.guard(), floor_y: trial.floor_y() };
+fn measured(device: String, able: &Capabilities, run: &TestRun, watch: Option<&Watch>) -> Measured {
+    let samples = &run.samples;
     let mut found = Measured {
         device,
         model: able.name.clone(),
-        ended: result.ended,
+        ended: run.ended,
         fault: watch.and_then(Watch::fault).map(|fault| fault.to_string()),
         faults: watch.map_or(0, Watch::count),
         findings: Vec::new(),
-        timing: Timing::of(&run),
+        timing: Timing::of(run),
         delay_ms: delay::median_ms(samples),
         stated_delay_ticks: able.delay_ticks,
         explored_mm: measured::explored(samples).map(|corner| corner.to_array()),
         workspace_mm: able.workspace_mm.is_finite().then(|| able.workspace_mm.to_array()),
         resolution_mm: able.position_resolution_mm,
         forces_n: [able.peak_force_n, able.continuous_force_n],
-        floor: Floor::of(&run),
+        floor: Floor::of(run),
         end_force_n: samples.last().map_or(0.0, |last| last.force.length()),
-        remarks: result.remarks.clone(),
+        remarks: run.remarks.clone(),
         machine: Machine::here(None),
     };
     found.findings = findings::of(&found, able);
@@ -220,9 +210,9 @@ fn measured(device: String, able: &Capabilities, result: &LoopResult, tick_ms: f
 }
 
 fn write(found: &Measured, samples: &[Sample], out: &Path) -> Result<(), SessionError> {
-    let internal = |fault: &dyn std::fmt::Display| SessionError::Internal(format!("device.json: {fault}"));
-    let json = serde_json::to_vec_pretty(found).map_err(|fault| internal(&fault))?;
-    let page = page::html(found, samples).map_err(SessionError::Internal)?;
+    let json = serde_json::to_vec_pretty(found);
+    let json = json.map_err(|fault| SessionError::Internal(format!("device.json: {fault}")))?;
+    let page = page::html(found, samples)?;
     fs::create_dir_all(out).map_err(|fault| SessionError::Output { path: out.into(), fault })?;
     whole(&out.join("device.json"), &json)?;
     whole(&out.join("device.html"), page.as_bytes())

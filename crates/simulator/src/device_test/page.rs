@@ -2,58 +2,45 @@
 
 use crate::device_test::measured::{Measured, Sample};
 use crate::device_test::trial::Part;
-use crate::report::chart::{Curve, histogram, over_time, traces};
-use crate::report::page::{STYLE, escaped, rows, table};
+use crate::error::SessionError;
+use crate::report::chart::{Chart, Curve, histogram, over_time, traces};
+use crate::report::page::{Table, render, rows};
 use crate::run::Times;
+use serde_json::json;
 
 /// Builds the page.
-pub fn html(found: &Measured, samples: &[Sample]) -> Result<String, String> {
-    let title = format!("Trepan: test of {}", escaped(&found.device));
-    let head = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">";
-    let mut page = format!("{head}<title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>");
-    page += &format!("<p>{}</p><ul>", escaped(&found.model));
-    for finding in &found.findings {
-        let class = if finding.good { "" } else { " class=\"w\"" };
-        page += &format!("<li{class}>{}</li>", escaped(&finding.text));
-    }
-    page += "</ul>";
-    for (caption, svg) in charts(samples, found.timing.asked_hz)? {
-        page += &format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>");
-    }
-    page += "<h2>Numbers</h2>";
-    let value = serde_json::to_value(found).map_err(|fault| format!("device.json: {fault}"))?;
-    let mut numbers = Vec::new();
-    rows("", &value, &mut numbers);
-    table(&mut page, &numbers);
-    page += "</body></html>\n";
-    Ok(page)
+pub(super) fn html(found: &Measured, samples: &[Sample]) -> Result<String, SessionError> {
+    let context = json!({
+        "title": format!("Trepan: test of {}", found.device),
+        "found": found,
+        "charts": charts(samples, found.timing.asked_hz)?,
+        "tables": [Table { title: "Numbers", rows: rows("device.json", found)? }],
+    });
+    render("device.html", &context)
 }
 
-fn charts(samples: &[Sample], asked_hz: f64) -> Result<Vec<(&'static str, String)>, String> {
-    let over = |name, value: &dyn Fn(&Sample) -> f32| Curve {
-        name,
-        points: samples.iter().map(|s| (s.time_ms * 1e-3, f64::from(value(s)))).collect(),
+fn charts(samples: &[Sample], asked_hz: f64) -> Result<[Chart; 6], SessionError> {
+    let over = |name, value: fn(&Sample) -> f32| Curve::over_time(name, samples, |s| (s.time_ms, value(s)));
+    let of = |name, part: Option<Part>, point: fn(&Sample) -> (f32, f32)| {
+        let points = samples.iter().filter(|s| part.is_none_or(|part| s.part == part)).map(point);
+        Curve { name, points: points.map(|(x, y)| (f64::from(x), f64::from(y))).collect() }
     };
-    let seen = |name, of: &dyn Fn(&Sample) -> (f32, f32)| Curve {
-        name,
-        points: samples.iter().map(of).map(|(x, y)| (f64::from(x), f64::from(y))).collect(),
-    };
-    let floor = samples.iter().filter(|s| s.part == Part::Floor);
-    let pressed = Curve { name: "floor", points: floor.map(|s| (f64::from(s.tip.y), f64::from(s.force.y))).collect() };
+    let front = [of("tip", None, |s| (s.tip.x, s.tip.y))];
+    let side = [of("tip", None, |s| (s.tip.z, s.tip.y))];
+    let pressed = [of("floor", Some(Part::Floor), |s| (s.tip.y, s.force.y))];
+    let [height, force] = [over("tip", |s| s.tip.y), over("up", |s| s.force.y)];
     let mut gaps = Times::default();
     samples.windows(2).for_each(|pair| gaps.add_us(((pair[1].time_ms - pair[0].time_ms) * 1e3) as f32));
-    Ok(vec![
-        (
-            "Path of the tip from the front: right and up",
-            traces(["to the right, mm", "up, mm"], &[seen("tip", &|s| (s.tip.x, s.tip.y))])?,
-        ),
-        (
+    let periods = histogram("tick period, µs", &gaps.bins(), 1e6 / asked_hz)?;
+    Ok([
+        Chart::new("Path of the tip from the front: right and up", traces(["to the right, mm", "up, mm"], &front)?),
+        Chart::new(
             "Path of the tip from the right: towards the user and up",
-            traces(["towards you, mm", "up, mm"], &[seen("tip", &|s| (s.tip.z, s.tip.y))])?,
+            traces(["towards you, mm", "up, mm"], &side)?,
         ),
-        ("Height of the tip", over_time("up, mm", &[over("tip", &|s| s.tip.y)], None)?),
-        ("Force: at the floor, then of the taps", over_time("force, N", &[over("up", &|s| s.force.y)], None)?),
-        ("Force at the floor over the height of the tip", traces(["up, mm", "force, N"], &[pressed])?),
-        ("Tick period (dashed: requested)", histogram("tick period, µs", &gaps.bins(), 1e6 / asked_hz)?),
+        Chart::new("Height of the tip", over_time("up, mm", &[height], None)?),
+        Chart::new("Force: at the floor, then of the taps", over_time("force, N", &[force], None)?),
+        Chart::new("Force at the floor over the height of the tip", traces(["up, mm", "force, N"], &pressed)?),
+        Chart::new("Tick period (dashed: requested)", periods),
     ])
 }

@@ -21,13 +21,13 @@ use trepan_geometry::{ToolState, Vec3, Wrench};
 use trepan_haptics::{Capabilities, Reading, Status};
 
 /// Stiffness of the floor, N/mm.
-pub const FLOOR_N_PER_MM: f32 = 0.3;
+pub(crate) const FLOOR_N_PER_MM: f32 = 0.3;
 /// Force limit of the floor, N.
-pub const FLOOR_N: f32 = 1.0;
+pub(crate) const FLOOR_N: f32 = 1.0;
 /// Force of a tap, N.
 const TAP_N: f32 = 0.8;
 /// Duration of a tap, ms.
-pub const TAP_MS: f64 = 25.0;
+pub(crate) const TAP_MS: f64 = 25.0;
 /// Period of the taps, ms: a light hand oscillates for a third of a second after a tap.
 const TAP_PERIOD_MS: f64 = 400.0;
 /// Duration of all taps, ms: an even number of periods.
@@ -41,7 +41,7 @@ const EXPLORE: f64 = 0.4;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u8)]
-pub enum Part {
+pub(crate) enum Part {
     /// Move through the whole range.
     Explore,
     /// Press down.
@@ -70,14 +70,16 @@ impl Part {
 }
 
 /// State of one test.
-pub struct Trial {
+pub(crate) struct Trial {
     end_ms: f64,
     tick_ms: f32,
     driven: bool,
     height: [f32; 2],
-    floor_y: Option<f32>,
+    /// Height of the floor, mm; `None` before its part begins.
+    pub floor_y: Option<f32>,
     taps: ForceGuard,
-    floor: ForceGuard,
+    /// The guard of the floor.
+    pub floor: ForceGuard,
 }
 
 impl Trial {
@@ -120,16 +122,6 @@ impl Trial {
     pub fn release(&mut self) {
         self.taps.release();
         self.floor.release();
-    }
-
-    /// The guard of the floor.
-    pub fn guard(&self) -> &ForceGuard {
-        &self.floor
-    }
-
-    /// Height of the floor, mm; `None` before its part begins.
-    pub fn floor_y(&self) -> Option<f32> {
-        self.floor_y
     }
 
     fn part(&self, time_ms: f64) -> (Part, f64) {
@@ -223,7 +215,7 @@ mod tests {
         trial.step(&reading(50.0, 1.0, Status::Fresh), 1.0);
         trial.step(&reading(-50.0, 2.0, Status::Fresh), 2.0);
         trial.step(&reading(-30.0, 5000.0, Status::Fresh), 5000.0);
-        assert_eq!(trial.floor_y(), Some(-31.0));
+        assert_eq!(trial.floor_y, Some(-31.0));
     }
 
     #[test]

@@ -13,11 +13,10 @@
 //! # When not to use it
 //! To judge the CT itself: what the scanner has blurred is unknown.
 
-use super::quantile;
 use crate::run::clock::Clock;
 use glam::DAffine3;
 use trepan_budget::{Bone, Scene};
-use trepan_geometry::{Pose, Tool, ToolState, Vec3};
+use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile};
 use trepan_rigid::rivals::brute;
 use trepan_rigid::{Method, RigidStep};
 use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
@@ -169,7 +168,7 @@ impl Stretch {
         if cuts {
             bone.undo_stroke();
         }
-        (forces, quantile(us, 0.5))
+        (forces, quantile(&mut us, 0.5))
     }
 
     /// Measures each choice, in the order given: the worst error of all paths, the tick time of the
@@ -215,7 +214,7 @@ impl Stretch {
 /// Force error over the ticks in contact, 95th percentile, N.
 fn error_n(forces: &[Vec3], truth: &[Vec3]) -> f64 {
     let both = forces.iter().zip(truth).filter(|(a, b)| **a != Vec3::ZERO || **b != Vec3::ZERO);
-    quantile(both.map(|(a, b)| f64::from(a.distance(*b))).collect(), 0.95)
+    quantile(&mut both.map(|(a, b)| f64::from(a.distance(*b))).collect::<Vec<_>>(), 0.95)
 }
 
 /// Resamples the block around a place on the grid of a session.
@@ -250,9 +249,7 @@ impl<'a> Surface<'a> {
     /// Height of the outermost bone over a point of the plane, mm.
     fn height(&self, aside: Vec3) -> Option<f32> {
         let step = 0.5 * self.bone.spacing_mm();
-        let over = |height: f32| {
-            density(self.bone, self.place + aside + height * self.normal) - f32::from(self.bone.isovalue())
-        };
+        let over = |height: f32| over_isovalue(self.bone, self.place + aside + height * self.normal);
         let mut height = 10.0;
         while height > -10.0 {
             let (above, below) = (over(height), over(height - step));
@@ -265,16 +262,16 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// Trilinear density, HU.
-fn density(bone: &BoneVolume, place: Vec3) -> f32 {
-    let grid = bone.grid_of(place);
-    let (low, share) = (grid.floor().as_ivec3(), grid - grid.floor());
+/// Trilinear density minus the isovalue at a point, HU.
+pub(crate) fn over_isovalue(bone: &BoneVolume, point: Vec3) -> f32 {
+    let at = bone.grid_of(point);
+    let (low, part) = (at.floor().as_ivec3(), at - at.floor());
     let corner = |n: i32| {
-        let bit = glam::IVec3::new(n & 1, n >> 1 & 1, n >> 2);
-        let part = Vec3::select(bit.cmpeq(glam::IVec3::ONE), share, 1.0 - share);
-        part.x * part.y * part.z * f32::from(bone.hu(low + bit))
+        let step = glam::IVec3::new(n & 1, n >> 1 & 1, n >> 2);
+        let weight = Vec3::select(step.cmpeq(glam::IVec3::ONE), part, 1.0 - part);
+        weight.element_product() * f32::from(bone.hu(low + step))
     };
-    (0..8).map(corner).sum()
+    (0..8).map(corner).sum::<f32>() - f32::from(bone.isovalue())
 }
 
 /// Path in along the normal, then along the surface at constant depth below its smoothed height.

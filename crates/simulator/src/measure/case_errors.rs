@@ -24,6 +24,7 @@
 //! the rest. The errors do not depend on the tolerances, so they are cached with the case. Parts
 //! that cannot be measured use the power laws.
 
+use super::Parts;
 use super::bone::{Skull, Slide, Stretch};
 use super::picture::View;
 use super::tissue::{Brains, Fineness, LEAST_MM, Push, Shape};
@@ -108,8 +109,9 @@ impl CaseErrors {
     }
 
     /// Whether bone, tissue and picture were measured.
-    pub fn has(&self) -> [bool; 3] {
-        [!self.bone.is_empty(), !self.tissue.is_empty(), !self.picture.is_empty()]
+    pub fn has(&self) -> Parts<bool> {
+        let Self { bone, tissue, picture } = self;
+        Parts { bone: !bone.is_empty(), tissue: !tissue.is_empty(), picture: !picture.is_empty() }
     }
 }
 
@@ -241,7 +243,7 @@ mod tests {
         rows.bone.retain(|row| row.what.method == "god-object-sphere" && [0.5, 2.0].contains(&row.what.spacing_mm));
         rows.picture.retain(|row| !row.what.sparse && [0.25, 0.5, 1.0].contains(&row.what.detail));
         let own = CaseErrors::of(&ball(), &scene, &rows, 1);
-        assert_eq!(own.has(), [true, false, true]);
+        assert_eq!(own.has(), Parts { bone: true, tissue: false, picture: true });
         let found = own.instead(rows.clone(), &scene);
         let errors: Vec<f64> = found.bone.iter().map(|row| row.error.at_most(&scene.bone_features())).collect();
         assert!(errors.len() == 2 && errors[0] < 0.6 * errors[1], "{errors:?}");

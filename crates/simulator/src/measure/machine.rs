@@ -5,11 +5,12 @@
 //! that stay in the CPU cache as real ones do. Parts that are not wanted keep the number of
 //! [`Machine::default`].
 
+use crate::measure::Wanted;
 use crate::run::clock::Clock;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 use trepan_budget::Machine;
-use trepan_geometry::{Pose, Tool, ToolState, Vec3, units};
+use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile, units};
 use trepan_render::{Camera, Frame, ProcessorRenderer, SceneData, SliceLook};
 use trepan_rigid::{Method, RigidStep};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
@@ -22,24 +23,6 @@ const CALLS: usize = 400;
 const PICTURES: usize = 9;
 /// Edge of a picture, pixels.
 const PIXELS: u32 = 160;
-
-/// Parts that a plan chooses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Wanted {
-    /// Haptic ticks on bone.
-    pub bone: bool,
-    /// Solver steps of tissue.
-    pub tissue: bool,
-    /// Rays of the picture.
-    pub picture: bool,
-}
-
-impl Wanted {
-    /// Whether any part is wanted.
-    pub fn any(self) -> bool {
-        self.bone || self.tissue || self.picture
-    }
-}
 
 /// Measures this machine. `device_draws`: whether a graphics card draws.
 pub fn machine(wanted: Wanted, device_draws: bool) -> Machine {
@@ -56,15 +39,12 @@ pub fn machine(wanted: Wanted, device_draws: bool) -> Machine {
 
 /// Median time of a call, µs.
 fn median_us(clock: &Clock, calls: usize, mut call: impl FnMut(usize)) -> f64 {
-    let mut times: Vec<f64> = (0..calls)
-        .map(|i| {
-            let began_ms = clock.now_ms();
-            call(i);
-            1e3 * (clock.now_ms() - began_ms)
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    times[calls / 2]
+    let time_us = |i| {
+        let began_ms = clock.now_ms();
+        call(i);
+        1e3 * (clock.now_ms() - began_ms)
+    };
+    quantile(&mut (0..calls).map(time_us).collect::<Vec<_>>(), 0.5)
 }
 
 /// Median time per tetrahedron of a TLED step, ns.

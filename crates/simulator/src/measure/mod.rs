@@ -8,11 +8,25 @@ pub mod picture;
 pub mod tissue;
 
 pub use case_errors::{CaseErrors, Sight};
-pub use machine::{Wanted, machine};
+pub use machine::machine;
 
-/// Quantile `share` (0 to 1) of values in any order; NaN without values.
-fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1);
-    values.get((share * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
+/// One value for each part that a plan chooses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Parts<T> {
+    /// Haptic ticks on bone.
+    pub bone: T,
+    /// Solver steps of tissue.
+    pub tissue: T,
+    /// Rays of the picture.
+    pub picture: T,
+}
+
+/// Which parts a plan chooses.
+pub type Wanted = Parts<bool>;
+
+impl Wanted {
+    /// Whether any part is wanted.
+    pub fn any(self) -> bool {
+        self.bone || self.tissue || self.picture
+    }
 }

@@ -17,13 +17,12 @@
 //! solvers is a ratio of times in one run.
 
 use super::bone::Slide;
-use super::quantile;
 use crate::error::SessionError;
 use crate::run::clock::Clock;
 use std::collections::BTreeMap;
 use trepan_budget::{Scene, Tissue, dt_ms};
 use trepan_contact::{NodalContact, NodalContacts};
-use trepan_geometry::Vec3;
+use trepan_geometry::{Vec3, quantile};
 use trepan_mesh::{Surface, TetMesh, lattice};
 use trepan_soft::{Body, Loads, Material, Method, SoftSolver};
 use trepan_tled::{Config, Damping, Tled};
@@ -309,7 +308,8 @@ impl Push {
     }
 
     fn error_mm(&self, places: &[Vec3]) -> f64 {
-        quantile(places.iter().zip(&self.truth).map(|(a, b)| f64::from(a.distance(*b))).collect(), 0.95)
+        let apart = places.iter().zip(&self.truth).map(|(a, b)| f64::from(a.distance(*b)));
+        quantile(&mut apart.collect::<Vec<_>>(), 0.95)
     }
 
     /// Runs push and slide. Returns the points' displacements at the end of each, the mean relative

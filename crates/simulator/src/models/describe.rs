@@ -1,11 +1,13 @@
 //! Describes the models: in the log, in a recording's header, in `summary.json`, on a terminal.
 
 use super::Models;
+use crate::measure::Parts;
 use serde::Serialize;
+use std::fmt::Display;
 use trepan_budget::{Plan, Setup};
 
 /// The models in `summary.json`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct ModelSummary {
     /// Source of the choice: a quality, or `replay`.
     pub quality: &'static str,
@@ -20,7 +22,7 @@ pub struct ModelSummary {
 }
 
 /// Model and haptic method of bone.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct BoneSummary {
     /// Name of the method.
     pub method: &'static str,
@@ -33,7 +35,7 @@ pub struct BoneSummary {
 }
 
 /// Mesh and solver of tissue.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct TissueSummary {
     /// Name of the solver.
     pub solver: &'static str,
@@ -48,7 +50,7 @@ pub struct TissueSummary {
 }
 
 /// Rendering of pictures.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct PictureSummary {
     /// Whether rays are skipped where bone is smooth.
     pub sparse: bool,
@@ -62,10 +64,9 @@ impl Models {
     /// Logs one line for each part, and unmet tolerances as warnings.
     pub fn log(&self) {
         let Setup { bone, tissue, picture } = &self.setup;
-        let parts: [(&str, &dyn std::fmt::Display); 3] = [("bone", bone), ("tissue", tissue), ("picture", picture)];
-        for ((name, what), why) in parts.into_iter().zip(&self.why) {
-            tracing::info!("{name}: {what} ({why})");
-        }
+        tracing::info!("bone: {bone} ({})", self.why.bone);
+        tracing::info!("tissue: {tissue} ({})", self.why.tissue);
+        tracing::info!("picture: {picture} ({})", self.why.picture);
         if let Some(plan) = &self.plan {
             tracing::info!("planned: {:.2} cores of {}", plan.cores(), plan.machine.threads);
         }
@@ -94,7 +95,7 @@ impl Models {
             plan.scene.brain_mm3 * 1e-3,
             self.errors_by()
         );
-        for (given, what) in self.given.iter().zip([bone as &dyn std::fmt::Display, tissue]) {
+        for (given, what) in [(&self.given.bone, bone as &dyn Display), (&self.given.tissue, tissue)] {
             if !given.is_empty() {
                 text += &format!("{}: {what}\n", given.join(", "));
             }
@@ -105,8 +106,9 @@ impl Models {
 
     /// Source of the plan's errors.
     fn errors_by(&self) -> String {
-        let all = ["bone", "tissue", "picture"].into_iter().zip(self.measured);
-        let measured: Vec<_> = all.filter(|(_, measured)| *measured).map(|(name, _)| name).collect();
+        let Parts { bone, tissue, picture } = self.measured;
+        let all = [("bone", bone), ("tissue", tissue), ("picture", picture)];
+        let measured: Vec<_> = all.into_iter().filter_map(|(name, measured)| measured.then_some(name)).collect();
         match measured[..] {
             [] => "power laws of similar cases".into(),
             _ => format!("measuring {} in it, else by power laws of similar cases", measured.join(", ")),
@@ -116,7 +118,7 @@ impl Models {
     /// Entries for a recording's header; a replay reads the parameters among them.
     pub fn entries(&self) -> [(String, String); 13] {
         let Setup { bone, tissue, picture } = &self.setup;
-        let [bone_why, tissue_why, picture_why] = self.why.clone();
+        let why = self.why.clone();
         [
             ("rigid", bone.method.to_string()),
             ("rigid_points", bone.points.to_string()),
@@ -128,9 +130,9 @@ impl Models {
             ("picture_sparse", picture.sparse.to_string()),
             ("picture_detail", picture.detail.to_string()),
             ("quality", self.by.to_string()),
-            ("bone_why", bone_why),
-            ("tissue_why", tissue_why),
-            ("picture_why", picture_why),
+            ("bone_why", why.bone),
+            ("tissue_why", why.tissue),
+            ("picture_why", why.picture),
         ]
         .map(|(key, value)| (key.to_string(), value))
     }
@@ -138,18 +140,18 @@ impl Models {
     /// Entry for `summary.json`.
     pub fn summary(&self) -> ModelSummary {
         let Setup { bone, tissue, picture } = self.setup;
-        let [bone_why, tissue_why, picture_why] = self.why.clone();
+        let why = self.why.clone();
         ModelSummary {
             quality: self.by,
-            bone: BoneSummary { method: bone.method, spacing_mm: bone.spacing_mm, points: bone.points, why: bone_why },
+            bone: BoneSummary { method: bone.method, spacing_mm: bone.spacing_mm, points: bone.points, why: why.bone },
             tissue: TissueSummary {
                 solver: tissue.solver,
                 tets: tissue.tets,
                 halvings: tissue.halvings,
                 still_mm: tissue.still_mm,
-                why: tissue_why,
+                why: why.tissue,
             },
-            picture: PictureSummary { sparse: picture.sparse, detail: picture.detail, why: picture_why },
+            picture: PictureSummary { sparse: picture.sparse, detail: picture.detail, why: why.picture },
             planned_cores: self.plan.as_ref().map(Plan::cores),
         }
     }

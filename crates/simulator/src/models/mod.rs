@@ -19,15 +19,16 @@
 mod describe;
 mod overrides;
 
-pub use describe::{BoneSummary, ModelSummary, PictureSummary, TissueSummary};
-pub use overrides::{FASTEST, rigid_of, solver_named};
+pub use describe::{ModelSummary, TissueSummary};
+pub(crate) use overrides::{FASTEST, rigid_of, solver_named};
 
 use crate::error::SessionError;
-use crate::measure::{self, CaseErrors, Wanted};
+use crate::measure::{self, CaseErrors, Parts, Wanted};
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
 use crate::program::Program;
 use crate::recipe::Recipe;
+use crate::stages::haptic_config::BONE_STIFFNESS;
 use crate::tissue_class::TissueClass;
 use overrides::{Overrides, written};
 use serde::{Deserialize, Serialize};
@@ -43,21 +44,21 @@ pub struct Models {
     pub setup: Setup,
     /// Source of the choice: the name of a quality, or `replay`.
     pub by: &'static str,
-    /// Reasons for the choice of bone, tissue and picture.
-    pub why: [String; 3],
-    /// Given values of bone and tissue, in words.
-    pub given: [Vec<String>; 2],
+    /// Reasons for the choice.
+    pub why: Parts<String>,
+    /// Given values, in words.
+    pub given: Parts<Vec<String>>,
     /// Tolerances that no choice meets in real time on this machine.
     pub unmet: Vec<String>,
     /// The plan, if anything was planned.
     pub plan: Option<Plan>,
-    /// Whether the errors of bone, tissue and picture were measured in this case.
-    pub measured: [bool; 3],
+    /// Whether the errors were measured in this case.
+    pub measured: Parts<bool>,
 }
 
 /// Properties of the images that the choice of voxel size and mesh depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Facts {
+pub(crate) struct Facts {
     /// Mean edge of the CT's voxels, mm. `None` without a CT.
     pub ct_voxel_mm: Option<f64>,
     /// Volume of the brain, mm³; `None` without an MRI.
@@ -65,7 +66,7 @@ pub struct Facts {
 }
 
 /// Request for a session's models, before its case is opened.
-pub struct ModelRequest {
+pub(crate) struct ModelRequest {
     program: Program,
     /// `None` for a replay.
     quality: Option<Quality>,
@@ -127,11 +128,10 @@ impl ModelRequest {
         let spacing_mm = written(recipe.spacing_mm);
         let (tets, halvings) = (Some(recipe.tets), Some(recipe.halvings));
         let as_built = Overrides { spacing_mm: Some(spacing_mm), tets, halvings, ..Overrides::default() };
-        let words = [format!("voxels of {spacing_mm} mm"), format!("{} tetrahedra", recipe.tets)];
-        let of_parts = self.given.words.each_mut().into_iter().zip(words);
-        of_parts.for_each(|(part, what)| part.push(format!("the case folder has {what}")));
-        self.given = Overrides { words: self.given.words.clone(), ..as_built.or(self.given) };
-        self
+        let mut words = std::mem::take(&mut self.given.words);
+        words.bone.push(format!("the case folder has voxels of {spacing_mm} mm"));
+        words.tissue.push(format!("the case folder has {} tetrahedra", recipe.tets));
+        Self { given: Overrides { words, ..as_built.or(self.given) }, ..self }
     }
 
     /// Chooses the models for a case with these images. `card` returns whether a graphics card
@@ -180,7 +180,7 @@ impl ModelRequest {
         wanted: Wanted,
         device_draws: bool,
         case_errors: impl FnOnce(&Scene, &Rows) -> Result<CaseErrors, SessionError>,
-    ) -> Result<(Plan, [bool; 3]), SessionError> {
+    ) -> Result<(Plan, Parts<bool>), SessionError> {
         let internal = |fault: trepan_budget::PlanError| SessionError::Internal(format!("--quality auto: {fault}"));
         let (machine, mut rows) = (measure::machine(wanted, device_draws), Rows::stored().map_err(internal)?);
         let near = |a: f64, all: &mut dyn Iterator<Item = f64>| {
@@ -241,7 +241,7 @@ impl ModelRequest {
     }
 
     /// Reasons for each part, and the unmet tolerances.
-    fn why(&self, plan: Option<&Plan>, wanted: Wanted, measured: [bool; 3]) -> ([String; 3], Vec<String>) {
+    fn why(&self, plan: Option<&Plan>, wanted: Wanted, measured: Parts<bool>) -> (Parts<String>, Vec<String>) {
         let rest = match self.quality {
             None => "as recorded".into(),
             Some(Quality::Auto) => "as usual".into(),
@@ -258,25 +258,18 @@ impl ModelRequest {
             let reason = reason.map_or_else(|| rest.clone(), |(reason, _)| reason);
             words.iter().cloned().chain([reason]).collect::<Vec<_>>().join("; ")
         };
-        let why = [
-            part(
-                "bone",
-                &self.given.words[0],
-                bone.map(|choice| reason(choice, (scene.force_error_n, "N"), measured[0])),
-            ),
-            part(
-                "tissue",
-                &self.given.words[1],
-                tissue.map(|choice| reason(choice, (scene.displacement_mm, "mm"), measured[1])),
-            ),
-            part("picture", &[], picture.map(|choice| reason(choice, (scene.picture_error_percent, "%"), measured[2]))),
-        ];
+        let words = &self.given.words;
+        let bone = bone.map(|choice| reason(choice, (scene.force_error_n, "N"), measured.bone));
+        let tissue = tissue.map(|choice| reason(choice, (scene.displacement_mm, "mm"), measured.tissue));
+        let picture = picture.map(|choice| reason(choice, (scene.picture_error_percent, "%"), measured.picture));
+        let why = Parts {
+            bone: part("bone", &words.bone, bone),
+            tissue: part("tissue", &words.tissue, tissue),
+            picture: part("picture", &words.picture, picture),
+        };
         (why, unmet)
     }
 }
-
-/// Stiffness of the contact with bone, N/mm.
-pub const BONE_STIFFNESS: f32 = 2.0;
 
 /// Height of the 3-D view at the opening, mm.
 const VIEW_MM: f64 = 105.0;
@@ -288,7 +281,7 @@ const LIVE_HZ: f64 = 10.0;
 const PRESS_N: f64 = 1.0;
 
 /// Default models: preset `usual`.
-pub fn usual() -> Setup {
+pub(crate) fn usual() -> Setup {
     Quality::Usual.preset().expect("only auto has none")
 }
 
@@ -353,7 +346,7 @@ mod tests {
         let draft = Quality::Draft.preset().unwrap();
         assert_eq!(models.setup.bone, Bone { method: "thesis", points: 0, ..draft.bone });
         assert_eq!(models.setup.tissue, Tissue { tets: 3000, ..draft.tissue });
-        assert!(models.why[0].contains("--rigid thesis is given; preset draft"), "{}", models.why[0]);
+        assert!(models.why.bone.contains("--rigid thesis is given; preset draft"), "{}", models.why.bone);
         let all = "--spacing-mm 0.7 --rigid thesis --tets 4000 --solver xpbd --frames-per-second 0";
         let models = request(all, None).settle(&FACTS, || false, unmeasured).unwrap();
         assert!(models.plan.is_none() && models.setup.bone.spacing_mm == 0.7 && models.setup.tissue.solver == "xpbd");
@@ -367,8 +360,10 @@ mod tests {
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.7, 9000));
         let plan = models.plan.as_ref().unwrap();
         assert_eq!(plan.bone.unwrap().what.method, models.setup.bone.method);
-        assert!(models.why[0].contains("--spacing-mm 0.7 is given; ") && models.why[0].contains(" N of 0.4 allowed"));
-        assert_eq!(models.why[2], "as usual", "no picture is drawn");
+        assert!(
+            models.why.bone.contains("--spacing-mm 0.7 is given; ") && models.why.bone.contains(" N of 0.4 allowed")
+        );
+        assert_eq!(models.why.picture, "as usual", "no picture is drawn");
         let models =
             request("--rigid exposed-faces --frames-per-second 0", None).settle(&FACTS, || false, unmeasured).unwrap();
         let usual = Quality::Usual.preset().unwrap();
@@ -409,19 +404,10 @@ mod tests {
 
     #[test]
     fn a_case_folder_overrides_other_values() {
-        let recipe = Recipe {
-            spacing_mm: 0.8,
-            tets: 6000,
-            halvings: 1,
-            isovalue_hu: None,
-            ct_series: None,
-            mri_series: None,
-            register: false,
-            opening: None,
-        };
+        let recipe = Recipe { spacing_mm: 0.8, tets: 6000, halvings: 1, ..Recipe::default() };
         let models = request("--quality fine", None).on(&recipe).settle(&FACTS, || false, unmeasured).unwrap();
         assert_eq!((models.setup.bone.spacing_mm, models.setup.tissue.tets), (0.8, 6000));
         assert_eq!(models.setup.tissue.halvings, 1);
-        assert!(models.why[0].contains("the case folder has voxels of 0.8 mm; preset fine"), "{}", models.why[0]);
+        assert!(models.why.bone.contains("the case folder has voxels of 0.8 mm; preset fine"), "{}", models.why.bone);
     }
 }

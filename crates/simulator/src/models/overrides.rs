@@ -1,11 +1,12 @@
 //! Given parameters of the models: by flags, a recording's header or a case folder.
 
 use crate::error::SessionError;
+use crate::measure::Parts;
 use crate::options::Patient;
 use std::collections::BTreeMap;
 use trepan_budget::{Bone, Picture, Tissue};
 
-/// Given parameters of each part; `words` describes those of bone and tissue.
+/// Given parameters of each part, and `words` that describe them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Overrides {
     pub spacing_mm: Option<f64>,
@@ -16,7 +17,7 @@ pub(super) struct Overrides {
     pub solver: Option<&'static str>,
     pub still_mm: Option<f64>,
     pub picture: Option<Picture>,
-    pub words: [Vec<String>; 2],
+    pub words: Parts<Vec<String>>,
 }
 
 impl Overrides {
@@ -25,10 +26,7 @@ impl Overrides {
         let tled = |name| if name == FASTEST { FASTEST } else { TLED };
         let named = |name| Ok::<_, SessionError>(solver_named(name)?.map_or(tled(name), |method| method.name()));
         let words = |flags: &[(&str, Option<String>)]| -> Vec<String> {
-            flags
-                .iter()
-                .filter_map(|(flag, value)| value.as_ref().map(|value| format!("{flag} {value} is given")))
-                .collect()
+            flags.iter().filter_map(|(flag, value)| Some(format!("{flag} {} is given", value.as_ref()?))).collect()
         };
         Ok(Self {
             spacing_mm: patient.spacing_mm.map(written),
@@ -39,17 +37,18 @@ impl Overrides {
             solver: solver.map(named).transpose()?,
             still_mm: solver.map(|_| 0.0),
             picture: None,
-            words: [
-                words(&[
+            words: Parts {
+                bone: words(&[
                     ("--spacing-mm", patient.spacing_mm.map(|mm| mm.to_string())),
                     ("--rigid", rigid.map(String::from)),
                 ]),
-                words(&[
+                tissue: words(&[
                     ("--tets", patient.tets.map(|n| n.to_string())),
                     ("--opening-refinement", patient.opening_refinement.map(|n| n.to_string())),
                     ("--solver", solver.map(String::from)),
                 ]),
-            ],
+                picture: Vec::new(),
+            },
         })
     }
 
@@ -71,7 +70,7 @@ impl Overrides {
             solver: config.get("solver").map(solver),
             still_mm: number("still_mm"),
             picture: detail.map(|detail| Picture { sparse: flag("picture_sparse"), detail }),
-            words: Default::default(),
+            words: Parts::default(),
         }
     }
 
@@ -109,11 +108,11 @@ impl Overrides {
 }
 
 /// Total Lagrangian explicit dynamics.
-pub const TLED: &str = "tled";
+pub(crate) const TLED: &str = "tled";
 
 /// TLED on the CPU or the GPU, whichever is faster on this machine. A replay may then not reproduce
 /// the recorded forces bit for bit.
-pub const FASTEST: &str = "fastest";
+pub(crate) const FASTEST: &str = "fastest";
 
 /// Haptic method on bone with this name.
 fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
@@ -124,12 +123,12 @@ fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
 }
 
 /// Haptic method of a choice for bone, with its number of points.
-pub fn rigid_of(bone: &Bone) -> Result<trepan_rigid::Method, SessionError> {
+pub(crate) fn rigid_of(bone: &Bone) -> Result<trepan_rigid::Method, SessionError> {
     rigid_named(bone.method).map(|method| method.with_points(bone.points))
 }
 
 /// Solver of `trepan_soft` with this name; `None` for TLED.
-pub fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
+pub(crate) fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
     if name == TLED || name == FASTEST {
         return Ok(None);
     }

@@ -29,7 +29,7 @@ const REACH_MM: f64 = 3.0;
 const MAX_POINTS: f64 = 24.0;
 
 /// Removes from a CT the bone that was removed since `before`.
-pub fn drilled(mut ct: VoxelVolume<i16>, before: &VoxelVolume<i16>, bone: &BoneVolume) -> VoxelVolume<i16> {
+pub(crate) fn drilled(mut ct: VoxelVolume<i16>, before: &VoxelVolume<i16>, bone: &BoneVolume) -> VoxelVolume<i16> {
     let Some((low, high)) = gone_box(before, bone) else { return ct };
     let part = Part::of(&ct, low, high);
     let mut shares: Vec<Option<f32>> = part.voxels().map(|voxel| share(&ct, voxel, before, bone)).collect();

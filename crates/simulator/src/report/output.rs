@@ -18,17 +18,17 @@ use trepan_volume::{BoneVolume, VoxelVolume, nifti};
 /// Files that a session writes into its folder, besides pictures.
 const FILES: [&str; 6] = ["summary.json", "scores.csv", "report.html", "drilled.nii.gz", "drilled.stl", RECORDING];
 /// Default name of the recording; `--record` gives another.
-pub const RECORDING: &str = "session.mcap";
+pub(crate) const RECORDING: &str = "session.mcap";
 /// Folder of the pictures.
 const FRAMES: &str = "frames";
 
 /// Whether a folder holds files of a session.
-pub fn holds_session(out: &Path) -> bool {
+pub(crate) fn holds_session(out: &Path) -> bool {
     FILES.iter().any(|name| out.join(name).exists())
 }
 
 /// Returns a new folder below `trepan-out/PROGRAM`, named after the time (UTC).
-pub fn dated(program: Program) -> PathBuf {
+pub(crate) fn dated(program: Program) -> PathBuf {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
     let place = Path::new("trepan-out").join(program.name());
     let (first, mut nth) = (place.join(date_and_time(now)), 1);
@@ -57,7 +57,7 @@ fn date_and_time(seconds: u64) -> String {
 /// Folder of a session that is being written. Dropped before [`keep`](Self::keep), it removes the
 /// session's files; a recording that can be opened is kept, up to its last whole chunk.
 #[derive(Debug)]
-pub struct Place {
+pub(crate) struct Place {
     out: PathBuf,
     record: PathBuf,
     /// Folders that this session created, the deepest first.
@@ -116,7 +116,12 @@ impl Drop for Place {
 }
 
 /// Writes the densities of the drilled skull, HU, and with `surface` its isosurface as triangles.
-pub fn drilled(out: &Path, densities: &VoxelVolume<i16>, bone: &BoneVolume, surface: bool) -> Result<(), SessionError> {
+pub(crate) fn drilled(
+    out: &Path,
+    densities: &VoxelVolume<i16>,
+    bone: &BoneVolume,
+    surface: bool,
+) -> Result<(), SessionError> {
     let failed = |fault: &dyn std::fmt::Display| SessionError::Case(format!("{fault}; give another folder with --out"));
     nifti::write(&out.join("drilled.nii.gz"), densities).map_err(|fault| failed(&fault))?;
     if surface {
@@ -127,7 +132,7 @@ pub fn drilled(out: &Path, densities: &VoxelVolume<i16>, bone: &BoneVolume, surf
 }
 
 /// Writes summary, scores and report.
-pub fn write(
+pub(crate) fn write(
     out: &Path,
     recording: &Recording,
     summary: &Summary,
@@ -138,7 +143,7 @@ pub fn write(
         serde_json::to_vec_pretty(summary).map_err(|fault| SessionError::Internal(format!("summary: {fault}")))?;
     whole(&out.join("summary.json"), &json)?;
     whole(&out.join("scores.csv"), scores(summary).as_bytes())?;
-    let page = page::html(summary, outcome, recording, shots).map_err(SessionError::Internal)?;
+    let page = page::html(summary, outcome, recording, shots)?;
     whole(&out.join("report.html"), page.as_bytes())
 }
 
@@ -168,7 +173,7 @@ fn scores(summary: &Summary) -> String {
 }
 
 /// Writes a file atomically.
-pub fn whole(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
+pub(crate) fn whole(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
     let failed = |fault| SessionError::Output { path: path.into(), fault };
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;

@@ -1,20 +1,20 @@
 //! `summary.json`: the results of a session as numbers.
 
 use crate::models::ModelSummary;
-use crate::program::Program;
 use crate::report::plan_comparison::PlanComparison;
 use crate::report::regions::Region;
-use crate::run::{Outcome, Replayed, Times};
-use crate::stages::notice::What;
+use crate::run::{Outcome, Quantiles, Replayed, SolverOutcome};
+use crate::stages::by_cause;
+use crate::stages::notice::{Notice, What};
 use crate::stages::score::ScoreKeeper;
-use crate::stages::solver_step::SolverFaults;
+use crate::stages::second_hand::SecondOutcome;
 use serde::Serialize;
 use std::fs;
 use trepan_contact::GuardCounters;
 use trepan_volume::Piece;
 
 /// The whole file.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Summary {
     /// Name of the program.
     pub app: String,
@@ -57,7 +57,8 @@ pub struct Summary {
     /// Regions of the brain that were pressed, largest impulse first.
     pub regions: Vec<Region>,
     /// Ticks in which the force guard acted, by cause.
-    pub guard: GuardSummary,
+    #[serde(serialize_with = "by_cause")]
+    pub guard: GuardCounters,
     /// The second hand; `null` without.
     pub second: Option<SecondSummary>,
     /// Pictures rendered.
@@ -112,28 +113,8 @@ impl CutOff {
     }
 }
 
-/// Quantiles of a time, µs.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Quantiles {
-    /// Median.
-    pub p50: f64,
-    /// 99 % quantile.
-    pub p99: f64,
-    /// 99.9 % quantile.
-    pub p999: f64,
-    /// Largest value.
-    pub max: f64,
-}
-
-impl From<&Times> for Quantiles {
-    fn from(times: &Times) -> Self {
-        let [p50, p99, p999] = [0.5, 0.99, 0.999].map(|q| times.quantile_us(q));
-        Self { p50, p99, p999, max: times.max_us() }
-    }
-}
-
 /// Results of the solver.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct SolverSummary {
     /// Name of the solver.
     pub name: String,
@@ -143,25 +124,13 @@ pub struct SolverSummary {
     pub nodes: usize,
     /// Number of fixed nodes.
     pub fixed_nodes: usize,
-    /// Length of a step, ms.
-    pub dt_ms: f32,
-    /// Compute time of a step, µs.
-    pub step_us: Quantiles,
-    /// Compute time of a collision step, µs.
-    pub collision_us: Quantiles,
-    /// Simulated time over wall time.
-    pub real_time_factor: f64,
-    /// Largest displacement of a node, mm.
-    pub max_displacement_mm: f32,
-    /// Largest displacement of a node at the end, mm.
-    pub end_displacement_mm: f32,
-    /// Faults of the solver, summed over steps.
+    /// Results of its loop.
     #[serde(flatten)]
-    pub solver_faults: SolverFaults,
+    pub outcome: SolverOutcome,
 }
 
 /// Forces on the hand.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Forces {
     /// Largest force, N.
     pub max: f32,
@@ -171,54 +140,18 @@ pub struct Forces {
     pub end: f32,
 }
 
-/// Ticks in which the force guard acted, by cause.
-#[derive(Clone, Debug, Serialize)]
-pub struct GuardSummary {
-    /// Force over the device's limit.
-    pub clamped: u64,
-    /// Force over the limit of warm motors.
-    pub heated: u64,
-    /// Force changed too fast.
-    pub slewed: u64,
-    /// Force, tool or tick length was not finite.
-    pub non_finite: u64,
-    /// The passivity controller damped the force.
-    pub passivity: u64,
-    /// The passivity controller shortened the force: damping was not enough.
-    pub bounded: u64,
-    /// Force restarted after the passivity controller had shortened it for long.
-    pub restarted: u64,
-    /// The tool was too fast, or jumped.
-    pub too_fast: u64,
-    /// The device's position was stale.
-    pub stale: u64,
-    /// The force was still ramping in.
-    pub ramped: u64,
-}
-
-impl From<&GuardCounters> for GuardSummary {
-    fn from(guard: &GuardCounters) -> Self {
-        let &GuardCounters { clamped, heated, slewed, non_finite, passivity, bounded, restarted, .. } = guard;
-        let &GuardCounters { too_fast, stale, ramped, .. } = guard;
-        Self { clamped, heated, slewed, non_finite, passivity, bounded, restarted, too_fast, stale, ramped }
-    }
-}
-
 /// Results of the second hand.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct SecondSummary {
     /// Name of its device.
     pub device: String,
-    /// Largest force, N.
-    pub force_max_n: f32,
-    /// Force after the last tick, N.
-    pub force_end_n: f32,
-    /// Ticks in which its force guard acted, by cause.
-    pub guard: GuardSummary,
+    /// Results of its loop.
+    #[serde(flatten)]
+    pub outcome: SecondOutcome,
 }
 
 /// The machine that the session ran on.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Machine {
     /// Processor.
     pub cpu: String,
@@ -250,112 +183,51 @@ impl Machine {
     }
 }
 
-/// Contents of a summary that are not in the outcome.
-#[derive(Clone, Debug)]
-pub struct About {
-    /// The program.
-    pub program: Program,
-    /// Name of the case.
-    pub case: String,
-    /// Name of the device.
-    pub device: String,
-    /// Name of the second hand's device.
-    pub second_device: String,
-    /// Models that ran, and why they were chosen.
-    pub models: ModelSummary,
-    /// Name of the solver.
-    pub solver: String,
-    /// Numbers of tetrahedra, nodes and fixed nodes.
-    pub brain: [usize; 3],
-    /// Requested rate of the haptic loop, Hz.
-    pub asked_hz: f64,
-    /// Pictures rendered.
-    pub frames: u64,
-    /// Time in which they were rendered, s.
-    pub drawn_s: f64,
-    /// Pieces of bone cut off the skull.
-    pub cut_off: CutOff,
-    /// Comparison of the removed bone with the plan.
-    pub plan: Option<PlanComparison>,
-    /// Regions of the brain that were pressed.
-    pub regions: Vec<Region>,
-    /// Remarks on import and pictures.
-    pub remarks: Vec<String>,
-    /// The machine.
-    pub machine: Machine,
-}
-
 impl Summary {
-    /// Makes the summary at the end of a session.
-    pub fn new(about: About, outcome: &Outcome) -> Self {
-        let seconds = outcome.seconds.max(1e-9);
-        let rate_hz = outcome.ticks.count as f64 / seconds;
-        let slow = outcome.replayed.is_none().then(|| slow(rate_hz, about.asked_hz)).flatten();
+    /// Adds the outcome at the end of a session: all that the loops measured. The remarks of both
+    /// are joined.
+    pub(crate) fn with(self, outcome: &Outcome) -> Self {
+        let rate_hz = outcome.ticks.count as f64 / outcome.seconds.max(1e-9);
+        let slow = outcome.replayed.is_none().then(|| slow(rate_hz, self.asked_hz)).flatten();
         let solver_faults = outcome.solver.iter().flat_map(|solver| solver.solver_faults.remarks());
+        let remarks = slow.into_iter().chain(self.remarks).chain(outcome.remarks.iter().cloned());
         Self {
-            app: about.program.name().into(),
-            case: about.case,
-            device: about.device,
-            models: about.models,
             phases: phases(outcome),
             through_s: through_s(outcome),
             ticks: outcome.ticks.count,
             rate_hz,
-            asked_hz: about.asked_hz,
             late_ticks: outcome.ticks.late,
             held_ticks: outcome.ticks.held,
             tick_us: (&outcome.ticks.times).into(),
-            solver: outcome.solver.as_ref().map(|solver| SolverSummary {
-                name: about.solver,
-                tets: about.brain[0],
-                nodes: about.brain[1],
-                fixed_nodes: about.brain[2],
-                dt_ms: solver.dt_ms,
-                step_us: (&solver.times).into(),
-                collision_us: (&solver.collision_times).into(),
-                real_time_factor: solver.real_time_factor,
-                max_displacement_mm: solver.max_displacement_mm,
-                end_displacement_mm: solver.end_displacement_mm,
-                solver_faults: solver.solver_faults,
-            }),
+            solver: outcome.solver.clone().map(|outcome| SolverSummary { outcome, ..self.solver.unwrap_or_default() }),
             force_n: Forces {
                 max: outcome.scores.peak_force_n,
                 max_step: outcome.scores.peak_force_step_n,
                 end: outcome.end_force_n,
             },
             bone_removed_mm3: outcome.scores.bone_removed_mm3,
-            cut_off: about.cut_off,
             warnings: warnings(outcome),
             scores: outcome.scores,
-            plan: about.plan,
-            regions: about.regions,
-            guard: (&outcome.guard).into(),
-            second: outcome.second.as_ref().map(|second| SecondSummary {
-                device: about.second_device,
-                force_max_n: second.peak_force_n,
-                force_end_n: second.end_force_n,
-                guard: (&second.guard).into(),
-            }),
-            frames: about.frames,
-            fps: if about.frames > 0 { about.frames as f64 / about.drawn_s.max(1e-3) } else { 0.0 },
+            guard: outcome.guard,
+            second: outcome.second.map(|outcome| SecondSummary { outcome, ..self.second.unwrap_or_default() }),
             replay: outcome.replayed.clone(),
             dropped_records: outcome.written.dropped,
-            remarks: slow
-                .into_iter()
-                .chain(about.remarks)
-                .chain(outcome.remarks.iter().cloned())
-                .chain(solver_faults)
-                .collect(),
-            machine: about.machine,
+            remarks: remarks.chain(solver_faults).collect(),
+            ..self
         }
     }
+}
+
+/// Returns the pictures per second of drawing; 0 without pictures.
+pub(crate) fn fps(frames: u64, drawn_s: f64) -> f64 {
+    if frames > 0 { frames as f64 / drawn_s.max(1e-3) } else { 0.0 }
 }
 
 /// Share of the requested rate under which a session counts as slow.
 const FULL_RATE: f64 = 0.995;
 
 /// Returns a remark where the haptic rate was lower than requested.
-pub fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
+pub(crate) fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
     (rate_hz < FULL_RATE * asked_hz).then(|| {
         format!(
             "SLOW: {rate_hz:.1} ticks a second instead of {asked_hz:.0}: forces were late, so do not compare forces \
@@ -365,7 +237,7 @@ pub fn slow(rate_hz: f64, asked_hz: f64) -> Option<String> {
 }
 
 fn phases(outcome: &Outcome) -> Vec<PhaseStart> {
-    let start = |notice: &crate::Notice| match notice.what {
+    let start = |notice: &Notice| match notice.what {
         What::Phase(phase) => Some(PhaseStart { name: phase.name().into(), from_s: notice.time_ms * 1e-3 }),
         _ => None,
     };
@@ -378,7 +250,7 @@ fn through_s(outcome: &Outcome) -> Vec<f64> {
 }
 
 fn warnings(outcome: &Outcome) -> Vec<Raised> {
-    let raised = |notice: &crate::Notice| match notice.what {
+    let raised = |notice: &Notice| match notice.what {
         What::Warning(warning, true, _) => {
             Some(Raised { time_s: notice.time_ms * 1e-3, name: warning.name().into(), text: notice.words().1 })
         }
@@ -390,55 +262,29 @@ fn warnings(outcome: &Outcome) -> Vec<Raised> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::{BoneSummary, PictureSummary, TissueSummary};
 
-    fn about() -> About {
-        let why = String::new;
-        About {
-            program: Program::Craniotomy,
-            case: "a case".into(),
-            device: "mouse".into(),
-            second_device: String::new(),
-            models: ModelSummary {
-                quality: "usual",
-                bone: BoneSummary { method: "god-object-sphere", spacing_mm: 1.0, points: 0, why: why() },
-                tissue: TissueSummary { solver: "tled", tets: 0, halvings: 0, still_mm: 0.0, why: why() },
-                picture: PictureSummary { sparse: false, detail: 1.0, why: why() },
-                planned_cores: None,
-            },
-            solver: String::new(),
-            brain: [0; 3],
-            asked_hz: 1000.0,
-            frames: 0,
-            drawn_s: 0.0,
-            cut_off: CutOff::default(),
-            plan: None,
-            regions: Vec::new(),
-            remarks: vec!["another".into()],
-            machine: Machine::here(None),
-        }
+    fn about() -> Summary {
+        Summary { asked_hz: 1000.0, remarks: vec!["another".into()], ..Summary::default() }
     }
 
     #[test]
     fn a_slow_session_has_a_remark_and_a_replay_has_none() {
         let mut outcome = Outcome { seconds: 10.0, ..Outcome::default() };
         outcome.ticks.count = 9920;
-        let live = Summary::new(about(), &outcome);
+        let live = about().with(&outcome);
         assert!(live.remarks.len() == 2 && live.remarks[0].contains("992.0"), "{:?}", live.remarks);
         outcome.replayed = Some(Replayed::default());
-        assert_eq!(Summary::new(about(), &outcome).remarks, ["another"]);
+        assert_eq!(about().with(&outcome).remarks, ["another"]);
     }
 
     #[test]
     fn pictures_are_told_by_the_second_of_drawing_not_of_the_session() {
-        let outcome = Outcome { seconds: 60.0, ..Outcome::default() };
-        let fps = |frames, drawn_s| Summary::new(About { frames, drawn_s, ..about() }, &outcome).fps;
         assert_eq!([fps(300, 10.0), fps(0, 0.0)], [30.0, 0.0]);
     }
 
     #[test]
     fn each_stroke_that_came_through_has_its_time() {
-        let notice = |time_ms: f64, what| crate::Notice { tick: 1, time_ms, what };
+        let notice = |time_ms: f64, what| Notice { tick: 1, time_ms, what };
         let mut outcome = Outcome::default();
         let notices =
             [(10.0, What::Undone(1.0)), (1500.0, What::Through), (1600.0, What::NotOpen), (2500.0, What::Through)];

@@ -13,7 +13,7 @@ const SPIN_MS: f64 = 0.12;
 
 /// Milliseconds since the session began.
 #[derive(Clone, Copy, Debug)]
-pub struct Clock {
+pub(crate) struct Clock {
     start: Instant,
 }
 
@@ -47,7 +47,7 @@ impl Clock {
 
 /// Deadlines at a fixed rate.
 #[derive(Clone, Copy, Debug)]
-pub struct Schedule {
+pub(crate) struct Schedule {
     period_ms: f64,
     next_ms: f64,
 }

@@ -30,14 +30,14 @@ use trepan_geometry::Vec3;
 use trepan_volume::BoneVolume;
 
 /// Session time between two shots, ms.
-pub const SHOT_MS: f64 = 1000.0 / 30.0;
+pub(crate) const SHOT_MS: f64 = 1000.0 / 30.0;
 /// Largest number of shots that hold the brain's node positions.
 const BRAINS: f64 = 3600.0;
 /// Edge of a brick, voxels.
 const BRICK: usize = 8;
 
 /// One moment of a film.
-pub struct Shot {
+pub(crate) struct Shot {
     /// View of the tick.
     pub view: View,
     /// Voxels that changed since the last shot.
@@ -48,7 +48,7 @@ pub struct Shot {
 
 /// A voxel whose density changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Change {
+pub(crate) struct Change {
     /// Index of the voxel.
     pub voxel: IVec3,
     /// Density before, HU.
@@ -58,7 +58,7 @@ pub struct Change {
 }
 
 /// Takes the shots of a replay.
-pub struct Filming {
+pub(crate) struct Filming {
     shots: Sender<Shot>,
     skull: Option<Carved>,
     next_ms: f64,
@@ -134,14 +134,15 @@ fn places(low: [usize; 3], dims: [usize; 3]) -> impl Iterator<Item = (usize, usi
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::program::Program;
     use crate::stages::haptic_tick::ToolSample;
     use trepan_geometry::{Pose, ToolState};
     use trepan_volume::{AIR_HU, VoxelVolume};
 
-    fn view(time_ms: f64) -> View {
+    /// Returns the view of a tool at the origin.
+    pub(crate) fn view(time_ms: f64) -> View {
         let tool = Program::Craniotomy.tray()[0];
         let sample = ToolSample { tick: 0, state: ToolState::at(Pose::IDENTITY), tool, slot: 0, drilling: false };
         View { time_ms, ..View::at(sample, 1.0) }

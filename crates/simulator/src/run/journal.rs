@@ -16,9 +16,6 @@ use trepan_link::queue::{Receiver, Sender, bounded};
 use trepan_link::wire::{CollisionRecord, EventRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_link::{LinkError, Recorder};
 
-/// Destinations of the records: a file, and watching sessions where the session is shared.
-pub type Kept = (Recorder, Option<Share>);
-
 /// Capacity of a ring buffer, records.
 const RING: usize = 8192;
 /// Time between two flushes of the file, ms.
@@ -29,7 +26,7 @@ const SCORES_MS: f64 = 200.0;
 const DRAIN: Duration = Duration::from_millis(5);
 
 /// Send ends of the ring buffers, for the loops.
-pub struct JournalSenders {
+pub(crate) struct JournalSenders {
     /// For the haptic loop.
     pub ticks: Sender<TickRecord>,
     /// For the haptic loop, with a second hand.
@@ -43,7 +40,7 @@ pub struct JournalSenders {
 }
 
 /// Receive ends of the ring buffers, for the recording thread.
-pub struct Journal {
+pub(crate) struct Journal {
     ticks: Receiver<TickRecord>,
     second: Receiver<SecondRecord>,
     notices: Receiver<Notice>,
@@ -55,7 +52,7 @@ pub struct Journal {
 
 /// Result of the recording thread.
 #[derive(Debug, Default)]
-pub struct Written {
+pub(crate) struct Written {
     /// Every notice, in order.
     pub notices: Vec<Notice>,
     /// Records that did not fit into a ring buffer.
@@ -75,21 +72,25 @@ impl Written {
 }
 
 /// Makes the ring buffers and returns both ends.
-pub fn journal() -> (JournalSenders, Journal) {
-    let (ticks, ticks_in) = bounded(RING);
-    let (second, second_in) = bounded(RING);
-    let (notices, notices_in) = bounded(RING / 8);
-    let (collisions, collisions_in) = bounded(RING);
-    let (solver, solver_in) = bounded(RING);
+pub(crate) fn journal() -> (JournalSenders, Journal) {
+    let (ticks, second, notices) = (bounded(RING), bounded(RING), bounded(RING / 8));
+    let (collisions, solver) = (bounded(RING), bounded(RING));
+    let newest = (0, 0.0);
     (
-        JournalSenders { ticks, second, notices, collisions, solver },
+        JournalSenders {
+            ticks: ticks.0,
+            second: second.0,
+            notices: notices.0,
+            collisions: collisions.0,
+            solver: solver.0,
+        },
         Journal {
-            ticks: ticks_in,
-            second: second_in,
-            notices: notices_in,
-            collisions: collisions_in,
-            solver: solver_in,
-            newest: (0, 0.0),
+            ticks: ticks.1,
+            second: second.1,
+            notices: notices.1,
+            collisions: collisions.1,
+            solver: solver.1,
+            newest,
         },
     )
 }
@@ -139,12 +140,12 @@ impl Journal {
             self.newest = (record.tick, record.time_ms);
             let before_ms = scores.time_ms();
             scores.add(&record);
-            share.take_if(|share| !share.tick(&record));
+            share.take_if(|share| share.ticks.send(&record).is_err());
             recorder.tick(&record)?;
             if (before_ms / SCORES_MS).floor() < (record.time_ms / SCORES_MS).floor() {
                 let text = serde_json::to_string(scores).unwrap_or_default();
                 let event = EventRecord { tick: record.tick, time_ms: record.time_ms, kind: "score".into(), text };
-                share.take_if(|share| !share.event(&event));
+                share.take_if(|share| share.events.send(&event).is_err());
                 recorder.event(&event)?;
             }
         }
@@ -162,7 +163,7 @@ impl Journal {
             log(&notice);
             let (kind, text) = notice.words();
             let record = EventRecord { tick: notice.tick, time_ms: notice.time_ms, kind: kind.into(), text };
-            share.take_if(|share| !share.event(&record));
+            share.take_if(|share| share.events.send(&record).is_err());
             recorder.event(&record)?;
         }
         Ok(())
@@ -176,7 +177,7 @@ impl Journal {
         now_ms: f64,
     ) -> Result<(), LinkError> {
         let Some(sharing) = share else { return Ok(()) };
-        for (begins, text) in sharing.receive(now_ms) {
+        for (begins, text) in sharing.teacher.receive(now_ms) {
             let text = format!("{}: {text}", if begins { "begins" } else { "ends" });
             tracing::info!("{:7.3} s  teacher: {text}", self.newest.1 * 1e-3);
             let record = EventRecord { tick: self.newest.0, time_ms: self.newest.1, kind: "teacher".into(), text };

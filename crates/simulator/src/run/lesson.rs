@@ -25,17 +25,17 @@ use trepan_link::topics::{Publisher, Session, Subscriber, TopicError};
 use trepan_link::wire::TeacherRecord;
 
 /// Time without a record after which all of the teacher's requests end, ms.
-pub const GONE_MS: f64 = 3000.0;
+pub(crate) const GONE_MS: f64 = 3000.0;
 
 /// Bit of each request, and the text that the trainee reads.
-pub const TEACHER_REQUESTS: [(u32, &str); 3] = [
+pub(crate) const TEACHER_REQUESTS: [(u32, &str); 3] = [
     (TeacherRecord::PAUSE, "the teacher pauses the operation"),
     (TeacherRecord::NO_POWER, "the drill has no power"),
     (TeacherRecord::BLEEDING, "the patient bleeds from the bone's edge"),
 ];
 
 /// Receive end, for the recording thread.
-pub struct Listener {
+pub(crate) struct Listener {
     teacher: Subscriber<TeacherRecord>,
     newest: TeacherRecord,
     received_ms: f64,
@@ -76,7 +76,7 @@ impl Listener {
 }
 
 /// A device whose buttons are changed by the teacher's requests.
-pub struct Taught {
+pub(crate) struct Taught {
     device: Box<dyn HapticDevice>,
     teacher: Reader<TeacherRecord>,
 }
@@ -119,7 +119,7 @@ impl HapticDevice for Taught {
 }
 
 /// Send end, for the window of a watching session.
-pub struct Teacher {
+pub(crate) struct Teacher {
     trainee: Publisher<TeacherRecord>,
     record: TeacherRecord,
     _session: Session,
@@ -161,7 +161,6 @@ impl Teacher {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::watch::Watched;
     use trepan_geometry::{Quat, ToolState};
     use trepan_haptics::Status;
 
@@ -178,7 +177,7 @@ mod tests {
         fn apply(&mut self, _wrench: GuardedWrench) {}
 
         fn capabilities(&self) -> Capabilities {
-            Capabilities { name: "all pressed".into(), ..Watched::CAPABILITIES }
+            Capabilities::passive("all pressed")
         }
 
         fn close(&mut self) {}

@@ -19,11 +19,10 @@
 
 use crate::run::clock::Clock;
 use crate::run::film::{Filming, Shot};
-use crate::run::journal::Kept;
 use crate::run::journal::{Journal, JournalSenders, journal};
-use crate::run::stop::Stop;
-use crate::run::threads::outcome;
-use crate::run::{Cells, Numbered, Outcome, RenderInputs, Replayed, Stages, Ticks, Times, Tissue, View};
+use crate::run::{
+    Cells, Numbered, Outcome, RenderInputs, Replayed, Run, SolverOutcome, Stages, Ticks, Times, Tissue, View,
+};
 use crate::stages::collision_step::SoftFrame;
 use crate::stages::haptic_tick::{HapticStage, TickInput, ToolSample};
 use crate::stages::second_hand::{SecondHand, SecondView};
@@ -41,7 +40,7 @@ use trepan_soft::Loads;
 const MEMORY: usize = 16_384;
 
 /// Returns the ticks up to a time, ms, and those right after it in which the force faded out.
-pub fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
+pub(crate) fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
     let ticks = &recording.ticks;
     let until = ticks.iter().position(|tick| tick.time_ms >= end_ms).map_or(ticks.len(), |at| at + 1);
     let fading = ticks[until..].iter().take_while(|tick| tick.has(TickRecord::RELEASED)).count();
@@ -50,21 +49,19 @@ pub fn up_to(recording: &Recording, end_ms: f64) -> &[TickRecord] {
 
 /// Replays a recording up to a time, ms. Requests a stop at the end, unless a film is made: its
 /// window stays open.
-pub fn run(
-    stages: Stages,
+pub(crate) fn run(
+    run: Run<'_>,
     (recording, end_ms): (&Recording, f64),
-    (recorder, share): Kept,
-    start: ToolSample,
     film: Option<(Filming, Receiver<Shot>)>,
-    stop: &Stop,
     picture: impl FnOnce(RenderInputs),
 ) -> Outcome {
+    let Run { stages, start, recorder, share, stop } = run;
     let clock = Clock::start();
     let cells = Cells::new(&stages, start);
     let (senders, receivers) = journal();
     let (mut film, shots) = film.unzip();
-    let inputs =
-        RenderInputs { view: cells.view.1, soft: stages.tissue.is_some().then_some(cells.shown.1), film: shots };
+    let soft = stages.tissue.is_some().then_some(cells.shown.1);
+    let inputs = RenderInputs { view: cells.view.1, soft, film: shots };
     thread::scope(|scope| {
         let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
         let (mut view, mut shown) = (cells.view.0, cells.shown.0);
@@ -90,9 +87,8 @@ pub fn run(
             replay.outcome()
         });
         picture(inputs);
-        let mut outcome = replaying.join().unwrap_or_default();
-        outcome.written = writing.join().unwrap_or_default();
-        outcome
+        let outcome = replaying.join().unwrap_or_default();
+        Outcome { written: writing.join().unwrap_or_default(), ..outcome }
     })
 }
 
@@ -154,15 +150,12 @@ impl<'a> Replay<'a> {
     /// Replays one tick and returns its view.
     fn tick(&mut self, record: &TickRecord, clock: &Clock) -> View {
         self.collide_up_to(record.patch_seq, clock);
-        let &(patch_seq, patch) =
-            self.patches.iter().rev().find(|(seq, _)| *seq <= record.patch_seq).unwrap_or(&(0, PATCH));
-        let input = TickInput {
-            tick: record.tick,
-            reading: reading(record.into()),
-            patch: &patch,
-            patch_seq,
-            second: self.second_pose,
-        };
+        let known = self.patches.iter().rev().find(|(seq, _)| *seq <= record.patch_seq);
+        let (patch_seq, patch) = known.copied().unwrap_or_default();
+        let &TickRecord { tick, device, twist, buttons, time_ms, flags, .. } = record;
+        let tool = ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms };
+        let reading = reading(tool, flags);
+        let input = TickInput { tick, reading, patch: &patch, patch_seq, second: self.second_pose };
         if record.has(TickRecord::RELEASED) {
             self.haptic.release();
         }
@@ -197,7 +190,9 @@ impl<'a> Replay<'a> {
             stage.release();
         }
         let (notices, ticks) = (&mut self.senders.notices, &mut self.ticks);
-        let (wrench, again) = stage.tick(record.tick, &reading(record.into()), &mut |notice| {
+        let &SecondRecord { device, twist, buttons, time_ms, flags, .. } = record;
+        let tool = ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms };
+        let (wrench, again) = stage.tick(record.tick, &reading(tool, flags), &mut |notice| {
             ticks.record(notice);
             notices.send(notice);
         });
@@ -270,50 +265,20 @@ impl<'a> Replay<'a> {
 
     fn outcome(self) -> Outcome {
         let last = self.last;
-        let solver = self.tissue.as_ref().map(|tissue| {
-            let mut solver = outcome(&tissue.solver);
-            (solver.times, solver.collision_times) = (self.step_times, self.collision_times);
-            solver.real_time_factor = last.map_or(0.0, |t| tissue.solver.time_ms() / t.time_ms.max(1e-3));
-            solver
+        let solver = self.tissue.as_ref().map(|tissue| SolverOutcome {
+            times: self.step_times,
+            collision_times: self.collision_times,
+            real_time_factor: last.map_or(0.0, |t| tissue.solver.time_ms() / t.time_ms.max(1e-3)),
+            ..SolverOutcome::of(&tissue.solver)
         });
         Outcome {
             ticks: self.ticks,
             seconds: last.map_or(0.0, |tick| tick.time_ms * 1e-3),
             solver,
-            scores: *self.haptic.scores(),
-            guard: self.haptic.guard().counters(),
-            force_limit_n: self.haptic.guard().config().max_force_n,
-            second: self.second.as_ref().map(SecondHand::outcome),
             end_force_n: last.map_or(0.0, |tick| tick.wrench.force.length()),
             replayed: Some(self.replayed),
-            ..Outcome::default()
+            ..Outcome::of(&self.haptic, self.second.as_ref())
         }
-    }
-}
-
-const PATCH: SurfacePatch = SurfacePatch {
-    time_ms: 0.0,
-    normal: trepan_geometry::Vec3::ZERO,
-    tip_mm: trepan_geometry::Vec3::ZERO,
-    depth_mm: 0.0,
-    normal_velocity: 0.0,
-};
-
-/// Device state in the record of either hand.
-struct DeviceRecord {
-    tool: ToolState,
-    flags: u32,
-}
-
-impl From<&TickRecord> for DeviceRecord {
-    fn from(&TickRecord { device, twist, buttons, time_ms, flags, .. }: &TickRecord) -> Self {
-        Self { tool: ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms }, flags }
-    }
-}
-
-impl From<&SecondRecord> for DeviceRecord {
-    fn from(&SecondRecord { device, twist, buttons, time_ms, flags, .. }: &SecondRecord) -> Self {
-        Self { tool: ToolState { world_from_tool: device, twist, buttons: Buttons(buttons), time_ms }, flags }
     }
 }
 
@@ -326,7 +291,7 @@ fn pace(recording: &Recording, dt_ms: f32) -> Option<f64> {
 }
 
 /// Restores the device's reading at a recorded tick.
-fn reading(DeviceRecord { tool, flags }: DeviceRecord) -> Reading {
+fn reading(tool: ToolState, flags: u32) -> Reading {
     let status = match (flags & TickRecord::LOST != 0, flags & TickRecord::STALE != 0) {
         (true, _) => Status::Lost,
         (false, true) => Status::Stale,
@@ -346,11 +311,9 @@ fn remember<T>(memory: &mut VecDeque<T>, item: T) {
 mod tests {
     use super::*;
     use crate::program::Program;
-    use crate::stages::alarms::Limits;
     use crate::stages::haptic_config::HapticConfig;
     use crate::stages::notice::{Hindrance, What};
     use std::sync::Arc;
-    use trepan_contact::{GuardConfig, Vibration, Viscoelastic};
     use trepan_geometry::Vec3;
     use trepan_volume::{BoneVolume, VoxelVolume};
 
@@ -373,17 +336,7 @@ mod tests {
         let mut ct = VoxelVolume::isotropic([32; 3], Vec3::new(-15.5, -15.5, -18.5), 1.0, -1000i16);
         (32 * 32 * 12..32 * 32 * 19).for_each(|voxel| ct.data[voxel] = 1200);
         let bone = Arc::new(BoneVolume::new(&ct, 400).expect("there is bone"));
-        let config = HapticConfig {
-            program: Program::Craniotomy,
-            rigid: trepan_rigid::Method::RECOMMENDED,
-            dt_ms: 1.0,
-            bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
-            tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
-            guard: GuardConfig::default(),
-            limits: Limits::default(),
-            opening_needed: true,
-            force_waits: true,
-        };
+        let config = HapticConfig::usual(Program::Craniotomy);
         let haptic = HapticStage::new(config.clone(), Some(bone.clone()), None, at(20.0, Buttons(0)));
         let second = Some(SecondHand::new(config, Some(bone.clone()), None));
         (bone, Stages { haptic, second, tissue: None })
@@ -415,8 +368,13 @@ mod tests {
         let (mut recording, mut raised, mut second_pose) = (Recording::default(), Vec::new(), None);
         for tick in 1..4400u32 {
             let [first, other] = hands(tick);
-            let input =
-                TickInput { tick: tick.into(), reading: first, patch: &PATCH, patch_seq: 0, second: second_pose };
+            let input = TickInput {
+                tick: tick.into(),
+                reading: first,
+                patch: &SurfacePatch::default(),
+                patch_seq: 0,
+                second: second_pose,
+            };
             recording.ticks.push(haptic.tick(&input, &mut |notice| raised.push(notice)).record);
             recording.second.push(second.tick(tick.into(), &other, &mut |notice| raised.push(notice)).1);
             second_pose = second.place();

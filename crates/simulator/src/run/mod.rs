@@ -5,15 +5,17 @@
 
 pub(crate) mod clock;
 pub(crate) mod film;
-pub(crate) mod journal;
+mod journal;
 pub(crate) mod lesson;
-pub mod lockstep;
+pub(crate) mod lockstep;
 pub(crate) mod stop;
-pub mod threads;
+pub(crate) mod threads;
 pub(crate) mod watch;
 
 use crate::run::film::Shot;
 use crate::run::journal::Written;
+use crate::run::stop::Stop;
+use crate::run::watch::Share;
 use crate::stages::collision_step::{CollisionStage, SoftFrame};
 use crate::stages::haptic_tick::{HapticStage, Tick, ToolSample};
 use crate::stages::notice::{Notice, What};
@@ -21,11 +23,27 @@ use crate::stages::score::ScoreKeeper;
 use crate::stages::second_hand::{SecondHand, SecondOutcome, SecondView};
 use crate::stages::solver_step::{SolverFaults, SolverStage};
 use hdrhistogram::Histogram;
+use serde::{Serialize, Serializer};
 use std::sync::mpsc::Receiver;
 use trepan_contact::{GuardCounters, NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
+use trepan_link::Recorder;
 use trepan_link::cell::{Reader, Writer, cell};
 use trepan_soft::Loads;
+
+/// What a live session and a replay need.
+pub(crate) struct Run<'a> {
+    /// Bodies of the loops.
+    pub stages: Stages,
+    /// The tool before the first tick.
+    pub start: ToolSample,
+    /// Destination of the records.
+    pub recorder: Recorder,
+    /// Publishes the records, where the session is shared.
+    pub share: Option<Share>,
+    /// Ends the session.
+    pub stop: &'a Stop,
+}
 
 /// Bodies of the three loops.
 pub struct Stages {
@@ -47,7 +65,7 @@ pub struct Tissue {
 
 /// State of the session as it is rendered.
 #[derive(Clone, Copy, Debug)]
-pub struct View {
+pub(crate) struct View {
     /// Tool and phase.
     pub sample: ToolSample,
     /// Session time, ms.
@@ -98,7 +116,7 @@ impl View {
 }
 
 /// Read ends for rendering.
-pub struct RenderInputs {
+pub(crate) struct RenderInputs {
     /// Newest tick.
     pub view: Reader<View>,
     /// Newest state of the brain, where it deforms.
@@ -108,10 +126,10 @@ pub struct RenderInputs {
 }
 
 /// A collision result with its sequence number.
-pub type Numbered<T> = (u64, T);
+pub(crate) type Numbered<T> = (u64, T);
 
 /// Write and read ends of every cell between the loops.
-pub struct Cells {
+pub(crate) struct Cells {
     /// Haptic loop to collision loop.
     pub tool: (Writer<ToolSample>, Reader<ToolSample>),
     /// Haptic loop to rendering.
@@ -156,6 +174,12 @@ impl Default for Times {
     }
 }
 
+impl Serialize for Times {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        Quantiles::from(self).serialize(to)
+    }
+}
+
 impl Times {
     /// Adds a duration in µs.
     pub fn add_us(&mut self, us: f32) {
@@ -182,9 +206,29 @@ impl Times {
     }
 }
 
+/// Quantiles of a time, µs.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Quantiles {
+    /// Median.
+    pub p50: f64,
+    /// 99 % quantile.
+    pub p99: f64,
+    /// 99.9 % quantile.
+    pub p999: f64,
+    /// Largest value.
+    pub max: f64,
+}
+
+impl From<&Times> for Quantiles {
+    fn from(times: &Times) -> Self {
+        let [p50, p99, p999] = [0.5, 0.99, 0.999].map(|q| times.quantile_us(q));
+        Self { p50, p99, p999, max: times.max_us() }
+    }
+}
+
 /// Counts and times of the haptic loop.
 #[derive(Clone, Debug, Default)]
-pub struct Ticks {
+pub(crate) struct Ticks {
     /// Ticks run.
     pub count: u64,
     /// Ticks that missed their deadline.
@@ -234,29 +278,43 @@ impl Ticks {
     }
 }
 
-/// Outcome of the solver loop.
-#[derive(Clone, Debug, Default)]
+/// Outcome of the solver loop, as in `summary.json`.
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct SolverOutcome {
     /// Length of a step, ms.
     pub dt_ms: f32,
-    /// Steps done.
-    pub steps: u64,
-    /// Simulated time over wall time.
-    pub real_time_factor: f64,
     /// Compute time of a step.
+    #[serde(rename = "step_us")]
     pub times: Times,
     /// Compute time of a collision step.
+    #[serde(rename = "collision_us")]
     pub collision_times: Times,
+    /// Simulated time over wall time.
+    pub real_time_factor: f64,
     /// Largest displacement of a node, mm.
     pub max_displacement_mm: f32,
     /// Largest displacement of a node at the end, mm.
     pub end_displacement_mm: f32,
-    /// Faults of the solver, counted.
+    /// Faults of the solver, summed over steps.
+    #[serde(flatten)]
     pub solver_faults: SolverFaults,
 }
 
+impl SolverOutcome {
+    /// Returns the part of the outcome that a solver stage knows itself.
+    pub(crate) fn of(stage: &SolverStage) -> Self {
+        Self {
+            dt_ms: stage.dt_ms(),
+            max_displacement_mm: stage.max_displacement_mm(),
+            end_displacement_mm: stage.displacement_mm(),
+            solver_faults: *stage.solver_faults(),
+            ..Self::default()
+        }
+    }
+}
+
 /// Comparison of a replay with its recording.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Replayed {
     /// Ticks replayed.
     pub ticks: u64,
@@ -288,7 +346,7 @@ impl Replayed {
 
 /// Outcome of a live session or a replay.
 #[derive(Debug, Default)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// Counts and times of the haptic loop.
     pub ticks: Ticks,
     /// Length of the run, s of session time.
@@ -311,4 +369,17 @@ pub struct Outcome {
     pub replayed: Option<Replayed>,
     /// Remarks on the run: missing real-time priority, a loop that panicked.
     pub remarks: Vec<String>,
+}
+
+impl Outcome {
+    /// Returns the part of the outcome that the stages know themselves.
+    pub(crate) fn of(stage: &HapticStage, second: Option<&SecondHand>) -> Self {
+        Self {
+            scores: *stage.scores(),
+            guard: stage.guard().counters(),
+            force_limit_n: stage.guard().config().max_force_n,
+            second: second.map(SecondHand::outcome),
+            ..Self::default()
+        }
+    }
 }

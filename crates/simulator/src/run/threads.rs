@@ -14,11 +14,10 @@
 //! force is set to zero and the device closed in every case, also when a loop panics.
 
 use crate::run::clock::{Clock, Schedule};
-use crate::run::journal::Kept;
 use crate::run::journal::{Journal, JournalSenders, journal};
 use crate::run::stop::Stop;
-use crate::run::{Cells, Numbered, Outcome, RenderInputs, SolverOutcome, Stages, Ticks, Times, View};
-use crate::stages::haptic_tick::{HapticStage, TickInput};
+use crate::run::{Cells, Numbered, Outcome, RenderInputs, Run, SolverOutcome, Stages, Ticks, Times, View};
+use crate::stages::haptic_tick::{HapticStage, Tick, TickInput};
 use crate::stages::second_hand::{SecondHand, SecondView};
 use crate::{CollisionStage, Notice, SoftFrame, SolverStage, ToolSample};
 use std::thread;
@@ -30,203 +29,47 @@ use trepan_link::queue::Sender;
 use trepan_link::wire::{CollisionRecord, SecondRecord, SolverRecord, TickRecord};
 use trepan_soft::Loads;
 
-/// Periods of the loops and end of the session.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
-    /// Length of a haptic tick, ms.
-    pub tick_ms: f32,
-    /// Length of a collision step, ms.
-    pub collision_ms: f32,
-    /// End of the session, ms; infinite for none.
-    pub end_ms: f64,
-}
-
 /// Largest lag of simulated behind wall time, ms; more is skipped and lowers the real-time factor.
 const LAG_MS: f64 = 40.0;
 /// Largest number of ticks for the force to fade at the end.
 const FADE_TICKS: u64 = 200;
 
-/// Devices of the hands.
-pub struct Devices {
-    /// Device of the drill; the operation ends when it is finished.
-    pub first: Box<dyn HapticDevice>,
-    /// Device of the aspirator, for stages with a second hand.
-    pub second: Option<Box<dyn HapticDevice>>,
-}
-
-/// Runs until the first device is finished, the time is over or a stop is requested. `picture` runs
-/// on the calling thread.
-pub fn run(
-    stages: Stages,
-    devices: Devices,
-    (recorder, share): Kept,
-    start: ToolSample,
-    pace: Pace,
-    stop: &Stop,
-    picture: impl FnOnce(RenderInputs),
-) -> Outcome {
-    let clock = Clock::start();
-    let cells = Cells::new(&stages, start);
-    let (senders, receivers) = journal();
-    let JournalSenders { ticks, second: seconds, notices, collisions, solver } = senders;
-    let Stages { haptic, second, tissue } = stages;
-    let owned = |device| HapticDeviceOwner { device, stop: stop.clone() };
-    let hand = owned(devices.first);
-    let second = second.zip(devices.second.map(owned)).map(|(stage, hand)| Second { stage, hand, records: seconds });
-    let inputs = RenderInputs { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1), film: None };
-    thread::scope(|scope| {
-        let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
-        let ends = HapticEnds { tool: cells.tool.0, view: cells.view.0, patch: cells.patch.1, ticks, notices };
-        let feeling = scope.spawn(move || haptic_loop(haptic, hand, second, ends, clock, pace, stop));
-        let simulating = tissue.map(|tissue| {
-            let ends = CollisionEnds {
-                tool: cells.tool.1,
-                soft: cells.soft.1,
-                patch: cells.patch.0,
-                loads: cells.loads.0,
-                records: collisions,
-            };
-            let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
-            let ends = SolverEnds { loads: cells.loads.1, soft: cells.soft.0, shown: cells.shown.0, records: solver };
-            let solving = scope.spawn(move || solver_loop(tissue.solver, ends, clock, stop));
-            (colliding, solving)
-        });
-        picture(inputs);
-        stop.ask();
-        let mut outcome = feeling.join().unwrap_or_else(|_| panicked("haptic"));
-        if let Some((colliding, solving)) = simulating {
-            let mut solver = solving.join().unwrap_or_default();
-            solver.collision_times = colliding.join().unwrap_or_default();
-            outcome.solver = Some(solver);
-        }
-        outcome.written = writing.join().unwrap_or_default();
-        outcome
-    })
-}
-
-/// Outcome after a panic of a loop.
-fn panicked(name: &str) -> Outcome {
-    let remark = format!("the {name} thread panicked; force set to zero, device closed");
-    Outcome { remarks: vec![remark], ..Outcome::default() }
-}
-
-/// Owns the device; on drop it sets the force to zero, closes the device and ends the session.
-pub(crate) struct HapticDeviceOwner {
-    /// The device.
-    pub device: Box<dyn HapticDevice>,
-    /// Stop flag that is set on drop.
-    pub stop: Stop,
-}
-
-impl Drop for HapticDeviceOwner {
-    fn drop(&mut self) {
-        self.device.apply(GuardedWrench::ZERO);
-        self.device.close();
-        self.stop.ask();
-    }
-}
-
-/// Ends of cells and ring buffers for the haptic loop.
-struct HapticEnds {
-    tool: Writer<ToolSample>,
-    view: Writer<View>,
-    patch: Reader<Numbered<SurfacePatch>>,
-    ticks: Sender<TickRecord>,
-    notices: Sender<Notice>,
-}
-
-/// The second hand: its stage and its device.
-struct Second {
-    stage: SecondHand,
-    hand: HapticDeviceOwner,
-    records: Sender<SecondRecord>,
-}
-
-impl Second {
-    /// Reads the device, runs the tick and applies the force, after the first hand's tick of the
-    /// same number.
-    fn tick(&mut self, tick: u64, now_ms: f64, notify: &mut dyn FnMut(Notice)) -> SecondView {
-        let reading = self.hand.device.read(now_ms);
-        let (wrench, record) = self.stage.tick(tick, &reading, notify);
-        self.hand.device.apply(wrench);
-        self.records.send(record);
-        SecondView { world_from_tool: record.proxy, force: wrench.force() }
-    }
-}
-
 /// The haptic loop: read, tick, apply, publish, wait. Late ticks are counted, not made up for.
-fn haptic_loop(
-    mut stage: HapticStage,
-    mut hand: HapticDeviceOwner,
-    mut second: Option<Second>,
-    mut ends: HapticEnds,
-    clock: Clock,
-    pace: Pace,
-    stop: &Stop,
-) -> Outcome {
+fn haptic_loop(mut hands: Hands, mut ends: HapticEnds, clock: Clock, pace: Pace, stop: &Stop) -> Outcome {
     let remarks = real_time(80, "haptic").into_iter().collect();
     let mut ticks = Ticks::default();
     let mut schedule = Schedule::new(pace.tick_ms.into(), clock.now_ms());
-    let mut ending: Option<u64> = None;
-    let mut second_pose = None;
+    let (mut ending, mut second_pose) = (None, None);
     loop {
         clock.spin_until(schedule.next_ms());
         let now_ms = clock.now_ms();
-        let reading = hand.device.read(now_ms);
+        let reading = hands.owner.device.read(now_ms);
         let &(patch_seq, patch) = ends.patch.latest().0;
         let input = TickInput { tick: ticks.count + 1, reading, patch: &patch, patch_seq, second: second_pose };
-        let number = input.tick;
         let mut notify = |notice| {
             ticks.record(notice);
             ends.notices.send(notice);
         };
-        let mut tick = stage.tick(&input, &mut notify);
-        hand.device.apply(tick.wrench);
-        let second_view = second.as_mut().map(|second| second.tick(number, now_ms, &mut notify));
-        second_pose = second.as_ref().and_then(|second| second.stage.place());
+        let mut tick = hands.stage.tick(&input, &mut notify);
+        hands.owner.device.apply(tick.wrench);
+        let second_view = hands.second.as_mut().map(|second| second.tick(input.tick, now_ms, &mut notify));
+        second_pose = hands.second.as_ref().and_then(|second| second.stage.place());
         let done_ms = clock.now_ms();
         tick.record.compute_us = ((done_ms - now_ms) * 1e3) as f32;
         tick.record.flags |= if schedule.advance(done_ms) { TickRecord::LATE } else { 0 };
         ticks.add(&tick);
-        let over = reading.status == Status::Finished || now_ms >= pace.end_ms || stop.asked();
-        if over && ending.is_none() {
-            stage.release();
-            second.iter_mut().for_each(|second| second.stage.release());
+        if ending.is_none() && (reading.status == Status::Finished || now_ms >= pace.end_ms || stop.asked()) {
+            hands.release();
             ending = Some(ticks.count);
         }
-        let at_rest = stage.is_at_rest() && second.as_ref().is_none_or(|second| second.stage.is_at_rest());
-        let finished = ending.is_some_and(|since| at_rest || ticks.count - since > FADE_TICKS);
-        ends.tool.set(tick.sample);
-        ends.view.set(ticks.view(&tick, &stage, second_view, finished));
-        ends.ticks.send(tick.record);
+        let finished = ending.is_some_and(|since| hands.is_at_rest() || ticks.count - since > FADE_TICKS);
+        ends.publish(&tick, ticks.view(&tick, &hands.stage, second_view, finished));
         if finished {
-            let seconds = clock.now_ms() * 1e-3;
-            let end_force_n = if stage.is_at_rest() { tick.wrench.force().length() } else { 0.0 };
-            let (scores, guard) = (*stage.scores(), stage.guard().counters());
-            let (force_limit_n, second) =
-                (stage.guard().config().max_force_n, second.as_ref().map(|second| second.stage.outcome()));
-            return Outcome {
-                ticks,
-                seconds,
-                scores,
-                guard,
-                force_limit_n,
-                end_force_n,
-                second,
-                remarks,
-                ..Outcome::default()
-            };
+            let end_force_n = if hands.stage.is_at_rest() { tick.wrench.force().length() } else { 0.0 };
+            let of_stages = Outcome::of(&hands.stage, hands.second.as_ref().map(|second| &second.stage));
+            return Outcome { ticks, seconds: clock.now_ms() * 1e-3, end_force_n, remarks, ..of_stages };
         }
     }
-}
-
-/// Ends of cells and ring buffers for the collision loop.
-struct CollisionEnds {
-    tool: Reader<ToolSample>,
-    soft: Reader<SoftFrame>,
-    patch: Writer<Numbered<SurfacePatch>>,
-    loads: Writer<Numbered<Loads>>,
-    records: Sender<CollisionRecord>,
 }
 
 /// The collision loop: collides the newest tool with the newest brain at its own rate.
@@ -252,14 +95,6 @@ fn collision_loop(mut stage: CollisionStage, mut ends: CollisionEnds, clock: Clo
         schedule.advance(done_ms);
     }
     times
-}
-
-/// Ends of cells and ring buffers for the solver loop.
-struct SolverEnds {
-    loads: Reader<Numbered<Loads>>,
-    soft: Writer<SoftFrame>,
-    shown: Writer<SoftFrame>,
-    records: Sender<SolverRecord>,
 }
 
 /// The solver loop: simulated time follows wall time; a lag over [`LAG_MS`] is skipped.
@@ -291,19 +126,155 @@ fn solver_loop(mut stage: SolverStage, mut ends: SolverEnds, clock: Clock, stop:
         }
     }
     let span_ms = (clock.now_ms() - begin_ms).max(1e-3);
-    SolverOutcome { real_time_factor: stage.time_ms() / span_ms, times, ..outcome(&stage) }
+    SolverOutcome { real_time_factor: stage.time_ms() / span_ms, times, ..SolverOutcome::of(&stage) }
 }
 
-/// Returns the part of the outcome that a solver stage knows itself.
-pub fn outcome(stage: &SolverStage) -> SolverOutcome {
-    SolverOutcome {
-        dt_ms: stage.dt_ms(),
-        steps: stage.steps(),
-        max_displacement_mm: stage.max_displacement_mm(),
-        end_displacement_mm: stage.displacement_mm(),
-        solver_faults: *stage.solver_faults(),
-        ..SolverOutcome::default()
+/// Runs until the first device is finished, the time is over or a stop is requested. `picture` runs
+/// on the calling thread.
+pub(crate) fn run(run: Run<'_>, devices: Devices, pace: Pace, picture: impl FnOnce(RenderInputs)) -> Outcome {
+    let Run { stages, start, recorder, share, stop } = run;
+    let clock = Clock::start();
+    let cells = Cells::new(&stages, start);
+    let (senders, receivers) = journal();
+    let JournalSenders { ticks, second: seconds, notices, collisions, solver } = senders;
+    let Stages { haptic, second, tissue } = stages;
+    let owned = |device| HapticDeviceOwner { device, stop: stop.clone() };
+    let owner = owned(devices.first);
+    let second = second.zip(devices.second.map(owned));
+    let second = second.map(|(stage, owner)| Second { stage, owner, records: seconds });
+    let hands = Hands { stage: haptic, owner, second };
+    let inputs = RenderInputs { view: cells.view.1, soft: tissue.is_some().then_some(cells.shown.1), film: None };
+    thread::scope(|scope| {
+        let writing = scope.spawn(move || Journal::write(receivers, recorder, share, clock));
+        let ends = HapticEnds { tool: cells.tool.0, view: cells.view.0, patch: cells.patch.1, ticks, notices };
+        let feeling = scope.spawn(move || haptic_loop(hands, ends, clock, pace, stop));
+        let simulating = tissue.map(|tissue| {
+            let (tool, soft, patch, loads) = (cells.tool.1, cells.soft.1, cells.patch.0, cells.loads.0);
+            let ends = CollisionEnds { tool, soft, patch, loads, records: collisions };
+            let colliding = scope.spawn(move || collision_loop(tissue.collision, ends, clock, pace, stop));
+            let ends = SolverEnds { loads: cells.loads.1, soft: cells.soft.0, shown: cells.shown.0, records: solver };
+            (colliding, scope.spawn(move || solver_loop(tissue.solver, ends, clock, stop)))
+        });
+        picture(inputs);
+        stop.ask();
+        let panicked = || vec!["the haptic thread panicked; force set to zero, device closed".to_string()];
+        let outcome = feeling.join().unwrap_or_else(|_| Outcome { remarks: panicked(), ..Outcome::default() });
+        let solver = simulating.map(|(colliding, solving)| {
+            let solver = solving.join().unwrap_or_default();
+            SolverOutcome { collision_times: colliding.join().unwrap_or_default(), ..solver }
+        });
+        Outcome { solver, written: writing.join().unwrap_or_default(), ..outcome }
+    })
+}
+
+/// Periods of the loops and end of the session.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pace {
+    /// Length of a haptic tick, ms.
+    pub tick_ms: f32,
+    /// Length of a collision step, ms.
+    pub collision_ms: f32,
+    /// End of the session, ms; infinite for none.
+    pub end_ms: f64,
+}
+
+/// Devices of the hands.
+pub(crate) struct Devices {
+    /// Device of the drill; the operation ends when it is finished.
+    pub first: Box<dyn HapticDevice>,
+    /// Device of the aspirator, for stages with a second hand.
+    pub second: Option<Box<dyn HapticDevice>>,
+}
+
+/// Owns the device; on drop it sets the force to zero, closes the device and ends the session.
+pub(crate) struct HapticDeviceOwner {
+    /// The device.
+    pub device: Box<dyn HapticDevice>,
+    /// Stop flag that is set on drop.
+    pub stop: Stop,
+}
+
+impl Drop for HapticDeviceOwner {
+    fn drop(&mut self) {
+        self.device.apply(GuardedWrench::ZERO);
+        self.device.close();
+        self.stop.ask();
     }
+}
+
+/// Ends of cells and ring buffers for the haptic loop.
+struct HapticEnds {
+    tool: Writer<ToolSample>,
+    view: Writer<View>,
+    patch: Reader<Numbered<SurfacePatch>>,
+    ticks: Sender<TickRecord>,
+    notices: Sender<Notice>,
+}
+
+impl HapticEnds {
+    /// Sends the results of a tick to the other threads.
+    fn publish(&mut self, tick: &Tick, view: View) {
+        self.tool.set(tick.sample);
+        self.view.set(view);
+        self.ticks.send(tick.record);
+    }
+}
+
+/// Both hands: their stages and devices.
+struct Hands {
+    /// First, so that the device is closed before anything else is dropped.
+    owner: HapticDeviceOwner,
+    stage: HapticStage,
+    second: Option<Second>,
+}
+
+impl Hands {
+    /// Fades the forces to zero.
+    fn release(&mut self) {
+        self.stage.release();
+        self.second.iter_mut().for_each(|second| second.stage.release());
+    }
+
+    /// Whether the forces are released and zero.
+    fn is_at_rest(&self) -> bool {
+        self.stage.is_at_rest() && self.second.as_ref().is_none_or(|second| second.stage.is_at_rest())
+    }
+}
+
+/// The second hand: its stage and its device.
+struct Second {
+    owner: HapticDeviceOwner,
+    stage: SecondHand,
+    records: Sender<SecondRecord>,
+}
+
+impl Second {
+    /// Reads the device, runs the tick and applies the force, after the first hand's tick of the
+    /// same number.
+    fn tick(&mut self, tick: u64, now_ms: f64, notify: &mut dyn FnMut(Notice)) -> SecondView {
+        let reading = self.owner.device.read(now_ms);
+        let (wrench, record) = self.stage.tick(tick, &reading, notify);
+        self.owner.device.apply(wrench);
+        self.records.send(record);
+        SecondView { world_from_tool: record.proxy, force: wrench.force() }
+    }
+}
+
+/// Ends of cells and ring buffers for the collision loop.
+struct CollisionEnds {
+    tool: Reader<ToolSample>,
+    soft: Reader<SoftFrame>,
+    patch: Writer<Numbered<SurfacePatch>>,
+    loads: Writer<Numbered<Loads>>,
+    records: Sender<CollisionRecord>,
+}
+
+/// Ends of cells and ring buffers for the solver loop.
+struct SolverEnds {
+    loads: Reader<Numbered<Loads>>,
+    soft: Writer<SoftFrame>,
+    shown: Writer<SoftFrame>,
+    records: Sender<SolverRecord>,
 }
 
 /// Requests a first-in-first-out priority for this thread; returns a remark when it is refused.

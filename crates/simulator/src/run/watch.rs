@@ -31,7 +31,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use trepan_contact::GuardedWrench;
-use trepan_geometry::{Buttons, ToolState, Vec3};
+use trepan_geometry::{Buttons, ToolState};
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
 use trepan_link::cell::{Reader, cell};
 use trepan_link::topics::{Publisher, Session, Subscriber, TopicError};
@@ -48,15 +48,18 @@ const FIRST_TICK_TIMEOUT_S: f64 = 20.0;
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 /// Send end of a shared session, for the recording thread.
-pub struct Share {
-    ticks: Publisher<TickRecord>,
-    events: Publisher<EventRecord>,
-    teacher: Listener,
+pub(crate) struct Share {
+    /// Publishes ticks.
+    pub(super) ticks: Publisher<TickRecord>,
+    /// Publishes events.
+    pub(super) events: Publisher<EventRecord>,
+    /// Receives the teacher's requests.
+    pub(super) teacher: Listener,
     _session: Session,
 }
 
 /// Readers of the teacher's requests: first hand, second hand, window.
-pub type Asked = [Reader<TeacherRecord>; 3];
+pub(crate) type Asked = [Reader<TeacherRecord>; 3];
 
 impl Share {
     /// Shares a session under a name; returns also the readers of the teacher's requests.
@@ -71,25 +74,10 @@ impl Share {
         };
         open().map_err(|fault| SessionError::Usage(format!("--share {name}: {fault}")))
     }
-
-    /// Receives the teacher's requests; returns those that began (`true`) or ended.
-    pub fn receive(&mut self, now_ms: f64) -> impl Iterator<Item = (bool, &'static str)> + use<> {
-        self.teacher.receive(now_ms)
-    }
-
-    /// Publishes a tick; returns false when publishing failed.
-    pub fn tick(&mut self, record: &TickRecord) -> bool {
-        self.ticks.send(record).is_ok()
-    }
-
-    /// Publishes an event; returns false when publishing failed.
-    pub fn event(&mut self, record: &EventRecord) -> bool {
-        self.events.send(record).is_ok()
-    }
 }
 
 /// Another session as a device: receive end of a watcher.
-pub struct Watched {
+pub(crate) struct Watched {
     newest: Reader<TickRecord>,
     seen: u64,
     received_ms: Option<f64>,
@@ -101,7 +89,7 @@ pub struct Watched {
 
 /// Name of the watched session, and whether it has ended.
 #[derive(Clone)]
-pub struct Watching {
+pub(crate) struct Watching {
     name: String,
     over: Arc<AtomicBool>,
 }
@@ -131,20 +119,6 @@ fn first_tick(name: &str, ticks: &mut Subscriber<TickRecord>, stop: &Stop) -> Re
 }
 
 impl Watched {
-    /// Capabilities of a device without motors or limits.
-    pub const CAPABILITIES: Capabilities = Capabilities {
-        name: String::new(),
-        peak_force_n: 0.0,
-        continuous_force_n: 0.0,
-        rate_hz: 1000.0,
-        workspace_mm: Vec3::INFINITY,
-        axes_driven: 0,
-        position_resolution_mm: 0.0,
-        delay_ticks: 0,
-        moving_mass_g: 0.0,
-        damping: 0.0,
-    };
-
     /// Connects to the session of a name and waits for its first tick; the tool begins at `start`.
     pub fn open(name: &str, start: ToolState, stop: &Stop) -> Result<(Self, Watching), SessionError> {
         let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
@@ -196,7 +170,7 @@ impl HapticDevice for Watched {
     fn apply(&mut self, _wrench: GuardedWrench) {}
 
     fn capabilities(&self) -> Capabilities {
-        Self::CAPABILITIES
+        Capabilities::passive("")
     }
 
     fn close(&mut self) {
@@ -206,7 +180,7 @@ impl HapticDevice for Watched {
 
 /// Connections of a session's window to other sessions.
 #[derive(Default)]
-pub struct Company {
+pub(crate) struct Company {
     /// Requests of a teacher to this session's trainee.
     pub asked: Option<Reader<TeacherRecord>>,
     /// Send end, where this session teaches the trainee of another.

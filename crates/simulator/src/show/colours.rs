@@ -44,7 +44,7 @@ const MAX_TEXELS: u32 = 160;
 
 /// Colour overlays during the operation.
 #[derive(Clone, Debug, Default)]
-pub struct Colours {
+pub(crate) struct Colours {
     /// Over the bone.
     pub bone: Option<Paint>,
     /// Over the brain.
@@ -52,7 +52,7 @@ pub struct Colours {
 }
 
 /// Paints the plan's outline and the distance of bone to the brain below it.
-pub fn planned(plan: &Plan, brain: Option<&DistanceField>) -> Paint {
+pub(crate) fn planned(plan: &Plan, brain: Option<&DistanceField>) -> Paint {
     let (middle, inward) = (plan.site.entry, plan.site.inward);
     let reach = plan.hole_mm.max(plan.flap_mm) + AROUND_MM;
     let around = Aabb::of_points(&[middle - 4.0 * inward, middle + DEEP_MM * inward]).inflated(reach + 4.0);
@@ -70,7 +70,7 @@ pub fn planned(plan: &Plan, brain: Option<&DistanceField>) -> Paint {
 }
 
 /// Paints the structures on the brain that must not be touched.
-pub fn forbidden(field: &DistanceField, around: Aabb) -> Paint {
+pub(crate) fn forbidden(field: &DistanceField, around: Aabb) -> Paint {
     paint(1, around, (around.size().max_element() / MAX_TEXELS as f32).max(TEXEL_MM), |place| {
         let near = 1.0 - field.sample(place).max(0.0) / 2.0;
         if near > 0.0 { coloured(PURPLE, 0.85 * near) } else { CLEAR }
@@ -78,7 +78,7 @@ pub fn forbidden(field: &DistanceField, around: Aabb) -> Paint {
 }
 
 /// Paints removed and planned bone, voxel by voxel around the plan.
-pub fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Paint {
+pub(crate) fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Paint {
     let reach = plan.hole_mm.max(plan.flap_mm) + 2.0 * AROUND_MM;
     let around = Aabb::of_points(&[plan.site.entry, plan.site.entry + DEEP_MM * plan.site.inward]).inflated(reach);
     let low = bone.centre_of(bone.voxel_of(around.min));
@@ -108,7 +108,7 @@ pub fn against(plan: &Plan, before: &VoxelVolume<i16>, bone: &BoneVolume) -> Pai
 }
 
 /// Paints force over time on the brain at rest, where the tool touched it; `None` without touches.
-pub fn forces(brain: &DistanceField, tray: &[Tool], ticks: &[TickRecord]) -> Option<Paint> {
+pub(crate) fn forces(brain: &DistanceField, tray: &[Tool], ticks: &[TickRecord]) -> Option<Paint> {
     let pressed = |tick: &&TickRecord| tick.phase == 1 && tick.tissue_depth_mm > 0.0;
     let touched = |tick: &TickRecord| (touched(brain, tray, tick), tick.tissue_n());
     // Every 10th tick is enough: the tool moves less than the spread of a touch in that time.

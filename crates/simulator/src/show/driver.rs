@@ -9,7 +9,7 @@ const PACKAGES: [&str; 2] = ["libvulkan1", "mesa-vulkan-drivers"];
 
 /// Opens a graphics device. Without one, it installs the driver as root, or logs the command that
 /// would.
-pub fn open() -> Result<Gpu, GpuError> {
+pub(crate) fn open() -> Result<Gpu, GpuError> {
     let opened = Gpu::open(Prefer::default());
     if !matches!(opened, Err(GpuError::NoAdapter)) || !Path::new("/usr/bin/apt-get").is_file() {
         return opened;

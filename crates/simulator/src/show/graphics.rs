@@ -8,7 +8,7 @@ use std::path::Path;
 use trepan_budget::Picture;
 use trepan_gpu::{Gpu, GpuError};
 use trepan_link::Recording;
-use trepan_render::{Camera, Frame, Painter, SceneData, SliceLook};
+use trepan_render::{Camera, Frame, Painter, RenderError, SceneData, SliceLook};
 use trepan_volume::VoxelVolume;
 
 /// Caption of the map of bone.
@@ -21,7 +21,7 @@ const BONE_VIEW_MM: f32 = 75.0;
 const BRAIN_VIEW_MM: f32 = 150.0;
 
 /// The painter and the name of its device.
-pub struct Graphics {
+pub(crate) struct Graphics {
     /// Name of the graphics adapter.
     pub adapter: String,
     /// The painter; `None` once it is taken.
@@ -36,7 +36,7 @@ impl Graphics {
         size: [u32; 2],
         device: Result<Gpu, GpuError>,
         windowed: bool,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, RenderError> {
         let Picture { sparse, detail } = setup.models.setup.picture;
         let brain = setup.scene.brain.as_ref();
         let data = SceneData {
@@ -47,8 +47,8 @@ impl Graphics {
         };
         let by_processor = !windowed && (sparse || detail < 1.0) && device.as_ref().is_ok_and(Gpu::is_software);
         let painter = if by_processor { Painter::by_processor(&data, size) } else { Painter::on(device, &data, size) };
-        let mut painter = painter.map_err(|fault| fault.to_string())?;
-        painter.set_quality(sparse, detail as f32).map_err(|fault| fault.to_string())?;
+        let mut painter = painter?;
+        painter.set_quality(sparse, detail as f32)?;
         painter.notice().inspect(|notice| tracing::warn!("{notice}"));
         Ok(Self { adapter: painter.name(), painter: Some(painter) })
     }

@@ -16,7 +16,7 @@ use trepan_render::window::Capture;
 const QUEUE: usize = 30;
 
 /// Saves pictures of the window on a thread.
-pub struct Keeper {
+pub(crate) struct Keeper {
     sender: Option<SyncSender<(Capture, Image)>>,
     thread: Option<JoinHandle<Result<(), String>>>,
     dropped: u64,

@@ -1,6 +1,6 @@
 //! Rendering on the main thread: into files or a window.
 
-pub(crate) mod colours;
+mod colours;
 pub(crate) mod driver;
 pub(crate) mod graphics;
 mod keep;

@@ -20,7 +20,7 @@ const DANGERS: [Warning; 6] = [
 ];
 
 /// Returns the panel's contents that are common to all sessions.
-pub fn panel(case: &str, program: Program, view: &View) -> Panel {
+pub(crate) fn panel(case: &str, program: Program, view: &View) -> Panel {
     let value = |name: &str, value: String| (name.to_string(), value);
     let sample = &view.sample;
     let [_, late, held] = view.counts;
@@ -69,7 +69,7 @@ fn tray(program: Program, slot: usize) -> Choice {
 
 /// Returns the active warnings.
 fn active(bits: u32) -> impl Iterator<Item = Warning> {
-    Warning::ALL.into_iter().enumerate().filter(move |(at, _)| bits & (1 << at) != 0).map(|(_, warning)| warning)
+    Warning::ALL.into_iter().filter(move |warning| bits & (1 << *warning as u32) != 0)
 }
 
 fn in_words(notice: Notice) -> String {
@@ -78,7 +78,7 @@ fn in_words(notice: Notice) -> String {
 }
 
 /// Returns a hint on what to do next.
-pub fn hint(phase: Phase, by_hand: bool) -> &'static str {
+pub(crate) fn hint(phase: Phase, by_hand: bool) -> &'static str {
     match (phase, by_hand) {
         (_, false) => "the operation runs by itself",
         (Phase::Craniotomy, true) => {

@@ -26,7 +26,7 @@ const SHOTS_BETWEEN: usize = 4;
 
 /// Results of rendering.
 #[derive(Debug, Default)]
-pub struct Album {
+pub(crate) struct Album {
     /// The painter, for further pictures.
     pub painter: Option<Painter>,
     /// Pictures rendered.
@@ -53,20 +53,20 @@ impl Album {
 }
 
 /// Returns the default camera on the site.
-pub fn camera(site: &Site) -> Camera {
+pub(crate) fn camera(site: &Site) -> Camera {
     Camera::viewed_from(site.entry, eye(site), 170.0)
 }
 
 /// Returns the camera of the microscope: 250 mm from the site, with a field of some 50 mm. It is
 /// inclined by 15 degrees, so that a tool along the approach does not hide its tip.
-pub fn microscope(site: &Site) -> Camera {
+pub(crate) fn microscope(site: &Site) -> Camera {
     let outward = -site.inward;
     let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
     Camera { fov_rad: 0.2, ..Camera::viewed_from(site.entry, outward + 0.27 * side, 250.0) }
 }
 
 /// Returns a frame of a state.
-pub fn frame<'a>(
+pub(crate) fn frame<'a>(
     camera: Camera,
     view: &View,
     brain_positions: Option<&'a [Vec3]>,
@@ -96,14 +96,14 @@ fn arrow(view: &View) -> Option<[Vec3; 2]> {
 }
 
 /// Waits for the end without rendering.
-pub fn wait(mut inputs: RenderInputs, stop: &Stop) {
+pub(crate) fn wait(mut inputs: RenderInputs, stop: &Stop) {
     while !stop.asked() && !inputs.view.latest().0.finished {
         std::thread::sleep(Duration::from_millis(5));
     }
 }
 
 /// Renders `per_second` pictures a second into `folder` until the end, and one more at the end.
-pub fn draw(
+pub(crate) fn draw(
     mut inputs: RenderInputs,
     mut painter: Painter,
     setup: &SessionSetup,
@@ -153,7 +153,7 @@ fn write(image: &Image, path: &Path) -> Result<(), String> {
 }
 
 /// Writes a picture for the report; its file is named after the caption up to a colon.
-pub fn snap(image: &Image, folder: &Path, caption: &str) -> Result<Shot, String> {
+pub(crate) fn snap(image: &Image, folder: &Path, caption: &str) -> Result<Shot, String> {
     let name = caption.split(':').next().unwrap_or_default().replace(' ', "-");
     let path = folder.join(format!("frame-{name}.png"));
     write(image, &path)?;
@@ -167,12 +167,10 @@ fn chosen(candidates: &[(f64, PathBuf)]) -> Vec<Shot> {
     picks.dedup();
     let shot = |&at: &usize| {
         let (seconds, path) = candidates.get(at)?;
-        let when = if at == 0 {
-            "before"
-        } else if at == last {
-            "after"
-        } else {
-            "during"
+        let when = match at {
+            0 => "before",
+            _ if at == last => "after",
+            _ => "during",
         };
         Some(Shot { caption: format!("{when}, at {seconds:.1} s"), png: std::fs::read(path).ok()? })
     };

@@ -6,16 +6,12 @@
 //! [`MAX_VOXELS`] per picture: a longer jump takes a few pictures. The brain's nodes are
 //! interpolated between the shots that hold them.
 
-use crate::program::Program;
 use crate::run::View;
 use crate::run::film::Shot;
 use crate::run::lockstep::up_to;
 use crate::run::stop::Stop;
-use crate::show::colours::Colours;
-use crate::show::keep::Keeper;
-use crate::show::notice_text;
-use crate::show::picture::{Album, frame};
-use crate::show::window::{self, Opened};
+use crate::show::picture::Album;
+use crate::show::window::{self, Opened, Shown};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use trepan_geometry::Vec3;
@@ -105,19 +101,14 @@ struct Player {
     timeline: Timeline,
     now_s: Option<f64>,
     first: View,
-    case: String,
-    program: Program,
-    bone_shown: bool,
-    colours: Colours,
-    keeper: Keeper,
-    stop: Stop,
+    shown: Shown,
     hint: String,
     /// Time at which the window closes, s.
     until_s: f64,
 }
 
 /// Shows a replay until the window is closed, or for `until_s`.
-pub fn show(
+pub(crate) fn show(
     first: View,
     coming: Receiver<Shot>,
     painter: Painter,
@@ -131,20 +122,13 @@ pub fn show(
         timeline: timeline(recording, until_s),
         now_s: None,
         first,
-        case: opened.case.into(),
-        program: opened.table.program,
-        bone_shown: bone.is_some(),
-        colours: opened.table.colours(),
-        keeper: Keeper::into_folder(&opened.out.join("window")),
-        stop: stop.clone(),
+        shown: Shown::of(opened, bone.is_some(), stop),
         hint: recording.losses().map_or_else(|| HINT.into(), |losses| format!("not a whole recording: {losses}")),
         until_s,
         film: Film { shots: Vec::new(), coming, bone, at: 0, positions: Vec::new() },
     };
-    let (player, mut album) = window::run(player, painter, opened, first);
-    stop.ask();
-    album.faults.extend(player.keeper.finish());
-    album
+    let (player, album) = window::run(player, painter, opened, first);
+    player.shown.finish(album)
 }
 
 /// Makes the timeline of a recording up to a time, s, with its events as marks.
@@ -189,20 +173,17 @@ impl Session for Player {
         let passed_s = input.seconds - self.now_s.replace(input.seconds).unwrap_or(input.seconds);
         advance(&mut self.timeline, input.playback, passed_s);
         self.film.go_to(self.timeline.at_s * 1e3);
-        let mut panel = notice_text::panel(&self.case, self.program, self.view());
-        panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
-        let finished = self.stop.asked() || input.seconds > self.until_s;
-        let hint = self.hint.clone();
-        Panel { hint, timeline: Some(self.timeline.clone()), finished, ..panel }
+        let panel = self.shown.panel(self.view(), false);
+        let finished = self.shown.stop.asked() || input.seconds > self.until_s;
+        Panel { hint: self.hint.clone(), timeline: Some(self.timeline.clone()), finished, ..panel }
     }
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
-        let positions = Some(self.film.positions.as_slice()).filter(|p| !p.is_empty());
-        frame(camera, self.view(), positions, self.bone_shown, &self.colours)
+        self.shown.frame(camera, self.view(), &self.film.positions)
     }
 
     fn capture(&mut self, what: Capture, picture: Image) {
-        self.keeper.keep(what, picture);
+        self.shown.keep(what, picture);
     }
 }
 
@@ -216,18 +197,11 @@ impl Player {
 mod tests {
     use super::*;
     use crate::run::film::Change;
-    use crate::stages::haptic_tick::ToolSample;
+    use crate::run::film::tests::view;
     use glam::IVec3;
     use std::sync::mpsc::channel;
-    use trepan_geometry::{Pose, ToolState};
     use trepan_link::wire::TickRecord;
     use trepan_volume::VoxelVolume;
-
-    fn view(time_ms: f64) -> View {
-        let tool = Program::Craniotomy.tray()[0];
-        let sample = ToolSample { tick: 0, state: ToolState::at(Pose::IDENTITY), tool, slot: 0, drilling: false };
-        View { time_ms, ..View::at(sample, 1.0) }
-    }
 
     /// Makes a film of `count` shots, 10 ms apart. Shot n removes voxel n; every other shot holds
     /// the brain's nodes.

@@ -28,13 +28,8 @@ const LEASH_MM: f32 = 2.0;
 /// Duration of a request, s: long enough that no tick misses it.
 const REQUEST_S: f64 = 0.1;
 
-/// Whether a window can be opened here.
-pub fn has_display() -> bool {
-    window::display().is_ok()
-}
-
 /// Session data for the window.
-pub struct Opened<'a> {
+pub(crate) struct Opened<'a> {
     /// Patient, plan and program.
     pub table: &'a SessionSetup,
     /// Name of the case, without the patient's name.
@@ -45,16 +40,65 @@ pub struct Opened<'a> {
     pub rate_hz: f32,
 }
 
+/// What a live session and a replay show alike.
+pub(super) struct Shown {
+    case: String,
+    program: Program,
+    /// Whether bone is shown.
+    pub bone: bool,
+    colours: Colours,
+    keeper: Keeper,
+    /// Ends the session.
+    pub stop: Stop,
+}
+
+impl Shown {
+    /// Prepares what is shown of a session.
+    pub fn of(opened: &Opened<'_>, bone: bool, stop: &Stop) -> Self {
+        Self {
+            case: opened.case.into(),
+            program: opened.table.program,
+            bone,
+            colours: opened.table.colours(),
+            keeper: Keeper::into_folder(&opened.out.join("window")),
+            stop: stop.clone(),
+        }
+    }
+
+    /// Returns the panel of a state; without `by_hand` no tool can be chosen.
+    pub fn panel(&self, view: &View, by_hand: bool) -> Panel {
+        let mut panel = notice_text::panel(&self.case, self.program, view);
+        if !by_hand {
+            panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
+        }
+        panel
+    }
+
+    /// Returns the frame of a state, with the brain at the given positions.
+    pub fn frame<'a>(&'a self, camera: Camera, view: &View, positions: &'a [Vec3]) -> Frame<'a> {
+        frame(camera, view, Some(positions).filter(|p| !p.is_empty()), self.bone, &self.colours)
+    }
+
+    /// Keeps a picture of the window.
+    pub fn keep(&mut self, what: Capture, picture: Image) {
+        self.keeper.keep(what, picture);
+    }
+
+    /// Ends the session, and adds the faults of saving its pictures to the album.
+    pub fn finish(self, mut album: Album) -> Album {
+        self.stop.ask();
+        album.faults.extend(self.keeper.finish());
+        album
+    }
+}
+
 /// A live session in the window.
 struct Show {
     inputs: RenderInputs,
     view: View,
     positions: Vec<Vec3>,
-    case: String,
-    program: Program,
+    shown: Shown,
     wanted_rate_hz: f32,
-    bone_shown: bool,
-    colours: Colours,
     pointer: Option<MouseHandle>,
     company: Company,
     /// Markers on the anatomy, mm.
@@ -63,8 +107,6 @@ struct Show {
     ghost: Option<Pose>,
     requests: Requests,
     rate: Rate,
-    keeper: Keeper,
-    stop: Stop,
 }
 
 /// Recent requests, each with the time at which it expires, s.
@@ -98,7 +140,7 @@ impl Rate {
 }
 
 /// Shows the session until it ends or the window is closed.
-pub fn show(
+pub(crate) fn show(
     mut inputs: RenderInputs,
     painter: Painter,
     opened: &Opened<'_>,
@@ -111,28 +153,21 @@ pub fn show(
         inputs,
         view,
         positions: Vec::new(),
-        case: opened.case.into(),
-        program: opened.table.program,
+        shown: Shown::of(opened, opened.table.bone().is_some(), stop),
         wanted_rate_hz: opened.rate_hz,
-        bone_shown: opened.table.bone().is_some(),
-        colours: opened.table.colours(),
         pointer,
         company,
         markers: Vec::new(),
         ghost: None,
         requests: Requests::default(),
         rate: Rate::default(),
-        keeper: Keeper::into_folder(&opened.out.join("window")),
-        stop: stop.clone(),
     };
-    let (show, mut album) = run(show, painter, opened, view);
-    stop.ask();
-    album.faults.extend(show.keeper.finish());
-    album
+    let (show, album) = run(show, painter, opened, view);
+    show.shown.finish(album)
 }
 
 /// Runs a session in a window, with a picture before and one after it.
-pub fn run<S: window::Session + 'static>(
+pub(crate) fn run<S: window::Session + 'static>(
     session: S,
     mut painter: Painter,
     opened: &Opened<'_>,
@@ -198,27 +233,24 @@ impl window::Session for Show {
         let view = &self.view;
         let (by_hand, teaches) = (self.pointer.is_some(), self.company.teacher.is_some());
         let flap = || Action { name: "Lift the flap, or put it back".into(), key: Some('f'), on: false };
-        let mut panel = notice_text::panel(&self.case, self.program, view);
+        let mut panel = self.shown.panel(view, by_hand);
         panel.warnings.extend(lesson.warnings);
         // A watcher reads that the other session has ended, and closes the window herself.
         let over = self.company.watching.as_ref().and_then(Watching::ended);
         let finished = match over {
-            Some(_) => self.stop.signal().is_some(),
-            None => view.finished || self.stop.asked(),
+            Some(_) => self.shown.stop.signal().is_some(),
+            None => view.finished || self.shown.stop.asked(),
         };
         if let Some(text) = over {
             panel.warnings.clear();
             panel.news = vec![format!("{text}: close the window (Q)")];
-        }
-        if !by_hand {
-            panel.choices.iter_mut().flat_map(|choice| &mut choice.options).for_each(|(_, open)| *open = false);
         }
         Panel {
             hint: if teaches { TEACH } else { notice_text::hint(view.sample.phase(), by_hand) }.into(),
             by_hand,
             rate_hz: self.rate.follow(view.time_ms, view.counts[0]) as f32,
             wanted_rate_hz: self.wanted_rate_hz,
-            actions: (by_hand && self.bone_shown).then(flap).into_iter().chain(lesson.actions).collect(),
+            actions: (by_hand && self.shown.bone).then(flap).into_iter().chain(lesson.actions).collect(),
             leash: by_hand.then(|| Leash { tip: view.sample.state.tip(), length_mm: LEASH_MM }),
             finished,
             ..panel
@@ -226,14 +258,13 @@ impl window::Session for Show {
     }
 
     fn frame(&self, camera: Camera) -> Frame<'_> {
-        let positions = Some(self.positions.as_slice()).filter(|p| !p.is_empty());
-        let frame = frame(camera, &self.view, positions, self.bone_shown, &self.colours);
+        let frame = self.shown.frame(camera, &self.view, &self.positions);
         let ghost = self.ghost.map(|pose| (self.view.sample.tool, pose));
         Frame { overlay: Overlay { ghost, markers: &self.markers, ..frame.overlay }, ..frame }
     }
 
     fn capture(&mut self, what: Capture, picture: Image) {
-        self.keeper.keep(what, picture);
+        self.shown.keep(what, picture);
     }
 }
 
@@ -251,9 +282,7 @@ impl Show {
         let pedal = if input.pedal { Buttons::PEDAL } else { Buttons(0) };
         pointer.set(input.world_from_tool, active | pedal);
     }
-}
 
-impl Show {
     /// Exchanges the teacher's requests for this picture; updates ghost and markers.
     fn exchange_requests(&mut self, input: &WindowInput) -> Lesson {
         let (lesson, requests) = match &mut self.company {
@@ -341,26 +370,28 @@ mod tests {
             view: View::at(sample, 1.0),
             inputs: RenderInputs { view, soft: None, film: None },
             positions: Vec::new(),
-            case: "case".into(),
-            program: Program::Brain,
+            shown: Shown {
+                case: "case".into(),
+                program: Program::Brain,
+                bone: false,
+                colours: Colours::default(),
+                keeper: Keeper::into_folder(Path::new("nowhere")),
+                stop: Stop::default(),
+            },
             wanted_rate_hz: 1000.0,
-            bone_shown: false,
-            colours: Colours::default(),
             pointer: None,
             company: Company { watching: Some(watching), ..Company::default() },
             markers: Vec::new(),
             ghost: None,
             requests: Requests::default(),
             rate: Rate::default(),
-            keeper: Keeper::into_folder(Path::new("nowhere")),
-            stop: Stop::default(),
         };
         let input = input();
         assert!(window::Session::update(&mut show, &input).news.is_empty());
         watched.read(0.0);
         watched.read(1e4);
         writer.set(View { finished: true, ..show.view });
-        show.stop.ask();
+        show.shown.stop.ask();
         let panel = window::Session::update(&mut show, &input);
         assert!(!panel.finished && panel.news[0].contains("has ended"), "{:?}", panel.news);
         show.company.watching = None;

@@ -18,6 +18,36 @@ use trepan_link::wire::CollisionRecord;
 use trepan_mesh::TetMesh;
 use trepan_soft::Loads;
 
+impl CollisionStage {
+    /// Runs a step; its results are in [`patch`](Self::patch) and [`loads`](Self::loads).
+    pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
+        self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
+        self.patch = self.step.patch.with(self.step.shaft.normal, self.step.shaft.depth_mm);
+        self.loads.gravity = self.settling.at(sample.phase(), sample.state.time_ms);
+        self.press(sample.phase(), soft);
+        self.seq += 1;
+        CollisionRecord {
+            seq: self.seq,
+            tick: sample.tick,
+            solver_step: soft.step,
+            depth_mm: self.step.manifold.depth_mm,
+            points: self.step.points_in_contact,
+            compute_us: 0.0,
+        }
+    }
+
+    fn press(&mut self, phase: Phase, soft: &SoftFrame) {
+        self.loads.contacts.clear();
+        if phase == Phase::Brain {
+            self.step.springs(&mut self.loads.contacts);
+            self.loads.contacts.overflow += self.step.overflow;
+        }
+        if let Some(wall) = self.wall.as_mut().filter(|_| self.settling.is_open()) {
+            wall.press(&soft.positions, phase == Phase::Brain, &mut self.loads.contacts);
+        }
+    }
+}
+
 /// State of the brain as last published by the solver.
 #[derive(Clone, Debug, Default)]
 pub struct SoftFrame {
@@ -69,23 +99,6 @@ impl CollisionStage {
         Self { settling, ..self }
     }
 
-    /// Runs a step; its results are in [`patch`](Self::patch) and [`loads`](Self::loads).
-    pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
-        self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
-        self.patch = self.step.patch.with(self.step.shaft.normal, self.step.shaft.depth_mm);
-        self.loads.gravity = self.settling.at(sample.phase(), sample.state.time_ms);
-        self.press(sample.phase(), soft);
-        self.seq += 1;
-        CollisionRecord {
-            seq: self.seq,
-            tick: sample.tick,
-            solver_step: soft.step,
-            depth_mm: self.step.manifold.depth_mm,
-            points: self.step.points_in_contact,
-            compute_us: 0.0,
-        }
-    }
-
     /// Returns the surface patch for the haptic thread.
     pub fn patch(&self) -> &SurfacePatch {
         &self.patch
@@ -94,16 +107,5 @@ impl CollisionStage {
     /// Returns the loads for the solver, without contacts of a tool for bone.
     pub fn loads(&self) -> &Loads {
         &self.loads
-    }
-
-    fn press(&mut self, phase: Phase, soft: &SoftFrame) {
-        self.loads.contacts.clear();
-        if phase == Phase::Brain {
-            self.step.springs(&mut self.loads.contacts);
-            self.loads.contacts.overflow += self.step.overflow;
-        }
-        if let Some(wall) = self.wall.as_mut().filter(|_| self.settling.is_open()) {
-            wall.press(&soft.positions, phase == Phase::Brain, &mut self.loads.contacts);
-        }
     }
 }

@@ -8,7 +8,6 @@
 use crate::stages::ahead::bone_ahead_mm;
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3};
 use trepan_rigid::RigidStep;
-use trepan_rigid::spindle::Spindle;
 use trepan_volume::BoneVolume;
 
 /// Remaining bone under which a warning is raised, mm.
@@ -63,16 +62,6 @@ pub(crate) fn remaining_thickness_mm(bone: &BoneVolume, world_from_tool: Pose, t
         bone_ahead_mm(bone, front, way, REACH_MM)
     };
     ahead(world_from_tool.rotation * Vec3::NEG_Z).min(ahead(-normal))
-}
-
-/// Returns the speed of the spindle, 1/min: the free speed in air, reduced by the load in bone, 0
-/// while not drilling.
-pub(crate) fn spindle_rpm(spindle: Option<Spindle>, step: &RigidStep, drilling: bool) -> f32 {
-    match spindle {
-        Some(_) if drilling && step.manifold.touches() => step.spindle_rpm,
-        Some(spindle) if drilling => spindle.free_rpm,
-        _ => 0.0,
-    }
 }
 
 #[cfg(test)]

@@ -12,12 +12,22 @@
 //! While the force is off nothing drills either. The guard fades the force out and ramps it in
 //! again. A device that has never given a pose has no fault.
 
-use trepan_geometry::{Buttons, ToolState};
+use trepan_contact::ForceGuard;
+use trepan_geometry::{Buttons, ToolState, Twist};
+use trepan_haptics::{Reading, Status};
 
 /// Time of stale readings after which the device has a fault, ms.
 const LONG_MS: f32 = 100.0;
 /// Time without contact after which the force returns, ms.
 const CLEAR_MS: f32 = 200.0;
+
+/// Returns the reading of a device, or its last valid one at rest and `true` if it gave no usable
+/// pose.
+pub(crate) fn last_valid_state(reading: &Reading, last: ToolState) -> (ToolState, bool) {
+    let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
+    let at_rest = ToolState { twist: Twist::default(), time_ms: reading.tool.time_ms, ..last };
+    (if fresh { reading.tool } else { at_rest }, !fresh)
+}
 
 /// Status of the device and its tool in a tick.
 #[derive(Clone, Copy, Debug)]
@@ -49,8 +59,27 @@ impl AfterFault {
         self.waits
     }
 
+    /// Runs a tick, and switches the force off or on again; a `released` hand stays off. Returns a
+    /// change: `true` when the force is switched off.
+    pub fn follow(
+        &mut self,
+        tool: &ToolState,
+        status: DeviceStatus,
+        dt_ms: f32,
+        guard: &mut ForceGuard,
+        released: bool,
+    ) -> Option<bool> {
+        let waits = self.tick(tool, status, dt_ms)?;
+        match waits {
+            true => guard.release(),
+            false if !released => guard.resume(),
+            false => {}
+        }
+        Some(waits)
+    }
+
     /// Runs a tick of `dt_ms`; returns a change: `true` when the force is switched off.
-    pub fn tick(&mut self, tool: &ToolState, status: DeviceStatus, dt_ms: f32) -> Option<bool> {
+    fn tick(&mut self, tool: &ToolState, status: DeviceStatus, dt_ms: f32) -> Option<bool> {
         let before = self.waits;
         if status.stale || status.lost {
             (self.fresh, self.clear_ms) = (false, 0.0);

@@ -7,26 +7,18 @@ use crate::program::{Phase, called};
 use trepan_geometry::Tool;
 use trepan_volume::{MAX_STROKE_BRICKS, MAX_STROKES};
 
-/// A warning, active while its cause is present.
+/// A warning, active while its cause is present; the number is that of its bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Warning {
     /// Less than 1 mm of bone is left ahead of the burr.
     BoneThin,
     /// At most 0.3 mm of bone is left ahead of the burr.
     BreakThrough,
-    /// At the present feed rate the burr comes through within 300 ms.
-    BreachSoon,
     /// The burr is close to the brain.
     BrainNear,
     /// The cutting part is past the brain's rest surface, where the dura lies. A craniotome's foot
     /// does not count.
     BrainTouched,
-    /// A tool presses hard on the brain.
-    BrainPressed,
-    /// A tool is close to a structure that must not be touched.
-    ForbiddenNear,
-    /// The drill has stalled under its load.
-    DrillStalled,
     /// The desired force is over the device's limit.
     ForceLimit,
     /// The last collision result is stale; its force fades.
@@ -35,6 +27,24 @@ pub enum Warning {
     DeviceStale,
     /// The device's motors are warm; the force is less than desired.
     MotorsWarm,
+    /// The drill has stalled under its load.
+    DrillStalled,
+    /// At the present feed rate the burr comes through within 300 ms.
+    BreachSoon,
+    /// A tool presses hard on the brain.
+    BrainPressed,
+    /// A tool is close to a structure that must not be touched.
+    ForbiddenNear,
+}
+
+/// Texts of a warning.
+struct Texts {
+    /// Name for files.
+    name: &'static str,
+    /// Text shown to the trainee.
+    text: &'static str,
+    /// Unit of its value.
+    unit: &'static str,
 }
 
 impl Warning {
@@ -54,40 +64,36 @@ impl Warning {
         Self::ForbiddenNear,
     ];
 
+    fn texts(self) -> Texts {
+        let (name, text, unit) = match self {
+            Self::BoneThin => ("bone-thin", "less than a millimetre of bone is left", "mm left"),
+            Self::BreakThrough => ("break-through", "the bone is about to give way", "mm left"),
+            Self::BrainNear => ("brain-near", "the drill is about to reach the brain", "mm away"),
+            Self::BrainTouched => ("brain-touched", "the drill touches the brain", "mm deep"),
+            Self::ForceLimit => ("force-limit", "the force is at the device's limit", "N wanted"),
+            Self::TissueLate => {
+                ("tissue-late", "the collision result of the tissue is late, its force fades", "ms old")
+            }
+            Self::DeviceStale => ("device-stale", "the device gave no fresh position, the last one is used", "ms old"),
+            Self::MotorsWarm => {
+                ("motors-warm", "the device's motors are warm, its force is reduced: press less", "N wanted")
+            }
+            Self::DrillStalled => ("drill-stalled", "the drill has stalled: press less", "N wanted"),
+            Self::BreachSoon => ("breach-soon", "at this feed the drill is through in a moment", "ms left"),
+            Self::BrainPressed => ("brain-pressed", "the brain is pressed hard: press less", "N"),
+            Self::ForbiddenNear => ("forbidden-near", "a structure that must not be touched is close", "mm away"),
+        };
+        Texts { name, text, unit }
+    }
+
     /// Returns the name for files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::BoneThin => "bone-thin",
-            Self::BreakThrough => "break-through",
-            Self::BrainNear => "brain-near",
-            Self::BrainTouched => "brain-touched",
-            Self::ForceLimit => "force-limit",
-            Self::TissueLate => "tissue-late",
-            Self::DeviceStale => "device-stale",
-            Self::MotorsWarm => "motors-warm",
-            Self::DrillStalled => "drill-stalled",
-            Self::BreachSoon => "breach-soon",
-            Self::BrainPressed => "brain-pressed",
-            Self::ForbiddenNear => "forbidden-near",
-        }
+        self.texts().name
     }
 
     /// Returns the text shown to the trainee.
     pub fn text(self) -> &'static str {
-        match self {
-            Self::BoneThin => "less than a millimetre of bone is left",
-            Self::BreakThrough => "the bone is about to give way",
-            Self::BrainNear => "the drill is about to reach the brain",
-            Self::BrainTouched => "the drill touches the brain",
-            Self::ForceLimit => "the force is at the device's limit",
-            Self::TissueLate => "the collision result of the tissue is late, its force fades",
-            Self::DeviceStale => "the device gave no fresh position, the last one is used",
-            Self::MotorsWarm => "the device's motors are warm, its force is reduced: press less",
-            Self::DrillStalled => "the drill has stalled: press less",
-            Self::BreachSoon => "at this feed the drill is through in a moment",
-            Self::BrainPressed => "the brain is pressed hard: press less",
-            Self::ForbiddenNear => "a structure that must not be touched is close",
-        }
+        self.texts().text
     }
 }
 
@@ -187,18 +193,10 @@ impl Notice {
             What::Phase(phase) => ("phase", format!("{} begins", phase.name())),
             What::Taken(tool) => ("tool", format!("the {} is in the hand", called(&tool))),
             What::Warning(warning, true, value) => {
-                let unit = match warning {
-                    Warning::BoneThin | Warning::BreakThrough => "mm left",
-                    Warning::BrainNear | Warning::ForbiddenNear => "mm away",
-                    Warning::BrainTouched => "mm deep",
-                    Warning::ForceLimit | Warning::MotorsWarm | Warning::DrillStalled => "N wanted",
-                    Warning::BrainPressed => "N",
-                    Warning::BreachSoon => "ms left",
-                    Warning::TissueLate | Warning::DeviceStale => "ms old",
-                };
+                let Texts { name, text, unit } = warning.texts();
                 // Avoids -0.00.
                 let value = (100.0 * value).round() / 100.0 + 0.0;
-                ("warning", format!("{}: {} ({value:.2} {unit})", warning.name(), warning.text()))
+                ("warning", format!("{name}: {text} ({value:.2} {unit})"))
             }
             What::Warning(warning, false, _) => ("cleared", warning.name().to_string()),
             What::Through => ("through", "the burr came through the bone".into()),
@@ -222,7 +220,7 @@ impl Notice {
 
 /// The active warnings, with hysteresis, so that noise at a threshold does not repeat them.
 #[derive(Clone, Debug, Default)]
-pub struct Watch {
+pub(crate) struct Watch {
     standing: u32,
     quiet_since_ms: [f64; Warning::ALL.len()],
 }
@@ -233,7 +231,7 @@ const CLEAR_MS: f64 = 100.0;
 impl Watch {
     /// Updates a warning with the presence of its cause at `time_ms`; returns a change.
     pub fn update(&mut self, warning: Warning, present: bool, value: f32, time_ms: f64) -> Option<What> {
-        let at = Warning::ALL.iter().position(|&w| w == warning)?;
+        let at = warning as usize;
         let bit = 1 << at;
         let stands = self.standing & bit != 0;
         if present {

@@ -15,9 +15,11 @@
 //! # When not to use it
 //! To retract the brain: use the first hand.
 
-use crate::stages::fault::{AfterFault, DeviceStatus};
+use crate::stages::by_cause;
+use crate::stages::fault::{AfterFault, DeviceStatus, last_valid_state};
 use crate::stages::haptic_config::HapticConfig;
 use crate::stages::notice::{Notice, What};
+use serde::Serialize;
 use std::sync::Arc;
 use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardCounters, GuardedWrench, Viscoelastic};
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3, Wrench};
@@ -28,22 +30,25 @@ use trepan_volume::{BoneVolume, DistanceField};
 
 /// State of the second hand as it is rendered.
 #[derive(Clone, Copy, Debug)]
-pub struct SecondView {
+pub(crate) struct SecondView {
     /// Pose of the proxy.
     pub world_from_tool: Pose,
     /// Force on the hand, N.
     pub force: Vec3,
 }
 
-/// Outcome of the second hand.
-#[derive(Clone, Copy, Debug, Default)]
+/// Outcome of the second hand, as in `summary.json`.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct SecondOutcome {
     /// Largest force, N.
+    #[serde(rename = "force_max_n")]
     pub peak_force_n: f32,
-    /// Ticks in which its force guard acted, by cause.
-    pub guard: GuardCounters,
     /// Force after the last tick, N; zero after a clean end.
+    #[serde(rename = "force_end_n")]
     pub end_force_n: f32,
+    /// Ticks in which its force guard acted, by cause.
+    #[serde(serialize_with = "by_cause")]
+    pub guard: GuardCounters,
 }
 
 /// State of the second hand.
@@ -99,12 +104,20 @@ impl SecondHand {
         reading: &Reading,
         notify: &mut dyn FnMut(Notice),
     ) -> (GuardedWrench, SecondRecord) {
-        let (tool, stale) = self.last_valid_state(reading);
+        let (tool, stale) = last_valid_state(reading, self.last_valid.unwrap_or(ToolState::at(Pose::IDENTITY)));
+        if !stale && self.last_valid.replace(tool).is_none() {
+            // The first valid pose sets the proxy.
+            self.rigid.reset(tool.world_from_tool);
+        }
         let proxy = self.touch_bone(&tool);
         self.touch_brain(proxy.translation);
         let lost = reading.status == Status::Lost;
-        if let Some(waits) = self.follow_fault(&tool, lost, stale) {
-            notify(Notice { tick, time_ms: tool.time_ms, what: What::Force { waits, second: true } });
+        if self.config.force_waits {
+            let touches = self.step.manifold.touches() || self.tissue.depth_mm > 0.0;
+            let status = DeviceStatus { lost, stale, touches };
+            let change = self.fault.follow(&tool, status, self.config.dt_ms, &mut self.guard, self.released);
+            let what = change.map(|waits| What::Force { waits, second: true });
+            what.into_iter().for_each(|what| notify(Notice { tick, time_ms: tool.time_ms, what }));
         }
         let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
         let desired = if let_go { Wrench::ZERO } else { self.desired_wrench(&tool) };
@@ -150,40 +163,6 @@ impl SecondHand {
         SecondOutcome { peak_force_n: self.peak_force_n, guard, end_force_n: self.force_n }
     }
 
-    /// Returns the reading, or the last valid one and `true` if the device gave no usable pose. The
-    /// first valid pose sets the proxy.
-    fn last_valid_state(&mut self, reading: &Reading) -> (ToolState, bool) {
-        let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
-        let begins = self.last_valid.is_none();
-        let last = self.last_valid.unwrap_or(ToolState::at(Pose::IDENTITY));
-        let last_valid = if fresh {
-            reading.tool
-        } else {
-            ToolState { twist: Default::default(), time_ms: reading.tool.time_ms, ..last }
-        };
-        if begins && fresh {
-            self.rigid.reset(last_valid.world_from_tool);
-        }
-        if fresh {
-            self.last_valid = Some(last_valid);
-        }
-        (last_valid, !fresh)
-    }
-
-    /// Switches the force off after a fault of the device until a deliberate action of the user.
-    /// Returns a change: `true` when it is switched off.
-    fn follow_fault(&mut self, tool: &ToolState, lost: bool, stale: bool) -> Option<bool> {
-        let touches = self.step.manifold.touches() || self.tissue.depth_mm > 0.0;
-        let status = self.config.force_waits.then_some(DeviceStatus { lost, stale, touches })?;
-        let waits = self.fault.tick(tool, status, self.config.dt_ms)?;
-        match waits {
-            true => self.guard.release(),
-            false if !self.released => self.guard.resume(),
-            false => {}
-        }
-        Some(waits)
-    }
-
     /// Runs the contact with bone, once a pose is known; returns the proxy.
     fn touch_bone(&mut self, tool: &ToolState) -> Pose {
         let (Some(bone), Some(_)) = (&self.bone, self.last_valid) else { return tool.world_from_tool };
@@ -213,8 +192,7 @@ impl SecondHand {
 mod tests {
     use super::*;
     use crate::program::Program;
-    use crate::stages::alarms::Limits;
-    use trepan_contact::{GuardConfig, Vibration};
+    use trepan_contact::GuardConfig;
     use trepan_volume::VoxelVolume;
 
     /// Makes a hand above bone under z = 0 and brain under z = -8 mm.
@@ -228,15 +206,8 @@ mod tests {
             mask.data[at] = u8::from(z < -8.0);
         }
         let config = HapticConfig {
-            program: Program::Craniotomy,
-            rigid: trepan_rigid::Method::RECOMMENDED,
-            dt_ms: 1.0,
-            bone_force: Vibration::drill(Viscoelastic { stiffness: 2.0, damping: 0.5 }),
-            tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
             guard: GuardConfig { ramp_in_ms: 0.0, passivity: None, ..GuardConfig::default() },
-            limits: Limits::default(),
-            opening_needed: true,
-            force_waits: true,
+            ..HapticConfig::usual(Program::Craniotomy)
         };
         let bone = with_bone.then(|| Arc::new(BoneVolume::new(&ct, 400).unwrap()));
         SecondHand::new(config, bone, Some(Arc::new(DistanceField::of_mask(&mask))))

@@ -13,11 +13,51 @@ use trepan_link::wire::SolverRecord;
 use trepan_soft::{Loads, SoftSolver, StepReport};
 
 /// Steps between two records while the contact is unchanged.
-pub const EACH: u64 = 32;
+pub(crate) const EACH: u64 = 32;
 /// Limit for the motion of a node in a step while no tool touches the brain, mm.
-pub const REST_MOTION_MM: f32 = 0.02;
+pub(crate) const REST_MOTION_MM: f32 = 0.02;
 /// Time after the last touch in which the brain may still move back, ms.
 const MOVES_BACK_MS: f64 = 500.0;
+
+impl SolverStage {
+    /// Runs a step; returns a record if one is due.
+    pub fn step(&mut self, loads: &Loads, contact_seq: u64) -> Option<SolverRecord> {
+        let switched = contact_seq != self.contact_seq;
+        if switched {
+            self.loads.gravity = loads.gravity;
+            self.loads.contacts.copy_from(&loads.contacts);
+            self.contact_seq = contact_seq;
+            self.solver_faults.contacts_left_out += u64::from(loads.contacts.overflow);
+        }
+        let report = self.solver.step(&self.loads, self.dt_ms);
+        self.steps += 1;
+        self.solver_faults.add(&report);
+        if !self.loads.contacts.is_empty() {
+            self.touched_ms = self.time_ms();
+        } else if self.time_ms() - self.touched_ms > MOVES_BACK_MS {
+            self.solver_faults.rest(self.fastest() * self.dt_ms);
+        }
+        (switched || self.steps.is_multiple_of(EACH)).then(|| self.record(report.inverted))
+    }
+
+    /// Returns the speed of the fastest node, mm/ms.
+    fn fastest(&self) -> f32 {
+        self.solver.velocities().iter().map(|v| v.length_squared()).fold(0.0, f32::max).sqrt()
+    }
+
+    fn record(&mut self, inverted: u32) -> SolverRecord {
+        let now_mm = self.displacement_mm();
+        self.max_displacement_mm = self.max_displacement_mm.max(now_mm);
+        SolverRecord {
+            step: self.steps,
+            contact_seq: self.contact_seq,
+            time_ms: self.time_ms(),
+            max_displacement_mm: now_mm,
+            inverted,
+            compute_us: 0.0,
+        }
+    }
+}
 
 /// State of the solver loop.
 pub struct SolverStage {
@@ -103,44 +143,6 @@ impl SolverStage {
             solver_faults: SolverFaults::default(),
             max_displacement_mm: 0.0,
             touched_ms: f64::NEG_INFINITY,
-        }
-    }
-
-    /// Runs a step; returns a record if one is due.
-    pub fn step(&mut self, loads: &Loads, contact_seq: u64) -> Option<SolverRecord> {
-        let switched = contact_seq != self.contact_seq;
-        if switched {
-            self.loads.gravity = loads.gravity;
-            self.loads.contacts.copy_from(&loads.contacts);
-            self.contact_seq = contact_seq;
-            self.solver_faults.contacts_left_out += u64::from(loads.contacts.overflow);
-        }
-        let report = self.solver.step(&self.loads, self.dt_ms);
-        self.steps += 1;
-        self.solver_faults.add(&report);
-        if !self.loads.contacts.is_empty() {
-            self.touched_ms = self.time_ms();
-        } else if self.time_ms() - self.touched_ms > MOVES_BACK_MS {
-            self.solver_faults.rest(self.fastest() * self.dt_ms);
-        }
-        (switched || self.steps.is_multiple_of(EACH)).then(|| self.record(report.inverted))
-    }
-
-    /// Returns the speed of the fastest node, mm/ms.
-    fn fastest(&self) -> f32 {
-        self.solver.velocities().iter().map(|v| v.length_squared()).fold(0.0, f32::max).sqrt()
-    }
-
-    fn record(&mut self, inverted: u32) -> SolverRecord {
-        let now_mm = self.displacement_mm();
-        self.max_displacement_mm = self.max_displacement_mm.max(now_mm);
-        SolverRecord {
-            step: self.steps,
-            contact_seq: self.contact_seq,
-            time_ms: self.time_ms(),
-            max_displacement_mm: now_mm,
-            inverted,
-            compute_us: 0.0,
         }
     }
 

@@ -24,7 +24,7 @@ use trepan_haptics::script::Site;
 use trepan_volume::{BoneVolume, DistanceField, VoxelVolume};
 
 /// Voxel edge of the skull in which an opening is searched, mm.
-pub const REFERENCE_MM: f32 = 1.0;
+pub(crate) const REFERENCE_MM: f32 = 1.0;
 
 /// Assumed depth of the brain below bone without an MRI, mm.
 const BELOW_BONE_MM: f32 = 5.0;
@@ -46,7 +46,7 @@ pub struct Opening {
 }
 
 /// Bone volume of a skull, for drilling.
-pub fn bone_of(skull: &VoxelVolume<i16>, isovalue_hu: i16) -> Result<BoneVolume, SessionError> {
+pub(crate) fn bone_of(skull: &VoxelVolume<i16>, isovalue_hu: i16) -> Result<BoneVolume, SessionError> {
     BoneVolume::new(skull, isovalue_hu).map_err(|fault| SessionError::Case(format!("the CT: {fault}")))
 }
 
@@ -56,7 +56,7 @@ const ON_BONE_MM: f32 = 3.0;
 const FARTHEST_MM: f32 = 150.0;
 
 /// Refuses a point that lies inside the skull or far from it; the bone's surface is at `entry`.
-fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), String> {
+fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), SessionError> {
     let away_mm = Vec3::from(requested).distance(centre) - entry.distance(centre);
     let what = if away_mm < -ON_BONE_MM {
         format!("lies {:.0} mm inside the skull", -away_mm)
@@ -66,9 +66,9 @@ fn check_point(requested: [f32; 3], centre: Vec3, entry: Vec3) -> Result<(), Str
         return Ok(());
     };
     let [x, y, z] = entry.to_array();
-    Err(format!(
+    Err(SessionError::Case(format!(
         "--opening: {requested:?} {what}: give a point outside the skull, over the place to open; on the same line the bone begins at {x:.0},{y:.0},{z:.0} (RAS mm)"
-    ))
+    )))
 }
 
 impl Opening {
@@ -100,15 +100,14 @@ impl Opening {
         let site = match requested {
             Some(requested) => head.towards((Vec3::from(requested) - centre).normalize_or_zero()).ok_or_else(|| {
                 let what = if brain.is_some() { "bone and then brain" } else { "a wall of bone up to 30 mm thick" };
-                format!(
+                SessionError::Case(format!(
                     "--opening: the line from {requested:?} to the centre of the head at {centre:.0} (RAS mm) does not meet {what}: give a point outside the skull, over the place to open"
-                )
-            }),
-            None => head.best(),
+                ))
+            })?,
+            None => head.best()?,
         };
-        let site = site.map_err(SessionError::Case)?;
         if let Some(requested) = requested {
-            check_point(requested, centre, site.entry).map_err(SessionError::Case)?;
+            check_point(requested, centre, site.entry)?;
         }
         Ok(site.into())
     }
@@ -165,7 +164,7 @@ fn middle(classes: &VoxelVolume<u8>) -> Vec3 {
 
 /// Finds a place to probe a brain without a skull, on a ray to its centre from above, right and
 /// front.
-pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
+pub(crate) fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
     let outward = Vec3::new(0.45, 0.35, 0.82).normalize();
     let from = centre + search::FAR_MM * outward;
     let depth = search::first(0.0, search::FAR_MM, |t| -brain.sample(from - t * outward))?;
@@ -174,7 +173,7 @@ pub fn bare_brain(brain: &DistanceField, centre: Vec3) -> Option<Site> {
 
 /// Direction from the site to the camera: slightly from behind and the side, so that hole and tool
 /// are visible.
-pub fn eye(site: &Site) -> Vec3 {
+pub(crate) fn eye(site: &Site) -> Vec3 {
     let outward = -site.inward;
     let side = outward.cross(Vec3::Z).normalize_or(Vec3::X);
     outward + 0.45 * side + 0.25 * Vec3::Z

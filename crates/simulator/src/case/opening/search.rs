@@ -9,11 +9,13 @@
 //! ray.
 
 use super::{BELOW_BONE_MM, Vec3};
+use crate::error::SessionError;
+use crate::measure::bone::over_isovalue;
 use trepan_haptics::script::Site;
 use trepan_volume::{BoneVolume, DistanceField};
 
 /// Start of the rays, mm from the centre of the head.
-pub const FAR_MM: f32 = 160.0;
+pub(super) const FAR_MM: f32 = 160.0;
 /// Rays over the whole sphere.
 const RAYS: usize = 3200;
 /// Step along a line, mm; surfaces are interpolated between steps.
@@ -40,7 +42,7 @@ const AROUND_MM: f32 = 10.0;
 const LOST_MM: f32 = 10.0;
 
 /// Geometry that lines are intersected with.
-pub struct Surroundings<'a> {
+pub(super) struct Surroundings<'a> {
     pub bone: &'a BoneVolume,
     pub brain: Option<&'a DistanceField>,
     /// Centre of the head.
@@ -93,32 +95,26 @@ impl Surroundings<'_> {
 
     /// Best place on the upper right front if one is suitable there, else on the vault; the error
     /// says why none is.
-    pub fn best(&self) -> Result<Site, String> {
+    pub fn best(&self) -> Result<Site, SessionError> {
         let right_front = |d: &Vec3| d.x > 0.25 && d.y > -0.2 && d.z > 0.45;
         let vault = |d: &Vec3| d.z > 0.2;
         let suits = |found: &Option<Candidate>| found.as_ref().is_some_and(|best| best.beyond_mm == 0.0);
         let found = Some(self.best_of(right_front)).filter(suits).unwrap_or_else(|| self.best_of(vault));
-        let below = if self.brain.is_some() { " and then brain" } else { "" };
         let remedy = "are CT and MRI of one head, upright, in one space (--register), and does the bone threshold fit (--isovalue-hu)? Or name a place with --opening X,Y,Z";
-        match found {
-            Some(best) if best.beyond_mm == 0.0 => Ok(best.site),
-            Some(best) => Err(format!(
-                "no place on the vault has bone {} to {} mm thick{} within {HOLE_MM} mm around; the nearest to it has bone of {:.1} mm{} at {:.0} (RAS mm): {remedy}",
-                BONE_MM[0],
-                BONE_MM[1],
-                self.brain.map_or(String::new(), |_| format!(
-                    " with brain at most {} mm below and no air between",
-                    GAP_MM[1]
-                )),
-                best.site.bone_mm,
-                self.brain.map_or(String::new(), |_| format!(
-                    " and brain {:.1} mm below",
-                    best.site.brain_mm - best.site.bone_mm
-                )),
-                best.site.entry,
-            )),
-            None => Err(format!("no line from above meets bone{below}: {remedy}")),
-        }
+        let with_brain = |text: String| if self.brain.is_some() { text } else { String::new() };
+        let fault = match found {
+            Some(best) if best.beyond_mm == 0.0 => return Ok(best.site),
+            Some(Candidate { site: Site { entry, bone_mm, brain_mm, .. }, .. }) => {
+                let [thinnest, thickest] = BONE_MM;
+                let wanted = with_brain(format!(" with brain at most {} mm below and no air between", GAP_MM[1]));
+                let nearest = with_brain(format!(" and brain {:.1} mm below", brain_mm - bone_mm));
+                format!(
+                    "no place on the vault has bone {thinnest} to {thickest} mm thick{wanted} within {HOLE_MM} mm around; the nearest to it has bone of {bone_mm:.1} mm{nearest} at {entry:.0} (RAS mm)"
+                )
+            }
+            None => format!("no line from above meets bone{}", with_brain(" and then brain".into())),
+        };
+        Err(SessionError::Case(format!("{fault}: {remedy}")))
     }
 
     fn best_of(&self, region: impl Fn(&Vec3) -> bool) -> Option<Candidate> {
@@ -197,7 +193,7 @@ fn cost(hole: &[(Vec3, Passage)]) -> f32 {
 }
 
 /// First entry into bone and last exit from it between two depths of a line, mm.
-pub fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f32; 2]) -> Option<[f32; 2]> {
+pub(super) fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f32; 2]) -> Option<[f32; 2]> {
     let over = |t: f32| over_isovalue(bone, from + t * inward);
     let outer = first(start, end, over)?;
     let back = first(0.0, end - outer, |t| over(end - t))?;
@@ -206,7 +202,7 @@ pub fn bone_along(bone: &BoneVolume, from: Vec3, inward: Vec3, [start, end]: [f3
 
 /// First depth between `start` and `end` at which a value reaches 0, interpolated between steps,
 /// mm.
-pub fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
+pub(super) fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
     let steps = ((end - start) / STEP_MM).max(0.0) as usize;
     let mut before = None;
     for n in 0..=steps {
@@ -218,18 +214,6 @@ pub fn first(start: f32, end: f32, value: impl Fn(f32) -> f32) -> Option<f32> {
         before = Some(now);
     }
     None
-}
-
-/// Trilinear density minus the isovalue at a point, HU.
-fn over_isovalue(bone: &BoneVolume, point: Vec3) -> f32 {
-    let at = bone.grid_of(point);
-    let (low, part) = (at.floor().as_ivec3(), at - at.floor());
-    let corner = |n: i32| {
-        let step = glam::IVec3::new(n & 1, n >> 1 & 1, n >> 2);
-        let weight = Vec3::select(step.cmpeq(glam::IVec3::ONE), part, 1.0 - part);
-        weight.element_product() * f32::from(bone.hu(low + step))
-    };
-    (0..8).map(corner).sum::<f32>() - f32::from(bone.isovalue())
 }
 
 /// Evenly distributed directions over the sphere.

@@ -5,16 +5,10 @@ use std::path::Path;
 use trepan_volume::{bone_isovalue, hounsfield, largest_component, read};
 
 const N: usize = 96;
-const RECIPE: Recipe = Recipe {
-    spacing_mm: REFERENCE_MM,
-    tets: 0,
-    halvings: 0,
-    isovalue_hu: None,
-    ct_series: None,
-    mri_series: None,
-    register: false,
-    opening: None,
-};
+
+fn recipe() -> Recipe {
+    Recipe { spacing_mm: REFERENCE_MM, ..Recipe::default() }
+}
 
 /// Spherical head whose density depends on radius and direction; brain within 78 mm.
 fn head(hu: impl Fn(f32, Vec3) -> f32) -> (VoxelVolume<i16>, VoxelVolume<u8>) {
@@ -124,7 +118,7 @@ fn on_every_preset(ct: &Path, brain: &Path, requested: Option<[f32; 3]>) -> Vec<
     let classes = cropped(&largest_component(&read(brain).unwrap().map(|v| u8::from(v != 0.0)))).unwrap();
     let isovalue = bone_isovalue(&ct);
     let on = |spacing_mm| {
-        let recipe = Recipe { spacing_mm, opening: requested, ..RECIPE };
+        let recipe = Recipe { spacing_mm, opening: requested, ..recipe() };
         let skull = make_skull(&ct, &recipe, isovalue).unwrap();
         Opening::planned(&ct, &skull, isovalue, Some(&classes), &recipe).unwrap()
     };

@@ -10,6 +10,15 @@
 //! a slow collision thread reduces accuracy, not stability. The force of an old patch fades: full
 //! force up to [`FRESH_MS`], none after [`GONE_MS`].
 //!
+//! The passes of a tick, each a function of the same name:
+//!
+//! ```text
+//! read      last_valid_state
+//! compute   change_tool → drills → undo → touch_bone → follow_flap → bone_ahead → sample
+//!           → touch_tissue → follow_fault → desired_wrench → guard
+//! apply     record → warn → count_hole; the caller gives the wrench to the device
+//! ```
+//!
 //! # Practice
 //! The stage has no clock and no device: the same readings and patches give wrenches equal bit for
 //! bit, live or in a replay. A tick does not allocate, lock, log or panic.
@@ -18,8 +27,8 @@ mod requests;
 
 use crate::program::Phase;
 use crate::stages::alarms::{Feed, WarningInputs};
-use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm, spindle_rpm};
-use crate::stages::fault::{AfterFault, DeviceStatus};
+use crate::stages::drill::{Drill, REACH_MM, remaining_thickness_mm};
+use crate::stages::fault::{AfterFault, DeviceStatus, last_valid_state};
 use crate::stages::flap::Flap;
 use crate::stages::haptic_config::HapticConfig;
 use crate::stages::notice::{Notice, Watch, What};
@@ -34,10 +43,51 @@ use trepan_link::wire::TickRecord;
 use trepan_rigid::{RigidContact, RigidStep};
 use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
 
+impl HapticStage {
+    /// Runs a tick; notices go to `notify`. The caller applies the wrench.
+    pub fn tick(&mut self, input: &TickInput<'_>, notify: &mut dyn FnMut(Notice)) -> Tick {
+        let (tool, stale) = last_valid_state(&input.reading, self.last_valid);
+        self.last_valid = tool;
+        let lost = input.reading.status == Status::Lost;
+        let report = &mut |what| notify(Notice { tick: input.tick, time_ms: tool.time_ms, what });
+        self.change_tool(&tool, input.tick <= 1, report);
+        let drilling = self.drills(&tool);
+        let back_mm3 = self.undo(&tool, drilling, input.second, report);
+        self.touch_bone(&tool, drilling);
+        self.follow_flap(&tool, drilling, report);
+        let ahead_mm = self.bone_ahead(drilling);
+        let sample = self.sample(&tool, input.tick, drilling);
+        let held = self.touch_tissue(input.patch, &sample);
+        self.follow_fault(&tool, (lost, stale), report);
+        let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
+        let desired = if let_go { DesiredWrench::default() } else { self.desired_wrench(&tool, drilling) };
+        let heated = self.guard.counters().heated;
+        let wrench = self.guard.guard(desired.sum(), &tool, self.config.dt_ms);
+        let warm = self.guard.counters().heated > heated;
+        let through = self.drill.came_through(&self.bone_step, ahead_mm);
+        let flags = [
+            (held, TickRecord::HELD),
+            (drilling, TickRecord::DRILLING),
+            (stale, TickRecord::STALE),
+            (lost, TickRecord::LOST),
+            (through, TickRecord::THROUGH),
+        ];
+        let record = self.record(input, &sample, wrench, desired, &flags, back_mm3);
+        let inputs = self.warning_inputs(&record, &sample, ahead_mm, input.patch, (desired, warm));
+        self.warn(&record, inputs, report);
+        if through {
+            self.count_hole();
+            report(What::Through);
+        }
+        self.scores.add(&record);
+        Tick { wrench, sample, record, warnings: self.watch.standing() }
+    }
+}
+
 /// Age up to which a patch gives its full force, ms.
-pub const FRESH_MS: f32 = 10.0;
+pub(crate) const FRESH_MS: f32 = 10.0;
 /// Age from which a patch gives no force, ms.
-pub const GONE_MS: f32 = 60.0;
+pub(crate) const GONE_MS: f32 = 60.0;
 
 /// Inputs of a tick.
 #[derive(Clone, Copy, Debug)]
@@ -188,41 +238,6 @@ impl HapticStage {
         Self { forbidden: Some(forbidden), ..self }
     }
 
-    /// Runs a tick; notices go to `notify`.
-    pub fn tick(&mut self, input: &TickInput<'_>, notify: &mut dyn FnMut(Notice)) -> Tick {
-        let (tool, stale) = self.last_valid_state(&input.reading);
-        self.change_tool(&tool, input.tick, notify);
-        let drilling = self.drills(&tool);
-        let back_mm3 = self.undo(&tool, drilling, input.second, input.tick, notify);
-        self.touch_bone(&tool, drilling);
-        self.follow_flap(&tool, drilling, input.tick, notify);
-        let ahead_mm = self.bone_ahead(drilling);
-        let sample = self.sample(&tool, input.tick, drilling);
-        let stale_patch = self.touch_tissue(input.patch, &sample);
-        let lost = input.reading.status == Status::Lost;
-        self.follow_fault(&tool, (lost, stale), input.tick, notify);
-        let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
-        let desired = if let_go { DesiredWrench::default() } else { self.desired_wrench(&tool, drilling) };
-        let heated = self.guard.counters().heated;
-        let wrench = self.guard.guard(desired.sum(), &tool, self.config.dt_ms);
-        let warm = self.guard.counters().heated > heated;
-        let mut record = self.record(input, &tool, &sample, wrench, stale_patch, stale, desired);
-        record.removed_mm3 -= back_mm3;
-        let inputs = self.warning_inputs(&record, &sample, ahead_mm, input.patch, (desired, warm));
-        for (warning, present, value) in inputs.causes(&record, &self.config.limits) {
-            if let Some(what) = self.watch.update(warning, present, value, record.time_ms) {
-                notify(Notice { tick: record.tick, time_ms: record.time_ms, what });
-            }
-        }
-        if self.drill.came_through(&self.bone_step, ahead_mm) {
-            record.flags |= TickRecord::THROUGH;
-            self.count_hole();
-            notify(Notice { tick: input.tick, time_ms: tool.time_ms, what: What::Through });
-        }
-        self.scores.add(&record);
-        Tick { wrench, sample, record, warnings: self.watch.standing() }
-    }
-
     /// Fades the force to zero over the coming ticks.
     pub fn release(&mut self) {
         self.guard.release();
@@ -254,37 +269,13 @@ impl HapticStage {
         self.config.rigid.removal().spindle().map_or(0.0, |spindle| record.spindle_rpm / spindle.free_rpm)
     }
 
-    /// Returns the reading, or the last valid one and `true` if the device gave no usable pose.
-    fn last_valid_state(&mut self, reading: &Reading) -> (ToolState, bool) {
-        let fresh = matches!(reading.status, Status::Fresh | Status::Finished) && reading.tool.is_finite();
-        if fresh {
-            self.last_valid = reading.tool;
-        } else {
-            self.last_valid.time_ms = reading.tool.time_ms;
-            self.last_valid.twist = Default::default();
-        }
-        (self.last_valid, !fresh)
-    }
-
     /// Switches the force off after a fault of the device until a deliberate action of the user.
-    fn follow_fault(
-        &mut self,
-        tool: &ToolState,
-        (lost, stale): (bool, bool),
-        tick: u64,
-        notify: &mut dyn FnMut(Notice),
-    ) {
-        if !self.config.force_waits {
-            return;
+    fn follow_fault(&mut self, tool: &ToolState, (lost, stale): (bool, bool), report: &mut dyn FnMut(What)) {
+        if self.config.force_waits {
+            let status = DeviceStatus { lost, stale, touches: !self.is_free() };
+            let change = self.fault.follow(tool, status, self.config.dt_ms, &mut self.guard, self.released);
+            change.into_iter().for_each(|waits| report(What::Force { waits, second: false }));
         }
-        let status = DeviceStatus { lost, stale, touches: !self.is_free() };
-        let Some(waits) = self.fault.tick(tool, status, self.config.dt_ms) else { return };
-        match waits {
-            true => self.guard.release(),
-            false if !self.released => self.guard.resume(),
-            false => {}
-        }
-        notify(Notice { tick, time_ms: tool.time_ms, what: What::Force { waits, second: false } });
     }
 
     fn tool(&self) -> Tool {
@@ -310,9 +301,14 @@ impl HapticStage {
         self.bone.iter().for_each(|bone| self.undo.newest(bone).through += 1);
     }
 
-    /// Returns the speed of the spindle, 1/min.
+    /// Returns the speed of the spindle, 1/min: the free speed in air, reduced by the load in bone,
+    /// 0 while not drilling.
     fn spindle_rpm(&self, drilling: bool) -> f32 {
-        spindle_rpm(self.config.rigid.removal().spindle(), &self.bone_step, drilling)
+        match self.config.rigid.removal().spindle() {
+            Some(_) if drilling && self.bone_step.manifold.touches() => self.bone_step.spindle_rpm,
+            Some(spindle) if drilling => spindle.free_rpm,
+            _ => 0.0,
+        }
     }
 
     fn sample(&mut self, tool: &ToolState, tick: u64, drilling: bool) -> ToolSample {
@@ -354,27 +350,19 @@ impl HapticStage {
     fn record(
         &self,
         input: &TickInput<'_>,
-        tool: &ToolState,
         sample: &ToolSample,
         wrench: GuardedWrench,
-        stale_patch: bool,
-        stale: bool,
         desired: DesiredWrench,
+        flags: &[(bool, u32)],
+        back_mm3: f32,
     ) -> TickRecord {
         let clamped = desired.sum().force.length() > self.config.guard.max_force_n;
-        let bits = [
-            (stale_patch, TickRecord::HELD),
-            (clamped, TickRecord::CLAMPED),
-            (sample.drilling, TickRecord::DRILLING),
-            (stale, TickRecord::STALE),
-            (self.released, TickRecord::RELEASED),
-            (input.reading.status == Status::Lost, TickRecord::LOST),
-            (true, TickRecord::TISSUE),
-        ];
+        let of_stage =
+            [(clamped, TickRecord::CLAMPED), (self.released, TickRecord::RELEASED), (true, TickRecord::TISSUE)];
         let bone = &self.bone_step.manifold;
         TickRecord {
             tick: input.tick,
-            time_ms: tool.time_ms,
+            time_ms: sample.state.time_ms,
             device: input.reading.tool.world_from_tool,
             twist: input.reading.tool.twist,
             buttons: input.reading.tool.buttons.0,
@@ -384,12 +372,12 @@ impl HapticStage {
             contact_normal: if bone.touches() { bone.normal } else { self.tissue.normal },
             depth_mm: bone.depth_mm,
             tissue_depth_mm: self.tissue.depth_mm,
-            removed_mm3: self.bone_step.removed_mm3,
+            removed_mm3: self.bone_step.removed_mm3 - back_mm3,
             spindle_rpm: self.spindle_rpm(sample.drilling),
             brain_distance_mm: self.brain_distance(sample.state.world_from_tool),
             patch_seq: input.patch_seq,
             compute_us: 0.0,
-            flags: bits.iter().filter(|(on, _)| *on).map(|(_, bit)| bit).sum(),
+            flags: flags.iter().chain(&of_stage).filter(|(on, _)| *on).map(|(_, bit)| bit).sum(),
             phase: self.phase() as u8,
             tool: self.tray.slot() as u8,
         }
@@ -419,9 +407,11 @@ impl HapticStage {
         }
     }
 
-    /// Whether the drill has stalled under its load.
-    fn stalls(&self, record: &TickRecord) -> bool {
-        record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some()
+    /// Raises and clears the warnings.
+    fn warn(&mut self, record: &TickRecord, inputs: WarningInputs, report: &mut dyn FnMut(What)) {
+        for (warning, present, value) in inputs.causes(record, &self.config.limits) {
+            self.watch.update(warning, present, value, record.time_ms).into_iter().for_each(&mut *report);
+        }
     }
 
     /// Returns the inputs of the warnings.
@@ -442,7 +432,7 @@ impl HapticStage {
             tissue_n: record.tissue_n(),
             forbidden_mm: forbidden.unwrap_or(f32::INFINITY),
             desired_n: desired.sum().force.length(),
-            stalled: self.stalls(record),
+            stalled: record.spindle_rpm == 0.0 && self.config.rigid.removal().spindle().is_some(),
             age_ms: (record.time_ms - patch.time_ms) as f32,
             warm,
         }

@@ -4,7 +4,7 @@ use super::HapticStage;
 use crate::program::Phase;
 use crate::stages::drill::Drill;
 use crate::stages::flap::Flap;
-use crate::stages::notice::{Hindrance, Notice, What};
+use crate::stages::notice::{Hindrance, What};
 use crate::stages::second_hand::SecondHand;
 use crate::stages::tray::Change;
 use crate::stages::undo::{Answer, Place, Stroke};
@@ -36,9 +36,9 @@ impl HapticStage {
         lifted || self.bone.is_none() || self.holes > 0 || !self.config.opening_needed
     }
 
-    /// Changes the tool on request, if the present one touches nothing.
-    pub(super) fn change_tool(&mut self, tool: &ToolState, tick: u64, notify: &mut dyn FnMut(Notice)) {
-        let mut report = |what| notify(Notice { tick, time_ms: tool.time_ms, what });
+    /// Changes the tool on request, if the present one touches nothing. The first tick reports
+    /// phase and tool.
+    pub(super) fn change_tool(&mut self, tool: &ToolState, is_first: bool, report: &mut dyn FnMut(What)) {
         let before = self.phase();
         let change = self.tray.change(tool.buttons, self.is_free() && !self.undo.runs(), self.is_open());
         match change {
@@ -52,21 +52,20 @@ impl HapticStage {
             }
             None => {}
         }
-        if tick <= 1 || before != self.phase() {
+        if is_first || before != self.phase() {
             report(What::Phase(self.phase()));
         }
-        if tick <= 1 || change == Some(Change::Taken) {
+        if is_first || change == Some(Change::Taken) {
             report(What::Taken(self.tool()));
         }
     }
 
     /// Runs the tick of the flap.
-    pub(super) fn follow_flap(&mut self, tool: &ToolState, drilling: bool, tick: u64, notify: &mut dyn FnMut(Notice)) {
+    pub(super) fn follow_flap(&mut self, tool: &ToolState, drilling: bool, report: &mut dyn FnMut(What)) {
         let free = self.is_free() && self.phase() == Phase::Craniotomy && !self.undo.runs();
         let cut = self.bone_step.removed_mm3 > 0.0;
         if let (Some(bone), Some(flap)) = (&self.bone, &mut self.flap) {
-            let what = flap.tick(bone, tool.buttons, drilling, cut, free);
-            what.into_iter().for_each(|what| notify(Notice { tick, time_ms: tool.time_ms, what }));
+            flap.tick(bone, tool.buttons, drilling, cut, free).into_iter().for_each(report);
         }
     }
 
@@ -77,8 +76,7 @@ impl HapticStage {
         tool: &ToolState,
         drilling: bool,
         second: Option<Pose>,
-        tick: u64,
-        notify: &mut dyn FnMut(Notice),
+        report: &mut dyn FnMut(What),
     ) -> f32 {
         let hinders = self.hinders_undo(tool);
         let Some(bone) = &self.bone else { return 0.0 };
@@ -104,7 +102,7 @@ impl HapticStage {
             }
             Answer::Not(why) => (What::NotUndone(why), 0.0),
         };
-        notify(Notice { tick, time_ms: tool.time_ms, what });
+        report(what);
         back_mm3
     }
 

@@ -1,12 +1,12 @@
 //! A haptic stage with a simulated device in a simulated hand, tick by tick without a clock.
 
 use std::sync::Arc;
-use trepan_contact::{GuardConfig, SurfacePatch, Vibration, Viscoelastic};
+use trepan_contact::{SurfacePatch, Vibration, Viscoelastic};
 use trepan_geometry::ToolState;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
 use trepan_link::wire::TickRecord;
-use trepan_simulator::{HapticConfig, HapticStage, Limits, Notice, Program, TickInput, Warning, What};
+use trepan_simulator::{HapticConfig, HapticStage, Notice, Program, TickInput, Warning, What};
 use trepan_volume::{BoneVolume, DistanceField, FlapSearch};
 
 /// What a tick without tissue is given.
@@ -75,15 +75,6 @@ impl Bench {
 
 /// As a session configures a stage for a Touch.
 pub fn config(program: Program) -> HapticConfig {
-    HapticConfig {
-        program,
-        rigid: trepan_rigid::Method::RECOMMENDED,
-        dt_ms: 1.0,
-        bone_force: Vibration::drill(Viscoelastic { stiffness: 1.0, damping: 0.5 }),
-        tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
-        guard: GuardConfig::default(),
-        limits: Limits::default(),
-        opening_needed: true,
-        force_waits: true,
-    }
+    let bone_force = Vibration::drill(Viscoelastic { stiffness: 1.0, damping: 0.5 });
+    HapticConfig { bone_force, ..HapticConfig::usual(program) }
 }

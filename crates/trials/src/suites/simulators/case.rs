@@ -14,16 +14,7 @@ pub fn inputs() -> Inputs {
 
 /// How it is imported: a skull of 1 mm.
 pub fn recipe() -> Recipe {
-    Recipe {
-        spacing_mm: 1.0,
-        tets: 12_000,
-        halvings: 0,
-        isovalue_hu: None,
-        ct_series: None,
-        mri_series: None,
-        register: false,
-        opening: None,
-    }
+    Recipe { spacing_mm: 1.0, tets: 12_000, ..Recipe::default() }
 }
 
 /// An operating table whose skull can be had whole again.
