@@ -104,21 +104,18 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};
     use trepan_geometry::Vec3;
-    use trepan_soft::{Material, StepReport, boxes};
+    use trepan_soft::{Material, NodeState, StepReport, boxes};
 
     /// Solver that only advances the clock.
-    struct Costly(Arc<AtomicU64>, u64, f32);
+    struct Costly(Arc<AtomicU64>, u64, f32, NodeState);
 
     impl SoftSolver for Costly {
         fn step(&mut self, _: &Loads, _: f32) -> StepReport {
             self.0.fetch_add(self.1, Ordering::Relaxed);
             StepReport::default()
         }
-        fn positions(&self) -> &[Vec3] {
-            &[]
-        }
-        fn velocities(&self) -> &[Vec3] {
-            &[]
+        fn state(&self) -> &NodeState {
+            &self.3
         }
         fn stable_dt_ms(&self) -> f32 {
             self.2
@@ -130,7 +127,7 @@ mod tests {
         let clock = Arc::new(AtomicU64::new(0));
         let make = |name, cost, dt| {
             let clock = Arc::clone(&clock);
-            let costly = move || Costly(Arc::clone(&clock), cost, dt);
+            let costly = move || Costly(Arc::clone(&clock), cost, dt, NodeState::default());
             let build = move || Ok(Box::new(costly()) as Box<dyn SoftSolver>);
             Candidate { name, build: Box::new(build) }
         };
