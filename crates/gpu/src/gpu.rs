@@ -201,6 +201,24 @@ impl FaultLog {
     }
 }
 
+/// The device for a test, a software driver if there is one. `None` where there is no adapter and
+/// the test is to be skipped.
+///
+/// # Panics
+/// Without an adapter where the environment variable `CI` or `TREPAN_REQUIRE_GPU` is set.
+#[doc(hidden)]
+pub fn adapter_for_tests() -> Option<Gpu> {
+    let error = match Gpu::open(Prefer::Software) {
+        Ok(gpu) => return Some(gpu),
+        Err(error) => error,
+    };
+    assert_eq!(error, GpuError::NoAdapter);
+    let is_required = ["CI", "TREPAN_REQUIRE_GPU"].iter().any(|name| std::env::var_os(name).is_some());
+    assert!(!is_required, "this test needs a GPU adapter: {error}");
+    eprintln!("skipped: no GPU adapter");
+    None
+}
+
 /// Rank of an adapter; lower is better.
 fn rank(prefer: Prefer, info: &wgpu::AdapterInfo) -> (u8, u8) {
     let kind = match info.device_type {
@@ -227,10 +245,7 @@ mod tests {
 
     #[test]
     fn a_mistake_is_counted_and_does_not_panic() {
-        let gpu = match Gpu::open(Prefer::Software) {
-            Ok(gpu) => gpu,
-            Err(error) => return assert_eq!(error, GpuError::NoAdapter, "this machine has no adapter"),
-        };
+        let Some(gpu) = adapter_for_tests() else { return };
         assert_eq!(gpu.faults(), Faults::default());
         let _broken = gpu.device().create_buffer(&wgpu::BufferDescriptor {
             label: Some("impossible"),

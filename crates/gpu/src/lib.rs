@@ -31,6 +31,8 @@ mod timer;
 pub use bind::{Bindings, Resource, Slot};
 pub use buffer::Buffer;
 pub use error::GpuError;
+#[doc(hidden)]
+pub use gpu::adapter_for_tests;
 pub use gpu::{Faults, Gpu, PATIENCE, Prefer};
 pub use kernel::Kernel;
 pub use pipeline::{Pipeline, PipelineSpec, Topology};

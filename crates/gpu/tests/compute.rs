@@ -1,7 +1,6 @@
-//! Tests kernels, textures, pipelines and timing against the processor. Without an adapter only the
-//! error is tested.
+//! Tests kernels, textures, pipelines and timing against the processor.
 
-use trepan_gpu::*;
+use trepan_gpu::{adapter_for_tests as device, *};
 
 const SAXPY: &str = "
 struct Scale { a: f32, count: u32 }
@@ -17,19 +16,6 @@ struct Scale { a: f32, count: u32 }
 struct Scale {
     a: f32,
     count: u32,
-}
-
-/// The device, or `None` after checking that its absence is reported with the remedy.
-fn device() -> Option<Gpu> {
-    match Gpu::open(Prefer::Software) {
-        Ok(gpu) => Some(gpu),
-        Err(error) => {
-            println!("no adapter on this machine: {error}");
-            assert_eq!(error, GpuError::NoAdapter);
-            assert!(error.to_string().contains("mesa-vulkan-drivers"));
-            None
-        }
-    }
 }
 
 #[test]

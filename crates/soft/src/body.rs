@@ -107,6 +107,13 @@ pub(crate) struct Element {
     pub material: u8,
 }
 
+impl BodyError {
+    /// Refuses a setting that is not right, by its name, its value and what would be right.
+    pub fn check_config(is_right: bool, field: &'static str, value: f32, right: &'static str) -> Result<(), Self> {
+        if is_right { Ok(()) } else { Err(Self::Config { field, value, right }) }
+    }
+}
+
 impl Body {
     /// A body of one material.
     pub fn uniform(mesh: TetMesh, fixed: Vec<u32>, material: Material) -> Self {
@@ -182,9 +189,15 @@ impl Body {
 
     /// Mass of every node, g: a quarter of each of its tetrahedra.
     pub fn lumped_masses_g(&self) -> Vec<f64> {
+        self.lumped_masses_scaled_g(|_| 1.0)
+    }
+
+    /// The same with a factor on the density of every tetrahedron.
+    pub fn lumped_masses_scaled_g(&self, factor: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut masses = vec![0.0; self.mesh.positions.len()];
         for (tet, corners) in self.mesh.tets.iter().enumerate() {
-            let quarter = f64::from(self.material(tet).density_g_mm3()) * self.mesh.volume_mm3(tet) / 4.0;
+            let density = f64::from(self.material(tet).density_g_mm3());
+            let quarter = density * self.mesh.volume_mm3(tet) / 4.0 * factor(tet);
             corners.iter().for_each(|&n| masses[n as usize] += quarter);
         }
         masses

@@ -131,7 +131,8 @@ fn swing(a: &[DVec3], b: &[DVec3], masses: &[f64]) -> f64 {
     a.iter().zip(b).zip(masses).map(|((a, b), m)| m * a.dot(*b)).sum()
 }
 
-fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
+/// Sum of the products of two fields.
+pub(crate) fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }
 

@@ -12,25 +12,12 @@ use trepan_mesh::TetMesh;
 
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-/// A box from the origin to `size`, mm, of `cells` cells with a node in the middle of each. It has
-/// about twelve tetrahedra a cell, as the mesher lays them.
+/// A box from the origin to `size`, mm, of `cells` cells with six tetrahedra each.
 pub fn split_box(cells: [usize; 3], size: Vec3) -> TetMesh {
-    let [nx, ny, nz] = cells;
-    let node = |c: [usize; 3]| ((c[2] * (ny + 1) + c[1]) * (nx + 1) + c[0]) as u32;
-    let mut mesh = TetMesh::default();
-    for k in 0..=nz {
-        for j in 0..=ny {
-            for i in 0..=nx {
-                let share = Vec3::new(i as f32 / nx as f32, j as f32 / ny as f32, k as f32 / nz as f32);
-                mesh.positions.push(share * size);
-            }
-        }
-    }
-    for cell in 0..nx * ny * nz {
-        let corner = [cell % nx, cell / nx % ny, cell / (nx * ny)];
-        for order in ORDERS {
-            mesh.tets.push(kuhn(corner, order).map(node));
-        }
+    let nodes = cells.map(|n| n + 1);
+    let mut mesh = TetMesh { positions: spread(nodes, 0.0, cells, size).collect(), ..TetMesh::default() };
+    for cell in each(cells) {
+        mesh.tets.extend(ORDERS.map(|order| kuhn(cell, order).map(|corner| number(nodes, corner))));
     }
     outside_in(&mut mesh);
     mesh
@@ -39,33 +26,24 @@ pub fn split_box(cells: [usize; 3], size: Vec3) -> TetMesh {
 /// A box from the origin to `size`, mm, of `cells` cells with a node in the middle of each. It has
 /// about twelve tetrahedra a cell, as the mesher lays them.
 pub fn centred_box(cells: [usize; 3], size: Vec3) -> TetMesh {
-    let TetMesh { positions, .. } = split_box(cells, size);
-    let mut mesh = TetMesh { positions, ..TetMesh::default() };
-    let node = |c: [usize; 3]| ((c[2] * (cells[1] + 1) + c[1]) * (cells[0] + 1) + c[0]) as u32;
+    let nodes = cells.map(|n| n + 1);
+    let mut mesh = TetMesh { positions: spread(nodes, 0.0, cells, size).collect(), ..TetMesh::default() };
     let first = mesh.positions.len() as u32;
-    let middle = |c: [usize; 3]| first + ((c[2] * cells[1] + c[1]) * cells[0] + c[0]) as u32;
-    let counts: [usize; 3] = cells;
-    let all = || {
-        (0..counts.iter().product())
-            .map(|n: usize| [n % counts[0], n / counts[0] % counts[1], n / (counts[0] * counts[1])])
-    };
-    for c in all() {
-        let share = Vec3::from_array(std::array::from_fn(|k| (c[k] as f32 + 0.5) / counts[k] as f32));
-        mesh.positions.push(share * size);
-    }
-    for (c, axis) in all().flat_map(|c| [0, 1, 2].map(|axis| (c, axis))) {
+    mesh.positions.extend(spread(cells, 0.5, cells, size));
+    let middle = |cell: [usize; 3]| first + number(cells, cell);
+    let step = |at: [usize; 3], axis: usize| -> [usize; 3] { std::array::from_fn(|k| at[k] + usize::from(k == axis)) };
+    for (c, axis) in each(cells).flat_map(|c| [0, 1, 2].map(|axis| (c, axis))) {
         let (second, third) = ((axis + 1) % 3, (axis + 2) % 3);
-        let step =
-            |at: [usize; 3], axis: usize| -> [usize; 3] { std::array::from_fn(|k| at[k] + usize::from(k == axis)) };
-        let around = |c: [usize; 3]| [c, step(c, second), step(step(c, second), third), step(c, third)].map(node);
+        let around = |c: [usize; 3]| {
+            [c, step(c, second), step(step(c, second), third), step(c, third)].map(|corner| number(nodes, corner))
+        };
+        let half = |[a, b, d, e]: [u32; 4]| [[a, b, d, middle(c)], [a, d, e, middle(c)]];
         if c[axis] == 0 {
-            let [a, b, d, e] = around(c);
-            mesh.tets.extend([[a, b, d, middle(c)], [a, d, e, middle(c)]]);
+            mesh.tets.extend(half(around(c)));
         }
         let far = around(step(c, axis));
-        if c[axis] + 1 == counts[axis] {
-            let [a, b, d, e] = far;
-            mesh.tets.extend([[a, b, d, middle(c)], [a, d, e, middle(c)]]);
+        if c[axis] + 1 == cells[axis] {
+            mesh.tets.extend(half(far));
         } else {
             let next = middle(step(c, axis));
             mesh.tets.extend((0..4).map(|k| [far[k], far[(k + 1) % 4], next, middle(c)]));
@@ -73,6 +51,21 @@ pub fn centred_box(cells: [usize; 3], size: Vec3) -> TetMesh {
     }
     outside_in(&mut mesh);
     mesh
+}
+
+/// Every place of a grid of so many, x first.
+fn each([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    (0..nx * ny * nz).map(move |n| [n % nx, n / nx % ny, n / (nx * ny)])
+}
+
+/// Number of a place in the order of [`each`].
+fn number([nx, ny, _]: [usize; 3], [x, y, z]: [usize; 3]) -> u32 {
+    ((z * ny + y) * nx + x) as u32
+}
+
+/// Positions of a grid's places, `shift` cells from the origin, in a box of so many cells, mm.
+fn spread(places: [usize; 3], shift: f32, cells: [usize; 3], size: Vec3) -> impl Iterator<Item = Vec3> {
+    each(places).map(move |c| Vec3::from_array(std::array::from_fn(|k| (c[k] as f32 + shift) / cells[k] as f32)) * size)
 }
 
 /// Swaps corners where a tetrahedron is inside out.

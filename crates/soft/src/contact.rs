@@ -163,24 +163,6 @@ fn force_of_plane(plane: &PlaneContact, moved: Vec3, step: Gain, node: FreeNode)
     (if force.is_finite() { force.max(0.0) } else { 0.0 }, if brake.is_finite() { brake } else { Vec3::ZERO })
 }
 
-/// Adds a spring's force to the nodes at these positions and velocities, `add(node, N)`, whole and
-/// explicit; gives it, N.
-pub(crate) fn press(
-    spring: &NodalContact,
-    [positions, velocities]: [&[Vec3]; 2],
-    mut add: impl FnMut(u32, Vec3),
-) -> f32 {
-    let known = |values: &[Vec3], n: u32| values.get(n as usize).copied().unwrap_or_default();
-    let (mean, speed) = (spring.mean(|n| known(positions, n)), spring.mean(|n| known(velocities, n)));
-    let pressure = spring.pressure_n(mean, speed);
-    if !(pressure.is_finite() && pressure > 0.0) {
-        return 0.0;
-    }
-    let nodes = spring.nodes().filter(|(n, _)| (*n as usize) < positions.len());
-    nodes.for_each(|(n, w)| add(n, spring.normal * -(pressure * w)));
-    pressure
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -40,21 +40,21 @@ impl NeoHookean {
     /// Energy per rest volume, N mm/mm³.
     pub fn energy(&self, f: DMat3) -> f64 {
         let j = f.determinant();
-        let [g, ..] = isochoric(j);
+        let [g, ..] = power(j, -2.0 / 3.0);
         0.5 * self.mu * (g * squared(f) - 3.0) + self.kappa * volumetric(j)[0]
     }
 
     /// First Piola-Kirchhoff stress P, MPa.
     pub fn stress(&self, f: DMat3) -> DMat3 {
         let j = f.determinant();
-        let [g, dg, _] = isochoric(j);
+        let [g, dg, _] = power(j, -2.0 / 3.0);
         f * (self.mu * g) + cofactor(f) * self.volumetric(f, j, dg)
     }
 
     /// The change of the stress, `∂P/∂F : dF`, for a change `df`, MPa.
     pub fn stress_change(&self, f: DMat3, df: DMat3) -> DMat3 {
         let j = f.determinant();
-        let [g, dg, ddg] = isochoric(j);
+        let [g, dg, ddg] = power(j, -2.0 / 3.0);
         let c = cofactor(f);
         let (fd, cd) = (dot(f, df), dot(c, df));
         let along_c = self.mu * dg * fd + (0.5 * self.mu * ddg * squared(f) + self.kappa * volumetric(j)[2]) * cd;
@@ -64,11 +64,6 @@ impl NeoHookean {
     fn volumetric(&self, f: DMat3, j: f64, dg: f64) -> f64 {
         0.5 * self.mu * dg * squared(f) + self.kappa * volumetric(j)[1]
     }
-}
-
-/// g, g', g'' at J.
-fn isochoric(j: f64) -> [f64; 3] {
-    power(j, -2.0 / 3.0)
 }
 
 /// `J^n` with its first two derivatives, continued along its tangent line below [`FADE_BELOW`].

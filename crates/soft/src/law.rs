@@ -14,6 +14,7 @@
 
 use crate::energy::{NeoHookean, cofactor, cofactor_change, dot, power, squared, volumetric};
 use glam::{DMat3, DVec3};
+use nalgebra::Matrix3;
 
 /// Principal stretches below this are taken for it.
 pub const LEAST_STRETCH: f64 = 0.1;
@@ -198,28 +199,10 @@ fn trace(a: DMat3) -> f64 {
     a.x_axis.x + a.y_axis.y + a.z_axis.z
 }
 
-/// Eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations.
-pub(crate) fn eigen(mut a: DMat3) -> (DVec3, DMat3) {
-    let mut axes = DMat3::IDENTITY;
-    for _ in 0..12 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            let (off, apart) = (a.col(q)[p], a.col(q)[q] - a.col(p)[p]);
-            let root = (apart * apart + 4.0 * off * off).sqrt();
-            if root == 0.0 {
-                continue;
-            }
-            let t = 2.0 * off / (apart + root.copysign(apart));
-            let cosine = 1.0 / (1.0 + t * t).sqrt();
-            let mut turn = DMat3::IDENTITY;
-            turn.col_mut(p)[p] = cosine;
-            turn.col_mut(q)[q] = cosine;
-            turn.col_mut(q)[p] = t * cosine;
-            turn.col_mut(p)[q] = -t * cosine;
-            a = turn.transpose() * a * turn;
-            axes *= turn;
-        }
-    }
-    (DVec3::new(a.x_axis.x, a.y_axis.y, a.z_axis.z), axes)
+/// Eigenvalues and eigenvectors (columns) of a symmetric matrix.
+fn eigen(a: DMat3) -> (DVec3, DMat3) {
+    let found = Matrix3::from_column_slice(&a.to_cols_array()).symmetric_eigen();
+    (DVec3::from_slice(found.eigenvalues.as_slice()), DMat3::from_cols_slice(found.eigenvectors.as_slice()))
 }
 
 #[cfg(test)]

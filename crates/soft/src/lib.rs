@@ -52,5 +52,5 @@ pub use material::{Material, MaterialError};
 pub use method::{Descriptor, Method};
 pub use operator::Stiffness;
 pub use pressure::SurfacePressure;
-pub use solver::{Loads, SoftSolver, StepReport};
+pub use solver::{Loads, NodeState, SoftSolver, StepReport};
 pub use tetra::Shape;

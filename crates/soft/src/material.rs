@@ -136,7 +136,7 @@ impl Material {
     /// Refuses parameters that no material has, and fits that are not convex.
     pub fn check(&self) -> Result<(), MaterialError> {
         let positive = |x: f32| x.is_finite() && x > 0.0;
-        let (poisson, density) = (self.poisson(), self.density_g_mm3());
+        let [poisson, density] = self.poisson_and_density();
         if !(0.0..0.5).contains(&poisson) {
             return Err(MaterialError::Poisson(poisson));
         }
@@ -164,21 +164,20 @@ impl Material {
 
     /// Density of the rest state, g/mm³.
     pub fn density_g_mm3(&self) -> f32 {
-        match *self {
-            Self::NeoHookean { density_g_mm3, .. }
-            | Self::StVenantKirchhoff { density_g_mm3, .. }
-            | Self::MooneyRivlin { density_g_mm3, .. }
-            | Self::Ogden { density_g_mm3, .. } => density_g_mm3,
-        }
+        self.poisson_and_density()[1]
     }
 
     /// Poisson's ratio at small strain.
     pub fn poisson(&self) -> f32 {
+        self.poisson_and_density()[0]
+    }
+
+    fn poisson_and_density(&self) -> [f32; 2] {
         match *self {
-            Self::NeoHookean { poisson, .. }
-            | Self::StVenantKirchhoff { poisson, .. }
-            | Self::MooneyRivlin { poisson, .. }
-            | Self::Ogden { poisson, .. } => poisson,
+            Self::NeoHookean { poisson, density_g_mm3, .. }
+            | Self::StVenantKirchhoff { poisson, density_g_mm3, .. }
+            | Self::MooneyRivlin { poisson, density_g_mm3, .. }
+            | Self::Ogden { poisson, density_g_mm3, .. } => [poisson, density_g_mm3],
         }
     }
 

@@ -1,7 +1,9 @@
 //! The seam of the soft-tissue solvers: loads in, nodal state out.
 
+use glam::DVec3;
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
+use trepan_mesh::TetMesh;
 
 /// Advances a body under loads. One implementation owns all of a body's nodal state.
 ///
@@ -15,14 +17,42 @@ pub trait SoftSolver: Send {
     /// finite.
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport;
 
+    /// Present state of the nodes.
+    fn state(&self) -> &NodeState;
+
     /// Present node positions, world mm.
-    fn positions(&self) -> &[Vec3];
+    fn positions(&self) -> &[Vec3] {
+        &self.state().positions
+    }
 
     /// Present node velocities, mm/ms.
-    fn velocities(&self) -> &[Vec3];
+    fn velocities(&self) -> &[Vec3] {
+        &self.state().velocities
+    }
 
     /// Longest step that is stable with margin, ms; infinite for implicit and static solvers.
     fn stable_dt_ms(&self) -> f32;
+}
+
+/// What a solver publishes of its nodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NodeState {
+    /// Positions, world mm.
+    pub positions: Vec<Vec3>,
+    /// Velocities, mm/ms.
+    pub velocities: Vec<Vec3>,
+}
+
+impl NodeState {
+    /// The nodes of a mesh at rest.
+    pub fn at_rest(mesh: &TetMesh) -> Self {
+        Self { positions: mesh.positions.clone(), velocities: vec![Vec3::ZERO; mesh.positions.len()] }
+    }
+
+    /// Rounds the state of a node.
+    pub(crate) fn set(&mut self, node: usize, position: DVec3, velocity: DVec3) {
+        (self.positions[node], self.velocities[node]) = (position.as_vec3(), velocity.as_vec3());
+    }
 }
 
 /// What acts on the body during one step.

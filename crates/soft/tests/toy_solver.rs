@@ -2,13 +2,12 @@
 
 use trepan_contact::NodalContacts;
 use trepan_geometry::Vec3;
-use trepan_soft::{Body, Descriptor, Loads, Material, Method, SoftSolver, StepReport, boxes};
+use trepan_soft::{Body, Descriptor, Loads, Material, Method, NodeState, SoftSolver, StepReport, boxes};
 
 /// Lets every node that is not fixed fall.
 struct Toy {
     free: Vec<bool>,
-    positions: Vec<Vec3>,
-    velocities: Vec<Vec3>,
+    state: NodeState,
 }
 
 const TOY: Descriptor = Descriptor {
@@ -18,26 +17,21 @@ const TOY: Descriptor = Descriptor {
     build: |body: &Body| {
         let mut free = vec![true; body.mesh.positions.len()];
         body.fixed.iter().for_each(|&node| free[node as usize] = false);
-        let (positions, velocities) = (body.mesh.positions.clone(), vec![Vec3::ZERO; free.len()]);
-        Ok(Box::new(Toy { free, positions, velocities }))
+        Ok(Box::new(Toy { free, state: NodeState::at_rest(&body.mesh) }))
     },
 };
 
 impl SoftSolver for Toy {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
         for node in (0..self.free.len()).filter(|&node| self.free[node]) {
-            self.velocities[node] += dt_ms * loads.gravity;
-            self.positions[node] += dt_ms * self.velocities[node];
+            self.state.velocities[node] += dt_ms * loads.gravity;
+            self.state.positions[node] += dt_ms * self.state.velocities[node];
         }
         StepReport { substeps: 1, converged: true, ..StepReport::default() }
     }
 
-    fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    fn velocities(&self) -> &[Vec3] {
-        &self.velocities
+    fn state(&self) -> &NodeState {
+        &self.state
     }
 
     fn stable_dt_ms(&self) -> f32 {

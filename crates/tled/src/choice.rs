@@ -6,14 +6,32 @@
 //! disadvantage. The winner is built again, so the measurement does not change its state.
 
 use crate::{Config, Tled};
-use trepan_soft::{Body, Loads, SoftSolver};
+use trepan_soft::{Body, BodyError, Loads, SoftSolver};
 
 /// A solver to choose from.
 pub struct Candidate<'a> {
     /// Name of the solver.
     pub name: &'static str,
     /// Builds the solver at rest, or returns the reason why not.
-    pub build: Box<dyn Fn() -> Result<Box<dyn SoftSolver>, String> + 'a>,
+    pub build: Box<dyn Fn() -> Result<Box<dyn SoftSolver>, ChoiceError> + 'a>,
+}
+
+/// Why a candidate, or any at all, was not built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ChoiceError {
+    /// The body or the settings make no sense.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// The body does not run on the graphics device.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] crate::gpu::GpuTledError),
+    /// The program has no solver on the graphics device.
+    #[error("this program was built without the feature `gpu`")]
+    NoGpuFeature,
+    /// Every candidate failed, each for the reason given.
+    #[error("{0}")]
+    NoneBuilt(String),
 }
 
 /// The chosen solver.
@@ -28,21 +46,18 @@ pub struct Chosen {
 
 /// TLED on the CPU, and on the GPU where this crate has the feature `gpu`.
 pub fn candidates<'a>(body: &'a Body, config: &'a Config) -> Vec<Candidate<'a>> {
-    let processor = move || Ok(Box::new(Tled::new(body, config).map_err(|f| f.to_string())?) as Box<dyn SoftSolver>);
-    let mut all = vec![Candidate { name: "tled", build: Box::new(processor) }];
+    let processor = || Ok(Box::new(Tled::new(body, config)?) as Box<dyn SoftSolver>);
     #[cfg(feature = "gpu")]
-    all.push(Candidate {
-        name: "tled-gpu",
-        build: Box::new(move || {
-            let gpu = trepan_gpu::Gpu::open(trepan_gpu::Prefer::Hardware).map_err(|f| f.to_string())?;
-            Ok(Box::new(crate::gpu::GpuTled::new(&gpu, body, config).map_err(|f| f.to_string())?))
-        }),
-    });
-    if all.len() == 1 {
-        let absent = || Err("this program was built without the feature `gpu`".to_string());
-        all.push(Candidate { name: "tled-gpu", build: Box::new(absent) });
-    }
-    all
+    let device = || {
+        let gpu = trepan_gpu::Gpu::open(trepan_gpu::Prefer::Hardware).map_err(crate::gpu::GpuTledError::from)?;
+        Ok(Box::new(crate::gpu::GpuTled::new(&gpu, body, config)?) as Box<dyn SoftSolver>)
+    };
+    #[cfg(not(feature = "gpu"))]
+    let device = || Err(ChoiceError::NoGpuFeature);
+    vec![
+        Candidate { name: "tled", build: Box::new(processor) },
+        Candidate { name: "tled-gpu", build: Box::new(device) },
+    ]
 }
 
 /// Steps each candidate under `loads` for `each_ms` of the clock `now_ms` and returns the cheapest.
@@ -52,7 +67,7 @@ pub fn fastest(
     loads: &Loads,
     each_ms: f64,
     now_ms: &dyn Fn() -> f64,
-) -> Result<Chosen, String> {
+) -> Result<Chosen, ChoiceError> {
     let (mut words, mut best) = (Vec::new(), None::<(f64, &Candidate<'_>)>);
     for candidate in candidates {
         match (candidate.build)() {
@@ -67,7 +82,7 @@ pub fn fastest(
         }
     }
     let why = words.join("; ");
-    let (_, winner) = best.ok_or_else(|| why.clone())?;
+    let (_, winner) = best.ok_or_else(|| ChoiceError::NoneBuilt(why.clone()))?;
     Ok(Chosen { solver: (winner.build)()?, name: winner.name, why })
 }
 
@@ -89,21 +104,18 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};
     use trepan_geometry::Vec3;
-    use trepan_soft::{Material, StepReport, boxes};
+    use trepan_soft::{Material, NodeState, StepReport, boxes};
 
     /// Solver that only advances the clock.
-    struct Costly(Arc<AtomicU64>, u64, f32);
+    struct Costly(Arc<AtomicU64>, u64, f32, NodeState);
 
     impl SoftSolver for Costly {
         fn step(&mut self, _: &Loads, _: f32) -> StepReport {
             self.0.fetch_add(self.1, Ordering::Relaxed);
             StepReport::default()
         }
-        fn positions(&self) -> &[Vec3] {
-            &[]
-        }
-        fn velocities(&self) -> &[Vec3] {
-            &[]
+        fn state(&self) -> &NodeState {
+            &self.3
         }
         fn stable_dt_ms(&self) -> f32 {
             self.2
@@ -115,17 +127,21 @@ mod tests {
         let clock = Arc::new(AtomicU64::new(0));
         let make = |name, cost, dt| {
             let clock = Arc::clone(&clock);
-            let build = move || Ok(Box::new(Costly(Arc::clone(&clock), cost, dt)) as Box<dyn SoftSolver>);
+            let costly = move || Costly(Arc::clone(&clock), cost, dt, NodeState::default());
+            let build = move || Ok(Box::new(costly()) as Box<dyn SoftSolver>);
             Candidate { name, build: Box::new(build) }
         };
-        let absent = Candidate { name: "absent", build: Box::new(|| Err("no adapter".into())) };
+        let absent = Candidate { name: "absent", build: Box::new(|| Err(ChoiceError::NoneBuilt("no adapter".into()))) };
         let all = [make("short steps", 2, 0.1), make("long steps", 10, 0.8), absent];
         let now_ms = || clock.load(Ordering::Relaxed) as f64;
         let chosen = fastest(&all, &Loads::default(), 200.0, &now_ms).ok().map(|c| (c.name, c.why));
         let why =
             "short steps: 20.000 ms for a ms of tissue; long steps: 12.500 ms for a ms of tissue; absent: no adapter";
         assert_eq!(chosen, Some(("long steps", why.to_string())));
-        assert_eq!(fastest(&all[2..], &Loads::default(), 1.0, &now_ms).err(), Some("absent: no adapter".into()));
+        assert_eq!(
+            fastest(&all[2..], &Loads::default(), 1.0, &now_ms).err().unwrap().to_string(),
+            "absent: no adapter"
+        );
     }
 
     #[test]

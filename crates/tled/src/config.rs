@@ -88,47 +88,28 @@ pub enum Damping {
 impl Config {
     /// Rejects invalid settings.
     pub fn check(&self) -> Result<(), BodyError> {
-        let refuse = |field, value, right| Err(BodyError::Config { field, value, right });
+        let check = BodyError::check_config;
+        let positive = |field, value: f32| check(value > 0.0 && value.is_finite(), field, value, "over 0 and finite");
         let damping = match self.damping {
             Damping::None => 0.0,
             Damping::Critical(share) => share,
             Damping::Rate(rate) => rate,
         };
-        if !(damping.is_finite() && damping >= 0.0) {
-            return refuse("damping", damping, "at least 0 and finite");
-        }
-        if !(self.safety > 0.0 && self.safety < 1.0) {
-            return refuse("safety", self.safety, "over 0 and below 1");
-        }
-        if !self.balanced_gravity.is_finite() {
-            return refuse("balanced_gravity", self.balanced_gravity.length(), "finite, 9.81e-3 mm/ms² on Earth");
-        }
-        if self.mass_scaling.is_nan() || self.mass_scaling < 0.0 {
-            return refuse("mass_scaling", self.mass_scaling, "at least 0; 0.01 is not felt");
-        }
-        if !(self.max_speed > 0.0 && self.max_speed.is_finite()) {
-            return refuse("max_speed", self.max_speed, "over 0 and finite");
-        }
-        if !(self.max_displacement > 0.0 && self.max_displacement.is_finite()) {
-            return refuse("max_displacement", self.max_displacement, "over 0 and finite");
-        }
-        if !(self.still_mm >= 0.0 && self.still_mm.is_finite()) {
-            return refuse("still_mm", self.still_mm, "at least 0 and finite; 0.001 mm is not felt");
-        }
-        if self.still_mm > 0.0 && !self.relaxation.is_none() {
-            return refuse(
-                "still_mm",
-                self.still_mm,
-                "0 where relaxation is not NONE: tissue that relaxes never rests",
-            );
-        }
+        check(damping.is_finite() && damping >= 0.0, "damping", damping, "at least 0 and finite")?;
+        check(self.safety > 0.0 && self.safety < 1.0, "safety", self.safety, "over 0 and below 1")?;
+        let gravity = self.balanced_gravity;
+        check(gravity.is_finite(), "balanced_gravity", gravity.length(), "finite, 9.81e-3 mm/ms² on Earth")?;
+        check(self.mass_scaling >= 0.0, "mass_scaling", self.mass_scaling, "at least 0; 0.01 is not felt")?;
+        positive("max_speed", self.max_speed)?;
+        positive("max_displacement", self.max_displacement)?;
+        let still_mm = self.still_mm;
+        let is_right = still_mm >= 0.0 && still_mm.is_finite();
+        check(is_right, "still_mm", still_mm, "at least 0 and finite; 0.001 mm is not felt")?;
+        let right = "0 where relaxation is not NONE: tissue that relaxes never rests";
+        check(still_mm == 0.0 || self.relaxation.is_none(), "still_mm", still_mm, right)?;
         self.relaxation.check()?;
-        if !(1..=64).contains(&self.threads) {
-            return refuse("threads", self.threads as f32, "1 to 64");
-        }
-        if !self.kernel.runs_here() {
-            return refuse("kernel", 0.0, "a kernel whose instructions this CPU has; Fastest always runs");
-        }
-        Ok(())
+        check((1..=64).contains(&self.threads), "threads", self.threads as f32, "1 to 64")?;
+        let right = "a kernel whose instructions this CPU has; Fastest always runs";
+        check(self.kernel.runs_here(), "kernel", 0.0, right)
     }
 }

@@ -8,7 +8,7 @@
 //! S and q come from the material. J̄ is J, or with averaged pressure the mean volume ratio of the
 //! corners' node groups; p resists inversion (`law.rs`).
 
-use crate::lane::Lane;
+use crate::lane::{Lane, dot};
 use crate::law::{Deformation, Stress};
 
 /// Computes the deformation from `u_a - u_0` and ∇N_a, a = 1..3.
@@ -76,11 +76,6 @@ fn multiplied<L: Lane>(stress: &Stress<L>, f: &[L; 3], c: &[L; 3]) -> [L; 3] {
 #[inline(always)]
 fn times<L: Lane>(rows: &[[L; 3]; 3], v: &[L; 3]) -> [L; 3] {
     [dot(&rows[0], v), dot(&rows[1], v), dot(&rows[2], v)]
-}
-
-#[inline(always)]
-fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]

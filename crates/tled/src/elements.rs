@@ -61,25 +61,20 @@ impl Elements {
         self.team.nodes()
     }
 
-    /// Runs both passes over the elements, `dt_ms` after the previous run.
-    pub fn compute(&mut self, dt_ms: f32) -> PassReport {
-        self.average_volumes(dt_ms);
-        self.find_forces(dt_ms)
-    }
-
-    /// Computes every element's forces from the nodes' displacements.
-    pub fn find_forces(&mut self, dt_ms: f32) -> PassReport {
-        let (fade, averaged_pressure) = (self.relaxation.fade(dt_ms), self.averaged_pressure);
-        self.team.compute(Work::Forces(Forcing { fade, averaged_pressure, quiet: self.quiet(dt_ms) }));
-        self.team.report()
-    }
-
-    /// Averages the volume change by node group, if averaged pressure is on.
-    pub fn average_volumes(&mut self, dt_ms: f32) {
+    /// Averages the volume change by node group, if averaged pressure is on, `dt_ms` after the
+    /// last step.
+    pub fn volumes(&mut self, dt_ms: f32) {
         if self.averaged_pressure {
             self.team.compute(Work::Volumes(self.quiet(dt_ms)));
             self.team.compute(Work::Average);
         }
+    }
+
+    /// Computes every element's forces from the nodes' displacements, `dt_ms` after the last step.
+    pub fn forces(&mut self, dt_ms: f32) -> PassReport {
+        let (fade, averaged_pressure) = (self.relaxation.fade(dt_ms), self.averaged_pressure);
+        self.team.compute(Work::Forces(Forcing { fade, averaged_pressure, quiet: self.quiet(dt_ms) }));
+        self.team.report()
     }
 
     fn quiet(&self, dt_ms: f32) -> Quiet {
@@ -157,7 +152,11 @@ mod tests {
             (0..count).for_each(|n| nodes.set(n, Vec3::from([3 * n, 3 * n + 1, 3 * n + 2].map(noise)), Vec3::ZERO));
             let config = Config { kernel, averaged_pressure: averaged, relaxation, threads, ..Config::default() };
             let mut elements = Elements::of(body, &layout, &Scaling::of(body, 0.0), nodes, &config);
-            let report = (0..3).map(|_| elements.compute(0.7)).last();
+            let mut compute = || {
+                elements.volumes(0.7);
+                elements.forces(0.7)
+            };
+            let report = (0..3).map(|_| compute()).last();
             (report, (0..count).map(|place| elements.force(place).to_array()).collect::<Vec<_>>())
         };
         let scalar = forces(Kernel::Scalar, 1);

@@ -10,7 +10,7 @@
 //! ```
 
 use crate::field::{Field, Scalars};
-use crate::node_groups::NodeGroups;
+use crate::node_groups::{NodeGroups, Runs};
 use glam::Vec4;
 use std::ops::Range;
 
@@ -24,9 +24,7 @@ pub(crate) struct ForceSlots {
     /// By group: mean `J - 1` of its elements.
     pub volume_change: Scalars,
     inverse_volume: Vec<f32>,
-    /// First slot of each group, and of each place; one more entry than there are.
-    of_groups: Vec<u32>,
-    of_places: Vec<u32>,
+    runs: Runs,
 }
 
 impl ForceSlots {
@@ -38,24 +36,15 @@ impl ForceSlots {
         places: usize,
         inverse_volume: Vec<f32>,
     ) -> (Self, Vec<Vec<u32>>) {
-        let mut of_groups = vec![0u32; node_groups.place_of.len() + 1];
-        owned.iter().flatten().for_each(|&group| of_groups[group as usize + 1] += 1);
-        (1..of_groups.len()).for_each(|i| of_groups[i] += of_groups[i - 1]);
-        let mut next = of_groups.clone();
-        let mut take = |&group: &u32| {
-            next[group as usize] += 1;
-            next[group as usize] - 1
-        };
-        let slots = owned.iter().map(|groups| groups.iter().map(&mut take).collect()).collect();
-        let count = owned.iter().map(Vec::len).sum();
-        let first_of = |place: usize| of_groups[node_groups.place_of.partition_point(|&p| (p as usize) < place)];
+        let runs = node_groups.runs(owned.iter().flatten().copied(), places);
+        let mut left = runs.slots.iter().copied();
+        let slots = owned.iter().map(|groups| left.by_ref().take(groups.len()).collect()).collect();
         let force_slots = Self {
-            sums: Field::zeroed(count),
-            shares: Scalars::zeroed(if inverse_volume.is_empty() { 0 } else { count }),
+            sums: Field::zeroed(runs.slots.len()),
+            shares: Scalars::zeroed(if inverse_volume.is_empty() { 0 } else { runs.slots.len() }),
             volume_change: Scalars::zeroed(inverse_volume.len()),
             inverse_volume,
-            of_places: (0..=places).map(first_of).collect(),
-            of_groups,
+            runs,
         };
         (force_slots, slots)
     }
@@ -63,7 +52,7 @@ impl ForceSlots {
     /// Element force on the node at `place`, N, and the number of sleeping parts around it.
     #[inline(always)]
     pub fn force(&self, place: usize) -> Vec4 {
-        let slots = self.of_places[place] as usize..self.of_places[place + 1] as usize;
+        let slots = self.runs.of_places[place] as usize..self.runs.of_places[place + 1] as usize;
         slots.fold(Vec4::ZERO, |sum, slot| sum + self.sums.vector(slot))
     }
 
@@ -75,7 +64,7 @@ impl ForceSlots {
     /// Averages the volume change of some node groups.
     pub fn average(&self, node_groups: Range<usize>) {
         for group in node_groups {
-            let slots = self.of_groups[group] as usize..self.of_groups[group + 1] as usize;
+            let slots = self.runs.of_groups[group] as usize..self.runs.of_groups[group + 1] as usize;
             let sum = slots.fold(0.0, |sum, slot| sum + self.shares.get(slot));
             self.volume_change.set(group, sum * self.inverse_volume[group]);
         }

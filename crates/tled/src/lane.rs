@@ -101,6 +101,18 @@ pub(crate) trait Lane:
     }
 }
 
+/// Scalar product.
+#[inline(always)]
+pub(crate) fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Sum of the squares of three rows.
+#[inline(always)]
+pub(crate) fn squared<L: Lane>([a, b, c]: &[[L; 3]; 3]) -> L {
+    dot(a, a) + dot(b, b) + dot(c, c)
+}
+
 /// Adding and subtracting this rounds to a whole number.
 const ROUND: f32 = 12_582_912.0;
 

@@ -12,7 +12,7 @@
 //! `p = w² (1 + 4 w²)` resists inversion, `w = (0.3 - J)/0.3` between 0 and 1. Its reasons stand in
 //! `trepan_soft::Law`, the f64 version of this file.
 
-use crate::lane::Lane;
+use crate::lane::{Lane, squared};
 use crate::principal::{Symmetric, principal};
 use trepan_soft::{FADE_BELOW, LEAST_STRETCH, Law, STEEPENING};
 
@@ -81,42 +81,26 @@ impl<L: Lane> Deformation<L> {
         (squared * (L::splat(1.0) + steep), slope)
     }
 
-    /// FᵀF.
-    #[inline(always)]
-    fn cauchy_green(&self) -> Symmetric<L> {
-        let [a, b, c] = &self.f;
-        [
-            a[0] * a[0] + b[0] * b[0] + c[0] * c[0],
-            a[1] * a[1] + b[1] * b[1] + c[1] * c[1],
-            a[2] * a[2] + b[2] * b[2] + c[2] * c[2],
-            a[0] * a[1] + b[0] * b[1] + c[0] * c[1],
-            a[0] * a[2] + b[0] * b[2] + c[0] * c[2],
-            a[1] * a[2] + b[1] * b[2] + c[1] * c[2],
-        ]
-    }
-
     /// `(cof F)ᵀ cof F / max(J, 0.3)`, which is J (FᵀF)⁻¹ where J is not clamped.
     #[inline(always)]
     pub fn inverse_green(&self) -> Symmetric<L> {
         let inverse = self.root * self.root * self.root;
-        let [a, b, c] = &self.c;
-        [
-            (a[0] * a[0] + b[0] * b[0] + c[0] * c[0]) * inverse,
-            (a[1] * a[1] + b[1] * b[1] + c[1] * c[1]) * inverse,
-            (a[2] * a[2] + b[2] * b[2] + c[2] * c[2]) * inverse,
-            (a[0] * a[1] + b[0] * b[1] + c[0] * c[1]) * inverse,
-            (a[0] * a[2] + b[0] * b[2] + c[0] * c[2]) * inverse,
-            (a[1] * a[2] + b[1] * b[2] + c[1] * c[2]) * inverse,
-        ]
+        let [xx, yy, zz, xy, xz, yz] = gram(&self.c);
+        [xx * inverse, yy * inverse, zz * inverse, xy * inverse, xz * inverse, yz * inverse]
     }
 }
 
+/// `AᵀA`, A given by rows.
 #[inline(always)]
-fn squared<L: Lane>(rows: &[[L; 3]; 3]) -> L {
-    let [a, b, c] = rows;
-    (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-        + (b[0] * b[0] + b[1] * b[1] + b[2] * b[2])
-        + (c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
+fn gram<L: Lane>([a, b, c]: &[[L; 3]; 3]) -> Symmetric<L> {
+    [
+        a[0] * a[0] + b[0] * b[0] + c[0] * c[0],
+        a[1] * a[1] + b[1] * b[1] + c[1] * c[1],
+        a[2] * a[2] + b[2] * b[2] + c[2] * c[2],
+        a[0] * a[1] + b[0] * b[1] + c[0] * c[1],
+        a[0] * a[2] + b[0] * b[2] + c[0] * c[2],
+        a[1] * a[2] + b[1] * b[2] + c[1] * c[2],
+    ]
 }
 
 impl Constitutive<2> for NeoHookean {
@@ -155,7 +139,7 @@ impl Constitutive<2> for StVenantKirchhoff {
 
     #[inline(always)]
     fn stress<L: Lane>(&[lambda, mu]: &[L; 2], d: &Deformation<L>) -> Stress<L> {
-        let b = d.cauchy_green();
+        let b = gram(&d.f);
         let trace = ((b[0] - L::splat(1.0)) + (b[1] - L::splat(1.0)) + (b[2] - L::splat(1.0))) * L::splat(0.5);
         let along = lambda * trace - mu;
         let s = [along + mu * b[0], along + mu * b[1], along + mu * b[2], mu * b[3], mu * b[4], mu * b[5]];
@@ -184,7 +168,7 @@ impl Constitutive<3> for MooneyRivlin {
         let power = d.root * d.root;
         let (g, dg) = d.continued(power, L::splat(-2.0 / 3.0));
         let (h, dh) = d.continued(power * power, L::splat(-4.0 / 3.0));
-        let (b, two) = (d.cauchy_green(), L::splat(2.0));
+        let (b, two) = (gram(&d.f), L::splat(2.0));
         let i1 = b[0] + b[1] + b[2];
         let second = two * c01 * h;
         let along = two * c10 * g + second * i1;
@@ -220,7 +204,7 @@ impl Constitutive<5> for Ogden {
 
     #[inline(always)]
     fn stress<L: Lane>(&[scale1, alpha1, scale2, alpha2, _]: &[L; 5], d: &Deformation<L>) -> Stress<L> {
-        let (squares, axes) = principal(&d.cauchy_green());
+        let (squares, axes) = principal(&gram(&d.f));
         let (one, q1) = term(scale1, alpha1, &squares, d);
         let (two, q2) = term(scale2, alpha2, &squares, d);
         let along = [one[0] + two[0], one[1] + two[1], one[2] + two[2]];

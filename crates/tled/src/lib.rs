@@ -36,6 +36,7 @@
 //! plain 4-node tetrahedra lock. For slow processes (minutes): the speed of sound limits the step,
 //! so use a static solver.
 
+mod base;
 mod block;
 mod bound;
 pub mod choice;

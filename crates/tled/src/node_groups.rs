@@ -22,6 +22,15 @@ pub(crate) struct NodeGroups {
     apart: bool,
 }
 
+/// Slots sorted by node group: one run of them belongs to a group, a longer one to a place.
+pub(crate) struct Runs {
+    /// First slot of each group, and of each place; one more entry than there are.
+    pub of_groups: Vec<u32>,
+    pub of_places: Vec<u32>,
+    /// Slot of each owner.
+    pub slots: Vec<u32>,
+}
+
 impl NodeGroups {
     /// Creates one group per material at a node if `apart`, else one per node.
     pub fn of(body: &Body, layout: &Layout, apart: bool) -> Self {
@@ -55,5 +64,20 @@ impl NodeGroups {
             self.of_tet(body, layout, t as u32).iter().for_each(|&group| volumes[group as usize] += quarter);
         }
         volumes.into_iter().map(|v| (1.0 / v) as f32).collect()
+    }
+
+    /// Gives a slot to each owner of a node group, by group and then in the order of the owners.
+    pub fn runs(&self, owned: impl Iterator<Item = u32> + Clone, places: usize) -> Runs {
+        let mut of_groups = vec![0u32; self.place_of.len() + 1];
+        owned.clone().for_each(|group| of_groups[group as usize + 1] += 1);
+        (1..of_groups.len()).for_each(|i| of_groups[i] += of_groups[i - 1]);
+        let mut next = of_groups.clone();
+        let take = |group: u32| {
+            next[group as usize] += 1;
+            next[group as usize] - 1
+        };
+        let slots = owned.map(take).collect();
+        let first_of = |place: usize| of_groups[self.place_of.partition_point(|&p| (p as usize) < place)];
+        Runs { of_places: (0..=places).map(first_of).collect(), of_groups, slots }
     }
 }

@@ -60,6 +60,14 @@ impl Update {
     pub fn keep_and_gain(&self) -> [f32; 2] {
         keep_and_gain(self.damping_per_ms, self.kick_ms)
     }
+
+    /// What damping leaves of a node's velocity; a rigid motion of the whole body is not damped.
+    #[inline(always)]
+    fn carried(&self, position: Vec4, velocity: Vec4, keep: f32) -> Vec4 {
+        let Some(rigid) = self.rigid else { return velocity * keep };
+        let whole = rigid.at(position.truncate()).extend(0.0);
+        whole + (velocity - whole) * keep
+    }
 }
 
 /// Time from the middle of the last substep to that of this one, ms; `last_ms` is 0 before the
@@ -78,12 +86,21 @@ pub(crate) fn keep_and_gain(damping_per_ms: f32, kick_ms: f32) -> [f32; 2] {
     [(1.0 - half) / (1.0 + half), kick_ms / (1.0 + half)]
 }
 
+/// By place: 1/m, 1/g, 0 for fixed nodes; and the share of the mass that has weight.
+pub(crate) fn inverse_masses_and_weights(body: &Body, layout: &Layout, masses: &[f64]) -> (Vec<f32>, Vec<f32>) {
+    let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
+    let of = |&n: &u32| {
+        let (n, mass) = (n as usize, masses[n as usize]);
+        (if fixed[n] { 0.0 } else { (1.0 / mass) as f32 }, (weights[n] / mass) as f32)
+    };
+    layout.node_at.iter().map(of).unzip()
+}
+
 impl Nodes {
     /// Creates nodes at rest with the given masses by mesh node, g. Added mass (mass scaling) has
     /// no weight.
     pub fn of(body: &Body, layout: &Layout, masses: &[f64]) -> Self {
-        let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
-        let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };
+        let (inverse_mass, weight) = inverse_masses_and_weights(body, layout, masses);
         let field = || Field::zeroed(layout.node_at.len());
         Self {
             u: field(),
@@ -91,8 +108,8 @@ impl Nodes {
             external: field(),
             is_pushed: AtomicBool::new(false),
             pushed: Scalars::zeroed(layout.node_at.len()),
-            inverse_mass: layout.node_at.iter().map(inverse).collect(),
-            weight: layout.node_at.iter().map(|&n| (weights[n as usize] / masses[n as usize]) as f32).collect(),
+            inverse_mass,
+            weight,
             rest: layout.node_at.iter().map(|&n| body.mesh.positions[n as usize].extend(0.0)).collect(),
             limited: AtomicU32::new(0),
             non_finite: AtomicU32::new(0),
@@ -132,14 +149,7 @@ impl Nodes {
             if may_sleep {
                 self.pushed.set(place, if is_pushed { 1.0 } else { 0.0 });
             }
-            let carried = match update.rigid {
-                Some(rigid) => {
-                    let whole = rigid.at((self.rest[place] + u).truncate()).extend(0.0);
-                    whole + (v - whole) * keep
-                }
-                None => v * keep,
-            };
-            let velocity = carried + pull * gain;
+            let velocity = update.carried(self.rest[place] + u, v, keep) + pull * gain;
             let after = u + velocity * dt_ms;
             // False for NaN.
             let within = velocity.length_squared() <= fastest && after.length_squared() <= furthest;
@@ -152,18 +162,12 @@ impl Nodes {
     /// Velocity of a node after a substep under its element force alone, mm/ms. A fixed node keeps
     /// its velocity.
     pub fn free_velocity(&self, place: usize, force: Vec3, update: &Update) -> Vec3 {
-        let (velocity, inverse_mass) = (self.velocity(place), self.inverse_mass[place]);
+        let (u, v, inverse_mass) = (self.u.vector(place), self.v.vector(place), self.inverse_mass[place]);
         if inverse_mass == 0.0 {
-            return velocity;
+            return v.truncate();
         }
         let [keep, gain] = update.keep_and_gain();
-        let carried = match update.rigid {
-            Some(rigid) => {
-                let whole = rigid.at(self.position(place));
-                whole + (velocity - whole) * keep
-            }
-            None => velocity * keep,
-        };
+        let carried = update.carried(self.rest[place] + u, v, keep).truncate();
         carried + (update.gravity * self.weight[place] + force * inverse_mass) * gain
     }
 

@@ -35,10 +35,7 @@ use trepan_soft::{Body, Law};
 /// Some elements of one law, with copies of their nodes and the last force sums.
 pub(crate) struct Part {
     elements: Box<dyn LawElements>,
-    /// By node of the part: its node group, ascending; its place; the slot for its force.
-    node_groups: Vec<u32>,
-    places: Vec<u32>,
-    slots: Vec<u32>,
+    groups: PartGroups,
     u: Vec<Quad>,
     sums: Vec<Quad>,
     /// A quarter of the volume change of the elements around each node, mm³.
@@ -75,7 +72,7 @@ pub(crate) struct Quiet {
     pub still_mm: f32,
 }
 
-/// The nodes of a part, ascending by node group.
+/// By node of a part: its node group, ascending; its place; the slot for its force.
 pub(crate) struct PartGroups {
     pub node_groups: Vec<u32>,
     pub places: Vec<u32>,
@@ -84,14 +81,7 @@ pub(crate) struct PartGroups {
 
 /// Elements of one constitutive law.
 trait LawElements: Send {
-    fn forces(
-        &mut self,
-        kernel: Kernel,
-        fade: [Fade; 2],
-        averaged_pressure: bool,
-        u: &[Quad],
-        sums: &mut [Quad],
-    ) -> PassReport;
+    fn forces(&mut self, kernel: Kernel, how: &Forcing, u: &[Quad], sums: &mut [Quad]) -> PassReport;
     fn volumes(&self, kernel: Kernel, u: &[Quad], shares: &mut [f32]);
     fn forget(&mut self);
 }
@@ -110,23 +100,21 @@ impl Part {
         scaling: &Scaling,
         tets: &[u32],
         groups_of: &dyn Fn(u32) -> [u32; 4],
-        part_groups: PartGroups,
+        groups: PartGroups,
         relaxation: &Relaxation,
     ) -> Self {
-        let PartGroups { node_groups, places, slots } = part_groups;
-        let nodes = |t: u32| groups_of(t).map(|s| node_groups.partition_point(|&o| o < s) as u32);
+        let nodes = |t: u32| groups_of(t).map(|s| groups.node_groups.partition_point(|&o| o < s) as u32);
+        let zero = vec![[0.0; 4]; groups.places.len()];
         Self {
             elements: elements_of(body, scaling, tets, &nodes, relaxation),
-            u: vec![[0.0; 4]; node_groups.len()],
-            sums: vec![[0.0; 4]; node_groups.len()],
-            shares: vec![0.0; node_groups.len()],
+            u: zero.clone(),
+            sums: zero.clone(),
+            shares: vec![0.0; zero.len()],
             report: PassReport::default(),
             tets: tets.len(),
-            anchor: vec![[0.0; 4]; node_groups.len()],
+            anchor: zero,
             quiet_ms: 0.0,
-            node_groups,
-            places,
-            slots,
+            groups,
         }
     }
 
@@ -138,7 +126,11 @@ impl Part {
         self.copy(nodes);
         self.shares.fill(0.0);
         self.elements.volumes(kernel, &self.u, &mut self.shares);
-        self.slots.iter().zip(&self.shares).for_each(|(&slot, &share)| force_slots.shares.set(slot as usize, share));
+        self.groups
+            .slots
+            .iter()
+            .zip(&self.shares)
+            .for_each(|(&slot, &share)| force_slots.shares.set(slot as usize, share));
     }
 
     /// Finds the elements' forces, unless they sleep; with averaged pressure after their change of
@@ -150,20 +142,18 @@ impl Part {
             return;
         }
         if how.averaged_pressure {
-            self.u
-                .iter_mut()
-                .zip(&self.node_groups)
-                .for_each(|(u, &group)| u[3] = force_slots.volume_change.get(group as usize));
+            let averages = self.groups.node_groups.iter().map(|&group| force_slots.volume_change.get(group as usize));
+            self.u.iter_mut().zip(averages).for_each(|(u, average)| u[3] = average);
         } else {
             self.copy(nodes);
         }
         self.sums.fill([0.0; 4]);
-        self.report = self.elements.forces(kernel, how.fade, how.averaged_pressure, &self.u, &mut self.sums);
+        self.report = self.elements.forces(kernel, how, &self.u, &mut self.sums);
         if self.quiet_ms > DOZE_MS {
             self.quiet_ms = f32::INFINITY;
             self.sums.iter_mut().for_each(|sum| sum[3] = 1.0);
         }
-        self.slots.iter().zip(&self.sums).for_each(|(&slot, &sum)| force_slots.sums.set(slot as usize, sum));
+        self.groups.slots.iter().zip(&self.sums).for_each(|(&slot, &sum)| force_slots.sums.set(slot as usize, sum));
     }
 
     /// Number of elements, and number of awake elements.
@@ -187,17 +177,17 @@ impl Part {
             let moved = nodes.u.vector(place as usize) - Vec4::from_array(*anchor);
             moved.length_squared() <= most && nodes.pushed.get(place as usize) == 0.0
         };
-        if self.anchor.iter().zip(&self.places).all(near) {
+        if self.anchor.iter().zip(&self.groups.places).all(near) {
             self.quiet_ms += quiet.dt_ms;
             return self.quiet_ms == f32::INFINITY;
         }
-        self.anchor.iter_mut().zip(&self.places).for_each(|(to, &place)| *to = nodes.u.get(place as usize));
+        self.anchor.iter_mut().zip(&self.groups.places).for_each(|(to, &place)| *to = nodes.u.get(place as usize));
         self.quiet_ms = 0.0;
         false
     }
 
     fn copy(&mut self, nodes: &Nodes) {
-        self.u.iter_mut().zip(&self.places).for_each(|(to, &place)| *to = nodes.u.get(place as usize));
+        self.u.iter_mut().zip(&self.groups.places).for_each(|(to, &place)| *to = nodes.u.get(place as usize));
     }
 
     /// Clears the stress memory.
@@ -240,15 +230,8 @@ impl<M: Constitutive<K>, const K: usize, const T: usize> Blocks<M, K, T> {
 }
 
 impl<M: Constitutive<K> + Send, const K: usize, const T: usize> LawElements for Blocks<M, K, T> {
-    fn forces(
-        &mut self,
-        kernel: Kernel,
-        fade: [Fade; 2],
-        averaged_pressure: bool,
-        u: &[Quad],
-        sums: &mut [Quad],
-    ) -> PassReport {
-        let (blocks, memory) = (&self.blocks, &mut self.memory);
+    fn forces(&mut self, kernel: Kernel, how: &Forcing, u: &[Quad], sums: &mut [Quad]) -> PassReport {
+        let (blocks, memory, &Forcing { fade, averaged_pressure, .. }) = (&self.blocks, &mut self.memory, how);
         kernel.run(&mut Forces::<M, K, T> { blocks, memory, fade, u, sums, averaged_pressure, law: PhantomData })
     }
 

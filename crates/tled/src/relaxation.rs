@@ -48,16 +48,13 @@ impl Relaxation {
 
     /// Rejects invalid shares and times.
     pub fn check(&self) -> Result<(), BodyError> {
-        let refuse = |field, value, right| Err(BodyError::Config { field, value, right });
         let total = self.share[0] + self.share[1];
-        if self.share.iter().any(|g| g.is_nan() || *g < 0.0) || total >= 1.0 {
-            return refuse("relaxation.share", total, "each at least 0 and together below 1");
-        }
-        let bad = (0..2).find(|&i| self.share[i] > 0.0 && !(self.time_ms[i] > 0.0 && self.time_ms[i].is_finite()));
-        match bad {
-            Some(i) => refuse("relaxation.time_ms", self.time_ms[i], "over 0 and finite"),
-            None => Ok(()),
-        }
+        let is_right = self.share.iter().all(|g| *g >= 0.0) && total < 1.0;
+        BodyError::check_config(is_right, "relaxation.share", total, "each at least 0 and together below 1")?;
+        let terms = self.share.iter().zip(self.time_ms).filter(|(share, _)| **share > 0.0);
+        let mut times = terms.map(|(_, ms)| (ms > 0.0 && ms.is_finite(), ms));
+        let (is_right, ms) = times.find(|(is_right, _)| !is_right).unwrap_or((true, 0.0));
+        BodyError::check_config(is_right, "relaxation.time_ms", ms, "over 0 and finite")
     }
 
     /// Factors for a step of `dt_ms`; the same bits on every machine.

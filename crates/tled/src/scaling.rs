@@ -55,13 +55,7 @@ impl Scaling {
 
     /// Inertial mass of every node, g.
     pub fn masses_g(&self, body: &Body) -> Vec<f64> {
-        let mut masses = vec![0.0; body.mesh.positions.len()];
-        for (t, corners) in body.mesh.tets.iter().enumerate() {
-            let quarter =
-                0.25 * f64::from(body.material(t).density_g_mm3()) * body.mesh.volume_mm3(t) * self.factors[t];
-            corners.iter().for_each(|&n| masses[n as usize] += quarter);
-        }
-        masses
+        body.lumped_masses_scaled_g(|tet| self.factors[tet])
     }
 }
 

@@ -53,14 +53,14 @@ impl Tled {
     /// Moves the body to equilibrium under `loads`, then sets velocities to zero and restores the
     /// damping. A body without supports is not moved, and `converged` is false.
     pub fn settle(&mut self, loads: &Loads, settling: &Settling) -> Settled {
-        let (rate, lowest) = (self.damping_per_ms, self.lowest_per_ms);
+        let (rate, lowest) = (self.base.damping_per_ms, self.base.lowest_per_ms);
         let (mut slow, mut settled) = (lowest, Settled { left_mm: f32::INFINITY, ..Settled::default() });
-        if !self.supported {
+        if !self.base.supported {
             return settled;
         }
         let mut before = self.elements_and_nodes();
         while settled.steps < settling.steps && !settled.converged {
-            self.damping_per_ms = 2.0 * slow;
+            self.base.damping_per_ms = 2.0 * slow;
             let dt_ms = self.longest_dt_ms();
             for _ in 0..CHECK_STEPS {
                 settled.last = self.step(loads, dt_ms);
@@ -74,14 +74,14 @@ impl Tled {
             settled.converged = settled.left_mm <= settling.tolerance_mm;
             before = now;
         }
-        self.damping_per_ms = rate;
+        self.base.damping_per_ms = rate;
         self.stop();
         settled
     }
 
     /// Longest step that is stable near rest, ms; cut into substeps where the body is not.
     fn longest_dt_ms(&self) -> f32 {
-        self.config.safety * self.bound.at_rest_ms
+        self.base.config.safety * self.base.bound.at_rest_ms
     }
 
     /// Displacement, velocity and force of every node, by place.

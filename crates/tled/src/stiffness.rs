@@ -12,7 +12,7 @@
 //! About 50 operations an element. For Ogden's and Mooney-Rivlin's laws the second term is that of
 //! a neo-Hookean solid with the same moduli; their additional stiffening is in the first term.
 
-use crate::lane::Lane;
+use crate::lane::{Lane, dot, squared};
 use crate::law::{Deformation, Stress};
 
 /// The bound A times rest volume, from the isochoric stress and (μ V, κ V).
@@ -23,7 +23,7 @@ pub(crate) fn stiffness<L: Lane>(stress: &Stress<L>, (mu, kappa): (L, L), d: &De
     let itself = magnitude(xx) + magnitude(yy) + magnitude(zz) + off + off;
     let inverse = d.root * d.root * d.root;
     let power = inverse * inverse * d.root * d.root;
-    let i1 = squared(&d.f[0]) + squared(&d.f[1]) + squared(&d.f[2]);
+    let i1 = squared(&d.f);
     let resistance = kappa * d.resistance().1;
     let volume = kappa + resistance + L::splat(5.0 / 9.0) * mu * i1 * power;
     let turning = magnitude(stress.q + kappa * volume_change) * i1.sqrt();
@@ -40,7 +40,7 @@ pub(crate) fn stiffness_at_rest<L: Lane>(stress: L, (mu, kappa): (L, L)) -> L {
 /// Upper bound of the largest eigenvalue of `CᵀC`, C given by rows.
 #[inline(always)]
 fn largest_eigenvalue<L: Lane>([a, b, c]: &[[L; 3]; 3]) -> L {
-    let (xx, yy, zz) = (squared(a), squared(b), squared(c));
+    let (xx, yy, zz) = (dot(a, a), dot(b, b), dot(c, c));
     let (xy, xz, yz) = (dot(a, b), dot(a, c), dot(b, c));
     let mean = (xx + yy + zz) * L::splat(1.0 / 3.0);
     let (dx, dy, dz) = (xx - mean, yy - mean, zz - mean);
@@ -52,16 +52,6 @@ fn largest_eigenvalue<L: Lane>([a, b, c]: &[[L; 3]; 3]) -> L {
 #[inline(always)]
 fn magnitude<L: Lane>(x: L) -> L {
     x.with_sign_of(L::splat(1.0))
-}
-
-#[inline(always)]
-fn squared<L: Lane>(a: &[L; 3]) -> L {
-    dot(a, a)
-}
-
-#[inline(always)]
-fn dot<L: Lane>(a: &[L; 3], b: &[L; 3]) -> L {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

@@ -1,26 +1,12 @@
-//! The device's solver against the processor's. Without an adapter only the error can be tested,
-//! and is.
+//! The device's solver against the processor's.
 #![cfg(feature = "gpu")]
 
 use trepan_contact::{NodalContact, PlaneContact};
 use trepan_geometry::Vec3;
-use trepan_gpu::{Gpu, GpuError, Prefer};
+use trepan_gpu::{Gpu, adapter_for_tests as device};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
 use trepan_tled::gpu::{GpuTled, GpuTledError};
 use trepan_tled::{Config, Relaxation, Tled};
-
-/// The device, or `None` after checking that its absence is reported with the remedy.
-fn device() -> Option<Gpu> {
-    match Gpu::open(Prefer::Software) {
-        Ok(gpu) => Some(gpu),
-        Err(error) => {
-            println!("no adapter on this machine: {error}");
-            assert_eq!(error, GpuError::NoAdapter);
-            assert!(error.to_string().contains("mesa-vulkan-drivers"));
-            None
-        }
-    }
-}
 
 /// A block of brain, the rest of it tumour.
 fn body() -> Body {

@@ -2,24 +2,12 @@
 
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
-use trepan_gpu::{Gpu, GpuError, Prefer};
+use trepan_gpu::Gpu;
+pub use trepan_gpu::adapter_for_tests as device;
 use trepan_render::{Renderer, SceneData};
 use trepan_volume::{BoneVolume, VoxelVolume};
 
 pub const ISO: i16 = 400;
-
-/// The software device; `None` after checking that a missing driver is reported with its remedy.
-pub fn device() -> Option<Gpu> {
-    match Gpu::open(Prefer::Software) {
-        Ok(gpu) => Some(gpu),
-        Err(error) => {
-            println!("no adapter on this machine: {error}");
-            assert_eq!(error, GpuError::NoAdapter);
-            assert!(error.to_string().contains("mesa-vulkan-drivers"));
-            None
-        }
-    }
-}
 
 /// A grid of `edge`³ voxels of 1 mm around the origin, with a density by world position.
 pub fn volume(edge: usize, hu: impl Fn(DVec3) -> f64) -> VoxelVolume<i16> {

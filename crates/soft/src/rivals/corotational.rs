@@ -20,12 +20,13 @@
 //! collapse. For vibration: it is damped by the step.
 
 use crate::body::Element;
+use crate::bound::dot;
 use crate::method::Descriptor;
 use crate::operator::Hooke;
-use crate::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency};
+use crate::rivals::nodes::{Nodes, known};
+use crate::{Body, BodyError, Loads, NodeState, SoftSolver, StepReport};
 use glam::{DMat3, DQuat, DVec3};
 use trepan_contact::{MAX_PLANES, MAX_SPRINGS, NodalContact};
-use trepan_geometry::Vec3;
 
 /// Settings of the corotational solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,16 +53,9 @@ pub struct Corotational {
     config: Config,
     elements: Vec<Element>,
     turns: Vec<DQuat>,
-    rest: Vec<DVec3>,
-    u: Vec<DVec3>,
-    v: Vec<DVec3>,
-    masses: Vec<f64>,
-    fixed: Vec<bool>,
+    nodes: Nodes,
     hooke: Vec<Hooke>,
-    damping_per_ms: f64,
     system: System,
-    positions: Vec<Vec3>,
-    velocities: Vec<Vec3>,
 }
 
 /// Vectors of conjugate gradients, and the springs that press.
@@ -83,32 +77,17 @@ struct Touch {
 impl Corotational {
     /// Takes a body at rest.
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
-        body.check()?;
-        if config.damping_per_ms.is_some_and(|d| d.is_nan() || d < 0.0) {
-            let value = config.damping_per_ms.unwrap_or_default();
-            return Err(BodyError::Config { field: "damping_per_ms", value, right: "at least 0" });
-        }
-        if !(config.longest_ms > 0.0 && config.longest_ms.is_finite()) {
-            return Err(BodyError::Config {
-                field: "longest_ms",
-                value: config.longest_ms,
-                right: "over 0 and finite",
-            });
-        }
-        let nodes = body.mesh.positions.len();
-        let zero = || vec![DVec3::ZERO; nodes];
-        let critical = || 2.0 * lowest_frequency(body).unwrap_or(0.0);
+        let longest_ms = config.longest_ms;
+        let nodes = Nodes::of(body, config.damping_per_ms, || {
+            let is_right = longest_ms > 0.0 && longest_ms.is_finite();
+            BodyError::check_config(is_right, "longest_ms", longest_ms, "over 0 and finite")
+        })?;
+        let zero = || nodes.u.clone();
         Ok(Self {
             config: *config,
             elements: body.elements(),
             turns: vec![DQuat::IDENTITY; body.mesh.tets.len()],
-            rest: body.mesh.positions.iter().map(|p| p.as_dvec3()).collect(),
-            u: zero(),
-            v: zero(),
-            masses: body.lumped_masses_g(),
-            fixed: body.fixed_mask(),
             hooke: body.materials.iter().map(Hooke::of).collect(),
-            damping_per_ms: config.damping_per_ms.map_or_else(critical, f64::from),
             system: System {
                 right: zero(),
                 residual: zero(),
@@ -116,29 +95,26 @@ impl Corotational {
                 product: zero(),
                 touches: Vec::with_capacity(MAX_SPRINGS + MAX_PLANES),
             },
-            positions: body.mesh.positions.clone(),
-            velocities: vec![Vec3::ZERO; nodes],
+            nodes,
         })
     }
 
     /// Turns every element's frame and puts `M v + h (f_ext - f_int)` into the right side; gives
     /// the number of inverted elements.
     fn balance(&mut self, gravity: DVec3, h: f64) -> u32 {
-        for ((right, v), (m, fixed)) in
-            self.system.right.iter_mut().zip(&self.v).zip(self.masses.iter().zip(&self.fixed))
-        {
+        let Nodes { v, masses, fixed, .. } = &self.nodes;
+        for ((right, v), (m, fixed)) in self.system.right.iter_mut().zip(v).zip(masses.iter().zip(fixed)) {
             *right = if *fixed { DVec3::ZERO } else { (*v + gravity * h) * *m };
         }
         let mut inverted = 0;
         for (Element { corners, shape, material }, turn) in self.elements.iter().zip(&mut self.turns) {
-            let [a, b, c, d] = corners.map(|n| self.u[n as usize]);
-            let f = DMat3::IDENTITY + shape.gradient_of([a, b, c, d]);
+            let f = DMat3::IDENTITY + shape.gradient_of(self.nodes.corners(corners));
             *turn = rotation_of(f, *turn);
             inverted += u32::from(f.determinant() <= 0.0);
             let r = DMat3::from_quat(*turn);
             let strain = r.transpose() * f - DMat3::IDENTITY;
             let stress = self.hooke[usize::from(*material)].stress(strain);
-            scatter(&mut self.system.right, corners, &shape.forces_of(r * stress), -h, &self.fixed);
+            scatter(&mut self.system.right, corners, &shape.forces_of(r * stress), -h, fixed);
         }
         inverted
     }
@@ -146,24 +122,24 @@ impl Corotational {
     /// `product = A along`.
     fn apply(&mut self, h: f64) {
         let System { along, product, touches, .. } = &mut self.system;
-        for ((y, x), (m, fixed)) in product.iter_mut().zip(along.iter()).zip(self.masses.iter().zip(&self.fixed)) {
-            *y = if *fixed { DVec3::ZERO } else { *x * (*m * (1.0 + self.damping_per_ms * h)) };
+        let Nodes { masses, fixed, damping_per_ms, .. } = &self.nodes;
+        for ((y, x), (m, fixed)) in product.iter_mut().zip(along.iter()).zip(masses.iter().zip(fixed)) {
+            *y = if *fixed { DVec3::ZERO } else { *x * (*m * (1.0 + damping_per_ms * h)) };
         }
         for (Element { corners, shape, material }, turn) in self.elements.iter().zip(&self.turns) {
             let r = DMat3::from_quat(*turn);
-            let [a, b, c, d] = corners.map(|n| along[n as usize]);
-            let g = r.transpose() * shape.gradient_of([a, b, c, d]);
+            let g = r.transpose() * shape.gradient_of(corners.map(|n| along[n as usize]));
             let stress = self.hooke[usize::from(*material)].stress(g);
-            scatter(product, corners, &shape.forces_of(r * stress), h * h, &self.fixed);
+            scatter(product, corners, &shape.forces_of(r * stress), h * h, fixed);
         }
         for touch in touches {
-            touch.spread(product, h * touch.rate * touch.along(along), &self.fixed);
+            touch.spread(product, h * touch.rate * touch.along(along), fixed);
         }
     }
 
     /// Conjugate gradients for v from its present value; gives iterations and whether it converged.
     fn solve(&mut self, h: f64) -> (u32, bool) {
-        self.system.along.copy_from_slice(&self.v);
+        self.system.along.copy_from_slice(&self.nodes.v);
         self.apply(h);
         let System { right, residual, along, product, .. } = &mut self.system;
         for ((r, b), y) in residual.iter_mut().zip(right.iter()).zip(product.iter()) {
@@ -179,7 +155,7 @@ impl Corotational {
             self.apply(h);
             let System { residual, along, product, .. } = &mut self.system;
             let share = rr / dot(along, product);
-            self.v.iter_mut().zip(along.iter()).for_each(|(v, p)| *v += *p * share);
+            self.nodes.v.iter_mut().zip(along.iter()).for_each(|(v, p)| *v += *p * share);
             residual.iter_mut().zip(product.iter()).for_each(|(r, y)| *r -= *y * share);
             let next = dot(residual, residual);
             along.iter_mut().zip(residual.iter()).for_each(|(p, r)| *p = *r + *p * (next / rr));
@@ -192,16 +168,14 @@ impl Corotational {
     fn touch(&mut self, loads: &Loads, h: f64) {
         self.system.touches.clear();
         for spring in loads.contacts.all().take(MAX_SPRINGS + MAX_PLANES) {
-            let normal = spring.normal.as_dvec3();
-            let known = spring.nodes().filter(|(n, _)| (*n as usize) < self.u.len());
-            let place: f64 =
-                known.map(|(n, w)| f64::from(w) * (self.rest[n as usize] + self.u[n as usize]).dot(normal)).sum();
+            let (Nodes { rest, u, fixed, .. }, normal) = (&self.nodes, spring.normal.as_dvec3());
+            let place: f64 = known(&spring, u.len()).map(|(n, w)| w * (rest[n] + u[n]).dot(normal)).sum();
             let depth = f64::from(spring.offset_mm) + place;
             let (k, b) = (f64::from(spring.stiffness), f64::from(spring.damping));
             let push = k * depth - b * f64::from(spring.tool_normal_velocity);
             if depth > 0.0 && !spring.is_empty() {
                 let touch = Touch { spring, push, rate: h * k + b };
-                touch.spread(&mut self.system.right, -h * push, &self.fixed);
+                touch.spread(&mut self.system.right, -h * push, fixed);
                 self.system.touches.push(touch);
             }
         }
@@ -212,23 +186,13 @@ impl Corotational {
         let before = self.system.touches.len();
         let System { touches, right, .. } = &mut self.system;
         touches.retain(|touch| {
-            let pulls = touch.force(&self.v) < 0.0;
+            let pulls = touch.force(&self.nodes.v) < 0.0;
             if pulls {
-                touch.spread(right, h * touch.push, &self.fixed);
+                touch.spread(right, h * touch.push, &self.nodes.fixed);
             }
             !pulls
         });
         touches.len() < before
-    }
-
-    fn advance(&mut self, h: f64, report: &mut StepReport) {
-        for n in (0..self.u.len()).filter(|&n| !self.fixed[n]) {
-            let u = self.u[n] + self.v[n] * h;
-            let sound = u.is_finite() && u.length() < 1e4;
-            (self.u[n], self.v[n]) = if sound { (u, self.v[n]) } else { (DVec3::ZERO, DVec3::ZERO) };
-            report.non_finite += u32::from(!sound);
-            (self.positions[n], self.velocities[n]) = ((self.rest[n] + self.u[n]).as_vec3(), self.v[n].as_vec3());
-        }
     }
 }
 
@@ -242,17 +206,14 @@ impl SoftSolver for Corotational {
         if self.let_go(h) {
             (report.iterations, report.converged) = self.solve(h);
         }
-        report.contact_n = self.system.touches.iter().map(|touch| touch.force(&self.v).max(0.0)).sum::<f64>() as f32;
-        self.advance(h, &mut report);
+        report.contact_n =
+            self.system.touches.iter().map(|touch| touch.force(&self.nodes.v).max(0.0)).sum::<f64>() as f32;
+        self.nodes.advance(&mut report, |Nodes { u, v, .. }, n| (u[n] + v[n] * h, v[n]));
         report
     }
 
-    fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    fn velocities(&self) -> &[Vec3] {
-        &self.velocities
+    fn state(&self) -> &NodeState {
+        &self.nodes.state
     }
 
     fn stable_dt_ms(&self) -> f32 {
@@ -263,15 +224,14 @@ impl SoftSolver for Corotational {
 impl Touch {
     /// `Σ w n·x`, mm.
     fn along(&self, x: &[DVec3]) -> f64 {
-        let known = self.spring.nodes().filter(|(n, _)| (*n as usize) < x.len());
-        let sum: DVec3 = known.map(|(n, w)| x[n as usize] * f64::from(w)).sum();
+        let sum: DVec3 = known(&self.spring, x.len()).map(|(n, w)| x[n] * w).sum();
         sum.dot(self.spring.normal.as_dvec3())
     }
 
     /// Adds `scale` times `w n` to free nodes.
     fn spread(&self, to: &mut [DVec3], scale: f64, fixed: &[bool]) {
-        for (n, w) in self.spring.nodes().filter(|(n, _)| fixed.get(*n as usize) == Some(&false)) {
-            to[n as usize] += self.spring.normal.as_dvec3() * (f64::from(w) * scale);
+        for (n, w) in known(&self.spring, fixed.len()).filter(|(n, _)| !fixed[*n]) {
+            to[n] += self.spring.normal.as_dvec3() * (w * scale);
         }
     }
 
@@ -304,10 +264,6 @@ fn rotation_of(f: DMat3, mut turn: DQuat) -> DQuat {
         turn = (DQuat::from_axis_angle(omega / angle, angle) * turn).normalize();
     }
     turn
-}
-
-fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }
 
 /// What the solver says of itself.

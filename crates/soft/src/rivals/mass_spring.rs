@@ -16,30 +16,17 @@
 //! no finer mesh makes it better.
 
 use crate::body::Element;
-use crate::contact::press;
 use crate::energy::cofactor;
 use crate::method::Descriptor;
-use crate::{Body, BodyError, Loads, SoftSolver, StepReport, lowest_frequency};
+use crate::rivals::nodes::Nodes;
+use crate::{Body, BodyError, Loads, NodeState, SoftSolver, StepReport};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
-use trepan_geometry::Vec3;
 
-/// Settings of masses and springs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Config {
-    /// Mass-proportional damping α, 1/ms; `None` = critical for the lowest mode of the elastic
-    /// body.
-    pub damping_per_ms: Option<f32>,
-    /// Share of a bound of the stable step that [`SoftSolver::stable_dt_ms`] gives, over 0 and
-    /// below 1.
-    pub safety: f32,
-}
+pub use crate::rivals::nodes::Config;
 
-impl Default for Config {
-    fn default() -> Self {
-        Self { damping_per_ms: None, safety: 0.9 }
-    }
-}
+/// Settings of [`METHOD`].
+const DEFAULT: Config = Config { damping_per_ms: None, safety: 0.9 };
 
 /// Mass-spring solver.
 pub struct MassSpring {
@@ -47,15 +34,8 @@ pub struct MassSpring {
     elements: Vec<Element>,
     /// κ' by material, MPa.
     pressures: Vec<f64>,
-    rest: Vec<DVec3>,
-    masses: Vec<f64>,
-    fixed: Vec<bool>,
-    u: Vec<DVec3>,
-    v: Vec<DVec3>,
+    nodes: Nodes,
     force: Vec<DVec3>,
-    positions: Vec<Vec3>,
-    velocities: Vec<Vec3>,
-    damping_per_ms: f64,
     stable_dt_ms: f64,
 }
 
@@ -69,30 +49,14 @@ struct Spring {
 impl MassSpring {
     /// Takes a body at rest.
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
-        body.check()?;
-        if !(config.safety > 0.0 && config.safety < 1.0) {
-            return Err(BodyError::Config { field: "safety", value: config.safety, right: "over 0 and below 1" });
-        }
-        if config.damping_per_ms.is_some_and(|d| d.is_nan() || d < 0.0) {
-            let value = config.damping_per_ms.unwrap_or_default();
-            return Err(BodyError::Config { field: "damping_per_ms", value, right: "at least 0" });
-        }
-        let nodes = body.mesh.positions.len();
-        let critical = || 2.0 * lowest_frequency(body).unwrap_or(0.0);
+        let nodes = config.nodes(body)?;
         let made_up = |m: &crate::Material| (m.bulk_mpa() - m.shear_mpa() * 5.0 / 3.0).max(0.0);
         let mut solver = Self {
             springs: springs(body),
             elements: body.elements(),
             pressures: body.materials.iter().map(made_up).collect(),
-            rest: body.mesh.positions.iter().map(|p| p.as_dvec3()).collect(),
-            masses: body.lumped_masses_g(),
-            fixed: body.fixed_mask(),
-            u: vec![DVec3::ZERO; nodes],
-            v: vec![DVec3::ZERO; nodes],
-            force: vec![DVec3::ZERO; nodes],
-            positions: body.mesh.positions.clone(),
-            velocities: vec![Vec3::ZERO; nodes],
-            damping_per_ms: config.damping_per_ms.map_or_else(critical, f64::from),
+            force: nodes.u.clone(),
+            nodes,
             stable_dt_ms: 0.0,
         };
         solver.stable_dt_ms = f64::from(config.safety) * solver.bound_ms(body);
@@ -102,9 +66,9 @@ impl MassSpring {
     /// `2/ω` with ω² no less than the largest: Gershgorin's circles for the springs, single
     /// elements for the pressure.
     fn bound_ms(&self, body: &Body) -> f64 {
-        let mut around = vec![0.0; self.masses.len()];
+        let mut around = vec![0.0; self.nodes.masses.len()];
         self.springs.iter().for_each(|s| s.ends.iter().for_each(|&n| around[n as usize] += 2.0 * s.stiffness));
-        let of_springs = around.iter().zip(&self.masses).map(|(k, m)| k / m).fold(0.0, f64::max);
+        let of_springs = around.iter().zip(&self.nodes.masses).map(|(k, m)| k / m).fold(0.0, f64::max);
         let of_pressure = |t: usize| {
             let slopes: f64 = self.elements[t].shape.gradients.iter().map(|g| g.length_squared()).sum();
             let pressure = self.pressures[usize::from(self.elements[t].material)];
@@ -116,9 +80,10 @@ impl MassSpring {
     /// Forces of springs and pressure; gives the number of inverted elements.
     fn pull(&mut self) -> u32 {
         self.force.fill(DVec3::ZERO);
+        let Nodes { rest, u, .. } = &self.nodes;
         for Spring { ends: [a, b], length_mm, stiffness } in &self.springs {
             let [a, b] = [*a as usize, *b as usize];
-            let apart = (self.rest[b] + self.u[b]) - (self.rest[a] + self.u[a]);
+            let apart = (rest[b] + u[b]) - (rest[a] + u[a]);
             let length = apart.length().max(1e-9);
             let force = apart * (stiffness * (1.0 - length_mm / length));
             self.force[a] += force;
@@ -126,7 +91,7 @@ impl MassSpring {
         }
         let mut inverted = 0;
         for Element { corners, shape, material } in &self.elements {
-            let f = DMat3::IDENTITY + shape.gradient_of(corners.map(|n| self.u[n as usize]));
+            let f = DMat3::IDENTITY + shape.gradient_of(self.nodes.corners(corners));
             let j = f.determinant();
             inverted += u32::from(j <= 0.0);
             let stress = cofactor(f) * (self.pressures[usize::from(*material)] * (j - 1.0));
@@ -136,42 +101,19 @@ impl MassSpring {
         }
         inverted
     }
-
-    fn press(&mut self, loads: &Loads) -> f32 {
-        let state = [&self.positions[..], &self.velocities[..]];
-        let mut add = |n: u32, push: Vec3| self.force[n as usize] += push.as_dvec3();
-        loads.contacts.all().map(|spring| press(&spring, state, &mut add)).sum()
-    }
-
-    fn advance(&mut self, gravity: DVec3, dt: f64, report: &mut StepReport) {
-        let half = 0.5 * self.damping_per_ms * dt;
-        for n in (0..self.u.len()).filter(|&n| !self.fixed[n]) {
-            let pull = gravity + self.force[n] / self.masses[n];
-            let v = (self.v[n] * (1.0 - half) + pull * dt) / (1.0 + half);
-            let u = self.u[n] + v * dt;
-            let sound = v.is_finite() && u.is_finite() && u.length() < 1e4;
-            (self.v[n], self.u[n]) = if sound { (v, u) } else { (DVec3::ZERO, DVec3::ZERO) };
-            report.non_finite += u32::from(!sound);
-            (self.positions[n], self.velocities[n]) = ((self.rest[n] + self.u[n]).as_vec3(), self.v[n].as_vec3());
-        }
-    }
 }
 
 impl SoftSolver for MassSpring {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
         let inverted = self.pull();
         let mut report = StepReport { substeps: 1, converged: true, inverted, ..StepReport::default() };
-        report.contact_n = self.press(loads);
-        self.advance(loads.gravity.as_dvec3(), f64::from(dt_ms), &mut report);
+        report.contact_n = self.nodes.press(loads, &mut self.force);
+        self.nodes.leapfrog(&self.force, loads.gravity, dt_ms, &mut report);
         report
     }
 
-    fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    fn velocities(&self) -> &[Vec3] {
-        &self.velocities
+    fn state(&self) -> &NodeState {
+        &self.nodes.state
     }
 
     fn stable_dt_ms(&self) -> f32 {
@@ -202,13 +144,14 @@ pub const METHOD: Descriptor = Descriptor {
     name: "mass-spring",
     source: "Provot 1995, with a pressure that makes up the bulk modulus",
     is_static: false,
-    build: |body| Ok(Box::new(MassSpring::new(body, &Config::default())?)),
+    build: |body| Ok(Box::new(MassSpring::new(body, &DEFAULT)?)),
 };
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{Material, boxes};
+    use trepan_geometry::Vec3;
 
     #[test]
     fn swelling_has_the_bulk_modulus_of_the_material_and_turning_no_force() {
@@ -216,13 +159,13 @@ mod tests {
         let body = Body::uniform(mesh, vec![], Material::BRAIN);
         let mut solver = MassSpring::new(&body, &Config::default()).unwrap();
         let (strain, turn) = (1e-5, DMat3::from_rotation_y(0.7));
-        solver.u = solver.rest.iter().map(|x| *x * strain).collect();
+        solver.nodes.u = solver.nodes.rest.iter().map(|x| *x * strain).collect();
         solver.pull();
         // The virial of the nodal forces is -3 p V, p = 3 κ ε.
-        let virial: f64 = solver.rest.iter().zip(&solver.force).map(|(x, f)| x.dot(*f)).sum();
+        let virial: f64 = solver.nodes.rest.iter().zip(&solver.force).map(|(x, f)| x.dot(*f)).sum();
         let exact = -9.0 * body.material(0).bulk_mpa() * strain * 8000.0;
         assert!((virial / exact - 1.0).abs() < 1e-3, "{virial} {exact}");
-        solver.u = solver.rest.iter().map(|x| turn * *x - *x).collect();
+        solver.nodes.u = solver.nodes.rest.iter().map(|x| turn * *x - *x).collect();
         solver.pull();
         assert!(solver.force.iter().all(|f| f.length() < 1e-12));
     }

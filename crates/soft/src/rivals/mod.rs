@@ -3,5 +3,6 @@
 pub mod corotational;
 pub mod linear;
 pub mod mass_spring;
+mod nodes;
 pub mod reference;
 pub mod xpbd;

@@ -19,11 +19,12 @@
 //! further on it folds into itself.
 
 use crate::body::Element;
+use crate::energy::{cofactor, squared};
 use crate::method::Descriptor;
-use crate::{Body, BodyError, Loads, Material, SoftSolver, StepReport, lowest_frequency};
+use crate::rivals::nodes::{Nodes, depth_mm, known};
+use crate::{Body, BodyError, Loads, Material, NodeState, SoftSolver, StepReport};
 use glam::{DMat3, DVec3};
 use trepan_contact::NodalContact;
-use trepan_geometry::Vec3;
 
 /// Settings of XPBD.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,15 +47,10 @@ impl Default for Config {
 pub struct Xpbd {
     config: Config,
     elements: Vec<Element>,
-    rest: Vec<DVec3>,
-    u: Vec<DVec3>,
+    nodes: Nodes,
     before: Vec<DVec3>,
-    v: Vec<DVec3>,
     inverse_mass: Vec<f64>,
     moduli: Vec<Moduli>,
-    damping_per_ms: f64,
-    positions: Vec<Vec3>,
-    velocities: Vec<Vec3>,
 }
 
 /// μ and λ' of a material, MPa.
@@ -74,63 +70,51 @@ impl Moduli {
 impl Xpbd {
     /// Takes a body at rest.
     pub fn new(body: &Body, config: &Config) -> Result<Self, BodyError> {
-        body.check()?;
-        if config.damping_per_ms.is_some_and(|d| d.is_nan() || d < 0.0) {
-            let value = config.damping_per_ms.unwrap_or_default();
-            return Err(BodyError::Config { field: "damping_per_ms", value, right: "at least 0" });
-        }
-        if !(config.substep_ms > 0.0 && config.substep_ms.is_finite()) {
-            return Err(BodyError::Config {
-                field: "substep_ms",
-                value: config.substep_ms,
-                right: "over 0 and finite",
-            });
-        }
-        let (nodes, fixed) = (body.mesh.positions.len(), body.fixed_mask());
+        let substep_ms = config.substep_ms;
+        let nodes = Nodes::of(body, config.damping_per_ms, || {
+            let is_right = substep_ms > 0.0 && substep_ms.is_finite();
+            BodyError::check_config(is_right, "substep_ms", substep_ms, "over 0 and finite")
+        })?;
         let inverse = |(m, fixed): (&f64, &bool)| if *fixed { 0.0 } else { 1.0 / m };
-        let critical = || 2.0 * lowest_frequency(body).unwrap_or(0.0);
         Ok(Self {
             config: *config,
             elements: body.elements(),
-            rest: body.mesh.positions.iter().map(|p| p.as_dvec3()).collect(),
-            u: vec![DVec3::ZERO; nodes],
-            before: vec![DVec3::ZERO; nodes],
-            v: vec![DVec3::ZERO; nodes],
-            inverse_mass: body.lumped_masses_g().iter().zip(&fixed).map(inverse).collect(),
+            before: nodes.u.clone(),
+            inverse_mass: nodes.masses.iter().zip(&nodes.fixed).map(inverse).collect(),
             moduli: body.materials.iter().map(Moduli::of).collect(),
-            damping_per_ms: config.damping_per_ms.map_or_else(critical, f64::from),
-            positions: body.mesh.positions.clone(),
-            velocities: vec![Vec3::ZERO; nodes],
+            nodes,
         })
     }
 
     fn substep(&mut self, loads: &Loads, h: f64, report: &mut StepReport) {
-        let keep = (-self.damping_per_ms * h).exp();
-        self.before.copy_from_slice(&self.u);
-        for n in (0..self.u.len()).filter(|&n| self.inverse_mass[n] > 0.0) {
-            self.u[n] += (self.v[n] * keep + loads.gravity.as_dvec3() * h) * h;
+        let Nodes { u, v, damping_per_ms, .. } = &mut self.nodes;
+        let keep = (-*damping_per_ms * h).exp();
+        self.before.copy_from_slice(u);
+        for n in (0..u.len()).filter(|&n| self.inverse_mass[n] > 0.0) {
+            u[n] += (v[n] * keep + loads.gravity.as_dvec3() * h) * h;
         }
         let mut inverted = 0;
         for t in 0..self.elements.len() {
             inverted += u32::from(self.correct(self.elements[t], h) <= 0.0);
         }
         report.inverted = report.inverted.max(inverted);
-        self.press(loads, h, report);
-        for n in (0..self.u.len()).filter(|&n| self.inverse_mass[n] > 0.0) {
-            let sound = self.u[n].is_finite() && self.u[n].length() < 1e4;
-            self.u[n] = if sound { self.u[n] } else { self.before[n] };
+        // Each spring in turn; what one moves, the next one sees.
+        report.contact_n = loads.contacts.all().map(|spring| self.press(&spring, h)).sum();
+        let Nodes { u, v, .. } = &mut self.nodes;
+        for n in (0..u.len()).filter(|&n| self.inverse_mass[n] > 0.0) {
+            let sound = u[n].is_finite() && u[n].length() < 1e4;
+            u[n] = if sound { u[n] } else { self.before[n] };
             report.non_finite += u32::from(!sound);
-            self.v[n] = (self.u[n] - self.before[n]) / h;
+            v[n] = (u[n] - self.before[n]) / h;
         }
     }
 
     /// Moves an element's nodes by both constraints at once; gives its J before.
     fn correct(&mut self, Element { corners, shape, material }: Element, h: f64) -> f64 {
         let Moduli { mu, lambda } = self.moduli[usize::from(material)];
-        let [a, b, c, d] = corners.map(|n| self.u[n as usize]);
-        let f = DMat3::IDENTITY + shape.gradient_of([a, b, c, d]);
-        let (j, cofactor) = (f.determinant(), crate::energy::cofactor(f));
-        let length = crate::energy::squared(f).sqrt().max(1e-9);
+        let f = DMat3::IDENTITY + shape.gradient_of(self.nodes.corners(&corners));
+        let (j, cofactor) = (f.determinant(), cofactor(f));
+        let length = squared(f).sqrt().max(1e-9);
         let stretch = shape.gradients.map(|g| f * g / length);
         let volume = shape.gradients.map(|g| cofactor * g);
         let weights = corners.map(|n| self.inverse_mass[n as usize]);
@@ -141,32 +125,22 @@ impl Xpbd {
         let determinant = dd * hh - dh * dh;
         let (of_d, of_h) = ((dh * excess - hh * length) / determinant, (dh * length - dd * excess) / determinant);
         for i in (0..4).filter(|&i| weights[i] > 0.0) {
-            self.u[corners[i] as usize] += (stretch[i] * of_d + volume[i] * of_h) * weights[i];
+            self.nodes.u[corners[i] as usize] += (stretch[i] * of_d + volume[i] * of_h) * weights[i];
         }
         j
     }
 
-    /// Each spring in turn; what one moves, the next one sees.
-    fn press(&mut self, loads: &Loads, h: f64, report: &mut StepReport) {
-        report.contact_n = loads.contacts.all().map(|spring| self.press_one(&spring, h)).sum();
-    }
-
-    fn press_one(&mut self, contact: &NodalContact, h: f64) -> f32 {
-        let normal = contact.normal.as_dvec3();
-        let nodes = || {
-            contact.nodes().filter(|(n, _)| (*n as usize) < self.rest.len()).map(|(n, w)| (n as usize, f64::from(w)))
-        };
-        let mean: DVec3 = nodes().map(|(n, w)| (self.rest[n] + self.u[n]) * w).sum();
-        let depth = f64::from(contact.offset_mm) + mean.dot(normal);
-        let stiffness = f64::from(contact.stiffness);
+    fn press(&mut self, contact: &NodalContact, h: f64) -> f32 {
+        let Nodes { rest, u, .. } = &mut self.nodes;
+        let count = u.len();
+        let (depth, stiffness) = (depth_mm(contact, count, [rest, u]), f64::from(contact.stiffness));
         if contact.is_empty() || depth <= 0.0 || stiffness <= 0.0 {
             return 0.0;
         }
-        let sum: f64 = nodes().map(|(n, w)| w * w * self.inverse_mass[n]).sum();
+        let sum: f64 = known(contact, count).map(|(n, w)| w * w * self.inverse_mass[n]).sum();
         let multiplier = -depth / (sum + 1.0 / (stiffness * h * h));
-        for (n, w) in contact.nodes().filter(|(n, _)| self.inverse_mass.get(*n as usize).is_some_and(|m| *m > 0.0)) {
-            let n = n as usize;
-            self.u[n] += normal * (f64::from(w) * self.inverse_mass[n] * multiplier);
+        for (n, w) in known(contact, count).filter(|(n, _)| self.inverse_mass[*n] > 0.0) {
+            u[n] += contact.normal.as_dvec3() * (w * self.inverse_mass[n] * multiplier);
         }
         (-multiplier / (h * h)) as f32
     }
@@ -184,18 +158,13 @@ impl SoftSolver for Xpbd {
                 self.substep(loads, f64::from(h), &mut report);
             }
         }
-        for n in 0..self.u.len() {
-            (self.positions[n], self.velocities[n]) = ((self.rest[n] + self.u[n]).as_vec3(), self.v[n].as_vec3());
-        }
+        let Nodes { rest, u, v, state, .. } = &mut self.nodes;
+        (0..u.len()).for_each(|n| state.set(n, rest[n] + u[n], v[n]));
         report
     }
 
-    fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    fn velocities(&self) -> &[Vec3] {
-        &self.velocities
+    fn state(&self) -> &NodeState {
+        &self.nodes.state
     }
 
     fn stable_dt_ms(&self) -> f32 {

@@ -2,6 +2,7 @@
 //! `step.wgsl` declares them.
 
 use crate::layout::Layout;
+use crate::nodes::inverse_masses_and_weights;
 use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_soft::Body;
 
@@ -46,11 +47,7 @@ impl DeviceState {
     /// Nodes at rest, of masses by mesh node, g, which may be more than what their weight comes
     /// from.
     pub fn new(gpu: &Gpu, body: &Body, layout: &Layout, masses: &[f64]) -> Result<Self, GpuError> {
-        let (weights, fixed) = (body.lumped_masses_g(), body.fixed_mask());
-        let inverse = |&n: &u32| if fixed[n as usize] { 0.0 } else { (1.0 / masses[n as usize]) as f32 };
-        let inverse_mass: Vec<f32> = layout.node_at.iter().map(inverse).collect();
-        let share = |&n: &u32| (weights[n as usize] / masses[n as usize]) as f32;
-        let weight: Vec<f32> = layout.node_at.iter().map(share).collect();
+        let (inverse_mass, weight) = inverse_masses_and_weights(body, layout, masses);
         let nodes: Vec<[f32; 4]> = inverse_mass.iter().zip(&weight).map(|(&m, &w)| [m, w, 0.0, 0.0]).collect();
         Ok(Self {
             step: Buffer::zeroed(gpu, "step", 1)?,

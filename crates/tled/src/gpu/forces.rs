@@ -13,29 +13,25 @@
 use crate::block::omega2_over_stiffness;
 use crate::config::Config;
 use crate::gpu::device_state::DeviceState;
+use crate::gpu::groups;
+use crate::gpu::pass::Pass;
 use crate::gpu::topology::Topology;
-use crate::gpu::{LANES, groups};
 use crate::law::{Constitutive, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff};
 use crate::layout::{Layout, kind};
 use crate::scaling::Scaling;
-use trepan_gpu::{Bindings, Buffer, Dispatches, Gpu, GpuError, Kernel, Slot};
+use trepan_gpu::Slot::{Storage, StorageMut, Uniform};
+use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_shaders::TLED_FORCES;
 use trepan_soft::{Body, Law};
 
 /// Elements on the device and the kernels of their forces.
 pub(crate) struct Forces {
-    laws: Vec<OfLaw>,
+    /// A pass for each law.
+    pub laws: Vec<Pass>,
     /// Gradients, and constants beside them, three rows an element.
     pub rows: Buffer<[f32; 4]>,
     /// Forces by slot, N.
     pub slots: Buffer<[f32; 4]>,
-}
-
-/// The elements of one law.
-struct OfLaw {
-    kernel: Kernel,
-    bindings: Bindings,
-    count: u32,
 }
 
 impl Forces {
@@ -56,39 +52,25 @@ impl Forces {
         let relaxes = !config.relaxation.is_none();
         let memory = Buffer::<f32>::zeroed(gpu, "memory", if relaxes { 12 * count } else { 1 })?;
         let slots = Buffer::zeroed(gpu, "forces", 4 * count)?;
-        let mut wanted = [Slot::Storage; 9];
-        (wanted[0], wanted[4], wanted[6], wanted[8]) =
-            (Slot::Uniform, Slot::StorageMut, Slot::StorageMut, Slot::Uniform);
         let (mut laws, mut first) = (Vec::new(), 0u32);
         for tets in layout.tet_at.chunk_by(|&a, &b| kind(body, a) == kind(body, b)) {
             let range = Buffer::from_slice(gpu, "range", &[[first, tets.len() as u32, 0, 0]])?;
             let text = text(body, tets[0], relaxes, config.averaged_pressure);
-            let kernel = Kernel::new(gpu, "forces", &text, "main", &wanted)?;
-            let bindings = kernel.bind(
-                gpu,
-                &[
-                    (&state.step).into(),
-                    (&topology.corners).into(),
-                    (&rows).into(),
-                    (&state.u).into(),
-                    (&slots).into(),
-                    (&more).into(),
-                    (&memory).into(),
-                    (&topology.volume_change).into(),
-                    (&range).into(),
-                ],
-            )?;
-            laws.push(OfLaw { kernel, bindings, count: tets.len() as u32 });
+            let bound = [
+                (Uniform, (&state.step).into()),
+                (Storage, (&topology.corners).into()),
+                (Storage, (&rows).into()),
+                (Storage, (&state.u).into()),
+                (StorageMut, (&slots).into()),
+                (Storage, (&more).into()),
+                (StorageMut, (&memory).into()),
+                (Storage, (&topology.volume_change).into()),
+                (Uniform, (&range).into()),
+            ];
+            laws.push(Pass::new(gpu, "forces", &text, &bound, tets.len())?);
             first += tets.len() as u32;
         }
         Ok(Self { laws, rows, slots })
-    }
-
-    /// Adds the pass to a submission.
-    pub fn dispatch(&self, to: &mut Dispatches) {
-        for law in &self.laws {
-            to.dispatch(&law.kernel, &law.bindings, [law.count.div_ceil(LANES), 1, 1]);
-        }
     }
 }
 

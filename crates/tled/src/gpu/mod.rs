@@ -43,28 +43,25 @@
 
 mod device_state;
 mod forces;
+mod pass;
 mod press;
 mod topology;
 mod update;
 mod volumes;
 
-use crate::bound::Bound;
+use crate::base::{Base, left_of};
 use crate::config::Config;
-use crate::layout::Layout;
 use crate::node_groups::NodeGroups;
 use crate::nodes::{keep_and_gain, kick_ms};
-use crate::scaling::Scaling;
-use crate::tled::{NEARLY, SUBSTEP_SAFETY, damping_rate, lowest_per_ms};
 use device_state::{DeviceState, Step};
 use forces::Forces;
+use pass::Pass;
 use press::Press;
 use topology::Topology;
 use trepan_contact::PlaneContact;
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, GpuError};
-use trepan_soft::{Body, BodyError, Loads, SoftSolver, StepReport, Stiffness};
-use update::Update;
-use volumes::Volumes;
+use trepan_soft::{Body, BodyError, Loads, NodeState, SoftSolver, StepReport};
 
 /// Threads in a workgroup, as in the shaders.
 pub(crate) const LANES: u32 = 64;
@@ -93,23 +90,15 @@ pub enum GpuTledError {
 /// Total Lagrangian explicit solver of one body on the graphics device.
 pub struct GpuTled {
     gpu: Gpu,
-    config: Config,
+    base: Base,
     state: DeviceState,
-    volumes: Option<Volumes>,
+    /// Passes of averaged pressure.
+    volumes: Option<[Pass; 2]>,
     forces: Forces,
     press: Press,
-    update: Update,
-    layout: Layout,
-    rest: Vec<Vec3>,
-    positions: Vec<Vec3>,
-    velocities: Vec<Vec3>,
-    bound: Bound,
-    damping_per_ms: f32,
-    max_displacement_mm: f32,
+    update: Pass,
     elements: u32,
     node_groups: u32,
-    /// Length of the last step, ms; 0 before the first one.
-    elapsed_ms: f32,
     /// Largest growth of an element's ω² between the last two reads, 1/ms².
     growth: f32,
     submitted: u32,
@@ -119,48 +108,35 @@ pub struct GpuTled {
 impl GpuTled {
     /// Takes a body at rest to the device.
     pub fn new(gpu: &Gpu, body: &Body, config: &Config) -> Result<Self, GpuTledError> {
-        body.check()?;
-        config.check()?;
-        let extent = (body.mesh.bounds().max - body.mesh.bounds().min).max_element();
-        let scaling = Scaling::of(body, config.mass_scaling);
-        let stiffness = Stiffness::of(body).with_masses(scaling.masses_g(body));
-        let damping_per_ms = damping_rate(config.damping, lowest_per_ms(body, config.damping, &stiffness));
-        refuse(body, config, damping_per_ms)?;
-        let (layout, averages) = (Layout::of(body), config.averaged_pressure);
-        let node_groups = NodeGroups::of(body, &layout, averages);
-        let state = DeviceState::new(gpu, body, &layout, stiffness.masses_g())?;
-        let topology = Topology::new(gpu, body, &layout, &node_groups, averages)?;
-        let forces = Forces::new(gpu, (body, &layout, &scaling), config, &state, &topology)?;
-        let volumes = || Volumes::new(gpu, (body, &layout, &node_groups), &state, &topology, &forces);
+        let (base, masses, scaling) = Base::of(body, config)?;
+        refuse(&base)?;
+        let (layout, averages) = (&base.layout, config.averaged_pressure);
+        let node_groups = NodeGroups::of(body, layout, averages);
+        let state = DeviceState::new(gpu, body, layout, &masses)?;
+        let topology = Topology::new(gpu, body, layout, &node_groups, averages)?;
+        let forces = Forces::new(gpu, (body, layout, &scaling), config, &state, &topology)?;
+        let volumes = || volumes::passes(gpu, (body, layout, &node_groups), &state, &topology, &forces);
         let press = Press::new(gpu, &state, &topology, &forces)?;
         Ok(Self {
             volumes: averages.then(volumes).transpose()?,
-            update: Update::new(gpu, &state, &topology, &forces, &press)?,
+            update: update::pass(gpu, &state, &topology, &forces, &press)?,
             gpu: gpu.clone(),
-            config: *config,
-            rest: body.mesh.positions.clone(),
-            positions: body.mesh.positions.clone(),
-            velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
-            bound: Bound::of(body, &stiffness, &scaling),
-            max_displacement_mm: config.max_displacement * extent,
             elements: body.mesh.tets.len() as u32,
             node_groups: node_groups.place_of.len() as u32,
-            elapsed_ms: 0.0,
             growth: 0.0,
             submitted: 0,
             fault: None,
-            damping_per_ms,
+            base,
             state,
             forces,
             press,
-            layout,
         })
     }
 
     /// Submits `count` steps of the longest stable length under the same loads, and gives that
     /// length, ms. Does not wait.
     pub fn steps(&mut self, loads: &Loads, count: u32) -> f32 {
-        let dt_ms = self.longest_ms();
+        let dt_ms = self.base.longest_ms(self.growth);
         self.submit(loads, dt_ms, count);
         dt_ms
     }
@@ -171,9 +147,10 @@ impl GpuTled {
         let (u, v) = (self.state.u.read(&self.gpu)?, self.state.v.read(&self.gpu)?);
         let noticed = self.state.noticed.read(&self.gpu)?;
         let contact_n = self.press.pressure.read(&self.gpu)?[0];
-        for (place, &node) in self.layout.node_at.iter().enumerate() {
-            self.positions[node as usize] = self.rest[node as usize] + Vec3::from_slice(&u[place]);
-            self.velocities[node as usize] = Vec3::from_slice(&v[place]);
+        let Base { layout, rest, state, .. } = &mut self.base;
+        for (place, node) in layout.node_at.iter().map(|&n| n as usize).enumerate() {
+            state.positions[node] = rest[node] + Vec3::from_slice(&u[place]);
+            state.velocities[node] = Vec3::from_slice(&v[place]);
         }
         if self.submitted > 0 {
             self.growth = noticed.iter().map(|n| f32::from_bits(n[3])).fold(0.0, f32::max);
@@ -199,16 +176,7 @@ impl GpuTled {
 
     /// Length of a step that is just stable at rest, ms, without any margin.
     pub fn bound_ms(&self) -> f32 {
-        self.bound.at_rest_ms
-    }
-
-    /// The stable bound as the elements were at the last read.
-    fn bound_now_ms(&self) -> f32 {
-        self.bound.deformed_ms(self.growth)
-    }
-
-    fn longest_ms(&self) -> f32 {
-        self.stable_dt_ms().min(SUBSTEP_SAFETY * self.bound_now_ms())
+        self.base.bound.at_rest_ms
     }
 
     /// Submits `count` steps of one length. Where the last step had another length, the first of
@@ -219,16 +187,16 @@ impl GpuTled {
         if !presses {
             self.press.pressure.write(&self.gpu, 0, &[0.0]);
         }
-        let first = u32::from(self.elapsed_ms != dt_ms).min(count);
-        for (elapsed_ms, count) in [(self.elapsed_ms, first), (dt_ms, count - first)] {
-            let [one, two] = self.config.relaxation.fade(elapsed_ms);
-            [step.keep, step.gain] = keep_and_gain(self.damping_per_ms, kick_ms(elapsed_ms, dt_ms));
+        let first = u32::from(self.base.elapsed_ms != dt_ms).min(count);
+        for (elapsed_ms, count) in [(self.base.elapsed_ms, first), (dt_ms, count - first)] {
+            let [one, two] = self.base.config.relaxation.fade(elapsed_ms);
+            [step.keep, step.gain] = keep_and_gain(self.base.damping_per_ms, kick_ms(elapsed_ms, dt_ms));
             (step.fade_keep, step.fade_gain) = ([one.keep, two.keep], [one.gain, two.gain]);
             self.state.step.write(&self.gpu, 0, &[step]);
             self.run(count, presses);
         }
         if count > 0 {
-            self.elapsed_ms = dt_ms;
+            self.base.elapsed_ms = dt_ms;
         }
         self.submitted += count;
     }
@@ -241,12 +209,9 @@ impl GpuTled {
             let mut recorder = self.gpu.record("tled");
             recorder.compute("tled", |to| {
                 for _ in 0..now {
-                    if let Some(volumes) = &self.volumes {
-                        volumes.dispatch(to);
-                    }
-                    self.forces.dispatch(to);
+                    self.volumes.iter().flatten().chain(&self.forces.laws).for_each(|pass| pass.dispatch(to));
                     if presses {
-                        self.press.dispatch(to);
+                        self.press.pass.dispatch(to);
                     }
                     self.update.dispatch(to);
                 }
@@ -259,15 +224,16 @@ impl GpuTled {
     /// The uniform of a step; hands the springs over.
     fn numbers(&mut self, loads: &Loads, dt_ms: f32) -> Step {
         let (springs, planes) = self.hand_over(loads);
+        let Base { config, layout, max_displacement_mm, .. } = &self.base;
         Step {
-            gravity: (loads.gravity - self.config.balanced_gravity).to_array(),
+            gravity: (loads.gravity - config.balanced_gravity).to_array(),
             dt: dt_ms,
-            max_speed: self.config.max_speed,
-            max_displacement: self.max_displacement_mm,
+            max_speed: config.max_speed,
+            max_displacement: *max_displacement_mm,
             springs,
             planes,
             elements: self.elements,
-            nodes: self.layout.node_at.len() as u32,
+            nodes: layout.node_at.len() as u32,
             node_groups: self.node_groups,
             ..Step::default()
         }
@@ -275,8 +241,8 @@ impl GpuTled {
 
     /// Gives the device every spring and plane; gives how many springs and planes there are.
     fn hand_over(&mut self, loads: &Loads) -> (u32, u32) {
-        let at_rest = |n: u32| self.rest.get(n as usize).copied().unwrap_or_default();
-        let (list, place_of) = (&mut self.press.list, &self.layout.place_of);
+        let at_rest = |n: u32| self.base.rest.get(n as usize).copied().unwrap_or_default();
+        let (list, place_of) = (&mut self.press.list, &self.base.layout.place_of);
         list.clear();
         for spring in loads.contacts.iter() {
             let rest_depth = spring.offset_mm + spring.mean(at_rest).dot(spring.normal);
@@ -292,8 +258,8 @@ impl GpuTled {
 
 impl SoftSolver for GpuTled {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
-        let (dt_ms, most) = (dt_ms.max(0.0), self.config.substeps);
-        let needed = (dt_ms / self.longest_ms() * NEARLY).ceil().max(1.0);
+        let (dt_ms, most) = (dt_ms.max(0.0), self.base.config.substeps);
+        let needed = self.base.substeps(dt_ms, self.growth);
         let count = if most == 0 { 1.0 } else { needed.min(most as f32) };
         let each_ms = if most == 0 { dt_ms } else { dt_ms / needed };
         let before = self.submitted;
@@ -301,8 +267,7 @@ impl SoftSolver for GpuTled {
         match self.read() {
             Ok(mut report) => {
                 report.substeps -= before;
-                let left_ms = dt_ms - each_ms * count;
-                report.skipped_ms = if left_ms > 1e-5 * dt_ms { left_ms } else { 0.0 };
+                report.skipped_ms = left_of(dt_ms, dt_ms - each_ms * count);
                 self.fault = None;
                 report
             }
@@ -313,25 +278,21 @@ impl SoftSolver for GpuTled {
         }
     }
 
-    fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    fn velocities(&self) -> &[Vec3] {
-        &self.velocities
+    fn state(&self) -> &NodeState {
+        &self.base.state
     }
 
     fn stable_dt_ms(&self) -> f32 {
-        self.config.safety * self.bound.elements_ms()
+        self.base.stable_dt_ms()
     }
 }
 
 /// Refuses what the kernels lack.
-fn refuse(body: &Body, config: &Config, damping_per_ms: f32) -> Result<(), GpuTledError> {
-    if config.still_mm > 0.0 {
+fn refuse(base: &Base) -> Result<(), GpuTledError> {
+    if base.config.still_mm > 0.0 {
         return Err(GpuTledError::Unsupported { field: "still_mm", right: "every element in every step (0)" });
     }
-    if damping_per_ms > 0.0 && !body.is_supported() {
+    if base.damping_per_ms > 0.0 && !base.supported {
         let right = "undamped bodies where no fixed nodes hold them";
         return Err(GpuTledError::Unsupported { field: "damping", right });
     }

@@ -2,15 +2,17 @@
 
 use crate::gpu::device_state::DeviceState;
 use crate::gpu::forces::Forces;
+use crate::gpu::pass::Pass;
 use crate::gpu::topology::Topology;
 use trepan_contact::{MAX_NODES, MAX_PLANES, MAX_SPRINGS, NodalContact, PlaneContact};
-use trepan_gpu::{Bindings, Buffer, Dispatches, Gpu, GpuError, Kernel, Slot};
+use trepan_gpu::Slot::{Storage, StorageMut, Uniform};
+use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_shaders::TLED_PRESS;
 
 /// The contacts on the device.
 pub(crate) struct Press {
-    kernel: Kernel,
-    bindings: Bindings,
+    /// Of one workgroup.
+    pub pass: Pass,
     springs: Buffer<Spring>,
     touched: Buffer<[u32; 4]>,
     /// Forces of the springs by place, N; of meaning where a node is marked.
@@ -108,34 +110,28 @@ impl List {
 
 impl Press {
     pub fn new(gpu: &Gpu, state: &DeviceState, topology: &Topology, forces: &Forces) -> Result<Self, GpuError> {
-        let mut wanted = [Slot::Storage; 9];
-        wanted[0] = Slot::Uniform;
-        wanted[7..].fill(Slot::StorageMut);
-        let kernel = Kernel::new(gpu, "press", TLED_PRESS, "main", &wanted)?;
         // Room for 64 more: idle lanes read past the last spring's nodes.
         let most = MAX_SPRINGS * MAX_NODES + MAX_PLANES;
         let touched = Buffer::zeroed(gpu, "touched", most + MAX_NODES)?;
         let springs = Buffer::zeroed(gpu, "springs", MAX_SPRINGS + MAX_PLANES)?;
         let pushed = Buffer::zeroed(gpu, "pushed", state.u.len())?;
         let pressure = Buffer::zeroed(gpu, "pressure", 1)?;
-        let bindings = kernel.bind(
-            gpu,
-            &[
-                (&state.step).into(),
-                (&springs).into(),
-                (&touched).into(),
-                (&state.u).into(),
-                (&state.v).into(),
-                (&topology.starts).into(),
-                (&forces.slots).into(),
-                (&pushed).into(),
-                (&pressure).into(),
-            ],
-        )?;
+        let bound = [
+            (Uniform, (&state.step).into()),
+            (Storage, (&springs).into()),
+            (Storage, (&touched).into()),
+            (Storage, (&state.u).into()),
+            (Storage, (&state.v).into()),
+            (Storage, (&topology.starts).into()),
+            (Storage, (&forces.slots).into()),
+            (StorageMut, (&pushed).into()),
+            (StorageMut, (&pressure).into()),
+        ];
+        let pass = Pass::new(gpu, "press", TLED_PRESS, &bound, 1)?;
         let springs_of = Vec::with_capacity(MAX_SPRINGS + MAX_PLANES);
         let list = List { springs: springs_of, touched: Vec::with_capacity(most) };
         let marks = Marks { marked: Vec::with_capacity(most), pushed_in: vec![0; state.u.len()], hand_over: 0 };
-        Ok(Self { kernel, bindings, springs, touched, pushed, pressure, list, marks })
+        Ok(Self { pass, springs, touched, pushed, pressure, list, marks })
     }
 
     /// Hands the list over, and marks of the nodes where they changed.
@@ -157,10 +153,5 @@ impl Press {
         marked.retain(|&place| pushed_in[place as usize] != *hand_over);
         marked.drain(..).for_each(|place| state.mark(gpu, place, false));
         marked.extend(touched.iter().map(|[place, ..]| *place));
-    }
-
-    /// Adds the pass to a submission.
-    pub fn dispatch(&self, to: &mut Dispatches) {
-        to.dispatch(&self.kernel, &self.bindings, [1, 1, 1]);
     }
 }

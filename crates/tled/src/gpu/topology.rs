@@ -10,7 +10,7 @@
 //! ```
 
 use crate::layout::Layout;
-use crate::node_groups::NodeGroups;
+use crate::node_groups::{NodeGroups, Runs};
 use trepan_gpu::{Buffer, Gpu, GpuError};
 use trepan_soft::Body;
 
@@ -22,18 +22,8 @@ pub(crate) struct Topology {
     pub starts: Buffer<u32>,
     /// By group: mean `J - 1` around it; one number without averaged pressure.
     pub volume_change: Buffer<f32>,
-    /// The same on this side, for averaged nodal pressure.
+    /// Slots of the corners, element by element, and the runs that they make, on this side.
     pub runs: Runs,
-}
-
-/// Slots of the corners, and the runs that they make.
-pub(crate) struct Runs {
-    /// Where a group's run of slots begins, one more than node_groups.
-    pub of_groups: Vec<u32>,
-    /// The element of every slot.
-    pub owners: Vec<u32>,
-    of_places: Vec<u32>,
-    slots: Vec<[u32; 4]>,
 }
 
 impl Topology {
@@ -45,10 +35,10 @@ impl Topology {
         averages: bool,
     ) -> Result<Self, GpuError> {
         let groups_of: Vec<[u32; 4]> = layout.tet_at.iter().map(|&t| node_groups.of_tet(body, layout, t)).collect();
-        let runs = Runs::of(&groups_of, node_groups, layout.node_at.len());
+        let runs = node_groups.runs(groups_of.iter().flatten().copied(), layout.node_at.len());
         let place = |group: u32| node_groups.place_of[group as usize];
         let mut corners: Vec<[u32; 4]> = groups_of.iter().map(|tet| tet.map(place)).collect();
-        corners.extend_from_slice(&runs.slots);
+        corners.extend_from_slice(runs.slots.as_chunks().0);
         if averages {
             corners.extend_from_slice(&groups_of);
         }
@@ -61,25 +51,11 @@ impl Topology {
     }
 }
 
-impl Runs {
-    fn of(groups_of: &[[u32; 4]], node_groups: &NodeGroups, places: usize) -> Self {
-        let mut of_groups = vec![0u32; node_groups.place_of.len() + 1];
-        groups_of.iter().flatten().for_each(|&group| of_groups[group as usize + 1] += 1);
-        (1..of_groups.len()).for_each(|i| of_groups[i] += of_groups[i - 1]);
-        let (mut next, mut owners) = (of_groups.clone(), vec![0u32; 4 * groups_of.len()]);
-        let mut slots = Vec::with_capacity(groups_of.len());
-        for (element, tet) in groups_of.iter().enumerate() {
-            slots.push(tet.map(|group| {
-                let slot = next[group as usize];
-                next[group as usize] += 1;
-                owners[slot as usize] = element as u32;
-                slot
-            }));
-        }
-        let first_of = |place: usize| of_groups[node_groups.place_of.partition_point(|&p| (p as usize) < place)];
-        let of_places = (0..=places).map(first_of).collect();
-        Self { of_groups, owners, of_places, slots }
-    }
+/// The element of every slot.
+pub(crate) fn owners(runs: &Runs) -> Vec<u32> {
+    let mut owners = vec![0; runs.slots.len()];
+    runs.slots.iter().enumerate().for_each(|(corner, &slot)| owners[slot as usize] = corner as u32 / 4);
+    owners
 }
 
 #[cfg(test)]
@@ -98,14 +74,15 @@ mod tests {
             let node_groups = NodeGroups::of(&body, &layout, apart);
             let groups_of: Vec<[u32; 4]> =
                 layout.tet_at.iter().map(|&t| node_groups.of_tet(&body, &layout, t)).collect();
-            let runs = Runs::of(&groups_of, &node_groups, layout.node_at.len());
+            let runs = node_groups.runs(groups_of.iter().flatten().copied(), layout.node_at.len());
+            let (owners, corners) = (owners(&runs), runs.slots.as_chunks::<4>().0);
             let mut taken = vec![false; 4 * groups_of.len()];
-            for (element, (tet, slots)) in groups_of.iter().zip(&runs.slots).enumerate() {
+            for (element, (tet, slots)) in groups_of.iter().zip(corners).enumerate() {
                 for (&group, &slot) in tet.iter().zip(slots) {
                     let place = node_groups.place_of[group as usize] as usize;
                     assert!((runs.of_groups[group as usize]..runs.of_groups[group as usize + 1]).contains(&slot));
                     assert!((runs.of_places[place]..runs.of_places[place + 1]).contains(&slot));
-                    assert_eq!(runs.owners[slot as usize] as usize, element);
+                    assert_eq!(owners[slot as usize] as usize, element);
                     assert!(!std::mem::replace(&mut taken[slot as usize], true));
                 }
             }

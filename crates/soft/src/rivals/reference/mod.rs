@@ -25,13 +25,14 @@
 mod cells;
 mod rank_one;
 
+use crate::bound::dot;
 use crate::factor::Factor;
 use crate::method::Descriptor;
-use crate::{Body, BodyError, Law, Loads, Material, SoftSolver, StepReport, SurfacePressure};
+use crate::rivals::nodes::{depth_mm, known};
+use crate::{Body, BodyError, Law, Loads, Material, NodeState, SoftSolver, StepReport, SurfacePressure};
 use cells::{Cell, Cells};
 use glam::{DMat3, DVec3};
-use rank_one::{RankOne, dot};
-use trepan_geometry::Vec3;
+use rank_one::RankOne;
 
 pub use cells::Order;
 
@@ -71,8 +72,7 @@ pub struct Reference {
     acceleration: Vec<DVec3>,
     pressure: SurfacePressure,
     pushed: Vec<DVec3>,
-    positions: Vec<Vec3>,
-    velocities: Vec<Vec3>,
+    state: NodeState,
 }
 
 /// Energy, forces and state of one trial displacement.
@@ -112,15 +112,19 @@ impl Reference {
             pushed: zero(),
             pressure: SurfacePressure::default(),
             cells,
-            positions: body.mesh.positions.clone(),
-            velocities: vec![Vec3::ZERO; body.mesh.positions.len()],
+            state: NodeState::at_rest(&body.mesh),
         })
+    }
+
+    /// Number of the mesh's nodes; those in the middle of edges follow.
+    fn count(&self) -> usize {
+        self.state.positions.len()
     }
 
     /// Moves a fixed node to `displacement` from its rest position, mm; the next step finds the
     /// equilibrium around it.
     pub fn prescribe(&mut self, node: u32, displacement: DVec3) {
-        if self.cells.fixed.get(node as usize) == Some(&true) && (node as usize) < self.positions.len() {
+        if self.cells.fixed.get(node as usize) == Some(&true) && (node as usize) < self.count() {
             self.u[node as usize] = displacement;
         }
     }
@@ -136,23 +140,22 @@ impl Reference {
 
     /// Puts pressure on some triangles; those that name nodes outside the mesh are left out.
     pub fn set_pressure(&mut self, mut pressure: SurfacePressure) {
-        let nodes = self.positions.len();
+        let nodes = self.count();
         pressure.triangles.retain(|t| t.iter().all(|&n| (n as usize) < nodes));
         self.pressure = pressure;
     }
 
     /// Displacements of the mesh's nodes from their rest positions, mm.
     pub fn displacements(&self) -> &[DVec3] {
-        &self.u[..self.positions.len()]
+        &self.u[..self.count()]
     }
 
     /// Force that the support exerts on each node of the mesh, N; zero at free nodes in
     /// equilibrium.
     pub fn reactions(&self, loads: &Loads) -> Vec<DVec3> {
         let mut reactions = self.trial(&self.u, loads, None, false).residual;
-        let middles = reactions.split_off(self.positions.len());
-        for ((ends, force), fixed) in self.cells.ends.iter().zip(middles).zip(&self.cells.fixed[self.positions.len()..])
-        {
+        let middles = reactions.split_off(self.count());
+        for ((ends, force), fixed) in self.cells.ends.iter().zip(middles).zip(&self.cells.fixed[self.count()..]) {
             ends.iter().filter(|_| *fixed).for_each(|&n| reactions[n as usize] += force * 0.5);
         }
         reactions
@@ -202,19 +205,17 @@ impl Reference {
 
     fn press(&self, u: &[DVec3], loads: &Loads, trial: &mut Trial) {
         for (place, contact) in loads.contacts.all().enumerate() {
-            let normal = contact.normal.as_dvec3();
-            let nodes =
-                || contact.nodes().map(|(n, w)| (n as usize, f64::from(w))).filter(|(n, _)| *n < self.positions.len());
-            let mean: DVec3 = nodes().map(|(n, w)| (self.cells.rest[n] + u[n]) * w).sum();
-            let depth = f64::from(contact.offset_mm) + mean.dot(normal);
+            let depth = depth_mm(&contact, self.count(), [&self.cells.rest, u]);
             let stiffness = f64::from(contact.stiffness);
-            if !contact.is_empty() && depth > 0.0 && stiffness > 0.0 {
-                trial.pressing.push(place);
-                trial.energy += 0.5 * stiffness * depth * depth;
-                trial.contact_n += stiffness * depth;
-                trial.scale = trial.scale.max(stiffness * depth);
-                nodes().for_each(|(n, w)| trial.residual[n] += normal * (stiffness * depth * w));
+            if contact.is_empty() || !(depth > 0.0 && stiffness > 0.0) {
+                continue;
             }
+            trial.pressing.push(place);
+            trial.energy += 0.5 * stiffness * depth * depth;
+            trial.contact_n += stiffness * depth;
+            trial.scale = trial.scale.max(stiffness * depth);
+            let normal = contact.normal.as_dvec3();
+            known(&contact, self.count()).for_each(|(n, w)| trial.residual[n] += normal * (stiffness * depth * w));
         }
     }
 
@@ -243,10 +244,9 @@ impl Reference {
         let mut terms: Vec<RankOne> = Vec::with_capacity(trial.pressing.len());
         let pressing = |place: &usize| trial.pressing.contains(place);
         for contact in loads.contacts.all().enumerate().filter(|(place, _)| pressing(place)).map(|(_, c)| c) {
-            let known = |n: u32| (n as usize) < self.positions.len() && !self.cells.fixed[n as usize];
             let mut v = vec![DVec3::ZERO; trial.residual.len()];
-            let normal = contact.normal.as_dvec3();
-            contact.nodes().filter(|(n, _)| known(*n)).for_each(|(n, w)| v[n as usize] += normal * f64::from(w));
+            let (normal, free) = (contact.normal.as_dvec3(), |(n, _): &(usize, f64)| !self.cells.fixed[*n]);
+            known(&contact, self.count()).filter(free).for_each(|(n, w)| v[n] += normal * w);
             let mut solved = v.clone();
             self.factor.solve(&mut solved);
             terms.iter().for_each(|term| term.correct(&mut solved));
@@ -296,7 +296,7 @@ impl Reference {
     /// Computes the forces of pressure anew; gives by how much they changed, as a share of the
     /// largest.
     fn push(&mut self) -> f64 {
-        let count = self.positions.len();
+        let count = self.count();
         let now: Vec<DVec3> = self.cells.rest[..count].iter().zip(&self.u).map(|(x, u)| *x + *u).collect();
         let mut pushed = vec![DVec3::ZERO; self.u.len()];
         self.pressure.add_to(&now, &mut pushed);
@@ -323,19 +323,12 @@ impl Reference {
             self.acceleration[n] = acceleration;
         }
     }
-
-    fn publish(&mut self) {
-        for n in 0..self.positions.len() {
-            self.positions[n] = (self.cells.rest[n] + self.u[n]).as_vec3();
-            self.velocities[n] = self.velocity[n].as_vec3();
-        }
-    }
 }
 
 impl SoftSolver for Reference {
     fn step(&mut self, loads: &Loads, dt_ms: f32) -> StepReport {
         let mut report = StepReport { substeps: 1, ..StepReport::default() };
-        let count = self.positions.len();
+        let count = self.count();
         for (i, &[a, b]) in self.cells.ends.iter().enumerate().filter(|(i, _)| self.cells.fixed[count + i]) {
             self.u[count + i] = (self.u[a as usize] + self.u[b as usize]) * 0.5;
         }
@@ -351,16 +344,12 @@ impl SoftSolver for Reference {
         if let Some(inertia) = inertia {
             self.arrive(&inertia, h);
         }
-        self.publish();
+        (0..count).for_each(|n| self.state.set(n, self.cells.rest[n] + self.u[n], self.velocity[n]));
         report
     }
 
-    fn positions(&self) -> &[Vec3] {
-        &self.positions
-    }
-
-    fn velocities(&self) -> &[Vec3] {
-        &self.velocities
+    fn state(&self) -> &NodeState {
+        &self.state
     }
 
     fn stable_dt_ms(&self) -> f32 {

@@ -1,6 +1,7 @@
 //! A spring on many nodes beside a sparse matrix: one rank-one term, taken in after the solution
 //! (Sherman and Morrison 1950).
 
+use crate::bound::dot;
 use glam::DVec3;
 
 /// `k v vᵀ` in the matrix: v, the solution for it without this term, and `1/k + v·solved`.
@@ -16,9 +17,4 @@ impl RankOne {
         let share = dot(&self.v, x) / self.below;
         x.iter_mut().zip(&self.solved).for_each(|(x, c)| *x -= *c * share);
     }
-}
-
-/// Sum of the products of two fields.
-pub(super) fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }
