@@ -38,11 +38,11 @@ struct Spring {
 var<workgroup> sums: array<vec2f, 64>;
 
 // Force of a spring that is so deep, mm, on nodes that come at this speed, mm/ms.
-fn pressed(spring: Spring, depth: f32, coming: f32) -> f32 {
+fn pressed(spring: Spring, depth: f32, coming: f32, touches: bool) -> f32 {
     let held = 1.0 + now.gain * (spring.stiffness * now.dt + spring.damping) * spring.compliance;
     let force = (spring.stiffness * (depth + now.dt * coming) + spring.damping * (coming - spring.tool_velocity)) / held;
     let finite = (bitcast<u32>(force) & 0x7f800000u) != 0x7f800000u;
-    return select(0.0, max(force, 0.0), depth > 0.0 && finite);
+    return select(0.0, max(force, 0.0), touches && finite);
 }
 
 // Velocity that a node would have after the step under its elements, weight, and the springs so
@@ -84,7 +84,7 @@ fn free_velocity(at: vec4u) -> vec3f {
             workgroupBarrier();
         }
         let depth = spring.rest_depth + sums[0].x;
-        let force = pressed(spring, depth, sums[0].y);
+        let force = pressed(spring, depth, sums[0].y, depth > 0.0);
         total += force;
         if mine && depth > 0.0 {
             let slip = velocity - spring.lateral_velocity;
@@ -103,7 +103,11 @@ fn free_velocity(at: vec4u) -> vec3f {
         let depth = plane.rest_depth + dot(u[at.x].xyz, plane.normal);
         let velocity = free_velocity(at);
         let coming = dot(velocity, plane.normal);
-        let force = pressed(plane, depth, coming);
+        // A plane acts from the moment that its node reaches it, within the step.
+        let ahead = depth + now.dt * coming;
+        var reached = plane;
+        if depth <= 0.0 { reached.damping *= ahead / (now.dt * coming); }
+        let force = pressed(reached, depth, coming, depth > 0.0 || ahead > 0.0);
         of_planes += force;
         let braking = plane.damping * clamp(depth / SLIDING_FULL_MM, 0.0, 1.0);
         let brake = braking / (1.0 + now.gain * bitcast<f32>(at.z) * braking);
