@@ -8,7 +8,7 @@
 
 use crate::DeviceError;
 use libloading::Library;
-use std::ffi::OsStr;
+use std::ffi::{CStr, OsStr, c_char};
 use std::path::Path;
 
 /// A loaded library.
@@ -95,6 +95,18 @@ macro_rules! functions {
 }
 
 pub(crate) use functions;
+
+/// Copies a library's text.
+///
+/// # Safety
+/// `text` is null or a C string.
+pub(crate) unsafe fn owned(text: *const c_char) -> String {
+    if text.is_null() {
+        return "no description".to_owned();
+    }
+    // SAFETY: not null; the caller guarantees the rest.
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
+}
 
 #[cfg(test)]
 mod tests {

@@ -9,9 +9,9 @@ use crate::run::stop::Stop;
 use crate::run::watch::{Watched, Watching};
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
-use trepan_haptics::script::{self, Script, Site};
+use trepan_haptics::script::{self, Script, ScriptError, Site};
 use trepan_haptics::{
-    Capabilities, Clutch, DeviceName, HapticDevice, ThreadedDevice, Watch, Workspace, hardware, mouse, simulated,
+    Capabilities, Clutch, DeviceName, HapticDevice, Motion, Opened, Setting, ThreadedDevice, Watch, Workspace, mouse,
 };
 use trepan_link::Recording;
 
@@ -37,39 +37,33 @@ impl OpenDevice {
         rate_hz: f32,
         stop: &Stop,
     ) -> Result<Self, SessionError> {
-        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| scripted(name, options, plan);
+        let script = |name: Option<&str>| scripted(name.unwrap_or(program.script()), options, plan);
         let mut hand = Self { device: None, pointer: None, watch: None, watching: None };
         if let Some(name) = &options.watch {
-            let (watched, watching) = Watched::open(name, script(program.script())?.at(0.0), stop)?;
+            let (watched, watching) = Watched::open(name, script(None).map_err(refused)?.at(0.0), stop)?;
             hand.watching = Some(watching);
             hand.device = Some(Box::new(watched));
-            return Ok(hand);
+        } else if name.recording().is_none() {
+            let workspace = workspace(&plan.site, options.device_scale);
+            let opened = opened(name, &Setting { workspace, script: &script }, rate_hz)?;
+            (hand.device, hand.watch, hand.pointer) = (Some(opened.device), opened.watch, opened.pointer);
         }
-        hand.device = match name {
-            DeviceName::Script(name) => Some(Box::new(script(name)?)),
-            DeviceName::Simulated(name) => {
-                let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-                Some(Box::new(simulated::Simulated::new(config, grip, Box::new(script(name)?))))
-            }
-            DeviceName::Mouse => {
-                let (pointer, mouse) = mouse::pair(script(program.script())?.at(0.0).world_from_tool);
-                hand.pointer = Some(pointer);
-                Some(Box::new(mouse))
-            }
-            DeviceName::Replay(_) => None,
-            hardware => match hardware::open(hardware, workspace(&plan.site, options.device_scale)) {
-                Some(opened) => {
-                    let opened = opened.map_err(|f| fault(&f))?;
-                    check_rate(&opened.device.capabilities(), rate_hz)?;
-                    hand.watch = Some(opened.watch);
-                    Some(Box::new(Clutch::new(opened.device)))
-                }
-                None => None,
-            },
-        };
         Ok(hand)
     }
+}
+
+/// Opens a device; hardware gets a clutch, and must be as fast as the session.
+fn opened(name: &DeviceName, setting: &Setting<'_>, rate_hz: f32) -> Result<Opened, SessionError> {
+    let mut opened = name.open(setting).map_err(refused)?;
+    if name.is_hardware() {
+        check_rate(&opened.device.capabilities(), rate_hz)?;
+        opened.device = Box::new(Clutch::new(opened.device));
+    }
+    Ok(opened)
+}
+
+fn refused(fault: impl std::fmt::Display) -> SessionError {
+    SessionError::Device(fault.to_string())
 }
 
 /// An open device of the second hand.
@@ -84,25 +78,14 @@ impl SecondDevice {
     /// Opens the device. Hardware runs on its own thread, so that its link never delays the first
     /// hand.
     pub fn open(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
-        let fault = |fault: &dyn std::fmt::Display| SessionError::Device(fault.to_string());
-        let script = |name: &str| scripted(name, options, plan);
-        let (device, watch): (Box<dyn HapticDevice>, _) = match name {
-            DeviceName::Script(operation) => (Box::new(script(operation)?), None),
-            DeviceName::Simulated(operation) => {
-                let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-                (Box::new(simulated::Simulated::new(config, grip, Box::new(script(operation)?))), None)
-            }
-            hardware_name => {
-                let mut beside = workspace(&plan.site, options.device_scale);
-                // With both hands in the middle of their workspaces the tools are side by side.
-                beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
-                let opened = hardware::open(hardware_name, beside)
-                    .ok_or_else(|| unfit(hardware_name))?
-                    .map_err(|f| fault(&f))?;
-                check_rate(&opened.device.capabilities(), rate_hz)?;
-                (Box::new(ThreadedDevice::new(Box::new(Clutch::new(opened.device)))), Some(opened.watch))
-            }
-        };
+        let script = |name: Option<&str>| scripted(name.unwrap_or_default(), options, plan);
+        let mut beside = workspace(&plan.site, options.device_scale);
+        // With both hands in the middle of their workspaces the tools are side by side.
+        beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
+        let Opened { mut device, watch, .. } = opened(name, &Setting { workspace: beside, script: &script }, rate_hz)?;
+        if name.is_hardware() {
+            device = Box::new(ThreadedDevice::new(device));
+        }
         Ok(Self { device, watch })
     }
 }
@@ -111,11 +94,10 @@ impl SecondDevice {
 const SCRIPT_S: (f64, f64) = (20.0, 75.0);
 
 /// Makes the script of an operation that follows a plan.
-fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, SessionError> {
+fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, ScriptError> {
     let usual_s = if name == "flap" { SCRIPT_S.1 } else { SCRIPT_S.0 };
     let how = script::Plan { outline: plan.outline.clone(), ..script::Plan::default() };
-    let script = Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(usual_s), &how);
-    script.map_err(|fault| SessionError::Device(fault.to_string()))
+    Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(usual_s), &how)
 }
 
 /// Refuses a tick rate above that of the device.
@@ -134,10 +116,10 @@ const SIDE_MM: f32 = 30.0;
 pub fn second_name(first: &DeviceName, options: &Options) -> Result<Option<DeviceName>, SessionError> {
     let Some(text) = &options.second_device else { return Ok(None) };
     let name: DeviceName = text.parse().map_err(|fault: trepan_haptics::NameError| second(fault.to_string()))?;
-    if matches!(first, DeviceName::Replay(_)) {
+    if first.recording().is_some() {
         return Err(second("a replay brings its second hand along: leave this flag out".into()));
     }
-    if matches!(name, DeviceName::Mouse | DeviceName::Replay(_)) {
+    if matches!(name.kind().motion, Motion::Window | Motion::Recording) {
         return Err(unfit(&name));
     }
     if name.may_be(first) {
@@ -169,15 +151,12 @@ fn workspace(site: &Site, scale: f32) -> Workspace {
 
 /// Name of the requested device; by default the mouse with a window, else the program's script.
 pub fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
-    let script = || DeviceName::Script(program.script().into());
     let name = match &options.device {
-        Some(text) => {
-            text.parse().map_err(|fault: trepan_haptics::NameError| SessionError::Device(fault.to_string()))?
-        }
-        None if windowed => DeviceName::Mouse,
-        None => script(),
+        Some(text) => text.parse().map_err(|fault: trepan_haptics::NameError| refused(fault))?,
+        None if windowed => DeviceName::MOUSE,
+        None => DeviceName::scripted(program.script()),
     };
-    if name == DeviceName::Mouse && !windowed {
+    if name.kind().motion == Motion::Window && !windowed {
         let text =
             "the mouse needs a window: leave out --headless on a machine with a display, or give --device script:NAME";
         return Err(SessionError::Device(text.into()));
@@ -228,7 +207,7 @@ impl DeviceLimits {
             axes_driven: number(AXES) as u8,
             moving_mass_g: number(MASS),
             damping: number(DAMPING),
-            ..Watched::CAPABILITIES
+            ..Capabilities::PASSIVE
         };
         Self { device, scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0) }
     }

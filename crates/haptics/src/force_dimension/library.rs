@@ -5,8 +5,8 @@
 #![expect(unsafe_code, reason = "calls into the vendor's C library")]
 
 use crate::DeviceError;
-use crate::dynamic::{Loaded, functions};
-use std::ffi::{CStr, c_char, c_int, c_uint};
+use crate::dynamic::{Loaded, functions, owned};
+use std::ffi::{c_char, c_int, c_uint};
 use std::path::Path;
 
 const NAMES: &[&str] = if cfg!(windows) {
@@ -220,14 +220,4 @@ impl Drd {
         // SAFETY: the library returns null or a C string of its own that lives as long as it does.
         unsafe { owned((self.functions.dhdErrorGetLastStr)()) }
     }
-}
-
-/// # Safety
-/// `text` is null or a C string.
-unsafe fn owned(text: *const c_char) -> String {
-    if text.is_null() {
-        return "no description".to_owned();
-    }
-    // SAFETY: not null; the caller guarantees the rest.
-    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }

@@ -7,8 +7,8 @@
 
 use super::codes;
 use crate::DeviceError;
-use crate::dynamic::{Loaded, functions};
-use std::ffi::{CStr, CString, c_char, c_ulong, c_void};
+use crate::dynamic::{Loaded, functions, owned};
+use std::ffi::{CString, c_char, c_ulong, c_void};
 use std::path::Path;
 
 /// Scheduler rate, Hz.
@@ -63,7 +63,7 @@ functions! {
 }
 
 /// Most errors taken from the stack at once.
-const MAX_ERRORS: usize = 64;
+pub(super) const MAX_ERRORS: usize = 64;
 
 /// libHD.
 #[derive(Clone, Copy)]
@@ -225,14 +225,4 @@ extern "system" fn tick<T: Ticked>(data: *mut c_void) -> u32 {
     // SAFETY: `data` is what was given to `schedule`; nothing else accesses it until `stop`.
     let ticked = unsafe { &mut *data.cast::<T>() };
     ticked.tick()
-}
-
-/// # Safety
-/// `text` is null or a C string.
-unsafe fn owned(text: *const c_char) -> String {
-    if text.is_null() {
-        return "no description".to_owned();
-    }
-    // SAFETY: not null; the caller guarantees the rest.
-    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }

@@ -7,7 +7,7 @@
 //! device does not affect the others.
 
 use super::codes;
-use super::library::{Hd, RATE_HZ, Ticked};
+use super::library::{Hd, MAX_ERRORS, RATE_HZ, Ticked};
 use crate::{Fault, STALE_MS, ramp::Ramp};
 use trepan_geometry::Wrench;
 use triple_buffer::{Input, Output};
@@ -16,8 +16,6 @@ use triple_buffer::{Input, Output};
 const TICK_MS: f32 = 1e3 / RATE_HZ as f32;
 /// Ticks without a new command after which the force is cut.
 pub(super) const SILENT_TICKS: u32 = 10;
-/// Most errors taken from the stack at once.
-const MAX_ERRORS: usize = 64;
 
 /// One sample of the device, in its own axes: mm, mm/ms, rad/ms.
 #[derive(Clone, Copy, Debug, Default)]

@@ -25,8 +25,9 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::simulated::{self, Simulated};
-use trepan_haptics::{Capabilities, DeviceName, HapticDevice, NameError, Status, Watch, Workspace, hardware};
+use trepan_haptics::{
+    Capabilities, DeviceName, HapticDevice, Motion, NameError, Opened, Setting, Status, Watch, Workspace,
+};
 use trial::{Part, Trial};
 
 /// Largest number of ticks in which the force fades at the end.
@@ -64,25 +65,16 @@ pub fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, SessionE
 
 fn open(name: &str, end_ms: f64) -> Result<Subject, String> {
     let name: DeviceName = name.parse().map_err(|fault: NameError| fault.to_string())?;
-    let script = |script: &str| {
-        let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Y, bone_mm: 6.0, brain_mm: 8.0 };
-        Script::named(script, &site, end_ms).map_err(|fault| fault.to_string())
-    };
-    let software = |device: Box<dyn HapticDevice>| Ok(Subject { name: name.clone(), device, watch: None });
-    match &name {
-        DeviceName::Script(operation) => software(Box::new(script(operation)?)),
-        DeviceName::Simulated(operation) => {
-            let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-            software(Box::new(Simulated::new(config, grip, Box::new(script(operation)?))))
-        }
-        _ => match hardware::open(&name, Workspace::default()) {
-            Some(opened) => {
-                let hardware::Hardware { device, watch } = opened.map_err(|fault| fault.to_string())?;
-                Ok(Subject { name, device, watch: Some(watch) })
-            }
-            None => Err(format!("{name} cannot be tested; `--list-devices` shows the devices that can")),
-        },
+    if !matches!(name.kind().motion, Motion::Hardware | Motion::Script) {
+        return Err(format!("{name} cannot be tested; `--list-devices` shows the devices that can"));
     }
+    let script = |script: Option<&str>| {
+        let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Y, bone_mm: 6.0, brain_mm: 8.0 };
+        Script::named(script.unwrap_or_default(), &site, end_ms)
+    };
+    let opened = name.open(&Setting { workspace: Workspace::default(), script: &script });
+    let Opened { device, watch, .. } = opened.map_err(|fault| fault.to_string())?;
+    Ok(Subject { name, device, watch })
 }
 
 /// Result of the haptic loop.

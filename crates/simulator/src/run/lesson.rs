@@ -161,7 +161,6 @@ impl Teacher {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::watch::Watched;
     use trepan_geometry::{Quat, ToolState};
     use trepan_haptics::Status;
 
@@ -178,7 +177,7 @@ mod tests {
         fn apply(&mut self, _wrench: GuardedWrench) {}
 
         fn capabilities(&self) -> Capabilities {
-            Capabilities { name: "all pressed".into(), ..Watched::CAPABILITIES }
+            Capabilities { name: "all pressed".into(), ..Capabilities::PASSIVE }
         }
 
         fn close(&mut self) {}

@@ -31,7 +31,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use trepan_contact::GuardedWrench;
-use trepan_geometry::{Buttons, ToolState, Vec3};
+use trepan_geometry::{Buttons, ToolState};
 use trepan_haptics::{Capabilities, HapticDevice, Reading, Status};
 use trepan_link::cell::{Reader, cell};
 use trepan_link::topics::{Publisher, Session, Subscriber, TopicError};
@@ -131,20 +131,6 @@ fn first_tick(name: &str, ticks: &mut Subscriber<TickRecord>, stop: &Stop) -> Re
 }
 
 impl Watched {
-    /// Capabilities of a device without motors or limits.
-    pub const CAPABILITIES: Capabilities = Capabilities {
-        name: String::new(),
-        peak_force_n: 0.0,
-        continuous_force_n: 0.0,
-        rate_hz: 1000.0,
-        workspace_mm: Vec3::INFINITY,
-        axes_driven: 0,
-        position_resolution_mm: 0.0,
-        delay_ticks: 0,
-        moving_mass_g: 0.0,
-        damping: 0.0,
-    };
-
     /// Connects to the session of a name and waits for its first tick; the tool begins at `start`.
     pub fn open(name: &str, start: ToolState, stop: &Stop) -> Result<(Self, Watching), SessionError> {
         let fault = |fault: TopicError| SessionError::Usage(format!("--watch {name}: {fault}"));
@@ -196,7 +182,7 @@ impl HapticDevice for Watched {
     fn apply(&mut self, _wrench: GuardedWrench) {}
 
     fn capabilities(&self) -> Capabilities {
-        Self::CAPABILITIES
+        Capabilities::PASSIVE
     }
 
     fn close(&mut self) {
