@@ -181,7 +181,7 @@ impl std::fmt::Display for DeviceName {
 pub fn no_argument(name: &str, argument: Option<&str>) -> Result<Option<String>, NameError> {
     match argument {
         None => Ok(None),
-        Some(extra) => Err(NameError::Superfluous { name: name.to_owned(), extra: extra.to_owned() }),
+        Some(extra) => Err(NameError::Argument(format!("{name:?} takes no {extra:?}; write {name}"))),
     }
 }
 
@@ -196,36 +196,14 @@ pub enum NameError {
         /// The names that there are.
         known: String,
     },
-    /// The script of a scripted or simulated device is unknown.
-    #[error("device {name:?}: the scripts are {}", script::NAMES.join(", "))]
-    UnknownScript {
-        /// The requested name.
-        name: String,
-    },
-    /// The name needs something after its colon.
-    #[error("device {name:?} lacks its {what}; write {name}:{example}")]
-    Incomplete {
-        /// The requested name.
-        name: String,
-        /// What is missing.
-        what: &'static str,
-        /// An example of it.
-        example: &'static str,
-    },
-    /// The device needs a number.
-    #[error("device {name}:{text} goes by a number; write {name}:N with N from 0 to 127, as --list-devices does")]
-    NoNumber {
-        /// The device.
-        name: String,
-        /// The text after the colon.
-        text: String,
-    },
-    /// The device takes nothing after a colon.
-    #[error("device {name:?} takes no {extra:?}; write {name}")]
-    Superfluous {
-        /// The device.
-        name: String,
-        /// The text after the colon.
-        extra: String,
-    },
+    /// What follows the name's colon is missing or invalid.
+    #[error("device {0}")]
+    Argument(String),
+}
+
+impl NameError {
+    /// The name lacks what must follow its colon.
+    pub fn lacks(name: &str, what: &str, example: &str) -> Self {
+        Self::Argument(format!("{name:?} lacks its {what}; write {name}:{example}"))
+    }
 }

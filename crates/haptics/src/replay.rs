@@ -15,7 +15,7 @@ pub static DEVICE: Descriptor = Descriptor {
     source: "a session's recording",
     motion: Motion::Recording,
     argument: |name, file| match file {
-        None => Err(NameError::Incomplete { name: name.to_owned(), what: "file", example: "session.mcap" }),
+        None => Err(NameError::lacks(name, "file", "session.mcap")),
         Some(file) => Ok(Some(file.to_owned())),
     },
     id: |file| file,

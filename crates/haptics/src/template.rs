@@ -50,7 +50,7 @@ pub static DEVICE: Descriptor = Descriptor {
     source: "imaginary protocol over UDP",
     motion: Motion::Hardware,
     argument: |name, address| match address {
-        None => Err(NameError::Incomplete { name: name.to_owned(), what: "address", example: "192.168.0.7:9000" }),
+        None => Err(NameError::lacks(name, "address", "192.168.0.7:9000")),
         Some(address) => Ok(Some(address.to_owned())),
     },
     id: |address| address,
@@ -198,13 +198,11 @@ impl HapticDevice for Template {
             name: "template".to_owned(),
             peak_force_n: 3.0,
             continuous_force_n: 1.0,
-            rate_hz: 1000.0,
             workspace_mm: Vec3::splat(100.0),
             axes_driven: 3,
             position_resolution_mm: 0.01,
             delay_ticks: 1,
-            moving_mass_g: 0.0,
-            damping: 0.0,
+            ..Capabilities::PASSIVE
         }
     }
 

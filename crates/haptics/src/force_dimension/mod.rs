@@ -40,7 +40,10 @@ pub static DEVICE: Descriptor = Descriptor {
     argument: |name, text| {
         let number = |text: &str| match text.parse::<u8>() {
             Ok(number) if number < 128 => Ok(number.to_string()),
-            _ => Err(NameError::NoNumber { name: name.to_owned(), text: text.to_owned() }),
+            _ => {
+                let remedy = format!("write {name}:N with N from 0 to 127, as --list-devices does");
+                Err(NameError::Argument(format!("{name}:{text} goes by a number; {remedy}")))
+            }
         };
         text.map(number).transpose()
     },
@@ -294,8 +297,6 @@ fn capabilities(drd: &Drd, id: i8) -> Capabilities {
         workspace_mm: Vec3::new(workspace_mm.y, workspace_mm.z, workspace_mm.x),
         axes_driven: if drd.has_active_wrist(id) { 6 } else { 3 },
         position_resolution_mm: resolution_mm,
-        delay_ticks: 0,
-        moving_mass_g: 0.0,
-        damping: 0.0,
+        ..Capabilities::PASSIVE
     }
 }

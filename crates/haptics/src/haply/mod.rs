@@ -185,13 +185,11 @@ impl HapticDevice for Haply {
             name: self.name.clone(),
             peak_force_n: 10.0,
             continuous_force_n: 2.0,
-            rate_hz: 1000.0,
             workspace_mm: Vec3::splat(300.0),
             axes_driven: 3,
             position_resolution_mm: 0.1,
             delay_ticks: 2,
-            moving_mass_g: 0.0,
-            damping: 0.0,
+            ..Capabilities::PASSIVE
         }
     }
 

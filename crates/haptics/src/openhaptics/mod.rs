@@ -103,11 +103,11 @@ impl OpenHaptics {
         let (commands, command_out) = triple_buffer(&Command::default());
         let open = || {
             let device = init(&hd, wanted)?;
-            hd.make_current(device);
+            (hd.hdMakeCurrentDevice)(device);
             let drives_torque = hd.integer(codes::OUTPUT_DOF) >= 6;
             let capabilities = capabilities(&hd, drives_torque);
             let calibration_style = lowest_bit(hd.integer(codes::CALIBRATION_STYLE));
-            hd.enable(codes::FORCE_OUTPUT);
+            (hd.hdEnable)(codes::FORCE_OUTPUT);
             let ramp = Ramp::new(watch.clone());
             let servo = Servo::new(device, drives_torque, calibration_style, sample_in, command_out, ramp);
             Ok((servo, (device, capabilities)))
@@ -197,7 +197,7 @@ fn init(hd: &Hd, wanted: Option<&str>) -> Result<u32, DeviceError> {
         let error = hd.drain_errors();
         match device {
             Some(device) if error == codes::SUCCESS => return Ok(device),
-            Some(device) => hd.disable_device(device),
+            Some(device) => (hd.hdDisableDevice)(device),
             None => {}
         }
         reason = hd.describe(error);

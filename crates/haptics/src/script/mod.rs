@@ -52,9 +52,12 @@ pub static DEVICE: Descriptor = Descriptor {
 /// The argument of a device that a script moves: one of [`NAMES`].
 pub(crate) fn operation_name(device: &str, operation: Option<&str>) -> Result<Option<String>, NameError> {
     match operation {
-        None => Err(NameError::Incomplete { name: device.to_owned(), what: "operation", example: NAMES[0] }),
+        None => Err(NameError::lacks(device, "operation", NAMES[0])),
         Some(name) if NAMES.contains(&name) => Ok(Some(name.to_owned())),
-        Some(name) => Err(NameError::UnknownScript { name: format!("{device}:{name}") }),
+        Some(name) => {
+            let name = format!("{device}:{name}");
+            Err(NameError::Argument(format!("{name:?}: the scripts are {}", NAMES.join(", "))))
+        }
     }
 }
 
