@@ -6,8 +6,7 @@
 use std::error::Error;
 use trepan_geometry::{Buttons, Vec3};
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::simulated::{Config, HandModel, Simulated};
-use trepan_haptics::{DeviceName, GuardedWrench, HapticDevice, Status, Workspace, hardware, list};
+use trepan_haptics::{DeviceName, GuardedWrench, Setting, Status, Workspace, list};
 
 const DURATION_MS: f64 = 8000.0;
 
@@ -17,7 +16,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let name: DeviceName = std::env::args().nth(1).as_deref().unwrap_or("script:craniotomy").parse()?;
     let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 };
-    let mut device = open(&name, &site)?;
+    let script = |script: Option<&str>| Script::named(script.unwrap_or("craniotomy"), &site, DURATION_MS);
+    let mut device = name.open(&Setting { workspace: Workspace::default(), script: &script })?.device;
     let able = device.capabilities();
     println!("\n{}: {:.1} N peak, {} axes driven", able.name, able.peak_force_n, able.axes_driven);
     println!("{:>8} {:>24} {:>12} {:>6}", "ms", "tip, mm", "speed, mm/s", "pedal");
@@ -35,18 +35,4 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     device.close();
     Ok(())
-}
-
-fn open(name: &DeviceName, site: &Site) -> Result<Box<dyn HapticDevice>, Box<dyn Error>> {
-    if let Some(opened) = hardware::open(name, Workspace::default()) {
-        return Ok(opened?.device);
-    }
-    Ok(match name {
-        DeviceName::Script(script) => Box::new(Script::named(script, site, DURATION_MS)?),
-        DeviceName::Simulated(script) => {
-            let intent = Script::named(script, site, DURATION_MS)?;
-            Box::new(Simulated::new(Config::default(), HandModel::LIGHT, Box::new(intent)))
-        }
-        _ => return Err(format!("{name} needs a window or a file: this example has neither").into()),
-    })
 }

@@ -72,19 +72,22 @@ pub struct Capabilities {
 
 impl Capabilities {
     /// A device without motors or limits, read at 1 kHz.
+    pub const PASSIVE: Self = Self {
+        name: String::new(),
+        peak_force_n: 0.0,
+        continuous_force_n: 0.0,
+        rate_hz: 1000.0,
+        workspace_mm: Vec3::INFINITY,
+        axes_driven: 0,
+        position_resolution_mm: 0.0,
+        delay_ticks: 0,
+        moving_mass_g: 0.0,
+        damping: 0.0,
+    };
+
+    /// [`Capabilities::PASSIVE`] with a name.
     pub fn passive(name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            peak_force_n: 0.0,
-            continuous_force_n: 0.0,
-            rate_hz: 1000.0,
-            workspace_mm: Vec3::INFINITY,
-            axes_driven: 0,
-            position_resolution_mm: 0.0,
-            delay_ticks: 0,
-            moving_mass_g: 0.0,
-            damping: 0.0,
-        }
+        Self { name: name.into(), ..Self::PASSIVE }
     }
 
     /// Limits the wall `wanted` to what stays stable on this device in a light grip, read every

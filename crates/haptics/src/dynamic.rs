@@ -8,7 +8,7 @@
 
 use crate::DeviceError;
 use libloading::Library;
-use std::ffi::OsStr;
+use std::ffi::{CStr, OsStr, c_char};
 use std::path::Path;
 
 /// A loaded library.
@@ -71,22 +71,31 @@ impl Loaded {
     }
 }
 
-/// Declares a struct of function pointers, all required, each looked up by name in the library.
+/// Declares a library: a struct of function pointers, all required, each looked up by name. Those
+/// under `safe` take numbers only, and an invalid one only raises an error.
 macro_rules! functions {
-    ($(#[$doc:meta])* $table:ident { $($name:ident($($argument:ty),*) $(-> $result:ty)?;)* }) => {
+    ($(#[$doc:meta])* $table:ident {
+        safe { $($plain:ident($($number:ty),*) $(-> $answer:ty)?;)* }
+        $($name:ident($($argument:ty),*) $(-> $result:ty)?;)*
+    }) => {
         $(#[$doc])*
         #[expect(non_snake_case, reason = "the vendor's names")]
         #[derive(Clone, Copy)]
-        struct $table {
+        pub(super) struct $table {
+            $(pub(super) $plain: extern "system" fn($($number),*) $(-> $answer)?,)*
             $($name: unsafe extern "system" fn($($argument),*) $(-> $result)?,)*
         }
 
         impl $table {
-            fn load(library: &$crate::dynamic::Loaded) -> Result<Self, $crate::DeviceError> {
+            fn of(library: &$crate::dynamic::Loaded) -> Result<Self, $crate::DeviceError> {
                 Ok(Self {
                     $(
                         // SAFETY: the types are those of the vendor's header.
                         $name: unsafe { library.symbol(stringify!($name)) }?,
+                    )*
+                    $(
+                        // SAFETY: the types are those of the vendor's header, which accepts any number.
+                        $plain: unsafe { library.symbol(stringify!($plain)) }?,
                     )*
                 })
             }
@@ -95,6 +104,18 @@ macro_rules! functions {
 }
 
 pub(crate) use functions;
+
+/// Copies a library's text.
+///
+/// # Safety
+/// `text` is null or a C string.
+pub(crate) unsafe fn owned(text: *const c_char) -> String {
+    if text.is_null() {
+        return "no description".to_owned();
+    }
+    // SAFETY: not null; the caller guarantees the rest.
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
+}
 
 #[cfg(test)]
 mod tests {

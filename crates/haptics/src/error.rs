@@ -1,7 +1,7 @@
 //! Why a device cannot be opened, and what to install or do.
 
 /// A device could not be opened.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DeviceError {
     /// The vendor's library is missing or does not load.
     #[error("cannot load {library}: {reason}; {install}")]
@@ -35,4 +35,14 @@ pub enum DeviceError {
         /// What to do.
         remedy: &'static str,
     },
+    /// The operation that moves a virtual device cannot be made.
+    #[error(transparent)]
+    Script(#[from] crate::script::ScriptError),
+}
+
+impl DeviceError {
+    /// The device cannot be opened.
+    pub fn open(device: impl Into<String>, reason: impl Into<String>, remedy: &'static str) -> Self {
+        Self::Open { device: device.into(), reason: reason.into(), remedy }
+    }
 }

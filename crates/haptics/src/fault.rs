@@ -38,39 +38,25 @@ pub enum Fault {
     Stopped = 12,
 }
 
-const ALL: [Fault; 12] = [
-    Fault::Disconnected,
-    Fault::Overheated,
-    Fault::ForceRefused,
-    Fault::TooFast,
-    Fault::NotCalibrated,
-    Fault::Braked,
-    Fault::LoopSilent,
-    Fault::ServiceSilent,
-    Fault::Garbled,
-    Fault::NoPower,
-    Fault::Stale,
-    Fault::Stopped,
+/// Every fault, with its cause and remedy.
+const ALL: [(Fault, &str); 12] = [
+    (Fault::Disconnected, "the device is disconnected: check its cable and power, then start again"),
+    (Fault::Overheated, "the motors are too warm: rest the device for a few minutes"),
+    (Fault::ForceRefused, "the device refused a force: lower the stiffness or the force limit"),
+    (Fault::TooFast, "the tool moved too fast and the device cut its force: hold it and move slowly"),
+    (Fault::NotCalibrated, "the device is not calibrated: put the stylus in its inkwell, or move it through its range"),
+    (Fault::Braked, "the brakes are on: release the emergency stop, press the device's force button"),
+    (Fault::LoopSilent, "the haptic loop was silent for 10 ms and the force was cut: close other programs"),
+    (Fault::ServiceSilent, "the vendor's service does not answer: see whether it runs, then start again"),
+    (Fault::Garbled, "the device sends invalid data: update its driver or its service"),
+    (Fault::NoPower, "the device has no power: plug in its power supply"),
+    (Fault::Stale, "the device sends no new positions: close other programs, check its cable"),
+    (Fault::Stopped, "the maker's software stopped serving the device: close other programs, then start again"),
 ];
 
 impl std::fmt::Display for Fault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Disconnected => "the device is disconnected: check its cable and power, then start again",
-            Self::Overheated => "the motors are too warm: rest the device for a few minutes",
-            Self::ForceRefused => "the device refused a force: lower the stiffness or the force limit",
-            Self::TooFast => "the tool moved too fast and the device cut its force: hold it and move slowly",
-            Self::NotCalibrated => {
-                "the device is not calibrated: put the stylus in its inkwell, or move it through its range"
-            }
-            Self::Braked => "the brakes are on: release the emergency stop, press the device's force button",
-            Self::LoopSilent => "the haptic loop was silent for 10 ms and the force was cut: close other programs",
-            Self::ServiceSilent => "the vendor's service does not answer: see whether it runs, then start again",
-            Self::Garbled => "the device sends invalid data: update its driver or its service",
-            Self::NoPower => "the device has no power: plug in its power supply",
-            Self::Stale => "the device sends no new positions: close other programs, check its cable",
-            Self::Stopped => "the maker's software stopped serving the device: close other programs, then start again",
-        })
+        ALL.iter().filter(|(fault, _)| fault == self).try_for_each(|(_, words)| f.write_str(words))
     }
 }
 
@@ -88,7 +74,7 @@ impl Watch {
     /// The current fault, if any.
     pub fn fault(&self) -> Option<Fault> {
         let code = self.0.now.load(Ordering::Relaxed);
-        ALL.into_iter().find(|fault| *fault as u32 == code)
+        ALL.iter().map(|(fault, _)| *fault).find(|fault| *fault as u32 == code)
     }
 
     /// Number of faults so far.
@@ -112,7 +98,7 @@ mod tests {
     #[test]
     fn every_fault_is_seen_counted_once_and_says_what_to_do() {
         let watch = Watch::default();
-        for fault in ALL {
+        for (fault, _) in ALL {
             watch.set(Some(fault));
             watch.set(Some(fault));
             assert_eq!(watch.fault(), Some(fault));

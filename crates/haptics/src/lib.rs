@@ -15,15 +15,16 @@
 //! For input that moves a camera or a menu.
 
 mod clutch;
+mod descriptor;
 mod device;
 mod dynamic;
 mod error;
 mod fault;
 pub mod force_dimension;
 pub mod haply;
-pub mod hardware;
+mod latest;
+mod list;
 pub mod mouse;
-mod name;
 pub mod openhaptics;
 mod ramp;
 pub mod replay;
@@ -35,11 +36,11 @@ mod threaded;
 mod workspace;
 
 pub use clutch::Clutch;
+pub use descriptor::{Descriptor, DeviceName, Listed, Motion, NameError, Opened, Setting, no_argument};
 pub use device::{Capabilities, HapticDevice, Reading, Status};
 pub use error::DeviceError;
 pub use fault::{Fault, Watch};
-pub use hardware::list;
-pub use name::{DeviceName, Listed, NameError};
+pub use list::{list, usage};
 pub use threaded::ThreadedDevice;
 pub use workspace::Workspace;
 

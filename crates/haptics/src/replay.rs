@@ -4,9 +4,24 @@
 //! One state per read makes a replay produce bit-identical forces at any speed. The states keep
 //! their recorded times. After the last one the tool stays there.
 
-use crate::{Capabilities, HapticDevice, Reading, Status};
+use crate::{Capabilities, Descriptor, DeviceError, HapticDevice, Listed, Motion, NameError, Reading, Status};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Pose, ToolState, Twist, Wrench};
+
+/// `replay:FILE`: the motion of a recorded session. Its tool states come with the recording.
+pub static DEVICE: Descriptor = Descriptor {
+    name: "replay",
+    usage: ":FILE",
+    source: "a session's recording",
+    motion: Motion::Recording,
+    argument: |name, file| match file {
+        None => Err(NameError::lacks(name, "file", "session.mcap")),
+        Some(file) => Ok(Some(file.to_owned())),
+    },
+    id: |file| file,
+    probe: || Ok(vec![Listed::new("replay:FILE", "ready")]),
+    open: |_, _| Err(DeviceError::open("replay", "its session must be read first", "replay it with `--device`")),
+};
 
 /// A recording used as a device.
 #[derive(Clone, Debug)]
@@ -21,11 +36,6 @@ impl Replay {
     /// Replays `states` in order. Without any, every read is [`Status::Finished`] at the origin.
     pub fn new(states: Vec<ToolState>) -> Self {
         Self { states, next: 0, applied: GuardedWrench::ZERO, closed: false }
-    }
-
-    /// Number of remaining states.
-    pub fn remaining(&self) -> usize {
-        self.states.len() - self.next
     }
 
     /// The wrench last applied.

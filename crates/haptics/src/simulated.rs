@@ -26,9 +26,25 @@
 //! # When not to use it
 //! To measure a real device.
 
-use crate::{Capabilities, HapticDevice, Reading};
+use crate::script::{self, operation_name};
+use crate::{Capabilities, Descriptor, HapticDevice, Listed, Motion, Opened, Reading};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{ToolState, Vec3, Wrench};
+
+/// `simulated:NAME`: a Touch in a firm hand that follows a scripted operation.
+pub static DEVICE: Descriptor = Descriptor {
+    name: "simulated",
+    usage: ":NAME",
+    source: "Gil et al. 2004; Colgate and Schenkel 1997",
+    motion: Motion::Script,
+    argument: operation_name,
+    id: |name| name,
+    probe: || Ok(script::NAMES.map(|name| Listed::new(format!("simulated:{name}"), "ready")).into()),
+    open: |operation, setting| {
+        let intent = Box::new((setting.script)(operation)?);
+        Ok(Opened::new(Simulated::new(Config::default(), HandModel::FIRM, intent)))
+    },
+};
 
 /// Longest integration step, ms.
 const STEP_MS: f64 = 0.02;

@@ -18,8 +18,8 @@
 //!    and encoder step from it.
 //! 7. **Emulate the device in a test** with all faults: silence, invalid data, old counters,
 //!    faults, unplugging, a hundred sessions.
-//! 8. **Name it**: a variant in `name.rs`, a line in `hardware.rs`. `device test NAME` then tests
-//!    the real one.
+//! 8. **Describe it** in a [`Descriptor`] in the same file, and name that in `list.rs`: a line, from
+//!    which command lines, help and lists follow. `device test NAME` then tests the real one.
 //!
 //! # The imaginary protocol
 //! One datagram each way per tick, little-endian. The device drops its force 10 ms after the last
@@ -34,12 +34,36 @@
 //! To drive hardware: no such device is sold.
 
 use crate::ramp::Ramp;
-use crate::{Capabilities, DeviceError, Fault, HapticDevice, Reading, Status, Watch, Workspace};
+use crate::{
+    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Motion, NameError, Opened, Reading, Status, Watch,
+    Workspace,
+};
 use std::io::{self, ErrorKind};
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, ToolState, Twist, Vec3};
 
+/// `template:ADDRESS`. It is not in `list.rs`, since there is no such device.
+pub static DEVICE: Descriptor = Descriptor {
+    name: "template",
+    usage: ":ADDRESS",
+    source: "imaginary protocol over UDP",
+    motion: Motion::Hardware,
+    argument: |name, address| match address {
+        None => Err(NameError::lacks(name, "address", "192.168.0.7:9000")),
+        Some(address) => Ok(Some(address.to_owned())),
+    },
+    id: |address| address,
+    probe: || Ok(Vec::new()),
+    open: |address, setting| {
+        let address = address.unwrap_or_default().parse::<SocketAddr>();
+        let address = address.map_err(|fault| DeviceError::open(DEVICE.name, fault.to_string(), REMEDY))?;
+        let config = Config { address, workspace: setting.workspace };
+        Template::open(&config).map(|device| Opened::watched(device.watch(), device))
+    },
+};
+
+const REMEDY: &str = "switch it on and give the address that it shows";
 /// The device's tick, ms.
 const TICK_MS: f32 = 1.0;
 /// Ticks of silence after which the force is cut.
@@ -174,13 +198,11 @@ impl HapticDevice for Template {
             name: "template".to_owned(),
             peak_force_n: 3.0,
             continuous_force_n: 1.0,
-            rate_hz: 1000.0,
             workspace_mm: Vec3::splat(100.0),
             axes_driven: 3,
             position_resolution_mm: 0.01,
             delay_ticks: 1,
-            moving_mass_g: 0.0,
-            damping: 0.0,
+            ..Capabilities::PASSIVE
         }
     }
 
@@ -252,11 +274,7 @@ fn connected(address: SocketAddr) -> io::Result<UdpSocket> {
 }
 
 fn not_opened(address: SocketAddr, fault: &io::Error) -> DeviceError {
-    DeviceError::Open {
-        device: format!("template at {address}"),
-        reason: fault.to_string(),
-        remedy: "switch it on and give the address that it shows",
-    }
+    DeviceError::open(format!("template at {address}"), fault.to_string(), REMEDY)
 }
 
 #[cfg(test)]

@@ -1,8 +1,11 @@
 //! Requirements on every device, checked on each of them.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
-use trepan_geometry::{Pose, ToolState, Vec3, Wrench};
+mod common;
+
+use common::guarded;
+use trepan_contact::GuardedWrench;
+use trepan_geometry::{Pose, Vec3, Wrench};
 use trepan_haptics::mouse::{self, MouseHandle};
 use trepan_haptics::replay::Replay;
 use trepan_haptics::script::{self, Script, Site};
@@ -42,8 +45,7 @@ fn devices() -> Vec<(Box<dyn HapticDevice>, &'static str)> {
 
 /// A guarded wrench of one newton.
 fn one_newton() -> GuardedWrench {
-    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, slew_n_per_ms: 10.0, ..GuardConfig::default() });
-    let wrench = guard.guard(Wrench { force: Vec3::X, torque: Vec3::ZERO }, &ToolState::at(Pose::IDENTITY), 1.0);
+    let wrench = guarded(Vec3::X, Vec3::ZERO);
     assert_eq!(wrench.force(), Vec3::X);
     wrench
 }

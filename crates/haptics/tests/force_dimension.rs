@@ -1,9 +1,11 @@
 //! Tests the Force Dimension driver against an emulator of libdrd: units, axes, and faults.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
+mod common;
+
+use common::guarded;
 use trepan_emulators::{Library as Emulator, drd as keys};
-use trepan_geometry::{Buttons, Pose, Quat, ToolState, Vec3, Wrench};
+use trepan_geometry::{Buttons, Pose, Quat, Vec3};
 use trepan_haptics::force_dimension::{Config, ForceDimension};
 use trepan_haptics::{Fault, HapticDevice, Status, Workspace};
 
@@ -20,16 +22,6 @@ fn config(emulator: &Emulator) -> Config {
 
 fn error(emulator: &Emulator) -> String {
     ForceDimension::open(&config(emulator)).err().unwrap().to_string()
-}
-
-fn guarded(force: Vec3, torque: Vec3) -> GuardedWrench {
-    let mut guard = ForceGuard::new(GuardConfig {
-        ramp_in_ms: 0.0,
-        slew_n_per_ms: 10.0,
-        torque_slew_nmm_per_ms: 500.0,
-        ..GuardConfig::default()
-    });
-    guard.guard(Wrench { force, torque }, &ToolState::at(Pose::IDENTITY), 1.0)
 }
 
 /// Runs the loop; returns the force on the motors at the end, in the maker's axes.

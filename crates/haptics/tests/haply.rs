@@ -1,20 +1,17 @@
 //! Tests the Haply driver against an emulator of its service: units, axes, protocol, and faults.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
+mod common;
+
+use common::guarded;
 use std::time::Duration;
-use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
 use trepan_emulators::service::{self, Behaviour, Service};
-use trepan_geometry::{Buttons, Pose, ToolState, Vec3, Wrench};
+use trepan_geometry::{Buttons, Vec3};
 use trepan_haptics::haply::{Config, Haply};
 use trepan_haptics::{Fault, HapticDevice, Reading, Status};
 
 fn open(service: &Service) -> Result<Haply, trepan_haptics::DeviceError> {
     Haply::open(&Config { service: service.simulation.clone(), events: service.events.clone(), ..Config::default() })
-}
-
-fn guarded(force: Vec3) -> GuardedWrench {
-    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, slew_n_per_ms: 10.0, ..GuardConfig::default() });
-    guard.guard(Wrench { force, torque: Vec3::ZERO }, &ToolState::at(Pose::IDENTITY), 1.0)
 }
 
 /// Runs the haptic loop until a condition holds; panics only after a generous timeout.
@@ -26,7 +23,7 @@ fn run_until(
 ) -> Reading {
     for tick in 0..20_000 {
         let reading = device.read(f64::from(tick) * 0.01);
-        device.apply(guarded(force));
+        device.apply(guarded(force, Vec3::ZERO));
         if done(&reading, told_force(service)) {
             return reading;
         }

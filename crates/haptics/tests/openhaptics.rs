@@ -1,9 +1,11 @@
 //! Tests the OpenHaptics driver against an emulator of libHD: units, axes, frame rules, and faults.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
-use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
+mod common;
+
+use common::guarded;
 use trepan_emulators::{Library as Emulator, hd as keys};
-use trepan_geometry::{Buttons, Pose, Quat, ToolState, Vec3, Wrench};
+use trepan_geometry::{Buttons, Quat, Vec3};
 use trepan_haptics::openhaptics::{Config, OpenHaptics};
 use trepan_haptics::{DeviceError, Fault, HapticDevice, Status, Workspace};
 
@@ -18,16 +20,6 @@ fn config(emulator: &Emulator) -> Config {
     Config { library: Some(emulator.path().to_owned()), ..Config::default() }
 }
 
-fn guarded(force: Vec3, torque: Vec3) -> GuardedWrench {
-    let mut guard = ForceGuard::new(GuardConfig {
-        ramp_in_ms: 0.0,
-        slew_n_per_ms: 10.0,
-        torque_slew_nmm_per_ms: 500.0,
-        ..GuardConfig::default()
-    });
-    guard.guard(Wrench { force, torque }, &ToolState::at(Pose::IDENTITY), 1.0)
-}
-
 /// Alternates loop and servo; returns the force on the motors at the end.
 fn run(device: &mut OpenHaptics, emulator: &Emulator, from: u32, ticks: u32, force: Vec3) -> Vec3 {
     for tick in from..from + ticks {
@@ -36,6 +28,14 @@ fn run(device: &mut OpenHaptics, emulator: &Emulator, from: u32, ticks: u32, for
         emulator.set(keys::TICKS, 1.0);
     }
     motors(emulator)
+}
+
+/// An open device with a full force of 1 N along x on its motors.
+fn settled() -> (Emulator, OpenHaptics) {
+    let emulator = emulator();
+    let mut device = OpenHaptics::open(&config(&emulator)).unwrap();
+    assert!(run(&mut device, &emulator, 0, SETTLED, Vec3::X).x > 0.99);
+    (emulator, device)
 }
 
 fn motors(emulator: &Emulator) -> Vec3 {
@@ -263,9 +263,7 @@ fn closing_waits_for_a_running_callback() {
 
 #[test]
 fn after_a_pause_of_the_library_no_old_force_comes_back() {
-    let emulator = emulator();
-    let mut device = OpenHaptics::open(&config(&emulator)).unwrap();
-    assert!(run(&mut device, &emulator, 0, SETTLED, Vec3::X).x > 0.99);
+    let (emulator, mut device) = settled();
     for tick in 1000..1200 {
         device.read(f64::from(tick));
         device.apply(guarded(Vec3::X, Vec3::ZERO));
@@ -283,10 +281,8 @@ fn faults_cut_the_force_at_once_and_it_comes_back_slowly() {
         (0x0201, Fault::ForceRefused),
         (0x0204, Fault::ForceRefused),
     ] {
-        let emulator = emulator();
-        let mut device = OpenHaptics::open(&config(&emulator)).unwrap();
+        let (emulator, mut device) = settled();
         let watch = device.watch();
-        assert!(run(&mut device, &emulator, 0, SETTLED, Vec3::X).x > 0.99);
         emulator.set(keys::ERROR, f64::from(error));
         assert_eq!(run(&mut device, &emulator, 1000, 1, Vec3::X), Vec3::ZERO);
         assert_eq!((watch.fault(), watch.count()), (Some(fault), 1));
@@ -316,9 +312,7 @@ fn an_unplugged_device_is_lost_and_without_force() {
 
 #[test]
 fn a_silent_loop_loses_its_force_within_ten_milliseconds() {
-    let emulator = emulator();
-    let mut device = OpenHaptics::open(&config(&emulator)).unwrap();
-    assert!(run(&mut device, &emulator, 0, SETTLED, Vec3::X).x > 0.99);
+    let (emulator, device) = settled();
     emulator.set(keys::TICKS, 9.0);
     assert!(motors(&emulator).x > 0.99);
     emulator.set(keys::TICKS, 1.0);

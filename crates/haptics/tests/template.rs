@@ -1,11 +1,15 @@
 //! Tests the template driver against an emulator of its imaginary device: units, axes, and faults.
 #![expect(clippy::unwrap_used, reason = "a test may stop where it fails")]
 
+mod common;
+
+use common::guarded;
 use std::net::{SocketAddr, UdpSocket};
-use trepan_contact::{ForceGuard, GuardConfig, GuardedWrench};
-use trepan_geometry::{Buttons, Pose, ToolState, Vec3, Wrench};
-use trepan_haptics::template::{Config, Template};
-use trepan_haptics::{Fault, HapticDevice, Reading, Status, Workspace};
+use trepan_contact::GuardedWrench;
+use trepan_geometry::{Buttons, Vec3};
+use trepan_haptics::script::ScriptError;
+use trepan_haptics::template::{self, Config, Template};
+use trepan_haptics::{DeviceName, Fault, HapticDevice, Reading, Setting, Status, Workspace};
 
 /// The emulated device and its driver. Loopback delivers a datagram before `send` returns, so
 /// nothing waits.
@@ -74,8 +78,7 @@ impl Bench {
 
 /// A guarded force of 1 N to the right.
 fn one_newton() -> GuardedWrench {
-    let mut guard = ForceGuard::new(GuardConfig { ramp_in_ms: 0.0, slew_n_per_ms: 10.0, ..GuardConfig::default() });
-    guard.guard(Wrench { force: Vec3::X, torque: Vec3::ZERO }, &ToolState::at(Pose::IDENTITY), 1.0)
+    guarded(Vec3::X, Vec3::ZERO)
 }
 
 #[test]
@@ -156,4 +159,14 @@ fn a_hundred_sessions_end_without_force() {
         bench.listen();
         assert_eq!((bench.told, bench.driver.read(0.0).status), (Vec3::ZERO, Status::Lost));
     }
+}
+
+#[test]
+fn it_is_opened_by_its_name() {
+    let named = |text: &str| DeviceName::among(&[&template::DEVICE], text);
+    let script = |name: Option<&str>| Err(ScriptError::UnknownName { name: name.unwrap_or_default().to_owned() });
+    let setting = Setting { workspace: Workspace::default(), script: &script };
+    assert!(named("template:127.0.0.1:9").unwrap().open(&setting).unwrap().watch.is_some());
+    assert!(named("template:attic").unwrap().open(&setting).is_err_and(|fault| fault.to_string().contains("address")));
+    assert!(named("template").unwrap_err().to_string().contains("write template:192"));
 }

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use trepan_geometry::{Pose, Twist, Vec3, Wrench};
 
 /// One tick of the haptic loop.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct TickRecord {
     /// Number of the tick, from 0.
     pub tick: u64,
@@ -97,34 +97,8 @@ impl TickRecord {
     }
 }
 
-impl Default for TickRecord {
-    fn default() -> Self {
-        Self {
-            tick: 0,
-            time_ms: 0.0,
-            device: Pose::IDENTITY,
-            twist: Twist::default(),
-            buttons: 0,
-            proxy: Pose::IDENTITY,
-            wrench: Wrench::ZERO,
-            tissue_force: Vec3::ZERO,
-            contact_normal: Vec3::ZERO,
-            depth_mm: 0.0,
-            tissue_depth_mm: 0.0,
-            removed_mm3: 0.0,
-            spindle_rpm: 0.0,
-            brain_distance_mm: 0.0,
-            patch_seq: 0,
-            compute_us: 0.0,
-            flags: 0,
-            phase: 0,
-            tool: 0,
-        }
-    }
-}
-
 /// One tick of the second hand.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SecondRecord {
     /// Number of the tick, equal to the first hand's.
     pub tick: u64,
@@ -152,23 +126,6 @@ impl SecondRecord {
     /// Whether every flag of `mask` is set.
     pub fn has(&self, mask: u32) -> bool {
         self.flags & mask == mask
-    }
-}
-
-impl Default for SecondRecord {
-    fn default() -> Self {
-        Self {
-            tick: 0,
-            time_ms: 0.0,
-            device: Pose::IDENTITY,
-            twist: Twist::default(),
-            buttons: 0,
-            proxy: Pose::IDENTITY,
-            wrench: Wrench::ZERO,
-            depth_mm: 0.0,
-            tissue_depth_mm: 0.0,
-            flags: 0,
-        }
     }
 }
 
@@ -221,7 +178,7 @@ pub struct EventRecord {
 }
 
 /// A teacher's state: a ghost tool, a marker on the anatomy, a pause, simulated complications.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct TeacherRecord {
     /// Number of the record, from 1.
     pub seq: u64,
@@ -244,12 +201,6 @@ impl TeacherRecord {
     pub const NO_POWER: u32 = 1 << 3;
     /// The trainee sees a bleeding warning.
     pub const BLEEDING: u32 = 1 << 4;
-}
-
-impl Default for TeacherRecord {
-    fn default() -> Self {
-        Self { seq: 0, ghost: Pose::IDENTITY, marker: Vec3::ZERO, flags: 0 }
-    }
 }
 
 /// Description of a session: enough to repeat it, without a patient's name, number, date or folder.

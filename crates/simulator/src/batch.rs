@@ -19,8 +19,8 @@ use trepan_haptics::DeviceName;
 /// folder of recordings.
 pub(crate) fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, SessionError> {
     let named = options.device.as_deref().and_then(|name| name.parse::<DeviceName>().ok());
-    let folder = match named {
-        Some(DeviceName::Replay(path)) if path.is_dir() => path,
+    let folder = match named.as_ref().and_then(DeviceName::recording) {
+        Some(path) if path.is_dir() => path,
         _ if options.shard.is_some() => {
             let fault = "--shard needs a folder of recordings: give --device replay:FOLDER";
             return Err(SessionError::Usage(fault.into()));
@@ -28,7 +28,7 @@ pub(crate) fn recordings(options: &Options) -> Result<Option<Vec<PathBuf>>, Sess
         _ => return Ok(None),
     };
     let read = |fault| SessionError::Usage(format!("--device replay:{}: {fault}", folder.display()));
-    let entries = std::fs::read_dir(&folder).map_err(|fault| read(fault.to_string()))?;
+    let entries = std::fs::read_dir(folder).map_err(|fault| read(fault.to_string()))?;
     let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     files.retain(|file| file.extension() == Some(OsStr::new("mcap")));
     if files.is_empty() {

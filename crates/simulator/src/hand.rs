@@ -9,9 +9,9 @@ use crate::run::stop::Stop;
 use crate::run::watch::{Watched, Watching};
 use trepan_contact::{GuardConfig, Viscoelastic};
 use trepan_geometry::Vec3;
-use trepan_haptics::script::{self, Script, Site};
+use trepan_haptics::script::{self, Script, ScriptError, Site};
 use trepan_haptics::{
-    Capabilities, Clutch, DeviceName, HapticDevice, ThreadedDevice, Watch, Workspace, hardware, mouse, simulated,
+    Capabilities, Clutch, DeviceName, HapticDevice, Motion, Opened, Setting, ThreadedDevice, Watch, Workspace, mouse,
 };
 use trepan_link::Recording;
 
@@ -38,80 +38,60 @@ impl OpenDevice {
         rate_hz: f32,
         stop: &Stop,
     ) -> Result<Self, SessionError> {
-        let none = Self::default();
-        let start = || scripted(program.script(), options, plan).map(|script| script.at(0.0));
+        let script = |name: Option<&str>| scripted(name.unwrap_or(program.script()), options, plan);
         if let Some(name) = &options.watch {
-            let (watched, watching) = Watched::open(name, start()?, stop)?;
-            return Ok(Self { device: Some(Box::new(watched)), watching: Some(watching), ..none });
+            let (watched, watching) = Watched::open(name, script(None).map_err(refused)?.at(0.0), stop)?;
+            return Ok(Self { device: Some(Box::new(watched)), watching: Some(watching), ..Self::default() });
         }
-        if let Some(device) = software(name, options, plan)? {
-            return Ok(Self { device: Some(device), ..none });
+        if name.recording().is_some() {
+            return Ok(Self::default());
         }
-        Ok(match name {
-            DeviceName::Mouse => {
-                let (pointer, mouse) = mouse::pair(start()?.world_from_tool);
-                Self { device: Some(Box::new(mouse)), pointer: Some(pointer), ..none }
-            }
-            DeviceName::Replay(_) => none,
-            hardware => match opened(hardware, workspace(&plan.site, options.device_scale), rate_hz)? {
-                Some((device, watch)) => Self { device: Some(Box::new(device)), watch: Some(watch), ..none },
-                None => none,
-            },
-        })
+        let workspace = workspace(&plan.site, options.device_scale);
+        let Opened { device, watch, pointer } = opened(name, &Setting { workspace, script: &script }, rate_hz)?;
+        Ok(Self { device: Some(device), watch, pointer, ..Self::default() })
     }
 
     /// Opens the device of the second hand. Hardware runs on its own thread, so that its link never
     /// delays the first hand.
     pub fn second(name: &DeviceName, options: &Options, plan: &Plan, rate_hz: f32) -> Result<Self, SessionError> {
-        if let Some(device) = software(name, options, plan)? {
-            return Ok(Self { device: Some(device), ..Self::default() });
-        }
+        let script = |name: Option<&str>| scripted(name.unwrap_or_default(), options, plan);
         let mut beside = workspace(&plan.site, options.device_scale);
         // With both hands in the middle of their workspaces the tools are side by side.
         beside.world_from_device.translation += beside.world_from_device.rotation * (SIDE_MM * Vec3::NEG_X);
-        let (device, watch) = opened(name, beside, rate_hz)?.ok_or_else(|| unfit(name))?;
-        let device: Box<dyn HapticDevice> = Box::new(ThreadedDevice::new(Box::new(device)));
-        Ok(Self { device: Some(device), watch: Some(watch), ..Self::default() })
+        let Opened { mut device, watch, .. } = opened(name, &Setting { workspace: beside, script: &script }, rate_hz)?;
+        if name.is_hardware() {
+            device = Box::new(ThreadedDevice::new(device));
+        }
+        Ok(Self { device: Some(device), watch, ..Self::default() })
     }
 }
 
-/// Makes a device of software: a script, or a simulated hand that follows one.
-fn software(name: &DeviceName, options: &Options, plan: &Plan) -> Result<Option<Box<dyn HapticDevice>>, SessionError> {
-    Ok(match name {
-        DeviceName::Script(operation) => Some(Box::new(scripted(operation, options, plan)?)),
-        DeviceName::Simulated(operation) => Some(simulated_hand(scripted(operation, options, plan)?)),
-        _ => None,
-    })
-}
-
-/// Makes a simulated device in a firm hand that follows a script.
-pub(crate) fn simulated_hand(script: Script) -> Box<dyn HapticDevice> {
-    let (config, grip) = (simulated::Config::default(), simulated::HandModel::FIRM);
-    Box::new(simulated::Simulated::new(config, grip, Box::new(script)))
-}
-
-/// Opens hardware; `None` if the name is not one of hardware. Refuses a tick rate above that of the
-/// device.
-fn opened(name: &DeviceName, workspace: Workspace, rate_hz: f32) -> Result<Option<(Clutch, Watch)>, SessionError> {
-    let Some(opened) = hardware::open(name, workspace) else { return Ok(None) };
-    let opened = opened.map_err(|fault| SessionError::Device(fault.to_string()))?;
-    let Capabilities { name, rate_hz: most_hz, .. } = opened.device.capabilities();
-    if rate_hz > most_hz {
-        let fault = format!("--rate-hz {rate_hz} is too fast for {name}: give at most {most_hz}");
-        return Err(SessionError::Usage(fault));
+/// Opens a device; hardware gets a clutch, and must be as fast as the session.
+fn opened(name: &DeviceName, setting: &Setting<'_>, rate_hz: f32) -> Result<Opened, SessionError> {
+    let mut opened = name.open(setting).map_err(refused)?;
+    if name.is_hardware() {
+        let Capabilities { name, rate_hz: most_hz, .. } = opened.device.capabilities();
+        if rate_hz > most_hz {
+            let fault = format!("--rate-hz {rate_hz} is too fast for {name}: give at most {most_hz}");
+            return Err(SessionError::Usage(fault));
+        }
+        opened.device = Box::new(Clutch::new(opened.device));
     }
-    Ok(Some((Clutch::new(opened.device), opened.watch)))
+    Ok(opened)
+}
+
+fn refused(fault: impl std::fmt::Display) -> SessionError {
+    SessionError::Device(fault.to_string())
 }
 
 /// Duration of a scripted operation, and of one that cuts a flap, s.
 const SCRIPT_S: (f64, f64) = (20.0, 75.0);
 
 /// Makes the script of an operation that follows a plan.
-fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, SessionError> {
+fn scripted(name: &str, options: &Options, plan: &Plan) -> Result<Script, ScriptError> {
     let usual_s = if name == "flap" { SCRIPT_S.1 } else { SCRIPT_S.0 };
     let how = script::Plan { outline: plan.outline.clone(), ..script::Plan::default() };
-    let script = Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(usual_s), &how);
-    script.map_err(|fault| SessionError::Device(fault.to_string()))
+    Script::planned(name, &plan.site, 1e3 * options.duration.unwrap_or(usual_s), &how)
 }
 
 /// Offset of the second hand's workspace to the left of the first one's, mm.
@@ -121,10 +101,10 @@ const SIDE_MM: f32 = 30.0;
 pub(crate) fn second_name(first: &DeviceName, options: &Options) -> Result<Option<DeviceName>, SessionError> {
     let Some(text) = &options.second_device else { return Ok(None) };
     let name: DeviceName = text.parse().map_err(|fault: trepan_haptics::NameError| second(fault.to_string()))?;
-    if matches!(first, DeviceName::Replay(_)) {
+    if first.recording().is_some() {
         return Err(second("a replay brings its second hand along: leave this flag out".into()));
     }
-    if matches!(name, DeviceName::Mouse | DeviceName::Replay(_)) {
+    if matches!(name.kind().motion, Motion::Window | Motion::Recording) {
         return Err(unfit(&name));
     }
     if name.may_be(first) {
@@ -156,15 +136,12 @@ fn workspace(site: &Site, scale: f32) -> Workspace {
 
 /// Name of the requested device; by default the mouse with a window, else the program's script.
 pub(crate) fn device_name(program: Program, options: &Options, windowed: bool) -> Result<DeviceName, SessionError> {
-    let script = || DeviceName::Script(program.script().into());
     let name = match &options.device {
-        Some(text) => {
-            text.parse().map_err(|fault: trepan_haptics::NameError| SessionError::Device(fault.to_string()))?
-        }
-        None if windowed => DeviceName::Mouse,
-        None => script(),
+        Some(text) => text.parse().map_err(|fault: trepan_haptics::NameError| refused(fault))?,
+        None if windowed => DeviceName::MOUSE,
+        None => DeviceName::scripted(program.script()),
     };
-    if name == DeviceName::Mouse && !windowed {
+    if name.kind().motion == Motion::Window && !windowed {
         let text =
             "the mouse needs a window: leave out --headless on a machine with a display, or give --device script:NAME";
         return Err(SessionError::Device(text.into()));
@@ -215,7 +192,7 @@ impl DeviceLimits {
             axes_driven: number(AXES) as u8,
             moving_mass_g: number(MASS),
             damping: number(DAMPING),
-            ..Capabilities::passive("")
+            ..Capabilities::PASSIVE
         };
         Self { device, scale: Some(number(SCALE)).filter(|&scale| scale > 0.0).unwrap_or(1.0) }
     }

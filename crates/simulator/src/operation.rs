@@ -41,7 +41,7 @@ impl Operation {
         let recorded = |key: &str| recording?.header.config.get(key);
         let number = |key: &str| recorded(key)?.parse::<f32>().ok().filter(|value| value.is_finite());
         let within = |key: &str, [low, high]: [f64; 2]| number(key).filter(|&n| (low..=high).contains(&n.into()));
-        let scripted = matches!(device, DeviceName::Script(name) | DeviceName::Simulated(name) if name == "flap");
+        let scripted = device.operation() == Some("flap");
         let flap = options.flap.or_else(|| number("flap_mm")).or(scripted.then_some(SCRIPTED_FLAP_MM));
         let listed = || {
             let names = recorded("forbidden")?;
@@ -90,8 +90,8 @@ mod tests {
     #[test]
     fn options_override_the_recording_and_the_recording_the_defaults() {
         let parse = |line: &str| Options::try_parse_from(line.split(' ')).unwrap();
-        let script = DeviceName::Script("flap".into());
-        let usual = Operation::of(&parse("x"), &DeviceName::Mouse, None);
+        let script = DeviceName::scripted("flap");
+        let usual = Operation::of(&parse("x"), &DeviceName::MOUSE, None);
         assert_eq!((usual.flap_mm, usual.csf_loss, &usual.forbidden[..]), (0.0, CSF_LOSS, &[TissueClass::Vessel][..]));
         assert_eq!(Operation::of(&parse("x"), &script, None).flap_mm, SCRIPTED_FLAP_MM);
         let line = "x --flap 30 --forbid tumour,vessel --csf-loss 0 --young-modulus-kpa 6 --rate-hz 500 --watch other";
@@ -100,7 +100,7 @@ mod tests {
         let mut recording = Recording::default();
         assert!(usual.force_waits && !Operation::of(&parse("x"), &script, Some(&recording)).force_waits);
         recording.header.config.extend(given.entries());
-        assert_eq!(Operation::of(&parse("x"), &DeviceName::Mouse, Some(&recording)), given);
+        assert_eq!(Operation::of(&parse("x"), &DeviceName::MOUSE, Some(&recording)), given);
         assert_eq!(Operation::of(&parse("x --flap 40"), &script, Some(&recording)).flap_mm, 40.0);
         let older = |line: &str| Operation::of(&parse(line), &script, Some(&recording)).csf_loss;
         assert_eq!((older("x"), older("x --fluid-lost 0.2")), (0.0, 0.2), "the flag of version 0.1");

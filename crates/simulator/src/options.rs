@@ -24,10 +24,8 @@ pub struct Options {
     /// Images and how they are imported
     #[command(flatten)]
     pub patient: Patient,
-    /// Haptic device: mouse, script:NAME, replay:FILE, simulated:NAME, openhaptics,
-    /// openhaptics:NAME, force-dimension, force-dimension:N, haply, haply:ID, spacemouse [default:
-    /// mouse with a window, else a script]
-    #[arg(long, value_name = "DEVICE")]
+    /// Haptic device, by name
+    #[arg(long, value_name = "DEVICE", help = format!("Haptic device: {} [default: mouse with a window, else a script]", trepan_haptics::usage()))]
     pub device: Option<String>,
     /// Device of the second hand, which holds an aspirator: script:aspirate, simulated:NAME, or a
     /// device that --list-devices shows

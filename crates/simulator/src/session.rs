@@ -81,9 +81,9 @@ impl Session {
         check_outputs(&options)?;
         let device = hand::device_name(program, &options, windowed)?;
         let second = hand::second_name(&device, &options)?;
-        let recording = match &device {
-            DeviceName::Replay(path) => Some(recordings::open(program, path, &choice::identity(&options, &built_in)?)?),
-            _ => None,
+        let recording = match device.recording() {
+            Some(path) => Some(recordings::open(program, path, &choice::identity(&options, &built_in)?)?),
+            None => None,
         };
         let operation = Operation::of(&options, &device, recording.as_ref());
         let request = ModelRequest::of(program, &options, &operation, recording.as_ref())?;
@@ -166,7 +166,7 @@ impl Session {
 
     /// Describes what the replayed recording lacks, and whether its case was built differently.
     fn replay_remarks(&self) -> (Option<String>, Option<String>) {
-        let (Some(recording), DeviceName::Replay(path)) = (&self.recording, &self.device) else { return (None, None) };
+        let (Some(recording), Some(path)) = (&self.recording, self.device.recording()) else { return (None, None) };
         (recordings::not_whole(self.program, path, recording), recordings::unlike(recording, &self.case))
     }
 
@@ -304,8 +304,7 @@ impl Session {
     }
 
     fn pace(&self) -> Pace {
-        let scripted =
-            self.options.watch.is_none() && matches!(self.device, DeviceName::Script(_) | DeviceName::Simulated(_));
+        let scripted = self.options.watch.is_none() && self.device.operation().is_some();
         let end_ms = self.options.duration.filter(|_| !scripted).map_or(f64::INFINITY, |s| 1e3 * s);
         Pace { tick_ms: self.tick_ms(), collision_ms: 1.0, end_ms }
     }
@@ -338,10 +337,10 @@ impl Session {
         Summary {
             app: self.program.name().into(),
             case: self.case.name.clone(),
-            device: match (&self.device, &self.options.watch) {
+            device: match (self.device.recording(), &self.options.watch) {
                 (_, Some(_)) => "watch".into(),
-                (DeviceName::Replay(_), _) => "replay".into(),
-                (other, _) => other.to_string(),
+                (Some(_), _) => "replay".into(),
+                (None, _) => self.device.to_string(),
             },
             second: Some(SecondSummary {
                 device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),

@@ -46,6 +46,17 @@ fn with<R>(act: impl FnOnce(&mut Fake) -> R) -> R {
     act(&mut FAKE.lock().unwrap())
 }
 
+/// A call to the device: fails when it is unplugged, counts as misuse when the id is wrong.
+fn call(id: c_char, act: impl FnOnce(&mut Fake) -> c_int) -> c_int {
+    with(|f| {
+        if id != ID || !f.open {
+            f.misuse += 1;
+            return -1;
+        }
+        if f.is(keys::UNPLUGGED) { -1 } else { act(f) }
+    })
+}
+
 impl Fake {
     fn get(&self, key: u32) -> f64 {
         self.settings[key as usize]
@@ -53,15 +64,6 @@ impl Fake {
 
     fn is(&self, key: u32) -> bool {
         self.get(key) != 0.0
-    }
-
-    /// A call to the device: fails when it is unplugged, counts as misuse when the id is wrong.
-    fn call(&mut self, id: c_char, act: impl FnOnce(&mut Self) -> c_int) -> c_int {
-        if id != ID || !self.open {
-            self.misuse += 1;
-            return -1;
-        }
-        if self.is(keys::UNPLUGGED) { -1 } else { act(self) }
     }
 
     fn drop_force(&mut self, cause: f64) {
@@ -143,47 +145,41 @@ pub extern "C" fn drdIsInitialized(_: c_char) -> u8 {
 
 #[unsafe(no_mangle)]
 pub extern "C" fn drdAutoInit(id: c_char) -> c_int {
-    with(|f| {
-        f.call(id, |f| {
-            f.moved_by_itself += 1;
-            if f.is(keys::STUCK) {
-                return -1;
-            }
-            f.settings[keys::INITIALISED as usize] = 1.0;
-            0
-        })
+    call(id, |f| {
+        f.moved_by_itself += 1;
+        if f.is(keys::STUCK) {
+            return -1;
+        }
+        f.settings[keys::INITIALISED as usize] = 1.0;
+        0
     })
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn drdStop(_: u8, id: c_char) -> c_int {
-    with(|f| f.call(id, |_| 0))
+    call(id, |_| 0)
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn dhdEnableForce(on: u8, id: c_char) -> c_int {
-    with(|f| {
-        f.call(id, |f| {
-            (f.force_on, f.wrench) = (on != 0, [0.0; 6]);
-            if on != 0 {
-                f.settings[keys::CAUSE as usize] = 0.0;
-            }
-            0
-        })
+    call(id, |f| {
+        (f.force_on, f.wrench) = (on != 0, [0.0; 6]);
+        if on != 0 {
+            f.settings[keys::CAUSE as usize] = 0.0;
+        }
+        0
     })
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn dhdSetGravityCompensation(_: c_int, id: c_char) -> c_int {
-    with(|f| f.call(id, |_| 0))
+    call(id, |_| 0)
 }
 
 #[unsafe(no_mangle)]
 pub extern "C" fn dhdStop(id: c_char) -> c_int {
-    with(|f| {
-        f.force_on = false;
-        f.call(id, |_| 0)
-    })
+    with(|f| f.force_on = false);
+    call(id, |_| 0)
 }
 
 #[unsafe(no_mangle)]
@@ -194,39 +190,33 @@ pub unsafe extern "C" fn dhdGetPositionAndOrientationFrame(
     rows: *mut [[f64; 3]; 3],
     id: c_char,
 ) -> c_int {
-    with(|f| {
-        f.call(id, |f| {
-            let (s, c) = f.get(keys::TURN_X).sin_cos();
-            unsafe {
-                (*x, *y, *z) = (f.get(keys::POSITION_X), f.get(keys::POSITION_Y), f.get(keys::POSITION_Z));
-                *rows = [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]];
-            }
-            c_int::from(f.is(keys::TOO_SOON))
-        })
+    call(id, |f| {
+        let (s, c) = f.get(keys::TURN_X).sin_cos();
+        unsafe {
+            (*x, *y, *z) = (f.get(keys::POSITION_X), f.get(keys::POSITION_Y), f.get(keys::POSITION_Z));
+            *rows = [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]];
+        }
+        c_int::from(f.is(keys::TOO_SOON))
     })
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dhdGetLinearVelocity(x: *mut f64, y: *mut f64, z: *mut f64, id: c_char) -> c_int {
-    with(|f| {
-        f.call(id, |f| {
-            if f.is(keys::NO_VELOCITY) {
-                return -1;
-            }
-            unsafe { (*x, *y, *z) = (f.get(keys::VELOCITY_X), 0.0, 0.0) };
-            0
-        })
+    call(id, |f| {
+        if f.is(keys::NO_VELOCITY) {
+            return -1;
+        }
+        unsafe { (*x, *y, *z) = (f.get(keys::VELOCITY_X), 0.0, 0.0) };
+        0
     })
 }
 
 #[cfg(not(old))]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dhdGetAngularVelocityRad(x: *mut f64, y: *mut f64, z: *mut f64, id: c_char) -> c_int {
-    with(|f| {
-        f.call(id, |_| {
-            unsafe { (*x, *y, *z) = (0.0, 0.0, 2.0) };
-            0
-        })
+    call(id, |_| {
+        unsafe { (*x, *y, *z) = (0.0, 0.0, 2.0) };
+        0
     })
 }
 
@@ -246,34 +236,30 @@ pub extern "C" fn dhdSetForceAndTorqueAndGripperForce(
     _: f64,
     id: c_char,
 ) -> c_int {
-    with(|f| {
-        f.call(id, |f| {
-            if [x, y, z, a, b, c].iter().any(|value| !value.is_finite()) {
-                f.misuse += 1;
-            }
-            if f.is(keys::REFUSES_FORCE) {
-                f.wrench = [0.0; 6];
-                return -1;
-            }
-            if f.force_on {
-                f.wrench = [x, y, z, a, b, c];
-            }
-            2 // saturated, still a success
-        })
+    call(id, |f| {
+        if [x, y, z, a, b, c].iter().any(|value| !value.is_finite()) {
+            f.misuse += 1;
+        }
+        if f.is(keys::REFUSES_FORCE) {
+            f.wrench = [0.0; 6];
+            return -1;
+        }
+        if f.force_on {
+            f.wrench = [x, y, z, a, b, c];
+        }
+        2 // saturated, still a success
     })
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dhdGetStatus(status: *mut c_int, id: c_char) -> c_int {
-    with(|f| {
-        f.call(id, |f| {
-            let numbers = [(0, f.is(keys::POWER)), (1, true), (5, f.force_on), (6, false)];
-            for (place, value) in numbers {
-                unsafe { *status.add(place) = c_int::from(value) };
-            }
-            unsafe { *status.add(14) = f.get(keys::CAUSE) as c_int };
-            0
-        })
+    call(id, |f| {
+        let numbers = [(0, f.is(keys::POWER)), (1, true), (5, f.force_on), (6, false)];
+        for (place, value) in numbers {
+            unsafe { *status.add(place) = c_int::from(value) };
+        }
+        unsafe { *status.add(14) = f.get(keys::CAUSE) as c_int };
+        0
     })
 }
 
@@ -296,17 +282,15 @@ pub extern "C" fn dhdDisableExpertMode() -> c_int {
 
 #[unsafe(no_mangle)]
 pub extern "C" fn dhdSetWatchdog(steps: u8, id: c_char) -> c_int {
-    with(|f| {
-        f.call(id, |f| {
-            if !f.expert {
-                f.misuse += 1;
-                return -1;
-            }
-            if f.is(keys::NO_WATCHDOG) {
-                return -1;
-            }
-            f.watchdog_ms = f64::from(steps) * 0.125;
-            0
-        })
+    call(id, |f| {
+        if !f.expert {
+            f.misuse += 1;
+            return -1;
+        }
+        if f.is(keys::NO_WATCHDOG) {
+            return -1;
+        }
+        f.watchdog_ms = f64::from(steps) * 0.125;
+        0
     })
 }

@@ -4,12 +4,16 @@
 //! # Practice
 //! Forces act once, as the service documents: a connection that ends leaves none.
 
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
+use tungstenite::error::{Error, ProtocolError};
+use tungstenite::protocol::frame::Frame;
+use tungstenite::protocol::frame::coding::{Data, OpCode};
+use tungstenite::{Message, WebSocket};
 
 /// What the service sends and how it misbehaves.
 #[derive(Clone, Debug)]
@@ -76,7 +80,7 @@ pub struct Told {
     pub pongs: u32,
     /// Closing frames received.
     pub goodbyes: u32,
-    /// Unmasked frames, messages that are not JSON, forces that are not numbers.
+    /// Invalid frames, messages that are not JSON, forces that are not numbers.
     pub misuse: u32,
 }
 
@@ -150,7 +154,7 @@ impl Drop for Service {
     }
 }
 
-fn listen(shared: Arc<Shared>, serve: fn(&Shared, TcpStream)) -> (String, JoinHandle<()>) {
+fn listen(shared: Arc<Shared>, serve: fn(&Shared, WebSocket<TcpStream>)) -> (String, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     listener.set_nonblocking(true).unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -160,10 +164,13 @@ fn listen(shared: Arc<Shared>, serve: fn(&Shared, TcpStream)) -> (String, JoinHa
             if let Ok((stream, _)) = listener.accept() {
                 stream.set_nonblocking(false).unwrap();
                 stream.set_nodelay(true).unwrap();
-                stream.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
                 let shared = shared.clone();
                 serving.retain(|serving: &JoinHandle<()>| !serving.is_finished());
-                serving.push(thread::spawn(move || serve(&shared, stream)));
+                serving.push(thread::spawn(move || {
+                    let Ok(socket) = tungstenite::accept(stream) else { return };
+                    socket.get_ref().set_read_timeout(Some(Duration::from_millis(5))).unwrap();
+                    serve(&shared, socket);
+                }));
             }
             thread::sleep(Duration::from_millis(1));
         }
@@ -172,42 +179,28 @@ fn listen(shared: Arc<Shared>, serve: fn(&Shared, TcpStream)) -> (String, JoinHa
     (address, thread)
 }
 
-fn shake_hands(stream: &mut TcpStream) {
-    let mut request = Vec::new();
-    while !request.ends_with(b"\r\n\r\n") {
-        let mut byte = [0];
-        if stream.read(&mut byte).is_ok_and(|count| count == 1) {
-            request.push(byte[0]);
-        }
-    }
-    assert!(String::from_utf8(request).unwrap().contains("Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="));
-    let answer = "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
-                  Sec-WebSocket-Accept: s3pPLMBiTxaQ9kYGzzhZRbK+xOo=\r\n\r\n";
-    stream.write_all(answer.as_bytes()).unwrap();
-}
-
-fn simulate(shared: &Shared, mut stream: TcpStream) {
-    shake_hands(&mut stream);
+fn simulate(shared: &Shared, mut socket: WebSocket<TcpStream>) {
     let behaviour = || shared.behaviour.lock().unwrap().clone();
     let b = behaviour();
-    let _ = send(&mut stream, 0x81, b.inventory.clone().unwrap_or_else(|| state(&b)).as_bytes());
-    let mut received = Vec::new();
+    send(socket.get_mut(), text(b.inventory.clone().unwrap_or_else(|| state(&b)), true));
     while !shared.closing.load(Ordering::SeqCst) && !behaviour().hang_up {
-        let mut bytes = [0; 4096];
-        match stream.read(&mut bytes) {
-            Ok(0) => break,
-            Ok(count) => received.extend_from_slice(&bytes[..count]),
-            Err(_) => continue,
-        }
-        while let Some((opcode, payload)) = take_frame(shared, &mut received) {
-            match opcode {
-                1 => {
-                    note(shared, &payload);
-                    reply(&mut stream, &behaviour());
-                }
-                8 => shared.told.lock().unwrap().goodbyes += 1,
-                10 => shared.told.lock().unwrap().pongs += 1,
-                _ => shared.told.lock().unwrap().misuse += 1,
+        let received = socket.read();
+        let mut told = shared.told.lock().unwrap();
+        match received {
+            Ok(Message::Text(message)) => {
+                drop(told);
+                note(shared, &message);
+                reply(socket.get_mut(), &behaviour());
+            }
+            Ok(Message::Close(_)) => told.goodbyes += 1,
+            Ok(Message::Pong(_)) => told.pongs += 1,
+            Ok(_) => told.misuse += 1,
+            Err(error) if is_timeout(&error) => {}
+            Err(Error::Io(_) | Error::ConnectionClosed) => break,
+            Err(Error::Protocol(ProtocolError::ResetWithoutClosingHandshake)) => break,
+            Err(_) => {
+                told.misuse += 1;
+                break;
             }
         }
     }
@@ -225,29 +218,30 @@ fn reply(stream: &mut TcpStream, b: &Behaviour) {
         });
         return;
     }
-    let text = b.garbage.clone().unwrap_or_else(|| state(b));
+    let message = b.garbage.clone().unwrap_or_else(|| state(b));
     if b.mute {
     } else if b.fragmented {
-        let (head, tail) = text.as_bytes().split_at(text.len() / 2);
-        let _ = send(stream, 0x89, b"still there?");
-        let _ = send(stream, 0x01, head);
-        let _ = stream.write_all(&[0x80]);
+        let (head, tail) = message.split_at(message.len() / 2);
+        send(stream, Frame::ping("still there?"));
+        send(stream, text(head.to_owned(), false));
+        let mut bytes = Vec::new();
+        Frame::message(tail.to_owned(), OpCode::Data(Data::Continue), true).format(&mut bytes).unwrap();
+        let _ = stream.write_all(&bytes[..1]);
         thread::sleep(Duration::from_millis(1));
-        let _ = stream.write_all(&[126, (tail.len() >> 8) as u8, tail.len() as u8]);
-        let _ = stream.write_all(tail);
+        let _ = stream.write_all(&bytes[1..4]);
+        let _ = stream.write_all(&bytes[4..]);
     } else {
-        let _ = send(stream, 0x81, text.as_bytes());
+        send(stream, text(message, true));
     }
 }
 
-fn send_events(shared: &Shared, mut stream: TcpStream) {
-    shake_hands(&mut stream);
+fn send_events(shared: &Shared, mut socket: WebSocket<TcpStream>) {
     while !shared.closing.load(Ordering::SeqCst) {
         if let Some(event) = shared.behaviour.lock().unwrap().event.take() {
             shared.begin();
-            let _ = send(&mut stream, 0x81, event.as_bytes());
+            send(socket.get_mut(), text(event, true));
         }
-        if matches!(stream.read(&mut [0; 64]), Ok(0)) {
+        if socket.read().is_err_and(|error| !is_timeout(&error)) {
             return;
         }
     }
@@ -267,10 +261,10 @@ fn state(b: &Behaviour) -> String {
     format!(r#"{{"session_id":1,"inverse3":[{devices}],"wireless_verse_grip":[{grip}],"custom_verse_grip":[{grip}]}}"#)
 }
 
-fn note(shared: &Shared, payload: &[u8]) {
+fn note(shared: &Shared, message: &str) {
     let mut told = shared.told.lock().unwrap();
     told.messages += 1;
-    let Ok(message) = serde_json::from_slice::<serde_json::Value>(payload) else {
+    let Ok(message) = serde_json::from_str::<serde_json::Value>(message) else {
         told.misuse += 1;
         return;
     };
@@ -292,30 +286,17 @@ fn note(shared: &Shared, payload: &[u8]) {
     }
 }
 
-/// Opcode and unmasked payload of the first complete frame.
-fn take_frame(shared: &Shared, received: &mut Vec<u8>) -> Option<(u8, Vec<u8>)> {
-    let second = *received.get(1)?;
-    let (start, length) = match second & 0x7f {
-        126 => (4, usize::from(u16::from_be_bytes(received.get(2..4)?.try_into().unwrap()))),
-        short => (2, usize::from(short)),
-    };
-    if second & 0x80 == 0 {
-        shared.told.lock().unwrap().misuse += 1;
-    }
-    let mask: [u8; 4] = received.get(start..start + 4)?.try_into().unwrap();
-    let payload = received.get(start + 4..start + 4 + length)?;
-    let payload = payload.iter().zip(mask.iter().cycle()).map(|(b, m)| b ^ m).collect();
-    let opcode = received[0] & 0x0f;
-    received.drain(..start + 4 + length);
-    Some((opcode, payload))
+fn is_timeout(error: &Error) -> bool {
+    matches!(error, Error::Io(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
 }
 
-fn send(stream: &mut TcpStream, first: u8, payload: &[u8]) -> std::io::Result<()> {
-    let mut frame = vec![first];
-    match payload.len() {
-        length @ 0..126 => frame.push(length as u8),
-        length => frame.extend([126, (length >> 8) as u8, length as u8]),
-    }
-    frame.extend(payload);
-    stream.write_all(&frame)
+fn text(message: String, is_final: bool) -> Frame {
+    Frame::message(message, OpCode::Data(Data::Text), is_final)
+}
+
+/// Sends a frame in one piece; the client may already have gone.
+fn send(stream: &mut TcpStream, frame: Frame) {
+    let mut bytes = Vec::new();
+    frame.format(&mut bytes).unwrap();
+    let _ = stream.write_all(&bytes);
 }

@@ -5,8 +5,8 @@
 #![expect(unsafe_code, reason = "calls into the vendor's C library")]
 
 use crate::DeviceError;
-use crate::dynamic::{Loaded, functions};
-use std::ffi::{CStr, c_char, c_int, c_uint};
+use crate::dynamic::{Loaded, functions, owned};
+use std::ffi::{c_char, c_int, c_uint};
 use std::path::Path;
 
 const NAMES: &[&str] = if cfg!(windows) {
@@ -23,26 +23,28 @@ const INSTALL: &str =
 functions! {
     /// DHD and DRD. The last argument of most is the device's id; C's bool is one byte.
     Functions {
+        safe {
+            drdOpenID(c_char) -> c_int;
+            drdClose(c_char) -> c_int;
+            dhdGetSystemType(c_char) -> c_int;
+            drdIsInitialized(c_char) -> u8;
+            drdAutoInit(c_char) -> c_int;
+            drdStop(u8, c_char) -> c_int;
+            dhdEnableForce(u8, c_char) -> c_int;
+            dhdSetGravityCompensation(c_int, c_char) -> c_int;
+            dhdStop(c_char) -> c_int;
+            dhdGetButtonMask(c_char) -> c_uint;
+            dhdSetForceAndTorqueAndGripperForce(f64, f64, f64, f64, f64, f64, f64, c_char) -> c_int;
+            dhdEnableExpertMode() -> c_int;
+            dhdDisableExpertMode() -> c_int;
+            dhdSetWatchdog(u8, c_char) -> c_int;
+        }
         dhdGetDeviceCount() -> c_int;
-        drdOpenID(c_char) -> c_int;
-        drdClose(c_char) -> c_int;
-        dhdGetSystemType(c_char) -> c_int;
         dhdGetSystemName(c_char) -> *const c_char;
-        drdIsInitialized(c_char) -> u8;
-        drdAutoInit(c_char) -> c_int;
-        drdStop(u8, c_char) -> c_int;
-        dhdEnableForce(u8, c_char) -> c_int;
-        dhdSetGravityCompensation(c_int, c_char) -> c_int;
-        dhdStop(c_char) -> c_int;
         dhdGetPositionAndOrientationFrame(*mut f64, *mut f64, *mut f64, *mut [[f64; 3]; 3], c_char) -> c_int;
         dhdGetLinearVelocity(*mut f64, *mut f64, *mut f64, c_char) -> c_int;
-        dhdGetButtonMask(c_char) -> c_uint;
-        dhdSetForceAndTorqueAndGripperForce(f64, f64, f64, f64, f64, f64, f64, c_char) -> c_int;
         dhdGetStatus(*mut c_int, c_char) -> c_int;
         dhdErrorGetLastStr() -> *const c_char;
-        dhdEnableExpertMode() -> c_int;
-        dhdDisableExpertMode() -> c_int;
-        dhdSetWatchdog(u8, c_char) -> c_int;
     }
 }
 
@@ -84,7 +86,7 @@ impl Drd {
     pub(super) fn load(path: Option<&Path>) -> Result<Self, DeviceError> {
         let library = Loaded::open(path, NAMES, INSTALL)?;
         Ok(Self {
-            functions: Functions::load(&library)?,
+            functions: Functions::of(&library)?,
             // SAFETY: the types are those of the vendor's header.
             angular_velocity: unsafe { library.symbol("dhdGetAngularVelocityRad") }.ok(),
             // SAFETY: as above.
@@ -99,19 +101,15 @@ impl Drd {
 
     /// Id of the device at `index`.
     pub(super) fn open(&self, index: i8) -> Option<i8> {
-        // SAFETY: numbers; here and below an invalid id only returns an error.
-        let id = unsafe { (self.functions.drdOpenID)(index as c_char) };
-        i8::try_from(id).ok().filter(|id| *id >= 0)
+        i8::try_from((self.functions.drdOpenID)(index as c_char)).ok().filter(|id| *id >= 0)
     }
 
     pub(super) fn close(&self, id: i8) {
-        // SAFETY: as above.
-        unsafe { (self.functions.drdClose)(id as c_char) };
+        (self.functions.drdClose)(id as c_char);
     }
 
     pub(super) fn system_type(&self, id: i8) -> i32 {
-        // SAFETY: as above.
-        unsafe { (self.functions.dhdGetSystemType)(id as c_char) }
+        (self.functions.dhdGetSystemType)(id as c_char)
     }
 
     pub(super) fn system_name(&self, id: i8) -> String {
@@ -120,52 +118,43 @@ impl Drd {
     }
 
     pub(super) fn has_active_wrist(&self, id: i8) -> bool {
-        // SAFETY: as above.
+        // SAFETY: a number; an invalid id only returns an error.
         self.has_active_wrist.is_some_and(|ask| unsafe { ask(id as c_char) } != 0)
     }
 
     pub(super) fn is_initialised(&self, id: i8) -> bool {
-        // SAFETY: as above.
-        unsafe { (self.functions.drdIsInitialized)(id as c_char) != 0 }
+        (self.functions.drdIsInitialized)(id as c_char) != 0
     }
 
     /// Lets the device find its zero; it moves by itself.
     pub(super) fn auto_init(&self, id: i8) -> Outcome {
-        // SAFETY: as above.
-        Outcome::of(unsafe { (self.functions.drdAutoInit)(id as c_char) })
+        Outcome::of((self.functions.drdAutoInit)(id as c_char))
     }
 
     /// Ends regulation, so that the caller's force takes effect.
     pub(super) fn stop_regulation(&self, id: i8) -> Outcome {
-        // SAFETY: as above.
-        Outcome::of(unsafe { (self.functions.drdStop)(1, id as c_char) })
+        Outcome::of((self.functions.drdStop)(1, id as c_char))
     }
 
     pub(super) fn enable_force(&self, id: i8, on: bool) -> Outcome {
-        // SAFETY: as above.
-        Outcome::of(unsafe { (self.functions.dhdEnableForce)(u8::from(on), id as c_char) })
+        Outcome::of((self.functions.dhdEnableForce)(u8::from(on), id as c_char))
     }
 
     pub(super) fn compensate_gravity(&self, id: i8) -> Outcome {
-        // SAFETY: as above.
-        Outcome::of(unsafe { (self.functions.dhdSetGravityCompensation)(1, id as c_char) })
+        Outcome::of((self.functions.dhdSetGravityCompensation)(1, id as c_char))
     }
 
     /// Turns the motors off and the brakes on.
     pub(super) fn stop(&self, id: i8) {
-        // SAFETY: as above.
-        unsafe { (self.functions.dhdStop)(id as c_char) };
+        (self.functions.dhdStop)(id as c_char);
     }
 
     /// Sets the firmware watchdog: force is dropped after `steps` of 125 µs without a call.
     pub(super) fn set_watchdog(&self, id: i8, steps: u8) -> Outcome {
-        // SAFETY: as above.
-        unsafe {
-            (self.functions.dhdEnableExpertMode)();
-            let outcome = Outcome::of((self.functions.dhdSetWatchdog)(steps, id as c_char));
-            (self.functions.dhdDisableExpertMode)();
-            outcome
-        }
+        (self.functions.dhdEnableExpertMode)();
+        let outcome = Outcome::of((self.functions.dhdSetWatchdog)(steps, id as c_char));
+        (self.functions.dhdDisableExpertMode)();
+        outcome
     }
 
     /// Position, m, and rows of the orientation.
@@ -196,15 +185,13 @@ impl Drd {
     }
 
     pub(super) fn buttons(&self, id: i8) -> u32 {
-        // SAFETY: as above.
-        unsafe { (self.functions.dhdGetButtonMask)(id as c_char) }
+        (self.functions.dhdGetButtonMask)(id as c_char)
     }
 
     /// Applies a force in N and a torque in N m.
     pub(super) fn set_wrench(&self, id: i8, f: [f64; 3], t: [f64; 3]) -> Outcome {
         let set = self.functions.dhdSetForceAndTorqueAndGripperForce;
-        // SAFETY: as above.
-        Outcome::of(unsafe { set(f[0], f[1], f[2], t[0], t[1], t[2], 0.0, id as c_char) })
+        Outcome::of(set(f[0], f[1], f[2], t[0], t[1], t[2], 0.0, id as c_char))
     }
 
     /// The status values, if the device reports them.
@@ -220,14 +207,4 @@ impl Drd {
         // SAFETY: the library returns null or a C string of its own that lives as long as it does.
         unsafe { owned((self.functions.dhdErrorGetLastStr)()) }
     }
-}
-
-/// # Safety
-/// `text` is null or a C string.
-unsafe fn owned(text: *const c_char) -> String {
-    if text.is_null() {
-        return "no description".to_owned();
-    }
-    // SAFETY: not null; the caller guarantees the rest.
-    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }

@@ -22,11 +22,39 @@
 mod library;
 
 use crate::ramp::Ramp;
-use crate::{Capabilities, DeviceError, Fault, HapticDevice, Listed, Reading, STALE_MS, Status, Watch, Workspace};
+use crate::{
+    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Listed, Motion, NameError, Opened, Reading, STALE_MS,
+    Status, Watch, Workspace,
+};
 use library::{Drd, Outcome};
 use std::path::PathBuf;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Mat3, Pose, Quat, ToolState, Twist, Vec3, Wrench};
+
+/// `force-dimension[:N]`: the first, or by number from 0.
+pub static DEVICE: Descriptor = Descriptor {
+    name: "force-dimension",
+    usage: "[:N]",
+    source: "Force Dimension SDK 3 (libdrd)",
+    motion: Motion::Hardware,
+    argument: |name, text| {
+        let number = |text: &str| match text.parse::<u8>() {
+            Ok(number) if number < 128 => Ok(number.to_string()),
+            _ => {
+                let remedy = format!("write {name}:N with N from 0 to 127, as --list-devices does");
+                Err(NameError::Argument(format!("{name}:{text} goes by a number; {remedy}")))
+            }
+        };
+        text.map(number).transpose()
+    },
+    id: |number| number,
+    probe: || Drd::load(None).map(|drd| found(&drd)),
+    open: |number, setting| {
+        let index = number.and_then(|number| number.parse().ok()).unwrap_or(0);
+        let config = Config { index, workspace: setting.workspace, ..Config::default() };
+        ForceDimension::open(&config).map(|device| Opened::watched(device.watch(), device))
+    },
+};
 
 /// Watchdog of 9.5 ms in the firmware's steps of 125 µs, so that force ends within 10 ms.
 const WATCHDOG_STEPS: u8 = 76;
@@ -206,26 +234,21 @@ impl Drop for ForceDimension {
 }
 
 /// Lists every device that the library finds.
-pub(crate) fn probe() -> Result<Vec<Listed>, DeviceError> {
-    Drd::load(None).map(|drd| found(&drd))
-}
-
 fn found(drd: &Drd) -> Vec<Listed> {
-    let listed = |name: String, state: &str| Listed { name, state: state.to_owned() };
     match drd.device_count() {
-        count @ 1.. => (0..count).map(|number| listed(format!("force-dimension:{number}"), "ready")).collect(),
-        _ => vec![listed("force-dimension".to_owned(), "its library is installed; no device is connected")],
+        count @ 1.. => (0..count).map(|number| Listed::new(format!("force-dimension:{number}"), "ready")).collect(),
+        _ => vec![Listed::new("force-dimension", "its library is installed; no device is connected")],
     }
 }
 
 fn prepare(drd: &Drd, id: i8, auto_init: bool) -> Result<(), DeviceError> {
     if !drd.is_initialised(id) {
         if !auto_init {
-            return Err(DeviceError::Open {
-                device: "force-dimension".to_owned(),
-                reason: "the device does not know its zero".to_owned(),
-                remedy: "take your hands off and run the maker's initialisation program, or allow the device to initialise itself",
-            });
+            return Err(DeviceError::open(
+                DEVICE.name,
+                "the device does not know its zero",
+                "take your hands off and run the maker's initialisation program, or allow the device to initialise itself",
+            ));
         }
         done(drd, drd.auto_init(id), "take your hands off the device and try again")?;
         done(drd, drd.stop_regulation(id), "try again")?;
@@ -240,7 +263,7 @@ fn done(drd: &Drd, outcome: Outcome, remedy: &'static str) -> Result<(), DeviceE
 }
 
 fn not_opened(drd: &Drd, remedy: &'static str) -> DeviceError {
-    DeviceError::Open { device: "force-dimension".to_owned(), reason: drd.last_error(), remedy }
+    DeviceError::open(DEVICE.name, drd.last_error(), remedy)
 }
 
 /// Converts the maker's axes (x to the user, y right, z up) to x right, y up, z to the user.
@@ -254,9 +277,7 @@ fn makers_axes(v: Vec3) -> [f64; 3] {
 
 /// Converts the maker's orientation to these axes: at rest the shaft points to the user.
 fn rotation(rows: [[f64; 3]; 3]) -> Quat {
-    let row = |r: [f64; 3]| axes(r);
-    let rows = [row(rows[1]), row(rows[2]), row(rows[0])];
-    Quat::from_mat3(&Mat3::from_cols(rows[0], rows[1], rows[2]).transpose()).normalize()
+    Quat::from_mat3(&Mat3::from_cols(axes(rows[1]), axes(rows[2]), axes(rows[0])).transpose()).normalize()
 }
 
 /// Capabilities from the data sheet, by system type.
@@ -276,8 +297,6 @@ fn capabilities(drd: &Drd, id: i8) -> Capabilities {
         workspace_mm: Vec3::new(workspace_mm.y, workspace_mm.z, workspace_mm.x),
         axes_driven: if drd.has_active_wrist(id) { 6 } else { 3 },
         position_resolution_mm: resolution_mm,
-        delay_ticks: 0,
-        moving_mass_g: 0.0,
-        damping: 0.0,
+        ..Capabilities::PASSIVE
     }
 }

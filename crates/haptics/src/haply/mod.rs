@@ -27,8 +27,11 @@ mod protocol;
 mod pump;
 mod websocket;
 
+use crate::latest::Latest;
 use crate::ramp::Ramp;
-use crate::{Capabilities, DeviceError, HapticDevice, Listed, Reading, Status, Watch, Workspace};
+use crate::{
+    Capabilities, Descriptor, DeviceError, HapticDevice, Listed, Motion, Opened, Reading, Status, Watch, Workspace,
+};
 use protocol::{Frame, Garbled};
 use pump::{Command, Flags, News, Pump};
 use std::sync::Arc;
@@ -40,7 +43,26 @@ use trepan_geometry::{Pose, Quat, ToolState, Twist, Vec3};
 use triple_buffer::{Input, Output, triple_buffer};
 use websocket::WebSocket;
 
+/// `haply[:ID[+GRIP]]`: the first, or by the four hexadecimal digits of the device and of its grip.
+pub static DEVICE: Descriptor = Descriptor {
+    name: "haply",
+    usage: "[:ID[+GRIP]]",
+    source: "Haply Inverse service 3.5 (WebSocket)",
+    motion: Motion::Hardware,
+    argument: |_, ids| Ok(ids.map(str::to_uppercase)),
+    id: |ids| ids.split('+').next().unwrap_or_default(),
+    probe: || list(&Config::default()),
+    open: |ids, setting| {
+        let mut ids =
+            ids.into_iter().flat_map(|ids| ids.split('+')).map(|id| Some(id.to_owned()).filter(|id| !id.is_empty()));
+        let (device, grip) = (ids.next().flatten(), ids.next().flatten());
+        let config = Config { device, grip, workspace: setting.workspace, ..Config::default() };
+        Haply::open(&config).map(|device| Opened::watched(device.watch(), device))
+    },
+};
+
 const PATIENCE: Duration = Duration::from_secs(1);
+const RESTART: &str = "restart Haply's Inverse service";
 /// Time without a state after which a device is lost, ms.
 const LOST_MS: f64 = 1000.0;
 
@@ -84,10 +106,7 @@ pub struct Haply {
     flags: Arc<Flags>,
     threads: Vec<JoinHandle<()>>,
     number: u64,
-    last_news: u64,
-    last: Reading,
-    fresh_ms: f64,
-    time_ms: f64,
+    latest: Latest,
     watch: Watch,
 }
 
@@ -131,10 +150,7 @@ impl Haply {
             flags,
             threads,
             number: 0,
-            last_news: 0,
-            last: Reading { tool: start, status: Status::Stale },
-            fresh_ms: f64::NAN,
-            time_ms: f64::NAN,
+            latest: Latest::new(start),
             watch,
         })
     }
@@ -143,49 +159,24 @@ impl Haply {
     pub fn watch(&self) -> Watch {
         self.watch.clone()
     }
-
-    fn tool(&self, frame: &Frame, time_ms: f64) -> ToolState {
-        let (position, velocity) = frame.cursor.unwrap_or_default();
-        let grip = frame.orientation.unwrap_or(Quat::IDENTITY).normalize();
-        let turn = axes_turn();
-        let rotation = turn * grip * turn.inverse() * self.grip_from_tool;
-        self.workspace.world(&ToolState {
-            world_from_tool: Pose::from_parts(axes(position) * 1e3, rotation.normalize()),
-            twist: Twist { linear: axes(velocity), angular: Vec3::ZERO },
-            buttons: frame.buttons.unwrap_or_default(),
-            time_ms,
-        })
-    }
 }
 
 impl HapticDevice for Haply {
     fn read(&mut self, time_ms: f64) -> Reading {
-        if self.fresh_ms.is_nan() {
-            self.fresh_ms = time_ms;
-        }
-        self.time_ms = time_ms;
         let news = *self.news.read();
-        self.last.status = Status::Stale;
-        if news.number != self.last_news {
-            self.last_news = news.number;
-            let tool = self.tool(&news.frame, time_ms);
-            if tool.is_finite() {
-                self.fresh_ms = time_ms;
-                self.last = Reading { tool, status: Status::Fresh };
-            }
+        let tool = || self.workspace.world(&tool(&news.frame, self.grip_from_tool, time_ms));
+        let mut reading = self.latest.read(time_ms, news.number, tool, LOST_MS);
+        if self.threads.is_empty() || self.flags.lost.load(Ordering::Acquire) {
+            reading.status = Status::Lost;
         }
-        let lost = self.threads.is_empty() || self.flags.lost.load(Ordering::Acquire);
-        if lost || time_ms - self.fresh_ms > LOST_MS {
-            self.last.status = Status::Lost;
-        }
-        self.last
+        reading
     }
 
     fn apply(&mut self, wrench: GuardedWrench) {
         let Some(pump) = self.threads.first() else { return };
         self.number += 1;
         let force = services_axes(self.workspace.device_wrench(wrench.wrench()).force);
-        self.commands.write(Command { number: self.number, force, pose_age_ms: self.time_ms - self.fresh_ms });
+        self.commands.write(Command { number: self.number, force, pose_age_ms: self.latest.age_ms() });
         pump.thread().unpark();
     }
 
@@ -194,13 +185,11 @@ impl HapticDevice for Haply {
             name: self.name.clone(),
             peak_force_n: 10.0,
             continuous_force_n: 2.0,
-            rate_hz: 1000.0,
             workspace_mm: Vec3::splat(300.0),
             axes_driven: 3,
             position_resolution_mm: 0.1,
             delay_ticks: 2,
-            moving_mass_g: 0.0,
-            damping: 0.0,
+            ..Capabilities::PASSIVE
         }
     }
 
@@ -220,16 +209,25 @@ impl Drop for Haply {
     }
 }
 
-/// Lists every device of the service.
-pub(crate) fn probe() -> Result<Vec<Listed>, DeviceError> {
-    list(&Config::default())
+/// The tool of a frame in device space.
+fn tool(frame: &Frame, grip_from_tool: Quat, time_ms: f64) -> ToolState {
+    let (position, velocity) = frame.cursor.unwrap_or_default();
+    let grip = frame.orientation.unwrap_or(Quat::IDENTITY).normalize();
+    let turn = axes_turn();
+    let rotation = turn * grip * turn.inverse() * grip_from_tool;
+    ToolState {
+        world_from_tool: Pose::from_parts(axes(position) * 1e3, rotation.normalize()),
+        twist: Twist { linear: axes(velocity), angular: Vec3::ZERO },
+        buttons: frame.buttons.unwrap_or_default(),
+        time_ms,
+    }
 }
 
 /// Lists every device of a service by the name that opens it; an error says what is missing and how
 /// to fix it.
 pub fn list(config: &Config) -> Result<Vec<Listed>, DeviceError> {
     let mut socket = connect(&config.service)?;
-    let listed = |id: String| Listed { name: format!("haply:{id}"), state: "ready".to_owned() };
+    let listed = |id: String| Listed::new(format!("haply:{id}"), "ready");
     let found = devices(&mut socket, None).map(|(ids, _)| ids.into_iter().map(listed).collect());
     socket.close();
     found
@@ -254,17 +252,13 @@ fn find(
 }
 
 fn broken(error: std::io::Error) -> DeviceError {
-    not_opened(error.to_string(), "restart Haply's Inverse service")
+    not_opened(error.to_string(), RESTART)
 }
 
 /// Reads the inventory: its text and the ids of the devices that match `wanted`, at least one.
 fn devices(socket: &mut WebSocket, wanted: Option<&str>) -> Result<(Vec<String>, String), DeviceError> {
-    let inventory = socket.receive(PATIENCE).map_err(broken)?;
-    let Some(inventory) = inventory else {
-        return Err(not_opened(
-            "the service does not say which devices it has".to_owned(),
-            "restart Haply's Inverse service",
-        ));
+    let Some(inventory) = socket.receive(PATIENCE).map_err(broken)? else {
+        return Err(not_opened("the service does not say which devices it has", RESTART));
     };
     match protocol::devices(&inventory, wanted) {
         Ok(devices) if !devices.is_empty() => Ok((devices, inventory)),
@@ -273,17 +267,15 @@ fn devices(socket: &mut WebSocket, wanted: Option<&str>) -> Result<(Vec<String>,
                 .map_or_else(|| "no Inverse3 is connected".to_owned(), |id| format!("no Inverse3 {id} is connected"));
             Err(not_opened(reason, "plug it in, switch it on and see whether Haply Hub finds it"))
         }
-        Err(Garbled::TooOld) => {
-            Err(not_opened("its service is older than 3.5".to_owned(), "update Haply's Inverse service"))
-        }
+        Err(Garbled::TooOld) => Err(not_opened("its service is older than 3.5", "update Haply's Inverse service")),
         Err(Garbled::NotJson) => {
-            Err(not_opened("what answers is not Haply's service".to_owned(), "see which program has its port"))
+            Err(not_opened("what answers is not Haply's service", "see which program has its port"))
         }
     }
 }
 
-fn not_opened(reason: String, remedy: &'static str) -> DeviceError {
-    DeviceError::Open { device: "haply".to_owned(), reason, remedy }
+fn not_opened(reason: impl Into<String>, remedy: &'static str) -> DeviceError {
+    DeviceError::open(DEVICE.name, reason, remedy)
 }
 
 /// Converts the service's axes (x right, y forward, z up) to x right, y up, z to the user.

@@ -46,13 +46,11 @@ struct InverseState {
     cursor_velocity: Vector,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
+#[serde(default)]
 struct InverseStatus {
-    #[serde(default)]
     calibrated: bool,
-    #[serde(default)]
     power_supply: bool,
-    #[serde(default)]
     ready: bool,
 }
 
@@ -63,11 +61,10 @@ struct GripState {
     buttons: Option<GripButtons>,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
+#[serde(default)]
 struct GripButtons {
-    #[serde(default)]
     a: bool,
-    #[serde(default)]
     b: bool,
 }
 

@@ -7,8 +7,8 @@
 
 use super::codes;
 use crate::DeviceError;
-use crate::dynamic::{Loaded, functions};
-use std::ffi::{CStr, CString, c_char, c_ulong, c_void};
+use crate::dynamic::{Loaded, functions, owned};
+use std::ffi::{CString, c_char, c_ulong, c_void};
 use std::path::Path;
 
 /// Scheduler rate, Hz.
@@ -28,7 +28,7 @@ const INSTALL: &str =
 /// An entry of the error stack, returned by value.
 #[repr(C)]
 #[derive(Clone, Copy)]
-struct ErrorInfo {
+pub(super) struct ErrorInfo {
     code: u32,
     internal: i32,
     device: u32,
@@ -37,45 +37,41 @@ struct ErrorInfo {
 type Callback = extern "system" fn(*mut c_void) -> u32;
 
 functions! {
-    /// HDAPI.
-    Functions {
+    /// libHD, with HDAPI.
+    Hd {
+        safe {
+            hdDisableDevice(u32);
+            hdMakeCurrentDevice(u32);
+            hdBeginFrame(u32);
+            hdEndFrame(u32);
+            hdEnable(u32);
+            hdDisable(u32);
+            hdGetError() -> ErrorInfo;
+            hdCheckCalibration() -> u32;
+            hdUpdateCalibration(u32);
+            hdStartScheduler();
+            hdSetSchedulerRate(c_ulong);
+        }
         hdInitDevice(*const c_char) -> u32;
-        hdDisableDevice(u32);
-        hdMakeCurrentDevice(u32);
-        hdBeginFrame(u32);
-        hdEndFrame(u32);
-        hdEnable(u32);
-        hdDisable(u32);
         hdGetIntegerv(u32, *mut i32);
         hdGetDoublev(u32, *mut f64);
         hdSetDoublev(u32, *const f64);
         hdGetString(u32) -> *const c_char;
-        hdGetError() -> ErrorInfo;
         hdGetErrorString(u32) -> *const c_char;
-        hdCheckCalibration() -> u32;
-        hdUpdateCalibration(u32);
-        hdStartScheduler();
         hdStopScheduler();
-        hdSetSchedulerRate(c_ulong);
         hdScheduleAsynchronous(Callback, *mut c_void, u16) -> c_ulong;
         hdUnschedule(c_ulong);
     }
 }
 
 /// Most errors taken from the stack at once.
-const MAX_ERRORS: usize = 64;
-
-/// libHD.
-#[derive(Clone, Copy)]
-pub(super) struct Hd {
-    functions: Functions,
-}
+pub(super) const MAX_ERRORS: usize = 64;
 
 impl Hd {
     /// Loads the library; also returns its name.
     pub(super) fn load(path: Option<&Path>) -> Result<(Self, String), DeviceError> {
         let library = Loaded::open(path, NAMES, INSTALL)?;
-        Ok((Self { functions: Functions::load(&library)? }, library.name().to_owned()))
+        Ok((Self::of(&library)?, library.name().to_owned()))
     }
 
     /// Initialises the device of this name and returns its handle; `None` opens the first device.
@@ -83,44 +79,14 @@ impl Hd {
         let name = name.map(CString::new).transpose().ok()?;
         let pointer = name.as_ref().map_or(std::ptr::null(), |name| name.as_ptr());
         // SAFETY: a C string that outlives the call, or null, which means the first device.
-        let device = unsafe { (self.functions.hdInitDevice)(pointer) };
+        let device = unsafe { (self.hdInitDevice)(pointer) };
         (device != codes::INVALID_HANDLE).then_some(device)
-    }
-
-    pub(super) fn disable_device(&self, device: u32) {
-        // SAFETY: a handle; an invalid one only raises an error.
-        unsafe { (self.functions.hdDisableDevice)(device) }
-    }
-
-    pub(super) fn make_current(&self, device: u32) {
-        // SAFETY: as above.
-        unsafe { (self.functions.hdMakeCurrentDevice)(device) }
-    }
-
-    pub(super) fn begin_frame(&self, device: u32) {
-        // SAFETY: as above.
-        unsafe { (self.functions.hdBeginFrame)(device) }
-    }
-
-    pub(super) fn end_frame(&self, device: u32) {
-        // SAFETY: as above.
-        unsafe { (self.functions.hdEndFrame)(device) }
-    }
-
-    pub(super) fn enable(&self, capability: u32) {
-        // SAFETY: a number; an invalid one only raises an error.
-        unsafe { (self.functions.hdEnable)(capability) }
-    }
-
-    pub(super) fn disable(&self, capability: u32) {
-        // SAFETY: as above.
-        unsafe { (self.functions.hdDisable)(capability) }
     }
 
     pub(super) fn integer(&self, what: u32) -> i32 {
         let mut value = [0; 16];
         // SAFETY: no parameter has more than 16 integers.
-        unsafe { (self.functions.hdGetIntegerv)(what, value.as_mut_ptr()) };
+        unsafe { (self.hdGetIntegerv)(what, value.as_mut_ptr()) };
         value[0]
     }
 
@@ -128,24 +94,23 @@ impl Hd {
     pub(super) fn doubles(&self, what: u32) -> [f64; 16] {
         let mut values = [0.0; 16];
         // SAFETY: no parameter has more than 16 doubles.
-        unsafe { (self.functions.hdGetDoublev)(what, values.as_mut_ptr()) };
+        unsafe { (self.hdGetDoublev)(what, values.as_mut_ptr()) };
         values
     }
 
     pub(super) fn set_vector(&self, what: u32, value: [f64; 3]) {
         // SAFETY: force and torque, which this is used for, have three doubles.
-        unsafe { (self.functions.hdSetDoublev)(what, value.as_ptr()) }
+        unsafe { (self.hdSetDoublev)(what, value.as_ptr()) }
     }
 
     pub(super) fn string(&self, what: u32) -> String {
         // SAFETY: the library returns null or a C string of its own that lives as long as it does.
-        unsafe { owned((self.functions.hdGetString)(what)) }
+        unsafe { owned((self.hdGetString)(what)) }
     }
 
     /// Takes the newest error from the stack: its code and its device.
     pub(super) fn next_error(&self) -> Option<(u32, u32)> {
-        // SAFETY: no arguments.
-        let ErrorInfo { code, device, .. } = unsafe { (self.functions.hdGetError)() };
+        let ErrorInfo { code, device, .. } = (self.hdGetError)();
         (code != codes::SUCCESS).then_some((code, device))
     }
 
@@ -160,28 +125,8 @@ impl Hd {
     /// The vendor's text for an error.
     pub(super) fn describe(&self, code: u32) -> String {
         // SAFETY: the library returns null or a C string of its own that lives as long as it does.
-        let words = unsafe { owned((self.functions.hdGetErrorString)(code)) };
+        let words = unsafe { owned((self.hdGetErrorString)(code)) };
         format!("{words} (error {code:04x})")
-    }
-
-    pub(super) fn check_calibration(&self) -> u32 {
-        // SAFETY: no arguments.
-        unsafe { (self.functions.hdCheckCalibration)() }
-    }
-
-    pub(super) fn update_calibration(&self, style: u32) {
-        // SAFETY: a number; an invalid one only raises an error.
-        unsafe { (self.functions.hdUpdateCalibration)(style) }
-    }
-
-    pub(super) fn set_scheduler_rate(&self, hz: u32) {
-        // SAFETY: as above.
-        unsafe { (self.functions.hdSetSchedulerRate)(c_ulong::from(hz)) }
-    }
-
-    pub(super) fn start_scheduler(&self) {
-        // SAFETY: no arguments.
-        unsafe { (self.functions.hdStartScheduler)() }
     }
 
     /// Runs `ticked` on the library's thread once per tick, from the scheduler's start until
@@ -189,7 +134,7 @@ impl Hd {
     pub(super) fn schedule<T: Ticked>(&self, ticked: Box<T>) -> Scheduled<T> {
         let data = Box::into_raw(ticked);
         // SAFETY: `data` stays allocated until `stop`, which first stops the scheduler.
-        let handle = unsafe { (self.functions.hdScheduleAsynchronous)(tick::<T>, data.cast(), codes::MAX_PRIORITY) };
+        let handle = unsafe { (self.hdScheduleAsynchronous)(tick::<T>, data.cast(), codes::MAX_PRIORITY) };
         Scheduled { handle, data }
     }
 
@@ -198,8 +143,8 @@ impl Hd {
         // SAFETY: after these two calls the library does not use `data` any more; it came from a
         // box in `schedule`.
         unsafe {
-            (self.functions.hdStopScheduler)();
-            (self.functions.hdUnschedule)(scheduled.handle);
+            (self.hdStopScheduler)();
+            (self.hdUnschedule)(scheduled.handle);
             Box::from_raw(scheduled.data)
         }
     }
@@ -225,14 +170,4 @@ extern "system" fn tick<T: Ticked>(data: *mut c_void) -> u32 {
     // SAFETY: `data` is what was given to `schedule`; nothing else accesses it until `stop`.
     let ticked = unsafe { &mut *data.cast::<T>() };
     ticked.tick()
-}
-
-/// # Safety
-/// `text` is null or a C string.
-unsafe fn owned(text: *const c_char) -> String {
-    if text.is_null() {
-        return "no description".to_owned();
-    }
-    // SAFETY: not null; the caller guarantees the rest.
-    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }

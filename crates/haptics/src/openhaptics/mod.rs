@@ -29,14 +29,37 @@ mod library;
 mod scheduler;
 mod servo;
 
+use crate::latest::Latest;
 use crate::ramp::Ramp;
-use crate::{Capabilities, DeviceError, Fault, HapticDevice, Reading, Status, Watch, Workspace};
+use crate::{
+    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Listed, Motion, Opened, Reading, Status, Watch,
+    Workspace,
+};
 use library::Hd;
 use servo::{Command, Sample, Servo};
 use std::path::PathBuf;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Mat3, Pose, Quat, ToolState, Twist, Vec3};
 use triple_buffer::{Input, Output, triple_buffer};
+
+/// `openhaptics[:NAME]`: by the name in the maker's set-up tool. The list only says whether the
+/// library is installed.
+pub static DEVICE: Descriptor = Descriptor {
+    name: "openhaptics",
+    usage: "[:NAME]",
+    source: "OpenHaptics HDAPI 3 (libHD)",
+    motion: Motion::Hardware,
+    argument: |_, name| Ok(name.map(str::to_owned)),
+    id: |name| name,
+    probe: || {
+        let installed = |name| format!("{name} is installed; the device is looked for when it is opened");
+        Hd::load(None).map(|(_, library)| vec![Listed::new("openhaptics", installed(library))])
+    },
+    open: |device, setting| {
+        let config = Config { device: device.map(str::to_owned), workspace: setting.workspace, ..Config::default() };
+        OpenHaptics::open(&config).map(|device| Opened::watched(device.watch(), device))
+    },
+};
 
 /// Time without a sample after which a device is lost, ms.
 const LOST_MS: f64 = 50.0;
@@ -64,10 +87,7 @@ pub struct OpenHaptics {
     samples: Output<Sample>,
     commands: Input<Command>,
     number: u64,
-    last: Reading,
-    last_sample: u64,
-    fresh_ms: f64,
-    time_ms: f64,
+    latest: Latest,
     workspace: Workspace,
     capabilities: Capabilities,
     watch: Watch,
@@ -83,11 +103,11 @@ impl OpenHaptics {
         let (commands, command_out) = triple_buffer(&Command::default());
         let open = || {
             let device = init(&hd, wanted)?;
-            hd.make_current(device);
+            (hd.hdMakeCurrentDevice)(device);
             let drives_torque = hd.integer(codes::OUTPUT_DOF) >= 6;
             let capabilities = capabilities(&hd, drives_torque);
             let calibration_style = lowest_bit(hd.integer(codes::CALIBRATION_STYLE));
-            hd.enable(codes::FORCE_OUTPUT);
+            (hd.hdEnable)(codes::FORCE_OUTPUT);
             let ramp = Ramp::new(watch.clone());
             let servo = Servo::new(device, drives_torque, calibration_style, sample_in, command_out, ramp);
             Ok((servo, (device, capabilities)))
@@ -103,10 +123,7 @@ impl OpenHaptics {
             samples,
             commands,
             number: 0,
-            last: Reading { tool: start, status: Status::Stale },
-            last_sample: 0,
-            fresh_ms: f64::NAN,
-            time_ms: f64::NAN,
+            latest: Latest::new(start),
             workspace: config.workspace,
             capabilities,
             watch,
@@ -121,32 +138,20 @@ impl OpenHaptics {
 
 impl HapticDevice for OpenHaptics {
     fn read(&mut self, time_ms: f64) -> Reading {
-        if self.fresh_ms.is_nan() {
-            self.fresh_ms = time_ms;
-        }
-        self.time_ms = time_ms;
         let sample = *self.samples.read();
-        self.last.status = Status::Stale;
-        if sample.number != self.last_sample {
-            self.last_sample = sample.number;
-            let tool = self.workspace.world(&tool(&sample, time_ms));
-            if tool.is_finite() {
-                self.fresh_ms = time_ms;
-                self.last = Reading { tool, status: Status::Fresh };
-            }
+        let tool = || self.workspace.world(&tool(&sample, time_ms));
+        let mut reading = self.latest.read(time_ms, sample.number, tool, LOST_MS);
+        if !self.open || matches!(self.watch.fault(), Some(Fault::Disconnected | Fault::Stopped)) {
+            reading.status = Status::Lost;
         }
-        let gone = matches!(self.watch.fault(), Some(Fault::Disconnected | Fault::Stopped));
-        if !self.open || gone || time_ms - self.fresh_ms > LOST_MS {
-            self.last.status = Status::Lost;
-        }
-        self.last
+        reading
     }
 
     fn apply(&mut self, wrench: GuardedWrench) {
         if self.open {
             self.number += 1;
             let wrench = self.workspace.device_wrench(wrench.wrench());
-            self.commands.write(Command { number: self.number, wrench, pose_age_ms: self.time_ms - self.fresh_ms });
+            self.commands.write(Command { number: self.number, wrench, pose_age_ms: self.latest.age_ms() });
         }
     }
 
@@ -165,11 +170,6 @@ impl Drop for OpenHaptics {
     fn drop(&mut self) {
         self.close();
     }
-}
-
-/// Checks whether the library is installed.
-pub(crate) fn probe() -> Result<String, DeviceError> {
-    Hd::load(None).map(|(_, library)| format!("{library} is installed; the device is looked for when it is opened"))
 }
 
 /// Converts a sample to a tool in device space. The transform's columns drift from orthonormal and
@@ -197,7 +197,7 @@ fn init(hd: &Hd, wanted: Option<&str>) -> Result<u32, DeviceError> {
         let error = hd.drain_errors();
         match device {
             Some(device) if error == codes::SUCCESS => return Ok(device),
-            Some(device) => hd.disable_device(device),
+            Some(device) => (hd.hdDisableDevice)(device),
             None => {}
         }
         reason = hd.describe(error);
@@ -209,11 +209,11 @@ fn init(hd: &Hd, wanted: Option<&str>) -> Result<u32, DeviceError> {
 }
 
 fn not_opened(wanted: Option<&str>, reason: String) -> DeviceError {
-    DeviceError::Open {
-        device: wanted.map_or_else(|| "openhaptics".to_owned(), |name| format!("openhaptics:{name}")),
+    DeviceError::open(
+        wanted.map_or_else(|| "openhaptics".to_owned(), |name| format!("openhaptics:{name}")),
         reason,
-        remedy: "give the name that the maker's set-up tool shows, close other programs, and see whether its diagnostic program finds the device",
-    }
+        "give the name that the maker's set-up tool shows, close other programs, and see whether its diagnostic program finds the device",
+    )
 }
 
 fn capabilities(hd: &Hd, drives_torque: bool) -> Capabilities {

@@ -77,9 +77,9 @@ fn start(hd: Hd, library: &str, mut servos: Vec<Servo>, schedulers: &mut Vec<Sch
     servos.iter_mut().for_each(|servo| servo.ramp.restart());
     let running = hd.schedule(Box::new(ServoGroup { hd, servos }));
     schedulers.push(Scheduler { library: library.to_owned(), running });
-    hd.set_scheduler_rate(RATE_HZ);
+    (hd.hdSetSchedulerRate)(RATE_HZ.into());
     hd.drain_errors(); // An unsupported rate leaves the default, 1 kHz.
-    hd.start_scheduler();
+    (hd.hdStartScheduler)();
     match hd.drain_errors() {
         codes::SUCCESS => Ok(()),
         error => Err(error),
@@ -87,11 +87,11 @@ fn start(hd: Hd, library: &str, mut servos: Vec<Servo>, schedulers: &mut Vec<Sch
 }
 
 fn switch_off(hd: Hd, device: u32) {
-    hd.make_current(device);
-    hd.begin_frame(device);
+    (hd.hdMakeCurrentDevice)(device);
+    (hd.hdBeginFrame)(device);
     hd.set_vector(codes::CURRENT_FORCE, [0.0; 3]);
-    hd.end_frame(device);
-    hd.disable(codes::FORCE_OUTPUT);
-    hd.disable_device(device);
+    (hd.hdEndFrame)(device);
+    (hd.hdDisable)(codes::FORCE_OUTPUT);
+    (hd.hdDisableDevice)(device);
     hd.drain_errors();
 }

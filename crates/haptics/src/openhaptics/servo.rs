@@ -7,7 +7,7 @@
 //! device does not affect the others.
 
 use super::codes;
-use super::library::{Hd, RATE_HZ, Ticked};
+use super::library::{Hd, MAX_ERRORS, RATE_HZ, Ticked};
 use crate::{Fault, STALE_MS, ramp::Ramp};
 use trepan_geometry::Wrench;
 use triple_buffer::{Input, Output};
@@ -16,8 +16,6 @@ use triple_buffer::{Input, Output};
 const TICK_MS: f32 = 1e3 / RATE_HZ as f32;
 /// Ticks without a new command after which the force is cut.
 pub(super) const SILENT_TICKS: u32 = 10;
-/// Most errors taken from the stack at once.
-const MAX_ERRORS: usize = 64;
 
 /// One sample of the device, in its own axes: mm, mm/ms, rad/ms.
 #[derive(Clone, Copy, Debug, Default)]
@@ -111,9 +109,9 @@ impl Servo {
     }
 
     fn frame(&mut self, hd: &Hd) {
-        hd.make_current(self.device);
+        (hd.hdMakeCurrentDevice)(self.device);
         let calibrated = self.calibrate(hd);
-        hd.begin_frame(self.device);
+        (hd.hdBeginFrame)(self.device);
         self.sense(hd);
         self.given = self.desired_wrench(calibrated);
         let wrench = self.given;
@@ -122,16 +120,16 @@ impl Servo {
             // mN·m is N mm.
             hd.set_vector(codes::CURRENT_TORQUE, wrench.torque.to_array().map(f64::from));
         }
-        hd.end_frame(self.device);
+        (hd.hdEndFrame)(self.device);
     }
 
     /// Checks the calibration, and updates it if needed once the force is zero, since the position
     /// then jumps.
     fn calibrate(&mut self, hd: &Hd) -> bool {
-        match hd.check_calibration() {
+        match (hd.hdCheckCalibration)() {
             codes::CALIBRATION_OK => return true,
             codes::CALIBRATION_NEEDS_UPDATE if self.given == Wrench::ZERO => {
-                hd.update_calibration(self.calibration_style);
+                (hd.hdUpdateCalibration)(self.calibration_style);
             }
             _ => {}
         }
@@ -184,8 +182,8 @@ impl Servo {
         self.ramp.cut(fault);
         if !self.lost && matches!(fault, Fault::Disconnected | Fault::Stopped) {
             self.lost = true;
-            hd.make_current(self.device);
-            hd.disable(codes::FORCE_OUTPUT);
+            (hd.hdMakeCurrentDevice)(self.device);
+            (hd.hdDisable)(codes::FORCE_OUTPUT);
         }
     }
 }

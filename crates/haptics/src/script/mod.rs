@@ -25,7 +25,7 @@ mod path;
 pub use operation::{Plan, Rim, Site};
 pub use path::Waypoint;
 
-use crate::{Capabilities, HapticDevice, Reading, Status};
+use crate::{Capabilities, Descriptor, HapticDevice, Listed, Motion, NameError, Opened, Reading, Status};
 use path::Path;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{ToolState, Wrench};
@@ -37,8 +37,29 @@ use trepan_geometry::{ToolState, Wrench};
 /// minute.
 pub const NAMES: [&str; 5] = ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap"];
 
-/// Default duration of an operation, ms.
-pub const DEFAULT_DURATION_MS: f64 = 20_000.0;
+/// `script:NAME`: performs a scripted operation.
+pub static DEVICE: Descriptor = Descriptor {
+    name: "script",
+    usage: ":NAME",
+    source: "Flash and Hogan 1985, J. Neurosci. 5",
+    motion: Motion::Script,
+    argument: operation_name,
+    id: |name| name,
+    probe: || Ok(NAMES.map(|name| Listed::new(format!("script:{name}"), "ready")).into()),
+    open: |operation, setting| Ok(Opened::new((setting.script)(operation)?)),
+};
+
+/// The argument of a device that a script moves: one of [`NAMES`].
+pub(crate) fn operation_name(device: &str, operation: Option<&str>) -> Result<Option<String>, NameError> {
+    match operation {
+        None => Err(NameError::lacks(device, "operation", NAMES[0])),
+        Some(name) if NAMES.contains(&name) => Ok(Some(name.to_owned())),
+        Some(name) => {
+            let name = format!("{device}:{name}");
+            Err(NameError::Argument(format!("{name:?}: the scripts are {}", NAMES.join(", "))))
+        }
+    }
+}
 
 /// A script could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -169,8 +190,8 @@ mod tests {
     #[test]
     fn every_name_builds_and_an_unknown_one_lists_them() {
         for name in NAMES {
-            let script = Script::named(name, &site(), DEFAULT_DURATION_MS).unwrap();
-            assert_eq!((script.name(), script.duration_ms()), (name, DEFAULT_DURATION_MS));
+            let script = Script::named(name, &site(), 20_000.0).unwrap();
+            assert_eq!((script.name(), script.duration_ms()), (name, 20_000.0));
         }
         let error = Script::named("lobotomy", &site(), 1000.0).unwrap_err().to_string();
         assert!(NAMES.iter().all(|name| error.contains(name)), "{error}");

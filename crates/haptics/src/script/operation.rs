@@ -123,28 +123,32 @@ impl Plan {
     }
 }
 
-/// One move: share of the total time, final depth below the entry in mm, pressed buttons.
-struct Move(&'static str, f64, f32, Buttons);
+/// One move: share of the total time, where the tip ends, pressed buttons.
+struct Move(&'static str, f64, Vec3, Buttons);
 
 const HANDS_OFF: Buttons = Buttons(0);
 
 /// The path of an operation listed in [`super::NAMES`].
 pub(super) fn path(name: &str, site: &Site, plan: &Plan, duration_ms: f64) -> Path {
-    match name {
-        "aspirate" => return aspirate(site, plan, duration_ms),
-        "flap" => return flap(site, plan, duration_ms),
-        _ => {}
-    }
-    let moves = match name {
-        "craniotomy" => craniotomy(site, plan),
-        "probe" => probe(site, plan),
-        _ => [craniotomy(site, plan), change(plan), probe(site, plan)].into_iter().flatten().collect(),
+    let upright = Quat::from_rotation_arc(Vec3::Z, -site.inward.normalize());
+    let start = site.below(-plan.start_mm);
+    let (start, rotation, moves) = match name {
+        "aspirate" => aspirate(site, plan),
+        "flap" => {
+            let (start, moves) = flap(site, plan);
+            (start, upright, moves)
+        }
+        "craniotomy" => (start, upright, craniotomy(site, plan)),
+        "probe" => (start, upright, probe(site, plan)),
+        _ => {
+            let moves = [craniotomy(site, plan), change(site, plan), probe(site, plan)];
+            (start, upright, moves.into_iter().flatten().collect())
+        }
     };
     let whole: f64 = moves.iter().map(|m| m.1).sum();
-    let rotation = Quat::from_rotation_arc(Vec3::Z, -site.inward.normalize());
-    let mut path = Path::from(site.below(-plan.start_mm), rotation);
-    for Move(label, share, depth_mm, buttons) in moves {
-        path.to(label, duration_ms * share / whole, site.below(depth_mm), buttons);
+    let mut path = Path::from(start, rotation);
+    for Move(label, share, tip, buttons) in moves {
+        path.to(label, duration_ms * share / whole, tip, buttons);
     }
     path.end_at(duration_ms);
     path
@@ -161,25 +165,25 @@ impl Site {
 }
 
 fn craniotomy(site: &Site, plan: &Plan) -> Vec<Move> {
-    let depth_mm = plan.burr_depth_mm(site);
+    let deepest = site.below(plan.burr_depth_mm(site));
     vec![
-        Move("approach with the burr", 8.0, -plan.burr_radius_mm - 1.0, HANDS_OFF),
-        Move("drill", 43.0 * site.drilling_share(), depth_mm, Buttons::PEDAL),
-        Move("clean the hole", 2.0, depth_mm, Buttons::PEDAL),
-        Move("retreat", 7.0, -plan.away_mm, HANDS_OFF),
+        Move("approach with the burr", 8.0, site.below(-plan.burr_radius_mm - 1.0), HANDS_OFF),
+        Move("drill", 43.0 * site.drilling_share(), deepest, Buttons::PEDAL),
+        Move("clean the hole", 2.0, deepest, Buttons::PEDAL),
+        Move("retreat", 7.0, site.below(-plan.away_mm), HANDS_OFF),
     ]
 }
 
 /// The aspirator beside the burr, its shaft tilted away: rests on the bone, moves to the hole,
 /// lifts off and leaves.
-fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
+fn aspirate(site: &Site, plan: &Plan) -> (Vec3, Quat, Vec<Move>) {
     const LEAN_RAD: f32 = 0.5;
     let outward = -site.inward.normalize();
     let side = -outward.cross(Vec3::Z).try_normalize().unwrap_or(outward.any_orthonormal_vector());
     let (near_mm, over_mm) = (plan.burr_radius_mm + plan.aspirator_radius_mm + 3.0, -plan.aspirator_radius_mm);
     let rotation = Quat::from_rotation_arc(Vec3::Z, (outward + LEAN_RAD * side).normalize());
     let at = |aside_mm: f32, depth_mm: f32| site.below(depth_mm) + aside_mm * side;
-    let stations = [
+    let moves = [
         ("approach with the aspirator", 15.0, at(near_mm + 4.0, over_mm - 1.0)),
         ("touch the bone", 5.0, at(near_mm + 4.0, over_mm + 0.5)),
         ("follow the burr", 20.0, at(near_mm, over_mm + 0.5)),
@@ -187,50 +191,37 @@ fn aspirate(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
         ("lift", 5.0, at(near_mm, over_mm - 2.0)),
         ("leave", 25.0, at(near_mm + 30.0, -plan.away_mm)),
     ];
-    let whole: f64 = stations.iter().map(|station| station.1).sum();
-    let mut path = Path::from(at(near_mm + 30.0, -plan.start_mm), rotation);
-    for (label, share, tip) in stations {
-        path.to(label, duration_ms * share / whole, tip, HANDS_OFF);
-    }
-    path.end_at(duration_ms);
-    path
+    let moves = moves.map(|(label, share, tip)| Move(label, share, tip, HANDS_OFF));
+    (at(near_mm + 30.0, -plan.start_mm), rotation, moves.into())
 }
 
 /// Drills a burr hole at the rim, cuts around the flap with the craniotome, lifts it, and presses
 /// the brain in the middle.
-fn flap(site: &Site, plan: &Plan, duration_ms: f64) -> Path {
+fn flap(site: &Site, plan: &Plan) -> (Vec3, Vec<Move>) {
     let outline = if plan.outline.is_empty() { circle(site) } else { plan.outline.clone() };
     let gap_mm = site.brain_mm - site.bone_mm;
     let hole =
         Site { entry: outline[0].outer, bone_mm: outline[0].bone_mm, brain_mm: outline[0].bone_mm + gap_mm, ..*site };
     let foot = |rim: &Rim| rim.outer + site.inward * (rim.bone_mm + plan.foot_mm);
-    let at = |Move(label, share, depth_mm, buttons): Move, site: &Site| (label, share, site.below(depth_mm), buttons);
     let (out, over) = (outline[0].outer - site.inward * plan.away_mm, outline[0].outer - site.inward * 4.0);
-    let mut moves: Vec<(&str, f64, Vec3, Buttons)> =
-        craniotomy(&hole, plan).into_iter().map(|m| at(m, &hole)).collect();
+    let mut moves = craniotomy(&hole, plan);
     moves[1].1 *= 0.35;
     moves.extend([
-        ("take the craniotome", 1.5, out, Buttons::take(ToolKind::Craniotome)),
-        ("come to the hole", 3.0, over, HANDS_OFF),
-        ("enter the hole", 4.0, foot(&outline[0]), Buttons::PEDAL),
+        Move("take the craniotome", 1.5, out, Buttons::take(ToolKind::Craniotome)),
+        Move("come to the hole", 3.0, over, HANDS_OFF),
+        Move("enter the hole", 4.0, foot(&outline[0]), Buttons::PEDAL),
     ]);
     let around = outline.iter().cycle().skip(1).take(outline.len());
     let share = 60.0 / outline.len() as f64;
-    moves.extend(around.map(|rim| ("cut around the flap", share, foot(rim), Buttons::PEDAL)));
+    moves.extend(around.map(|rim| Move("cut around the flap", share, foot(rim), Buttons::PEDAL)));
     moves.extend([
-        ("leave the cut", 4.0, over, HANDS_OFF),
-        ("draw back", 3.0, out, HANDS_OFF),
-        ("lift the flap", 2.0, out, Buttons::FLAP),
+        Move("leave the cut", 4.0, over, HANDS_OFF),
+        Move("draw back", 3.0, out, HANDS_OFF),
+        Move("lift the flap", 2.0, out, Buttons::FLAP),
     ]);
-    let brain = [change(plan), probe(site, plan)].into_iter().flatten();
-    moves.extend(brain.map(|m| at(m, site)).map(|m| (m.0, 0.8 * m.1, m.2, m.3)));
-    let whole: f64 = moves.iter().map(|m| m.1).sum();
-    let mut path = Path::from(hole.below(-plan.start_mm), Quat::from_rotation_arc(Vec3::Z, -site.inward.normalize()));
-    for (label, share, tip, buttons) in moves {
-        path.to(label, duration_ms * share / whole, tip, buttons);
-    }
-    path.end_at(duration_ms);
-    path
+    let brain = [change(site, plan), probe(site, plan)].into_iter().flatten();
+    moves.extend(brain.map(|m| Move(m.0, 0.8 * m.1, m.2, m.3)));
+    (hole.below(-plan.start_mm), moves)
 }
 
 /// A circular outline on flat bone.
@@ -243,24 +234,27 @@ fn circle(site: &Site) -> Vec<Rim> {
     (0..24).map(rim).collect()
 }
 
-fn change(plan: &Plan) -> Vec<Move> {
+fn change(site: &Site, plan: &Plan) -> Vec<Move> {
+    let away = site.below(-plan.away_mm);
     vec![
-        Move("change the tool", 1.5, -plan.away_mm, Buttons::take(ToolKind::Probe)),
-        Move("take the probe", 1.5, -plan.away_mm, HANDS_OFF),
+        Move("change the tool", 1.5, away, Buttons::take(ToolKind::Probe)),
+        Move("take the probe", 1.5, away, HANDS_OFF),
     ]
 }
 
 fn probe(site: &Site, plan: &Plan) -> Vec<Move> {
     let over_brain = site.brain_mm - plan.probe_radius_mm;
-    let mut moves = vec![Move("approach with the probe", 8.0, over_brain - 1.0, HANDS_OFF)];
+    let over = site.below(over_brain - 1.0);
+    let mut moves = vec![Move("approach with the probe", 8.0, over, HANDS_OFF)];
     for press_mm in plan.presses_mm {
+        let deep = site.below(over_brain + press_mm);
         moves.extend([
-            Move("press", 3.0, over_brain + press_mm, HANDS_OFF),
-            Move("hold", 1.5, over_brain + press_mm, HANDS_OFF),
-            Move("withdraw", 2.5, over_brain - 1.0, HANDS_OFF),
+            Move("press", 3.0, deep, HANDS_OFF),
+            Move("hold", 1.5, deep, HANDS_OFF),
+            Move("withdraw", 2.5, over, HANDS_OFF),
         ]);
     }
-    moves.push(Move("leave", 8.0, -plan.away_mm, HANDS_OFF));
+    moves.push(Move("leave", 8.0, site.below(-plan.away_mm), HANDS_OFF));
     moves
 }
 

@@ -2,7 +2,6 @@
 //!
 //! ```text
 //! 1  x y z [rx ry rz]   i16 little-endian      raw axes: x right, y to the user, z down
-//! 2  rx ry rz           i16                    older models send the turns apart
 //! 2  rx ry rz           i16                    older models send the rotation separately
 //! ```
 

@@ -26,11 +26,29 @@ mod daemon;
 mod hid;
 
 use crate::mouse::rotation_vector;
-use crate::{Capabilities, DeviceError, Fault, HapticDevice, Reading, Status, Watch, Workspace};
+use crate::{
+    Capabilities, Descriptor, DeviceError, Fault, HapticDevice, Listed, Motion, Opened, Reading, Status, Watch,
+    Workspace, no_argument,
+};
 use std::io;
 use std::path::PathBuf;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3};
+
+/// `spacemouse`: a six-axis knob without force.
+pub static DEVICE: Descriptor = Descriptor {
+    name: "spacemouse",
+    usage: "",
+    source: "spacenavd's protocol, USB HID reports",
+    motion: Motion::Hardware,
+    argument: no_argument,
+    id: |_| "",
+    probe: || link(&Source::Any).map(|(_, name)| vec![Listed::new("spacemouse", format!("ready: {name}"))]),
+    open: |_, setting| {
+        let config = Config { workspace: setting.workspace, ..Config::default() };
+        SpaceMouse::open(&config).map(|device| Opened::watched(device.watch(), device))
+    },
+};
 
 /// Count that a knob reports at full deflection.
 const FULL_SCALE: f32 = 350.0;
@@ -200,19 +218,14 @@ impl HapticDevice for SpaceMouse {
     }
 }
 
-/// Checks whether a knob can be read.
-pub(crate) fn probe() -> Result<String, DeviceError> {
-    link(&Source::Any).map(|(_, name)| format!("ready: {name}"))
-}
-
 fn link(source: &Source) -> Result<(Box<dyn Link>, &'static str), DeviceError> {
     let daemon = |path: PathBuf| match daemon::Daemon::connect(&path) {
         Ok(link) => Ok((Box::new(link) as Box<dyn Link>, "SpaceMouse, by its daemon")),
-        Err(fault) => Err(not_opened(&format!("the daemon at {}: {fault}", path.display()))),
+        Err(fault) => Err(not_opened(format!("the daemon at {}: {fault}", path.display()))),
     };
     let hid = |path: PathBuf| match hid::Hid::open(&path) {
         Ok(link) => Ok((Box::new(link) as Box<dyn Link>, "SpaceMouse, by its HID reports")),
-        Err(fault) => Err(not_opened(&format!("{}: {fault}", path.display()))),
+        Err(fault) => Err(not_opened(format!("{}: {fault}", path.display()))),
     };
     match source {
         Source::Daemon(path) => daemon(path.clone()),
@@ -221,10 +234,7 @@ fn link(source: &Source) -> Result<(Box<dyn Link>, &'static str), DeviceError> {
     }
 }
 
-fn not_opened(reason: &str) -> DeviceError {
-    DeviceError::Open {
-        device: "spacemouse".to_owned(),
-        reason: reason.to_owned(),
-        remedy: "plug it in, and install and start spacenavd (`apt install spacenavd`), or let your user read its /dev/hidraw file",
-    }
+fn not_opened(reason: String) -> DeviceError {
+    let remedy = "plug it in, and install and start spacenavd (`apt install spacenavd`), or let your user read its /dev/hidraw file";
+    DeviceError::open(DEVICE.name, reason, remedy)
 }

@@ -1,6 +1,6 @@
 //! Decodes a record from arbitrary bytes, without panics and without allocation except for strings.
 
-use super::{Fields, Nested, Visit, wire_type};
+use super::{Fields, Nested, Value, Visit, wire_type};
 
 /// Field numbers below this are read, others skipped.
 const MAX_FIELDS: usize = 32;
@@ -10,13 +10,18 @@ const MAX_FIELDS: usize = 32;
 /// stay readable.
 pub(crate) fn decode<T: Fields>(bytes: &[u8]) -> Option<T> {
     let mut record = T::default();
+    read_message(bytes, &mut |visit| record.visit(visit))?;
+    Some(record)
+}
+
+fn read_message(bytes: &[u8], fields: Nested<'_>) -> Option<()> {
     let mut decoder = Decoder { values: parse(bytes)?, sound: true };
-    record.visit(&mut decoder);
-    decoder.sound.then_some(record)
+    fields(&mut decoder);
+    decoder.sound.then_some(())
 }
 
 #[derive(Clone, Copy)]
-enum Value<'a> {
+enum Raw<'a> {
     Missing,
     Varint(u64),
     Fixed64(u64),
@@ -24,17 +29,17 @@ enum Value<'a> {
     Bytes(&'a [u8]),
 }
 
-fn parse(mut bytes: &[u8]) -> Option<[Value<'_>; MAX_FIELDS]> {
-    let mut values = [Value::Missing; MAX_FIELDS];
+fn parse(mut bytes: &[u8]) -> Option<[Raw<'_>; MAX_FIELDS]> {
+    let mut values = [Raw::Missing; MAX_FIELDS];
     while !bytes.is_empty() {
         let key = take_varint(&mut bytes)?;
         let value = match (key & 7) as u32 {
-            wire_type::VARINT => Value::Varint(take_varint(&mut bytes)?),
-            wire_type::FIXED64 => Value::Fixed64(u64::from_le_bytes(take(&mut bytes, 8)?.try_into().ok()?)),
-            wire_type::FIXED32 => Value::Fixed32(u32::from_le_bytes(take(&mut bytes, 4)?.try_into().ok()?)),
+            wire_type::VARINT => Raw::Varint(take_varint(&mut bytes)?),
+            wire_type::FIXED64 => Raw::Fixed64(u64::from_le_bytes(take(&mut bytes, 8)?.try_into().ok()?)),
+            wire_type::FIXED32 => Raw::Fixed32(u32::from_le_bytes(take(&mut bytes, 4)?.try_into().ok()?)),
             wire_type::BYTES => {
                 let length = usize::try_from(take_varint(&mut bytes)?).ok()?;
-                Value::Bytes(take(&mut bytes, length)?)
+                Raw::Bytes(take(&mut bytes, length)?)
             }
             _ => return None,
         };
@@ -64,66 +69,27 @@ fn take_varint(bytes: &mut &[u8]) -> Option<u64> {
 }
 
 struct Decoder<'a> {
-    values: [Value<'a>; MAX_FIELDS],
+    values: [Raw<'a>; MAX_FIELDS],
     sound: bool,
 }
 
 impl Visit for Decoder<'_> {
-    fn uint32(&mut self, number: u32, _: &'static str, value: &mut u32) {
-        match self.values[number as usize] {
-            Value::Missing => {}
-            Value::Varint(v) if u32::try_from(v).is_ok() => *value = v as u32,
-            _ => self.sound = false,
-        }
+    fn field(&mut self, number: u32, _: &'static str, value: Value<'_>) {
+        self.sound &= read(self.values[number as usize], value).is_some();
     }
+}
 
-    fn uint64(&mut self, number: u32, _: &'static str, value: &mut u64) {
-        match self.values[number as usize] {
-            Value::Missing => {}
-            Value::Varint(v) => *value = v,
-            _ => self.sound = false,
-        }
+/// Sets a field; `None` for another type.
+fn read(raw: Raw<'_>, field: Value<'_>) -> Option<()> {
+    match (raw, field) {
+        (Raw::Missing, _) => {}
+        (Raw::Varint(value), Value::Uint32(field)) => *field = value.try_into().ok()?,
+        (Raw::Varint(value), Value::Uint64(field)) => *field = value,
+        (Raw::Fixed32(bits), Value::Float(field)) => *field = f32::from_bits(bits),
+        (Raw::Fixed64(bits), Value::Double(field)) => *field = f64::from_bits(bits),
+        (Raw::Bytes(bytes), Value::String(field)) => str::from_utf8(bytes).ok()?.clone_into(field),
+        (Raw::Bytes(bytes), Value::Message(_, fields)) => read_message(bytes, fields)?,
+        _ => return None,
     }
-
-    fn float(&mut self, number: u32, _: &'static str, value: &mut f32) {
-        match self.values[number as usize] {
-            Value::Missing => {}
-            Value::Fixed32(bits) => *value = f32::from_bits(bits),
-            _ => self.sound = false,
-        }
-    }
-
-    fn double(&mut self, number: u32, _: &'static str, value: &mut f64) {
-        match self.values[number as usize] {
-            Value::Missing => {}
-            Value::Fixed64(bits) => *value = f64::from_bits(bits),
-            _ => self.sound = false,
-        }
-    }
-
-    fn string(&mut self, number: u32, _: &'static str, value: &mut String) {
-        match self.values[number as usize] {
-            Value::Missing => {}
-            Value::Bytes(bytes) => match str::from_utf8(bytes) {
-                Ok(text) => value.replace_range(.., text),
-                Err(_) => self.sound = false,
-            },
-            _ => self.sound = false,
-        }
-    }
-
-    fn message(&mut self, number: u32, _: &'static str, _: &'static str, fields: Nested<'_>) {
-        match self.values[number as usize] {
-            Value::Missing => {}
-            Value::Bytes(bytes) => match parse(bytes) {
-                Some(values) => {
-                    let mut nested = Decoder { values, sound: true };
-                    fields(&mut nested);
-                    self.sound &= nested.sound;
-                }
-                None => self.sound = false,
-            },
-            _ => self.sound = false,
-        }
-    }
+    Some(())
 }

@@ -1,8 +1,8 @@
 //! Protobuf messages from one field list per record: encoding, decoding and schema.
 //!
 //! # Theory
-//! A record lists its fields once, in [`Fields::visit`]. The [`encode`], [`decode`] and [`schema`]
-//! visitors use that list. Every field is written, zero or not, so that -0.0 keeps its sign
+//! One list in `records` has the fields of every message; the [`encode`], [`decode`] and [`schema`]
+//! visitors use it. Every field is written, zero or not, so that -0.0 keeps its sign
 //! (generated proto3 code drops it), and floats are stored as bits, so that a NaN keeps its
 //! payload.
 //!
@@ -22,7 +22,7 @@ pub(crate) use decode::decode;
 pub(crate) use encode::encode;
 pub(crate) use schema::file_descriptor_set;
 
-/// A record that lists its protobuf fields.
+/// A message that lists its protobuf fields: a record or a part of one.
 pub trait Fields: Default + Clone {
     /// Message name, with its package.
     const NAME: &'static str;
@@ -34,15 +34,25 @@ pub trait Fields: Default + Clone {
 /// The body of a nested message.
 pub type Nested<'a> = &'a mut dyn FnMut(&mut dyn Visit);
 
-/// Visits the fields of a record.
+/// The value of a field, or the name and the body of a nested message.
+pub enum Value<'a> {
+    Uint32(&'a mut u32),
+    Uint64(&'a mut u64),
+    Float(&'a mut f32),
+    Double(&'a mut f64),
+    String(&'a mut String),
+    Message(&'static str, Nested<'a>),
+}
+
+/// A type that a field can have.
+trait Field {
+    /// Passes itself to `visit` as the field of this number and name.
+    fn visit_as(&mut self, number: u32, name: &'static str, visit: &mut dyn Visit);
+}
+
+/// Visits the fields of a message.
 pub trait Visit {
-    fn uint32(&mut self, number: u32, name: &'static str, value: &mut u32);
-    fn uint64(&mut self, number: u32, name: &'static str, value: &mut u64);
-    fn float(&mut self, number: u32, name: &'static str, value: &mut f32);
-    fn double(&mut self, number: u32, name: &'static str, value: &mut f64);
-    fn string(&mut self, number: u32, name: &'static str, value: &mut String);
-    /// A nested message of type `kind`.
-    fn message(&mut self, number: u32, name: &'static str, kind: &'static str, fields: Nested<'_>);
+    fn field(&mut self, number: u32, name: &'static str, value: Value<'_>);
 }
 
 /// Wire types of the encoding.
@@ -83,24 +93,18 @@ mod tests {
     }
 
     impl Visit for Noise {
-        fn uint32(&mut self, _: u32, name: &'static str, value: &mut u32) {
-            let limit = if matches!(name, "phase" | "tool") { 0xff } else { u32::MAX };
-            *value = self.next() as u32 & limit;
-        }
-        fn uint64(&mut self, _: u32, _: &'static str, value: &mut u64) {
-            *value = self.next();
-        }
-        fn float(&mut self, _: u32, _: &'static str, value: &mut f32) {
-            *value = f32::from_bits(self.next() as u32);
-        }
-        fn double(&mut self, _: u32, _: &'static str, value: &mut f64) {
-            *value = f64::from_bits(self.next());
-        }
-        fn string(&mut self, _: u32, _: &'static str, value: &mut String) {
-            *value = format!("é{:x}", self.next());
-        }
-        fn message(&mut self, _: u32, _: &'static str, _: &'static str, fields: Nested<'_>) {
-            fields(self);
+        fn field(&mut self, _: u32, name: &'static str, value: Value<'_>) {
+            match value {
+                Value::Uint32(value) => {
+                    let limit = if matches!(name, "phase" | "tool") { 0xff } else { u32::MAX };
+                    *value = self.next() as u32 & limit;
+                }
+                Value::Uint64(value) => *value = self.next(),
+                Value::Float(value) => *value = f32::from_bits(self.next() as u32),
+                Value::Double(value) => *value = f64::from_bits(self.next()),
+                Value::String(value) => *value = format!("é{:x}", self.next()),
+                Value::Message(_, fields) => fields(self),
+            }
         }
     }
 

@@ -10,7 +10,8 @@ use super::{Recording, chunk};
 use crate::LinkError;
 use crate::recorder::{LOSSES_KEY, REPAIR_NAME, options, write_error};
 use mcap::McapError;
-use mcap::records::{MessageHeader, Metadata, op};
+use mcap::records::{Channel, MessageHeader, Metadata, SchemaHeader, op};
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -105,14 +106,14 @@ impl Copy {
         let body = Cursor(body);
         match opcode {
             op::SCHEMA => {
-                let Some(schema) = body.whole_schema() else { return Ok(()) };
-                tolerate(self.mcap.add_schema_with_id(schema.id, schema.name, schema.encoding, schema.data))
+                let Some((SchemaHeader { id, name, encoding }, data)) = body.whole_schema() else { return Ok(()) };
+                tolerate(self.mcap.add_schema_with_id(id, &name, &encoding, data))
             }
             op::CHANNEL => {
-                let Some(channel) = body.whole_channel() else { return Ok(()) };
-                let metadata = channel.metadata.into_iter().map(|(k, v)| (k.to_owned(), v.to_owned())).collect();
-                let (id, schema) = (channel.id, channel.schema);
-                tolerate(self.mcap.add_channel_with_id(id, schema, channel.topic, channel.encoding, &metadata))
+                let Some(Channel { id, schema_id, topic, message_encoding, metadata }) = body.whole_channel() else {
+                    return Ok(());
+                };
+                tolerate(self.mcap.add_channel_with_id(id, schema_id, &topic, &message_encoding, &metadata))
             }
             op::MESSAGE => {
                 let Some((header, data)) = body.whole_message() else { return Ok(()) };
@@ -123,8 +124,7 @@ impl Copy {
                 let Some((name, entries)) = body.metadata().filter(|(name, _)| *name != REPAIR_NAME) else {
                     return Ok(());
                 };
-                let metadata = entries.into_iter().map(|(k, v)| (k.to_owned(), v.to_owned())).collect();
-                self.mcap.write_metadata(&Metadata { name: name.to_owned(), metadata })
+                self.mcap.write_metadata(&Metadata { name: name.to_owned(), metadata: owned(entries) })
             }
             _ => Ok(()),
         }
@@ -153,33 +153,25 @@ fn tolerate<T>(result: Result<T, McapError>) -> Result<(), McapError> {
     }
 }
 
-/// A schema record.
-pub(super) struct Schema<'a> {
-    pub id: u16,
-    pub name: &'a str,
-    pub encoding: &'a str,
-    pub data: &'a [u8],
-}
-
-/// A channel record.
-pub(super) struct Channel<'a> {
-    pub id: u16,
-    pub schema: u16,
-    pub topic: &'a str,
-    pub encoding: &'a str,
-    pub metadata: Vec<(&'a str, &'a str)>,
+fn owned(entries: Vec<(&str, &str)>) -> BTreeMap<String, String> {
+    entries.into_iter().map(|(key, value)| (key.to_owned(), value.to_owned())).collect()
 }
 
 impl<'a> Cursor<'a> {
-    fn whole_schema(mut self) -> Option<Schema<'a>> {
-        let (id, name, encoding) = (self.u16()?, self.text()?, self.text()?);
+    fn whole_schema(mut self) -> Option<(SchemaHeader, &'a [u8])> {
+        let header = SchemaHeader { id: self.u16()?, name: self.text()?.to_owned(), encoding: self.text()?.to_owned() };
         let length = usize::try_from(self.u32()?).ok()?;
-        Some(Schema { id, name, encoding, data: self.take(length)? })
+        Some((header, self.take(length)?))
     }
 
-    fn whole_channel(mut self) -> Option<Channel<'a>> {
-        let (id, schema) = (self.u16()?, self.u16()?);
-        Some(Channel { id, schema, topic: self.text()?, encoding: self.text()?, metadata: self.map()? })
+    fn whole_channel(mut self) -> Option<Channel> {
+        Some(Channel {
+            id: self.u16()?,
+            schema_id: self.u16()?,
+            topic: self.text()?.to_owned(),
+            message_encoding: self.text()?.to_owned(),
+            metadata: owned(self.map()?),
+        })
     }
 
     fn whole_message(mut self) -> Option<(MessageHeader, &'a [u8])> {

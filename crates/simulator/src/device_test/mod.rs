@@ -13,7 +13,6 @@ mod page;
 mod trial;
 
 use crate::error::SessionError;
-use crate::hand::simulated_hand;
 use crate::report::output::whole;
 use crate::report::summary::Machine;
 use crate::run::clock::{Clock, Schedule};
@@ -27,7 +26,9 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
 use trepan_geometry::Vec3;
 use trepan_haptics::script::{Script, Site};
-use trepan_haptics::{Capabilities, DeviceName, HapticDevice, NameError, Status, Watch, Workspace, hardware};
+use trepan_haptics::{
+    Capabilities, DeviceName, HapticDevice, Motion, NameError, Opened, Setting, Status, Watch, Workspace,
+};
 use trial::{Part, Trial};
 
 /// Largest number of ticks in which the force fades at the end.
@@ -66,20 +67,15 @@ pub(crate) fn run(name: &str, out: &Path, seconds: f64) -> Result<Option<i32>, S
 fn open(name: &str, end_ms: f64) -> Result<Subject, SessionError> {
     let usage = |fault: &dyn Display| SessionError::Usage(fault.to_string());
     let name: DeviceName = name.parse().map_err(|fault: NameError| usage(&fault))?;
-    let script = |script: &str| {
+    if !matches!(name.kind().motion, Motion::Hardware | Motion::Script) {
+        return Err(usage(&format!("{name} cannot be tested; `--list-devices` shows the devices that can")));
+    }
+    let script = |script: Option<&str>| {
         let site = Site { entry: Vec3::ZERO, inward: Vec3::NEG_Y, bone_mm: 6.0, brain_mm: 8.0 };
-        Script::named(script, &site, end_ms).map_err(|fault| usage(&fault))
+        Script::named(script.unwrap_or_default(), &site, end_ms)
     };
-    let (device, watch): (Box<dyn HapticDevice>, _) = match &name {
-        DeviceName::Script(operation) => (Box::new(script(operation)?), None),
-        DeviceName::Simulated(operation) => (simulated_hand(script(operation)?), None),
-        _ => {
-            let unfit = || usage(&format!("{name} cannot be tested; `--list-devices` shows the devices that can"));
-            let opened = hardware::open(&name, Workspace::default()).ok_or_else(unfit)?;
-            let hardware::Hardware { device, watch } = opened.map_err(|fault| usage(&fault))?;
-            (device, Some(watch))
-        }
-    };
+    let opened = name.open(&Setting { workspace: Workspace::default(), script: &script });
+    let Opened { device, watch, .. } = opened.map_err(|fault| usage(&fault))?;
     Ok(Subject { name, device, watch })
 }
 

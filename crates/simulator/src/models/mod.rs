@@ -328,7 +328,7 @@ mod tests {
 
     fn request(line: &str, recording: Option<&Recording>) -> ModelRequest {
         let options = Options::try_parse_from(format!("x --headless {line}").split_whitespace()).unwrap();
-        let operation = Operation::of(&options, &trepan_haptics::DeviceName::Mouse, recording);
+        let operation = Operation::of(&options, &trepan_haptics::DeviceName::MOUSE, recording);
         ModelRequest::of(Program::Integrated, &options, &operation, recording).unwrap()
     }
 

@@ -170,7 +170,7 @@ impl HapticDevice for Watched {
     fn apply(&mut self, _wrench: GuardedWrench) {}
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities::passive("")
+        Capabilities::PASSIVE
     }
 
     fn close(&mut self) {
