@@ -1,6 +1,6 @@
 //! Lays out a stability map for the page's template: cells, names, lines and lettered reasons.
 
-use crate::engine::picture::{Map, Outcome};
+use crate::engine::picture::{Line, Map, Outcome};
 use serde::Serialize;
 
 /// Width and height of a cell, px.
@@ -82,7 +82,7 @@ impl<'a> Figure<'a> {
             let (x, y) = (x.clamp(0.0, map.columns.len() as f64), y.clamp(0.0, map.rows.len() as f64));
             format!("{:.1},{:.1}", left as f64 + x * CELL[0] as f64, top as f64 + y * CELL[1] as f64)
         };
-        let line = |(at, (name, points)): (usize, &'a (String, Vec<(f64, f64)>))| Polyline {
+        let line = |(at, (name, points)): (usize, &'a Line)| Polyline {
             name,
             colour: STROKE[at % STROKE.len()],
             points: points.iter().map(place).collect::<Vec<_>>().join(" "),
