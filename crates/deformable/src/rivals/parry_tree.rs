@@ -61,6 +61,6 @@ impl BroadPhase for ParryTree {
 }
 
 /// The tree of the crate parry.
-pub const METHOD: Descriptor = Descriptor::of_phase("parry-tree", "parry3d", |inputs| {
+pub const METHOD: Descriptor = Descriptor::of("parry-tree", "parry3d", |inputs| {
     Box::new(Phased::new(ParryTree::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
 });

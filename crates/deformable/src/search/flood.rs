@@ -4,7 +4,7 @@ use super::lost::Lost;
 use crate::{
     extent::Extent,
     narrow::{Hits, NONE},
-    phase::box_of,
+    phase::{box_of, push_bounded},
     scene::Scene,
 };
 
@@ -38,12 +38,9 @@ impl Flood {
         if self.seen_at[tet as usize] == self.number {
             return;
         }
-        match self.open.len() < self.open.capacity() {
-            true => {
-                self.seen_at[tet as usize] = self.number;
-                self.open.push(tet);
-            }
-            false => hits.overflow += 1,
+        match push_bounded(&mut self.open, tet) {
+            0 => self.seen_at[tet as usize] = self.number,
+            _ => hits.overflow += 1,
         }
     }
 
