@@ -25,9 +25,10 @@
 //! a step's motion.
 
 use crate::{
+    bounded::push_bounded,
     config::ConfigError,
     narrow::{Hits, NONE},
-    phase::{BroadPhase, Indexed, push_bounded},
+    phase::{BroadPhase, Indexed},
     rivals::HashedGrid,
     scene::Scene,
     step::{check_mesh, usual_cell_mm},

@@ -18,6 +18,7 @@
 //! For cutting: connections of the mesh are fixed.
 
 mod bodies;
+mod bounded;
 mod config;
 mod extent;
 mod list;

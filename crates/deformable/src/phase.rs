@@ -1,6 +1,7 @@
 //! Broad phases: from moving boxes to few pairs of point and tetrahedron, each of which gets the
 //! exact test.
 
+use crate::bounded::push_bounded;
 use crate::extent::Extent;
 use crate::narrow::{Hits, NONE};
 use crate::scene::Scene;
@@ -30,15 +31,6 @@ pub(crate) fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Extent {
         return Extent::EMPTY;
     }
     Extent { low: a.min(b).min(c.min(d)), high: a.max(b).max(c.max(d)) }
-}
-
-/// Adds an item when it fits without new memory; returns 1 when it does not.
-pub(crate) fn push_bounded<T>(out: &mut Vec<T>, item: T) -> u32 {
-    if out.len() == out.capacity() {
-        return 1;
-    }
-    out.push(item);
-    0
 }
 
 /// The points of a step, sorted so that a box finds those inside it.

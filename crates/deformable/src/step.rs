@@ -1,9 +1,10 @@
 //! One collision step, readable as a list: place the points, fit the surface, find, respond.
 
 use crate::config::{Config, ConfigError};
+use crate::list::responder;
 use crate::narrow::{Hits, NONE};
 use crate::outcome::TissueStep;
-use crate::response::{Answer, Friction, Respond, Shaft, Spring, responder};
+use crate::response::{Answer, Friction, Respond, Shaft, Spring};
 use crate::scene::Scene;
 use crate::seam::{Search, SearchInputs};
 use crate::surface::MovingSurface;

@@ -20,7 +20,7 @@
 //! Cost: 3 ns for each node of a fitted box, 3 ns for each group of 16 clusters, 10 ns for each
 //! triangle near the tool. Triangles with a NaN corner are skipped.
 
-use crate::{extent::Extent, narrow::NONE, phase::push_bounded, triangle};
+use crate::{bounded::push_bounded, extent::Extent, narrow::NONE, triangle};
 use glam::Vec3A;
 use trepan_geometry::Vec3;
 use trepan_mesh::{Csr, Surface, TetMesh};

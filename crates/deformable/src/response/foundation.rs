@@ -72,9 +72,9 @@ impl Foundation {
         Self { spring, springs: Vec::with_capacity(MAX_SPRINGS), spring_of: vec![NONE; nodes] }
     }
 
-    /// Writes the springs of the ball on the triangles near it. Together they have the force of the
-    /// ball's spring pressed as the answer says; at depth 0 all wait. Returns how many nodes did not
-    /// fit.
+    /// Writes the springs of the ball on the triangles near it. Together they have the force of
+    /// the ball's spring pressed as the answer says; at depth 0 all wait. Returns how many nodes
+    /// did not fit.
     pub(crate) fn press(
         &mut self,
         scene: &Scene,

@@ -6,11 +6,11 @@ mod friction;
 mod near;
 mod shaft;
 
+pub(crate) use ball::Ball;
 pub(crate) use friction::Friction;
 pub(crate) use shaft::Shaft;
 
-use crate::rivals::printed::Faces;
-use crate::{method::Response, narrow::Hits, outcome::TissueStep, scene::Scene, surface::MovingSurface};
+use crate::{narrow::Hits, outcome::TissueStep, scene::Scene, surface::MovingSurface};
 use trepan_contact::{NodalContact, NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
 
@@ -40,15 +40,6 @@ pub(crate) trait Respond: Send {
 
     /// Forgets what was touched.
     fn reset(&mut self) {}
-}
-
-/// The response for a mesh of so many nodes.
-pub(crate) fn responder(response: Response, nodes: usize, spring: Spring) -> Box<dyn Respond> {
-    match response {
-        Response::Ball => Box::new(ball::Ball::on_nodes(nodes, spring)),
-        Response::Printed => Box::new(Faces { nearest: false }),
-        Response::NearestFace => Box::new(Faces { nearest: true }),
-    }
 }
 
 /// The spring between tool and tissue.

@@ -16,9 +16,10 @@
 //! it, level by level.
 
 use super::volume_tree::{LEAF, Node, halved};
+use crate::bounded::push_bounded;
 use crate::extent::Extent;
 use crate::method::Descriptor;
-use crate::phase::{BroadPhase, Phased, box_of, push_bounded};
+use crate::phase::{BroadPhase, Phased, box_of};
 use crate::surface::distinct_rows;
 use trepan_geometry::{Aabb, Vec3};
 use trepan_mesh::Csr;

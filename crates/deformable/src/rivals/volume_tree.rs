@@ -23,8 +23,9 @@
 //! For one small tool: the refit costs more than a scan over all boxes. It pays with many points
 //! that lie far apart.
 
+use crate::bounded::push_bounded;
 use crate::extent::Extent;
-use crate::phase::{BroadPhase, Phased, box_of, push_bounded};
+use crate::phase::{BroadPhase, Phased, box_of};
 use crate::seam::{Search, SearchInputs};
 use trepan_geometry::{Aabb, Vec3};
 

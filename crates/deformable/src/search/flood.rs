@@ -2,9 +2,10 @@
 
 use super::lost::Lost;
 use crate::{
+    bounded::push_bounded,
     extent::Extent,
     narrow::{Hits, NONE},
-    phase::{box_of, push_bounded},
+    phase::box_of,
     scene::Scene,
 };
 
