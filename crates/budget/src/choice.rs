@@ -32,22 +32,20 @@ pub struct Neighbour<T> {
     pub in_time: bool,
 }
 
-/// Picks from (what, error, cost, whether it runs in time).
+/// Picks from what may be chosen.
 /// Of those in time, the cheapest within the tolerance, else the most accurate. If none runs in
 /// time, the cheapest. Ties go to the more accurate or cheaper one.
-pub(crate) fn choose<T: Copy>(judged: impl Iterator<Item = (T, f64, f64, bool)>, tolerance: f64) -> Option<Choice<T>> {
-    let all: Vec<Neighbour<T>> =
-        judged.map(|(what, error, cost, in_time)| Neighbour { what, error, cost, in_time }).collect();
-    let cheapest = |keep: &dyn Fn(&Neighbour<T>) -> bool| {
-        let order =
-            |a: &&Neighbour<T>, b: &&Neighbour<T>| (a.cost.total_cmp(&b.cost)).then(a.error.total_cmp(&b.error));
+pub(crate) fn choose<T: Copy>(all: impl Iterator<Item = Neighbour<T>>, tolerance: f64) -> Option<Choice<T>> {
+    let all: Vec<_> = all.collect();
+    let least = |keep: &dyn Fn(&Neighbour<T>) -> bool, key: fn(&Neighbour<T>) -> [f64; 2]| {
+        let order = |a: &&Neighbour<T>, b: &&Neighbour<T>| {
+            let (a, b) = (key(a), key(b));
+            a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
+        };
         all.iter().filter(|n| keep(n)).min_by(order).copied()
     };
-    let most_accurate = |keep: &dyn Fn(&Neighbour<T>) -> bool| {
-        let order =
-            |a: &&Neighbour<T>, b: &&Neighbour<T>| (a.error.total_cmp(&b.error)).then(a.cost.total_cmp(&b.cost));
-        all.iter().filter(|n| keep(n)).min_by(order).copied()
-    };
+    let cheapest = |keep: &dyn Fn(&Neighbour<T>) -> bool| least(keep, |n| [n.cost, n.error]);
+    let most_accurate = |keep: &dyn Fn(&Neighbour<T>) -> bool| least(keep, |n| [n.error, n.cost]);
     let taken = cheapest(&|n| n.in_time && n.error <= tolerance)
         .or_else(|| most_accurate(&|n| n.in_time))
         .or_else(|| cheapest(&|_| true))?;

@@ -68,19 +68,12 @@ pub(crate) fn check(machine: &Machine, scene: &Scene) -> Result<(), PlanError> {
     if let Some(&(field, value)) = positive.iter().chain(&scene.numbers()).find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
         return Err(PlanError::Value { field, value, must: "finite and above 0" });
     }
-    if scene.press_mm > scene.tool_radius_mm {
-        return Err(PlanError::Value {
-            field: "scene.press_mm",
-            value: scene.press_mm,
-            must: "at most scene.tool_radius_mm",
-        });
-    }
-    if scene.tissue_motion_mm > scene.probe_radius_mm {
-        let (field, value) = ("scene.tissue_motion_mm", scene.tissue_motion_mm);
-        return Err(PlanError::Value { field, value, must: "at most scene.probe_radius_mm" });
-    }
-    if scene.headroom < 1.0 {
-        return Err(PlanError::Value { field: "scene.headroom", value: scene.headroom, must: "finite and 1 or more" });
-    }
-    Ok(())
+    let limit = |field, value, must, is_met: bool| match is_met {
+        true => Ok(()),
+        false => Err(PlanError::Value { field, value, must }),
+    };
+    let (press, motion) = (scene.press_mm, scene.tissue_motion_mm);
+    limit("scene.press_mm", press, "at most scene.tool_radius_mm", press <= scene.tool_radius_mm)?;
+    limit("scene.tissue_motion_mm", motion, "at most scene.probe_radius_mm", motion <= scene.probe_radius_mm)?;
+    limit("scene.headroom", scene.headroom, "finite and 1 or more", scene.headroom >= 1.0)
 }

@@ -1,6 +1,6 @@
 //! The planner: selects bone, tissue and picture models.
 
-use crate::choice::{Choice, choose};
+use crate::choice::{Choice, Neighbour, choose};
 use crate::machine::check;
 use crate::step::{edge_mm, stable_dt_ms};
 use crate::{Bone, Machine, Picture, PlanError, Quality, Row, Rows, Scene, Setup, Tissue};
@@ -102,10 +102,9 @@ pub fn plan_with(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Plan, 
 }
 
 fn bone(machine: &Machine, scene: &Scene, rows: &Rows) -> Result<Choice<Bone>, PlanError> {
-    let longest = TICK_SHARE;
     let judged = rows.bone.iter().filter(|row| holds_walls(&row.what, scene.tool_radius_mm)).map(|row| {
         let cost = bone_cores(machine, scene, row);
-        (row.what, bone_error_n(scene, row), cost, cost <= longest)
+        Neighbour { what: row.what, error: bone_error_n(scene, row), cost, in_time: cost <= TICK_SHARE }
     });
     choose(judged, scene.force_error_n).ok_or(PlanError::NoRows("bone"))
 }
@@ -126,7 +125,8 @@ fn tissue(machine: &Machine, scene: &Scene, rows: &Rows, free: f64) -> Result<Ch
     let most = solver_cores(free) / scene.headroom;
     let judged = rows.tissue.iter().map(|row| {
         let cost = tissue_cores(machine, scene, row);
-        (row.what, row.error.at_most(&scene.tissue_features()), cost, cost <= most)
+        let error = row.error.at_most(&scene.tissue_features());
+        Neighbour { what: row.what, error, cost, in_time: cost <= most }
     });
     choose(judged, scene.displacement_mm).ok_or(PlanError::NoRows("tissue"))
 }
@@ -134,7 +134,8 @@ fn tissue(machine: &Machine, scene: &Scene, rows: &Rows, free: f64) -> Result<Ch
 fn picture(machine: &Machine, scene: &Scene, rows: &Rows, free: f64) -> Result<Choice<Picture>, PlanError> {
     let judged = rows.picture.iter().map(|row| {
         let cost = picture_cores(machine, scene, row);
-        (row.what, row.error.at_most(&scene.picture_features()), cost, cost <= free)
+        let error = row.error.at_most(&scene.picture_features());
+        Neighbour { what: row.what, error, cost, in_time: cost <= free }
     });
     choose(judged, scene.picture_error_percent).ok_or(PlanError::NoRows("picture"))
 }

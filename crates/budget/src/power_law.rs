@@ -11,8 +11,12 @@
 //! # When not to use it
 //! Far outside the features of the fitted scenes: a power law does not extrapolate far.
 
+use nalgebra::{Matrix3, Vector3};
+
 /// Number of features of a scene.
 pub const FEATURES: usize = 3;
+/// Features of a scene, or a slope for each.
+type Features = Vector3<f64>;
 /// Width of a conservative bound, in root mean squares of r.
 const WIDE: f64 = 2.5;
 /// Weight of the ridge term, in scenes.
@@ -53,10 +57,10 @@ impl PowerLaw {
             return None;
         }
         let count = measured.len() as f64;
-        let middle: [f64; FEATURES] = std::array::from_fn(|k| measured.iter().map(|(f, _)| f[k]).sum::<f64>() / count);
+        let middle = measured.iter().map(|(f, _)| Features::from(*f)).sum::<Features>() / count;
         let level = measured.iter().map(|(_, y)| y.ln()).sum::<f64>() / count;
-        let slopes = slopes(measured, &middle, level);
-        let offset = level - slopes.iter().zip(&middle).map(|(w, m)| w * m).sum::<f64>();
+        let slopes = slopes(measured, &middle, level)?;
+        let offset = level - slopes.dot(&middle);
         let mut law = Self { weights: [offset, slopes[0], slopes[1], slopes[2]], spread: 0.0, bound: 0.0 };
         let mut left: Vec<f64> = measured.iter().map(|(f, y)| (y / law.expected(f)).ln()).collect();
         left.sort_by(f64::total_cmp);
@@ -72,29 +76,15 @@ impl PowerLaw {
     }
 }
 
-/// Slopes of ridge-regularised least squares, by Gaussian elimination; the matrix is positive
-/// definite.
-fn slopes(measured: &[([f64; FEATURES], f64)], middle: &[f64; FEATURES], level: f64) -> [f64; FEATURES] {
-    let mut rows = [[0.0; FEATURES + 1]; FEATURES];
+/// Slopes of ridge-regularised least squares; the matrix is positive definite.
+fn slopes(measured: &[([f64; FEATURES], f64)], middle: &Features, level: f64) -> Option<Features> {
+    let (mut squares, mut moments) = (Matrix3::from_diagonal_element(RIDGE), Features::zeros());
     for (f, y) in measured {
-        for i in 0..FEATURES {
-            (0..FEATURES).for_each(|j| rows[i][j] += (f[i] - middle[i]) * (f[j] - middle[j]));
-            rows[i][FEATURES] += (f[i] - middle[i]) * (y.ln() - level);
-        }
+        let off = Features::from(*f) - middle;
+        squares += off * off.transpose();
+        moments += off * (y.ln() - level);
     }
-    (0..FEATURES).for_each(|i| rows[i][i] += RIDGE);
-    for i in 0..FEATURES {
-        for k in i + 1..FEATURES {
-            let share = rows[k][i] / rows[i][i];
-            (i..=FEATURES).for_each(|j| rows[k][j] -= share * rows[i][j]);
-        }
-    }
-    let mut slopes = [0.0; FEATURES];
-    for i in (0..FEATURES).rev() {
-        let known: f64 = (i + 1..FEATURES).map(|j| rows[i][j] * slopes[j]).sum();
-        slopes[i] = (rows[i][FEATURES] - known) / rows[i][i];
-    }
-    slopes
+    Some(squares.cholesky()?.solve(&moments))
 }
 
 #[cfg(test)]

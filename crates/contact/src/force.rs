@@ -10,6 +10,6 @@ pub trait ForceModel: Send {
     /// tick length.
     fn wrench(&mut self, tool: &ToolState, manifold: &ContactManifold, dt_ms: f32) -> Wrench;
 
-    /// Forgets all history, as after a pause or a tool change.
-    fn reset(&mut self);
+    /// Forgets all history, as after a pause or a tool change; nothing in a model without any.
+    fn reset(&mut self) {}
 }

@@ -30,8 +30,6 @@ impl ForceModel for Hooke {
     fn wrench(&mut self, tool: &ToolState, manifold: &ContactManifold, _dt_ms: f32) -> Wrench {
         pressed(tool, manifold, self.stiffness * manifold.depth_mm)
     }
-
-    fn reset(&mut self) {}
 }
 
 #[cfg(test)]

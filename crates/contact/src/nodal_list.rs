@@ -37,27 +37,14 @@ impl NodalContacts {
 
     /// Adds a spring that presses on a node; counts one that does not fit.
     pub fn push(&mut self, spring: NodalContact) {
-        if spring.is_empty() {
-            return;
-        }
-        match self.springs.len() < MAX_SPRINGS {
-            true => {
-                self.springs.reserve_exact(MAX_SPRINGS - self.springs.len());
-                self.springs.push(spring);
-            }
-            false => self.overflow += 1,
+        if !spring.is_empty() {
+            self.overflow += push_bounded(&mut self.springs, MAX_SPRINGS, spring);
         }
     }
 
     /// Adds the plane of a node that has none yet; counts one that does not fit.
     pub fn push_plane(&mut self, plane: PlaneContact) {
-        match self.planes.len() < MAX_PLANES {
-            true => {
-                self.planes.reserve_exact(MAX_PLANES - self.planes.len());
-                self.planes.push(plane);
-            }
-            false => self.overflow += 1,
-        }
+        self.overflow += push_bounded(&mut self.planes, MAX_PLANES, plane);
     }
 
     /// The planes, each of another node.
@@ -89,6 +76,17 @@ impl NodalContacts {
         }
         self.overflow = other.overflow;
     }
+}
+
+/// Adds an item to a list of at most `most`, whose memory is taken once; returns 1 when it does not
+/// fit.
+fn push_bounded<T>(list: &mut Vec<T>, most: usize, item: T) -> u32 {
+    if list.len() >= most {
+        return 1;
+    }
+    list.reserve_exact(most - list.len());
+    list.push(item);
+    0
 }
 
 impl Clone for NodalContacts {

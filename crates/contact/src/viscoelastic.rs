@@ -49,11 +49,9 @@ impl Default for Viscoelastic {
 
 impl ForceModel for Viscoelastic {
     fn wrench(&mut self, tool: &ToolState, manifold: &ContactManifold, _dt_ms: f32) -> Wrench {
-        let leaving = tool.velocity_at(manifold).dot(manifold.normal);
+        let leaving = tool.velocity_at(manifold.point).dot(manifold.normal);
         pressed(tool, manifold, self.stiffness * manifold.depth_mm - self.damping * leaving)
     }
-
-    fn reset(&mut self) {}
 }
 
 /// The wrench of a force of `size` N along the manifold's normal: nothing for no contact, a pull,
@@ -62,18 +60,6 @@ pub(crate) fn pressed(tool: &ToolState, manifold: &ContactManifold, size: f32) -
     let force = manifold.normal * size;
     let wrench = Wrench { force, torque: (manifold.point - tool.tip()).cross(force) + size * manifold.couple_mm };
     if manifold.touches() && size > 0.0 && wrench.is_finite() { wrench } else { Wrench::ZERO }
-}
-
-/// Velocity of the tool's material at a contact.
-pub(crate) trait VelocityAt {
-    /// Velocity at the manifold's point, world mm/ms.
-    fn velocity_at(&self, manifold: &ContactManifold) -> trepan_geometry::Vec3;
-}
-
-impl VelocityAt for ToolState {
-    fn velocity_at(&self, manifold: &ContactManifold) -> trepan_geometry::Vec3 {
-        self.twist.linear + self.twist.angular.cross(manifold.point - self.tip())
-    }
 }
 
 #[cfg(test)]

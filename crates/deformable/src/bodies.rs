@@ -25,17 +25,18 @@
 //! a step's motion.
 
 use crate::{
+    bounded::push_bounded,
     config::ConfigError,
     narrow::{Hits, NONE},
-    phase::BroadPhase,
+    phase::{BroadPhase, Indexed},
     rivals::HashedGrid,
     scene::Scene,
     step::{check_mesh, usual_cell_mm},
-    surface::MovingSurface,
+    surface::{MovingSurface, distinct_rows},
 };
 use trepan_contact::NodalContact;
 use trepan_geometry::{Aabb, Pose, ToolState, Vec3};
-use trepan_mesh::TetMesh;
+use trepan_mesh::{Surface, TetMesh};
 
 /// One border node of a body inside another.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,14 +79,12 @@ impl MeshCollision {
     pub fn between(body: &TetMesh, other: &TetMesh) -> Result<Self, ConfigError> {
         check_mesh(body)?;
         check_mesh(other)?;
-        let mut nodes: Vec<u32> = MovingSurface::of(body).triangles.iter().flatten().copied().collect();
-        nodes.sort_unstable();
-        nodes.dedup();
+        let nodes = distinct_rows([Surface::of(body).triangles.into_flattened().into_iter()].into_iter()).items;
         let (count, cell_mm) = (nodes.len(), usual_cell_mm(other));
         let mut rest_surface = MovingSurface::of(other);
         rest_surface.refit(&other.positions, crate::extent::Extent::EMPTY);
         Ok(Self {
-            phase: Box::new(HashedGrid::new(cell_mm, count, other.tets.len())),
+            phase: Box::new(Indexed::new(HashedGrid::new(cell_mm, count), other.tets.len())),
             points: vec![Vec3::ZERO; count],
             pairs: Vec::with_capacity(count * CANDIDATES),
             hits: Hits::with_points(count),
@@ -122,11 +121,7 @@ impl MeshCollision {
         let mut overflow = self.phase.pairs(&self.points, &mut self.pairs);
         self.test_pairs(other);
         for i in 0..self.nodes.len() {
-            let Some(contact) = self.contact(i, other) else { continue };
-            match out.len() < out.capacity() {
-                true => out.push(contact),
-                false => overflow += 1,
-            }
+            overflow += self.contact(i, other).map_or(0, |contact| push_bounded(out, contact));
         }
         overflow
     }
@@ -166,11 +161,19 @@ impl NodeContact {
     pub fn spring(&self, stiffness: f32, damping: f32) -> NodalContact {
         let mut spring = NodalContact::none();
         spring.add(self.node, 1.0);
-        for (node, weight) in self.triangle.into_iter().zip(self.weights) {
-            spring.add(node, -weight);
-        }
+        self.left_through().for_each(|(node, weight)| spring.add(node, -weight));
         (spring.normal, spring.stiffness, spring.damping) = (-self.normal, stiffness, damping);
         spring
+    }
+
+    /// Nodes of the triangle that it leaves through, with their weights.
+    fn left_through(&self) -> impl Iterator<Item = (u32, f32)> {
+        self.triangle.into_iter().zip(self.weights)
+    }
+
+    /// Force of a spring on the node, N.
+    fn force(&self, stiffness: f32) -> Vec3 {
+        self.normal * (stiffness * self.depth_mm)
     }
 }
 
@@ -178,21 +181,17 @@ impl NodeContact {
 /// node, and the opposite on the triangle that it leaves through.
 pub fn push_apart(contacts: &[NodeContact], stiffness: f32, on_body: &mut [Vec3], on_other: &mut [Vec3]) {
     for contact in contacts {
-        let force = contact.normal * (stiffness * contact.depth_mm);
+        let force = contact.force(stiffness);
         on_body[contact.node as usize] += force;
-        for (node, weight) in contact.triangle.into_iter().zip(contact.weights) {
-            on_other[node as usize] -= force * weight;
-        }
+        contact.left_through().for_each(|(node, weight)| on_other[node as usize] -= force * weight);
     }
 }
 
 /// [`push_apart`] for a body against itself.
 pub fn push_itself_apart(contacts: &[NodeContact], stiffness: f32, forces: &mut [Vec3]) {
     for contact in contacts {
-        let force = contact.normal * (stiffness * contact.depth_mm);
+        let force = contact.force(stiffness);
         forces[contact.node as usize] += force;
-        for (node, weight) in contact.triangle.into_iter().zip(contact.weights) {
-            forces[node as usize] -= force * weight;
-        }
+        contact.left_through().for_each(|(node, weight)| forces[node as usize] -= force * weight);
     }
 }

@@ -81,29 +81,19 @@ pub enum ConfigError {
 impl Config {
     /// Refuses what cannot work, naming the field.
     pub(crate) fn check(&self, tip_radius_mm: f32) -> Result<(), ConfigError> {
-        let positive = |field, value: f32| match value.is_finite() && value > 0.0 {
+        let must = |field, value: f64, must, is_met: bool| match is_met {
             true => Ok(()),
-            false => Err(ConfigError::Value { field, value: value.into(), must: "finite and above 0" }),
+            false => Err(ConfigError::Value { field, value, must }),
         };
+        let positive =
+            |field, value: f32| must(field, value.into(), "finite and above 0", value.is_finite() && value > 0.0);
         positive("tool.tip_radius_mm", tip_radius_mm)?;
         positive("stiffness", self.stiffness)?;
-        if let Some(cell_mm) = self.cell_mm {
-            positive("cell_mm", cell_mm)?;
-        }
-        if !(self.damping.is_finite() && self.damping >= 0.0) {
-            return Err(ConfigError::Value {
-                field: "damping",
-                value: self.damping.into(),
-                must: "finite and 0 or more",
-            });
-        }
-        if !(0.0..=2.0).contains(&self.friction) {
-            return Err(ConfigError::Value { field: "friction", value: self.friction.into(), must: "0 to 2" });
-        }
-        if !(1..=MAX_POINTS).contains(&self.points) {
-            return Err(ConfigError::Value { field: "points", value: self.points as f64, must: "1 to 65536" });
-        }
-        Ok(())
+        self.cell_mm.map_or(Ok(()), |cell_mm| positive("cell_mm", cell_mm))?;
+        let damped = self.damping.is_finite() && self.damping >= 0.0;
+        must("damping", self.damping.into(), "finite and 0 or more", damped)?;
+        must("friction", self.friction.into(), "0 to 2", (0.0..=2.0).contains(&self.friction))?;
+        must("points", self.points as f64, "1 to 65536", (1..=MAX_POINTS).contains(&self.points))
     }
 }
 

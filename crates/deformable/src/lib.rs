@@ -18,6 +18,7 @@
 //! For cutting: connections of the mesh are fixed.
 
 mod bodies;
+mod bounded;
 mod config;
 mod extent;
 mod list;
@@ -39,7 +40,7 @@ pub use bodies::{MeshCollision, NodeContact, push_apart, push_itself_apart};
 pub use config::{Config, ConfigError};
 pub use method::{Descriptor, Method, Response};
 pub use outcome::TissueStep;
-pub use phase::{BroadPhase, Phased};
+pub use phase::{BroadPhase, Indexed, Phased};
 pub use seam::{Search, SearchInputs};
 pub use step::TissueCollision;
 pub use wall::{Hollow, SlidingWall};

@@ -1,8 +1,10 @@
 //! The methods of this crate.
 
-use crate::method::{Descriptor, Method};
+use crate::method::{Descriptor, Method, Response};
+use crate::response::{Ball, Respond, Spring};
 #[cfg(feature = "parry")]
 use crate::rivals::parry_tree;
+use crate::rivals::printed::Faces;
 use crate::rivals::{aabb, brute, hashed_grid, hybrid_tree, k_dop, kd_tree};
 use crate::rivals::{obb, octree, sphere, thesis, uniform_grid};
 use crate::search::walk;
@@ -35,6 +37,15 @@ impl Method {
     /// The method of this name.
     pub fn named(name: &str) -> Option<Self> {
         METHODS.iter().find(|descriptor| descriptor.name == name).map(Self::of)
+    }
+}
+
+/// The response for a mesh of so many nodes.
+pub(crate) fn responder(response: Response, nodes: usize, spring: Spring) -> Box<dyn Respond> {
+    match response {
+        Response::Ball => Box::new(Ball::on_nodes(nodes, spring)),
+        Response::Printed => Box::new(Faces { nearest: false }),
+        Response::NearestFace => Box::new(Faces { nearest: true }),
     }
 }
 

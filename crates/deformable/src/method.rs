@@ -27,12 +27,9 @@ pub struct Descriptor {
 }
 
 impl Descriptor {
-    /// A broad phase with the recommended response: [`Phased`](crate::Phased) makes its search.
-    pub const fn of_phase(
-        name: &'static str,
-        source: &'static str,
-        build: fn(&SearchInputs) -> Box<dyn Search>,
-    ) -> Self {
+    /// A method that finds every point and answers with the recommended response. The search of a
+    /// broad phase is [`Phased`](crate::Phased).
+    pub const fn of(name: &'static str, source: &'static str, build: fn(&SearchInputs) -> Box<dyn Search>) -> Self {
         let response = Response::RECOMMENDED;
         Self { name, source, response, is_oracle: false, is_complete: true, uses_surface: false, build }
     }

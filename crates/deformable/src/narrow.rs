@@ -81,7 +81,7 @@ impl Hits {
         let weights = frame.weights(scene.points[i]);
         if is_inside(&weights) {
             self.tet[i] = tet;
-            self.weights[i] = [weights[0] as f32, weights[1] as f32, weights[2] as f32, weights[3] as f32];
+            self.weights[i] = weights.map(|weight| weight as f32);
         }
         Some(weights)
     }

@@ -1,10 +1,11 @@
 //! Broad phases: from moving boxes to few pairs of point and tetrahedron, each of which gets the
 //! exact test.
 
+use crate::bounded::push_bounded;
 use crate::extent::Extent;
 use crate::narrow::{Hits, NONE};
 use crate::scene::Scene;
-use crate::seam::Search;
+use crate::seam::{Search, SearchInputs};
 use crate::surface::MovingSurface;
 use glam::Vec3A;
 use trepan_geometry::{Aabb, Vec3};
@@ -32,34 +33,60 @@ pub(crate) fn box_of(positions: &[Vec3], tet: &[u32; 4]) -> Extent {
     Extent { low: a.min(b).min(c.min(d)), high: a.max(b).max(c.max(d)) }
 }
 
-/// The boxes of a mesh's tetrahedra that meet a region, in order.
-#[derive(Debug, Default)]
-pub(crate) struct TetBoxes {
-    pub boxes: Vec<(u32, Extent)>,
+/// The points of a step, sorted so that a box finds those inside it.
+pub(crate) trait PointIndex: Send {
+    /// Takes the points of a step; those that are not finite are left out.
+    fn place(&mut self, points: &[Vec3]);
+
+    /// Calls `found` once for each placed point inside `bounds`.
+    fn visit(&self, points: &[Vec3], bounds: &Extent, found: impl FnMut(u32));
 }
 
-impl TetBoxes {
-    pub(crate) fn with_capacity(tets: usize) -> Self {
-        Self { boxes: Vec::with_capacity(tets) }
-    }
+/// Fills `out`, up to its capacity, with the numbers of the finite points.
+pub(crate) fn list_finite(points: &[Vec3], out: &mut Vec<u32>) {
+    out.clear();
+    let finite = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite());
+    out.extend(finite.take(out.capacity()));
+}
 
-    pub(crate) fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
+/// The broad phase by an index of the points, which the boxes of the tetrahedra ask.
+#[derive(Debug)]
+pub struct Indexed<I> {
+    /// The index.
+    pub index: I,
+    /// Boxes that meet the region, in order.
+    boxes: Vec<(u32, Extent)>,
+}
+
+impl<I> Indexed<I> {
+    /// For at most so many tetrahedra.
+    pub fn new(index: I, tets: usize) -> Self {
+        Self { index, boxes: Vec::with_capacity(tets) }
+    }
+}
+
+impl<I: PointIndex> BroadPhase for Indexed<I> {
+    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
         self.boxes.clear();
         let region = Extent::from(*region);
         let met = tets.iter().enumerate().map(|(t, tet)| (t as u32, box_of(positions, tet)));
         self.boxes.extend(met.filter(|(_, b)| b.overlaps(&region)).take(self.boxes.capacity()));
     }
+
+    fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
+        out.clear();
+        self.index.place(points);
+        let mut overflow = 0;
+        for (tet, bounds) in &self.boxes {
+            self.index.visit(points, bounds, |point| overflow += push_bounded(out, [point, *tet]));
+        }
+        overflow
+    }
 }
 
-/// Adds a pair when it fits; returns 1 when it does not.
-pub(crate) fn push_bounded(out: &mut Vec<[u32; 2]>, pair: [u32; 2]) -> u32 {
-    match out.len() < out.capacity() {
-        true => {
-            out.push(pair);
-            0
-        }
-        false => 1,
-    }
+/// The search by an index of the points.
+pub(crate) fn indexed(inputs: &SearchInputs, index: impl PointIndex + 'static) -> Box<dyn Search> {
+    Box::new(Phased::new(Indexed::new(index, inputs.mesh.tets.len()), inputs.points))
 }
 
 /// The search by any [`BroadPhase`] and the exact test on each of its pairs.

@@ -24,8 +24,7 @@ pub struct Scene<'a> {
 impl Scene<'_> {
     #[inline]
     pub(crate) fn corners(&self, tet: u32) -> [Vec3; 4] {
-        let [a, b, c, d] = self.tets[tet as usize];
-        [self.positions[a as usize], self.positions[b as usize], self.positions[c as usize], self.positions[d as usize]]
+        self.tets[tet as usize].map(|node| self.positions[node as usize])
     }
 
     /// Box of the ball.
@@ -36,10 +35,5 @@ impl Scene<'_> {
     /// Number of the last point, the centre.
     pub(crate) fn centre(&self) -> usize {
         self.points.len() - 1
-    }
-
-    /// Velocity of the tool's body at a world point, mm/ms.
-    pub(crate) fn tool_velocity_at(&self, point: Vec3) -> Vec3 {
-        self.tool.twist.linear + self.tool.twist.angular.cross(point - self.tool.tip())
     }
 }

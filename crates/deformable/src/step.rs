@@ -1,9 +1,10 @@
 //! One collision step, readable as a list: place the points, fit the surface, find, respond.
 
 use crate::config::{Config, ConfigError};
+use crate::list::responder;
 use crate::narrow::{Hits, NONE};
 use crate::outcome::TissueStep;
-use crate::response::{Friction, Responder, Shaft, Spring, finish};
+use crate::response::{Answer, Friction, Respond, Shaft, Spring};
 use crate::scene::Scene;
 use crate::seam::{Search, SearchInputs};
 use crate::surface::MovingSurface;
@@ -23,7 +24,7 @@ pub struct TissueCollision {
     points: Vec<Vec3>,
     surface: MovingSurface,
     search: Box<dyn Search>,
-    responder: Responder,
+    responder: Box<dyn Respond>,
     uses_surface: bool,
     hits: Hits,
     spring: Spring,
@@ -43,9 +44,10 @@ impl TissueCollision {
         let shell = Pointshell::sphere(tool.tip_radius_mm, config.points, Spread::Fibonacci);
         let count = shell.points.len() + 1;
         let cell_mm = config.cell_mm.unwrap_or_else(|| usual_cell_mm(mesh));
-        let shaft = if config.shaft { Shaft::new(tool, mesh.tets.len()) } else { None };
+        let spring = Spring { stiffness: config.stiffness, damping: config.damping };
+        let shaft = if config.shaft { Shaft::new(tool, mesh.tets.len(), spring) } else { None };
         let method = config.method.descriptor();
-        let responder = Responder::new(config.response.unwrap_or(method.response), mesh.positions.len());
+        let responder = responder(config.response.unwrap_or(method.response), mesh.positions.len(), spring);
         Ok(Self {
             neighbours: Topology::of(mesh).neighbours,
             tets: mesh.tets.clone(),
@@ -58,7 +60,7 @@ impl TissueCollision {
             responder,
             hits: Hits::with_points(count),
             shell,
-            spring: Spring { stiffness: config.stiffness, damping: config.damping },
+            spring,
             friction: Friction::default(),
             friction_coefficient: config.friction,
             shaft,
@@ -86,20 +88,20 @@ impl TissueCollision {
         self.search.find(&scene, &mut self.surface, &mut self.hits);
         count(&self.hits, out);
         let answer = self.responder.respond(&scene, &self.hits, &mut self.surface, out);
-        let contact = match answer {
-            Some(answer) => finish(&scene, &answer, self.spring, out).then_some((answer.normal, answer.depth_mm)),
+        let is_sound = match &answer {
+            Some(answer) => self.spring.finish(&scene, answer, out),
             None => {
                 out.forget_contact();
-                Some((Vec3::ZERO, 0.0))
+                true
             }
         };
-        if let Some(contact) = contact {
-            let springs = &mut out.surface_springs;
-            out.overflow += self.responder.press(&scene, &self.surface, contact, self.spring, springs);
+        if is_sound {
+            let answer = answer.unwrap_or(Answer { normal: Vec3::ZERO, depth_mm: 0.0 });
+            out.overflow += self.responder.press(&scene, &self.surface, &answer, &mut out.surface_springs);
         }
         out.friction_n = self.friction.drag(&scene, self.friction_coefficient, out);
         if let Some(shaft) = &mut self.shaft
-            && let Some((contact, nodal)) = shaft.respond(&scene, &mut self.surface, &self.spring, &mut out.overflow)
+            && let Some((contact, nodal)) = shaft.respond(&scene, &mut self.surface, &mut out.overflow)
         {
             (out.shaft, out.shaft_nodal) = (contact, nodal);
         }

@@ -20,7 +20,7 @@
 //! Cost: 3 ns for each node of a fitted box, 3 ns for each group of 16 clusters, 10 ns for each
 //! triangle near the tool. Triangles with a NaN corner are skipped.
 
-use crate::{extent::Extent, narrow::NONE, triangle};
+use crate::{bounded::push_bounded, extent::Extent, narrow::NONE, triangle};
 use glam::Vec3A;
 use trepan_geometry::Vec3;
 use trepan_mesh::{Csr, Surface, TetMesh};
@@ -81,7 +81,8 @@ impl MovingSurface {
         let area = |corners: [Vec3; 3]| 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
         let rest_area_mm2 = triangles.iter().map(|nodes| area(nodes.map(|n| mesh.positions[n as usize]))).collect();
         let around = triangles.iter().enumerate().flat_map(|(t, nodes)| nodes.map(|n| (n, t as u32)));
-        let nodes_of_cluster = nodes_of_clusters(&triangles);
+        let nodes_of_cluster =
+            distinct_rows(triangles.chunks(CLUSTER).map(|cluster| cluster.iter().flatten().copied()));
         let clusters = nodes_of_cluster.len();
         Self {
             triangles_of_node: Csr::of_pairs(mesh.positions.len(), around),
@@ -164,10 +165,7 @@ impl MovingSurface {
     pub(crate) fn gather(&mut self, positions: &[Vec3], region: &Extent, near: &mut Vec<u32>) -> u32 {
         near.clear();
         let mut overflow = 0;
-        let mut take = |t: u32| match near.len() < near.capacity() {
-            true => near.push(t),
-            false => overflow += 1,
-        };
+        let mut take = |t: u32| overflow += push_bounded(near, t);
         if self.region.holds(region) {
             self.here.iter().filter(|(_, bounds)| bounds.overlaps(region)).for_each(|&(t, _)| take(t));
             return overflow;
@@ -344,13 +342,14 @@ fn spread_bits(x: u32) -> u32 {
     (x | x << 2) & 0x0924_9249
 }
 
-fn nodes_of_clusters(triangles: &[[u32; 3]]) -> Csr {
+/// Rows of numbers, each sorted and without repetition.
+pub(crate) fn distinct_rows(rows: impl Iterator<Item = impl Iterator<Item = u32>>) -> Csr {
     let mut csr = Csr { starts: vec![0], items: Vec::new() };
-    for cluster in triangles.chunks(CLUSTER) {
-        let mut nodes: Vec<u32> = cluster.iter().flatten().copied().collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        csr.items.extend(nodes);
+    for row in rows {
+        let mut row: Vec<u32> = row.collect();
+        row.sort_unstable();
+        row.dedup();
+        csr.items.extend(row);
         csr.starts.push(csr.items.len() as u32);
     }
     csr

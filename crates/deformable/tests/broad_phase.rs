@@ -5,18 +5,18 @@ mod common;
 
 use common::{Random, block, deformed};
 use glam::{DVec3, Vec3};
-use trepan_deformable::BroadPhase;
 use trepan_deformable::rivals::*;
+use trepan_deformable::{BroadPhase, Indexed};
 use trepan_geometry::Aabb;
 use trepan_mesh::TetMesh;
 
 fn all(mesh: &TetMesh, cell_mm: f32, points: usize) -> Vec<(&'static str, Box<dyn BroadPhase>)> {
     let tets = mesh.tets.len();
     vec![
-        ("uniform grid", Box::new(UniformGrid::new(cell_mm, points, tets))),
-        ("hashed grid", Box::new(HashedGrid::new(cell_mm, points, tets))),
-        ("octree", Box::new(Octree::new(points, tets))),
-        ("k-d tree", Box::new(KdTree::new(points, tets))),
+        ("uniform grid", Box::new(Indexed::new(UniformGrid::new(cell_mm, points), tets))),
+        ("hashed grid", Box::new(Indexed::new(HashedGrid::new(cell_mm, points), tets))),
+        ("octree", Box::new(Indexed::new(Octree::new(points), tets))),
+        ("k-d tree", Box::new(Indexed::new(KdTree::new(points), tets))),
         ("box tree", Box::new(VolumeTree::<Aabox>::new(&mesh.positions, &mesh.tets))),
         ("ball tree", Box::new(VolumeTree::<Sphere>::new(&mesh.positions, &mesh.tets))),
         ("k-DOP tree", Box::new(VolumeTree::<KDop>::new(&mesh.positions, &mesh.tets))),

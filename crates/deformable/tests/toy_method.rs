@@ -9,7 +9,7 @@ struct Toy {
     tets: u32,
 }
 
-const TOY: Descriptor = Descriptor::of_phase("toy", "none", |inputs| {
+const TOY: Descriptor = Descriptor::of("toy", "none", |inputs| {
     Box::new(Phased::new(Toy { tets: inputs.mesh.tets.len() as u32 }, inputs.points))
 });
 

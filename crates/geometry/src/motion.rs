@@ -119,6 +119,12 @@ impl ToolState {
         self.world_from_tool.translation
     }
 
+    /// Velocity of the tool's body at a world point, mm/ms.
+    #[inline]
+    pub fn velocity_at(&self, point: Vec3) -> Vec3 {
+        self.twist.linear + self.twist.angular.cross(point - self.tip())
+    }
+
     /// Whether pose and velocity are all finite and the rotation is a unit quaternion to 1e-3.
     #[inline]
     pub fn is_finite(&self) -> bool {

@@ -50,6 +50,11 @@ impl Pointshell {
             inward_normals: directions.iter().map(|&d| -d).collect(),
         }
     }
+
+    /// Each point with its inward normal.
+    pub fn iter(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        self.points.iter().copied().zip(self.inward_normals.iter().copied())
+    }
 }
 
 /// `count` unit directions on the Fibonacci lattice.

@@ -259,19 +259,9 @@ impl GodObjectSphere {
     /// The ball at the proxy.
     fn ball(&self, bone: &BoneVolume) -> Ball {
         let inside = bone.is_bone(bone.voxel_of(self.proxy.translation));
-        Ball { radius: self.ball_mm / bone.spacing_mm(), inside, shaft: self.shaft(bone) }
-    }
-
-    /// The shaft as seen from the tip, grid units.
-    fn shaft(&self, bone: &BoneVolume) -> Shaft {
-        let Tool { tip_radius_mm, shaft_radius_mm, shaft_length_mm, .. } = self.tool;
-        let spacing = bone.spacing_mm();
-        Shaft {
-            start: Vec3::ZERO,
-            axis: self.proxy.rotation * Vec3::Z,
-            span: (tip_radius_mm / spacing, shaft_length_mm.max(tip_radius_mm) / spacing),
-            radius: shaft_radius_mm / spacing,
-        }
+        // Seen from the tip.
+        let shaft = Shaft::of(&self.tool, bone, Vec3::ZERO, self.proxy.rotation * Vec3::Z);
+        Ball { radius: self.ball_mm / bone.spacing_mm(), inside, shaft }
     }
 
     /// Lets the ball become smaller where it works or is jammed, at a rate that a hand does not
@@ -547,28 +537,20 @@ impl RigidContact for GodObjectSphere {
 
 /// The ball alone.
 pub const METHOD: Descriptor = Descriptor {
-    name: "god-object-sphere",
     former_names: &["distance-field"], // version 0.1
-    source: "Ruspini et al. 1997, Xu and Barbič 2017",
-    extent: Extent::Ball,
     has_proxy: true,
-    is_oracle: false,
-    points: 0,
-    removal: RemovalLaw::RATE,
-    build: |tool, _| Box::new(GodObjectSphere::new(tool, Config::RECOMMENDED)),
+    ..Descriptor::of("god-object-sphere", "Ruspini et al. 1997, Xu and Barbič 2017", |tool, _| {
+        Box::new(GodObjectSphere::new(tool, Config::RECOMMENDED))
+    })
 };
 
 /// The ball and the shaft.
 pub const WITH_SHAFT: Descriptor = Descriptor {
     name: "god-object-sphere-shaft",
     former_names: &["distance-field-shaft"], // version 0.1
-    source: "Ruspini et al. 1997, Xu and Barbič 2017",
     extent: Extent::BallAndShaft,
-    has_proxy: true,
-    is_oracle: false,
-    points: 0,
-    removal: RemovalLaw::RATE,
     build: |tool, _| Box::new(GodObjectSphere::new(tool, Config::WITH_SHAFT)),
+    ..METHOD
 };
 
 impl Method {

@@ -38,20 +38,18 @@
 //!
 //! # When not to use it
 //! For soft tissue, or for bones that move: the bone is fixed in the world. Tools that are not
-//! round at the tip have [`mesh_shell`] and a penalty method only.
+//! round at the tip have [`mesh_shell`](rivals::mesh_shell) and a penalty method only.
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 mod readme {}
 
 mod ball;
-mod cell;
 mod chain;
 pub mod god_object_sphere;
 mod half_spaces;
 mod lean;
 mod list;
-pub mod mesh_shell;
 mod method;
 pub mod removal;
 pub mod rivals;
@@ -60,10 +58,7 @@ mod seam;
 mod shaft;
 pub mod spindle;
 mod surface;
-mod sweep;
-mod traverse;
 mod window;
 
 pub use method::{Descriptor, Extent, Method};
 pub use seam::{RigidContact, RigidStep};
-pub use sweep::Sweep;

@@ -35,6 +35,18 @@ pub struct Descriptor {
     pub build: fn(&Tool, usize) -> Box<dyn RigidContact>,
 }
 
+impl Descriptor {
+    /// A method that feels the ball, without proxy and points, with the default law of removal.
+    pub const fn of(
+        name: &'static str,
+        source: &'static str,
+        build: fn(&Tool, usize) -> Box<dyn RigidContact>,
+    ) -> Self {
+        let (extent, removal) = (Extent::Ball, RemovalLaw::RATE);
+        Self { name, former_names: &[], source, extent, has_proxy: false, is_oracle: false, points: 0, removal, build }
+    }
+}
+
 /// Which part of a tool a method feels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {

@@ -181,6 +181,7 @@ struct Bite {
 }
 
 /// The cutting side of one tool.
+#[derive(Default)]
 pub(crate) struct Burr {
     law: RemovalLaw,
     bites: Vec<Bite>,
@@ -198,15 +199,7 @@ pub(crate) struct Burr {
 impl Burr {
     /// A burr that reaches at most `limit` voxels a tick.
     pub fn new(law: RemovalLaw, limit: usize) -> Self {
-        Self {
-            law,
-            bites: Vec::with_capacity(limit),
-            limit,
-            tick: 0,
-            opened: false,
-            stalled: false,
-            forward: Vec3::ZERO,
-        }
+        Self { law, bites: Vec::with_capacity(limit), limit, ..Self::default() }
     }
 
     /// Starts the dither and a stalled spindle anew.

@@ -19,6 +19,9 @@ pub(crate) struct GridBall {
 }
 
 impl GridBall {
+    /// Has no voxel.
+    pub const NONE: Self = Self { centre: Vec3::ZERO, radius: -1.0 };
+
     /// Half the length of the ball's row at (j, k); none where it has no row.
     fn half(&self, j: i32, k: i32) -> Option<f32> {
         let across = (j as f32 - self.centre.y).powi(2) + (k as f32 - self.centre.z).powi(2);
@@ -52,6 +55,16 @@ pub(crate) fn rows_within(ball: GridBall, hole: GridBall, within: (IVec3, IVec3)
                 }
                 None => visit(IVec3::new(from, j, k), to),
             }
+        }
+    }
+}
+
+/// Calls `visit` with each voxel of a box from `start` to before `end`, x fastest.
+#[inline]
+pub(crate) fn each(start: IVec3, end: IVec3, mut visit: impl FnMut(IVec3)) {
+    for k in start.z..end.z {
+        for j in start.y..end.y {
+            (start.x..end.x).for_each(|i| visit(IVec3::new(i, j, k)));
         }
     }
 }

@@ -16,7 +16,7 @@
 //! Grid coordinates. About a microsecond for a shaft in the air, one load per voxel near bone.
 
 use glam::IVec3;
-use trepan_geometry::Vec3;
+use trepan_geometry::{Tool, Vec3};
 use trepan_volume::BoneVolume;
 
 /// Length of a slice, voxels.
@@ -36,6 +36,14 @@ pub(crate) struct Shaft {
 }
 
 impl Shaft {
+    /// The shaft of a tool whose tip is at `start`, with its unit `axis`.
+    pub fn of(tool: &Tool, bone: &BoneVolume, start: Vec3, axis: Vec3) -> Self {
+        let &Tool { tip_radius_mm, shaft_radius_mm, shaft_length_mm, .. } = tool;
+        let spacing = bone.spacing_mm();
+        let span = (tip_radius_mm / spacing, shaft_length_mm.max(tip_radius_mm) / spacing);
+        Self { start, axis, span, radius: shaft_radius_mm / spacing }
+    }
+
     /// Place along the shaft of what is nearest to `point`.
     pub fn along(&self, point: Vec3) -> f32 {
         (point - self.start).dot(self.axis).clamp(self.span.0, self.span.1)

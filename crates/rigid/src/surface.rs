@@ -51,7 +51,8 @@ const SAME: f32 = 0.8;
 /// Smallest disc, voxels.
 const SMALLEST: f32 = 0.2;
 
-const NEIGHBOURS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
+/// The ways from a voxel to those that share a face with it.
+pub(crate) const NEIGHBOURS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
 
 /// A piece of surface.
 #[derive(Clone, Copy, Debug, Default)]
@@ -73,7 +74,9 @@ pub(crate) trait Densities {
     /// Density of a voxel, HU.
     fn hu(&self, voxel: IVec3) -> i16;
     /// Densities of a voxel and the next two along x, HU.
-    fn three(&self, voxel: IVec3) -> [i16; 3];
+    fn three(&self, voxel: IVec3) -> [i16; 3] {
+        core::array::from_fn(|i| self.hu(voxel.with_x(voxel.x + i as i32)))
+    }
 }
 
 impl Densities for Window {
@@ -99,13 +102,10 @@ impl Densities for BoneVolume {
     fn hu(&self, voxel: IVec3) -> i16 {
         BoneVolume::hu(self, voxel)
     }
-
-    fn three(&self, voxel: IVec3) -> [i16; 3] {
-        core::array::from_fn(|i| BoneVolume::hu(self, voxel.with_x(voxel.x + i as i32)))
-    }
 }
 
 /// The discs near a point, gathered anew for each place of the tool.
+#[derive(Default)]
 pub(crate) struct Discs {
     /// Voxel at the origin of the discs' frame.
     pub base: IVec3,
@@ -170,20 +170,9 @@ fn keep(before: &mut [Before], base: IVec3, edge: &Edge, disc: &Disc, wear: u32)
 impl Discs {
     /// Room for `limit` discs, each of at most `radius` voxels.
     pub fn new(limit: usize, radius: f32) -> Self {
-        let (list, edges) = (Vec::with_capacity(limit), Vec::with_capacity(limit));
-        Self {
-            base: IVec3::ZERO,
-            visited: 0,
-            voxels: 0,
-            overflow: 0,
-            bounds: (IVec3::MAX, IVec3::MIN),
-            list,
-            edges,
-            before: vec![Before::default(); CACHE],
-            wear: 0,
-            limit,
-            radius,
-        }
+        let (list, edges, before) =
+            (Vec::with_capacity(limit), Vec::with_capacity(limit), vec![Before::default(); CACHE]);
+        Self { bounds: (IVec3::MAX, IVec3::MIN), list, edges, before, limit, radius, ..Self::default() }
     }
 
     /// Drops all discs.

@@ -14,6 +14,7 @@
 //! changes it is told ([`Window::set`]), what others change it finds by the versions of the bricks
 //! that it meets ([`Window::renew`]), a nanosecond each.
 
+use crate::rows::each;
 use glam::IVec3;
 use trepan_volume::{BRICK, BoneVolume};
 
@@ -108,13 +109,7 @@ impl Window {
         }
         let of = |voxel: IVec3| voxel.div_euclid(IVec3::splat(BRICK as i32));
         let (first, last) = (of(self.low), of(self.low + (1 << self.bits) - 1));
-        for k in first.z..=last.z {
-            for j in first.y..=last.y {
-                for i in first.x..=last.x {
-                    visit(self, IVec3::new(i, j, k));
-                }
-            }
-        }
+        each(first, last + 1, |brick| visit(self, brick));
     }
 
     fn see(&mut self, bone: &BoneVolume, brick: IVec3) {
@@ -122,15 +117,10 @@ impl Window {
     }
 
     fn read(&mut self, bone: &BoneVolume, from: IVec3, to: IVec3) {
-        for k in from.z..to.z {
-            for j in from.y..to.y {
-                for i in from.x..to.x {
-                    let voxel = IVec3::new(i, j, k);
-                    let at = self.index(voxel);
-                    self.cells[at] = bone.hu(voxel);
-                }
-            }
-        }
+        each(from, to, |voxel| {
+            let at = self.index(voxel);
+            self.cells[at] = bone.hu(voxel);
+        });
     }
 
     fn index(&self, voxel: IVec3) -> usize {

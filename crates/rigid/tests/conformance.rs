@@ -3,7 +3,7 @@
 mod common;
 use common::{at, bone, directions, held, walk};
 use trepan_geometry::{Pose, Quat, Tool, ToolState, Vec3};
-use trepan_rigid::rivals::{centre_line, pointshell, thesis};
+use trepan_rigid::rivals::{centre_line, mesh_shell, pointshell, thesis};
 use trepan_rigid::{Extent, Method, RigidContact, RigidStep};
 use trepan_volume::BoneVolume;
 
@@ -284,7 +284,7 @@ fn a_tool_of_any_shape_is_pushed_and_turned_where_its_mesh_touches() {
     let positions: Vec<Vec3> = (0..8).map(corner).collect();
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles: Vec<[u32; 3]> = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let shell = trepan_rigid::mesh_shell::of_mesh(&positions, &triangles, 0.4).unwrap();
+    let shell = mesh_shell::of_mesh(&positions, &triangles, 0.4).unwrap();
     let tool = Tool::probe(1.0);
     let mut contact = pointshell::with_shell(&tool, shell, &Default::default());
     let bone = bone([40, 28, 28], 0.5, |p| p.z.max(-p.x));

@@ -19,7 +19,7 @@
 //! # When not to use it
 //! When nothing is copied (t_p = 0): then larger is always better, up to the memory.
 
-use crate::error::{VoxelSizeError, checked};
+use crate::error::{VoxelSizeError, checked, positive};
 
 /// A volume, a tool, and the cost of each operation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,8 +57,6 @@ impl Bricks {
     }
 
     fn check(&self) -> Result<(), VoxelSizeError> {
-        let positive =
-            |field, value: f64| checked(field, value, value > 0.0 && value.is_finite(), "positive and finite");
         positive("voxel_mm", self.voxel_mm)?;
         positive("tool_mm", self.tool_mm)?;
         positive("visit", self.visit)?;

@@ -20,7 +20,7 @@
 //! counts ([`crate::counts`]).
 
 use crate::Measures;
-use crate::error::{VoxelSizeError, checked};
+use crate::error::{VoxelSizeError, checked, positive};
 
 /// The two constants of the cost function.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,28 +62,29 @@ impl CostModel {
 
     /// The cheapest cell edge, mm: the positive root of the cubic, in closed form.
     pub fn analytic(&self, measures: &Measures) -> Result<f64, VoxelSizeError> {
-        self.check()?;
-        let s = measures.checked()?.longest_edge_mm;
-        // In x = δ / s:  x³ − x²/4 − k = 0.
-        let k = 3.0 * self.p_nc / (4.0 * self.q() * particle_density(measures) * s * s);
+        let (s, k) = self.cubic(measures)?;
         Ok(s * root(k))
     }
 
     /// The cheapest cell edge, mm, by golden-section search on the logarithm of δ.
     pub fn minimised(&self, measures: &Measures) -> Result<f64, VoxelSizeError> {
-        self.check()?;
-        let s = measures.checked()?.longest_edge_mm;
-        let k = 3.0 * self.p_nc / (4.0 * self.q() * particle_density(measures) * s * s);
+        let (s, k) = self.cubic(measures)?;
         // The root of x³ − x²/4 = k lies between 1/4 and 1/4 + ∛k.
         let (low, high) = ((0.2 * s).ln(), (s * (0.3 + k.cbrt())).ln());
         Ok(golden_section(|log| self.cost(measures, log.exp()), low, high, 80).exp())
     }
 
+    /// s and k of the cubic, which is x³ − x²/4 − k = 0 in x = δ / s.
+    fn cubic(&self, measures: &Measures) -> Result<(f64, f64), VoxelSizeError> {
+        self.check()?;
+        let s = measures.checked()?.longest_edge_mm;
+        Ok((s, 3.0 * self.p_nc / (4.0 * self.q() * particle_density(measures) * s * s)))
+    }
+
     /// Checks that the parameters are in range.
     pub fn check(&self) -> Result<(), VoxelSizeError> {
         checked("p_nc", self.p_nc, (0.0..1.0).contains(&self.p_nc), "at least 0 and less than 1")?;
-        checked("r_t", self.r_t, self.r_t > 0.0 && self.r_t.is_finite(), "positive and finite")?;
-        Ok(())
+        positive("r_t", self.r_t).map(|_| ())
     }
 }
 

@@ -11,7 +11,7 @@
 //! Cells are `floor(x / cell)`, half open, with the world origin at 0. At most [`MAX_CELLS`] cells
 //! around the particles; visits outside them count too.
 
-use crate::error::{VoxelSizeError, checked};
+use crate::error::{VoxelSizeError, positive};
 use glam::{DVec3, I64Vec3};
 use trepan_geometry::{Aabb, Vec3};
 use trepan_mesh::TetMesh;
@@ -44,7 +44,7 @@ pub fn boxes(mesh: &TetMesh) -> Vec<Aabb> {
 
 /// Counts the work of a grid with cells of `cell_mm` for these boxes and particles.
 pub fn grid(boxes: &[Aabb], particles: &[Vec3], cell_mm: f64) -> Result<Counts, VoxelSizeError> {
-    checked("cell_mm", cell_mm, cell_mm > 0.0 && cell_mm.is_finite(), "positive and finite")?;
+    positive("cell_mm", cell_mm)?;
     check_finite(boxes, particles)?;
     let table = Table::new(particles, cell_mm)?;
     let mut counts = Counts { boxes: boxes.len() as u64, particles: particles.len() as u64, ..Counts::default() };

@@ -40,6 +40,11 @@ pub enum VoxelSizeError {
     },
 }
 
+/// Returns the number if it is positive and finite, else an error.
+pub(crate) fn positive(field: &'static str, got: f64) -> Result<f64, VoxelSizeError> {
+    checked(field, got, got > 0.0 && got.is_finite(), "positive and finite")
+}
+
 /// Returns the number if `good`, else an error.
 pub(crate) fn checked(field: &'static str, got: f64, good: bool, wanted: &'static str) -> Result<f64, VoxelSizeError> {
     if good { Ok(got) } else { Err(VoxelSizeError::Field { field, got, wanted }) }

@@ -21,7 +21,7 @@
 //! with more, every second, third … box represents its neighbours.
 
 use crate::counts::Table;
-use crate::error::{VoxelSizeError, checked};
+use crate::error::{VoxelSizeError, checked, positive};
 use crate::{Prices, Work, cost::golden_section};
 use glam::{DVec3, Vec3};
 use trepan_geometry::Aabb;
@@ -54,7 +54,7 @@ pub struct Expected {
 impl Expected {
     /// Computes the statistics for cells of up to `reach_mm`.
     pub fn of(boxes: &[Aabb], particles: &[Vec3], reach_mm: f64) -> Result<Self, VoxelSizeError> {
-        checked("reach_mm", reach_mm, reach_mm > 0.0 && reach_mm.is_finite(), "positive and finite")?;
+        positive("reach_mm", reach_mm)?;
         crate::counts::check_finite(boxes, particles)?;
         let table = Table::new(particles, reach_mm)?;
         let boxes: Vec<Aabb> = boxes.iter().copied().filter(|b| !b.is_empty()).collect();
@@ -108,9 +108,10 @@ impl Expected {
     /// The cheapest cell edge from `low_mm` up to the reach, mm.
     pub fn best(&self, prices: &Prices, low_mm: f64) -> Result<f64, VoxelSizeError> {
         checked("low_mm", low_mm, low_mm > 0.0 && low_mm < self.reach_mm, "positive and under the reach")?;
-        checked("visit", prices.visit, prices.visit > 0.0 && prices.visit.is_finite(), "positive and finite")?;
-        checked("doubt", prices.doubt, prices.doubt >= 0.0 && prices.doubt.is_finite(), "0 or more and finite")?;
-        checked("test", prices.test, prices.test >= 0.0 && prices.test.is_finite(), "0 or more and finite")?;
+        positive("visit", prices.visit)?;
+        for (field, price) in [("doubt", prices.doubt), ("test", prices.test)] {
+            checked(field, price, price >= 0.0 && price.is_finite(), "0 or more and finite")?;
+        }
         const STEPS: usize = 24;
         let (low, high) = (low_mm.ln(), self.reach_mm.ln());
         let at = |n: usize| low + (high - low) * n as f64 / STEPS as f64;

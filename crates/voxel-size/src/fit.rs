@@ -12,7 +12,8 @@
 //! twelve from 0.5 to 4 mean edges are recommended.
 
 use crate::CostModel;
-use crate::error::{VoxelSizeError, checked};
+use crate::error::{VoxelSizeError, checked, positive};
+use nalgebra::{SMatrix, SVector};
 
 /// The work of a pass that depends on the cell size: counted, or expected by
 /// [`Expected::work`](crate::Expected::work).
@@ -60,7 +61,7 @@ const PRICES: usize = 4;
 /// Fits the costs to measured work and times.
 pub fn fit(measured: &[(Work, f64)]) -> Result<Prices, VoxelSizeError> {
     for (_, time) in measured {
-        checked("a measured time", *time, *time > 0.0 && time.is_finite(), "positive and finite")?;
+        positive("a measured time", *time)?;
     }
     let mut used = [true; PRICES];
     loop {
@@ -80,17 +81,17 @@ fn least_squares(measured: &[(Work, f64)], mut used: [bool; PRICES]) -> Result<[
     let scale = column_scale(measured);
     (0..PRICES).for_each(|n| used[n] &= scale[n] > f64::MIN_POSITIVE);
     let wanted = used.iter().filter(|u| **u).count();
-    let mut matrix = [[0.0; PRICES + 1]; PRICES];
+    let (mut normal, mut right) = (SMatrix::<f64, PRICES, PRICES>::zeros(), SVector::<f64, PRICES>::zeros());
     for (work, time) in measured {
-        let row: [f64; PRICES] =
-            std::array::from_fn(|n| if used[n] { columns(work)[n] / scale[n] / time } else { 0.0 });
-        for i in 0..PRICES {
-            (0..PRICES).for_each(|j| matrix[i][j] += row[i] * row[j]);
-            matrix[i][PRICES] += row[i];
-        }
+        let columns = columns(work);
+        let row = SVector::<f64, PRICES>::from_fn(|n, _| if used[n] { columns[n] / scale[n] / time } else { 0.0 });
+        normal += row * row.transpose();
+        right += row;
     }
-    (0..PRICES).filter(|&n| !used[n]).for_each(|n| matrix[n][n] = 1.0);
-    let solved = solve(matrix).filter(|_| measured.len() >= wanted);
+    (0..PRICES).filter(|&n| !used[n]).for_each(|n| normal[(n, n)] = 1.0);
+    let lu = normal.lu();
+    let is_regular = lu.u().diagonal().iter().all(|pivot| pivot.abs() > 1e-10) && measured.len() >= wanted;
+    let solved = lu.solve(&right).filter(|_| is_regular);
     let solved = solved.ok_or(VoxelSizeError::Fit { got: measured.len(), wanted })?;
     Ok(std::array::from_fn(|n| if used[n] { solved[n] / scale[n] } else { 0.0 }))
 }
@@ -103,24 +104,6 @@ fn columns(work: &Work) -> [f64; PRICES] {
 fn column_scale(measured: &[(Work, f64)]) -> [f64; PRICES] {
     let largest = |n: usize| measured.iter().map(|(c, t)| columns(c)[n] / t).fold(f64::MIN_POSITIVE, f64::max);
     std::array::from_fn(largest)
-}
-
-/// Gaussian elimination with row pivoting; `None` if the matrix is numerically singular.
-fn solve(mut m: [[f64; PRICES + 1]; PRICES]) -> Option<[f64; PRICES]> {
-    for col in 0..PRICES {
-        let pivot = (col..PRICES).max_by(|&a, &b| m[a][col].abs().total_cmp(&m[b][col].abs()))?;
-        m.swap(col, pivot);
-        let regular = m[col][col].abs() > 1e-10;
-        if !regular {
-            return None;
-        }
-        let pivot_row = m[col];
-        for row in (0..PRICES).filter(|&row| row != col) {
-            let factor = m[row][col] / pivot_row[col];
-            (col..=PRICES).for_each(|n| m[row][n] -= factor * pivot_row[n]);
-        }
-    }
-    Some(std::array::from_fn(|n| m[n][PRICES] / m[n][n]))
 }
 
 #[cfg(test)]

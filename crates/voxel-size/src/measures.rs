@@ -1,6 +1,6 @@
 //! Mesh statistics for the cost function.
 
-use crate::error::{VoxelSizeError, checked};
+use crate::error::{VoxelSizeError, checked, positive};
 use trepan_geometry::Vec3;
 use trepan_mesh::{FACES, MeshError, TetMesh};
 
@@ -23,22 +23,18 @@ impl Measures {
     /// non-finite coordinate, or without extent.
     pub fn of(mesh: &TetMesh) -> Result<Self, VoxelSizeError> {
         mesh.check_indices()?;
-        if let Some(node) = mesh.positions.iter().position(|p| !p.is_finite()) {
-            return Err(MeshError::NotFinite(node).into());
-        }
-        let (mut longest, mut edges, mut areas) = (0.0, 0.0, 0.0);
-        for tet in 0..mesh.tets.len() {
+        let of_tet = |tet: usize| {
             let corners = mesh.corners(tet).map(|p| p.as_dvec3());
             let lengths =
                 [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)].map(|(i, j)| corners[i].distance(corners[j]));
-            longest += lengths.into_iter().fold(0.0, f64::max);
-            edges += lengths.iter().sum::<f64>() / 6.0;
             let area = |[i, j, k]: [usize; 3]| 0.5 * (corners[j] - corners[i]).cross(corners[k] - corners[i]).length();
-            areas += FACES.map(area).iter().sum::<f64>() / 4.0;
-        }
-        let tets = mesh.tets.len();
-        let [longest_edge_mm, mean_edge_mm, facet_mm2] = [longest, edges, areas].map(|sum| sum / tets as f64);
-        Self { elements: tets, longest_edge_mm, mean_edge_mm, facet_mm2 }.checked()
+            [
+                lengths.into_iter().fold(0.0, f64::max),
+                lengths.iter().sum::<f64>() / 6.0,
+                FACES.map(area).iter().sum::<f64>() / 4.0,
+            ]
+        };
+        Self::mean(&mesh.positions, mesh.tets.len(), of_tet)
     }
 
     /// Measures a triangle mesh, for the triangle form of Borro et al. 2004: the same cost with the
@@ -51,25 +47,28 @@ impl Measures {
         let unknown = triangles.iter().flatten().find(|n| !known(n));
         let wanted = "a node that is there";
         checked("a triangle's node", unknown.copied().unwrap_or(0).into(), unknown.is_none(), wanted)?;
+        let of_triangle = |at: usize| {
+            let [a, b, c] = triangles[at].map(|n| positions[n as usize].as_dvec3());
+            let lengths = [a.distance(b), b.distance(c), c.distance(a)];
+            let longest = lengths.into_iter().fold(0.0, f64::max);
+            [longest, lengths.iter().sum::<f64>() / 3.0, 0.5 * (b - a).cross(c - a).length()]
+        };
+        Self::mean(positions, triangles.len(), of_triangle)
+    }
+
+    /// Means of longest edge, edge and facet over so many elements.
+    fn mean(positions: &[Vec3], elements: usize, of: impl Fn(usize) -> [f64; 3]) -> Result<Self, VoxelSizeError> {
         if let Some(node) = positions.iter().position(|p| !p.is_finite()) {
             return Err(MeshError::NotFinite(node).into());
         }
         let mut sums = [0.0; 3];
-        for triangle in triangles {
-            let [a, b, c] = triangle.map(|n| positions[n as usize].as_dvec3());
-            let lengths = [a.distance(b), b.distance(c), c.distance(a)];
-            sums[0] += lengths.into_iter().fold(0.0, f64::max);
-            sums[1] += lengths.iter().sum::<f64>() / 3.0;
-            sums[2] += 0.5 * (b - a).cross(c - a).length();
-        }
-        let [longest_edge_mm, mean_edge_mm, facet_mm2] = sums.map(|sum| sum / triangles.len() as f64);
-        Self { elements: triangles.len(), longest_edge_mm, mean_edge_mm, facet_mm2 }.checked()
+        (0..elements).for_each(|at| sums.iter_mut().zip(of(at)).for_each(|(sum, x)| *sum += x));
+        let [longest_edge_mm, mean_edge_mm, facet_mm2] = sums.map(|sum| sum / elements as f64);
+        Self { elements, longest_edge_mm, mean_edge_mm, facet_mm2 }.checked()
     }
 
     /// Checks that the values are valid lengths and areas.
     pub fn checked(self) -> Result<Self, VoxelSizeError> {
-        let positive =
-            |field, value: f64| checked(field, value, value > 0.0 && value.is_finite(), "positive and finite");
         positive("longest_edge_mm", self.longest_edge_mm)?;
         positive("mean_edge_mm", self.mean_edge_mm)?;
         positive("facet_mm2", self.facet_mm2)?;

@@ -101,18 +101,23 @@ pub struct PassivityConfig {
     pub delay_ticks: u8,
 }
 
+impl PassivityConfig {
+    /// For a Touch whose driver applies each force at once.
+    pub const TOUCH: Self = Self {
+        max_damping: 10.0,
+        damping_memory_ms: 3000.0,
+        max_stored_nmm: 20.0,
+        advance_nmm: 0.05,
+        recovery_ms: 300.0,
+        min_speed: 1e-3,
+        quantum_mm: 0.055,
+        delay_ticks: 0,
+    };
+}
+
 impl Default for PassivityConfig {
     fn default() -> Self {
-        Self {
-            max_damping: 10.0,
-            damping_memory_ms: 3000.0,
-            max_stored_nmm: 20.0,
-            advance_nmm: 0.05,
-            recovery_ms: 300.0,
-            min_speed: 1e-3,
-            quantum_mm: 0.055,
-            delay_ticks: 0,
-        }
+        Self::TOUCH
     }
 }
 
@@ -263,16 +268,7 @@ fn share(dt_ms: f32, whole_ms: f32) -> f32 {
 mod tests {
     use super::*;
 
-    const EXACT: PassivityConfig = PassivityConfig {
-        max_damping: 10.0,
-        damping_memory_ms: 3000.0,
-        max_stored_nmm: 20.0,
-        advance_nmm: 0.05,
-        recovery_ms: 300.0,
-        min_speed: 1e-3,
-        quantum_mm: 0.0,
-        delay_ticks: 0,
-    };
+    const EXACT: PassivityConfig = PassivityConfig { quantum_mm: 0.0, ..PassivityConfig::TOUCH };
 
     /// An observer whose tip is somewhere, and a way to move it.
     struct Hand(PassivityObserver, Vec3);

@@ -30,7 +30,7 @@
 //! sharply that one normal says nothing.
 
 use super::{
-    Answer, Spring,
+    Answer, Respond, Spring,
     foundation::{Foundation, WAITING},
     near::{Near, Sample},
 };
@@ -64,67 +64,14 @@ const SAMPLE_EVERY: usize = 4;
 const BLEND: f32 = 0.5;
 
 impl Ball {
-    pub(crate) fn on_nodes(nodes: usize) -> Self {
+    pub(crate) fn on_nodes(nodes: usize, spring: Spring) -> Self {
         Self {
             anchor: NONE,
             last_centre: Vec3::ZERO,
             numbers: Vec::with_capacity(MAX_NEAR),
             near: Near::with_capacity(MAX_NEAR),
-            foundation: Foundation::on_nodes(nodes),
+            foundation: Foundation::on_nodes(nodes, spring),
         }
-    }
-
-    pub(crate) fn reset(&mut self) {
-        self.anchor = NONE;
-    }
-
-    /// Writes the springs of the surface under and around the ball of the last step; returns what
-    /// did not fit.
-    pub(crate) fn press(
-        &mut self,
-        scene: &Scene,
-        surface: &MovingSurface,
-        contact: (Vec3, f32),
-        spring: Spring,
-        out: &mut NodalContacts,
-    ) -> u32 {
-        match self.anchor {
-            NONE => 0,
-            _ => self.foundation.press(scene, (&self.near, surface), contact, spring, out),
-        }
-    }
-
-    /// Fills manifold list and nodes; the answer is `None` when the ball does not touch, though
-    /// springs may wait.
-    pub(crate) fn respond(
-        &mut self,
-        scene: &Scene,
-        hits: &Hits,
-        surface: &mut MovingSurface,
-        out: &mut TissueStep,
-    ) -> Option<Answer> {
-        let touch = self.touch(scene, hits, surface, out);
-        self.anchor = touch.as_ref().map_or(NONE, |(sample, _)| sample.triangle);
-        let (centre, depth_mm) = touch?;
-        if depth_mm <= 0.0 {
-            return None;
-        }
-        let mut sum = Sum::default();
-        sum.add(depth_mm, centre.normal);
-        Self::load(surface, &centre, depth_mm, out);
-        let stride = points_inside(hits).count().div_ceil(SAMPLE_EVERY * MAX_CONTACTS).max(1);
-        for (k, i) in points_inside(hits).filter(|i| i % SAMPLE_EVERY == 0).enumerate() {
-            let p = scene.points[i];
-            let Some(sample) = self.near.sample(p, BLEND * scene.radius_mm) else { break };
-            sum.add(sample.distance, sample.normal);
-            Self::load(surface, &sample, sample.distance, out);
-            if k % stride == 0 {
-                let normal = sample.normal.normalize_or_zero();
-                out.manifold.push(Contact { point: p, normal, depth_mm: sample.distance });
-            }
-        }
-        let fallback = surface.flat_normal(scene.positions, centre.triangle);
-        Some(sum.answer(depth_mm, fallback))
     }
 
     /// Puts load on the nodes under a sample.
@@ -184,6 +131,55 @@ impl Ball {
         self.near.fill(surface, scene.positions, &self.numbers, |normal, corner| {
             normal.dot(touched) > SAME_SIDE || (centre - corner).dot(normal) > 0.0
         });
+    }
+}
+
+impl Respond for Ball {
+    fn needs_surface(&self) -> bool {
+        true
+    }
+
+    fn reset(&mut self) {
+        self.anchor = NONE;
+    }
+
+    fn press(&mut self, scene: &Scene, surface: &MovingSurface, answer: &Answer, out: &mut NodalContacts) -> u32 {
+        match self.anchor {
+            NONE => 0,
+            _ => self.foundation.press(scene, &self.near, surface, answer, out),
+        }
+    }
+
+    /// The answer is `None` when the ball does not touch, though springs may wait.
+    fn respond(
+        &mut self,
+        scene: &Scene,
+        hits: &Hits,
+        surface: &mut MovingSurface,
+        out: &mut TissueStep,
+    ) -> Option<Answer> {
+        let touch = self.touch(scene, hits, surface, out);
+        self.anchor = touch.as_ref().map_or(NONE, |(sample, _)| sample.triangle);
+        let (centre, depth_mm) = touch?;
+        if depth_mm <= 0.0 {
+            return None;
+        }
+        let mut sum = Sum::default();
+        sum.add(depth_mm, centre.normal);
+        Self::load(surface, &centre, depth_mm, out);
+        let stride = points_inside(hits).count().div_ceil(SAMPLE_EVERY * MAX_CONTACTS).max(1);
+        for (k, i) in points_inside(hits).filter(|i| i % SAMPLE_EVERY == 0).enumerate() {
+            let p = scene.points[i];
+            let Some(sample) = self.near.sample(p, BLEND * scene.radius_mm) else { break };
+            sum.add(sample.distance, sample.normal);
+            Self::load(surface, &sample, sample.distance, out);
+            if k % stride == 0 {
+                let normal = sample.normal.normalize_or_zero();
+                out.manifold.push(Contact { point: p, normal, depth_mm: sample.distance });
+            }
+        }
+        let fallback = surface.flat_normal(scene.positions, centre.triangle);
+        Some(sum.answer(depth_mm, fallback))
     }
 }
 

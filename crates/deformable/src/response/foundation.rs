@@ -25,7 +25,7 @@
 //! Hughes, The Finite Element Method, 2000, section 7.3.2.
 
 use super::{
-    Spring, finite_or_zero,
+    Answer, Spring, finite_or_zero,
     near::{Near, NearTriangle},
 };
 use crate::{scene::Scene, surface::MovingSurface};
@@ -34,6 +34,7 @@ use trepan_geometry::{Quat, Vec3};
 
 /// The springs of the nodes near the ball.
 pub(crate) struct Foundation {
+    spring: Spring,
     springs: Vec<NodeSpring>,
     /// The spring of each node, or [`NONE`].
     spring_of: Vec<u32>,
@@ -67,19 +68,19 @@ const LATE_MS: f32 = 1.0;
 const NONE: u32 = u32::MAX;
 
 impl Foundation {
-    pub(crate) fn on_nodes(nodes: usize) -> Self {
-        Self { springs: Vec::with_capacity(MAX_SPRINGS), spring_of: vec![NONE; nodes] }
+    pub(crate) fn on_nodes(nodes: usize, spring: Spring) -> Self {
+        Self { spring, springs: Vec::with_capacity(MAX_SPRINGS), spring_of: vec![NONE; nodes] }
     }
 
     /// Writes the springs of the ball on the triangles near it. Together they have the force of
-    /// `spring` pressed `depth_mm` deep along `normal`; at depth 0 all wait. Returns how many nodes
+    /// the ball's spring pressed as the answer says; at depth 0 all wait. Returns how many nodes
     /// did not fit.
     pub(crate) fn press(
         &mut self,
         scene: &Scene,
-        (near, surface): (&Near, &MovingSurface),
-        (normal, depth_mm): (Vec3, f32),
-        spring: Spring,
+        near: &Near,
+        surface: &MovingSurface,
+        &Answer { normal, depth_mm }: &Answer,
         out: &mut NodalContacts,
     ) -> u32 {
         let grown_mm = (depth_mm - GROWS * scene.radius_mm).max(0.0);
@@ -95,7 +96,7 @@ impl Foundation {
             overflow += self.sum(&ball, triangle, surface, scene.radius_mm);
         }
         self.springs.iter().for_each(|spring| self.spring_of[spring.node as usize] = NONE);
-        self.write(scene, normal * depth_mm, spring, out);
+        self.write(scene, normal * depth_mm, out);
         overflow
     }
 
@@ -138,7 +139,8 @@ impl Foundation {
     }
 
     /// Scales the sums to the ball's `depth`, along its normal, mm, and turns them to that normal.
-    fn write(&self, scene: &Scene, depth: Vec3, spring: Spring, out: &mut NodalContacts) {
+    fn write(&self, scene: &Scene, depth: Vec3, out: &mut NodalContacts) {
+        let spring = self.spring;
         let push: Vec3 = self.springs.iter().map(|spring| spring.push).sum();
         let area_mm2: f32 = self.springs.iter().map(|spring| spring.area_mm2).sum();
         let pressed = depth != Vec3::ZERO && push.length() > f32::MIN_POSITIVE;
@@ -164,7 +166,7 @@ impl Foundation {
             let depth_mm = if force_n > 0.0 { force_n / stiffness } else { sums.depth_mm3.min(0.0) / sums.area_mm2 };
             contact.offset_mm = depth_mm - place.dot(contact.normal);
             (contact.stiffness, contact.damping) = (stiffness, spring.damping * share);
-            contact.tool_normal_velocity = finite_or_zero(scene.tool_velocity_at(place).dot(contact.normal));
+            contact.tool_normal_velocity = finite_or_zero(scene.tool.velocity_at(place).dot(contact.normal));
             contact.lateral_damping = LATE_MS * stiffness;
             contact.lateral_velocity = velocity;
             out.push(contact);

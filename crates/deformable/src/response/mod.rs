@@ -4,74 +4,42 @@ mod ball;
 mod foundation;
 mod friction;
 mod near;
-mod printed;
 mod shaft;
 
+pub(crate) use ball::Ball;
 pub(crate) use friction::Friction;
 pub(crate) use shaft::Shaft;
 
-use crate::{method::Response, narrow::Hits, outcome::TissueStep, scene::Scene, surface::MovingSurface};
-use trepan_contact::{NodalContacts, SurfacePatch};
+use crate::{narrow::Hits, outcome::TissueStep, scene::Scene, surface::MovingSurface};
+use trepan_contact::{NodalContact, NodalContacts, SurfacePatch};
 use trepan_geometry::Vec3;
 
 /// A response with its memory.
-pub(crate) enum Responder {
-    Ball(ball::Ball),
-    Faces(printed::Faces),
-}
-
-impl Responder {
-    pub(crate) fn new(response: Response, nodes: usize) -> Self {
-        match response {
-            Response::Ball => Self::Ball(ball::Ball::on_nodes(nodes)),
-            Response::Printed => Self::Faces(printed::Faces { nearest: false }),
-            Response::NearestFace => Self::Faces(printed::Faces { nearest: true }),
-        }
-    }
-
+pub(crate) trait Respond: Send {
     /// Whether it reads the moving surface.
-    pub(crate) fn needs_surface(&self) -> bool {
-        matches!(self, Self::Ball(_))
+    fn needs_surface(&self) -> bool {
+        false
     }
 
     /// Fills the list and the nodes; normal and depth are the answer, `None` when nothing is
     /// touched.
-    pub(crate) fn respond(
+    fn respond(
         &mut self,
         scene: &Scene,
         hits: &Hits,
         surface: &mut MovingSurface,
         out: &mut TissueStep,
-    ) -> Option<Answer> {
-        match self {
-            Self::Ball(ball) => ball.respond(scene, hits, surface, out),
-            Self::Faces(faces) => faces.respond(scene, hits, out),
-        }
-    }
+    ) -> Option<Answer>;
 
     /// Writes the springs of the surface under the tool, if the response has any. Together they
-    /// have the force of `spring` pressed `depth_mm` deep along the normal, and wait where that
-    /// is 0. Returns what did not fit.
-    pub(crate) fn press(
-        &mut self,
-        scene: &Scene,
-        surface: &MovingSurface,
-        contact: (Vec3, f32),
-        spring: Spring,
-        out: &mut NodalContacts,
-    ) -> u32 {
-        match self {
-            Self::Ball(ball) => ball.press(scene, surface, contact, spring, out),
-            Self::Faces(_) => 0,
-        }
+    /// have the force of the spring pressed as the answer says, and wait where its depth is 0.
+    /// Returns what did not fit.
+    fn press(&mut self, _: &Scene, _: &MovingSurface, _: &Answer, _: &mut NodalContacts) -> u32 {
+        0
     }
 
     /// Forgets what was touched.
-    pub(crate) fn reset(&mut self) {
-        if let Self::Ball(ball) = self {
-            ball.reset();
-        }
-    }
+    fn reset(&mut self) {}
 }
 
 /// The spring between tool and tissue.
@@ -84,39 +52,45 @@ pub(crate) struct Spring {
 }
 
 /// What every response ends in.
+#[derive(Clone, Copy)]
 pub(crate) struct Answer {
     /// Unit vector out of the tissue.
     pub normal: Vec3,
-    /// How deep, mm, above 0.
+    /// How deep, mm.
     pub depth_mm: f32,
 }
 
-/// Writes the answer into manifold, patch and nodal spring, whose nodes are already there; nothing,
-/// and false, when a number is not finite.
-pub(crate) fn finish(scene: &Scene, answer: &Answer, spring: Spring, out: &mut TissueStep) -> bool {
-    out.nodal.normalise();
-    let place = out.nodal.mean(|n| scene.positions[n as usize]);
-    let tissue_velocity = out.nodal.mean(|n| scene.velocities[n as usize]).dot(answer.normal);
-    let sound =
-        answer.depth_mm > 0.0 && answer.depth_mm.is_finite() && answer.normal.is_normalized() && place.is_finite();
-    if !sound || out.nodal.is_empty() {
-        out.forget_contact();
-        return false;
+impl Spring {
+    /// Makes `nodal`, whose nodes are already there, the spring pressed as the answer says. Returns
+    /// where it acts, mm; `None` when it does not press or a number is not finite.
+    fn load(&self, scene: &Scene, answer: &Answer, nodal: &mut NodalContact) -> Option<Vec3> {
+        let &Answer { normal, depth_mm } = answer;
+        nodal.normalise();
+        let place = nodal.mean(|n| scene.positions[n as usize]);
+        let sound = depth_mm > 0.0 && depth_mm.is_finite() && normal.is_normalized() && place.is_finite();
+        if !sound || nodal.is_empty() {
+            return None;
+        }
+        (nodal.normal, nodal.offset_mm) = (normal, depth_mm - place.dot(normal));
+        (nodal.stiffness, nodal.damping) = (self.stiffness, self.damping);
+        nodal.tool_normal_velocity = finite_or_zero(scene.tool.velocity_at(place).dot(normal));
+        Some(place)
     }
-    let tool_velocity = scene.tool_velocity_at(place).dot(answer.normal);
-    (out.manifold.normal, out.manifold.depth_mm, out.manifold.point) = (answer.normal, answer.depth_mm, place);
-    out.nodal.normal = answer.normal;
-    out.nodal.offset_mm = answer.depth_mm - place.dot(answer.normal);
-    (out.nodal.stiffness, out.nodal.damping) = (spring.stiffness, spring.damping);
-    out.nodal.tool_normal_velocity = finite_or_zero(tool_velocity);
-    out.patch = SurfacePatch {
-        time_ms: scene.tool.time_ms,
-        normal: answer.normal,
-        tip_mm: scene.tool.tip(),
-        depth_mm: answer.depth_mm,
-        normal_velocity: finite_or_zero(tissue_velocity),
-    };
-    true
+
+    /// Writes the answer into manifold, patch and nodal spring, whose nodes are already there;
+    /// nothing, and false, when a number is not finite.
+    pub(crate) fn finish(&self, scene: &Scene, answer: &Answer, out: &mut TissueStep) -> bool {
+        let Some(place) = self.load(scene, answer, &mut out.nodal) else {
+            out.forget_contact();
+            return false;
+        };
+        let &Answer { normal, depth_mm } = answer;
+        let velocity = out.nodal.mean(|n| scene.velocities[n as usize]).dot(normal);
+        (out.manifold.normal, out.manifold.depth_mm, out.manifold.point) = (normal, depth_mm, place);
+        let (time_ms, tip_mm) = (scene.tool.time_ms, scene.tool.tip());
+        out.patch = SurfacePatch { time_ms, normal, tip_mm, depth_mm, normal_velocity: finite_or_zero(velocity) };
+        true
+    }
 }
 
 fn finite_or_zero(x: f32) -> f32 {

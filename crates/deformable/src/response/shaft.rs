@@ -17,7 +17,7 @@
 use crate::{
     extent::Extent,
     narrow::{Hits, NONE},
-    response::Spring,
+    response::{Answer, Spring},
     scene::Scene,
     seam::Search,
     search::Walk,
@@ -28,6 +28,7 @@ use trepan_geometry::{Tool, ToolState, Vec3};
 
 /// Samples on the axis, and what was found at each.
 pub(crate) struct Shaft {
+    spring: Spring,
     radius_mm: f32,
     along_mm: Vec<f32>,
     points: Vec<Vec3>,
@@ -45,7 +46,7 @@ const MAX_NEAR: usize = 1024;
 
 impl Shaft {
     /// For a tool and a mesh of so many tetrahedra; `None` for a tool without a shaft.
-    pub(crate) fn new(tool: &Tool, tets: usize) -> Option<Self> {
+    pub(crate) fn new(tool: &Tool, tets: usize, spring: Spring) -> Option<Self> {
         let length_mm = tool.shaft_length_mm - tool.tip_radius_mm;
         if !(tool.shaft_radius_mm > 0.0 && length_mm > 0.0 && length_mm.is_finite()) {
             return None;
@@ -54,6 +55,7 @@ impl Shaft {
         let count = wanted.min(MAX_SAMPLES);
         let at = |k: usize| tool.tip_radius_mm + length_mm * k as f32 / (count - 1) as f32;
         Some(Self {
+            spring,
             radius_mm: tool.shaft_radius_mm,
             along_mm: (0..count).map(at).collect(),
             points: vec![Vec3::ZERO; count],
@@ -73,7 +75,6 @@ impl Shaft {
         &mut self,
         scene: &Scene,
         surface: &mut MovingSurface,
-        spring: &Spring,
         overflow: &mut u32,
     ) -> Option<(Contact, NodalContact)> {
         self.place(scene.tool);
@@ -98,7 +99,9 @@ impl Shaft {
                 }
             }
         }
-        finish(scene, force.try_normalize()?, deepest, nodal, spring)
+        let (normal, depth_mm) = (force.try_normalize()?, deepest);
+        let point = self.spring.load(scene, &Answer { normal, depth_mm }, &mut nodal)?;
+        Some((Contact { point, normal, depth_mm }, nodal))
     }
 
     fn place(&mut self, tool: &ToolState) {
@@ -123,24 +126,4 @@ impl Shaft {
         let normal = if outwards.length() > 1e-3 * self.radius_mm { outwards.normalize() } else { flat };
         (depth_mm > 0.0).then_some((foot, normal, depth_mm))
     }
-}
-
-fn finish(
-    scene: &Scene,
-    normal: Vec3,
-    depth_mm: f32,
-    mut nodal: NodalContact,
-    spring: &Spring,
-) -> Option<(Contact, NodalContact)> {
-    nodal.normalise();
-    let point = nodal.mean(|n| scene.positions[n as usize]);
-    if nodal.is_empty() || !(depth_mm.is_finite() && point.is_finite()) {
-        return None;
-    }
-    nodal.normal = normal;
-    nodal.offset_mm = depth_mm - point.dot(normal);
-    (nodal.stiffness, nodal.damping) = (spring.stiffness, spring.damping);
-    let closing = scene.tool_velocity_at(point).dot(normal);
-    nodal.tool_normal_velocity = if closing.is_finite() { closing } else { 0.0 };
-    Some((Contact { point, normal, depth_mm }, nodal))
 }

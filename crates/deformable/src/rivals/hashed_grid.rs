@@ -20,15 +20,14 @@ use super::uniform_grid::fitting_cell;
 use crate::extent::Extent;
 use crate::method::Descriptor;
 use crate::narrow::NONE;
-use crate::phase::{BroadPhase, Phased, TetBoxes, push_bounded};
-use trepan_geometry::{Aabb, Vec3};
+use crate::phase::{PointIndex, indexed};
+use trepan_geometry::Vec3;
 
 /// A hash table of points by cell.
 #[derive(Debug)]
 pub struct HashedGrid {
     wanted_mm: f32,
     cell_mm: f32,
-    tets: TetBoxes,
     bounds: Extent,
     first: Vec<u32>,
     written_at: Vec<u32>,
@@ -40,13 +39,12 @@ pub struct HashedGrid {
 }
 
 impl HashedGrid {
-    /// A grid with cells of `cell_mm` (positive) for at most so many points and tetrahedra.
-    pub fn new(cell_mm: f32, points: usize, tets: usize) -> Self {
+    /// A grid with cells of `cell_mm` (positive) for at most so many points.
+    pub fn new(cell_mm: f32, points: usize) -> Self {
         let table = (4 * points).next_power_of_two() - 1;
         Self {
             wanted_mm: cell_mm,
             cell_mm,
-            tets: TetBoxes::with_capacity(tets),
             bounds: Extent::EMPTY,
             first: vec![NONE; table],
             written_at: vec![0; table],
@@ -57,26 +55,8 @@ impl HashedGrid {
         }
     }
 
-    /// Puts the points into their buckets, the last one first, so that buckets run upwards.
-    fn place(&mut self, points: &[Vec3]) {
-        self.bounds = Extent::of(points.iter().filter(|p| p.is_finite()));
-        self.cell_mm = fitting_cell(self.wanted_mm, &self.bounds);
-        self.coarsened += u32::from(self.cell_mm != self.wanted_mm);
-        self.step = self.step.wrapping_add(1);
-        if self.step == 0 {
-            self.written_at.fill(0);
-            self.step = 1;
-        }
-        for i in (0..points.len().min(self.next.len())).rev().filter(|&i| points[i].is_finite()) {
-            self.cell_of[i] = self.cell_at(points[i]);
-            let bucket = self.bucket(self.cell_of[i]);
-            self.next[i] = if self.written_at[bucket] == self.step { self.first[bucket] } else { NONE };
-            (self.first[bucket], self.written_at[bucket]) = (i as u32, self.step);
-        }
-    }
-
     /// Calls `found` for every point of the cell that lies in `bounds`.
-    fn visit(&self, points: &[Vec3], cell: [i32; 3], bounds: &Extent, mut found: impl FnMut(u32)) {
+    fn visit_cell(&self, points: &[Vec3], cell: [i32; 3], bounds: &Extent, found: &mut impl FnMut(u32)) {
         let bucket = self.bucket(cell);
         let mut at = if self.written_at[bucket] == self.step { self.first[bucket] } else { NONE };
         while at != NONE {
@@ -102,31 +82,42 @@ impl HashedGrid {
     }
 }
 
-impl BroadPhase for HashedGrid {
-    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
-        self.tets.update(positions, tets, region);
+impl PointIndex for HashedGrid {
+    /// Puts the points into their buckets, the last one first, so that buckets run upwards.
+    fn place(&mut self, points: &[Vec3]) {
+        self.bounds = Extent::of(points.iter().filter(|p| p.is_finite()));
+        self.cell_mm = fitting_cell(self.wanted_mm, &self.bounds);
+        self.coarsened += u32::from(self.cell_mm != self.wanted_mm);
+        self.step = self.step.wrapping_add(1);
+        if self.step == 0 {
+            self.written_at.fill(0);
+            self.step = 1;
+        }
+        for i in (0..points.len().min(self.next.len())).rev().filter(|&i| points[i].is_finite()) {
+            self.cell_of[i] = self.cell_at(points[i]);
+            let bucket = self.bucket(self.cell_of[i]);
+            self.next[i] = if self.written_at[bucket] == self.step { self.first[bucket] } else { NONE };
+            (self.first[bucket], self.written_at[bucket]) = (i as u32, self.step);
+        }
     }
 
-    fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
-        out.clear();
-        self.place(points);
-        let mut overflow = 0;
-        for (tet, bounds) in self.tets.boxes.iter().filter(|(_, b)| b.overlaps(&self.bounds)) {
-            let shared = bounds.shared(&self.bounds);
-            let (low, high) = (self.cell_at(shared.low.into()), self.cell_at(shared.high.into()));
-            for k in low[2]..=high[2] {
-                for j in low[1]..=high[1] {
-                    for i in low[0]..=high[0] {
-                        self.visit(points, [i, j, k], bounds, |p| overflow += push_bounded(out, [p, *tet]));
-                    }
+    fn visit(&self, points: &[Vec3], bounds: &Extent, mut found: impl FnMut(u32)) {
+        if !bounds.overlaps(&self.bounds) {
+            return;
+        }
+        let shared = bounds.shared(&self.bounds);
+        let (low, high) = (self.cell_at(shared.low.into()), self.cell_at(shared.high.into()));
+        for k in low[2]..=high[2] {
+            for j in low[1]..=high[1] {
+                for i in low[0]..=high[0] {
+                    self.visit_cell(points, [i, j, k], bounds, &mut found);
                 }
             }
         }
-        overflow
     }
 }
 
 /// Points in the hashed grid.
-pub const METHOD: Descriptor = Descriptor::of_phase("hashed-grid", "Teschner et al. 2003", |inputs| {
-    Box::new(Phased::new(HashedGrid::new(inputs.cell_mm, inputs.points, inputs.mesh.tets.len()), inputs.points))
+pub const METHOD: Descriptor = Descriptor::of("hashed-grid", "Teschner et al. 2003", |inputs| {
+    indexed(inputs, HashedGrid::new(inputs.cell_mm, inputs.points))
 });

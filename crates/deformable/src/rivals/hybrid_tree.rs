@@ -16,9 +16,11 @@
 //! it, level by level.
 
 use super::volume_tree::{LEAF, Node, halved};
+use crate::bounded::push_bounded;
 use crate::extent::Extent;
 use crate::method::Descriptor;
-use crate::phase::{BroadPhase, Phased, box_of, push_bounded};
+use crate::phase::{BroadPhase, Phased, box_of};
+use crate::surface::distinct_rows;
 use trepan_geometry::{Aabb, Vec3};
 use trepan_mesh::Csr;
 
@@ -35,7 +37,6 @@ pub struct HybridTree {
     /// Tetrahedra below a node that is half way down, at most.
     below: u32,
     boxes: Vec<(u32, Extent)>,
-    open: Vec<u32>,
 }
 
 /// Tetrahedra below a node that is half way down: the square root of a leaf times the mesh, at
@@ -57,20 +58,11 @@ impl HybridTree {
                 open.extend([node.right, at + 1]);
             }
         }
-        let mut mesh_nodes = Csr { starts: vec![0], items: Vec::new() };
-        for &at in &half_way {
-            let node = shape[at as usize];
-            let tets = order[node.first as usize..node.last as usize].iter().map(|&t| tets[t as usize]);
-            let mut nodes: Vec<u32> = tets.flatten().collect();
-            nodes.sort_unstable();
-            nodes.dedup();
-            mesh_nodes.items.extend(nodes);
-            mesh_nodes.starts.push(mesh_nodes.items.len() as u32);
-        }
+        let tets_below = |at: &u32| shape[*at as usize].tets(&order).iter().flat_map(|&t| tets[t as usize]);
+        let mesh_nodes = distinct_rows(half_way.iter().map(tets_below));
         let bounds = vec![Extent::EMPTY; shape.len()];
         let (below, boxes) = (below as u32, Vec::with_capacity(tets.len()));
-        let open = Vec::with_capacity(shape.len());
-        Self { shape, order, bounds, half_way, upper, mesh_nodes, below, boxes, open }
+        Self { shape, order, bounds, half_way, upper, mesh_nodes, below, boxes }
     }
 
     /// Boxes half way down, then those above.
@@ -88,23 +80,18 @@ impl HybridTree {
 
     /// Goes down where boxes meet the region, fits what lies below half way, and lists the
     /// tetrahedra reached.
-    fn fit_lower(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Extent) {
-        self.open.push(0);
-        while let Some(at) = self.open.pop() {
-            let node = self.shape[at as usize];
-            if !self.bounds[at as usize].overlaps(region) {
-                continue;
-            }
-            if node.right == 0 {
-                let leaf = &self.order[node.first as usize..node.last as usize];
-                let met = leaf.iter().map(|&t| (t, box_of(positions, &tets[t as usize])));
-                self.boxes.extend(met.filter(|(_, b)| b.overlaps(region)));
-                continue;
-            }
-            for child in [node.right, at + 1] {
-                self.fit_below(positions, tets, child, node);
-                self.open.push(child);
-            }
+    fn fit_lower(&mut self, at: u32, positions: &[Vec3], tets: &[[u32; 4]], region: &Extent) {
+        let node = self.shape[at as usize];
+        if !self.bounds[at as usize].overlaps(region) {
+            return;
+        }
+        if node.right == 0 {
+            let met = node.tets(&self.order).iter().map(|&t| (t, box_of(positions, &tets[t as usize])));
+            return self.boxes.extend(met.filter(|(_, b)| b.overlaps(region)));
+        }
+        for child in [at + 1, node.right] {
+            self.fit_below(positions, tets, child, node);
+            self.fit_lower(child, positions, tets, region);
         }
     }
 
@@ -114,9 +101,8 @@ impl HybridTree {
         if parent.last - parent.first > self.below {
             return;
         }
-        let Node { first, last, .. } = self.shape[child as usize];
         let mut bounds = Extent::EMPTY;
-        for &t in &self.order[first as usize..last as usize] {
+        for &t in self.shape[child as usize].tets(&self.order) {
             bounds.merge(&box_of(positions, &tets[t as usize]));
         }
         self.bounds[child as usize] = bounds;
@@ -126,9 +112,8 @@ impl HybridTree {
 impl BroadPhase for HybridTree {
     fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
         self.boxes.clear();
-        self.open.clear();
         self.fit_upper(positions);
-        self.fit_lower(positions, tets, &Extent::from(*region));
+        self.fit_lower(0, positions, tets, &Extent::from(*region));
         self.boxes.sort_unstable_by_key(|(t, _)| *t);
     }
 
@@ -145,6 +130,6 @@ impl BroadPhase for HybridTree {
 }
 
 /// The tree of boxes, refitted where it is looked at.
-pub const METHOD: Descriptor = Descriptor::of_phase("hybrid-tree", "Larsson and Akenine-Möller 2001", |inputs| {
+pub const METHOD: Descriptor = Descriptor::of("hybrid-tree", "Larsson and Akenine-Möller 2001", |inputs| {
     Box::new(Phased::new(HybridTree::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
 });

@@ -9,10 +9,8 @@
 //! 72 bytes; a refit costs three times that of boxes, a test up to nine slabs; holds slanted parts
 //! more tightly.
 
-use super::volume_tree::Volume;
-use super::volume_tree::VolumeTree;
+use super::volume_tree::{Volume, search};
 use crate::method::Descriptor;
-use crate::phase::Phased;
 use trepan_geometry::Vec3;
 
 /// An 18-DOP; empty when a `low` exceeds its `high`.
@@ -44,12 +42,7 @@ impl Volume for KDop {
     }
 
     fn add_corners(&mut self, corners: &[Vec3; 4]) {
-        for at in corners.map(along) {
-            for slab in 0..SLABS {
-                self.low[slab] = self.low[slab].min(at[slab]);
-                self.high[slab] = self.high[slab].max(at[slab]);
-            }
-        }
+        corners.map(along).iter().for_each(|&at| self.add_child(&Self { low: at, high: at }));
     }
 
     fn add_child(&mut self, child: &Self) {
@@ -72,6 +65,4 @@ impl Volume for KDop {
 const ROUNDING: f32 = 4e-7;
 
 /// A tree of polytopes with 18 sides.
-pub const METHOD: Descriptor = Descriptor::of_phase("k-dop-tree", "Klosowski et al. 1998", |inputs| {
-    Box::new(Phased::new(VolumeTree::<KDop>::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
-});
+pub const METHOD: Descriptor = Descriptor::of("k-dop-tree", "Klosowski et al. 1998", search::<KDop>);

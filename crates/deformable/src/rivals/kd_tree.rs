@@ -12,36 +12,32 @@
 //! # When not to use it
 //! For few points in a small box: nearly every tetrahedron there meets nearly every split.
 
+use crate::extent::Extent;
 use crate::method::Descriptor;
-use crate::phase::{BroadPhase, Phased, TetBoxes, push_bounded};
-use trepan_geometry::{Aabb, Vec3};
+use crate::phase::{PointIndex, indexed, list_finite};
+use trepan_geometry::Vec3;
 
 /// A k-d tree of points.
 #[derive(Debug)]
 pub struct KdTree {
-    tets: TetBoxes,
     order: Vec<u32>,
-    open: Vec<(u32, u32, u32)>,
 }
 
-/// Deepest range that still waits: two for each halving.
-const MAX_OPEN: usize = 128;
-
 impl KdTree {
-    /// Room for so many points and tetrahedra.
-    pub fn new(points: usize, tets: usize) -> Self {
-        Self {
-            tets: TetBoxes::with_capacity(tets),
-            order: Vec::with_capacity(points),
-            open: Vec::with_capacity(MAX_OPEN),
-        }
+    /// Room for so many points.
+    pub fn new(points: usize) -> Self {
+        Self { order: Vec::with_capacity(points) }
+    }
+}
+
+impl PointIndex for KdTree {
+    fn place(&mut self, points: &[Vec3]) {
+        list_finite(points, &mut self.order);
+        split(&mut self.order, points, 0);
     }
 
-    fn place(&mut self, points: &[Vec3]) {
-        self.order.clear();
-        let finite = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite());
-        self.order.extend(finite.take(self.order.capacity()));
-        split(&mut self.order, points, 0);
+    fn visit(&self, points: &[Vec3], bounds: &Extent, mut found: impl FnMut(u32)) {
+        search(&self.order, points, 0, bounds, &mut found);
     }
 }
 
@@ -57,42 +53,21 @@ fn split(range: &mut [u32], points: &[Vec3], axis: usize) {
     split(&mut right[1..], points, (axis + 1) % 3);
 }
 
-impl BroadPhase for KdTree {
-    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
-        self.tets.update(positions, tets, region);
+fn search(range: &[u32], points: &[Vec3], axis: usize, bounds: &Extent, found: &mut impl FnMut(u32)) {
+    let middle = range.len() / 2;
+    let Some(&i) = range.get(middle) else { return };
+    let p = points[i as usize];
+    if bounds.contains(p) {
+        found(i);
     }
-
-    fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
-        out.clear();
-        self.place(points);
-        let mut overflow = 0;
-        for &(tet, bounds) in &self.tets.boxes {
-            self.open.clear();
-            self.open.push((0, self.order.len() as u32, 0));
-            while let Some((first, last, axis)) = self.open.pop() {
-                if first == last {
-                    continue;
-                }
-                let middle = (first + last) / 2;
-                let i = self.order[middle as usize];
-                let p = points[i as usize];
-                if bounds.contains(p) {
-                    overflow += push_bounded(out, [i, tet]);
-                }
-                let (x, next) = (p.to_array()[axis as usize], (axis + 1) % 3);
-                if bounds.high[axis as usize] >= x {
-                    self.open.push((middle + 1, last, next));
-                }
-                if bounds.low[axis as usize] <= x {
-                    self.open.push((first, middle, next));
-                }
-            }
-        }
-        overflow
+    if bounds.low[axis] <= p[axis] {
+        search(&range[..middle], points, (axis + 1) % 3, bounds, found);
+    }
+    if bounds.high[axis] >= p[axis] {
+        search(&range[middle + 1..], points, (axis + 1) % 3, bounds, found);
     }
 }
 
 /// Points in the k-d tree.
-pub const METHOD: Descriptor = Descriptor::of_phase("kd-tree", "Bentley 1975", |inputs| {
-    Box::new(Phased::new(KdTree::new(inputs.points, inputs.mesh.tets.len()), inputs.points))
-});
+pub const METHOD: Descriptor =
+    Descriptor::of("kd-tree", "Bentley 1975", |inputs| indexed(inputs, KdTree::new(inputs.points)));

@@ -1,8 +1,8 @@
 //! The searches beside the recommended one: broad phases, the thesis's, the oracle.
 //!
 //! # Practice
-//! Each file ends with what the method says of itself. [`HashedGrid`] also serves
-//! [`MeshCollision`](crate::MeshCollision).
+//! Each file ends with what the method says of itself, `printed.rs` has the thesis's response.
+//! [`HashedGrid`] also serves [`MeshCollision`](crate::MeshCollision).
 
 pub mod aabb;
 pub mod brute;
@@ -14,6 +14,7 @@ pub mod obb;
 pub mod octree;
 #[cfg(feature = "parry")]
 pub mod parry_tree;
+pub(crate) mod printed;
 pub mod sphere;
 pub mod thesis;
 pub mod uniform_grid;

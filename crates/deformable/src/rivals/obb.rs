@@ -12,10 +12,8 @@
 //! # When not to use it
 //! Where the mesh turns: directions from rest then fit no better than those of the axes.
 
-use super::volume_tree::Volume;
-use super::volume_tree::VolumeTree;
+use super::volume_tree::{Volume, search};
 use crate::method::Descriptor;
-use crate::phase::Phased;
 use glam::Mat3;
 use trepan_geometry::Vec3;
 
@@ -106,9 +104,7 @@ fn rotation(m: &[[f32; 3]; 3], i: usize, j: usize) -> (f32, f32) {
 }
 
 /// A tree of turned boxes.
-pub const METHOD: Descriptor = Descriptor::of_phase("obb-tree", "Gottschalk et al. 1996", |inputs| {
-    Box::new(Phased::new(VolumeTree::<Obb>::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
-});
+pub const METHOD: Descriptor = Descriptor::of("obb-tree", "Gottschalk et al. 1996", search::<Obb>);
 
 #[cfg(test)]
 mod tests {

@@ -11,16 +11,14 @@
 
 use crate::extent::Extent;
 use crate::method::Descriptor;
-use crate::phase::{BroadPhase, Phased, TetBoxes, push_bounded};
-use trepan_geometry::{Aabb, Vec3};
+use crate::phase::{PointIndex, indexed, list_finite};
+use trepan_geometry::Vec3;
 
 /// An octree of points.
 #[derive(Debug)]
 pub struct Octree {
-    tets: TetBoxes,
     order: Vec<u32>,
     cells: Vec<Cell>,
-    open: Vec<u32>,
 }
 
 /// `order[first..last]`; its children are `cells[children..children + 8]`, none when 0.
@@ -38,29 +36,9 @@ const FEW: u32 = 6;
 const MAX_DEPTH: u32 = 10;
 
 impl Octree {
-    /// Room for so many points and tetrahedra.
-    pub fn new(points: usize, tets: usize) -> Self {
-        Self {
-            tets: TetBoxes::with_capacity(tets),
-            order: Vec::with_capacity(points),
-            cells: Vec::with_capacity(1 + 8 * points),
-            open: Vec::with_capacity(1 + 8 * points),
-        }
-    }
-
-    fn place(&mut self, points: &[Vec3]) {
-        self.order.clear();
-        let finite = (0..points.len() as u32).filter(|&i| points[i as usize].is_finite());
-        self.order.extend(finite.take(self.order.capacity()));
-        self.cells.clear();
-        let last = self.order.len() as u32;
-        let root = self.cell(points, 0, last, 0);
-        self.cells.push(root);
-        let mut at = 0;
-        while at < self.cells.len() {
-            self.cut(points, at);
-            at += 1;
-        }
+    /// Room for so many points.
+    pub fn new(points: usize) -> Self {
+        Self { order: Vec::with_capacity(points), cells: Vec::with_capacity(1 + 8 * points) }
     }
 
     fn cell(&self, points: &[Vec3], first: u32, last: u32, depth: u32) -> Cell {
@@ -92,40 +70,40 @@ impl Octree {
             start = end;
         }
     }
+
+    fn search(&self, at: u32, points: &[Vec3], bounds: &Extent, found: &mut impl FnMut(u32)) {
+        let cell = self.cells[at as usize];
+        if !cell.bounds.overlaps(bounds) {
+            return;
+        }
+        if cell.children != 0 {
+            return (cell.children..cell.children + 8)
+                .rev()
+                .for_each(|child| self.search(child, points, bounds, found));
+        }
+        let own = &self.order[cell.first as usize..cell.last as usize];
+        own.iter().filter(|&&i| bounds.contains(points[i as usize])).for_each(|&i| found(i));
+    }
 }
 
-impl BroadPhase for Octree {
-    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
-        self.tets.update(positions, tets, region);
+impl PointIndex for Octree {
+    fn place(&mut self, points: &[Vec3]) {
+        list_finite(points, &mut self.order);
+        self.cells.clear();
+        let root = self.cell(points, 0, self.order.len() as u32, 0);
+        self.cells.push(root);
+        let mut at = 0;
+        while at < self.cells.len() {
+            self.cut(points, at);
+            at += 1;
+        }
     }
 
-    fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
-        out.clear();
-        self.place(points);
-        let mut overflow = 0;
-        for &(tet, bounds) in &self.tets.boxes {
-            self.open.clear();
-            self.open.push(0);
-            while let Some(at) = self.open.pop() {
-                let cell = self.cells[at as usize];
-                if !cell.bounds.overlaps(&bounds) {
-                    continue;
-                }
-                if cell.children != 0 {
-                    self.open.extend(cell.children..cell.children + 8);
-                    continue;
-                }
-                let inside = |i: &&u32| bounds.contains(points[**i as usize]);
-                for &i in self.order[cell.first as usize..cell.last as usize].iter().filter(inside) {
-                    overflow += push_bounded(out, [i, tet]);
-                }
-            }
-        }
-        overflow
+    fn visit(&self, points: &[Vec3], bounds: &Extent, mut found: impl FnMut(u32)) {
+        self.search(0, points, bounds, &mut found);
     }
 }
 
 /// Points in the octree.
-pub const METHOD: Descriptor = Descriptor::of_phase("octree", "Meagher 1982", |inputs| {
-    Box::new(Phased::new(Octree::new(inputs.points, inputs.mesh.tets.len()), inputs.points))
-});
+pub const METHOD: Descriptor =
+    Descriptor::of("octree", "Meagher 1982", |inputs| indexed(inputs, Octree::new(inputs.points)));

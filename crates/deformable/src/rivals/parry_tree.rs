@@ -8,9 +8,10 @@
 //! # When not to use it
 //! For one small tool, as all trees that follow every tetrahedron.
 
+use crate::bounded::push_bounded;
 use crate::extent::Extent;
 use crate::method::Descriptor;
-use crate::phase::{BroadPhase, Phased, box_of, push_bounded};
+use crate::phase::{BroadPhase, Phased, box_of};
 use parry3d::bounding_volume::Aabb as Box3;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use trepan_geometry::{Aabb, Vec3};
@@ -61,6 +62,6 @@ impl BroadPhase for ParryTree {
 }
 
 /// The tree of the crate parry.
-pub const METHOD: Descriptor = Descriptor::of_phase("parry-tree", "parry3d", |inputs| {
+pub const METHOD: Descriptor = Descriptor::of("parry-tree", "parry3d", |inputs| {
     Box::new(Phased::new(ParryTree::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
 });

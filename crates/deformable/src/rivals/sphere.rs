@@ -10,10 +10,8 @@
 //! 16 bytes and one distance for each test, the same in every direction; each merge loosens the
 //! ball, so the upper levels are much larger than what they hold.
 
-use super::volume_tree::Volume;
-use super::volume_tree::VolumeTree;
+use super::volume_tree::{Volume, search};
 use crate::method::Descriptor;
-use crate::phase::Phased;
 use trepan_geometry::Vec3;
 
 /// A ball; empty when its radius is negative.
@@ -60,6 +58,4 @@ impl Volume for Sphere {
 }
 
 /// A tree of balls.
-pub const METHOD: Descriptor = Descriptor::of_phase("sphere-tree", "Hubbard 1996", |inputs| {
-    Box::new(Phased::new(VolumeTree::<Sphere>::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
-});
+pub const METHOD: Descriptor = Descriptor::of("sphere-tree", "Hubbard 1996", search::<Sphere>);

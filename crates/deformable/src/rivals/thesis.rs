@@ -19,11 +19,11 @@
 //! 22 thousand tetrahedra: all boxes are updated at every step, and a lost contact costs a search
 //! over all of them.
 
-use super::uniform_grid::PointCells;
+use super::UniformGrid;
 use crate::extent::Extent;
 use crate::method::{Descriptor, Response};
 use crate::narrow::{Hits, NONE};
-use crate::phase::box_of;
+use crate::phase::{PointIndex, box_of};
 use crate::scene::Scene;
 use crate::seam::Search;
 use crate::surface::MovingSurface;
@@ -31,8 +31,7 @@ use trepan_geometry::Aabb;
 
 /// Grid, boxes, and the tetrahedron found last.
 struct Thesis {
-    cell_mm: f32,
-    cells: PointCells,
+    cells: UniformGrid,
     boxes: Vec<Extent>,
     last: u32,
     rings: Vec<u32>,
@@ -43,13 +42,11 @@ const TWO_RINGS: usize = 1 + 4 + 12;
 
 /// The thesis's search with its response.
 pub const METHOD: Descriptor = Descriptor {
-    name: "thesis",
-    source: "thesis, chapter 4",
     response: Response::Printed,
-    is_oracle: false,
     is_complete: false,
-    uses_surface: false,
-    build: |inputs| Box::new(Thesis::new(inputs.cell_mm, inputs.points, inputs.mesh.tets.len())),
+    ..Descriptor::of("thesis", "thesis, chapter 4", |inputs| {
+        Box::new(Thesis::new(inputs.cell_mm, inputs.points, inputs.mesh.tets.len()))
+    })
 };
 
 impl Search for Thesis {
@@ -58,7 +55,7 @@ impl Search for Thesis {
     }
 
     fn find(&mut self, scene: &Scene, _: &mut MovingSurface, hits: &mut Hits) {
-        self.cells.place(scene.points, self.cell_mm);
+        self.cells.place(scene.points);
         let tissue = self.update_boxes(scene);
         let colliding = Aabb::from(tissue).intersection(scene.ball_box());
         if colliding.is_empty() {
@@ -77,8 +74,7 @@ impl Search for Thesis {
 impl Thesis {
     fn new(cell_mm: f32, points: usize, tets: usize) -> Self {
         Self {
-            cell_mm,
-            cells: PointCells::new(points),
+            cells: UniformGrid::new(cell_mm, points),
             boxes: Vec::with_capacity(tets),
             last: 0,
             rings: Vec::with_capacity(TWO_RINGS),

@@ -17,15 +17,20 @@
 
 use crate::extent::Extent;
 use crate::method::Descriptor;
-use crate::phase::{BroadPhase, Phased, TetBoxes, push_bounded};
+use crate::phase::{PointIndex, indexed};
 use trepan_geometry::{Aabb, Vec3};
 
-/// A uniform grid over the points, as an array.
+/// A uniform grid over the points, as an array: points sorted by cell.
 #[derive(Debug)]
 pub struct UniformGrid {
+    wanted_mm: f32,
     cell_mm: f32,
-    tets: TetBoxes,
-    cells: PointCells,
+    origin: Vec3,
+    bounds: Extent,
+    dims: [usize; 3],
+    starts: Vec<u32>,
+    sorted: Vec<u32>,
+    cell_of: Vec<u32>,
     /// Steps in which the cells had to be coarsened.
     pub coarsened: u32,
 }
@@ -34,66 +39,19 @@ impl UniformGrid {
     /// Most cells in the array.
     pub const MAX_CELLS: usize = 1 << 16;
 
-    /// A grid with cells of `cell_mm` (positive) for at most so many points and tetrahedra.
-    pub fn new(cell_mm: f32, points: usize, tets: usize) -> Self {
-        Self { cell_mm, tets: TetBoxes::with_capacity(tets), cells: PointCells::new(points), coarsened: 0 }
-    }
-}
-
-impl BroadPhase for UniformGrid {
-    fn update(&mut self, positions: &[Vec3], tets: &[[u32; 4]], region: &Aabb) {
-        self.tets.update(positions, tets, region);
-    }
-
-    fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
-        out.clear();
-        self.coarsened += u32::from(self.cells.place(points, self.cell_mm));
-        let mut overflow = 0;
-        for &(tet, bounds) in &self.tets.boxes {
-            self.cells.visit(points, &bounds, |point| overflow += push_bounded(out, [point, tet]));
-        }
-        overflow
-    }
-}
-
-/// Points sorted by cell.
-#[derive(Debug)]
-pub(crate) struct PointCells {
-    origin: Vec3,
-    bounds: Extent,
-    cell_mm: f32,
-    dims: [usize; 3],
-    starts: Vec<u32>,
-    sorted: Vec<u32>,
-    cell_of: Vec<u32>,
-}
-
-impl PointCells {
-    pub(crate) fn new(points: usize) -> Self {
+    /// A grid with cells of `cell_mm` (positive) for at most so many points.
+    pub fn new(cell_mm: f32, points: usize) -> Self {
         Self {
+            wanted_mm: cell_mm,
+            cell_mm,
             origin: Vec3::ZERO,
             bounds: Extent::EMPTY,
-            cell_mm: 1.0,
             dims: [0; 3],
-            starts: vec![0; UniformGrid::MAX_CELLS + 1],
+            starts: vec![0; Self::MAX_CELLS + 1],
             sorted: vec![0; points],
             cell_of: vec![0; points],
+            coarsened: 0,
         }
-    }
-
-    /// Sorts the points into cells; says whether the cells had to be larger than asked for.
-    pub(crate) fn place(&mut self, points: &[Vec3], cell_mm: f32) -> bool {
-        let points = &points[..points.len().min(self.sorted.len())];
-        let bounds = Aabb::of_points(points.iter().filter(|p| p.is_finite()));
-        self.dims = [0; 3];
-        if bounds.is_empty() || !bounds.size().is_finite() {
-            return false;
-        }
-        (self.origin, self.bounds) = (bounds.min, bounds.into());
-        self.cell_mm = fitting_cell(cell_mm, &self.bounds);
-        self.dims = bounds.size().to_array().map(|s| (s / self.cell_mm) as usize + 1);
-        self.count_and_sort(points);
-        self.cell_mm != cell_mm
     }
 
     /// Counting sort: cells ascending, in each cell points ascending.
@@ -101,8 +59,7 @@ impl PointCells {
         let cells = self.dims.iter().product::<usize>();
         self.starts[..=cells].fill(0);
         for (i, p) in points.iter().enumerate() {
-            let [x, y, z] = self.cell_at(*p);
-            self.cell_of[i] = ((z * self.dims[1] + y) * self.dims[0] + x) as u32;
+            self.cell_of[i] = self.index(self.cell_at(*p)) as u32;
             self.starts[self.cell_of[i] as usize] += 1;
         }
         for cell in 0..cells {
@@ -115,24 +72,8 @@ impl PointCells {
         }
     }
 
-    /// Calls `found` for every point inside `bounds`, through the cells that it meets.
-    pub(crate) fn visit(&self, points: &[Vec3], bounds: &Extent, mut found: impl FnMut(u32)) {
-        if self.dims[0] == 0 || !bounds.overlaps(&self.bounds) {
-            return;
-        }
-        let (low, high) = (self.cell_at(bounds.low.into()), self.cell_at(bounds.high.into()));
-        for z in low[2]..=high[2] {
-            for y in low[1]..=high[1] {
-                for x in low[0]..=high[0] {
-                    let cell = (z * self.dims[1] + y) * self.dims[0] + x;
-                    for &i in self.points_in(cell) {
-                        if bounds.contains(points[i as usize]) {
-                            found(i);
-                        }
-                    }
-                }
-            }
-        }
+    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        (z * self.dims[1] + y) * self.dims[0] + x
     }
 
     fn points_in(&self, cell: usize) -> &[u32] {
@@ -143,6 +84,37 @@ impl PointCells {
     fn cell_at(&self, p: Vec3) -> [usize; 3] {
         let at = ((p - self.origin) / self.cell_mm).floor().to_array();
         core::array::from_fn(|axis| (at[axis].max(0.0) as usize).min(self.dims[axis] - 1))
+    }
+}
+
+impl PointIndex for UniformGrid {
+    fn place(&mut self, points: &[Vec3]) {
+        let points = &points[..points.len().min(self.sorted.len())];
+        let bounds = Aabb::of_points(points.iter().filter(|p| p.is_finite()));
+        self.dims = [0; 3];
+        if bounds.is_empty() || !bounds.size().is_finite() {
+            return;
+        }
+        (self.origin, self.bounds) = (bounds.min, bounds.into());
+        self.cell_mm = fitting_cell(self.wanted_mm, &self.bounds);
+        self.coarsened += u32::from(self.cell_mm != self.wanted_mm);
+        self.dims = bounds.size().to_array().map(|s| (s / self.cell_mm) as usize + 1);
+        self.count_and_sort(points);
+    }
+
+    fn visit(&self, points: &[Vec3], bounds: &Extent, mut found: impl FnMut(u32)) {
+        if self.dims[0] == 0 || !bounds.overlaps(&self.bounds) {
+            return;
+        }
+        let (low, high) = (self.cell_at(bounds.low.into()), self.cell_at(bounds.high.into()));
+        for z in low[2]..=high[2] {
+            for y in low[1]..=high[1] {
+                for x in low[0]..=high[0] {
+                    let inside = |i: &&u32| bounds.contains(points[**i as usize]);
+                    self.points_in(self.index([x, y, z])).iter().filter(inside).for_each(|&i| found(i));
+                }
+            }
+        }
     }
 }
 
@@ -159,11 +131,10 @@ pub(crate) fn fitting_cell(wanted_mm: f32, bounds: &Extent) -> f32 {
 }
 
 /// Points in the uniform grid.
-pub const METHOD: Descriptor = Descriptor::of_phase("uniform-grid", "Teschner et al. 2003", |inputs| {
-    Box::new(Phased::new(UniformGrid::new(inputs.cell_mm, inputs.points, inputs.mesh.tets.len()), inputs.points))
+pub const METHOD: Descriptor = Descriptor::of("uniform-grid", "Teschner et al. 2003", |inputs| {
+    indexed(inputs, UniformGrid::new(inputs.cell_mm, inputs.points))
 });
 
 /// One cell for all: the box of every tetrahedron against the tool's box, the plain baseline.
-pub const SCAN: Descriptor = Descriptor::of_phase("scan", "none", |inputs| {
-    Box::new(Phased::new(UniformGrid::new(f32::MAX, inputs.points, inputs.mesh.tets.len()), inputs.points))
-});
+pub const SCAN: Descriptor =
+    Descriptor::of("scan", "none", |inputs| indexed(inputs, UniformGrid::new(f32::MAX, inputs.points)));

@@ -23,8 +23,10 @@
 //! For one small tool: the refit costs more than a scan over all boxes. It pays with many points
 //! that lie far apart.
 
+use crate::bounded::push_bounded;
 use crate::extent::Extent;
-use crate::phase::{BroadPhase, box_of, push_bounded};
+use crate::phase::{BroadPhase, Phased, box_of};
+use crate::seam::{Search, SearchInputs};
 use trepan_geometry::{Aabb, Vec3};
 
 /// Something that holds points, and can be made to hold more.
@@ -52,7 +54,6 @@ pub struct VolumeTree<V> {
     volumes: Vec<V>,
     shape: Vec<Node>,
     order: Vec<u32>,
-    open: Vec<u32>,
     boxes: Vec<Extent>,
 }
 
@@ -65,6 +66,13 @@ pub(crate) struct Node {
     pub right: u32,
 }
 
+impl Node {
+    /// The tetrahedra below it, in the order of its tree.
+    pub fn tets<'a>(&self, order: &'a [u32]) -> &'a [u32] {
+        &order[self.first as usize..self.last as usize]
+    }
+}
+
 /// Most tetrahedra in a leaf.
 pub(crate) const LEAF: usize = 8;
 
@@ -73,17 +81,33 @@ impl<V: Volume> VolumeTree<V> {
     pub fn new(positions: &[Vec3], tets: &[[u32; 4]]) -> Self {
         let (shape, order) = halved(positions, tets);
         let corners = |n: &Node| -> Vec<Vec3> {
-            let below = &order[n.first as usize..n.last as usize];
-            below.iter().flat_map(|&t| tets[t as usize].map(|c| positions[c as usize])).collect()
+            n.tets(&order).iter().flat_map(|&t| tets[t as usize].map(|c| positions[c as usize])).collect()
         };
         Self {
             volumes: shape.iter().map(|n| V::for_points(&corners(n))).collect(),
-            open: Vec::with_capacity(shape.len()),
             boxes: vec![Extent::EMPTY; tets.len()],
             shape,
             order,
         }
     }
+
+    /// Adds the pairs of a point below a node; returns how many did not fit.
+    fn descend(&self, at: u32, i: u32, p: Vec3, out: &mut Vec<[u32; 2]>) -> u32 {
+        let node = self.shape[at as usize];
+        if !self.volumes[at as usize].holds(p) {
+            return 0;
+        }
+        if node.right != 0 {
+            return self.descend(at + 1, i, p, out) + self.descend(node.right, i, p, out);
+        }
+        let met = node.tets(&self.order).iter().filter(|&&t| self.boxes[t as usize].contains(p));
+        met.map(|&t| push_bounded(out, [i, t])).sum()
+    }
+}
+
+/// The search by a tree of such volumes.
+pub(crate) fn search<V: Volume + 'static>(inputs: &SearchInputs) -> Box<dyn Search> {
+    Box::new(Phased::new(VolumeTree::<V>::new(&inputs.mesh.positions, &inputs.mesh.tets), inputs.points))
 }
 
 impl<V: Volume> BroadPhase for VolumeTree<V> {
@@ -96,7 +120,7 @@ impl<V: Volume> BroadPhase for VolumeTree<V> {
             let mut volume = self.volumes[at];
             volume.clear();
             if node.right == 0 {
-                for &t in &self.order[node.first as usize..node.last as usize] {
+                for &t in node.tets(&self.order) {
                     if self.boxes[t as usize] != Extent::EMPTY {
                         volume.add_corners(&tets[t as usize].map(|c| positions[c as usize]));
                     }
@@ -111,25 +135,7 @@ impl<V: Volume> BroadPhase for VolumeTree<V> {
 
     fn pairs(&mut self, points: &[Vec3], out: &mut Vec<[u32; 2]>) -> u32 {
         out.clear();
-        let mut overflow = 0;
-        for (i, &p) in points.iter().enumerate() {
-            self.open.clear();
-            self.open.push(0);
-            while let Some(at) = self.open.pop() {
-                let node = self.shape[at as usize];
-                if !self.volumes[at as usize].holds(p) {
-                    continue;
-                }
-                if node.right != 0 {
-                    self.open.extend([node.right, at + 1]);
-                    continue;
-                }
-                let leaf = &self.order[node.first as usize..node.last as usize];
-                for &t in leaf.iter().filter(|&&t| self.boxes[t as usize].contains(p)) {
-                    overflow += push_bounded(out, [i as u32, t]);
-                }
-            }
-        }
+        let overflow = (0..).zip(points).map(|(i, &p)| self.descend(0, i, p, out)).sum();
         out.sort_unstable_by_key(|&[point, tet]| (tet, point));
         overflow
     }

@@ -2,6 +2,7 @@
 
 use super::lost::Lost;
 use crate::{
+    bounded::push_bounded,
     extent::Extent,
     narrow::{Hits, NONE},
     phase::box_of,
@@ -38,12 +39,9 @@ impl Flood {
         if self.seen_at[tet as usize] == self.number {
             return;
         }
-        match self.open.len() < self.open.capacity() {
-            true => {
-                self.seen_at[tet as usize] = self.number;
-                self.open.push(tet);
-            }
-            false => hits.overflow += 1,
+        match push_bounded(&mut self.open, tet) {
+            0 => self.seen_at[tet as usize] = self.number,
+            _ => hits.overflow += 1,
         }
     }
 

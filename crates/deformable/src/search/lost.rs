@@ -2,15 +2,13 @@
 //! compared with a box at once.
 
 use crate::extent::Extent;
-use glam::Vec3A;
 use trepan_geometry::Vec3;
 
 /// Numbers and places of lost points.
 pub(crate) struct Lost {
     numbers: Vec<u32>,
-    x: Vec<f32>,
-    y: Vec<f32>,
-    z: Vec<f32>,
+    /// x, y and z of each.
+    axes: [Vec<f32>; 3],
 }
 
 /// Points compared at once.
@@ -18,28 +16,24 @@ const LANES: usize = 8;
 
 impl Lost {
     pub(crate) fn with_capacity(points: usize) -> Self {
-        let axis = || Vec::with_capacity(points);
-        Self { numbers: Vec::with_capacity(points), x: axis(), y: axis(), z: axis() }
+        let axes = core::array::from_fn(|_| Vec::with_capacity(points));
+        Self { numbers: Vec::with_capacity(points), axes }
     }
 
     pub(crate) fn clear(&mut self) {
         self.numbers.clear();
-        [&mut self.x, &mut self.y, &mut self.z].into_iter().for_each(Vec::clear);
+        self.axes.iter_mut().for_each(Vec::clear);
     }
 
     pub(crate) fn push(&mut self, number: u32, p: Vec3) {
         self.numbers.push(number);
-        self.x.push(p.x);
-        self.y.push(p.y);
-        self.z.push(p.z);
+        self.axes.iter_mut().zip(p.to_array()).for_each(|(axis, x)| axis.push(x));
     }
 
     /// Takes the `k`th away; the last one takes its place.
     pub(crate) fn swap_remove(&mut self, k: usize) {
         self.numbers.swap_remove(k);
-        for axis in [&mut self.x, &mut self.y, &mut self.z] {
-            axis.swap_remove(k);
-        }
+        self.axes.iter_mut().for_each(|axis| _ = axis.swap_remove(k));
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -55,19 +49,19 @@ impl Lost {
     }
 
     pub(crate) fn place(&self, k: usize) -> Vec3 {
-        Vec3::new(self.x[k], self.y[k], self.z[k])
+        self.axes.each_ref().map(|axis| axis[k]).into()
     }
 
     /// Box of all.
     pub(crate) fn bounds(&self) -> Extent {
-        let [x, y, z] = [range(&self.x), range(&self.y), range(&self.z)];
-        Extent { low: Vec3A::new(x.0, y.0, z.0), high: Vec3A::new(x.1, y.1, z.1) }
+        let ranges = self.axes.each_ref().map(|axis| range(axis));
+        Extent { low: ranges.map(|r| r.0).into(), high: ranges.map(|r| r.1).into() }
     }
 
     /// The first one from the `k`th on that lies in a box.
     #[inline]
     pub(crate) fn next_in(&self, mut k: usize, b: &Extent) -> Option<usize> {
-        let (x, y, z) = (&self.x[..], &self.y[..self.x.len()], &self.z[..self.x.len()]);
+        let [x, y, z] = self.axes.each_ref().map(|axis| &axis[..self.numbers.len()]);
         let (low, high) = (b.low.to_array(), b.high.to_array());
         let inside = |n: usize| {
             (low[0] <= x[n])

@@ -32,7 +32,7 @@
 
 use super::{degenerate::Degenerate, flood::Flood, lost::Lost};
 use crate::extent::Extent;
-use crate::method::{Descriptor, Method, Response};
+use crate::method::{Descriptor, Method};
 use crate::narrow::{Hits, NONE, is_inside};
 use crate::scene::Scene;
 use crate::seam::Search;
@@ -56,13 +56,10 @@ const MAX_SEEDS: usize = 4_096;
 
 /// The walk.
 pub const METHOD: Descriptor = Descriptor {
-    name: "walk",
-    source: "Guibas and Stolfi 1985, with floods (this crate)",
-    response: Response::RECOMMENDED,
-    is_oracle: false,
-    is_complete: true,
     uses_surface: true,
-    build: |inputs| Box::new(Walk::new(inputs.points, inputs.mesh.tets.len())),
+    ..Descriptor::of("walk", "Guibas and Stolfi 1985, with floods (this crate)", |inputs| {
+        Box::new(Walk::new(inputs.points, inputs.mesh.tets.len()))
+    })
 };
 
 impl Method {

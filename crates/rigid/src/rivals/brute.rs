@@ -16,10 +16,11 @@
 //! # When not to use it
 //! In a haptic tick.
 
-use crate::cell;
-use crate::method::{Descriptor, Extent};
-use crate::removal::{Burr, Cut, RemovalLaw};
-use crate::rows::EVERYWHERE;
+use super::cell;
+use super::frame::{Held, Rival, framed};
+use crate::method::Descriptor;
+use crate::removal::RemovalLaw;
+use crate::rows::each;
 use crate::{RigidContact, RigidStep};
 use glam::{DVec3, IVec3};
 use trepan_contact::Contact;
@@ -51,33 +52,21 @@ impl Default for Config {
 }
 
 /// The ball of one tool.
-pub struct Brute {
+struct Brute {
     config: Config,
-    tool: Tool,
-    proxy: Pose,
+    radius: f64,
     centre: DVec3,
-    placed: bool,
     triangles: Vec<[DVec3; 3]>,
     overflow: bool,
-    burr: Burr,
+}
+
+/// The method with a ball of the tool's tip.
+pub fn new(tool: &Tool, config: Config) -> Box<dyn RigidContact> {
+    let (radius, triangles) = (tool.tip_radius_mm.into(), Vec::with_capacity(MAX_TRIANGLES));
+    framed(tool, config.removal, Brute { config, radius, centre: DVec3::ZERO, triangles, overflow: false })
 }
 
 impl Brute {
-    /// A ball of the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts
-    /// at the first tool pose.
-    pub fn new(tool: &Tool, config: Config) -> Self {
-        Self {
-            config,
-            tool: *tool,
-            proxy: Pose::IDENTITY,
-            centre: DVec3::ZERO,
-            placed: false,
-            triangles: Vec::with_capacity(MAX_TRIANGLES),
-            overflow: false,
-            burr: Burr::new(config.removal, MAX_TRIANGLES),
-        }
-    }
-
     /// Triangles within `reach` mm of the centre.
     fn triangulate(&mut self, bone: &BoneVolume, reach: f64, out: &mut RigidStep) {
         self.triangles.clear();
@@ -85,18 +74,13 @@ impl Brute {
         let spacing = f64::from(bone.spacing_mm());
         let low = bone.grid_of((self.centre - reach).as_vec3()).floor().as_ivec3() - 1;
         let high = bone.grid_of((self.centre + reach).as_vec3()).ceil().as_ivec3() + 1;
-        for k in low.z..=high.z {
-            for j in low.y..=high.y {
-                for i in low.x..=high.x {
-                    let cell = IVec3::new(i, j, k);
-                    let middle = bone.origin().as_dvec3() + (cell.as_dvec3() + 0.5) * spacing;
-                    out.voxels_swept += 1;
-                    if middle.distance(self.centre) < reach + spacing {
-                        self.cell(bone, cell);
-                    }
-                }
+        each(low, high + 1, |cell| {
+            let middle = bone.origin().as_dvec3() + (cell.as_dvec3() + 0.5) * spacing;
+            out.voxels_swept += 1;
+            if middle.distance(self.centre) < reach + spacing {
+                self.cell(bone, cell);
             }
-        }
+        });
         out.fallbacks += u32::from(self.overflow);
     }
 
@@ -106,16 +90,11 @@ impl Brute {
         let over = |c: usize| f64::from(bone.hu(corner(c as i32))) - f64::from(bone.isovalue());
         let (origin, spacing) = (bone.origin().as_dvec3(), f64::from(bone.spacing_mm()));
         cell::triangles(&core::array::from_fn(over), |triangle| {
-            self.add(triangle.map(|p| origin + (cell.as_dvec3() + p) * spacing));
+            self.overflow |= self.triangles.len() == MAX_TRIANGLES;
+            if !self.overflow {
+                self.triangles.push(triangle.map(|p| origin + (cell.as_dvec3() + p) * spacing));
+            }
         });
-    }
-
-    fn add(&mut self, triangle: [DVec3; 3]) {
-        if self.triangles.len() < MAX_TRIANGLES {
-            self.triangles.push(triangle);
-        } else {
-            self.overflow = true;
-        }
     }
 
     /// The nearest point of the surface and its distance.
@@ -125,11 +104,11 @@ impl Brute {
     }
 
     /// Pushes a ball at `centre` off the surface; `None` when it does not come free.
-    fn pushed_off(&self, mut centre: DVec3, radius: f64) -> Option<DVec3> {
+    fn pushed_off(&self, mut centre: DVec3) -> Option<DVec3> {
         for _ in 0..MAX_PUSHES {
             match self.nearest(centre) {
-                Some((point, distance)) if distance < radius - 1e-7 => {
-                    centre += (centre - point) * ((radius - distance) / distance.max(1e-9));
+                Some((point, distance)) if distance < self.radius - 1e-7 => {
+                    centre += (centre - point) * ((self.radius - distance) / distance.max(1e-9));
                 }
                 _ => return Some(centre),
             }
@@ -138,7 +117,7 @@ impl Brute {
     }
 
     fn follow(&mut self, bone: &BoneVolume, device: DVec3, out: &mut RigidStep) {
-        let (radius, spacing) = (f64::from(self.tool.tip_radius_mm), f64::from(bone.spacing_mm()));
+        let (radius, spacing) = (self.radius, f64::from(bone.spacing_mm()));
         let way = Aabb::of_points(&[self.centre.as_vec3(), device.as_vec3()]);
         if !way.inflated((radius + 2.0 * spacing) as f32).overlaps(bone.bounds()) {
             self.triangles.clear();
@@ -153,7 +132,7 @@ impl Brute {
                 self.triangulate(bone, radius + REACH * spacing, out);
             }
             let wanted = (device - self.centre).clamp_length_max(self.config.step_voxels * spacing);
-            let Some(next) = self.pushed_off(self.centre + wanted, radius) else {
+            let Some(next) = self.pushed_off(self.centre + wanted) else {
                 out.fallbacks += 1;
                 return;
             };
@@ -174,51 +153,33 @@ impl Brute {
         if depth < 1e-9 {
             return;
         }
-        let radius = f64::from(self.tool.tip_radius_mm);
         if let Some((point, _)) = self.nearest(self.centre) {
             let normal = (self.centre - point).normalize_or_zero();
-            let deep = radius - (device - point).dot(normal);
-            let deep = deep.max(0.0) as f32;
-            out.manifold.push(Contact { point: point.as_vec3(), normal: normal.as_vec3(), depth_mm: deep });
+            let depth_mm = (self.radius - (device - point).dot(normal)).max(0.0) as f32;
+            out.manifold.push(Contact { point: point.as_vec3(), normal: normal.as_vec3(), depth_mm });
         }
         (out.points_in_contact, out.voxels_in_contact) = (1, 1);
         let normal = lifted / depth;
         out.manifold.normal = normal.as_vec3();
         out.manifold.depth_mm = depth as f32;
-        out.manifold.point = (self.centre - radius * normal).as_vec3();
+        out.manifold.point = (self.centre - self.radius * normal).as_vec3();
     }
 }
 
-impl RigidContact for Brute {
-    fn step(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool, dt_ms: f32, out: &mut RigidStep) {
-        out.clear();
-        if !tool.is_finite() {
-            out.fallbacks = 1;
-            return;
-        }
-        if !self.placed {
-            self.reset(tool.world_from_tool);
-        }
-        self.follow(bone, tool.tip().as_dvec3(), out);
-        self.proxy = Pose::from_parts(self.centre.as_vec3(), tool.world_from_tool.rotation);
-        self.report(tool.tip().as_dvec3(), out);
-        if drilling && self.tool.kind.cuts() {
-            let (device, proxy, radius_mm) = (tool.tip(), self.proxy.translation, self.tool.tip_radius_mm);
-            let depth_mm = device.distance(proxy);
-            let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms, within: EVERYWHERE };
-            self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
-        }
-    }
+impl Rival for Brute {
+    const MAX_BITES: usize = MAX_TRIANGLES;
 
-    fn proxy(&self) -> Pose {
-        self.proxy
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
+        let device = tool.tip();
+        self.follow(bone, device.as_dvec3(), out);
+        let proxy = self.centre.as_vec3();
+        held.proxy = Pose::from_parts(proxy, tool.world_from_tool.rotation);
+        self.report(device.as_dvec3(), out);
+        held.cut(bone, device, proxy, device.distance(proxy), out);
     }
 
     fn reset(&mut self, pose: Pose) {
-        self.proxy = pose;
         self.centre = pose.translation.as_dvec3();
-        self.placed = pose.translation.is_finite();
-        self.burr.reset();
     }
 }
 
@@ -253,13 +214,9 @@ fn nearest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
 
 /// What the method says of itself.
 pub const METHOD: Descriptor = Descriptor {
-    name: "brute",
-    former_names: &[],
-    source: "Zilles and Salisbury 1995, by small steps in f64",
-    extent: Extent::Ball,
     has_proxy: true,
     is_oracle: true,
-    points: 0,
-    removal: RemovalLaw::RATE,
-    build: |tool, _| Box::new(Brute::new(tool, Config::default())),
+    ..Descriptor::of("brute", "Zilles and Salisbury 1995, by small steps in f64", |tool, _| {
+        new(tool, Config::default())
+    })
 };

@@ -23,7 +23,7 @@
 //! For a steady force: depth is counted from voxel centres, so that it steps by fractions of a
 //! voxel. Against thin walls: it has no proxy.
 
-use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
+use super::frame::{Felt, PenaltyProbe, answer, framed};
 use crate::RigidStep;
 use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
@@ -33,9 +33,7 @@ use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
-struct BurrAndShaft {
-    tool: Tool,
-}
+struct BurrAndShaft;
 
 /// What the voxels near one part of the tool do together; grid units.
 #[derive(Default)]
@@ -68,43 +66,31 @@ impl Press {
     }
 }
 
-impl BurrAndShaft {
-    pub fn new(tool: &Tool) -> Self {
-        Self { tool: *tool }
-    }
+fn burr(bone: &BoneVolume, tool: &Tool, centre: Vec3, visited: &mut u32) -> Press {
+    let (mut press, radius) = (Press::default(), tool.tip_radius_mm / bone.spacing_mm());
+    rows(GridBall { centre, radius }, GridBall::NONE, |start, to| {
+        *visited += (to - start.x + 1).max(0) as u32;
+        for voxel in (start.x..=to).map(|x| start.with_x(x)).filter(|&voxel| bone.is_bone(voxel)) {
+            press.add(voxel.as_vec3(), centre - voxel.as_vec3(), radius);
+        }
+    });
+    press
+}
 
-    fn burr(&self, bone: &BoneVolume, centre: Vec3, visited: &mut u32) -> Press {
-        let (mut press, radius) = (Press::default(), self.tool.tip_radius_mm / bone.spacing_mm());
-        let none = GridBall { centre, radius: -1.0 };
-        rows(GridBall { centre, radius }, none, |start, to| {
-            *visited += (to - start.x + 1).max(0) as u32;
-            for voxel in (start.x..=to).map(|x| start.with_x(x)).filter(|&voxel| bone.is_bone(voxel)) {
-                press.add(voxel.as_vec3(), centre - voxel.as_vec3(), radius);
-            }
-        });
-        press
-    }
-
-    fn shaft(&self, bone: &BoneVolume, pose: &Pose, visited: &mut u32) -> Press {
-        let (mut press, spacing) = (Press::default(), bone.spacing_mm());
-        let shaft = Shaft {
-            start: bone.grid_of(pose.translation),
-            axis: pose.rotation * Vec3::Z,
-            span: (self.tool.tip_radius_mm / spacing, self.tool.shaft_length_mm / spacing),
-            radius: self.tool.shaft_radius_mm / spacing,
-        };
-        *visited += shaft.around(bone, shaft.radius, |voxel| {
-            let place = voxel.as_vec3();
-            press.add(place, shaft.at(shaft.along(place)) - place, shaft.radius);
-        });
-        press
-    }
+fn shaft(bone: &BoneVolume, tool: &Tool, pose: &Pose, visited: &mut u32) -> Press {
+    let mut press = Press::default();
+    let shaft = Shaft::of(tool, bone, bone.grid_of(pose.translation), pose.rotation * Vec3::Z);
+    *visited += shaft.around(bone, shaft.radius, |voxel| {
+        let place = voxel.as_vec3();
+        press.add(place, shaft.at(shaft.along(place)) - place, shaft.radius);
+    });
+    press
 }
 
 impl PenaltyProbe for BurrAndShaft {
-    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
-        let burr = self.burr(bone, bone.grid_of(pose.translation), &mut out.voxels_swept);
-        let shaft = self.shaft(bone, pose, &mut out.voxels_swept);
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+        let burr = burr(bone, tool, bone.grid_of(pose.translation), &mut out.voxels_swept);
+        let shaft = shaft(bone, tool, pose, &mut out.voxels_swept);
         out.voxels_in_contact = burr.voxels + shaft.voxels;
         out.points_in_contact = out.voxels_in_contact;
         let (mut push, mut moment) = (Vec3::ZERO, Vec3::ZERO);
@@ -126,13 +112,6 @@ impl PenaltyProbe for BurrAndShaft {
 
 /// What the method says of itself.
 pub const METHOD: Descriptor = Descriptor {
-    name: "burr-and-shaft",
-    former_names: &[],
-    source: "He and Chen 2006",
     extent: Extent::BallAndShaft,
-    has_proxy: false,
-    is_oracle: false,
-    points: 0,
-    removal: RemovalLaw::RATE,
-    build: |tool, _| Box::new(Penalty::new(tool, BurrAndShaft::new(tool), RemovalLaw::RATE)),
+    ..Descriptor::of("burr-and-shaft", "He and Chen 2006", |tool, _| framed(tool, RemovalLaw::RATE, BurrAndShaft))
 };

@@ -21,11 +21,11 @@
 //! For burrs that are seen: the line has no thickness, so that a burr sinks in to its centre before
 //! it touches.
 
+use super::frame::{Held, Rival, framed};
 use super::ray_trace::over_iso;
+use super::traverse::first_bone;
 use crate::method::{Descriptor, Extent};
-use crate::removal::{Burr, Cut, RemovalLaw};
-use crate::rows::EVERYWHERE;
-use crate::traverse::first_bone;
+use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};
@@ -33,8 +33,6 @@ use trepan_volume::BoneVolume;
 
 /// Most vertices on a shaft.
 const MAX_VERTICES: usize = 512;
-/// Most voxels that a burr bites at once.
-const MAX_BITES: usize = 16384;
 /// How far before bone a proxy stops, voxels.
 const BEFORE: f32 = 0.01;
 
@@ -76,28 +74,22 @@ impl Vertex {
 }
 
 /// The line of one tool.
-pub struct CentreLine {
-    tool: Tool,
-    proxy: Pose,
-    placed: bool,
+struct CentreLine {
     /// The first is the tip.
     vertices: Vec<Vertex>,
-    burr: Burr,
+}
+
+/// The method with a line of the tool's length.
+pub fn new(tool: &Tool, config: Config) -> Box<dyn RigidContact> {
+    let step_mm = config.step_mm.max(1e-2);
+    let heights = (1..MAX_VERTICES).map(|at| tool.tip_radius_mm + at as f32 * step_mm);
+    let on_shaft = heights.take_while(|&height| height <= tool.shaft_length_mm);
+    let vertex = |height_mm| Vertex { height_mm, proxy: Vec3::ZERO };
+    let vertices = core::iter::once(0.0).chain(on_shaft).map(vertex).collect();
+    framed(tool, config.removal, CentreLine { vertices })
 }
 
 impl CentreLine {
-    /// A line of the tool's length. Until [`reset`](RigidContact::reset) puts it somewhere it
-    /// starts at the first tool pose.
-    pub fn new(tool: &Tool, config: Config) -> Self {
-        let step_mm = config.step_mm.max(1e-2);
-        let heights = (1..MAX_VERTICES).map(|at| tool.tip_radius_mm + at as f32 * step_mm);
-        let on_shaft = heights.take_while(|&height| height <= tool.shaft_length_mm);
-        let vertex = |height_mm| Vertex { height_mm, proxy: Vec3::ZERO };
-        let vertices = core::iter::once(0.0).chain(on_shaft).map(vertex).collect();
-        let burr = Burr::new(config.removal, MAX_BITES);
-        Self { tool: *tool, proxy: Pose::IDENTITY, placed: false, vertices, burr }
-    }
-
     /// The springs of tip and shaft, and the shaft's arm, world mm.
     fn springs(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> (Vec3, Vec3, Vec3) {
         let (mut tip, mut shaft, mut arm) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
@@ -123,19 +115,11 @@ impl CentreLine {
     }
 }
 
-impl RigidContact for CentreLine {
-    fn step(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool, dt_ms: f32, out: &mut RigidStep) {
-        out.clear();
-        if !tool.is_finite() {
-            out.fallbacks = 1;
-            return;
-        }
-        if !self.placed {
-            self.reset(tool.world_from_tool);
-        }
+impl Rival for CentreLine {
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
         let (tip, shaft, arm) = self.springs(bone, &tool.world_from_tool, out);
-        self.proxy = tool.world_from_tool;
-        self.proxy.translation += tip + shaft;
+        held.proxy = tool.world_from_tool;
+        held.proxy.translation += tip + shaft;
         let depth = (tip + shaft).length();
         if depth > 0.0 {
             out.manifold.normal = (tip + shaft) / depth;
@@ -143,31 +127,13 @@ impl RigidContact for CentreLine {
             out.manifold.point = tool.tip();
             out.manifold.couple_mm = arm.cross(shaft) / depth;
         }
-        if drilling && self.tool.kind.cuts() && tip != Vec3::ZERO {
-            let (device, proxy) = (tool.tip(), tool.tip() + tip);
-            let cut = Cut {
-                device,
-                proxy,
-                radius_mm: self.tool.tip_radius_mm,
-                depth_mm: tip.length(),
-                dt_ms,
-                within: EVERYWHERE,
-            };
-            self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
-        }
-    }
-
-    fn proxy(&self) -> Pose {
-        self.proxy
+        held.cut(bone, tool.tip(), tool.tip() + tip, tip.length(), out);
     }
 
     fn reset(&mut self, pose: Pose) {
-        self.proxy = pose;
-        self.placed = pose.translation.is_finite();
         for vertex in &mut self.vertices {
             vertex.proxy = pose.translation + pose.rotation * Vec3::Z * vertex.height_mm;
         }
-        self.burr.reset();
     }
 }
 
@@ -191,13 +157,7 @@ fn normal(bone: &BoneVolume, point: Vec3) -> Vec3 {
 
 /// What the method says of itself.
 pub const METHOD: Descriptor = Descriptor {
-    name: "centre-line",
-    former_names: &[],
-    source: "Asenjo 2008, line approximation",
     extent: Extent::Axis,
     has_proxy: true,
-    is_oracle: false,
-    points: 0,
-    removal: RemovalLaw::RATE,
-    build: |tool, _| Box::new(CentreLine::new(tool, Config::default())),
+    ..Descriptor::of("centre-line", "Asenjo 2008, line approximation", |tool, _| new(tool, Config::default()))
 };

@@ -23,81 +23,62 @@
 //! On oblique bone: a voxel knows 26 normals, so that force turns and jumps at voxel borders.
 //! Against thin walls: it has no proxy.
 
-use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
+use super::frame::{Felt, PenaltyProbe, ball_shell, deepest, framed};
 use crate::RigidStep;
-use crate::method::{Descriptor, Extent};
+use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
+use crate::surface::NEIGHBOURS;
 use glam::IVec3;
 use trepan_contact::Contact;
-use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
+use trepan_geometry::{Pointshell, Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
-const NEIGHBOURS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
+struct Faces(Pointshell);
 
-struct Faces {
-    shell: Pointshell,
-    radius_mm: f32,
-}
-
-impl Faces {
-    pub fn new(tool: &Tool, points: usize) -> Self {
-        let shell = Pointshell::sphere(tool.tip_radius_mm, points.clamp(8, 20_000), Spread::Fibonacci);
-        Self { shell, radius_mm: tool.tip_radius_mm }
-    }
-
-    /// The depth of `point`, mm, and its normal, found on the way along `inward`; `None` when there
-    /// is bone to the tool's centre.
-    fn plane(&self, bone: &BoneVolume, point: Vec3, inward: Vec3, visited: &mut u32) -> Option<(f32, Vec3)> {
-        let steps = (self.radius_mm / bone.spacing_mm()).floor().clamp(0.0, 256.0) as u32;
-        (0..=steps).find_map(|step| {
-            let voxel = bone.voxel_of(point + step as f32 * bone.spacing_mm() * inward);
-            if !bone.is_bone(voxel) {
-                return None;
-            }
-            *visited += NEIGHBOURS.len() as u32;
-            let bare = NEIGHBOURS.into_iter().filter(|&face| !bone.is_bone(voxel + face));
-            let (count, sum) = bare.fold((0, IVec3::ZERO), |(count, sum), face| (count + 1, sum + face));
-            let through = bone.centre_of(voxel) + sum.as_vec3() * (0.5 * bone.spacing_mm() / count.max(1) as f32);
-            // Faces that cancel, of a wall or a pillar one voxel thick, say nothing.
-            let normal = if sum == IVec3::ZERO { inward } else { sum.as_vec3().normalize() };
-            (count > 0).then(|| ((through - point).dot(normal), normal))
-        })
-    }
+/// The depth of `point`, mm, and its normal, found within `reach_mm` along `inward`; `None` when
+/// there is bone so far.
+fn plane(bone: &BoneVolume, reach_mm: f32, point: Vec3, inward: Vec3, visited: &mut u32) -> Option<(f32, Vec3)> {
+    let steps = (reach_mm / bone.spacing_mm()).floor().clamp(0.0, 256.0) as u32;
+    (0..=steps).find_map(|step| {
+        let voxel = bone.voxel_of(point + step as f32 * bone.spacing_mm() * inward);
+        if !bone.is_bone(voxel) {
+            return None;
+        }
+        *visited += NEIGHBOURS.len() as u32;
+        let bare = NEIGHBOURS.into_iter().filter(|&face| !bone.is_bone(voxel + face));
+        let (count, sum) = bare.fold((0, IVec3::ZERO), |(count, sum), face| (count + 1, sum + face));
+        let through = bone.centre_of(voxel) + sum.as_vec3() * (0.5 * bone.spacing_mm() / count.max(1) as f32);
+        // Faces that cancel, of a wall or a pillar one voxel thick, say nothing.
+        let normal = if sum == IVec3::ZERO { inward } else { sum.as_vec3().normalize() };
+        (count > 0).then(|| ((through - point).dot(normal), normal))
+    })
 }
 
 impl PenaltyProbe for Faces {
-    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let mut push = Vec3::ZERO;
-        for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {
-            let point = pose.translation + *point;
+        for (point, inward) in self.0.iter() {
+            let point = pose.translation + point;
             out.voxels_swept += 1;
             if !bone.is_bone(bone.voxel_of(point)) {
                 continue;
             }
             out.points_in_contact += 1;
-            if let Some((depth_mm, normal)) = self.plane(bone, point, *inward, &mut out.voxels_swept)
+            if let Some((depth_mm, normal)) = plane(bone, tool.tip_radius_mm, point, inward, &mut out.voxels_swept)
                 && depth_mm > 0.0
             {
                 push += depth_mm * normal;
                 out.manifold.push(Contact { point, normal, depth_mm });
             }
         }
-        out.voxels_in_contact = out.points_in_contact;
-        let normal = push.normalize_or_zero();
-        let depth = out.manifold.contacts().iter().map(|c| c.depth_mm * c.normal.dot(normal)).fold(0.0, f32::max);
-        answer(push, depth, out)
+        deepest(push, out)
     }
 }
 
 /// What the method says of itself.
 pub const METHOD: Descriptor = Descriptor {
-    name: "exposed-faces",
-    former_names: &[],
-    source: "Acosta and Liu 2007",
-    extent: Extent::Ball,
-    has_proxy: false,
-    is_oracle: false,
     points: Pointshell::RIGID_COUNT,
-    removal: RemovalLaw::RATE,
-    build: |tool, points| Box::new(Penalty::new(tool, Faces::new(tool, points), RemovalLaw::RATE)),
+    ..Descriptor::of("exposed-faces", "Acosta and Liu 2007", |tool, points| {
+        framed(tool, RemovalLaw::RATE, Faces(ball_shell(tool, points)))
+    })
 };

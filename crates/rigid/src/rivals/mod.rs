@@ -6,11 +6,17 @@
 
 pub mod brute;
 pub mod burr_and_shaft;
+mod cell;
 pub mod centre_line;
 pub mod exposed_faces;
-mod penalty;
+mod frame;
+pub mod mesh_shell;
 pub mod pointshell;
 pub mod ray_trace;
 pub mod surface_vertices;
+mod sweep;
 pub mod thesis;
+mod traverse;
 pub mod voxel_sum;
+
+pub use sweep::Sweep;

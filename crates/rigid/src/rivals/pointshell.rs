@@ -22,12 +22,12 @@
 //! Deeper than a voxel: the depth of a point starts anew in each voxel, so that the force stays as
 //! small as at the surface.
 
-use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
-use crate::method::{Descriptor, Extent};
+use super::frame::{Felt, PenaltyProbe, answer, ball_shell, framed};
+use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
-use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
+use trepan_geometry::{Pointshell, Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
 /// Points up to which the sum is not reduced.
@@ -46,8 +46,6 @@ pub enum Combine {
 /// How the method is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// Points of the shell.
-    pub points: usize,
     /// How their pushes become one.
     pub combine: Combine,
     /// What a burr takes away.
@@ -56,7 +54,7 @@ pub struct Config {
 
 impl Config {
     /// McNeely's sum.
-    pub const SUM: Self = Self { points: Pointshell::RIGID_COUNT, combine: Combine::Sum, removal: RemovalLaw::RATE };
+    pub const SUM: Self = Self { combine: Combine::Sum, removal: RemovalLaw::RATE };
 }
 
 impl Default for Config {
@@ -66,9 +64,9 @@ impl Default for Config {
 }
 
 /// The method for a tool of any shape, whose surface is `shell` (see
-/// [`mesh_shell`](crate::mesh_shell)). A burr cuts with the ball at its tip.
+/// [`mesh_shell`](super::mesh_shell)). A burr cuts with the ball at its tip.
 pub fn with_shell(tool: &Tool, shell: Pointshell, config: &Config) -> Box<dyn RigidContact> {
-    Box::new(Penalty::new(tool, Shell { shell, combine: config.combine }, config.removal))
+    framed(tool, config.removal, Shell { shell, combine: config.combine })
 }
 
 struct Shell {
@@ -76,18 +74,11 @@ struct Shell {
     combine: Combine,
 }
 
-impl Shell {
-    pub fn new(tool: &Tool, config: &Config) -> Self {
-        let shell = Pointshell::sphere(tool.tip_radius_mm, config.points.clamp(8, 20_000), Spread::Fibonacci);
-        Self { shell, combine: config.combine }
-    }
-}
-
 impl PenaltyProbe for Shell {
-    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+    fn feel(&mut self, bone: &BoneVolume, _: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let (mut push, mut moment) = (Vec3::ZERO, Vec3::ZERO);
-        for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {
-            let (arm, inward) = (pose.rotation * *point, pose.rotation * *inward);
+        for (point, inward) in self.shell.iter() {
+            let (arm, inward) = (pose.rotation * point, pose.rotation * inward);
             let point = pose.translation + arm;
             let voxel = bone.voxel_of(point);
             if bone.is_bone(voxel) {
@@ -113,30 +104,16 @@ impl PenaltyProbe for Shell {
 
 /// The mean of the points' pushes.
 pub const AVERAGE: Descriptor = Descriptor {
-    name: "pointshell-average",
-    former_names: &[],
-    source: "Renz et al. 2001",
-    extent: Extent::Ball,
-    has_proxy: false,
-    is_oracle: false,
     points: Pointshell::RIGID_COUNT,
-    removal: RemovalLaw::RATE,
-    build: |tool, points| penalty(tool, &Config { points, ..Config::default() }),
+    ..Descriptor::of("pointshell-average", "Renz et al. 2001", |tool, points| {
+        with_shell(tool, ball_shell(tool, points), &Config::default())
+    })
 };
 
 /// The sum of the points' pushes.
 pub const SUM: Descriptor = Descriptor {
-    name: "pointshell-sum",
-    former_names: &[],
-    source: "McNeely et al. 1999",
-    extent: Extent::Ball,
-    has_proxy: false,
-    is_oracle: false,
     points: Pointshell::RIGID_COUNT,
-    removal: RemovalLaw::RATE,
-    build: |tool, points| penalty(tool, &Config { points, ..Config::SUM }),
+    ..Descriptor::of("pointshell-sum", "McNeely et al. 1999", |tool, points| {
+        with_shell(tool, ball_shell(tool, points), &Config::SUM)
+    })
 };
-
-fn penalty(tool: &Tool, config: &Config) -> Box<dyn RigidContact> {
-    Box::new(Penalty::new(tool, Shell::new(tool, config), config.removal))
-}

@@ -20,45 +20,31 @@
 //! # When not to use it
 //! For a tool that is wholly in bone: the rays end at its centre, and there is no way out.
 
-use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
+use super::frame::{Felt, PenaltyProbe, ball_shell, deepest, framed};
 use crate::RigidStep;
-use crate::method::{Descriptor, Extent};
+use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use trepan_contact::Contact;
-use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
+use trepan_geometry::{Pointshell, Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
-struct Rays {
-    shell: Pointshell,
-    radius_mm: f32,
-}
-
-impl Rays {
-    pub fn new(tool: &Tool, points: usize) -> Self {
-        let shell = Pointshell::sphere(tool.tip_radius_mm, points.clamp(8, 20_000), Spread::Fibonacci);
-        Self { shell, radius_mm: tool.tip_radius_mm }
-    }
-}
+struct Rays(Pointshell);
 
 impl PenaltyProbe for Rays {
-    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
-        let tip = pose.translation;
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let mut push = Vec3::ZERO;
-        for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {
-            let point = tip + *point;
+        for (point, inward) in self.0.iter() {
+            let point = pose.translation + point;
             let over = over_iso(bone, point);
             if over > 0.0 {
-                let depth_mm = way_out(bone, point, *inward, over, self.radius_mm, &mut out.voxels_swept);
-                push += depth_mm * *inward;
+                let depth_mm = way_out(bone, point, inward, over, tool.tip_radius_mm, &mut out.voxels_swept);
+                push += depth_mm * inward;
                 out.points_in_contact += 1;
-                out.manifold.push(Contact { point, normal: *inward, depth_mm });
+                out.manifold.push(Contact { point, normal: inward, depth_mm });
             }
         }
-        out.voxels_swept += self.shell.points.len() as u32;
-        out.voxels_in_contact = out.points_in_contact;
-        let normal = push.normalize_or_zero();
-        let depth = out.manifold.contacts().iter().map(|c| c.depth_mm * c.normal.dot(normal)).fold(0.0, f32::max);
-        answer(push, depth, out)
+        out.voxels_swept += self.0.points.len() as u32;
+        deepest(push, out)
     }
 }
 
@@ -91,13 +77,8 @@ pub(crate) fn over_iso(bone: &BoneVolume, point: Vec3) -> f32 {
 
 /// What the method says of itself.
 pub const METHOD: Descriptor = Descriptor {
-    name: "ray-trace",
-    former_names: &[],
-    source: "Petersik et al. 2002, Morris et al. 2006",
-    extent: Extent::Ball,
-    has_proxy: false,
-    is_oracle: false,
     points: Pointshell::RIGID_COUNT,
-    removal: RemovalLaw::RATE,
-    build: |tool, points| Box::new(Penalty::new(tool, Rays::new(tool, points), RemovalLaw::RATE)),
+    ..Descriptor::of("ray-trace", "Petersik et al. 2002, Morris et al. 2006", |tool, points| {
+        framed(tool, RemovalLaw::RATE, Rays(ball_shell(tool, points)))
+    })
 };

@@ -22,14 +22,14 @@
 //! Where depth is wanted: a mean over a cap is half of what its deepest vertex has. Against thin
 //! walls: it has no proxy.
 
-use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
+use super::frame::{Felt, PenaltyProbe, answer, ball_shell, framed};
 use super::ray_trace::{over_iso, way_out};
 use crate::RigidStep;
 use crate::method::{Descriptor, Extent};
 use crate::removal::RemovalLaw;
 use core::f32::consts::TAU;
 use trepan_contact::Contact;
-use trepan_geometry::{Pointshell, Pose, Spread, Tool, Vec3};
+use trepan_geometry::{Pointshell, Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
 /// Most rings of vertices on a shaft.
@@ -44,13 +44,11 @@ struct Vertices {
     shell: Pointshell,
     /// Vertices before this one are on the ball, the others on the shaft.
     on_ball: usize,
-    tip_radius_mm: f32,
-    shaft_radius_mm: f32,
 }
 
 impl Vertices {
-    pub fn new(tool: &Tool, points: usize) -> Self {
-        let mut shell = Pointshell::sphere(tool.tip_radius_mm, points.clamp(8, 20_000), Spread::Fibonacci);
+    fn new(tool: &Tool, points: usize) -> Self {
+        let mut shell = ball_shell(tool, points);
         let on_ball = shell.points.len();
         let rings = ((tool.shaft_length_mm - tool.tip_radius_mm) / RING_MM).clamp(0.0, MAX_RINGS as f32) as usize;
         for at in 0..rings * RING {
@@ -60,23 +58,23 @@ impl Vertices {
             shell.points.push(tool.shaft_radius_mm * out + Vec3::Z * height);
             shell.inward_normals.push(-out);
         }
-        Self { shell, on_ball, tip_radius_mm: tool.tip_radius_mm, shaft_radius_mm: tool.shaft_radius_mm }
+        Self { shell, on_ball }
     }
 }
 
 impl PenaltyProbe for Vertices {
-    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let (mut push, mut moment, mut burr) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-        for (at, (point, inward)) in self.shell.points.iter().zip(&self.shell.inward_normals).enumerate() {
-            let arm = pose.rotation * *point;
+        for (at, (point, inward)) in self.shell.iter().enumerate() {
+            let arm = pose.rotation * point;
             let point = pose.translation + arm;
             let voxel = bone.voxel_of(point);
             let over = if bone.may_hold_bone(voxel - 1, voxel + 1) { over_iso(bone, point) } else { -1.0 };
             out.voxels_swept += 1;
             if over > 0.0 {
                 let on_ball = at < self.on_ball;
-                let longest = if on_ball { self.tip_radius_mm } else { self.shaft_radius_mm };
-                let normal = pose.rotation * *inward;
+                let longest = if on_ball { tool.tip_radius_mm } else { tool.shaft_radius_mm };
+                let normal = pose.rotation * inward;
                 let depth_mm = way_out(bone, point, normal, over, longest, &mut out.voxels_swept);
                 push += depth_mm * normal;
                 burr += if on_ball { depth_mm * normal } else { Vec3::ZERO };
@@ -95,13 +93,9 @@ impl PenaltyProbe for Vertices {
 
 /// What the method says of itself.
 pub const METHOD: Descriptor = Descriptor {
-    name: "surface-vertices",
-    former_names: &[],
-    source: "Asenjo 2008, surface approximation",
     extent: Extent::BallAndShaft,
-    has_proxy: false,
-    is_oracle: false,
     points: Pointshell::RIGID_COUNT,
-    removal: RemovalLaw::RATE,
-    build: |tool, points| Box::new(Penalty::new(tool, Vertices::new(tool, points), RemovalLaw::RATE)),
+    ..Descriptor::of("surface-vertices", "Asenjo 2008, surface approximation", |tool, points| {
+        framed(tool, RemovalLaw::RATE, Vertices::new(tool, points))
+    })
 };

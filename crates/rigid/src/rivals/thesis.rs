@@ -32,18 +32,15 @@
 //! For force feedback on a hand: [`god_object_sphere`](crate::god_object_sphere) is smoother and
 //! nearer to the surface. It is here for comparison.
 
-use crate::method::{Descriptor, Extent};
-use crate::removal::{Burr, Cut, RemovalLaw};
-use crate::rows::EVERYWHERE;
-use crate::sweep::{Ball, Stop, Sweep};
+use super::frame::{Held, Rival, framed};
+use super::sweep::{Ball, Sweep};
+use crate::method::Descriptor;
+use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use glam::IVec3;
 use trepan_contact::{Contact, GodObject, Plane};
-use trepan_geometry::{Aabb, Pointshell, Pose, Spread, Tool, ToolState, Vec3};
+use trepan_geometry::{Aabb, Pointshell, Spread, Tool, ToolState, Vec3};
 use trepan_volume::BoneVolume;
-
-/// Most voxels that the rate law bites at once.
-const MAX_BITES: usize = 16384;
 
 /// How the method is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,57 +97,45 @@ struct Touched {
 }
 
 /// The shell of one tool.
-pub struct Thesis {
+struct Thesis {
     config: Config,
-    tool: Tool,
     shell: Pointshell,
-    proxy: Pose,
-    placed: bool,
     touched: Vec<Touched>,
     /// Open hash table: index into `touched` plus one, 0 for none.
     table: Vec<u16>,
-    burr: Burr,
+}
+
+/// The method with a shell on the tool's tip.
+pub fn new(tool: &Tool, config: Config) -> Box<dyn RigidContact> {
+    let tool = Tool { tip_radius_mm: tool.tip_radius_mm.clamp(1e-3, 100.0), ..*tool };
+    let shell = Pointshell::sphere(tool.tip_radius_mm, config.points.clamp(8, 20_000), config.spread);
+    let points = shell.points.len();
+    let (touched, table) = (Vec::with_capacity(points), vec![0; (2 * points).next_power_of_two()]);
+    framed(&tool, config.removal, Thesis { config, shell, touched, table })
 }
 
 impl Thesis {
-    /// A shell on the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts
-    /// at the first tool pose.
-    pub fn new(tool: &Tool, config: Config) -> Self {
-        let config = Config { points: config.points.clamp(8, 20_000), ..config };
-        let tool = Tool { tip_radius_mm: tool.tip_radius_mm.clamp(1e-3, 100.0), ..*tool };
-        let shell = Pointshell::sphere(tool.tip_radius_mm, config.points, config.spread);
-        let points = shell.points.len();
-        Self {
-            config,
-            tool,
-            proxy: Pose::IDENTITY,
-            placed: false,
-            touched: Vec::with_capacity(points),
-            table: vec![0; (2 * points).next_power_of_two()],
-            burr: Burr::new(config.removal, MAX_BITES),
-            shell,
-        }
-    }
-
-    fn sweep(&self, bone: &BoneVolume, from: Vec3, to: Vec3, out: &mut RigidStep) -> Stop {
-        let ball = Ball { radius_mm: self.tool.tip_radius_mm, shell: &self.shell.points };
-        ball.sweep(bone, self.config.sweep, from, to, &mut out.voxels_swept)
+    /// Moves the proxy towards `to`; returns whether bone stopped it.
+    fn sweep(&self, bone: &BoneVolume, to: Vec3, held: &mut Held, out: &mut RigidStep) -> bool {
+        let ball = Ball { radius_mm: held.tool.tip_radius_mm, shell: &self.shell.points };
+        let stop = ball.sweep(bone, self.config.sweep, held.proxy.translation, to, &mut out.voxels_swept);
+        held.proxy.translation = stop.centre;
+        stop.hit
     }
 
     /// Step 3: the voxels of bone that hold points, within the colliding box.
-    fn touch(&mut self, bone: &BoneVolume, colliding: Aabb) {
-        self.touched.clear();
+    fn touch(&mut self, bone: &BoneVolume, proxy: Vec3, colliding: Aabb) {
         self.table.fill(0);
-        for (point, inward) in self.shell.points.iter().zip(&self.shell.inward_normals) {
-            let point = self.proxy.translation + *point;
+        for (point, inward) in self.shell.iter() {
+            let point = proxy + point;
             if !colliding.contains(point) {
                 continue;
             }
             let voxel = bone.voxel_of(point);
             if bone.is_bone(voxel) {
-                let depth = (bone.centre_of(voxel) - point).dot(*inward).max(0.0);
+                let depth = (bone.centre_of(voxel) - point).dot(inward).max(0.0);
                 let touched = slot(&mut self.touched, &mut self.table, voxel);
-                touched.normals += *inward;
+                touched.normals += inward;
                 touched.depths_mm += depth;
                 touched.points += 1;
             }
@@ -178,93 +163,61 @@ impl Thesis {
     }
 
     /// Steps 2 and 3 without a contact set: one more sweep decides.
-    fn sweep_decides(&mut self, bone: &BoneVolume, device: Vec3, out: &mut RigidStep) {
-        let from = self.proxy.translation;
-        let stop = self.sweep(bone, from, device, out);
-        self.proxy.translation = stop.centre;
-        if stop.hit {
-            let normal = (from - device).normalize_or_zero();
-            self.report(normal, self.config.preset_depth_mm, out);
+    fn sweep_decides(&self, bone: &BoneVolume, device: Vec3, held: &mut Held, out: &mut RigidStep) {
+        let from = held.proxy.translation;
+        if self.sweep(bone, device, held, out) {
+            held.report((from - device).normalize_or_zero(), self.config.preset_depth_mm, out);
         }
     }
 
     /// Step 6: the god-object on the plane of the contact.
-    fn rectify(&mut self, bone: &BoneVolume, device: Vec3, normal: Vec3, depth: f32, out: &mut RigidStep) {
-        let from = self.proxy.translation;
-        let mut god = GodObject::new(from);
-        let goal = god.follow(device, &[Plane { point: from + depth * normal, normal }]);
-        self.proxy.translation = self.sweep(bone, from, goal, out).centre;
-        let gap = device.distance(self.proxy.translation);
-        self.report(normal, if gap > 0.0 { gap } else { depth }, out);
-    }
-
-    fn report(&self, normal: Vec3, depth_mm: f32, out: &mut RigidStep) {
-        if normal != Vec3::ZERO && depth_mm > 0.0 {
-            out.manifold.normal = normal;
-            out.manifold.depth_mm = depth_mm;
-            out.manifold.point = self.proxy.translation - self.tool.tip_radius_mm * normal;
-        }
+    fn rectify(
+        &self,
+        bone: &BoneVolume,
+        device: Vec3,
+        (normal, depth): (Vec3, f32),
+        held: &mut Held,
+        out: &mut RigidStep,
+    ) {
+        let from = held.proxy.translation;
+        let goal = GodObject::new(from).follow(device, &[Plane { point: from + depth * normal, normal }]);
+        self.sweep(bone, goal, held, out);
+        let gap = device.distance(held.proxy.translation);
+        held.report(normal, if gap > 0.0 { gap } else { depth }, out);
     }
 
     /// Step 4.
-    fn drill(&mut self, bone: &BoneVolume, device: Vec3, dt_ms: f32, out: &mut RigidStep) {
+    fn drill(&self, bone: &BoneVolume, device: Vec3, held: &mut Held, out: &mut RigidStep) {
+        let proxy = held.proxy.translation;
         match self.config.removal {
-            RemovalLaw::PerTick { .. } => self.burr.wear(bone, self.touched.iter().map(|t| t.voxel), out),
-            RemovalLaw::Rate { .. } => {
-                let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
-                let depth_mm = device.distance(proxy);
-                let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms, within: EVERYWHERE };
-                self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
-            }
+            RemovalLaw::PerTick { .. } => held.wear(bone, self.touched.iter().map(|t| t.voxel), out),
+            RemovalLaw::Rate { .. } => held.cut(bone, device, proxy, device.distance(proxy), out),
         }
     }
 }
 
-impl RigidContact for Thesis {
-    fn step(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool, dt_ms: f32, out: &mut RigidStep) {
-        out.clear();
-        if !tool.is_finite() {
-            out.fallbacks = 1;
-            return;
-        }
-        if !self.placed {
-            self.reset(tool.world_from_tool);
-        }
+impl Rival for Thesis {
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
         let device = tool.tip();
-        self.proxy.rotation = tool.world_from_tool.rotation;
-        self.proxy.translation = self.sweep(bone, self.proxy.translation, device, out).centre;
-        let box_of_tool = Aabb::of_sphere(self.proxy.translation, self.tool.tip_radius_mm);
-        let colliding = box_of_tool.intersection(bone.bounds());
-        if colliding.is_empty() {
-            self.touched.clear();
-        } else {
-            self.touch(bone, colliding);
+        held.proxy.rotation = tool.world_from_tool.rotation;
+        self.sweep(bone, device, held, out);
+        let proxy = held.proxy.translation;
+        let colliding = Aabb::of_sphere(proxy, held.tool.tip_radius_mm).intersection(bone.bounds());
+        self.touched.clear();
+        if !colliding.is_empty() {
+            self.touch(bone, proxy, colliding);
         }
         if self.touched.is_empty() {
-            self.sweep_decides(bone, device, out);
-            return;
+            return self.sweep_decides(bone, device, held, out);
         }
-        if drilling && self.tool.kind.cuts() {
-            self.drill(bone, device, dt_ms, out);
-        }
+        self.drill(bone, device, held, out);
         let (mut normal, depth) = self.respond(out, bone);
         if normal == Vec3::ZERO {
             // Opposed contacts: the way back to the proxy is the only direction left.
-            normal = (self.proxy.translation - device).normalize_or_zero();
+            normal = (proxy - device).normalize_or_zero();
             out.fallbacks += 1;
         }
-        self.rectify(bone, device, normal, depth, out);
-    }
-
-    fn proxy(&self) -> Pose {
-        self.proxy
-    }
-
-    fn reset(&mut self, pose: Pose) {
-        self.proxy = pose;
-        self.placed = pose.translation.is_finite();
-        self.touched.clear();
-        self.burr.reset();
+        self.rectify(bone, device, (normal, depth), held, out);
     }
 }
 
@@ -286,26 +239,18 @@ fn slot<'a>(touched: &'a mut Vec<Touched>, table: &mut [u16], voxel: IVec3) -> &
 
 /// The thesis's method with its errors put right.
 pub const METHOD: Descriptor = Descriptor {
-    name: "thesis",
-    former_names: &[],
-    source: "the thesis, chapter 3, its errors put right",
-    extent: Extent::Ball,
     has_proxy: true,
-    is_oracle: false,
     points: Pointshell::RIGID_COUNT,
-    removal: RemovalLaw::RATE,
-    build: |tool, points| Box::new(Thesis::new(tool, Config { points, ..Config::default() })),
+    ..Descriptor::of("thesis", "the thesis, chapter 3, its errors put right", |tool, points| {
+        new(tool, Config { points, ..Config::default() })
+    })
 };
 
 /// The thesis's method as printed.
 pub const AS_PRINTED: Descriptor = Descriptor {
     name: "thesis-printed",
-    former_names: &[],
     source: "the thesis, chapter 3",
-    extent: Extent::Ball,
-    has_proxy: true,
-    is_oracle: false,
-    points: Pointshell::RIGID_COUNT,
     removal: RemovalLaw::PER_TICK,
-    build: |tool, points| Box::new(Thesis::new(tool, Config { points, ..Config::PRINTED })),
+    build: |tool, points| new(tool, Config { points, ..Config::PRINTED }),
+    ..METHOD
 };

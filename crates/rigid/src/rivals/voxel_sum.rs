@@ -21,9 +21,9 @@
 //! Against edges and thin walls, where there is less bone than a cap has: the depth reads too
 //! small.
 
-use super::penalty::{Felt, Penalty, PenaltyProbe, answer};
+use super::frame::{Felt, PenaltyProbe, answer, framed};
 use crate::RigidStep;
-use crate::method::{Descriptor, Extent};
+use crate::method::Descriptor;
 use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
 use core::f32::consts::PI;
@@ -31,24 +31,15 @@ use trepan_contact::Contact;
 use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_volume::BoneVolume;
 
-struct Sum {
-    radius_mm: f32,
-}
-
-impl Sum {
-    pub fn new(tool: &Tool) -> Self {
-        Self { radius_mm: tool.tip_radius_mm }
-    }
-}
+struct Sum;
 
 impl PenaltyProbe for Sum {
-    fn feel(&mut self, bone: &BoneVolume, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt> {
         let tip = pose.translation;
         let centre = bone.grid_of(tip);
-        let radius = self.radius_mm / bone.spacing_mm();
-        let (ball, none) = (GridBall { centre, radius: radius + 0.5 }, GridBall { centre, radius: -1.0 });
+        let radius = tool.tip_radius_mm / bone.spacing_mm();
         let (mut volume, mut moment) = (0.0f32, Vec3::ZERO);
-        rows(ball, none, |start, to| {
+        rows(GridBall { centre, radius: radius + 0.5 }, GridBall::NONE, |start, to| {
             for x in start.x..=to {
                 let voxel = start.with_x(x);
                 let bone_share =
@@ -67,7 +58,7 @@ impl PenaltyProbe for Sum {
         let depth = cap_height(volume, radius) * bone.spacing_mm();
         let found = answer(-moment, depth, out);
         if let Some(Felt { normal, depth_mm, .. }) = found {
-            out.manifold.push(Contact { point: tip - self.radius_mm * normal, normal, depth_mm });
+            out.manifold.push(Contact { point: tip - tool.tip_radius_mm * normal, normal, depth_mm });
         }
         found
     }
@@ -84,17 +75,8 @@ fn cap_height(volume: f32, radius: f32) -> f32 {
 }
 
 /// What the method says of itself.
-pub const METHOD: Descriptor = Descriptor {
-    name: "voxel-sum",
-    former_names: &[],
-    source: "Agus et al. 2003",
-    extent: Extent::Ball,
-    has_proxy: false,
-    is_oracle: false,
-    points: 0,
-    removal: RemovalLaw::RATE,
-    build: |tool, _| Box::new(Penalty::new(tool, Sum::new(tool), RemovalLaw::RATE)),
-};
+pub const METHOD: Descriptor =
+    Descriptor::of("voxel-sum", "Agus et al. 2003", |tool, _| framed(tool, RemovalLaw::RATE, Sum));
 
 #[cfg(test)]
 mod tests {

@@ -11,12 +11,11 @@
 //! no depth, so deeper can read shallower, and the depth jumps at every border. Kept for
 //! comparison.
 
-use super::Answer;
-use crate::{
-    narrow::{Hits, NONE},
-    outcome::TissueStep,
-    scene::Scene,
-};
+use crate::narrow::{Hits, NONE};
+use crate::outcome::TissueStep;
+use crate::response::{Answer, Respond};
+use crate::scene::Scene;
+use crate::surface::MovingSurface;
 use trepan_contact::Contact;
 use trepan_geometry::Vec3;
 use trepan_mesh::FACES;
@@ -26,8 +25,8 @@ pub(crate) struct Faces {
     pub nearest: bool,
 }
 
-impl Faces {
-    pub(crate) fn respond(&self, scene: &Scene, hits: &Hits, out: &mut TissueStep) -> Option<Answer> {
+impl Respond for Faces {
+    fn respond(&mut self, scene: &Scene, hits: &Hits, _: &mut MovingSurface, out: &mut TissueStep) -> Option<Answer> {
         let (mut normals, mut depth_mm) = (Vec3::ZERO, 0.0f32);
         for i in (0..hits.tet.len() - 1).filter(|&i| hits.tet[i] != NONE) {
             let tet = hits.tet[i];

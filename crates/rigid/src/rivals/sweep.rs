@@ -8,7 +8,7 @@
 //! # When not to use it
 //! The line rules, for tools wider than a cavity: they pass bone that lies beside the line.
 
-use crate::traverse::{clipped, first_bone};
+use super::traverse::{clipped, first_bone};
 use trepan_geometry::Vec3;
 use trepan_volume::BoneVolume;
 

@@ -1,0 +1,162 @@
+//! The frame of the rivals: what all of them do alike around their own part of a tick.
+//!
+//! # Theory
+//! A [`Rival`] with a proxy moves it itself. A penalty method ([`PenaltyProbe`]) remembers nothing:
+//! it looks at the bone with the tool where the hand has it and answers with a normal and a depth.
+//! The proxy is drawn that depth out along the normal.
+//!
+//! # When not to use it
+//! Penalties against thin walls: past the middle of a wall the nearest way out leads to the far
+//! side, and a fast tool is through between two ticks.
+
+use crate::removal::{Burr, Cut, RemovalLaw};
+use crate::rows::EVERYWHERE;
+use crate::{RigidContact, RigidStep};
+use glam::IVec3;
+use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
+use trepan_volume::BoneVolume;
+
+/// A method's own part.
+pub(crate) trait Rival: Send {
+    /// Most voxels that a burr bites at once.
+    const MAX_BITES: usize = 16384;
+
+    /// Finds the contact of a tool whose pose is finite, moves the proxy in `held` and cuts.
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep);
+
+    /// Forgets all history; the tool is at `pose`.
+    fn reset(&mut self, _pose: Pose) {}
+}
+
+/// The tool with its proxy and its burr.
+pub(crate) struct Held {
+    pub tool: Tool,
+    pub proxy: Pose,
+    burr: Burr,
+    /// Whether the burr cuts in this tick.
+    cuts: bool,
+    dt_ms: f32,
+}
+
+impl Held {
+    /// Where the burr cuts in this tick, takes bone away between `device` and `proxy`, pressed
+    /// `depth_mm` deep.
+    pub fn cut(&mut self, bone: &BoneVolume, device: Vec3, proxy: Vec3, depth_mm: f32, out: &mut RigidStep) {
+        if self.cuts {
+            let (radius_mm, dt_ms) = (self.tool.tip_radius_mm, self.dt_ms);
+            let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms, within: EVERYWHERE };
+            self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
+        }
+    }
+
+    /// Where the burr cuts in this tick, wears these voxels by the per-tick law.
+    pub fn wear(&mut self, bone: &BoneVolume, voxels: impl Iterator<Item = IVec3>, out: &mut RigidStep) {
+        if self.cuts {
+            self.burr.wear(bone, voxels, out);
+        }
+    }
+
+    /// Fills the manifold for a ball that touches under the proxy, if normal and depth are
+    /// something.
+    pub fn report(&self, normal: Vec3, depth_mm: f32, out: &mut RigidStep) {
+        if normal != Vec3::ZERO && depth_mm > 0.0 {
+            (out.manifold.normal, out.manifold.depth_mm) = (normal, depth_mm);
+            out.manifold.point = self.proxy.translation - self.tool.tip_radius_mm * normal;
+        }
+    }
+}
+
+struct Framed<R> {
+    rival: R,
+    held: Held,
+    /// Whether the proxy has been put anywhere yet.
+    placed: bool,
+}
+
+/// A tool handled by a rival. Until [`reset`](RigidContact::reset) puts it somewhere it starts at
+/// the first tool pose.
+pub(crate) fn framed<R: Rival + 'static>(tool: &Tool, removal: RemovalLaw, rival: R) -> Box<dyn RigidContact> {
+    let burr = Burr::new(removal, R::MAX_BITES);
+    let held = Held { tool: *tool, proxy: Pose::IDENTITY, burr, cuts: false, dt_ms: 0.0 };
+    Box::new(Framed { rival, held, placed: false })
+}
+
+impl<R: Rival> RigidContact for Framed<R> {
+    fn step(&mut self, bone: &BoneVolume, tool: &ToolState, drilling: bool, dt_ms: f32, out: &mut RigidStep) {
+        out.clear();
+        if !tool.is_finite() {
+            out.fallbacks = 1;
+            return;
+        }
+        if !self.placed {
+            self.reset(tool.world_from_tool);
+        }
+        (self.held.cuts, self.held.dt_ms) = (drilling && self.held.tool.kind.cuts(), dt_ms);
+        self.rival.tick(bone, tool, &mut self.held, out);
+    }
+
+    fn proxy(&self) -> Pose {
+        self.held.proxy
+    }
+
+    fn reset(&mut self, pose: Pose) {
+        self.held.proxy = pose;
+        self.held.burr.reset();
+        self.placed = pose.translation.is_finite();
+        self.rival.reset(pose);
+    }
+}
+
+/// What a penalty method knows to answer.
+pub(crate) trait PenaltyProbe: Send {
+    /// What the tool at `pose` feels; `None` without contact. Fills contacts and counts of `out`.
+    fn feel(&mut self, bone: &BoneVolume, tool: &Tool, pose: &Pose, out: &mut RigidStep) -> Option<Felt>;
+}
+
+/// A contact as a whole.
+pub(crate) struct Felt {
+    /// Unit vector out of the bone.
+    pub normal: Vec3,
+    /// Depth along it, mm.
+    pub depth_mm: f32,
+    /// What the burr alone is pushed, mm: what it cuts with.
+    pub burr: Vec3,
+}
+
+impl<P: PenaltyProbe> Rival for P {
+    fn tick(&mut self, bone: &BoneVolume, tool: &ToolState, held: &mut Held, out: &mut RigidStep) {
+        held.proxy = tool.world_from_tool;
+        let felt = self.feel(bone, &held.tool, &tool.world_from_tool, out);
+        let Some(Felt { normal, depth_mm, burr }) = felt else { return };
+        held.proxy.translation += depth_mm * normal;
+        held.report(normal, depth_mm, out);
+        if burr != Vec3::ZERO {
+            held.cut(bone, tool.tip(), tool.tip() + burr, burr.length(), out);
+        }
+    }
+}
+
+/// The direction of `push` and `depth`, if both are something.
+pub(crate) fn answer(push: Vec3, depth_mm: f32, out: &mut RigidStep) -> Option<Felt> {
+    let normal = push.normalize_or_zero();
+    if normal == Vec3::ZERO {
+        // Opposed contacts cancel: there is no way to push.
+        out.fallbacks += u32::from(out.points_in_contact > 0);
+        return None;
+    }
+    (depth_mm > 0.0 && depth_mm.is_finite()).then_some(Felt { normal, depth_mm, burr: depth_mm * normal })
+}
+
+/// The answer of points that push together: the direction of `push`, the depth of the deepest of
+/// the contacts in `out` along it.
+pub(crate) fn deepest(push: Vec3, out: &mut RigidStep) -> Option<Felt> {
+    out.voxels_in_contact = out.points_in_contact;
+    let normal = push.normalize_or_zero();
+    let depth = out.manifold.contacts().iter().map(|c| c.depth_mm * c.normal.dot(normal)).fold(0.0, f32::max);
+    answer(push, depth, out)
+}
+
+/// So many points on the ball at a tool's tip.
+pub(crate) fn ball_shell(tool: &Tool, points: usize) -> Pointshell {
+    Pointshell::sphere(tool.tip_radius_mm, points.clamp(8, 20_000), Spread::Fibonacci)
+}
