@@ -2,15 +2,13 @@
 //!
 //! # Practice
 //! A kind is one file with a [`HapticDevice`] and a [`Descriptor`]. [`DeviceName::among`] makes it
-//! usable from any crate (`tests/toy_device.rs`); a `mod` line and its name in `list.rs` bring it to
-//! the command lines.
+//! usable from any crate (`tests/toy_device.rs`); a `mod` line and its name in `list.rs` bring it
+//! to the command lines.
 
-use crate::list::DEVICES;
-use crate::mouse::{self, MouseHandle};
-use crate::script::{self, Script, ScriptError};
+use crate::mouse::MouseHandle;
+use crate::script::{Script, ScriptError};
 use crate::{DeviceError, HapticDevice, Watch, Workspace};
 use std::path::Path;
-use std::str::FromStr;
 
 /// A kind of device.
 #[derive(Debug)]
@@ -102,12 +100,8 @@ pub struct DeviceName {
 }
 
 impl DeviceName {
-    /// The window's pointer.
-    pub const MOUSE: Self = Self { kind: &mouse::DEVICE, argument: None };
-
-    /// A scripted operation.
-    pub fn scripted(operation: &str) -> Self {
-        Self { kind: &script::DEVICE, argument: Some(operation.to_owned()) }
+    pub(crate) const fn new(kind: &'static Descriptor, argument: Option<String>) -> Self {
+        Self { kind, argument }
     }
 
     /// The device that `text` names, of one of the `kinds`.
@@ -159,14 +153,6 @@ impl DeviceName {
 impl PartialEq for DeviceName {
     fn eq(&self, other: &Self) -> bool {
         std::ptr::eq(self.kind, other.kind) && self.argument == other.argument
-    }
-}
-
-impl FromStr for DeviceName {
-    type Err = NameError;
-
-    fn from_str(text: &str) -> Result<Self, NameError> {
-        Self::among(DEVICES, text)
     }
 }
 

@@ -94,7 +94,7 @@ macro_rules! functions {
                         $name: unsafe { library.symbol(stringify!($name)) }?,
                     )*
                     $(
-                        // SAFETY: the types are those of the vendor's header, which accepts any number.
+                        // SAFETY: the types are the vendor's header's, which accepts any number.
                         $plain: unsafe { library.symbol(stringify!($plain)) }?,
                     )*
                 })

@@ -29,6 +29,7 @@ pub mod openhaptics;
 mod ramp;
 pub mod replay;
 pub mod script;
+mod scripted;
 pub mod simulated;
 pub mod spacemouse;
 pub mod template;

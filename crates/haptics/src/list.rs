@@ -1,12 +1,13 @@
 //! The devices of this crate.
 
-use crate::descriptor::{Descriptor, Listed};
-use crate::{force_dimension, haply, mouse, openhaptics, replay, script, simulated, spacemouse};
+use crate::descriptor::{Descriptor, DeviceName, Listed, NameError};
+use crate::{force_dimension, haply, openhaptics, replay, scripted, simulated, spacemouse};
+use std::str::FromStr;
 
 /// All of them, in the order of help texts.
-pub(crate) static DEVICES: &[&Descriptor] = &[
-    &mouse::DEVICE,
-    &script::DEVICE,
+static DEVICES: &[&Descriptor] = &[
+    &scripted::MOUSE,
+    &scripted::SCRIPT,
     &replay::DEVICE,
     &simulated::DEVICE,
     &openhaptics::DEVICE,
@@ -14,6 +15,24 @@ pub(crate) static DEVICES: &[&Descriptor] = &[
     &haply::DEVICE,
     &spacemouse::DEVICE,
 ];
+
+impl DeviceName {
+    /// The window's pointer.
+    pub const MOUSE: Self = Self::new(&scripted::MOUSE, None);
+
+    /// A scripted operation.
+    pub fn scripted(operation: &str) -> Self {
+        Self::new(&scripted::SCRIPT, Some(operation.to_owned()))
+    }
+}
+
+impl FromStr for DeviceName {
+    type Err = NameError;
+
+    fn from_str(text: &str) -> Result<Self, NameError> {
+        Self::among(DEVICES, text)
+    }
+}
 
 /// Lists every device that a user can request: by the name that opens it, or what is missing.
 pub fn list() -> Vec<Listed> {
@@ -35,7 +54,7 @@ pub fn usage() -> String {
 mod tests {
     use super::*;
     use crate::script::{Script, Site};
-    use crate::{DeviceName, Setting, Workspace};
+    use crate::{Setting, Workspace};
     use trepan_geometry::Vec3;
 
     fn name(text: &str) -> DeviceName {

@@ -16,7 +16,7 @@
 //! # When not to use it
 //! To judge forces: the pointer does not render them. [`MouseHandle::wrench`] is for display.
 
-use crate::{Capabilities, Descriptor, HapticDevice, Listed, Motion, Opened, Reading, Status, no_argument};
+use crate::{Capabilities, HapticDevice, Reading, Status};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{Buttons, Pose, Quat, ToolState, Twist, Vec3, Wrench};
 use triple_buffer::{Input, Output, triple_buffer};
@@ -25,21 +25,6 @@ use triple_buffer::{Input, Output, triple_buffer};
 const OMEGA_PER_MS: f64 = 0.08;
 /// Longest tick that the smoothing follows, ms.
 const MAX_DT_MS: f64 = 100.0;
-
-/// `mouse`: follows the window's pointer from where the program's operation begins.
-pub static DEVICE: Descriptor = Descriptor {
-    name: "mouse",
-    usage: "",
-    source: "critically damped second-order filter",
-    motion: Motion::Window,
-    argument: no_argument,
-    id: |_| "",
-    probe: || Ok(vec![Listed::new("mouse", "ready where there is a window")]),
-    open: |_, setting| {
-        let (pointer, mouse) = pair((setting.script)(None)?.at(0.0).world_from_tool);
-        Ok(Opened { pointer: Some(pointer), ..Opened::new(mouse) })
-    },
-};
 
 /// The window's end of the pair.
 pub struct MouseHandle {

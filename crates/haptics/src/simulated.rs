@@ -26,7 +26,8 @@
 //! # When not to use it
 //! To measure a real device.
 
-use crate::script::{self, operation_name};
+use crate::script;
+use crate::scripted::operation_name;
 use crate::{Capabilities, Descriptor, HapticDevice, Listed, Motion, Opened, Reading};
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{ToolState, Vec3, Wrench};

@@ -18,8 +18,8 @@
 //!    and encoder step from it.
 //! 7. **Emulate the device in a test** with all faults: silence, invalid data, old counters,
 //!    faults, unplugging, a hundred sessions.
-//! 8. **Describe it** in a [`Descriptor`] in the same file, and name that in `list.rs`: a line, from
-//!    which command lines, help and lists follow. `device test NAME` then tests the real one.
+//! 8. **Describe it** in a [`Descriptor`] in the same file, and name that in `list.rs`: a line,
+//!    from which command lines, help and lists follow. `device test NAME` then tests the real one.
 //!
 //! # The imaginary protocol
 //! One datagram each way per tick, little-endian. The device drops its force 10 ms after the last

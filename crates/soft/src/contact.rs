@@ -17,9 +17,9 @@
 //! `dt² ω² ≤ 4 + 2 q`: never for less than without the spring, however stiff and damped it is.
 //! Springs that share nodes see what those before them did.
 //!
-//! A plane acts on a node from the moment that it reaches it, within the step: a light node in front
-//! of its plane, by less than a step's way, would otherwise be free for a step. The damping of that
-//! step counts for the share of it in which the node is in the plane, `(d + dt v̄) / (dt v̄)`.
+//! A plane acts on a node from the moment that the node reaches it, within the step: a light node
+//! in front of its plane would otherwise be free for a step. The damping of that step counts for
+//! the share of it in which the node is in the plane, `(d + dt v̄) / (dt v̄)`.
 //!
 //! A spring's damping across its normal is taken implicitly too, node by node, because a contact
 //! that is found anew every millisecond follows a node's sliding late, and what is late drives

@@ -23,12 +23,14 @@ pub enum ReadError {
         source: io::Error,
     },
     /// The format is not supported.
-    #[error("{}: {found}; readable are {}", file.display(), crate::format::names())]
+    #[error("{}: {found}; readable are {readable}", file.display())]
     Format {
         /// The file.
         file: PathBuf,
         /// The detected content.
         found: String,
+        /// The formats that can be read.
+        readable: String,
     },
     /// A header field is invalid.
     #[error("{}: {field} is {found}; {remedy}", file.display())]

@@ -24,6 +24,7 @@ mod error;
 mod flap;
 mod format;
 mod keys;
+mod list;
 mod memory;
 pub mod metaimage;
 #[cfg(test)]
@@ -53,7 +54,8 @@ pub use component::largest_component;
 pub use distance::{DistanceField, FAR_MM};
 pub use error::{ReadError, WriteError};
 pub use flap::{FlapSearch, FlapState};
-pub use format::{FORMATS, Format, import, import_among, read};
+pub use format::Format;
+pub use list::{FORMATS, import, import_among, read};
 pub use memory::{Limit, MOST_VOXELS, TooLarge, room_for, room_for_voxels};
 pub use note::{Import, Note};
 pub use overlap::{LEAST_SHARE, OverlapError, overlap};

@@ -106,7 +106,7 @@ mod tests {
     use std::net::TcpListener;
     use std::thread;
 
-    /// What a client receives from a service that sends `bytes` after, or instead of, the handshake.
+    /// What a client receives from a service that sends `bytes` after the handshake or instead.
     fn received(shakes_hands: bool, bytes: Vec<u8>) -> Result<Option<String>> {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap().to_string();

@@ -25,7 +25,7 @@ mod path;
 pub use operation::{Plan, Rim, Site};
 pub use path::Waypoint;
 
-use crate::{Capabilities, Descriptor, HapticDevice, Listed, Motion, NameError, Opened, Reading, Status};
+use crate::{Capabilities, HapticDevice, Reading, Status};
 use path::Path;
 use trepan_contact::GuardedWrench;
 use trepan_geometry::{ToolState, Wrench};
@@ -36,30 +36,6 @@ use trepan_geometry::{ToolState, Wrench};
 /// `flap` cuts a bone flap with burr and craniotome, lifts it and probes the brain; give it a
 /// minute.
 pub const NAMES: [&str; 5] = ["craniotomy-and-probe", "craniotomy", "probe", "aspirate", "flap"];
-
-/// `script:NAME`: performs a scripted operation.
-pub static DEVICE: Descriptor = Descriptor {
-    name: "script",
-    usage: ":NAME",
-    source: "Flash and Hogan 1985, J. Neurosci. 5",
-    motion: Motion::Script,
-    argument: operation_name,
-    id: |name| name,
-    probe: || Ok(NAMES.map(|name| Listed::new(format!("script:{name}"), "ready")).into()),
-    open: |operation, setting| Ok(Opened::new((setting.script)(operation)?)),
-};
-
-/// The argument of a device that a script moves: one of [`NAMES`].
-pub(crate) fn operation_name(device: &str, operation: Option<&str>) -> Result<Option<String>, NameError> {
-    match operation {
-        None => Err(NameError::lacks(device, "operation", NAMES[0])),
-        Some(name) if NAMES.contains(&name) => Ok(Some(name.to_owned())),
-        Some(name) => {
-            let name = format!("{device}:{name}");
-            Err(NameError::Argument(format!("{name:?}: the scripts are {}", NAMES.join(", "))))
-        }
-    }
-}
 
 /// A script could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

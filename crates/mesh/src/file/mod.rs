@@ -8,6 +8,7 @@
 pub mod abaqus;
 mod format;
 pub mod gmsh;
+mod list;
 pub mod medit;
 mod numbered;
 pub mod obj;
@@ -17,9 +18,8 @@ pub mod tetgen;
 pub mod vtk;
 pub mod vtu;
 
-pub use format::{
-    Format, SURFACE_FORMATS, VOLUME_FORMATS, read, read_among, read_surface, write, write_among, write_surface,
-};
+pub use format::Format;
+pub use list::{SURFACE_FORMATS, VOLUME_FORMATS, read, read_among, read_surface, write, write_among, write_surface};
 
 use crate::{MeshError, TetMesh, TriMesh};
 use std::fmt::Display;

@@ -103,8 +103,8 @@ impl Nodes {
         });
     }
 
-    /// Gives every free node the displacement and velocity that `next` says; one that is not finite
-    /// or far off goes back to rest and is counted.
+    /// Gives every free node the displacement and velocity of `next`. One that is not finite or far
+    /// off goes back to rest and is counted.
     pub fn advance(&mut self, report: &mut StepReport, next: impl Fn(&Self, usize) -> (DVec3, DVec3)) {
         for n in 0..self.u.len() {
             if self.fixed[n] {

@@ -396,7 +396,7 @@ fn damaged_files_give_errors_and_no_panic() {
     let seeds = [enhanced(PLAIN[0], 3), enhanced(PLAIN[1], 2), enhanced(PLAIN[2], 2)];
     survives_mutations(&seeds, |bytes| {
         let file = Path::new("a");
-        let nothing = || ReadError::Format { file: file.into(), found: "no picture".into() };
+        let nothing = || ReadError::Format { file: file.into(), found: "no picture".into(), readable: String::new() };
         let bytes = slice::inflated(file, bytes)?;
         let slice = Slice::parse(file, &bytes)?.ok_or_else(nothing)?;
         let stack = stack::stack(file, &[&slice])?;
@@ -434,7 +434,7 @@ fn compressed() -> [Vec<u8>; 5] {
 /// Reads a single picture, ignoring its position.
 fn one_picture(bytes: Vec<u8>) -> Result<Import, ReadError> {
     let file = Path::new("a");
-    let nothing = || ReadError::Format { file: file.into(), found: "no picture".into() };
+    let nothing = || ReadError::Format { file: file.into(), found: "no picture".into(), readable: String::new() };
     let slice = Slice::parse(file, &bytes)?.ok_or_else(nothing)?;
     let mut data = Vec::new();
     pixels::frame(&slice, &bytes, 0, &mut data)?;

@@ -1,0 +1,55 @@
+//! Reads any image file; the format is detected by content.
+//!
+//! # Practice
+//! A format is one file with a [`Format`]; its name in [`FORMATS`] brings it to the programs.
+//! [`import_among`] uses it from any crate (`tests/toy_format.rs`).
+
+use crate::format::Format;
+use crate::source::Source;
+use crate::{Import, ReadError, VoxelVolume, dicom, metaimage, nifti, nrrd};
+use std::path::Path;
+
+/// The formats that are read.
+pub const FORMATS: &[Format] = &[nifti::FORMAT, nrrd::FORMAT, metaimage::FORMAT, dicom::FORMAT];
+
+/// Bytes of a file in which its format is recognised.
+const START: usize = 512;
+
+/// Reads a volume in any supported format, whatever its name; a folder is a DICOM series.
+pub fn read(path: &Path) -> Result<VoxelVolume<f32>, ReadError> {
+    import(path).map(|import| import.volume)
+}
+
+/// Reads a volume in any of the [`FORMATS`], with notes about the file.
+pub fn import(path: &Path) -> Result<Import, ReadError> {
+    import_among(FORMATS, path)
+}
+
+/// Reads a volume in the first of `formats` that the content belongs to, with notes.
+pub fn import_among(formats: &[Format], path: &Path) -> Result<Import, ReadError> {
+    if path.is_dir() {
+        return dicom::import(path);
+    }
+    for format in formats {
+        if (format.starts)(Source::open(&(format.file)(path))?.peek(START)?) {
+            return (format.import)(path);
+        }
+    }
+    let found = foreign(Source::open(path)?.peek(START)?).into();
+    let readable = formats.iter().map(|format| format.name).collect::<Vec<_>>().join(", ");
+    Err(ReadError::Format { file: path.into(), found, readable })
+}
+
+/// Names a content that is not read.
+fn foreign(start: &[u8]) -> &'static str {
+    match start {
+        [] => "it is empty",
+        [0x89, b'P', b'N', b'G', ..] => "it is a PNG picture",
+        [0xff, 0xd8, 0xff, ..] => "it is a JPEG picture",
+        [b'P', b'K', 3, 4, ..] => "it is a ZIP archive; unpack it first",
+        [b'%', b'P', b'D', b'F', ..] => "it is a PDF document",
+        [0, 0, 0, 1, ..] => "it looks like MGH (FreeSurfer); convert it with mri_convert to .nii.gz",
+        _ if start.iter().all(|&b| b == b'\n' || b == b'\r' || b == b'\t' || (32..127).contains(&b)) => "it is a text",
+        _ => "its first bytes are of no known format",
+    }
+}
