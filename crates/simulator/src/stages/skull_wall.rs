@@ -7,7 +7,7 @@
 //! bone, foramina) the wall remains. Testing only the present bone there would change its answer
 //! with every breathing motion of the brain. A node that the wall supports when its bone is
 //! removed, or that slides past the rim of the opening, is released gradually: its contact plane
-//! recedes, at most by 0.005 mm per collision step.
+//! recedes, at most by 0.005 mm per collision step, until the node no longer follows.
 //!
 //! ```text
 //! hollow  φ > 0     x  node     s  point of the wall     0.5, 1, 2 mm behind s: is bone gone?
@@ -40,6 +40,9 @@ const BEHIND_MM: [f32; 3] = [1.0, 2.0, 0.5];
 const FIRST_MM: f32 = 1e-4;
 /// Increase of the recession per collision step, as a share of the recession so far.
 const GROWTH: f32 = 0.02;
+/// Gap over which a node has detached from the receding wall, mm. One that the wall still supports
+/// comes off it by thousandths for a step, where the wall is curved.
+const DETACHED_MM: f32 = 0.05;
 /// Largest recession in a collision step, mm.
 const FASTEST_MM: f32 = 5e-3;
 
@@ -133,7 +136,7 @@ impl Hollow for Carved<'_> {
             // A node that left through the opening is not caught by its rim.
             *back_mm = match there && (*back_mm == 0.0 || depth_mm <= 0.0) {
                 true => 0.0,
-                false if depth_mm > *back_mm => *back_mm + (FIRST_MM + GROWTH * *back_mm).min(FASTEST_MM),
+                false if depth_mm > *back_mm - DETACHED_MM => *back_mm + (FIRST_MM + GROWTH * *back_mm).min(FASTEST_MM),
                 false => f32::INFINITY,
             };
         }
@@ -183,5 +186,30 @@ mod tests {
         let steps = std::iter::once(-up.z).chain(let_go.iter().copied()).zip(&let_go);
         assert!(steps.into_iter().all(|(before, after)| *after <= before && before - after < -0.007 * up.z));
         assert_eq!(pushed(Vec3::Z * -2.0, true), down);
+    }
+
+    /// A node that comes off the receding wall for a step is not let go at once: the pressure behind
+    /// it would throw it out.
+    #[test]
+    fn a_node_that_comes_off_the_receding_wall_for_a_step_is_still_supported() {
+        let (bone, brain) = boxed();
+        let mut wall = SkullWall::new(Arc::clone(&bone), &brain, &[]).unwrap();
+        for (k, j, i) in (50..68).flat_map(|k| (0..68).flat_map(move |j| (0..68).map(move |i| (k, j, i)))) {
+            bone.set_hu(IVec3::new(i, j, k), 0);
+        }
+        let middle = brain.positions.iter().position(|p| *p == 10.0 * Vec3::Z).unwrap();
+        let mut pushed_n = |up_mm: f32| -> f32 {
+            let at: Vec<Vec3> = brain.positions.iter().map(|p| *p + up_mm * Vec3::Z).collect();
+            let mut out = NodalContacts::none();
+            wall.press(&at, true, &mut out);
+            let own = out.planes().iter().find(|plane| plane.node as usize == middle);
+            own.map_or(0.0, |plane| plane.stiffness * plane.depth_mm(at[middle]).max(0.0))
+        };
+        // The wall is 1.25 mm above the middle of the brain's top.
+        let before = (0..20).map(|_| pushed_n(1.3)).fold(f32::MAX, f32::min);
+        assert!(before > 0.0 && pushed_n(1.249) == 0.0);
+        let after = pushed_n(1.3);
+        assert!(after > 0.9 * before, "{after} N after {before} N");
+        assert_eq!((pushed_n(1.1), pushed_n(1.3)), (0.0, 0.0), "detached by more, it is free");
     }
 }
