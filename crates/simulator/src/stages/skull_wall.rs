@@ -188,8 +188,8 @@ mod tests {
         assert_eq!(pushed(Vec3::Z * -2.0, true), down);
     }
 
-    /// A node that comes off the receding wall for a step is not let go at once: the pressure behind
-    /// it would throw it out.
+    /// A node that comes off the receding wall for a step is not let go at once: the pressure
+    /// behind it would throw it out.
     #[test]
     fn a_node_that_comes_off_the_receding_wall_for_a_step_is_still_supported() {
         let (bone, brain) = boxed();
