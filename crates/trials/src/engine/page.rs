@@ -130,6 +130,7 @@ mod tests {
                 columns: vec!["1".into()],
                 rows: vec!["r".into()],
                 cells: vec![vec![Outcome::Fails("falls <through>".into())]],
+                lines: vec![("bound".into(), vec![(0.0, 1.0), (1.0, 0.5)])],
                 ..Map::default()
             }],
             regressions: vec!["WORSE: a map".into()],
@@ -152,6 +153,8 @@ mod tests {
             "<td>NaN</td>",
             "<code>validate toy&#x2f;PART</code>",
             "<b>a</b> falls &lt;through&gt;",
+            "<polyline points=",
+            "</span> bound",
             "fails (1)",
             "WORSE: a map",
             "<circle",
