@@ -25,7 +25,7 @@ use trepan_link::wire::{EventRecord, TickRecord};
 pub(crate) fn compare(files: [&Path; 2], out: &Path) -> Result<PathBuf, SessionError> {
     let [first, second] = files;
     let page = page(&[Recording::open(first)?, Recording::open(second)?])?;
-    fs::create_dir_all(out).map_err(|fault| SessionError::Output { path: out.into(), fault })?;
+    fs::create_dir_all(out).map_err(SessionError::output(out))?;
     let path = out.join("compare.html");
     whole(&path, page.as_bytes()).map(|()| path)
 }

@@ -1,6 +1,6 @@
 //! Errors before and after a session, and their exit codes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Error that keeps a session from starting or from writing its files. Errors that the user can
 /// correct exit with 2, others with 1.
@@ -29,12 +29,20 @@ pub enum SessionError {
         /// Cause.
         fault: std::io::Error,
     },
+    /// Picture that cannot be rendered.
+    #[error(transparent)]
+    Picture(#[from] trepan_render::RenderError),
     /// Internal error, which the user cannot correct.
     #[error("{0}")]
     Internal(String),
 }
 
 impl SessionError {
+    /// Returns the constructor of the error of an output file at `path`.
+    pub(crate) fn output(path: &Path) -> impl Fn(std::io::Error) -> Self + Copy {
+        move |fault| Self::Output { path: path.into(), fault }
+    }
+
     /// Exit code: 2 for errors that the user can correct, else 1.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -25,7 +25,7 @@ use crate::run::watch::{Asked, Company, Share};
 use crate::run::{Outcome, RenderInputs, Run, Stages};
 use crate::session_setup::SessionSetup;
 use crate::show::driver;
-use crate::show::graphics::Graphics;
+use crate::show::graphics::{Graphics, NoPicture};
 use crate::show::picture::{self, Album};
 use crate::show::{player, window};
 use crate::stages::haptic_tick::ToolSample;
@@ -140,7 +140,7 @@ impl Session {
         remarks.extend(self.setup.models.unmet.iter().cloned());
         let (lack, unlike) = self.replay_remarks();
         remarks.extend(lack.iter().cloned().chain(unlike).chain(ended));
-        remarks.extend(graphics.err());
+        remarks.extend(graphics.err().map(|why| why.to_string()));
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
         let drilled =
@@ -173,12 +173,14 @@ impl Session {
     /// Current skull in the scanner's voxels; in those of the case, with a remark, if the CT is not
     /// available.
     fn drilled(&self, bone: &BoneVolume, whole: &VoxelVolume<i16>, remarks: &mut Vec<String>) -> VoxelVolume<i16> {
-        let ct = anatomy::scanned(&self.inputs, self.options.patient.ct_series).unwrap_or_else(|why| {
-            let edge = bone.spacing_mm();
-            remarks.push(format!("drilled.nii.gz has voxels of {edge} mm instead of the scanner's: {why}"));
-            whole.clone()
-        });
-        drilled::drilled(ct, whole, bone)
+        let why = match anatomy::scanned(&self.inputs, self.options.patient.ct_series) {
+            Some(Ok(ct)) => return drilled::drilled(ct, whole, bone),
+            Some(Err(fault)) => format!("the CT cannot be read again: {fault}"),
+            None => "a case folder does not hold the scanner's images".into(),
+        };
+        let edge = bone.spacing_mm();
+        remarks.push(format!("drilled.nii.gz has voxels of {edge} mm instead of the scanner's: {why}"));
+        drilled::drilled(whole.clone(), whole, bone)
     }
 
     /// The patient's current scene.
@@ -252,18 +254,18 @@ impl Session {
         ToolSample { tick: 0, state, tool: self.program.tray()[0], slot: 0, drilling: false }
     }
 
-    fn graphics(&self, drawing: Option<Result<Gpu, GpuError>>) -> Result<Graphics, String> {
+    fn graphics(&self, drawing: Option<Result<Gpu, GpuError>>) -> Result<Graphics, NoPicture> {
         if !self.windowed && self.options.frames_per_second == 0.0 {
-            return Err("no picture was requested".into());
+            return Err(NoPicture::NotRequested);
         }
         let gpu = drawing.unwrap_or_else(driver::open);
-        Graphics::open(&self.setup, self.options.picture, gpu, self.windowed).map_err(|fault| fault.to_string())
+        Ok(Graphics::open(&self.setup, self.options.picture, gpu, self.windowed)?)
     }
 
     fn picture(
         &self,
         mut eyes: RenderInputs,
-        graphics: &mut Result<Graphics, String>,
+        graphics: &mut Result<Graphics, NoPicture>,
         pointer: Option<mouse::MouseHandle>,
         company: Company,
         stop: &Stop,

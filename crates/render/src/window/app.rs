@@ -7,7 +7,7 @@ use super::look::Look;
 use super::panel::{self, Clicks, Traces};
 use super::quality::Quality;
 use super::{Draws, Lent, Panel, Playback, Session, Shared, Start, WindowInput, banner, timeline};
-use crate::{Frame, View};
+use crate::{Frame, RenderError, View};
 use eframe::egui_wgpu::RenderState;
 use eframe::{egui, wgpu};
 use std::time::Duration;
@@ -159,7 +159,7 @@ impl<S: Session, D: Draws> Window<S, D> {
         let pixels = [space.x, space.y].map(|s| (s * scale).round().max(1.0) as u32);
         let frame = self.look.on(shared.session.frame(self.hand.camera));
         match self.screen.show(ui, state, &mut shared.renderer, &frame, pixels, self.quality.detail()) {
-            Err(error) => shared.fault = Some(error),
+            Err(error) => shared.fault = Some(error.to_string()),
             Ok((view, id)) => {
                 let pointer = Pointer::over(ui, &response);
                 self.hand.follow(&pointer, &view, space.y);
@@ -175,6 +175,17 @@ impl<S: Session, D: Draws> Window<S, D> {
     }
 }
 
+/// Why a frame is not shown.
+#[derive(Debug, thiserror::Error)]
+enum ShowError {
+    /// The window was opened without a graphics device.
+    #[error("the window has no graphics device")]
+    NoDevice,
+    /// Rendering failed.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
 impl Screen {
     /// Draws a frame and returns the window's texture of it.
     fn show(
@@ -185,11 +196,11 @@ impl Screen {
         frame: &Frame<'_>,
         pixels: [u32; 2],
         detail: f32,
-    ) -> Result<(View, egui::TextureId), String> {
+    ) -> Result<(View, egui::TextureId), ShowError> {
         let texture = match self {
             Self::Shares(texture) => texture,
             Self::Copies(copy) => {
-                let (view, image) = renderer.picture(frame, pixels, detail).map_err(|fault| fault.to_string())?;
+                let (view, image) = renderer.picture(frame, pixels, detail)?;
                 let size = [image.width as usize, image.height as usize];
                 let image = egui::ColorImage::from_rgba_unmultiplied(size, &image.rgba);
                 let linear = egui::TextureOptions::LINEAR;
@@ -199,8 +210,8 @@ impl Screen {
                 return Ok((view, copy.id()));
             }
         };
-        let state = state.ok_or("the window has no graphics device")?;
-        let view = renderer.draw(frame, pixels, detail).map_err(|fault| fault.to_string())?;
+        let state = state.ok_or(ShowError::NoDevice)?;
+        let view = renderer.draw(frame, pixels, detail)?;
         if let Some(drawn) = renderer.texture() {
             return Ok((view, registered(texture, state, drawn.view())));
         }

@@ -14,6 +14,20 @@ use cpal::{FromSample, SampleFormat, SizedSample, Stream, StreamConfig};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// Why there is no sound.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum AudioError {
+    /// The machine has no sound device.
+    #[error("there is no sound device")]
+    NoDevice,
+    /// The sound device takes no samples that this program can make.
+    #[error("the sound device wants samples of {0}")]
+    Samples(SampleFormat),
+    /// The sound system failed.
+    #[error(transparent)]
+    System(#[from] cpal::Error),
+}
+
 /// An open sound device.
 pub(crate) struct Loudspeaker {
     wanted: Arc<AtomicU64>,
@@ -23,19 +37,19 @@ pub(crate) struct Loudspeaker {
 
 impl Loudspeaker {
     /// Opens the default device.
-    pub fn open() -> Result<Self, String> {
-        let device = cpal::default_host().default_output_device().ok_or("there is no sound device")?;
-        let config = device.default_output_config().map_err(|fault| fault.to_string())?;
+    pub fn open() -> Result<Self, AudioError> {
+        let device = cpal::default_host().default_output_device().ok_or(AudioError::NoDevice)?;
+        let config = device.default_output_config()?;
         let wanted = Arc::new(AtomicU64::new(0));
         let stream = match config.sample_format() {
             SampleFormat::F32 => stream::<f32>(&device, config.into(), wanted.clone()),
             SampleFormat::I16 => stream::<i16>(&device, config.into(), wanted.clone()),
             SampleFormat::I32 => stream::<i32>(&device, config.into(), wanted.clone()),
             SampleFormat::U16 => stream::<u16>(&device, config.into(), wanted.clone()),
-            other => return Err(format!("the sound device wants samples of {other}")),
+            other => return Err(AudioError::Samples(other)),
         };
-        let stream = stream.map_err(|fault| fault.to_string())?;
-        stream.play().map_err(|fault| fault.to_string())?;
+        let stream = stream?;
+        stream.play()?;
         Ok(Self { wanted, _stream: stream })
     }
 
@@ -50,7 +64,7 @@ impl Loudspeaker {
 pub(crate) struct AudioOutput {
     /// Whether sound is muted.
     pub muted: bool,
-    loudspeaker: Option<Result<Loudspeaker, String>>,
+    loudspeaker: Option<Result<Loudspeaker, AudioError>>,
 }
 
 impl AudioOutput {
@@ -62,7 +76,7 @@ impl AudioOutput {
         }
         match self.loudspeaker.get_or_insert_with(Loudspeaker::open) {
             Ok(loudspeaker) => loudspeaker.sound(sound),
-            Err(why) => return Some(why.clone()),
+            Err(why) => return Some(why.to_string()),
         }
         None
     }

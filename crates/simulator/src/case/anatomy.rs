@@ -40,10 +40,9 @@ pub(super) fn read_ct(
     hounsfield(&import.volume).map_err(|fault| SessionError::Case(format!("{}: {fault}", path.display())))
 }
 
-/// Reads the original CT of a case again; the error is a text for a remark.
-pub(crate) fn scanned(inputs: &Inputs, series: Option<usize>) -> Result<VoxelVolume<i16>, String> {
-    let path = inputs.ct.as_deref().ok_or("a case folder does not hold the scanner's images")?;
-    read_ct(path, series, &mut Vec::new()).map_err(|fault| format!("the CT cannot be read again: {fault}"))
+/// Reads the original CT of a case again; `None` for a case folder, which does not hold it.
+pub(crate) fn scanned(inputs: &Inputs, series: Option<usize>) -> Option<Result<VoxelVolume<i16>, SessionError>> {
+    inputs.ct.as_deref().map(|path| read_ct(path, series, &mut Vec::new()))
 }
 
 /// Reads an MRI, and adds remarks on it; refuses voxels that are not finite, and CTs.

@@ -209,7 +209,7 @@ fn write(found: &Measured, samples: &[Sample], out: &Path) -> Result<(), Session
     let json = serde_json::to_vec_pretty(found);
     let json = json.map_err(|fault| SessionError::Internal(format!("device.json: {fault}")))?;
     let page = page::html(found, samples)?;
-    fs::create_dir_all(out).map_err(|fault| SessionError::Output { path: out.into(), fault })?;
+    fs::create_dir_all(out).map_err(SessionError::output(out))?;
     whole(&out.join("device.json"), &json)?;
     whole(&out.join("device.html"), page.as_bytes())
 }

@@ -71,7 +71,7 @@ impl Place {
         let missing = out.ancestors().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let made = missing.map(PathBuf::from).collect();
         let place = Self { out: out.into(), record: record.into(), made, kept: false };
-        let failed = |fault| SessionError::Output { path: out.into(), fault };
+        let failed = SessionError::output(out);
         fs::create_dir_all(out.join(FRAMES)).map_err(failed)?;
         place.clear()?;
         Ok(place)
@@ -89,7 +89,7 @@ impl Place {
         let pictures = pictures.map(|entry| entry.path()).filter(|path| path.extension() == Some(OsStr::new("png")));
         let files = FILES.iter().map(|name| self.out.join(name)).chain([self.record.clone()]);
         for path in files.filter(|path| path.exists()).chain(pictures) {
-            fs::remove_file(&path).map_err(|fault| SessionError::Output { path, fault })?;
+            fs::remove_file(&path).map_err(SessionError::output(&path))?;
         }
         Ok(())
     }
@@ -174,7 +174,7 @@ fn scores(summary: &Summary) -> String {
 
 /// Writes a file atomically.
 pub(crate) fn whole(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
-    let failed = |fault| SessionError::Output { path: path.into(), fault };
+    let failed = SessionError::output(path);
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
     file.write_all(bytes).map_err(failed)?;

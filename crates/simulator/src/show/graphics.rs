@@ -1,5 +1,6 @@
 //! The painter of a session's pictures, and the coloured maps at its end.
 
+use crate::SessionError;
 use crate::report::page::Shot;
 use crate::session_setup::SessionSetup;
 use crate::show::colours::{self, Colours};
@@ -19,6 +20,17 @@ const OF_BRAIN: &str = "force on the brain over time: yellow little, red most";
 const BONE_VIEW_MM: f32 = 75.0;
 /// Camera distance for the map of the brain, mm.
 const BRAIN_VIEW_MM: f32 = 150.0;
+
+/// Why a session has no pictures.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum NoPicture {
+    /// None was requested.
+    #[error("no picture was requested")]
+    NotRequested,
+    /// The painter could not be made.
+    #[error(transparent)]
+    Failed(#[from] RenderError),
+}
 
 /// The painter and the name of its device.
 pub(crate) struct Graphics {
@@ -73,7 +85,7 @@ impl SessionSetup {
         before: Option<&VoxelVolume<i16>>,
         recording: &Recording,
         folder: &Path,
-    ) -> Vec<Result<Shot, String>> {
+    ) -> Vec<Result<Shot, SessionError>> {
         let removed = self.bone().zip(before).map(|(bone, before)| colours::against(&self.plan, before, bone));
         let field = self.scene.brain.as_ref().map(|brain| &*brain.field);
         let forces = field.and_then(|field| colours::forces(field, self.program.tray(), &recording.ticks));
@@ -85,8 +97,8 @@ impl SessionSetup {
             ..Frame::of(eye(distance_mm))
         };
         let mut draw = |caption: &str, frame: Frame| {
-            let drawn = painter.picture(&frame).map_err(|fault| fault.to_string());
-            drawn.and_then(|(image, _)| snap(&image, folder, caption))
+            let (image, _) = painter.picture(&frame)?;
+            snap(&image, folder, caption)
         };
         let of_bone = removed.as_ref().map(|paint| {
             draw(OF_BONE, Frame { bone_paint: Some(paint), ..frame(BONE_VIEW_MM + 3.0 * self.plan.flap_mm) })

@@ -5,6 +5,7 @@
 //! most a second of pictures is queued; further ones are dropped, counted and reported. A list with
 //! the time of each picture of a film is written for `ffmpeg -i film.ffconcat film.mp4`.
 
+use crate::SessionError;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
@@ -18,7 +19,7 @@ const QUEUE: usize = 30;
 /// Saves pictures of the window on a thread.
 pub(crate) struct Keeper {
     sender: Option<SyncSender<(Capture, Image)>>,
-    thread: Option<JoinHandle<Result<(), String>>>,
+    thread: Option<JoinHandle<Result<(), SessionError>>>,
     dropped: u64,
 }
 
@@ -66,7 +67,7 @@ struct Files {
 
 impl Files {
     /// Writes a picture under the next number.
-    fn put(&mut self, what: Capture, image: &Image) -> Result<(), String> {
+    fn put(&mut self, what: Capture, image: &Image) -> Result<(), SessionError> {
         let name = match what {
             Capture::Picture => {
                 self.pictures += 1;
@@ -79,11 +80,11 @@ impl Files {
         };
         let path = self.folder.join(name);
         let written = std::fs::create_dir_all(&self.folder).and_then(|()| image.write_png(&path));
-        written.map_err(|fault| format!("{}: {fault}", path.display()))
+        written.map_err(SessionError::output(&path))
     }
 
     /// Writes the list of the film's pictures, if there is a film.
-    fn list(&self) -> Result<(), String> {
+    fn list(&self) -> Result<(), SessionError> {
         let Some(last) = self.film_ms.last() else { return Ok(()) };
         let mut text = String::from("ffconcat version 1.0\n");
         let ends = self.film_ms.iter().skip(1).copied().chain([last + 33]);
@@ -92,7 +93,7 @@ impl Files {
             _ = writeln!(text, "file film-{:05}.png\nduration {seconds:.3}", at + 1);
         }
         let path = self.folder.join("film.ffconcat");
-        std::fs::write(&path, text).map_err(|fault| format!("{}: {fault}", path.display()))
+        std::fs::write(&path, text).map_err(SessionError::output(&path))
     }
 }
 

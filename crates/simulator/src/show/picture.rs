@@ -1,6 +1,7 @@
 //! The main thread of a headless run: renders pictures of the newest state with the same code as
 //! the window.
 
+use crate::SessionError;
 use crate::case::opening::eye;
 use crate::report::page::Shot;
 use crate::run::clock::Clock;
@@ -41,7 +42,7 @@ pub(crate) struct Album {
 
 impl Album {
     /// Adds a picture or its fault.
-    pub fn add(&mut self, shot: Result<Shot, String>) {
+    pub fn add(&mut self, shot: Result<Shot, SessionError>) {
         match shot {
             Ok(shot) => {
                 self.frames += 1;
@@ -124,7 +125,7 @@ pub(crate) fn draw(
             let soft = inputs.soft.as_mut().map(|soft| soft.latest().0.positions.as_slice());
             let path = folder.join(format!("frame-{:05}.png", album.frames));
             let drawn = painter.picture(&frame(camera, &view, soft, bone_shown, &colours));
-            match drawn.map_err(|f| f.to_string()).and_then(|(image, _)| write(&image, &path)) {
+            match drawn.map_err(SessionError::from).and_then(|(image, _)| write(&image, &path)) {
                 Ok(()) => {
                     album.frames += 1;
                     candidates.push((view.time_ms * 1e-3, path));
@@ -148,16 +149,16 @@ pub(crate) fn draw(
     album
 }
 
-fn write(image: &Image, path: &Path) -> Result<(), String> {
-    image.write_png(path).map_err(|fault| format!("{}: {fault}", path.display()))
+fn write(image: &Image, path: &Path) -> Result<(), SessionError> {
+    image.write_png(path).map_err(SessionError::output(path))
 }
 
 /// Writes a picture for the report; its file is named after the caption up to a colon.
-pub(crate) fn snap(image: &Image, folder: &Path, caption: &str) -> Result<Shot, String> {
+pub(crate) fn snap(image: &Image, folder: &Path, caption: &str) -> Result<Shot, SessionError> {
     let name = caption.split(':').next().unwrap_or_default().replace(' ', "-");
     let path = folder.join(format!("frame-{name}.png"));
     write(image, &path)?;
-    Ok(Shot { caption: caption.into(), png: std::fs::read(&path).map_err(|fault| fault.to_string())? })
+    Ok(Shot { caption: caption.into(), png: std::fs::read(&path).map_err(SessionError::output(&path))? })
 }
 
 /// Returns the first and the last picture, and some evenly spaced between.

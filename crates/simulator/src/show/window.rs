@@ -4,6 +4,7 @@
 //! Window and loops never wait for each other. With the mouse as device, the haptic loop reads the
 //! mouse pose at its own rate. Closing the window ends the session.
 
+use crate::SessionError;
 use crate::program::Program;
 use crate::report::page::Shot;
 use crate::run::lesson::{TEACHER_REQUESTS, Teacher};
@@ -217,8 +218,8 @@ impl<S: window::Session> window::Session for Counted<S> {
     }
 }
 
-fn shot(painter: &mut Painter, frame: &Frame<'_>, folder: &Path, caption: &str) -> Result<Shot, String> {
-    let (image, _) = painter.picture(frame).map_err(|fault| fault.to_string())?;
+fn shot(painter: &mut Painter, frame: &Frame<'_>, folder: &Path, caption: &str) -> Result<Shot, SessionError> {
+    let (image, _) = painter.picture(frame)?;
     snap(&image, folder, caption)
 }
 

@@ -5,6 +5,7 @@
 //! Python; if it has the packages already, it is used as it is. The packages are not linked, kept
 //! or shipped.
 
+use anyhow::{Context, Result, bail};
 use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::Command;
@@ -21,9 +22,9 @@ pub struct Workshop {
 impl Workshop {
     /// Sets up packages, as (name to import, name in the index), and a script, and prints the
     /// packages' versions.
-    pub fn with(packages: &[(&str, &str)], script: &str) -> Result<Self, String> {
-        let folder = tempfile::tempdir().map_err(|fault| fault.to_string())?;
-        std::fs::write(folder.path().join("script.py"), script).map_err(|fault| fault.to_string())?;
+    pub fn with(packages: &[(&str, &str)], script: &str) -> Result<Self> {
+        let folder = tempfile::tempdir()?;
+        std::fs::write(folder.path().join("script.py"), script)?;
         let given: PathBuf = std::env::var_os(PYTHON).unwrap_or_else(|| "python3".into()).into();
         let imports = packages.iter().map(|(import, _)| format!("import {import}\n")).collect::<String>();
         let python = match said(Command::new(&given).args(["-c", &imports])) {
@@ -50,19 +51,19 @@ impl Workshop {
     }
 
     /// Returns the script's output, or the last line of its error text.
-    pub fn run(&self, arguments: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Result<String, String> {
+    pub fn run(&self, arguments: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Result<String> {
         said(Command::new(&self.python).arg(self.at("script.py")).args(arguments).current_dir(self.folder.path()))
     }
 }
 
 /// Returns a program's output, or the last line of its error text.
-fn said(command: &mut Command) -> Result<String, String> {
+fn said(command: &mut Command) -> Result<String> {
     let program = command.get_program().to_string_lossy().into_owned();
-    let out = command.output().map_err(|fault| format!("{program}: {fault}"))?;
+    let out = command.output().with_context(|| program.clone())?;
     if out.status.success() {
         return Ok(String::from_utf8_lossy(&out.stdout).into_owned());
     }
     let complaint = [&out.stderr, &out.stdout].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
     let last = complaint.iter().flat_map(|text| text.lines().rev()).find(|line| !line.trim().is_empty());
-    Err(format!("{program}: {}", last.unwrap_or("it failed without a word")))
+    bail!("{program}: {}", last.unwrap_or("it failed without a word"))
 }

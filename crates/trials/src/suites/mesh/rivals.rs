@@ -12,6 +12,7 @@ use super::scenes::{self, Scene};
 use super::spots::{Spots, faces, samples};
 use crate::engine::suite::{Findings, Row};
 use crate::suites::python::Workshop;
+use anyhow::{Context, Result};
 use std::ffi::OsStr;
 use std::path::Path;
 use std::time::Instant;
@@ -36,7 +37,7 @@ fn run(scope: Scope) -> Findings {
     let workshop = match Workshop::with(&packages, SCRIPT) {
         Ok(workshop) => workshop,
         Err(fault) => {
-            println!("  left out, since there is no Python with the rivals: {fault}");
+            println!("  left out, since there is no Python with the rivals: {fault:#}");
             return findings;
         }
     };
@@ -57,7 +58,7 @@ fn compare(scene: &Scene, workshop: &Workshop, rows: &mut Vec<Row>) {
     for (name, _, ending) in RIVALS {
         match fill(workshop, name, ending, &own, scene.config.target_tets) {
             Ok((mesh, seconds)) => rows.push(row(scene, name, &mesh, seconds)),
-            Err(fault) => println!("  {} by {name}: {fault}", scene.name),
+            Err(fault) => println!("  {} by {name}: {fault:#}", scene.name),
         }
     }
 }
@@ -91,18 +92,18 @@ fn print_table(rows: &[Row]) {
 }
 
 /// What a rival makes of the surface of a mesh, and its seconds.
-fn fill(workshop: &Workshop, name: &str, ending: &str, own: &TetMesh, target: usize) -> Result<(TetMesh, f64), String> {
+fn fill(workshop: &Workshop, name: &str, ending: &str, own: &TetMesh, target: usize) -> Result<(TetMesh, f64)> {
     let (from, to) = (workshop.at("surface.obj"), workshop.at("filled"));
     let surface = Surface::of(own).to_tri_mesh(&own.positions);
-    obj::write(&from, &surface).map_err(|fault| fault.to_string())?;
+    obj::write(&from, &surface)?;
     let told = workshop.run([OsStr::new(name), from.as_os_str(), OsStr::new(&target.to_string()), to.as_os_str()])?;
     let seconds = told.lines().find_map(|line| line.strip_prefix("seconds ")?.parse().ok());
     let mesh = read(&to.with_extension(ending))?;
-    Ok((mesh, seconds.ok_or("it does not tell its seconds")?))
+    Ok((mesh, seconds.context("it does not tell its seconds")?))
 }
 
-fn read(path: &Path) -> Result<TetMesh, String> {
-    let mesh = trepan_mesh::read(path).map_err(|fault| fault.to_string())?;
-    mesh.check().map_err(|fault| format!("its mesh is degenerate: {fault}"))?;
+fn read(path: &Path) -> Result<TetMesh> {
+    let mesh = trepan_mesh::read(path)?;
+    mesh.check().context("its mesh is degenerate")?;
     Ok(mesh)
 }

@@ -15,6 +15,7 @@ use crate::engine::suite::{Findings, Gate, Row};
 use crate::engine::timer::Samples;
 use crate::suites::python::Workshop;
 use crate::suites::{Part, Scope};
+use anyhow::{Context, Result, ensure};
 use glam::Vec3;
 use std::path::Path;
 use trepan_render::{Casting, Image};
@@ -35,7 +36,7 @@ fn run(scope: Scope) -> Findings {
     let edge = scope.pick(100, 160);
     match vtk(edge, size, 4) {
         Ok(theirs) => compare(edge, size, scope, &theirs, &mut findings),
-        Err(fault) => println!("  left out, since there is no Python with VTK: {fault}"),
+        Err(fault) => println!("  left out, since there is no Python with VTK: {fault:#}"),
     }
     findings
 }
@@ -77,7 +78,7 @@ fn compare(edge: usize, size: [u32; 2], scope: Scope, theirs: &[Theirs], finding
 }
 
 /// VTK's times and errors, finest samples first.
-fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>, String> {
+fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>> {
     let workshop = Workshop::with(&[("vtk", "vtk"), ("numpy", "numpy")], SCRIPT)?;
     let at = |name: &str| workshop.at(name);
     let bone = head(edge);
@@ -91,10 +92,7 @@ fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>, Strin
         "fov_deg": 0.6f32.to_degrees(), "size": size, "repeats": repeats, "steps_voxel": STEPS,
     });
     let files = [("volume.raw", bytes), ("scene.json", scene.to_string().into())];
-    files
-        .into_iter()
-        .try_for_each(|(name, bytes)| std::fs::write(at(name), bytes))
-        .map_err(|fault| fault.to_string())?;
+    files.into_iter().try_for_each(|(name, bytes)| std::fs::write(at(name), bytes))?;
     let told = workshop.run([at("scene.json"), at("picture")])?;
     let ms = told.lines().filter_map(|line| line.strip_prefix("ms ")?.split_once(' ')?.1.parse::<f64>().ok());
     let image = |n: usize| read(&at(&format!("picture{n}.rgb")), size);
@@ -102,15 +100,15 @@ fn vtk(edge: usize, size: [u32; 2], repeats: usize) -> Result<Vec<Theirs>, Strin
     let theirs = ms
         .enumerate()
         .map(|(n, ms)| Ok(Theirs { step_voxel: STEPS[n], ms, error_percent: image(n)?.error_percent(&finest) }));
-    let theirs = theirs.collect::<Result<Vec<_>, String>>()?;
-    if theirs.len() == STEPS.len() { Ok(theirs) } else { Err(format!("VTK tells {} times", theirs.len())) }
+    let theirs = theirs.collect::<Result<Vec<_>>>()?;
+    ensure!(theirs.len() == STEPS.len(), "VTK tells {} times", theirs.len());
+    Ok(theirs)
 }
 
 /// A picture as VTK left it: three bytes a pixel.
-fn read(path: &Path, [width, height]: [u32; 2]) -> Result<Image, String> {
-    let rgb = std::fs::read(path).map_err(|fault| format!("{}: {fault}", path.display()))?;
-    if rgb.len() != 3 * (width * height) as usize {
-        return Err(format!("{} has {} bytes; {width}x{height} pixels have 3 each", path.display(), rgb.len()));
-    }
+fn read(path: &Path, [width, height]: [u32; 2]) -> Result<Image> {
+    let rgb = std::fs::read(path).with_context(|| path.display().to_string())?;
+    let whole = rgb.len() == 3 * (width * height) as usize;
+    ensure!(whole, "{} has {} bytes; {width}x{height} pixels have 3 each", path.display(), rgb.len());
     Ok(Image { width, height, rgba: rgb.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect() })
 }

@@ -23,17 +23,17 @@ fn run(_: Scope) -> Findings {
     let mut findings = Findings::default();
     match read() {
         Ok(found) => findings = found,
-        Err(fault) => println!("  left out: {fault}"),
+        Err(fault) => println!("  left out: {fault:#}"),
     }
     findings
 }
 
-fn read() -> Result<Findings, String> {
+fn read() -> anyhow::Result<Findings> {
     let workshop = Workshop::with(&PACKAGES, include_str!("readers.py"))?;
     let out = workshop.at("session");
-    sessions::run(&out, &["--duration", "4"]).map_err(|fault| format!("{fault:#}"))?;
+    sessions::run(&out, &["--duration", "4"])?;
     let file = out.join("session.mcap");
-    let own = Recording::open(&file).map_err(|fault| fault.to_string())?;
+    let own = Recording::open(&file)?;
     let rerun = workshop.at("session.rrd");
     let told = workshop.run([&file, &rerun])?;
     let facts: Vec<Vec<&str>> = told.lines().map(|line| line.split(' ').collect()).collect();
