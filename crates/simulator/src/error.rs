@@ -46,7 +46,7 @@ impl SessionError {
     /// Exit code: 2 for errors that the user can correct, else 1.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Internal(_) => 1,
+            Self::Picture(_) | Self::Internal(_) => 1,
             _ => 2,
         }
     }
