@@ -45,7 +45,7 @@ mod stroke;
 mod volume;
 
 pub use atomic::write_atomically;
-pub use bone::{AIR_HU, BoneError, BoneVolume};
+pub use bone::{AIR_HU, BetweenScratch, BoneError, BoneVolume, CUT_STEPS, CUT_SURFACE, CutWriter, cut_depth};
 pub use brain::{
     BrainConfidence, BrainConfig, BrainFit, FoundBrain, MaskError, brain_by_mri, brain_fit, brain_mask,
     check_brain_mask, find_brain,

@@ -17,6 +17,9 @@
 //! converting a world point costs three multiply-adds. 2 bytes a voxel, 4 bytes a brick. The caller
 //! must ensure that only one thread writes at a time.
 //!
+//! What a burr cuts is not written into the densities but into a second field, which is finer
+//! (`cut.rs`); [`hu`](BoneVolume::hu) shows both as one.
+//!
 //! Strokes of the burr, each from the pedal's press to its release, can be undone, newest first.
 //! [`begin_stroke`](BoneVolume::begin_stroke) marks the press; bricks are then copied before they
 //! change. For readers an undo is one more change. A tick undoes a few bricks at a time
@@ -25,7 +28,12 @@
 //! # When not to use it
 //! For volumes that do not change: use [`VoxelVolume`].
 
+mod between;
+mod cut;
 mod undo;
+
+pub use between::BetweenScratch;
+pub use cut::{CUT_STEPS, CUT_SURFACE, CutWriter, cut_depth};
 
 use crate::VoxelVolume;
 use crate::stroke::{BRICK, Strokes};
@@ -48,9 +56,14 @@ pub struct BoneVolume {
     spacing_mm: f32,
     isovalue: i16,
     bounds: Aabb,
+    /// The CT.
     hu: Vec<AtomicI16>,
+    cut: cut::CutField,
     bricks: [usize; 3],
+    /// Changes of each brick's densities.
     versions: Vec<AtomicU32>,
+    /// Changes of the cut in each brick.
+    cut_versions: Vec<AtomicU32>,
     /// Whether a brick has ever held bone.
     solid: Vec<AtomicBool>,
     strokes: Strokes,
@@ -78,6 +91,7 @@ impl BoneVolume {
             return Err(BoneError::Grid(format!("{scale:?}")));
         }
         let bricks = volume.dims.map(|n| n.div_ceil(BRICK));
+        let counters = || (0..bricks.iter().product()).map(|_| AtomicU32::new(0)).collect();
         let mut bone = Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
             dims: volume.dims,
@@ -86,13 +100,18 @@ impl BoneVolume {
             isovalue,
             bounds: Aabb::EMPTY,
             hu: volume.data.iter().map(|&v| AtomicI16::new(v)).collect(),
+            cut: cut::CutField::new(volume.dims, spacing as f32, 0),
             bricks,
-            versions: (0..bricks.iter().product()).map(|_| AtomicU32::new(0)).collect(),
+            versions: counters(),
+            cut_versions: counters(),
             solid: (0..bricks.iter().product()).map(|_| AtomicBool::new(false)).collect(),
-            strokes: Strokes::new(bricks.iter().product()),
+            strokes: Strokes::new(0),
             undone: AtomicU32::new(0),
         };
         bone.bounds = bone.find_bone().ok_or(BoneError::Empty(isovalue))?;
+        let solid = bone.solid.iter().filter(|solid| solid.load(Ordering::Relaxed)).count();
+        bone.cut = cut::CutField::new(volume.dims, bone.spacing_mm, solid);
+        bone.strokes = Strokes::new(bone.versions.len() + bone.cut.pool());
         Ok(bone)
     }
 
@@ -172,9 +191,21 @@ impl BoneVolume {
         inside.then(|| voxel.x as usize + nx * (voxel.y as usize + ny * voxel.z as usize))
     }
 
-    /// Density of a voxel, HU; [`AIR_HU`] outside the grid.
+    /// Density of a voxel with what was cut from it, HU. It is less than that of the CT in a cut
+    /// and within a voxel of it; [`AIR_HU`] outside the grid.
     #[inline]
     pub fn hu(&self, voxel: IVec3) -> i16 {
+        self.index(voxel).map_or(AIR_HU, |at| self.shown(at, voxel))
+    }
+
+    #[inline]
+    fn shown(&self, at: usize, voxel: IVec3) -> i16 {
+        self.ramped(self.hu[at].load(Ordering::Relaxed), self.cut.at(self.cut.nodes * voxel))
+    }
+
+    /// Density of a voxel in the CT, HU, as if nothing had been cut; [`AIR_HU`] outside the grid.
+    #[inline]
+    pub fn ct(&self, voxel: IVec3) -> i16 {
         self.index(voxel).map_or(AIR_HU, |at| self.hu[at].load(Ordering::Relaxed))
     }
 
@@ -184,13 +215,21 @@ impl BoneVolume {
         self.hu(voxel) >= self.isovalue
     }
 
-    /// Sets the density of a voxel, HU; ignored outside the grid. For the writer only.
+    /// Whether a world point is in bone that was not cut, to the nearest voxel and node.
+    #[inline]
+    pub fn holds(&self, point: Vec3) -> bool {
+        let at = self.grid_of(point);
+        let node = (self.cut.nodes as f32 * at).round().as_ivec3();
+        self.ct(at.round().as_ivec3()) >= self.isovalue && self.cut.at(node) < CUT_SURFACE
+    }
+
+    /// Sets the CT's density of a voxel, HU; ignored outside the grid. For the writer only.
     pub fn set_hu(&self, voxel: IVec3, hu: i16) {
         if let Some(at) = self.index(voxel) {
             let brick = self.brick_of(voxel);
             if self.strokes.is_first(brick) {
                 let low = self.low_of(brick);
-                self.strokes.keep(brick, |n| self.hu(low + Self::within(n)));
+                self.strokes.keep(brick, |n| self.ct(low + Self::within(n)));
             }
             self.hu[at].store(hu, Ordering::Relaxed);
             if hu >= self.isovalue {
@@ -214,10 +253,37 @@ impl BoneVolume {
     /// voxel 8 times `brick`.
     #[inline]
     pub fn version(&self, brick: IVec3) -> u32 {
+        self.ct_version(brick).wrapping_add(self.cut_version(brick))
+    }
+
+    /// Version of a brick's densities alone.
+    #[inline]
+    pub fn ct_version(&self, brick: IVec3) -> u32 {
+        self.brick_index(brick).map_or(0, |at| self.versions[at].load(Ordering::Acquire))
+    }
+
+    /// Version of the cut in a brick alone.
+    #[inline]
+    pub fn cut_version(&self, brick: IVec3) -> u32 {
+        self.brick_index(brick).map_or(0, |at| self.cut_versions[at].load(Ordering::Acquire))
+    }
+
+    fn brick_index(&self, brick: IVec3) -> Option<usize> {
         let [bx, by, bz] = self.bricks;
         let inside = brick.cmpge(IVec3::ZERO).all() && brick.cmplt(IVec3::new(bx as i32, by as i32, bz as i32)).all();
-        let at = || brick.x as usize + bx * (brick.y as usize + by * brick.z as usize);
-        if inside { self.versions[at()].load(Ordering::Acquire) } else { 0 }
+        inside.then(|| brick.x as usize + bx * (brick.y as usize + by * brick.z as usize))
+    }
+
+    /// Versions of all bricks.
+    fn all_versions(&self) -> impl Iterator<Item = u32> + '_ {
+        let sum =
+            |(ct, cut): (&AtomicU32, &AtomicU32)| ct.load(Ordering::Acquire).wrapping_add(cut.load(Ordering::Acquire));
+        self.versions.iter().zip(&self.cut_versions).map(sum)
+    }
+
+    /// The last voxel.
+    fn last(&self) -> IVec3 {
+        IVec3::from(self.dims.map(|n| n as i32)) - 1
     }
 
     /// The lowest voxel of a brick.
@@ -242,8 +308,7 @@ impl BoneVolume {
     /// Whether the box from voxel `low` to voxel `high`, inclusive, touches a brick that has ever
     /// held bone.
     pub fn may_hold_bone(&self, low: IVec3, high: IVec3) -> bool {
-        let last = IVec3::new(self.dims[0] as i32, self.dims[1] as i32, self.dims[2] as i32) - 1;
-        let (low, high) = (low.max(IVec3::ZERO), high.min(last));
+        let (low, high) = (low.max(IVec3::ZERO), high.min(self.last()));
         if low.cmpgt(high).any() {
             return false;
         }
@@ -266,7 +331,7 @@ impl BoneVolume {
     /// Creates a reader's record for [`changed`](Self::changed), with everything so far marked as
     /// seen.
     pub fn seen(&self) -> Vec<u32> {
-        self.versions.iter().map(|v| v.load(Ordering::Acquire)).collect()
+        self.all_versions().collect()
     }
 
     /// Calls `visit` with the coordinates of up to `limit` bricks changed since `seen` and marks
@@ -276,8 +341,7 @@ impl BoneVolume {
     pub fn changed(&self, seen: &mut [u32], limit: usize, mut visit: impl FnMut([usize; 3])) -> usize {
         let [bx, by, _] = self.bricks;
         let mut found = 0;
-        for (at, (version, seen)) in self.versions.iter().zip(seen).enumerate() {
-            let now = version.load(Ordering::Acquire);
+        for (at, (now, seen)) in self.all_versions().zip(seen).enumerate() {
             if now != *seen {
                 found += 1;
                 if found <= limit {
@@ -289,10 +353,19 @@ impl BoneVolume {
         found.saturating_sub(limit)
     }
 
-    /// A copy of the current densities, HU.
+    /// A copy of the current densities with what was cut, HU: [`hu`](Self::hu) of every voxel.
     pub fn snapshot(&self) -> VoxelVolume<i16> {
         let mut volume = VoxelVolume::isotropic(self.dims, self.origin, self.spacing_mm, AIR_HU);
-        volume.data.iter_mut().zip(&self.hu).for_each(|(to, from)| *to = from.load(Ordering::Relaxed));
+        let [nx, ny, _] = self.dims;
+        for (row, to) in volume.data.chunks_exact_mut(nx).enumerate() {
+            let start = IVec3::new(0, (row % ny) as i32, (row / ny) as i32);
+            let from = &self.hu[row * nx..][..nx];
+            if self.is_cut_near(self.cut.nodes * start, self.cut.nodes * start.with_x(nx as i32 - 1)) {
+                to.iter_mut().enumerate().for_each(|(x, to)| *to = self.shown(row * nx + x, start.with_x(x as i32)));
+            } else {
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = from.load(Ordering::Relaxed));
+            }
+        }
         volume
     }
 }

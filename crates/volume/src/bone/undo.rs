@@ -1,7 +1,8 @@
 //! Records strokes of the burr and undoes them brick by brick.
 
-use super::{BRICK, BoneVolume};
+use super::{BRICK, BoneVolume, CUT_SURFACE};
 use crate::stroke::Undone;
+use glam::IVec3;
 use std::sync::atomic::{AtomicI16, Ordering};
 use trepan_geometry::Vec3;
 
@@ -41,16 +42,24 @@ impl BoneVolume {
     /// For the writer only; half a microsecond.
     pub fn exchange_brick(&self, n: usize) {
         let Some((brick, copy)) = self.strokes.kept(n) else { return };
-        let low = self.low_of(brick);
-        for (n, copy) in copy.iter().enumerate() {
-            if let Some(at) = self.index(low + Self::within(n)) {
-                // Not an atomic swap, which would lock the bus: there is one writer.
-                let before = copy.load(Ordering::Relaxed);
-                copy.store(self.hu[at].load(Ordering::Relaxed), Ordering::Relaxed);
-                self.hu[at].store(before, Ordering::Relaxed);
+        // Not an atomic swap, which would lock the bus: there is one writer.
+        let exchange = |kept: &AtomicI16, value: &AtomicI16| {
+            let before = kept.load(Ordering::Relaxed);
+            kept.store(value.load(Ordering::Relaxed), Ordering::Relaxed);
+            value.store(before, Ordering::Relaxed);
+        };
+        if let Some(place) = brick.checked_sub(self.versions.len()) {
+            copy.iter().zip(self.cut.values(place)).for_each(|(kept, value)| exchange(kept, value));
+            self.note_cut(self.cut.low_of(place) / BRICK as i32);
+        } else {
+            let low = self.low_of(brick);
+            for (n, kept) in copy.iter().enumerate() {
+                if let Some(at) = self.index(low + Self::within(n)) {
+                    exchange(kept, &self.hu[at]);
+                }
             }
+            self.versions[brick].fetch_add(1, Ordering::Release);
         }
-        self.versions[brick].fetch_add(1, Ordering::Release);
         self.came_back();
     }
 
@@ -58,13 +67,22 @@ impl BoneVolume {
     /// `taken` is true. `near` is called first, with the brick's centre and half diagonal, mm.
     pub fn brings_back(&self, n: usize, near: impl Fn(Vec3, f32) -> bool, taken: impl Fn(Vec3) -> bool) -> bool {
         let Some((brick, copy)) = self.strokes.kept(n) else { return false };
-        let low = self.low_of(brick);
-        let middle = self.centre_of(low) + Vec3::splat(0.5 * (BRICK - 1) as f32 * self.spacing_mm);
-        let half = 0.5 * 3f32.sqrt() * BRICK as f32 * self.spacing_mm;
+        let place = brick.checked_sub(self.versions.len());
+        let low = place.map_or_else(|| self.low_of(brick), |place| self.cut.low_of(place));
+        let edge = place.map_or(self.spacing_mm, |_| self.node_mm());
+        let world = |at: IVec3| self.origin + edge * at.as_vec3();
+        let middle = world(low) + Vec3::splat(0.5 * (BRICK - 1) as f32 * edge);
+        let half = 0.5 * 3f32.sqrt() * BRICK as f32 * edge;
         let comes = |n: usize, copy: &AtomicI16| {
-            let voxel = low + Self::within(n);
-            let gone = copy.load(Ordering::Relaxed) >= self.isovalue && !self.is_bone(voxel);
-            gone && taken(self.centre_of(voxel))
+            let (at, kept) = (low + Self::within(n), copy.load(Ordering::Relaxed));
+            let gone = match place {
+                None => kept >= self.isovalue && !self.is_bone(at),
+                Some(place) => {
+                    let now = self.cut.values(place)[n].load(Ordering::Relaxed);
+                    kept < CUT_SURFACE && now >= CUT_SURFACE && self.ct(at / self.cut.nodes) >= self.isovalue
+                }
+            };
+            gone && taken(world(at))
         };
         near(middle, half) && copy.iter().enumerate().any(|(n, copy)| comes(n, copy))
     }
@@ -94,7 +112,6 @@ impl BoneVolume {
 mod tests {
     use super::*;
     use crate::{AIR_HU, MAX_STROKE_BRICKS, MAX_STROKES, VoxelVolume};
-    use glam::IVec3;
 
     fn block() -> VoxelVolume<i16> {
         let mut volume = VoxelVolume::isotropic([20, 18, 17], Vec3::new(-9.0, 4.0, 1.0), 0.5, AIR_HU);
