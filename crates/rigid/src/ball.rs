@@ -21,7 +21,7 @@ use trepan_geometry::Vec3;
 /// Moves within one set of discs.
 const MAX_SLIDES: usize = 12;
 /// A slide shorter than this is rest.
-const REST: f32 = 2e-4;
+const REST: f32 = 1e-3;
 /// Overlap that each slide takes back: more than rounding brings in.
 const PUSH: f32 = 2e-4;
 

@@ -8,11 +8,12 @@
 //! o = Σ |oᵢ| oᵢ / Σ |oᵢ|         |o| ≤ max |oᵢ|, continuous where a station begins to touch
 //! ```
 //! so that a chain is no stiffer than its balls. The lowest station is blunt: it holds the tool
-//! back where the bone is not open below it. The others cut with the load of their own depth.
+//! back where the bone is not open below it. The others cut with the load of their own depth, each
+//! with the part of the shaft half way to the next: a flat slot.
 //!
 //! ```text
 //!  ║(·)║  cutting_mm above the tip
-//!  ║(·)║     1.4 radii apart: ridges of 0.29 radii
+//!  ║(·)║     1.4 radii apart
 //!  ║(·)║
 //!   (·)   tip: blunt
 //! ```
@@ -47,7 +48,8 @@ impl Chain {
     pub fn new(tool: &Tool, build: impl Fn(&Tool) -> Box<dyn RigidContact>) -> Self {
         let count = ((tool.cutting_mm / (APART * tool.tip_radius_mm.max(1e-3))) as usize + 1).clamp(2, MOST);
         let height = |at: usize| tool.cutting_mm * at as f32 / (count - 1) as f32;
-        let ball = Tool { cutting_mm: 0.0, ..*tool };
+        // Each cuts the part of the shaft half way to the next.
+        let ball = Tool { cutting_mm: height(1) - height(0), ..*tool };
         let stations = (0..count).map(|at| (height(at), build(&ball))).collect();
         Self { stations, proxy: Pose::IDENTITY, each: RigidStep::default() }
     }

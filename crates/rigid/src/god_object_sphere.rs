@@ -3,8 +3,8 @@
 //! # Theory
 //! The centre of a ball of radius r may be where the distance to the bone is at least r. The proxy
 //! is the nearest such place to the device that it can slide to: Zilles and Salisbury's god-object
-//! in the space of centres. The surface is a set of small discs on the crossings of the density
-//! with the isovalue; discs yᵢ, at distance dᵢ in direction gᵢ, give half-spaces
+//! in the space of centres. The surface is a set of small discs where the CT falls under the
+//! isovalue or a tool has cut; discs yᵢ, at distance dᵢ in direction gᵢ, give half-spaces
 //! ```text
 //! gᵢ·c ≥ gᵢ·yᵢ + r        safe: a half-space without the convex disc keeps the ball out of it
 //! ```
@@ -19,23 +19,21 @@
 //! ```
 //!
 //! Projection on a convex set never lengthens a motion, so on flat or convex bone the force changes
-//! by no more than k times the hand's motion. Discs move continuously with the density, also while
-//! it is drilled away; where bone gives way or an edge ends at once the proxy follows at
-//! `yield_mm_per_ms` over the hand's own speed.
+//! by no more than k times the hand's motion. Discs move continuously with the cut; where bone
+//! gives way or an edge ends at once the proxy follows at `yield_mm_per_ms` over the hand's own
+//! speed.
 //!
-//! The ball that touches is a little smaller than the tool while a burr cuts (it sits in what it
-//! cuts), and where the tool is jammed: where its walls push more against each other than against
-//! the pull of the hand. It grows back into free space at once; where it must push itself off the
-//! bone for that, slowly, and only while growing by g moves it by no more than 2.4 g, which is true
-//! on a surface and false in a bore.
+//! The ball that touches is a little smaller than the tool where it is jammed: where its walls
+//! push more against each other than against the pull of the hand. It grows back into free space at
+//! once; where it must push itself off the bone for that, slowly, and only while growing by g moves
+//! it by no more than 2.4 g, which is true on a surface and false in a bore.
 //!
 //! # Practice
-//! World mm, f32. For a 3 mm ball in 0.5 mm voxels about 4 us a tick of touch, 30 when discs are
-//! gathered anew, 20 while drilling: then discs move with the density, and only a voxel that opens
-//! makes them be gathered anew. With `shaft` the contact of the shaft adds its half-spaces
-//! (`lean.rs`), a microsecond. Allocates in `new` only. A ball that starts in bone keeps the
-//! clearance that it has and gains more at `recover_mm_per_ms`. Steps past `max_moves` are left for
-//! the next tick; that, and constraints that contradict, count as fallbacks.
+//! World mm, f32. Discs stand on the nodes of the cut, at most half a millimetre apart
+//! (`local_surface.rs`). With `shaft` the contact of the shaft adds its half-spaces (`lean.rs`), a
+//! microsecond. Allocates in `new` only. A ball that starts in bone keeps the clearance that it has
+//! and gains more at `recover_mm_per_ms`. Steps past `max_moves` are left for the next tick; that,
+//! and constraints that contradict, count as fallbacks.
 //!
 //! # Sources
 //! C. B. Zilles, J. K. Salisbury, IROS 1995; D. Ruspini, K. Kolarov, O. Khatib, *The haptic display
@@ -44,17 +42,18 @@
 //! fields*, IEEE Trans. Haptics 10 (2017), for continuous motion.
 //!
 //! # When not to use it
-//! For tools that are not balls. Where edges sharper than a voxel matter: discs stand out over them
-//! by up to `disc_voxels`.
+//! For tools that are not balls. Where edges of the CT sharper than a node matter: discs stand out
+//! over them by up to `disc_nodes`.
 
 use crate::ball::{Ball, Limits};
+use crate::burr::{Burr, Cut};
 use crate::half_spaces::{HalfSpace, supports};
 use crate::lean::Lean;
+use crate::local_surface::LocalSurface;
 use crate::method::{Descriptor, Extent, Method};
-use crate::removal::{Burr, Cut, RemovalLaw};
+use crate::removal::RemovalLaw;
 use crate::shaft::Shaft;
-use crate::surface::{Disc, Discs};
-use crate::window::Window;
+use crate::surface::Disc;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
 use trepan_geometry::{Aabb, Pose, Tool, ToolState, Vec3};
@@ -62,21 +61,17 @@ use trepan_volume::BoneVolume;
 
 /// Most discs in reach; past it the rest is counted as a fallback.
 const MAX_DISCS: usize = 8192;
-/// Most voxels that a burr bites at once.
-const MAX_BITES: usize = 16384;
-/// Discs this close count as touched, voxels.
+/// Most nodes or voxels that a burr reaches at once.
+const MAX_REACHED: usize = 1 << 17;
+/// Discs this close count as touched, nodes.
 const TOUCH: f32 = 0.05;
-/// Bone in reach of the burr is this near to a disc, voxels.
-const MARGIN_VOXELS: i32 = 2;
-/// Free space that a ball leaves around it when it grows, voxels: more than the unevenness of a
+/// Free space that a ball leaves around it when it grows, nodes: more than the unevenness of a
 /// bore.
-const MARGIN: f32 = 0.2;
+const MARGIN: f32 = 0.1;
 /// A smaller ball would come on by more than 1/JAM of what it is smaller: jammed. That is how many
 /// times the sum of what the walls push exceeds the pull of the hand. 0.4 is between walls less
 /// than 47 degrees apart.
 const JAM: f32 = 0.4;
-/// Overlap of a jammed burr at rest relative to one at work: it leaves the bore that it came in by.
-const RESTING_SLOP: f32 = 1.5;
 /// Growing may move a ball by so many times its growth.
 const PUSHED: f32 = 2.4;
 /// A shaft this far in bone gives way, voxels.
@@ -87,25 +82,20 @@ const ROUNDING_MM: f32 = 1e-4;
 /// How the method is set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// Radius of a disc, voxels. Under 0.71 discs on a plane leave gaps, over which a ball bobs;
-    /// more fattens sharp edges.
-    pub disc_voxels: f32,
-    /// Longest move with one set of discs, voxels. More weighs more discs at each move, less takes
+    /// Radius of a disc, nodes of the cut. Under 0.71 discs on a plane leave gaps, over which a
+    /// ball bobs; more fattens sharp edges.
+    pub disc_nodes: f32,
+    /// Radius of a disc against the shaft, voxels.
+    pub shaft_disc_voxels: f32,
+    /// Longest move with one set of discs, nodes. More weighs more discs at each move, less takes
     /// more moves at speed.
-    pub move_voxels: f32,
-    /// How far the tool may go before discs are gathered anew, voxels. More gathers less often, and
-    /// more discs each time.
-    pub ahead_voxels: f32,
+    pub move_nodes: f32,
     /// Most moves in one tick. What is left of the way is gone in the next tick.
     pub max_moves: u32,
-    /// How deep a burr at work sits in the bone that it cuts, voxels. Its bore is then a little
-    /// wider than what touches, so that it does not lock there. Must be less than `slop_voxels`.
-    pub bite_voxels: f32,
     /// Overlap that a jammed ball may have, voxels: in a bore of its own width the unevenness of
     /// opposite walls would lock it.
     pub slop_voxels: f32,
-    /// How fast the ball sinks in when a burr starts to cut, and grows back, mm/ms. Times the
-    /// stiffness it is a change of force.
+    /// How fast the ball grows back, mm/ms. Times the stiffness it is a change of force.
     pub fit_mm_per_ms: f32,
     /// How fast a ball that has its centre in bone is let out, mm/ms.
     pub recover_mm_per_ms: f32,
@@ -122,11 +112,10 @@ pub struct Config {
 impl Config {
     /// The charted choice.
     pub const RECOMMENDED: Self = Self {
-        disc_voxels: 0.8,
-        move_voxels: 0.25,
-        ahead_voxels: 0.5,
+        disc_nodes: 0.8,
+        shaft_disc_voxels: 0.8,
+        move_nodes: 0.5,
         max_moves: 1024,
-        bite_voxels: 0.15,
         slop_voxels: 0.3,
         fit_mm_per_ms: 0.01,
         recover_mm_per_ms: 0.05,
@@ -167,9 +156,9 @@ pub struct GodObjectSphere {
     sure: (Vec3, f32),
     /// Which bone the window shows.
     seen: Option<Seen>,
-    window: Window,
-    known: Known,
-    discs: Discs,
+    surface: LocalSurface,
+    /// Whether the ball was clear of bone, so that nothing needs to be looked for inside it.
+    clear: bool,
     lean: Lean,
     near: Vec<Disc>,
     /// What the burr alone is pushed, mm: what it cuts with.
@@ -189,21 +178,6 @@ struct Seen {
     undone: u32,
 }
 
-/// What the discs at hand are good for.
-#[derive(Clone, Copy, Debug, Default)]
-struct Known {
-    /// Whether the edges that cross are those of the bone as it is now.
-    fresh: bool,
-    /// Whether densities have changed since the discs were put on them.
-    worn: bool,
-    /// Grid point around which they were gathered.
-    centre: Vec3,
-    /// How far from there they are good for, voxels.
-    ahead: f32,
-    /// Whether the ball was clear of bone there, so that nothing needs to be looked for inside it.
-    clear: bool,
-}
-
 impl GodObjectSphere {
     /// A ball of the tool's tip. Until [`reset`](RigidContact::reset) puts it somewhere it starts
     /// at the first tool pose.
@@ -221,15 +195,14 @@ impl GodObjectSphere {
             left_mm: 0.0,
             sure: (Vec3::ZERO, 0.0),
             seen: None,
-            window: Window::new(),
-            known: Known::default(),
-            discs: Discs::new(MAX_DISCS, config.disc_voxels),
-            lean: Lean::new(if config.shaft { MAX_DISCS } else { 0 }, config.disc_voxels),
-            near: Vec::with_capacity(2 * MAX_DISCS),
+            surface: LocalSurface::new(MAX_DISCS, config.disc_nodes),
+            clear: false,
+            lean: Lean::new(if config.shaft { MAX_DISCS } else { 0 }, config.shaft_disc_voxels),
+            near: Vec::with_capacity(3 * MAX_DISCS),
             pressed: Vec3::ZERO,
-            arms: Vec::with_capacity(2 * MAX_DISCS),
-            spaces: Vec::with_capacity(2 * MAX_DISCS),
-            burr: Burr::new(config.removal, MAX_BITES),
+            arms: Vec::with_capacity(3 * MAX_DISCS),
+            spaces: Vec::with_capacity(3 * MAX_DISCS),
+            burr: Burr::new(config.removal, MAX_REACHED),
         }
     }
 
@@ -238,53 +211,39 @@ impl GodObjectSphere {
         let this = Some(Seen { bone: bone.id(), undone: bone.undone() });
         if self.seen != this {
             self.seen = this;
-            self.known = Known::default();
-            self.window.forget();
-            self.discs.renew();
+            self.clear = false;
+            self.surface.forget();
             self.lean.renew();
         }
-        if self.window.renew(bone) {
-            self.known.fresh = false;
-            self.discs.renew();
+        if self.surface.look_at(bone) {
             self.lean.renew();
         }
-    }
-
-    /// How deep a burr at work sits in the bone, mm.
-    fn bite_mm(&self, bone: &BoneVolume) -> f32 {
-        let most = (self.config.bite_voxels * bone.spacing_mm()).min(0.5 * self.tool.tip_radius_mm);
-        if self.works { most } else { 0.0 }
     }
 
     /// The ball at the proxy.
     fn ball(&self, bone: &BoneVolume) -> Ball {
-        let inside = bone.is_bone(bone.voxel_of(self.proxy.translation));
+        let inside = bone.holds(self.proxy.translation);
         // Seen from the tip.
-        let shaft = Shaft::of(&self.tool, bone, Vec3::ZERO, self.proxy.rotation * Vec3::Z);
-        Ball { radius: self.ball_mm / bone.spacing_mm(), inside, shaft }
+        let shaft = Shaft::of(&self.tool, bone.node_mm(), Vec3::ZERO, self.proxy.rotation * Vec3::Z);
+        Ball { radius: self.ball_mm / bone.node_mm(), inside, shaft }
     }
 
-    /// Lets the ball become smaller where it works or is jammed, at a rate that a hand does not
-    /// feel as a jump.
+    /// Lets the ball become smaller where it is jammed, at a rate that a hand does not feel as a
+    /// jump.
     fn shrink(&mut self, bone: &BoneVolume, dt_ms: f32) {
         let radius = self.tool.tip_radius_mm;
-        let (least, rate) = if self.jammed {
-            let share = if self.works { 1.0 } else { RESTING_SLOP };
-            let slop = share * self.config.slop_voxels * bone.spacing_mm();
-            ((radius - slop).max(0.5 * radius), self.config.yield_mm_per_ms)
-        } else {
-            (radius - self.bite_mm(bone), self.config.fit_mm_per_ms)
-        };
-        if self.ball_mm > least {
-            self.ball_mm = least.max(self.ball_mm - rate * dt_ms);
+        let least = (radius - self.config.slop_voxels * bone.spacing_mm()).max(0.5 * radius);
+        // A burr at work cuts itself free.
+        if self.jammed && !self.works && self.ball_mm > least {
+            self.ball_mm = least.max(self.ball_mm - self.config.yield_mm_per_ms * dt_ms);
         }
     }
 
     /// Lets the ball that rests grow back into free space, or by pushing itself off a surface.
     fn grow(&mut self, bone: &BoneVolume, motion: Vec3, dt_ms: f32) {
-        let (spacing, full) = (bone.spacing_mm(), self.tool.tip_radius_mm - self.bite_mm(bone));
-        let base = self.discs.base.as_vec3();
-        let grid = bone.grid_of(self.proxy.translation);
+        let (spacing, full) = (bone.node_mm(), self.tool.tip_radius_mm);
+        let base = self.surface.base();
+        let grid = bone.node_at(self.proxy.translation);
         let ball = self.ball(bone);
         if self.ball_mm >= full && !ball.inside {
             return;
@@ -297,7 +256,7 @@ impl GodObjectSphere {
         let rate = if ball.inside { self.config.recover_mm_per_ms } else { self.config.fit_mm_per_ms };
         let growth = rate * dt_ms / spacing;
         let grown = Ball { radius: (self.ball_mm / spacing + growth).min(full / spacing), ..ball };
-        let (from, goal) = (grid - base, bone.grid_of(self.hand) - base);
+        let (from, goal) = (grid - base, bone.node_at(self.hand) - base);
         let Some(to) = grown.settle(&self.near, &mut self.spaces, from, goal, (growth, 0.0)) else { return };
         let push = to - from;
         let most = (PUSHED * growth).min(self.left_mm / spacing);
@@ -319,9 +278,9 @@ impl GodObjectSphere {
             self.proxy.translation = device;
             self.ball_mm = self.tool.tip_radius_mm;
             self.near.clear();
-            self.discs.forget();
-            self.sure = (bone.grid_of(device), f32::MAX);
-            self.known = Known { fresh: false, clear: true, ..self.known };
+            self.surface.leave();
+            self.sure = (bone.node_at(device), f32::MAX);
+            self.clear = true;
             return true;
         }
         self.give_way(bone, dt_ms, out);
@@ -336,17 +295,17 @@ impl GodObjectSphere {
 
     /// One move within what is known of the surface. Returns whether the proxy has come to rest.
     fn advance(&mut self, bone: &BoneVolume, device: Vec3, out: &mut RigidStep) -> bool {
-        let spacing = bone.spacing_mm();
-        let start = bone.grid_of(self.proxy.translation);
+        let spacing = bone.node_mm();
+        let start = bone.node_at(self.proxy.translation);
         if !self.know(bone, start, out) {
             return true;
         }
-        let base = self.discs.base.as_vec3();
-        let (from, goal) = (start - base, bone.grid_of(device) - base);
-        let (ball, reach, full) = (self.ball(bone), self.config.move_voxels, self.tool.tip_radius_mm / spacing);
+        let base = self.surface.base();
+        let (from, goal) = (start - base, bone.node_at(device) - base);
+        let (ball, reach, full) = (self.ball(bone), self.config.move_nodes, self.tool.tip_radius_mm / spacing);
         let nearest = self.select(bone, &ball, from, out);
         self.sure = (start, full + reach);
-        self.known.clear = nearest > full - 0.5;
+        self.clear = nearest > full - 0.5;
         let limits = Limits { reach, way: self.left_mm / spacing };
         let slide = ball.slide(&self.near, &mut self.spaces, from, goal, limits);
         self.left_mm = (self.left_mm - slide.way * spacing).max(0.0);
@@ -362,10 +321,9 @@ impl GodObjectSphere {
     /// The discs near the tool with its ball at `from`. Returns the distance of the nearest from
     /// the ball's centre.
     fn select(&mut self, bone: &BoneVolume, ball: &Ball, from: Vec3, out: &mut RigidStep) -> f32 {
-        let (base, reach) = (self.discs.base.as_vec3(), self.config.move_voxels);
-        let full = self.tool.tip_radius_mm / bone.spacing_mm();
-        self.discs.shape(&self.window, |_| from, full + reach);
-        let nearest = ball.select(self.discs.list(), from, full, reach, &mut self.near);
+        let (base, reach) = (self.surface.base(), self.config.move_nodes);
+        let full = self.tool.tip_radius_mm / bone.node_mm();
+        let nearest = ball.select(self.surface.shaped(from, full + reach), from, full, reach, &mut self.near);
         if self.config.shaft {
             let shaft = Shaft { start: base + from, ..ball.shaft };
             self.lean.select(bone, &shaft, reach, base, &mut self.near, out);
@@ -375,11 +333,11 @@ impl GodObjectSphere {
 
     /// Moves the tip aside where the turning hand has pressed the shaft into bone.
     fn give_way(&mut self, bone: &BoneVolume, dt_ms: f32, out: &mut RigidStep) {
-        let (spacing, start) = (bone.spacing_mm(), bone.grid_of(self.proxy.translation));
+        let (spacing, start) = (bone.node_mm(), bone.node_at(self.proxy.translation));
         if !self.config.shaft || !self.know(bone, start, out) {
             return;
         }
-        let base = self.discs.base.as_vec3();
+        let base = self.surface.base();
         let (ball, from) = (self.ball(bone), start - base);
         self.select(bone, &ball, from, out);
         let pressed = |disc: &Disc| disc.shaft && ball.nearest(disc, from).distance < ball.shaft.radius - PRESSED;
@@ -393,32 +351,10 @@ impl GodObjectSphere {
         }
     }
 
-    /// Makes sure that all discs in reach of the ball at grid point `at` are known; false when the
-    /// ball is too large for that.
+    /// Makes sure that all discs in reach of the ball at node `at` are known; false when the ball
+    /// is too large for that.
     fn know(&mut self, bone: &BoneVolume, at: Vec3, out: &mut RigidStep) -> bool {
-        let reach = self.config.move_voxels;
-        if self.known.fresh && at.distance(self.known.centre) <= self.known.ahead {
-            if self.known.worn {
-                let full = self.tool.tip_radius_mm / bone.spacing_mm();
-                self.discs.refresh(&self.window, at - self.discs.base.as_vec3(), full + reach);
-                self.known.worn = false;
-                out.voxels_swept += self.discs.visited;
-            }
-            return true;
-        }
-        let ahead = self.config.ahead_voxels;
-        let radius = self.tool.tip_radius_mm / bone.spacing_mm();
-        let far = radius + reach + ahead + self.config.disc_voxels;
-        let Some(read) = self.window.cover(bone, at.round().as_ivec3(), far.ceil() as i32 + 3) else {
-            out.fallbacks += 1;
-            return false;
-        };
-        let hollow = if self.known.clear { radius - ahead - 1.0 } else { 0.0 };
-        self.discs.gather(&self.window, at, hollow, far);
-        self.known = Known { fresh: true, worn: false, centre: at, ahead, clear: self.known.clear };
-        out.voxels_swept += read + self.discs.visited;
-        out.fallbacks += u32::from(self.discs.overflow > 0);
-        true
+        self.surface.know(bone, &self.tool, at, (self.config.move_nodes, self.clear), out)
     }
 
     /// Fills the manifold from where proxy and device are.
@@ -429,9 +365,9 @@ impl GodObjectSphere {
         if depth == 0.0 {
             return;
         }
-        let (spacing, radius) = (bone.spacing_mm(), self.ball_mm);
-        let base = self.discs.base.as_vec3();
-        let centre = bone.grid_of(self.proxy.translation) - base;
+        let (spacing, radius) = (bone.node_mm(), self.ball_mm);
+        let base = self.surface.base();
+        let centre = bone.node_at(self.proxy.translation) - base;
         let ball = Ball { inside: false, ..self.ball(bone) };
         let mut leans = false;
         self.spaces.clear();
@@ -449,7 +385,7 @@ impl GodObjectSphere {
                 out.manifold.push(Contact { point, normal: near.direction, depth_mm: deep.max(0.0) });
             }
         }
-        out.voxels_in_contact = out.points_in_contact.min(self.discs.voxels);
+        out.voxels_in_contact = out.points_in_contact.min(self.surface.owners());
         out.manifold.normal = lifted / depth;
         out.manifold.depth_mm = depth;
         out.manifold.point = self.proxy.translation - radius * out.manifold.normal;
@@ -494,26 +430,18 @@ impl RigidContact for GodObjectSphere {
         self.report(bone, device, out);
         if self.works {
             let (proxy, radius_mm) = (self.proxy.translation, self.tool.tip_radius_mm);
-            let depth_mm = self.pressed.length() + (radius_mm - self.ball_mm).min(self.bite_mm(bone));
-            if self.discs.list().is_empty() {
-                return;
+            let depth_mm = self.pressed.length();
+            let side = self.proxy.rotation * (0.5 * self.tool.cutting_mm * Vec3::Z);
+            let cut = Cut { device: proxy - self.pressed, proxy, radius_mm, side, depth_mm, dt_ms };
+            self.burr.cut(bone, &cut, &mut self.surface.nodes, out);
+            if self.burr.changed() {
+                self.surface.cut(self.burr.opened());
             }
-            let within = self.discs.bounds(MARGIN_VOXELS);
-            let cut = Cut { device: proxy - self.pressed, proxy, radius_mm, depth_mm, dt_ms, within };
-            let window = &self.window;
-            let read = |voxel| {
-                let row = window.row(voxel);
-                move |x| row.hu(x)
-            };
-            self.burr.cut(bone, &cut, read, out);
-            for voxel in self.burr.bitten() {
-                self.window.set(bone, voxel);
-            }
-            self.known.worn = true;
-            self.known.fresh &= !self.burr.opened();
             if self.config.shaft && self.burr.opened() {
                 self.lean.opened(radius_mm / bone.spacing_mm() + 4.0);
             }
+        } else {
+            self.burr.rest();
         }
     }
 
@@ -526,9 +454,8 @@ impl RigidContact for GodObjectSphere {
         self.placed = pose.translation.is_finite();
         (self.ball_mm, self.jammed) = (self.tool.tip_radius_mm, false);
         (self.hand, self.left_mm) = (pose.translation, 0.0);
-        self.known = Known::default();
-        self.window.forget();
-        self.discs.renew();
+        self.clear = false;
+        self.surface.forget();
         self.lean.renew();
         self.near.clear();
         self.burr.reset();

@@ -50,8 +50,8 @@ impl Lean {
         }
     }
 
-    /// Adds the discs that `shaft`, in grid coordinates, has within `reach` to `near`, in the frame
-    /// shifted to `base`.
+    /// Adds the discs that `shaft` has within `reach` to `near`, in the frame shifted to `base`;
+    /// all in nodes of the cut.
     pub fn select(
         &mut self,
         bone: &BoneVolume,
@@ -61,6 +61,8 @@ impl Lean {
         near: &mut Vec<Disc>,
         out: &mut RigidStep,
     ) {
+        let nodes = bone.cut_nodes() as f32;
+        let (shaft, reach) = (&shaft.scaled(1.0 / nodes), reach / nodes);
         let still = |(start, axis): (Vec3, Vec3)| {
             start.distance(shaft.start) + shaft.span.1 * axis.distance(shaft.axis) <= AHEAD
         };
@@ -77,7 +79,7 @@ impl Lean {
         let within = |disc: &&Disc| disc.centre.distance(axis_near(disc.centre)) - disc.radius <= far;
         for disc in self.discs.list().iter().filter(within) {
             if near.len() < near.capacity() {
-                near.push(Disc { centre: disc.centre + own - base, ..*disc });
+                near.push(Disc { centre: nodes * (disc.centre + own) - base, radius: nodes * disc.radius, ..*disc });
             } else {
                 out.fallbacks += 1;
             }

@@ -45,12 +45,16 @@
 mod readme {}
 
 mod ball;
+mod burr;
 mod chain;
+mod cut_ball;
 pub mod god_object_sphere;
 mod half_spaces;
 mod lean;
 mod list;
+mod local_surface;
 mod method;
+mod nodes;
 pub mod removal;
 pub mod rivals;
 mod rows;

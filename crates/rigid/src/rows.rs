@@ -30,23 +30,14 @@ impl GridBall {
     }
 }
 
-/// A box that bounds nothing, lowest and highest voxel.
-pub(crate) const EVERYWHERE: (IVec3, IVec3) = (IVec3::splat(i32::MIN), IVec3::splat(i32::MAX));
-
 /// Calls `visit` with the first voxel and the last x of every row of `ball` without `hole`.
-pub(crate) fn rows(ball: GridBall, hole: GridBall, visit: impl FnMut(IVec3, i32)) {
-    rows_within(ball, hole, EVERYWHERE, visit);
-}
-
-/// As [`rows`], but only the rows through a box, whole, and none outside its x.
-pub(crate) fn rows_within(ball: GridBall, hole: GridBall, within: (IVec3, IVec3), mut visit: impl FnMut(IVec3, i32)) {
+pub(crate) fn rows(ball: GridBall, hole: GridBall, mut visit: impl FnMut(IVec3, i32)) {
     let (low, high) = ((ball.centre - ball.radius).ceil().as_ivec3(), (ball.centre + ball.radius).floor().as_ivec3());
-    let (low, high) = (low.max(within.0), high.min(within.1));
     for k in low.z..=high.z {
         for j in low.y..=high.y {
             let Some(half) = ball.half(j, k) else { continue };
-            let from = ceil(ball.centre.x - half).max(low.x);
-            let to = floor(ball.centre.x + half).min(high.x);
+            let from = ceil(ball.centre.x - half);
+            let to = floor(ball.centre.x + half);
             match hole.half(j, k) {
                 Some(skip) => {
                     let (skip_from, skip_to) = (ceil(hole.centre.x - skip), floor(hole.centre.x + skip));

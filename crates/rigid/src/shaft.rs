@@ -36,12 +36,18 @@ pub(crate) struct Shaft {
 }
 
 impl Shaft {
-    /// The shaft of a tool whose tip is at `start`, with its unit `axis`.
-    pub fn of(tool: &Tool, bone: &BoneVolume, start: Vec3, axis: Vec3) -> Self {
+    /// The shaft of a tool with its tip at `start` and its unit `axis`, on a grid of this spacing.
+    pub fn of(tool: &Tool, spacing: f32, start: Vec3, axis: Vec3) -> Self {
         let &Tool { tip_radius_mm, shaft_radius_mm, shaft_length_mm, .. } = tool;
-        let spacing = bone.spacing_mm();
         let span = (tip_radius_mm / spacing, shaft_length_mm.max(tip_radius_mm) / spacing);
         Self { start, axis, span, radius: shaft_radius_mm / spacing }
+    }
+
+    /// The shaft in another unit of length, of which there are `factor` in one of this.
+    pub fn scaled(&self, factor: f32) -> Self {
+        let (from, to) = self.span;
+        let span = (factor * from, factor * to);
+        Self { start: factor * self.start, span, radius: factor * self.radius, ..*self }
     }
 
     /// Place along the shaft of what is nearest to `point`.

@@ -1,33 +1,36 @@
 //! The bone's surface near a point as a set of small discs.
 //!
 //! # Theory
-//! Where a grid edge joins a bone voxel (density ≥ isovalue) to one that is not, the density,
-//! linear along the edge, crosses the isovalue at `x`. There stands a disc. Its normal n starts as
-//! the gradient of the density's quadratic B-spline, and is then that of the plane which fits the
-//! densities h of the 27 voxels around best that lie within a voxel of n's plane:
+//! Where a grid edge joins a cell of bone to one that is not, a field ends the bone at `x`: the
+//! density, linear along the edge, falls under the isovalue, or the cut, a cubic along the edge,
+//! rises over its surface. There stands a disc. The normal n of one on the density starts as the
+//! gradient of the density's quadratic B-spline, and is then that of the plane which fits the
+//! densities h of the 27 cells around best that lie within a cell of n's plane:
 //! ```text
 //! minimise Σ w (h - iso + g·d)² ,   w = B(d) · max(0, 1 - (n·d)²)
-//! d: from x to the voxel,  n = g/|g|
+//! d: from x to the cell,  n = g/|g|
 //! ```
 //! What is further off is flat bone or flat air, and its gradient that of the grid's corners: the
-//! spline alone is up to 2.6 degrees off on planes, the fit 0.3. All of it is continuous, so that
-//! nothing jumps at voxel borders. The distance to a set of discs is 1-Lipschitz by construction,
-//! and each disc is convex: a half-space that just leaves the disc out is a safe constraint.
+//! spline alone is up to 2.6 degrees off on planes, the fit 0.3. The cut is a distance: the normal
+//! is its slope. In a hole of 3 mm on nodes of 0.5 mm the discs lie within 0.5 um of the ball that
+//! cut it. All of it is continuous, so that nothing jumps at borders of cells. The distance to a
+//! set of discs is 1-Lipschitz by construction, and each disc is convex: a half-space that just
+//! leaves the disc out is a safe constraint.
 //!
 //! ```text
-//!   ·    ·    ·    ·      · air voxel, • bone voxel
+//!   ·    ·    ·    ·      · air, • bone
 //!   ── ── ─── ──  ──      discs on the edges that cross
 //!   •    •    •    •
 //! ```
 //!
-//! A wall one voxel thick still has its crossings, which a smoothed isosurface would lose.
+//! A disc ends where the other field ends the bone, so that none stands out over the rim of a hole.
+//! Edges that a cut only grazes have none: there is a steeper edge nearby. A wall one voxel thick
+//! still has its crossings, which a smoothed isosurface would lose.
 //!
 //! # Practice
-//! Lengths are voxels, in a frame shifted to a whole voxel near the tool ([`Discs::base`]). The
-//! cost is one load per voxel visited, six per bone voxel, 27 per disc that the tool can reach: 3
-//! to 20 us for a ball of 12 voxels. A disc that was there before keeps its normal; while density
-//! goes away the discs move at each tick, and every fourth is turned. The capacity is fixed; what
-//! does not fit is counted.
+//! Lengths are cells, in a frame shifted to a whole cell near the tool ([`Discs::base`]). Bone is
+//! found 8 cells at once; a disc costs some 30 ns. One that was there before keeps its normal for a
+//! few gatherings. The capacity is fixed; what does not fit is counted.
 
 use crate::rows::{GridBall, rows};
 use crate::shaft::Shaft;
@@ -37,7 +40,7 @@ use trepan_geometry::Vec3;
 use trepan_volume::BoneVolume;
 
 /// Density differences past this many HU from the isovalue do not bend a normal further.
-const CLAMP_HU: i32 = 1000;
+const CLAMP_HU: f32 = 1000.0;
 
 /// How far the rim of a disc may stand out over a surface that bends away, voxels.
 const STAND_OUT: f32 = 0.05;
@@ -48,6 +51,15 @@ const TURNS: u32 = 4;
 const CACHE: usize = 4096;
 /// Cosine of the most that a fit may turn the slope's own normal.
 const SAME: f32 = 0.8;
+/// Fall of the cut along an edge under which a steeper edge is nearby, HU. The cosine of a
+/// surface's angle with one of the axes is at least 0.58.
+const GRAZED: f32 = 500.0;
+/// Slope of the cut along an edge that counts as steep, HU a cell.
+const STEEP: f32 = -300.0;
+/// Radius of a disc on the cut, cells. A wider one, a little tilted, would stand out in a hollow.
+const CUT_DISC: f32 = 0.1;
+/// Density over the isovalue at which the surface is further than a disc reaches, HU.
+const FAR_HU: f32 = 800.0;
 /// Smallest disc, voxels.
 const SMALLEST: f32 = 0.2;
 
@@ -67,40 +79,77 @@ pub(crate) struct Disc {
     pub shaft: bool,
 }
 
-/// Where densities are read from.
-pub(crate) trait Densities {
-    /// Density from which a voxel is bone, HU.
-    fn isovalue(&self) -> i16;
-    /// Density of a voxel, HU.
-    fn hu(&self, voxel: IVec3) -> i16;
-    /// Densities of a voxel and the next two along x, HU.
-    fn three(&self, voxel: IVec3) -> [i16; 3] {
-        core::array::from_fn(|i| self.hu(voxel.with_x(voxel.x + i as i32)))
+/// Where the surface is read from: one or two fields on the cells of a grid, bone where all of
+/// them are over their borders.
+pub(crate) trait Solid {
+    /// How far a cell is over the border of bone in a field, HU or 1000 a node.
+    fn over(&self, field: Field, cell: IVec3) -> f32;
+    /// The same of a cell and the next two along x.
+    fn three_over(&self, field: Field, cell: IVec3) -> [f32; 3] {
+        core::array::from_fn(|i| self.over(field, cell.with_x(cell.x + i as i32)))
+    }
+    /// Whether a cell is bone.
+    fn is_bone(&self, cell: IVec3) -> bool;
+    /// One bit for each of `count` cells along x from `start` that is bone, at most 128.
+    fn bone_bits(&self, start: IVec3, count: i32) -> u128 {
+        (0..count).fold(0, |bits, i| bits | u128::from(self.is_bone(start.with_x(start.x + i))) << i)
+    }
+    /// Whether there is a cut beside the densities.
+    const CUT: bool = false;
+}
+
+/// Which field bounds the bone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Field {
+    /// The CT.
+    #[default]
+    Density,
+    /// What tools have cut.
+    Cut,
+}
+
+/// CT and cut on the nodes of the cut.
+pub(crate) struct Fine<'a> {
+    pub density: &'a Window,
+    pub cut: &'a Window,
+}
+
+impl Solid for Fine<'_> {
+    const CUT: bool = true;
+
+    fn over(&self, field: Field, cell: IVec3) -> f32 {
+        match field {
+            Field::Density => self.density.over(cell),
+            Field::Cut => self.cut.over(cell),
+        }
+    }
+
+    fn three_over(&self, field: Field, cell: IVec3) -> [f32; 3] {
+        match field {
+            Field::Density => self.density.three_over(cell),
+            Field::Cut => self.cut.three_over(cell),
+        }
+    }
+
+    fn is_bone(&self, cell: IVec3) -> bool {
+        self.cut.at(cell) < self.cut.border() && self.density.at(cell) >= self.density.border()
+    }
+
+    fn bone_bits(&self, start: IVec3, count: i32) -> u128 {
+        let border = self.cut.border();
+        let uncut = self.cut.bits(start, count, |cell| cell < border);
+        if uncut == 0 { 0 } else { uncut & self.density.bits(start, count, |cell| cell >= self.density.border()) }
     }
 }
 
-impl Densities for Window {
-    fn isovalue(&self) -> i16 {
-        self.isovalue
+/// The voxels with what was cut from them.
+impl Solid for BoneVolume {
+    fn over(&self, _: Field, cell: IVec3) -> f32 {
+        f32::from(self.hu(cell)) - f32::from(self.isovalue())
     }
 
-    fn hu(&self, voxel: IVec3) -> i16 {
-        Window::hu(self, voxel)
-    }
-
-    fn three(&self, voxel: IVec3) -> [i16; 3] {
-        let row = self.row(voxel);
-        [row.hu(voxel.x), row.hu(voxel.x + 1), row.hu(voxel.x + 2)]
-    }
-}
-
-impl Densities for BoneVolume {
-    fn isovalue(&self) -> i16 {
-        BoneVolume::isovalue(self)
-    }
-
-    fn hu(&self, voxel: IVec3) -> i16 {
-        BoneVolume::hu(self, voxel)
+    fn is_bone(&self, cell: IVec3) -> bool {
+        BoneVolume::is_bone(self, cell)
     }
 }
 
@@ -115,14 +164,14 @@ pub(crate) struct Discs {
     pub voxels: u32,
     /// Discs that did not fit.
     pub overflow: u32,
-    /// Lowest and highest voxel, from [`Self::base`], at an end of a disc's edge.
-    bounds: (IVec3, IVec3),
     list: Vec<Disc>,
     /// The edge on which each disc stands.
     edges: Vec<Edge>,
     /// Discs of before, by edge: a tool that moves on meets most of them again.
     before: Vec<Before>,
-    /// How often discs have been refreshed.
+    /// Bone in the rows around the tool, a bit a cell.
+    bones: Vec<u128>,
+    /// How often discs have been gathered or refreshed.
     wear: u32,
     limit: usize,
     radius: f32,
@@ -135,6 +184,8 @@ struct Edge {
     voxel: IVec3,
     /// Which of its neighbours.
     to: u8,
+    /// What bounds the bone there.
+    field: Field,
     /// Whether the disc has its normal yet.
     shaped: bool,
 }
@@ -172,7 +223,8 @@ impl Discs {
     pub fn new(limit: usize, radius: f32) -> Self {
         let (list, edges, before) =
             (Vec::with_capacity(limit), Vec::with_capacity(limit), vec![Before::default(); CACHE]);
-        Self { bounds: (IVec3::MAX, IVec3::MIN), list, edges, before, limit, radius, ..Self::default() }
+        let bones = Vec::with_capacity(1 << 14);
+        Self { bones, list, edges, before, limit, radius, ..Self::default() }
     }
 
     /// Drops all discs.
@@ -180,13 +232,6 @@ impl Discs {
         self.list.clear();
         self.edges.clear();
         (self.visited, self.voxels, self.overflow) = (0, 0, 0);
-        self.bounds = (IVec3::MAX, IVec3::MIN);
-    }
-
-    /// The box in the grid that holds all bone and air within `margin` voxels of a disc; there must
-    /// be one.
-    pub fn bounds(&self, margin: i32) -> (IVec3, IVec3) {
-        (self.bounds.0 + self.base - margin, self.bounds.1 + self.base + margin)
     }
 
     /// Drops all discs and what is remembered of earlier ones: the bone is another.
@@ -202,29 +247,68 @@ impl Discs {
 
     /// Finds the discs whose centres are at most `reach` voxels from grid point `at`. Voxels nearer
     /// than `hollow` are not looked at. The window must hold all voxels up to `reach` and two more.
-    pub fn gather(&mut self, window: &Window, at: Vec3, hollow: f32, reach: f32) {
+    pub fn gather(&mut self, solid: &impl Solid, at: Vec3, hollow: f32, reach: f32) {
         self.forget();
+        self.wear = self.wear.wrapping_add(1);
         self.base = at.round().as_ivec3();
         let centre = at - self.base.as_vec3();
         // A bone voxel is up to one voxel behind its crossing.
         let (hollow, outer) = (hollow - 1.0, reach + 1.0);
+        let edge = (outer + 1.5).ceil() as i32;
+        let (low, count) = (-edge, 2 * edge + 1);
+        let mut bones = core::mem::take(&mut self.bones);
+        bones.clear();
+        for k in low..=edge {
+            for j in low..=edge {
+                let across = (j as f32 - centre.y).powi(2) + (k as f32 - centre.z).powi(2);
+                let near = across <= (outer + 1.5) * (outer + 1.5);
+                bones.push(if near { solid.bone_bits(self.base + IVec3::new(low, j, k), count) } else { 0 });
+            }
+        }
+        let at = |j: i32, k: i32| ((k - low) * count + (j - low)) as usize;
         rows(GridBall { centre, radius: outer }, GridBall { centre, radius: hollow }, |start, to| {
-            self.row(window, start, to, centre, reach);
+            self.visited += (to - start.x + 1).max(0) as u32;
+            let here = at(start.y, start.z);
+            let span = !(!0u128 << (to - start.x + 1).max(0)) << (start.x - low);
+            let bone = bones[here];
+            let own = bone & span;
+            if own == 0 {
+                return;
+            }
+            let air = [
+                bone >> 1,
+                bone << 1,
+                bones[here + 1],
+                bones[here - 1],
+                bones[here + count as usize],
+                bones[here - count as usize],
+            ];
+            for (to, beside) in (0..).zip(air) {
+                let mut ends = own & !beside;
+                while ends != 0 {
+                    let local = start.with_x(low + ends.trailing_zeros() as i32);
+                    ends &= ends - 1;
+                    let within = |x: Vec3| x.distance_squared(centre) <= reach * reach;
+                    self.edge(solid, local, to, within, false);
+                }
+            }
         });
+        self.bones = bones;
     }
 
     /// Moves the discs to where the crossings are now, and turns some to their normals. It turns
     /// one in [`TURNS`] of those with a point within `reach` of `centre`. The edges that cross must
     /// be the same as when they were gathered.
-    pub fn refresh(&mut self, window: &Window, centre: Vec3, reach: f32) {
+    pub fn refresh(&mut self, solid: &impl Solid, centre: Vec3, reach: f32) {
         self.visited = self.list.len() as u32;
         self.wear = self.wear.wrapping_add(1);
-        for (known, edge) in self.list.iter_mut().zip(&self.edges) {
+        for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
             let step = NEIGHBOURS[usize::from(edge.to)];
-            let x = crossing(window, self.base, edge.voxel, step);
+            let (x, field) = crossing(solid, self.base, edge.voxel, step);
+            edge.field = field;
             let turn = (slot(key(self.base, edge)) as u32).wrapping_add(self.wear).is_multiple_of(TURNS);
             if edge.shaped && turn && x.distance_squared(centre) <= (reach + known.radius).powi(2) {
-                *known = disc(window, self.base, x, step.as_vec3(), self.radius);
+                *known = disc(solid, self.base, (x, field), step.as_vec3(), self.radius);
                 keep(&mut self.before, self.base, edge, known, self.wear);
             } else {
                 known.centre = x;
@@ -235,7 +319,7 @@ impl Discs {
     /// Computes the normals of the discs that have a point within `reach` of the tool. The tool's
     /// part nearest to a place is at `centre`, voxels from [`Self::base`]. The others are of no
     /// use.
-    pub fn shape(&mut self, densities: &impl Densities, centre: impl Fn(Vec3) -> Vec3, reach: f32) {
+    pub fn shape(&mut self, solid: &impl Solid, centre: impl Fn(Vec3) -> Vec3, reach: f32) {
         for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
             let apart = known.centre.distance_squared(centre(known.centre));
             if !edge.shaped && apart <= (reach + known.radius).powi(2) {
@@ -246,7 +330,7 @@ impl Discs {
                 } else {
                     *known = Disc {
                         shaft: known.shaft,
-                        ..disc(densities, self.base, known.centre, known.normal, self.radius)
+                        ..disc(solid, self.base, (known.centre, edge.field), known.normal, self.radius)
                     };
                     keep(&mut self.before, self.base, edge, known, self.wear);
                 }
@@ -267,53 +351,103 @@ impl Discs {
         });
     }
 
-    /// The voxels of one row, from `start` to x = `to`.
-    fn row(&mut self, window: &Window, start: IVec3, to: i32, centre: Vec3, reach: f32) {
-        let row = window.row(self.base + start);
-        for i in start.x..=to {
-            let hu = row.hu(self.base.x + i);
-            if hu >= window.isovalue {
-                let within = |x: Vec3| x.distance_squared(centre) <= reach * reach;
-                self.voxel(window, start.with_x(i), within, false);
-            }
-        }
-        self.visited += (to - start.x + 1).max(0) as u32;
-    }
-
     /// The crossings around one bone voxel that are `within` reach of the tool.
-    fn voxel(&mut self, window: &impl Densities, local: IVec3, within: impl Fn(Vec3) -> bool, shaft: bool) {
-        let before = self.list.len();
+    fn voxel(&mut self, solid: &impl Solid, local: IVec3, within: impl Fn(Vec3) -> bool, shaft: bool) {
         for (to, step) in (0..).zip(NEIGHBOURS) {
-            if window.hu(self.base + local + step) >= window.isovalue() {
-                continue;
+            if !solid.is_bone(self.base + local + step) {
+                self.edge(solid, local, to, &within, shaft);
             }
-            let x = crossing(window, self.base, local, step);
-            if !within(x) {
-                continue;
-            }
-            if self.list.len() == self.limit {
-                self.overflow += 1;
-                continue;
-            }
-            self.list.push(Disc { centre: x, normal: step.as_vec3(), radius: self.radius, shaft });
-            self.bounds = (self.bounds.0.min(local.min(local + step)), self.bounds.1.max(local.max(local + step)));
-            self.edges.push(Edge { voxel: local, to, shaped: false });
         }
-        self.voxels += u32::from(self.list.len() > before);
+    }
+
+    /// The crossing from a bone voxel to its neighbour `to`, if it is `within` reach of the tool.
+    fn edge<S: Solid>(&mut self, solid: &S, local: IVec3, to: u8, within: impl Fn(Vec3) -> bool, shaft: bool) {
+        let (cell, step) = (self.base + local, NEIGHBOURS[usize::from(to)]);
+        if S::CUT && is_grazed(solid, cell, step) {
+            return;
+        }
+        let (x, field) = crossing(solid, self.base, local, step);
+        if !within(x) {
+            return;
+        }
+        if self.list.len() == self.limit {
+            self.overflow += 1;
+            return;
+        }
+        self.list.push(Disc { centre: x, normal: step.as_vec3(), radius: self.radius, shaft });
+        self.voxels += u32::from(self.edges.last().is_none_or(|edge: &Edge| edge.voxel != local));
+        self.edges.push(Edge { voxel: local, to, field, shaped: false });
     }
 }
 
-/// Where the density passes the isovalue on the edge from bone voxel `local` by `step`, voxels from
-/// `base`.
-fn crossing(window: &impl Densities, base: IVec3, local: IVec3, step: IVec3) -> Vec3 {
-    let (inside, outside) = (f32::from(window.hu(base + local)), f32::from(window.hu(base + local + step)));
-    let along = (inside - f32::from(window.isovalue())) / (inside - outside);
-    local.as_vec3() + along * step.as_vec3()
+/// Whether the cut passes an edge at so little an angle that it passes a steeper one nearby.
+fn is_grazed(solid: &impl Solid, cell: IVec3, step: IVec3) -> bool {
+    let beyond = solid.over(Field::Cut, cell + step);
+    beyond <= 0.0 && solid.over(Field::Cut, cell) - beyond < GRAZED && solid.over(Field::Density, cell + step) >= 0.0
 }
 
-/// A disc at `x` (voxels from `base`) on an edge that leads out of the bone along `edge`.
-fn disc(window: &impl Densities, base: IVec3, x: Vec3, edge: Vec3, radius: f32) -> Disc {
-    let block = Block::read(window, base, x);
+/// Where bone ends on the edge from bone voxel `local` by `step`, voxels from `base`, and what ends
+/// it.
+fn crossing<S: Solid>(solid: &S, base: IVec3, local: IVec3, step: IVec3) -> (Vec3, Field) {
+    let of = |field| {
+        let over = |n: i32| solid.over(field, base + local + n * step);
+        let (here, after) = (over(0), over(1));
+        match field {
+            _ if after >= 0.0 => 1.0,
+            Field::Density => here / (here - after),
+            Field::Cut => end_of_bone([over(-1), here, after, over(2)]),
+        }
+    };
+    let mut found = (of(Field::Density), Field::Density);
+    if S::CUT {
+        let cut = of(Field::Cut);
+        // On equal terms it is the cut: a density on its border is bone, a cut is not.
+        found = if cut <= found.0 { (cut, Field::Cut) } else { found };
+    }
+    (local.as_vec3() + found.0 * step.as_vec3(), found.1)
+}
+
+/// Where the cubic of [`cubic`] passes 0.
+fn end_of_bone([a, b, c, d]: [f32; 4]) -> f32 {
+    let [one, two, three] = coefficients([a, b, c, d]);
+    let value = |t: f32| b + t * (one + t * (two + t * three));
+    let slope = |t: f32| one + t * (2.0 * two + 3.0 * t * three);
+    // Two of Newton's steps from the line between the ends: exact to 1e-4 where the cubic is steep.
+    let line = b / (b - c);
+    let near = line - value(line) / slope(line);
+    let found = near - value(near) / slope(near);
+    if slope(line) < STEEP && slope(near) < STEEP && (0.0..=1.0).contains(&found) {
+        return found;
+    }
+    let (mut low, mut high, mut t) = (0.0, 1.0, line);
+    for _ in 0..10 {
+        (low, high) = if value(t) >= 0.0 { (t, high) } else { (low, t) };
+        let next = t - value(t) / slope(t);
+        // Newton's step, or half way where that leads out.
+        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+        if (next - t).abs() < 3e-4 {
+            return next;
+        }
+        t = next;
+    }
+    t
+}
+
+/// A disc at `x` (voxels from `base`), where `field` ends the bone on an edge that leads out of it
+/// along `edge`.
+fn disc<S: Solid>(solid: &S, base: IVec3, (x, field): (Vec3, Field), edge: Vec3, radius: f32) -> Disc {
+    // Where the other field ends the bone nearby the disc must not stand out over that edge.
+    let radius = if field == Field::Cut { CUT_DISC.min(radius) } else { radius };
+    let radius = if S::CUT { radius.min(to_edge(solid, field, base, x, edge).max(0.0)) } else { radius };
+    if field == Field::Cut {
+        // A distance: its slope at the ends of the edge says it all.
+        let (step, along) = (edge.as_ivec3(), x.dot(edge));
+        let cell = base + x.round().as_ivec3() + (along.floor() - along.round()) as i32 * step;
+        let slope = slope(solid, field, cell).lerp(slope(solid, field, cell + step), along - along.floor());
+        let normal = (-slope).normalize_or(edge);
+        return Disc { centre: x, normal, radius, shaft: false };
+    }
+    let block = Block::read(solid, field, base, x);
     let shape = Shape::of(&block);
     let size = shape.slope.length();
     // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than
@@ -328,6 +462,44 @@ fn disc(window: &impl Densities, base: IVec3, x: Vec3, edge: Vec3, radius: f32) 
     Disc { centre: x, normal, radius, shaft: false }
 }
 
+/// How far `x` on an edge along `edge` is from where the field that does not end the bone there
+/// would end it, cells.
+fn to_edge(solid: &impl Solid, field: Field, base: IVec3, x: Vec3, edge: Vec3) -> f32 {
+    let other = if field == Field::Cut { Field::Density } else { Field::Cut };
+    let (step, along) = (edge.as_ivec3(), x.dot(edge));
+    let cell = base + x.round().as_ivec3() + (along.floor() - along.round()) as i32 * step;
+    let over = cubic([-1, 0, 1, 2].map(|n| solid.over(other, cell + n * step)), along - along.floor());
+    if field == Field::Density {
+        // The cut rises by so much a node, wherever.
+        return over * 1e-3;
+    }
+    if over > FAR_HU {
+        return f32::MAX;
+    }
+    over / slope(solid, other, cell).length().max(1.0)
+}
+
+/// The slope of a field at a cell, HU a cell.
+fn slope(solid: &impl Solid, field: Field, cell: IVec3) -> Vec3 {
+    let near = |step: IVec3| solid.over(field, cell + step);
+    0.5 * Vec3::new(
+        near(IVec3::X) - near(IVec3::NEG_X),
+        near(IVec3::Y) - near(IVec3::NEG_Y),
+        near(IVec3::Z) - near(IVec3::NEG_Z),
+    )
+}
+
+/// The Catmull-Rom cubic through `b` at 0 and `c` at 1, with `a` and `d` before and after, at `t`.
+fn cubic([a, b, c, d]: [f32; 4], t: f32) -> f32 {
+    let [one, two, three] = coefficients([a, b, c, d]);
+    b + t * (one + t * (two + t * three))
+}
+
+/// Its coefficients of t, t² and t³.
+fn coefficients([a, b, c, d]: [f32; 4]) -> [f32; 3] {
+    [0.5 * (c - a), 0.5 * (2.0 * a - 5.0 * b + 4.0 * c - d), 0.5 * (3.0 * (b - c) + d - a)]
+}
+
 /// The densities around a place over the isovalue, HU, and where the middle one is seen from the
 /// place.
 struct Block {
@@ -336,17 +508,14 @@ struct Block {
 }
 
 impl Block {
-    fn read(window: &impl Densities, base: IVec3, x: Vec3) -> Self {
+    fn read(solid: &impl Solid, field: Field, base: IVec3, x: Vec3) -> Self {
         let middle = x.round();
         let corner = base + middle.as_ivec3() - 1;
-        let iso = i32::from(window.isovalue());
         let mut hu = [[[0.0; 3]; 3]; 3];
         for (k, layer) in (0..).zip(&mut hu) {
             for (j, cells) in (0..).zip(layer) {
-                let row = window.three(corner + IVec3::new(0, j, k));
-                for (hu, cell) in row.into_iter().zip(cells) {
-                    *cell = (i32::from(hu) - iso).clamp(-CLAMP_HU, CLAMP_HU) as f32;
-                }
+                let row = solid.three_over(field, corner + IVec3::new(0, j, k));
+                *cells = row.map(|over| over.clamp(-CLAMP_HU, CLAMP_HU));
             }
         }
         Self { hu, off: middle - x }

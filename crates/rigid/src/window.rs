@@ -1,4 +1,5 @@
-//! The densities around the tool, copied close together.
+//! The bone around the tool, copied close together: densities of voxels, or what is kept on the
+//! finer nodes of the cut.
 //!
 //! # Theory
 //! A ball touches some thousands of voxels of the millions. They are kept in a cube whose edge is a
@@ -11,12 +12,12 @@
 //!
 //! # Practice
 //! A look costs about a nanosecond, with no test for borders. The window is a copy: what its owner
-//! changes it is told ([`Window::set`]), what others change it finds by the versions of the bricks
+//! changes it is told ([`Window::put`]), what others change it finds by the versions of the bricks
 //! that it meets ([`Window::renew`]), a nanosecond each.
 
 use crate::rows::each;
 use glam::IVec3;
-use trepan_volume::{BRICK, BoneVolume};
+use trepan_volume::{BRICK, BetweenScratch, BoneVolume, CUT_STEPS, CUT_SURFACE};
 
 /// Largest edge, log2: 128 voxels, 4 MB.
 const MAX_BITS: u32 = 7;
@@ -24,8 +25,23 @@ const MAX_BITS: u32 = 7;
 /// two.
 const BRICKS: i32 = 32;
 
+/// What a window shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shown {
+    /// The CT's density at the nodes of the cut, HU.
+    Density,
+    /// The cut at its nodes.
+    Cut,
+}
+
 pub(crate) struct Window {
+    shown: Shown,
     cells: Vec<i16>,
+    /// One box as it is read.
+    read: Vec<i16>,
+    scratch: BetweenScratch,
+    /// Cells along the edge of a brick of voxels.
+    brick: i32,
     bits: u32,
     /// Lowest voxel held.
     low: IVec3,
@@ -33,13 +49,16 @@ pub(crate) struct Window {
     /// Versions of the bricks that it meets; brick (i, j, k) lies at each index mod [`BRICKS`].
     seen: Vec<u32>,
     /// Density from which a voxel is bone, HU.
-    pub isovalue: i16,
+    isovalue: i16,
 }
 
 impl Window {
-    pub fn new() -> Self {
+    pub fn new(shown: Shown) -> Self {
         let (cells, seen) = (vec![0; 1 << (3 * MAX_BITS)], vec![0; BRICKS.pow(3) as usize]);
-        Self { cells, bits: 0, low: IVec3::ZERO, filled: false, seen, isovalue: 0 }
+        let read = Vec::with_capacity(1 << (3 * MAX_BITS));
+        let scratch = BetweenScratch::new(if shown == Shown::Density { 1 << MAX_BITS } else { 0 });
+        let (brick, low) = (BRICK as i32, IVec3::ZERO);
+        Self { shown, cells, read, scratch, brick, bits: 0, low, filled: false, seen, isovalue: 0 }
     }
 
     /// Everything is to be read anew.
@@ -59,6 +78,7 @@ impl Window {
         // tool comes back.
         let mut low = self.low.clamp(centre + half + 1 - edge, centre - half);
         let far = (low - self.low).abs().max_element() >= edge;
+        self.brick = BRICK as i32 * bone.cut_nodes();
         if !self.filled || bits != self.bits || far || self.isovalue != bone.isovalue() {
             low = centre - edge / 2;
             (self.bits, self.low, self.filled, self.isovalue) = (bits, low, true, bone.isovalue());
@@ -92,10 +112,12 @@ impl Window {
         let mut changed = false;
         let (low, high) = (self.low, self.low + (1 << self.bits));
         self.bricks(|window, brick| {
-            if window.seen[place(brick)] != bone.version(brick) {
+            if window.seen[place(brick)] != window.version(bone, brick) {
                 window.see(bone, brick);
-                let from = brick * BRICK as i32;
-                window.read(bone, from.max(low), (from + BRICK as i32).min(high));
+                // Densities change beyond the brick, by less than a voxel.
+                let more = if window.shown == Shown::Density { bone.cut_nodes() } else { 0 };
+                let from = brick * window.brick;
+                window.read(bone, (from - more).max(low), (from + window.brick + more).min(high));
                 changed = true;
             }
         });
@@ -107,20 +129,63 @@ impl Window {
         if !self.filled {
             return;
         }
-        let of = |voxel: IVec3| voxel.div_euclid(IVec3::splat(BRICK as i32));
+        let of = |cell: IVec3| cell.div_euclid(IVec3::splat(self.brick));
         let (first, last) = (of(self.low), of(self.low + (1 << self.bits) - 1));
         each(first, last + 1, |brick| visit(self, brick));
     }
 
+    fn version(&self, bone: &BoneVolume, brick: IVec3) -> u32 {
+        if self.shown == Shown::Cut { bone.cut_version(brick) } else { bone.ct_version(brick) }
+    }
+
     fn see(&mut self, bone: &BoneVolume, brick: IVec3) {
-        self.seen[place(brick)] = bone.version(brick);
+        self.seen[place(brick)] = self.version(bone, brick);
     }
 
     fn read(&mut self, bone: &BoneVolume, from: IVec3, to: IVec3) {
-        each(from, to, |voxel| {
-            let at = self.index(voxel);
-            self.cells[at] = bone.hu(voxel);
-        });
+        let size = to - from;
+        if size.cmple(IVec3::ZERO).any() {
+            return;
+        }
+        self.read.resize(size.element_product() as usize, 0);
+        if self.shown == Shown::Cut {
+            bone.read_cut(from, size, &mut self.read);
+        } else {
+            bone.read_between(from, size, &mut self.scratch, &mut self.read);
+        }
+        let mut rest = &self.read[..];
+        let (mask, cells) = ((1 << self.bits) - 1, &mut self.cells);
+        for k in from.z..to.z {
+            for j in from.y..to.y {
+                let (row, next) = rest.split_at(size.x as usize);
+                let start = ((j & mask) << self.bits | (k & mask) << (2 * self.bits)) as usize;
+                row.iter().enumerate().for_each(|(i, value)| {
+                    cells[start + ((from.x + i as i32) & mask) as usize] = *value;
+                });
+                rest = next;
+            }
+        }
+    }
+
+    /// How far a cell is over the border of bone, HU; 1000 a node for the cut.
+    #[inline]
+    pub fn over(&self, cell: IVec3) -> f32 {
+        self.scaled(self.cells[self.index(cell)])
+    }
+
+    #[inline]
+    fn scaled(&self, value: i16) -> f32 {
+        match self.shown {
+            Shown::Cut => f32::from(CUT_SURFACE - value) * (1000.0 / CUT_STEPS),
+            _ => f32::from(value) - f32::from(self.isovalue),
+        }
+    }
+
+    /// The same of a cell and the next two along x.
+    #[inline]
+    pub fn three_over(&self, cell: IVec3) -> [f32; 3] {
+        let row = self.row(cell);
+        [0, 1, 2].map(|i| self.scaled(row.at(cell.x + i)))
     }
 
     fn index(&self, voxel: IVec3) -> usize {
@@ -129,9 +194,27 @@ impl Window {
         (v.x | v.y << self.bits | v.z << (2 * self.bits)) as usize
     }
 
-    /// Density of a voxel within the window, HU; outside it, of some other voxel.
-    pub fn hu(&self, voxel: IVec3) -> i16 {
-        self.cells[self.index(voxel)]
+    /// A cell within the window; outside it, some other cell.
+    #[inline]
+    pub fn at(&self, cell: IVec3) -> i16 {
+        self.cells[self.index(cell)]
+    }
+
+    /// The value from which a cell is bone; with the cut, from which it is not.
+    pub fn border(&self) -> i16 {
+        if self.shown == Shown::Cut { CUT_SURFACE } else { self.isovalue }
+    }
+
+    /// Sets a cell of the cut to what its owner has just cut.
+    #[inline]
+    pub fn put(&mut self, cell: IVec3, value: i16) {
+        let at = self.index(cell);
+        self.cells[at] = value;
+    }
+
+    /// Takes note that what it shows of the bricks that it meets is how they are now.
+    pub fn see_all(&mut self, bone: &BoneVolume) {
+        self.bricks(|window, brick| window.see(bone, brick));
     }
 
     /// The row of voxels along x through `voxel`, for looks at many of them.
@@ -142,14 +225,23 @@ impl Window {
         Row { cells: &self.cells[start..=start + mask], mask }
     }
 
-    /// Takes note of the density that its owner has just given to a voxel.
-    pub fn set(&mut self, bone: &BoneVolume, voxel: IVec3) {
-        let inside = voxel.cmpge(self.low).all() && voxel.cmplt(self.low + (1 << self.bits)).all();
-        if self.filled && inside {
-            let at = self.index(voxel);
-            self.cells[at] = bone.hu(voxel);
-            self.see(bone, voxel.div_euclid(IVec3::splat(BRICK as i32)));
+    /// One bit for each of `count` cells along x from `start` that `holds`, at most 128.
+    #[inline]
+    pub fn bits(&self, start: IVec3, count: i32, holds: impl Fn(i16) -> bool) -> u128 {
+        let (row, mut bits, mut done) = (self.row(start), 0u128, 0);
+        while done < count {
+            let from = (start.x + done) as usize & row.mask;
+            let part = ((count - done) as usize).min(row.mask + 1 - from);
+            for (n, eight) in row.cells[from..from + part].chunks(8).enumerate() {
+                let mut bytes = [0u8; 8];
+                bytes.iter_mut().zip(eight).for_each(|(byte, cell)| *byte = holds(*cell).into());
+                // Gathers the lowest bits of eight bytes.
+                let byte = u64::from_le_bytes(bytes).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+                bits |= u128::from(byte) << (done as usize + 8 * n);
+            }
+            done += part as i32;
         }
+        bits
     }
 }
 
@@ -166,8 +258,9 @@ pub(crate) struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Density of the voxel at `x`, HU.
-    pub fn hu(&self, x: i32) -> i16 {
+    /// The cell at `x`.
+    #[inline]
+    pub fn at(&self, x: i32) -> i16 {
         self.cells[x as usize & self.mask]
     }
 }
@@ -182,15 +275,13 @@ mod tests {
     proptest! {
         #[test]
         fn the_window_shows_the_volume_wherever_it_goes(path in prop::collection::vec((-3i32..12, -3i32..12, -3i32..12, 1i32..6), 1..20)) {
-            let mut ct = VoxelVolume::isotropic([9, 10, 11], Vec3::ZERO, 1.0, 0i16);
+            let mut ct = VoxelVolume::isotropic([9, 10, 11], Vec3::ZERO, 0.3, 0i16);
             ct.data.iter_mut().enumerate().for_each(|(i, v)| *v = i as i16);
             let bone = BoneVolume::new(&ct, 400).unwrap();
-            let mut window = Window::new();
+            let mut window = Window::new(Shown::Density);
             for (x, y, z, half) in path {
                 let centre = IVec3::new(x, y, z);
                 prop_assert!(window.cover(&bone, centre, half).is_some());
-                bone.set_hu(centre, 7);
-                window.set(&bone, centre);
                 let others = centre + IVec3::new(half, -half, 0);
                 bone.set_hu(others, 1000 + half as i16);
                 let within = others.cmpge(IVec3::ZERO).all() && others.cmplt(IVec3::new(9, 10, 11)).all();
@@ -199,7 +290,7 @@ mod tests {
                 for at in 0..(2 * half + 1).pow(3) {
                     let n = 2 * half + 1;
                     let voxel = centre - half + IVec3::new(at % n, at / n % n, at / n / n);
-                    prop_assert_eq!(window.hu(voxel), bone.hu(voxel));
+                    prop_assert_eq!(window.at(voxel), bone.ct(voxel));
                 }
             }
         }
@@ -207,7 +298,7 @@ mod tests {
 
     #[test]
     fn more_than_it_can_hold_is_refused() {
-        let bone = BoneVolume::new(&VoxelVolume::isotropic([2, 2, 2], Vec3::ZERO, 1.0, 900i16), 400).unwrap();
-        assert_eq!(Window::new().cover(&bone, IVec3::ZERO, 64), None);
+        let bone = BoneVolume::new(&VoxelVolume::isotropic([2, 2, 2], Vec3::ZERO, 0.3, 900i16), 400).unwrap();
+        assert_eq!(Window::new(Shown::Density).cover(&bone, IVec3::ZERO, 64), None);
     }
 }

@@ -36,7 +36,7 @@ fn reach(t: f32) -> f32 {
 /// The hand's depth along the bore, mm, and whether the pedal is down.
 fn hand(tick: usize, deepest: f32) -> Option<(f32, bool)> {
     const DRILL: usize = 6000;
-    const CLEAN: usize = 280;
+    const CLEAN: usize = 3000;
     const RETREAT: usize = 2900;
     let way_out = 43.0 + deepest;
     match tick {

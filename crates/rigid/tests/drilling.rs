@@ -79,7 +79,7 @@ fn the_hole_has_the_shape_of_the_burr() {
     for t in 0..6000 {
         let sunk = (t as f32 / 2000.0).min(1.0);
         let across = (t as f32 / 4000.0 - 0.5).clamp(0.0, 1.0) * 6.0 - 3.0;
-        contact.step(&bone, &at(Vec3::new(across, 0.0, 2.0 - sunk)), true, 2.0, &mut out);
+        contact.step(&bone, &at(Vec3::new(across, 0.0, 2.0 - sunk)), true, 10.0, &mut out);
         removed += out.removed_mm3;
     }
     // Swept volume below z = 0: a spherical cap (radius 2, height 1) and a segment of a cylinder 6

@@ -79,7 +79,7 @@ fn burr(bone: &BoneVolume, tool: &Tool, centre: Vec3, visited: &mut u32) -> Pres
 
 fn shaft(bone: &BoneVolume, tool: &Tool, pose: &Pose, visited: &mut u32) -> Press {
     let mut press = Press::default();
-    let shaft = Shaft::of(tool, bone, bone.grid_of(pose.translation), pose.rotation * Vec3::Z);
+    let shaft = Shaft::of(tool, bone.spacing_mm(), bone.grid_of(pose.translation), pose.rotation * Vec3::Z);
     *visited += shaft.around(bone, shaft.radius, |voxel| {
         let place = voxel.as_vec3();
         press.add(place, shaft.at(shaft.along(place)) - place, shaft.radius);

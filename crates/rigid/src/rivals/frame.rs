@@ -9,8 +9,9 @@
 //! Penalties against thin walls: past the middle of a wall the nearest way out leads to the far
 //! side, and a fast tool is through between two ticks.
 
-use crate::removal::{Burr, Cut, RemovalLaw};
-use crate::rows::EVERYWHERE;
+use crate::burr::{Burr, Cut};
+use crate::nodes::Nodes;
+use crate::removal::RemovalLaw;
 use crate::{RigidContact, RigidStep};
 use glam::IVec3;
 use trepan_geometry::{Pointshell, Pose, Spread, Tool, ToolState, Vec3};
@@ -33,6 +34,9 @@ pub(crate) struct Held {
     pub tool: Tool,
     pub proxy: Pose,
     burr: Burr,
+    nodes: Nodes,
+    /// The bone that the nodes show.
+    bone: u64,
     /// Whether the burr cuts in this tick.
     cuts: bool,
     dt_ms: f32,
@@ -44,8 +48,14 @@ impl Held {
     pub fn cut(&mut self, bone: &BoneVolume, device: Vec3, proxy: Vec3, depth_mm: f32, out: &mut RigidStep) {
         if self.cuts {
             let (radius_mm, dt_ms) = (self.tool.tip_radius_mm, self.dt_ms);
-            let cut = Cut { device, proxy, radius_mm, depth_mm, dt_ms, within: EVERYWHERE };
-            self.burr.cut(bone, &cut, |voxel| move |x| bone.hu(voxel.with_x(x)), out);
+            let side = self.proxy.rotation * (0.5 * self.tool.cutting_mm * Vec3::Z);
+            let cut = Cut { device, proxy, radius_mm, side, depth_mm, dt_ms };
+            if self.bone != bone.id() {
+                self.bone = bone.id();
+                self.nodes.forget();
+            }
+            self.nodes.renew(bone);
+            self.burr.cut(bone, &cut, &mut self.nodes, out);
         }
     }
 
@@ -77,7 +87,8 @@ struct Framed<R> {
 /// the first tool pose.
 pub(crate) fn framed<R: Rival + 'static>(tool: &Tool, removal: RemovalLaw, rival: R) -> Box<dyn RigidContact> {
     let burr = Burr::new(removal, R::MAX_BITES);
-    let held = Held { tool: *tool, proxy: Pose::IDENTITY, burr, cuts: false, dt_ms: 0.0 };
+    let held =
+        Held { tool: *tool, proxy: Pose::IDENTITY, burr, nodes: Nodes::new(), bone: u64::MAX, cuts: false, dt_ms: 0.0 };
     Box::new(Framed { rival, held, placed: false })
 }
 
@@ -92,6 +103,9 @@ impl<R: Rival> RigidContact for Framed<R> {
             self.reset(tool.world_from_tool);
         }
         (self.held.cuts, self.held.dt_ms) = (drilling && self.held.tool.kind.cuts(), dt_ms);
+        if !self.held.cuts {
+            self.held.burr.rest();
+        }
         self.rival.tick(bone, tool, &mut self.held, out);
     }
 

@@ -1,0 +1,434 @@
+//! The cutting side of a tool: what it reaches, and what it takes by a law of removal.
+
+use crate::RigidStep;
+use crate::cut_ball::{BAND, BEHIND, Eight, LANES, Paid, Place, Side, outside};
+use crate::nodes::Nodes;
+use crate::removal::RemovalLaw;
+use crate::rows::{GridBall, rows};
+use crate::surface::{Field, Solid};
+use glam::{IVec3, Vec3Swizzles};
+use trepan_geometry::Vec3;
+use trepan_volume::{AIR_HU, BoneVolume, CUT_STEPS, CUT_SURFACE, cut_depth};
+
+/// Fall of the ramp down to which the per-tick law cuts at the burr's surface, HU per voxel.
+const RAMP_HU: f32 = 1000.0;
+/// Span of density around the isovalue in which a voxel counts as partly bone, HU.
+const PARTIAL_HU: f32 = 750.0;
+/// How far in front of the proxy the per-tick law bites, voxels.
+const BITE_VOXELS: f32 = 1.5;
+/// Furthest that a burr cuts in one tick, nodes.
+const STRIDE: f32 = 1.0;
+/// How many times the last way a cut is first sought.
+const AS_BEFORE: f32 = 3.0;
+/// Least way that counts as the last, nodes.
+const LEAST_WAY: f32 = 1e-3;
+/// How much wider a burr cuts than it is, mm, at least: enough that it does not lock in its bore.
+const WIDER_MM: f32 = 0.004;
+/// The same for burrs of few nodes, nodes, times the square of the radius in nodes: what the
+/// splines are uncertain by.
+const WIDER_NODES: f32 = 0.06;
+/// Least step of the cut, nodes: 5 um. Times the stiffness it is a change of force, and between two
+/// steps the surface stands still, so that nothing needs to be looked for anew.
+const STEP: f32 = 0.01;
+/// Ticks whose earnings a burr keeps that does not come to cut.
+const KEPT_TICKS: f32 = 20.0;
+/// How near the proxy stands to where the burr has cut to, mm.
+const STANDS_MM: f32 = 0.01;
+/// Free way ahead that tells the far side of a bone from a hollow in it, mm.
+const BEYOND_MM: f32 = 3.0;
+
+/// Where and how hard a burr cuts in one tick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cut {
+    /// Centre of the burr as the hand holds it, world mm.
+    pub device: Vec3,
+    /// Centre of the burr as the bone lets it be, world mm.
+    pub proxy: Vec3,
+    /// Radius of the burr, mm.
+    pub radius_mm: f32,
+    /// From the middle of its cutting side to the end of it, world mm; nothing for a ball.
+    pub side: Vec3,
+    /// How deep the burr is pressed in, mm: what makes the load.
+    pub depth_mm: f32,
+    /// Tick, ms.
+    pub dt_ms: f32,
+}
+
+/// Where a burr stops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stop {
+    /// It has not earned the first of it.
+    Before,
+    /// After so many nodes; less than nothing is less than it overlaps with bone at its start.
+    At(f32),
+    /// It could go on.
+    Beyond,
+}
+
+/// A node that the burr's front may reach.
+#[derive(Clone, Copy, Debug, Default)]
+struct Reached {
+    node: IVec3,
+    /// Its value before.
+    value: i16,
+    place: Place,
+}
+
+/// One voxel that the per-tick law reaches.
+#[derive(Clone, Copy, Debug, Default)]
+struct Bite {
+    voxel: IVec3,
+    hu: i16,
+    /// The density that it may not pass.
+    floor_hu: f32,
+}
+
+/// The cutting side of one tool.
+pub(crate) struct Burr {
+    law: RemovalLaw,
+    reached: Vec<Reached>,
+    paid: Paid,
+    bites: Vec<Bite>,
+    limit: usize,
+    /// Bone of the reference density that the load has earned and the burr has not cut, mm³.
+    earned_mm3: f32,
+    /// What is enough for a step, node³; from the last one.
+    enough: f32,
+    /// How far the last cut went, nodes.
+    way: f32,
+    /// Where the ball of the last cut is, world mm.
+    at: Option<Vec3>,
+    /// Whether the last cut changed anything.
+    changed: bool,
+    /// Whether the last cut opened a node or a voxel.
+    opened: bool,
+    /// Whether the spindle has stalled.
+    stalled: bool,
+    /// Direction of the last cut.
+    forward: Vec3,
+}
+
+impl Burr {
+    /// A burr that reaches at most `limit` nodes or voxels a tick.
+    pub fn new(law: RemovalLaw, limit: usize) -> Self {
+        Self {
+            law,
+            reached: Vec::with_capacity(limit),
+            paid: Paid::with_capacity(limit),
+            bites: Vec::with_capacity(limit),
+            limit,
+            earned_mm3: 0.0,
+            enough: 0.0,
+            way: 0.0,
+            at: None,
+            changed: false,
+            opened: false,
+            stalled: false,
+            forward: Vec3::ZERO,
+        }
+    }
+
+    /// Starts a stalled spindle anew.
+    pub fn reset(&mut self) {
+        self.stalled = false;
+        self.rest();
+    }
+
+    /// The burr does not work: what it has earned is lost.
+    pub fn rest(&mut self) {
+        (self.earned_mm3, self.enough, self.way, self.at) = (0.0, 0.0, 0.0, None);
+    }
+
+    /// Whether the last cut changed what the nodes show.
+    pub fn changed(&self) -> bool {
+        self.changed
+    }
+
+    /// Whether a node or voxel was bone before the last cut and is not any more.
+    pub fn opened(&self) -> bool {
+        self.opened
+    }
+
+    /// How far from the centre of a burr nodes are read, nodes; its side is `side_mm` long.
+    pub fn reach(bone: &BoneVolume, radius_mm: f32, side_mm: f32) -> i32 {
+        ((radius_mm + 0.5 * side_mm) / bone.node_mm() + BAND + STRIDE).ceil() as i32 + 3
+    }
+
+    /// Takes bone away and says in `out` how much, how fast the spindle turned and whether it broke
+    /// through. `nodes` may show any place, but nothing old.
+    pub fn cut(&mut self, bone: &BoneVolume, cut: &Cut, nodes: &mut Nodes, out: &mut RigidStep) {
+        self.bites.clear();
+        (self.changed, self.opened, self.forward) = (false, false, (cut.device - cut.proxy).normalize_or_zero());
+        let sound = cut.depth_mm.is_finite() && cut.dt_ms.is_finite();
+        if !sound || cut.depth_mm <= 0.0 || cut.dt_ms <= 0.0 {
+            self.rest();
+            return;
+        }
+        if let RemovalLaw::PerTick { decrement_hu } = self.law {
+            self.find_bites(bone, cut);
+            self.take(bone, decrement_hu, out);
+            return;
+        }
+        let (earned, rpm) = self.law.turned(cut.radius_mm, cut.depth_mm, cut.dt_ms, &mut self.stalled);
+        out.spindle_rpm = rpm;
+        let of_nodes = bone.node_mm() / cut.radius_mm.max(bone.node_mm());
+        let wider_mm = (WIDER_NODES * bone.node_mm() * of_nodes * of_nodes).max(WIDER_MM);
+        // The ball goes on from where it has cut to, as long as the proxy stands in that: what the
+        // contact is uncertain by does not get into the cut. A ball so much wider than the burr
+        // starts so much further back to end where the burr does.
+        let stands = |at: &Vec3| at.distance(cut.proxy) < STANDS_MM + wider_mm;
+        let start = self.at.filter(stands).unwrap_or(cut.proxy - wider_mm * self.forward);
+        self.forward = (cut.device - start).normalize_or_zero();
+        self.at = Some(start);
+        let centre = bone.cut_nodes() as f32 * bone.grid_of(start);
+        let side = Side::of(cut.side / bone.node_mm());
+        let covered = nodes.cover(
+            bone,
+            centre.round().as_ivec3(),
+            Self::reach(bone, cut.radius_mm, 2.0 * side.half * bone.node_mm()),
+        );
+        if rpm <= 0.0 || covered.is_none() {
+            out.fallbacks += u32::from(covered.is_none());
+            self.rest();
+            return;
+        }
+        let node_mm3 = bone.node_mm().powi(3);
+        self.earned_mm3 = (self.earned_mm3 + earned).min((KEPT_TICKS * earned).max(2.0 * self.enough * node_mm3));
+        if self.earned_mm3 < self.enough * node_mm3 {
+            return;
+        }
+        let radius = (cut.radius_mm + wider_mm) / bone.node_mm();
+        let longest = (cut.device.distance(start) / bone.node_mm()).min(STRIDE);
+        // As far as the last few cuts together, or else as far as it may go.
+        let (mut hollow, mut most) = (radius - BAND, longest.min(AS_BEFORE * self.way));
+        let (stop, way) = loop {
+            out.fallbacks += u32::from(self.find_reached((centre, side), radius, (hollow, most), nodes));
+            let stop = self.stop(radius, (hollow - radius, most), self.earned_mm3 / node_mm3);
+            match stop {
+                Stop::Beyond if most < longest => most = longest,
+                Stop::At(way) if way < 0.0 && hollow > 0.0 => hollow = 0.0,
+                Stop::Before if hollow > 0.0 => hollow = 0.0,
+                Stop::Before => return,
+                Stop::At(way) => break (stop, way),
+                Stop::Beyond => break (stop, most),
+            }
+        };
+        let spent = self.open(bone, radius, way, nodes, out);
+        self.changed = true;
+        if stop == Stop::At(way) && way > 0.0 {
+            self.enough = spent * (STEP / way).min(1.0);
+        }
+        self.way = way.max(LEAST_WAY);
+        self.at = Some(start + way.max(0.0) * bone.node_mm() * self.forward);
+        self.earned_mm3 -= spent * node_mm3;
+        if stop == Stop::Beyond {
+            // All within reach is not worth what was earned: the burr idles.
+            self.rest();
+        }
+        out.removed_mm3 *= node_mm3;
+    }
+
+    /// Takes density from `voxels` by the per-tick law, wherever they are.
+    pub fn wear(&mut self, bone: &BoneVolume, voxels: impl Iterator<Item = IVec3>, out: &mut RigidStep) {
+        let RemovalLaw::PerTick { decrement_hu } = self.law else { return };
+        self.forward = Vec3::ZERO;
+        self.bites.clear();
+        for voxel in voxels.take(self.limit) {
+            self.bites.push(Bite { voxel, hu: bone.ct(voxel), floor_hu: f32::from(AIR_HU) });
+        }
+        self.take(bone, decrement_hu, out);
+    }
+
+    /// Lists the nodes that a ball of `radius` at `centre` changes when it goes `most` forward,
+    /// nodes, but none nearer than `hollow`. Returns whether there were more than fit.
+    fn find_reached(
+        &mut self,
+        (centre, side): (Vec3, Side),
+        radius: f32,
+        (hollow, most): (f32, f32),
+        nodes: &Nodes,
+    ) -> bool {
+        self.reached.clear();
+        self.paid.clear();
+        let (solid, forward, mut over) = (nodes.fine(), self.forward, false);
+        let Self { reached, paid, law, limit, .. } = self;
+        let long = side.half;
+        let ball = GridBall { centre, radius: radius + BAND + most + long };
+        let hole = GridBall { centre, radius: hollow };
+        rows(ball, hole, |start, to| {
+            let first = start.as_vec3() - centre;
+            let values = solid.cut.row(start);
+            // What lies behind needs no look.
+            let (across, rest) = (first.yz().length_squared(), first.yz().dot(forward.yz()));
+            let cut_off = (BEHIND - long - rest) / forward.x - first.x;
+            let (from, to) = match forward.x {
+                fx if fx > 1e-3 => (start.x + (cut_off.clamp(0.0, 1e6) as i32), to),
+                fx if fx < -1e-3 => (start.x, to.min(start.x.saturating_add(cut_off.clamp(-1.0, 1e6) as i32))),
+                _ if rest + long < BEHIND - 1.0 => return,
+                _ => (start.x, to),
+            };
+            let mut x = from;
+            while x <= to {
+                let dx = first.x + (x - start.x) as f32;
+                let all = if long == 0.0 {
+                    Eight::of(|lane| {
+                        let dx = dx + lane as f32;
+                        (rest + dx * forward.x, across + dx * dx, values.at(x + lane))
+                    })
+                } else {
+                    Eight::of(|lane| {
+                        let off = side.nearest(first.with_x(dx + lane as f32));
+                        (off.dot(forward), off.length_squared(), values.at(x + lane))
+                    })
+                };
+                let mut hits = all.reached(radius, most) & (0xFF >> (7 - (to - x).min(7)));
+                while hits != 0 {
+                    let lane = hits.trailing_zeros() as usize;
+                    hits &= hits - 1;
+                    if reached.len() == *limit {
+                        over = true;
+                        return;
+                    }
+                    let node = start.with_x(x + lane as i32);
+                    let (value, place) = (all.value[lane], Place { along: all.along[lane], apart: all.apart[lane] });
+                    reached.push(Reached { node, value, place });
+                    let before = cut_depth(value);
+                    if before < 0.5 && place.apart_after(most) < (radius + 0.5) * (radius + 0.5) {
+                        let over = solid.over(Field::Density, node);
+                        let share = outside(before, radius).min(0.5 + over / PARTIAL_HU);
+                        if share > 0.0 {
+                            paid.push(place, share, law.price(over + f32::from(solid.density.border())));
+                        }
+                    }
+                }
+                x += LANES as i32;
+            }
+        });
+        over
+    }
+
+    /// Where the ball stops that has `earned` so many node³ of reference bone. It may go from the
+    /// first to the second of `between`.
+    fn stop(&self, radius: f32, between: (f32, f32), earned: f32) -> Stop {
+        let cost = |way: f32| self.paid.cost(radius, way);
+        let zero = cost(0.0) - earned;
+        let ends = if zero < 0.0 { (0.0, between.1) } else { (between.0, 0.0) };
+        let of = |way: f32| if way == 0.0 { zero } else { cost(way) - earned };
+        let ((mut low, mut under), (mut high, mut over)) = ((ends.0, of(ends.0)), (ends.1, of(ends.1)));
+        if over <= 0.0 {
+            return Stop::Beyond;
+        }
+        if under >= 0.0 {
+            return Stop::Before;
+        }
+        // The regula falsi of Illinois: an end that stays counts half.
+        let (mut way, mut side) = (0.0, 0.0);
+        for _ in 0..24 {
+            way = low - under * (high - low) / (over - under);
+            let off = cost(way) - earned;
+            if off.abs() < 0.02 * earned || high - low < 1e-5 {
+                break;
+            }
+            if off < 0.0 {
+                (low, under) = (way, off);
+                over *= if side < 0.0 { 0.5 } else { 1.0 };
+            } else {
+                (high, over) = (way, off);
+                under *= if side > 0.0 { 0.5 } else { 1.0 };
+            }
+            side = off;
+        }
+        Stop::At(way)
+    }
+
+    /// Adds the ball that has gone `way` to the cut. Returns what that cost, node³ of bone of the
+    /// reference density, and adds the volume of the bone, node³, to `out`.
+    fn open(&mut self, bone: &BoneVolume, radius: f32, way: f32, nodes: &mut Nodes, out: &mut RigidStep) -> f32 {
+        let (law, forward, mut opened, mut spent) = (self.law, self.forward, false, 0.0);
+        let (mut writer, (cut, density)) = (bone.cut_writer(), nodes.split());
+        for reached in &self.reached {
+            let depth = reached.place.depth(radius, way).clamp(-BAND, BAND);
+            // The border plus what rounds to the nearest; all of it is positive.
+            let value = (f32::from(CUT_SURFACE) + 0.5 + depth * CUT_STEPS) as i16;
+            if value <= reached.value {
+                continue;
+            }
+            if !writer.set(reached.node, value) {
+                // Beyond the grid there is no bone.
+                out.fallbacks += u32::from(density.over(reached.node) >= 0.0);
+                continue;
+            }
+            cut.put(reached.node, value);
+            let (before, after) = (outside(cut_depth(reached.value), radius), outside(cut_depth(value), radius));
+            if before <= after {
+                continue;
+            }
+            let over = density.over(reached.node);
+            let share = 0.5 + over / PARTIAL_HU;
+            if share > after {
+                let gone = before.min(share) - after;
+                out.removed_mm3 += gone;
+                spent += law.price(over + f32::from(density.border())) * gone;
+            }
+            if reached.value < CUT_SURFACE && value >= CUT_SURFACE && over >= 0.0 {
+                opened = true;
+                let voxel = reached.node / bone.cut_nodes();
+                out.broke_through |= !out.broke_through && is_free(bone, voxel, forward);
+            }
+        }
+        drop(writer);
+        cut.see_all(bone);
+        self.opened = opened;
+        spent
+    }
+
+    /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device,
+    /// or on its surface.
+    fn find_bites(&mut self, bone: &BoneVolume, cut: &Cut) {
+        let (device, proxy) = (bone.grid_of(cut.device), bone.grid_of(cut.proxy));
+        let radius = cut.radius_mm / bone.spacing_mm();
+        let way = device - proxy;
+        let (forward, length) = (way.normalize_or_zero(), way.length());
+        let iso = f32::from(bone.isovalue());
+        let ball = GridBall { centre: proxy, radius: radius + BITE_VOXELS };
+        let Self { bites, limit, .. } = self;
+        rows(ball, GridBall::NONE, |start, to| {
+            for voxel in (start.x..=to).map(|x| start.with_x(x)) {
+                let (off, hu) = (voxel.as_vec3() - proxy, bone.ct(voxel));
+                let along = off.dot(forward);
+                let from_way = (off - along.clamp(0.0, length) * forward).length();
+                let floor_hu = (iso + RAMP_HU * (from_way - radius)).max(f32::from(AIR_HU));
+                if along >= -1.0 && from_way < radius + 1.0 && f32::from(hu) > floor_hu && bites.len() < *limit {
+                    bites.push(Bite { voxel, hu, floor_hu });
+                }
+            }
+        });
+    }
+
+    /// Lowers each bite's density by `loss` whole HU, not below its floor.
+    fn take(&mut self, bone: &BoneVolume, loss: f32, out: &mut RigidStep) {
+        let iso = f32::from(bone.isovalue());
+        let fraction = |hu: f32| (0.5 + (hu - iso) / PARTIAL_HU).clamp(0.0, 1.0);
+        let mut removed = 0.0;
+        self.opened = false;
+        for bite in &self.bites {
+            let from = f32::from(bite.hu);
+            let whole = loss.round().clamp(0.0, (from - bite.floor_hu).floor());
+            if whole >= 1.0 {
+                bone.set_hu(bite.voxel, (from - whole) as i16);
+                removed += fraction(from) - fraction(from - whole);
+                if from >= iso && from - whole < iso {
+                    self.opened = true;
+                    out.broke_through |= self.forward != Vec3::ZERO && is_free(bone, bite.voxel, self.forward);
+                }
+            }
+        }
+        out.removed_mm3 = removed * bone.voxel_mm3();
+    }
+}
+
+/// Whether there is no bone for some way from `voxel` along `forward`.
+fn is_free(bone: &BoneVolume, voxel: IVec3, forward: Vec3) -> bool {
+    let steps = (BEYOND_MM / bone.spacing_mm()).ceil().clamp(1.0, 64.0) as u32;
+    (1..=steps).all(|step| !bone.is_bone((voxel.as_vec3() + step as f32 * forward).round().as_ivec3()))
+}

@@ -1,0 +1,46 @@
+//! CT and cut around a tool, on the nodes of the cut.
+
+use crate::surface::Fine;
+use crate::window::{Shown, Window};
+use glam::IVec3;
+use trepan_volume::BoneVolume;
+
+/// Two windows that show the same box of nodes.
+pub(crate) struct Nodes {
+    cut: Window,
+    density: Window,
+}
+
+impl Nodes {
+    pub fn new() -> Self {
+        Self { cut: Window::new(Shown::Cut), density: Window::new(Shown::Density) }
+    }
+
+    /// Everything is to be read anew.
+    pub fn forget(&mut self) {
+        self.cut.forget();
+        self.density.forget();
+    }
+
+    /// Makes the windows hold all nodes within `half` of `centre`. Returns the nodes read, or
+    /// `None` when that is more than they can hold.
+    pub fn cover(&mut self, bone: &BoneVolume, centre: IVec3, half: i32) -> Option<u32> {
+        self.density.cover(bone, centre, half)?;
+        self.cut.cover(bone, centre, half)
+    }
+
+    /// Reads anew what others have changed. Returns whether there was anything.
+    pub fn renew(&mut self, bone: &BoneVolume) -> bool {
+        self.cut.renew(bone) | self.density.renew(bone)
+    }
+
+    /// The bone that they show.
+    pub fn fine(&self) -> Fine<'_> {
+        Fine { density: &self.density, cut: &self.cut }
+    }
+
+    /// The window of the cut, to change it, and that of the densities.
+    pub fn split(&mut self) -> (&mut Window, &Window) {
+        (&mut self.cut, &self.density)
+    }
+}
