@@ -4,9 +4,11 @@
 //! After each stroke of a cutting tool a flood fill starts in the middle of the flap. It visits a
 //! few hundred voxels per tick while nothing cuts ([`FlapSearch`]). Lifting and putting back write
 //! a fixed number of voxels per tick. Everything depends on the ticks alone, so a replay lifts the
-//! same voxels. Bone under the isovalue at the flap's rim is not lifted.
+//! same voxels. Bone under the isovalue at the flap's rim is not lifted. What the CT shows in the
+//! cut beside the flap goes with it: else the density between the two would leave a thin wall.
 
 use crate::stages::notice::What;
+use glam::IVec3;
 use trepan_geometry::Buttons;
 use trepan_volume::{AIR_HU, BoneVolume, FlapSearch, FlapState};
 
@@ -32,12 +34,19 @@ enum State {
     Returning(usize),
 }
 
+/// A voxel that went with the flap.
+#[derive(Clone, Copy, Debug)]
+struct Lifted {
+    voxel: IVec3,
+    hu: i16,
+}
+
 /// The flap of an operation.
 #[derive(Clone, Debug)]
 pub(crate) struct Flap {
     search: FlapSearch,
     at: State,
-    densities: Vec<i16>,
+    lifted: Vec<Lifted>,
     stroke: bool,
     was_requested: bool,
     reported: bool,
@@ -49,7 +58,7 @@ impl Flap {
         Self {
             search,
             at: State::Skull,
-            densities: Vec::with_capacity(1 << 20),
+            lifted: Vec::with_capacity(1 << 20),
             stroke: false,
             was_requested: false,
             reported: false,
@@ -95,7 +104,7 @@ impl Flap {
             State::Skull => requested.then_some(What::FlapHangs),
             State::Searched => self.look(bone, requested),
             State::Cut if requested => {
-                self.densities.clear();
+                self.lifted.clear();
                 self.at = State::Lifting(0);
                 None
             }
@@ -128,22 +137,34 @@ impl Flap {
     }
 
     fn lift(&mut self, bone: &BoneVolume, done: usize) -> Option<What> {
-        let end = (done + WRITTEN).min(self.search.voxels()).min(self.densities.capacity());
+        let all = self.search.voxels();
+        let end = (done + WRITTEN).min(all);
         for at in done..end {
             let voxel = self.search.voxel(at);
-            self.densities.push(bone.hu(voxel));
-            bone.set_hu(voxel, AIR_HU);
+            self.take(bone, voxel);
+            for beside in (0..27).map(|n| voxel + IVec3::new(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)) {
+                if bone.ct(beside) >= bone.isovalue() && !bone.is_bone(beside) {
+                    self.take(bone, beside);
+                }
+            }
         }
-        let whole = end == self.search.voxels().min(self.densities.capacity());
+        let whole = end == all || self.lifted.len() == self.lifted.capacity();
         self.at = if whole { State::Away } else { State::Lifting(end) };
         whole.then(|| What::FlapLifted(self.mm3(bone)))
     }
 
+    fn take(&mut self, bone: &BoneVolume, voxel: IVec3) {
+        if self.lifted.len() < self.lifted.capacity() {
+            self.lifted.push(Lifted { voxel, hu: bone.ct(voxel) });
+            bone.set_hu(voxel, AIR_HU);
+        }
+    }
+
     fn put_back(&mut self, bone: &BoneVolume, done: usize) -> Option<What> {
-        let end = (done + WRITTEN).min(self.densities.len());
-        (done..end).for_each(|at| bone.set_hu(self.search.voxel(at), self.densities[at]));
+        let end = (done + WRITTEN).min(self.lifted.len());
+        self.lifted[done..end].iter().for_each(|lifted| bone.set_hu(lifted.voxel, lifted.hu));
         bone.came_back();
-        let whole = end == self.densities.len();
+        let whole = end == self.lifted.len();
         self.at = if whole { State::Cut } else { State::Returning(end) };
         whole.then_some(What::FlapReturned)
     }
@@ -152,7 +173,6 @@ impl Flap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::IVec3;
     use trepan_geometry::Vec3;
     use trepan_volume::VoxelVolume;
 
