@@ -32,6 +32,8 @@ const WIDER_NODES: f32 = 0.06;
 const STEP: f32 = 0.01;
 /// Ticks whose earnings a burr keeps that does not come to cut.
 const KEPT_TICKS: f32 = 20.0;
+/// Ticks without the pedal after which a cut begins anew: a pedal may flicker.
+const PAUSE: u32 = 20;
 /// How near the proxy stands to where the burr has cut to, mm.
 const STANDS_MM: f32 = 0.01;
 /// Free way ahead that tells the far side of a bone from a hollow in it, mm.
@@ -102,6 +104,8 @@ pub(crate) struct Burr {
     changed: bool,
     /// Whether the last cut opened a node or a voxel.
     opened: bool,
+    /// Ticks since it worked.
+    paused: u32,
     /// Whether the spindle has stalled.
     stalled: bool,
     /// Direction of the last cut.
@@ -123,6 +127,7 @@ impl Burr {
             at: None,
             changed: false,
             opened: false,
+            paused: 0,
             stalled: false,
             forward: Vec3::ZERO,
         }
@@ -134,8 +139,15 @@ impl Burr {
         self.rest();
     }
 
-    /// The burr does not work: what it has earned is lost.
-    pub fn rest(&mut self) {
+    /// The burr does not work for a tick. After some of them what it has earned is lost.
+    pub fn pause(&mut self) {
+        self.paused = self.paused.saturating_add(1);
+        if self.paused > PAUSE {
+            self.rest();
+        }
+    }
+
+    fn rest(&mut self) {
         (self.earned_mm3, self.enough, self.way, self.at) = (0.0, 0.0, 0.0, None);
     }
 
@@ -151,13 +163,14 @@ impl Burr {
 
     /// How far from the centre of a burr nodes are read, nodes; its side is `side_mm` long.
     pub fn reach(bone: &BoneVolume, radius_mm: f32, side_mm: f32) -> i32 {
-        ((radius_mm + 0.5 * side_mm) / bone.node_mm() + BAND + STRIDE).ceil() as i32 + 3
+        ((radius_mm + 0.5 * side_mm) / bone.node_mm() + BAND + STRIDE).ceil() as i32 + 4
     }
 
     /// Takes bone away and says in `out` how much, how fast the spindle turned and whether it broke
     /// through. `nodes` may show any place, but nothing old.
     pub fn cut(&mut self, bone: &BoneVolume, cut: &Cut, nodes: &mut Nodes, out: &mut RigidStep) {
         self.bites.clear();
+        self.paused = 0;
         (self.changed, self.opened, self.forward) = (false, false, (cut.device - cut.proxy).normalize_or_zero());
         let sound = cut.depth_mm.is_finite() && cut.dt_ms.is_finite();
         if !sound || cut.depth_mm <= 0.0 || cut.dt_ms <= 0.0 {

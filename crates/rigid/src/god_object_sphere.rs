@@ -441,7 +441,7 @@ impl RigidContact for GodObjectSphere {
                 self.lean.opened(radius_mm / bone.spacing_mm() + 4.0);
             }
         } else {
-            self.burr.rest();
+            self.burr.pause();
         }
     }
 

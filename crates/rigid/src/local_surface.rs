@@ -108,7 +108,7 @@ impl LocalSurface {
             out.fallbacks += 1;
             return false;
         };
-        let far = radius + reach + AHEAD + self.disc;
+        let far = radius + reach + AHEAD + self.disc * bone.cut_nodes() as f32;
         let hollow = if clear { radius - AHEAD - 1.0 } else { 0.0 };
         self.discs.gather(&self.nodes.fine(), centre, hollow, far);
         (self.at, self.worn) = (Some(centre), false);

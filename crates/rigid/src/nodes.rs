@@ -9,11 +9,15 @@ use trepan_volume::BoneVolume;
 pub(crate) struct Nodes {
     cut: Window,
     density: Window,
+    /// Nodes from one voxel to the next.
+    stride: i32,
+    /// Whether anything was cut nearby.
+    near: bool,
 }
 
 impl Nodes {
     pub fn new() -> Self {
-        Self { cut: Window::new(Shown::Cut), density: Window::new(Shown::Density) }
+        Self { cut: Window::new(Shown::Cut), density: Window::new(Shown::Density), stride: 1, near: false }
     }
 
     /// Everything is to be read anew.
@@ -25,6 +29,8 @@ impl Nodes {
     /// Makes the windows hold all nodes within `half` of `centre`. Returns the nodes read, or
     /// `None` when that is more than they can hold.
     pub fn cover(&mut self, bone: &BoneVolume, centre: IVec3, half: i32) -> Option<u32> {
+        self.stride = bone.cut_nodes();
+        self.near = bone.is_cut_near(centre - half, centre + half);
         self.density.cover(bone, centre, half)?;
         self.cut.cover(bone, centre, half)
     }
@@ -36,7 +42,7 @@ impl Nodes {
 
     /// The bone that they show.
     pub fn fine(&self) -> Fine<'_> {
-        Fine { density: &self.density, cut: &self.cut }
+        Fine { density: &self.density, cut: &self.cut, stride: self.stride, near: self.near }
     }
 
     /// The window of the cut, to change it, and that of the densities.

@@ -54,6 +54,8 @@ const SAME: f32 = 0.8;
 /// Fall of the cut along an edge under which a steeper edge is nearby, HU. The cosine of a
 /// surface's angle with one of the axes is at least 0.58.
 const GRAZED: f32 = 500.0;
+/// Widest disc that does not stand out over a cut which ends over two nodes away, cells.
+const WIDEST: f32 = 1.2;
 /// Slope of the cut along an edge that counts as steep, HU a cell.
 const STEEP: f32 = -300.0;
 /// Radius of a disc on the cut, cells. A wider one, a little tilted, would stand out in a hollow.
@@ -84,10 +86,6 @@ pub(crate) struct Disc {
 pub(crate) trait Solid {
     /// How far a cell is over the border of bone in a field, HU or 1000 a node.
     fn over(&self, field: Field, cell: IVec3) -> f32;
-    /// The same of a cell and the next two along x.
-    fn three_over(&self, field: Field, cell: IVec3) -> [f32; 3] {
-        core::array::from_fn(|i| self.over(field, cell.with_x(cell.x + i as i32)))
-    }
     /// Whether a cell is bone.
     fn is_bone(&self, cell: IVec3) -> bool;
     /// One bit for each of `count` cells along x from `start` that is bone, at most 128.
@@ -96,6 +94,15 @@ pub(crate) trait Solid {
     }
     /// Whether there is a cut beside the densities.
     const CUT: bool = false;
+    /// Cells from one voxel to the next where the edge by `step` lies far from all cuts, else 1.
+    /// Far from cuts the surface is looked for on the edges between voxels alone.
+    fn stride(&self, _cell: IVec3, _step: IVec3) -> i32 {
+        1
+    }
+    /// Widest disc, cells.
+    fn widest(&self) -> f32 {
+        f32::MAX
+    }
 }
 
 /// Which field bounds the bone.
@@ -112,22 +119,27 @@ pub(crate) enum Field {
 pub(crate) struct Fine<'a> {
     pub density: &'a Window,
     pub cut: &'a Window,
+    /// Nodes from one voxel to the next.
+    pub stride: i32,
+    /// Whether anything was cut nearby.
+    pub near: bool,
 }
 
 impl Solid for Fine<'_> {
     const CUT: bool = true;
 
+    fn stride(&self, cell: IVec3, step: IVec3) -> i32 {
+        if self.cut.at(cell) == 0 && self.cut.at(cell + step) == 0 { self.stride } else { 1 }
+    }
+
+    fn widest(&self) -> f32 {
+        if self.near { WIDEST } else { f32::MAX }
+    }
+
     fn over(&self, field: Field, cell: IVec3) -> f32 {
         match field {
             Field::Density => self.density.over(cell),
             Field::Cut => self.cut.over(cell),
-        }
-    }
-
-    fn three_over(&self, field: Field, cell: IVec3) -> [f32; 3] {
-        match field {
-            Field::Density => self.density.three_over(cell),
-            Field::Cut => self.cut.three_over(cell),
         }
     }
 
@@ -363,6 +375,10 @@ impl Discs {
     /// The crossing from a bone voxel to its neighbour `to`, if it is `within` reach of the tool.
     fn edge<S: Solid>(&mut self, solid: &S, local: IVec3, to: u8, within: impl Fn(Vec3) -> bool, shaft: bool) {
         let (cell, step) = (self.base + local, NEIGHBOURS[usize::from(to)]);
+        let stride = solid.stride(cell, step);
+        if (cell % stride * (1 - step * step)) != IVec3::ZERO {
+            return;
+        }
         if S::CUT && is_grazed(solid, cell, step) {
             return;
         }
@@ -374,7 +390,8 @@ impl Discs {
             self.overflow += 1;
             return;
         }
-        self.list.push(Disc { centre: x, normal: step.as_vec3(), radius: self.radius, shaft });
+        let radius = stride as f32 * self.radius;
+        self.list.push(Disc { centre: x, normal: step.as_vec3(), radius, shaft });
         self.voxels += u32::from(self.edges.last().is_none_or(|edge: &Edge| edge.voxel != local));
         self.edges.push(Edge { voxel: local, to, field, shaped: false });
     }
@@ -437,17 +454,24 @@ fn end_of_bone([a, b, c, d]: [f32; 4]) -> f32 {
 /// along `edge`.
 fn disc<S: Solid>(solid: &S, base: IVec3, (x, field): (Vec3, Field), edge: Vec3, radius: f32) -> Disc {
     // Where the other field ends the bone nearby the disc must not stand out over that edge.
-    let radius = if field == Field::Cut { CUT_DISC.min(radius) } else { radius };
-    let radius = if S::CUT { radius.min(to_edge(solid, field, base, x, edge).max(0.0)) } else { radius };
+    let (step, along) = (edge.as_ivec3(), x.dot(edge));
+    let cell = base + x.round().as_ivec3() + (along.floor() - along.round()) as i32 * step;
+    let stride = solid.stride(cell, step);
+    let mut radius = match field {
+        Field::Cut => CUT_DISC.min(radius),
+        Field::Density => (stride as f32 * radius).min(solid.widest()),
+    };
+    if S::CUT && stride == 1 {
+        // Where the other field ends the bone nearby the disc must not stand out over that edge.
+        radius = radius.min(to_edge(solid, field, base, x, edge).max(0.0));
+    }
     if field == Field::Cut {
         // A distance: its slope at the ends of the edge says it all.
-        let (step, along) = (edge.as_ivec3(), x.dot(edge));
-        let cell = base + x.round().as_ivec3() + (along.floor() - along.round()) as i32 * step;
         let slope = slope(solid, field, cell).lerp(slope(solid, field, cell + step), along - along.floor());
         let normal = (-slope).normalize_or(edge);
         return Disc { centre: x, normal, radius, shaft: false };
     }
-    let block = Block::read(solid, field, base, x);
+    let block = Block::read(solid, stride, base, x);
     let shape = Shape::of(&block);
     let size = shape.slope.length();
     // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than
@@ -458,7 +482,8 @@ fn disc<S: Solid>(solid: &S, base: IVec3, (x, field): (Vec3, Field), edge: Vec3,
     let rough = -shape.slope / size;
     let normal = block.fitted(rough).unwrap_or(rough);
     let bend = shape.bend(normal) / size;
-    let radius = if bend > 0.0 { (2.0 * STAND_OUT / bend).sqrt().clamp(SMALLEST.min(radius), radius) } else { radius };
+    let flat = stride as f32 * (2.0 * STAND_OUT / bend.max(1e-9)).sqrt();
+    let radius = if bend > 0.0 { flat.clamp(SMALLEST.min(radius), radius) } else { radius };
     Disc { centre: x, normal, radius, shaft: false }
 }
 
@@ -508,17 +533,17 @@ struct Block {
 }
 
 impl Block {
-    fn read(solid: &impl Solid, field: Field, base: IVec3, x: Vec3) -> Self {
-        let middle = x.round();
-        let corner = base + middle.as_ivec3() - 1;
-        let mut hu = [[[0.0; 3]; 3]; 3];
-        for (k, layer) in (0..).zip(&mut hu) {
-            for (j, cells) in (0..).zip(layer) {
-                let row = solid.three_over(field, corner + IVec3::new(0, j, k));
-                *cells = row.map(|over| over.clamp(-CLAMP_HU, CLAMP_HU));
-            }
-        }
-        Self { hu, off: middle - x }
+    fn read(solid: &impl Solid, stride: i32, base: IVec3, x: Vec3) -> Self {
+        // The nearest voxel, where only those count.
+        let all = base.as_vec3() + x;
+        let middle = stride as f32 * (all / stride as f32).round() - base.as_vec3();
+        let centre = base + middle.as_ivec3();
+        let over = |i: usize, j: usize, k: usize| {
+            let step = IVec3::new(i as i32, j as i32, k as i32) - 1;
+            solid.over(Field::Density, centre + stride * step).clamp(-CLAMP_HU, CLAMP_HU)
+        };
+        let hu = core::array::from_fn(|k| core::array::from_fn(|j| core::array::from_fn(|i| over(i, j, k))));
+        Self { hu, off: (middle - x) / stride as f32 }
     }
 
     fn taps(&self) -> [[[f32; 3]; 3]; 3] {

@@ -181,13 +181,6 @@ impl Window {
         }
     }
 
-    /// The same of a cell and the next two along x.
-    #[inline]
-    pub fn three_over(&self, cell: IVec3) -> [f32; 3] {
-        let row = self.row(cell);
-        [0, 1, 2].map(|i| self.scaled(row.at(cell.x + i)))
-    }
-
     fn index(&self, voxel: IVec3) -> usize {
         let mask = (1 << self.bits) - 1;
         let v = voxel & IVec3::splat(mask);

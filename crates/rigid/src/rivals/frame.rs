@@ -104,7 +104,7 @@ impl<R: Rival> RigidContact for Framed<R> {
         }
         (self.held.cuts, self.held.dt_ms) = (drilling && self.held.tool.kind.cuts(), dt_ms);
         if !self.held.cuts {
-            self.held.burr.rest();
+            self.held.burr.pause();
         }
         self.rival.tick(bone, tool, &mut self.held, out);
     }
