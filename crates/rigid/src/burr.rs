@@ -1,14 +1,14 @@
 //! The cutting side of a tool: what it reaches, and what it takes by a law of removal.
 
 use crate::RigidStep;
-use crate::cut_ball::{BAND, BEHIND, Eight, LANES, Paid, Place, Side, outside};
+use crate::cut_ball::{BAND, Eight, FrontRows, LANE, LANES, Paid, Place, Side, Taken, lanes};
 use crate::nodes::Nodes;
 use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
-use crate::surface::{Field, Solid};
 use glam::{IVec3, Vec3Swizzles};
 use trepan_geometry::Vec3;
-use trepan_volume::{AIR_HU, BoneVolume, CUT_STEPS, CUT_SURFACE, cut_depth};
+use trepan_volume::{AIR_HU, BoneVolume, CUT_SURFACE};
+use wide::f32x8;
 
 /// Fall of the ramp down to which the per-tick law cuts at the burr's surface, HU per voxel.
 const RAMP_HU: f32 = 1000.0;
@@ -67,15 +67,6 @@ enum Stop {
     Beyond,
 }
 
-/// A node that the burr's front may reach.
-#[derive(Clone, Copy, Debug, Default)]
-struct Reached {
-    node: IVec3,
-    /// Its value before.
-    value: i16,
-    place: Place,
-}
-
 /// One voxel that the per-tick law reaches.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bite {
@@ -88,7 +79,7 @@ struct Bite {
 /// The cutting side of one tool.
 pub(crate) struct Burr {
     law: RemovalLaw,
-    reached: Vec<Reached>,
+    reached: Vec<Eight>,
     paid: Paid,
     bites: Vec<Bite>,
     limit: usize,
@@ -226,7 +217,8 @@ impl Burr {
                 Stop::Beyond => break (stop, most),
             }
         };
-        let spent = self.open(bone, radius, way, nodes, out);
+        let Taken { cost: spent, volume } = self.paid.taken(radius, way);
+        self.opened = self.open(bone, radius, way, nodes, out);
         self.changed = true;
         if stop == Stop::At(way) && way > 0.0 {
             self.enough = spent * (STEP / way).min(1.0);
@@ -238,7 +230,7 @@ impl Burr {
             // All within reach is not worth what was earned: the burr idles.
             self.rest();
         }
-        out.removed_mm3 *= node_mm3;
+        out.removed_mm3 = volume * node_mm3;
     }
 
     /// Takes density from `voxels` by the per-tick law, wherever they are.
@@ -263,67 +255,60 @@ impl Burr {
     ) -> bool {
         self.reached.clear();
         self.paid.clear();
-        let (solid, forward, mut over) = (nodes.fine(), self.forward, false);
+        let (forward, mut over) = (self.forward, false);
+        let (cut, density) = (nodes.cut(), nodes.density());
         let Self { reached, paid, law, limit, .. } = self;
-        let long = side.half;
-        let ball = GridBall { centre, radius: radius + BAND + most + long };
-        let hole = GridBall { centre, radius: hollow };
-        rows(ball, hole, |start, to| {
-            let first = start.as_vec3() - centre;
-            let values = solid.cut.row(start);
-            // What lies behind needs no look.
-            let (across, rest) = (first.yz().length_squared(), first.yz().dot(forward.yz()));
-            let cut_off = (BEHIND - long - rest) / forward.x - first.x;
-            let (from, to) = match forward.x {
-                fx if fx > 1e-3 => (start.x + (cut_off.clamp(0.0, 1e6) as i32), to),
-                fx if fx < -1e-3 => (start.x, to.min(start.x.saturating_add(cut_off.clamp(-1.0, 1e6) as i32))),
-                _ if rest + long < BEHIND - 1.0 => return,
-                _ => (start.x, to),
-            };
-            let mut x = from;
+        let (long, border) = (side.half, f32::from(density.border()));
+        let bounds = FrontRows { centre, forward, long, radius: radius + BAND + most + long, hollow };
+        bounds.each(|start, to, hole| {
+            let mut x = start.x & -(LANES as i32);
             while x <= to {
-                let dx = first.x + (x - start.x) as f32;
-                let all = if long == 0.0 {
-                    Eight::of(|lane| {
-                        let dx = dx + lane as f32;
-                        (rest + dx * forward.x, across + dx * dx, values.at(x + lane))
-                    })
+                if x >= hole.0 && x + LANES as i32 - 1 <= hole.1 {
+                    x += LANES as i32;
+                    continue;
+                }
+                let (node, from) = (start.with_x(x), start.x);
+                let first = node.as_vec3() - centre;
+                let (across, rest) = (first.yz().length_squared(), first.yz().dot(forward.yz()));
+                let place = if long == 0.0 {
+                    let dx = first.x + LANE;
+                    Place { along: rest + dx * forward.x, apart: across + dx * dx }
                 } else {
-                    Eight::of(|lane| {
-                        let off = side.nearest(first.with_x(dx + lane as f32));
-                        (off.dot(forward), off.length_squared(), values.at(x + lane))
-                    })
+                    let off: [Vec3; LANES] = core::array::from_fn(|n| side.nearest(first + n as f32 * Vec3::X));
+                    let of = |each: fn(&Vec3, Vec3) -> f32| f32x8::new(off.each_ref().map(|off| each(off, forward)));
+                    Place { along: of(|off, forward| off.dot(forward)), apart: of(|off, _| off.length_squared()) }
                 };
-                let mut hits = all.reached(radius, most) & (0xFF >> (7 - (to - x).min(7)));
-                while hits != 0 {
-                    let lane = hits.trailing_zeros() as usize;
-                    hits &= hits - 1;
-                    if reached.len() == *limit {
-                        over = true;
-                        return;
-                    }
-                    let node = start.with_x(x + lane as i32);
-                    let (value, place) = (all.value[lane], Place { along: all.along[lane], apart: all.apart[lane] });
-                    reached.push(Reached { node, value, place });
-                    let before = cut_depth(value);
-                    if before < 0.5 && place.apart_after(most) < (radius + 0.5) * (radius + 0.5) {
-                        let over = solid.over(Field::Density, node);
-                        let share = outside(before, radius).min(0.5 + over / PARTIAL_HU);
-                        if share > 0.0 {
-                            paid.push(place, share, law.price(over + f32::from(solid.density.border())));
-                        }
+                let mut all = Eight::of(node, *cut.eight(node), place);
+                let which = (0xFF << (from - x).max(0)) & (0xFF >> (7 - (to - x).min(7)));
+                all.hits = all.reached(which, radius, most);
+                x += LANES as i32;
+                if all.hits == 0 {
+                    continue;
+                }
+                if reached.len() == *limit {
+                    over = true;
+                    return;
+                }
+                let hu = density.eight(node);
+                let (shares, may) = all.paid(radius, most);
+                for lane in lanes(may) {
+                    let hu = f32::from(hu[lane]);
+                    let share = shares.as_array()[lane].min(0.5 + (hu - border) / PARTIAL_HU);
+                    if share > 0.0 {
+                        paid.push(&all.place, lane, share, law.price(hu));
                     }
                 }
-                x += LANES as i32;
+                reached.push(all);
             }
         });
+        paid.fill_up();
         over
     }
 
     /// Where the ball stops that has `earned` so many node³ of reference bone. It may go from the
     /// first to the second of `between`.
     fn stop(&self, radius: f32, between: (f32, f32), earned: f32) -> Stop {
-        let cost = |way: f32| self.paid.cost(radius, way);
+        let cost = |way: f32| self.paid.taken(radius, way).cost;
         let zero = cost(0.0) - earned;
         let ends = if zero < 0.0 { (0.0, between.1) } else { (between.0, 0.0) };
         let of = |way: f32| if way == 0.0 { zero } else { cost(way) - earned };
@@ -354,45 +339,32 @@ impl Burr {
         Stop::At(way)
     }
 
-    /// Adds the ball that has gone `way` to the cut. Returns what that cost, node³ of bone of the
-    /// reference density, and adds the volume of the bone, node³, to `out`.
-    fn open(&mut self, bone: &BoneVolume, radius: f32, way: f32, nodes: &mut Nodes, out: &mut RigidStep) -> f32 {
-        let (law, forward, mut opened, mut spent) = (self.law, self.forward, false, 0.0);
-        let (mut writer, (cut, density)) = (bone.cut_writer(), nodes.split());
-        for reached in &self.reached {
-            let depth = reached.place.depth(radius, way).clamp(-BAND, BAND);
-            // The border plus what rounds to the nearest; all of it is positive.
-            let value = (f32::from(CUT_SURFACE) + 0.5 + depth * CUT_STEPS) as i16;
-            if value <= reached.value {
+    /// Adds the ball that has gone `way` to the cut. Returns whether nodes of bone opened.
+    fn open(&self, bone: &BoneVolume, radius: f32, way: f32, nodes: &mut Nodes, out: &mut RigidStep) -> bool {
+        let (mut writer, (cut, density), mut opened) = (bone.cut_writer(), nodes.split(), false);
+        for eight in &self.reached {
+            let (values, changed) = eight.cut(radius, way);
+            if changed == 0 {
                 continue;
             }
-            if !writer.set(reached.node, value) {
+            let hu = density.eight(eight.node);
+            let is_bone = |lane: &usize| hu[*lane] >= density.border();
+            if !writer.set_eight(eight.node, values, changed) {
                 // Beyond the grid there is no bone.
-                out.fallbacks += u32::from(density.over(reached.node) >= 0.0);
+                out.fallbacks += lanes(changed).filter(is_bone).count() as u32;
                 continue;
             }
-            cut.put(reached.node, value);
-            let (before, after) = (outside(cut_depth(reached.value), radius), outside(cut_depth(value), radius));
-            if before <= after {
-                continue;
-            }
-            let over = density.over(reached.node);
-            let share = 0.5 + over / PARTIAL_HU;
-            if share > after {
-                let gone = before.min(share) - after;
-                out.removed_mm3 += gone;
-                spent += law.price(over + f32::from(density.border())) * gone;
-            }
-            if reached.value < CUT_SURFACE && value >= CUT_SURFACE && over >= 0.0 {
+            cut.put_eight(eight.node, values, changed);
+            let opens = |lane: &usize| eight.was_outside(*lane) && values[*lane] >= CUT_SURFACE;
+            for lane in lanes(changed).filter(opens).filter(is_bone) {
                 opened = true;
-                let voxel = reached.node / bone.cut_nodes();
-                out.broke_through |= !out.broke_through && is_free(bone, voxel, forward);
+                let voxel = (eight.node + lane as i32 * IVec3::X) / bone.cut_nodes();
+                out.broke_through |= !out.broke_through && is_free(bone, voxel, self.forward);
             }
         }
         drop(writer);
         cut.see_all(bone);
-        self.opened = opened;
-        spent
+        opened
     }
 
     /// Lists the voxels in front of the proxy inside the ball swept from the proxy to the device,

@@ -1,11 +1,13 @@
 //! The nodes that a burr's ball reaches, and what the bone among them costs.
 //!
 //! # Practice
-//! Lengths are nodes, seen from where the ball starts. Eight nodes of a row are looked at together;
-//! sums run in eight lanes.
+//! Lengths are nodes, seen from where the ball starts. Eight nodes of a row are looked at and changed
+//! together; sums run in eight lanes.
 
+use glam::IVec3;
 use trepan_geometry::Vec3;
-use trepan_volume::cut_depth;
+use trepan_volume::{CUT_STEPS, CUT_SURFACE};
+use wide::{f32x8, i16x8, i32x8};
 
 /// How far from its surface the cut is kept, nodes: as far as its splines reach.
 pub(crate) const BAND: f32 = 2.1;
@@ -39,74 +41,169 @@ impl Side {
     }
 }
 
-/// Where a node lies to the burr.
-#[derive(Clone, Copy, Debug, Default)]
+/// The rows of nodes along x that the front half of a ball meets.
+pub(crate) struct FrontRows {
+    pub centre: Vec3,
+    pub forward: Vec3,
+    /// How much further back it begins.
+    pub long: f32,
+    pub radius: f32,
+    /// Radius of the part of it that is not looked at.
+    pub hollow: f32,
+}
+
+impl FrontRows {
+    /// Calls `visit` with the first node and the last x of each row, and the first and last x of
+    /// what is hollow in it. Rows may be a node longer at both ends than they need to be.
+    pub fn each(&self, mut visit: impl FnMut(IVec3, i32, (i32, i32))) {
+        let Self { centre, forward, long, radius, hollow } = *self;
+        let (low, high) = ((centre - radius).floor().as_ivec3(), (centre + radius).ceil().as_ivec3());
+        let half = |square: f32, across: f32x8| (square - across).fast_max(f32x8::ZERO).sqrt();
+        let whole = |x: f32x8| (centre.x + x).fast_round_int().to_array();
+        for k in low.z..=high.z {
+            let z = k as f32 - centre.z;
+            for j in (low.y..=high.y).step_by(LANES) {
+                let y = j as f32 - centre.y + LANE;
+                let across = y * y + z * z;
+                let (outer, inner) = (half(radius * radius, across), half(hollow.max(0.0).powi(2), across));
+                // What lies behind needs no look.
+                let behind = BEHIND - long - (y * forward.y + z * forward.z);
+                let (mut from, mut to) = (-outer, outer);
+                if forward.x > 1e-3 {
+                    from = from.fast_max(behind / forward.x);
+                } else if forward.x < -1e-3 {
+                    to = to.fast_min(behind / forward.x);
+                } else {
+                    to = behind.simd_gt(f32x8::splat(1.0)).bitselect(from - 2.0, to);
+                }
+                let [from, to, hole_from, hole_to] = [from - 0.5, to + 0.5, 0.5 - inner, inner - 0.5].map(whole);
+                let meets = across.simd_lt(f32x8::splat(radius * radius)).to_bitmask();
+                for lane in lanes(meets).filter(|lane| from[*lane] <= to[*lane]) {
+                    let start = IVec3::new(from[lane], j + lane as i32, k);
+                    visit(start, to[lane], (hole_from[lane], hole_to[lane]));
+                }
+            }
+        }
+    }
+}
+
+/// Where eight nodes lie to the burr.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
-    /// Square of its distance from the burr's start, nodes².
-    pub apart: f32,
-    /// How far it lies along the way, nodes.
-    pub along: f32,
+    /// Square of their distance from the burr's start, nodes².
+    pub apart: f32x8,
+    /// How far they lie along the way, nodes.
+    pub along: f32x8,
 }
 
 impl Place {
-    /// Square of its distance from the burr's centre on a way of `way`, nodes².
+    /// Square of their distance from the burr's centre on a way of `way`, nodes².
     #[inline]
-    pub fn apart_after(self, way: f32) -> f32 {
-        let passed = self.along.max(0.0).min(way.max(0.0));
-        (self.apart + passed * (passed - 2.0 * self.along)).max(0.0)
+    fn apart_after(self, way: f32) -> f32x8 {
+        let passed = self.along.fast_max(f32x8::ZERO).fast_min(f32x8::splat(way.max(0.0)));
+        (self.apart + passed * (passed - 2.0 * self.along)).fast_max(f32x8::ZERO)
     }
 
-    /// How deep it lies in a ball of `radius` that has gone `way`, nodes. One that has gone less
+    /// How deep they lie in a ball of `radius` that has gone `way`, nodes. One that has gone less
     /// than nothing has not left and is so much smaller.
     #[inline]
-    pub fn depth(self, radius: f32, way: f32) -> f32 {
-        radius + way.min(0.0) - self.apart_after(way).sqrt()
+    fn depth(self, radius: f32, way: f32) -> f32x8 {
+        f32x8::splat(radius + way.min(0.0)) - self.apart_after(way).sqrt()
     }
 }
 
-/// Eight nodes of a row.
+/// Eight nodes of a row, the first at a multiple of eight: one load, and never in two bricks.
 pub(crate) struct Eight {
-    pub along: [f32; LANES],
-    pub apart: [f32; LANES],
-    pub value: [i16; LANES],
+    /// The first.
+    pub node: IVec3,
+    /// One bit for each that counts.
+    pub hits: u32,
+    pub place: Place,
+    /// What the cut was there, steps of [`CUT_STEPS`] a node.
+    value: f32x8,
 }
+
+/// 0 to 7.
+pub(crate) const LANE: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
 impl Eight {
+    /// The nodes from `node` on, none of which counts yet.
     #[inline]
-    pub fn of(each: impl Fn(i32) -> (f32, f32, i16)) -> Self {
-        let mut all = Self { along: [0.0; LANES], apart: [0.0; LANES], value: [0; LANES] };
-        for lane in 0..LANES {
-            (all.along[lane], all.apart[lane], all.value[lane]) = each(lane as i32);
-        }
-        all
+    pub fn of(node: IVec3, value: [i16; LANES], place: Place) -> Self {
+        let value = f32x8::from_i32x8(i32x8::from_i16x8(i16x8::new(value)));
+        Self { node, hits: 0, place, value }
     }
 
-    /// One bit for each node that a ball of `radius` changes when it goes `most`.
+    /// How deep they lay in the cut, nodes.
     #[inline]
-    pub fn reached(&self, radius: f32, most: f32) -> u32 {
-        let mut bytes = [0u8; LANES];
-        for lane in 0..LANES {
-            // It is reached if the ball gets nearer than this, nodes.
-            let before = cut_depth(self.value[lane]);
-            let lag = if before.abs() > NEAR { LAG } else { 0.0 };
-            let most_apart = (radius - before - lag).min(radius + BAND).max(0.0);
-            let apart = Place { along: self.along[lane], apart: self.apart[lane] }.apart_after(most);
-            let hit = (self.along[lane] >= BEHIND) & (before < BAND) & (apart < most_apart * most_apart);
-            bytes[lane] = u8::from(hit);
-        }
-        (u64::from_le_bytes(bytes).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
+    fn before(&self) -> f32x8 {
+        (self.value - f32::from(CUT_SURFACE)) * (1.0 / CUT_STEPS)
     }
+
+    /// One bit for each node of `which` that a ball of `radius` changes when it goes `most`.
+    #[inline]
+    pub fn reached(&self, which: u32, radius: f32, most: f32) -> u32 {
+        // It is reached if the ball gets nearer than this, nodes.
+        let before = self.before();
+        let lag = before.abs().simd_gt(f32x8::splat(NEAR)) & f32x8::splat(LAG);
+        let most_apart = (radius - before - lag).fast_min(f32x8::splat(radius + BAND)).fast_max(f32x8::ZERO);
+        let reached = self.place.apart_after(most).simd_lt(most_apart * most_apart);
+        let ahead = self.place.along.simd_ge(f32x8::splat(BEHIND));
+        which & (reached & ahead & before.simd_lt(f32x8::splat(BAND))).to_bitmask()
+    }
+
+    /// How much of each is outside the cut, and one bit for each hit that may hold bone which a
+    /// ball of `radius` takes when it goes `most`.
+    #[inline]
+    pub fn paid(&self, radius: f32, most: f32) -> (f32x8, u32) {
+        let (share, edge) = (outside(self.before(), radius), f32x8::splat((radius + 0.5) * (radius + 0.5)));
+        let taken = share.simd_gt(f32x8::ZERO) & self.place.apart_after(most).simd_lt(edge);
+        (share, self.hits & taken.to_bitmask())
+    }
+
+    /// The values when a ball of `radius` has gone `way`, and one bit for each hit that it changes.
+    #[inline]
+    pub fn cut(&self, radius: f32, way: f32) -> ([i16; LANES], u32) {
+        let depth = self.place.depth(radius, way).fast_max(f32x8::splat(-BAND)).fast_min(f32x8::splat(BAND));
+        let value = (depth * CUT_STEPS + f32::from(CUT_SURFACE)).fast_round_int();
+        let changed = f32x8::from_i32x8(value).simd_gt(self.value);
+        (value.to_array().map(|value| value as i16), self.hits & changed.to_bitmask())
+    }
+
+    /// Whether a node was outside the cut.
+    pub fn was_outside(&self, lane: usize) -> bool {
+        self.value.as_array()[lane] < f32::from(CUT_SURFACE)
+    }
+}
+
+/// The lanes of which a bit is set.
+#[inline]
+pub(crate) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let lane = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        (lane < LANES).then_some(lane)
+    })
 }
 
 /// Nodes of bone that the burr may take some of, eight by eight.
 #[derive(Default)]
 pub(crate) struct Paid {
-    pub along: Vec<f32>,
-    pub apart: Vec<f32>,
+    along: Vec<f32>,
+    apart: Vec<f32>,
     /// How much of each node is bone.
-    pub share: Vec<f32>,
+    share: Vec<f32>,
     /// What a node of bone costs there.
-    pub price: Vec<f32>,
+    price: Vec<f32>,
+}
+
+/// Bone that a ball takes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Taken {
+    /// As if all of it had the reference density, node³.
+    pub cost: f32,
+    /// node³.
+    pub volume: f32,
 }
 
 impl Paid {
@@ -116,35 +213,42 @@ impl Paid {
     }
 
     pub fn clear(&mut self) {
-        for each in [&mut self.along, &mut self.apart, &mut self.share, &mut self.price] {
-            each.clear();
+        self.all().into_iter().for_each(Vec::clear);
+    }
+
+    fn all(&mut self) -> [&mut Vec<f32>; 4] {
+        [&mut self.along, &mut self.apart, &mut self.share, &mut self.price]
+    }
+
+    /// Adds the node in a lane of `place` of which `share` is bone.
+    pub fn push(&mut self, place: &Place, lane: usize, share: f32, price: f32) {
+        let (along, apart) = (place.along.as_array()[lane], place.apart.as_array()[lane]);
+        for (list, value) in self.all().into_iter().zip([along, apart, share, price]) {
+            list.push(value);
         }
     }
 
-    pub fn push(&mut self, place: Place, share: f32, price: f32) {
-        self.along.push(place.along);
-        self.apart.push(place.apart);
-        self.share.push(share);
-        self.price.push(price);
+    /// Fills the last eight up with nodes that hold nothing.
+    pub fn fill_up(&mut self) {
+        let full = self.along.len().next_multiple_of(LANES);
+        self.all().into_iter().for_each(|list| list.resize(full, 0.0));
     }
 
-    /// What the bone costs that a ball of `radius` takes on a way of `way`, node³.
-    pub fn cost(&self, radius: f32, way: f32) -> f32 {
-        let one = |along: f32, apart: f32, share: f32, price: f32| {
-            price * (share - outside(Place { along, apart }.depth(radius, way), radius)).max(0.0)
-        };
-        let mut sums = [0.0; LANES];
-        let (along, rest) = self.along.as_chunks::<LANES>();
-        let (apart, share, price) =
-            (self.apart.as_chunks::<LANES>().0, self.share.as_chunks::<LANES>().0, self.price.as_chunks::<LANES>().0);
-        for (((along, apart), share), price) in along.iter().zip(apart).zip(share).zip(price) {
-            for lane in 0..LANES {
-                sums[lane] += one(along[lane], apart[lane], share[lane], price[lane]);
-            }
+    /// The bone that a ball of `radius` takes on a way of `way`.
+    pub fn taken(&self, radius: f32, way: f32) -> Taken {
+        let (mut costs, mut volumes) = (f32x8::ZERO, f32x8::ZERO);
+        fn eights(list: &[f32]) -> impl Iterator<Item = &[f32; LANES]> {
+            list.as_chunks().0.iter()
         }
-        let last = self.along.len() - rest.len();
-        let rest = (last..self.along.len()).map(|n| one(self.along[n], self.apart[n], self.share[n], self.price[n]));
-        sums.iter().sum::<f32>() + rest.sum::<f32>()
+        let places = eights(&self.along).zip(eights(&self.apart));
+        for ((along, apart), (share, price)) in places.zip(eights(&self.share).zip(eights(&self.price))) {
+            let place = Place { along: f32x8::new(*along), apart: f32x8::new(*apart) };
+            let after = outside(place.depth(radius, way), radius);
+            let volume = (f32x8::new(*share) - after).fast_max(f32x8::ZERO);
+            volumes += volume;
+            costs += f32x8::new(*price) * volume;
+        }
+        Taken { cost: costs.reduce_add(), volume: volumes.reduce_add() }
     }
 }
 
@@ -153,6 +257,6 @@ impl Paid {
 /// In a round hole that counts `π (R² + 1/12)` nodes² where there are `π R²`; a border that lies
 /// `1/(24 R)` further out makes up for it.
 #[inline]
-pub(crate) fn outside(depth: f32, radius: f32) -> f32 {
-    (0.5 + 1.0 / (24.0 * radius) - depth).clamp(0.0, 1.0)
+pub(crate) fn outside(depth: f32x8, radius: f32) -> f32x8 {
+    (0.5 + 1.0 / (24.0 * radius) - depth).fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
 }

@@ -67,6 +67,7 @@ impl LocalSurface {
     /// The burr has cut; `opened` when a node is not bone any more.
     pub fn cut(&mut self, opened: bool) {
         self.worn = true;
+        self.discs.wear();
         if opened {
             self.at = None;
         }

@@ -45,6 +45,16 @@ impl Nodes {
         Fine { density: &self.density, cut: &self.cut, stride: self.stride, near: self.near }
     }
 
+    /// The cut.
+    pub fn cut(&self) -> &Window {
+        &self.cut
+    }
+
+    /// The densities.
+    pub fn density(&self) -> &Window {
+        &self.density
+    }
+
     /// The window of the cut, to change it, and that of the densities.
     pub fn split(&mut self) -> (&mut Window, &Window) {
         (&mut self.cut, &self.density)

@@ -29,8 +29,8 @@
 //!
 //! # Practice
 //! Lengths are cells, in a frame shifted to a whole cell near the tool ([`Discs::base`]). Bone is
-//! found 8 cells at once; a disc costs some 30 ns. One that was there before keeps its normal for a
-//! few gatherings. The capacity is fixed; what does not fit is counted.
+//! found 8 cells at once; a disc costs some 30 ns. One that was there before keeps its normal, while
+//! bone goes away for a few ticks. The capacity is fixed; what does not fit is counted.
 
 use crate::rows::{GridBall, rows};
 use crate::shaft::Shaft;
@@ -38,6 +38,7 @@ use crate::window::Window;
 use glam::IVec3;
 use trepan_geometry::Vec3;
 use trepan_volume::BoneVolume;
+use wide::i16x8;
 
 /// Density differences past this many HU from the isovalue do not bend a normal further.
 const CLAMP_HU: f32 = 1000.0;
@@ -148,9 +149,9 @@ impl Solid for Fine<'_> {
     }
 
     fn bone_bits(&self, start: IVec3, count: i32) -> u128 {
-        let border = self.cut.border();
-        let uncut = self.cut.bits(start, count, |cell| cell < border);
-        if uncut == 0 { 0 } else { uncut & self.density.bits(start, count, |cell| cell >= self.density.border()) }
+        let [cut, density] = [self.cut, self.density].map(|window| i16x8::splat(window.border()));
+        let dense = self.density.bits(start, count, |cells| !cells.simd_lt(density));
+        if dense == 0 || !self.near { dense } else { dense & self.cut.bits(start, count, |cells| cells.simd_lt(cut)) }
     }
 }
 
@@ -183,7 +184,7 @@ pub(crate) struct Discs {
     before: Vec<Before>,
     /// Bone in the rows around the tool, a bit a cell.
     bones: Vec<u128>,
-    /// How often discs have been gathered or refreshed.
+    /// How often bone has gone away.
     wear: u32,
     limit: usize,
     radius: f32,
@@ -252,6 +253,11 @@ impl Discs {
         self.before.fill(Before::default());
     }
 
+    /// Bone has gone away.
+    pub fn wear(&mut self) {
+        self.wear = self.wear.wrapping_add(1);
+    }
+
     /// The discs found.
     pub fn list(&self) -> &[Disc] {
         &self.list
@@ -261,7 +267,6 @@ impl Discs {
     /// than `hollow` are not looked at. The window must hold all voxels up to `reach` and two more.
     pub fn gather(&mut self, solid: &impl Solid, at: Vec3, hollow: f32, reach: f32) {
         self.forget();
-        self.wear = self.wear.wrapping_add(1);
         self.base = at.round().as_ivec3();
         let centre = at - self.base.as_vec3();
         // A bone voxel is up to one voxel behind its crossing.
@@ -313,7 +318,6 @@ impl Discs {
     /// be the same as when they were gathered.
     pub fn refresh(&mut self, solid: &impl Solid, centre: Vec3, reach: f32) {
         self.visited = self.list.len() as u32;
-        self.wear = self.wear.wrapping_add(1);
         for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
             let step = NEIGHBOURS[usize::from(edge.to)];
             let (x, field) = crossing(solid, self.base, edge.voxel, step);

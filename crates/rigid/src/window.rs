@@ -18,6 +18,7 @@
 use crate::rows::each;
 use glam::IVec3;
 use trepan_volume::{BRICK, BetweenScratch, BoneVolume, CUT_STEPS, CUT_SURFACE};
+use wide::i16x8;
 
 /// Largest edge, log2: 128 voxels, 4 MB.
 const MAX_BITS: u32 = 7;
@@ -198,11 +199,27 @@ impl Window {
         if self.shown == Shown::Cut { CUT_SURFACE } else { self.isovalue }
     }
 
-    /// Sets a cell of the cut to what its owner has just cut.
+    fn index_of_eight(&self, cell: IVec3) -> usize {
+        debug_assert_eq!(cell.x % 8, 0);
+        self.index(cell) & !7
+    }
+
+    /// The eight cells along x from `cell`, which is at a multiple of eight.
     #[inline]
-    pub fn put(&mut self, cell: IVec3, value: i16) {
-        let at = self.index(cell);
-        self.cells[at] = value;
+    pub fn eight(&self, cell: IVec3) -> &[i16; 8] {
+        let at = self.index_of_eight(cell);
+        self.cells[at..].first_chunk().expect("the edge is a multiple of eight")
+    }
+
+    /// Sets those of the eight cells from `cell` on of which a bit is set in `which` to what their
+    /// owner has just cut.
+    #[inline]
+    pub fn put_eight(&mut self, cell: IVec3, values: [i16; 8], which: u32) {
+        let at = self.index_of_eight(cell);
+        let cells: &mut [i16; 8] = self.cells[at..].first_chunk_mut().expect("the edge is a multiple of eight");
+        for lane in 0..8 {
+            cells[lane] = if which >> lane & 1 == 1 { values[lane] } else { cells[lane] };
+        }
     }
 
     /// Takes note that what it shows of the bricks that it meets is how they are now.
@@ -210,31 +227,17 @@ impl Window {
         self.bricks(|window, brick| window.see(bone, brick));
     }
 
-    /// The row of voxels along x through `voxel`, for looks at many of them.
-    #[inline]
-    pub fn row(&self, voxel: IVec3) -> Row<'_> {
-        let mask = (1usize << self.bits) - 1;
-        let start = self.index(voxel.with_x(0));
-        Row { cells: &self.cells[start..=start + mask], mask }
-    }
-
     /// One bit for each of `count` cells along x from `start` that `holds`, at most 128.
     #[inline]
-    pub fn bits(&self, start: IVec3, count: i32, holds: impl Fn(i16) -> bool) -> u128 {
-        let (row, mut bits, mut done) = (self.row(start), 0u128, 0);
-        while done < count {
-            let from = (start.x + done) as usize & row.mask;
-            let part = ((count - done) as usize).min(row.mask + 1 - from);
-            for (n, eight) in row.cells[from..from + part].chunks(8).enumerate() {
-                let mut bytes = [0u8; 8];
-                bytes.iter_mut().zip(eight).for_each(|(byte, cell)| *byte = holds(*cell).into());
-                // Gathers the lowest bits of eight bytes.
-                let byte = u64::from_le_bytes(bytes).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-                bits |= u128::from(byte) << (done as usize + 8 * n);
-            }
-            done += part as i32;
+    pub fn bits(&self, start: IVec3, count: i32, holds: impl Fn(i16x8) -> i16x8) -> u128 {
+        let before = start.x & 7;
+        let first = start - before * IVec3::X;
+        let mut bits = 0u128;
+        for done in (0..before + count).step_by(8) {
+            let eight = u128::from(holds(i16x8::new(*self.eight(first + done * IVec3::X))).to_bitmask() & 0xFF);
+            bits |= if done == 0 { eight >> before } else { eight << (done - before) };
         }
-        bits
+        bits & !0 >> (128 - count.clamp(1, 128))
     }
 }
 
@@ -242,20 +245,6 @@ impl Window {
 fn place(brick: IVec3) -> usize {
     let b = brick & (BRICKS - 1);
     (b.x + BRICKS * (b.y + BRICKS * b.z)) as usize
-}
-
-/// One row of the window.
-pub(crate) struct Row<'a> {
-    cells: &'a [i16],
-    mask: usize,
-}
-
-impl Row<'_> {
-    /// The cell at `x`.
-    #[inline]
-    pub fn at(&self, x: i32) -> i16 {
-        self.cells[x as usize & self.mask]
-    }
 }
 
 #[cfg(test)]

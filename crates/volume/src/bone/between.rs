@@ -49,11 +49,17 @@ impl Axis {
         (self.low + count - 1).div_euclid(self.nodes) + 2 - self.first_voxel()
     }
 
-    /// Of the `n`th node: its first voxel, from the first of all, and how far it is past that.
-    fn of(&self, n: i32) -> (usize, f32) {
-        let node = self.low + n;
-        let past = node.rem_euclid(self.nodes) as f32 / self.nodes as f32;
-        ((node.div_euclid(self.nodes) - self.first_voxel()) as usize, past)
+    /// Of each of `count` nodes: its first voxel, from the first of all, and how far it is past that.
+    fn of(&self, count: i32) -> impl Iterator<Item = (usize, f32)> {
+        let (nodes, mut past, mut at) = (self.nodes, self.low.rem_euclid(self.nodes), 0);
+        (0..count).map(move |_| {
+            let here = (at, past as f32 / nodes as f32);
+            past += 1;
+            if past == nodes {
+                (past, at) = (0, at + 1);
+            }
+            here
+        })
     }
 }
 
@@ -71,34 +77,33 @@ impl BoneVolume {
         let [nx, ny, nz] = size.to_array().map(|n| n as usize);
         let (first, across) = (IVec3::new(x.first_voxel(), y.first_voxel(), z.first_voxel()), x.voxels(size.x));
         let (deep, high) = (y.voxels(size.y), z.voxels(size.z));
+        if nodes == 1 {
+            for (at, out) in out[..nx * ny * nz].chunks_exact_mut(nx).enumerate() {
+                let start = low + IVec3::new(0, (at % ny) as i32, (at / ny) as i32);
+                out.iter_mut().zip(0..).for_each(|(out, i)| *out = self.ct(start + i * IVec3::X));
+            }
+            return;
+        }
         let BetweenScratch { row, rows, layers } = scratch;
         layers.iter_mut().for_each(|layer| layer.resize(nx * ny, 0.0));
-        let mut done = 0;
+        let mut slices = z.of(size.z).zip(out.chunks_exact_mut(nx * ny)).peekable();
         for layer in 0..high {
             rows.clear();
             for j in 0..deep {
                 row.clear();
                 let start = first + IVec3::new(0, j, layer);
                 row.extend((0..across).map(|i| f32::from(self.ct(start + IVec3::new(i, 0, 0)))));
-                rows.extend((0..size.x).map(|i| {
-                    let (at, t) = x.of(i);
-                    row[at] + t * (row[at + 1] - row[at])
-                }));
+                rows.extend(x.of(size.x).map(|(at, t)| row[at] + t * (row[at + 1] - row[at])));
             }
             let fine = &mut layers[layer as usize % 2];
-            for j in 0..size.y {
-                let (at, t) = y.of(j);
+            for ((at, t), to) in y.of(size.y).zip(fine.chunks_exact_mut(nx)) {
                 let (below, above) = rows[at * nx..(at + 2) * nx].split_at(nx);
-                let to = &mut fine[j as usize * nx..][..nx];
                 to.iter_mut().zip(below.iter().zip(above)).for_each(|(to, (a, b))| *to = a + t * (b - a));
             }
-            while done < nz && z.of(done as i32).0 as i32 + 1 == layer {
-                let (at, t) = z.of(done as i32);
+            while let Some(((at, t), to)) = slices.next_if(|((at, _), _)| *at as i32 + 1 == layer) {
                 let (below, above) = (&layers[at % 2], &layers[(at + 1) % 2]);
-                let to = &mut out[done * nx * ny..][..nx * ny];
                 let whole = |a: f32, b: f32| (a + t * (b - a) + 32768.5) as i32 - 32768;
                 to.iter_mut().zip(below.iter().zip(above)).for_each(|(to, (a, b))| *to = whole(*a, *b) as i16);
-                done += 1;
             }
         }
     }

@@ -221,7 +221,7 @@ impl BoneVolume {
     }
 }
 
-/// Changes the cut node by node; readers notice after each brick, and at the latest when it is
+/// Changes the cut; readers notice after each brick, and at the latest when it is
 /// dropped.
 pub struct CutWriter<'a> {
     bone: &'a BoneVolume,
@@ -234,22 +234,41 @@ impl CutWriter<'_> {
     /// nothing changes.
     #[inline]
     pub fn set(&mut self, node: IVec3, value: i16) -> bool {
+        let lane = node.x & 7;
+        self.set_eight(node - lane * IVec3::X, [value; 8], 1 << lane)
+    }
+
+    /// Sets those of the eight nodes along x from `node` on of which a bit is set in `which`; the
+    /// first is at a multiple of eight. Returns false outside the grid and where no memory is left:
+    /// then nothing changes.
+    #[inline]
+    pub fn set_eight(&mut self, node: IVec3, values: [i16; 8], which: u32) -> bool {
+        debug_assert_eq!(node.x % 8, 0);
         let brick = node >> BRICK.trailing_zeros();
         if brick != self.brick {
-            self.publish();
-            let bone = self.bone;
-            (self.brick, self.place) = (brick, bone.cut.find_or_take(brick));
-            if let Some(place) = self.place {
-                let stored = bone.versions.len() + place;
-                if bone.strokes.is_first(stored) {
-                    let values = bone.cut.values(place);
-                    bone.strokes.keep(stored, |n| values[n].load(Ordering::Relaxed));
-                }
-            }
+            self.look_at(brick);
         }
         let Some(place) = self.place else { return false };
-        self.bone.cut.values[place * BRICK_NODES + within(node)].store(value, Ordering::Relaxed);
+        let cells = &self.bone.cut.values[place * BRICK_NODES + within(node)..][..8];
+        for (lane, (cell, value)) in cells.iter().zip(values).enumerate() {
+            // Without a branch, which nobody could foresee. Nobody else writes.
+            let value = if which >> lane & 1 == 1 { value } else { cell.load(Ordering::Relaxed) };
+            cell.store(value, Ordering::Relaxed);
+        }
         true
+    }
+
+    fn look_at(&mut self, brick: IVec3) {
+        self.publish();
+        let bone = self.bone;
+        (self.brick, self.place) = (brick, bone.cut.find_or_take(brick));
+        if let Some(place) = self.place {
+            let stored = bone.versions.len() + place;
+            if bone.strokes.is_first(stored) {
+                let values = bone.cut.values(place);
+                bone.strokes.keep(stored, |n| values[n].load(Ordering::Relaxed));
+            }
+        }
     }
 
     fn publish(&mut self) {
