@@ -13,7 +13,7 @@
 //! # Practice
 //! All lengths are voxels, in the discs' frame.
 
-use crate::half_spaces::{HalfSpace, nearest};
+use crate::half_spaces::{HalfSpace, HalfSpaces};
 use crate::shaft::Shaft;
 use crate::surface::Disc;
 use trepan_geometry::Vec3;
@@ -130,7 +130,7 @@ impl Ball {
     pub fn settle(
         &self,
         discs: &[Disc],
-        spaces: &mut Vec<HalfSpace>,
+        spaces: &mut HalfSpaces,
         centre: Vec3,
         goal: Vec3,
         (push, lean): (f32, f32),
@@ -142,11 +142,11 @@ impl Ball {
             spaces
                 .push(HalfSpace { normal: near.direction, offset: near.direction.dot(centre) - near.distance + clear });
         }
-        nearest(goal, spaces)
+        spaces.nearest(goal)
     }
 
     /// Slides from `from` towards `goal`, no further than `limits`.
-    pub fn slide(&self, discs: &[Disc], spaces: &mut Vec<HalfSpace>, from: Vec3, goal: Vec3, limits: Limits) -> Slide {
+    pub fn slide(&self, discs: &[Disc], spaces: &mut HalfSpaces, from: Vec3, goal: Vec3, limits: Limits) -> Slide {
         let mut slide = Slide { to: from, way: 0.0, rests: false, contradiction: false };
         for _ in 0..MAX_SLIDES {
             let at = slide.to;
@@ -208,7 +208,7 @@ mod tests {
             let (ball, goal) = (Ball { radius, inside: false, shaft: Shaft::default() }, Vec3::from(goal));
             // Discs through the centre have no side.
             prop_assume!(ball.clearance(&discs, Vec3::ZERO) > 0.1);
-            let slide = ball.slide(&discs, &mut Vec::new(), Vec3::ZERO, goal, Limits { reach: 0.5, way });
+            let slide = ball.slide(&discs, &mut HalfSpaces::default(), Vec3::ZERO, goal, Limits { reach: 0.5, way });
             prop_assert!(slide.to.distance(goal) <= goal.length() + 0.011, "{} > {}", slide.to.distance(goal), goal.length());
             prop_assert!(slide.way <= way + 1e-5 && slide.to.length() <= 0.5 + 1e-4);
             for disc in &discs {

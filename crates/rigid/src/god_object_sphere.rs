@@ -47,7 +47,7 @@
 
 use crate::ball::{Ball, Limits};
 use crate::burr::{Burr, Cut};
-use crate::half_spaces::{HalfSpace, supports};
+use crate::half_spaces::{HalfSpace, HalfSpaces};
 use crate::lean::Lean;
 use crate::local_surface::LocalSurface;
 use crate::method::{Descriptor, Extent, Method};
@@ -165,7 +165,9 @@ pub struct GodObjectSphere {
     pressed: Vec3,
     /// Of each touching disc, whether it is at the shaft, and the way from the tip to there, mm.
     arms: Vec<(bool, Vec3)>,
-    spaces: Vec<HalfSpace>,
+    spaces: HalfSpaces,
+    /// Those of the discs that touch.
+    touching: HalfSpaces,
     burr: Burr,
 }
 
@@ -201,7 +203,8 @@ impl GodObjectSphere {
             near: Vec::with_capacity(3 * MAX_DISCS),
             pressed: Vec3::ZERO,
             arms: Vec::with_capacity(3 * MAX_DISCS),
-            spaces: Vec::with_capacity(3 * MAX_DISCS),
+            spaces: HalfSpaces::with_capacity(3 * MAX_DISCS),
+            touching: HalfSpaces::with_capacity(3 * MAX_DISCS),
             burr: Burr::new(config.removal, MAX_REACHED),
         }
     }
@@ -370,7 +373,7 @@ impl GodObjectSphere {
         let centre = bone.node_at(self.proxy.translation) - base;
         let ball = Ball { inside: false, ..self.ball(bone) };
         let mut leans = false;
-        self.spaces.clear();
+        self.touching.clear();
         self.arms.clear();
         for disc in &self.near {
             let near = ball.nearest(disc, centre);
@@ -379,7 +382,7 @@ impl GodObjectSphere {
                 let point = bone.origin() + spacing * (centre + arm + base - near.direction * near.distance);
                 let deep = spacing * (ball.radius_at(disc) - near.distance) + lifted.dot(near.direction);
                 leans |= disc.shaft;
-                self.spaces.push(HalfSpace { normal: near.direction, offset: near.direction.dot(lifted) });
+                self.touching.push(HalfSpace { normal: near.direction, offset: near.direction.dot(lifted) });
                 self.arms.push((disc.shaft, spacing * arm));
                 out.points_in_contact += 1;
                 out.manifold.push(Contact { point, normal: near.direction, depth_mm: deep.max(0.0) });
@@ -390,8 +393,8 @@ impl GodObjectSphere {
         out.manifold.depth_mm = depth;
         out.manifold.point = self.proxy.translation - radius * out.manifold.normal;
         let (mut pinch, mut moment, mut pressed) = (0.0, Vec3::ZERO, Vec3::ZERO);
-        for (at, size) in supports(Vec3::ZERO, &self.spaces).into_iter().flatten() {
-            let (push, (shaft, arm)) = (size * self.spaces[at].normal, self.arms[at]);
+        for (at, size) in self.touching.supports(Vec3::ZERO).into_iter().flatten() {
+            let (push, (shaft, arm)) = (size * self.touching.list()[at].normal, self.arms[at]);
             pinch += size;
             moment += arm.cross(push);
             pressed += if shaft { Vec3::ZERO } else { push };

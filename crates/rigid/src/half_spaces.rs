@@ -7,10 +7,11 @@
 //! A problem of LP type in three dimensions: at most three half-spaces are active at the solution.
 //! Start with none; as long as some half-space is violated, take the one violated most and find the
 //! best active set among it and the (at most three) active ones. The distance to the goal grows
-//! with each exchange, so no set comes back.
+//! with each exchange, so no set comes back. Whatever the set to start from: that of the last
+//! solution is a good guess, and where it still holds one pass says so.
 //!
 //! # Practice
-//! Two to six exchanges are usual, each one pass over the half-spaces. Any unit of length;
+//! Two to six exchanges are usual without a guess, each one pass over the half-spaces. Any unit of length;
 //! tolerances are in that unit. Active sets are solved in f64, as their borders may be nearly
 //! parallel.
 //!
@@ -46,46 +47,65 @@ impl HalfSpace {
     }
 }
 
-/// The point of all `spaces` nearest to `goal`; `None` when there is none (or rounding hides it).
-pub(crate) fn nearest(goal: Vec3, spaces: &[HalfSpace]) -> Option<Vec3> {
-    Some(solved(goal, spaces)?.0)
+/// Half-spaces, with those of them that held the last solution as the first guess of the next.
+#[derive(Default)]
+pub(crate) struct HalfSpaces {
+    list: Vec<HalfSpace>,
+    /// Places of those that held the last solution.
+    held: Vec<usize>,
 }
 
-/// The half-spaces that keep the nearest point off `goal`, each with its weight. The sum of their
-/// normals so weighted is the way from the goal.
-pub(crate) fn supports(goal: Vec3, spaces: &[HalfSpace]) -> Option<impl Iterator<Item = (usize, f32)>> {
-    let (x, active) = solved(goal, spaces)?;
-    let normals: [DVec3; 3] =
-        core::array::from_fn(|i| if i < active.count { active.spaces[i].normal.as_dvec3() } else { DVec3::ZERO });
-    // Normal equations; the rows that are not in use are the identity's.
-    let row = |i: usize| {
-        DVec3::from_array(core::array::from_fn(|j| {
-            normals[i].dot(normals[j]) + f64::from(u8::from(i == j && i >= active.count))
-        }))
-    };
-    let way = (x - goal).as_dvec3();
-    let moments = DVec3::from_array(normals.map(|normal| normal.dot(way)));
-    let sizes = DMat3::from_cols(row(0), row(1), row(2)).inverse() * moments;
-    Some((0..active.count).map(move |i| (active.of[i], sizes[i].max(0.0) as f32)))
-}
-
-fn solved(goal: Vec3, spaces: &[HalfSpace]) -> Option<(Vec3, Active)> {
-    let mut active = Active::default();
-    let mut x = goal;
-    for _ in 0..MAX_EXCHANGES {
-        let (mut lowest, mut worst) = (-TOLERANCE, None);
-        for (at, space) in spaces.iter().enumerate() {
-            let height = space.height(x);
-            if height < lowest {
-                (lowest, worst) = (height, Some(at));
-            }
-        }
-        match worst {
-            Some(worst) => x = active.exchange(goal, &spaces[worst], worst)?,
-            None => return Some((x, active)),
-        }
+impl HalfSpaces {
+    pub fn with_capacity(count: usize) -> Self {
+        Self { list: Vec::with_capacity(count), held: Vec::with_capacity(3) }
     }
-    None
+
+    /// Takes all of them away, but keeps the guess.
+    pub fn clear(&mut self) {
+        self.list.clear();
+    }
+
+    pub fn push(&mut self, space: HalfSpace) {
+        self.list.push(space);
+    }
+
+    pub fn list(&self) -> &[HalfSpace] {
+        &self.list
+    }
+
+    /// The point of all of them that is nearest to `goal`; `None` when there is none (or rounding
+    /// hides it).
+    pub fn nearest(&mut self, goal: Vec3) -> Option<Vec3> {
+        Some(self.solve(goal)?.0)
+    }
+
+    /// Those that keep the nearest point off `goal`, each with its weight. The sum of their normals
+    /// so weighted is the way from the goal.
+    pub fn supports(&mut self, goal: Vec3) -> Option<impl Iterator<Item = (usize, f32)> + use<>> {
+        let (x, active) = self.solve(goal)?;
+        let sizes = active.weights((x - goal).as_dvec3());
+        Some((0..active.count).map(move |i| (active.of[i], sizes[i].max(0.0) as f32)))
+    }
+
+    fn solve(&mut self, goal: Vec3) -> Option<(Vec3, Active)> {
+        let (mut x, mut active) = Active::guess(goal, &self.list, &self.held).unwrap_or((goal, Active::default()));
+        for _ in 0..MAX_EXCHANGES {
+            let (mut lowest, mut worst) = (-TOLERANCE, None);
+            for (at, space) in self.list.iter().enumerate() {
+                let height = space.height(x);
+                if height < lowest {
+                    (lowest, worst) = (height, Some(at));
+                }
+            }
+            let Some(worst) = worst else {
+                self.held.clear();
+                self.held.extend(&active.of[..active.count]);
+                return Some((x, active));
+            };
+            x = active.exchange(goal, &self.list[worst], worst)?;
+        }
+        None
+    }
 }
 
 /// The half-spaces whose borders hold the present solution.
@@ -98,6 +118,31 @@ struct Active {
 }
 
 impl Active {
+    /// The solution that those of `spaces` at the places `held` would hold, if they hold any.
+    fn guess(goal: Vec3, spaces: &[HalfSpace], held: &[usize]) -> Option<(Vec3, Self)> {
+        let mut guess = Self { count: held.len(), ..Self::default() };
+        for (i, at) in held.iter().enumerate() {
+            (guess.spaces[i], guess.of[i]) = (*spaces.get(*at)?, *at);
+        }
+        let x = on_borders(goal, &guess.spaces, !(!0 << guess.count))?;
+        // A half-space that draws the point to itself is not needed.
+        let sound = guess.weights(x - goal.as_dvec3()).to_array().iter().take(guess.count).all(|size| *size >= 0.0);
+        sound.then(|| (x.as_vec3(), guess))
+    }
+
+    /// How much of each half-space's normal is in the `way` from the goal to the solution.
+    fn weights(&self, way: DVec3) -> DVec3 {
+        let normals: [DVec3; 3] =
+            core::array::from_fn(|i| if i < self.count { self.spaces[i].normal.as_dvec3() } else { DVec3::ZERO });
+        // Normal equations; the rows that are not in use are the identity's.
+        let row = |i: usize| {
+            DVec3::from_array(core::array::from_fn(|j| {
+                normals[i].dot(normals[j]) + f64::from(u8::from(i == j && i >= self.count))
+            }))
+        };
+        DMat3::from_cols(row(0), row(1), row(2)).inverse() * DVec3::from_array(normals.map(|normal| normal.dot(way)))
+    }
+
     /// Takes `entering` in and keeps of the others what the new solution needs, which is returned.
     fn exchange(&mut self, goal: Vec3, entering: &HalfSpace, at: usize) -> Option<Vec3> {
         let all = [*entering, self.spaces[0], self.spaces[1], self.spaces[2]];
@@ -160,7 +205,24 @@ mod tests {
         x.as_vec3()
     }
 
+    fn nearest(goal: Vec3, spaces: &[HalfSpace]) -> Option<Vec3> {
+        HalfSpaces { list: spaces.to_vec(), held: vec![] }.nearest(goal)
+    }
+
     proptest! {
+        #[test]
+        fn no_guess_changes_the_solution(goals in prop::collection::vec(prop::array::uniform3(-4.0f32..4.0), 2..6),
+                                         n in prop::collection::vec((prop::array::uniform3(-1.0f32..1.0), 0.0f32..1.0), 1..12)) {
+            let spaces: Vec<_> = n.iter().filter(|(n, _)| Vec3::from(*n).length() > 0.2)
+                .map(|(n, b)| HalfSpace { normal: Vec3::from(*n).normalize(), offset: -b }).collect();
+            let mut kept = HalfSpaces { list: spaces.clone(), held: vec![] };
+            for goal in goals.into_iter().map(Vec3::from) {
+                if let (Some(warm), Some(cold)) = (kept.nearest(goal), nearest(goal, &spaces)) {
+                    prop_assert!((warm.distance(goal) - cold.distance(goal)).abs() < 2e-3, "{warm} {cold}");
+                }
+            }
+        }
+
         #[test]
         fn agrees_with_dykstra(goal in prop::array::uniform3(-4.0f32..4.0), n in prop::collection::vec((prop::array::uniform3(-1.0f32..1.0), 0.0f32..1.0), 1..12)) {
             // All half-spaces hold the origin, so there is always a solution.
@@ -183,10 +245,11 @@ mod tests {
     #[test]
     fn supports_carry_the_way_from_the_goal() {
         let spaces = [Vec3::Z, Vec3::X, Vec3::new(0.6, 0.0, 0.8)].map(|normal| HalfSpace { normal, offset: 0.0 });
-        let found: Vec<_> = supports(Vec3::new(-1.0, 5.0, -2.0), &spaces).unwrap().collect();
+        let mut all = HalfSpaces { list: spaces.to_vec(), held: vec![] };
+        let found: Vec<_> = all.supports(Vec3::new(-1.0, 5.0, -2.0)).unwrap().collect();
         let way: Vec3 = found.iter().map(|&(at, size)| size * spaces[at].normal).sum();
         assert!((way - Vec3::new(1.0, 0.0, 2.0)).length() < 1e-6, "{found:?}");
-        assert_eq!(supports(Vec3::ONE, &spaces).unwrap().count(), 0);
+        assert_eq!(all.supports(Vec3::ONE).unwrap().count(), 0);
     }
 
     #[test]
