@@ -1,10 +1,12 @@
 // Traces rays through the padded density grid: skips bricks without bone, visits the cells of the
 // others, and solves the cubic in a cell exactly.
 
-@group(0) @binding(1) var density: texture_3d<f32>;   // HU, padded by one voxel of air on all sides
+@group(0) @binding(1) var density: texture_3d<f32>;   // HU of the CT, padded by one voxel of air on all sides
 @group(0) @binding(2) var linear: sampler;
 @group(0) @binding(3) var leap: texture_3d<u32>;      // per brick of cells: 0 where bone may be, else bricks to the nearest such
 @group(0) @binding(4) var crowd: texture_3d<f32>;     // share of bone in blocks of 4³ voxels
+@group(0) @binding(5) var<storage, read> drilled_table: array<u32>;
+@group(0) @binding(6) var<storage, read> drilled_depths: array<i32>;
 
 const BRICK: f32 = 4.0;   // cells along an edge: `LEAP` in Rust
 const NUDGE: f32 = 1e-3;
@@ -13,22 +15,22 @@ const MOST_STEPS: i32 = 8192;
 // Continuous padded grid coordinates of a world point; voxel centres are at integers.
 fn grid_of(point: vec3f) -> vec3f { return (point - scene.origin.xyz) / scene.origin.w; }
 
-// HU at continuous padded grid coordinates.
+// HU of the CT at continuous padded grid coordinates.
 fn hu(g: vec3f) -> f32 { return textureSampleLevel(density, linear, (g + 0.5) / scene.dims.xyz, 0.0).x; }
 
-// Smallest fraction s of the path through a cell at which the density reaches the isovalue, or 2.
-// `v` is the density less the isovalue at s = 0, 1/3, 2/3, 1: a trilinear cell is a cubic along a
-// ray (Marmitt et al. 2004: split at the extrema, then refine).
-fn first_root(v: vec4f) -> f32 {
-    if v.x >= 0.0 { return 0.0; }
+// Smallest fraction s ≥ `from` of the path through a cell at which the density reaches the isovalue,
+// or 2. `v` is the density less the isovalue at s = 0, 1/3, 2/3, 1: a trilinear cell is a cubic
+// along a ray (Marmitt et al. 2004: split at the extrema, then refine).
+fn first_root(v: vec4f, begin: f32) -> f32 {
     let c1 = 0.5 * (-11.0 * v.x + 18.0 * v.y - 9.0 * v.z + 2.0 * v.w);
     let c2 = 4.5 * (2.0 * v.x - 5.0 * v.y + 4.0 * v.z - v.w);
     let c3 = 4.5 * (-v.x + 3.0 * v.y - 3.0 * v.z + v.w);
+    if v.x + begin * (c1 + begin * (c2 + begin * c3)) >= 0.0 { return begin; }
     let roots = sqrt(max(c2 * c2 - 3.0 * c1 * c3, 0.0));
     let q = -(c2 + select(-roots, roots, c2 >= 0.0));
     let e1 = select(2.0, q / (3.0 * c3), abs(c3) > 1e-20);
     let e2 = select(2.0, c1 / q, abs(q) > 1e-20);
-    var start = 0.0;
+    var start = begin;
     for (var part = 0; part < 3; part++) {
         var to = 1.0;
         if e1 > start && e1 < to { to = e1; }
@@ -48,16 +50,18 @@ fn first_root(v: vec4f) -> f32 {
     return 2.0;
 }
 
-// Trilinear interpolation of eight corners, x fastest.
-fn blend(low: vec4f, high: vec4f, u: vec3f) -> f32 {
-    let plane = mix(low, high, u.z);
-    let line = mix(plane.xy, plane.zw, u.y);
-    return mix(line.x, line.y, u.x);
+// First fraction from which two such cubics are both at least 0, or 2.
+fn first_of_both(a: vec4f, b: vec4f) -> f32 {
+    var s = first_root(a, 0.0);
+    for (var turn = 0; turn < 4 && s <= 1.0; turn++) {
+        let next = first_root(select(a, b, turn % 2 == 0), s);
+        if next == s { return s; }
+        s = next;
+    }
+    return s;
 }
 
-// The eight corners of a cell, x fastest, less the isovalue.
-struct Corners { low: vec4f, high: vec4f }
-
+// The corners of a cell of the CT, less the isovalue.
 fn corners(c: vec3i) -> Corners {
     let e = vec2i(0, 1);
     let low = vec4f(textureLoad(density, c, 0).x, textureLoad(density, c + e.yxx, 0).x,
@@ -73,12 +77,46 @@ fn promising(c: Corners) -> bool {
     return max(max(most.x, most.y), max(most.z, most.w)) >= 0.0;
 }
 
-// Fraction of the segment between two local points of a cell at which bone begins, or 2.
-fn enter(c: Corners, a: vec3f, b: vec3f) -> f32 {
+// Values at 0, 1/3, 2/3, 1 of the segment between two local points of a cell.
+fn along_segment(c: Corners, a: vec3f, b: vec3f) -> vec4f {
     let third = (b - a) / 3.0;
-    let v = vec4f(blend(c.low, c.high, a), blend(c.low, c.high, a + third), blend(c.low, c.high, b - third), blend(c.low, c.high, b));
-    return first_root(v);
+    return vec4f(blend(c.low, c.high, a), blend(c.low, c.high, a + third), blend(c.low, c.high, b - third), blend(c.low, c.high, b));
 }
+
+// Fraction of the segment between two local points of a cell at which bone begins that was not cut,
+// or 2. The CT reaches the isovalue at the fraction `begin`.
+fn enter_drilled(c: Corners, cell: vec3i, a: vec3f, b: vec3f, begin: f32) -> f32 {
+    let first = drilled_brick(cell);
+    if first < 0 { return begin; }
+    // The segment on the lattice of the brick.
+    let steps = scene.tips.z;
+    let low = steps * vec3f(cell % 4);
+    let o = low + steps * a;
+    let d = steps * (b - a);
+    let safe = select(d, vec3f(1e-12), abs(d) < vec3f(1e-12));
+    let ahead = select(vec3f(0.0), vec3f(1.0), safe > vec3f(0.0));
+    var s = begin;
+    for (var n = 0; n < 3 * i32(steps) + 3; n++) {
+        let at = clamp(floor(o + safe * (s + 1e-4)), low, low + steps - 1.0);
+        let exits = (at + ahead - o) / safe;
+        let next = clamp(min(min(exits.x, exits.y), exits.z), s, 1.0);
+        let depth = drilled_corners(first, vec3i(at));
+        let left = Corners(-depth.low, -depth.high);
+        let most = max(left.low, left.high);
+        if max(max(most.x, most.y), max(most.z, most.w)) > 0.0 {
+            // Where the CT was entered it may be a little under the isovalue, by rounding.
+            let ct = along_segment(c, mix(a, b, s), mix(a, b, next)) + 0.01;
+            let root = first_of_both(ct, along_segment(left, o + safe * s - at, o + safe * next - at));
+            if root <= 1.0 { return s + root * (next - s); }
+        }
+        if next >= 1.0 { break; }
+        s = next;
+    }
+    return 2.0;
+}
+
+// Height over the CT's surface at which shadow rays start, voxels.
+const LIFT_VOXEL: f32 = 0.8;
 
 // Distance along the ray o + t·d (padded grid coordinates, t in mm) at which bone begins, or
 // NOTHING. Three loops, each cheap, instead of branches: drivers that run pixels in lockstep skip
@@ -138,7 +176,10 @@ fn meet(o: vec3f, d: vec3f, furthest: f32) -> f32 {
                 steps++;
             }
             if open { break; }
-            let s = enter(found, o + safe * t - vec3f(cell), o + safe * next - vec3f(cell));
+            let a = o + safe * t - vec3f(cell);
+            let b = o + safe * next - vec3f(cell);
+            var s = first_root(along_segment(found, a, b), 0.0);
+            if s <= 1.0 { s = enter_drilled(found, cell, a, b, s); }
             if s <= 1.0 {
                 let hit = t + s * (next - t);
                 return select(NOTHING, hit, hit <= end);
@@ -168,7 +209,7 @@ fn openness(g: vec3f, normal: vec3f) -> f32 {
 // Whether a point that a ray has met is where bone is cut.
 fn on_cut(point: vec3f) -> bool { return any(scene.bone_cut.xyz != vec3f(0.0)) && abs(height(scene.bone_cut, point)) < 0.01; }
 
-// Whether bone stands between a surface point and the light.
-fn shadowed(g: vec3f, normal: vec3f) -> bool {
-    return meet(g + 0.8 * normal, scene.light.xyz / scene.origin.w, NOTHING) < NOTHING;
+// Whether bone stands between a surface point and the light, seen from `lift` voxels over it.
+fn shadowed(g: vec3f, normal: vec3f, lift: f32) -> bool {
+    return meet(g + lift * normal, scene.light.xyz / scene.origin.w, NOTHING) < NOTHING;
 }

@@ -1,11 +1,11 @@
 // The 3-D view: shades the nearest of bone, brain and tool at each pixel.
 
-@group(0) @binding(5) var skull_hit: texture_2d<u32>;
-@group(0) @binding(6) var brain_hit: texture_2d<u32>;
-@group(0) @binding(7) var brain_rest: texture_2d<u32>;
-@group(0) @binding(8) var mri: texture_3d<f32>;
-@group(0) @binding(9) var bone_coat: texture_3d<f32>;    // colours over bone, alpha multiplied in
-@group(0) @binding(10) var brain_coat: texture_3d<f32>;
+@group(0) @binding(7) var skull_hit: texture_2d<u32>;
+@group(0) @binding(8) var brain_hit: texture_2d<u32>;
+@group(0) @binding(9) var brain_rest: texture_2d<u32>;
+@group(0) @binding(10) var mri: texture_3d<f32>;
+@group(0) @binding(11) var bone_coat: texture_3d<f32>;    // colours over bone, alpha multiplied in
+@group(0) @binding(12) var brain_coat: texture_3d<f32>;
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
 
@@ -104,7 +104,7 @@ fn shade_brain(point: vec3f, along: vec3f, brain: vec4f, rest: vec3f) -> vec3f {
     var open = 1.0;
     if scene.forward.w > 0.0 {
         open = openness(g, normal);
-        key *= select(1.0, 0.25, shadowed(g, normal));
+        key *= select(1.0, 0.25, shadowed(g, normal, LIFT_VOXEL));
     }
     return lit(painted_brain(brain_colour(rest - 3.5 * normal), rest), normal, along, open, key, 0.20);
 }

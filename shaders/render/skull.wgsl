@@ -3,15 +3,29 @@
 
 @vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f { return cover(i); }
 
-// Differences between the corners of a cube of 3.2 voxels: smooths the steps of thick slices and of
-// drilled voxels.
-fn outward_normal(g: vec3f, along: vec3f) -> vec3f {
+// A surface: its unit normal, outwards, and the height over it at which shadow rays start, voxels.
+struct Surface { normal: vec3f, lift: f32 }
+
+// The surface of the CT or of the cut, whichever is nearer. That of the CT by differences between
+// the corners of a cube of 3.2 voxels, which smooths the steps of thick slices.
+fn surface(g: vec3f, along: vec3f) -> Surface {
     var gradient = vec3f(0.0);
     for (var i = 0u; i < 8u; i++) {
         let corner = vec3f(vec3u(i, i >> 1u, i >> 2u) & vec3u(1u)) * 2.0 - 1.0;
         gradient += corner * hu(g + 1.6 * corner);
     }
-    return select(-normalize(gradient), -along, dot(gradient, gradient) < 1e-6);
+    let scanned = Surface(select(-normalize(gradient), -along, dot(gradient, gradient) < 1e-6), LIFT_VOXEL);
+    let depth = drilled(g);
+    if depth == FAR { return scanned; }
+    // Eight differences over 3.2 voxels, two of which go by each edge.
+    let slope = length(gradient) / 12.8;
+    let node = 2.0 / scene.tips.z;
+    if abs(depth) * node * slope > abs(hu(g) - scene.dims.w) { return scanned; }
+    let h = vec2f(0.5 * node, 0.0);
+    let rise = vec3f(drilled(g + h.xyy) - drilled(g - h.xyy), drilled(g + h.yxy) - drilled(g - h.yxy),
+                     drilled(g + h.yyx) - drilled(g - h.yyx));
+    if dot(rise, rise) < 1e-12 { return scanned; }
+    return Surface(normalize(rise), 0.2 * node);
 }
 
 @fragment fn fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4u {
@@ -21,7 +35,9 @@ fn outward_normal(g: vec3f, along: vec3f) -> vec3f {
     let t = meet(o, d, NOTHING);
     if t >= NOTHING { return packed(vec4f(0.0, 0.0, 1.0, NOTHING)); }
     let g = o + d * t;
-    let normal = select(outward_normal(g, along), scene.bone_cut.xyz, on_cut(scene.eye.xyz + t * along));
-    let facing = dot(normal, scene.light.xyz) > 0.0 && !shadowed(g, normal);
+    var met = Surface(scene.bone_cut.xyz, LIFT_VOXEL);
+    if !on_cut(scene.eye.xyz + t * along) { met = surface(g, along); }
+    let normal = met.normal;
+    let facing = dot(normal, scene.light.xyz) > 0.0 && !shadowed(g, normal, met.lift);
     return packed(vec4f(fold(normal), 0.999 * openness(g, normal) + select(0.0, 1.0, facing), t));
 }

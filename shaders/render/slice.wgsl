@@ -15,6 +15,8 @@ struct Slice {
 @group(0) @binding(3) var mri: texture_3d<f32>;
 @group(0) @binding(4) var linear: sampler;
 @group(0) @binding(5) var section: texture_2d<u32>;   // where the brain that is here now is at rest, world mm; w: 1 in the brain
+@group(0) @binding(6) var<storage, read> drilled_table: array<u32>;
+@group(0) @binding(7) var<storage, read> drilled_depths: array<i32>;
 
 // Letters of 5 x 5 dots, top row first, leftmost dot in the highest bit: R L A P S I.
 const LETTERS = array<u32, 6>(0x1e8fa51u, 0x108421fu, 0x0e8fe31u, 0x1e8fa10u, 0x0f8383eu, 0x0e2108eu);
@@ -42,7 +44,7 @@ fn tissue(world: vec3f, rest: vec3f) -> vec3f {
     let g = (world - scene.origin.xyz) / scene.origin.w;
     let at = (g + 0.5) / scene.dims.xyz;
     let inside = all(at >= vec3f(0.0)) && all(at <= vec3f(1.0));
-    let hu = select(-1000.0, textureSampleLevel(density, linear, at, 0.0).x, inside);
+    let hu = select(-1000.0, shown_hu(textureSampleLevel(density, linear, at, 0.0).x, g), inside);
     let grey = clamp((hu - slice.window.x) / slice.window.y, 0.0, 1.0);
     let place = (scene.mri_from_world * vec4f(rest, 1.0)).xyz;
     let known = all(place >= vec3f(0.0)) && all(place <= vec3f(1.0));

@@ -13,17 +13,17 @@ macro_rules! picture {
 }
 
 /// The bone's isosurface by ray casting; `bricks.wgsl` traces the rays through the grid.
-pub const RENDER_SKULL: &str = picture!("bricks.wgsl", "skull.wgsl");
+pub const RENDER_SKULL: &str = picture!("drilled.wgsl", "bricks.wgsl", "skull.wgsl");
 /// The brain's deformed surface.
 pub const RENDER_BRAIN: &str = picture!("brain.wgsl");
 /// Lighting of bone, brain and tool, with the shadows of bone on the brain.
-pub const RENDER_LIGHT: &str = picture!("bricks.wgsl", "tool.wgsl", "light.wgsl");
+pub const RENDER_LIGHT: &str = picture!("drilled.wgsl", "bricks.wgsl", "tool.wgsl", "light.wgsl");
 /// Arrow, ghost and markers over the 3-D view.
 pub const RENDER_OVERLAY: &str = picture!("tool.wgsl", "overlay.wgsl");
 /// The cut surface of the brain.
 pub const RENDER_CUT: &str = picture!("cut.wgsl");
 /// One orthogonal slice.
-pub const RENDER_SLICE: &str = picture!("slice.wgsl");
+pub const RENDER_SLICE: &str = picture!("drilled.wgsl", "slice.wgsl");
 /// The brain's outline in a slice.
 pub const RENDER_CONTOUR: &str = picture!("contour.wgsl");
 /// Enlarges a coarser 3-D view.

@@ -3,7 +3,8 @@
 //! # Theory
 //! The grid is padded by one voxel of air, so that bone at the border has a closed surface. Cell
 //! (i, j, k) lies between the centres of padded voxels (i, j, k) and (i+1, j+1, k+1). A brick is 4³
-//! cells. Where no corner of a brick's cells reaches the isovalue, no ray can enter bone. Free
+//! cells. Where no corner of a brick's cells reaches the isovalue, or all was cut, no ray can enter
+//! bone. Free
 //! bricks store, for each octant of directions, the chessboard distance in bricks to the nearest
 //! non-free brick in that octant (Cohen and Sheffer 1994), so that bricks behind a ray do not limit
 //! it. In other bricks each cell has an occupancy bit.
@@ -12,6 +13,7 @@
 //! 17 bytes a brick of 64 cells. Drilling only frees bricks; when bricks regain bone (an undo) the
 //! distances are recomputed, at about 0.1 µs a brick.
 
+use crate::drilled::Drilled;
 use glam::{IVec3, Vec3};
 use trepan_geometry::Aabb;
 use trepan_volume::{AIR_HU, BRICK, BoneVolume};
@@ -36,6 +38,8 @@ pub(crate) struct Grid {
     pub spacing_mm: f32,
     /// Isovalue of bone, HU.
     pub isovalue: i16,
+    /// Steps of the cut's lattice along a voxel's edge.
+    pub steps: usize,
 }
 
 /// Free distances from each brick.
@@ -48,20 +52,32 @@ pub(crate) struct Leaps {
     pub octants: Vec<[u8; 8]>,
     /// Occupancy bits of the cells with a corner in bone, x fastest.
     pub cells: Vec<u64>,
+    /// What was cut in each brick.
+    pub drilled: Drilled,
     stale: bool,
+}
+
+/// What a change of bone did to bricks of cells.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Touched {
+    /// Bricks that became free of bone.
+    pub freed: Vec<[usize; 3]>,
+    /// Bricks whose cut was copied, with their places.
+    pub drilled: Vec<(usize, usize)>,
 }
 
 impl Grid {
     /// The grid of a bone volume; without bone, eight voxels of air.
     pub fn of(bone: Option<&BoneVolume>) -> Self {
         let Some(bone) = bone else {
-            return Self { dims: [2; 3], origin: Vec3::ZERO, spacing_mm: 1.0, isovalue: i16::MAX };
+            return Self { dims: [2; 3], origin: Vec3::ZERO, spacing_mm: 1.0, isovalue: i16::MAX, steps: 1 };
         };
         Self {
             dims: bone.dims().map(|n| n + 2),
             origin: bone.centre_of(IVec3::NEG_ONE),
             spacing_mm: bone.spacing_mm(),
             isovalue: bone.isovalue(),
+            steps: 2 * bone.cut_nodes() as usize,
         }
     }
 
@@ -123,10 +139,13 @@ impl Leaps {
     pub fn of(bone: Option<&BoneVolume>, grid: &Grid) -> Self {
         let bricks = grid.dims.map(|n| (n - 1).div_ceil(LEAP));
         let count = bricks.iter().product();
-        let mut leaps =
-            Self { bricks, octants: vec![[u8::MAX; 8]; count], cells: vec![0; count], stale: bone.is_some() };
+        let (octants, drilled) = (vec![[u8::MAX; 8]; count], Drilled::new(grid, count));
+        let mut leaps = Self { bricks, octants, cells: vec![0; count], drilled, stale: bone.is_some() };
         if let Some(bone) = bone {
-            (0..count).for_each(|at| leaps.cells[at] = promising(bone, leaps.place(at)));
+            for at in 0..count {
+                leaps.drilled.follow(bone, at, leaps.place(at));
+                leaps.cells[at] = leaps.promising(bone, at);
+            }
         }
         leaps.settle();
         leaps
@@ -146,22 +165,54 @@ impl Leaps {
         self.octants[at].into_iter().fold(u8::MAX, u8::min)
     }
 
-    /// Updates the bricks of cells that touch a brick of voxels, and returns them. Call
-    /// [`settle`](Self::settle) before casting rays.
-    pub fn follow(&mut self, bone: &BoneVolume, brick: [usize; 3]) -> Vec<[usize; 3]> {
-        let low = brick.map(|b| b * (BRICK / LEAP));
-        let touched = boxed(low, low.map(|v| v + BRICK / LEAP), self.bricks);
-        for &brick in &touched {
-            let at = self.index(brick);
+    /// Updates the bricks of cells near bricks of voxels. Call [`settle`](Self::settle) before
+    /// casting rays.
+    pub fn follow(&mut self, bone: &BoneVolume, bricks: &[[usize; 3]]) -> Touched {
+        let near = |brick: &[usize; 3]| {
+            let low = brick.map(|b| b * (BRICK / LEAP));
+            // The cut is a spline, which reaches two nodes beyond the brick.
+            boxed(low.map(|v| v.saturating_sub(1)), low.map(|v| v + BRICK / LEAP), self.bricks)
+        };
+        let mut near: Vec<usize> = bricks.iter().flat_map(near).map(|brick| self.index(brick)).collect();
+        near.sort_unstable();
+        near.dedup();
+        let mut touched = Touched::default();
+        for at in near {
+            touched.drilled.extend(self.drilled.follow(bone, at, self.place(at)).map(|place| (at, place)));
             let held = self.cells[at] != 0;
-            self.cells[at] = promising(bone, brick);
+            self.cells[at] = self.promising(bone, at);
             match (held, self.cells[at] != 0) {
-                (true, false) => self.octants[at] = [1; 8],
+                (true, false) => {
+                    self.octants[at] = [1; 8];
+                    touched.freed.push(self.place(at));
+                }
                 (false, true) => self.stale = true,
                 _ => (),
             }
         }
         touched
+    }
+
+    /// Occupancy bits of the cells of a brick with a corner at the isovalue and a part that was not
+    /// cut, x fastest.
+    fn promising(&self, bone: &BoneVolume, at: usize) -> u64 {
+        const EDGE: usize = LEAP + 1;
+        let mut corner = [false; EDGE * EDGE * EDGE];
+        for (is_bone, padded) in corner.iter_mut().zip(corners(self.place(at).map(|b| b * LEAP), EDGE)) {
+            *is_bone = bone.ct(padded - 1) >= bone.isovalue();
+        }
+        if !corner.contains(&true) {
+            return 0;
+        }
+        let near = [0, 1, EDGE, EDGE + 1].map(|at| [at, at + EDGE * EDGE]);
+        let depths = self.drilled.brick(at);
+        let holds = |cell: usize| {
+            let local = [cell % LEAP, cell / LEAP % LEAP, cell / (LEAP * LEAP)];
+            let first = local[0] + EDGE * (local[1] + EDGE * local[2]);
+            near.as_flattened().iter().any(|at| corner[first + at])
+                && depths.is_none_or(|depths| self.drilled.is_left(depths, IVec3::from(local.map(|n| n as i32))))
+        };
+        (0..LEAP.pow(3)).fold(0, |bits, cell| bits | u64::from(holds(cell)) << cell)
     }
 
     /// Recomputes the distances if free bricks regained bone; returns whether they did.
@@ -197,25 +248,7 @@ impl Leaps {
     }
 }
 
-/// Occupancy bits of the cells of a brick with a corner at the isovalue, x fastest.
-fn promising(bone: &BoneVolume, brick: [usize; 3]) -> u64 {
-    const EDGE: usize = LEAP + 1;
-    let mut corner = [false; EDGE * EDGE * EDGE];
-    for (is_bone, padded) in corner.iter_mut().zip(corners(brick.map(|b| b * LEAP), EDGE)) {
-        *is_bone = bone.is_bone(padded - 1);
-    }
-    if !corner.contains(&true) {
-        return 0;
-    }
-    let near = [0, 1, EDGE, EDGE + 1].map(|at| [at, at + EDGE * EDGE]);
-    let holds = |cell: usize| {
-        let first = cell % LEAP + EDGE * (cell / LEAP % LEAP + EDGE * (cell / (LEAP * LEAP)));
-        near.as_flattened().iter().any(|at| corner[first + at])
-    };
-    (0..LEAP.pow(3)).fold(0, |bits, cell| bits | u64::from(holds(cell)) << cell)
-}
-
-/// Converts the densities of the padded box of `size` voxels from `first`, x fastest.
+/// Converts the CT's densities of the padded box of `size` voxels from `first`, x fastest.
 pub(crate) fn densities<T>(
     bone: Option<&BoneVolume>,
     first: [usize; 3],
@@ -227,10 +260,10 @@ pub(crate) fn densities<T>(
     let mut values = Vec::with_capacity(size.iter().product());
     for k in 0..size[2] as i32 {
         for j in 0..size[1] as i32 {
-            values.extend((0..size[0] as i32).map(|i| convert(bone.hu(IVec3::new(x + i, y + j, z + k)))));
+            values.extend((0..size[0] as i32).map(|i| convert(bone.ct(IVec3::new(x + i, y + j, z + k)))));
         }
     }
-    debug_assert_eq!(AIR_HU, bone.hu(IVec3::NEG_ONE));
+    debug_assert_eq!(AIR_HU, bone.ct(IVec3::NEG_ONE));
     values
 }
 
@@ -295,12 +328,13 @@ mod tests {
     #[test]
     fn a_cell_has_its_bit_where_one_of_its_corners_is_bone() {
         let bone = bone_at([20, 20, 20], &[[7, 7, 7], [10, 9, 8]]);
+        let leaps = Leaps::of(Some(&bone), &Grid::of(Some(&bone)));
         for brick in [[1, 1, 1], [2, 2, 2], [2, 2, 1], [0, 4, 4]] {
             for cell in 0..64 {
                 let low = [cell % 4, cell / 4 % 4, cell / 16];
                 let first = [0, 1, 2].map(|a| 4 * brick[a] + low[a]);
                 let holds = corners(first, 2).any(|padded| bone.is_bone(padded - 1));
-                assert_eq!(promising(&bone, brick) >> cell & 1 == 1, holds, "{brick:?} {cell}");
+                assert_eq!(leaps.cells[leaps.index(brick)] >> cell & 1 == 1, holds, "{brick:?} {cell}");
             }
         }
     }
@@ -312,11 +346,11 @@ mod tests {
         let mut leaps = Leaps::of(Some(&bone), &grid);
         check(&bone, &leaps, true);
         bone.set_hu(IVec3::new(60, 20, 46), AIR_HU);
-        leaps.follow(&bone, [7, 2, 5]);
+        leaps.follow(&bone, &[[7, 2, 5]]);
         assert!(!leaps.settle());
         check(&bone, &leaps, false);
         bone.set_hu(IVec3::new(40, 30, 20), 700);
-        leaps.follow(&bone, [5, 3, 2]);
+        leaps.follow(&bone, &[[5, 3, 2]]);
         assert!(leaps.settle());
         check(&bone, &leaps, true);
     }

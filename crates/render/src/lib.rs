@@ -29,6 +29,7 @@ mod bricks;
 mod camera;
 mod cut;
 mod device;
+mod drilled;
 mod error;
 mod frame;
 mod image;

@@ -45,15 +45,24 @@ impl Canvas {
         };
         let column = layout.slices.map_or([1, 1], |s| [s[0][2], height]);
         let section = sheet("section", column, Format::Rgba32Uint)?;
-        let (density, mri) = (&passes.skull.density, &passes.mri.texture);
         Ok(Self {
             division,
             layout,
             picture: sheet("picture", division.size, Format::Rgba8Unorm)?,
             anaglyph,
-            slices: passes.slices.bind(gpu, &passes.scenes[0], density, mri, &section)?,
+            slices: bind_slices(gpu, passes, &section)?,
             eyes,
             section,
         })
     }
+
+    /// Binds the passes that read bone again, after its buffers changed.
+    pub fn rebind(&mut self, gpu: &Gpu, passes: &Passes) -> Result<(), RenderError> {
+        self.slices = bind_slices(gpu, passes, &self.section)?;
+        self.eyes.iter_mut().try_for_each(|eye| eye.rebind(gpu, passes))
+    }
+}
+
+fn bind_slices(gpu: &Gpu, passes: &Passes, section: &Texture) -> Result<[Bindings; 3], RenderError> {
+    passes.slices.bind(gpu, &passes.scenes[0], &passes.skull, &passes.mri.texture, section)
 }

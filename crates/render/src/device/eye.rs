@@ -80,8 +80,9 @@ impl Eye {
         })
     }
 
-    /// Rebinds the lighting, after a paint's texture changed.
+    /// Rebinds bone and lighting, after a paint's texture or the bone's buffers changed.
     pub fn rebind(&mut self, gpu: &Gpu, passes: &Passes) -> Result<(), RenderError> {
+        self.skull = passes.skull.bind(gpu, &passes.scenes[self.number])?;
         let inputs = inputs(&self.skull_hit, &self.brain_hit, &self.brain_rest, passes);
         self.light = passes.light.bind(gpu, &passes.scenes[self.number], &inputs)?;
         Ok(())

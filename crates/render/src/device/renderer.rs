@@ -80,7 +80,10 @@ impl Renderer {
     pub fn draw(&mut self, frame: &Frame) -> Result<DrawReport, RenderError> {
         let stereo = frame.stereo.map(|s| s.look);
         self.divide(Division { slices: frame.slices.shown, stereo, ..self.canvas.division })?;
-        let followed = self.passes.skull.follow(&self.gpu, self.bricks_per_frame);
+        let (followed, grown) = self.passes.skull.follow(&self.gpu, self.bricks_per_frame)?;
+        if grown {
+            self.canvas.rebind(&self.gpu, &self.passes)?;
+        }
         self.canvas.eyes.iter_mut().for_each(|eye| eye.recast.note(followed.changed));
         let lines_left = self.follow_brain(frame)? + self.follow_slices(frame) + self.follow_looks(frame)?;
         let mut timer = self.timer.take();

@@ -25,7 +25,8 @@ use trepan_volume::BoneVolume;
 const LOAD_BYTES: usize = 16 << 20;
 
 /// The slots of [`Skull::volumes`].
-pub(crate) const VOLUMES: [Slot; 4] = [Slot::Texture3, Slot::Sampler, Slot::Integer3, Slot::Texture3];
+pub(crate) const VOLUMES: [Slot; 6] =
+    [Slot::Texture3, Slot::Sampler, Slot::Integer3, Slot::Texture3, Slot::Storage, Slot::Storage];
 
 /// The skull on the device.
 #[derive(Debug)]
@@ -37,6 +38,8 @@ pub(crate) struct Skull {
     pub density: Texture,
     leap: Texture,
     crowd: Texture,
+    /// Table and depths of what was cut.
+    drilled: (Buffer<u32>, Buffer<[i16; 2]>),
     pipeline: Pipeline,
     leaping: bool,
 }
@@ -55,6 +58,8 @@ impl Skull {
         let density = volume("density", grid.dims, Format::R16Float)?;
         let leap = volume("leap", leaps.bricks, Format::R8Uint)?;
         let crowd = volume("crowd", grid.blocks(), Format::R8Unorm)?;
+        let table = Buffer::from_slice(gpu, "drilled table", &leaps.drilled.table)?;
+        let depths = Buffer::from_slice(gpu, "drilled depths", bytemuck::cast_slice(&leaps.drilled.depths))?;
         let slots = [&[Slot::Uniform], &VOLUMES[..]].concat();
         let pipeline = Pipeline::new(
             gpu,
@@ -68,7 +73,8 @@ impl Skull {
                 topology: Topology::Triangles,
             },
         )?;
-        let skull = Self { bone, grid, leaps, seen, density, leap, crowd, pipeline, leaping: true };
+        let drilled = (table, depths);
+        let skull = Self { bone, grid, leaps, seen, density, leap, crowd, drilled, pipeline, leaping: true };
         skull.load(gpu);
         Ok(skull)
     }
@@ -109,36 +115,64 @@ impl Skull {
         self.density.write(gpu, first.map(|v| v as u32), size.map(|v| v as u32), &values);
     }
 
-    /// Uploads up to `limit` changed bricks.
-    pub fn follow(&mut self, gpu: &Gpu, limit: usize) -> Followed {
-        let Some(bone) = self.bone.clone() else { return Followed::default() };
+    /// Uploads up to `limit` changed bricks; also returns whether passes must be bound again.
+    pub fn follow(&mut self, gpu: &Gpu, limit: usize) -> Result<(Followed, bool), RenderError> {
+        let Some(bone) = self.bone.clone() else { return Ok(Default::default()) };
         let mut changed = Vec::new();
         let left = bone.changed(&mut self.seen, limit, |brick| changed.push(brick));
         for &brick in &changed {
             self.refresh(gpu, &bone, brick);
         }
-        if self.leaps.settle() {
-            self.write_leaps(gpu);
-        }
-        Followed::of(&self.grid, &changed, left)
-    }
-
-    /// Uploads one brick of voxels and the bricks of cells and blocks that it touches.
-    fn refresh(&mut self, gpu: &Gpu, bone: &BoneVolume, brick: [usize; 3]) {
-        let (first, size) = self.grid.voxels_of(brick);
-        self.upload(gpu, first, size);
-        for cells in self.leaps.follow(bone, brick).into_iter().filter(|_| self.leaping) {
+        let touched = self.leaps.follow(&bone, &changed);
+        for cells in touched.freed.into_iter().filter(|_| self.leaping) {
             let free = self.leaps.free(self.leaps.index(cells));
             self.leap.write(gpu, cells.map(|v| v as u32), [1; 3], &[free]);
         }
+        if self.leaps.settle() {
+            self.write_leaps(gpu);
+        }
+        let grown = self.write_drilled(gpu, &touched.drilled)?;
+        Ok((Followed::of(&self.grid, &changed, left), grown))
+    }
+
+    /// Uploads what was cut in some bricks of cells, each with its place; returns whether the buffer
+    /// was too small and is a new one.
+    fn write_drilled(&mut self, gpu: &Gpu, bricks: &[(usize, usize)]) -> Result<bool, RenderError> {
+        let (table, room) = &mut self.drilled;
+        let (depths, words) = (&self.leaps.drilled.depths, self.leaps.drilled.stride() / 2);
+        let depths: &[[i16; 2]] = bytemuck::cast_slice(depths);
+        let grown = depths.len() > room.len();
+        if grown {
+            *room = Buffer::zeroed(gpu, "drilled depths", 2 * depths.len())?;
+            room.write(gpu, 0, depths);
+        }
+        for &(brick, place) in bricks {
+            table.write(gpu, brick, &[place as u32 + 1]);
+            if !grown {
+                room.write(gpu, place * words, &depths[place * words..][..words]);
+            }
+        }
+        Ok(grown)
+    }
+
+    /// Uploads one brick of voxels and the blocks that it touches.
+    fn refresh(&self, gpu: &Gpu, bone: &BoneVolume, brick: [usize; 3]) {
+        let (first, size) = self.grid.voxels_of(brick);
+        self.upload(gpu, first, size);
         for block in self.grid.blocks_of(brick) {
             self.crowd.write(gpu, block.map(|v| v as u32), [1; 3], &[self.grid.share(bone, block)]);
         }
     }
 
     /// The resources that `bricks.wgsl` binds, after the uniform.
-    pub fn volumes(&self) -> [Resource<'_>; 4] {
-        [(&self.density).into(), Resource::Linear, (&self.leap).into(), (&self.crowd).into()]
+    pub fn volumes(&self) -> [Resource<'_>; 6] {
+        let [table, depths] = self.drilled();
+        [(&self.density).into(), Resource::Linear, (&self.leap).into(), (&self.crowd).into(), table, depths]
+    }
+
+    /// What was cut, as `drilled.wgsl` reads it.
+    pub fn drilled(&self) -> [Resource<'_>; 2] {
+        [(&self.drilled.0).into(), (&self.drilled.1).into()]
     }
 
     /// Binds the pass to the frame's uniform.

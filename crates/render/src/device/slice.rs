@@ -1,5 +1,6 @@
 //! The pass of the three slices.
 
+use super::skull::Skull;
 use crate::RenderError;
 use crate::frame::SliceLook;
 use crate::scene::Scene;
@@ -35,7 +36,8 @@ impl Slices {
         let spec = PipelineSpec {
             label: "slice",
             wgsl: trepan_shaders::RENDER_SLICE,
-            slots: &[&[Slot::Uniform, Slot::Uniform], &volumes[..], &[Slot::Integer2]].concat(),
+            slots: &[&[Slot::Uniform, Slot::Uniform], &volumes[..], &[Slot::Integer2, Slot::Storage, Slot::Storage]]
+                .concat(),
             targets: &[Format::Rgba8Unorm],
             depth: false,
             blend: false,
@@ -51,14 +53,14 @@ impl Slices {
         &self,
         gpu: &Gpu,
         scene: &Buffer<Scene>,
-        density: &Texture,
+        skull: &Skull,
         mri: &Texture,
         section: &Texture,
     ) -> Result<[Bindings; 3], RenderError> {
         let bind = |n: usize| {
             let uniforms = [scene.into(), (&self.uniforms[n]).into()];
-            let volumes = [density.into(), mri.into(), Resource::Linear, section.into()];
-            self.pipeline.bind(gpu, &[&uniforms[..], &volumes].concat())
+            let volumes = [(&skull.density).into(), mri.into(), Resource::Linear, section.into()];
+            self.pipeline.bind(gpu, &[&uniforms[..], &volumes, &skull.drilled()].concat())
         };
         Ok([bind(0)?, bind(1)?, bind(2)?])
     }

@@ -1,5 +1,6 @@
 //! CPU version of `bricks.wgsl`: rays through the padded density grid.
 
+use super::drilled::Surface;
 use super::root::enter;
 use crate::bricks::{BLOCK, Followed, Grid, LEAP, Leaps, NOTHING, densities};
 use crate::cut::height;
@@ -16,6 +17,8 @@ const NUDGE: f32 = 1e-3;
 const MOST_STEPS: u32 = 8192;
 /// Step below which a beam counts as near bone, voxels.
 const LEAST_LEAP: f32 = 0.5;
+/// Height over the CT's surface at which shadow rays start, voxels.
+pub(crate) const LIFT_VOXEL: f32 = 0.8;
 
 /// How rays are cast through bone. The default is used for every picture; the alternatives are for
 /// comparison measurements.
@@ -42,9 +45,9 @@ impl Default for Casting {
 pub(crate) struct Bricks {
     bone: Option<Arc<BoneVolume>>,
     pub grid: Grid,
-    leaps: Leaps,
+    pub leaps: Leaps,
     seen: Vec<u32>,
-    /// HU of the padded grid, x fastest.
+    /// HU of the padded grid as scanned, x fastest.
     density: Vec<i16>,
     /// Bone fraction of blocks, 0 to 255.
     crowd: Vec<u8>,
@@ -72,6 +75,7 @@ impl Bricks {
         let mut changed = Vec::new();
         let left = bone.changed(&mut self.seen, limit, |brick| changed.push(brick));
         changed.iter().for_each(|&brick| self.refresh(&bone, brick));
+        self.leaps.follow(&bone, &changed);
         self.leaps.settle();
         Followed::of(&self.grid, &changed, left)
     }
@@ -83,7 +87,6 @@ impl Bricks {
             let at = self.index([first[0], first[1] + n % size[1], first[2] + n / size[1]]);
             self.density[at..at + size[0]].copy_from_slice(row);
         }
-        self.leaps.follow(bone, brick);
         let [bx, by, _] = self.grid.blocks();
         for block in self.grid.blocks_of(brick) {
             self.crowd[block[0] + bx * (block[1] + by * block[2])] = self.grid.share(bone, block);
@@ -105,15 +108,15 @@ impl Bricks {
         self.grid.origin + self.grid.spacing_mm * g
     }
 
-    /// HU at continuous padded grid coordinates, clamped at the border.
+    /// HU of the CT at continuous padded grid coordinates, clamped at the border.
     #[inline(always)]
     pub fn hu(&self, g: Vec3) -> f32 {
         trilinear(self.grid.dims, g, |at| f32::from(self.density[at]))
     }
 
-    /// Unit outward normal at a surface point hit by a ray `along`.
+    /// The surface at a point hit by a ray `along`: that of the CT or of the cut.
     #[inline(always)]
-    pub fn outward_normal(&self, g: Vec3, along: Vec3) -> Vec3 {
+    pub fn surface(&self, g: Vec3, along: Vec3) -> Surface {
         let (dims, strides) = (self.grid.dims, self.strides());
         // Eight points, but only two indices along each axis.
         let pairs: [[(usize, f32); 2]; 3] =
@@ -124,7 +127,12 @@ impl Bricks {
             let corner = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - 1.0;
             gradient += corner * mixed(place, strides, |at| f32::from(self.density[at]));
         }
-        if gradient.length_squared() < 1e-6 { -along } else { -gradient.normalize() }
+        // Eight differences over 3.2 voxels, two of which go by each edge.
+        if let Some(bore) = self.bore(g, gradient.length() / (8.0 * 1.6)) {
+            return bore;
+        }
+        let normal = if gradient.length_squared() < 1e-6 { -along } else { -gradient.normalize() };
+        Surface { normal, lift: LIFT_VOXEL }
     }
 
     /// Index offsets to the next value along each axis.
@@ -148,8 +156,8 @@ impl Bricks {
 
     /// Whether bone is between a surface point and the light.
     #[inline(always)]
-    pub fn shadowed(&self, g: Vec3, normal: Vec3, scene: &Scene) -> bool {
-        let (from, light) = (g + 0.8 * normal, scene.light.truncate());
+    pub fn shadowed(&self, g: Vec3, surface: Surface, scene: &Scene) -> bool {
+        let (from, light) = (g + surface.lift * surface.normal, scene.light.truncate());
         let [near, far] = under(scene.bone_cut, self.world_of(from), light);
         self.trace(from, light / self.grid.spacing_mm, near, far).0 < NOTHING
     }
@@ -241,7 +249,7 @@ impl Bricks {
         let (mut t, mut last) = (part.start, None);
         while *steps < MOST_STEPS {
             *steps += 1;
-            let over = self.hu(o + d * t) - isovalue;
+            let over = self.shown_hu(o + d * t) - isovalue;
             if over >= 0.0 {
                 return last.map_or(t, |(from, under): (f32, f32)| from + (t - from) * under / (under - over));
             }
@@ -272,7 +280,11 @@ impl Bricks {
             let may = beside || cells >> (bit & 63) & 1 == 1;
             if may && let Some(corners) = self.corners(cell) {
                 let low = cell.as_vec3a();
-                let s = enter(&corners, ray.at(t) - low, ray.at(next) - low);
+                let [a, b] = [ray.at(t) - low, ray.at(next) - low];
+                let mut s = enter(&corners, a, b);
+                if s <= 1.0 {
+                    s = self.enter_drilled(cell, &corners, [a, b], s);
+                }
                 if s <= 1.0 {
                     return t + s * (next - t);
                 }
@@ -305,12 +317,12 @@ impl Bricks {
 }
 
 /// A ray o + t·d in padded grid coordinates, with precomputed values.
-struct Line {
-    o: Vec3A,
-    d: Vec3A,
-    inverse: Vec3A,
+pub(crate) struct Line {
+    pub o: Vec3A,
+    pub d: Vec3A,
+    pub inverse: Vec3A,
     /// 1 along the axes on which it ascends, else 0.
-    ahead: Vec3A,
+    pub ahead: Vec3A,
     /// 1 along these axes, else -1.
     side: Vec3A,
     step: IVec3,
@@ -320,7 +332,7 @@ struct Line {
 
 impl Line {
     #[inline(always)]
-    fn of(o: Vec3, d: Vec3) -> Self {
+    pub fn of(o: Vec3, d: Vec3) -> Self {
         let d = Vec3A::from(d);
         let d = Vec3A::select(d.abs().cmplt(Vec3A::splat(1e-12)), Vec3A::splat(1e-12), d);
         let ahead = Vec3A::select(d.cmpgt(Vec3A::ZERO), Vec3A::ONE, Vec3A::ZERO);
@@ -330,7 +342,7 @@ impl Line {
     }
 
     #[inline(always)]
-    fn at(&self, t: f32) -> Vec3A {
+    pub fn at(&self, t: f32) -> Vec3A {
         self.o + self.d * t
     }
 }

@@ -2,6 +2,8 @@
 
 use super::Inputs;
 use super::brain::Fragment;
+use super::bricks::LIFT_VOXEL;
+use super::drilled::Surface;
 use super::skull::{Ray, on_cut};
 use super::tool::{Met, lit};
 use crate::bricks::NOTHING;
@@ -90,7 +92,7 @@ fn shade_brain(inputs: &Inputs, point: Vec3, along: Vec3, brain: &Fragment) -> V
     if scene.forward.w > 0.0 {
         let g = inputs.bricks.grid_of(point);
         open = inputs.bricks.openness(g, brain.normal, scene.bone_cut);
-        if inputs.bricks.shadowed(g, brain.normal, scene) {
+        if inputs.bricks.shadowed(g, Surface { normal: brain.normal, lift: LIFT_VOXEL }, scene) {
             key *= 0.25;
         }
     }

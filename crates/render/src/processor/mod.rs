@@ -19,6 +19,7 @@
 mod brain;
 mod bricks;
 mod contour;
+mod drilled;
 mod eye;
 mod light;
 mod overlay;

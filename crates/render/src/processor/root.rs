@@ -9,7 +9,7 @@ use glam::{Vec3A, Vec4};
 
 /// Trilinear interpolation of a cell's corners at four points, given by their coordinates.
 #[inline(always)]
-fn blend(corners: &[f32; 8], [x, y, z]: [Vec4; 3]) -> Vec4 {
+pub(crate) fn blend(corners: &[f32; 8], [x, y, z]: [Vec4; 3]) -> Vec4 {
     let line = |n: usize| corners[n] + x * (corners[n + 1] - corners[n]);
     let plane = |n: usize| {
         let (a, b) = (line(n), line(n + 2));
@@ -41,21 +41,41 @@ pub(crate) fn first_root(v: [f32; 4]) -> f32 {
     if greater(greater(second, third), v[3]) < 0.0 {
         return 2.0;
     }
-    rising_root(v)
+    rising_root(v, 0.0)
 }
 
-/// Like [`first_root`], where a root is possible.
-fn rising_root(v: [f32; 4]) -> f32 {
+/// First place from which two such cubics are both at least 0, or 2.
+pub(crate) fn first_of_both(a: [f32; 4], b: [f32; 4]) -> f32 {
+    let (mut this, mut other) = (a, b);
+    let mut s = rising_root(this, 0.0);
+    for _ in 0..MOST_TURNS {
+        if s > 1.0 {
+            return 2.0;
+        }
+        let next = rising_root(other, s);
+        if next == s {
+            break;
+        }
+        (this, other, s) = (other, this, next);
+    }
+    s
+}
+
+/// Like [`first_root`], where a root is possible, at or behind `from`.
+fn rising_root(v: [f32; 4], from: f32) -> f32 {
     let c1 = 0.5 * (-11.0 * v[0] + 18.0 * v[1] - 9.0 * v[2] + 2.0 * v[3]);
     let c2 = 4.5 * (2.0 * v[0] - 5.0 * v[1] + 4.0 * v[2] - v[3]);
     let c3 = 4.5 * (-v[0] + 3.0 * v[1] - 3.0 * v[2] + v[3]);
     let cubic = |s: f32| v[0] + s * (c1 + s * (c2 + s * c3));
+    if cubic(from) >= 0.0 {
+        return from;
+    }
     let slope = |s: f32| c1 + s * (2.0 * c2 + s * 3.0 * c3);
     let roots = greater(c2 * c2 - 3.0 * c1 * c3, 0.0).sqrt();
     let q = -(c2 + if c2 >= 0.0 { roots } else { -roots });
     let e1 = if c3.abs() > 1e-20 { q / (3.0 * c3) } else { 2.0 };
     let e2 = if q.abs() > 1e-20 { c1 / q } else { 2.0 };
-    let mut start = 0.0;
+    let mut start = from;
     while start < 1.0 {
         let mut to = 1.0f32;
         for extremum in [e1, e2] {
@@ -88,6 +108,9 @@ fn rising_root(v: [f32; 4]) -> f32 {
 
 /// Most iterations to a root: bisection alone reaches 2⁻¹² in as many.
 const MOST_NEWTON: usize = 12;
+
+/// Most turns between two cubics: each rises at most twice within a cell.
+const MOST_TURNS: usize = 4;
 
 #[cfg(test)]
 mod tests {

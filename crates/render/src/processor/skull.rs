@@ -1,6 +1,7 @@
 //! CPU version of `skull.wgsl`: the bone's isosurface at a pixel.
 
-use super::bricks::{Bricks, under};
+use super::bricks::{Bricks, LIFT_VOXEL, under};
+use super::drilled::Surface;
 use crate::bricks::NOTHING;
 use crate::cut::height;
 use crate::scene::Scene;
@@ -55,14 +56,15 @@ pub(crate) fn cast(bricks: &Bricks, scene: &Scene, [x, y]: [usize; 2], from: f32
         return Ray { steps, ..Ray::NONE };
     }
     let g = o + d * t;
-    let normal = if on_cut(scene.bone_cut, eye + t * along) {
-        scene.bone_cut.truncate()
+    let surface = if on_cut(scene.bone_cut, eye + t * along) {
+        Surface { normal: scene.bone_cut.truncate(), lift: LIFT_VOXEL }
     } else {
-        bricks.outward_normal(g, along)
+        bricks.surface(g, along)
     };
+    let normal = surface.normal;
     let known = around.iter().any(|ray| ray.lit) && around.iter().all(|ray| ray.lit || ray.t >= NOTHING);
     let faces = normal.dot(scene.light.truncate()) > 0.0;
-    let lit = faces && (known || !bricks.shadowed(g, normal, scene));
+    let lit = faces && (known || !bricks.shadowed(g, surface, scene));
     let plane = t * along.dot(normal);
     Ray { t, steps, normal, plane, open: 0.999 * bricks.openness(g, normal, scene.bone_cut), lit }
 }

@@ -56,7 +56,7 @@ fn tissue(inputs: &Inputs, world: Vec3, rest: Vec3, look: &SliceLook) -> Vec3 {
     let g = inputs.bricks.grid_of(world);
     let dims = Vec3::from(inputs.bricks.grid.dims.map(|n| n as f32));
     let inside = (g + 0.5).cmpge(Vec3::ZERO).all() && (g + 0.5).cmple(dims).all();
-    let hu = if inside { inputs.bricks.hu(g) } else { f32::from(AIR_HU) };
+    let hu = if inside { inputs.bricks.shown_hu(g) } else { f32::from(AIR_HU) };
     let grey = ((hu - (look.level_hu - 0.5 * look.width_hu)) / look.width_hu.max(1.0)).clamp(0.0, 1.0);
     let Some(signals) = inputs.mri else { return Vec3::splat(grey) };
     let place = signals.texture_from_world.transform_point3(rest);
