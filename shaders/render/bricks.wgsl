@@ -18,9 +18,9 @@ fn grid_of(point: vec3f) -> vec3f { return (point - scene.origin.xyz) / scene.or
 // HU of the CT at continuous padded grid coordinates.
 fn hu(g: vec3f) -> f32 { return textureSampleLevel(density, linear, (g + 0.5) / scene.dims.xyz, 0.0).x; }
 
-// Smallest fraction s ≥ `from` of the path through a cell at which the density reaches the isovalue,
-// or 2. `v` is the density less the isovalue at s = 0, 1/3, 2/3, 1: a trilinear cell is a cubic
-// along a ray (Marmitt et al. 2004: split at the extrema, then refine).
+// Smallest fraction s ≥ `begin` of the path through a cell at which the density reaches the
+// isovalue, or 2. `v` is the density less the isovalue at s = 0, 1/3, 2/3, 1: a trilinear cell is a
+// cubic along a ray (Marmitt et al. 2004: split at the extrema, then refine).
 fn first_root(v: vec4f, begin: f32) -> f32 {
     let c1 = 0.5 * (-11.0 * v.x + 18.0 * v.y - 9.0 * v.z + 2.0 * v.w);
     let c2 = 4.5 * (2.0 * v.x - 5.0 * v.y + 4.0 * v.z - v.w);

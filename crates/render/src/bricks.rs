@@ -13,16 +13,13 @@
 //! 17 bytes a brick of 64 cells. Drilling only frees bricks; when bricks regain bone (an undo) the
 //! distances are recomputed, at about 0.1 µs a brick.
 
-use crate::drilled::Drilled;
+use crate::drilled::{Drilled, LEAP};
 use glam::{IVec3, Vec3};
 use trepan_geometry::Aabb;
 use trepan_volume::{AIR_HU, BRICK, BoneVolume};
 
 /// Distance stored for a ray that hits nothing.
 pub(crate) const NOTHING: f32 = 1e30;
-
-/// Edge of a brick of cells; `BRICK` in `bricks.wgsl`. Divides the bone's own brick.
-pub(crate) const LEAP: usize = 4;
 
 /// Edge of a block whose bone fraction is stored for ambient light, in voxels.
 pub(crate) const BLOCK: usize = 4;
@@ -139,7 +136,7 @@ impl Leaps {
     pub fn of(bone: Option<&BoneVolume>, grid: &Grid) -> Self {
         let bricks = grid.dims.map(|n| (n - 1).div_ceil(LEAP));
         let count = bricks.iter().product();
-        let (octants, drilled) = (vec![[u8::MAX; 8]; count], Drilled::new(grid, count));
+        let (octants, drilled) = (vec![[u8::MAX; 8]; count], Drilled::new(grid.steps, count));
         let mut leaps = Self { bricks, octants, cells: vec![0; count], drilled, stale: bone.is_some() };
         if let Some(bone) = bone {
             for at in 0..count {

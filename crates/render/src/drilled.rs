@@ -11,9 +11,11 @@
 //! bytes of table a brick of cells; for each brick near a cut 10 kB at voxels of 1 mm. Memory grows
 //! with the cut and does not shrink. About 20 µs a brick that has changed.
 
-use crate::bricks::{Grid, LEAP};
 use glam::IVec3;
 use trepan_volume::{BoneVolume, CUT_STEPS, CUT_SURFACE};
+
+/// Edge of a brick of cells; `BRICK` in `bricks.wgsl`. Divides the bone's own brick.
+pub(crate) const LEAP: usize = 4;
 
 /// Depth of a place far from all cuts, nodes; `FAR` in `drilled.wgsl`.
 pub(crate) const FAR: f32 = -4.0;
@@ -32,9 +34,9 @@ pub(crate) struct Drilled {
 }
 
 impl Drilled {
-    /// Nothing is cut of so many bricks of cells.
-    pub fn new(grid: &Grid, bricks: usize) -> Self {
-        Self { edge: LEAP * grid.steps + 1, table: vec![0; bricks], depths: Vec::new() }
+    /// Nothing is cut of so many bricks of cells, with `steps` of the lattice along a cell's edge.
+    pub fn new(steps: usize, bricks: usize) -> Self {
+        Self { edge: LEAP * steps + 1, table: vec![0; bricks], depths: Vec::new() }
     }
 
     /// Values of a place, an even number.
@@ -52,7 +54,8 @@ impl Drilled {
     /// Copies the cut in a brick of cells; returns the place of the brick, if it has one.
     pub fn follow(&mut self, bone: &BoneVolume, at: usize, brick: [usize; 3]) -> Option<usize> {
         let nodes = bone.cut_nodes();
-        // Padded voxel 0 is one before the bone's first; the spline needs one node more on each side.
+        // Padded voxel 0 is one before the bone's first; the spline needs one node more on each
+        // side.
         let low = nodes * (IVec3::from(brick.map(|b| (b * LEAP) as i32)) - 1) - 1;
         let count = LEAP as i32 * nodes + 3;
         if self.table[at] == 0 && !bone.is_cut_near(low, low + count) {

@@ -135,8 +135,8 @@ impl Skull {
         Ok((Followed::of(&self.grid, &changed, left), grown))
     }
 
-    /// Uploads what was cut in some bricks of cells, each with its place; returns whether the buffer
-    /// was too small and is a new one.
+    /// Uploads what was cut in bricks of cells, each with its place; returns whether the buffer was
+    /// too small and is a new one.
     fn write_drilled(&mut self, gpu: &Gpu, bricks: &[(usize, usize)]) -> Result<bool, RenderError> {
         let (table, room) = &mut self.drilled;
         let (depths, words) = (&self.leaps.drilled.depths, self.leaps.drilled.stride() / 2);

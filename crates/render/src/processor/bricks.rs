@@ -1,9 +1,11 @@
 //! CPU version of `bricks.wgsl`: rays through the padded density grid.
 
-use super::drilled::Surface;
+use super::drilled::{LIFT_VOXEL, Surface, shown_hu};
+use super::line::Line;
 use super::root::enter;
-use crate::bricks::{BLOCK, Followed, Grid, LEAP, Leaps, NOTHING, densities};
+use crate::bricks::{BLOCK, Followed, Grid, Leaps, NOTHING, densities};
 use crate::cut::height;
+use crate::drilled::LEAP;
 use crate::mix::{between, greater, greatest, least, lesser, mixed, trilinear};
 use crate::scene::Scene;
 
@@ -17,8 +19,6 @@ const NUDGE: f32 = 1e-3;
 const MOST_STEPS: u32 = 8192;
 /// Step below which a beam counts as near bone, voxels.
 const LEAST_LEAP: f32 = 0.5;
-/// Height over the CT's surface at which shadow rays start, voxels.
-pub(crate) const LIFT_VOXEL: f32 = 0.8;
 
 /// How rays are cast through bone. The default is used for every picture; the alternatives are for
 /// comparison measurements.
@@ -114,6 +114,11 @@ impl Bricks {
         trilinear(self.grid.dims, g, |at| f32::from(self.density[at]))
     }
 
+    /// HU with what was cut, at continuous padded grid coordinates.
+    pub fn shown_hu(&self, g: Vec3) -> f32 {
+        shown_hu(&self.grid, self.hu(g), self.leaps.depth(&self.grid, g))
+    }
+
     /// The surface at a point hit by a ray `along`: that of the CT or of the cut.
     #[inline(always)]
     pub fn surface(&self, g: Vec3, along: Vec3) -> Surface {
@@ -128,7 +133,8 @@ impl Bricks {
             gradient += corner * mixed(place, strides, |at| f32::from(self.density[at]));
         }
         // Eight differences over 3.2 voxels, two of which go by each edge.
-        if let Some(bore) = self.bore(g, gradient.length() / (8.0 * 1.6)) {
+        let over = self.hu(g) - f32::from(self.grid.isovalue);
+        if let Some(bore) = self.leaps.bore(&self.grid, g, over, gradient.length() / (8.0 * 1.6)) {
             return bore;
         }
         let normal = if gradient.length_squared() < 1e-6 { -along } else { -gradient.normalize() };
@@ -283,7 +289,7 @@ impl Bricks {
                 let [a, b] = [ray.at(t) - low, ray.at(next) - low];
                 let mut s = enter(&corners, a, b);
                 if s <= 1.0 {
-                    s = self.enter_drilled(cell, &corners, [a, b], s);
+                    s = self.leaps.enter_drilled(cell, &corners, [a, b], s);
                 }
                 if s <= 1.0 {
                     return t + s * (next - t);
@@ -313,37 +319,6 @@ impl Bricks {
         let most = a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)));
         let isovalue = f32::from(self.grid.isovalue);
         (most >= self.grid.isovalue).then(|| values.map(|v| f32::from(v) - isovalue))
-    }
-}
-
-/// A ray o + t·d in padded grid coordinates, with precomputed values.
-pub(crate) struct Line {
-    pub o: Vec3A,
-    pub d: Vec3A,
-    pub inverse: Vec3A,
-    /// 1 along the axes on which it ascends, else 0.
-    pub ahead: Vec3A,
-    /// 1 along these axes, else -1.
-    side: Vec3A,
-    step: IVec3,
-    /// Octant of the direction: bit n is set where it ascends along axis n.
-    octant: usize,
-}
-
-impl Line {
-    #[inline(always)]
-    pub fn of(o: Vec3, d: Vec3) -> Self {
-        let d = Vec3A::from(d);
-        let d = Vec3A::select(d.abs().cmplt(Vec3A::splat(1e-12)), Vec3A::splat(1e-12), d);
-        let ahead = Vec3A::select(d.cmpgt(Vec3A::ZERO), Vec3A::ONE, Vec3A::ZERO);
-        let side = ahead * 2.0 - 1.0;
-        let octant = d.cmpgt(Vec3A::ZERO).bitmask() as usize;
-        Self { o: o.into(), d, inverse: d.recip(), ahead, side, step: side.as_ivec3(), octant }
-    }
-
-    #[inline(always)]
-    pub fn at(&self, t: f32) -> Vec3A {
-        self.o + self.d * t
     }
 }
 

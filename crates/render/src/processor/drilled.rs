@@ -1,15 +1,18 @@
 //! CPU version of `drilled.wgsl`: where rays meet the bone that tools have left.
 
-use super::bricks::{Bricks, Line};
+use super::line::Line;
 use super::root::{blend, first_of_both, first_root};
-use crate::bricks::LEAP;
-use crate::drilled::FAR;
+use crate::bricks::{Grid, Leaps};
+use crate::drilled::{FAR, LEAP};
 use crate::mix::{least, trilinear};
 use glam::{IVec3, Vec3, Vec3A, Vec4};
-use trepan_volume::CUT_STEPS;
+use trepan_volume::{AIR_HU, CUT_STEPS};
 
 /// Steepness with which a cut lowers the density that is shown, HU a node.
 const RAMP_HU: f32 = 1000.0;
+
+/// Height over the CT's surface at which shadow rays start, voxels.
+pub(crate) const LIFT_VOXEL: f32 = 0.8;
 
 /// A surface at a hit.
 #[derive(Clone, Copy, Debug)]
@@ -20,35 +23,36 @@ pub(crate) struct Surface {
     pub lift: f32,
 }
 
-impl Bricks {
+/// A density with what was cut at a depth, HU: under a ramp at the cut.
+pub(crate) fn shown_hu(grid: &Grid, hu: f32, depth: f32) -> f32 {
+    hu.min((f32::from(grid.isovalue) - RAMP_HU * depth).max(f32::from(AIR_HU)))
+}
+
+impl Leaps {
     /// How deep a place lies in what was cut, nodes; [`FAR`] far from all cuts.
     #[inline(always)]
-    pub fn depth(&self, g: Vec3) -> f32 {
-        let brick = self.brick_in(g);
-        let Some(depths) = self.leaps.drilled.brick(self.leaps.index(brick)) else { return FAR };
+    pub fn depth(&self, grid: &Grid, g: Vec3) -> f32 {
+        let last = IVec3::from(grid.dims.map(|n| n as i32 - 2));
+        let brick = g.as_ivec3().clamp(IVec3::ZERO, last).to_array().map(|c| c as usize / LEAP);
+        let Some(depths) = self.drilled.brick(self.index(brick)) else { return FAR };
         let low = Vec3::from(brick.map(|b| (b * LEAP) as f32));
-        let edge = self.leaps.drilled.edge;
-        trilinear([edge; 3], (g - low) * self.grid.steps as f32, |at| f32::from(depths[at])) / CUT_STEPS
-    }
-
-    /// HU with what was cut, at continuous padded grid coordinates: under a ramp at the cut.
-    #[inline(always)]
-    pub fn shown_hu(&self, g: Vec3) -> f32 {
-        let most = f32::from(self.grid.isovalue) - RAMP_HU * self.depth(g);
-        self.hu(g).min(most.max(f32::from(trepan_volume::AIR_HU)))
+        let edge = self.drilled.edge;
+        trilinear([edge; 3], (g - low) * grid.steps as f32, |at| f32::from(depths[at])) / CUT_STEPS
     }
 
     /// Fraction of the segment between two local points of a cell at which bone begins that was not
     /// cut, or 2. The CT reaches the isovalue at the fraction `s`.
     pub fn enter_drilled(&self, cell: IVec3, corners: &[f32; 8], [a, b]: [Vec3A; 2], mut s: f32) -> f32 {
         let brick = cell.to_array().map(|c| c as usize / LEAP);
-        let Some(depths) = self.leaps.drilled.brick(self.leaps.index(brick)) else { return s };
-        let (steps, edge) = (self.grid.steps as f32, self.leaps.drilled.edge);
+        let Some(depths) = self.drilled.brick(self.index(brick)) else { return s };
+        let edge = self.drilled.edge;
+        let count = (edge - 1) / LEAP;
+        let steps = count as f32;
         // The segment on the lattice of the brick.
         let low = steps * (cell - (LEAP as i32) * IVec3::from(brick.map(|b| b as i32))).as_vec3a();
         let ray = Line::of((low + steps * a).into(), (steps * (b - a)).into());
         let last = low + steps - 1.0;
-        for _ in 0..3 * self.grid.steps + 3 {
+        for _ in 0..3 * count + 3 {
             let step = ray.at(s + 1e-4).floor().clamp(low, last);
             let first = step.x as usize + edge * (step.y as usize + edge * step.z as usize);
             let pair = |at: usize| [depths[at], depths[at + 1]];
@@ -78,28 +82,22 @@ impl Bricks {
         2.0
     }
 
-    /// The surface of the cut at a hit, where it bounds the bone and not the CT, which falls by
-    /// `slope`, HU a voxel.
+    /// The surface of the cut at a hit, where it and not the CT bounds the bone. The CT is `over`
+    /// the isovalue, HU, and falls by `slope`, HU a voxel.
     #[inline(always)]
-    pub fn bore(&self, g: Vec3, slope: f32) -> Option<Surface> {
-        let depth = self.depth(g);
+    pub fn bore(&self, grid: &Grid, g: Vec3, over: f32, slope: f32) -> Option<Surface> {
+        let depth = self.depth(grid, g);
         if depth == FAR {
             return None;
         }
-        let over = (self.hu(g) - f32::from(self.grid.isovalue)).abs();
         // A node is two steps.
-        let node = 2.0 / self.grid.steps as f32;
-        if depth.abs() * node * slope > over {
+        let node = 2.0 / grid.steps as f32;
+        if depth.abs() * node * slope > over.abs() {
             return None;
         }
         let half = 0.5 * node;
-        let along = |axis: Vec3| self.depth(g + half * axis) - self.depth(g - half * axis);
+        let along = |axis: Vec3| self.depth(grid, g + half * axis) - self.depth(grid, g - half * axis);
         let normal = Vec3::from(Vec3::AXES.map(along)).try_normalize()?;
         Some(Surface { normal, lift: 0.2 * node })
-    }
-
-    fn brick_in(&self, g: Vec3) -> [usize; 3] {
-        let last = IVec3::from(self.grid.dims.map(|n| n as i32 - 2));
-        g.as_ivec3().clamp(IVec3::ZERO, last).to_array().map(|c| c as usize / LEAP)
     }
 }

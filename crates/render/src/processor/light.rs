@@ -2,8 +2,7 @@
 
 use super::Inputs;
 use super::brain::Fragment;
-use super::bricks::LIFT_VOXEL;
-use super::drilled::Surface;
+use super::drilled::{LIFT_VOXEL, Surface};
 use super::skull::{Ray, on_cut};
 use super::tool::{Met, lit};
 use crate::bricks::NOTHING;

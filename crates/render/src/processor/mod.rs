@@ -22,6 +22,7 @@ mod contour;
 mod drilled;
 mod eye;
 mod light;
+mod line;
 mod overlay;
 mod root;
 mod rows;

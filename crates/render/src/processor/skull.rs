@@ -1,7 +1,7 @@
 //! CPU version of `skull.wgsl`: the bone's isosurface at a pixel.
 
-use super::bricks::{Bricks, LIFT_VOXEL, under};
-use super::drilled::Surface;
+use super::bricks::{Bricks, under};
+use super::drilled::{LIFT_VOXEL, Surface};
 use crate::bricks::NOTHING;
 use crate::cut::height;
 use crate::scene::Scene;
