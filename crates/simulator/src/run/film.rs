@@ -4,9 +4,9 @@
 //! # Theory
 //! Stages run forwards only, but their changes can be undone. A [`Shot`] is taken thirty times per
 //! second of session time, and at each new notice or change of warnings. It holds what the picture
-//! needs: the tick's view, the positions of the brain's nodes, and each voxel that changed since
-//! the last shot, with its density before and after. Playing forwards writes the new densities,
-//! backwards the old ones, so that the skull is exact at every shot.
+//! needs: the tick's view, the positions of the brain's nodes, and each voxel of the CT and node of
+//! the cut that changed since the last shot, with its value before and after. Playing forwards
+//! writes the new values, backwards the old ones, so that the skull is exact at every shot.
 //!
 //! ```text
 //!  stages ── carve a copy of the skull ───┐
@@ -15,8 +15,9 @@
 //!
 //! # Practice
 //! The stages run on a copy of the skull, so memory holds three skulls (the visible one, the copy
-//! and the state at the last shot) and the nodes of at most [`BRAINS`] shots, 12 bytes each. A
-//! minute of craniotomy is made in a second; with the brain, in about the time of the solver.
+//! and the state at the last shot, each with its cut) and the nodes of at most [`BRAINS`] shots, 12
+//! bytes each. A minute of craniotomy is made in a second; with the brain, in about the time of the
+//! solver.
 //!
 //! # When not to use it
 //! Headless: there is no time bar.
@@ -24,6 +25,7 @@
 use crate::run::View;
 use crate::stages::notice::Notice;
 use glam::IVec3;
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use trepan_geometry::Vec3;
@@ -40,21 +42,35 @@ const BRICK: usize = 8;
 pub(crate) struct Shot {
     /// View of the tick.
     pub view: View,
-    /// Voxels that changed since the last shot.
+    /// Voxels of the CT that changed since the last shot.
     pub changes: Vec<Change>,
+    /// Nodes of the cut that changed since the last shot.
+    pub cuts: Vec<Change>,
     /// Positions of the brain's nodes, mm, in some of the shots.
     pub positions: Option<Vec<Vec3>>,
 }
 
-/// A voxel whose density changed.
+/// A voxel whose density changed, or a node whose depth in the cut did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Change {
-    /// Index of the voxel.
-    pub voxel: IVec3,
-    /// Density before, HU.
+    /// Index of the voxel or node.
+    pub at: IVec3,
+    /// Density, HU, or the cut's value before.
     pub before: i16,
-    /// Density after, HU.
+    /// The same after.
     pub after: i16,
+}
+
+impl Shot {
+    /// Writes the changes since the last shot into a skull, or takes them back; returns their
+    /// number.
+    pub fn write(&self, bone: &BoneVolume, forwards: bool) -> usize {
+        let value = |change: &Change| if forwards { change.after } else { change.before };
+        self.changes.iter().for_each(|change| bone.set_hu(change.at, value(change)));
+        let mut writer = bone.cut_writer();
+        self.cuts.iter().for_each(|change| _ = writer.set(change.at, value(change)));
+        self.changes.len() + self.cuts.len()
+    }
 }
 
 /// Takes the shots of a replay.
@@ -92,8 +108,8 @@ impl Filming {
             self.next_brain_ms = time_ms + self.brain_every_ms;
         }
         let positions = moved.then(brain).flatten();
-        let changes = self.skull.as_mut().map_or_else(Vec::new, Carved::changes);
-        self.shots.send(Shot { view, changes, positions }).is_ok()
+        let (changes, cuts) = self.skull.as_mut().map(Carved::changes).unwrap_or_default();
+        self.shots.send(Shot { view, changes, cuts, positions }).is_ok()
     }
 }
 
@@ -102,28 +118,49 @@ struct Carved {
     bone: Arc<BoneVolume>,
     versions: Vec<u32>,
     last: Vec<i16>,
+    /// The cut at the last shot in the bricks of voxels where there was some.
+    last_cut: HashMap<[usize; 3], Vec<i16>>,
 }
 
 impl Carved {
     fn of(bone: Arc<BoneVolume>) -> Self {
-        Self { versions: bone.seen(), last: bone.snapshot().data, bone }
+        let [nx, ny, nz] = bone.dims().map(|n| n as i32);
+        let voxels = (0..nx * ny * nz).map(|n| IVec3::new(n % nx, n / nx % ny, n / (nx * ny)));
+        let last = voxels.map(|voxel| bone.ct(voxel)).collect();
+        Self { versions: bone.seen(), last, last_cut: HashMap::new(), bone }
     }
 
-    fn changes(&mut self) -> Vec<Change> {
-        let Self { bone, versions, last } = self;
+    /// Voxels of the CT and nodes of the cut that changed since the last call.
+    fn changes(&mut self) -> (Vec<Change>, Vec<Change>) {
+        let Self { bone, versions, last, last_cut } = self;
         let [nx, ny, nz] = bone.dims();
-        let mut changes = Vec::new();
+        let edge = BRICK as i32 * bone.cut_nodes();
+        let mut now = vec![0; edge.pow(3) as usize];
+        let (mut changes, mut cuts) = (Vec::new(), Vec::new());
         bone.changed(versions, usize::MAX, |brick| {
             let [x, y, z] = brick.map(|b| b * BRICK);
             for (k, j, i) in places([z, y, x], [nz, ny, nx]) {
-                let voxel = IVec3::new(i as i32, j as i32, k as i32);
-                let (was, after) = (&mut last[i + nx * (j + ny * k)], bone.hu(voxel));
+                let at = IVec3::new(i as i32, j as i32, k as i32);
+                let (was, after) = (&mut last[i + nx * (j + ny * k)], bone.ct(at));
                 if *was != after {
-                    changes.push(Change { voxel, before: std::mem::replace(was, after), after });
+                    changes.push(Change { at, before: std::mem::replace(was, after), after });
                 }
             }
+            let low = edge * IVec3::from(brick.map(|b| b as i32));
+            if !bone.is_cut_near(low, low + edge - 1) {
+                return;
+            }
+            bone.read_cut(low, IVec3::splat(edge), &mut now);
+            let before = last_cut.entry(brick).or_insert_with(|| vec![0; now.len()]);
+            for (n, (was, &after)) in
+                before.iter_mut().zip(&now).enumerate().filter(|(_, (was, after))| **was != **after)
+            {
+                let n = n as i32;
+                let at = low + IVec3::new(n % edge, n / edge % edge, n / (edge * edge));
+                cuts.push(Change { at, before: std::mem::replace(was, after), after });
+            }
         });
-        changes
+        (changes, cuts)
     }
 }
 
@@ -139,13 +176,23 @@ pub(crate) mod tests {
     use crate::program::Program;
     use crate::stages::haptic_tick::ToolSample;
     use trepan_geometry::{Pose, ToolState};
-    use trepan_volume::{AIR_HU, VoxelVolume};
+    use trepan_volume::{AIR_HU, CUT_SURFACE, VoxelVolume};
 
     /// Returns the view of a tool at the origin.
     pub(crate) fn view(time_ms: f64) -> View {
         let tool = Program::Craniotomy.tray()[0];
         let sample = ToolSample { tick: 0, state: ToolState::at(Pose::IDENTITY), tool, slot: 0, drilling: false };
         View { time_ms, ..View::at(sample, 1.0) }
+    }
+
+    /// The CT of every voxel and the cut of every node.
+    fn state(bone: &BoneVolume) -> (Vec<i16>, Vec<i16>) {
+        let [nx, ny, nz] = bone.dims().map(|n| n as i32);
+        let voxels = (0..nx * ny * nz).map(|n| bone.ct(IVec3::new(n % nx, n / nx % ny, n / (nx * ny))));
+        let size = bone.cut_nodes() * IVec3::new(nx, ny, nz);
+        let mut cut = vec![0; size.element_product() as usize];
+        bone.read_cut(IVec3::ZERO, size, &mut cut);
+        (voxels.collect(), cut)
     }
 
     #[test]
@@ -159,22 +206,23 @@ pub(crate) mod tests {
         for ms in 0..1000 {
             let place = IVec3::new(random.i32(0..19), random.i32(0..17), random.i32(0..11));
             carved.set_hu(place, if ms % 3 == 0 { 700 } else { AIR_HU });
+            assert!(carved.cut_writer().set(2 * place, random.i16(0..CUT_SURFACE)));
             let taken = filming.next_ms <= f64::from(ms);
             assert!(filming.tick(view(ms.into()), ms == 999, || Some(vec![Vec3::splat(ms as f32)])));
             if taken || ms == 999 {
-                states.push(carved.snapshot());
+                states.push(state(&carved));
             }
         }
         let shots: Vec<Shot> = receiver.try_iter().collect();
         assert!(shots.len() == states.len() && (30..33).contains(&shots.len()), "{}", shots.len());
         for (shot, state) in shots.iter().zip(&states) {
-            shot.changes.iter().for_each(|change| shown.set_hu(change.voxel, change.after));
-            assert_eq!(shown.snapshot(), *state);
+            assert!(shot.write(&shown, true) > 0);
+            assert!(self::state(&shown) == *state);
         }
         for shot in shots.iter().rev() {
-            shot.changes.iter().for_each(|change| shown.set_hu(change.voxel, change.before));
+            shot.write(&shown, false);
         }
-        assert_eq!(shown.snapshot(), volume);
+        assert!(state(&shown) == state(&made(&volume)));
         assert_eq!(shots.last().unwrap().positions, Some(vec![Vec3::splat(999.0)]));
     }
 

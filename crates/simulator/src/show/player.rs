@@ -2,8 +2,8 @@
 //!
 //! # Practice
 //! The film is made at full speed while it is shown ([`crate::run::film`]); the time bar shows how
-//! far it is made. Seeking writes the voxels that changed in between, some 20 ns each, at most
-//! [`MAX_VOXELS`] per picture: a longer jump takes a few pictures. The brain's nodes are
+//! far it is made. Seeking writes the voxels and nodes that changed in between, some 20 ns each, at
+//! most [`MAX_VOXELS`] per picture: a longer jump takes a few pictures. The brain's nodes are
 //! interpolated between the shots that hold them.
 
 use crate::run::View;
@@ -20,7 +20,7 @@ use trepan_render::window::{Capture, Mark, Panel, Playback, Session, Timeline, W
 use trepan_render::{Camera, Frame, Image, Painter};
 use trepan_volume::BoneVolume;
 
-/// Largest number of voxels written per picture: some 10 ms.
+/// Largest number of voxels and nodes written per picture: some 10 ms.
 const MAX_VOXELS: usize = 500_000;
 /// Kinds of events without marks on the time bar: they come many times a second.
 const STREAMED: [&str; 1] = ["score"];
@@ -72,10 +72,7 @@ impl Film {
     /// Writes the changes of a shot into the skull; returns their number.
     fn write(&self, shot: usize, forwards: bool) -> usize {
         let (Some(bone), Some(shot)) = (&self.bone, self.shots.get(shot)) else { return 0 };
-        for change in &shot.changes {
-            bone.set_hu(change.voxel, if forwards { change.after } else { change.before });
-        }
-        shot.changes.len()
+        shot.write(bone, forwards)
     }
 
     /// Interpolates the brain's nodes between the nearest shots that hold them.
@@ -211,9 +208,9 @@ mod tests {
         let (sender, coming) = channel();
         for n in 0..count {
             let voxel = IVec3::new(n as i32 % 40, n as i32 / 40, 1);
-            let changes = vec![Change { voxel, before: 900, after: -1000 }];
+            let changes = vec![Change { at: voxel, before: 900, after: -1000 }];
             let positions = (n % 2 == 0).then(|| vec![Vec3::X * n as f32]);
-            sender.send(Shot { view: view(10.0 * n as f64), changes, positions }).unwrap();
+            sender.send(Shot { view: view(10.0 * n as f64), changes, cuts: Vec::new(), positions }).unwrap();
         }
         let mut film = Film { shots: Vec::new(), coming, bone, at: 0, positions: Vec::new() };
         film.grow();
