@@ -57,9 +57,13 @@ pub struct Options {
     /// Replace the session that --out holds, or the file that --record names
     #[arg(long)]
     pub overwrite: bool,
-    /// Also write the drilled skull's surface as drilled.stl, about 50 MB
+    /// Also write the drilled skull's surface as drilled.stl, some hundred MB
     #[arg(long)]
     pub stl: bool,
+    /// Also write drilled-fine.nii.gz: the skull around the removed bone, in voxels of 0.5 mm or
+    /// less
+    #[arg(long)]
+    pub drilled_fine: bool,
     /// Accuracy of bone, brain and picture [default: auto; a replay's as recorded]. Auto measures
     /// this machine and takes the cheapest models that keep the tolerances below; draft, usual and
     /// fine are the same on every machine

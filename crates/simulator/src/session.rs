@@ -146,6 +146,8 @@ impl Session {
         let drilled =
             self.setup.bone().zip(whole.as_ref()).map(|(bone, whole)| self.drilled(bone, whole, &mut remarks));
         remarks.extend(second_watch.as_ref().and_then(hand::faults).map(|text| format!("second hand: {text}")));
+        let around = self.setup.bone().zip(whole.as_ref()).filter(|_| self.options.drilled_fine);
+        let around = around.and_then(|(bone, whole)| drilled::on_nodes_around(whole, bone));
         let bone_before = self.setup.bone().zip(whole);
         let summary = Summary {
             cut_off: CutOff::of(&before, &self.setup.pieces(), self.setup.bone().map_or(0.0, |bone| bone.voxel_mm3())),
@@ -158,7 +160,7 @@ impl Session {
         let summary = summary.with(&outcome);
         output::write(&self.out, &recording, &summary, &outcome, &self.shots(album.shots))?;
         if let Some((bone, densities)) = self.setup.bone().zip(drilled) {
-            output::drilled(&self.out, &densities, bone, self.options.stl)?;
+            output::skull(&self.out, &densities, around.as_ref(), bone, self.options.stl)?;
         }
         place.keep();
         Ok(Ended { summary, out: self.out, signal: stop.signal(), lack })

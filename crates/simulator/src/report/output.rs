@@ -2,6 +2,7 @@
 
 use crate::error::SessionError;
 use crate::program::Program;
+use crate::report::drilled;
 use crate::report::page::{self, Shot};
 use crate::report::summary::Summary;
 use crate::run::Outcome;
@@ -16,7 +17,8 @@ use trepan_mesh::{isosurface, stl};
 use trepan_volume::{BoneVolume, VoxelVolume, nifti};
 
 /// Files that a session writes into its folder, besides pictures.
-const FILES: [&str; 6] = ["summary.json", "scores.csv", "report.html", "drilled.nii.gz", "drilled.stl", RECORDING];
+const FILES: [&str; 7] =
+    ["summary.json", "scores.csv", "report.html", "drilled.nii.gz", "drilled-fine.nii.gz", "drilled.stl", RECORDING];
 /// Default name of the recording; `--record` gives another.
 pub(crate) const RECORDING: &str = "session.mcap";
 /// Folder of the pictures.
@@ -115,17 +117,21 @@ impl Drop for Place {
     }
 }
 
-/// Writes the densities of the drilled skull, HU, and with `surface` its isosurface as triangles.
-pub(crate) fn drilled(
+/// Writes the densities of the drilled skull, HU. If asked, also those on the nodes around what was
+/// removed, and with `surface` its isosurface as triangles.
+pub(crate) fn skull(
     out: &Path,
     densities: &VoxelVolume<i16>,
+    around: Option<&VoxelVolume<i16>>,
     bone: &BoneVolume,
     surface: bool,
 ) -> Result<(), SessionError> {
     let failed = |fault: &dyn std::fmt::Display| SessionError::Case(format!("{fault}; give another folder with --out"));
-    nifti::write(&out.join("drilled.nii.gz"), densities).map_err(|fault| failed(&fault))?;
+    for (name, volume) in [("drilled.nii.gz", Some(densities)), ("drilled-fine.nii.gz", around)] {
+        volume.map_or(Ok(()), |volume| nifti::write(&out.join(name), volume)).map_err(|fault| failed(&fault))?;
+    }
     if surface {
-        let triangles = isosurface(&bone.snapshot(), bone.isovalue());
+        let triangles = isosurface(&drilled::on_nodes(bone), bone.isovalue());
         stl::write(&out.join("drilled.stl"), &triangles).map_err(|fault| failed(&fault))?;
     }
     Ok(())
