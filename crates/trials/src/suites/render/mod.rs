@@ -1,7 +1,8 @@
-//! Rendering: accuracy of rays against a brute-force f64 march, GPU against CPU, effect of
-//! empty-space skipping, sparse rays, step and resolution, and failure cases.
+//! Rendering: accuracy of rays against a brute-force f64 march, bores, GPU against CPU, effect of
+//! empty-space skipping, sparse rays, step and resolution, failures.
 
 mod accuracy;
+mod bores;
 mod faults;
 mod likeness;
 mod models;
@@ -46,9 +47,10 @@ const SPARSE: Setting = Setting { name: "sparse rays", casting: Casting { sparse
 /// Lists the parts: accuracy on small pictures, speed on large ones, models and failures.
 pub fn parts(_: Scope) -> Vec<Part> {
     type Subject = fn(Scope, Option<&Gpu>, &mut Findings);
-    let all: [(&str, Subject); 6] = [
+    let all: [(&str, Subject); 7] = [
         ("depth", accuracy::depth),
         ("walls", |_, gpu, found| accuracy::walls(gpu, found)),
+        ("bores", bores::run),
         ("edits", |_, gpu, found| accuracy::edits(gpu, found)),
         ("faults", |_, gpu, found| faults::run(gpu, found)),
         ("speed", speed::run),
