@@ -19,3 +19,4 @@
 pub mod engine;
 pub mod population;
 pub mod suites;
+pub mod truth;
