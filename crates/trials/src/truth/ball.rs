@@ -20,10 +20,11 @@ const CREEP_MM: f64 = 1e-5;
 const TIGHT_MM: f64 = 1e-8;
 /// Distance at which bone touches, mm.
 const TOUCHED_MM: f64 = 1e-3;
-/// Overlap that is rounding, mm.
-const ROUNDING_MM: f64 = 2e-6;
-/// Difference from its neighbours under which a direction needs no polish, mm.
-const FLAT_MM: f64 = 1e-5;
+/// Overlap that is rounding, mm: that of a hand whose poses are f32.
+const ROUNDING_MM: f64 = 2e-5;
+/// Difference from its neighbours under which a direction needs no polish, mm: a quarter of it is
+/// the most that bone stands out between them.
+const FLAT_MM: f64 = 1e-3;
 /// First and last turn of a polish, rad.
 const TURNS: [f64; 2] = [0.03, 2e-5];
 /// How far before the front bone is looked for, mm.
@@ -38,13 +39,15 @@ const MOST_STEPS: usize = 20_000;
 struct Bound {
     direction: DVec3,
     room: f64,
+    /// Room more, mm, as it is bent.
+    bend: f64,
 }
 
 impl Bound {
     /// How far a step goes beyond it, mm. Rounding is no overlap.
     fn beyond(&self, way: DVec3) -> f64 {
         let room = if self.room < -ROUNDING_MM { self.room } else { self.room.max(0.0) };
-        self.direction.dot(way) - room
+        self.direction.dot(way) - room - self.bend
     }
 }
 
@@ -113,14 +116,37 @@ impl Ball {
         if wanted.length() < self.free() {
             return wanted;
         }
+        // On a way out of a hole bounds that are straight would hold the ball back.
+        let straight = wanted.clamp_length_max(NEAR_MM);
+        if self.fits(bone, self.centre + straight, wanted) {
+            return straight;
+        }
         let mut rooms: Vec<Option<f64>> = vec![None; self.clear_until.len()];
-        let way = self.nearest(bone, wanted, &mut rooms, &[]);
-        if way.length() < REST_MM {
+        if self.consistent(bone, wanted, &mut rooms, &[]).length() < REST_MM {
             return DVec3::ZERO;
         }
         let polished = self.look_around(bone, &mut rooms);
-        let way = self.nearest(bone, wanted, &mut rooms, &polished);
-        way.clamp_length_max(self.free().max(STEP_MM))
+        self.consistent(bone, wanted, &mut rooms, &polished)
+    }
+
+    /// The way within bent bounds, mm. Around a point of bone the bound is a ball: over a step of s
+    /// it leaves s²/2r more room than a straight one.
+    fn consistent(&mut self, bone: &Bone, wanted: DVec3, rooms: &mut [Option<f64>], more: &[Bound]) -> DVec3 {
+        let mut length = wanted.length().min(self.free().max(STEP_MM));
+        loop {
+            let bend = 0.5 * length * length / self.radius;
+            let way = self.nearest(bone, wanted, rooms, more, bend).clamp_length_max(length);
+            if way.length() >= 0.5 * length || length < REST_MM {
+                return way;
+            }
+            length *= 0.25;
+        }
+    }
+
+    /// Whether the ball has room somewhere; looks along `first` first.
+    fn fits(&self, bone: &Bone, centre: DVec3, first: DVec3) -> bool {
+        let free = |direction: DVec3| bone.within(centre + self.radius * direction, NEAR_MM) < ROUNDING_MM;
+        free(first.normalize_or_zero()) && Directions::get().all.iter().all(|direction| free(*direction))
     }
 
     /// How far bone is at least from the ball's surface in the direction of that number, mm.
@@ -162,7 +188,7 @@ impl Ball {
             let others = beside[at].map(|other| rooms[usize::from(other)].unwrap_or(NEAR_MM));
             let deepest = others.iter().all(|other| room <= *other);
             let stands_out = deepest && others.iter().any(|other| other - room > FLAT_MM);
-            stands_out.then(|| self.polished(bone, Bound { direction: all[at], room }))
+            stands_out.then(|| self.polished(bone, Bound { direction: all[at], room, bend: 0.0 }))
         };
         (0..rooms.len()).filter_map(polish).collect()
     }
@@ -173,7 +199,7 @@ impl Ball {
     /// A dual active-set method: the bound that is most violated joins, and of it and those that
     /// hold the point, at most three hold the next. Bounds that contradict leave the ball where it
     /// is.
-    fn nearest(&mut self, bone: &Bone, wanted: DVec3, rooms: &mut [Option<f64>], more: &[Bound]) -> DVec3 {
+    fn nearest(&mut self, bone: &Bone, wanted: DVec3, rooms: &mut [Option<f64>], more: &[Bound], bend: f64) -> DVec3 {
         let (mut held, mut way) = (Vec::<Bound>::new(), wanted);
         let Directions { all, beside } = Directions::get();
         // In a hole of its own width those around the way that is wanted hold the ball.
@@ -184,15 +210,15 @@ impl Ball {
             let (mut worst, mut beyond, mut unknown) = (None, TIGHT_MM, None);
             for &at in &asked {
                 let room = rooms[at].unwrap_or(self.clear(at));
-                let bound = Bound { direction: all[at], room };
+                let bound = Bound { direction: all[at], room, bend };
                 if room < NEAR_MM && bound.beyond(way) > beyond {
                     (worst, beyond) = (Some(bound), bound.beyond(way));
                     unknown = rooms[at].is_none().then_some(at);
                 }
             }
-            for bound in more {
+            for bound in more.iter().map(|bound| Bound { bend, ..*bound }) {
                 if bound.beyond(way) > beyond {
-                    (worst, beyond, unknown) = (Some(*bound), bound.beyond(way), None);
+                    (worst, beyond, unknown) = (Some(bound), bound.beyond(way), None);
                 }
             }
             match (worst, unknown) {
@@ -259,8 +285,9 @@ impl Ball {
         while turn > TURNS[1] {
             let (a, b) = best.direction.any_orthonormal_pair();
             let tried = [a, -a, b, -b].map(|aside| (best.direction + turn * aside).normalize());
-            let rays =
-                tried.into_iter().filter_map(|direction| Some(Bound { direction, room: self.room(bone, direction)? }));
+            let rays = tried
+                .into_iter()
+                .filter_map(|direction| Some(Bound { direction, room: self.room(bone, direction)?, bend: 0.0 }));
             match rays.min_by(|a, b| a.room.total_cmp(&b.room)).filter(|nearer| nearer.room < best.room) {
                 Some(nearer) => best = nearer,
                 None => turn *= 0.4,

@@ -62,10 +62,8 @@ impl Scan {
                 .map(|(low, at)| low + at)
                 .collect::<Vec<_>>()
         };
-        let hu: Vec<f64> = (0..dims.iter().product())
-            .map(|at| voxel(at))
-            .map(|v| f64::from(ct.data[ct.index([v[0], v[1], v[2]])]))
-            .collect();
+        let hu: Vec<f64> =
+            (0..dims.iter().product()).map(voxel).map(|v| f64::from(ct.data[ct.index([v[0], v[1], v[2]])])).collect();
         let steps = [1, dims[0], dims[0] * dims[1]];
         let most = |axis: usize| {
             let inner = |at: &usize| at / steps[axis] % dims[axis] + 1 < dims[axis];

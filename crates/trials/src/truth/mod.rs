@@ -19,7 +19,8 @@
 //! The first tick must be free of bone.
 //!
 //! # When not to use it
-//! In a haptic loop: it allocates and takes as long as it needs.
+//! In a haptic loop: it allocates and takes as long as it needs. For a ball on its way out of a
+//! long hole of its own width in a CT: there it takes up to seconds a tick, and may stay behind.
 
 mod ball;
 mod cut;

@@ -14,7 +14,8 @@ fn solid(distance: impl Fn(DVec3) -> f64 + Send + Sync + 'static) -> Bone {
 #[test]
 fn a_pressed_ball_is_held_where_closed_forms_say() {
     let outside = 12.0 * OBLIQUE;
-    let cases: [(Bone, fn(DVec3) -> DVec3); 3] = [
+    type Held = fn(DVec3) -> DVec3;
+    let cases: [(Bone, Held); 3] = [
         (solid(|p| p.dot(OBLIQUE)), |p| p + (R - p.dot(OBLIQUE)).max(0.0) * OBLIQUE),
         (solid(|p| p.length() - 8.0), |p| p.normalize() * p.length().max(8.0 + R)),
         (solid(|p| 16.0 - p.length()), |p| p.clamp_length_max(16.0 - R)),
@@ -89,4 +90,23 @@ fn a_scan_is_trilinear_on_its_own_grid() {
     let mut ball = Ball::new(R as f32, 5.0 * OBLIQUE);
     let lifted = ball.follow(&bone, 2.5 * OBLIQUE);
     assert!((lifted.length() - 0.5).abs() < 5e-3 && lifted.angle_between(OBLIQUE) < 0.01, "{lifted}");
+}
+
+/// A burr leaves its own bore as fast as the hand draws it.
+#[test]
+fn a_burr_comes_out_of_its_bore() {
+    let mut bone = solid(|p| p.dot(OBLIQUE));
+    let mut ball = Ball::new(R as f32, 3.5 * OBLIQUE);
+    for tick in 0..1500 {
+        let device = (3.5 - 4e-3 * f64::from(tick)) * OBLIQUE;
+        ball.follow(&bone, device);
+        ball.drill(&mut bone, device, &RemovalLaw::RATE, 4.0);
+    }
+    for tick in 0..60 {
+        // Poses are f32: a hand's noise is some nanometres.
+        let noise = 5e-6 * OBLIQUE.any_orthonormal_vector() * f64::from(tick % 3 - 1);
+        let device = (0.2 * f64::from(tick) - 2.0) * OBLIQUE + noise;
+        let lifted = ball.follow(&bone, device);
+        assert!(lifted.length() < 1e-3 || lifted.dot(OBLIQUE) > 0.0, "tick {tick}: {lifted}");
+    }
 }
