@@ -59,7 +59,7 @@ impl<'a> Section<'a> {
         Self {
             name: suite.name,
             question: suite.question,
-            broken: found.gates.iter().filter(|gate| !gate.pass).count(),
+            broken: found.gates.iter().filter(|gate| gate.breaks()).count(),
             command_of_part: report.command.replacen(&report.suite, &format!("{}/PART", report.suite), 1),
             charts: charts(suite, report),
             maps: found.maps.iter().map(Figure::of).collect(),

@@ -2,7 +2,7 @@
 
 use crate::engine::borders;
 use crate::engine::part::{Part, Scope, Suite};
-use crate::engine::suite::Findings;
+use crate::engine::suite::{Findings, Gate};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -67,7 +67,7 @@ impl Report {
 
     /// Whether every acceptance limit is met.
     pub fn passed(&self) -> bool {
-        self.findings.gates.iter().all(|gate| gate.pass)
+        !self.findings.gates.iter().any(Gate::breaks)
     }
 }
 
