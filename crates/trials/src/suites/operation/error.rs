@@ -8,15 +8,10 @@ const FELT_N: f32 = 0.02;
 
 /// What differs.
 pub struct Errors {
-    /// Error of the force, N: root mean square, and what 95 of 100 ticks stay under. It counts
-    /// while the burr is in the hand, or the probe touches bone in one of the two, and one feels
-    /// something.
-    pub bone_rms_n: f64,
-    /// See above.
-    pub bone_p95_n: f64,
-    /// The same while the probe touches no bone in either.
+    /// Error of the force while the probe touches no bone, root mean square, N. It counts where one
+    /// of the two feels something.
     pub tissue_rms_n: f64,
-    /// See above.
+    /// The same: what 95 of 100 ticks stay under.
     pub tissue_p95_n: f64,
     /// Error of the brain's surface at the opening, mm, while the probe is in the hand. It is the
     /// distance from where the finest run shows it to the nearest place of this run's brain.
@@ -42,16 +37,12 @@ impl Errors {
             let (a, b) = (ride.forces[tick], truth.forces[tick]);
             (a.length() > FELT_N || b.length() > FELT_N).then(|| f64::from(a.distance(b)))
         };
-        let (tissue, bone): (Vec<usize>, Vec<usize>) = (0..truth.forces.len()).partition(on_tissue);
-        let [mut bone, mut tissue] =
-            [bone, tissue].map(|ticks| ticks.into_iter().filter_map(apart_n).collect::<Vec<_>>());
+        let mut tissue: Vec<f64> = (0..truth.forces.len()).filter(on_tissue).filter_map(apart_n).collect();
         let (mut rest, mut shown) = surfaces(ride, truth);
         let both = ride.removed.iter().zip(&truth.removed);
         let count = |wanted: fn(bool, bool) -> bool| both.clone().filter(|(a, b)| wanted(**a, **b)).count() as f64;
         let (common, apart) = (count(|a, b| a && b), count(|a, b| a != b));
         Self {
-            bone_rms_n: rms(&bone),
-            bone_p95_n: quantile(&mut bone, 0.95),
             tissue_rms_n: rms(&tissue),
             tissue_p95_n: quantile(&mut tissue, 0.95),
             shown_mean_mm: shown.iter().sum::<f64>() / shown.len() as f64,
@@ -64,10 +55,8 @@ impl Errors {
     }
 
     /// By their names with units.
-    pub fn named(&self) -> [(&'static str, f64); 10] {
+    pub fn named(&self) -> [(&'static str, f64); 8] {
         [
-            ("bone_force_error_rms_n", self.bone_rms_n),
-            ("bone_force_error_p95_n", self.bone_p95_n),
             ("tissue_force_error_rms_n", self.tissue_rms_n),
             ("tissue_force_error_p95_n", self.tissue_p95_n),
             ("shown_error_mean_mm", self.shown_mean_mm),
@@ -130,6 +119,7 @@ mod tests {
             setup: String::new(),
             site: Site { entry: Vec3::ZERO, inward: Vec3::NEG_Z, bone_mm: 6.0, brain_mm: 8.0 },
             forces: vec![Vec3::X * newtons; ticks],
+            lifted: vec![Vec3::ZERO; ticks],
             probing: (0..ticks).map(|tick| tick >= ticks / 2).collect(),
             on_bone: (0..ticks).map(|tick| tick < ticks / 2).collect(),
             looks: [0.0, 0.0, dip_mm, dip_mm].map(look).into(),
@@ -148,9 +138,7 @@ mod tests {
     fn errors_are_those_of_hand_made_runs() {
         let errors = Errors::between(&ride(1.3, 8.5, 1.2, 60), &ride(1.0, 8.0, 1.0, 80));
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-5, "{a} and {b}");
-        [errors.bone_rms_n, errors.bone_p95_n, errors.tissue_rms_n, errors.tissue_p95_n]
-            .into_iter()
-            .for_each(|e| near(e, 0.3));
+        [errors.tissue_rms_n, errors.tissue_p95_n].into_iter().for_each(|e| near(e, 0.3));
         near(errors.shown_p95_mm, 0.7);
         near(errors.shown_mean_mm, 0.7);
         near(errors.rest_p95_mm, 0.5);
@@ -158,7 +146,7 @@ mod tests {
         near(errors.bone_mm3, 20.0 * 0.125);
         near(errors.bone_dice, 120.0 / 140.0);
         let same = Errors::between(&ride(1.0, 8.0, 1.0, 80), &ride(1.0, 8.0, 1.0, 80));
-        assert_eq!((same.bone_rms_n, same.shown_p95_mm, same.bone_dice), (0.0, 0.0, 1.0));
+        assert_eq!((same.tissue_rms_n, same.shown_p95_mm, same.bone_dice), (0.0, 0.0, 1.0));
     }
 
     #[test]

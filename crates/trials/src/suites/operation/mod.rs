@@ -15,9 +15,11 @@
 //! ```
 //!
 //! # When not to use it
-//! To judge a method by itself: its own suite does so against closed forms. The truth here is a
-//! finer run by the recommended methods, not nature.
+//! To judge a method by itself: its own suite does so against closed forms. The truth of tissue and
+//! picture is a finer run by the recommended methods; that of bone is `truth`, which shares nothing
+//! with a method, on the CT as it was scanned.
 
+mod bone;
 mod error;
 mod ride;
 mod setups;
@@ -26,6 +28,7 @@ use super::{Part, Scope};
 use crate::engine::picture::{Chart, Mark};
 use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::{Result, ensure};
+use bone::Felt;
 use error::Errors;
 use ride::Ride;
 use setups::Candidate;
@@ -48,25 +51,31 @@ pub fn parts(scope: Scope) -> Vec<Part> {
             }
         })
     };
-    setups::all(scope).into_iter().map(part).collect()
+    let budget = Part::new("error budget of drilling", bone::budget);
+    setups::all(scope).into_iter().map(part).chain([budget]).collect()
 }
 
 /// The finest run of this process: every part needs it, and it is the same for all.
-static TRUTH: Mutex<Option<(Scope, Ride)>> = Mutex::new(None);
+static TRUTH: Mutex<Option<(Scope, Ride, Felt)>> = Mutex::new(None);
 
 fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
     let mut kept = TRUTH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    if kept.as_ref().is_none_or(|(of, _)| *of != scope) {
-        *kept = Some((scope, ride::truth(scope)?));
+    if kept.as_ref().is_none_or(|(of, ..)| *of != scope) {
+        let ride = ride::truth(scope)?;
+        let felt = bone::truth(scope, &ride.site)?;
+        *kept = Some((scope, ride, felt));
     }
-    let (_, truth) = kept.as_ref().expect("it was just made");
+    let (_, truth, felt) = kept.as_ref().expect("it was just made");
     ensure!(truth.opened(), "the truth did not open the skull: nothing can be held against it");
     let ride = ride::ride(scope, candidate, Some(truth))?;
     let errors = Errors::between(&ride, truth);
     let per_s = |seconds: f64| seconds / ride.seconds;
-    let errors_over = [errors.bone_p95_n / FORCE_N, errors.tissue_p95_n / FORCE_N, errors.shown_p95_mm / SURFACE_MM];
+    let on_bone = Felt::of(&ride.lifted).against(felt).named();
+    let bone_p95_n =
+        on_bone.iter().find(|(name, _)| *name == "bone_force_error_p95_n").map_or(f64::NAN, |found| found.1);
+    let errors_over = [bone_p95_n / FORCE_N, errors.tissue_p95_n / FORCE_N, errors.shown_p95_mm / SURFACE_MM];
     let mut row = Row::new(SCENE, candidate.name).with("setup", ride.setup.as_str()).with("seconds", ride.seconds);
-    for (name, value) in errors.named() {
+    for (name, value) in errors.named().into_iter().chain(on_bone) {
         row = row.metric(name, value);
     }
     Ok(row
@@ -123,6 +132,13 @@ fn gates(rows: &[Row], gates: &mut Vec<Gate>) {
     for row in presets().chain([auto]) {
         gates.push(Gate::at_least(format!("{}: the skull is opened", row.method), number(row, "opened"), 1.0));
     }
+    let force = number(auto, "drilling_force_error_p95_n");
+    let normal = number(auto, "bone_normal_error_p95_deg");
+    gates
+        .push(Gate::at_most("auto: force while drilling, error against the truth, p95, N", force, 0.05).or_known_gap());
+    gates.push(
+        Gate::at_most("auto: normal while drilling, error against the truth, p95, degrees", normal, 3.0).or_known_gap(),
+    );
     for error in ["bone_force_error_rms_n", "tissue_force_error_rms_n", "shown_error_p95_mm"] {
         // What lies within the spread of two runs is no difference.
         let beats = |row: &&Row| {
@@ -146,6 +162,7 @@ mod tests {
         assert_eq!(worst([1.0, 3.0, 2.0]), 3.0);
         let row = |name: &str, tissue: f64| {
             let row = Row::new(SCENE, name).metric("opened", 1.0).metric("cpu_s_per_s", 0.5);
+            let row = row.metric("drilling_force_error_p95_n", 0.04).metric("bone_normal_error_p95_deg", 1.0);
             let row = row.metric("bone_force_error_rms_n", 0.1).metric("shown_error_p95_mm", 0.5);
             row.metric("tissue_force_error_rms_n", tissue)
         };

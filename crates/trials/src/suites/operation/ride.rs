@@ -2,6 +2,7 @@
 //! bone, where the brain was shown, and what it cost.
 
 use super::Scope;
+use super::bone;
 use super::setups::{self, Candidate};
 use crate::suites::simulators::case;
 use anyhow::{Context, Result};
@@ -9,14 +10,12 @@ use clap::Parser;
 use cpu_time::ThreadTime;
 use trepan_contact::SurfacePatch;
 use trepan_geometry::{ToolState, Vec3};
-use trepan_haptics::script::{self, Script, Site};
+use trepan_haptics::script::{Script, Site};
 use trepan_haptics::{Reading, Status};
 use trepan_mesh::Surface;
 use trepan_simulator::{Options, Phase, Program, Session, SoftFrame, Stages, TickInput};
 use trepan_volume::BoneVolume;
 
-/// Over the place that is opened, RAS mm: the same in every run.
-const OPENING: &str = "108,8,84";
 /// Time between two looks at the brain, ms.
 pub const LOOK_MS: u64 = 250;
 /// Radius around the way in within which the brain is looked at, and bone is counted, mm: the hole
@@ -37,6 +36,8 @@ pub struct Ride {
     pub site: Site,
     /// Felt at each tick, N.
     pub forces: Vec<Vec3>,
+    /// From the device to where bone holds the tool, at each tick, mm.
+    pub lifted: Vec<Vec3>,
     /// Whether the probe was in the hand at each tick.
     pub probing: Vec<bool>,
     /// Whether the tool touched bone at each tick; the probe may touch the rim of the hole.
@@ -80,22 +81,24 @@ pub fn truth(scope: Scope) -> Result<Ride> {
 /// A run along the plan of the finest one, or along its own.
 pub fn ride(scope: Scope, candidate: &Candidate, truth: Option<&Ride>) -> Result<Ride> {
     let before_mb = memory_mb();
-    let flags = format!("integrated --headless --frames-per-second 0 --opening {OPENING} {}", candidate.flags);
+    let Vec3 { x, y, z } = bone::OPENING;
+    let flags = format!("integrated --headless --frames-per-second 0 --opening {x},{y},{z} {}", candidate.flags);
     let options = Options::try_parse_from(flags.split_whitespace())?;
     let session = Session::open(Program::Integrated, options, case::inputs())?;
     let site = truth.map_or(session.scene().site, |truth| truth.site);
-    let milliseconds = scope.pick(6_000, 20_000);
-    let path = Script::planned(Program::Integrated.script(), &site, milliseconds as f64, &script::Plan::default())?;
+    let milliseconds = bone::milliseconds(scope);
+    let path = bone::path(scope, &site)?;
     let stages = session.stages(path.at(0.0), &candidate.touch)?;
-    let bone = session.scene().bone.as_ref().context("the built-in case has a skull")?;
+    let skull = session.scene().bone.as_ref().context("the built-in case has a skull")?;
     let brain = session.scene().brain.as_ref().context("the built-in case has a brain")?;
-    let (places, was) = (places(&site), is_bone(bone, &places(&site)));
+    let (places, was) = (places(&site), is_bone(skull, &places(&site)));
     let rays = Rays::new(&brain.mesh.positions, &Surface::of(&brain.mesh).triangles, site);
     let at_rest = rays.look(&brain.mesh.positions);
     let mut ride = Ride {
         setup: session.models().setup.to_string(),
         site,
         forces: Vec::new(),
+        lifted: Vec::new(),
         probing: Vec::new(),
         on_bone: Vec::new(),
         looks: Vec::new(),
@@ -107,7 +110,7 @@ pub fn ride(scope: Scope, candidate: &Candidate, truth: Option<&Ride>) -> Result
         memory_mb: 0.0,
     };
     run(stages, milliseconds, &path, &rays, &mut ride);
-    ride.removed = was.into_iter().zip(is_bone(bone, &places)).map(|(was, is)| was && !is).collect();
+    ride.removed = was.into_iter().zip(is_bone(skull, &places)).map(|(was, is)| was && !is).collect();
     ride.memory_mb = memory_mb() - before_mb;
     Ok(ride)
 }
@@ -131,8 +134,10 @@ fn run(mut stages: Stages, milliseconds: u64, path: &Script, rays: &Rays, ride: 
         });
         tissue.solver.publish(&mut frame);
         ride.forces.push(tick.wrench.force());
+        let touches = tick.record.depth_mm > 0.0;
+        ride.lifted.push(if touches { tick.record.depth_mm * tick.record.contact_normal } else { Vec3::ZERO });
         ride.probing.push(tick.sample.phase() == Phase::Brain);
-        ride.on_bone.push(tick.record.depth_mm > 0.0);
+        ride.on_bone.push(touches);
         if ms % LOOK_MS == 0 {
             ride.looks.push(rays.look(&frame.positions));
         }

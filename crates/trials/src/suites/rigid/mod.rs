@@ -19,6 +19,7 @@ mod soak;
 mod solid;
 mod walls;
 
+pub use bones::head;
 pub use recording::record_all;
 
 use super::{Part, Scope};
