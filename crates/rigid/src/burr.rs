@@ -293,7 +293,9 @@ impl Burr {
                 let (shares, may) = all.paid(radius, most);
                 for lane in lanes(may) {
                     let hu = f32::from(hu[lane]);
-                    let share = shares.as_array()[lane].min(0.5 + (hu - border) / PARTIAL_HU);
+                    // How much of the node is bone where the density falls so steeply.
+                    let slope = density.slope(node + lane as i32 * IVec3::X).length();
+                    let share = shares.as_array()[lane].min(0.5 + (hu - border) / slope.max(1.0));
                     if share > 0.0 {
                         paid.push(&all.place, lane, share, law.price(hu));
                     }

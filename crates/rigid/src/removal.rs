@@ -21,6 +21,8 @@
 //! ```text
 //! Σ price (share before - share after s) node³ = earned        share of bone: ½ - d, cut to 0..1
 //! ```
+//! Where the CT ends the bone, d is how far the density is under the isovalue, over its slope: a
+//! ramp of any width counts as bone up to the isovalue, and no further.
 //! What is earned and not yet cut stays for the next tick: a tick moves the cut by a micrometre,
 //! less than the proxy may stand before it, and a burr that forgot would never move. The ball goes
 //! on from where it has cut to, not from the proxy, so that what the contact is uncertain by does

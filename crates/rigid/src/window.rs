@@ -17,6 +17,7 @@
 
 use crate::rows::each;
 use glam::IVec3;
+use trepan_geometry::Vec3;
 use trepan_volume::{BRICK, BetweenScratch, BoneVolume, CUT_STEPS, CUT_SURFACE};
 use wide::i16x8;
 
@@ -199,6 +200,13 @@ impl Window {
         if self.shown == Shown::Cut { CUT_SURFACE } else { self.isovalue }
     }
 
+    /// How fast the values rise at a cell, a cell.
+    #[inline]
+    pub fn slope(&self, cell: IVec3) -> Vec3 {
+        let of = |step: IVec3| 0.5 * (f32::from(self.at(cell + step)) - f32::from(self.at(cell - step)));
+        Vec3::new(of(IVec3::X), of(IVec3::Y), of(IVec3::Z))
+    }
+
     fn index_of_eight(&self, cell: IVec3) -> usize {
         debug_assert_eq!(cell.x % 8, 0);
         self.index(cell) & !7
@@ -251,7 +259,6 @@ fn place(brick: IVec3) -> usize {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use trepan_geometry::Vec3;
     use trepan_volume::VoxelVolume;
 
     proptest! {
