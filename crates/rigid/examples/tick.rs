@@ -1,8 +1,8 @@
 //! Strokes over and drills into a synthetic head and prints the cost of a tick. The head has 425 x
 //! 403 x 283 voxels; every method runs, or the one named: `tick [METHOD [RADIUS_MM [TASK]]]`.
 //!
-//! `touch` and `drill` go over the head at 50 mm/s, half a millimetre deep; `feed` goes into it at 1
-//! mm/s.
+//! `touch` and `drill` go over the head at 50 mm/s, half a millimetre deep; `feed` goes into it at
+//! 1 mm/s.
 
 use std::time::Instant;
 use trepan_geometry::{Pose, Tool, ToolState, Vec3};

@@ -1,8 +1,8 @@
 //! The nodes that a burr's ball reaches, and what the bone among them costs.
 //!
 //! # Practice
-//! Lengths are nodes, seen from where the ball starts. Eight nodes of a row are looked at and changed
-//! together; sums run in eight lanes.
+//! Lengths are nodes, seen from where the ball starts. Eight nodes of a row are looked at and
+//! changed together; sums run in eight lanes.
 
 use glam::IVec3;
 use trepan_geometry::Vec3;
@@ -152,8 +152,8 @@ impl Eight {
         which & (reached & ahead & before.simd_lt(f32x8::splat(BAND))).to_bitmask()
     }
 
-    /// How much of each is outside the cut, and one bit for each hit that may hold bone which a
-    /// ball of `radius` takes when it goes `most`.
+    /// How much of each is outside the cut, and one bit for each hit that may lose bone.
+    /// The ball of `radius` goes `most`.
     #[inline]
     pub fn paid(&self, radius: f32, most: f32) -> (f32x8, u32) {
         let (share, edge) = (outside(self.before(), radius), f32x8::splat((radius + 0.5) * (radius + 0.5)));

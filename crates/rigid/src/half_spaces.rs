@@ -11,8 +11,8 @@
 //! solution is a good guess, and where it still holds one pass says so.
 //!
 //! # Practice
-//! Two to six exchanges are usual without a guess, each one pass over the half-spaces. Any unit of length;
-//! tolerances are in that unit. Active sets are solved in f64, as their borders may be nearly
+//! Two to six exchanges are usual without a guess, each one pass over the half-spaces. Any unit of
+//! length; tolerances are in that unit. Active sets are solved in f64, as their borders may be nearly
 //! parallel.
 //!
 //! # Sources

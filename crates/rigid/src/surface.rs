@@ -29,8 +29,8 @@
 //!
 //! # Practice
 //! Lengths are cells, in a frame shifted to a whole cell near the tool ([`Discs::base`]). Bone is
-//! found 8 cells at once; a disc costs some 30 ns. One that was there before keeps its normal, while
-//! bone goes away for a few ticks. The capacity is fixed; what does not fit is counted.
+//! found 8 cells at once; a disc costs some 30 ns. One that was there before keeps its normal;
+//! while bone goes away, for a few ticks. The capacity is fixed; what does not fit is counted.
 
 use crate::rows::{GridBall, rows};
 use crate::shaft::Shaft;

@@ -49,7 +49,7 @@ impl Axis {
         (self.low + count - 1).div_euclid(self.nodes) + 2 - self.first_voxel()
     }
 
-    /// Of each of `count` nodes: its first voxel, from the first of all, and how far it is past that.
+    /// Of each of `count` nodes: its first voxel, from the first of all, and how far it is past it.
     fn of(&self, count: i32) -> impl Iterator<Item = (usize, f32)> {
         let (nodes, mut past, mut at) = (self.nodes, self.low.rem_euclid(self.nodes), 0);
         (0..count).map(move |_| {

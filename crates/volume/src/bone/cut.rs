@@ -238,8 +238,8 @@ impl CutWriter<'_> {
         self.set_eight(node - lane * IVec3::X, [value; 8], 1 << lane)
     }
 
-    /// Sets those of the eight nodes along x from `node` on of which a bit is set in `which`; the
-    /// first is at a multiple of eight. Returns false outside the grid and where no memory is left:
+    /// Sets those of the eight nodes along x from `node` on that have a bit in `which`.
+    /// The first is at a multiple of eight. Returns false outside the grid and where no memory is left:
     /// then nothing changes.
     #[inline]
     pub fn set_eight(&mut self, node: IVec3, values: [i16; 8], which: u32) -> bool {
