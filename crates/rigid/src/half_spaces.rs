@@ -12,8 +12,8 @@
 //!
 //! # Practice
 //! Two to six exchanges are usual without a guess, each one pass over the half-spaces. Any unit of
-//! length; tolerances are in that unit. Active sets are solved in f64, as their borders may be nearly
-//! parallel.
+//! length; tolerances are in that unit. Active sets are solved in f64, as their borders may be
+//! nearly parallel.
 //!
 //! # Sources
 //! M. Sharir, E. Welzl, *A combinatorial bound for linear programming and related problems*, STACS

@@ -239,8 +239,8 @@ impl CutWriter<'_> {
     }
 
     /// Sets those of the eight nodes along x from `node` on that have a bit in `which`.
-    /// The first is at a multiple of eight. Returns false outside the grid and where no memory is left:
-    /// then nothing changes.
+    /// The first is at a multiple of eight. Returns false outside the grid and where no memory is
+    /// left: then nothing changes.
     #[inline]
     pub fn set_eight(&mut self, node: IVec3, values: [i16; 8], which: u32) -> bool {
         debug_assert_eq!(node.x % 8, 0);
