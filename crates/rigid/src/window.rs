@@ -12,8 +12,8 @@
 //!
 //! # Practice
 //! A look costs about a nanosecond, with no test for borders. The window is a copy: what its owner
-//! changes it is told ([`Window::put`]), what others change it finds by the versions of the bricks
-//! that it meets ([`Window::renew`]), a nanosecond each.
+//! changes it is told ([`Window::put_eight`]), what others change it finds by the versions of the
+//! bricks that it meets ([`Window::renew`]), a nanosecond each.
 
 use crate::rows::each;
 use glam::IVec3;
