@@ -12,6 +12,7 @@ mod coupling;
 mod energy;
 mod faults;
 mod models;
+mod order;
 mod published;
 mod recording;
 mod removal;
@@ -36,6 +37,7 @@ const BUDGET_US: f64 = 1000.0;
 pub fn parts(scope: Scope) -> Vec<Part> {
     let mut parts = accuracy::parts();
     parts.extend(models::parts(scope));
+    parts.extend(order::parts());
     parts.extend(removal::parts(scope));
     parts.push(Part::new("faults", |_, findings| faults::run(findings)));
     parts.extend(walls::parts(scope));
@@ -48,6 +50,7 @@ pub fn parts(scope: Scope) -> Vec<Part> {
 pub fn judge(_: Scope, findings: &mut Findings) {
     accuracy::judge(findings);
     models::judge(findings);
+    order::judge(findings);
     removal::judge(findings);
 }
 
