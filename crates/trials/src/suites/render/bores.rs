@@ -25,8 +25,12 @@ const HALF_MM: f64 = 2.6;
 const AXIS: Vec3 = Vec3::new(0.3, -0.4, 0.0);
 /// Radii of the burrs, mm.
 const RADII_MM: [f32; 2] = [1.5, 0.75];
-/// Width of the microscope's field, mm. In half of it the smaller bore reaches an SSIM of 0.987.
-const FIELD_MM: f32 = 9.0;
+/// Widths of the microscope's field, mm.
+const FIELDS_MM: [f32; 2] = [9.0, 4.5];
+/// Least SSIM of a bore's surface to its closed form.
+const LIKE: f64 = 0.99;
+/// Burr and field that are known to miss it.
+const GAP_MM: (f32, f32) = (0.75, 4.5);
 /// Step of the march, mm.
 const STEP_MM: f64 = 1.0 / 128.0;
 
@@ -79,12 +83,12 @@ fn lit(hits: &Hits, [width, height]: [u32; 2]) -> Image {
 /// Each burr's bore by every drawer.
 pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
     let size = scope.pick([240, 200], [640, 480]);
-    for radius in RADII_MM {
+    for (radius, field_mm) in RADII_MM.into_iter().flat_map(|radius| FIELDS_MM.map(|field_mm| (radius, field_mm))) {
         let (bone, whole) = (plate(), plate());
         drill(&bone, radius);
         let view_of = |turn: f32| {
             let towards_eye = Vec3::new(0.25 + turn, 0.5, 1.0);
-            frame(AXIS.with_z(HALF_MM as f32), towards_eye, 250.0, FIELD_MM / 250.0)
+            frame(AXIS.with_z(HALF_MM as f32), towards_eye, 250.0, field_mm / 250.0)
         };
         let (here, aside) = (view_of(0.0), view_of(0.01));
         let drawers = By::all(&bone, gpu, size).into_iter().zip(By::all(&whole, gpu, size));
@@ -100,8 +104,10 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
             let (errors, lost) = super::accuracy::apart(&hits, &truth);
             let p95 = errors.get(errors.len() * 95 / 100).copied().unwrap_or(f64::NAN);
             let like = similarity(&lit(&hits, size), &lit(&truth, size));
-            let name = format!("{}: bore of {} mm", by.name(), 2.0 * radius);
-            let row = Row::new(format!("bore of {} mm in voxels of 1 mm", 2.0 * radius), by.name());
+            let scene = format!("bore of {} mm in voxels of 1 mm, field of {field_mm} mm", 2.0 * radius);
+            let name = format!("{}: {scene}: SSIM of its surface to the closed form", by.name());
+            let gate = Gate::at_least(name, like, LIKE);
+            let row = Row::new(scene, by.name());
             findings.rows.push(
                 row.with("rays", hits.len())
                     .with("machine", by.machine())
@@ -111,7 +117,7 @@ pub fn run(scope: Scope, gpu: Option<&Gpu>, findings: &mut Findings) {
                     .metric("frame_p50_ms", cost)
                     .metric("frame_before_the_bore_p50_ms", before),
             );
-            findings.gates.push(Gate::at_least(format!("{name}: SSIM of its surface to the closed form"), like, 0.99));
+            findings.gates.push(if (radius, field_mm) == GAP_MM { gate.or_known_gap() } else { gate });
         }
     }
 }
@@ -124,8 +130,8 @@ mod tests {
     fn a_burr_drills_the_round_bore_that_the_picture_is_compared_with() {
         let mut findings = Findings::default();
         run(Scope { quick: true, seed: 1 }, None, &mut findings);
-        assert_eq!(findings.gates.len(), RADII_MM.len());
+        assert_eq!(findings.gates.len(), RADII_MM.len() * FIELDS_MM.len());
         findings.rows.iter().for_each(|row| println!("{row:?}"));
-        assert!(findings.gates.iter().all(|gate| gate.pass), "{:?}", findings.gates);
+        assert!(!findings.gates.iter().any(Gate::breaks), "{:?}", findings.gates);
     }
 }

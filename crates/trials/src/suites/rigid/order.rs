@@ -263,6 +263,16 @@ fn steady_mm() -> f64 {
     low.into()
 }
 
+/// Orders that are known to be missed: scene and error.
+const GAPS: [(&str, &str); 6] = [
+    ("order: ball", "force"),
+    ("order: cylinder", "force"),
+    ("order: hollow ball", "force"),
+    ("order: hollow ball", "depth"),
+    ("order: bore", "force"),
+    ("order: bore", "depth"),
+];
+
 /// The orders that the recommended method reaches.
 pub fn judge(findings: &mut Findings) {
     let own = findings.rows.iter().filter(|row| row.method == Method::RECOMMENDED.name());
@@ -271,7 +281,9 @@ pub fn judge(findings: &mut Findings) {
         for (what, metric) in [("force", "force_error_n_order"), ("depth", "depth_error_mm_order")] {
             let least = if in_bore { BORE_ORDER } else { SMOOTH_ORDER };
             let name = format!("{}: order of the error of {what}", row.scene);
-            findings.gates.push(Gate::at_least(name, row.metrics[metric], least).or_known_gap());
+            let gate = Gate::at_least(name, row.metrics[metric], least);
+            let known = GAPS.contains(&(row.scene.as_str(), what));
+            findings.gates.push(if known { gate.or_known_gap() } else { gate });
         }
         if in_bore {
             let name = "order: bore: error of depth on the finest voxels, mm";
