@@ -13,9 +13,9 @@
 //! # Practice
 //! All lengths are voxels, in the discs' frame.
 
+use crate::disc::Disc;
 use crate::half_spaces::{HalfSpace, HalfSpaces};
 use crate::shaft::Shaft;
-use crate::surface::Disc;
 use trepan_geometry::Vec3;
 
 /// Moves within one set of discs.

@@ -47,13 +47,13 @@
 
 use crate::ball::{Ball, Limits};
 use crate::burr::{Burr, Cut};
+use crate::disc::Disc;
 use crate::half_spaces::{HalfSpace, HalfSpaces};
 use crate::lean::Lean;
 use crate::local_surface::LocalSurface;
 use crate::method::{Descriptor, Extent, Method};
 use crate::removal::RemovalLaw;
 use crate::shaft::Shaft;
-use crate::surface::Disc;
 use crate::{RigidContact, RigidStep};
 use trepan_contact::Contact;
 use trepan_geometry::{Aabb, Pose, Tool, ToolState, Vec3};

@@ -15,8 +15,9 @@
 //! happens where no brick near the shaft has ever held bone.
 
 use crate::RigidStep;
+use crate::disc::Disc;
 use crate::shaft::Shaft;
-use crate::surface::{Disc, Discs};
+use crate::surface::Discs;
 use trepan_geometry::Vec3;
 use trepan_volume::BoneVolume;
 

@@ -11,8 +11,9 @@
 
 use crate::RigidStep;
 use crate::burr::Burr;
+use crate::disc::Disc;
 use crate::nodes::Nodes;
-use crate::surface::{Disc, Discs};
+use crate::surface::Discs;
 use trepan_geometry::{Tool, Vec3};
 use trepan_volume::BoneVolume;
 

@@ -1,6 +1,6 @@
 //! CT and cut around a tool, on the nodes of the cut.
 
-use crate::surface::Fine;
+use crate::solid::Fine;
 use crate::window::{Shown, Window};
 use glam::IVec3;
 use trepan_volume::BoneVolume;
