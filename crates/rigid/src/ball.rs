@@ -85,20 +85,18 @@ impl Ball {
     pub fn nearest(&self, disc: &Disc, centre: Vec3) -> Near {
         let seen = centre + self.arm(disc, disc.centre - centre);
         let from_disc = seen - disc.centre;
-        let height = from_disc.dot(disc.normal);
         if self.inside && !disc.shaft {
-            return Near { distance: height, direction: disc.normal };
+            return Near { distance: from_disc.dot(disc.normal), direction: disc.normal };
         }
-        let sideways = from_disc - height * disc.normal;
-        let off = sideways.length();
-        let mut rim = from_disc - sideways * (disc.radius / off.max(disc.radius));
+        let (mut rim, mut ahead) = disc.way_to(from_disc);
         if disc.shaft {
             // Across the axis from the point of the disc itself.
             let point = seen - rim - centre;
             rim = self.arm(disc, point) - point;
+            ahead = rim;
         }
         let distance = rim.length();
-        let direction = if distance > 1e-6 { rim / distance } else { disc.normal };
+        let direction = ahead.try_normalize().unwrap_or(disc.normal);
         Near { distance, direction }
     }
 
@@ -109,7 +107,7 @@ impl Ball {
         let mut smallest = f32::MAX;
         for disc in discs {
             // Cheaper than the disc's own distance and never greater.
-            if disc.centre.distance(centre) - disc.radius <= most + reach {
+            if disc.least_distance(centre) <= most + reach {
                 let distance = self.nearest(disc, centre).distance;
                 smallest = smallest.min(distance);
                 if distance <= most + reach {
@@ -204,7 +202,7 @@ mod tests {
             goal in prop::array::uniform3(-3.0f32..3.0), radius in 0.5f32..4.0, way in 0.0f32..1.0,
         ) {
             let discs: Vec<Disc> =
-                discs.into_iter().map(|(c, n)| Disc { centre: Vec3::from(c), normal: unit(n), radius: 0.8, shaft: false }).collect();
+                discs.into_iter().map(|(c, n)| Disc { centre: Vec3::from(c), normal: unit(n), radius: 0.8, ..Disc::default() }).collect();
             let (ball, goal) = (Ball { radius, inside: false, shaft: Shaft::default() }, Vec3::from(goal));
             // Discs through the centre have no side.
             prop_assume!(ball.clearance(&discs, Vec3::ZERO) > 0.1);

@@ -154,7 +154,9 @@ impl Burr {
 
     /// How far from the centre of a burr nodes are read, nodes; its side is `side_mm` long.
     pub fn reach(bone: &BoneVolume, radius_mm: f32, side_mm: f32) -> i32 {
-        ((radius_mm + 0.5 * side_mm) / bone.node_mm() + BAND + STRIDE).ceil() as i32 + 4
+        // What a disc of the surface reads is up to three voxels off.
+        let beyond = (BAND + STRIDE + 4.0).max(2.0 + 3.0 * bone.cut_nodes() as f32);
+        ((radius_mm + 0.5 * side_mm) / bone.node_mm() + beyond).ceil() as i32
     }
 
     /// Takes bone away and says in `out` how much, how fast the spindle turned and whether it broke

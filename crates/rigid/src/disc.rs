@@ -1,7 +1,37 @@
-//! One disc of the bone's surface: its place, normal and size.
+//! One disc of the bone's surface: its place, normal, curvature and size.
+//!
+//! # Theory
+//! A disc is bent like the surface under it. With the principal directions e₁ and e₂ of its plane
+//! and the curvatures k₁ and k₂ it is
+//! ```text
+//! z = z₀ + ½ (k₁ a² + k₂ b²) ,   a² + b² ≤ radius²        k > 0: hollow
+//! ```
+//! Slope and curvature of the cut, which is a distance, are those of its quadratic B-spline. Those
+//! of the density are from the quadric that fits best what lies within a voxel of the tangent plane:
+//! ```text
+//! minimise Σ w (h - iso + c₀ + g·d + ½ (c₁ a² + 2 c₂ a b + c₃ b²))²
+//! w = B(d) · max(0, 1 - (n·d)²)        d = (a, b, n·d): from x to the voxel,  n = g/|g|
+//! ```
+//! What is further off is flat bone or flat air, and its slope that of the grid's corners: the
+//! spline alone is up to 2.6 degrees off on planes, the fit 0.1. A density is linear along an edge,
+//! a bent surface's is not: z₀ = -½ t (1 - t) k at t between the voxels, k along the edge. Near a
+//! cut discs stand between voxels, where the density is linear and bends nothing: they are flat and
+//! their normal that of a fitted plane.
+//!
+//! The point of a disc that is nearest to one at (a₀, b₀, h) has `a = a₀ / (1 - (h - z) k₁)`, and so
+//! b; two steps find z. Neighbours differ by a third power of their distance, so places, normals and
+//! forces are of second order in the voxel (`validate rigid` gives the orders). Past the rim the way
+//! turns to that from the rim little by little: of two discs of nearly the same height either may
+//! touch, and both then push the same way.
+//!
+//! # Sources
+//! Curvature from a fitted quadric: D. S. Meek, D. J. Walton, *On surface normal and Gaussian
+//! curvature approximations given data sampled from a smooth surface*, Comput. Aided Geom. Des. 17
+//! (2000).
 
 use crate::solid::{Field, Solid, cubic, slope};
 use glam::IVec3;
+use nalgebra::{SMatrix, SVector};
 use trepan_geometry::Vec3;
 
 /// Density differences past this many HU from the isovalue do not bend a normal further.
@@ -10,12 +40,26 @@ const CLAMP_HU: f32 = 1000.0;
 const STAND_OUT: f32 = 0.05;
 /// Cosine of the most that a fit may turn the slope's own normal.
 const SAME: f32 = 0.8;
-/// Radius of a disc on the cut, cells. A wider one, a little tilted, would stand out in a hollow.
-const CUT_DISC: f32 = 0.1;
+/// Radius of a disc on the cut, cells.
+const CUT_DISC: f32 = 0.5;
 /// Density over the isovalue at which the surface is further than a disc reaches, HU.
 const FAR_HU: f32 = 800.0;
+/// Weight of flatness in the fit of a quadric, beside weights of the densities of about 1.
+const RIDGE: f32 = 1e-4;
 /// Smallest disc, voxels.
 const SMALLEST: f32 = 0.2;
+/// Largest curvature of a disc, 1/voxel.
+const MAX_CURVATURE: f32 = 0.6;
+/// How far a bent disc reaches from its centre, in radii: its rim is up to a quarter of the radius
+/// off the plane.
+pub(crate) const EXTENT: f32 = 1.04;
+/// Width of the band around a disc in which directions turn to those from the rim, radii.
+const BLEND: f32 = 0.7;
+/// `1 - h k` under which only a part of a hollow disc counts, and the least part.
+const SPREAD: f32 = 0.3;
+const LEAST_PART: f32 = 0.2;
+/// Least of `1 - h k`: nearer to the middle of a hollow every point of it is as near.
+const FOCUS: f32 = 0.25;
 
 /// A piece of surface.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,16 +68,107 @@ pub(crate) struct Disc {
     pub centre: Vec3,
     /// Unit normal out of the bone.
     pub normal: Vec3,
-    /// Radius, voxels: less where the surface bends away.
+    /// Radius, voxels: less where the surface bends away more than the disc.
     pub radius: f32,
+    pub bend: Bend,
     /// Whether it is the shaft that it stands against, not the ball.
     pub shaft: bool,
+}
+
+/// The curvature of a disc.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Bend {
+    /// First principal direction, a unit vector in the disc's plane; zero for a flat disc.
+    along: Vec3,
+    /// Principal curvatures, 1/voxel, positive where the surface is hollow.
+    curvatures: [f32; 2],
+    /// Height over the disc's centre, voxels.
+    rise: f32,
+}
+
+impl Bend {
+    /// Of a surface that rises by `½ (uu a² + 2 uv a b + vv b²)` over its plane of `u` and `v`.
+    fn of(u: Vec3, v: Vec3, [uu, uv, vv]: [f32; 3]) -> Self {
+        let (mean, half) = (0.5 * (uu + vv), 0.5 * (uu - vv));
+        let root = (half * half + uv * uv).sqrt();
+        // The cosine of twice the angle of the first direction with u.
+        let cosine = half / root.max(1e-9);
+        let (cos, sin) = ((0.5 + 0.5 * cosine).max(0.0).sqrt(), (0.5 - 0.5 * cosine).max(0.0).sqrt().copysign(uv));
+        Self { along: cos * u + sin * v, curvatures: [mean + root, mean - root], rise: 0.0 }
+    }
+
+    /// The second derivative of the height on a line along `edge`, where `normal` is across.
+    fn along(&self, edge: Vec3, normal: Vec3) -> f32 {
+        let (a, b) = (edge.dot(self.along), edge.dot(normal.cross(self.along)));
+        self.curvatures[0] * a * a + self.curvatures[1] * b * b
+    }
+
+    /// The same with its direction turned into the plane across `normal`.
+    fn in_plane_of(self, normal: Vec3) -> Self {
+        Self { along: self.along.reject_from_normalized(normal).normalize_or(normal.any_orthonormal_vector()), ..self }
+    }
+
+    /// The same, but bent by no more than a disc may be.
+    fn limited(self) -> Self {
+        Self { curvatures: self.curvatures.map(|k| k.clamp(-MAX_CURVATURE, MAX_CURVATURE)), ..self }
+    }
+
+    /// The same in cells of which a cell of before has `times`.
+    fn scaled(self, times: f32) -> Self {
+        Self { curvatures: self.curvatures.map(|k| k / times), rise: times * self.rise, ..self }
+    }
+}
+
+impl Disc {
+    /// The same in cells of which a cell of before has `times`.
+    pub fn scaled(self, times: f32) -> Self {
+        let (centre, radius) = (times * self.centre, times * self.radius);
+        Self { centre, radius, bend: self.bend.scaled(times), ..self }
+    }
+
+    /// No point of it is nearer to `place` than this, voxels.
+    #[inline]
+    pub fn least_distance(&self, place: Vec3) -> f32 {
+        self.centre.distance(place) - EXTENT * self.radius
+    }
+
+    /// The way from its nearest point to the place `from` its centre, and the way to follow there:
+    /// near the rim that from the surface that the disc is a part of.
+    #[inline(always)]
+    pub fn way_to(&self, from: Vec3) -> (Vec3, Vec3) {
+        let height = from.dot(self.normal);
+        let Bend { along, curvatures: [first, second], rise } = self.bend;
+        if along == Vec3::ZERO {
+            let sideways = from - height * self.normal;
+            let way = from - sideways * (self.radius / sideways.length().max(self.radius));
+            return (way, way);
+        }
+        let across = self.normal.cross(along);
+        let (a0, b0) = (from.dot(along), from.dot(across));
+        let nearest = |height: f32| (a0 / (1.0 - height * first).max(FOCUS), b0 / (1.0 - height * second).max(FOCUS));
+        let z = |a: f32, b: f32| rise + 0.5 * (first * a * a + second * b * b);
+        let (a, b) = nearest(height);
+        let (a, b) = nearest(height - z(a, b));
+        let way = |a: f32, b: f32| from - a * along - b * across - z(a, b) * self.normal;
+        let off = (a * a + b * b).sqrt();
+        // Where the hollow is about as wide as the ball all of it is as near, and the centre is best
+        // known.
+        let radius = self.radius * ((1.0 - height * first) / SPREAD).clamp(LEAST_PART, 1.0);
+        if off <= radius {
+            let way = way(a, b);
+            return (way, way);
+        }
+        let within = radius / off;
+        let rim = way(within * a, within * b);
+        let share = ((off - radius) / (BLEND * radius)).min(1.0);
+        let share = share * share * (3.0 - 2.0 * share);
+        (rim, way(a, b).lerp(rim, share))
+    }
 }
 
 /// A disc at `x` (voxels from `base`), where `field` ends the bone on an edge that leads out of it
 /// along `edge`.
 pub(crate) fn disc<S: Solid>(solid: &S, base: IVec3, (x, field): (Vec3, Field), edge: Vec3, radius: f32) -> Disc {
-    // Where the other field ends the bone nearby the disc must not stand out over that edge.
     let (step, along) = (edge.as_ivec3(), x.dot(edge));
     let cell = base + x.round().as_ivec3() + (along.floor() - along.round()) as i32 * step;
     let stride = solid.stride(cell, step);
@@ -45,26 +180,45 @@ pub(crate) fn disc<S: Solid>(solid: &S, base: IVec3, (x, field): (Vec3, Field), 
         // Where the other field ends the bone nearby the disc must not stand out over that edge.
         radius = radius.min(to_edge(solid, field, base, x, edge).max(0.0));
     }
-    if field == Field::Cut {
-        // A distance: its slope at the ends of the edge says it all.
-        let slope = slope(solid, field, cell).lerp(slope(solid, field, cell + step), along - along.floor());
-        let normal = (-slope).normalize_or(edge);
-        return Disc { centre: x, normal, radius, shaft: false };
-    }
-    let block = Block::read(solid, stride, base, x);
+    let block = Block::read(solid, field, stride, base, x);
     let shape = Shape::of(&block);
     let size = shape.slope.length();
     // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than
     // its kernel.
     if size < 1.0 || -shape.slope.dot(edge) < -0.5 * size {
-        return Disc { centre: x, normal: edge, radius: SMALLEST.min(radius), shaft: false };
+        return Disc { centre: x, normal: edge, radius: SMALLEST.min(radius), ..Disc::default() };
     }
     let rough = -shape.slope / size;
-    let normal = block.fitted(rough).unwrap_or(rough);
-    let bend = shape.bend(normal) / size;
-    let flat = stride as f32 * (2.0 * STAND_OUT / bend.max(1e-9)).sqrt();
-    let radius = if bend > 0.0 { flat.clamp(SMALLEST.min(radius), radius) } else { radius };
-    Disc { centre: x, normal, radius, shaft: false }
+    let bent = match field {
+        // A distance: its spline says it all.
+        Field::Cut => Some((rough, shape.bend(rough, size))),
+        Field::Density if stride == solid.voxel() => {
+            // From the voxel before on the edge.
+            let before = cell.dot(step).rem_euclid(stride);
+            let share = (before as f32 + along - along.floor()) / stride as f32;
+            let fit = fitted_quadric(solid, cell - before * step, step, share, rough);
+            // Between voxels the density is a parabola with the curvature along the edge.
+            let rise = |bend: &Bend, normal| -0.5 * share * (1.0 - share) * bend.along(edge, normal);
+            fit.map(|(normal, bend)| (normal, Bend { rise: rise(&bend.limited(), normal), ..bend }))
+        }
+        // Between voxels the density is linear and says nothing of how the surface bends.
+        Field::Density => None,
+    };
+    let Some((normal, bend)) = bent else {
+        let normal = block.fitted(rough).unwrap_or(rough);
+        let radius = stood_out(-shape.bend(normal, size).curvatures[1], stride, radius);
+        return Disc { centre: x, normal, radius, ..Disc::default() };
+    };
+    // What bends away more than the disc may.
+    let radius = stood_out(-bend.curvatures[1] - MAX_CURVATURE, stride, radius);
+    Disc { centre: x, normal, radius, bend: bend.limited().scaled(stride as f32), shaft: false }
+}
+
+/// The radius, up to `radius` cells, at which a disc stands out by [`STAND_OUT`] over a surface that
+/// bends away by `more` than the disc, 1/voxel.
+fn stood_out(more: f32, stride: i32, radius: f32) -> f32 {
+    let most = stride as f32 * (2.0 * STAND_OUT / more.max(1e-9)).sqrt();
+    if more > 0.0 { most.clamp(SMALLEST.min(radius), radius) } else { radius }
 }
 
 /// How far `x` on an edge along `edge` is from where the field that does not end the bone there
@@ -92,14 +246,15 @@ struct Block {
 }
 
 impl Block {
-    fn read(solid: &impl Solid, stride: i32, base: IVec3, x: Vec3) -> Self {
+    fn read(solid: &impl Solid, field: Field, stride: i32, base: IVec3, x: Vec3) -> Self {
         // The nearest voxel, where only those count.
         let all = base.as_vec3() + x;
         let middle = stride as f32 * (all / stride as f32).round() - base.as_vec3();
         let centre = base + middle.as_ivec3();
+        let clamp = if field == Field::Cut { f32::MAX } else { CLAMP_HU };
         let over = |i: usize, j: usize, k: usize| {
             let step = IVec3::new(i as i32, j as i32, k as i32) - 1;
-            solid.over(Field::Density, centre + stride * step).clamp(-CLAMP_HU, CLAMP_HU)
+            solid.over(field, centre + stride * step).clamp(-clamp, clamp)
         };
         let hu = core::array::from_fn(|k| core::array::from_fn(|j| core::array::from_fn(|i| over(i, j, k))));
         Self { hu, off: (middle - x) / stride as f32 }
@@ -138,6 +293,44 @@ impl Block {
     }
 }
 
+/// The normal and curvature of the quadric that best fits the densities around the place `share`
+/// of the way from `cell` to the next voxel by `step`, weighed as in [`Block::fitted`].
+fn fitted_quadric(solid: &impl Solid, cell: IVec3, step: IVec3, share: f32, normal: Vec3) -> Option<(Vec3, Bend)> {
+    let (u, v) = normal.any_orthonormal_pair();
+    let (right, up) = (IVec3::new(step.y, step.z, step.x), IVec3::new(step.z, step.x, step.y));
+    let (mut square, mut moment) = (SMatrix::<f32, 7, 7>::zeros(), SVector::<f32, 7>::zeros());
+    let along = cubic_taps(share);
+    for (n, (j, k)) in (-1..=1).flat_map(|j| (-1..=1).map(move |k| (j, k))).enumerate() {
+        let side = [0.125, 0.75, 0.125];
+        let w = side[n / 3] * side[n % 3];
+        for (i, tap) in (-1..=2).zip(along) {
+            let off = i * step + j * right + k * up;
+            let d = off.as_vec3() - share * step.as_vec3();
+            let (height, a, b) = (d.dot(normal), d.dot(u), d.dot(v));
+            let w = w * tap * (1.0 - height * height).max(0.0);
+            let over = solid.over(Field::Density, cell + solid.voxel() * off).clamp(-CLAMP_HU, CLAMP_HU);
+            let terms = SVector::from([height, a, b, 0.5 * a * a, a * b, 0.5 * b * b, 1.0]);
+            square.syger(w, &terms, &terms, 1.0);
+            moment.axpy(-w * over, &terms, 1.0);
+        }
+    }
+    for n in 3..6 {
+        square[(n, n)] += RIDGE;
+    }
+    let found = square.cholesky()?.solve(&moment);
+    let rise = found[0] * normal + found[1] * u + found[2] * v;
+    let size = rise.length();
+    let across = (rise / size).try_normalize().filter(|across| across.dot(normal) > SAME)?;
+    Some((across, Bend::of(u, v, [3, 4, 5].map(|n| -found[n] / size)).in_plane_of(across)))
+}
+
+/// Weights of the four taps of a cubic B-spline, `t` from the second to the third.
+fn cubic_taps(t: f32) -> [f32; 4] {
+    let s = 1.0 - t;
+    let middle = |t: f32| (4.0 + t * t * (3.0 * t - 6.0)) / 6.0;
+    [s * s * s / 6.0, middle(t), middle(s), t * t * t / 6.0]
+}
+
 /// A symmetric matrix of `straight` xx, yy, zz and `mixed` yz, xz, xy, times `v`.
 fn times(straight: Vec3, mixed: Vec3, v: Vec3) -> Vec3 {
     straight * v
@@ -169,14 +362,11 @@ impl Shape {
         shape
     }
 
-    /// How much the surface bends away from `normal` where it bends most, times the slope; negative
-    /// where it bends up everywhere.
-    fn bend(&self, normal: Vec3) -> f32 {
-        let times = |v: Vec3| times(self.straight, self.mixed, v);
+    /// How the surface bends whose unit normal is `normal`, where the density falls by `size`.
+    fn bend(&self, normal: Vec3, size: f32) -> Bend {
         let (u, v) = normal.any_orthonormal_pair();
-        let (uu, uv, vv) = (u.dot(times(u)), u.dot(times(v)), v.dot(times(v)));
-        let (mean, half) = (0.5 * (uu + vv), 0.5 * (uu - vv));
-        (half * half + uv * uv).sqrt() - mean
+        let times = |v: Vec3| times(self.straight, self.mixed, v) / size;
+        Bend::of(u, v, [u.dot(times(u)), u.dot(times(v)), v.dot(times(v))])
     }
 }
 

@@ -77,10 +77,11 @@ impl Lean {
         let axis_near = |place: Vec3| shaft.at(shaft.along(place + own)) - own;
         let far = shaft.radius + reach;
         self.discs.shape(bone, axis_near, far);
-        let within = |disc: &&Disc| disc.centre.distance(axis_near(disc.centre)) - disc.radius <= far;
+        let within = |disc: &&Disc| disc.least_distance(axis_near(disc.centre)) <= far;
         for disc in self.discs.list().iter().filter(within) {
             if near.len() < near.capacity() {
-                near.push(Disc { centre: nodes * (disc.centre + own) - base, radius: nodes * disc.radius, ..*disc });
+                let seen = disc.scaled(nodes);
+                near.push(Disc { centre: seen.centre + nodes * own - base, ..seen });
             } else {
                 out.fallbacks += 1;
             }

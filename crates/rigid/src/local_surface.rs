@@ -11,7 +11,7 @@
 
 use crate::RigidStep;
 use crate::burr::Burr;
-use crate::disc::Disc;
+use crate::disc::{Disc, EXTENT};
 use crate::nodes::Nodes;
 use crate::surface::Discs;
 use trepan_geometry::{Tool, Vec3};
@@ -110,7 +110,7 @@ impl LocalSurface {
             out.fallbacks += 1;
             return false;
         };
-        let far = radius + reach + AHEAD + self.disc * bone.cut_nodes() as f32;
+        let far = radius + reach + AHEAD + EXTENT * self.disc * bone.cut_nodes() as f32;
         let hollow = if clear { radius - AHEAD - 1.0 } else { 0.0 };
         self.discs.gather(&self.nodes.fine(), centre, hollow, far);
         (self.at, self.worn) = (Some(centre), false);
@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn discs_in_a_ball_shaped_hole_lie_on_the_ball() {
         for (r, off_nodes, off_degrees) in [(1.0, 0.01, 5.0), (2.0, 2e-3, 1.5), (3.0, 1e-3, 0.7)] {
-            let ct = VoxelVolume::isotropic([20; 3], Vec3::splat(-10.0), 1.0, 1400i16);
+            let ct = VoxelVolume::isotropic([20; 3], Vec3::splat(-6.0), 1.0, 1400i16);
             let bone = BoneVolume::new(&ct, 400).unwrap();
             let (centre, radius) = (bone.node_at(Vec3::new(0.123, 0.234, 0.345)), r / bone.node_mm());
             let (mut writer, half) = (bone.cut_writer(), (radius + 4.0) as i32);
@@ -159,6 +159,30 @@ mod tests {
             println!("{} discs in a ball of {radius} nodes: {off} nodes and {tilt} degrees off", discs.len());
             assert!(discs.len() as f32 > 2.0 * std::f32::consts::PI * radius * radius, "{}", discs.len());
             assert!(off < off_nodes && tilt < off_degrees, "{off} nodes {tilt} degrees");
+        }
+    }
+
+    #[test]
+    fn bent_discs_follow_a_ball_of_the_ct() {
+        for (voxel_mm, off_mm, off_degrees) in [(2.0f32, 1e-3, 0.3), (1.0, 5e-4, 0.15), (0.5, 5e-4, 0.06)] {
+            let edge = (36.0 / voxel_mm) as usize + 1;
+            let mut ct = VoxelVolume::isotropic([edge; 3], Vec3::splat(-18.13), voxel_mm, 0i16);
+            for at in 0..ct.data.len() {
+                let place = ct.centre_of([at % edge, at / edge % edge, at / (edge * edge)]);
+                let over = 800.0 * (10.0 - place.length()) / f64::from(voxel_mm);
+                ct.data[at] = (400.0 + over).clamp(-1000.0, 1500.0).round() as i16;
+            }
+            let bone = BoneVolume::new(&ct, 400).unwrap();
+            let tip = 13.0 * Vec3::new(0.3, 0.5, 0.7).normalize();
+            let (mut surface, mut out) = (LocalSurface::new(8192, 0.8), RigidStep::default());
+            assert!(surface.know(&bone, &Tool::burr(3.0), bone.node_at(tip), (0.5, false), &mut out));
+            let (at, reach) = (bone.node_at(tip) - surface.base(), 3.0 / bone.node_mm());
+            let seen = surface.shaped(at, reach + 0.5).iter().map(|disc| disc.way_to(at - disc.centre));
+            let near = seen.min_by(|a, b| a.0.length().total_cmp(&b.0.length())).expect("there is surface");
+            let off = (near.0.length() * bone.node_mm() - 3.0).abs();
+            let turned = near.1.angle_between(tip).to_degrees();
+            println!("{voxel_mm} mm: {off} mm, {turned} degrees off");
+            assert!(off < off_mm && turned < off_degrees, "{voxel_mm} mm: {off} mm, {turned} degrees off");
         }
     }
 }

@@ -32,6 +32,10 @@ pub(crate) trait Solid {
     fn stride(&self, _cell: IVec3, _step: IVec3) -> i32 {
         1
     }
+    /// Cells from one voxel to the next.
+    fn voxel(&self) -> i32 {
+        1
+    }
     /// Widest disc, cells.
     fn widest(&self) -> f32 {
         f32::MAX
@@ -63,6 +67,10 @@ impl Solid for Fine<'_> {
 
     fn stride(&self, cell: IVec3, step: IVec3) -> i32 {
         if self.cut.at(cell) == 0 && self.cut.at(cell + step) == 0 { self.stride } else { 1 }
+    }
+
+    fn voxel(&self) -> i32 {
+        self.stride
     }
 
     fn widest(&self) -> f32 {

@@ -3,19 +3,10 @@
 //! # Theory
 //! Where a grid edge joins a cell of bone to one that is not, a field ends the bone at `x`: the
 //! density, linear along the edge, falls under the isovalue, or the cut, a cubic along the edge,
-//! rises over its surface. There stands a disc. The normal n of one on the density starts as the
-//! gradient of the density's quadratic B-spline, and is then that of the plane which fits the
-//! densities h of the 27 cells around best that lie within a cell of n's plane:
-//! ```text
-//! minimise Σ w (h - iso + g·d)² ,   w = B(d) · max(0, 1 - (n·d)²)
-//! d: from x to the cell,  n = g/|g|
-//! ```
-//! What is further off is flat bone or flat air, and its gradient that of the grid's corners: the
-//! spline alone is up to 2.6 degrees off on planes, the fit 0.3. The cut is a distance: the normal
-//! is its slope. In a hole of 3 mm on nodes of 0.5 mm the discs lie within 0.5 um of the ball that
-//! cut it. All of it is continuous, so that nothing jumps at borders of cells. The distance to a
-//! set of discs is 1-Lipschitz by construction, and each disc is convex: a half-space that just
-//! leaves the disc out is a safe constraint.
+//! rises over its surface. There stands a disc, bent like the surface (`disc.rs`). All of it is
+//! continuous, so that nothing jumps at borders of cells. Flat and convex discs are safe: a
+//! half-space that just leaves one out keeps the ball out of it. Over a hollow one the ball may
+//! sink while it moves, by half the curvature times the square of the move, and is lifted again.
 //!
 //! ```text
 //!   ·    ·    ·    ·      · air, • bone
@@ -29,7 +20,7 @@
 //!
 //! # Practice
 //! Lengths are cells, in a frame shifted to a whole cell near the tool ([`Discs::base`]). Bone is
-//! found 8 cells at once; a disc costs some 30 ns. One that was there before keeps its normal;
+//! found 8 cells at once; a disc costs 30 ns on the cut, 300 ns on voxels. One that was there before keeps its normal;
 //! while bone goes away, for a few ticks. The capacity is fixed; what does not fit is counted.
 
 use crate::disc::{Disc, disc};
@@ -90,8 +81,7 @@ struct Edge {
 struct Before {
     /// Which edge; 0 for none.
     key: u64,
-    normal: Vec3,
-    radius: f32,
+    disc: Disc,
     /// The value of [`Discs::wear`] when its normal was found.
     wear: u32,
 }
@@ -110,7 +100,7 @@ fn slot(key: u64) -> usize {
 
 fn keep(before: &mut [Before], base: IVec3, edge: &Edge, disc: &Disc, wear: u32) {
     let key = key(base, edge);
-    before[slot(key)] = Before { key, normal: disc.normal, radius: disc.radius, wear };
+    before[slot(key)] = Before { key, disc: *disc, wear };
 }
 
 impl Discs {
@@ -219,12 +209,11 @@ impl Discs {
     /// use.
     pub fn shape(&mut self, solid: &impl Solid, centre: impl Fn(Vec3) -> Vec3, reach: f32) {
         for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
-            let apart = known.centre.distance_squared(centre(known.centre));
-            if !edge.shaped && apart <= (reach + known.radius).powi(2) {
+            if !edge.shaped && known.least_distance(centre(known.centre)) <= reach {
                 let key = key(self.base, edge);
                 let was = &self.before[slot(key)];
                 if was.key == key && self.wear.wrapping_sub(was.wear) < TURNS {
-                    (known.normal, known.radius) = (was.normal, was.radius);
+                    *known = Disc { centre: known.centre, shaft: known.shaft, ..was.disc };
                 } else {
                     *known = Disc {
                         shaft: known.shaft,
@@ -277,7 +266,7 @@ impl Discs {
             return;
         }
         let radius = stride as f32 * self.radius;
-        self.list.push(Disc { centre: x, normal: step.as_vec3(), radius, shaft });
+        self.list.push(Disc { centre: x, normal: step.as_vec3(), radius, shaft, ..Disc::default() });
         self.voxels += u32::from(self.edges.last().is_none_or(|edge: &Edge| edge.voxel != local));
         self.edges.push(Edge { voxel: local, to, field, shaped: false });
     }
