@@ -38,11 +38,65 @@ pub(crate) struct Ball {
 }
 
 /// Where a ball sees a disc.
+#[derive(Clone, Copy)]
 pub(crate) struct Near {
     /// Distance from the disc to the centre; negative behind it when the centre is in bone.
     pub distance: f32,
     /// Unit vector from the disc to the centre.
     pub direction: Vec3,
+}
+
+/// A disc and where a ball sees it.
+#[derive(Clone, Copy)]
+struct Seen {
+    disc: Disc,
+    near: Near,
+}
+
+/// The discs in reach of a ball.
+#[derive(Default)]
+pub(crate) struct InReach {
+    list: Vec<Seen>,
+    /// Where the ball sees them from.
+    at: Vec3,
+    /// Whether its centre is in bone there.
+    inside: bool,
+}
+
+impl InReach {
+    pub fn with_capacity(count: usize) -> Self {
+        Self { list: Vec::with_capacity(count), ..Self::default() }
+    }
+
+    pub fn clear(&mut self) {
+        self.list.clear();
+    }
+
+    /// The discs as `ball` with its centre at `at` sees them.
+    pub fn seen_from(&mut self, ball: &Ball, at: Vec3) -> impl Iterator<Item = (&Disc, &Near)> {
+        if (at, ball.inside) != (self.at, self.inside) {
+            (self.at, self.inside) = (at, ball.inside);
+            self.list.iter_mut().for_each(|seen| seen.near = ball.nearest(&seen.disc, at));
+        }
+        self.list.iter().map(|seen| (&seen.disc, &seen.near))
+    }
+
+    /// Those that `ball`, its centre not in bone, touches with a tolerance of `most`.
+    pub fn touching(&self, ball: &Ball, at: Vec3, most: f32) -> impl Iterator<Item = (&Disc, Near)> {
+        let moved = if self.inside { f32::MAX } else { at.distance(self.at) };
+        let may = move |seen: &&Seen| seen.near.distance - moved <= ball.radius_at(&seen.disc) + most;
+        let seen = self.list.iter().filter(may).map(move |seen| (&seen.disc, ball.nearest(&seen.disc, at)));
+        seen.filter(move |(disc, near)| near.distance < ball.radius_at(disc) + most)
+    }
+
+    /// Adds a disc that `ball` sees from where it saw the others; false when there is no room.
+    pub fn push(&mut self, ball: &Ball, disc: Disc) -> bool {
+        let has_room = self.list.len() < self.list.capacity();
+        if has_room {
+            self.list.push(Seen { near: ball.nearest(&disc, self.at), disc });
+        }
+        has_room
+    }
 }
 
 /// How far a ball may go.
@@ -102,16 +156,17 @@ impl Ball {
 
     /// Copies those discs to `near` that a ball of radius `most` at `centre` has within `reach`.
     /// Returns the smallest distance.
-    pub fn select(&self, discs: &[Disc], centre: Vec3, most: f32, reach: f32, near: &mut Vec<Disc>) -> f32 {
-        near.clear();
+    pub fn select(&self, discs: &[Disc], centre: Vec3, most: f32, reach: f32, all: &mut InReach) -> f32 {
+        all.clear();
+        (all.at, all.inside) = (centre, self.inside);
         let mut smallest = f32::MAX;
         for disc in discs {
             // Cheaper than the disc's own distance and never greater.
             if disc.least_distance(centre) <= most + reach {
-                let distance = self.nearest(disc, centre).distance;
-                smallest = smallest.min(distance);
-                if distance <= most + reach {
-                    near.push(*disc);
+                let near = self.nearest(disc, centre);
+                smallest = smallest.min(near.distance);
+                if near.distance <= most + reach {
+                    all.list.push(Seen { disc: *disc, near });
                 }
             }
         }
@@ -119,23 +174,23 @@ impl Ball {
     }
 
     /// Distance of the nearest disc from the ball's centre.
-    pub fn clearance(&self, discs: &[Disc], centre: Vec3) -> f32 {
-        discs.iter().filter(|disc| !disc.shaft).map(|disc| self.nearest(disc, centre).distance).fold(f32::MAX, f32::min)
+    pub fn clearance(&self, all: &mut InReach, centre: Vec3) -> f32 {
+        let ball = all.seen_from(self, centre).filter(|(disc, _)| !disc.shaft);
+        ball.map(|(_, near)| near.distance).fold(f32::MAX, f32::min)
     }
 
     /// Where the ball at `centre` is nearest to `goal`, when overlaps must lose `push`, those of
     /// the shaft `lean`; `None` when that is nowhere.
     pub fn settle(
         &self,
-        discs: &[Disc],
+        discs: &mut InReach,
         spaces: &mut HalfSpaces,
         centre: Vec3,
         goal: Vec3,
         (push, lean): (f32, f32),
     ) -> Option<Vec3> {
         spaces.clear();
-        for disc in discs {
-            let near = self.nearest(disc, centre);
+        for (disc, near) in discs.seen_from(self, centre) {
             let clear = self.radius_at(disc).min(near.distance + if disc.shaft { lean } else { push });
             spaces
                 .push(HalfSpace { normal: near.direction, offset: near.direction.dot(centre) - near.distance + clear });
@@ -144,7 +199,7 @@ impl Ball {
     }
 
     /// Slides from `from` towards `goal`, no further than `limits`.
-    pub fn slide(&self, discs: &[Disc], spaces: &mut HalfSpaces, from: Vec3, goal: Vec3, limits: Limits) -> Slide {
+    pub fn slide(&self, discs: &mut InReach, spaces: &mut HalfSpaces, from: Vec3, goal: Vec3, limits: Limits) -> Slide {
         let mut slide = Slide { to: from, way: 0.0, rests: false, contradiction: false };
         for _ in 0..MAX_SLIDES {
             let at = slide.to;
@@ -204,9 +259,10 @@ mod tests {
             let discs: Vec<Disc> =
                 discs.into_iter().map(|(c, n)| Disc { centre: Vec3::from(c), normal: unit(n), radius: 0.8, ..Disc::default() }).collect();
             let (ball, goal) = (Ball { radius, inside: false, shaft: Shaft::default() }, Vec3::from(goal));
+            let mut all = InReach::default();
             // Discs through the centre have no side.
-            prop_assume!(ball.clearance(&discs, Vec3::ZERO) > 0.1);
-            let slide = ball.slide(&discs, &mut HalfSpaces::default(), Vec3::ZERO, goal, Limits { reach: 0.5, way });
+            prop_assume!(ball.select(&discs, Vec3::ZERO, radius, 9.0, &mut all) > 0.1);
+            let slide = ball.slide(&mut all, &mut HalfSpaces::default(), Vec3::ZERO, goal, Limits { reach: 0.5, way });
             prop_assert!(slide.to.distance(goal) <= goal.length() + 0.011, "{} > {}", slide.to.distance(goal), goal.length());
             prop_assert!(slide.way <= way + 1e-5 && slide.to.length() <= 0.5 + 1e-4);
             for disc in &discs {

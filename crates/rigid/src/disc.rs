@@ -120,6 +120,50 @@ impl Bend {
 }
 
 impl Disc {
+    /// A disc at `x` (voxels from `base`), where `field` ends the bone on an edge that leads out of it
+    /// along `edge`.
+    pub fn of(solid: &impl Solid, base: IVec3, (x, field): (Vec3, Field), edge: Vec3, radius: f32) -> Self {
+        let (step, along) = (edge.as_ivec3(), x.dot(edge));
+        let cell = base + x.round().as_ivec3() + (along.floor() - along.round()) as i32 * step;
+        let stride = solid.stride(cell, step);
+        let radius = match field {
+            Field::Cut => CUT_DISC.min(radius),
+            Field::Density => (stride as f32 * radius).min(solid.widest()),
+        };
+        let block = Block::read(solid, field, stride, base, x);
+        let shape = Shape::of(&block);
+        let size = shape.slope.length();
+        // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than
+        // its kernel.
+        if size < 1.0 || -shape.slope.dot(edge) < -0.5 * size {
+            return Self { centre: x, normal: edge, radius: SMALLEST.min(radius), ..Self::default() };
+        }
+        let rough = -shape.slope / size;
+        let bent = match field {
+            // A distance: its spline says it all.
+            Field::Cut => Some((rough, shape.bend(rough, size))),
+            Field::Density if stride == solid.voxel() => {
+                // From the voxel before on the edge.
+                let before = cell.dot(step).rem_euclid(stride);
+                let share = (before as f32 + along - along.floor()) / stride as f32;
+                let fit = fitted_quadric(solid, cell - before * step, step, share, rough);
+                // Between voxels the density is a parabola with the curvature along the edge.
+                let rise = |bend: &Bend, normal| -0.5 * share * (1.0 - share) * bend.along(edge, normal);
+                fit.map(|(normal, bend)| (normal, Bend { rise: rise(&bend.limited(), normal), ..bend }))
+            }
+            // Between voxels the density is linear and says nothing of how the surface bends.
+            Field::Density => None,
+        };
+        let Some((normal, bend)) = bent else {
+            let normal = block.fitted(rough).unwrap_or(rough);
+            let radius = stood_out(-shape.bend(normal, size).curvatures[1], stride, radius);
+            return Self { centre: x, normal, radius, ..Self::default() };
+        };
+        // What bends away more than the disc may.
+        let radius = stood_out(-bend.curvatures[1] - MAX_CURVATURE, stride, radius);
+        Self { centre: x, normal, radius, bend: bend.limited().scaled(stride as f32), shaft: false }
+    }
+
     /// The same in cells of which a cell of before has `times`.
     pub fn scaled(self, times: f32) -> Self {
         let (centre, radius) = (times * self.centre, times * self.radius);
@@ -166,54 +210,6 @@ impl Disc {
     }
 }
 
-/// A disc at `x` (voxels from `base`), where `field` ends the bone on an edge that leads out of it
-/// along `edge`.
-pub(crate) fn disc<S: Solid>(solid: &S, base: IVec3, (x, field): (Vec3, Field), edge: Vec3, radius: f32) -> Disc {
-    let (step, along) = (edge.as_ivec3(), x.dot(edge));
-    let cell = base + x.round().as_ivec3() + (along.floor() - along.round()) as i32 * step;
-    let stride = solid.stride(cell, step);
-    let mut radius = match field {
-        Field::Cut => CUT_DISC.min(radius),
-        Field::Density => (stride as f32 * radius).min(solid.widest()),
-    };
-    if S::CUT && stride == 1 {
-        // Where the other field ends the bone nearby the disc must not stand out over that edge.
-        radius = radius.min(to_edge(solid, field, base, x, edge).max(0.0));
-    }
-    let block = Block::read(solid, field, stride, base, x);
-    let shape = Shape::of(&block);
-    let size = shape.slope.length();
-    // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than
-    // its kernel.
-    if size < 1.0 || -shape.slope.dot(edge) < -0.5 * size {
-        return Disc { centre: x, normal: edge, radius: SMALLEST.min(radius), ..Disc::default() };
-    }
-    let rough = -shape.slope / size;
-    let bent = match field {
-        // A distance: its spline says it all.
-        Field::Cut => Some((rough, shape.bend(rough, size))),
-        Field::Density if stride == solid.voxel() => {
-            // From the voxel before on the edge.
-            let before = cell.dot(step).rem_euclid(stride);
-            let share = (before as f32 + along - along.floor()) / stride as f32;
-            let fit = fitted_quadric(solid, cell - before * step, step, share, rough);
-            // Between voxels the density is a parabola with the curvature along the edge.
-            let rise = |bend: &Bend, normal| -0.5 * share * (1.0 - share) * bend.along(edge, normal);
-            fit.map(|(normal, bend)| (normal, Bend { rise: rise(&bend.limited(), normal), ..bend }))
-        }
-        // Between voxels the density is linear and says nothing of how the surface bends.
-        Field::Density => None,
-    };
-    let Some((normal, bend)) = bent else {
-        let normal = block.fitted(rough).unwrap_or(rough);
-        let radius = stood_out(-shape.bend(normal, size).curvatures[1], stride, radius);
-        return Disc { centre: x, normal, radius, ..Disc::default() };
-    };
-    // What bends away more than the disc may.
-    let radius = stood_out(-bend.curvatures[1] - MAX_CURVATURE, stride, radius);
-    Disc { centre: x, normal, radius, bend: bend.limited().scaled(stride as f32), shaft: false }
-}
-
 /// The radius, up to `radius` cells, at which a disc stands out by [`STAND_OUT`] over a surface that
 /// bends away by `more` than the disc, 1/voxel.
 fn stood_out(more: f32, stride: i32, radius: f32) -> f32 {
@@ -222,20 +218,20 @@ fn stood_out(more: f32, stride: i32, radius: f32) -> f32 {
 }
 
 /// How far `x` on an edge along `edge` is from where the field that does not end the bone there
-/// would end it, cells.
-fn to_edge(solid: &impl Solid, field: Field, base: IVec3, x: Vec3, edge: Vec3) -> f32 {
+/// would end it, cells: no disc may stand out over that.
+pub(crate) fn to_edge(solid: &impl Solid, field: Field, base: IVec3, x: Vec3, edge: Vec3) -> f32 {
     let other = if field == Field::Cut { Field::Density } else { Field::Cut };
     let (step, along) = (edge.as_ivec3(), x.dot(edge));
     let cell = base + x.round().as_ivec3() + (along.floor() - along.round()) as i32 * step;
     let over = cubic([-1, 0, 1, 2].map(|n| solid.over(other, cell + n * step)), along - along.floor());
     if field == Field::Density {
         // The cut rises by so much a node, wherever.
-        return over * 1e-3;
+        return (over * 1e-3).max(0.0);
     }
     if over > FAR_HU {
         return f32::MAX;
     }
-    over / slope(solid, other, cell).length().max(1.0)
+    (over / slope(solid, other, cell).length().max(1.0)).max(0.0)
 }
 
 /// The densities around a place over the isovalue, HU, and where the middle one is seen from the

@@ -45,9 +45,8 @@
 //! For tools that are not balls. Where edges of the CT sharper than a node matter: discs stand out
 //! over them by up to `disc_nodes`.
 
-use crate::ball::{Ball, Limits};
+use crate::ball::{Ball, InReach, Limits};
 use crate::burr::{Burr, Cut};
-use crate::disc::Disc;
 use crate::half_spaces::{HalfSpace, HalfSpaces};
 use crate::lean::Lean;
 use crate::local_surface::LocalSurface;
@@ -68,6 +67,8 @@ const TOUCH: f32 = 0.05;
 /// Free space that a ball leaves around it when it grows, nodes: more than the unevenness of a
 /// bore.
 const MARGIN: f32 = 0.1;
+/// What a ball may grow and be pushed off in a tick, nodes.
+const ROOM: f32 = 0.25;
 /// A smaller ball would come on by more than 1/JAM of what it is smaller: jammed. That is how many
 /// times the sum of what the walls push exceeds the pull of the hand. 0.4 is between walls less
 /// than 47 degrees apart.
@@ -160,7 +161,7 @@ pub struct GodObjectSphere {
     /// Whether the ball was clear of bone, so that nothing needs to be looked for inside it.
     clear: bool,
     lean: Lean,
-    near: Vec<Disc>,
+    near: InReach,
     /// What the burr alone is pushed, mm: what it cuts with.
     pressed: Vec3,
     /// Of each touching disc, whether it is at the shaft, and the way from the tip to there, mm.
@@ -200,7 +201,7 @@ impl GodObjectSphere {
             surface: LocalSurface::new(MAX_DISCS, config.disc_nodes),
             clear: false,
             lean: Lean::new(if config.shaft { MAX_DISCS } else { 0 }, config.shaft_disc_voxels),
-            near: Vec::with_capacity(3 * MAX_DISCS),
+            near: InReach::with_capacity(3 * MAX_DISCS),
             pressed: Vec3::ZERO,
             arms: Vec::with_capacity(3 * MAX_DISCS),
             spaces: HalfSpaces::with_capacity(3 * MAX_DISCS),
@@ -251,7 +252,7 @@ impl GodObjectSphere {
         if self.ball_mm >= full && !ball.inside {
             return;
         }
-        let room = (self.sure.1 - grid.distance(self.sure.0)).min(ball.clearance(&self.near, grid - base));
+        let room = (self.sure.1 - grid.distance(self.sure.0)).min(ball.clearance(&mut self.near, grid - base));
         self.ball_mm = self.ball_mm.max(full.min(spacing * (room - MARGIN)));
         if self.jammed || self.proxy.translation == self.hand || self.ball_mm >= full && !ball.inside {
             return;
@@ -260,7 +261,7 @@ impl GodObjectSphere {
         let growth = rate * dt_ms / spacing;
         let grown = Ball { radius: (self.ball_mm / spacing + growth).min(full / spacing), ..ball };
         let (from, goal) = (grid - base, bone.node_at(self.hand) - base);
-        let Some(to) = grown.settle(&self.near, &mut self.spaces, from, goal, (growth, 0.0)) else { return };
+        let Some(to) = grown.settle(&mut self.near, &mut self.spaces, from, goal, (growth, 0.0)) else { return };
         let push = to - from;
         let most = (PUSHED * growth).min(self.left_mm / spacing);
         // A hand that draws the tool off is not overtaken.
@@ -305,12 +306,12 @@ impl GodObjectSphere {
         }
         let base = self.surface.base();
         let (from, goal) = (start - base, bone.node_at(device) - base);
-        let (ball, reach, full) = (self.ball(bone), self.config.move_nodes, self.tool.tip_radius_mm / spacing);
+        let (ball, reach, full) = (self.ball(bone), self.reach(bone), self.tool.tip_radius_mm / spacing);
         let nearest = self.select(bone, &ball, from, out);
         self.sure = (start, full + reach);
         self.clear = nearest > full - 0.5;
         let limits = Limits { reach, way: self.left_mm / spacing };
-        let slide = ball.slide(&self.near, &mut self.spaces, from, goal, limits);
+        let slide = ball.slide(&mut self.near, &mut self.spaces, from, goal, limits);
         self.left_mm = (self.left_mm - slide.way * spacing).max(0.0);
         out.fallbacks += u32::from(slide.contradiction);
         if slide.to == goal {
@@ -321,15 +322,20 @@ impl GodObjectSphere {
         slide.rests
     }
 
+    /// How far the ball may move with one set of discs, nodes: what is left of its way in this tick,
+    /// and room to grow.
+    fn reach(&self, bone: &BoneVolume) -> f32 {
+        self.config.move_nodes.min(self.left_mm / bone.node_mm() + ROOM)
+    }
+
     /// The discs near the tool with its ball at `from`. Returns the distance of the nearest from
     /// the ball's centre.
     fn select(&mut self, bone: &BoneVolume, ball: &Ball, from: Vec3, out: &mut RigidStep) -> f32 {
-        let (base, reach) = (self.surface.base(), self.config.move_nodes);
+        let (base, reach) = (self.surface.base(), self.reach(bone));
         let full = self.tool.tip_radius_mm / bone.node_mm();
         let nearest = ball.select(self.surface.shaped(from, full + reach), from, full, reach, &mut self.near);
         if self.config.shaft {
-            let shaft = Shaft { start: base + from, ..ball.shaft };
-            self.lean.select(bone, &shaft, reach, base, &mut self.near, out);
+            self.lean.select(bone, (ball, from), reach, base, &mut self.near, out);
         }
         nearest
     }
@@ -343,12 +349,12 @@ impl GodObjectSphere {
         let base = self.surface.base();
         let (ball, from) = (self.ball(bone), start - base);
         self.select(bone, &ball, from, out);
-        let pressed = |disc: &Disc| disc.shaft && ball.nearest(disc, from).distance < ball.shaft.radius - PRESSED;
-        if !self.near.iter().any(pressed) {
+        let most = ball.shaft.radius - PRESSED;
+        if !self.near.seen_from(&ball, from).any(|(disc, near)| disc.shaft && near.distance < most) {
             return;
         }
         let most = self.config.recover_mm_per_ms * dt_ms / spacing;
-        let Some(to) = ball.settle(&self.near, &mut self.spaces, from, from, (0.0, most)) else { return };
+        let Some(to) = ball.settle(&mut self.near, &mut self.spaces, from, from, (0.0, most)) else { return };
         if to.distance(from) <= PUSHED * most {
             self.proxy.translation = bone.origin() + spacing * (to + base);
         }
@@ -375,18 +381,15 @@ impl GodObjectSphere {
         let mut leans = false;
         self.touching.clear();
         self.arms.clear();
-        for disc in &self.near {
-            let near = ball.nearest(disc, centre);
-            if near.distance < ball.radius_at(disc) + TOUCH {
-                let arm = ball.arm(disc, disc.centre - centre);
-                let point = bone.origin() + spacing * (centre + arm + base - near.direction * near.distance);
-                let deep = spacing * (ball.radius_at(disc) - near.distance) + lifted.dot(near.direction);
-                leans |= disc.shaft;
-                self.touching.push(HalfSpace { normal: near.direction, offset: near.direction.dot(lifted) });
-                self.arms.push((disc.shaft, spacing * arm));
-                out.points_in_contact += 1;
-                out.manifold.push(Contact { point, normal: near.direction, depth_mm: deep.max(0.0) });
-            }
+        for (disc, near) in self.near.touching(&ball, centre, TOUCH) {
+            let arm = ball.arm(disc, disc.centre - centre);
+            let point = bone.origin() + spacing * (centre + arm + base - near.direction * near.distance);
+            let deep = spacing * (ball.radius_at(disc) - near.distance) + lifted.dot(near.direction);
+            leans |= disc.shaft;
+            self.touching.push(HalfSpace { normal: near.direction, offset: near.direction.dot(lifted) });
+            self.arms.push((disc.shaft, spacing * arm));
+            out.points_in_contact += 1;
+            out.manifold.push(Contact { point, normal: near.direction, depth_mm: deep.max(0.0) });
         }
         out.voxels_in_contact = out.points_in_contact.min(self.surface.owners());
         out.manifold.normal = lifted / depth;

@@ -15,6 +15,7 @@
 //! happens where no brick near the shaft has ever held bone.
 
 use crate::RigidStep;
+use crate::ball::{Ball, InReach};
 use crate::disc::Disc;
 use crate::shaft::Shaft;
 use crate::surface::Discs;
@@ -51,18 +52,19 @@ impl Lean {
         }
     }
 
-    /// Adds the discs that `shaft` has within `reach` to `near`, in the frame shifted to `base`;
-    /// all in nodes of the cut.
+    /// Adds the discs that the shaft of `ball` at `from` has within `reach` to `near`, in the frame
+    /// shifted to `base`; all in nodes of the cut.
     pub fn select(
         &mut self,
         bone: &BoneVolume,
-        shaft: &Shaft,
+        (ball, from): (&Ball, Vec3),
         reach: f32,
         base: Vec3,
-        near: &mut Vec<Disc>,
+        near: &mut InReach,
         out: &mut RigidStep,
     ) {
         let nodes = bone.cut_nodes() as f32;
+        let shaft = Shaft { start: base + from, ..ball.shaft };
         let (shaft, reach) = (&shaft.scaled(1.0 / nodes), reach / nodes);
         let still = |(start, axis): (Vec3, Vec3)| {
             start.distance(shaft.start) + shaft.span.1 * axis.distance(shaft.axis) <= AHEAD
@@ -79,10 +81,8 @@ impl Lean {
         self.discs.shape(bone, axis_near, far);
         let within = |disc: &&Disc| disc.least_distance(axis_near(disc.centre)) <= far;
         for disc in self.discs.list().iter().filter(within) {
-            if near.len() < near.capacity() {
-                let seen = disc.scaled(nodes);
-                near.push(Disc { centre: seen.centre + nodes * own - base, ..seen });
-            } else {
+            let seen = disc.scaled(nodes);
+            if !near.push(ball, Disc { centre: seen.centre + nodes * own - base, ..seen }) {
                 out.fallbacks += 1;
             }
         }

@@ -27,10 +27,15 @@ pub(crate) trait Solid {
     }
     /// Whether there is a cut beside the densities.
     const CUT: bool = false;
+    /// Whether the edge by `step` lies so far from all cuts that none of them can bound the bone
+    /// there.
+    fn is_far(&self, _cell: IVec3, _step: IVec3) -> bool {
+        false
+    }
     /// Cells from one voxel to the next where the edge by `step` lies far from all cuts, else 1.
     /// Far from cuts the surface is looked for on the edges between voxels alone.
-    fn stride(&self, _cell: IVec3, _step: IVec3) -> i32 {
-        1
+    fn stride(&self, cell: IVec3, step: IVec3) -> i32 {
+        if self.is_far(cell, step) { self.voxel() } else { 1 }
     }
     /// Cells from one voxel to the next.
     fn voxel(&self) -> i32 {
@@ -65,8 +70,8 @@ pub(crate) struct Fine<'a> {
 impl Solid for Fine<'_> {
     const CUT: bool = true;
 
-    fn stride(&self, cell: IVec3, step: IVec3) -> i32 {
-        if self.cut.at(cell) == 0 && self.cut.at(cell + step) == 0 { self.stride } else { 1 }
+    fn is_far(&self, cell: IVec3, step: IVec3) -> bool {
+        self.cut.at(cell) == 0 && self.cut.at(cell + step) == 0
     }
 
     fn voxel(&self) -> i32 {

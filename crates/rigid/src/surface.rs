@@ -23,7 +23,7 @@
 //! found 8 cells at once; a disc costs 30 ns on the cut, 300 ns on voxels. One that was there before keeps its normal;
 //! while bone goes away, for a few ticks. The capacity is fixed; what does not fit is counted.
 
-use crate::disc::{Disc, disc};
+use crate::disc::{Disc, to_edge};
 use crate::rows::{GridBall, rows};
 use crate::shaft::Shaft;
 use crate::solid::{Field, Solid, crossing, is_grazed};
@@ -39,6 +39,7 @@ const CACHE: usize = 4096;
 
 /// The ways from a voxel to those that share a face with it.
 pub(crate) const NEIGHBOURS: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
+
 /// The discs near a point, gathered anew for each place of the tool.
 #[derive(Default)]
 pub(crate) struct Discs {
@@ -53,14 +54,10 @@ pub(crate) struct Discs {
     list: Vec<Disc>,
     /// The edge on which each disc stands.
     edges: Vec<Edge>,
-    /// Discs of before, by edge: a tool that moves on meets most of them again.
-    before: Vec<Before>,
+    kept: Kept,
     /// Bone in the rows around the tool, a bit a cell.
     bones: Vec<u128>,
-    /// How often bone has gone away.
-    wear: u32,
     limit: usize,
-    radius: f32,
 }
 
 /// A grid edge out of the bone.
@@ -81,9 +78,22 @@ struct Edge {
 struct Before {
     /// Which edge; 0 for none.
     key: u64,
+    field: Field,
+    /// Cells from one crossing to the next.
+    stride: i32,
     disc: Disc,
-    /// The value of [`Discs::wear`] when its normal was found.
+    /// The value of [`Kept::wear`] when its normal was found.
     wear: u32,
+}
+
+/// Discs of before, by edge: a tool that moves on meets most of them again.
+#[derive(Default)]
+struct Kept {
+    before: Vec<Before>,
+    /// How often bone has gone away.
+    wear: u32,
+    /// Largest radius of a disc, voxels.
+    radius: f32,
 }
 
 /// One number for an edge of the grid, never 0.
@@ -98,18 +108,33 @@ fn slot(key: u64) -> usize {
     (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - CACHE.trailing_zeros())) as usize
 }
 
-fn keep(before: &mut [Before], base: IVec3, edge: &Edge, disc: &Disc, wear: u32) {
-    let key = key(base, edge);
-    before[slot(key)] = Before { key, disc: *disc, wear };
+impl Kept {
+    /// Gives a disc the normal, curvature and size of before where they still hold, else new ones.
+    /// Those of a cut are found `anew` or after some ticks; those of the density do not change.
+    fn shape<S: Solid>(&mut self, solid: &S, base: IVec3, edge: &mut Edge, disc: &mut Disc, anew: bool) {
+        let (key, step) = (key(base, edge), NEIGHBOURS[usize::from(edge.to)]);
+        let stride = solid.stride(base + edge.voxel, step);
+        let was = &mut self.before[slot(key)];
+        let holds = edge.field == Field::Density || !anew && self.wear.wrapping_sub(was.wear) < TURNS;
+        if (was.key, was.field, was.stride) != (key, edge.field, stride) || !holds {
+            let found = Disc::of(solid, base, (disc.centre, edge.field), step.as_vec3(), self.radius);
+            *was = Before { key, field: edge.field, stride, disc: found, wear: self.wear };
+        }
+        *disc = Disc { centre: disc.centre, shaft: disc.shaft, ..was.disc };
+        if S::CUT && stride == 1 {
+            // Where the other field ends the bone nearby the disc must not stand out over that edge.
+            disc.radius = disc.radius.min(to_edge(solid, edge.field, base, disc.centre, step.as_vec3()));
+        }
+        edge.shaped = true;
+    }
 }
 
 impl Discs {
     /// Room for `limit` discs, each of at most `radius` voxels.
     pub fn new(limit: usize, radius: f32) -> Self {
-        let (list, edges, before) =
-            (Vec::with_capacity(limit), Vec::with_capacity(limit), vec![Before::default(); CACHE]);
-        let bones = Vec::with_capacity(1 << 14);
-        Self { bones, list, edges, before, limit, radius, ..Self::default() }
+        let (list, edges) = (Vec::with_capacity(limit), Vec::with_capacity(limit));
+        let kept = Kept { before: vec![Before::default(); CACHE], wear: 0, radius };
+        Self { bones: Vec::with_capacity(1 << 14), list, edges, kept, limit, ..Self::default() }
     }
 
     /// Drops all discs.
@@ -122,12 +147,12 @@ impl Discs {
     /// Drops all discs and what is remembered of earlier ones: the bone is another.
     pub fn renew(&mut self) {
         self.forget();
-        self.before.fill(Before::default());
+        self.kept.before.fill(Before::default());
     }
 
     /// Bone has gone away.
     pub fn wear(&mut self) {
-        self.wear = self.wear.wrapping_add(1);
+        self.kept.wear = self.kept.wear.wrapping_add(1);
     }
 
     /// The discs found.
@@ -192,14 +217,15 @@ impl Discs {
         self.visited = self.list.len() as u32;
         for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
             let step = NEIGHBOURS[usize::from(edge.to)];
+            if solid.is_far(self.base + edge.voxel, step) {
+                continue;
+            }
             let (x, field) = crossing(solid, self.base, edge.voxel, step);
-            edge.field = field;
-            let turn = (slot(key(self.base, edge)) as u32).wrapping_add(self.wear).is_multiple_of(TURNS);
-            if edge.shaped && turn && x.distance_squared(centre) <= (reach + known.radius).powi(2) {
-                *known = disc(solid, self.base, (x, field), step.as_vec3(), self.radius);
-                keep(&mut self.before, self.base, edge, known, self.wear);
-            } else {
-                known.centre = x;
+            let turn = (slot(key(self.base, edge)) as u32).wrapping_add(self.kept.wear).is_multiple_of(TURNS);
+            let anew = turn || field != edge.field;
+            (known.centre, edge.field) = (x, field);
+            if edge.shaped && anew && known.least_distance(centre) <= reach {
+                self.kept.shape(solid, self.base, edge, known, true);
             }
         }
     }
@@ -210,18 +236,7 @@ impl Discs {
     pub fn shape(&mut self, solid: &impl Solid, centre: impl Fn(Vec3) -> Vec3, reach: f32) {
         for (known, edge) in self.list.iter_mut().zip(&mut self.edges) {
             if !edge.shaped && known.least_distance(centre(known.centre)) <= reach {
-                let key = key(self.base, edge);
-                let was = &self.before[slot(key)];
-                if was.key == key && self.wear.wrapping_sub(was.wear) < TURNS {
-                    *known = Disc { centre: known.centre, shaft: known.shaft, ..was.disc };
-                } else {
-                    *known = Disc {
-                        shaft: known.shaft,
-                        ..disc(solid, self.base, (known.centre, edge.field), known.normal, self.radius)
-                    };
-                    keep(&mut self.before, self.base, edge, known, self.wear);
-                }
-                edge.shaped = true;
+                self.kept.shape(solid, self.base, edge, known, false);
             }
         }
     }
@@ -265,7 +280,7 @@ impl Discs {
             self.overflow += 1;
             return;
         }
-        let radius = stride as f32 * self.radius;
+        let radius = stride as f32 * self.kept.radius;
         self.list.push(Disc { centre: x, normal: step.as_vec3(), radius, shaft, ..Disc::default() });
         self.voxels += u32::from(self.edges.last().is_none_or(|edge: &Edge| edge.voxel != local));
         self.edges.push(Edge { voxel: local, to, field, shaped: false });
