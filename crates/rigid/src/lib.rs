@@ -64,6 +64,7 @@ mod shaft;
 mod solid;
 pub mod spindle;
 mod surface;
+pub mod truth;
 mod window;
 
 pub use method::{Descriptor, Extent, Method};

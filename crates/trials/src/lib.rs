@@ -19,4 +19,3 @@
 pub mod engine;
 pub mod population;
 pub mod suites;
-pub mod truth;

@@ -1,23 +1,24 @@
-//! Measures the force error of each method on each voxel size, against fine voxels of the same CT.
-//! A ball slides along the skull, a burr cuts into it.
+//! Measures the force error of each method on each voxel size, against the CT itself. A ball slides
+//! along the skull, a burr cuts into it.
 //!
 //! # Theory
-//! The ground truth is the force of method `brute` on voxels of 0.25 mm, interpolated trilinearly
-//! from the same CT. The error of a tick is the norm of the difference between the forces. That of
-//! a choice is the 95th percentile over the ticks in contact, sliding or cutting, whichever is
-//! worse. If the tool's centre is below the surface, pressed in or at a ridge, several exits are
-//! valid, and correct methods may choose different ones. Hence the path is no deeper than the
-//! tool's radius, and not much deeper than the scene's depth: at a ridge a hand yields, which a
-//! path cannot.
+//! The ground truth is [`trepan_rigid::truth`] in f64: the density between the scanner's own
+//! voxels, with nothing of any method in it. The error of a tick is the norm of the difference
+//! between the forces. That of a choice is the 95th percentile over the ticks in contact, sliding
+//! or cutting, whichever is worse. If the tool's centre is below the surface, pressed in or at a
+//! ridge, several exits are valid, and correct methods may choose different ones. Hence the path is
+//! no deeper than the tool's radius, and not much deeper than the scene's depth: at a ridge a hand
+//! yields, which a path cannot.
 //!
 //! # When not to use it
 //! To judge the CT itself: what the scanner has blurred is unknown.
 
 use crate::run::clock::Clock;
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use trepan_budget::{Bone, Scene};
 use trepan_geometry::{Pose, Tool, ToolState, Vec3, quantile};
-use trepan_rigid::rivals::brute;
+use trepan_rigid::removal::RemovalLaw;
+use trepan_rigid::truth::{Ball, Bone as ExactBone, Scan};
 use trepan_rigid::{Method, RigidStep};
 use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample};
 
@@ -25,7 +26,7 @@ use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resamp
 const SPACINGS: [f64; 10] = [0.35, 0.42, 0.5, 0.6, 0.75, 0.85, 1.0, 1.25, 1.5, 2.0];
 /// Numbers of points of method `thesis`.
 const POINTS: [usize; 3] = [211, 466, 932];
-/// Voxel edge of the ground truth, mm.
+/// Voxel edge on which a path is laid out, mm.
 const FINE_MM: f32 = 0.25;
 /// Ticks of pressing in and of sliding.
 const TICKS: [usize; 2] = [120, 240];
@@ -33,8 +34,6 @@ const TICKS: [usize; 2] = [120, 240];
 const RIDGE: f64 = 1.5;
 /// Depth of the cut, mm, and its feed, mm/ms, as of a scripted hand.
 const DRILL: [f32; 2] = [1.5, 1.4e-3];
-/// Smallest radius of a burr whose cut the ground truth resolves, mm.
-const LEAST_CUT_MM: f64 = 4.0 * FINE_MM as f64;
 /// Half the edge of the block around the opening, mm.
 const ROOM_MM: f32 = 18.0;
 
@@ -96,7 +95,8 @@ impl Slide {
 }
 
 /// A block of skull, with tool paths and their ground-truth forces.
-pub struct Stretch {
+pub struct Stretch<'a> {
+    skull: &'a Skull,
     fine: BoneVolume,
     slide: Slide,
     paths: Vec<ToolPath>,
@@ -109,25 +109,21 @@ struct ToolPath {
     truth: Vec<Vec3>,
 }
 
-impl Stretch {
+impl<'a> Stretch<'a> {
     /// Cuts out the block and adds the slide as a path. `None` if the path has too little contact,
     /// or is much deeper than pressed, or deeper than the tool's radius.
-    pub fn of(skull: &Skull, slide: &Slide) -> Option<Self> {
+    pub fn of(skull: &'a Skull, slide: &Slide) -> Option<Self> {
         let fine = cut_out(skull, slide.place, FINE_MM)?;
         let path = path(&Surface::of(&fine, slide)?, slide)?;
-        let stretch = Self { fine, slide: *slide, paths: Vec::new() }.with(path, false);
+        let stretch = Self { skull, fine, slide: *slide, paths: Vec::new() }.with(path, false);
         let deep = stretch.paths[0].truth.iter().map(|force| f64::from(force.length()) / slide.scene.stiffness);
         let (touches, deepest) = (deep.clone().filter(|mm| *mm > 0.0).count(), deep.fold(0.0, f64::max));
         let deepest_allowed = slide.scene.tool_radius_mm.min(RIDGE * slide.scene.press_mm);
         (touches > TICKS[1] / 2 && deepest <= deepest_allowed).then_some(stretch)
     }
 
-    /// Adds a straight cut from just outside; not for a burr under 1 mm in radius, which the ground
-    /// truth does not resolve.
+    /// Adds a straight cut from just outside.
     pub fn cutting(self) -> Self {
-        if self.slide.scene.tool_radius_mm < LEAST_CUT_MM {
-            return self;
-        }
         let path = &self.paths[0].path;
         let [outside, inside] = [&path[0], &path[TICKS[0] - 1]];
         let inward = (inside.tip() - outside.tip()).normalize_or_zero();
@@ -143,9 +139,27 @@ impl Stretch {
 
     /// Adds a path.
     fn with(mut self, path: Vec<ToolState>, cuts: bool) -> Self {
-        let truth = self.follow(&Method::of(&brute::METHOD), &self.fine, &path, cuts).0;
+        let truth = self.exact(&path, cuts);
         self.paths.push(ToolPath { path, cuts, truth });
         self
+    }
+
+    /// The ground-truth forces along a path, N.
+    fn exact(&self, path: &[ToolState], cuts: bool) -> Vec<Vec3> {
+        let Slide { place, scene, .. } = &self.slide;
+        let scan = Scan::around(&self.skull.ct, self.skull.isovalue, place.as_dvec3(), ROOM_MM.into());
+        let (mut bone, law) = (ExactBone::new(scan), RemovalLaw::RATE);
+        let mut ball =
+            Ball::new(scene.tool_radius_mm as f32, path.first().map_or(DVec3::ZERO, |tool| tool.tip().as_dvec3()));
+        let tick = |tool: &ToolState| {
+            let device = tool.tip().as_dvec3();
+            let lifted = ball.follow(&bone, device);
+            if cuts {
+                ball.drill(&mut bone, device, &law, 1.0);
+            }
+            (scene.stiffness * lifted).as_vec3()
+        };
+        path.iter().map(tick).collect()
     }
 
     /// Forces along a path, N, and the median time of a tick, µs. Removed bone is restored
@@ -173,12 +187,12 @@ impl Stretch {
 
     /// Measures each choice, in the order given: the worst error of all paths, the tick time of the
     /// first. Each voxel size is resampled once.
-    pub fn measure(&self, skull: &Skull, choices: &[Bone]) -> Vec<Measurement> {
+    pub fn measure(&self, choices: &[Bone]) -> Vec<Measurement> {
         let mut grids: Vec<(f64, Option<BoneVolume>)> = Vec::new();
         let mut found = Vec::new();
         for choice in choices {
             if !grids.iter().any(|(edge, _)| *edge == choice.spacing_mm) {
-                let cut = cut_out(skull, self.slide.place, choice.spacing_mm as f32);
+                let cut = cut_out(self.skull, self.slide.place, choice.spacing_mm as f32);
                 grids.push((choice.spacing_mm, cut));
             }
             let grid = grids.iter().find(|(edge, _)| *edge == choice.spacing_mm);
@@ -196,8 +210,7 @@ impl Stretch {
         found
     }
 
-    /// Error of the recommended method on the voxels of the ground truth, sliding, 95th percentile,
-    /// N.
+    /// Error of the recommended method on voxels of 0.25 mm, sliding, 95th percentile, N.
     pub fn recommended_error_n(&self) -> f64 {
         let ToolPath { path, cuts, truth } = &self.paths[0];
         error_n(&self.follow(&Method::RECOMMENDED, &self.fine, path, *cuts).0, truth)

@@ -61,7 +61,7 @@ pub fn observe(part: usize, tables: &[String]) -> Observed {
         let (situation, stretch) = super::stretch(&case, &mut random);
         let scene = &situation.scene;
         let on_bone = || {
-            let found = stretch.measure(&case.skull, &bones);
+            let found = stretch.measure(&bones);
             Seen {
                 features: scene.bone_features(),
                 errors: found.iter().map(|found| found.error_n / scene.stiffness).collect(),

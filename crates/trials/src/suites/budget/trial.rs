@@ -26,7 +26,7 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
         let (situation, stretch, push) = scene(&case, &brains, truth, random);
         let name = format!("{} {number}", case.name);
         let bones: Vec<_> = rows.bone.iter().map(|row| row.what).collect();
-        let on_bone = stretch.measure(&case.skull, &bones).iter().map(|found| found.error_n).collect();
+        let on_bone = stretch.measure(&bones).iter().map(|found| found.error_n).collect();
         let in_tissue = push.measure(&brains).expect("the brain is sound");
         let in_tissue = in_tissue.iter().map(|found| found.error_mm).collect();
         let pictures: Vec<_> = rows.picture.iter().map(|row| row.what).collect();
@@ -37,7 +37,12 @@ pub fn run(source: Source, scenes: usize, random: &mut fastrand::Rng, quick: boo
 }
 
 /// A scene with bone to touch and a brain that moves under the push.
-fn scene(case: &Case, brains: &Brains, truth: Fineness, random: &mut fastrand::Rng) -> (Situation, Stretch, Push) {
+fn scene<'a>(
+    case: &'a Case,
+    brains: &Brains,
+    truth: Fineness,
+    random: &mut fastrand::Rng,
+) -> (Situation, Stretch<'a>, Push) {
     loop {
         let (situation, stretch) = super::stretch(case, random);
         let push = Push::of(&situation.push(case), brains, truth).expect("the brain is sound");

@@ -3,8 +3,8 @@
 use super::Bone;
 use super::directions::{Directions, SHARE};
 use super::price::price;
+use crate::removal::RemovalLaw;
 use glam::{DMat3, DVec3};
-use trepan_rigid::removal::RemovalLaw;
 
 /// Longest step with one set of bounds, mm, where bone is near.
 const STEP_MM: f64 = 0.02;

@@ -1,7 +1,7 @@
 use super::*;
+use crate::removal::RemovalLaw;
 use glam::DVec3;
 use std::f64::consts::PI;
-use trepan_rigid::removal::RemovalLaw;
 
 const R: f64 = 3.0;
 const OBLIQUE: DVec3 = DVec3::new(0.36, 0.48, 0.8);

@@ -1,6 +1,6 @@
 //! What bone costs by its density, from the law's documentation alone.
 
-use trepan_rigid::removal::RemovalLaw;
+use crate::removal::RemovalLaw;
 use trepan_volume::AIR_HU;
 
 /// Density at which a volume costs 1, HU.
