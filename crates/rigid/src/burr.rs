@@ -1,14 +1,14 @@
 //! The cutting side of a tool: what it reaches, and what it takes by a law of removal.
 
 use crate::RigidStep;
-use crate::cut_ball::{BAND, Eight, FrontRows, LANE, LANES, Paid, Place, Side, Taken, lanes};
+use crate::cut_ball::{BAND, Paid, Side, Sweep, Taken, depths, lanes, outside};
 use crate::nodes::Nodes;
 use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
-use glam::{IVec3, Vec3Swizzles};
+use glam::IVec3;
 use trepan_geometry::Vec3;
 use trepan_volume::{AIR_HU, BoneVolume, CUT_SURFACE};
-use wide::f32x8;
+use wide::{f32x8, i16x8};
 
 /// Fall of the ramp down to which the per-tick law cuts at the burr's surface, HU per voxel.
 const RAMP_HU: f32 = 1000.0;
@@ -79,7 +79,6 @@ struct Bite {
 /// The cutting side of one tool.
 pub(crate) struct Burr {
     law: RemovalLaw,
-    reached: Vec<Eight>,
     paid: Paid,
     bites: Vec<Bite>,
     limit: usize,
@@ -104,11 +103,10 @@ pub(crate) struct Burr {
 }
 
 impl Burr {
-    /// A burr that reaches at most `limit` nodes or voxels a tick.
+    /// A burr that takes bone of at most `limit` nodes or voxels a tick.
     pub fn new(law: RemovalLaw, limit: usize) -> Self {
         Self {
             law,
-            reached: Vec::with_capacity(limit),
             paid: Paid::with_capacity(limit),
             bites: Vec::with_capacity(limit),
             limit,
@@ -204,11 +202,12 @@ impl Burr {
             return;
         }
         let radius = (cut.radius_mm + wider_mm) / bone.node_mm();
+        let sweep = Sweep { centre, side, forward: self.forward, radius };
         let longest = (cut.device.distance(start) / bone.node_mm()).min(STRIDE);
         // As far as the last few cuts together, or else as far as it may go.
         let (mut hollow, mut most) = (radius - BAND, longest.min(AS_BEFORE * self.way));
         let (stop, way) = loop {
-            out.fallbacks += u32::from(self.find_reached((centre, side), radius, (hollow, most), nodes));
+            out.fallbacks += u32::from(self.find_paid(&sweep, (hollow, most), nodes));
             let stop = self.stop(radius, (hollow - radius, most), self.earned_mm3 / node_mm3);
             match stop {
                 Stop::Beyond if most < longest => most = longest,
@@ -220,7 +219,7 @@ impl Burr {
             }
         };
         let Taken { cost: spent, volume } = self.paid.taken(radius, way);
-        self.opened = self.open(bone, radius, way, nodes, out);
+        self.opened = self.open(bone, &sweep, (hollow, way), nodes, out);
         self.changed = true;
         if stop == Stop::At(way) && way > 0.0 {
             self.enough = spent * (STEP / way).min(1.0);
@@ -246,63 +245,28 @@ impl Burr {
         self.take(bone, decrement_hu, out);
     }
 
-    /// Lists the nodes that a ball of `radius` at `centre` changes when it goes `most` forward,
-    /// nodes, but none nearer than `hollow`. Returns whether there were more than fit.
-    fn find_reached(
-        &mut self,
-        (centre, side): (Vec3, Side),
-        radius: f32,
-        (hollow, most): (f32, f32),
-        nodes: &Nodes,
-    ) -> bool {
-        self.reached.clear();
-        self.paid.clear();
-        let (forward, mut over) = (self.forward, false);
-        let (cut, density) = (nodes.cut(), nodes.density());
-        let Self { reached, paid, law, limit, .. } = self;
-        let (long, border) = (side.half, f32::from(density.border()));
-        let bounds = FrontRows { centre, forward, long, radius: radius + BAND + most + long, hollow };
-        bounds.each(|start, to, hole| {
-            let mut x = start.x & -(LANES as i32);
-            while x <= to {
-                if x >= hole.0 && x + LANES as i32 - 1 <= hole.1 {
-                    x += LANES as i32;
-                    continue;
+    /// Lists the bone that the burr may take some of when it goes `most`, nodes, but none nearer
+    /// than `hollow`. Returns whether there was more than fits.
+    fn find_paid(&mut self, sweep: &Sweep, (hollow, most): (f32, f32), nodes: &Nodes) -> bool {
+        let (cut, density, mut over) = (nodes.cut(), nodes.density(), false);
+        let Self { paid, law, limit, .. } = self;
+        paid.clear();
+        sweep.eights(hollow, 0.5 + most, |node, place| {
+            let before = depths(cut.eight(node));
+            let taken = sweep.takes(&place, before, most);
+            if taken == 0 {
+                return;
+            }
+            // How much of each is bone where the density falls so steeply.
+            let over_border = density.overs(node);
+            let dense = 0.5 + over_border / density.steepness(node).fast_max(f32x8::ONE);
+            let share = outside(before, sweep.radius).fast_min(dense);
+            for lane in lanes(taken & share.simd_gt(f32x8::ZERO).to_bitmask()) {
+                over |= paid.len() == *limit;
+                if paid.len() < *limit {
+                    let price = law.price(over_border.as_array()[lane] + f32::from(density.border()));
+                    paid.push(&place, lane, share.as_array()[lane], price);
                 }
-                let (node, from) = (start.with_x(x), start.x);
-                let first = node.as_vec3() - centre;
-                let (across, rest) = (first.yz().length_squared(), first.yz().dot(forward.yz()));
-                let place = if long == 0.0 {
-                    let dx = first.x + LANE;
-                    Place { along: rest + dx * forward.x, apart: across + dx * dx }
-                } else {
-                    let off: [Vec3; LANES] = core::array::from_fn(|n| side.nearest(first + n as f32 * Vec3::X));
-                    let of = |each: fn(&Vec3, Vec3) -> f32| f32x8::new(off.each_ref().map(|off| each(off, forward)));
-                    Place { along: of(|off, forward| off.dot(forward)), apart: of(|off, _| off.length_squared()) }
-                };
-                let mut all = Eight::of(node, *cut.eight(node), place);
-                let which = (0xFF << (from - x).max(0)) & (0xFF >> (7 - (to - x).min(7)));
-                all.hits = all.reached(which, radius, most);
-                x += LANES as i32;
-                if all.hits == 0 {
-                    continue;
-                }
-                if reached.len() == *limit {
-                    over = true;
-                    return;
-                }
-                let hu = density.eight(node);
-                let (shares, may) = all.paid(radius, most);
-                for lane in lanes(may) {
-                    let hu = f32::from(hu[lane]);
-                    // How much of the node is bone where the density falls so steeply.
-                    let slope = density.slope(node + lane as i32 * IVec3::X).length();
-                    let share = shares.as_array()[lane].min(0.5 + (hu - border) / slope.max(1.0));
-                    if share > 0.0 {
-                        paid.push(&all.place, lane, share, law.price(hu));
-                    }
-                }
-                reached.push(all);
             }
         });
         paid.fill_up();
@@ -343,29 +307,39 @@ impl Burr {
         Stop::At(way)
     }
 
-    /// Adds the ball that has gone `way` to the cut. Returns whether nodes of bone opened.
-    fn open(&self, bone: &BoneVolume, radius: f32, way: f32, nodes: &mut Nodes, out: &mut RigidStep) -> bool {
+    /// Adds the burr that has gone `way` to the cut, but nothing nearer than `hollow` to its start.
+    /// Returns whether nodes of bone opened.
+    fn open(
+        &self,
+        bone: &BoneVolume,
+        sweep: &Sweep,
+        (hollow, way): (f32, f32),
+        nodes: &mut Nodes,
+        out: &mut RigidStep,
+    ) -> bool {
         let (mut writer, (cut, density), mut opened) = (bone.cut_writer(), nodes.split(), false);
-        for eight in &self.reached {
-            let (values, changed) = eight.cut(radius, way);
+        sweep.eights(hollow, BAND + way.max(0.0), |node, place| {
+            let was = i16x8::new(*cut.eight(node));
+            let (is, rises) = sweep.cut(&place, was, way);
+            let changed = rises.to_bitmask();
             if changed == 0 {
-                continue;
+                return;
             }
-            let hu = density.eight(eight.node);
-            let is_bone = |lane: &usize| hu[*lane] >= density.border();
-            if !writer.set_eight(eight.node, values, changed) {
+            let is_bone = |lane: &usize| density.eight(node)[*lane] >= density.border();
+            if !writer.set_eight(node, is.to_array(), changed) {
                 // Beyond the grid there is no bone.
                 out.fallbacks += lanes(changed).filter(is_bone).count() as u32;
-                continue;
+                return;
             }
-            cut.put_eight(eight.node, values, changed);
-            let opens = |lane: &usize| eight.was_outside(*lane) && values[*lane] >= CUT_SURFACE;
-            for lane in lanes(changed).filter(opens).filter(is_bone) {
+            cut.put_eight(node, rises.select(is, was));
+            let border = i16x8::splat(CUT_SURFACE);
+            let opens = (rises & was.simd_lt(border) & is.simd_ge(border)).to_bitmask();
+            for lane in lanes(opens).filter(is_bone) {
                 opened = true;
-                let voxel = (eight.node + lane as i32 * IVec3::X) / bone.cut_nodes();
+                let voxel = (node + lane as i32 * IVec3::X) / bone.cut_nodes();
                 out.broke_through |= !out.broke_through && is_free(bone, voxel, self.forward);
             }
-        }
+        });
         drop(writer);
         cut.see_all(bone);
         opened

@@ -4,10 +4,12 @@
 //! Lengths are nodes, seen from where the ball starts. Eight nodes of a row are looked at and
 //! changed together; sums run in eight lanes.
 
+use crate::rows::each;
+use crate::window::wide;
 use glam::IVec3;
 use trepan_geometry::Vec3;
 use trepan_volume::{CUT_STEPS, CUT_SURFACE};
-use wide::{f32x8, i16x8, i32x8};
+use wide::{f32x8, i16x8};
 
 /// How far from its surface the cut is kept, nodes: as far as its splines reach.
 pub(crate) const BAND: f32 = 2.1;
@@ -15,9 +17,9 @@ pub(crate) const BAND: f32 = 2.1;
 /// lag of at most [`LAG`], nodes.
 const NEAR: f32 = 1.1;
 /// See [`NEAR`].
-const LAG: f32 = 0.02;
+const LAG: f32 = 0.007;
 /// How far behind its start a burr still cuts, nodes: none of it but what rounding leaves.
-pub(crate) const BEHIND: f32 = -1.5;
+const BEHIND: f32 = -1.5;
 /// Nodes that are looked at together.
 pub(crate) const LANES: usize = 8;
 
@@ -41,49 +43,89 @@ impl Side {
     }
 }
 
-/// The rows of nodes along x that the front half of a ball meets.
-pub(crate) struct FrontRows {
+/// A ball, or a shaft of that radius, that goes forward.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sweep {
+    /// Where it starts.
     pub centre: Vec3,
+    pub side: Side,
+    /// Unit vector.
     pub forward: Vec3,
-    /// How much further back it begins.
-    pub long: f32,
     pub radius: f32,
-    /// Radius of the part of it that is not looked at.
-    pub hollow: f32,
 }
 
-impl FrontRows {
-    /// Calls `visit` with the first node and the last x of each row, and the first and last x of
-    /// what is hollow in it. Rows may be a node longer at both ends than they need to be.
-    pub fn each(&self, mut visit: impl FnMut(IVec3, i32, (i32, i32))) {
-        let Self { centre, forward, long, radius, hollow } = *self;
-        let (low, high) = ((centre - radius).floor().as_ivec3(), (centre + radius).ceil().as_ivec3());
-        let half = |square: f32, across: f32x8| (square - across).fast_max(f32x8::ZERO).sqrt();
-        let whole = |x: f32x8| (centre.x + x).fast_round_int().to_array();
-        for k in low.z..=high.z {
-            let z = k as f32 - centre.z;
-            for j in (low.y..=high.y).step_by(LANES) {
-                let y = j as f32 - centre.y + LANE;
-                let across = y * y + z * z;
-                let (outer, inner) = (half(radius * radius, across), half(hollow.max(0.0).powi(2), across));
-                // What lies behind needs no look.
-                let behind = BEHIND - long - (y * forward.y + z * forward.z);
-                let (mut from, mut to) = (-outer, outer);
-                if forward.x > 1e-3 {
-                    from = from.fast_max(behind / forward.x);
-                } else if forward.x < -1e-3 {
-                    to = to.fast_min(behind / forward.x);
-                } else {
-                    to = behind.simd_gt(f32x8::splat(1.0)).bitselect(from - 2.0, to);
-                }
-                let [from, to, hole_from, hole_to] = [from - 0.5, to + 0.5, 0.5 - inner, inner - 0.5].map(whole);
-                let meets = across.simd_lt(f32x8::splat(radius * radius)).to_bitmask();
-                for lane in lanes(meets).filter(|lane| from[*lane] <= to[*lane]) {
-                    let start = IVec3::new(from[lane], j + lane as i32, k);
-                    visit(start, to[lane], (hole_from[lane], hole_to[lane]));
+impl Sweep {
+    /// Calls `visit` with each eight nodes of a row at a multiple of eight, by the first of them,
+    /// brick by brick: those ahead up to `beyond` the radius from the start, but not all nearer
+    /// than `hollow`.
+    #[inline]
+    pub fn eights(&self, hollow: f32, beyond: f32, mut visit: impl FnMut(IVec3, Place)) {
+        let Self { centre, side, forward, radius } = *self;
+        let reach = radius + beyond + side.half;
+        let (outer, inner) = (reach * reach, hollow.max(0.0).powi(2));
+        // What lies behind needs no look.
+        let behind = BEHIND - side.half;
+        let edge = LANES as i32;
+        let of = |node: Vec3| node.floor().as_ivec3().div_euclid(IVec3::splat(edge));
+        each(of(centre - reach), of(centre + reach) + 1, |brick| {
+            let start = edge * brick;
+            let first = start.as_vec3() - centre;
+            let last = first + (edge - 1) as f32;
+            let (near, far) = (first.max(-last).max(Vec3::ZERO), last.max(-first));
+            let ahead = (first * forward).max(last * forward);
+            if near.length_squared() > outer || far.length_squared() < inner || ahead.element_sum() < behind {
+                return;
+            }
+            let (x, y) = (first.x + LANE, first.y + LANE);
+            let (apart, along) = (x * x, x * forward.x);
+            for k in 0..edge {
+                let z = first.z + k as f32;
+                let (across, rest) = (y * y + z * z, y * forward.y + z * forward.z);
+                let meets = across.simd_le(f32x8::splat(outer - near.x * near.x))
+                    & across.simd_ge(f32x8::splat(inner - far.x * far.x))
+                    & rest.simd_ge(f32x8::splat(behind - ahead.x));
+                for j in lanes(meets.to_bitmask()) {
+                    let node = start + IVec3::new(0, j as i32, k);
+                    let place = if side.half == 0.0 {
+                        Place { apart: apart + across.as_array()[j], along: along + rest.as_array()[j] }
+                    } else {
+                        self.beside(node)
+                    };
+                    visit(node, place);
                 }
             }
-        }
+        });
+    }
+
+    /// Where the eight nodes from `node` on lie to a shaft.
+    #[inline(never)]
+    fn beside(&self, node: IVec3) -> Place {
+        let Self { centre, side, forward, .. } = self;
+        let off: [Vec3; LANES] =
+            core::array::from_fn(|n| side.nearest((node + n as i32 * IVec3::X).as_vec3() - centre));
+        let of = |each: fn(&Vec3, Vec3) -> f32| f32x8::new(off.each_ref().map(|off| each(off, *forward)));
+        Place { along: of(|off, forward| off.dot(forward)), apart: of(|off, _| off.length_squared()) }
+    }
+
+    /// One bit for each of eight nodes that may lose bone when it goes `most`.
+    #[inline]
+    pub fn takes(&self, place: &Place, before: f32x8, most: f32) -> u32 {
+        // It loses some if the ball gets nearer than this, nodes.
+        let nearest = (self.radius - before).fast_min(f32x8::splat(self.radius + 0.5)).fast_max(f32x8::ZERO);
+        let taken = place.apart_after(most).simd_lt(nearest * nearest);
+        (taken & place.ahead() & outside(before, self.radius).simd_gt(f32x8::ZERO)).to_bitmask()
+    }
+
+    /// The values of eight nodes of the cut, which `was`, when it has gone `way`, and which of them
+    /// have changed.
+    #[inline]
+    pub fn cut(&self, place: &Place, was: i16x8, way: f32) -> (i16x8, i16x8) {
+        let depth = place.depth(self.radius, way);
+        let value = depth.fast_min(f32x8::splat(BAND)) * CUT_STEPS + f32::from(CUT_SURFACE);
+        let value = value & depth.simd_gt(f32x8::splat(-BAND)) & place.ahead();
+        let is = i16x8::from_i32x8_saturate(value.fast_round_int());
+        let far = (was - CUT_SURFACE).abs().simd_gt(i16x8::splat((NEAR * CUT_STEPS) as i16));
+        (is, is.simd_gt(was + (far & i16x8::splat((LAG * CUT_STEPS) as i16))))
     }
 }
 
@@ -104,6 +146,12 @@ impl Place {
         (self.apart + passed * (passed - 2.0 * self.along)).fast_max(f32x8::ZERO)
     }
 
+    /// Those that are not behind.
+    #[inline]
+    fn ahead(&self) -> f32x8 {
+        self.along.simd_ge(f32x8::splat(BEHIND))
+    }
+
     /// How deep they lie in a ball of `radius` that has gone `way`, nodes. One that has gone less
     /// than nothing has not left and is so much smaller.
     #[inline]
@@ -112,68 +160,13 @@ impl Place {
     }
 }
 
-/// Eight nodes of a row, the first at a multiple of eight: one load, and never in two bricks.
-pub(crate) struct Eight {
-    /// The first.
-    pub node: IVec3,
-    /// One bit for each that counts.
-    pub hits: u32,
-    pub place: Place,
-    /// What the cut was there, steps of [`CUT_STEPS`] a node.
-    value: f32x8,
-}
-
 /// 0 to 7.
 pub(crate) const LANE: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
-impl Eight {
-    /// The nodes from `node` on, none of which counts yet.
-    #[inline]
-    pub fn of(node: IVec3, value: [i16; LANES], place: Place) -> Self {
-        let value = f32x8::from_i32x8(i32x8::from_i16x8(i16x8::new(value)));
-        Self { node, hits: 0, place, value }
-    }
-
-    /// How deep they lay in the cut, nodes.
-    #[inline]
-    fn before(&self) -> f32x8 {
-        (self.value - f32::from(CUT_SURFACE)) * (1.0 / CUT_STEPS)
-    }
-
-    /// One bit for each node of `which` that a ball of `radius` changes when it goes `most`.
-    #[inline]
-    pub fn reached(&self, which: u32, radius: f32, most: f32) -> u32 {
-        // It is reached if the ball gets nearer than this, nodes.
-        let before = self.before();
-        let lag = before.abs().simd_gt(f32x8::splat(NEAR)) & f32x8::splat(LAG);
-        let most_apart = (radius - before - lag).fast_min(f32x8::splat(radius + BAND)).fast_max(f32x8::ZERO);
-        let reached = self.place.apart_after(most).simd_lt(most_apart * most_apart);
-        let ahead = self.place.along.simd_ge(f32x8::splat(BEHIND));
-        which & (reached & ahead & before.simd_lt(f32x8::splat(BAND))).to_bitmask()
-    }
-
-    /// How much of each is outside the cut, and one bit for each hit that may lose bone.
-    /// The ball of `radius` goes `most`.
-    #[inline]
-    pub fn paid(&self, radius: f32, most: f32) -> (f32x8, u32) {
-        let (share, edge) = (outside(self.before(), radius), f32x8::splat((radius + 0.5) * (radius + 0.5)));
-        let taken = share.simd_gt(f32x8::ZERO) & self.place.apart_after(most).simd_lt(edge);
-        (share, self.hits & taken.to_bitmask())
-    }
-
-    /// The values when a ball of `radius` has gone `way`, and one bit for each hit that it changes.
-    #[inline]
-    pub fn cut(&self, radius: f32, way: f32) -> ([i16; LANES], u32) {
-        let depth = self.place.depth(radius, way).fast_max(f32x8::splat(-BAND)).fast_min(f32x8::splat(BAND));
-        let value = (depth * CUT_STEPS + f32::from(CUT_SURFACE)).fast_round_int();
-        let changed = f32x8::from_i32x8(value).simd_gt(self.value);
-        (value.to_array().map(|value| value as i16), self.hits & changed.to_bitmask())
-    }
-
-    /// Whether a node was outside the cut.
-    pub fn was_outside(&self, lane: usize) -> bool {
-        self.value.as_array()[lane] < f32::from(CUT_SURFACE)
-    }
+/// How deep eight nodes of the cut lie in it, nodes.
+#[inline]
+pub(crate) fn depths(values: &[i16; LANES]) -> f32x8 {
+    (wide(values) - f32::from(CUT_SURFACE)) * (1.0 / CUT_STEPS)
 }
 
 /// The lanes of which a bit is set.
@@ -221,11 +214,17 @@ impl Paid {
     }
 
     /// Adds the node in a lane of `place` of which `share` is bone.
+    #[inline]
     pub fn push(&mut self, place: &Place, lane: usize, share: f32, price: f32) {
         let (along, apart) = (place.along.as_array()[lane], place.apart.as_array()[lane]);
         for (list, value) in self.all().into_iter().zip([along, apart, share, price]) {
             list.push(value);
         }
+    }
+
+    /// How many nodes there are.
+    pub fn len(&self) -> usize {
+        self.along.len()
     }
 
     /// Fills the last eight up with nodes that hold nothing.

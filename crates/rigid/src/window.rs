@@ -17,9 +17,8 @@
 
 use crate::rows::each;
 use glam::IVec3;
-use trepan_geometry::Vec3;
 use trepan_volume::{BRICK, BetweenScratch, BoneVolume, CUT_STEPS, CUT_SURFACE};
-use wide::i16x8;
+use wide::{f32x8, i16x8, i32x8};
 
 /// Largest edge, log2: 128 voxels, 4 MB.
 const MAX_BITS: u32 = 7;
@@ -200,11 +199,22 @@ impl Window {
         if self.shown == Shown::Cut { CUT_SURFACE } else { self.isovalue }
     }
 
-    /// How fast the values rise at a cell, a cell.
+    /// How steeply the values rise a cell at the eight cells along x from `cell`, which is at a
+    /// multiple of eight.
+    pub fn steepness(&self, cell: IVec3) -> f32x8 {
+        let of = |step: IVec3| wide(self.eight(cell + step));
+        let [a, b, c, d, e, f, g, h] = *self.eight(cell);
+        let (before, after) = (self.at(cell - IVec3::X), self.at(cell + 8 * IVec3::X));
+        let x = wide(&[b, c, d, e, f, g, h, after]) - wide(&[before, a, b, c, d, e, f, g]);
+        let (y, z) = (of(IVec3::Y) - of(IVec3::NEG_Y), of(IVec3::Z) - of(IVec3::NEG_Z));
+        0.5 * (x * x + y * y + z * z).sqrt()
+    }
+
+    /// How far the eight cells along x from `cell`, which is at a multiple of eight, are over the
+    /// border of bone, HU.
     #[inline]
-    pub fn slope(&self, cell: IVec3) -> Vec3 {
-        let of = |step: IVec3| 0.5 * (f32::from(self.at(cell + step)) - f32::from(self.at(cell - step)));
-        Vec3::new(of(IVec3::X), of(IVec3::Y), of(IVec3::Z))
+    pub fn overs(&self, cell: IVec3) -> f32x8 {
+        wide(self.eight(cell)) - f32::from(self.isovalue)
     }
 
     fn index_of_eight(&self, cell: IVec3) -> usize {
@@ -219,15 +229,11 @@ impl Window {
         self.cells[at..].first_chunk().expect("the edge is a multiple of eight")
     }
 
-    /// Sets those of the eight cells from `cell` on of which a bit is set in `which` to what their
-    /// owner has just cut.
+    /// Sets the eight cells from `cell` on to what their owner has just cut.
     #[inline]
-    pub fn put_eight(&mut self, cell: IVec3, values: [i16; 8], which: u32) {
+    pub fn put_eight(&mut self, cell: IVec3, values: i16x8) {
         let at = self.index_of_eight(cell);
-        let cells: &mut [i16; 8] = self.cells[at..].first_chunk_mut().expect("the edge is a multiple of eight");
-        for lane in 0..8 {
-            cells[lane] = if which >> lane & 1 == 1 { values[lane] } else { cells[lane] };
-        }
+        *self.cells[at..].first_chunk_mut().expect("the edge is a multiple of eight") = values.to_array();
     }
 
     /// Takes note that what it shows of the bricks that it meets is how they are now.
@@ -249,6 +255,12 @@ impl Window {
     }
 }
 
+/// Eight values as floats.
+#[inline]
+pub(crate) fn wide(values: &[i16; 8]) -> f32x8 {
+    f32x8::from_i32x8(i32x8::from_i16x8(i16x8::new(*values)))
+}
+
 /// Index of a brick among the versions.
 fn place(brick: IVec3) -> usize {
     let b = brick & (BRICKS - 1);
@@ -259,6 +271,7 @@ fn place(brick: IVec3) -> usize {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use trepan_geometry::Vec3;
     use trepan_volume::VoxelVolume;
 
     proptest! {
