@@ -7,22 +7,20 @@
 //! |kₜ s| > μₛ Fₙ      slips: the anchor follows so that |kₜ s| = μ Fₙ until the tip turns or rests
 //! ```
 //! The friction cone of Ruspini's proxy, with the anchor in the part of the proxy. The normal part
-//! is [`Viscoelastic`](crate::Viscoelastic).
+//! is [`Viscoelastic`].
 //!
 //! # Practice
 //! kₜ N/mm; μ without unit. Steel on wet bone is about 0.2 to 0.3 (uncalibrated). The anchor is
-//! forgotten when contact ends.
+//! forgotten when contact ends. Coefficients of 0 leave the normal part as it is. While the pedal
+//! is down there is no friction: a spinning burr cuts and does not stick.
 //!
 //! # Sources
 //! D. Ruspini, K. Kolarov, O. Khatib, *The haptic display of complex graphical environments*,
 //! SIGGRAPH 1997; V. Hayward, B. Armstrong, *A new computational model of friction applied to
 //! haptic rendering*, ISER 1999.
-//!
-//! # When not to use it
-//! For a spinning burr: it cuts and does not stick.
 
 use crate::{ContactManifold, ForceModel, Viscoelastic};
-use trepan_geometry::{ToolState, Vec3, Wrench};
+use trepan_geometry::{Buttons, ToolState, Vec3, Wrench};
 
 /// Spring, damper and Coulomb friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +66,8 @@ impl Default for Friction {
 impl ForceModel for Friction {
     fn wrench(&mut self, tool: &ToolState, manifold: &ContactManifold, dt_ms: f32) -> Wrench {
         let pressed = self.normal.wrench(tool, manifold, dt_ms);
-        if pressed.force == Vec3::ZERO || !tool.tip().is_finite() {
+        let spins = tool.buttons.has(Buttons::PEDAL);
+        if self.sticking <= 0.0 || spins || pressed.force == Vec3::ZERO || !tool.tip().is_finite() {
             self.reset();
             return pressed;
         }
@@ -104,6 +103,19 @@ mod tests {
         assert!((dragged(&mut model, 0.35) - Vec3::new(-0.2, 0.0, 1.0)).length() < 1e-6, "slips");
         assert!((dragged(&mut model, 1.0) - Vec3::new(-0.2, 0.0, 1.0)).length() < 1e-6, "goes on slipping");
         assert!((dragged(&mut model, 0.9) - Vec3::new(-0.1, 0.0, 1.0)).length() < 1e-6, "turns back and sticks");
+    }
+
+    #[test]
+    fn without_a_coefficient_or_with_the_burr_spinning_only_the_normal_part_is_left() {
+        let tool = |x: f32, buttons| ToolState { buttons, ..ToolState::at(Pose::from_translation(Vec3::X * x)) };
+        let mut none = Friction::new(Viscoelastic::BONE, 1.0, 0.0, 0.0);
+        let touch = ContactManifold::single(Contact { normal: Vec3::Z, depth_mm: 0.5, point: Vec3::ZERO });
+        let mut normal = Viscoelastic::BONE;
+        for x in [0.0, 0.4] {
+            let plain = normal.wrench(&tool(x, Buttons(0)), &touch, 1.0);
+            assert_eq!(none.wrench(&tool(x, Buttons(0)), &touch, 1.0), plain);
+            assert_eq!(Friction::default().wrench(&tool(x, Buttons::PEDAL), &touch, 1.0), plain);
+        }
     }
 
     #[test]

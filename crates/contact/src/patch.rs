@@ -14,7 +14,7 @@
 
 use trepan_geometry::Vec3;
 
-/// A tangent plane to the tissue near the tool. Plain data, 44 bytes, copied whole between threads.
+/// A tangent plane to the tissue near the tool. Plain data, 64 bytes, copied whole between threads.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfacePatch {
     /// When the tool pose of this result was read, session ms.
@@ -27,6 +27,10 @@ pub struct SurfacePatch {
     pub depth_mm: f32,
     /// Normal velocity of the tissue there, mm/ms, along `normal`.
     pub normal_velocity: f32,
+    /// Slip of the tool on the tissue since it last stuck, at that tip, mm; zero without friction.
+    pub slip_mm: Vec3,
+    /// Moment about the tip for each newton along `normal`, mm: what the shaft adds.
+    pub couple_mm: Vec3,
 }
 
 impl SurfacePatch {
@@ -38,14 +42,22 @@ impl SurfacePatch {
         (self.depth_mm + (self.tip_mm - tip).dot(self.normal)).max(0.0)
     }
 
-    /// With a second contact of the same tool: two equal springs pull like one along the sum of
-    /// their depths.
+    /// Slip of a tool whose tip has moved to `tip`, mm, across the normal.
+    pub fn slip_at(&self, tip: Vec3) -> Vec3 {
+        let way = self.slip_mm + (tip - self.tip_mm);
+        way - way.dot(self.normal) * self.normal
+    }
+
+    /// Adds a second contact of the same tool, `arm_mm` from its tip, which turns the tool. Two
+    /// equal springs pull like one along the sum of their depths.
     #[must_use]
-    pub fn with(&self, normal: Vec3, depth_mm: f32) -> Self {
-        let sum = self.normal * self.depth_mm.max(0.0) + normal * depth_mm.max(0.0);
+    pub fn with(&self, normal: Vec3, depth_mm: f32, arm_mm: Vec3) -> Self {
+        let second = normal * depth_mm.max(0.0);
+        let sum = self.normal * self.depth_mm.max(0.0) + second;
         let normal = sum.try_normalize().unwrap_or(Vec3::ZERO);
-        let normal_velocity = self.normal_velocity * self.normal.dot(normal);
-        Self { normal, depth_mm: sum.dot(normal), normal_velocity, ..*self }
+        let (normal_velocity, depth_mm) = (self.normal_velocity * self.normal.dot(normal), sum.dot(normal));
+        let couple_mm = if depth_mm > 0.0 { arm_mm.cross(second) / depth_mm } else { Vec3::ZERO };
+        Self { normal, depth_mm, normal_velocity, couple_mm, ..*self }
     }
 }
 
@@ -56,11 +68,20 @@ mod tests {
     #[test]
     fn two_contacts_pull_like_their_sum() {
         let tip = SurfacePatch { normal: Vec3::Z, depth_mm: 0.3, normal_velocity: 0.1, ..SurfacePatch::default() };
-        let both = tip.with(Vec3::X, 0.4);
+        let both = tip.with(Vec3::X, 0.4, Vec3::Z * 10.0);
         assert!((both.normal * both.depth_mm - Vec3::new(0.4, 0.0, 0.3)).length() < 1e-6);
-        assert_eq!((tip.with(Vec3::X, 0.0).depth_mm, tip.with(Vec3::X, 0.0).normal), (0.3, Vec3::Z));
-        assert_eq!(SurfacePatch::default().with(Vec3::X, 0.2).depth_mm, 0.2);
-        assert_eq!(tip.with(Vec3::NEG_Z, 0.3).depth_mm, 0.0);
+        // 0.4 mm at 10 mm from the tip, of 0.5 mm together.
+        assert!((both.couple_mm - Vec3::Y * 8.0).length() < 1e-5, "{}", both.couple_mm);
+        let free = tip.with(Vec3::X, 0.0, Vec3::Z);
+        assert_eq!((free.depth_mm, free.normal, free.couple_mm), (0.3, Vec3::Z, Vec3::ZERO));
+        assert_eq!(SurfacePatch::default().with(Vec3::X, 0.2, Vec3::ZERO).depth_mm, 0.2);
+        assert_eq!(tip.with(Vec3::NEG_Z, 0.3, Vec3::X).couple_mm, Vec3::ZERO);
+    }
+
+    #[test]
+    fn slip_follows_the_tip_across_the_normal_only() {
+        let patch = SurfacePatch { normal: Vec3::Z, slip_mm: Vec3::X * 0.1, ..SurfacePatch::default() };
+        assert!((patch.slip_at(Vec3::new(0.2, 0.5, 3.0)) - Vec3::new(0.3, 0.5, 0.0)).length() < 1e-6);
     }
 
     #[test]

@@ -57,7 +57,7 @@ impl<M: ForceModel> ForceShading<M> {
     fn shaded(&mut self, manifold: &ContactManifold) -> Vec3 {
         let Some((before, point)) = self.last else { return manifold.normal };
         let way = manifold.point.distance(point);
-        let share = if self.length_mm > 0.0 { 1.0 - (-way / self.length_mm).exp() } else { 1.0 };
+        let share = 1.0 - (-way / self.length_mm).exp();
         // Opposed normals have no mean: the new one is the truth.
         before.lerp(manifold.normal, share).try_normalize().unwrap_or(manifold.normal)
     }
@@ -65,7 +65,7 @@ impl<M: ForceModel> ForceShading<M> {
 
 impl<M: ForceModel> ForceModel for ForceShading<M> {
     fn wrench(&mut self, tool: &ToolState, manifold: &ContactManifold, dt_ms: f32) -> Wrench {
-        if !manifold.touches() || !manifold.is_finite() {
+        if !(self.length_mm > 0.0 && manifold.touches() && manifold.is_finite()) {
             self.last = None;
             return self.model.wrench(tool, manifold, dt_ms);
         }
@@ -111,6 +111,15 @@ mod tests {
         assert!(forces[199].angle_between(slope).to_degrees() < 0.5, "it has turned a few lengths on");
         let still = model.wrench(&tool, &touch(Vec3::Z, 4.95), 1.0).force;
         assert!((still - forces[199]).length() < 1e-6, "at rest nothing turns");
+    }
+
+    #[test]
+    fn without_a_length_the_force_is_that_of_the_model_bit_for_bit() {
+        let (mut plain, tool) = (Hooke { stiffness: 2.0 }, ToolState::at(Pose::IDENTITY));
+        let mut model = ForceShading::new(plain, 0.0);
+        for normal in [Vec3::Z, Vec3::new(0.6, -0.0, 0.8), Vec3::new(0.36, 0.48, 0.8)] {
+            assert_eq!(model.wrench(&tool, &touch(normal, 0.1), 1.0), plain.wrench(&tool, &touch(normal, 0.1), 1.0));
+        }
     }
 
     #[test]

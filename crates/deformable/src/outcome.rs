@@ -74,9 +74,20 @@ impl TissueStep {
         tip.iter().chain([&self.shaft_nodal])
     }
 
-    /// Adds the springs of tip and shaft to a solver's list. Friction is not among them.
+    /// Adds the springs of tip and shaft to a solver's list, and that of friction.
     pub fn springs(&self, out: &mut NodalContacts) {
         self.all().for_each(|spring| out.push(*spring));
+        out.push(self.friction_spring());
+    }
+
+    /// The spring across the normal that holds the tissue to the tool: as stiff as the contact, and
+    /// stretched by the slip. Nothing without friction.
+    fn friction_spring(&self) -> NodalContact {
+        let Some(normal) = self.friction_n.try_normalize() else { return NodalContact::none() };
+        let mut spring = self.nodal;
+        (spring.normal, spring.damping, spring.lateral_damping) = (normal, 0.0, 0.0);
+        spring.offset_mm = self.patch.slip_mm.length() - self.manifold.point.dot(normal);
+        spring
     }
 
     /// Adds all forces on the nodes, N: springs of tip and shaft, and friction. Returns the force

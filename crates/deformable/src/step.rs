@@ -99,7 +99,8 @@ impl TissueCollision {
             let answer = answer.unwrap_or(Answer { normal: Vec3::ZERO, depth_mm: 0.0 });
             out.overflow += self.responder.press(&scene, &self.surface, &answer, &mut out.surface_springs);
         }
-        out.friction_n = self.friction.drag(&scene, self.friction_coefficient, out);
+        out.patch.slip_mm = self.friction.slip(&scene, self.friction_coefficient, out);
+        out.friction_n = -out.nodal.stiffness * out.patch.slip_mm;
         if let Some(shaft) = &mut self.shaft
             && let Some((contact, nodal)) = shaft.respond(&scene, &mut self.surface, &mut out.overflow)
         {

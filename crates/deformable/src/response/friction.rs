@@ -42,8 +42,8 @@ impl Friction {
         (self.slip, self.last) = (Vec3::ZERO, None);
     }
 
-    /// Force on the tool, N, for the contact in `out` and a friction coefficient.
-    pub(crate) fn drag(&mut self, scene: &Scene, coefficient: f32, out: &TissueStep) -> Vec3 {
+    /// Slip, mm, for the contact in `out` and a friction coefficient; at most what the cone holds.
+    pub(crate) fn slip(&mut self, scene: &Scene, coefficient: f32, out: &TissueStep) -> Vec3 {
         if coefficient <= 0.0 || !out.manifold.touches() {
             self.reset();
             return Vec3::ZERO;
@@ -63,6 +63,6 @@ impl Friction {
         }
         let on_tool = pose.rotation.inverse() * (point - pose.translation);
         self.last = Some(Touch { nodal: out.nodal, tissue: mean(&out.nodal), on_tool, point });
-        -out.nodal.stiffness * self.slip
+        self.slip
     }
 }

@@ -88,7 +88,8 @@ impl Spring {
         let velocity = out.nodal.mean(|n| scene.velocities[n as usize]).dot(normal);
         (out.manifold.normal, out.manifold.depth_mm, out.manifold.point) = (normal, depth_mm, place);
         let (time_ms, tip_mm) = (scene.tool.time_ms, scene.tool.tip());
-        out.patch = SurfacePatch { time_ms, normal, tip_mm, depth_mm, normal_velocity: finite_or_zero(velocity) };
+        let normal_velocity = finite_or_zero(velocity);
+        out.patch = SurfacePatch { time_ms, normal, tip_mm, depth_mm, normal_velocity, ..SurfacePatch::default() };
         true
     }
 }
