@@ -44,14 +44,11 @@ pub struct Chosen {
     pub why: String,
 }
 
-/// TLED on the CPU, and on the GPU where this crate has the feature `gpu`.
+/// TLED on the CPU, and on a graphics card where this crate has the feature `gpu`.
 pub fn candidates<'a>(body: &'a Body, config: &'a Config) -> Vec<Candidate<'a>> {
     let processor = || Ok(Box::new(Tled::new(body, config)?) as Box<dyn SoftSolver>);
     #[cfg(feature = "gpu")]
-    let device = || {
-        let gpu = trepan_gpu::Gpu::open(trepan_gpu::Prefer::Hardware).map_err(crate::gpu::GpuTledError::from)?;
-        Ok(Box::new(crate::gpu::GpuTled::new(&gpu, body, config)?) as Box<dyn SoftSolver>)
-    };
+    let device = || Ok(Box::new(crate::gpu::WithSpare::on_a_card(body, config)?) as Box<dyn SoftSolver>);
     #[cfg(not(feature = "gpu"))]
     let device = || Err(ChoiceError::NoGpuFeature);
     vec![

@@ -173,6 +173,18 @@ impl Tled {
         self.base.elapsed_ms = 0.0;
     }
 
+    /// Goes on from another solver's state of the same body; the stress memory starts anew.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn resume(&mut self, state: &NodeState) {
+        let nodes = self.elements.nodes();
+        for (node, &place) in self.base.layout.place_of.iter().enumerate() {
+            nodes.set(place as usize, state.positions[node] - self.base.rest[node], state.velocities[node]);
+        }
+        self.elements.forget();
+        self.elements.wake();
+        self.publish();
+    }
+
     /// Does one pass of a step on the present state, for benches. A step is all passes in order.
     pub fn pass(&mut self, pass: Pass, loads: &Loads, dt_ms: f32) {
         let mut report = StepReport::default();

@@ -5,7 +5,7 @@ use trepan_contact::{NodalContact, PlaneContact};
 use trepan_geometry::Vec3;
 use trepan_gpu::{Gpu, adapter_for_tests as device};
 use trepan_soft::{Body, Loads, Material, SoftSolver, boxes};
-use trepan_tled::gpu::{GpuTled, GpuTledError};
+use trepan_tled::gpu::{GpuTled, GpuTledError, WithSpare};
 use trepan_tled::{Config, Relaxation, Tled};
 
 /// A block of brain, the rest of it tumour.
@@ -208,4 +208,32 @@ fn what_the_kernels_lack_is_refused_by_name() {
     let (plain, free) = (Config::default(), Body { fixed: vec![], ..body() });
     assert_eq!(name(&free, plain), "damping");
     assert_eq!(name(&free, Config { damping: trepan_tled::Damping::None, ..plain }), "nothing");
+}
+
+#[test]
+fn when_the_device_is_lost_the_processor_goes_on_from_where_it_was() {
+    let Some(gpu) = device() else { return };
+    let (body, config) = (body(), config());
+    let loads = loads(&body);
+    let mut spare = WithSpare::new(&gpu, &body, &config).unwrap();
+    let mut whole = Tled::new(&body, &config).unwrap();
+    let (lost, dt_ms) = (spare.lost(), whole.stable_dt_ms());
+    let moved = |before: &[Vec3], solver: &dyn SoftSolver| largest_difference(before, solver.positions());
+    for step in 0..120 {
+        if step == 60 {
+            gpu.device().destroy();
+        }
+        let [before, expected] = [&spare as &dyn SoftSolver, &whole].map(|solver| solver.positions().to_vec());
+        let report = spare.step(&loads, dt_ms);
+        whole.step(&loads, dt_ms);
+        assert_eq!((lost.load(std::sync::atomic::Ordering::Relaxed), report.skipped_ms), (step >= 60, 0.0), "{step}");
+        let (is, was) = (moved(&before, &spare), moved(&expected, &whole));
+        assert!((is - was).abs() < 0.02 * was + 1e-5, "{step}: {is} mm in a step, {was} mm without the loss");
+    }
+    let largest = largest_difference(whole.positions(), &body.mesh.positions);
+    assert!(largest_difference(whole.positions(), spare.positions()) < 0.01 * largest);
+    // A software driver is never taken for a card.
+    let opened = WithSpare::on_a_card(&body, &config);
+    let is_card = Gpu::open(trepan_gpu::Prefer::Hardware).is_ok_and(|gpu| !gpu.is_software());
+    assert_eq!(opened.is_ok(), is_card);
 }

@@ -45,6 +45,7 @@ mod device_state;
 mod forces;
 mod pass;
 mod press;
+mod spare;
 mod topology;
 mod update;
 mod volumes;
@@ -57,6 +58,7 @@ use device_state::{DeviceState, Step};
 use forces::Forces;
 use pass::Pass;
 use press::Press;
+pub use spare::WithSpare;
 use topology::Topology;
 use trepan_contact::PlaneContact;
 use trepan_geometry::Vec3;
@@ -77,6 +79,9 @@ pub enum GpuTledError {
     /// The device is missing, too small or gone.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// There is no graphics card; the processor's solver is faster than a software driver.
+    #[error("no graphics card here, only the software driver {0}; use trepan_tled::Tled")]
+    Software(String),
     /// The device's kernels do not have this; the processor's solver does.
     #[error("{field}: the device has only {right}; use trepan_tled::Tled")]
     Unsupported {
