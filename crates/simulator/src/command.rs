@@ -5,6 +5,7 @@ use crate::batch;
 use crate::case::choice::{Built, PlannedCase, build_case, plan_case};
 use crate::compare::compare;
 use crate::device_test;
+use crate::ingredients::table;
 use crate::models::ModelRequest;
 use crate::options::{CaseTask, DeviceTask, Patient, RecordingTask, Task, rate};
 use crate::printable::printable;
@@ -50,6 +51,10 @@ pub fn command(program: Program, built_in: Inputs) -> ExitCode {
         .init();
     if options.list_devices {
         trepan_haptics::list().iter().for_each(|device| println!("{:31} {}", device.name, device.state));
+        return ExitCode::SUCCESS;
+    }
+    if options.lists_keys() {
+        print!("{}", table());
         return ExitCode::SUCCESS;
     }
     if let Some(task) = &options.task {

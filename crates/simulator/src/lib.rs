@@ -12,7 +12,7 @@
 //! | [`CollisionStage::step`] | newest tool, newest node positions | patch, contacts, record |
 //! | [`SolverStage::step`] | newest contact | moved nodes, record |
 //!
-//! `run/threads.rs` runs the stages live; `run/lockstep.rs` replays them from a recording, bit for
+//! `run/threads.rs` runs the stages live; `run/lockstep` replays them from a recording, bit for
 //! bit.
 //!
 //! # Practice
@@ -29,6 +29,7 @@ mod compare;
 mod device_test;
 mod error;
 mod hand;
+mod ingredients;
 pub mod measure;
 mod models;
 mod operation;
@@ -42,6 +43,7 @@ mod run;
 mod session;
 mod session_setup;
 mod show;
+mod solver;
 mod stages;
 mod tissue_class;
 
@@ -52,6 +54,7 @@ pub use case::plan::Plan;
 pub use case::scene::{RestBrain, Scene};
 pub use command::command;
 pub use error::SessionError;
+pub use ingredients::{Device, Element, Ingredients, Law, Relaxation};
 pub use options::Options;
 pub use program::{Phase, Program};
 pub use recipe::Recipe;

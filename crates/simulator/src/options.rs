@@ -1,6 +1,7 @@
 //! The command line that the three programs share.
 
 use crate::error::SessionError;
+use crate::ingredients::{Given, setting, table};
 use crate::tissue_class::{TissueClass, TissueSource};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -72,10 +73,14 @@ pub struct Options {
     /// Tolerances of --quality auto
     #[command(flatten)]
     pub tolerances: Tolerances,
-    /// Solver of the brain's tissue [default: by --quality]
+    /// Ingredient of the models by hand, as in element=locking-free,threads=2; the last one of a
+    /// key counts. `--set list` prints the keys [default: by --quality; a replay's as recorded]
+    #[arg(long = "set", value_name = "KEY=VALUE", value_delimiter = ',', value_parser = setting, long_help = ingredients())]
+    pub settings: Vec<Option<Given>>,
+    /// Solver of the brain's tissue, as --set solver=NAME
     #[arg(long, value_name = "NAME")]
     pub solver: Option<String>,
-    /// Haptic method on bone [default: by --quality]
+    /// Haptic method on bone, as --set rigid=NAME
     #[arg(long, value_name = "NAME")]
     pub rigid: Option<String>,
     /// Random seed
@@ -305,6 +310,13 @@ pub(crate) fn rate(rate_hz: f64) -> Result<(), SessionError> {
     within("rate-hz", rate_hz, RATES_HZ[0], RATES_HZ[1])
 }
 
+/// Help on `--set`, with every key.
+fn ingredients() -> String {
+    let rule = "Ingredient of the models by hand. Repeatable and separated by commas; the last one of a key counts. A \
+                replay takes the others as recorded. `--set list` prints these keys, their defaults and values:";
+    format!("{rule}\n\n{}", table())
+}
+
 fn point(text: &str) -> Result<[f32; 3], String> {
     let remedy = "expected X,Y,Z in mm: right, anterior and superior positive, as in 40,30,120";
     let numbers: Vec<f32> = text.split(',').map(|s| s.trim().parse().map_err(|_| remedy)).collect::<Result<_, _>>()?;
@@ -332,6 +344,19 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 }
 
 impl Options {
+    /// Ingredients given by hand, `--rigid` and `--solver` first; refuses unknown names.
+    pub(crate) fn given(&self) -> Result<Vec<Given>, SessionError> {
+        let flags = [("rigid", &self.rigid), ("solver", &self.solver)].into_iter();
+        let named = flags.filter_map(|(name, text)| Some(Given::by_flag(name, text.as_deref()?)));
+        let named: Result<Vec<_>, _> = named.collect();
+        Ok(named.map_err(SessionError::Usage)?.into_iter().chain(self.settings.iter().flatten().cloned()).collect())
+    }
+
+    /// Whether only the list of keys is wanted.
+    pub(crate) fn lists_keys(&self) -> bool {
+        self.settings.iter().any(Option::is_none)
+    }
+
     /// Refuses numbers out of range; the error names flag and range.
     pub fn check(&self) -> Result<(), SessionError> {
         self.patient.check()?;
@@ -367,6 +392,14 @@ mod tests {
         assert_eq!(parse("x --quality fine").unwrap().quality, Some(Quality::Fine));
         assert!(parse("x --force-error-n 0").unwrap().check().unwrap_err().to_string().contains("--force-error-n"));
         assert!(parse("x plan --tets 5000 --displacement-mm 0.5 --spacing-mm 0.7").is_ok());
+        let given = |line: &str| parse(line).unwrap().given().map_err(|fault| fault.to_string());
+        let many = given("x --set element=plain,law.grey=ogden --set threads=2 --rigid thesis").unwrap();
+        assert_eq!(format!("{many:?}"), "[--rigid thesis, --set element=plain, --set law.grey=ogden, --set threads=2]");
+        assert_eq!(given("x --rigid magic").unwrap_err().split(';').next(), Some("--rigid magic is not known"));
+        assert!(parse("x --set speed=2").unwrap_err().to_string().contains("known are rigid, rigid-points, shaft"));
+        assert!(parse("x --set element=hex").unwrap_err().to_string().contains("plain, locking-free"));
+        assert!(parse("x --set list").unwrap().lists_keys() && !parse("x").unwrap().lists_keys());
+        assert!(parse("x --help").unwrap_err().to_string().contains("surface-pressure"));
         assert!(parse("x --picture 960").is_err() && parse("x --picture 0x7").is_err());
     }
 }

@@ -114,7 +114,7 @@ impl Session {
         let second_limits = second.as_ref().map(|second| self.limits(second, hand::SECOND));
         let start = self.start();
         let limits_of_both = (&limits, second_limits.as_ref());
-        let stages = self.setup.stages(start.state, self.tick_ms(), limits_of_both, &Default::default())?;
+        let stages = self.setup.stages(start.state, self.tick_ms(), limits_of_both)?;
         let OpenDevice { device, pointer, watch, watching } = hand;
         let OpenDevice { device: second_device, watch: second_watch, .. } = second.unwrap_or_default();
         let record = self.options.record.clone().unwrap_or_else(|| self.out.join(output::RECORDING));
@@ -140,6 +140,7 @@ impl Session {
         remarks.extend(self.setup.models.unmet.iter().cloned());
         let (lack, unlike) = self.replay_remarks();
         remarks.extend(lack.iter().cloned().chain(unlike).chain(ended));
+        remarks.extend(self.setup.solver_remarks());
         remarks.extend(graphics.err().map(|why| why.to_string()));
         remarks.append(&mut album.faults);
         remarks.extend(watch.as_ref().and_then(hand::faults));
@@ -201,10 +202,10 @@ impl Session {
     }
 
     /// Creates the stages for a hand without a device, for callers that do not use
-    /// [`run`](Self::run). The tool is at `start`; `touch` configures its contact with tissue.
-    pub fn stages(&self, start: ToolState, touch: &trepan_deformable::Config) -> Result<Stages, SessionError> {
+    /// [`run`](Self::run). The tool is at `start`.
+    pub fn stages(&self, start: ToolState) -> Result<Stages, SessionError> {
         let limits = DeviceLimits::of(&Capabilities::passive("a script"), 1.0);
-        self.setup.stages(start, self.tick_ms(), (&limits, None), touch)
+        self.setup.stages(start, self.tick_ms(), (&limits, None))
     }
 
     /// Connects a teacher. In a shared session the teacher's requests act on both hands' buttons; a
@@ -328,7 +329,7 @@ impl Session {
             hashes: self.case.hashes(),
             config: [("solver_run".to_string(), self.setup.solver_name().into())]
                 .into_iter()
-                .chain(self.setup.models.entries())
+                .chain(self.setup.models.entries(&self.setup.ingredients()))
                 .chain(self.setup.operation.entries())
                 .chain(hands)
                 .collect(),
@@ -350,7 +351,7 @@ impl Session {
                 device: self.second.as_ref().map_or("replay".to_string(), DeviceName::to_string),
                 ..SecondSummary::default()
             }),
-            models: self.setup.models.summary(),
+            models: self.setup.models.summary(&self.setup.ingredients()),
             solver: Some(SolverSummary {
                 name: self.setup.solver_name().into(),
                 tets: brain.map_or(0, |brain| brain.mesh.tets.len()),

@@ -5,15 +5,15 @@ use crate::case::plan::Plan;
 use crate::case::scene::{RestBrain, Scene};
 use crate::error::SessionError;
 use crate::hand::DeviceLimits;
-use crate::measure::tissue::MASS_ADDED;
-use crate::models::{FASTEST, Models, rigid_of, solver_named};
+use crate::ingredients::Ingredients;
+use crate::models::Models;
 use crate::operation::Operation;
 use crate::program::Program;
 use crate::report::regions::{Region, regions};
-use crate::run::clock::Clock;
 use crate::run::{self, Stages};
+use crate::solver::{self, Ran};
 use crate::stages::collision_step::CollisionStage;
-use crate::stages::haptic_config::HapticConfig;
+use crate::stages::haptic_config::{BONE, HapticConfig, TISSUE, bone_force};
 use crate::stages::haptic_tick::HapticStage;
 use crate::stages::second_hand::SecondHand;
 use crate::stages::settling::Settling;
@@ -21,12 +21,14 @@ use crate::stages::skull_wall::SkullWall;
 use crate::stages::solver_step::SolverStage;
 use crate::tissue_class::TissueClass;
 use std::sync::{Arc, OnceLock};
-use trepan_budget::Tissue;
-use trepan_contact::Vibration;
+use trepan_budget::Bone;
 use trepan_geometry::{ToolState, Vec3, units};
 use trepan_link::Recording;
-use trepan_soft::{Body, Loads, SoftSolver};
+use trepan_mesh::TetMesh;
+use trepan_rigid::{Extent, Method};
+use trepan_soft::Body;
 use trepan_volume::{BoneVolume, Piece};
+use trepan_voxel_size::{CostModel, Measures};
 
 /// Patient, plan, settings and models of a session.
 pub(crate) struct SessionSetup {
@@ -44,8 +46,8 @@ pub(crate) struct SessionSetup {
     /// forth.
     filmed: Option<Arc<BoneVolume>>,
     young_mpa: f32,
-    /// Name of the solver chosen for `fastest`, once it is chosen.
-    fastest: OnceLock<&'static str>,
+    /// What runs as the solver, once it is built.
+    ran: OnceLock<Ran>,
 }
 
 impl SessionSetup {
@@ -69,7 +71,7 @@ impl SessionSetup {
             operation,
             models,
             filmed: filmed.map_err(|fault| SessionError::Internal(fault.to_string()))?,
-            fastest: OnceLock::new(),
+            ran: OnceLock::new(),
         })
     }
 
@@ -93,9 +95,20 @@ impl SessionSetup {
         self.brain().map_or_else(Vec::new, |brain| regions(brain, self.program.tray(), &recording.ticks))
     }
 
-    /// Name of the tissue solver; for `fastest`, of the chosen one.
+    /// Name of the tissue solver that runs.
     pub fn solver_name(&self) -> &str {
-        self.fastest.get().copied().unwrap_or(self.models.setup.tissue.solver)
+        self.ran.get().map_or(self.models.setup.tissue.solver, |ran| ran.name)
+    }
+
+    /// Ingredients of the models that run.
+    pub fn ingredients(&self) -> Ingredients {
+        let chosen = self.models.ingredients();
+        Ingredients { device: self.ran.get().map_or(chosen.device, |ran| ran.device), ..chosen }
+    }
+
+    /// Remarks on the solver, for the report.
+    pub fn solver_remarks(&self) -> impl Iterator<Item = String> + use<> {
+        self.ran.get().into_iter().flat_map(Ran::remarks).collect::<Vec<_>>().into_iter()
     }
 
     /// Creates the stages, with the tool at `start`.
@@ -104,15 +117,16 @@ impl SessionSetup {
         start: ToolState,
         tick_ms: f32,
         (limits, second): (&DeviceLimits, Option<&DeviceLimits>),
-        touch: &trepan_deformable::Config,
     ) -> Result<Stages, SessionError> {
-        let rigid = rigid_of(&self.models.setup.bone)?;
+        let (rigid, with) = (self.rigid()?, self.models.ingredients());
+        let voxel_mm = self.models.setup.bone.spacing_mm as f32;
         let usual = HapticConfig::usual(self.program);
         let config = |limits: &DeviceLimits| HapticConfig {
             rigid,
             dt_ms: tick_ms,
-            bone_force: Vibration::drill(limits.coupled(usual.bone_force.mean, tick_ms)),
-            tissue_force: limits.coupled(usual.tissue_force, tick_ms),
+            bone_force: bone_force(limits.coupled(BONE, tick_ms), &with, voxel_mm),
+            tissue_force: limits.coupled(TISSUE, tick_ms),
+            tissue_friction: with.friction,
             guard: limits.guard(),
             opening_needed: self.operation.opening_needed,
             force_waits: self.operation.force_waits,
@@ -120,7 +134,7 @@ impl SessionSetup {
         };
         let bone = self.bone().cloned();
         let field = self.scene.brain.as_ref().map(|brain| Arc::clone(&brain.field));
-        let tissue = self.brain().map(|brain| self.tissue(brain, touch)).transpose()?;
+        let tissue = self.brain().map(|brain| self.tissue(brain, &rigid, &with)).transpose()?;
         let second = second.map(|limits| SecondHand::new(config(limits), bone.clone(), field.clone()));
         let search = bone.as_ref().and_then(|bone| self.plan.search(bone));
         let forbidden = self.scene.brain.as_ref().and_then(|brain| brain.distance_to(&self.operation.forbidden));
@@ -130,44 +144,46 @@ impl SessionSetup {
         Ok(Stages { haptic, second, tissue })
     }
 
-    fn tissue(&self, brain: &RestBrain, touch: &trepan_deformable::Config) -> Result<run::Tissue, SessionError> {
+    /// Method of contact with bone.
+    fn rigid(&self) -> Result<Method, SessionError> {
+        let Bone { method, points, .. } = self.models.setup.bone;
+        let unknown = || SessionError::Internal(format!("no method {method} of contact with bone"));
+        Ok(Method::named(method).ok_or_else(unknown)?.with_points(points))
+    }
+
+    fn tissue(&self, brain: &RestBrain, rigid: &Method, with: &Ingredients) -> Result<run::Tissue, SessionError> {
         let body = Body {
             mesh: brain.mesh.clone(),
             fixed: brain.fixed.clone(),
-            materials: TissueClass::ALL.map(|class| class.material(self.young_mpa)).to_vec(),
+            materials: TissueClass::ALL
+                .map(|class| with.laws[class as usize].like(class.material(self.young_mpa)))
+                .to_vec(),
             material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
         };
         let wall = self.bone().cloned().map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed));
         let wall = wall.transpose().map_err(|fault| brain_error(&fault))?;
-        let collision = CollisionStage::new(self.program, &brain.mesh, touch, wall);
         let settling = Settling::new(self.operation.csf_loss, Vec3::NEG_Y, -self.plan.site.inward);
-        Ok(run::Tissue {
-            collision: collision.map_err(|fault| brain_error(&fault))?.settling(settling),
-            solver: SolverStage::new(self.solver(&body)?),
-        })
+        let touch = touch(&brain.mesh, with)?;
+        let collision = CollisionStage::new(self.program, &brain.mesh, &touch, wall)
+            .and_then(|stage| if with.folds { stage.folding(&brain.mesh) } else { Ok(stage) })
+            .map_err(|fault| brain_error(&fault))?
+            .turning(rigid.descriptor().extent == Extent::BallAndShaft)
+            .settling(settling);
+        let (solver, ran) = solver::build(&body, &self.models.setup.tissue, with)?;
+        let _first = self.ran.set(ran);
+        Ok(run::Tissue { collision, solver: SolverStage::new(solver) })
     }
+}
 
-    fn solver(&self, body: &Body) -> Result<Box<dyn SoftSolver>, SessionError> {
-        let Tissue { solver, still_mm, .. } = self.models.setup.tissue;
-        if let Some(method) = solver_named(solver)? {
-            return method.build(body).map_err(|fault| brain_error(&fault));
-        }
-        let config = trepan_tled::Config {
-            still_mm: still_mm as f32,
-            mass_scaling: MASS_ADDED,
-            ..trepan_tled::Config::default()
-        };
-        if solver != FASTEST {
-            return Ok(Box::new(trepan_tled::Tled::new(body, &config).map_err(|fault| brain_error(&fault))?));
-        }
-        let clock = Clock::start();
-        let all = trepan_tled::choice::candidates(body, &config);
-        let chosen = trepan_tled::choice::fastest(&all, &Loads::default(), 100.0, &|| clock.now_ms());
-        let chosen = chosen.map_err(|fault| brain_error(&fault))?;
-        tracing::info!("solver {}: {}", chosen.name, chosen.why);
-        let _first = self.fastest.set(chosen.name);
-        Ok(chosen.solver)
-    }
+/// Contact of tool and tissue; a grid's cells are the cheapest for the mesh.
+fn touch(mesh: &TetMesh, with: &Ingredients) -> Result<trepan_deformable::Config, SessionError> {
+    let cell_mm = Measures::of(mesh).and_then(|measures| CostModel::default().analytic(&measures));
+    Ok(trepan_deformable::Config {
+        method: with.search,
+        cell_mm: Some(cell_mm.map_err(|fault| brain_error(&fault))? as f32),
+        friction: with.friction,
+        ..trepan_deformable::Config::default()
+    })
 }
 
 fn brain_error(fault: &dyn std::fmt::Display) -> SessionError {

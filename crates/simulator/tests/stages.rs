@@ -65,8 +65,15 @@ fn at(z: f32, speed: f32) -> ToolState {
     tool
 }
 
-const NO_PATCH: SurfacePatch =
-    SurfacePatch { time_ms: 0.0, normal: Vec3::ZERO, tip_mm: Vec3::ZERO, depth_mm: 0.0, normal_velocity: 0.0 };
+const NO_PATCH: SurfacePatch = SurfacePatch {
+    time_ms: 0.0,
+    normal: Vec3::ZERO,
+    tip_mm: Vec3::ZERO,
+    depth_mm: 0.0,
+    normal_velocity: 0.0,
+    slip_mm: Vec3::ZERO,
+    couple_mm: Vec3::ZERO,
+};
 
 #[test]
 fn undoing_a_stroke_restores_its_bone_once_the_tool_is_free() {
@@ -234,7 +241,7 @@ fn warning_and_score_agree_on_a_touch_of_the_brain_and_exclude_a_craniotomes_foo
                     normal: Vec3::Z,
                     tip_mm: at(z, 0.0).tip(),
                     depth_mm: 0.4,
-                    normal_velocity: 0.0,
+                    ..NO_PATCH
                 };
                 bench.step(take(z), Status::Fresh, &patch);
             });
@@ -333,13 +340,7 @@ fn the_proxy_does_not_follow_a_jump_through_the_skull() {
 #[test]
 fn the_force_of_a_stale_patch_fades_and_its_ticks_are_flagged() {
     let mut bench = Bench::new(Program::Brain);
-    let patch = SurfacePatch {
-        time_ms: 500.0,
-        normal: Vec3::Z,
-        tip_mm: at(0.0, 0.0).tip(),
-        depth_mm: 4.0,
-        normal_velocity: 0.0,
-    };
+    let patch = SurfacePatch { time_ms: 500.0, normal: Vec3::Z, tip_mm: at(0.0, 0.0).tip(), depth_mm: 4.0, ..NO_PATCH };
     let mut forces = Vec::new();
     for _ in 0..600 {
         let record = bench.step(at(0.0, 0.0), Status::Fresh, &patch);
@@ -358,7 +359,7 @@ fn a_probe_that_scrapes_the_rim_does_not_press_the_brain() {
         normal: Vec3::Z,
         tip_mm: at(1.0, 0.0).tip(),
         depth_mm,
-        normal_velocity: 0.0,
+        ..NO_PATCH
     };
     let (bone, brain) = head();
     let config = HapticConfig { opening_needed: false, ..HapticConfig::usual(Program::Integrated) };

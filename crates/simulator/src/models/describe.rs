@@ -1,6 +1,7 @@
 //! Describes the models: in the log, in a recording's header, in `summary.json`, on a terminal.
 
 use super::Models;
+use crate::ingredients::{Ingredients, KEYS};
 use crate::measure::Parts;
 use serde::Serialize;
 use std::fmt::Display;
@@ -17,6 +18,8 @@ pub struct ModelSummary {
     pub tissue: TissueSummary,
     /// Picture.
     pub picture: PictureSummary,
+    /// What bone and tissue are made of, by the keys of `--set`.
+    pub ingredients: Ingredients,
     /// CPU load that the plan expects, cores; `null` without a plan.
     pub planned_cores: Option<f64>,
 }
@@ -67,6 +70,12 @@ impl Models {
         tracing::info!("bone: {bone} ({})", self.why.bone);
         tracing::info!("tissue: {tissue} ({})", self.why.tissue);
         tracing::info!("picture: {picture} ({})", self.why.picture);
+        let (all, off) = (self.ingredients(), Ingredients::default());
+        let differs = KEYS.iter().filter(|key| key.usual.is_some() && key.value(&all) != key.value(&off));
+        let differs: Vec<_> = differs.map(|key| format!("{}={}", key.name, key.value(&all))).collect();
+        if !differs.is_empty() {
+            tracing::info!("ingredients: {}", differs.join(", "));
+        }
         if let Some(plan) = &self.plan {
             tracing::info!("planned: {:.2} cores of {}", plan.cores(), plan.machine.threads);
         }
@@ -115,30 +124,28 @@ impl Models {
         }
     }
 
-    /// Entries for a recording's header; a replay reads the parameters among them.
-    pub fn entries(&self) -> [(String, String); 13] {
+    /// Entries for a recording's header; a replay reads the parameters among them. `ran`: the
+    /// ingredients that ran.
+    pub fn entries(&self, ran: &Ingredients) -> impl Iterator<Item = (String, String)> {
         let Setup { bone, tissue, picture } = &self.setup;
         let why = self.why.clone();
-        [
-            ("rigid", bone.method.to_string()),
-            ("rigid_points", bone.points.to_string()),
+        let others = [
             ("spacing_mm", bone.spacing_mm.to_string()),
-            ("solver", tissue.solver.to_string()),
             ("tets", tissue.tets.to_string()),
             ("halvings", tissue.halvings.to_string()),
-            ("still_mm", tissue.still_mm.to_string()),
             ("picture_sparse", picture.sparse.to_string()),
             ("picture_detail", picture.detail.to_string()),
             ("quality", self.by.to_string()),
             ("bone_why", why.bone),
             ("tissue_why", why.tissue),
             ("picture_why", why.picture),
-        ]
-        .map(|(key, value)| (key.to_string(), value))
+        ];
+        let ingredients: Vec<_> = KEYS.iter().map(|key| (key.header_name(), key.value(ran))).collect();
+        others.map(|(key, value)| (key.to_string(), value)).into_iter().chain(ingredients)
     }
 
-    /// Entry for `summary.json`.
-    pub fn summary(&self) -> ModelSummary {
+    /// Entry for `summary.json`. `ran`: the ingredients that ran.
+    pub fn summary(&self, ran: &Ingredients) -> ModelSummary {
         let Setup { bone, tissue, picture } = self.setup;
         let why = self.why.clone();
         ModelSummary {
@@ -152,6 +159,7 @@ impl Models {
                 why: why.tissue,
             },
             picture: PictureSummary { sparse: picture.sparse, detail: picture.detail, why: why.picture },
+            ingredients: ran.clone(),
             planned_cores: self.plan.as_ref().map(Plan::cores),
         }
     }

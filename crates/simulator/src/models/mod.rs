@@ -20,9 +20,9 @@ mod describe;
 mod overrides;
 
 pub use describe::{ModelSummary, TissueSummary};
-pub(crate) use overrides::{FASTEST, rigid_of, solver_named};
 
 use crate::error::SessionError;
+use crate::ingredients::Ingredients;
 use crate::measure::{self, CaseErrors, Parts, Wanted};
 use crate::operation::Operation;
 use crate::options::{Options, Patient, Tolerances};
@@ -42,6 +42,8 @@ use trepan_soft::Material;
 pub struct Models {
     /// Models that run.
     pub setup: Setup,
+    /// What they are made of.
+    ingredients: Ingredients,
     /// Source of the choice: the name of a quality, or `replay`.
     pub by: &'static str,
     /// Reasons for the choice.
@@ -89,12 +91,16 @@ impl ModelRequest {
     ) -> Result<Self, SessionError> {
         let preset = options.quality.filter(|&quality| quality != Quality::Auto);
         let recording = recording.filter(|_| preset.is_none());
-        let given = Overrides::flags(&options.patient, options.rigid.as_deref(), options.solver.as_deref())?;
+        let quality = if recording.is_some() { None } else { Some(preset.unwrap_or_default()) };
+        let given = match recording {
+            Some(recording) => Overrides::recorded(&recording.header.config),
+            None => Overrides::of(Ingredients::of(quality.unwrap_or_default())),
+        };
         let pictures = !options.headless || options.frames_per_second > 0.0;
         Ok(Self {
             program,
-            quality: if recording.is_some() { None } else { Some(preset.unwrap_or_default()) },
-            given: recording.map(|r| Overrides::recorded(&r.header.config)).into_iter().fold(given, Overrides::or),
+            quality,
+            given: given.with_flags(&options.patient, &options.given()?)?,
             tolerances: options.tolerances,
             young_mpa: units::mpa_from_kpa(operation.young_kpa),
             rate_hz: operation.rate_hz,
@@ -114,7 +120,7 @@ impl ModelRequest {
         Ok(Self {
             program,
             quality: Some(Quality::Auto),
-            given: Overrides::flags(patient, None, None)?,
+            given: Overrides::of(Ingredients::of(Quality::Auto)).with_flags(patient, &[])?,
             tolerances,
             young_mpa: Material::BRAIN.young_mpa() as f32,
             rate_hz,
@@ -125,13 +131,12 @@ impl ModelRequest {
 
     /// Adds the values that a case folder was built with, which override all others.
     pub fn on(mut self, recipe: &Recipe) -> Self {
-        let spacing_mm = written(recipe.spacing_mm);
-        let (tets, halvings) = (Some(recipe.tets), Some(recipe.halvings));
-        let as_built = Overrides { spacing_mm: Some(spacing_mm), tets, halvings, ..Overrides::default() };
-        let mut words = std::mem::take(&mut self.given.words);
-        words.bone.push(format!("the case folder has voxels of {spacing_mm} mm"));
-        words.tissue.push(format!("the case folder has {} tetrahedra", recipe.tets));
-        Self { given: Overrides { words, ..as_built.or(self.given) }, ..self }
+        let (given, spacing_mm) = (&mut self.given, written(recipe.spacing_mm));
+        given.spacing_mm = Some(spacing_mm);
+        (given.tets, given.halvings) = (Some(recipe.tets), Some(recipe.halvings));
+        given.words.bone.push(format!("the case folder has voxels of {spacing_mm} mm"));
+        given.words.tissue.push(format!("the case folder has {} tetrahedra", recipe.tets));
+        self
     }
 
     /// Chooses the models for a case with these images. `card` returns whether a graphics card
@@ -146,9 +151,10 @@ impl ModelRequest {
         let (given, usual) = (&self.given, usual());
         let preset = self.quality.map_or(Some(usual), Quality::preset);
         let auto = preset.is_none();
+        let Ingredients { rigid, solver, .. } = given.ingredients;
         let wanted = Wanted {
-            bone: auto && self.program.has_bone() && (given.spacing_mm.is_none() || given.rigid.is_none()),
-            tissue: auto && self.program.has_tissue() && (given.tets.is_none() || given.solver.is_none()),
+            bone: auto && self.program.has_bone() && (given.spacing_mm.is_none() || rigid.is_none()),
+            tissue: auto && self.program.has_tissue() && (given.tets.is_none() || solver.is_none()),
             picture: auto && self.picture.is_some(),
         };
         let plan = wanted.any().then(|| self.plan(facts, wanted, wanted.picture && card(), case_errors)).transpose()?;
@@ -163,6 +169,7 @@ impl ModelRequest {
         let (why, unmet) = self.why(plan.as_ref(), wanted, measured);
         Ok(Models {
             setup,
+            ingredients: given.ingredients.clone(),
             by: self.quality.map_or("replay", Quality::name),
             why,
             given: given.words.clone(),
@@ -187,11 +194,13 @@ impl ModelRequest {
             let off = |b: &f64| (a / b).ln().abs();
             all.min_by(|x, y| off(x).total_cmp(&off(y)))
         };
-        let Overrides { spacing_mm, rigid, tets, halvings, solver, .. } = self.given;
+        let Overrides { spacing_mm, tets, halvings, ref ingredients, .. } = self.given;
+        let &Ingredients { rigid, solver, .. } = ingredients;
         rows.bone.retain(|row| rigid.is_none_or(|method| row.what.method == method));
         let spacing_mm = spacing_mm.and_then(|mm| near(mm, &mut rows.bone.iter().map(|row| row.what.spacing_mm)));
         rows.bone.retain(|row| spacing_mm.is_none_or(|mm| row.what.spacing_mm == mm));
         rows.tissue.retain(|row| solver.is_none_or(|name| row.what.solver == name));
+        rows.tissue.retain(|row| row.what.still_mm == 0.0 || !ingredients.steps_all());
         let tets = tets.and_then(|n| near(n as f64, &mut rows.tissue.iter().map(|row| row.what.tets as f64)));
         rows.tissue.retain(|row| tets.is_none_or(|n| row.what.tets as f64 == n));
         let finest = rows.tissue.iter().map(|row| row.what.halvings).max();
@@ -268,6 +277,20 @@ impl ModelRequest {
             picture: part("picture", &words.picture, picture),
         };
         (why, unmet)
+    }
+}
+
+impl Models {
+    /// What the models are made of; the device as given.
+    pub(crate) fn ingredients(&self) -> Ingredients {
+        let Setup { bone, tissue, .. } = self.setup;
+        Ingredients {
+            rigid: Some(bone.method),
+            rigid_points: Some(bone.points),
+            solver: Some(tissue.solver),
+            still_mm: Some(tissue.still_mm),
+            ..self.ingredients.clone()
+        }
     }
 }
 
@@ -386,7 +409,7 @@ mod tests {
         let recorded = request("--quality fine --spacing-mm 0.85 --rigid thesis", None)
             .settle(&FACTS, || false, unmeasured)
             .unwrap();
-        recording.header.config.extend(recorded.entries());
+        recording.header.config.extend(recorded.entries(&recorded.ingredients()));
         for line in ["", "--quality auto"] {
             let again = request(line, Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
             assert_eq!((again.setup, again.by, again.plan.is_none()), (recorded.setup, "replay", true));
@@ -400,6 +423,60 @@ mod tests {
         recording.header.config = [("spacing_mm".to_string(), "1".to_string())].into();
         let older = request("", Some(&recording)).settle(&FACTS, || false, unmeasured).unwrap();
         assert_eq!(Some(older.setup), Quality::Usual.preset(), "an older one ran the defaults");
+    }
+
+    #[test]
+    fn ingredients_are_given_recorded_and_overridden() {
+        let settle = |line: &str, recording: Option<&Recording>| {
+            request(line, recording).settle(&FACTS, || false, unmeasured).unwrap()
+        };
+        let plain = settle("--quality usual", None).ingredients();
+        assert_eq!(
+            Ingredients { solver: None, still_mm: None, rigid: None, rigid_points: None, ..plain.clone() },
+            Ingredients::default()
+        );
+        let line = "--quality usual --set element=locking-free,threads=2,law.grey=ogden,shaft=on --set friction=0.1";
+        let was = settle(line, None);
+        let json = serde_json::to_value(was.summary(&was.ingredients())).unwrap()["ingredients"].clone();
+        assert_eq!(
+            (&json["element"], &json["threads"], &json["friction"]),
+            (&"locking-free".into(), &"2".into(), &"0.1".into())
+        );
+        assert_eq!((&json["law"], &json["shaft"]), (&"neo-hookean+grey:ogden".into(), &"on".into()));
+        assert_eq!(was.setup.bone.method, "god-object-sphere-shaft");
+        assert!(was.why.tissue.contains("--set element=locking-free is given; "), "{}", was.why.tissue);
+        let mut recording = Recording::default();
+        recording.header.config.extend(was.entries(&was.ingredients()));
+        assert_eq!(settle("", Some(&recording)).ingredients(), was.ingredients());
+        let other = settle("--set threads=1,shaft=off", Some(&recording)).ingredients();
+        let expected = Ingredients { threads: 1, rigid: Some("god-object-sphere"), ..was.ingredients() };
+        assert_eq!(other, expected);
+        assert_eq!(settle("--quality usual", Some(&recording)).ingredients(), plain, "a preset overrides a recording");
+        recording.header.config.insert("solver".into(), "fastest".into());
+        assert_eq!(settle("", Some(&recording)).ingredients().device, crate::ingredients::Device::Cpu);
+    }
+
+    #[test]
+    fn what_relaxes_or_runs_on_the_card_never_sleeps() {
+        for key in ["relaxation=prony", "device=gpu"] {
+            let line = format!("--quality usual --set still-mm=0.01 --set {key}");
+            assert_eq!(request(&line, None).settle(&FACTS, || false, unmeasured).unwrap().setup.tissue.still_mm, 0.0);
+        }
+        let line = "--quality usual --set still-mm=0.01";
+        assert_eq!(request(line, None).settle(&FACTS, || false, unmeasured).unwrap().setup.tissue.still_mm, 0.01);
+    }
+
+    #[test]
+    fn an_ingredient_that_the_solver_lacks_is_refused_with_the_remedy() {
+        let refused = |line: &str| {
+            let options = Options::try_parse_from(format!("x --headless {line}").split_whitespace()).unwrap();
+            let operation = Operation::of(&options, &trepan_haptics::DeviceName::MOUSE, None);
+            ModelRequest::of(Program::Integrated, &options, &operation, None).err().map(|fault| fault.to_string())
+        };
+        let fault = refused("--solver xpbd --set element=locking-free").unwrap();
+        assert_eq!(fault, "--set element=locking-free: xpbd has no element; give --solver tled");
+        assert!(refused("--rigid thesis --set shaft=on").unwrap().starts_with("--set shaft=on: on is not known"));
+        assert_eq!(refused("--solver xpbd --set element=plain,friction=0.1"), None);
     }
 
     #[test]

@@ -1,141 +1,110 @@
 //! Given parameters of the models: by flags, a recording's header or a case folder.
 
 use crate::error::SessionError;
+use crate::ingredients::{Device, Given, Ingredients, KEYS, Part};
 use crate::measure::Parts;
 use crate::options::Patient;
 use std::collections::BTreeMap;
 use trepan_budget::{Bone, Picture, Tissue};
 
 /// Given parameters of each part, and `words` that describe them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Overrides {
     pub spacing_mm: Option<f64>,
-    pub rigid: Option<&'static str>,
-    pub points: Option<usize>,
     pub tets: Option<usize>,
     pub halvings: Option<u32>,
-    pub solver: Option<&'static str>,
-    pub still_mm: Option<f64>,
     pub picture: Option<Picture>,
+    pub ingredients: Ingredients,
     pub words: Parts<Vec<String>>,
 }
 
 impl Overrides {
-    /// Reads the flags; refuses unknown names.
-    pub fn flags(patient: &Patient, rigid: Option<&str>, solver: Option<&str>) -> Result<Self, SessionError> {
-        let tled = |name| if name == FASTEST { FASTEST } else { TLED };
-        let named = |name| Ok::<_, SessionError>(solver_named(name)?.map_or(tled(name), |method| method.name()));
-        let words = |flags: &[(&str, Option<String>)]| -> Vec<String> {
-            flags.iter().filter_map(|(flag, value)| Some(format!("{flag} {} is given", value.as_ref()?))).collect()
-        };
-        Ok(Self {
-            spacing_mm: patient.spacing_mm.map(written),
-            rigid: rigid.map(|name| rigid_named(name).map(|method| method.name())).transpose()?,
-            points: rigid.map(|_| 0),
-            tets: patient.tets,
-            halvings: patient.opening_refinement,
-            solver: solver.map(named).transpose()?,
-            still_mm: solver.map(|_| 0.0),
-            picture: None,
-            words: Parts {
-                bone: words(&[
-                    ("--spacing-mm", patient.spacing_mm.map(|mm| mm.to_string())),
-                    ("--rigid", rigid.map(String::from)),
-                ]),
-                tissue: words(&[
-                    ("--tets", patient.tets.map(|n| n.to_string())),
-                    ("--opening-refinement", patient.opening_refinement.map(|n| n.to_string())),
-                    ("--solver", solver.map(String::from)),
-                ]),
-                picture: Vec::new(),
-            },
-        })
+    /// Nothing is given but the ingredients.
+    pub fn of(ingredients: Ingredients) -> Self {
+        Self { spacing_mm: None, tets: None, halvings: None, picture: None, ingredients, words: Parts::default() }
     }
 
-    /// Reads a recording's header ([`Models::entries`]). Entries missing in older recordings had
-    /// the default value, except that meshes of a given size were uniform.
+    /// Reads a recording's header ([`Models::entries`](super::Models::entries)). Entries missing in
+    /// older recordings had the default value, except that meshes of a given size were uniform.
     pub fn recorded(config: &BTreeMap<String, String>) -> Self {
         let number = |key: &str| config.get(key)?.parse::<f64>().ok().filter(|value| value.is_finite());
         let count = |key: &str| config.get(key)?.parse::<usize>().ok();
         let flag = |key: &str| config.get(key).is_some_and(|value| value == "true");
-        // The fastest solver may be another one now; TLED on the CPU is always available.
-        let solver = |name: &String| trepan_soft::Method::named(name).map_or(TLED, |method| method.name());
+        let mut ingredients = Ingredients::default();
+        for (key, text) in KEYS.iter().filter_map(|key| Some((key, config.get(&key.header_name())?))) {
+            if let Err(fault) = key.set(&mut ingredients, text) {
+                tracing::warn!("the recording's {}: {fault}; its forces may differ", key.name);
+            }
+        }
+        // Which one was the fastest is not known; the processor is always available.
+        if ingredients.device == Device::Fastest {
+            ingredients.device = Device::Cpu;
+        }
         let detail = number("picture_detail");
         Self {
             spacing_mm: number("spacing_mm"),
-            rigid: config.get("rigid").and_then(|name| Some(trepan_rigid::Method::named(name)?.name())),
-            points: count("rigid_points"),
             tets: count("tets"),
             halvings: count("halvings").filter(|n| *n <= 3).or(count("tets").map(|_| 0)).map(|n| n as u32),
-            solver: config.get("solver").map(solver),
-            still_mm: number("still_mm"),
             picture: detail.map(|detail| Picture { sparse: flag("picture_sparse"), detail }),
-            words: Parts::default(),
+            ..Self::of(ingredients)
         }
     }
 
-    /// Takes missing values from `other`.
-    pub fn or(self, other: Self) -> Self {
-        Self {
-            spacing_mm: self.spacing_mm.or(other.spacing_mm),
-            points: self.points.or(other.points),
-            rigid: self.rigid.or(other.rigid),
-            tets: self.tets.or(other.tets),
-            halvings: self.halvings.or(other.halvings),
-            still_mm: self.still_mm.or(other.still_mm),
-            solver: self.solver.or(other.solver),
-            picture: self.picture.or(other.picture),
-            words: self.words,
+    /// Adds the flags, which override all others.
+    pub fn with_flags(mut self, patient: &Patient, given: &[Given]) -> Result<Self, SessionError> {
+        let Patient { spacing_mm, tets, opening_refinement, .. } = *patient;
+        self.spacing_mm = spacing_mm.map(written).or(self.spacing_mm);
+        self.tets = tets.or(self.tets);
+        self.halvings = opening_refinement.or(self.halvings);
+        let is_given = |flag: String| format!("{flag} is given");
+        self.words.bone.extend(spacing_mm.map(|mm| is_given(format!("--spacing-mm {mm}"))));
+        self.words.tissue.extend(tets.map(|n| is_given(format!("--tets {n}"))));
+        self.words.tissue.extend(opening_refinement.map(|n| is_given(format!("--opening-refinement {n}"))));
+        for Given { key, text, flag } in given {
+            let set = key.set(&mut self.ingredients, text);
+            set.map_err(|fault| SessionError::Usage(format!("{flag}: {fault}")))?;
+            let words = if key.part == Part::Bone { &mut self.words.bone } else { &mut self.words.tissue };
+            words.push(is_given(flag.clone()));
+        }
+        self.check(given)?;
+        Ok(self)
+    }
+
+    /// Refuses an ingredient of `tled` for another solver.
+    fn check(&self, given: &[Given]) -> Result<(), SessionError> {
+        let Some(rival) = self.ingredients.solver.and_then(trepan_soft::Method::named) else { return Ok(()) };
+        let plain = Ingredients::default();
+        let differs = |given: &&Given| {
+            given.key.part == Part::Tled && given.key.value(&self.ingredients) != given.key.value(&plain)
+        };
+        match given.iter().find(differs).filter(|given| given.key.name != "still-mm") {
+            None => Ok(()),
+            Some(given) => {
+                let fault = format!("{}: {} has no {}; give --solver tled", given.flag, rival.name(), given.key.name);
+                Err(SessionError::Usage(fault))
+            }
         }
     }
 
     /// Replaces the given values of bone.
     pub fn bone(&self, bone: Bone) -> Bone {
-        let points = self.points.unwrap_or(if self.rigid.is_some() { 0 } else { bone.points });
-        let (method, spacing_mm) = (self.rigid.unwrap_or(bone.method), self.spacing_mm.unwrap_or(bone.spacing_mm));
+        let Ingredients { rigid, rigid_points, .. } = self.ingredients;
+        let points = rigid_points.unwrap_or(if rigid.is_some() { 0 } else { bone.points });
+        let (method, spacing_mm) = (rigid.unwrap_or(bone.method), self.spacing_mm.unwrap_or(bone.spacing_mm));
         Bone { method, spacing_mm, points }
     }
 
     /// Replaces the given values of tissue.
     pub fn tissue(&self, tissue: Tissue) -> Tissue {
+        let Ingredients { solver, still_mm, .. } = self.ingredients;
+        let still_mm = still_mm.unwrap_or(tissue.still_mm);
         Tissue {
-            solver: self.solver.unwrap_or(tissue.solver),
+            solver: solver.unwrap_or(tissue.solver),
             tets: self.tets.unwrap_or(tissue.tets),
             halvings: self.halvings.unwrap_or(tissue.halvings),
-            still_mm: self.still_mm.unwrap_or(tissue.still_mm),
+            still_mm: if self.ingredients.steps_all() { 0.0 } else { still_mm },
         }
     }
-}
-
-/// Total Lagrangian explicit dynamics.
-pub(crate) const TLED: &str = "tled";
-
-/// TLED on the CPU or the GPU, whichever is faster on this machine. A replay may then not reproduce
-/// the recorded forces bit for bit.
-pub(crate) const FASTEST: &str = "fastest";
-
-/// Haptic method on bone with this name.
-fn rigid_named(name: &str) -> Result<trepan_rigid::Method, SessionError> {
-    trepan_rigid::Method::named(name).ok_or_else(|| {
-        let known: Vec<_> = trepan_rigid::Method::all().iter().map(|method| method.name()).collect();
-        SessionError::Usage(format!("--rigid {name} is not known; known are {}", known.join(", ")))
-    })
-}
-
-/// Haptic method of a choice for bone, with its number of points.
-pub(crate) fn rigid_of(bone: &Bone) -> Result<trepan_rigid::Method, SessionError> {
-    rigid_named(bone.method).map(|method| method.with_points(bone.points))
-}
-
-/// Solver of `trepan_soft` with this name; `None` for TLED.
-pub(crate) fn solver_named(name: &str) -> Result<Option<trepan_soft::Method>, SessionError> {
-    if name == TLED || name == FASTEST {
-        return Ok(None);
-    }
-    trepan_soft::Method::named(name).map(Some).ok_or_else(|| {
-        let known: Vec<_> = trepan_soft::Method::all().iter().map(|method| method.name()).collect();
-        SessionError::Usage(format!("--solver {name} is not known; known are {TLED}, {FASTEST}, {}", known.join(", ")))
-    })
 }
 
 /// Converts a flag's number to the decimal as written: 0.7, not 0.699999988.

@@ -2,6 +2,7 @@
 //! scores and the machine.
 
 use crate::error::SessionError;
+use crate::ingredients::KEYS;
 use crate::models::{ModelSummary, TissueSummary};
 use crate::report::chart::{Chart, Curve, histogram, over_time};
 use crate::report::summary::Summary;
@@ -57,6 +58,7 @@ pub(crate) fn html(
         "title": format!("Trepan {}: {}", summary.app, summary.case),
         "summary": summary,
         "parts": parts(&summary.models),
+        "ingredients": KEYS.iter().map(|key| format!("{} {}", key.name, key.value(&summary.models.ingredients))).collect::<Vec<_>>(),
         "events": events(outcome, recording),
         "shots": shots.iter().map(shot).collect::<Vec<_>>(),
         "charts": charts(outcome, recording)?,

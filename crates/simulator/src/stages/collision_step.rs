@@ -11,8 +11,8 @@ use crate::program::{Phase, Program};
 use crate::stages::haptic_tick::ToolSample;
 use crate::stages::settling::Settling;
 use crate::stages::skull_wall::SkullWall;
-use trepan_contact::{NodalContacts, SurfacePatch};
-use trepan_deformable::{Config, ConfigError, TissueCollision, TissueStep};
+use trepan_contact::{MAX_SPRINGS, NodalContacts, SurfacePatch};
+use trepan_deformable::{Config, ConfigError, MeshCollision, NodeContact, TissueCollision, TissueStep};
 use trepan_geometry::{Tool, Vec3};
 use trepan_link::wire::CollisionRecord;
 use trepan_mesh::TetMesh;
@@ -22,7 +22,9 @@ impl CollisionStage {
     /// Runs a step; its results are in [`patch`](Self::patch) and [`loads`](Self::loads).
     pub fn step(&mut self, sample: &ToolSample, soft: &SoftFrame) -> CollisionRecord {
         self.tools[sample.slot].step(&soft.positions, &soft.velocities, &sample.state, &mut self.step);
-        self.patch = self.step.patch.with(self.step.shaft.normal, self.step.shaft.depth_mm);
+        let shaft = self.step.shaft;
+        let arm_mm = if self.with_torque { shaft.point - sample.state.tip() } else { Vec3::ZERO };
+        self.patch = self.step.patch.with(shaft.normal, shaft.depth_mm, arm_mm);
         self.loads.gravity = self.settling.at(sample.phase(), sample.state.time_ms);
         self.press(sample.phase(), soft);
         self.seq += 1;
@@ -45,6 +47,9 @@ impl CollisionStage {
         if let Some(wall) = self.wall.as_mut().filter(|_| self.settling.is_open()) {
             wall.press(&soft.positions, phase == Phase::Brain, &mut self.loads.contacts);
         }
+        if let Some(folds) = self.folds.as_mut().filter(|_| self.settling.is_open()) {
+            folds.press(&soft.positions, &mut self.loads.contacts);
+        }
     }
 }
 
@@ -59,10 +64,34 @@ pub struct SoftFrame {
     pub velocities: Vec<Vec3>,
 }
 
+/// Contact of the brain's surface with itself: springs between a border node and the triangle that
+/// it has to leave through.
+struct Folds {
+    collision: MeshCollision,
+    contacts: Vec<NodeContact>,
+}
+
+/// Spring of such a contact, N/mm, and its damping, N ms/mm: those of a tool.
+const FOLD: (f32, f32) = (0.3, 0.3);
+
+impl Folds {
+    fn of(mesh: &TetMesh) -> Result<Self, ConfigError> {
+        Ok(Self { collision: MeshCollision::itself(mesh)?, contacts: Vec::with_capacity(MAX_SPRINGS) })
+    }
+
+    fn press(&mut self, positions: &[Vec3], to: &mut NodalContacts) {
+        to.overflow += self.collision.step(positions, positions, &mut self.contacts);
+        self.contacts.iter().for_each(|contact| to.push(contact.spring(FOLD.0, FOLD.1)));
+    }
+}
+
 /// State of the collision loop.
 pub struct CollisionStage {
     tools: Vec<TissueCollision>,
     wall: Option<SkullWall>,
+    folds: Option<Folds>,
+    /// Whether a contact of the shaft turns the tool.
+    with_torque: bool,
     settling: Settling,
     patch: SurfacePatch,
     loads: Loads,
@@ -86,12 +115,27 @@ impl CollisionStage {
         Ok(Self {
             tools: program.tray().iter().map(of_tool).collect::<Result<_, _>>()?,
             wall,
+            folds: None,
+            with_torque: false,
             patch: SurfacePatch::default(),
             settling: Settling::default(),
             loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
             step: TissueStep::default(),
             seq: 0,
         })
+    }
+
+    /// Adds the contact of the brain with itself once the dura is open.
+    ///
+    /// # Errors
+    /// When the mesh is empty, names a node that is not there, or has one that is nowhere.
+    pub fn folding(self, mesh: &TetMesh) -> Result<Self, ConfigError> {
+        Ok(Self { folds: Some(Folds::of(mesh)?), ..self })
+    }
+
+    /// Makes a contact of the shaft turn the tool, or only push it.
+    pub fn turning(self, with_torque: bool) -> Self {
+        Self { with_torque, ..self }
     }
 
     /// Adds the body force on the brain once the dura is open.
@@ -107,5 +151,48 @@ impl CollisionStage {
     /// Returns the loads for the solver, without contacts of a tool for bone.
     pub fn loads(&self) -> &Loads {
         &self.loads
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::haptic_tick::ToolSample;
+    use trepan_geometry::{Pose, ToolState};
+    use trepan_soft::boxes;
+
+    /// A clamp of brain: two arms, 4 mm apart, on a back; the tool is far away.
+    #[test]
+    fn arms_that_close_on_each_other_are_pushed_apart_where_folds_are_on() {
+        let mut mesh = boxes::split_box([6, 4, 6], Vec3::new(12.0, 8.0, 12.0));
+        let middle = |tet: &[u32; 4]| tet.iter().map(|n| mesh.positions[*n as usize]).sum::<Vec3>() / 4.0;
+        let is_gap = |at: Vec3| (4.0..8.0).contains(&at.x) && at.z > 4.0;
+        mesh.tets = mesh.tets.iter().copied().filter(|tet| !is_gap(middle(tet))).collect();
+        let tool = Program::Brain.tray()[0];
+        let far = ToolState::at(Pose::from_translation(Vec3::splat(100.0)));
+        let sample = ToolSample { tick: 1, state: far, tool, slot: 0, drilling: false };
+        // Over 4 mm the arms lean inwards, by 5 mm at the end.
+        let closed = |p: &Vec3| *p + Vec3::X * if p.z > 4.0 { (6.0 - p.x).signum() * (p.z - 4.0) * 0.35 } else { 0.0 };
+        let frame =
+            |positions: Vec<Vec3>| SoftFrame { velocities: vec![Vec3::ZERO; positions.len()], step: 1, positions };
+        let open = |folds: bool| {
+            let stage = CollisionStage::new(Program::Brain, &mesh, &Config::default(), None).unwrap();
+            if folds { stage.folding(&mesh).unwrap() } else { stage }
+        };
+        for (folds, shape, touches) in [
+            (false, frame(mesh.positions.iter().map(closed).collect()), false),
+            (true, frame(mesh.positions.clone()), false),
+            (true, frame(mesh.positions.iter().map(closed).collect()), true),
+        ] {
+            let mut stage = open(folds);
+            stage.step(&sample, &shape);
+            let springs = &stage.loads().contacts;
+            assert_eq!((!springs.is_empty(), springs.overflow), (touches, 0), "folds {folds}");
+            let apart = |spring: &trepan_contact::NodalContact| {
+                let (node, _) = spring.nodes().next().unwrap();
+                -spring.normal.x * (mesh.positions[node as usize].x - 6.0)
+            };
+            assert!(springs.iter().all(|spring| apart(spring) > 0.0), "each node is pushed back to its own side");
+        }
     }
 }

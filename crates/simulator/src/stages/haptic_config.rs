@@ -1,12 +1,17 @@
 //! Configuration of the haptic tick of either hand.
 
+use crate::ingredients::Ingredients;
 use crate::program::Program;
 use crate::stages::alarms::Limits;
-use trepan_contact::{GuardConfig, Vibration, Viscoelastic};
+use trepan_contact::{ForceShading, Friction, GuardConfig, Vibration, Viscoelastic};
 use trepan_rigid::Method;
 
 /// Stiffness of the contact with bone, N/mm.
 pub(crate) const BONE_STIFFNESS: f32 = 2.0;
+/// Contact with bone of a hand that no device limits.
+pub(crate) const BONE: Viscoelastic = Viscoelastic { stiffness: BONE_STIFFNESS, damping: 0.5 };
+/// Contact with tissue of a hand that no device limits.
+pub(crate) const TISSUE: Viscoelastic = Viscoelastic { stiffness: 0.3, damping: 0.3 };
 
 /// Configuration of a haptic stage.
 #[derive(Clone, Debug)]
@@ -17,10 +22,12 @@ pub struct HapticConfig {
     pub rigid: Method,
     /// Length of a tick, ms.
     pub dt_ms: f32,
-    /// Force of bone: k in N/mm, b in N ms/mm, with the vibration of the drill.
-    pub bone_force: Vibration<Viscoelastic>,
+    /// Force of bone: k in N/mm, b in N ms/mm, with friction, shading and the drill's vibration.
+    pub bone_force: Vibration<ForceShading<Friction>>,
     /// Force of tissue: k in N/mm, b in N ms/mm.
     pub tissue_force: Viscoelastic,
+    /// Friction coefficient of tissue, without unit.
+    pub tissue_friction: f32,
     /// Configuration of the force guard.
     pub guard: GuardConfig,
     /// Thresholds of the warnings.
@@ -38,12 +45,21 @@ impl HapticConfig {
             program,
             rigid: Method::RECOMMENDED,
             dt_ms: 1.0,
-            bone_force: Vibration::drill(Viscoelastic { stiffness: BONE_STIFFNESS, damping: 0.5 }),
-            tissue_force: Viscoelastic { stiffness: 0.3, damping: 0.3 },
+            bone_force: bone_force(BONE, &Ingredients::default(), 0.0),
+            tissue_force: TISSUE,
+            tissue_friction: 0.0,
             guard: GuardConfig::default(),
             limits: Limits::default(),
             opening_needed: true,
             force_waits: true,
         }
     }
+}
+
+/// Force of bone on voxels of an edge, mm, with the session's ingredients on a spring and damper.
+pub(crate) fn bone_force(wall: Viscoelastic, with: &Ingredients, voxel_mm: f32) -> Vibration<ForceShading<Friction>> {
+    let friction = Friction::new(wall, wall.stiffness, with.bone_friction, with.bone_friction);
+    let shaded = ForceShading::new(friction, if with.shading { voxel_mm } else { 0.0 });
+    let drill = Vibration::drill(shaded);
+    if with.vibration { drill } else { Vibration::new(shaded, 0.0, drill.frequency_hz) }
 }

@@ -21,7 +21,7 @@ use crate::stages::haptic_config::HapticConfig;
 use crate::stages::notice::{Notice, What};
 use serde::Serialize;
 use std::sync::Arc;
-use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardCounters, GuardedWrench, Viscoelastic};
+use trepan_contact::{Contact, ContactManifold, ForceGuard, ForceModel, GuardCounters, GuardedWrench};
 use trepan_geometry::{Buttons, Pose, Tool, ToolState, Vec3, Wrench};
 use trepan_haptics::{Reading, Status};
 use trepan_link::wire::{SecondRecord, TickRecord};
@@ -120,7 +120,7 @@ impl SecondHand {
             what.into_iter().for_each(|what| notify(Notice { tick, time_ms: tool.time_ms, what }));
         }
         let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
-        let desired = if let_go { Wrench::ZERO } else { self.desired_wrench(&tool) };
+        let desired = if let_go { self.let_go() } else { self.desired_wrench(&tool) };
         let wrench = self.guard.guard(desired, &tool, self.config.dt_ms);
         self.force_n = wrench.force().length();
         self.peak_force_n = self.peak_force_n.max(self.force_n);
@@ -181,10 +181,16 @@ impl SecondHand {
         }
     }
 
+    /// Forgets what the tool held on to; no wrench.
+    fn let_go(&mut self) -> Wrench {
+        self.config.bone_force.mean.reset();
+        Wrench::ZERO
+    }
+
     fn desired_wrench(&mut self, tool: &ToolState) -> Wrench {
         let HapticConfig { bone_force, tissue_force, dt_ms, .. } = &mut self.config;
-        let bone: &mut Viscoelastic = &mut bone_force.mean;
-        bone.wrench(tool, &self.step.manifold, *dt_ms) + tissue_force.wrench(tool, &self.tissue, *dt_ms)
+        // An aspirator does not vibrate.
+        bone_force.mean.wrench(tool, &self.step.manifold, *dt_ms) + tissue_force.wrench(tool, &self.tissue, *dt_ms)
     }
 }
 

@@ -60,7 +60,7 @@ impl HapticStage {
         let held = self.touch_tissue(input.patch, &sample);
         self.follow_fault(&tool, (lost, stale), report);
         let let_go = lost || self.fault.waits() || tool.buttons.has(Buttons::PAUSE);
-        let desired = if let_go { DesiredWrench::default() } else { self.desired_wrench(&tool, drilling) };
+        let desired = if let_go { self.let_go() } else { self.desired_wrench(&tool, drilling) };
         let heated = self.guard.counters().heated;
         let wrench = self.guard.guard(desired.sum(), &tool, self.config.dt_ms);
         let warm = self.guard.counters().heated > heated;
@@ -170,6 +170,8 @@ pub struct HapticStage {
     rigid: Vec<Option<Box<dyn RigidContact>>>,
     bone_step: RigidStep,
     tissue: ContactManifold,
+    /// Slip of the tool on the tissue, mm.
+    slip_mm: Vec3,
     guard: ForceGuard,
     watch: Watch,
     scores: ScoreKeeper,
@@ -214,6 +216,7 @@ impl HapticStage {
             forbidden: None,
             bone_step: RigidStep::default(),
             tissue: ContactManifold::default(),
+            slip_mm: Vec3::ZERO,
             watch: Watch::default(),
             scores: ScoreKeeper::default(),
             last_valid: start,
@@ -332,6 +335,8 @@ impl HapticStage {
         self.tissue.normal = patch.normal;
         self.tissue.point = sample.state.tip() - self.tool().tip_radius_mm * patch.normal;
         self.tissue.depth_mm = depth * share;
+        self.tissue.couple_mm = patch.couple_mm;
+        self.slip_mm = patch.slip_at(sample.state.tip());
         age_ms > FRESH_MS
     }
 
@@ -344,7 +349,24 @@ impl HapticStage {
         let bone = self.config.bone_force.wrench(tool, &self.bone_step.manifold, dt_ms);
         let brain = self.phase() == Phase::Brain;
         let tissue = brain.then(|| self.config.tissue_force.wrench(tool, &self.tissue, dt_ms));
-        DesiredWrench { bone, tissue }
+        DesiredWrench { bone, tissue: tissue.map(|pressed| self.with_friction(tool, pressed)) }
+    }
+
+    /// Adds the friction of tissue to the wrench that presses on the tool.
+    fn with_friction(&self, tool: &ToolState, pressed: Wrench) -> Wrench {
+        let HapticConfig { tissue_friction, tissue_force, .. } = &self.config;
+        if *tissue_friction <= 0.0 || pressed.force == Vec3::ZERO || !self.slip_mm.is_finite() {
+            return pressed;
+        }
+        let slip_mm = self.slip_mm.clamp_length_max(tissue_friction * self.tissue.depth_mm);
+        let force = -tissue_force.stiffness * slip_mm;
+        pressed + Wrench { force, torque: (self.tissue.point - tool.tip()).cross(force) }
+    }
+
+    /// Forgets what the tool held on to; no wrench.
+    fn let_go(&mut self) -> DesiredWrench {
+        self.config.bone_force.mean.reset();
+        DesiredWrench::default()
     }
 
     fn record(

@@ -88,7 +88,7 @@ pub fn ride(scope: Scope, candidate: &Candidate, truth: Option<&Ride>) -> Result
     let site = truth.map_or(session.scene().site, |truth| truth.site);
     let milliseconds = bone::milliseconds(scope);
     let path = bone::path(scope, &site)?;
-    let stages = session.stages(path.at(0.0), &candidate.touch)?;
+    let stages = session.stages(path.at(0.0))?;
     let skull = session.scene().bone.as_ref().context("the built-in case has a skull")?;
     let brain = session.scene().brain.as_ref().context("the built-in case has a brain")?;
     let (places, was) = (places(&site), is_bone(skull, &places(&site)));

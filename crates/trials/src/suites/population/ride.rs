@@ -85,7 +85,7 @@ pub fn ride(session: &Session, task: Task) -> Result<Ride> {
     // Drilling takes 43 % of it; thicker bone takes longer.
     let milliseconds = (task.milliseconds as f64 * (0.57 + 0.43 * site.drilling_share())) as u64;
     let path = Script::planned(task.script, &site, milliseconds as f64, &plan)?;
-    let stages = session.stages(path.at(0.0), &trepan_deformable::Config::default())?;
+    let stages = session.stages(path.at(0.0))?;
     let device = Simulated::new(Config::TOUCH, SURGEON, Box::new(path));
     let mut ride = Ride {
         setup: session.models().setup.to_string(),

@@ -1,7 +1,7 @@
 //! A haptic stage with a simulated device in a simulated hand, tick by tick without a clock.
 
 use std::sync::Arc;
-use trepan_contact::{SurfacePatch, Vibration, Viscoelastic};
+use trepan_contact::SurfacePatch;
 use trepan_geometry::ToolState;
 use trepan_haptics::HapticDevice;
 use trepan_haptics::simulated::{Config, HandModel, Simulated};
@@ -16,6 +16,8 @@ const NO_PATCH: SurfacePatch = SurfacePatch {
     tip_mm: trepan_geometry::Vec3::ZERO,
     depth_mm: 0.0,
     normal_velocity: 0.0,
+    slip_mm: trepan_geometry::Vec3::ZERO,
+    couple_mm: trepan_geometry::Vec3::ZERO,
 };
 
 /// One operation.
@@ -75,6 +77,7 @@ impl Bench {
 
 /// As a session configures a stage for a Touch.
 pub fn config(program: Program) -> HapticConfig {
-    let bone_force = Vibration::drill(Viscoelastic { stiffness: 1.0, damping: 0.5 });
-    HapticConfig { bone_force, ..HapticConfig::usual(program) }
+    let mut config = HapticConfig::usual(program);
+    config.bone_force.mean.model.normal.stiffness = 1.0;
+    config
 }

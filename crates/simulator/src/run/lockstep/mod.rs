@@ -308,6 +308,9 @@ fn remember<T>(memory: &mut VecDeque<T>, item: T) {
 }
 
 #[cfg(test)]
+mod ingredients;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::program::Program;

@@ -1,0 +1,500 @@
+//! The table of keys that `--set` takes, and what derives from it: parsing, lists, the user guide.
+
+use super::{Device, Element, Ingredients, Law, Relaxation};
+use crate::tissue_class::TissueClass;
+use clap::ValueEnum;
+use trepan_budget::Quality;
+use trepan_rigid::{Extent, god_object_sphere};
+
+/// One ingredient of the models.
+pub struct Key {
+    /// Name in `--set`; in a recording's header with `_` for `-`.
+    pub name: &'static str,
+    /// Known values, in words.
+    pub values: fn() -> String,
+    /// What it does.
+    pub about: &'static str,
+    /// Value of a session without `--set`; `None` where `--quality` chooses.
+    pub usual: Option<&'static str>,
+    /// Values of presets that differ from it.
+    pub presets: &'static [(Quality, &'static str)],
+    /// Model that it belongs to.
+    pub part: Part,
+    get: fn(&Ingredients) -> Option<String>,
+    set: fn(&mut Ingredients, &str) -> Option<()>,
+}
+
+/// A model of a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Contact with bone.
+    Bone,
+    /// Tissue, whatever its solver.
+    Tissue,
+    /// Tissue with the solver `tled` alone.
+    Tled,
+}
+
+/// Every key. One that is a shorthand for another stands after it.
+pub const KEYS: &[Key] = &[
+    Key {
+        name: "rigid",
+        values: || list(trepan_rigid::Method::all().iter().map(|method| method.name())),
+        about: "method of contact with bone; as `--rigid`",
+        get: |i| i.rigid.map(String::from),
+        set: |i, text| {
+            i.rigid = Some(trepan_rigid::Method::named(text)?.name());
+            i.rigid_points = Some(0);
+            Some(())
+        },
+        ..Key::of(Part::Bone)
+    },
+    Key {
+        name: "rigid-points",
+        values: || "0 to 65536".into(),
+        about: "points of that method on the burr; 0 for its own number",
+        get: |i| i.rigid_points.map(|points| points.to_string()),
+        set: |i, text| count(text, 0, 65_536).map(|points| i.rigid_points = Some(points)),
+        ..Key::of(Part::Bone)
+    },
+    Key {
+        name: "shaft",
+        values: switches,
+        about: "contact of the shaft, with torque: the variant of `rigid` that has it",
+        get: |i| i.rigid.map(|name| switch_name(has_shaft(name)).into()),
+        set: shaft,
+        ..Key::of(Part::Bone)
+    },
+    Key {
+        name: "shading",
+        values: switches,
+        about: "force shading on bone, over one voxel",
+        usual: Some("off"),
+        get: |i| Some(switch_name(i.shading).into()),
+        set: |i, text| switch(text).map(|on| i.shading = on),
+        ..Key::of(Part::Bone)
+    },
+    Key {
+        name: "bone-friction",
+        values: || "off, or a coefficient up to 2".into(),
+        about: "dry friction on bone of a tool that does not cut",
+        usual: Some("off"),
+        get: |i| Some(off_or(i.bone_friction)),
+        set: |i, text| up_to(text, 2.0).map(|coefficient| i.bone_friction = coefficient),
+        ..Key::of(Part::Bone)
+    },
+    Key {
+        name: "vibration",
+        values: switches,
+        about: "vibration of the drill on the hand",
+        usual: Some("on"),
+        get: |i| Some(switch_name(i.vibration).into()),
+        set: |i, text| switch(text).map(|on| i.vibration = on),
+        ..Key::of(Part::Bone)
+    },
+    Key {
+        name: "solver",
+        values: || {
+            let rivals = trepan_soft::Method::all();
+            list([TLED, FASTEST].into_iter().chain(rivals.iter().map(|method| method.name())))
+        },
+        about: "solver of the tissue; as `--solver`. `fastest` is `tled` with `device=fastest`",
+        get: |i| i.solver.map(String::from),
+        set: |i, text| {
+            let rival = trepan_soft::Method::named(text).map(|method| method.name());
+            i.solver = Some(rival.or([TLED, FASTEST].contains(&text).then_some(TLED))?);
+            i.still_mm = Some(0.0);
+            i.device = if text == FASTEST { Device::Fastest } else { i.device };
+            Some(())
+        },
+        ..Key::of(Part::Tissue)
+    },
+    Key {
+        name: "still-mm",
+        values: || "0 to 1 mm".into(),
+        about: "region of interest: tissue that moves less in 50 ms sleeps; 0 steps all of it",
+        get: |i| i.still_mm.map(|mm| mm.to_string()),
+        set: |i, text| number(text, 1.0).map(|mm| i.still_mm = Some(mm)),
+        ..Key::of(Part::Tled)
+    },
+    Key {
+        name: "element",
+        values: names::<Element>,
+        about: "tetrahedra; locking-free: averaged nodal pressure (Joldes et al. 2009)",
+        usual: Some("plain"),
+        get: |i| Some(name(&i.element)),
+        set: |i, text| value(text).map(|element| i.element = element),
+        ..Key::of(Part::Tled)
+    },
+    Key {
+        name: "law",
+        values: || {
+            format!("{}; law.CLASS for one of {}", names::<Law>(), list(TissueClass::ALL.map(TissueClass::name)))
+        },
+        about: "constitutive law, at the same moduli for small strain",
+        usual: Some("neo-hookean"),
+        get: |i| Some(laws(&i.laws)),
+        set: |i, text| text.split('+').try_for_each(|part| set_law(&mut i.laws, part)),
+        ..Key::of(Part::Tled)
+    },
+    Key {
+        name: "relaxation",
+        values: names::<Relaxation>,
+        about: "stress relaxation; prony: two terms (Miller and Chinzei 2002)",
+        usual: Some("off"),
+        get: |i| Some(name(&i.relaxation)),
+        set: |i, text| value(text).map(|relaxation| i.relaxation = relaxation),
+        ..Key::of(Part::Tled)
+    },
+    Key {
+        name: "device",
+        values: names::<Device>,
+        about: "where the solver runs; gpu: on a graphics card, else on the processor with a remark",
+        usual: Some("cpu"),
+        get: |i| Some(name(&i.device)),
+        set: |i, text| value(text).map(|device| i.device = device),
+        ..Key::of(Part::Tled)
+    },
+    Key {
+        name: "threads",
+        values: || "1 to 64".into(),
+        about: "threads of the solver on the processor; the forces are the same for any number",
+        usual: Some("1"),
+        get: |i| Some(i.threads.to_string()),
+        set: |i, text| count(text, 1, 64).map(|threads| i.threads = threads),
+        ..Key::of(Part::Tled)
+    },
+    Key {
+        name: "surface-pressure",
+        values: || "off, or up to 60 mmHg".into(),
+        about: "pressure of the fluid on the brain's surface, with which the brain is at rest at the start",
+        usual: Some("off"),
+        get: |i| Some(off_or(i.surface_pressure_mmhg)),
+        set: |i, text| up_to(text, 60.0).map(|mmhg| i.surface_pressure_mmhg = mmhg),
+        ..Key::of(Part::Tled)
+    },
+    Key {
+        name: "search",
+        values: || list(searches().map(|method| method.name())),
+        about: "search for the tool's points in the tissue; a grid's cells by trepan-voxel-size",
+        usual: Some("walk"),
+        get: |i| Some(i.search.name().into()),
+        set: |i, text| searches().find(|method| method.name() == text).map(|method| i.search = method),
+        ..Key::of(Part::Tissue)
+    },
+    Key {
+        name: "friction",
+        values: || "off, or a coefficient up to 2".into(),
+        about: "dry friction of the first hand's tool on tissue, felt and dragging the tissue",
+        usual: Some("off"),
+        get: |i| Some(off_or(i.friction)),
+        set: |i, text| up_to(text, 2.0).map(|coefficient| i.friction = coefficient),
+        ..Key::of(Part::Tissue)
+    },
+    Key {
+        name: "folds",
+        values: switches,
+        about: "contact of the brain's surface with itself, once the dura is open",
+        usual: Some("off"),
+        get: |i| Some(switch_name(i.folds).into()),
+        set: |i, text| switch(text).map(|on| i.folds = on),
+        ..Key::of(Part::Tissue)
+    },
+];
+
+/// Total Lagrangian explicit dynamics.
+pub(super) const TLED: &str = "tled";
+/// TLED where it is faster on this machine.
+const FASTEST: &str = "fastest";
+
+impl Key {
+    /// The fields that most keys share.
+    const fn of(part: Part) -> Self {
+        Self {
+            name: "",
+            values: String::new,
+            about: "",
+            usual: None,
+            presets: &[],
+            part,
+            get: |_| None,
+            set: |_, _| None,
+        }
+    }
+
+    /// The key of this name.
+    fn named(name: &str) -> Option<&'static Self> {
+        KEYS.iter().find(|key| key.name == name)
+    }
+
+    /// Name of its entry in a recording's header.
+    pub fn header_name(&self) -> String {
+        self.name.replace('-', "_")
+    }
+
+    /// Its value; `by --quality` where that chooses.
+    pub fn value(&self, of: &Ingredients) -> String {
+        (self.get)(of).unwrap_or_else(|| BY_QUALITY.into())
+    }
+
+    /// Changes the ingredient; refuses an unknown value.
+    pub fn set(&self, to: &mut Ingredients, text: &str) -> Result<(), String> {
+        (self.set)(to, text).ok_or_else(|| format!("{text} is not known; known are {}", (self.values)()))
+    }
+
+    /// Value of a quality, where it does not depend on machine and case.
+    fn in_quality(&self, quality: Quality) -> Option<&'static str> {
+        self.presets.iter().find(|(preset, _)| *preset == quality).map(|(_, text)| *text).or(self.usual)
+    }
+
+    /// Default value, in words.
+    fn default_text(&self) -> String {
+        let presets = self.presets.iter().map(|(quality, text)| format!("; {}: {text}", quality.name()));
+        self.usual.unwrap_or(BY_QUALITY).to_string() + &presets.collect::<String>()
+    }
+}
+
+/// Value of what `--quality` chooses.
+const BY_QUALITY: &str = "by --quality";
+
+impl Ingredients {
+    /// Ingredients of a quality.
+    pub(crate) fn of(quality: Quality) -> Self {
+        let mut made = Self::default();
+        for (key, text) in KEYS.iter().filter_map(|key| Some((key, key.in_quality(quality)?))) {
+            let set = key.set(&mut made, text);
+            debug_assert_eq!(set, Ok(()), "{}", key.name);
+        }
+        made
+    }
+}
+
+/// A key with the value that a user gave it.
+#[derive(Clone)]
+pub struct Given {
+    /// The key.
+    pub key: &'static Key,
+    /// Its value.
+    pub text: String,
+    /// The flag, as it was given.
+    pub flag: String,
+}
+
+impl core::fmt::Debug for Given {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(&self.flag)
+    }
+}
+
+impl Given {
+    /// A value by a flag of the key's own name; refuses an unknown value.
+    pub fn by_flag(name: &str, text: &str) -> Result<Self, String> {
+        let key = Key::named(name).ok_or_else(|| format!("no key {name}"))?;
+        key.set(&mut Ingredients::default(), text).map_err(|fault| format!("--{name} {fault}"))?;
+        Ok(Self { key, text: text.into(), flag: format!("--{name} {text}") })
+    }
+}
+
+/// Parses `KEY=VALUE`, or `KEY.PART=VALUE` for a part of it; `None` for `list`.
+pub fn setting(text: &str) -> Result<Option<Given>, String> {
+    if text == "list" {
+        return Ok(None);
+    }
+    let known = || format!("known are {}, and list", list(KEYS.iter().map(|key| key.name)));
+    let (name, value) = text.split_once('=').ok_or_else(|| format!("expected KEY=VALUE; {}", known()))?;
+    let (name, value) = match name.split_once('.') {
+        Some((name, part)) => (name, format!("{part}:{value}")),
+        None => (name, value.to_string()),
+    };
+    let key = Key::named(name).ok_or_else(|| format!("{name} is not known; {}", known()))?;
+    let mut scratch = Ingredients { rigid: Some(god_object_sphere::METHOD.name), ..Ingredients::default() };
+    key.set(&mut scratch, &value)?;
+    Ok(Some(Given { key, text: value, flag: format!("--set {text}") }))
+}
+
+/// The keys for a terminal: name, default, what it does, values.
+pub fn table() -> String {
+    let line =
+        |key: &Key| format!("{:17} {} [{}]\n{:18}{}\n", key.name, key.about, key.default_text(), "", (key.values)());
+    KEYS.iter().map(line).collect()
+}
+
+/// Sets the shaft's contact: takes the variant of the method that has it, or that has it not.
+fn shaft(i: &mut Ingredients, text: &str) -> Option<()> {
+    let (ball, with_shaft) = (god_object_sphere::METHOD.name, god_object_sphere::WITH_SHAFT.name);
+    match (switch(text)?, i.rigid) {
+        (true, Some(name)) if has_shaft(name) => {}
+        (true, None) => i.rigid = Some(with_shaft),
+        (true, Some(name)) if name == ball => i.rigid = Some(with_shaft),
+        (false, Some(name)) if name == with_shaft => i.rigid = Some(ball),
+        (false, rigid) if !rigid.is_some_and(has_shaft) => {}
+        _ => return None,
+    }
+    Some(())
+}
+
+/// Whether a method of contact with bone feels the shaft.
+pub(super) fn has_shaft(rigid: &str) -> bool {
+    trepan_rigid::Method::named(rigid).is_some_and(|method| method.descriptor().extent == Extent::BallAndShaft)
+}
+
+/// Searches that a session can step.
+fn searches() -> impl Iterator<Item = trepan_deformable::Method> {
+    trepan_deformable::Method::all().into_iter().filter(|method| !method.descriptor().is_oracle)
+}
+
+/// Sets the law of all classes, or with `CLASS:LAW` of one.
+fn set_law(laws: &mut [Law; TissueClass::ALL.len()], text: &str) -> Option<()> {
+    match text.split_once(':') {
+        Some((class, law)) => laws[TissueClass::named(class)? as usize] = value(law)?,
+        None => laws.fill(value(text)?),
+    }
+    Some(())
+}
+
+/// The law of the brain, and of each class that has another.
+fn laws(laws: &[Law; TissueClass::ALL.len()]) -> String {
+    let others = TissueClass::ALL.into_iter().filter(|class| laws[*class as usize] != laws[0]);
+    name(&laws[0])
+        + &others.map(|class| format!("+{}:{}", class.name(), name(&laws[class as usize]))).collect::<String>()
+}
+
+fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    names.into_iter().collect::<Vec<_>>().join(", ")
+}
+
+fn names<T: ValueEnum>() -> String {
+    T::value_variants().iter().map(name).collect::<Vec<_>>().join(", ")
+}
+
+fn name<T: ValueEnum>(of: &T) -> String {
+    of.to_possible_value().map_or_else(String::new, |value| value.get_name().into())
+}
+
+fn value<T: ValueEnum>(text: &str) -> Option<T> {
+    T::from_str(text, false).ok()
+}
+
+fn switches() -> String {
+    "off, on".into()
+}
+
+fn switch(text: &str) -> Option<bool> {
+    ["off", "on"].iter().position(|name| *name == text).map(|at| at == 1)
+}
+
+fn switch_name(on: bool) -> &'static str {
+    if on { "on" } else { "off" }
+}
+
+fn count(text: &str, low: usize, high: usize) -> Option<usize> {
+    text.parse().ok().filter(|count| (low..=high).contains(count))
+}
+
+fn number(text: &str, high: f64) -> Option<f64> {
+    text.parse().ok().filter(|number| (0.0..=high).contains(number))
+}
+
+/// A number from 0 up; `off` is 0.
+fn up_to(text: &str, high: f32) -> Option<f32> {
+    if text == "off" { Some(0.0) } else { text.parse().ok().filter(|number| (0.0..=high).contains(number)) }
+}
+
+fn off_or(number: f32) -> String {
+    if number == 0.0 { "off".into() } else { number.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(settings: &[&str]) -> Ingredients {
+        let mut made = Ingredients::of(Quality::Usual);
+        for text in settings {
+            let given = setting(text).unwrap().unwrap();
+            given.key.set(&mut made, &given.text).unwrap();
+        }
+        made
+    }
+
+    #[test]
+    fn every_key_reads_what_it_writes_and_names_its_values() {
+        let made = with(&[
+            "rigid=god-object-sphere",
+            "shaft=on",
+            "shading=on",
+            "bone-friction=0.3",
+            "vibration=off",
+            "solver=tled",
+            "still-mm=0.01",
+            "element=locking-free",
+            "law=ogden",
+            "law.grey=mooney-rivlin",
+            "relaxation=prony",
+            "device=gpu",
+            "threads=2",
+            "surface-pressure=10",
+            "search=hashed-grid",
+            "friction=0.2",
+            "folds=on",
+        ]);
+        let mut again = Ingredients::default();
+        for key in KEYS {
+            let text = key.value(&made);
+            assert_eq!(key.set(&mut again, &text), Ok(()), "{} {text}", key.name);
+            let fault = key.set(&mut again, "magic").unwrap_err();
+            assert!(fault.starts_with("magic is not known; known are ") && fault.len() > 34, "{fault}");
+            assert!(!key.about.is_empty() && KEYS.iter().filter(|other| other.name == key.name).count() == 1);
+        }
+        assert_eq!(again, made);
+        let value = |name: &str| Key::named(name).unwrap().value(&made);
+        assert_eq!(value("law"), "ogden+grey:mooney-rivlin");
+        assert_eq!((value("rigid"), value("shaft")), ("god-object-sphere-shaft".into(), "on".into()));
+        let json = serde_json::to_value(&made).unwrap();
+        assert_eq!((&json["element"], json.as_object().unwrap().len()), (&"locking-free".into(), KEYS.len()));
+    }
+
+    #[test]
+    fn a_session_without_settings_runs_what_old_recordings_ran() {
+        for quality in Quality::ALL {
+            assert_eq!(Ingredients::of(quality), Ingredients::default());
+        }
+        let fine = Key { usual: Some("plain"), presets: &[(Quality::Fine, "locking-free")], ..Key::of(Part::Tled) };
+        assert_eq!(fine.in_quality(Quality::Fine), Some("locking-free"));
+        assert_eq!(fine.in_quality(Quality::Draft), Some("plain"));
+        assert_eq!(fine.default_text(), "plain; fine: locking-free");
+    }
+
+    #[test]
+    fn unknown_keys_and_values_are_refused_with_those_known() {
+        let fault = |text| setting(text).unwrap_err();
+        assert!(fault("elements=plain").starts_with("elements is not known; known are rigid, rigid-points, shaft"));
+        assert!(fault("element").starts_with("expected KEY=VALUE; known are rigid"));
+        assert_eq!(fault("element=hex"), "hex is not known; known are plain, locking-free");
+        assert!(fault("law.bone=ogden").contains("for one of brain, white, grey"));
+        assert!(fault("threads=0").contains("1 to 64") && fault("friction=-1").contains("up to 2"));
+        assert!(fault("friction=nan").contains("up to 2") && fault("search=brute-force").contains("walk"));
+        assert!(setting("list").unwrap().is_none());
+        assert_eq!(with(&["solver=fastest"]).device, Device::Fastest);
+        let method = |settings: &[&str]| with(settings).rigid;
+        assert_eq!(method(&["shaft=on", "shaft=off"]), Some("god-object-sphere"));
+        assert_eq!(method(&["shaft=off"]), None);
+        let mut thesis = with(&["rigid=thesis"]);
+        assert!(Key::named("shaft").unwrap().set(&mut thesis, "on").is_err(), "the thesis's method has no shaft");
+    }
+
+    /// The keys as a table for the user guide.
+    fn markdown() -> String {
+        let line =
+            |key: &Key| format!("| `{}` | {} | {} | {} |\n", key.name, (key.values)(), key.about, key.default_text());
+        "| key | values | what it does | default |\n|---|---|---|---|\n".to_string()
+            + &KEYS.iter().map(line).collect::<String>()
+    }
+
+    #[test]
+    fn the_user_guide_has_the_table_of_keys() {
+        let guide = include_str!("../../../../apps/README.md");
+        assert!(guide.contains(&markdown()), "paste into apps/README.md:\n{}", markdown());
+        assert!(table().contains("element") && table().contains("[plain]"), "{}", table());
+    }
+}

@@ -1,0 +1,122 @@
+//! Ingredients of the models: element, law, relaxation, friction and the like, each chosen for a
+//! session by `--set KEY=VALUE`.
+//!
+//! # Practice
+//! An ingredient is a field of [`Ingredients`] and an entry of the table in `keys.rs`. Parsing,
+//! help, a recording's header, `summary.json`, the report and the user guide's table derive from
+//! that entry. [`Ingredients::default`] has everything off: what recordings without an entry ran
+//! with.
+
+mod keys;
+mod law;
+
+pub(crate) use keys::{Given, KEYS, Part, setting, table};
+pub use law::Law;
+
+use crate::tissue_class::TissueClass;
+use clap::ValueEnum;
+use serde::{Serialize, Serializer};
+
+/// What the models of a session are made of; `None` where `--quality` chooses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ingredients {
+    /// Method of contact with bone.
+    pub rigid: Option<&'static str>,
+    /// Points of that method on the burr; 0 for its own number.
+    pub rigid_points: Option<usize>,
+    /// Force shading on bone, over one voxel.
+    pub shading: bool,
+    /// Friction coefficient of a tool that does not cut on bone, without unit.
+    pub bone_friction: f32,
+    /// Vibration of the drill on the hand.
+    pub vibration: bool,
+    /// Solver of the tissue.
+    pub solver: Option<&'static str>,
+    /// Motion in 50 ms below which tissue sleeps, mm; 0 = nothing sleeps.
+    pub still_mm: Option<f64>,
+    /// Tetrahedral element.
+    pub element: Element,
+    /// Constitutive law of each tissue class, in the order of [`TissueClass::ALL`].
+    pub laws: [Law; TissueClass::ALL.len()],
+    /// Stress relaxation.
+    pub relaxation: Relaxation,
+    /// Where the solver runs.
+    pub device: Device,
+    /// Threads of the solver on the processor.
+    pub threads: usize,
+    /// Pressure of the fluid on the brain's surface, mmHg.
+    pub surface_pressure_mmhg: f32,
+    /// Search for the tool's points inside the tissue.
+    pub search: trepan_deformable::Method,
+    /// Friction coefficient of tool and tissue, without unit.
+    pub friction: f32,
+    /// Contact of the brain's surface with itself.
+    pub folds: bool,
+}
+
+/// Tetrahedral elements of the solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Element {
+    /// Linear tetrahedra.
+    Plain,
+    /// Linear tetrahedra with averaged nodal pressure.
+    LockingFree,
+}
+
+/// Stress relaxation of the tissue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Relaxation {
+    /// None: elastic.
+    Off,
+    /// Prony series of two terms.
+    Prony,
+}
+
+/// Where the solver of the tissue runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Device {
+    /// On the processor.
+    Cpu,
+    /// On the graphics card; on the processor where there is none.
+    Gpu,
+    /// On whichever of the two is faster for this body on this machine.
+    Fastest,
+}
+
+impl Default for Ingredients {
+    fn default() -> Self {
+        Self {
+            rigid: None,
+            rigid_points: None,
+            shading: false,
+            bone_friction: 0.0,
+            vibration: true,
+            solver: None,
+            still_mm: None,
+            element: Element::Plain,
+            laws: [Law::NeoHookean; TissueClass::ALL.len()],
+            relaxation: Relaxation::Off,
+            device: Device::Cpu,
+            threads: 1,
+            surface_pressure_mmhg: 0.0,
+            search: trepan_deformable::Method::RECOMMENDED,
+            friction: 0.0,
+            folds: false,
+        }
+    }
+}
+
+impl Ingredients {
+    /// Whether every element must be stepped: tissue that relaxes never rests, and the graphics
+    /// card has no sleeping elements.
+    pub(crate) fn steps_all(&self) -> bool {
+        self.relaxation != Relaxation::Off || self.device != Device::Cpu
+    }
+}
+
+/// Each key with its value, as `--set` takes them.
+impl Serialize for Ingredients {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_map(KEYS.iter().map(|key| (key.name, key.value(self))))
+    }
+}

@@ -1,0 +1,226 @@
+//! Every key of `--set` in a short operation without a device: its effect on the hand, and replays.
+
+use super::*;
+use crate::case::opening::Opening;
+use crate::case::{Brain, Case};
+use crate::hand::DeviceLimits;
+use crate::ingredients::{Device, KEYS};
+use crate::measure::CaseErrors;
+use crate::models::{Facts, ModelRequest};
+use crate::operation::Operation;
+use crate::options::Options;
+use crate::program::{Phase, Program};
+use crate::session_setup::SessionSetup;
+use clap::Parser;
+use trepan_geometry::{Quat, ToolKind, Vec3};
+use trepan_haptics::{Capabilities, DeviceName};
+use trepan_soft::boxes;
+use trepan_volume::VoxelVolume;
+
+/// Length of the operation, ms, and when the probe is taken.
+const END: u64 = 1300;
+const PROBE: u64 = 600;
+
+/// Every key at once.
+const ALL: &str = "rigid=god-object-sphere,shaft=on,shading=on,bone-friction=0.3,vibration=off,element=locking-free,\
+                   law=ogden,law.grey=mooney-rivlin,relaxation=prony,threads=2,device=gpu,surface-pressure=2,\
+                   search=hashed-grid,friction=0.3,folds=on";
+
+/// A plate of bone 6 mm thick with a hole of 24 mm, 2 mm over a block of brain.
+fn case() -> Case {
+    let (n, low) = (60, Vec3::new(-29.5, -29.5, -39.5));
+    let place = |at: usize| low + Vec3::from([at % n, at / n % n, at / (n * n)].map(|i| i as f32));
+    let mut skull = VoxelVolume::isotropic([n; 3], low, 1.0, -1000i16);
+    let mut classes = skull.map(|_| 0u8);
+    for at in 0..skull.data.len() {
+        let p = place(at);
+        let depth = (-p.z).min(p.z + 6.0).min(p.truncate().length() - 12.0);
+        skull.data[at] = (400.0 + 800.0 * depth).clamp(-1000.0, 1200.0) as i16;
+        classes.data[at] = u8::from(p.z < -8.0 && p.z > -33.0 && p.truncate().abs().max_element() < 20.0);
+    }
+    let mut mesh = boxes::split_box([8, 8, 5], Vec3::new(40.0, 40.0, 25.0));
+    mesh.positions.iter_mut().for_each(|p| *p -= Vec3::new(20.0, 20.0, 33.0));
+    let class_of_tet = (0..mesh.tets.len()).map(|tet| if tet % 5 == 0 { 3 } else { 1 }).collect();
+    let brain = Brain { mri: classes.map(f32::from), classes, mesh, class_of_tet };
+    let opening = Opening { entry_mm: [0.0; 3], inward: [0.0, 0.0, -1.0], bone_mm: 6.0, brain_mm: 8.0 };
+    Case {
+        name: "plate".into(),
+        skull: Some(skull),
+        isovalue_hu: 400,
+        brain: Some(brain),
+        opening: Some(opening),
+        ..Case::default()
+    }
+}
+
+fn setup(line: &str, recording: Option<&Recording>) -> SessionSetup {
+    let options = Options::try_parse_from(format!("x --headless --frames-per-second 0 {line}").split_whitespace());
+    let (options, program) = (options.unwrap(), Program::Integrated);
+    let mut operation = Operation::of(&options, &DeviceName::MOUSE, recording);
+    operation.opening_needed = false;
+    let request = ModelRequest::of(program, &options, &operation, recording).unwrap();
+    let models = request.settle(&Facts::default(), || false, |_, _| Ok(CaseErrors::default())).unwrap();
+    SessionSetup::new(program, (case(), models), operation, false).unwrap()
+}
+
+fn stages(setup: &SessionSetup) -> Stages {
+    let limits = DeviceLimits::of(&Capabilities::passive("a script"), 1.0);
+    setup.stages(hand(0), 1.0, (&limits, None)).unwrap()
+}
+
+/// The tool in the hand at a time, ms. A burr slides over the bone, drills, and leans on the rim of
+/// the hole; then a probe presses the brain and slides.
+fn hand(ms: u64) -> ToolState {
+    let way = |from: Vec3, to: Vec3, since: u64, span: f32| from.lerp(to, ((ms - since) as f32 / span).min(1.0));
+    let at = |x: f32, z: f32| Vec3::new(x, 0.3, z);
+    let lean = if (400..PROBE).contains(&ms) { 1.0 } else { 0.1 };
+    let (tip, buttons) = match ms {
+        0..100 => (way(at(16.0, 6.0), at(16.0, 2.2), 0, 80.0), Buttons(0)),
+        100..250 => (way(at(16.0, 2.2), at(20.0, 2.2), 100, 150.0), Buttons(0)),
+        250..330 => (at(20.0, 2.2), Buttons::PEDAL),
+        330..400 => (way(at(20.0, 2.2), at(0.0, 12.0), 330, 60.0), Buttons(0)),
+        400..460 => (way(at(0.0, 12.0), at(0.0, -1.5), 400, 50.0), Buttons(0)),
+        460..560 => (way(at(0.0, -1.5), at(8.7, -1.5), 460, 80.0), Buttons(0)),
+        560..PROBE => (way(at(8.7, -1.5), at(0.0, 14.0), 560, 30.0), Buttons(0)),
+        PROBE..650 => (at(0.0, 14.0), Buttons::take(ToolKind::Probe)),
+        650..1000 => (way(at(0.0, 14.0), at(0.0, -9.5), 650, 250.0), Buttons(0)),
+        _ => (way(at(0.0, -9.5), at(5.0, -9.5), 1000, 200.0), Buttons(0)),
+    };
+    let pose = Pose::from_parts(tip, Quat::from_rotation_y(lean));
+    ToolState { time_ms: ms as f64, buttons, ..ToolState::at(pose) }
+}
+
+/// Runs the operation, each loop as if it kept pace.
+fn operated(line: &str) -> (Recording, SessionSetup) {
+    let setup = setup(&format!("--quality usual {line}"), None);
+    let Stages { mut haptic, tissue, .. } = stages(&setup);
+    let mut tissue = tissue.expect("the program has tissue");
+    let (mut recording, mut frame, mut patch) =
+        (Recording::default(), SoftFrame::default(), (0, SurfacePatch::default()));
+    for tick in 1..END {
+        let reading = Reading { tool: hand(tick), status: Status::Fresh };
+        let input = TickInput { tick, reading, patch: &patch.1, patch_seq: patch.0, second: None };
+        let done = haptic.tick(&input, &mut |_| {});
+        tissue.solver.publish(&mut frame);
+        let collision = tissue.collision.step(&done.sample, &frame);
+        patch = (collision.seq, *tissue.collision.patch());
+        while tissue.solver.time_ms() < tick as f64 {
+            recording.solver.extend(tissue.solver.step(tissue.collision.loads(), collision.seq));
+        }
+        recording.ticks.push(done.record);
+        recording.collisions.push(collision);
+    }
+    assert_eq!(tissue.solver.solver_faults().contacts_left_out, 0);
+    recording.header.config.extend(setup.models.entries(&setup.ingredients()));
+    recording.header.config.extend(setup.operation.entries());
+    (recording, setup)
+}
+
+/// Ticks that give the same force when the recording is replayed by its header.
+fn replayed(recording: &Recording) -> (u64, SessionSetup) {
+    let setup = setup("", Some(recording));
+    let (senders, _pages) = journal();
+    let tool = Program::Integrated.tray()[0];
+    let start = ToolSample { tick: 0, state: hand(0), tool, slot: 0, drilling: false };
+    let mut replay = Replay::new(stages(&setup), recording, senders, start);
+    recording.ticks.iter().for_each(|record| _ = replay.tick(record, &Clock::start()));
+    (replay.replayed.identical, setup)
+}
+
+/// Largest difference on bone and on the brain: of the forces, N, and of the torques, N mm.
+fn difference(a: &Recording, b: &Recording) -> [[f32; 2]; 2] {
+    let of_phase = |phase: Phase| {
+        let both = a.ticks.iter().zip(&b.ticks).filter(|(a, _)| a.phase == phase as u8);
+        both.fold([0.0f32; 2], |[force, torque], (a, b)| {
+            let (a, b) = (a.wrench, b.wrench);
+            [force.max(a.force.distance(b.force)), torque.max(a.torque.distance(b.torque))]
+        })
+    };
+    [of_phase(Phase::Craniotomy), of_phase(Phase::Brain)]
+}
+
+#[test]
+fn all_ingredients_together_are_recorded_and_replay_bit_for_bit() {
+    let (recording, was) = operated(&format!("--set {ALL}"));
+    let (identical, is) = replayed(&recording);
+    assert_eq!((identical, is.ingredients()), (END - 1, was.ingredients()));
+    for (name, text) in ALL.split(',').filter_map(|given| given.split_once('=')) {
+        let key = KEYS.iter().find(|key| key.name == name.split('.').next().unwrap()).unwrap();
+        let recorded = &recording.header.config[&key.header_name()];
+        let expected = match name {
+            "rigid" => "god-object-sphere-shaft",
+            "law" | "law.grey" => "ogden+grey:mooney-rivlin",
+            // Surface pressure is the processor's alone.
+            "device" => "cpu",
+            _ => text,
+        };
+        assert_eq!(recorded, expected, "{name}");
+    }
+    let given = |name: &&str| ALL.split(',').any(|given| given.split_once('=').is_some_and(|(key, _)| key == *name));
+    let unset: Vec<_> = KEYS.iter().map(|key| key.name).filter(|name| !given(name)).collect();
+    assert_eq!(unset, ["rigid-points", "solver", "still-mm"], "every other key is on here");
+    assert!(was.solver_remarks().any(|remark| remark.contains("runs on the processor")));
+}
+
+#[test]
+fn each_key_that_is_physical_changes_the_force_where_it_acts_and_replays() {
+    let (plain, _) = operated("");
+    assert_eq!(replayed(&plain).0, END - 1);
+    let peak = |phase: Phase| {
+        let of = plain.ticks.iter().filter(|tick| tick.phase == phase as u8);
+        of.map(|tick| tick.wrench.force.length()).fold(0.0, f32::max)
+    };
+    assert!(peak(Phase::Craniotomy) > 1.0 && peak(Phase::Brain) > 0.1, "the path touches bone and brain");
+    // Smallest change on bone and on the brain: of the force, N, and of the torque, N mm.
+    let cases = [
+        ("rigid=thesis", [[0.02, 0.0], [0.0; 2]]),
+        ("shaft=on", [[0.1, 1.0], [0.0; 2]]),
+        ("shading=on", [[0.002, 0.0], [0.0; 2]]),
+        ("bone-friction=0.3", [[0.1, 0.0], [0.0; 2]]),
+        ("vibration=off", [[0.005, 0.0], [0.0; 2]]),
+        ("element=locking-free", [[0.0; 2], [0.002, 0.0]]),
+        ("law=ogden", [[0.0; 2], [0.002, 0.0]]),
+        ("law.grey=ogden", [[0.0; 2], [0.0002, 0.0]]),
+        ("relaxation=prony", [[0.0; 2], [0.01, 0.0]]),
+        ("surface-pressure=10", [[0.0; 2], [0.01, 0.0]]),
+        ("friction=0.3", [[0.0; 2], [0.02, 0.0]]),
+        ("search=thesis", [[0.0; 2], [0.002, 0.0]]),
+        ("solver=xpbd", [[0.0; 2], [0.01, 0.0]]),
+    ];
+    for (given, least) in cases {
+        let (with, setup) = operated(&format!("--set {given}"));
+        let found = difference(&plain, &with);
+        let is_enough = found.iter().flatten().zip(least.iter().flatten()).all(|(found, least)| found >= least);
+        assert!(is_enough, "{given}: {found:?} of {least:?}");
+        let bone_alone = least[1] == [0.0; 2];
+        assert!(bone_alone || found[0] == [0.0; 2], "{given} changes the force on bone: {found:?}");
+        let name = given.split(['=', '.']).next().unwrap();
+        let key = KEYS.iter().find(|key| key.name == name).unwrap();
+        assert_ne!(key.value(&setup.ingredients()), plain.header.config[&key.header_name()], "{given}");
+        assert_eq!(replayed(&with).0, END - 1, "{given}");
+    }
+}
+
+#[test]
+fn keys_of_speed_leave_the_force_as_it_is() {
+    let (plain, _) = operated("");
+    for given in ["threads=3", "folds=on", "search=hashed-grid", "device=gpu"] {
+        let (with, setup) = operated(&format!("--set {given}"));
+        let found = difference(&plain, &with);
+        // A card rounds otherwise.
+        let most = if setup.ingredients().device == Device::Gpu { 1e-3 } else { 0.0 };
+        assert!(found.iter().flatten().all(|found| *found <= most), "{given}: {found:?}");
+    }
+}
+
+#[test]
+fn friction_holds_the_hand_back_and_takes_the_tissue_along() {
+    let slid = |line: &str| {
+        let (recording, _) = operated(line);
+        let last = recording.ticks.last().unwrap().wrench.force;
+        (last, recording.solver.last().unwrap().max_displacement_mm)
+    };
+    let ((free, _), (held, _)) = (slid(""), slid("--set friction=0.5"));
+    let [free_pull, held_pull] = [free.x, held.x];
+    assert!(held_pull < free_pull - 0.05, "sliding towards +x: {free} without, {held} with friction");
+}

@@ -1,0 +1,222 @@
+//! Builds the tissue's solver from the session's ingredients.
+//!
+//! # Practice
+//! The graphics card is taken only when it is one: a software driver is slower than the processor.
+//! What cannot run on the card runs on the processor, with a remark; so does the rest of a session
+//! whose card is lost ([`WithSpare`]).
+
+use crate::error::SessionError;
+use crate::ingredients::{Device, Element, Ingredients, Relaxation};
+use crate::measure::tissue::MASS_ADDED;
+use crate::run::clock::Clock;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use trepan_budget::Tissue;
+use trepan_mesh::Surface;
+use trepan_soft::{Body, BodyError, Loads, SoftSolver, SurfacePressure};
+use trepan_tled::gpu::WithSpare;
+use trepan_tled::{Config, Settling, Tled, choice};
+
+/// Pressure of 1 mmHg, MPa.
+const MPA_PER_MMHG: f32 = 1.333_22e-4;
+/// Time for which each device is tried to find the faster one, ms.
+const TRIAL_MS: f64 = 100.0;
+
+/// What runs as the solver.
+#[derive(Clone, Debug)]
+pub(crate) struct Ran {
+    /// Name of the solver.
+    pub name: &'static str,
+    /// Where it runs.
+    pub device: Device,
+    remark: Option<String>,
+    lost: Arc<AtomicBool>,
+}
+
+impl Ran {
+    fn here(name: &'static str) -> Self {
+        Self { name, device: Device::Cpu, remark: None, lost: Arc::default() }
+    }
+
+    /// Remarks for the report: why it runs elsewhere than asked, and whether the card was lost.
+    pub fn remarks(&self) -> impl Iterator<Item = String> + use<> {
+        let lost = self.lost.load(Ordering::Relaxed).then(|| {
+            "the graphics card was lost while the solver ran on it: the processor went on from the same positions; \
+             update its driver, or use --set device=cpu"
+                .into()
+        });
+        self.remark.clone().into_iter().chain(lost)
+    }
+}
+
+/// Builds the solver of a body at rest.
+pub(crate) fn build(
+    body: &Body,
+    tissue: &Tissue,
+    ingredients: &Ingredients,
+) -> Result<(Box<dyn SoftSolver>, Ran), SessionError> {
+    if let Some(method) = trepan_soft::Method::named(tissue.solver) {
+        return Ok((method.build(body).map_err(refused)?, Ran::here(method.name())));
+    }
+    let config = config(tissue, ingredients);
+    let (on_card, remark) = match ingredients.device {
+        Device::Cpu => (None, None),
+        _ if ingredients.surface_pressure_mmhg > 0.0 => (None, Some(elsewhere("it has no surface pressure"))),
+        Device::Fastest if !is_faster_on_card(body, &config)? => (None, None),
+        _ => match WithSpare::on_a_card(body, &config) {
+            Ok(solver) => (Some(solver), None),
+            Err(fault) => (None, Some(elsewhere(&fault.to_string()))),
+        },
+    };
+    remark.iter().for_each(|remark| tracing::warn!("{remark}"));
+    match on_card {
+        Some(solver) => {
+            let ran = Ran { lost: solver.lost(), device: Device::Gpu, ..Ran::here("tled-gpu") };
+            Ok((Box::new(solver), ran))
+        }
+        None => {
+            let solver = on_processor(body, &config, ingredients).map_err(refused)?;
+            Ok((Box::new(solver), Ran { remark, ..Ran::here("tled") }))
+        }
+    }
+}
+
+fn elsewhere(why: &str) -> String {
+    format!("the solver runs on the processor, not on the graphics card: {why}")
+}
+
+fn refused(fault: BodyError) -> SessionError {
+    SessionError::Internal(format!("the brain: {fault}"))
+}
+
+fn config(tissue: &Tissue, ingredients: &Ingredients) -> Config {
+    Config {
+        still_mm: tissue.still_mm as f32,
+        mass_scaling: MASS_ADDED,
+        averaged_pressure: ingredients.element == Element::LockingFree,
+        relaxation: match ingredients.relaxation {
+            Relaxation::Off => trepan_tled::Relaxation::NONE,
+            Relaxation::Prony => trepan_tled::Relaxation::BRAIN,
+        },
+        threads: ingredients.threads,
+        ..Config::default()
+    }
+}
+
+/// The solver on the processor, at rest under the pressure on its surface.
+fn on_processor(body: &Body, config: &Config, ingredients: &Ingredients) -> Result<Tled, BodyError> {
+    let mut solver = Tled::new(body, config)?;
+    let mpa = MPA_PER_MMHG * ingredients.surface_pressure_mmhg;
+    if mpa > 0.0 {
+        solver.set_pressure(SurfacePressure { triangles: Surface::of(&body.mesh).triangles, mpa });
+        let settled = solver.settle(&Loads::default(), &Settling::default());
+        tracing::info!("at rest under the surface pressure within {:.3} mm", settled.left_mm);
+    }
+    Ok(solver)
+}
+
+/// Tries both devices for a time.
+fn is_faster_on_card(body: &Body, config: &Config) -> Result<bool, SessionError> {
+    let clock = Clock::start();
+    let all = choice::candidates(body, config);
+    let chosen = choice::fastest(&all, &Loads::default(), TRIAL_MS, &|| clock.now_ms());
+    let chosen = chosen.map_err(|fault| SessionError::Internal(format!("the brain: {fault}")))?;
+    tracing::info!("solver {}: {}", chosen.name, chosen.why);
+    Ok(chosen.name != "tled")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ingredients::Law;
+    use crate::tissue_class::TissueClass;
+    use trepan_contact::NodalContact;
+    use trepan_geometry::Vec3;
+    use trepan_soft::boxes;
+
+    const TLED: Tissue = Tissue { solver: "tled", tets: 0, halvings: 0, still_mm: 0.0 };
+
+    /// A block of brain, 30 mm wide, fixed at the bottom.
+    fn block(laws: &Ingredients) -> Body {
+        let mesh = boxes::split_box([6; 3], Vec3::splat(30.0));
+        let fixed = boxes::nodes_where(&mesh, |p| p.z < 1e-3);
+        Body::uniform(mesh, fixed, laws.laws[0].like(TissueClass::Brain.material(0.003)))
+    }
+
+    /// Depth of the middle of the top, mm, 60 ms after a spring began to press on it, and the
+    /// force, N.
+    fn pressed(ingredients: &Ingredients) -> ([f32; 2], Ran) {
+        let body = block(ingredients);
+        let (mut solver, ran) = build(&body, &TLED, ingredients).unwrap();
+        let mut spring = NodalContact::none();
+        let top = boxes::nodes_where(&body.mesh, |p| p.z > 29.99 && p.truncate().distance([15.0; 2].into()) < 7.0);
+        top.iter().for_each(|node| spring.add(*node, 1.0));
+        spring.normalise();
+        (spring.normal, spring.stiffness, spring.damping) = (Vec3::Z, 0.3, 0.3);
+        let place = spring;
+        let height = |solver: &dyn SoftSolver| place.mean(|node| solver.positions()[node as usize]).z;
+        let start = height(&*solver);
+        spring.offset_mm = 4.0 - start;
+        let loads = Loads { contacts: spring.into(), ..Loads::default() };
+        let (mut force, dt_ms) = (0.0, solver.stable_dt_ms());
+        (0..(60.0 / dt_ms) as u32).for_each(|_| force = solver.step(&loads, dt_ms).contact_n);
+        ([start - height(&*solver), force], ran)
+    }
+
+    #[test]
+    fn each_ingredient_of_the_solver_reaches_it() {
+        let plain = Ingredients::default();
+        let (usual, ran) = pressed(&plain);
+        assert_eq!((ran.name, ran.device, ran.remarks().count()), ("tled", Device::Cpu, 0));
+        assert!(usual[0] > 0.5 && usual[1] > 0.01, "{usual:?}");
+        assert_eq!(pressed(&Ingredients { threads: 2, ..plain.clone() }).0, usual, "threads change no bit");
+        let softer = [
+            Ingredients { element: Element::LockingFree, ..plain.clone() },
+            Ingredients { relaxation: Relaxation::Prony, ..plain.clone() },
+        ];
+        for with in softer {
+            let (is, _) = pressed(&with);
+            assert!(is[0] > 1.002 * usual[0] && is[1] < usual[1], "{with:?}: {is:?} of {usual:?}");
+        }
+        for law in [Law::StVenantKirchhoff, Law::MooneyRivlin, Law::Ogden] {
+            let (is, _) = pressed(&Ingredients { laws: [law; TissueClass::ALL.len()], ..plain.clone() });
+            let change = (is[1] / usual[1] - 1.0).abs();
+            assert!((1e-4..0.5).contains(&change), "{law:?}: {is:?} of {usual:?}");
+        }
+    }
+
+    #[test]
+    fn a_body_under_surface_pressure_is_at_rest_and_smaller() {
+        let with = Ingredients { surface_pressure_mmhg: 10.0, ..Ingredients::default() };
+        let body = block(&with);
+        let (mut solver, _) = build(&body, &TLED, &with).unwrap();
+        let (before, dt_ms) = (solver.positions().to_vec(), solver.stable_dt_ms());
+        let top = boxes::nodes_where(&body.mesh, |p| p.z > 29.99);
+        let sunk = top.into_iter().map(|n| 30.0 - before[n as usize].z);
+        assert!(sunk.fold(f32::INFINITY, f32::min) > 0.2, "1.3 kPa on a bulk modulus of 10 kPa");
+        (0..100).for_each(|_| _ = solver.step(&Loads::default(), dt_ms));
+        let moved = before.iter().zip(solver.positions()).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
+        assert!(moved < 0.02, "{moved} mm");
+    }
+
+    #[test]
+    fn without_a_graphics_card_the_processor_takes_over_with_a_remark() {
+        let plain = Ingredients::default();
+        let usual = pressed(&plain).0;
+        for device in [Device::Gpu, Device::Fastest] {
+            let (is, ran) = pressed(&Ingredients { device, ..plain.clone() });
+            let on_card = ran.device == Device::Gpu;
+            let is_card = trepan_gpu::Gpu::open(trepan_gpu::Prefer::Hardware).is_ok_and(|gpu| !gpu.is_software());
+            assert!(!on_card || is_card, "a software driver was taken");
+            assert!((is[1] / usual[1] - 1.0).abs() < if on_card { 1e-3 } else { 1e-9 });
+            let remarks: Vec<String> = ran.remarks().collect();
+            assert_eq!(remarks.len(), usize::from(device == Device::Gpu && !on_card), "{remarks:?}");
+            assert!(remarks.iter().all(|text| text.contains("runs on the processor")), "{remarks:?}");
+        }
+        let both = Ingredients { device: Device::Gpu, surface_pressure_mmhg: 5.0, ..plain };
+        let (_, ran) = build(&block(&both), &TLED, &both).unwrap();
+        assert!(ran.remarks().next().unwrap().contains("no surface pressure"));
+        ran.lost.store(true, Ordering::Relaxed);
+        assert!(ran.remarks().last().unwrap().contains("the graphics card was lost"));
+    }
+}
