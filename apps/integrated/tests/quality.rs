@@ -111,3 +111,31 @@ fn a_plan_is_printed_for_the_given_case() {
     let error = |text: &str| of_tissue(text)?.split("error ").nth(1)?.split(" mm").next().map(String::from);
     assert!(error(&text).is_some() && error(&text) == error(&again), "{text}\n{again}");
 }
+
+#[test]
+fn every_ingredient_at_once_is_shown_recorded_and_replayed() {
+    let [live, again] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let all = "shaft=on,shading=on,bone-friction=0.3,vibration=off,element=locking-free,law=ogden,relaxation=prony,\
+               device=gpu,threads=2,search=hashed-grid,friction=0.2,folds=on";
+    let fixed = ["--quality", "draft", "--frames-per-second", "0", "--set", all];
+    let (was, log) = operation(live.path(), "2", &fixed);
+    assert!(log.contains("ingredients: shading=on, bone-friction=0.3, vibration=off, element=locking-free"), "{log}");
+    let models = &was["models"];
+    assert_eq!((&models["ingredients"]["law"], &models["ingredients"]["threads"]), (&"ogden".into(), &"2".into()));
+    assert_eq!(models["bone"]["method"], "god-object-sphere-shaft");
+    let report = fs::read_to_string(live.path().join("report.html")).unwrap();
+    assert!(report.contains("element locking-free; law ogden"), "the report lacks the ingredients");
+    // A machine without a graphics card says so.
+    let on_card = models["ingredients"]["device"] == "gpu";
+    let remarks = was["remarks"].to_string();
+    assert_eq!(remarks.contains("runs on the processor, not on the graphics card"), !on_card, "{remarks}");
+    assert_eq!(was["solver"]["contacts_left_out"], 0, "{remarks}");
+    let (is, _) = operation(again.path(), "2", &["--device", &replay_of(live.path()), "--frames-per-second", "0"]);
+    assert_eq!(is["replay"]["identical"], is["replay"]["ticks"]);
+    assert_eq!(is["models"]["ingredients"], models["ingredients"]);
+    let listed = integrated(&["--set", "list"]);
+    assert!(listed.status.success() && String::from_utf8_lossy(&listed.stdout).contains("surface-pressure"));
+    let refused = integrated(&["--headless", "--set", "element=hex"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("known are plain, locking-free"));
+}

@@ -5,7 +5,7 @@ mod common;
 
 use common::{Random, block, deformed, tool_at};
 use glam::{Quat, Vec3};
-use trepan_contact::{NodalContacts, PlaneContact};
+use trepan_contact::{NodalContact, NodalContacts, PlaneContact};
 use trepan_deformable::{
     Config, ConfigError, MeshCollision, NodeContact, SlidingWall, TissueCollision, TissueStep, push_apart,
     push_itself_apart,
@@ -68,6 +68,16 @@ fn friction_sticks_slips_and_is_equal_and_opposite() {
         let mut forces = still.clone();
         let on_tool = out.push(&mesh.positions, &still, &mut forces);
         assert!((on_tool + forces.iter().sum::<Vec3>()).length() < 1e-5 && (on_tool.z - 0.3).abs() < 1e-3);
+        // The solver's springs drag the nodes with the same force, and give way as they follow.
+        let mut springs = NodalContacts::with_room();
+        out.springs(&mut springs);
+        let drag = |by_mm: f32| {
+            let shown = |n: u32| mesh.positions[n as usize] + Vec3::X * by_mm;
+            let force = |spring: &NodalContact| -spring.pressure_n(spring.mean(shown), Vec3::ZERO) * spring.normal.x;
+            springs.iter().filter(|spring| spring.normal.x < -0.9).map(force).sum::<f32>()
+        };
+        assert!((drag(0.0) + out.friction_n.x).abs() < 1e-5, "{} of {}", drag(0.0), out.friction_n.x);
+        assert!(k < 10 || (drag(0.05) - drag(0.0) + 0.3 * 0.05).abs() < 1e-4, "{} at {k}", drag(0.05));
     }
     collision.reset();
     let tool = tool_at(Vec3::new(13.2, 15.1, 17.0), Quat::IDENTITY);

@@ -54,7 +54,7 @@ pub use case::plan::Plan;
 pub use case::scene::{RestBrain, Scene};
 pub use command::command;
 pub use error::SessionError;
-pub use ingredients::{Device, Element, Ingredients, Law, Relaxation};
+pub use ingredients::{Element, Ingredients, Law, Relaxation, SolverDevice};
 pub use options::Options;
 pub use program::{Phase, Program};
 pub use recipe::Recipe;

@@ -107,8 +107,8 @@ impl SessionSetup {
     }
 
     /// Remarks on the solver, for the report.
-    pub fn solver_remarks(&self) -> impl Iterator<Item = String> + use<> {
-        self.ran.get().into_iter().flat_map(Ran::remarks).collect::<Vec<_>>().into_iter()
+    pub fn solver_remarks(&self) -> Vec<String> {
+        self.ran.get().map(Ran::remarks).unwrap_or_default()
     }
 
     /// Creates the stages, with the tool at `start`.
@@ -161,16 +161,17 @@ impl SessionSetup {
             material_of_tet: brain.class_of_tet.iter().map(|code| code - 1).collect(),
         };
         let wall = self.bone().cloned().map(|bone| SkullWall::new(bone, &brain.mesh, &brain.fixed));
-        let wall = wall.transpose().map_err(|fault| brain_error(&fault))?;
+        let mut wall = wall.transpose().map_err(|fault| brain_error(&fault))?;
+        let (solver, ran) = solver::build(&body, wall.as_mut(), &self.models.setup.tissue, with)?;
+        let _first = self.ran.set(ran);
         let settling = Settling::new(self.operation.csf_loss, Vec3::NEG_Y, -self.plan.site.inward);
         let touch = touch(&brain.mesh, with)?;
         let collision = CollisionStage::new(self.program, &brain.mesh, &touch, wall)
             .and_then(|stage| if with.folds { stage.folding(&brain.mesh) } else { Ok(stage) })
             .map_err(|fault| brain_error(&fault))?
+            .under_pressure(with.surface_pressure_mmhg > 0.0)
             .turning(rigid.descriptor().extent == Extent::BallAndShaft)
             .settling(settling);
-        let (solver, ran) = solver::build(&body, &self.models.setup.tissue, with)?;
-        let _first = self.ran.set(ran);
         Ok(run::Tissue { collision, solver: SolverStage::new(solver) })
     }
 }

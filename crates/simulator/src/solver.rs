@@ -6,12 +6,14 @@
 //! whose card is lost ([`WithSpare`]).
 
 use crate::error::SessionError;
-use crate::ingredients::{Device, Element, Ingredients, Relaxation};
+use crate::ingredients::{Element, Ingredients, Relaxation, SolverDevice};
 use crate::measure::tissue::MASS_ADDED;
 use crate::run::clock::Clock;
+use crate::stages::skull_wall::SkullWall;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trepan_budget::Tissue;
+use trepan_contact::NodalContacts;
 use trepan_mesh::Surface;
 use trepan_soft::{Body, BodyError, Loads, SoftSolver, SurfacePressure};
 use trepan_tled::gpu::WithSpare;
@@ -19,6 +21,8 @@ use trepan_tled::{Config, Settling, Tled, choice};
 
 /// Pressure of 1 mmHg, MPa.
 const MPA_PER_MMHG: f32 = 1.333_22e-4;
+/// Times that the brain comes to rest in the skull under pressure, as the wall is found anew.
+const ROUNDS: usize = 3;
 /// Time for which each device is tried to find the faster one, ms.
 const TRIAL_MS: f64 = 100.0;
 
@@ -28,30 +32,31 @@ pub(crate) struct Ran {
     /// Name of the solver.
     pub name: &'static str,
     /// Where it runs.
-    pub device: Device,
+    pub device: SolverDevice,
     remark: Option<String>,
     lost: Arc<AtomicBool>,
 }
 
 impl Ran {
     fn here(name: &'static str) -> Self {
-        Self { name, device: Device::Cpu, remark: None, lost: Arc::default() }
+        Self { name, device: SolverDevice::Cpu, remark: None, lost: Arc::default() }
     }
 
     /// Remarks for the report: why it runs elsewhere than asked, and whether the card was lost.
-    pub fn remarks(&self) -> impl Iterator<Item = String> + use<> {
+    pub fn remarks(&self) -> Vec<String> {
         let lost = self.lost.load(Ordering::Relaxed).then(|| {
             "the graphics card was lost while the solver ran on it: the processor went on from the same positions; \
              update its driver, or use --set device=cpu"
                 .into()
         });
-        self.remark.clone().into_iter().chain(lost)
+        self.remark.iter().cloned().chain(lost).collect()
     }
 }
 
-/// Builds the solver of a body at rest.
+/// Builds the solver of a body at rest, with the skull around it, if there is one.
 pub(crate) fn build(
     body: &Body,
+    wall: Option<&mut SkullWall>,
     tissue: &Tissue,
     ingredients: &Ingredients,
 ) -> Result<(Box<dyn SoftSolver>, Ran), SessionError> {
@@ -60,9 +65,9 @@ pub(crate) fn build(
     }
     let config = config(tissue, ingredients);
     let (on_card, remark) = match ingredients.device {
-        Device::Cpu => (None, None),
+        SolverDevice::Cpu => (None, None),
         _ if ingredients.surface_pressure_mmhg > 0.0 => (None, Some(elsewhere("it has no surface pressure"))),
-        Device::Fastest if !is_faster_on_card(body, &config)? => (None, None),
+        SolverDevice::Fastest if !is_faster_on_card(body, &config)? => (None, None),
         _ => match WithSpare::on_a_card(body, &config) {
             Ok(solver) => (Some(solver), None),
             Err(fault) => (None, Some(elsewhere(&fault.to_string()))),
@@ -71,11 +76,11 @@ pub(crate) fn build(
     remark.iter().for_each(|remark| tracing::warn!("{remark}"));
     match on_card {
         Some(solver) => {
-            let ran = Ran { lost: solver.lost(), device: Device::Gpu, ..Ran::here("tled-gpu") };
+            let ran = Ran { lost: solver.lost(), device: SolverDevice::Gpu, ..Ran::here("tled-gpu") };
             Ok((Box::new(solver), ran))
         }
         None => {
-            let solver = on_processor(body, &config, ingredients).map_err(refused)?;
+            let solver = on_processor(body, wall, &config, ingredients).map_err(refused)?;
             Ok((Box::new(solver), Ran { remark, ..Ran::here("tled") }))
         }
     }
@@ -103,14 +108,24 @@ fn config(tissue: &Tissue, ingredients: &Ingredients) -> Config {
     }
 }
 
-/// The solver on the processor, at rest under the pressure on its surface.
-fn on_processor(body: &Body, config: &Config, ingredients: &Ingredients) -> Result<Tled, BodyError> {
+/// The solver on the processor, at rest under the pressure on its surface within the skull.
+fn on_processor(
+    body: &Body,
+    mut wall: Option<&mut SkullWall>,
+    config: &Config,
+    ingredients: &Ingredients,
+) -> Result<Tled, BodyError> {
     let mut solver = Tled::new(body, config)?;
     let mpa = MPA_PER_MMHG * ingredients.surface_pressure_mmhg;
     if mpa > 0.0 {
         solver.set_pressure(SurfacePressure { triangles: Surface::of(&body.mesh).triangles, mpa });
-        let settled = solver.settle(&Loads::default(), &Settling::default());
-        tracing::info!("at rest under the surface pressure within {:.3} mm", settled.left_mm);
+        let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
+        for _ in 0..ROUNDS {
+            loads.contacts.clear();
+            wall.iter_mut().for_each(|wall| wall.press(solver.positions(), false, &mut loads.contacts));
+            let settled = solver.settle(&loads, &Settling::default());
+            tracing::debug!("at rest under the surface pressure within {:.3} mm", settled.left_mm);
+        }
     }
     Ok(solver)
 }
@@ -147,7 +162,7 @@ mod tests {
     /// force, N.
     fn pressed(ingredients: &Ingredients) -> ([f32; 2], Ran) {
         let body = block(ingredients);
-        let (mut solver, ran) = build(&body, &TLED, ingredients).unwrap();
+        let (mut solver, ran) = build(&body, None, &TLED, ingredients).unwrap();
         let mut spring = NodalContact::none();
         let top = boxes::nodes_where(&body.mesh, |p| p.z > 29.99 && p.truncate().distance([15.0; 2].into()) < 7.0);
         top.iter().for_each(|node| spring.add(*node, 1.0));
@@ -167,7 +182,7 @@ mod tests {
     fn each_ingredient_of_the_solver_reaches_it() {
         let plain = Ingredients::default();
         let (usual, ran) = pressed(&plain);
-        assert_eq!((ran.name, ran.device, ran.remarks().count()), ("tled", Device::Cpu, 0));
+        assert_eq!((ran.name, ran.device, ran.remarks().len()), ("tled", SolverDevice::Cpu, 0));
         assert!(usual[0] > 0.5 && usual[1] > 0.01, "{usual:?}");
         assert_eq!(pressed(&Ingredients { threads: 2, ..plain.clone() }).0, usual, "threads change no bit");
         let softer = [
@@ -189,7 +204,7 @@ mod tests {
     fn a_body_under_surface_pressure_is_at_rest_and_smaller() {
         let with = Ingredients { surface_pressure_mmhg: 10.0, ..Ingredients::default() };
         let body = block(&with);
-        let (mut solver, _) = build(&body, &TLED, &with).unwrap();
+        let (mut solver, _) = build(&body, None, &TLED, &with).unwrap();
         let (before, dt_ms) = (solver.positions().to_vec(), solver.stable_dt_ms());
         let top = boxes::nodes_where(&body.mesh, |p| p.z > 29.99);
         let sunk = top.into_iter().map(|n| 30.0 - before[n as usize].z);
@@ -203,20 +218,20 @@ mod tests {
     fn without_a_graphics_card_the_processor_takes_over_with_a_remark() {
         let plain = Ingredients::default();
         let usual = pressed(&plain).0;
-        for device in [Device::Gpu, Device::Fastest] {
+        for device in [SolverDevice::Gpu, SolverDevice::Fastest] {
             let (is, ran) = pressed(&Ingredients { device, ..plain.clone() });
-            let on_card = ran.device == Device::Gpu;
+            let on_card = ran.device == SolverDevice::Gpu;
             let is_card = trepan_gpu::Gpu::open(trepan_gpu::Prefer::Hardware).is_ok_and(|gpu| !gpu.is_software());
             assert!(!on_card || is_card, "a software driver was taken");
             assert!((is[1] / usual[1] - 1.0).abs() < if on_card { 1e-3 } else { 1e-9 });
-            let remarks: Vec<String> = ran.remarks().collect();
-            assert_eq!(remarks.len(), usize::from(device == Device::Gpu && !on_card), "{remarks:?}");
+            let remarks = ran.remarks();
+            assert_eq!(remarks.len(), usize::from(device == SolverDevice::Gpu && !on_card), "{remarks:?}");
             assert!(remarks.iter().all(|text| text.contains("runs on the processor")), "{remarks:?}");
         }
-        let both = Ingredients { device: Device::Gpu, surface_pressure_mmhg: 5.0, ..plain };
-        let (_, ran) = build(&block(&both), &TLED, &both).unwrap();
-        assert!(ran.remarks().next().unwrap().contains("no surface pressure"));
+        let both = Ingredients { device: SolverDevice::Gpu, surface_pressure_mmhg: 5.0, ..plain };
+        let (_, ran) = build(&block(&both), None, &TLED, &both).unwrap();
+        assert!(ran.remarks()[0].contains("no surface pressure"));
         ran.lost.store(true, Ordering::Relaxed);
-        assert!(ran.remarks().last().unwrap().contains("the graphics card was lost"));
+        assert!(ran.remarks()[1].contains("the graphics card was lost"));
     }
 }

@@ -1,6 +1,6 @@
 //! The table of keys that `--set` takes, and what derives from it: parsing, lists, the user guide.
 
-use super::{Device, Element, Ingredients, Law, Relaxation};
+use super::{Element, Ingredients, Law, Relaxation, SolverDevice};
 use crate::tissue_class::TissueClass;
 use clap::ValueEnum;
 use trepan_budget::Quality;
@@ -104,7 +104,7 @@ pub const KEYS: &[Key] = &[
             let rival = trepan_soft::Method::named(text).map(|method| method.name());
             i.solver = Some(rival.or([TLED, FASTEST].contains(&text).then_some(TLED))?);
             i.still_mm = Some(0.0);
-            i.device = if text == FASTEST { Device::Fastest } else { i.device };
+            i.device = if text == FASTEST { SolverDevice::Fastest } else { i.device };
             Some(())
         },
         ..Key::of(Part::Tissue)
@@ -148,7 +148,7 @@ pub const KEYS: &[Key] = &[
     },
     Key {
         name: "device",
-        values: names::<Device>,
+        values: names::<SolverDevice>,
         about: "where the solver runs; gpu: on a graphics card, else on the processor with a remark",
         usual: Some("cpu"),
         get: |i| Some(name(&i.device)),
@@ -475,7 +475,7 @@ mod tests {
         assert!(fault("threads=0").contains("1 to 64") && fault("friction=-1").contains("up to 2"));
         assert!(fault("friction=nan").contains("up to 2") && fault("search=brute-force").contains("walk"));
         assert!(setting("list").unwrap().is_none());
-        assert_eq!(with(&["solver=fastest"]).device, Device::Fastest);
+        assert_eq!(with(&["solver=fastest"]).device, SolverDevice::Fastest);
         let method = |settings: &[&str]| with(settings).rigid;
         assert_eq!(method(&["shaft=on", "shaft=off"]), Some("god-object-sphere"));
         assert_eq!(method(&["shaft=off"]), None);

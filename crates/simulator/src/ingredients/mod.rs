@@ -41,7 +41,7 @@ pub struct Ingredients {
     /// Stress relaxation.
     pub relaxation: Relaxation,
     /// Where the solver runs.
-    pub device: Device,
+    pub device: SolverDevice,
     /// Threads of the solver on the processor.
     pub threads: usize,
     /// Pressure of the fluid on the brain's surface, mmHg.
@@ -74,7 +74,7 @@ pub enum Relaxation {
 
 /// Where the solver of the tissue runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Device {
+pub enum SolverDevice {
     /// On the processor.
     Cpu,
     /// On the graphics card; on the processor where there is none.
@@ -96,7 +96,7 @@ impl Default for Ingredients {
             element: Element::Plain,
             laws: [Law::NeoHookean; TissueClass::ALL.len()],
             relaxation: Relaxation::Off,
-            device: Device::Cpu,
+            device: SolverDevice::Cpu,
             threads: 1,
             surface_pressure_mmhg: 0.0,
             search: trepan_deformable::Method::RECOMMENDED,
@@ -110,7 +110,7 @@ impl Ingredients {
     /// Whether every element must be stepped: tissue that relaxes never rests, and the graphics
     /// card has no sleeping elements.
     pub(crate) fn steps_all(&self) -> bool {
-        self.relaxation != Relaxation::Off || self.device != Device::Cpu
+        self.relaxation != Relaxation::Off || self.device != SolverDevice::Cpu
     }
 }
 

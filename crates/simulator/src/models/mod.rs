@@ -453,7 +453,7 @@ mod tests {
         assert_eq!(other, expected);
         assert_eq!(settle("--quality usual", Some(&recording)).ingredients(), plain, "a preset overrides a recording");
         recording.header.config.insert("solver".into(), "fastest".into());
-        assert_eq!(settle("", Some(&recording)).ingredients().device, crate::ingredients::Device::Cpu);
+        assert_eq!(settle("", Some(&recording)).ingredients().device, crate::ingredients::SolverDevice::Cpu);
     }
 
     #[test]

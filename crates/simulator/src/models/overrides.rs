@@ -1,7 +1,7 @@
 //! Given parameters of the models: by flags, a recording's header or a case folder.
 
 use crate::error::SessionError;
-use crate::ingredients::{Device, Given, Ingredients, KEYS, Part};
+use crate::ingredients::{Given, Ingredients, KEYS, Part, SolverDevice};
 use crate::measure::Parts;
 use crate::options::Patient;
 use std::collections::BTreeMap;
@@ -37,8 +37,8 @@ impl Overrides {
             }
         }
         // Which one was the fastest is not known; the processor is always available.
-        if ingredients.device == Device::Fastest {
-            ingredients.device = Device::Cpu;
+        if ingredients.device == SolverDevice::Fastest {
+            ingredients.device = SolverDevice::Cpu;
         }
         let detail = number("picture_detail");
         Self {

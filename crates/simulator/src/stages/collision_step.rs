@@ -4,8 +4,9 @@
 //! # Practice
 //! With a tool for bone the result only causes warnings: the patch goes to the haptic thread, the
 //! solver gets no contact of it (thesis 6.4). A tool for the brain collides with tip and shaft.
-//! From its first use on, the skull supports the brain against the probe and its own weight. The
-//! stage has no clock; the same tools and positions give the same results.
+//! From its first use on, the skull supports the brain against the probe and its own weight; under
+//! surface pressure it does so from the start. The stage has no clock; the same tools and positions
+//! give the same results.
 
 use crate::program::{Phase, Program};
 use crate::stages::haptic_tick::ToolSample;
@@ -44,7 +45,7 @@ impl CollisionStage {
             self.step.springs(&mut self.loads.contacts);
             self.loads.contacts.overflow += self.step.overflow;
         }
-        if let Some(wall) = self.wall.as_mut().filter(|_| self.settling.is_open()) {
+        if let Some(wall) = self.wall.as_mut().filter(|_| self.under_pressure || self.settling.is_open()) {
             wall.press(&soft.positions, phase == Phase::Brain, &mut self.loads.contacts);
         }
         if let Some(folds) = self.folds.as_mut().filter(|_| self.settling.is_open()) {
@@ -92,6 +93,8 @@ pub struct CollisionStage {
     folds: Option<Folds>,
     /// Whether a contact of the shaft turns the tool.
     with_torque: bool,
+    /// Whether the brain is pressed, and so needs the wall, before the dura is open.
+    under_pressure: bool,
     settling: Settling,
     patch: SurfacePatch,
     loads: Loads,
@@ -117,6 +120,7 @@ impl CollisionStage {
             wall,
             folds: None,
             with_torque: false,
+            under_pressure: false,
             patch: SurfacePatch::default(),
             settling: Settling::default(),
             loads: Loads { gravity: Vec3::ZERO, contacts: NodalContacts::with_room() },
@@ -136,6 +140,11 @@ impl CollisionStage {
     /// Makes a contact of the shaft turn the tool, or only push it.
     pub fn turning(self, with_torque: bool) -> Self {
         Self { with_torque, ..self }
+    }
+
+    /// Lets the skull support the brain from the start, or only once the dura is open.
+    pub fn under_pressure(self, under_pressure: bool) -> Self {
+        Self { under_pressure, ..self }
     }
 
     /// Adds the body force on the brain once the dura is open.
