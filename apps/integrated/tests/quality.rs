@@ -121,7 +121,10 @@ fn every_ingredient_at_once_is_shown_recorded_and_replayed() {
     let (was, log) = operation(live.path(), "2", &fixed);
     assert!(log.contains("ingredients: shading=on, bone-friction=0.3, vibration=off, element=locking-free"), "{log}");
     let models = &was["models"];
-    assert_eq!((&models["ingredients"]["law"], &models["ingredients"]["threads"]), (&"ogden".into(), &"2".into()));
+    assert_eq!(
+        (&models["ingredients"]["law"], &models["ingredients"]["threads"]),
+        (&"ogden+ventricle:neo-hookean".into(), &"2".into())
+    );
     assert_eq!(models["bone"]["method"], "god-object-sphere-shaft");
     let report = fs::read_to_string(live.path().join("report.html")).unwrap();
     assert!(report.contains("element locking-free; law ogden"), "the report lacks the ingredients");

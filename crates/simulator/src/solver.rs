@@ -10,19 +10,23 @@ use crate::ingredients::{Element, Ingredients, Relaxation, SolverDevice};
 use crate::measure::tissue::MASS_ADDED;
 use crate::run::clock::Clock;
 use crate::stages::skull_wall::SkullWall;
+use crate::tissue_class::TissueClass;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trepan_budget::Tissue;
-use trepan_contact::NodalContacts;
-use trepan_mesh::Surface;
+use trepan_mesh::{Surface, TetMesh};
 use trepan_soft::{Body, BodyError, Loads, SoftSolver, SurfacePressure};
 use trepan_tled::gpu::WithSpare;
-use trepan_tled::{Config, Settling, Tled, choice};
+use trepan_tled::{Config, Settled, Settling, Tled, choice};
 
 /// Pressure of 1 mmHg, MPa.
 const MPA_PER_MMHG: f32 = 1.333_22e-4;
 /// Times that the brain comes to rest in the skull under pressure, as the wall is found anew.
 const ROUNDS: usize = 3;
+/// End of each; what is left of the motion is seen in the session's first second.
+const SETTLING: Settling = Settling { tolerance_mm: 0.01, steps: 2000 };
+/// Motion to go at which a brain counts as at rest, mm.
+const AT_REST_MM: f32 = 0.05;
 /// Time for which each device is tried to find the faster one, ms.
 const TRIAL_MS: f64 = 100.0;
 
@@ -53,7 +57,8 @@ impl Ran {
     }
 }
 
-/// Builds the solver of a body at rest, with the skull around it, if there is one.
+/// Builds the solver of a body at rest, with the skull around it, if there is one. The body's
+/// materials are the tissue classes, in their order.
 pub(crate) fn build(
     body: &Body,
     wall: Option<&mut SkullWall>,
@@ -80,7 +85,7 @@ pub(crate) fn build(
             Ok((Box::new(solver), ran))
         }
         None => {
-            let solver = on_processor(body, wall, &config, ingredients).map_err(refused)?;
+            let solver = on_processor(body, wall, &config, ingredients)?;
             Ok((Box::new(solver), Ran { remark, ..Ran::here("tled") }))
         }
     }
@@ -114,20 +119,35 @@ fn on_processor(
     mut wall: Option<&mut SkullWall>,
     config: &Config,
     ingredients: &Ingredients,
-) -> Result<Tled, BodyError> {
-    let mut solver = Tled::new(body, config)?;
-    let mpa = MPA_PER_MMHG * ingredients.surface_pressure_mmhg;
-    if mpa > 0.0 {
-        solver.set_pressure(SurfacePressure { triangles: Surface::of(&body.mesh).triangles, mpa });
-        let mut loads = Loads { contacts: NodalContacts::with_room(), ..Loads::default() };
+) -> Result<Tled, SessionError> {
+    let mut solver = Tled::new(body, config).map_err(refused)?;
+    let mmhg = ingredients.surface_pressure_mmhg;
+    if mmhg > 0.0 {
+        solver.set_pressure(SurfacePressure { triangles: wet(body), mpa: MPA_PER_MMHG * mmhg });
+        let (mut loads, mut settled) = (Loads::default(), Settled::default());
         for _ in 0..ROUNDS {
             loads.contacts.clear();
             wall.iter_mut().for_each(|wall| wall.press(solver.positions(), false, &mut loads.contacts));
-            let settled = solver.settle(&loads, &Settling::default());
-            tracing::debug!("at rest under the surface pressure within {:.3} mm", settled.left_mm);
+            settled = solver.settle(&loads, &SETTLING);
+        }
+        let Settled { left_mm, last, .. } = settled;
+        if left_mm > AT_REST_MM || last.inverted > 0 {
+            return Err(SessionError::Usage(format!(
+                "--set surface-pressure={mmhg}: the brain does not come to rest under it, with {} elements inverted \
+                 and {left_mm:.2} mm to go: give less, or --set law=neo-hookean",
+                last.inverted
+            )));
         }
     }
     Ok(solver)
+}
+
+/// Triangles between tissue and fluid: the brain's surface and the walls of the ventricles. On the
+/// surface alone the pressure would close the ventricles.
+fn wet(body: &Body) -> Vec<[u32; 3]> {
+    let is_tissue = |(_, material): &(_, &u8)| **material != TissueClass::Ventricle as u8;
+    let tets = body.mesh.tets.iter().zip(&body.material_of_tet).filter(is_tissue).map(|(tet, _)| *tet).collect();
+    Surface::of(&TetMesh { positions: body.mesh.positions.clone(), tets }).triangles
 }
 
 /// Tries both devices for a time.
@@ -144,7 +164,6 @@ fn is_faster_on_card(body: &Body, config: &Config) -> Result<bool, SessionError>
 mod tests {
     use super::*;
     use crate::ingredients::Law;
-    use crate::tissue_class::TissueClass;
     use trepan_contact::NodalContact;
     use trepan_geometry::Vec3;
     use trepan_soft::boxes;
@@ -209,6 +228,27 @@ mod tests {
         let top = boxes::nodes_where(&body.mesh, |p| p.z > 29.99);
         let sunk = top.into_iter().map(|n| 30.0 - before[n as usize].z);
         assert!(sunk.fold(f32::INFINITY, f32::min) > 0.2, "1.3 kPa on a bulk modulus of 10 kPa");
+        let centre = |tet: usize| body.mesh.corners(tet).iter().sum::<Vec3>() / 4.0;
+        let is_inside = |tet: &usize| (centre(*tet) - 15.0).abs().max_element() < 5.0;
+        let mut hollow = block(&with);
+        hollow.materials = TissueClass::ALL.map(|class| class.material(0.003)).to_vec();
+        let all = hollow.mesh.tets.len();
+        (0..all).filter(is_inside).for_each(|tet| hollow.material_of_tet[tet] = TissueClass::Ventricle as u8);
+        let (filled, _) = build(&hollow, None, &TLED, &with).unwrap();
+        let volume = |tet: usize, positions: &[Vec3]| {
+            let [a, b, c, d] = hollow.mesh.tets[tet].map(|n| positions[n as usize]);
+            (b - a).cross(c - a).dot(d - a) / 6.0
+        };
+        let of_ventricle =
+            |positions: &[Vec3]| (0..all).filter(is_inside).map(|tet| volume(tet, positions)).sum::<f32>();
+        let share = of_ventricle(filled.positions()) / of_ventricle(&hollow.mesh.positions);
+        assert!(share > 0.8, "the ventricle keeps {share} of its volume");
+        let much = Ingredients { surface_pressure_mmhg: 60.0, laws: [Law::StVenantKirchhoff; 6], ..with.clone() };
+        let fault = build(&block(&much), None, &TLED, &much).err().map(|fault| fault.to_string());
+        assert!(
+            fault.as_ref().is_some_and(|fault| fault.contains("surface-pressure=60: the brain does not")),
+            "{fault:?}"
+        );
         (0..100).for_each(|_| _ = solver.step(&Loads::default(), dt_ms));
         let moved = before.iter().zip(solver.positions()).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max);
         assert!(moved < 0.02, "{moved} mm");

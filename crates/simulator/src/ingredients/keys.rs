@@ -131,7 +131,7 @@ pub const KEYS: &[Key] = &[
         values: || {
             format!("{}; law.CLASS for one of {}", names::<Law>(), list(TissueClass::ALL.map(TissueClass::name)))
         },
-        about: "constitutive law, at the same moduli for small strain",
+        about: "constitutive law at the same moduli; without CLASS of all tissue, not of the ventricles' fluid",
         usual: Some("neo-hookean"),
         get: |i| Some(laws(&i.laws)),
         set: |i, text| text.split('+').try_for_each(|part| set_law(&mut i.laws, part)),
@@ -167,7 +167,7 @@ pub const KEYS: &[Key] = &[
     Key {
         name: "surface-pressure",
         values: || "off, or up to 60 mmHg".into(),
-        about: "pressure of the fluid on the brain's surface, with which the brain is at rest at the start",
+        about: "fluid pressure on the brain's surface and in the ventricles; the brain starts at rest under it",
         usual: Some("off"),
         get: |i| Some(off_or(i.surface_pressure_mmhg)),
         set: |i, text| up_to(text, 60.0).map(|mmhg| i.surface_pressure_mmhg = mmhg),
@@ -343,11 +343,15 @@ fn searches() -> impl Iterator<Item = trepan_deformable::Method> {
     trepan_deformable::Method::all().into_iter().filter(|method| !method.descriptor().is_oracle)
 }
 
-/// Sets the law of all classes, or with `CLASS:LAW` of one.
+/// Sets the law of all classes but the ventricles, which stand for fluid; with `CLASS:LAW` of one.
 fn set_law(laws: &mut [Law; TissueClass::ALL.len()], text: &str) -> Option<()> {
     match text.split_once(':') {
         Some((class, law)) => laws[TissueClass::named(class)? as usize] = value(law)?,
-        None => laws.fill(value(text)?),
+        None => {
+            let law = value(text)?;
+            let tissue = TissueClass::ALL.into_iter().filter(|class| *class != TissueClass::Ventricle);
+            tissue.for_each(|class| laws[class as usize] = law);
+        }
     }
     Some(())
 }
@@ -448,7 +452,7 @@ mod tests {
         }
         assert_eq!(again, made);
         let value = |name: &str| Key::named(name).unwrap().value(&made);
-        assert_eq!(value("law"), "ogden+grey:mooney-rivlin");
+        assert_eq!(value("law"), "ogden+grey:mooney-rivlin+ventricle:neo-hookean");
         assert_eq!((value("rigid"), value("shaft")), ("god-object-sphere-shaft".into(), "on".into()));
         let json = serde_json::to_value(&made).unwrap();
         assert_eq!((&json["element"], json.as_object().unwrap().len()), (&"locking-free".into(), KEYS.len()));

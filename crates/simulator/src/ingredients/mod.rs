@@ -44,7 +44,7 @@ pub struct Ingredients {
     pub device: SolverDevice,
     /// Threads of the solver on the processor.
     pub threads: usize,
-    /// Pressure of the fluid on the brain's surface, mmHg.
+    /// Fluid pressure on the brain's surface and in the ventricles, mmHg.
     pub surface_pressure_mmhg: f32,
     /// Search for the tool's points inside the tissue.
     pub search: trepan_deformable::Method,
