@@ -55,9 +55,8 @@ pub(crate) struct Sweep {
 }
 
 impl Sweep {
-    /// Calls `visit` with each eight nodes of a row at a multiple of eight, by the first of them,
-    /// brick by brick: those ahead up to `beyond` the radius from the start, but not all nearer
-    /// than `hollow`.
+    /// Calls `visit` with each eight nodes of a row, by the first of them, brick by brick. They are
+    /// ahead, up to `beyond` the radius from the start, and not all nearer than `hollow`.
     #[inline]
     pub fn eights(&self, hollow: f32, beyond: f32, mut visit: impl FnMut(IVec3, Place)) {
         let Self { centre, side, forward, radius } = *self;

@@ -7,7 +7,8 @@
 //! z = z₀ + ½ (k₁ a² + k₂ b²) ,   a² + b² ≤ radius²        k > 0: hollow
 //! ```
 //! Slope and curvature of the cut, which is a distance, are those of its quadratic B-spline. Those
-//! of the density are from the quadric that fits best what lies within a voxel of the tangent plane:
+//! of the density are from the quadric that fits best what lies within a voxel of the tangent
+//! plane:
 //! ```text
 //! minimise Σ w (h - iso + c₀ + g·d + ½ (c₁ a² + 2 c₂ a b + c₃ b²))²
 //! w = B(d) · max(0, 1 - (n·d)²)        d = (a, b, n·d): from x to the voxel,  n = g/|g|
@@ -18,11 +19,11 @@
 //! cut discs stand between voxels, where the density is linear and bends nothing: they are flat and
 //! their normal that of a fitted plane.
 //!
-//! The point of a disc that is nearest to one at (a₀, b₀, h) has `a = a₀ / (1 - (h - z) k₁)`, and so
-//! b; two steps find z. Neighbours differ by a third power of their distance, so places, normals and
-//! forces are of second order in the voxel (`validate rigid` gives the orders). Past the rim the way
-//! turns to that from the rim little by little: of two discs of nearly the same height either may
-//! touch, and both then push the same way.
+//! The point of a disc that is nearest to one at (a₀, b₀, h) has `a = a₀ / (1 - (h - z) k₁)`, and
+//! so b; two steps find z. Neighbours differ by a third power of their distance, so places, normals
+//! and forces are of second order in the voxel (`validate rigid` gives the orders). Past the rim
+//! the way turns to that from the rim little by little: of two discs of nearly the same height
+//! either may touch, and both then push the same way.
 //!
 //! # Sources
 //! Curvature from a fitted quadric: D. S. Meek, D. J. Walton, *On surface normal and Gaussian
@@ -120,8 +121,8 @@ impl Bend {
 }
 
 impl Disc {
-    /// A disc at `x` (voxels from `base`), where `field` ends the bone on an edge that leads out of it
-    /// along `edge`.
+    /// A disc at `x` (voxels from `base`), where `field` ends the bone on an edge that leads out of
+    /// it along `edge`.
     pub fn of(solid: &impl Solid, base: IVec3, (x, field): (Vec3, Field), edge: Vec3, radius: f32) -> Self {
         let (step, along) = (edge.as_ivec3(), x.dot(edge));
         let cell = base + x.round().as_ivec3() + (along.floor() - along.round()) as i32 * step;
@@ -133,8 +134,8 @@ impl Disc {
         let block = Block::read(solid, field, stride, base, x);
         let shape = Shape::of(&block);
         let size = shape.slope.length();
-        // Against the edge, or without slope, the smoothed density is of no use: a wall thinner than
-        // its kernel.
+        // Against the edge, or without slope, the smoothed density is of no use: a wall thinner
+        // than its kernel.
         if size < 1.0 || -shape.slope.dot(edge) < -0.5 * size {
             return Self { centre: x, normal: edge, radius: SMALLEST.min(radius), ..Self::default() };
         }
@@ -176,8 +177,8 @@ impl Disc {
         self.centre.distance(place) - EXTENT * self.radius
     }
 
-    /// The way from its nearest point to the place `from` its centre, and the way to follow there:
-    /// near the rim that from the surface that the disc is a part of.
+    /// The way from its nearest point to the place `from` its centre, and the way to push there.
+    /// Past the rim that is at first the way from the surface that the disc is a part of.
     #[inline(always)]
     pub fn way_to(&self, from: Vec3) -> (Vec3, Vec3) {
         let height = from.dot(self.normal);
@@ -195,8 +196,8 @@ impl Disc {
         let (a, b) = nearest(height - z(a, b));
         let way = |a: f32, b: f32| from - a * along - b * across - z(a, b) * self.normal;
         let off = (a * a + b * b).sqrt();
-        // Where the hollow is about as wide as the ball all of it is as near, and the centre is best
-        // known.
+        // Where the hollow is about as wide as the ball all of it is as near, and the centre is
+        // best known.
         let radius = self.radius * ((1.0 - height * first) / SPREAD).clamp(LEAST_PART, 1.0);
         if off <= radius {
             let way = way(a, b);
@@ -210,15 +211,15 @@ impl Disc {
     }
 }
 
-/// The radius, up to `radius` cells, at which a disc stands out by [`STAND_OUT`] over a surface that
-/// bends away by `more` than the disc, 1/voxel.
+/// The radius, up to `radius` cells, at which a disc stands out by [`STAND_OUT`]. The surface bends
+/// away by `more` than the disc, 1/voxel.
 fn stood_out(more: f32, stride: i32, radius: f32) -> f32 {
     let most = stride as f32 * (2.0 * STAND_OUT / more.max(1e-9)).sqrt();
     if more > 0.0 { most.clamp(SMALLEST.min(radius), radius) } else { radius }
 }
 
-/// How far `x` on an edge along `edge` is from where the field that does not end the bone there
-/// would end it, cells: no disc may stand out over that.
+/// How far `x` is from where the other field would end the bone, cells. No disc may stand out over
+/// that. The field that ends it at `x` is `field`, on an edge along `edge`.
 pub(crate) fn to_edge(solid: &impl Solid, field: Field, base: IVec3, x: Vec3, edge: Vec3) -> f32 {
     let other = if field == Field::Cut { Field::Density } else { Field::Cut };
     let (step, along) = (edge.as_ivec3(), x.dot(edge));
@@ -289,8 +290,8 @@ impl Block {
     }
 }
 
-/// The normal and curvature of the quadric that best fits the densities around the place `share`
-/// of the way from `cell` to the next voxel by `step`, weighed as in [`Block::fitted`].
+/// The normal and curvature of the quadric that best fits the densities around a place. It is
+/// `share` of the way from `cell` to the next voxel by `step`; weights as in [`Block::fitted`].
 fn fitted_quadric(solid: &impl Solid, cell: IVec3, step: IVec3, share: f32, normal: Vec3) -> Option<(Vec3, Bend)> {
     let (u, v) = normal.any_orthonormal_pair();
     let (right, up) = (IVec3::new(step.y, step.z, step.x), IVec3::new(step.z, step.x, step.y));

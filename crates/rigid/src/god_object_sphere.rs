@@ -322,8 +322,8 @@ impl GodObjectSphere {
         slide.rests
     }
 
-    /// How far the ball may move with one set of discs, nodes: what is left of its way in this tick,
-    /// and room to grow.
+    /// How far the ball may move with one set of discs, nodes: what is left of its way in this
+    /// tick, and room to grow.
     fn reach(&self, bone: &BoneVolume) -> f32 {
         self.config.move_nodes.min(self.left_mm / bone.node_mm() + ROOM)
     }

@@ -52,8 +52,8 @@ impl Lean {
         }
     }
 
-    /// Adds the discs that the shaft of `ball` at `from` has within `reach` to `near`, in the frame
-    /// shifted to `base`; all in nodes of the cut.
+    /// Adds the discs that the shaft of `ball` at `from` has within `reach` to `near`. All is in
+    /// nodes of the cut, in the frame shifted to `base`.
     pub fn select(
         &mut self,
         bone: &BoneVolume,

@@ -20,8 +20,9 @@
 //!
 //! # Practice
 //! Lengths are cells, in a frame shifted to a whole cell near the tool ([`Discs::base`]). Bone is
-//! found 8 cells at once; a disc costs 30 ns on the cut, 300 ns on voxels. One that was there before keeps its normal;
-//! while bone goes away, for a few ticks. The capacity is fixed; what does not fit is counted.
+//! found 8 cells at once; a disc costs 30 ns on the cut, 300 ns on voxels. One that was there
+//! before keeps its normal; while bone goes away, for a few ticks. The capacity is fixed; what does
+//! not fit is counted.
 
 use crate::disc::{Disc, to_edge};
 use crate::rows::{GridBall, rows};
@@ -122,7 +123,8 @@ impl Kept {
         }
         *disc = Disc { centre: disc.centre, shaft: disc.shaft, ..was.disc };
         if S::CUT && stride == 1 {
-            // Where the other field ends the bone nearby the disc must not stand out over that edge.
+            // Where the other field ends the bone nearby the disc must not stand out over that
+            // edge.
             disc.radius = disc.radius.min(to_edge(solid, edge.field, base, disc.centre, step.as_vec3()));
         }
         edge.shaped = true;

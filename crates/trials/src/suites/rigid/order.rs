@@ -3,9 +3,10 @@
 //!
 //! # Theory
 //! An error `e = C h^p` on voxels of h, h/2 and h/4 gives the order p, the slope of ln e over ln h
-//! by least squares. The density is the distance to the closed form, in voxels, times a slope: there
-//! is no blur that could shrink with the voxel. All that is left is the method's own error, that of
-//! the interpolation between voxels, which is of order 2, and that of whole HU: 1/1600 voxel.
+//! by least squares. The density is the distance to the closed form, in voxels, times a slope:
+//! there is no blur that could shrink with the voxel. All that is left is the method's own error,
+//! that of the interpolation between voxels, which is of order 2, and that of whole HU: 1/1600
+//! voxel.
 //!
 //! A burr fed at a steady speed settles where its law takes a cylinder of its width at that speed:
 //! a closed form for the depth. Its bore is a cylinder in which a smaller ball is pressed against
@@ -263,8 +264,8 @@ fn steady_mm() -> f64 {
     low.into()
 }
 
-/// Orders that are known to be missed: scene and error. In a bore the error is that of the clearance
-/// of 0.004 mm that a burr cuts around itself, at every voxel.
+/// Orders that are known to be missed: scene and error. In a bore the error is that of the
+/// clearance of 0.004 mm that a burr cuts around itself, at every voxel.
 const GAPS: [(&str, &str); 2] = [("order: bore", "force"), ("order: bore", "depth")];
 
 /// The orders that the recommended method reaches.
