@@ -13,7 +13,7 @@
 //! # Practice
 //! A look costs about a nanosecond, with no test for borders. The window is a copy: what its owner
 //! changes it is told ([`Window::put_eight`]), what others change it finds by the versions of the
-//! bricks that it meets ([`Window::renew`]), a nanosecond each, where anything has changed at all.
+//! bricks that it meets ([`Window::renew`]), a nanosecond each.
 
 use crate::rows::each;
 use glam::IVec3;
@@ -49,8 +49,6 @@ pub(crate) struct Window {
     filled: bool,
     /// Versions of the bricks that it meets; brick (i, j, k) lies at each index mod [`BRICKS`].
     seen: Vec<u32>,
-    /// Changes of the whole bone when the bricks were last compared.
-    changes: Option<u32>,
     /// Density from which a voxel is bone, HU.
     isovalue: i16,
 }
@@ -61,12 +59,12 @@ impl Window {
         let read = Vec::with_capacity(1 << (3 * MAX_BITS));
         let scratch = BetweenScratch::new(if shown == Shown::Density { 1 << MAX_BITS } else { 0 });
         let (brick, low) = (BRICK as i32, IVec3::ZERO);
-        Self { shown, cells, read, scratch, brick, bits: 0, low, filled: false, seen, changes: None, isovalue: 0 }
+        Self { shown, cells, read, scratch, brick, bits: 0, low, filled: false, seen, isovalue: 0 }
     }
 
     /// Everything is to be read anew.
     pub fn forget(&mut self) {
-        (self.filled, self.changes) = (false, None);
+        self.filled = false;
     }
 
     /// Makes the window hold all voxels within `half` of `centre`. Returns the voxels read, or
@@ -112,11 +110,7 @@ impl Window {
 
     /// Reads the bricks anew that others have changed. Returns whether there were any.
     pub fn renew(&mut self, bone: &BoneVolume) -> bool {
-        let (before, mut changed) = (self.changes, false);
-        self.changes = Some(self.all_changes(bone));
-        if self.changes == before {
-            return false;
-        }
+        let mut changed = false;
         let (low, high) = (self.low, self.low + (1 << self.bits));
         self.bricks(|window, brick| {
             if window.seen[place(brick)] != window.version(bone, brick) {
@@ -143,10 +137,6 @@ impl Window {
 
     fn version(&self, bone: &BoneVolume, brick: IVec3) -> u32 {
         if self.shown == Shown::Cut { bone.cut_version(brick) } else { bone.ct_version(brick) }
-    }
-
-    fn all_changes(&self, bone: &BoneVolume) -> u32 {
-        if self.shown == Shown::Cut { bone.cut_changes() } else { bone.ct_changes() }
     }
 
     fn see(&mut self, bone: &BoneVolume, brick: IVec3) {
@@ -248,7 +238,6 @@ impl Window {
 
     /// Takes note that what it shows of the bricks that it meets is how they are now.
     pub fn see_all(&mut self, bone: &BoneVolume) {
-        self.changes = Some(self.all_changes(bone));
         self.bricks(|window, brick| window.see(bone, brick));
     }
 

@@ -289,8 +289,8 @@ impl BoneVolume {
     pub(super) fn note_cut(&self, brick: IVec3) {
         let low = BRICK as i32 * brick;
         // A brick of nodes lies within one brick of voxels, since its edge divides theirs.
-        super::bump(&self.cut_versions[self.brick_of_node(low)]);
-        super::bump(&self.changes[1]);
+        let version = &self.cut_versions[self.brick_of_node(low)];
+        version.store(version.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
     }
 }
 

@@ -64,8 +64,6 @@ pub struct BoneVolume {
     versions: Vec<AtomicU32>,
     /// Changes of the cut in each brick.
     cut_versions: Vec<AtomicU32>,
-    /// Changes of all bricks' densities together, and of the cut in them.
-    changes: [AtomicU32; 2],
     /// Whether a brick has ever held bone.
     solid: Vec<AtomicBool>,
     strokes: Strokes,
@@ -106,7 +104,6 @@ impl BoneVolume {
             bricks,
             versions: counters(),
             cut_versions: counters(),
-            changes: Default::default(),
             solid: (0..bricks.iter().product()).map(|_| AtomicBool::new(false)).collect(),
             strokes: Strokes::new(0),
             undone: AtomicU32::new(0),
@@ -238,14 +235,8 @@ impl BoneVolume {
             if hu >= self.isovalue {
                 self.solid[brick].store(true, Ordering::Relaxed);
             }
-            self.note_ct(brick);
+            self.versions[brick].fetch_add(1, Ordering::Release);
         }
-    }
-
-    /// Tells readers that a brick of voxels has changed.
-    fn note_ct(&self, brick: usize) {
-        bump(&self.versions[brick]);
-        bump(&self.changes[0]);
     }
 
     /// Records that [`set_hu`](Self::set_hu) restored bone. For the writer only.
@@ -275,18 +266,6 @@ impl BoneVolume {
     #[inline]
     pub fn cut_version(&self, brick: IVec3) -> u32 {
         self.brick_index(brick).map_or(0, |at| self.cut_versions[at].load(Ordering::Acquire))
-    }
-
-    /// How often any densities of the CT have changed.
-    #[inline]
-    pub fn ct_changes(&self) -> u32 {
-        self.changes[0].load(Ordering::Acquire)
-    }
-
-    /// How often the cut has changed anywhere.
-    #[inline]
-    pub fn cut_changes(&self) -> u32 {
-        self.changes[1].load(Ordering::Acquire)
     }
 
     fn brick_index(&self, brick: IVec3) -> Option<usize> {
@@ -389,11 +368,6 @@ impl BoneVolume {
         }
         volume
     }
-}
-
-/// Counts a change. Without a lock on the bus: there is one writer.
-fn bump(counter: &AtomicU32) {
-    counter.store(counter.load(Ordering::Relaxed).wrapping_add(1), Ordering::Release);
 }
 
 #[cfg(test)]

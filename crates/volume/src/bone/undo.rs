@@ -58,7 +58,7 @@ impl BoneVolume {
                     exchange(kept, &self.hu[at]);
                 }
             }
-            self.note_ct(brick);
+            self.versions[brick].fetch_add(1, Ordering::Release);
         }
         self.came_back();
     }
