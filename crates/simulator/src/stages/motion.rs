@@ -2,7 +2,8 @@
 //!
 //! # Theory
 //! The position of the tip is averaged over equal windows of time, linear between two ticks, so
-//! that neither tick rate nor encoder noise affects it. Over windows of 20 ms:
+//! that neither tick rate nor encoder noise affects it. Windows begin at multiples of their length,
+//! not at the first tick, and the tip counts as at rest before that tick. Over windows of 20 ms:
 //!
 //! ```text
 //! path = Σ |xₖ₊₁ - xₖ|          idle = time with |xₖ₊₁ - xₖ| / h < 5 mm/s
@@ -135,7 +136,10 @@ impl Grid {
                 }
                 self.sum += (time_ms - done_ms) * at(0.5 * (done_ms + time_ms));
             }
-            _ => (self.end_ms, self.sum) = (time_ms + step_ms, DVec3::ZERO),
+            _ => {
+                let start_ms = (time_ms / step_ms).floor() * step_ms;
+                (self.end_ms, self.sum) = (start_ms + step_ms, (time_ms - start_ms) * tip);
+            }
         }
         self.before = Some((time_ms, tip));
     }
