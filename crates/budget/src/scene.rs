@@ -48,11 +48,11 @@ pub struct Scene {
 }
 
 impl Default for Scene {
-    /// Tolerances that the usual setup just meets for force and tissue in an adult head, and for a
-    /// picture whose edges are still sharp.
+    /// Tolerances: a force error that a hand just notices, a displacement that the usual setup just
+    /// meets in an adult head, and a picture whose edges are still sharp.
     fn default() -> Self {
         Self {
-            force_error_n: 0.4,
+            force_error_n: 0.1,
             displacement_mm: 0.4,
             picture_error_percent: 1.0,
             has_bone: true,

@@ -41,6 +41,7 @@ mod resample;
 mod sample;
 mod skull;
 mod source;
+mod spline;
 mod stroke;
 mod volume;
 
@@ -68,6 +69,7 @@ pub use sample::{ByteOrder, Number, Sample};
 pub use skull::{
     GREATEST_ISOVALUE, HounsfieldError, LEAST_ISOVALUE, bone_isovalue, hounsfield, is_ct, labels, skull_only,
 };
+pub use spline::Spline;
 pub use stroke::{BRICK, MAX_STROKE_BRICKS, MAX_STROKES, Undone};
 pub use volume::VoxelVolume;
 

@@ -161,7 +161,8 @@ pub(super) fn find_brain(
     Ok(mask)
 }
 
-/// Resamples a CT to cubic voxels and keeps the largest piece of bone.
+/// Resamples a CT to cubic voxels, by a spline whose isosurface has no creases, and keeps the
+/// largest piece of bone.
 pub(super) fn make_skull(
     ct: &VoxelVolume<i16>,
     recipe: &Recipe,
@@ -173,7 +174,7 @@ pub(super) fn make_skull(
             format!("the skull at --spacing-mm {}: {fault}; give a larger spacing or crop the CT", recipe.spacing_mm);
         SessionError::Usage(text)
     })?;
-    let mut skull = resample(ct, &grid, Interpolation::Trilinear, AIR_HU);
+    let mut skull = resample(ct, &grid, Interpolation::Cubic, AIR_HU);
     skull_only(&mut skull, isovalue_hu);
     if !skull.data.iter().any(|&hu| hu >= isovalue_hu) {
         return Err(SessionError::Case(format!(

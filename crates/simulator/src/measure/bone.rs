@@ -2,7 +2,7 @@
 //! along the skull, a burr cuts into it.
 //!
 //! # Theory
-//! The ground truth is [`trepan_rigid::truth`] in f64: the density between the scanner's own
+//! The ground truth is [`trepan_rigid::truth`] in f64: a smooth density between the scanner's own
 //! voxels, with nothing of any method in it. The error of a tick is the norm of the difference
 //! between the forces. That of a choice is the 95th percentile over the ticks in contact, sliding
 //! or cutting, whichever is worse. If the tool's centre is below the surface, pressed in or at a
@@ -237,7 +237,7 @@ fn cut_out(skull: &Skull, place: Vec3, edge_mm: f32) -> Option<BoneVolume> {
     let room = f64::from(ROOM_MM / edge_mm).ceil();
     let world_from_voxel = whole.world_from_voxel * DAffine3::from_translation(middle - room);
     let grid = Grid { dims: [2 * room as usize + 1; 3], world_from_voxel };
-    let cut: VoxelVolume<i16> = resample(&skull.ct, &grid, Interpolation::Trilinear, AIR_HU);
+    let cut: VoxelVolume<i16> = resample(&skull.ct, &grid, Interpolation::Cubic, AIR_HU);
     BoneVolume::new(&cut, skull.isovalue).ok()
 }
 

@@ -217,7 +217,7 @@ impl ModelRequest {
             asked.picture.clear();
         }
         let case_errors = case_errors(&scene, &asked)?;
-        let plan = trepan_budget::plan_with(&machine, &scene, &case_errors.instead(rows, &scene)).map_err(internal)?;
+        let plan = trepan_budget::plan_with(&machine, &scene, &case_errors.instead(rows)).map_err(internal)?;
         Ok((plan, case_errors.has()))
     }
 

@@ -257,7 +257,7 @@ mod tests {
     fn removed_bone_is_absent_at_a_low_threshold_and_the_rest_is_as_scanned() {
         let ct = ct();
         for spacing_mm in [0.5, 1.0] {
-            let before = resample(&ct, &Grid::isotropic_over(&ct, spacing_mm), Interpolation::Trilinear, AIR_HU);
+            let before = resample(&ct, &Grid::isotropic_over(&ct, spacing_mm), Interpolation::Cubic, AIR_HU);
             let bone = BoneVolume::new(&before, 400).unwrap();
             assert!(drilled(ct.clone(), &before, &bone) == ct, "nothing went");
             let [nx, ny, nz] = before.dims;

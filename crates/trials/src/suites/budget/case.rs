@@ -107,7 +107,7 @@ impl Case {
         mask: VoxelVolume<u8>,
         ball: Option<(DVec3, f64)>,
     ) -> Self {
-        let look = resample(&ct, &Grid::isotropic_over(&ct, LOOK_MM), Interpolation::Trilinear, AIR_HU);
+        let look = resample(&ct, &Grid::isotropic_over(&ct, LOOK_MM), Interpolation::Cubic, AIR_HU);
         let bone = Arc::new(BoneVolume::new(&look, isovalue).expect("the case has bone"));
         let brain = Shape { field: DistanceField::of_mask(&mask), mask, material: Material::BRAIN };
         Self { name, skull: Skull { ct, isovalue }, bone, brain, ball }

@@ -75,7 +75,7 @@ fn note(
     let holds_walls = |(row, _): &(Laws<Bone>, f64)| holds_walls(&row.what, scene.tool_radius_mm);
     let (holding, on_bone): (Vec<_>, Vec<_>) = rows.bone.iter().copied().zip(on_bone).filter(holds_walls).unzip();
     let rows = &Rows { bone: holding, ..rows.clone() };
-    let looked_at = own.instead(rows.clone(), scene);
+    let looked_at = own.instead(rows.clone());
     let plan = plan_with(&MACHINE, scene, &looked_at).expect("the scene is sound");
     let (bone, tissue, picture) =
         (plan.bone.expect("there is bone"), plan.tissue.expect("there is tissue"), plan.picture);

@@ -174,7 +174,7 @@ pub fn budget(scope: Scope, findings: &mut Findings) {
     };
     let mut rows = vec![row("time step: half a ms against 1 ms", &Felt::exact(around(&ct), &path, until, 2), &truth)];
     for &spacing_mm in scope.pick(&[0.75f32][..], &[1.0, 0.75, 0.5]) {
-        let mut skull = resample(&ct, &Grid::isotropic_over(&ct, spacing_mm), Interpolation::Trilinear, AIR_HU);
+        let mut skull = resample(&ct, &Grid::isotropic_over(&ct, spacing_mm), Interpolation::Cubic, AIR_HU);
         skull_only(&mut skull, isovalue);
         let exact = Felt::exact(around(&skull), &path, until, 1);
         let method = Felt::by_method(&skull, isovalue, &path, until);

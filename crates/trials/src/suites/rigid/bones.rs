@@ -39,5 +39,5 @@ pub fn skull(head: &VoxelVolume<i16>, dims: [usize; 3], voxel_mm: f32) -> VoxelV
     let corner = (0.5 * (low + high) - 0.5 * size).with_z(high.z - size.z);
     let origin = (corner + 0.5 * f64::from(voxel_mm)).as_vec3();
     let grid = Grid::of(&VoxelVolume::isotropic([0; 3], origin, voxel_mm, 0u8));
-    resample(head, &Grid { dims, ..grid }, Interpolation::Trilinear, AIR_HU)
+    resample(head, &Grid { dims, ..grid }, Interpolation::Cubic, AIR_HU)
 }
