@@ -319,19 +319,22 @@ impl Burr {
     ) -> bool {
         let (mut writer, (cut, density), mut opened) = (bone.cut_writer(), nodes.split(), false);
         sweep.eights(hollow, BAND + way.max(0.0), |node, place| {
-            let was = i16x8::new(*cut.eight(node));
+            let (whole, cells) = (cut.holds_eight(node), cut.eight_mut(node));
+            let was = i16x8::new(*cells);
             let (is, rises) = sweep.cut(&place, was, way);
             let changed = rises.to_bitmask();
             if changed == 0 {
                 return;
             }
             let is_bone = |lane: &usize| density.eight(node)[*lane] >= density.border();
-            if !writer.set_eight(node, is.to_array(), changed) {
+            let now = rises.select(is, was).to_array();
+            // Those that have not changed are known where the window holds all of them.
+            if !writer.set_eight(node, now, if whole { 0xFF } else { changed }) {
                 // Beyond the grid there is no bone.
                 out.fallbacks += lanes(changed).filter(is_bone).count() as u32;
                 return;
             }
-            cut.put_eight(node, rises.select(is, was));
+            *cells = now;
             let border = i16x8::splat(CUT_SURFACE);
             let opens = (rises & was.simd_lt(border) & is.simd_ge(border)).to_bitmask();
             for lane in lanes(opens).filter(is_bone) {

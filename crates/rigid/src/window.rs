@@ -12,7 +12,7 @@
 //!
 //! # Practice
 //! A look costs about a nanosecond, with no test for borders. The window is a copy: what its owner
-//! changes it is told ([`Window::put_eight`]), what others change it finds by the versions of the
+//! changes it is told ([`Window::eight_mut`]), what others change it finds by the versions of the
 //! bricks that it meets ([`Window::renew`]), a nanosecond each.
 
 use crate::rows::each;
@@ -229,11 +229,17 @@ impl Window {
         self.cells[at..].first_chunk().expect("the edge is a multiple of eight")
     }
 
-    /// Sets the eight cells from `cell` on to what their owner has just cut.
+    /// Whether the eight cells from `cell` on are all within the window.
     #[inline]
-    pub fn put_eight(&mut self, cell: IVec3, values: i16x8) {
+    pub fn holds_eight(&self, cell: IVec3) -> bool {
+        (0..=(1 << self.bits) - 8).contains(&(cell.x - self.low.x))
+    }
+
+    /// The eight cells from `cell` on, for their owner to change as it cuts.
+    #[inline]
+    pub fn eight_mut(&mut self, cell: IVec3) -> &mut [i16; 8] {
         let at = self.index_of_eight(cell);
-        *self.cells[at..].first_chunk_mut().expect("the edge is a multiple of eight") = values.to_array();
+        self.cells[at..].first_chunk_mut().expect("the edge is a multiple of eight")
     }
 
     /// Takes note that what it shows of the bricks that it meets is how they are now.

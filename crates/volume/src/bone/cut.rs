@@ -238,9 +238,9 @@ impl CutWriter<'_> {
         self.set_eight(node - lane * IVec3::X, [value; 8], 1 << lane)
     }
 
-    /// Sets those of the eight nodes along x from `node` on that have a bit in `which`.
-    /// The first is at a multiple of eight. Returns false outside the grid and where no memory is
-    /// left: then nothing changes.
+    /// Sets those of the eight nodes along x from `node` on that have a bit in `which`: fast where
+    /// it has all eight. The first is at a multiple of eight. Returns false outside the grid and
+    /// where no memory is left: then nothing changes.
     #[inline]
     pub fn set_eight(&mut self, node: IVec3, values: [i16; 8], which: u32) -> bool {
         debug_assert_eq!(node.x % 8, 0);
@@ -250,10 +250,11 @@ impl CutWriter<'_> {
         }
         let Some(place) = self.place else { return false };
         let cells = &self.bone.cut.values[place * BRICK_NODES + within(node)..][..8];
+        let all = which == 0xFF;
         for (lane, (cell, value)) in cells.iter().zip(values).enumerate() {
-            // Without a branch, which nobody could foresee. Nobody else writes.
-            let value = if which >> lane & 1 == 1 { value } else { cell.load(Ordering::Relaxed) };
-            cell.store(value, Ordering::Relaxed);
+            if all || which >> lane & 1 == 1 {
+                cell.store(value, Ordering::Relaxed);
+            }
         }
         true
     }
