@@ -38,7 +38,7 @@ pub(crate) struct Ball {
 }
 
 /// Where a ball sees a disc.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Near {
     /// Distance from the disc to the centre; negative behind it when the centre is in bone.
     pub distance: f32,
@@ -76,7 +76,7 @@ impl InReach {
     pub fn seen_from(&mut self, ball: &Ball, at: Vec3) -> impl Iterator<Item = (&Disc, &Near)> {
         if (at, ball.inside) != (self.at, self.inside) {
             (self.at, self.inside) = (at, ball.inside);
-            self.list.iter_mut().for_each(|seen| seen.near = ball.nearest(&seen.disc, at));
+            ball.see(&mut self.list, at);
         }
         self.list.iter().map(|seen| (&seen.disc, &seen.near))
     }
@@ -154,22 +154,37 @@ impl Ball {
         Near { distance, direction }
     }
 
+    /// Sees all of them with the ball at `centre`, eight at once: with the bits of
+    /// [`nearest`](Self::nearest).
+    fn see(&self, all: &mut [Seen], centre: Vec3) {
+        for eight in all.chunks_mut(8) {
+            if self.inside || eight.iter().any(|seen| seen.disc.shaft) {
+                eight.iter_mut().for_each(|seen| seen.near = self.nearest(&seen.disc, centre));
+                continue;
+            }
+            let discs = core::array::from_fn(|n| &eight[n.min(eight.len() - 1)].disc);
+            let (rim, ahead) = Disc::ways_to(discs, centre);
+            let (distance, share) = (rim.length(), 1.0 / ahead.length());
+            let direction = ahead * share;
+            for (n, Seen { disc, near }) in eight.iter_mut().enumerate() {
+                let share = share.as_array()[n];
+                let direction = if share.is_finite() && share > 0.0 { direction.lane(n) } else { disc.normal };
+                *near = Near { distance: distance.as_array()[n], direction };
+            }
+        }
+    }
+
     /// Copies those discs to `near` that a ball of radius `most` at `centre` has within `reach`.
     /// Returns the smallest distance.
     pub fn select(&self, discs: &[Disc], centre: Vec3, most: f32, reach: f32, all: &mut InReach) -> f32 {
         all.clear();
         (all.at, all.inside) = (centre, self.inside);
-        let mut smallest = f32::MAX;
-        for disc in discs {
-            // Cheaper than the disc's own distance and never greater.
-            if disc.least_distance(centre) <= most + reach {
-                let near = self.nearest(disc, centre);
-                smallest = smallest.min(near.distance);
-                if near.distance <= most + reach {
-                    all.list.push(Seen { disc: *disc, near });
-                }
-            }
-        }
+        // Cheaper than the disc's own distance and never greater.
+        let may = discs.iter().filter(|disc| disc.least_distance(centre) <= most + reach);
+        all.list.extend(may.map(|disc| Seen { disc: *disc, near: Near::default() }));
+        self.see(&mut all.list, centre);
+        let smallest = all.list.iter().map(|seen| seen.near.distance).fold(f32::MAX, f32::min);
+        all.list.retain(|seen| seen.near.distance <= most + reach);
         smallest
     }
 
@@ -248,6 +263,31 @@ mod tests {
 
     fn unit(v: [f32; 3]) -> Vec3 {
         Vec3::from(v).normalize_or(Vec3::Z)
+    }
+
+    proptest! {
+        #[test]
+        fn eight_at_once_have_the_bits_of_one(
+            discs in prop::collection::vec((prop::array::uniform3(-4.0f32..4.0), prop::array::uniform3(-1.0f32..1.0),
+                                            -0.6f32..0.6, -0.6f32..0.6, -0.1f32..0.1), 1..40),
+            centre in prop::array::uniform3(-3.0f32..3.0), flat in 0usize..4,
+        ) {
+            let (ball, centre) = (Ball { radius: 2.0, inside: false, shaft: Shaft::default() }, Vec3::from(centre));
+            let disc = |(n, (c, normal, k1, k2, rise)): (usize, &([f32; 3], [f32; 3], f32, f32, f32))| {
+                let disc = Disc { centre: Vec3::from(*c), normal: unit(*normal), radius: 0.8, ..Disc::default() };
+                if n % 4 < flat { disc } else { disc.bent([*k1, *k2], *rise) }
+            };
+            let mut discs: Vec<Disc> = discs.iter().enumerate().map(disc).collect();
+            // One of them has the ball's centre in it.
+            discs[0].centre = centre;
+            let mut all: Vec<Seen> = discs.iter().map(|disc| Seen { disc: *disc, near: Near::default() }).collect();
+            ball.see(&mut all, centre);
+            for Seen { disc, near } in all {
+                let one = ball.nearest(&disc, centre);
+                let bits = |near: Near| (near.distance.to_bits(), near.direction.to_array().map(f32::to_bits));
+                prop_assert_eq!(bits(near), bits(one));
+            }
+        }
     }
 
     proptest! {

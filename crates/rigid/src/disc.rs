@@ -30,10 +30,12 @@
 //! curvature approximations given data sampled from a smooth surface*, Comput. Aided Geom. Des. 17
 //! (2000).
 
+use crate::eight::Vec3x8;
 use crate::solid::{Field, Solid, cubic, slope};
 use glam::IVec3;
 use nalgebra::{SMatrix, SVector};
 use trepan_geometry::Vec3;
+use wide::f32x8;
 
 /// Density differences past this many HU from the isovalue do not bend a normal further.
 const CLAMP_HU: f32 = 1000.0;
@@ -165,6 +167,12 @@ impl Disc {
         Self { centre: x, normal, radius, bend: bend.limited().scaled(stride as f32), shaft: false }
     }
 
+    /// The same, but bent so in some direction.
+    #[cfg(test)]
+    pub fn bent(self, curvatures: [f32; 2], rise: f32) -> Self {
+        Self { bend: Bend { along: self.normal.any_orthonormal_vector(), curvatures, rise }, ..self }
+    }
+
     /// The same in cells of which a cell of before has `times`.
     pub fn scaled(self, times: f32) -> Self {
         let (centre, radius) = (times * self.centre, times * self.radius);
@@ -208,6 +216,44 @@ impl Disc {
         let share = ((off - radius) / (BLEND * radius)).min(1.0);
         let share = share * share * (3.0 - 2.0 * share);
         (rim, way(a, b).lerp(rim, share))
+    }
+
+    /// The ways of [`way_to`](Self::way_to) of eight discs to one `place`, with the same bits.
+    #[inline]
+    pub fn ways_to(discs: [&Self; 8], place: Vec3) -> (Vec3x8, Vec3x8) {
+        let vectors = |of: fn(&Self) -> Vec3| Vec3x8::new(discs.map(of));
+        let numbers = |of: fn(&Self) -> f32| f32x8::new(discs.map(of));
+        let (normal, along) = (vectors(|disc| disc.normal), vectors(|disc| disc.bend.along));
+        let (from, size) = (Vec3x8::new([place; 8]) - vectors(|disc| disc.centre), numbers(|disc| disc.radius));
+        let height = from.dot(normal);
+        let sideways = from - normal * height;
+        let flat = from - sideways * (size / sideways.length().fast_max(size));
+        let zero = f32x8::ZERO;
+        let is_flat = along.x.simd_eq(zero) & along.y.simd_eq(zero) & along.z.simd_eq(zero);
+        if is_flat.all() {
+            return (flat, flat);
+        }
+        let first = numbers(|disc| disc.bend.curvatures[0]);
+        let second = numbers(|disc| disc.bend.curvatures[1]);
+        let rise = numbers(|disc| disc.bend.rise);
+        let across = normal.cross(along);
+        let (a0, b0, focus) = (from.dot(along), from.dot(across), f32x8::splat(FOCUS));
+        let nearest =
+            |height: f32x8| (a0 / (1.0 - height * first).fast_max(focus), b0 / (1.0 - height * second).fast_max(focus));
+        let z = |a: f32x8, b: f32x8| rise + 0.5 * (first * a * a + second * b * b);
+        let (a, b) = nearest(height);
+        let (a, b) = nearest(height - z(a, b));
+        let way = |a, b| from - along * a - across * b - normal * z(a, b);
+        let off = (a * a + b * b).sqrt();
+        let part = (1.0 - height * first) / f32x8::splat(SPREAD);
+        let radius = size * part.fast_max(f32x8::splat(LEAST_PART)).fast_min(f32x8::ONE);
+        let (on, within, straight) = (off.simd_le(radius), radius / off, way(a, b));
+        let rim = way(within * a, within * b);
+        let share = ((off - radius) / (BLEND * radius)).fast_min(f32x8::ONE);
+        let share = share * share * (3.0 - 2.0 * share);
+        let turned = straight * (1.0 - share) + rim * share;
+        let bent = |past: Vec3x8| flat.where_or(is_flat, straight.where_or(on, past));
+        (bent(rim), bent(turned))
     }
 }
 

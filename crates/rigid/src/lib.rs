@@ -49,6 +49,7 @@ mod burr;
 mod chain;
 mod cut_ball;
 mod disc;
+mod eight;
 pub mod god_object_sphere;
 mod half_spaces;
 mod lean;
