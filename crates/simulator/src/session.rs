@@ -36,6 +36,7 @@ use trepan_haptics::script::Script;
 use trepan_haptics::{Capabilities, DeviceName, HapticDevice, mouse};
 use trepan_link::wire::SessionHeader;
 use trepan_link::{Recorder, Recording};
+use trepan_render::Camera;
 use trepan_volume::{BoneVolume, VoxelVolume};
 
 /// A session that is ready to run.
@@ -199,6 +200,16 @@ impl Session {
     /// The models that run, with the reasons.
     pub fn models(&self) -> &Models {
         &self.setup.models
+    }
+
+    /// The camera of the session's pictures.
+    pub fn camera(&self) -> Camera {
+        picture::camera(&self.setup.scene.site)
+    }
+
+    /// What the solver lacks of what was asked, once the stages are made: where it runs instead.
+    pub fn solver_remarks(&self) -> Vec<String> {
+        self.setup.solver_remarks()
     }
 
     /// Creates the stages for a hand without a device, for callers that do not use

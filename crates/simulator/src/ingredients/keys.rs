@@ -20,8 +20,26 @@ pub struct Key {
     pub presets: &'static [(Quality, &'static str)],
     /// Model that it belongs to.
     pub part: Part,
+    /// Values to compare with the default, the most telling first; empty where none means anything
+    /// alone.
+    pub compared: fn() -> Vec<String>,
+    /// Value that physical realism asks for, where that is not the default.
+    pub realistic: Option<&'static str>,
+    /// What a value changes.
+    pub effect: fn(&str) -> Effect,
     get: fn(&Ingredients) -> Option<String>,
     set: fn(&mut Ingredients, &str) -> Option<()>,
+}
+
+/// What another value of a key may change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// Forces and motions: another model.
+    Model,
+    /// Cost, and forces and motions by rounding.
+    Rounding,
+    /// Cost alone: forces and motions are the same bit for bit.
+    Cost,
 }
 
 /// A model of a session.
@@ -41,6 +59,11 @@ pub const KEYS: &[Key] = &[
         name: "rigid",
         values: || list(trepan_rigid::Method::all().iter().map(|method| method.name())),
         about: "method of contact with bone; as `--rigid`",
+        compared: || {
+            let usual = [god_object_sphere::METHOD.name, god_object_sphere::WITH_SHAFT.name];
+            let rivals = trepan_rigid::Method::all().into_iter().filter(|method| !usual.contains(&method.name()));
+            rivals.filter(|method| !method.descriptor().is_oracle).map(|method| method.name().into()).collect()
+        },
         get: |i| i.rigid.map(String::from),
         set: |i, text| {
             i.rigid = Some(trepan_rigid::Method::named(text)?.name());
@@ -61,6 +84,8 @@ pub const KEYS: &[Key] = &[
         name: "shaft",
         values: switches,
         about: "contact of the shaft, with torque: the variant of `rigid` that has it",
+        compared: on,
+        realistic: Some("on"),
         get: |i| i.rigid.map(|name| switch_name(has_shaft(name)).into()),
         set: shaft,
         ..Key::of(Part::Bone)
@@ -70,6 +95,8 @@ pub const KEYS: &[Key] = &[
         values: switches,
         about: "force shading on bone, over one voxel",
         usual: Some("off"),
+        compared: on,
+        realistic: Some("on"),
         get: |i| Some(switch_name(i.shading).into()),
         set: |i, text| switch(text).map(|on| i.shading = on),
         ..Key::of(Part::Bone)
@@ -79,6 +106,8 @@ pub const KEYS: &[Key] = &[
         values: || "off, or a coefficient up to 2".into(),
         about: "dry friction on bone of a tool that does not cut",
         usual: Some("off"),
+        compared: || vec![FRICTION_ON_BONE.into()],
+        realistic: Some(FRICTION_ON_BONE),
         get: |i| Some(off_or(i.bone_friction)),
         set: |i, text| up_to(text, 2.0).map(|coefficient| i.bone_friction = coefficient),
         ..Key::of(Part::Bone)
@@ -88,6 +117,7 @@ pub const KEYS: &[Key] = &[
         values: switches,
         about: "vibration of the drill on the hand",
         usual: Some("on"),
+        compared: || vec!["off".into()],
         get: |i| Some(switch_name(i.vibration).into()),
         set: |i, text| switch(text).map(|on| i.vibration = on),
         ..Key::of(Part::Bone)
@@ -99,6 +129,7 @@ pub const KEYS: &[Key] = &[
             list([TLED, FASTEST].into_iter().chain(rivals.iter().map(|method| method.name())))
         },
         about: "solver of the tissue; as `--solver`. `fastest` is `tled` with `device=fastest`",
+        compared: || trepan_soft::Method::all().iter().map(|method| method.name().into()).collect(),
         get: |i| i.solver.map(String::from),
         set: |i, text| {
             let rival = trepan_soft::Method::named(text).map(|method| method.name());
@@ -113,6 +144,7 @@ pub const KEYS: &[Key] = &[
         name: "still-mm",
         values: || "0 to 1 mm".into(),
         about: "region of interest: tissue that moves less in 50 ms sleeps; 0 steps all of it",
+        compared: || vec!["0.01".into()],
         get: |i| i.still_mm.map(|mm| mm.to_string()),
         set: |i, text| number(text, 1.0).map(|mm| i.still_mm = Some(mm)),
         ..Key::of(Part::Tled)
@@ -122,6 +154,8 @@ pub const KEYS: &[Key] = &[
         values: names::<Element>,
         about: "tetrahedra; locking-free: averaged nodal pressure (Joldes et al. 2009)",
         usual: Some("plain"),
+        compared: others::<Element>,
+        realistic: Some("locking-free"),
         get: |i| Some(name(&i.element)),
         set: |i, text| value(text).map(|element| i.element = element),
         ..Key::of(Part::Tled)
@@ -133,6 +167,7 @@ pub const KEYS: &[Key] = &[
         },
         about: "constitutive law at the same moduli; without CLASS of all tissue, not of the ventricles' fluid",
         usual: Some("neo-hookean"),
+        compared: || others::<Law>().into_iter().rev().collect(),
         get: |i| Some(laws(&i.laws)),
         set: |i, text| text.split('+').try_for_each(|part| set_law(&mut i.laws, part)),
         ..Key::of(Part::Tled)
@@ -142,6 +177,8 @@ pub const KEYS: &[Key] = &[
         values: names::<Relaxation>,
         about: "stress relaxation; prony: two terms (Miller and Chinzei 2002)",
         usual: Some("off"),
+        compared: others::<Relaxation>,
+        realistic: Some("prony"),
         get: |i| Some(name(&i.relaxation)),
         set: |i, text| value(text).map(|relaxation| i.relaxation = relaxation),
         ..Key::of(Part::Tled)
@@ -151,6 +188,8 @@ pub const KEYS: &[Key] = &[
         values: names::<SolverDevice>,
         about: "where the solver runs; gpu: on a graphics card, else on the processor with a remark",
         usual: Some("cpu"),
+        compared: others::<SolverDevice>,
+        effect: |_| Effect::Rounding,
         get: |i| Some(name(&i.device)),
         set: |i, text| value(text).map(|device| i.device = device),
         ..Key::of(Part::Tled)
@@ -160,6 +199,8 @@ pub const KEYS: &[Key] = &[
         values: || "1 to 64".into(),
         about: "threads of the solver on the processor; the forces are the same for any number",
         usual: Some("1"),
+        compared: || vec!["2".into()],
+        effect: |_| Effect::Cost,
         get: |i| Some(i.threads.to_string()),
         set: |i, text| count(text, 1, 64).map(|threads| i.threads = threads),
         ..Key::of(Part::Tled)
@@ -169,6 +210,7 @@ pub const KEYS: &[Key] = &[
         values: || "off, or up to 60 mmHg".into(),
         about: "fluid pressure on the brain's surface and in the ventricles; the brain starts at rest under it",
         usual: Some("off"),
+        compared: || vec!["10".into()],
         get: |i| Some(off_or(i.surface_pressure_mmhg)),
         set: |i, text| up_to(text, 60.0).map(|mmhg| i.surface_pressure_mmhg = mmhg),
         ..Key::of(Part::Tled)
@@ -178,6 +220,11 @@ pub const KEYS: &[Key] = &[
         values: || list(searches().map(|method| method.name())),
         about: "search for the tool's points in the tissue; a grid's cells by trepan-voxel-size",
         usual: Some("walk"),
+        compared: || {
+            let usual = trepan_deformable::Method::RECOMMENDED;
+            searches().filter(|method| *method != usual).map(|method| method.name().into()).collect()
+        },
+        effect: effect_of_search,
         get: |i| Some(i.search.name().into()),
         set: |i, text| searches().find(|method| method.name() == text).map(|method| i.search = method),
         ..Key::of(Part::Tissue)
@@ -187,6 +234,8 @@ pub const KEYS: &[Key] = &[
         values: || "off, or a coefficient up to 2".into(),
         about: "dry friction of the first hand's tool on tissue, felt and dragging the tissue",
         usual: Some("off"),
+        compared: || vec![FRICTION_ON_TISSUE.into()],
+        realistic: Some(FRICTION_ON_TISSUE),
         get: |i| Some(off_or(i.friction)),
         set: |i, text| up_to(text, 2.0).map(|coefficient| i.friction = coefficient),
         ..Key::of(Part::Tissue)
@@ -196,12 +245,18 @@ pub const KEYS: &[Key] = &[
         values: switches,
         about: "contact of the brain's surface with itself, once the dura is open",
         usual: Some("off"),
+        compared: on,
+        realistic: Some("on"),
         get: |i| Some(switch_name(i.folds).into()),
         set: |i, text| switch(text).map(|on| i.folds = on),
         ..Key::of(Part::Tissue)
     },
 ];
 
+/// Friction coefficients that are compared with none: a wet tool on brain and a metal one on bone,
+/// both assumed.
+const FRICTION_ON_TISSUE: &str = "0.1";
+const FRICTION_ON_BONE: &str = "0.3";
 /// Total Lagrangian explicit dynamics.
 pub(super) const TLED: &str = "tled";
 /// TLED where it is faster on this machine.
@@ -217,6 +272,9 @@ impl Key {
             usual: None,
             presets: &[],
             part,
+            compared: Vec::new,
+            realistic: None,
+            effect: |_| Effect::Model,
             get: |_| None,
             set: |_, _| None,
         }
@@ -343,6 +401,16 @@ fn searches() -> impl Iterator<Item = trepan_deformable::Method> {
     trepan_deformable::Method::all().into_iter().filter(|method| !method.descriptor().is_oracle)
 }
 
+/// A search that finds every point, with the same response, finds the same depth; others do not.
+fn effect_of_search(name: &str) -> Effect {
+    let usual = trepan_deformable::Method::RECOMMENDED.descriptor().response;
+    let is_same = |method: trepan_deformable::Method| {
+        let of = method.descriptor();
+        of.is_complete && of.response == usual
+    };
+    if trepan_deformable::Method::named(name).is_some_and(is_same) { Effect::Rounding } else { Effect::Model }
+}
+
 /// Sets the law of all classes but the ventricles, which stand for fluid; with `CLASS:LAW` of one.
 fn set_law(laws: &mut [Law; TissueClass::ALL.len()], text: &str) -> Option<()> {
     match text.split_once(':') {
@@ -371,6 +439,11 @@ fn names<T: ValueEnum>() -> String {
     T::value_variants().iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
+/// Every value but the first, which is the default.
+fn others<T: ValueEnum>() -> Vec<String> {
+    T::value_variants().iter().skip(1).map(name).collect()
+}
+
 fn name<T: ValueEnum>(of: &T) -> String {
     of.to_possible_value().map_or_else(String::new, |value| value.get_name().into())
 }
@@ -381,6 +454,10 @@ fn value<T: ValueEnum>(text: &str) -> Option<T> {
 
 fn switches() -> String {
     "off, on".into()
+}
+
+fn on() -> Vec<String> {
+    vec!["on".into()]
 }
 
 fn switch(text: &str) -> Option<bool> {

@@ -9,9 +9,12 @@
 
 mod keys;
 mod law;
+mod variants;
 
+pub use keys::Effect;
 pub(crate) use keys::{Given, KEYS, Part, setting, table};
 pub use law::Law;
+pub use variants::{Variant, realistic, variants};
 
 use crate::tissue_class::TissueClass;
 use clap::ValueEnum;
