@@ -343,7 +343,7 @@ fn write(suite: &Suite, report: &Report, out: &Path) -> Result<bool> {
         };
         println!("  {word} {}: {} {} {}", gate.name, shown(gate.value), gate.op, gate.limit);
     }
-    report.findings.regressions.iter().for_each(|line| println!("  {line}"));
+    report.findings.conclusions.iter().chain(&report.findings.regressions).for_each(|line| println!("  {line}"));
     whole(&out.join(format!("{}.json", suite.name)), &serde_json::to_vec_pretty(report)?)?;
     Ok(report.passed())
 }

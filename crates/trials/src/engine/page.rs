@@ -104,7 +104,7 @@ fn chart_of_all(suite: &Suite, report: &Report) -> Chart {
 mod tests {
     use super::*;
     use crate::engine::part::{Scope, nothing_more};
-    use crate::engine::picture::Map;
+    use crate::engine::picture::{Map, Table};
     use crate::engine::report::Making;
     use crate::engine::suite::{Findings, Gate};
     use std::collections::BTreeMap;
@@ -124,7 +124,11 @@ mod tests {
         };
         let findings = Findings {
             rows: vec![row(1), row(2), Row::new("other", "c").metric("cost_s", f64::NAN)],
-            gates: vec![Gate::at_most("depth", 0.3, 0.2), Gate::at_most("cost", f64::NAN, 1.0)],
+            gates: vec![
+                Gate::at_most("depth", 0.3, 0.2),
+                Gate::at_most("cost", f64::NAN, 1.0),
+                Gate::at_most("change", 3.0, 1.0).or_known_gap(),
+            ],
             maps: vec![Map {
                 title: "a map".into(),
                 columns: vec!["1".into()],
@@ -133,6 +137,12 @@ mod tests {
                 lines: vec![("bound".into(), vec![(0.0, 1.0), (1.0, 0.5)])],
                 ..Map::default()
             }],
+            tables: vec![Table {
+                title: "what <it> changes".into(),
+                columns: vec!["key".into(), "force, N".into()],
+                rows: vec![vec!["a=1".into(), "0.25".into()]],
+            }],
+            conclusions: vec!["a=1 changes & costs".into()],
             regressions: vec!["WORSE: a map".into()],
             ..Findings::default()
         };
@@ -157,6 +167,10 @@ mod tests {
             "</span> bound",
             "fails (1)",
             "WORSE: a map",
+            "what &lt;it&gt; changes",
+            "<td>a=1</td><td>0.25</td>",
+            "a=1 changes &amp; costs",
+            "<td>known gap</td>",
             "<circle",
         ] {
             assert!(page.contains(part), "{part} is missing in {page}");

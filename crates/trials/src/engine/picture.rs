@@ -1,4 +1,4 @@
-//! Data of the charts (cost against error with the Pareto front) and of the stability maps.
+//! Data of the charts (cost against error with the Pareto front), tables and stability maps.
 //!
 //! # Practice
 //! A suite fills them together with its rows; the page draws them. Both axes of a chart are
@@ -85,6 +85,17 @@ impl Chart {
         let pairs: Vec<(f64, f64)> = self.marks.iter().map(|mark| (mark.cost, mark.error)).collect();
         front(&pairs).into_iter().map(|at| pairs[at]).collect()
     }
+}
+
+/// Table of a suite's results, for its page.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// Title.
+    pub title: String,
+    /// Names of the columns with their units.
+    pub columns: Vec<String>,
+    /// Cells, row by row.
+    pub rows: Vec<Vec<String>>,
 }
 
 /// Result of a method in one cell of a map.

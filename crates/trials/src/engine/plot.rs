@@ -30,10 +30,12 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 /// Quantities whose names do not follow from the metric's.
-const QUANTITIES: [(&str, &str); 4] = [
+const QUANTITIES: [(&str, &str); 6] = [
     ("cpu_s_per_s", "CPU load, cores"),
     ("cost_cores", "CPU load, cores"),
     ("error_over_tolerance", "worst error / tolerance"),
+    ("change_over_tolerance", "worst change / tolerance"),
+    ("hand_change_over_tolerance", "change of force / tolerance"),
     ("regret_percent", "time over the best voxel size, %"),
 ];
 /// Units as a metric's name ends in them, and as they are written.
@@ -116,7 +118,7 @@ pub fn svg(chart: &Chart, methods: &[&str]) -> Result<String, Box<dyn std::error
 
 /// Error at which a tolerance is reached, where the metric is measured in tolerances.
 fn tolerance(metric: &str) -> Option<f64> {
-    (metric == "error_over_tolerance").then_some(1.0)
+    metric.ends_with("_over_tolerance").then_some(1.0)
 }
 
 /// Quantity of a metric with its unit, for an axis.

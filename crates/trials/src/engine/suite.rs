@@ -4,7 +4,7 @@
 //! A metric's name ends in its unit (`depth_error_voxel`, `step_us`). A gate never depends on an
 //! absolute time: times belong in charts, as ratios within one run.
 
-use crate::engine::picture::{Chart, Map as StabilityMap};
+use crate::engine::picture::{Chart, Map as StabilityMap, Table};
 use crate::engine::row::number;
 pub use crate::engine::row::{Row, shown};
 use serde::{Deserialize, Serialize};
@@ -78,6 +78,12 @@ pub struct Findings {
     pub charts: Vec<Chart>,
     /// Maps for the page.
     pub maps: Vec<StabilityMap>,
+    /// Tables for the page.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tables: Vec<Table>,
+    /// Conclusions in words, for the page and the terminal.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub conclusions: Vec<String>,
     /// Names of map cells that are worse than the kept boundary.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regressions: Vec<String>,
@@ -90,6 +96,8 @@ impl Findings {
         self.gates.append(&mut other.gates);
         self.charts.append(&mut other.charts);
         self.maps.append(&mut other.maps);
+        self.tables.append(&mut other.tables);
+        self.conclusions.append(&mut other.conclusions);
         self.regressions.append(&mut other.regressions);
     }
 }
