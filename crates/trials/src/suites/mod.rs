@@ -12,6 +12,7 @@ mod population;
 mod python;
 mod render;
 pub mod rigid;
+mod scripted;
 mod simulators;
 mod tled;
 mod volume;

@@ -15,37 +15,24 @@
 use super::Scope;
 use crate::engine::suite::{Findings, Row};
 use crate::suites::rigid;
+use crate::suites::scripted::{FELT_N, OPENING, milliseconds, path};
 use crate::suites::simulators::case;
 use anyhow::Result;
 use glam::DVec3;
 use trepan_geometry::{Buttons, Tool, Vec3, quantile};
-use trepan_haptics::script::{self, Script, Site};
+use trepan_haptics::script::{Script, Site};
 use trepan_rigid::removal::RemovalLaw;
 use trepan_rigid::truth::{Ball, Bone, Scan};
 use trepan_rigid::{Method, RigidStep};
 use trepan_simulator::{Cache, Program, Recipe, Scene, open_case};
 use trepan_volume::{AIR_HU, BoneVolume, Grid, Interpolation, VoxelVolume, resample, skull_only};
 
-/// Over the place that is opened, RAS mm: the same in every run.
-pub const OPENING: Vec3 = Vec3::new(108.0, 8.0, 84.0);
 /// Stiffness of the contact with bone, N/mm.
 const STIFFNESS: f64 = 2.0;
 /// Radius of the tray's first burr, which the script drills with, mm.
 const BURR_MM: f32 = 3.0;
-/// A force under this is no contact, N.
-const FELT_N: f64 = 0.02;
 /// How far around the entry bone is looked for, mm: further than any tool reaches into it.
 const AROUND_MM: f64 = 30.0;
-
-/// Length of the operation, ms.
-pub fn milliseconds(scope: Scope) -> u64 {
-    scope.pick(6_000, 20_000)
-}
-
-/// The hand's poses: the planned script at a site.
-pub fn path(scope: Scope, site: &Site) -> Result<Script> {
-    Ok(Script::planned(Program::Integrated.script(), site, milliseconds(scope) as f64, &script::Plan::default())?)
-}
 
 /// When the burr works for the last time, ms: so far the truth goes.
 fn last_cut_ms(scope: Scope, path: &Script) -> u64 {
@@ -117,7 +104,7 @@ impl Felt {
     pub fn against(&self, truth: &Self) -> BoneErrors {
         let mut errors = BoneErrors { all_n: Vec::new(), drilling_n: Vec::new(), normal_deg: Vec::new() };
         for ((a, b), drilling) in self.lifted.iter().zip(&truth.lifted).zip(&truth.drilling) {
-            let felt = [a, b].map(|lifted| STIFFNESS * lifted.length() > FELT_N);
+            let felt = [a, b].map(|lifted| STIFFNESS * lifted.length() > f64::from(FELT_N));
             if felt[0] || felt[1] {
                 let error = STIFFNESS * a.distance(*b);
                 errors.all_n.push(error);

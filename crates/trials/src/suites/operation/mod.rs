@@ -21,16 +21,15 @@
 
 mod bone;
 mod error;
-mod ride;
 mod setups;
 
+use super::scripted::{Prepared, Ride, worst};
 use super::{Part, Scope};
 use crate::engine::picture::{Chart, Mark};
 use crate::engine::suite::{Findings, Gate, Row};
 use anyhow::{Result, ensure};
 use bone::Felt;
 use error::Errors;
-use ride::Ride;
 use setups::Candidate;
 use std::sync::Mutex;
 
@@ -61,13 +60,13 @@ static TRUTH: Mutex<Option<(Scope, Ride, Felt)>> = Mutex::new(None);
 fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
     let mut kept = TRUTH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     if kept.as_ref().is_none_or(|(of, ..)| *of != scope) {
-        let ride = ride::truth(scope)?;
+        let ride = Prepared::open(scope, setups::truth(scope).flags, None)?.run(&mut |_| {})?;
         let felt = bone::truth(scope, &ride.site)?;
         *kept = Some((scope, ride, felt));
     }
     let (_, truth, felt) = kept.as_ref().expect("it was just made");
     ensure!(truth.opened(), "the truth did not open the skull: nothing can be held against it");
-    let ride = ride::ride(scope, candidate, Some(truth))?;
+    let ride = Prepared::open(scope, candidate.flags, Some(truth.site))?.run(&mut |_| {})?;
     let errors = Errors::between(&ride, truth);
     let per_s = |seconds: f64| seconds / ride.seconds;
     let on_bone = Felt::of(&ride.lifted).against(felt).named();
@@ -88,11 +87,6 @@ fn row(scope: Scope, candidate: &Candidate) -> Result<Row> {
         .metric("memory_mb", ride.memory_mb)
         .metric("opened", f64::from(u8::from(ride.opened())))
         .metric("truth_cpu_s_per_s", truth.cpu_s.iter().sum::<f64>() / truth.seconds))
-}
-
-/// The largest; not a number where one is none.
-fn worst(all: [f64; 3]) -> f64 {
-    all.into_iter().fold(0.0, |most, e| if e.is_nan() || most.is_nan() { f64::NAN } else { most.max(e) })
 }
 
 /// Charts of error over CPU time, and what every setup must keep.
