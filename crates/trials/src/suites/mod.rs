@@ -1,5 +1,6 @@
 //! All validation suites, one file each; one list feeds the command line and the page.
 
+mod ablation;
 pub mod budget;
 mod conditions;
 pub mod deformable;
@@ -55,6 +56,13 @@ pub const ON_REQUEST: &[Suite] = &[
 
 /// Suites that run by default.
 pub const ALL: &[Suite] = &[
+    Suite {
+        name: "ablation",
+        question: "what does each ingredient of --set change in the operation, and what does it cost",
+        chart: ("cpu_s_per_s", "change_over_tolerance"),
+        parts: ablation::parts,
+        judge: ablation::judge,
+    },
     Suite {
         name: "mesh",
         question: "how well do tetrahedra fill a mask, and what does meshing cost",
