@@ -40,11 +40,7 @@ impl Vec3x8 {
     /// Those of `self` where `which` has its bits, else those of `other`.
     #[inline]
     pub fn where_or(self, which: f32x8, other: Self) -> Self {
-        Self {
-            x: which.select(self.x, other.x),
-            y: which.select(self.y, other.y),
-            z: which.select(self.z, other.z),
-        }
+        Self { x: which.select(self.x, other.x), y: which.select(self.y, other.y), z: which.select(self.z, other.z) }
     }
 
     #[inline]

@@ -2,6 +2,7 @@
 
 mod common;
 use common::{at, bone};
+use glam::IVec3;
 use trepan_geometry::{Pose, Tool, Vec3};
 use trepan_rigid::god_object_sphere::{Config, GodObjectSphere};
 use trepan_rigid::{Method, RigidContact, RigidStep, removal::RemovalLaw};
@@ -132,4 +133,28 @@ fn a_stalled_burr_cuts_nothing() {
     assert!(half_a_second(1400.0, 0.3, law).0 > 0.0);
     let (removed, rpm) = half_a_second(1400.0, 3.0, law);
     assert_eq!((removed, rpm), (0.0, 0.0));
+}
+
+#[test]
+fn a_stroke_changes_only_nodes_near_the_burr() {
+    let size = IVec3::new(70, 24, 24);
+    let bone = bone([70, 24, 24], 0.5, |p| p.z);
+    for (from, to) in [(-14.0f32, 14.0f32), (14.0, -14.0)] {
+        let mut contact = Method::RECOMMENDED.build(&Tool::burr(3.0));
+        contact.reset(Pose::from_translation(Vec3::new(from, 0.0, 3.5)));
+        let (mut before, mut out) = (vec![0; 70 * 24 * 24], RigidStep::default());
+        bone.read_cut(IVec3::ZERO, size, &mut before);
+        let mut now = before.clone();
+        for t in 0..=560 {
+            let device = Vec3::new(from + (to - from) * t as f32 / 560.0, 0.0, if to > 0.0 { 2.5 } else { 2.0 });
+            contact.step(&bone, &at(device), true, 1.0, &mut out);
+            bone.read_cut(IVec3::ZERO, size, &mut now);
+            for at in (0..now.len()).filter(|at| now[*at] != before[*at]) {
+                let off = (at % 70) as f32 - bone.node_at(contact.proxy().translation).x;
+                assert!(now[at] > before[at] && off.abs() < 6.0 + 3.0, "tick {t}: {off} nodes off");
+            }
+            std::mem::swap(&mut before, &mut now);
+        }
+        assert!(before.iter().any(|value| *value > 0));
+    }
 }
