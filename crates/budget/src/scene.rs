@@ -48,8 +48,10 @@ pub struct Scene {
 }
 
 impl Default for Scene {
-    /// Tolerances: a force error that a hand just notices, a displacement that the usual setup just
-    /// meets in an adult head, and a picture whose edges are still sharp.
+    /// Tolerances that a hand or an eye just notices.
+    ///
+    /// Force error: 0.1 N. Displacement: what the usual setup just meets in an adult head. Picture:
+    /// its edges are still sharp.
     fn default() -> Self {
         Self {
             force_error_n: 0.1,

@@ -3,8 +3,8 @@
 //! # Theory
 //! A target voxel's centre is mapped by
 //! `from_voxel_from_to_voxel = from.world_from_voxel⁻¹ · to.world_from_voxel` to the source's
-//! continuous indices. Trilinear weights the 8 surrounding voxels, cubic is a [`Spline`] through the
-//! values, nearest takes one voxel. Majority is
+//! continuous indices. Trilinear weights the 8 surrounding voxels, cubic is a [`Spline`] through
+//! the values, nearest takes one voxel. Majority is
 //! for labels: each target voxel is split into as many sub-points as source voxels fit into it
 //! along each axis, each sub-point adds its trilinear weights to the surrounding labels, and the
 //! label with the largest sum wins (the first met on a tie).

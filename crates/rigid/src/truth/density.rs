@@ -87,8 +87,9 @@ impl Scan {
     }
 }
 
-/// Solves for the coefficients c along one line: `(c₋₁ + 4 c₀ + c₊₁) / 6` is the value of each voxel,
-/// with the line mirrored at both ends (Thomas's algorithm).
+/// Solves for the coefficients along one line, mirrored at both ends (Thomas's algorithm).
+///
+/// The value of a voxel is `(c₋₁ + 4 c₀ + c₊₁) / 6`.
 fn solve(values: &mut [f64], start: usize, step: usize, count: usize) {
     if count < 2 {
         return;

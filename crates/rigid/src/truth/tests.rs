@@ -73,7 +73,7 @@ fn a_bore_goes_as_deep_and_takes_as_much_as_the_law_says() {
     off(&probe, (bottom + 0.5) * OBLIQUE + aside);
 }
 
-/// The spline through a ball's distance, on an oblique grid of other spacings: of third order there.
+/// The spline through a ball's distance, on an oblique grid of other spacings.
 #[test]
 fn a_scan_holds_a_ball_between_its_voxels() {
     let turn = glam::DAffine3::from_scale_rotation_translation(

@@ -264,7 +264,7 @@ mod tests {
     fn a_measured_error_replaces_the_law() {
         let scene = Scene::default();
         let mut rows = Rows::stored().unwrap();
-        let names = |row: &trepan_budget::Row<trepan_budget::Tissue>| row.what.write();
+        let names = |row: &Row<trepan_budget::Tissue>| row.what.write();
         let tissue = rows.tissue.iter().take(2).map(|row| (names(row), 2.0)).collect();
         let own = CaseErrors { tissue, ..CaseErrors::default() };
         let found = own.instead(rows.clone()).tissue;
