@@ -384,7 +384,7 @@ mod tests {
         let plan = models.plan.as_ref().unwrap();
         assert_eq!(plan.bone.unwrap().what.method, models.setup.bone.method);
         assert!(
-            models.why.bone.contains("--spacing-mm 0.7 is given; ") && models.why.bone.contains(" N of 0.4 allowed")
+            models.why.bone.contains("--spacing-mm 0.7 is given; ") && models.why.bone.contains(" N of 0.1 allowed")
         );
         assert_eq!(models.why.picture, "as usual", "no picture is drawn");
         let models =
