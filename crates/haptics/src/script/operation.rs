@@ -169,7 +169,7 @@ fn craniotomy(site: &Site, plan: &Plan) -> Vec<Move> {
     vec![
         Move("approach with the burr", 8.0, site.below(-plan.burr_radius_mm - 1.0), HANDS_OFF),
         Move("drill", 43.0 * site.drilling_share(), deepest, Buttons::PEDAL),
-        Move("clean the hole", 2.0, deepest, Buttons::PEDAL),
+        Move("clean the hole", 7.0, deepest, Buttons::PEDAL),
         Move("retreat", 7.0, site.below(-plan.away_mm), HANDS_OFF),
     ]
 }
