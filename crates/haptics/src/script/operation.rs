@@ -206,6 +206,8 @@ fn flap(site: &Site, plan: &Plan) -> (Vec3, Vec<Move>) {
     let (out, over) = (outline[0].outer - site.inward * plan.away_mm, outline[0].outer - site.inward * 4.0);
     let mut moves = craniotomy(&hole, plan);
     moves[1].1 *= 0.35;
+    // Its hole is for the craniotome's foot, not for the probe.
+    moves[2].1 = 2.0;
     moves.extend([
         Move("take the craniotome", 1.5, out, Buttons::take(ToolKind::Craniotome)),
         Move("come to the hole", 3.0, over, HANDS_OFF),
