@@ -57,13 +57,27 @@ impl Bench {
     }
 }
 
+/// Returns the middle of the chunk in which the second half of an MCAP file begins, or of the next.
+fn middle_of_a_chunk(file: &[u8]) -> usize {
+    const CHUNK: u8 = 6;
+    let mut at = 8;
+    loop {
+        let length = u64::from_le_bytes(file[at + 1..at + 9].try_into().unwrap()) as usize;
+        let end = at + 9 + length;
+        if file[at] == CHUNK && end > file.len() / 2 {
+            return at + 9 + length / 2;
+        }
+        at = end;
+    }
+}
+
 #[test]
 fn a_replay_of_a_damaged_recording_reports_it_and_a_repair_keeps_the_rest() {
     let bench = Bench::new();
     let all = Recording::of_bytes(&bench.whole, Path::new("whole")).unwrap().ticks.len();
     let mut bytes = bench.whole.clone();
-    let middle = bytes.len() / 2;
-    bytes[middle..middle + 16].fill(0x5a);
+    let at = middle_of_a_chunk(&bytes);
+    bytes[at..at + 16].fill(0x5a);
     let damaged = bench.file("damaged.mcap", &bytes);
 
     let (output, summary) = bench.again(&damaged, &[]);
