@@ -1,8 +1,8 @@
 //! The cutting side of a tool: what it reaches, and what it takes by a law of removal.
 
 use crate::RigidStep;
-use crate::cut_ball::{BAND, Paid, Side, Sweep, Taken, depths, lanes, outside};
-use crate::nodes::Nodes;
+use crate::cut_ball::{BAND, Crossed, Paid, Side, Sweep, Taken, covered, depths, lanes};
+use crate::nodes::{Nodes, clearance};
 use crate::removal::RemovalLaw;
 use crate::rows::{GridBall, rows};
 use glam::IVec3;
@@ -22,11 +22,6 @@ const STRIDE: f32 = 1.0;
 const AS_BEFORE: f32 = 3.0;
 /// Least way that counts as the last, nodes.
 const LEAST_WAY: f32 = 1e-3;
-/// How much wider a burr cuts than it is, mm, at least: enough that it does not lock in its bore.
-const WIDER_MM: f32 = 0.004;
-/// The same for burrs of few nodes, nodes, times the square of the radius in nodes: what the
-/// splines are uncertain by.
-const WIDER_NODES: f32 = 0.06;
 /// Least step of the cut, nodes: 5 um. Times the stiffness it is a change of force, and between two
 /// steps the surface stands still, so that nothing needs to be looked for anew.
 const STEP: f32 = 0.01;
@@ -175,13 +170,11 @@ impl Burr {
         }
         let (earned, rpm) = self.law.turned(cut.radius_mm, cut.depth_mm, cut.dt_ms, &mut self.stalled);
         out.spindle_rpm = rpm;
-        let of_nodes = bone.node_mm() / cut.radius_mm.max(bone.node_mm());
-        let wider_mm = (WIDER_NODES * bone.node_mm() * of_nodes * of_nodes).max(WIDER_MM);
         // The ball goes on from where it has cut to, as long as the proxy stands in that: what the
-        // contact is uncertain by does not get into the cut. A ball so much wider than the burr
-        // starts so much further back to end where the burr does.
-        let stands = |at: &Vec3| at.distance(cut.proxy) < STANDS_MM + wider_mm;
-        let start = self.at.filter(stands).unwrap_or(cut.proxy - wider_mm * self.forward);
+        // contact is uncertain by does not get into the cut.
+        let clearance_mm = bone.node_mm() * clearance(bone.node_mm(), cut.radius_mm);
+        let stands = |at: &Vec3| at.distance(cut.proxy) < STANDS_MM + clearance_mm;
+        let start = self.at.filter(stands).unwrap_or(cut.proxy - clearance_mm * self.forward);
         self.forward = (cut.device - start).normalize_or_zero();
         self.at = Some(start);
         let centre = bone.cut_nodes() as f32 * bone.grid_of(start);
@@ -201,7 +194,7 @@ impl Burr {
         if self.earned_mm3 < self.enough * node_mm3 {
             return;
         }
-        let radius = (cut.radius_mm + wider_mm) / bone.node_mm();
+        let radius = cut.radius_mm / bone.node_mm();
         let sweep = Sweep { centre, side, forward: self.forward, radius };
         let longest = (cut.device.distance(start) / bone.node_mm()).min(STRIDE);
         // As far as the last few cuts together, or else as far as it may go.
@@ -259,13 +252,22 @@ impl Burr {
             }
             // How much of each is bone where the density falls so steeply.
             let over_border = density.overs(node);
-            let dense = 0.5 + over_border / density.steepness(node).fast_max(f32x8::ONE);
-            let share = outside(before, sweep.radius).fast_min(dense);
-            for lane in lanes(taken & share.simd_gt(f32x8::ZERO).to_bitmask()) {
+            let rise = density.rise(node);
+            let steepness = rise.length().fast_max(f32x8::ONE);
+            let dense = 0.5 + over_border / steepness;
+            let share = dense.fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
+            let taken = taken & share.simd_gt(f32x8::ZERO).to_bitmask();
+            if taken == 0 {
+                return;
+            }
+            let cosine = sweep.cosine(node, rise, (place.apart.sqrt(), steepness));
+            let crossed = Crossed { share, cosine };
+            let gone = crossed.taken(covered(before, sweep.radius));
+            for lane in lanes(taken) {
                 over |= paid.len() == *limit;
                 if paid.len() < *limit {
                     let price = law.price(over_border.as_array()[lane] + f32::from(density.border()));
-                    paid.push(&place, lane, share.as_array()[lane], price);
+                    paid.push(lane, &place, &crossed, gone, price);
                 }
             }
         });

@@ -4,6 +4,7 @@
 //! Lengths are nodes, seen from where the ball starts. Eight nodes of a row are looked at and
 //! changed together; sums run in eight lanes.
 
+use crate::eight::Vec3x8;
 use crate::rows::each;
 use crate::window::wide;
 use glam::IVec3;
@@ -112,7 +113,21 @@ impl Sweep {
         // It loses some if the ball gets nearer than this, nodes.
         let nearest = (self.radius - before).fast_min(f32x8::splat(self.radius + 0.5)).fast_max(f32x8::ZERO);
         let taken = place.apart_after(most).simd_lt(nearest * nearest);
-        (taken & place.ahead() & outside(before, self.radius).simd_gt(f32x8::ZERO)).to_bitmask()
+        (taken & place.ahead() & covered(before, self.radius).simd_lt(f32x8::ONE)).to_bitmask()
+    }
+
+    /// Cosine of the angle between the ways to `node` and the seven after it from where it starts
+    /// and the `rise` of the bone's density there; the sizes of the ways and rises are given.
+    #[inline]
+    pub fn cosine(&self, node: IVec3, rise: Vec3x8, sizes: (f32x8, f32x8)) -> f32x8 {
+        let off = node.as_vec3() - self.centre;
+        let ahead = rise.x * (LANE + off.x) + rise.y * off.y + rise.z * off.z;
+        let Vec3 { x, y, z } = self.side.axis;
+        let half = f32x8::splat(self.side.half);
+        let beside = ((LANE + off.x) * x + off.y * y + off.z * z).fast_max(-half).fast_min(half);
+        let ahead = ahead - beside * (rise.x * x + rise.y * y + rise.z * z);
+        let cosine = ahead / (sizes.0 * sizes.1).fast_max(f32x8::splat(1e-3));
+        cosine.fast_max(-f32x8::ONE).fast_min(f32x8::ONE)
     }
 
     /// The values of eight nodes of the cut, which `was`, when it has gone `way`, and which of them
@@ -178,13 +193,43 @@ pub(crate) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
+/// Eight nodes of which the CT's surface leaves a part to the bone.
+///
+/// The surface and the burr's meet under an angle, so a burr that covers `e` of a node takes
+/// ```text
+/// (1 - |c|) d e + max(c, 0) max(d + e - 1, 0) + max(-c, 0) min(d, e)        c: its cosine
+/// ```
+/// of it: d e is exact where they cross at right angles, the others where they are parallel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Crossed {
+    /// How much of a node is bone, d.
+    pub share: f32x8,
+    /// Cosine of the angle between the two normals, c.
+    pub cosine: f32x8,
+}
+
+impl Crossed {
+    /// How much of each node a burr takes that covers so much of it.
+    #[inline]
+    pub fn taken(&self, covered: f32x8) -> f32x8 {
+        let Self { share, cosine } = *self;
+        let least = (share + covered - 1.0).fast_max(f32x8::ZERO);
+        let parallel = cosine.simd_gt(f32x8::ZERO).select(least, share.fast_min(covered));
+        let across = share * covered;
+        across + cosine.abs() * (parallel - across)
+    }
+}
+
 /// Nodes of bone that the burr may take some of, eight by eight.
 #[derive(Default)]
 pub(crate) struct Paid {
     along: Vec<f32>,
     apart: Vec<f32>,
-    /// How much of each node is bone.
+    /// As in [`Crossed`].
     share: Vec<f32>,
+    cosine: Vec<f32>,
+    /// How much of each node was taken before.
+    gone: Vec<f32>,
     /// What a node of bone costs there.
     price: Vec<f32>,
 }
@@ -201,22 +246,24 @@ pub(crate) struct Taken {
 impl Paid {
     pub fn with_capacity(limit: usize) -> Self {
         let room = || Vec::with_capacity(limit);
-        Self { along: room(), apart: room(), share: room(), price: room() }
+        Self { along: room(), apart: room(), share: room(), cosine: room(), gone: room(), price: room() }
     }
 
     pub fn clear(&mut self) {
         self.all().into_iter().for_each(Vec::clear);
     }
 
-    fn all(&mut self) -> [&mut Vec<f32>; 4] {
-        [&mut self.along, &mut self.apart, &mut self.share, &mut self.price]
+    fn all(&mut self) -> [&mut Vec<f32>; 6] {
+        let Self { along, apart, share, cosine, gone, price } = self;
+        [along, apart, share, cosine, gone, price]
     }
 
-    /// Adds the node in a lane of `place` of which `share` is bone.
+    /// Adds the node in a lane, of which so much is `gone`.
     #[inline]
-    pub fn push(&mut self, place: &Place, lane: usize, share: f32, price: f32) {
-        let (along, apart) = (place.along.as_array()[lane], place.apart.as_array()[lane]);
-        for (list, value) in self.all().into_iter().zip([along, apart, share, price]) {
+    pub fn push(&mut self, lane: usize, place: &Place, crossed: &Crossed, gone: f32x8, price: f32) {
+        let of = |all: f32x8| all.as_array()[lane];
+        let values = [of(place.along), of(place.apart), of(crossed.share), of(crossed.cosine), of(gone), price];
+        for (list, value) in self.all().into_iter().zip(values) {
             list.push(value);
         }
     }
@@ -239,10 +286,15 @@ impl Paid {
             list.as_chunks().0.iter()
         }
         let places = eights(&self.along).zip(eights(&self.apart));
-        for ((along, apart), (share, price)) in places.zip(eights(&self.share).zip(eights(&self.price))) {
+        let surfaces = eights(&self.share).zip(eights(&self.cosine));
+        let costs_of = eights(&self.gone).zip(eights(&self.price));
+        for (((along, apart), (share, cosine)), (gone, price)) in places.zip(surfaces).zip(costs_of) {
             let place = Place { along: f32x8::new(*along), apart: f32x8::new(*apart) };
-            let after = outside(place.depth(radius, way), radius);
-            let volume = (f32x8::new(*share) - after).fast_max(f32x8::ZERO);
+            let crossed = Crossed { share: f32x8::new(*share), cosine: f32x8::new(*cosine) };
+            // As it will be stored.
+            let depth = (place.depth(radius, way) * CUT_STEPS).round() * (1.0 / CUT_STEPS);
+            let taken = crossed.taken(covered(depth, radius));
+            let volume = (taken - f32x8::new(*gone)).fast_max(f32x8::ZERO);
             volumes += volume;
             costs += f32x8::new(*price) * volume;
         }
@@ -250,11 +302,11 @@ impl Paid {
     }
 }
 
-/// How much of a node is bone when it lies so deep in the cut of a burr of `radius` nodes.
+/// How much of a node a burr of `radius` nodes covers when it lies so deep in the cut.
 ///
 /// In a round hole that counts `π (R² + 1/12)` nodes² where there are `π R²`; a border that lies
 /// `1/(24 R)` further out makes up for it.
 #[inline]
-pub(crate) fn outside(depth: f32x8, radius: f32) -> f32x8 {
-    (0.5 + 1.0 / (24.0 * radius) - depth).fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
+pub(crate) fn covered(depth: f32x8, radius: f32) -> f32x8 {
+    (0.5 - 1.0 / (24.0 * radius) + depth).fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
 }

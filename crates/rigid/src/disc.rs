@@ -6,9 +6,9 @@
 //! ```text
 //! z = z₀ + ½ (k₁ a² + k₂ b²) ,   a² + b² ≤ radius²        k > 0: hollow
 //! ```
-//! Discs on the cut, which is a distance, are small and flat, across the slope of its quadratic
-//! B-spline. Slope and curvature of the density are from the quadric that fits best what lies
-//! within a voxel of the tangent plane:
+//! Slope and curvature of the cut, which is a distance, are those of its quadratic B-spline. Those
+//! of the density are from the quadric that fits best what lies within a voxel of the tangent
+//! plane:
 //! ```text
 //! minimise Σ w (h - iso + c₀ + g·d + ½ (c₁ a² + 2 c₂ a b + c₃ b²))²
 //! w = B(d) · max(0, 1 - (n·d)²)        d = (a, b, n·d): from x to the voxel,  n = g/|g|
@@ -43,8 +43,8 @@ const CLAMP_HU: f32 = 1000.0;
 const STAND_OUT: f32 = 0.05;
 /// Cosine of the most that a fit may turn the slope's own normal.
 const SAME: f32 = 0.8;
-/// Radius of a disc on the cut, cells. A wider one holds a ball in the mouth of a hole.
-const CUT_DISC: f32 = 0.1;
+/// Radius of a disc on the cut, cells.
+const CUT_DISC: f32 = 0.5;
 /// Density over the isovalue at which the surface is further than a disc reaches, HU.
 const FAR_HU: f32 = 800.0;
 /// Weight of flatness in the fit of a quadric, beside weights of the densities of about 1.
@@ -143,8 +143,8 @@ impl Disc {
         }
         let rough = -shape.slope / size;
         let bent = match field {
-            // A distance: its spline says it all, and on so small a disc nothing bends.
-            Field::Cut => return Self { centre: x, normal: rough, radius, ..Self::default() },
+            // A distance: its spline says it all.
+            Field::Cut => Some((rough, shape.bend(rough, size))),
             Field::Density if stride == solid.voxel() => {
                 // From the voxel before on the edge.
                 let before = cell.dot(step).rem_euclid(stride);

@@ -198,7 +198,7 @@ impl GodObjectSphere {
             left_mm: 0.0,
             sure: (Vec3::ZERO, 0.0),
             seen: None,
-            surface: LocalSurface::new(MAX_DISCS, config.disc_nodes),
+            surface: LocalSurface::new(tool.tip_radius_mm, MAX_DISCS, config.disc_nodes),
             clear: false,
             lean: Lean::new(if config.shaft { MAX_DISCS } else { 0 }, config.shaft_disc_voxels),
             near: InReach::with_capacity(3 * MAX_DISCS),

@@ -33,10 +33,10 @@ pub(crate) struct LocalSurface {
 }
 
 impl LocalSurface {
-    /// Room for `limit` discs of at most `radius`.
-    pub fn new(limit: usize, radius: f32) -> Self {
+    /// Room for `limit` discs of at most `radius`, around a tool of `tool_mm`.
+    pub fn new(tool_mm: f32, limit: usize, radius: f32) -> Self {
         let discs = Discs::new(limit, radius);
-        Self { nodes: Nodes::new(), discs, at: None, worn: false, disc: radius }
+        Self { nodes: Nodes::new(tool_mm), discs, at: None, worn: false, disc: radius }
     }
 
     /// The bone is another.
@@ -130,6 +130,7 @@ impl LocalSurface {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::nodes::clearance;
     use glam::IVec3;
     use trepan_volume::{CUT_STEPS, CUT_SURFACE, VoxelVolume};
 
@@ -149,11 +150,12 @@ mod tests {
                 }
             }
             drop(writer);
-            let (mut surface, mut out) = (LocalSurface::new(8192, 0.8), RigidStep::default());
+            let (mut surface, mut out) = (LocalSurface::new(1000.0, 8192, 0.8), RigidStep::default());
             assert!(surface.know(&bone, &Tool::burr(r), centre, (0.5, false), &mut out));
             let at = centre - surface.base();
             let discs = surface.shaped(at, radius + 0.5);
-            let off = discs.iter().map(|disc| (disc.centre.distance(at) - radius).abs()).fold(0.0, f32::max);
+            let wall = radius + clearance(bone.node_mm(), 1000.0);
+            let off = discs.iter().map(|disc| (disc.centre.distance(at) - wall).abs()).fold(0.0, f32::max);
             let tilt = |disc: &Disc| disc.normal.angle_between(at - disc.centre).to_degrees();
             let tilt = discs.iter().map(tilt).fold(0.0, f32::max);
             println!("{} discs in a ball of {radius} nodes: {off} nodes and {tilt} degrees off", discs.len());
@@ -174,7 +176,7 @@ mod tests {
             }
             let bone = BoneVolume::new(&ct, 400).unwrap();
             let tip = 13.0 * Vec3::new(0.3, 0.5, 0.7).normalize();
-            let (mut surface, mut out) = (LocalSurface::new(8192, 0.8), RigidStep::default());
+            let (mut surface, mut out) = (LocalSurface::new(1000.0, 8192, 0.8), RigidStep::default());
             assert!(surface.know(&bone, &Tool::burr(3.0), bone.node_at(tip), (0.5, false), &mut out));
             let (at, reach) = (bone.node_at(tip) - surface.base(), 3.0 / bone.node_mm());
             let seen = surface.shaped(at, reach + 0.5).iter().map(|disc| disc.way_to(at - disc.centre));

@@ -5,6 +5,18 @@ use crate::window::{Shown, Window};
 use glam::IVec3;
 use trepan_volume::BoneVolume;
 
+/// How far behind its surface a cut stops a tool, mm, at least: a burr would lock in its bore.
+const CLEARANCE_MM: f32 = 0.004;
+/// The same for tools of few nodes, nodes, times the square of the radius in nodes: what the
+/// splines are uncertain by.
+const CLEARANCE_NODES: f32 = 0.06;
+
+/// How far behind its surface a cut stops a tool of that radius, nodes.
+pub(crate) fn clearance(node_mm: f32, radius_mm: f32) -> f32 {
+    let of_nodes = node_mm / radius_mm.max(node_mm);
+    (CLEARANCE_NODES * of_nodes * of_nodes).max(CLEARANCE_MM / node_mm)
+}
+
 /// Two windows that show the same box of nodes.
 pub(crate) struct Nodes {
     cut: Window,
@@ -13,11 +25,15 @@ pub(crate) struct Nodes {
     stride: i32,
     /// Whether anything was cut nearby.
     near: bool,
+    /// Radius of the tool, mm.
+    radius_mm: f32,
 }
 
 impl Nodes {
-    pub fn new() -> Self {
-        Self { cut: Window::new(Shown::Cut), density: Window::new(Shown::Density), stride: 1, near: false }
+    /// For a tool of that radius.
+    pub fn new(radius_mm: f32) -> Self {
+        let [cut, density] = [Shown::Cut, Shown::Density].map(Window::new);
+        Self { cut, density, stride: 1, near: false, radius_mm }
     }
 
     /// Everything is to be read anew.
@@ -32,6 +48,7 @@ impl Nodes {
         self.stride = bone.cut_nodes();
         self.near = bone.is_cut_near(centre - half, centre + half);
         self.density.cover(bone, centre, half)?;
+        self.cut.clear(clearance(bone.node_mm(), self.radius_mm));
         self.cut.cover(bone, centre, half)
     }
 

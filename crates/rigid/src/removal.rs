@@ -19,10 +19,11 @@
 //! ([`cut_at`](trepan_volume::BoneVolume::cut_at)). So the cut is the burr's own shape, whatever
 //! the voxels.
 //! ```text
-//! Σ price (share before - share after s) node³ = earned        share of bone: ½ - d, cut to 0..1
+//! Σ price (taken after s - taken before) node³ = earned        covered: ½ + d, cut to 0..1
 //! ```
-//! Where the CT ends the bone, d is how far the density is under the isovalue, over its slope: a
-//! ramp of any width counts as bone up to the isovalue, and no further.
+//! A ball at whose surface a node lies d deep covers as much of it; where the CT ends the bone a
+//! part of that is taken. A density so far under the isovalue, over its slope, as a node is deep
+//! counts the same: a ramp of any width is bone up to the isovalue, and no further.
 //! What is earned and not yet cut stays for the next tick: a tick moves the cut by a micrometre,
 //! less than the proxy may stand before it, and a burr that forgot would never move. The ball goes
 //! on from where it has cut to, not from the proxy, so that what the contact is uncertain by does
@@ -30,8 +31,8 @@
 //!
 //! # Practice
 //! F = stiffness · depth, N, up to `max_load_n`. The same path gives the same bytes. A burr cuts in
-//! steps of 5 um; a step costs about 10 ns for each node within two of its front half. It cuts 4 um
-//! wider than it is, or it would lock in its own bore.
+//! steps of 5 um; a step costs about 10 ns for each node within two of its front half. Contact with
+//! what was cut begins 4 um behind its surface, or a burr would lock in its own bore.
 //!
 //! # Sources
 //! J. F. Archard, *Contact and rubbing of flat surfaces*, J. Appl. Phys. 24 (1953). Specific energy

@@ -15,6 +15,7 @@
 //! changes it is told ([`Window::eight_mut`]), what others change it finds by the versions of the
 //! bricks that it meets ([`Window::renew`]), a nanosecond each.
 
+use crate::eight::Vec3x8;
 use crate::rows::each;
 use glam::IVec3;
 use trepan_volume::{BRICK, BetweenScratch, BoneVolume, CUT_STEPS, CUT_SURFACE};
@@ -49,8 +50,8 @@ pub(crate) struct Window {
     filled: bool,
     /// Versions of the bricks that it meets; brick (i, j, k) lies at each index mod [`BRICKS`].
     seen: Vec<u32>,
-    /// Density from which a voxel is bone, HU.
-    isovalue: i16,
+    /// The value from which a cell is bone; with the cut, from which it is not.
+    border: i16,
 }
 
 impl Window {
@@ -59,12 +60,17 @@ impl Window {
         let read = Vec::with_capacity(1 << (3 * MAX_BITS));
         let scratch = BetweenScratch::new(if shown == Shown::Density { 1 << MAX_BITS } else { 0 });
         let (brick, low) = (BRICK as i32, IVec3::ZERO);
-        Self { shown, cells, read, scratch, brick, bits: 0, low, filled: false, seen, isovalue: 0 }
+        Self { shown, cells, read, scratch, brick, bits: 0, low, filled: false, seen, border: CUT_SURFACE }
     }
 
     /// Everything is to be read anew.
     pub fn forget(&mut self) {
         self.filled = false;
+    }
+
+    /// Makes the cut end bone so many nodes behind its surface.
+    pub fn clear(&mut self, nodes: f32) {
+        self.border = CUT_SURFACE - (nodes * CUT_STEPS).round() as i16;
     }
 
     /// Makes the window hold all voxels within `half` of `centre`. Returns the voxels read, or
@@ -80,9 +86,12 @@ impl Window {
         let mut low = self.low.clamp(centre + half + 1 - edge, centre - half);
         let far = (low - self.low).abs().max_element() >= edge;
         self.brick = BRICK as i32 * bone.cut_nodes();
-        if !self.filled || bits != self.bits || far || self.isovalue != bone.isovalue() {
+        if self.shown == Shown::Density && self.border != bone.isovalue() {
+            (self.filled, self.border) = (false, bone.isovalue());
+        }
+        if !self.filled || bits != self.bits || far {
             low = centre - edge / 2;
-            (self.bits, self.low, self.filled, self.isovalue) = (bits, low, true, bone.isovalue());
+            (self.bits, self.low, self.filled) = (bits, low, true);
             self.read(bone, low, low + edge);
             self.bricks(|window, brick| window.see(bone, brick));
             return Some((edge * edge * edge) as u32);
@@ -177,8 +186,8 @@ impl Window {
     #[inline]
     fn scaled(&self, value: i16) -> f32 {
         match self.shown {
-            Shown::Cut => f32::from(CUT_SURFACE - value) * (1000.0 / CUT_STEPS),
-            _ => f32::from(value) - f32::from(self.isovalue),
+            Shown::Cut => f32::from(self.border - value) * (1000.0 / CUT_STEPS),
+            Shown::Density => f32::from(value) - f32::from(self.border),
         }
     }
 
@@ -196,25 +205,25 @@ impl Window {
 
     /// The value from which a cell is bone; with the cut, from which it is not.
     pub fn border(&self) -> i16 {
-        if self.shown == Shown::Cut { CUT_SURFACE } else { self.isovalue }
+        self.border
     }
 
-    /// How steeply the values rise a cell at the eight cells along x from `cell`, which is at a
-    /// multiple of eight.
-    pub fn steepness(&self, cell: IVec3) -> f32x8 {
+    /// How the values rise a cell at the eight cells along x from `cell`, which is at a multiple of
+    /// eight.
+    pub fn rise(&self, cell: IVec3) -> Vec3x8 {
         let of = |step: IVec3| wide(self.eight(cell + step));
         let [a, b, c, d, e, f, g, h] = *self.eight(cell);
         let (before, after) = (self.at(cell - IVec3::X), self.at(cell + 8 * IVec3::X));
         let x = wide(&[b, c, d, e, f, g, h, after]) - wide(&[before, a, b, c, d, e, f, g]);
         let (y, z) = (of(IVec3::Y) - of(IVec3::NEG_Y), of(IVec3::Z) - of(IVec3::NEG_Z));
-        0.5 * (x * x + y * y + z * z).sqrt()
+        Vec3x8 { x, y, z } * f32x8::splat(0.5)
     }
 
     /// How far the eight cells along x from `cell`, which is at a multiple of eight, are over the
     /// border of bone, HU.
     #[inline]
     pub fn overs(&self, cell: IVec3) -> f32x8 {
-        wide(self.eight(cell)) - f32::from(self.isovalue)
+        wide(self.eight(cell)) - f32::from(self.border)
     }
 
     fn index_of_eight(&self, cell: IVec3) -> usize {

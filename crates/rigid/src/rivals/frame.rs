@@ -87,8 +87,8 @@ struct Framed<R> {
 /// the first tool pose.
 pub(crate) fn framed<R: Rival + 'static>(tool: &Tool, removal: RemovalLaw, rival: R) -> Box<dyn RigidContact> {
     let burr = Burr::new(removal, R::MAX_BITES);
-    let held =
-        Held { tool: *tool, proxy: Pose::IDENTITY, burr, nodes: Nodes::new(), bone: u64::MAX, cuts: false, dt_ms: 0.0 };
+    let nodes = Nodes::new(tool.tip_radius_mm);
+    let held = Held { tool: *tool, proxy: Pose::IDENTITY, burr, nodes, bone: u64::MAX, cuts: false, dt_ms: 0.0 };
     Box::new(Framed { rival, held, placed: false })
 }
 

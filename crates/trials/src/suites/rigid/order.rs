@@ -43,9 +43,9 @@ const FORM_MM: f64 = 6.0;
 const SMALL_MM: f64 = 2.0;
 /// Depth of a press, mm.
 const PRESS_MM: f64 = 0.5;
-/// Feed of the burr, mm a tick of 1 ms, and how deep it goes, mm.
+/// Feed of the burr, mm a tick of 1 ms, and how far it goes, mm: its depth has settled by then.
 const FEED_MM: f64 = 1e-3;
-const DEEP_MM: f64 = 7.0;
+const DEEP_MM: f64 = 9.0;
 /// Least orders, and the largest error on the finest voxels in the bore, mm.
 const SMOOTH_ORDER: f64 = 1.8;
 const BORE_ORDER: f64 = 1.5;

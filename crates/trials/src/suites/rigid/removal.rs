@@ -6,7 +6,7 @@
 //! ```text
 //! V = π h² (3r - h)/3 + l (r² acos((r - h)/r) - (r - h) √(2rh - h²))
 //! ```
-//! The stroke is so slow that a burr takes all that is in its way. A second burr is pressed with a
+//! The stroke is slow, and rests at its corner and its end: a burr takes all that is in its way. A second burr is pressed with a
 //! constant load; what it takes in a given time must not depend on the length of a tick.
 //!
 //! # Practice
@@ -97,13 +97,19 @@ fn swept_mm3() -> f64 {
 
 /// A slow stroke: what the method says it took and what is gone, mm³.
 fn stroke(method: &Method, normal: Vec3, times: &mut Vec<f64>) -> (f64, f64) {
+    // A third of the way down and two thirds across; before each next way, and at the end, it rests.
     const TICKS: usize = 6000;
+    const REST: usize = 500;
     let bone = voxels(EDGE, VOXEL_MM, |p| p.dot(normal.as_dvec3()));
     let before = volume_mm3(&bone);
     let mut contact = method.build(&Tool::burr(R as f32));
     let (across, mut out, mut said) = (normal.any_orthonormal_vector(), RigidStep::default(), 0.0);
     contact.reset(held(normal * R as f32, normal).world_from_tool);
-    for tick in 0..TICKS {
+    let way = (0..TICKS).flat_map(|tick| {
+        let rests = tick == TICKS / 3 || tick == TICKS - 1;
+        std::iter::repeat_n(tick, if rests { 1 + REST } else { 1 })
+    });
+    for tick in way {
         let sunk = (3.0 * tick as f64 / TICKS as f64).min(1.0) * SUNK_MM;
         let way = ((1.5 * tick as f64 / TICKS as f64 - 0.5).clamp(0.0, 1.0) - 0.5) * ACROSS_MM;
         let tip = normal * (R - sunk) as f32 + across * way as f32;
