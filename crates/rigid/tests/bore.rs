@@ -146,3 +146,22 @@ fn a_burr_that_fell_through_comes_out_again() {
         }
     }
 }
+
+/// A CT that ends at the bone's surface, on the border of a brick: a head that the scanner cut off.
+#[test]
+fn a_burr_drills_on_through_bone_at_the_end_of_the_ct() {
+    for (voxel_mm, edge) in [(0.5, 48), (1.0, 24), (0.5, 45)] {
+        let half_mm = 0.5 * edge as f32 * voxel_mm;
+        let corner = Vec3::splat(0.5 * voxel_mm - half_mm);
+        let bone = BoneVolume::new(&VoxelVolume::isotropic([edge; 3], corner, voxel_mm, 1500i16), ISO).unwrap();
+        let mut contact = Method::RECOMMENDED.build(&Tool::burr(RADIUS_MM));
+        let device = |ms: usize| Vec3::Z * (half_mm + RADIUS_MM - 1e-3 * ms as f32);
+        contact.reset(Pose::from_translation(device(0)));
+        let mut out = RigidStep::default();
+        for ms in 0..4000 {
+            contact.step(&bone, &ToolState::at(Pose::from_translation(device(ms))), true, 1.0, &mut out);
+        }
+        let depth_mm = out.manifold.depth_mm;
+        assert!(depth_mm < 1.0, "in voxels of {voxel_mm} mm the burr is {depth_mm} mm behind");
+    }
+}

@@ -45,6 +45,8 @@ const RAMP_HU: f32 = 1000.0;
 pub(super) struct CutField {
     /// Nodes along a voxel's edge.
     pub nodes: i32,
+    /// Bricks along each axis, one beyond the grid on either side among them: near the end of a CT
+    /// the surface of a cut needs nodes beyond it.
     bricks: IVec3,
     /// For each brick its place in the pool and 1, or 0.
     table: Box<[AtomicU32]>,
@@ -58,7 +60,7 @@ impl CutField {
     /// Nothing is cut of a grid whose bricks of voxels hold bone in `solid` of them.
     pub fn new(dims: [usize; 3], spacing_mm: f32, solid: usize) -> Self {
         let nodes = (spacing_mm / NODE_MM - 1e-3).ceil().clamp(1.0, 64.0) as i32;
-        let bricks = IVec3::from(dims.map(|n| (n * nodes as usize).div_ceil(BRICK) as i32));
+        let bricks = IVec3::from(dims.map(|n| (n * nodes as usize).div_ceil(BRICK) as i32)) + 2;
         let all = bricks.to_array().map(|n| n as usize).iter().product::<usize>();
         // A cut reaches into the bricks beside the bone.
         let pool = (solid * (nodes as usize).pow(3)).saturating_mul(4).min(all).min(MOST_BRICKS);
@@ -78,6 +80,7 @@ impl CutField {
     }
 
     fn index(&self, brick: IVec3) -> Option<usize> {
+        let brick = brick + 1;
         let inside = brick.cmpge(IVec3::ZERO).all() && brick.cmplt(self.bricks).all();
         inside.then(|| (brick.x + self.bricks.x * (brick.y + self.bricks.y * brick.z)) as usize)
     }
@@ -89,8 +92,8 @@ impl CutField {
         place.checked_sub(1)
     }
 
-    /// The same, taking a place for a brick that has none; `None` outside the grid and where the
-    /// pool is used up.
+    /// The same, taking a place for a brick that has none; `None` beyond all bricks and where
+    /// the pool is used up.
     fn find_or_take(&self, brick: IVec3) -> Option<usize> {
         let index = self.index(brick)?;
         if let Some(place) = (self.table[index].load(Ordering::Acquire) as usize).checked_sub(1) {
@@ -113,7 +116,7 @@ impl CutField {
     pub fn low_of(&self, place: usize) -> IVec3 {
         let [bx, by, _] = self.bricks.to_array();
         let at = self.owners[place].load(Ordering::Relaxed) as i32;
-        BRICK as i32 * IVec3::new(at % bx, at / bx % by, at / (bx * by))
+        BRICK as i32 * (IVec3::new(at % bx, at / bx % by, at / (bx * by)) - 1)
     }
 
     #[inline]
@@ -183,7 +186,7 @@ impl BoneVolume {
             return false;
         }
         let (first, last) = (low >> BRICK.trailing_zeros(), high >> BRICK.trailing_zeros());
-        let (first, last) = (first.max(IVec3::ZERO), last.min(self.cut.bricks - 1));
+        let (first, last) = (first.max(IVec3::NEG_ONE), last.min(self.cut.bricks - 2));
         let mut all = (first.z..=last.z).flat_map(|k| (first.y..=last.y).map(move |j| (j, k)));
         all.any(|(j, k)| (first.x..=last.x).any(|i| self.cut.find(IVec3::new(i, j, k)).is_some()))
     }
@@ -215,9 +218,9 @@ impl BoneVolume {
         CutWriter { bone: self, brick: IVec3::MIN, place: None }
     }
 
-    /// The brick of voxels in which a node lies.
+    /// The brick of voxels in which a node lies, or the nearest one.
     pub(super) fn brick_of_node(&self, node: IVec3) -> usize {
-        self.brick_of((node / self.cut.nodes).min(self.last()))
+        self.brick_of((node / self.cut.nodes).clamp(IVec3::ZERO, self.last()))
     }
 }
 
@@ -230,8 +233,8 @@ pub struct CutWriter<'a> {
 }
 
 impl CutWriter<'_> {
-    /// Sets the value of a node. Returns false outside the grid and where no memory is left: then
-    /// nothing changes.
+    /// Sets the value of a node. Returns false beyond the grid and the brick next to it, and where
+    /// no memory is left: then nothing changes.
     #[inline]
     pub fn set(&mut self, node: IVec3, value: i16) -> bool {
         let lane = node.x & 7;
@@ -239,8 +242,8 @@ impl CutWriter<'_> {
     }
 
     /// Sets those of the eight nodes along x from `node` on that have a bit in `which`: fast where
-    /// it has all eight. The first is at a multiple of eight. Returns false outside the grid and
-    /// where no memory is left: then nothing changes.
+    /// it has all eight. The first is at a multiple of eight. Returns false beyond the grid and
+    /// the brick next to it, and where no memory is left: then nothing changes.
     #[inline]
     pub fn set_eight(&mut self, node: IVec3, values: [i16; 8], which: u32) -> bool {
         debug_assert_eq!(node.x % 8, 0);
@@ -359,7 +362,8 @@ mod tests {
                 .all(|v| snapshot.get(v.to_array().map(|i| i as usize)) == Some(bone.hu(v)))
         );
         let mut writer = bone.cut_writer();
-        assert!(!writer.set(IVec3::splat(-1), CUT_SURFACE) && !writer.set(IVec3::new(40, 0, 0), CUT_SURFACE));
+        assert!(!writer.set(IVec3::splat(-9), CUT_SURFACE) && !writer.set(IVec3::new(40, 0, 0), CUT_SURFACE));
+        assert!(writer.set(IVec3::splat(-1), CUT_SURFACE) && bone.cut_at(IVec3::splat(-1)) == CUT_SURFACE);
     }
 
     #[test]

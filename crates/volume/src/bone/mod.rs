@@ -262,10 +262,12 @@ impl BoneVolume {
         self.brick_index(brick).map_or(0, |at| self.versions[at].load(Ordering::Acquire))
     }
 
-    /// Version of the cut in a brick alone.
+    /// Version of the cut in a brick alone; beyond the grid that of the nearest brick.
     #[inline]
     pub fn cut_version(&self, brick: IVec3) -> u32 {
-        self.brick_index(brick).map_or(0, |at| self.cut_versions[at].load(Ordering::Acquire))
+        let last = IVec3::from(self.bricks.map(|n| n as i32)) - 1;
+        let nearest = brick.clamp(IVec3::ZERO, last);
+        self.brick_index(nearest).map_or(0, |at| self.cut_versions[at].load(Ordering::Acquire))
     }
 
     fn brick_index(&self, brick: IVec3) -> Option<usize> {

@@ -79,7 +79,9 @@ impl BoneVolume {
                 None => kept >= self.isovalue && !self.is_bone(at),
                 Some(place) => {
                     let now = self.cut.values(place)[n].load(Ordering::Relaxed);
-                    kept < CUT_SURFACE && now >= CUT_SURFACE && self.ct(at / self.cut.nodes) >= self.isovalue
+                    kept < CUT_SURFACE
+                        && now >= CUT_SURFACE
+                        && self.ct(at.div_euclid(IVec3::splat(self.cut.nodes))) >= self.isovalue
                 }
             };
             gone && taken(world(at))
